@@ -1,0 +1,145 @@
+//! Everything that can go wrong in this crate.
+
+use std::path::PathBuf;
+
+use crate::npy::NpyError;
+
+/// Errors of grids, fields, shapes and files, each with the numbers needed to act on it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A periodic grid needs at least two cells per side.
+    #[error("a periodic grid needs at least 2 cells per side, got {cells}")]
+    GridTooSmall {
+        /// Requested cells per side.
+        cells: usize,
+    },
+    /// The number of nodes does not fit in memory addresses.
+    #[error("{cells}^{dimension} nodes cannot be addressed on this machine; use fewer cells")]
+    GridTooLarge {
+        /// Requested cells per side.
+        cells: usize,
+        /// Number of axes.
+        dimension: usize,
+    },
+    /// `n * side` cells per side is not a whole number.
+    #[error(
+        "{cells_per_unit} cells per unit length on a side of {side} give {cells} cells; \
+         choose values whose product is a whole number"
+    )]
+    FractionalCells {
+        /// Requested cells per unit length.
+        cells_per_unit: usize,
+        /// Side of the box.
+        side: f64,
+        /// Their product.
+        cells: f64,
+    },
+    /// A number is outside the range in which the formula makes sense.
+    #[error("{name} = {value} is not allowed: it must be {requirement}")]
+    InvalidParameter {
+        /// What the number is.
+        name: &'static str,
+        /// The number.
+        value: f64,
+        /// The condition it violates.
+        requirement: &'static str,
+    },
+    /// The number of values is not the number of nodes.
+    #[error("the grid has {expected} nodes, but {actual} values were given")]
+    ValueCount {
+        /// Nodes of the grid.
+        expected: usize,
+        /// Values given.
+        actual: usize,
+    },
+    /// A nodal value is NaN or infinite.
+    #[error("the value at node {index} is {value}; all nodal values must be finite")]
+    NonFinite {
+        /// Row-major index of the first such node.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// Two fields live on different grids.
+    #[error(
+        "the grids differ: {left_cells} cells on a side of {left_side} against {right_cells} \
+         on {right_side} (or their origins differ)"
+    )]
+    GridMismatch {
+        /// Cells per side of the first grid.
+        left_cells: usize,
+        /// Side of the first grid.
+        left_side: f64,
+        /// Cells per side of the second grid.
+        right_cells: usize,
+        /// Side of the second grid.
+        right_side: f64,
+    },
+    /// A point lies outside the box spanned by the nodes.
+    #[error("the point {point:?} is outside the box spanned by the nodes")]
+    PointOutside {
+        /// The point.
+        point: Vec<f64>,
+    },
+    /// A list of named arrays is unusable.
+    #[error("array name {name:?} cannot be written: {reason}")]
+    ArrayName {
+        /// The offending name.
+        name: String,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+    /// Nothing to write.
+    #[error("no arrays were given to write to {path}", path = path.display())]
+    NoArrays {
+        /// Destination.
+        path: PathBuf,
+    },
+    /// The operating system refused.
+    #[error("could not {action} {path}", path = path.display())]
+    Io {
+        /// What was attempted.
+        action: &'static str,
+        /// On which file.
+        path: PathBuf,
+        /// Why it failed.
+        source: std::io::Error,
+    },
+    /// A file is not a usable NPY file.
+    #[error("{path} cannot be read as a field", path = path.display())]
+    Npy {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: NpyError,
+    },
+}
+
+/// Accepts finite positive numbers.
+pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64, Error> {
+    if value.is_finite() && value > 0.0 {
+        Ok(value)
+    } else {
+        Err(Error::InvalidParameter {
+            name,
+            value,
+            requirement: "finite and positive",
+        })
+    }
+}
+
+/// Accepts vectors of finite numbers.
+pub(crate) fn finite<const D: usize>(
+    name: &'static str,
+    vector: [f64; D],
+) -> Result<[f64; D], Error> {
+    match vector.into_iter().find(|v| !v.is_finite()) {
+        None => Ok(vector),
+        Some(value) => Err(Error::InvalidParameter {
+            name,
+            value,
+            requirement: "finite",
+        }),
+    }
+}

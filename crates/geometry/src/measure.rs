@@ -1,0 +1,230 @@
+//! Norms, perimeter, enclosed volume and extent of fields.
+//!
+//! Sums run in parallel over fixed chunks, so that results do not depend on the number of threads.
+
+use crate::error::positive;
+use crate::profile::profile_variable;
+use crate::{Error, Field, Grid, reduce, vector};
+
+/// `L2` norm `sqrt(h^D sum u^2)`: the trapezoidal rule on the periodic box, not a mean.
+pub fn l2_norm<const D: usize>(u: &Field<D>) -> f64 {
+    let v = u.values();
+    (u.grid().cell_volume() * reduce::sum(v.len(), |i| v[i] * v[i])).sqrt()
+}
+
+/// `L2` norm of the difference.
+///
+/// # Errors
+/// Both fields must live on the same grid.
+pub fn l2_distance<const D: usize>(a: &Field<D>, b: &Field<D>) -> Result<f64, Error> {
+    a.grid().same_as(b.grid())?;
+    let (v, w) = (a.values(), b.values());
+    let sum = reduce::sum(v.len(), |i| (v[i] - w[i]) * (v[i] - w[i]));
+    Ok((a.grid().cell_volume() * sum).sqrt())
+}
+
+/// Maximum norm over the nodes; NaN if a value is.
+pub fn linf<const D: usize>(u: &Field<D>) -> f64 {
+    u.values()
+        .iter()
+        .fold(0.0, |largest, v| vector::max(largest, v.abs()))
+}
+
+/// Maximum norm of the difference.
+///
+/// # Errors
+/// Both fields must live on the same grid.
+pub fn linf_distance<const D: usize>(a: &Field<D>, b: &Field<D>) -> Result<f64, Error> {
+    Ok(linf(&a.zip_map(b, |v, w| v - w)?))
+}
+
+/// Mean of the nodal values.
+pub fn mean<const D: usize>(u: &Field<D>) -> f64 {
+    let v = u.values();
+    reduce::sum(v.len(), |i| v[i]) / v.len() as f64
+}
+
+/// Perimeter `P_eps[u] = 1/2 integral of eps |grad u|^2 + Psi(u)/eps`, `Psi(u) = 9/16 (1-u^2)^2`.
+///
+/// For phase fields it tends to the length (area in 3D) of the interface as `eps -> 0`; at a
+/// sphere of radius `r` in 3D the excess is `4 pi * 0.573 eps^2`, at a circle it is exponentially
+/// small.
+///
+/// Discretisation: along each axis the derivative at the middle of an edge is the fourth-order
+/// difference `(27 (u_1 - u_0) - (u_2 - u_-1)) / (24 h)`; squares are summed over the
+/// edges, and the double well over the nodes, with weight `h^D`. The sums are spectrally accurate
+/// on a periodic grid, so the error is `O(h^4)` at fixed `eps`: a relative 1e-4 at `eps = 2h`.
+///
+/// # Errors
+/// `eps` must be finite and positive.
+pub fn perimeter<const D: usize>(u: &Field<D>, eps: f64) -> Result<f64, Error> {
+    positive("eps", eps)?;
+    let (grid, v) = (*u.grid(), u.values());
+    let h = grid.spacing();
+    let density = |index: usize| {
+        let well = 1.0 - v[index] * v[index];
+        let node = grid.multi_index(index);
+        let gradient: f64 = (0..D)
+            .map(|axis| edge_derivative(&grid, v, node, axis).powi(2))
+            .sum();
+        0.5 * (eps / (h * h) * gradient + 0.5625 * well * well / eps)
+    };
+    Ok(grid.cell_volume() * reduce::sum(v.len(), density))
+}
+
+/// Fourth-order difference, times `h`, at the middle of the edge from `node` along `axis`.
+fn edge_derivative<const D: usize>(
+    grid: &Grid<D>,
+    values: &[f64],
+    node: [usize; D],
+    axis: usize,
+) -> f64 {
+    // `index` wraps around, so that stepping back by one is stepping forward by N - 1.
+    let at = |step: usize| {
+        let mut shifted = node;
+        shifted[axis] += step;
+        values[grid.index(shifted)]
+    };
+    (27.0 * (at(1) - at(0)) - (at(2) - at(grid.cells() - 1))) / 24.0
+}
+
+/// Area or volume `integral of (1 + u)/2`, positive inside.
+///
+/// For the optimal profile on a flat interface it is exact; curvature adds `O(eps^2)`:
+/// `4 pi^3/27 eps^2` at a circle, `16 pi^3/27 r eps^2` at a sphere of radius `r`. See
+/// [`zero_set_volume`] for a value without this excess.
+pub fn enclosed_volume<const D: usize>(u: &Field<D>) -> f64 {
+    let v = u.values();
+    u.grid().cell_volume() * reduce::sum(v.len(), |i| 0.5 * (1.0 + v[i]))
+}
+
+/// Area or volume of `{u > 0}`, resolved below the size of a cell.
+///
+/// Every cell is cut into `D!` simplices along its main diagonal (Kuhn's triangulation), on each
+/// of which `atanh u`, which is nearly the distance, is interpolated linearly; the volume of
+/// the positive part is then exact. The error is `O(h^2)`, without a contribution of `eps`.
+pub fn zero_set_volume<const D: usize>(u: &Field<D>) -> f64 {
+    let (grid, v) = (*u.grid(), u.values());
+    let orders = permutations::<D>();
+    let cell = |index: usize| {
+        let node = grid.multi_index(index);
+        let corner = |bits: usize| {
+            let upper = std::array::from_fn(|axis| node[axis] + (bits >> axis & 1));
+            v[grid.index(upper)]
+        };
+        let inside = (0..1_usize << D).filter(|&bits| corner(bits) > 0.0).count();
+        if inside == 0 || inside == 1 << D {
+            return f64::from(inside != 0);
+        }
+        let simplices = orders.iter().map(|order| {
+            // From the first corner to the opposite one, one axis after the other.
+            let mut bits = 0;
+            let mut vertices = vec![profile_variable(corner(0))];
+            for axis in order {
+                bits |= 1 << axis;
+                vertices.push(profile_variable(corner(bits)));
+            }
+            positive_fraction(&mut vertices)
+        });
+        simplices.sum::<f64>() / orders.len() as f64
+    };
+    grid.cell_volume() * reduce::sum(v.len(), cell)
+}
+
+/// All orders of the axes.
+fn permutations<const D: usize>() -> Vec<[usize; D]> {
+    fn extend<const D: usize>(depth: usize, order: &mut [usize; D], all: &mut Vec<[usize; D]>) {
+        if depth == D {
+            all.push(*order);
+            return;
+        }
+        for i in depth..D {
+            order.swap(depth, i);
+            extend(depth + 1, order, all);
+            order.swap(depth, i);
+        }
+    }
+    let mut all = Vec::new();
+    extend(0, &mut std::array::from_fn(|axis| axis), &mut all);
+    all
+}
+
+/// Fraction of a simplex in which the linear function with these vertex values is positive.
+///
+/// Splits the simplex at the zero of an edge with values of both signs: in each half that vertex
+/// has the value zero, so the recursion ends when one sign is left.
+fn positive_fraction(values: &mut [f64]) -> f64 {
+    let above = values.iter().position(|&v| v > 0.0);
+    let below = values.iter().position(|&v| v < 0.0);
+    let (Some(above), Some(below)) = (above, below) else {
+        return f64::from(above.is_some());
+    };
+    let (high, low) = (values[above], values[below]);
+    let share = high / (high - low);
+    values[below] = 0.0;
+    let near_high = positive_fraction(values);
+    (values[above], values[below]) = (0.0, low);
+    let near_low = positive_fraction(values);
+    values[above] = high;
+    share * near_high + (1.0 - share) * near_low
+}
+
+/// An axis-parallel box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoundingBox<const D: usize> {
+    /// Smallest coordinates.
+    pub lower: [f64; D],
+    /// Largest coordinates.
+    pub upper: [f64; D],
+}
+
+impl<const D: usize> BoundingBox<D> {
+    /// Extent along each axis.
+    pub fn extent(&self) -> [f64; D] {
+        std::array::from_fn(|axis| self.upper[axis] - self.lower[axis])
+    }
+
+    /// The middle.
+    pub fn centre(&self) -> [f64; D] {
+        std::array::from_fn(|axis| 0.5 * (self.lower[axis] + self.upper[axis]))
+    }
+}
+
+/// Bounding box of `{u > 0}`, or `None` if no node is inside.
+///
+/// The ends come from linear interpolation of `atanh u` along the grid lines, so they are
+/// accurate to `O(h^2)` at a smooth interface. The grid is treated as a picture: it does not wrap.
+pub fn bounding_box<const D: usize>(u: &Field<D>) -> Option<BoundingBox<D>> {
+    let (grid, v) = (u.grid(), u.values());
+    let (mut lower, mut upper) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
+    for (index, &value) in v.iter().enumerate().filter(|(_, value)| **value > 0.0) {
+        let node = grid.multi_index(index);
+        let inside = profile_variable(value);
+        for axis in 0..D {
+            let here = grid.coordinate(axis, node[axis]);
+            // How far the interface is towards a neighbour outside, if that one is.
+            let reach = |neighbour: usize| {
+                let outside = profile_variable(v[neighbour]);
+                if outside > 0.0 {
+                    0.0
+                } else {
+                    grid.spacing() * inside / (inside - outside)
+                }
+            };
+            let stride = grid.stride(axis);
+            let back = if node[axis] > 0 {
+                reach(index - stride)
+            } else {
+                0.0
+            };
+            let ahead = if node[axis] + 1 < grid.cells() {
+                reach(index + stride)
+            } else {
+                0.0
+            };
+            lower[axis] = lower[axis].min(here - back);
+            upper[axis] = upper[axis].max(here + ahead);
+        }
+    }
+    (lower[0] <= upper[0]).then_some(BoundingBox { lower, upper })
+}

@@ -1,0 +1,411 @@
+//! Fields as `NumPy` arrays (`.npy`), `float64`, C order, shape `(N, ..., N)`.
+//!
+//! An NPY file holds the values but not the box: the reader is told how to make the grid from the
+//! number of cells it finds.
+//!
+//! ```
+//! use geometry::{Field, Grid, npy};
+//!
+//! # let folder = tempfile::tempdir()?;
+//! # let path = folder.path().join("u.npy");
+//! let u = Field::from_fn(Grid::<2>::centred(16, 2.0)?, |[x, y]| x * y);
+//! npy::write(&path, &u)?;
+//! let v = npy::read(&path, |cells| Grid::<2>::centred(cells, 2.0))?;
+//! assert_eq!(u, v);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! The header is parsed here and not by a general reader, so that no file, however broken, can
+//! cause more than a typed error: nothing is allocated on the word of a header.
+
+use std::path::Path;
+
+use crate::file::write_atomically;
+use crate::{Error, Field, Grid};
+
+const MAGIC: &[u8; 6] = b"\x93NUMPY";
+/// The header is padded so that the data start at a multiple of this.
+const ALIGNMENT: usize = 64;
+
+/// What is wrong with an NPY file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NpyError {
+    /// The magic bytes are missing.
+    #[error("this is not an NPY file (it does not begin with \\x93NUMPY)")]
+    NotNpy,
+    /// A version of the format that does not exist yet.
+    #[error("NPY format {major}.{minor} is not supported; use 1.0, 2.0 or 3.0")]
+    Version {
+        /// Major version.
+        major: u8,
+        /// Minor version.
+        minor: u8,
+    },
+    /// The header is not the dictionary that the format prescribes.
+    #[error("the header is malformed at byte {position} of its text: expected {expected}")]
+    Header {
+        /// Where parsing stopped.
+        position: usize,
+        /// What should have come.
+        expected: &'static str,
+    },
+    /// The element type is not a floating-point number of 4 or 8 bytes.
+    #[error("elements have type {found}; save the array as float64 (float32 is accepted too)")]
+    DataType {
+        /// The type as written in the header.
+        found: String,
+    },
+    /// The array has the wrong number of axes.
+    #[error("the array has shape {shape:?}, but {expected} axes are needed")]
+    Rank {
+        /// Axes needed.
+        expected: usize,
+        /// Shape found.
+        shape: Vec<u64>,
+    },
+    /// The sides of the array differ.
+    #[error("the array has shape {shape:?}, but all its sides must be equal")]
+    NotCubical {
+        /// Shape found.
+        shape: Vec<u64>,
+    },
+    /// The file ends early, or goes on after the data.
+    #[error("the file has {found} bytes where {expected} are needed: truncated, or not one array")]
+    Length {
+        /// Bytes according to the header; saturates at `u64::MAX`.
+        expected: u64,
+        /// Bytes found.
+        found: u64,
+    },
+    /// A value is NaN or infinite.
+    #[error("element {index} (row-major) is {value}; all values must be finite")]
+    NonFinite {
+        /// Row-major index of the first one.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+}
+
+/// Writes a field, atomically (see [`write_atomically`]).
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn write<const D: usize>(path: impl AsRef<Path>, field: &Field<D>) -> Result<(), Error> {
+    let header = header(&field.grid().shape());
+    write_atomically(path, |out| {
+        out.write_all(&header)?;
+        field
+            .values()
+            .iter()
+            .try_for_each(|value| out.write_all(&value.to_le_bytes()))
+    })
+}
+
+/// Reads a field; `grid` makes the grid from the number of cells per side.
+///
+/// `float32` values are widened; both byte orders and Fortran order are understood.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Npy`] for a wrong type, rank or shape, for a truncated or overlong file
+/// and for values that are not finite; what `grid` returns; [`Error::ValueCount`] if it makes a
+/// grid of another size.
+pub fn read<const D: usize>(
+    path: impl AsRef<Path>,
+    grid: impl FnOnce(usize) -> Result<Grid<D>, Error>,
+) -> Result<Field<D>, Error> {
+    let path = path.as_ref();
+    let bytes = std::fs::read(path).map_err(|source| Error::Io {
+        action: "read",
+        path: path.into(),
+        source,
+    })?;
+    let (cells, values) = decode::<D>(&bytes).map_err(|source| Error::Npy {
+        path: path.into(),
+        source,
+    })?;
+    Field::from_values(grid(cells)?, values)
+}
+
+/// Magic, version 1.0, and the dictionary, padded to the alignment.
+fn header(shape: &[usize]) -> Vec<u8> {
+    let sides: Vec<String> = shape.iter().map(ToString::to_string).collect();
+    // A tuple of one element needs its comma.
+    let comma = if shape.len() == 1 { "," } else { "" };
+    let mut text = format!(
+        "{{'descr': '<f8', 'fortran_order': False, 'shape': ({}{comma}), }}",
+        sides.join(", ")
+    );
+    let prefix = MAGIC.len() + 4;
+    let padded = (prefix + text.len() + 1).next_multiple_of(ALIGNMENT) - prefix;
+    text.extend(std::iter::repeat_n(' ', padded - text.len() - 1));
+    text.push('\n');
+    let length = u16::try_from(padded).expect("a header of a few axes is short");
+    [
+        MAGIC.as_slice(),
+        &[1, 0],
+        &length.to_le_bytes(),
+        text.as_bytes(),
+    ]
+    .concat()
+}
+
+/// Cells per side and values in C order.
+///
+/// # Errors
+/// See [`read`].
+pub fn decode<const D: usize>(bytes: &[u8]) -> Result<(usize, Vec<f64>), NpyError> {
+    let (header, data) = split(bytes)?;
+    let header = Header::parse(header)?;
+    let element = Element::parse(&header.data_type)?;
+    let shape = header.shape;
+    if shape.len() != D {
+        return Err(NpyError::Rank { expected: D, shape });
+    }
+    let side = shape.first().copied().unwrap_or(0);
+    if shape.iter().any(|&s| s != side) {
+        return Err(NpyError::NotCubical { shape });
+    }
+    let count = shape
+        .iter()
+        .try_fold(1_u64, |product, &s| product.checked_mul(s));
+    let expected = count.and_then(|count| count.checked_mul(element.size as u64));
+    if expected != Some(data.len() as u64) {
+        let before = (bytes.len() - data.len()) as u64;
+        return Err(NpyError::Length {
+            expected: expected.unwrap_or(u64::MAX).saturating_add(before),
+            found: bytes.len() as u64,
+        });
+    }
+    let stored: Vec<f64> = data
+        .chunks_exact(element.size)
+        .map(|b| element.decode(b))
+        .collect();
+    let cells = side as usize;
+    let values = if header.fortran_order {
+        (0..stored.len())
+            .map(|index| stored[reversed::<D>(index, cells)])
+            .collect()
+    } else {
+        stored
+    };
+    match values.iter().enumerate().find(|(_, v)| !v.is_finite()) {
+        None => Ok((cells, values)),
+        Some((index, &value)) => Err(NpyError::NonFinite { index, value }),
+    }
+}
+
+/// Position in Fortran order of the element at `index` in C order.
+fn reversed<const D: usize>(index: usize, cells: usize) -> usize {
+    let digits = (0..D).scan(index, |rest, _| {
+        let digit = *rest % cells;
+        *rest /= cells;
+        Some(digit)
+    });
+    digits.fold(0, |position, digit| position * cells + digit)
+}
+
+/// Separates the text of the header from the data.
+fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), NpyError> {
+    let rest = bytes.strip_prefix(MAGIC).ok_or(NpyError::NotNpy)?;
+    let truncated = |expected: usize| NpyError::Length {
+        expected: expected as u64,
+        found: bytes.len() as u64,
+    };
+    let (version, rest) = rest.split_first_chunk::<2>().ok_or(truncated(8))?;
+    let (length, rest) = match version {
+        [1, 0] => {
+            let (length, rest) = rest.split_first_chunk::<2>().ok_or(truncated(10))?;
+            (usize::from(u16::from_le_bytes(*length)), rest)
+        }
+        [2 | 3, 0] => {
+            let (length, rest) = rest.split_first_chunk::<4>().ok_or(truncated(12))?;
+            (u32::from_le_bytes(*length) as usize, rest)
+        }
+        &[major, minor] => return Err(NpyError::Version { major, minor }),
+    };
+    let before = bytes.len() - rest.len();
+    rest.split_at_checked(length)
+        .ok_or(truncated(before.saturating_add(length)))
+}
+
+/// Size and byte order of an element.
+#[derive(Clone, Copy)]
+struct Element {
+    size: usize,
+    big_endian: bool,
+}
+
+impl Element {
+    fn parse(data_type: &str) -> Result<Self, NpyError> {
+        let native_big = cfg!(target_endian = "big");
+        let (big_endian, kind) = match data_type.split_at_checked(1) {
+            Some(("<", kind)) => (false, kind),
+            Some((">", kind)) => (true, kind),
+            Some(("=", kind)) => (native_big, kind),
+            _ => (native_big, data_type),
+        };
+        let size = match kind {
+            "f8" => 8,
+            "f4" => 4,
+            _ => {
+                return Err(NpyError::DataType {
+                    found: data_type.into(),
+                });
+            }
+        };
+        Ok(Self { size, big_endian })
+    }
+
+    fn decode(self, bytes: &[u8]) -> f64 {
+        // As bits in the low bytes of one integer, whatever the order and size.
+        let push = |bits: u64, byte: &u8| bits << 8 | u64::from(*byte);
+        let bits = if self.big_endian {
+            bytes.iter().fold(0, push)
+        } else {
+            bytes.iter().rev().fold(0, push)
+        };
+        if self.size == 8 {
+            f64::from_bits(bits)
+        } else {
+            f64::from(f32::from_bits(bits as u32))
+        }
+    }
+}
+
+/// The three entries of the dictionary.
+struct Header {
+    data_type: String,
+    fortran_order: bool,
+    shape: Vec<u64>,
+}
+
+impl Header {
+    fn parse(text: &[u8]) -> Result<Self, NpyError> {
+        let mut cursor = Cursor { text, position: 0 };
+        let (mut data_type, mut fortran_order, mut shape) = (None, None, None);
+        cursor.expect(b'{', "{")?;
+        while !cursor.take(b'}') {
+            let key = cursor.string()?;
+            cursor.expect(b':', ":")?;
+            match key.as_str() {
+                "descr" => data_type = Some(cursor.data_type()?),
+                "fortran_order" => fortran_order = Some(cursor.boolean()?),
+                "shape" => shape = Some(cursor.tuple()?),
+                _ => return Err(cursor.error("the key descr, fortran_order or shape")),
+            }
+            if !cursor.take(b',') && cursor.peek() != Some(b'}') {
+                return Err(cursor.error(", or }"));
+            }
+        }
+        if cursor.peek().is_some() {
+            return Err(cursor.error("nothing after }"));
+        }
+        Ok(Self {
+            data_type: data_type.ok_or(cursor.error("the key descr"))?,
+            fortran_order: fortran_order.ok_or(cursor.error("the key fortran_order"))?,
+            shape: shape.ok_or(cursor.error("the key shape"))?,
+        })
+    }
+}
+
+/// Reads the subset of Python literals that NPY headers use.
+struct Cursor<'a> {
+    text: &'a [u8],
+    position: usize,
+}
+
+impl Cursor<'_> {
+    fn error(&self, expected: &'static str) -> NpyError {
+        NpyError::Header {
+            position: self.position,
+            expected,
+        }
+    }
+
+    /// The next byte that is not white space.
+    fn peek(&mut self) -> Option<u8> {
+        while self
+            .text
+            .get(self.position)
+            .is_some_and(u8::is_ascii_whitespace)
+        {
+            self.position += 1;
+        }
+        self.text.get(self.position).copied()
+    }
+
+    fn take(&mut self, byte: u8) -> bool {
+        let found = self.peek() == Some(byte);
+        self.position += usize::from(found);
+        found
+    }
+
+    fn expect(&mut self, byte: u8, name: &'static str) -> Result<(), NpyError> {
+        if self.take(byte) {
+            Ok(())
+        } else {
+            Err(self.error(name))
+        }
+    }
+
+    fn string(&mut self) -> Result<String, NpyError> {
+        let quote = self.peek().filter(|q| matches!(q, b'\'' | b'"'));
+        let quote = quote.ok_or(self.error("a quoted string"))?;
+        let rest = &self.text[self.position + 1..];
+        let length = rest.iter().position(|&b| b == quote);
+        let length = length.ok_or(self.error("a quoted string that ends"))?;
+        self.position += length + 2;
+        Ok(String::from_utf8_lossy(&rest[..length]).into_owned())
+    }
+
+    /// A string; anything else is the description of a record, which is not a number.
+    fn data_type(&mut self) -> Result<String, NpyError> {
+        if matches!(self.peek(), Some(b'[' | b'(')) {
+            return Err(NpyError::DataType {
+                found: "a record".into(),
+            });
+        }
+        self.string()
+    }
+
+    fn boolean(&mut self) -> Result<bool, NpyError> {
+        self.peek();
+        let rest = &self.text[self.position..];
+        for (word, value) in [("True", true), ("False", false)] {
+            if rest.starts_with(word.as_bytes()) {
+                self.position += word.len();
+                return Ok(value);
+            }
+        }
+        Err(self.error("True or False"))
+    }
+
+    fn tuple(&mut self) -> Result<Vec<u64>, NpyError> {
+        let mut items = Vec::new();
+        self.expect(b'(', "(")?;
+        while !self.take(b')') {
+            items.push(self.integer()?);
+            if !self.take(b',') && self.peek() != Some(b')') {
+                return Err(self.error(", or )"));
+            }
+        }
+        Ok(items)
+    }
+
+    fn integer(&mut self) -> Result<u64, NpyError> {
+        self.peek();
+        let digits = self.text[self.position..]
+            .iter()
+            .take_while(|b| b.is_ascii_digit());
+        let digits: Vec<u8> = digits.copied().collect();
+        let value = digits.iter().try_fold(0_u64, |value, digit| {
+            value.checked_mul(10)?.checked_add(u64::from(digit - b'0'))
+        });
+        let value = value.filter(|_| !digits.is_empty());
+        let value = value.ok_or(self.error("a whole number below 2^64"))?;
+        self.position += digits.len();
+        Ok(value)
+    }
+}

@@ -1,0 +1,300 @@
+//! Shapes with exact signed distances, inside and outside.
+//!
+//! All but [`Ball`], [`Capsule`] and [`HalfSpace`] are centred at the origin; move them with the
+//! combinations of [`SignedDistanceExt`](crate::SignedDistanceExt).
+
+use crate::error::{finite, positive};
+use crate::{Error, SignedDistance, vector};
+
+/// A ball (a disc in 2D). Exact everywhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball<const D: usize> {
+    centre: [f64; D],
+    radius: f64,
+}
+
+impl<const D: usize> Ball<D> {
+    /// The ball of the given centre and radius.
+    ///
+    /// # Errors
+    /// The centre must be finite, the radius finite and positive.
+    pub fn new(centre: [f64; D], radius: f64) -> Result<Self, Error> {
+        Ok(Self {
+            centre: finite("centre", centre)?,
+            radius: positive("radius", radius)?,
+        })
+    }
+}
+
+impl<const D: usize> SignedDistance<D> for Ball<D> {
+    fn signed_distance(&self, x: [f64; D]) -> f64 {
+        vector::norm(vector::sub(x, self.centre)) - self.radius
+    }
+}
+
+/// Signed distance of the box with the given half extents, from the absolute coordinates.
+fn cuboid_distance<const D: usize>(absolute: [f64; D], half_extents: [f64; D]) -> f64 {
+    let excess = vector::sub(absolute, half_extents);
+    let outside = vector::norm(excess.map(|q| q.max(0.0)));
+    let inside = excess.into_iter().fold(f64::NEG_INFINITY, vector::max);
+    // NaN must pass: the check of the phase field relies on it.
+    if inside > 0.0 { outside } else { inside }
+}
+
+/// The box `|x_i| <= half_extents_i` (a rectangle in 2D). Exact everywhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cuboid<const D: usize> {
+    half_extents: [f64; D],
+}
+
+impl<const D: usize> Cuboid<D> {
+    /// The box with the given half extents.
+    ///
+    /// # Errors
+    /// They must be finite and positive.
+    pub fn new(half_extents: [f64; D]) -> Result<Self, Error> {
+        for value in half_extents {
+            positive("half extent", value)?;
+        }
+        Ok(Self { half_extents })
+    }
+}
+
+impl<const D: usize> SignedDistance<D> for Cuboid<D> {
+    fn signed_distance(&self, x: [f64; D]) -> f64 {
+        cuboid_distance(x.map(f64::abs), self.half_extents)
+    }
+}
+
+/// A box whose edges and corners are rounded; the extents include the rounding. Exact everywhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RoundedBox<const D: usize> {
+    core: [f64; D],
+    radius: f64,
+}
+
+impl<const D: usize> RoundedBox<D> {
+    /// The box with the given outer half extents and radius of its edges.
+    ///
+    /// # Errors
+    /// The extents must be finite and positive, the radius at least zero and at most the smallest
+    /// half extent.
+    pub fn new(half_extents: [f64; D], radius: f64) -> Result<Self, Error> {
+        Cuboid::new(half_extents)?;
+        let smallest = half_extents.into_iter().fold(f64::INFINITY, f64::min);
+        if !(0.0..=smallest).contains(&radius) {
+            return Err(Error::InvalidParameter {
+                name: "rounding radius",
+                value: radius,
+                requirement: "between zero and the smallest half extent",
+            });
+        }
+        Ok(Self {
+            core: half_extents.map(|a| a - radius),
+            radius,
+        })
+    }
+}
+
+impl<const D: usize> SignedDistance<D> for RoundedBox<D> {
+    fn signed_distance(&self, x: [f64; D]) -> f64 {
+        // The offset of a convex shape is exact on both sides.
+        cuboid_distance(x.map(f64::abs), self.core) - self.radius
+    }
+}
+
+/// The union over the axes `k` of the boxes `|x_k| <= a`, `|x_i| <= b` for `i != k`.
+///
+/// In 2D this is the cross `[-a,a] x [-b,b]` with its transpose. Exact everywhere, also near the
+/// re-entrant corners, where the minimum over the boxes is not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cross<const D: usize> {
+    half_length: f64,
+    half_width: f64,
+}
+
+impl<const D: usize> Cross<D> {
+    /// The cross with arms of half length `a` and half width `b`.
+    ///
+    /// # Errors
+    /// `0 < b < a`, both finite.
+    pub fn new(half_length: f64, half_width: f64) -> Result<Self, Error> {
+        positive("half length", half_length)?;
+        if !(half_width > 0.0 && half_width < half_length) {
+            return Err(Error::InvalidParameter {
+                name: "half width",
+                value: half_width,
+                requirement: "positive and smaller than the half length",
+            });
+        }
+        Ok(Self {
+            half_length,
+            half_width,
+        })
+    }
+}
+
+impl<const D: usize> SignedDistance<D> for Cross<D> {
+    fn signed_distance(&self, x: [f64; D]) -> f64 {
+        let (a, b) = (self.half_length, self.half_width);
+        let x = x.map(f64::abs);
+        let arm = |k| cuboid_distance(x, std::array::from_fn(|i| if i == k { a } else { b }));
+        let union = -(0..D).map(|k| -arm(k)).fold(f64::NEG_INFINITY, vector::max);
+        if union >= 0.0 || union.is_nan() {
+            return union;
+        }
+        // By symmetry the nearest point outside is in the same orthant. There the outside is
+        // the union of {x_i > a} and of {x_i > b and x_j > b} over the pairs, of which the two
+        // largest coordinates give the nearest.
+        let (first, second) =
+            x.into_iter()
+                .fold((f64::NEG_INFINITY, f64::NEG_INFINITY), |(p, q), v| {
+                    if v > p { (v, p) } else { (p, q.max(v)) }
+                });
+        let corner = (b - first).max(0.0).hypot((b - second).max(0.0));
+        -corner.min(a - first)
+    }
+}
+
+/// The points within `radius` of a segment. Exact everywhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Capsule<const D: usize> {
+    start: [f64; D],
+    end: [f64; D],
+    radius: f64,
+}
+
+impl<const D: usize> Capsule<D> {
+    /// The capsule about the segment from `start` to `end`, which may coincide.
+    ///
+    /// # Errors
+    /// The points must be finite, the radius finite and positive.
+    pub fn new(start: [f64; D], end: [f64; D], radius: f64) -> Result<Self, Error> {
+        Ok(Self {
+            start: finite("start", start)?,
+            end: finite("end", end)?,
+            radius: positive("radius", radius)?,
+        })
+    }
+}
+
+impl<const D: usize> SignedDistance<D> for Capsule<D> {
+    fn signed_distance(&self, x: [f64; D]) -> f64 {
+        let (axis, relative) = (
+            vector::sub(self.end, self.start),
+            vector::sub(x, self.start),
+        );
+        let length_squared = vector::dot(axis, axis);
+        let along = if length_squared > 0.0 {
+            (vector::dot(relative, axis) / length_squared).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        vector::norm(vector::sub(relative, vector::scale(axis, along))) - self.radius
+    }
+}
+
+/// The points behind a hyperplane. Exact everywhere.
+///
+/// It is not periodic: intersect it with something that stays inside the box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HalfSpace<const D: usize> {
+    point: [f64; D],
+    normal: [f64; D],
+}
+
+impl<const D: usize> HalfSpace<D> {
+    /// The half space `(x - point) . normal <= 0`; the normal, of any length, points outwards.
+    ///
+    /// # Errors
+    /// The point must be finite, the normal finite and not zero.
+    pub fn new(point: [f64; D], normal: [f64; D]) -> Result<Self, Error> {
+        let length = positive("length of the normal", vector::norm(normal))?;
+        Ok(Self {
+            point: finite("point", point)?,
+            normal: vector::scale(normal, 1.0 / length),
+        })
+    }
+}
+
+impl<const D: usize> SignedDistance<D> for HalfSpace<D> {
+    fn signed_distance(&self, x: [f64; D]) -> f64 {
+        vector::dot(vector::sub(x, self.point), self.normal)
+    }
+}
+
+/// A ring torus about the third axis. Exact everywhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Torus {
+    major: f64,
+    minor: f64,
+}
+
+impl Torus {
+    /// The torus whose tube, of radius `minor`, has the circle of radius `major` as its centre.
+    ///
+    /// # Errors
+    /// `0 < minor < major`, both finite.
+    pub fn new(major: f64, minor: f64) -> Result<Self, Error> {
+        positive("major radius", major)?;
+        if !(minor > 0.0 && minor < major) {
+            return Err(Error::InvalidParameter {
+                name: "minor radius",
+                value: minor,
+                requirement: "positive and smaller than the major radius",
+            });
+        }
+        Ok(Self { major, minor })
+    }
+
+    /// The Clifford torus, `major = sqrt(2) minor`, with outer radius `major + minor`.
+    ///
+    /// # Errors
+    /// The radius must be finite and positive.
+    pub fn clifford(outer_radius: f64) -> Result<Self, Error> {
+        let minor = positive("outer radius", outer_radius)? / (1.0 + std::f64::consts::SQRT_2);
+        Self::new(outer_radius - minor, minor)
+    }
+
+    /// Radius of the central circle.
+    pub fn major(&self) -> f64 {
+        self.major
+    }
+
+    /// Radius of the tube.
+    pub fn minor(&self) -> f64 {
+        self.minor
+    }
+}
+
+impl SignedDistance<3> for Torus {
+    fn signed_distance(&self, [x, y, z]: [f64; 3]) -> f64 {
+        (x.hypot(y) - self.major).hypot(z) - self.minor
+    }
+}
+
+/// A solid cylinder (a thick disk, if flat) about the third axis. Exact everywhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cylinder {
+    radius: f64,
+    half_height: f64,
+}
+
+impl Cylinder {
+    /// The cylinder `x^2 + y^2 <= radius^2`, `|z| <= half_height`.
+    ///
+    /// # Errors
+    /// Both must be finite and positive.
+    pub fn new(radius: f64, half_height: f64) -> Result<Self, Error> {
+        Ok(Self {
+            radius: positive("radius", radius)?,
+            half_height: positive("half height", half_height)?,
+        })
+    }
+}
+
+impl SignedDistance<3> for Cylinder {
+    fn signed_distance(&self, [x, y, z]: [f64; 3]) -> f64 {
+        cuboid_distance([x.hypot(y), z.abs()], [self.radius, self.half_height])
+    }
+}

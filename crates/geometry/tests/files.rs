@@ -1,0 +1,359 @@
+//! NPY and VTI files.
+
+use std::fs;
+use std::path::Path;
+
+use geometry::npy::{self, NpyError};
+use geometry::{Error, Field, Grid, file, vti};
+use npyz::WriterBuilder;
+
+fn sample<const D: usize>(cells: usize) -> Field<D> {
+    let grid = Grid::centred(cells, 2.0).unwrap();
+    let mut k = 0.1;
+    let values = (0..grid.len()).map(|_| {
+        k = 3.9 * k * (1.0 - k);
+        k
+    });
+    Field::from_values(grid, values.collect()).unwrap()
+}
+
+fn read_back<const D: usize>(path: &Path) -> Result<Field<D>, Error> {
+    npy::read(path, |cells| Grid::centred(cells, 2.0))
+}
+
+#[test]
+fn npy_round_trips_bit_for_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("u.npy");
+    let plane = sample::<2>(17);
+    npy::write(&path, &plane).unwrap();
+    assert_eq!(read_back::<2>(&path).unwrap(), plane);
+    let space = sample::<3>(5);
+    npy::write(&path, &space).unwrap();
+    assert_eq!(read_back::<3>(&path).unwrap(), space);
+    let line = sample::<1>(6);
+    npy::write(&path, &line).unwrap();
+    assert_eq!(read_back::<1>(&path).unwrap(), line);
+}
+
+#[test]
+fn npy_header_is_the_documented_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("u.npy");
+    let u = sample::<2>(3);
+    npy::write(&path, &u).unwrap();
+    let bytes = fs::read(&path).unwrap();
+    assert_eq!(&bytes[..10], b"\x93NUMPY\x01\x00\x76\x00");
+    let text = "{'descr': '<f8', 'fortran_order': False, 'shape': (3, 3), }";
+    assert!(bytes[10..].starts_with(text.as_bytes()));
+    assert!(bytes[10 + text.len()..127].iter().all(|&b| b == b' '));
+    assert_eq!(bytes[127], b'\n');
+    assert_eq!(bytes.len(), 128 + 9 * 8);
+    assert_eq!(
+        &bytes[128 + 5 * 8..128 + 6 * 8],
+        &u.values()[5].to_le_bytes()
+    );
+    // An independent reader agrees.
+    let other = npyz::NpyFile::new(bytes.as_slice()).unwrap();
+    assert_eq!(
+        (other.shape(), other.order()),
+        ([3, 3].as_slice(), npyz::Order::C)
+    );
+    assert_eq!(other.into_vec::<f64>().unwrap(), u.values());
+}
+
+/// Bytes as an independent writer makes them.
+fn foreign<T: npyz::Serialize + npyz::AutoSerialize>(
+    shape: &[u64],
+    order: npyz::Order,
+    values: impl IntoIterator<Item = T>,
+) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let options = npyz::WriteOptions::new()
+        .default_dtype()
+        .order(order)
+        .shape(shape);
+    let mut writer = options.writer(&mut bytes).begin_nd().unwrap();
+    writer.extend(values).unwrap();
+    writer.finish().unwrap();
+    bytes
+}
+
+#[test]
+fn npy_reads_what_others_write() {
+    let values = || (0..8_u8).map(|v| f64::from(v) + 0.5);
+    let expected: Vec<f64> = values().collect();
+    let c_order = foreign(&[2, 2, 2], npyz::Order::C, values());
+    assert_eq!(npy::decode::<3>(&c_order), Ok((2, expected.clone())));
+    let single = foreign(&[2, 2, 2], npyz::Order::C, values().map(|v| v as f32));
+    assert_eq!(npy::decode::<3>(&single), Ok((2, expected)));
+    let fortran = foreign(&[2, 2, 2], npyz::Order::Fortran, values());
+    let reordered = [0.5, 4.5, 2.5, 6.5, 1.5, 5.5, 3.5, 7.5].to_vec();
+    assert_eq!(npy::decode::<3>(&fortran), Ok((2, reordered)));
+    // Big-endian, format 2.0, keys in another order, double quotes.
+    let text = b"{\"shape\":(2,),\"descr\":\">f8\",\"fortran_order\":True}";
+    let mut bytes = b"\x93NUMPY\x02\x00".to_vec();
+    bytes.extend((text.len() as u32).to_le_bytes());
+    bytes.extend(text);
+    bytes.extend([1.5_f64, -2.0].iter().flat_map(|v| v.to_be_bytes()));
+    assert_eq!(npy::decode::<1>(&bytes), Ok((2, vec![1.5, -2.0])));
+}
+
+#[test]
+fn npy_refuses_what_is_not_a_field() {
+    let order = npyz::Order::C;
+    let decode = |bytes: &[u8]| npy::decode::<2>(bytes).unwrap_err();
+    assert_eq!(
+        decode(&foreign(&[2, 2, 2], order, [0.0; 8])),
+        NpyError::Rank {
+            expected: 2,
+            shape: vec![2, 2, 2]
+        }
+    );
+    assert_eq!(
+        decode(&foreign(&[2, 3], order, [0.0; 6])),
+        NpyError::NotCubical { shape: vec![2, 3] }
+    );
+    assert_eq!(
+        decode(&foreign(&[2, 2], order, [0_i64; 4])),
+        NpyError::DataType {
+            found: "<i8".into()
+        }
+    );
+    assert_eq!(
+        decode(&foreign(&[2, 2], order, [0.0, 1.0, f64::NEG_INFINITY, 0.0])),
+        NpyError::NonFinite {
+            index: 2,
+            value: f64::NEG_INFINITY
+        }
+    );
+    assert_eq!(decode(b"P5 3 3 255 not an array"), NpyError::NotNpy);
+    assert_eq!(
+        decode(b"\x93NUMPY\x04\x00"),
+        NpyError::Version { major: 4, minor: 0 }
+    );
+    let good = foreign(&[3, 3], order, [0.0; 9]);
+    let whole = good.len();
+    let mut longer = good.clone();
+    longer.push(0);
+    assert!(matches!(decode(&longer), NpyError::Length { found, .. } if found == 1 + whole as u64));
+    for length in 0..whole {
+        let error = decode(&good[..length]);
+        if length < 6 {
+            assert_eq!(error, NpyError::NotNpy);
+        } else {
+            let NpyError::Length { expected, found } = error else {
+                panic!("{length}: {error}")
+            };
+            assert!(found == length as u64 && found < expected, "{length}");
+        }
+    }
+}
+
+/// Headers that lie about sizes, or are nonsense, give errors and take no memory.
+#[test]
+fn npy_survives_hostile_headers() {
+    let with = |text: &str| {
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((text.len() as u16).to_le_bytes());
+        bytes.extend(text.as_bytes());
+        npy::decode::<2>(&bytes).unwrap_err()
+    };
+    let shape = |shape: &str| {
+        with(&format!(
+            "{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}"
+        ))
+    };
+    let huge = shape("(4294967296, 4294967296)");
+    assert!(
+        matches!(
+            huge,
+            NpyError::Length {
+                expected: u64::MAX,
+                ..
+            }
+        ),
+        "{huge:?}"
+    );
+    assert!(matches!(shape("(100000, 100000)"), NpyError::Length { .. }));
+    for bad in [
+        "(18446744073709551616, 2)",
+        "(-2, 2)",
+        "(2 2)",
+        "(2, 2",
+        "2",
+        "((2, 2))",
+        "()x",
+    ] {
+        assert!(matches!(shape(bad), NpyError::Header { .. }), "{bad}");
+    }
+    for bad in [
+        "",
+        "{",
+        "{}",
+        "{'descr'}",
+        "{'descr': '<f8'}",
+        "{'descr': '<f8', 'fortran_order': Maybe}",
+        "{'colour': 3}",
+        "{'descr': '<f8",
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (2, 2)} and more",
+    ] {
+        assert!(matches!(with(bad), NpyError::Header { .. }), "{bad}");
+    }
+    let record = with("{'descr': [('x', '<f8')], 'fortran_order': False, 'shape': (2, 2)}");
+    assert!(matches!(record, NpyError::DataType { .. }), "{record:?}");
+    let unicode = with("{'descr': '\u{e9}8', 'fortran_order': False, 'shape': (2, 2)}");
+    assert!(matches!(unicode, NpyError::DataType { .. }), "{unicode:?}");
+    // A header longer than the file.
+    let cut = npy::decode::<2>(b"\x93NUMPY\x02\x00\xff\xff\xff\xff{");
+    assert!(matches!(cut, Err(NpyError::Length { .. })), "{cut:?}");
+}
+
+#[test]
+fn errors_name_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("absent.npy");
+    let error = read_back::<2>(&path).unwrap_err();
+    assert!(matches!(error, Error::Io { action: "read", .. }));
+    assert!(error.to_string().contains("absent.npy"));
+    fs::write(&path, b"nonsense").unwrap();
+    let error = read_back::<2>(&path).unwrap_err();
+    assert!(matches!(
+        error,
+        Error::Npy {
+            source: NpyError::NotNpy,
+            ..
+        }
+    ));
+    npy::write(&path, &sample::<2>(4)).unwrap();
+    let other = npy::read(&path, |_| Grid::<2>::new(5, 1.0));
+    assert!(matches!(
+        other,
+        Err(Error::ValueCount {
+            expected: 25,
+            actual: 16
+        })
+    ));
+    let nowhere = folder.path().join("no/such/folder/u.npy");
+    assert!(matches!(
+        npy::write(nowhere, &sample::<2>(4)),
+        Err(Error::Io { .. })
+    ));
+}
+
+#[test]
+fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("state");
+    file::write_atomically(&path, |out| out.write_all(b"old")).unwrap();
+    let failed = file::write_atomically(&path, |out| {
+        out.write_all(b"half of the n")?;
+        Err(std::io::Error::other("the disk is on fire"))
+    });
+    assert!(matches!(
+        failed,
+        Err(Error::Io {
+            action: "write",
+            ..
+        })
+    ));
+    assert_eq!(fs::read(&path).unwrap(), b"old");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    file::write_atomically(&path, |out| out.write_all(b"new")).unwrap();
+    assert_eq!(fs::read(&path).unwrap(), b"new");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+/// The value of an attribute after `from` in the XML.
+fn attribute<'a>(xml: &'a str, element: &str, name: &str) -> &'a str {
+    let rest = &xml[xml.find(element).unwrap_or_else(|| panic!("no {element}"))..];
+    let rest = &rest[rest.find(&format!(" {name}=\"")).unwrap() + name.len() + 3..];
+    &rest[..rest.find('"').unwrap()]
+}
+
+/// The header, and the block of appended data of one array.
+fn parse_vti(bytes: &[u8], array: &str) -> (String, Vec<f64>) {
+    let marker = b"<AppendedData encoding=\"raw\">\n_";
+    let start = bytes
+        .windows(marker.len())
+        .position(|w| w == marker)
+        .unwrap()
+        + marker.len();
+    let xml = String::from_utf8(bytes[..start].to_vec()).unwrap();
+    let element = format!("<DataArray type=\"Float64\" Name=\"{array}\"");
+    let offset: usize = attribute(&xml, &element, "offset").parse().unwrap();
+    let block = &bytes[start + offset..];
+    let size = u64::from_le_bytes(block[..8].try_into().unwrap()) as usize;
+    let values = block[8..8 + size].chunks_exact(8);
+    let values = values
+        .map(|b| f64::from_le_bytes(b.try_into().unwrap()))
+        .collect();
+    (xml, values)
+}
+
+#[test]
+fn vti_holds_every_array_with_x_fastest() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("u.vti");
+    let grid = Grid::<3>::centred(4, 2.0).unwrap();
+    let u = Field::from_fn(grid, |[x, y, z]| x + 10.0 * y + 100.0 * z);
+    let v = u.map(|value| -value);
+    vti::write(&path, &[("u", &u), ("a<b & \"c\"", &v)]).unwrap();
+    let bytes = fs::read(&path).unwrap();
+    let (xml, values) = parse_vti(&bytes, "u");
+    assert_eq!(attribute(&xml, "<ImageData", "WholeExtent"), "0 3 0 3 0 3");
+    assert_eq!(attribute(&xml, "<ImageData", "Origin"), "-1 -1 -1");
+    assert_eq!(attribute(&xml, "<ImageData", "Spacing"), "0.5 0.5 0.5");
+    assert_eq!(attribute(&xml, "<VTKFile", "byte_order"), "LittleEndian");
+    assert_eq!(attribute(&xml, "<VTKFile", "header_type"), "UInt64");
+    assert_eq!(values.len(), 64);
+    for (position, value) in values.iter().enumerate() {
+        let [i, j, k] = [position % 4, position / 4 % 4, position / 16];
+        assert_eq!(value.to_bits(), u.values()[grid.index([i, j, k])].to_bits());
+    }
+    let (_, second) = parse_vti(&bytes, "a&lt;b &amp; &quot;c&quot;");
+    assert!(
+        values
+            .iter()
+            .zip(&second)
+            .all(|(a, b)| a.to_bits() == (-b).to_bits())
+    );
+    assert!(bytes.ends_with(b"\n  </AppendedData>\n</VTKFile>\n"));
+}
+
+#[test]
+fn vti_of_a_plane_is_one_layer() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("u.vti");
+    let u = sample::<2>(5);
+    vti::write(&path, &[("u", &u)]).unwrap();
+    let (xml, values) = parse_vti(&fs::read(&path).unwrap(), "u");
+    assert_eq!(attribute(&xml, "<Piece", "Extent"), "0 4 0 4 0 0");
+    assert_eq!(attribute(&xml, "<ImageData", "Origin"), "-1 -1 0");
+    assert_eq!(values[1].to_bits(), u.values()[5].to_bits());
+}
+
+#[test]
+fn vti_refuses_unusable_arrays() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("u.vti");
+    let (u, other) = (sample::<2>(4), sample::<2>(5));
+    let none: [(&str, &Field<2>); 0] = [];
+    assert!(matches!(
+        vti::write(&path, &none),
+        Err(Error::NoArrays { .. })
+    ));
+    let twice = vti::write(&path, &[("u", &u), ("u", &u)]);
+    assert!(matches!(twice, Err(Error::ArrayName { .. })));
+    assert!(matches!(
+        vti::write(&path, &[("", &u)]),
+        Err(Error::ArrayName { .. })
+    ));
+    assert!(matches!(
+        vti::write(&path, &[("a\nb", &u)]),
+        Err(Error::ArrayName { .. })
+    ));
+    let mixed = vti::write(&path, &[("u", &u), ("v", &other)]);
+    assert!(matches!(mixed, Err(Error::GridMismatch { .. })));
+    assert!(!path.exists());
+}

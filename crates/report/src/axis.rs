@@ -1,0 +1,461 @@
+//! Axes: ranges, the map from values to positions, ticks and their labels.
+
+use crate::error::{Error, Result};
+
+/// How values are spread along an axis or a colour bar.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Scale {
+    /// Equal differences are equally far apart.
+    #[default]
+    Linear,
+    /// Equal ratios are equally far apart; values that are not positive cannot be shown.
+    Log,
+}
+
+/// One axis of a chart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// What is measured, with its unit or scaling.
+    pub label: String,
+    /// Linear or logarithmic.
+    pub scale: Scale,
+    /// Ends of the axis; `None` takes them from the data.
+    pub range: Option<[f64; 2]>,
+}
+
+impl Axis {
+    /// A linear axis with an automatic range.
+    pub fn linear(label: impl Into<String>) -> Self {
+        Self {
+            label: label.into(),
+            scale: Scale::Linear,
+            range: None,
+        }
+    }
+
+    /// A logarithmic axis (base 10) with an automatic range.
+    pub fn log(label: impl Into<String>) -> Self {
+        Self {
+            label: label.into(),
+            scale: Scale::Log,
+            range: None,
+        }
+    }
+
+    /// Fixes both ends. They are checked when the figure is drawn.
+    #[must_use]
+    pub fn with_range(mut self, low: f64, high: f64) -> Self {
+        self.range = Some([low, high]);
+        self
+    }
+
+    /// Whether a value can be placed on this axis.
+    pub(crate) fn shows(&self, value: f64) -> bool {
+        // Numbers below the normal range have too few digits left to be data.
+        value.is_finite() && (self.scale == Scale::Linear || value >= f64::MIN_POSITIVE)
+    }
+
+    /// The axis with both ends known. `None` if there is neither a range nor a value to show.
+    pub(crate) fn resolve(
+        &self,
+        values: impl Iterator<Item = f64>,
+        padding: f64,
+    ) -> Result<Option<Mapping>> {
+        if let Some([low, high]) = self.range {
+            return Mapping::new(&self.label, self.scale, low, high).map(Some);
+        }
+        let (low, high) = values
+            .filter(|&v| self.shows(v))
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| {
+                (lo.min(v), hi.max(v))
+            });
+        if low > high {
+            return Ok(None);
+        }
+        let (low, high) = match self.scale {
+            Scale::Linear => {
+                let span = match high - low {
+                    span if span > narrowest(low, high) => span,
+                    // As good as constant: show it in the middle of a range of its own size.
+                    _ if high.abs() < 1e-250 => 1.0,
+                    _ => high.abs(),
+                };
+                (low - padding * span, high + padding * span)
+            }
+            Scale::Log => {
+                let span = match high.log10() - low.log10() {
+                    span if span > 1e-9 => span,
+                    _ => 1.0,
+                };
+                let factor = 10.0_f64.powf(padding * span);
+                (
+                    (low / factor).max(f64::MIN_POSITIVE),
+                    (high * factor).min(f64::MAX),
+                )
+            }
+        };
+        Mapping::new(&self.label, self.scale, low, high).map(Some)
+    }
+}
+
+/// An axis whose ends are known: values to fractions of its length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Mapping {
+    pub scale: Scale,
+    pub low: f64,
+    pub high: f64,
+}
+
+impl Mapping {
+    pub fn new(label: &str, scale: Scale, low: f64, high: f64) -> Result<Self> {
+        let valid = low.is_finite()
+            && high.is_finite()
+            && (high - low).is_finite()
+            && high - low > narrowest(low, high)
+            && (scale == Scale::Linear || low >= f64::MIN_POSITIVE);
+        if valid {
+            Ok(Self { scale, low, high })
+        } else {
+            Err(Error::Range {
+                axis: label.to_owned(),
+                low,
+                high,
+            })
+        }
+    }
+
+    /// 0 at the low end, 1 at the high end.
+    pub fn fraction(&self, value: f64) -> f64 {
+        match self.scale {
+            Scale::Linear => (value - self.low) / (self.high - self.low),
+            Scale::Log => {
+                let low = self.low.log10();
+                (value.log10() - low) / (self.high.log10() - low)
+            }
+        }
+    }
+
+    /// Whether a value lies on the axis, up to rounding.
+    pub fn holds(&self, value: f64) -> bool {
+        value.is_finite()
+            && (self.scale == Scale::Linear || value > 0.0)
+            && (-1e-9..=1.0 + 1e-9).contains(&self.fraction(value))
+    }
+
+    /// Ticks for an axis `length` units long. `extent` is the room a label takes along the axis.
+    pub fn ticks(&self, length: f64, extent: impl Fn(&str) -> f64) -> Ticks {
+        let most = ((length / 28.0) as usize).clamp(2, 12);
+        let mut best = None;
+        for target in (1..=most).rev() {
+            let ticks = self.ticks_for(target);
+            let fits = ticks.fit(self, length, &extent);
+            let enough = ticks.major.len() >= 2;
+            if fits && enough {
+                return ticks;
+            }
+            if best.is_none() || (enough && !fits) {
+                best = Some(ticks);
+            }
+        }
+        best.unwrap_or_default()
+    }
+
+    fn ticks_for(&self, target: usize) -> Ticks {
+        match self.scale {
+            Scale::Linear => linear_ticks(self.low, self.high, target),
+            Scale::Log => log_ticks(self.low, self.high, target),
+        }
+    }
+}
+
+/// Tick positions (as values) and labels.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Ticks {
+    pub major: Vec<(f64, String)>,
+    pub minor: Vec<f64>,
+    /// A factor common to all labels, such as `×10⁻⁵`.
+    pub factor: Option<String>,
+}
+
+impl Ticks {
+    fn fit(&self, map: &Mapping, length: f64, extent: &impl Fn(&str) -> f64) -> bool {
+        self.major.windows(2).all(|pair| {
+            let gap = (map.fraction(pair[1].0) - map.fraction(pair[0].0)).abs() * length;
+            gap >= 0.5 * (extent(&pair[0].1) + extent(&pair[1].1))
+        })
+    }
+}
+
+/// Ranges up to this width cannot be told from a point: their ticks would drown in rounding.
+fn narrowest(low: f64, high: f64) -> f64 {
+    1e-12 * low.abs().max(high.abs()) + 1e-280
+}
+
+/// The smallest of 1, 2, 5 times a power of ten that is at least `raw`.
+fn nice_step(raw: f64) -> f64 {
+    let power = 10.0_f64.powf(raw.log10().floor());
+    let leading = raw / power;
+    let nice = [1.0, 2.0, 5.0]
+        .into_iter()
+        .find(|&m| leading <= m * (1.0 + 1e-9))
+        .unwrap_or(10.0);
+    nice * power
+}
+
+fn linear_ticks(low: f64, high: f64, target: usize) -> Ticks {
+    let step = nice_step((high - low) / target as f64);
+    let slack = 1e-9 * (high - low) / step;
+    let (first, last) = ((low / step - slack).ceil(), (high / step + slack).floor());
+    let count = (last - first).max(-1.0) as usize + usize::from(last >= first);
+    let values: Vec<f64> = (0..count).map(|k| (first + k as f64) * step).collect();
+    let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let exponent = if largest > 0.0 && !(1e-3..1e5).contains(&largest) {
+        (largest * (1.0 + 1e-9)).log10().floor() as i32
+    } else {
+        0
+    };
+    let step_exponent = (step * (1.0 + 1e-9)).log10().floor() as i32;
+    // Zero alone needs no decimals, however small the step.
+    let decimals = match usize::try_from(exponent - step_exponent) {
+        Ok(decimals) if largest > 0.0 => decimals,
+        _ => 0,
+    };
+    let unit = 10.0_f64.powi(exponent);
+    let major = values
+        .into_iter()
+        .map(|value| (value, signed(&format!("{:.decimals$}", value / unit))))
+        .collect();
+    let factor = (exponent != 0).then(|| format!("×{}", power_of_ten(exponent)));
+    Ticks {
+        major,
+        minor: Vec::new(),
+        factor,
+    }
+}
+
+fn log_ticks(low: f64, high: f64, target: usize) -> Ticks {
+    let (bottom, top) = (low.log10() - 1e-9, high.log10() + 1e-9);
+    let inside = |value: f64| (bottom..=top).contains(&value.log10());
+    let (first, last) = (bottom.ceil() as i32, top.floor() as i32);
+    let decades: Vec<i32> = (first..=last).collect();
+    let within = |mantissas: &[i32]| -> Vec<(i32, i32)> {
+        (first - 1..=last)
+            .flat_map(|k| mantissas.iter().map(move |&m| (m, k)))
+            .filter(|&(m, k)| inside(f64::from(m) * 10.0_f64.powi(k)))
+            .collect()
+    };
+    let value = |(m, k): (i32, i32)| f64::from(m) * 10.0_f64.powi(k);
+    // Mantissas are labelled too, if there is room, where few powers of ten are in sight.
+    let families: [&[i32]; 3] = [&[1, 2, 3, 4, 5, 6, 7, 8, 9], &[1, 2, 5], &[1, 3]];
+    let chosen = (decades.len() <= 2)
+        .then(|| {
+            families
+                .into_iter()
+                .find(|f| (2..=target).contains(&within(f).len()))
+        })
+        .flatten();
+    if chosen.is_none() && decades.len() >= 2 {
+        let stride = i32::try_from(decades.len().div_ceil(target)).unwrap_or(i32::MAX);
+        let (labelled, rest): (Vec<i32>, Vec<i32>) =
+            decades.iter().partition(|&&k| k.rem_euclid(stride) == 0);
+        let minor = if stride == 1 {
+            within(&[2, 3, 4, 5, 6, 7, 8, 9])
+                .into_iter()
+                .map(value)
+                .collect()
+        } else {
+            rest.into_iter().map(|k| 10.0_f64.powi(k)).collect()
+        };
+        let major = labelled
+            .into_iter()
+            .map(|k| (10.0_f64.powi(k), power_of_ten(k)))
+            .collect();
+        return Ticks {
+            major,
+            minor,
+            factor: None,
+        };
+    }
+    let Some(mantissas) = chosen else {
+        // A narrow range: plain numbers.
+        return linear_ticks(low, high, target);
+    };
+    let labelled = within(mantissas);
+    let minor = within(&[1, 2, 3, 4, 5, 6, 7, 8, 9])
+        .into_iter()
+        .filter(|tick| !labelled.contains(tick))
+        .map(value)
+        .collect();
+    let major = labelled
+        .into_iter()
+        .map(|(m, k)| {
+            let label = if m == 1 {
+                power_of_ten(k)
+            } else {
+                format!("{m}·{}", power_of_ten(k))
+            };
+            (value((m, k)), label)
+        })
+        .collect();
+    Ticks {
+        major,
+        minor,
+        factor: None,
+    }
+}
+
+/// `10⁻³` for -3.
+pub(crate) fn power_of_ten(exponent: i32) -> String {
+    format!("10{}", superscript(exponent))
+}
+
+fn superscript(number: i32) -> String {
+    const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    number
+        .to_string()
+        .chars()
+        .map(|c| c.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize]))
+        .collect()
+}
+
+/// A real minus sign, and none on zero.
+fn signed(number: &str) -> String {
+    match number.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| matches!(c, '0' | '.')) => rest.to_owned(),
+        Some(rest) => format!("−{rest}"),
+        None => number.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn labels(ticks: &Ticks) -> Vec<&str> {
+        ticks
+            .major
+            .iter()
+            .map(|(_, label)| label.as_str())
+            .collect()
+    }
+
+    fn log(low: f64, high: f64) -> Mapping {
+        Mapping::new("y", Scale::Log, low, high).unwrap()
+    }
+
+    #[test]
+    fn log_mapping_spaces_ratios_equally() {
+        let map = log(1e-4, 1.0);
+        for (value, fraction) in [
+            (1e-4, 0.0),
+            (1e-3, 0.25),
+            (1e-2, 0.5),
+            (0.1, 0.75),
+            (1.0, 1.0),
+        ] {
+            assert!((map.fraction(value) - fraction).abs() < 1e-12);
+        }
+        assert!(!map.holds(0.0) && !map.holds(-1.0) && !map.holds(2.0) && map.holds(0.5));
+    }
+
+    #[test]
+    fn decades_are_labelled_with_eight_minor_ticks_between() {
+        let ticks = log(1e-4, 1e-1).ticks(300.0, |_| 20.0);
+        assert_eq!(labels(&ticks), ["10⁻⁴", "10⁻³", "10⁻²", "10⁻¹"]);
+        assert_eq!(ticks.minor.len(), 3 * 8);
+    }
+
+    #[test]
+    fn many_decades_are_thinned() {
+        let ticks = log(1e-30, 1.0).ticks(200.0, |_| 20.0);
+        assert!((3..=8).contains(&ticks.major.len()), "{:?}", labels(&ticks));
+        assert!(!ticks.minor.is_empty());
+    }
+
+    #[test]
+    fn less_than_a_decade_is_still_labelled() {
+        assert_eq!(
+            labels(&log(1.5e-3, 6e-3).ticks(400.0, |_| 30.0)),
+            ["2·10⁻³", "3·10⁻³", "4·10⁻³", "5·10⁻³", "6·10⁻³"]
+        );
+        let narrow = log(1.01, 1.09).ticks(200.0, |_| 30.0);
+        assert!(narrow.major.len() >= 2, "{narrow:?}");
+    }
+
+    #[test]
+    fn linear_labels_are_plain_or_share_a_factor() {
+        assert_eq!(
+            labels(&linear_ticks(0.0, 1.0, 5)),
+            ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]
+        );
+        assert_eq!(labels(&linear_ticks(-1.0, 1.0, 2)), ["−1", "0", "1"]);
+        assert_eq!(labels(&linear_ticks(-1e-9, 4e-8, 1)), ["0"]);
+        let small = linear_ticks(0.0, 4e-5, 4);
+        assert_eq!(labels(&small), ["0", "1", "2", "3", "4"]);
+        assert_eq!(small.factor.as_deref(), Some("×10⁻⁵"));
+        let large = linear_ticks(0.0, 1e6, 2);
+        assert_eq!(labels(&large), ["0.0", "0.5", "1.0"]);
+        assert_eq!(large.factor.as_deref(), Some("×10⁶"));
+    }
+
+    #[test]
+    fn automatic_ranges_ignore_what_cannot_be_shown() {
+        let axis = Axis::log("error");
+        let values = [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-3, 1e-1];
+        let map = axis.resolve(values.into_iter(), 0.0).unwrap().unwrap();
+        assert_eq!((map.low, map.high), (1e-3, 1e-1));
+        assert_eq!(axis.resolve([0.0, -1.0].into_iter(), 0.0).unwrap(), None);
+        let flat = Axis::linear("u")
+            .resolve([0.0, 0.0].into_iter(), 0.05)
+            .unwrap()
+            .unwrap();
+        assert!(flat.low < 0.0 && flat.high > 0.0);
+    }
+
+    #[test]
+    fn bad_ranges_are_refused_with_their_numbers() {
+        for (axis, low, high) in [
+            (Axis::linear("time"), 1.0, 1.0),
+            (Axis::linear("time"), 0.0, f64::NAN),
+            (Axis::log("time"), 0.0, 1.0),
+        ] {
+            let error = axis
+                .with_range(low, high)
+                .resolve(std::iter::empty(), 0.0)
+                .unwrap_err();
+            assert!(error.to_string().contains("\"time\""), "{error}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn ticks_lie_on_the_axis_and_do_not_overlap(
+            low in -1e3..1e3_f64, decades in -6.0..6.0_f64, length in 80.0..900.0_f64,
+        ) {
+            let map = Mapping::new("x", Scale::Linear, low, low + 10.0_f64.powf(decades)).unwrap();
+            let extent = |label: &str| 7.0 * label.chars().count() as f64 + 10.0;
+            let ticks = map.ticks(length, extent);
+            prop_assert!(ticks.major.len() <= 13);
+            for (value, _) in &ticks.major {
+                prop_assert!(map.holds(*value), "{value} of {map:?}");
+            }
+            if length > 400.0 {
+                prop_assert!(ticks.major.len() >= 2, "{ticks:?}");
+                prop_assert!(ticks.fit(&map, length, &extent));
+            }
+        }
+
+        #[test]
+        fn log_ticks_lie_on_the_axis(
+            low in -12.0..6.0_f64, decades in 0.05..20.0_f64, length in 80.0..900.0_f64,
+        ) {
+            let map = log(10.0_f64.powf(low), 10.0_f64.powf(low + decades));
+            let ticks = map.ticks(length, |label| 7.0 * label.chars().count() as f64 + 10.0);
+            prop_assert!(!ticks.major.is_empty());
+            for value in ticks.major.iter().map(|(v, _)| v).chain(&ticks.minor) {
+                prop_assert!((-1e-8..=1.0 + 1e-8).contains(&map.fraction(*value)));
+            }
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! The embedded typeface: `DejaVu Sans` 2.37 (Bitstream Vera licence, changes in the public
+//! domain).
+//!
+//! Pictures come out the same on every machine because no system font is ever consulted.
+
+use std::convert::Infallible;
+use std::sync::LazyLock;
+
+use ab_glyph::{Font, FontRef, GlyphId, ScaleFont};
+use plotters_backend::text_anchor::{HPos, Pos, VPos};
+use plotters_backend::{BackendColor, BackendTextStyle, FontFamily, FontTransform};
+
+use crate::colour::Rgb;
+
+static FONT: LazyLock<FontRef<'static>> = LazyLock::new(|| {
+    FontRef::try_from_slice(dejavu::sans::regular()).expect("the embedded font is well formed")
+});
+
+/// Families named in SVG files: the embedded one, the one with the same metrics, then any.
+const SVG_FAMILY: &str = "DejaVu Sans, Verdana, sans-serif";
+
+/// Height of capitals and digits, in em.
+pub(crate) const CAP_HEIGHT: f64 = 0.73;
+
+/// Distance from the top anchor of the drawing backends to the baseline, in em.
+pub(crate) const TOP_TO_BASELINE: f64 = 0.76;
+
+/// `ab_glyph` scales by ascent minus descent; this is that height in em.
+fn scale_of(em: f64) -> f32 {
+    let units = FONT.units_per_em().expect("the embedded font has an em");
+    (em * f64::from(FONT.height_unscaled() / units)) as f32
+}
+
+/// Lays out one line: glyphs with their pen positions, and the width.
+fn lay_out(text: &str, em: f64) -> (Vec<(GlyphId, f32)>, f32) {
+    let font = FONT.as_scaled(scale_of(em));
+    let (mut pen, mut previous) = (0.0_f32, None);
+    let mut glyphs = Vec::with_capacity(text.len());
+    for symbol in text.chars() {
+        let glyph = font.glyph_id(symbol);
+        if let Some(previous) = previous {
+            pen += font.kern(previous, glyph);
+        }
+        glyphs.push((glyph, pen));
+        pen += font.h_advance(glyph);
+        previous = Some(glyph);
+    }
+    (glyphs, pen)
+}
+
+/// Width of one line of text at `em` layout units per em.
+pub(crate) fn width(text: &str, em: f64) -> f64 {
+    f64::from(lay_out(text, em).1)
+}
+
+/// Breaks `text` at spaces so that no line is wider than `limit`, unless a single word is.
+pub(crate) fn wrap(text: &str, em: f64, limit: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for paragraph in text.lines() {
+        let mut line = String::new();
+        for word in paragraph.split_whitespace() {
+            let longer = if line.is_empty() {
+                word.to_owned()
+            } else {
+                format!("{line} {word}")
+            };
+            if !line.is_empty() && width(&longer, em) > limit {
+                lines.push(std::mem::replace(&mut line, word.to_owned()));
+            } else {
+                line = longer;
+            }
+        }
+        if !line.is_empty() {
+            lines.push(line);
+        }
+    }
+    lines
+}
+
+/// A text style for the backends of `plotters` that draws with the embedded font.
+pub(crate) struct Label {
+    /// Device pixels per em.
+    pub em: f64,
+    pub colour: Rgb,
+    pub align: HPos,
+    /// Turned to be read from bottom to top.
+    pub vertical: bool,
+}
+
+impl BackendTextStyle for Label {
+    type FontError = Infallible;
+
+    fn color(&self) -> BackendColor {
+        let Rgb(r, g, b) = self.colour;
+        BackendColor {
+            alpha: 1.0,
+            rgb: (r, g, b),
+        }
+    }
+
+    /// The SVG backend divides by 1.24 to get `font-size`.
+    fn size(&self) -> f64 {
+        self.em * 1.24
+    }
+
+    fn transform(&self) -> FontTransform {
+        if self.vertical {
+            FontTransform::Rotate270
+        } else {
+            FontTransform::None
+        }
+    }
+
+    fn anchor(&self) -> Pos {
+        Pos::new(self.align, VPos::Top)
+    }
+
+    fn family(&self) -> FontFamily<'_> {
+        FontFamily::Name(SVG_FAMILY)
+    }
+
+    fn layout_box(&self, text: &str) -> Result<((i32, i32), (i32, i32)), Self::FontError> {
+        Ok((
+            (0, 0),
+            (width(text, self.em).round() as i32, self.em.round() as i32),
+        ))
+    }
+
+    fn draw<E, DrawFunc: FnMut(i32, i32, BackendColor) -> Result<(), E>>(
+        &self,
+        text: &str,
+        (x0, y0): (i32, i32),
+        mut draw: DrawFunc,
+    ) -> Result<Result<(), E>, Self::FontError> {
+        let baseline = (TOP_TO_BASELINE * self.em) as f32;
+        for (glyph, pen) in lay_out(text, self.em).0 {
+            let placed =
+                glyph.with_scale_and_position(scale_of(self.em), ab_glyph::point(pen, baseline));
+            let Some(outline) = FONT.outline_glyph(placed) else {
+                continue;
+            };
+            let corner = outline.px_bounds().min;
+            let mut pixels = Vec::new();
+            outline.draw(|x, y, coverage| pixels.push((x, y, coverage)));
+            for (x, y, coverage) in pixels {
+                let colour = BackendColor {
+                    alpha: f64::from(coverage).min(1.0),
+                    ..self.color()
+                };
+                let at = (
+                    x0 + corner.x as i32 + x.cast_signed(),
+                    y0 + corner.y as i32 + y.cast_signed(),
+                );
+                if let Err(error) = draw(at.0, at.1, colour) {
+                    return Ok(Err(error));
+                }
+            }
+        }
+        Ok(Ok(()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_font_has_every_symbol_of_the_field() {
+        let symbols = "ετπεφψκλσΔ∇ΓΩ‖√∞×·±≈≤≥→−–…²³⁻⁰¹⁴⁵⁶⁷⁸⁹₀₁₂∂∫½";
+        for symbol in symbols.chars() {
+            let glyph = FONT.glyph_id(symbol);
+            assert_ne!(glyph, GlyphId(0), "no glyph for {symbol:?}");
+            assert!(FONT.outline(glyph).is_some(), "no outline for {symbol:?}");
+        }
+    }
+
+    #[test]
+    fn widths_scale_and_add() {
+        let (once, twice) = (width("time", 10.0), width("time", 20.0));
+        assert!((twice - 2.0 * once).abs() < 1e-3);
+        assert!(width("0", 10.0) > 5.0 && width("0", 10.0) < 8.0);
+    }
+
+    #[test]
+    fn wrapping_respects_the_limit() {
+        let text = "the error against the exact radius, measured in the Euclidean norm";
+        let lines = wrap(text, 12.0, 150.0);
+        assert!(lines.len() > 2);
+        assert!(lines.iter().all(|line| width(line, 12.0) <= 150.0));
+        assert_eq!(lines.join(" "), text);
+    }
+}

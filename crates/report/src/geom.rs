@@ -1,0 +1,296 @@
+//! Plane geometry of the layout: points, boxes, clipping, dashing and thinning of polylines.
+//!
+//! Everything is in layout units with the origin at the upper left and `y` pointing down.
+
+/// A point in layout units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Point {
+    pub x: f64,
+    pub y: f64,
+}
+
+/// Shorthand constructor.
+pub(crate) const fn point(x: f64, y: f64) -> Point {
+    Point { x, y }
+}
+
+impl Point {
+    pub fn distance(self, other: Self) -> f64 {
+        (self.x - other.x).hypot(self.y - other.y)
+    }
+
+    /// The point a fraction `t` of the way to `other`.
+    pub fn towards(self, other: Self, t: f64) -> Self {
+        point(
+            self.x + t * (other.x - self.x),
+            self.y + t * (other.y - self.y),
+        )
+    }
+}
+
+/// An axis-parallel box.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Rect {
+    pub x: f64,
+    pub y: f64,
+    pub width: f64,
+    pub height: f64,
+}
+
+impl Rect {
+    pub const fn new(x: f64, y: f64, width: f64, height: f64) -> Self {
+        Self {
+            x,
+            y,
+            width,
+            height,
+        }
+    }
+
+    pub fn right(&self) -> f64 {
+        self.x + self.width
+    }
+
+    pub fn bottom(&self) -> f64 {
+        self.y + self.height
+    }
+
+    pub fn centre(&self) -> Point {
+        point(self.x + 0.5 * self.width, self.y + 0.5 * self.height)
+    }
+
+    /// The box grown by `by` on every side.
+    pub fn grown(&self, by: f64) -> Self {
+        Self::new(
+            self.x - by,
+            self.y - by,
+            self.width + 2.0 * by,
+            self.height + 2.0 * by,
+        )
+    }
+
+    pub fn contains(&self, p: Point) -> bool {
+        p.x >= self.x && p.x <= self.right() && p.y >= self.y && p.y <= self.bottom()
+    }
+
+    /// The largest box of the given height-to-width ratio centred in this one.
+    pub fn fitted(&self, aspect: f64) -> Self {
+        let width = self.width.min(self.height / aspect);
+        let height = width * aspect;
+        let centre = self.centre();
+        Self::new(
+            centre.x - 0.5 * width,
+            centre.y - 0.5 * height,
+            width,
+            height,
+        )
+    }
+
+    /// Corners, clockwise from the upper left.
+    pub fn corners(&self) -> [Point; 4] {
+        [
+            point(self.x, self.y),
+            point(self.right(), self.y),
+            point(self.right(), self.bottom()),
+            point(self.x, self.bottom()),
+        ]
+    }
+}
+
+/// The part of the segment from `a` to `b` inside `bounds` (Liang and Barsky, 1984).
+pub(crate) fn clip_segment(a: Point, b: Point, bounds: &Rect) -> Option<(Point, Point)> {
+    let (dx, dy) = (b.x - a.x, b.y - a.y);
+    let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
+    let sides = [
+        (-dx, a.x - bounds.x),
+        (dx, bounds.right() - a.x),
+        (-dy, a.y - bounds.y),
+        (dy, bounds.bottom() - a.y),
+    ];
+    for (slope, gap) in sides {
+        if slope == 0.0 {
+            if gap < 0.0 {
+                return None;
+            }
+        } else if slope < 0.0 {
+            enter = enter.max(gap / slope);
+        } else {
+            leave = leave.min(gap / slope);
+        }
+    }
+    (enter <= leave).then(|| (a.towards(b, enter), a.towards(b, leave)))
+}
+
+/// Clips a polyline, giving the connected runs inside `bounds`.
+pub(crate) fn clip_polyline(points: &[Point], bounds: &Rect) -> Vec<Vec<Point>> {
+    let mut runs: Vec<Vec<Point>> = Vec::new();
+    for pair in points.windows(2) {
+        let Some((a, b)) = clip_segment(pair[0], pair[1], bounds) else {
+            continue;
+        };
+        match runs.last_mut() {
+            Some(run) if run.last().is_some_and(|end| end.distance(a) < 1e-9) => run.push(b),
+            _ => runs.push(vec![a, b]),
+        }
+    }
+    runs
+}
+
+/// Clips a filled loop against `bounds` (Sutherland and Hodgman, 1974).
+pub(crate) fn clip_loop(points: &[Point], bounds: &Rect) -> Vec<Point> {
+    let mut ring = points.to_vec();
+    let inside: [&dyn Fn(Point) -> f64; 4] = [
+        &|p| p.x - bounds.x,
+        &|p| bounds.right() - p.x,
+        &|p| p.y - bounds.y,
+        &|p| bounds.bottom() - p.y,
+    ];
+    for depth in inside {
+        let mut clipped = Vec::with_capacity(ring.len() + 4);
+        for (k, &b) in ring.iter().enumerate() {
+            let a = ring[(k + ring.len() - 1) % ring.len()];
+            let (da, db) = (depth(a), depth(b));
+            if (da < 0.0) != (db < 0.0) {
+                clipped.push(a.towards(b, da / (da - db)));
+            }
+            if db >= 0.0 {
+                clipped.push(b);
+            }
+        }
+        ring = clipped;
+    }
+    ring
+}
+
+/// Drops points closer than `spacing` to the last one kept; the ends stay.
+///
+/// A curve that wanders inside the spacing is invisible at the resolution drawn.
+pub(crate) fn thin(points: &[Point], spacing: f64) -> Vec<Point> {
+    let mut kept: Vec<Point> = Vec::with_capacity(points.len());
+    for (k, &p) in points.iter().enumerate() {
+        let last = k + 1 == points.len();
+        if last || kept.last().is_none_or(|q| q.distance(p) >= spacing) {
+            kept.push(p);
+        }
+    }
+    kept
+}
+
+/// Cuts a polyline into the dashes of `pattern` (lengths of pen down, pen up, ...); empty: solid.
+pub(crate) fn dash(points: &[Point], pattern: &[f64]) -> Vec<Vec<Point>> {
+    if pattern.is_empty() || points.len() < 2 {
+        return vec![points.to_vec()];
+    }
+    let mut dashes = Vec::new();
+    let (mut slot, mut left) = (0, pattern[0]);
+    let mut current = vec![points[0]];
+    for pair in points.windows(2) {
+        let (mut from, to) = (pair[0], pair[1]);
+        loop {
+            let length = from.distance(to);
+            let ends = length <= left || !length.is_finite();
+            if ends {
+                left -= length;
+                if slot % 2 == 0 {
+                    current.push(to);
+                }
+                break;
+            }
+            from = from.towards(to, left / length);
+            if slot % 2 == 0 {
+                current.push(from);
+                dashes.push(std::mem::take(&mut current));
+            } else {
+                current = vec![from];
+            }
+            slot = (slot + 1) % pattern.len();
+            left = pattern[slot];
+        }
+    }
+    if slot % 2 == 0 && current.len() > 1 {
+        dashes.push(current);
+    }
+    dashes
+}
+
+/// Points along a polyline at most `step` apart, to test boxes against.
+pub(crate) fn sample(points: &[Point], step: f64) -> Vec<Point> {
+    let mut samples = Vec::with_capacity(points.len());
+    samples.extend(points.first());
+    for pair in points.windows(2) {
+        let pieces = (pair[0].distance(pair[1]) / step).ceil().max(1.0) as usize;
+        samples.extend((1..=pieces).map(|k| pair[0].towards(pair[1], k as f64 / pieces as f64)));
+    }
+    samples
+}
+
+/// Twice the signed area of a loop (positive: clockwise as seen, since `y` points down).
+pub(crate) fn signed_area(ring: &[Point]) -> f64 {
+    (0..ring.len())
+        .map(|k| {
+            let (a, b) = (ring[k], ring[(k + 1) % ring.len()]);
+            a.x * b.y - b.x * a.y
+        })
+        .sum()
+}
+
+/// Whether `p` lies inside the loop, by the even-odd rule.
+pub(crate) fn inside(p: Point, ring: &[Point]) -> bool {
+    let mut odd = false;
+    for k in 0..ring.len() {
+        let (a, b) = (ring[k], ring[(k + 1) % ring.len()]);
+        if (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x) {
+            odd = !odd;
+        }
+    }
+    odd
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const UNIT: Rect = Rect::new(0.0, 0.0, 10.0, 10.0);
+
+    #[test]
+    fn clipping_keeps_the_part_inside() {
+        let (a, b) = clip_segment(point(-5.0, 5.0), point(15.0, 5.0), &UNIT).unwrap();
+        assert_eq!((a, b), (point(0.0, 5.0), point(10.0, 5.0)));
+        assert!(clip_segment(point(-5.0, 0.0), point(0.0, -5.1), &UNIT).is_none());
+        let zigzag = [
+            point(2.0, 2.0),
+            point(2.0, 20.0),
+            point(8.0, 20.0),
+            point(8.0, 2.0),
+        ];
+        assert_eq!(clip_polyline(&zigzag, &UNIT).len(), 2);
+    }
+
+    #[test]
+    fn clipped_loop_has_the_area_of_the_intersection() {
+        let square = Rect::new(5.0, 5.0, 10.0, 10.0).corners();
+        assert!((signed_area(&clip_loop(&square, &UNIT)) - 50.0).abs() < 1e-12);
+        assert!(clip_loop(&Rect::new(20.0, 20.0, 1.0, 1.0).corners(), &UNIT).is_empty());
+    }
+
+    #[test]
+    fn even_odd_membership() {
+        let ring = UNIT.corners();
+        assert!(inside(point(1.0, 9.0), &ring));
+        assert!(!inside(point(11.0, 5.0), &ring));
+    }
+
+    proptest! {
+        #[test]
+        fn dashes_cover_the_pattern_share(length in 50.0..400.0_f64, cuts in 1_usize..40) {
+            let line: Vec<Point> =
+                (0..=cuts).map(|k| point(length * k as f64 / cuts as f64, 0.0)).collect();
+            let inked: f64 =
+                dash(&line, &[6.0, 4.0]).iter().map(|d| d[0].distance(d[d.len() - 1])).sum();
+            let periods = (length / 10.0).floor();
+            let expected = 6.0 * periods + (length - 10.0 * periods).min(6.0);
+            prop_assert!((inked - expected).abs() < 1e-9);
+        }
+    }
+}

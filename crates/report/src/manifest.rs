@@ -1,0 +1,227 @@
+//! Run manifests: what was computed, with which program, parameters and machine class.
+
+use std::path::PathBuf;
+use std::process::Command;
+use std::time::{Instant, SystemTime};
+
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use crate::error::{Error, Result};
+use crate::output::OutputDir;
+
+/// A named part of a run and how long it took.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Phase {
+    /// What was done.
+    pub name: String,
+    /// Wall time in seconds.
+    pub seconds: f64,
+}
+
+/// What is needed to repeat a run. It holds nothing about who ran it where: no host name, no user,
+/// no paths.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Manifest {
+    /// Name of the experiment.
+    pub experiment: String,
+    /// All parameters, by name.
+    pub parameters: Map<String, Value>,
+    /// Version of the workspace.
+    pub version: String,
+    /// Commit of the sources, if they are a git checkout; `-modified` is appended if tracked files
+    /// differ from it.
+    pub commit: Option<String>,
+    /// Compiler version.
+    pub rustc: String,
+    /// Target triple.
+    pub target: String,
+    /// Operating system.
+    pub os: String,
+    /// Processor architecture.
+    pub arch: String,
+    /// Number of processors available to the run.
+    pub cpus: usize,
+    /// Device the tensors lived on, such as `cpu`.
+    pub device: Option<String>,
+    /// Number format of the tensors, such as `f64`.
+    pub dtype: Option<String>,
+    /// Tensor backend, such as `flex`.
+    pub backend: Option<String>,
+    /// Seed of all random numbers.
+    pub seed: Option<u64>,
+    /// Start of the run, RFC 3339 in UTC.
+    pub started: String,
+    /// Wall time of the whole run in seconds, set when the manifest is written.
+    pub wall_seconds: f64,
+    /// Parts of the run in order.
+    pub phases: Vec<Phase>,
+    #[serde(skip)]
+    clock: Instant,
+}
+
+impl Manifest {
+    /// Starts the clock and looks up what the program can know by itself.
+    pub fn start(experiment: impl Into<String>) -> Self {
+        Self {
+            experiment: experiment.into(),
+            parameters: Map::new(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            commit: commit(),
+            rustc: env!("REPORT_RUSTC").to_owned(),
+            target: env!("REPORT_TARGET").to_owned(),
+            os: std::env::consts::OS.to_owned(),
+            arch: std::env::consts::ARCH.to_owned(),
+            cpus: std::thread::available_parallelism().map_or(1, usize::from),
+            device: None,
+            dtype: None,
+            backend: None,
+            seed: None,
+            started: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
+            wall_seconds: 0.0,
+            phases: Vec::new(),
+            clock: Instant::now(),
+        }
+    }
+
+    /// Sets the parameters from anything that serialises to a map, such as a struct.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameters`] if it does not, [`Error::Json`] if it does not serialise at all.
+    pub fn with_parameters(mut self, parameters: &impl Serialize) -> Result<Self> {
+        let value = serde_json::to_value(parameters).map_err(|source| Error::Json {
+            what: "the run parameters".to_owned(),
+            source,
+        })?;
+        match value {
+            Value::Object(map) => self.parameters = map,
+            _ => {
+                return Err(Error::Parameters {
+                    experiment: self.experiment,
+                });
+            }
+        }
+        Ok(self)
+    }
+
+    /// Names the tensor backend, its device and its number format.
+    #[must_use]
+    pub fn with_backend(
+        mut self,
+        backend: impl Into<String>,
+        device: impl Into<String>,
+        dtype: impl Into<String>,
+    ) -> Self {
+        self.backend = Some(backend.into());
+        self.device = Some(device.into());
+        self.dtype = Some(dtype.into());
+        self
+    }
+
+    /// Names the seed of all random numbers.
+    #[must_use]
+    pub fn with_seed(mut self, seed: u64) -> Self {
+        self.seed = Some(seed);
+        self
+    }
+
+    /// Does a part of the run and records how long it took.
+    pub fn phase<R>(&mut self, name: impl Into<String>, work: impl FnOnce() -> R) -> R {
+        let clock = Instant::now();
+        let result = work();
+        self.phases.push(Phase {
+            name: name.into(),
+            seconds: clock.elapsed().as_secs_f64(),
+        });
+        result
+    }
+
+    /// Writes `manifest.json` with the wall time so far.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Write`].
+    pub fn write(&mut self, folder: &OutputDir) -> Result<PathBuf> {
+        self.wall_seconds = self.clock.elapsed().as_secs_f64();
+        folder.write("manifest.json", crate::data::to_json(self)?)
+    }
+}
+
+/// Commit of the checkout this crate was built from, if it still is there and git knows it.
+fn commit() -> Option<String> {
+    let git = |arguments: &[&str]| -> Option<String> {
+        let output = Command::new("git")
+            .args(["-C", env!("CARGO_MANIFEST_DIR")])
+            .args(arguments)
+            .output()
+            .ok()
+            .filter(|output| output.status.success())?;
+        Some(String::from_utf8(output.stdout).ok()?.trim().to_owned())
+    };
+    let hash = git(&["rev-parse", "HEAD"])?;
+    let changes = git(&["status", "--porcelain", "--untracked-files=no"])?;
+    Some(if changes.is_empty() {
+        hash
+    } else {
+        format!("{hash}-modified")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Serialize)]
+    struct Parameters {
+        epsilon: f64,
+        shape: &'static str,
+    }
+
+    #[test]
+    fn a_manifest_says_what_was_run_but_not_where() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = OutputDir::create(root.path()).unwrap();
+        let mut manifest = Manifest::start("circle")
+            .with_parameters(&Parameters {
+                epsilon: 0.02,
+                shape: "circle",
+            })
+            .unwrap()
+            .with_backend("flex", "cpu", "f64")
+            .with_seed(7);
+        let answer = manifest.phase("solve", || {
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            42
+        });
+        assert_eq!(answer, 42);
+        let text = std::fs::read_to_string(manifest.write(&folder).unwrap()).unwrap();
+        let json: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(json["experiment"], "circle");
+        assert_eq!(json["parameters"]["epsilon"], 0.02);
+        assert_eq!(json["seed"], 7);
+        assert_eq!(json["backend"], "flex");
+        assert!(json["rustc"].as_str().unwrap().starts_with("rustc 1."));
+        assert!(
+            json["target"]
+                .as_str()
+                .unwrap()
+                .contains(std::env::consts::ARCH)
+        );
+        assert!(json["cpus"].as_u64().unwrap() >= 1);
+        let started = json["started"].as_str().unwrap();
+        assert!(humantime::parse_rfc3339(started).is_ok() && started.ends_with('Z'));
+        let phase = json["phases"][0]["seconds"].as_f64().unwrap();
+        assert!(phase >= 0.02 && json["wall_seconds"].as_f64().unwrap() >= phase);
+        assert!(!text.contains(env!("CARGO_MANIFEST_DIR")));
+        assert!(!text.contains(root.path().to_str().unwrap()));
+    }
+
+    #[test]
+    fn parameters_must_be_a_map() {
+        let error = Manifest::start("circle")
+            .with_parameters(&[1, 2])
+            .unwrap_err();
+        assert!(matches!(error, Error::Parameters { .. }));
+    }
+}

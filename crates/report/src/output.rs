@@ -1,0 +1,220 @@
+//! An output folder that is checked early and whose files are never half written.
+
+use std::fs;
+use std::io::{self, BufWriter, Write};
+use std::path::{Component, Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+use crate::error::{Error, Result};
+
+/// A folder that exists and has been written to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OutputDir {
+    path: PathBuf,
+}
+
+impl OutputDir {
+    /// Creates the folder (with its parents) unless it exists, and proves that files can be made in
+    /// it, so that a long computation does not end in a lost result.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Folder`] with the path and the cause.
+    pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
+        let path = path.into();
+        let failed = |source| Error::Folder {
+            path: path.clone(),
+            source,
+        };
+        fs::create_dir_all(&path).map_err(failed)?;
+        let mut probe = temporary(&path).map_err(failed)?;
+        probe.write_all(b"probe").map_err(failed)?;
+        probe.close().map_err(failed)?;
+        Ok(Self { path })
+    }
+
+    /// A folder inside this one, created and checked likewise.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::FileName`] unless `name` is one plain component, [`Error::Folder`] as above.
+    pub fn subfolder(&self, name: &str) -> Result<Self> {
+        Self::create(self.path(name)?)
+    }
+
+    /// The folder itself.
+    pub fn as_path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The path of a file in the folder, whether or not it exists.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::FileName`] unless `name` is one plain component: no separator, not `..`.
+    pub fn path(&self, name: &str) -> Result<PathBuf> {
+        let mut components = Path::new(name).components();
+        match (components.next(), components.next()) {
+            (Some(Component::Normal(only)), None) if only == name => Ok(self.path.join(name)),
+            _ => Err(Error::FileName {
+                name: name.to_owned(),
+            }),
+        }
+    }
+
+    /// Writes a whole file at once, replacing an old one only when the new one is complete.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::FileName`] or [`Error::Write`]; an old file of that name is then untouched.
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> Result<PathBuf> {
+        self.write_with(name, |file| file.write_all(content.as_ref()))
+    }
+
+    /// Writes a file through a callback, replacing an old one only if the callback succeeds.
+    ///
+    /// The content goes to a temporary file in the same folder, is flushed to the disk, and then
+    /// takes its name in one step.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::FileName`] or [`Error::Write`]; an old file of that name is then untouched.
+    pub fn write_with(
+        &self,
+        name: &str,
+        produce: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<PathBuf> {
+        let path = self.path(name)?;
+        let stored = || -> io::Result<()> {
+            let mut writer = BufWriter::new(temporary(&self.path)?);
+            produce(&mut writer)?;
+            let file = writer
+                .into_inner()
+                .map_err(io::IntoInnerError::into_error)?;
+            file.as_file().sync_all()?;
+            file.persist(&path).map_err(|error| error.error)?;
+            sync_folder(&self.path);
+            Ok(())
+        };
+        match stored() {
+            Ok(()) => Ok(path),
+            Err(source) => Err(Error::Write { path, source }),
+        }
+    }
+}
+
+/// A temporary file, deleted when dropped, with the permissions of an ordinary new file.
+fn temporary(folder: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".unfinished-");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder)
+}
+
+/// Makes the new name durable where folders can be synchronised; elsewhere it soon is anyway.
+fn sync_folder(folder: &Path) {
+    if let Ok(folder) = fs::File::open(folder) {
+        let _ = folder.sync_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> = fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn files_appear_whole_and_nothing_else_remains() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = OutputDir::create(root.path().join("a/b")).unwrap();
+        let path = folder.write("result.csv", "x\n1\n").unwrap();
+        assert_eq!(path, folder.path("result.csv").unwrap());
+        assert_eq!(fs::read_to_string(path).unwrap(), "x\n1\n");
+        folder.write("result.csv", "x\n2\n").unwrap();
+        assert_eq!(
+            fs::read_to_string(folder.path("result.csv").unwrap()).unwrap(),
+            "x\n2\n"
+        );
+        assert_eq!(names(folder.as_path()), ["result.csv"]);
+        assert_eq!(
+            folder.subfolder("c").unwrap().as_path(),
+            folder.as_path().join("c")
+        );
+    }
+
+    #[test]
+    fn a_failing_producer_leaves_the_old_file() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = OutputDir::create(root.path()).unwrap();
+        folder.write("state.json", "old").unwrap();
+        let error = folder
+            .write_with("state.json", |file| {
+                file.write_all(b"half of the ne")?;
+                Err(io::Error::other("the solver gave up"))
+            })
+            .unwrap_err();
+        assert!(matches!(error, Error::Write { .. }));
+        let message = error.to_string();
+        assert!(message.contains("state.json") && message.contains("the solver gave up"));
+        assert_eq!(
+            fs::read_to_string(root.path().join("state.json")).unwrap(),
+            "old"
+        );
+        assert_eq!(names(root.path()), ["state.json"]);
+    }
+
+    #[test]
+    fn a_file_in_place_of_the_folder_is_reported_on_one_line() {
+        let root = tempfile::tempdir().unwrap();
+        let blocked = root.path().join("results");
+        fs::write(&blocked, "not a folder").unwrap();
+        for path in [blocked.clone(), blocked.join("deeper")] {
+            let error = OutputDir::create(&path).unwrap_err();
+            assert!(matches!(&error, Error::Folder { path: p, .. } if *p == path));
+            let message = error.to_string();
+            assert!(
+                message.contains("results") && !message.contains('\n'),
+                "{message}"
+            );
+        }
+        assert_eq!(fs::read_to_string(blocked).unwrap(), "not a folder");
+    }
+
+    #[test]
+    fn names_with_folders_in_them_are_refused() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = OutputDir::create(root.path()).unwrap();
+        for name in ["", ".", "..", "a/b", "../a", "/a", "a/"] {
+            let error = folder.write(name, "x").unwrap_err();
+            assert!(matches!(error, Error::FileName { .. }), "{name:?}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn files_are_readable_like_any_other() {
+        use std::os::unix::fs::PermissionsExt;
+        let root = tempfile::tempdir().unwrap();
+        let plain = root.path().join("plain");
+        fs::write(&plain, "x").unwrap();
+        let ours = OutputDir::create(root.path())
+            .unwrap()
+            .write("ours", "x")
+            .unwrap();
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        assert_eq!(mode(&ours), mode(&plain));
+    }
+}

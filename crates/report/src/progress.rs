@@ -1,0 +1,100 @@
+//! Progress bars on standard error, for terminals only.
+
+use std::borrow::Cow;
+use std::io::IsTerminal;
+
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// A stack of progress bars. Nothing is drawn when standard error is not a terminal or `quiet` is
+/// set, so logs stay clean; everything else works alike.
+///
+/// ```
+/// let progress = report::Progress::new(true);
+/// let bar = progress.bar("time steps", 100);
+/// for _ in 0..100 {
+///     bar.inc(1);
+/// }
+/// bar.finish();
+/// ```
+#[derive(Debug, Clone)]
+pub struct Progress {
+    bars: MultiProgress,
+}
+
+impl Progress {
+    /// Progress bars on standard error if it is a terminal and not `quiet`.
+    pub fn new(quiet: bool) -> Self {
+        Self::on(!quiet && std::io::stderr().is_terminal())
+    }
+
+    fn on(visible: bool) -> Self {
+        let target = if visible {
+            ProgressDrawTarget::stderr()
+        } else {
+            ProgressDrawTarget::hidden()
+        };
+        Self {
+            bars: MultiProgress::with_draw_target(target),
+        }
+    }
+
+    /// A bar below the others: message, position of `length`, time elapsed, time to go.
+    pub fn bar(&self, message: impl Into<Cow<'static, str>>, length: u64) -> ProgressBar {
+        let template = "{msg:28} {bar:28} {pos:>6}/{len:<6} {elapsed_precise}  eta {eta_precise}";
+        self.add(ProgressBar::new(length), template, message)
+    }
+
+    /// A bar for work of unknown length: message, position, time elapsed.
+    pub fn counter(&self, message: impl Into<Cow<'static, str>>) -> ProgressBar {
+        self.add(
+            ProgressBar::no_length(),
+            "{msg:28} {spinner} {pos:>6} {elapsed_precise}",
+            message,
+        )
+    }
+
+    fn add(
+        &self,
+        bar: ProgressBar,
+        template: &str,
+        message: impl Into<Cow<'static, str>>,
+    ) -> ProgressBar {
+        let style = ProgressStyle::with_template(template)
+            .expect("the templates are fixed and valid")
+            .progress_chars("━╸ ");
+        self.bars.add(bar).with_style(style).with_message(message)
+    }
+
+    /// Writes a line to standard error above the bars, even when they are hidden.
+    pub fn println(&self, line: &str) {
+        self.bars.suspend(|| eprintln!("{line}"));
+    }
+
+    /// Takes all bars off the screen.
+    pub fn clear(&self) {
+        // Failing to clear the screen leaves an old bar on it and harms nothing else.
+        let _ = self.bars.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hidden_bars_count_all_the_same() {
+        let progress = Progress::new(true);
+        let (bar, counter) = (progress.bar("steps", 10), progress.counter("iterations"));
+        assert!(bar.is_hidden() && counter.is_hidden());
+        bar.inc(3);
+        counter.inc(5);
+        assert_eq!(
+            (bar.position(), bar.length(), counter.position()),
+            (3, Some(10), 5)
+        );
+        assert_eq!(bar.message(), "steps");
+        bar.finish();
+        assert!(bar.is_finished() && !counter.is_finished());
+        progress.clear();
+    }
+}

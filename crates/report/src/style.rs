@@ -1,0 +1,124 @@
+//! What lines, markers and letters look like.
+
+use crate::colour::Rgb;
+use crate::error::Result;
+use crate::geom::{Point, point};
+use crate::surface::{Surface, disc};
+
+/// How a curve is stroked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LineStyle {
+    /// Unbroken.
+    #[default]
+    Solid,
+    /// Long dashes.
+    Dashed,
+    /// Dots.
+    Dotted,
+    /// Dashes and dots in turn.
+    DashDot,
+    /// No line: only the markers are drawn.
+    None,
+}
+
+impl LineStyle {
+    /// Pen-down and pen-up lengths in layout units.
+    pub(crate) const fn pattern(self) -> &'static [f64] {
+        match self {
+            Self::Solid | Self::None => &[],
+            Self::Dashed => &[8.5, 4.5],
+            Self::Dotted => &[2.2, 3.2],
+            Self::DashDot => &[9.0, 3.5, 2.2, 3.5],
+        }
+    }
+}
+
+/// The symbol at a data point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Marker {
+    /// A disc.
+    Circle,
+    /// An axis-parallel square.
+    Square,
+    /// A square on its corner.
+    Diamond,
+    /// A triangle pointing up.
+    Triangle,
+    /// Two crossing strokes.
+    Cross,
+}
+
+/// Half the size of a marker.
+pub(crate) const MARKER_RADIUS: f64 = 3.8;
+
+/// Width of data curves.
+pub(crate) const CURVE_WIDTH: f64 = 2.0;
+
+/// Draws one marker with a thin white rim, so that it stands out from its curve.
+pub(crate) fn draw_marker(
+    surface: &mut dyn Surface,
+    marker: Marker,
+    at: Point,
+    colour: Rgb,
+) -> Result<()> {
+    if marker == Marker::Cross {
+        let r = 0.85 * MARKER_RADIUS;
+        for s in [-1.0, 1.0] {
+            let ends = [point(at.x - r, at.y - s * r), point(at.x + r, at.y + s * r)];
+            surface.stroke(&ends, 1.8, colour)?;
+        }
+        return Ok(());
+    }
+    surface.fill(
+        &[symbol(marker, at, MARKER_RADIUS + 1.0)],
+        crate::colour::WHITE,
+    )?;
+    surface.fill(&[symbol(marker, at, MARKER_RADIUS)], colour)
+}
+
+fn symbol(marker: Marker, at: Point, r: f64) -> Vec<Point> {
+    let corners = |list: &[(f64, f64)]| {
+        list.iter()
+            .map(|&(x, y)| point(at.x + x * r, at.y + y * r))
+            .collect()
+    };
+    match marker {
+        Marker::Circle => disc(at, r),
+        Marker::Square => corners(&[(-0.88, -0.88), (0.88, -0.88), (0.88, 0.88), (-0.88, 0.88)]),
+        Marker::Diamond => corners(&[(0.0, -1.2), (1.2, 0.0), (0.0, 1.2), (-1.2, 0.0)]),
+        Marker::Triangle | Marker::Cross => corners(&[(0.0, -1.15), (1.1, 0.8), (-1.1, 0.8)]),
+    }
+}
+
+/// Letter sizes (em, in layout units) of one figure.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Fonts {
+    pub heading: f64,
+    pub title: f64,
+    pub label: f64,
+    pub tick: f64,
+    pub legend: f64,
+    pub note: f64,
+}
+
+impl Fonts {
+    /// Sizes for a figure with this many panels side by side.
+    pub fn for_columns(columns: usize) -> Self {
+        let (title, label, tick) = match columns {
+            0 | 1 => (17.0, 15.0, 13.5),
+            2 => (15.0, 13.5, 12.5),
+            _ => (14.0, 13.0, 12.0),
+        };
+        Self {
+            heading: 17.5,
+            title,
+            label,
+            tick,
+            legend: tick,
+            note: 12.0,
+        }
+    }
+}
+
+/// Distance from one line of text to the next, in em.
+pub(crate) const LEADING: f64 = 1.35;

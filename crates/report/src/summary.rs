@@ -1,0 +1,201 @@
+//! Headline numbers of a run: a flat map from metric names to numbers, stored as `summary.json`.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use serde_json::Number;
+
+use crate::error::{Error, Result};
+use crate::output::OutputDir;
+
+/// Metric names and their values, sorted by name.
+///
+/// Names are lower-case words of ASCII letters, digits and `_` that start with a letter, joined by
+/// `.`, such as `circle.error_l2`. Values are finite. The same content gives the same bytes: floats
+/// are written with the fewest digits that read back exactly.
+///
+/// ```
+/// let mut summary = report::Summary::new();
+/// summary.insert("circle.error_l2", 2.5e-4)?;
+/// summary.insert_count("circle.newton_iterations", 17)?;
+/// assert_eq!(
+///     summary.to_json(),
+///     "{\n  \"circle.error_l2\": 0.00025,\n  \"circle.newton_iterations\": 17\n}\n"
+/// );
+/// # Ok::<(), report::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Summary {
+    metrics: BTreeMap<String, Number>,
+}
+
+impl Summary {
+    /// An empty summary.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a metric.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotFinite`], [`Error::MetricName`], or [`Error::DuplicateMetric`].
+    pub fn insert(&mut self, name: &str, value: f64) -> Result<()> {
+        let number = Number::from_f64(value).ok_or_else(|| Error::NotFinite {
+            what: format!("metric {name:?}"),
+            value,
+        })?;
+        self.add(name, number)
+    }
+
+    /// Adds a metric that counts something; it is written without a decimal point.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::MetricName`] or [`Error::DuplicateMetric`].
+    pub fn insert_count(&mut self, name: &str, value: usize) -> Result<()> {
+        self.add(name, Number::from(value))
+    }
+
+    fn add(&mut self, name: &str, number: Number) -> Result<()> {
+        if !is_metric_name(name) {
+            return Err(Error::MetricName {
+                name: name.to_owned(),
+            });
+        }
+        if let Some(old) = self.metrics.get(name) {
+            let (name, value) = (name.to_owned(), old.to_string());
+            return Err(Error::DuplicateMetric { name, value });
+        }
+        self.metrics.insert(name.to_owned(), number);
+        Ok(())
+    }
+
+    /// The value of a metric.
+    pub fn get(&self, name: &str) -> Option<f64> {
+        self.metrics.get(name).and_then(Number::as_f64)
+    }
+
+    /// All metrics in order of their names.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, f64)> {
+        self.metrics
+            .iter()
+            .filter_map(|(name, number)| Some((name.as_str(), number.as_f64()?)))
+    }
+
+    /// The summary as indented JSON with sorted keys and a final newline.
+    pub fn to_json(&self) -> String {
+        let mut text = String::from("{");
+        for (k, (name, number)) in self.metrics.iter().enumerate() {
+            let comma = if k == 0 { "" } else { "," };
+            // Names need no escaping: their grammar allows nothing special.
+            text.extend([comma, "\n  \"", name, "\": ", &number.to_string()]);
+        }
+        text.push_str(if self.metrics.is_empty() {
+            "}\n"
+        } else {
+            "\n}\n"
+        });
+        text
+    }
+
+    /// Reads what [`Summary::to_json`] wrote.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Json`] if the text is not a JSON map of numbers, [`Error::MetricName`] if a name is
+    /// not allowed.
+    pub fn from_json(text: &str) -> Result<Self> {
+        let numbers: BTreeMap<String, Number> =
+            serde_json::from_str(text).map_err(|source| Error::Json {
+                what: "the summary".to_owned(),
+                source,
+            })?;
+        let mut summary = Self::new();
+        for (name, number) in numbers {
+            summary.add(&name, number)?;
+        }
+        Ok(summary)
+    }
+
+    /// Writes `summary.json`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Write`].
+    pub fn write(&self, folder: &OutputDir) -> Result<PathBuf> {
+        folder.write("summary.json", self.to_json())
+    }
+}
+
+fn is_metric_name(name: &str) -> bool {
+    name.split('.').all(|word| {
+        word.starts_with(|c: char| c.is_ascii_lowercase())
+            && word
+                .chars()
+                .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn values_that_are_not_finite_are_refused_by_name() {
+        let mut summary = Summary::new();
+        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            let error = summary.insert("torus.energy", value).unwrap_err();
+            assert!(matches!(error, Error::NotFinite { .. }));
+            assert!(error.to_string().contains("\"torus.energy\""), "{error}");
+        }
+        assert_eq!(summary, Summary::new());
+    }
+
+    #[test]
+    fn names_follow_the_grammar() {
+        let mut summary = Summary::new();
+        for name in ["a", "error_l2", "circle.n128.error_l2", "a.b2_c"] {
+            summary.insert(name, 1.0).unwrap();
+        }
+        for name in [
+            "", "Error", "a b", "a..b", ".a", "a.", "2d", "ä", "a-b", "a.2", "_a", "a\"b",
+        ] {
+            let error = summary.insert(name, 1.0).unwrap_err();
+            assert!(matches!(error, Error::MetricName { .. }), "{name:?}");
+        }
+        let error = summary.insert("a", 2.0).unwrap_err();
+        assert!(matches!(error, Error::DuplicateMetric { .. }));
+        assert_eq!(summary.get("a"), Some(1.0));
+    }
+
+    #[test]
+    fn bytes_do_not_depend_on_the_order_of_insertion() {
+        let (mut forwards, mut backwards) = (Summary::new(), Summary::new());
+        let metrics = [("b.two", 0.1 + 0.2), ("a", -1e-12), ("b.one", 3.0)];
+        for (name, value) in metrics {
+            forwards.insert(name, value).unwrap();
+        }
+        for (name, value) in metrics.into_iter().rev() {
+            backwards.insert(name, value).unwrap();
+        }
+        assert_eq!(forwards.to_json(), backwards.to_json());
+        let keys: Vec<&str> = forwards.iter().map(|(name, _)| name).collect();
+        assert_eq!(keys, ["a", "b.one", "b.two"]);
+        assert!(serde_json::from_str::<serde_json::Value>(&Summary::new().to_json()).is_ok());
+    }
+
+    proptest! {
+        #[test]
+        fn every_finite_number_survives(
+            value in proptest::num::f64::NORMAL | proptest::num::f64::ZERO,
+        ) {
+            let mut summary = Summary::new();
+            summary.insert("metric", value).unwrap();
+            let read = Summary::from_json(&summary.to_json()).unwrap();
+            prop_assert_eq!(read.get("metric").unwrap().to_bits(), value.to_bits());
+            prop_assert_eq!(read.to_json(), summary.to_json());
+        }
+    }
+}
