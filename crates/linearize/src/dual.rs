@@ -1,0 +1,285 @@
+//! Dual numbers `x + ε ẋ`, `ε² = 0`, over tensors: forward mode by overloading.
+//!
+//! Writing an energy with duals gives its directional derivative as an ordinary tensor expression;
+//! Burn's `backward` of that is a Hessian-vector product, reverse over forward. It recomputes the
+//! energy for every direction and shares no code with the linearized programs, which makes it an
+//! independent check of them.
+//!
+//! ```
+//! use burn::tensor::{DType, Device, Tensor, TensorData};
+//! use linearize::dual::{self, Dual};
+//!
+//! let device = Device::default();
+//! let tensor = |data: [f64; 2]| {
+//!     Tensor::<1>::from_data(TensorData::from(data), (&device, DType::F64))
+//! };
+//! // E(x) = Σ x³: the Hessian is diag(6x).
+//! let energy = |x: Dual<1>| x.powi(3).sum();
+//! let product = dual::hessian_vector_product(&tensor([1.0, 2.0]), &tensor([1.0, 10.0]), energy);
+//! product.into_data().assert_eq(&TensorData::from([6.0, 120.0]), true);
+//! ```
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use burn::tensor::Tensor;
+
+/// A tensor and its derivative in one direction.
+#[derive(Clone, Debug)]
+pub struct Dual<const D: usize> {
+    /// The value.
+    pub primal: Tensor<D>,
+    /// The directional derivative.
+    pub tangent: Tensor<D>,
+}
+
+impl<const D: usize> Dual<D> {
+    /// A value with a given derivative.
+    pub fn new(primal: Tensor<D>, tangent: Tensor<D>) -> Self {
+        Self { primal, tangent }
+    }
+
+    /// A value that does not vary.
+    pub fn constant(primal: Tensor<D>) -> Self {
+        let tangent = primal.zeros_like();
+        Self { primal, tangent }
+    }
+
+    /// Image under a linear map, which may change the rank.
+    #[must_use]
+    pub fn linear<const E: usize>(self, map: impl Fn(Tensor<D>) -> Tensor<E>) -> Dual<E> {
+        Dual {
+            primal: map(self.primal),
+            tangent: map(self.tangent),
+        }
+    }
+
+    /// Image under a pointwise function, given its value and its derivative there.
+    #[must_use]
+    pub fn pointwise(self, value: Tensor<D>, slope: Tensor<D>) -> Self {
+        Self {
+            primal: value,
+            tangent: self.tangent * slope,
+        }
+    }
+
+    /// Image of two duals under a bilinear map.
+    #[must_use]
+    pub fn bilinear<const E: usize, const F: usize>(
+        self,
+        other: Dual<E>,
+        map: impl Fn(Tensor<D>, Tensor<E>) -> Tensor<F>,
+    ) -> Dual<F> {
+        Dual {
+            primal: map(self.primal.clone(), other.primal.clone()),
+            tangent: map(self.tangent, other.primal) + map(self.primal, other.tangent),
+        }
+    }
+
+    /// Matrix product.
+    #[must_use]
+    pub fn matmul(self, other: Self) -> Self {
+        self.bilinear(other, Tensor::matmul)
+    }
+
+    /// Integer power.
+    #[must_use]
+    pub fn powi(self, exponent: i32) -> Self {
+        let slope = self.primal.clone().powi_scalar(exponent - 1) * f64::from(exponent);
+        let value = self.primal.clone().powi_scalar(exponent);
+        self.pointwise(value, slope)
+    }
+
+    /// Real power of positive numbers.
+    #[must_use]
+    pub fn powf(self, exponent: f64) -> Self {
+        let slope = self.primal.clone().powf_scalar(exponent - 1.0) * exponent;
+        let value = self.primal.clone().powf_scalar(exponent);
+        self.pointwise(value, slope)
+    }
+
+    /// Exponential.
+    #[must_use]
+    pub fn exp(self) -> Self {
+        let value = self.primal.clone().exp();
+        self.pointwise(value.clone(), value)
+    }
+
+    /// Natural logarithm.
+    #[must_use]
+    pub fn log(self) -> Self {
+        let (value, slope) = (self.primal.clone().log(), self.primal.clone().recip());
+        self.pointwise(value, slope)
+    }
+
+    /// Hyperbolic tangent.
+    #[must_use]
+    pub fn tanh(self) -> Self {
+        let value = self.primal.clone().tanh();
+        let slope = -(value.clone() * value.clone()) + 1.0;
+        self.pointwise(value, slope)
+    }
+
+    /// Sine.
+    #[must_use]
+    pub fn sin(self) -> Self {
+        let (value, slope) = (self.primal.clone().sin(), self.primal.clone().cos());
+        self.pointwise(value, slope)
+    }
+
+    /// Cosine.
+    #[must_use]
+    pub fn cos(self) -> Self {
+        let (value, slope) = (self.primal.clone().cos(), -self.primal.clone().sin());
+        self.pointwise(value, slope)
+    }
+
+    /// Square root.
+    #[must_use]
+    pub fn sqrt(self) -> Self {
+        let value = self.primal.clone().sqrt();
+        self.pointwise(value.clone(), value.recip() * 0.5)
+    }
+
+    /// Sum of all elements.
+    #[must_use]
+    pub fn sum(self) -> Dual<1> {
+        self.linear(Tensor::sum)
+    }
+
+    /// Mean of all elements.
+    #[must_use]
+    pub fn mean(self) -> Dual<1> {
+        self.linear(Tensor::mean)
+    }
+}
+
+impl<const D: usize> Add for Dual<D> {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self::new(self.primal + other.primal, self.tangent + other.tangent)
+    }
+}
+
+impl<const D: usize> Sub for Dual<D> {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        Self::new(self.primal - other.primal, self.tangent - other.tangent)
+    }
+}
+
+impl<const D: usize> Mul for Dual<D> {
+    type Output = Self;
+
+    fn mul(self, other: Self) -> Self {
+        self.bilinear(other, |a, b| a * b)
+    }
+}
+
+impl<const D: usize> Div for Dual<D> {
+    type Output = Self;
+
+    fn div(self, other: Self) -> Self {
+        let quotient = self.primal / other.primal.clone();
+        let tangent = (self.tangent - quotient.clone() * other.tangent) / other.primal;
+        Self::new(quotient, tangent)
+    }
+}
+
+impl<const D: usize> Neg for Dual<D> {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        self.linear(Tensor::neg)
+    }
+}
+
+/// A constant tensor is added to the value alone.
+impl<const D: usize> Add<Tensor<D>> for Dual<D> {
+    type Output = Self;
+
+    fn add(self, other: Tensor<D>) -> Self {
+        Self::new(self.primal + other, self.tangent)
+    }
+}
+
+impl<const D: usize> Sub<Tensor<D>> for Dual<D> {
+    type Output = Self;
+
+    fn sub(self, other: Tensor<D>) -> Self {
+        Self::new(self.primal - other, self.tangent)
+    }
+}
+
+impl<const D: usize> Mul<Tensor<D>> for Dual<D> {
+    type Output = Self;
+
+    fn mul(self, other: Tensor<D>) -> Self {
+        self.linear(|t| t * other.clone())
+    }
+}
+
+impl<const D: usize> Add<f64> for Dual<D> {
+    type Output = Self;
+
+    fn add(self, other: f64) -> Self {
+        Self::new(self.primal + other, self.tangent)
+    }
+}
+
+impl<const D: usize> Sub<f64> for Dual<D> {
+    type Output = Self;
+
+    fn sub(self, other: f64) -> Self {
+        Self::new(self.primal - other, self.tangent)
+    }
+}
+
+impl<const D: usize> Mul<f64> for Dual<D> {
+    type Output = Self;
+
+    fn mul(self, other: f64) -> Self {
+        self.linear(|t| t * other)
+    }
+}
+
+#[allow(
+    clippy::suspicious_arithmetic_impl,
+    reason = "Burn's backward pass of a division by a number has single precision"
+)]
+impl<const D: usize> Div<f64> for Dual<D> {
+    type Output = Self;
+
+    fn div(self, other: f64) -> Self {
+        self.linear(|t| t * other.recip())
+    }
+}
+
+/// `∇²E(u) p`, reverse over forward: Burn's gradient of the directional derivative of `energy`.
+///
+/// Operands that `energy` creates or captures may live on the plain device of `u`.
+pub fn hessian_vector_product<const D: usize>(
+    u: &Tensor<D>,
+    p: &Tensor<D>,
+    energy: impl FnOnce(Dual<D>) -> Dual<1>,
+) -> Tensor<D> {
+    let leaf = u.clone().autodiff().require_grad();
+    let direction = p.clone().autodiff();
+    let slope = energy(Dual::new(leaf.clone(), direction)).tangent;
+    let gradients = slope.backward();
+    leaf.grad(&gradients).unwrap_or_else(|| u.zeros_like())
+}
+
+/// `∇E(u)` by Burn's autodiff.
+///
+/// Burn 0.22.1 rounds `1/c` to single precision in the gradient of `x / c` with a number `c`; traced
+/// graphs do not. Write `x * (1.0 / c)` to compare the two.
+pub fn gradient<const D: usize>(
+    u: &Tensor<D>,
+    energy: impl FnOnce(Tensor<D>) -> Tensor<1>,
+) -> Tensor<D> {
+    let leaf = u.clone().autodiff().require_grad();
+    let gradients = energy(leaf.clone()).backward();
+    leaf.grad(&gradients).unwrap_or_else(|| u.zeros_like())
+}

@@ -1,0 +1,646 @@
+//! Value numbering: every operation enters a program through an [`Emitter`], which shares common
+//! subexpressions and applies the algebra that Burn's gradients leave undone: products with ones,
+//! sums with zeros, scalars spread over a whole grid.
+
+use std::collections::HashMap;
+use std::collections::hash_map::DefaultHasher;
+use std::hash::{Hash, Hasher};
+
+use burn::backend::ir::{
+    BaseOperationIr as Base, BinaryOpIr, CreationOpIr, FloatOperationIr as Float, FullOpIr,
+    NumericOperationIr as Num, OperationIr, ScalarIr, ScalarOpIr, ShapeOpIr, SliceAssignOpIr,
+    TensorId, TensorIr, UnaryOpIr,
+};
+use burn::tensor::{DType, Shape, Slice};
+
+use crate::ir::{detach_outputs, each_tensor, like, output, read_only, tensor};
+use crate::precision;
+
+/// A tensor all of whose elements are `factor` times the one element of `scalar` (one if absent).
+#[derive(Clone)]
+struct Uniform {
+    factor: f64,
+    scalar: Option<TensorIr>,
+}
+
+/// Builds one program.
+pub(crate) struct Emitter {
+    next: u64,
+    operations: Vec<OperationIr>,
+    /// Operations without output identifiers, and their outputs, by hash.
+    seen: HashMap<u64, Vec<(OperationIr, Vec<TensorIr>)>>,
+    producer: HashMap<TensorId, usize>,
+    uniform: HashMap<TensorId, Uniform>,
+}
+
+impl Emitter {
+    pub(crate) fn new(first_id: u64) -> Self {
+        Self {
+            next: first_id,
+            operations: Vec::new(),
+            seen: HashMap::new(),
+            producer: HashMap::new(),
+            uniform: HashMap::new(),
+        }
+    }
+
+    pub(crate) fn into_operations(self) -> Vec<OperationIr> {
+        self.operations
+    }
+
+    pub(crate) fn fresh(&mut self, shape: Shape, dtype: DType) -> TensorIr {
+        let id = self.next;
+        self.next += 1;
+        tensor(id, shape, dtype)
+    }
+
+    /// Emit an operation unless it is already there. Output identifiers are chosen here.
+    pub(crate) fn emit(&mut self, mut operation: OperationIr) -> Vec<TensorIr> {
+        sort_operands(&mut operation);
+        detach_outputs(&mut operation);
+        let hash = hash(&operation);
+        if let Some(outputs) = self.find(hash, &operation) {
+            return outputs.to_vec();
+        }
+        let key = operation.clone();
+        let mut fresh = HashMap::new();
+        let outputs: Vec<TensorIr> = key
+            .outputs()
+            .map(|out| {
+                let new = self.fresh(out.shape.clone(), out.dtype);
+                fresh.insert(out.id, new.id);
+                new
+            })
+            .collect();
+        each_tensor(&mut operation, |t| {
+            if let Some(id) = fresh.get(&t.id) {
+                t.id = *id;
+            }
+        });
+        for out in &outputs {
+            self.producer.insert(out.id, self.operations.len());
+        }
+        self.note_uniform(&operation);
+        self.operations.push(operation);
+        self.seen
+            .entry(hash)
+            .or_default()
+            .push((key, outputs.clone()));
+        outputs
+    }
+
+    fn find(&self, hash: u64, detached: &OperationIr) -> Option<&[TensorIr]> {
+        let candidates = self.seen.get(&hash)?;
+        let (_, outputs) = candidates.iter().find(|(seen, _)| seen == detached)?;
+        Some(outputs)
+    }
+
+    /// `factor * t`, if it has been emitted.
+    fn find_multiple(&self, t: &TensorIr, factor: f64) -> Option<TensorIr> {
+        let mut operation = OperationIr::NumericFloat(
+            t.dtype,
+            Num::MulScalar(ScalarOpIr {
+                lhs: read_only(t),
+                rhs: ScalarIr::Float(factor),
+                out: like(t),
+            }),
+        );
+        detach_outputs(&mut operation);
+        let outputs = self.find(hash(&operation), &operation)?;
+        outputs.first().cloned()
+    }
+
+    /// [`emit`](Self::emit) for operations with one output.
+    pub(crate) fn emit_one(&mut self, operation: OperationIr) -> TensorIr {
+        self.emit(operation)
+            .into_iter()
+            .next()
+            .expect("an operation built here has an output")
+    }
+
+    /// Emit a captured operation through the simplifying constructors.
+    pub(crate) fn simplify(&mut self, operation: OperationIr) -> Vec<TensorIr> {
+        let one = match &operation {
+            OperationIr::NumericFloat(_, op) => match op {
+                Num::Add(b) => Some(self.add(&b.lhs, &b.rhs)),
+                Num::Sub(b) => Some(self.sub(&b.lhs, &b.rhs)),
+                Num::Mul(b) => Some(self.mul(&b.lhs, &b.rhs)),
+                Num::Div(b) => Some(self.div(&b.lhs, &b.rhs)),
+                Num::Neg(u) => Some(self.neg(&u.input)),
+                Num::MulScalar(s) => Some(self.scale(&s.lhs, s.rhs.elem())),
+                Num::AddScalar(s) => Some(self.shift(&s.lhs, s.rhs.elem())),
+                Num::SubScalar(s) => Some(self.shift(&s.lhs, -s.rhs.elem::<f64>())),
+                Num::DivScalar(s) if self.constant(&s.lhs).is_some() => {
+                    Some(self.scale(&s.lhs, 1.0 / s.rhs.elem::<f64>()))
+                }
+                Num::PowiScalar(s) => Some(self.powi(&s.lhs, s.rhs.elem())),
+                Num::Full(full) => {
+                    Some(self.full(full.out.shape.clone(), full.out.dtype, full.value.elem()))
+                }
+                Num::SumDim(r) | Num::MeanDim(r) if r.input.shape[r.axis] == 1 => {
+                    Some(r.input.clone())
+                }
+                _ => None,
+            },
+            OperationIr::Float(_, Float::PowfScalar(s)) => Some(self.powf(&s.lhs, s.rhs.elem())),
+            OperationIr::BaseFloat(Base::Reshape(r)) => {
+                Some(self.reshape(&r.input, r.out.shape.clone()))
+            }
+            OperationIr::BaseFloat(Base::Expand(e)) => {
+                Some(self.expand(&e.input, e.out.shape.clone()))
+            }
+            OperationIr::BaseFloat(Base::Cast(c)) if c.input.dtype == c.out.dtype => {
+                Some(c.input.clone())
+            }
+            OperationIr::Activation(op) => precision::lower(self, op),
+            _ => None,
+        };
+        match one {
+            Some(out) => vec![out],
+            None => self.emit(operation),
+        }
+    }
+
+    fn note_uniform(&mut self, operation: &OperationIr) {
+        let constant = |factor: f64| Uniform {
+            factor,
+            scalar: None,
+        };
+        let noted = match operation {
+            OperationIr::BaseFloat(op) => match op {
+                Base::Zeros(c) => Some((c.out.id, constant(0.0))),
+                Base::Ones(c) => Some((c.out.id, constant(1.0))),
+                Base::Expand(s) => self.uniform_or_single(&s.input).map(|u| (s.out.id, u)),
+                Base::Reshape(s) => self.uniform.get(&s.input.id).map(|u| (s.out.id, u.clone())),
+                Base::Permute(s) => self.uniform.get(&s.input.id).map(|u| (s.out.id, u.clone())),
+                Base::SwapDims(s) => self.uniform.get(&s.input.id).map(|u| (s.out.id, u.clone())),
+                Base::Flip(s) => self.uniform.get(&s.input.id).map(|u| (s.out.id, u.clone())),
+                Base::Slice(s) => self
+                    .uniform
+                    .get(&s.tensor.id)
+                    .map(|u| (s.out.id, u.clone())),
+                _ => None,
+            },
+            OperationIr::NumericFloat(_, Num::Full(f)) => {
+                Some((f.out.id, constant(f.value.elem())))
+            }
+            _ => None,
+        };
+        if let Some((id, uniform)) = noted {
+            self.uniform.insert(id, uniform);
+        }
+    }
+
+    fn uniform_or_single(&self, t: &TensorIr) -> Option<Uniform> {
+        self.uniform.get(&t.id).cloned().or_else(|| {
+            (t.shape.num_elements() == 1).then(|| Uniform {
+                factor: 1.0,
+                scalar: Some(t.clone()),
+            })
+        })
+    }
+
+    /// The value of a tensor that is the same known number everywhere.
+    pub(crate) fn constant(&self, t: &TensorIr) -> Option<f64> {
+        match self.uniform.get(&t.id) {
+            Some(Uniform {
+                factor,
+                scalar: None,
+            }) => Some(*factor),
+            _ => None,
+        }
+    }
+
+    /// A tensor with one element that broadcasts to `t`, if `t` is uniform; otherwise `t`.
+    pub(crate) fn compact(&mut self, t: &TensorIr) -> TensorIr {
+        let rank = t.shape.num_dims();
+        match self.uniform.get(&t.id).cloned() {
+            Some(uniform) if t.shape.num_elements() > 1 => self.single(&uniform, rank, t.dtype),
+            _ => t.clone(),
+        }
+    }
+
+    fn single(&mut self, uniform: &Uniform, rank: usize, dtype: DType) -> TensorIr {
+        let shape = Shape::from(vec![1; rank]);
+        match &uniform.scalar {
+            None => self.full(shape, dtype, uniform.factor),
+            Some(scalar) => {
+                let scaled = self.scale(scalar, uniform.factor);
+                self.reshape(&scaled, shape)
+            }
+        }
+    }
+
+    pub(crate) fn full(&mut self, shape: Shape, dtype: DType, value: f64) -> TensorIr {
+        let out = output(shape, dtype);
+        self.emit_one(if value == 0.0 {
+            OperationIr::BaseFloat(Base::Zeros(CreationOpIr { out }))
+        } else if value.to_bits() == 1.0_f64.to_bits() {
+            OperationIr::BaseFloat(Base::Ones(CreationOpIr { out }))
+        } else {
+            OperationIr::NumericFloat(
+                dtype,
+                Num::Full(FullOpIr {
+                    out,
+                    value: ScalarIr::Float(value),
+                }),
+            )
+        })
+    }
+
+    pub(crate) fn reshape(&mut self, t: &TensorIr, shape: Shape) -> TensorIr {
+        if t.shape == shape {
+            return t.clone();
+        }
+        if let Some(value) = self.constant(t) {
+            return self.full(shape, t.dtype, value);
+        }
+        if let Some(OperationIr::BaseFloat(Base::Reshape(inner))) = self.definition(t) {
+            let input = inner.input.clone();
+            return self.reshape(&input, shape);
+        }
+        self.emit_one(OperationIr::BaseFloat(Base::Reshape(ShapeOpIr {
+            input: read_only(t),
+            out: output(shape, t.dtype),
+        })))
+    }
+
+    pub(crate) fn expand(&mut self, t: &TensorIr, shape: Shape) -> TensorIr {
+        if t.shape == shape {
+            return t.clone();
+        }
+        if let Some(value) = self.constant(t) {
+            return self.full(shape, t.dtype, value);
+        }
+        self.emit_one(OperationIr::BaseFloat(Base::Expand(ShapeOpIr {
+            input: read_only(t),
+            out: output(shape, t.dtype),
+        })))
+    }
+
+    fn definition(&self, t: &TensorIr) -> Option<&OperationIr> {
+        self.producer.get(&t.id).map(|i| &self.operations[*i])
+    }
+
+    /// If both operands are uniform, `combine` on single elements, spread over `shape`.
+    fn on_single_elements(
+        &mut self,
+        a: &TensorIr,
+        b: &TensorIr,
+        shape: &Shape,
+        combine: fn(&mut Self, &TensorIr, &TensorIr) -> TensorIr,
+    ) -> Option<TensorIr> {
+        if shape.num_elements() <= 1 {
+            return None;
+        }
+        let (ua, ub) = (self.uniform_or_single(a)?, self.uniform_or_single(b)?);
+        let rank = shape.num_dims();
+        let (a, b) = (
+            self.single(&ua, rank, a.dtype),
+            self.single(&ub, rank, b.dtype),
+        );
+        let single = combine(self, &a, &b);
+        Some(self.expand(&single, shape.clone()))
+    }
+
+    pub(crate) fn mul(&mut self, a: &TensorIr, b: &TensorIr) -> TensorIr {
+        let shape = broadcast(a, b);
+        if let Some(uniform) = self.on_single_elements(a, b, &shape, Self::mul) {
+            return uniform;
+        }
+        for (a, b) in [(a, b), (b, a)] {
+            if let Some(value) = self.constant(a)
+                && b.shape == shape
+            {
+                return self.scale(b, value);
+            }
+        }
+        let (a, b) = self.compact_operands(a, b, &shape);
+        self.binary(&a, &b, shape, Num::Mul)
+    }
+
+    pub(crate) fn add(&mut self, a: &TensorIr, b: &TensorIr) -> TensorIr {
+        let shape = broadcast(a, b);
+        if let Some(uniform) = self.on_single_elements(a, b, &shape, Self::add) {
+            return uniform;
+        }
+        for (a, b) in [(a, b), (b, a)] {
+            if let Some(value) = self.constant(a)
+                && b.shape == shape
+            {
+                return self.shift(b, value);
+            }
+        }
+        if a.id == b.id {
+            return self.scale(a, 2.0);
+        }
+        if let Some(OperationIr::NumericFloat(_, Num::Neg(neg))) = self.definition(b) {
+            let negated = neg.input.clone();
+            return self.sub(a, &negated);
+        }
+        if let Some(OperationIr::NumericFloat(_, Num::Neg(neg))) = self.definition(a) {
+            let negated = neg.input.clone();
+            return self.sub(b, &negated);
+        }
+        if let Some(joined) = self.join(a, b) {
+            return joined;
+        }
+        let (a, b) = self.compact_operands(a, b, &shape);
+        self.binary(&a, &b, shape, Num::Add)
+    }
+
+    /// `a + b` without an addition, if both are blocks put into zeros and the blocks do not overlap:
+    /// the second block can be put into the first tensor. Gradients of shifts are full of these.
+    pub(crate) fn join(&mut self, a: &TensorIr, b: &TensorIr) -> Option<TensorIr> {
+        let (first, second) = (self.block_in_zeros(a)?, self.block_in_zeros(b)?);
+        if !disjoint(&first.ranges, &second.ranges) {
+            return None;
+        }
+        let joined = SliceAssignOpIr {
+            tensor: read_only(a),
+            ..second.clone()
+        };
+        Some(self.emit_one(OperationIr::BaseFloat(Base::SliceAssign(joined))))
+    }
+
+    fn block_in_zeros(&self, t: &TensorIr) -> Option<&SliceAssignOpIr> {
+        match self.definition(t) {
+            Some(OperationIr::BaseFloat(Base::SliceAssign(block)))
+                if self.constant(&block.tensor) == Some(0.0) =>
+            {
+                Some(block)
+            }
+            _ => None,
+        }
+    }
+
+    pub(crate) fn sub(&mut self, a: &TensorIr, b: &TensorIr) -> TensorIr {
+        let shape = broadcast(a, b);
+        if let Some(uniform) = self.on_single_elements(a, b, &shape, Self::sub) {
+            return uniform;
+        }
+        if let Some(value) = self.constant(b)
+            && a.shape == shape
+        {
+            return self.shift(a, -value);
+        }
+        if self.constant(a) == Some(0.0) && b.shape == shape {
+            return self.neg(b);
+        }
+        if a.id == b.id {
+            return self.full(shape, a.dtype, 0.0);
+        }
+        if let Some(OperationIr::NumericFloat(_, Num::Neg(neg))) = self.definition(b) {
+            let negated = neg.input.clone();
+            return self.add(a, &negated);
+        }
+        let (a, b) = self.compact_operands(a, b, &shape);
+        self.binary(&a, &b, shape, Num::Sub)
+    }
+
+    pub(crate) fn div(&mut self, a: &TensorIr, b: &TensorIr) -> TensorIr {
+        let shape = broadcast(a, b);
+        if let Some(uniform) = self.on_single_elements(a, b, &shape, Self::div) {
+            return uniform;
+        }
+        if let (Some(x), Some(y)) = (self.constant(a), self.constant(b)) {
+            return self.full(shape, a.dtype, x / y);
+        }
+        if let Some(value) = self.constant(b)
+            && a.shape == shape
+        {
+            return if value.to_bits() == 1.0_f64.to_bits() {
+                a.clone()
+            } else {
+                self.scalar(a, value, Num::DivScalar)
+            };
+        }
+        let (a, b) = self.compact_operands(a, b, &shape);
+        self.binary(&a, &b, shape, Num::Div)
+    }
+
+    pub(crate) fn neg(&mut self, t: &TensorIr) -> TensorIr {
+        self.scale(t, -1.0)
+    }
+
+    /// `factor * t`
+    pub(crate) fn scale(&mut self, t: &TensorIr, factor: f64) -> TensorIr {
+        if factor.to_bits() == 1.0_f64.to_bits() {
+            return t.clone();
+        }
+        if let Some(value) = self.constant(t) {
+            return self.full(t.shape.clone(), t.dtype, factor * value);
+        }
+        if t.shape.num_elements() > 1
+            && let Some(mut uniform) = self.uniform.get(&t.id).cloned()
+        {
+            uniform.factor *= factor;
+            let single = self.single(&uniform, t.shape.num_dims(), t.dtype);
+            return self.expand(&single, t.shape.clone());
+        }
+        match self.definition(t) {
+            Some(OperationIr::NumericFloat(_, Num::Neg(inner))) => {
+                let input = inner.input.clone();
+                self.scale(&input, -factor)
+            }
+            Some(OperationIr::NumericFloat(_, Num::MulScalar(inner)))
+                if factor.to_bits() != (-1.0_f64).to_bits() =>
+            {
+                let (input, inner) = (inner.lhs.clone(), inner.rhs.elem::<f64>());
+                self.scale(&input, factor * inner)
+            }
+            // The factor of a spread scalar goes into the scalar.
+            Some(OperationIr::NumericFloat(_, Num::Mul(product)))
+                if t.shape.num_elements() > 1
+                    && factor.to_bits() != (-1.0_f64).to_bits()
+                    && has_one_element(product).is_some() =>
+            {
+                let (single, other) = has_one_element(product).expect("checked by the guard");
+                let (single, other) = (single.clone(), other.clone());
+                let single = self.scale(&single, factor);
+                self.mul(&other, &single)
+            }
+            _ if factor.to_bits() == (-1.0_f64).to_bits() => {
+                self.emit_one(OperationIr::NumericFloat(
+                    t.dtype,
+                    Num::Neg(UnaryOpIr {
+                        input: read_only(t),
+                        out: like(t),
+                    }),
+                ))
+            }
+            // Negatives of what is there vanish in differences.
+            _ => match self.find_multiple(t, -factor) {
+                Some(opposite) => self.neg(&opposite),
+                None => self.scalar(t, factor, Num::MulScalar),
+            },
+        }
+    }
+
+    /// `t + value`
+    pub(crate) fn shift(&mut self, t: &TensorIr, value: f64) -> TensorIr {
+        if value == 0.0 {
+            return t.clone();
+        }
+        if let Some(constant) = self.constant(t) {
+            return self.full(t.shape.clone(), t.dtype, constant + value);
+        }
+        if let Some(OperationIr::NumericFloat(_, Num::AddScalar(inner))) = self.definition(t) {
+            let (input, inner) = (inner.lhs.clone(), inner.rhs.elem::<f64>());
+            return self.shift(&input, inner + value);
+        }
+        self.scalar(t, value, Num::AddScalar)
+    }
+
+    /// Integer power; small ones become products.
+    pub(crate) fn powi(&mut self, t: &TensorIr, exponent: i64) -> TensorIr {
+        match exponent {
+            0 => self.full(t.shape.clone(), t.dtype, 1.0),
+            1 => t.clone(),
+            2 => self.mul(t, t),
+            3 => {
+                let square = self.mul(t, t);
+                self.mul(&square, t)
+            }
+            4 => {
+                let square = self.mul(t, t);
+                self.mul(&square, &square)
+            }
+            -1 => self.unary(t, Float::Recip),
+            _ => self.emit_one(OperationIr::NumericFloat(
+                t.dtype,
+                Num::PowiScalar(ScalarOpIr {
+                    lhs: read_only(t),
+                    rhs: ScalarIr::Int(exponent),
+                    out: like(t),
+                }),
+            )),
+        }
+    }
+
+    pub(crate) fn powf(&mut self, t: &TensorIr, exponent: f64) -> TensorIr {
+        if exponent.fract() == 0.0 && exponent.abs() < 1e6 {
+            return self.powi(t, exponent as i64);
+        }
+        self.emit_one(OperationIr::Float(
+            t.dtype,
+            Float::PowfScalar(ScalarOpIr {
+                lhs: read_only(t),
+                rhs: ScalarIr::Float(exponent),
+                out: like(t),
+            }),
+        ))
+    }
+
+    pub(crate) fn unary(&mut self, t: &TensorIr, variant: fn(UnaryOpIr) -> Float) -> TensorIr {
+        self.emit_one(OperationIr::Float(
+            t.dtype,
+            variant(UnaryOpIr {
+                input: read_only(t),
+                out: like(t),
+            }),
+        ))
+    }
+
+    pub(crate) fn numeric(&mut self, t: &TensorIr, variant: fn(UnaryOpIr) -> Num) -> TensorIr {
+        self.emit_one(OperationIr::NumericFloat(
+            t.dtype,
+            variant(UnaryOpIr {
+                input: read_only(t),
+                out: like(t),
+            }),
+        ))
+    }
+
+    fn scalar(&mut self, t: &TensorIr, value: f64, variant: fn(ScalarOpIr) -> Num) -> TensorIr {
+        self.emit_one(OperationIr::NumericFloat(
+            t.dtype,
+            variant(ScalarOpIr {
+                lhs: read_only(t),
+                rhs: ScalarIr::Float(value),
+                out: like(t),
+            }),
+        ))
+    }
+
+    fn binary(
+        &mut self,
+        a: &TensorIr,
+        b: &TensorIr,
+        shape: Shape,
+        variant: fn(BinaryOpIr) -> Num,
+    ) -> TensorIr {
+        self.emit_one(OperationIr::NumericFloat(
+            a.dtype,
+            variant(BinaryOpIr {
+                lhs: read_only(a),
+                rhs: read_only(b),
+                out: output(shape, a.dtype),
+            }),
+        ))
+    }
+
+    /// Uniform operands shrink to one element where the other operand already has the full shape.
+    fn compact_operands(
+        &mut self,
+        a: &TensorIr,
+        b: &TensorIr,
+        shape: &Shape,
+    ) -> (TensorIr, TensorIr) {
+        if b.shape == *shape && self.uniform.contains_key(&a.id) {
+            (self.compact(a), b.clone())
+        } else if a.shape == *shape && self.uniform.contains_key(&b.id) {
+            (a.clone(), self.compact(b))
+        } else {
+            (a.clone(), b.clone())
+        }
+    }
+}
+
+/// Whether two blocks are certain not to overlap: they do not along some axis.
+fn disjoint(a: &[Slice], b: &[Slice]) -> bool {
+    a.iter().zip(b).any(|(a, b)| {
+        let (Some(a_end), Some(b_end)) = (a.end, b.end) else {
+            return false;
+        };
+        let forward = a.step > 0 && b.step > 0;
+        let from_start = a.start >= 0 && b.start >= 0 && a_end >= 0 && b_end >= 0;
+        forward && from_start && (a_end <= b.start || b_end <= a.start)
+    })
+}
+
+/// Shape of an elementwise operation of two tensors of equal rank.
+pub(crate) fn broadcast(a: &TensorIr, b: &TensorIr) -> Shape {
+    let axes = a.shape.iter().zip(b.shape.iter());
+    Shape::from(
+        axes.map(|(x, y)| if *x == 1 { *y } else { *x })
+            .collect::<Vec<_>>(),
+    )
+}
+
+fn hash(operation: &OperationIr) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    operation.hash(&mut hasher);
+    hasher.finish()
+}
+
+/// The operand with one element, and the other.
+fn has_one_element(product: &BinaryOpIr) -> Option<(&TensorIr, &TensorIr)> {
+    if product.rhs.shape.num_elements() == 1 {
+        Some((&product.rhs, &product.lhs))
+    } else if product.lhs.shape.num_elements() == 1 {
+        Some((&product.lhs, &product.rhs))
+    } else {
+        None
+    }
+}
+
+/// Commutative operands in one order, youngest first: it is the likeliest to be reused in place.
+fn sort_operands(operation: &mut OperationIr) {
+    if let OperationIr::NumericFloat(_, Num::Add(op) | Num::Mul(op))
+    | OperationIr::NumericInt(_, Num::Add(op) | Num::Mul(op)) = operation
+        && op.lhs.id < op.rhs.id
+    {
+        std::mem::swap(&mut op.lhs, &mut op.rhs);
+    }
+}

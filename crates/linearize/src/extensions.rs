@@ -1,0 +1,190 @@
+//! Custom operations: how they differentiate, and how each backend runs them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use burn::backend::BackendTypes;
+use burn::backend::ir::{BackendIr, CustomOpIr, HandleContainer, TensorIr};
+
+use crate::{Builder, Error};
+
+/// Forward-mode rule of a custom operation.
+///
+/// A rule maps the tangents of the inputs (`None` is zero) to the tangents of the outputs. It may
+/// add operations to the primal program, which runs once per point, and builds tangents, which must
+/// depend linearly on the given ones. Closures of the same signature are rules;
+/// [`Multilinear`] is the rule of an operation that is linear in each of its inputs.
+///
+/// A pointwise function `f⁽ᵏ⁾(x)` whose order `k` is a scalar argument differentiates to
+/// `f⁽ᵏ⁺¹⁾(x) ⊙ ẋ`:
+///
+/// ```
+/// use linearize::{Extensions, ScalarIr};
+/// let mut extensions = Extensions::new();
+/// extensions.rule("pointwise", |operation: &linearize::CustomOpIr,
+///                               tangents: &[Option<linearize::TensorIr>],
+///                               build: &mut linearize::Builder| {
+///     let Some(tangent) = &tangents[0] else { return Ok(vec![None]) };
+///     let order = operation.scalars[0].elem::<u64>();
+///     let mut derivative = operation.clone();
+///     derivative.scalars[0] = ScalarIr::UInt(order + 1);
+///     let derivative = build.primal(derivative);
+///     Ok(vec![Some(build.mul(&derivative, tangent))])
+/// });
+/// ```
+pub trait Rule: Send + Sync {
+    /// Tangents of the outputs of `operation`, given the tangents of its inputs, in their order.
+    ///
+    /// # Errors
+    /// [`Error::NoRule`] if this combination of active inputs cannot be differentiated.
+    fn jvp(
+        &self,
+        operation: &CustomOpIr,
+        tangents: &[Option<TensorIr>],
+        build: &mut Builder,
+    ) -> Result<Vec<Option<TensorIr>>, Error>;
+}
+
+impl<F> Rule for F
+where
+    F: Fn(&CustomOpIr, &[Option<TensorIr>], &mut Builder) -> Result<Vec<Option<TensorIr>>, Error>
+        + Send
+        + Sync,
+{
+    fn jvp(
+        &self,
+        operation: &CustomOpIr,
+        tangents: &[Option<TensorIr>],
+        build: &mut Builder,
+    ) -> Result<Vec<Option<TensorIr>>, Error> {
+        self(operation, tangents, build)
+    }
+}
+
+/// Rule of operations that are linear in each input separately: convolutions, transforms, products.
+///
+/// The tangent is the sum over the active inputs of the operation with that input replaced by its
+/// tangent.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Multilinear;
+
+impl Rule for Multilinear {
+    fn jvp(
+        &self,
+        operation: &CustomOpIr,
+        tangents: &[Option<TensorIr>],
+        build: &mut Builder,
+    ) -> Result<Vec<Option<TensorIr>>, Error> {
+        Ok(build.multilinear(operation, tangents))
+    }
+}
+
+/// Handlers of custom operations on backend `B`, by identifier.
+///
+/// Burn's registry of the same name, which additionally knows what it contains, so that a missing
+/// handler is an [error](Error::NoHandler) when a program is loaded rather than a panic when it
+/// runs.
+pub struct CustomOpRegistry<B: BackendIr> {
+    pub(crate) handlers: burn_router::CustomOpRegistry<B>,
+    pub(crate) known: BTreeSet<String>,
+}
+
+impl<B: BackendIr> Clone for CustomOpRegistry<B> {
+    fn clone(&self) -> Self {
+        Self {
+            handlers: self.handlers.clone(),
+            known: self.known.clone(),
+        }
+    }
+}
+
+impl<B: BackendIr> Default for CustomOpRegistry<B> {
+    fn default() -> Self {
+        Self {
+            handlers: burn_router::CustomOpRegistry::new(),
+            known: BTreeSet::new(),
+        }
+    }
+}
+
+impl<B: BackendIr> CustomOpRegistry<B> {
+    /// Run operations called `id` with `handler`, which reads the inputs from the container and
+    /// registers the outputs in it. Replaces an earlier handler of the same name.
+    pub fn register<F>(&mut self, id: &str, handler: F)
+    where
+        F: Fn(&mut HandleContainer<B::Handle>, &CustomOpIr, &<B as BackendTypes>::Device)
+            + Send
+            + Sync
+            + 'static,
+    {
+        self.handlers.register(id, handler);
+        self.known.insert(id.to_owned());
+    }
+}
+
+/// Differentiation rules and per-backend handlers of custom (backend-extension) operations.
+#[derive(Clone, Default)]
+pub struct Extensions {
+    rules: BTreeMap<String, Arc<dyn Rule>>,
+    #[cfg(feature = "flex")]
+    pub(crate) flex: CustomOpRegistry<burn::backend::Flex>,
+    #[cfg(feature = "ndarray")]
+    #[allow(
+        deprecated,
+        reason = "burn deprecates the backend, which we still offer"
+    )]
+    pub(crate) ndarray: CustomOpRegistry<burn::backend::NdArray>,
+    #[cfg(any(feature = "wgpu", feature = "cuda"))]
+    pub(crate) cube: CustomOpRegistry<burn::backend::Cube>,
+}
+
+impl Extensions {
+    /// No custom operations.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Differentiate custom operations called `id` with `rule`.
+    pub fn rule(&mut self, id: &str, rule: impl Rule + 'static) -> &mut Self {
+        self.rules.insert(id.to_owned(), Arc::new(rule));
+        self
+    }
+
+    pub(crate) fn rule_of(&self, id: &str) -> Option<Arc<dyn Rule>> {
+        self.rules.get(id).cloned()
+    }
+
+    /// Register handlers on the Flex backend.
+    #[cfg(feature = "flex")]
+    pub fn on_flex(
+        &mut self,
+        f: impl FnOnce(&mut CustomOpRegistry<burn::backend::Flex>),
+    ) -> &mut Self {
+        f(&mut self.flex);
+        self
+    }
+
+    /// Register handlers on the `NdArray` backend.
+    #[cfg(feature = "ndarray")]
+    #[allow(
+        deprecated,
+        reason = "burn deprecates the backend, which we still offer"
+    )]
+    pub fn on_ndarray(
+        &mut self,
+        f: impl FnOnce(&mut CustomOpRegistry<burn::backend::NdArray>),
+    ) -> &mut Self {
+        f(&mut self.ndarray);
+        self
+    }
+
+    /// Register handlers on the `CubeCL` backend (wgpu, CUDA).
+    #[cfg(any(feature = "wgpu", feature = "cuda"))]
+    pub fn on_cube(
+        &mut self,
+        f: impl FnOnce(&mut CustomOpRegistry<burn::backend::Cube>),
+    ) -> &mut Self {
+        f(&mut self.cube);
+        self
+    }
+}

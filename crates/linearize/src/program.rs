@@ -1,0 +1,714 @@
+//! From a graph to straight-line programs.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::fmt;
+
+use burn::backend::ir::{
+    BaseOperationIr as Base, NumericOperationIr as Num, OperationIr, TensorId, TensorIr,
+    TensorStatus,
+};
+use burn::tensor::{Device, TensorData};
+
+use crate::emit::Emitter;
+use crate::ir::{Line, detach_outputs, each_tensor, name, read_only, rename, with_status};
+use crate::rules::{self, Context};
+use crate::tangent::{Builder, Expression};
+use crate::{Error, Extensions, Graph, Linearization};
+
+/// Programs ready to run: constants (once), value, primal (once per point), tangent (once per
+/// direction).
+///
+/// `Display` lists the operations; the [statistics](Self::statistics) count them.
+#[derive(Clone, Debug)]
+pub struct Program {
+    pub(crate) variables: Vec<TensorIr>,
+    pub(crate) parameters: Vec<TensorIr>,
+    pub(crate) constants: Vec<(TensorIr, TensorData)>,
+    /// Operations that depend on no input.
+    pub(crate) constant: Vec<OperationIr>,
+    pub(crate) value: Block,
+    pub(crate) primal: Block,
+    pub(crate) tangent: Block,
+    /// What the tangent program reads of the primal program, to be freed with the point.
+    pub(crate) saved: Vec<TensorIr>,
+}
+
+/// One straight-line program.
+#[derive(Clone, Debug)]
+pub(crate) struct Block {
+    /// Tensors to register before running, `None` where the program does not read the input.
+    pub(crate) inputs: Vec<Option<TensorId>>,
+    pub(crate) operations: Vec<OperationIr>,
+    /// Outputs, with the status under which to take them out of the interpreter.
+    pub(crate) outputs: Vec<TensorIr>,
+}
+
+/// How many operations of which name each program runs.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Statistics {
+    /// Run by [`value`](Linearization::value).
+    pub value: BTreeMap<String, usize>,
+    /// Run by [`at`](Linearization::at).
+    pub primal: BTreeMap<String, usize>,
+    /// Run by [`apply`](Linearization::apply).
+    pub tangent: BTreeMap<String, usize>,
+    /// Number of tensors that `at` keeps for `apply`.
+    pub saved: usize,
+    /// Number of elements of these tensors.
+    pub saved_elements: usize,
+}
+
+impl Program {
+    /// Load the programs onto a device.
+    ///
+    /// # Errors
+    /// [`Error::NoHandler`] if a custom operation has no handler on the device's backend,
+    /// [`Error::Device`] if that backend is not compiled in.
+    pub fn on(&self, device: &Device, extensions: &Extensions) -> Result<Linearization, Error> {
+        Linearization::new(self, device, extensions)
+    }
+
+    /// Operation counts.
+    pub fn statistics(&self) -> Statistics {
+        Statistics {
+            value: count(&self.value.operations),
+            primal: count(&self.primal.operations),
+            tangent: count(&self.tangent.operations),
+            saved: self.saved.len(),
+            saved_elements: self.saved.iter().map(|t| t.shape.num_elements()).sum(),
+        }
+    }
+
+    /// Identifiers of the custom operations in all programs.
+    pub(crate) fn custom_operations(&self) -> impl Iterator<Item = &str> {
+        [
+            &self.constant,
+            &self.value.operations,
+            &self.primal.operations,
+            &self.tangent.operations,
+        ]
+        .into_iter()
+        .flatten()
+        .filter_map(|operation| match operation {
+            OperationIr::Custom(custom) => Some(custom.id.as_str()),
+            _ => None,
+        })
+    }
+}
+
+fn is_drop(operation: &OperationIr) -> bool {
+    matches!(operation, OperationIr::Drop(_))
+}
+
+fn count(operations: &[OperationIr]) -> BTreeMap<String, usize> {
+    let mut counts = BTreeMap::new();
+    for operation in operations.iter().filter(|operation| !is_drop(operation)) {
+        *counts.entry(name(operation)).or_insert(0) += 1;
+    }
+    counts
+}
+
+impl fmt::Display for Program {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (title, operations) in [
+            ("constant", &self.constant),
+            ("value", &self.value.operations),
+            ("primal", &self.primal.operations),
+            ("tangent", &self.tangent.operations),
+        ] {
+            writeln!(f, "{title}:")?;
+            for operation in operations.iter().filter(|operation| !is_drop(operation)) {
+                writeln!(f, "  {}", Line(operation))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A graph after common-subexpression elimination and algebra, in new numbering.
+struct Simplified {
+    operations: Vec<OperationIr>,
+    variables: Vec<TensorIr>,
+    parameters: Vec<TensorIr>,
+    constants: Vec<(TensorIr, TensorData)>,
+    value: TensorIr,
+    outputs: Vec<TensorIr>,
+}
+
+fn simplify(graph: &Graph) -> Simplified {
+    let mut emitter = Emitter::new(0);
+    let mut map: HashMap<TensorId, TensorIr> = HashMap::new();
+    let mut input = |old: &TensorIr| {
+        let new = emitter.fresh(old.shape.clone(), old.dtype);
+        map.insert(old.id, new.clone());
+        new
+    };
+    let variables = graph.variables.iter().map(&mut input).collect();
+    let parameters = graph.parameters.iter().map(&mut input).collect();
+    let constants = graph
+        .constants
+        .iter()
+        .map(|(old, data)| (input(old), data.clone()))
+        .collect();
+    for operation in live(
+        &graph.operations,
+        graph.outputs.iter().chain([&graph.value]),
+    ) {
+        replay(&mut map, operation, |operation| emitter.simplify(operation));
+    }
+    let value = map[&graph.value.id].clone();
+    let outputs: Vec<TensorIr> = graph.outputs.iter().map(|t| map[&t.id].clone()).collect();
+    let operations = emitter.into_operations();
+    let operations = live(&operations, outputs.iter().chain([&value]))
+        .cloned()
+        .collect();
+    Simplified {
+        operations,
+        variables,
+        parameters,
+        constants,
+        value,
+        outputs,
+    }
+}
+
+/// Emit `operation` with its inputs renamed, and note what its outputs are called now.
+fn replay(
+    map: &mut HashMap<TensorId, TensorIr>,
+    operation: &OperationIr,
+    emit: impl FnOnce(OperationIr) -> Vec<TensorIr>,
+) -> Vec<TensorIr> {
+    let old: Vec<TensorId> = operation.outputs().map(|out| out.id).collect();
+    let mut operation = operation.clone();
+    detach_outputs(&mut operation);
+    rename(&mut operation, map);
+    let new = emit(operation);
+    map.extend(old.into_iter().zip(new.iter().cloned()));
+    new
+}
+
+/// Dead-code elimination: the operations that `outputs` depend on, in order.
+fn live<'a, 'b>(
+    operations: &'a [OperationIr],
+    outputs: impl Iterator<Item = &'b TensorIr>,
+) -> impl Iterator<Item = &'a OperationIr> {
+    let mut needed: HashSet<TensorId> = outputs.map(|t| t.id).collect();
+    let mut keep = vec![false; operations.len()];
+    for (operation, keep) in operations.iter().zip(&mut keep).rev() {
+        if operation.outputs().any(|out| needed.contains(&out.id)) {
+            needed.extend(operation.inputs().map(|t| t.id));
+            *keep = true;
+        }
+    }
+    operations
+        .iter()
+        .zip(keep)
+        .filter_map(|(operation, keep)| keep.then_some(operation))
+}
+
+pub(crate) fn linearize(graph: &Graph, extensions: &Extensions) -> Result<Program, Error> {
+    let simplified = simplify(graph);
+    let mut cx = Context {
+        build: Builder::new(),
+        extensions,
+        tangents: HashMap::new(),
+    };
+    let mut map: HashMap<TensorId, TensorIr> = HashMap::new();
+    let mut input = |build: &mut Builder, old: &TensorIr| {
+        let new = build.primal.fresh(old.shape.clone(), old.dtype);
+        map.insert(old.id, new.clone());
+        new
+    };
+    let variables: Vec<TensorIr> = (simplified.variables.iter())
+        .map(|old| input(&mut cx.build, old))
+        .collect();
+    let parameters: Vec<TensorIr> = (simplified.parameters.iter())
+        .map(|old| input(&mut cx.build, old))
+        .collect();
+    let constants: Vec<(TensorIr, TensorData)> = (simplified.constants.iter())
+        .map(|(old, data)| (input(&mut cx.build, old), data.clone()))
+        .collect();
+    let directions: Vec<TensorIr> = variables
+        .iter()
+        .map(|variable| {
+            let seed = cx
+                .build
+                .tangent
+                .fresh(variable.shape.clone(), variable.dtype);
+            cx.tangents
+                .insert(variable.id, Expression::atom(seed.clone()));
+            seed
+        })
+        .collect();
+
+    // Only what the outputs depend on needs a tangent; the value alone does not.
+    let mut differentiated: HashSet<TensorId> = HashSet::new();
+    let mut uses: HashMap<TensorId, usize> = HashMap::new();
+    for operation in live(&simplified.operations, simplified.outputs.iter()) {
+        differentiated.extend(operation.outputs().map(|t| t.id));
+        for t in operation.inputs() {
+            *uses.entry(t.id).or_insert(0) += 1;
+        }
+    }
+    for t in &simplified.outputs {
+        *uses.entry(t.id).or_insert(0) += 1;
+    }
+    for operation in &simplified.operations {
+        let old: Vec<TensorId> = operation.outputs().map(|out| out.id).collect();
+        let mut emitted = None;
+        let new = replay(&mut map, operation, |operation| {
+            let outputs = cx.build.primal.emit(operation.clone());
+            emitted = Some(operation);
+            outputs
+        });
+        if !old.iter().any(|id| differentiated.contains(id)) {
+            continue;
+        }
+        let mut emitted = emitted.expect("replaying emits");
+        name_outputs(&mut emitted, &new);
+        let tangents = rules::jvp(&mut cx, &emitted)?;
+        for ((old, new), tangent) in old.iter().zip(&new).zip(tangents) {
+            let Some(mut tangent) = tangent else { continue };
+            if uses.get(old).copied().unwrap_or(0) > 1 && tangent.is_long() {
+                tangent = cx.build.shared(tangent);
+            }
+            cx.tangents.insert(new.id, tangent);
+        }
+    }
+
+    let value = map[&simplified.value.id].clone();
+    let outputs: Vec<TensorIr> = (simplified.outputs.iter())
+        .map(|t| map[&t.id].clone())
+        .collect();
+    let tangents: Vec<TensorIr> = outputs
+        .iter()
+        .map(|out| {
+            let tangent = cx.tangents.get(&out.id).cloned();
+            cx.build.or_zeros(tangent, &out.shape, out.dtype)
+        })
+        .collect();
+    Ok(assemble(
+        cx.build,
+        variables,
+        parameters,
+        constants,
+        &directions,
+        &value,
+        &outputs,
+        &tangents,
+    ))
+}
+
+/// Give a detached operation its outputs back.
+fn name_outputs(operation: &mut OperationIr, outputs: &[TensorIr]) {
+    let detached: Vec<TensorId> = operation.outputs().map(|out| out.id).collect();
+    each_tensor(operation, |t| {
+        if let Some(i) = detached.iter().position(|id| *id == t.id) {
+            t.id = outputs[i].id;
+        }
+    });
+}
+
+#[allow(
+    clippy::too_many_arguments,
+    reason = "called once, to finish linearize"
+)]
+fn assemble(
+    build: Builder,
+    variables: Vec<TensorIr>,
+    parameters: Vec<TensorIr>,
+    constants: Vec<(TensorIr, TensorData)>,
+    directions: &[TensorIr],
+    value: &TensorIr,
+    outputs: &[TensorIr],
+    tangents: &[TensorIr],
+) -> Program {
+    let tangent: Vec<OperationIr> = live(&build.tangent.into_operations(), tangents.iter())
+        .cloned()
+        .collect();
+    let all = build.primal.into_operations();
+
+    // What depends on inputs, and what does not.
+    let inputs: Vec<TensorIr> = variables.iter().chain(&parameters).cloned().collect();
+    let mut varying: HashSet<TensorId> = inputs.iter().map(|t| t.id).collect();
+    for operation in &all {
+        if operation.inputs().any(|t| varying.contains(&t.id)) {
+            varying.extend(operation.outputs().map(|t| t.id));
+        }
+    }
+    let varies = |operation: &OperationIr| operation.outputs().any(|t| varying.contains(&t.id));
+    // Filling memory with a number is as cheap as reading it: do that where it is needed. Whatever
+    // else is constant is computed once.
+    let local: Vec<OperationIr> = all
+        .iter()
+        .filter(|operation| varies(operation) || is_fill(operation))
+        .cloned()
+        .collect();
+    let produced_locally: HashSet<TensorId> = (local.iter())
+        .flat_map(|operation| operation.outputs().map(|t| t.id).collect::<Vec<_>>())
+        .chain(inputs.iter().map(|t| t.id))
+        .collect();
+
+    let in_primal: HashSet<TensorId> = (all.iter())
+        .flat_map(|operation| operation.outputs().map(|t| t.id).collect::<Vec<_>>())
+        .chain(inputs.iter().map(|t| t.id))
+        .collect();
+    let mut saved: Vec<TensorIr> = Vec::new();
+    let mut from_constants: Vec<TensorIr> = Vec::new();
+    for t in tangent.iter().flat_map(OperationIr::inputs) {
+        let list = if produced_locally.contains(&t.id) {
+            &mut saved
+        } else if in_primal.contains(&t.id) {
+            &mut from_constants
+        } else {
+            continue;
+        };
+        if !list.iter().any(|known| known.id == t.id) {
+            list.push(read_only(t));
+        }
+    }
+
+    let primal: Vec<OperationIr> = live(&local, outputs.iter().chain([value]).chain(&saved))
+        .cloned()
+        .collect();
+    let value_operations: Vec<OperationIr> = live(&local, [value].into_iter()).cloned().collect();
+    for t in (primal.iter().chain(&value_operations))
+        .flat_map(OperationIr::inputs)
+        .chain(outputs)
+        .chain([value])
+    {
+        if !produced_locally.contains(&t.id) {
+            from_constants.push(t.clone());
+        }
+    }
+    let constant: Vec<OperationIr> = live(&all, from_constants.iter())
+        .filter(|operation| !varies(operation))
+        .cloned()
+        .collect();
+
+    let primal_outputs: Vec<TensorIr> = [value].into_iter().chain(outputs).cloned().collect();
+    let keep: HashSet<TensorId> = saved.iter().map(|t| t.id).collect();
+    Program {
+        value: separate(Block::new(
+            &inputs,
+            value_operations,
+            std::slice::from_ref(value),
+            &HashSet::new(),
+        )),
+        primal: Block::new(&inputs, primal, &primal_outputs, &keep),
+        tangent: Block::new(directions, tangent, tangents, &HashSet::new()),
+        variables,
+        parameters,
+        constants,
+        constant: Block::new(
+            &[],
+            constant,
+            &[],
+            &from_constants.iter().map(|t| t.id).collect(),
+        )
+        .operations,
+        saved: saved
+            .iter()
+            .map(|t| with_status(t, TensorStatus::ReadWrite))
+            .collect(),
+    }
+}
+
+fn is_fill(operation: &OperationIr) -> bool {
+    matches!(
+        operation,
+        OperationIr::BaseFloat(Base::Zeros(_) | Base::Ones(_) | Base::Empty(_))
+            | OperationIr::NumericFloat(_, Num::Full(_))
+    )
+}
+
+impl Block {
+    /// Mark last uses: the interpreter gives such a tensor away, so that the backend can reuse its
+    /// memory in place, and nothing is kept longer than needed. `keep` survives the program.
+    pub(crate) fn new(
+        inputs: &[TensorIr],
+        operations: Vec<OperationIr>,
+        outputs: &[TensorIr],
+        keep: &HashSet<TensorId>,
+    ) -> Self {
+        let read: HashSet<TensorId> = (operations.iter())
+            .flat_map(OperationIr::inputs)
+            .chain(outputs)
+            .map(|t| t.id)
+            .collect();
+        let inputs: Vec<Option<TensorId>> = inputs
+            .iter()
+            .map(|t| (read.contains(&t.id) || keep.contains(&t.id)).then_some(t.id))
+            .collect();
+        let mut owned: HashSet<TensorId> = inputs.iter().flatten().copied().collect();
+        owned.extend(
+            operations
+                .iter()
+                .flat_map(|op| op.outputs().map(|t| t.id).collect::<Vec<_>>()),
+        );
+        for id in keep {
+            owned.remove(id);
+        }
+
+        let mut used: HashSet<TensorId> = outputs.iter().map(|t| t.id).collect();
+        let mut reversed: Vec<OperationIr> = Vec::with_capacity(operations.len());
+        for mut operation in operations.into_iter().rev() {
+            let results: Vec<TensorIr> = operation.outputs().cloned().collect();
+            let arguments: Vec<TensorIr> = operation.inputs().cloned().collect();
+            // Results that nobody reads, and repeated arguments, which cannot be given away by one
+            // of their occurrences, are dropped after the operation.
+            let mut drops: Vec<TensorIr> = (results.iter())
+                .filter(|t| owned.contains(&t.id) && !used.contains(&t.id))
+                .cloned()
+                .collect();
+            let mut last: HashSet<TensorId> = HashSet::new();
+            for t in &arguments {
+                let times = arguments.iter().filter(|other| other.id == t.id).count();
+                if !owned.contains(&t.id) || used.contains(&t.id) {
+                    continue;
+                }
+                if times == 1 {
+                    last.insert(t.id);
+                } else if !drops.iter().any(|drop| drop.id == t.id) {
+                    drops.push(t.clone());
+                }
+            }
+            used.extend(arguments.iter().map(|t| t.id));
+            each_tensor(&mut operation, |t| {
+                t.status = if results.iter().any(|out| out.id == t.id) {
+                    TensorStatus::NotInit
+                } else if last.contains(&t.id) {
+                    TensorStatus::ReadWrite
+                } else {
+                    TensorStatus::ReadOnly
+                };
+            });
+            reversed.extend(
+                (drops.iter()).map(|t| OperationIr::Drop(with_status(t, TensorStatus::ReadWrite))),
+            );
+            reversed.push(operation);
+        }
+        reversed.reverse();
+
+        let outputs = (outputs.iter().enumerate())
+            .map(|(i, t)| {
+                let again = outputs[i + 1..].iter().any(|later| later.id == t.id);
+                let status = if owned.contains(&t.id) && !again {
+                    TensorStatus::ReadWrite
+                } else {
+                    TensorStatus::ReadOnly
+                };
+                with_status(t, status)
+            })
+            .collect();
+        Self {
+            inputs,
+            operations: reversed,
+            outputs,
+        }
+    }
+}
+
+/// Rename everything that the value program owns, so that running it between `at` and `apply`
+/// leaves the point alone.
+fn separate(mut block: Block) -> Block {
+    const OFFSET: u64 = 1 << 24;
+    let mut own: HashSet<TensorId> = block.inputs.iter().flatten().copied().collect();
+    own.extend(
+        (block.operations.iter()).flat_map(|op| op.outputs().map(|t| t.id).collect::<Vec<_>>()),
+    );
+    let shift = |id: TensorId| {
+        if own.contains(&id) {
+            TensorId::new(id.value() + OFFSET)
+        } else {
+            id
+        }
+    };
+    for id in block.inputs.iter_mut().flatten() {
+        *id = shift(*id);
+    }
+    for operation in &mut block.operations {
+        each_tensor(operation, |t| t.id = shift(t.id));
+    }
+    for out in &mut block.outputs {
+        out.id = shift(out.id);
+    }
+    block
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ir::tensor;
+    use TensorStatus::{ReadOnly, ReadWrite};
+    use burn::backend::ir::{BinaryOpIr, UnaryOpIr};
+    use burn::tensor::{DType, Shape};
+
+    fn t(id: u64) -> TensorIr {
+        tensor(id, Shape::from([2, 2]), DType::F64)
+    }
+
+    fn mul(lhs: u64, rhs: u64, out: u64) -> OperationIr {
+        OperationIr::NumericFloat(
+            DType::F64,
+            Num::Mul(BinaryOpIr {
+                lhs: read_only(&t(lhs)),
+                rhs: read_only(&t(rhs)),
+                out: t(out),
+            }),
+        )
+    }
+
+    fn abs(input: u64, out: u64) -> OperationIr {
+        OperationIr::NumericFloat(
+            DType::F64,
+            Num::Abs(UnaryOpIr {
+                input: read_only(&t(input)),
+                out: t(out),
+            }),
+        )
+    }
+
+    #[test]
+    fn dead_code_is_eliminated() {
+        let operations = [abs(0, 1), abs(1, 2), mul(0, 1, 3), abs(3, 4)];
+        let kept: Vec<_> = live(&operations, [t(3)].iter()).cloned().collect();
+        assert_eq!(kept, [abs(0, 1), mul(0, 1, 3)]);
+    }
+
+    #[test]
+    fn equal_operations_are_shared_whatever_the_order_of_commutative_operands() {
+        let mut emitter = Emitter::new(0);
+        let shape = Shape::from([2, 2]);
+        let x = emitter.fresh(shape.clone(), DType::F64);
+        let y = emitter.fresh(shape, DType::F64);
+        let xy = emitter.mul(&x, &y);
+        assert_eq!(emitter.mul(&y, &x).id, xy.id);
+        let difference = emitter.sub(&x, &y);
+        assert_ne!(emitter.sub(&y, &x).id, difference.id);
+        assert_eq!(emitter.into_operations().len(), 3);
+    }
+
+    #[test]
+    fn products_with_ones_and_sums_with_zeros_vanish() {
+        let mut emitter = Emitter::new(0);
+        let shape = Shape::from([2, 2]);
+        let x = emitter.fresh(shape.clone(), DType::F64);
+        let ones = emitter.full(shape.clone(), DType::F64, 1.0);
+        let zeros = emitter.full(shape, DType::F64, 0.0);
+        assert_eq!(emitter.mul(&ones, &x).id, x.id);
+        assert_eq!(emitter.add(&x, &zeros).id, x.id);
+        let twice = emitter.neg(&x);
+        assert_eq!(emitter.neg(&twice).id, x.id);
+    }
+
+    #[test]
+    fn a_spread_scalar_multiplies_once() {
+        // x ⊙ expand(reshape(s)) is x times s with one element per axis: nothing is spread.
+        let mut emitter = Emitter::new(0);
+        let shape = Shape::from([2, 2]);
+        let x = emitter.fresh(shape.clone(), DType::F64);
+        let s = emitter.fresh(Shape::from([1]), DType::F64);
+        let ones = emitter.full(shape, DType::F64, 1.0);
+        let one_by_one = emitter.reshape(&s, Shape::from([1, 1]));
+        let spread = emitter.mul(&ones, &one_by_one);
+        let product = emitter.mul(&x, &spread);
+        let operations = emitter.into_operations();
+        let names: Vec<_> = live(&operations, [product].iter()).map(name).collect();
+        assert_eq!(names, ["Reshape", "Mul"]);
+    }
+
+    #[test]
+    fn last_uses_are_given_away_and_nothing_else() {
+        // 1 = |0|, 2 = 1·1, 3 = 2·0, and 2 is kept.
+        let operations = vec![abs(0, 1), mul(1, 1, 2), mul(2, 0, 3)];
+        let keep = HashSet::from([t(2).id]);
+        let block = Block::new(&[t(0)], operations, &[t(3)], &keep);
+        let statuses: Vec<Vec<_>> = (block.operations.iter())
+            .map(|op| op.inputs().map(|t| (t.id.value(), t.status)).collect())
+            .collect();
+        assert_eq!(
+            statuses,
+            [
+                vec![(0, ReadOnly)],
+                vec![(1, ReadOnly), (1, ReadOnly)],
+                vec![(1, ReadWrite)], // a drop: both factors were the same tensor
+                vec![(2, ReadOnly), (0, ReadWrite)],
+            ]
+        );
+        assert!(is_drop(&block.operations[2]));
+        assert_eq!(block.outputs[0].status, ReadWrite);
+    }
+
+    #[test]
+    fn inputs_that_are_not_read_are_not_registered() {
+        let block = Block::new(&[t(0), t(1)], vec![abs(0, 2)], &[t(2)], &HashSet::new());
+        assert_eq!(block.inputs, [Some(t(0).id), None]);
+    }
+
+    /// What the interpreter holds after a block, and the most it ever held, in elements.
+    fn simulate(block: &Block, held: &mut HashMap<TensorId, usize>) -> usize {
+        for id in block.inputs.iter().flatten() {
+            held.insert(*id, 0);
+        }
+        let mut most = 0;
+        for operation in &block.operations {
+            for t in operation.inputs() {
+                assert!(
+                    held.contains_key(&t.id),
+                    "{} reads what is gone",
+                    Line(operation)
+                );
+                if t.status == TensorStatus::ReadWrite {
+                    held.remove(&t.id);
+                }
+            }
+            for t in operation.outputs() {
+                held.insert(t.id, t.shape.num_elements());
+            }
+            most = most.max(held.values().sum());
+        }
+        for out in &block.outputs {
+            assert!(held.contains_key(&out.id));
+            if out.status == TensorStatus::ReadWrite {
+                held.remove(&out.id);
+            }
+        }
+        most
+    }
+
+    /// A long chain of intermediate results: the primal program keeps what the tangent program
+    /// reads, and a few tensors at a time otherwise; the other programs leave nothing behind.
+    #[test]
+    fn only_what_the_tangent_program_reads_is_kept() {
+        use burn::tensor::Tensor;
+        let device = Device::default();
+        let u = Tensor::<2>::zeros([8, 8], (&device, DType::F64));
+        let graph = Graph::gradient(&[(&u).into()], &[], |i| {
+            let mut v = i.variable::<2>(0);
+            for _ in 0..10 {
+                v = (v.clone() * v).sin();
+            }
+            v.sum()
+        })
+        .unwrap();
+        let program = graph.linearize(&Extensions::new()).unwrap();
+        let elements = 64;
+        let mut held = HashMap::new();
+        simulate(&program.value, &mut held);
+        assert!(held.is_empty(), "{held:?}");
+        simulate(&program.primal, &mut held);
+        let saved: HashSet<TensorId> = program.saved.iter().map(|t| t.id).collect();
+        assert_eq!(held.keys().copied().collect::<HashSet<_>>(), saved);
+        assert_eq!(saved.len(), 1, "the Hessian is diagonal");
+        let most = simulate(&program.tangent, &mut held);
+        assert!(most <= 3 * elements);
+        for t in &program.saved {
+            held.remove(&t.id);
+        }
+        assert!(held.is_empty(), "{held:?}");
+        // Backpropagation through twenty steps needs them all once, but not two of each.
+        let most = simulate(&program.primal, &mut held);
+        assert!(most < 50 * elements, "{}", most / elements);
+    }
+}

@@ -1,0 +1,122 @@
+//! Forward-mode rules of Burn's operations.
+//!
+//! Each rule maps the tangents of an operation's inputs to those of its outputs. Operations without
+//! active inputs never get here; operations that are not listed are [`Error::NoRule`].
+
+mod activation;
+mod base;
+mod float;
+mod module;
+mod numeric;
+
+use std::collections::HashMap;
+
+use burn::backend::ir::{
+    BoolOperationIr, CastOpIr, OperationIr, ScalarIr, ScalarOpIr, TensorId, TensorIr,
+};
+use burn::tensor::{BoolStore, DType};
+
+use crate::ir::{like, name, output, read_only};
+use crate::tangent::{Builder, Expression, Tangent};
+use crate::{Error, Extensions};
+
+/// The state of a linearization: programs under construction, tangents of what they contain.
+pub(crate) struct Context<'a> {
+    pub(crate) build: Builder,
+    pub(crate) extensions: &'a Extensions,
+    pub(crate) tangents: HashMap<TensorId, Expression>,
+}
+
+impl Context<'_> {
+    fn d(&self, t: &TensorIr) -> Tangent {
+        self.tangents.get(&t.id).cloned()
+    }
+
+    /// `p ⊙ ṫ`, in the shape of `out`.
+    fn times(&mut self, p: &TensorIr, t: Tangent, out: &TensorIr) -> Tangent {
+        t.and_then(|e| self.build.times(p, e, &out.shape))
+    }
+
+    /// `1` where `t` compares true, `0` elsewhere.
+    fn indicator(
+        &mut self,
+        t: &TensorIr,
+        bound: ScalarIr,
+        compare: fn(ScalarOpIr) -> OperationIr,
+    ) -> TensorIr {
+        let mask = self.build.primal.emit_one(compare(ScalarOpIr {
+            lhs: read_only(t),
+            rhs: bound,
+            out: output(t.shape.clone(), DType::Bool(BoolStore::U8)),
+        }));
+        self.build
+            .primal
+            .emit_one(OperationIr::Bool(BoolOperationIr::IntoFloat(CastOpIr {
+                input: mask,
+                out: like(t),
+            })))
+    }
+}
+
+/// Tangents of the outputs of `operation`, which is part of the primal program.
+pub(crate) fn jvp(cx: &mut Context, operation: &OperationIr) -> Result<Vec<Tangent>, Error> {
+    if !operation.inputs().any(|t| cx.tangents.contains_key(&t.id)) {
+        return Ok(vec![None; operation.outputs().count()]);
+    }
+    let found = match operation {
+        OperationIr::NumericFloat(dtype, op) => numeric::jvp(cx, *dtype, op),
+        OperationIr::Float(dtype, op) => float::jvp(cx, *dtype, op),
+        OperationIr::BaseFloat(op) => base::jvp(cx, op),
+        OperationIr::Module(op) => module::jvp(cx, op),
+        OperationIr::Activation(op) => activation::jvp(cx, op),
+        OperationIr::Custom(op) => return custom(cx, op),
+        _ => None,
+    };
+    found.ok_or_else(|| Error::NoRule {
+        operation: name(operation),
+    })
+}
+
+fn custom(
+    cx: &mut Context,
+    operation: &burn::backend::ir::CustomOpIr,
+) -> Result<Vec<Tangent>, Error> {
+    let id = &operation.id;
+    let rule = cx.extensions.rule_of(id).ok_or_else(|| Error::NoRule {
+        operation: id.clone(),
+    })?;
+    let tangents: Vec<Option<TensorIr>> = operation
+        .inputs
+        .iter()
+        .map(|t| cx.d(t).map(|e| cx.build.handle(e)))
+        .collect();
+    let outputs = rule.jvp(operation, &tangents, &mut cx.build)?;
+    if outputs.len() != operation.outputs.len() {
+        return Err(Error::Rule {
+            operation: id.clone(),
+            reason: format!(
+                "{} tangents for {} outputs",
+                outputs.len(),
+                operation.outputs.len()
+            ),
+        });
+    }
+    for (tangent, out) in outputs.iter().zip(&operation.outputs) {
+        if let Some(tangent) = tangent
+            && tangent.shape != out.shape
+        {
+            return Err(Error::Rule {
+                operation: id.clone(),
+                reason: format!(
+                    "tangent of shape {:?} for an output of shape {:?}",
+                    tangent.shape.to_vec(),
+                    out.shape.to_vec()
+                ),
+            });
+        }
+    }
+    Ok(outputs
+        .into_iter()
+        .map(|tangent| tangent.map(|t| cx.build.expression(&t)))
+        .collect())
+}

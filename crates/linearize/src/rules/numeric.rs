@@ -1,0 +1,245 @@
+//! Arithmetic, reductions, comparisons, clamping.
+
+use burn::backend::ir::{BaseOperationIr as Base, FloatOperationIr as Float};
+use burn::backend::ir::{
+    BinaryOpIr, CastOpIr, ClampOpIr, DimOpIr, GatherOpIr, IntOperationIr,
+    NumericOperationIr as Num, OperationIr, PadModeIr, PadOpIr, ReduceDimOpIr,
+    ReduceDimWithIndicesOpIr, ReduceDimsOpIr, ReduceOpIr, ScalarIr, ScalarOpIr, TensorIr,
+};
+use burn::tensor::DType;
+
+use super::Context;
+use crate::ir::{like, output, read_only};
+use crate::tangent::{Builder, Tangent};
+
+#[allow(clippy::too_many_lines, reason = "one table")]
+pub(super) fn jvp(cx: &mut Context, dtype: DType, op: &Num) -> Option<Vec<Tangent>> {
+    let wrap = move |op| OperationIr::NumericFloat(dtype, op);
+    let one = match op {
+        Num::Add(b) => {
+            let (l, r) = spread_operands(cx, b);
+            cx.build.plus(l, r)
+        }
+        Num::Sub(b) => {
+            let (l, r) = spread_operands(cx, b);
+            cx.build.plus(l, Builder::scaled(r, -1.0))
+        }
+        Num::Mul(b) => {
+            let l = cx.times(&b.rhs, cx.d(&b.lhs), &b.out);
+            let r = cx.times(&b.lhs, cx.d(&b.rhs), &b.out);
+            cx.build.plus(l, r)
+        }
+        Num::Div(b) => {
+            let reciprocal = cx.build.primal.powi(&b.rhs, -1);
+            let l = cx.times(&reciprocal, cx.d(&b.lhs), &b.out);
+            let r = if cx.d(&b.rhs).is_some() {
+                let slope = cx.build.primal.mul(&b.out, &reciprocal);
+                Builder::scaled(cx.times(&slope, cx.d(&b.rhs), &b.out), -1.0)
+            } else {
+                None
+            };
+            cx.build.plus(l, r)
+        }
+        // l mod r = l − r ⌊l/r⌋
+        Num::Rem(b) => {
+            let l = cx.d(&b.lhs).map(|e| cx.build.spread(e, &b.out.shape));
+            let r = if cx.d(&b.rhs).is_some() {
+                let quotient = cx.build.primal.div(&b.lhs, &b.rhs);
+                let floor = cx.build.primal.unary(&quotient, Float::Floor);
+                Builder::scaled(cx.times(&floor, cx.d(&b.rhs), &b.out), -1.0)
+            } else {
+                None
+            };
+            cx.build.plus(l, r)
+        }
+        Num::AddScalar(s) | Num::SubScalar(s) | Num::RemScalar(s) => cx.d(&s.lhs),
+        Num::MulScalar(s) => Builder::scaled(cx.d(&s.lhs), s.rhs.elem()),
+        Num::DivScalar(s) => Builder::scaled(cx.d(&s.lhs), 1.0 / s.rhs.elem::<f64>()),
+        Num::Neg(u) => Builder::scaled(cx.d(&u.input), -1.0),
+        Num::Abs(u) => {
+            let sign = cx.build.primal.numeric(&u.input, Num::Sign);
+            cx.times(&sign, cx.d(&u.input), &u.out)
+        }
+        Num::PowiScalar(s) => {
+            let exponent: i64 = s.rhs.elem();
+            let power = cx.build.primal.powi(&s.lhs, exponent - 1);
+            Builder::scaled(cx.times(&power, cx.d(&s.lhs), &s.out), exponent as f64)
+        }
+        Num::Powi(b) => {
+            let slope = powi_slope(cx, dtype, b);
+            cx.times(&slope, cx.d(&b.lhs), &b.out)
+        }
+        Num::Clamp(c) => {
+            let inside = inside(cx, c);
+            cx.times(&inside, cx.d(&c.tensor), &c.out)
+        }
+        Num::ClampMin(s) => {
+            let inside = cx.indicator(&s.lhs, s.rhs, |op| {
+                OperationIr::NumericFloat(op.lhs.dtype, Num::GreaterEqualElem(op))
+            });
+            cx.times(&inside, cx.d(&s.lhs), &s.out)
+        }
+        Num::ClampMax(s) => {
+            let inside = cx.indicator(&s.lhs, s.rhs, |op| {
+                OperationIr::NumericFloat(op.lhs.dtype, Num::LowerEqualElem(op))
+            });
+            cx.times(&inside, cx.d(&s.lhs), &s.out)
+        }
+        Num::Sum(r) | Num::Mean(r) => {
+            let variant = if matches!(op, Num::Sum(_)) {
+                Num::Sum
+            } else {
+                Num::Mean
+            };
+            let out = like(&r.out);
+            cx.d(&r.input).map(|e| {
+                cx.build
+                    .linear(e, |input| wrap(variant(ReduceOpIr { input, out })))
+            })
+        }
+        Num::SumDim(r) | Num::MeanDim(r) => {
+            let variant = if matches!(op, Num::SumDim(_)) {
+                Num::SumDim
+            } else {
+                Num::MeanDim
+            };
+            let r = r.clone();
+            cx.d(&r.input).map(|e| {
+                cx.build
+                    .linear(e, |input| wrap(variant(ReduceDimOpIr { input, ..r })))
+            })
+        }
+        Num::SumDims(r) => {
+            let r = r.clone();
+            cx.d(&r.input).map(|e| {
+                cx.build
+                    .linear(e, |input| wrap(Num::SumDims(ReduceDimsOpIr { input, ..r })))
+            })
+        }
+        Num::CumSum(r) => {
+            let r = r.clone();
+            cx.d(&r.input).map(|e| {
+                cx.build
+                    .linear(e, |input| wrap(Num::CumSum(DimOpIr { input, ..r })))
+            })
+        }
+        Num::Pad(p) => {
+            let mut p: PadOpIr = p.clone();
+            if let PadModeIr::Constant(value) = &mut p.mode {
+                *value = ScalarIr::Float(0.0);
+            }
+            cx.d(&p.input).map(|e| {
+                cx.build
+                    .linear(e, |input| wrap(Num::Pad(PadOpIr { input, ..p })))
+            })
+        }
+        Num::MaxDimWithIndices(m) | Num::MinDimWithIndices(m) => {
+            let value = gather(cx, &m.tensor, m.dim, &m.out_indices, &m.out);
+            return Some(vec![value, None]);
+        }
+        Num::MaxDim(r) | Num::MinDim(r) => {
+            let variant = if matches!(op, Num::MaxDim(_)) {
+                Num::MaxDimWithIndices
+            } else {
+                Num::MinDimWithIndices
+            };
+            let indices = cx.build.primal.emit(wrap(variant(ReduceDimWithIndicesOpIr {
+                tensor: read_only(&r.input),
+                dim: r.axis,
+                out: like(&r.out),
+                out_indices: output(r.out.shape.clone(), DType::I64),
+            })));
+            gather(cx, &r.input, r.axis, &indices[1], &r.out)
+        }
+        Num::TopKWithIndices(m) => {
+            let value = gather(cx, &m.tensor, m.dim, &m.out_indices, &m.out);
+            return Some(vec![value, None]);
+        }
+        Num::SortWithIndices(m) => {
+            let value = gather(cx, &m.input, m.dim, &m.out_indices, &m.out);
+            return Some(vec![value, None]);
+        }
+        // Piecewise constant, or not real.
+        Num::Sign(_)
+        | Num::Full(_)
+        | Num::Greater(_)
+        | Num::GreaterElem(_)
+        | Num::GreaterEqual(_)
+        | Num::GreaterEqualElem(_)
+        | Num::Lower(_)
+        | Num::LowerElem(_)
+        | Num::LowerEqual(_)
+        | Num::LowerEqualElem(_)
+        | Num::ArgMax(_)
+        | Num::ArgMin(_)
+        | Num::ArgTopK(_)
+        | Num::ArgSort(_)
+        | Num::IntRandom(_) => None,
+        _ => return None,
+    };
+    Some(vec![one])
+}
+
+fn spread_operands(cx: &mut Context, b: &BinaryOpIr) -> (Tangent, Tangent) {
+    let l = cx.d(&b.lhs).map(|e| cx.build.spread(e, &b.out.shape));
+    let r = cx.d(&b.rhs).map(|e| cx.build.spread(e, &b.out.shape));
+    (l, r)
+}
+
+/// `n xⁿ⁻¹` for integer tensors `n`.
+fn powi_slope(cx: &mut Context, dtype: DType, b: &BinaryOpIr) -> TensorIr {
+    let primal = &mut cx.build.primal;
+    let lower = primal.emit_one(OperationIr::NumericInt(
+        b.rhs.dtype,
+        Num::SubScalar(ScalarOpIr {
+            lhs: read_only(&b.rhs),
+            rhs: ScalarIr::Int(1),
+            out: like(&b.rhs),
+        }),
+    ));
+    let power = primal.emit_one(OperationIr::NumericFloat(
+        dtype,
+        Num::Powi(BinaryOpIr {
+            lhs: read_only(&b.lhs),
+            rhs: lower,
+            out: like(&b.out),
+        }),
+    ));
+    let exponent = primal.emit_one(OperationIr::Int(IntOperationIr::IntoFloat(CastOpIr {
+        input: read_only(&b.rhs),
+        out: output(b.rhs.shape.clone(), dtype),
+    })));
+    primal.mul(&power, &exponent)
+}
+
+/// Indicator of `min ≤ x ≤ max`.
+fn inside(cx: &mut Context, c: &ClampOpIr) -> TensorIr {
+    let above = cx.indicator(&c.tensor, c.min, |op| {
+        OperationIr::NumericFloat(op.lhs.dtype, Num::GreaterEqualElem(op))
+    });
+    let below = cx.indicator(&c.tensor, c.max, |op| {
+        OperationIr::NumericFloat(op.lhs.dtype, Num::LowerEqualElem(op))
+    });
+    cx.build.primal.mul(&above, &below)
+}
+
+/// The tangent of selected elements is the selection of the tangent.
+fn gather(
+    cx: &mut Context,
+    input: &TensorIr,
+    dim: usize,
+    indices: &TensorIr,
+    out: &TensorIr,
+) -> Tangent {
+    let (indices, out) = (read_only(indices), like(out));
+    cx.d(input).map(|e| {
+        cx.build.linear(e, |tensor| {
+            OperationIr::BaseFloat(Base::Gather(GatherOpIr {
+                tensor,
+                dim,
+                indices,
+                out,
+            }))
+        })
+    })
+}

@@ -1,0 +1,91 @@
+//! The extension operations on CubeCL backends (wgpu, CUDA): composed of Burn's own operations.
+
+use burn::backend::{Cube, tensor::FloatTensor};
+use burn::tensor::Tensor;
+use burn_backend::TensorMetadata;
+
+use crate::composed;
+use crate::filter::{FilterOps, SpectralFilter};
+use crate::ops::GridOps;
+use crate::table::TableRange;
+
+type CubeTensor = FloatTensor<Cube>;
+
+fn up<const R: usize>(x: CubeTensor) -> Tensor<R> {
+    Tensor::from_primitive::<Cube>(x)
+}
+
+fn down<const R: usize>(x: Tensor<R>) -> CubeTensor {
+    x.try_into_primitive::<Cube>()
+        .expect("operations on a tensor of this backend stay on it")
+}
+
+/// Calls a function of tensors of static rank for a run-time rank.
+macro_rules! ranked {
+    ($rank:expr, $($r:literal)+, $R:ident => $body:expr) => {
+        match $rank {
+            $($r => { const $R: usize = $r; $body })+
+            rank => unreachable!("grid operations take tensors of 1 to 4 axes, got {rank}"),
+        }
+    };
+}
+
+macro_rules! gridded {
+    ($rank:expr, $axes:expr, $R:ident, $K:ident => $body:expr) => {
+        match ($rank, $axes) {
+            (2, 2) => {
+                const $R: usize = 2;
+                const $K: usize = 2;
+                $body
+            }
+            (3, 2) => {
+                const $R: usize = 3;
+                const $K: usize = 2;
+                $body
+            }
+            (3, 3) => {
+                const $R: usize = 3;
+                const $K: usize = 3;
+                $body
+            }
+            (4, 3) => {
+                const $R: usize = 4;
+                const $K: usize = 3;
+                $body
+            }
+            shape => {
+                unreachable!("grids have 2 or 3 axes and at most one batch axis, got {shape:?}")
+            }
+        }
+    };
+}
+
+impl GridOps for Cube {
+    fn circular_convolution(x: CubeTensor, kernel: CubeTensor, adjoint: bool) -> CubeTensor {
+        gridded!(x.shape().num_dims(), kernel.shape().num_dims(), R, K => {
+            down(composed::circular_convolution::<R, K>(up(x), up(kernel), adjoint))
+        })
+    }
+
+    fn kernel_correlation(x: CubeTensor, g: CubeTensor, width: usize, axes: usize) -> CubeTensor {
+        gridded!(x.shape().num_dims(), axes, R, K => {
+            down(composed::kernel_correlation::<R, K>(up(x), up(g), width))
+        })
+    }
+
+    fn tabulated(w: CubeTensor, table: CubeTensor, range: TableRange, order: usize) -> CubeTensor {
+        ranked!(w.shape().num_dims(), 1 2 3 4, R => {
+            down(composed::tabulated::<R>(up(w), up(table), range, order))
+        })
+    }
+}
+
+impl FilterOps for Cube {
+    fn spectral_filter(x: CubeTensor, filter: SpectralFilter) -> CubeTensor {
+        ranked!(x.shape().num_dims(), 2 3, R => {
+            let x = up::<R>(x);
+            let symbol = filter.on_device(&x.device(), x.dtype());
+            down(composed::spectral_filter::<R>(x, symbol))
+        })
+    }
+}

@@ -1,0 +1,227 @@
+//! Devices by name, and tensors of the right precision on them.
+
+use std::fmt;
+use std::str::FromStr;
+
+use burn::tensor::{DType, Device, Tensor, TensorData};
+
+use crate::Error;
+
+/// The backends a device can belong to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum DeviceKind {
+    /// burn-flex on the CPU, `f64`.
+    Flex,
+    /// burn-ndarray on the CPU, `f64`.
+    NdArray,
+    /// burn-wgpu (Vulkan, Metal, DX12) on a GPU, `f32`.
+    Wgpu,
+    /// burn-cuda on an NVIDIA GPU, `f32`.
+    Cuda,
+}
+
+impl DeviceKind {
+    /// All kinds, compiled in or not.
+    pub const ALL: [Self; 4] = [Self::Flex, Self::NdArray, Self::Wgpu, Self::Cuda];
+
+    /// The name users type.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Flex => "flex",
+            Self::NdArray => "ndarray",
+            Self::Wgpu => "wgpu",
+            Self::Cuda => "cuda",
+        }
+    }
+
+    /// Whether this build contains the backend.
+    pub fn is_compiled(self) -> bool {
+        match self {
+            Self::Flex => cfg!(feature = "flex"),
+            Self::NdArray => cfg!(feature = "ndarray"),
+            Self::Wgpu => cfg!(feature = "wgpu"),
+            Self::Cuda => cfg!(feature = "cuda"),
+        }
+    }
+
+    /// The kinds in this build, the default one first.
+    pub fn compiled() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(|kind| kind.is_compiled())
+    }
+}
+
+impl fmt::Display for DeviceKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for DeviceKind {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self, Error> {
+        let kind = Self::ALL
+            .into_iter()
+            .find(|kind| kind.name() == name)
+            .ok_or_else(|| Error::UnknownDevice {
+                name: name.to_owned(),
+                compiled: compiled_names(),
+            })?;
+        if kind.is_compiled() {
+            Ok(kind)
+        } else {
+            Err(Error::NotCompiled {
+                name: kind.name(),
+                compiled: compiled_names(),
+            })
+        }
+    }
+}
+
+fn compiled_names() -> String {
+    DeviceKind::compiled()
+        .map(DeviceKind::name)
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+/// An opened device with its working precision.
+#[derive(Clone, Debug)]
+pub struct ComputeDevice {
+    kind: DeviceKind,
+    device: Device,
+    dtype: DType,
+}
+
+impl ComputeDevice {
+    /// Opens a device. A GPU is compared with the CPU first, on operations that drivers and tuned kernels have been
+    /// seen to get wrong.
+    ///
+    /// # Errors
+    /// [`Error::NotCompiled`], [`Error::Unavailable`] without a usable adapter, [`Error::WrongArithmetic`].
+    pub fn open(kind: DeviceKind) -> Result<Self, Error> {
+        match kind {
+            #[cfg(feature = "flex")]
+            DeviceKind::Flex => Ok(Self::cpu(kind, Device::flex())),
+            #[cfg(feature = "ndarray")]
+            DeviceKind::NdArray => Ok(Self::cpu(kind, Device::ndarray())),
+            #[cfg(feature = "wgpu")]
+            DeviceKind::Wgpu => crate::device_check::open_gpu(kind, || {
+                Device::wgpu(burn::tensor::DeviceKind::DefaultDevice)
+            }),
+            #[cfg(feature = "cuda")]
+            DeviceKind::Cuda => crate::device_check::open_gpu(kind, || Device::cuda(0)),
+            #[allow(unreachable_patterns)] // reachable unless every backend is compiled in
+            _ => Err(Error::NotCompiled {
+                name: kind.name(),
+                compiled: compiled_names(),
+            }),
+        }
+    }
+
+    /// The first device compiled in: `flex` unless default features are off.
+    ///
+    /// # Errors
+    /// As [`Self::open`]; [`Error::UnknownDevice`] if no backend was compiled in at all.
+    pub fn default_compiled() -> Result<Self, Error> {
+        let kind = DeviceKind::compiled()
+            .next()
+            .ok_or_else(|| Error::UnknownDevice {
+                name: "default".to_owned(),
+                compiled: "no backend".to_owned(),
+            })?;
+        Self::open(kind)
+    }
+
+    #[cfg(any(feature = "flex", feature = "ndarray"))]
+    fn cpu(kind: DeviceKind, device: Device) -> Self {
+        Self {
+            kind,
+            device,
+            dtype: DType::F64,
+        }
+    }
+
+    #[cfg(any(feature = "wgpu", feature = "cuda"))]
+    pub(crate) fn gpu(kind: DeviceKind, device: Device) -> Self {
+        Self {
+            kind,
+            device,
+            dtype: DType::F32,
+        }
+    }
+
+    /// The same device in another precision (`f32` on a CPU, for comparisons).
+    ///
+    /// # Errors
+    /// [`Error::Unavailable`] for `f64` on a GPU, which computes wrongly there.
+    pub fn with_dtype(mut self, dtype: DType) -> Result<Self, Error> {
+        let gpu = matches!(self.kind, DeviceKind::Wgpu | DeviceKind::Cuda);
+        if gpu && dtype != DType::F32 {
+            return Err(Error::Unavailable {
+                name: self.kind.name(),
+                reason: format!("{dtype:?} is not reliable there; use f32"),
+            });
+        }
+        self.dtype = dtype;
+        Ok(self)
+    }
+
+    /// The backend.
+    pub fn kind(&self) -> DeviceKind {
+        self.kind
+    }
+
+    /// Burn's device.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// Precision of the tensors made here.
+    pub fn dtype(&self) -> DType {
+        self.dtype
+    }
+
+    /// Unit roundoff of that precision.
+    pub fn epsilon(&self) -> f64 {
+        if self.dtype == DType::F64 {
+            f64::EPSILON
+        } else {
+            f64::from(f32::EPSILON)
+        }
+    }
+
+    /// A tensor with these values. Burn casts to the device's default precision unless told; this tells it.
+    pub fn tensor<const R: usize>(&self, values: &[f64], shape: [usize; R]) -> Tensor<R> {
+        let data = TensorData::new(values.to_vec(), shape);
+        Tensor::from_data(data, (&self.device, self.dtype))
+    }
+
+    /// A tensor's values in double precision.
+    ///
+    /// # Errors
+    /// [`Error::Read`] if the device was lost.
+    pub fn values<const R: usize>(&self, tensor: Tensor<R>) -> Result<Vec<f64>, Error> {
+        let read = |e: &dyn fmt::Debug| Error::Read {
+            reason: format!("{e:?}"),
+        };
+        let data = tensor
+            .try_into_data_dtype(DType::F64)
+            .map_err(|e| read(&e))?;
+        data.try_into_vec::<f64>().map_err(|e| read(&e))
+    }
+
+    /// The single value of a tensor.
+    ///
+    /// # Errors
+    /// As [`Self::values`].
+    pub fn scalar<const R: usize>(&self, tensor: Tensor<R>) -> Result<f64, Error> {
+        let values = self.values(tensor)?;
+        match values[..] {
+            [value] => Ok(value),
+            _ => Err(Error::Read {
+                reason: format!("expected one value, got {}", values.len()),
+            }),
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! Comparison of a GPU with the CPU before it is trusted with a run.
+//!
+//! GPU drivers and auto-tuned kernels have returned wrong numbers without an error; a run that starts on such a
+//! device wastes hours. The check takes milliseconds.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use burn::tensor::Device;
+
+use crate::convolution::convolve;
+use crate::{ComputeDevice, DeviceKind, Error, circular_convolution};
+
+/// Relative difference to the CPU accepted in single precision.
+const LIMIT: f64 = 1e-4;
+
+pub(crate) fn open_gpu(
+    kind: DeviceKind,
+    device: impl FnOnce() -> Device,
+) -> Result<ComputeDevice, Error> {
+    // Burn panics when there is no adapter; a user gets one line instead.
+    let opened = catch_unwind(AssertUnwindSafe(|| {
+        let device = ComputeDevice::gpu(kind, device());
+        let one = device.scalar(device.tensor::<1>(&[1.0], [1]))?;
+        Ok((device, one))
+    }));
+    let (device, _) = opened.map_err(|_| Error::Unavailable {
+        name: kind.name(),
+        reason: "no adapter could be opened (is a GPU driver installed?)".to_owned(),
+    })??;
+    check(&device)?;
+    Ok(device)
+}
+
+fn check(device: &ComputeDevice) -> Result<(), Error> {
+    const N: usize = 24;
+    let u: Vec<f64> = (0..N * N).map(|i| (0.37 * i as f64).sin()).collect();
+    let kernel: Vec<f64> = (0..25).map(|i| 0.04 + 0.01 * (i as f64).cos()).collect();
+    let x = device.tensor::<2>(&u, [N, N]);
+
+    let expected = convolve(&u, &[N, N], &kernel, 5, false);
+    let k = device.tensor::<2>(&kernel, [5, 5]);
+    compare(
+        device,
+        "a circular convolution",
+        circular_convolution(x.clone(), k, false),
+        &expected,
+    )?;
+
+    let expected: Vec<f64> = u.iter().map(|v| v.exp().tanh()).collect();
+    compare(device, "exp and tanh", x.exp().tanh(), &expected)
+}
+
+fn compare(
+    device: &ComputeDevice,
+    operation: &'static str,
+    result: burn::tensor::Tensor<2>,
+    expected: &[f64],
+) -> Result<(), Error> {
+    let difference = device
+        .values(result)?
+        .iter()
+        .zip(expected)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, |m, d| {
+            if d.is_nan() {
+                f64::INFINITY
+            } else {
+                f64::max(m, d)
+            }
+        });
+    if difference > LIMIT {
+        return Err(Error::WrongArithmetic {
+            name: device.kind().name(),
+            operation,
+            difference,
+            limit: LIMIT,
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,406 @@
+//! Real discrete Fourier transforms of periodic grids of any shape and size.
+//!
+//! A circular convolution is `inverse(symbol * forward(x))`. [`Transform::filter`] does all of it in three
+//! passes over memory: the first axis is transformed, multiplied by the symbol and transformed back while a
+//! block of its columns lies in cache. Every pass runs on all cores when the grid is large enough.
+
+use std::any::TypeId;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex};
+
+use rayon::prelude::*;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use rustfft::num_complex::Complex;
+use rustfft::num_traits::Float;
+use rustfft::{Fft, FftNum, FftPlanner};
+
+/// Columns of the first axis that are transformed together: two cache lines of complex doubles.
+const BLOCK: usize = 8;
+/// Below this number of grid points one thread is faster than two.
+const PARALLEL_FROM: usize = 1 << 15;
+
+/// Floating-point type of a grid: `f64` or `f32`.
+pub trait Real: FftNum + Float + bytemuck::Pod + Default {
+    /// Conversion from a double, rounding if needed.
+    fn of(value: f64) -> Self;
+    /// The process-wide plans and kernel symbols of this type.
+    fn shared() -> &'static Shared<Self>;
+}
+
+/// Plans by grid shape, and the symbols of the kernels used last.
+pub struct Shared<T: Real> {
+    plans: Mutex<HashMap<Vec<usize>, Arc<Transform<T>>>>,
+    pub(crate) symbols: Mutex<Vec<crate::convolution::CachedSymbol<T>>>,
+}
+
+macro_rules! real {
+    ($type:ty) => {
+        impl Real for $type {
+            fn of(value: f64) -> Self {
+                value as $type
+            }
+            fn shared() -> &'static Shared<Self> {
+                static SHARED: std::sync::OnceLock<Shared<$type>> = std::sync::OnceLock::new();
+                SHARED.get_or_init(|| Shared {
+                    plans: Mutex::new(HashMap::new()),
+                    symbols: Mutex::new(Vec::new()),
+                })
+            }
+        }
+    };
+}
+real!(f32);
+real!(f64);
+
+/// A plan for the real transform of grids of one shape.
+///
+/// Spectra are stored column by column of the first axis: entry `(c, k0)` at `c * n0 + k0`, where `c` runs over
+/// the (row-major) half spectrum of the remaining axes. Nothing is normalised: `inverse(forward(x)) = N x`, with
+/// `N` the number of grid points.
+pub struct Transform<T: Real> {
+    shape: Vec<usize>,
+    /// Complex numbers per slab (one index of the first axis) after the transform of the remaining axes.
+    columns: usize,
+    half: usize,
+    real: Arc<dyn RealToComplex<T>>,
+    real_inverse: Arc<dyn ComplexToReal<T>>,
+    /// Forward and inverse plans of all axes but the last.
+    complex: Vec<[Arc<dyn Fft<T>>; 2]>,
+    pool: Mutex<Vec<Vec<Complex<T>>>>,
+}
+
+/// Buffers of one worker.
+struct Work<T: Real> {
+    row: Vec<T>,
+    slab: Vec<Complex<T>>,
+    columns: Vec<Complex<T>>,
+    scratch: Vec<Complex<T>>,
+}
+
+impl<T: Real> Transform<T> {
+    /// The shared plan for `shape` (at least two axes, none empty), made at the first request.
+    pub fn of_shape(shape: &[usize]) -> Arc<Self> {
+        let mut plans = lock(&T::shared().plans);
+        if let Some(plan) = plans.get(shape) {
+            return plan.clone();
+        }
+        let plan = Arc::new(Self::new(shape));
+        plans.insert(shape.to_vec(), plan.clone());
+        plan
+    }
+
+    fn new(shape: &[usize]) -> Self {
+        assert!(
+            shape.len() >= 2 && shape.iter().all(|&n| n > 0),
+            "periodic transforms need at least two non-empty axes, got {shape:?}"
+        );
+        let last = shape[shape.len() - 1];
+        let half = last / 2 + 1;
+        let mut planner = RealFftPlanner::new();
+        let (real, real_inverse) = (
+            planner.plan_fft_forward(last),
+            planner.plan_fft_inverse(last),
+        );
+        let mut planner = FftPlanner::new();
+        let complex = shape[..shape.len() - 1]
+            .iter()
+            .map(|&n| [planner.plan_fft_forward(n), planner.plan_fft_inverse(n)])
+            .collect();
+        let columns = shape[1..shape.len() - 1].iter().product::<usize>() * half;
+        Self {
+            shape: shape.to_vec(),
+            columns,
+            half,
+            real,
+            real_inverse,
+            complex,
+            pool: Mutex::new(Vec::new()),
+        }
+    }
+
+    /// Number of grid points.
+    pub fn len(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    /// Never: a plan has at least one point.
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// Number of complex numbers in a spectrum.
+    pub fn spectrum_len(&self) -> usize {
+        self.columns * self.shape[0]
+    }
+
+    /// The half spectrum of `x`, not normalised.
+    pub fn forward(&self, x: &[T]) -> Vec<Complex<T>> {
+        let rows = self.slabs_forward(x);
+        let n0 = self.shape[0];
+        let mut spectrum = vec![Complex::default(); self.spectrum_len()];
+        self.over_blocks(&mut spectrum, |work, first, chunk| {
+            gather(&rows, self.columns, first, n0, chunk);
+            self.complex[0][0].process_with_scratch(chunk, &mut work.scratch);
+        });
+        self.give_back(rows);
+        spectrum
+    }
+
+    /// The real grid with this half spectrum, not normalised.
+    pub fn inverse(&self, spectrum: &[Complex<T>]) -> Vec<T> {
+        let mut blocks = self.take();
+        self.over_blocks(&mut blocks, |work, first, chunk| {
+            let n0 = self.shape[0];
+            let columns = &mut work.columns[..chunk.len()];
+            columns.copy_from_slice(&spectrum[first * n0..][..chunk.len()]);
+            self.complex[0][1].process_with_scratch(columns, &mut work.scratch);
+            scatter(columns, n0, chunk);
+        });
+        let result = self.slabs_inverse(&blocks);
+        self.give_back(blocks);
+        result
+    }
+
+    /// `inverse(symbol * forward(x))`, the symbol conjugated if asked: a circulant matrix or its transpose.
+    pub fn filter(&self, x: &[T], symbol: &[Complex<T>], conjugate: bool) -> Vec<T> {
+        self.filter_with(x, |first, columns| {
+            let symbol = &symbol[first..first + columns.len()];
+            if conjugate {
+                for (value, factor) in columns.iter_mut().zip(symbol) {
+                    *value = *value * factor.conj();
+                }
+            } else {
+                for (value, factor) in columns.iter_mut().zip(symbol) {
+                    *value = *value * *factor;
+                }
+            }
+        })
+    }
+
+    /// `inverse(symbol * forward(x))` with a real symbol: a symmetric circulant matrix.
+    pub fn filter_real(&self, x: &[T], symbol: &[T]) -> Vec<T> {
+        self.filter_with(x, |first, columns| {
+            for (value, &factor) in columns.iter_mut().zip(&symbol[first..]) {
+                *value = value.scale(factor);
+            }
+        })
+    }
+
+    fn filter_with(&self, x: &[T], multiply: impl Fn(usize, &mut [Complex<T>]) + Sync) -> Vec<T> {
+        let n0 = self.shape[0];
+        let rows = self.slabs_forward(x);
+        let mut blocks = self.take();
+        self.over_blocks(&mut blocks, |work, first, chunk| {
+            let columns = &mut work.columns[..chunk.len()];
+            gather(&rows, self.columns, first, n0, columns);
+            self.complex[0][0].process_with_scratch(columns, &mut work.scratch);
+            multiply(first * n0, columns);
+            self.complex[0][1].process_with_scratch(columns, &mut work.scratch);
+            scatter(columns, n0, chunk);
+        });
+        self.give_back(rows);
+        let result = self.slabs_inverse(&blocks);
+        self.give_back(blocks);
+        result
+    }
+
+    /// Transforms all axes but the first; the result is row-major `[n0, columns]`.
+    fn slabs_forward(&self, x: &[T]) -> Vec<Complex<T>> {
+        assert_eq!(x.len(), self.len(), "grid of shape {:?}", self.shape);
+        let points = self.len() / self.shape[0];
+        let mut rows = self.take();
+        self.over_chunks(&mut rows, self.columns, |work, index, slab| {
+            let x = &x[index * points..][..points];
+            self.slab_forward(x, slab, work);
+        });
+        rows
+    }
+
+    fn slab_forward(&self, x: &[T], slab: &mut [Complex<T>], work: &mut Work<T>) {
+        let last = self.shape[self.shape.len() - 1];
+        for (line, out) in x.chunks_exact(last).zip(slab.chunks_exact_mut(self.half)) {
+            work.row.copy_from_slice(line);
+            self.real
+                .process_with_scratch(
+                    &mut work.row,
+                    out,
+                    &mut work.scratch[..self.real.get_scratch_len()],
+                )
+                .expect("row and spectrum have the plan's lengths");
+        }
+        self.inner_axes(slab, work, 0);
+    }
+
+    /// Complex transforms (`direction` 0 forward, 1 inverse) of the axes between the first and the last.
+    fn inner_axes(&self, slab: &mut [Complex<T>], work: &mut Work<T>, direction: usize) {
+        let mut trailing = self.half;
+        for axis in (1..self.shape.len() - 1).rev() {
+            let n = self.shape[axis];
+            let fft = &self.complex[axis][direction];
+            for matrix in slab.chunks_exact_mut(n * trailing) {
+                for first in (0..trailing).step_by(BLOCK) {
+                    let width = BLOCK.min(trailing - first);
+                    let columns = &mut work.columns[..width * n];
+                    gather(matrix, trailing, first, n, columns);
+                    fft.process_with_scratch(columns, &mut work.scratch);
+                    for (column, values) in columns.chunks_exact(n).enumerate() {
+                        for (row, value) in values.iter().enumerate() {
+                            matrix[row * trailing + first + column] = *value;
+                        }
+                    }
+                }
+            }
+            trailing *= n;
+        }
+    }
+
+    /// Inverse of [`Self::slabs_forward`], from columns stored block by block (see [`scatter`]).
+    fn slabs_inverse(&self, blocks: &[Complex<T>]) -> Vec<T> {
+        let n0 = self.shape[0];
+        let points = self.len() / n0;
+        let last = self.shape[self.shape.len() - 1];
+        let mut result = vec![T::zero(); self.len()];
+        self.over_chunks(&mut result, points, |work, index, out| {
+            let mut slab = std::mem::take(&mut work.slab);
+            for (block, part) in slab.chunks_mut(BLOCK).enumerate() {
+                let start = block * BLOCK * n0 + index * part.len();
+                part.copy_from_slice(&blocks[start..start + part.len()]);
+            }
+            self.inner_axes(&mut slab, work, 1);
+            for (line, out) in slab
+                .chunks_exact_mut(self.half)
+                .zip(out.chunks_exact_mut(last))
+            {
+                line[0].im = T::zero();
+                if last % 2 == 0 {
+                    line[self.half - 1].im = T::zero();
+                }
+                self.real_inverse
+                    .process_with_scratch(
+                        line,
+                        out,
+                        &mut work.scratch[..self.real_inverse.get_scratch_len()],
+                    )
+                    .expect("row and spectrum have the plan's lengths");
+            }
+            work.slab = slab;
+        });
+        result
+    }
+
+    /// Runs `f(work, first column, columns)` on every block of columns of the first axis.
+    fn over_blocks(
+        &self,
+        data: &mut [Complex<T>],
+        f: impl Fn(&mut Work<T>, usize, &mut [Complex<T>]) + Sync,
+    ) {
+        self.over_chunks(data, BLOCK * self.shape[0], |work, block, chunk| {
+            f(work, block * BLOCK, chunk);
+        });
+    }
+
+    fn over_chunks<E: Send>(
+        &self,
+        data: &mut [E],
+        chunk: usize,
+        f: impl Fn(&mut Work<T>, usize, &mut [E]) + Sync,
+    ) {
+        if self.len() >= PARALLEL_FROM && rayon::current_num_threads() > 1 {
+            let tasks = data.len().div_ceil(chunk);
+            let per_task = tasks.div_ceil(4 * rayon::current_num_threads());
+            data.par_chunks_mut(chunk * per_task)
+                .enumerate()
+                .for_each_init(
+                    || self.work(),
+                    |work, (task, data)| {
+                        for (i, part) in data.chunks_mut(chunk).enumerate() {
+                            f(work, task * per_task + i, part);
+                        }
+                    },
+                );
+        } else {
+            let mut work = self.work();
+            for (i, part) in data.chunks_mut(chunk).enumerate() {
+                f(&mut work, i, part);
+            }
+        }
+    }
+
+    fn work(&self) -> Work<T> {
+        let scratch = self
+            .complex
+            .iter()
+            .flatten()
+            .map(|fft| fft.get_inplace_scratch_len())
+            .chain([
+                self.real.get_scratch_len(),
+                self.real_inverse.get_scratch_len(),
+            ])
+            .max()
+            .unwrap_or(0);
+        let longest = self.shape[..self.shape.len() - 1]
+            .iter()
+            .max()
+            .copied()
+            .unwrap_or(0);
+        Work {
+            row: vec![T::zero(); self.shape[self.shape.len() - 1]],
+            slab: vec![Complex::default(); self.columns],
+            columns: vec![Complex::default(); BLOCK * longest],
+            scratch: vec![Complex::default(); scratch],
+        }
+    }
+
+    fn take(&self) -> Vec<Complex<T>> {
+        lock(&self.pool)
+            .pop()
+            .unwrap_or_else(|| vec![Complex::default(); self.spectrum_len()])
+    }
+
+    fn give_back(&self, buffer: Vec<Complex<T>>) {
+        let mut pool = lock(&self.pool);
+        // Two buffers per concurrent convolution; more would only pin memory.
+        if pool.len() < 2 * rayon::current_num_threads() {
+            pool.push(buffer);
+        }
+    }
+}
+
+/// Columns `first..` of the row-major matrix `[n, stride]`, one after the other.
+fn gather<T: Real>(
+    matrix: &[Complex<T>],
+    stride: usize,
+    first: usize,
+    n: usize,
+    columns: &mut [Complex<T>],
+) {
+    let width = columns.len() / n;
+    for row in 0..n {
+        let line = &matrix[row * stride + first..][..width];
+        for (column, value) in line.iter().enumerate() {
+            columns[column * n + row] = *value;
+        }
+    }
+}
+
+/// Stores a block of columns row by row, so that a row's part of it is contiguous.
+fn scatter<T: Real>(columns: &[Complex<T>], n: usize, block: &mut [Complex<T>]) {
+    let width = columns.len() / n;
+    for (row, line) in block.chunks_exact_mut(width).enumerate() {
+        for (column, value) in line.iter_mut().enumerate() {
+            *value = columns[column * n + row];
+        }
+    }
+}
+
+/// Locks a mutex whose data is valid at every point where a panic could poison it.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex
+        .lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner)
+}
+
+/// The floating-point type as a run-time value.
+pub(crate) fn is_f64<T: 'static>() -> bool {
+    TypeId::of::<T>() == TypeId::of::<f64>()
+}

@@ -1,0 +1,109 @@
+//! Symmetric circulant matrices given by their real spectrum: preconditioners.
+
+use std::fmt;
+use std::sync::{Arc, Mutex};
+
+use burn::backend::{Backend, backend_extension, tensor::FloatTensor};
+use burn::tensor::{DType, Device, Tensor, TensorData};
+
+use crate::composed::full_symbol;
+use crate::convolution::kernel_symbol;
+use crate::fft::{Real, Transform, is_f64, lock};
+
+/// A real, even symbol on the frequencies of a periodic grid; cheap to clone.
+#[derive(Clone)]
+pub struct SpectralFilter(Arc<Symbol>);
+
+struct Symbol {
+    shape: Vec<usize>,
+    /// Normalised by the number of grid points, in the order of [`Transform`]'s spectra.
+    double: Vec<f64>,
+    single: Vec<f32>,
+    /// The whole symbol where the composed operation ran last.
+    uploaded: Mutex<Option<(Device, DType, Tensor<1>)>>,
+}
+
+impl SpectralFilter {
+    /// The filter whose symbol is `f(k)` with `k` the complex symbol of a convolution kernel at each frequency
+    /// (`kernel`: `width^D` values, row-major, centre in the middle).
+    pub fn from_kernel(
+        shape: &[usize],
+        kernel: &[f64],
+        width: usize,
+        f: impl Fn(rustfft::num_complex::Complex<f64>) -> f64,
+    ) -> Self {
+        let points = Transform::<f64>::of_shape(shape).len() as f64;
+        let double: Vec<f64> = kernel_symbol(shape, kernel, width)
+            .iter()
+            .map(|k| f(k.scale(points)) / points)
+            .collect();
+        let single = double.iter().map(|&v| v as f32).collect();
+        Self(Arc::new(Symbol {
+            shape: shape.to_vec(),
+            double,
+            single,
+            uploaded: Mutex::new(None),
+        }))
+    }
+
+    /// Shape of the grids it applies to.
+    pub fn shape(&self) -> &[usize] {
+        &self.0.shape
+    }
+
+    pub(crate) fn symbol<T: Real>(&self) -> &[T] {
+        if is_f64::<T>() {
+            bytemuck::cast_slice(&self.0.double)
+        } else {
+            bytemuck::cast_slice(&self.0.single)
+        }
+    }
+
+    /// The symbol at all frequencies, row-major and not normalised, as a tensor.
+    #[cfg_attr(not(any(test, feature = "wgpu", feature = "cuda")), allow(dead_code))]
+    pub(crate) fn on_device(&self, device: &Device, dtype: DType) -> Tensor<1> {
+        let mut uploaded = lock(&self.0.uploaded);
+        if let Some((at, of, symbol)) = uploaded.as_ref()
+            && at == device
+            && *of == dtype
+        {
+            return symbol.clone();
+        }
+        let values = full_symbol(&self.0.shape, &self.row_major());
+        let length = values.len();
+        let symbol = Tensor::from_data(TensorData::new(values, [length]), (device, dtype));
+        *uploaded = Some((device.clone(), dtype, symbol.clone()));
+        symbol
+    }
+
+    /// The symbol row-major over the half spectrum `[n0, .., n_last / 2 + 1]`, not normalised.
+    pub fn row_major(&self) -> Vec<f64> {
+        let n0 = self.0.shape[0];
+        let points: usize = self.0.shape.iter().product();
+        let columns = self.0.double.len() / n0;
+        let mut natural = vec![0.0; self.0.double.len()];
+        for column in 0..columns {
+            for row in 0..n0 {
+                natural[row * columns + column] = self.0.double[column * n0 + row] * points as f64;
+            }
+        }
+        natural
+    }
+}
+
+impl fmt::Debug for SpectralFilter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "SpectralFilter({:?})", self.0.shape)
+    }
+}
+
+/// Multiplication in Fourier space; not differentiated, so neither captured nor on the tape.
+#[backend_extension(
+    Flex: cfg(feature = "flex"),
+    NdArray: cfg(feature = "ndarray"),
+    Cube: cfg(any(feature = "wgpu", feature = "cuda"))
+)]
+pub trait FilterOps: Backend {
+    /// Applies the circulant matrix to one grid.
+    fn spectral_filter(x: FloatTensor<Self>, filter: SpectralFilter) -> FloatTensor<Self>;
+}

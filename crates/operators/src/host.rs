@@ -1,0 +1,195 @@
+//! The extension operations on the CPU backends, through the host kernels, in `f64` or `f32`.
+
+use burn_backend::Shape;
+
+use crate::convolution::{convolve, correlate};
+use crate::fft::{Real, Transform};
+use crate::filter::SpectralFilter;
+use crate::table::{TableRange, evaluate};
+
+/// Grid axes and width of a kernel from its shape; batch axes lead.
+fn grid_axes<'a>(x: &'a Shape, kernel: &Shape) -> (&'a [usize], usize) {
+    let axes = kernel.num_dims();
+    (&x[x.num_dims() - axes..], kernel[0])
+}
+
+pub(crate) fn circular_convolution<T: Real>(
+    x: &[T],
+    shape: &Shape,
+    kernel: &[T],
+    kernel_shape: &Shape,
+    adjoint: bool,
+) -> Vec<T> {
+    let (grid, width) = grid_axes(shape, kernel_shape);
+    convolve(x, grid, kernel, width, adjoint)
+}
+
+pub(crate) fn kernel_correlation<T: Real>(
+    x: &[T],
+    shape: &Shape,
+    g: &[T],
+    width: usize,
+    axes: usize,
+) -> Vec<T> {
+    correlate(x, g, &shape[shape.num_dims() - axes..], width)
+}
+
+pub(crate) fn tabulated<T: Real>(w: &[T], table: &[T], range: TableRange, order: usize) -> Vec<T> {
+    evaluate(w, range, table, order)
+}
+
+pub(crate) fn spectral_filter<T: Real>(x: &[T], shape: &Shape, filter: &SpectralFilter) -> Vec<T> {
+    let symbol: &[T] = filter.symbol();
+    Transform::of_shape(&shape[..]).filter_real(x, symbol)
+}
+
+/// Runs a generic host kernel in the tensor's own precision.
+macro_rules! in_precision {
+    ($dtype:expr, $type:ident => $body:expr) => {
+        match $dtype {
+            DType::F64 => {
+                type $type = f64;
+                $body
+            }
+            DType::F32 => {
+                type $type = f32;
+                $body
+            }
+            other => unreachable!("grid operations run on f64 or f32 tensors, got {other:?}"),
+        }
+    };
+}
+
+#[cfg(feature = "flex")]
+mod flex {
+    use burn_backend::{DType, TensorData, TensorMetadata};
+    use burn_flex::{Flex, FlexTensor};
+
+    use super::{SpectralFilter, TableRange};
+    use crate::filter::FilterOps;
+    use crate::ops::GridOps;
+
+    fn contiguous(x: FlexTensor) -> FlexTensor {
+        if x.is_contiguous() {
+            x
+        } else {
+            x.to_contiguous()
+        }
+    }
+
+    impl GridOps for Flex {
+        fn circular_convolution(x: FlexTensor, kernel: FlexTensor, adjoint: bool) -> FlexTensor {
+            let (x, kernel) = (contiguous(x), contiguous(kernel));
+            let (shape, kernel_shape) = (x.shape(), kernel.shape());
+            in_precision!(x.dtype(), T => {
+                let y = super::circular_convolution::<T>(x.storage(), &shape, kernel.storage(), &kernel_shape, adjoint);
+                FlexTensor::from_data(TensorData::new(y, shape))
+            })
+        }
+
+        fn kernel_correlation(
+            x: FlexTensor,
+            g: FlexTensor,
+            width: usize,
+            axes: usize,
+        ) -> FlexTensor {
+            let (x, g) = (contiguous(x), contiguous(g));
+            let shape = x.shape();
+            in_precision!(x.dtype(), T => {
+                let y = super::kernel_correlation::<T>(x.storage(), &shape, g.storage(), width, axes);
+                FlexTensor::from_data(TensorData::new(y, vec![width; axes]))
+            })
+        }
+
+        fn tabulated(
+            w: FlexTensor,
+            table: FlexTensor,
+            range: TableRange,
+            order: usize,
+        ) -> FlexTensor {
+            let (w, table) = (contiguous(w), contiguous(table));
+            let shape = w.shape();
+            in_precision!(w.dtype(), T => {
+                let y = super::tabulated::<T>(w.storage(), table.storage(), range, order);
+                FlexTensor::from_data(TensorData::new(y, shape))
+            })
+        }
+    }
+
+    impl FilterOps for Flex {
+        fn spectral_filter(x: FlexTensor, filter: SpectralFilter) -> FlexTensor {
+            let x = contiguous(x);
+            let shape = x.shape();
+            in_precision!(x.dtype(), T => {
+                let y = super::spectral_filter::<T>(x.storage(), &shape, &filter);
+                FlexTensor::from_data(TensorData::new(y, shape))
+            })
+        }
+    }
+}
+
+#[cfg(feature = "ndarray")]
+mod ndarray {
+    use burn_backend::{
+        DType, Element, TensorData, TensorMetadata, ops::FloatTensorOps, tensor::FloatTensor,
+    };
+    use burn_ndarray::NdArray;
+
+    use super::{SpectralFilter, TableRange};
+    use crate::fft::Real;
+    use crate::filter::FilterOps;
+    use crate::ops::GridOps;
+
+    type NdTensor = FloatTensor<NdArray>;
+
+    fn values<T: Real + Element>(x: NdTensor) -> Vec<T> {
+        burn_std::reader::try_read_sync(NdArray::float_into_data(x))
+            .expect("the ndarray backend reads synchronously")
+            .expect("an ndarray tensor can be read")
+            .try_into_vec()
+            .expect("the tensor has the element type of its dtype")
+    }
+
+    fn tensor<T: Real + Element>(
+        values: Vec<T>,
+        shape: impl Into<burn_backend::Shape>,
+    ) -> NdTensor {
+        NdArray::float_from_data(TensorData::new(values, shape), &Default::default())
+    }
+
+    impl GridOps for NdArray {
+        fn circular_convolution(x: NdTensor, kernel: NdTensor, adjoint: bool) -> NdTensor {
+            let (shape, kernel_shape) = (x.shape(), kernel.shape());
+            in_precision!(x.dtype(), T => {
+                let (x, kernel) = (values::<T>(x), values::<T>(kernel));
+                let y = super::circular_convolution(&x, &shape, &kernel, &kernel_shape, adjoint);
+                tensor(y, shape)
+            })
+        }
+
+        fn kernel_correlation(x: NdTensor, g: NdTensor, width: usize, axes: usize) -> NdTensor {
+            let shape = x.shape();
+            in_precision!(x.dtype(), T => {
+                let (x, g) = (values::<T>(x), values::<T>(g));
+                tensor(super::kernel_correlation(&x, &shape, &g, width, axes), vec![width; axes])
+            })
+        }
+
+        fn tabulated(w: NdTensor, table: NdTensor, range: TableRange, order: usize) -> NdTensor {
+            let shape = w.shape();
+            in_precision!(w.dtype(), T => {
+                let (w, table) = (values::<T>(w), values::<T>(table));
+                tensor(super::tabulated(&w, &table, range, order), shape)
+            })
+        }
+    }
+
+    impl FilterOps for NdArray {
+        fn spectral_filter(x: NdTensor, filter: SpectralFilter) -> NdTensor {
+            let shape = x.shape();
+            in_precision!(x.dtype(), T => {
+                tensor(super::spectral_filter(&values::<T>(x), &shape, &filter), shape)
+            })
+        }
+    }
+}

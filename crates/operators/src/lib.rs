@@ -1,0 +1,61 @@
+//! Burn extension operations on periodic grids, and the choice of the device they run on.
+//!
+//! ```
+//! use operators::{ComputeDevice, circular_convolution};
+//!
+//! # fn main() -> Result<(), operators::Error> {
+//! // A discrete unit impulse, smoothed by a 3 x 3 box kernel with periodic wrap-around.
+//! let device = ComputeDevice::default_compiled()?;
+//! let mut impulse = vec![0.0; 36];
+//! impulse[0] = 9.0;
+//! let u = device.tensor::<2>(&impulse, [6, 6]);
+//! let kernel = device.tensor::<2>(&[1.0 / 9.0; 9], [3, 3]);
+//! let smooth = device.values(circular_convolution(u, kernel, false))?;
+//! assert!((smooth[35] - 1.0).abs() < 1e-5, "node (5, 5) is a neighbour of node (0, 0)");
+//! assert!(smooth[14].abs() < 1e-5, "node (2, 2) is not");
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! | operation | formula | derivative |
+//! |---|---|---|
+//! | [`circular_convolution`] | `y_a = sum_b K_b x_{a+b}` | itself with `adjoint` flipped; in the kernel [`kernel_correlation`] |
+//! | [`kernel_correlation`] | `c_b = sum_a g_a x_{a+b}` | [`circular_convolution`] |
+//! | [`tabulated`] | `y_a = F^(k)(w_a)`, `F` a quintic Hermite table | itself with `k + 1` |
+//! | [`spectral_filter`] | `y = F^-1[symbol F[x]]` | none (preconditioners) |
+//!
+//! Conventions: grids are row-major, the last axis fastest; a kernel has the same odd width on every axis and its
+//! centre in the middle; leading axes beyond the kernel's are a batch. The CPU backends (`flex`, `ndarray`) compute in
+//! the tensor's own precision, `f64` unless asked otherwise, by real FFTs of any length (realfft, rustfft). On a GPU the
+//! operations are composed of Burn tensor operations in `f32`. The same input gives the same bytes on a CPU, whatever
+//! the number of threads.
+
+// Burn 0.22 deprecates its ndarray backend in favour of flex; it stays selectable here until it is gone.
+#![cfg_attr(feature = "ndarray", allow(deprecated))]
+
+mod composed;
+mod convolution;
+#[cfg(any(feature = "wgpu", feature = "cuda"))]
+mod cube;
+mod device;
+#[cfg(any(feature = "wgpu", feature = "cuda"))]
+mod device_check;
+mod error;
+mod fft;
+mod filter;
+#[macro_use]
+mod host;
+mod ops;
+mod rules;
+mod table;
+mod tensor;
+
+pub use convolution::kernel_symbol;
+pub use device::{ComputeDevice, DeviceKind};
+pub use error::Error;
+pub use fft::{Real, Transform};
+pub use filter::{FilterOps, SpectralFilter};
+pub use ops::GridOps;
+pub use rules::extensions;
+pub use table::{COEFFICIENTS, HermiteTable, TableRange};
+pub use tensor::{circular_convolution, kernel_correlation, spectral_filter, tabulated};

@@ -1,0 +1,281 @@
+//! A scalar function as a piecewise polynomial: quintic Hermite interpolation of its jets.
+//!
+//! Newton's method needs `F`, `F'` and `F''` of the *same* function, and a table gives all of them for the price
+//! of one look-up. On each of `cells` equal cells of `[low, high]` the interpolant matches `F`, `F'`, `F''` at both
+//! ends, so it is twice continuously differentiable, with an error of `width^6 / 46080 max |F^(6)|`. Beyond the ends it
+//! continues as the second-order Taylor polynomial there.
+
+use rayon::prelude::*;
+
+use crate::Error;
+use crate::fft::Real;
+
+/// Coefficients per cell.
+pub const COEFFICIENTS: usize = 6;
+const PARALLEL_FROM: usize = 1 << 15;
+
+/// Interval and resolution of a table; the coefficients travel beside it as a `[cells, 6]` tensor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TableRange {
+    /// Left end.
+    pub low: f64,
+    /// Right end.
+    pub high: f64,
+    /// Number of equal cells.
+    pub cells: usize,
+}
+
+impl TableRange {
+    fn width(&self) -> f64 {
+        (self.high - self.low) / self.cells as f64
+    }
+}
+
+/// A tabulated function on the host: coefficient `j` of cell `i` at `6 i + j`, in powers of `t = (w - w_i) / width`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HermiteTable {
+    range: TableRange,
+    coefficients: Vec<f64>,
+}
+
+impl HermiteTable {
+    /// Tabulates a function given by its jet `w -> [F, F', F'']`.
+    ///
+    /// # Errors
+    /// [`Error::TableRange`] if the interval is empty or not finite, or there are no cells;
+    /// [`Error::NonFiniteTable`] at the first node where the jet is not finite.
+    pub fn new(range: TableRange, jet: impl Fn(f64) -> [f64; 3]) -> Result<Self, Error> {
+        let TableRange { low, high, cells } = range;
+        if !(low.is_finite() && high.is_finite() && low < high && cells > 0) {
+            return Err(Error::TableRange { low, high, cells });
+        }
+        let width = range.width();
+        let mut nodes = Vec::with_capacity(cells + 1);
+        for i in 0..=cells {
+            let at = low + i as f64 * width;
+            let value = jet(at);
+            if value.iter().any(|v| !v.is_finite()) {
+                return Err(Error::NonFiniteTable { at });
+            }
+            nodes.push(value);
+        }
+        let coefficients = nodes
+            .windows(2)
+            .flat_map(|ends| hermite(ends[0], ends[1], width))
+            .collect();
+        Ok(Self {
+            range,
+            coefficients,
+        })
+    }
+
+    /// Interval and number of cells.
+    pub fn range(&self) -> TableRange {
+        self.range
+    }
+
+    /// All coefficients, `[cells, 6]` row-major.
+    pub fn coefficients(&self) -> &[f64] {
+        &self.coefficients
+    }
+
+    /// The `order`-th derivative of the interpolant at `w`.
+    pub fn derivative(&self, w: f64, order: usize) -> f64 {
+        Evaluator::new(self.range, &self.coefficients, order).at(w)
+    }
+}
+
+fn hermite(a: [f64; 3], b: [f64; 3], width: f64) -> [f64; COEFFICIENTS] {
+    let [f0, d0, s0] = [a[0], a[1] * width, 0.5 * a[2] * width * width];
+    let [f1, d1, s1] = [b[0], b[1] * width, 0.5 * b[2] * width * width];
+    // What the quadratic from the left end misses at the right end, in value and derivatives.
+    let value = f1 - f0 - d0 - s0;
+    let slope = d1 - d0 - 2.0 * s0;
+    let bend = s1 - s0;
+    [
+        f0,
+        d0,
+        s0,
+        10.0 * value - 4.0 * slope + bend,
+        -15.0 * value + 7.0 * slope - 2.0 * bend,
+        6.0 * value - 3.0 * slope + bend,
+    ]
+}
+
+/// Evaluates one derivative of a table.
+struct Evaluator<'a, T> {
+    low: T,
+    width: T,
+    inverse_width: T,
+    last: usize,
+    order: usize,
+    factors: [T; COEFFICIENTS],
+    coefficients: &'a [T],
+}
+
+/// `j! / (j - order)! / width^order`: what the `order`-th derivative multiplies coefficient `j` by.
+fn factors<T: Real>(width: f64, order: usize) -> [T; COEFFICIENTS] {
+    std::array::from_fn(|j| {
+        let falling: f64 = (0..order).map(|i| j as f64 - i as f64).product();
+        T::of(if j < order {
+            0.0
+        } else {
+            falling / width.powi(order as i32)
+        })
+    })
+}
+
+impl<'a, T: Real> Evaluator<'a, T> {
+    fn new(range: TableRange, coefficients: &'a [T], order: usize) -> Self {
+        let width = range.width();
+        Self {
+            low: T::of(range.low),
+            width: T::of(width),
+            inverse_width: T::of(1.0 / width),
+            last: range.cells - 1,
+            order,
+            factors: factors(width, order),
+            coefficients,
+        }
+    }
+
+    fn at(&self, w: T) -> T {
+        let s = (w - self.low) * self.inverse_width;
+        let end = T::of((self.last + 1) as f64);
+        if s < T::zero() || s > end {
+            return self.beyond(s, if s < T::zero() { T::zero() } else { end });
+        }
+        // NaN lands in cell 0 and stays NaN through t.
+        let cell = s.to_usize().unwrap_or(0).min(self.last);
+        self.polynomial(cell, s - T::of(cell as f64), &self.factors, self.order)
+    }
+
+    fn polynomial(&self, cell: usize, t: T, factors: &[T; COEFFICIENTS], order: usize) -> T {
+        let c = &self.coefficients[cell * COEFFICIENTS..][..COEFFICIENTS];
+        let mut sum = T::zero();
+        for j in (order..COEFFICIENTS).rev() {
+            sum = sum * t + c[j] * factors[j];
+        }
+        sum
+    }
+
+    /// The Taylor polynomial of degree 2 at the end of the table nearest to `s`.
+    fn beyond(&self, s: T, end: T) -> T {
+        let cell = if end == T::zero() { 0 } else { self.last };
+        let t = end - T::of(cell as f64);
+        let distance = (s - end) * self.width;
+        let mut sum = T::zero();
+        let mut weight = T::one();
+        for (step, order) in (self.order..3).enumerate() {
+            if step > 0 {
+                weight = weight * distance / T::of(step as f64);
+            }
+            let factors = factors(self.width.to_f64().unwrap_or(f64::NAN), order);
+            sum = sum + weight * self.polynomial(cell, t, &factors, order);
+        }
+        sum
+    }
+}
+
+/// The `order`-th derivative at every entry of `w`.
+pub(crate) fn evaluate<T: Real>(
+    w: &[T],
+    range: TableRange,
+    coefficients: &[T],
+    order: usize,
+) -> Vec<T> {
+    let table = Evaluator::new(range, coefficients, order);
+    let mut result = vec![T::zero(); w.len()];
+    let chunk = if w.len() >= PARALLEL_FROM {
+        1 << 13
+    } else {
+        w.len().max(1)
+    };
+    result
+        .par_chunks_mut(chunk)
+        .zip(w.par_chunks(chunk))
+        .for_each(|(out, w)| {
+            for (out, &w) in out.iter_mut().zip(w) {
+                *out = table.at(w);
+            }
+        });
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sine(w: f64) -> [f64; 3] {
+        [w.sin(), w.cos(), -w.sin()]
+    }
+
+    fn table(cells: usize) -> HermiteTable {
+        HermiteTable::new(
+            TableRange {
+                low: -2.0,
+                high: 2.0,
+                cells,
+            },
+            sine,
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn converges_with_the_orders_of_quintic_interpolation() {
+        let error = |cells: usize, order: usize| {
+            (0..4001)
+                .map(|i| -2.0 + i as f64 * 1e-3)
+                .map(|w| {
+                    (table(cells).derivative(w, order)
+                        - (w + order as f64 * std::f64::consts::FRAC_PI_2).sin())
+                    .abs()
+                })
+                .fold(0.0, f64::max)
+        };
+        for (order, expected) in [(0, 6.0), (1, 5.0), (2, 4.0), (3, 3.0)] {
+            let rate = (error(8, order) / error(16, order)).log2();
+            assert!((rate - expected).abs() < 0.2, "order {order}: rate {rate}");
+        }
+        assert!(error(1024, 0) < 1e-14);
+    }
+
+    #[test]
+    fn continues_twice_differentiably_beyond_the_ends() {
+        let table = table(64);
+        for end in [-2.0, 2.0] {
+            for order in 0..3 {
+                let inside = table.derivative(end * (1.0 - 1e-9), order);
+                let outside = table.derivative(end * (1.0 + 1e-9), order);
+                assert!((inside - outside).abs() < 1e-7, "order {order} at {end}");
+            }
+            let d = 0.7;
+            let [f, f1, f2] = sine(end);
+            let taylor = f + f1 * d * end.signum() + 0.5 * f2 * d * d;
+            assert!((table.derivative(end + d * end.signum(), 0) - taylor).abs() < 1e-12);
+            assert!(table.derivative(3.0 * end, 3).abs() < f64::EPSILON);
+        }
+        assert!(table.derivative(f64::NAN, 0).is_nan());
+    }
+
+    #[test]
+    fn refuses_bad_input_with_its_numbers() {
+        let range = TableRange {
+            low: 1.0,
+            high: 1.0,
+            cells: 4,
+        };
+        assert!(matches!(
+            HermiteTable::new(range, sine),
+            Err(Error::TableRange { .. })
+        ));
+        let range = TableRange {
+            low: -1.0,
+            high: 1.0,
+            cells: 4,
+        };
+        let error = HermiteTable::new(range, |w| [1.0 / w, 0.0, 0.0]).unwrap_err();
+        assert_eq!(error, Error::NonFiniteTable { at: 0.0 });
+    }
+}

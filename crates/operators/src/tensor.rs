@@ -1,0 +1,63 @@
+//! The extension operations on Burn's `Tensor`.
+
+use burn::backend::Dispatch;
+use burn::tensor::Tensor;
+
+use crate::filter::{FilterOps, SpectralFilter};
+use crate::ops::GridOps;
+use crate::table::TableRange;
+
+/// `y_a = sum_b K_b x_{a+b}` (or `x_{a-b}` if `adjoint`) with periodic `x`: the paper's `K * U`.
+///
+/// `x` has the kernel's `K` axes, preceded by any batch axes; `kernel` has odd width `n_K` on each axis. Differentiable
+/// in both.
+pub fn circular_convolution<const R: usize, const K: usize>(
+    x: Tensor<R>,
+    kernel: Tensor<K>,
+    adjoint: bool,
+) -> Tensor<R> {
+    Tensor::from_dispatch(<Dispatch as GridOps>::circular_convolution(
+        x.into_dispatch(),
+        kernel.into_dispatch(),
+        adjoint,
+    ))
+}
+
+/// `c_b = sum_a g_a x_{a+b}` for all offsets `b` of a kernel of the given width, summed over batch axes.
+pub fn kernel_correlation<const R: usize, const K: usize>(
+    x: Tensor<R>,
+    g: Tensor<R>,
+    width: usize,
+) -> Tensor<K> {
+    Tensor::from_dispatch(<Dispatch as GridOps>::kernel_correlation(
+        x.into_dispatch(),
+        g.into_dispatch(),
+        width,
+        K,
+    ))
+}
+
+/// `F^(order)(w)` entry by entry, `F` given by the coefficients `[cells, 6]` of a [`crate::HermiteTable`].
+///
+/// Differentiable in `w`; the table is constant.
+pub fn tabulated<const R: usize>(
+    w: Tensor<R>,
+    table: Tensor<2>,
+    range: TableRange,
+    order: usize,
+) -> Tensor<R> {
+    Tensor::from_dispatch(<Dispatch as GridOps>::tabulated(
+        w.into_dispatch(),
+        table.into_dispatch(),
+        range,
+        order,
+    ))
+}
+
+/// Applies a symmetric circulant matrix given by its spectrum. Not differentiable.
+pub fn spectral_filter<const R: usize>(x: Tensor<R>, filter: &SpectralFilter) -> Tensor<R> {
+    Tensor::from_dispatch(<Dispatch as FilterOps>::spectral_filter(
+        x.into_dispatch(),
+        filter.clone(),
+    ))
+}
