@@ -48,13 +48,18 @@ macro_rules! gridded {
                 const $K: usize = 3;
                 $body
             }
+            (4, 2) => {
+                const $R: usize = 4;
+                const $K: usize = 2;
+                $body
+            }
             (4, 3) => {
                 const $R: usize = 4;
                 const $K: usize = 3;
                 $body
             }
             shape => {
-                unreachable!("grids have 2 or 3 axes and at most one batch axis, got {shape:?}")
+                unreachable!("grids have 2 or 3 axes, 4 with the batch, got {shape:?}")
             }
         }
     };

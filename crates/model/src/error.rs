@@ -1,0 +1,108 @@
+use std::path::PathBuf;
+
+use thiserror::Error as ThisError;
+
+use crate::Ratios;
+
+/// What can go wrong with networks and their training.
+#[derive(Debug, ThisError)]
+pub enum Error {
+    /// A network of other ratios than the run's.
+    #[error("the network does not fit this run: trained for {network}, the run has {run}")]
+    Mismatch {
+        /// The network's ratios.
+        network: Ratios,
+        /// The run's ratios.
+        run: Ratios,
+    },
+    /// No shipped network has these ratios.
+    #[error(
+        "no trained network for {wanted}; available: {available}. Choose one of these ratios, or train one with \
+         `cargo run -p experiments --bin train_networks`"
+    )]
+    NotFound {
+        /// What the run needs.
+        wanted: String,
+        /// What there is.
+        available: String,
+    },
+    /// The kernel does not fit on the grid.
+    #[error(
+        "the kernel is {width} cells wide, but the grid has only {cells}; use a larger box or a finer grid"
+    )]
+    KernelTooWide {
+        /// Kernel width.
+        width: usize,
+        /// Cells per side.
+        cells: usize,
+    },
+    /// Ratios that cannot describe an operator.
+    #[error("impossible ratios ({ratios}): {reason}")]
+    Ratios {
+        /// The ratios.
+        ratios: Ratios,
+        /// What is wrong with them.
+        reason: &'static str,
+    },
+    /// An array of the wrong size.
+    #[error("{what}: expected {expected}, found {found}")]
+    Shape {
+        /// Which array.
+        what: &'static str,
+        /// Its proper size.
+        expected: String,
+        /// Its size.
+        found: String,
+    },
+    /// A number that is not finite.
+    #[error("{what}: entry {index} is not finite")]
+    NonFinite {
+        /// Which array.
+        what: &'static str,
+        /// First bad entry.
+        index: usize,
+    },
+    /// A weights file that cannot be read or written.
+    #[error("{action} {path}: {source}")]
+    Io {
+        /// What was attempted.
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A weights file with the wrong content.
+    #[error("{path} is not a usable network: {reason}")]
+    Weights {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Training parameters out of range.
+    #[error("training: {0}")]
+    Training(String),
+    /// The loss or a parameter became NaN or infinite.
+    #[error(
+        "training diverged in iteration {iteration}: {what} is not finite; lower the learning rate or change the seed"
+    )]
+    Diverged {
+        /// Iteration or epoch.
+        iteration: usize,
+        /// What became non-finite.
+        what: &'static str,
+    },
+    /// Training was interrupted; its checkpoint can be resumed.
+    #[error("training interrupted after iteration {iteration}; run again to resume")]
+    Interrupted {
+        /// The last finished iteration.
+        iteration: usize,
+    },
+    /// A file that cannot be written.
+    #[error(transparent)]
+    Write(#[from] geometry::Error),
+    /// From the operations on the device.
+    #[error(transparent)]
+    Operators(#[from] operators::Error),
+}

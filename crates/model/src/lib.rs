@@ -1,0 +1,55 @@
+//! The learned mean-curvature operator `V[u] = F(K * u)`: network, training, quality, storage.
+//!
+//! ```
+//! use geometry::{Grid, exact::mean_curvature_radius, measure::l2_distance, phase_field, shapes::Ball};
+//! use model::{MeanCurvatureOperator, Ratios, pretrained};
+//! use operators::ComputeDevice;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // One step of mean curvature flow of a disc, at h = 1/128 with eps = 2 h and tautilde = h^2.
+//! let grid = Grid::<2>::per_unit(128, 1.0)?;
+//! let (eps, step) = (2.0 * grid.spacing(), grid.spacing().powi(2));
+//! let network = pretrained::find(Ratios::of_run(2, 17, grid.spacing(), eps, step))?;
+//!
+//! let device = ComputeDevice::default_compiled()?;
+//! let operator = MeanCurvatureOperator::<2>::new(&network, &device)?;
+//! let disc = |radius| phase_field(grid, &Ball::<2>::new([0.0, 0.0], radius)?, eps);
+//! let u = device.tensor::<2>(disc(0.2)?.values(), grid.shape());
+//! let v = geometry::Field::from_values(grid, device.values(operator.apply(u))?)?;
+//!
+//! let exact = disc(mean_curvature_radius(0.2, step, 2))?;
+//! assert!(l2_distance(&v, &exact)? < 0.05 * l2_distance(&disc(0.2)?, &exact)?);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # The network
+//!
+//! `K` is a convolution kernel of odd width `n_K` and `F: R -> R` a perceptron `1-32-16-8-4-2-1` ([`Mlp`]), trained so that
+//! shrinking spheres follow mean curvature flow (Bretin, Denis, Masnou and Terii, J. Comput. Phys. 470,
+//! 2022; the form used by Rumpf, Sassen and Smoch, eq:mcf_operator_discrete). The operator depends only on the ratios `eps / h` and
+//! `tautilde / h^2` ([`Ratios`]), so one network serves every grid that has them. [`pretrained::find`] returns the shipped
+//! ones.
+//!
+//! # Training
+//!
+//! [`training::adam`] is the paper's method; [`training::levenberg_marquardt`] minimizes the same loss
+//! (eq:mcf_scheme_optimization_discrete) to its floor in about a minute. Losses here are means over nodes of the unit cube and over
+//! the radii `[0.05, 0.4]`. The smallest spheres dominate that mean, so a loss says little without its radii:
+//! [`Quality`] measures it on an evenly spread set and on the fixed draw of forty radii that an earlier
+//! implementation quoted its values for.
+
+mod error;
+mod mlp;
+mod network;
+mod operator;
+pub mod pretrained;
+mod quality;
+mod store;
+pub mod training;
+
+pub use error::Error;
+pub use mlp::{Mlp, PAPER_LAYERS, TABLE, forward, parameter_count};
+pub use network::{Network, Provenance, Ratios};
+pub use operator::MeanCurvatureOperator;
+pub use quality::{Quality, REFERENCE_RADII};

@@ -1,0 +1,185 @@
+//! A trained operator: kernel, activation, and the ratios it was trained for.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, Mlp};
+
+/// What a network depends on; one network serves every grid with these ratios.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ratios {
+    /// Dimension `D` of space.
+    pub dimension: usize,
+    /// Kernel width `n_K`, odd.
+    pub width: usize,
+    /// Interface width over grid spacing, `eps / h`.
+    pub eps_over_h: f64,
+    /// Time step of the mean curvature flow over the squared spacing, `tautilde / h^2`.
+    pub step_over_h2: f64,
+}
+
+impl Ratios {
+    /// The ratios of a run with interface width `eps` and inner step `mcf_step` on a grid of spacing `h`.
+    pub fn of_run(dimension: usize, width: usize, h: f64, eps: f64, mcf_step: f64) -> Self {
+        Self {
+            dimension,
+            width,
+            eps_over_h: eps / h,
+            step_over_h2: mcf_step / (h * h),
+        }
+    }
+
+    /// Whether `other` differs by no more than rounding.
+    pub fn matches(&self, other: &Self) -> bool {
+        let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
+        self.dimension == other.dimension
+            && self.width == other.width
+            && close(self.eps_over_h, other.eps_over_h)
+            && close(self.step_over_h2, other.step_over_h2)
+    }
+
+    /// Number of kernel entries, `n_K^D`.
+    pub fn kernel_len(&self) -> usize {
+        self.width.pow(self.dimension as u32)
+    }
+
+    /// Checks that the numbers can describe an operator.
+    ///
+    /// # Errors
+    /// [`Error::Ratios`] naming the first that cannot.
+    pub fn validate(&self) -> Result<(), Error> {
+        let reason = if !(2..=3).contains(&self.dimension) {
+            "the dimension must be 2 or 3"
+        } else if self.width % 2 == 0 || self.width > 1025 {
+            "the kernel width must be odd and at most 1025"
+        } else if !(self.eps_over_h.is_finite() && self.eps_over_h > 0.0) {
+            "eps/h must be positive"
+        } else if !(self.step_over_h2.is_finite() && self.step_over_h2 > 0.0) {
+            "tautilde/h^2 must be positive"
+        } else if self.step_over_h2 >= 8.0 / 9.0 * self.eps_over_h * self.eps_over_h {
+            "tautilde must be below 8/9 eps^2, or the step is not monotone"
+        } else {
+            return Ok(());
+        };
+        Err(Error::Ratios {
+            ratios: *self,
+            reason,
+        })
+    }
+}
+
+impl fmt::Display for Ratios {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}D, n_K = {}, eps/h = {}, tautilde/h^2 = {}",
+            self.dimension, self.width, self.eps_over_h, self.step_over_h2
+        )
+    }
+}
+
+/// How a network came to be and how good it is; stored with the weights.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// Training method and its settings, in words.
+    pub recipe: String,
+    /// Cells per unit length of the training grid.
+    pub reference_cells: usize,
+    /// Seed of the random numbers.
+    pub seed: u64,
+    /// Version of the program that trained it.
+    pub version: String,
+    /// Loss (eq:mcf_scheme_optimization_discrete) on the training samples.
+    pub training_loss: f64,
+    /// The same on held-out radii, whole grid.
+    pub held_out_loss: f64,
+    /// Held-out loss with both phases exchanged.
+    pub flipped_loss: f64,
+}
+
+/// The learned mean-curvature operator `V[u] = F(K * u)` (eq:mcf_operator_discrete).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Network {
+    ratios: Ratios,
+    kernel: Vec<f64>,
+    activation: Mlp,
+    provenance: Provenance,
+}
+
+impl Network {
+    /// Puts a network together.
+    ///
+    /// `kernel`: `n_K^D` values, row-major, centre in the middle.
+    ///
+    /// # Errors
+    /// [`Error::Ratios`], [`Error::Shape`] or [`Error::NonFinite`].
+    pub fn new(
+        ratios: Ratios,
+        kernel: Vec<f64>,
+        activation: Mlp,
+        provenance: Provenance,
+    ) -> Result<Self, Error> {
+        ratios.validate()?;
+        if kernel.len() != ratios.kernel_len() {
+            return Err(Error::Shape {
+                what: "kernel",
+                expected: ratios.kernel_len().to_string(),
+                found: kernel.len().to_string(),
+            });
+        }
+        if let Some(index) = kernel.iter().position(|k| !k.is_finite()) {
+            return Err(Error::NonFinite {
+                what: "kernel",
+                index,
+            });
+        }
+        Ok(Self {
+            ratios,
+            kernel,
+            activation,
+            provenance,
+        })
+    }
+
+    /// The ratios it was trained for.
+    pub fn ratios(&self) -> Ratios {
+        self.ratios
+    }
+
+    /// Kernel `K`, row-major.
+    pub fn kernel(&self) -> &[f64] {
+        &self.kernel
+    }
+
+    /// Activation `F`.
+    pub fn activation(&self) -> &Mlp {
+        &self.activation
+    }
+
+    /// How it came to be.
+    pub fn provenance(&self) -> &Provenance {
+        &self.provenance
+    }
+
+    /// Refuses a run whose ratios are not the network's.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] naming both.
+    pub fn check_fits(&self, run: Ratios) -> Result<(), Error> {
+        if self.ratios.matches(&run) {
+            return Ok(());
+        }
+        Err(Error::Mismatch {
+            network: self.ratios,
+            run,
+        })
+    }
+
+    /// The same operator with another account of its origin.
+    #[must_use]
+    pub fn with_provenance(mut self, provenance: Provenance) -> Self {
+        self.provenance = provenance;
+        self
+    }
+}

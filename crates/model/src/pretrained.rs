@@ -1,0 +1,60 @@
+//! The networks that ship with the library.
+
+use std::path::Path;
+
+use crate::{Error, Network, Ratios};
+
+macro_rules! shipped {
+    ($($name:literal),* $(,)?) => {
+        &[$(($name, include_bytes!(concat!("../networks/", $name)))),*]
+    };
+}
+
+/// File names and contents. `train_networks` in the experiments package makes these files.
+const SHIPPED: &[(&str, &[u8])] = shipped![
+    "d2_k17_eps2_step1.safetensors",
+    "d2_k33_eps4_step4.safetensors",
+    "d2_k65_eps8_step16.safetensors",
+    "d2_k17_eps4_step4.safetensors",
+];
+
+/// The name under which a network with these ratios is shipped.
+pub fn file_name(ratios: Ratios) -> String {
+    let Ratios {
+        dimension,
+        width,
+        eps_over_h,
+        step_over_h2,
+    } = ratios;
+    format!("d{dimension}_k{width}_eps{eps_over_h}_step{step_over_h2}.safetensors")
+}
+
+/// All shipped networks with their file names.
+///
+/// # Errors
+/// [`Error::Weights`] if a file in the program is damaged.
+pub fn all() -> Result<Vec<(&'static str, Network)>, Error> {
+    SHIPPED
+        .iter()
+        .map(|(name, data)| Ok((*name, Network::from_bytes(data, Path::new(name))?)))
+        .collect()
+}
+
+/// The shipped network with these ratios.
+///
+/// # Errors
+/// [`Error::NotFound`] naming the ratios wanted and those available.
+pub fn find(wanted: Ratios) -> Result<Network, Error> {
+    let all = all()?;
+    let available: Vec<String> = all
+        .iter()
+        .map(|(_, n)| format!("({})", n.ratios()))
+        .collect();
+    all.into_iter()
+        .map(|(_, network)| network)
+        .find(|network| network.ratios().matches(&wanted))
+        .ok_or_else(|| Error::NotFound {
+            wanted: wanted.to_string(),
+            available: available.join(", "),
+        })
+}

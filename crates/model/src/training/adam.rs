@@ -1,0 +1,369 @@
+//! The paper's training (alg:mcf_training): Adam on mini-batches of whole grids, refined progressively.
+
+use burn::optim::{Adam, AdamConfig, AdamState as BurnState, AdaptiveMomentumState, Optimizer};
+use burn::tensor::Tensor;
+use operators::{ComputeDevice, circular_convolution};
+use rand::seq::SliceRandom;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use super::{Observer, Progress, SphereData};
+use crate::mlp::forward;
+use crate::{Error, Mlp};
+
+/// Settings of the training.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AdamParams {
+    /// Passes over all radii.
+    pub epochs: usize,
+    /// Radii per mini-batch, 10 in the paper.
+    pub batch: usize,
+    /// Learning rate of the first epoch.
+    pub learning_rate: f64,
+    /// Learning rate of the last epoch; geometric in between.
+    pub final_learning_rate: f64,
+    /// Held-out radii for the learning curve.
+    pub held_out: usize,
+}
+
+impl Default for AdamParams {
+    fn default() -> Self {
+        Self {
+            epochs: 200,
+            batch: 10,
+            learning_rate: 1e-3,
+            final_learning_rate: 1e-4,
+            held_out: 10,
+        }
+    }
+}
+
+/// State between epochs; what a checkpoint holds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AdamState {
+    /// Kernel entries, then activation parameters.
+    pub parameters: Vec<f64>,
+    /// First and second moment of the gradient.
+    pub moments: [Vec<f64>; 2],
+    /// Updates so far.
+    pub updates: usize,
+    /// Finished epochs.
+    pub epoch: usize,
+}
+
+/// Loss (eq:mcf_scheme_optimization_discrete) of a mini-batch as a Burn graph.
+///
+/// `parameters`: kernel then activation, flat; `spheres`, `targets`: `[batch, n, .., n]`.
+pub fn loss<const D: usize, const R: usize>(
+    parameters: &Tensor<1>,
+    width: usize,
+    layers: &[usize],
+    spheres: Tensor<R>,
+    targets: Tensor<R>,
+) -> Tensor<1> {
+    let kernel_len = width.pow(D as u32);
+    let total = parameters.dims()[0];
+    let kernel: Tensor<D> = parameters
+        .clone()
+        .slice([0..kernel_len])
+        .reshape([width; D]);
+    let activation = parameters.clone().slice([kernel_len..total]);
+    let smoothed = circular_convolution(spheres, kernel, false);
+    let points: usize = smoothed.dims().iter().product();
+    let result = forward(layers, &activation, smoothed.reshape([points, 1]));
+    let error = result - targets.reshape([points, 1]);
+    (error.clone() * error).mean()
+}
+
+/// A batch of spheres before and after the step, `[batch, n, .., n]`.
+fn batch<const R: usize>(
+    data: &SphereData,
+    radii: &[f64],
+    device: &ComputeDevice,
+) -> (Tensor<R>, Tensor<R>) {
+    let mut shape = [data.cells; R];
+    shape[0] = radii.len();
+    let stack = |f: &dyn Fn(f64) -> f64| {
+        let values: Vec<f64> = radii.iter().flat_map(|&r| data.sphere(f(r))).collect();
+        device.tensor::<R>(&values, shape)
+    };
+    (stack(&|r| r), stack(&|r| data.shrunk(r)))
+}
+
+/// Trains kernel and activation from a start; `state` resumes an earlier run with the same bytes.
+///
+/// # Errors
+/// [`Error::Diverged`], [`Error::Interrupted`], [`Error::Training`].
+pub fn train(
+    data: &SphereData,
+    params: &AdamParams,
+    start: (&[f64], &Mlp),
+    seed: u64,
+    state: Option<AdamState>,
+    device: &ComputeDevice,
+    observer: &mut dyn Observer<AdamState>,
+) -> Result<(Vec<f64>, Mlp, AdamState), Error> {
+    if data.ratios.dimension == 2 {
+        train_in::<2, 3>(data, params, start, seed, state, device, observer)
+    } else {
+        train_in::<3, 4>(data, params, start, seed, state, device, observer)
+    }
+}
+
+fn train_in<const D: usize, const R: usize>(
+    data: &SphereData,
+    params: &AdamParams,
+    start: (&[f64], &Mlp),
+    seed: u64,
+    state: Option<AdamState>,
+    device: &ComputeDevice,
+    observer: &mut dyn Observer<AdamState>,
+) -> Result<(Vec<f64>, Mlp, AdamState), Error> {
+    data.validate()?;
+    if params.batch == 0 || params.epochs == 0 {
+        return Err(Error::Training(
+            "Adam needs at least one epoch and one radius per batch".to_owned(),
+        ));
+    }
+    let layers = start.1.layers().to_vec();
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let radii = data.draw_radii(data.count, &mut rng);
+    let held_out = data.draw_radii(params.held_out.max(1), &mut rng);
+    let (held_spheres, held_targets) = batch::<R>(data, &held_out, device);
+
+    let mut state = match state {
+        Some(state) => state,
+        None => {
+            let parameters = [start.0, start.1.parameters()].concat();
+            let zeros = vec![0.0; parameters.len()];
+            AdamState {
+                moments: [zeros.clone(), zeros],
+                parameters,
+                updates: 0,
+                epoch: 0,
+            }
+        }
+    };
+    let n = start.0.len() + start.1.parameters().len();
+    if state.parameters.len() != n || state.moments.iter().any(|m| m.len() != n) {
+        return Err(Error::Shape {
+            what: "training checkpoint",
+            expected: n.to_string(),
+            found: state.parameters.len().to_string(),
+        });
+    }
+    let adam: Adam = AdamConfig::new().with_epsilon(1e-10).build();
+    let upload = |values: &[f64]| device.tensor::<1>(values, [n]);
+    let mut parameters = upload(&state.parameters);
+    let mut momentum = (state.updates > 0).then(|| {
+        let [first, second] = &state.moments;
+        BurnState::new(AdaptiveMomentumState::new(
+            state.updates,
+            upload(first),
+            upload(second),
+        ))
+    });
+    let width = data.ratios.width;
+    while state.epoch < params.epochs {
+        // Every epoch has its own stream, so that a resumed training draws what an uninterrupted one would.
+        let mut order: Vec<usize> = (0..radii.len()).collect();
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(1 + state.epoch as u64);
+        order.shuffle(&mut rng);
+        let progress = state.epoch as f64 / (params.epochs.max(2) - 1) as f64;
+        let rate = params.learning_rate
+            * (params.final_learning_rate / params.learning_rate).powf(progress);
+        let mut sum = 0.0;
+        let mut batches = 0.0;
+        for chunk in order.chunks(params.batch) {
+            let chosen: Vec<f64> = chunk.iter().map(|&i| radii[i]).collect();
+            let (spheres, targets) = batch::<R>(data, &chosen, device);
+            let variable = parameters.clone().autodiff().require_grad();
+            let value = loss::<D, R>(&variable, width, &layers, spheres, targets);
+            let gradients = value.clone().backward();
+            let gradient = variable
+                .grad(&gradients)
+                .ok_or_else(|| Error::Training("autodiff returned no gradient".to_owned()))?;
+            sum += device.scalar(value.inner())?;
+            batches += 1.0;
+            let (next, next_momentum) = adam.step(rate, parameters, gradient, momentum);
+            (parameters, momentum) = (next, next_momentum);
+            state.updates += 1;
+        }
+        state.epoch += 1;
+        state.parameters = device.values(parameters.clone())?;
+        if let Some(m) = &momentum {
+            state.moments = [
+                device.values(m.momentum.moment_1.clone())?,
+                device.values(m.momentum.moment_2.clone())?,
+            ];
+        }
+        if state.parameters.iter().any(|p| !p.is_finite()) {
+            return Err(Error::Diverged {
+                iteration: state.epoch,
+                what: "a parameter",
+            });
+        }
+        let held = loss::<D, R>(
+            &parameters,
+            width,
+            &layers,
+            held_spheres.clone(),
+            held_targets.clone(),
+        );
+        let progress = Progress {
+            iteration: state.epoch,
+            of: params.epochs,
+            training_loss: sum / batches,
+            held_out_loss: device.scalar(held)?,
+        };
+        if !observer.observe(&progress, &state)? {
+            return Err(Error::Interrupted {
+                iteration: state.epoch,
+            });
+        }
+    }
+    let (kernel, activation) = state.parameters.split_at(start.0.len());
+    let activation = Mlp::new(layers, activation.to_vec())?;
+    Ok((kernel.to_vec(), activation, state))
+}
+
+/// The paper's start: kernel zero, activation parameters normal.
+pub fn paper_start(data: &SphereData, seed: u64) -> (Vec<f64>, Mlp) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let layers = crate::PAPER_LAYERS.to_vec();
+    let parameters = (0..crate::parameter_count(&layers))
+        .map(|_| {
+            // The sum of twelve uniform numbers is normal enough for a start.
+            (0..12).map(|_| rng.random_range(-0.5..0.5)).sum()
+        })
+        .collect();
+    let activation = Mlp::new(layers, parameters).expect("the paper's layers, finite numbers");
+    (vec![0.0; data.ratios.kernel_len()], activation)
+}
+
+/// A kernel on a grid of half the spacing: multilinear interpolation, scaled by `2^-D` since it approximates `h^D` times a
+/// density. The width goes from `n` to `2 n - 1`.
+pub fn refine_kernel(kernel: &[f64], dimension: usize, width: usize) -> (Vec<f64>, usize) {
+    let fine = 2 * width - 1;
+    let mut values = kernel.to_vec();
+    let mut shape = vec![width; dimension];
+    for axis in 0..dimension {
+        let inner: usize = shape[axis + 1..].iter().product();
+        let outer: usize = shape[..axis].iter().product();
+        let mut next = vec![0.0; outer * fine * inner];
+        for o in 0..outer {
+            for i in 0..fine {
+                for k in 0..inner {
+                    let at = |j: usize| values[(o * width + j) * inner + k];
+                    let value = if i % 2 == 0 {
+                        at(i / 2)
+                    } else {
+                        0.5 * (at(i / 2) + at(i / 2 + 1))
+                    };
+                    next[(o * fine + i) * inner + k] = 0.5 * value;
+                }
+            }
+        }
+        values = next;
+        shape[axis] = fine;
+    }
+    (values, fine)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Ratios;
+    use crate::training::levenberg_marquardt::heat_kernel;
+
+    fn data(dimension: usize) -> SphereData {
+        let ratios = Ratios {
+            dimension,
+            width: 9,
+            eps_over_h: 2.0,
+            step_over_h2: 1.0,
+        };
+        SphereData {
+            ratios,
+            cells: 32,
+            radii: [0.2, 0.3],
+            count: 4,
+        }
+    }
+
+    fn params() -> AdamParams {
+        AdamParams {
+            epochs: 4,
+            batch: 2,
+            held_out: 2,
+            ..AdamParams::default()
+        }
+    }
+
+    #[test]
+    fn resumes_with_the_same_bytes_and_lowers_the_loss() {
+        let device = ComputeDevice::default_compiled().unwrap();
+        for dimension in [2, 3] {
+            let mut data = data(dimension);
+            data.cells = if dimension == 2 { 32 } else { 16 };
+            let start = paper_start(&data, 3);
+            let run = |params: &AdamParams, state, losses: &mut Vec<f64>| {
+                let mut watch = |p: &Progress, _: &AdamState| {
+                    losses.push(p.held_out_loss);
+                    Ok(true)
+                };
+                train(
+                    &data,
+                    params,
+                    (&start.0, &start.1),
+                    3,
+                    state,
+                    &device,
+                    &mut watch,
+                )
+                .unwrap()
+            };
+            let mut losses = Vec::new();
+            let (kernel, activation, whole) = run(&params(), None, &mut losses);
+            assert!(losses[3] < losses[0], "{dimension}D {losses:?}");
+            // Stopped after two epochs of the same schedule, then resumed.
+            let mut half = None;
+            let mut stop = |p: &Progress, s: &AdamState| {
+                half = Some(s.clone());
+                Ok(p.iteration < 2)
+            };
+            let stopped = train(
+                &data,
+                &params(),
+                (&start.0, &start.1),
+                3,
+                None,
+                &device,
+                &mut stop,
+            );
+            assert!(matches!(stopped, Err(Error::Interrupted { iteration: 2 })));
+            let (k, a, resumed) = run(&params(), half, &mut losses);
+            assert_eq!((k, a, resumed), (kernel, activation, whole));
+        }
+    }
+
+    #[test]
+    fn refinement_keeps_mass_and_linear_kernels() {
+        for dimension in [2, 3] {
+            let kernel = heat_kernel(&data(dimension));
+            let (fine, width) = refine_kernel(&kernel, dimension, 9);
+            assert_eq!((width, fine.len()), (17, 17_usize.pow(dimension as u32)));
+            let (coarse_sum, fine_sum): (f64, f64) = (kernel.iter().sum(), fine.iter().sum());
+            // The outermost half cells are lost; a heat kernel is small there.
+            assert!(
+                (coarse_sum - fine_sum).abs() < 1e-3,
+                "{coarse_sum} {fine_sum}"
+            );
+            let middle = fine.len() / 2;
+            let expected = kernel[kernel.len() / 2] / 2_f64.powi(dimension as i32);
+            assert!((fine[middle] - expected).abs() < 1e-15);
+        }
+    }
+}

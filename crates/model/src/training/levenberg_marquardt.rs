@@ -1,0 +1,512 @@
+//! Levenberg-Marquardt training: all parameters at once, from a good start.
+//!
+//! The residuals `F(K * u_r) - u_R` of 25 000 sampled points depend on about a thousand parameters, so that the full
+//! Gauss-Newton matrix is affordable and converges where Adam crawls. The Jacobian comes from Burn's autodiff: one backward
+//! pass of `sum F` yields, on leaves added to every layer's pre-activation, the derivative of each row's output; the rows
+//! of the Jacobian are products of those with the layers' inputs.
+
+use burn::tensor::{DType, Tensor};
+use faer::linalg::solvers::Solve;
+use faer::{Mat, MatRef, Side};
+use operators::ComputeDevice;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use super::{BandSamples, Observer, Orbits, Progress, SphereData};
+use crate::mlp::{forward_with, layout, parameter_count};
+use crate::{Error, Mlp, PAPER_LAYERS};
+
+/// Rows of the Jacobian assembled at once.
+const CHUNK: usize = 2048;
+
+/// Settings of the training.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LmParams {
+    /// Strata across the interface band, per radius.
+    pub shells: usize,
+    /// Random points per stratum.
+    pub directions: usize,
+    /// Weight of the exchanged phases `-u` in the loss.
+    pub flipped: f64,
+    /// Ridge of the kernel toward the heat kernel; keeps its transfer function in `[0, 1]` where the data say nothing.
+    pub kernel_ridge: f64,
+    /// Ridge of the activation's parameters.
+    pub activation_ridge: f64,
+    /// Upper bound of iterations.
+    pub iterations: usize,
+    /// Random starts of the activation.
+    pub starts: usize,
+    /// Stop when the held-out loss has not improved by one percent over this many iterations.
+    pub patience: usize,
+}
+
+impl Default for LmParams {
+    fn default() -> Self {
+        Self {
+            shells: 32,
+            directions: 4,
+            flipped: 0.25,
+            kernel_ridge: 1e-4,
+            activation_ridge: 1e-9,
+            iterations: 300,
+            starts: 2,
+            patience: 40,
+        }
+    }
+}
+
+/// State between iterations; what a checkpoint holds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LmState {
+    /// Kernel (one value per orbit), then activation parameters.
+    pub parameters: Vec<f64>,
+    /// Damping.
+    pub damping: f64,
+    /// Finished iterations.
+    pub iteration: usize,
+    /// Best parameters on the held-out samples and their loss.
+    pub best: Vec<f64>,
+    /// Held-out loss of [`Self::best`].
+    pub best_loss: f64,
+    /// Iteration of the last improvement by one percent.
+    pub improved_at: usize,
+    /// Loss it had then.
+    pub improved_to: f64,
+}
+
+/// `residual_i = sqrt(weight_i) (F(design k)_i - target_i)`, with ridges.
+struct Problem<'a> {
+    design: Tensor<2>,
+    target: Tensor<1>,
+    root_weight: Tensor<1>,
+    rows: usize,
+    orbits: usize,
+    widths: &'a [usize],
+    /// Ridge per parameter and the values it pulls to.
+    ridge: Vec<f64>,
+    centre: Vec<f64>,
+    /// Gradient of the kernel's sum, which is held at 1 so that `F(+-1) = +-1`.
+    sum: Vec<f64>,
+    device: &'a ComputeDevice,
+}
+
+/// Weight of `(sum K - 1)^2`, relative to the loss of the identity map.
+const SUM_WEIGHT: f64 = 1e3;
+
+/// Value, gradient and Gauss-Newton matrix of half the squared residual norm.
+struct Normal {
+    value: f64,
+    gradient: Vec<f64>,
+    matrix: Mat<f64>,
+}
+
+impl<'a> Problem<'a> {
+    fn new(
+        samples: &BandSamples,
+        sizes: &[usize],
+        widths: &'a [usize],
+        ridge: (Vec<f64>, Vec<f64>),
+        device: &'a ComputeDevice,
+    ) -> Self {
+        let (rows, orbits) = (samples.len(), sizes.len());
+        // Relative to the identity map, so that ridges mean the same for every network.
+        let scale = 1.0 / samples.identity_loss;
+        let root: Vec<f64> = samples.weight.iter().map(|w| (w * scale).sqrt()).collect();
+        Self {
+            design: device.tensor(&samples.design, [rows, orbits]),
+            target: device.tensor(&samples.target, [rows]),
+            root_weight: device.tensor(&root, [rows]),
+            rows,
+            orbits,
+            widths,
+            ridge: ridge.0,
+            centre: ridge.1,
+            sum: sizes.iter().map(|&s| s as f64).collect(),
+            device,
+        }
+    }
+
+    fn ridge_value(&self, x: &[f64]) -> f64 {
+        let terms = x.iter().zip(&self.centre).zip(&self.ridge);
+        let ridge: f64 = terms.map(|((x, c), r)| r * (x - c) * (x - c)).sum();
+        ridge + SUM_WEIGHT * self.sum_defect(x).powi(2)
+    }
+
+    fn sum_defect(&self, x: &[f64]) -> f64 {
+        self.sum.iter().zip(x).map(|(s, x)| s * x).sum::<f64>() - 1.0
+    }
+
+    /// Squared norm of the residual without and with the ridge.
+    fn value(&self, x: &[f64]) -> Result<(f64, f64), Error> {
+        let (kernel, activation) = self.split(x);
+        let z = self.design.clone().matmul(kernel);
+        let f = forward_with(self.widths, &activation, z, |_, a| a);
+        let residual = (f.reshape([self.rows]) - self.target.clone()) * self.root_weight.clone();
+        let loss = self.device.scalar((residual.clone() * residual).sum())?;
+        Ok((loss, loss + self.ridge_value(x)))
+    }
+
+    fn split(&self, x: &[f64]) -> (Tensor<2>, Tensor<1>) {
+        let (kernel, activation) = x.split_at(self.orbits);
+        (
+            self.device.tensor(kernel, [self.orbits, 1]),
+            self.device.tensor(activation, [activation.len()]),
+        )
+    }
+
+    /// Weighted Jacobian `[rows, parameters]` and residual of a block of rows.
+    fn block(&self, x: &[f64], start: usize, end: usize) -> Result<(Vec<f64>, Vec<f64>), Error> {
+        let rows = end - start;
+        let (kernel, activation) = self.split(x);
+        let design = self.design.clone().slice([start..end, 0..self.orbits]);
+        let root = self
+            .root_weight
+            .clone()
+            .slice([start..end])
+            .reshape([rows, 1]);
+
+        let z = design.clone().matmul(kernel).autodiff().require_grad();
+        let activation = activation.autodiff();
+        let mut leaves = Vec::new();
+        let mut inputs = Vec::new();
+        let device = z.device();
+        let f = forward_with(self.widths, &activation, z.clone(), |_, preactivation| {
+            let leaf =
+                Tensor::<2>::zeros(preactivation.dims(), (&device, DType::F64)).require_grad();
+            leaves.push(leaf.clone());
+            let sum = preactivation + leaf;
+            inputs.push(sum.clone());
+            sum
+        });
+        let gradients = f.clone().sum().backward();
+        let missing = || Error::Training("autodiff returned no gradient for a layer".to_owned());
+        let slope = z.grad(&gradients).ok_or_else(missing)?;
+
+        let mut columns = vec![design * slope];
+        let mut input = z.inner();
+        for (leaf, preactivation) in leaves.iter().zip(inputs) {
+            let delta = leaf.grad(&gradients).ok_or_else(missing)?;
+            let ([_, outputs], [_, width]) = (delta.dims(), input.dims());
+            let outer: Tensor<3> =
+                input.reshape([rows, width, 1]) * delta.clone().reshape([rows, 1, outputs]);
+            columns.push(outer.reshape([rows, width * outputs]));
+            columns.push(delta);
+            let a = preactivation.inner();
+            input = (a.clone() * a).neg().exp();
+        }
+        let jacobian = Tensor::cat(columns, 1) * root.clone();
+        let target = self.target.clone().slice([start..end]).reshape([rows, 1]);
+        let residual = (f.inner() - target) * root;
+        Ok((self.device.values(jacobian)?, self.device.values(residual)?))
+    }
+
+    fn normal(&self, x: &[f64]) -> Result<Normal, Error> {
+        let n = x.len();
+        let mut matrix = Mat::<f64>::zeros(n, n);
+        let mut gradient = vec![0.0; n];
+        let mut value = self.ridge_value(x);
+        for start in (0..self.rows).step_by(CHUNK) {
+            let end = (start + CHUNK).min(self.rows);
+            let (jacobian, residual) = self.block(x, start, end)?;
+            let jacobian = MatRef::from_row_major_slice(&jacobian, end - start, n);
+            let residual = MatRef::from_column_major_slice(&residual, end - start, 1);
+            use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+            matmul(
+                matrix.as_mut(),
+                BlockStructure::TriangularLower,
+                faer::Accum::Add,
+                jacobian.transpose(),
+                BlockStructure::Rectangular,
+                jacobian,
+                BlockStructure::Rectangular,
+                1.0,
+                faer::get_global_parallelism(),
+            );
+            let product = jacobian.transpose() * residual;
+            for (g, i) in gradient.iter_mut().zip(0..n) {
+                *g += product[(i, 0)];
+            }
+            value += residual.squared_norm_l2();
+        }
+        for i in 0..n {
+            matrix[(i, i)] += self.ridge[i];
+            gradient[i] += self.ridge[i] * (x[i] - self.centre[i]);
+        }
+        let defect = self.sum_defect(x);
+        for (i, a) in self.sum.iter().enumerate() {
+            gradient[i] += SUM_WEIGHT * defect * a;
+            for (j, b) in self.sum[..=i].iter().enumerate() {
+                matrix[(i, j)] += SUM_WEIGHT * a * b;
+            }
+        }
+        Ok(Normal {
+            value,
+            gradient,
+            matrix,
+        })
+    }
+
+    /// Accepts the first damped step that lowers the value; `None` if none does.
+    fn step(&self, x: &[f64], damping: &mut f64) -> Result<Option<Vec<f64>>, Error> {
+        let normal = self.normal(x)?;
+        let n = x.len();
+        let largest = (0..n).map(|i| normal.matrix[(i, i)]).fold(0.0, f64::max);
+        let right = Mat::from_fn(n, 1, |i, _| -normal.gradient[i]);
+        let mut growth = 2.0;
+        for _ in 0..14 {
+            let mut damped = normal.matrix.clone();
+            for i in 0..n {
+                damped[(i, i)] += *damping * (normal.matrix[(i, i)] + 1e-12 * largest);
+            }
+            if let Ok(factor) = damped.llt(Side::Lower) {
+                let step = factor.solve(&right);
+                let trial: Vec<f64> = (0..n).map(|i| x[i] + step[(i, 0)]).collect();
+                let (_, value) = self.value(&trial)?;
+                if value.is_finite() && value < normal.value {
+                    let slope: f64 = (0..n).map(|i| normal.gradient[i] * step[(i, 0)]).sum();
+                    let damping_term: f64 = (0..n)
+                        .map(|i| *damping * normal.matrix[(i, i)] * step[(i, 0)] * step[(i, 0)])
+                        .sum();
+                    // The model predicts a drop of -g.s - s.H.s = -g.s + s.D s, since (H + D) s = -g.
+                    let predicted = -slope + damping_term;
+                    let ratio = (normal.value - value) / predicted.max(f64::MIN_POSITIVE);
+                    let factor = (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(0.2, 3.0);
+                    *damping = (*damping * factor).clamp(1e-14, 1e10);
+                    return Ok(Some(trial));
+                }
+            }
+            *damping *= growth;
+            growth = f64::min(2.0 * growth, 16.0);
+        }
+        Ok(None)
+    }
+}
+
+/// The heat kernel of variance `2 tautilde` per axis, sampled and normalised: the kernel of the splitting scheme.
+pub fn heat_kernel(data: &SphereData) -> Vec<f64> {
+    let ratios = data.ratios;
+    let orbits = Orbits::new(ratios.dimension, ratios.width);
+    let mut kernel: Vec<f64> = orbits
+        .offsets()
+        .iter()
+        .map(|b| {
+            let squared: f64 = b.iter().map(|&b| (b * b) as f64).sum();
+            (-squared / (4.0 * ratios.step_over_h2)).exp()
+        })
+        .collect();
+    let sum: f64 = kernel.iter().sum();
+    kernel.iter_mut().for_each(|k| *k /= sum);
+    kernel
+}
+
+/// The activation of the splitting scheme: the inverse of `phi(v) = v + tautilde / (2 eps^2) Psi'(v)`.
+pub fn splitting_activation(step_over_eps2: f64, w: f64) -> f64 {
+    let c = 9.0 / 8.0 * step_over_eps2;
+    let mut v = w.clamp(-1.5, 1.5);
+    for _ in 0..60 {
+        let phi = v - c * v * (1.0 - v * v);
+        let slope = 1.0 - c * (1.0 - 3.0 * v * v);
+        v -= (phi - w) / slope;
+    }
+    v
+}
+
+/// Range over which the start imitates [`splitting_activation`].
+const START_RANGE: f64 = 1.4;
+
+/// Fits perceptrons from several random starts to the splitting scheme's activation and returns the best.
+pub fn splitting_start(
+    step_over_eps2: f64,
+    params: &LmParams,
+    seed: u64,
+    device: &ComputeDevice,
+) -> Result<Mlp, Error> {
+    let count = 401;
+    let w: Vec<f64> = (0..count)
+        .map(|i| START_RANGE * (2.0 * f64::from(i) / f64::from(count - 1) - 1.0))
+        .collect();
+    let samples = BandSamples {
+        target: w
+            .iter()
+            .map(|&w| splitting_activation(step_over_eps2, w))
+            .collect(),
+        weight: vec![1.0 / f64::from(count); w.len()],
+        identity_loss: 1.0,
+        design: w,
+    };
+    let n = parameter_count(&PAPER_LAYERS);
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for start in 0..params.starts.max(1) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(start as u64));
+        let mut x = random_activation(&mut rng);
+        for ridge in [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10] {
+            // One "orbit" whose value is frozen at 1 by an overwhelming ridge.
+            let mut weights = vec![ridge; n + 1];
+            weights[0] = 1e12;
+            let mut centre = vec![0.0; n + 1];
+            centre[0] = 1.0;
+            let problem = Problem::new(&samples, &[1], &PAPER_LAYERS, (weights, centre), device);
+            let mut all = [vec![1.0], x].concat();
+            let mut damping = 1e-3;
+            for _ in 0..15 {
+                match problem.step(&all, &mut damping)? {
+                    Some(next) => all = next,
+                    None => break,
+                }
+            }
+            let (loss, _) = problem.value(&all)?;
+            x = all.split_off(1);
+            if best.as_ref().is_none_or(|(b, _)| loss < *b) {
+                best = Some((loss, x.clone()));
+            }
+        }
+        if best.as_ref().is_some_and(|(loss, _)| *loss < 1e-9) {
+            break;
+        }
+    }
+    let (_, parameters) = best.ok_or_else(|| Error::Training("no start".to_owned()))?;
+    Mlp::new(PAPER_LAYERS.to_vec(), parameters)
+}
+
+/// Parameters whose neurons cover the interval of interest.
+fn random_activation(rng: &mut ChaCha8Rng) -> Vec<f64> {
+    let mut normal = || {
+        // Box-Muller
+        let (a, b): (f64, f64) = (rng.random_range(1e-12..1.0), rng.random_range(0.0..1.0));
+        (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos()
+    };
+    let mut parameters = Vec::with_capacity(parameter_count(&PAPER_LAYERS));
+    for (l, layer) in layout(&PAPER_LAYERS).iter().enumerate() {
+        let spread = if l == 0 {
+            2.0
+        } else {
+            1.5 / (layer.inputs as f64).sqrt()
+        };
+        parameters.extend((0..layer.inputs * layer.outputs).map(|_| spread * normal()));
+        let spread = if l == 0 { 1.2 } else { 0.3 };
+        parameters.extend((0..layer.outputs).map(|_| spread * normal()));
+    }
+    parameters
+}
+
+/// Trains kernel and activation; returns the kernel and activation that are best on held-out samples.
+///
+/// `state` resumes an earlier run. The observer sees every iteration, may store the state, and can stop the training.
+///
+/// # Errors
+/// [`Error::Diverged`], [`Error::Interrupted`], [`Error::Training`].
+pub fn train(
+    data: &SphereData,
+    params: &LmParams,
+    start: (&[f64], &Mlp),
+    seed: u64,
+    state: Option<LmState>,
+    device: &ComputeDevice,
+    observer: &mut dyn Observer<LmState>,
+) -> Result<(Vec<f64>, Mlp, LmState), Error> {
+    data.validate()?;
+    let orbits = Orbits::new(data.ratios.dimension, data.ratios.width);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5EED);
+    let samples = |rng: &mut ChaCha8Rng, flipped: f64| {
+        BandSamples::draw(
+            data,
+            &orbits,
+            params.shells,
+            params.directions,
+            flipped,
+            rng,
+        )
+    };
+    let (training, held_out) = (samples(&mut rng, params.flipped), samples(&mut rng, 0.0));
+    let heat = orbits.average(&heat_kernel(data));
+    let activation_len = parameter_count(&PAPER_LAYERS);
+    let mut ridge: Vec<f64> = orbits
+        .sizes()
+        .iter()
+        .map(|&s| params.kernel_ridge * s as f64)
+        .collect();
+    ridge.extend(vec![params.activation_ridge; activation_len]);
+    let centre = [heat, vec![0.0; activation_len]].concat();
+    let n = orbits.count();
+    let scale = training.identity_loss;
+    let held_scale = held_out.identity_loss;
+    let held_out = Problem::new(
+        &held_out,
+        orbits.sizes(),
+        &PAPER_LAYERS,
+        (vec![0.0; ridge.len()], centre.clone()),
+        device,
+    );
+    let problem = Problem::new(
+        &training,
+        orbits.sizes(),
+        &PAPER_LAYERS,
+        (ridge, centre),
+        device,
+    );
+    drop(training);
+
+    let mut state = match state {
+        Some(state) if state.parameters.len() == n + activation_len => state,
+        Some(state) => {
+            return Err(Error::Shape {
+                what: "training checkpoint",
+                expected: (n + activation_len).to_string(),
+                found: state.parameters.len().to_string(),
+            });
+        }
+        None => {
+            let parameters = [orbits.average(start.0), start.1.parameters().to_vec()].concat();
+            LmState {
+                best: parameters.clone(),
+                parameters,
+                damping: 1e-3,
+                iteration: 0,
+                best_loss: f64::INFINITY,
+                improved_at: 0,
+                improved_to: f64::INFINITY,
+            }
+        }
+    };
+    while state.iteration < params.iterations
+        && state.iteration <= state.improved_at + params.patience
+    {
+        let Some(next) = problem.step(&state.parameters, &mut state.damping)? else {
+            break;
+        };
+        state.parameters = next;
+        state.iteration += 1;
+        let (loss, _) = problem.value(&state.parameters)?;
+        let (held, _) = held_out.value(&state.parameters)?;
+        let held = held * held_scale;
+        if !held.is_finite() {
+            return Err(Error::Diverged {
+                iteration: state.iteration,
+                what: "held-out loss",
+            });
+        }
+        if held < state.best_loss {
+            state.best_loss = held;
+            state.best.clone_from(&state.parameters);
+        }
+        if held < 0.99 * state.improved_to {
+            state.improved_to = held;
+            state.improved_at = state.iteration;
+        }
+        let progress = Progress {
+            iteration: state.iteration,
+            of: params.iterations,
+            training_loss: loss * scale,
+            held_out_loss: held,
+        };
+        if !observer.observe(&progress, &state)? {
+            return Err(Error::Interrupted {
+                iteration: state.iteration,
+            });
+        }
+    }
+    let (kernel, activation) = state.best.split_at(n);
+    let activation = Mlp::new(PAPER_LAYERS.to_vec(), activation.to_vec())?;
+    Ok((orbits.expand(kernel), activation, state))
+}

@@ -1,0 +1,107 @@
+//! Truncated, preconditioned conjugate gradients.
+
+use burn::tensor::Tensor;
+use operators::{ComputeDevice, SpectralFilter, spectral_filter};
+
+use crate::{Error, Objective};
+
+/// How a conjugate-gradient solve ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum CgExit {
+    /// The residual fell below the tolerance.
+    Converged,
+    /// The iteration limit was reached; the direction is still a descent direction.
+    Limit,
+    /// A direction of negative curvature was met; the direction so far (or the first one) is used.
+    NegativeCurvature,
+}
+
+/// An approximate solution of `H p = -g`.
+pub(crate) struct CgSolution<const D: usize> {
+    pub direction: Tensor<D>,
+    /// `g . p`, negative for a descent direction.
+    pub slope: f64,
+    pub iterations: usize,
+    pub exit: CgExit,
+}
+
+/// Settings of one solve.
+#[derive(Clone, Copy)]
+pub(crate) struct CgLimits {
+    /// Reduction of the residual in the norm of the preconditioner.
+    pub tolerance: f64,
+    pub iterations: usize,
+}
+
+/// Longest step along a conjugate direction, times the unit of the objective. The preconditioner is below `1 / unit` and the
+/// curvature above it where the energy is convex, so steps are near 1 there.
+const LONGEST_STEP: f64 = 1e10;
+
+/// Sum of products, read back to the host.
+pub(crate) fn dot<const D: usize>(
+    a: &Tensor<D>,
+    b: &Tensor<D>,
+    device: &ComputeDevice,
+) -> Result<f64, Error> {
+    Ok(device.scalar((a.clone() * b.clone()).sum())?)
+}
+
+/// Solves `H p = -g` at the objective's point until the residual's norm `sqrt(r . M r)` is reduced, a direction of
+/// negative curvature appears (Steihaug), or the limit is reached.
+pub(crate) fn conjugate_gradients<const D: usize>(
+    objective: &mut impl Objective<D>,
+    gradient: &Tensor<D>,
+    preconditioner: Option<&SpectralFilter>,
+    limits: CgLimits,
+    device: &ComputeDevice,
+) -> Result<CgSolution<D>, Error> {
+    let precondition = |r: &Tensor<D>| match preconditioner {
+        Some(filter) => spectral_filter(r.clone(), filter),
+        None => r.clone(),
+    };
+    let mut residual = gradient.clone().neg();
+    let mut z = precondition(&residual);
+    let mut rz = dot(&residual, &z, device)?;
+    let target = limits.tolerance * limits.tolerance * rz;
+    let mut direction = z.clone();
+    let mut solution: Option<Tensor<D>> = None;
+    let mut iterations = 0;
+    let mut exit = CgExit::Limit;
+    while iterations < limits.iterations {
+        let product = objective.hessian_vector_product(&direction)?;
+        iterations += 1;
+        let curvature = dot(&direction, &product, device)?;
+        // `rz / curvature` is the step: beyond this length it is rounding noise that made the curvature positive. NaN
+        // fails the test too and leaves through the same door; the caller checks the slope.
+        if !(curvature * LONGEST_STEP > rz * objective.unit()) {
+            exit = CgExit::NegativeCurvature;
+            break;
+        }
+        let alpha = rz / curvature;
+        let increment = direction.clone() * alpha;
+        solution = Some(match solution {
+            Some(p) => p + increment,
+            None => increment,
+        });
+        residual = residual - product * alpha;
+        z = precondition(&residual);
+        let next = dot(&residual, &z, device)?;
+        if next.abs() <= target {
+            exit = CgExit::Converged;
+            break;
+        }
+        let beta = next / rz;
+        rz = next;
+        direction = z + direction * beta;
+    }
+    // Negative curvature at once: the preconditioned steepest descent is still a descent direction. It carries the unit of
+    // the energy, which conjugate gradients divide out otherwise.
+    let direction = solution.unwrap_or_else(|| direction * objective.unit().recip());
+    let slope = dot(gradient, &direction, device)?;
+    Ok(CgSolution {
+        direction,
+        slope,
+        iterations,
+        exit,
+    })
+}

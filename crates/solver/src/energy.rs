@@ -1,0 +1,173 @@
+//! The minimizing-movement energy as a Burn graph.
+
+use burn::tensor::Tensor;
+use linearize::{Graph, Linearization, Value};
+use model::MeanCurvatureOperator;
+use operators::{ComputeDevice, SpectralFilter};
+
+use crate::Error;
+
+/// A step of mean curvature flow, `v[u]`, as the energy sees it.
+///
+/// The solver asks no more of it: the learned operator is one, an implicit finite-element step can be another.
+pub trait MeanCurvatureStep<const D: usize> {
+    /// `v[u]` as a Burn graph, on whatever device `u` lives (including Burn's capture device).
+    fn apply(&self, u: Tensor<D>) -> Tensor<D>;
+
+    /// Rules and handlers of the custom operations in that graph.
+    fn extensions(&self) -> linearize::Extensions;
+
+    /// An approximate inverse of `1 + c (J - 1)^T (J - 1)` in the pure phases, `J` the derivative of `v`.
+    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> SpectralFilter;
+}
+
+impl<const D: usize> MeanCurvatureStep<D> for MeanCurvatureOperator<D> {
+    fn apply(&self, u: Tensor<D>) -> Tensor<D> {
+        MeanCurvatureOperator::apply(self, u)
+    }
+
+    fn extensions(&self) -> linearize::Extensions {
+        operators::extensions()
+    }
+
+    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> SpectralFilter {
+        MeanCurvatureOperator::phase_preconditioner(self, cells, stiffness)
+    }
+}
+
+/// A twice differentiable function of a grid of values.
+///
+/// `evaluate` sets the point at which `hessian_vector_product` works; `value` leaves it alone.
+pub trait Objective<const D: usize> {
+    /// The function.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn value(&mut self, u: &Tensor<D>) -> Result<f64, Error>;
+
+    /// The function and its gradient.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn evaluate(&mut self, u: &Tensor<D>) -> Result<(f64, Tensor<D>), Error>;
+
+    /// The Hessian at the last evaluated point, applied to `p`.
+    ///
+    /// # Errors
+    /// If nothing was evaluated, or the device fails.
+    fn hessian_vector_product(&mut self, p: &Tensor<D>) -> Result<Tensor<D>, Error>;
+
+    /// A lower bound of the curvature where the function is convex: the weight of `1/2 |u|^2` in it.
+    fn unit(&self) -> f64;
+}
+
+/// The energy of one minimizing movement (eq:fully_discrete_willmore_flow_energy), scaled by `N / (2 eps)`:
+///
+/// `E(u) = 1/2 |u - u_k|^2 + c/2 |V[u] - u|^2`, with plain sums over the grid and `c = tau / tautilde^2`,
+///
+/// so that its Hessian is the identity plus what the curvature adds. `u_k` and `c` are inputs of the traced graph: one
+/// trace serves a whole run.
+pub struct MinimizingMovement<const D: usize> {
+    linearization: Linearization,
+    device: ComputeDevice,
+    previous: Value,
+    stiffness: f64,
+    stiffness_tensor: Value,
+}
+
+impl<const D: usize> MinimizingMovement<D> {
+    /// Traces the energy for grids of `cells^D` and loads it on the device.
+    ///
+    /// # Errors
+    /// [`Error::Linearize`] if the step contains an operation without a rule.
+    pub fn new(
+        step: &impl MeanCurvatureStep<D>,
+        cells: usize,
+        device: &ComputeDevice,
+    ) -> Result<Self, Error> {
+        let zeros = Tensor::<D>::zeros([cells; D], (device.device(), device.dtype()));
+        let previous = Value::from(zeros);
+        let stiffness_tensor = Value::from(device.tensor::<1>(&[1.0], [1]));
+        let graph = Graph::gradient(
+            std::slice::from_ref(&previous),
+            &[previous.clone(), stiffness_tensor.clone()],
+            |inputs| {
+                let u = inputs.variable::<D>(0);
+                let motion = u.clone() - inputs.parameter::<D>(0);
+                let residual = step.apply(u.clone()) - u;
+                let curvature = (residual.clone() * residual).sum() * inputs.parameter::<1>(1);
+                ((motion.clone() * motion).sum() + curvature) * 0.5
+            },
+        )?;
+        let extensions = step.extensions();
+        let linearization = graph
+            .linearize(&extensions)?
+            .on(device.device(), &extensions)?;
+        Ok(Self {
+            linearization,
+            device: device.clone(),
+            previous,
+            stiffness: 1.0,
+            stiffness_tensor,
+        })
+    }
+
+    /// Sets `u_k` and `c = tau / tautilde^2`.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] unless `c` is positive and finite.
+    pub fn set(&mut self, previous: &Tensor<D>, stiffness: f64) -> Result<(), Error> {
+        if !(stiffness.is_finite() && stiffness > 0.0) {
+            return Err(Error::Parameter {
+                name: "tau / tautilde^2",
+                value: stiffness,
+                expected: "positive and finite",
+            });
+        }
+        self.previous = previous.clone().into();
+        if self.stiffness.to_bits() != stiffness.to_bits() {
+            self.stiffness = stiffness;
+            self.stiffness_tensor = self.device.tensor::<1>(&[stiffness], [1]).into();
+        }
+        self.linearization.forget();
+        Ok(())
+    }
+
+    /// `c = tau / tautilde^2`.
+    pub fn stiffness(&self) -> f64 {
+        self.stiffness
+    }
+
+    /// The traced program, for statistics.
+    pub fn program(&self) -> &linearize::Program {
+        self.linearization.program()
+    }
+
+    fn parameters(&self) -> [Value; 2] {
+        [self.previous.clone(), self.stiffness_tensor.clone()]
+    }
+}
+
+impl<const D: usize> Objective<D> for MinimizingMovement<D> {
+    fn value(&mut self, u: &Tensor<D>) -> Result<f64, Error> {
+        let parameters = self.parameters();
+        let value = self.linearization.value(&[u.clone().into()], &parameters)?;
+        Ok(self.device.scalar(value.tensor::<1>()?)?)
+    }
+
+    fn evaluate(&mut self, u: &Tensor<D>) -> Result<(f64, Tensor<D>), Error> {
+        let parameters = self.parameters();
+        let evaluation = self.linearization.at(&[u.clone().into()], &parameters)?;
+        let value = self.device.scalar(evaluation.value.tensor::<1>()?)?;
+        Ok((value, evaluation.gradients[0].tensor::<D>()?))
+    }
+
+    fn hessian_vector_product(&mut self, p: &Tensor<D>) -> Result<Tensor<D>, Error> {
+        let product = self.linearization.apply(&[p.clone().into()])?;
+        Ok(product[0].tensor::<D>()?)
+    }
+
+    fn unit(&self) -> f64 {
+        1.0
+    }
+}

@@ -1,0 +1,53 @@
+use thiserror::Error as ThisError;
+
+/// What can stop a minimization or a flow.
+#[derive(Debug, ThisError)]
+pub enum Error {
+    /// A value became NaN or infinite.
+    #[error(
+        "step {step}: {field} is not finite; the initial phase field or the step size is unsuitable"
+    )]
+    NonFinite {
+        /// Time step, counted from 1 (0: the initial data).
+        step: usize,
+        /// Which quantity.
+        field: &'static str,
+    },
+    /// The minimization gave up before its stop test held.
+    #[error(
+        "step {step}: the minimization stopped ({reason}) at {estimate:.1e} of the step, above the tolerance {tolerance:.1e}; \
+         use a smaller time step"
+    )]
+    NotConverged {
+        /// Time step, counted from 1.
+        step: usize,
+        /// Why it stopped.
+        reason: crate::Exit,
+        /// Estimated distance to the minimizer relative to the motion.
+        estimate: f64,
+        /// What was asked for.
+        tolerance: f64,
+    },
+    /// A parameter out of range.
+    #[error("{name} = {value:e} is out of range: {expected}")]
+    Parameter {
+        /// Which parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The range.
+        expected: &'static str,
+    },
+    /// From the network.
+    #[error(transparent)]
+    Model(#[from] model::Error),
+    /// From the traced energy.
+    #[error(transparent)]
+    Linearize(#[from] linearize::Error),
+    /// From the device.
+    #[error(transparent)]
+    Operators(#[from] operators::Error),
+    /// From the phase field.
+    #[error(transparent)]
+    Geometry(#[from] geometry::Error),
+}

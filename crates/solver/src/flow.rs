@@ -1,0 +1,318 @@
+//! Willmore flow and mean curvature flow, step by step, with a record of each.
+
+use std::time::Instant;
+
+use burn::tensor::Tensor;
+use geometry::measure::{enclosed_volume, perimeter};
+use geometry::{Field, Grid};
+use model::{MeanCurvatureOperator, Network, Ratios};
+use operators::{ComputeDevice, SpectralFilter};
+use serde::{Deserialize, Serialize};
+
+use crate::newton::{NewtonInfo, NewtonParams, minimize};
+use crate::profile::extrapolate;
+use crate::{Error, Exit, MeanCurvatureStep, MinimizingMovement};
+
+/// Scales of a flow.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FlowParams {
+    /// Interface width `eps`.
+    pub eps: f64,
+    /// Inner time step `tautilde` of the mean curvature flow.
+    pub mcf_step: f64,
+    /// Settings of the minimization.
+    pub newton: NewtonParams,
+}
+
+impl FlowParams {
+    /// The network ratios that a grid needs with these scales.
+    pub fn ratios<const D: usize>(&self, grid: &Grid<D>, width: usize) -> Ratios {
+        Ratios::of_run(D, width, grid.spacing(), self.eps, self.mcf_step)
+    }
+}
+
+/// One time step of Willmore flow.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StepRecord {
+    /// Number of the step, from 1.
+    pub step: usize,
+    /// Time at its end.
+    pub time: f64,
+    /// Its size `tau`.
+    pub tau: f64,
+    /// `E[u_k, u_k]`: the energy (eq:discrete_willmore_flow_energy) of standing still, true L2 norms.
+    pub energy_before: f64,
+    /// `E[u_k, u_{k+1}]`.
+    pub energy: f64,
+    /// `eps / (2 tautilde^2) |V[u] - u|^2`, the approximate Willmore energy of the result.
+    pub willmore_energy: f64,
+    /// Perimeter `P_eps` of the result.
+    pub perimeter: f64,
+    /// Area or volume enclosed.
+    pub volume: f64,
+    /// What the minimization did.
+    pub newton: NewtonInfo,
+    /// Wall time, seconds.
+    pub seconds: f64,
+}
+
+/// Willmore flow of a phase field by minimizing movements (def:minProblem).
+///
+/// ```
+/// use geometry::{Grid, phase_field, shapes::Ball};
+/// use model::pretrained;
+/// use operators::ComputeDevice;
+/// use solver::{FlowParams, NewtonParams, WillmoreFlow};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let device = ComputeDevice::default_compiled()?;
+/// let grid = Grid::<2>::per_unit(128, 1.0)?;
+/// let params = FlowParams {
+///     eps: 2.0 * grid.spacing(),
+///     mcf_step: grid.spacing().powi(2),
+///     newton: NewtonParams::default(),
+/// };
+/// let network = pretrained::find(params.ratios(&grid, 17))?;
+/// let disc = phase_field(grid, &Ball::<2>::new([0.0, 0.0], 0.2)?, params.eps)?;
+/// let mut flow = WillmoreFlow::with_network(&network, &disc, params, &device)?;
+/// let record = flow.advance(params.mcf_step)?;
+/// assert!(record.energy < record.energy_before);
+/// # Ok(())
+/// # }
+/// ```
+pub struct WillmoreFlow<const D: usize> {
+    grid: Grid<D>,
+    params: FlowParams,
+    device: ComputeDevice,
+    energy: MinimizingMovement<D>,
+    preconditioner: Box<dyn Fn(f64) -> SpectralFilter + Send>,
+    filter: Option<(f64, SpectralFilter)>,
+    current: Tensor<D>,
+    /// The phase field one step ago and the size of that step.
+    previous: Option<(Tensor<D>, f64)>,
+    step: usize,
+    time: f64,
+}
+
+impl<const D: usize> WillmoreFlow<D> {
+    /// A flow with a learned operator, whose ratios must be those of the grid.
+    ///
+    /// # Errors
+    /// [`Error::Model`] if the network does not fit the grid, [`Error::NonFinite`] if the initial field is not finite.
+    pub fn with_network(
+        network: &Network,
+        initial: &Field<D>,
+        params: FlowParams,
+        device: &ComputeDevice,
+    ) -> Result<Self, Error> {
+        let operator = fitting_operator(network, initial.grid(), &params, device)?;
+        Self::new(operator, initial, params, device)
+    }
+
+    /// A flow whose curvature comes from any step of mean curvature flow of size `params.mcf_step`.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`], [`Error::NonFinite`], or what tracing the energy raises.
+    pub fn new(
+        step: impl MeanCurvatureStep<D> + Send + 'static,
+        initial: &Field<D>,
+        params: FlowParams,
+        device: &ComputeDevice,
+    ) -> Result<Self, Error> {
+        params.newton.validate()?;
+        for (name, value) in [("eps", params.eps), ("tautilde", params.mcf_step)] {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::Parameter {
+                    name,
+                    value,
+                    expected: "positive and finite",
+                });
+            }
+        }
+        let grid = *initial.grid();
+        let current = upload(initial, device)?;
+        let energy = MinimizingMovement::new(&step, grid.cells(), device)?;
+        Ok(Self {
+            grid,
+            params,
+            device: device.clone(),
+            energy,
+            preconditioner: Box::new(move |c| step.phase_preconditioner(grid.cells(), c)),
+            filter: None,
+            current,
+            previous: None,
+            step: 0,
+            time: 0.0,
+        })
+    }
+
+    /// The phase field now, on the device.
+    pub fn current(&self) -> &Tensor<D> {
+        &self.current
+    }
+
+    /// The phase field now.
+    ///
+    /// # Errors
+    /// [`Error::Operators`] if the device fails.
+    pub fn field(&self) -> Result<Field<D>, Error> {
+        download(&self.grid, &self.current, &self.device)
+    }
+
+    /// Time reached.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Steps done.
+    pub fn steps(&self) -> usize {
+        self.step
+    }
+
+    /// The energy of the steps.
+    pub fn energy(&self) -> &MinimizingMovement<D> {
+        &self.energy
+    }
+
+    /// One step of size `tau` (eq:discrete_willmore_step).
+    ///
+    /// # Errors
+    /// [`Error::NonFinite`] naming the field, [`Error::NotConverged`]; the flow stays where it was.
+    pub fn advance(&mut self, tau: f64) -> Result<StepRecord, Error> {
+        let clock = Instant::now();
+        let step = self.step + 1;
+        let stiffness = tau / (self.params.mcf_step * self.params.mcf_step);
+        self.energy.set(&self.current, stiffness)?;
+        if self
+            .filter
+            .as_ref()
+            .is_none_or(|(c, _)| c.to_bits() != stiffness.to_bits())
+        {
+            self.filter = Some((stiffness, (self.preconditioner)(stiffness)));
+        }
+        let filter = self.filter.as_ref().map(|(_, filter)| filter);
+        let start = match &self.previous {
+            Some((previous, last)) => extrapolate(&self.current, previous, (tau / last).min(2.0)),
+            None => self.current.clone(),
+        };
+        let (u, newton) = minimize(
+            &mut self.energy,
+            &self.current,
+            &start,
+            filter,
+            self.params.newton,
+            &self.device,
+        )
+        .map_err(|error| match error {
+            Error::NonFinite { field, .. } => Error::NonFinite { step, field },
+            other => other,
+        })?;
+        if newton.exit == Exit::IterationLimit {
+            return Err(Error::NotConverged {
+                step,
+                reason: newton.exit,
+                estimate: newton.estimate,
+                tolerance: self.params.newton.tolerance,
+            });
+        }
+        let field = download(&self.grid, &u, &self.device).map_err(|_| Error::NonFinite {
+            step,
+            field: "phase field",
+        })?;
+        // The scaled energy counts points; eps h^D makes it the paper's (true L2 norms).
+        let scale = 2.0 * self.params.eps * self.grid.cell_volume();
+        let motion = u.clone() - self.current.clone();
+        let fidelity = 0.5 * self.device.scalar((motion.clone() * motion).sum())?;
+        let record = StepRecord {
+            step,
+            time: self.time + tau,
+            tau,
+            energy_before: scale * newton.energy_before,
+            energy: scale * newton.energy,
+            willmore_energy: scale * (newton.energy - fidelity) / (2.0 * tau),
+            perimeter: perimeter(&field, self.params.eps)?,
+            volume: enclosed_volume(&field),
+            newton,
+            seconds: clock.elapsed().as_secs_f64(),
+        };
+        self.previous = Some((std::mem::replace(&mut self.current, u), tau));
+        self.step = step;
+        self.time += tau;
+        Ok(record)
+    }
+}
+
+/// Mean curvature flow by repeated application of the learned operator (eq:mcf_operator_discrete).
+pub struct MeanCurvatureFlow<const D: usize> {
+    grid: Grid<D>,
+    operator: MeanCurvatureOperator<D>,
+    device: ComputeDevice,
+    current: Tensor<D>,
+    step: usize,
+}
+
+impl<const D: usize> MeanCurvatureFlow<D> {
+    /// Starts from a phase field; the network's ratios must be those of the grid.
+    ///
+    /// # Errors
+    /// As [`WillmoreFlow::with_network`].
+    pub fn new(
+        network: &Network,
+        initial: &Field<D>,
+        params: &FlowParams,
+        device: &ComputeDevice,
+    ) -> Result<Self, Error> {
+        Ok(Self {
+            grid: *initial.grid(),
+            operator: fitting_operator(network, initial.grid(), params, device)?,
+            device: device.clone(),
+            current: upload(initial, device)?,
+            step: 0,
+        })
+    }
+
+    /// One step `u <- V[u]`. A value that is not finite is reported by the next [`Self::field`].
+    pub fn advance(&mut self) {
+        self.step += 1;
+        self.current = self.operator.apply(self.current.clone());
+    }
+
+    /// The phase field now.
+    ///
+    /// # Errors
+    /// [`Error::NonFinite`] naming the step, [`Error::Operators`] if the device fails.
+    pub fn field(&self) -> Result<Field<D>, Error> {
+        download(&self.grid, &self.current, &self.device).map_err(|_| Error::NonFinite {
+            step: self.step,
+            field: "phase field",
+        })
+    }
+}
+
+fn fitting_operator<const D: usize>(
+    network: &Network,
+    grid: &Grid<D>,
+    params: &FlowParams,
+    device: &ComputeDevice,
+) -> Result<MeanCurvatureOperator<D>, Error> {
+    network.check_fits(params.ratios(grid, network.ratios().width))?;
+    let operator = MeanCurvatureOperator::new(network, device)?;
+    operator.check_grid(grid.cells())?;
+    Ok(operator)
+}
+
+fn upload<const D: usize>(field: &Field<D>, device: &ComputeDevice) -> Result<Tensor<D>, Error> {
+    field.check_finite().map_err(|_| Error::NonFinite {
+        step: 0,
+        field: "phase field",
+    })?;
+    Ok(device.tensor(field.values(), field.grid().shape()))
+}
+
+fn download<const D: usize>(
+    grid: &Grid<D>,
+    u: &Tensor<D>,
+    device: &ComputeDevice,
+) -> Result<Field<D>, Error> {
+    Ok(Field::from_values(*grid, device.values(u.clone())?)?)
+}

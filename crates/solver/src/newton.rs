@@ -1,0 +1,431 @@
+//! Newton's method for one minimizing movement.
+//!
+//! Two methods share the same inputs and outputs. [`Method::Preconditioned`] is the one to use. [`Method::Paper`] is the
+//! plain Newton-CG with Armijo's rule of the paper (alg:hybrid_scheme), kept for comparison.
+
+use std::fmt;
+
+use burn::tensor::Tensor;
+use operators::{ComputeDevice, SpectralFilter};
+use serde::{Deserialize, Serialize};
+
+use crate::cg::{CgExit, CgLimits, CgSolution, conjugate_gradients, dot};
+use crate::profile::retract;
+use crate::{Error, Objective};
+
+/// Which minimization.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Preconditioned Newton-CG with profile-preserving updates and cleanup.
+    #[default]
+    Preconditioned,
+    /// Plain Newton-CG with Armijo line search along straight lines.
+    Paper,
+}
+
+/// Settings of the minimization.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NewtonParams {
+    /// The method.
+    pub method: Method,
+    /// Stop when the Newton decrement says that the minimizer is nearer than this fraction of the motion
+    /// `u - u_k` (root mean squares).
+    pub tolerance: f64,
+    /// Reduction of the residual in each linear solve, in the norm of the preconditioner.
+    pub cg_tolerance: f64,
+    /// Limit of linear iterations per Newton step.
+    pub cg_iterations: usize,
+    /// Limit of Newton steps.
+    pub newton_iterations: usize,
+    /// Linear iterations of one cleanup.
+    pub cleanup_iterations: usize,
+}
+
+impl Default for NewtonParams {
+    fn default() -> Self {
+        Self {
+            method: Method::Preconditioned,
+            tolerance: 0.02,
+            cg_tolerance: 0.1,
+            cg_iterations: 600,
+            newton_iterations: 60,
+            cleanup_iterations: 4,
+        }
+    }
+}
+
+impl NewtonParams {
+    /// Checks the ranges.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming the first bad one.
+    pub fn validate(&self) -> Result<(), Error> {
+        for (name, value) in [
+            ("tolerance", self.tolerance),
+            ("cg_tolerance", self.cg_tolerance),
+        ] {
+            if !(value > 0.0 && value < 1.0) {
+                return Err(Error::Parameter {
+                    name,
+                    value,
+                    expected: "between 0 and 1",
+                });
+            }
+        }
+        for (name, value) in [
+            ("cg_iterations", self.cg_iterations),
+            ("newton_iterations", self.newton_iterations),
+        ] {
+            if value == 0 {
+                return Err(Error::Parameter {
+                    name,
+                    value: 0.0,
+                    expected: "at least 1",
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Why a minimization ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Exit {
+    /// The stop test holds.
+    Converged,
+    /// The gradient vanishes to rounding: `u` is a minimizer already.
+    Stationary,
+    /// No step along a descent direction lowers the energy by more than rounding.
+    Precision,
+    /// The limit of Newton steps was reached.
+    IterationLimit,
+}
+
+impl fmt::Display for Exit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Converged => "converged",
+            Self::Stationary => "stationary",
+            Self::Precision => "no further decrease at this precision",
+            Self::IterationLimit => "limit of Newton steps",
+        })
+    }
+}
+
+/// What a minimization did.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NewtonInfo {
+    /// Why it ended.
+    pub exit: Exit,
+    /// Newton steps.
+    pub newton: usize,
+    /// Hessian-vector products.
+    pub hvp: usize,
+    /// Energy evaluations without gradient.
+    pub values: usize,
+    /// Gradient evaluations.
+    pub gradients: usize,
+    /// Linear solves that met negative curvature.
+    pub negative_curvature: usize,
+    /// Energy (scaled as in [`crate::MinimizingMovement`]) at the previous phase field.
+    pub energy_before: f64,
+    /// Energy at the result.
+    pub energy: f64,
+    /// Estimated distance to the minimizer, relative to the motion: the quantity of the stop test.
+    pub estimate: f64,
+}
+
+/// A point with its energy and gradient; the objective's own point is this one.
+struct Point<const D: usize> {
+    u: Tensor<D>,
+    energy: f64,
+    gradient: Tensor<D>,
+}
+
+struct Minimizer<'a, const D: usize, O> {
+    objective: &'a mut O,
+    params: NewtonParams,
+    device: &'a ComputeDevice,
+    preconditioner: Option<&'a SpectralFilter>,
+    previous: &'a Tensor<D>,
+    unknowns: f64,
+    info: NewtonInfo,
+}
+
+/// Minimizes `objective`, whose fidelity term is centred at `previous`, from `start`.
+///
+/// # Errors
+/// [`Error::Parameter`]; [`Error::NonFinite`] (with step 0: the caller knows the number) if the start has no finite energy;
+/// device errors.
+pub fn minimize<const D: usize>(
+    objective: &mut impl Objective<D>,
+    previous: &Tensor<D>,
+    start: &Tensor<D>,
+    preconditioner: Option<&SpectralFilter>,
+    params: NewtonParams,
+    device: &ComputeDevice,
+) -> Result<(Tensor<D>, NewtonInfo), Error> {
+    params.validate()?;
+    let energy_before = objective.value(previous)?;
+    if !energy_before.is_finite() {
+        return Err(Error::NonFinite {
+            step: 0,
+            field: "energy",
+        });
+    }
+    let mut minimizer = Minimizer {
+        objective,
+        params,
+        device,
+        preconditioner: preconditioner.filter(|_| params.method == Method::Preconditioned),
+        previous,
+        unknowns: previous.shape().num_elements() as f64,
+        info: NewtonInfo {
+            exit: Exit::IterationLimit,
+            newton: 0,
+            hvp: 0,
+            values: 1,
+            gradients: 0,
+            negative_curvature: 0,
+            energy_before,
+            energy: energy_before,
+            estimate: f64::INFINITY,
+        },
+    };
+    let u = match params.method {
+        Method::Preconditioned => minimizer.preconditioned(start)?,
+        Method::Paper => minimizer.paper()?,
+    };
+    Ok((u, minimizer.info))
+}
+
+impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
+    fn point(&mut self, u: Tensor<D>) -> Result<Point<D>, Error> {
+        let (energy, gradient) = self.objective.evaluate(&u)?;
+        self.info.gradients += 1;
+        Ok(Point {
+            u,
+            energy,
+            gradient,
+        })
+    }
+
+    fn energy(&mut self, u: &Tensor<D>) -> Result<f64, Error> {
+        self.info.values += 1;
+        self.objective.value(u)
+    }
+
+    fn solve(
+        &mut self,
+        gradient: &Tensor<D>,
+        preconditioner: Option<&SpectralFilter>,
+        limits: CgLimits,
+    ) -> Result<CgSolution<D>, Error> {
+        let solution = conjugate_gradients(
+            self.objective,
+            gradient,
+            preconditioner,
+            limits,
+            self.device,
+        )?;
+        self.info.hvp += solution.iterations;
+        if solution.exit == CgExit::NegativeCurvature {
+            self.info.negative_curvature += 1;
+        }
+        if !solution.slope.is_finite() {
+            return Err(Error::NonFinite {
+                step: 0,
+                field: "search direction",
+            });
+        }
+        Ok(solution)
+    }
+
+    /// The smallest difference of energies that means anything.
+    fn noise(&self, energy: f64) -> f64 {
+        8.0 * self.device.epsilon() * energy.abs()
+    }
+
+    /// The stop test: `sqrt(-g . p / N)` against the root mean square of the motion. Invariant under scaling of the
+    /// energy, and never satisfied by standing still unless the gradient vanishes.
+    fn converged(&mut self, point: &Point<D>, slope: f64) -> Result<Option<Exit>, Error> {
+        let motion = point.u.clone() - self.previous.clone();
+        let motion = dot(&motion, &motion, self.device)?;
+        let decrement = slope.abs() / self.objective.unit();
+        self.info.estimate = (decrement / motion.max(f64::MIN_POSITIVE)).sqrt();
+        let rounding = self.device.epsilon() * self.device.epsilon() * self.unknowns;
+        Ok(if decrement <= rounding {
+            Some(Exit::Stationary)
+        } else if self.info.estimate <= self.params.tolerance {
+            Some(Exit::Converged)
+        } else {
+            None
+        })
+    }
+
+    fn finish(&mut self, exit: Exit, point: Point<D>) -> Tensor<D> {
+        self.info.exit = exit;
+        self.info.energy = point.energy;
+        point.u
+    }
+
+    /// A few preconditioned iterations on the new Hessian: they remove the stiff error that a long step leaves in the
+    /// profile, before the energy is compared.
+    fn clean(&mut self, mut point: Point<D>) -> Result<Point<D>, Error> {
+        const ROUNDS: usize = 3;
+        const WORTHWHILE: f64 = 0.05;
+        let limits = CgLimits {
+            tolerance: 0.2,
+            iterations: self.params.cleanup_iterations,
+        };
+        if limits.iterations == 0 {
+            return Ok(point);
+        }
+        for _ in 0..ROUNDS {
+            let solution = self.solve(&point.gradient, self.preconditioner, limits)?;
+            let Some((u, energy)) = self.straight(&point, &solution, 0.05, 0.0)? else {
+                return Ok(point);
+            };
+            let drop = point.energy - energy;
+            let worthwhile = drop > WORTHWHILE * point.energy;
+            point = self.point(u)?;
+            if !worthwhile {
+                break;
+            }
+        }
+        Ok(point)
+    }
+
+    /// Backtracks along the straight line until the energy falls by `sufficient * t * slope`.
+    fn straight(
+        &mut self,
+        point: &Point<D>,
+        solution: &CgSolution<D>,
+        shortest: f64,
+        sufficient: f64,
+    ) -> Result<Option<(Tensor<D>, f64)>, Error> {
+        let (mut t, sign) = (1.0, -solution.slope.signum());
+        while t >= shortest {
+            let u = point.u.clone() + solution.direction.clone() * (sign * t);
+            let energy = self.energy(&u)?;
+            if energy < point.energy - sufficient * t * solution.slope.abs() {
+                return Ok(Some((u, energy)));
+            }
+            t *= 0.5;
+        }
+        Ok(None)
+    }
+
+    fn preconditioned(&mut self, start: &Tensor<D>) -> Result<Tensor<D>, Error> {
+        const HOPELESS: f64 = 50.0;
+        const SHORTEST: f64 = 0.02;
+        let mut point = self.point(start.clone())?;
+        if !point.energy.is_finite() {
+            return Err(Error::NonFinite {
+                step: 0,
+                field: "energy of the start",
+            });
+        }
+        point = self.clean(point)?;
+        if point.energy > self.info.energy_before {
+            // An extrapolation that made things worse is dropped.
+            point = self.point(self.previous.clone())?;
+        }
+        let limits = CgLimits {
+            tolerance: self.params.cg_tolerance,
+            iterations: self.params.cg_iterations,
+        };
+        while self.info.newton < self.params.newton_iterations {
+            let solution = self.solve(&point.gradient, self.preconditioner, limits)?;
+            let sign = -solution.slope.signum();
+            let decrease = solution.slope.abs();
+            let done = self.converged(&point, solution.slope)?;
+            self.info.newton += 1;
+            if let Some(exit) = done {
+                let u = retract(&point.u, &solution.direction, sign);
+                let energy = self.energy(&u)?;
+                if energy <= point.energy {
+                    point = Point {
+                        u,
+                        energy,
+                        gradient: point.gradient,
+                    };
+                }
+                return Ok(self.finish(exit, point));
+            }
+            let mut t = 1.0;
+            let mut next = None;
+            while t >= SHORTEST {
+                let u = retract(&point.u, &solution.direction, sign * t);
+                let energy = self.energy(&u)?;
+                if energy.is_finite() && energy < HOPELESS * point.energy {
+                    let candidate = self.point(u)?;
+                    let candidate = self.clean(candidate)?;
+                    if candidate.energy <= point.energy - 1e-3 * t * decrease {
+                        next = Some(candidate);
+                        break;
+                    }
+                }
+                t *= 0.4;
+            }
+            point = match next {
+                Some(next) => next,
+                None => match self.straight(&point, &solution, 1e-6, 1e-4)? {
+                    Some((u, _)) => self.point(u)?,
+                    None => {
+                        let exit = self.stuck(decrease, point.energy);
+                        return Ok(self.finish(exit, point));
+                    }
+                },
+            };
+        }
+        Ok(self.finish(Exit::IterationLimit, point))
+    }
+
+    /// No step lowered the energy: either the expected decrease drowns in rounding, or the method failed.
+    fn stuck(&self, decrease: f64, energy: f64) -> Exit {
+        if decrease <= self.noise(energy) * self.unknowns.sqrt() {
+            Exit::Precision
+        } else {
+            Exit::IterationLimit
+        }
+    }
+
+    /// alg:hybrid_scheme: from `u_k`, conjugate gradients with a forcing sequence, Armijo backtracking on a straight line.
+    fn paper(&mut self) -> Result<Tensor<D>, Error> {
+        let mut point = self.point(self.previous.clone())?;
+        let first = dot(&point.gradient, &point.gradient, self.device)?.sqrt();
+        while self.info.newton < self.params.newton_iterations {
+            let norm = dot(&point.gradient, &point.gradient, self.device)?.sqrt();
+            let forcing = (norm / first.max(f64::MIN_POSITIVE)).sqrt().min(0.5);
+            let limits = CgLimits {
+                tolerance: forcing.min(self.params.cg_tolerance),
+                iterations: self.params.cg_iterations,
+            };
+            let solution = self.solve(&point.gradient, None, limits)?;
+            let done = self.converged(&point, solution.slope)?;
+            self.info.newton += 1;
+            let next = self.straight(&point, &solution, 1e-6, 1e-4)?;
+            match (done, next) {
+                (Some(exit), next) => {
+                    if let Some((u, energy)) = next {
+                        point = Point {
+                            u,
+                            energy,
+                            gradient: point.gradient,
+                        };
+                    }
+                    return Ok(self.finish(exit, point));
+                }
+                (None, Some((u, _))) => point = self.point(u)?,
+                (None, None) => {
+                    let exit = self.stuck(solution.slope.abs(), point.energy);
+                    return Ok(self.finish(exit, point));
+                }
+            }
+        }
+        Ok(self.finish(Exit::IterationLimit, point))
+    }
+}
