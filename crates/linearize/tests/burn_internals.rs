@@ -73,8 +73,8 @@ fn capture_devices_take_a_float_type_inside_a_scope() {
 #[cfg(feature = "flex")]
 #[test]
 fn captured_operations_replay_on_a_backend() {
-    use burn::backend::Flex;
     use burn::backend::ir::{TensorIr, TensorStatus};
+    use burn::backend::{Flex, FlexDevice};
     use burn_router::TensorInterpreter;
 
     let device = Device::capture();
@@ -94,7 +94,7 @@ fn captured_operations_replay_on_a_backend() {
             completed
         })
         .unwrap();
-    let mut interpreter = TensorInterpreter::<Flex>::new(Default::default());
+    let mut interpreter = TensorInterpreter::<Flex>::new(FlexDevice);
     for (id, value) in &captured.values {
         interpreter.register_tensor_data_id(*id, value.clone());
     }

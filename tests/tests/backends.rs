@@ -1,0 +1,465 @@
+//! One suite for all backends: operations against their definitions, derivatives against independent ones, and a step
+//! of the flow against double precision on the CPU.
+
+use burn::tensor::Tensor;
+use geometry::{Field, Grid, measure::l2_distance, phase_field, shapes::Ball};
+use linearize::dual::{self, Dual};
+use linearize::taylor::{halvings, remainder};
+use model::{MeanCurvatureOperator, Network};
+use operators::{
+    COEFFICIENTS, HermiteTable, SpectralFilter, TableRange, circular_convolution,
+    kernel_correlation, spectral_filter, tabulated,
+};
+use solver::{
+    Exit, FlowParams, MinimizingMovement, NewtonParams, Objective, StepRecord, WillmoreFlow,
+};
+use workbench_tests::{
+    Backend, backends, convolution, correlation, dot, noise, relative_distance, splitting_network,
+};
+
+/// Kernel width of the networks here.
+const WIDTH: usize = 9;
+/// `c = tau / tautilde^2`.
+const STIFFNESS: f64 = 300.0;
+
+fn close(backend: &Backend, found: &[f64], expected: &[f64], tolerance: f64, what: &str) {
+    let difference = relative_distance(found, expected);
+    assert!(
+        difference <= tolerance,
+        "{}: {what} differs by {difference:.1e}, more than {tolerance:.0e}",
+        backend.name
+    );
+}
+
+/// `K` axes of a grid behind `R - K` of a batch.
+fn convolution_case<const R: usize, const K: usize>(
+    backend: &Backend,
+    shape: [usize; R],
+    width: usize,
+) {
+    let device = &backend.device;
+    let (x, kernel) = (
+        noise(shape.iter().product(), 1),
+        noise(width.pow(K as u32), 2),
+    );
+    let tolerance = backend.tolerance(1e-12, 1e-5);
+    for adjoint in [false, true] {
+        let found = circular_convolution::<R, K>(
+            device.tensor(&x, shape),
+            device.tensor(&kernel, [width; K]),
+            adjoint,
+        );
+        let expected = convolution(&x, &shape[R - K..], &kernel, width, adjoint);
+        let what = format!("convolution {shape:?} * {width}^{K}, adjoint: {adjoint}");
+        assert_eq!(found.dims(), shape);
+        close(
+            backend,
+            &device.values(found).unwrap(),
+            &expected,
+            tolerance,
+            &what,
+        );
+    }
+    let g = noise(x.len(), 3);
+    let found: Tensor<K> =
+        kernel_correlation(device.tensor(&x, shape), device.tensor(&g, shape), width);
+    let expected = correlation(&x, &g, &shape[R - K..], width);
+    assert_eq!(found.dims(), [width; K]);
+    let what = format!("correlation {shape:?}, {width}^{K}");
+    close(
+        backend,
+        &device.values(found).unwrap(),
+        &expected,
+        tolerance,
+        &what,
+    );
+}
+
+#[test]
+fn convolutions_and_correlations_are_their_sums() {
+    for backend in &backends() {
+        convolution_case::<2, 2>(backend, [12, 12], 5);
+        convolution_case::<2, 2>(backend, [9, 15], 7);
+        convolution_case::<2, 2>(backend, [33, 26], 17);
+        convolution_case::<3, 2>(backend, [3, 7, 10], 3);
+        convolution_case::<4, 2>(backend, [2, 3, 8, 5], 5);
+        convolution_case::<3, 3>(backend, [6, 5, 8], 3);
+        convolution_case::<4, 3>(backend, [2, 5, 7, 9], 5);
+    }
+}
+
+#[test]
+fn convolutions_have_adjoint_gradients() {
+    for backend in &backends() {
+        let device = &backend.device;
+        let (shape, width) = ([10, 13], 5);
+        let (x, kernel, g) = (noise(130, 1), noise(25, 2), noise(130, 3));
+        let leaf_x = device.tensor(&x, shape).autodiff().require_grad();
+        let leaf_k = device.tensor(&kernel, [width; 2]).autodiff().require_grad();
+        let weights = device.tensor(&g, shape).autodiff();
+        let y: Tensor<2> = circular_convolution(leaf_x.clone(), leaf_k.clone(), false);
+        let gradients = (y * weights).sum().backward();
+        let tolerance = backend.tolerance(1e-12, 1e-5);
+        for (found, expected, what) in [
+            (
+                leaf_x.grad(&gradients).unwrap(),
+                convolution(&g, &shape, &kernel, width, true),
+                "gradient in the grid",
+            ),
+            (
+                leaf_k.grad(&gradients).unwrap(),
+                correlation(&x, &g, &shape, width),
+                "gradient in the kernel",
+            ),
+        ] {
+            close(
+                backend,
+                &device.values(found).unwrap(),
+                &expected,
+                tolerance,
+                what,
+            );
+        }
+    }
+}
+
+#[test]
+fn tables_give_a_function_and_its_derivatives() {
+    let range = TableRange {
+        low: -2.0,
+        high: 2.0,
+        cells: 256,
+    };
+    let table = HermiteTable::new(range, |w| [w.sin(), w.cos(), -w.sin()]).unwrap();
+    // Inside, at the ends and beyond them.
+    let mut w: Vec<f64> = noise(300, 4).iter().map(|w| 2.4 * w).collect();
+    w.extend([-2.0, 2.0, 0.0, -2.5, 2.5, 1.0]);
+    let inside: Vec<usize> = (0..w.len()).filter(|&i| w[i].abs() <= 2.0).collect();
+    for backend in &backends() {
+        let device = &backend.device;
+        let coefficients = device.tensor(table.coefficients(), [range.cells, COEFFICIENTS]);
+        for order in 0..=3 {
+            let input = device.tensor(&w, [2, w.len() / 2]);
+            let found = tabulated(input, coefficients.clone(), range, order);
+            let found = device.values(found).unwrap();
+            let expected: Vec<f64> = w.iter().map(|&w| table.derivative(w, order)).collect();
+            let single = [1e-6, 1e-5, 1e-4, 1e-3][order];
+            let tolerance = backend.tolerance(1e-13, single);
+            close(
+                backend,
+                &found,
+                &expected,
+                tolerance,
+                &format!("table, order {order}"),
+            );
+            let shift = order as f64 * std::f64::consts::FRAC_PI_2;
+            let pick = |v: &dyn Fn(usize) -> f64| inside.iter().map(|&i| v(i)).collect::<Vec<_>>();
+            let (found, exact) = (pick(&|i| found[i]), pick(&|i| (w[i] + shift).sin()));
+            let double: f64 = [1e-13, 1e-11, 1e-8, 1e-5][order];
+            let tolerance = double.max(backend.tolerance(0.0, single));
+            close(
+                backend,
+                &found,
+                &exact,
+                tolerance,
+                &format!("sine, order {order}"),
+            );
+        }
+    }
+}
+
+fn filter_case<const D: usize>(backend: &Backend, shape: [usize; D], width: usize) {
+    let device = &backend.device;
+    let x = noise(shape.iter().product(), 5);
+    let kernel = noise(width.pow(D as u32), 6);
+    // |k|^2 is the kernel's convolution followed by its transpose.
+    let filter = SpectralFilter::from_kernel(&shape, &kernel, width, |k| k.norm_sqr());
+    let found = device
+        .values(spectral_filter(device.tensor(&x, shape), &filter))
+        .unwrap();
+    let once = convolution(&x, &shape, &kernel, width, false);
+    let expected = convolution(&once, &shape, &kernel, width, true);
+    let tolerance = backend.tolerance(1e-12, 1e-5);
+    close(
+        backend,
+        &found,
+        &expected,
+        tolerance,
+        &format!("spectral filter {shape:?}"),
+    );
+}
+
+#[test]
+fn spectral_filters_multiply_spectra() {
+    for backend in &backends() {
+        filter_case(backend, [12, 12], 5);
+        filter_case(backend, [9, 14], 3);
+        filter_case(backend, [6, 5, 7], 3);
+    }
+}
+
+/// The energy of a step at one point, and directions, in `D` dimensions.
+struct Case<const D: usize> {
+    network: Network,
+    cells: usize,
+    u: Vec<f64>,
+    previous: Vec<f64>,
+    p: Vec<f64>,
+    q: Vec<f64>,
+}
+
+impl<const D: usize> Case<D> {
+    fn new(cells: usize) -> Self {
+        let grid = Grid::<D>::centred(cells, 1.0).unwrap();
+        let rough = |radius: f64, seed: u64| -> Vec<f64> {
+            let field = ball(grid, radius);
+            let noise = noise(grid.len(), seed);
+            (field.values().iter().zip(noise))
+                .map(|(u, noise)| u + 0.05 * noise)
+                .collect()
+        };
+        Self {
+            network: splitting_network(D, WIDTH).unwrap(),
+            cells,
+            u: rough(0.3, 1),
+            previous: rough(0.28, 2),
+            p: noise(grid.len(), 3),
+            q: noise(grid.len(), 4),
+        }
+    }
+
+    fn tensor(&self, backend: &Backend, values: &[f64]) -> Tensor<D> {
+        backend.device.tensor(values, [self.cells; D])
+    }
+
+    fn energy(&self, backend: &Backend) -> MinimizingMovement<D> {
+        let operator = MeanCurvatureOperator::new(&self.network, &backend.device).unwrap();
+        let mut energy = MinimizingMovement::new(&operator, self.cells, &backend.device).unwrap();
+        let previous = self.tensor(backend, &self.previous);
+        energy.set(&previous, STIFFNESS).unwrap();
+        energy
+    }
+
+    /// Energy, gradient and Hessian times `p`, from their formulas on the host.
+    fn by_hand(&self) -> (f64, Vec<f64>, Vec<f64>) {
+        let table = self.network.activation().table().unwrap();
+        let shape = [self.cells; D];
+        let convolve =
+            |x: &[f64], adjoint| convolution(x, &shape, self.network.kernel(), WIDTH, adjoint);
+        let zip = |a: &[f64], b: &[f64], f: &dyn Fn(f64, f64) -> f64| -> Vec<f64> {
+            a.iter().zip(b).map(|(a, b)| f(*a, *b)).collect()
+        };
+        let w = convolve(&self.u, false);
+        let residual = zip(&w, &self.u, &|w, u| table.derivative(w, 0) - u);
+        let motion = zip(&self.u, &self.previous, &|a, b| a - b);
+        let energy = 0.5 * (dot(&motion, &motion) + STIFFNESS * dot(&residual, &residual));
+        let slope: Vec<f64> = w.iter().map(|&w| table.derivative(w, 1)).collect();
+        let weighted = zip(&slope, &residual, &|a, b| a * b);
+        let curvature = zip(&convolve(&weighted, true), &residual, &|a, b| a - b);
+        let gradient = zip(&motion, &curvature, &|m, c| m + STIFFNESS * c);
+        let dw = convolve(&self.p, false);
+        let defect: Vec<f64> = zip(&zip(&slope, &dw, &|a, b| a * b), &self.p, &|a, b| a - b);
+        let bend: Vec<f64> = zip(&w, &residual, &|w, r| table.derivative(w, 2) * r);
+        let inner = zip(
+            &zip(&slope, &defect, &|a, b| a * b),
+            &zip(&bend, &dw, &|a, b| a * b),
+            &|a, b| a + b,
+        );
+        let curvature = zip(&convolve(&inner, true), &defect, &|a, b| a - b);
+        let product = zip(&self.p, &curvature, &|p, c| p + STIFFNESS * c);
+        (energy, gradient, product)
+    }
+
+    /// The same energy with dual numbers.
+    fn dual_energy(&self, backend: &Backend, u: Dual<D>) -> Dual<1> {
+        let device = &backend.device;
+        let table = self.network.activation().table().unwrap();
+        let range = table.range();
+        let coefficients = device.tensor(table.coefficients(), [range.cells, COEFFICIENTS]);
+        let coefficients = coefficients.autodiff();
+        let kernel: Tensor<D> = device.tensor(self.network.kernel(), [WIDTH; D]);
+        let kernel = kernel.autodiff();
+        let previous = self.tensor(backend, &self.previous).autodiff();
+        let w = u
+            .clone()
+            .linear(|x| circular_convolution(x, kernel.clone(), false));
+        let at = |order| tabulated(w.primal.clone(), coefficients.clone(), range, order);
+        let step = w.clone().pointwise(at(0), at(1));
+        let residual = step - u.clone();
+        let motion = u - previous;
+        ((motion.clone() * motion).sum() + (residual.clone() * residual).sum() * STIFFNESS) * 0.5
+    }
+
+    fn derivatives(&self, backend: &Backend) {
+        let device = &backend.device;
+        let mut energy = self.energy(backend);
+        let u = self.tensor(backend, &self.u);
+        let (value, gradient) = energy.evaluate(&u).unwrap();
+        let gradient = device.values(gradient).unwrap();
+        let (exact_value, exact_gradient, exact_product) = self.by_hand();
+        let tolerance = backend.tolerance(1e-11, 3e-5);
+        close(backend, &[value], &[exact_value], tolerance, "energy");
+        close(backend, &gradient, &exact_gradient, tolerance, "gradient");
+
+        let mut apply = |p: &[f64]| {
+            let product = energy
+                .hessian_vector_product(&self.tensor(backend, p))
+                .unwrap();
+            device.values(product).unwrap()
+        };
+        let (hp, hq) = (apply(&self.p), apply(&self.q));
+        close(
+            backend,
+            &hp,
+            &exact_product,
+            backend.tolerance(1e-11, 3e-5),
+            "product by hand",
+        );
+        let independent = dual::hessian_vector_product(&u, &self.tensor(backend, &self.p), |u| {
+            self.dual_energy(backend, u)
+        });
+        let independent = device.values(independent).unwrap();
+        close(
+            backend,
+            &hp,
+            &independent,
+            backend.tolerance(1e-10, 3e-5),
+            "reverse over forward",
+        );
+        // Rounding is relative to the lengths, not to the inner product.
+        let scale = (dot(&hp, &hp) * dot(&self.q, &self.q)).sqrt();
+        let asymmetry = (dot(&hp, &self.q) - dot(&self.p, &hq)).abs() / scale;
+        assert!(
+            asymmetry < backend.tolerance(1e-14, 1e-6),
+            "{}: {asymmetry:e}",
+            backend.name
+        );
+
+        if backend.is_double() {
+            let mut at = |t: f64| {
+                let moved: Vec<f64> = self.u.iter().zip(&self.p).map(|(u, p)| u + t * p).collect();
+                energy.value(&self.tensor(backend, &moved)).unwrap()
+            };
+            let t = 1e-5;
+            let difference = (at(t) - at(-t)) / (2.0 * t);
+            let slope = dot(&gradient, &self.p);
+            assert!(
+                (difference / slope - 1.0).abs() < 1e-6,
+                "{difference} {slope}"
+            );
+        }
+    }
+
+    fn taylor(&self, backend: &Backend) {
+        let device = &backend.device;
+        let mut energy = self.energy(backend);
+        let (u, p) = (self.tensor(backend, &self.u), self.tensor(backend, &self.p));
+        let (_, gradient) = energy.evaluate(&u).unwrap();
+        let product = energy.hessian_vector_product(&p).unwrap();
+        let along = |v: Tensor<D>| dot(&device.values(v).unwrap(), &self.p);
+        let derivatives = [along(gradient), along(product)];
+        let steps = halvings(0.1, 14);
+        let mut value = |t: f64| energy.value(&(u.clone() + p.clone() * t)).unwrap();
+        let mut check = |order: usize, derivatives: &[f64]| {
+            let found = remainder(&mut value, &derivatives[..order], &steps, device.epsilon());
+            (found.rate(), found.is_consistent(0.2), found)
+        };
+        for order in [1, 2] {
+            let (rate, consistent, found) = check(order, &derivatives);
+            assert!(consistent, "{}: {found:?}", backend.name);
+            if backend.is_double() {
+                let rate = rate.expect("double precision resolves several steps");
+                assert!((rate - (order + 1) as f64).abs() < 0.2, "{rate} {found:?}");
+            }
+        }
+        let wrong = [derivatives[0], 1.1 * derivatives[1]];
+        assert!(
+            !check(2, &wrong).1,
+            "{}: a wrong Hessian passes",
+            backend.name
+        );
+    }
+}
+
+#[test]
+fn derivatives_of_the_energy_agree_with_independent_ones() {
+    let (flat, solid) = (Case::<2>::new(20), Case::<3>::new(11));
+    for backend in &backends() {
+        flat.derivatives(backend);
+        solid.derivatives(backend);
+    }
+}
+
+#[test]
+fn taylor_remainders_decay_with_rates_two_and_three() {
+    let (flat, solid) = (Case::<2>::new(20), Case::<3>::new(11));
+    for backend in &backends() {
+        flat.taylor(backend);
+        solid.taylor(backend);
+    }
+}
+
+fn ball<const D: usize>(grid: Grid<D>, radius: f64) -> Field<D> {
+    let ball = Ball::new([0.0; D], radius).unwrap();
+    phase_field(grid, &ball, 2.0 * grid.spacing()).unwrap()
+}
+
+/// Two steps, so that the second starts from the extrapolation.
+fn flow<const D: usize>(backend: &Backend, grid: Grid<D>) -> (Field<D>, [StepRecord; 2]) {
+    let params = FlowParams {
+        eps: 2.0 * grid.spacing(),
+        mcf_step: grid.spacing().powi(2),
+        newton: NewtonParams {
+            tolerance: 1e-3,
+            cg_tolerance: 1e-2,
+            ..NewtonParams::default()
+        },
+    };
+    let network = splitting_network(D, WIDTH).unwrap();
+    let start = ball(grid, 0.3);
+    let mut flow = WillmoreFlow::with_network(&network, &start, params, &backend.device).unwrap();
+    let records = [(); 2].map(|()| flow.advance(params.mcf_step).unwrap());
+    (flow.field().unwrap(), records)
+}
+
+fn flow_case<const D: usize>(cells: usize) {
+    let grid = Grid::<D>::centred(cells, 1.0).unwrap();
+    let backends = backends();
+    let reference = backends.iter().find(|backend| backend.is_double());
+    let reference = reference.map(|backend| flow(backend, grid).0);
+    for backend in &backends {
+        let (field, records) = flow(backend, grid);
+        for record in records {
+            let name = &backend.name;
+            assert!(record.energy < record.energy_before, "{name}: {record:?}");
+            assert!(matches!(
+                record.newton.exit,
+                Exit::Converged | Exit::Precision
+            ));
+            assert!(
+                record.newton.exit == Exit::Converged || !backend.is_double(),
+                "{record:?}"
+            );
+        }
+        if let Some(reference) = &reference {
+            let motion = l2_distance(reference, &ball(grid, 0.3)).unwrap();
+            let difference = l2_distance(&field, reference).unwrap() / motion;
+            let tolerance = backend.tolerance(1e-9, 3e-3);
+            assert!(
+                difference <= tolerance,
+                "{}: {difference:.1e} of the motion {motion:.1e}",
+                backend.name
+            );
+        }
+    }
+}
+
+#[test]
+fn steps_of_the_flow_agree_in_two_dimensions() {
+    flow_case::<2>(64);
+}
+
+#[test]
+fn steps_of_the_flow_agree_in_three_dimensions() {
+    flow_case::<3>(24);
+}
