@@ -1,5 +1,9 @@
 //! Whole energies as a user would write them, against duals (reverse over forward), which share no
 //! code with the linearized programs; and how long the programs are.
+#![allow(
+    clippy::needless_pass_by_value,
+    reason = "energies consume tensors, as Burn's methods do"
+)]
 
 mod common;
 

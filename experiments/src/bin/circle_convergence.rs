@@ -1,0 +1,504 @@
+//! Convergence test on circles: mean curvature flow and Willmore flow against the exact solutions.
+
+use std::collections::BTreeMap;
+use std::process::ExitCode;
+
+use clap::Parser;
+use experiments::circles::{self, Ensemble, Flow, Method};
+use experiments::networks::{NetworkOptions, convergence_ratios};
+use experiments::options::RunOptions;
+use experiments::partial::Partial;
+use experiments::training::{self, NetworkSpec};
+use experiments::{Error, harness};
+use model::{Network, Ratios};
+use operators::ComputeDevice;
+use report::{
+    Axis, Colour, Column, Figure, Format, LegendEntry, LineChart, LineStyle, Marker, OutputDir,
+    Series, Summary, Table,
+};
+use serde::Serialize;
+
+const PROGRAM: &str = "circle_convergence";
+/// Steps at which tables and summaries give the error.
+const SHOWN_STEPS: [usize; 5] = [1, 8, 16, 32, 64];
+
+/// Mean curvature flow and Willmore flow of 30 circles, eps = 2^-6, 64 steps of 2^-14: L2 distance to the exact
+/// solution over time, mean over the radii 0.05 pi + 0.15 pi i/30.
+///
+/// An interrupted run continues with the circles that are missing.
+#[derive(Parser, Debug)]
+#[command(name = PROGRAM, version)]
+struct Options {
+    #[command(flatten)]
+    run: RunOptions,
+
+    #[command(flatten)]
+    networks: NetworkOptions,
+
+    /// Add n = 512
+    #[arg(long, conflicts_with = "cells")]
+    full: bool,
+
+    /// Cells per unit length, separated by commas [default: 128,256]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    cells: Vec<usize>,
+
+    /// Train the networks first, instead of loading them
+    #[arg(long, conflicts_with = "network")]
+    retrain: bool,
+}
+
+#[derive(Serialize)]
+struct Parameters {
+    cells: Vec<usize>,
+    circles: usize,
+    steps: usize,
+    eps: f64,
+    time_step: f64,
+    networks: BTreeMap<String, String>,
+    retrained: bool,
+    quick: bool,
+}
+
+fn main() -> ExitCode {
+    let options = Options::parse();
+    harness::run(|| program(&options))
+}
+
+fn program(options: &Options) -> Result<(), Error> {
+    let (count, steps) = if options.run.quick {
+        (4, 8)
+    } else {
+        (circles::COUNT, circles::STEPS)
+    };
+    let cells = resolutions(options);
+    let ratios = cells
+        .iter()
+        .map(|&n| convergence_ratios(n))
+        .collect::<Result<Vec<_>, _>>()?;
+    let device = options.run.open_device()?;
+    let loaded = if options.retrain {
+        training::training_device(&device)?;
+        None
+    } else {
+        Some(options.networks.find(&ratios)?)
+    };
+    let output = options.run.open_output(PROGRAM)?;
+    let networks = match loaded {
+        Some(networks) => networks,
+        None => retrain(options, &cells, &ratios, &device, &output)?,
+    };
+
+    let parameters = Parameters {
+        networks: cells
+            .iter()
+            .zip(&networks)
+            .map(|(n, network)| (format!("n{n}"), experiments::networks::checksum(network)))
+            .collect(),
+        cells: cells.clone(),
+        circles: count,
+        steps,
+        eps: circles::EPS,
+        time_step: circles::STEP,
+        retrained: options.retrain,
+        quick: options.run.quick,
+    };
+    let mut manifest = options.run.manifest(PROGRAM, &parameters, &device)?;
+    let partial = Partial::open(&output, "partial")?;
+    let progress = options.run.progress();
+    let clock = std::time::Instant::now();
+    let mut ensembles = Vec::new();
+    for flow in Flow::ALL {
+        for (&n, network) in cells.iter().zip(&networks) {
+            let method = Method::Hybrid;
+            let title = format!("{}, n = {n}", flow.title());
+            let bar = progress.bar(title.clone(), (count * steps) as u64);
+            let ensemble = manifest.phase(title, || {
+                let what = (flow, method, n);
+                Ensemble::run(what, (count, steps), network, &device, &partial, &bar)
+            })?;
+            bar.finish();
+            ensembles.push(ensemble);
+        }
+    }
+    let seconds = clock.elapsed().as_secs_f64();
+
+    let report = Report {
+        ensembles: &ensembles,
+        cells: &cells,
+        options: &options.run,
+        steps,
+    };
+    report.figures(&output)?;
+    report.data(&output)?;
+    let table = report.table()?;
+    table.write(&output, "errors")?;
+    report.summary(seconds)?.write(&output)?;
+    manifest.write(&output)?;
+    partial.remove()?;
+    progress.clear();
+    options.run.say(&format!(
+        "{}\n{}\nResults are in {}",
+        options.run.title("Mean L2 distance to the exact solution"),
+        table.to_markdown(),
+        output.as_path().display()
+    ));
+    Ok(())
+}
+
+fn resolutions(options: &Options) -> Vec<usize> {
+    let mut cells = if !options.cells.is_empty() {
+        options.cells.clone()
+    } else if options.run.quick {
+        vec![128]
+    } else if options.full {
+        vec![128, 256, 512]
+    } else {
+        vec![128, 256]
+    };
+    cells.sort_unstable();
+    cells.dedup();
+    cells
+}
+
+fn retrain(
+    options: &Options,
+    cells: &[usize],
+    ratios: &[Ratios],
+    device: &ComputeDevice,
+    output: &OutputDir,
+) -> Result<Vec<Network>, Error> {
+    let progress = options.run.progress();
+    let checkpoints = Partial::open(output, "checkpoints")?;
+    let folder = output.subfolder("networks")?;
+    let mut networks = Vec::new();
+    for (&n, &ratios) in cells.iter().zip(ratios) {
+        let spec = NetworkSpec::new(format!("n{n}"), ratios, n);
+        let settings = training::LmSettings::new(options.run.quick, options.run.seed);
+        let trained =
+            training::levenberg_marquardt(&spec, &settings, device, &checkpoints, &progress)?;
+        trained.network.save(&folder.path(&spec.file_name())?)?;
+        networks.push(trained.network);
+    }
+    checkpoints.remove()?;
+    Ok(networks)
+}
+
+/// Turns the ensembles into files.
+struct Report<'a> {
+    ensembles: &'a [Ensemble],
+    cells: &'a [usize],
+    options: &'a RunOptions,
+    steps: usize,
+}
+
+#[derive(Serialize)]
+struct CurveRow {
+    flow: Flow,
+    n: usize,
+    method: Method,
+    step: usize,
+    time: f64,
+    l2_mean: f64,
+    l2_min: f64,
+    l2_max: f64,
+}
+
+#[derive(Serialize)]
+struct CircleRow {
+    flow: Flow,
+    n: usize,
+    method: Method,
+    radius: f64,
+    step: usize,
+    time: f64,
+    l2: f64,
+}
+
+#[derive(Serialize)]
+struct StepRow {
+    n: usize,
+    method: Method,
+    radius: f64,
+    step: usize,
+    time: f64,
+    tau: f64,
+    energy_before: f64,
+    energy: f64,
+    willmore_energy: f64,
+    perimeter: f64,
+    volume: f64,
+    exit: solver::Exit,
+    newton: usize,
+    hvp: usize,
+    values: usize,
+    gradients: usize,
+    negative_curvature: usize,
+    estimate: f64,
+    seconds: f64,
+}
+
+impl Report<'_> {
+    fn of_flow(&self, flow: Flow) -> impl Iterator<Item = &Ensemble> {
+        self.ensembles.iter().filter(move |e| e.flow == flow)
+    }
+
+    fn time(k: usize) -> f64 {
+        k as f64 * circles::STEP
+    }
+
+    /// Colour and line of an ensemble. Curves of several resolutions often coincide, so coarser ones are wider and
+    /// show on both sides of finer ones.
+    fn series(&self, ensemble: &Ensemble, points: Vec<[f64; 2]>) -> Series {
+        let k = self.colour(ensemble.n);
+        let name = format!("{}, n = {}", ensemble.method.label(), ensemble.n);
+        Series::new(name, points)
+            .with_colour(k)
+            .with_style(ensemble.method.style())
+            .with_width(1.8 + 1.9 * (self.cells.len() - 1 - k) as f64)
+    }
+
+    fn colour(&self, n: usize) -> usize {
+        self.cells.iter().position(|&c| c == n).unwrap_or(0)
+    }
+
+    /// Line styles stand for methods, colours for resolutions.
+    fn legend(&self, chart: LineChart) -> LineChart {
+        let methods: Vec<Method> = Method::ALL
+            .into_iter()
+            .filter(|m| self.ensembles.iter().any(|e| e.method == *m))
+            .collect();
+        let method = methods
+            .iter()
+            .map(|m| LegendEntry::line(m.label(), Colour::Black, m.style()));
+        let resolutions = self
+            .cells
+            .iter()
+            .map(|&n| LegendEntry::line(format!("n = {n}"), self.colour(n), LineStyle::Solid));
+        chart.with_entries(method).with_entries(resolutions)
+    }
+
+    fn figures(&self, output: &OutputDir) -> Result<(), Error> {
+        let last = Self::time(self.steps);
+        let title = |text: &str| self.options.title(text);
+
+        let mut convergence = Figure::new(title("Error on circles over time"), 2);
+        for flow in Flow::ALL {
+            let mut chart = LineChart::new(
+                flow.title(),
+                Axis::linear("time t"),
+                Axis::linear("mean L² error"),
+            );
+            for ensemble in self.of_flow(flow) {
+                let points: Vec<[f64; 2]> = (0..=self.steps)
+                    .map(|k| [Self::time(k), ensemble.mean_error(k)])
+                    .collect();
+                chart = chart.with_series(self.series(ensemble, points));
+            }
+            if let Some(scale) = self.scale(flow) {
+                chart = chart.with_note(format!(
+                    "For scale: mean ‖u(t) − u(0)‖ = {scale:.3} at t = {last:.4}."
+                ));
+            }
+            convergence = convergence.with_panel(self.legend(chart));
+        }
+        let radii = self.ensembles.first().map_or(&[][..], |e| &e.radii);
+        let count = radii.len();
+        let smallest = radii.iter().copied().fold(f64::INFINITY, f64::min);
+        let largest = radii.iter().copied().fold(0.0, f64::max);
+        convergence
+            .with_shared_legend()
+            .with_note(format!(
+                "ε = 2⁻⁶, τ = 2⁻¹⁴, h = 1/n; mean over {count} circles with radii between {:.3} and {:.3}.",
+                smallest,
+                largest
+            ))
+            .write(output, "convergence")?;
+
+        let mut over_radius = Figure::new(
+            title(&format!(
+                "Error on circles at t = {last:.4} over the radius"
+            )),
+            2,
+        );
+        for flow in Flow::ALL {
+            let mut chart = LineChart::new(
+                flow.title(),
+                Axis::linear("initial radius r"),
+                Axis::linear("L² error"),
+            );
+            for ensemble in self.of_flow(flow) {
+                let points: Vec<[f64; 2]> = ensemble
+                    .radii
+                    .iter()
+                    .zip(&ensemble.results)
+                    .map(|(&radius, result)| [radius, result.errors[self.steps]])
+                    .collect();
+                let marker = [Marker::Circle, Marker::Square, Marker::Triangle]
+                    [self.colour(ensemble.n).min(2)];
+                chart = chart.with_series(
+                    self.series(ensemble, points)
+                        .with_marker(marker)
+                        .with_width(1.6),
+                );
+            }
+            over_radius = over_radius.with_panel(self.legend(chart));
+        }
+        over_radius
+            .with_shared_legend()
+            .write(output, "error_over_radius")?;
+
+        let mut work = Figure::new(
+            title("Work per step of Willmore flow, mean over the circles"),
+            2,
+        );
+        let counts: [(&str, fn(&solver::StepRecord) -> usize); 2] = [
+            ("Hessian-vector products", |r| r.newton.hvp),
+            ("Newton steps", |r| r.newton.newton),
+        ];
+        for (label, count) in counts {
+            let mut chart = LineChart::new("", Axis::linear("time t"), Axis::linear(label));
+            let mut highest = 0.0_f64;
+            for ensemble in self.of_flow(Flow::Willmore) {
+                let points: Vec<[f64; 2]> = (0..self.steps)
+                    .map(|k| {
+                        let mean = ensemble.mean(|result| count(&result.records[k]) as f64);
+                        [Self::time(k + 1), mean]
+                    })
+                    .collect();
+                highest = points.iter().map(|p| p[1]).fold(highest, f64::max);
+                chart = chart.with_series(self.series(ensemble, points).with_width(1.8));
+            }
+            chart.y = chart.y.with_range(0.0, 1.1 * highest.max(1.0));
+            work = work.with_panel(self.legend(chart));
+        }
+        work.with_shared_legend().write(output, "work_per_step")?;
+        Ok(())
+    }
+
+    /// The scale number of a flow, at the finest resolution.
+    fn scale(&self, flow: Flow) -> Option<f64> {
+        self.of_flow(flow).last().map(Ensemble::scale)
+    }
+
+    fn data(&self, output: &OutputDir) -> Result<(), Error> {
+        let mut curves = Vec::new();
+        let mut singles = Vec::new();
+        let mut steps = Vec::new();
+        for e in self.ensembles {
+            let (flow, n, method) = (e.flow, e.n, e.method);
+            for step in 0..=self.steps {
+                let [l2_min, l2_max] = e.error_range(step);
+                curves.push(CurveRow {
+                    flow,
+                    n,
+                    method,
+                    step,
+                    time: Self::time(step),
+                    l2_mean: e.mean_error(step),
+                    l2_min,
+                    l2_max,
+                });
+            }
+            for (&radius, result) in e.radii.iter().zip(&e.results) {
+                singles.extend(
+                    result
+                        .errors
+                        .iter()
+                        .enumerate()
+                        .map(|(step, &l2)| CircleRow {
+                            flow,
+                            n,
+                            method,
+                            radius,
+                            step,
+                            time: Self::time(step),
+                            l2,
+                        }),
+                );
+            }
+            steps.extend(e.records().map(|(radius, r)| StepRow {
+                n,
+                method,
+                radius,
+                step: r.step,
+                time: r.time,
+                tau: r.tau,
+                energy_before: r.energy_before,
+                energy: r.energy,
+                willmore_energy: r.willmore_energy,
+                perimeter: r.perimeter,
+                volume: r.volume,
+                exit: r.newton.exit,
+                newton: r.newton.newton,
+                hvp: r.newton.hvp,
+                values: r.newton.values,
+                gradients: r.newton.gradients,
+                negative_curvature: r.newton.negative_curvature,
+                estimate: r.newton.estimate,
+                seconds: r.seconds,
+            }));
+        }
+        let csv = |name: &str, text: String| output.write(&format!("{name}.csv"), text);
+        csv("curves", report::data::to_csv(&curves)?)?;
+        csv("circles", report::data::to_csv(&singles)?)?;
+        csv("steps", report::data::to_csv(&steps)?)?;
+        output.write("curves.json", report::data::to_json(&curves)?)?;
+        output.write("steps.json", report::data::to_json(&steps)?)?;
+        Ok(())
+    }
+
+    fn shown_steps(&self) -> impl Iterator<Item = usize> {
+        SHOWN_STEPS.into_iter().filter(|&k| k <= self.steps)
+    }
+
+    fn table(&self) -> Result<Table, Error> {
+        let head = [
+            Column::text("flow"),
+            Column::number("n", Format::Shortest),
+            Column::text("method"),
+        ];
+        let errors = self
+            .shown_steps()
+            .map(|k| Column::number(format!("step {k}"), Format::Fixed(5)));
+        let tail = [Column::number("HVP/step", Format::Fixed(1))];
+        let mut table = Table::new(head.into_iter().chain(errors).chain(tail));
+        for e in self.ensembles {
+            let hvp =
+                (e.flow == Flow::Willmore).then(|| e.mean_of_records(|r| r.newton.hvp as f64));
+            let head = [e.flow.title().into(), e.n.into(), e.method.label().into()];
+            let errors = self.shown_steps().map(|k| e.mean_error(k).into());
+            table.push(head.into_iter().chain(errors).chain([hvp.into()]))?;
+        }
+        Ok(table)
+    }
+
+    fn summary(&self, seconds: f64) -> Result<Summary, Error> {
+        let mut summary = Summary::new();
+        for e in self.ensembles {
+            let key = e.key();
+            for k in self.shown_steps() {
+                summary.insert(&format!("{key}.l2.step{k}"), e.mean_error(k))?;
+            }
+            if e.flow == Flow::Willmore {
+                let per_step = [
+                    ("hvp", e.mean_of_records(|r| r.newton.hvp as f64)),
+                    ("newton", e.mean_of_records(|r| r.newton.newton as f64)),
+                ];
+                for (what, value) in per_step {
+                    summary.insert(&format!("{key}.{what}_per_step"), value)?;
+                }
+                summary.insert_count(&format!("{key}.energy_increases"), e.energy_increases())?;
+                summary
+                    .insert_count(&format!("{key}.negative_curvature"), e.negative_curvature())?;
+            }
+        }
+        for flow in Flow::ALL {
+            if let Some(scale) = self.scale(flow) {
+                summary.insert(&format!("{}.scale", flow.key()), scale)?;
+            }
+        }
+        summary.insert("seconds", seconds)?;
+        Ok(summary)
+    }
+}

@@ -1,0 +1,61 @@
+use std::path::PathBuf;
+
+use thiserror::Error as ThisError;
+
+/// What can stop an experiment.
+#[derive(Debug, ThisError)]
+pub enum Error {
+    /// Options that contradict each other or the experiment.
+    #[error("{0}")]
+    Options(String),
+    /// A file or folder of an experiment that cannot be used.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// What was attempted.
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// One of the parallel runs failed.
+    #[error("{run}: {source}")]
+    Run {
+        /// Which one.
+        run: String,
+        /// Why.
+        source: solver::Error,
+    },
+    /// From networks and training.
+    #[error(transparent)]
+    Model(#[from] model::Error),
+    /// From the device.
+    #[error(transparent)]
+    Operators(#[from] operators::Error),
+    /// From the flows.
+    #[error(transparent)]
+    Solver(#[from] solver::Error),
+    /// From the geometry.
+    #[error(transparent)]
+    Geometry(#[from] geometry::Error),
+    /// From figures, tables and output files.
+    #[error(transparent)]
+    Report(#[from] report::Error),
+}
+
+impl Error {
+    /// The message with its causes, on one line.
+    pub fn line(&self) -> String {
+        let mut line = self.to_string();
+        let mut cause = std::error::Error::source(self);
+        while let Some(error) = cause {
+            let text = error.to_string();
+            // Most messages already contain their cause's.
+            if !line.contains(&text) {
+                line = format!("{line}: {text}");
+            }
+            cause = error.source();
+        }
+        line.split_whitespace().collect::<Vec<_>>().join(" ")
+    }
+}

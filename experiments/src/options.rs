@@ -1,0 +1,103 @@
+//! Options common to all programs.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use operators::{ComputeDevice, DeviceKind};
+use report::{Manifest, OutputDir, Progress};
+use serde::Serialize;
+
+use crate::Error;
+
+/// Options of every program.
+#[derive(Args, Clone, Debug)]
+pub struct RunOptions {
+    /// Where tensors live: flex or ndarray (CPU, f64), wgpu or cuda (GPU, f32), if compiled in [default: the first
+    /// compiled in]
+    #[arg(long, value_name = "NAME")]
+    pub device: Option<String>,
+
+    /// Seed of all random numbers
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+
+    /// Folder for the results [default: results/<program>]
+    #[arg(long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+
+    /// A smoke test of seconds; its outputs are marked as quick
+    #[arg(long)]
+    pub quick: bool,
+
+    /// Print nothing but errors
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+impl RunOptions {
+    /// Opens the device.
+    ///
+    /// # Errors
+    /// [`Error::Operators`] for a name that is unknown, not compiled in, or without hardware.
+    pub fn open_device(&self) -> Result<ComputeDevice, Error> {
+        Ok(match &self.device {
+            Some(name) => ComputeDevice::open(name.parse::<DeviceKind>()?)?,
+            None => ComputeDevice::default_compiled()?,
+        })
+    }
+
+    /// Creates and checks the output folder; to be called when everything else has been checked.
+    ///
+    /// # Errors
+    /// [`Error::Report`] if it cannot be written.
+    pub fn open_output(&self, program: &str) -> Result<OutputDir, Error> {
+        let default = || PathBuf::from("results").join(program);
+        Ok(OutputDir::create(
+            self.output.clone().unwrap_or_else(default),
+        )?)
+    }
+
+    /// Progress bars, unless quiet.
+    pub fn progress(&self) -> Progress {
+        Progress::new(self.quiet)
+    }
+
+    /// Starts the manifest of a run.
+    ///
+    /// # Errors
+    /// [`Error::Report`] if the parameters do not serialise to a map.
+    pub fn manifest(
+        &self,
+        program: &str,
+        parameters: &impl Serialize,
+        device: &ComputeDevice,
+    ) -> Result<Manifest, Error> {
+        let place = match device.kind() {
+            DeviceKind::Flex | DeviceKind::NdArray => "cpu",
+            DeviceKind::Wgpu | DeviceKind::Cuda => "gpu",
+        };
+        let dtype = format!("{:?}", device.dtype()).to_lowercase();
+        Ok(Manifest::start(program)
+            .with_parameters(parameters)?
+            .with_backend(device.kind().name(), place, dtype)
+            .with_seed(self.seed))
+    }
+
+    /// A title, marked if this is a quick run.
+    pub fn title(&self, title: &str) -> String {
+        if self.quick {
+            format!("{title} (quick run)")
+        } else {
+            title.to_owned()
+        }
+    }
+
+    /// Prints a text on standard output, unless quiet.
+    pub fn say(&self, text: &str) {
+        use std::io::Write;
+        if !self.quiet {
+            // A closed pipe (`| head`) is no reason to fail after the results have been written.
+            let _ = writeln!(std::io::stdout(), "{text}");
+        }
+    }
+}

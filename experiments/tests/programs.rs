@@ -1,0 +1,222 @@
+//! The compiled programs: what they refuse, and the quick convergence test.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use model::pretrained;
+use report::Summary;
+
+const CIRCLES: &str = env!("CARGO_BIN_EXE_circle_convergence");
+const LEARNED: &str = env!("CARGO_BIN_EXE_learned_networks");
+const TRAIN: &str = env!("CARGO_BIN_EXE_train_networks");
+
+fn run(program: &str, folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(program)
+        .current_dir(folder)
+        .args(arguments)
+        .output()
+        .expect("the program starts")
+}
+
+/// Runs a program that must refuse: code 2, one line that contains `parts`, and the folder as it was.
+fn refused(program: &str, folder: &Path, arguments: &[&str], parts: &[&str]) {
+    let before = content(folder);
+    let output = run(program, folder, arguments);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+    assert_eq!(message.lines().count(), 1, "{arguments:?}: {message}");
+    assert!(message.starts_with("error: "), "{message}");
+    for part in parts {
+        assert!(message.contains(part), "{part:?} is not in {message}");
+    }
+    assert!(output.stdout.is_empty());
+    assert_eq!(content(folder), before, "{arguments:?}");
+}
+
+/// All files and folders with the bytes in them.
+fn content(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.push((path.clone(), Vec::new()));
+            found.extend(content(&path));
+        } else {
+            found.push((path.clone(), fs::read(&path).unwrap()));
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn devices_that_are_unknown_or_not_compiled_in() {
+    let root = tempfile::tempdir().unwrap();
+    for program in [CIRCLES, LEARNED, TRAIN] {
+        refused(
+            program,
+            root.path(),
+            &["--quick", "--device", "abacus"],
+            &["abacus"],
+        );
+        for kind in operators::DeviceKind::ALL {
+            if !kind.is_compiled() {
+                let arguments = ["--quick", "--device", kind.name()];
+                refused(program, root.path(), &arguments, &[kind.name()]);
+            }
+        }
+    }
+}
+
+#[test]
+fn weights_that_are_missing_damaged_or_of_another_run() {
+    let root = tempfile::tempdir().unwrap();
+    let networks = pretrained::all().unwrap();
+    let with_width = |width: usize| {
+        let mut all = networks.iter().map(|(_, network)| network);
+        all.find(|network| network.ratios().dimension == 2 && network.ratios().width == width)
+            .unwrap()
+    };
+    let good = with_width(17).to_bytes().unwrap();
+    let write = |name: &str, data: &[u8]| fs::write(root.path().join(name), data).unwrap();
+    write("truncated.safetensors", &good[..good.len() - 100]);
+    write("empty.safetensors", &[]);
+    let mut flipped = good.clone();
+    // A bit of the length of the header.
+    flipped[2] ^= 0x40;
+    write("flipped.safetensors", &flipped);
+    let mut nan = good.clone();
+    let end = nan.len();
+    nan[end - 8..].copy_from_slice(&f64::NAN.to_le_bytes());
+    write("nan.safetensors", &nan);
+    write("other.safetensors", &with_width(33).to_bytes().unwrap());
+    for program in [CIRCLES, LEARNED] {
+        let name = "missing.safetensors";
+        refused(
+            program,
+            root.path(),
+            &["--quick", "--network", name],
+            &[name],
+        );
+        for name in ["truncated", "empty", "flipped", "nan"] {
+            let file = format!("{name}.safetensors");
+            refused(
+                program,
+                root.path(),
+                &["--quick", "--network", &file],
+                &[&file],
+            );
+        }
+        let arguments = ["--quick", "--network", "other.safetensors"];
+        refused(program, root.path(), &arguments, &["n_K = 33", "n_K = 17"]);
+    }
+}
+
+#[test]
+fn resolutions_names_and_outputs_that_cannot_be() {
+    let root = tempfile::tempdir().unwrap();
+    refused(
+        CIRCLES,
+        root.path(),
+        &["--cells", "100"],
+        &["100", "multiple of 16"],
+    );
+    // No network was trained for this one.
+    refused(CIRCLES, root.path(), &["--cells", "192"], &["n_K = 25"]);
+    refused(TRAIN, root.path(), &["--only", "n1024"], &["n1024", "n128"]);
+    fs::write(root.path().join("results"), "a file of the user").unwrap();
+    for program in [CIRCLES, LEARNED, TRAIN] {
+        refused(program, root.path(), &["--quick"], &["results"]);
+        refused(
+            program,
+            root.path(),
+            &["--quick", "--output", "results"],
+            &["results"],
+        );
+    }
+}
+
+#[test]
+fn the_quick_convergence_test_is_accurate_and_reproducible() {
+    let root = tempfile::tempdir().unwrap();
+    let results: Vec<PathBuf> = ["first", "second"]
+        .iter()
+        .map(|name| {
+            let output = run(CIRCLES, root.path(), &["--quick", "--output", name]);
+            let message = String::from_utf8(output.stderr).unwrap();
+            assert!(output.status.success() && message.is_empty(), "{message}");
+            assert!(
+                String::from_utf8(output.stdout)
+                    .unwrap()
+                    .contains("quick run")
+            );
+            root.path().join(name)
+        })
+        .collect();
+    let read = |folder: &Path, name: &str| fs::read_to_string(folder.join(name)).unwrap();
+
+    for name in ["convergence", "error_over_radius", "work_per_step"] {
+        assert!(read(&results[0], &format!("{name}.svg")).contains("quick run"));
+        assert!(results[0].join(format!("{name}.png")).exists());
+    }
+    for name in ["curves.json", "steps.json", "errors.md"] {
+        assert!(results[0].join(name).exists(), "{name}");
+    }
+    assert!(!results[0].join("partial").exists());
+    assert!(read(&results[0], "manifest.json").contains("\"quick\": true"));
+
+    let summary = Summary::from_json(&read(&results[0], "summary.json")).unwrap();
+    let metric = |name: &str| {
+        summary
+            .get(name)
+            .unwrap_or_else(|| panic!("no metric {name}"))
+    };
+    assert!(metric("mcf.n128.hybrid.l2.step1") > 0.0);
+    assert!(metric("mcf.n128.hybrid.l2.step8") <= 0.0008);
+    assert!(metric("willmore.n128.hybrid.l2.step8") <= 0.021);
+    assert!(metric("willmore.n128.hybrid.energy_increases") <= 0.0);
+    assert!(metric("willmore.n128.hybrid.hvp_per_step") >= 1.0);
+    assert!(metric("willmore.n128.hybrid.newton_per_step") >= 1.0);
+    assert!(metric("willmore.scale") > 5.0 * metric("mcf.n128.hybrid.l2.step8"));
+
+    for name in ["curves.csv", "circles.csv", "errors.csv", "convergence.svg"] {
+        assert_eq!(read(&results[0], name), read(&results[1], name), "{name}");
+    }
+    // All but the wall times: the last column of one, the last line of the other.
+    let without_times = |folder: &Path, name: &str, end: &str| -> Vec<String> {
+        let cut = |line: &str| {
+            line.rsplit_once(end)
+                .map_or(line, |(rest, _)| rest)
+                .to_owned()
+        };
+        read(folder, name).lines().map(cut).collect()
+    };
+    for (name, end) in [("steps.csv", ","), ("summary.json", "\"seconds\"")] {
+        let lines = without_times(&results[0], name, end);
+        assert!(lines.len() > 5);
+        assert_eq!(lines, without_times(&results[1], name, end), "{name}");
+    }
+}
+
+#[test]
+fn finished_circles_are_not_computed_again() {
+    let root = tempfile::tempdir().unwrap();
+    let arguments = ["--quick", "--quiet", "--output", "out"];
+    assert!(run(CIRCLES, root.path(), &arguments).status.success());
+    let reference = fs::read(root.path().join("out/steps.csv")).unwrap();
+    // The wall times of the first run can only come back from its stored parts, which a failure at the end leaves.
+    let again = tempfile::tempdir().unwrap();
+    fs::create_dir_all(again.path().join("out/errors.md")).unwrap();
+    assert_eq!(
+        run(CIRCLES, again.path(), &arguments).status.code(),
+        Some(2)
+    );
+    assert!(again.path().join("out/partial").exists());
+    let first = fs::read(again.path().join("out/steps.csv")).unwrap();
+    fs::remove_dir(again.path().join("out/errors.md")).unwrap();
+    assert!(run(CIRCLES, again.path(), &arguments).status.success());
+    let second = fs::read(again.path().join("out/steps.csv")).unwrap();
+    assert!(first == second && first != reference);
+    assert!(!again.path().join("out/partial").exists());
+}
