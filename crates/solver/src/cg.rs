@@ -72,8 +72,8 @@ pub(crate) fn conjugate_gradients<const D: usize>(
         iterations += 1;
         let curvature = dot(&direction, &product, device)?;
         // `rz / curvature` is the step: beyond this length it is rounding noise that made the curvature positive. NaN
-        // fails the test too and leaves through the same door; the caller checks the slope.
-        if !(curvature * LONGEST_STEP > rz * objective.unit()) {
+        // leaves through the same door; the caller checks the slope.
+        if curvature.is_nan() || curvature * LONGEST_STEP <= rz * objective.unit() {
             exit = CgExit::NegativeCurvature;
             break;
         }

@@ -510,3 +510,124 @@ pub fn train(
     let activation = Mlp::new(PAPER_LAYERS.to_vec(), activation.to_vec())?;
     Ok((orbits.expand(kernel), activation, state))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Ratios;
+    use crate::training::Progress;
+
+    fn data(dimension: usize) -> SphereData {
+        let ratios = Ratios {
+            dimension,
+            width: 9,
+            eps_over_h: 2.0,
+            step_over_h2: 1.0,
+        };
+        SphereData {
+            ratios,
+            cells: 64,
+            radii: [0.1, 0.4],
+            count: 8,
+        }
+    }
+
+    fn params() -> LmParams {
+        LmParams {
+            shells: 12,
+            directions: 2,
+            iterations: 6,
+            starts: 1,
+            ..LmParams::default()
+        }
+    }
+
+    fn problem<'a>(data: &SphereData, device: &'a ComputeDevice) -> (Problem<'a>, Vec<f64>) {
+        let orbits = Orbits::new(data.ratios.dimension, data.ratios.width);
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let samples = BandSamples::draw(data, &orbits, 12, 2, 0.25, &mut rng);
+        let heat = orbits.average(&heat_kernel(data));
+        let x = [heat, random_activation(&mut rng)].concat();
+        let centre = x.iter().map(|x| 0.9 * x).collect();
+        let ridge = vec![1e-2; x.len()];
+        let problem = Problem::new(
+            &samples,
+            orbits.sizes(),
+            &PAPER_LAYERS,
+            (ridge, centre),
+            device,
+        );
+        (problem, x)
+    }
+
+    /// `f(x + t p) - f(x) - 2 t g.p` is of second order in `t`, with the Gauss-Newton form as its main part near a fit.
+    #[test]
+    fn the_gradient_passes_the_taylor_test() {
+        let device = ComputeDevice::default_compiled().unwrap();
+        for dimension in [2, 3] {
+            let (problem, x) = problem(&data(dimension), &device);
+            let normal = problem.normal(&x).unwrap();
+            let (_, value) = problem.value(&x).unwrap();
+            assert!((value / normal.value - 1.0).abs() < 1e-10);
+            let p: Vec<f64> = (0..x.len()).map(|i| 0.1 * (1.7 * i as f64).sin()).collect();
+            let slope: f64 = normal.gradient.iter().zip(&p).map(|(g, p)| g * p).sum();
+            let remainder = |t: f64| {
+                let y: Vec<f64> = x.iter().zip(&p).map(|(x, p)| x + t * p).collect();
+                // The value is the squared norm, the gradient that of half of it.
+                (problem.value(&y).unwrap().1 - value - 2.0 * t * slope).abs()
+            };
+            let rate = (remainder(1e-3) / remainder(5e-4)).log2();
+            assert!((rate - 2.0).abs() < 0.1, "{dimension}D: rate {rate}");
+        }
+    }
+
+    #[test]
+    fn training_lowers_the_loss_and_resumes_with_the_same_bytes() {
+        let device = ComputeDevice::default_compiled().unwrap();
+        for dimension in [2, 3] {
+            let data = data(dimension);
+            let start = splitting_start(0.25, &params(), 1, &device).unwrap();
+            let kernel = heat_kernel(&data);
+            let run = |state, observer: &mut dyn Observer<LmState>| {
+                train(
+                    &data,
+                    &params(),
+                    (&kernel, &start),
+                    2,
+                    state,
+                    &device,
+                    observer,
+                )
+            };
+            let mut losses = Vec::new();
+            let whole = run(None, &mut |p: &Progress, _: &LmState| {
+                losses.push(p.held_out_loss);
+                Ok(true)
+            })
+            .unwrap();
+            assert!(
+                losses[losses.len() - 1] < 0.5 * losses[0],
+                "{dimension}D {losses:?}"
+            );
+            let mut half = None;
+            let stopped = run(None, &mut |p: &Progress, s: &LmState| {
+                half = Some(s.clone());
+                Ok(p.iteration < 3)
+            });
+            assert!(matches!(stopped, Err(Error::Interrupted { iteration: 3 })));
+            let resumed = run(half, &mut |_: &Progress, _: &LmState| Ok(true)).unwrap();
+            assert_eq!(resumed, whole);
+        }
+    }
+
+    #[test]
+    fn the_splitting_activation_inverts_its_function() {
+        for i in -14..=14 {
+            let w = f64::from(i) / 10.0;
+            let v = splitting_activation(0.25, w);
+            let phi = v - 9.0 / 8.0 * 0.25 * v * (1.0 - v * v);
+            assert!((phi - w).abs() < 1e-13);
+        }
+        assert!((splitting_activation(0.25, 1.0) - 1.0).abs() < 1e-14);
+    }
+}
