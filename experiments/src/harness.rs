@@ -53,7 +53,7 @@ pub fn in_parallel<R: Send>(
             }
             let mut results = results
                 .lock()
-                .unwrap_or_else(|poisoned| poisoned.into_inner());
+                .unwrap_or_else(std::sync::PoisonError::into_inner);
             results.push((number, result));
         }
     };
@@ -72,7 +72,7 @@ pub fn in_parallel<R: Send>(
     }
     let mut results = results
         .into_inner()
-        .unwrap_or_else(|poisoned| poisoned.into_inner());
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
     results.sort_by_key(|(number, _)| *number);
     results.into_iter().map(|(_, result)| result).collect()
 }

@@ -160,7 +160,7 @@ fn gaussian_series(s: [f64; 4]) -> [f64; 4] {
     // e = exp(q) satisfies e' = q' e.
     let e0 = (-s[0] * s[0]).exp();
     let e1 = q1 * e0;
-    let e2 = (2.0 * q2 * e0 + q1 * e1) / 2.0;
+    let e2 = q2 * e0 + 0.5 * q1 * e1;
     let e3 = (3.0 * q3 * e0 + 2.0 * q2 * e1 + q1 * e2) / 3.0;
     [e0, e1, e2, e3]
 }

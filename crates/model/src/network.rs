@@ -51,7 +51,7 @@ impl Ratios {
     pub fn validate(&self) -> Result<(), Error> {
         let reason = if !(2..=3).contains(&self.dimension) {
             "the dimension must be 2 or 3"
-        } else if self.width % 2 == 0 || self.width > 1025 {
+        } else if self.width.is_multiple_of(2) || self.width > 1025 {
             "the kernel width must be odd and at most 1025"
         } else if !(self.eps_over_h.is_finite() && self.eps_over_h > 0.0) {
             "eps/h must be positive"

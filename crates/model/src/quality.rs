@@ -1,12 +1,12 @@
 //! What a network is worth: losses on whole grids, its transfer function, its activation.
 
-use operators::{ComputeDevice, Transform, circular_convolution, kernel_symbol};
+use operators::{ComputeDevice, Transform, kernel_symbol};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::training::SphereData;
-use crate::{Error, Network};
+use crate::{Error, MeanCurvatureOperator, Network};
 
 /// A fixed draw of forty radii from `[0.05, 0.4]`, for which other implementations quote their losses.
 ///
@@ -107,16 +107,15 @@ fn losses(
     for &radius in radii {
         let u = data.sphere(radius);
         let target = data.sphere(data.shrunk(radius));
-        let smoothed = if network.ratios().dimension == 2 {
-            smoothed::<2>(network, data, &u, device)?
+        let [value, flipped] = if network.ratios().dimension == 2 {
+            applied::<2>(network, data, &u, device)?
         } else {
-            smoothed::<3>(network, data, &u, device)?
+            applied::<3>(network, data, &u, device)?
         };
-        for ((w, u), target) in smoothed.iter().zip(&u).zip(&target) {
-            let activation = network.activation();
-            sums[0] += (activation.value(*w) - target).powi(2) / u_len(data);
-            sums[1] += (activation.value(-w) + target).powi(2) / u_len(data);
-            sums[2] += (u - target).powi(2) / u_len(data);
+        for (i, target) in target.iter().enumerate() {
+            sums[0] += (value[i] - target).powi(2) / u_len(data);
+            sums[1] += (flipped[i] + target).powi(2) / u_len(data);
+            sums[2] += (u[i] - target).powi(2) / u_len(data);
         }
     }
     Ok(sums.map(|sum| sum / radii.len() as f64))
@@ -126,15 +125,19 @@ fn u_len(data: &SphereData) -> f64 {
     (data.cells as f64).powi(data.ratios.dimension as i32)
 }
 
-fn smoothed<const D: usize>(
+/// `V[u]` and `V[-u]`.
+fn applied<const D: usize>(
     network: &Network,
     data: &SphereData,
     u: &[f64],
     device: &ComputeDevice,
-) -> Result<Vec<f64>, Error> {
+) -> Result<[Vec<f64>; 2], Error> {
+    let operator = MeanCurvatureOperator::<D>::new(network, device)?;
     let u = device.tensor::<D>(u, [data.cells; D]);
-    let kernel = device.tensor::<D>(network.kernel(), [network.ratios().width; D]);
-    Ok(device.values(circular_convolution(u, kernel, false))?)
+    Ok([
+        device.values(operator.apply(u.clone()))?,
+        device.values(operator.apply(u.neg()))?,
+    ])
 }
 
 /// Fine line over the arguments that occur, `[-1.05, 1.05]`.

@@ -27,11 +27,7 @@ fn checksum(network: &Network) -> serde_json::Result<String> {
     hash.update(serde_json::to_vec(&about)?);
     hash.update(bytes(network.kernel()));
     hash.update(bytes(network.activation().parameters()));
-    Ok(hash
-        .finalize()
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect())
+    Ok(format!("{:x}", hash.finalize()))
 }
 
 /// Name of the metadata entry. There is only one: safetensors writes several in random order, and the same network should

@@ -272,7 +272,7 @@ impl<T: Real> Transform<T> {
                 .zip(out.chunks_exact_mut(last))
             {
                 line[0].im = T::zero();
-                if last % 2 == 0 {
+                if last.is_multiple_of(2) {
                     line[self.half - 1].im = T::zero();
                 }
                 self.real_inverse

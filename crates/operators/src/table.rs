@@ -226,7 +226,7 @@ mod tests {
     fn converges_with_the_orders_of_quintic_interpolation() {
         let error = |cells: usize, order: usize| {
             (0..4001)
-                .map(|i| -2.0 + i as f64 * 1e-3)
+                .map(|i| -2.0 + f64::from(i) * 1e-3)
                 .map(|w| {
                     (table(cells).derivative(w, order)
                         - (w + order as f64 * std::f64::consts::FRAC_PI_2).sin())

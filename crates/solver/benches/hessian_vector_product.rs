@@ -199,10 +199,10 @@ impl<const D: usize> Candidates<D> {
         let mut group = criterion.benchmark_group("hessian_vector_product");
         group.bench_function(BenchmarkId::new("burn", name), |b| b.iter(|| self.burn()));
         group.bench_function(BenchmarkId::new("by_hand", name), |b| {
-            b.iter(|| self.hand())
+            b.iter(|| self.hand());
         });
         group.bench_function(BenchmarkId::new("evaluate", name), |b| {
-            b.iter(|| self.evaluate())
+            b.iter(|| self.evaluate());
         });
         group.finish();
     }

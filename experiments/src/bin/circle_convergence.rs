@@ -309,9 +309,7 @@ impl Report<'_> {
         convergence
             .with_shared_legend()
             .with_note(format!(
-                "ε = 2⁻⁶, τ = 2⁻¹⁴, h = 1/n; mean over {count} circles with radii between {:.3} and {:.3}.",
-                smallest,
-                largest
+                "ε = 2⁻⁶, τ = 2⁻¹⁴, h = 1/n; mean over {count} circles with radii between {smallest:.3} and {largest:.3}."
             ))
             .write(output, "convergence")?;
 

