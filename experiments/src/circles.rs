@@ -402,7 +402,7 @@ mod tests {
                     let cells = box_cells(flow, r, STEPS, n);
                     let last = flow.radius(r, STEPS as f64 * STEP);
                     let gap = 0.5 * cells as f64 / n as f64 - r.max(last);
-                    assert!((MARGIN..MARGIN + 0.08).contains(&gap), "{gap}");
+                    assert!((MARGIN..MARGIN + 0.15).contains(&gap), "{gap}");
                     assert!(cells.is_multiple_of(2) && is_smooth(cells));
                     assert!(1.0 + geometry::optimal_profile(gap, EPS) < 1e-12);
                 }

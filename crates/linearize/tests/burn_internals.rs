@@ -4,7 +4,7 @@
 
 use burn::backend::autodiff::Autodiff;
 use burn::backend::capture::CaptureBackend;
-use burn::backend::ir::{HandleKind, OperationIr};
+use burn::backend::ir::OperationIr;
 use burn::backend::tensor::FloatTensor;
 use burn::tensor::{DType, Device, FloatDType, Tensor, TensorData};
 
@@ -73,7 +73,7 @@ fn capture_devices_take_a_float_type_inside_a_scope() {
 #[cfg(feature = "flex")]
 #[test]
 fn captured_operations_replay_on_a_backend() {
-    use burn::backend::ir::{TensorIr, TensorStatus};
+    use burn::backend::ir::{HandleKind, TensorIr, TensorStatus};
     use burn::backend::{Flex, FlexDevice};
     use burn_router::TensorInterpreter;
 
