@@ -214,10 +214,11 @@ impl Circle {
         let mut records = Vec::new();
         match self.flow {
             Flow::MeanCurvature => {
-                let mut flow = MeanCurvatureFlow::new(network, &initial, &self.params, device)
-                    .map_err(failed)?;
+                let mut flow =
+                    MeanCurvatureFlow::with_network(network, &initial, &self.params, device)
+                        .map_err(failed)?;
                 for k in 1..=self.steps {
-                    flow.advance();
+                    flow.advance().map_err(failed)?;
                     errors.push(l2_distance(&flow.field().map_err(failed)?, &exact(k)?)?);
                     bar.inc(1);
                 }

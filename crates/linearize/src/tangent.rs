@@ -410,6 +410,14 @@ impl Builder {
     }
 }
 
+/// Forgets the identifiers of the outputs: a rule may describe them by those of another operation, which is perhaps an input
+/// of this one.
+fn release_outputs(operation: &mut CustomOpIr) {
+    for (position, out) in operation.outputs.iter_mut().enumerate() {
+        out.id = TensorId::new(u64::MAX - position as u64);
+    }
+}
+
 /// For rules of custom operations. Tangents are handles to unevaluated expressions: pass them
 /// around freely, they cost nothing until an operation needs their values.
 impl Builder {
@@ -419,7 +427,8 @@ impl Builder {
     ///
     /// # Panics
     /// If the operation has no outputs.
-    pub fn primal(&mut self, operation: CustomOpIr) -> TensorIr {
+    pub fn primal(&mut self, mut operation: CustomOpIr) -> TensorIr {
+        release_outputs(&mut operation);
         self.primal.emit_one(OperationIr::Custom(operation))
     }
 
@@ -448,7 +457,8 @@ impl Builder {
     ///
     /// # Panics
     /// If the operation has no outputs.
-    pub fn tangent(&mut self, operation: CustomOpIr) -> TensorIr {
+    pub fn tangent(&mut self, mut operation: CustomOpIr) -> TensorIr {
+        release_outputs(&mut operation);
         let mut operation = OperationIr::Custom(operation);
         let mut values = HashMap::new();
         let inputs: Vec<TensorIr> = operation.inputs().cloned().collect();

@@ -33,10 +33,41 @@ impl SpectralFilter {
         f: impl Fn(rustfft::num_complex::Complex<f64>) -> f64,
     ) -> Self {
         let points = Transform::<f64>::of_shape(shape).len() as f64;
-        let double: Vec<f64> = kernel_symbol(shape, kernel, width)
-            .iter()
-            .map(|k| f(k.scale(points)) / points)
-            .collect();
+        let symbol = kernel_symbol(shape, kernel, width);
+        Self::from_ordered(
+            shape,
+            symbol.iter().map(|k| f(k.scale(points)) / points).collect(),
+        )
+    }
+
+    /// The filter whose symbol is `f(theta)` at the frequencies `theta = 2 pi k / n` of every axis.
+    pub fn from_symbol(shape: &[usize], f: impl Fn(&[f64]) -> f64) -> Self {
+        let points: usize = shape.iter().product();
+        let columns = Transform::<f64>::of_shape(shape).spectrum_len() / shape[0];
+        let angle = |k: usize, n: usize| std::f64::consts::TAU * k as f64 / n as f64;
+        let half = shape[shape.len() - 1] / 2 + 1;
+        let mut theta = vec![0.0; shape.len()];
+        let mut double = Vec::with_capacity(columns * shape[0]);
+        for column in 0..columns {
+            let mut rest = column;
+            for axis in (1..shape.len()).rev() {
+                let extent = if axis + 1 == shape.len() {
+                    half
+                } else {
+                    shape[axis]
+                };
+                theta[axis] = angle(rest % extent, shape[axis]);
+                rest /= extent;
+            }
+            for k in 0..shape[0] {
+                theta[0] = angle(k, shape[0]);
+                double.push(f(&theta) / points as f64);
+            }
+        }
+        Self::from_ordered(shape, double)
+    }
+
+    fn from_ordered(shape: &[usize], double: Vec<f64>) -> Self {
         let single = double.iter().map(|&v| v as f32).collect();
         Self(Arc::new(Symbol {
             shape: shape.to_vec(),
@@ -44,6 +75,14 @@ impl SpectralFilter {
             single,
             uploaded: Mutex::new(None),
         }))
+    }
+
+    /// The filtered grid, on the host.
+    ///
+    /// # Panics
+    /// If `x` is not of the filter's shape.
+    pub fn apply(&self, x: &[f64]) -> Vec<f64> {
+        Transform::of_shape(&self.0.shape).filter_real(x, &self.0.double)
     }
 
     /// Shape of the grids it applies to.

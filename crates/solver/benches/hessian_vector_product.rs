@@ -144,7 +144,8 @@ impl<const D: usize> Candidates<D> {
             .map(|i| (1.0 - u.values()[i].powi(2)) + 0.1 * (0.37 * i as f64).sin())
             .collect();
         let operator = MeanCurvatureOperator::<D>::new(&network, &device)?;
-        let mut energy = MinimizingMovement::new(&operator, cells, &device)?;
+        let mut energy =
+            MinimizingMovement::new(std::sync::Arc::new(operator.clone()), cells, &device)?;
         energy.set(&device.tensor(previous.values(), grid.shape()), STIFFNESS)?;
         let mut candidates = Self {
             energy,

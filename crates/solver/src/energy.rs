@@ -1,5 +1,7 @@
 //! The minimizing-movement energy as a Burn graph.
 
+use std::sync::Arc;
+
 use burn::tensor::Tensor;
 use linearize::{Graph, Linearization, Value};
 use model::MeanCurvatureOperator;
@@ -10,15 +12,43 @@ use crate::Error;
 /// A step of mean curvature flow, `v[u]`, as the energy sees it.
 ///
 /// The solver asks no more of it: the learned operator is one, an implicit finite-element step can be another.
-pub trait MeanCurvatureStep<const D: usize> {
+pub trait MeanCurvatureStep<const D: usize>: Send + Sync {
     /// `v[u]` as a Burn graph, on whatever device `u` lives (including Burn's capture device).
     fn apply(&self, u: Tensor<D>) -> Tensor<D>;
+
+    /// The matrix of the inner product in which the energy measures motions, as a Burn graph: `<a, b> = h^D a . mass(b)`.
+    /// The identity unless the step brings a mass matrix.
+    fn mass(&self, x: Tensor<D>) -> Tensor<D> {
+        x
+    }
 
     /// Rules and handlers of the custom operations in that graph.
     fn extensions(&self) -> linearize::Extensions;
 
     /// An approximate inverse of `1 + c (J - 1)^T (J - 1)` in the pure phases, `J` the derivative of `v`.
     fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> SpectralFilter;
+
+    /// Says how accurate derivatives of the step have to be; a step that solves systems adapts its tolerances.
+    fn set_accuracy(&self, _accuracy: &Accuracy) {}
+
+    /// The failure behind values that are not finite, if the step had one since the last call.
+    fn failure(&self) -> Option<StepFailure> {
+        None
+    }
+}
+
+/// Why a step of mean curvature flow failed.
+pub type StepFailure = Box<dyn std::error::Error + Send + Sync>;
+
+/// What the outer iteration asks of an inner solver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Accuracy {
+    /// `c = tau / tautilde^2`, the factor by which the energy magnifies errors of the step.
+    pub stiffness: f64,
+    /// Accuracy of the minimizer, relative to the motion.
+    pub tolerance: f64,
+    /// Reduction of the residual in the outer linear solves.
+    pub cg_tolerance: f64,
 }
 
 impl<const D: usize> MeanCurvatureStep<D> for MeanCurvatureOperator<D> {
@@ -57,18 +87,20 @@ pub trait Objective<const D: usize> {
     /// If nothing was evaluated, or the device fails.
     fn hessian_vector_product(&mut self, p: &Tensor<D>) -> Result<Tensor<D>, Error>;
 
-    /// A lower bound of the curvature where the function is convex: the weight of `1/2 |u|^2` in it.
+    /// The size of the curvature where the function is flattest and convex: the weight of `1/2 |u|^2` in it.
     fn unit(&self) -> f64;
 }
 
 /// The energy of one minimizing movement (eq:fully_discrete_willmore_flow_energy), scaled by `N / (2 eps)`:
 ///
-/// `E(u) = 1/2 |u - u_k|^2 + c/2 |V[u] - u|^2`, with plain sums over the grid and `c = tau / tautilde^2`,
+/// `E(u) = 1/2 |u - u_k|^2 + c/2 |V[u] - u|^2`, with sums over the grid in the step's inner product and
+/// `c = tau / tautilde^2`,
 ///
-/// so that its Hessian is the identity plus what the curvature adds. `u_k` and `c` are inputs of the traced graph: one
+/// so that its Hessian is the identity (or mass matrix) plus what the curvature adds. `u_k` and `c` are inputs of the traced graph: one
 /// trace serves a whole run.
 pub struct MinimizingMovement<const D: usize> {
     linearization: Linearization,
+    step: Arc<dyn MeanCurvatureStep<D>>,
     device: ComputeDevice,
     previous: Value,
     stiffness: f64,
@@ -81,7 +113,7 @@ impl<const D: usize> MinimizingMovement<D> {
     /// # Errors
     /// [`Error::Linearize`] if the step contains an operation without a rule.
     pub fn new(
-        step: &impl MeanCurvatureStep<D>,
+        step: Arc<dyn MeanCurvatureStep<D>>,
         cells: usize,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
@@ -95,8 +127,8 @@ impl<const D: usize> MinimizingMovement<D> {
                 let u = inputs.variable::<D>(0);
                 let motion = u.clone() - inputs.parameter::<D>(0);
                 let residual = step.apply(u.clone()) - u;
-                let curvature = (residual.clone() * residual).sum() * inputs.parameter::<1>(1);
-                ((motion.clone() * motion).sum() + curvature) * 0.5
+                let square = |x: Tensor<D>| (x.clone() * step.mass(x)).sum();
+                (square(motion) + square(residual) * inputs.parameter::<1>(1)) * 0.5
             },
         )?;
         let extensions = step.extensions();
@@ -105,6 +137,7 @@ impl<const D: usize> MinimizingMovement<D> {
             .on(device.device(), &extensions)?;
         Ok(Self {
             linearization,
+            step,
             device: device.clone(),
             previous,
             stiffness: 1.0,
@@ -143,6 +176,13 @@ impl<const D: usize> MinimizingMovement<D> {
         self.linearization.program()
     }
 
+    fn check(&self) -> Result<(), Error> {
+        match self.step.failure() {
+            Some(failure) => Err(Error::Step(failure)),
+            None => Ok(()),
+        }
+    }
+
     fn parameters(&self) -> [Value; 2] {
         [self.previous.clone(), self.stiffness_tensor.clone()]
     }
@@ -152,18 +192,25 @@ impl<const D: usize> Objective<D> for MinimizingMovement<D> {
     fn value(&mut self, u: &Tensor<D>) -> Result<f64, Error> {
         let parameters = self.parameters();
         let value = self.linearization.value(&[u.clone().into()], &parameters)?;
-        Ok(self.device.scalar(value.tensor::<1>()?)?)
+        let value = self.device.scalar(value.tensor::<1>()?)?;
+        // Where the step fails the energy counts as infinite: a line search turns back.
+        Ok(match self.step.failure() {
+            Some(_) => f64::INFINITY,
+            None => value,
+        })
     }
 
     fn evaluate(&mut self, u: &Tensor<D>) -> Result<(f64, Tensor<D>), Error> {
         let parameters = self.parameters();
         let evaluation = self.linearization.at(&[u.clone().into()], &parameters)?;
         let value = self.device.scalar(evaluation.value.tensor::<1>()?)?;
+        self.check()?;
         Ok((value, evaluation.gradients[0].tensor::<D>()?))
     }
 
     fn hessian_vector_product(&mut self, p: &Tensor<D>) -> Result<Tensor<D>, Error> {
         let product = self.linearization.apply(&[p.clone().into()])?;
+        self.check()?;
         Ok(product[0].tensor::<D>()?)
     }
 

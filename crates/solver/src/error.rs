@@ -38,6 +38,9 @@ pub enum Error {
         /// The range.
         expected: &'static str,
     },
+    /// The step of mean curvature flow failed.
+    #[error("the step of mean curvature flow failed: {0}")]
+    Step(crate::StepFailure),
     /// From the network.
     #[error(transparent)]
     Model(#[from] model::Error),

@@ -1,5 +1,6 @@
 //! Willmore flow and mean curvature flow, step by step, with a record of each.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use burn::tensor::Tensor;
@@ -11,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::newton::{NewtonInfo, NewtonParams, minimize};
 use crate::profile::extrapolate;
-use crate::{Error, Exit, MeanCurvatureStep, MinimizingMovement};
+use crate::{Accuracy, Error, Exit, MeanCurvatureStep, MinimizingMovement};
 
 /// Scales of a flow.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -84,8 +85,8 @@ pub struct WillmoreFlow<const D: usize> {
     grid: Grid<D>,
     params: FlowParams,
     device: ComputeDevice,
+    mcf: Arc<dyn MeanCurvatureStep<D>>,
     energy: MinimizingMovement<D>,
-    preconditioner: Box<dyn Fn(f64) -> SpectralFilter + Send>,
     filter: Option<(f64, SpectralFilter)>,
     current: Tensor<D>,
     /// The phase field one step ago and the size of that step.
@@ -114,7 +115,7 @@ impl<const D: usize> WillmoreFlow<D> {
     /// # Errors
     /// [`Error::Parameter`], [`Error::NonFinite`], or what tracing the energy raises.
     pub fn new(
-        step: impl MeanCurvatureStep<D> + Send + 'static,
+        step: impl MeanCurvatureStep<D> + 'static,
         initial: &Field<D>,
         params: FlowParams,
         device: &ComputeDevice,
@@ -131,13 +132,14 @@ impl<const D: usize> WillmoreFlow<D> {
         }
         let grid = *initial.grid();
         let current = upload(initial, device)?;
-        let energy = MinimizingMovement::new(&step, grid.cells(), device)?;
+        let mcf: Arc<dyn MeanCurvatureStep<D>> = Arc::new(step);
+        let energy = MinimizingMovement::new(mcf.clone(), grid.cells(), device)?;
         Ok(Self {
             grid,
             params,
             device: device.clone(),
+            mcf,
             energy,
-            preconditioner: Box::new(move |c| step.phase_preconditioner(grid.cells(), c)),
             filter: None,
             current,
             previous: None,
@@ -188,7 +190,13 @@ impl<const D: usize> WillmoreFlow<D> {
             .as_ref()
             .is_none_or(|(c, _)| c.to_bits() != stiffness.to_bits())
         {
-            self.filter = Some((stiffness, (self.preconditioner)(stiffness)));
+            let filter = self.mcf.phase_preconditioner(self.grid.cells(), stiffness);
+            self.filter = Some((stiffness, filter));
+            self.mcf.set_accuracy(&Accuracy {
+                stiffness,
+                tolerance: self.params.newton.tolerance,
+                cg_tolerance: self.params.newton.cg_tolerance,
+            });
         }
         let filter = self.filter.as_ref().map(|(_, filter)| filter);
         let start = match &self.previous {
@@ -222,7 +230,10 @@ impl<const D: usize> WillmoreFlow<D> {
         // The scaled energy counts points; eps h^D makes it the paper's (true L2 norms).
         let scale = 2.0 * self.params.eps * self.grid.cell_volume();
         let motion = u.clone() - self.current.clone();
-        let fidelity = 0.5 * self.device.scalar((motion.clone() * motion).sum())?;
+        let fidelity = 0.5
+            * self
+                .device
+                .scalar((motion.clone() * self.mcf.mass(motion)).sum())?;
         let record = StepRecord {
             step,
             time: self.time + tau,
@@ -242,39 +253,60 @@ impl<const D: usize> WillmoreFlow<D> {
     }
 }
 
-/// Mean curvature flow by repeated application of the learned operator (eq:mcf_operator_discrete).
+/// Mean curvature flow by repeated application of a step: the learned operator (eq:mcf_operator_discrete) or another.
 pub struct MeanCurvatureFlow<const D: usize> {
     grid: Grid<D>,
-    operator: MeanCurvatureOperator<D>,
+    mcf: Arc<dyn MeanCurvatureStep<D>>,
     device: ComputeDevice,
     current: Tensor<D>,
     step: usize,
 }
 
 impl<const D: usize> MeanCurvatureFlow<D> {
-    /// Starts from a phase field; the network's ratios must be those of the grid.
+    /// A flow with a learned operator, whose ratios must be those of the grid.
     ///
     /// # Errors
     /// As [`WillmoreFlow::with_network`].
-    pub fn new(
+    pub fn with_network(
         network: &Network,
         initial: &Field<D>,
         params: &FlowParams,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
+        let operator = fitting_operator(network, initial.grid(), params, device)?;
+        Self::new(operator, initial, device)
+    }
+
+    /// A flow by any step.
+    ///
+    /// # Errors
+    /// [`Error::NonFinite`] if the initial field is not finite.
+    pub fn new(
+        step: impl MeanCurvatureStep<D> + 'static,
+        initial: &Field<D>,
+        device: &ComputeDevice,
+    ) -> Result<Self, Error> {
         Ok(Self {
             grid: *initial.grid(),
-            operator: fitting_operator(network, initial.grid(), params, device)?,
+            mcf: Arc::new(step),
             device: device.clone(),
             current: upload(initial, device)?,
             step: 0,
         })
     }
 
-    /// One step `u <- V[u]`. A value that is not finite is reported by the next [`Self::field`].
-    pub fn advance(&mut self) {
+    /// One step `u <- v[u]`. A value that is not finite is reported by the next [`Self::field`].
+    ///
+    /// # Errors
+    /// [`Error::Step`] if the step's own solver fails; the flow stays where it was.
+    pub fn advance(&mut self) -> Result<(), Error> {
+        let next = self.mcf.apply(self.current.clone());
+        if let Some(failure) = self.mcf.failure() {
+            return Err(Error::Step(failure));
+        }
+        self.current = next;
         self.step += 1;
-        self.current = self.operator.apply(self.current.clone());
+        Ok(())
     }
 
     /// The phase field now.

@@ -64,7 +64,7 @@ mod flow;
 mod newton;
 mod profile;
 
-pub use energy::{MeanCurvatureStep, MinimizingMovement, Objective};
+pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective, StepFailure};
 pub use error::Error;
 pub use flow::{FlowParams, MeanCurvatureFlow, StepRecord, WillmoreFlow};
 pub use newton::{Exit, Method, NewtonInfo, NewtonParams, minimize};

@@ -1,0 +1,94 @@
+//! The finite-element schemes that the learned operator is compared with.
+//!
+//! The nested scheme of Franken, Rumpf and Wirth puts a finite-element step of mean curvature flow into the
+//! minimizing-movement energy; [`FiniteElementStep`] is that step, fully implicit or semi-implicit, and
+//! [`solver::WillmoreFlow`] does the rest with the same Newton method as for the learned operator:
+//!
+//! ```
+//! use fem::FiniteElementStep;
+//! use geometry::{Grid, phase_field, shapes::Ball};
+//! use operators::ComputeDevice;
+//! use solver::{FlowParams, NewtonParams, WillmoreFlow};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let grid = Grid::<2>::per_unit(64, 1.0)?;
+//! let params = FlowParams {
+//!     eps: 2.0 * grid.spacing(),
+//!     mcf_step: grid.spacing().powi(2),
+//!     newton: NewtonParams::default(),
+//! };
+//! let disc = phase_field(grid, &Ball::new([0.0, 0.0], 0.2)?, params.eps)?;
+//! let step = FiniteElementStep::implicit(&grid, params.eps, params.mcf_step)?;
+//! let device = ComputeDevice::default_compiled()?;
+//! let mut flow = WillmoreFlow::new(step.clone(), &disc, params, &device)?;
+//! let record = flow.advance(params.mcf_step)?;
+//! assert!(record.energy < record.energy_before);
+//! println!("w = {:.2}, {:?}", step.willmore_energy(&flow.field()?)?, step.statistics());
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Discretization
+//!
+//! Multilinear (Q1) elements on the periodic grid, one code for two and three dimensions ([`element`]); consistent mass and
+//! stiffness; the double well `Psi(v) = 9/16 (1 - v^2)^2` is integrated exactly (three Gauss points per axis). Linear systems
+//! are solved by conjugate gradients, preconditioned with the exact inverse in the pure phases by Fourier transforms: the
+//! spectrum of the preconditioned matrix lies in `[(1 - 9/8 s)/(1 + 9/4 s), 1]` with `s = tautilde/eps^2`, independent of the
+//! grid. [`LinearSolver::Direct`] is the sparse Cholesky factorization the paper's comparison used.
+//!
+//! # Derivatives
+//!
+//! The implicit step `v[u]` solves `M (v - u) + tautilde S v + kappa b(v) = 0`. With `A(v)` the derivative of the left side in
+//! `v`, `v'[u] p = A(v)^-1 M p` and its transpose is `M A(v)^-1`; `A(v)` depends on `v` through `int v^2 phi_i phi_j`. So all
+//! derivatives are compositions of five operations, closed under differentiation: the mass matrix, the inverse of
+//! `M + tautilde S`, the symmetric product `int a b c phi_i`, the step, and `A(v)^-1 g`. Gradients come from Burn's autodiff,
+//! Hessian-vector products from `linearize`.
+
+// Burn 0.22 deprecates its ndarray backend in favour of flex; it stays selectable here until it is gone.
+#![cfg_attr(feature = "ndarray", allow(deprecated))]
+
+mod backends;
+mod direct;
+pub mod element;
+mod error;
+mod ops;
+mod rules;
+mod scheme;
+mod step;
+
+pub use error::Error;
+pub use ops::FemOps;
+pub use rules::extensions;
+pub use scheme::{Scheme, Statistics};
+pub use step::FiniteElementStep;
+
+/// How linear systems of the implicit step are solved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LinearSolver {
+    /// Conjugate gradients with a Fourier preconditioner.
+    #[default]
+    ConjugateGradients,
+    /// Sparse Cholesky factorization, as in the paper's comparison.
+    Direct,
+}
+
+/// How accurately the inner systems are solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerances {
+    /// Reduction of the residual of linear systems, in the norm of the preconditioner.
+    pub linear: f64,
+    /// Residual of the implicit equation relative to the phase field, in the same norm.
+    pub newton: f64,
+    /// Limit of the iterations of one linear solve.
+    pub iterations: usize,
+}
+
+impl Default for Tolerances {
+    fn default() -> Self {
+        Self {
+            linear: 1e-10,
+            newton: 1e-12,
+            iterations: 400,
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Forward-mode rules and replay handlers of the finite-element operations.
+
+use burn_ir::{BackendIr, CustomOpIr, ScalarIr, TensorIr};
+use linearize::{Builder, CustomOpRegistry, Error, Extensions, Multilinear, Rule};
+
+use crate::ops::{FemOps, HEAT, IMPLICIT, LINEARIZED, MASS, PRODUCT, host};
+
+/// `d int a b c phi`: linear in each factor, and symmetric, so that equal factors are differentiated once.
+struct Product;
+
+impl Rule for Product {
+    fn jvp(
+        &self,
+        operation: &CustomOpIr,
+        tangents: &[Option<TensorIr>],
+        build: &mut Builder,
+    ) -> Result<Vec<Option<TensorIr>>, Error> {
+        let mut sum: Option<TensorIr> = None;
+        for (i, tangent) in tangents.iter().enumerate() {
+            let Some(tangent) = tangent else { continue };
+            let same = |k: &usize| operation.inputs[*k].id == operation.inputs[i].id;
+            if (0..i).any(|k| same(&k)) {
+                continue;
+            }
+            let multiplicity = (0..3).filter(same).count() as f64;
+            let [x, y] = [(i + 1) % 3, (i + 2) % 3].map(|k| operation.inputs[k].clone());
+            let mut one = operation.clone();
+            one.inputs = vec![x, y, tangent.clone()].into();
+            let term = build.tangent(one);
+            let term = build.scale(&term, multiplicity);
+            sum = Some(match sum {
+                Some(sum) => build.add(&sum, &term),
+                None => term,
+            });
+        }
+        Ok(vec![sum])
+    }
+}
+
+fn with_inputs(operation: &CustomOpIr, id: &'static str, inputs: Vec<TensorIr>) -> CustomOpIr {
+    let scalars: Vec<ScalarIr> = operation.scalars.clone();
+    CustomOpIr::with_scalars(id, &inputs, &operation.outputs, scalars)
+}
+
+/// `dv = A(v)^-1 M du`
+struct ImplicitStep;
+
+impl Rule for ImplicitStep {
+    fn jvp(
+        &self,
+        operation: &CustomOpIr,
+        tangents: &[Option<TensorIr>],
+        build: &mut Builder,
+    ) -> Result<Vec<Option<TensorIr>>, Error> {
+        let Some(du) = &tangents[0] else {
+            return Ok(vec![None]);
+        };
+        let v = build.primal(operation.clone());
+        let source = build.tangent(with_inputs(operation, MASS, vec![du.clone()]));
+        let dv = build.tangent(with_inputs(operation, LINEARIZED, vec![v, source]));
+        Ok(vec![Some(dv)])
+    }
+}
+
+/// `y = A(v)^-1 g`: `dy = A(v)^-1 (dg - 6 reaction int v dv y phi)`
+struct LinearizedSolve;
+
+impl Rule for LinearizedSolve {
+    fn jvp(
+        &self,
+        operation: &CustomOpIr,
+        tangents: &[Option<TensorIr>],
+        build: &mut Builder,
+    ) -> Result<Vec<Option<TensorIr>>, Error> {
+        let v = operation.inputs[0].clone();
+        let mut source = tangents[1].clone();
+        if let Some(dv) = &tangents[0] {
+            let y = build.primal(operation.clone());
+            let factor = -6.0 * host(operation.scalars[0].elem::<u64>()).reaction();
+            let inputs = vec![v.clone(), y, dv.clone()];
+            let moved = build.tangent(with_inputs(operation, PRODUCT, inputs));
+            let moved = build.scale(&moved, factor);
+            source = Some(match source {
+                Some(source) => build.add(&source, &moved),
+                None => moved,
+            });
+        }
+        let Some(source) = source else {
+            return Ok(vec![None]);
+        };
+        let dy = build.tangent(with_inputs(operation, LINEARIZED, vec![v, source]));
+        Ok(vec![Some(dy)])
+    }
+}
+
+fn register<B: BackendIr + FemOps>(registry: &mut CustomOpRegistry<B>) {
+    macro_rules! handler {
+        ($id:expr, $op:ident, $($input:literal)+) => {
+            registry.register($id, |handles, ir, _| {
+                let scheme = ir.scalars[0].elem::<u64>();
+                let y = B::$op($(handles.get_float_tensor::<B>(&ir.inputs[$input])),+, scheme);
+                handles.register_float_tensor::<B>(&ir.outputs[0].id, y);
+            });
+        };
+    }
+    handler!(MASS, fem_mass, 0);
+    handler!(HEAT, fem_heat_solve, 0);
+    handler!(PRODUCT, fem_product, 0 1 2);
+    handler!(IMPLICIT, fem_implicit_step, 0);
+    handler!(LINEARIZED, fem_linearized_solve, 0 1);
+}
+
+/// Everything [`linearize`] needs to differentiate and replay the operations of this crate.
+pub fn extensions() -> Extensions {
+    let mut extensions = Extensions::new();
+    extensions
+        .rule(MASS, Multilinear)
+        .rule(HEAT, Multilinear)
+        .rule(PRODUCT, Product)
+        .rule(IMPLICIT, ImplicitStep)
+        .rule(LINEARIZED, LinearizedSolve);
+    #[cfg(feature = "flex")]
+    extensions.on_flex(register);
+    #[cfg(feature = "ndarray")]
+    extensions.on_ndarray(register);
+    #[cfg(any(feature = "wgpu", feature = "cuda"))]
+    extensions.on_cube(register);
+    extensions
+}

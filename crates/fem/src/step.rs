@@ -1,0 +1,253 @@
+//! Finite-element steps of mean curvature flow as Burn graphs.
+
+use burn::backend::Dispatch;
+use burn::tensor::Tensor;
+use geometry::{Field, Grid};
+use linearize::Extensions;
+use operators::SpectralFilter;
+use solver::{Accuracy, MeanCurvatureStep};
+
+use crate::ops::{FemOps, Registered};
+use crate::{Error, LinearSolver, Scheme, Statistics, Tolerances};
+
+/// Which step of mean curvature flow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Implicit,
+    SemiImplicit,
+}
+
+/// A finite-element step of mean curvature flow: `v[u]` of Franken, Rumpf and Wirth's nested scheme.
+///
+/// Cheap to clone; clones share matrices and statistics. Tensors may live on any device: the work is done in `f64` on the
+/// host.
+///
+/// ```
+/// use fem::FiniteElementStep;
+/// use geometry::{Grid, measure, phase_field, shapes::Ball};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // A disc of radius 0.25 shrinks to sqrt(r^2 - 2 t) under mean curvature flow.
+/// let grid = Grid::<2>::per_unit(96, 1.0)?;
+/// let (eps, step) = (2.0 * grid.spacing(), grid.spacing().powi(2));
+/// let disc = phase_field(grid, &Ball::new([0.0, 0.0], 0.25)?, eps)?;
+/// let implicit = FiniteElementStep::implicit(&grid, eps, step)?;
+/// let mut u = disc.clone();
+/// for _ in 0..16 {
+///     u = implicit.step(&u)?;
+/// }
+/// let radius = f64::sqrt(0.25_f64.powi(2) - 2.0 * 16.0 * step);
+/// let exact = phase_field(grid, &Ball::new([0.0, 0.0], radius)?, eps)?;
+/// let error = measure::l2_distance(&u, &exact)?;
+/// assert!(error < 0.1 * measure::l2_distance(&disc, &exact)?);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone)]
+pub struct FiniteElementStep<const D: usize> {
+    kind: Kind,
+    grid: Grid<D>,
+    eps: f64,
+    step: f64,
+    scheme: Registered<D>,
+}
+
+impl<const D: usize> FiniteElementStep<D> {
+    /// The implicit step (eq:implicitMCF): the minimizer of `eps |u - v|^2 + 2 tautilde P_eps[v]`, by Newton's method.
+    ///
+    /// # Errors
+    /// As [`Scheme::new`].
+    pub fn implicit(grid: &Grid<D>, eps: f64, step: f64) -> Result<Self, Error> {
+        Self::new(Kind::Implicit, grid, eps, step, LinearSolver::default())
+    }
+
+    /// The implicit step with another solver for its linear systems.
+    ///
+    /// # Errors
+    /// As [`Scheme::new`].
+    pub fn implicit_with(
+        grid: &Grid<D>,
+        eps: f64,
+        step: f64,
+        solver: LinearSolver,
+    ) -> Result<Self, Error> {
+        Self::new(Kind::Implicit, grid, eps, step, solver)
+    }
+
+    /// The semi-implicit step `(v - u)/tautilde = lap v - Psi'(u)/(2 eps^2)`: one circulant system, solved exactly.
+    ///
+    /// # Errors
+    /// As [`Scheme::new`].
+    pub fn semi_implicit(grid: &Grid<D>, eps: f64, step: f64) -> Result<Self, Error> {
+        Self::new(Kind::SemiImplicit, grid, eps, step, LinearSolver::default())
+    }
+
+    fn new(
+        kind: Kind,
+        grid: &Grid<D>,
+        eps: f64,
+        step: f64,
+        solver: LinearSolver,
+    ) -> Result<Self, Error> {
+        let scheme = Scheme::new(grid.cells(), grid.spacing(), eps, step, solver)?;
+        Ok(Self {
+            kind,
+            grid: *grid,
+            eps,
+            step,
+            scheme: Registered::new(scheme),
+        })
+    }
+
+    /// The matrices and solvers.
+    pub fn scheme(&self) -> &Scheme<D> {
+        self.scheme.scheme()
+    }
+
+    /// Work of the inner solvers so far.
+    pub fn statistics(&self) -> Statistics {
+        self.scheme().statistics()
+    }
+
+    /// One step of mean curvature flow.
+    ///
+    /// # Errors
+    /// As [`Scheme::implicit_step`].
+    ///
+    /// # Panics
+    /// If `u` lives on another grid.
+    pub fn step(&self, u: &Field<D>) -> Result<Field<D>, Error> {
+        assert_eq!(
+            u.grid().cells(),
+            self.grid.cells(),
+            "the phase field lives on another grid than the scheme"
+        );
+        let scheme = self.scheme();
+        let values = match self.kind {
+            Kind::Implicit => scheme.implicit_step(u.values())?,
+            Kind::SemiImplicit => scheme.semi_implicit_step(u.values()),
+        };
+        Ok(Field::from_values(*u.grid(), values).expect("a step keeps the number of nodes"))
+    }
+
+    /// `w = eps / (2 tautilde^2) |v[u] - u|^2`, the approximate Willmore energy of a phase field, in the norm of the mass
+    /// matrix. With the implicit step it is the paper's `w_tautilde^eps`.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn willmore_energy(&self, u: &Field<D>) -> Result<f64, Error> {
+        let v = self.step(u)?;
+        let motion: Vec<f64> = v
+            .values()
+            .iter()
+            .zip(u.values())
+            .map(|(v, u)| v - u)
+            .collect();
+        let square: f64 = motion
+            .iter()
+            .zip(self.scheme().mass(&motion))
+            .map(|(a, b)| a * b)
+            .sum();
+        Ok(self.eps / (2.0 * self.step * self.step) * square * self.grid.cell_volume())
+    }
+
+    /// The derivative of the step at `u` in direction `p`, given `v = v[u]`, as a Burn graph: `A(v)^-1 M p` for the implicit
+    /// step.
+    pub fn derivative(&self, u: Tensor<D>, v: Tensor<D>, p: Tensor<D>) -> Tensor<D> {
+        match self.kind {
+            Kind::Implicit => self.linearized_tensor(v, self.mass_tensor(p)),
+            Kind::SemiImplicit => {
+                let r = self.scheme().reaction();
+                let cubic = self.product_tensor([u.clone(), u, p.clone()]);
+                self.heat_tensor(self.mass_tensor(p) * (1.0 + r) - cubic * (3.0 * r))
+            }
+        }
+    }
+
+    fn mass_tensor(&self, x: Tensor<D>) -> Tensor<D> {
+        let number = self.scheme.number();
+        Tensor::from_dispatch(<Dispatch as FemOps>::fem_mass(x.into_dispatch(), number))
+    }
+
+    fn implicit_tensor(&self, u: Tensor<D>) -> Tensor<D> {
+        let number = self.scheme.number();
+        Tensor::from_dispatch(<Dispatch as FemOps>::fem_implicit_step(
+            u.into_dispatch(),
+            number,
+        ))
+    }
+
+    fn linearized_tensor(&self, v: Tensor<D>, g: Tensor<D>) -> Tensor<D> {
+        let number = self.scheme.number();
+        Tensor::from_dispatch(<Dispatch as FemOps>::fem_linearized_solve(
+            v.into_dispatch(),
+            g.into_dispatch(),
+            number,
+        ))
+    }
+
+    fn product_tensor(&self, factors: [Tensor<D>; 3]) -> Tensor<D> {
+        let number = self.scheme.number();
+        let [a, b, c] = factors.map(Tensor::into_dispatch);
+        Tensor::from_dispatch(<Dispatch as FemOps>::fem_product(a, b, c, number))
+    }
+
+    fn heat_tensor(&self, x: Tensor<D>) -> Tensor<D> {
+        let number = self.scheme.number();
+        Tensor::from_dispatch(<Dispatch as FemOps>::fem_heat_solve(
+            x.into_dispatch(),
+            number,
+        ))
+    }
+
+    fn semi_implicit_tensor(&self, u: Tensor<D>) -> Tensor<D> {
+        let r = self.scheme().reaction();
+        let cubic = self.product_tensor([u.clone(), u.clone(), u.clone()]);
+        self.heat_tensor(self.mass_tensor(u) * (1.0 + r) - cubic * r)
+    }
+}
+
+impl<const D: usize> MeanCurvatureStep<D> for FiniteElementStep<D> {
+    fn apply(&self, u: Tensor<D>) -> Tensor<D> {
+        match self.kind {
+            Kind::Implicit => self.implicit_tensor(u),
+            Kind::SemiImplicit => self.semi_implicit_tensor(u),
+        }
+    }
+
+    fn mass(&self, x: Tensor<D>) -> Tensor<D> {
+        self.mass_tensor(x)
+    }
+
+    fn extensions(&self) -> Extensions {
+        crate::extensions()
+    }
+
+    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> SpectralFilter {
+        SpectralFilter::from_symbol(&[cells; D], |theta| {
+            let (mass, implicit, semi_implicit) = self.scheme().phase_symbols(theta);
+            let derivative = match self.kind {
+                Kind::Implicit => implicit,
+                Kind::SemiImplicit => semi_implicit,
+            };
+            1.0 / (mass * (1.0 + stiffness * (1.0 - derivative).powi(2)))
+        })
+    }
+
+    /// A product with the Hessian contains `c (J - 1)^T M (J - 1) p`; where `J` is near 1, errors of `J p` come out `c` times
+    /// larger than what the outer iteration looks at.
+    fn set_accuracy(&self, accuracy: &Accuracy) {
+        let amplification = 1.0 + accuracy.stiffness;
+        self.scheme().set_tolerances(Tolerances {
+            linear: (1e-2 * accuracy.cg_tolerance / amplification).clamp(1e-12, 1e-6),
+            newton: (1e-2 * accuracy.tolerance / amplification).clamp(1e-13, 1e-8),
+            ..self.scheme().tolerances()
+        });
+    }
+
+    fn failure(&self) -> Option<solver::StepFailure> {
+        self.scheme()
+            .take_failure()
+            .map(|error| Box::new(error) as solver::StepFailure)
+    }
+}
