@@ -3,6 +3,7 @@
 
 use std::f64::consts::PI;
 
+use fem::LinearSolver;
 use geometry::exact::{mean_curvature_radius, willmore_radius};
 use geometry::measure::l2_distance;
 use geometry::shapes::Ball;
@@ -10,12 +11,12 @@ use geometry::{Field, Grid, phase_field};
 use indicatif::ProgressBar;
 use model::Network;
 use operators::ComputeDevice;
-use report::LineStyle;
 use serde::{Deserialize, Serialize};
-use solver::{FlowParams, MeanCurvatureFlow, NewtonParams, StepRecord, WillmoreFlow};
+use solver::{FlowParams, NewtonParams, StepRecord};
 
 use crate::Error;
 use crate::harness::{in_parallel, workers};
+use crate::method::Method;
 use crate::networks::checksum;
 use crate::partial::Partial;
 
@@ -66,40 +67,6 @@ impl Flow {
         match self {
             Self::MeanCurvature => mean_curvature_radius(r, t, 2),
             Self::Willmore => willmore_radius(r, t, 2),
-        }
-    }
-}
-
-/// How mean curvature flow is approximated; a line style in figures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Method {
-    /// The learned operator.
-    Hybrid,
-}
-
-impl Method {
-    /// All methods, in the order of legends.
-    pub const ALL: [Self; 1] = [Self::Hybrid];
-
-    /// Name in files and metrics.
-    pub fn key(self) -> &'static str {
-        match self {
-            Self::Hybrid => "hybrid",
-        }
-    }
-
-    /// Name in legends.
-    pub fn label(self) -> &'static str {
-        match self {
-            Self::Hybrid => "learned operator",
-        }
-    }
-
-    /// Line style in figures.
-    pub fn style(self) -> LineStyle {
-        match self {
-            Self::Hybrid => LineStyle::Solid,
         }
     }
 }
@@ -157,8 +124,8 @@ pub struct Circle {
     pub params: FlowParams,
     /// Device and precision.
     pub device: String,
-    /// Checksum of the network.
-    pub network: String,
+    /// Checksum of the network, if the method has one.
+    pub network: Option<String>,
     /// Version of the program.
     pub version: &'static str,
 }
@@ -187,15 +154,16 @@ impl Circle {
 
     fn run(
         &self,
-        network: &Network,
+        network: Option<&Network>,
         device: &ComputeDevice,
         bar: &ProgressBar,
     ) -> Result<CircleResult, Error> {
         let failed = |source: solver::Error| Error::Run {
             run: format!(
-                "{} of the circle r = {:.4} at n = {}",
+                "{} of the circle r = {:.4} by {} at n = {}",
                 self.flow.title(),
                 self.radius,
+                self.method.label(),
                 self.cells_per_unit
             ),
             source,
@@ -215,8 +183,8 @@ impl Circle {
         match self.flow {
             Flow::MeanCurvature => {
                 let mut flow =
-                    MeanCurvatureFlow::with_network(network, &initial, &self.params, device)
-                        .map_err(failed)?;
+                    self.method
+                        .mean_curvature_flow(network, &initial, &self.params, device)?;
                 for k in 1..=self.steps {
                     flow.advance().map_err(failed)?;
                     errors.push(l2_distance(&flow.field().map_err(failed)?, &exact(k)?)?);
@@ -224,8 +192,10 @@ impl Circle {
                 }
             }
             Flow::Willmore => {
-                let mut flow = WillmoreFlow::with_network(network, &initial, self.params, device)
-                    .map_err(failed)?;
+                let linear = LinearSolver::default();
+                let mut flow =
+                    self.method
+                        .willmore_flow(network, &initial, self.params, linear, device)?;
                 for k in 1..=self.steps {
                     records.push(flow.advance(self.step).map_err(failed)?);
                     errors.push(l2_distance(&flow.field().map_err(failed)?, &exact(k)?)?);
@@ -265,7 +235,7 @@ impl Ensemble {
     pub fn run(
         (flow, method, n): (Flow, Method, usize),
         (count, steps): (usize, usize),
-        network: &Network,
+        network: Option<&Network>,
         device: &ComputeDevice,
         partial: &Partial,
         bar: &ProgressBar,
@@ -275,7 +245,7 @@ impl Ensemble {
             mcf_step: STEP,
             newton: NewtonParams::default(),
         };
-        let network_checksum = checksum(network);
+        let network_checksum = network.map(checksum);
         let circles: Vec<Circle> = radii(count)
             .into_iter()
             .enumerate()

@@ -26,6 +26,9 @@ pub enum Error {
         /// Why.
         source: solver::Error,
     },
+    /// From the finite elements.
+    #[error(transparent)]
+    Fem(#[from] fem::Error),
     /// From networks and training.
     #[error(transparent)]
     Model(#[from] model::Error),

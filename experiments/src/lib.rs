@@ -22,8 +22,11 @@
 //! - Results are collected in a fixed order: the same input gives the same bytes, wall times aside.
 
 pub mod circles;
+pub mod comparison;
 mod error;
+pub mod evolution;
 pub mod harness;
+pub mod method;
 pub mod networks;
 pub mod options;
 pub mod partial;

@@ -57,6 +57,19 @@ pub struct StepRecord {
     pub seconds: f64,
 }
 
+/// Where a flow is, for resuming it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FlowState<const D: usize> {
+    /// The phase field.
+    pub current: Field<D>,
+    /// The phase field one step ago and the size of that step: what the next step extrapolates.
+    pub previous: Option<(Field<D>, f64)>,
+    /// Steps done.
+    pub step: usize,
+    /// Time reached.
+    pub time: f64,
+}
+
 /// Willmore flow of a phase field by minimizing movements (def:minProblem).
 ///
 /// ```
@@ -159,6 +172,44 @@ impl<const D: usize> WillmoreFlow<D> {
     /// [`Error::Operators`] if the device fails.
     pub fn field(&self) -> Result<Field<D>, Error> {
         download(&self.grid, &self.current, &self.device)
+    }
+
+    /// Everything the following steps depend on: a flow [restored](Self::restore) from it continues with the same bytes.
+    ///
+    /// # Errors
+    /// [`Error::Operators`] if the device fails.
+    pub fn state(&self) -> Result<FlowState<D>, Error> {
+        let previous = match &self.previous {
+            Some((u, tau)) => Some((download(&self.grid, u, &self.device)?, *tau)),
+            None => None,
+        };
+        Ok(FlowState {
+            current: self.field()?,
+            previous,
+            step: self.step,
+            time: self.time,
+        })
+    }
+
+    /// Goes to a state of a flow with the same grid and parameters.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] for fields on another grid, [`Error::NonFinite`] for values that are not finite.
+    pub fn restore(&mut self, state: &FlowState<D>) -> Result<(), Error> {
+        let fitting = |field: &Field<D>| -> Result<Tensor<D>, Error> {
+            let field = Field::from_values(self.grid, field.values().to_vec())?;
+            upload(&field, &self.device)
+        };
+        let current = fitting(&state.current)?;
+        let previous = match &state.previous {
+            Some((u, tau)) => Some((fitting(u)?, *tau)),
+            None => None,
+        };
+        self.current = current;
+        self.previous = previous;
+        self.step = state.step;
+        self.time = state.time;
+        Ok(())
     }
 
     /// Time reached.

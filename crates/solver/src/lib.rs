@@ -66,6 +66,6 @@ mod profile;
 
 pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective, StepFailure};
 pub use error::Error;
-pub use flow::{FlowParams, MeanCurvatureFlow, StepRecord, WillmoreFlow};
+pub use flow::{FlowParams, FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow};
 pub use newton::{Exit, Method, NewtonInfo, NewtonParams, minimize};
 pub use profile::{extrapolate, retract};

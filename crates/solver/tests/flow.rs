@@ -206,6 +206,29 @@ fn steps_of_changing_size_share_one_trace() {
 }
 
 #[test]
+fn a_restored_flow_continues_with_the_same_bytes() {
+    let mut whole = flow(NewtonParams::default());
+    steps(&mut whole, 2);
+    let state = whole.state().unwrap();
+    let mut restored = flow(NewtonParams::default());
+    restored.restore(&state).unwrap();
+    assert_eq!((restored.steps(), restored.time()), (2, whole.time()));
+    let without_time = |mut records: Vec<StepRecord>| {
+        for record in &mut records {
+            record.seconds = 0.0;
+        }
+        records
+    };
+    let expected = without_time(steps(&mut whole, 2));
+    assert_eq!(without_time(steps(&mut restored, 2)), expected);
+    assert_eq!(restored.field().unwrap(), whole.field().unwrap());
+    let other = Grid::<2>::per_unit(128, 0.5).unwrap();
+    let mut foreign = state;
+    foreign.current = ball(other, RADIUS);
+    assert!(restored.restore(&foreign).is_err());
+}
+
+#[test]
 fn a_ball_stays_put() {
     let grid = Grid::<3>::per_unit(32, 1.0).unwrap();
     let start = ball(grid, 0.3);

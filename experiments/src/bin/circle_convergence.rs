@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::process::ExitCode;
 
 use clap::Parser;
-use experiments::circles::{self, Ensemble, Flow, Method};
+use experiments::circles::{self, Ensemble, Flow};
+use experiments::method::Method;
 use experiments::networks::{NetworkOptions, convergence_ratios};
 use experiments::options::RunOptions;
 use experiments::partial::Partial;
@@ -43,6 +44,10 @@ struct Options {
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     cells: Vec<usize>,
 
+    /// Methods, separated by commas [default: all for mean curvature flow, hybrid for Willmore flow; with --full all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
+    methods: Vec<Method>,
+
     /// Train the networks first, instead of loading them
     #[arg(long, conflicts_with = "network")]
     retrain: bool,
@@ -51,6 +56,7 @@ struct Options {
 #[derive(Serialize)]
 struct Parameters {
     cells: Vec<usize>,
+    runs: Vec<Run>,
     circles: usize,
     steps: usize,
     eps: f64,
@@ -58,6 +64,34 @@ struct Parameters {
     networks: BTreeMap<String, String>,
     retrained: bool,
     quick: bool,
+}
+
+/// One curve of the figures.
+#[derive(Serialize, Clone, Copy, Debug, PartialEq, Eq)]
+struct Run {
+    flow: Flow,
+    method: Method,
+    n: usize,
+}
+
+impl Run {
+    /// Fills in the default methods. Nested finite elements take hours; everything else together some minutes.
+    fn list(options: &Options, cells: &[usize]) -> Vec<Self> {
+        let mut runs = Vec::new();
+        for flow in Flow::ALL {
+            for method in Method::ALL {
+                let chosen = if options.methods.is_empty() {
+                    flow == Flow::MeanCurvature || method == Method::Hybrid || options.full
+                } else {
+                    options.methods.contains(&method)
+                };
+                if chosen {
+                    runs.extend(cells.iter().map(|&n| Self { flow, method, n }));
+                }
+            }
+        }
+        runs
+    }
 }
 
 fn main() -> ExitCode {
@@ -72,7 +106,15 @@ fn program(options: &Options) -> Result<(), Error> {
         (circles::COUNT, circles::STEPS)
     };
     let cells = resolutions(options);
-    let ratios = cells
+    let runs = Run::list(options, &cells);
+    let learned = runs.iter().any(|run| run.method.is_learned());
+    if !learned && (options.retrain || !options.networks.network.is_empty()) {
+        return Err(Error::Options(
+            "no run of these methods needs a network".to_owned(),
+        ));
+    }
+    let trained_for: &[usize] = if learned { &cells } else { &[] };
+    let ratios = trained_for
         .iter()
         .map(|&n| convergence_ratios(n))
         .collect::<Result<Vec<_>, _>>()?;
@@ -96,6 +138,7 @@ fn program(options: &Options) -> Result<(), Error> {
             .map(|(n, network)| (format!("n{n}"), experiments::networks::checksum(network)))
             .collect(),
         cells: cells.clone(),
+        runs: runs.clone(),
         circles: count,
         steps,
         eps: circles::EPS,
@@ -108,18 +151,17 @@ fn program(options: &Options) -> Result<(), Error> {
     let progress = options.run.progress();
     let clock = std::time::Instant::now();
     let mut ensembles = Vec::new();
-    for flow in Flow::ALL {
-        for (&n, network) in cells.iter().zip(&networks) {
-            let method = Method::Hybrid;
-            let title = format!("{}, n = {n}", flow.title());
-            let bar = progress.bar(title.clone(), (count * steps) as u64);
-            let ensemble = manifest.phase(title, || {
-                let what = (flow, method, n);
-                Ensemble::run(what, (count, steps), network, &device, &partial, &bar)
-            })?;
-            bar.finish();
-            ensembles.push(ensemble);
-        }
+    for &Run { flow, method, n } in &runs {
+        let network = (trained_for.iter().position(|&m| m == n)).map(|k| &networks[k]);
+        let title = format!("{}, {}, n = {n}", flow.title(), method.label());
+        let bar = progress.bar(title.clone(), (count * steps) as u64);
+        let ensemble = manifest.phase(title, || {
+            let what = (flow, method, n);
+            let network = network.filter(|_| method.is_learned());
+            Ensemble::run(what, (count, steps), network, &device, &partial, &bar)
+        })?;
+        bar.finish();
+        ensembles.push(ensemble);
     }
     let seconds = clock.elapsed().as_secs_f64();
 

@@ -27,7 +27,7 @@ enum Recipe {
     Lm,
     /// The paper's: Adam from a random start at n = 128, refined to n = 256 and 512
     Adam,
-    /// Both, with the learning curves side by side
+    /// Both, with the learning curves side by side; Adam only for the networks of the convergence tests
     Both,
 }
 
@@ -148,8 +148,12 @@ fn program(options: &Options) -> Result<(), Error> {
     }
     let mut by_adam = Vec::new();
     if options.recipe != Recipe::Lm {
+        let mut compared = specs.clone();
+        if options.recipe == Recipe::Both && options.only.is_empty() {
+            compared.retain(in_the_chain);
+        }
         by_adam = manifest.phase("Adam", || {
-            settings.progressively(&specs, &device, &checkpoints, &progress)
+            settings.progressively(&compared, &device, &checkpoints, &progress)
         })?;
         for trained in &by_adam {
             let name = format!("adam_{}", trained.spec.file_name());
@@ -214,6 +218,11 @@ fn chosen(only: &[String]) -> Result<Vec<NetworkSpec>, Error> {
     Ok(specs)
 }
 
+/// Whether a network belongs to the progressive refinement from n = 128 to n = 512.
+fn in_the_chain(spec: &NetworkSpec) -> bool {
+    spec.name != "inpainting"
+}
+
 struct Settings {
     lm: LmSettings,
     adam: AdamSettings,
@@ -231,16 +240,15 @@ impl Settings {
     ) -> Result<Vec<Trained>, Error> {
         let mut finished: Vec<Trained> = Vec::new();
         let mut settings = self.adam.clone();
-        let chain = |spec: &NetworkSpec| spec.name != "inpainting";
         let finest = chosen
             .iter()
-            .filter(|s| chain(s))
+            .filter(|s| in_the_chain(s))
             .map(|s| s.cells)
             .max()
             .unwrap_or(0);
         let stages = NetworkSpec::paper()
             .into_iter()
-            .filter(|spec| chain(spec) && spec.cells <= finest);
+            .filter(|spec| in_the_chain(spec) && spec.cells <= finest);
         for spec in stages {
             let start = finished.last().map(|coarse| &coarse.network);
             finished.push(training::adam(
@@ -254,7 +262,7 @@ impl Settings {
             settings.params.epochs = settings.params.epochs.div_ceil(4);
         }
         finished.retain(|trained| chosen.contains(&trained.spec));
-        for spec in chosen.iter().filter(|spec| !chain(spec)) {
+        for spec in chosen.iter().filter(|spec| !in_the_chain(spec)) {
             let settings = &self.adam;
             finished.push(training::adam(
                 spec,

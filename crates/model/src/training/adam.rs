@@ -32,8 +32,8 @@ impl Default for AdamParams {
         Self {
             epochs: 200,
             batch: 10,
-            learning_rate: 1e-3,
-            final_learning_rate: 1e-4,
+            learning_rate: 2e-2,
+            final_learning_rate: 1e-3,
             held_out: 10,
         }
     }
@@ -229,16 +229,22 @@ fn train_in<const D: usize, const R: usize>(
     Ok((kernel.to_vec(), activation, state))
 }
 
-/// The paper's start: kernel zero, activation parameters normal.
+/// The paper's start: kernel zero, activation parameters normal. It does not say how wide: weights and biases have standard
+/// deviation `1/sqrt(inputs of the layer)`, so that the Gaussian units begin neither flat nor saturated (with deviation 1 they
+/// saturate, and 2000 updates learn no more than a constant).
 pub fn paper_start(data: &SphereData, seed: u64) -> (Vec<f64>, Mlp) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let layers = crate::PAPER_LAYERS.to_vec();
-    let parameters = (0..crate::parameter_count(&layers))
-        .map(|_| {
+    let mut parameters = Vec::with_capacity(crate::parameter_count(&layers));
+    for pair in layers.windows(2) {
+        let [inputs, outputs] = [pair[0], pair[1]];
+        let deviation = 1.0 / (inputs as f64).sqrt();
+        parameters.extend((0..(inputs + 1) * outputs).map(|_| {
             // The sum of twelve uniform numbers is normal enough for a start.
-            (0..12).map(|_| rng.random_range(-0.5..0.5)).sum()
-        })
-        .collect();
+            let normal: f64 = (0..12).map(|_| rng.random_range(-0.5..0.5)).sum();
+            deviation * normal
+        }));
+    }
     let activation = Mlp::new(layers, parameters).expect("the paper's layers, finite numbers");
     (vec![0.0; data.ratios.kernel_len()], activation)
 }

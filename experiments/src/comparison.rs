@@ -1,0 +1,660 @@
+//! Shapes without a known solution: all methods and resolutions against a finer run.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use clap::Args;
+use geometry::contour::{Interpolation, zero_level};
+use geometry::shapes::Cross;
+use geometry::{Field, Grid, phase_field};
+use model::Network;
+use report::{
+    Axis, Colour, Column, Curve, Figure, Format, LegendEntry, LineChart, LineStyle, Manifest,
+    OutputDir, Series, Shapes, Summary, Table,
+};
+use serde::Serialize;
+use solver::{FlowParams, NewtonParams};
+
+use crate::Error;
+use crate::circles::{EPS, Flow, STEP};
+use crate::evolution::{Evolution, Trajectory};
+use crate::method::Method;
+use crate::networks::{NetworkOptions, convergence_ratios};
+use crate::options::RunOptions;
+
+/// The non-convex cross: arms of half length 0.8 and half width 0.27.
+///
+/// # Errors
+/// [`Error::Geometry`] never, for these numbers.
+pub fn cross(grid: Grid<2>, eps: f64) -> Result<Field<2>, Error> {
+    Ok(phase_field(grid, &Cross::new(0.8, 0.27)?, eps)?)
+}
+
+/// A shape and the flow it undergoes.
+pub struct Setting {
+    /// Name of the program and its folder.
+    pub program: &'static str,
+    /// Prefix of the metrics.
+    pub key: &'static str,
+    /// Title of the figures.
+    pub title: &'static str,
+    /// Name of the shape with its measures.
+    pub shape: &'static str,
+    /// Its phase field.
+    pub initial: fn(Grid<2>, f64) -> Result<Field<2>, Error>,
+    /// Which flow.
+    pub flow: Flow,
+    /// Side of the periodic box.
+    pub side: f64,
+    /// Time steps of `2^-14`.
+    pub steps: usize,
+    /// Steps whose shapes are drawn.
+    pub shown: &'static [usize],
+    /// Steps of the reference per step of the compared runs.
+    pub reference_ratio: usize,
+    /// Half the width of the window of the shapes.
+    pub window: f64,
+}
+
+/// Options of the comparisons.
+#[derive(Args, Clone, Debug)]
+pub struct ComparisonOptions {
+    /// Common options.
+    #[command(flatten)]
+    pub run: RunOptions,
+
+    /// Networks.
+    #[command(flatten)]
+    pub networks: NetworkOptions,
+
+    /// Cells per unit length, separated by commas [default: 128,256; with --full 128,256,512]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub cells: Vec<usize>,
+
+    /// Methods, separated by commas [default: all; nested finite elements from n = 256 on, where they are stable]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
+    pub methods: Vec<Method>,
+
+    /// Cells per unit length of the reference, implicit finite elements [default: twice the finest; paper: 2048]
+    #[arg(long, value_name = "N")]
+    pub reference_n: Option<usize>,
+
+    /// Add n = 512
+    #[arg(long, conflicts_with = "cells")]
+    pub full: bool,
+
+    /// Number of time steps [default: the paper's]
+    #[arg(long, value_name = "COUNT")]
+    pub steps: Option<usize>,
+}
+
+#[derive(Serialize)]
+struct Parameters<'a> {
+    shape: &'a str,
+    flow: Flow,
+    cells: &'a [usize],
+    reference_n: usize,
+    reference_steps_per_step: usize,
+    side: f64,
+    eps: f64,
+    time_step: f64,
+    steps: usize,
+    networks: BTreeMap<String, String>,
+    quick: bool,
+}
+
+#[derive(Serialize)]
+struct ErrorRow {
+    n: usize,
+    method: Method,
+    step: usize,
+    time: f64,
+    l2: f64,
+}
+
+#[derive(Serialize)]
+struct StepRow {
+    n: usize,
+    method: Method,
+    reference: bool,
+    step: usize,
+    time: f64,
+    perimeter: f64,
+    area: f64,
+    tip: Option<f64>,
+    diagonal: Option<f64>,
+    energy: Option<f64>,
+    energy_before: Option<f64>,
+    willmore_energy: Option<f64>,
+    exit: Option<solver::Exit>,
+    newton: Option<usize>,
+    hvp: Option<usize>,
+    negative_curvature: Option<usize>,
+    seconds: Option<f64>,
+}
+
+/// Everything a comparison computed.
+struct Comparison<'a> {
+    setting: &'a Setting,
+    options: &'a ComparisonOptions,
+    steps: usize,
+    cells: Vec<usize>,
+    runs: Vec<Trajectory>,
+    reference: Trajectory,
+    /// The reference at half its resolution, to estimate its error.
+    half: Option<Trajectory>,
+}
+
+/// Runs a comparison and writes everything.
+///
+/// # Errors
+/// Bad options before anything is written; what the runs raise.
+pub fn run(setting: &Setting, options: &ComparisonOptions) -> Result<(), Error> {
+    let cells = resolutions(options);
+    let finest = cells.iter().copied().max().unwrap_or(0);
+    let default = if options.run.quick {
+        finest
+    } else {
+        2 * finest
+    };
+    let reference_n = options.reference_n.unwrap_or(default);
+    for &n in &cells {
+        if !reference_n.is_multiple_of(n) {
+            return Err(Error::Options(format!(
+                "--reference-n {reference_n} must be a multiple of every n compared with it, also of {n}"
+            )));
+        }
+    }
+    let steps = options
+        .steps
+        .unwrap_or(if options.run.quick { 2 } else { setting.steps });
+    if steps == 0 {
+        return Err(Error::Options("--steps must be at least 1".to_owned()));
+    }
+    let device = options.run.open_device()?;
+    let plan = plan(setting, options, &cells, steps);
+    let learned: Vec<usize> = plan
+        .iter()
+        .filter(|e| e.method.is_learned())
+        .map(|e| e.n)
+        .collect();
+    let ratios = learned
+        .iter()
+        .map(|&n| convergence_ratios(n))
+        .collect::<Result<Vec<_>, _>>()?;
+    let networks = options.networks.find(&ratios)?;
+    let network_of = |n: usize| (learned.iter().position(|&m| m == n)).map(|k| &networks[k]);
+    let output = options.run.open_output(setting.program)?;
+    let parameters = Parameters {
+        shape: setting.shape,
+        flow: setting.flow,
+        cells: &cells,
+        reference_n,
+        reference_steps_per_step: setting.reference_ratio,
+        side: setting.side,
+        eps: EPS,
+        time_step: STEP,
+        steps,
+        networks: learned
+            .iter()
+            .zip(&networks)
+            .map(|(n, network)| (format!("n{n}"), crate::networks::checksum(network)))
+            .collect(),
+        quick: options.run.quick,
+    };
+    let mut manifest = options
+        .run
+        .manifest(setting.program, &parameters, &device)?;
+    let progress = options.run.progress();
+    let store = output.subfolder("fields")?;
+    let clock = Instant::now();
+    let execute = |manifest: &mut Manifest, evolution: &Evolution, what: &str| {
+        let title = format!("{what}{}, n = {}", evolution.method.label(), evolution.n);
+        let bar = progress.bar(title.clone(), evolution.steps as u64);
+        let network: Option<&Network> = network_of(evolution.n);
+        let trajectory = manifest.phase(title, || {
+            evolution.run(&setting.initial, network, &device, &store, &bar)
+        });
+        bar.finish();
+        trajectory
+    };
+    let runs = plan
+        .iter()
+        .map(|evolution| execute(&mut manifest, evolution, ""))
+        .collect::<Result<Vec<_>, _>>()?;
+    let fine = reference(setting, reference_n, steps);
+    let reference_run = execute(&mut manifest, &fine, "reference: ")?;
+    // The error of the reference is estimated from the same run at half the resolution.
+    let half = if reference_n.is_multiple_of(2) && finest <= reference_n / 2 {
+        let half = reference(setting, reference_n / 2, steps);
+        Some(execute(
+            &mut manifest,
+            &half,
+            "for the reference's error: ",
+        )?)
+    } else {
+        None
+    };
+    let comparison = Comparison {
+        setting,
+        options,
+        steps,
+        cells,
+        runs,
+        reference: reference_run,
+        half,
+    };
+    comparison.write(&output, clock.elapsed().as_secs_f64())?;
+    manifest.write(&output)?;
+    progress.clear();
+    options.run.say(&format!(
+        "{}\n{}\n{}\nResults are in {}",
+        options.run.title(setting.title),
+        comparison.table()?.to_markdown(),
+        comparison.about_the_reference()?,
+        output.as_path().display()
+    ));
+    Ok(())
+}
+
+fn resolutions(options: &ComparisonOptions) -> Vec<usize> {
+    let mut cells = if !options.cells.is_empty() {
+        options.cells.clone()
+    } else if options.run.quick {
+        vec![128]
+    } else if options.full {
+        vec![128, 256, 512]
+    } else {
+        vec![128, 256]
+    };
+    cells.sort_unstable();
+    cells.dedup();
+    cells
+}
+
+fn evolution(
+    setting: &Setting,
+    method: Method,
+    n: usize,
+    (steps, ratio): (usize, usize),
+) -> Evolution {
+    let tau = STEP / ratio as f64;
+    Evolution {
+        shape: setting.shape.to_owned(),
+        flow: setting.flow,
+        method,
+        n,
+        side: setting.side,
+        params: FlowParams {
+            eps: EPS,
+            mcf_step: if setting.flow == Flow::MeanCurvature {
+                tau
+            } else {
+                STEP
+            },
+            newton: NewtonParams::default(),
+        },
+        tau,
+        sample_every: 8 * ratio,
+        also_sample: [1, 2, 4].map(|k| k * ratio).to_vec(),
+        steps: steps * ratio,
+    }
+}
+
+fn plan(
+    setting: &Setting,
+    options: &ComparisonOptions,
+    cells: &[usize],
+    steps: usize,
+) -> Vec<Evolution> {
+    let mut runs = Vec::new();
+    for method in Method::ALL {
+        for &n in cells {
+            // Franken, Rumpf and Wirth: for eps = 2h the nested scheme is unstable.
+            let stable =
+                method.is_learned() || setting.flow == Flow::MeanCurvature || n as f64 * EPS >= 4.0;
+            let chosen = if options.methods.is_empty() {
+                stable
+            } else {
+                options.methods.contains(&method)
+            };
+            if chosen {
+                runs.push(evolution(setting, method, n, (steps, 1)));
+            }
+        }
+    }
+    runs
+}
+
+/// The paper's references are implicit finite elements.
+fn reference(setting: &Setting, n: usize, steps: usize) -> Evolution {
+    evolution(
+        setting,
+        Method::FeImplicit,
+        n,
+        (steps, setting.reference_ratio),
+    )
+}
+
+impl Comparison<'_> {
+    fn sampled(&self) -> Vec<usize> {
+        evolution(self.setting, Method::Hybrid, self.cells[0], (self.steps, 1)).sampled_steps()
+    }
+
+    fn shown(&self) -> Vec<usize> {
+        let sampled = self.sampled();
+        let mut shown: Vec<usize> = self.setting.shown.to_vec();
+        shown.retain(|k| sampled.contains(k));
+        if !shown.contains(&self.steps) {
+            shown.push(self.steps);
+        }
+        shown
+    }
+
+    fn time(step: usize) -> f64 {
+        step as f64 * STEP
+    }
+
+    fn is_reference_run(&self, run: &Trajectory) -> bool {
+        run.evolution == self.reference.evolution
+    }
+
+    fn errors(&self, run: &Trajectory) -> Result<Vec<(usize, f64)>, Error> {
+        self.sampled()
+            .into_iter()
+            .map(|k| Ok((k, run.distance(&self.reference, k)?)))
+            .collect()
+    }
+
+    /// Distance between the reference and the same method at half the resolution, at the end.
+    fn reference_difference(&self) -> Result<Option<f64>, Error> {
+        let Some(half) = &self.half else {
+            return Ok(None);
+        };
+        let step = half.evolution.steps;
+        Ok(Some(half.distance(&self.reference, step)?))
+    }
+
+    fn about_the_reference(&self) -> Result<String, Error> {
+        let n = self.reference.evolution.n;
+        let ratio = self.setting.reference_ratio;
+        let step = match self.setting.flow {
+            Flow::MeanCurvature if ratio > 1 => format!(", {ratio} steps for each"),
+            _ => String::new(),
+        };
+        let estimate = match self.reference_difference()? {
+            Some(distance) => format!(
+                "; it differs from n = {} by {distance:.1e} at the end, so its own error in h is about {:.0e}",
+                n / 2,
+                distance / 3.0
+            ),
+            None => String::new(),
+        };
+        Ok(format!(
+            "Reference: implicit finite elements, n = {n}{step}{estimate}."
+        ))
+    }
+
+    fn write(&self, output: &OutputDir, seconds: f64) -> Result<(), Error> {
+        self.error_figure()?.write(output, "errors")?;
+        self.shape_figure()?.write(output, "shapes")?;
+        self.table()?.write(output, "error_table")?;
+        self.summary(seconds)?.write(output)?;
+        let mut errors = Vec::new();
+        for run in &self.runs {
+            for (step, l2) in self.errors(run)? {
+                errors.push(ErrorRow {
+                    n: run.evolution.n,
+                    method: run.evolution.method,
+                    step,
+                    time: Self::time(step),
+                    l2,
+                });
+            }
+        }
+        output.write("errors.csv", report::data::to_csv(&errors)?)?;
+        output.write("errors.json", report::data::to_json(&errors)?)?;
+        let reference = std::iter::once(&self.reference).chain(&self.half);
+        let rows: Vec<StepRow> = self
+            .runs
+            .iter()
+            .flat_map(|run| step_rows(run, false))
+            .chain(reference.flat_map(|run| step_rows(run, true)))
+            .collect();
+        output.write("steps.csv", report::data::to_csv(&rows)?)?;
+        Ok(())
+    }
+
+    fn colour(&self, n: usize) -> usize {
+        self.cells.iter().position(|&c| c == n).unwrap_or(0)
+    }
+
+    fn error_figure(&self) -> Result<Figure, Error> {
+        let mut chart = LineChart::new("", Axis::linear("time t"), Axis::linear("L² error"));
+        for run in &self.runs {
+            if self.is_reference_run(run) {
+                continue;
+            }
+            let Evolution { n, method, .. } = run.evolution;
+            let points: Vec<[f64; 2]> = self
+                .errors(run)?
+                .into_iter()
+                .map(|(k, l2)| [Self::time(k), l2])
+                .collect();
+            let k = self.colour(n);
+            chart = chart.with_series(
+                Series::new(format!("{}, n = {n}", method.label()), points)
+                    .with_colour(k)
+                    .with_style(method.style())
+                    .with_width(1.8 + 1.2 * (self.cells.len() - 1 - k) as f64),
+            );
+        }
+        let methods = Method::ALL
+            .into_iter()
+            .filter(|m| self.runs.iter().any(|run| run.evolution.method == *m))
+            .map(|m| LegendEntry::line(m.label(), Colour::Black, m.style()));
+        let resolutions = self
+            .cells
+            .iter()
+            .map(|&n| LegendEntry::line(format!("n = {n}"), self.colour(n), LineStyle::Solid));
+        chart = chart.with_entries(methods).with_entries(resolutions);
+        let title = format!("{}: error over time", self.setting.title);
+        Ok(Figure::new(self.options.run.title(&title), 1)
+            .with_panel(chart)
+            .with_shared_legend()
+            .with_note(format!(
+                "ε = 2⁻⁶, time step 2⁻¹⁴. {}",
+                self.about_the_reference()?
+            )))
+    }
+
+    /// Rows: methods at their finest resolution, and the reference; columns: times.
+    fn shape_figure(&self) -> Result<Figure, Error> {
+        let shown = self.shown();
+        let mut rows: Vec<(&Trajectory, String)> = Vec::new();
+        for method in Method::ALL {
+            let finest = self
+                .runs
+                .iter()
+                .filter(|run| run.evolution.method == method && !self.is_reference_run(run))
+                .max_by_key(|run| run.evolution.n);
+            if let Some(run) = finest {
+                rows.push((run, format!("{}\nn = {}", method.label(), run.evolution.n)));
+            }
+        }
+        let reference = &self.reference;
+        rows.push((
+            reference,
+            format!("reference (FE)\nn = {}", reference.evolution.n),
+        ));
+        let window = [-self.setting.window, self.setting.window];
+        let title = format!("{}: shapes", self.setting.title);
+        let mut figure = Figure::new(self.options.run.title(&title), shown.len())
+            .with_column_labels(shown.iter().map(|&k| format!("t = {}", time_label(k))))
+            .with_row_labels(rows.iter().map(|(_, label)| label.clone()));
+        for (run, _) in &rows {
+            let ratio = (STEP / run.evolution.tau).round() as usize;
+            for &step in &shown {
+                let curves = zero_level(&run.field(step * ratio)?, Interpolation::Profile);
+                let loops: Vec<Vec<[f64; 2]>> =
+                    curves.into_iter().map(|curve| curve.points).collect();
+                figure = figure.with_panel(
+                    Shapes::new("")
+                        .with_curve(Curve::new(loops).filled(Colour::Grey))
+                        .with_window(window, window),
+                );
+            }
+        }
+        Ok(figure.with_note(self.about_the_reference()?))
+    }
+
+    fn table(&self) -> Result<Table, Error> {
+        let shown: Vec<usize> = self.shown().into_iter().filter(|k| *k > 0).collect();
+        let head = [
+            Column::text("method"),
+            Column::number("n", Format::Shortest),
+        ];
+        let errors = shown
+            .iter()
+            .map(|k| Column::number(format!("error, step {k}"), Format::Fixed(5)));
+        let tail = [
+            Column::number("HVP/step", Format::Fixed(1)),
+            Column::number("s/step", Format::Fixed(2)),
+        ];
+        let mut table = Table::new(head.into_iter().chain(errors).chain(tail));
+        for run in &self.runs {
+            let Evolution { n, method, .. } = run.evolution;
+            let reference = self.is_reference_run(run);
+            let errors = self.errors(run)?;
+            let errors = shown.iter().map(|k| {
+                let found = errors.iter().find(|(step, _)| step == k);
+                found.filter(|_| !reference).map(|(_, l2)| *l2).into()
+            });
+            let count = run.records.len() as f64;
+            let hvp = (count > 0.0)
+                .then(|| run.records.iter().map(|r| r.newton.hvp as f64).sum::<f64>() / count);
+            let seconds = run.seconds / run.evolution.steps as f64;
+            table.push(
+                [method.label().into(), n.into()]
+                    .into_iter()
+                    .chain(errors)
+                    .chain([hvp.into(), seconds.into()]),
+            )?;
+        }
+        Ok(table)
+    }
+
+    fn summary(&self, seconds: f64) -> Result<Summary, Error> {
+        let mut summary = Summary::new();
+        for run in &self.runs {
+            let Evolution { n, method, .. } = run.evolution;
+            let key = format!("{}.n{n}.{}", self.setting.key, method.key());
+            if !self.is_reference_run(run) {
+                for (step, l2) in self.errors(run)? {
+                    summary.insert(&format!("{key}.l2.step{step}"), l2)?;
+                }
+            }
+            for (step, m) in run.measures.iter().enumerate() {
+                summary.insert(&format!("{key}.area.step{step}"), m.area)?;
+                summary.insert(&format!("{key}.perimeter.step{step}"), m.perimeter)?;
+                for (what, value) in [("tip", m.tip), ("diagonal", m.diagonal)] {
+                    if let Some(value) = value {
+                        summary.insert(&format!("{key}.{what}.step{step}"), value)?;
+                    }
+                }
+            }
+            for r in &run.records {
+                summary.insert(&format!("{key}.energy.step{}", r.step), r.energy)?;
+            }
+            let count = run.records.len();
+            if count > 0 {
+                let mean = |f: &dyn Fn(&solver::StepRecord) -> usize| {
+                    run.records.iter().map(|r| f(r) as f64).sum::<f64>() / count as f64
+                };
+                summary.insert(&format!("{key}.hvp_per_step"), mean(&|r| r.newton.hvp))?;
+                summary.insert(
+                    &format!("{key}.newton_per_step"),
+                    mean(&|r| r.newton.newton),
+                )?;
+                let rises = run.records.iter().filter(|r| r.energy >= r.energy_before);
+                summary.insert_count(&format!("{key}.energy_increases"), rises.count())?;
+            }
+            summary.insert(&format!("{key}.seconds"), run.seconds)?;
+        }
+        let key = format!("{}.reference", self.setting.key);
+        summary.insert_count(&format!("{key}.n"), self.reference.evolution.n)?;
+        summary.insert(&format!("{key}.seconds"), self.reference.seconds)?;
+        if let Some(distance) = self.reference_difference()? {
+            summary.insert(&format!("{key}.l2_to_half_n"), distance)?;
+        }
+        summary.insert("seconds", seconds)?;
+        Ok(summary)
+    }
+}
+
+fn step_rows(run: &Trajectory, reference: bool) -> Vec<StepRow> {
+    let e = &run.evolution;
+    run.measures
+        .iter()
+        .enumerate()
+        .map(|(step, m)| {
+            let record = step.checked_sub(1).and_then(|k| run.records.get(k));
+            StepRow {
+                n: e.n,
+                method: e.method,
+                reference,
+                step,
+                time: step as f64 * e.tau,
+                perimeter: m.perimeter,
+                area: m.area,
+                tip: m.tip,
+                diagonal: m.diagonal,
+                energy: record.map(|r| r.energy),
+                energy_before: record.map(|r| r.energy_before),
+                willmore_energy: record.map(|r| r.willmore_energy),
+                exit: record.map(|r| r.newton.exit),
+                newton: record.map(|r| r.newton.newton),
+                hvp: record.map(|r| r.newton.hvp),
+                negative_curvature: record.map(|r| r.newton.negative_curvature),
+                seconds: record.map(|r| r.seconds),
+            }
+        })
+        .collect()
+}
+
+/// A multiple of `2^-14` as the paper writes it: `0`, `2⁻⁹`, `3·2⁻⁹`.
+fn time_label(step: usize) -> String {
+    if step == 0 {
+        return "0".to_owned();
+    }
+    let power = step.trailing_zeros();
+    let superscript: String = (14 - i64::from(power))
+        .to_string()
+        .chars()
+        .filter_map(|c| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(c.to_digit(10)? as usize))
+        .collect();
+    match step >> power {
+        1 => format!("2⁻{superscript}"),
+        factor => format!("{factor}·2⁻{superscript}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_written_as_in_the_paper() {
+        let labels: Vec<String> = [0, 1, 32, 64, 96, 128].map(time_label).into();
+        assert_eq!(labels, ["0", "2⁻¹⁴", "2⁻⁹", "2⁻⁸", "3·2⁻⁹", "2⁻⁷"]);
+    }
+
+    #[test]
+    fn the_cross_is_the_documented_one() {
+        let grid = Grid::<2>::per_unit(64, 2.0).unwrap();
+        let field = cross(grid, EPS).unwrap();
+        let area = geometry::measure::zero_set_volume(&field);
+        let exact = 2.0 * 1.6 * 0.54 - 0.54 * 0.54;
+        assert!((area - exact).abs() < 2e-3, "{area} {exact}");
+    }
+}

@@ -1,0 +1,415 @@
+//! One shape evolving by one method, kept on disk sample by sample, so that it can be compared with any other run.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use fem::LinearSolver;
+use geometry::contour::ray_crossing;
+use geometry::measure::{perimeter, zero_set_volume};
+use geometry::{Field, Grid, npy};
+use indicatif::ProgressBar;
+use model::Network;
+use operators::ComputeDevice;
+use report::OutputDir;
+use serde::{Deserialize, Serialize};
+use solver::{FlowParams, FlowState, StepRecord};
+
+use crate::Error;
+use crate::circles::Flow;
+use crate::method::Method;
+use crate::networks::checksum;
+
+/// Least time between two checkpoints of a run.
+const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
+
+/// A run, with everything its result depends on.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Evolution {
+    /// Name of the initial shape with its measures.
+    pub shape: String,
+    /// Which flow.
+    pub flow: Flow,
+    /// Which method.
+    pub method: Method,
+    /// Cells per unit length.
+    pub n: usize,
+    /// Side of the periodic box, centred at the origin.
+    pub side: f64,
+    /// Scales and settings.
+    pub params: FlowParams,
+    /// Size of an (outer) time step.
+    pub tau: f64,
+    /// Steps between two samples.
+    pub sample_every: usize,
+    /// Further steps to sample.
+    pub also_sample: Vec<usize>,
+    /// Number of steps.
+    pub steps: usize,
+}
+
+/// What else the result depends on.
+#[derive(Serialize)]
+struct Key<'a> {
+    evolution: &'a Evolution,
+    device: String,
+    network: Option<String>,
+    version: &'static str,
+}
+
+/// Index of a stored run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Stored {
+    key: serde_json::Value,
+    records: Vec<StepRecord>,
+    measures: Vec<Measures>,
+    seconds: f64,
+    checkpoint: Option<Checkpoint>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Checkpoint {
+    step: usize,
+    time: f64,
+    previous_tau: Option<f64>,
+}
+
+/// Measures of a shape around the origin.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Measures {
+    /// Perimeter `P_eps`.
+    pub perimeter: f64,
+    /// Area of `{u > 0}`.
+    pub area: f64,
+    /// Distance from the origin to the zero crossing on the positive x axis.
+    pub tip: Option<f64>,
+    /// Distance from the origin to the zero crossing on the diagonal `x = y > 0`.
+    pub diagonal: Option<f64>,
+}
+
+impl Measures {
+    fn of(field: &Field<2>, eps: f64) -> Result<Self, Error> {
+        let along = |direction| ray_crossing(field, [0.0, 0.0], direction);
+        Ok(Self {
+            perimeter: perimeter(field, eps)?,
+            area: zero_set_volume(field),
+            tip: along([1.0, 0.0])?,
+            diagonal: along([1.0, 1.0])?,
+        })
+    }
+}
+
+/// A finished run.
+pub struct Trajectory {
+    /// What was run.
+    pub evolution: Evolution,
+    /// Records of the steps of Willmore flow; empty for mean curvature flow.
+    pub records: Vec<StepRecord>,
+    /// Measures of the shape after every step, the initial ones first.
+    pub measures: Vec<Measures>,
+    /// Wall time of all steps, interruptions left out.
+    pub seconds: f64,
+    grid: Grid<2>,
+    folder: OutputDir,
+}
+
+impl Evolution {
+    /// Name of the run's folder.
+    pub fn name(&self) -> String {
+        format!(
+            "{}-{}-n{}-t{:.4}",
+            self.flow.key(),
+            self.method.key(),
+            self.n,
+            -self.tau.log2()
+        )
+    }
+
+    /// The grid.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] if the side is no multiple of `1/n`.
+    pub fn grid(&self) -> Result<Grid<2>, Error> {
+        Ok(Grid::per_unit(self.n, self.side)?)
+    }
+
+    /// Whether the phase field after `step` steps is kept.
+    pub fn samples(&self, step: usize) -> bool {
+        step.is_multiple_of(self.sample_every)
+            || step == self.steps
+            || self.also_sample.contains(&step)
+    }
+
+    /// The steps whose phase fields are kept.
+    pub fn sampled_steps(&self) -> Vec<usize> {
+        (0..=self.steps).filter(|&k| self.samples(k)).collect()
+    }
+
+    /// Runs, or continues, or only looks up what is stored in `store`.
+    ///
+    /// # Errors
+    /// What the flow raises, and [`Error::Report`] or [`Error::Geometry`] if something cannot be stored.
+    pub fn run(
+        &self,
+        initial: &dyn Fn(Grid<2>, f64) -> Result<Field<2>, Error>,
+        network: Option<&Network>,
+        device: &ComputeDevice,
+        store: &OutputDir,
+        bar: &ProgressBar,
+    ) -> Result<Trajectory, Error> {
+        let folder = store.subfolder(&self.name())?;
+        let key = serde_json::to_string(&Key {
+            evolution: self,
+            device: format!("{} {:?}", device.kind(), device.dtype()),
+            network: network.filter(|_| self.method.is_learned()).map(checksum),
+            version: env!("CARGO_PKG_VERSION"),
+        })
+        .and_then(|text| serde_json::from_str::<serde_json::Value>(&text))
+        .map_err(|error| Error::Options(format!("a run cannot be described: {error}")))?;
+        let grid = self.grid()?;
+        let mut trajectory = Trajectory {
+            evolution: self.clone(),
+            records: Vec::new(),
+            measures: Vec::new(),
+            seconds: 0.0,
+            grid,
+            folder,
+        };
+        let mut stored = trajectory.stored().filter(|stored| stored.key == key);
+        let state = stored
+            .as_ref()
+            .and_then(|s| trajectory.checkpoint(s.checkpoint?).ok());
+        if state.is_none() {
+            stored = None;
+        }
+        let mut stored = stored.unwrap_or_else(|| Stored {
+            key,
+            ..Stored::default()
+        });
+        let state = match state {
+            Some(state) => state,
+            None => {
+                let field = initial(grid, self.params.eps)?;
+                stored.measures.push(Measures::of(&field, self.params.eps)?);
+                trajectory.keep(0, &field)?;
+                FlowState {
+                    current: field,
+                    previous: None,
+                    step: 0,
+                    time: 0.0,
+                }
+            }
+        };
+        bar.set_position(state.step as u64);
+        if state.step < self.steps {
+            match self.flow {
+                Flow::Willmore => {
+                    self.willmore(&mut trajectory, &mut stored, state, network, device, bar)
+                }
+                Flow::MeanCurvature => {
+                    self.mean_curvature(&mut trajectory, &mut stored, &state, network, device, bar)
+                }
+            }?;
+        }
+        trajectory.records = stored.records;
+        trajectory.measures = stored.measures;
+        trajectory.seconds = stored.seconds;
+        Ok(trajectory)
+    }
+
+    fn failed(&self, source: Error) -> Error {
+        let Error::Solver(source) = source else {
+            return source;
+        };
+        Error::Run {
+            run: format!(
+                "{} of the {} by {} at n = {}",
+                self.flow.title(),
+                self.shape,
+                self.method.label(),
+                self.n
+            ),
+            source,
+        }
+    }
+
+    fn willmore(
+        &self,
+        trajectory: &mut Trajectory,
+        stored: &mut Stored,
+        state: FlowState<2>,
+        network: Option<&Network>,
+        device: &ComputeDevice,
+        bar: &ProgressBar,
+    ) -> Result<(), Error> {
+        let linear = LinearSolver::default();
+        let mut flow =
+            self.method
+                .willmore_flow(network, &state.current, self.params, linear, device)?;
+        flow.restore(&state)?;
+        let mut last = Instant::now();
+        while flow.steps() < self.steps {
+            let record = flow
+                .advance(self.tau)
+                .map_err(|error| self.failed(error.into()))?;
+            stored.seconds += record.seconds;
+            stored.records.push(record);
+            let step = flow.steps();
+            let field = flow.field()?;
+            stored.measures.push(Measures::of(&field, self.params.eps)?);
+            if self.samples(step) {
+                trajectory.keep(step, &field)?;
+            }
+            bar.inc(1);
+            if step == self.steps || last.elapsed() >= CHECKPOINT_INTERVAL {
+                trajectory.store(stored, &flow.state()?)?;
+                last = Instant::now();
+            }
+        }
+        Ok(())
+    }
+
+    fn mean_curvature(
+        &self,
+        trajectory: &mut Trajectory,
+        stored: &mut Stored,
+        state: &FlowState<2>,
+        network: Option<&Network>,
+        device: &ComputeDevice,
+        bar: &ProgressBar,
+    ) -> Result<(), Error> {
+        let mut flow =
+            self.method
+                .mean_curvature_flow(network, &state.current, &self.params, device)?;
+        let mut last = Instant::now();
+        for step in state.step + 1..=self.steps {
+            let clock = Instant::now();
+            flow.advance().map_err(|error| self.failed(error.into()))?;
+            let field = flow.field().map_err(|error| self.failed(error.into()))?;
+            stored.seconds += clock.elapsed().as_secs_f64();
+            stored.measures.push(Measures::of(&field, self.params.eps)?);
+            if self.samples(step) {
+                trajectory.keep(step, &field)?;
+            }
+            bar.inc(1);
+            if step == self.steps || last.elapsed() >= CHECKPOINT_INTERVAL {
+                let state = FlowState {
+                    current: field,
+                    previous: None,
+                    step,
+                    time: step as f64 * self.tau,
+                };
+                trajectory.store(stored, &state)?;
+                last = Instant::now();
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Trajectory {
+    /// The phase field after `step` steps, which must be a sampled one.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] if it is not there.
+    pub fn field(&self, step: usize) -> Result<Field<2>, Error> {
+        self.read(&sample_name(step))
+    }
+
+    /// `L2` distance to a run at a multiple of the resolution (and of the time resolution) at the same time, in the nodes of
+    /// this grid: the finer phase field is sampled there.
+    ///
+    /// # Errors
+    /// [`Error::Options`] if the nodes of this grid are not among those of the other.
+    pub fn distance(&self, reference: &Self, step: usize) -> Result<f64, Error> {
+        let (own, other) = (&self.evolution, &reference.evolution);
+        let ratio = own.tau / other.tau;
+        let there = (step as f64 * ratio).round() as usize;
+        if !other.n.is_multiple_of(own.n) || own.side.to_bits() != other.side.to_bits() {
+            return Err(Error::Options(format!(
+                "a run at n = {} cannot be compared with a reference at n = {}: the latter must be a multiple",
+                own.n, other.n
+            )));
+        }
+        let fine = reference.field(there)?;
+        let stride = other.n / own.n;
+        let (n, cells) = (self.grid.cells(), fine.grid().cells());
+        let sampled =
+            (0..n * n).map(|i| fine.values()[(i / n) * stride * cells + (i % n) * stride]);
+        let sampled = Field::from_values(self.grid, sampled.collect())?;
+        Ok(geometry::measure::l2_distance(
+            &self.field(step)?,
+            &sampled,
+        )?)
+    }
+
+    fn path(&self, name: &str) -> Result<PathBuf, Error> {
+        Ok(self.folder.path(&format!("{name}.npy"))?)
+    }
+
+    fn read(&self, name: &str) -> Result<Field<2>, Error> {
+        let grid = self.grid;
+        Ok(npy::read(self.path(name)?, |_| Ok(grid))?)
+    }
+
+    fn keep(&self, step: usize, field: &Field<2>) -> Result<(), Error> {
+        Ok(npy::write(self.path(&sample_name(step))?, field)?)
+    }
+
+    fn stored(&self) -> Option<Stored> {
+        let path = self.folder.path("run.json").ok()?;
+        serde_json::from_slice(&std::fs::read(path).ok()?).ok()
+    }
+
+    fn checkpoint(&self, checkpoint: Checkpoint) -> Result<FlowState<2>, Error> {
+        let Checkpoint {
+            step,
+            time,
+            previous_tau,
+        } = checkpoint;
+        let previous = match previous_tau {
+            Some(tau) => Some((self.read(&checkpoint_name(step, "previous"))?, tau)),
+            None => None,
+        };
+        Ok(FlowState {
+            current: self.read(&checkpoint_name(step, "current"))?,
+            previous,
+            step,
+            time,
+        })
+    }
+
+    /// Writes the fields of a checkpoint, then the index that names them, then removes the fields of the one before.
+    fn store(&self, stored: &mut Stored, state: &FlowState<2>) -> Result<(), Error> {
+        let old = stored.checkpoint;
+        let current = self.path(&checkpoint_name(state.step, "current"))?;
+        npy::write(current, &state.current)?;
+        if let Some((previous, _)) = &state.previous {
+            npy::write(
+                self.path(&checkpoint_name(state.step, "previous"))?,
+                previous,
+            )?;
+        }
+        stored.checkpoint = Some(Checkpoint {
+            step: state.step,
+            time: state.time,
+            previous_tau: state.previous.as_ref().map(|(_, tau)| *tau),
+        });
+        self.folder
+            .write("run.json", report::data::to_json(stored)?)?;
+        for old in old.iter().filter(|old| old.step != state.step) {
+            for which in ["current", "previous"] {
+                // A file that is not there needs no removal.
+                let _ = std::fs::remove_file(self.path(&checkpoint_name(old.step, which))?);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn sample_name(step: usize) -> String {
+    format!("step_{step:05}")
+}
+
+fn checkpoint_name(step: usize, which: &str) -> String {
+    format!("checkpoint_{step:05}_{which}")
+}

@@ -1,0 +1,127 @@
+//! The methods that the paper compares: one step of mean curvature flow each, alone or inside the Willmore scheme.
+
+use clap::ValueEnum;
+use fem::{FiniteElementStep, LinearSolver};
+use geometry::{Field, Grid};
+use model::Network;
+use operators::ComputeDevice;
+use report::LineStyle;
+use serde::{Deserialize, Serialize};
+use solver::{FlowParams, MeanCurvatureFlow, WillmoreFlow};
+
+use crate::Error;
+
+/// How mean curvature flow is approximated; a line style in figures.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[value(rename_all = "snake_case")]
+pub enum Method {
+    /// The learned operator
+    Hybrid,
+    /// Implicit finite elements (Franken, Rumpf and Wirth)
+    FeImplicit,
+    /// Semi-implicit finite elements
+    FeSemi,
+}
+
+impl Method {
+    /// All methods, in the order of legends.
+    pub const ALL: [Self; 3] = [Self::Hybrid, Self::FeImplicit, Self::FeSemi];
+
+    /// Name in files and metrics.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Hybrid => "hybrid",
+            Self::FeImplicit => "fe_implicit",
+            Self::FeSemi => "fe_semi",
+        }
+    }
+
+    /// Name in legends.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Hybrid => "learned operator",
+            Self::FeImplicit => "FE implicit",
+            Self::FeSemi => "FE semi-implicit",
+        }
+    }
+
+    /// Line style in figures, as in the paper.
+    pub fn style(self) -> LineStyle {
+        match self {
+            Self::Hybrid => LineStyle::Solid,
+            Self::FeImplicit => LineStyle::Dashed,
+            Self::FeSemi => LineStyle::Dotted,
+        }
+    }
+
+    /// Whether the method needs a trained network.
+    pub fn is_learned(self) -> bool {
+        self == Self::Hybrid
+    }
+
+    /// The finite-element step of a grid.
+    fn elements<const D: usize>(
+        self,
+        grid: &Grid<D>,
+        params: &FlowParams,
+        linear: LinearSolver,
+    ) -> Result<FiniteElementStep<D>, Error> {
+        let (eps, step) = (params.eps, params.mcf_step);
+        Ok(match self {
+            Self::FeSemi => FiniteElementStep::semi_implicit(grid, eps, step)?,
+            Self::FeImplicit | Self::Hybrid => {
+                FiniteElementStep::implicit_with(grid, eps, step, linear)?
+            }
+        })
+    }
+
+    /// Mean curvature flow by this method with time step `params.mcf_step`.
+    ///
+    /// # Errors
+    /// [`Error::Options`] if the learned operator is asked for without a network; what the flow raises.
+    pub fn mean_curvature_flow<const D: usize>(
+        self,
+        network: Option<&Network>,
+        initial: &Field<D>,
+        params: &FlowParams,
+        device: &ComputeDevice,
+    ) -> Result<MeanCurvatureFlow<D>, Error> {
+        Ok(match self {
+            Self::Hybrid => {
+                MeanCurvatureFlow::with_network(needed(network)?, initial, params, device)?
+            }
+            Self::FeImplicit | Self::FeSemi => {
+                let step = self.elements(initial.grid(), params, LinearSolver::default())?;
+                MeanCurvatureFlow::new(step, initial, device)?
+            }
+        })
+    }
+
+    /// Willmore flow with this method inside.
+    ///
+    /// # Errors
+    /// As [`Self::mean_curvature_flow`].
+    pub fn willmore_flow<const D: usize>(
+        self,
+        network: Option<&Network>,
+        initial: &Field<D>,
+        params: FlowParams,
+        linear: LinearSolver,
+        device: &ComputeDevice,
+    ) -> Result<WillmoreFlow<D>, Error> {
+        Ok(match self {
+            Self::Hybrid => WillmoreFlow::with_network(needed(network)?, initial, params, device)?,
+            Self::FeImplicit | Self::FeSemi => {
+                let step = self.elements(initial.grid(), &params, linear)?;
+                WillmoreFlow::new(step, initial, params, device)?
+            }
+        })
+    }
+}
+
+fn needed(network: Option<&Network>) -> Result<&Network, Error> {
+    network.ok_or_else(|| {
+        Error::Options("the learned operator needs a network with the ratios of the run".to_owned())
+    })
+}
