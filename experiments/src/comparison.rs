@@ -298,6 +298,7 @@ fn evolution(
         sample_every: 8 * ratio,
         also_sample: [1, 2, 4].map(|k| k * ratio).to_vec(),
         steps: steps * ratio,
+        pause_after: None,
     }
 }
 
@@ -479,33 +480,43 @@ impl Comparison<'_> {
                 .filter(|run| run.evolution.method == method && !self.is_reference_run(run))
                 .max_by_key(|run| run.evolution.n);
             if let Some(run) = finest {
-                rows.push((run, format!("{}\nn = {}", method.label(), run.evolution.n)));
+                rows.push((run, format!("{}, n = {}", method.label(), run.evolution.n)));
             }
         }
         let reference = &self.reference;
         rows.push((
             reference,
-            format!("reference (FE)\nn = {}", reference.evolution.n),
+            format!("reference, n = {}", reference.evolution.n),
         ));
         let window = [-self.setting.window, self.setting.window];
         let title = format!("{}: shapes", self.setting.title);
         let mut figure = Figure::new(self.options.run.title(&title), shown.len())
             .with_column_labels(shown.iter().map(|&k| format!("t = {}", time_label(k))))
             .with_row_labels(rows.iter().map(|(_, label)| label.clone()));
-        for (run, _) in &rows {
+        let loops = |run: &Trajectory, step: usize| -> Result<Vec<Vec<[f64; 2]>>, Error> {
             let ratio = (STEP / run.evolution.tau).round() as usize;
+            let curves = zero_level(&run.field(step * ratio)?, Interpolation::Profile);
+            Ok(curves.into_iter().map(|curve| curve.points).collect())
+        };
+        for (run, _) in &rows {
             for &step in &shown {
-                let curves = zero_level(&run.field(step * ratio)?, Interpolation::Profile);
-                let loops: Vec<Vec<[f64; 2]>> =
-                    curves.into_iter().map(|curve| curve.points).collect();
-                figure = figure.with_panel(
-                    Shapes::new("")
-                        .with_curve(Curve::new(loops).filled(Colour::Grey))
-                        .with_window(window, window),
-                );
+                let curve = Curve::new(loops(run, step)?).filled(Colour::LightGrey);
+                let mut panel = Shapes::new("")
+                    .with_curve(curve)
+                    .with_window(window, window);
+                if !self.is_reference_run(run) {
+                    let reference = Curve::new(loops(reference, step)?)
+                        .with_colour(1)
+                        .with_width(1.0);
+                    panel = panel.with_curve(reference);
+                }
+                figure = figure.with_panel(panel);
             }
         }
-        Ok(figure.with_note(self.about_the_reference()?))
+        Ok(figure.with_note(format!(
+            "Orange: the reference. {}",
+            self.about_the_reference()?
+        )))
     }
 
     fn table(&self) -> Result<Table, Error> {

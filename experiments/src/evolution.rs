@@ -20,7 +20,7 @@ use crate::method::Method;
 use crate::networks::checksum;
 
 /// Least time between two checkpoints of a run.
-const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
+const CHECKPOINT_INTERVAL: Duration = Duration::from_mins(1);
 
 /// A run, with everything its result depends on.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -45,6 +45,9 @@ pub struct Evolution {
     pub also_sample: Vec<usize>,
     /// Number of steps.
     pub steps: usize,
+    /// Pause after this many steps, with a checkpoint. Does not change the result of the run that continues.
+    #[serde(skip)]
+    pub pause_after: Option<usize>,
 }
 
 /// What else the result depends on.
@@ -132,6 +135,11 @@ impl Evolution {
         Ok(Grid::per_unit(self.n, self.side)?)
     }
 
+    /// The last step before the end or the pause.
+    fn last(&self) -> usize {
+        self.pause_after.unwrap_or(self.steps).min(self.steps)
+    }
+
     /// Whether the phase field after `step` steps is kept.
     pub fn samples(&self, step: usize) -> bool {
         step.is_multiple_of(self.sample_every)
@@ -200,10 +208,10 @@ impl Evolution {
             }
         };
         bar.set_position(state.step as u64);
-        if state.step < self.steps {
+        if state.step < self.last() {
             match self.flow {
                 Flow::Willmore => {
-                    self.willmore(&mut trajectory, &mut stored, state, network, device, bar)
+                    self.willmore(&mut trajectory, &mut stored, &state, network, device, bar)
                 }
                 Flow::MeanCurvature => {
                     self.mean_curvature(&mut trajectory, &mut stored, &state, network, device, bar)
@@ -236,7 +244,7 @@ impl Evolution {
         &self,
         trajectory: &mut Trajectory,
         stored: &mut Stored,
-        state: FlowState<2>,
+        state: &FlowState<2>,
         network: Option<&Network>,
         device: &ComputeDevice,
         bar: &ProgressBar,
@@ -245,9 +253,9 @@ impl Evolution {
         let mut flow =
             self.method
                 .willmore_flow(network, &state.current, self.params, linear, device)?;
-        flow.restore(&state)?;
+        flow.restore(state)?;
         let mut last = Instant::now();
-        while flow.steps() < self.steps {
+        while flow.steps() < self.last() {
             let record = flow
                 .advance(self.tau)
                 .map_err(|error| self.failed(error.into()))?;
@@ -260,7 +268,7 @@ impl Evolution {
                 trajectory.keep(step, &field)?;
             }
             bar.inc(1);
-            if step == self.steps || last.elapsed() >= CHECKPOINT_INTERVAL {
+            if step == self.last() || last.elapsed() >= CHECKPOINT_INTERVAL {
                 trajectory.store(stored, &flow.state()?)?;
                 last = Instant::now();
             }
@@ -281,7 +289,7 @@ impl Evolution {
             self.method
                 .mean_curvature_flow(network, &state.current, &self.params, device)?;
         let mut last = Instant::now();
-        for step in state.step + 1..=self.steps {
+        for step in state.step + 1..=self.last() {
             let clock = Instant::now();
             flow.advance().map_err(|error| self.failed(error.into()))?;
             let field = flow.field().map_err(|error| self.failed(error.into()))?;
@@ -291,7 +299,7 @@ impl Evolution {
                 trajectory.keep(step, &field)?;
             }
             bar.inc(1);
-            if step == self.steps || last.elapsed() >= CHECKPOINT_INTERVAL {
+            if step == self.last() || last.elapsed() >= CHECKPOINT_INTERVAL {
                 let state = FlowState {
                     current: field,
                     previous: None,
@@ -412,4 +420,87 @@ fn sample_name(step: usize) -> String {
 
 fn checkpoint_name(step: usize, which: &str) -> String {
     format!("checkpoint_{step:05}_{which}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::circles::{EPS, STEP};
+    use geometry::phase_field;
+    use geometry::shapes::Ball;
+    use model::pretrained;
+    use report::Progress;
+    use solver::NewtonParams;
+
+    fn evolution(flow: Flow, method: Method) -> Evolution {
+        Evolution {
+            shape: "disc of radius 0.2".to_owned(),
+            flow,
+            method,
+            n: 128,
+            side: 0.75,
+            params: FlowParams {
+                eps: EPS,
+                mcf_step: STEP,
+                newton: NewtonParams::default(),
+            },
+            tau: STEP,
+            sample_every: 2,
+            also_sample: vec![1],
+            steps: 4,
+            pause_after: None,
+        }
+    }
+
+    fn disc(grid: Grid<2>, eps: f64) -> Result<Field<2>, Error> {
+        Ok(phase_field(grid, &Ball::new([0.0, 0.0], 0.2)?, eps)?)
+    }
+
+    #[test]
+    fn an_interrupted_run_continues_with_the_same_bytes() {
+        let root = tempfile::tempdir().unwrap();
+        let store = |name: &str| OutputDir::create(root.path().join(name)).unwrap();
+        let device = ComputeDevice::default_compiled().unwrap();
+        let bar = Progress::new(true).bar("", 4);
+        let ratios = crate::networks::convergence_ratios(128).unwrap();
+        let network = pretrained::find(ratios).unwrap();
+        for (flow, method) in [
+            (Flow::Willmore, Method::Hybrid),
+            (Flow::MeanCurvature, Method::FeImplicit),
+        ] {
+            let whole = evolution(flow, method);
+            assert_eq!(whole.sampled_steps(), [0, 1, 2, 4]);
+            let run = |e: &Evolution, folder: &OutputDir| {
+                e.run(&disc, Some(&network), &device, folder, &bar).unwrap()
+            };
+            let reference = run(&whole, &store("whole"));
+            let paused = Evolution {
+                pause_after: Some(2),
+                ..whole.clone()
+            };
+            let folder = store("interrupted");
+            assert_eq!(run(&paused, &folder).measures.len(), 3);
+            let resumed = run(&whole, &folder);
+            assert_eq!(resumed.measures, reference.measures);
+            assert_eq!(reference.measures.len(), 5);
+            for step in whole.sampled_steps() {
+                assert_eq!(resumed.field(step).unwrap(), reference.field(step).unwrap());
+            }
+            // Looked up, not computed again: the wall time is that of the first time.
+            assert_eq!(
+                run(&whole, &folder).seconds.to_bits(),
+                resumed.seconds.to_bits()
+            );
+            // Another run does not take these fields for its own.
+            let other = Evolution {
+                tau: 0.5 * STEP,
+                ..whole.clone()
+            };
+            assert_ne!(other.name(), whole.name());
+            assert_eq!(resumed.distance(&reference, 4).unwrap().to_bits(), 0);
+            let areas = [&reference.measures[0], &reference.measures[4]].map(|m| m.area);
+            let grows = flow == Flow::Willmore;
+            assert_eq!(areas[1] > areas[0], grows, "{areas:?}");
+        }
+    }
 }

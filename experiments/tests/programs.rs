@@ -9,6 +9,10 @@ use report::Summary;
 
 const CIRCLES: &str = env!("CARGO_BIN_EXE_circle_convergence");
 const LEARNED: &str = env!("CARGO_BIN_EXE_learned_networks");
+const CROSS: &str = env!("CARGO_BIN_EXE_cross");
+const MCF_CROSS: &str = env!("CARGO_BIN_EXE_mcf_cross");
+const RECTANGLE: &str = env!("CARGO_BIN_EXE_rectangle");
+const TIMING: &str = env!("CARGO_BIN_EXE_timing_tables");
 const TRAIN: &str = env!("CARGO_BIN_EXE_train_networks");
 
 fn run(program: &str, folder: &Path, arguments: &[&str]) -> Output {
@@ -53,7 +57,7 @@ fn content(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 #[test]
 fn devices_that_are_unknown_or_not_compiled_in() {
     let root = tempfile::tempdir().unwrap();
-    for program in [CIRCLES, LEARNED, TRAIN] {
+    for program in [CIRCLES, CROSS, LEARNED, MCF_CROSS, RECTANGLE, TIMING, TRAIN] {
         refused(
             program,
             root.path(),
@@ -125,8 +129,24 @@ fn resolutions_names_and_outputs_that_cannot_be() {
     // No network was trained for this one.
     refused(CIRCLES, root.path(), &["--cells", "192"], &["n_K = 25"]);
     refused(TRAIN, root.path(), &["--only", "n1024"], &["n1024", "n128"]);
+    for program in [CROSS, MCF_CROSS, RECTANGLE] {
+        refused(
+            program,
+            root.path(),
+            &["--cells", "128,256", "--reference-n", "384"],
+            &["384", "multiple", "256"],
+        );
+        refused(program, root.path(), &["--steps", "0"], &["--steps"]);
+    }
+    refused(
+        CIRCLES,
+        root.path(),
+        &["--methods", "fe_semi", "--retrain"],
+        &["network"],
+    );
+    refused(TIMING, root.path(), &["--budget", "0"], &["--budget"]);
     fs::write(root.path().join("results"), "a file of the user").unwrap();
-    for program in [CIRCLES, LEARNED, TRAIN] {
+    for program in [CIRCLES, CROSS, LEARNED, MCF_CROSS, RECTANGLE, TIMING, TRAIN] {
         refused(program, root.path(), &["--quick"], &["results"]);
         refused(
             program,
@@ -219,4 +239,60 @@ fn finished_circles_are_not_computed_again() {
     let second = fs::read(again.path().join("out/steps.csv")).unwrap();
     assert!(first == second && first != reference);
     assert!(!again.path().join("out/partial").exists());
+}
+
+/// Mean curvature flow of the cross: the methods agree on the shape to a small part of the interface width.
+#[test]
+fn the_quick_cross_compares_all_methods() {
+    let root = tempfile::tempdir().unwrap();
+    let arguments = ["--quick", "--quiet", "--output", "out"];
+    let output = run(MCF_CROSS, root.path(), &arguments);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && message.is_empty(), "{message}");
+    let folder = root.path().join("out");
+    for name in ["errors", "shapes"] {
+        let text = fs::read_to_string(folder.join(format!("{name}.svg"))).unwrap();
+        assert!(text.contains("quick run"));
+    }
+    for name in ["error_table.md", "errors.csv", "steps.csv", "manifest.json"] {
+        assert!(folder.join(name).exists(), "{name}");
+    }
+    let text = fs::read_to_string(folder.join("summary.json")).unwrap();
+    let summary = Summary::from_json(&text).unwrap();
+    let metric = |name: &str| summary.get(name).unwrap_or_else(|| panic!("no {name}"));
+    for method in ["hybrid", "fe_implicit", "fe_semi"] {
+        let key = format!("mcf_cross.n128.{method}");
+        assert!(metric(&format!("{key}.l2.step0")) <= 0.0);
+        let error = metric(&format!("{key}.l2.step2"));
+        assert!(error > 0.0 && error < 0.01, "{method}: {error}");
+        let tip = metric(&format!("{key}.tip.step2"));
+        assert!((tip - 0.8).abs() < 0.01, "{tip}");
+        assert!(
+            metric(&format!("{key}.perimeter.step2")) < metric(&format!("{key}.perimeter.step0"))
+        );
+    }
+    // A second run finds everything and gives the same bytes.
+    let before = fs::read(folder.join("errors.csv")).unwrap();
+    let steps = fs::read(folder.join("steps.csv")).unwrap();
+    assert!(run(MCF_CROSS, root.path(), &arguments).status.success());
+    assert_eq!(fs::read(folder.join("errors.csv")).unwrap(), before);
+    assert_eq!(fs::read(folder.join("steps.csv")).unwrap(), steps);
+}
+
+#[test]
+fn the_quick_timing_table_has_a_row_for_every_method() {
+    let root = tempfile::tempdir().unwrap();
+    let output = run(
+        TIMING,
+        root.path(),
+        &["--quick", "--quiet", "--output", "out"],
+    );
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && message.is_empty(), "{message}");
+    let table = fs::read_to_string(root.path().join("out/timing.md")).unwrap();
+    assert!(table.contains("extrapolated from") && table.contains("FE implicit, Cholesky inside"));
+    let text = fs::read_to_string(root.path().join("out/summary.json")).unwrap();
+    let summary = Summary::from_json(&text).unwrap();
+    let seconds = |key: &str| summary.get(&format!("timing.n128.{key}.seconds")).unwrap();
+    assert!(seconds("hybrid") > 0.0 && seconds("fe_implicit") > seconds("hybrid"));
 }

@@ -2,6 +2,7 @@
 //! of the flow against double precision on the CPU.
 
 use burn::tensor::Tensor;
+use fem::FiniteElementStep;
 use geometry::{Field, Grid, measure::l2_distance, phase_field, shapes::Ball};
 use linearize::dual::{self, Dual};
 use linearize::taylor::{halvings, remainder};
@@ -11,7 +12,8 @@ use operators::{
     kernel_correlation, spectral_filter, tabulated,
 };
 use solver::{
-    Exit, FlowParams, MinimizingMovement, NewtonParams, Objective, StepRecord, WillmoreFlow,
+    Exit, FlowParams, MeanCurvatureStep, MinimizingMovement, NewtonParams, Objective, StepRecord,
+    WillmoreFlow,
 };
 use workbench_tests::{
     Backend, backends, convolution, correlation, dot, noise, relative_distance, splitting_network,
@@ -468,4 +470,52 @@ fn steps_of_the_flow_agree_in_two_dimensions() {
 #[test]
 fn steps_of_the_flow_agree_in_three_dimensions() {
     flow_case::<3>(24);
+}
+
+/// Finite elements are solved on the host; their tensors and the derivatives of the nested energy live on the backend.
+fn finite_elements<const D: usize>(cells: usize) {
+    let grid = Grid::<D>::centred(cells, 1.0).unwrap();
+    let (eps, size) = (2.0 * grid.spacing(), grid.spacing().powi(2));
+    let start = ball(grid, 0.3);
+    let p = noise(grid.len(), 3);
+    let steps = [
+        FiniteElementStep::implicit(&grid, eps, size).unwrap(),
+        FiniteElementStep::semi_implicit(&grid, eps, size).unwrap(),
+    ];
+    for (step, backend) in steps
+        .iter()
+        .flat_map(|step| backends().into_iter().map(move |backend| (step, backend)))
+    {
+        let device = &backend.device;
+        let tensor = |x: &[f64]| -> Tensor<D> { device.tensor(x, grid.shape()) };
+        let u = tensor(start.values());
+        let moved = device.values(step.apply(u.clone())).unwrap();
+        let expected = step.step(&start).unwrap();
+        let tolerance = backend.tolerance(1e-14, 1e-6);
+        close(&backend, &moved, expected.values(), tolerance, "step");
+
+        let mut energy =
+            MinimizingMovement::new(std::sync::Arc::new(step.clone()), cells, device).unwrap();
+        let previous: Vec<f64> = start.values().iter().map(|u| 0.9 * u).collect();
+        energy.set(&tensor(&previous), 1.0).unwrap();
+        energy.evaluate(&u).unwrap();
+        let product = energy.hessian_vector_product(&tensor(&p)).unwrap();
+        let independent = dual::hessian_vector_product(&u, &tensor(&p), |u| {
+            let v = step.apply(u.primal.clone());
+            let dv = step.derivative(u.primal.clone(), v.clone(), u.tangent.clone());
+            let residual = Dual::new(v, dv) - u.clone();
+            let motion = u - tensor(&previous).autodiff();
+            let square = |x: Dual<D>| (x.clone() * x.linear(|x| step.mass(x))).sum();
+            (square(motion) + square(residual)) * 0.5
+        });
+        let [found, expected] = [product, independent].map(|x| device.values(x).unwrap());
+        let tolerance = backend.tolerance(1e-9, 3e-5);
+        close(&backend, &found, &expected, tolerance, "product");
+    }
+}
+
+#[test]
+fn finite_element_steps_have_their_derivatives() {
+    finite_elements::<2>(20);
+    finite_elements::<3>(9);
 }

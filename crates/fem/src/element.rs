@@ -192,8 +192,9 @@ pub fn product<const D: usize>(cells: usize, a: &[f64], b: &[f64], c: &[f64]) ->
                         let out = &mut out[(target - 1) * slab + line * cells..][..cells];
                         let factor = weight * at;
                         out[0] += factor * (work.low[0] + work.high[cells - 1]);
-                        for i in 1..cells {
-                            out[i] += factor * (work.low[i] + work.high[i - 1]);
+                        let ends = work.low[1..cells].iter().zip(&work.high[..cells - 1]);
+                        for (value, (low, high)) in out[1..].iter_mut().zip(ends) {
+                            *value += factor * (low + high);
                         }
                     }
                 }

@@ -16,7 +16,7 @@ use burn_autodiff::{
 use burn_backend::TensorMetadata;
 use burn_capture::CaptureBackend;
 use burn_ir::{CustomOpIr, OperationIr, OperationOutput, ScalarIr, TensorIr};
-use burn_router::RouterClient;
+use burn_router::{RouterClient, RouterTensor};
 
 use crate::Scheme;
 
@@ -151,7 +151,7 @@ fn record(
 ) -> FloatTensor<CaptureBackend> {
     let first = &inputs[0];
     let (client, shape, dtype) = (first.client.clone(), first.shape(), first.dtype());
-    let inputs: Vec<TensorIr> = inputs.into_iter().map(|x| x.into_ir()).collect();
+    let inputs: Vec<TensorIr> = inputs.into_iter().map(RouterTensor::into_ir).collect();
     let output = TensorIr::uninit(client.create_empty_handle(), shape, dtype);
     let operation = CustomOpIr::with_scalars(id, &inputs, &[output], vec![ScalarIr::UInt(scheme)]);
     client.register(OperationIr::Custom(operation)).output()
@@ -225,6 +225,7 @@ impl<B: Backend + FemOps, C: CheckpointStrategy> FemOps for Autodiff<B, C> {
     self_adjoint!(fem_mass, Mass);
     self_adjoint!(fem_heat_solve, HeatSolve);
 
+    #[allow(clippy::redundant_closure_for_method_calls)] // the tensor's type cannot be named
     fn fem_product(
         a: FloatTensor<Self>,
         b: FloatTensor<Self>,

@@ -25,7 +25,7 @@ impl Rule for Product {
             let multiplicity = (0..3).filter(same).count() as f64;
             let [x, y] = [(i + 1) % 3, (i + 2) % 3].map(|k| operation.inputs[k].clone());
             let mut one = operation.clone();
-            one.inputs = vec![x, y, tangent.clone()].into();
+            one.inputs = vec![x, y, tangent.clone()];
             let term = build.tangent(one);
             let term = build.scale(&term, multiplicity);
             sum = Some(match sum {
@@ -37,9 +37,9 @@ impl Rule for Product {
     }
 }
 
-fn with_inputs(operation: &CustomOpIr, id: &'static str, inputs: Vec<TensorIr>) -> CustomOpIr {
+fn with_inputs(operation: &CustomOpIr, id: &'static str, inputs: &[TensorIr]) -> CustomOpIr {
     let scalars: Vec<ScalarIr> = operation.scalars.clone();
-    CustomOpIr::with_scalars(id, &inputs, &operation.outputs, scalars)
+    CustomOpIr::with_scalars(id, inputs, &operation.outputs, scalars)
 }
 
 /// `dv = A(v)^-1 M du`
@@ -56,8 +56,8 @@ impl Rule for ImplicitStep {
             return Ok(vec![None]);
         };
         let v = build.primal(operation.clone());
-        let source = build.tangent(with_inputs(operation, MASS, vec![du.clone()]));
-        let dv = build.tangent(with_inputs(operation, LINEARIZED, vec![v, source]));
+        let source = build.tangent(with_inputs(operation, MASS, std::slice::from_ref(du)));
+        let dv = build.tangent(with_inputs(operation, LINEARIZED, &[v, source]));
         Ok(vec![Some(dv)])
     }
 }
@@ -77,8 +77,8 @@ impl Rule for LinearizedSolve {
         if let Some(dv) = &tangents[0] {
             let y = build.primal(operation.clone());
             let factor = -6.0 * host(operation.scalars[0].elem::<u64>()).reaction();
-            let inputs = vec![v.clone(), y, dv.clone()];
-            let moved = build.tangent(with_inputs(operation, PRODUCT, inputs));
+            let inputs = [v.clone(), y, dv.clone()];
+            let moved = build.tangent(with_inputs(operation, PRODUCT, &inputs));
             let moved = build.scale(&moved, factor);
             source = Some(match source {
                 Some(source) => build.add(&source, &moved),
@@ -88,7 +88,7 @@ impl Rule for LinearizedSolve {
         let Some(source) = source else {
             return Ok(vec![None]);
         };
-        let dy = build.tangent(with_inputs(operation, LINEARIZED, vec![v, source]));
+        let dy = build.tangent(with_inputs(operation, LINEARIZED, &[v, source]));
         Ok(vec![Some(dy)])
     }
 }

@@ -192,7 +192,7 @@ fn a_disc_grows_like_the_reference() {
         assert!(record.energy < record.energy_before);
         assert!(record.willmore_energy < willmore);
         willmore = record.willmore_energy;
-        let radius = exact::willmore_radius(RADIUS, k as f64 * tau, 2);
+        let radius = exact::willmore_radius(RADIUS, f64::from(k) * tau, 2);
         let error = l2_distance(&flow.field().unwrap(), &ball(grid, radius, eps)).unwrap();
         let expected = match k {
             1 => 0.00174,

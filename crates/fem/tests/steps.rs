@@ -226,7 +226,11 @@ fn a_disc_shrinks_like_the_reference() {
         let mut u = disc(grid, radius, eps);
         for k in 1..=8 {
             u = step.step(&u).unwrap();
-            let exact = disc(grid, mean_curvature_radius(radius, k as f64 * size, 2), eps);
+            let exact = disc(
+                grid,
+                mean_curvature_radius(radius, f64::from(k) * size, 2),
+                eps,
+            );
             let error = l2_distance(&u, &exact).unwrap();
             if k == 1 || k == 8 {
                 let expected = expected[usize::from(k == 8)];

@@ -1,0 +1,396 @@
+//! Time of the methods for the same flow on the same machine.
+
+use std::collections::BTreeMap;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Parser;
+use experiments::circles::{EPS, STEP};
+use experiments::comparison::cross;
+use experiments::networks::{NetworkOptions, checksum, convergence_ratios};
+use experiments::options::RunOptions;
+use experiments::{Error, harness};
+use fem::{FiniteElementStep, LinearSolver, Statistics};
+use geometry::shapes::Ball;
+use geometry::{Field, Grid, phase_field};
+use indicatif::ProgressBar;
+use model::Network;
+use operators::ComputeDevice;
+use report::{
+    Axis, Column, Figure, Format, LineChart, LineStyle, Marker, OutputDir, Series, Summary, Table,
+};
+use serde::Serialize;
+use solver::{FlowParams, Method as Newton, NewtonParams, WillmoreFlow};
+
+const PROGRAM: &str = "timing_tables";
+/// Time steps of the table, until `t = 2^-7`.
+const STEPS: usize = 128;
+
+/// Wall time of 128 Willmore steps of the cross (eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7) by the hybrid scheme and by
+/// nested finite elements, one after the other on this machine, with the numbers of Newton steps, Hessian-vector products and
+/// inner iterations. Rows that exceed the budget are extrapolated from the steps done, and say so.
+#[derive(Parser, Debug)]
+#[command(name = PROGRAM, version)]
+struct Options {
+    #[command(flatten)]
+    run: RunOptions,
+
+    #[command(flatten)]
+    networks: NetworkOptions,
+
+    /// Cells per unit length, separated by commas
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [256, 512])]
+    cells: Vec<usize>,
+
+    /// Stop a row after this many seconds and extrapolate; at least three steps are done
+    #[arg(long, value_name = "SECONDS", default_value_t = 120.0)]
+    budget: f64,
+}
+
+#[derive(Serialize)]
+struct Parameters {
+    cells: Vec<usize>,
+    budget: f64,
+    steps: usize,
+    networks: BTreeMap<String, String>,
+    quick: bool,
+}
+
+/// A row of the table.
+#[derive(Serialize, Clone, Copy, Debug, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+enum Variant {
+    Hybrid,
+    HybridPlain,
+    FeImplicit,
+    FeImplicitDirect,
+    FeSemi,
+}
+
+impl Variant {
+    const ALL: [Self; 5] = [
+        Self::Hybrid,
+        Self::HybridPlain,
+        Self::FeImplicit,
+        Self::FeImplicitDirect,
+        Self::FeSemi,
+    ];
+
+    fn key(self) -> &'static str {
+        match self {
+            Self::Hybrid => "hybrid",
+            Self::HybridPlain => "hybrid_plain_newton",
+            Self::FeImplicit => "fe_implicit",
+            Self::FeImplicitDirect => "fe_implicit_direct",
+            Self::FeSemi => "fe_semi",
+        }
+    }
+
+    fn label(self) -> &'static str {
+        match self {
+            Self::Hybrid => "hybrid",
+            Self::HybridPlain => "hybrid, plain Newton-CG",
+            Self::FeImplicit => "FE implicit, FFT-CG inside",
+            Self::FeImplicitDirect => "FE implicit, Cholesky inside",
+            Self::FeSemi => "FE semi-implicit",
+        }
+    }
+
+    /// What the paper reports for 128 steps, in seconds: hybrid on one A100, finite elements (sparse direct solver) on 64 cores.
+    fn papers_seconds(self, n: usize) -> Option<f64> {
+        match (self, n) {
+            (Self::HybridPlain, 256) => Some(122.0),
+            (Self::HybridPlain, 512) => Some(1020.0),
+            (Self::FeImplicitDirect, 256) => Some(4970.0),
+            (Self::FeImplicitDirect, 512) => Some(28622.0),
+            (Self::FeSemi, 256) => Some(4307.0),
+            (Self::FeSemi, 512) => Some(22045.0),
+            _ => None,
+        }
+    }
+}
+
+/// What was measured for one row.
+#[derive(Serialize, Clone, Debug)]
+struct Timing {
+    variant: Variant,
+    n: usize,
+    /// Steps done.
+    measured_steps: usize,
+    /// Wall time of those.
+    measured_seconds: f64,
+    /// Wall time of all steps: measured, or the first step plus the mean of the others for each of the rest.
+    seconds: f64,
+    extrapolated: bool,
+    newton_per_step: f64,
+    hvp_per_step: f64,
+    inner_cg_per_step: f64,
+    factorizations_per_step: f64,
+    /// Why the row ended early, if it failed.
+    failure: Option<String>,
+}
+
+fn main() -> ExitCode {
+    let options = Options::parse();
+    harness::run(|| program(&options))
+}
+
+fn program(options: &Options) -> Result<(), Error> {
+    let quick = options.run.quick;
+    if !(options.budget.is_finite() && options.budget > 0.0) {
+        return Err(Error::Options("--budget must be positive".to_owned()));
+    }
+    let cells = if quick {
+        vec![128]
+    } else {
+        options.cells.clone()
+    };
+    let budget = if quick { 0.1 } else { options.budget };
+    let ratios = cells
+        .iter()
+        .map(|&n| convergence_ratios(n))
+        .collect::<Result<Vec<_>, _>>()?;
+    let device = options.run.open_device()?;
+    let networks = options.networks.find(&ratios)?;
+    let output = options.run.open_output(PROGRAM)?;
+    let parameters = Parameters {
+        networks: cells
+            .iter()
+            .zip(&networks)
+            .map(|(n, network)| (format!("n{n}"), checksum(network)))
+            .collect(),
+        cells: cells.clone(),
+        budget,
+        steps: STEPS,
+        quick,
+    };
+    let mut manifest = options.run.manifest(PROGRAM, &parameters, &device)?;
+    let progress = options.run.progress();
+    let mut timings = Vec::new();
+    for (&n, network) in cells.iter().zip(&networks) {
+        for variant in Variant::ALL {
+            let title = format!("{}, n = {n}", variant.label());
+            let bar = progress.bar(title.clone(), STEPS as u64);
+            let timing = manifest.phase(title, || {
+                let initial = initial(n, quick)?;
+                measure(variant, &initial, network, &device, budget, &bar)
+            })?;
+            bar.finish();
+            timings.push(timing);
+        }
+    }
+    let table = table(&timings)?;
+    table.write(&output, "timing")?;
+    output.write("timing.json", report::data::to_json(&timings)?)?;
+    figure(&options.run, &timings).write(&output, "timing")?;
+    summary(&timings)?.write(&output)?;
+    manifest.write(&output)?;
+    progress.clear();
+    options.run.say(&format!(
+        "{}\n{}\nResults are in {}",
+        options
+            .run
+            .title("128 Willmore steps of the cross: wall time on this machine"),
+        table.to_markdown(),
+        output_path(&output)
+    ));
+    Ok(())
+}
+
+fn output_path(output: &OutputDir) -> String {
+    output.as_path().display().to_string()
+}
+
+/// The cross, or for a smoke test a disc on a small box.
+fn initial(n: usize, quick: bool) -> Result<Field<2>, Error> {
+    if quick {
+        let grid = Grid::per_unit(n, 0.75)?;
+        return Ok(phase_field(grid, &Ball::new([0.0, 0.0], 0.2)?, EPS)?);
+    }
+    cross(Grid::per_unit(n, 2.0)?, EPS)
+}
+
+fn measure(
+    variant: Variant,
+    initial: &Field<2>,
+    network: &Network,
+    device: &ComputeDevice,
+    budget: f64,
+    bar: &ProgressBar,
+) -> Result<Timing, Error> {
+    /// The first step costs more than the others: extrapolation needs some of those.
+    const LEAST_STEPS: usize = 3;
+    let grid = *initial.grid();
+    let newton = match variant {
+        Variant::HybridPlain => Newton::Paper,
+        _ => Newton::Preconditioned,
+    };
+    let params = FlowParams {
+        eps: EPS,
+        mcf_step: STEP,
+        newton: NewtonParams {
+            method: newton,
+            ..NewtonParams::default()
+        },
+    };
+    let elements = match variant {
+        Variant::Hybrid | Variant::HybridPlain => None,
+        Variant::FeImplicit => Some(FiniteElementStep::implicit(&grid, EPS, STEP)?),
+        Variant::FeImplicitDirect => Some(FiniteElementStep::implicit_with(
+            &grid,
+            EPS,
+            STEP,
+            LinearSolver::Direct,
+        )?),
+        Variant::FeSemi => Some(FiniteElementStep::semi_implicit(&grid, EPS, STEP)?),
+    };
+    let mut flow = match &elements {
+        Some(step) => WillmoreFlow::new(step.clone(), initial, params, device)?,
+        None => WillmoreFlow::with_network(network, initial, params, device)?,
+    };
+    let mut records = Vec::new();
+    let mut failure = None;
+    let clock = Instant::now();
+    while records.len() < STEPS
+        && (records.len() < LEAST_STEPS || clock.elapsed().as_secs_f64() < budget)
+    {
+        match flow.advance(STEP) {
+            Ok(record) => records.push(record),
+            Err(error @ solver::Error::NotConverged { .. }) => {
+                failure = Some(error.to_string());
+                break;
+            }
+            Err(error) => return Err(error.into()),
+        }
+        bar.inc(1);
+    }
+    let inner: Statistics = elements.map(|step| step.statistics()).unwrap_or_default();
+    let measured_seconds: f64 = records.iter().map(|r| r.seconds).sum();
+    let count = records.len();
+    let per_step = |total: usize| total as f64 / count.max(1) as f64;
+    let seconds = match &records[..] {
+        [first, others @ ..] if count < STEPS && !others.is_empty() => {
+            let mean = others.iter().map(|r| r.seconds).sum::<f64>() / others.len() as f64;
+            first.seconds + mean * (STEPS - 1) as f64
+        }
+        _ => measured_seconds,
+    };
+    Ok(Timing {
+        variant,
+        n: (1.0 / grid.spacing()).round() as usize,
+        measured_steps: count,
+        measured_seconds,
+        seconds,
+        extrapolated: count < STEPS,
+        newton_per_step: per_step(records.iter().map(|r| r.newton.newton).sum()),
+        hvp_per_step: per_step(records.iter().map(|r| r.newton.hvp).sum()),
+        inner_cg_per_step: per_step(inner.cg),
+        factorizations_per_step: per_step(inner.factorizations),
+        failure,
+    })
+}
+
+/// Whether a row has a time worth showing.
+fn usable(timing: &Timing) -> bool {
+    timing.failure.is_none() && timing.measured_steps > 1
+}
+
+fn table(timings: &[Timing]) -> Result<Table, Error> {
+    let mut table = Table::new([
+        Column::text("method"),
+        Column::number("n", Format::Shortest),
+        Column::number("128 steps [s]", Format::Fixed(1)),
+        Column::text("measured"),
+        Column::number("times hybrid", Format::Fixed(1)),
+        Column::number("Newton/step", Format::Fixed(1)),
+        Column::number("HVP/step", Format::Fixed(0)),
+        Column::number("inner CG/step", Format::Fixed(0)),
+        Column::number("Cholesky/step", Format::Fixed(1)),
+        Column::number("paper, other machines [s]", Format::Shortest),
+    ]);
+    for timing in timings {
+        let hybrid = timings
+            .iter()
+            .find(|t| t.n == timing.n && t.variant == Variant::Hybrid && usable(t));
+        let seconds = usable(timing).then_some(timing.seconds);
+        let factor = seconds.zip(hybrid).map(|(s, hybrid)| s / hybrid.seconds);
+        let measured = match &timing.failure {
+            Some(reason) => format!("stopped after {} steps: {reason}", timing.measured_steps),
+            None if timing.extrapolated => {
+                format!("extrapolated from {} steps", timing.measured_steps)
+            }
+            None => "all steps".to_owned(),
+        };
+        table.push([
+            timing.variant.label().into(),
+            timing.n.into(),
+            seconds.into(),
+            measured.into(),
+            factor.into(),
+            timing.newton_per_step.into(),
+            timing.hvp_per_step.into(),
+            timing.inner_cg_per_step.into(),
+            timing.factorizations_per_step.into(),
+            timing.variant.papers_seconds(timing.n).into(),
+        ])?;
+    }
+    Ok(table)
+}
+
+fn figure(run: &RunOptions, timings: &[Timing]) -> Figure {
+    let mut chart = LineChart::new(
+        "",
+        Axis::log("cells per unit length n"),
+        Axis::log("seconds for 128 steps"),
+    );
+    for (k, variant) in Variant::ALL.into_iter().enumerate() {
+        let marker = [Marker::Circle, Marker::Square, Marker::Triangle][k % 3];
+        let of_variant = || timings.iter().filter(move |t| t.variant == variant);
+        let ours: Vec<[f64; 2]> = of_variant()
+            .filter(|t| usable(t))
+            .map(|t| [t.n as f64, t.seconds])
+            .collect();
+        let papers: Vec<[f64; 2]> = of_variant()
+            .filter_map(|t| Some([t.n as f64, variant.papers_seconds(t.n)?]))
+            .collect();
+        if !ours.is_empty() {
+            chart = chart.with_series(
+                Series::new(variant.label(), ours)
+                    .with_colour(k)
+                    .with_marker(marker),
+            );
+        }
+        if !papers.is_empty() {
+            let name = format!("{} (paper, other machines)", variant.label());
+            chart = chart.with_series(
+                Series::new(name, papers)
+                    .with_colour(k)
+                    .with_style(LineStyle::Dashed)
+                    .with_marker(marker),
+            );
+        }
+    }
+    Figure::new(run.title("Willmore flow of a cross: wall time"), 1)
+        .with_panel(chart)
+        .with_shared_legend()
+        .with_note(
+            "Solid: this machine, one run, long rows extrapolated (see the table). Dashed: the paper's times on an A100 (hybrid) and \
+             on 64 cores (finite elements).",
+        )
+}
+
+fn summary(timings: &[Timing]) -> Result<Summary, Error> {
+    let mut summary = Summary::new();
+    for timing in timings.iter().filter(|t| usable(t)) {
+        let key = format!("timing.n{}.{}", timing.n, timing.variant.key());
+        summary.insert(&format!("{key}.seconds"), timing.seconds)?;
+        summary.insert_count(&format!("{key}.measured_steps"), timing.measured_steps)?;
+        summary.insert(&format!("{key}.newton_per_step"), timing.newton_per_step)?;
+        summary.insert(&format!("{key}.hvp_per_step"), timing.hvp_per_step)?;
+        summary.insert(
+            &format!("{key}.inner_cg_per_step"),
+            timing.inner_cg_per_step,
+        )?;
+    }
+    Ok(summary)
+}
