@@ -5,7 +5,6 @@ use std::path::Path;
 
 use geometry::npy::{self, NpyError};
 use geometry::{Error, Field, Grid, file, vti};
-use npyz::WriterBuilder;
 
 fn sample<const D: usize>(cells: usize) -> Field<D> {
     let grid = Grid::centred(cells, 2.0).unwrap();
@@ -53,41 +52,53 @@ fn npy_header_is_the_documented_one() {
         &bytes[128 + 5 * 8..128 + 6 * 8],
         &u.values()[5].to_le_bytes()
     );
-    // An independent reader agrees.
-    let other = npyz::NpyFile::new(bytes.as_slice()).unwrap();
-    assert_eq!(
-        (other.shape(), other.order()),
-        ([3, 3].as_slice(), npyz::Order::C)
-    );
-    assert_eq!(other.into_vec::<f64>().unwrap(), u.values());
 }
 
-/// Bytes as an independent writer makes them.
-fn foreign<T: npyz::Serialize + npyz::AutoSerialize>(
-    shape: &[u64],
-    order: npyz::Order,
-    values: impl IntoIterator<Item = T>,
-) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    let options = npyz::WriteOptions::new()
-        .default_dtype()
-        .order(order)
-        .shape(shape);
-    let mut writer = options.writer(&mut bytes).begin_nd().unwrap();
-    writer.extend(values).unwrap();
-    writer.finish().unwrap();
+/// `numpy.save` of `numpy.array([[1.5, -2.0], [0.1, 3.0]])`, NumPy 2.4.
+const BY_NUMPY: &str = "934e554d5059010076007b276465736372273a20273c6638272c2027666f727472616e5f6f72646572273a2046616c73652c20277368617065273a2028322c2032292c207d202020202020202020202020202020202020202020202020202020202020202020202020202020202020202020202020202020202020202020200a000000000000f83f00000000000000c09a9999999999b93f0000000000000840";
+
+#[test]
+fn npy_files_are_those_of_numpy() {
+    let numpy: Vec<u8> = (0..BY_NUMPY.len() / 2)
+        .map(|i| u8::from_str_radix(&BY_NUMPY[2 * i..2 * i + 2], 16).unwrap())
+        .collect();
+    let values = vec![1.5, -2.0, 0.1, 3.0];
+    assert_eq!(npy::decode::<2>(&numpy), Ok((2, values.clone())));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("u.npy");
+    let grid = Grid::<2>::centred(2, 2.0).unwrap();
+    npy::write(&path, &Field::from_values(grid, values).unwrap()).unwrap();
+    assert_eq!(fs::read(&path).unwrap(), numpy);
+}
+
+/// Bytes as NumPy writes them: `data` in the given order, little-endian, of the given type.
+fn foreign(dtype: &str, fortran: bool, shape: &str, data: &[&[u8]]) -> Vec<u8> {
+    let order = if fortran { "True" } else { "False" };
+    let text = format!("{{'descr': '{dtype}', 'fortran_order': {order}, 'shape': {shape}, }}");
+    let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    bytes.extend(format!("{text:<117}\n").as_bytes());
+    bytes.extend(data.concat());
     bytes
+}
+
+fn doubles(shape: &str, values: &[f64]) -> Vec<u8> {
+    let data: Vec<[u8; 8]> = values.iter().map(|v| v.to_le_bytes()).collect();
+    let data: Vec<&[u8]> = data.iter().map(|v| &v[..]).collect();
+    foreign("<f8", false, shape, &data)
 }
 
 #[test]
 fn npy_reads_what_others_write() {
-    let values = || (0..8_u8).map(|v| f64::from(v) + 0.5);
-    let expected: Vec<f64> = values().collect();
-    let c_order = foreign(&[2, 2, 2], npyz::Order::C, values());
-    assert_eq!(npy::decode::<3>(&c_order), Ok((2, expected.clone())));
-    let single = foreign(&[2, 2, 2], npyz::Order::C, values().map(|v| v as f32));
-    assert_eq!(npy::decode::<3>(&single), Ok((2, expected)));
-    let fortran = foreign(&[2, 2, 2], npyz::Order::Fortran, values());
+    let values: Vec<f64> = (0..8_u8).map(|v| f64::from(v) + 0.5).collect();
+    let c_order = doubles("(2, 2, 2)", &values);
+    assert_eq!(npy::decode::<3>(&c_order), Ok((2, values.clone())));
+    let data: Vec<[u8; 4]> = values.iter().map(|v| (*v as f32).to_le_bytes()).collect();
+    let data: Vec<&[u8]> = data.iter().map(|v| &v[..]).collect();
+    let single = foreign("<f4", false, "(2, 2, 2)", &data);
+    assert_eq!(npy::decode::<3>(&single), Ok((2, values.clone())));
+    let data: Vec<[u8; 8]> = values.iter().map(|v| v.to_le_bytes()).collect();
+    let data: Vec<&[u8]> = data.iter().map(|v| &v[..]).collect();
+    let fortran = foreign("<f8", true, "(2, 2, 2)", &data);
     let reordered = [0.5, 4.5, 2.5, 6.5, 1.5, 5.5, 3.5, 7.5].to_vec();
     assert_eq!(npy::decode::<3>(&fortran), Ok((2, reordered)));
     // Big-endian, format 2.0, keys in another order, double quotes.
@@ -101,27 +112,26 @@ fn npy_reads_what_others_write() {
 
 #[test]
 fn npy_refuses_what_is_not_a_field() {
-    let order = npyz::Order::C;
     let decode = |bytes: &[u8]| npy::decode::<2>(bytes).unwrap_err();
     assert_eq!(
-        decode(&foreign(&[2, 2, 2], order, [0.0; 8])),
+        decode(&doubles("(2, 2, 2)", &[0.0; 8])),
         NpyError::Rank {
             expected: 2,
             shape: vec![2, 2, 2]
         }
     );
     assert_eq!(
-        decode(&foreign(&[2, 3], order, [0.0; 6])),
+        decode(&doubles("(2, 3)", &[0.0; 6])),
         NpyError::NotCubical { shape: vec![2, 3] }
     );
     assert_eq!(
-        decode(&foreign(&[2, 2], order, [0_i64; 4])),
+        decode(&foreign("<i8", false, "(2, 2)", &[&[0; 32]])),
         NpyError::DataType {
             found: "<i8".into()
         }
     );
     assert_eq!(
-        decode(&foreign(&[2, 2], order, [0.0, 1.0, f64::NEG_INFINITY, 0.0])),
+        decode(&doubles("(2, 2)", &[0.0, 1.0, f64::NEG_INFINITY, 0.0])),
         NpyError::NonFinite {
             index: 2,
             value: f64::NEG_INFINITY
@@ -132,7 +142,7 @@ fn npy_refuses_what_is_not_a_field() {
         decode(b"\x93NUMPY\x04\x00"),
         NpyError::Version { major: 4, minor: 0 }
     );
-    let good = foreign(&[3, 3], order, [0.0; 9]);
+    let good = doubles("(3, 3)", &[0.0; 9]);
     let whole = good.len();
     let mut longer = good.clone();
     longer.push(0);

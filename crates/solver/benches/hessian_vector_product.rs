@@ -5,7 +5,7 @@
 //!
 //! `H p = p + c (K^T (F' s + F'' r dw) - s)`, `dw = K*p`, `s = F' dw - p`,
 //!
-//! that is two convolutions and two loops. `BENCH_TABLE=path` also writes a Markdown table of medians, for which the
+//! that is two convolutions and two loops. With `BENCH_TABLE=path` it writes a Markdown table of medians instead, for which the
 //! candidates take turns so that both see the same machine.
 
 use std::error::Error;
@@ -15,7 +15,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use burn::tensor::Tensor;
-use criterion::{BenchmarkId, Criterion};
+use divan::Bencher;
 use geometry::{Grid, phase_field, shapes::Ball};
 use model::training::{SphereData, levenberg_marquardt::heat_kernel};
 use model::{MeanCurvatureOperator, Network, Ratios, pretrained};
@@ -196,18 +196,6 @@ impl<const D: usize> Candidates<D> {
         );
     }
 
-    fn criterion(&mut self, criterion: &mut Criterion, name: &str) {
-        let mut group = criterion.benchmark_group("hessian_vector_product");
-        group.bench_function(BenchmarkId::new("burn", name), |b| b.iter(|| self.burn()));
-        group.bench_function(BenchmarkId::new("by_hand", name), |b| {
-            b.iter(|| self.hand());
-        });
-        group.bench_function(BenchmarkId::new("evaluate", name), |b| {
-            b.iter(|| self.evaluate());
-        });
-        group.finish();
-    }
-
     /// One row of the table.
     fn row(&mut self, table: &mut String, name: &str) -> Outcome<()> {
         const BUDGET: Duration = Duration::from_secs(6);
@@ -239,45 +227,66 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-fn run<const D: usize>(
-    criterion: &mut Criterion,
-    table: Option<&mut String>,
-    cells: usize,
-) -> Outcome<()> {
-    let name = format!("{cells}^{D}");
-    let mut candidates = Candidates::<D>::new(cells)?;
-    match table {
-        Some(table) => candidates.row(table, &name)?,
-        None => candidates.criterion(criterion, &name),
-    }
-    Ok(())
+const CELLS: [usize; 3] = [256, 512, 1024];
+const SOLID: usize = 64;
+
+fn bench<const D: usize>(bencher: Bencher<'_, '_>, cells: usize, part: fn(&mut Candidates<D>)) {
+    let mut candidates = Candidates::<D>::new(cells).expect("a device and a network");
+    bencher.bench_local(|| part(&mut candidates));
 }
 
-fn all(criterion: &mut Criterion, mut table: Option<&mut String>) -> Outcome<()> {
-    for cells in [256, 512, 1024] {
-        run::<2>(criterion, table.as_deref_mut(), cells)?;
+/// The product through Burn.
+#[divan::bench(args = CELLS)]
+fn burn_2d(bencher: Bencher<'_, '_>, cells: usize) {
+    bench::<2>(bencher, cells, Candidates::burn);
+}
+
+/// The product by hand.
+#[divan::bench(args = CELLS)]
+fn by_hand_2d(bencher: Bencher<'_, '_>, cells: usize) {
+    bench::<2>(bencher, cells, Candidates::hand);
+}
+
+/// Energy and gradient.
+#[divan::bench(args = CELLS)]
+fn evaluate_2d(bencher: Bencher<'_, '_>, cells: usize) {
+    bench::<2>(bencher, cells, Candidates::evaluate);
+}
+
+/// The product through Burn.
+#[divan::bench(args = [SOLID])]
+fn burn_3d(bencher: Bencher<'_, '_>, cells: usize) {
+    bench::<3>(bencher, cells, Candidates::burn);
+}
+
+/// The product by hand.
+#[divan::bench(args = [SOLID])]
+fn by_hand_3d(bencher: Bencher<'_, '_>, cells: usize) {
+    bench::<3>(bencher, cells, Candidates::hand);
+}
+
+fn table(path: &str) -> Outcome<()> {
+    let mut table = format!(
+        "Hessian-vector products in milliseconds (median, {} threads); `evaluate` (energy and gradient) and `value` \
+         in units of one product.\n\n\
+         | grid | Burn | by hand | ratio | evaluate | value |\n|---|---|---|---|---|---|\n",
+        rayon::current_num_threads()
+    );
+    for cells in CELLS {
+        Candidates::<2>::new(cells)?.row(&mut table, &format!("{cells}^2"))?;
     }
-    run::<3>(criterion, table, 64)
+    Candidates::<3>::new(SOLID)?.row(&mut table, &format!("{SOLID}^3"))?;
+    println!("{table}");
+    std::fs::write(path, table)?;
+    Ok(())
 }
 
 fn main() -> Outcome<()> {
-    let mut criterion = Criterion::default()
-        .sample_size(10)
-        .measurement_time(Duration::from_secs(3))
-        .warm_up_time(Duration::from_millis(500))
-        .configure_from_args();
-    all(&mut criterion, None)?;
-    criterion.final_summary();
-    if let Ok(path) = std::env::var("BENCH_TABLE") {
-        let mut table = format!(
-            "Hessian-vector products in milliseconds (median, {} threads); `evaluate` (energy and gradient) and `value` \
-             in units of one product.\n\n\
-             | grid | Burn | by hand | ratio | evaluate | value |\n|---|---|---|---|---|---|\n",
-            rayon::current_num_threads()
-        );
-        all(&mut criterion, Some(&mut table))?;
-        println!("{table}");
-        std::fs::write(path, table)?;
+    match std::env::var("BENCH_TABLE") {
+        Ok(path) => table(&path),
+        Err(_) => {
+            divan::main();
+            Ok(())
+        }
     }
-    Ok(())
 }
