@@ -260,6 +260,10 @@ impl Settings {
                 progress,
             )?);
             settings.params.epochs = settings.params.epochs.div_ceil(4);
+            // The entries of a refined kernel are 2^-D times as large, and Adam's steps do not scale with them.
+            let shrinkage = 0.5_f64.powi(spec.ratios.dimension as i32);
+            settings.params.learning_rate *= shrinkage;
+            settings.params.final_learning_rate *= shrinkage;
         }
         finished.retain(|trained| chosen.contains(&trained.spec));
         for spec in chosen.iter().filter(|spec| !in_the_chain(spec)) {
