@@ -34,7 +34,7 @@ pub struct Statistics {
 /// `Psi'(v) = 9/4 (v^3 - v)` integrated exactly against the basis functions (`b(v)`):
 ///
 /// - implicit: `M (v - u) + tautilde S v + kappa b(v) = 0`, the minimizer of `eps |u - v|^2 + 2 tautilde P_eps[v]`,
-/// - semi-implicit: `M (v - u) + tautilde S v + kappa b(u) = 0`.
+/// - semi-implicit: `M (v - u) + tautilde S v + kappa b(u) = 0`, or with `M Psi'(u)` in place of `b(u)`.
 ///
 /// All matrices are divided by `h^D`.
 pub struct Scheme<const D: usize> {
@@ -193,9 +193,13 @@ impl<const D: usize> Scheme<D> {
         self.reaction
     }
 
-    /// The semi-implicit step: one circulant system.
-    pub fn semi_implicit_step(&self, u: &[f64]) -> Vec<f64> {
+    /// The semi-implicit step: one circulant system. The well is integrated exactly, or interpolated at the nodes.
+    pub fn semi_implicit_step(&self, u: &[f64], exact: bool) -> Vec<f64> {
         let r = self.reaction;
+        if !exact {
+            let explicit: Vec<f64> = u.iter().map(|u| u * (1.0 + r - r * u * u)).collect();
+            return self.heat_solve(&self.mass(&explicit));
+        }
         let mut right = self.mass(u);
         let cubic = self.product(u, u, u);
         zip_apply(&mut right, &cubic, |m, c| (1.0 + r) * m - r * c);

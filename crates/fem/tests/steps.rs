@@ -93,18 +93,28 @@ fn the_semi_implicit_step_solves_its_equation() {
     let grid = Grid::<2>::centred(20, 1.0).unwrap();
     let (eps, step) = (0.1, 0.002);
     let u = smooth(grid);
-    let v = FiniteElementStep::semi_implicit(&grid, eps, step)
-        .unwrap()
-        .step(&u)
-        .unwrap();
     let h2 = grid.spacing().powi(2);
-    let left = fem::element::Stencil::<2>::constant(20, 1.0, step / h2).apply(v.values());
-    let mass = fem::element::mass::<2>(20, u.values());
-    let cubic = fem::element::product::<2>(20, u.values(), u.values(), u.values());
-    for i in 0..left.len() {
-        let well = 9.0 / 4.0 * (cubic[i] - mass[i]);
-        let right = mass[i] - step / (2.0 * eps * eps) * well;
-        assert!((left[i] - right).abs() < 1e-13, "{} {right}", left[i]);
+    let mass = |x: &[f64]| fem::element::mass::<2>(20, x);
+    let cubes: Vec<f64> = u.values().iter().map(|u| u.powi(3)).collect();
+    let exact = fem::element::product::<2>(20, u.values(), u.values(), u.values());
+    for (step_of_mcf, cubic) in [
+        (
+            FiniteElementStep::semi_implicit(&grid, eps, step),
+            mass(&cubes),
+        ),
+        (
+            FiniteElementStep::semi_implicit_exact(&grid, eps, step),
+            exact,
+        ),
+    ] {
+        let v = step_of_mcf.unwrap().step(&u).unwrap();
+        let left = fem::element::Stencil::<2>::constant(20, 1.0, step / h2).apply(v.values());
+        let mass = mass(u.values());
+        for i in 0..left.len() {
+            let well = 9.0 / 4.0 * (cubic[i] - mass[i]);
+            let right = mass[i] - step / (2.0 * eps * eps) * well;
+            assert!((left[i] - right).abs() < 1e-13, "{} {right}", left[i]);
+        }
     }
 }
 

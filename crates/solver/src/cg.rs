@@ -1,7 +1,7 @@
 //! Truncated, preconditioned conjugate gradients.
 
 use burn::tensor::Tensor;
-use operators::{ComputeDevice, SpectralFilter, spectral_filter};
+use operators::ComputeDevice;
 
 use crate::{Error, Objective};
 
@@ -51,16 +51,12 @@ pub(crate) fn dot<const D: usize>(
 pub(crate) fn conjugate_gradients<const D: usize>(
     objective: &mut impl Objective<D>,
     gradient: &Tensor<D>,
-    preconditioner: Option<&SpectralFilter>,
+    precondition: &dyn Fn(&Tensor<D>) -> Result<Tensor<D>, Error>,
     limits: CgLimits,
     device: &ComputeDevice,
 ) -> Result<CgSolution<D>, Error> {
-    let precondition = |r: &Tensor<D>| match preconditioner {
-        Some(filter) => spectral_filter(r.clone(), filter),
-        None => r.clone(),
-    };
     let mut residual = gradient.clone().neg();
-    let mut z = precondition(&residual);
+    let mut z = precondition(&residual)?;
     let mut rz = dot(&residual, &z, device)?;
     let target = limits.tolerance * limits.tolerance * rz;
     let mut direction = z.clone();
@@ -84,7 +80,7 @@ pub(crate) fn conjugate_gradients<const D: usize>(
             None => increment,
         });
         residual = residual - product * alpha;
-        z = precondition(&residual);
+        z = precondition(&residual)?;
         let next = dot(&residual, &z, device)?;
         if next.abs() <= target {
             exit = CgExit::Converged;

@@ -10,7 +10,8 @@ use model::{MeanCurvatureOperator, Network, Ratios};
 use operators::{ComputeDevice, SpectralFilter};
 use serde::{Deserialize, Serialize};
 
-use crate::newton::{NewtonInfo, NewtonParams, minimize};
+use crate::newton::{Method, NewtonInfo, NewtonParams, minimize};
+use crate::preconditioner::Preconditioner;
 use crate::profile::extrapolate;
 use crate::{Accuracy, Error, Exit, MeanCurvatureStep, MinimizingMovement};
 
@@ -249,16 +250,26 @@ impl<const D: usize> WillmoreFlow<D> {
                 cg_tolerance: self.params.newton.cg_tolerance,
             });
         }
-        let filter = self.filter.as_ref().map(|(_, filter)| filter);
         let start = match &self.previous {
             Some((previous, last)) => extrapolate(&self.current, previous, (tau / last).min(2.0)),
             None => self.current.clone(),
+        };
+        let filter = self.filter.as_ref().map(|(_, filter)| filter.clone());
+        let preconditioner = match filter {
+            Some(filter) if self.params.newton.method == Method::Preconditioned => {
+                let near = self.device.values(start.clone())?;
+                let eps = self.params.eps;
+                Some(Preconditioner::two_level(
+                    filter, &self.grid, &near, eps, tau,
+                ))
+            }
+            _ => None,
         };
         let (u, newton) = minimize(
             &mut self.energy,
             &self.current,
             &start,
-            filter,
+            preconditioner.as_ref(),
             self.params.newton,
             &self.device,
         )

@@ -61,11 +61,14 @@ mod cg;
 mod energy;
 mod error;
 mod flow;
+mod interface;
 mod newton;
+mod preconditioner;
 mod profile;
 
 pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective, StepFailure};
 pub use error::Error;
 pub use flow::{FlowParams, FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow};
 pub use newton::{Exit, Method, NewtonInfo, NewtonParams, minimize};
+pub use preconditioner::Preconditioner;
 pub use profile::{extrapolate, retract};

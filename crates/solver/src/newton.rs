@@ -6,10 +6,11 @@
 use std::fmt;
 
 use burn::tensor::Tensor;
-use operators::{ComputeDevice, SpectralFilter};
+use operators::{ComputeDevice, spectral_filter};
 use serde::{Deserialize, Serialize};
 
 use crate::cg::{CgExit, CgLimits, CgSolution, conjugate_gradients, dot};
+use crate::preconditioner::Preconditioner;
 use crate::profile::retract;
 use crate::{Error, Objective};
 
@@ -137,6 +138,13 @@ pub struct NewtonInfo {
     pub estimate: f64,
 }
 
+/// Which parts of the preconditioner.
+#[derive(Clone, Copy)]
+enum Level {
+    Both,
+    Phase,
+}
+
 /// A point with its energy and gradient; the objective's own point is this one.
 struct Point<const D: usize> {
     u: Tensor<D>,
@@ -148,7 +156,7 @@ struct Minimizer<'a, const D: usize, O> {
     objective: &'a mut O,
     params: NewtonParams,
     device: &'a ComputeDevice,
-    preconditioner: Option<&'a SpectralFilter>,
+    preconditioner: Option<&'a Preconditioner>,
     previous: &'a Tensor<D>,
     unknowns: f64,
     info: NewtonInfo,
@@ -163,7 +171,7 @@ pub fn minimize<const D: usize>(
     objective: &mut impl Objective<D>,
     previous: &Tensor<D>,
     start: &Tensor<D>,
-    preconditioner: Option<&SpectralFilter>,
+    preconditioner: Option<&Preconditioner>,
     params: NewtonParams,
     device: &ComputeDevice,
 ) -> Result<(Tensor<D>, NewtonInfo), Error> {
@@ -220,16 +228,19 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
     fn solve(
         &mut self,
         gradient: &Tensor<D>,
-        preconditioner: Option<&SpectralFilter>,
         limits: CgLimits,
+        level: Level,
     ) -> Result<CgSolution<D>, Error> {
-        let solution = conjugate_gradients(
-            self.objective,
-            gradient,
-            preconditioner,
-            limits,
-            self.device,
-        )?;
+        let (preconditioner, device) = (self.preconditioner, self.device);
+        let precondition = |r: &Tensor<D>| match (preconditioner, level) {
+            (Some(preconditioner), Level::Both) => preconditioner.apply(r, device),
+            (Some(preconditioner), Level::Phase) => {
+                Ok(spectral_filter(r.clone(), preconditioner.phase()))
+            }
+            (None, _) => Ok(r.clone()),
+        };
+        let solution =
+            conjugate_gradients(self.objective, gradient, &precondition, limits, device)?;
         self.info.hvp += solution.iterations;
         if solution.exit == CgExit::NegativeCurvature {
             self.info.negative_curvature += 1;
@@ -284,7 +295,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
             return Ok(point);
         }
         for _ in 0..ROUNDS {
-            let solution = self.solve(&point.gradient, self.preconditioner, limits)?;
+            let solution = self.solve(&point.gradient, limits, Level::Phase)?;
             let Some((u, energy)) = self.straight(&point, &solution, 0.05, 0.0)? else {
                 return Ok(point);
             };
@@ -338,7 +349,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
             iterations: self.params.cg_iterations,
         };
         while self.info.newton < self.params.newton_iterations {
-            let solution = self.solve(&point.gradient, self.preconditioner, limits)?;
+            let solution = self.solve(&point.gradient, limits, Level::Both)?;
             let sign = -solution.slope.signum();
             let decrease = solution.slope.abs();
             let done = self.converged(&point, solution.slope)?;
@@ -404,7 +415,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
                 tolerance: forcing.min(self.params.cg_tolerance),
                 iterations: self.params.cg_iterations,
             };
-            let solution = self.solve(&point.gradient, None, limits)?;
+            let solution = self.solve(&point.gradient, limits, Level::Both)?;
             let done = self.converged(&point, solution.slope)?;
             self.info.newton += 1;
             let next = self.straight(&point, &solution, 1e-6, 1e-4)?;

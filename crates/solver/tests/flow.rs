@@ -101,15 +101,18 @@ fn both_methods_find_the_same_minimizer_at_different_cost() {
             ..NewtonParams::default()
         });
         let record = flow.advance(TAU).unwrap();
-        (flow.field().unwrap(), record.newton)
+        let field = flow.field().unwrap();
+        let later = steps(&mut flow, 3).iter().map(|r| r.newton.hvp).sum();
+        (field, record.newton, later)
     };
-    let (fast, cheap) = run(Method::Preconditioned);
-    let (slow, plain) = run(Method::Paper);
+    let (fast, cheap, few): (_, _, usize) = run(Method::Preconditioned);
+    let (slow, plain, many): (_, _, usize) = run(Method::Paper);
     let motion = l2_distance(&fast, &ball(grid(), RADIUS)).unwrap();
     let difference = l2_distance(&fast, &slow).unwrap() / motion;
     assert!(difference < 0.02, "{difference}: {cheap:?} {plain:?}");
     assert!((cheap.energy / plain.energy - 1.0).abs() < 1e-3);
-    assert!(2 * plain.hvp > 3 * cheap.hvp, "{cheap:?} {plain:?}");
+    // The first step of the small disc costs about the same; later ones far less.
+    assert!(many > 4 * few, "{many} {few}");
 }
 
 /// One minimization of a scaled energy.
@@ -130,7 +133,7 @@ fn scaled_step(scale: f64) -> (Vec<f64>, solver::NewtonInfo) {
         &mut energy,
         &previous,
         &previous,
-        Some(&filter),
+        Some(&filter.into()),
         params,
         &device,
     )
