@@ -20,7 +20,7 @@ use crate::circles::{EPS, Flow, STEP};
 use crate::evolution::{Evolution, Trajectory};
 use crate::method::Method;
 use crate::networks::{NetworkOptions, convergence_ratios};
-use crate::options::RunOptions;
+use crate::options::{RunOptions, resolutions};
 
 /// The non-convex cross: arms of half length 0.8 and half width 0.27.
 ///
@@ -150,7 +150,7 @@ struct Comparison<'a> {
 /// # Errors
 /// Bad options before anything is written; what the runs raise.
 pub fn run(setting: &Setting, options: &ComparisonOptions) -> Result<(), Error> {
-    let cells = resolutions(options);
+    let cells = resolutions(&options.cells, options.run.quick, options.full);
     let finest = cells.iter().copied().max().unwrap_or(0);
     let default = if options.run.quick {
         finest
@@ -255,21 +255,6 @@ pub fn run(setting: &Setting, options: &ComparisonOptions) -> Result<(), Error> 
         output.as_path().display()
     ));
     Ok(())
-}
-
-fn resolutions(options: &ComparisonOptions) -> Vec<usize> {
-    let mut cells = if !options.cells.is_empty() {
-        options.cells.clone()
-    } else if options.run.quick {
-        vec![128]
-    } else if options.full {
-        vec![128, 256, 512]
-    } else {
-        vec![128, 256]
-    };
-    cells.sort_unstable();
-    cells.dedup();
-    cells
 }
 
 fn evolution(

@@ -101,3 +101,17 @@ impl RunOptions {
         }
     }
 }
+
+/// Cells per unit length of a convergence study, in increasing order: those chosen, or 128 for a smoke test, or 128 and 256, or
+/// with `full` 512 too.
+pub fn resolutions(chosen: &[usize], quick: bool, full: bool) -> Vec<usize> {
+    let mut cells = match (chosen, quick, full) {
+        ([], true, _) => vec![128],
+        ([], false, false) => vec![128, 256],
+        ([], false, true) => vec![128, 256, 512],
+        (chosen, ..) => chosen.to_vec(),
+    };
+    cells.sort_unstable();
+    cells.dedup();
+    cells
+}

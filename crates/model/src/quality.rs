@@ -1,12 +1,12 @@
 //! What a network is worth: losses on whole grids, its transfer function, its activation.
 
-use operators::{ComputeDevice, Transform, kernel_symbol};
+use operators::{ComputeDevice, Transform, circular_convolution, kernel_symbol};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::training::SphereData;
-use crate::{Error, MeanCurvatureOperator, Network};
+use crate::{Error, Network};
 
 /// A fixed draw of forty radii from `[0.05, 0.4]`, for which other implementations quote their losses.
 ///
@@ -125,19 +125,27 @@ fn u_len(data: &SphereData) -> f64 {
     (data.cells as f64).powi(data.ratios.dimension as i32)
 }
 
-/// `V[u]` and `V[-u]`.
+/// `V[u]` and `V[-u]`: by the table where it reaches, exactly beyond, where kernels without regularization go.
 fn applied<const D: usize>(
     network: &Network,
     data: &SphereData,
     u: &[f64],
     device: &ComputeDevice,
 ) -> Result<[Vec<f64>; 2], Error> {
-    let operator = MeanCurvatureOperator::<D>::new(network, device)?;
+    let kernel = device.tensor::<D>(network.kernel(), [network.ratios().width; D]);
     let u = device.tensor::<D>(u, [data.cells; D]);
-    Ok([
-        device.values(operator.apply(u.clone()))?,
-        device.values(operator.apply(u.neg()))?,
-    ])
+    let smoothed = device.values(circular_convolution(u, kernel, false))?;
+    let activation = network.activation();
+    let table = activation.table()?;
+    let range = table.range();
+    let value = |w: f64| {
+        if (range.low..=range.high).contains(&w) {
+            table.derivative(w, 0)
+        } else {
+            activation.value(w)
+        }
+    };
+    Ok([1.0, -1.0].map(|sign| smoothed.iter().map(|w| value(sign * w)).collect()))
 }
 
 /// Fine line over the arguments that occur, `[-1.05, 1.05]`.
@@ -172,4 +180,35 @@ fn radial_asymmetry(network: &Network) -> f64 {
         .map(|(low, high)| high - low)
         .fold(0.0, f64::max);
     spread / largest.max(f64::MIN_POSITIVE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pretrained;
+
+    /// The same function with `w` forty times as large: beyond the table, but not worse.
+    #[test]
+    fn losses_hold_beyond_the_table_of_the_activation() {
+        const SCALE: f64 = 40.0;
+        let (_, network) = pretrained::all().unwrap().remove(0);
+        let device = ComputeDevice::default_compiled().unwrap();
+        let mut data =
+            SphereData::new(network.ratios(), network.provenance().reference_cells).unwrap();
+        data.count = 4;
+        let quality = |network: &Network| Quality::measure(network, &data, 2, &device).unwrap();
+        let kernel = network.kernel().iter().map(|k| SCALE * k).collect();
+        let mut parameters = network.activation().parameters().to_vec();
+        // The weights of the first layer come first.
+        for weight in &mut parameters[..network.activation().layers()[1]] {
+            *weight /= SCALE;
+        }
+        let activation =
+            crate::Mlp::new(network.activation().layers().to_vec(), parameters).unwrap();
+        let provenance = network.provenance().clone();
+        let scaled = Network::new(network.ratios(), kernel, activation, provenance).unwrap();
+        let (expected, found) = (quality(&network), quality(&scaled));
+        let ratio = found.held_out_loss / expected.held_out_loss;
+        assert!((ratio - 1.0).abs() < 1e-6, "{ratio}");
+    }
 }

@@ -46,7 +46,8 @@
 //! 1. starts from an extrapolation in `atanh u`, the distance to the interface ([`extrapolate`]),
 //! 2. updates in that variable too ([`retract`]),
 //! 3. cleans the profile with a few linear iterations after every update, before energies are compared,
-//! 4. preconditions with the Hessian of the pure phases, diagonal in Fourier space,
+//! 4. preconditions with the Hessian of the pure phases, diagonal in Fourier space, plus the Hessian of the geometric problem
+//!    for displacements of the interface, on a coarse lattice ([`Preconditioner`]),
 //! 5. uses the full Hessian and stops at negative curvature (Steihaug),
 //! 6. stops when the Newton decrement is a small fraction of the motion, a test that no scaling of the energy changes and that
 //!    standing still does not pass.

@@ -7,7 +7,7 @@ use clap::Parser;
 use experiments::circles::{self, Ensemble, Flow};
 use experiments::method::Method;
 use experiments::networks::{NetworkOptions, convergence_ratios};
-use experiments::options::RunOptions;
+use experiments::options::{RunOptions, resolutions};
 use experiments::partial::Partial;
 use experiments::training::{self, NetworkSpec};
 use experiments::{Error, harness};
@@ -105,7 +105,7 @@ fn program(options: &Options) -> Result<(), Error> {
     } else {
         (circles::COUNT, circles::STEPS)
     };
-    let cells = resolutions(options);
+    let cells = resolutions(&options.cells, options.run.quick, options.full);
     let runs = Run::list(options, &cells);
     let learned = runs.iter().any(|run| run.method.is_learned());
     if !learned && (options.retrain || !options.networks.network.is_empty()) {
@@ -186,21 +186,6 @@ fn program(options: &Options) -> Result<(), Error> {
         output.as_path().display()
     ));
     Ok(())
-}
-
-fn resolutions(options: &Options) -> Vec<usize> {
-    let mut cells = if !options.cells.is_empty() {
-        options.cells.clone()
-    } else if options.run.quick {
-        vec![128]
-    } else if options.full {
-        vec![128, 256, 512]
-    } else {
-        vec![128, 256]
-    };
-    cells.sort_unstable();
-    cells.dedup();
-    cells
 }
 
 fn retrain(
