@@ -31,7 +31,8 @@
 //! # Discretization
 //!
 //! Multilinear (Q1) elements on the periodic grid, one code for two and three dimensions ([`element`]); consistent mass and
-//! stiffness; the double well `Psi(v) = 9/16 (1 - v^2)^2` is integrated exactly (three Gauss points per axis). Linear systems
+//! stiffness; the double well `Psi(v) = 9/16 (1 - v^2)^2` is integrated exactly (three Gauss points per axis), but for the explicit
+//! term of the semi-implicit step, which is interpolated at the nodes unless asked otherwise. Linear systems
 //! are solved by conjugate gradients, preconditioned with the exact inverse in the pure phases by Fourier transforms: the
 //! spectrum of the preconditioned matrix lies in `[(1 - 9/8 s)/(1 + 9/4 s), 1]` with `s = tautilde/eps^2`, independent of the
 //! grid. [`LinearSolver::Direct`] is the sparse Cholesky factorization the paper's comparison used.

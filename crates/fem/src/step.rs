@@ -87,7 +87,7 @@ impl<const D: usize> FiniteElementStep<D> {
     }
 
     /// The semi-implicit step with `int Psi'(u) phi_i` integrated exactly: of the same order, with a smaller error in the first
-    /// steps on coarse grids (a fifth less on circles at `h = eps/2`).
+    /// steps on coarse grids (a quarter less after one step of the circles at `h = eps/2`).
     ///
     /// # Errors
     /// As [`Scheme::new`].

@@ -91,11 +91,10 @@ impl InterfaceModes {
                 *n /= length;
             }
             // The foot point on the interface, in units of the lattice.
-            let s = here;
             let mut low = [0; D];
             let mut fraction = [0.0; D];
             for axis in 0..D {
-                let x = (index[axis] as f64 - s * normal[axis] / spacing) / width;
+                let x = (index[axis] as f64 - here * normal[axis] / spacing) / width;
                 low[axis] = x.floor().rem_euclid(lattice as f64) as usize % lattice;
                 fraction[axis] = x - x.floor();
             }
