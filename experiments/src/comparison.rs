@@ -465,13 +465,13 @@ impl Comparison<'_> {
                 .filter(|run| run.evolution.method == method && !self.is_reference_run(run))
                 .max_by_key(|run| run.evolution.n);
             if let Some(run) = finest {
-                rows.push((run, format!("{}, n = {}", method.label(), run.evolution.n)));
+                rows.push((run, format!("{}\nn = {}", method.label(), run.evolution.n)));
             }
         }
         let reference = &self.reference;
         rows.push((
             reference,
-            format!("reference, n = {}", reference.evolution.n),
+            format!("reference\nn = {}", reference.evolution.n),
         ));
         let window = [-self.setting.window, self.setting.window];
         let title = format!("{}: shapes", self.setting.title);

@@ -30,6 +30,7 @@ pub mod method;
 pub mod networks;
 pub mod options;
 pub mod partial;
+pub mod products;
 pub mod quality;
 pub mod training;
 

@@ -55,6 +55,25 @@ impl NetworkSpec {
         ]
     }
 
+    /// The network of the surfaces: `n = 64` with `eps = 2^-5`, `tautilde = 2^-12`, and `n = 128` with half and a quarter of
+    /// those. It is trained at `n = 128`, where the smallest sphere measures six cells.
+    pub fn surfaces() -> Self {
+        let ratios = Ratios {
+            dimension: 3,
+            width: 17,
+            eps_over_h: 2.0,
+            step_over_h2: 1.0,
+        };
+        Self::new("surfaces", ratios, 128)
+    }
+
+    /// All networks that ship with the library.
+    pub fn shipped() -> Vec<Self> {
+        let mut all = Self::paper();
+        all.push(Self::surfaces());
+        all
+    }
+
     /// Name of the weights file, by the ratios: `d2_k17_eps2_step1.safetensors`.
     pub fn file_name(&self) -> String {
         let Ratios {

@@ -1,6 +1,8 @@
 //! One suite for all backends: operations against their definitions, derivatives against independent ones, and a step
 //! of the flow against double precision on the CPU.
 
+use std::sync::Arc;
+
 use burn::tensor::Tensor;
 use fem::FiniteElementStep;
 use geometry::{Field, Grid, measure::l2_distance, phase_field, shapes::Ball};
@@ -8,8 +10,9 @@ use linearize::dual::{self, Dual};
 use linearize::taylor::{halvings, remainder};
 use model::{MeanCurvatureOperator, Network};
 use operators::{
-    COEFFICIENTS, HermiteTable, SpectralFilter, TableRange, circular_convolution,
-    kernel_correlation, spectral_filter, tabulated,
+    COEFFICIENTS, HermiteTable, HostUpdate, HostVectors, SpectralFilter, TableRange, add_scaled,
+    circular_convolution, extrapolate, inner_product, kernel_correlation, retract, spectral_filter,
+    tabulated, update_on_host,
 };
 use solver::{
     Exit, FlowParams, MeanCurvatureStep, MinimizingMovement, NewtonParams, Objective, StepRecord,
@@ -200,6 +203,149 @@ fn spectral_filters_multiply_spectra() {
     }
 }
 
+/// Slices share the memory of the tensor they are cut from.
+#[test]
+fn operations_take_slices_for_what_they_are() {
+    let (grid, width) = ([6, 8], 3);
+    let (x, kernel) = (noise(48, 1), noise(9, 2));
+    let expected = convolution(&x, &grid, &kernel, width, false);
+    let table = HermiteTable::new(
+        TableRange {
+            low: -2.0,
+            high: 2.0,
+            cells: 512,
+        },
+        |w: f64| [w.sin(), w.cos(), -w.sin()],
+    )
+    .unwrap();
+    for backend in &backends() {
+        let device = &backend.device;
+        let tolerance = backend.tolerance(1e-12, 1e-5);
+        // The values with others before and behind them.
+        let cut = |values: &[f64]| -> Tensor<1> {
+            let longer = [&noise(5, 3), values, &noise(7, 4)].concat();
+            let whole: Tensor<1> = device.tensor(&longer, [longer.len()]);
+            whole.slice([5..5 + values.len()])
+        };
+        let grid_of = |values: &[f64]| -> Tensor<2> { cut(values).reshape(grid) };
+        let values = |x: Tensor<2>| device.values(x).unwrap();
+        let check = |found: &[f64], expected: &[f64], what| {
+            close(
+                backend,
+                found,
+                expected,
+                tolerance,
+                &format!("{what} of slices"),
+            );
+        };
+        let sliced: Tensor<2> = cut(&kernel).reshape([width; 2]);
+        let found = circular_convolution(grid_of(&x), sliced, false);
+        check(&values(found), &expected, "convolution");
+        let g = noise(48, 6);
+        let found: Tensor<2> = kernel_correlation(grid_of(&x), grid_of(&g), width);
+        check(
+            &values(found),
+            &correlation(&x, &g, &grid, width),
+            "correlation",
+        );
+        let coefficients: Tensor<2> = cut(table.coefficients()).reshape([512, COEFFICIENTS]);
+        let found = tabulated(grid_of(&x), coefficients, table.range(), 0);
+        let sine: Vec<f64> = x.iter().map(|x| x.sin()).collect();
+        check(&values(found), &sine, "table");
+        let filter = SpectralFilter::from_kernel(&grid, &[1.0], 1, |_| 2.0);
+        let twice: Vec<f64> = x.iter().map(|x| 2.0 * x).collect();
+        check(
+            &values(spectral_filter(grid_of(&x), &filter)),
+            &twice,
+            "filter",
+        );
+        let sum: Vec<f64> = x.iter().zip(&g).map(|(x, g)| x + 3.0 * g).collect();
+        check(
+            &values(add_scaled(grid_of(&x), &grid_of(&g), 3.0)),
+            &sum,
+            "sum",
+        );
+        let product = device
+            .scalar(inner_product(&grid_of(&x), &grid_of(&g)))
+            .unwrap();
+        check(&[product], &[dot(&x, &g)], "inner product");
+    }
+}
+
+/// Adds three times the first vector.
+struct AddThrice;
+
+impl HostUpdate for AddThrice {
+    fn update(&self, vectors: HostVectors<'_>) {
+        match vectors {
+            HostVectors::Double(x, z) => z.iter_mut().zip(x).for_each(|(z, x)| *z += 3.0 * x),
+            HostVectors::Single(x, z) => z.iter_mut().zip(x).for_each(|(z, x)| *z += 3.0 * x),
+        }
+    }
+}
+
+#[test]
+fn vector_operations_are_their_formulas() {
+    // Long enough for several threads.
+    let shape = [210, 200];
+    let count = 210 * 200;
+    let (a, b) = (noise(count, 1), noise(count, 2));
+    let phase: Vec<f64> = a.iter().map(|a| (4.0 * a).tanh()).collect();
+    let before: Vec<f64> = phase.iter().zip(&b).map(|(u, b)| u - 0.1 * b).collect();
+    let zip = |x: &[f64], y: &[f64], f: &dyn Fn(f64, f64) -> f64| -> Vec<f64> {
+        x.iter().zip(y).map(|(x, y)| f(*x, *y)).collect()
+    };
+    let sum = zip(&a, &b, &|a, b| a + 3.0 * b);
+    // In the variable atanh u, both motions are shifts.
+    let atanh = |u: f64| u.clamp(-0.99999, 0.99999).atanh();
+    let retracted = zip(&phase, &b, &|u, p| {
+        let q = 1.0 - u * u;
+        let shift = (-0.3 * p * q / (q * q + 0.0025)).clamp(-1.5, 1.5);
+        (atanh(u) + shift).tanh() - atanh(u).tanh() + u - 0.3 * p - q * shift
+    });
+    let extrapolated = zip(&phase, &before, &|u, v| {
+        let q = 1.0 - u * u;
+        let s = (2.0 * (atanh(u) - atanh(v)).tanh()).clamp(-0.9, 0.9);
+        let s = s * q * q / (q * q + 0.0025);
+        let moved = (atanh(u) + s.atanh()).tanh();
+        u + moved - atanh(u).tanh()
+    });
+    for backend in &backends() {
+        let device = &backend.device;
+        let tensor = |x: &[f64]| -> Tensor<2> { device.tensor(x, shape) };
+        let values = |x: Tensor<2>| device.values(x).unwrap();
+        let product = device
+            .scalar(inner_product(&tensor(&a), &tensor(&b)))
+            .unwrap();
+        let scale = (dot(&a, &a) * dot(&b, &b)).sqrt();
+        let error = (product - dot(&a, &b)).abs() / scale;
+        assert!(error < backend.tolerance(1e-14, 1e-6), "{error:e}");
+        let kept = tensor(&a);
+        let moved = add_scaled(kept.clone(), &tensor(&b), 3.0);
+        let tolerance = backend.tolerance(1e-9, 1e-5);
+        close(backend, &values(moved), &sum, tolerance, "x + 3 y");
+        close(backend, &values(kept), &a, tolerance, "x after x + 3 y");
+        let updated = update_on_host(&tensor(&b), tensor(&a), &Arc::new(AddThrice));
+        close(
+            backend,
+            &values(updated),
+            &sum,
+            tolerance,
+            "update on the host",
+        );
+        let moved = retract(&tensor(&phase), &tensor(&b), -0.3);
+        close(backend, &values(moved), &retracted, tolerance, "retraction");
+        let moved = extrapolate(&tensor(&phase), &tensor(&before), 2.0);
+        close(
+            backend,
+            &values(moved),
+            &extrapolated,
+            tolerance,
+            "extrapolation",
+        );
+    }
+}
+
 /// The energy of a step at one point, and directions, in `D` dimensions.
 struct Case<const D: usize> {
     network: Network,
@@ -236,12 +382,9 @@ impl<const D: usize> Case<D> {
 
     fn energy(&self, backend: &Backend) -> MinimizingMovement<D> {
         let operator = MeanCurvatureOperator::new(&self.network, &backend.device).unwrap();
-        let mut energy = MinimizingMovement::new(
-            std::sync::Arc::new(operator.clone()),
-            self.cells,
-            &backend.device,
-        )
-        .unwrap();
+        let mut energy =
+            MinimizingMovement::new(Arc::new(operator.clone()), self.cells, &backend.device)
+                .unwrap();
         let previous = self.tensor(backend, &self.previous);
         energy.set(&previous, STIFFNESS).unwrap();
         energy
@@ -495,8 +638,7 @@ fn finite_elements<const D: usize>(cells: usize) {
         let tolerance = backend.tolerance(1e-14, 1e-6);
         close(&backend, &moved, expected.values(), tolerance, "step");
 
-        let mut energy =
-            MinimizingMovement::new(std::sync::Arc::new(step.clone()), cells, device).unwrap();
+        let mut energy = MinimizingMovement::new(Arc::new(step.clone()), cells, device).unwrap();
         let previous: Vec<f64> = start.values().iter().map(|u| 0.9 * u).collect();
         energy.set(&tensor(&previous), 1.0).unwrap();
         energy.evaluate(&u).unwrap();

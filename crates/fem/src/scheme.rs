@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use operators::SpectralFilter;
-use rayon::prelude::*;
+use operators::slices::{dot, zip_apply};
 
 use crate::direct::{Factorization, Symbolic};
 use crate::element::{self, Stencil};
@@ -368,47 +368,4 @@ impl<const D: usize> Scheme<D> {
             tolerance,
         })
     }
-}
-
-/// Values per task of parallel vector operations; sums are taken in this order whatever the number of threads.
-const CHUNK: usize = 1 << 14;
-
-fn zip_apply(a: &mut [f64], b: &[f64], f: impl Fn(f64, f64) -> f64 + Sync) {
-    let run = |a: &mut [f64], b: &[f64]| {
-        for (a, b) in a.iter_mut().zip(b) {
-            *a = f(*a, *b);
-        }
-    };
-    if a.len() <= 2 * CHUNK {
-        run(a, b);
-    } else {
-        a.par_chunks_mut(CHUNK)
-            .zip(b.par_chunks(CHUNK))
-            .for_each(|(a, b)| run(a, b));
-    }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let part = |(a, b): (&[f64], &[f64])| -> f64 {
-        // Eight sums side by side, in a fixed order.
-        let mut sums = [0.0; 8];
-        let (blocks_a, rest_a) = a.as_chunks::<8>();
-        let (blocks_b, rest_b) = b.as_chunks::<8>();
-        for (a, b) in blocks_a.iter().zip(blocks_b) {
-            for k in 0..8 {
-                sums[k] += a[k] * b[k];
-            }
-        }
-        let rest: f64 = rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum();
-        sums.iter().sum::<f64>() + rest
-    };
-    if a.len() <= 2 * CHUNK {
-        return a.chunks(CHUNK).zip(b.chunks(CHUNK)).map(part).sum();
-    }
-    let parts: Vec<f64> = a
-        .par_chunks(CHUNK)
-        .zip(b.par_chunks(CHUNK))
-        .map(part)
-        .collect();
-    parts.iter().sum()
 }

@@ -6,6 +6,8 @@ use std::fmt;
 use burn::backend::ir::{IrVisitorMut, OperationIr, TensorId, TensorIr, TensorStatus};
 use burn::tensor::{DType, Shape};
 
+/// First identifier of tensors converted to the precision of the tangent program.
+pub(crate) const CAST_IDS: u64 = 1 << 28;
 /// First identifier of tensors of the tangent program.
 pub(crate) const TANGENT_IDS: u64 = 1 << 32;
 /// First identifier of unevaluated tangent expressions.

@@ -72,7 +72,7 @@
 //! operations are elementwise, so that pointwise second derivatives merge into one coefficient that is
 //! computed once per point. [`Program`] prints what is left. Last uses are known, so backends compute
 //! in place, and between [`at`](Linearization::at) and [`apply`](Linearization::apply) only what the
-//! tangent program reads is kept.
+//! tangent program reads is kept. [`Graph::linearize_in`] runs the products in another precision than values and gradients.
 //!
 //! Rules cover arithmetic with broadcasting, elementary functions, reductions, matrix products,
 //! convolutions and linear layers with their backward passes, indexing, masks, and what Burn's autodiff
@@ -100,6 +100,7 @@ compile_error!("linearize needs a backend: enable one of the features flex, ndar
 pub mod dual;
 pub mod taylor;
 
+mod conversion;
 mod emit;
 mod error;
 mod extensions;

@@ -7,8 +7,9 @@ use burn::backend::ir::{
     BaseOperationIr as Base, NumericOperationIr as Num, OperationIr, TensorId, TensorIr,
     TensorStatus,
 };
-use burn::tensor::{Device, TensorData};
+use burn::tensor::{DType, Device, TensorData};
 
+use crate::conversion::Conversion;
 use crate::emit::Emitter;
 use crate::ir::{Line, detach_outputs, each_tensor, name, read_only, rename, with_status};
 use crate::rules::{self, Context};
@@ -31,6 +32,8 @@ pub struct Program {
     pub(crate) tangent: Block,
     /// What the tangent program reads of the primal program, to be freed with the point.
     pub(crate) saved: Vec<TensorIr>,
+    /// What the tangent program is applied to.
+    pub(crate) directions: Vec<TensorIr>,
 }
 
 /// One straight-line program.
@@ -206,7 +209,12 @@ fn live<'a, 'b>(
         .filter_map(|(operation, keep)| keep.then_some(operation))
 }
 
-pub(crate) fn linearize(graph: &Graph, extensions: &Extensions) -> Result<Program, Error> {
+/// `products`: the float type of the tangent program, if not that of the graph.
+pub(crate) fn linearize(
+    graph: &Graph,
+    extensions: &Extensions,
+    products: Option<DType>,
+) -> Result<Program, Error> {
     let simplified = simplify(graph);
     let mut cx = Context {
         build: Builder::new(),
@@ -287,16 +295,16 @@ pub(crate) fn linearize(graph: &Graph, extensions: &Extensions) -> Result<Progra
             cx.build.or_zeros(tangent, &out.shape, out.dtype)
         })
         .collect();
-    Ok(assemble(
-        cx.build,
+    let ends = Ends {
         variables,
         parameters,
         constants,
-        &directions,
-        &value,
-        &outputs,
-        &tangents,
-    ))
+        directions,
+        value,
+        outputs,
+        tangents,
+    };
+    Ok(assemble(cx.build, ends, products))
 }
 
 /// Give a detached operation its outputs back.
@@ -309,27 +317,34 @@ fn name_outputs(operation: &mut OperationIr, outputs: &[TensorIr]) {
     });
 }
 
-#[allow(
-    clippy::too_many_arguments,
-    reason = "called once, to finish linearize"
-)]
-fn assemble(
-    build: Builder,
+/// Inputs and outputs of all programs.
+struct Ends {
     variables: Vec<TensorIr>,
     parameters: Vec<TensorIr>,
     constants: Vec<(TensorIr, TensorData)>,
-    directions: &[TensorIr],
-    value: &TensorIr,
-    outputs: &[TensorIr],
-    tangents: &[TensorIr],
-) -> Program {
-    let tangent: Vec<OperationIr> = live(&build.tangent.into_operations(), tangents.iter())
-        .cloned()
-        .collect();
+    directions: Vec<TensorIr>,
+    value: TensorIr,
+    outputs: Vec<TensorIr>,
+    tangents: Vec<TensorIr>,
+}
+
+fn outputs_of<'a>(operations: impl IntoIterator<Item = &'a OperationIr>) -> HashSet<TensorId> {
+    let outputs = |operation: &'a OperationIr| operation.outputs().map(|t| t.id);
+    operations.into_iter().flat_map(outputs).collect()
+}
+
+fn assemble(build: Builder, mut ends: Ends, products: Option<DType>) -> Program {
+    let mut tangent: Vec<OperationIr> =
+        live(&build.tangent.into_operations(), ends.tangents.iter())
+            .cloned()
+            .collect();
     let all = build.primal.into_operations();
 
     // What depends on inputs, and what does not.
-    let inputs: Vec<TensorIr> = variables.iter().chain(&parameters).cloned().collect();
+    let inputs: Vec<TensorIr> = (ends.variables.iter())
+        .chain(&ends.parameters)
+        .cloned()
+        .collect();
     let mut varying: HashSet<TensorId> = inputs.iter().map(|t| t.id).collect();
     for operation in &all {
         if operation.inputs().any(|t| varying.contains(&t.id)) {
@@ -344,73 +359,74 @@ fn assemble(
         .filter(|operation| varies(operation) || is_fill(operation))
         .cloned()
         .collect();
-    let produced_locally: HashSet<TensorId> = (local.iter())
-        .flat_map(|operation| operation.outputs().map(|t| t.id).collect::<Vec<_>>())
-        .chain(inputs.iter().map(|t| t.id))
-        .collect();
+    let mut produced_locally = outputs_of(&local);
+    produced_locally.extend(inputs.iter().map(|t| t.id));
 
-    let in_primal: HashSet<TensorId> = (all.iter())
-        .flat_map(|operation| operation.outputs().map(|t| t.id).collect::<Vec<_>>())
-        .chain(inputs.iter().map(|t| t.id))
-        .collect();
+    let mut in_tangent = outputs_of(&tangent);
+    in_tangent.extend(ends.directions.iter().map(|t| t.id));
     let mut saved: Vec<TensorIr> = Vec::new();
-    let mut from_constants: Vec<TensorIr> = Vec::new();
+    let mut constants_of_tangent: Vec<TensorIr> = Vec::new();
     for t in tangent.iter().flat_map(OperationIr::inputs) {
-        let list = if produced_locally.contains(&t.id) {
-            &mut saved
-        } else if in_primal.contains(&t.id) {
-            &mut from_constants
-        } else {
+        let list = if in_tangent.contains(&t.id) {
             continue;
+        } else if produced_locally.contains(&t.id) {
+            &mut saved
+        } else {
+            &mut constants_of_tangent
         };
         if !list.iter().any(|known| known.id == t.id) {
             list.push(read_only(t));
         }
     }
 
-    let primal: Vec<OperationIr> = live(&local, outputs.iter().chain([value]).chain(&saved))
+    let value = std::slice::from_ref(&ends.value);
+    let needed = ends.outputs.iter().chain(value).chain(&saved);
+    let mut primal: Vec<OperationIr> = live(&local, needed).cloned().collect();
+    let value_operations: Vec<OperationIr> = live(&local, value.iter()).cloned().collect();
+    let mut from_constants: Vec<TensorIr> = (primal.iter().chain(&value_operations))
+        .flat_map(OperationIr::inputs)
+        .chain(&ends.outputs)
+        .chain(value)
+        .filter(|t| !produced_locally.contains(&t.id))
         .cloned()
         .collect();
-    let value_operations: Vec<OperationIr> = live(&local, [value].into_iter()).cloned().collect();
-    for t in (primal.iter().chain(&value_operations))
-        .flat_map(OperationIr::inputs)
-        .chain(outputs)
-        .chain([value])
-    {
-        if !produced_locally.contains(&t.id) {
-            from_constants.push(t.clone());
+    let mut constant: Vec<OperationIr> =
+        live(&all, from_constants.iter().chain(&constants_of_tangent))
+            .filter(|operation| !varies(operation))
+            .cloned()
+            .collect();
+    if let Some(dtype) = products {
+        let mut conversion = Conversion::to(dtype);
+        primal.extend(conversion.cast(&mut saved));
+        constant.extend(conversion.cast(&mut constants_of_tangent));
+        tangent.iter_mut().for_each(|op| conversion.rewrite(op));
+        for t in ends.directions.iter_mut().chain(&mut ends.tangents) {
+            conversion.convert(t);
         }
     }
-    let constant: Vec<OperationIr> = live(&all, from_constants.iter())
-        .filter(|operation| !varies(operation))
-        .cloned()
-        .collect();
+    from_constants.extend(constants_of_tangent);
 
-    let primal_outputs: Vec<TensorIr> = [value].into_iter().chain(outputs).cloned().collect();
+    let primal_outputs: Vec<TensorIr> = value.iter().chain(&ends.outputs).cloned().collect();
     let keep: HashSet<TensorId> = saved.iter().map(|t| t.id).collect();
+    let kept_constants = from_constants.iter().map(|t| t.id).collect();
     Program {
         value: separate(Block::new(
             &inputs,
             value_operations,
-            std::slice::from_ref(value),
+            value,
             &HashSet::new(),
         )),
         primal: Block::new(&inputs, primal, &primal_outputs, &keep),
-        tangent: Block::new(directions, tangent, tangents, &HashSet::new()),
-        variables,
-        parameters,
-        constants,
-        constant: Block::new(
-            &[],
-            constant,
-            &[],
-            &from_constants.iter().map(|t| t.id).collect(),
-        )
-        .operations,
+        tangent: Block::new(&ends.directions, tangent, &ends.tangents, &HashSet::new()),
+        constant: Block::new(&[], constant, &[], &kept_constants).operations,
         saved: saved
             .iter()
             .map(|t| with_status(t, TensorStatus::ReadWrite))
             .collect(),
+        variables: ends.variables,
+        parameters: ends.parameters,
+        constants: ends.constants,
+        directions: ends.directions,
     }
 }
 
@@ -542,7 +558,7 @@ mod tests {
     use crate::ir::tensor;
     use TensorStatus::{ReadOnly, ReadWrite};
     use burn::backend::ir::{BinaryOpIr, UnaryOpIr};
-    use burn::tensor::{DType, Shape};
+    use burn::tensor::Shape;
 
     fn t(id: u64) -> TensorIr {
         tensor(id, Shape::from([2, 2]), DType::F64)

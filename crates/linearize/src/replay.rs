@@ -139,7 +139,7 @@ impl Linearization {
         }
         check(
             ("directions", "direction"),
-            &self.program.variables,
+            &self.program.directions,
             directions,
         )?;
         let block = &self.program.tangent;

@@ -339,6 +339,43 @@ fn double_precision_stays_double() {
     }
 }
 
+/// Only products change their precision: values and gradients are the same bytes.
+#[test]
+fn products_in_single_precision() {
+    for device in devices() {
+        let u: Tensor<2> = random(&device, [16, 16], 1, -1.0, 1.0);
+        let f: Tensor<2> = random(&device, [16, 16], 2, -1.0, 1.0);
+        let c: Tensor<1> = random(&device, [1], 3, 0.5, 1.0);
+        let p: Tensor<2> = random(&device, [16, 16], 4, -1.0, 1.0);
+        let graph = graph(&u, &f, &c);
+        let program = graph.linearize_in(&Extensions::new(), DType::F32).unwrap();
+        let mut mixed = program.on(&device, &Extensions::new()).unwrap();
+        let mut double = linearization(&graph, &device);
+        for scale in [1.0, 0.5] {
+            let point = [Value::from(u.clone() * scale)];
+            let parameters = [Value::from(&f), Value::from(&c)];
+            let (one, other) = (
+                mixed.at(&point, &parameters).unwrap(),
+                double.at(&point, &parameters).unwrap(),
+            );
+            assert_eq!(one.value.to_vec(), other.value.to_vec());
+            assert_eq!(one.gradients[0].to_vec(), other.gradients[0].to_vec());
+            let exact = double.apply(&[(&p).into()]).unwrap()[0].to_vec();
+            let single = mixed.apply(&[(p.clone().cast(DType::F32)).into()]).unwrap();
+            assert_eq!(single[0].dtype(), DType::F32);
+            let error = distance(&single[0].to_vec(), &exact);
+            assert!(error > 0.0 && error < 1e-5, "{error:e}");
+            assert!(matches!(
+                mixed.apply(&[(&p).into()]),
+                Err(Error::DType {
+                    role: "direction",
+                    ..
+                })
+            ));
+        }
+    }
+}
+
 #[test]
 fn linearizations_run_on_several_threads_at_once() {
     fn is_send<T: Send>() {}

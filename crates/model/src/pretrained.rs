@@ -16,6 +16,7 @@ const SHIPPED: &[(&str, &[u8])] = shipped![
     "d2_k33_eps4_step4.safetensors",
     "d2_k65_eps8_step16.safetensors",
     "d2_k17_eps4_step4.safetensors",
+    "d3_k17_eps2_step1.safetensors",
 ];
 
 /// The name under which a network with these ratios is shipped.

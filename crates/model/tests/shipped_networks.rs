@@ -15,7 +15,7 @@ fn bounds(ratios: Ratios) -> (f64, f64) {
 fn shipped_networks_reach_their_quality() {
     let device = ComputeDevice::default_compiled().unwrap();
     let networks = pretrained::all().unwrap();
-    assert_eq!(networks.len(), 4);
+    assert_eq!(networks.len(), 5);
     for (name, network) in networks {
         assert_eq!(name, pretrained::file_name(network.ratios()));
         let cells = network.provenance().reference_cells;
@@ -42,8 +42,8 @@ fn losses_in_the_metadata_are_those_of_the_weights() {
     let device = ComputeDevice::default_compiled().unwrap();
     for (name, network) in pretrained::all().unwrap() {
         let provenance = network.provenance();
-        if provenance.reference_cells > 256 {
-            continue; // the same code path, four times the time
+        if provenance.reference_cells > 256 || network.ratios().dimension > 2 {
+            continue; // the same code path, many times the time
         }
         let data = SphereData::new(network.ratios(), provenance.reference_cells).unwrap();
         let quality = Quality::measure(&network, &data, 20, &device).unwrap();

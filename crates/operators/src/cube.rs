@@ -1,13 +1,15 @@
 //! The extension operations on CubeCL backends (wgpu, CUDA): composed of Burn's own operations.
 
 use burn::backend::{Cube, tensor::FloatTensor};
-use burn::tensor::Tensor;
+use burn::tensor::{DType, Tensor, TensorData};
 use burn_backend::TensorMetadata;
 
 use crate::composed;
 use crate::filter::{FilterOps, SpectralFilter};
 use crate::ops::GridOps;
+use crate::profile;
 use crate::table::TableRange;
+use crate::vector::{self, SharedUpdate, VectorOps};
 
 type CubeTensor = FloatTensor<Cube>;
 
@@ -91,6 +93,40 @@ impl FilterOps for Cube {
             let x = up::<R>(x);
             let symbol = filter.on_device(&x.device(), x.dtype());
             down(composed::spectral_filter::<R>(x, symbol))
+        })
+    }
+}
+
+impl VectorOps for Cube {
+    fn inner_product(a: CubeTensor, b: CubeTensor) -> CubeTensor {
+        ranked!(a.shape().num_dims(), 1 2 3 4, R => down((up::<R>(a) * up::<R>(b)).sum()))
+    }
+
+    fn add_scaled(x: CubeTensor, y: CubeTensor, alpha: f64) -> CubeTensor {
+        ranked!(x.shape().num_dims(), 1 2 3 4, R => down(up::<R>(x) + up::<R>(y) * alpha))
+    }
+
+    fn retract(u: CubeTensor, p: CubeTensor, t: f64) -> CubeTensor {
+        ranked!(u.shape().num_dims(), 1 2 3 4, R => down(profile::retract(up::<R>(u), up::<R>(p), t)))
+    }
+
+    fn extrapolate(u: CubeTensor, previous: CubeTensor, factor: f64) -> CubeTensor {
+        ranked!(u.shape().num_dims(), 1 2 3 4, R => {
+            down(profile::extrapolate(up::<R>(u), up::<R>(previous), factor))
+        })
+    }
+
+    fn update_on_host(x: CubeTensor, z: CubeTensor, update: SharedUpdate) -> CubeTensor {
+        ranked!(x.shape().num_dims(), 1 2 3 4, R => {
+            let (x, z) = (up::<R>(x), up::<R>(z));
+            let (shape, device) = (z.dims(), z.device());
+            let read = |t: Tensor<R>| -> Vec<f32> {
+                let data = t.try_into_data_dtype(DType::F32).expect("the device answers");
+                data.try_into_vec().expect("single precision was asked for")
+            };
+            let (x, mut z) = (read(x), read(z));
+            vector::call(&update, &x, &mut z);
+            down(Tensor::from_data(TensorData::new(z, shape), (&device, DType::F32)))
         })
     }
 }

@@ -23,6 +23,8 @@ const PARALLEL_FROM: usize = 1 << 15;
 pub trait Real: FftNum + Float + bytemuck::Pod + Default {
     /// Conversion from a double, rounding if needed.
     fn of(value: f64) -> Self;
+    /// The value as a double, exactly.
+    fn double(self) -> f64;
     /// The process-wide plans and kernel symbols of this type.
     fn shared() -> &'static Shared<Self>;
 }
@@ -38,6 +40,9 @@ macro_rules! real {
         impl Real for $type {
             fn of(value: f64) -> Self {
                 value as $type
+            }
+            fn double(self) -> f64 {
+                self.into()
             }
             fn shared() -> &'static Shared<Self> {
                 static SHARED: std::sync::OnceLock<Shared<$type>> = std::sync::OnceLock::new();

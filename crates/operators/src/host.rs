@@ -62,12 +62,14 @@ macro_rules! in_precision {
 
 #[cfg(feature = "flex")]
 mod flex {
-    use burn_backend::{DType, TensorData, TensorMetadata};
+    use burn_backend::{DType, Element, TensorData, TensorMetadata};
     use burn_flex::{Flex, FlexTensor};
 
     use super::{SpectralFilter, TableRange};
     use crate::filter::FilterOps;
     use crate::ops::GridOps;
+    use crate::slices;
+    use crate::vector::{self, SharedUpdate, VectorOps};
 
     fn contiguous(x: FlexTensor) -> FlexTensor {
         if x.is_contiguous() {
@@ -77,12 +79,18 @@ mod flex {
         }
     }
 
+    /// The values of a contiguous tensor. Its storage can hold more: that of the tensor it is a slice of.
+    fn values<T: Element + bytemuck::Pod>(x: &FlexTensor) -> &[T] {
+        x.as_slice()
+            .expect("the tensor is contiguous and of this type")
+    }
+
     impl GridOps for Flex {
         fn circular_convolution(x: FlexTensor, kernel: FlexTensor, adjoint: bool) -> FlexTensor {
             let (x, kernel) = (contiguous(x), contiguous(kernel));
             let (shape, kernel_shape) = (x.shape(), kernel.shape());
             in_precision!(x.dtype(), T => {
-                let y = super::circular_convolution::<T>(x.storage(), &shape, kernel.storage(), &kernel_shape, adjoint);
+                let y = super::circular_convolution::<T>(values(&x), &shape, values(&kernel), &kernel_shape, adjoint);
                 FlexTensor::from_data(TensorData::new(y, shape))
             })
         }
@@ -96,7 +104,7 @@ mod flex {
             let (x, g) = (contiguous(x), contiguous(g));
             let shape = x.shape();
             in_precision!(x.dtype(), T => {
-                let y = super::kernel_correlation::<T>(x.storage(), &shape, g.storage(), width, axes);
+                let y = super::kernel_correlation::<T>(values(&x), &shape, values(&g), width, axes);
                 FlexTensor::from_data(TensorData::new(y, vec![width; axes]))
             })
         }
@@ -110,9 +118,47 @@ mod flex {
             let (w, table) = (contiguous(w), contiguous(table));
             let shape = w.shape();
             in_precision!(w.dtype(), T => {
-                let y = super::tabulated::<T>(w.storage(), table.storage(), range, order);
+                let y = super::tabulated::<T>(values(&w), values(&table), range, order);
                 FlexTensor::from_data(TensorData::new(y, shape))
             })
+        }
+    }
+
+    /// Changes `x` in place, or a copy of it if somebody else holds it; `y` stays.
+    macro_rules! in_place {
+        ($x:ident, $y:ident, $f:expr) => {{
+            let (mut x, y) = (contiguous($x), contiguous($y));
+            in_precision!(x.dtype(), T => {
+                let (start, end) = x.layout().contiguous_offsets().expect("x is contiguous");
+                $f(&mut x.storage_mut::<T>()[start..end], values::<T>(&y));
+            });
+            x
+        }};
+    }
+
+    impl VectorOps for Flex {
+        fn inner_product(a: FlexTensor, b: FlexTensor) -> FlexTensor {
+            let (a, b) = (contiguous(a), contiguous(b));
+            let sum = in_precision!(a.dtype(), T => slices::dot::<T>(values(&a), values(&b)));
+            FlexTensor::from_data(TensorData::new(vec![sum], vec![1]))
+        }
+
+        fn add_scaled(x: FlexTensor, y: FlexTensor, alpha: f64) -> FlexTensor {
+            in_place!(x, y, |x, y| vector::axpy(x, y, alpha))
+        }
+
+        fn retract(u: FlexTensor, p: FlexTensor, t: f64) -> FlexTensor {
+            in_place!(u, p, |u, p| vector::retract_values(u, p, t))
+        }
+
+        fn extrapolate(u: FlexTensor, previous: FlexTensor, factor: f64) -> FlexTensor {
+            in_place!(u, previous, |u, before| vector::extrapolate_values(
+                u, before, factor
+            ))
+        }
+
+        fn update_on_host(x: FlexTensor, z: FlexTensor, update: SharedUpdate) -> FlexTensor {
+            in_place!(z, x, |z, x| vector::call(&update, x, z))
         }
     }
 
@@ -121,7 +167,7 @@ mod flex {
             let x = contiguous(x);
             let shape = x.shape();
             in_precision!(x.dtype(), T => {
-                let y = super::spectral_filter::<T>(x.storage(), &shape, &filter);
+                let y = super::spectral_filter::<T>(values(&x), &shape, &filter);
                 FlexTensor::from_data(TensorData::new(y, shape))
             })
         }
@@ -139,6 +185,8 @@ mod ndarray {
     use crate::fft::Real;
     use crate::filter::FilterOps;
     use crate::ops::GridOps;
+    use crate::slices;
+    use crate::vector::{self, SharedUpdate, VectorOps};
 
     type NdTensor = FloatTensor<NdArray>;
 
@@ -181,6 +229,42 @@ mod ndarray {
                 let (w, table) = (values::<T>(w), values::<T>(table));
                 tensor(super::tabulated(&w, &table, range, order), shape)
             })
+        }
+    }
+
+    macro_rules! in_place {
+        ($x:ident, $y:ident, $f:expr) => {{
+            let shape = $x.shape();
+            in_precision!($x.dtype(), T => {
+                let (mut x, y) = (values::<T>($x), values::<T>($y));
+                $f(&mut x[..], &y[..]);
+                tensor(x, shape)
+            })
+        }};
+    }
+
+    impl VectorOps for NdArray {
+        fn inner_product(a: NdTensor, b: NdTensor) -> NdTensor {
+            let sum = in_precision!(a.dtype(), T => slices::dot(&values::<T>(a), &values::<T>(b)));
+            tensor(vec![sum], vec![1])
+        }
+
+        fn add_scaled(x: NdTensor, y: NdTensor, alpha: f64) -> NdTensor {
+            in_place!(x, y, |x, y| vector::axpy(x, y, alpha))
+        }
+
+        fn retract(u: NdTensor, p: NdTensor, t: f64) -> NdTensor {
+            in_place!(u, p, |u, p| vector::retract_values(u, p, t))
+        }
+
+        fn extrapolate(u: NdTensor, previous: NdTensor, factor: f64) -> NdTensor {
+            in_place!(u, previous, |u, before| vector::extrapolate_values(
+                u, before, factor
+            ))
+        }
+
+        fn update_on_host(x: NdTensor, z: NdTensor, update: SharedUpdate) -> NdTensor {
+            in_place!(z, x, |z, x| vector::call(&update, x, z))
         }
     }
 

@@ -23,6 +23,8 @@
 //! | [`kernel_correlation`] | `c_b = sum_a g_a x_{a+b}` | [`circular_convolution`] |
 //! | [`tabulated`] | `y_a = F^(k)(w_a)`, `F` a quintic Hermite table | itself with `k + 1` |
 //! | [`spectral_filter`] | `y = F^-1[symbol F[x]]` | none (preconditioners) |
+//! | [`inner_product`], [`add_scaled`], [`update_on_host`] | `sum a b`, `x + alpha y`, work on the host | none (iterative solvers) |
+//! | [`retract`], [`extrapolate`] | motions in the variable `atanh u` | none (line searches) |
 //!
 //! Conventions: grids are row-major, the last axis fastest; a kernel has the same odd width on every axis and its
 //! centre in the middle; leading axes beyond the kernel's are a batch. The CPU backends (`flex`, `ndarray`) compute in
@@ -38,6 +40,8 @@
     allow(dead_code, unused_macros, unused_imports)
 )]
 
+pub mod slices;
+
 mod composed;
 mod convolution;
 #[cfg(any(feature = "wgpu", feature = "cuda"))]
@@ -51,9 +55,11 @@ mod filter;
 #[macro_use]
 mod host;
 mod ops;
+mod profile;
 mod rules;
 mod table;
 mod tensor;
+mod vector;
 
 pub use convolution::kernel_symbol;
 pub use device::{ComputeDevice, DeviceKind};
@@ -64,3 +70,7 @@ pub use ops::GridOps;
 pub use rules::extensions;
 pub use table::{COEFFICIENTS, HermiteTable, TableRange};
 pub use tensor::{circular_convolution, kernel_correlation, spectral_filter, tabulated};
+pub use vector::{
+    HostUpdate, HostVectors, SharedUpdate, VectorOps, add_scaled, extrapolate, inner_product,
+    retract, update_on_host,
+};

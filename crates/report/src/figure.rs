@@ -193,7 +193,7 @@ impl Figure {
         self
     }
 
-    /// Labels the rows.
+    /// Labels the rows; a line break in a label makes two lines.
     #[must_use]
     pub fn with_row_labels<S: Into<String>>(mut self, labels: impl IntoIterator<Item = S>) -> Self {
         self.row_labels = labels.into_iter().map(Into::into).collect();
@@ -305,12 +305,9 @@ impl Figure {
         let columns = self.columns.clamp(1, self.panels.len());
         let fonts = Fonts::for_columns(columns);
         let label_strip = (LEADING * fonts.label + 4.0).ceil();
-        let left = PADDING
-            + if self.row_labels.is_empty() {
-                0.0
-            } else {
-                label_strip
-            };
+        let lines = |label: &String| label.lines().count();
+        let label_lines = self.row_labels.iter().map(lines).max().unwrap_or(0);
+        let left = PADDING + label_strip * label_lines as f64;
         let gaps = COLUMN_GAP * (columns - 1) as f64;
         let room = width - PADDING - left - gaps;
         let cell_width = room / columns as f64;
@@ -423,11 +420,10 @@ impl Figure {
             .iter()
             .zip(layout.plots.iter().step_by(columns))
         {
-            label.at = point(PADDING + 0.45 * strip, plot.centre().y);
-            surface.text(Text {
-                line: text,
-                ..label
-            })?;
+            for (k, line) in text.lines().enumerate() {
+                label.at = point(PADDING + (k as f64 + 0.45) * strip, plot.centre().y);
+                surface.text(Text { line, ..label })?;
+            }
         }
 
         for (k, panel) in self.panels.iter().enumerate() {

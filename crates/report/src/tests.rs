@@ -350,7 +350,7 @@ fn shapes_are_filled_with_holes_at_a_common_scale() {
         .with_panel(Shapes::new("ring").with_curve(ring))
         .with_panel(Shapes::new("small").with_curve(Curve::new(vec![square(0.5)])))
         .with_column_labels(["left", "right"])
-        .with_row_labels(["only row"]);
+        .with_row_labels(["only row\nsecond line"]);
     let (picture, layout) = (picture(&figure), figure.layout().unwrap());
     let (left, right) = (layout.plots[0], layout.plots[1]);
     assert!((left.width - left.height).abs() <= 1.0);
@@ -370,7 +370,15 @@ fn shapes_are_filled_with_holes_at_a_common_scale() {
         "the scale is common"
     );
     let svg = figure.to_svg().unwrap();
-    for text in ["Squares", "left", "right", "only row", "ring", "small"] {
+    for text in [
+        "Squares",
+        "left",
+        "right",
+        "only row",
+        "second line",
+        "ring",
+        "small",
+    ] {
         assert!(svg.contains(&format!(">\n{text}\n</text>")), "no {text:?}");
     }
 }

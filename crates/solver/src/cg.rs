@@ -1,7 +1,7 @@
 //! Truncated, preconditioned conjugate gradients.
 
 use burn::tensor::Tensor;
-use operators::ComputeDevice;
+use operators::{ComputeDevice, add_scaled, inner_product};
 
 use crate::{Error, Objective};
 
@@ -43,23 +43,25 @@ pub(crate) fn dot<const D: usize>(
     b: &Tensor<D>,
     device: &ComputeDevice,
 ) -> Result<f64, Error> {
-    Ok(device.scalar((a.clone() * b.clone()).sum())?)
+    Ok(device.scalar(inner_product(a, b))?)
 }
 
 /// Solves `H p = -g` at the objective's point until the residual's norm `sqrt(r . M r)` is reduced, a direction of
-/// negative curvature appears (Steihaug), or the limit is reached.
+/// negative curvature appears (Steihaug), or the limit is reached. Vectors have the precision of the products.
 pub(crate) fn conjugate_gradients<const D: usize>(
     objective: &mut impl Objective<D>,
     gradient: &Tensor<D>,
-    precondition: &dyn Fn(&Tensor<D>) -> Result<Tensor<D>, Error>,
+    precondition: &dyn Fn(&Tensor<D>) -> Tensor<D>,
     limits: CgLimits,
     device: &ComputeDevice,
 ) -> Result<CgSolution<D>, Error> {
-    let mut residual = gradient.clone().neg();
-    let mut z = precondition(&residual)?;
+    let full = gradient.dtype();
+    let working = objective.product_dtype().unwrap_or(full);
+    let mut residual = gradient.clone().neg().cast(working);
+    let z = precondition(&residual);
     let mut rz = dot(&residual, &z, device)?;
     let target = limits.tolerance * limits.tolerance * rz;
-    let mut direction = z.clone();
+    let mut direction = z;
     let mut solution: Option<Tensor<D>> = None;
     let mut iterations = 0;
     let mut exit = CgExit::Limit;
@@ -74,13 +76,12 @@ pub(crate) fn conjugate_gradients<const D: usize>(
             break;
         }
         let alpha = rz / curvature;
-        let increment = direction.clone() * alpha;
         solution = Some(match solution {
-            Some(p) => p + increment,
-            None => increment,
+            Some(p) => add_scaled(p, &direction, alpha),
+            None => direction.clone() * alpha,
         });
-        residual = residual - product * alpha;
-        z = precondition(&residual)?;
+        residual = add_scaled(residual, &product, -alpha);
+        let z = precondition(&residual);
         let next = dot(&residual, &z, device)?;
         if next.abs() <= target {
             exit = CgExit::Converged;
@@ -88,11 +89,12 @@ pub(crate) fn conjugate_gradients<const D: usize>(
         }
         let beta = next / rz;
         rz = next;
-        direction = z + direction * beta;
+        direction = add_scaled(z, &direction, beta);
     }
     // Negative curvature at once: the preconditioned steepest descent is still a descent direction. It carries the unit of
     // the energy, which conjugate gradients divide out otherwise.
     let direction = solution.unwrap_or_else(|| direction * objective.unit().recip());
+    let direction = direction.cast(full);
     let slope = dot(gradient, &direction, device)?;
     Ok(CgSolution {
         direction,

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use burn::tensor::Tensor;
+use burn::tensor::{DType, Tensor};
 use linearize::{Graph, Linearization, Value};
 use model::MeanCurvatureOperator;
 use operators::{ComputeDevice, SpectralFilter};
 
-use crate::Error;
+use crate::{Error, Precision};
 
 /// A step of mean curvature flow, `v[u]`, as the energy sees it.
 ///
@@ -24,6 +24,11 @@ pub trait MeanCurvatureStep<const D: usize>: Send + Sync {
 
     /// Rules and handlers of the custom operations in that graph.
     fn extensions(&self) -> linearize::Extensions;
+
+    /// Whether products of its derivatives may be computed in single precision.
+    fn allows_single_precision(&self) -> bool {
+        false
+    }
 
     /// An approximate inverse of `1 + c (J - 1)^T (J - 1)` in the pure phases, `J` the derivative of `v`.
     fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> SpectralFilter;
@@ -60,6 +65,10 @@ impl<const D: usize> MeanCurvatureStep<D> for MeanCurvatureOperator<D> {
         operators::extensions()
     }
 
+    fn allows_single_precision(&self) -> bool {
+        true
+    }
+
     fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> SpectralFilter {
         MeanCurvatureOperator::phase_preconditioner(self, cells, stiffness)
     }
@@ -87,6 +96,11 @@ pub trait Objective<const D: usize> {
     /// If nothing was evaluated, or the device fails.
     fn hessian_vector_product(&mut self, p: &Tensor<D>) -> Result<Tensor<D>, Error>;
 
+    /// The float type of the vectors that `hessian_vector_product` takes and returns, if not that of the points.
+    fn product_dtype(&self) -> Option<DType> {
+        None
+    }
+
     /// The size of the curvature where the function is flattest and convex: the weight of `1/2 |u|^2` in it.
     fn unit(&self) -> f64;
 }
@@ -100,6 +114,7 @@ pub trait Objective<const D: usize> {
 /// trace serves a whole run.
 pub struct MinimizingMovement<const D: usize> {
     linearization: Linearization,
+    product_dtype: Option<DType>,
     step: Arc<dyn MeanCurvatureStep<D>>,
     device: ComputeDevice,
     previous: Value,
@@ -108,13 +123,26 @@ pub struct MinimizingMovement<const D: usize> {
 }
 
 impl<const D: usize> MinimizingMovement<D> {
-    /// Traces the energy for grids of `cells^D` and loads it on the device.
+    /// Traces the energy for grids of `cells^D` and loads it on the device. Products have the device's precision.
     ///
     /// # Errors
     /// [`Error::Linearize`] if the step contains an operation without a rule.
     pub fn new(
         step: Arc<dyn MeanCurvatureStep<D>>,
         cells: usize,
+        device: &ComputeDevice,
+    ) -> Result<Self, Error> {
+        Self::with_precision(step, cells, Precision::Device, device)
+    }
+
+    /// As [`Self::new`], with products in single precision if asked for and if the step allows it.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_precision(
+        step: Arc<dyn MeanCurvatureStep<D>>,
+        cells: usize,
+        products: Precision,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
         let zeros = Tensor::<D>::zeros([cells; D], (device.device(), device.dtype()));
@@ -132,11 +160,15 @@ impl<const D: usize> MinimizingMovement<D> {
             },
         )?;
         let extensions = step.extensions();
-        let linearization = graph
-            .linearize(&extensions)?
-            .on(device.device(), &extensions)?;
+        let single = products == Precision::Single && step.allows_single_precision();
+        let product_dtype = (single && device.dtype() != DType::F32).then_some(DType::F32);
+        let program = match product_dtype {
+            Some(dtype) => graph.linearize_in(&extensions, dtype)?,
+            None => graph.linearize(&extensions)?,
+        };
         Ok(Self {
-            linearization,
+            linearization: program.on(device.device(), &extensions)?,
+            product_dtype,
             step,
             device: device.clone(),
             previous,
@@ -212,6 +244,10 @@ impl<const D: usize> Objective<D> for MinimizingMovement<D> {
         let product = self.linearization.apply(&[p.clone().into()])?;
         self.check()?;
         Ok(product[0].tensor::<D>()?)
+    }
+
+    fn product_dtype(&self) -> Option<DType> {
+        self.product_dtype
     }
 
     fn unit(&self) -> f64 {

@@ -7,12 +7,12 @@ use burn::tensor::Tensor;
 use geometry::measure::{enclosed_volume, perimeter};
 use geometry::{Field, Grid};
 use model::{MeanCurvatureOperator, Network, Ratios};
-use operators::{ComputeDevice, SpectralFilter};
+use operators::{ComputeDevice, SpectralFilter, extrapolate};
 use serde::{Deserialize, Serialize};
 
-use crate::newton::{Method, NewtonInfo, NewtonParams, minimize};
+use crate::newton::{NewtonInfo, NewtonParams, minimize_timed};
 use crate::preconditioner::Preconditioner;
-use crate::profile::extrapolate;
+use crate::times::PhaseTimes;
 use crate::{Accuracy, Error, Exit, MeanCurvatureStep, MinimizingMovement};
 
 /// Scales of a flow.
@@ -56,6 +56,8 @@ pub struct StepRecord {
     pub newton: NewtonInfo,
     /// Wall time, seconds.
     pub seconds: f64,
+    /// Wall time of the parts of the minimization.
+    pub times: PhaseTimes,
 }
 
 /// Where a flow is, for resuming it.
@@ -147,7 +149,12 @@ impl<const D: usize> WillmoreFlow<D> {
         let grid = *initial.grid();
         let current = upload(initial, device)?;
         let mcf: Arc<dyn MeanCurvatureStep<D>> = Arc::new(step);
-        let energy = MinimizingMovement::new(mcf.clone(), grid.cells(), device)?;
+        let energy = MinimizingMovement::with_precision(
+            mcf.clone(),
+            grid.cells(),
+            params.newton.precision,
+            device,
+        )?;
         Ok(Self {
             grid,
             params,
@@ -254,22 +261,14 @@ impl<const D: usize> WillmoreFlow<D> {
             Some((previous, last)) => extrapolate(&self.current, previous, (tau / last).min(2.0)),
             None => self.current.clone(),
         };
-        let filter = self.filter.as_ref().map(|(_, filter)| filter.clone());
-        let preconditioner = match filter {
-            Some(filter) if self.params.newton.method == Method::Preconditioned => {
-                let near = self.device.values(start.clone())?;
-                let eps = self.params.eps;
-                Some(Preconditioner::two_level(
-                    filter, &self.grid, &near, eps, tau,
-                ))
-            }
-            _ => None,
-        };
-        let (u, newton) = minimize(
+        let preconditioner = self.filter.as_ref().map(|(_, filter)| {
+            Preconditioner::two_level(filter.clone(), &self.grid, self.params.eps, tau)
+        });
+        let (u, newton, times) = minimize_timed(
             &mut self.energy,
             &self.current,
             &start,
-            preconditioner.as_ref(),
+            preconditioner,
             self.params.newton,
             &self.device,
         )
@@ -307,6 +306,7 @@ impl<const D: usize> WillmoreFlow<D> {
             volume: enclosed_volume(&field),
             newton,
             seconds: clock.elapsed().as_secs_f64(),
+            times,
         };
         self.previous = Some((std::mem::replace(&mut self.current, u), tau));
         self.step = step;

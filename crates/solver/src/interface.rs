@@ -14,6 +14,7 @@
 use faer::linalg::solvers::{Llt, Solve};
 use faer::{Mat, Side};
 use geometry::Grid;
+use operators::{HostUpdate, HostVectors, Real};
 
 /// Spacing of the lattice in units of `eps`.
 const SPACING: f64 = 4.0;
@@ -172,10 +173,10 @@ impl InterfaceModes {
     }
 
     /// Adds `Z A^-1 Z^T r` to `z`.
-    pub(crate) fn correct(&self, r: &[f64], z: &mut [f64]) {
+    pub(crate) fn correct<T: Real>(&self, r: &[T], z: &mut [T]) {
         let mut coarse = Mat::<f64>::zeros(self.columns, 1);
         for (&node, entries) in self.nodes.iter().zip(self.entries.chunks(self.per_node)) {
-            let value = r[node as usize];
+            let value = r[node as usize].double();
             for &(column, weight) in entries {
                 coarse[(column as usize, 0)] += weight * value;
             }
@@ -186,7 +187,17 @@ impl InterfaceModes {
                 .iter()
                 .map(|&(column, weight)| weight * coarse[(column as usize, 0)])
                 .sum();
-            z[node as usize] += sum;
+            let z = &mut z[node as usize];
+            *z = T::of(z.double() + sum);
+        }
+    }
+}
+
+impl HostUpdate for InterfaceModes {
+    fn update(&self, vectors: HostVectors<'_>) {
+        match vectors {
+            HostVectors::Double(r, z) => self.correct(r, z),
+            HostVectors::Single(r, z) => self.correct(r, z),
         }
     }
 }

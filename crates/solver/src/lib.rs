@@ -49,13 +49,14 @@
 //! 4. preconditions with the Hessian of the pure phases, diagonal in Fourier space, plus the Hessian of the geometric problem
 //!    for displacements of the interface, on a coarse lattice ([`Preconditioner`]),
 //! 5. uses the full Hessian and stops at negative curvature (Steihaug),
-//! 6. stops when the Newton decrement is a small fraction of the motion, a test that no scaling of the energy changes and that
+//! 6. computes products and vectors of the linear solves in single precision where the step allows it ([`Precision`]),
+//! 7. stops when the Newton decrement is a small fraction of the motion, a test that no scaling of the energy changes and that
 //!    standing still does not pass.
 //!
 //! # Conventions
 //!
 //! Grids, norms and signs are those of [`geometry`]. Energies in [`StepRecord`] are in the paper's units with true L2 norms.
-//! Computations run in the precision of the device, `f64` on CPUs. On a GPU in `f32` the energy of a step is known to about
+//! Energies and gradients have the precision of the device, `f64` on CPUs. On a GPU in `f32` the energy of a step is known to about
 //! seven digits, so that a minimization can end with [`Exit::Precision`] before a tight tolerance.
 
 mod cg;
@@ -65,11 +66,12 @@ mod flow;
 mod interface;
 mod newton;
 mod preconditioner;
-mod profile;
+mod times;
 
 pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective, StepFailure};
 pub use error::Error;
 pub use flow::{FlowParams, FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow};
-pub use newton::{Exit, Method, NewtonInfo, NewtonParams, minimize};
+pub use newton::{Exit, Method, NewtonInfo, NewtonParams, Precision, minimize};
+pub use operators::{extrapolate, retract};
 pub use preconditioner::Preconditioner;
-pub use profile::{extrapolate, retract};
+pub use times::PhaseTimes;

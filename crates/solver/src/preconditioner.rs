@@ -1,57 +1,70 @@
 //! Preconditioners of the linear solves.
 
+use std::sync::Arc;
+
 use burn::tensor::Tensor;
 use geometry::Grid;
-use operators::{ComputeDevice, SpectralFilter, spectral_filter};
+use operators::{ComputeDevice, SpectralFilter, spectral_filter, update_on_host};
 
 use crate::Error;
 use crate::interface::InterfaceModes;
 
 /// A symmetric positive definite approximation of the inverse Hessian: the exact one in the pure phases, which handles
-/// everything but displacements of the interface, plus a coarse correction for those.
-pub struct Preconditioner {
+/// everything but displacements of the interface, plus a coarse correction for those that follows the interface.
+pub struct Preconditioner<const D: usize> {
     phase: SpectralFilter,
-    interface: Option<InterfaceModes>,
+    scales: Option<Scales<D>>,
+    interface: Option<Arc<InterfaceModes>>,
 }
 
-impl From<SpectralFilter> for Preconditioner {
+/// What the coarse correction needs to know of a step.
+struct Scales<const D: usize> {
+    grid: Grid<D>,
+    eps: f64,
+    tau: f64,
+}
+
+impl<const D: usize> From<SpectralFilter> for Preconditioner<D> {
     /// The part for the pure phases alone.
     fn from(phase: SpectralFilter) -> Self {
         Self {
             phase,
+            scales: None,
             interface: None,
         }
     }
 }
 
-impl Preconditioner {
-    /// Both parts, at the phase field `u` with interface width `eps`, for a step of size `tau`.
-    pub fn two_level<const D: usize>(
-        phase: SpectralFilter,
-        grid: &Grid<D>,
-        u: &[f64],
-        eps: f64,
-        tau: f64,
-    ) -> Self {
+impl<const D: usize> Preconditioner<D> {
+    /// Both parts, for phase fields with interface width `eps` and a step of size `tau`.
+    pub fn two_level(phase: SpectralFilter, grid: &Grid<D>, eps: f64, tau: f64) -> Self {
+        let grid = *grid;
         Self {
             phase,
-            interface: InterfaceModes::new(grid, u, eps, tau),
+            scales: Some(Scales { grid, eps, tau }),
+            interface: None,
         }
     }
 
-    /// Applies it.
-    pub(crate) fn apply<const D: usize>(
-        &self,
-        r: &Tensor<D>,
-        device: &ComputeDevice,
-    ) -> Result<Tensor<D>, Error> {
+    /// Moves the coarse correction to the interface of `u`.
+    ///
+    /// # Errors
+    /// [`Error::Operators`] if the device fails.
+    pub(crate) fn follow(&mut self, u: &Tensor<D>, device: &ComputeDevice) -> Result<(), Error> {
+        if let Some(Scales { grid, eps, tau }) = &self.scales {
+            let u = device.values(u.clone())?;
+            self.interface = InterfaceModes::new(grid, &u, *eps, *tau).map(Arc::new);
+        }
+        Ok(())
+    }
+
+    /// Applies it, in the precision of `r`.
+    pub(crate) fn apply(&self, r: &Tensor<D>) -> Tensor<D> {
         let z = spectral_filter(r.clone(), &self.phase);
-        let Some(interface) = &self.interface else {
-            return Ok(z);
-        };
-        let mut values = device.values(z)?;
-        interface.correct(&device.values(r.clone())?, &mut values);
-        Ok(device.tensor(&values, r.dims()))
+        match &self.interface {
+            Some(interface) => update_on_host(r, z, interface),
+            None => z,
+        }
     }
 
     /// The part for the pure phases.

@@ -1,4 +1,4 @@
-//! Trains the 2D networks that ship with the library.
+//! Trains the networks that ship with the library.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -31,7 +31,7 @@ enum Recipe {
     Both,
 }
 
-/// Trains the 2D networks: n = 128, 256, 512 of the convergence tests, and the one for inpainting.
+/// Trains the networks: n = 128, 256, 512 of the convergence tests, the one for inpainting, and the one for surfaces in 3D.
 ///
 /// An interrupted training continues from its last checkpoint.
 #[derive(Parser, Debug)]
@@ -44,13 +44,17 @@ struct Options {
     #[arg(long, value_enum, default_value_t = Recipe::Lm)]
     recipe: Recipe,
 
-    /// Train this network alone: n128, n256, n512 or inpainting; can be repeated
+    /// Train this network alone: n128, n256, n512, inpainting or surfaces; can be repeated
     #[arg(long, value_name = "NAME")]
     only: Vec<String>,
 
     /// Epochs of Adam at n = 128; every refinement gets a quarter of the epochs before it
     #[arg(long, value_name = "COUNT", default_value_t = 200)]
     adam_epochs: usize,
+
+    /// Learning rate of Adam's first epoch at n = 128; it falls to a twentieth, and every refinement starts with a quarter
+    #[arg(long, value_name = "RATE", default_value_t = AdamParams::default().learning_rate)]
+    adam_rate: f64,
 
     /// Copy the networks trained by Levenberg-Marquardt (by Adam with --recipe adam) to this folder, too
     #[arg(long, value_name = "DIR")]
@@ -95,11 +99,19 @@ fn program(options: &Options) -> Result<(), Error> {
             "--adam-epochs must be at least 1".to_owned(),
         ));
     }
+    if !(options.adam_rate.is_finite() && options.adam_rate > 0.0) {
+        return Err(Error::Options(format!(
+            "--adam-rate must be positive, not {}",
+            options.adam_rate
+        )));
+    }
     let settings = Settings {
         lm: LmSettings::new(run.quick, run.seed),
         adam: AdamSettings {
             params: AdamParams {
                 epochs,
+                learning_rate: options.adam_rate,
+                final_learning_rate: 0.05 * options.adam_rate,
                 ..AdamParams::default()
             },
             seed: run.seed,
@@ -204,7 +216,7 @@ fn program(options: &Options) -> Result<(), Error> {
 }
 
 fn chosen(only: &[String]) -> Result<Vec<NetworkSpec>, Error> {
-    let mut specs = NetworkSpec::paper();
+    let mut specs = NetworkSpec::shipped();
     let names: Vec<&str> = specs.iter().map(|spec| &spec.name[..]).collect();
     if let Some(unknown) = only.iter().find(|name| !names.contains(&&name[..])) {
         return Err(Error::Options(format!(
@@ -220,7 +232,7 @@ fn chosen(only: &[String]) -> Result<Vec<NetworkSpec>, Error> {
 
 /// Whether a network belongs to the progressive refinement from n = 128 to n = 512.
 fn in_the_chain(spec: &NetworkSpec) -> bool {
-    spec.name != "inpainting"
+    !["inpainting", "surfaces"].contains(&&spec.name[..])
 }
 
 struct Settings {
@@ -230,7 +242,7 @@ struct Settings {
 
 impl Settings {
     /// The paper's progressive training up to the finest of the chosen networks: each starts from the refined kernel
-    /// and the activation of the one before. The inpainting network has no coarser one and starts at random.
+    /// and the activation of the one before. The others have no coarser one and start at random.
     fn progressively(
         &self,
         chosen: &[NetworkSpec],

@@ -1,0 +1,52 @@
+//! Passes over vectors in the memory of the host, on all cores.
+
+use rayon::prelude::*;
+
+use crate::fft::Real;
+
+/// Entries per task; sums are taken in this order whatever the number of threads.
+const CHUNK: usize = 1 << 14;
+/// Shorter vectors stay on one thread.
+const PARALLEL_FROM: usize = 1 << 15;
+
+/// `sum a b`, accumulated in double precision, with the same result whatever the number of threads.
+pub fn dot<T: Real>(a: &[T], b: &[T]) -> f64 {
+    let part = |(a, b): (&[T], &[T])| -> f64 {
+        // Eight sums side by side, in a fixed order.
+        let mut sums = [0.0; 8];
+        let (blocks_a, rest_a) = a.as_chunks::<8>();
+        let (blocks_b, rest_b) = b.as_chunks::<8>();
+        for (a, b) in blocks_a.iter().zip(blocks_b) {
+            for k in 0..8 {
+                sums[k] += a[k].double() * b[k].double();
+            }
+        }
+        let rest: f64 = (rest_a.iter().zip(rest_b))
+            .map(|(a, b)| a.double() * b.double())
+            .sum();
+        sums.iter().sum::<f64>() + rest
+    };
+    if a.len() < PARALLEL_FROM {
+        return a.chunks(CHUNK).zip(b.chunks(CHUNK)).map(part).sum();
+    }
+    let parts: Vec<f64> = (a.par_chunks(CHUNK).zip(b.par_chunks(CHUNK)))
+        .map(part)
+        .collect();
+    parts.iter().sum()
+}
+
+/// `a_i <- f(a_i, b_i)`
+pub fn zip_apply<T: Real>(a: &mut [T], b: &[T], f: impl Fn(T, T) -> T + Sync) {
+    let run = |(a, b): (&mut [T], &[T])| {
+        for (a, b) in a.iter_mut().zip(b) {
+            *a = f(*a, *b);
+        }
+    };
+    if a.len() < PARALLEL_FROM {
+        run((a, b));
+    } else {
+        a.par_chunks_mut(CHUNK)
+            .zip(b.par_chunks(CHUNK))
+            .for_each(run);
+    }
+}

@@ -1,0 +1,142 @@
+//! Vector operations of iterative solvers, each one pass over memory on all cores, and work on the host in between.
+//!
+//! They are not differentiated, so neither captured nor on the tape.
+
+use std::fmt;
+use std::sync::Arc;
+
+use burn::backend::{Backend, Dispatch, backend_extension, tensor::FloatTensor};
+use burn::tensor::Tensor;
+
+use crate::fft::{Real, is_f64};
+use crate::profile;
+use crate::slices::zip_apply;
+
+/// Two vectors in the memory of the host, in the precision of their tensors.
+pub enum HostVectors<'a> {
+    /// Double precision.
+    Double(&'a [f64], &'a mut [f64]),
+    /// Single precision.
+    Single(&'a [f32], &'a mut [f32]),
+}
+
+/// A change of one vector that depends on another and is computed on the host, such as a sparse correction.
+pub trait HostUpdate: Send + Sync {
+    /// Changes the second vector.
+    fn update(&self, vectors: HostVectors<'_>);
+}
+
+/// A shared [`HostUpdate`].
+#[derive(Clone)]
+pub struct SharedUpdate(pub(crate) Arc<dyn HostUpdate>);
+
+impl fmt::Debug for SharedUpdate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("SharedUpdate")
+    }
+}
+
+/// Vector operations of iterative solvers.
+#[backend_extension(
+    Flex: cfg(feature = "flex"),
+    NdArray: cfg(feature = "ndarray"),
+    Cube: cfg(any(feature = "wgpu", feature = "cuda"))
+)]
+pub trait VectorOps: Backend {
+    /// `sum a b`, shape `[1]`; accumulated and returned in double precision on a CPU.
+    fn inner_product(a: FloatTensor<Self>, b: FloatTensor<Self>) -> FloatTensor<Self>;
+    /// `x + alpha y`.
+    fn add_scaled(x: FloatTensor<Self>, y: FloatTensor<Self>, alpha: f64) -> FloatTensor<Self>;
+    /// [`retract`] on primitives.
+    fn retract(u: FloatTensor<Self>, p: FloatTensor<Self>, t: f64) -> FloatTensor<Self>;
+    /// [`extrapolate`] on primitives.
+    fn extrapolate(
+        u: FloatTensor<Self>,
+        previous: FloatTensor<Self>,
+        factor: f64,
+    ) -> FloatTensor<Self>;
+    /// [`update_on_host`] on primitives.
+    fn update_on_host(
+        x: FloatTensor<Self>,
+        z: FloatTensor<Self>,
+        update: SharedUpdate,
+    ) -> FloatTensor<Self>;
+}
+
+/// `sum a b` as a tensor of one element, accumulated and returned in double precision on a CPU.
+pub fn inner_product<const R: usize>(a: &Tensor<R>, b: &Tensor<R>) -> Tensor<1> {
+    let (a, b) = (a.clone().into_dispatch(), b.clone().into_dispatch());
+    Tensor::from_dispatch(<Dispatch as VectorOps>::inner_product(a, b))
+}
+
+/// `x + alpha y`, in place on a CPU if nobody else holds `x`.
+pub fn add_scaled<const R: usize>(x: Tensor<R>, y: &Tensor<R>, alpha: f64) -> Tensor<R> {
+    let y = y.clone().into_dispatch();
+    Tensor::from_dispatch(<Dispatch as VectorOps>::add_scaled(
+        x.into_dispatch(),
+        y,
+        alpha,
+    ))
+}
+
+/// A phase field `u` moved along `p`: in `atanh u`, which is the distance, where the interface is, straight elsewhere.
+///
+/// A time step moves the interface by a fraction of `eps`. A straight update `u + t p` leaves the `tanh` profile; the same motion
+/// in the variable `atanh u` does not. With `q = 1 - u^2` and `d = t p q / (q^2 + 0.05^2)`, limited to 1.5, the interface part of
+/// the motion becomes the translation of `atanh u` by `d`; what is left of `t p` is added straight. Agrees with `u + t p` to first
+/// order in `t`.
+pub fn retract<const R: usize>(u: &Tensor<R>, p: &Tensor<R>, t: f64) -> Tensor<R> {
+    let (u, p) = (u.clone().into_dispatch(), p.clone().into_dispatch());
+    Tensor::from_dispatch(<Dispatch as VectorOps>::retract(u, p, t))
+}
+
+/// The phase field after `factor` more steps like the last one, extrapolated in `atanh u`.
+///
+/// `(u + s w) / (1 + u s w)` with `s = factor (u - u_previous) / (1 - u u_previous)`, limited to 0.9, windowed to the interface by
+/// `w = q^2 / (q^2 + 0.05^2)`, `q = 1 - u^2`.
+pub fn extrapolate<const R: usize>(u: &Tensor<R>, previous: &Tensor<R>, factor: f64) -> Tensor<R> {
+    let (u, previous) = (u.clone().into_dispatch(), previous.clone().into_dispatch());
+    Tensor::from_dispatch(<Dispatch as VectorOps>::extrapolate(u, previous, factor))
+}
+
+/// Changes `z` by a host computation that depends on `x`. On a CPU nothing is copied if nobody else holds `z`.
+pub fn update_on_host<const R: usize>(
+    x: &Tensor<R>,
+    z: Tensor<R>,
+    update: &Arc<impl HostUpdate + 'static>,
+) -> Tensor<R> {
+    let x = x.clone().into_dispatch();
+    let update = SharedUpdate(update.clone());
+    Tensor::from_dispatch(<Dispatch as VectorOps>::update_on_host(
+        x,
+        z.into_dispatch(),
+        update,
+    ))
+}
+
+/// Calls an update with slices of either precision.
+pub(crate) fn call<T: Real>(update: &SharedUpdate, x: &[T], z: &mut [T]) {
+    let vectors = if is_f64::<T>() {
+        HostVectors::Double(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(z))
+    } else {
+        HostVectors::Single(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(z))
+    };
+    update.0.update(vectors);
+}
+
+pub(crate) fn axpy<T: Real>(x: &mut [T], y: &[T], alpha: f64) {
+    let alpha = T::of(alpha);
+    zip_apply(x, y, |x, y| x + alpha * y);
+}
+
+pub(crate) fn retract_values<T: Real>(u: &mut [T], p: &[T], t: f64) {
+    zip_apply(u, p, |u, p| {
+        T::of(profile::retracted(u.double(), t * p.double()))
+    });
+}
+
+pub(crate) fn extrapolate_values<T: Real>(u: &mut [T], previous: &[T], factor: f64) {
+    zip_apply(u, previous, |u, before| {
+        T::of(profile::extrapolated(u.double(), before.double(), factor))
+    });
+}

@@ -1,0 +1,82 @@
+//! Where the time of a step goes.
+
+use std::cell::Cell;
+use std::time::Instant;
+
+use burn::tensor::{DType, Tensor};
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, Objective};
+
+/// Wall time of the parts of a minimization, in seconds. What is missing from a step's time are vector operations, line searches
+/// and measurements.
+///
+/// On a GPU, which works while the host goes on, only sums mean something.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PhaseTimes {
+    /// Hessian-vector products.
+    pub products: f64,
+    /// Applications of the preconditioner.
+    pub preconditioner: f64,
+    /// Assembly of its coarse part.
+    pub assembly: f64,
+    /// Energies and gradients.
+    pub energies: f64,
+}
+
+/// A sum of times.
+#[derive(Default)]
+pub(crate) struct Stopwatch(Cell<f64>);
+
+impl Stopwatch {
+    pub(crate) fn time<T>(&self, f: impl FnOnce() -> T) -> T {
+        let clock = Instant::now();
+        let result = f();
+        self.0.set(self.0.get() + clock.elapsed().as_secs_f64());
+        result
+    }
+
+    pub(crate) fn seconds(&self) -> f64 {
+        self.0.get()
+    }
+}
+
+/// An objective that measures its own time.
+pub(crate) struct Timed<'a, O> {
+    objective: &'a mut O,
+    pub(crate) products: Stopwatch,
+    pub(crate) energies: Stopwatch,
+}
+
+impl<'a, O> Timed<'a, O> {
+    pub(crate) fn new(objective: &'a mut O) -> Self {
+        Self {
+            objective,
+            products: Stopwatch::default(),
+            energies: Stopwatch::default(),
+        }
+    }
+}
+
+impl<const D: usize, O: Objective<D>> Objective<D> for Timed<'_, O> {
+    fn value(&mut self, u: &Tensor<D>) -> Result<f64, Error> {
+        self.energies.time(|| self.objective.value(u))
+    }
+
+    fn evaluate(&mut self, u: &Tensor<D>) -> Result<(f64, Tensor<D>), Error> {
+        self.energies.time(|| self.objective.evaluate(u))
+    }
+
+    fn hessian_vector_product(&mut self, p: &Tensor<D>) -> Result<Tensor<D>, Error> {
+        self.products
+            .time(|| self.objective.hessian_vector_product(p))
+    }
+
+    fn product_dtype(&self) -> Option<DType> {
+        self.objective.product_dtype()
+    }
+
+    fn unit(&self) -> f64 {
+        self.objective.unit()
+    }
+}

@@ -1,0 +1,254 @@
+//! What a Hessian-vector product costs through Burn: replayed from a trace, against the same product written by hand, and against
+//! its Fourier transforms alone, in the same run.
+//!
+//! By hand, with `w = K*u`, `r = F(w) - u` and the caches `F'(w)`, `F''(w) r`:
+//!
+//! `H p = p + c (K^T (F' s + F'' r dw) - s)`, `dw = K*p`, `s = F' dw - p`,
+//!
+//! that is two convolutions and two loops on `Vec<f64>`.
+
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use burn::tensor::{DType, Tensor};
+use geometry::Field;
+use model::{MeanCurvatureOperator, Network};
+use operators::{ComputeDevice, SpectralFilter, Transform, kernel_symbol};
+use rayon::prelude::*;
+use rustfft::num_complex::Complex;
+use serde::Serialize;
+use solver::{MinimizingMovement, Objective, Precision};
+
+use crate::Error;
+
+/// `c = tau / tautilde^2` of a typical step: `tau = tautilde = 2^-14`.
+const STIFFNESS: f64 = 16384.0;
+const PARALLEL_FROM: usize = 1 << 15;
+const CHUNK: usize = 1 << 13;
+
+/// The product by hand: caches at one point.
+struct ByHand {
+    plan: Arc<Transform<f64>>,
+    symbol: Arc<Vec<Complex<f64>>>,
+    /// `F'(w)`.
+    slope: Vec<f64>,
+    /// `F''(w) r`.
+    bend: Vec<f64>,
+}
+
+impl ByHand {
+    fn new(network: &Network, shape: &[usize], u: &[f64]) -> Result<Self, Error> {
+        let plan = Transform::of_shape(shape);
+        let symbol = kernel_symbol(shape, network.kernel(), network.ratios().width);
+        let table = network.activation().table()?;
+        let w = plan.filter(u, &symbol, false);
+        let slope = w.iter().map(|&w| table.derivative(w, 1)).collect();
+        let bend = w
+            .iter()
+            .zip(u)
+            .map(|(&w, u)| table.derivative(w, 2) * (table.derivative(w, 0) - u))
+            .collect();
+        Ok(Self {
+            plan,
+            symbol,
+            slope,
+            bend,
+        })
+    }
+
+    fn product(&self, p: &[f64]) -> Vec<f64> {
+        let chunk = if p.len() >= PARALLEL_FROM {
+            CHUNK
+        } else {
+            p.len()
+        };
+        // After the first loop: `dw` holds `F' s + F'' r dw`, `s` the defect `F' dw - p`.
+        let mut dw = self.plan.filter(p, &self.symbol, false);
+        let mut s = vec![0.0; p.len()];
+        dw.par_chunks_mut(chunk)
+            .zip(s.par_chunks_mut(chunk))
+            .enumerate()
+            .for_each(|(i, (dw, s))| {
+                let part = i * chunk..i * chunk + dw.len();
+                let caches = self.slope[part.clone()]
+                    .iter()
+                    .zip(&self.bend[part.clone()]);
+                let data = dw.iter_mut().zip(s).zip(&p[part]);
+                for (((dw, s), p), (slope, bend)) in data.zip(caches) {
+                    *s = slope * *dw - p;
+                    *dw = slope * *s + bend * *dw;
+                }
+            });
+        let mut result = self.plan.filter(&dw, &self.symbol, true);
+        result
+            .par_chunks_mut(chunk)
+            .enumerate()
+            .for_each(|(i, result)| {
+                let part = i * chunk..i * chunk + result.len();
+                for ((result, s), p) in result.iter_mut().zip(&s[part.clone()]).zip(&p[part]) {
+                    *result = p + STIFFNESS * (*result - s);
+                }
+            });
+        result
+    }
+}
+
+/// All candidates at one point, with one direction.
+pub struct Candidates<const D: usize> {
+    double: MinimizingMovement<D>,
+    single: MinimizingMovement<D>,
+    by_hand: ByHand,
+    /// Two pairs of transforms, the least that a product needs, in both precisions.
+    floor: SpectralFilter,
+    u: Tensor<D>,
+    p: Tensor<D>,
+    p_single: Tensor<D>,
+    p_host: Vec<f64>,
+}
+
+/// Medians in seconds over many turns, in which all candidates follow each other.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ProductTimes {
+    /// Product through Burn in double precision.
+    pub burn: f64,
+    /// Product through Burn in single precision.
+    pub burn_single: f64,
+    /// Product by hand in double precision.
+    pub by_hand: f64,
+    /// Two pairs of transforms in double precision.
+    pub floor: f64,
+    /// Two pairs of transforms in single precision.
+    pub floor_single: f64,
+    /// Energy and gradient.
+    pub evaluate: f64,
+    /// Median of the ratios of `burn` to `by_hand` in the same turn.
+    pub ratio: f64,
+}
+
+impl<const D: usize> Candidates<D> {
+    /// Everything at the phase field `u`, for a CPU device.
+    ///
+    /// # Errors
+    /// [`Error::Options`] if the candidates disagree; what the solver raises.
+    pub fn new(network: &Network, u: &Field<D>, device: &ComputeDevice) -> Result<Self, Error> {
+        let grid = *u.grid();
+        let p_host: Vec<f64> = (0..grid.len())
+            .map(|i| (1.0 - u.values()[i].powi(2)) + 0.1 * (0.37 * i as f64).sin())
+            .collect();
+        let tensor = |x: &[f64]| -> Tensor<D> { device.tensor(x, grid.shape()) };
+        let previous: Vec<f64> = u.values().iter().map(|u| 0.99 * u).collect();
+        let operator = Arc::new(MeanCurvatureOperator::<D>::new(network, device)?);
+        let energy = |precision| -> Result<_, Error> {
+            let mut energy = MinimizingMovement::with_precision(
+                operator.clone(),
+                grid.cells(),
+                precision,
+                device,
+            )?;
+            energy.set(&tensor(&previous), STIFFNESS)?;
+            energy.evaluate(&tensor(u.values()))?;
+            Ok(energy)
+        };
+        let p = tensor(&p_host);
+        let width = network.ratios().width;
+        let mut candidates = Self {
+            double: energy(Precision::Device)?,
+            single: energy(Precision::Single)?,
+            by_hand: ByHand::new(network, &grid.shape(), u.values())?,
+            floor: SpectralFilter::from_kernel(&grid.shape(), network.kernel(), width, |k| k.re),
+            u: tensor(u.values()),
+            p_single: p.clone().cast(DType::F32),
+            p,
+            p_host,
+        };
+        let hand = candidates.by_hand.product(&candidates.p_host);
+        let burn = candidates.double.hessian_vector_product(&candidates.p)?;
+        let burn = device.values(burn)?;
+        let norm = |x: &mut dyn Iterator<Item = f64>| x.map(|x| x * x).sum::<f64>().sqrt();
+        let difference =
+            norm(&mut burn.iter().zip(&hand).map(|(a, b)| a - b)) / norm(&mut hand.iter().copied());
+        if difference > 1e-12 {
+            return Err(Error::Options(format!(
+                "the products through Burn and by hand differ by {difference:.1e}: nothing to compare"
+            )));
+        }
+        Ok(candidates)
+    }
+
+    /// The product through Burn in double precision.
+    pub fn burn(&mut self) {
+        let product = self.double.hessian_vector_product(black_box(&self.p));
+        black_box(product.expect("worked in the constructor"));
+    }
+
+    /// The product through Burn in single precision.
+    pub fn burn_single(&mut self) {
+        let product = self
+            .single
+            .hessian_vector_product(black_box(&self.p_single));
+        black_box(product.expect("the same as in double precision"));
+    }
+
+    /// The product by hand.
+    pub fn by_hand(&mut self) {
+        black_box(self.by_hand.product(black_box(&self.p_host)));
+    }
+
+    /// Two pairs of transforms in double precision.
+    pub fn floor(&mut self) {
+        let once = operators::spectral_filter(black_box(self.p.clone()), &self.floor);
+        black_box(operators::spectral_filter(once, &self.floor));
+    }
+
+    /// Two pairs of transforms in single precision.
+    pub fn floor_single(&mut self) {
+        let once = operators::spectral_filter(black_box(self.p_single.clone()), &self.floor);
+        black_box(operators::spectral_filter(once, &self.floor));
+    }
+
+    /// Energy and gradient.
+    pub fn evaluate(&mut self) {
+        let evaluation = self.double.evaluate(black_box(&self.u));
+        black_box(evaluation.expect("worked in the constructor"));
+    }
+
+    /// Measures all candidates in turns, for at least this time and eleven turns.
+    pub fn measure(&mut self, budget: Duration) -> ProductTimes {
+        const LEAST: usize = 11;
+        let parts: [fn(&mut Self); 6] = [
+            Self::burn,
+            Self::burn_single,
+            Self::by_hand,
+            Self::floor,
+            Self::floor_single,
+            Self::evaluate,
+        ];
+        let mut times: [Vec<f64>; 6] = Default::default();
+        let clock = Instant::now();
+        while times[0].len() < LEAST || clock.elapsed() < budget {
+            for (part, times) in parts.iter().zip(&mut times) {
+                let clock = Instant::now();
+                part(self);
+                times.push(clock.elapsed().as_secs_f64());
+            }
+        }
+        let ratios = times[0].iter().zip(&times[2]).map(|(a, b)| a / b).collect();
+        let [burn, burn_single, by_hand, floor, floor_single, evaluate] = times.map(median);
+        ProductTimes {
+            burn,
+            burn_single,
+            by_hand,
+            floor,
+            floor_single,
+            evaluate,
+            ratio: median(ratios),
+        }
+    }
+}
+
+/// The middle value; 0 for none.
+pub fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
