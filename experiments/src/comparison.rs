@@ -352,13 +352,18 @@ impl Comparison<'_> {
             .collect()
     }
 
-    /// Distance between the reference and the same method at half the resolution, at the end.
+    /// Largest distance over time between the reference and the same method at half the resolution.
     fn reference_difference(&self) -> Result<Option<f64>, Error> {
         let Some(half) = &self.half else {
             return Ok(None);
         };
-        let step = half.evolution.steps;
-        Ok(Some(half.distance(&self.reference, step)?))
+        let distances = half
+            .evolution
+            .sampled_steps()
+            .into_iter()
+            .map(|step| half.distance(&self.reference, step))
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Some(distances.into_iter().fold(0.0, f64::max)))
     }
 
     fn about_the_reference(&self) -> Result<String, Error> {
@@ -370,7 +375,7 @@ impl Comparison<'_> {
         };
         let estimate = match self.reference_difference()? {
             Some(distance) => format!(
-                "; it differs from n = {} by {distance:.1e} at the end, so its own error in h is about {:.0e}",
+                "; it differs from n = {} by at most {distance:.1e}, so its own error in h is about {:.0e}",
                 n / 2,
                 distance / 3.0
             ),

@@ -11,6 +11,7 @@ const CIRCLES: &str = env!("CARGO_BIN_EXE_circle_convergence");
 const LEARNED: &str = env!("CARGO_BIN_EXE_learned_networks");
 const CROSS: &str = env!("CARGO_BIN_EXE_cross");
 const MCF_CROSS: &str = env!("CARGO_BIN_EXE_mcf_cross");
+const PERFORMANCE: &str = env!("CARGO_BIN_EXE_performance");
 const RECTANGLE: &str = env!("CARGO_BIN_EXE_rectangle");
 const TIMING: &str = env!("CARGO_BIN_EXE_timing_tables");
 const TRAIN: &str = env!("CARGO_BIN_EXE_train_networks");
@@ -57,7 +58,16 @@ fn content(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 #[test]
 fn devices_that_are_unknown_or_not_compiled_in() {
     let root = tempfile::tempdir().unwrap();
-    for program in [CIRCLES, CROSS, LEARNED, MCF_CROSS, RECTANGLE, TIMING, TRAIN] {
+    for program in [
+        CIRCLES,
+        CROSS,
+        LEARNED,
+        MCF_CROSS,
+        PERFORMANCE,
+        RECTANGLE,
+        TIMING,
+        TRAIN,
+    ] {
         refused(
             program,
             root.path(),
@@ -146,7 +156,16 @@ fn resolutions_names_and_outputs_that_cannot_be() {
     );
     refused(TIMING, root.path(), &["--budget", "0"], &["--budget"]);
     fs::write(root.path().join("results"), "a file of the user").unwrap();
-    for program in [CIRCLES, CROSS, LEARNED, MCF_CROSS, RECTANGLE, TIMING, TRAIN] {
+    for program in [
+        CIRCLES,
+        CROSS,
+        LEARNED,
+        MCF_CROSS,
+        PERFORMANCE,
+        RECTANGLE,
+        TIMING,
+        TRAIN,
+    ] {
         refused(program, root.path(), &["--quick"], &["results"]);
         refused(
             program,
@@ -295,4 +314,27 @@ fn the_quick_timing_table_has_a_row_for_every_method() {
     let summary = Summary::from_json(&text).unwrap();
     let seconds = |key: &str| summary.get(&format!("timing.n128.{key}.seconds")).unwrap();
     assert!(seconds("hybrid") > 0.0 && seconds("fe_implicit") > seconds("hybrid"));
+}
+
+#[test]
+fn the_quick_performance_run_measures_planes_and_solids() {
+    let root = tempfile::tempdir().unwrap();
+    refused(PERFORMANCE, root.path(), &["--turns", "0"], &["--turns"]);
+    let output = run(
+        PERFORMANCE,
+        root.path(),
+        &["--quick", "--quiet", "--output", "out"],
+    );
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && message.is_empty(), "{message}");
+    let text = fs::read_to_string(root.path().join("out/summary.json")).unwrap();
+    let summary = Summary::from_json(&text).unwrap();
+    let metric = |name: &str| summary.get(name).unwrap();
+    for key in ["cross.n128", "cube.n16", "blob.n32"] {
+        assert!(metric(&format!("{key}.seconds")) > 0.0);
+        assert!(metric(&format!("{key}.hvp_per_step")) >= 1.0);
+    }
+    assert!(metric("hvp.96x96.ratio") > 0.0 && metric("hvp.32x32x32.ratio") > 0.0);
+    let table = fs::read_to_string(root.path().join("out/steps.md")).unwrap();
+    assert!(table.contains("cube, n = 16"));
 }
