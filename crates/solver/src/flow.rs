@@ -56,7 +56,8 @@ pub struct StepRecord {
     pub newton: NewtonInfo,
     /// Wall time, seconds.
     pub seconds: f64,
-    /// Wall time of the parts of the minimization.
+    /// Wall time of the parts of the minimization; zero in records of earlier versions.
+    #[serde(default)]
     pub times: PhaseTimes,
 }
 
