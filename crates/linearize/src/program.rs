@@ -399,7 +399,9 @@ fn assemble(build: Builder, mut ends: Ends, products: Option<DType>) -> Program 
         let mut conversion = Conversion::to(dtype);
         primal.extend(conversion.cast(&mut saved));
         constant.extend(conversion.cast(&mut constants_of_tangent));
-        tangent.iter_mut().for_each(|op| conversion.rewrite(op));
+        for operation in &mut tangent {
+            conversion.rewrite(operation);
+        }
         for t in ends.directions.iter_mut().chain(&mut ends.tangents) {
             conversion.convert(t);
         }
