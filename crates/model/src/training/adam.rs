@@ -230,8 +230,7 @@ fn train_in<const D: usize, const R: usize>(
 }
 
 /// The paper's start: kernel zero, activation parameters normal. It does not say how wide: weights and biases have standard
-/// deviation `1/sqrt(inputs of the layer)`, so that the Gaussian units begin neither flat nor saturated (with deviation 1 they
-/// saturate, and 2000 updates learn no more than a constant).
+/// deviation `1/sqrt(inputs of the layer)`, so that the Gaussian units begin neither flat nor saturated.
 pub fn paper_start(data: &SphereData, seed: u64) -> (Vec<f64>, Mlp) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let layers = crate::PAPER_LAYERS.to_vec();
