@@ -68,8 +68,8 @@ pub enum Error {
     },
     /// A metric name outside the allowed grammar.
     #[error(
-        "metric name {name:?} is not allowed: use lower-case words of letters, digits and '_' \
-         that start with a letter, joined by '.', such as \"circle.error_l2\""
+        "metric name {name:?} is not allowed: use lower-case words of letters, digits and '_', \
+         joined by '.' and beginning with a letter, such as \"circle.error_l2\""
     )]
     MetricName {
         /// The name as given.

@@ -10,7 +10,7 @@ use crate::output::OutputDir;
 
 /// Metric names and their values, sorted by name.
 ///
-/// Names are lower-case words of ASCII letters, digits and `_` that start with a letter, joined by
+/// Names are lower-case words of ASCII letters, digits and `_` (not at their start), the first one starting with a letter, joined by
 /// `.`, such as `circle.error_l2`. Values are finite. The same content gives the same bytes: floats
 /// are written with the fewest digits that read back exactly.
 ///
@@ -129,12 +129,13 @@ impl Summary {
 }
 
 fn is_metric_name(name: &str) -> bool {
-    name.split('.').all(|word| {
-        word.starts_with(|c: char| c.is_ascii_lowercase())
-            && word
-                .chars()
-                .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
-    })
+    name.starts_with(|c: char| c.is_ascii_lowercase())
+        && name.split('.').all(|word| {
+            word.starts_with(|c: char| c.is_ascii_lowercase() || c.is_ascii_digit())
+                && word
+                    .chars()
+                    .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+        })
 }
 
 #[cfg(test)]
@@ -156,11 +157,17 @@ mod tests {
     #[test]
     fn names_follow_the_grammar() {
         let mut summary = Summary::new();
-        for name in ["a", "error_l2", "circle.n128.error_l2", "a.b2_c"] {
+        for name in [
+            "a",
+            "error_l2",
+            "circle.n128.error_l2",
+            "a.b2_c",
+            "hvp.512x512.ratio",
+        ] {
             summary.insert(name, 1.0).unwrap();
         }
         for name in [
-            "", "Error", "a b", "a..b", ".a", "a.", "2d", "ä", "a-b", "a.2", "_a", "a\"b",
+            "", "Error", "a b", "a..b", ".a", "a.", "2d", "ä", "a-b", "a._b", "_a", "a\"b",
         ] {
             let error = summary.insert(name, 1.0).unwrap_err();
             assert!(matches!(error, Error::MetricName { .. }), "{name:?}");

@@ -368,6 +368,15 @@ fn slope(points: &[[f64; 2]]) -> Option<f64> {
     (last[0] > first[0]).then(|| (last[1] / first[1]).ln() / (last[0] / first[0]).ln())
 }
 
+/// Line style in figures.
+fn style(dimension: usize) -> LineStyle {
+    if dimension == 2 {
+        LineStyle::Solid
+    } else {
+        LineStyle::Dashed
+    }
+}
+
 fn figure(run: &RunOptions, all: &[Measurement]) -> Figure {
     let mut cost = LineChart::new(
         "cost of a step",
@@ -375,7 +384,7 @@ fn figure(run: &RunOptions, all: &[Measurement]) -> Figure {
         Axis::log("median step [s]"),
     );
     let mut slopes = Vec::new();
-    for (dimension, marker) in [(2, Marker::Circle), (3, Marker::Square)] {
+    for dimension in [2, 3] {
         let points: Vec<[f64; 2]> = all
             .iter()
             .filter(|m| m.dimension == dimension)
@@ -384,11 +393,11 @@ fn figure(run: &RunOptions, all: &[Measurement]) -> Figure {
         if let Some(slope) = slope(&points) {
             slopes.push(format!("{slope:.2} in {dimension}D"));
         }
-        let name = format!("{dimension}D");
         cost = cost.with_series(
-            Series::new(name, points)
-                .with_colour(dimension - 2)
-                .with_marker(marker),
+            Series::new(format!("{dimension}D"), points)
+                .with_colour(Colour::Black)
+                .with_style(style(dimension))
+                .with_marker(Marker::Circle),
         );
     }
     let mut parts = LineChart::new(
@@ -400,16 +409,9 @@ fn figure(run: &RunOptions, all: &[Measurement]) -> Figure {
     for dimension in [2, 3] {
         let rows: Vec<&Measurement> = all.iter().filter(|m| m.dimension == dimension).collect();
         let Some(first) = rows.first() else { continue };
-        let style = if dimension == 2 {
-            LineStyle::Solid
-        } else {
-            LineStyle::Dashed
-        };
-        entries.push(LegendEntry::line(
-            format!("{dimension}D"),
-            Colour::Black,
-            style,
-        ));
+        let style = style(dimension);
+        let name = format!("{dimension}D");
+        entries.push(LegendEntry::line(name, Colour::Black, style));
         for (k, (name, _)) in first.parts().into_iter().enumerate() {
             let points: Vec<[f64; 2]> = rows
                 .iter()
@@ -430,8 +432,9 @@ fn figure(run: &RunOptions, all: &[Measurement]) -> Figure {
         .enumerate()
         .map(|(k, (name, _))| LegendEntry::line(*name, k, LineStyle::Solid));
     Figure::new(run.title("Willmore steps by the hybrid scheme"), 2)
-        .with_panel(cost)
+        .with_panel(cost.with_entries([]))
         .with_panel(parts.with_entries(phases).with_entries(entries))
+        .with_shared_legend()
         .with_note(format!(
             "2D: a cross, eps = 2⁻⁶, tau = 2⁻¹⁴. 3D: a cube at n = 64, a blob at n = 128, eps = 2h, tau = 2⁻¹⁸. {} threads. Cost \
              of a step ~ unknowns to the power {}.",
