@@ -330,11 +330,11 @@ fn the_quick_performance_run_measures_planes_and_solids() {
     let text = fs::read_to_string(root.path().join("out/summary.json")).unwrap();
     let summary = Summary::from_json(&text).unwrap();
     let metric = |name: &str| summary.get(name).unwrap();
-    for key in ["cross.n128", "cube.n16", "blob.n32"] {
+    for key in ["cross.n128", "cube.n24", "blob.n32"] {
         assert!(metric(&format!("{key}.seconds")) > 0.0);
         assert!(metric(&format!("{key}.hvp_per_step")) >= 1.0);
     }
     assert!(metric("hvp.96x96.ratio") > 0.0 && metric("hvp.32x32x32.ratio") > 0.0);
     let table = fs::read_to_string(root.path().join("out/steps.md")).unwrap();
-    assert!(table.contains("cube, n = 16"));
+    assert!(table.contains("cube, n = 24"));
 }

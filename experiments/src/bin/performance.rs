@@ -167,8 +167,12 @@ fn program(options: &Options) -> Result<(), Error> {
         bar.finish();
     }
     let network = &networks[networks.len() - 1];
-    for (name, n, steps) in [("cube", 64, 20), ("blob", 128, 8)] {
-        let (n, steps) = if quick { (n / 4, 2) } else { (n, steps) };
+    let solids = if quick {
+        [("cube", 24, 2), ("blob", 32, 2)]
+    } else {
+        [("cube", 64, 20), ("blob", 128, 8)]
+    };
+    for (name, n, steps) in solids {
         let spacing = 1.0 / n as f64;
         let bar = progress.bar(format!("{name}, n = {n}"), steps as u64);
         let initial = solid_shape(name, n)?;
