@@ -126,7 +126,7 @@ impl VectorOps for Cube {
             };
             let (x, mut z) = (read(x), read(z));
             vector::call(&update, &x, &mut z);
-            down(Tensor::from_data(TensorData::new(z, shape), (&device, DType::F32)))
+            down(Tensor::<R>::from_data(TensorData::new(z, shape), (&device, DType::F32)))
         })
     }
 }
