@@ -6,10 +6,11 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use operators::{ComputeDevice, DeviceKind};
 
-use crate::Error;
+use crate::{Error, memory};
 
 /// Runs a program: success is exit code 0, a failure one line on standard error and exit code 2.
 pub fn run(program: impl FnOnce() -> Result<(), Error>) -> ExitCode {
+    memory::keep_freed();
     match program() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -26,6 +26,7 @@ pub mod comparison;
 mod error;
 pub mod evolution;
 pub mod harness;
+pub mod memory;
 pub mod method;
 pub mod networks;
 pub mod options;

@@ -43,11 +43,12 @@ impl ByHand {
         let symbol = kernel_symbol(shape, network.kernel(), network.ratios().width);
         let table = network.activation().table()?;
         let w = plan.filter(u, &symbol, false);
-        let slope = w.iter().map(|&w| table.derivative(w, 1)).collect();
-        let bend = w
+        let [value, slope, bend] = [0, 1, 2].map(|order| table.derivatives(&w, order));
+        let residual = value.iter().zip(u).map(|(value, u)| value - u);
+        let bend = bend
             .iter()
-            .zip(u)
-            .map(|(&w, u)| table.derivative(w, 2) * (table.derivative(w, 0) - u))
+            .zip(residual)
+            .map(|(bend, r)| bend * r)
             .collect();
         Ok(Self {
             plan,

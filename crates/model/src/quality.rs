@@ -138,14 +138,16 @@ fn applied<const D: usize>(
     let activation = network.activation();
     let table = activation.table()?;
     let range = table.range();
-    let value = |w: f64| {
-        if (range.low..=range.high).contains(&w) {
-            table.derivative(w, 0)
-        } else {
-            activation.value(w)
+    Ok([1.0, -1.0].map(|sign| {
+        let smoothed: Vec<f64> = smoothed.iter().map(|w| sign * w).collect();
+        let mut values = table.derivatives(&smoothed, 0);
+        for (value, &w) in values.iter_mut().zip(&smoothed) {
+            if !(range.low..=range.high).contains(&w) {
+                *value = activation.value(w);
+            }
         }
-    };
-    Ok([1.0, -1.0].map(|sign| smoothed.iter().map(|w| value(sign * w)).collect()))
+        values
+    }))
 }
 
 /// Fine line over the arguments that occur, `[-1.05, 1.05]`.

@@ -25,6 +25,8 @@ pub trait Real: FftNum + Float + bytemuck::Pod + Default {
     fn of(value: f64) -> Self;
     /// The value as a double, exactly.
     fn double(self) -> f64;
+    /// The value towards zero, as an index: 0 for NaN and below.
+    fn truncated(self) -> usize;
     /// The process-wide plans and kernel symbols of this type.
     fn shared() -> &'static Shared<Self>;
 }
@@ -43,6 +45,10 @@ macro_rules! real {
             }
             fn double(self) -> f64 {
                 self.into()
+            }
+            fn truncated(self) -> usize {
+                // A 32-bit conversion is one instruction, a 64-bit unsigned one is not.
+                (self as i32).max(0) as usize
             }
             fn shared() -> &'static Shared<Self> {
                 static SHARED: std::sync::OnceLock<Shared<$type>> = std::sync::OnceLock::new();

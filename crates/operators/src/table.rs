@@ -13,6 +13,7 @@ use crate::fft::Real;
 /// Coefficients per cell.
 pub const COEFFICIENTS: usize = 6;
 const PARALLEL_FROM: usize = 1 << 15;
+const CHUNK: usize = 1 << 13;
 
 /// Interval and resolution of a table; the coefficients travel beside it as a `[cells, 6]` tensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,9 +80,14 @@ impl HermiteTable {
         &self.coefficients
     }
 
-    /// The `order`-th derivative of the interpolant at `w`.
+    /// The `order`-th derivative of the interpolant at each entry of `w`.
+    pub fn derivatives(&self, w: &[f64], order: usize) -> Vec<f64> {
+        evaluate(w, self.range, &self.coefficients, order)
+    }
+
+    /// The `order`-th derivative of the interpolant at `w`. For many values [`Self::derivatives`] is far cheaper.
     pub fn derivative(&self, w: f64, order: usize) -> f64 {
-        Evaluator::new(self.range, &self.coefficients, order).at(w)
+        self.derivatives(&[w], order)[0]
     }
 }
 
@@ -102,79 +108,100 @@ fn hermite(a: [f64; 3], b: [f64; 3], width: f64) -> [f64; COEFFICIENTS] {
     ]
 }
 
-/// Evaluates one derivative of a table.
-struct Evaluator<'a, T> {
+/// The `ORDER`-th derivative of a table: coefficients of the derived polynomials, ready for Horner's rule.
+struct Evaluator<T, const ORDER: usize> {
     low: T,
-    width: T,
     inverse_width: T,
-    last: usize,
-    order: usize,
-    factors: [T; COEFFICIENTS],
-    coefficients: &'a [T],
+    cells: usize,
+    end: T,
+    /// Per cell, lowest power first; those beyond the degree `5 - ORDER` are not read.
+    polynomials: Vec<[T; COEFFICIENTS]>,
+    /// Taylor polynomials in `s - end` at both ends of the table.
+    beyond: [[T; 3]; 2],
 }
 
 /// `j! / (j - order)! / width^order`: what the `order`-th derivative multiplies coefficient `j` by.
-fn factors<T: Real>(width: f64, order: usize) -> [T; COEFFICIENTS] {
-    std::array::from_fn(|j| {
-        let falling: f64 = (0..order).map(|i| j as f64 - i as f64).product();
-        T::of(if j < order {
-            0.0
-        } else {
-            falling / width.powi(order as i32)
-        })
-    })
+fn factor(width: f64, j: usize, order: usize) -> f64 {
+    let falling: f64 = (0..order).map(|i| j as f64 - i as f64).product();
+    falling / width.powi(order as i32)
 }
 
-impl<'a, T: Real> Evaluator<'a, T> {
-    fn new(range: TableRange, coefficients: &'a [T], order: usize) -> Self {
+impl<T: Real, const ORDER: usize> Evaluator<T, ORDER> {
+    fn new(range: TableRange, coefficients: &[T]) -> Self {
         let width = range.width();
+        let derived = |order: usize| {
+            let factors: [T; COEFFICIENTS] =
+                std::array::from_fn(|j| T::of(factor(width, j, order)));
+            move |cell: &[T]| -> [T; COEFFICIENTS] {
+                std::array::from_fn(|i| match cell.get(i + order) {
+                    Some(&c) => c * factors[i + order],
+                    None => T::zero(),
+                })
+            }
+        };
+        let (cells, _) = coefficients.as_chunks::<COEFFICIENTS>();
+        // The second-order Taylor polynomial of the function itself, derived `ORDER` times, in units of cells.
+        let taylor = |cell: &[T; COEFFICIENTS], t: T| -> [T; 3] {
+            std::array::from_fn(|power| {
+                if ORDER + power > 2 {
+                    return T::zero();
+                }
+                let slope = horner(&derived(ORDER + power)(cell), t);
+                let unit = width.powi(power as i32) / if power == 2 { 2.0 } else { 1.0 };
+                slope * T::of(unit)
+            })
+        };
+        let beyond = match (cells.first(), cells.last()) {
+            (Some(first), Some(last)) => [taylor(first, T::zero()), taylor(last, T::one())],
+            _ => [[T::zero(); 3]; 2],
+        };
+        let derive = derived(ORDER);
         Self {
             low: T::of(range.low),
-            width: T::of(width),
             inverse_width: T::of(1.0 / width),
-            last: range.cells - 1,
-            order,
-            factors: factors(width, order),
-            coefficients,
+            cells: cells.len(),
+            end: T::of(cells.len() as f64),
+            polynomials: cells.iter().map(|cell| derive(cell)).collect(),
+            beyond,
         }
     }
 
     fn at(&self, w: T) -> T {
         let s = (w - self.low) * self.inverse_width;
-        let end = T::of((self.last + 1) as f64);
-        if s < T::zero() || s > end {
-            return self.beyond(s, if s < T::zero() { T::zero() } else { end });
+        if s < T::zero() || s > self.end {
+            return self.beyond(s);
         }
         // NaN lands in cell 0 and stays NaN through t.
-        let cell = s.to_usize().unwrap_or(0).min(self.last);
-        self.polynomial(cell, s - T::of(cell as f64), &self.factors, self.order)
-    }
-
-    fn polynomial(&self, cell: usize, t: T, factors: &[T; COEFFICIENTS], order: usize) -> T {
-        let c = &self.coefficients[cell * COEFFICIENTS..][..COEFFICIENTS];
+        let cell = s.truncated().min(self.cells - 1);
+        let t = s - T::of(cell as f64);
+        let polynomial = &self.polynomials[cell];
         let mut sum = T::zero();
-        for j in (order..COEFFICIENTS).rev() {
-            sum = sum * t + c[j] * factors[j];
+        for j in (0..COEFFICIENTS - ORDER).rev() {
+            sum = sum * t + polynomial[j];
         }
         sum
     }
 
-    /// The Taylor polynomial of degree 2 at the end of the table nearest to `s`.
-    fn beyond(&self, s: T, end: T) -> T {
-        let cell = if end == T::zero() { 0 } else { self.last };
-        let t = end - T::of(cell as f64);
-        let distance = (s - end) * self.width;
-        let mut sum = T::zero();
-        let mut weight = T::one();
-        for (step, order) in (self.order..3).enumerate() {
-            if step > 0 {
-                weight = weight * distance / T::of(step as f64);
-            }
-            let factors = factors(self.width.to_f64().unwrap_or(f64::NAN), order);
-            sum = sum + weight * self.polynomial(cell, t, &factors, order);
-        }
-        sum
+    /// The second-order Taylor polynomial at the end of the table nearest to `s`.
+    #[cold]
+    fn beyond(&self, s: T) -> T {
+        let (polynomial, distance) = if s < T::zero() {
+            (&self.beyond[0], s)
+        } else {
+            (&self.beyond[1], s - self.end)
+        };
+        polynomial[0] + distance * (polynomial[1] + distance * polynomial[2])
     }
+
+    fn fill(&self, w: &[T], out: &mut [T]) {
+        for (out, &w) in out.iter_mut().zip(w) {
+            *out = self.at(w);
+        }
+    }
+}
+
+fn horner<T: Real>(polynomial: &[T; COEFFICIENTS], t: T) -> T {
+    (polynomial.iter().rev()).fold(T::zero(), |sum, &c| sum * t + c)
 }
 
 /// The `order`-th derivative at every entry of `w`.
@@ -184,21 +211,32 @@ pub(crate) fn evaluate<T: Real>(
     coefficients: &[T],
     order: usize,
 ) -> Vec<T> {
-    let table = Evaluator::new(range, coefficients, order);
+    // The order as a constant: the polynomial is then unrolled.
+    match order {
+        0 => evaluate_order::<T, 0>(w, range, coefficients),
+        1 => evaluate_order::<T, 1>(w, range, coefficients),
+        2 => evaluate_order::<T, 2>(w, range, coefficients),
+        3 => evaluate_order::<T, 3>(w, range, coefficients),
+        4 => evaluate_order::<T, 4>(w, range, coefficients),
+        5 => evaluate_order::<T, 5>(w, range, coefficients),
+        // Derivatives of NaN stay NaN.
+        _ => w.iter().map(|&w| w * T::zero()).collect(),
+    }
+}
+
+fn evaluate_order<T: Real, const ORDER: usize>(
+    w: &[T],
+    range: TableRange,
+    coefficients: &[T],
+) -> Vec<T> {
+    let table = Evaluator::<T, ORDER>::new(range, coefficients);
     let mut result = vec![T::zero(); w.len()];
-    let chunk = if w.len() >= PARALLEL_FROM {
-        1 << 13
+    if w.len() < PARALLEL_FROM {
+        table.fill(w, &mut result);
     } else {
-        w.len().max(1)
-    };
-    result
-        .par_chunks_mut(chunk)
-        .zip(w.par_chunks(chunk))
-        .for_each(|(out, w)| {
-            for (out, &w) in out.iter_mut().zip(w) {
-                *out = table.at(w);
-            }
-        });
+        let chunks = result.par_chunks_mut(CHUNK).zip(w.par_chunks(CHUNK));
+        chunks.for_each(|(out, w)| table.fill(w, out));
+    }
     result
 }
 
@@ -225,13 +263,11 @@ mod tests {
     #[test]
     fn converges_with_the_orders_of_quintic_interpolation() {
         let error = |cells: usize, order: usize| {
-            (0..4001)
-                .map(|i| -2.0 + f64::from(i) * 1e-3)
-                .map(|w| {
-                    (table(cells).derivative(w, order)
-                        - (w + order as f64 * std::f64::consts::FRAC_PI_2).sin())
-                    .abs()
-                })
+            let points: Vec<f64> = (0..4001).map(|i| -2.0 + f64::from(i) * 1e-3).collect();
+            let exact = |w: f64| (w + order as f64 * std::f64::consts::FRAC_PI_2).sin();
+            (table(cells).derivatives(&points, order).iter())
+                .zip(&points)
+                .map(|(value, &w)| (value - exact(w)).abs())
                 .fold(0.0, f64::max)
         };
         for (order, expected) in [(0, 6.0), (1, 5.0), (2, 4.0), (3, 3.0)] {

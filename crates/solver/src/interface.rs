@@ -15,11 +15,12 @@ use faer::linalg::solvers::{Llt, Solve};
 use faer::{Mat, Side};
 use geometry::Grid;
 use operators::{HostUpdate, HostVectors, Real};
+use rayon::prelude::*;
+
+use crate::samples::{MOST_CORNERS, Samples};
 
 /// Spacing of the lattice in units of `eps`.
 const SPACING: f64 = 4.0;
-/// Nodes with `1 - u^2` above this belong to the interface: `|s| < 3.1 eps`.
-const WINDOW: f64 = 0.03;
 /// More functions than this cost more than they save.
 const MOST_COLUMNS: usize = 2000;
 /// With more than this part of the interface curved more sharply than `1/eps` (corners, in the first steps), displacements
@@ -29,171 +30,126 @@ const SHARP: f64 = 1e-3;
 const BENT: f64 = 4.0;
 /// Regularization of the mass matrix of the functions on the interface, which may depend on each other there.
 const RIDGE: f64 = 1e-7;
+/// Vectors are worked on in pieces of this many entries.
+const CHUNK: usize = 1 << 14;
 
 /// A coarse correction at one phase field for one time step.
-pub(crate) struct InterfaceModes {
-    /// Grid node, then the column and the value of `q phi` for each hat function that does not vanish there.
-    nodes: Vec<u32>,
-    entries: Vec<(u32, f64)>,
-    per_node: usize,
-    columns: usize,
+pub(crate) struct InterfaceModes<const D: usize> {
+    samples: Samples<D>,
     factor: Llt<f64>,
 }
 
-impl InterfaceModes {
+/// One matrix per cell, rows and columns being the corners.
+type Local = [[f64; MOST_CORNERS]; MOST_CORNERS];
+
+impl<const D: usize> InterfaceModes<D> {
     /// The correction for the interface of `u`, or none if there is no interface, or too much of it.
-    pub(crate) fn new<const D: usize>(
-        grid: &Grid<D>,
-        u: &[f64],
-        eps: f64,
-        tau: f64,
-    ) -> Option<Self> {
-        let cells = grid.cells();
-        let spacing = grid.spacing();
-        let lattice = ((grid.side() / (SPACING * eps)).round() as usize).max(4);
-        let width = cells as f64 / lattice as f64;
-        let corners = 1_usize << D;
-        let strides: [usize; D] = std::array::from_fn(|axis| grid.stride(axis));
-        let mut column_of = vec![u32::MAX; lattice.pow(D as u32)];
-        let mut columns = 0;
-        let (mut nodes, mut entries) = (Vec::new(), Vec::new());
-        let mut slopes: Vec<[f64; D]> = Vec::new();
-        let mut sharp = 0_usize;
-        let mut curvatures: Vec<f64> = Vec::new();
-        let distance = |v: f64| -4.0 / 3.0 * eps * v.clamp(-0.999_999, 0.999_999).atanh();
-        for (node, &value) in u.iter().enumerate() {
-            let q = 1.0 - value * value;
-            if q < WINDOW {
-                continue;
-            }
-            let index = grid.multi_index(node);
-            let here = distance(value);
-            let mut laplacian = 0.0;
-            let mut normal: [f64; D] = std::array::from_fn(|axis| {
-                let at = |shift: usize| {
-                    let moved = (index[axis] + shift) % cells;
-                    distance(u[node + moved * strides[axis] - index[axis] * strides[axis]])
-                };
-                let (after, before) = (at(1), at(cells - 1));
-                laplacian += after - 2.0 * here + before;
-                after - before
-            });
-            // For a distance function the Laplacian is the mean curvature.
-            let curvature = laplacian / (spacing * spacing);
-            let length = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
-            let slope = length / (2.0 * spacing);
-            if slope < 1e-3 {
-                continue;
-            }
-            if curvature.abs() * eps > 1.0 {
-                sharp += 1;
-            }
-            for n in &mut normal {
-                *n /= length;
-            }
-            // The foot point on the interface, in units of the lattice.
-            let mut low = [0; D];
-            let mut fraction = [0.0; D];
-            for axis in 0..D {
-                let x = (index[axis] as f64 - here * normal[axis] / spacing) / width;
-                low[axis] = x.floor().rem_euclid(lattice as f64) as usize % lattice;
-                fraction[axis] = x - x.floor();
-            }
-            nodes.push(node as u32);
-            curvatures.push(curvature);
-            for corner in 0..corners {
-                let (mut hat, mut position) = (1.0, 0);
-                let mut slope = [1.0; D];
-                for axis in 0..D {
-                    let upper = corner >> axis & 1;
-                    let (along, change) = if upper == 1 {
-                        (fraction[axis], 1.0)
-                    } else {
-                        (1.0 - fraction[axis], -1.0)
-                    };
-                    hat *= along;
-                    for (other, slope) in slope.iter_mut().enumerate() {
-                        *slope *= if other == axis { change } else { along };
-                    }
-                    position = position * lattice + (low[axis] + upper) % lattice;
-                }
-                let column = &mut column_of[position];
-                if *column == u32::MAX {
-                    *column = columns;
-                    columns += 1;
-                }
-                // The tangential part of the gradient.
-                let across: f64 = slope.iter().zip(&normal).map(|(a, n)| a * n).sum();
-                let scale = q / (width * spacing);
-                slopes.push(std::array::from_fn(|axis| {
-                    scale * (slope[axis] - across * normal[axis])
-                }));
-                entries.push((*column, q * hat));
-            }
-        }
-        let columns = columns as usize;
-        let corners_dominate = sharp as f64 > SHARP * nodes.len() as f64;
-        if columns == 0 || columns > MOST_COLUMNS || corners_dominate {
+    pub(crate) fn new(grid: &Grid<D>, u: &[f64], eps: f64, tau: f64) -> Option<Self> {
+        let samples = Samples::new(grid, u, eps, SPACING * eps);
+        let nodes = &samples.samples;
+        let sharp = nodes.iter().filter(|s| s.curvature.abs() * eps > 1.0);
+        let corners_dominate = sharp.count() as f64 > SHARP * nodes.len() as f64;
+        if nodes.is_empty() || samples.columns > MOST_COLUMNS || corners_dominate {
             return None;
         }
-        let mut mass = Mat::<f64>::zeros(columns, columns);
-        let mut stiffness = Mat::<f64>::zeros(columns, columns);
-        let mut bent = Mat::<f64>::zeros(columns, columns);
-        for ((entries, slopes), curvature) in entries
-            .chunks(corners)
-            .zip(slopes.chunks(corners))
-            .zip(&curvatures)
-        {
-            let square = curvature * curvature;
-            for (&(j, a), da) in entries.iter().zip(slopes) {
-                for (&(k, b), db) in entries.iter().zip(slopes) {
-                    let dot: f64 = da.iter().zip(db).map(|(x, y)| x * y).sum();
-                    mass[(j as usize, k as usize)] += a * b;
-                    stiffness[(j as usize, k as usize)] += dot;
-                    bent[(j as usize, k as usize)] += BENT * square * (dot + square * a * b);
-                }
-            }
-        }
-        let mean: f64 = (0..columns).map(|j| mass[(j, j)]).sum::<f64>() / columns as f64;
-        for j in 0..columns {
-            mass[(j, j)] += RIDGE * mean;
-        }
-        // M + tau S M^-1 S
-        let bending = &stiffness * mass.llt(Side::Lower).ok()?.solve(&stiffness);
-        let coarse = Mat::from_fn(columns, columns, |j, k| {
-            mass[(j, k)] + tau * (0.5 * (bending[(j, k)] + bending[(k, j)]) + bent[(j, k)])
-        });
-        Some(Self {
-            nodes,
-            entries,
-            per_node: corners,
-            columns,
-            factor: coarse.llt(Side::Lower).ok()?,
-        })
+        let factor = coarse_matrix(&samples, tau)?.llt(Side::Lower).ok()?;
+        Some(Self { samples, factor })
     }
 
     /// Adds `Z A^-1 Z^T r` to `z`.
     pub(crate) fn correct<T: Real>(&self, r: &[T], z: &mut [T]) {
-        let mut coarse = Mat::<f64>::zeros(self.columns, 1);
-        for (&node, entries) in self.nodes.iter().zip(self.entries.chunks(self.per_node)) {
-            let value = r[node as usize].double();
-            for &(column, weight) in entries {
-                coarse[(column as usize, 0)] += weight * value;
+        let samples = &self.samples;
+        let parts: Vec<[f64; MOST_CORNERS]> = (0..samples.corners.len())
+            .into_par_iter()
+            .with_min_len(16)
+            .map(|cell| {
+                let mut sums = [0.0; MOST_CORNERS];
+                for sample in samples.of_cell(cell) {
+                    let value = sample.weight * r[sample.node as usize].double();
+                    for (sum, hat) in sums.iter_mut().zip(sample.hats()) {
+                        *sum += hat * value;
+                    }
+                }
+                sums
+            })
+            .collect();
+        let mut coarse = Mat::<f64>::zeros(samples.columns, 1);
+        for (corners, sums) in samples.corners.iter().zip(&parts) {
+            for (&column, sum) in corners.iter().zip(sums).take(1 << D) {
+                coarse[(column as usize, 0)] += sum;
             }
         }
         self.factor.solve_in_place(&mut coarse);
-        for (&node, entries) in self.nodes.iter().zip(self.entries.chunks(self.per_node)) {
-            let sum: f64 = entries
-                .iter()
-                .map(|&(column, weight)| weight * coarse[(column as usize, 0)])
-                .sum();
-            let z = &mut z[node as usize];
-            *z = T::of(z.double() + sum);
-        }
+        z.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, z)| {
+            let first = chunk * CHUNK;
+            let from = (samples.samples).partition_point(|s| (s.node as usize) < first);
+            for sample in &samples.samples[from..] {
+                let Some(z) = z.get_mut(sample.node as usize - first) else {
+                    break;
+                };
+                let sum: f64 = (sample.hats().iter())
+                    .zip(&samples.corners[sample.cell as usize])
+                    .take(1 << D)
+                    .map(|(hat, &column)| hat * coarse[(column as usize, 0)])
+                    .sum();
+                *z = T::of(z.double() + sample.weight * sum);
+            }
+        });
     }
 }
 
-impl HostUpdate for InterfaceModes {
+/// `M + tau (S M^-1 S + B)`
+fn coarse_matrix<const D: usize>(samples: &Samples<D>, tau: f64) -> Option<Mat<f64>> {
+    let locals: Vec<[Local; 3]> = (0..samples.corners.len())
+        .into_par_iter()
+        .map(|cell| local_matrices(samples, cell))
+        .collect();
+    let columns = samples.columns;
+    let mut mass = Mat::<f64>::zeros(columns, columns);
+    let mut stiffness = Mat::<f64>::zeros(columns, columns);
+    let mut bent = Mat::<f64>::zeros(columns, columns);
+    for (corners, [m, s, b]) in samples.corners.iter().zip(&locals) {
+        for (j, &row) in corners.iter().enumerate().take(1 << D) {
+            for (k, &column) in corners.iter().enumerate().take(1 << D) {
+                let place = (row as usize, column as usize);
+                mass[place] += m[j][k];
+                stiffness[place] += s[j][k];
+                bent[place] += b[j][k];
+            }
+        }
+    }
+    let mean: f64 = (0..columns).map(|j| mass[(j, j)]).sum::<f64>() / columns as f64;
+    for j in 0..columns {
+        mass[(j, j)] += RIDGE * mean;
+    }
+    let bending = &stiffness * mass.llt(Side::Lower).ok()?.solve(&stiffness);
+    Some(Mat::from_fn(columns, columns, |j, k| {
+        mass[(j, k)] + tau * (0.5 * (bending[(j, k)] + bending[(k, j)]) + bent[(j, k)])
+    }))
+}
+
+/// The parts of `M`, `S` and `B` that belong to one cell of the lattice.
+fn local_matrices<const D: usize>(samples: &Samples<D>, cell: usize) -> [Local; 3] {
+    let [mut mass, mut stiffness, mut bent] = [[[0.0; MOST_CORNERS]; MOST_CORNERS]; 3];
+    let unit = samples.spacing.powi(-2);
+    for sample in samples.of_cell(cell) {
+        let (hats, slopes) = (sample.hats(), sample.slopes());
+        let weight = sample.weight * sample.weight;
+        let square = sample.curvature * sample.curvature;
+        for j in 0..1 << D {
+            for k in 0..1 << D {
+                let slope: f64 = slopes[j].iter().zip(&slopes[k]).map(|(a, b)| a * b).sum();
+                let (dot, product) = (weight * unit * slope, weight * hats[j] * hats[k]);
+                mass[j][k] += product;
+                stiffness[j][k] += dot;
+                bent[j][k] += BENT * square * (dot + square * product);
+            }
+        }
+    }
+    [mass, stiffness, bent]
+}
+
+impl<const D: usize> HostUpdate for InterfaceModes<D> {
     fn update(&self, vectors: HostVectors<'_>) {
         match vectors {
             HostVectors::Double(r, z) => self.correct(r, z),

@@ -66,6 +66,7 @@ mod flow;
 mod interface;
 mod newton;
 mod preconditioner;
+mod samples;
 mod times;
 
 pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective, StepFailure};

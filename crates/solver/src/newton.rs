@@ -259,6 +259,15 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
         })
     }
 
+    /// A point that may turn out to be too far: none where the mean curvature step fails.
+    fn trial(&mut self, u: Tensor<D>) -> Result<Option<Point<D>>, Error> {
+        match self.point(u) {
+            Ok(point) => Ok(Some(point).filter(|point| point.energy.is_finite())),
+            Err(Error::Step(_)) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
     fn energy(&mut self, u: &Tensor<D>) -> Result<f64, Error> {
         self.info.values += 1;
         self.objective.value(u)
@@ -338,12 +347,17 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
         }
         for _ in 0..ROUNDS {
             let solution = self.solve(&point.gradient, limits, Level::Phase)?;
-            let Some((u, energy)) = self.straight(&point, &solution, 0.05, 0.0)? else {
-                return Ok(point);
+            // The full step nearly always lowers the energy: it is evaluated with its gradient at once.
+            let full = point.u.clone() - solution.direction.clone() * solution.slope.signum();
+            let next = match self.trial(full)? {
+                Some(next) if next.energy < point.energy => next,
+                _ => match self.straight(&point, &solution, 0.5, 0.05, 0.0)? {
+                    Some((u, _)) => self.point(u)?,
+                    None => return self.point(point.u),
+                },
             };
-            let drop = point.energy - energy;
-            let worthwhile = drop > WORTHWHILE * point.energy;
-            point = self.point(u)?;
+            let worthwhile = point.energy - next.energy > WORTHWHILE * point.energy;
+            point = next;
             if !worthwhile {
                 break;
             }
@@ -351,15 +365,16 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
         Ok(point)
     }
 
-    /// Backtracks along the straight line until the energy falls by `sufficient * t * slope`.
+    /// Backtracks from `longest` along the straight line until the energy falls by `sufficient * t * slope`.
     fn straight(
         &mut self,
         point: &Point<D>,
         solution: &CgSolution<D>,
+        longest: f64,
         shortest: f64,
         sufficient: f64,
     ) -> Result<Option<(Tensor<D>, f64)>, Error> {
-        let (mut t, sign) = (1.0, -solution.slope.signum());
+        let (mut t, sign) = (longest, -solution.slope.signum());
         while t >= shortest {
             let u = point.u.clone() + solution.direction.clone() * (sign * t);
             let energy = self.energy(&u)?;
@@ -416,9 +431,8 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
             let mut next = None;
             while t >= SHORTEST {
                 let u = retract(&point.u, &solution.direction, sign * t);
-                let energy = self.energy(&u)?;
-                if energy.is_finite() && energy < HOPELESS * point.energy {
-                    let candidate = self.point(u)?;
+                let candidate = self.trial(u)?;
+                if let Some(candidate) = candidate.filter(|c| c.energy < HOPELESS * point.energy) {
                     let candidate = self.clean(candidate)?;
                     if candidate.energy <= point.energy - 1e-3 * t * decrease {
                         next = Some(candidate);
@@ -429,7 +443,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
             }
             point = match next {
                 Some(next) => next,
-                None => match self.straight(&point, &solution, 1e-6, 1e-4)? {
+                None => match self.straight(&point, &solution, 1.0, 1e-6, 1e-4)? {
                     Some((u, _)) => self.point(u)?,
                     None => {
                         let exit = self.stuck(decrease, point.energy);
@@ -464,7 +478,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
             let solution = self.solve(&point.gradient, limits, Level::Both)?;
             let done = self.converged(&point, solution.slope)?;
             self.info.newton += 1;
-            let next = self.straight(&point, &solution, 1e-6, 1e-4)?;
+            let next = self.straight(&point, &solution, 1.0, 1e-6, 1e-4)?;
             match (done, next) {
                 (Some(exit), next) => {
                     if let Some((u, energy)) = next {

@@ -14,7 +14,7 @@ use crate::interface::InterfaceModes;
 pub struct Preconditioner<const D: usize> {
     phase: SpectralFilter,
     scales: Option<Scales<D>>,
-    interface: Option<Arc<InterfaceModes>>,
+    interface: Option<Arc<InterfaceModes<D>>>,
 }
 
 /// What the coarse correction needs to know of a step.

@@ -1,0 +1,228 @@
+//! The grid nodes of an interface, with their foot points on it, in the cells of a coarse lattice.
+
+use geometry::Grid;
+use rayon::prelude::*;
+
+/// Corners of a cell of the lattice in 3D; in 2D the first four count.
+pub(crate) const MOST_CORNERS: usize = 8;
+/// Nodes with `1 - u^2` above this belong to the interface: `|s| < 3.1 eps`.
+const WINDOW: f64 = 0.03;
+/// Nodes are worked on in pieces of this many.
+const CHUNK: usize = 1 << 14;
+/// Where the distance to the interface changes less than this per unit length, there is no normal.
+const FLAT: f64 = 1e-3;
+
+/// A grid node of the interface.
+pub(crate) struct Sample<const D: usize> {
+    pub node: u32,
+    /// Number of the lattice cell in which the foot point lies, in order of first appearance.
+    pub cell: u32,
+    /// Place of the foot point in that cell.
+    fraction: [f64; D],
+    normal: [f64; D],
+    /// `1 - u^2`
+    pub weight: f64,
+    pub curvature: f64,
+}
+
+impl<const D: usize> Sample<D> {
+    /// Values of the hat functions of the cell's corners at the foot point.
+    pub(crate) fn hats(&self) -> [f64; MOST_CORNERS] {
+        let mut hats = [0.0; MOST_CORNERS];
+        for (corner, hat) in hats.iter_mut().enumerate().take(1 << D) {
+            *hat = (0..D)
+                .map(|axis| along(corner, axis, self.fraction[axis]).0)
+                .product();
+        }
+        hats
+    }
+
+    /// Tangential gradients of the hat functions, in units of the lattice.
+    pub(crate) fn slopes(&self) -> [[f64; D]; MOST_CORNERS] {
+        let mut slopes = [[0.0; D]; MOST_CORNERS];
+        for (corner, slope) in slopes.iter_mut().enumerate().take(1 << D) {
+            let gradient: [f64; D] = std::array::from_fn(|k| {
+                (0..D)
+                    .map(|axis| {
+                        let (value, change) = along(corner, axis, self.fraction[axis]);
+                        if axis == k { change } else { value }
+                    })
+                    .product()
+            });
+            let across: f64 = gradient.iter().zip(&self.normal).map(|(a, n)| a * n).sum();
+            *slope = std::array::from_fn(|k| gradient[k] - across * self.normal[k]);
+        }
+        slopes
+    }
+}
+
+/// Value and derivative along one axis of the hat function of a corner.
+fn along(corner: usize, axis: usize, fraction: f64) -> (f64, f64) {
+    if corner >> axis & 1 == 1 {
+        (fraction, 1.0)
+    } else {
+        (1.0 - fraction, -1.0)
+    }
+}
+
+/// All nodes of an interface, and the lattice cells that hold their foot points.
+pub(crate) struct Samples<const D: usize> {
+    /// In the order of the grid.
+    pub samples: Vec<Sample<D>>,
+    /// Positions in `samples`, cell by cell, and where each cell begins.
+    order: Vec<u32>,
+    starts: Vec<u32>,
+    /// Numbers of the hat functions at the corners of each cell.
+    pub corners: Vec<[u32; MOST_CORNERS]>,
+    /// How many hat functions there are.
+    pub columns: usize,
+    /// Side of a lattice cell.
+    pub spacing: f64,
+}
+
+impl<const D: usize> Samples<D> {
+    /// The interface of `u`, whose width is `eps`, on a lattice of about the given spacing.
+    pub(crate) fn new(grid: &Grid<D>, u: &[f64], eps: f64, spacing: f64) -> Self {
+        let cells = ((grid.side() / spacing).round() as usize).max(4);
+        let lattice = Lattice {
+            grid,
+            eps,
+            cells,
+            width: grid.cells() as f64 / cells as f64,
+        };
+        let mut samples: Vec<Sample<D>> = (0..u.len())
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .filter_map(|node| lattice.sample(node, u))
+            .collect();
+        let mut cell_of = vec![u32::MAX; cells.pow(D as u32)];
+        let mut column_of = cell_of.clone();
+        let mut corners: Vec<[u32; MOST_CORNERS]> = Vec::new();
+        let mut columns = 0;
+        for sample in &mut samples {
+            let cell = &mut cell_of[sample.cell as usize];
+            if *cell == u32::MAX {
+                *cell = corners.len() as u32;
+                let mut ends = [0; MOST_CORNERS];
+                for (corner, end) in ends.iter_mut().enumerate().take(1 << D) {
+                    let column = &mut column_of[lattice.corner(sample.cell as usize, corner)];
+                    if *column == u32::MAX {
+                        *column = columns;
+                        columns += 1;
+                    }
+                    *end = *column;
+                }
+                corners.push(ends);
+            }
+            sample.cell = *cell;
+        }
+        let (order, starts) = grouped(&samples, corners.len());
+        Self {
+            samples,
+            order,
+            starts,
+            corners,
+            columns: columns as usize,
+            spacing: lattice.width * grid.spacing(),
+        }
+    }
+
+    /// The samples of one lattice cell, in the order of the grid.
+    pub(crate) fn of_cell(&self, cell: usize) -> impl Iterator<Item = &Sample<D>> {
+        let range = self.starts[cell] as usize..self.starts[cell + 1] as usize;
+        self.order[range].iter().map(|&i| &self.samples[i as usize])
+    }
+}
+
+/// Positions of the samples cell by cell, and where each cell begins.
+fn grouped<const D: usize>(samples: &[Sample<D>], cells: usize) -> (Vec<u32>, Vec<u32>) {
+    let mut starts = vec![0; cells + 1];
+    for sample in samples {
+        starts[sample.cell as usize + 1] += 1;
+    }
+    for cell in 0..cells {
+        starts[cell + 1] += starts[cell];
+    }
+    let mut next = starts.clone();
+    let mut order = vec![0; samples.len()];
+    for (i, sample) in samples.iter().enumerate() {
+        let place = &mut next[sample.cell as usize];
+        order[*place as usize] = i as u32;
+        *place += 1;
+    }
+    (order, starts)
+}
+
+struct Lattice<'a, const D: usize> {
+    grid: &'a Grid<D>,
+    eps: f64,
+    /// Cells per side.
+    cells: usize,
+    /// Grid cells per lattice cell.
+    width: f64,
+}
+
+impl<const D: usize> Lattice<'_, D> {
+    fn distance(&self, u: f64) -> f64 {
+        -4.0 / 3.0 * self.eps * u.clamp(-0.999_999, 0.999_999).atanh()
+    }
+
+    /// What a node is to the interface, if it belongs to it. Its cell is still that of the whole lattice.
+    fn sample(&self, node: usize, u: &[f64]) -> Option<Sample<D>> {
+        let weight = 1.0 - u[node] * u[node];
+        if weight < WINDOW {
+            return None;
+        }
+        let (cells, spacing) = (self.grid.cells(), self.grid.spacing());
+        let index = self.grid.multi_index(node);
+        let here = self.distance(u[node]);
+        let mut laplacian = 0.0;
+        let mut normal: [f64; D] = std::array::from_fn(|axis| {
+            let stride = self.grid.stride(axis);
+            let at = |shift: usize| {
+                let moved = (index[axis] + shift) % cells;
+                self.distance(u[node + moved * stride - index[axis] * stride])
+            };
+            let (after, before) = (at(1), at(cells - 1));
+            laplacian += after - 2.0 * here + before;
+            after - before
+        });
+        let length = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
+        if length / (2.0 * spacing) < FLAT {
+            return None;
+        }
+        for n in &mut normal {
+            *n /= length;
+        }
+        let mut cell = 0;
+        let mut fraction = [0.0; D];
+        for axis in 0..D {
+            // The foot point on the interface, in units of the lattice.
+            let x = (index[axis] as f64 - here * normal[axis] / spacing) / self.width;
+            let low = x.floor().rem_euclid(self.cells as f64) as usize % self.cells;
+            cell = cell * self.cells + low;
+            fraction[axis] = x - x.floor();
+        }
+        Some(Sample {
+            node: node as u32,
+            cell: cell as u32,
+            fraction,
+            normal,
+            weight,
+            // For a distance function the Laplacian is the mean curvature.
+            curvature: laplacian / (spacing * spacing),
+        })
+    }
+
+    /// Row-major index of a corner of a cell.
+    fn corner(&self, cell: usize, corner: usize) -> usize {
+        let (mut rest, mut stride, mut position) = (cell, 1, 0);
+        for axis in (0..D).rev() {
+            let low = rest % self.cells;
+            rest /= self.cells;
+            position += (low + (corner >> axis & 1)) % self.cells * stride;
+            stride *= self.cells;
+        }
+        position
+    }
+}
