@@ -17,7 +17,7 @@ use solver::{FlowParams, NewtonParams};
 
 use crate::Error;
 use crate::circles::{EPS, Flow, STEP};
-use crate::evolution::{Evolution, Trajectory};
+use crate::evolution::{self, Evolution, TimeSteps};
 use crate::method::Method;
 use crate::networks::{NetworkOptions, convergence_ratios};
 use crate::options::{RunOptions, resolutions};
@@ -87,6 +87,8 @@ pub struct ComparisonOptions {
     #[arg(long, value_name = "COUNT")]
     pub steps: Option<usize>,
 }
+
+type Trajectory = evolution::Trajectory<2>;
 
 #[derive(Serialize)]
 struct Parameters<'a> {
@@ -208,7 +210,7 @@ pub fn run(setting: &Setting, options: &ComparisonOptions) -> Result<(), Error> 
     let progress = options.run.progress();
     let store = output.subfolder("fields")?;
     let clock = Instant::now();
-    let execute = |manifest: &mut Manifest, evolution: &Evolution, what: &str| {
+    let execute = |manifest: &mut Manifest, evolution: &Evolution<2>, what: &str| {
         let title = format!("{what}{}, n = {}", evolution.method.label(), evolution.n);
         let bar = progress.bar(title.clone(), evolution.steps as u64);
         let network: Option<&Network> = network_of(evolution.n);
@@ -262,7 +264,7 @@ fn evolution(
     method: Method,
     n: usize,
     (steps, ratio): (usize, usize),
-) -> Evolution {
+) -> Evolution<2> {
     let tau = STEP / ratio as f64;
     Evolution {
         shape: setting.shape.to_owned(),
@@ -270,6 +272,7 @@ fn evolution(
         method,
         n,
         side: setting.side,
+        centre: 0.0,
         params: FlowParams {
             eps: EPS,
             mcf_step: if setting.flow == Flow::MeanCurvature {
@@ -279,7 +282,7 @@ fn evolution(
             },
             newton: NewtonParams::default(),
         },
-        tau,
+        tau: TimeSteps::Constant(tau),
         sample_every: 8 * ratio,
         also_sample: [1, 2, 4].map(|k| k * ratio).to_vec(),
         steps: steps * ratio,
@@ -292,7 +295,7 @@ fn plan(
     options: &ComparisonOptions,
     cells: &[usize],
     steps: usize,
-) -> Vec<Evolution> {
+) -> Vec<Evolution<2>> {
     let mut runs = Vec::new();
     for method in Method::ALL {
         for &n in cells {
@@ -313,7 +316,7 @@ fn plan(
 }
 
 /// The paper's references are implicit finite elements.
-fn reference(setting: &Setting, n: usize, steps: usize) -> Evolution {
+fn reference(setting: &Setting, n: usize, steps: usize) -> Evolution<2> {
     evolution(
         setting,
         Method::FeImplicit,
@@ -484,7 +487,7 @@ impl Comparison<'_> {
             .with_column_labels(shown.iter().map(|&k| format!("t = {}", time_label(k))))
             .with_row_labels(rows.iter().map(|(_, label)| label.clone()));
         let loops = |run: &Trajectory, step: usize| -> Result<Vec<Vec<[f64; 2]>>, Error> {
-            let ratio = (STEP / run.evolution.tau).round() as usize;
+            let ratio = (STEP / run.evolution.tau.size(1)).round() as usize;
             let curves = zero_level(&run.field(step * ratio)?, Interpolation::Profile);
             Ok(curves.into_iter().map(|curve| curve.points).collect())
         };
@@ -556,7 +559,7 @@ impl Comparison<'_> {
                 }
             }
             for (step, m) in run.measures.iter().enumerate() {
-                summary.insert(&format!("{key}.area.step{step}"), m.area)?;
+                summary.insert(&format!("{key}.area.step{step}"), m.volume)?;
                 summary.insert(&format!("{key}.perimeter.step{step}"), m.perimeter)?;
                 for (what, value) in [("tip", m.tip), ("diagonal", m.diagonal)] {
                     if let Some(value) = value {
@@ -605,9 +608,9 @@ fn step_rows(run: &Trajectory, reference: bool) -> Vec<StepRow> {
                 method: e.method,
                 reference,
                 step,
-                time: step as f64 * e.tau,
+                time: e.tau.time(step),
                 perimeter: m.perimeter,
-                area: m.area,
+                area: m.volume,
                 tip: m.tip,
                 diagonal: m.diagonal,
                 energy: record.map(|r| r.energy),

@@ -22,9 +22,45 @@ use crate::networks::checksum;
 /// Least time between two checkpoints of a run.
 const CHECKPOINT_INTERVAL: Duration = Duration::from_mins(1);
 
-/// A run, with everything its result depends on.
+/// Sizes of the time steps of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TimeSteps {
+    /// All alike.
+    Constant(f64),
+    /// The first one; each of the others is twice as long as the one before.
+    Doubling(f64),
+}
+
+impl TimeSteps {
+    /// Size of a step, counted from 1.
+    pub fn size(self, step: usize) -> f64 {
+        match self {
+            Self::Constant(tau) => tau,
+            Self::Doubling(first) => first * 2.0_f64.powi(step as i32 - 1),
+        }
+    }
+
+    /// Time after so many steps.
+    pub fn time(self, steps: usize) -> f64 {
+        match self {
+            Self::Constant(tau) => steps as f64 * tau,
+            Self::Doubling(first) => first * (2.0_f64.powi(steps as i32) - 1.0),
+        }
+    }
+
+    /// Name in folders.
+    fn key(self) -> String {
+        match self {
+            Self::Constant(tau) => format!("t{:.4}", -tau.log2()),
+            Self::Doubling(first) => format!("doubling{:.4}", -first.log2()),
+        }
+    }
+}
+
+/// A run in `D` dimensions, with everything its result depends on.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Evolution {
+pub struct Evolution<const D: usize> {
     /// Name of the initial shape with its measures.
     pub shape: String,
     /// Which flow.
@@ -33,12 +69,14 @@ pub struct Evolution {
     pub method: Method,
     /// Cells per unit length.
     pub n: usize,
-    /// Side of the periodic box, centred at the origin.
+    /// Side of the periodic box.
     pub side: f64,
+    /// Centre of the box, on every axis.
+    pub centre: f64,
     /// Scales and settings.
     pub params: FlowParams,
-    /// Size of an (outer) time step.
-    pub tau: f64,
+    /// Sizes of the (outer) time steps.
+    pub tau: TimeSteps,
     /// Steps between two samples.
     pub sample_every: usize,
     /// Further steps to sample.
@@ -52,8 +90,8 @@ pub struct Evolution {
 
 /// What else the result depends on.
 #[derive(Serialize)]
-struct Key<'a> {
-    evolution: &'a Evolution,
+struct Key<'a, const D: usize> {
+    evolution: &'a Evolution<D>,
     device: String,
     network: Option<String>,
     version: &'static str,
@@ -76,54 +114,55 @@ struct Checkpoint {
     previous_tau: Option<f64>,
 }
 
-/// Measures of a shape around the origin.
+/// Measures of a shape around the centre of the box.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measures {
     /// Perimeter `P_eps`.
     pub perimeter: f64,
-    /// Area of `{u > 0}`.
-    pub area: f64,
-    /// Distance from the origin to the zero crossing on the positive x axis.
+    /// Area or volume of `{u > 0}`.
+    pub volume: f64,
+    /// Distance from the centre to the zero crossing on the positive x axis.
     pub tip: Option<f64>,
-    /// Distance from the origin to the zero crossing on the diagonal `x = y > 0`.
+    /// Distance from the centre to the zero crossing on the diagonal `x = y (= z) > 0`.
     pub diagonal: Option<f64>,
 }
 
 impl Measures {
-    fn of(field: &Field<2>, eps: f64) -> Result<Self, Error> {
-        let along = |direction| ray_crossing(field, [0.0, 0.0], direction);
+    fn of<const D: usize>(field: &Field<D>, centre: f64, eps: f64) -> Result<Self, Error> {
+        let along = |direction| ray_crossing(field, [centre; D], direction);
+        let first = std::array::from_fn(|axis| if axis == 0 { 1.0 } else { 0.0 });
         Ok(Self {
             perimeter: perimeter(field, eps)?,
-            area: zero_set_volume(field),
-            tip: along([1.0, 0.0])?,
-            diagonal: along([1.0, 1.0])?,
+            volume: zero_set_volume(field),
+            tip: along(first)?,
+            diagonal: along([1.0; D])?,
         })
     }
 }
 
 /// A finished run.
-pub struct Trajectory {
+pub struct Trajectory<const D: usize> {
     /// What was run.
-    pub evolution: Evolution,
+    pub evolution: Evolution<D>,
     /// Records of the steps of Willmore flow; empty for mean curvature flow.
     pub records: Vec<StepRecord>,
     /// Measures of the shape after every step, the initial ones first.
     pub measures: Vec<Measures>,
     /// Wall time of all steps, interruptions left out.
     pub seconds: f64,
-    grid: Grid<2>,
+    grid: Grid<D>,
     folder: OutputDir,
 }
 
-impl Evolution {
+impl<const D: usize> Evolution<D> {
     /// Name of the run's folder.
     pub fn name(&self) -> String {
         format!(
-            "{}-{}-n{}-t{:.4}",
+            "{}-{}-n{}-{}",
             self.flow.key(),
             self.method.key(),
             self.n,
-            -self.tau.log2()
+            self.tau.key()
         )
     }
 
@@ -131,8 +170,9 @@ impl Evolution {
     ///
     /// # Errors
     /// [`Error::Geometry`] if the side is no multiple of `1/n`.
-    pub fn grid(&self) -> Result<Grid<2>, Error> {
-        Ok(Grid::per_unit(self.n, self.side)?)
+    pub fn grid(&self) -> Result<Grid<D>, Error> {
+        let corner = [self.centre - 0.5 * self.side; D];
+        Ok(Grid::per_unit(self.n, self.side)?.with_origin(corner)?)
     }
 
     /// The last step before the end or the pause.
@@ -158,12 +198,12 @@ impl Evolution {
     /// What the flow raises, and [`Error::Report`] or [`Error::Geometry`] if something cannot be stored.
     pub fn run(
         &self,
-        initial: &dyn Fn(Grid<2>, f64) -> Result<Field<2>, Error>,
+        initial: &dyn Fn(Grid<D>, f64) -> Result<Field<D>, Error>,
         network: Option<&Network>,
         device: &ComputeDevice,
         store: &OutputDir,
         bar: &ProgressBar,
-    ) -> Result<Trajectory, Error> {
+    ) -> Result<Trajectory<D>, Error> {
         let folder = store.subfolder(&self.name())?;
         let key = serde_json::to_string(&Key {
             evolution: self,
@@ -197,7 +237,7 @@ impl Evolution {
             Some(state) => state,
             None => {
                 let field = initial(grid, self.params.eps)?;
-                stored.measures.push(Measures::of(&field, self.params.eps)?);
+                stored.measures.push(Measures::of(&field, self.centre, self.params.eps)?);
                 trajectory.keep(0, &field)?;
                 FlowState {
                     current: field,
@@ -242,9 +282,9 @@ impl Evolution {
 
     fn willmore(
         &self,
-        trajectory: &mut Trajectory,
+        trajectory: &mut Trajectory<D>,
         stored: &mut Stored,
-        state: &FlowState<2>,
+        state: &FlowState<D>,
         network: Option<&Network>,
         device: &ComputeDevice,
         bar: &ProgressBar,
@@ -257,13 +297,13 @@ impl Evolution {
         let mut last = Instant::now();
         while flow.steps() < self.last() {
             let record = flow
-                .advance(self.tau)
+                .advance(self.tau.size(flow.steps() + 1))
                 .map_err(|error| self.failed(error.into()))?;
             stored.seconds += record.seconds;
             stored.records.push(record);
             let step = flow.steps();
             let field = flow.field()?;
-            stored.measures.push(Measures::of(&field, self.params.eps)?);
+            stored.measures.push(Measures::of(&field, self.centre, self.params.eps)?);
             if self.samples(step) {
                 trajectory.keep(step, &field)?;
             }
@@ -278,9 +318,9 @@ impl Evolution {
 
     fn mean_curvature(
         &self,
-        trajectory: &mut Trajectory,
+        trajectory: &mut Trajectory<D>,
         stored: &mut Stored,
-        state: &FlowState<2>,
+        state: &FlowState<D>,
         network: Option<&Network>,
         device: &ComputeDevice,
         bar: &ProgressBar,
@@ -294,7 +334,7 @@ impl Evolution {
             flow.advance().map_err(|error| self.failed(error.into()))?;
             let field = flow.field().map_err(|error| self.failed(error.into()))?;
             stored.seconds += clock.elapsed().as_secs_f64();
-            stored.measures.push(Measures::of(&field, self.params.eps)?);
+            stored.measures.push(Measures::of(&field, self.centre, self.params.eps)?);
             if self.samples(step) {
                 trajectory.keep(step, &field)?;
             }
@@ -304,7 +344,7 @@ impl Evolution {
                     current: field,
                     previous: None,
                     step,
-                    time: step as f64 * self.tau,
+                    time: self.tau.time(step),
                 };
                 trajectory.store(stored, &state)?;
                 last = Instant::now();
@@ -314,12 +354,12 @@ impl Evolution {
     }
 }
 
-impl Trajectory {
+impl<const D: usize> Trajectory<D> {
     /// The phase field after `step` steps, which must be a sampled one.
     ///
     /// # Errors
     /// [`Error::Geometry`] if it is not there.
-    pub fn field(&self, step: usize) -> Result<Field<2>, Error> {
+    pub fn field(&self, step: usize) -> Result<Field<D>, Error> {
         self.read(&sample_name(step))
     }
 
@@ -330,8 +370,12 @@ impl Trajectory {
     /// [`Error::Options`] if the nodes of this grid are not among those of the other.
     pub fn distance(&self, reference: &Self, step: usize) -> Result<f64, Error> {
         let (own, other) = (&self.evolution, &reference.evolution);
-        let ratio = own.tau / other.tau;
-        let there = (step as f64 * ratio).round() as usize;
+        let there = match (own.tau, other.tau) {
+            (TimeSteps::Constant(own), TimeSteps::Constant(other)) => {
+                (step as f64 * own / other).round() as usize
+            }
+            _ => step,
+        };
         if !other.n.is_multiple_of(own.n) || own.side.to_bits() != other.side.to_bits() {
             return Err(Error::Options(format!(
                 "a run at n = {} cannot be compared with a reference at n = {}: the latter must be a multiple",
@@ -340,9 +384,10 @@ impl Trajectory {
         }
         let fine = reference.field(there)?;
         let stride = other.n / own.n;
-        let (n, cells) = (self.grid.cells(), fine.grid().cells());
-        let sampled =
-            (0..n * n).map(|i| fine.values()[(i / n) * stride * cells + (i % n) * stride]);
+        let sampled = (0..self.grid.len()).map(|node| {
+            let index = self.grid.multi_index(node).map(|i| i * stride);
+            fine.values()[fine.grid().index(index)]
+        });
         let sampled = Field::from_values(self.grid, sampled.collect())?;
         Ok(geometry::measure::l2_distance(
             &self.field(step)?,
@@ -354,12 +399,12 @@ impl Trajectory {
         Ok(self.folder.path(&format!("{name}.npy"))?)
     }
 
-    fn read(&self, name: &str) -> Result<Field<2>, Error> {
+    fn read(&self, name: &str) -> Result<Field<D>, Error> {
         let grid = self.grid;
         Ok(npy::read(self.path(name)?, |_| Ok(grid))?)
     }
 
-    fn keep(&self, step: usize, field: &Field<2>) -> Result<(), Error> {
+    fn keep(&self, step: usize, field: &Field<D>) -> Result<(), Error> {
         Ok(npy::write(self.path(&sample_name(step))?, field)?)
     }
 
@@ -368,7 +413,7 @@ impl Trajectory {
         serde_json::from_slice(&std::fs::read(path).ok()?).ok()
     }
 
-    fn checkpoint(&self, checkpoint: Checkpoint) -> Result<FlowState<2>, Error> {
+    fn checkpoint(&self, checkpoint: Checkpoint) -> Result<FlowState<D>, Error> {
         let Checkpoint {
             step,
             time,
@@ -387,7 +432,7 @@ impl Trajectory {
     }
 
     /// Writes the fields of a checkpoint, then the index that names them, then removes the fields of the one before.
-    fn store(&self, stored: &mut Stored, state: &FlowState<2>) -> Result<(), Error> {
+    fn store(&self, stored: &mut Stored, state: &FlowState<D>) -> Result<(), Error> {
         let old = stored.checkpoint;
         let current = self.path(&checkpoint_name(state.step, "current"))?;
         npy::write(current, &state.current)?;
@@ -432,19 +477,20 @@ mod tests {
     use report::Progress;
     use solver::NewtonParams;
 
-    fn evolution(flow: Flow, method: Method) -> Evolution {
+    fn evolution(flow: Flow, method: Method) -> Evolution<2> {
         Evolution {
             shape: "disc of radius 0.2".to_owned(),
             flow,
             method,
             n: 128,
             side: 0.75,
+            centre: 0.0,
             params: FlowParams {
                 eps: EPS,
                 mcf_step: STEP,
                 newton: NewtonParams::default(),
             },
-            tau: STEP,
+            tau: TimeSteps::Constant(STEP),
             sample_every: 2,
             also_sample: vec![1],
             steps: 4,
@@ -454,6 +500,15 @@ mod tests {
 
     fn disc(grid: Grid<2>, eps: f64) -> Result<Field<2>, Error> {
         Ok(phase_field(grid, &Ball::new([0.0, 0.0], 0.2)?, eps)?)
+    }
+
+    #[test]
+    fn time_adds_up() {
+        for tau in [TimeSteps::Constant(0.25), TimeSteps::Doubling(0.25)] {
+            let sum: f64 = (1..=5).map(|k| tau.size(k)).sum();
+            assert!((tau.time(5) - sum).abs() < 1e-15);
+        }
+        assert!((TimeSteps::Doubling(0.25).time(5) - 0.25 * 31.0).abs() < 1e-15);
     }
 
     #[test]
@@ -470,7 +525,7 @@ mod tests {
         ] {
             let whole = evolution(flow, method);
             assert_eq!(whole.sampled_steps(), [0, 1, 2, 4]);
-            let run = |e: &Evolution, folder: &OutputDir| {
+            let run = |e: &Evolution<2>, folder: &OutputDir| {
                 e.run(&disc, Some(&network), &device, folder, &bar).unwrap()
             };
             let reference = run(&whole, &store("whole"));
@@ -493,14 +548,14 @@ mod tests {
             );
             // Another run does not take these fields for its own.
             let other = Evolution {
-                tau: 0.5 * STEP,
+                tau: TimeSteps::Constant(0.5 * STEP),
                 ..whole.clone()
             };
             assert_ne!(other.name(), whole.name());
             assert_eq!(resumed.distance(&reference, 4).unwrap().to_bits(), 0);
-            let areas = [&reference.measures[0], &reference.measures[4]].map(|m| m.area);
+            let volumes = [&reference.measures[0], &reference.measures[4]].map(|m| m.volume);
             let grows = flow == Flow::Willmore;
-            assert_eq!(areas[1] > areas[0], grows, "{areas:?}");
+            assert_eq!(volumes[1] > volumes[0], grows, "{volumes:?}");
         }
     }
 }

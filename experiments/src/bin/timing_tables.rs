@@ -119,7 +119,9 @@ struct Timing {
     measured_steps: usize,
     /// Wall time of those.
     measured_seconds: f64,
-    /// Wall time of all steps: measured, or the first step plus the mean of the others for each of the rest.
+    /// The same, step by step.
+    step_seconds: Vec<f64>,
+    /// Wall time of all steps: measured, or with the mean of the later half of the measured steps for each of the rest.
     seconds: f64,
     extrapolated: bool,
     newton_per_step: f64,
@@ -268,18 +270,17 @@ fn measure(
     let measured_seconds: f64 = records.iter().map(|r| r.seconds).sum();
     let count = records.len();
     let per_step = |total: usize| total as f64 / count.max(1) as f64;
-    let seconds = match &records[..] {
-        [first, others @ ..] if count < STEPS && !others.is_empty() => {
-            let mean = others.iter().map(|r| r.seconds).sum::<f64>() / others.len() as f64;
-            first.seconds + mean * (STEPS - 1) as f64
-        }
-        _ => measured_seconds,
-    };
+    let step_seconds: Vec<f64> = records.iter().map(|r| r.seconds).collect();
+    // Steps become cheaper as corners smooth out: the later ones say most about what is to come.
+    let later = &step_seconds[count / 2..];
+    let mean = later.iter().sum::<f64>() / later.len().max(1) as f64;
+    let seconds = measured_seconds + mean * (STEPS - count) as f64;
     Ok(Timing {
         variant,
         n: (1.0 / grid.spacing()).round() as usize,
         measured_steps: count,
         measured_seconds,
+        step_seconds,
         seconds,
         extrapolated: count < STEPS,
         newton_per_step: per_step(records.iter().map(|r| r.newton.newton).sum()),
@@ -288,6 +289,16 @@ fn measure(
         factorizations_per_step: per_step(inner.factorizations),
         failure,
     })
+}
+
+/// Time of the measured steps over that of the same steps by the hybrid scheme.
+fn over_hybrid(timing: &Timing, timings: &[Timing]) -> Option<f64> {
+    let hybrid = timings
+        .iter()
+        .find(|t| t.n == timing.n && t.variant == Variant::Hybrid && usable(t))?;
+    let common = timing.measured_steps.min(hybrid.measured_steps);
+    let sum = |t: &Timing| t.step_seconds[..common].iter().sum::<f64>();
+    usable(timing).then(|| sum(timing) / sum(hybrid))
 }
 
 /// Whether a row has a time worth showing.
@@ -302,6 +313,7 @@ fn table(timings: &[Timing]) -> Result<Table, Error> {
         Column::number("128 steps [s]", Format::Fixed(1)),
         Column::text("measured"),
         Column::number("times hybrid", Format::Fixed(1)),
+        Column::number("times hybrid, measured steps", Format::Fixed(1)),
         Column::number("Newton/step", Format::Fixed(1)),
         Column::number("HVP/step", Format::Fixed(0)),
         Column::number("inner CG/step", Format::Fixed(0)),
@@ -327,6 +339,7 @@ fn table(timings: &[Timing]) -> Result<Table, Error> {
             seconds.into(),
             measured.into(),
             factor.into(),
+            over_hybrid(timing, timings).into(),
             timing.newton_per_step.into(),
             timing.hvp_per_step.into(),
             timing.inner_cg_per_step.into(),
@@ -385,6 +398,9 @@ fn summary(timings: &[Timing]) -> Result<Summary, Error> {
         let key = format!("timing.n{}.{}", timing.n, timing.variant.key());
         summary.insert(&format!("{key}.seconds"), timing.seconds)?;
         summary.insert_count(&format!("{key}.measured_steps"), timing.measured_steps)?;
+        if let Some(factor) = over_hybrid(timing, timings) {
+            summary.insert(&format!("{key}.times_hybrid_measured_steps"), factor)?;
+        }
         summary.insert(&format!("{key}.newton_per_step"), timing.newton_per_step)?;
         summary.insert(&format!("{key}.hvp_per_step"), timing.hvp_per_step)?;
         summary.insert(
