@@ -1,0 +1,479 @@
+//! Closed oriented surfaces, their topology and measures.
+
+use std::fmt;
+
+use rayon::prelude::*;
+
+use crate::mesh::{BoundingBox, merge_coincident};
+use crate::vector::{Vector, corners, scaled_normal, solid_angle};
+use crate::{Error, Placement, TriangleMesh};
+
+/// A triangle mesh that bounds a solid: every edge is run through exactly once in each direction.
+///
+/// There may be several components. Those that lie inside others and are oriented inwards bound
+/// cavities. Intersections of faces are not looked for: where a surface crosses itself, inside and
+/// outside are not defined, and no error tells so.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClosedMesh {
+    mesh: TriangleMesh,
+    euler_characteristic: i64,
+    components: usize,
+}
+
+/// What [`ClosedMesh::new`] changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Warning {
+    /// The total volume was negative: all faces were reversed.
+    Reversed,
+    /// The surface is closed only if vertices with exactly equal coordinates are one.
+    Merged {
+        /// Vertices less than before.
+        vertices: usize,
+    },
+    /// Faces with a repeated vertex were left out.
+    Collapsed {
+        /// Number of such faces.
+        faces: usize,
+    },
+    /// Vertices of no face were left out.
+    Unreferenced {
+        /// Number of such vertices.
+        vertices: usize,
+    },
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Reversed => write!(f, "the surface was oriented inwards: all faces reversed"),
+            Self::Merged { vertices } => write!(
+                f,
+                "{vertices} vertices were merged with others at exactly the same place"
+            ),
+            Self::Collapsed { faces } => {
+                write!(f, "{faces} faces with a repeated vertex were left out")
+            }
+            Self::Unreferenced { vertices } => {
+                write!(f, "{vertices} vertices of no face were left out")
+            }
+        }
+    }
+}
+
+impl ClosedMesh {
+    /// Checks a mesh, and mends what can be mended without moving a vertex; the warnings tell what.
+    ///
+    /// If the surface is not closed as it is, vertices with exactly equal coordinates are merged
+    /// and faces with a repeated vertex left out. The orientation is decided by the total volume:
+    /// if it is negative, all faces are reversed. Then components must lie outside all others if
+    /// they are oriented outwards, and inside one more than they are outside of if inwards.
+    ///
+    /// # Errors
+    /// [`Error::NoFaces`]; [`Error::NonFiniteVertex`]; [`Error::Normals`];
+    /// [`Error::IndexOutOfRange`]; [`Error::Open`], [`Error::NonManifold`] and
+    /// [`Error::MixedOrientation`] for edges that are not used once in each direction;
+    /// [`Error::NoArea`] for faces whose corners are on a line; [`Error::NoVolume`];
+    /// [`Error::Nesting`].
+    pub fn new(mut mesh: TriangleMesh) -> Result<(Self, Vec<Warning>), Error> {
+        mesh.check(f64::MAX)?;
+        let mut warnings = Vec::new();
+        let mut seams = Seams::find(&mesh);
+        if seams.is_err() || has_collapsed_faces(&mesh) || has_no_area(&mesh).is_err() {
+            let merged = merge_coincident(&mesh.vertices);
+            let vertices = mesh.vertices.len() - merged.first.len();
+            let before = mesh.faces.len();
+            let mended = mesh.reindexed(&merged.first, |v| merged.index[v as usize]);
+            mesh = if vertices > 0 { mended } else { mesh };
+            mesh.faces.retain(|&[a, b, c]| a != b && b != c && c != a);
+            let faces = before - mesh.faces.len();
+            if vertices > 0 {
+                warnings.push(Warning::Merged { vertices });
+            }
+            if faces > 0 {
+                warnings.push(Warning::Collapsed { faces });
+            }
+            seams = Seams::find(&mesh);
+        }
+        let seams = seams?;
+        has_no_area(&mesh)?;
+        let unreferenced = drop_unreferenced(&mut mesh);
+        if unreferenced > 0 {
+            warnings.push(Warning::Unreferenced {
+                vertices: unreferenced,
+            });
+        }
+
+        let bounds = mesh.bounding_box().ok_or(Error::NoFaces)?;
+        let (area, volume) = (area(&mesh), volume(&mesh, &mesh.faces));
+        // The sum of the volumes is exact to a few units in the last place of this product.
+        let rounding = 1e-14 * area * bounds.longest_side();
+        if volume.abs() <= rounding {
+            return Err(Error::NoVolume { volume, area });
+        }
+        if volume < 0.0 {
+            reverse(&mut mesh);
+            warnings.push(Warning::Reversed);
+        }
+        check_nesting(&mesh, &seams.component, seams.components)?;
+        let closed = Self {
+            // V - E + F with E = 3/2 F.
+            euler_characteristic: seams.vertices as i64 - mesh.faces.len() as i64 / 2,
+            components: seams.components,
+            mesh,
+        };
+        Ok((closed, warnings))
+    }
+
+    /// The triangles.
+    pub fn mesh(&self) -> &TriangleMesh {
+        &self.mesh
+    }
+
+    /// Gives up what is known about the triangles.
+    pub fn into_mesh(self) -> TriangleMesh {
+        self.mesh
+    }
+
+    /// Area of the surface.
+    pub fn area(&self) -> f64 {
+        area(&self.mesh)
+    }
+
+    /// Enclosed volume, cavities subtracted: `1/6 sum of a . (b x c)` over the faces (divergence
+    /// theorem).
+    pub fn volume(&self) -> f64 {
+        volume(&self.mesh, &self.mesh.faces)
+    }
+
+    /// Euler characteristic `V - E + F`, the sum of `2 - 2 g` over the components.
+    ///
+    /// A vertex in which sheets only touch counts once for every sheet.
+    pub fn euler_characteristic(&self) -> i64 {
+        self.euler_characteristic
+    }
+
+    /// Number of components, connected over edges.
+    pub fn components(&self) -> usize {
+        self.components
+    }
+
+    /// Number of handles, summed over the components.
+    pub fn genus(&self) -> i64 {
+        self.components as i64 - self.euler_characteristic / 2
+    }
+
+    /// The smallest box around the surface.
+    pub fn bounding_box(&self) -> BoundingBox {
+        let bounds = self.mesh.bounding_box();
+        bounds.expect("a closed mesh has vertices")
+    }
+
+    /// The surface scaled and moved.
+    #[must_use]
+    pub fn placed(&self, placement: &Placement) -> Self {
+        let mut placed = self.clone();
+        for x in &mut placed.mesh.vertices {
+            *x = placement.apply(*x);
+        }
+        placed
+    }
+}
+
+fn has_collapsed_faces(mesh: &TriangleMesh) -> bool {
+    let collapsed = |&[a, b, c]: &[u32; 3]| a == b || b == c || c == a;
+    mesh.faces.iter().any(collapsed)
+}
+
+/// Refuses faces whose corners are on a line up to rounding.
+fn has_no_area(mesh: &TriangleMesh) -> Result<(), Error> {
+    let flat = |&face: &[u32; 3]| {
+        let [a, b, c] = corners(mesh, face);
+        let edges = [b - a, c - b, a - c].map(Vector::length);
+        let longest = edges.into_iter().fold(0.0, f64::max);
+        // The height over the longest edge, against the rounding of the cross product.
+        scaled_normal([a, b, c]).length() <= 4.0 * f64::EPSILON * longest * longest
+    };
+    let Some(face) = mesh.faces.iter().position(flat) else {
+        return Ok(());
+    };
+    Err(Error::NoArea {
+        faces: mesh.faces.iter().filter(|f| flat(f)).count(),
+        face,
+        corners: mesh.faces[face].map(|v| mesh.vertices[v as usize]),
+    })
+}
+
+/// Leaves out vertices without faces and returns how many there were.
+fn drop_unreferenced(mesh: &mut TriangleMesh) -> usize {
+    let mut used = vec![false; mesh.vertices.len()];
+    for &v in mesh.faces.as_flattened() {
+        used[v as usize] = true;
+    }
+    let kept: Vec<usize> = (0..used.len()).filter(|&v| used[v]).collect();
+    let unreferenced = used.len() - kept.len();
+    if unreferenced > 0 {
+        let mut index = vec![0; used.len()];
+        for (new, &old) in kept.iter().enumerate() {
+            index[old] = new as u32;
+        }
+        *mesh = mesh.reindexed(&kept, |v| index[v as usize]);
+    }
+    unreferenced
+}
+
+fn reverse(mesh: &mut TriangleMesh) {
+    for face in &mut mesh.faces {
+        face.swap(1, 2);
+    }
+    for normal in mesh.normals.iter_mut().flatten() {
+        *normal = normal.map(|v| -v);
+    }
+}
+
+fn area(mesh: &TriangleMesh) -> f64 {
+    let twice = mesh.faces.iter().map(|&f| scaled_normal(corners(mesh, f)).length());
+    0.5 * twice.sum::<f64>()
+}
+
+/// Signed volume behind some of the faces.
+fn volume<'a>(mesh: &TriangleMesh, faces: impl IntoIterator<Item = &'a [u32; 3]>) -> f64 {
+    // From a point close by, so that far-away meshes do not lose digits.
+    let origin = mesh.vertices.first().copied().unwrap_or_default();
+    let origin = Vector::from_array(origin);
+    let sixfold = faces.into_iter().map(|&face| {
+        let [a, b, c] = corners(mesh, face).map(|x| x - origin);
+        a.dot(b.cross(c))
+    });
+    sixfold.sum::<f64>() / 6.0
+}
+
+/// Components must be enclosed by as many others as their orientation says.
+fn check_nesting(mesh: &TriangleMesh, component: &[u32], components: usize) -> Result<(), Error> {
+    if components < 2 {
+        return Ok(());
+    }
+    struct Part {
+        first: usize,
+        faces: Vec<[u32; 3]>,
+        bounds: BoundingBox,
+    }
+    let mut parts: Vec<Part> = Vec::with_capacity(components);
+    for (face, (&corners, &part)) in mesh.faces.iter().zip(component).enumerate() {
+        // Components are numbered in the order of their first faces.
+        if part as usize == parts.len() {
+            let x = mesh.vertices[corners[0] as usize];
+            parts.push(Part {
+                first: face,
+                faces: Vec::new(),
+                bounds: BoundingBox { min: x, max: x },
+            });
+        }
+        let part = &mut parts[part as usize];
+        part.faces.push(corners);
+        for v in corners {
+            for (axis, &x) in mesh.vertices[v as usize].iter().enumerate() {
+                part.bounds.min[axis] = part.bounds.min[axis].min(x);
+                part.bounds.max[axis] = part.bounds.max[axis].max(x);
+            }
+        }
+    }
+    let checked = (0..parts.len()).into_par_iter().map(|this| {
+        let part = &parts[this];
+        let x = mesh.vertices[part.faces[0][0] as usize];
+        let others = parts.iter().enumerate();
+        let others = others.filter(|(k, other)| *k != this && other.bounds.contains(x));
+        let angle = others.map(|(_, other)| {
+            let seen = other.faces.iter().map(|&face| {
+                solid_angle(corners(mesh, face).map(|v| v - Vector::from_array(x)))
+            });
+            seen.sum::<f64>()
+        });
+        let winding = angle.sum::<f64>() / (4.0 * std::f64::consts::PI);
+        let outwards = volume(mesh, &part.faces) > 0.0;
+        let expected = i64::from(!outwards);
+        // Where components touch, the winding number is not whole and tells nothing.
+        if (winding - winding.round()).abs() > 0.01 || winding.round() as i64 == expected {
+            return Ok(());
+        }
+        Err(Error::Nesting {
+            face: part.first,
+            orientation: if outwards { "outwards" } else { "inwards" },
+            enclosing: winding.round() as i64,
+            expected,
+        })
+    });
+    // The first one, whatever the order of the threads.
+    checked.collect::<Vec<_>>().into_iter().collect()
+}
+
+/// How faces hang together.
+struct Seams {
+    /// Number of the component of every face, in the order of first faces.
+    component: Vec<u32>,
+    components: usize,
+    /// Vertices, counted once for every sheet.
+    vertices: usize,
+}
+
+/// A side of a face, `low < high`.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Side {
+    low: u32,
+    high: u32,
+    face: u32,
+    /// Corner from which the side starts.
+    corner: u8,
+    /// From `low` to `high`.
+    upwards: bool,
+}
+
+impl Seams {
+    /// Pairs the sides of the faces.
+    fn find(mesh: &TriangleMesh) -> Result<Self, Error> {
+        let count = mesh.faces.len();
+        if count == 0 {
+            return Err(Error::NoFaces);
+        }
+        // Three corners for every face are counted in 32 bits below.
+        if u32::try_from(3 * count).is_err() {
+            return Err(Error::TooLarge {
+                elements: "faces",
+                count,
+            });
+        }
+        let mut sides: Vec<Side> = Vec::with_capacity(3 * count);
+        for (face, corners) in mesh.faces.iter().enumerate() {
+            for corner in 0..3 {
+                let (from, to) = (corners[corner], corners[(corner + 1) % 3]);
+                sides.push(Side {
+                    low: from.min(to),
+                    high: from.max(to),
+                    face: face as u32,
+                    corner: corner as u8,
+                    upwards: from < to,
+                });
+            }
+        }
+        sides.par_sort_unstable();
+        check_edges(mesh, &sides)?;
+
+        let mut faces = DisjointSets::new(count);
+        let mut sheets = DisjointSets::new(3 * count);
+        for pair in sides.as_chunks::<2>().0 {
+            let [a, b] = pair;
+            faces.unite(a.face, b.face);
+            // The start of one side is the end of the other.
+            sheets.unite(a.start(), b.end());
+            sheets.unite(a.end(), b.start());
+        }
+        let (component, components) = faces.numbered();
+        let (_, vertices) = sheets.numbered();
+        Ok(Self {
+            component,
+            components,
+            vertices,
+        })
+    }
+}
+
+impl Side {
+    fn start(self) -> u32 {
+        3 * self.face + u32::from(self.corner)
+    }
+
+    fn end(self) -> u32 {
+        3 * self.face + (u32::from(self.corner) + 1) % 3
+    }
+}
+
+/// Every edge must have one side in each direction.
+fn check_edges(mesh: &TriangleMesh, sides: &[Side]) -> Result<(), Error> {
+    let (mut open, mut crowded, mut mixed) = ((0, None), (0, None), (0, None));
+    for edge in sides.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high)) {
+        let upwards = edge.iter().filter(|s| s.upwards).count();
+        let kind = match edge.len() {
+            2 if upwards == 1 => continue,
+            1 => &mut open,
+            2 => &mut mixed,
+            _ => &mut crowded,
+        };
+        kind.0 += 1;
+        kind.1.get_or_insert(edge);
+    }
+    let ends = |side: &Side| {
+        let [a, b] = [side.low, side.high].map(|v| mesh.vertices[v as usize]);
+        if side.upwards { (a, b) } else { (b, a) }
+    };
+    if let (edges, Some([side, others @ ..])) = crowded {
+        let (from, to) = ends(side);
+        return Err(Error::NonManifold {
+            edges,
+            face: side.face as usize,
+            others: others.len(),
+            from,
+            to,
+        });
+    }
+    if let (edges, Some([side, ..])) = open {
+        let (from, to) = ends(side);
+        return Err(Error::Open {
+            edges,
+            face: side.face as usize,
+            from,
+            to,
+        });
+    }
+    if let (edges, Some([side, other, ..])) = mixed {
+        let (from, to) = ends(side);
+        return Err(Error::MixedOrientation {
+            edges,
+            first: side.face as usize,
+            second: other.face as usize,
+            from,
+            to,
+        });
+    }
+    Ok(())
+}
+
+/// Union-find with path halving.
+struct DisjointSets(Vec<u32>);
+
+impl DisjointSets {
+    fn new(count: usize) -> Self {
+        Self((0..count as u32).collect())
+    }
+
+    fn root(&mut self, mut element: u32) -> u32 {
+        let parent = &mut self.0;
+        while parent[element as usize] != element {
+            parent[element as usize] = parent[parent[element as usize] as usize];
+            element = parent[element as usize];
+        }
+        element
+    }
+
+    /// The smaller root becomes the root of both.
+    fn unite(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.0[a.max(b) as usize] = a.min(b);
+    }
+
+    /// The number of the set of every element, in the order of first elements, and of sets.
+    fn numbered(mut self) -> (Vec<u32>, usize) {
+        let mut number = vec![u32::MAX; self.0.len()];
+        let mut sets = 0;
+        let all = 0..self.0.len() as u32;
+        let numbers = all.map(|element| {
+            let root = self.root(element) as usize;
+            if number[root] == u32::MAX {
+                number[root] = sets;
+                sets += 1;
+            }
+            number[root]
+        });
+        let numbers = numbers.collect();
+        (numbers, sets as usize)
+    }
+}

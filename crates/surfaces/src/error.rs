@@ -1,0 +1,217 @@
+//! Everything that can go wrong in this crate.
+
+use std::path::PathBuf;
+
+use crate::read::FormatError;
+
+/// Errors of mesh files, checks, placement and isosurfaces, each with the numbers needed to act on it.
+///
+/// Faces and vertices are counted from zero, in the order of the mesh.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The extension names no known format.
+    #[error(
+        "{path} has no known extension; meshes are read and written as .obj, .ply or .stl",
+        path = path.display()
+    )]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file is no usable mesh.
+    #[error("{path} cannot be read as a mesh: {problem}", path = path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: FormatError,
+    },
+    /// Grids, fields and the operating system.
+    #[error(transparent)]
+    Geometry(#[from] geometry::Error),
+    /// A mesh without faces.
+    #[error("the mesh has no faces; a surface needs at least four")]
+    NoFaces,
+    /// A coordinate is NaN or infinite, or does not fit the numbers of the file.
+    #[error("vertex {vertex} is {position:?}; all coordinates must be finite{}", within(*limit))]
+    NonFiniteVertex {
+        /// The first such vertex.
+        vertex: usize,
+        /// Its coordinates.
+        position: [f64; 3],
+        /// Largest magnitude that the format holds.
+        limit: f64,
+    },
+    /// A normal is NaN or infinite, or there are more or fewer normals than vertices.
+    #[error(
+        "{normals} normals for {vertices} vertices, {finite} of them finite; \
+         every vertex needs one, or the mesh none"
+    )]
+    Normals {
+        /// Number of normals.
+        normals: usize,
+        /// How many are finite.
+        finite: usize,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// A face refers to a vertex that does not exist.
+    #[error("face {face} refers to vertex {vertex}, but there are {vertices} vertices")]
+    IndexOutOfRange {
+        /// The first such face.
+        face: usize,
+        /// Its index.
+        vertex: u32,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// More vertices or faces than 32-bit indices can count.
+    #[error("{count} {elements} are more than 32-bit indices can count; use a coarser mesh")]
+    TooLarge {
+        /// Vertices or faces.
+        elements: &'static str,
+        /// How many.
+        count: usize,
+    },
+    /// Edges with one face only.
+    #[error(
+        "the surface is open: {edges} edges belong to one face only, such as {from:?} - {to:?} of \
+         face {face}; close the holes"
+    )]
+    Open {
+        /// Number of such edges.
+        edges: usize,
+        /// Face of the first one.
+        face: usize,
+        /// Its start.
+        from: [f64; 3],
+        /// Its end.
+        to: [f64; 3],
+    },
+    /// Edges with more than two faces.
+    #[error(
+        "the surface is not a manifold: {edges} edges belong to more than two faces, such as \
+         {from:?} - {to:?} of face {face} and {others} others; remove the inner or doubled sheets"
+    )]
+    NonManifold {
+        /// Number of such edges.
+        edges: usize,
+        /// One face of the first one.
+        face: usize,
+        /// Number of its other faces.
+        others: usize,
+        /// Its start.
+        from: [f64; 3],
+        /// Its end.
+        to: [f64; 3],
+    },
+    /// Edges that both their faces run through in the same direction.
+    #[error(
+        "the orientation is mixed: {edges} edges are run through twice in the same direction, \
+         such as {from:?} - {to:?} by the faces {first} and {second}; orient all faces alike"
+    )]
+    MixedOrientation {
+        /// Number of such edges.
+        edges: usize,
+        /// One face of the first one.
+        first: usize,
+        /// Its other face.
+        second: usize,
+        /// Its start.
+        from: [f64; 3],
+        /// Its end.
+        to: [f64; 3],
+    },
+    /// Faces without area, whose normal is undefined.
+    #[error(
+        "{faces} faces have no area, such as face {face} with the corners {corners:?} on a line; \
+         merge their vertices or flip their longest edges"
+    )]
+    NoArea {
+        /// Number of such faces.
+        faces: usize,
+        /// The first one.
+        face: usize,
+        /// Its corners.
+        corners: [[f64; 3]; 3],
+    },
+    /// A closed surface that encloses nothing.
+    #[error(
+        "the enclosed volume {volume:e} is zero up to rounding (area {area:e}), so that inside and \
+         outside cannot be told apart"
+    )]
+    NoVolume {
+        /// Signed volume.
+        volume: f64,
+        /// Area.
+        area: f64,
+    },
+    /// A component whose orientation does not agree with where it lies.
+    #[error(
+        "the component with face {face} is oriented {orientation}, but {enclosing} other components \
+         enclose it where {expected} should; unite overlapping parts, orient cavities inwards"
+    )]
+    Nesting {
+        /// First face of the component.
+        face: usize,
+        /// `outwards` or `inwards`.
+        orientation: &'static str,
+        /// Winding number of the other components about it.
+        enclosing: i64,
+        /// What it should be: 0 outwards, 1 inwards.
+        expected: i64,
+    },
+    /// A mesh does not fit the box.
+    #[error(
+        "with a longest side of {side_length} the mesh does not fit a box of side {box_side} with a \
+         margin of {margin}; the largest side length that fits is {largest}"
+    )]
+    DoesNotFit {
+        /// Longest side of the bounding box after scaling.
+        side_length: f64,
+        /// Side of the box.
+        box_side: f64,
+        /// Margin asked for.
+        margin: f64,
+        /// `box_side - 2 margin`, not below zero.
+        largest: f64,
+    },
+    /// A mesh that is not to be moved reaches beyond the box.
+    #[error(
+        "the mesh spans {min:?} to {max:?}, beyond the box less its margin of {margin}, {low:?} to \
+         {high:?}; fit it to the box instead, by a side length of at most {largest}"
+    )]
+    Outside {
+        /// Lower corner of the bounding box.
+        min: [f64; 3],
+        /// Upper corner.
+        max: [f64; 3],
+        /// Margin asked for.
+        margin: f64,
+        /// Lower corner of what is allowed.
+        low: [f64; 3],
+        /// Upper corner.
+        high: [f64; 3],
+        /// The largest side length that fits after moving to the centre.
+        largest: f64,
+    },
+    /// A number is outside the range in which it makes sense.
+    #[error("{name} = {value} is not allowed: it must be {requirement}")]
+    InvalidParameter {
+        /// What the number is.
+        name: &'static str,
+        /// The number.
+        value: f64,
+        /// The condition it violates.
+        requirement: &'static str,
+    },
+}
+
+fn within(limit: f64) -> String {
+    if limit < f64::MAX {
+        format!(" and at most {limit:e} in this format")
+    } else {
+        String::new()
+    }
+}

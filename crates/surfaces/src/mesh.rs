@@ -1,0 +1,130 @@
+//! Lists of triangles.
+
+use std::collections::HashMap;
+
+use crate::Error;
+
+/// Triangles over shared vertices, not necessarily closed; see [`ClosedMesh`](crate::ClosedMesh).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriangleMesh {
+    /// Positions.
+    pub vertices: Vec<[f64; 3]>,
+    /// Three vertices each, counter-clockwise seen from outside.
+    pub faces: Vec<[u32; 3]>,
+    /// Outward unit normals of the vertices, if known.
+    pub normals: Option<Vec<[f64; 3]>>,
+}
+
+impl TriangleMesh {
+    /// The smallest box with all vertices; `None` without vertices.
+    pub fn bounding_box(&self) -> Option<BoundingBox> {
+        let (&first, rest) = self.vertices.split_first()?;
+        let start = BoundingBox {
+            min: first,
+            max: first,
+        };
+        Some(rest.iter().fold(start, |bounds, x| BoundingBox {
+            min: std::array::from_fn(|i| bounds.min[i].min(x[i])),
+            max: std::array::from_fn(|i| bounds.max[i].max(x[i])),
+        }))
+    }
+
+    /// Checks that all numbers are finite and at most `limit`, and all indices in range.
+    pub(crate) fn check(&self, limit: f64) -> Result<(), Error> {
+        let count = self.vertices.len();
+        let representable = |x: &[f64; 3]| x.iter().all(|v| v.abs() <= limit);
+        if let Some(vertex) = self.vertices.iter().position(|x| !representable(x)) {
+            return Err(Error::NonFiniteVertex {
+                vertex,
+                position: self.vertices[vertex],
+                limit,
+            });
+        }
+        for (face, corners) in self.faces.iter().enumerate() {
+            if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= count) {
+                return Err(Error::IndexOutOfRange {
+                    face,
+                    vertex,
+                    vertices: count,
+                });
+            }
+        }
+        if let Some(normals) = &self.normals {
+            let finite = normals.iter().filter(|n| n.iter().all(|v| v.is_finite()));
+            let finite = finite.count();
+            if finite != count || normals.len() != count {
+                return Err(Error::Normals {
+                    normals: normals.len(),
+                    finite,
+                    vertices: count,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Keeps the given vertices and renumbers the corners; `corner` maps old indices to new ones.
+    pub(crate) fn reindexed(&self, kept: &[usize], corner: impl Fn(u32) -> u32) -> Self {
+        let keep = |values: &[[f64; 3]]| kept.iter().map(|&v| values[v]).collect();
+        Self {
+            vertices: keep(&self.vertices),
+            faces: self.faces.iter().map(|f| f.map(&corner)).collect(),
+            normals: self.normals.as_deref().map(keep),
+        }
+    }
+}
+
+/// An axis-parallel box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoundingBox {
+    /// Lower corner.
+    pub min: [f64; 3],
+    /// Upper corner.
+    pub max: [f64; 3],
+}
+
+impl BoundingBox {
+    /// Lengths of the sides.
+    pub fn extent(&self) -> [f64; 3] {
+        std::array::from_fn(|i| self.max[i] - self.min[i])
+    }
+
+    /// The centre.
+    pub fn centre(&self) -> [f64; 3] {
+        std::array::from_fn(|i| 0.5 * (self.min[i] + self.max[i]))
+    }
+
+    /// Length of the longest side.
+    pub fn longest_side(&self) -> f64 {
+        self.extent().into_iter().fold(0.0, f64::max)
+    }
+
+    /// Whether the point lies in the box or on its faces.
+    pub(crate) fn contains(&self, x: [f64; 3]) -> bool {
+        (0..3).all(|i| (self.min[i]..=self.max[i]).contains(&x[i]))
+    }
+}
+
+/// Positions that coincide exactly, as one.
+pub(crate) struct Merged {
+    /// For every distinct position, the first vertex there.
+    pub first: Vec<usize>,
+    /// For every vertex, the number of its position.
+    pub index: Vec<u32>,
+}
+
+/// Finds the vertices with exactly equal coordinates (`-0` equals `0`).
+pub(crate) fn merge_coincident(vertices: &[[f64; 3]]) -> Merged {
+    let mut known = HashMap::with_capacity(vertices.len());
+    let mut first = Vec::new();
+    let index = vertices.iter().enumerate().map(|(vertex, x)| {
+        // Adding zero turns -0 into 0.
+        let key = x.map(|v| (v + 0.0).to_bits());
+        *known.entry(key).or_insert_with(|| {
+            first.push(vertex);
+            first.len() as u32 - 1
+        })
+    });
+    let index = index.collect();
+    Merged { first, index }
+}

@@ -1,0 +1,268 @@
+//! Mesh files in.
+
+mod obj;
+mod ply;
+mod stl;
+
+use std::path::Path;
+
+use crate::format::Format;
+use crate::{Error, TriangleMesh};
+
+/// What is wrong with the contents of a mesh file. Lines are counted from one, all else from zero.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FormatError {
+    /// Nothing in it.
+    #[error("the file is empty")]
+    Empty,
+    /// A line of text is not what the format says.
+    #[error("line {line} has {found:?} where {expected} is expected")]
+    Line {
+        /// Number of the line.
+        line: usize,
+        /// What stands there, shortened.
+        found: String,
+        /// What should.
+        expected: &'static str,
+    },
+    /// The text ends too early.
+    #[error("the file ends in line {line} where {expected} is expected: it is truncated")]
+    EndOfText {
+        /// Number of the last line.
+        line: usize,
+        /// What should follow.
+        expected: &'static str,
+    },
+    /// The number of bytes does not agree with the header.
+    #[error(
+        "the header announces {count} {elements}, which take at least {expected} bytes, but the \
+         file has {found}: truncated, or another format"
+    )]
+    Length {
+        /// What is announced.
+        elements: String,
+        /// How many.
+        count: u64,
+        /// Bytes of the whole file according to the header; saturates at `u64::MAX`.
+        expected: u64,
+        /// Bytes found.
+        found: u64,
+    },
+    /// A coordinate is NaN or infinite.
+    #[error("vertex {vertex} has the coordinate {value}; all coordinates must be finite")]
+    NonFinite {
+        /// Number of the vertex.
+        vertex: usize,
+        /// The coordinate.
+        value: f64,
+    },
+    /// A corner of a face does not exist.
+    #[error("face {face} refers to vertex {index}, but the file has {vertices} vertices{}", base(*first))]
+    Index {
+        /// Number of the face in the file.
+        face: usize,
+        /// The index as it stands in the file.
+        index: i64,
+        /// Number of vertices.
+        vertices: usize,
+        /// Index of the first vertex in this format.
+        first: u8,
+    },
+    /// A face with fewer than three corners, or an STL facet with another number than three.
+    #[error("face {face} has {corners} corners; {expected}")]
+    Corners {
+        /// Number of the face in the file.
+        face: usize,
+        /// Its corners.
+        corners: usize,
+        /// How many it needs.
+        expected: &'static str,
+    },
+    /// No faces.
+    #[error("the file has {vertices} vertices and no faces: no mesh, or another format")]
+    NoFaces {
+        /// Vertices found.
+        vertices: usize,
+    },
+    /// More vertices than 32-bit indices can count.
+    #[error("{vertices} vertices are more than 32-bit indices can count; use a coarser mesh")]
+    TooManyVertices {
+        /// Vertices found.
+        vertices: usize,
+    },
+    /// The header of a PLY file lacks something.
+    #[error("the header does not declare {missing}")]
+    Undeclared {
+        /// What is missing.
+        missing: &'static str,
+    },
+    /// An element of a PLY file has no properties and hence no data.
+    #[error("the header announces {count} elements {element:?} without properties")]
+    NoProperties {
+        /// Name of the element.
+        element: String,
+        /// How many.
+        count: usize,
+    },
+    /// What the PLY library says.
+    #[error("{message}")]
+    Ply {
+        /// In one line, shortened.
+        message: String,
+    },
+}
+
+fn base(first: u8) -> &'static str {
+    if first == 0 {
+        ", the first of which is 0"
+    } else {
+        ", the first of which is 1"
+    }
+}
+
+/// Reads a mesh; the extension (`.obj`, `.ply`, `.stl`) tells the format.
+///
+/// - OBJ: `v` and `f`, with relative indices; groups, normals, colours and everything else are
+///   passed over.
+/// - PLY: ASCII and binary of both byte orders; `x y z` of `vertex`, with `nx ny nz` if they are
+///   there, and `vertex_indices` (or `vertex_index`) of `face`; everything else is passed over.
+/// - STL: binary and ASCII; corners with exactly equal coordinates become one vertex.
+///
+/// Polygons are cut into triangles from their first corner, which is right for convex ones.
+///
+/// # Errors
+/// [`Error::UnknownFormat`]; [`Error::Geometry`] if the file cannot be read; [`Error::Format`] for
+/// everything that is wrong with its contents. Whether the surface is closed is another matter: see
+/// [`ClosedMesh`](crate::ClosedMesh).
+pub fn read(path: impl AsRef<Path>) -> Result<TriangleMesh, Error> {
+    let path = path.as_ref();
+    let format = Format::of(path)?;
+    let bytes = std::fs::read(path).map_err(|source| geometry::Error::Io {
+        action: "read",
+        path: path.into(),
+        source,
+    })?;
+    let mesh = if bytes.is_empty() {
+        Err(FormatError::Empty)
+    } else {
+        match format {
+            Format::Obj => obj::decode(&bytes),
+            Format::Ply => ply::decode(&bytes),
+            Format::Stl => stl::decode(&bytes),
+        }
+    };
+    mesh.map_err(|problem| Error::Format {
+        path: path.into(),
+        problem,
+    })
+}
+
+/// The start of a text, in one line.
+fn shortened(text: &str) -> String {
+    const LONGEST: usize = 60;
+    let mut words = text.split_whitespace();
+    let mut line = String::new();
+    for word in words.by_ref() {
+        if !line.is_empty() {
+            line.push(' ');
+        }
+        line.extend(word.chars().take(LONGEST));
+        if line.chars().count() >= LONGEST {
+            break;
+        }
+    }
+    if words.next().is_some() || line.chars().count() > LONGEST {
+        line = line.chars().take(LONGEST).collect();
+        line.push_str(" ...");
+    }
+    line
+}
+
+/// The three coordinates that follow in a line of text.
+fn position<'a>(
+    mut words: impl Iterator<Item = &'a str>,
+    line: usize,
+    vertex: usize,
+) -> Result<[f64; 3], FormatError> {
+    let mut position = [0.0; 3];
+    for coordinate in &mut position {
+        let word = words.next().unwrap_or_default();
+        let value: f64 = word.parse().map_err(|_| FormatError::Line {
+            line,
+            found: shortened(word),
+            expected: "a coordinate",
+        })?;
+        if !value.is_finite() {
+            return Err(FormatError::NonFinite { vertex, value });
+        }
+        *coordinate = value;
+    }
+    Ok(position)
+}
+
+/// Polygons cut into triangles, with their indices checked.
+struct Polygons {
+    faces: Vec<[u32; 3]>,
+    vertices: usize,
+    first: u8,
+}
+
+impl Polygons {
+    fn new(vertices: usize, first: u8) -> Result<Self, FormatError> {
+        if u32::try_from(vertices).is_err() {
+            return Err(FormatError::TooManyVertices { vertices });
+        }
+        Ok(Self {
+            faces: Vec::new(),
+            vertices,
+            first,
+        })
+    }
+
+    /// Adds face number `face`; its corners are counted from `self.first`.
+    fn push(&mut self, face: usize, corners: &[i64]) -> Result<(), FormatError> {
+        let index = |&index: &i64| {
+            let vertex = index.checked_sub(i64::from(self.first));
+            let vertex = vertex.and_then(|v| u32::try_from(v).ok());
+            vertex
+                .filter(|&v| (v as usize) < self.vertices)
+                .ok_or(FormatError::Index {
+                    face,
+                    index,
+                    vertices: self.vertices,
+                    first: self.first,
+                })
+        };
+        let [first, rest @ ..] = corners else {
+            return Err(FormatError::Corners {
+                face,
+                corners: 0,
+                expected: TOO_FEW,
+            });
+        };
+        if rest.len() < 2 {
+            return Err(FormatError::Corners {
+                face,
+                corners: corners.len(),
+                expected: TOO_FEW,
+            });
+        }
+        let first = index(first)?;
+        for pair in rest.windows(2) {
+            self.faces.push([first, index(&pair[0])?, index(&pair[1])?]);
+        }
+        Ok(())
+    }
+
+    fn finish(self) -> Result<Vec<[u32; 3]>, FormatError> {
+        if self.faces.is_empty() {
+            return Err(FormatError::NoFaces {
+                vertices: self.vertices,
+            });
+        }
+        Ok(self.faces)
+    }
+}
+
+const TOO_FEW: &str = "a face needs at least three";

@@ -1,0 +1,137 @@
+//! STL, binary and ASCII.
+//!
+//! Not by a library: `stl_io` takes binary files whose comment begins with `solid` for ASCII, refuses
+//! `solid` without a name, reads the first of several solids only, and rounds ASCII to single
+//! precision.
+
+use super::{FormatError, position, shortened};
+use crate::TriangleMesh;
+use crate::mesh::merge_coincident;
+
+/// Comment and number of facets.
+const HEADER: usize = 84;
+/// Normal, three corners, and two bytes of attributes.
+const FACET: usize = 50;
+
+pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
+    // The length tells binary files from ASCII; their comment may begin with "solid" as well.
+    let corners = match binary_length(bytes) {
+        Some((_, length)) if length == bytes.len() as u64 => binary(&bytes[HEADER..])?,
+        _ if is_text(bytes) => ascii(&String::from_utf8_lossy(bytes))?,
+        Some((count, expected)) => {
+            return Err(FormatError::Length {
+                elements: "facets".into(),
+                count,
+                expected,
+                found: bytes.len() as u64,
+            });
+        }
+        None => {
+            return Err(FormatError::Line {
+                line: 1,
+                found: shortened(&String::from_utf8_lossy(bytes)),
+                expected: "\"solid\", or a binary header of 84 bytes,",
+            });
+        }
+    };
+    if corners.is_empty() {
+        return Err(FormatError::NoFaces { vertices: 0 });
+    }
+    let merged = merge_coincident(&corners);
+    if u32::try_from(merged.first.len()).is_err() {
+        return Err(FormatError::TooManyVertices {
+            vertices: merged.first.len(),
+        });
+    }
+    Ok(TriangleMesh {
+        vertices: merged.first.iter().map(|&v| corners[v]).collect(),
+        faces: merged.index.as_chunks().0.to_vec(),
+        normals: None,
+    })
+}
+
+/// Number of facets and length of the file according to a binary header.
+fn binary_length(bytes: &[u8]) -> Option<(u64, u64)> {
+    let (_, count) = bytes.get(..HEADER)?.split_last_chunk()?;
+    let count = u64::from(u32::from_le_bytes(*count));
+    Some((count, HEADER as u64 + FACET as u64 * count))
+}
+
+fn is_text(bytes: &[u8]) -> bool {
+    let start = bytes.trim_ascii_start();
+    start.len() >= 5 && start[..5].eq_ignore_ascii_case(b"solid")
+}
+
+/// Three corners for every facet.
+fn binary(facets: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
+    let mut corners = Vec::with_capacity(3 * facets.len() / FACET);
+    for facet in facets.as_chunks::<FACET>().0 {
+        // The normal comes first; it follows from the corners.
+        for corner in facet[12..48].as_chunks::<12>().0 {
+            let mut position = [0.0; 3];
+            for (value, bytes) in position.iter_mut().zip(corner.as_chunks().0) {
+                *value = f64::from(f32::from_le_bytes(*bytes));
+                if !value.is_finite() {
+                    return Err(FormatError::NonFinite {
+                        vertex: corners.len(),
+                        value: *value,
+                    });
+                }
+            }
+            corners.push(position);
+        }
+    }
+    Ok(corners)
+}
+
+/// Three corners for every facet, of all solids.
+fn ascii(text: &str) -> Result<Vec<[f64; 3]>, FormatError> {
+    let mut corners = Vec::new();
+    let mut facet = 0;
+    let mut open = false;
+    let (mut last, mut complete) = (0, false);
+    for (number, line) in text.lines().enumerate() {
+        let mut words = line.split_whitespace();
+        let Some(keyword) = words.next() else {
+            continue;
+        };
+        last = number + 1;
+        let keyword = keyword.to_ascii_lowercase();
+        complete = keyword == "endsolid";
+        match (keyword.as_str(), open) {
+            ("facet", false) => open = true,
+            ("vertex", true) => corners.push(position(words, last, corners.len())?),
+            ("endfacet", true) => {
+                let count = corners.len() - 3 * facet;
+                if count != 3 {
+                    return Err(FormatError::Corners {
+                        face: facet,
+                        corners: count,
+                        expected: "an STL facet has three",
+                    });
+                }
+                facet += 1;
+                open = false;
+            }
+            ("outer" | "endloop", true) | ("solid" | "endsolid", false) => {}
+            _ => {
+                return Err(FormatError::Line {
+                    line: last,
+                    found: shortened(line),
+                    expected: if open {
+                        "outer loop, vertex, endloop or endfacet"
+                    } else {
+                        "facet or endsolid"
+                    },
+                });
+            }
+        }
+    }
+    if !complete {
+        return Err(FormatError::EndOfText {
+            line: last,
+            expected: "endsolid",
+        });
+    }
+    Ok(corners)
+}
