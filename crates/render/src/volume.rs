@@ -1,0 +1,306 @@
+//! The surface: a smooth interpolant of the clamped distance, and rays against it.
+//!
+//! Positions are in cells of a padded lattice: node `i` of the grid is at `i + PAD`, and the
+//! periodic image of its first layer closes the box.
+
+use geometry::{Field, Grid};
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::camera::Ray;
+use crate::emptiness::Emptiness;
+use crate::spline;
+
+/// Layers of nodes added on each side: support for the cubic spline outside the box.
+const PAD: usize = 3;
+/// Steps in cells that may hold the surface: for rays from the camera, and for rays of light.
+const FINE_STEP: f64 = 0.35;
+const COARSE_STEP: f64 = 0.5;
+/// Added after leaving an empty cube, so that the next cell is another one.
+const NUDGE: f64 = 1e-5;
+
+/// From positions in space to cells of the lattice and back.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lattice {
+    origin: DVec3,
+    spacing: f64,
+}
+
+impl Lattice {
+    pub fn new(grid: &Grid<3>) -> Self {
+        Self {
+            origin: grid.origin().into(),
+            spacing: grid.spacing(),
+        }
+    }
+
+    pub fn place(&self, x: [f64; 3]) -> DVec3 {
+        (DVec3::from(x) - self.origin) / self.spacing + PAD as f64
+    }
+
+    pub fn position(&self, p: DVec3) -> [f64; 3] {
+        (self.origin + self.spacing * (p - PAD as f64)).to_array()
+    }
+
+    pub fn length(&self, length: f64) -> f64 {
+        length / self.spacing
+    }
+}
+
+/// A cubic spline on the padded lattice.
+pub(crate) struct Spline {
+    size: usize,
+    coefficients: Vec<f32>,
+}
+
+impl Spline {
+    /// The interpolant of the samples.
+    pub fn interpolating(size: usize, samples: &[f32]) -> Self {
+        let mut coefficients = samples.to_vec();
+        spline::prefilter(&mut coefficients, size);
+        Self { size, coefficients }
+    }
+
+    /// The spline that has the samples as coefficients: it smooths them.
+    pub fn smoothing(size: usize, samples: Vec<f32>) -> Self {
+        Self {
+            size,
+            coefficients: samples,
+        }
+    }
+
+    /// The cell, kept where its support is inside the lattice, and the place in it.
+    fn locate(&self, p: DVec3) -> ([usize; 3], [f32; 3]) {
+        locate(p, 1, self.size - 3)
+    }
+
+    pub fn value(&self, p: DVec3) -> f64 {
+        let (cell, local) = self.locate(p);
+        f64::from(spline::value(&self.coefficients, self.size, cell, local))
+    }
+
+    fn gradient(&self, p: DVec3) -> DVec3 {
+        let (cell, local) = self.locate(p);
+        let [x, y, z] = spline::gradient(&self.coefficients, self.size, cell, local);
+        DVec3::new(x.into(), y.into(), z.into())
+    }
+}
+
+fn locate(p: DVec3, low: usize, high: usize) -> ([usize; 3], [f32; 3]) {
+    let p = p.to_array();
+    let cell = p.map(|c| (c as usize).clamp(low, high));
+    let local = std::array::from_fn(|k| (p[k] - cell[k] as f64).clamp(0.0, 1.0) as f32);
+    (cell, local)
+}
+
+/// Nodal values in the lattice: those of the grid in its box, periodic images around it.
+pub(crate) fn padded(field: &Field<3>, value: impl Fn(f64) -> f64 + Sync) -> (usize, Vec<f32>) {
+    let cells = field.grid().cells();
+    let size = cells + 1 + 2 * PAD;
+    let source = |k: usize| (k + 2 * cells - PAD) % cells;
+    let values = (0..size * size)
+        .into_par_iter()
+        .flat_map_iter(|row| {
+            let start = field.grid().index([source(row / size), source(row % size), 0]);
+            let value = &value;
+            (0..size).map(move |k| value(field.values()[start + source(k)]) as f32)
+        })
+        .collect();
+    (size, values)
+}
+
+/// The surface `f = 0`; `f < 0` inside, in cells.
+pub(crate) struct Volume {
+    size: usize,
+    spline: Spline,
+    /// The values at the nodes, for rays of light.
+    samples: Vec<f32>,
+    /// Empty space for the spline, and for the trilinear interpolant of the samples.
+    around_spline: Emptiness,
+    around_samples: Emptiness,
+    /// Where lattice edges cross the surface.
+    pub crossings: Vec<DVec3>,
+}
+
+impl Volume {
+    /// From signed distances, in cells. They are clamped softly at `limit` and intersected with
+    /// the box of the grid.
+    ///
+    /// `limit tanh(s / limit)` has the zeros and the slope of `s` there, and is smooth: a sharp
+    /// clamp would make the spline ring.
+    pub fn new(field: &Field<3>, limit: f64, distance: impl Fn(f64) -> f64 + Sync) -> Self {
+        let (size, mut samples) = padded(field, |v| limit * (distance(v) / limit).tanh());
+        let last = (size - 1 - PAD) as f64;
+        samples.par_iter_mut().enumerate().for_each(|(at, value)| {
+            let place = [at / size / size, at / size % size, at % size];
+            let outside = place
+                .iter()
+                .map(|&k| (PAD as f64 - k as f64).max(k as f64 - last))
+                .fold(f64::NEG_INFINITY, f64::max);
+            *value = value.max((limit * (outside / limit).tanh()) as f32);
+        });
+        let spline = Spline::interpolating(size, &samples);
+        // The values of a spline lie between its coefficients, those of the other between samples.
+        let (around_spline, around_samples) = rayon::join(
+            || Emptiness::new(&spline.coefficients, size, 1, 2),
+            || Emptiness::new(&samples, size, 0, 1),
+        );
+        let crossings = crossings(&samples, size);
+        Self {
+            size,
+            spline,
+            samples,
+            around_spline,
+            around_samples,
+            crossings,
+        }
+    }
+
+    /// The part of a ray inside the lattice's box with its support, from `start` on.
+    fn clip(&self, ray: &Ray, inverse: [f64; 3], start: f64) -> (f64, f64) {
+        let (low, high) = (1.0, (self.size - 2) as f64);
+        let origin = ray.origin.to_array();
+        let (mut from, mut to) = (start, f64::INFINITY);
+        for axis in 0..3 {
+            let a = (low - origin[axis]) * inverse[axis];
+            let b = (high - origin[axis]) * inverse[axis];
+            from = from.max(a.min(b));
+            to = to.min(a.max(b));
+        }
+        (from, to)
+    }
+
+    /// Where a ray from outside first meets the surface.
+    pub fn intersect(&self, ray: &Ray) -> Option<f64> {
+        let inverse = inverse(ray.direction);
+        let (mut t, end) = self.clip(ray, inverse, 0.0);
+        let (origin, direction) = (ray.origin.to_array(), ray.direction.to_array());
+        // The last place known to be outside.
+        let mut outside = t;
+        while t < end {
+            let p = ray.at(t);
+            let (cell, _) = self.spline.locate(p);
+            let k = self.around_spline.at(cell);
+            if k > 0 {
+                outside = t;
+                t = Emptiness::exit(cell, k, origin, direction, inverse).max(t) + NUDGE;
+                continue;
+            }
+            let value = self.spline.value(p);
+            if value <= 0.0 {
+                return Some(self.root(ray, outside, t, value));
+            }
+            outside = t;
+            t += FINE_STEP;
+        }
+        None
+    }
+
+    /// Narrows down a sign change by the Illinois variant of regula falsi.
+    fn root(&self, ray: &Ray, outside: f64, inside: f64, value: f64) -> f64 {
+        const ITERATIONS: usize = 12;
+        const TOLERANCE: f64 = 1e-5;
+        let f = |t: f64| self.spline.value(ray.at(t));
+        let (mut a, mut fa, mut b, mut fb) = (outside, f(outside), inside, value);
+        if fa <= 0.0 {
+            return outside;
+        }
+        let mut last = 0_i8;
+        for _ in 0..ITERATIONS {
+            let t = (a * fb - b * fa) / (fb - fa);
+            let value = f(t);
+            if value.abs() < TOLERANCE {
+                return t;
+            }
+            if value > 0.0 {
+                (a, fa) = (t, value);
+                if last == 1 {
+                    fb *= 0.5;
+                }
+                last = 1;
+            } else {
+                (b, fb) = (t, value);
+                if last == -1 {
+                    fa *= 0.5;
+                }
+                last = -1;
+            }
+        }
+        0.5 * (a + b)
+    }
+
+    /// The outer unit normal.
+    pub fn normal(&self, p: DVec3) -> Option<DVec3> {
+        self.spline.gradient(p).try_normalize()
+    }
+
+    /// Whether a ray of light that starts outside meets the surface.
+    ///
+    /// Here the trilinear interpolant of the samples will do: its distance from the spline is a
+    /// small part of a cell, and it costs an eighth.
+    pub fn blocks(&self, ray: &Ray) -> bool {
+        let inverse = inverse(ray.direction);
+        let (mut t, end) = self.clip(ray, inverse, 0.0);
+        let (origin, direction) = (ray.origin.to_array(), ray.direction.to_array());
+        while t < end {
+            let (cell, local) = locate(ray.at(t), 1, self.size - 3);
+            let k = self.around_samples.at(cell);
+            if k > 0 {
+                t = Emptiness::exit(cell, k, origin, direction, inverse).max(t) + NUDGE;
+                continue;
+            }
+            if self.trilinear(cell, local) <= 0.0 {
+                return true;
+            }
+            t += COARSE_STEP;
+        }
+        false
+    }
+
+    fn trilinear(&self, [i, j, k]: [usize; 3], [x, y, z]: [f32; 3]) -> f32 {
+        let along = |i: usize, j: usize| {
+            let at = (i * self.size + j) * self.size + k;
+            let pair: &[f32; 2] = self.samples[at..].first_chunk().expect("inside the lattice");
+            pair[0] + z * (pair[1] - pair[0])
+        };
+        let across = |i: usize| {
+            let (a, b) = (along(i, j), along(i, j + 1));
+            a + y * (b - a)
+        };
+        let (a, b) = (across(i), across(i + 1));
+        a + x * (b - a)
+    }
+}
+
+/// Reciprocals of the components, finite where they vanish.
+fn inverse(direction: DVec3) -> [f64; 3] {
+    direction
+        .to_array()
+        .map(|c| if c.abs() < 1e-30 { 1e30 } else { 1.0 / c })
+}
+
+/// Where the linear interpolant vanishes on the edges of the lattice.
+fn crossings(samples: &[f32], size: usize) -> Vec<DVec3> {
+    let strides = [size * size, size, 1];
+    (0..size)
+        .into_par_iter()
+        .flat_map_iter(|i| {
+            (0..size * size).flat_map(move |rest| {
+                let place = [i, rest / size, rest % size];
+                let at = i * size * size + rest;
+                let a = samples[at];
+                (0..3).filter_map(move |axis| {
+                    if place[axis] + 1 == size {
+                        return None;
+                    }
+                    let b = samples[at + strides[axis]];
+                    ((a <= 0.0) != (b <= 0.0)).then(|| {
+                        let mut p = DVec3::from(place.map(|k| k as f64));
+                        p[axis] += f64::from(a / (a - b));
+                        p
+                    })
+                })
+            })
+        })
+        .collect()
+}
