@@ -20,6 +20,7 @@ fn knobbly() -> impl SignedDistance<3> {
             let centre = [ring * angle.cos(), ring * angle.sin(), z].map(|c| 0.5 + reach * c);
             (centre, 0.12 + 0.035 * (2.3 * k).cos())
         })
+        .chain([([0.5; 3], 0.19)])
         .collect();
     move |x: [f64; 3]| {
         let distance = |&(centre, radius): &([f64; 3], f64)| {

@@ -106,7 +106,7 @@ const FILL_ELEVATION: f64 = 10.0;
 
 /// Tints of the key light and of the surroundings: warm light, cool shade, white together.
 const KEY_TINT: [f64; 3] = [1.03, 1.0, 0.955];
-const SKY_TINT: [f64; 3] = [0.965, 1.0, 1.06];
+const SKY_TINT: [f64; 3] = [0.985, 1.0, 1.03];
 
 /// Lights in the coordinates of the scene.
 pub(crate) struct Lights {

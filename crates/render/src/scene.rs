@@ -101,8 +101,8 @@ impl<'a> Scene<'a> {
     /// The surface `u = 0` of a phase field, which is positive inside.
     ///
     /// The interface is found as the zero of the distance `-(4 eps / 3) atanh u`, smoothly clamped
-    /// at `3 eps`, on its cubic spline; what `u` does further away is not seen. The solid ends at
-    /// the faces of the grid's box.
+    /// at `3 eps`; what `u` does further away is not seen. A cubic B-spline makes a smooth surface
+    /// of it. The solid ends at the faces of the grid's box.
     ///
     /// # Errors
     /// `u` must be finite, and `eps` finite and positive.
@@ -275,7 +275,7 @@ impl<'a> Scene<'a> {
         mask.check_finite()?;
         let (from, to) = (self.lattice, Lattice::new(mask.grid()));
         let (size, values) = padded(mask, |v| v);
-        let spline = Spline::smoothing(size, values);
+        let spline = Spline::new(size, values);
         self.highlights.push(Highlight {
             region: Arc::new(move |p| 0.5 - spline.value(to.place(from.position(p)))),
             colour,

@@ -1,4 +1,4 @@
-//! The surface: a smooth interpolant of the clamped distance, and rays against it.
+//! The surface: a smooth approximation of the clamped distance, and rays against it.
 //!
 //! Positions are in cells of a padded lattice: node `i` of the grid is at `i + PAD`, and the
 //! periodic image of its first layer closes the box.
@@ -16,6 +16,9 @@ const PAD: usize = 3;
 /// Steps in cells that may hold the surface: for rays from the camera, and for rays of light.
 const FINE_STEP: f64 = 0.35;
 const COARSE_STEP: f64 = 0.5;
+/// Width of the space left around the surface, which holds the crossings on lattice edges, in
+/// cells: it cannot bulge further between them.
+const MARGIN: f64 = 1.5;
 /// Added after leaving an empty cube, so that the next cell is another one.
 const NUDGE: f64 = 1e-5;
 
@@ -47,22 +50,19 @@ impl Lattice {
     }
 }
 
-/// A cubic spline on the padded lattice.
+/// A cubic B-spline on the padded lattice with the nodal values as coefficients.
+///
+/// It smooths them a little: a surface moves by `h^2 / 6` times its mean curvature, which no
+/// picture shows. In return it neither rings nor overshoots at creases and clamps, as a spline
+/// through the values does.
 pub(crate) struct Spline {
     size: usize,
     coefficients: Vec<f32>,
 }
 
 impl Spline {
-    /// The interpolant of the samples.
-    pub fn interpolating(size: usize, samples: &[f32]) -> Self {
-        let mut coefficients = samples.to_vec();
-        spline::prefilter(&mut coefficients, size);
-        Self { size, coefficients }
-    }
-
-    /// The spline that has the samples as coefficients: it smooths them.
-    pub fn smoothing(size: usize, samples: Vec<f32>) -> Self {
+    /// The spline that has the samples as coefficients.
+    pub fn new(size: usize, samples: Vec<f32>) -> Self {
         Self {
             size,
             coefficients: samples,
@@ -111,7 +111,8 @@ pub(crate) fn padded(field: &Field<3>, value: impl Fn(f64) -> f64 + Sync) -> (us
 
 /// The surface `f = 0`; `f < 0` inside, in cells.
 pub(crate) struct Volume {
-    size: usize,
+    /// Rays are followed in here alone.
+    box_around: [DVec3; 2],
     spline: Spline,
     /// The values at the nodes, for rays of light.
     samples: Vec<f32>,
@@ -126,8 +127,7 @@ impl Volume {
     /// From signed distances, in cells. They are clamped softly at `limit` and intersected with
     /// the box of the grid.
     ///
-    /// `limit tanh(s / limit)` has the zeros and the slope of `s` there, and is smooth: a sharp
-    /// clamp would make the spline ring.
+    /// `limit tanh(s / limit)` has the zeros and the slope of `s` there, and no kink.
     pub fn new(field: &Field<3>, limit: f64, distance: impl Fn(f64) -> f64 + Sync) -> Self {
         let (size, mut samples) = padded(field, |v| limit * (distance(v) / limit).tanh());
         let last = (size - 1 - PAD) as f64;
@@ -139,15 +139,20 @@ impl Volume {
                 .fold(f64::NEG_INFINITY, f64::max);
             *value = value.max((limit * (outside / limit).tanh()) as f32);
         });
-        let spline = Spline::interpolating(size, &samples);
+        let spline = Spline::new(size, samples);
+        let samples = spline::nodal(&spline.coefficients, size);
         // The values of a spline lie between its coefficients, those of the other between samples.
         let (around_spline, around_samples) = rayon::join(
             || Emptiness::new(&spline.coefficients, size, 1, 2),
             || Emptiness::new(&samples, size, 0, 1),
         );
         let crossings = crossings(&samples, size);
+        let (low, high) = crossings.iter().fold(
+            (DVec3::INFINITY, DVec3::NEG_INFINITY),
+            |(low, high), &p| (low.min(p), high.max(p)),
+        );
         Self {
-            size,
+            box_around: [low - MARGIN, high + MARGIN],
             spline,
             samples,
             around_spline,
@@ -156,25 +161,21 @@ impl Volume {
         }
     }
 
-    /// The part of a ray inside the lattice's box with its support, from `start` on.
-    fn clip(&self, ray: &Ray, inverse: [f64; 3], start: f64) -> (f64, f64) {
-        let (low, high) = (1.0, (self.size - 2) as f64);
-        let origin = ray.origin.to_array();
-        let (mut from, mut to) = (start, f64::INFINITY);
-        for axis in 0..3 {
-            let a = (low - origin[axis]) * inverse[axis];
-            let b = (high - origin[axis]) * inverse[axis];
-            from = from.max(a.min(b));
-            to = to.min(a.max(b));
-        }
-        (from, to)
+    /// The part of a ray inside the box around the surface.
+    fn clip(&self, ray: &Ray, inverse: DVec3) -> (f64, f64) {
+        let [low, high] = self.box_around.map(|corner| (corner - ray.origin) * inverse);
+        (
+            low.min(high).max_element().max(0.0),
+            low.max(high).min_element(),
+        )
     }
 
     /// Where a ray from outside first meets the surface.
     pub fn intersect(&self, ray: &Ray) -> Option<f64> {
         let inverse = inverse(ray.direction);
-        let (mut t, end) = self.clip(ray, inverse, 0.0);
+        let (mut t, end) = self.clip(ray, inverse);
         let (origin, direction) = (ray.origin.to_array(), ray.direction.to_array());
+        let inverse = inverse.to_array();
         // The last place known to be outside.
         let mut outside = t;
         while t < end {
@@ -240,10 +241,11 @@ impl Volume {
     /// small part of a cell, and it costs an eighth.
     pub fn blocks(&self, ray: &Ray) -> bool {
         let inverse = inverse(ray.direction);
-        let (mut t, end) = self.clip(ray, inverse, 0.0);
+        let (mut t, end) = self.clip(ray, inverse);
         let (origin, direction) = (ray.origin.to_array(), ray.direction.to_array());
+        let inverse = inverse.to_array();
         while t < end {
-            let (cell, local) = locate(ray.at(t), 1, self.size - 3);
+            let (cell, local) = locate(ray.at(t), 1, self.spline.size - 3);
             let k = self.around_samples.at(cell);
             if k > 0 {
                 t = Emptiness::exit(cell, k, origin, direction, inverse).max(t) + NUDGE;
@@ -259,7 +261,7 @@ impl Volume {
 
     fn trilinear(&self, [i, j, k]: [usize; 3], [x, y, z]: [f32; 3]) -> f32 {
         let along = |i: usize, j: usize| {
-            let at = (i * self.size + j) * self.size + k;
+            let at = (i * self.spline.size + j) * self.spline.size + k;
             let pair: &[f32; 2] = self.samples[at..].first_chunk().expect("inside the lattice");
             pair[0] + z * (pair[1] - pair[0])
         };
@@ -273,10 +275,8 @@ impl Volume {
 }
 
 /// Reciprocals of the components, finite where they vanish.
-fn inverse(direction: DVec3) -> [f64; 3] {
-    direction
-        .to_array()
-        .map(|c| if c.abs() < 1e-30 { 1e30 } else { 1.0 / c })
+fn inverse(direction: DVec3) -> DVec3 {
+    direction.map(|c| if c.abs() < 1e-30 { 1e30 } else { 1.0 / c })
 }
 
 /// Where the linear interpolant vanishes on the edges of the lattice.
