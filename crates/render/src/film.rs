@@ -46,16 +46,28 @@ impl Seen {
 #[derive(Clone, Copy, Debug)]
 struct Hit {
     seen: Seen,
-    t: f64,
+    /// Distance along the ray.
+    t: f32,
+    place: Vec3,
     normal: Vec3,
 }
 
 impl Hit {
     const NONE: Self = Self {
         seen: Seen::Nothing,
-        t: f64::INFINITY,
+        t: f32::INFINITY,
+        place: Vec3::INFINITY,
         normal: Vec3::ZERO,
     };
+
+    fn new(seen: Seen, ray: &Ray, t: f64, normal: DVec3) -> Self {
+        Self {
+            seen,
+            t: t as f32,
+            place: ray.at(t).as_vec3(),
+            normal: normal.as_vec3(),
+        }
+    }
 }
 
 /// Visible part of the key light and arriving part of the surroundings' light, from 0 to 1.
@@ -142,8 +154,7 @@ impl Film<'_> {
             .map(|(at, hit)| {
                 let (x, y) = (at % width, at / width);
                 let pattern = y % TILE * TILE + x % TILE;
-                let ray = self.ray(x, y, [0.5; 2]);
-                self.arriving(&ray, hit, patterns.slices(counts, pattern))
+                self.arriving(hit, patterns.slices(counts, pattern))
             })
             .collect();
         let (patterns, counts) = Patterns::new(&self.lights, self.quality, 4);
@@ -163,7 +174,7 @@ impl Film<'_> {
                         let ray = self.ray(x, y, subpixel(pattern));
                         let hit = self.hit(&ray);
                         let slices = patterns.slices(counts, pattern);
-                        let arriving = self.arriving(&ray, &hit, slices);
+                        let arriving = self.arriving(&hit, slices);
                         sum = sum + self.shade(&ray, &hit, arriving);
                     }
                     sum * (1.0 / PATTERNS as f32)
@@ -182,35 +193,25 @@ impl Film<'_> {
     }
 
     fn hit(&self, ray: &Ray) -> Hit {
-        let mut hit = Hit::NONE;
-        if let Some(t) = self.volume.intersect(ray) {
+        let surface = self.volume.intersect(ray);
+        let limit = surface.unwrap_or(f64::INFINITY);
+        if let Some((t, normal, tube)) = self.tubes.intersect(ray, limit) {
+            return Hit::new(Seen::Tube(tube as u32), ray, t, normal);
+        }
+        if let Some(t) = surface {
             let p = ray.at(t);
             // A vanishing gradient has no direction; what faces the camera will do.
             let normal = self.volume.normal(p).unwrap_or(-ray.direction);
-            hit = Hit {
-                seen: Seen::Surface((self.region)(p) as u16),
-                t,
-                normal: normal.as_vec3(),
-            };
+            return Hit::new(Seen::Surface((self.region)(p) as u16), ray, t, normal);
         }
-        if let Some((t, normal, tube)) = self.tubes.intersect(ray, hit.t) {
-            hit = Hit {
-                seen: Seen::Tube(tube as u32),
-                t,
-                normal: normal.as_vec3(),
-            };
-        }
-        if let (Seen::Nothing, Some(ground)) = (hit.seen, &self.ground) {
-            let t = (ground.height - ray.origin.dot(ground.up)) / ray.direction.dot(ground.up);
-            if t.is_finite() && t > 0.0 && ray.direction.dot(ground.up) < 0.0 {
-                hit = Hit {
-                    seen: Seen::Ground,
-                    t,
-                    normal: ground.up.as_vec3(),
-                };
+        if let Some(ground) = &self.ground {
+            let falling = -ray.direction.dot(ground.up);
+            let t = (ray.origin.dot(ground.up) - ground.height) / falling;
+            if falling > 0.0 && t > 0.0 && t.is_finite() {
+                return Hit::new(Seen::Ground, ray, t, ground.up);
             }
         }
-        hit
+        Hit::NONE
     }
 
     fn blocked(&self, origin: DVec3, direction: DVec3) -> bool {
@@ -218,12 +219,12 @@ impl Film<'_> {
         self.volume.blocks(&ray) || self.tubes.blocks(&ray)
     }
 
-    fn arriving(&self, ray: &Ray, hit: &Hit, (sky, key): (&[[f64; 3]], &[DVec3])) -> Arriving {
+    fn arriving(&self, hit: &Hit, (sky, key): (&[[f64; 3]], &[DVec3])) -> Arriving {
         if hit.seen == Seen::Nothing {
             return Arriving::default();
         }
         let normal = hit.normal.as_dvec3();
-        let origin = ray.at(hit.t) + OFFSET * normal;
+        let origin = hit.place.as_dvec3() + OFFSET * normal;
         let [a, b] = frame(normal);
         let (mut all, mut open) = (0.0, 0.0);
         for &[x, y, z] in sky {
@@ -311,13 +312,10 @@ impl Neighbourhood<'_> {
     }
 
     /// Distance of what another pixel shows from the tangent plane of this one, in pixels.
-    fn height(&self, x: usize, y: usize) -> f64 {
+    fn height(&self, x: usize, y: usize) -> f32 {
         let own = self.hit(self.x, self.y);
-        let centre = [0.5; 2];
-        let ray = self.film.ray(self.x, self.y, centre);
-        let other = self.film.ray(x, y, centre).at(self.hit(x, y).t);
-        let offset = (other - ray.at(own.t)).dot(own.normal.as_dvec3());
-        offset.abs() / self.film.view.footprint(own.t)
+        let offset = (self.hit(x, y).place - own.place).dot(own.normal);
+        offset.abs() / self.film.view.footprint(own.t.into()) as f32
     }
 
     /// Whether the pixel may show more than one thing.
@@ -325,7 +323,7 @@ impl Neighbourhood<'_> {
         /// Normals further apart than this (the cosine) make a crease.
         const CREASE: f32 = 0.94;
         /// Height above the tangent plane, in pixels, that makes a step.
-        const STEP: f64 = 2.0;
+        const STEP: f32 = 2.0;
         let own = self.hit(self.x, self.y);
         self.within(1).any(|(x, y)| {
             let other = self.hit(x, y);
@@ -345,7 +343,7 @@ impl Neighbourhood<'_> {
         /// Normals of pixels that share light differ less than this (the cosine).
         const ALIKE: f32 = 0.9;
         /// And their places lie this close to the tangent plane, in pixels.
-        const CLOSE: f64 = 2.0;
+        const CLOSE: f32 = 2.0;
         let own = self.hit(self.x, self.y);
         if own.seen == Seen::Nothing {
             return Arriving::default();
