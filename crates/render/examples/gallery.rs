@@ -24,7 +24,11 @@ fn knobbly() -> impl SignedDistance<3> {
         .collect();
     move |x: [f64; 3]| {
         let distance = |&(centre, radius): &([f64; 3], f64)| {
-            (0..3).map(|i| (x[i] - centre[i]).powi(2)).sum::<f64>().sqrt() - radius
+            (0..3)
+                .map(|i| (x[i] - centre[i]).powi(2))
+                .sum::<f64>()
+                .sqrt()
+                - radius
         };
         balls.iter().map(distance).fold(f64::INFINITY, f64::min)
     }
@@ -48,13 +52,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let field = |shape: &dyn SignedDistance<3>| -> Result<Field<3>, geometry::Error> {
         phase_field(grid, shape, eps)
     };
-    let draw = |name: &str, scene: &Scene<'_>, size: (u32, u32)| -> Result<Picture, Box<dyn Error>> {
-        let start = Instant::now();
-        let picture = scene.render(size)?;
-        picture.write_png(folder.join(format!("{name}.png")))?;
-        println!("{name}: {:.2} s", start.elapsed().as_secs_f64());
-        Ok(picture)
-    };
+    let draw =
+        |name: &str, scene: &Scene<'_>, size: (u32, u32)| -> Result<Picture, Box<dyn Error>> {
+            let start = Instant::now();
+            let picture = scene.render(size)?;
+            picture.write_png(folder.join(format!("{name}.png")))?;
+            println!("{name}: {:.2} s", start.elapsed().as_secs_f64());
+            Ok(picture)
+        };
     let square = (800, 800);
 
     let ball = field(&Ball::new(middle, 0.33)?)?;
@@ -66,7 +71,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let scene = scene
         .colour(Rgb::SKY)
         .tube(Tube::new(circle(0.36, 0.0), 0.005).closed())
-        .tube(Tube::new(circle(0.211, 0.149), 0.005).closed().with_colour(Rgb::VERMILLION));
+        .tube(
+            Tube::new(circle(0.211, 0.149), 0.005)
+                .closed()
+                .with_colour(Rgb::VERMILLION),
+        );
     draw("torus_circles", &scene, square)?;
     scene
         .turntable(8, 240, Duration::from_millis(80))?

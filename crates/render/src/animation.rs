@@ -26,7 +26,8 @@ impl Animation {
     pub fn new(frames: Vec<Picture>, delay: Duration) -> Result<Self, Error> {
         let first = frames.first().ok_or(Error::NoFrames)?;
         let [first_width, first_height] = [first.width(), first.height()];
-        let other = |(_, p): &(usize, &Picture)| [p.width(), p.height()] != [first_width, first_height];
+        let other =
+            |(_, p): &(usize, &Picture)| [p.width(), p.height()] != [first_width, first_height];
         if let Some((index, picture)) = frames.iter().enumerate().find(other) {
             return Err(Error::FrameSize {
                 index,
@@ -37,9 +38,12 @@ impl Animation {
             });
         }
         let milliseconds = 1e3 * delay.as_secs_f64();
-        require("delay in milliseconds", milliseconds, "between 1 and 60000", |v| {
-            (1.0..=60e3).contains(&v)
-        })?;
+        require(
+            "delay in milliseconds",
+            milliseconds,
+            "between 1 and 60000",
+            |v| (1.0..=60e3).contains(&v),
+        )?;
         Ok(Self { frames, delay })
     }
 
@@ -69,7 +73,9 @@ impl Animation {
 /// A PNG file of the first picture or, with a delay, of all. Opaque pictures are stored without
 /// opacity.
 pub(crate) fn encode(frames: &[Picture], delay: Option<Duration>) -> Result<Vec<u8>, Error> {
-    let opaque = frames.iter().all(|f| f.pixels().iter().all(|p| p[3] == 255));
+    let opaque = frames
+        .iter()
+        .all(|f| f.pixels().iter().all(|p| p[3] == 255));
     let (colour, channels) = if opaque {
         (png::ColorType::Rgb, 3)
     } else {
@@ -85,7 +91,11 @@ pub(crate) fn encode(frames: &[Picture], delay: Option<Duration>) -> Result<Vec<
         encoder.set_frame_delay(delay.as_secs_f64().mul_add(1e3, 0.5) as u16, 1000)?;
     }
     let mut writer = encoder.write_header()?;
-    let shown = if delay.is_some() { frames } else { &frames[..1] };
+    let shown = if delay.is_some() {
+        frames
+    } else {
+        &frames[..1]
+    };
     for frame in shown {
         let data: Vec<u8> = frame
             .pixels()

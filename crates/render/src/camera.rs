@@ -24,11 +24,6 @@ impl Axis {
         let k = self as usize;
         [axes[k], axes[(k + 1) % 3], axes[(k + 2) % 3]]
     }
-
-    /// The unit vector.
-    pub(crate) fn vector(self) -> DVec3 {
-        self.frame()[0]
-    }
 }
 
 /// How depth is shown.
@@ -163,15 +158,22 @@ impl Ray {
     }
 }
 
-/// A camera fitted to its subject.
+/// Orthonormal directions seen from the subject, and the axis that points up.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct View {
+pub(crate) struct Orientation {
     /// Rightwards in the picture.
     pub right: DVec3,
     /// Upwards in the picture.
     pub above: DVec3,
     /// Towards the camera.
     pub toward: DVec3,
+    pub up: DVec3,
+}
+
+/// A camera fitted to its subject.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct View {
+    orientation: Orientation,
     target: DVec3,
     /// Distance of the eye from the target plane.
     distance: f64,
@@ -195,7 +197,12 @@ impl Subject {
                 v >= 0.0
             })?;
         }
-        require("diagonal of the framed box", bounds.radius(), "positive", |v| v > 0.0)?;
+        require(
+            "diagonal of the framed box",
+            bounds.radius(),
+            "positive",
+            |v| v > 0.0,
+        )?;
         Ok(Self::Points(bounds.corners().into()))
     }
 
@@ -212,7 +219,12 @@ impl Camera {
     /// Checks the numbers of the camera; those of the framing are checked with the subject.
     fn check(&self) -> Result<(), Error> {
         require("azimuth", self.azimuth, "finite", |_| true)?;
-        require("elevation", self.elevation, "between -90 and 90 degrees", |v| v.abs() <= 90.0)?;
+        require(
+            "elevation",
+            self.elevation,
+            "between -90 and 90 degrees",
+            |v| v.abs() <= 90.0,
+        )?;
         require("margin", self.margin, "at least 0 and below 0.45", |v| {
             (0.0..0.45).contains(&v)
         })?;
@@ -225,18 +237,31 @@ impl Camera {
         Ok(())
     }
 
-    /// Fits the camera to its subject in a picture of `size` pixels.
-    pub(crate) fn view(&self, subject: &Subject, size: [u32; 2]) -> Result<View, Error> {
+    /// The directions of the view.
+    pub(crate) fn orientation(&self) -> Result<Orientation, Error> {
         self.check()?;
         let [up, a, b] = self.up.frame();
         let (sin_az, cos_az) = self.azimuth.to_radians().sin_cos();
         let (sin_el, cos_el) = self.elevation.to_radians().sin_cos();
         let horizontal = cos_az * a + sin_az * b;
-        // Well defined at the poles too, unlike a cross product with the upward axis.
-        let right = cos_az * b - sin_az * a;
-        let toward = cos_el * horizontal + sin_el * up;
-        let above = cos_el * up - sin_el * horizontal;
+        Ok(Orientation {
+            // Well defined at the poles too, unlike a cross product with the upward axis.
+            right: cos_az * b - sin_az * a,
+            above: cos_el * up - sin_el * horizontal,
+            toward: cos_el * horizontal + sin_el * up,
+            up,
+        })
+    }
 
+    /// Fits the camera to its subject in a picture of `size` pixels.
+    pub(crate) fn view(&self, subject: &Subject, size: [u32; 2]) -> Result<View, Error> {
+        let orientation = self.orientation()?;
+        let Orientation {
+            right,
+            above,
+            toward,
+            ..
+        } = orientation;
         let size = size.map(f64::from);
         let shorter = size[0].min(size[1]);
         let used = size.map(|side| side / shorter * (1.0 - 2.0 * self.margin));
@@ -254,10 +279,10 @@ impl Camera {
                         .iter()
                         .map(|p| DVec3::new(p.dot(right), p.dot(above), p.dot(toward)))
                 };
-                let (low, high) = placed().fold(
-                    (DVec3::INFINITY, DVec3::NEG_INFINITY),
-                    |(low, high), p| (low.min(p), high.max(p)),
-                );
+                let (low, high) = placed()
+                    .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+                        (low.min(p), high.max(p))
+                    });
                 let centre = 0.5 * (low + high);
                 let target = centre.x * right + centre.y * above + centre.z * toward;
                 let extent = 0.5 * (high - low);
@@ -292,9 +317,7 @@ impl Camera {
         // A subject seen edge-on may have no extent in the picture.
         let half = require("extent of what is framed", half, "positive", |v| v > 0.0)?;
         Ok(View {
-            right,
-            above,
-            toward,
+            orientation,
             target,
             distance,
             orthographic: tangent.is_none(),
@@ -307,17 +330,23 @@ impl Camera {
 impl View {
     /// The ray through the point `(x, y)` of the picture, in pixels from its upper left corner.
     pub fn ray(&self, x: f64, y: f64) -> Ray {
-        let sideways = self.pixel * (x - 0.5 * self.size[0]) * self.right
-            + self.pixel * (0.5 * self.size[1] - y) * self.above;
+        let Orientation {
+            right,
+            above,
+            toward,
+            ..
+        } = self.orientation;
+        let sideways = self.pixel * (x - 0.5 * self.size[0]) * right
+            + self.pixel * (0.5 * self.size[1] - y) * above;
         if self.orthographic {
             Ray {
-                origin: self.target + sideways + self.distance * self.toward,
-                direction: -self.toward,
+                origin: self.target + sideways + self.distance * toward,
+                direction: -toward,
             }
         } else {
             Ray {
-                origin: self.target + self.distance * self.toward,
-                direction: (sideways - self.distance * self.toward).normalize(),
+                origin: self.target + self.distance * toward,
+                direction: (sideways - self.distance * toward).normalize(),
             }
         }
     }

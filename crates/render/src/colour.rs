@@ -6,9 +6,9 @@ pub struct Rgb(pub u8, pub u8, pub u8);
 
 impl Rgb {
     /// Warm light grey, like unglazed clay.
-    pub const CLAY: Self = Self(226, 213, 196);
+    pub const CLAY: Self = Self(229, 219, 205);
     /// Light blue.
-    pub const SKY: Self = Self(158, 190, 222);
+    pub const SKY: Self = Self(160, 191, 221);
     /// Vermillion of the palette of Okabe and Ito, for what is to stand out.
     pub const VERMILLION: Self = Self(213, 94, 0);
     /// Near-black, for lines.

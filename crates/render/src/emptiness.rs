@@ -14,8 +14,13 @@ impl Emptiness {
     /// each axis are positive. Indices beyond the lattice are left out.
     pub fn new(values: &[f32], size: usize, before: usize, after: usize) -> Self {
         let inside: Vec<u8> = values.par_iter().map(|&v| u8::from(v <= 0.0)).collect();
-        let spread = (0..3).fold(inside, |flags, axis| spread(&flags, size, axis, before, after));
-        let mut distance: Vec<u8> = spread.into_iter().map(|f| if f == 1 { 0 } else { 255 }).collect();
+        let spread = (0..3).fold(inside, |flags, axis| {
+            spread(&flags, size, axis, before, after)
+        });
+        let mut distance: Vec<u8> = spread
+            .into_iter()
+            .map(|f| if f == 1 { 0 } else { 255 })
+            .collect();
         chessboard(&mut distance, size);
         Self { size, distance }
     }
@@ -58,7 +63,11 @@ fn spread(flags: &[u8], size: usize, axis: usize, before: usize, after: usize) -
             let i = at / stride % size;
             let low = at - before.min(i) * stride;
             let high = at + after.min(size - 1 - i) * stride;
-            (low..=high).step_by(stride).map(|k| flags[k]).max().unwrap_or(0)
+            (low..=high)
+                .step_by(stride)
+                .map(|k| flags[k])
+                .max()
+                .unwrap_or(0)
         })
         .collect()
 }
@@ -76,7 +85,11 @@ fn chessboard(distance: &mut [u8], size: usize) {
     let mut pass = |forward: bool| {
         let sign = if forward { 1 } else { -1 };
         for step in 0..distance.len() {
-            let at = if forward { step } else { distance.len() - 1 - step };
+            let at = if forward {
+                step
+            } else {
+                distance.len() - 1 - step
+            };
             if distance[at] == 0 {
                 continue;
             }

@@ -96,7 +96,5 @@ pub(crate) fn require(
 
 /// Accepts numbers from zero to one.
 pub(crate) fn fraction(name: &'static str, value: f64) -> Result<f64, Error> {
-    require(name, value, "between 0 and 1", |v| {
-        (0.0..=1.0).contains(&v)
-    })
+    require(name, value, "between 0 and 1", |v| (0.0..=1.0).contains(&v))
 }

@@ -85,6 +85,16 @@ pub(crate) struct GroundPlane {
     pub strength: f64,
 }
 
+impl GroundPlane {
+    /// Where the shadow of a point falls, unless the light is low.
+    pub fn shadow_of(&self, p: DVec3, light: DVec3) -> Option<DVec3> {
+        /// Sine of the lowest elevation of a light that is followed.
+        const LOWEST: f64 = 0.3;
+        let rise = light.dot(self.up);
+        (rise > LOWEST).then(|| p - (p.dot(self.up) - self.height) / rise * light)
+    }
+}
+
 /// Everything needed to draw, in lattice coordinates.
 pub(crate) struct Film<'a> {
     pub volume: &'a Volume,
@@ -238,9 +248,7 @@ impl Film<'_> {
         let open = if all > 0.0 { open / all } else { 1.0 };
         let lit = key
             .iter()
-            .filter(|&&direction| {
-                normal.dot(direction) > 0.0 && !self.blocked(origin, direction)
-            })
+            .filter(|&&direction| normal.dot(direction) > 0.0 && !self.blocked(origin, direction))
             .count();
         Arriving {
             key: lit as f32 / key.len() as f32,
@@ -263,8 +271,10 @@ impl Film<'_> {
         )
     }
 
-    /// Opacity of the shadow on the ground: the part of its light that is missing.
+    /// Opacity of the shadow on the ground: the part of its light that is missing, less a little,
+    /// so that the shadow ends.
     fn shadow(&self, up: DVec3, [key, open]: [f64; 2]) -> f32 {
+        const UNNOTICED: f64 = 0.02;
         let direct = self.lights.key_strength * up.dot(self.lights.key).max(0.0);
         let ambient = self.lights.irradiance(up);
         let missing = if direct + ambient > 0.0 {
@@ -273,7 +283,7 @@ impl Film<'_> {
             0.0
         };
         let strength = self.ground.as_ref().map_or(0.0, |ground| ground.strength);
-        (strength * missing) as f32
+        (strength * (missing - UNNOTICED).max(0.0) / (1.0 - UNNOTICED)) as f32
     }
 }
 
@@ -304,9 +314,7 @@ impl Neighbourhood<'_> {
     /// The pixels at most `reach` away along each axis.
     fn within(&self, reach: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
         let [width, height] = self.film.size.map(|side| side as usize);
-        let range = |at: usize, side: usize| {
-            at.saturating_sub(reach)..=(at + reach).min(side - 1)
-        };
+        let range = |at: usize, side: usize| at.saturating_sub(reach)..=(at + reach).min(side - 1);
         let columns = range(self.x, width);
         range(self.y, height).flat_map(move |y| columns.clone().map(move |x| (x, y)))
     }
@@ -385,7 +393,10 @@ mod tests {
                 assert!((value - (k as f64 + 0.5) / 16.0).abs() < 1e-12);
             }
         }
-        let mut squares: Vec<[usize; 2]> = places.iter().map(|p| p.map(|c| (4.0 * c) as usize)).collect();
+        let mut squares: Vec<[usize; 2]> = places
+            .iter()
+            .map(|p| p.map(|c| (4.0 * c) as usize))
+            .collect();
         squares.sort_unstable();
         squares.dedup();
         assert_eq!(squares.len(), PATTERNS);

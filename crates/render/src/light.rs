@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use crate::Error;
-use crate::camera::View;
+use crate::camera::Orientation;
 use crate::colour::Rgb;
 use crate::error::{fraction, require};
 
@@ -90,10 +90,10 @@ impl Default for Lighting {
         Self {
             key_azimuth: -42.0,
             key_elevation: 38.0,
-            key: 0.72,
+            key: 0.70,
             softness: 9.0,
-            sky: 0.42,
-            fill: 0.16,
+            sky: 0.48,
+            fill: 0.2,
         }
     }
 }
@@ -121,7 +121,7 @@ pub(crate) struct Lights {
 }
 
 impl Lighting {
-    pub(crate) fn resolve(&self, view: &View, up: DVec3) -> Result<Lights, Error> {
+    pub(crate) fn resolve(&self, view: &Orientation) -> Result<Lights, Error> {
         for (name, value) in [
             ("azimuth of the key light", self.key_azimuth),
             ("elevation of the key light", self.key_elevation),
@@ -133,7 +133,9 @@ impl Lighting {
             ("strength of the sky", self.sky),
             ("strength of the fill light", self.fill),
         ] {
-            require(name, value, "between 0 and 100", |v| (0.0..=100.0).contains(&v))?;
+            require(name, value, "between 0 and 100", |v| {
+                (0.0..=100.0).contains(&v)
+            })?;
         }
         require("softness", self.softness, "between 0 and 45 degrees", |v| {
             (0.0..=45.0).contains(&v)
@@ -148,7 +150,7 @@ impl Lighting {
             key: direction(self.key_azimuth, self.key_elevation),
             key_strength: self.key,
             spread: self.softness.to_radians().tan(),
-            up,
+            up: view.up,
             sky: self.sky,
             fill: direction(side * FILL_AZIMUTH, FILL_ELEVATION),
             fill_strength: self.fill,
@@ -190,8 +192,7 @@ impl Lights {
         let gloss = self.key_strength * key * PI * material.highlight(normal, toward, self.key);
         std::array::from_fn(|c| {
             let albedo = f64::from(body[c]);
-            let light = direct * KEY_TINT[c]
-                + ambient * SKY_TINT[c] * interreflected(open, albedo);
+            let light = direct * KEY_TINT[c] + ambient * SKY_TINT[c] * interreflected(open, albedo);
             shoulder(albedo * light + gloss) as f32
         })
     }
@@ -269,7 +270,7 @@ mod tests {
                 v * material.highlight(DVec3::Z, toward, light)
             })
             .sum();
-        let reflected = 2.0 * PI * sum / f64::from(count) / light.z;
+        let reflected = 2.0 * PI * sum / count as f64 / light.z;
         assert!((0.02..0.2).contains(&reflected), "{reflected}");
     }
 }

@@ -58,12 +58,7 @@ mod tests {
 
     #[test]
     fn frames_are_orthonormal() {
-        for n in [
-            DVec3::Z,
-            -DVec3::Z,
-            DVec3::X,
-            DVec3::new(0.36, -0.48, -0.8),
-        ] {
+        for n in [DVec3::Z, -DVec3::Z, DVec3::X, DVec3::new(0.36, -0.48, -0.8)] {
             let [a, b] = frame(n);
             for (product, expected) in [
                 (a.dot(a), 1.0),

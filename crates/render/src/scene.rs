@@ -10,7 +10,7 @@ use crate::camera::{Axis, Bounds, Camera, Framing, Projection, Subject};
 use crate::colour::Rgb;
 use crate::error::{fraction, require};
 use crate::film::{Film, GroundPlane};
-use crate::light::{Lighting, Material};
+use crate::light::{Lighting, Lights, Material};
 use crate::picture::{Light, Picture, checked};
 use crate::tube::{Tube, Tubes};
 use crate::volume::{Lattice, Spline, Volume, padded};
@@ -233,7 +233,8 @@ impl<'a> Scene<'a> {
     }
 
     /// Lets the surface stand on an invisible ground that receives its shadow, of the given
-    /// strength from 0 (none) to 1 (full). The ground is seen from above only.
+    /// strength from 0 (none) to 1 (full). The ground is seen from above only, and
+    /// [`Framing::Surface`] makes room for the shadow.
     #[must_use]
     pub fn ground_shadow(mut self, strength: f64) -> Self {
         self.ground_shadow = Some(strength);
@@ -301,20 +302,37 @@ impl<'a> Scene<'a> {
         )
     }
 
+    /// Points that outline the surface and the tubes, in lattice coordinates.
+    fn outline(&self, tubes: &Tubes) -> Vec<DVec3> {
+        let mut points = self.volume.crossings.clone();
+        points.extend(tubes.extent());
+        points
+    }
+
     /// What the camera is fitted to, in lattice coordinates.
-    fn subject(&self, tubes: &Tubes) -> Result<Subject, Error> {
+    fn subject(
+        &self,
+        mut outline: Vec<DVec3>,
+        ground: Option<&GroundPlane>,
+        lights: &Lights,
+    ) -> Result<Subject, Error> {
         let within = |bounds: &Bounds| {
             let [low, high] = [bounds.low, bounds.high].map(|p| self.lattice.place(p).to_array());
             Subject::bounds(&Bounds { low, high })
         };
         match &self.camera.framing {
             Framing::Surface => {
-                let mut points = self.volume.crossings.clone();
-                points.extend(tubes.extent());
-                if points.is_empty() {
+                if outline.is_empty() {
                     return Err(Error::NothingToFrame);
                 }
-                Ok(Subject::Points(points))
+                if let Some(ground) = ground {
+                    let shadow: Vec<DVec3> = outline
+                        .iter()
+                        .filter_map(|&p| ground.shadow_of(p, lights.key))
+                        .collect();
+                    outline.extend(shadow);
+                }
+                Ok(Subject::Points(outline))
             }
             Framing::Domain => within(&self.domain),
             Framing::Within(bounds) => within(bounds),
@@ -333,21 +351,23 @@ impl<'a> Scene<'a> {
         let size = checked(size.into().0)?;
         self.material.check()?;
         let tubes = Tubes::new(&self.tubes, &self.lattice)?;
-        let view = self.camera.view(&self.subject(&tubes)?, size)?;
-        let up = self.camera.up.vector();
+        let orientation = self.camera.orientation()?;
+        let lights = self.lighting.resolve(&orientation)?;
+        let outline = self.outline(&tubes);
+        let up = orientation.up;
         let ground = match self.ground_shadow {
             None => None,
-            Some(strength) => {
-                let strength = fraction("strength of the ground shadow", strength)?;
-                let points = self.volume.crossings.iter().copied().chain(tubes.extent());
-                let height = points.map(|p| p.dot(up)).fold(f64::INFINITY, f64::min);
-                Some(GroundPlane {
-                    up,
-                    height,
-                    strength,
-                })
-            }
+            Some(strength) => Some(GroundPlane {
+                up,
+                height: outline
+                    .iter()
+                    .map(|p| p.dot(up))
+                    .fold(f64::INFINITY, f64::min),
+                strength: fraction("strength of the ground shadow", strength)?,
+            }),
         };
+        let subject = self.subject(outline, ground.as_ref(), &lights)?;
+        let view = self.camera.view(&subject, size)?;
         // The last highlight that holds a point wins; colour 0 is that of the material.
         let region = |p: DVec3| {
             let holds = |h: &Highlight<'_>| (h.region)(p) < 0.0;
@@ -357,7 +377,7 @@ impl<'a> Scene<'a> {
         let film = Film {
             volume: &self.volume,
             view,
-            lights: self.lighting.resolve(&view, up)?,
+            lights,
             material: self.material,
             region: &region,
             surface_colours: std::iter::once(self.material.colour)

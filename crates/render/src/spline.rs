@@ -29,28 +29,20 @@ fn weights(t: f32) -> ([f32; 4], [f32; 4]) {
         2.0 / 3.0 - 0.5 * s2 * (2.0 - s),
         t2 * t / 6.0,
     ];
-    let slope = [
-        -0.5 * s2,
-        1.5 * t2 - 2.0 * t,
-        2.0 * s - 1.5 * s2,
-        0.5 * t2,
-    ];
+    let slope = [-0.5 * s2, 1.5 * t2 - 2.0 * t, 2.0 * s - 1.5 * s2, 0.5 * t2];
     (value, slope)
 }
 
 /// The value of the spline in the cell `cell`, at `local` in `[0, 1]^3` from its lower corner.
-pub(crate) fn value(
-    coefficients: &[f32],
-    size: usize,
-    cell: [usize; 3],
-    local: [f32; 3],
-) -> f32 {
+pub(crate) fn value(coefficients: &[f32], size: usize, cell: [usize; 3], local: [f32; 3]) -> f32 {
     let [wx, wy, wz] = local.map(|t| weights(t).0);
     let mut sum = 0.0;
     for (i, a) in wx.into_iter().enumerate() {
         for (j, b) in wy.into_iter().enumerate() {
             let start = ((cell[0] + i - 1) * size + cell[1] + j - 1) * size + cell[2] - 1;
-            let c: &[f32; 4] = coefficients[start..].first_chunk().expect("inside the lattice");
+            let c: &[f32; 4] = coefficients[start..]
+                .first_chunk()
+                .expect("inside the lattice");
             sum += a * b * (c[0] * wz[0] + c[1] * wz[1] + c[2] * wz[2] + c[3] * wz[3]);
         }
     }
@@ -69,7 +61,9 @@ pub(crate) fn gradient(
     for i in 0..4 {
         for j in 0..4 {
             let start = ((cell[0] + i - 1) * size + cell[1] + j - 1) * size + cell[2] - 1;
-            let c: &[f32; 4] = coefficients[start..].first_chunk().expect("inside the lattice");
+            let c: &[f32; 4] = coefficients[start..]
+                .first_chunk()
+                .expect("inside the lattice");
             let along = c[0] * wz[0] + c[1] * wz[1] + c[2] * wz[2] + c[3] * wz[3];
             let slope = c[0] * dz[0] + c[1] * dz[1] + c[2] * dz[2] + c[3] * dz[3];
             sum[0] += dx[i] * wy[j] * along;
@@ -107,7 +101,10 @@ mod tests {
             assert!((there - nodal[index]).abs() < 1e-6, "{cell:?}");
             // The leading error is a sixth of the Laplacian, here at most 0.19.
             let error = there - smooth(at);
-            assert!((1e-4..0.19 / 6.0).contains(&error.abs()), "{cell:?}: {error}");
+            assert!(
+                (1e-4..0.19 / 6.0).contains(&error.abs()),
+                "{cell:?}: {error}"
+            );
         }
     }
 

@@ -49,7 +49,13 @@ impl Tube {
     /// The twelve edges of a box.
     pub fn edges_of_box(low: [f64; 3], high: [f64; 3], radius: f64) -> Vec<Self> {
         let corner = |k: usize| -> [f64; 3] {
-            std::array::from_fn(|axis| if k >> axis & 1 == 1 { high[axis] } else { low[axis] })
+            std::array::from_fn(|axis| {
+                if k >> axis & 1 == 1 {
+                    high[axis]
+                } else {
+                    low[axis]
+                }
+            })
         };
         let ends = (0..8_usize).flat_map(|k| (0..3).map(move |axis| (k, k | 1 << axis)));
         ends.filter(|(a, b)| a != b)
@@ -134,8 +140,8 @@ impl Segment {
         // The infinite cylinder, by a quadratic equation.
         let qa = length2 - along_ray * along_ray;
         let qb = length2 * from.dot(ray.direction) - along_from * along_ray;
-        let qc = length2 * (from.length_squared() - self.radius * self.radius)
-            - along_from * along_from;
+        let qc =
+            length2 * (from.length_squared() - self.radius * self.radius) - along_from * along_from;
         let discriminant = qb * qb - qa * qc;
         if discriminant < 0.0 {
             return None;
@@ -168,7 +174,9 @@ impl Segment {
         let fraction = ((p - a).dot(axis) / axis.length_squared()).clamp(0.0, 1.0);
         let normal = (p - a - fraction * axis) / self.radius;
         if fraction > 0.0 && fraction < 1.0 {
-            let tangent = self.tangents[0].lerp(self.tangents[1], fraction).normalize();
+            let tangent = self.tangents[0]
+                .lerp(self.tangents[1], fraction)
+                .normalize();
             (normal - normal.dot(tangent) * tangent).normalize()
         } else {
             normal.normalize()
@@ -305,7 +313,11 @@ impl Tubes {
         let mut hit = false;
         self.walk(ray, f64::INFINITY, |segment| {
             hit = hit || segment.intersect(ray).is_some();
-            if hit { f64::NEG_INFINITY } else { f64::INFINITY }
+            if hit {
+                f64::NEG_INFINITY
+            } else {
+                f64::INFINITY
+            }
         });
         hit
     }
