@@ -1,0 +1,106 @@
+//! Draws a picture of every kind: `cargo run -p render --example gallery -- <folder> [<cells>]`.
+
+use std::error::Error;
+use std::f64::consts::TAU;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use geometry::shapes::{Ball, Cross, RoundedBox, Torus};
+use geometry::{Field, Grid, SignedDistance, SignedDistanceExt, phase_field};
+use render::{Axis, Background, Framing, Picture, Rgb, Scene, Tube};
+
+/// A union of balls of several sizes about the middle of the box.
+fn knobbly() -> impl SignedDistance<3> {
+    let balls: Vec<([f64; 3], f64)> = (0..14)
+        .map(|k| {
+            let k = f64::from(k);
+            let (z, angle) = (1.0 - (2.0 * k + 1.0) / 14.0, 2.4 * k);
+            let ring = (1.0 - z * z).sqrt();
+            let reach = 0.2 + 0.03 * (1.7 * k).sin();
+            let centre = [ring * angle.cos(), ring * angle.sin(), z].map(|c| 0.5 + reach * c);
+            (centre, 0.12 + 0.035 * (2.3 * k).cos())
+        })
+        .chain([([0.5; 3], 0.19)])
+        .collect();
+    move |x: [f64; 3]| {
+        let distance = |&(centre, radius): &([f64; 3], f64)| {
+            (0..3)
+                .map(|i| (x[i] - centre[i]).powi(2))
+                .sum::<f64>()
+                .sqrt()
+                - radius
+        };
+        balls.iter().map(distance).fold(f64::INFINITY, f64::min)
+    }
+}
+
+fn circle(radius: f64, height: f64) -> Vec<[f64; 3]> {
+    (0..120)
+        .map(|k| TAU * f64::from(k) / 120.0)
+        .map(|a| [0.5 + radius * a.cos(), 0.5 + radius * a.sin(), 0.5 + height])
+        .collect()
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let folder = PathBuf::from(arguments.next().unwrap_or_else(|| "gallery".to_owned()));
+    let cells: usize = arguments.next().map_or(Ok(64), |n| n.parse())?;
+    std::fs::create_dir_all(&folder)?;
+    let grid = Grid::<3>::new(cells, 1.0)?;
+    let eps = 2.0 * grid.spacing();
+    let middle = [0.5; 3];
+    let field = |shape: &dyn SignedDistance<3>| -> Result<Field<3>, geometry::Error> {
+        phase_field(grid, shape, eps)
+    };
+    let draw =
+        |name: &str, scene: &Scene<'_>, size: (u32, u32)| -> Result<Picture, Box<dyn Error>> {
+            let start = Instant::now();
+            let picture = scene.render(size)?;
+            picture.write_png(folder.join(format!("{name}.png")))?;
+            println!("{name}: {:.2} s", start.elapsed().as_secs_f64());
+            Ok(picture)
+        };
+    let square = (800, 800);
+
+    let ball = field(&Ball::new(middle, 0.33)?)?;
+    draw("ball", &Scene::new(&ball, eps)?.ground_shadow(0.5), square)?;
+
+    let torus = field(&Torus::clifford(0.36)?.translated(middle))?;
+    let scene = Scene::new(&torus, eps)?.elevation(38.0);
+    draw("torus", &scene, square)?;
+    let scene = scene
+        .colour(Rgb::SKY)
+        .tube(Tube::new(circle(0.36, 0.0), 0.005).closed())
+        .tube(
+            Tube::new(circle(0.211, 0.149), 0.005)
+                .closed()
+                .with_colour(Rgb::VERMILLION),
+        );
+    draw("torus_circles", &scene, square)?;
+    scene
+        .turntable(8, 240, Duration::from_millis(80))?
+        .write_apng(folder.join("turntable.png"))?;
+
+    let cube = field(&RoundedBox::new([0.26; 3], 0.06)?.translated(middle))?;
+    draw("cube", &Scene::new(&cube, eps)?.ground_shadow(0.5), square)?;
+    let boxed = Scene::new(&cube, eps)?
+        .colour(Rgb::SKY)
+        .framing(Framing::Domain)
+        .tubes(Tube::edges_of_box([0.0; 3], [1.0; 3], 0.004))
+        .highlight(Ball::new([0.76, 0.6, 0.7], 0.17)?, Rgb::VERMILLION);
+    draw("boxed", &boxed, square)?;
+
+    let start = Instant::now();
+    let union = field(&knobbly())?;
+    let scene = Scene::new(&union, eps)?;
+    println!("field and scene: {:.2} s", start.elapsed().as_secs_f64());
+    draw("knobbly", &scene, square)?;
+    let cross = field(&Cross::new(0.36, 0.12)?.translated(middle))?;
+    let scene = Scene::new(&cross, eps)?
+        .up(Axis::Y)
+        .orthographic()
+        .background(Background::Transparent)
+        .ground_shadow(0.6);
+    draw("cross", &scene, (960, 640))?;
+    Ok(())
+}

@@ -1,0 +1,100 @@
+//! Everything that can go wrong in this crate.
+
+/// Errors of scenes and pictures, each with the numbers needed to act on it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A field, grid or file was refused by [`geometry`].
+    #[error(transparent)]
+    Geometry(#[from] geometry::Error),
+    /// The PNG encoder failed.
+    #[error("the picture could not be encoded as PNG")]
+    Encode(#[from] png::EncodingError),
+    /// A number is outside its allowed range.
+    #[error("{name} is {value}, but must be {requirement}")]
+    Parameter {
+        /// What the number is.
+        name: &'static str,
+        /// The number.
+        value: f64,
+        /// The condition it violates.
+        requirement: &'static str,
+    },
+    /// The camera is to be fitted to a surface that is not there.
+    #[error(
+        "the field has no zero level set and there is no tube, so nothing can be framed; use \
+         Framing::Domain or Framing::Within for a picture that may be empty"
+    )]
+    NothingToFrame,
+    /// A tube with too few points.
+    #[error("tube {index} has {points} points; it needs at least 2")]
+    TubePoints {
+        /// Which tube, from 0.
+        index: usize,
+        /// Its points.
+        points: usize,
+    },
+    /// A picture without pixels, or with more than can be meant.
+    #[error("a picture of {width} x {height} pixels cannot be drawn; use 1 to {limit} a side")]
+    PictureSize {
+        /// Pixels in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Largest allowed side.
+        limit: u32,
+    },
+    /// The number of pixels is not that of the picture.
+    #[error("{width} x {height} pixels were announced, but {actual} given")]
+    PixelCount {
+        /// Pixels in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Pixels given.
+        actual: usize,
+    },
+    /// An animation without pictures.
+    #[error("an animation needs at least one picture")]
+    NoFrames,
+    /// The pictures of an animation differ in size.
+    #[error(
+        "picture {index} of the animation has {width} x {height} pixels, but the first has \
+         {first_width} x {first_height}"
+    )]
+    FrameSize {
+        /// Which picture, from 0.
+        index: usize,
+        /// Its pixels in a row.
+        width: u32,
+        /// Its rows.
+        height: u32,
+        /// Pixels in a row of the first.
+        first_width: u32,
+        /// Rows of the first.
+        first_height: u32,
+    },
+}
+
+/// Accepts finite numbers for which `condition` holds.
+pub(crate) fn require(
+    name: &'static str,
+    value: f64,
+    requirement: &'static str,
+    condition: impl FnOnce(f64) -> bool,
+) -> Result<f64, Error> {
+    if value.is_finite() && condition(value) {
+        Ok(value)
+    } else {
+        Err(Error::Parameter {
+            name,
+            value,
+            requirement,
+        })
+    }
+}
+
+/// Accepts numbers from zero to one.
+pub(crate) fn fraction(name: &'static str, value: f64) -> Result<f64, Error> {
+    require(name, value, "between 0 and 1", |v| (0.0..=1.0).contains(&v))
+}
