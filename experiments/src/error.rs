@@ -41,6 +41,12 @@ pub enum Error {
     /// From the geometry.
     #[error(transparent)]
     Geometry(#[from] geometry::Error),
+    /// From meshes.
+    #[error(transparent)]
+    Surfaces(#[from] surfaces::Error),
+    /// From pictures of surfaces.
+    #[error(transparent)]
+    Render(#[from] render::Error),
     /// From figures, tables and output files.
     #[error(transparent)]
     Report(#[from] report::Error),

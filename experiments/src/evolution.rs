@@ -237,7 +237,9 @@ impl<const D: usize> Evolution<D> {
             Some(state) => state,
             None => {
                 let field = initial(grid, self.params.eps)?;
-                stored.measures.push(Measures::of(&field, self.centre, self.params.eps)?);
+                stored
+                    .measures
+                    .push(Measures::of(&field, self.centre, self.params.eps)?);
                 trajectory.keep(0, &field)?;
                 FlowState {
                     current: field,
@@ -303,7 +305,9 @@ impl<const D: usize> Evolution<D> {
             stored.records.push(record);
             let step = flow.steps();
             let field = flow.field()?;
-            stored.measures.push(Measures::of(&field, self.centre, self.params.eps)?);
+            stored
+                .measures
+                .push(Measures::of(&field, self.centre, self.params.eps)?);
             if self.samples(step) {
                 trajectory.keep(step, &field)?;
             }
@@ -334,7 +338,9 @@ impl<const D: usize> Evolution<D> {
             flow.advance().map_err(|error| self.failed(error.into()))?;
             let field = flow.field().map_err(|error| self.failed(error.into()))?;
             stored.seconds += clock.elapsed().as_secs_f64();
-            stored.measures.push(Measures::of(&field, self.centre, self.params.eps)?);
+            stored
+                .measures
+                .push(Measures::of(&field, self.centre, self.params.eps)?);
             if self.samples(step) {
                 trajectory.keep(step, &field)?;
             }

@@ -22,17 +22,20 @@
 //! - Results are collected in a fixed order: the same input gives the same bytes, wall times aside.
 
 pub mod circles;
+pub mod clifford;
 pub mod comparison;
 mod error;
 pub mod evolution;
 pub mod harness;
 pub mod memory;
+pub mod meshes;
 pub mod method;
 pub mod networks;
 pub mod options;
 pub mod partial;
 pub mod products;
 pub mod quality;
+pub mod surfaces;
 pub mod training;
 
 pub use error::Error;

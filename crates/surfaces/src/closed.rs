@@ -232,7 +232,10 @@ fn reverse(mesh: &mut TriangleMesh) {
 }
 
 fn area(mesh: &TriangleMesh) -> f64 {
-    let twice = mesh.faces.iter().map(|&f| scaled_normal(corners(mesh, f)).length());
+    let twice = mesh
+        .faces
+        .iter()
+        .map(|&f| scaled_normal(corners(mesh, f)).length());
     0.5 * twice.sum::<f64>()
 }
 
@@ -284,9 +287,10 @@ fn check_nesting(mesh: &TriangleMesh, component: &[u32], components: usize) -> R
         let others = parts.iter().enumerate();
         let others = others.filter(|(k, other)| *k != this && other.bounds.contains(x));
         let angle = others.map(|(_, other)| {
-            let seen = other.faces.iter().map(|&face| {
-                solid_angle(corners(mesh, face).map(|v| v - Vector::from_array(x)))
-            });
+            let seen = other
+                .faces
+                .iter()
+                .map(|&face| solid_angle(corners(mesh, face).map(|v| v - Vector::from_array(x))));
             seen.sum::<f64>()
         });
         let winding = angle.sum::<f64>() / (4.0 * std::f64::consts::PI);

@@ -46,7 +46,10 @@ impl MeshDistance {
         let merged = merge_coincident(&mesh.vertices);
         let vertices = merged.first.iter().map(|&v| mesh.vertices[v]);
         let vertices = vertices.map(|x| Vector::from_array(x) * scale).collect();
-        let faces = mesh.faces.iter().map(|f| f.map(|v| merged.index[v as usize]));
+        let faces = mesh
+            .faces
+            .iter()
+            .map(|f| f.map(|v| merged.index[v as usize]));
         let mesh = TriMesh::with_flags(vertices, faces.collect(), TriMeshFlags::ORIENTED)
             .expect("a closed mesh has faces");
         Ok(Self { mesh, scale })

@@ -65,7 +65,11 @@ pub fn isosurface(s: &Field<3>) -> Result<TriangleMesh, Error> {
         let corner = |bits: usize| -> Node {
             std::array::from_fn(|axis| {
                 let odd = cell[axis] + 1 - cell[axis] % 2;
-                if bits >> axis & 1 == 1 { odd } else { even[axis] }
+                if bits >> axis & 1 == 1 {
+                    odd
+                } else {
+                    even[axis]
+                }
             })
         };
         let reflected = cell.iter().map(|c| c % 2).sum::<usize>() % 2 == 1;
@@ -200,7 +204,10 @@ impl<'a> Lattice<'a> {
                 let curvature = |left: Option<f64>, middle: f64, right: Option<f64>| {
                     left.zip(right).map_or(0.0, |(l, r)| l - 2.0 * middle + r)
                 };
-                let bend = smaller(curvature(at(-1), va, Some(vb)), curvature(Some(va), vb, at(2)));
+                let bend = smaller(
+                    curvature(at(-1), va, Some(vb)),
+                    curvature(Some(va), vb, at(2)),
+                );
                 root(va, vb, bend)
             }
             // A cap at the border of the grid.
@@ -214,7 +221,9 @@ impl<'a> Lattice<'a> {
             _ => Vector::ZERO,
         };
         let outwards = if self.is_inside(a) { xb - xa } else { xa - xb };
-        let normal = gradient.try_normalize().unwrap_or_else(|| outwards.normalize());
+        let normal = gradient
+            .try_normalize()
+            .unwrap_or_else(|| outwards.normalize());
         (xa.lerp(xb, part), normal)
     }
 }
@@ -295,8 +304,7 @@ impl Surface<'_> {
                 // Inversions of the order (a, b, c, d).
                 let outwards = positive == ((a + b - 1) % 2 == 0);
                 let quadrilateral = [[a, c], [a, d], [b, d], [b, c]];
-                let [p, q, r, s] =
-                    quadrilateral.map(|edge| self.vertex(edge.map(|c| corners[c])));
+                let [p, q, r, s] = quadrilateral.map(|edge| self.vertex(edge.map(|c| corners[c])));
                 self.push([p, q, r], outwards);
                 self.push([p, r, s], outwards);
             }
@@ -305,7 +313,8 @@ impl Surface<'_> {
     }
 
     fn push(&mut self, [a, b, c]: [u32; 3], outwards: bool) {
-        self.faces.push(if outwards { [a, b, c] } else { [a, c, b] });
+        self.faces
+            .push(if outwards { [a, b, c] } else { [a, c, b] });
     }
 
     fn vertex(&mut self, [p, q]: [Node; 2]) -> u32 {

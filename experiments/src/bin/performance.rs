@@ -9,7 +9,7 @@ use experiments::comparison::cross;
 use experiments::networks::{NetworkOptions, convergence_ratios};
 use experiments::options::RunOptions;
 use experiments::products::{Candidates, ProductTimes, median};
-use experiments::{Error, harness};
+use experiments::{Error, harness, memory};
 use geometry::shapes::{Ball, Capsule, Cuboid};
 use geometry::{Field, Grid, SignedDistanceExt, phase_field};
 use indicatif::ProgressBar;
@@ -256,14 +256,14 @@ impl Case {
             mcf_step: self.mcf_step,
             newton: NewtonParams::default(),
         };
-        forget_peak_memory();
+        memory::forget_peak();
         let mut flow = WillmoreFlow::with_network(network, initial, params, device)?;
         let mut records: Vec<StepRecord> = Vec::new();
         for _ in 0..self.steps {
             records.push(flow.advance(self.tau)?);
             bar.inc(1);
         }
-        let peak_mib = peak_memory_mib();
+        let peak_mib = memory::peak_mib();
         let field = flow.field()?;
         drop(flow);
         let products = Candidates::new(network, &field, device)?.measure(turns);
@@ -293,20 +293,6 @@ impl Case {
             products,
         })
     }
-}
-
-/// Starts a new measurement of the largest resident memory, where the system can do that.
-fn forget_peak_memory() {
-    // Without that the peak is the one since the start of the program: an upper bound.
-    let _ = std::fs::write("/proc/self/clear_refs", "5");
-}
-
-/// `VmHWM` of this process.
-fn peak_memory_mib() -> Option<f64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
-    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kib / 1024.0)
 }
 
 fn step_table(all: &[Measurement]) -> Result<Table, Error> {

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::process::ExitCode;
-use std::time::Instant;
 
 use clap::Parser;
 use experiments::circles::{EPS, STEP};
@@ -20,14 +19,14 @@ use report::{
     Axis, Column, Figure, Format, LineChart, LineStyle, Marker, OutputDir, Series, Summary, Table,
 };
 use serde::Serialize;
-use solver::{FlowParams, Method as Newton, NewtonParams, WillmoreFlow};
+use solver::{FlowParams, Method as Newton, NewtonParams, StepRecord, WillmoreFlow};
 
 const PROGRAM: &str = "timing_tables";
 /// Time steps of the table, until `t = 2^-7`.
 const STEPS: usize = 128;
 
 /// Wall time of 128 Willmore steps of the cross (eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7) by the hybrid scheme and by
-/// nested finite elements, one after the other on this machine, with the numbers of Newton steps, Hessian-vector products and
+/// nested finite elements, taking turns step by step on this machine, with the numbers of Newton steps, Hessian-vector products and
 /// inner iterations. Rows that exceed the budget are extrapolated from the steps done, and say so.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
@@ -170,16 +169,20 @@ fn program(options: &Options) -> Result<(), Error> {
     let progress = options.run.progress();
     let mut timings = Vec::new();
     for (&n, network) in cells.iter().zip(&networks) {
-        for variant in Variant::ALL {
-            let title = format!("{}, n = {n}", variant.label());
-            let bar = progress.bar(title.clone(), STEPS as u64);
-            let timing = manifest.phase(title, || {
-                let initial = initial(n, quick)?;
-                measure(variant, &initial, network, &device, budget, &bar)
-            })?;
-            bar.finish();
-            timings.push(timing);
+        let initial = initial(n, quick)?;
+        let mut contenders = Variant::ALL
+            .into_iter()
+            .map(|variant| {
+                let bar = progress.bar(format!("{}, n = {n}", variant.label()), STEPS as u64);
+                Contender::new(variant, &initial, network, &device, bar)
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let measured =
+            manifest.phase(format!("n = {n}"), || measure(&mut contenders, n, budget))?;
+        for contender in &contenders {
+            contender.bar.finish();
         }
+        timings.extend(measured);
     }
     let table = table(&timings)?;
     table.write(&output, "timing")?;
@@ -212,83 +215,122 @@ fn initial(n: usize, quick: bool) -> Result<Field<2>, Error> {
     cross(Grid::per_unit(n, 2.0)?, EPS)
 }
 
-fn measure(
+/// A method at work.
+struct Contender {
     variant: Variant,
-    initial: &Field<2>,
-    network: &Network,
-    device: &ComputeDevice,
-    budget: f64,
-    bar: &ProgressBar,
-) -> Result<Timing, Error> {
-    /// The first step costs more than the others: extrapolation needs some of those.
-    const LEAST_STEPS: usize = 3;
-    let grid = *initial.grid();
-    let newton = match variant {
-        Variant::HybridPlain => Newton::Paper,
-        _ => Newton::Preconditioned,
-    };
-    let params = FlowParams {
-        eps: EPS,
-        mcf_step: STEP,
-        newton: NewtonParams {
-            method: newton,
-            ..NewtonParams::default()
-        },
-    };
-    let elements = match variant {
-        Variant::Hybrid | Variant::HybridPlain => None,
-        Variant::FeImplicit => Some(FiniteElementStep::implicit(&grid, EPS, STEP)?),
-        Variant::FeImplicitDirect => Some(FiniteElementStep::implicit_with(
-            &grid,
-            EPS,
-            STEP,
-            LinearSolver::Direct,
-        )?),
-        Variant::FeSemi => Some(FiniteElementStep::semi_implicit(&grid, EPS, STEP)?),
-    };
-    let mut flow = match &elements {
-        Some(step) => WillmoreFlow::new(step.clone(), initial, params, device)?,
-        None => WillmoreFlow::with_network(network, initial, params, device)?,
-    };
-    let mut records = Vec::new();
-    let mut failure = None;
-    let clock = Instant::now();
-    while records.len() < STEPS
-        && (records.len() < LEAST_STEPS || clock.elapsed().as_secs_f64() < budget)
-    {
-        match flow.advance(STEP) {
-            Ok(record) => records.push(record),
+    flow: WillmoreFlow<2>,
+    elements: Option<FiniteElementStep<2>>,
+    records: Vec<StepRecord>,
+    spent: f64,
+    failure: Option<String>,
+    bar: ProgressBar,
+}
+
+impl Contender {
+    fn new(
+        variant: Variant,
+        initial: &Field<2>,
+        network: &Network,
+        device: &ComputeDevice,
+        bar: ProgressBar,
+    ) -> Result<Self, Error> {
+        let grid = initial.grid();
+        let method = match variant {
+            Variant::HybridPlain => Newton::Paper,
+            _ => Newton::Preconditioned,
+        };
+        let params = FlowParams {
+            eps: EPS,
+            mcf_step: STEP,
+            newton: NewtonParams {
+                method,
+                ..NewtonParams::default()
+            },
+        };
+        let elements = match variant {
+            Variant::Hybrid | Variant::HybridPlain => None,
+            Variant::FeImplicit => Some(FiniteElementStep::implicit(grid, EPS, STEP)?),
+            Variant::FeImplicitDirect => Some(FiniteElementStep::implicit_with(
+                grid,
+                EPS,
+                STEP,
+                LinearSolver::Direct,
+            )?),
+            Variant::FeSemi => Some(FiniteElementStep::semi_implicit(grid, EPS, STEP)?),
+        };
+        let flow = match &elements {
+            Some(step) => WillmoreFlow::new(step.clone(), initial, params, device)?,
+            None => WillmoreFlow::with_network(network, initial, params, device)?,
+        };
+        Ok(Self {
+            variant,
+            flow,
+            elements,
+            records: Vec::new(),
+            spent: 0.0,
+            failure: None,
+            bar,
+        })
+    }
+
+    /// Whether there is a next step within the budget.
+    fn goes_on(&self, budget: f64) -> bool {
+        /// The first step costs more than the others: extrapolation needs some of those.
+        const LEAST_STEPS: usize = 3;
+        let done = self.records.len();
+        self.failure.is_none() && done < STEPS && (done < LEAST_STEPS || self.spent < budget)
+    }
+
+    fn advance(&mut self) -> Result<(), Error> {
+        match self.flow.advance(STEP) {
+            Ok(record) => {
+                self.spent += record.seconds;
+                self.records.push(record);
+            }
             Err(error @ solver::Error::NotConverged { .. }) => {
-                failure = Some(error.to_string());
-                break;
+                self.failure = Some(error.to_string());
             }
             Err(error) => return Err(error.into()),
         }
-        bar.inc(1);
+        self.bar.inc(1);
+        Ok(())
     }
-    let inner: Statistics = elements.map(|step| step.statistics()).unwrap_or_default();
-    let measured_seconds: f64 = records.iter().map(|r| r.seconds).sum();
-    let count = records.len();
-    let per_step = |total: usize| total as f64 / count.max(1) as f64;
-    let step_seconds: Vec<f64> = records.iter().map(|r| r.seconds).collect();
-    // Steps become cheaper as corners smooth out: the later ones say most about what is to come.
-    let later = &step_seconds[count / 2..];
-    let mean = later.iter().sum::<f64>() / later.len().max(1) as f64;
-    let seconds = measured_seconds + mean * (STEPS - count) as f64;
-    Ok(Timing {
-        variant,
-        n: (1.0 / grid.spacing()).round() as usize,
-        measured_steps: count,
-        measured_seconds,
-        step_seconds,
-        seconds,
-        extrapolated: count < STEPS,
-        newton_per_step: per_step(records.iter().map(|r| r.newton.newton).sum()),
-        hvp_per_step: per_step(records.iter().map(|r| r.newton.hvp).sum()),
-        inner_cg_per_step: per_step(inner.cg),
-        factorizations_per_step: per_step(inner.factorizations),
-        failure,
-    })
+
+    fn timing(&self, n: usize) -> Timing {
+        let records = &self.records;
+        let inner: Statistics =
+            (self.elements.as_ref()).map_or_else(Statistics::default, |step| step.statistics());
+        let count = records.len();
+        let per_step = |total: usize| total as f64 / count.max(1) as f64;
+        let step_seconds: Vec<f64> = records.iter().map(|r| r.seconds).collect();
+        // Steps become cheaper as corners smooth out: the later ones say most about what is to come.
+        let later = &step_seconds[count / 2..];
+        let mean = later.iter().sum::<f64>() / later.len().max(1) as f64;
+        Timing {
+            variant: self.variant,
+            n,
+            measured_steps: count,
+            measured_seconds: self.spent,
+            seconds: self.spent + mean * (STEPS - count) as f64,
+            step_seconds,
+            extrapolated: count < STEPS,
+            newton_per_step: per_step(records.iter().map(|r| r.newton.newton).sum()),
+            hvp_per_step: per_step(records.iter().map(|r| r.newton.hvp).sum()),
+            inner_cg_per_step: per_step(inner.cg),
+            factorizations_per_step: per_step(inner.factorizations),
+            failure: self.failure.clone(),
+        }
+    }
+}
+
+/// All methods take turns, step by step, so that whatever else the machine does burdens them alike.
+fn measure(contenders: &mut [Contender], n: usize, budget: f64) -> Result<Vec<Timing>, Error> {
+    while contenders.iter().any(|c| c.goes_on(budget)) {
+        for contender in contenders.iter_mut().filter(|c| c.goes_on(budget)) {
+            contender.advance()?;
+        }
+    }
+    Ok(contenders.iter().map(|c| c.timing(n)).collect())
 }
 
 /// Time of the measured steps over that of the same steps by the hybrid scheme.

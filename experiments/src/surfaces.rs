@@ -1,0 +1,376 @@
+//! Willmore flow of surfaces: what the programs in three dimensions share.
+
+use std::time::Instant;
+
+use fem::FiniteElementStep;
+use geometry::{Field, Grid};
+use model::{Network, Ratios};
+use operators::ComputeDevice;
+use render::{Axis, Bounds, Framing, Quality, Scene, Tube};
+use report::{Column, Figure, Format, Manifest, OutputDir, Progress, Summary, Table};
+use serde::Serialize;
+use solver::{FlowParams, NewtonParams};
+
+use crate::Error;
+use crate::circles::Flow;
+use crate::evolution::{Evolution, TimeSteps, Trajectory};
+use crate::method::Method;
+use crate::options::RunOptions;
+
+/// Interface width of surfaces, in cells.
+const EPS_OVER_H: f64 = 2.0;
+/// Kernel width of the network for surfaces.
+const WIDTH: usize = 17;
+
+/// The scales of the paper for surfaces at resolution `n`: `eps = 2h`, `tautilde = h^2`.
+pub fn scales(n: usize) -> FlowParams {
+    let h = 1.0 / n as f64;
+    FlowParams {
+        eps: EPS_OVER_H * h,
+        mcf_step: h * h,
+        newton: NewtonParams::default(),
+    }
+}
+
+/// The ratios of the network for surfaces.
+pub fn ratios() -> Ratios {
+    Ratios {
+        dimension: 3,
+        width: WIDTH,
+        eps_over_h: EPS_OVER_H,
+        step_over_h2: 1.0,
+    }
+}
+
+/// The unit box `[0, 1]^3` with nodes `i/n`.
+///
+/// # Errors
+/// [`Error::Geometry`] for fewer than two cells.
+pub fn unit_box(n: usize) -> Result<Grid<3>, Error> {
+    Ok(Grid::new(n, 1.0)?)
+}
+
+/// From where a surface is looked at.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    /// The axis that points up.
+    pub up: Axis,
+    /// Degrees about it.
+    pub azimuth: f64,
+    /// Degrees above the horizon.
+    pub elevation: f64,
+}
+
+/// A surface that flows.
+pub struct SurfaceRun<'a> {
+    /// Prefix of its metrics and name of its folder.
+    pub key: String,
+    /// Name in titles and tables.
+    pub title: String,
+    /// The method.
+    pub method: Method,
+    /// Cells per unit length.
+    pub n: usize,
+    /// Sizes of the time steps.
+    pub tau: TimeSteps,
+    /// Their number.
+    pub steps: usize,
+    /// Steps to be shown, and with them the Willmore energy that the paper reports.
+    pub shown: Vec<(usize, Option<f64>)>,
+    /// The phase field at the beginning.
+    pub initial: &'a Field<3>,
+    /// What identifies it in stored runs.
+    pub identity: String,
+    /// Direction of view.
+    pub view: View,
+}
+
+/// A shown step.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Snapshot {
+    /// Its number.
+    pub step: usize,
+    /// Its time.
+    pub time: f64,
+    /// The Willmore energy `w` of the phase field, with the implicit finite-element step and the mass-matrix norm.
+    pub w: f64,
+    /// What the paper reports.
+    pub paper: Option<f64>,
+    /// Perimeter `P_eps`, the area of the surface.
+    pub perimeter: f64,
+    /// Volume inside.
+    pub volume: f64,
+}
+
+/// A surface that has flowed.
+pub struct Finished<'a> {
+    /// What was asked for.
+    pub run: SurfaceRun<'a>,
+    /// All steps.
+    pub trajectory: Trajectory<3>,
+    /// The shown ones.
+    pub snapshots: Vec<Snapshot>,
+}
+
+/// What running surfaces needs.
+pub struct Workshop<'a> {
+    /// Common options.
+    pub options: &'a RunOptions,
+    /// Where tensors live.
+    pub device: &'a ComputeDevice,
+    /// The learned operator.
+    pub network: &'a Network,
+    /// Where results go.
+    pub output: &'a OutputDir,
+    /// Progress bars.
+    pub progress: &'a Progress,
+}
+
+#[derive(Serialize)]
+struct StepRow<'a> {
+    surface: &'a str,
+    method: Method,
+    step: usize,
+    time: f64,
+    tau: f64,
+    energy_before: f64,
+    energy: f64,
+    willmore_energy: f64,
+    perimeter: f64,
+    volume: f64,
+    exit: solver::Exit,
+    newton: usize,
+    hvp: usize,
+    negative_curvature: usize,
+    seconds: f64,
+}
+
+impl Workshop<'_> {
+    /// Runs, continues or looks up a surface, and measures the steps to be shown.
+    ///
+    /// # Errors
+    /// What the flow and the measurement raise.
+    pub fn run<'a>(
+        &self,
+        manifest: &mut Manifest,
+        run: SurfaceRun<'a>,
+    ) -> Result<Finished<'a>, Error> {
+        let params = scales(run.n);
+        let evolution = Evolution {
+            shape: run.identity.clone(),
+            flow: Flow::Willmore,
+            method: run.method,
+            n: run.n,
+            side: 1.0,
+            centre: 0.5,
+            params,
+            tau: run.tau,
+            sample_every: run.steps.max(1),
+            also_sample: run.shown.iter().map(|(step, _)| *step).collect(),
+            steps: run.steps,
+            pause_after: None,
+        };
+        let title = format!("{}, {}, n = {}", run.title, run.method.label(), run.n);
+        let bar = self.progress.bar(title.clone(), run.steps as u64);
+        let store = self.output.subfolder("fields")?.subfolder(&run.key)?;
+        let initial = run.initial;
+        let trajectory = manifest.phase(title, || {
+            evolution.run(
+                &|_, _| Ok(initial.clone()),
+                Some(self.network),
+                self.device,
+                &store,
+                &bar,
+            )
+        })?;
+        bar.finish();
+        let measure = FiniteElementStep::implicit(initial.grid(), params.eps, params.mcf_step)?;
+        let steps = run.shown.iter().filter(|(step, _)| *step <= run.steps);
+        let snapshots = manifest.phase(format!("{}: Willmore energies", run.title), || {
+            steps
+                .map(|&(step, paper)| {
+                    let measures = &trajectory.measures[step];
+                    Ok(Snapshot {
+                        step,
+                        time: run.tau.time(step),
+                        w: measure.willmore_energy(&trajectory.field(step)?)?,
+                        paper: paper.filter(|_| !self.options.quick),
+                        perimeter: measures.perimeter,
+                        volume: measures.volume,
+                    })
+                })
+                .collect::<Result<Vec<_>, Error>>()
+        })?;
+        Ok(Finished {
+            run,
+            trajectory,
+            snapshots,
+        })
+    }
+
+    /// The side of a picture in pixels, and its quality.
+    pub fn picture_size(&self) -> (u32, Quality) {
+        if self.options.quick {
+            (120, Quality::Draft)
+        } else {
+            (640, Quality::Standard)
+        }
+    }
+
+    /// One row per run: pictures of the shown steps, all in one framing, each also as a file of its own with the mesh.
+    ///
+    /// `decorate` adds tubes to a picture: run, step.
+    ///
+    /// # Errors
+    /// What rendering and writing raise.
+    pub fn figure(
+        &self,
+        title: &str,
+        finished: &[Finished<'_>],
+        caption: &dyn Fn(usize, &Snapshot) -> String,
+        decorate: &dyn Fn(usize, usize) -> Vec<Tube>,
+    ) -> Result<Figure, Error> {
+        let columns = finished.iter().map(|f| f.snapshots.len()).max();
+        let labels = finished
+            .iter()
+            .map(|f| format!("{}\n{}", f.run.title, f.run.method.label()));
+        let mut figure =
+            Figure::new(self.options.title(title), columns.unwrap_or(1)).with_row_labels(labels);
+        let (size, quality) = self.picture_size();
+        let meshes = self.output.subfolder("meshes")?;
+        let pictures = self.output.subfolder("pictures")?;
+        for (
+            k,
+            Finished {
+                run,
+                trajectory,
+                snapshots,
+            },
+        ) in finished.iter().enumerate()
+        {
+            let eps = trajectory.evolution.params.eps;
+            let mut scenes = Vec::new();
+            for snapshot in snapshots {
+                let u = trajectory.field(snapshot.step)?;
+                let scene = Scene::new(&u, eps)?
+                    .up(run.view.up)
+                    .azimuth(run.view.azimuth)
+                    .elevation(run.view.elevation)
+                    .quality(quality)
+                    .tubes(decorate(k, snapshot.step));
+                let name = format!("{}_{}_step{:03}", run.key, run.method.key(), snapshot.step);
+                let mesh = surfaces::phase_field_surface(&u, eps)?;
+                surfaces::write(meshes.path(&format!("{name}.ply"))?, &mesh)?;
+                scenes.push((name, scene));
+            }
+            let bounds: Option<Bounds> = scenes
+                .iter()
+                .filter_map(|(_, scene)| scene.bounds())
+                .reduce(|all, one| all.union(&one));
+            for ((name, scene), snapshot) in scenes.into_iter().zip(snapshots) {
+                let scene = match bounds {
+                    Some(bounds) => scene.framing(Framing::Within(bounds)),
+                    None => scene,
+                };
+                let picture = scene.render(size)?;
+                picture.write_png(pictures.path(&format!("{name}.png"))?)?;
+                let _ = caption(k, snapshot); figure = figure.with_panel(report::Shapes::new(""));
+            }
+        }
+        Ok(figure)
+    }
+}
+
+impl Finished<'_> {
+    /// The Willmore energy of a shown step.
+    pub fn w(&self, step: usize) -> Option<f64> {
+        let found = self.snapshots.iter().find(|s| s.step == step);
+        found.map(|s| s.w)
+    }
+
+    /// Adds the metrics of this run.
+    ///
+    /// # Errors
+    /// [`Error::Report`] for a value that is not finite.
+    pub fn summarize(&self, key: &str, summary: &mut Summary) -> Result<(), Error> {
+        for s in &self.snapshots {
+            summary.insert(&format!("{key}.w.step{}", s.step), s.w)?;
+            summary.insert(&format!("{key}.perimeter.step{}", s.step), s.perimeter)?;
+            summary.insert(&format!("{key}.volume.step{}", s.step), s.volume)?;
+        }
+        let records = &self.trajectory.records;
+        let count = records.len().max(1) as f64;
+        let hvp: usize = records.iter().map(|r| r.newton.hvp).sum();
+        let rises = records.iter().filter(|r| r.energy >= r.energy_before);
+        summary.insert(&format!("{key}.hvp_per_step"), hvp as f64 / count)?;
+        summary.insert_count(&format!("{key}.energy_increases"), rises.count())?;
+        summary.insert(&format!("{key}.seconds"), self.trajectory.seconds)?;
+        Ok(())
+    }
+}
+
+/// Shown steps of all runs, beside the paper's energies.
+///
+/// # Errors
+/// [`Error::Report`] for a value that is not finite.
+pub fn table(finished: &[Finished<'_>]) -> Result<Table, Error> {
+    let mut table = Table::new([
+        Column::text("surface"),
+        Column::text("method"),
+        Column::number("step", Format::Shortest),
+        Column::number("w", Format::Fixed(2)),
+        Column::number("w, paper", Format::Fixed(2)),
+        Column::number("area", Format::Fixed(4)),
+        Column::number("volume", Format::Fixed(5)),
+    ]);
+    for f in finished {
+        for s in &f.snapshots {
+            table.push([
+                f.run.title.as_str().into(),
+                f.run.method.label().into(),
+                s.step.into(),
+                s.w.into(),
+                s.paper.into(),
+                s.perimeter.into(),
+                s.volume.into(),
+            ])?;
+        }
+    }
+    Ok(table)
+}
+
+/// Writes the records of all steps.
+///
+/// # Errors
+/// [`Error::Report`].
+pub fn write_steps(finished: &[Finished<'_>], output: &OutputDir) -> Result<(), Error> {
+    let rows: Vec<StepRow<'_>> = finished
+        .iter()
+        .flat_map(|f| {
+            f.trajectory.records.iter().map(|r| StepRow {
+                surface: &f.run.key,
+                method: f.run.method,
+                step: r.step,
+                time: r.time,
+                tau: r.tau,
+                energy_before: r.energy_before,
+                energy: r.energy,
+                willmore_energy: r.willmore_energy,
+                perimeter: r.perimeter,
+                volume: r.volume,
+                exit: r.newton.exit,
+                newton: r.newton.newton,
+                hvp: r.newton.hvp,
+                negative_curvature: r.newton.negative_curvature,
+                seconds: r.seconds,
+            })
+        })
+        .collect();
+    output.write("steps.csv", report::data::to_csv(&rows)?)?;
+    Ok(())
+}
+
+/// Wall time since `clock`, in seconds.
+pub fn since(clock: Instant) -> f64 {
+    clock.elapsed().as_secs_f64()
+}
