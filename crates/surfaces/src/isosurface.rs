@@ -65,7 +65,11 @@ pub fn isosurface(s: &Field<3>) -> Result<TriangleMesh, Error> {
         let corner = |bits: usize| -> Node {
             std::array::from_fn(|axis| {
                 let odd = cell[axis] + 1 - cell[axis] % 2;
-                if bits >> axis & 1 == 1 { odd } else { even[axis] }
+                if bits >> axis & 1 == 1 {
+                    odd
+                } else {
+                    even[axis]
+                }
             })
         };
         let reflected = cell.iter().map(|c| c % 2).sum::<usize>() % 2 == 1;
@@ -200,7 +204,10 @@ impl<'a> Lattice<'a> {
                 let curvature = |left: Option<f64>, middle: f64, right: Option<f64>| {
                     left.zip(right).map_or(0.0, |(l, r)| l - 2.0 * middle + r)
                 };
-                let bend = smaller(curvature(at(-1), va, Some(vb)), curvature(Some(va), vb, at(2)));
+                let bend = smaller(
+                    curvature(at(-1), va, Some(vb)),
+                    curvature(Some(va), vb, at(2)),
+                );
                 root(va, vb, bend)
             }
             // A cap at the border of the grid.
@@ -214,7 +221,9 @@ impl<'a> Lattice<'a> {
             _ => Vector::ZERO,
         };
         let outwards = if self.is_inside(a) { xb - xa } else { xa - xb };
-        let normal = gradient.try_normalize().unwrap_or_else(|| outwards.normalize());
+        let normal = gradient
+            .try_normalize()
+            .unwrap_or_else(|| outwards.normalize());
         (xa.lerp(xb, part), normal)
     }
 }
@@ -232,12 +241,18 @@ fn smaller(a: f64, b: f64) -> f64 {
 
 /// The root in `[0, 1]` of `va + (vb - va) t - bend/2 t (1 - t)`, where `va` and `vb` differ in sign.
 fn root(va: f64, vb: f64, bend: f64) -> f64 {
+    if va == 0.0 {
+        return 0.0;
+    }
     let (a, b, c) = (0.5 * bend, vb - va - 0.5 * bend, va);
-    // Not less than zero, because there is a change of sign; without cancellation.
-    let q = -0.5 * (b + (b * b - 4.0 * a * c).max(0.0).sqrt().copysign(b));
-    let candidates = [c / q, q / a];
-    let root = candidates.into_iter().find(|t| (0.0..=1.0).contains(t));
-    root.unwrap_or(va / (va - vb))
+    // The root with a slope of the sign of vb - va, without cancellation. The discriminant is not
+    // negative, because there is a change of sign.
+    let slope = (b * b - 4.0 * a * c).max(0.0).sqrt().copysign(vb - va);
+    if b * slope >= 0.0 {
+        -2.0 * c / (b + slope)
+    } else {
+        (slope - b) / (2.0 * a)
+    }
 }
 
 /// Corners of a tetrahedron on the way from the first corner of a cell to the opposite one.
@@ -295,8 +310,7 @@ impl Surface<'_> {
                 // Inversions of the order (a, b, c, d).
                 let outwards = positive == ((a + b - 1) % 2 == 0);
                 let quadrilateral = [[a, c], [a, d], [b, d], [b, c]];
-                let [p, q, r, s] =
-                    quadrilateral.map(|edge| self.vertex(edge.map(|c| corners[c])));
+                let [p, q, r, s] = quadrilateral.map(|edge| self.vertex(edge.map(|c| corners[c])));
                 self.push([p, q, r], outwards);
                 self.push([p, r, s], outwards);
             }
@@ -305,7 +319,8 @@ impl Surface<'_> {
     }
 
     fn push(&mut self, [a, b, c]: [u32; 3], outwards: bool) {
-        self.faces.push(if outwards { [a, b, c] } else { [a, c, b] });
+        self.faces
+            .push(if outwards { [a, b, c] } else { [a, c, b] });
     }
 
     fn vertex(&mut self, [p, q]: [Node; 2]) -> u32 {

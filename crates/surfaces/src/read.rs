@@ -161,20 +161,16 @@ pub fn read(path: impl AsRef<Path>) -> Result<TriangleMesh, Error> {
 /// The start of a text, in one line.
 fn shortened(text: &str) -> String {
     const LONGEST: usize = 60;
-    let mut words = text.split_whitespace();
     let mut line = String::new();
-    for word in words.by_ref() {
+    for word in text.split_whitespace() {
         if !line.is_empty() {
             line.push(' ');
         }
-        line.extend(word.chars().take(LONGEST));
-        if line.chars().count() >= LONGEST {
-            break;
+        line.extend(word.chars().take(LONGEST + 1));
+        if let Some((end, _)) = line.char_indices().nth(LONGEST) {
+            line.truncate(end);
+            return line + " ...";
         }
-    }
-    if words.next().is_some() || line.chars().count() > LONGEST {
-        line = line.chars().take(LONGEST).collect();
-        line.push_str(" ...");
     }
     line
 }

@@ -38,7 +38,10 @@ pub fn figure(cells: usize) -> Result<ClosedMesh, Error> {
         ([0.0, -0.30, 0.22], [0.03, -0.33, 0.36], 0.026),
     ];
     let capsules = |parts: &[([f64; 3], [f64; 3], f64)]| -> Result<Vec<_>, geometry::Error> {
-        parts.iter().map(|&(a, b, r)| Capsule::new(a, b, r)).collect()
+        parts
+            .iter()
+            .map(|&(a, b, r)| Capsule::new(a, b, r))
+            .collect()
     };
     let (limbs, tail) = (capsules(&LIMBS)?, capsules(&TAIL)?);
     build(cells, |[x, y, z]| {

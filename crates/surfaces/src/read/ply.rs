@@ -28,8 +28,8 @@ pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
                         });
                     }
                 }
-                let read = Parser::<Vertex>::new()
-                    .read_payload_for_element(&mut reader, element, &header);
+                let read =
+                    Parser::<Vertex>::new().read_payload_for_element(&mut reader, element, &header);
                 let normals = NORMAL.iter().all(|n| element.properties.contains_key(*n));
                 vertices = Some((read.map_err(|e| said(&e))?, normals));
             }
@@ -100,7 +100,11 @@ fn check_length(
         (Encoding::Ascii, _) => 2,
         (_, PropertyType::Scalar(scalar) | PropertyType::List(scalar, _)) => size(scalar),
     };
-    let each: u64 = element.properties.values().map(|p| least(&p.data_type)).sum();
+    let each: u64 = element
+        .properties
+        .values()
+        .map(|p| least(&p.data_type))
+        .sum();
     let count = element.count as u64;
     // The last line of a text may lack its end.
     let missing = u64::from(encoding == Encoding::Ascii && count > 0);
