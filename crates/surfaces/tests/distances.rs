@@ -1,5 +1,7 @@
 //! The distance to a mesh against all its triangles, one by one.
 
+#![allow(clippy::float_cmp, reason = "where equality is asserted, it is exact")]
+
 mod common;
 
 use std::path::PathBuf;
@@ -215,6 +217,21 @@ fn sampling_is_the_distance_at_every_node() {
     let distance = MeshDistance::new(&closed(cube(0.5)));
     let error = distance.sample(far, || ()).unwrap_err();
     assert!(error.to_string().contains("node 0 is NaN"), "{error}");
+}
+
+#[test]
+fn results_do_not_depend_on_the_number_of_threads() {
+    let grid = Grid::<3>::centred(20, 1.0).unwrap();
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        pool.build().unwrap().install(|| {
+            let lever = samples::lever(48).unwrap();
+            let sampled = MeshDistance::new(&lever).sample(grid, || ()).unwrap();
+            (lever, sampled)
+        })
+    };
+    let one = with(1);
+    assert!(one == with(2) && one == with(5));
 }
 
 #[test]

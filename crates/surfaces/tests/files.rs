@@ -1,9 +1,12 @@
 //! Mesh files: round trips, variants of the formats, and files that are none.
 
+#![allow(clippy::float_cmp, reason = "files keep every bit")]
+
 mod common;
 
 use std::fs;
 use std::path::Path;
+use std::sync::LazyLock;
 
 use common::{cube, sphere, torus};
 use proptest::prelude::*;
@@ -61,7 +64,7 @@ fn stl_round_trips_in_single_precision() {
             .zip(back.faces.as_flattened())
         {
             let (a, b) = (mesh.vertices[*a as usize], back.vertices[*b as usize]);
-            assert_eq!(a.map(|v| v as f32 as f64), b);
+            assert_eq!(a.map(|v| f64::from(v as f32)), b);
         }
         let (back, warnings) = ClosedMesh::new(back).unwrap();
         assert_eq!(warnings, []);
@@ -327,7 +330,9 @@ fn ply(format: &str) -> Vec<u8> {
     }
     for face in faces {
         put(&[face.len() as u8]);
-        face.iter().for_each(|v| put(&v.to_le_bytes()));
+        for v in face {
+            put(&v.to_le_bytes());
+        }
         put(&0.5_f32.to_le_bytes());
     }
     put(&7_i32.to_le_bytes());
@@ -542,16 +547,14 @@ fn exercise(extension: &str, bytes: &[u8]) {
 }
 
 /// Valid files of all formats.
-fn valid_files() -> Vec<(&'static str, Vec<u8>)> {
+static VALID_FILES: LazyLock<Vec<(&str, Vec<u8>)>> = LazyLock::new(|| {
     let mesh = sphere([0.0; 3], 1.0, 1);
     let mut files: Vec<_> = ["obj", "ply", "stl"].map(|e| (e, encode(e, &mesh))).into();
     files.extend(ENCODINGS.map(|format| ("ply", ply(format))));
-    files.push((
-        "stl",
-        format!("solid a\n{FACET}{FACET}endsolid a\n").into_bytes(),
-    ));
+    let text = format!("solid a\n{FACET}{FACET}endsolid a\n");
+    files.push(("stl", text.into_bytes()));
     files
-}
+});
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
@@ -574,7 +577,7 @@ proptest! {
         cut in prop::option::of(any::<prop::sample::Index>()),
         doubled in prop::option::of(any::<prop::sample::Index>()),
     ) {
-        for (extension, mut bytes) in valid_files() {
+        for (extension, mut bytes) in VALID_FILES.clone() {
             for (index, value) in &changes {
                 // Also near the start, where the headers are.
                 let limit = if value % 2 == 0 { bytes.len() } else { bytes.len().min(300) };

@@ -1,5 +1,7 @@
 //! Isosurfaces: topology, accuracy, symmetry.
 
+#![allow(clippy::float_cmp, reason = "where equality is asserted, it is exact")]
+
 mod common;
 
 use std::f64::consts::PI;
