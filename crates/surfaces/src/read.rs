@@ -58,7 +58,10 @@ pub enum FormatError {
         value: f64,
     },
     /// A corner of a face does not exist.
-    #[error("face {face} refers to vertex {index}, but the file has {vertices} vertices{}", base(*first))]
+    #[error(
+        "face {face} refers to vertex {index}, but the file has {vertices} vertices, the first of \
+         which is {first}"
+    )]
     Index {
         /// Number of the face in the file.
         face: usize,
@@ -111,14 +114,6 @@ pub enum FormatError {
         /// In one line, shortened.
         message: String,
     },
-}
-
-fn base(first: u8) -> &'static str {
-    if first == 0 {
-        ", the first of which is 0"
-    } else {
-        ", the first of which is 1"
-    }
 }
 
 /// Reads a mesh; the extension (`.obj`, `.ply`, `.stl`) tells the format.

@@ -9,8 +9,8 @@ use crate::format::Format;
 use crate::vector::{Vector, corners, scaled_normal};
 use crate::{Error, TriangleMesh};
 
-/// Writes a mesh, atomically (see [`write_atomically`]); the extension (`.obj`, `.ply`, `.stl`) tells
-/// the format.
+/// Writes a mesh, atomically (see [`write_atomically`]); the extension (`.obj`, `.ply`, `.stl`)
+/// tells the format.
 ///
 /// - OBJ: text; coordinates and normals as the shortest decimals that read back to the last bit.
 /// - PLY: binary, little-endian, double precision, with normals.
