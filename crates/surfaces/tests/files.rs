@@ -142,8 +142,8 @@ fn broken_obj_files_are_explained() {
         ),
         (
             "f 1 2 9223372036854775807",
-            "face 0 refers to vertex 9223372036854775807, but the file has 4 vertices, the first of \
-             which is 1",
+            "face 0 refers to vertex 9223372036854775807, but the file has 4 vertices, the first \
+             of which is 1",
         ),
         (
             "f 1 2 4294967297",
