@@ -71,12 +71,21 @@ impl ClosedMesh {
     ///
     /// # Errors
     /// [`Error::NoFaces`]; [`Error::NonFiniteVertex`]; [`Error::Normals`];
-    /// [`Error::IndexOutOfRange`]; [`Error::Open`], [`Error::NonManifold`] and
+    /// [`Error::IndexOutOfRange`]; [`Error::InvalidParameter`] for meshes so small or large that
+    /// products of lengths leave the range of numbers; [`Error::Open`], [`Error::NonManifold`] and
     /// [`Error::MixedOrientation`] for edges that are not used once in each direction;
     /// [`Error::NoArea`] for faces whose corners are on a line; [`Error::NoVolume`];
     /// [`Error::Nesting`].
     pub fn new(mut mesh: TriangleMesh) -> Result<(Self, Vec<Warning>), Error> {
         mesh.check(f64::MAX)?;
+        let side = mesh.bounding_box().ok_or(Error::NoFaces)?.longest_side();
+        if !(side == 0.0 || (1e-70..1e70).contains(&side)) {
+            return Err(Error::InvalidParameter {
+                name: "longest side of the bounding box",
+                value: side,
+                requirement: "between 1e-70 and 1e70; choose another unit of length",
+            });
+        }
         let mut warnings = Vec::new();
         let mut seams = Seams::find(&mesh);
         if seams.is_err() || has_collapsed_faces(&mesh) || has_no_area(&mesh).is_err() {

@@ -28,19 +28,9 @@ pub struct MeshDistance {
 
 impl MeshDistance {
     /// Builds the hierarchy.
-    ///
-    /// # Errors
-    /// [`Error::InvalidParameter`] if the size of the mesh is near the limits of the numbers.
-    pub fn new(mesh: &ClosedMesh) -> Result<Self, Error> {
-        let side = mesh.bounding_box().longest_side();
-        let scale = side.log2().floor().exp2().recip();
-        if !scale.is_normal() {
-            return Err(Error::InvalidParameter {
-                name: "longest side of the bounding box",
-                value: side,
-                requirement: "between 1e-300 and 1e300",
-            });
-        }
+    pub fn new(mesh: &ClosedMesh) -> Self {
+        let exponent = mesh.bounding_box().longest_side().log2().floor();
+        let scale = (-exponent).clamp(-1000.0, 1000.0).exp2();
         let mesh = mesh.mesh();
         // Where sheets touch in a vertex, the pseudo-normal is the sum over all of them.
         let merged = merge_coincident(&mesh.vertices);
@@ -52,7 +42,7 @@ impl MeshDistance {
             .map(|f| f.map(|v| merged.index[v as usize]));
         let mesh = TriMesh::with_flags(vertices, faces.collect(), TriMeshFlags::ORIENTED)
             .expect("a closed mesh has faces");
-        Ok(Self { mesh, scale })
+        Self { mesh, scale }
     }
 
     /// Samples the distance at the nodes of a grid, in parallel over layers of the first axis;

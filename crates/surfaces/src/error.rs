@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use crate::read::FormatError;
 
-/// Errors of mesh files, checks, placement and isosurfaces, each with the numbers needed to act on it.
+/// Errors of mesh files, checks, placement and isosurfaces, each with the numbers needed to act on
+/// it.
 ///
 /// Faces and vertices are counted from zero, in the order of the mesh.
 #[derive(Debug, thiserror::Error)]
@@ -138,8 +139,8 @@ pub enum Error {
     },
     /// A closed surface that encloses nothing.
     #[error(
-        "the enclosed volume {volume:e} is zero up to rounding (area {area:e}), so that inside and \
-         outside cannot be told apart"
+        "the enclosed volume {volume:e} is zero up to rounding (area {area:e}), so that inside \
+         and outside cannot be told apart"
     )]
     NoVolume {
         /// Signed volume.
@@ -149,8 +150,9 @@ pub enum Error {
     },
     /// A component whose orientation does not agree with where it lies.
     #[error(
-        "the component with face {face} is oriented {orientation}, but {enclosing} other components \
-         enclose it where {expected} should; unite overlapping parts, orient cavities inwards"
+        "the component with face {face} is oriented {orientation}, but {enclosing} other \
+         components enclose it where {expected} should; unite overlapping parts, orient cavities \
+         inwards"
     )]
     Nesting {
         /// First face of the component.
@@ -164,8 +166,8 @@ pub enum Error {
     },
     /// A mesh does not fit the box.
     #[error(
-        "with a longest side of {side_length} the mesh does not fit a box of side {box_side} with a \
-         margin of {margin}; the largest side length that fits is {largest}"
+        "with a longest side of {side_length} the mesh does not fit a box of side {box_side} with \
+         a margin of {margin}; the largest side length that fits is {largest}"
     )]
     DoesNotFit {
         /// Longest side of the bounding box after scaling.

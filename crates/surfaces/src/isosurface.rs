@@ -30,12 +30,12 @@ pub fn phase_field_surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error
 /// The surface `{s = 0}` of a field, around `{s < 0}`, by marching tetrahedra; without faces where
 /// `s` does not change its sign.
 ///
-/// **Topology.** Every cell is cut into six tetrahedra around a diagonal, which runs from the corner
-/// with even indices to that with odd ones (Todd's triangulation J1). Vertices belong to the edges
-/// of this triangulation of space and are shared: the surface is a closed oriented manifold, always.
-/// It has the symmetries of the field under reflections at planes of nodes and exchange of axes.
-/// Nodes with `s = 0` count as outside. The periodic grid is treated as a picture: where the
-/// inside reaches the first or last nodes, it is closed by a cap there.
+/// **Topology.** Every cell is cut into six tetrahedra around a diagonal, which runs from the
+/// corner with even indices to that with odd ones (Todd's triangulation J1). Vertices belong to
+/// the edges of this triangulation of space and are shared: the surface is a closed oriented
+/// manifold, always. It has the symmetries of the field under reflections at planes of nodes and
+/// exchange of axes. Nodes with `s = 0` count as outside. The periodic grid is treated as a
+/// picture: where the inside reaches the first or last nodes, it is closed by a cap there.
 ///
 /// **Accuracy.** Along an edge `s` is quadratic: the second difference is the smaller of those at
 /// its ends, zero if they differ in sign (so that kinks and plateaus next to the surface do no
@@ -239,14 +239,20 @@ fn smaller(a: f64, b: f64) -> f64 {
     }
 }
 
-/// The root in `[0, 1]` of `va + (vb - va) t - bend/2 t (1 - t)`, where `va` and `vb` differ in sign.
+/// The root in `[0, 1]` of `va + (vb - va) t - bend/2 t (1 - t)`; `va` and `vb` differ in sign.
 fn root(va: f64, vb: f64, bend: f64) -> f64 {
+    if va == 0.0 {
+        return 0.0;
+    }
     let (a, b, c) = (0.5 * bend, vb - va - 0.5 * bend, va);
-    // Not less than zero, because there is a change of sign; without cancellation.
-    let q = -0.5 * (b + (b * b - 4.0 * a * c).max(0.0).sqrt().copysign(b));
-    let candidates = [c / q, q / a];
-    let root = candidates.into_iter().find(|t| (0.0..=1.0).contains(t));
-    root.unwrap_or(va / (va - vb))
+    // The root with a slope of the sign of vb - va, without cancellation. The discriminant is not
+    // negative, because there is a change of sign.
+    let slope = (b * b - 4.0 * a * c).max(0.0).sqrt().copysign(vb - va);
+    if b * slope >= 0.0 {
+        -2.0 * c / (b + slope)
+    } else {
+        (slope - b) / (2.0 * a)
+    }
 }
 
 /// Corners of a tetrahedron on the way from the first corner of a cell to the opposite one.

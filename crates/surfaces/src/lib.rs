@@ -1,4 +1,59 @@
-//! Triangle meshes.
+//! Triangle meshes in and out of phase fields: files, closed surfaces, signed distances,
+//! isosurfaces.
+//!
+//! ```
+//! use geometry::{Grid, optimal_profile, phase_field, shapes::Ball};
+//! use surfaces::{ClosedMesh, MeshDistance, Placement, phase_field_surface, read, write};
+//!
+//! fn main() -> Result<(), surfaces::Error> {
+//!     // A ball as a phase field, its surface as a mesh.
+//!     let grid = Grid::<3>::centred(64, 1.0)?;
+//!     let eps = 2.0 * grid.spacing();
+//!     let u = phase_field(grid, &Ball::new([0.0; 3], 0.3)?, eps)?;
+//!     let (ball, _) = ClosedMesh::new(phase_field_surface(&u, eps)?)?;
+//!     // 4 pi 0.3^2 = 1.13097 and 4/3 pi 0.3^3 = 0.11310.
+//!     println!("area {:.4}, volume {:.4}", ball.area(), ball.volume());
+//!     println!("Euler characteristic {}", ball.euler_characteristic());
+//! #   assert_eq!(format!("{:.4} {:.4}", ball.area(), ball.volume()), "1.1306 0.1130");
+//! #   assert_eq!(ball.euler_characteristic(), 2);
+//!
+//!     // To a file and back, and into a phase field again, twice as large.
+//!     let folder = tempfile::tempdir().expect("a folder for temporary files");
+//!     let path = folder.path().join("ball.ply");
+//!     write(&path, ball.mesh())?;
+//!     let (ball, warnings) = ClosedMesh::new(read(&path)?)?;
+//!     for warning in warnings {
+//!         println!("{warning}");
+//!     }
+//!     let coarse = Grid::<3>::centred(32, 2.0)?;
+//!     let eps = 2.0 * coarse.spacing();
+//!     let placement = Placement::fit(&ball, &coarse, 1.2, 2.0 * eps)?;
+//!     let distance = MeshDistance::new(&ball.placed(&placement));
+//!     let s = distance.sample(coarse, || ())?;
+//!     let u = s.map(|s| optimal_profile(s, eps));
+//!     let (again, _) = ClosedMesh::new(phase_field_surface(&u, eps)?)?;
+//!     println!("volume {:.3}", again.volume()); // 4/3 pi 0.6^3 = 0.905
+//! #   assert_eq!(format!("{:.3}", again.volume()), "0.902");
+//!     Ok(())
+//! }
+//! ```
+//! prints
+//! ```text
+//! area 1.1306, volume 0.1130
+//! Euler characteristic 2
+//! volume 0.902
+//! ```
+//!
+//! # Conventions
+//!
+//! - Faces are counter-clockwise seen from outside. Distances are negative inside, phase fields
+//!   positive.
+//! - A [`TriangleMesh`] may be anything; a [`ClosedMesh`] bounds a solid, and only that has a
+//!   volume and a [`MeshDistance`].
+//! - Vertices and faces are counted from zero, lines of files from one.
+//! - Meshes are not periodic: they lie in the box of a grid, with a margin of a few `eps`.
+//! - Same input, same bytes, for any number of threads.
+
 mod closed;
 mod distance;
 mod error;

@@ -58,7 +58,10 @@ pub enum FormatError {
         value: f64,
     },
     /// A corner of a face does not exist.
-    #[error("face {face} refers to vertex {index}, but the file has {vertices} vertices{}", base(*first))]
+    #[error(
+        "face {face} refers to vertex {index}, but the file has {vertices} vertices, the first of \
+         which is {first}"
+    )]
     Index {
         /// Number of the face in the file.
         face: usize,
@@ -113,14 +116,6 @@ pub enum FormatError {
     },
 }
 
-fn base(first: u8) -> &'static str {
-    if first == 0 {
-        ", the first of which is 0"
-    } else {
-        ", the first of which is 1"
-    }
-}
-
 /// Reads a mesh; the extension (`.obj`, `.ply`, `.stl`) tells the format.
 ///
 /// - OBJ: `v` and `f`, with relative indices; groups, normals, colours and everything else are
@@ -161,20 +156,16 @@ pub fn read(path: impl AsRef<Path>) -> Result<TriangleMesh, Error> {
 /// The start of a text, in one line.
 fn shortened(text: &str) -> String {
     const LONGEST: usize = 60;
-    let mut words = text.split_whitespace();
     let mut line = String::new();
-    for word in words.by_ref() {
+    for word in text.split_whitespace() {
         if !line.is_empty() {
             line.push(' ');
         }
-        line.extend(word.chars().take(LONGEST));
-        if line.chars().count() >= LONGEST {
-            break;
+        line.extend(word.chars().take(LONGEST + 1));
+        if let Some((end, _)) = line.char_indices().nth(LONGEST) {
+            line.truncate(end);
+            return line + " ...";
         }
-    }
-    if words.next().is_some() || line.chars().count() > LONGEST {
-        line = line.chars().take(LONGEST).collect();
-        line.push_str(" ...");
     }
     line
 }

@@ -9,8 +9,8 @@ use crate::format::Format;
 use crate::vector::{Vector, corners, scaled_normal};
 use crate::{Error, TriangleMesh};
 
-/// Writes a mesh, atomically (see [`write_atomically`]); the extension (`.obj`, `.ply`, `.stl`) tells
-/// the format.
+/// Writes a mesh, atomically (see [`write_atomically`]); the extension (`.obj`, `.ply`, `.stl`)
+/// tells the format.
 ///
 /// - OBJ: text; coordinates and normals as the shortest decimals that read back to the last bit.
 /// - PLY: binary, little-endian, double precision, with normals.
@@ -93,12 +93,13 @@ fn stl(out: &mut dyn Write, mesh: &TriangleMesh, faces: u32) -> io::Result<()> {
     out.write_all(&[0; 80])?;
     out.write_all(&faces.to_le_bytes())?;
     for &face in &mesh.faces {
-        let corners = corners(mesh, face);
-        let normal = scaled_normal(corners).normalize_or_zero();
-        for vector in [normal].iter().chain(&corners) {
-            for value in Vector::to_array(vector) {
-                out.write_all(&(value as f32).to_le_bytes())?;
-            }
+        // The normal is that of the rounded corners.
+        let rounded = |x: Vector| x.to_array().map(|v| v as f32);
+        let corners = corners(mesh, face).map(rounded);
+        let normal = scaled_normal(corners.map(|x| Vector::from_array(x.map(f64::from))));
+        let normal = rounded(normal.normalize_or_zero());
+        for value in [normal].as_flattened().iter().chain(corners.as_flattened()) {
+            out.write_all(&value.to_le_bytes())?;
         }
         out.write_all(&[0; 2])?;
     }

@@ -1,7 +1,7 @@
 //! Wavefront OBJ.
 //!
-//! Not by a library: of those, `tobj` takes polylines for faces, splits vertices between groups, and
-//! tells no line numbers; `obj` reads single precision.
+//! Not by a library: of those, `tobj` takes polylines for faces, splits vertices between groups,
+//! and tells no line numbers; `obj` reads single precision.
 
 use super::{FormatError, Polygons, position, shortened};
 use crate::TriangleMesh;

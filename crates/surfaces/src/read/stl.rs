@@ -1,8 +1,8 @@
 //! STL, binary and ASCII.
 //!
-//! Not by a library: `stl_io` takes binary files whose comment begins with `solid` for ASCII, refuses
-//! `solid` without a name, reads the first of several solids only, and rounds ASCII to single
-//! precision.
+//! Not by a library: `stl_io` takes binary files whose comment begins with `solid` for ASCII,
+//! refuses `solid` without a name, reads the first of several solids only, and rounds ASCII to
+//! single precision.
 
 use super::{FormatError, position, shortened};
 use crate::TriangleMesh;

@@ -1,0 +1,325 @@
+//! Checks, measures and placement of closed meshes.
+
+#![allow(clippy::float_cmp, reason = "where equality is asserted, it is exact")]
+
+mod common;
+
+use std::f64::consts::PI;
+
+use common::{closed, cube, reversed, sphere, together, torus, translated};
+use geometry::Grid;
+use surfaces::{ClosedMesh, Error, Placement, TriangleMesh, Warning};
+
+fn error(mesh: TriangleMesh) -> Error {
+    ClosedMesh::new(mesh).unwrap_err()
+}
+
+#[track_caller]
+fn near(value: f64, expected: f64, tolerance: f64) {
+    assert!(
+        (value - expected).abs() <= tolerance,
+        "{value} for {expected}"
+    );
+}
+
+#[test]
+fn measures_are_those_of_the_solid() {
+    let mesh = closed(translated(cube(0.5), [100.0, 200.0, -300.0]));
+    near(mesh.area(), 6.0, 1e-12);
+    near(mesh.volume(), 1.0, 1e-12);
+    assert_eq!(
+        (mesh.euler_characteristic(), mesh.components(), mesh.genus()),
+        (2, 1, 0)
+    );
+    assert_eq!(mesh.bounding_box().extent(), [1.0; 3]);
+    assert_eq!(mesh.bounding_box().centre(), [100.0, 200.0, -300.0]);
+
+    let mesh = closed(torus(0.5, 0.2, 400, 200));
+    near(mesh.area(), 4.0 * PI * PI * 0.5 * 0.2, 2e-3);
+    near(mesh.volume(), 2.0 * PI * PI * 0.5 * 0.04, 2e-4);
+    assert_eq!(
+        (mesh.euler_characteristic(), mesh.components(), mesh.genus()),
+        (0, 1, 1)
+    );
+
+    let both = together(torus(0.5, 0.2, 20, 20), &sphere([2.0, 0.0, 0.0], 0.3, 2));
+    let mesh = closed(both);
+    assert_eq!(
+        (mesh.euler_characteristic(), mesh.components(), mesh.genus()),
+        (2, 2, 1)
+    );
+}
+
+#[test]
+fn cavities_stay() {
+    let outer = sphere([0.0; 3], 0.5, 3);
+    let inner = reversed(sphere([0.1, 0.0, 0.0], 0.3, 3));
+    let solid = closed(outer.clone()).volume();
+    let hole = closed(reversed(inner.clone())).volume();
+    let mesh = closed(together(outer.clone(), &inner));
+    near(mesh.volume(), solid - hole, 1e-12);
+    assert_eq!((mesh.euler_characteristic(), mesh.components()), (4, 2));
+
+    // The same the other way round is reversed as a whole.
+    let inverted = together(reversed(outer.clone()), &reversed(inner.clone()));
+    let (again, warnings) = ClosedMesh::new(inverted).unwrap();
+    assert_eq!(warnings, [Warning::Reversed]);
+    near(again.volume(), mesh.volume(), 1e-15);
+
+    // Both outwards, or the inner one outside.
+    let doubled = together(outer.clone(), &reversed(inner.clone()));
+    let text = error(doubled).to_string();
+    assert!(
+        text.contains("outwards, but 1 other components enclose it where 0"),
+        "{text}"
+    );
+    let beside = together(outer, &translated(inner, [2.0, 0.0, 0.0]));
+    let text = error(beside).to_string();
+    assert!(
+        text.contains("inwards, but 0 other components enclose it where 1"),
+        "{text}"
+    );
+}
+
+#[test]
+fn inverted_meshes_are_reversed() {
+    let mut mesh = reversed(cube(0.5));
+    mesh.normals = Some(vec![[0.0, 0.6, 0.8]; 8]);
+    let (mesh, warnings) = ClosedMesh::new(mesh).unwrap();
+    assert_eq!(warnings, [Warning::Reversed]);
+    near(mesh.volume(), 1.0, 1e-15);
+    assert_eq!(mesh.mesh().normals.as_ref().unwrap()[3], [0.0, -0.6, -0.8]);
+}
+
+#[test]
+fn seams_are_merged_and_only_if_needed() {
+    // Every face with its own corners.
+    let whole = cube(0.5);
+    let split = TriangleMesh {
+        vertices: whole
+            .faces
+            .as_flattened()
+            .iter()
+            .map(|&v| whole.vertices[v as usize])
+            .collect(),
+        faces: (0..12).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect(),
+        normals: Some(vec![[1.0, 0.0, 0.0]; 36]),
+    };
+    let (mesh, warnings) = ClosedMesh::new(split.clone()).unwrap();
+    assert_eq!(warnings, [Warning::Merged { vertices: 28 }]);
+    assert_eq!(
+        (mesh.mesh().vertices.len(), mesh.euler_characteristic()),
+        (8, 2)
+    );
+    assert_eq!(mesh.mesh().normals.as_ref().unwrap().len(), 8);
+
+    // Minus zero is zero.
+    let mut signed = translated(split, [-0.5; 3]);
+    for x in signed.vertices.iter_mut().step_by(2).flatten() {
+        *x = if *x == 0.0 { -0.0 } else { *x };
+    }
+    assert!(ClosedMesh::new(signed).is_ok());
+
+    // Components that touch in a vertex are closed as they are.
+    let touching = together(cube(0.5), &translated(cube(0.5), [1.0; 3]));
+    let mesh = closed(touching);
+    assert_eq!((mesh.components(), mesh.mesh().vertices.len()), (2, 16));
+}
+
+#[test]
+fn sheets_that_share_a_vertex_count_it_twice() {
+    let mut mesh = together(cube(0.5), &translated(cube(0.5), [1.0; 3]));
+    for corner in mesh.faces.as_flattened_mut() {
+        *corner = if *corner == 8 { 7 } else { *corner };
+    }
+    let (mesh, warnings) = ClosedMesh::new(mesh).unwrap();
+    assert_eq!(warnings, [Warning::Unreferenced { vertices: 1 }]);
+    assert_eq!(
+        (mesh.mesh().vertices.len(), mesh.euler_characteristic()),
+        (15, 4)
+    );
+    assert_eq!((mesh.components(), mesh.genus()), (2, 0));
+}
+
+#[test]
+fn collapsed_faces_are_left_out() {
+    let mut mesh = cube(0.5);
+    mesh.faces.push([3, 3, 5]);
+    mesh.vertices.push([9.0; 3]);
+    let (mesh, warnings) = ClosedMesh::new(mesh).unwrap();
+    assert_eq!(
+        warnings,
+        [
+            Warning::Collapsed { faces: 1 },
+            Warning::Unreferenced { vertices: 1 }
+        ]
+    );
+    assert_eq!(
+        (mesh.mesh().faces.len(), mesh.mesh().vertices.len()),
+        (12, 8)
+    );
+    assert_eq!(mesh.bounding_box().longest_side(), 1.0);
+}
+
+#[test]
+fn open_meshes_are_refused() {
+    let mut mesh = cube(0.5);
+    mesh.faces.remove(4);
+    let error = error(mesh);
+    assert!(matches!(error, Error::Open { edges: 3, .. }), "{error}");
+    assert!(
+        error
+            .to_string()
+            .starts_with("the surface is open: 3 edges"),
+        "{error}"
+    );
+}
+
+#[test]
+fn crowded_and_mixed_edges_are_refused() {
+    let mut mesh = cube(0.5);
+    mesh.vertices.push([2.0, 0.0, 0.0]);
+    mesh.faces.push([0, 1, 8]);
+    assert!(matches!(
+        error(mesh),
+        Error::NonManifold {
+            edges: 1,
+            others: 2,
+            ..
+        }
+    ));
+
+    let mut mesh = cube(0.5);
+    mesh.faces[5].swap(0, 1);
+    let error = error(mesh);
+    assert!(
+        matches!(error, Error::MixedOrientation { edges: 3, .. }),
+        "{error}"
+    );
+    assert!(
+        error.to_string().contains("orient all faces alike"),
+        "{error}"
+    );
+}
+
+#[test]
+fn meshes_without_sense_are_refused() {
+    assert!(matches!(error(TriangleMesh::default()), Error::NoFaces));
+    let mut mesh = cube(0.5);
+    mesh.faces[3][1] = 8;
+    assert!(matches!(
+        error(mesh),
+        Error::IndexOutOfRange {
+            face: 3,
+            vertex: 8,
+            vertices: 8
+        }
+    ));
+    for bad in [f64::NAN, f64::INFINITY] {
+        let mut mesh = cube(0.5);
+        mesh.vertices[6][2] = bad;
+        assert!(matches!(
+            error(mesh),
+            Error::NonFiniteVertex { vertex: 6, .. }
+        ));
+    }
+    let mut mesh = cube(0.5);
+    mesh.normals = Some(vec![[1.0, 0.0, 0.0]; 7]);
+    assert!(matches!(
+        error(mesh),
+        Error::Normals {
+            normals: 7,
+            vertices: 8,
+            ..
+        }
+    ));
+    for (size, word) in [(1e-71, "between"), (1e71, "between"), (0.0, "no faces")] {
+        let text = error(cube(size)).to_string();
+        assert!(text.contains(word), "{text}");
+    }
+    // Both sides of a triangle.
+    let sheet = TriangleMesh {
+        vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+        faces: vec![[0, 1, 2], [0, 2, 1]],
+        normals: None,
+    };
+    assert!(matches!(error(sheet), Error::NoVolume { .. }));
+    // A corner of the tetrahedron in the middle of an edge.
+    let mut sliver = cube(0.5);
+    sliver.vertices.push([-0.5, -0.5, 0.0]);
+    sliver
+        .faces
+        .retain(|f| *f != [0, 1, 3] && !(f.contains(&0) && f.contains(&1)));
+    let whole = cube(0.5);
+    for face in whole
+        .faces
+        .iter()
+        .filter(|f| f.contains(&0) && f.contains(&1))
+    {
+        sliver.faces.push(*face);
+    }
+    let side = sliver
+        .faces
+        .iter()
+        .position(|f| {
+            [[0, 1], [1, 2], [2, 0]]
+                .iter()
+                .any(|&[a, b]| (f[a], f[b]) == (0, 1))
+        })
+        .unwrap();
+    let third = *sliver.faces[side].iter().find(|&&v| v > 1).unwrap();
+    sliver.faces[side] = [0, 8, third];
+    sliver.faces.extend([[8, 1, third], [0, 1, 8]]);
+    let error = error(sliver);
+    assert!(matches!(error, Error::NoArea { faces: 1, .. }), "{error}");
+}
+
+#[test]
+fn placement_centres_and_scales() {
+    let mut mesh = cube(1.0);
+    for x in &mut mesh.vertices {
+        *x = [3.0 * x[0] + 7.0, x[1] - 2.0, 2.0 * x[2]];
+    }
+    let mesh = closed(mesh);
+    let grid = Grid::<3>::new(16, 1.0).unwrap();
+    let placement = Placement::fit(&mesh, &grid, 0.6, 0.2).unwrap();
+    near(placement.scale(), 0.1, 1e-16);
+    let placed = mesh.placed(&placement).bounding_box();
+    for (axis, half) in [0.3, 0.1, 0.2].into_iter().enumerate() {
+        near(placed.min[axis], 0.5 - half, 1e-15);
+        near(placed.max[axis], 0.5 + half, 1e-15);
+    }
+    for x in &mesh.mesh().vertices {
+        let back = placement.apply_inverse(placement.apply(*x));
+        (0..3).for_each(|i| near(back[i], x[i], 1e-14));
+    }
+    near(
+        mesh.placed(&placement).volume(),
+        1e-3 * mesh.volume(),
+        1e-15,
+    );
+
+    let error = Placement::fit(&mesh, &grid, 0.8, 0.2).unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .ends_with("the largest side length that fits is 0.6"),
+        "{error}"
+    );
+    assert!(Placement::fit(&mesh, &grid, f64::NAN, 0.1).is_err());
+    assert!(Placement::fit(&mesh, &grid, 0.0, 0.1).is_err());
+    assert!(Placement::fit(&mesh, &grid, 0.5, -0.1).is_err());
+    assert!(Placement::fit(&mesh, &grid, 1e-9, 0.6).is_err());
+}
+
+#[test]
+fn placement_may_leave_the_mesh_alone() {
+    let mesh = closed(translated(cube(0.25), [0.5, 0.5, 0.5]));
+    let grid = Grid::<3>::new(16, 1.0).unwrap();
+    let kept = mesh.placed(&Placement::keep(&mesh, &grid, 0.25).unwrap());
+    assert_eq!(kept, mesh);
+    let error = Placement::keep(&mesh, &grid, 0.3).unwrap_err();
+    assert!(matches!(error, Error::Outside { .. }), "{error}");
+    let centred = Grid::<3>::centred(16, 1.0).unwrap();
+    assert!(Placement::keep(&mesh, &centred, 0.0).is_err());
+}

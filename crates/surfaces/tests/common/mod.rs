@@ -1,0 +1,140 @@
+//! Meshes for the tests.
+#![allow(dead_code, reason = "every test program uses some of them")]
+#![allow(clippy::float_cmp, reason = "equal vertices are computed alike")]
+
+use surfaces::{ClosedMesh, TriangleMesh};
+
+pub fn cube(half: f64) -> TriangleMesh {
+    let vertices =
+        (0..8).map(|bits| [2, 1, 0].map(|axis| if bits >> axis & 1 == 1 { half } else { -half }));
+    let quads = [
+        [0, 1, 3, 2],
+        [4, 6, 7, 5],
+        [0, 4, 5, 1],
+        [2, 3, 7, 6],
+        [0, 2, 6, 4],
+        [1, 5, 7, 3],
+    ];
+    TriangleMesh {
+        vertices: vertices.collect(),
+        faces: quads
+            .iter()
+            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+            .collect(),
+        normals: None,
+    }
+}
+
+/// A torus about the third axis with `n` by `m` vertices.
+pub fn torus(major: f64, minor: f64, n: u32, m: u32) -> TriangleMesh {
+    let turn = |i: u32, n: u32| f64::from(i) / f64::from(n) * std::f64::consts::TAU;
+    let vertices = (0..n * m).map(|index| {
+        let (a, b) = (turn(index / m, n), turn(index % m, m));
+        let ring = major + minor * b.cos();
+        [ring * a.cos(), ring * a.sin(), minor * b.sin()]
+    });
+    let faces = (0..n * m).flat_map(|index| {
+        let (i, j) = (index / m, index % m);
+        let at = |i: u32, j: u32| (i % n) * m + j % m;
+        let [p, q, r, s] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        [[p, q, r], [p, r, s]]
+    });
+    TriangleMesh {
+        vertices: vertices.collect(),
+        faces: faces.collect(),
+        normals: None,
+    }
+}
+
+/// A sphere as an octahedron, subdivided.
+pub fn sphere(centre: [f64; 3], radius: f64, levels: usize) -> TriangleMesh {
+    let mut corners: Vec<[[f64; 3]; 3]> = (0..8)
+        .map(|octant| {
+            let sign = |axis: u32| if octant >> axis & 1 == 1 { -1.0 } else { 1.0 };
+            let [x, y, z] = [
+                [sign(0), 0.0, 0.0],
+                [0.0, sign(1), 0.0],
+                [0.0, 0.0, sign(2)],
+            ];
+            if sign(0) * sign(1) * sign(2) > 0.0 {
+                [x, y, z]
+            } else {
+                [x, z, y]
+            }
+        })
+        .collect();
+    for _ in 0..levels {
+        corners = corners
+            .into_iter()
+            .flat_map(|[a, b, c]| {
+                let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[p, q]| {
+                    let middle: [f64; 3] = std::array::from_fn(|i| p[i] + q[i]);
+                    let length = middle.iter().map(|v| v * v).sum::<f64>().sqrt();
+                    middle.map(|v| v / length)
+                });
+                [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+            })
+            .collect();
+    }
+    let mut mesh = TriangleMesh::default();
+    for triangle in corners {
+        let face = triangle.map(|x| {
+            let x: [f64; 3] = std::array::from_fn(|i| centre[i] + radius * x[i]);
+            let known = mesh.vertices.iter().position(|v| *v == x);
+            known.unwrap_or_else(|| {
+                mesh.vertices.push(x);
+                mesh.vertices.len() - 1
+            }) as u32
+        });
+        mesh.faces.push(face);
+    }
+    mesh
+}
+
+pub fn reversed(mut mesh: TriangleMesh) -> TriangleMesh {
+    for face in &mut mesh.faces {
+        face.swap(0, 1);
+    }
+    mesh
+}
+
+pub fn translated(mut mesh: TriangleMesh, shift: [f64; 3]) -> TriangleMesh {
+    for x in &mut mesh.vertices {
+        *x = std::array::from_fn(|i| x[i] + shift[i]);
+    }
+    mesh
+}
+
+/// Both, as separate components.
+pub fn together(mut a: TriangleMesh, b: &TriangleMesh) -> TriangleMesh {
+    let offset = a.vertices.len() as u32;
+    a.vertices.extend(&b.vertices);
+    a.faces
+        .extend(b.faces.iter().map(|f| f.map(|v| v + offset)));
+    a.normals = None;
+    a
+}
+
+pub fn closed(mesh: TriangleMesh) -> ClosedMesh {
+    let (closed, warnings) = ClosedMesh::new(mesh).unwrap();
+    assert_eq!(warnings, []);
+    closed
+}
+
+/// Reproducible numbers in `[0, 1)` (Knuth's linear congruential generator).
+pub struct Numbers(pub u64);
+
+impl Numbers {
+    pub fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// In a box.
+    pub fn point(&mut self, min: [f64; 3], max: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|i| min[i] + (max[i] - min[i]) * self.next())
+    }
+}

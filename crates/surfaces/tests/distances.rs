@@ -1,0 +1,264 @@
+//! The distance to a mesh against all its triangles, one by one.
+
+#![allow(clippy::float_cmp, reason = "where equality is asserted, it is exact")]
+
+mod common;
+
+use std::path::PathBuf;
+
+use common::{Numbers, closed, cube, reversed, sphere, together, torus, translated};
+use geometry::{Field, Grid, SignedDistance, shapes};
+use surfaces::{ClosedMesh, MeshDistance, Placement, samples};
+
+type Point = [f64; 3];
+
+fn sub(a: Point, b: Point) -> Point {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: Point, b: Point) -> Point {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+fn length(a: Point) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// Distance to a segment.
+fn to_segment(x: Point, [a, b]: [Point; 2]) -> f64 {
+    let (ab, ax) = (sub(b, a), sub(x, a));
+    let along = (dot(ax, ab) / dot(ab, ab)).clamp(0.0, 1.0);
+    length(std::array::from_fn(|i| ax[i] - along * ab[i]))
+}
+
+/// Distance to a triangle: to its plane over the inside, else to the nearest side.
+fn to_triangle(x: Point, [a, b, c]: [Point; 3]) -> f64 {
+    let normal = cross(sub(b, a), sub(c, a));
+    let sides = [[a, b], [b, c], [c, a]];
+    if sides
+        .iter()
+        .all(|&[p, q]| dot(cross(sub(q, p), sub(x, p)), normal) >= 0.0)
+    {
+        dot(sub(x, a), normal).abs() / length(normal)
+    } else {
+        sides
+            .into_iter()
+            .map(|s| to_segment(x, s))
+            .fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Solid angle over `4 pi`, summed: 1 inside, 0 outside.
+fn winding_number(x: Point, triangles: &[[Point; 3]]) -> f64 {
+    let angle = |triangle: &[Point; 3]| {
+        let [a, b, c] = triangle.map(|v| sub(v, x));
+        let [la, lb, lc] = [a, b, c].map(length);
+        let denominator = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
+        2.0 * dot(a, cross(b, c)).atan2(denominator)
+    };
+    triangles.iter().map(angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
+}
+
+/// Compares at random points in and around the bounding box, and at points near the surface.
+/// Returns the largest error.
+fn compare(name: &str, mesh: &ClosedMesh, points: usize) -> f64 {
+    let vertices = &mesh.mesh().vertices;
+    let triangles: Vec<[Point; 3]> = mesh
+        .mesh()
+        .faces
+        .iter()
+        .map(|f| f.map(|v| vertices[v as usize]))
+        .collect();
+    let distance = MeshDistance::new(mesh);
+    let bounds = mesh.bounding_box();
+    let side = bounds.longest_side();
+    let mut numbers = Numbers(7);
+    let mut worst = 0.0_f64;
+    for index in 0..points {
+        let wide = 0.2 * side;
+        let x = if index % 2 == 0 {
+            numbers.point(bounds.min.map(|v| v - wide), bounds.max.map(|v| v + wide))
+        } else {
+            // Close to a corner, an edge or a face: these decide the sign.
+            let triangle = triangles[(numbers.next() * triangles.len() as f64) as usize];
+            let weights = match index % 6 {
+                1 => [1.0, 0.0, 0.0],
+                3 => [0.4, 0.6, 0.0],
+                _ => [0.3, 0.3, 0.4],
+            };
+            let foot: Point =
+                std::array::from_fn(|i| (0..3).map(|k| weights[k] * triangle[k][i]).sum());
+            let reach = side * 10_f64.powf(-1.0 - 4.0 * numbers.next());
+            numbers.point(foot.map(|v| v - reach), foot.map(|v| v + reach))
+        };
+        let unsigned = triangles
+            .iter()
+            .map(|t| to_triangle(x, *t))
+            .fold(f64::INFINITY, f64::min);
+        let winding = winding_number(x, &triangles);
+        assert!(
+            (winding - winding.round()).abs() < 1e-6,
+            "{name}: {winding} at {x:?}"
+        );
+        let expected = if winding > 0.5 { -unsigned } else { unsigned };
+        let error = (distance.signed_distance(x) - expected).abs() / side;
+        assert!(
+            error < 1e-12,
+            "{name}: {} for {expected} at {x:?}",
+            distance.signed_distance(x)
+        );
+        worst = worst.max(error);
+    }
+    worst
+}
+
+#[test]
+fn distances_agree_with_brute_force() {
+    let cavity = together(
+        sphere([0.0; 3], 0.5, 3),
+        &reversed(sphere([0.1, 0.0, 0.0], 0.3, 2)),
+    );
+    let island = together(cavity.clone(), &sphere([0.1, 0.05, 0.0], 0.1, 2));
+    // Two cubes that share one vertex.
+    let mut touching = together(cube(0.3), &translated(cube(0.2), [0.5; 3]));
+    for corner in touching.faces.as_flattened_mut() {
+        if *corner == 8 {
+            *corner = 7;
+        }
+    }
+    touching.vertices.swap_remove(8);
+    for corner in touching.faces.as_flattened_mut() {
+        if *corner == 15 {
+            *corner = 8;
+        }
+    }
+    let cases = [
+        ("cube", closed(cube(0.4))),
+        ("torus", closed(torus(0.5, 0.2, 40, 20))),
+        ("thin torus", closed(torus(0.5, 0.01, 60, 5))),
+        ("cavity", closed(cavity)),
+        ("island", closed(island)),
+        ("touching", closed(touching)),
+        (
+            "far away",
+            closed(translated(torus(0.5, 0.2, 20, 10), [30.0, -20.0, 50.0])),
+        ),
+        ("figure", samples::figure(48).unwrap()),
+        ("lever", samples::lever(48).unwrap()),
+    ];
+    for (name, mesh) in cases {
+        let points = if mesh.mesh().faces.len() > 5000 {
+            200
+        } else {
+            2000
+        };
+        compare(name, &mesh, points);
+    }
+}
+
+#[test]
+fn tiny_and_huge_meshes_are_as_exact() {
+    for size in [1e-70, 3e-9, 7e11, 1e69] {
+        let mut mesh = cube(0.5);
+        mesh.vertices = mesh
+            .vertices
+            .iter()
+            .map(|x| x.map(|v| v * 2.0 * size))
+            .collect();
+        let distance = MeshDistance::new(&closed(mesh));
+        let cuboid = shapes::Cuboid::new([1.0; 3]).unwrap();
+        let mut numbers = Numbers(3);
+        for _ in 0..500 {
+            let x = numbers.point([-2.0; 3], [2.0; 3]);
+            let expected = cuboid.signed_distance(x);
+            let found = distance.signed_distance(x.map(|v| v * size)) / size;
+            assert!(
+                (found - expected).abs() < 1e-14,
+                "{found} for {expected} at {x:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn points_that_are_not_finite_have_no_distance() {
+    let distance = MeshDistance::new(&closed(cube(0.5)));
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e200] {
+        assert!(distance.signed_distance([bad, 0.0, 0.0]).is_nan(), "{bad}");
+    }
+    assert!(distance.signed_distance([0.5, 0.1, 0.2]).abs() < 1e-15);
+}
+
+#[test]
+fn sampling_is_the_distance_at_every_node() {
+    let grid = Grid::<3>::centred(24, 1.5).unwrap();
+    for mesh in [closed(torus(0.5, 0.2, 40, 20)), samples::lever(48).unwrap()] {
+        let distance = MeshDistance::new(&mesh);
+        let layers = std::sync::atomic::AtomicUsize::new(0);
+        let count = || {
+            layers.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        };
+        let sampled = distance.sample(grid, count).unwrap();
+        assert_eq!(layers.into_inner(), 24);
+        let direct = Field::from_fn(grid, |x| distance.signed_distance(x));
+        for (index, (a, b)) in sampled.values().iter().zip(direct.values()).enumerate() {
+            assert!((a - b).abs() < 1e-15, "{a} for {b} at node {index}");
+        }
+    }
+    let far = grid.with_origin([1e200; 3]).unwrap();
+    let distance = MeshDistance::new(&closed(cube(0.5)));
+    let error = distance.sample(far, || ()).unwrap_err();
+    assert!(error.to_string().contains("node 0 is NaN"), "{error}");
+}
+
+#[test]
+fn results_do_not_depend_on_the_number_of_threads() {
+    let grid = Grid::<3>::centred(20, 1.0).unwrap();
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        pool.build().unwrap().install(|| {
+            let lever = samples::lever(48).unwrap();
+            let sampled = MeshDistance::new(&lever).sample(grid, || ()).unwrap();
+            (lever, sampled)
+        })
+    };
+    let one = with(1);
+    assert!(one == with(2) && one == with(5));
+}
+
+#[test]
+fn placed_meshes_keep_their_distances() {
+    let mesh = closed(translated(torus(5.0, 2.0, 40, 20), [100.0, 3.0, -7.0]));
+    let grid = Grid::<3>::new(16, 2.0).unwrap();
+    let placement = Placement::fit(&mesh, &grid, 1.4, 0.3).unwrap();
+    let before = MeshDistance::new(&mesh);
+    let after = MeshDistance::new(&mesh.placed(&placement));
+    for index in 0..grid.len() {
+        let x = grid.node(index);
+        let expected = placement.scale() * before.signed_distance(placement.apply_inverse(x));
+        assert!((after.signed_distance(x) - expected).abs() < 1e-13);
+    }
+}
+
+/// Scanned meshes that cannot be part of the repository.
+#[test]
+fn scanned_meshes_agree_with_brute_force() {
+    let Some(folder) = std::env::var_os("WORKBENCH_MESHES").map(PathBuf::from) else {
+        println!("skipped: set WORKBENCH_MESHES to a folder with armadillo.obj and rocker-arm.obj");
+        return;
+    };
+    for (name, genus) in [("armadillo.obj", 0), ("rocker-arm.obj", 1)] {
+        let mesh = closed(surfaces::read(folder.join(name)).unwrap());
+        assert_eq!((mesh.components(), mesh.genus()), (1, genus), "{name}");
+        let worst = compare(name, &mesh, 300);
+        println!("{name}: 300 points, largest error {worst:.1e} of the longest side");
+    }
+}

@@ -1,0 +1,610 @@
+//! Mesh files: round trips, variants of the formats, and files that are none.
+
+#![allow(clippy::float_cmp, reason = "files keep every bit")]
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+use std::sync::LazyLock;
+
+use common::{cube, sphere, torus};
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+use surfaces::{ClosedMesh, Error, FormatError, TriangleMesh, read, samples, write};
+
+/// Reads bytes as a file with that extension.
+fn decode(extension: &str, bytes: &[u8]) -> Result<TriangleMesh, Error> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mesh").with_extension(extension);
+    fs::write(&path, bytes).unwrap();
+    read(&path)
+}
+
+/// The bytes of a written file.
+fn encode(extension: &str, mesh: &TriangleMesh) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mesh").with_extension(extension);
+    write(&path, mesh).unwrap();
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    fs::read(&path).unwrap()
+}
+
+fn problem(extension: &str, bytes: impl AsRef<[u8]>) -> FormatError {
+    match decode(extension, bytes.as_ref()).unwrap_err() {
+        Error::Format { problem, .. } => problem,
+        other => panic!("{other}"),
+    }
+}
+
+#[test]
+fn obj_and_ply_round_trip_bit_for_bit() {
+    let with_normals = samples::lever(48).unwrap().into_mesh();
+    assert!(with_normals.normals.is_some());
+    for mesh in [torus(0.5, 1.0 / 7.0, 30, 20), with_normals] {
+        assert_eq!(decode("ply", &encode("ply", &mesh)).unwrap(), mesh);
+        let plain = TriangleMesh {
+            normals: None,
+            ..mesh.clone()
+        };
+        assert_eq!(decode("OBJ", &encode("obj", &mesh)).unwrap(), plain);
+    }
+}
+
+#[test]
+fn stl_round_trips_in_single_precision() {
+    for mesh in [cube(0.5), samples::figure(48).unwrap().into_mesh()] {
+        let bytes = encode("stl", &mesh);
+        assert_eq!(bytes.len(), 84 + 50 * mesh.faces.len());
+        let back = decode("stl", &bytes).unwrap();
+        assert_eq!(back.vertices.len(), mesh.vertices.len());
+        for (a, b) in mesh
+            .faces
+            .as_flattened()
+            .iter()
+            .zip(back.faces.as_flattened())
+        {
+            let (a, b) = (mesh.vertices[*a as usize], back.vertices[*b as usize]);
+            assert_eq!(a.map(|v| f64::from(v as f32)), b);
+        }
+        let (back, warnings) = ClosedMesh::new(back).unwrap();
+        assert_eq!(warnings, []);
+        assert!(encode("stl", back.mesh()) == bytes);
+    }
+    // The normal of the first facet of the cube points down the first axis.
+    let bytes = encode("stl", &cube(0.5));
+    assert_eq!(
+        bytes[84..96],
+        [(-1.0_f32).to_le_bytes(), [0; 4], [0; 4]].concat()
+    );
+}
+
+const TETRAHEDRON: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+
+#[test]
+fn obj_variants_are_understood() {
+    let expected = decode(
+        "obj",
+        &[TETRAHEDRON, "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4"]
+            .concat()
+            .into_bytes(),
+    );
+    let expected = expected.unwrap();
+    assert_eq!(expected.faces, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]);
+    assert_eq!(ClosedMesh::new(expected.clone()).unwrap().1, []);
+    for faces in [
+        "f 1/1/1 3/9/9 2//7\nf 1/5 2/ 4//\ng a\nf 1 4 3\no b\nf 2 3 4",
+        "f -4 -2 -3\nf -4 -3 -1\nf 1 -1 3\nusemtl x\nf 2 3 4\nl 1 2 3\np 1",
+        "\r\n# \u{e9}\r\nf 1 3 2\r\n\tf  1 2 4 \r\nf 1 4 3\r\nvt nonsense\r\nf 2 3 4\r\n",
+    ] {
+        let text = [TETRAHEDRON, faces].concat();
+        assert_eq!(decode("obj", text.as_bytes()).unwrap(), expected, "{faces}");
+    }
+    // Colours, weights, Latin-1 comments; vertices after the faces.
+    let bytes = b"# caf\xe9\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n\
+                  v 0 0 0 1 0 0\nv 1 0 0 1.0\nv +0 1. 0e0\nv 0 -0 .1e1\n";
+    let mesh = decode("obj", bytes).unwrap();
+    assert_eq!(mesh.faces, expected.faces);
+    assert_eq!(mesh.vertices, expected.vertices);
+    // Polygons as fans.
+    let quads = [TETRAHEDRON, "f 1 2 3 4\nv 0 0 0\nf 5 4 3 2 1"].concat();
+    let faces = decode("obj", quads.as_bytes()).unwrap().faces;
+    assert_eq!(
+        faces,
+        [[0, 1, 2], [0, 2, 3], [4, 3, 2], [4, 2, 1], [4, 1, 0]]
+    );
+}
+
+#[test]
+fn broken_obj_files_are_explained() {
+    let message = |text: &str| problem("obj", [TETRAHEDRON, text].concat()).to_string();
+    for (text, expected) in [
+        (
+            "f 1 2 3\nf 1 2 9",
+            "face 1 refers to vertex 9, but the file has 4 vertices, the first of which is 1",
+        ),
+        (
+            "f 0 1 2",
+            "face 0 refers to vertex 0, but the file has 4 vertices, the first of which is 1",
+        ),
+        (
+            "f 1 2 -5",
+            "line 5 has \"-5\" where a relative index of a vertex above is expected",
+        ),
+        (
+            "f 1 2 99999999999999999999",
+            "line 5 has \"99999999999999999999\" where the index of a vertex is expected",
+        ),
+        (
+            "f 1 2 -9223372036854775808",
+            "line 5 has \"-9223372036854775808\" where a relative index of a vertex above is \
+             expected",
+        ),
+        (
+            "f 1 2 9223372036854775807",
+            "face 0 refers to vertex 9223372036854775807, but the file has 4 vertices, the first \
+             of which is 1",
+        ),
+        (
+            "f 1 2 4294967297",
+            "face 0 refers to vertex 4294967297, but the file has 4 vertices, the first of which \
+             is 1",
+        ),
+        (
+            "f 1 2 3.5",
+            "line 5 has \"3.5\" where the index of a vertex is expected",
+        ),
+        (
+            "f 1 /2 3",
+            "line 5 has \"/2\" where the index of a vertex is expected",
+        ),
+        (
+            "f 1 2 3\nf 1 2",
+            "face 1 has 2 corners; a face needs at least three",
+        ),
+        ("f", "face 0 has 0 corners; a face needs at least three"),
+        ("v 1 2", "line 5 has \"\" where a coordinate is expected"),
+        (
+            "v 1 2 1,5",
+            "line 5 has \"1,5\" where a coordinate is expected",
+        ),
+        (
+            "v 1 nan 2",
+            "vertex 4 has the coordinate NaN; all coordinates must be finite",
+        ),
+        (
+            "v 1 2 -1e999",
+            "vertex 4 has the coordinate -inf; all coordinates must be finite",
+        ),
+        (
+            "g empty",
+            "the file has 4 vertices and no faces: no mesh, or another format",
+        ),
+    ] {
+        assert_eq!(message(text), expected);
+    }
+    let long = message(&format!("v 1 2 {}", "x".repeat(1000)));
+    assert!(long.len() < 150 && long.contains("xxx ...\""), "{long}");
+    assert!(matches!(problem("obj", ""), FormatError::Empty));
+}
+
+const FACET: &str = "facet normal 0 0 1\n outer loop\n  vertex 0 0 0\n  vertex 1 0 0\n  \
+                     vertex 0 1.5e0 0\n endloop\nendfacet\n";
+
+#[test]
+fn stl_variants_are_understood() {
+    let expected = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.5, 0.0]];
+    for text in [
+        format!("solid a b\n{FACET}endsolid a b\n"),
+        format!("solid\n{FACET}endsolid"),
+        format!(
+            "\r\n  SOLID\r\n{}ENDSOLID\r\n",
+            FACET.to_ascii_uppercase().replace('\n', "\r\n")
+        ),
+        format!(
+            "solid nan\n{}endsolid nan",
+            FACET.replace("0 0 1\n", "nan nan nan\n")
+        ),
+    ] {
+        let mesh = decode("stl", text.as_bytes()).unwrap();
+        assert_eq!(
+            (mesh.vertices, mesh.faces),
+            (expected.to_vec(), vec![[0, 1, 2]]),
+            "{text}"
+        );
+    }
+    let two = format!("solid a\n{FACET}endsolid a\nsolid b\n{FACET}{FACET}endsolid b");
+    assert_eq!(decode("stl", two.as_bytes()).unwrap().faces, [[0, 1, 2]; 3]);
+
+    // Binary, with a comment that looks like ASCII.
+    let mut bytes = encode("stl", &cube(0.5));
+    bytes[..20].copy_from_slice(b"solid not ascii\n\xff\xfe\0\n");
+    assert_eq!(decode("stl", &bytes).unwrap().faces.len(), 12);
+}
+
+#[test]
+fn broken_stl_files_are_explained() {
+    let good = encode("stl", &cube(0.5));
+    assert_eq!(
+        problem("stl", &good[..600]).to_string(),
+        "the header announces 12 facets, which take at least 684 bytes, but the file has 600: \
+         truncated, or another format"
+    );
+    let mut huge = good.clone();
+    huge[80..84].fill(0xff);
+    let text = problem("stl", &huge).to_string();
+    assert!(
+        text.contains("4294967295 facets, which take at least 214748364834 bytes"),
+        "{text}"
+    );
+    let mut none = good[..84].to_vec();
+    none[80..84].fill(0);
+    assert!(matches!(problem("stl", &none), FormatError::NoFaces { .. }));
+    let mut bad = good;
+    bad[84 + 50 + 12 + 16..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
+    assert!(matches!(
+        problem("stl", &bad),
+        FormatError::NonFinite { vertex: 4, .. }
+    ));
+
+    let message = |text: String| problem("stl", text).to_string();
+    for (text, expected) in [
+        (
+            format!("solid a\n{FACET}"),
+            "the file ends in line 8 where endsolid is expected: it is truncated",
+        ),
+        (
+            format!("solid a\n{}", &FACET[..60]),
+            "the file ends in line 5 where endsolid is expected: it is truncated",
+        ),
+        (
+            format!("solid a\n{FACET}vertex 1 2 3\nendsolid"),
+            "line 9 has \"vertex 1 2 3\" where facet or endsolid is expected",
+        ),
+        (
+            format!(
+                "solid a\n{}endsolid",
+                FACET.replace("endloop", "vertex 1 1 1")
+            ),
+            "face 0 has 4 corners; an STL facet has three",
+        ),
+        (
+            format!("solid a\n{}endsolid", FACET.replace("1.5e0", "one")),
+            "line 6 has \"one\" where a coordinate is expected",
+        ),
+        (
+            format!("solid a\n{}endsolid", FACET.replace("1.5e0", "inf")),
+            "vertex 2 has the coordinate inf; all coordinates must be finite",
+        ),
+        (
+            format!("solid a\n{}endsolid", FACET.replace("endfacet", "facet")),
+            "line 8 has \"facet\" where outer loop, vertex, endloop or endfacet is expected",
+        ),
+        (
+            "solid a\nendsolid".into(),
+            "the file has 0 vertices and no faces: no mesh, or another format",
+        ),
+        (
+            "nonsense".into(),
+            "line 1 has \"nonsense\" where \"solid\", or a binary header of 84 bytes, is expected",
+        ),
+    ] {
+        assert_eq!(message(text), expected);
+    }
+}
+
+/// A tetrahedron in three encodings, with properties and elements that are passed over.
+fn ply(format: &str) -> Vec<u8> {
+    let header = format!(
+        "ply\nformat {format} 1.0\ncomment a b\nelement camera 1\nproperty list uchar float view\n\
+         element vertex 4\nproperty uchar red\nproperty float x\nproperty double y\n\
+         property short z\n\
+         element face 3\nproperty list uchar int vertex_index\nproperty float quality\n\
+         element edge 1\nproperty int a\nend_header\n"
+    );
+    let corners = [
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0],
+    ];
+    let faces: [&[i32]; 3] = [&[0, 2, 1], &[0, 1, 3], &[0, 3, 2, 1]];
+    let mut bytes = header.into_bytes();
+    if format == "ascii" {
+        bytes.extend(b"2 1.5 2.5\n0 0 0 0\n1 1 0 0\n2 0 1.0 0\n3 0 0 1\n");
+        bytes.extend(b"3 0 2 1 0.5\n3 0 1 3 0.5\n4 0 3 2 1 0.5\n7\n");
+        return bytes;
+    }
+    let big = format == "binary_big_endian";
+    let mut put = |value: &[u8]| {
+        // Given little-endian.
+        let mut value = value.to_vec();
+        if big {
+            value.reverse();
+        }
+        bytes.extend(value);
+    };
+    put(&[2]);
+    put(&1.5_f32.to_le_bytes());
+    put(&2.5_f32.to_le_bytes());
+    for (colour, [x, y, z]) in corners.into_iter().enumerate() {
+        put(&[colour as u8]);
+        put(&(x as f32).to_le_bytes());
+        put(&f64::to_le_bytes(y));
+        put(&(z as i16).to_le_bytes());
+    }
+    for face in faces {
+        put(&[face.len() as u8]);
+        for v in face {
+            put(&v.to_le_bytes());
+        }
+        put(&0.5_f32.to_le_bytes());
+    }
+    put(&7_i32.to_le_bytes());
+    bytes
+}
+
+const ENCODINGS: [&str; 3] = ["ascii", "binary_little_endian", "binary_big_endian"];
+
+#[test]
+fn ply_variants_are_understood() {
+    for format in ENCODINGS {
+        let mesh = decode("ply", &ply(format)).unwrap();
+        assert_eq!(mesh.vertices[3], [0.0, 0.0, 1.0], "{format}");
+        assert_eq!(
+            mesh.faces,
+            [[0, 2, 1], [0, 1, 3], [0, 3, 2], [0, 2, 1]],
+            "{format}"
+        );
+        assert_eq!(mesh.normals, None);
+    }
+}
+
+#[test]
+fn broken_ply_files_are_explained() {
+    let text = String::from_utf8(ply("ascii")).unwrap();
+    let message = |from: &str, to: &str| {
+        assert!(text.contains(from));
+        problem("ply", text.replacen(from, to, 1)).to_string()
+    };
+    for (from, to, expected) in [
+        (
+            "3 0 1 3",
+            "3 0 1 4",
+            "face 1 refers to vertex 4, but the file has 4 vertices, the first of which is 0",
+        ),
+        (
+            "3 0 1 3",
+            "3 0 1 -3",
+            "face 1 refers to vertex -3, but the file has 4 vertices, the first of which is 0",
+        ),
+        (
+            "3 0 1 3",
+            "2 0 1",
+            "face 1 has 2 corners; a face needs at least three",
+        ),
+        (
+            "float x",
+            "float X",
+            "the header does not declare x, y and z of vertex",
+        ),
+        (
+            "vertex_index",
+            "indices",
+            "the header does not declare a list vertex_indices of face",
+        ),
+        (
+            "element vertex",
+            "element point",
+            "the header does not declare an element vertex",
+        ),
+        (
+            "element face",
+            "element patch",
+            "the header does not declare an element face",
+        ),
+        (
+            "1 1 0 0\n",
+            "1 1 1e999 0\n",
+            "vertex 1 has the coordinate inf; all coordinates must be finite",
+        ),
+        (
+            "element edge 1\nproperty int a",
+            "element edge 9",
+            "the header announces 9 elements \"edge\" without properties",
+        ),
+    ] {
+        assert_eq!(message(from, to), expected);
+    }
+    let text = message("vertex 4\n", "vertex 4000000000\n");
+    assert!(
+        text.starts_with(
+            "the header announces 4000000000 elements \"vertex\", which take at least 3200000"
+        ),
+        "{text}"
+    );
+    for (from, to) in [
+        ("element vertex 4", "element vertex -4"),
+        ("element vertex 4", "element vertex 99999999999999999999"),
+        ("format ascii", "format utf8"),
+        ("ply\n", "plx\n"),
+        ("end_header", "end"),
+        ("1 1 0 0\n", "1 nan 0 0\n"),
+        ("1 1 0 0\n", "1 1\n"),
+        ("3 0 1 3", "4294967295 0 1 3"),
+        ("3 0 1 3", "0 0 1 3"),
+        ("float x", "list uchar float x"),
+    ] {
+        let text = message(from, to);
+        assert!(!text.contains('\n') && text.len() < 200, "{text:?}");
+    }
+    for format in ENCODINGS {
+        let good = ply(format);
+        for length in 0..good.len() - 2 {
+            let text = problem("ply", &good[..length]).to_string();
+            assert!(!text.contains('\n') && text.len() < 200, "{text:?}");
+        }
+    }
+    // A list of 2^31 corners, announced by a few bytes.
+    let header = "ply\nformat binary_little_endian 1.0\nelement vertex 1\n\
+                  property float x\nproperty float y\nproperty float z\nelement face 1\n\
+                  property list uint int vertex_indices\nend_header\n";
+    let bytes = [header.as_bytes(), &[0; 12], &[0, 0, 0, 0x80], &[0; 40]].concat();
+    assert!(matches!(problem("ply", bytes), FormatError::Ply { .. }));
+}
+
+#[test]
+fn unusable_normals_are_dropped() {
+    let mut mesh = cube(0.5);
+    mesh.normals = Some(vec![[0.0, 0.0, 1.0]; 8]);
+    let mut bytes = encode("ply", &mesh);
+    let end = bytes
+        .windows(11)
+        .position(|w| w == b"end_header\n")
+        .unwrap()
+        + 11;
+    bytes[end + 24..end + 32].copy_from_slice(&f64::NAN.to_le_bytes());
+    assert_eq!(decode("ply", &bytes).unwrap(), cube(0.5));
+}
+
+#[test]
+fn unknown_extensions_and_missing_files_are_told() {
+    for path in ["mesh.off", "mesh", "obj", ".ply", "mesh.stl.gz"] {
+        let text = read(path).unwrap_err().to_string();
+        assert_eq!(
+            text,
+            format!(
+                "{path} has no known extension; meshes are read and written as .obj, .ply or .stl"
+            )
+        );
+        assert!(matches!(
+            write(path, &cube(1.0)),
+            Err(Error::UnknownFormat { .. })
+        ));
+    }
+    let text = read("no/such/file.ply").unwrap_err().to_string();
+    assert_eq!(text, "could not read no/such/file.ply");
+    assert!(write("no/such/file.ply", &cube(1.0)).is_err());
+    assert!(
+        read(
+            Path::new(env!("CARGO_MANIFEST_DIR"))
+                .join("src")
+                .with_extension("obj")
+        )
+        .is_err()
+    );
+}
+
+#[test]
+fn unusable_meshes_are_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    for extension in ["obj", "ply", "stl"] {
+        let path = folder.path().join("mesh").with_extension(extension);
+        assert!(matches!(
+            write(&path, &TriangleMesh::default()),
+            Err(Error::NoFaces)
+        ));
+        let mut mesh = cube(1.0);
+        mesh.vertices[5][1] = f64::NAN;
+        assert!(matches!(
+            write(&path, &mesh),
+            Err(Error::NonFiniteVertex { vertex: 5, .. })
+        ));
+        let mut mesh = cube(1.0);
+        mesh.faces[2][0] = 8;
+        assert!(matches!(
+            write(&path, &mesh),
+            Err(Error::IndexOutOfRange { face: 2, .. })
+        ));
+        let mut mesh = cube(1.0);
+        mesh.normals = Some(Vec::new());
+        assert!(matches!(write(&path, &mesh), Err(Error::Normals { .. })));
+    }
+    let huge = cube(1e39);
+    let text = write(folder.path().join("mesh.stl"), &huge)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        text.contains("at most 3.4028234663852886e38 in this format"),
+        "{text}"
+    );
+    assert!(write(folder.path().join("mesh.ply"), &huge).is_ok());
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+/// Whatever was read can be checked; whatever was not has one line to say.
+fn exercise(extension: &str, bytes: &[u8]) {
+    match decode(extension, bytes) {
+        Ok(mesh) => {
+            assert!(
+                mesh.faces
+                    .as_flattened()
+                    .iter()
+                    .all(|&v| (v as usize) < mesh.vertices.len())
+            );
+            assert!(mesh.vertices.iter().flatten().all(|v| v.is_finite()));
+            let _ = ClosedMesh::new(mesh);
+        }
+        Err(error) => {
+            let text = error.to_string();
+            assert!(!text.contains('\n') && text.len() < 400, "{text:?}");
+        }
+    }
+}
+
+/// Valid files of all formats.
+static VALID_FILES: LazyLock<Vec<(&str, Vec<u8>)>> = LazyLock::new(|| {
+    let mesh = sphere([0.0; 3], 1.0, 1);
+    let mut files: Vec<_> = ["obj", "ply", "stl"].map(|e| (e, encode(e, &mesh))).into();
+    files.extend(ENCODINGS.map(|format| ("ply", ply(format))));
+    let text = format!("solid a\n{FACET}{FACET}endsolid a\n");
+    files.push(("stl", text.into_bytes()));
+    files
+});
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 400,
+        rng_seed: RngSeed::Fixed(20),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn random_bytes_do_no_harm(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+        for (extension, start) in [
+            ("obj", ""), ("ply", ""), ("stl", ""),
+            ("stl", "solid "), ("obj", "f "), ("ply", "ply\n"),
+            ("ply", "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n\
+                     property float y\nproperty char z\nelement face 2\n\
+                     property list char ushort vertex_indices\nend_header\n"),
+        ] {
+            exercise(extension, &[start.as_bytes(), &bytes].concat());
+        }
+    }
+
+    #[test]
+    fn corrupted_files_do_no_harm(
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+        cut in prop::option::of(any::<prop::sample::Index>()),
+        doubled in prop::option::of(any::<prop::sample::Index>()),
+    ) {
+        for (extension, mut bytes) in VALID_FILES.clone() {
+            for (index, value) in &changes {
+                // Also near the start, where the headers are.
+                let limit = if value % 2 == 0 { bytes.len() } else { bytes.len().min(300) };
+                let at = index.index(limit);
+                let likely = b"0123456789-+.e \n"[usize::from(*value) % 16];
+                bytes[at] = if value % 3 == 0 { likely } else { *value };
+            }
+            if let Some(index) = doubled {
+                let tail = bytes[index.index(bytes.len())..].to_vec();
+                bytes.extend(tail);
+            }
+            if let Some(index) = cut {
+                bytes.truncate(index.index(bytes.len()));
+            }
+            exercise(extension, &bytes);
+        }
+    }
+}

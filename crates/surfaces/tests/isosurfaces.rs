@@ -1,0 +1,322 @@
+//! Isosurfaces: topology, accuracy, symmetry.
+
+#![allow(clippy::float_cmp, reason = "where equality is asserted, it is exact")]
+
+mod common;
+
+use std::f64::consts::PI;
+
+use common::Numbers;
+use geometry::shapes::{Ball, Cuboid, Torus};
+use geometry::{Field, Grid, Rotation, SignedDistance, SignedDistanceExt, phase_field};
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+use surfaces::{ClosedMesh, Error, MeshDistance, isosurface, phase_field_surface, samples};
+
+/// Every edge once in each direction, without mending anything.
+#[track_caller]
+fn closed(mesh: surfaces::TriangleMesh) -> ClosedMesh {
+    let (mesh, warnings) = ClosedMesh::new(mesh).unwrap();
+    assert_eq!(warnings, []);
+    mesh
+}
+
+fn surface(grid: Grid<3>, shape: &impl SignedDistance<3>) -> ClosedMesh {
+    let eps = 2.0 * grid.spacing();
+    closed(phase_field_surface(&phase_field(grid, shape, eps).unwrap(), eps).unwrap())
+}
+
+#[test]
+fn spheres_are_accurate_to_second_order() {
+    let ball = Ball::new([0.011, -0.007, 0.003], 0.3).unwrap();
+    let (area, volume) = (4.0 * PI * 0.09, 4.0 / 3.0 * PI * 0.027);
+    let mut previous: Option<[f64; 2]> = None;
+    for n in [32, 64, 128] {
+        let mesh = surface(Grid::centred(n, 1.0).unwrap(), &ball);
+        assert_eq!((mesh.euler_characteristic(), mesh.genus()), (2, 0));
+        let errors = [mesh.area() / area - 1.0, mesh.volume() / volume - 1.0].map(f64::abs);
+        println!(
+            "n = {n}: relative errors of area {:.1e} and volume {:.1e}",
+            errors[0], errors[1]
+        );
+        if n == 64 {
+            assert!(errors[0] < 5e-4 && errors[1] < 1e-3, "{errors:?}");
+        }
+        if let Some([a, v]) = previous {
+            assert!(
+                errors[0] < 0.3 * a && errors[1] < 0.3 * v,
+                "{errors:?} after {a}, {v}"
+            );
+        }
+        previous = Some(errors);
+    }
+}
+
+#[test]
+fn vertices_and_normals_lie_on_the_sphere() {
+    let ball = Ball::new([0.011, -0.007, 0.003], 0.3).unwrap();
+    let grid = Grid::<3>::centred(64, 1.0).unwrap();
+    let h = grid.spacing();
+    let mesh = surface(grid, &ball).into_mesh();
+    for (x, normal) in mesh.vertices.iter().zip(mesh.normals.unwrap()) {
+        // But for the clearance at nodes, third order: (h/r)^3 r/16 = 2.6e-6.
+        let error = ball.signed_distance(*x).abs();
+        assert!(error < 3e-6 + 1.8 * h / 1024.0, "{error} at {x:?}");
+        let exact = [x[0] - 0.011, x[1] + 0.007, x[2] - 0.003];
+        let length = exact.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let cosine: f64 = (0..3).map(|i| exact[i] / length * normal[i]).sum();
+        assert!((cosine - 1.0).abs() < 1e-4, "{cosine} at {x:?}");
+    }
+}
+
+#[test]
+fn euler_characteristics_are_right() {
+    let grid = Grid::<3>::centred(48, 1.0).unwrap();
+    let torus = Torus::new(0.3, 0.1).unwrap();
+    let mesh = surface(grid, &torus);
+    assert_eq!(
+        (mesh.euler_characteristic(), mesh.components(), mesh.genus()),
+        (0, 1, 1)
+    );
+    let balls = Ball::new([-0.2, 0.0, 0.0], 0.15).unwrap();
+    let balls = balls.union(Ball::new([0.2, 0.05, 0.0], 0.17).unwrap());
+    let mesh = surface(grid, &balls);
+    assert_eq!(
+        (mesh.euler_characteristic(), mesh.components(), mesh.genus()),
+        (4, 2, 0)
+    );
+    let shell = Ball::new([0.0; 3], 0.4).unwrap();
+    let shell = shell.difference(Ball::new([0.0; 3], 0.2).unwrap());
+    let mesh = surface(grid, &shell);
+    assert_eq!((mesh.euler_characteristic(), mesh.components()), (4, 2));
+    let volume = 4.0 / 3.0 * PI * (0.064 - 0.008);
+    assert!(
+        (mesh.volume() / volume - 1.0).abs() < 2e-3,
+        "{}",
+        mesh.volume()
+    );
+}
+
+#[test]
+fn faces_of_a_cube_may_lie_on_nodes() {
+    // All nodes of the surface are exactly zero.
+    let grid = Grid::<3>::centred(32, 1.0).unwrap();
+    let cuboid = Cuboid::new([0.25; 3]).unwrap();
+    let exact = Field::from_fn(grid, |x| cuboid.signed_distance(x));
+    assert!(exact.values().iter().filter(|&&s| s == 0.0).count() > 1000);
+    for s in [exact.clone(), exact.map(|s| -s)] {
+        let mesh = closed(isosurface(&s).unwrap());
+        let reach = |x: &[f64; 3]| x.iter().fold(0.0_f64, |reach, v| reach.max(v.abs()));
+        // But for the cap around the complement.
+        let reaches = mesh.mesh().vertices.iter().map(reach).filter(|r| *r < 0.4);
+        let reach = reaches.fold(0.0, f64::max);
+        assert!((reach - 0.25).abs() <= 1.01 / 1024.0 / 32.0, "{reach}");
+    }
+    let mesh = closed(isosurface(&exact).unwrap());
+    assert!((mesh.volume() - 0.125).abs() < 3e-4, "{}", mesh.volume());
+}
+
+#[test]
+fn shapes_that_leave_the_grid_get_a_cap() {
+    let grid = Grid::<3>::centred(32, 1.0).unwrap();
+    let everything = Field::constant(grid, -1.0);
+    let mesh = closed(isosurface(&everything).unwrap());
+    let reach = 31.0 / 32.0 + 2.0 / 32.0 / 1024.0;
+    assert!(
+        (mesh.volume() - reach * reach * reach).abs() < 1e-6,
+        "{}",
+        mesh.volume()
+    );
+    assert_eq!(mesh.euler_characteristic(), 2);
+
+    let half = closed(isosurface(&Field::from_fn(grid, |[x, y, _]| x.hypot(y) - 0.3)).unwrap());
+    assert!(
+        (half.volume() / (PI * 0.09 * 31.0 / 32.0) - 1.0).abs() < 2e-3,
+        "{}",
+        half.volume()
+    );
+}
+
+#[test]
+fn nothing_inside_gives_no_faces() {
+    let grid = Grid::<3>::centred(8, 1.0).unwrap();
+    let mesh = isosurface(&Field::constant(grid, 1.0)).unwrap();
+    assert!(mesh.faces.is_empty() && mesh.vertices.is_empty());
+    assert!(
+        isosurface(&Field::constant(grid, 0.0))
+            .unwrap()
+            .faces
+            .is_empty()
+    );
+    let mut broken = Field::constant(grid, 1.0);
+    broken.values_mut()[17] = f64::NAN;
+    assert!(
+        isosurface(&broken)
+            .unwrap_err()
+            .to_string()
+            .contains("node 17 is NaN")
+    );
+    assert!(phase_field_surface(&broken, 0.1).is_err());
+    let u = Field::constant(grid, 1.0);
+    for eps in [0.0, -1.0, f64::NAN] {
+        assert!(matches!(
+            phase_field_surface(&u, eps),
+            Err(Error::InvalidParameter { .. })
+        ));
+    }
+}
+
+#[test]
+fn saturated_fields_are_surfaces_too() {
+    // Only -1 and 1, and thin parts of one node.
+    let grid = Grid::<3>::centred(24, 1.0).unwrap();
+    let mut numbers = Numbers(5);
+    let values = (0..grid.len()).map(|_| if numbers.next() < 0.3 { 1.0 } else { -1.0 });
+    let u = Field::from_values(grid, values.collect()).unwrap();
+    let mesh = closed(phase_field_surface(&u, 0.05).unwrap());
+    assert!(
+        mesh.mesh()
+            .normals
+            .as_ref()
+            .unwrap()
+            .iter()
+            .flatten()
+            .all(|v| v.is_finite())
+    );
+
+    // A plate two spacings thick: its distance has a kink in the middle.
+    let h = grid.spacing();
+    let plate = Cuboid::new([0.3, 0.3, h]).unwrap();
+    let mesh = surface(grid, &plate.translated([0.0, 0.0, 0.3 * h]));
+    let volume = 0.36 * 2.0 * h;
+    assert!(
+        (mesh.volume() / volume - 1.0).abs() < 0.03,
+        "{} for {volume}",
+        mesh.volume()
+    );
+}
+
+#[test]
+fn symmetric_fields_have_symmetric_surfaces() {
+    let grid = Grid::<3>::centred(32, 1.0).unwrap();
+    let turn = Rotation::about_axis([1.0, 2.0, 0.5], 0.7).unwrap();
+    let shape = Cuboid::new([0.3, 0.2, 0.1])
+        .unwrap()
+        .rotated(turn)
+        .union(Ball::new([0.2, 0.1, -0.2], 0.15).unwrap());
+    let area = |map: &(dyn Fn([f64; 3]) -> [f64; 3] + Sync)| {
+        surface(grid, &|x| shape.signed_distance(map(x))).area()
+    };
+    let reference = area(&|x| x);
+    for (name, same) in [
+        ("reflected", area(&|[x, y, z]| [-x, y, z])),
+        ("reflected in all axes", area(&|x| x.map(|v| -v))),
+        ("axes exchanged", area(&|[x, y, z]| [z, x, y])),
+        ("turned", area(&|[x, y, z]| [y, -x, z])),
+        ("moved by two cells", area(&|[x, y, z]| [x, y + 0.0625, z])),
+    ] {
+        assert!(
+            (same / reference - 1.0).abs() < 1e-11,
+            "{name}: {same} for {reference}"
+        );
+    }
+    let moved = area(&|[x, y, z]| [x, y + 0.03125, z]);
+    assert!(
+        (moved / reference - 1.0).abs() < 1e-3,
+        "{moved} for {reference}"
+    );
+}
+
+#[test]
+fn sample_meshes_have_their_genus() {
+    for cells in [48, 61, 96] {
+        let figure = samples::figure(cells).unwrap();
+        assert_eq!(
+            (figure.components(), figure.genus()),
+            (1, 0),
+            "figure {cells}"
+        );
+        let lever = samples::lever(cells).unwrap();
+        assert_eq!((lever.components(), lever.genus()), (1, 1), "lever {cells}");
+        for mesh in [figure, lever] {
+            assert!((0.03..0.04).contains(&mesh.volume()), "{}", mesh.volume());
+            assert!((0.85..1.0).contains(&mesh.bounding_box().longest_side()));
+        }
+    }
+    assert!(matches!(
+        samples::figure(47),
+        Err(Error::InvalidParameter { .. })
+    ));
+    assert!(matches!(
+        samples::lever(0),
+        Err(Error::InvalidParameter { .. })
+    ));
+}
+
+#[test]
+fn a_mesh_survives_the_way_through_a_phase_field() {
+    let lever = samples::lever(96).unwrap();
+    let grid = Grid::<3>::centred(64, 1.0).unwrap();
+    let eps = 2.0 * grid.spacing();
+    let distance = MeshDistance::new(&lever);
+    let u = distance.sample(grid, || ()).unwrap();
+    let u = u.map(|s| geometry::optimal_profile(s, eps));
+    let mesh = closed(phase_field_surface(&u, eps).unwrap());
+    assert_eq!((mesh.components(), mesh.genus()), (1, 1));
+    assert!(
+        (mesh.volume() / lever.volume() - 1.0).abs() < 5e-3,
+        "{}",
+        mesh.volume()
+    );
+    assert!(
+        (mesh.area() / lever.area() - 1.0).abs() < 1e-2,
+        "{}",
+        mesh.area()
+    );
+    for x in &mesh.mesh().vertices {
+        let off = distance.signed_distance(*x).abs();
+        assert!(off < 0.5 * grid.spacing(), "{off}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 60,
+        rng_seed: RngSeed::Fixed(20),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    /// Random smooth fields, with values rounded so that zeros and ties are frequent.
+    #[test]
+    fn surfaces_are_always_closed(
+        seed in any::<u64>(),
+        cells in 3..14_usize,
+        levels in prop::sample::select(vec![0.0, 0.5, 2.0, 1e3]),
+    ) {
+        let grid = Grid::<3>::new(cells, 1.0).unwrap();
+        let mut numbers = Numbers(seed);
+        let waves: Vec<([f64; 3], f64, f64)> = (0..6)
+            .map(|_| (numbers.point([-9.0; 3], [9.0; 3]), 6.3 * numbers.next(), numbers.next()))
+            .collect();
+        let s = Field::from_fn(grid, |x| {
+            let wave = |(k, phase, amplitude): &([f64; 3], f64, f64)| {
+                amplitude * (k[0] * x[0] + k[1] * x[1] + k[2] * x[2] + phase).sin()
+            };
+            let s: f64 = waves.iter().map(wave).sum();
+            if levels > 0.0 { (s * levels).round() / levels } else { s }
+        });
+        let mesh = isosurface(&s).unwrap();
+        if !mesh.faces.is_empty() {
+            let mesh = closed(mesh);
+            prop_assert!(mesh.volume() > 0.0);
+            prop_assert!(mesh.euler_characteristic() % 2 == 0);
+            // Nodes are inside if they were: the surface separates them.
+            let distance = MeshDistance::new(&mesh);
+            for index in (0..grid.len()).step_by(7) {
+                let inside = distance.signed_distance(grid.node(index)) < 0.0;
+                prop_assert_eq!(inside, s.values()[index] < 0.0, "node {}", index);
+            }
+        }
+    }
+}
