@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 use surfaces::{ClosedMesh, MeshDistance, Placement, TriangleMesh};
 
 use crate::Error;
+use crate::surfaces::centred_box;
 
 /// Names a folder that holds the meshes of the paper.
 pub const FOLDER_VARIABLE: &str = "WORKBENCH_MESHES";
@@ -28,9 +29,13 @@ pub struct MeshOptions {
     #[arg(long)]
     pub procedural: bool,
 
-    /// Longest side of the mesh in the unit box [default: 0.8]
+    /// Longest side of the mesh
     #[arg(long, value_name = "LENGTH")]
     pub side_length: Option<f64>,
+
+    /// Side of the periodic box, in whose centre the mesh is put
+    #[arg(long, value_name = "LENGTH")]
+    pub box_side: Option<f64>,
 }
 
 /// A mesh of the paper, and what stands in for it.
@@ -39,6 +44,10 @@ pub struct KnownMesh {
     pub file: &'static str,
     /// Name in titles.
     pub title: &'static str,
+    /// Longest side, unless chosen otherwise.
+    pub side_length: f64,
+    /// Side of the box, unless chosen otherwise.
+    pub box_side: f64,
     /// Makes the built-in shape at a resolution.
     pub procedural: fn(usize) -> Result<ClosedMesh, surfaces::Error>,
     /// Its name in titles.
@@ -86,12 +95,20 @@ impl AboutMesh {
 const PROCEDURAL_CELLS: usize = 96;
 
 impl MeshOptions {
+    /// The box around the point (0.5, 0.5, 0.5), with `n` cells per unit length.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] unless `n` times its side is a whole number.
+    pub fn grid(&self, known: &KnownMesh, n: usize) -> Result<Grid<3>, Error> {
+        centred_box(n, self.box_side.unwrap_or(known.box_side))
+    }
+
     /// The chosen mesh.
     ///
     /// # Errors
     /// [`Error::Options`] if it is nowhere, [`Error::Surfaces`] if it is no closed surface.
     pub fn load(&self, known: &KnownMesh) -> Result<LoadedMesh, Error> {
-        let side_length = self.side_length.unwrap_or(0.8);
+        let side_length = self.side_length.unwrap_or(known.side_length);
         if self.procedural {
             let mesh = (known.procedural)(PROCEDURAL_CELLS)?;
             return Ok(LoadedMesh::new(
@@ -176,7 +193,7 @@ impl LoadedMesh {
     ) -> Result<Field<3>, Error> {
         let placement = Placement::fit(&self.mesh, &grid, self.about.side_length, margin)?;
         bar.set_length(grid.cells() as u64);
-        let distance = MeshDistance::new(&self.mesh.placed(&placement))?;
+        let distance = MeshDistance::new(&self.mesh.placed(&placement));
         Ok(distance.sample(grid, || bar.inc(1))?)
     }
 

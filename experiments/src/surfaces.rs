@@ -42,12 +42,15 @@ pub fn ratios() -> Ratios {
     }
 }
 
-/// The unit box `[0, 1]^3` with nodes `i/n`.
+/// Centre of all boxes, on every axis.
+const CENTRE: f64 = 0.5;
+
+/// The box of the given side around `(0.5, 0.5, 0.5)` with `n` cells per unit length; the nodes of the unit box are `i/n`.
 ///
 /// # Errors
-/// [`Error::Geometry`] for fewer than two cells.
-pub fn unit_box(n: usize) -> Result<Grid<3>, Error> {
-    Ok(Grid::new(n, 1.0)?)
+/// [`Error::Geometry`] unless `n` times the side is a whole number, at least 2.
+pub fn centred_box(n: usize, side: f64) -> Result<Grid<3>, Error> {
+    Ok(Grid::per_unit(n, side)?.with_origin([CENTRE - 0.5 * side; 3])?)
 }
 
 /// From where a surface is looked at.
@@ -161,8 +164,8 @@ impl Workshop<'_> {
             flow: Flow::Willmore,
             method: run.method,
             n: run.n,
-            side: 1.0,
-            centre: 0.5,
+            side: run.initial.grid().side(),
+            centre: CENTRE,
             params,
             tau: run.tau,
             sample_every: run.steps.max(1),
@@ -274,7 +277,8 @@ impl Workshop<'_> {
                 };
                 let picture = scene.render(size)?;
                 picture.write_png(pictures.path(&format!("{name}.png"))?)?;
-                let _ = caption(k, snapshot); figure = figure.with_panel(report::Shapes::new(""));
+                let _ = caption(k, snapshot);
+                figure = figure.with_panel(report::Shapes::new(""));
             }
         }
         Ok(figure)

@@ -7,7 +7,7 @@ use burn::tensor::Tensor;
 use geometry::measure::{enclosed_volume, perimeter};
 use geometry::{Field, Grid};
 use model::{MeanCurvatureOperator, Network, Ratios};
-use operators::{ComputeDevice, SpectralFilter, extrapolate};
+use operators::{ComputeDevice, SpectralFilter, extrapolate, inner_product};
 use serde::{Deserialize, Serialize};
 
 use crate::newton::{NewtonInfo, NewtonParams, minimize_timed};
@@ -236,6 +236,17 @@ impl<const D: usize> WillmoreFlow<D> {
         &self.energy
     }
 
+    /// Whether the interface moved by less than half its width, `4 eps/3` in root mean square, since `previous`. After longer
+    /// moves an extrapolation can end in the valley of another minimizer, even close a hole.
+    fn moved_little(&self, previous: &Tensor<D>) -> Result<bool, Error> {
+        const FAR: f64 = 0.5;
+        let square = |x: &Tensor<D>| self.device.scalar(inner_product(x, x));
+        // A displacement d is the motion (1 - u^2) 3 d / (4 eps).
+        let motion = square(&(self.current.clone() - previous.clone()))?;
+        let profile = square(&((self.current.clone() * self.current.clone()).neg() + 1.0))?;
+        Ok(motion < FAR * FAR * profile)
+    }
+
     /// One step of size `tau` (eq:discrete_willmore_step).
     ///
     /// # Errors
@@ -259,8 +270,10 @@ impl<const D: usize> WillmoreFlow<D> {
             });
         }
         let start = match &self.previous {
-            Some((previous, last)) => extrapolate(&self.current, previous, (tau / last).min(2.0)),
-            None => self.current.clone(),
+            Some((previous, last)) if self.moved_little(previous)? => {
+                extrapolate(&self.current, previous, (tau / last).min(2.0))
+            }
+            _ => self.current.clone(),
         };
         let preconditioner = self.filter.as_ref().map(|(_, filter)| {
             Preconditioner::two_level(filter.clone(), &self.grid, self.params.eps, tau)

@@ -50,7 +50,7 @@ impl MeshDistance {
     ///
     /// The values do not depend on the number of threads. They agree with
     /// [`MeshDistance::signed_distance`](SignedDistance::signed_distance) to rounding, and come
-    /// several times faster: the nearest face of a node bounds the search for the next node's.
+    /// faster: the nearest face of a node bounds the search for the next node's.
     ///
     /// # Errors
     /// [`geometry::Error::NonFinite`] for nodes so far away that squares of distances overflow.

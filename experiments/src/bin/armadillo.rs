@@ -10,7 +10,7 @@ use experiments::method::Method;
 use experiments::networks::{NetworkOptions, checksum};
 use experiments::options::RunOptions;
 use experiments::surfaces::{
-    SurfaceRun, View, Workshop, ratios, scales, since, table, unit_box, write_steps,
+    SurfaceRun, View, Workshop, ratios, scales, since, table, write_steps,
 };
 use experiments::{Error, harness, memory};
 use render::Axis;
@@ -21,6 +21,8 @@ const PROGRAM: &str = "armadillo";
 const ARMADILLO: KnownMesh = KnownMesh {
     file: "armadillo.obj",
     title: "armadillo",
+    side_length: 0.8,
+    box_side: 1.0,
     procedural: surfaces::samples::figure,
     procedural_title: "built-in figure",
 };
@@ -58,6 +60,7 @@ struct Options {
 struct Parameters<'a> {
     mesh: &'a AboutMesh,
     n: usize,
+    box_side: f64,
     eps: f64,
     mcf_step: f64,
     first_tau: f64,
@@ -81,11 +84,12 @@ fn program(options: &Options) -> Result<(), Error> {
     let device = options.run.open_device()?;
     let networks = options.networks.find(&[ratios()])?;
     let mesh = options.mesh.load(&ARMADILLO)?;
-    let (grid, params) = (unit_box(n)?, scales(n));
+    let (grid, params) = (options.mesh.grid(&ARMADILLO, n)?, scales(n));
     let output = options.run.open_output(PROGRAM)?;
     let parameters = Parameters {
         mesh: &mesh.about,
         n,
+        box_side: grid.side(),
         eps: params.eps,
         mcf_step: params.mcf_step,
         first_tau: FIRST_TAU,

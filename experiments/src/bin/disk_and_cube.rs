@@ -9,7 +9,7 @@ use experiments::method::Method;
 use experiments::networks::{NetworkOptions, checksum};
 use experiments::options::RunOptions;
 use experiments::surfaces::{
-    Finished, SurfaceRun, View, Workshop, ratios, scales, since, table, unit_box, write_steps,
+    Finished, SurfaceRun, View, Workshop, centred_box, ratios, scales, since, table, write_steps,
 };
 use experiments::{Error, harness};
 use geometry::shapes::{Cuboid, Cylinder};
@@ -78,7 +78,7 @@ struct Solid {
 }
 
 fn solids(n: usize) -> Result<[Solid; 2], Error> {
-    let (grid, eps) = (unit_box(n)?, scales(n).eps);
+    let (grid, eps) = (centred_box(n, 1.0)?, scales(n).eps);
     let centre = [0.5; 3];
     let cube = Cuboid::new([CUBE_HALF_SIDE; 3])?.translated(centre);
     let disk = Cylinder::new(DISK_RADIUS, DISK_HALF_HEIGHT)?.translated(centre);

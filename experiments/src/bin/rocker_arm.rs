@@ -11,7 +11,7 @@ use experiments::method::Method;
 use experiments::networks::{NetworkOptions, checksum};
 use experiments::options::RunOptions;
 use experiments::surfaces::{
-    SurfaceRun, View, Workshop, ratios, scales, since, table, unit_box, write_steps,
+    SurfaceRun, View, Workshop, ratios, scales, since, table, write_steps,
 };
 use experiments::{Error, harness};
 use fem::FiniteElementStep;
@@ -23,6 +23,8 @@ const PROGRAM: &str = "rocker_arm";
 const ROCKER_ARM: KnownMesh = KnownMesh {
     file: "rocker-arm.obj",
     title: "rocker arm",
+    side_length: 1.0,
+    box_side: 1.25,
     procedural: surfaces::samples::lever,
     procedural_title: "built-in lever",
 };
@@ -65,6 +67,7 @@ struct Options {
 struct Parameters<'a> {
     mesh: &'a AboutMesh,
     n: usize,
+    box_side: f64,
     eps: f64,
     mcf_step: f64,
     tau: f64,
@@ -88,11 +91,12 @@ fn program(options: &Options) -> Result<(), Error> {
     let device = options.run.open_device()?;
     let networks = options.networks.find(&[ratios()])?;
     let mesh = options.mesh.load(&ROCKER_ARM)?;
-    let (grid, params) = (unit_box(n)?, scales(n));
+    let (grid, params) = (options.mesh.grid(&ROCKER_ARM, n)?, scales(n));
     let output = options.run.open_output(PROGRAM)?;
     let parameters = Parameters {
         mesh: &mesh.about,
         n,
+        box_side: grid.side(),
         eps: params.eps,
         mcf_step: params.mcf_step,
         tau: TAU,
