@@ -279,29 +279,42 @@ impl Camera {
                         .iter()
                         .map(|p| DVec3::new(p.dot(right), p.dot(above), p.dot(toward)))
                 };
-                let (low, high) = placed()
-                    .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
-                        (low.min(p), high.max(p))
-                    });
-                let centre = 0.5 * (low + high);
-                let target = centre.x * right + centre.y * above + centre.z * toward;
-                let extent = 0.5 * (high - low);
-                let (half, distance) = match tangent {
+                // Over all points, the largest value of a function.
+                let most =
+                    |f: &dyn Fn(DVec3) -> f64| placed().map(f).fold(f64::NEG_INFINITY, f64::max);
+                let nearest = most(&|p| p.z);
+                let depth = nearest + most(&|p| -p.z);
+                // Half the extent and the middle along one direction of the picture, seen through
+                // a slit that opens towards the back with the given slope.
+                let across = |axis: usize, slope: f64| {
+                    let after = most(&|p| p[axis] + slope * p.z);
+                    let before = most(&|p| -p[axis] + slope * p.z);
+                    (0.5 * (after + before), 0.5 * (after - before))
+                };
+                let middle = nearest - 0.5 * depth;
+                let (x, y, half, distance) = match tangent {
                     None => {
-                        let half = (extent.x / used[0]).max(extent.y / used[1]);
-                        (half, 2.0 * extent.length())
+                        let ((a, x), (b, y)) = (across(0, 0.0), across(1, 0.0));
+                        let half = (a / used[0]).max(b / used[1]);
+                        (x, y, half, DVec3::new(a, b, depth).length())
                     }
                     Some(tangent) => {
-                        let needed = placed().map(|p| {
-                            let p = p - centre;
-                            let sideways = (p.x.abs() / used[0]).max(p.y.abs() / used[1]);
-                            p.z + sideways / tangent
-                        });
-                        let distance = needed.fold(0.0, f64::max);
-                        (distance * tangent, distance)
+                        // The eye is where the slits of both directions are wide enough.
+                        let slopes = used.map(|side| side * tangent);
+                        let wide = |axis: usize| across(axis, slopes[axis]).0 / slopes[axis];
+                        let eye = wide(0).max(wide(1));
+                        // Where the picture is wider than need be, centring takes a narrower slit.
+                        let centred = |axis: usize| {
+                            let narrowed =
+                                (0..4).fold(slopes[axis], |slope, _| across(axis, slope).0 / eye);
+                            across(axis, narrowed).1
+                        };
+                        let distance = eye - middle;
+                        let (x, y) = (centred(0), centred(1));
+                        (x, y, distance * tangent, distance)
                     }
                 };
-                (target, half, distance)
+                (x * right + y * above + middle * toward, half, distance)
             }
             &Subject::Ball(centre, radius) => {
                 let narrow = used[0].min(used[1]);

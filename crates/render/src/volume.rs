@@ -11,8 +11,8 @@ use crate::camera::Ray;
 use crate::emptiness::Emptiness;
 use crate::spline;
 
-/// Layers of nodes added on each side: support for the cubic spline outside the box.
-const PAD: usize = 3;
+/// Layers of nodes added on each side: support for the cubic spline in the space around the box.
+const PAD: usize = 4;
 /// Steps in cells that may hold the surface: for rays from the camera, and for rays of light.
 const FINE_STEP: f64 = 0.35;
 const COARSE_STEP: f64 = 0.5;
@@ -152,13 +152,14 @@ impl Volume {
             || Emptiness::new(&samples, size, 0, 1),
         );
         let crossings = crossings(&samples, size);
-        let (low, high) = crossings
+        let box_around = crossings
             .iter()
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &p| {
-                (low.min(p), high.max(p))
-            });
+            .map(|&p| [p - MARGIN, p + MARGIN])
+            .reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])
+            // No ray spends time in an empty box.
+            .unwrap_or_default();
         Self {
-            box_around: [low - MARGIN, high + MARGIN],
+            box_around,
             spline,
             samples,
             around_spline,

@@ -15,6 +15,12 @@ pub enum Error {
         /// Title of the panel.
         chart: String,
     },
+    /// A picture without pixels.
+    #[error("the picture {chart:?} has no pixels")]
+    NoPixels {
+        /// Title or caption of the panel.
+        chart: String,
+    },
     /// A figure without panels.
     #[error("the figure has no panels: add one with `Figure::with_panel`")]
     NoPanels,

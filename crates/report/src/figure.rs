@@ -13,6 +13,7 @@ use crate::heatmap::Heatmap;
 use crate::legend::{Block, LegendEntry};
 use crate::output::OutputDir;
 use crate::plot::LineChart;
+use crate::raster::Raster;
 use crate::shapes::{Shapes, Window};
 use crate::style::{Fonts, LEADING};
 use crate::surface::{self, Surface, Text};
@@ -27,6 +28,8 @@ pub enum Panel {
     Heatmap(Heatmap),
     /// Plane curves.
     Shapes(Shapes),
+    /// A picture.
+    Raster(Raster),
 }
 
 impl From<LineChart> for Panel {
@@ -47,12 +50,19 @@ impl From<Shapes> for Panel {
     }
 }
 
+impl From<Raster> for Panel {
+    fn from(raster: Raster) -> Self {
+        Self::Raster(raster)
+    }
+}
+
 impl Panel {
     fn drawable(&self) -> &dyn Drawable {
         match self {
             Self::Line(chart) => chart,
             Self::Heatmap(map) => map,
             Self::Shapes(shapes) => shapes,
+            Self::Raster(raster) => raster,
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::font;
 use crate::geom::{Point, Rect, clip_polyline, point, thin};
 use crate::legend::LegendEntry;
 use crate::shapes::Curve;
-use crate::surface::{Surface, Text, outline, stroke_dashed};
+use crate::surface::{Scaling, Surface, Text, outline, stroke_dashed};
 
 /// A description of a heat map with a colour bar.
 ///
@@ -181,7 +181,7 @@ impl Heatmap {
             .rev()
             .map(|k| self.map.at(f64::from(k) / f64::from(SHADES - 1)))
             .collect();
-        surface.image(bar, 1, &shades)?;
+        surface.image(bar, 1, &shades, Scaling::Cells)?;
         outline(surface, bar, 1.0, FRAME)?;
         let ticks = self.bar_ticks(context, plot.height)?;
         let at = |value: f64| snap(bar.bottom() - colours.fraction(value) * bar.height);
@@ -288,7 +288,8 @@ impl Drawable for Heatmap {
         outer: Rect,
     ) -> Result<()> {
         let axes = self.axes(context)?;
-        surface.image(plot, self.shape[0], &self.cells(&self.colours()?))?;
+        let cells = self.cells(&self.colours()?);
+        surface.image(plot, self.shape[0], &cells, Scaling::Cells)?;
         for curve in &self.curves {
             for ring in curve.closed_loops() {
                 let placed: Vec<Point> = ring.iter().map(|&p| axes.place(&plot, p)).collect();

@@ -37,6 +37,15 @@ pub(crate) struct Text<'a> {
     pub vertical: bool,
 }
 
+/// How viewers may scale a raster.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Scaling {
+    /// Cells stay sharp.
+    Cells,
+    /// Pixels are interpolated.
+    Smooth,
+}
+
 /// What the charts need to draw. Coordinates are layout units.
 pub(crate) trait Surface {
     /// A filled box.
@@ -48,7 +57,7 @@ pub(crate) trait Surface {
     /// One line of text.
     fn text(&mut self, text: Text<'_>) -> Result<()>;
     /// A raster of `columns * rows` cells, row by row from the top, stretched over `area`.
-    fn image(&mut self, area: Rect, columns: usize, cells: &[Rgb]) -> Result<()>;
+    fn image(&mut self, area: Rect, columns: usize, cells: &[Rgb], scaling: Scaling) -> Result<()>;
 }
 
 /// Draws a polyline in dashes.
@@ -178,8 +187,12 @@ impl Surface for SvgSurface<'_> {
         draw_label(&mut self.backend, text, Self::SCALE)
     }
 
-    fn image(&mut self, area: Rect, columns: usize, cells: &[Rgb]) -> Result<()> {
+    fn image(&mut self, area: Rect, columns: usize, cells: &[Rgb], scaling: Scaling) -> Result<()> {
         let rows = cells.len() / columns;
+        let rendering = match scaling {
+            Scaling::Cells => " style=\"image-rendering:pixelated\"",
+            Scaling::Smooth => "",
+        };
         let bytes: Vec<u8> = cells.iter().flat_map(|&Rgb(r, g, b)| [r, g, b]).collect();
         let encoded = STANDARD.encode(encode_png(columns as u32, rows as u32, &bytes)?);
         let (x, y) = to_device(point(area.x, area.y), Self::SCALE);
@@ -187,7 +200,7 @@ impl Surface for SvgSurface<'_> {
         let (width, height) = (right - x, bottom - y);
         self.images.push(format!(
             "<image x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" \
-             preserveAspectRatio=\"none\" style=\"image-rendering:pixelated\" \
+             preserveAspectRatio=\"none\"{rendering} \
              href=\"data:image/png;base64,{encoded}\"/>\n"
         ));
         let marker = image_marker(self.images.len() - 1);
@@ -356,7 +369,7 @@ impl Surface for PngSurface<'_> {
         draw_label(&mut self.backend, text, Self::SCALE)
     }
 
-    fn image(&mut self, area: Rect, columns: usize, cells: &[Rgb]) -> Result<()> {
+    fn image(&mut self, area: Rect, columns: usize, cells: &[Rgb], _: Scaling) -> Result<()> {
         let rows = cells.len() / columns;
         let (x0, y0) = to_device(point(area.x, area.y), Self::SCALE);
         let (x1, y1) = to_device(point(area.right(), area.bottom()), Self::SCALE);
@@ -511,7 +524,7 @@ mod tests {
     fn an_svg_image_takes_its_place_and_scale() {
         let cells = [Rgb(1, 2, 3), Rgb(4, 5, 6)];
         let document = svg(100, 50, |s| {
-            s.image(Rect::new(10.0, 5.0, 20.0, 30.0), 2, &cells)
+            s.image(Rect::new(10.0, 5.0, 20.0, 30.0), 2, &cells, Scaling::Cells)
         })
         .unwrap();
         assert!(document.starts_with("<svg width=\"100\" height=\"50\""));

@@ -7,7 +7,7 @@ use crate::colour::{INK, WHITE};
 use crate::decoded::Picture;
 use crate::{
     Axis, Colour, ColourMap, Curve, Error, Figure, Heatmap, Legend, LegendEntry, LineChart,
-    LineStyle, Marker, OutputDir, Reference, Rgb, Series, Shapes,
+    LineStyle, Marker, OutputDir, Raster, Reference, Rgb, Series, Shapes,
 };
 
 const BLUE: Rgb = crate::OKABE_ITO[0];
@@ -419,6 +419,106 @@ fn mixed_panels_can_be_drawn_and_written_twice_with_the_same_bytes() {
     let picture = Picture::new(&std::fs::read(root.path().join("first.png")).unwrap());
     assert!(picture.count(BLUE) > 50 && picture.count(ColourMap::Viridis.at(1.0)) > 50);
     assert!(picture.count(INK) > 50);
+}
+
+/// A picture of one colour whose left half is transparent.
+fn half(columns: usize, rows: usize) -> Raster {
+    let pixel = |k: usize| {
+        if k % columns < columns / 2 {
+            [9, 9, 9, 0]
+        } else {
+            [0, 158, 115, 255]
+        }
+    };
+    Raster::new(
+        [columns, rows],
+        (0..columns * rows).map(pixel).collect::<Vec<_>>(),
+    )
+}
+
+#[test]
+fn pictures_keep_their_shape_and_show_the_page_where_they_are_transparent() {
+    let green = crate::OKABE_ITO[2];
+    for (columns, rows) in [(300, 200), (60, 40), (1500, 1000)] {
+        let figure = Figure::new("Steps", 2)
+            .with_panel(half(columns, rows).with_caption("step 100, w = 25.78"))
+            .with_panel(half(columns, rows).with_title("above").with_frame());
+        let (picture, layout) = (picture(&figure), figure.layout().unwrap());
+        for plot in &layout.plots {
+            assert!((plot.height / plot.width - 2.0 / 3.0).abs() < 0.01);
+            let at = |x: f64, y: f64| {
+                let (x, y) = (plot.x + x * plot.width, plot.y + y * plot.height);
+                picture.pixel((2.0 * x) as usize, (2.0 * y) as usize)
+            };
+            for y in [0.02, 0.5, 0.98] {
+                assert_eq!((at(0.02, y), at(0.45, y)), (WHITE, WHITE), "{columns} {y}");
+                assert_eq!((at(0.55, y), at(0.98, y)), (green, green), "{columns} {y}");
+            }
+        }
+        assert!(
+            layout.plots[0].bottom() + 15.0 < layout.height,
+            "room for the caption"
+        );
+        let svg = figure.to_svg().unwrap();
+        assert_eq!(svg.matches("<image").count(), 2);
+        assert!(!svg.contains("pixelated") && !svg.contains('\u{F8FF}'));
+        for text in ["step 100, w = 25.78", "above"] {
+            assert!(svg.contains(&format!(">\n{text}\n</text>")), "no {text:?}");
+        }
+    }
+}
+
+#[test]
+fn pictures_of_the_right_size_are_copied_and_others_averaged_in_linear_light() {
+    let noise = |k: usize| {
+        [
+            (k * 37 % 256) as u8,
+            (k * 91 % 256) as u8,
+            (k * 53 % 256) as u8,
+            255,
+        ]
+    };
+    let shown = |size: [usize; 2], pixels: Vec<[u8; 4]>| {
+        let figure = Figure::from(Raster::new(size, pixels)).with_width(200.0);
+        let plot = figure.layout().unwrap().plots[0];
+        (picture(&figure), plot)
+    };
+    // The layout depends on the ratio of the sides alone.
+    let (_, plot) = shown([1, 1], vec![[0; 4]]);
+    let size = [2 * plot.width as usize, 2 * plot.height as usize];
+    let (copied, _) = shown(size, (0..size[0] * size[1]).map(noise).collect());
+    for (x, y) in [(0, 0), (7, 3), (size[0] - 1, size[1] - 1)] {
+        let [r, g, b, _] = noise(y * size[0] + x);
+        let at = (2 * plot.x as usize + x, 2 * plot.y as usize + y);
+        assert_eq!(copied.pixel(at.0, at.1), Rgb(r, g, b), "{x} {y}");
+    }
+    // A fine chessboard of black and white has half the light of white.
+    let double = [2 * size[0], 2 * size[1]];
+    let board = (0..double[0] * double[1]).map(|k| {
+        let v = 255 * ((k % double[0] + k / double[0]) % 2) as u8;
+        [v, v, v, 255]
+    });
+    let (averaged, plot) = shown(double, board.collect());
+    let centre = averaged.pixel(2 * plot.centre().x as usize, 2 * plot.centre().y as usize);
+    assert!(centre.0.abs_diff(188) <= 1, "{centre:?}");
+}
+
+#[test]
+fn pictures_without_pixels_or_with_the_wrong_number_are_refused() {
+    let error = |raster: Raster| Figure::from(raster.with_caption("c")).to_png().unwrap_err();
+    let none = error(Raster::new([0, 3], vec![]));
+    assert!(matches!(none, Error::NoPixels { chart } if chart == "c"));
+    let few = error(Raster::new([2, 2], vec![[0; 4]; 3]));
+    assert!(matches!(
+        few,
+        Error::ArrayShape {
+            expected: 4,
+            found: 3,
+            ..
+        }
+    ));
+    let huge = error(Raster::new([usize::MAX, 2], vec![[0; 4]; 3]));
+    assert!(matches!(huge, Error::ArrayShape { found: 3, .. }));
 }
 
 proptest! {
