@@ -7,7 +7,7 @@ use geometry::{Field, Grid};
 use model::{Network, Ratios};
 use operators::ComputeDevice;
 use render::{Axis, Bounds, Framing, Quality, Scene, Tube};
-use report::{Column, Figure, Format, Manifest, OutputDir, Progress, Summary, Table};
+use report::{Column, Figure, Format, Manifest, OutputDir, Progress, Raster, Summary, Table};
 use serde::Serialize;
 use solver::{FlowParams, NewtonParams};
 
@@ -277,8 +277,9 @@ impl Workshop<'_> {
                 };
                 let picture = scene.render(size)?;
                 picture.write_png(pictures.path(&format!("{name}.png"))?)?;
-                let _ = caption(k, snapshot);
-                figure = figure.with_panel(report::Shapes::new(""));
+                let size = [picture.width() as usize, picture.height() as usize];
+                let raster = Raster::new(size, picture.pixels()).with_caption(caption(k, snapshot));
+                figure = figure.with_panel(raster);
             }
         }
         Ok(figure)
