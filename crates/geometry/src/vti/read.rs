@@ -42,12 +42,12 @@ pub enum VtiError {
         count: usize,
     },
     /// The piece is not the whole image.
-    #[error("the piece spans nodes {piece:?}, but the image {whole:?}; save the whole image")]
+    #[error("the piece spans nodes {piece}, but the image {whole}; save the whole image")]
     PartialPiece {
-        /// First and last node of the piece along x, y and z.
-        piece: [i64; 6],
+        /// First and last node of the piece along x, y and z, as written.
+        piece: String,
         /// Of the image.
-        whole: [i64; 6],
+        whole: String,
     },
     /// The image is not a cube of the wanted dimension.
     #[error(
@@ -236,9 +236,10 @@ pub fn decode<const D: usize>(bytes: &[u8]) -> Result<Image<D>, VtiError> {
     };
     let extent: [i64; 6] = numbers(piece, "Piece", "Extent", image.attribute("WholeExtent"))?;
     if extent != whole {
+        let written = |node: Node<'_, '_>, name| node.attribute(name).unwrap_or_default().into();
         return Err(VtiError::PartialPiece {
-            piece: extent,
-            whole,
+            piece: written(piece, "Extent"),
+            whole: written(image, "WholeExtent"),
         });
     }
     let has_arrays = |group: &Node<'_, '_>| group.children().any(|n| n.has_tag_name("DataArray"));
