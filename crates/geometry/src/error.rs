@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::npy::NpyError;
+use crate::vti::VtiError;
 
 /// Errors of grids, fields, shapes and files, each with the numbers needed to act on it.
 #[derive(Debug, thiserror::Error)]
@@ -113,6 +114,14 @@ pub enum Error {
         path: PathBuf,
         /// What is wrong with it.
         source: NpyError,
+    },
+    /// A file is not usable VTK image data.
+    #[error("{path} cannot be read as fields", path = path.display())]
+    Vti {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: VtiError,
     },
 }
 

@@ -1,9 +1,28 @@
 //! Fields as VTK image data (`.vti`), for `ParaView`.
 //!
-//! One file holds any number of named point arrays on one grid: `Float64`, little-endian, raw,
-//! appended after the XML. Axis 0 of the grid is VTK's x, axis 1 its y, axis 2 its z. VTK runs
-//! through x fastest, so the values are reordered. The repeated last layer of the periodic grid
-//! is not written.
+//! One file holds any number of named point arrays on one grid. Axis 0 of the grid is VTK's x, axis
+//! 1 its y, axis 2 its z. VTK runs through x fastest, so the values are reordered. The repeated
+//! last layer of the periodic grid is not written.
+//!
+//! Written are `Float64` arrays, little-endian, raw, appended after the XML; [`read`] understands
+//! what other programs write, too.
+//!
+//! ```
+//! use geometry::{Field, Grid, vti};
+//!
+//! # let folder = tempfile::tempdir()?;
+//! # let path = folder.path().join("u.vti");
+//! let u = Field::from_fn(Grid::<3>::centred(8, 2.0)?, |[x, y, z]| x * y + z);
+//! vti::write(&path, &[("u", &u)])?;
+//! let arrays = vti::read::<3>(&path)?;
+//! assert_eq!(arrays, [("u".to_owned(), u)]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod read;
+mod stream;
+
+pub use read::{Image, VtiError, decode, read};
 
 use std::collections::HashSet;
 use std::fmt::Write as _;

@@ -343,7 +343,7 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// Draws the picture.
+    /// Draws the picture. It takes some 50 bytes of memory for each pixel.
     ///
     /// # Errors
     /// A number out of range, nothing to frame, or a size that cannot be drawn.

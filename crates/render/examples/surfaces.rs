@@ -1,4 +1,4 @@
-//! Draws a picture of every kind: `cargo run -p render --example gallery -- <folder> [<cells>]`.
+//! Draws a picture of every kind: `cargo run -p render --example surfaces -- <folder> [<cells>]`.
 
 use std::error::Error;
 use std::f64::consts::TAU;
@@ -43,7 +43,7 @@ fn circle(radius: f64, height: f64) -> Vec<[f64; 3]> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
-    let folder = PathBuf::from(arguments.next().unwrap_or_else(|| "gallery".to_owned()));
+    let folder = PathBuf::from(arguments.next().unwrap_or_else(|| "surfaces".to_owned()));
     let cells: usize = arguments.next().map_or(Ok(64), |n| n.parse())?;
     std::fs::create_dir_all(&folder)?;
     let grid = Grid::<3>::new(cells, 1.0)?;
