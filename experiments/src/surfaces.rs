@@ -10,6 +10,7 @@ use render::{Axis, Bounds, Framing, Quality, Scene, Tube};
 use report::{Column, Figure, Format, Manifest, OutputDir, Progress, Raster, Summary, Table};
 use serde::Serialize;
 use solver::{FlowParams, NewtonParams};
+use surfaces::ClosedMesh;
 
 use crate::Error;
 use crate::circles::Flow;
@@ -19,6 +20,8 @@ use crate::options::RunOptions;
 
 /// Interface width of surfaces, in cells.
 const EPS_OVER_H: f64 = 2.0;
+/// Room around a surface, as a fraction of the picture.
+const MARGIN: f64 = 0.02;
 /// Kernel width of the network for surfaces.
 const WIDTH: usize = 17;
 
@@ -103,6 +106,10 @@ pub struct Snapshot {
     pub perimeter: f64,
     /// Volume inside.
     pub volume: f64,
+    /// Euler characteristic of the isosurface `u = 0`.
+    pub euler_characteristic: i64,
+    /// Its connected components.
+    pub components: usize,
 }
 
 /// A surface that has flowed.
@@ -188,18 +195,27 @@ impl Workshop<'_> {
         })?;
         bar.finish();
         let measure = FiniteElementStep::implicit(initial.grid(), params.eps, params.mcf_step)?;
+        let meshes = self.output.subfolder("meshes")?;
         let steps = run.shown.iter().filter(|(step, _)| *step <= run.steps);
-        let snapshots = manifest.phase(format!("{}: Willmore energies", run.title), || {
+        let snapshots = manifest.phase(format!("{}: measures", run.title), || {
             steps
                 .map(|&(step, paper)| {
+                    let u = trajectory.field(step)?;
+                    // The isosurface is closed by construction; whoever uses the file relies on it.
+                    let surface = surfaces::phase_field_surface(&u, params.eps)?;
+                    let (surface, _) = ClosedMesh::new(surface)?;
+                    let name = format!("{}.ply", run.name(step));
+                    surfaces::write(meshes.path(&name)?, surface.mesh())?;
                     let measures = &trajectory.measures[step];
                     Ok(Snapshot {
                         step,
                         time: run.tau.time(step),
-                        w: measure.willmore_energy(&trajectory.field(step)?)?,
+                        w: measure.willmore_energy(&u)?,
                         paper: paper.filter(|_| !self.options.quick),
                         perimeter: measures.perimeter,
                         volume: measures.volume,
+                        euler_characteristic: surface.euler_characteristic(),
+                        components: surface.components(),
                     })
                 })
                 .collect::<Result<Vec<_>, Error>>()
@@ -240,7 +256,6 @@ impl Workshop<'_> {
         let mut figure =
             Figure::new(self.options.title(title), columns.unwrap_or(1)).with_row_labels(labels);
         let (size, quality) = self.picture_size();
-        let meshes = self.output.subfolder("meshes")?;
         let pictures = self.output.subfolder("pictures")?;
         for (
             k,
@@ -259,12 +274,10 @@ impl Workshop<'_> {
                     .up(run.view.up)
                     .azimuth(run.view.azimuth)
                     .elevation(run.view.elevation)
+                    .margin(MARGIN)
                     .quality(quality)
                     .tubes(decorate(k, snapshot.step));
-                let name = format!("{}_{}_step{:03}", run.key, run.method.key(), snapshot.step);
-                let mesh = surfaces::phase_field_surface(&u, eps)?;
-                surfaces::write(meshes.path(&format!("{name}.ply"))?, &mesh)?;
-                scenes.push((name, scene));
+                scenes.push((run.name(snapshot.step), scene));
             }
             let bounds: Option<Bounds> = scenes
                 .iter()
@@ -286,13 +299,14 @@ impl Workshop<'_> {
     }
 }
 
-impl Finished<'_> {
-    /// The Willmore energy of a shown step.
-    pub fn w(&self, step: usize) -> Option<f64> {
-        let found = self.snapshots.iter().find(|s| s.step == step);
-        found.map(|s| s.w)
+impl SurfaceRun<'_> {
+    /// Name of the files of a step.
+    fn name(&self, step: usize) -> String {
+        format!("{}_{}_step{step:03}", self.key, self.method.key())
     }
+}
 
+impl Finished<'_> {
     /// Adds the metrics of this run.
     ///
     /// # Errors
@@ -302,6 +316,8 @@ impl Finished<'_> {
             summary.insert(&format!("{key}.w.step{}", s.step), s.w)?;
             summary.insert(&format!("{key}.perimeter.step{}", s.step), s.perimeter)?;
             summary.insert(&format!("{key}.volume.step{}", s.step), s.volume)?;
+            let euler = s.euler_characteristic as f64;
+            summary.insert(&format!("{key}.euler_characteristic.step{}", s.step), euler)?;
         }
         let records = &self.trajectory.records;
         let count = records.len().max(1) as f64;
@@ -327,6 +343,7 @@ pub fn table(finished: &[Finished<'_>]) -> Result<Table, Error> {
         Column::number("w, paper", Format::Fixed(2)),
         Column::number("area", Format::Fixed(4)),
         Column::number("volume", Format::Fixed(5)),
+        Column::number("Euler characteristic", Format::Fixed(0)),
     ]);
     for f in finished {
         for s in &f.snapshots {
@@ -338,6 +355,7 @@ pub fn table(finished: &[Finished<'_>]) -> Result<Table, Error> {
                 s.paper.into(),
                 s.perimeter.into(),
                 s.volume.into(),
+                (s.euler_characteristic as f64).into(),
             ])?;
         }
     }

@@ -21,7 +21,7 @@ const PROGRAM: &str = "armadillo";
 const ARMADILLO: KnownMesh = KnownMesh {
     file: "armadillo.obj",
     title: "armadillo",
-    side_length: 0.8,
+    side_length: 0.9,
     box_side: 1.0,
     procedural: surfaces::samples::figure,
     procedural_title: "built-in figure",

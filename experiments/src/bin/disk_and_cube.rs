@@ -22,10 +22,6 @@ const PROGRAM: &str = "disk_and_cube";
 /// Size of a time step.
 const TAU: f64 = 1.0 / 262_144.0;
 const STEPS: usize = 100;
-/// The paper does not give the sizes: these have its initial energies.
-const CUBE_HALF_SIDE: f64 = 0.25;
-const DISK_RADIUS: f64 = 0.3;
-const DISK_HALF_HEIGHT: f64 = 0.1;
 
 /// Willmore flow of a cube and of a thick disk, n = 64, eps = 2^-5, tautilde = 2^-12, tau = 2^-18, by the hybrid scheme and by
 /// nested implicit finite elements: pictures, Willmore energies w and L2 distances after 0, 1 and 100 steps.
@@ -47,6 +43,18 @@ struct Options {
     /// Number of time steps [default: 100]
     #[arg(long, value_name = "COUNT")]
     steps: Option<usize>,
+
+    /// Half the side of the cube; the paper does not say, but its initial energy fits a cube of side 0.5
+    #[arg(long, value_name = "LENGTH", default_value_t = 0.25)]
+    cube_half_side: f64,
+
+    /// Radius of the disk; the paper does not say, but its initial energy fits about 0.29
+    #[arg(long, value_name = "LENGTH", default_value_t = 0.29)]
+    disk_radius: f64,
+
+    /// Half the height of the disk; the paper does not say
+    #[arg(long, value_name = "LENGTH", default_value_t = 0.1)]
+    disk_half_height: f64,
 
     /// Methods, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum, default_values_t = [Method::Hybrid, Method::FeImplicit])]
@@ -77,25 +85,31 @@ struct Solid {
     identity: String,
 }
 
-fn solids(n: usize) -> Result<[Solid; 2], Error> {
+fn solids(options: &Options, n: usize) -> Result<[Solid; 2], Error> {
+    let Options {
+        cube_half_side,
+        disk_radius,
+        disk_half_height,
+        ..
+    } = *options;
     let (grid, eps) = (centred_box(n, 1.0)?, scales(n).eps);
     let centre = [0.5; 3];
-    let cube = Cuboid::new([CUBE_HALF_SIDE; 3])?.translated(centre);
-    let disk = Cylinder::new(DISK_RADIUS, DISK_HALF_HEIGHT)?.translated(centre);
+    let cube = Cuboid::new([cube_half_side; 3])?.translated(centre);
+    let disk = Cylinder::new(disk_radius, disk_half_height)?.translated(centre);
     Ok([
         Solid {
             key: "cube",
             title: "cube",
             initial: phase_field(grid, &cube, eps)?,
             papers: [132.65, 52.26, 25.78],
-            identity: format!("cube, half side {CUBE_HALF_SIDE}"),
+            identity: format!("cube, half side {cube_half_side}"),
         },
         Solid {
             key: "disk",
             title: "thick disk",
             initial: phase_field(grid, &disk, eps)?,
             papers: [87.15, 50.49, 25.59],
-            identity: format!("disk, radius {DISK_RADIUS}, half height {DISK_HALF_HEIGHT}"),
+            identity: format!("disk, radius {disk_radius}, half height {disk_half_height}"),
         },
     ])
 }
@@ -116,7 +130,7 @@ fn program(options: &Options) -> Result<(), Error> {
     }
     let device = options.run.open_device()?;
     let networks = options.networks.find(&[ratios()])?;
-    let solids = solids(n)?;
+    let solids = solids(options, n)?;
     let output = options.run.open_output(PROGRAM)?;
     let params = scales(n);
     let parameters = Parameters {
@@ -126,9 +140,9 @@ fn program(options: &Options) -> Result<(), Error> {
         tau: TAU,
         steps,
         methods: &options.methods,
-        cube_half_side: CUBE_HALF_SIDE,
-        disk_radius: DISK_RADIUS,
-        disk_half_height: DISK_HALF_HEIGHT,
+        cube_half_side: options.cube_half_side,
+        disk_radius: options.disk_radius,
+        disk_half_height: options.disk_half_height,
         network: checksum(&networks[0]),
         quick,
     };
