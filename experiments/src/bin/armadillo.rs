@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use experiments::evolution::TimeSteps;
-use experiments::meshes::{AboutMesh, KnownMesh, MeshOptions};
+use experiments::meshes::{ARMADILLO, AboutMesh, MeshOptions};
 use experiments::method::Method;
 use experiments::networks::{NetworkOptions, checksum};
 use experiments::options::RunOptions;
@@ -18,14 +18,6 @@ use report::Summary;
 use serde::Serialize;
 
 const PROGRAM: &str = "armadillo";
-const ARMADILLO: KnownMesh = KnownMesh {
-    file: "armadillo.obj",
-    title: "armadillo",
-    side_length: 0.9,
-    box_side: 1.0,
-    procedural: surfaces::samples::figure,
-    procedural_title: "built-in figure",
-};
 /// The first time step; every further one is twice as long.
 const FIRST_TAU: f64 = 1.0 / 4_194_304.0;
 const STEPS: usize = 16;

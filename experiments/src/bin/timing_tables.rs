@@ -6,9 +6,11 @@ use std::process::ExitCode;
 use clap::Parser;
 use experiments::circles::{EPS, STEP};
 use experiments::comparison::cross;
+use experiments::meshes::{ARMADILLO, AboutMesh, MeshOptions};
+use experiments::method::Method;
 use experiments::networks::{NetworkOptions, checksum, convergence_ratios};
 use experiments::options::RunOptions;
-use experiments::{Error, harness};
+use experiments::{Error, harness, surfaces};
 use fem::{FiniteElementStep, LinearSolver, Statistics};
 use geometry::shapes::Ball;
 use geometry::{Field, Grid, phase_field};
@@ -16,7 +18,8 @@ use indicatif::ProgressBar;
 use model::Network;
 use operators::ComputeDevice;
 use report::{
-    Axis, Column, Figure, Format, LineChart, LineStyle, Marker, OutputDir, Series, Summary, Table,
+    Axis, Column, Figure, Format, LineChart, LineStyle, Marker, OutputDir, Progress, Series,
+    Summary, Table,
 };
 use serde::Serialize;
 use solver::{FlowParams, Method as Newton, NewtonParams, StepRecord, WillmoreFlow};
@@ -40,6 +43,9 @@ struct Options {
     /// Cells per unit length, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [256, 512])]
     cells: Vec<usize>,
+
+    #[command(flatten)]
+    mesh: MeshOptions,
 
     /// Stop a row after this many seconds and extrapolate; at least three steps are done
     #[arg(long, value_name = "SECONDS", default_value_t = 120.0)]
@@ -147,10 +153,11 @@ fn program(options: &Options) -> Result<(), Error> {
         options.cells.clone()
     };
     let budget = if quick { 0.1 } else { options.budget };
-    let ratios = cells
+    let mut ratios = cells
         .iter()
         .map(|&n| convergence_ratios(n))
         .collect::<Result<Vec<_>, _>>()?;
+    ratios.push(surfaces::ratios());
     let device = options.run.open_device()?;
     let networks = options.networks.find(&ratios)?;
     let output = options.run.open_output(PROGRAM)?;
@@ -184,22 +191,122 @@ fn program(options: &Options) -> Result<(), Error> {
         }
         timings.extend(measured);
     }
+    let surface = manifest.phase("armadillo", || {
+        surface_steps(options, &networks[networks.len() - 1], &device, &progress)
+    })?;
     let table = table(&timings)?;
     table.write(&output, "timing")?;
+    let surface_table = surface_table(&surface)?;
+    surface_table.write(&output, "armadillo")?;
     output.write("timing.json", report::data::to_json(&timings)?)?;
     figure(&options.run, &timings).write(&output, "timing")?;
-    summary(&timings)?.write(&output)?;
+    let mut summary = summary(&timings)?;
+    for step in &surface.steps {
+        let key = format!("timing.armadillo.{}", step.method.key());
+        summary.insert(&format!("{key}.seconds"), step.seconds)?;
+        summary.insert_count(&format!("{key}.hvp"), step.hvp)?;
+    }
+    summary.write(&output)?;
     manifest.write(&output)?;
     progress.clear();
     options.run.say(&format!(
-        "{}\n{}\nResults are in {}",
+        "{}\n{}\n{}\n{}\nResults are in {}",
         options
             .run
             .title("128 Willmore steps of the cross: wall time on this machine"),
         table.to_markdown(),
+        options.run.title(&format!(
+            "One Willmore step of a surface: {}",
+            surface.about.title
+        )),
+        surface_table.to_markdown(),
         output_path(&output)
     ));
     Ok(())
+}
+
+/// One step of a surface by one method.
+#[derive(Serialize, Clone, Debug)]
+struct SurfaceStep {
+    method: Method,
+    seconds: f64,
+    newton: usize,
+    hvp: usize,
+    /// What the paper reports.
+    papers_seconds: f64,
+}
+
+#[derive(Serialize, Clone, Debug)]
+struct SurfaceSteps {
+    about: AboutMesh,
+    n: usize,
+    tau: f64,
+    steps: Vec<SurfaceStep>,
+}
+
+/// One step of tau = 2^-18 of the armadillo at n = 64, eps = 2^-5, tautilde = 2^-12, by the hybrid scheme and nested finite elements.
+fn surface_steps(
+    options: &Options,
+    network: &Network,
+    device: &ComputeDevice,
+    progress: &Progress,
+) -> Result<SurfaceSteps, Error> {
+    const TAU: f64 = 1.0 / 262_144.0;
+    let n = if options.run.quick { 32 } else { 64 };
+    let mesh = options.mesh.load_or_built_in(&ARMADILLO)?;
+    let bar = progress.bar("signed distance".to_owned(), n as u64);
+    let params = surfaces::scales(n);
+    let grid = options.mesh.grid(&ARMADILLO, n)?;
+    let initial = mesh.phase_field(grid, params.eps, &bar)?;
+    bar.finish();
+    let mut steps = Vec::new();
+    for (method, papers_seconds) in [(Method::Hybrid, 807.0), (Method::FeImplicit, 14589.0)] {
+        let mut flow = method.willmore_flow(
+            Some(network),
+            &initial,
+            params,
+            LinearSolver::default(),
+            device,
+        )?;
+        let record = flow.advance(TAU)?;
+        steps.push(SurfaceStep {
+            method,
+            seconds: record.seconds,
+            newton: record.newton.newton,
+            hvp: record.newton.hvp,
+            papers_seconds,
+        });
+    }
+    Ok(SurfaceSteps {
+        about: mesh.about,
+        n,
+        tau: TAU,
+        steps,
+    })
+}
+
+fn surface_table(surface: &SurfaceSteps) -> Result<Table, Error> {
+    let mut table = Table::new([
+        Column::text("surface"),
+        Column::text("method"),
+        Column::number("n", Format::Shortest),
+        Column::number("one step [s]", Format::Fixed(2)),
+        Column::number("Newton", Format::Shortest),
+        Column::number("HVP", Format::Shortest),
+        Column::number("paper, other machines [s]", Format::Shortest),
+    ]);
+    for step in &surface.steps {
+        table.push([
+            surface.about.title.as_str().into(),
+            step.method.label().into(),
+            surface.n.into(),
+            step.seconds.into(),
+            step.newton.into(),
+            step.hvp.into(),
+            step.papers_seconds.into(),
+        ])?;
+    }
+    Ok(table)
 }
 
 fn output_path(output: &OutputDir) -> String {
