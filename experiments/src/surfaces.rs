@@ -12,11 +12,11 @@ use serde::Serialize;
 use solver::{FlowParams, NewtonParams};
 use surfaces::ClosedMesh;
 
-use crate::Error;
 use crate::circles::Flow;
 use crate::evolution::{Evolution, TimeSteps, Trajectory};
 use crate::method::Method;
 use crate::options::RunOptions;
+use crate::{Error, memory};
 
 /// Interface width of surfaces, in cells.
 const EPS_OVER_H: f64 = 2.0;
@@ -120,6 +120,8 @@ pub struct Finished<'a> {
     pub trajectory: Trajectory<3>,
     /// The shown ones.
     pub snapshots: Vec<Snapshot>,
+    /// Largest resident memory of the process until the last step was done, in MiB, where the system tells.
+    pub peak_mib: Option<f64>,
 }
 
 /// What running surfaces needs.
@@ -194,6 +196,7 @@ impl Workshop<'_> {
             )
         })?;
         bar.finish();
+        let peak_mib = memory::peak_mib();
         let measure = FiniteElementStep::implicit(initial.grid(), params.eps, params.mcf_step)?;
         let meshes = self.output.subfolder("meshes")?;
         let steps = run.shown.iter().filter(|(step, _)| *step <= run.steps);
@@ -224,6 +227,7 @@ impl Workshop<'_> {
             run,
             trajectory,
             snapshots,
+            peak_mib,
         })
     }
 
@@ -263,6 +267,7 @@ impl Workshop<'_> {
                 run,
                 trajectory,
                 snapshots,
+                ..
             },
         ) in finished.iter().enumerate()
         {
@@ -326,6 +331,9 @@ impl Finished<'_> {
         summary.insert(&format!("{key}.hvp_per_step"), hvp as f64 / count)?;
         summary.insert_count(&format!("{key}.energy_increases"), rises.count())?;
         summary.insert(&format!("{key}.seconds"), self.trajectory.seconds)?;
+        if let Some(peak) = self.peak_mib {
+            summary.insert(&format!("{key}.peak_mib"), peak)?;
+        }
         Ok(())
     }
 }

@@ -92,7 +92,6 @@ fn program(options: &Options) -> Result<(), Error> {
     let mut manifest = options.run.manifest(PROGRAM, &parameters, &device)?;
     let progress = options.run.progress();
     let clock = Instant::now();
-    memory::forget_peak();
     let bar = progress.bar("signed distance".to_owned(), n as u64);
     let initial = manifest.phase("signed distance", || {
         mesh.phase_field(grid, params.eps, &bar)
@@ -123,12 +122,11 @@ fn program(options: &Options) -> Result<(), Error> {
             identity: mesh.about.identity(),
             view: View {
                 up: Axis::Y,
-                azimuth: -65.0,
+                azimuth: 205.0,
                 elevation: 8.0,
             },
         },
     )?;
-    let peak = memory::peak_mib();
     let finished = [run];
     let figure = manifest.phase("pictures", || {
         workshop.figure(
@@ -149,8 +147,8 @@ fn program(options: &Options) -> Result<(), Error> {
     write_steps(&finished, &output)?;
     let mut summary = Summary::new();
     finished[0].summarize(PROGRAM, &mut summary)?;
-    if let Some(peak) = peak {
-        summary.insert(&format!("{PROGRAM}.peak_mib"), peak)?;
+    if let Some(peak) = memory::peak_mib() {
+        summary.insert(&format!("{PROGRAM}.peak_mib_with_pictures"), peak)?;
     }
     summary.insert("seconds", since(clock))?;
     summary.write(&output)?;
