@@ -272,27 +272,30 @@ impl Workshop<'_> {
         ) in finished.iter().enumerate()
         {
             let eps = trajectory.evolution.params.eps;
-            let mut scenes = Vec::new();
-            for snapshot in snapshots {
-                let u = trajectory.field(snapshot.step)?;
-                let scene = Scene::new(&u, eps)?
+            let scene = |snapshot: &Snapshot| -> Result<Scene<'static>, Error> {
+                Ok(Scene::new(&trajectory.field(snapshot.step)?, eps)?
                     .up(run.view.up)
                     .azimuth(run.view.azimuth)
                     .elevation(run.view.elevation)
                     .margin(MARGIN)
                     .quality(quality)
-                    .tubes(decorate(k, snapshot.step));
-                scenes.push((run.name(snapshot.step), scene));
-            }
-            let bounds: Option<Bounds> = scenes
-                .iter()
-                .filter_map(|(_, scene)| scene.bounds())
-                .reduce(|all, one| all.union(&one));
-            for ((name, scene), snapshot) in scenes.into_iter().zip(snapshots) {
-                let scene = match bounds {
-                    Some(bounds) => scene.framing(Framing::Within(bounds)),
-                    None => scene,
+                    .tubes(decorate(k, snapshot.step)))
+            };
+            // Made twice rather than kept: a scene takes several times the memory of its phase field.
+            let mut bounds: Option<Bounds> = None;
+            for snapshot in snapshots {
+                let one = scene(snapshot)?.bounds();
+                bounds = match (bounds, one) {
+                    (Some(all), Some(one)) => Some(all.union(&one)),
+                    (all, one) => all.or(one),
                 };
+            }
+            for snapshot in snapshots {
+                let mut scene = scene(snapshot)?;
+                if let Some(bounds) = bounds {
+                    scene = scene.framing(Framing::Within(bounds));
+                }
+                let name = run.name(snapshot.step);
                 let picture = scene.render(size)?;
                 picture.write_png(pictures.path(&format!("{name}.png"))?)?;
                 let size = [picture.width() as usize, picture.height() as usize];

@@ -1,9 +1,11 @@
 //! The compiled programs: what they refuse, and the quick convergence test.
 
+mod common;
+
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
+use common::{refused, run};
 use model::pretrained;
 use report::Summary;
 
@@ -14,46 +16,9 @@ const MCF_CROSS: &str = env!("CARGO_BIN_EXE_mcf_cross");
 const PERFORMANCE: &str = env!("CARGO_BIN_EXE_performance");
 const RECTANGLE: &str = env!("CARGO_BIN_EXE_rectangle");
 const TIMING: &str = env!("CARGO_BIN_EXE_timing_tables");
+const SPHERES: &str = env!("CARGO_BIN_EXE_spheres");
+const DISK_AND_CUBE: &str = env!("CARGO_BIN_EXE_disk_and_cube");
 const TRAIN: &str = env!("CARGO_BIN_EXE_train_networks");
-
-fn run(program: &str, folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(program)
-        .current_dir(folder)
-        .args(arguments)
-        .output()
-        .expect("the program starts")
-}
-
-/// Runs a program that must refuse: code 2, one line that contains `parts`, and the folder as it was.
-fn refused(program: &str, folder: &Path, arguments: &[&str], parts: &[&str]) {
-    let before = content(folder);
-    let output = run(program, folder, arguments);
-    let message = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-    assert_eq!(message.lines().count(), 1, "{arguments:?}: {message}");
-    assert!(message.starts_with("error: "), "{message}");
-    for part in parts {
-        assert!(message.contains(part), "{part:?} is not in {message}");
-    }
-    assert!(output.stdout.is_empty());
-    assert_eq!(content(folder), before, "{arguments:?}");
-}
-
-/// All files and folders with the bytes in them.
-fn content(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
-    let mut found = Vec::new();
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            found.push((path.clone(), Vec::new()));
-            found.extend(content(&path));
-        } else {
-            found.push((path.clone(), fs::read(&path).unwrap()));
-        }
-    }
-    found.sort();
-    found
-}
 
 #[test]
 fn devices_that_are_unknown_or_not_compiled_in() {
@@ -65,6 +30,8 @@ fn devices_that_are_unknown_or_not_compiled_in() {
         MCF_CROSS,
         PERFORMANCE,
         RECTANGLE,
+        SPHERES,
+        DISK_AND_CUBE,
         TIMING,
         TRAIN,
     ] {
@@ -163,6 +130,8 @@ fn resolutions_names_and_outputs_that_cannot_be() {
         MCF_CROSS,
         PERFORMANCE,
         RECTANGLE,
+        SPHERES,
+        DISK_AND_CUBE,
         TIMING,
         TRAIN,
     ] {
@@ -304,7 +273,7 @@ fn the_quick_timing_table_has_a_row_for_every_method() {
     let output = run(
         TIMING,
         root.path(),
-        &["--quick", "--quiet", "--output", "out"],
+        &["--quick", "--quiet", "--procedural", "--output", "out"],
     );
     let message = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success() && message.is_empty(), "{message}");
@@ -314,6 +283,12 @@ fn the_quick_timing_table_has_a_row_for_every_method() {
     let summary = Summary::from_json(&text).unwrap();
     let seconds = |key: &str| summary.get(&format!("timing.n128.{key}.seconds")).unwrap();
     assert!(seconds("hybrid") > 0.0 && seconds("fe_implicit") > seconds("hybrid"));
+    let step = |key: &str| {
+        summary
+            .get(&format!("timing.armadillo.{key}.seconds"))
+            .unwrap()
+    };
+    assert!(step("hybrid") > 0.0 && step("fe_implicit") > step("hybrid"));
 }
 
 #[test]

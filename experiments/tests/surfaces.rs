@@ -1,0 +1,237 @@
+//! Surfaces: the programs, and what their flows must satisfy.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::{refused, run};
+use experiments::method::Method;
+use experiments::surfaces::{centred_box, ratios, scales};
+use fem::{FiniteElementStep, LinearSolver};
+use geometry::measure::{l2_distance, zero_set_volume};
+use geometry::shapes::{Ball, Capsule};
+use geometry::{Field, SignedDistanceExt, npy, phase_field};
+use model::pretrained;
+use operators::ComputeDevice;
+use report::Summary;
+
+const ARMADILLO: &str = env!("CARGO_BIN_EXE_armadillo");
+const DISK_AND_CUBE: &str = env!("CARGO_BIN_EXE_disk_and_cube");
+const MESH_DISTANCE: &str = env!("CARGO_BIN_EXE_mesh_distance");
+const ROCKER_ARM: &str = env!("CARGO_BIN_EXE_rocker_arm");
+const SPHERES: &str = env!("CARGO_BIN_EXE_spheres");
+
+const TAU: f64 = 1.0 / 262_144.0;
+
+/// Runs a program that must succeed without a word, and returns its metrics.
+fn metrics(program: &str, folder: &Path, arguments: &[&str]) -> Summary {
+    let output = run(program, folder, arguments);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && message.is_empty(), "{message}");
+    let text = fs::read_to_string(folder.join("out/summary.json")).unwrap();
+    Summary::from_json(&text).unwrap()
+}
+
+#[test]
+fn built_in_shapes_flow_without_any_file() {
+    let root = tempfile::tempdir().unwrap();
+    let arguments = ["--quick", "--quiet", "--procedural", "--output", "out"];
+    let summary = metrics(ARMADILLO, root.path(), &arguments);
+    let metric = |name: &str| summary.get(name).unwrap_or_else(|| panic!("no {name}"));
+    assert!(metric("armadillo.w.step2") < metric("armadillo.w.step0"));
+    assert!(metric("armadillo.energy_increases") <= 0.0);
+    for file in [
+        "surfaces.png",
+        "surfaces.svg",
+        "energies.md",
+        "steps.csv",
+        "meshes/armadillo_hybrid_step000.ply",
+        "pictures/armadillo_hybrid_step002.png",
+    ] {
+        assert!(root.path().join("out").join(file).exists(), "{file}");
+    }
+    let summary = metrics(ROCKER_ARM, root.path(), &arguments);
+    let metric = |name: &str| summary.get(name).unwrap_or_else(|| panic!("no {name}"));
+    assert!(metric("rocker_arm.w.step2") < metric("rocker_arm.w.step0"));
+    assert!(metric("rocker_arm.energy_increases") <= 0.0);
+    assert!(metric("rocker_arm.clifford_l2") > 0.0);
+}
+
+#[test]
+fn cube_and_disk_come_near_their_finite_element_runs() {
+    let root = tempfile::tempdir().unwrap();
+    let arguments = ["--quick", "--quiet", "--output", "out"];
+    let summary = metrics(DISK_AND_CUBE, root.path(), &arguments);
+    let metric = |name: &str| summary.get(name).unwrap_or_else(|| panic!("no {name}"));
+    for key in ["cube", "disk"] {
+        assert!(metric(&format!("{key}.w.step2")) < metric(&format!("{key}.w.step0")));
+        assert!(metric(&format!("{key}.energy_increases")) <= 0.0);
+        let l2 = metric(&format!("{key}.l2_to_fe.step2"));
+        assert!(l2 > 0.0 && l2 < 0.02, "{key}: {l2}");
+    }
+}
+
+#[test]
+fn quick_spheres_keep_their_radius() {
+    let root = tempfile::tempdir().unwrap();
+    let summary = metrics(
+        SPHERES,
+        root.path(),
+        &["--quick", "--quiet", "--output", "out"],
+    );
+    let change = summary.get("spheres.r025.radius_change_over_h").unwrap();
+    assert!(change.abs() < 0.25, "{change}");
+}
+
+#[test]
+fn meshes_that_are_missing_or_not_closed() {
+    let root = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(root.path().join(name), text).unwrap();
+    for program in [ARMADILLO, ROCKER_ARM] {
+        refused(
+            program,
+            root.path(),
+            &["--quick"],
+            &["scripts/fetch_meshes", "WORKBENCH_MESHES", "--procedural"],
+        );
+    }
+    let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+    write(
+        "open.obj",
+        &format!("{vertices}f 1 3 2\nf 1 2 4\nf 2 3 4\n"),
+    );
+    write("nan.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    write("mesh.txt", "nothing");
+    for (file, part) in [
+        ("open.obj", "open"),
+        ("nan.obj", "nan"),
+        ("mesh.txt", "mesh.txt"),
+        ("missing.ply", "missing.ply"),
+    ] {
+        let arguments = ["--quick", "--mesh", file];
+        refused(ARMADILLO, root.path(), &arguments, &[part]);
+        let arguments = ["--mesh", file, "--output", "s.npy"];
+        refused(MESH_DISTANCE, root.path(), &arguments, &[part]);
+    }
+    write(
+        "good.obj",
+        &format!("{vertices}f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"),
+    );
+    let too_large = [
+        "--mesh",
+        "good.obj",
+        "--side-length",
+        "1.5",
+        "--output",
+        "s.npy",
+    ];
+    refused(MESH_DISTANCE, root.path(), &too_large, &["1.5", "fit"]);
+    let unknown = ["--mesh", "good.obj", "--output", "s.raw"];
+    refused(MESH_DISTANCE, root.path(), &unknown, &[".npy", ".vti"]);
+}
+
+#[test]
+fn the_distance_of_a_mesh_is_written_on_any_grid() {
+    let root = tempfile::tempdir().unwrap();
+    let cube = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 0 0 2\nv 2 0 2\nv 2 2 2\nv 0 2 2\n\
+                f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+    fs::write(root.path().join("cube.obj"), cube).unwrap();
+    let arguments = [
+        "--mesh",
+        "cube.obj",
+        "--cells",
+        "20",
+        "--side-length",
+        "0.5",
+        "--output",
+        "s.npy",
+        "--quiet",
+    ];
+    let output = run(MESH_DISTANCE, root.path(), &arguments);
+    assert!(output.status.success() && output.stderr.is_empty());
+    let grid = centred_box(20, 1.0).unwrap();
+    let field: Field<3> = npy::read(root.path().join("s.npy"), |_| Ok(grid)).unwrap();
+    let exact = geometry::shapes::Cuboid::new([0.25; 3])
+        .unwrap()
+        .translated([0.5; 3]);
+    for (i, &value) in field.values().iter().enumerate() {
+        let expected = geometry::SignedDistance::signed_distance(&exact, grid.node(i));
+        assert!((value - expected).abs() < 1e-14, "{i}: {value} {expected}");
+    }
+}
+
+fn flow(initial: &Field<3>, n: usize, steps: usize) -> (Field<3>, Vec<solver::StepRecord>) {
+    let device = ComputeDevice::default_compiled().unwrap();
+    let network = pretrained::find(ratios()).unwrap();
+    let mut flow = Method::Hybrid
+        .willmore_flow(
+            Some(&network),
+            initial,
+            scales(n),
+            LinearSolver::default(),
+            &device,
+        )
+        .unwrap();
+    let records = (0..steps).map(|_| flow.advance(TAU).unwrap()).collect();
+    (flow.field().unwrap(), records)
+}
+
+#[test]
+fn spheres_have_the_energy_of_spheres_and_stay() {
+    let n = 64;
+    for radius in [0.15, 0.4] {
+        let ball = Ball::new([0.5; 3], radius).unwrap();
+        let initial = phase_field(centred_box(n, 1.0).unwrap(), &ball, scales(n).eps).unwrap();
+        let w = FiniteElementStep::implicit(initial.grid(), scales(n).eps, scales(n).mcf_step)
+            .unwrap()
+            .willmore_energy(&initial)
+            .unwrap();
+        let exact = 8.0 * std::f64::consts::PI;
+        assert!((w / exact - 1.0).abs() < 0.03, "r = {radius}: w = {w}");
+        let (last, records) = flow(&initial, n, 20);
+        assert!(records.iter().all(|r| r.energy <= r.energy_before));
+        let radius_of = |u: &Field<3>| (0.75 * zero_set_volume(u) / std::f64::consts::PI).cbrt();
+        let change = (radius_of(&last) - radius_of(&initial)) * n as f64;
+        assert!(change.abs() < 0.25, "r = {radius}: {change} h");
+    }
+}
+
+/// A shape without symmetry, small enough for shifts.
+fn blob(n: usize) -> Field<3> {
+    let arm = Capsule::new([0.3, 0.42, 0.45], [0.62, 0.5, 0.6], 0.12).unwrap();
+    let shape = Ball::new([0.5, 0.6, 0.45], 0.17).unwrap().union(arm);
+    phase_field(centred_box(n, 1.0).unwrap(), &shape, scales(n).eps).unwrap()
+}
+
+/// The field whose value at `i` is that of `u` at `from(i)`.
+fn moved(u: &Field<3>, from: impl Fn([usize; 3]) -> [usize; 3]) -> Field<3> {
+    let grid = *u.grid();
+    let values = (0..grid.len())
+        .map(|node| u.values()[grid.index(from(grid.multi_index(node)))])
+        .collect();
+    Field::from_values(grid, values).unwrap()
+}
+
+#[test]
+fn moving_the_input_by_symmetries_of_the_grid_moves_the_result() {
+    let n = 32;
+    let u = blob(n);
+    let (result, _) = flow(&u, n, 2);
+    let motion = l2_distance(&u, &result).unwrap();
+    let shift = |[i, j, k]: [usize; 3]| [i + 3, j + n - 5, k + 7];
+    // A quarter turn about the first axis through the origin.
+    let turn = |[i, j, k]: [usize; 3]| [i, (n - k) % n, j];
+    let mirror = |[i, j, k]: [usize; 3]| [(n - i) % n, j, k];
+    let check = |what: &str, from: &dyn Fn([usize; 3]) -> [usize; 3]| {
+        let (other, _) = flow(&moved(&u, from), n, 2);
+        let difference = l2_distance(&other, &moved(&result, from)).unwrap();
+        assert!(
+            difference < 0.01 * motion,
+            "{what}: {difference} of {motion}"
+        );
+    };
+    check("shift", &shift);
+    check("turn", &turn);
+    check("mirror", &mirror);
+}
