@@ -8,7 +8,7 @@ pub fn keep_freed() {
     {
         /// The largest value glibc accepts.
         const MAPPED_FROM: libc::c_int = 32 << 20;
-        const KEPT: libc::c_int = 256 << 20;
+        const KEPT: libc::c_int = 128 << 20;
         #[allow(unsafe_code, reason = "a call into the C library without pointers")]
         // SAFETY: `mallopt` takes two integers and may be called at any time.
         unsafe {

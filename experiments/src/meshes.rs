@@ -1,13 +1,13 @@
-//! Triangle meshes as initial data.
+//! Triangle meshes and volumes as initial data.
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
-use geometry::{Field, Grid, optimal_profile};
+use clap::{Args, ValueEnum};
+use geometry::{Field, Grid, npy, optimal_profile, vti};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
-use surfaces::{ClosedMesh, MeshDistance, Placement, TriangleMesh};
+use surfaces::{ClosedMesh, MeshDistance, Placement};
 
 use crate::Error;
 use crate::surfaces::centred_box;
@@ -29,6 +29,20 @@ pub struct MeshOptions {
     #[arg(long)]
     pub procedural: bool,
 
+    /// Start from values on the n^3 nodes of the box: NPY, or the first array of a VTI file
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["mesh", "procedural", "side_length"])]
+    pub volume: Option<PathBuf>,
+
+    /// What the values are
+    #[arg(
+        long,
+        value_name = "KIND",
+        value_enum,
+        default_value_t,
+        requires = "volume"
+    )]
+    pub volume_holds: VolumeKind,
+
     /// Longest side of the mesh
     #[arg(long, value_name = "LENGTH")]
     pub side_length: Option<f64>,
@@ -36,6 +50,17 @@ pub struct MeshOptions {
     /// Side of the periodic box, in whose centre the mesh is put
     #[arg(long, value_name = "LENGTH")]
     pub box_side: Option<f64>,
+}
+
+/// What the values of a volume are.
+#[derive(ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VolumeKind {
+    /// Signed distances, negative inside
+    #[default]
+    SignedDistance,
+    /// A phase field, 1 inside and -1 outside
+    PhaseField,
 }
 
 /// A mesh of the paper, and what stands in for it.
@@ -66,40 +91,50 @@ pub const ARMADILLO: KnownMesh = KnownMesh {
     procedural_title: "built-in figure",
 };
 
-/// A mesh with its provenance.
-pub struct LoadedMesh {
-    /// The mesh, closed and oriented outwards.
-    pub mesh: ClosedMesh,
+/// Initial data with their provenance.
+pub struct Loaded {
+    shape: Shape,
     /// What it is.
-    pub about: AboutMesh,
+    pub about: About,
 }
 
-/// Provenance of a mesh, for manifests.
-#[derive(Clone, Debug, Serialize)]
-pub struct AboutMesh {
+enum Shape {
+    /// Closed and oriented outwards.
+    Mesh(ClosedMesh),
+    Volume(Field<3>),
+}
+
+/// Provenance of initial data, for manifests.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct About {
     /// Name in titles.
     pub title: String,
     /// Name of the file, none for a built-in shape.
     pub file: Option<String>,
     /// SHA-256 of the file.
     pub sha256: Option<String>,
-    /// Number of vertices.
-    pub vertices: usize,
+    /// What a volume holds.
+    pub holds: Option<VolumeKind>,
+    /// Number of vertices of a mesh.
+    pub vertices: Option<usize>,
     /// Number of faces.
-    pub faces: usize,
+    pub faces: Option<usize>,
     /// `1 - chi / 2` of a connected surface.
-    pub genus: i64,
-    /// Longest side in the box.
-    pub side_length: f64,
+    pub genus: Option<i64>,
+    /// Longest side of a mesh in the box.
+    pub side_length: Option<f64>,
     /// What was mended.
     pub warnings: Vec<String>,
 }
 
-impl AboutMesh {
+impl About {
     /// What a stored run depends on.
     pub fn identity(&self) -> String {
         let source = self.sha256.as_ref().unwrap_or(&self.title);
-        format!("{source}, longest side {}", self.side_length)
+        match (self.side_length, self.holds) {
+            (Some(side), _) => format!("{source}, longest side {side}"),
+            (None, holds) => format!("{source}, {holds:?}"),
+        }
     }
 }
 
@@ -115,20 +150,37 @@ impl MeshOptions {
         centred_box(n, self.box_side.unwrap_or(known.box_side))
     }
 
-    /// The chosen mesh.
+    /// Whether nothing but the mesh of the paper was asked for.
+    pub fn is_the_papers(&self) -> bool {
+        self.mesh.is_none() && self.volume.is_none() && !self.procedural
+    }
+
+    /// The chosen mesh or volume, for runs on a grid.
     ///
     /// # Errors
-    /// [`Error::Options`] if it is nowhere, [`Error::Surfaces`] if it is no closed surface.
-    pub fn load(&self, known: &KnownMesh) -> Result<LoadedMesh, Error> {
+    /// [`Error::Options`] if it is nowhere; [`Error::Surfaces`] if it is no closed surface or does not fit the box; for a volume
+    /// [`Error::Geometry`] if it cannot be read, [`Error::Options`] if it has another size or its values are no phase field.
+    pub fn load(&self, known: &KnownMesh, grid: &Grid<3>) -> Result<Loaded, Error> {
         let side_length = self.side_length.unwrap_or(known.side_length);
+        if let Some(path) = &self.volume {
+            let about = About {
+                holds: Some(self.volume_holds),
+                ..About::of_file(path)?
+            };
+            let values = volume(path, *grid)?;
+            if self.volume_holds == VolumeKind::PhaseField {
+                check_phase_field(&values, path)?;
+            }
+            let shape = Shape::Volume(values);
+            return Ok(Loaded { shape, about });
+        }
         if self.procedural {
             let mesh = (known.procedural)(PROCEDURAL_CELLS)?;
-            return Ok(LoadedMesh::new(
-                mesh,
-                known.procedural_title,
-                side_length,
-                Vec::new(),
-            ));
+            let about = About {
+                title: known.procedural_title.to_owned(),
+                ..About::default()
+            };
+            return Loaded::mesh(mesh, about, side_length).fitting(grid);
         }
         match self.find(known) {
             Some(path) => {
@@ -136,7 +188,7 @@ impl MeshOptions {
                 if self.mesh.is_none() {
                     known.title.clone_into(&mut loaded.about.title);
                 }
-                Ok(loaded)
+                loaded.fitting(grid)
             }
             None => Err(Error::Options(format!(
                 "{} is not here: run scripts/fetch_meshes, or set {FOLDER_VARIABLE} to a folder that holds it, or give --mesh FILE, \
@@ -150,13 +202,14 @@ impl MeshOptions {
     ///
     /// # Errors
     /// As [`Self::load`].
-    pub fn load_or_built_in(&self, known: &KnownMesh) -> Result<LoadedMesh, Error> {
-        let procedural = self.procedural || self.find(known).is_none();
+    pub fn load_or_built_in(&self, known: &KnownMesh, grid: &Grid<3>) -> Result<Loaded, Error> {
+        let nothing = self.volume.is_none() && self.find(known).is_none();
+        let procedural = self.procedural || nothing;
         Self {
             procedural,
             ..self.clone()
         }
-        .load(known)
+        .load(known, grid)
     }
 
     fn find(&self, known: &KnownMesh) -> Option<PathBuf> {
@@ -173,66 +226,133 @@ impl MeshOptions {
 ///
 /// # Errors
 /// [`Error::Surfaces`] if it cannot be read or is no closed surface, [`Error::Io`].
-pub fn load(path: &Path, side_length: f64) -> Result<LoadedMesh, Error> {
-    let mesh: TriangleMesh = surfaces::read(path)?;
-    let (mesh, warnings) = ClosedMesh::new(mesh)?;
-    let name = path.file_name().unwrap_or(path.as_os_str());
-    let name = name.to_string_lossy().into_owned();
-    let warnings = warnings.iter().map(ToString::to_string).collect();
-    let mut loaded = LoadedMesh::new(mesh, &name, side_length, warnings);
-    let bytes = std::fs::read(path).map_err(|source| Error::Io {
-        action: "read",
-        path: path.to_owned(),
-        source,
-    })?;
-    let hash = Sha256::digest(bytes);
-    loaded.about.sha256 = Some(hash.iter().map(|byte| format!("{byte:02x}")).collect());
-    loaded.about.file = Some(name);
-    Ok(loaded)
+fn load(path: &Path, side_length: f64) -> Result<Loaded, Error> {
+    let (mesh, warnings) = ClosedMesh::new(surfaces::read(path)?)?;
+    let about = About {
+        warnings: warnings.iter().map(ToString::to_string).collect(),
+        ..About::of_file(path)?
+    };
+    Ok(Loaded::mesh(mesh, about, side_length))
 }
 
-impl LoadedMesh {
-    fn new(mesh: ClosedMesh, title: &str, side_length: f64, warnings: Vec<String>) -> Self {
-        let about = AboutMesh {
-            title: title.to_owned(),
-            file: None,
-            sha256: None,
-            vertices: mesh.mesh().vertices.len(),
-            faces: mesh.mesh().faces.len(),
-            genus: mesh.genus(),
-            side_length,
-            warnings,
+impl About {
+    fn of_file(path: &Path) -> Result<Self, Error> {
+        let bytes = std::fs::read(path).map_err(|source| Error::Io {
+            action: "read",
+            path: path.to_owned(),
+            source,
+        })?;
+        let hash = Sha256::digest(bytes);
+        let name = path.file_name().unwrap_or(path.as_os_str());
+        let name = name.to_string_lossy().into_owned();
+        Ok(Self {
+            title: name.clone(),
+            file: Some(name),
+            sha256: Some(hash.iter().map(|byte| format!("{byte:02x}")).collect()),
+            ..Self::default()
+        })
+    }
+}
+
+impl Loaded {
+    fn mesh(mesh: ClosedMesh, about: About, side_length: f64) -> Self {
+        let about = About {
+            vertices: Some(mesh.mesh().vertices.len()),
+            faces: Some(mesh.mesh().faces.len()),
+            genus: Some(mesh.genus()),
+            side_length: Some(side_length),
+            ..about
         };
-        Self { mesh, about }
+        Self {
+            shape: Shape::Mesh(mesh),
+            about,
+        }
     }
 
-    /// Signed distances to the mesh, scaled to its side length and centred in the box of the grid, at least `margin` from its faces.
+    fn fitting(self, grid: &Grid<3>) -> Result<Self, Error> {
+        if let (Shape::Mesh(mesh), Some(side_length)) = (&self.shape, self.about.side_length) {
+            Placement::fit(mesh, grid, side_length, 0.0)?;
+        }
+        Ok(self)
+    }
+
+    /// The phase field on the grid for which the data were loaded: of a mesh scaled to its side length and centred in the box, or of
+    /// a volume.
     ///
     /// # Errors
     /// [`Error::Surfaces`] if the mesh does not fit.
-    pub fn signed_distance(
-        &self,
-        grid: Grid<3>,
-        margin: f64,
-        bar: &ProgressBar,
-    ) -> Result<Field<3>, Error> {
-        let placement = Placement::fit(&self.mesh, &grid, self.about.side_length, margin)?;
-        bar.set_length(grid.cells() as u64);
-        let distance = MeshDistance::new(&self.mesh.placed(&placement));
-        Ok(distance.sample(grid, || bar.inc(1))?)
-    }
-
-    /// The phase field of the mesh.
-    ///
-    /// # Errors
-    /// As [`Self::signed_distance`].
     pub fn phase_field(
         &self,
         grid: Grid<3>,
         eps: f64,
         bar: &ProgressBar,
     ) -> Result<Field<3>, Error> {
-        let distance = self.signed_distance(grid, 0.0, bar)?;
-        Ok(distance.map(|s| optimal_profile(s, eps)))
+        let profile = |distance: Field<3>| distance.map(|s| optimal_profile(s, eps));
+        match &self.shape {
+            Shape::Mesh(mesh) => {
+                let side_length = self.about.side_length.unwrap_or(1.0);
+                let distance = signed_distance(mesh, grid, side_length, 0.0, bar)?;
+                Ok(profile(distance))
+            }
+            Shape::Volume(values) => Ok(match self.about.holds {
+                Some(VolumeKind::PhaseField) => values.clone(),
+                _ => profile(values.clone()),
+            }),
+        }
     }
+}
+
+/// The values of a file on a grid, whatever box the file says.
+fn volume(path: &Path, grid: Grid<3>) -> Result<Field<3>, Error> {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+    let field = match extension.to_ascii_lowercase().as_str() {
+        "npy" => npy::read(path, |cells| Grid::new(cells, grid.side()))?,
+        "vti" => {
+            let mut arrays = vti::read::<3>(path)?;
+            arrays.swap_remove(0).1
+        }
+        _ => {
+            return Err(Error::Options(format!(
+                "--volume {} must end in .npy or .vti",
+                path.display()
+            )));
+        }
+    };
+    let (found, expected) = (field.grid().cells(), grid.cells());
+    if found != expected {
+        return Err(Error::Options(format!(
+            "{} has {found} nodes per side, and the box {expected}: choose --cells and --box-side with a product of {found}",
+            path.display()
+        )));
+    }
+    Ok(Field::from_values(grid, field.into_values())?)
+}
+
+fn check_phase_field(u: &Field<3>, path: &Path) -> Result<(), Error> {
+    /// Flows overshoot the phases a little.
+    const LARGEST: f64 = 1.1;
+    match u.values().iter().find(|u| u.abs() > LARGEST) {
+        None => Ok(()),
+        Some(value) => Err(Error::Options(format!(
+            "{} holds the value {value}, which no phase field has; are they signed distances?",
+            path.display()
+        ))),
+    }
+}
+
+/// Signed distances to a mesh, scaled to a longest side and centred in the box of the grid, at least `margin` from its faces.
+///
+/// # Errors
+/// [`Error::Surfaces`] if the mesh does not fit.
+pub fn signed_distance(
+    mesh: &ClosedMesh,
+    grid: Grid<3>,
+    side_length: f64,
+    margin: f64,
+    bar: &ProgressBar,
+) -> Result<Field<3>, Error> {
+    let placement = Placement::fit(mesh, &grid, side_length, margin)?;
+    bar.set_length(grid.cells() as u64);
+    let distance = MeshDistance::new(&mesh.placed(&placement));
+    Ok(distance.sample(grid, || bar.inc(1))?)
 }

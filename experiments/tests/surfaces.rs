@@ -11,7 +11,7 @@ use experiments::surfaces::{centred_box, ratios, scales};
 use fem::{FiniteElementStep, LinearSolver};
 use geometry::measure::{l2_distance, zero_set_volume};
 use geometry::shapes::{Ball, Capsule};
-use geometry::{Field, SignedDistanceExt, npy, phase_field};
+use geometry::{Field, SignedDistanceExt, npy, phase_field, vti};
 use model::pretrained;
 use operators::ComputeDevice;
 use report::Summary;
@@ -159,6 +159,44 @@ fn the_distance_of_a_mesh_is_written_on_any_grid() {
         let expected = geometry::SignedDistance::signed_distance(&exact, grid.node(i));
         assert!((value - expected).abs() < 1e-14, "{i}: {value} {expected}");
     }
+}
+
+#[test]
+fn a_volume_flows_like_the_shape_it_was_made_from() {
+    let root = tempfile::tempdir().unwrap();
+    let u = blob(32);
+    npy::write(root.path().join("u.npy"), &u).unwrap();
+    let s = u.map(|u| geometry::distance_from_phase_field(u, scales(32).eps));
+    vti::write(root.path().join("s.vti"), &[("s", &s)]).unwrap();
+    let common = ["--quick", "--quiet", "--output"];
+    let w = |folder: &str, arguments: &[&str]| {
+        let arguments = [&common[..], &[folder], arguments].concat();
+        let output = run(ARMADILLO, root.path(), &arguments);
+        assert!(output.status.success(), "{output:?}");
+        let text = fs::read_to_string(root.path().join(folder).join("summary.json")).unwrap();
+        Summary::from_json(&text)
+            .unwrap()
+            .get("armadillo.w.step2")
+            .unwrap()
+    };
+    let phase_field = w("a", &["--volume", "u.npy", "--volume-holds", "phase-field"]);
+    let distance = w("b", &["--volume", "s.vti"]);
+    assert!(
+        (phase_field - distance).abs() < 1e-3 * distance,
+        "{phase_field} {distance}"
+    );
+    let arguments = ["--cells", "24", "--volume", "u.npy"];
+    refused(ARMADILLO, root.path(), &arguments, &["32", "24"]);
+    let arguments = [
+        "--quick",
+        "--volume",
+        "s.vti",
+        "--volume-holds",
+        "phase-field",
+    ];
+    let doubled = s.map(|s| 40.0 * s);
+    vti::write(root.path().join("s.vti"), &[("s", &doubled)]).unwrap();
+    refused(ARMADILLO, root.path(), &arguments, &["signed distances"]);
 }
 
 fn flow(initial: &Field<3>, n: usize, steps: usize) -> (Field<3>, Vec<solver::StepRecord>) {

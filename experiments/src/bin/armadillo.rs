@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use experiments::evolution::TimeSteps;
-use experiments::meshes::{ARMADILLO, AboutMesh, MeshOptions};
+use experiments::meshes::{ARMADILLO, About, MeshOptions};
 use experiments::method::Method;
 use experiments::networks::{NetworkOptions, checksum};
 use experiments::options::RunOptions;
@@ -50,7 +50,7 @@ struct Options {
 
 #[derive(Serialize)]
 struct Parameters<'a> {
-    mesh: &'a AboutMesh,
+    mesh: &'a About,
     n: usize,
     box_side: f64,
     eps: f64,
@@ -75,8 +75,8 @@ fn program(options: &Options) -> Result<(), Error> {
     }
     let device = options.run.open_device()?;
     let networks = options.networks.find(&[ratios()])?;
-    let mesh = options.mesh.load(&ARMADILLO)?;
     let (grid, params) = (options.mesh.grid(&ARMADILLO, n)?, scales(n));
+    let mesh = options.mesh.load(&ARMADILLO, &grid)?;
     let output = options.run.open_output(PROGRAM)?;
     let parameters = Parameters {
         mesh: &mesh.about,

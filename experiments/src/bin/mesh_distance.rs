@@ -7,6 +7,7 @@ use clap::Parser;
 use experiments::{Error, harness, meshes};
 use geometry::{Grid, npy, vti};
 use report::Progress;
+use surfaces::ClosedMesh;
 
 /// Writes the signed distance to a closed triangle mesh, negative inside, at the nodes i/n of the box [0,1]^3. The mesh is scaled so
 /// that the longest side of its bounding box has the given length, and its bounding box is centred at (0.5, 0.5, 0.5).
@@ -55,14 +56,14 @@ fn program(options: &Options) -> Result<(), Error> {
             )));
         }
     };
-    let loaded = meshes::load(&options.mesh, options.side_length)?;
-    for warning in &loaded.about.warnings {
+    let (mesh, warnings) = ClosedMesh::new(surfaces::read(&options.mesh)?)?;
+    for warning in &warnings {
         eprintln!("warning: {}: {warning}", options.mesh.display());
     }
     let grid = Grid::<3>::new(options.cells, 1.0)?;
     let progress = Progress::new(options.quiet);
     let bar = progress.bar("signed distance".to_owned(), options.cells as u64);
-    let distance = loaded.signed_distance(grid, options.margin, &bar)?;
+    let distance = meshes::signed_distance(&mesh, grid, options.side_length, options.margin, &bar)?;
     bar.finish();
     if volume {
         vti::write(&options.output, &[("signed_distance", &distance)])?;
@@ -73,10 +74,10 @@ fn program(options: &Options) -> Result<(), Error> {
     if !options.quiet {
         println!(
             "{}: {} vertices, {} faces, genus {}; signed distance in {}",
-            loaded.about.title,
-            loaded.about.vertices,
-            loaded.about.faces,
-            loaded.about.genus,
+            options.mesh.display(),
+            mesh.mesh().vertices.len(),
+            mesh.mesh().faces.len(),
+            mesh.genus(),
             options.output.display()
         );
     }

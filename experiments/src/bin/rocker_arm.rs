@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Parser;
 use experiments::clifford::CliffordFit;
 use experiments::evolution::TimeSteps;
-use experiments::meshes::{AboutMesh, KnownMesh, MeshOptions};
+use experiments::meshes::{About, KnownMesh, MeshOptions};
 use experiments::method::Method;
 use experiments::networks::{NetworkOptions, checksum};
 use experiments::options::RunOptions;
@@ -65,7 +65,7 @@ struct Options {
 
 #[derive(Serialize)]
 struct Parameters<'a> {
-    mesh: &'a AboutMesh,
+    mesh: &'a About,
     n: usize,
     box_side: f64,
     eps: f64,
@@ -90,8 +90,8 @@ fn program(options: &Options) -> Result<(), Error> {
     }
     let device = options.run.open_device()?;
     let networks = options.networks.find(&[ratios()])?;
-    let mesh = options.mesh.load(&ROCKER_ARM)?;
     let (grid, params) = (options.mesh.grid(&ROCKER_ARM, n)?, scales(n));
+    let mesh = options.mesh.load(&ROCKER_ARM, &grid)?;
     let output = options.run.open_output(PROGRAM)?;
     let parameters = Parameters {
         mesh: &mesh.about,
@@ -119,7 +119,7 @@ fn program(options: &Options) -> Result<(), Error> {
         output: &output,
         progress: &progress,
     };
-    let papers = options.mesh.mesh.is_none() && !options.mesh.procedural;
+    let papers = options.mesh.is_the_papers();
     let mut shown: Vec<(usize, Option<f64>)> = SHOWN
         .into_iter()
         .filter(|(step, _)| *step <= steps)

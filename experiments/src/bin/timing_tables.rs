@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use experiments::circles::{EPS, STEP};
 use experiments::comparison::cross;
-use experiments::meshes::{ARMADILLO, AboutMesh, MeshOptions};
+use experiments::meshes::{ARMADILLO, About, MeshOptions};
 use experiments::method::Method;
 use experiments::networks::{NetworkOptions, checksum, convergence_ratios};
 use experiments::options::RunOptions;
@@ -238,7 +238,7 @@ struct SurfaceStep {
 
 #[derive(Serialize, Clone, Debug)]
 struct SurfaceSteps {
-    about: AboutMesh,
+    about: About,
     n: usize,
     tau: f64,
     steps: Vec<SurfaceStep>,
@@ -253,10 +253,10 @@ fn surface_steps(
 ) -> Result<SurfaceSteps, Error> {
     const TAU: f64 = 1.0 / 262_144.0;
     let n = if options.run.quick { 32 } else { 64 };
-    let mesh = options.mesh.load_or_built_in(&ARMADILLO)?;
     let bar = progress.bar("signed distance".to_owned(), n as u64);
     let params = surfaces::scales(n);
     let grid = options.mesh.grid(&ARMADILLO, n)?;
+    let mesh = options.mesh.load_or_built_in(&ARMADILLO, &grid)?;
     let initial = mesh.phase_field(grid, params.eps, &bar)?;
     bar.finish();
     let mut steps = Vec::new();
