@@ -244,6 +244,7 @@ impl Ensemble {
             eps: EPS,
             mcf_step: STEP,
             newton: NewtonParams::default(),
+            calibration: solver::Factors::PAPER,
         };
         let network_checksum = network.map(checksum);
         let circles: Vec<Circle> = radii(count)
