@@ -560,11 +560,11 @@ fn flow<const D: usize>(backend: &Backend, grid: Grid<D>) -> (Field<D>, [StepRec
         eps: 2.0 * grid.spacing(),
         mcf_step: grid.spacing().powi(2),
         newton: NewtonParams {
-            calibration: solver::Factors::PAPER,
             tolerance: 1e-3,
             cg_tolerance: 1e-2,
             ..NewtonParams::default()
         },
+        calibration: solver::Factors::PAPER,
     };
     let network = splitting_network(D, WIDTH).unwrap();
     let start = ball(grid, 0.3);
