@@ -106,3 +106,73 @@ impl PlanarStep for NetworkOnPlanes<'_> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::planar::{flat_interface, optimal_interface};
+    use super::super::{normals, solve};
+    use super::*;
+    use crate::pretrained;
+
+    fn dot(a: &Col<f64>, b: &Col<f64>) -> f64 {
+        a.iter().zip(b.iter()).map(|(a, b)| a * b).sum()
+    }
+
+    /// For a symmetric kernel `psi = K * w'` and `<A, psi> = -<T * w', w'>`, without an eigenvalue problem.
+    #[test]
+    fn factors_have_a_closed_form_for_symmetric_kernels() {
+        for (name, network) in pretrained::all().unwrap() {
+            if network.ratios().width > 17 {
+                continue; // the same code path, many times the time
+            }
+            for &(normal, _) in normals(network.ratios().dimension) {
+                let step = NetworkOnPlanes::new(&network, normal);
+                let found = solve(&step, 0.25).unwrap();
+                let (start, optimal_slope) = optimal_interface(&step, 0.25);
+                let w = flat_interface(&step, &start, &optimal_slope).unwrap();
+                let (_, jacobian) = step.linearize(&w).unwrap();
+                let mut slope = optimal_slope.clone();
+                for _ in 0..100 {
+                    slope = &jacobian * &slope;
+                }
+                let jump = w[w.nrows() - 1] - w[0];
+                slope *= faer::Scale(jump / (slope.sum() * step.spacing()));
+                let psi = step.smoothed(&step.kernel, &slope);
+                let response = dot(&slope, &step.smoothed(&step.moments, &slope));
+                let scale = step.time_step().powi(2) * dot(&optimal_slope, &optimal_slope);
+                let energy = response.powi(2) / (dot(&psi, &psi) * scale);
+                assert!(
+                    (energy / found.energy - 1.0).abs() < 1e-5,
+                    "{name} {normal:?}: {energy} {found:?}"
+                );
+                let alignment = dot(&psi, &slope).powi(2) / (dot(&psi, &psi) * dot(&slope, &slope));
+                assert!((alignment - found.alignment).abs() < 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn planes_keep_the_sums_of_the_kernel_and_see_half_its_variance() {
+        for (name, network) in pretrained::all().unwrap() {
+            let dimension = network.ratios().dimension;
+            for &(normal, _) in normals(dimension) {
+                let step = NetworkOnPlanes::new(&network, normal);
+                let sum: f64 = network.kernel().iter().sum();
+                assert!(
+                    (step.kernel.iter().sum::<f64>() - sum).abs() < 1e-12,
+                    "{name}"
+                );
+                // The variance per axis of a symmetric kernel does not depend on the direction.
+                let reach = (step.kernel.len() / 2) as f64;
+                let variance: f64 = (step.kernel.iter().enumerate())
+                    .map(|(m, k)| k * ((m as f64 - reach) * step.spacing).powi(2))
+                    .sum();
+                let moment: f64 = step.moments.iter().sum();
+                assert!(
+                    (moment - 0.5 * variance).abs() < 1e-10 * variance,
+                    "{name} {normal:?}"
+                );
+            }
+        }
+    }
+}

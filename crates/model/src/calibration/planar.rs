@@ -99,11 +99,8 @@ const OFF: f64 = 1e-2;
 pub fn solve(step: &impl PlanarStep, position: f64) -> Result<PlanarInterface, Error> {
     let failed = |reason, eigenvalue| Error::Calibration { reason, eigenvalue };
     let (eps, spacing) = (step.eps(), step.spacing());
-    let half = (HALF_WIDTH * eps / spacing).ceil();
-    let planes = 2 * half as usize + 1;
-    let x = |i: usize| (i as f64 - half + position) * spacing;
-    let start = Col::from_fn(planes, |i| optimal_profile(-x(i), eps));
-    let optimal_slope = Col::from_fn(planes, |i| 0.75 / eps * (1.0 - start[i] * start[i]));
+    let (start, optimal_slope) = optimal_interface(step, position);
+    let planes = start.nrows();
     let optimal_square = dot(&optimal_slope, &optimal_slope);
 
     let w = flat_interface(step, &start, &optimal_slope)?;
@@ -163,9 +160,20 @@ pub fn solve(step: &impl PlanarStep, position: f64) -> Result<PlanarInterface, E
     Ok(interface)
 }
 
+/// `q` and `q'` on the planes of the layer.
+pub(super) fn optimal_interface(step: &impl PlanarStep, position: f64) -> (Col<f64>, Col<f64>) {
+    let (eps, spacing) = (step.eps(), step.spacing());
+    let half = (HALF_WIDTH * eps / spacing).ceil();
+    let planes = 2 * half as usize + 1;
+    let x = |i: usize| (i as f64 - half + position) * spacing;
+    let start = Col::from_fn(planes, |i| optimal_profile(-x(i), eps));
+    let slope = Col::from_fn(planes, |i| 0.75 / eps * (1.0 - start[i] * start[i]));
+    (start, slope)
+}
+
 /// The profile `w` with `v[w] - w = s q'` at the position of `start`, for some speed `s`: zero unless the step moves flat
 /// interfaces, up to what the grid holds on to.
-fn flat_interface(
+pub(super) fn flat_interface(
     step: &impl PlanarStep,
     start: &Col<f64>,
     optimal_slope: &Col<f64>,
