@@ -12,11 +12,11 @@ use indicatif::ProgressBar;
 use model::Network;
 use operators::ComputeDevice;
 use serde::{Deserialize, Serialize};
-use solver::{FlowParams, NewtonParams, StepRecord};
+use solver::{Factors, FlowParams, NewtonParams, StepRecord};
 
 use crate::Error;
 use crate::harness::{in_parallel, workers};
-use crate::method::Method;
+use crate::method::{Method, Scheme};
 use crate::networks::checksum;
 use crate::partial::Partial;
 
@@ -108,6 +108,8 @@ pub struct Circle {
     pub flow: Flow,
     /// Which method.
     pub method: Method,
+    /// Which scheme of Willmore flow.
+    pub scheme: Scheme,
     /// Cells per unit length.
     pub cells_per_unit: usize,
     /// Number in the list of radii.
@@ -146,7 +148,7 @@ impl Circle {
         format!(
             "{}-{}-n{}-{:02}",
             self.flow.key(),
-            self.method.key(),
+            self.method.key_in(self.scheme),
             self.cells_per_unit,
             self.index
         )
@@ -163,7 +165,7 @@ impl Circle {
                 "{} of the circle r = {:.4} by {} at n = {}",
                 self.flow.title(),
                 self.radius,
-                self.method.label(),
+                self.method.label_in(self.scheme),
                 self.cells_per_unit
             ),
             source,
@@ -212,13 +214,15 @@ impl Circle {
     }
 }
 
-/// All circles of one flow, method and resolution.
+/// All circles of one flow, method, scheme and resolution.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Ensemble {
     /// Which flow.
     pub flow: Flow,
     /// Which method.
     pub method: Method,
+    /// Which scheme of Willmore flow.
+    pub scheme: Scheme,
     /// Cells per unit length.
     pub n: usize,
     /// Initial radii.
@@ -233,25 +237,32 @@ impl Ensemble {
     /// # Errors
     /// [`Error::Run`] of the first circle that fails; [`Error::Report`] if a part cannot be stored.
     pub fn run(
-        (flow, method, n): (Flow, Method, usize),
+        (flow, method, scheme, n): (Flow, Method, Scheme, usize),
         (count, steps): (usize, usize),
         network: Option<&Network>,
         device: &ComputeDevice,
         partial: &Partial,
         bar: &ProgressBar,
     ) -> Result<Self, Error> {
+        let network_checksum = network.map(checksum);
+        let prepared = network.map(|network| scheme.prepare(network)).transpose()?;
+        let (network, calibration) = match &prepared {
+            Some((network, factors)) => (Some(network), *factors),
+            None => (None, Factors::PAPER),
+        };
         let params = FlowParams {
             eps: EPS,
             mcf_step: STEP,
             newton: NewtonParams::default(),
+            calibration,
         };
-        let network_checksum = network.map(checksum);
         let circles: Vec<Circle> = radii(count)
             .into_iter()
             .enumerate()
             .map(|(index, radius)| Circle {
                 flow,
                 method,
+                scheme,
                 cells_per_unit: n,
                 index,
                 radius,
@@ -280,6 +291,7 @@ impl Ensemble {
         Ok(Self {
             flow,
             method,
+            scheme,
             n,
             radii: circles.iter().map(|circle| circle.radius).collect(),
             results,
@@ -346,9 +358,15 @@ impl Ensemble {
             .sum()
     }
 
-    /// Name in metrics, such as `willmore.n128.hybrid`.
+    /// Name in metrics, such as `willmore.n128.hybrid_calibrated`.
     pub fn key(&self) -> String {
-        format!("{}.n{}.{}", self.flow.key(), self.n, self.method.key())
+        let method = self.method.key_in(self.scheme);
+        format!("{}.n{}.{method}", self.flow.key(), self.n)
+    }
+
+    /// Name of method and scheme in legends.
+    pub fn label(&self) -> String {
+        self.method.label_in(self.scheme)
     }
 }
 

@@ -281,6 +281,7 @@ fn evolution(
                 STEP
             },
             newton: NewtonParams::default(),
+            calibration: solver::Factors::PAPER,
         },
         tau: TimeSteps::Constant(tau),
         sample_every: 8 * ratio,

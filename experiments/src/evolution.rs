@@ -495,6 +495,7 @@ mod tests {
                 eps: EPS,
                 mcf_step: STEP,
                 newton: NewtonParams::default(),
+                calibration: solver::Factors::PAPER,
             },
             tau: TimeSteps::Constant(STEP),
             sample_every: 2,

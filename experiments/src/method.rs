@@ -7,7 +7,7 @@ use model::Network;
 use operators::ComputeDevice;
 use report::LineStyle;
 use serde::{Deserialize, Serialize};
-use solver::{FlowParams, MeanCurvatureFlow, WillmoreFlow};
+use solver::{Factors, FlowParams, MeanCurvatureFlow, WillmoreFlow};
 
 use crate::Error;
 
@@ -22,6 +22,33 @@ pub enum Method {
     FeImplicit,
     /// Semi-implicit finite elements
     FeSemi,
+}
+
+/// How the energy of a time step of Willmore flow is weighted.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Scheme {
+    /// As in the paper
+    Paper,
+    /// Divided by the operator's calibration factors, with the operator's odd part, which treats both phases alike
+    Calibrated,
+}
+
+impl Scheme {
+    /// Both schemes.
+    pub const ALL: [Self; 2] = [Self::Paper, Self::Calibrated];
+
+    /// The operator and the factors of the scheme, from the network as it was trained.
+    ///
+    /// # Errors
+    /// [`Error::Model`] if a network without a calibration cannot be calibrated.
+    pub fn prepare(self, network: &Network) -> Result<(Network, Factors), Error> {
+        Ok(match self {
+            Self::Paper => (network.clone(), Factors::PAPER),
+            // The odd part has the same factors to first order in its difference to the whole.
+            Self::Calibrated => (network.odd_part(), network.calibration()?.factors),
+        })
+    }
 }
 
 impl Method {
@@ -52,6 +79,30 @@ impl Method {
             Self::Hybrid => LineStyle::Solid,
             Self::FeImplicit => LineStyle::Dashed,
             Self::FeSemi => LineStyle::Dotted,
+        }
+    }
+
+    /// Name in files and metrics of Willmore flow in a scheme.
+    pub fn key_in(self, scheme: Scheme) -> String {
+        match scheme {
+            Scheme::Paper => self.key().to_owned(),
+            Scheme::Calibrated => format!("{}_calibrated", self.key()),
+        }
+    }
+
+    /// Name in legends of Willmore flow in a scheme.
+    pub fn label_in(self, scheme: Scheme) -> String {
+        match scheme {
+            Scheme::Paper => self.label().to_owned(),
+            Scheme::Calibrated => format!("{}, calibrated", self.label()),
+        }
+    }
+
+    /// Line style in figures in a scheme.
+    pub fn style_in(self, scheme: Scheme) -> LineStyle {
+        match scheme {
+            Scheme::Paper => self.style(),
+            Scheme::Calibrated => LineStyle::DashDot,
         }
     }
 

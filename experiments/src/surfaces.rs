@@ -32,6 +32,7 @@ pub fn scales(n: usize) -> FlowParams {
         eps: EPS_OVER_H * h,
         mcf_step: h * h,
         newton: NewtonParams::default(),
+        calibration: solver::Factors::PAPER,
     }
 }
 

@@ -394,18 +394,17 @@ fn finished(
         held_out_loss: 0.0,
         flipped_loss: 0.0,
     };
-    let network = Network::new(
-        spec.ratios,
-        kernel.clone(),
-        activation.clone(),
-        provenance.clone(),
-    )?;
+    let network = Network::new(spec.ratios, kernel, activation, provenance.clone())?;
     let quality = Quality::measure(&network, data, held_out_radii(data.count < 100), device)?;
     provenance.held_out_loss = quality.held_out_loss;
     provenance.flipped_loss = quality.flipped_loss;
+    // Hardly trained networks have no flat interface, and do without.
+    let calibration = network.calibrate().ok();
     Ok(Trained {
         spec: spec.clone(),
-        network: Network::new(spec.ratios, kernel, activation, provenance)?,
+        network: network
+            .with_provenance(provenance)
+            .with_calibration(calibration),
         curve,
         quality,
     })

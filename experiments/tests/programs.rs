@@ -9,6 +9,7 @@ use common::{refused, run};
 use model::pretrained;
 use report::Summary;
 
+const CALIBRATION: &str = env!("CARGO_BIN_EXE_calibration");
 const CIRCLES: &str = env!("CARGO_BIN_EXE_circle_convergence");
 const LEARNED: &str = env!("CARGO_BIN_EXE_learned_networks");
 const CROSS: &str = env!("CARGO_BIN_EXE_cross");
@@ -24,6 +25,7 @@ const TRAIN: &str = env!("CARGO_BIN_EXE_train_networks");
 fn devices_that_are_unknown_or_not_compiled_in() {
     let root = tempfile::tempdir().unwrap();
     for program in [
+        CALIBRATION,
         CIRCLES,
         CROSS,
         LEARNED,
@@ -124,6 +126,7 @@ fn resolutions_names_and_outputs_that_cannot_be() {
     refused(TIMING, root.path(), &["--budget", "0"], &["--budget"]);
     fs::write(root.path().join("results"), "a file of the user").unwrap();
     for program in [
+        CALIBRATION,
         CIRCLES,
         CROSS,
         LEARNED,
@@ -184,6 +187,9 @@ fn the_quick_convergence_test_is_accurate_and_reproducible() {
     assert!(metric("mcf.n128.hybrid.l2.step8") <= 0.0008);
     assert!(metric("willmore.n128.hybrid.l2.step8") <= 0.021);
     assert!(metric("willmore.n128.hybrid.energy_increases") <= 0.0);
+    assert!(metric("willmore.n128.hybrid_calibrated.l2.step8") <= 0.0025);
+    assert!(metric("willmore.n128.hybrid_calibrated.energy_increases") <= 0.0);
+    assert!(summary.get("mcf.n128.hybrid_calibrated.l2.step8").is_none());
     assert!(metric("willmore.n128.hybrid.hvp_per_step") >= 1.0);
     assert!(metric("willmore.n128.hybrid.newton_per_step") >= 1.0);
     assert!(metric("willmore.scale") > 5.0 * metric("mcf.n128.hybrid.l2.step8"));
@@ -205,6 +211,66 @@ fn the_quick_convergence_test_is_accurate_and_reproducible() {
         assert!(lines.len() > 5);
         assert_eq!(lines, without_times(&results[1], name, end), "{name}");
     }
+}
+
+#[test]
+fn one_scheme_alone_gives_the_same_numbers() {
+    let root = tempfile::tempdir().unwrap();
+    let summary = |options: &[&str], folder: &str| {
+        let mut arguments = vec!["--quick", "--quiet", "--output", folder];
+        arguments.extend(options);
+        assert!(run(CIRCLES, root.path(), &arguments).status.success());
+        let text = fs::read_to_string(root.path().join(folder).join("summary.json")).unwrap();
+        Summary::from_json(&text).unwrap()
+    };
+    let both = summary(&["--methods", "hybrid"], "both");
+    for (scheme, own, other) in [
+        ("paper", "hybrid", "hybrid_calibrated"),
+        ("calibrated", "hybrid_calibrated", "hybrid"),
+    ] {
+        let one = summary(&["--methods", "hybrid", "--scheme", scheme], scheme);
+        let key = |name: &str| format!("willmore.n128.{name}.l2.step8");
+        let bits = |summary: &Summary| summary.get(&key(own)).unwrap().to_bits();
+        assert_eq!(bits(&one), bits(&both), "{scheme}");
+        assert!(one.get(&key(other)).is_none(), "{scheme}");
+    }
+}
+
+#[test]
+fn the_quick_calibration_predicts_the_energies_and_installs_the_network() {
+    let root = tempfile::tempdir().unwrap();
+    let arguments = ["--quick", "--output", "out", "--install", "networks"];
+    let output = run(CALIBRATION, root.path(), &arguments);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && message.is_empty(), "{message}");
+    let folder = root.path().join("out");
+    for name in ["calibration.md", "discs.svg", "discs.csv", "manifest.json"] {
+        assert!(folder.join(name).exists(), "{name}");
+    }
+    let summary = fs::read_to_string(folder.join("summary.json")).unwrap();
+    let summary = Summary::from_json(&summary).unwrap();
+    let c = summary.get("d2_k17_eps2_step1.energy").unwrap();
+    assert!((c - 0.932).abs() < 0.002, "{c}");
+    let discs = fs::read_to_string(folder.join("discs.json")).unwrap();
+    let discs: Vec<serde_json::Value> = serde_json::from_str(&discs).unwrap();
+    assert_eq!(discs.len(), 8);
+    for disc in &discs {
+        let number = |name: &str| disc[name].as_f64().unwrap();
+        let ratio = number("measured") / number("predicted");
+        assert!((ratio - 1.0).abs() < 0.008, "{disc}");
+        if disc["odd_part"] == true {
+            assert!((number("calibrated") - 1.0).abs() < 0.01, "{disc}");
+        }
+    }
+    let name = "networks/d2_k17_eps2_step1.safetensors";
+    let installed = model::Network::load(&root.path().join(name)).unwrap();
+    assert!(installed.stored_calibration().is_some());
+    refused(
+        CALIBRATION,
+        root.path(),
+        &["--quick", "--network", "missing.safetensors"],
+        &["missing.safetensors"],
+    );
 }
 
 #[test]

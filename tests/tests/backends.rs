@@ -564,6 +564,7 @@ fn flow<const D: usize>(backend: &Backend, grid: Grid<D>) -> (Field<D>, [StepRec
             cg_tolerance: 1e-2,
             ..NewtonParams::default()
         },
+        calibration: solver::Factors::PAPER,
     };
     let network = splitting_network(D, WIDTH).unwrap();
     let start = ball(grid, 0.3);

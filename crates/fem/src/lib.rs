@@ -16,6 +16,7 @@
 //!     eps: 2.0 * grid.spacing(),
 //!     mcf_step: grid.spacing().powi(2),
 //!     newton: NewtonParams::default(),
+//!     calibration: solver::Factors::PAPER,
 //! };
 //! let disc = phase_field(grid, &Ball::new([0.0, 0.0], 0.2)?, params.eps)?;
 //! let step = FiniteElementStep::implicit(&grid, params.eps, params.mcf_step)?;

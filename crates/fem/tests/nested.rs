@@ -181,6 +181,7 @@ fn a_disc_grows_like_the_reference() {
         eps,
         mcf_step: tau,
         newton: NewtonParams::default(),
+        calibration: solver::Factors::PAPER,
     };
     let start = ball(grid, RADIUS, eps);
     let step = FiniteElementStep::implicit(&grid, eps, tau).unwrap();
@@ -214,6 +215,7 @@ fn a_ball_stays_put_and_discs_shrink() {
         eps,
         mcf_step: size,
         newton: NewtonParams::default(),
+        calibration: solver::Factors::PAPER,
     };
     let device = ComputeDevice::default_compiled().unwrap();
     let start = ball(grid, 0.3, eps);
@@ -263,6 +265,7 @@ fn a_failing_inner_solver_stops_the_flow_with_its_numbers() {
         eps,
         mcf_step: size,
         newton: NewtonParams::default(),
+        calibration: solver::Factors::PAPER,
     };
     let mut flow = WillmoreFlow::new(step, &start, params, &device).unwrap();
     let error = flow.advance(size).unwrap_err();

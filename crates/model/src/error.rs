@@ -93,6 +93,16 @@ pub enum Error {
         /// What became non-finite.
         what: &'static str,
     },
+    /// A step of mean curvature flow that cannot be calibrated.
+    #[error(
+        "calibration: {reason} (eigenvalue near 1: {eigenvalue:.6}); train the network longer, or run without calibration"
+    )]
+    Calibration {
+        /// What is missing.
+        reason: &'static str,
+        /// The eigenvalue of the step's derivative at the flat interface that should be 1; NaN if there is no such interface.
+        eigenvalue: f64,
+    },
     /// Training was interrupted; its checkpoint can be resumed.
     #[error("training interrupted after iteration {iteration}; run again to resume")]
     Interrupted {

@@ -140,6 +140,42 @@ impl Mlp {
         [x[0][0], x[0][1], 2.0 * x[0][2], 6.0 * x[0][3]]
     }
 
+    /// `(F(w) - F(-w)) / 2` as one perceptron: two copies side by side, so its hidden layers are twice as wide.
+    #[must_use]
+    pub fn odd_part(&self) -> Self {
+        let last = self.layers.len() - 1;
+        let width = |l: usize| if l == 0 || l == last { 1 } else { 2 };
+        let layers: Vec<usize> = (self.layers.iter().enumerate())
+            .map(|(l, neurons)| width(l) * neurons)
+            .collect();
+        let mut parameters = Vec::with_capacity(parameter_count(&layers));
+        for (l, layer) in layout(&self.layers).iter().enumerate() {
+            let (first, final_one) = (l == 0, l + 1 == last);
+            // The weights from one copy to another: the second copy sees the input with the other sign.
+            let factor = |from: usize, to: usize| match (first, final_one) {
+                (true, true) => 1.0,
+                (true, false) => [1.0, -1.0][to],
+                (false, true) => [0.5, -0.5][from],
+                (false, false) => f64::from(u8::from(from == to)),
+            };
+            for from in 0..width(l) {
+                for input in 0..layer.inputs {
+                    let row = &self.parameters[layer.weights + input * layer.outputs..];
+                    for to in 0..width(l + 1) {
+                        let weights = row[..layer.outputs].iter();
+                        parameters.extend(weights.map(|weight| factor(from, to) * weight));
+                    }
+                }
+            }
+            for _ in 0..width(l + 1) {
+                let biases = self.parameters[layer.biases..][..layer.outputs].iter();
+                // Those of the last layer cancel.
+                parameters.extend(biases.map(|bias| if final_one { 0.0 } else { *bias }));
+            }
+        }
+        Self { layers, parameters }
+    }
+
     /// The quintic Hermite table on [`TABLE`] that the solver uses as `F`.
     ///
     /// # Errors

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, Mlp};
+use crate::{Calibration, Error, Mlp};
 
 /// What a network depends on; one network serves every grid with these ratios.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -105,6 +105,7 @@ pub struct Network {
     kernel: Vec<f64>,
     activation: Mlp,
     provenance: Provenance,
+    calibration: Option<Calibration>,
 }
 
 impl Network {
@@ -139,6 +140,7 @@ impl Network {
             kernel,
             activation,
             provenance,
+            calibration: None,
         })
     }
 
@@ -160,6 +162,38 @@ impl Network {
     /// How it came to be.
     pub fn provenance(&self) -> &Provenance {
         &self.provenance
+    }
+
+    /// The calibration stored with the weights, if there is one.
+    pub fn stored_calibration(&self) -> Option<&Calibration> {
+        self.calibration.as_ref()
+    }
+
+    /// The stored calibration, or a new one.
+    ///
+    /// # Errors
+    /// As [`Self::calibrate`].
+    pub fn calibration(&self) -> Result<Calibration, Error> {
+        self.calibration.map_or_else(|| self.calibrate(), Ok)
+    }
+
+    /// The same operator with a calibration to be stored with it.
+    #[must_use]
+    pub fn with_calibration(mut self, calibration: Option<Calibration>) -> Self {
+        self.calibration = calibration;
+        self
+    }
+
+    /// The part of the operator that commutes with exchanging the phases, `(V[u] - V[-u]) / 2`: a network of the same form
+    /// whose activation is [`Mlp::odd_part`]. Its spontaneous curvature is zero. Losses and calibration are to be measured
+    /// anew.
+    #[must_use]
+    pub fn odd_part(&self) -> Self {
+        Self {
+            activation: self.activation.odd_part(),
+            calibration: None,
+            ..self.clone()
+        }
     }
 
     /// Refuses a run whose ratios are not the network's.

@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 
 use crate::mlp::{layout, parameter_count};
 use crate::network::Provenance;
-use crate::{Error, Mlp, Network, Ratios};
+use crate::{Calibration, Error, Mlp, Network, Ratios};
 
 /// Version of the file format, bumped when a reader of the old one would misread the new one.
 const FORMAT: &str = "1";
@@ -25,6 +25,10 @@ fn checksum(network: &Network) -> serde_json::Result<String> {
         network.activation().layers(),
     );
     hash.update(serde_json::to_vec(&about)?);
+    // Files from before there was a calibration have none, and keep their checksum.
+    if let Some(calibration) = network.stored_calibration() {
+        hash.update(serde_json::to_vec(calibration)?);
+    }
     hash.update(bytes(network.kernel()));
     hash.update(bytes(network.activation().parameters()));
     Ok(format!("{:x}", hash.finalize()))
@@ -39,12 +43,15 @@ struct Metadata {
     format: String,
     ratios: Ratios,
     provenance: Provenance,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    calibration: Option<Calibration>,
     checksum: String,
 }
 
 impl Network {
     /// The network as a safetensors file: `kernel` with `D` axes, `activation.N.weight`, `activation.N.bias`, all `F64`,
-    /// and one metadata entry `network`: JSON with `format`, `ratios`, `provenance` and a SHA-256 `checksum` of all of it.
+    /// and one metadata entry `network`: JSON with `format`, `ratios`, `provenance`, the `calibration` if there is one, and a SHA-256
+    /// `checksum` of all of it.
     ///
     /// # Errors
     /// [`Error::Weights`] if the metadata cannot be encoded.
@@ -58,6 +65,7 @@ impl Network {
             format: FORMAT.to_owned(),
             ratios: self.ratios(),
             provenance: self.provenance().clone(),
+            calibration: self.stored_calibration().copied(),
             checksum: checksum(self).map_err(unencodable)?,
         };
         let metadata = serde_json::to_string(&metadata).map_err(unencodable)?;
@@ -114,6 +122,7 @@ impl Network {
             format,
             ratios,
             provenance,
+            calibration,
             checksum: expected,
         } = serde_json::from_str(metadata)
             .map_err(|e| failed(format!("its metadata are unreadable ({e})")))?;
@@ -169,8 +178,9 @@ impl Network {
         }
         debug_assert_eq!(parameters.len(), parameter_count(&layers));
         let activation = Mlp::new(layers, parameters).map_err(|e| failed(e.to_string()))?;
-        let network =
-            Self::new(ratios, kernel, activation, provenance).map_err(|e| failed(e.to_string()))?;
+        let network = Self::new(ratios, kernel, activation, provenance)
+            .map_err(|e| failed(e.to_string()))?
+            .with_calibration(calibration);
         if checksum(&network).ok() != Some(expected) {
             return Err(failed(
                 "its checksum is wrong: the file was damaged or edited".to_owned(),

@@ -6,7 +6,7 @@ use std::time::Instant;
 use burn::tensor::Tensor;
 use geometry::measure::{enclosed_volume, perimeter};
 use geometry::{Field, Grid};
-use model::{MeanCurvatureOperator, Network, Ratios};
+use model::{Factors, MeanCurvatureOperator, Network, Ratios};
 use operators::{ComputeDevice, SpectralFilter, extrapolate, inner_product};
 use serde::{Deserialize, Serialize};
 
@@ -24,12 +24,21 @@ pub struct FlowParams {
     pub mcf_step: f64,
     /// Settings of the minimization.
     pub newton: NewtonParams,
+    /// What the energy is divided by, term by term: [`Factors::PAPER`] for the scheme of the paper, those of the step's
+    /// calibration for a flow with the speed of Willmore flow. Mean curvature flow does not look at it.
+    #[serde(default)]
+    pub calibration: Factors,
 }
 
 impl FlowParams {
     /// The network ratios that a grid needs with these scales.
     pub fn ratios<const D: usize>(&self, grid: &Grid<D>, width: usize) -> Ratios {
         Ratios::of_run(D, width, grid.spacing(), self.eps, self.mcf_step)
+    }
+
+    /// `tau m / (c tautilde^2)`, the weight of the curvature against the motion in a time step of size `tau`.
+    pub fn stiffness(&self, tau: f64) -> f64 {
+        tau / (self.calibration.speed() * self.mcf_step * self.mcf_step)
     }
 }
 
@@ -42,11 +51,12 @@ pub struct StepRecord {
     pub time: f64,
     /// Its size `tau`.
     pub tau: f64,
-    /// `E[u_k, u_k]`: the energy (eq:discrete_willmore_flow_energy) of standing still, true L2 norms.
+    /// `E[u_k, u_k]`: the energy (eq:discrete_willmore_flow_energy) of standing still, true L2 norms; its terms are divided by
+    /// the factors of the calibration.
     pub energy_before: f64,
     /// `E[u_k, u_{k+1}]`.
     pub energy: f64,
-    /// `eps / (2 tautilde^2) |V[u] - u|^2`, the approximate Willmore energy of the result.
+    /// `eps / (2 c tautilde^2) |V[u] - u|^2`, the approximate Willmore energy of the result; `c = 1` without calibration.
     pub willmore_energy: f64,
     /// Perimeter `P_eps` of the result.
     pub perimeter: f64,
@@ -80,7 +90,7 @@ pub struct FlowState<const D: usize> {
 /// use geometry::{Grid, phase_field, shapes::Ball};
 /// use model::pretrained;
 /// use operators::ComputeDevice;
-/// use solver::{FlowParams, NewtonParams, WillmoreFlow};
+/// use solver::{Factors, FlowParams, NewtonParams, WillmoreFlow};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let device = ComputeDevice::default_compiled()?;
@@ -89,6 +99,7 @@ pub struct FlowState<const D: usize> {
 ///     eps: 2.0 * grid.spacing(),
 ///     mcf_step: grid.spacing().powi(2),
 ///     newton: NewtonParams::default(),
+///     calibration: Factors::PAPER,
 /// };
 /// let network = pretrained::find(params.ratios(&grid, 17))?;
 /// let disc = phase_field(grid, &Ball::<2>::new([0.0, 0.0], 0.2)?, params.eps)?;
@@ -138,7 +149,12 @@ impl<const D: usize> WillmoreFlow<D> {
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
         params.newton.validate()?;
-        for (name, value) in [("eps", params.eps), ("tautilde", params.mcf_step)] {
+        for (name, value) in [
+            ("eps", params.eps),
+            ("tautilde", params.mcf_step),
+            ("calibration.energy", params.calibration.energy),
+            ("calibration.metric", params.calibration.metric),
+        ] {
             if !(value.is_finite() && value > 0.0) {
                 return Err(Error::Parameter {
                     name,
@@ -254,7 +270,7 @@ impl<const D: usize> WillmoreFlow<D> {
     pub fn advance(&mut self, tau: f64) -> Result<StepRecord, Error> {
         let clock = Instant::now();
         let step = self.step + 1;
-        let stiffness = tau / (self.params.mcf_step * self.params.mcf_step);
+        let stiffness = self.params.stiffness(tau);
         self.energy.set(&self.current, stiffness)?;
         if self
             .filter
@@ -303,7 +319,8 @@ impl<const D: usize> WillmoreFlow<D> {
             field: "phase field",
         })?;
         // The scaled energy counts points; eps h^D makes it the paper's (true L2 norms).
-        let scale = 2.0 * self.params.eps * self.grid.cell_volume();
+        let metric = self.params.calibration.metric;
+        let scale = 2.0 * self.params.eps * self.grid.cell_volume() / metric;
         let motion = u.clone() - self.current.clone();
         let fidelity = 0.5
             * self

@@ -4,7 +4,7 @@
 //! use geometry::{Grid, exact::willmore_radius, measure::l2_distance, phase_field, shapes::Ball};
 //! use model::pretrained;
 //! use operators::ComputeDevice;
-//! use solver::{FlowParams, NewtonParams, WillmoreFlow};
+//! use solver::{Factors, FlowParams, NewtonParams, WillmoreFlow};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // A disc of radius 0.2 grows under Willmore flow: R(t) = (r^4 + 2 t)^(1/4).
@@ -14,6 +14,7 @@
 //!     eps: 2.0 * grid.spacing(),
 //!     mcf_step: grid.spacing().powi(2),
 //!     newton: NewtonParams::default(),
+//!     calibration: Factors::PAPER,
 //! };
 //! let network = pretrained::find(params.ratios(&grid, 17))?;
 //! let disc = |radius| phase_field(grid, &Ball::<2>::new([0.0, 0.0], radius)?, params.eps);
@@ -37,6 +38,13 @@
 //! (eq:discrete_willmore_flow_energy of Rumpf, Sassen and Smoch; v after Franken, Rumpf and Wirth). [`MinimizingMovement`] is
 //! that energy, scaled, as a Burn graph: the gradient is Burn's autodiff, the Hessian-vector product its linearization
 //! ([`linearize`]), forward over reverse.
+//!
+//! # Calibration
+//!
+//! Minimizing relaxes the profile of the interface, so that what is left of the energy is `c` times the Willmore energy, with
+//! a factor `c` near 1 that belongs to the step of mean curvature flow ([`model::calibration`]). With [`Factors::PAPER`] the
+//! flow is the paper's; with the factors of the step, `network.calibration()?.factors`, it is Willmore flow to first order in
+//! the curvature, and the Willmore energies in the records are those of the interface.
 //!
 //! # The minimization
 //!
@@ -72,6 +80,7 @@ mod times;
 pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective, StepFailure};
 pub use error::Error;
 pub use flow::{FlowParams, FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow};
+pub use model::Factors;
 pub use newton::{Exit, Method, NewtonInfo, NewtonParams, Precision, minimize};
 pub use operators::{extrapolate, retract};
 pub use preconditioner::Preconditioner;

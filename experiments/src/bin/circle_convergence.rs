@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use experiments::circles::{self, Ensemble, Flow};
-use experiments::method::Method;
+use experiments::method::{Method, Scheme};
 use experiments::networks::{NetworkOptions, convergence_ratios};
 use experiments::options::{RunOptions, resolutions};
 use experiments::partial::Partial;
@@ -48,6 +48,10 @@ struct Options {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     methods: Vec<Method>,
 
+    /// Scheme of Willmore flow with the learned operator, paper or calibrated [default: both]
+    #[arg(long, value_name = "NAME", value_enum)]
+    scheme: Option<Scheme>,
+
     /// Train the networks first, instead of loading them
     #[arg(long, conflicts_with = "network")]
     retrain: bool,
@@ -71,6 +75,7 @@ struct Parameters {
 struct Run {
     flow: Flow,
     method: Method,
+    scheme: Scheme,
     n: usize,
 }
 
@@ -85,8 +90,21 @@ impl Run {
                 } else {
                     options.methods.contains(&method)
                 };
-                if chosen {
-                    runs.extend(cells.iter().map(|&n| Self { flow, method, n }));
+                if !chosen {
+                    continue;
+                }
+                // Only Willmore flow with the learned operator has both schemes.
+                let both = flow == Flow::Willmore && method.is_learned();
+                for scheme in Scheme::ALL {
+                    let wanted = options.scheme.is_none_or(|wanted| wanted == scheme);
+                    if (both && wanted) || (!both && scheme == Scheme::Paper) {
+                        runs.extend(cells.iter().map(|&n| Self {
+                            flow,
+                            method,
+                            scheme,
+                            n,
+                        }));
+                    }
                 }
             }
         }
@@ -151,12 +169,18 @@ fn program(options: &Options) -> Result<(), Error> {
     let progress = options.run.progress();
     let clock = std::time::Instant::now();
     let mut ensembles = Vec::new();
-    for &Run { flow, method, n } in &runs {
+    for &Run {
+        flow,
+        method,
+        scheme,
+        n,
+    } in &runs
+    {
         let network = (trained_for.iter().position(|&m| m == n)).map(|k| &networks[k]);
-        let title = format!("{}, {}, n = {n}", flow.title(), method.label());
+        let title = format!("{}, {}, n = {n}", flow.title(), method.label_in(scheme));
         let bar = progress.bar(title.clone(), (count * steps) as u64);
         let ensemble = manifest.phase(title, || {
-            let what = (flow, method, n);
+            let what = (flow, method, scheme, n);
             let network = network.filter(|_| method.is_learned());
             Ensemble::run(what, (count, steps), network, &device, &partial, &bar)
         })?;
@@ -224,6 +248,7 @@ struct CurveRow {
     flow: Flow,
     n: usize,
     method: Method,
+    scheme: Scheme,
     step: usize,
     time: f64,
     l2_mean: f64,
@@ -236,6 +261,7 @@ struct CircleRow {
     flow: Flow,
     n: usize,
     method: Method,
+    scheme: Scheme,
     radius: f64,
     step: usize,
     time: f64,
@@ -246,6 +272,7 @@ struct CircleRow {
 struct StepRow {
     n: usize,
     method: Method,
+    scheme: Scheme,
     radius: f64,
     step: usize,
     time: f64,
@@ -278,10 +305,10 @@ impl Report<'_> {
     /// show on both sides of finer ones.
     fn series(&self, ensemble: &Ensemble, points: Vec<[f64; 2]>) -> Series {
         let k = self.colour(ensemble.n);
-        let name = format!("{}, n = {}", ensemble.method.label(), ensemble.n);
+        let name = format!("{}, n = {}", ensemble.label(), ensemble.n);
         Series::new(name, points)
             .with_colour(k)
-            .with_style(ensemble.method.style())
+            .with_style(ensemble.method.style_in(ensemble.scheme))
             .with_width(1.8 + 1.9 * (self.cells.len() - 1 - k) as f64)
     }
 
@@ -291,13 +318,17 @@ impl Report<'_> {
 
     /// Line styles stand for methods, colours for resolutions.
     fn legend(&self, chart: LineChart) -> LineChart {
-        let methods: Vec<Method> = Method::ALL
+        let methods = Method::ALL
             .into_iter()
-            .filter(|m| self.ensembles.iter().any(|e| e.method == *m))
-            .collect();
-        let method = methods
-            .iter()
-            .map(|m| LegendEntry::line(m.label(), Colour::Black, m.style()));
+            .flat_map(|method| Scheme::ALL.map(|scheme| (method, scheme)))
+            .filter(|&(method, scheme)| {
+                let mut shown = self.ensembles.iter();
+                shown.any(|e| e.method == method && e.scheme == scheme)
+            });
+        let method = methods.map(|(method, scheme)| {
+            let label = method.label_in(scheme);
+            LegendEntry::line(label, Colour::Black, method.style_in(scheme))
+        });
         let resolutions = self
             .cells
             .iter()
@@ -411,13 +442,14 @@ impl Report<'_> {
         let mut singles = Vec::new();
         let mut steps = Vec::new();
         for e in self.ensembles {
-            let (flow, n, method) = (e.flow, e.n, e.method);
+            let (flow, n, method, scheme) = (e.flow, e.n, e.method, e.scheme);
             for step in 0..=self.steps {
                 let [l2_min, l2_max] = e.error_range(step);
                 curves.push(CurveRow {
                     flow,
                     n,
                     method,
+                    scheme,
                     step,
                     time: Self::time(step),
                     l2_mean: e.mean_error(step),
@@ -435,6 +467,7 @@ impl Report<'_> {
                             flow,
                             n,
                             method,
+                            scheme,
                             radius,
                             step,
                             time: Self::time(step),
@@ -445,6 +478,7 @@ impl Report<'_> {
             steps.extend(e.records().map(|(radius, r)| StepRow {
                 n,
                 method,
+                scheme,
                 radius,
                 step: r.step,
                 time: r.time,
@@ -491,7 +525,7 @@ impl Report<'_> {
         for e in self.ensembles {
             let hvp =
                 (e.flow == Flow::Willmore).then(|| e.mean_of_records(|r| r.newton.hvp as f64));
-            let head = [e.flow.title().into(), e.n.into(), e.method.label().into()];
+            let head = [e.flow.title().into(), e.n.into(), e.label().into()];
             let errors = self.shown_steps().map(|k| e.mean_error(k).into());
             table.push(head.into_iter().chain(errors).chain([hvp.into()]))?;
         }

@@ -255,6 +255,7 @@ impl Case {
             eps: self.eps,
             mcf_step: self.mcf_step,
             newton: NewtonParams::default(),
+            calibration: solver::Factors::PAPER,
         };
         memory::forget_peak();
         let mut flow = WillmoreFlow::with_network(network, initial, params, device)?;

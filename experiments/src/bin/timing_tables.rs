@@ -353,6 +353,7 @@ impl Contender {
                 method,
                 ..NewtonParams::default()
             },
+            calibration: solver::Factors::PAPER,
         };
         let elements = match variant {
             Variant::Hybrid | Variant::HybridPlain => None,

@@ -40,6 +40,7 @@ pub fn params<const D: usize>(grid: &Grid<D>) -> FlowParams {
         eps: 2.0 * grid.spacing(),
         mcf_step: grid.spacing().powi(2),
         newton: NewtonParams::default(),
+        calibration: solver::Factors::PAPER,
     }
 }
 

@@ -1,0 +1,182 @@
+//! What a step of mean curvature flow makes of the Willmore energy: its effective factor, from the flat interface.
+//!
+//! The scheme measures curvature as `|v[u] - u|^2 / tautilde^2`, and minimizing its energy also relaxes the interface's
+//! profile. To first order in the curvature `kappa` (sum of the principal ones) the energy that is left per area is
+//!
+//! `eps / (2 tautilde^2) min |v[u] - u|^2 = c/2 (kappa - kappa_0)^2 + ...`
+//!
+//! and a displacement `delta` of the interface costs `eps |u - u_k|^2 = m delta^2`, where for an exact step `c = m = 1` and
+//! `kappa_0 = 0`. With the flat interface `w` of the step, its derivative `J = v'[w]`, the left null vector `psi` of
+//! `J - 1`, the response `A = d/dkappa (v[u] - u)` to bending the interface, and the optimal profile `q`,
+//!
+//! `c = <A, psi>^2 / (|psi|^2 tautilde^2 |q'|^2)`, `m = |w'|^2 / |q'|^2`, `kappa_0 = -<v[w] - w, psi> / <A, psi>`.
+//!
+//! `docs/calibration.md` derives this. Flat interfaces with a rational normal are functions on equidistant planes, so that all
+//! of it is a small dense problem in one dimension ([`PlanarStep`]), solved for several positions of the interface between the
+//! planes and several normals.
+//!
+//! ```
+//! use model::{Ratios, pretrained};
+//!
+//! # fn main() -> Result<(), model::Error> {
+//! let ratios = Ratios { dimension: 2, width: 17, eps_over_h: 2.0, step_over_h2: 1.0 };
+//! let calibration = pretrained::find(ratios)?.calibrate()?;
+//! println!("c = {:.4}, m = {:.4}", calibration.factors.energy, calibration.factors.metric);
+//! assert!((calibration.factors.energy - 0.932).abs() < 0.002);
+//! // The left null vector is not the interface's translation, as it would be for a gradient flow.
+//! assert!(calibration.alignment < 0.985);
+//! # Ok(())
+//! # }
+//! ```
+
+mod network;
+mod planar;
+
+use serde::{Deserialize, Serialize};
+
+pub use planar::{PlanarInterface, PlanarStep, solve};
+
+use crate::{Error, Network};
+
+/// The factors of the effective energy and metric; both are 1 for an exact step.
+///
+/// The calibrated scheme divides by them: it minimizes `eps |u - u_k|^2 / m + tau eps / (c tautilde^2) |v[u] - u|^2` and
+/// reports `w = eps / (2 c tautilde^2) |v[u] - u|^2`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Factors {
+    /// `c`: the energy that the scheme minimizes over the Willmore energy.
+    pub energy: f64,
+    /// `m`: the squared norm of a displacement over that of the optimal profile.
+    pub metric: f64,
+}
+
+impl Factors {
+    /// No calibration, `c = m = 1`: the scheme of the paper.
+    pub const PAPER: Self = Self {
+        energy: 1.0,
+        metric: 1.0,
+    };
+
+    /// How much faster than Willmore flow the scheme of the paper flows with this step, `c / m`.
+    pub fn speed(&self) -> f64 {
+        self.energy / self.metric
+    }
+}
+
+impl Default for Factors {
+    fn default() -> Self {
+        Self::PAPER
+    }
+}
+
+/// The calibration of a step: means over positions and normals of the interface, with diagnostics.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Calibration {
+    /// Factors of energy and metric.
+    pub factors: Factors,
+    /// `eps kappa_0`, the curvature that the step takes for flat, positive towards the phase `u = 1`. Zero for a step that
+    /// commutes with exchanging the phases.
+    pub spontaneous_curvature: f64,
+    /// Speed of a shrinking interface over its curvature, `-<A, w'> / (tautilde |w'|^2)`, as `kappa -> 0`: what a single step
+    /// of mean curvature flow shows.
+    pub displacement: f64,
+    /// `cos^2` of the angle between `psi` and `w'`: 1 if `J` is symmetric.
+    pub alignment: f64,
+    /// The eigenvalue of `J` that belongs to translations, farthest from 1 of all.
+    pub eigenvalue: f64,
+    /// Largest minus smallest `c` over the positions of the interface between the planes, at the worst normal.
+    pub position_spread: f64,
+    /// Largest minus smallest `c` over the normals.
+    pub normal_spread: f64,
+}
+
+/// Normals and their weights: `c` is averaged over them. In 2D the four integrate `cos 4 theta` exactly, in 3D they are Lebedev's
+/// rule of degree 7.
+pub(crate) fn normals(dimension: usize) -> &'static [(&'static [isize], f64)] {
+    match dimension {
+        2 => &[
+            (&[1, 0], 0.25),
+            (&[3, 1], 0.25),
+            (&[2, 1], 0.25),
+            (&[1, 1], 0.25),
+        ],
+        _ => &[
+            (&[1, 0, 0], 2.0 / 7.0),
+            (&[1, 1, 0], 16.0 / 35.0),
+            (&[1, 1, 1], 9.0 / 35.0),
+        ],
+    }
+}
+
+/// Positions of the interface between two planes, in fractions of their distance.
+const POSITIONS: [f64; 4] = [0.125, 0.375, 0.625, 0.875];
+
+/// Calibrates a step given on planes, one [`PlanarStep`] with its weight for each normal.
+///
+/// # Errors
+/// [`Error::Calibration`] if the step has no flat interface at rest, or if its response to curvature vanishes.
+pub fn calibrate(normals: &[(impl PlanarStep, f64)]) -> Result<Calibration, Error> {
+    // One thread: the order of sums in the factorizations depends on their number.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let work = || -> Result<Vec<(Vec<PlanarInterface>, f64)>, Error> {
+        let mut all = Vec::with_capacity(normals.len());
+        for (step, weight) in normals {
+            let interfaces: Result<Vec<_>, _> = POSITIONS.iter().map(|&s| solve(step, s)).collect();
+            all.push((interfaces?, *weight));
+        }
+        Ok(all)
+    };
+    let all = match pool {
+        Ok(pool) => pool.install(work),
+        Err(_) => work(),
+    }?;
+    let total: f64 = all.iter().map(|(_, weight)| weight).sum();
+    let mean = |f: fn(&PlanarInterface) -> f64| -> f64 {
+        let means =
+            (all.iter()).map(|(i, weight)| weight * i.iter().map(f).sum::<f64>() / i.len() as f64);
+        means.sum::<f64>() / total
+    };
+    let energies: Vec<f64> = (all.iter())
+        .map(|(i, _)| i.iter().map(|i| i.energy).sum::<f64>() / i.len() as f64)
+        .collect();
+    let position_spreads =
+        (all.iter()).map(|(i, _)| spread(&i.iter().map(|i| i.energy).collect::<Vec<_>>()));
+    let eigenvalues = all.iter().flat_map(|(i, _)| i.iter().map(|i| i.eigenvalue));
+    Ok(Calibration {
+        factors: Factors {
+            energy: mean(|i| i.energy),
+            metric: mean(|i| i.metric),
+        },
+        spontaneous_curvature: mean(|i| i.spontaneous_curvature),
+        displacement: mean(|i| i.displacement),
+        alignment: mean(|i| i.alignment),
+        eigenvalue: eigenvalues.fold(1.0, |worst: f64, e| {
+            if (e - 1.0).abs() > (worst - 1.0).abs() {
+                e
+            } else {
+                worst
+            }
+        }),
+        position_spread: position_spreads.fold(0.0, f64::max),
+        normal_spread: spread(&energies),
+    })
+}
+
+fn spread(values: &[f64]) -> f64 {
+    let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    largest - values.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+impl Network {
+    /// The calibration of the operator, computed anew (a tenth of a second at `eps = 2h`, seconds at `8h`).
+    ///
+    /// # Errors
+    /// [`Error::Calibration`] if the operator has no flat interface at rest, as after too little training.
+    pub fn calibrate(&self) -> Result<Calibration, Error> {
+        let steps: Vec<_> = normals(self.ratios().dimension)
+            .iter()
+            .map(|&(normal, weight)| (network::NetworkOnPlanes::new(self, normal), weight))
+            .collect();
+        calibrate(&steps)
+    }
+}

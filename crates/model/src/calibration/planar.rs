@@ -1,0 +1,227 @@
+//! The flat interface of a step: a dense problem in one dimension.
+
+use faer::linalg::solvers::{PartialPivLu, Solve};
+use faer::{Col, Mat};
+use geometry::optimal_profile;
+
+use crate::Error;
+
+/// A step of mean curvature flow restricted to functions that are constant on parallel planes of grid nodes.
+///
+/// Lengths are in units of the grid spacing `h`, times in `h^2`. Beyond the first and the last plane the function continues as
+/// a constant.
+pub trait PlanarStep: Sync {
+    /// Interface width `eps / h`.
+    fn eps(&self) -> f64;
+
+    /// Time step `tautilde / h^2`.
+    fn time_step(&self) -> f64;
+
+    /// Distance of neighbouring planes in units of `h`; `1 / |a|` for the integer normal `a`.
+    fn spacing(&self) -> f64;
+
+    /// `v[w]` and the matrix of its derivative.
+    ///
+    /// # Errors
+    /// If the step's own solver fails.
+    fn linearize(&self, w: &Col<f64>) -> Result<(Col<f64>, Mat<f64>), Error>;
+
+    /// `A = d/dkappa (v[u] - u)` on the normal line of a bent interface `u(x) = w(sdist(x))`, where `kappa` is the sum of its
+    /// principal curvatures, all equal, positive if the phase `u = 1` is convex. `slope` is `w'` per unit `h`.
+    fn bending(&self, w: &Col<f64>, slope: &Col<f64>) -> Col<f64>;
+
+    /// The matrix `M` of the inner product, for one that is not the identity; its rows sum to 1.
+    fn mass(&self, _planes: usize) -> Option<Mat<f64>> {
+        None
+    }
+}
+
+impl<S: PlanarStep + ?Sized> PlanarStep for &S {
+    fn eps(&self) -> f64 {
+        (**self).eps()
+    }
+
+    fn time_step(&self) -> f64 {
+        (**self).time_step()
+    }
+
+    fn spacing(&self) -> f64 {
+        (**self).spacing()
+    }
+
+    fn linearize(&self, w: &Col<f64>) -> Result<(Col<f64>, Mat<f64>), Error> {
+        (**self).linearize(w)
+    }
+
+    fn bending(&self, w: &Col<f64>, slope: &Col<f64>) -> Col<f64> {
+        (**self).bending(w, slope)
+    }
+
+    fn mass(&self, planes: usize) -> Option<Mat<f64>> {
+        (**self).mass(planes)
+    }
+}
+
+/// The flat interface of a step at one position, and what it says about the scheme's energy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlanarInterface {
+    /// `c = <A, psi>^2 / (|psi|^2 tautilde^2 |q'|^2)`.
+    pub energy: f64,
+    /// `m = |w'|^2 / |q'|^2`.
+    pub metric: f64,
+    /// `eps kappa_0 = -eps <v[w] - w, psi> / <A, psi>`.
+    pub spontaneous_curvature: f64,
+    /// `-<A, w'> / (tautilde |w'|^2)`.
+    pub displacement: f64,
+    /// `<psi, w'>^2 / (|psi|^2 |w'|^2)`.
+    pub alignment: f64,
+    /// The eigenvalue of `psi`.
+    pub eigenvalue: f64,
+}
+
+/// Half the thickness of the layer of planes in units of `eps`; the profile's tails are `2 e^-18` there.
+const HALF_WIDTH: f64 = 12.0;
+/// Limit of Newton's method for the flat interface.
+const NEWTON: usize = 40;
+/// Last correction of a converged flat interface.
+const CONVERGED: f64 = 1e-11;
+/// Shift of the inverse iteration: off the eigenvalue 1, but nearer to it than to any other.
+const SHIFT: f64 = 1.003;
+/// Steps of the inverse iteration. The next eigenvalue is below 0.9, so that each gains more than an order of magnitude.
+const INVERSE: usize = 24;
+/// Farthest that the eigenvalue of translations may be from 1.
+const OFF: f64 = 1e-2;
+
+/// Solves for the flat interface at `position` (in plane distances, from a plane).
+///
+/// # Errors
+/// [`Error::Calibration`].
+pub fn solve(step: &impl PlanarStep, position: f64) -> Result<PlanarInterface, Error> {
+    let failed = |reason, eigenvalue| Error::Calibration { reason, eigenvalue };
+    let (eps, spacing) = (step.eps(), step.spacing());
+    let (start, optimal_slope) = optimal_interface(step, position);
+    let planes = start.nrows();
+    let optimal_square = dot(&optimal_slope, &optimal_slope);
+
+    let w = flat_interface(step, &start, &optimal_slope)?;
+    let (value, jacobian) = step.linearize(&w)?;
+    let shifted = |transpose: bool| {
+        PartialPivLu::new(
+            Mat::from_fn(planes, planes, |i, j| {
+                let entry = if transpose {
+                    jacobian[(j, i)]
+                } else {
+                    jacobian[(i, j)]
+                };
+                entry - if i == j { SHIFT } else { 0.0 }
+            })
+            .as_ref(),
+        )
+    };
+    let (left, right) = (shifted(true), shifted(false));
+    let mut psi = optimal_slope.clone();
+    let mut slope = optimal_slope.clone();
+    for _ in 0..INVERSE {
+        psi = normalized(left.solve(&psi));
+        slope = normalized(right.solve(&slope));
+    }
+    let eigenvalue = dot(&psi, &(jacobian.transpose() * &psi));
+    if !eigenvalue.is_finite() || (eigenvalue - 1.0).abs() > OFF {
+        return Err(failed(
+            "translations of the flat interface are no eigenvector",
+            eigenvalue,
+        ));
+    }
+    // The slope integrates to the jump between the phases.
+    let jump = w[planes - 1] - w[0];
+    let slope = &slope * faer::Scale(jump / (slope.sum() * spacing));
+
+    let mass = step.mass(planes);
+    let (mass_of_slope, dual_psi) = match &mass {
+        Some(mass) => (mass * &slope, PartialPivLu::new(mass.as_ref()).solve(&psi)),
+        None => (slope.clone(), psi.clone()),
+    };
+    let bending = step.bending(&w, &slope);
+    let response = dot(&bending, &psi);
+    let (psi_square, slope_square) = (dot(&psi, &dual_psi), dot(&slope, &mass_of_slope));
+    let tautilde = step.time_step();
+    let interface = PlanarInterface {
+        energy: response * response / (psi_square * tautilde * tautilde * optimal_square),
+        metric: slope_square / optimal_square,
+        spontaneous_curvature: -eps * dot(&(&value - &w), &psi) / response,
+        displacement: -dot(&bending, &mass_of_slope) / (tautilde * slope_square),
+        alignment: dot(&psi, &slope).powi(2) / (psi_square * slope_square),
+        eigenvalue,
+    };
+    let PlanarInterface { energy, metric, .. } = interface;
+    if !(energy.is_finite() && energy > 0.0 && metric.is_finite() && metric > 0.0) {
+        return Err(failed("the step does not see curvature", eigenvalue));
+    }
+    Ok(interface)
+}
+
+/// `q` and `q'` on the planes of the layer.
+pub(super) fn optimal_interface(step: &impl PlanarStep, position: f64) -> (Col<f64>, Col<f64>) {
+    let (eps, spacing) = (step.eps(), step.spacing());
+    let half = (HALF_WIDTH * eps / spacing).ceil();
+    let planes = 2 * half as usize + 1;
+    let x = |i: usize| (i as f64 - half + position) * spacing;
+    let start = Col::from_fn(planes, |i| optimal_profile(-x(i), eps));
+    let slope = Col::from_fn(planes, |i| 0.75 / eps * (1.0 - start[i] * start[i]));
+    (start, slope)
+}
+
+/// The profile `w` with `v[w] - w = s q'` at the position of `start`, for some speed `s`: zero unless the step moves flat
+/// interfaces, up to what the grid holds on to.
+pub(super) fn flat_interface(
+    step: &impl PlanarStep,
+    start: &Col<f64>,
+    optimal_slope: &Col<f64>,
+) -> Result<Col<f64>, Error> {
+    let planes = start.nrows();
+    let (mut w, mut speed) = (start.clone(), 0.0);
+    for _ in 0..NEWTON {
+        let (value, jacobian) = step.linearize(&w)?;
+        let matrix = Mat::from_fn(planes + 1, planes + 1, |i, j| {
+            match (i < planes, j < planes) {
+                (true, true) => jacobian[(i, j)] - if i == j { 1.0 } else { 0.0 },
+                (true, false) => -optimal_slope[i],
+                (false, true) => optimal_slope[j],
+                (false, false) => 0.0,
+            }
+        });
+        let residual = Col::from_fn(planes + 1, |i| {
+            if i < planes {
+                w[i] + speed * optimal_slope[i] - value[i]
+            } else {
+                dot(optimal_slope, &(start - &w))
+            }
+        });
+        let correction = PartialPivLu::new(matrix.as_ref()).solve(&residual);
+        let mut largest = 0.0_f64;
+        for i in 0..planes {
+            w[i] += correction[i];
+            largest = largest.max(correction[i].abs());
+        }
+        speed += correction[planes];
+        if !largest.is_finite() {
+            break;
+        }
+        if largest < CONVERGED {
+            return Ok(w);
+        }
+    }
+    Err(Error::Calibration {
+        reason: "no flat interface is at rest",
+        eigenvalue: f64::NAN,
+    })
+}
+
+fn dot(a: &Col<f64>, b: &Col<f64>) -> f64 {
+    a.iter().zip(b.iter()).map(|(a, b)| a * b).sum()
+}
+
+fn normalized(x: Col<f64>) -> Col<f64> {
+    let norm = dot(&x, &x).sqrt();
+    x * faer::Scale(1.0 / norm)
+}

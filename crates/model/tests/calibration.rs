@@ -1,0 +1,223 @@
+//! Calibrations against steps whose factors are known, and those of the shipped networks.
+
+use faer::{Col, Mat};
+use model::calibration::{Calibration, PlanarStep, calibrate, solve};
+use model::{Error, Mlp, Network, PAPER_LAYERS, Ratios, parameter_count, pretrained};
+
+/// An explicit step of the Allen-Cahn equation along an axis, `u + t (u'' - Psi'(u) / (2 eps^2))`, with the mobility and the
+/// forcing of choice. Its derivative is symmetric, so that `psi = w'`, and it takes the curvature `force / mobility` for flat.
+struct Explicit {
+    eps: f64,
+    mobility: f64,
+    force: f64,
+}
+
+impl PlanarStep for Explicit {
+    fn eps(&self) -> f64 {
+        self.eps
+    }
+
+    fn time_step(&self) -> f64 {
+        0.1
+    }
+
+    fn spacing(&self) -> f64 {
+        1.0
+    }
+
+    fn linearize(&self, w: &Col<f64>) -> Result<(Col<f64>, Mat<f64>), Error> {
+        let n = w.nrows();
+        let t = self.mobility * self.time_step();
+        let reaction = 1.125 / (self.eps * self.eps);
+        let at = |i: usize| w[i.min(n - 1)];
+        let value = Col::from_fn(n, |i| {
+            let second = at(i + 1) - 2.0 * at(i) + at(i.saturating_sub(1));
+            let force = self.force * self.time_step() * 0.75 / self.eps * (1.0 - at(i).powi(2));
+            at(i) + t * (second + reaction * (at(i) - at(i).powi(3))) + force
+        });
+        let mut jacobian = Mat::zeros(n, n);
+        for i in 0..n {
+            let force = -self.force * self.time_step() * 1.5 / self.eps * w[i];
+            jacobian[(i, i)] += 1.0 - 2.0 * t + t * reaction * (1.0 - 3.0 * w[i] * w[i]) + force;
+            jacobian[(i, i.saturating_sub(1))] += t;
+            jacobian[(i, (i + 1).min(n - 1))] += t;
+        }
+        Ok((value, jacobian))
+    }
+
+    /// The Laplacian of a bent interface is `w'' - kappa w'`.
+    fn bending(&self, _: &Col<f64>, slope: &Col<f64>) -> Col<f64> {
+        Col::from_fn(slope.nrows(), |i| {
+            -self.mobility * self.time_step() * slope[i]
+        })
+    }
+}
+
+fn explicit(eps: f64) -> Explicit {
+    Explicit {
+        eps,
+        mobility: 1.0,
+        force: 0.0,
+    }
+}
+
+#[test]
+fn a_symmetric_step_has_the_factors_of_its_profile_and_they_converge_to_one() {
+    let mut errors = Vec::new();
+    for eps in [2.0, 4.0, 8.0] {
+        let interface = solve(&explicit(eps), 0.3).unwrap();
+        assert!((interface.alignment - 1.0).abs() < 1e-9, "{interface:?}");
+        assert!((interface.displacement - 1.0).abs() < 1e-9, "{interface:?}");
+        assert!((interface.energy / interface.metric - 1.0).abs() < 1e-9);
+        // Up to what the grid holds on to.
+        assert!(
+            interface.spontaneous_curvature.abs() < 1e-5,
+            "{interface:?}"
+        );
+        assert!((interface.eigenvalue - 1.0).abs() < 1e-6);
+        errors.push((interface.energy - 1.0).abs());
+    }
+    for pair in errors.windows(2) {
+        let order = (pair[0] / pair[1]).log2();
+        assert!((order - 2.0).abs() < 0.3, "{errors:?}");
+    }
+}
+
+#[test]
+fn a_step_that_is_too_fast_or_forced_is_told_apart() {
+    let base = solve(&explicit(4.0), 0.3).unwrap();
+    let mut fast = explicit(4.0);
+    fast.mobility = 1.1;
+    let found = solve(&fast, 0.3).unwrap();
+    assert!(
+        (found.energy / base.energy - 1.21).abs() < 1e-8,
+        "{found:?}"
+    );
+    assert!((found.metric - base.metric).abs() < 1e-9);
+    // An interface is at rest where kappa = force: u = 1 gains, so the force bends outwards.
+    let mut forced = explicit(4.0);
+    forced.force = 1e-3;
+    let found = solve(&forced, 0.3).unwrap();
+    let expected = 4.0 * 1e-3;
+    assert!(
+        (found.spontaneous_curvature / expected - 1.0).abs() < 0.02,
+        "{found:?}"
+    );
+    assert!((found.energy / base.energy - 1.0).abs() < 1e-4, "{found:?}");
+}
+
+#[test]
+fn steps_without_an_interface_at_rest_are_refused_with_the_eigenvalue() {
+    // Far too explicit: the profile is unstable, no Newton iteration helps.
+    let mut broken = explicit(0.3);
+    broken.mobility = -4.0;
+    broken.force = 9.0;
+    match calibrate(&[(broken, 1.0)]) {
+        Err(Error::Calibration { reason, .. }) => assert!(!reason.is_empty()),
+        other => panic!("{other:?}"),
+    }
+    // A network that was never trained.
+    let ratios = ratios(2, 17, 2.0, 1.0);
+    let count = parameter_count(&PAPER_LAYERS);
+    let activation = Mlp::new(PAPER_LAYERS.to_vec(), vec![0.1; count]).unwrap();
+    let trained = pretrained::find(ratios).unwrap();
+    let provenance = trained.provenance().clone();
+    let untrained = Network::new(ratios, trained.kernel().to_vec(), activation, provenance);
+    let error = untrained.unwrap().calibration().unwrap_err();
+    assert!(matches!(error, Error::Calibration { .. }), "{error}");
+    assert!(
+        error.to_string().contains("train the network longer"),
+        "{error}"
+    );
+}
+
+fn ratios(dimension: usize, width: usize, eps_over_h: f64, step_over_h2: f64) -> Ratios {
+    Ratios {
+        dimension,
+        width,
+        eps_over_h,
+        step_over_h2,
+    }
+}
+
+fn close(a: &Calibration, b: &Calibration, tolerance: f64) -> bool {
+    let numbers = |c: &Calibration| {
+        [
+            c.factors.energy,
+            c.factors.metric,
+            c.spontaneous_curvature,
+            c.displacement,
+            c.alignment,
+            c.eigenvalue,
+            c.position_spread,
+            c.normal_spread,
+        ]
+    };
+    (numbers(a).iter().zip(numbers(b))).all(|(a, b)| (a - b).abs() < tolerance)
+}
+
+#[test]
+fn shipped_networks_carry_their_calibration() {
+    for (name, network) in pretrained::all().unwrap() {
+        let stored = *network.stored_calibration().expect(name);
+        let found = network.calibrate().unwrap();
+        assert!(close(&stored, &found, 1e-8), "{name}: {stored:?} {found:?}");
+        assert_eq!(network.calibration().unwrap(), stored);
+        let Calibration { factors, .. } = found;
+        // All shipped operators see too little curvature.
+        assert!((0.9..0.98).contains(&factors.energy), "{name}: {found:?}");
+        assert!((factors.metric - 1.0).abs() < 0.01, "{name}: {found:?}");
+        assert!((found.eigenvalue - 1.0).abs() < 1e-5, "{name}: {found:?}");
+        assert!((found.alignment - 0.98).abs() < 0.005, "{name}: {found:?}");
+        assert!(found.position_spread < 2e-4, "{name}: {found:?}");
+        assert!(found.normal_spread < 0.04, "{name}: {found:?}");
+        assert!(
+            found.spontaneous_curvature.abs() < 2e-3,
+            "{name}: {found:?}"
+        );
+    }
+}
+
+#[test]
+fn the_factor_is_the_square_of_the_displacement_but_for_the_angle_between_the_null_vectors() {
+    // A is nearly parallel to w', so c = displacement^2 m cos^2 up to the rest of A.
+    for (name, network) in pretrained::all().unwrap() {
+        let c = network.calibration().unwrap();
+        let product = c.displacement.powi(2) * c.factors.metric * c.alignment;
+        assert!(
+            (product / c.factors.energy - 1.0).abs() < 0.01,
+            "{name}: {c:?}"
+        );
+    }
+}
+
+#[test]
+fn odd_parts_have_the_same_factors_and_no_spontaneous_curvature() {
+    for (name, network) in pretrained::all().unwrap() {
+        if network.ratios().width > 17 {
+            continue; // the same code path, many times the time
+        }
+        let (whole, odd) = (network.calibration().unwrap(), network.odd_part());
+        let f = |network: &Network, w: f64| network.activation().value(w);
+        for w in [-1.2, -0.4, 0.0, 0.7, 1.0] {
+            let expected = 0.5 * (f(&network, w) - f(&network, -w));
+            assert!((f(&odd, w) - expected).abs() < 1e-13, "{name} {w}");
+        }
+        let odd = odd.calibrate().unwrap();
+        assert!(odd.spontaneous_curvature.abs() < 1e-10, "{name}: {odd:?}");
+        let ratio = odd.factors.energy / whole.factors.energy;
+        assert!((ratio - 1.0).abs() < 1e-4, "{name}: {odd:?} {whole:?}");
+    }
+}
+
+#[test]
+fn files_with_and_without_a_calibration_are_read() {
+    let (_, network) = pretrained::all().unwrap().remove(0);
+    let path = std::path::Path::new("network.safetensors");
+    for network in [network.clone().with_calibration(None), network] {
+        let data = network.to_bytes().unwrap();
+        let read = Network::from_bytes(&data, path).unwrap();
+        assert_eq!(read.stored_calibration(), network.stored_calibration());
+        assert_eq!(read, network);
+    }
+}
