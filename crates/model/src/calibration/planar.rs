@@ -103,8 +103,8 @@ const OFF: f64 = 1e-2;
 pub fn solve(step: &impl PlanarStep, position: f64) -> Result<PlanarInterface, Error> {
     let failed = |reason, eigenvalue| Error::Calibration { reason, eigenvalue };
     let (eps, spacing) = (step.eps(), step.spacing());
-    // Written so that NaN is refused.
-    if !(2.0 * HALF_WIDTH * eps / spacing <= MOST_PLANES) {
+    let thickness = 2.0 * HALF_WIDTH * eps / spacing;
+    if thickness.is_nan() || thickness > MOST_PLANES {
         return Err(failed(
             "the interface is too wide for the grid spacing",
             f64::NAN,
