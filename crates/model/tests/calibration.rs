@@ -116,6 +116,10 @@ fn steps_without_an_interface_at_rest_are_refused_with_the_eigenvalue() {
         Err(Error::Calibration { reason, .. }) => assert!(!reason.is_empty()),
         other => panic!("{other:?}"),
     }
+    for eps in [f64::NAN, 1e9] {
+        let error = solve(&explicit(eps), 0.3).unwrap_err();
+        assert!(matches!(error, Error::Calibration { .. }), "{error}");
+    }
     // A network that was never trained.
     let ratios = ratios(2, 17, 2.0, 1.0);
     let count = parameter_count(&PAPER_LAYERS);

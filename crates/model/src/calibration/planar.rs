@@ -89,6 +89,10 @@ const CONVERGED: f64 = 1e-11;
 const SHIFT: f64 = 1.003;
 /// Steps of the inverse iteration. The next eigenvalue is below 0.9, so that each gains more than an order of magnitude.
 const INVERSE: usize = 24;
+/// Largest residual of the eigenvector, relative to it.
+const RESIDUAL: f64 = 1e-8;
+/// Most planes of a dense problem.
+const MOST_PLANES: f64 = 8192.0;
 /// Farthest that the eigenvalue of translations may be from 1.
 const OFF: f64 = 1e-2;
 
@@ -99,6 +103,13 @@ const OFF: f64 = 1e-2;
 pub fn solve(step: &impl PlanarStep, position: f64) -> Result<PlanarInterface, Error> {
     let failed = |reason, eigenvalue| Error::Calibration { reason, eigenvalue };
     let (eps, spacing) = (step.eps(), step.spacing());
+    let thickness = 2.0 * HALF_WIDTH * eps / spacing;
+    if thickness.is_nan() || thickness > MOST_PLANES {
+        return Err(failed(
+            "the interface is too wide for the grid spacing",
+            f64::NAN,
+        ));
+    }
     let (start, optimal_slope) = optimal_interface(step, position);
     let planes = start.nrows();
     let optimal_square = dot(&optimal_slope, &optimal_slope);
@@ -125,8 +136,11 @@ pub fn solve(step: &impl PlanarStep, position: f64) -> Result<PlanarInterface, E
         psi = normalized(left.solve(&psi));
         slope = normalized(right.solve(&slope));
     }
-    let eigenvalue = dot(&psi, &(jacobian.transpose() * &psi));
-    if !eigenvalue.is_finite() || (eigenvalue - 1.0).abs() > OFF {
+    let image = jacobian.transpose() * &psi;
+    let eigenvalue = dot(&psi, &image);
+    let residual = eigenvector_residual(&image, &psi, eigenvalue);
+    // Written so that NaN is refused.
+    if !((eigenvalue - 1.0).abs() <= OFF && residual <= RESIDUAL) {
         return Err(failed(
             "translations of the flat interface are no eigenvector",
             eigenvalue,
@@ -219,6 +233,12 @@ pub(super) fn flat_interface(
 
 fn dot(a: &Col<f64>, b: &Col<f64>) -> f64 {
     a.iter().zip(b.iter()).map(|(a, b)| a * b).sum()
+}
+
+/// `|y - lambda x|` for a normalized `x`.
+fn eigenvector_residual(y: &Col<f64>, x: &Col<f64>, lambda: f64) -> f64 {
+    let rest = y - x * faer::Scale(lambda);
+    dot(&rest, &rest).sqrt()
 }
 
 fn normalized(x: Col<f64>) -> Col<f64> {
