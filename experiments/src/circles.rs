@@ -168,7 +168,7 @@ impl Circle {
                 self.method.label_in(self.scheme),
                 self.cells_per_unit
             ),
-            source,
+            source: Box::new(source),
         };
         let side = self.box_cells as f64 / self.cells_per_unit as f64;
         let grid = Grid::<2>::centred(self.box_cells, side)?;

@@ -24,7 +24,7 @@ pub enum Error {
         /// Which one.
         run: String,
         /// Why.
-        source: solver::Error,
+        source: Box<solver::Error>,
     },
     /// From the finite elements.
     #[error(transparent)]

@@ -278,7 +278,7 @@ impl<const D: usize> Evolution<D> {
                 self.method.label(),
                 self.n
             ),
-            source,
+            source: Box::new(source),
         }
     }
 

@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 use surfaces::{ClosedMesh, MeshDistance, Placement};
 
 use crate::Error;
+use crate::networks::hexadecimal;
 use crate::surfaces::centred_box;
 
 /// Names a folder that holds the meshes of the paper.
@@ -248,7 +249,7 @@ impl About {
         Ok(Self {
             title: name.clone(),
             file: Some(name),
-            sha256: Some(hash.iter().map(|byte| format!("{byte:02x}")).collect()),
+            sha256: Some(hexadecimal(&hash)),
             ..Self::default()
         })
     }

@@ -98,9 +98,12 @@ pub fn checksum(network: &Network) -> String {
     {
         hash.update(value.to_le_bytes());
     }
-    hash.finalize()
-        .iter()
-        .fold(String::with_capacity(64), |text, byte| {
-            format!("{text}{byte:02x}")
-        })
+    hexadecimal(&hash.finalize())
+}
+
+/// Bytes as text.
+pub fn hexadecimal(bytes: &[u8]) -> String {
+    (bytes.iter()).fold(String::with_capacity(2 * bytes.len()), |text, byte| {
+        format!("{text}{byte:02x}")
+    })
 }

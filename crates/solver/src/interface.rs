@@ -46,7 +46,7 @@ impl<const D: usize> InterfaceModes<D> {
     /// The correction for the interface of `u`, or none if there is no interface, or too much of it.
     pub(crate) fn new(grid: &Grid<D>, u: &[f64], eps: f64, tau: f64) -> Option<Self> {
         let samples = Samples::new(grid, u, eps, SPACING * eps);
-        let nodes = &samples.samples;
+        let nodes = &samples.nodes;
         let sharp = nodes.iter().filter(|s| s.curvature.abs() * eps > 1.0);
         let corners_dominate = sharp.count() as f64 > SHARP * nodes.len() as f64;
         if nodes.is_empty() || samples.columns > MOST_COLUMNS || corners_dominate {
@@ -82,8 +82,8 @@ impl<const D: usize> InterfaceModes<D> {
         self.factor.solve_in_place(&mut coarse);
         z.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, z)| {
             let first = chunk * CHUNK;
-            let from = (samples.samples).partition_point(|s| (s.node as usize) < first);
-            for sample in &samples.samples[from..] {
+            let from = samples.nodes.partition_point(|s| (s.node as usize) < first);
+            for sample in &samples.nodes[from..] {
                 let Some(z) = z.get_mut(sample.node as usize - first) else {
                     break;
                 };

@@ -68,8 +68,8 @@ fn along(corner: usize, axis: usize, fraction: f64) -> (f64, f64) {
 /// All nodes of an interface, and the lattice cells that hold their foot points.
 pub(crate) struct Samples<const D: usize> {
     /// In the order of the grid.
-    pub samples: Vec<Sample<D>>,
-    /// Positions in `samples`, cell by cell, and where each cell begins.
+    pub nodes: Vec<Sample<D>>,
+    /// Positions in `nodes`, cell by cell, and where each cell begins.
     order: Vec<u32>,
     starts: Vec<u32>,
     /// Numbers of the hat functions at the corners of each cell.
@@ -118,7 +118,7 @@ impl<const D: usize> Samples<D> {
         }
         let (order, starts) = grouped(&samples, corners.len());
         Self {
-            samples,
+            nodes: samples,
             order,
             starts,
             corners,
@@ -130,7 +130,7 @@ impl<const D: usize> Samples<D> {
     /// The samples of one lattice cell, in the order of the grid.
     pub(crate) fn of_cell(&self, cell: usize) -> impl Iterator<Item = &Sample<D>> {
         let range = self.starts[cell] as usize..self.starts[cell + 1] as usize;
-        self.order[range].iter().map(|&i| &self.samples[i as usize])
+        self.order[range].iter().map(|&i| &self.nodes[i as usize])
     }
 }
 

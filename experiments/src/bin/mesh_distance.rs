@@ -1,5 +1,6 @@
 //! The signed distance of any mesh on any grid.
 
+use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -9,7 +10,7 @@ use geometry::{Grid, npy, vti};
 use report::Progress;
 use surfaces::ClosedMesh;
 
-/// Writes the signed distance to a closed triangle mesh, negative inside, at the nodes i/n of the box [0,1]^3. The mesh is scaled so
+/// Writes the signed distance to a closed triangle mesh, negative inside, at the nodes i/n of the unit cube. The mesh is scaled so
 /// that the longest side of its bounding box has the given length, and its bounding box is centred at (0.5, 0.5, 0.5).
 #[derive(Parser, Debug)]
 #[command(name = "mesh_distance", version)]
@@ -45,7 +46,7 @@ fn main() -> ExitCode {
 }
 
 fn program(options: &Options) -> Result<(), Error> {
-    let extension = options.output.extension().map(|e| e.to_ascii_lowercase());
+    let extension = options.output.extension().map(OsStr::to_ascii_lowercase);
     let volume = match extension.as_deref().and_then(|e| e.to_str()) {
         Some("npy") => false,
         Some("vti") => true,

@@ -406,8 +406,8 @@ impl Contender {
 
     fn timing(&self, n: usize) -> Timing {
         let records = &self.records;
-        let inner: Statistics =
-            (self.elements.as_ref()).map_or_else(Statistics::default, |step| step.statistics());
+        let inner: Statistics = (self.elements.as_ref())
+            .map_or_else(Statistics::default, FiniteElementStep::statistics);
         let count = records.len();
         let per_step = |total: usize| total as f64 / count.max(1) as f64;
         let step_seconds: Vec<f64> = records.iter().map(|r| r.seconds).collect();
