@@ -18,6 +18,18 @@ pub fn keep_freed() {
     }
 }
 
+/// Gives kept memory back to the system: after one kind of work, before another that needs much.
+pub fn release_freed() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    {
+        #[allow(unsafe_code, reason = "a call into the C library without pointers")]
+        // SAFETY: `malloc_trim` takes an integer and may be called at any time.
+        unsafe {
+            libc::malloc_trim(0);
+        }
+    }
+}
+
 /// Starts a new measurement of the largest resident memory, where the system can do that.
 pub fn forget_peak() {
     // Without that the peak is the one since the start of the program: an upper bound.

@@ -198,6 +198,7 @@ impl Workshop<'_> {
         })?;
         bar.finish();
         let peak_mib = memory::peak_mib();
+        memory::release_freed();
         let measure = FiniteElementStep::implicit(initial.grid(), params.eps, params.mcf_step)?;
         let meshes = self.output.subfolder("meshes")?;
         let steps = run.shown.iter().filter(|(step, _)| *step <= run.steps);
@@ -211,6 +212,7 @@ impl Workshop<'_> {
                     let name = format!("{}.ply", run.name(step));
                     surfaces::write(meshes.path(&name)?, surface.mesh())?;
                     let measures = &trajectory.measures[step];
+                    memory::release_freed();
                     Ok(Snapshot {
                         step,
                         time: run.tau.time(step),
@@ -262,6 +264,7 @@ impl Workshop<'_> {
             Figure::new(self.options.title(title), columns.unwrap_or(1)).with_row_labels(labels);
         let (size, quality) = self.picture_size();
         let pictures = self.output.subfolder("pictures")?;
+        memory::release_freed();
         for (
             k,
             Finished {
