@@ -3,10 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use burn::backend::BackendTypes;
 use burn::backend::ir::{BackendIr, CustomOpIr, HandleContainer, TensorIr};
+use burn::backend::{BackendTypes, DispatchDevice};
+use burn::tensor::Device;
 
-use crate::{Builder, Error};
+use crate::{Builder, ELEMENTWISE, Error};
 
 /// Forward-mode rule of a custom operation.
 ///
@@ -148,6 +149,20 @@ impl Extensions {
     pub fn rule(&mut self, id: &str, rule: impl Rule + 'static) -> &mut Self {
         self.rules.insert(id.to_owned(), Arc::new(rule));
         self
+    }
+
+    /// Whether the device's backend has a handler for gathered elementwise operations.
+    pub(crate) fn fuses_on(&self, device: &Device) -> bool {
+        #[allow(unreachable_patterns, reason = "depends on the compiled backends")]
+        match device.as_dispatch() {
+            #[cfg(feature = "flex")]
+            DispatchDevice::Flex(_) => self.flex.known.contains(ELEMENTWISE),
+            #[cfg(feature = "ndarray")]
+            DispatchDevice::NdArray(_) => self.ndarray.known.contains(ELEMENTWISE),
+            #[cfg(any(feature = "wgpu", feature = "cuda"))]
+            DispatchDevice::Cube(_) => self.cube.known.contains(ELEMENTWISE),
+            _ => false,
+        }
     }
 
     pub(crate) fn rule_of(&self, id: &str) -> Option<Arc<dyn Rule>> {

@@ -72,7 +72,8 @@
 //! operations are elementwise, so that pointwise second derivatives merge into one coefficient that is
 //! computed once per point. [`Program`] prints what is left. Last uses are known, so backends compute
 //! in place, and between [`at`](Linearization::at) and [`apply`](Linearization::apply) only what the
-//! tangent program reads is kept. [`Graph::linearize_in`] runs the products in another precision than values and gradients.
+//! tangent program reads is kept. Backends with a handler for [`ELEMENTWISE`] run elementwise operations gathered, a pass over memory
+//! for many of them. [`Graph::linearize_in`] runs the products in another precision than values and gradients.
 //!
 //! Rules cover arithmetic with broadcasting, elementary functions, reductions, matrix products,
 //! convolutions and linear layers with their backward passes, indexing, masks, and what Burn's autodiff
@@ -104,6 +105,7 @@ mod conversion;
 mod emit;
 mod error;
 mod extensions;
+mod fusion;
 mod ir;
 mod precision;
 mod program;
@@ -117,6 +119,7 @@ pub use burn::backend::ir::{CustomOpIr, HandleContainer, OperationIr, ScalarIr, 
 
 pub use error::Error;
 pub use extensions::{CustomOpRegistry, Extensions, Multilinear, Rule};
+pub use fusion::{ELEMENTWISE, Elementwise, Instruction, Output};
 pub use program::{Program, Statistics};
 pub use replay::{Evaluation, Linearization};
 pub use tangent::Builder;

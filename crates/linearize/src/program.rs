@@ -11,6 +11,7 @@ use burn::tensor::{DType, Device, TensorData};
 
 use crate::conversion::Conversion;
 use crate::emit::Emitter;
+use crate::fusion::fuse;
 use crate::ir::{Line, detach_outputs, each_tensor, name, read_only, rename, with_status};
 use crate::rules::{self, Context};
 use crate::tangent::{Builder, Expression};
@@ -79,6 +80,17 @@ impl Program {
             tangent: count(&self.tangent.operations),
             saved: self.saved.len(),
             saved_elements: self.saved.iter().map(|t| t.shape.num_elements()).sum(),
+        }
+    }
+
+    /// The same programs with elementwise operations gathered into [`ELEMENTWISE`](crate::ELEMENTWISE) ones.
+    pub(crate) fn fused(&self) -> Self {
+        let saved = self.saved.iter().map(|t| t.id).collect();
+        Self {
+            value: self.value.fused(&HashSet::new()),
+            primal: self.primal.fused(&saved),
+            tangent: self.tangent.fused(&HashSet::new()),
+            ..self.clone()
         }
     }
 
@@ -441,8 +453,19 @@ fn is_fill(operation: &OperationIr) -> bool {
 }
 
 impl Block {
-    /// Mark last uses: the interpreter gives such a tensor away, so that the backend can reuse its
-    /// memory in place, and nothing is kept longer than needed. `keep` survives the program.
+    /// The same program with elementwise operations gathered; `keep` survives it.
+    fn fused(&self, keep: &HashSet<TensorId>) -> Self {
+        let operations: Vec<OperationIr> = (self.operations.iter())
+            .filter(|operation| !is_drop(operation))
+            .cloned()
+            .collect();
+        let mut needed = keep.clone();
+        needed.extend(self.outputs.iter().map(|t| t.id));
+        let operations = fuse(&operations, &needed);
+        Self::marked(self.inputs.clone(), operations, &self.outputs, keep)
+    }
+
+    /// A program that is given those `inputs` which it reads, or which `keep` says to keep.
     pub(crate) fn new(
         inputs: &[TensorIr],
         operations: Vec<OperationIr>,
@@ -458,6 +481,17 @@ impl Block {
             .iter()
             .map(|t| (read.contains(&t.id) || keep.contains(&t.id)).then_some(t.id))
             .collect();
+        Self::marked(inputs, operations, outputs, keep)
+    }
+
+    /// Mark last uses: the interpreter gives such a tensor away, so that the backend can reuse its
+    /// memory in place, and nothing is kept longer than needed. `keep` survives the program.
+    fn marked(
+        inputs: Vec<Option<TensorId>>,
+        operations: Vec<OperationIr>,
+        outputs: &[TensorIr],
+        keep: &HashSet<TensorId>,
+    ) -> Self {
         let mut owned: HashSet<TensorId> = inputs.iter().flatten().copied().collect();
         owned.extend(
             operations

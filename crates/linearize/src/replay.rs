@@ -63,6 +63,11 @@ impl Linearization {
         device: &Device,
         extensions: &Extensions,
     ) -> Result<Self, Error> {
+        let program = &if extensions.fuses_on(device) {
+            program.fused()
+        } else {
+            program.clone()
+        };
         #[allow(unreachable_patterns, reason = "depends on the compiled backends")]
         let interpreter = match device.as_dispatch() {
             #[cfg(feature = "flex")]
@@ -90,7 +95,7 @@ impl Linearization {
         })
     }
 
-    /// The program that is loaded.
+    /// The program that is loaded, with elementwise operations gathered if the backend has a handler for that.
     pub fn program(&self) -> &Program {
         &self.program
     }

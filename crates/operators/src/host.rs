@@ -61,11 +61,14 @@ macro_rules! in_precision {
 }
 
 #[cfg(feature = "flex")]
-mod flex {
+pub(crate) mod flex {
     use burn_backend::{DType, Element, TensorData, TensorMetadata};
     use burn_flex::{Flex, FlexTensor};
+    use burn_ir::TensorStatus;
+    use linearize::{CustomOpRegistry, ELEMENTWISE};
 
     use super::{SpectralFilter, TableRange};
+    use crate::elementwise::{self, Operand};
     use crate::filter::FilterOps;
     use crate::ops::GridOps;
     use crate::slices;
@@ -162,6 +165,40 @@ mod flex {
         }
     }
 
+    /// Runs gathered elementwise operations of captured programs.
+    pub(crate) fn register_elementwise(registry: &mut CustomOpRegistry<Flex>) {
+        registry.register(ELEMENTWISE, |handles, ir, _| {
+            let inputs: Vec<FlexTensor> = (ir.inputs.iter())
+                .map(|t| contiguous(handles.get_float_tensor::<Flex>(t)))
+                .collect();
+            let results = in_precision!(ir.inputs[0].dtype, T => {
+                // A tensor that was given away and that nobody else holds lends its memory to a result.
+                let (mut given, mut lent) = (Vec::new(), Vec::new());
+                for (x, ir) in inputs.into_iter().zip(&ir.inputs) {
+                    if ir.status == TensorStatus::ReadWrite && x.is_unique() {
+                        given.push(x.into_data().try_into_vec::<T>().ok());
+                        lent.push(None);
+                    } else {
+                        given.push(None);
+                        lent.push(Some(x));
+                    }
+                }
+                let operands = (given.into_iter().zip(&lent))
+                    .map(|pair| match pair {
+                        (Some(values), _) => Operand::Given(values),
+                        (None, Some(x)) => Operand::Lent(values::<T>(x)),
+                        (None, None) => unreachable!("the tensor has the type of its description"),
+                    })
+                    .collect();
+                elementwise::run_operation::<T>(ir, operands)
+            });
+            for (result, out) in results.into_iter().zip(&ir.outputs) {
+                let data = result.into_data(out.shape.clone());
+                handles.register_float_tensor::<Flex>(&out.id, FlexTensor::from_data(data));
+            }
+        });
+    }
+
     impl FilterOps for Flex {
         fn spectral_filter(x: FlexTensor, filter: SpectralFilter) -> FlexTensor {
             let x = contiguous(x);
@@ -175,13 +212,15 @@ mod flex {
 }
 
 #[cfg(feature = "ndarray")]
-mod ndarray {
+pub(crate) mod ndarray {
     use burn_backend::{
         DType, Element, TensorData, TensorMetadata, ops::FloatTensorOps, tensor::FloatTensor,
     };
     use burn_ndarray::NdArray;
+    use linearize::{CustomOpRegistry, ELEMENTWISE};
 
     use super::{SpectralFilter, TableRange};
+    use crate::elementwise::{self, Operand};
     use crate::fft::Real;
     use crate::filter::FilterOps;
     use crate::ops::GridOps;
@@ -266,6 +305,22 @@ mod ndarray {
         fn update_on_host(x: NdTensor, z: NdTensor, update: SharedUpdate) -> NdTensor {
             in_place!(z, x, |z, x| vector::call(&update, x, z))
         }
+    }
+
+    /// Runs gathered elementwise operations of captured programs.
+    pub(crate) fn register_elementwise(registry: &mut CustomOpRegistry<NdArray>) {
+        registry.register(ELEMENTWISE, |handles, ir, _| {
+            let inputs = (ir.inputs.iter()).map(|t| handles.get_float_tensor::<NdArray>(t));
+            let results = in_precision!(ir.inputs[0].dtype, T => {
+                let operands = inputs.map(|x| Operand::Given(values::<T>(x))).collect();
+                elementwise::run_operation::<T>(ir, operands)
+            });
+            for (result, out) in results.into_iter().zip(&ir.outputs) {
+                let data = result.into_data(out.shape.clone());
+                let tensor = NdArray::float_from_data(data, &Default::default());
+                handles.register_float_tensor::<NdArray>(&out.id, tensor);
+            }
+        });
     }
 
     impl FilterOps for NdArray {

@@ -49,6 +49,7 @@ mod cube;
 mod device;
 #[cfg(any(feature = "wgpu", feature = "cuda"))]
 mod device_check;
+mod elementwise;
 mod error;
 mod fft;
 mod filter;

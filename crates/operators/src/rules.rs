@@ -66,9 +66,15 @@ pub fn extensions() -> Extensions {
         .rule(CORRELATION, Multilinear)
         .rule(TABULATED, Tabulated);
     #[cfg(feature = "flex")]
-    extensions.on_flex(register);
+    extensions.on_flex(|registry| {
+        register(registry);
+        crate::host::flex::register_elementwise(registry);
+    });
     #[cfg(feature = "ndarray")]
-    extensions.on_ndarray(register);
+    extensions.on_ndarray(|registry| {
+        register(registry);
+        crate::host::ndarray::register_elementwise(registry);
+    });
     #[cfg(any(feature = "wgpu", feature = "cuda"))]
     extensions.on_cube(register);
     extensions

@@ -35,6 +35,18 @@ pub fn dot<T: Real>(a: &[T], b: &[T]) -> f64 {
     parts.iter().sum()
 }
 
+/// `sum a`, accumulated in double precision, eight sums side by side in a fixed order.
+pub(crate) fn sum<T: Real>(a: &[T]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (blocks, rest) = a.as_chunks::<8>();
+    for block in blocks {
+        for k in 0..8 {
+            sums[k] += block[k].double();
+        }
+    }
+    sums.iter().sum::<f64>() + rest.iter().map(|x| x.double()).sum::<f64>()
+}
+
 /// `a_i <- f(a_i, b_i)`
 pub fn zip_apply<T: Real>(a: &mut [T], b: &[T], f: impl Fn(T, T) -> T + Sync) {
     let run = |(a, b): (&mut [T], &[T])| {

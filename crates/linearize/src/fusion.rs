@@ -1,0 +1,468 @@
+//! Elementwise operations that run as one: a single pass over memory instead of one each.
+//!
+//! Burn's CPU backends run every elementwise operation as a pass of its own, on one core. Where a backend's
+//! [registry](crate::CustomOpRegistry) has a handler for [`ELEMENTWISE`], programs are loaded with their elementwise
+//! operations gathered into few custom operations, each an [`Elementwise`] program of arithmetic on the entries of its inputs,
+//! with sums and conversions of results where those follow.
+
+use std::collections::{HashMap, HashSet};
+
+use burn::backend::ir::{
+    BaseOperationIr as Base, BinaryOpIr, CustomOpIr, NumericOperationIr as Num, OperationIr,
+    ScalarIr, TensorId, TensorIr,
+};
+use burn::tensor::{DType, Shape};
+
+/// Identifier of fused elementwise operations.
+pub const ELEMENTWISE: &str = "linearize::elementwise";
+
+/// One operation on entries. Operands are numbered: the inputs, then the results of earlier instructions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Instruction {
+    /// `a + b`
+    Add(usize, usize),
+    /// `a - b`
+    Sub(usize, usize),
+    /// `a b`
+    Mul(usize, usize),
+    /// `a / b`
+    Div(usize, usize),
+    /// `a + number`
+    AddNumber(usize, f64),
+    /// `number a`
+    MulNumber(usize, f64),
+    /// `a / number`
+    DivNumber(usize, f64),
+}
+
+/// What becomes of an operand in the end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Output {
+    /// All entries, in the float type of the output.
+    Values(usize),
+    /// The sum of the entries, an output of one element.
+    Sum(usize),
+}
+
+/// A straight-line program on the entries of tensors of one shape; inputs of one element stand for all entries.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Elementwise {
+    /// Operations in order.
+    pub instructions: Vec<Instruction>,
+    /// In the order of the outputs of the operation.
+    pub outputs: Vec<Output>,
+}
+
+impl Elementwise {
+    fn encode(&self) -> Vec<ScalarIr> {
+        let mut scalars = vec![ScalarIr::UInt(self.instructions.len() as u64)];
+        let mut push = |code: u64, operand: usize, rest: ScalarIr| {
+            scalars.extend([ScalarIr::UInt(code), ScalarIr::UInt(operand as u64), rest]);
+        };
+        for instruction in &self.instructions {
+            let place = |b: usize| ScalarIr::UInt(b as u64);
+            match *instruction {
+                Instruction::Add(a, b) => push(0, a, place(b)),
+                Instruction::Sub(a, b) => push(1, a, place(b)),
+                Instruction::Mul(a, b) => push(2, a, place(b)),
+                Instruction::Div(a, b) => push(3, a, place(b)),
+                Instruction::AddNumber(a, x) => push(4, a, ScalarIr::Float(x)),
+                Instruction::MulNumber(a, x) => push(5, a, ScalarIr::Float(x)),
+                Instruction::DivNumber(a, x) => push(6, a, ScalarIr::Float(x)),
+            }
+        }
+        for output in &self.outputs {
+            let (sum, operand) = match *output {
+                Output::Values(operand) => (false, operand),
+                Output::Sum(operand) => (true, operand),
+            };
+            scalars.extend([ScalarIr::Bool(sum), ScalarIr::UInt(operand as u64)]);
+        }
+        scalars
+    }
+
+    /// The program of an operation called [`ELEMENTWISE`].
+    pub fn of(operation: &CustomOpIr) -> Self {
+        let place = |scalar: &ScalarIr| scalar.elem::<u64>() as usize;
+        let (count, rest) = (place(&operation.scalars[0]), &operation.scalars[1..]);
+        let (instructions, outputs) = rest.split_at(3 * count);
+        let instruction = |code: &[ScalarIr]| {
+            let (a, b) = (place(&code[1]), &code[2]);
+            match code[0].elem::<u64>() {
+                0 => Instruction::Add(a, place(b)),
+                1 => Instruction::Sub(a, place(b)),
+                2 => Instruction::Mul(a, place(b)),
+                3 => Instruction::Div(a, place(b)),
+                4 => Instruction::AddNumber(a, b.elem()),
+                5 => Instruction::MulNumber(a, b.elem()),
+                6 => Instruction::DivNumber(a, b.elem()),
+                other => unreachable!("no instruction has the code {other}"),
+            }
+        };
+        let output = |code: &[ScalarIr]| match code[0] {
+            ScalarIr::Bool(true) => Output::Sum(place(&code[1])),
+            _ => Output::Values(place(&code[1])),
+        };
+        Self {
+            instructions: instructions.chunks(3).map(instruction).collect(),
+            outputs: outputs.chunks(2).map(output).collect(),
+        }
+    }
+}
+
+/// What an operation does to the entries of its inputs.
+enum Entrywise<'a> {
+    Binary(fn(usize, usize) -> Instruction, &'a BinaryOpIr),
+    Number(
+        fn(usize, f64) -> Instruction,
+        f64,
+        &'a TensorIr,
+        &'a TensorIr,
+    ),
+    Sum(&'a TensorIr, &'a TensorIr),
+    Convert(&'a TensorIr, &'a TensorIr),
+}
+
+impl<'a> Entrywise<'a> {
+    fn of(operation: &'a OperationIr) -> Option<Self> {
+        let found = match operation {
+            OperationIr::NumericFloat(_, operation) => match operation {
+                Num::Add(op) => Self::Binary(Instruction::Add, op),
+                Num::Sub(op) => Self::Binary(Instruction::Sub, op),
+                Num::Mul(op) => Self::Binary(Instruction::Mul, op),
+                Num::Div(op) => Self::Binary(Instruction::Div, op),
+                Num::AddScalar(op) => {
+                    Self::Number(Instruction::AddNumber, op.rhs.elem(), &op.lhs, &op.out)
+                }
+                Num::SubScalar(op) => {
+                    let number: f64 = op.rhs.elem();
+                    Self::Number(Instruction::AddNumber, -number, &op.lhs, &op.out)
+                }
+                Num::MulScalar(op) => {
+                    Self::Number(Instruction::MulNumber, op.rhs.elem(), &op.lhs, &op.out)
+                }
+                Num::DivScalar(op) => {
+                    Self::Number(Instruction::DivNumber, op.rhs.elem(), &op.lhs, &op.out)
+                }
+                Num::Neg(op) => Self::Number(Instruction::MulNumber, -1.0, &op.input, &op.out),
+                Num::Sum(op) => Self::Sum(&op.input, &op.out),
+                _ => return None,
+            },
+            OperationIr::BaseFloat(Base::Cast(op)) => Self::Convert(&op.input, &op.out),
+            _ => return None,
+        };
+        found.fits().then_some(found)
+    }
+
+    /// The operand that has all entries: its shape and type are those of the loop.
+    fn main(&self) -> &TensorIr {
+        match self {
+            Self::Binary(_, op) if elements(&op.lhs) < elements(&op.rhs) => &op.rhs,
+            Self::Binary(_, op) => &op.lhs,
+            Self::Number(_, _, input, _) | Self::Sum(input, _) | Self::Convert(input, _) => input,
+        }
+    }
+
+    /// Whether this is a loop over more than one entry in which every operand has all entries or one.
+    fn fits(&self) -> bool {
+        let main = self.main();
+        let float = |t: &TensorIr| matches!(t.dtype, DType::F64 | DType::F32);
+        elements(main) > 1
+            && float(main)
+            && match self {
+                Self::Binary(_, op) => {
+                    op.out.shape == main.shape
+                        && [&op.lhs, &op.rhs].iter().all(|t| {
+                            t.dtype == main.dtype && (t.shape == main.shape || elements(t) == 1)
+                        })
+                }
+                Self::Convert(_, out) => float(out),
+                Self::Number(..) | Self::Sum(..) => true,
+            }
+    }
+
+    fn operands(&self) -> Vec<&TensorIr> {
+        match self {
+            Self::Binary(_, op) => vec![&op.lhs, &op.rhs],
+            Self::Number(_, _, input, _) | Self::Sum(input, _) | Self::Convert(input, _) => {
+                vec![input]
+            }
+        }
+    }
+
+    fn result(&self) -> &TensorIr {
+        match self {
+            Self::Binary(_, op) => &op.out,
+            Self::Number(_, _, _, out) | Self::Sum(_, out) | Self::Convert(_, out) => out,
+        }
+    }
+
+    /// Whether both can run in one loop.
+    fn same_loop(&self, other: &Self) -> bool {
+        let (a, b) = (self.main(), other.main());
+        a.shape == b.shape && a.dtype == b.dtype
+    }
+
+    /// Whether the result cannot be an operand of the same loop.
+    fn is_terminal(&self) -> bool {
+        matches!(self, Self::Sum(..) | Self::Convert(..))
+    }
+}
+
+fn elements(t: &TensorIr) -> usize {
+    t.shape.num_elements()
+}
+
+/// Gathers elementwise operations. `needed` are the tensors that are read after the program.
+pub(crate) fn fuse(operations: &[OperationIr], needed: &HashSet<TensorId>) -> Vec<OperationIr> {
+    let candidates: Vec<Option<Entrywise>> = operations.iter().map(Entrywise::of).collect();
+    let producer: HashMap<TensorId, usize> = (operations.iter().enumerate())
+        .flat_map(|(i, operation)| operation.outputs().map(move |t| (t.id, i)))
+        .collect();
+    // The number of loops and other operations that have to come before. Operations of one loop have the same, and
+    // whatever lies between two loops separates them.
+    let mut depth = vec![0_usize; operations.len()];
+    let mut loops = Classes::new(operations.len());
+    let mut reader: HashMap<(TensorId, usize), usize> = HashMap::new();
+    for (i, operation) in operations.iter().enumerate() {
+        let joins = |p: usize| match (&candidates[p], &candidates[i]) {
+            (Some(a), Some(b)) => a.same_loop(b) && !a.is_terminal(),
+            _ => false,
+        };
+        let producers = || {
+            operation
+                .inputs()
+                .filter_map(|t| producer.get(&t.id).copied())
+        };
+        depth[i] = producers()
+            .map(|p| depth[p] + usize::from(!joins(p)))
+            .max()
+            .unwrap_or(0);
+        let Some(candidate) = &candidates[i] else {
+            continue;
+        };
+        for p in producers().filter(|&p| joins(p) && depth[p] == depth[i]) {
+            loops.join(p, i);
+        }
+        // Loops that read the same are one: it is read once.
+        for t in operation.inputs().filter(|t| elements(t) > 1) {
+            let first = *reader.entry((t.id, depth[i])).or_insert(i);
+            if candidates[first]
+                .as_ref()
+                .is_some_and(|c| c.same_loop(candidate))
+            {
+                loops.join(first, i);
+            }
+        }
+    }
+    let mut order: Vec<usize> = (0..operations.len()).collect();
+    order.sort_by_key(|&i| (depth[i], loops.first(i), i));
+    let used_by = |t: TensorId, of: usize| {
+        needed.contains(&t)
+            || operations.iter().enumerate().any(|(i, operation)| {
+                loops.first(i) != of && operation.inputs().any(|input| input.id == t)
+            })
+    };
+    let mut result = Vec::with_capacity(operations.len());
+    for members in order.chunk_by(|&a, &b| loops.first(a) == loops.first(b)) {
+        let first = loops.first(members[0]);
+        let entrywise: Vec<&Entrywise> = (members.iter())
+            .filter_map(|&i| candidates[i].as_ref())
+            .collect();
+        result.push(if entrywise.is_empty() {
+            operations[first].clone()
+        } else {
+            OperationIr::Custom(as_one(&entrywise, |t| used_by(t, first)))
+        });
+    }
+    result
+}
+
+/// One operation that does what the members do, one after the other.
+fn as_one(members: &[&Entrywise], used: impl Fn(TensorId) -> bool) -> CustomOpIr {
+    let inside: HashSet<TensorId> = members.iter().map(|m| m.result().id).collect();
+    let mut inputs: Vec<TensorIr> = Vec::new();
+    for t in members.iter().flat_map(|m| m.operands()) {
+        if !inside.contains(&t.id) && !inputs.iter().any(|known| known.id == t.id) {
+            inputs.push(t.clone());
+        }
+    }
+    let mut place: HashMap<TensorId, usize> =
+        inputs.iter().enumerate().map(|(i, t)| (t.id, i)).collect();
+    let mut outputs = Vec::new();
+    let mut program = Elementwise::default();
+    for member in members {
+        let result = member.result();
+        let at = |t: &TensorIr| place[&t.id];
+        let instruction = match member {
+            Entrywise::Binary(make, op) => make(at(&op.lhs), at(&op.rhs)),
+            Entrywise::Number(make, number, input, _) => make(at(input), *number),
+            Entrywise::Sum(input, _) => {
+                program.outputs.push(Output::Sum(at(input)));
+                outputs.push(result.clone());
+                continue;
+            }
+            Entrywise::Convert(input, _) => {
+                program.outputs.push(Output::Values(at(input)));
+                outputs.push(result.clone());
+                continue;
+            }
+        };
+        let number = inputs.len() + program.instructions.len();
+        program.instructions.push(instruction);
+        place.insert(result.id, number);
+        if used(result.id) {
+            program.outputs.push(Output::Values(number));
+            outputs.push(result.clone());
+        }
+    }
+    CustomOpIr::with_scalars(ELEMENTWISE, &inputs, &outputs, program.encode())
+}
+
+/// Disjoint classes of operations, each known by its first.
+struct Classes(Vec<usize>);
+
+impl Classes {
+    fn new(count: usize) -> Self {
+        Self((0..count).collect())
+    }
+
+    fn first(&self, mut i: usize) -> usize {
+        while self.0[i] != i {
+            i = self.0[i];
+        }
+        i
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.first(a), self.first(b));
+        self.0[a.max(b)] = a.min(b);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ir::{name, output, read_only, tensor};
+    use burn::backend::ir::{ReduceOpIr, UnaryOpIr};
+
+    fn t(id: u64) -> TensorIr {
+        tensor(id, Shape::from([4, 4]), DType::F64)
+    }
+
+    fn binary(make: fn(BinaryOpIr) -> Num, lhs: u64, rhs: u64, out: u64) -> OperationIr {
+        let (lhs, rhs) = (read_only(&t(lhs)), read_only(&t(rhs)));
+        OperationIr::NumericFloat(
+            DType::F64,
+            make(BinaryOpIr {
+                lhs,
+                rhs,
+                out: t(out),
+            }),
+        )
+    }
+
+    fn abs(input: u64, out: u64) -> OperationIr {
+        let input = read_only(&t(input));
+        OperationIr::NumericFloat(DType::F64, Num::Abs(UnaryOpIr { input, out: t(out) }))
+    }
+
+    fn sum(input: u64, out: u64) -> OperationIr {
+        let out = tensor(out, Shape::from([1]), DType::F64);
+        let input = read_only(&t(input));
+        OperationIr::NumericFloat(DType::F64, Num::Sum(ReduceOpIr { input, out }))
+    }
+
+    fn custom(operation: &OperationIr) -> (Elementwise, Vec<u64>, Vec<u64>) {
+        let OperationIr::Custom(custom) = operation else {
+            panic!("{} was not fused", name(operation));
+        };
+        let ids = |tensors: &[TensorIr]| tensors.iter().map(|t| t.id.value()).collect();
+        (
+            Elementwise::of(custom),
+            ids(&custom.inputs),
+            ids(&custom.outputs),
+        )
+    }
+
+    #[test]
+    fn arithmetic_and_its_sum_become_one_operation() {
+        // 2 = 0 - 1, 3 = 2 2, 4 = sum 3; of these only 2 and 4 are read.
+        let operations = [
+            binary(Num::Sub, 0, 1, 2),
+            binary(Num::Mul, 2, 2, 3),
+            sum(3, 4),
+        ];
+        let fused = fuse(&operations, &HashSet::from([t(2).id, t(4).id]));
+        assert_eq!(fused.len(), 1);
+        let (program, inputs, outputs) = custom(&fused[0]);
+        assert_eq!((inputs, outputs), (vec![0, 1], vec![2, 4]));
+        assert_eq!(
+            program.instructions,
+            [Instruction::Sub(0, 1), Instruction::Mul(2, 2)]
+        );
+        assert_eq!(program.outputs, [Output::Values(2), Output::Sum(3)]);
+    }
+
+    #[test]
+    fn what_waits_for_another_operation_comes_after_it() {
+        // 2 = 0 + 1, 3 = |2|, 4 = 2 3, 5 = 0 0: the product needs |2|, and cannot run with the sum.
+        let operations = [
+            binary(Num::Add, 0, 1, 2),
+            abs(2, 3),
+            binary(Num::Mul, 2, 3, 4),
+            binary(Num::Mul, 0, 0, 5),
+        ];
+        let fused = fuse(&operations, &HashSet::from([t(4).id, t(5).id]));
+        let names: Vec<String> = fused.iter().map(name).collect();
+        assert_eq!(names, [ELEMENTWISE, "Abs", ELEMENTWISE]);
+        // The square reads what the sum reads, and is computed with it.
+        assert_eq!(custom(&fused[0]).2, [2, 5]);
+        assert_eq!(custom(&fused[2]).1, [2, 3]);
+    }
+
+    #[test]
+    fn other_shapes_are_other_loops_and_single_elements_belong_to_any() {
+        let small = tensor(7, Shape::from([1, 1]), DType::F64);
+        let scaled = OperationIr::NumericFloat(
+            DType::F64,
+            Num::Mul(BinaryOpIr {
+                lhs: read_only(&small),
+                rhs: read_only(&t(0)),
+                out: t(1),
+            }),
+        );
+        let row = BinaryOpIr {
+            lhs: read_only(&t(0)),
+            rhs: read_only(&tensor(8, Shape::from([1, 4]), DType::F64)),
+            out: t(2),
+        };
+        let spread = OperationIr::NumericFloat(DType::F64, Num::Mul(row));
+        let fused = fuse(&[scaled, spread], &HashSet::from([t(1).id, t(2).id]));
+        assert_eq!(custom(&fused[0]).1, [7, 0]);
+        assert_eq!(name(&fused[1]), "Mul");
+    }
+
+    #[test]
+    fn programs_survive_their_encoding() {
+        let program = Elementwise {
+            instructions: vec![
+                Instruction::Add(0, 1),
+                Instruction::Sub(1, 0),
+                Instruction::Mul(2, 3),
+                Instruction::Div(3, 2),
+                Instruction::AddNumber(4, 0.1),
+                Instruction::MulNumber(5, -3.0),
+                Instruction::DivNumber(6, 1e-300),
+            ],
+            outputs: vec![Output::Sum(7), Output::Values(8)],
+        };
+        let ir = CustomOpIr::with_scalars(
+            ELEMENTWISE,
+            &[t(0), t(1)],
+            &[output(Shape::from([1]), DType::F64), t(2)],
+            program.encode(),
+        );
+        assert_eq!(Elementwise::of(&ir), program);
+    }
+}

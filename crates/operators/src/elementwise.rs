@@ -1,0 +1,411 @@
+//! Gathered elementwise operations on the host: one pass over memory, on all cores.
+//!
+//! Entries are worked on in blocks that stay in the fastest cache, instruction by instruction.
+
+use burn_backend::{DType, Shape, TensorData};
+use linearize::{CustomOpIr, Elementwise, Instruction, Output};
+use rayon::prelude::*;
+
+use crate::fft::{Real, is_f64};
+use crate::slices::sum;
+
+/// Entries per block: a handful of intermediate results fit into the first-level cache.
+const BLOCK: usize = 1 << 10;
+/// Entries per task; sums are taken in this order whatever the number of threads.
+const CHUNK: usize = 1 << 14;
+/// Shorter vectors stay on one thread.
+const PARALLEL_FROM: usize = 1 << 15;
+
+/// An input of an elementwise program.
+pub(crate) enum Operand<'a, T> {
+    /// Entries whose memory can be reused for results.
+    Given(Vec<T>),
+    /// Entries that stay as they are.
+    Lent(&'a [T]),
+}
+
+impl<T: Real> Operand<'_, T> {
+    fn len(&self) -> usize {
+        match self {
+            Self::Given(values) => values.len(),
+            Self::Lent(values) => values.len(),
+        }
+    }
+}
+
+/// Values in either precision.
+#[derive(Debug, PartialEq)]
+pub(crate) enum Values {
+    Double(Vec<f64>),
+    Single(Vec<f32>),
+}
+
+/// Where a block of results goes.
+enum Target<'a> {
+    Double(&'a mut [f64]),
+    Single(&'a mut [f32]),
+}
+
+impl Values {
+    fn zeros(dtype: DType, len: usize) -> Self {
+        match dtype {
+            DType::F32 => Self::Single(vec![0.0; len]),
+            _ => Self::Double(vec![0.0; len]),
+        }
+    }
+
+    fn of<T: Real>(values: Vec<T>) -> Self {
+        if is_f64::<T>() {
+            Self::Double(bytemuck::allocation::cast_vec(values))
+        } else {
+            Self::Single(bytemuck::allocation::cast_vec(values))
+        }
+    }
+
+    pub(crate) fn into_data(self, shape: Shape) -> TensorData {
+        match self {
+            Self::Double(values) => TensorData::new(values, shape),
+            Self::Single(values) => TensorData::new(values, shape),
+        }
+    }
+
+    fn chunks(&mut self) -> Vec<Target<'_>> {
+        match self {
+            Self::Double(x) => x.chunks_mut(CHUNK).map(Target::Double).collect(),
+            Self::Single(x) => x.chunks_mut(CHUNK).map(Target::Single).collect(),
+        }
+    }
+}
+
+impl Target<'_> {
+    /// The entries themselves, where they have the precision of the loop.
+    fn read<T: Real>(&self, start: usize, block: &mut [T]) {
+        let end = start + block.len();
+        match self {
+            Self::Double(x) if is_f64::<T>() => {
+                block.copy_from_slice(bytemuck::cast_slice(&x[start..end]));
+            }
+            Self::Single(x) if !is_f64::<T>() => {
+                block.copy_from_slice(bytemuck::cast_slice(&x[start..end]));
+            }
+            _ => unreachable!("memory is reused in its own precision"),
+        }
+    }
+
+    fn write<T: Real>(&mut self, start: usize, block: &[T]) {
+        let end = start + block.len();
+        match self {
+            Self::Double(x) if is_f64::<T>() => {
+                x[start..end].copy_from_slice(bytemuck::cast_slice(block));
+            }
+            Self::Single(x) if !is_f64::<T>() => {
+                x[start..end].copy_from_slice(bytemuck::cast_slice(block));
+            }
+            Self::Double(x) => {
+                for (x, value) in x[start..end].iter_mut().zip(block) {
+                    *x = value.double();
+                }
+            }
+            Self::Single(x) => {
+                for (x, value) in x[start..end].iter_mut().zip(block) {
+                    *x = value.double() as f32;
+                }
+            }
+        }
+    }
+}
+
+/// Where the entries of an operand are while a task runs.
+enum Source<'a, T> {
+    Lent(&'a [T]),
+    /// The same for all entries.
+    Single(T),
+    /// In the memory of an output.
+    Reused(usize),
+}
+
+/// Runs the program of an operation on its operands.
+pub(crate) fn run_operation<T: Real>(
+    operation: &CustomOpIr,
+    operands: Vec<Operand<'_, T>>,
+) -> Vec<Values> {
+    let dtypes: Vec<DType> = operation.outputs.iter().map(|out| out.dtype).collect();
+    run(&Elementwise::of(operation), operands, &dtypes)
+}
+
+/// Runs a program; `dtypes` are the float types of its outputs.
+fn run<T: Real>(
+    program: &Elementwise,
+    operands: Vec<Operand<'_, T>>,
+    dtypes: &[DType],
+) -> Vec<Values> {
+    let len = operands.iter().map(Operand::len).max().unwrap_or(0);
+    let own = if is_f64::<T>() {
+        DType::F64
+    } else {
+        DType::F32
+    };
+    // Outputs that can take over the memory of an input do.
+    let mut results: Vec<Option<Values>> = dtypes.iter().map(|_| None).collect();
+    let mut free: Vec<usize> = (program.outputs.iter().zip(dtypes).enumerate())
+        .filter(|(_, (output, dtype))| matches!(output, Output::Values(_)) && **dtype == own)
+        .map(|(i, _)| i)
+        .rev()
+        .collect();
+    let mut kept = Vec::new();
+    let mut places = Vec::new();
+    for operand in operands {
+        places.push(match operand {
+            Operand::Lent([single]) if len > 1 => Place::Single(*single),
+            Operand::Given(values) if values.len() == 1 && len > 1 => Place::Single(values[0]),
+            Operand::Lent(values) => Place::Lent(values),
+            Operand::Given(values) => match free.pop() {
+                Some(output) => {
+                    results[output] = Some(Values::of(values));
+                    Place::Reused(output)
+                }
+                None => {
+                    kept.push(values);
+                    Place::Kept(kept.len() - 1)
+                }
+            },
+        });
+    }
+    let sources: Vec<Source<T>> = places
+        .into_iter()
+        .map(|place| match place {
+            Place::Single(value) => Source::Single(value),
+            Place::Lent(values) => Source::Lent(values),
+            Place::Kept(number) => Source::Lent(&kept[number]),
+            Place::Reused(output) => Source::Reused(output),
+        })
+        .collect();
+    let mut results: Vec<Values> = (results.into_iter().zip(&program.outputs).zip(dtypes))
+        .map(|((reused, output), dtype)| match (reused, output) {
+            (Some(values), _) => values,
+            (None, Output::Values(_)) => Values::zeros(*dtype, len),
+            (None, Output::Sum(_)) => Values::zeros(DType::F64, 0),
+        })
+        .collect();
+    // One task per chunk, with its part of every output.
+    let count = len.div_ceil(CHUNK);
+    let mut tasks: Vec<Vec<Option<Target>>> = (0..count).map(|_| Vec::new()).collect();
+    for result in &mut results {
+        let mut chunks = result.chunks().into_iter();
+        for task in &mut tasks {
+            task.push(chunks.next());
+        }
+    }
+    let machine = Machine { program, sources };
+    let work = |(chunk, targets): (usize, &mut Vec<Option<Target>>)| {
+        let start = chunk * CHUNK;
+        machine.run(start..len.min(start + CHUNK), targets)
+    };
+    let sums: Vec<Vec<f64>> = if len < PARALLEL_FROM {
+        tasks.iter_mut().enumerate().map(work).collect()
+    } else {
+        tasks.par_iter_mut().enumerate().map(work).collect()
+    };
+    drop(tasks);
+    for (i, (output, dtype)) in program.outputs.iter().zip(dtypes).enumerate() {
+        if let Output::Sum(_) = output {
+            let total: f64 = sums.iter().map(|sums| sums[i]).sum();
+            results[i] = match dtype {
+                DType::F32 => Values::Single(vec![total as f32]),
+                _ => Values::Double(vec![total]),
+            };
+        }
+    }
+    results
+}
+
+/// As [`Source`], before the kept inputs have stopped moving.
+enum Place<'a, T> {
+    Single(T),
+    Lent(&'a [T]),
+    Kept(usize),
+    Reused(usize),
+}
+
+struct Machine<'a, T> {
+    program: &'a Elementwise,
+    sources: Vec<Source<'a, T>>,
+}
+
+impl<T: Real> Machine<'_, T> {
+    /// Runs the program on some entries; returns the sums by output, zero for other outputs.
+    fn run(&self, entries: std::ops::Range<usize>, targets: &mut [Option<Target>]) -> Vec<f64> {
+        let inputs = self.sources.len();
+        let block = BLOCK.min(entries.len());
+        let mut registers = vec![T::zero(); (inputs + self.program.instructions.len()) * block];
+        for (register, source) in registers.chunks_mut(block).zip(&self.sources) {
+            if let Source::Single(value) = source {
+                register.fill(*value);
+            }
+        }
+        let mut sums = vec![0.0; targets.len()];
+        for start in entries.clone().step_by(block) {
+            let size = block.min(entries.end - start);
+            let within = start - entries.start;
+            for (register, source) in registers.chunks_mut(block).zip(&self.sources) {
+                if let Source::Reused(output) = source
+                    && let Some(target) = &targets[*output]
+                {
+                    target.read(within, &mut register[..size]);
+                }
+            }
+            for (number, instruction) in self.program.instructions.iter().enumerate() {
+                let (before, rest) = registers.split_at_mut((inputs + number) * block);
+                let operand = |i: usize| self.operand(i, before, block, start, size);
+                compute(*instruction, &mut rest[..size], operand);
+            }
+            for (output, (target, total)) in
+                (self.program.outputs.iter()).zip(targets.iter_mut().zip(&mut sums))
+            {
+                match (output, target) {
+                    (Output::Values(i), Some(target)) => {
+                        target.write(within, self.operand(*i, &registers, block, start, size));
+                    }
+                    (Output::Sum(i), _) => {
+                        *total += sum(self.operand(*i, &registers, block, start, size));
+                    }
+                    (Output::Values(_), None) => {}
+                }
+            }
+        }
+        sums
+    }
+
+    fn operand<'b>(
+        &'b self,
+        i: usize,
+        registers: &'b [T],
+        block: usize,
+        start: usize,
+        size: usize,
+    ) -> &'b [T] {
+        match self.sources.get(i) {
+            Some(Source::Lent(values)) => &values[start..start + size],
+            _ => &registers[i * block..][..size],
+        }
+    }
+}
+
+fn compute<'a, T: Real>(
+    instruction: Instruction,
+    result: &mut [T],
+    operand: impl Fn(usize) -> &'a [T],
+) {
+    let unary = |result: &mut [T], a: usize, f: &dyn Fn(&mut [T], &[T])| f(result, operand(a));
+    let binary = |result: &mut [T], a: usize, b: usize, f: &dyn Fn(&mut [T], &[T], &[T])| {
+        f(result, operand(a), operand(b));
+    };
+    // One loop for each operation, so that each is compiled to vector instructions.
+    macro_rules! two {
+        ($a:ident, $b:ident, $x:ident $op:tt $y:ident) => {
+            binary(result, $a, $b, &|r, a, b| {
+                for (r, (&$x, &$y)) in r.iter_mut().zip(a.iter().zip(b)) {
+                    *r = $x $op $y;
+                }
+            })
+        };
+    }
+    macro_rules! one {
+        ($a:ident, $x:ident $op:tt $number:ident) => {{
+            let number = T::of($number);
+            unary(result, $a, &|r, a| {
+                for (r, &$x) in r.iter_mut().zip(a) {
+                    *r = $x $op number;
+                }
+            })
+        }};
+    }
+    match instruction {
+        Instruction::Add(a, b) => two!(a, b, x + y),
+        Instruction::Sub(a, b) => two!(a, b, x - y),
+        Instruction::Mul(a, b) => two!(a, b, x * y),
+        Instruction::Div(a, b) => two!(a, b, x / y),
+        Instruction::AddNumber(a, number) => one!(a, x + number),
+        Instruction::MulNumber(a, number) => one!(a, x * number),
+        Instruction::DivNumber(a, number) => one!(a, x / number),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `(a + b s) / a` and its sum, and `b` in single precision.
+    fn program() -> Elementwise {
+        Elementwise {
+            instructions: vec![
+                Instruction::Mul(1, 2),
+                Instruction::Add(0, 3),
+                Instruction::Div(4, 0),
+                Instruction::MulNumber(5, 2.0),
+            ],
+            outputs: vec![Output::Values(5), Output::Sum(6), Output::Values(1)],
+        }
+    }
+
+    fn vectors(len: usize) -> (Vec<f64>, Vec<f64>) {
+        let wave = |a: f64| move |i: usize| 1.5 + (a * i as f64).sin();
+        (
+            (0..len).map(wave(0.3)).collect(),
+            (0..len).map(wave(1.7)).collect(),
+        )
+    }
+
+    #[test]
+    fn every_length_and_every_owner_gives_the_same() {
+        for len in [2, BLOCK - 1, BLOCK + 3, CHUNK, 3 * CHUNK + 17] {
+            let (a, b) = vectors(len);
+            let expected: Vec<f64> = a.iter().zip(&b).map(|(a, b)| (a + b * 0.25) / a).collect();
+            let total: f64 = expected.iter().map(|x| 2.0 * x).sum();
+            let single: Vec<f32> = b.iter().map(|&b| b as f32).collect();
+            for given in [false, true] {
+                let operand = |x: &'static [f64]| {
+                    if given {
+                        Operand::Given(x.to_vec())
+                    } else {
+                        Operand::Lent(x)
+                    }
+                };
+                let leak = |x: &[f64]| -> &'static [f64] { Vec::leak(x.to_vec()) };
+                let operands = vec![operand(leak(&a)), operand(leak(&b)), operand(leak(&[0.25]))];
+                let dtypes = [DType::F64, DType::F64, DType::F32];
+                let results = run(&program(), operands, &dtypes);
+                assert_eq!(
+                    results[0],
+                    Values::Double(expected.clone()),
+                    "{len} {given}"
+                );
+                assert_eq!(results[2], Values::Single(single.clone()), "{len} {given}");
+                let Values::Double(sum) = &results[1] else {
+                    panic!("the sum has the wrong precision");
+                };
+                assert!((sum[0] - total).abs() < 1e-12 * total, "{} {total}", sum[0]);
+            }
+        }
+    }
+
+    #[test]
+    fn results_do_not_depend_on_the_number_of_threads() {
+        let (a, b) = vectors(5 * CHUNK);
+        let a: Vec<f32> = a.iter().map(|&a| a as f32).collect();
+        let b: Vec<f32> = b.iter().map(|&b| b as f32).collect();
+        let results = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
+            let operands = vec![
+                Operand::Lent(&a[..]),
+                Operand::Lent(&b[..]),
+                Operand::Lent(&[0.5]),
+            ];
+            pool.install(|| run(&program(), operands, &[DType::F32, DType::F32, DType::F64]))
+        };
+        assert_eq!(results(1), results(3));
+    }
+}
