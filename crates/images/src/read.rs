@@ -88,12 +88,15 @@ pub fn read(path: impl AsRef<Path>) -> Result<Image, Error> {
         path: path.into(),
         problem,
     };
-    let mut bytes = Vec::new();
     let file = File::open(path).map_err(io)?;
-    file.take(LARGEST_FILE + 1)
-        .read_to_end(&mut bytes)
-        .map_err(io)?;
-    if bytes.len() as u64 > LARGEST_FILE {
+    let mut length = file.metadata().map_err(io)?.len();
+    let mut bytes = Vec::new();
+    if length <= LARGEST_FILE {
+        // What is no ordinary file does not tell its length.
+        let read = file.take(LARGEST_FILE + 1).read_to_end(&mut bytes);
+        length = read.map_err(io)? as u64;
+    }
+    if length > LARGEST_FILE {
         return Err(format(FormatError::TooLong {
             limit: LARGEST_FILE,
         }));
