@@ -87,7 +87,7 @@ pub fn zero_level(field: &Field<2>, interpolation: Interpolation) -> Vec<Polylin
 /// As [`zero_level`], for values at the nodes of any lattice that is not stored as a [`Field`]:
 /// one that is not square or not evenly spaced, such as the pixels of an image.
 ///
-/// `value` gives the value at a node, by its index along both axes. `crossing` gives the point
+/// `value` gives the value at a node, by its index along both axes; the second runs fastest. `crossing` gives the point
 /// where the line from `a` at a node to `b` at the next node along `axis` is zero, which is the
 /// fraction `a / (a - b)` of the way; `a` and `b` are the values or, by the interpolation, their
 /// `atanh`.
@@ -157,14 +157,21 @@ where
     fn segments(&self) -> BTreeMap<usize, usize> {
         let [rows, columns] = self.shape;
         let mut next = BTreeMap::new();
+        // Every value is asked for once, unless the curve is near.
+        let row = |i: usize| -> Vec<bool> {
+            let values = (0..columns).map(|j| (self.value)([i, j]) > 0.0);
+            values.collect()
+        };
+        let mut above = if rows > 0 { row(0) } else { Vec::new() };
         for i in 0..rows.saturating_sub(1) {
+            let below = std::mem::replace(&mut above, row(i + 1));
             for j in 0..columns.saturating_sub(1) {
-                // Corners and the edges that follow them, counter-clockwise.
-                let corners = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
-                let inside = corners.map(|c| (self.value)(c) > 0.0);
+                let inside = [below[j], above[j], above[j + 1], below[j + 1]];
                 if inside == [inside[0]; 4] {
                     continue;
                 }
+                // Corners and the edges that follow them, counter-clockwise.
+                let corners = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
                 let edges = [
                     self.edge(corners[0], 0),
                     self.edge(corners[1], 1),

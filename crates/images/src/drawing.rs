@@ -9,6 +9,8 @@ use crate::{Error, Frame};
 
 /// Pixels at an edge are cut into this many parts along both axes.
 const PARTS: u32 = 4;
+/// Rows drawn at once.
+const BAND: usize = 16;
 
 /// Shapes drawn one over the other, on white or on nothing.
 ///
@@ -83,43 +85,69 @@ impl<'a> Drawing<'a> {
     /// If the frame is too large, which it was checked not to be.
     pub fn picture(&self) -> Result<Picture, Error> {
         let [width, height] = [self.frame.width(), self.frame.height()];
-        let pixels: Vec<[u8; 4]> = (0..width * height)
-            .into_par_iter()
-            .map(|index| self.pixel([index % width, index / width]))
-            .collect();
+        let mut pixels = vec![[0; 4]; width as usize * height as usize];
+        pixels
+            .par_chunks_mut(BAND * width as usize)
+            .enumerate()
+            .for_each(|(band, pixels)| self.band(BAND * band, pixels));
         Ok(Picture::new(width, height, pixels)?)
     }
 
-    fn pixel(&self, place: [u32; 2]) -> [u8; 4] {
+    /// Some whole rows.
+    fn band(&self, first: usize, pixels: &mut [[u8; 4]]) {
+        let width = self.frame.width() as usize;
         // Colour times opacity, and opacity.
-        let mut sum = self.paper;
+        let mut sums = vec![self.paper; pixels.len()];
         for layer in &self.layers {
-            let opacity = layer.coverage(&self.frame, place.map(f64::from));
-            let Rgb(r, g, b) = layer.colour;
-            let colour = [r, g, b, 255].map(|v| opacity * f64::from(v) / 255.0);
-            sum = std::array::from_fn(|c| colour[c] + (1.0 - opacity) * sum[c]);
+            let corners = layer.corners(&self.frame, first, pixels.len() / width);
+            for (index, sum) in sums.iter_mut().enumerate() {
+                let [column, row] = [index % width, index / width];
+                let corner = row * (width + 1) + column;
+                let around = [0, 1, width + 1, width + 2].map(|k| corners[corner + k]);
+                let place = [column as f64, (first + row) as f64];
+                let opacity = layer.coverage(&self.frame, place, around);
+                let Rgb(r, g, b) = layer.colour;
+                let colour = [r, g, b, 255].map(|v| opacity * f64::from(v) / 255.0);
+                *sum = std::array::from_fn(|c| colour[c] + (1.0 - opacity) * sum[c]);
+            }
         }
-        let opacity = sum[3];
         let byte = |v: f64| (255.0 * v).round() as u8;
-        if byte(opacity) == 0 {
-            return [0; 4];
+        for (pixel, [r, g, b, opacity]) in pixels.iter_mut().zip(sums) {
+            *pixel = match byte(opacity) {
+                0 => [0; 4],
+                alpha => {
+                    let [r, g, b] = [r, g, b].map(|v| byte(v / opacity));
+                    [r, g, b, alpha]
+                }
+            };
         }
-        let [r, g, b, _] = sum.map(|v| byte(v / opacity));
-        [r, g, b, byte(opacity)]
     }
 }
 
 impl Layer<'_> {
-    /// The covered part of the pixel with the given upper left corner.
-    fn coverage(&self, frame: &Frame, [column, row]: [f64; 2]) -> f64 {
+    /// Distances at the corners of the pixels of some rows.
+    fn corners(&self, frame: &Frame, first: usize, rows: usize) -> Vec<f64> {
+        let columns = 0..=frame.width();
+        let row = |row: usize| {
+            let place = move |column: u32| [f64::from(column), row as f64];
+            columns.clone().map(place)
+        };
+        let places = (first..=first + rows).flat_map(row);
+        places
+            .map(|place| self.shape.signed_distance(frame.point(place)))
+            .collect()
+    }
+
+    /// The covered part of the pixel with the given upper left corner, and distances at all four.
+    fn coverage(&self, frame: &Frame, [column, row]: [f64; 2], corners: [f64; 4]) -> f64 {
         let side = frame.pixel();
         let s = |x: [f64; 2]| self.shape.signed_distance(x);
-        // Half a diagonal is 0.71 sides; distances from phase fields are not quite exact.
+        // Nothing is near: a point in the pixel is at most 0.71 sides from a corner. Fields that have
+        // lost their profile may be steep, so that only the signs tell.
         let reach = side + self.half_width.unwrap_or(0.0);
-        let centre = s(frame.point([column + 0.5, row + 0.5]));
-        if centre.abs() > reach {
-            let inside = centre < 0.0 && self.half_width.is_none();
-            return f64::from(u8::from(inside));
+        let [inside, outside] = [-1.0, 1.0].map(|sign| corners.iter().all(|s| sign * s > reach));
+        if inside || outside {
+            return f64::from(u8::from(inside && self.half_width.is_none()));
         }
         let part = side / f64::from(PARTS);
         let step = 0.25 * part;

@@ -3,6 +3,7 @@
 use geometry::Field;
 use geometry::contour::{Interpolation, Polyline, zero_level_of};
 use geometry::measure::BoundingBox;
+use rayon::prelude::*;
 
 use crate::{Error, Image, Placement, Side};
 
@@ -73,7 +74,8 @@ impl Outline {
         let depth = |pixel: usize| side.depth(image.pixel(pixel));
         let pixels = width * height;
 
-        let inside = (0..pixels).filter(|&p| depth(p) > 0.0).count();
+        let inside = (0..pixels).into_par_iter().filter(|&p| depth(p) > 0.0);
+        let inside = inside.count();
         if inside == 0 || inside == pixels {
             let values = (0..pixels).map(|p| side.value(image.pixel(p)));
             let (low, high) = range(values);
@@ -94,13 +96,14 @@ impl Outline {
                 }
             });
         }
-        let changes = |pixel: usize| {
-            let here = depth(pixel) > 0.0;
-            let right = pixel % width + 1 < width && here != (depth(pixel + 1) > 0.0);
-            let down = pixel + width < pixels && here != (depth(pixel + width) > 0.0);
-            usize::from(right) + usize::from(down)
+        let changes = |row: usize| {
+            let sides =
+                |row: usize| (row * width..(row + 1) * width).map(|pixel| depth(pixel) > 0.0);
+            let right = sides(row).zip(sides(row).skip(1)).filter(|(a, b)| a != b);
+            let below = sides(row).zip(sides((row + 1).min(height - 1)));
+            right.count() + below.filter(|(a, b)| a != b).count()
         };
-        let segments = (0..pixels).map(changes).sum();
+        let segments = (0..height).into_par_iter().map(changes).sum();
         if segments > LARGEST_OUTLINE {
             return Err(Error::Noise {
                 segments,
@@ -108,24 +111,24 @@ impl Outline {
             });
         }
 
-        // Nodes are the centres of the pixels, and the edges of the image before and after them.
-        let size = [width, height];
+        // Nodes are the centres of the pixels, and the edges of the image before and after them. The
+        // first axis points down and the second to the right: the plane, turned by a right angle.
+        let size = [height, width];
         let coordinate = |axis: usize, node: usize| match node {
             0 => 0.0,
             _ if node > size[axis] => size[axis] as f64,
             _ => node as f64 - 0.5,
         };
         let value = |node: [usize; 2]| {
-            let [x, y] = [0, 1].map(|axis| node[axis].clamp(1, size[axis]) - 1);
-            // Rows are stored from the top.
-            depth((height - 1 - y) * width + x)
+            let [row, column] = [0, 1].map(|axis| node[axis].clamp(1, size[axis]) - 1);
+            depth(row * width + column)
         };
-        Self::new(closed_curves(
-            [width + 2, height + 2],
-            value,
-            coordinate,
-            Interpolation::Value,
-        ))
+        let nodes = size.map(|n| n + 2);
+        let mut curves = closed_curves(nodes, value, coordinate, Interpolation::Value);
+        for point in curves.iter_mut().flat_map(|curve| &mut curve.points) {
+            *point = [point[1], height as f64 - point[0]];
+        }
+        Self::new(curves)
     }
 
     /// The interface of a phase field: marching squares on `atanh u`, as

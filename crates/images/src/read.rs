@@ -71,8 +71,8 @@ pub enum FormatError {
 /// Colours become grey by the luma of JPEG, `0.299 R + 0.587 G + 0.114 B` of the stored values.
 /// Colour profiles are passed over. Images that Exif says are turned or mirrored are set upright.
 ///
-/// Memory: at most [`LARGEST_IMAGE`] pixels are read, with up to 16 bytes each while
-/// decoding; the size is checked before anything is decoded.
+/// Memory: at most [`LARGEST_IMAGE`] pixels are read, with up to 16 bytes each while decoding beside
+/// those of the file; the size is checked before anything is decoded.
 ///
 /// # Errors
 /// [`Error::Geometry`] if the file cannot be read; [`Error::Format`] for everything that is wrong

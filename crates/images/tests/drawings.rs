@@ -9,7 +9,7 @@ use std::fs;
 
 use common::{Raster, disc, near, square};
 use geometry::shapes::{Ball, Cuboid};
-use geometry::{Grid, Rotation, SignedDistance, SignedDistanceExt, phase_field};
+use geometry::{Field, Grid, Rotation, SignedDistance, SignedDistanceExt, phase_field};
 use images::{
     Drawing, Frame, Image, Inside, Interface, Outline, OutlineDistance, Placement, Side, Svg,
     Threshold, decode,
@@ -168,6 +168,25 @@ fn images_survive_the_way_through_a_phase_field() {
         println!("  outlines {apart:.3} pixels apart");
         assert_eq!(b.curves().len(), 3);
         assert!(apart < 0.5, "{apart}");
+    }
+}
+
+#[test]
+fn edges_of_steep_fields_are_smooth_too() {
+    // No profile at all: the distance jumps by 49 eps from node to node.
+    let grid = Grid::<2>::centred(50, 1.0).unwrap();
+    let u = Field::from_fn(grid, |[x, y]| {
+        let within = x.abs().max(y.abs()) < 0.301;
+        if within { 1.0 } else { -1.0 }
+    });
+    let interface = Interface::new(&u, 0.04).unwrap();
+    // Nodes at 0.3 and 0.32: the interface is between them, three quarters up a pixel.
+    let frame = Frame::new(100, 100, [-0.5025, 0.5025], 0.01).unwrap();
+    let drawn = picture(&Drawing::on_white(frame).filled(&interface, Rgb::BLACK));
+    assert_eq!(drawn.pixel(50, 50), [0, 0, 0, 255]);
+    for x in [40, 50, 60] {
+        let edge = drawn.pixel(x, 19)[0];
+        assert!((60..=68).contains(&edge), "{edge}");
     }
 }
 

@@ -321,6 +321,26 @@ fn every_kind_of_jpeg_is_read() {
     }
 }
 
+#[test]
+fn what_follows_an_image_does_not_matter() {
+    let raster = Raster::new([64, 48], 4, disc([25.0, 20.0], 15.0));
+    for progressive in [false, true] {
+        let file = jpeg(raster.size, Jpeg::Luma, progressive, &raster.bytes());
+        let expected = decode(&file).unwrap();
+        // Cameras append a second picture, programs whatever they like.
+        for tail in [&file[..], b"\0\0\0", b"\xff\xff", b"some text"] {
+            let longer = [&file[..], tail].concat();
+            assert_eq!(decode(&longer).as_ref(), Ok(&expected), "{progressive}");
+        }
+        // Without its end marker a file is not complete, or has all pixels nevertheless.
+        for missing in 1..40 {
+            if let Ok(image) = decode(&file[..file.len() - missing]) {
+                assert_eq!(image, expected, "{progressive}: {missing} bytes less");
+            }
+        }
+    }
+}
+
 /// Exif data that tells the orientation.
 fn exif(value: u8, little: bool) -> Vec<u8> {
     if little {
