@@ -26,21 +26,26 @@ impl OutlineDistance {
         }
     }
 
-    /// Whether a ray to the left crosses the curves an odd number of times.
+    /// Whether a ray to the left or right, to where the bounding box is nearer, crosses the curves an
+    /// odd number of times.
     fn is_inside(&self, [x, y]: [f64; 2]) -> bool {
         let bounds = self.segments.root().envelope();
         if !bounds.contains_point(&[x, y]) {
             return false;
         }
-        let ray = AABB::from_corners([bounds.lower()[0], y], [x, y]);
+        let (left, right) = (bounds.lower()[0], bounds.upper()[0]);
+        let leftwards = x - left < right - x;
+        let end = if leftwards { left } else { right };
+        let ray = AABB::from_corners([end, y], [x, y]);
         let crossed =
             self.segments
                 .locate_in_envelope_intersecting(ray)
                 .filter(|Line { from, to }| {
                     // The lower end belongs to a segment, the upper one does not: every corner counts
                     // once.
-                    (from[1] > y) != (to[1] > y)
-                        && from[0] + (y - from[1]) / (to[1] - from[1]) * (to[0] - from[0]) < x
+                    let across = (from[1] > y) != (to[1] > y);
+                    let at = from[0] + (y - from[1]) / (to[1] - from[1]) * (to[0] - from[0]);
+                    across && (at < x) == leftwards
                 });
         crossed.count() % 2 == 1
     }

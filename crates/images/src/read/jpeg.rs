@@ -58,5 +58,6 @@ fn unusual(message: &str) -> FormatError {
 
 #[allow(clippy::needless_pass_by_value, reason = "for map_err")]
 fn refused(error: DecodeErrors) -> FormatError {
-    unusual(&one_line(&error.to_string()))
+    // Some messages come in quotation marks.
+    unusual(one_line(&error.to_string()).trim_matches('"'))
 }
