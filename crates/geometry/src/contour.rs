@@ -71,7 +71,39 @@ impl Polyline {
 /// sign of the mean of the corners decides whether they are joined. Open curves come first,
 /// then closed ones, in the order of their first grid edge.
 pub fn zero_level(field: &Field<2>, interpolation: Interpolation) -> Vec<Polyline> {
-    let next = segments(field, interpolation);
+    let (grid, v) = (field.grid(), field.values());
+    zero_level_of(
+        grid.shape(),
+        |node| v[grid.index(node)],
+        interpolation,
+        |node, axis, [a, b]| {
+            let mut point = [0, 1].map(|axis| grid.coordinate(axis, node[axis]));
+            point[axis] += grid.spacing() * a / (a - b);
+            point
+        },
+    )
+}
+
+/// As [`zero_level`], for values at the nodes of any lattice that is not stored as a [`Field`]:
+/// one that is not square or not evenly spaced, such as the pixels of an image.
+///
+/// `value` gives the value at a node, by its index along both axes; the second runs fastest. `crossing` gives the point
+/// where the line from `a` at a node to `b` at the next node along `axis` is zero, which is the
+/// fraction `a / (a - b)` of the way; `a` and `b` are the values or, by the interpolation, their
+/// `atanh`.
+pub fn zero_level_of(
+    shape: [usize; 2],
+    value: impl Fn([usize; 2]) -> f64,
+    interpolation: Interpolation,
+    crossing: impl Fn([usize; 2], usize, [f64; 2]) -> [f64; 2],
+) -> Vec<Polyline> {
+    let lattice = Lattice {
+        shape,
+        value,
+        interpolation,
+        crossing,
+    };
+    let next = lattice.segments();
     let mut open: BTreeMap<usize, usize> = next.clone();
     for end in next.values() {
         open.remove(end);
@@ -79,89 +111,109 @@ pub fn zero_level(field: &Field<2>, interpolation: Interpolation) -> Vec<Polylin
     let mut rest = next;
     let mut curves = Vec::new();
     for &start in open.keys() {
-        curves.push(trace(field, interpolation, &mut rest, start));
+        curves.push(lattice.trace(&mut rest, start));
     }
     while let Some((&start, _)) = rest.first_key_value() {
-        curves.push(trace(field, interpolation, &mut rest, start));
+        curves.push(lattice.trace(&mut rest, start));
     }
     curves.retain(|curve| curve.points.len() > 1);
     curves
 }
 
-/// Follows a curve from the crossed edge `start`, removing its segments.
-fn trace(
-    field: &Field<2>,
+/// Nodes in rows and columns. Edge `2 i + axis` goes from the `i`-th node, row-major, along `axis`.
+struct Lattice<V, C> {
+    shape: [usize; 2],
+    value: V,
     interpolation: Interpolation,
-    next: &mut BTreeMap<usize, usize>,
-    start: usize,
-) -> Polyline {
-    let mut points = vec![crossing(field, interpolation, start)];
-    let mut edge = start;
-    let mut closed = false;
-    while let Some(following) = next.remove(&edge) {
-        closed = following == start;
-        if !closed {
-            points.push(crossing(field, interpolation, following));
-        }
-        edge = following;
-    }
-    // Neighbouring edges that are crossed at a common node give the same point.
-    points.dedup();
-    if closed && points.len() > 1 && points.first() == points.last() {
-        points.pop();
-    }
-    Polyline { points, closed }
+    crossing: C,
 }
 
-/// The directed segments, from crossed edge to crossed edge.
-///
-/// Edge `2 i + axis` goes from node `i` along `axis`.
-fn segments(field: &Field<2>, interpolation: Interpolation) -> BTreeMap<usize, usize> {
-    let (grid, v) = (field.grid(), field.values());
-    let mut next = BTreeMap::new();
-    for i in 0..grid.cells() - 1 {
-        for j in 0..grid.cells() - 1 {
-            // Corners and the edges that follow them, counter-clockwise.
-            let corners = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]].map(|c| grid.index(c));
-            let edges = [
-                2 * corners[0],
-                2 * corners[1] + 1,
-                2 * corners[3],
-                2 * corners[0] + 1,
-            ];
-            let inside = corners.map(|c| v[c] > 0.0);
-            if inside == [inside[0]; 4] {
-                continue;
+impl<V, C> Lattice<V, C>
+where
+    V: Fn([usize; 2]) -> f64,
+    C: Fn([usize; 2], usize, [f64; 2]) -> [f64; 2],
+{
+    /// Follows a curve from the crossed edge `start`, removing its segments.
+    fn trace(&self, next: &mut BTreeMap<usize, usize>, start: usize) -> Polyline {
+        let mut points = vec![self.point(start)];
+        let mut edge = start;
+        let mut closed = false;
+        while let Some(following) = next.remove(&edge) {
+            closed = following == start;
+            if !closed {
+                points.push(self.point(following));
             }
-            let sum: f64 = corners.iter().map(|&c| interpolation.apply(v[c])).sum();
-            for k in (0..4).filter(|&k| inside[k] && !inside[(k + 1) % 4]) {
-                // The border leaves the inside at edge k. Joined insides: the curve cuts off the
-                // outer corner ahead and ends where the border enters again; else it goes back to
-                // where the border entered.
-                let enters = |&l: &usize| !inside[l % 4] && inside[(l + 1) % 4];
-                let mut ahead = k + 1..k + 4;
-                let entry = if sum > 0.0 {
-                    ahead.find(enters)
-                } else {
-                    ahead.rev().find(enters)
-                };
-                let entry = entry.expect("a border that leaves the inside enters it again");
-                next.insert(edges[k], edges[entry % 4]);
+            edge = following;
+        }
+        // Neighbouring edges that are crossed at a common node give the same point.
+        points.dedup();
+        if closed && points.len() > 1 && points.first() == points.last() {
+            points.pop();
+        }
+        Polyline { points, closed }
+    }
+
+    /// The directed segments, from crossed edge to crossed edge.
+    fn segments(&self) -> BTreeMap<usize, usize> {
+        let [rows, columns] = self.shape;
+        let mut next = BTreeMap::new();
+        // Every value is asked for once, unless the curve is near.
+        let row = |i: usize| -> Vec<bool> {
+            let values = (0..columns).map(|j| (self.value)([i, j]) > 0.0);
+            values.collect()
+        };
+        let mut above = if rows > 0 { row(0) } else { Vec::new() };
+        for i in 0..rows.saturating_sub(1) {
+            let below = std::mem::replace(&mut above, row(i + 1));
+            for j in 0..columns.saturating_sub(1) {
+                let inside = [below[j], above[j], above[j + 1], below[j + 1]];
+                if inside == [inside[0]; 4] {
+                    continue;
+                }
+                // Corners and the edges that follow them, counter-clockwise.
+                let corners = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
+                let edges = [
+                    self.edge(corners[0], 0),
+                    self.edge(corners[1], 1),
+                    self.edge(corners[3], 0),
+                    self.edge(corners[0], 1),
+                ];
+                let sum: f64 = corners.into_iter().map(|c| self.interpolated(c)).sum();
+                for k in (0..4).filter(|&k| inside[k] && !inside[(k + 1) % 4]) {
+                    // The border leaves the inside at edge k. Joined insides: the curve cuts off
+                    // the outer corner ahead and ends where the border enters again; else it goes
+                    // back to where the border entered.
+                    let enters = |&l: &usize| !inside[l % 4] && inside[(l + 1) % 4];
+                    let mut ahead = k + 1..k + 4;
+                    let entry = if sum > 0.0 {
+                        ahead.find(enters)
+                    } else {
+                        ahead.rev().find(enters)
+                    };
+                    let entry = entry.expect("a border that leaves the inside enters it again");
+                    next.insert(edges[k], edges[entry % 4]);
+                }
             }
         }
+        next
     }
-    next
-}
 
-/// Where the interface crosses an edge.
-fn crossing(field: &Field<2>, interpolation: Interpolation, edge: usize) -> [f64; 2] {
-    let (grid, v) = (field.grid(), field.values());
-    let (node, axis) = (edge / 2, edge % 2);
-    let a = interpolation.apply(v[node]);
-    let b = interpolation.apply(v[node + grid.stride(axis)]);
-    let mut point = grid.node(node);
-    point[axis] += grid.spacing() * a / (a - b);
-    point
+    fn edge(&self, [i, j]: [usize; 2], axis: usize) -> usize {
+        2 * (i * self.shape[1] + j) + axis
+    }
+
+    fn interpolated(&self, node: [usize; 2]) -> f64 {
+        self.interpolation.apply((self.value)(node))
+    }
+
+    /// Where the interface crosses an edge.
+    fn point(&self, edge: usize) -> [f64; 2] {
+        let (index, axis) = (edge / 2, edge % 2);
+        let node = [index / self.shape[1], index % self.shape[1]];
+        let mut end = node;
+        end[axis] += 1;
+        (self.crossing)(node, axis, [node, end].map(|n| self.interpolated(n)))
+    }
 }
 
 /// Distance along a ray from `start` at which a phase field first changes sign.

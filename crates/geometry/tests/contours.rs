@@ -183,3 +183,38 @@ fn rays_report_what_they_do_not_find() {
         );
     }
 }
+
+#[test]
+fn lattices_need_be_neither_square_nor_even() {
+    // A disc on a lattice whose second axis gets coarser upwards.
+    let coordinates: [Vec<f64>; 2] = [
+        (0..=40)
+            .map(|i| -1.0 + 0.05 * f64::from(i))
+            .collect::<Vec<f64>>(),
+        (0..=25)
+            .map(|j| -1.0 + 0.0032 * f64::from(j * j))
+            .collect::<Vec<f64>>(),
+    ];
+    let at = |node: [usize; 2]| [0, 1].map(|axis| coordinates[axis][node[axis]]);
+    let curves = geometry::contour::zero_level_of(
+        [41, 26],
+        |node| {
+            let [x, y] = at(node);
+            0.6 - x.hypot(y)
+        },
+        Interpolation::Value,
+        |node, axis, [a, b]| {
+            let mut point = at(node);
+            let step = coordinates[axis][node[axis] + 1] - point[axis];
+            point[axis] += step * a / (a - b);
+            point
+        },
+    );
+    assert_eq!(curves.len(), 1);
+    assert!(curves[0].closed);
+    for point in &curves[0].points {
+        assert!((point[0].hypot(point[1]) - 0.6).abs() < 0.01, "{point:?}");
+    }
+    let area = curves[0].signed_area();
+    assert!((area - 0.36 * std::f64::consts::PI).abs() < 0.01, "{area}");
+}

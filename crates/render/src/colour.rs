@@ -13,6 +13,10 @@ impl Rgb {
     pub const VERMILLION: Self = Self(213, 94, 0);
     /// Near-black, for lines.
     pub const INK: Self = Self(40, 40, 44);
+    /// Bluish green of the same palette.
+    pub const GREEN: Self = Self(0, 158, 115);
+    /// Black.
+    pub const BLACK: Self = Self(0, 0, 0);
     /// White.
     pub const WHITE: Self = Self(255, 255, 255);
 

@@ -70,6 +70,6 @@ pub use camera::{Axis, Bounds, Camera, Framing, Projection};
 pub use colour::Rgb;
 pub use error::Error;
 pub use light::{Lighting, Material};
-pub use picture::Picture;
+pub use picture::{LARGEST_SIDE, Picture};
 pub use scene::{Background, Quality, Scene, Size};
 pub use tube::Tube;

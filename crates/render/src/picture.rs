@@ -10,7 +10,7 @@ use crate::animation::encode as encode_png;
 use crate::colour::{Rgb, decode, encode};
 
 /// Largest side of a picture, in pixels.
-const LARGEST_SIDE: u32 = 8192;
+pub const LARGEST_SIDE: u32 = 8192;
 
 /// Accepts sizes that can be drawn.
 pub(crate) fn checked(size: [u32; 2]) -> Result<[u32; 2], Error> {

@@ -1,0 +1,87 @@
+//! Which part of the plane a drawing shows, and how large its pixels are.
+
+use geometry::Grid;
+
+use crate::error::{positive, require};
+use crate::{Error, Image, Placement};
+
+/// A raster of square pixels in the plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    size: [u32; 2],
+    upper_left: [f64; 2],
+    pixel: f64,
+}
+
+impl Frame {
+    /// A raster of `width` times `height` pixels of side `pixel`, by its upper left corner.
+    ///
+    /// # Errors
+    /// There must be from one to [`render::LARGEST_SIDE`] pixels a side; the numbers must be
+    /// finite, the pixels of positive side.
+    pub fn new(width: u32, height: u32, upper_left: [f64; 2], pixel: f64) -> Result<Self, Error> {
+        let size = [width, height];
+        if !size.iter().all(|n| (1..=render::LARGEST_SIDE).contains(n)) {
+            return Err(Error::Picture(render::Error::PictureSize {
+                width,
+                height,
+                limit: render::LARGEST_SIDE,
+            }));
+        }
+        for x in upper_left {
+            require("coordinate of the corner", x, "finite", |_| true)?;
+        }
+        Ok(Self {
+            size,
+            upper_left,
+            pixel: positive("side of a pixel", pixel)?,
+        })
+    }
+
+    /// The box of a grid, with that many pixels a side.
+    ///
+    /// # Errors
+    /// As [`Frame::new`].
+    pub fn of_box(grid: &Grid<2>, pixels: u32) -> Result<Self, Error> {
+        let [x, y] = grid.origin();
+        let pixel = grid.side() / f64::from(pixels.max(1));
+        Self::new(pixels, pixels, [x, y + grid.side()], pixel)
+    }
+
+    /// The pixels of an image where it was placed, so that a drawing can lie on the image.
+    ///
+    /// # Errors
+    /// As [`Frame::new`].
+    pub fn of_image(image: &Image, placement: &Placement) -> Result<Self, Error> {
+        let corner = placement.apply([0.0, f64::from(image.height())]);
+        Self::new(image.width(), image.height(), corner, placement.scale())
+    }
+
+    /// Pixels in a row.
+    pub fn width(&self) -> u32 {
+        self.size[0]
+    }
+
+    /// Rows.
+    pub fn height(&self) -> u32 {
+        self.size[1]
+    }
+
+    /// The side of a pixel.
+    pub fn pixel(&self) -> f64 {
+        self.pixel
+    }
+
+    /// The point at `[column, row]` in pixels from the upper left corner, columns to the right and
+    /// rows downwards.
+    pub fn point(&self, [column, row]: [f64; 2]) -> [f64; 2] {
+        let [x, y] = self.upper_left;
+        [x + column * self.pixel, y - row * self.pixel]
+    }
+
+    /// The inverse of [`Frame::point`].
+    pub fn position(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [left, top] = self.upper_left;
+        [(x - left) / self.pixel, (top - y) / self.pixel]
+    }
+}

@@ -1,0 +1,89 @@
+//! Images in and out of phase fields: PNG and JPEG files, outlines, signed distances, drawings.
+//!
+//! ```
+//! use geometry::{Grid, phase_field};
+//! use images::{
+//!     Drawing, Frame, Inside, Interface, Outline, OutlineDistance, Placement, Side, Svg, Threshold,
+//!     read,
+//! };
+//! use render::Rgb;
+//!
+//! fn main() -> Result<(), images::Error> {
+//! #   let folder = tempfile::tempdir().expect("a folder for temporary files");
+//! #   let folder = folder.path();
+//! #   let disc = geometry::shapes::Ball::new([50.0, 40.0], 30.0)?;
+//! #   let frame = Frame::new(100, 80, [0.0, 80.0], 1.0)?;
+//! #   Drawing::on_white(frame).filled(&disc, Rgb::BLACK).picture()?.write_png(folder.join("logo.png"))?;
+//!     // A black disc of radius 30 pixels on white, of 100 times 80 pixels.
+//!     let image = read(folder.join("logo.png"))?;
+//!     let side = Side::of(&image, Inside::Auto, Threshold::default())?;
+//!     let outline = Outline::of_image(&image, side)?;
+//!     println!("{side}, area {:.0} pixels", outline.area()); // 900 pi = 2827.4
+//! #   assert_eq!(format!("{side}, {:.0}", outline.area()), "darker than 0.5000, 2829");
+//!
+//!     // Its phase field in the box (-1,1)^2, the longer side of the image 1.6 long.
+//!     let grid = Grid::<2>::centred(128, 2.0)?;
+//!     let eps = 2.0 * grid.spacing();
+//!     let placement = Placement::fit(&image.bounding_box(), &grid, 1.6, 0.0)?;
+//!     let distance = OutlineDistance::new(&outline.placed(&placement));
+//!     let u = phase_field(grid, &distance, eps)?;
+//!
+//!     // Back in the pixels of the image, and as curves.
+//!     let frame = Frame::of_image(&image, &placement)?;
+//!     let interface = Interface::new(&u, eps)?;
+//!     let drawing = Drawing::transparent(frame).filled(&interface, Rgb::BLACK);
+//!     drawing.picture()?.write_png(folder.join("again.png"))?;
+//!     let curves = Outline::of_phase_field(&u)?;
+//!     Svg::on_white(frame).filled(&curves, Rgb::BLACK).write(folder.join("again.svg"))?;
+//!
+//!     let again = read(folder.join("again.png"))?;
+//!     let side = Side::of(&again, Inside::Auto, Threshold::default())?;
+//!     println!("{side}, area {:.0} pixels", Outline::of_image(&again, side)?.area());
+//! #   let area = Outline::of_image(&again, side)?.area();
+//! #   assert_eq!(format!("{side}, {area:.0}"), "more opaque than 0.5000, 2829");
+//!     Ok(())
+//! }
+//! ```
+//! prints
+//! ```text
+//! darker than 0.5000, area 2829 pixels
+//! more opaque than 0.5000, area 2829 pixels
+//! ```
+//!
+//! # Conventions
+//!
+//! - Pixels are stored row by row from the top. In the plane the second axis points upwards: the
+//!   image fills `[0, width] x [0, height]` until a [`Placement`] puts it into the box of a grid.
+//! - Grey values are compared and mixed as they are stored (sRGB), because edges are blended so by
+//!   drawing programs. A pixel half covered by black on white has the value 0.5.
+//! - Distances are negative inside, phase fields positive. Curves have the inside on their left.
+//! - Outside an image, and outside the box of a grid, is outside: nothing is repeated.
+//! - Everything with a signed distance can be drawn: outlines, the interface of a field, the shapes
+//!   of [`geometry`] and their combinations.
+//! - Same input, same bytes, for any number of threads.
+
+mod distance;
+mod drawing;
+mod error;
+mod frame;
+mod image;
+mod interface;
+mod mask;
+mod outline;
+mod placement;
+mod read;
+mod selection;
+mod svg;
+
+pub use distance::OutlineDistance;
+pub use drawing::Drawing;
+pub use error::Error;
+pub use frame::Frame;
+pub use image::{Image, LARGEST_IMAGE};
+pub use interface::Interface;
+pub use mask::Mask;
+pub use outline::{LARGEST_OUTLINE, Outline};
+pub use placement::Placement;
+pub use read::{FormatError, decode, read};
+pub use selection::{Inside, Side, Threshold};
+pub use svg::Svg;

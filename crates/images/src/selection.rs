@@ -1,0 +1,170 @@
+//! Which pixels of an image are the shape.
+
+use std::fmt;
+
+use crate::error::require;
+use crate::{Error, Image};
+
+/// Which pixels are inside.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Inside {
+    /// The opaque ones if a pixel is less than half opaque; else the dark ones, unless more than
+    /// half of the pixels at the border are dark, and then the light ones.
+    #[default]
+    Auto,
+    /// Those darker than the threshold. What is transparent is seen on white.
+    Dark,
+    /// Those lighter than the threshold. What is transparent is seen on black.
+    Light,
+    /// Those more opaque than the threshold, whatever their colour.
+    Opaque,
+}
+
+/// Where inside and outside are separated, on the scale from 0 (black, transparent) to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Threshold {
+    /// At this value.
+    At(f64),
+    /// At the value that separates two classes of pixels best: it maximises the variance between
+    /// them, and lies in the middle of all that do. N. Otsu: A threshold selection method from
+    /// gray-level histograms. IEEE Trans. Syst. Man Cybern. 9 (1979).
+    Otsu,
+}
+
+impl Default for Threshold {
+    fn default() -> Self {
+        Self::At(0.5)
+    }
+}
+
+/// A side of a threshold: what [`Inside`] and [`Threshold`] mean for a certain image.
+///
+/// Grey values are compared as they are stored, which is evenly spaced for the eye, and not in
+/// light: drawing programs blend edges in stored values, so that a pixel half covered by black on
+/// white has the value 0.5. Values equal to the threshold are outside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Side {
+    /// `1 - opacity (1 - grey)`, the grey value on white, is below the threshold.
+    Dark(f64),
+    /// `opacity grey`, the grey value on black, is above the threshold.
+    Light(f64),
+    /// The opacity is above the threshold.
+    Opaque(f64),
+}
+
+impl Side {
+    /// Decides for an image.
+    ///
+    /// # Errors
+    /// [`Error::InvalidParameter`] unless the threshold is from 0 to 1.
+    pub fn of(image: &Image, inside: Inside, threshold: Threshold) -> Result<Self, Error> {
+        let resolved = |side: fn(f64) -> Self| {
+            let value = match threshold {
+                Threshold::At(value) => require("threshold", value, "from 0 to 1", |v| {
+                    (0.0..=1.0).contains(&v)
+                })?,
+                Threshold::Otsu => otsu(image, side(0.0)),
+            };
+            Ok(side(value))
+        };
+        match inside {
+            Inside::Dark => resolved(Self::Dark),
+            Inside::Light => resolved(Self::Light),
+            Inside::Opaque => resolved(Self::Opaque),
+            Inside::Auto => {
+                let half = |opacity: &[u16]| opacity.iter().any(|&v| v <= u16::MAX / 2);
+                if image.opacity().is_some_and(half) {
+                    return resolved(Self::Opaque);
+                }
+                let dark = resolved(Self::Dark)?;
+                let (mut inside, mut all) = (0_usize, 0_usize);
+                for pixel in image.border() {
+                    inside += usize::from(dark.depth(image.pixel(pixel)) > 0.0);
+                    all += 1;
+                }
+                if 2 * inside > all {
+                    resolved(Self::Light)
+                } else {
+                    Ok(dark)
+                }
+            }
+        }
+    }
+
+    /// The threshold.
+    pub fn threshold(self) -> f64 {
+        let (Self::Dark(threshold) | Self::Light(threshold) | Self::Opaque(threshold)) = self;
+        threshold
+    }
+
+    /// What is compared with the threshold, from grey value and opacity.
+    pub(crate) fn value(self, [grey, opacity]: [f64; 2]) -> f64 {
+        match self {
+            Self::Dark(_) => 1.0 - opacity * (1.0 - grey),
+            Self::Light(_) => opacity * grey,
+            Self::Opaque(_) => opacity,
+        }
+    }
+
+    /// How far the value is on this side: positive inside.
+    pub(crate) fn depth(self, pixel: [f64; 2]) -> f64 {
+        let value = self.value(pixel);
+        match self {
+            Self::Dark(threshold) => threshold - value,
+            Self::Light(threshold) | Self::Opaque(threshold) => value - threshold,
+        }
+    }
+
+    /// The name of what is compared.
+    pub(crate) fn quantity(self) -> &'static str {
+        match self {
+            Self::Dark(_) | Self::Light(_) => "the grey value",
+            Self::Opaque(_) => "the opacity",
+        }
+    }
+}
+
+impl fmt::Display for Side {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (words, threshold) = match self {
+            Self::Dark(threshold) => ("darker than", threshold),
+            Self::Light(threshold) => ("lighter than", threshold),
+            Self::Opaque(threshold) => ("more opaque than", threshold),
+        };
+        write!(f, "{words} {threshold:.4}")
+    }
+}
+
+/// Otsu's threshold for what the side compares; 0.5 if all values are equal.
+fn otsu(image: &Image, side: Side) -> f64 {
+    /// Values are counted in steps of those of 8 bits.
+    const LAST: usize = 255;
+    let mut counts = [0_u32; LAST + 1];
+    for pixel in 0..image.grey().len() {
+        let value = side.value(image.pixel(pixel));
+        counts[((value * LAST as f64).round() as usize).min(LAST)] += 1;
+    }
+    let moment = |(value, &count): (usize, &u32)| value as f64 * f64::from(count);
+    let total: f64 = counts.iter().copied().map(f64::from).sum();
+    let whole: f64 = counts.iter().enumerate().map(moment).sum();
+    let (mut below, mut below_moment) = (0.0, 0.0);
+    let mut best = (0.0, None);
+    for (split, count) in counts.iter().enumerate().take(LAST) {
+        below += f64::from(*count);
+        below_moment += moment((split, count));
+        let above = total - below;
+        if below == 0.0 || above == 0.0 {
+            continue;
+        }
+        let difference = below_moment / below - (whole - below_moment) / above;
+        let variance = below * above * difference * difference;
+        // Between two values that occur the variance is the same, to the last bit.
+        best = match (variance.partial_cmp(&best.0), best.1) {
+            (Some(std::cmp::Ordering::Greater), _) => (variance, Some((split, split))),
+            (Some(std::cmp::Ordering::Equal), Some((first, _))) => (variance, Some((first, split))),
+            _ => best,
+        };
+    }
+    let (first, last) = best.1.unwrap_or((0, LAST - 1));
+    (0.5 * (first + last) as f64 + 0.5) / LAST as f64
+}
