@@ -244,18 +244,17 @@ impl Ensemble {
         partial: &Partial,
         bar: &ProgressBar,
     ) -> Result<Self, Error> {
-        let network_checksum = network.map(checksum);
-        let prepared = network.map(|network| scheme.prepare(network)).transpose()?;
-        let (network, calibration) = match &prepared {
-            Some((network, factors)) => (Some(network), *factors),
-            None => (None, Factors::PAPER),
-        };
-        let params = FlowParams {
+        let mut params = FlowParams {
             eps: EPS,
             mcf_step: STEP,
             newton: NewtonParams::default(),
-            calibration,
+            calibration: Factors::PAPER,
         };
+        let grid = Grid::<2>::per_unit(n, 1.0)?;
+        let (network, factors) = method.prepare(scheme, network, &grid, &params)?;
+        let network = network.as_ref();
+        let network_checksum = network.map(checksum);
+        params.calibration = factors;
         let circles: Vec<Circle> = radii(count)
             .into_iter()
             .enumerate()

@@ -18,7 +18,7 @@ use solver::{FlowParams, NewtonParams};
 use crate::Error;
 use crate::circles::{EPS, Flow, STEP};
 use crate::evolution::{self, Evolution, TimeSteps};
-use crate::method::Method;
+use crate::method::{Method, Scheme};
 use crate::networks::{NetworkOptions, convergence_ratios};
 use crate::options::{RunOptions, resolutions};
 
@@ -75,6 +75,10 @@ pub struct ComparisonOptions {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     pub methods: Vec<Method>,
 
+    /// One scheme alone, where it makes a difference: paper, calibrated or accurate [default: all]
+    #[arg(long, value_name = "NAME", value_enum)]
+    pub scheme: Option<Scheme>,
+
     /// Cells per unit length of the reference, implicit finite elements [default: twice the finest; paper: 2048]
     #[arg(long, value_name = "N")]
     pub reference_n: Option<usize>,
@@ -109,6 +113,7 @@ struct Parameters<'a> {
 struct ErrorRow {
     n: usize,
     method: Method,
+    scheme: Scheme,
     step: usize,
     time: f64,
     l2: f64,
@@ -118,6 +123,7 @@ struct ErrorRow {
 struct StepRow {
     n: usize,
     method: Method,
+    scheme: Scheme,
     reference: bool,
     step: usize,
     time: f64,
@@ -211,7 +217,7 @@ pub fn run(setting: &Setting, options: &ComparisonOptions) -> Result<(), Error> 
     let store = output.subfolder("fields")?;
     let clock = Instant::now();
     let execute = |manifest: &mut Manifest, evolution: &Evolution<2>, what: &str| {
-        let title = format!("{what}{}, n = {}", evolution.method.label(), evolution.n);
+        let title = format!("{what}{}, n = {}", label(evolution), evolution.n);
         let bar = progress.bar(title.clone(), evolution.steps as u64);
         let network: Option<&Network> = network_of(evolution.n);
         let trajectory = manifest.phase(title, || {
@@ -261,7 +267,7 @@ pub fn run(setting: &Setting, options: &ComparisonOptions) -> Result<(), Error> 
 
 fn evolution(
     setting: &Setting,
-    method: Method,
+    (method, scheme): (Method, Scheme),
     n: usize,
     (steps, ratio): (usize, usize),
 ) -> Evolution<2> {
@@ -270,6 +276,7 @@ fn evolution(
         shape: setting.shape.to_owned(),
         flow: setting.flow,
         method,
+        scheme,
         n,
         side: setting.side,
         centre: 0.0,
@@ -284,6 +291,7 @@ fn evolution(
             calibration: solver::Factors::PAPER,
         },
         tau: TimeSteps::Constant(tau),
+        region: None,
         sample_every: 8 * ratio,
         also_sample: [1, 2, 4].map(|k| k * ratio).to_vec(),
         steps: steps * ratio,
@@ -308,8 +316,11 @@ fn plan(
             } else {
                 options.methods.contains(&method)
             };
-            if chosen {
-                runs.push(evolution(setting, method, n, (steps, 1)));
+            if !chosen {
+                continue;
+            }
+            for scheme in method.chosen_schemes(setting.flow, options.scheme) {
+                runs.push(evolution(setting, (method, scheme), n, (steps, 1)));
             }
         }
     }
@@ -320,15 +331,24 @@ fn plan(
 fn reference(setting: &Setting, n: usize, steps: usize) -> Evolution<2> {
     evolution(
         setting,
-        Method::FeImplicit,
+        (Method::FeImplicit, Scheme::Paper),
         n,
         (steps, setting.reference_ratio),
     )
 }
 
+fn label(evolution: &Evolution<2>) -> String {
+    evolution.method.label_in(evolution.scheme)
+}
+
+fn variant(run: &Trajectory) -> (Method, Scheme) {
+    (run.evolution.method, run.evolution.scheme)
+}
+
 impl Comparison<'_> {
     fn sampled(&self) -> Vec<usize> {
-        evolution(self.setting, Method::Hybrid, self.cells[0], (self.steps, 1)).sampled_steps()
+        let any = (Method::Hybrid, Scheme::Paper);
+        evolution(self.setting, any, self.cells[0], (self.steps, 1)).sampled_steps()
     }
 
     fn shown(&self) -> Vec<usize> {
@@ -401,6 +421,7 @@ impl Comparison<'_> {
                 errors.push(ErrorRow {
                     n: run.evolution.n,
                     method: run.evolution.method,
+                    scheme: run.evolution.scheme,
                     step,
                     time: Self::time(step),
                     l2,
@@ -420,6 +441,14 @@ impl Comparison<'_> {
         Ok(())
     }
 
+    /// Methods and schemes that ran, in the order of legends.
+    fn variants(&self) -> impl Iterator<Item = (Method, Scheme)> {
+        let all = Method::ALL
+            .into_iter()
+            .flat_map(|method| Scheme::ALL.map(|scheme| (method, scheme)));
+        all.filter(|wanted| self.runs.iter().any(|run| variant(run) == *wanted))
+    }
+
     fn colour(&self, n: usize) -> usize {
         self.cells.iter().position(|&c| c == n).unwrap_or(0)
     }
@@ -430,7 +459,9 @@ impl Comparison<'_> {
             if self.is_reference_run(run) {
                 continue;
             }
-            let Evolution { n, method, .. } = run.evolution;
+            let Evolution {
+                n, method, scheme, ..
+            } = run.evolution;
             let points: Vec<[f64; 2]> = self
                 .errors(run)?
                 .into_iter()
@@ -438,16 +469,15 @@ impl Comparison<'_> {
                 .collect();
             let k = self.colour(n);
             chart = chart.with_series(
-                Series::new(format!("{}, n = {n}", method.label()), points)
+                Series::new(format!("{}, n = {n}", method.label_in(scheme)), points)
                     .with_colour(k)
-                    .with_style(method.style())
+                    .with_style(method.style_in(scheme))
                     .with_width(1.8 + 1.2 * (self.cells.len() - 1 - k) as f64),
             );
         }
-        let methods = Method::ALL
-            .into_iter()
-            .filter(|m| self.runs.iter().any(|run| run.evolution.method == *m))
-            .map(|m| LegendEntry::line(m.label(), Colour::Black, m.style()));
+        let methods = self
+            .variants()
+            .map(|(m, s)| LegendEntry::line(m.label_in(s), Colour::Black, m.style_in(s)));
         let resolutions = self
             .cells
             .iter()
@@ -467,14 +497,15 @@ impl Comparison<'_> {
     fn shape_figure(&self) -> Result<Figure, Error> {
         let shown = self.shown();
         let mut rows: Vec<(&Trajectory, String)> = Vec::new();
-        for method in Method::ALL {
+        for (method, scheme) in self.variants() {
             let finest = self
                 .runs
                 .iter()
-                .filter(|run| run.evolution.method == method && !self.is_reference_run(run))
+                .filter(|run| variant(run) == (method, scheme) && !self.is_reference_run(run))
                 .max_by_key(|run| run.evolution.n);
             if let Some(run) = finest {
-                rows.push((run, format!("{}\nn = {}", method.label(), run.evolution.n)));
+                let label = method.label_in(scheme).replace(", ", "\n");
+                rows.push((run, format!("{label}\nn = {}", run.evolution.n)));
             }
         }
         let reference = &self.reference;
@@ -528,7 +559,7 @@ impl Comparison<'_> {
         ];
         let mut table = Table::new(head.into_iter().chain(errors).chain(tail));
         for run in &self.runs {
-            let Evolution { n, method, .. } = run.evolution;
+            let n = run.evolution.n;
             let reference = self.is_reference_run(run);
             let errors = self.errors(run)?;
             let errors = shown.iter().map(|k| {
@@ -540,7 +571,7 @@ impl Comparison<'_> {
                 .then(|| run.records.iter().map(|r| r.newton.hvp as f64).sum::<f64>() / count);
             let seconds = run.seconds / run.evolution.steps as f64;
             table.push(
-                [method.label().into(), n.into()]
+                [label(&run.evolution).into(), n.into()]
                     .into_iter()
                     .chain(errors)
                     .chain([hvp.into(), seconds.into()]),
@@ -552,8 +583,10 @@ impl Comparison<'_> {
     fn summary(&self, seconds: f64) -> Result<Summary, Error> {
         let mut summary = Summary::new();
         for run in &self.runs {
-            let Evolution { n, method, .. } = run.evolution;
-            let key = format!("{}.n{n}.{}", self.setting.key, method.key());
+            let Evolution {
+                n, method, scheme, ..
+            } = run.evolution;
+            let key = format!("{}.n{n}.{}", self.setting.key, method.key_in(scheme));
             if !self.is_reference_run(run) {
                 for (step, l2) in self.errors(run)? {
                     summary.insert(&format!("{key}.l2.step{step}"), l2)?;
@@ -607,6 +640,7 @@ fn step_rows(run: &Trajectory, reference: bool) -> Vec<StepRow> {
             StepRow {
                 n: e.n,
                 method: e.method,
+                scheme: e.scheme,
                 reference,
                 step,
                 time: e.tau.time(step),

@@ -1,6 +1,7 @@
 //! One shape evolving by one method, kept on disk sample by sample, so that it can be compared with any other run.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use fem::LinearSolver;
@@ -12,11 +13,11 @@ use model::Network;
 use operators::ComputeDevice;
 use report::OutputDir;
 use serde::{Deserialize, Serialize};
-use solver::{FlowParams, FlowState, StepRecord};
+use solver::{Factors, FlowParams, FlowState, StepRecord};
 
 use crate::Error;
 use crate::circles::Flow;
-use crate::method::Method;
+use crate::method::{Method, Scheme};
 use crate::networks::checksum;
 
 /// Least time between two checkpoints of a run.
@@ -30,6 +31,14 @@ pub enum TimeSteps {
     Constant(f64),
     /// The first one; each of the others is twice as long as the one before.
     Doubling(f64),
+    /// All alike, but for the first: that is divided into `halvings + 1` parts, the first two of length `tau / 2^halvings` and each
+    /// of the others twice as long as the one before. Large steps from corners start so.
+    Ramp {
+        /// The step size in the end.
+        tau: f64,
+        /// How often the first part is halved.
+        halvings: usize,
+    },
 }
 
 impl TimeSteps {
@@ -38,6 +47,11 @@ impl TimeSteps {
         match self {
             Self::Constant(tau) => tau,
             Self::Doubling(first) => first * 2.0_f64.powi(step as i32 - 1),
+            Self::Ramp { tau, halvings } => {
+                // The first and the second part have the same length.
+                let doublings = step.max(2) - 2;
+                tau * 2.0_f64.powi(doublings.min(halvings) as i32 - halvings as i32)
+            }
         }
     }
 
@@ -46,6 +60,7 @@ impl TimeSteps {
         match self {
             Self::Constant(tau) => steps as f64 * tau,
             Self::Doubling(first) => first * (2.0_f64.powi(steps as i32) - 1.0),
+            Self::Ramp { .. } => (1..=steps).map(|step| self.size(step)).sum(),
         }
     }
 
@@ -54,8 +69,19 @@ impl TimeSteps {
         match self {
             Self::Constant(tau) => format!("t{:.4}", -tau.log2()),
             Self::Doubling(first) => format!("doubling{:.4}", -first.log2()),
+            Self::Ramp { tau, halvings } => format!("ramp{:.4}-{halvings}", -tau.log2()),
         }
     }
+}
+
+/// The nodes that may move, under a name.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NamedRegion {
+    /// What the nodes depend on, besides the grid.
+    pub name: String,
+    /// A mark for every node, in the order of the grid.
+    #[serde(skip)]
+    pub nodes: Arc<[bool]>,
 }
 
 /// A run in `D` dimensions, with everything its result depends on.
@@ -67,6 +93,8 @@ pub struct Evolution<const D: usize> {
     pub flow: Flow,
     /// Which method.
     pub method: Method,
+    /// Which scheme.
+    pub scheme: Scheme,
     /// Cells per unit length.
     pub n: usize,
     /// Side of the periodic box.
@@ -77,6 +105,8 @@ pub struct Evolution<const D: usize> {
     pub params: FlowParams,
     /// Sizes of the (outer) time steps.
     pub tau: TimeSteps,
+    /// The region in which Willmore flow moves values, if not everywhere.
+    pub region: Option<NamedRegion>,
     /// Steps between two samples.
     pub sample_every: usize,
     /// Further steps to sample.
@@ -160,7 +190,7 @@ impl<const D: usize> Evolution<D> {
         format!(
             "{}-{}-n{}-{}",
             self.flow.key(),
-            self.method.key(),
+            self.method.key_in(self.scheme),
             self.n,
             self.tau.key()
         )
@@ -214,6 +244,9 @@ impl<const D: usize> Evolution<D> {
         .and_then(|text| serde_json::from_str::<serde_json::Value>(&text))
         .map_err(|error| Error::Options(format!("a run cannot be described: {error}")))?;
         let grid = self.grid()?;
+        let (prepared, calibration) =
+            (self.method).prepare(self.scheme, network, &grid, &self.params)?;
+        let network = prepared.as_ref();
         let mut trajectory = Trajectory {
             evolution: self.clone(),
             records: Vec::new(),
@@ -253,7 +286,8 @@ impl<const D: usize> Evolution<D> {
         if state.step < self.last() {
             match self.flow {
                 Flow::Willmore => {
-                    self.willmore(&mut trajectory, &mut stored, &state, network, device, bar)
+                    let step = (network, calibration);
+                    self.willmore(&mut trajectory, &mut stored, &state, step, device, bar)
                 }
                 Flow::MeanCurvature => {
                     self.mean_curvature(&mut trajectory, &mut stored, &state, network, device, bar)
@@ -275,7 +309,7 @@ impl<const D: usize> Evolution<D> {
                 "{} of the {} by {} at n = {}",
                 self.flow.title(),
                 self.shape,
-                self.method.label(),
+                self.method.label_in(self.scheme),
                 self.n
             ),
             source: Box::new(source),
@@ -287,14 +321,21 @@ impl<const D: usize> Evolution<D> {
         trajectory: &mut Trajectory<D>,
         stored: &mut Stored,
         state: &FlowState<D>,
-        network: Option<&Network>,
+        (network, calibration): (Option<&Network>, Factors),
         device: &ComputeDevice,
         bar: &ProgressBar,
     ) -> Result<(), Error> {
         let linear = LinearSolver::default();
+        let params = FlowParams {
+            calibration,
+            ..self.params
+        };
         let mut flow =
             self.method
-                .willmore_flow(network, &state.current, self.params, linear, device)?;
+                .willmore_flow(network, &state.current, params, linear, device)?;
+        if let Some(region) = &self.region {
+            flow.restrict_to(&region.nodes)?;
+        }
         flow.restore(state)?;
         let mut last = Instant::now();
         while flow.steps() < self.last() {
@@ -488,6 +529,7 @@ mod tests {
             shape: "disc of radius 0.2".to_owned(),
             flow,
             method,
+            scheme: Scheme::Paper,
             n: 128,
             side: 0.75,
             centre: 0.0,
@@ -498,6 +540,7 @@ mod tests {
                 calibration: solver::Factors::PAPER,
             },
             tau: TimeSteps::Constant(STEP),
+            region: None,
             sample_every: 2,
             also_sample: vec![1],
             steps: 4,
@@ -516,6 +559,17 @@ mod tests {
             assert!((tau.time(5) - sum).abs() < 1e-15);
         }
         assert!((TimeSteps::Doubling(0.25).time(5) - 0.25 * 31.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_ramp_makes_up_for_one_step() {
+        let ramp = TimeSteps::Ramp {
+            tau: 0.25,
+            halvings: 3,
+        };
+        let sizes: Vec<f64> = (1..=6).map(|step| ramp.size(step)).collect();
+        assert_eq!(sizes, [0.03125, 0.03125, 0.0625, 0.125, 0.25, 0.25]);
+        assert!((ramp.time(4) - 0.25).abs() < 1e-15);
     }
 
     #[test]

@@ -3,13 +3,14 @@
 use clap::ValueEnum;
 use fem::{FiniteElementStep, LinearSolver};
 use geometry::{Field, Grid};
-use model::Network;
+use model::{Network, pretrained};
 use operators::ComputeDevice;
 use report::LineStyle;
 use serde::{Deserialize, Serialize};
 use solver::{Factors, FlowParams, MeanCurvatureFlow, WillmoreFlow};
 
 use crate::Error;
+use crate::circles::Flow;
 
 /// How mean curvature flow is approximated; a line style in figures.
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -30,25 +31,15 @@ pub enum Method {
 pub enum Scheme {
     /// As in the paper
     Paper,
-    /// Divided by the operator's calibration factors, with the operator's odd part, which treats both phases alike
+    /// Divided by the step's calibration factors; a learned operator with its odd part, which treats both phases alike
     Calibrated,
+    /// Calibrated, with the operator of the accurate recipe in place of the paper's
+    Accurate,
 }
 
 impl Scheme {
-    /// Both schemes.
-    pub const ALL: [Self; 2] = [Self::Paper, Self::Calibrated];
-
-    /// The operator and the factors of the scheme, from the network as it was trained.
-    ///
-    /// # Errors
-    /// [`Error::Model`] if a network without a calibration cannot be calibrated.
-    pub fn prepare(self, network: &Network) -> Result<(Network, Factors), Error> {
-        Ok(match self {
-            Self::Paper => (network.clone(), Factors::PAPER),
-            // The odd part has the same factors to first order in its difference to the whole.
-            Self::Calibrated => (network.odd_part(), network.calibration()?.factors),
-        })
-    }
+    /// All schemes.
+    pub const ALL: [Self; 3] = [Self::Paper, Self::Calibrated, Self::Accurate];
 }
 
 impl Method {
@@ -82,27 +73,85 @@ impl Method {
         }
     }
 
-    /// Name in files and metrics of Willmore flow in a scheme.
+    /// The schemes that make a difference for a flow with this method: the weights of the energy do not matter to mean
+    /// curvature flow, and only operators are learned.
+    pub fn schemes(self, flow: Flow) -> &'static [Scheme] {
+        match (flow, self.is_learned()) {
+            (Flow::Willmore, true) => &Scheme::ALL,
+            (Flow::Willmore, false) => &[Scheme::Paper, Scheme::Calibrated],
+            (Flow::MeanCurvature, true) => &[Scheme::Paper, Scheme::Accurate],
+            (Flow::MeanCurvature, false) => &[Scheme::Paper],
+        }
+    }
+
+    /// Of these, the wanted one, or the paper's where that makes no difference; all if none is wanted.
+    pub fn chosen_schemes(self, flow: Flow, wanted: Option<Scheme>) -> Vec<Scheme> {
+        let available = self.schemes(flow);
+        match wanted {
+            None => available.to_vec(),
+            Some(wanted) if available.contains(&wanted) => vec![wanted],
+            Some(_) => vec![Scheme::Paper],
+        }
+    }
+
+    /// The operator and the factors of a scheme, from the network of the paper's recipe.
+    ///
+    /// # Errors
+    /// [`Error::Options`] if the learned operator is asked for without a network; [`Error::Model`] if a step cannot be
+    /// calibrated, or if no accurate network has the ratios.
+    pub fn prepare<const D: usize>(
+        self,
+        scheme: Scheme,
+        network: Option<&Network>,
+        grid: &Grid<D>,
+        params: &FlowParams,
+    ) -> Result<(Option<Network>, Factors), Error> {
+        Ok(match (self, scheme) {
+            (Self::Hybrid, Scheme::Paper) => (Some(needed(network)?.clone()), Factors::PAPER),
+            // The odd part has the same factors to first order in its difference to the whole.
+            (Self::Hybrid, Scheme::Calibrated) => {
+                let network = needed(network)?;
+                (Some(network.odd_part()), network.calibration()?.factors)
+            }
+            (Self::Hybrid, Scheme::Accurate) => {
+                let accurate = pretrained::find_accurate(needed(network)?.ratios())?;
+                let factors = accurate.calibration()?.factors;
+                (Some(accurate), factors)
+            }
+            (_, Scheme::Paper) => (None, Factors::PAPER),
+            (_, Scheme::Calibrated | Scheme::Accurate) => {
+                let step = self.elements(grid, params, LinearSolver::default())?;
+                (None, step.calibrate()?.factors)
+            }
+        })
+    }
+
+    /// Name in files and metrics in a scheme.
     pub fn key_in(self, scheme: Scheme) -> String {
         match scheme {
             Scheme::Paper => self.key().to_owned(),
             Scheme::Calibrated => format!("{}_calibrated", self.key()),
+            Scheme::Accurate => format!("{}_accurate", self.key()),
         }
     }
 
-    /// Name in legends of Willmore flow in a scheme.
+    /// Name in legends in a scheme.
     pub fn label_in(self, scheme: Scheme) -> String {
         match scheme {
             Scheme::Paper => self.label().to_owned(),
             Scheme::Calibrated => format!("{}, calibrated", self.label()),
+            Scheme::Accurate => "accurate operator, calibrated".to_owned(),
         }
     }
 
     /// Line style in figures in a scheme.
     pub fn style_in(self, scheme: Scheme) -> LineStyle {
-        match scheme {
-            Scheme::Paper => self.style(),
-            Scheme::Calibrated => LineStyle::DashDot,
+        match (self, scheme) {
+            (_, Scheme::Paper) => self.style(),
+            (Self::Hybrid, Scheme::Calibrated) => LineStyle::DashDot,
+            (Self::Hybrid, Scheme::Accurate) => LineStyle::DashDotDot,
+            (Self::FeImplicit, _) => LineStyle::ShortDashed,
+            (Self::FeSemi, _) => LineStyle::WideDotted,
         }
     }
 

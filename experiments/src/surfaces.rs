@@ -14,7 +14,7 @@ use surfaces::ClosedMesh;
 
 use crate::circles::Flow;
 use crate::evolution::{Evolution, TimeSteps, Trajectory};
-use crate::method::Method;
+use crate::method::{Method, Scheme};
 use crate::options::RunOptions;
 use crate::{Error, memory};
 
@@ -173,11 +173,13 @@ impl Workshop<'_> {
             shape: run.identity.clone(),
             flow: Flow::Willmore,
             method: run.method,
+            scheme: Scheme::Paper,
             n: run.n,
             side: run.initial.grid().side(),
             centre: CENTRE,
             params,
             tau: run.tau,
+            region: None,
             sample_every: run.steps.max(1),
             also_sample: run.shown.iter().map(|(step, _)| *step).collect(),
             steps: run.steps,

@@ -4,8 +4,9 @@ use std::time::{Duration, Instant};
 
 use indicatif::ProgressBar;
 use model::training::adam::{self, AdamParams, AdamState};
+use model::training::least_squares::{self, LeastSquaresParams};
 use model::training::levenberg_marquardt::{self as lm, LmParams, LmState};
-use model::training::{Observer, Progress as Iteration, SphereData};
+use model::training::{Distillation, Observer, Progress as Iteration, SphereData};
 use model::{Error as ModelError, Mlp, Network, PAPER_LAYERS, Provenance, Quality, Ratios};
 use operators::{ComputeDevice, DeviceKind};
 use report::Progress;
@@ -67,7 +68,20 @@ impl NetworkSpec {
         Self::new("surfaces", ratios, 128)
     }
 
-    /// All networks that ship with the library.
+    /// The networks of the accurate recipe: those of the paper, and one for `eps = h`.
+    pub fn accurate() -> Vec<Self> {
+        let ratios = Ratios {
+            dimension: 2,
+            width: 9,
+            eps_over_h: 1.0,
+            step_over_h2: 0.25,
+        };
+        let mut all = vec![Self::new("n64", ratios, 64)];
+        all.extend(Self::shipped());
+        all
+    }
+
+    /// All networks of the paper's recipe that ship with the library.
     pub fn shipped() -> Vec<Self> {
         let mut all = Self::paper();
         all.push(Self::surfaces());
@@ -168,6 +182,36 @@ pub struct AdamSettings {
     pub seed: u64,
     /// A smoke test: few radii.
     pub quick: bool,
+}
+
+/// Settings of a training by the accurate recipe.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AccurateSettings {
+    /// Settings of the recipe.
+    pub params: LeastSquaresParams,
+    /// Seed of samples and starts.
+    pub seed: u64,
+    /// A smoke test: one short start.
+    pub quick: bool,
+}
+
+impl AccurateSettings {
+    /// The recipe of the shipped networks, or a smoke test.
+    pub fn new(quick: bool, seed: u64) -> Self {
+        let mut params = LeastSquaresParams::default();
+        if quick {
+            params.distillation = Distillation {
+                starts: 1,
+                start_iterations: 10,
+                iterations: 10,
+            };
+        }
+        Self {
+            params,
+            seed,
+            quick,
+        }
+    }
 }
 
 /// Training needs double precision: the given device if it has that, else a CPU.
@@ -366,6 +410,57 @@ pub fn adam(
         data.count, params.batch, state.epoch, params.learning_rate, params.final_learning_rate
     );
     let curve = recorder.curve;
+    finished(
+        spec,
+        (kernel, activation),
+        curve,
+        &recipe,
+        seed,
+        (&data, &device),
+    )
+}
+
+/// Trains by the accurate recipe: the heat kernel, an odd polynomial by linear least squares, and a perceptron that imitates it.
+///
+/// # Errors
+/// [`Error::Model`] if the training fails.
+pub fn accurate(
+    spec: &NetworkSpec,
+    settings: &AccurateSettings,
+    device: &ComputeDevice,
+    progress: &Progress,
+) -> Result<Trained, Error> {
+    let device = training_device(device)?;
+    let data = spec.data(settings.quick)?;
+    let params = &settings.params;
+    let bar = progress.bar(format!("{}-accurate", spec.name), 1);
+    let clock = Instant::now();
+    let mut curve = Vec::new();
+    let mut observer = |p: &Iteration, (): &()| {
+        bar.set_length(p.of as u64);
+        bar.set_position(p.iteration as u64);
+        curve.push(CurvePoint {
+            iteration: p.iteration,
+            seconds: clock.elapsed().as_secs_f64(),
+            training_loss: p.training_loss,
+            held_out_loss: p.held_out_loss,
+        });
+        Ok(true)
+    };
+    let seed = settings.seed;
+    let (kernel, activation, _) =
+        least_squares::train(&data, params, seed, &device, &mut observer)?;
+    bar.finish();
+    let recipe = format!(
+        "least squares, heat kernel, {} radii of {} to {} eps, {} x {} points each, {} flat interfaces, odd polynomial of degree {}",
+        params.radii,
+        params.range[0],
+        params.range[1],
+        params.shells,
+        params.directions,
+        params.normals,
+        2 * params.terms - 1
+    );
     finished(
         spec,
         (kernel, activation),

@@ -6,8 +6,8 @@
 use rayon::prelude::*;
 
 /// Nodes of the three-point Gauss rule on `[0, 1]`: `1/2 -+ sqrt(3/5)/2`, `1/2`.
-const GAUSS_NODES: [f64; 3] = [0.112_701_665_379_258_3, 0.5, 0.887_298_334_620_741_7];
-const GAUSS_WEIGHTS: [f64; 3] = [5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0];
+pub(crate) const GAUSS_NODES: [f64; 3] = [0.112_701_665_379_258_3, 0.5, 0.887_298_334_620_741_7];
+pub(crate) const GAUSS_WEIGHTS: [f64; 3] = [5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0];
 /// Below this number of nodes one thread is faster than two.
 const PARALLEL_FROM: usize = 1 << 14;
 

@@ -54,6 +54,7 @@ mod direct;
 pub mod element;
 mod error;
 mod ops;
+mod planar;
 mod rules;
 mod scheme;
 mod step;

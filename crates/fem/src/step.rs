@@ -4,6 +4,7 @@ use burn::backend::Dispatch;
 use burn::tensor::Tensor;
 use geometry::{Field, Grid};
 use linearize::Extensions;
+use model::Calibration;
 use operators::SpectralFilter;
 use solver::{Accuracy, MeanCurvatureStep};
 
@@ -12,7 +13,7 @@ use crate::{Error, LinearSolver, Scheme, Statistics, Tolerances};
 
 /// Which step of mean curvature flow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+pub(crate) enum Kind {
     Implicit,
     /// The well interpolated at the nodes.
     SemiImplicit,
@@ -164,6 +165,15 @@ impl<const D: usize> FiniteElementStep<D> {
             .map(|(a, b)| a * b)
             .sum();
         Ok(self.eps / (2.0 * self.step * self.step) * square * self.grid.cell_volume())
+    }
+
+    /// What the step makes of the Willmore energy, from its flat interfaces (`docs/calibration.md`).
+    ///
+    /// # Errors
+    /// [`model::Error::Calibration`] if the step has no flat interface at rest.
+    pub fn calibrate(&self) -> Result<Calibration, model::Error> {
+        let h = self.grid.spacing();
+        crate::planar::calibrate(self.kind, D, self.eps / h, self.step / (h * h))
     }
 
     /// The derivative of the step at `u` in direction `p`, given `v = v[u]`, as a Burn graph: `A(v)^-1 M p` for the implicit

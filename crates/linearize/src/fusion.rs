@@ -11,7 +11,7 @@ use burn::backend::ir::{
     BaseOperationIr as Base, BinaryOpIr, CustomOpIr, NumericOperationIr as Num, OperationIr,
     ScalarIr, TensorId, TensorIr,
 };
-use burn::tensor::{DType, Shape};
+use burn::tensor::DType;
 
 /// Identifier of fused elementwise operations.
 pub const ELEMENTWISE: &str = "linearize::elementwise";
@@ -345,6 +345,7 @@ mod tests {
     use super::*;
     use crate::ir::{name, output, read_only, tensor};
     use burn::backend::ir::{ReduceOpIr, UnaryOpIr};
+    use burn::tensor::Shape;
 
     fn t(id: u64) -> TensorIr {
         tensor(id, Shape::from([4, 4]), DType::F64)

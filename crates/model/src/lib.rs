@@ -54,9 +54,9 @@ mod quality;
 mod store;
 pub mod training;
 
-pub use calibration::{Calibration, Factors};
+pub use calibration::{Calibration, Factors, PlanarStep, calibrate, normals};
 pub use error::Error;
 pub use mlp::{Mlp, PAPER_LAYERS, TABLE, forward, parameter_count};
 pub use network::{Network, Provenance, Ratios};
 pub use operator::MeanCurvatureOperator;
-pub use quality::{Quality, REFERENCE_RADII};
+pub use quality::{Quality, REFERENCE_RADII, displacement_errors};

@@ -96,6 +96,36 @@ impl Quality {
     }
 }
 
+/// Relative error of the motion of spheres, `<V[u] - u, u_R - u> / |u_R - u|^2 - 1` for `u_R` the exact one after the step, and the same
+/// with both phases exchanged: how much too fast an interface of that curvature moves, towards either phase.
+///
+/// # Errors
+/// As [`Quality::measure`].
+pub fn displacement_errors(
+    network: &Network,
+    data: &SphereData,
+    radius: f64,
+    device: &ComputeDevice,
+) -> Result<[f64; 2], Error> {
+    data.validate()?;
+    let u = data.sphere(radius);
+    let target = data.sphere(data.shrunk(radius));
+    let values = if network.ratios().dimension == 2 {
+        applied::<2>(network, data, &u, device)?
+    } else {
+        applied::<3>(network, data, &u, device)?
+    };
+    let [mut products, mut square] = [[0.0; 2], [0.0; 2]];
+    for (i, (u, target)) in u.iter().zip(&target).enumerate() {
+        let exact = target - u;
+        for (phase, sign) in [1.0, -1.0].into_iter().enumerate() {
+            products[phase] += (sign * values[phase][i] - u) * exact;
+            square[phase] += exact * exact;
+        }
+    }
+    Ok([0, 1].map(|phase| products[phase] / square[phase] - 1.0))
+}
+
 /// Losses of the network, of the network on `-u`, and of the identity.
 fn losses(
     network: &Network,

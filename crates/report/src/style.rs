@@ -17,6 +17,12 @@ pub enum LineStyle {
     Dotted,
     /// Dashes and dots in turn.
     DashDot,
+    /// Dashes, each followed by two dots.
+    DashDotDot,
+    /// Short dashes.
+    ShortDashed,
+    /// Dots far apart.
+    WideDotted,
     /// No line: only the markers are drawn.
     None,
 }
@@ -29,6 +35,9 @@ impl LineStyle {
             Self::Dashed => &[8.5, 4.5],
             Self::Dotted => &[2.2, 3.2],
             Self::DashDot => &[9.0, 3.5, 2.2, 3.5],
+            Self::DashDotDot => &[9.0, 3.2, 2.2, 3.2, 2.2, 3.2],
+            Self::ShortDashed => &[4.6, 3.2],
+            Self::WideDotted => &[2.2, 7.5],
         }
     }
 }

@@ -103,6 +103,11 @@ pub trait Objective<const D: usize> {
 
     /// The size of the curvature where the function is flattest and convex: the weight of `1/2 |u|^2` in it.
     fn unit(&self) -> f64;
+
+    /// `u` with the values that may not change put back, where there are such.
+    fn hold(&self, u: Tensor<D>) -> Tensor<D> {
+        u
+    }
 }
 
 /// The energy of one minimizing movement (eq:fully_discrete_willmore_flow_energy), scaled by `N / (2 eps)`:

@@ -38,6 +38,18 @@ pub enum Error {
         /// The range.
         expected: &'static str,
     },
+    /// A region that does not fit the grid.
+    #[error(
+        "a region of {marked} of {marks} nodes does not fit a grid of {nodes} nodes; mark at least one node, and give a mark for each"
+    )]
+    Region {
+        /// Marks given.
+        marks: usize,
+        /// Nodes of the grid.
+        nodes: usize,
+        /// Marks that are set.
+        marked: usize,
+    },
     /// The step of mean curvature flow failed.
     #[error("the step of mean curvature flow failed: {0}")]
     Step(crate::StepFailure),

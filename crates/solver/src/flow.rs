@@ -12,8 +12,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::newton::{NewtonInfo, NewtonParams, minimize_timed};
 use crate::preconditioner::Preconditioner;
+use crate::region::Constrained;
 use crate::times::PhaseTimes;
-use crate::{Accuracy, Error, Exit, MeanCurvatureStep, MinimizingMovement};
+use crate::{Accuracy, Error, Exit, MeanCurvatureStep, MinimizingMovement, Objective, Region};
 
 /// Scales of a flow.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -116,6 +117,7 @@ pub struct WillmoreFlow<const D: usize> {
     mcf: Arc<dyn MeanCurvatureStep<D>>,
     energy: MinimizingMovement<D>,
     filter: Option<(f64, SpectralFilter)>,
+    region: Option<Region<D>>,
     current: Tensor<D>,
     /// The phase field one step ago and the size of that step.
     previous: Option<(Tensor<D>, f64)>,
@@ -179,11 +181,22 @@ impl<const D: usize> WillmoreFlow<D> {
             mcf,
             energy,
             filter: None,
+            region: None,
             current,
             previous: None,
             step: 0,
             time: 0.0,
         })
+    }
+
+    /// Lets only the values at these nodes move from now on, in the order of the grid; the others stay, bit for bit. The energy
+    /// is that of the whole field.
+    ///
+    /// # Errors
+    /// [`Error::Region`] if there are not as many marks as nodes, or if none is set.
+    pub fn restrict_to(&mut self, nodes: &[bool]) -> Result<(), Error> {
+        self.region = Some(Region::new(&self.grid, nodes, &self.device)?);
+        Ok(())
     }
 
     /// The phase field now, on the device.
@@ -293,15 +306,18 @@ impl<const D: usize> WillmoreFlow<D> {
         };
         let preconditioner = self.filter.as_ref().map(|(_, filter)| {
             Preconditioner::two_level(filter.clone(), &self.grid, self.params.eps, tau)
+                .within(self.region.clone())
         });
-        let (u, newton, times) = minimize_timed(
-            &mut self.energy,
-            &self.current,
-            &start,
-            preconditioner,
-            self.params.newton,
-            &self.device,
-        )
+        let (params, device) = (self.params.newton, &self.device);
+        let (energy, current) = (&mut self.energy, &self.current);
+        let (u, newton, times) = match &self.region {
+            None => minimize_timed(energy, current, &start, preconditioner, params, device),
+            Some(region) => {
+                let mut energy = Constrained::new(energy, region, current);
+                let start = energy.hold(start);
+                minimize_timed(&mut energy, current, &start, preconditioner, params, device)
+            }
+        }
         .map_err(|error| match error {
             Error::NonFinite { field, .. } => Error::NonFinite { step, field },
             other => other,

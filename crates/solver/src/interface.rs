@@ -44,8 +44,16 @@ type Local = [[f64; MOST_CORNERS]; MOST_CORNERS];
 
 impl<const D: usize> InterfaceModes<D> {
     /// The correction for the interface of `u`, or none if there is no interface, or too much of it.
-    pub(crate) fn new(grid: &Grid<D>, u: &[f64], eps: f64, tau: f64) -> Option<Self> {
-        let samples = Samples::new(grid, u, eps, SPACING * eps);
+    ///
+    /// With a `region` only its nodes count.
+    pub(crate) fn new(
+        grid: &Grid<D>,
+        u: &[f64],
+        eps: f64,
+        tau: f64,
+        region: Option<&[bool]>,
+    ) -> Option<Self> {
+        let samples = Samples::new(grid, u, eps, SPACING * eps, region);
         let nodes = &samples.nodes;
         let sharp = nodes.iter().filter(|s| s.curvature.abs() * eps > 1.0);
         let corners_dominate = sharp.count() as f64 > SHARP * nodes.len() as f64;
@@ -190,7 +198,7 @@ mod tests {
         let grid = Grid::<2>::centred(96, 1.0).unwrap();
         let u = disc(&grid);
         let tau = 2e-5;
-        let modes = InterfaceModes::new(&grid, &u, EPS, tau).unwrap();
+        let modes = InterfaceModes::new(&grid, &u, EPS, tau, None).unwrap();
         for k in [0.0_f64, 2.0, 5.0] {
             let p = wave(&grid, &u, k);
             let mut z = vec![0.0; p.len()];
@@ -211,7 +219,7 @@ mod tests {
     fn the_correction_is_symmetric_and_not_negative() {
         let grid = Grid::<2>::centred(64, 1.0).unwrap();
         let u = disc(&grid);
-        let modes = InterfaceModes::new(&grid, &u, EPS, 1e-4).unwrap();
+        let modes = InterfaceModes::new(&grid, &u, EPS, 1e-4, None).unwrap();
         let vector = |a: f64| -> Vec<f64> {
             (0..u.len())
                 .map(|i| (a * i as f64).sin() + 0.2 * (a * a * i as f64).cos())
@@ -233,9 +241,9 @@ mod tests {
     fn nothing_is_corrected_without_an_interface_or_at_corners() {
         let grid = Grid::<2>::centred(64, 1.0).unwrap();
         let flat = vec![1.0; grid.len()];
-        assert!(InterfaceModes::new(&grid, &flat, EPS, 1e-4).is_none());
+        assert!(InterfaceModes::new(&grid, &flat, EPS, 1e-4, None).is_none());
         let square = Cuboid::new([0.3, 0.3]).unwrap();
         let square = phase_field(grid, &square, EPS).unwrap();
-        assert!(InterfaceModes::new(&grid, square.values(), EPS, 1e-4).is_none());
+        assert!(InterfaceModes::new(&grid, square.values(), EPS, 1e-4, None).is_none());
     }
 }

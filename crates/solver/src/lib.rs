@@ -74,6 +74,7 @@ mod flow;
 mod interface;
 mod newton;
 mod preconditioner;
+mod region;
 mod samples;
 mod times;
 
@@ -84,4 +85,5 @@ pub use model::Factors;
 pub use newton::{Exit, Method, NewtonInfo, NewtonParams, Precision, minimize};
 pub use operators::{extrapolate, retract};
 pub use preconditioner::Preconditioner;
+pub use region::Region;
 pub use times::PhaseTimes;

@@ -6,7 +6,7 @@
 use std::fmt;
 
 use burn::tensor::Tensor;
-use operators::{ComputeDevice, retract, spectral_filter};
+use operators::{ComputeDevice, retract};
 use serde::{Deserialize, Serialize};
 
 use crate::cg::{CgExit, CgLimits, CgSolution, conjugate_gradients, dot};
@@ -284,9 +284,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
         let precondition = |r: &Tensor<D>| {
             clock.time(|| match (preconditioner, level) {
                 (Some(preconditioner), Level::Both) => preconditioner.apply(r),
-                (Some(preconditioner), Level::Phase) => {
-                    spectral_filter(r.clone(), preconditioner.phase())
-                }
+                (Some(preconditioner), Level::Phase) => preconditioner.apply_phase(r),
                 (None, _) => r.clone(),
             })
         };
@@ -417,6 +415,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
             self.info.newton += 1;
             if let Some(exit) = done {
                 let u = retract(&point.u, &solution.direction, sign);
+                let u = self.objective.hold(u);
                 let energy = self.energy(&u)?;
                 if energy <= point.energy {
                     point = Point {
@@ -431,6 +430,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
             let mut next = None;
             while t >= SHORTEST {
                 let u = retract(&point.u, &solution.direction, sign * t);
+                let u = self.objective.hold(u);
                 let candidate = self.trial(u)?;
                 if let Some(candidate) = candidate.filter(|c| c.energy < HOPELESS * point.energy) {
                     let candidate = self.clean(candidate)?;

@@ -6,8 +6,8 @@ use burn::tensor::Tensor;
 use geometry::Grid;
 use operators::{ComputeDevice, SpectralFilter, spectral_filter, update_on_host};
 
-use crate::Error;
 use crate::interface::InterfaceModes;
+use crate::{Error, Region};
 
 /// A symmetric positive definite approximation of the inverse Hessian: the exact one in the pure phases, which handles
 /// everything but displacements of the interface, plus a coarse correction for those that follows the interface.
@@ -15,6 +15,7 @@ pub struct Preconditioner<const D: usize> {
     phase: SpectralFilter,
     scales: Option<Scales<D>>,
     interface: Option<Arc<InterfaceModes<D>>>,
+    region: Option<Region<D>>,
 }
 
 /// What the coarse correction needs to know of a step.
@@ -31,6 +32,7 @@ impl<const D: usize> From<SpectralFilter> for Preconditioner<D> {
             phase,
             scales: None,
             interface: None,
+            region: None,
         }
     }
 }
@@ -43,7 +45,14 @@ impl<const D: usize> Preconditioner<D> {
             phase,
             scales: Some(Scales { grid, eps, tau }),
             interface: None,
+            region: None,
         }
+    }
+
+    /// The same for the values in a region, if there is one: projected from both sides, which keeps it symmetric and positive.
+    #[must_use]
+    pub fn within(self, region: Option<Region<D>>) -> Self {
+        Self { region, ..self }
     }
 
     /// Moves the coarse correction to the interface of `u`.
@@ -53,7 +62,8 @@ impl<const D: usize> Preconditioner<D> {
     pub(crate) fn follow(&mut self, u: &Tensor<D>, device: &ComputeDevice) -> Result<(), Error> {
         if let Some(Scales { grid, eps, tau }) = &self.scales {
             let u = device.values(u.clone())?;
-            self.interface = InterfaceModes::new(grid, &u, *eps, *tau).map(Arc::new);
+            let region = self.region.as_ref().map(Region::nodes);
+            self.interface = InterfaceModes::new(grid, &u, *eps, *tau, region).map(Arc::new);
         }
         Ok(())
     }
@@ -61,14 +71,21 @@ impl<const D: usize> Preconditioner<D> {
     /// Applies it, in the precision of `r`.
     pub(crate) fn apply(&self, r: &Tensor<D>) -> Tensor<D> {
         let z = spectral_filter(r.clone(), &self.phase);
-        match &self.interface {
+        self.projected(match &self.interface {
             Some(interface) => update_on_host(r, z, interface),
             None => z,
-        }
+        })
     }
 
-    /// The part for the pure phases.
-    pub(crate) fn phase(&self) -> &SpectralFilter {
-        &self.phase
+    /// Applies the part for the pure phases alone.
+    pub(crate) fn apply_phase(&self, r: &Tensor<D>) -> Tensor<D> {
+        self.projected(spectral_filter(r.clone(), &self.phase))
+    }
+
+    fn projected(&self, z: Tensor<D>) -> Tensor<D> {
+        match &self.region {
+            Some(region) => region.project(z),
+            None => z,
+        }
     }
 }

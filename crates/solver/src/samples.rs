@@ -82,7 +82,14 @@ pub(crate) struct Samples<const D: usize> {
 
 impl<const D: usize> Samples<D> {
     /// The interface of `u`, whose width is `eps`, on a lattice of about the given spacing.
-    pub(crate) fn new(grid: &Grid<D>, u: &[f64], eps: f64, spacing: f64) -> Self {
+    /// With a `region` only its nodes.
+    pub(crate) fn new(
+        grid: &Grid<D>,
+        u: &[f64],
+        eps: f64,
+        spacing: f64,
+        region: Option<&[bool]>,
+    ) -> Self {
         let cells = ((grid.side() / spacing).round() as usize).max(4);
         let lattice = Lattice {
             grid,
@@ -93,6 +100,7 @@ impl<const D: usize> Samples<D> {
         let mut samples: Vec<Sample<D>> = (0..u.len())
             .into_par_iter()
             .with_min_len(CHUNK)
+            .filter(|&node| region.is_none_or(|region| region[node]))
             .filter_map(|node| lattice.sample(node, u))
             .collect();
         let mut cell_of = vec![u32::MAX; cells.pow(D as u32)];

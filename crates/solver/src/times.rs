@@ -76,6 +76,10 @@ impl<const D: usize, O: Objective<D>> Objective<D> for Timed<'_, O> {
         self.objective.product_dtype()
     }
 
+    fn hold(&self, u: Tensor<D>) -> Tensor<D> {
+        self.objective.hold(u)
+    }
+
     fn unit(&self) -> f64 {
         self.objective.unit()
     }

@@ -11,11 +11,12 @@ use experiments::method::Method;
 use experiments::networks::checksum;
 use experiments::options::RunOptions;
 use experiments::{Error, harness};
-use fem::LinearSolver;
+use fem::{FiniteElementStep, LinearSolver};
 use geometry::measure::zero_set_volume;
-use geometry::shapes::Ball;
+use geometry::shapes::{Ball, Torus};
 use geometry::{Field, Grid, phase_field};
-use model::{Calibration, Network, pretrained};
+use model::training::SphereData;
+use model::{Calibration, Network, displacement_errors, pretrained};
 use operators::ComputeDevice;
 use report::{
     Axis, Colour, Column, Figure, Format, LineChart, LineStyle, Marker, OutputDir, Series, Summary,
@@ -34,8 +35,9 @@ const TAU: f64 = STEP / 8.0;
 /// Distance of the interface to the box's boundary.
 const MARGIN: f64 = 0.3;
 
-/// Calibrates the shipped networks, or others, and compares the predicted Willmore energy of discs of either phase with the
-/// one that the scheme finds.
+/// Calibrates the shipped networks, or others, and the finite-element steps; compares the predicted Willmore energy of discs of
+/// either phase with the one that the scheme finds, and the energy of balls and Clifford tori with the exact one; draws what
+/// tells good networks from bad ones.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
 struct Options {
@@ -92,7 +94,10 @@ fn program(options: &Options) -> Result<(), Error> {
     let run = &options.run;
     let mut networks = Vec::new();
     if options.network.is_empty() {
-        for (name, network) in pretrained::all()? {
+        for (name, network) in pretrained::all()?
+            .into_iter()
+            .chain(pretrained::all_accurate()?)
+        {
             networks.push((name.to_owned(), network));
         }
     }
@@ -144,7 +149,8 @@ fn program(options: &Options) -> Result<(), Error> {
             continue;
         };
         let bar = progress.bar(one.name.clone(), 4 * radii.len() as u64);
-        for odd_part in [false, true] {
+        let is_odd = one.name.starts_with("accurate");
+        for odd_part in [false, true].into_iter().filter(|odd| !(is_odd && *odd)) {
             let (network, calibration) = if odd_part {
                 let odd = one.network.odd_part();
                 let calibration = odd.calibrate()?;
@@ -180,10 +186,19 @@ fn program(options: &Options) -> Result<(), Error> {
         bar.finish();
     }
 
+    let surfaces = manifest.phase("balls and tori", || {
+        surface_energies(&all, run.quick, &device)
+    })?;
+    let diagnosed = manifest.phase("diagnostics", || diagnostics(&all, run.quick, &device))?;
+    diagnostics_figure(run, &diagnosed).write(&output, "diagnostics")?;
+    output.write("diagnostics.json", report::data::to_json(&diagnosed)?)?;
+    output.write("surfaces.csv", report::data::to_csv(&surfaces)?)?;
+    let surfaces = surface_table(&surfaces)?;
+    surfaces.write(&output, "surfaces_table")?;
     figure(run, &discs).write(&output, "discs")?;
     output.write("discs.csv", report::data::to_csv(&discs)?)?;
     output.write("discs.json", report::data::to_json(&discs)?)?;
-    let table = table(&all)?;
+    let table = table(&all, &elements()?)?;
     table.write(&output, "calibration")?;
     let discs = disc_table(&discs)?;
     discs.write(&output, "discs_table")?;
@@ -191,10 +206,11 @@ fn program(options: &Options) -> Result<(), Error> {
     manifest.write(&output)?;
     progress.clear();
     run.say(&format!(
-        "{}\n{}\n{}\nResults are in {}",
-        run.title("Calibration of the learned operators"),
+        "{}\n{}\n{}\n{}\nResults are in {}",
+        run.title("Calibration of the learned operators and of finite elements"),
         table.to_markdown(),
         discs.to_markdown(),
+        surfaces.to_markdown(),
         output.as_path().display()
     ));
     Ok(())
@@ -208,6 +224,215 @@ impl Calibrated {
         let fits = ratios.dimension == 2 && (ratios.step_over_h2 - n * n * STEP).abs() < 1e-9;
         fits.then_some(n as usize)
     }
+}
+
+/// The finite-element steps at the ratios of the experiments.
+fn elements() -> Result<Vec<(String, Calibration)>, Error> {
+    let mut all = Vec::new();
+    for (eps_over_h, step_over_h2) in [(2.0, 1.0), (4.0, 4.0)] {
+        let grid = Grid::<2>::centred(16, 16.0)?;
+        for (name, step) in [
+            (
+                "implicit",
+                FiniteElementStep::implicit(&grid, eps_over_h, step_over_h2)?,
+            ),
+            (
+                "semi-implicit",
+                FiniteElementStep::semi_implicit(&grid, eps_over_h, step_over_h2)?,
+            ),
+        ] {
+            let name = format!("FE {name}, 2D, eps = {eps_over_h} h, step = {step_over_h2} h²");
+            all.push((name, step.calibrate()?));
+        }
+    }
+    let grid = Grid::<3>::centred(8, 8.0)?;
+    let step = FiniteElementStep::implicit(&grid, 2.0, 1.0)?;
+    all.push((
+        "FE implicit, 3D, eps = 2 h, step = 1 h²".to_owned(),
+        step.calibrate()?,
+    ));
+    Ok(all)
+}
+
+/// The Willmore energy that the scheme sees in a surface whose energy is known.
+#[derive(Serialize)]
+struct SurfaceRow {
+    network: String,
+    surface: String,
+    /// Over the exact energy, without calibration.
+    measured: f64,
+    /// The same with calibration.
+    calibrated: f64,
+}
+
+/// Balls and Clifford tori at `n = 64`, `eps = 2^-5`, after one small step.
+fn surface_energies(
+    all: &[Calibrated],
+    quick: bool,
+    device: &ComputeDevice,
+) -> Result<Vec<SurfaceRow>, Error> {
+    const CELLS: usize = 64;
+    let (eps, step) = (1.0 / 32.0, 1.0 / 4096.0);
+    let grid = Grid::<3>::per_unit(CELLS, 1.0)?;
+    let mut shapes: Vec<(String, Field<3>, f64)> = Vec::new();
+    for radius in [0.2, 0.3, 0.34] {
+        let ball = phase_field(grid, &Ball::new([0.0; 3], radius)?, eps)?;
+        shapes.push((format!("ball, R = {radius}"), ball, 8.0 * PI));
+    }
+    for outer in [0.40, 0.45] {
+        let torus = phase_field(grid, &Torus::clifford(outer)?, eps)?;
+        shapes.push((format!("Clifford torus, {outer:.2}"), torus, 4.0 * PI * PI));
+    }
+    if quick {
+        shapes.truncate(1);
+    }
+    let mut rows = Vec::new();
+    for one in all.iter().filter(|one| one.network.ratios().dimension == 3) {
+        let network = one.network.odd_part();
+        for (surface, initial, exact) in &shapes {
+            let energy = |calibration: Factors| -> Result<f64, Error> {
+                let params = FlowParams {
+                    eps,
+                    mcf_step: step,
+                    newton: NewtonParams::default(),
+                    calibration,
+                };
+                let linear = LinearSolver::default();
+                let mut flow = Method::Hybrid.willmore_flow(
+                    Some(&network),
+                    initial,
+                    params,
+                    linear,
+                    device,
+                )?;
+                Ok(flow.advance(step / 8.0)?.willmore_energy / exact)
+            };
+            rows.push(SurfaceRow {
+                network: one.name.clone(),
+                surface: surface.clone(),
+                measured: energy(Factors::PAPER)?,
+                calibrated: energy(one.calibration.factors)?,
+            });
+        }
+    }
+    Ok(rows)
+}
+
+fn surface_table(rows: &[SurfaceRow]) -> Result<Table, Error> {
+    let number = |name: &str| Column::number(name, Format::Fixed(4));
+    let mut table = Table::new([
+        Column::text("network"),
+        Column::text("surface"),
+        number("w / exact"),
+        number("calibrated w / exact"),
+    ]);
+    for row in rows {
+        table.push([
+            row.network.as_str().into(),
+            row.surface.as_str().into(),
+            row.measured.into(),
+            row.calibrated.into(),
+        ])?;
+    }
+    Ok(table)
+}
+
+/// What tells good networks from bad ones.
+#[derive(Serialize)]
+struct Diagnostics {
+    network: String,
+    /// `eps kappa`, positive where the phase `u = 1` is convex, and the relative error of the displacement.
+    displacement: Vec<[f64; 2]>,
+    /// Eigenvalues of `J` at the flat interface, real and imaginary parts.
+    spectrum: Vec<[f64; 2]>,
+    /// `w` and `F''(w)`.
+    bend: Vec<[f64; 2]>,
+}
+
+fn diagnostics(
+    all: &[Calibrated],
+    quick: bool,
+    device: &ComputeDevice,
+) -> Result<Vec<Diagnostics>, Error> {
+    let count = if quick { 3 } else { 12 };
+    // Kernels of width 65 have a thousand planes; surfaces have millions of nodes.
+    let small =
+        |one: &&Calibrated| one.network.ratios().width < 65 && one.network.ratios().dimension == 2;
+    all.iter()
+        .filter(small)
+        .map(|one| {
+            let ratios = one.network.ratios();
+            let data = SphereData::new(ratios, one.network.provenance().reference_cells)?;
+            let mut displacement = Vec::new();
+            for i in 0..count {
+                let radius = 0.05 * (0.42_f64 / 0.05).powf(i as f64 / (count - 1) as f64);
+                let curvature = data.eps() / radius;
+                let errors = displacement_errors(&one.network, &data, radius, device)?;
+                displacement.push([curvature, errors[0]]);
+                displacement.push([-curvature, errors[1]]);
+            }
+            displacement.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            let bend = (0..=400).map(|i| {
+                let w = f64::from(i) / 200.0 - 1.0;
+                [w, one.network.activation().jet(w)[2]]
+            });
+            Ok(Diagnostics {
+                network: one.name.trim_end_matches(".safetensors").to_owned(),
+                displacement,
+                spectrum: one.network.flat_spectrum()?,
+                bend: bend.collect(),
+            })
+        })
+        .collect()
+}
+
+fn diagnostics_figure(run: &RunOptions, all: &[Diagnostics]) -> Figure {
+    let style = |one: &Diagnostics| {
+        if one.network.starts_with("accurate") {
+            LineStyle::Dashed
+        } else {
+            LineStyle::Solid
+        }
+    };
+    let mut panels = [
+        LineChart::new(
+            "Error of one step of mean curvature flow",
+            Axis::linear("curvature ε κ (positive: disc)"),
+            Axis::linear("relative error of the displacement"),
+        ),
+        LineChart::new(
+            "Spectrum of the flat interface",
+            Axis::linear("number of the eigenvalue"),
+            Axis::linear("real part"),
+        ),
+        LineChart::new(
+            "Second derivative of F",
+            Axis::linear("w"),
+            Axis::linear("F''(w)"),
+        ),
+    ];
+    for (k, one) in all.iter().enumerate() {
+        let spectrum: Vec<[f64; 2]> = (one.spectrum.iter().take(40).enumerate())
+            .map(|(i, value)| [(i + 1) as f64, value[0]])
+            .collect();
+        let curves = [one.displacement.clone(), spectrum, one.bend.clone()];
+        panels = {
+            let mut curves = curves.into_iter();
+            panels.map(|panel| {
+                let points = curves.next().unwrap_or_default();
+                panel.with_series(
+                    Series::new(one.network.clone(), points)
+                        .with_colour(k % 8)
+                        .with_style(style(one)),
+                )
+            })
+        };
+    }
+    let mut figure = Figure::new(run.title("Diagnostics of the learned operators"), 2);
+    for panel in panels {
+        figure = figure.with_panel(panel);
+    }
+    figure.with_shared_legend()
 }
 
 /// Willmore energy of a relaxed disc over that of its zero level set, `pi / R`.
@@ -244,7 +469,7 @@ fn disc_energy(
     Ok(record.willmore_energy * (area / PI).sqrt() / PI)
 }
 
-fn table(all: &[Calibrated]) -> Result<Table, Error> {
+fn table(all: &[Calibrated], elements: &[(String, Calibration)]) -> Result<Table, Error> {
     let number = |name: &str| Column::number(name, Format::Fixed(4));
     let small = |name: &str| Column::number(name, Format::Scientific(1));
     let mut table = Table::new([
@@ -259,10 +484,10 @@ fn table(all: &[Calibrated]) -> Result<Table, Error> {
         small("spread over positions"),
         small("spread over normals"),
     ]);
-    for one in all {
-        let c = &one.calibration;
+    let learned = all.iter().map(|one| (&one.name, &one.calibration));
+    for (name, c) in learned.chain(elements.iter().map(|(name, c)| (name, c))) {
         table.push([
-            one.name.as_str().into(),
+            name.as_str().into(),
             c.factors.energy.into(),
             c.factors.metric.into(),
             c.factors.speed().into(),

@@ -48,7 +48,8 @@ struct Options {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     methods: Vec<Method>,
 
-    /// Scheme of Willmore flow with the learned operator, paper or calibrated [default: both]
+    /// One scheme alone, where it makes a difference: paper, calibrated, or accurate, which is calibrated with the network of
+    /// the accurate recipe [default: all]
     #[arg(long, value_name = "NAME", value_enum)]
     scheme: Option<Scheme>,
 
@@ -93,18 +94,13 @@ impl Run {
                 if !chosen {
                     continue;
                 }
-                // Only Willmore flow with the learned operator has both schemes.
-                let both = flow == Flow::Willmore && method.is_learned();
-                for scheme in Scheme::ALL {
-                    let wanted = options.scheme.is_none_or(|wanted| wanted == scheme);
-                    if (both && wanted) || (!both && scheme == Scheme::Paper) {
-                        runs.extend(cells.iter().map(|&n| Self {
-                            flow,
-                            method,
-                            scheme,
-                            n,
-                        }));
-                    }
+                for scheme in method.chosen_schemes(flow, options.scheme) {
+                    runs.extend(cells.iter().map(|&n| Self {
+                        flow,
+                        method,
+                        scheme,
+                        n,
+                    }));
                 }
             }
         }
@@ -429,7 +425,55 @@ impl Report<'_> {
             work = work.with_panel(self.legend(chart));
         }
         work.with_shared_legend().write(output, "work_per_step")?;
+        self.cost_figure().write(output, "error_over_cost")?;
         Ok(())
+    }
+
+    /// Error at the end over the mean wall time of a circle, a curve for each method and scheme.
+    fn cost_figure(&self) -> Figure {
+        let last = Self::time(self.steps);
+        let mut chart = LineChart::new(
+            "",
+            Axis::log("wall time per circle [s]"),
+            Axis::log(format!("mean L² error at t = {last:.4}")),
+        );
+        let mut curves: Vec<(Method, Scheme)> = Vec::new();
+        for e in self.of_flow(Flow::Willmore) {
+            if !curves.contains(&(e.method, e.scheme)) {
+                curves.push((e.method, e.scheme));
+            }
+        }
+        for (k, &(method, scheme)) in curves.iter().enumerate() {
+            let own = |e: &&Ensemble| (e.method, e.scheme) == (method, scheme);
+            let points: Vec<[f64; 2]> = (self.of_flow(Flow::Willmore).filter(own))
+                .map(|e| {
+                    let steps = e.steps() as f64;
+                    [
+                        e.mean_of_records(|r| r.seconds) * steps,
+                        e.mean_error(self.steps),
+                    ]
+                })
+                .collect();
+            chart = chart.with_series(
+                Series::new(method.label_in(scheme), points)
+                    .with_colour(k)
+                    .with_style(method.style_in(scheme))
+                    .with_marker(Marker::Circle),
+            );
+        }
+        let cells: Vec<String> = self.cells.iter().map(|n| format!("{n}")).collect();
+        Figure::new(
+            self.options
+                .title("Willmore flow of circles: accuracy against cost"),
+            1,
+        )
+        .with_panel(chart)
+        .with_shared_legend()
+        .with_note(format!(
+            "Each curve from coarse to fine: n = {}. {} time steps; each circle on one core.",
+            cells.join(", "),
+            self.steps
+        ))
     }
 
     /// The scale number of a flow, at the finest resolution.

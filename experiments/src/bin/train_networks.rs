@@ -7,7 +7,8 @@ use clap::{Parser, ValueEnum};
 use experiments::options::RunOptions;
 use experiments::partial::Partial;
 use experiments::training::{
-    self, AdamSettings, CurvePoint, LmSettings, NetworkSpec, Trained, training_device,
+    self, AccurateSettings, AdamSettings, CurvePoint, LmSettings, NetworkSpec, Trained,
+    training_device,
 };
 use experiments::{Error, harness, quality};
 use model::training::adam::AdamParams;
@@ -27,7 +28,9 @@ enum Recipe {
     Lm,
     /// The paper's: Adam from a random start at n = 128, refined to n = 256 and 512
     Adam,
-    /// Both, with the learning curves side by side; Adam only for the networks of the convergence tests
+    /// The heat kernel and an odd activation by least squares, for the calibrated Willmore scheme
+    Accurate,
+    /// Levenberg-Marquardt and Adam, with the learning curves side by side; Adam only for the networks of the convergence tests
     Both,
 }
 
@@ -44,7 +47,7 @@ struct Options {
     #[arg(long, value_enum, default_value_t = Recipe::Lm)]
     recipe: Recipe,
 
-    /// Train this network alone: n128, n256, n512, inpainting or surfaces; can be repeated
+    /// Train this network alone: n128, n256, n512, inpainting or surfaces, with --recipe accurate also n64; can be repeated
     #[arg(long, value_name = "NAME")]
     only: Vec<String>,
 
@@ -56,7 +59,7 @@ struct Options {
     #[arg(long, value_name = "RATE", default_value_t = AdamParams::default().learning_rate)]
     adam_rate: f64,
 
-    /// Copy the networks trained by Levenberg-Marquardt (by Adam with --recipe adam) to this folder, too
+    /// Copy the networks trained by Levenberg-Marquardt (with --recipe adam or accurate those) to this folder, too
     #[arg(long, value_name = "DIR")]
     install: Option<PathBuf>,
 
@@ -71,6 +74,7 @@ struct Parameters<'a> {
     networks: &'a [NetworkSpec],
     levenberg_marquardt: &'a LmSettings,
     adam: &'a AdamSettings,
+    accurate: &'a AccurateSettings,
     quick: bool,
 }
 
@@ -91,7 +95,7 @@ fn main() -> ExitCode {
 
 fn program(options: &Options) -> Result<(), Error> {
     let run = &options.run;
-    let specs = chosen(&options.only)?;
+    let specs = chosen(options.recipe, &options.only)?;
     let device = training_device(&run.open_device()?)?;
     let epochs = if run.quick { 2 } else { options.adam_epochs };
     if epochs == 0 {
@@ -106,6 +110,7 @@ fn program(options: &Options) -> Result<(), Error> {
         )));
     }
     let settings = Settings {
+        accurate: AccurateSettings::new(run.quick, run.seed),
         lm: LmSettings::new(run.quick, run.seed),
         adam: AdamSettings {
             params: AdamParams {
@@ -135,13 +140,14 @@ fn program(options: &Options) -> Result<(), Error> {
         networks: &specs,
         levenberg_marquardt: &settings.lm,
         adam: &settings.adam,
+        accurate: &settings.accurate,
         quick: run.quick,
     };
     let mut manifest = run.manifest(PROGRAM, &parameters, &device)?;
     let progress = run.progress();
 
     let mut by_lm = Vec::new();
-    if options.recipe != Recipe::Adam {
+    if matches!(options.recipe, Recipe::Lm | Recipe::Both) {
         for spec in &specs {
             let trained =
                 manifest.phase(format!("{} by Levenberg-Marquardt", spec.name), || {
@@ -159,7 +165,7 @@ fn program(options: &Options) -> Result<(), Error> {
         }
     }
     let mut by_adam = Vec::new();
-    if options.recipe != Recipe::Lm {
+    if matches!(options.recipe, Recipe::Adam | Recipe::Both) {
         let mut compared = specs.clone();
         if options.recipe == Recipe::Both && options.only.is_empty() {
             compared.retain(in_the_chain);
@@ -172,11 +178,24 @@ fn program(options: &Options) -> Result<(), Error> {
             trained.network.save(&folder.path(&name)?)?;
         }
     }
+    let mut accurate = Vec::new();
+    if options.recipe == Recipe::Accurate {
+        for spec in &specs {
+            let trained = manifest.phase(format!("{} by least squares", spec.name), || {
+                training::accurate(spec, &settings.accurate, &device, &progress)
+            })?;
+            trained.network.save(&folder.path(&accurate_name(spec))?)?;
+            accurate.push(trained);
+        }
+    }
     if let Some(install) = &install {
         let trained = if by_lm.is_empty() { &by_adam } else { &by_lm };
         for one in trained {
-            let name = one.spec.file_name();
-            one.network.save(&install.path(&name)?)?;
+            one.network.save(&install.path(&one.spec.file_name())?)?;
+        }
+        for one in &accurate {
+            one.network
+                .save(&install.path(&accurate_name(&one.spec))?)?;
         }
     }
 
@@ -184,6 +203,7 @@ fn program(options: &Options) -> Result<(), Error> {
         .iter()
         .map(|trained| ("lm", trained))
         .chain(by_adam.iter().map(|trained| ("adam", trained)))
+        .chain(accurate.iter().map(|trained| ("accurate", trained)))
         .collect();
     figure(run, &all).write(&output, "learning_curves")?;
     write_data(&output, &all)?;
@@ -215,8 +235,15 @@ fn program(options: &Options) -> Result<(), Error> {
     Ok(())
 }
 
-fn chosen(only: &[String]) -> Result<Vec<NetworkSpec>, Error> {
-    let mut specs = NetworkSpec::shipped();
+fn accurate_name(spec: &NetworkSpec) -> String {
+    format!("accurate_{}", spec.file_name())
+}
+
+fn chosen(recipe: Recipe, only: &[String]) -> Result<Vec<NetworkSpec>, Error> {
+    let mut specs = match recipe {
+        Recipe::Accurate => NetworkSpec::accurate(),
+        Recipe::Lm | Recipe::Adam | Recipe::Both => NetworkSpec::shipped(),
+    };
     let names: Vec<&str> = specs.iter().map(|spec| &spec.name[..]).collect();
     if let Some(unknown) = only.iter().find(|name| !names.contains(&&name[..])) {
         return Err(Error::Options(format!(
@@ -236,6 +263,7 @@ fn in_the_chain(spec: &NetworkSpec) -> bool {
 }
 
 struct Settings {
+    accurate: AccurateSettings,
     lm: LmSettings,
     adam: AdamSettings,
 }
@@ -303,6 +331,7 @@ fn figure(run: &RunOptions, all: &[(&'static str, &Trained)]) -> Figure {
     }
     let style = |recipe: &str| match recipe {
         "lm" => LineStyle::Solid,
+        "accurate" => LineStyle::DashDotDot,
         _ => LineStyle::Dashed,
     };
     let mut figure = Figure::new(run.title("Learning curves"), 2);
@@ -325,10 +354,14 @@ fn figure(run: &RunOptions, all: &[(&'static str, &Trained)]) -> Figure {
                     .with_style(style(recipe)),
             );
         }
-        let methods = [("lm", "Levenberg-Marquardt"), ("adam", "Adam")]
-            .into_iter()
-            .filter(|(key, _)| all.iter().any(|(recipe, _)| recipe == key))
-            .map(|(key, label)| LegendEntry::line(label, Colour::Black, style(key)));
+        let methods = [
+            ("lm", "Levenberg-Marquardt"),
+            ("adam", "Adam"),
+            ("accurate", "distillation of the least-squares fit"),
+        ]
+        .into_iter()
+        .filter(|(key, _)| all.iter().any(|(recipe, _)| recipe == key))
+        .map(|(key, label)| LegendEntry::line(label, Colour::Black, style(key)));
         let networks = names
             .iter()
             .enumerate()

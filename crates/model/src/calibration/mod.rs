@@ -92,7 +92,7 @@ pub struct Calibration {
 
 /// Normals and their weights: `c` is averaged over them. In 2D the four integrate `cos 4 theta` exactly, in 3D they are Lebedev's
 /// rule of degree 7.
-pub(crate) fn normals(dimension: usize) -> &'static [(&'static [isize], f64)] {
+pub fn normals(dimension: usize) -> &'static [(&'static [isize], f64)] {
     match dimension {
         2 => &[
             (&[1, 0], 0.25),
@@ -178,5 +178,16 @@ impl Network {
             .map(|&(normal, weight)| (network::NetworkOnPlanes::new(self, normal), weight))
             .collect();
         calibrate(&steps)
+    }
+
+    /// Eigenvalues of `J`, the derivative of the operator at its flat interface normal to an axis, largest real part first. The
+    /// first belongs to translations and is 1, the second says how fast disturbed profiles recover, and the rest are between
+    /// the transfer function's values in the pure phases.
+    ///
+    /// # Errors
+    /// As [`Self::calibrate`].
+    pub fn flat_spectrum(&self) -> Result<Vec<[f64; 2]>, Error> {
+        let (normal, _) = normals(self.ratios().dimension)[0];
+        planar::spectrum(&network::NetworkOnPlanes::new(self, normal), POSITIONS[0])
     }
 }

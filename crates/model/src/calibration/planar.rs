@@ -174,6 +174,20 @@ pub fn solve(step: &impl PlanarStep, position: f64) -> Result<PlanarInterface, E
     Ok(interface)
 }
 
+/// Real and imaginary parts of the eigenvalues of `J` at the flat interface, largest real part first.
+pub(super) fn spectrum(step: &impl PlanarStep, position: f64) -> Result<Vec<[f64; 2]>, Error> {
+    let (start, optimal_slope) = optimal_interface(step, position);
+    let w = flat_interface(step, &start, &optimal_slope)?;
+    let (_, jacobian) = step.linearize(&w)?;
+    let values = jacobian.eigenvalues().map_err(|_| Error::Calibration {
+        reason: "the eigenvalues of the flat interface do not converge",
+        eigenvalue: f64::NAN,
+    })?;
+    let mut values: Vec<[f64; 2]> = values.iter().map(|z| [z.re, z.im]).collect();
+    values.sort_by(|a, b| b[0].total_cmp(&a[0]));
+    Ok(values)
+}
+
 /// `q` and `q'` on the planes of the layer.
 pub(super) fn optimal_interface(step: &impl PlanarStep, position: f64) -> (Col<f64>, Col<f64>) {
     let (eps, spacing) = (step.eps(), step.spacing());

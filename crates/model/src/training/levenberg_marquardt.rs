@@ -75,8 +75,8 @@ pub struct LmState {
     pub improved_to: f64,
 }
 
-/// `residual_i = sqrt(weight_i) (F(design k)_i - target_i)`, with ridges.
-struct Problem<'a> {
+/// `residual_i = sqrt(weight_i) (F(design k)_i - target_i)`, or combinations of these, with ridges.
+pub(super) struct Problem<'a> {
     design: Tensor<2>,
     target: Tensor<1>,
     root_weight: Tensor<1>,
@@ -88,6 +88,8 @@ struct Problem<'a> {
     centre: Vec<f64>,
     /// Gradient of the kernel's sum, which is held at 1 so that `F(+-1) = +-1`.
     sum: Vec<f64>,
+    /// What the residuals are multiplied by, if not the identity. The rows then make a single chunk.
+    pub(super) mix: Option<Mat<f64>>,
     device: &'a ComputeDevice,
 }
 
@@ -102,7 +104,7 @@ struct Normal {
 }
 
 impl<'a> Problem<'a> {
-    fn new(
+    pub(super) fn new(
         samples: &BandSamples,
         sizes: &[usize],
         widths: &'a [usize],
@@ -123,6 +125,7 @@ impl<'a> Problem<'a> {
             ridge: ridge.0,
             centre: ridge.1,
             sum: sizes.iter().map(|&s| s as f64).collect(),
+            mix: None,
             device,
         }
     }
@@ -138,12 +141,19 @@ impl<'a> Problem<'a> {
     }
 
     /// Squared norm of the residual without and with the ridge.
-    fn value(&self, x: &[f64]) -> Result<(f64, f64), Error> {
+    pub(super) fn value(&self, x: &[f64]) -> Result<(f64, f64), Error> {
         let (kernel, activation) = self.split(x);
         let z = self.design.clone().matmul(kernel);
         let f = forward_with(self.widths, &activation, z, |_, a| a);
         let residual = (f.reshape([self.rows]) - self.target.clone()) * self.root_weight.clone();
-        let loss = self.device.scalar((residual.clone() * residual).sum())?;
+        let loss = match &self.mix {
+            None => self.device.scalar((residual.clone() * residual).sum())?,
+            Some(mix) => {
+                let residual = self.device.values(residual)?;
+                let residual = MatRef::from_column_major_slice(&residual, self.rows, 1);
+                (mix * residual).squared_norm_l2()
+            }
+        };
         Ok((loss, loss + self.ridge_value(x)))
     }
 
@@ -211,6 +221,11 @@ impl<'a> Problem<'a> {
             let (jacobian, residual) = self.block(x, start, end)?;
             let jacobian = MatRef::from_row_major_slice(&jacobian, end - start, n);
             let residual = MatRef::from_column_major_slice(&residual, end - start, 1);
+            let mixed = (self.mix.as_ref()).map(|mix| (mix * jacobian, mix * residual));
+            let (jacobian, residual) = match &mixed {
+                Some((jacobian, residual)) => (jacobian.as_ref(), residual.as_ref()),
+                None => (jacobian, residual),
+            };
             use faer::linalg::matmul::triangular::{BlockStructure, matmul};
             matmul(
                 matrix.as_mut(),
@@ -248,7 +263,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Accepts the first damped step that lowers the value; `None` if none does.
-    fn step(&self, x: &[f64], damping: &mut f64) -> Result<Option<Vec<f64>>, Error> {
+    pub(super) fn step(&self, x: &[f64], damping: &mut f64) -> Result<Option<Vec<f64>>, Error> {
         let normal = self.normal(x)?;
         let n = x.len();
         let largest = (0..n).map(|i| normal.matrix[(i, i)]).fold(0.0, f64::max);
@@ -375,7 +390,7 @@ pub fn splitting_start(
 }
 
 /// Parameters whose neurons cover the interval of interest.
-fn random_activation(rng: &mut ChaCha8Rng) -> Vec<f64> {
+pub(super) fn random_activation(rng: &mut ChaCha8Rng) -> Vec<f64> {
     let mut normal = || {
         // Box-Muller
         let (a, b): (f64, f64) = (rng.random_range(1e-12..1.0), rng.random_range(0.0..1.0));

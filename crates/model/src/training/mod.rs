@@ -1,13 +1,17 @@
-//! Learning the operator from shrinking spheres (alg:mcf_training), in two ways.
+//! Learning the operator from shrinking spheres (alg:mcf_training), in three ways.
 //!
 //! [`adam`] is the paper's: mini-batches of whole grids, refined progressively. [`levenberg_marquardt`] solves the same
-//! least-squares problem on sampled points and gets to its floor in a minute.
+//! least-squares problem on sampled points and gets to its floor in a minute. [`least_squares`] asks for another thing, the
+//! same relative accuracy at every curvature, which is what the calibrated Willmore scheme needs.
 
 pub mod adam;
+mod distillation;
+pub mod least_squares;
 pub mod levenberg_marquardt;
 mod spheres;
 mod symmetry;
 
+pub use distillation::Distillation;
 pub use spheres::{BandSamples, SphereData};
 pub use symmetry::Orbits;
 

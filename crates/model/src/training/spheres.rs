@@ -241,7 +241,7 @@ fn ball_volume(dimension: usize, radius: f64) -> f64 {
 }
 
 /// A random point at distance `rho` from the origin.
-fn direction(dimension: usize, rho: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
+pub(super) fn direction(dimension: usize, rho: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
     loop {
         let x: Vec<f64> = (0..dimension)
             .map(|_| rng.random_range(-1.0..1.0))

@@ -1,0 +1,148 @@
+//! Perceptrons of the paper's form that imitate a given odd function with its first two derivatives.
+
+use faer::Mat;
+use operators::ComputeDevice;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use super::levenberg_marquardt::{Problem, random_activation};
+use super::{BandSamples, Observer, Progress};
+use crate::mlp::parameter_count;
+use crate::{Error, Mlp, PAPER_LAYERS};
+
+/// Settings of the fit of a perceptron to a function.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Distillation {
+    /// Random starts; the first that is good enough is taken.
+    pub starts: usize,
+    /// Iterations of each start at each of four ridges.
+    pub start_iterations: usize,
+    /// Iterations at each of the last three ridges.
+    pub iterations: usize,
+}
+
+impl Default for Distillation {
+    fn default() -> Self {
+        Self {
+            starts: 12,
+            start_iterations: 25,
+            iterations: 150,
+        }
+    }
+}
+
+/// Nodes at which a function is imitated: `[0, 1.3]`, beyond what `K * u` reaches.
+const IMITATED: usize = 105;
+/// Their distance.
+const NODE_DISTANCE: f64 = 0.0125;
+/// Weights of first and second differences against values.
+const SOBOLEV: [f64; 2] = [0.03, 0.002];
+/// A start this good is taken.
+const GOOD_START: f64 = 1e-9;
+
+/// Fits a perceptron `N` of the paper's layers such that `(N(z) - N(-z)) / 2` is the odd function `target`, together with its
+/// first two derivatives (a Sobolev norm on a fine grid), and returns that odd part.
+///
+/// # Errors
+/// [`Error::Operators`] if the device fails, [`Error::Interrupted`] if the observer says so.
+pub(super) fn distill_odd(
+    target: &dyn Fn(f64) -> f64,
+    settings: &Distillation,
+    seed: u64,
+    device: &ComputeDevice,
+    observer: &mut dyn Observer<()>,
+) -> Result<Mlp, Error> {
+    let nodes: Vec<f64> = (0..IMITATED).map(|i| i as f64 * NODE_DISTANCE).collect();
+    let design: Vec<f64> = nodes
+        .iter()
+        .copied()
+        .chain(nodes.iter().map(|z| -z))
+        .collect();
+    let samples = BandSamples {
+        target: design
+            .iter()
+            .map(|&z| z.signum() * target(z.abs()))
+            .collect(),
+        weight: vec![1.0; design.len()],
+        identity_loss: 1.0,
+        design,
+    };
+    let n = parameter_count(&PAPER_LAYERS);
+    let of = 4 * settings.starts.max(1) * settings.start_iterations + 3 * settings.iterations;
+    let mut iteration = 0;
+    let mut fit = |x: Vec<f64>, ridge: f64, iterations: usize| -> Result<(f64, Vec<f64>), Error> {
+        // One "orbit" whose value is frozen at 1 by an overwhelming ridge.
+        let mut weights = vec![ridge; n + 1];
+        weights[0] = 1e12;
+        let mut centre = vec![0.0; n + 1];
+        centre[0] = 1.0;
+        let mut problem = Problem::new(&samples, &[1], &PAPER_LAYERS, (weights, centre), device);
+        problem.mix = Some(odd_sobolev_rows());
+        let mut all = [vec![1.0], x].concat();
+        let mut damping = 1e-3;
+        for _ in 0..iterations {
+            let Some(next) = problem.step(&all, &mut damping)? else {
+                break;
+            };
+            all = next;
+            iteration += 1;
+            let (loss, _) = problem.value(&all)?;
+            let progress = Progress {
+                iteration,
+                of,
+                training_loss: loss,
+                held_out_loss: loss,
+            };
+            if !observer.observe(&progress, &())? {
+                return Err(Error::Interrupted { iteration });
+            }
+        }
+        let (loss, _) = problem.value(&all)?;
+        Ok((loss, all.split_off(1)))
+    };
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for start in 0..settings.starts.max(1) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(start as u64));
+        let mut found = (f64::INFINITY, random_activation(&mut rng));
+        for ridge in [1e-6, 1e-7, 1e-8, 1e-9] {
+            found = fit(found.1, ridge, settings.start_iterations)?;
+        }
+        if best.as_ref().is_none_or(|(loss, _)| found.0 < *loss) {
+            best = Some(found);
+        }
+        if best.as_ref().is_some_and(|(loss, _)| *loss < GOOD_START) {
+            break;
+        }
+    }
+    let (_, mut parameters) = best.ok_or_else(|| Error::Training("no start".to_owned()))?;
+    for ridge in [1e-10, 1e-11, 1e-12] {
+        (_, parameters) = fit(parameters, ridge, settings.iterations)?;
+    }
+    Ok(Mlp::new(PAPER_LAYERS.to_vec(), parameters)?.odd_part())
+}
+
+/// Values, first and second differences of `(N(z) - N(-z)) / 2` from values of `N` at the nodes and their negatives.
+fn odd_sobolev_rows() -> Mat<f64> {
+    let (n, h) = (IMITATED, NODE_DISTANCE);
+    let scale = 0.5 / (n as f64).sqrt();
+    let mut rows = Mat::zeros(3 * n - 3, 2 * n);
+    let mut put = |row: usize, node: usize, value: f64| {
+        rows[(row, node)] += scale * value;
+        rows[(row, n + node)] -= scale * value;
+    };
+    for i in 0..n {
+        put(i, i, 1.0);
+    }
+    let [first, second] = [SOBOLEV[0] / (2.0 * h), SOBOLEV[1] / (h * h)];
+    // The node before the first is minus the one after it.
+    put(n, 1, 2.0 * first);
+    for i in 1..n - 1 {
+        put(n + i, i + 1, first);
+        put(n + i, i - 1, -first);
+        put(2 * n - 2 + i, i + 1, second);
+        put(2 * n - 2 + i, i, -2.0 * second);
+        put(2 * n - 2 + i, i - 1, second);
+    }
+    rows
+}

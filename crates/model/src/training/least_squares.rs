@@ -1,0 +1,424 @@
+//! The accurate recipe: the heat kernel, and an odd activation by linear least squares.
+//!
+//! What the calibrated Willmore scheme asks of `V[u] = F(K * u)` is not what the paper's loss measures. It needs every
+//! curvature at the same relative accuracy, both phases treated alike, and an `F` without wiggles, since `F''` is in every
+//! Hessian. So here
+//!
+//! - `K` is the heat kernel of variance `2 tautilde` per axis, for which a single step is exact to first order in the
+//!   curvature once `F` keeps the flat interface (`docs/calibration.md`);
+//! - `F` is an odd polynomial, found by linear least squares: no start, no local minima. Each radius counts relative to how
+//!   far its sphere moves, and flat interfaces in many directions must stay where they are;
+//! - a [distillation](Distillation) fits a perceptron of the paper's form to the polynomial, with its first and second derivatives.
+
+use faer::linalg::solvers::SolveLstsq;
+use faer::{Col, Mat};
+use geometry::optimal_profile;
+use operators::ComputeDevice;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::distillation::{Distillation, distill_odd};
+use super::levenberg_marquardt::heat_kernel;
+use super::spheres::direction;
+use super::{Observer, SphereData};
+use crate::{Error, Mlp};
+
+/// Settings of the accurate recipe.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LeastSquaresParams {
+    /// Number of radii, evenly spread in their logarithm.
+    pub radii: usize,
+    /// Smallest and largest radius in units of `eps`. A sphere of the smallest must survive the step.
+    pub range: [f64; 2],
+    /// Strata across the interface band, per radius.
+    pub shells: usize,
+    /// Random points per stratum.
+    pub directions: usize,
+    /// Normals of flat interfaces.
+    pub normals: usize,
+    /// Weight of the flat interfaces against the spheres, as a factor of the residual.
+    pub flat: f64,
+    /// Number of odd Chebyshev polynomials; the highest has degree `2 terms - 1`.
+    pub terms: usize,
+    /// Settings of the perceptron's fit.
+    pub distillation: Distillation,
+}
+
+impl Default for LeastSquaresParams {
+    fn default() -> Self {
+        Self {
+            radii: 24,
+            range: [3.2, 40.0],
+            shells: 48,
+            directions: 3,
+            normals: 24,
+            flat: 1e3,
+            terms: 8,
+            distillation: Distillation::default(),
+        }
+    }
+}
+
+/// An odd function on `[-1, 1]`, continued by its second-order Taylor polynomial.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OddPolynomial {
+    /// Of the Chebyshev polynomials of degree 1, 3, 5, ...
+    coefficients: Vec<f64>,
+}
+
+impl OddPolynomial {
+    /// `[F, F', F'']` at `z`.
+    pub fn jet(&self, z: f64) -> [f64; 3] {
+        let x = z.clamp(-1.0, 1.0);
+        let mut sum = [0.0; 3];
+        // T_(n+1) = 2 x T_n - T_(n-1), differentiated twice.
+        let (mut before, mut now) = ([1.0, 0.0, 0.0], [x, 1.0, 0.0]);
+        for coefficient in &self.coefficients {
+            for (sum, t) in sum.iter_mut().zip(now) {
+                *sum += coefficient * t;
+            }
+            for _ in 0..2 {
+                let next = [
+                    2.0 * x * now[0] - before[0],
+                    2.0 * (now[0] + x * now[1]) - before[1],
+                    2.0 * (2.0 * now[1] + x * now[2]) - before[2],
+                ];
+                (before, now) = (now, next);
+            }
+        }
+        let beyond = z - x;
+        [
+            sum[0] + beyond * (sum[1] + 0.5 * beyond * sum[2]),
+            sum[1] + beyond * sum[2],
+            sum[2],
+        ]
+    }
+
+    /// The odd Chebyshev polynomials at `z`, as many as there are coefficients.
+    fn basis(terms: usize, z: f64) -> Vec<f64> {
+        let (mut before, mut now) = (1.0, z);
+        (0..terms)
+            .map(|_| {
+                let value = now;
+                for _ in 0..2 {
+                    (before, now) = (now, 2.0 * z * now - before);
+                }
+                value
+            })
+            .collect()
+    }
+}
+
+/// Half-width of the sampled band in units of `eps`.
+const BAND: f64 = 7.0;
+/// Samples across a flat interface.
+const ACROSS: usize = 64;
+/// Weight of `F(1) = 1`.
+const PHASE: f64 = 1e3;
+
+/// One equation `weight (F(K * u) - target) = 0`.
+struct Row {
+    smoothed: f64,
+    target: f64,
+    weight: f64,
+}
+
+/// `K * u` at a point, for a function `u` of the point.
+fn smoothed(kernel: &[(Vec<f64>, f64)], x: &[f64], u: impl Fn(&[f64]) -> f64) -> f64 {
+    let mut moved = vec![0.0; x.len()];
+    kernel
+        .iter()
+        .map(|(offset, weight)| {
+            for ((moved, x), b) in moved.iter_mut().zip(x).zip(offset) {
+                *moved = x + b;
+            }
+            weight * u(&moved)
+        })
+        .sum()
+}
+
+fn norm(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Equations for a shrinking sphere; their weights make the identity map score 1.
+fn sphere_rows(
+    data: &SphereData,
+    params: &LeastSquaresParams,
+    kernel: &[(Vec<f64>, f64)],
+    radius: f64,
+    points: &[(f64, Vec<f64>)],
+) -> Vec<Row> {
+    let eps = data.eps();
+    let shrunk = data.shrunk(radius);
+    let mut rows: Vec<Row> = points
+        .iter()
+        .map(|(weight, x)| Row {
+            smoothed: smoothed(kernel, x, |y| optimal_profile(norm(y) - radius, eps)),
+            target: optimal_profile(norm(x) - shrunk, eps),
+            weight: *weight,
+        })
+        .collect();
+    let identity: f64 = (rows.iter().zip(points))
+        .map(|(row, (_, x))| {
+            let motion = row.target - optimal_profile(norm(x) - radius, eps);
+            row.weight * motion * motion
+        })
+        .sum();
+    for row in &mut rows {
+        row.weight = (row.weight / (identity * params.radii as f64)).sqrt();
+    }
+    rows
+}
+
+/// Equations for flat interfaces, which stay.
+fn flat_rows(
+    data: &SphereData,
+    params: &LeastSquaresParams,
+    kernel: &[(Vec<f64>, f64)],
+    normal: &[f64],
+    shift: f64,
+) -> Vec<Row> {
+    let eps = data.eps();
+    let thickness = 2.0 * BAND * eps / ACROSS as f64;
+    let weight = params.flat * (thickness / params.normals as f64).sqrt();
+    (0..ACROSS)
+        .map(|i| {
+            let distance = (i as f64 + shift) * thickness - BAND * eps;
+            let x: Vec<f64> = normal.iter().map(|n| n * distance).collect();
+            let along = |y: &[f64]| y.iter().zip(normal).map(|(y, n)| y * n).sum::<f64>();
+            Row {
+                smoothed: smoothed(kernel, &x, |y| optimal_profile(along(y), eps)),
+                target: optimal_profile(distance, eps),
+                weight,
+            }
+        })
+        .collect()
+}
+
+/// The activation for a given kernel, by linear least squares.
+///
+/// # Errors
+/// [`Error::Training`] for radii that vanish within the step, or settings that determine nothing.
+pub fn fit(
+    data: &SphereData,
+    params: &LeastSquaresParams,
+    kernel: &[f64],
+    seed: u64,
+) -> Result<OddPolynomial, Error> {
+    data.ratios.validate()?;
+    let (dimension, eps) = (data.ratios.dimension, data.eps());
+    let [low, high] = params.range.map(|r| r * eps);
+    let enough = params.radii > 1 && params.terms > 0 && params.shells * params.directions > 1;
+    if !(enough && params.normals > 0 && low > 0.0 && low < high && data.shrunk(low) > 0.0) {
+        return Err(Error::Training(format!(
+            "{} radii from {low} to {high} and {} normals determine no activation of {} terms",
+            params.radii, params.normals, params.terms
+        )));
+    }
+    let kernel = with_offsets(data, kernel);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let spheres: Vec<(f64, Vec<(f64, Vec<f64>)>)> = (0..params.radii)
+        .map(|i| {
+            let part = i as f64 / (params.radii - 1) as f64;
+            let radius = low * (high / low).powf(part);
+            let nearest = (radius - BAND * eps).max(0.0);
+            let thickness = (radius + BAND * eps - nearest) / params.shells as f64;
+            let points = (0..params.shells * params.directions)
+                .map(|k| {
+                    let shell = (k / params.directions) as f64 + rng.random_range(0.0..1.0);
+                    let rho = nearest + thickness * shell;
+                    let weight = rho.powi(dimension as i32 - 1);
+                    (weight, direction(dimension, rho, &mut rng))
+                })
+                .collect();
+            (radius, points)
+        })
+        .collect();
+    let planes: Vec<(Vec<f64>, f64)> = (0..params.normals)
+        .map(|_| {
+            (
+                direction(dimension, 1.0, &mut rng),
+                rng.random_range(0.0..1.0),
+            )
+        })
+        .collect();
+    let mut rows: Vec<Row> = spheres
+        .par_iter()
+        .flat_map_iter(|(radius, points)| sphere_rows(data, params, &kernel, *radius, points))
+        .collect();
+    let flat: Vec<Row> = planes
+        .par_iter()
+        .flat_map_iter(|(normal, shift)| flat_rows(data, params, &kernel, normal, *shift))
+        .collect();
+    rows.extend(flat);
+    rows.push(Row {
+        smoothed: 1.0,
+        target: 1.0,
+        weight: PHASE,
+    });
+    let mut matrix = Mat::zeros(rows.len(), params.terms);
+    for (i, row) in rows.iter().enumerate() {
+        for (j, value) in OddPolynomial::basis(params.terms, row.smoothed)
+            .iter()
+            .enumerate()
+        {
+            matrix[(i, j)] = row.weight * value;
+        }
+    }
+    let right = Col::from_fn(rows.len(), |i| rows[i].weight * rows[i].target);
+    let solution = matrix.col_piv_qr().solve_lstsq(&right);
+    let coefficients: Vec<f64> = solution.iter().copied().collect();
+    if coefficients.iter().any(|c| !c.is_finite()) {
+        return Err(Error::Training(
+            "the least-squares problem of the activation is singular".to_owned(),
+        ));
+    }
+    Ok(OddPolynomial { coefficients })
+}
+
+/// The kernel's entries with their offsets as lengths.
+fn with_offsets(data: &SphereData, kernel: &[f64]) -> Vec<(Vec<f64>, f64)> {
+    let (dimension, width, h) = (data.ratios.dimension, data.ratios.width, data.spacing());
+    let middle = (width / 2) as f64;
+    (kernel.iter().enumerate())
+        .map(|(mut i, &weight)| {
+            let offset = (0..dimension)
+                .map(|_| {
+                    let b = (i % width) as f64 - middle;
+                    i /= width;
+                    b * h
+                })
+                .collect();
+            (offset, weight)
+        })
+        .collect()
+}
+
+/// Fits kernel and activation: the heat kernel, [`fit`], and a perceptron of the paper's layers, made odd (so that its hidden
+/// layers are twice as wide).
+///
+/// # Errors
+/// As [`fit`]; [`Error::Interrupted`] if the observer says so.
+pub fn train(
+    data: &SphereData,
+    params: &LeastSquaresParams,
+    seed: u64,
+    device: &ComputeDevice,
+    observer: &mut dyn Observer<()>,
+) -> Result<(Vec<f64>, Mlp, OddPolynomial), Error> {
+    let kernel = heat_kernel(data);
+    let polynomial = fit(data, params, &kernel, seed)?;
+    let target = |z: f64| polynomial.jet(z)[0];
+    let activation = distill_odd(&target, &params.distillation, seed, device, observer)?;
+    Ok((kernel, activation, polynomial))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Ratios;
+
+    fn data() -> SphereData {
+        let ratios = Ratios {
+            dimension: 2,
+            width: 17,
+            eps_over_h: 2.0,
+            step_over_h2: 1.0,
+        };
+        SphereData::new(ratios, 128).unwrap()
+    }
+
+    #[test]
+    fn jets_of_polynomials_are_their_derivatives() {
+        let polynomial = OddPolynomial {
+            coefficients: vec![0.9, -0.2, 0.05, 0.01],
+        };
+        for z in [-0.8, 0.0, 0.35, 0.99] {
+            let h = 1e-4;
+            let [minus, here, plus] = [z - h, z, z + h].map(|z| polynomial.jet(z));
+            assert!(((plus[0] - minus[0]) / (2.0 * h) - here[1]).abs() < 1e-6);
+            assert!(((plus[1] - minus[1]) / (2.0 * h) - here[2]).abs() < 1e-5);
+            assert!((polynomial.jet(-z)[0] + here[0]).abs() < 1e-15);
+        }
+        // cos 3 arccos 0.5 = -1
+        let third = OddPolynomial {
+            coefficients: vec![0.0, 1.0],
+        };
+        assert!((third.jet(0.5)[0] + 1.0).abs() < 1e-15);
+    }
+
+    /// The polynomial moves spheres of other radii than those of the fit, and keeps flat interfaces.
+    #[test]
+    fn the_fit_is_exact_for_nearly_flat_interfaces() {
+        let data = data();
+        let params = LeastSquaresParams::default();
+        let kernel = heat_kernel(&data);
+        let polynomial = fit(&data, &params, &kernel, 7).unwrap();
+        let offsets = with_offsets(&data, &kernel);
+        let mut rng = ChaCha8Rng::seed_from_u64(99);
+        for (radius, bound) in [(0.06, 0.05), (0.17, 0.01), (0.5, 0.01)] {
+            let (mut error, mut motion) = (0.0, 0.0);
+            for k in 0..200 {
+                let rho = radius + (f64::from(k) / 100.0 - 1.0) * 4.0 * data.eps();
+                if rho < 0.0 {
+                    continue;
+                }
+                let x = direction(2, rho, &mut rng);
+                let profile = |r: f64| optimal_profile(rho - r, data.eps());
+                let v = polynomial.jet(smoothed(&offsets, &x, |y| {
+                    optimal_profile(norm(y) - radius, data.eps())
+                }))[0];
+                let target = profile(data.shrunk(radius));
+                error += rho * (v - target).powi(2);
+                motion += rho * (profile(radius) - target).powi(2);
+            }
+            let relative = f64::sqrt(error / motion);
+            assert!(relative < bound, "radius {radius}: {relative}");
+        }
+    }
+
+    #[test]
+    fn settings_that_determine_nothing_are_refused() {
+        let data = data();
+        let kernel = heat_kernel(&data);
+        for params in [
+            LeastSquaresParams {
+                range: [0.1, 30.0],
+                ..LeastSquaresParams::default()
+            },
+            LeastSquaresParams {
+                terms: 0,
+                ..LeastSquaresParams::default()
+            },
+        ] {
+            assert!(matches!(
+                fit(&data, &params, &kernel, 1),
+                Err(Error::Training(_))
+            ));
+        }
+    }
+
+    #[test]
+    fn perceptrons_follow_the_polynomial_to_the_second_derivative() {
+        let device = ComputeDevice::default_compiled().unwrap();
+        let data = data();
+        let params = LeastSquaresParams::default();
+        let (_, mlp, polynomial) =
+            train(&data, &params, 1, &device, &mut |_: &_, (): &()| Ok(true)).unwrap();
+        let mut worst = [0.0_f64; 3];
+        for i in -100..=100 {
+            let z = f64::from(i) / 100.0;
+            let (found, wanted) = (mlp.jet(z), polynomial.jet(z));
+            for (k, worst) in worst.iter_mut().enumerate() {
+                *worst = worst.max((found[k] - wanted[k]).abs());
+            }
+        }
+        assert!(
+            worst[0] < 2e-5 && worst[1] < 2e-3 && worst[2] < 0.1,
+            "{worst:?}"
+        );
+    }
+}

@@ -1,0 +1,104 @@
+//! Flows in which only some unknowns move: inpainting.
+
+use std::sync::Arc;
+
+use burn::tensor::{Bool, DType, Tensor};
+use geometry::Grid;
+use operators::ComputeDevice;
+
+use crate::{Error, Objective};
+
+/// The grid nodes whose values may change; the others keep theirs, bit for bit.
+#[derive(Clone)]
+pub struct Region<const D: usize> {
+    nodes: Arc<[bool]>,
+    /// 1 inside, 0 outside.
+    inside: Tensor<D>,
+    outside: Tensor<D, Bool>,
+}
+
+impl<const D: usize> Region<D> {
+    /// The nodes that are marked, in the order of the grid.
+    ///
+    /// # Errors
+    /// [`Error::Region`] if there are not as many marks as nodes, or if none is set.
+    pub fn new(grid: &Grid<D>, nodes: &[bool], device: &ComputeDevice) -> Result<Self, Error> {
+        let marked = nodes.iter().filter(|inside| **inside).count();
+        if nodes.len() != grid.len() || marked == 0 {
+            return Err(Error::Region {
+                marks: nodes.len(),
+                nodes: grid.len(),
+                marked,
+            });
+        }
+        let values: Vec<f64> = nodes.iter().map(|&inside| f64::from(inside)).collect();
+        let inside = device.tensor::<D>(&values, [grid.cells(); D]);
+        Ok(Self {
+            nodes: nodes.into(),
+            outside: inside.clone().equal_elem(0.0),
+            inside,
+        })
+    }
+
+    /// Which nodes are inside, in the order of the grid.
+    pub fn nodes(&self) -> &[bool] {
+        &self.nodes
+    }
+
+    /// `x` inside, zero outside.
+    pub(crate) fn project(&self, x: Tensor<D>) -> Tensor<D> {
+        let inside = self.inside.clone().cast(x.dtype());
+        x * inside
+    }
+
+    /// `u` inside, `fixed` outside.
+    pub(crate) fn hold(&self, u: Tensor<D>, fixed: &Tensor<D>) -> Tensor<D> {
+        u.mask_where(self.outside.clone(), fixed.clone())
+    }
+}
+
+/// An objective as a function of the values in a region.
+pub(crate) struct Constrained<'a, const D: usize, O> {
+    objective: &'a mut O,
+    region: &'a Region<D>,
+    fixed: &'a Tensor<D>,
+}
+
+impl<'a, const D: usize, O> Constrained<'a, D, O> {
+    /// Outside the region the values are those of `fixed`.
+    pub(crate) fn new(objective: &'a mut O, region: &'a Region<D>, fixed: &'a Tensor<D>) -> Self {
+        Self {
+            objective,
+            region,
+            fixed,
+        }
+    }
+}
+
+impl<const D: usize, O: Objective<D>> Objective<D> for Constrained<'_, D, O> {
+    fn value(&mut self, u: &Tensor<D>) -> Result<f64, Error> {
+        self.objective.value(u)
+    }
+
+    fn evaluate(&mut self, u: &Tensor<D>) -> Result<(f64, Tensor<D>), Error> {
+        let (value, gradient) = self.objective.evaluate(u)?;
+        Ok((value, self.region.project(gradient)))
+    }
+
+    fn hessian_vector_product(&mut self, p: &Tensor<D>) -> Result<Tensor<D>, Error> {
+        let product = self.objective.hessian_vector_product(p)?;
+        Ok(self.region.project(product))
+    }
+
+    fn product_dtype(&self) -> Option<DType> {
+        self.objective.product_dtype()
+    }
+
+    fn unit(&self) -> f64 {
+        self.objective.unit()
+    }
+
+    fn hold(&self, u: Tensor<D>) -> Tensor<D> {
+        self.region.hold(u, self.fixed)
+    }
+}
