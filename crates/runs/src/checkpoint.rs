@@ -242,7 +242,7 @@ fn decode(source: impl Read, length: u64, path: &Path) -> Result<Checkpoint, Err
     let mut header = vec![0; header_length];
     source.read_exact(&mut header).map_err(failed)?;
     let header: Header =
-        serde_json::from_slice(&header).map_err(|e| content(format!("its header says {e}")))?;
+        serde_json::from_slice(&header).map_err(|e| damaged(Damage::json("its header", &e)))?;
     check_names(&header.arrays).map_err(content)?;
     let values = header
         .arrays

@@ -213,6 +213,24 @@ fn advice(fallback: Option<u64>) -> String {
     }
 }
 
+/// What a parser says about bytes that nobody has written: quotations made one line, and short.
+pub(crate) fn one_line(text: impl fmt::Display) -> String {
+    let text = text.to_string();
+    let plain = |c: char| if c.is_control() { ' ' } else { c };
+    let mut line: String = text.chars().take(300).map(plain).collect();
+    if line.len() < text.len() {
+        line.push('…');
+    }
+    line
+}
+
+impl Damage {
+    /// Content that a parser of JSON has refused.
+    pub(crate) fn json(what: &str, error: &serde_json::Error) -> Self {
+        Self::Content(one_line(format_args!("{what} is not as expected: {error}")))
+    }
+}
+
 impl Error {
     /// Damage of a file on its own, as seen by a reader that knows of no other files.
     pub(crate) fn damaged(path: impl Into<PathBuf>, damage: Damage) -> Self {

@@ -6,6 +6,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
+use crate::error::one_line;
 
 /// What is computed, on which grid, with which network and options, and by which program. A run is
 /// resumed only where all but the program agree.
@@ -62,8 +63,8 @@ impl Identity {
             Err(Error::Mismatch {
                 path: path.into(),
                 what,
-                found,
-                expected,
+                found: one_line(found),
+                expected: one_line(expected),
             })
         };
         if self.kind != expected.kind {

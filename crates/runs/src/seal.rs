@@ -60,5 +60,5 @@ pub(crate) fn unseal<T: DeserializeOwned>(bytes: &[u8], path: &Path) -> Result<T
         .strip_prefix(MIDDLE)
         .and_then(|rest| rest.strip_suffix(TAIL))
         .ok_or_else(|| failed(Damage::Content("nothing follows its checksum".into())))?;
-    serde_json::from_str(content).map_err(|e| failed(Damage::Content(format!("it says {e}"))))
+    serde_json::from_str(content).map_err(|e| failed(Damage::json("its content", &e)))
 }

@@ -192,8 +192,10 @@ impl StoredRun {
     /// [`Error::Io`], [`Error::Damaged`].
     pub fn manifest(&self) -> Result<Value, Error> {
         serde_json::from_str(&self.text(names::MANIFEST)?).map_err(|e| {
-            let damage = Damage::Content(format!("it says {e}"));
-            Error::damaged(self.path.join(names::MANIFEST), damage)
+            Error::damaged(
+                self.path.join(names::MANIFEST),
+                Damage::json("its content", &e),
+            )
         })
     }
 

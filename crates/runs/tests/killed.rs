@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use common::{Random, STEPS, Toy, contents, identity, run_to, state_at, uninterrupted};
 use files::Disk;
-use runs::{Interrupt, RunDirectory};
+use runs::{Error, Interrupt, RunDirectory};
 
 /// The folder of the run, the milliseconds of a step; both set for the process.
 const FOLDER: &str = "RUNS_TEST_FOLDER";
@@ -169,20 +169,77 @@ fn one_signal_commits_and_two_end_at_once() {
 fn where_the_system_refuses_to_write_the_last_commit_stays() {
     let root = tempfile::tempdir().unwrap();
     let folder = root.path().join("run");
-    // Blocks of 512 bytes; the metrics grow beyond two of them, the index is longer at once.
-    for blocks in [1, 2, 4] {
+    let mut last = 0;
+    // Blocks of 512 bytes. The index is the longest file, and grows.
+    for blocks in [1, 4, 5] {
         let limit = format!("trap '' XFSZ; ulimit -f {blocks};");
-        let child = start(&folder, 0, &limit);
-        let output = child.wait_with_output().unwrap();
+        let output = start(&folder, 0, &limit).wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(1));
         let message = String::from_utf8(output.stderr).unwrap();
         let message = message.lines().last().unwrap();
         assert!(message.starts_with("could not write"), "{message}");
         assert!(message.contains("File too large"), "{message}");
-        println!("{blocks} blocks: {message}");
+        if let Ok(stored) = RunDirectory::open(&folder) {
+            last = stored.checkpoint().map_or(0, |c| c.state.step);
+        }
     }
+    assert!(last > 0, "no run came far enough");
     run_to(&folder, STEPS).unwrap();
     assert!(contents(&folder) == uninterrupted());
+}
+
+/// Disks of all sizes up to one that is large enough, where the system lets users mount one.
+#[cfg(target_os = "linux")]
+#[test]
+fn on_a_full_disk_the_last_commit_stays() {
+    const SCRIPT: &str = "mount -t tmpfs -o size=$SIZE tmpfs \"$DISK\" || exit 77
+        \"$0\" \"$@\"; code=$?
+        cp -R \"$DISK/.\" \"$COPY\" || exit 78
+        exit $code";
+    let expected = uninterrupted();
+    let mut steps = Vec::new();
+    for size in (8..).step_by(4) {
+        let root = tempfile::tempdir().unwrap();
+        let (disk, copy) = (root.path().join("disk"), root.path().join("copy"));
+        for folder in [&disk, &copy] {
+            std::fs::create_dir(folder).unwrap();
+        }
+        let process = Command::new("unshare")
+            .args(["-rm", "sh", "-c", SCRIPT])
+            .arg(std::env::current_exe().unwrap())
+            .args(["--ignored", "--exact", "process", "--nocapture"])
+            .env("SIZE", format!("{size}k"))
+            .env("DISK", &disk)
+            .env("COPY", &copy)
+            .env(FOLDER, disk.join("run"))
+            .env(PAUSE, "0")
+            .output();
+        let output = match process {
+            Ok(output) if output.status.code() != Some(77) => output,
+            other => {
+                println!("SKIPPED, no disk can be mounted: {other:?}");
+                return;
+            }
+        };
+        let message = String::from_utf8(output.stderr).unwrap();
+        let run = copy.join("run");
+        if output.status.success() {
+            assert!(contents(&run) == expected);
+            println!("{size} KiB are enough; steps before: {steps:?}");
+            break;
+        }
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        let message = message.lines().last().unwrap();
+        assert!(message.starts_with("could not "), "{message}");
+        assert!(message.contains("No space left"), "{message}");
+        match RunDirectory::open(&run) {
+            Ok(stored) => steps.push(stored.checkpoint().map_or(0, |c| c.state.step)),
+            Err(error) => assert!(matches!(error, Error::NoRun { .. }), "{error}"),
+        }
+        run_to(&run, STEPS).unwrap();
+        assert!(contents(&run) == expected, "{size} KiB");
+    }
+    assert!(steps.iter().any(|step| (3..STEPS).contains(step)));
 }
 
 #[test]
