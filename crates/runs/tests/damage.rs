@@ -82,6 +82,9 @@ fn every_flipped_bit_is_noticed_and_its_file_named() {
             fs::write(&path, bytes).unwrap();
             RunDirectory::open(&run).unwrap();
         }
+        fs::remove_file(run.join("lock")).unwrap();
+        fs::create_dir(run.join("lock")).unwrap();
+        assert_eq!(damaged(&run).0, "lock");
         println!("{flips} flipped bits");
         // 24 and the ends for each file, and the sealed ones whole.
         assert!(flips > 40 * (files.len() - 1) + 2000, "{flips}");

@@ -218,6 +218,66 @@ fn every_operation_of_a_recovery_may_fail() {
     }
 }
 
+#[test]
+fn after_a_failed_commit_or_row_the_run_has_to_be_opened_again() {
+    let folder = common::quick_folder();
+    let start = |name: &str, at| {
+        let storage = Faulty::new(at, false, usize::MAX);
+        let path = folder.path().join(name);
+        let manifest = serde_json::Value::Null;
+        let run =
+            RunDirectory::create_on(storage.clone(), path, &common::identity(), &manifest, "");
+        (run.unwrap(), storage.operations())
+    };
+    let (_, operations) = start("counted", usize::MAX);
+
+    let (mut run, _) = start("row", operations);
+    let error = run.metric(&BTreeMap::from([("a", 1)])).unwrap_err();
+    assert!(
+        matches!(error, Error::Row { .. }),
+        "maps are no rows: {error}"
+    );
+    #[derive(serde::Serialize)]
+    struct Row {
+        a: u32,
+    }
+    assert!(matches!(run.metric(&Row { a: 1 }), Err(Error::Io { .. })));
+    assert!(matches!(
+        run.metric(&Row { a: 1 }),
+        Err(Error::Broken { .. })
+    ));
+    assert!(matches!(
+        run.commit(&state_at(1)),
+        Err(Error::Broken { .. })
+    ));
+
+    // The write of the checkpoint, and the flush of the folder after the index is in place.
+    for (name, after, step) in [("checkpoint", 1, 0), ("folder", 10, 3)] {
+        let (mut run, _) = start(name, operations + after);
+        let error = run.commit(&state_at(3)).unwrap_err();
+        assert!(matches!(error, Error::Write(_)), "{error}");
+        for result in [
+            run.commit(&state_at(3)),
+            run.metric(&Row { a: 1 }),
+            run.write_file("fields/a", |_| Ok(())).map(drop),
+            run.write_timings(&serde_json::Value::Null),
+            run.finish(&state_at(3)),
+        ] {
+            assert!(matches!(result, Err(Error::Broken { .. })), "{result:?}");
+        }
+        let stored = RunDirectory::open(folder.path().join(name)).unwrap();
+        let found = stored.checkpoint().map_or(0, |c| c.state.step);
+        assert_eq!(found, step, "{name}");
+    }
+    // A file alone does not break the run.
+    let (mut run, _) = start("file", operations + 1);
+    let failed = run.write_file("fields/a", |out| out.write_all(b"a"));
+    assert!(matches!(failed, Err(Error::Write(_))));
+    run.write_file("fields/a", |out| out.write_all(b"a"))
+        .unwrap();
+    run.finish(&state_at(3)).unwrap();
+}
+
 /// Watches the order of operations: what a power failure may take away.
 #[derive(Debug, Default)]
 struct Watching(Mutex<Watched>);
