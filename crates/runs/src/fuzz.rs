@@ -261,11 +261,40 @@ proptest! {
         if let Ok(index) = result {
             for commit in &index.commits {
                 let only = index.only(commit);
-                prop_assert_eq!(only.files.len(), commit.files);
                 prop_assert_eq!(read_index(&text(&only)).unwrap(), only);
             }
             prop_assert_eq!(read_index(&text(&index)).unwrap(), index);
         }
+    }
+}
+
+#[test]
+fn an_index_that_contradicts_itself_is_refused() {
+    let changes: [(&str, fn(&mut Index)); 13] = [
+        ("version 2", |i| i.format = 2),
+        ("one or two commits", |i| i.commits.clear()),
+        ("one or two commits", |i| {
+            i.commits.insert(0, i.commits[0].clone());
+        }),
+        ("more than one", |i| i.finished = true),
+        ("follow", |i| i.commits[0].files = 3),
+        ("follow", |i| i.commits[1].files = 1),
+        ("follow", |i| i.commits[1].files = 3),
+        ("follow", |i| i.commits[0].metrics.length = 61),
+        ("follow", |i| i.commits.swap(0, 1)),
+        ("file twice", |i| i.files[1] = i.files[0].clone()),
+        ("impossible name", |i| i.files[1].name = "../a".into()),
+        ("checkpoint twice", |i| i.commits[0] = i.commits[1].clone()),
+        ("impossible checksum", |i| {
+            i.commits[0].metrics.sha256.make_ascii_uppercase();
+        }),
+    ];
+    read_index(&text(&an_index())).unwrap();
+    for (reason, change) in changes {
+        let mut index = an_index();
+        change(&mut index);
+        let message = read_index(&text(&index)).unwrap_err().to_string();
+        assert!(message.contains(reason), "{message} instead of {reason}");
     }
 }
 
@@ -306,5 +335,5 @@ fn readers_are_bounded_in_memory() {
         .unwrap();
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{text}");
-    assert!(text.contains("7 passed"), "{text}");
+    assert!(text.contains("8 passed"), "{text}");
 }
