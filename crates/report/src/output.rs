@@ -1,10 +1,8 @@
 //! An output folder that is checked early and whose files are never half written.
 
 use std::fs;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Component, Path, PathBuf};
-
-use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
 
@@ -28,9 +26,7 @@ impl OutputDir {
             source,
         };
         fs::create_dir_all(&path).map_err(failed)?;
-        let mut probe = temporary(&path).map_err(failed)?;
-        probe.write_all(b"probe").map_err(failed)?;
-        probe.close().map_err(failed)?;
+        files::probe(&path).map_err(|error| failed(error.source))?;
         Ok(Self { path })
     }
 
@@ -74,8 +70,7 @@ impl OutputDir {
 
     /// Writes a file through a callback, replacing an old one only if the callback succeeds.
     ///
-    /// The content goes to a temporary file in the same folder, is flushed to the disk, and then
-    /// takes its name in one step.
+    /// See [`files::write_atomically`].
     ///
     /// # Errors
     ///
@@ -86,40 +81,10 @@ impl OutputDir {
         produce: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<PathBuf> {
         let path = self.path(name)?;
-        let stored = || -> io::Result<()> {
-            let mut writer = BufWriter::new(temporary(&self.path)?);
-            produce(&mut writer)?;
-            let file = writer
-                .into_inner()
-                .map_err(io::IntoInnerError::into_error)?;
-            file.as_file().sync_all()?;
-            file.persist(&path).map_err(|error| error.error)?;
-            sync_folder(&self.path);
-            Ok(())
-        };
-        match stored() {
+        match files::write_atomically(&path, produce) {
             Ok(()) => Ok(path),
-            Err(source) => Err(Error::Write { path, source }),
+            Err(files::Error { source, .. }) => Err(Error::Write { path, source }),
         }
-    }
-}
-
-/// A temporary file, deleted when dropped, with the permissions of an ordinary new file.
-fn temporary(folder: &Path) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".unfinished-");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(folder)
-}
-
-/// Makes the new name durable where folders can be synchronised; elsewhere it soon is anyway.
-fn sync_folder(folder: &Path) {
-    if let Ok(folder) = fs::File::open(folder) {
-        let _ = folder.sync_all();
     }
 }
 

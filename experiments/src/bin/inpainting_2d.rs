@@ -421,7 +421,7 @@ fn frames(run: &RunOptions, one: &Finished) -> Result<Figure, Error> {
 fn energies(run: &RunOptions, all: &[Finished]) -> Figure {
     let mut figure = Figure::new(run.title("Willmore energy while inpainting"), 2);
     for one in all {
-        let points = (one.trajectory.records.iter())
+        let points: Vec<[f64; 2]> = (one.trajectory.records.iter())
             .map(|r| [r.time, r.willmore_energy])
             .collect();
         figure = figure.with_panel(

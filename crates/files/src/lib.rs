@@ -1,0 +1,32 @@
+//! Files that are either complete or absent.
+//!
+//! ```
+//! # let folder = tempfile::tempdir().expect("a folder for temporary files");
+//! # let folder = folder.path();
+//! // A process killed earlier may have left the beginning of a file under another name.
+//! files::remove_stale(folder)?;
+//! let path = folder.join("result.txt");
+//! files::write_atomically(&path, |out| writeln!(out, "{}", 42))?;
+//! assert_eq!(std::fs::read_to_string(&path).unwrap(), "42\n");
+//! # Ok::<(), files::Error>(())
+//! ```
+//!
+//! # Conventions
+//!
+//! - A file is written under a temporary name in its own folder, flushed to the disk and renamed;
+//!   then the folder is flushed. A reader, or a restart after a crash, sees the old file or the new
+//!   one, never a part.
+//! - Temporary names begin with [`TEMPORARY_PREFIX`], and nothing else does. They are removed when
+//!   writing fails; only a process that is killed, or a power failure, leaves them behind.
+//! - Everything that changes the disk goes through [`Storage`], so that tests can let every single
+//!   operation fail.
+
+mod atomic;
+mod error;
+mod stale;
+mod storage;
+
+pub use atomic::{probe, write_atomically, write_atomically_on};
+pub use error::{Error, Step};
+pub use stale::{TEMPORARY_PREFIX, remove_stale, stale};
+pub use storage::{Disk, Storage};

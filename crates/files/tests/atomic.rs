@@ -1,0 +1,150 @@
+//! Files are complete or absent, whichever step fails.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use files::{Disk, Step, Storage, TEMPORARY_PREFIX};
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+/// Fails at one operation, of which it does nothing but half of a write.
+#[derive(Debug)]
+struct Failing {
+    at: usize,
+    count: AtomicUsize,
+}
+
+impl Failing {
+    fn next(&self) -> io::Result<()> {
+        match self.count.fetch_add(1, Ordering::Relaxed) {
+            n if n == self.at => Err(io::Error::from(io::ErrorKind::StorageFull)),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Storage for Failing {
+    fn create_file(&self, path: &Path) -> io::Result<fs::File> {
+        self.next()?;
+        Disk.create_file(path)
+    }
+    fn write(&self, file: &mut fs::File, path: &Path, bytes: &[u8]) -> io::Result<usize> {
+        if let Err(e) = self.next() {
+            Disk.write(file, path, &bytes[..bytes.len() / 2])?;
+            return Err(e);
+        }
+        Disk.write(file, path, bytes)
+    }
+    fn sync_file(&self, file: &fs::File, path: &Path) -> io::Result<()> {
+        self.next()?;
+        Disk.sync_file(file, path)
+    }
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        self.next()?;
+        Disk.rename(from, to)
+    }
+    fn sync_folder(&self, path: &Path) -> io::Result<()> {
+        self.next()?;
+        Disk.sync_folder(path)
+    }
+}
+
+#[test]
+fn every_step_may_fail() {
+    let steps = [
+        (Step::Create, "old"),
+        (Step::Write, "old"),
+        (Step::Flush, "old"),
+        (Step::Rename, "old"),
+        (Step::FlushFolder, "new"),
+    ];
+    for (at, (step, content)) in steps.into_iter().enumerate() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("state");
+        fs::write(&path, "old").unwrap();
+        let storage = Failing {
+            at,
+            count: AtomicUsize::new(0),
+        };
+        let error =
+            files::write_atomically_on(&storage, &path, |out| out.write_all(b"new")).unwrap_err();
+        assert_eq!(error.step, step);
+        assert_eq!(error.path, path);
+        assert_eq!(error.source.kind(), io::ErrorKind::StorageFull);
+        let message = error.to_string();
+        assert!(message.contains("state") && !message.contains('\n'));
+        assert_eq!(fs::read_to_string(&path).unwrap(), content, "{message}");
+        assert_eq!(names(folder.path()), ["state"], "{message}");
+    }
+}
+
+#[test]
+fn a_failing_or_panicking_producer_leaves_the_old_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("state");
+    files::write_atomically(&path, |out| out.write_all(b"old")).unwrap();
+    let error = files::write_atomically(&path, |out| {
+        out.write_all(b"half of the n")?;
+        Err(io::Error::other("the solver gave up"))
+    })
+    .unwrap_err();
+    assert_eq!(error.step, Step::Write);
+    assert!(error.to_string().contains("the solver gave up"));
+    let panicked = std::panic::catch_unwind(|| {
+        files::write_atomically(&path, |_| std::panic::resume_unwind(Box::new("stop")))
+    });
+    assert!(panicked.is_err());
+    assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+    assert_eq!(names(folder.path()), ["state"]);
+}
+
+#[test]
+fn only_temporary_files_are_stale() {
+    let folder = tempfile::tempdir().unwrap();
+    let left = format!("{TEMPORARY_PREFIX}Xy12");
+    fs::write(folder.path().join(&left), "half").unwrap();
+    fs::write(folder.path().join("result"), "whole").unwrap();
+    fs::create_dir(folder.path().join(format!("{TEMPORARY_PREFIX}folder"))).unwrap();
+    assert_eq!(
+        files::stale(folder.path()).unwrap(),
+        [folder.path().join(&left)]
+    );
+    assert_eq!(
+        files::remove_stale(folder.path()).unwrap(),
+        [folder.path().join(&left)]
+    );
+    assert_eq!(names(folder.path()), [".partial-folder", "result"]);
+    let error = files::stale(folder.path().join("result")).unwrap_err();
+    assert_eq!(error.step, Step::Search);
+}
+
+#[test]
+fn probing_finds_a_folder_that_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    files::probe(folder.path()).unwrap();
+    assert!(names(folder.path()).is_empty());
+    fs::write(folder.path().join("file"), "").unwrap();
+    let error = files::probe(folder.path().join("file")).unwrap_err();
+    assert_eq!(error.step, Step::Create);
+}
+
+#[cfg(unix)]
+#[test]
+fn files_are_readable_like_any_other() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let (plain, ours) = (folder.path().join("plain"), folder.path().join("ours"));
+    fs::write(&plain, "x").unwrap();
+    files::write_atomically(&ours, |out| out.write_all(b"x")).unwrap();
+    let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+    assert_eq!(mode(&ours), mode(&plain));
+}

@@ -1,0 +1,249 @@
+//! A toy computation, and what a run directory holds.
+
+#![allow(dead_code, reason = "every test file uses its own part")]
+
+use std::cell::Cell;
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use files::Storage;
+use runs::{Error, GridShape, Identity, Interrupt, NetworkName, Resumed, RunDirectory, State};
+use serde::Serialize;
+use serde_json::json;
+use tempfile::TempDir;
+
+pub const STEPS: u64 = 60;
+const CELLS: usize = 16;
+
+pub fn identity() -> Identity {
+    Identity {
+        kind: "logistic map".into(),
+        program: "toy 0.1".into(),
+        grid: GridShape {
+            cells: vec![4, 4],
+            side: 2.0,
+            origin: vec![-1.0, -1.0],
+        },
+        network: Some(NetworkName {
+            name: "plane".into(),
+            checksum: runs::fingerprint("weights"),
+        }),
+        options: runs::fingerprint("rate = 3.9"),
+    }
+}
+
+/// The disk, but without waiting for it.
+#[derive(Debug)]
+pub struct Quick;
+
+impl Storage for Quick {
+    fn sync_file(&self, _: &File, _: &Path) -> io::Result<()> {
+        Ok(())
+    }
+    fn sync_folder(&self, _: &Path) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// A temporary folder, in memory where the system has such a thing.
+pub fn quick_folder() -> TempDir {
+    let memory = Path::new("/dev/shm");
+    if memory.is_dir()
+        && let Ok(folder) = tempfile::tempdir_in(memory)
+    {
+        return folder;
+    }
+    tempfile::tempdir().unwrap()
+}
+
+#[derive(Serialize)]
+struct Row {
+    step: u64,
+    time: f64,
+    mean: f64,
+}
+
+fn beginning() -> State {
+    let values = (0..CELLS).map(|i| (i as f64 + 0.5) / CELLS as f64);
+    State::new(0, 0.0)
+        .with_array("u", values.collect())
+        .with_array("means", Vec::new())
+        .with_notes(json!({ "largest": 0.0 }))
+}
+
+fn step(state: &mut State) {
+    state.step += 1;
+    state.time += 0.1;
+    let u = &mut state.arrays[0].1;
+    for v in u.iter_mut() {
+        *v *= 3.9 * (1.0 - *v);
+    }
+    let mean = u.iter().sum::<f64>() / CELLS as f64;
+    let largest = state.notes["largest"].as_f64().unwrap().max(mean);
+    state.notes = json!({ "largest": largest });
+    state.arrays[1].1.push(mean);
+}
+
+pub fn state_at(step_number: u64) -> State {
+    let mut state = beginning();
+    while state.step < step_number {
+        step(&mut state);
+    }
+    state
+}
+
+/// How to run the toy.
+pub struct Toy<'a> {
+    pub storage: Arc<dyn Storage>,
+    pub interrupt: &'a Interrupt,
+    /// Time that a step takes.
+    pub pause: Duration,
+    /// Go no further, and commit no more.
+    pub stop: u64,
+    /// Recover from damage.
+    pub recover: bool,
+    /// The last step that was committed for certain, once the run is there.
+    pub committed: &'a Cell<Option<u64>>,
+}
+
+/// Starts or resumes the toy, commits every 3 steps and writes a field every 10.
+pub fn run(folder: &Path, toy: &Toy) -> Result<(), Error> {
+    let identity = identity();
+    let mut opened = RunDirectory::open_on(toy.storage.clone(), folder);
+    if toy.recover && matches!(opened, Err(Error::Damaged { .. })) {
+        opened = RunDirectory::recover_on(toy.storage.clone(), folder);
+    }
+    let (mut run, state) = match opened {
+        Ok(mut stored) if stored.is_finished() => {
+            stored.remove_leftovers()?;
+            return Ok(());
+        }
+        Ok(stored) => {
+            let step = stored.checkpoint().map_or(0, |c| c.state.step);
+            toy.committed.set(Some(step));
+            let Resumed { run, state, .. } = stored.resume(&identity)?;
+            (run, state)
+        }
+        Err(Error::NoRun { .. }) => {
+            let manifest = json!({ "experiment": "logistic", "steps": STEPS });
+            let storage = toy.storage.clone();
+            let run =
+                RunDirectory::create_on(storage, folder, &identity, &manifest, "rate = 3.9\n")?;
+            toy.committed.set(Some(0));
+            (run, None)
+        }
+        Err(error) => return Err(error),
+    };
+    let mut state = state.unwrap_or_else(beginning);
+    while state.step < STEPS.min(toy.stop) {
+        step(&mut state);
+        std::thread::sleep(toy.pause);
+        run.metric(&Row {
+            step: state.step,
+            time: state.time,
+            mean: state.arrays[1].1.last().copied().unwrap(),
+        })?;
+        if state.step.is_multiple_of(10) {
+            let name = format!("fields/step-{:04}.raw", state.step);
+            let values = state.arrays[0].1.iter().flat_map(|v| v.to_le_bytes());
+            let bytes: Vec<u8> = values.collect();
+            run.write_file(&name, |out| out.write_all(&bytes))?;
+        }
+        if state.step == 25 {
+            let frames = run.make_folder("frames/first")?;
+            files::write_atomically_on(&*toy.storage, frames.join("a.png"), |out| {
+                out.write_all(b"a picture")
+            })?;
+            run.adopt_file("frames/first/a.png")?;
+        }
+        let interrupted = toy.interrupt.requested();
+        if state.step.is_multiple_of(3) || interrupted {
+            run.commit(&state)?;
+            toy.committed.set(Some(state.step));
+            run.write_timings(&json!({ "seconds": std::process::id() }))?;
+        }
+        if interrupted {
+            return Ok(());
+        }
+    }
+    if toy.stop >= STEPS {
+        run.write_file("figures/mean.svg", |out| writeln!(out, "{}", state.notes))?;
+        run.finish(&state)?;
+        toy.committed.set(Some(state.step));
+    }
+    Ok(())
+}
+
+/// The toy up to a step on a disk without waiting, repairing what is damaged.
+pub fn run_to(folder: &Path, stop: u64) -> Result<(), Error> {
+    let toy = Toy {
+        storage: Arc::new(Quick),
+        interrupt: &Interrupt::never(),
+        pause: Duration::ZERO,
+        stop,
+        recover: true,
+        committed: &Cell::new(None),
+    };
+    run(folder, &toy)
+}
+
+/// All files by their names in the folder.
+pub fn all_contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut contents = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(current) = folders.pop() {
+        for entry in fs::read_dir(current).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let name = path.strip_prefix(folder).unwrap().to_str().unwrap();
+                contents.insert(name.to_owned(), fs::read(&path).unwrap());
+            }
+        }
+    }
+    contents
+}
+
+/// All files that two runs of the same computation share.
+pub fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut contents = all_contents(folder);
+    assert!(contents.remove("timings.json").is_some());
+    contents
+}
+
+pub fn write_contents(folder: &Path, contents: &BTreeMap<String, Vec<u8>>) {
+    for name in ["checkpoints", "figures", "fields"] {
+        fs::create_dir_all(folder.join(name)).unwrap();
+    }
+    for (name, bytes) in contents {
+        let path = folder.join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    }
+}
+
+/// What the toy leaves that nothing has stopped.
+pub fn uninterrupted() -> BTreeMap<String, Vec<u8>> {
+    let folder = quick_folder();
+    let path = folder.path().join("run");
+    run_to(&path, STEPS).unwrap();
+    contents(&path)
+}
+
+/// Reproducible numbers (splitmix64).
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn below(&mut self, end: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (z ^ (z >> 31)) % end
+    }
+}

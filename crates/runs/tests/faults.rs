@@ -1,0 +1,395 @@
+//! Every single operation on the disk fails once, or with all after it, and the run ends with the
+//! same bytes nevertheless.
+
+mod common;
+
+use std::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use common::{Quick, STEPS, Toy, contents, run_to, state_at, uninterrupted, write_contents};
+use files::{Disk, Storage};
+use runs::{Error, Interrupt, RunDirectory};
+
+/// Fails at operation `at`, and also at all later ones if the process is to count as dead.
+#[derive(Debug)]
+struct Faulty {
+    at: usize,
+    dead: bool,
+    /// Longest piece that is written at once.
+    piece: usize,
+    count: AtomicUsize,
+}
+
+impl Faulty {
+    fn new(at: usize, dead: bool, piece: usize) -> Arc<Self> {
+        Arc::new(Self {
+            at,
+            dead,
+            piece,
+            count: AtomicUsize::new(0),
+        })
+    }
+
+    fn next(&self) -> io::Result<()> {
+        let n = self.count.fetch_add(1, Ordering::Relaxed);
+        if n == self.at || self.dead && n > self.at {
+            return Err(io::ErrorKind::StorageFull.into());
+        }
+        Ok(())
+    }
+
+    fn operations(&self) -> usize {
+        self.count.load(Ordering::Relaxed)
+    }
+}
+
+impl Storage for Faulty {
+    fn create_folder(&self, path: &Path) -> io::Result<()> {
+        self.next()?;
+        Disk.create_folder(path)
+    }
+    fn create_file(&self, path: &Path) -> io::Result<File> {
+        self.next()?;
+        Disk.create_file(path)
+    }
+    fn write(&self, file: &mut File, path: &Path, bytes: &[u8]) -> io::Result<usize> {
+        if let Err(e) = self.next() {
+            // The disk was not quite full.
+            if self.operations() == self.at + 1 {
+                Disk.write(file, path, &bytes[..bytes.len().min(self.piece) / 2])?;
+            }
+            return Err(e);
+        }
+        Disk.write(file, path, &bytes[..bytes.len().min(self.piece)])
+    }
+    fn set_length(&self, file: &File, path: &Path, length: u64) -> io::Result<()> {
+        self.next()?;
+        Disk.set_length(file, path, length)
+    }
+    fn sync_file(&self, _: &File, _: &Path) -> io::Result<()> {
+        self.next()
+    }
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        self.next()?;
+        Disk.rename(from, to)
+    }
+    fn remove_file(&self, path: &Path) -> io::Result<()> {
+        self.next()?;
+        Disk.remove_file(path)
+    }
+    fn remove_folder(&self, path: &Path) -> io::Result<()> {
+        self.next()?;
+        Disk.remove_folder(path)
+    }
+    fn sync_folder(&self, _: &Path) -> io::Result<()> {
+        self.next()
+    }
+}
+
+/// Runs the toy with a fault, checks what is left, and goes on to the end. Returns whether there was
+/// a fault.
+fn survives(
+    folder: &Path,
+    storage: &Arc<Faulty>,
+    expected: &BTreeMap<String, Vec<u8>>,
+    damaged: bool,
+) -> bool {
+    let committed = Cell::new(None);
+    let result = common::run(
+        folder,
+        &Toy {
+            storage: storage.clone(),
+            interrupt: &Interrupt::never(),
+            pause: Duration::ZERO,
+            stop: STEPS,
+            recover: damaged,
+            committed: &committed,
+        },
+    );
+    let fault = storage.operations() > storage.at;
+    assert_eq!(result.is_err(), fault, "{result:?}");
+    if let Err(error) = &result {
+        let message = error.to_string();
+        assert!(!message.contains('\n') && message.len() > 20, "{message}");
+        match RunDirectory::open_on(Arc::new(Quick), folder) {
+            Ok(stored) => {
+                let step = stored.checkpoint().map_or(0, |c| c.state.step);
+                // The commit that failed may have failed after it was done.
+                let last = committed.get().unwrap_or(0);
+                assert!(step == last || step == last + 3, "{step} after {last}");
+                if let Some(checkpoint) = stored.checkpoint() {
+                    assert_eq!(checkpoint.state, state_at(step));
+                }
+            }
+            Err(Error::NoRun { .. }) => assert_eq!(committed.get(), None, "{message}"),
+            Err(Error::Damaged { .. }) if damaged => {}
+            Err(other) => panic!("{other} after {message}"),
+        }
+        run_to(folder, STEPS).unwrap();
+    }
+    let found = contents(folder);
+    let names: Vec<_> = found.keys().collect();
+    assert_eq!(names, expected.keys().collect::<Vec<_>>());
+    for (name, bytes) in &found {
+        assert!(*bytes == expected[name], "{name} after {result:?}");
+    }
+    fault
+}
+
+#[test]
+fn every_operation_may_fail() {
+    let expected = uninterrupted();
+    for (dead, piece) in [
+        (false, usize::MAX),
+        (true, usize::MAX),
+        (false, 700),
+        (true, 700),
+    ] {
+        let mut at = 0;
+        loop {
+            let folder = common::quick_folder();
+            // Two levels, so that the upper folder is made too.
+            let run = folder.path().join("results/run");
+            if !survives(&run, &Faulty::new(at, dead, piece), &expected, false) {
+                break;
+            }
+            at += 1;
+        }
+        assert!(at > 400, "only {at} operations");
+        println!("{at} operations, dead {dead}, pieces of {piece}");
+    }
+}
+
+#[test]
+fn every_operation_of_a_resumption_may_fail() {
+    let expected = uninterrupted();
+    let mut leftovers = 0;
+    for killed_at in 185..205 {
+        let folder = common::quick_folder();
+        let left = folder.path().join("left");
+        let toy = Toy {
+            storage: Faulty::new(killed_at, true, 700),
+            interrupt: &Interrupt::never(),
+            pause: Duration::ZERO,
+            stop: STEPS,
+            recover: false,
+            committed: &Cell::new(None),
+        };
+        common::run(&left, &toy).unwrap_err();
+        leftovers += RunDirectory::open(&left).unwrap().leftovers().count();
+        let left = common::all_contents(&left);
+        for at in 0..30 {
+            let run = folder.path().join(format!("{at}"));
+            write_contents(&run, &left);
+            assert!(survives(
+                &run,
+                &Faulty::new(at, at % 2 == 0, 700),
+                &expected,
+                false
+            ));
+        }
+    }
+    assert!(leftovers > 10, "only {leftovers} leftovers");
+}
+
+#[test]
+fn every_operation_of_a_recovery_may_fail() {
+    let expected = uninterrupted();
+    let folder = common::quick_folder();
+    let left = folder.path().join("left");
+    // Past step 30, with its field, and on to the commit after it.
+    run_to(&left, 32).unwrap();
+    let mut left = common::all_contents(&left);
+    for name in ["checkpoints/step-00000030.ckpt", "fields/step-0030.raw"] {
+        left.get_mut(name).unwrap()[100] ^= 16;
+    }
+    for dead in [false, true] {
+        for at in 0..60 {
+            let run = folder.path().join(format!("{at}-{dead}"));
+            write_contents(&run, &left);
+            assert!(survives(&run, &Faulty::new(at, dead, 700), &expected, true));
+        }
+    }
+}
+
+#[test]
+fn after_a_failed_commit_or_row_the_run_has_to_be_opened_again() {
+    let folder = common::quick_folder();
+    let start = |name: &str, at| {
+        let storage = Faulty::new(at, false, usize::MAX);
+        let path = folder.path().join(name);
+        let manifest = serde_json::Value::Null;
+        let run =
+            RunDirectory::create_on(storage.clone(), path, &common::identity(), &manifest, "");
+        (run.unwrap(), storage.operations())
+    };
+    let (_, operations) = start("counted", usize::MAX);
+
+    let (mut run, _) = start("row", operations);
+    let error = run.metric(&BTreeMap::from([("a", 1)])).unwrap_err();
+    assert!(
+        matches!(error, Error::Row { .. }),
+        "maps are no rows: {error}"
+    );
+    #[derive(serde::Serialize)]
+    struct Row {
+        a: u32,
+    }
+    assert!(matches!(run.metric(&Row { a: 1 }), Err(Error::Io { .. })));
+    assert!(matches!(
+        run.metric(&Row { a: 1 }),
+        Err(Error::Broken { .. })
+    ));
+    assert!(matches!(
+        run.commit(&state_at(1)),
+        Err(Error::Broken { .. })
+    ));
+
+    // The write of the checkpoint, and the flush of the folder after the index is in place.
+    for (name, after, step) in [("checkpoint", 1, 0), ("folder", 10, 3)] {
+        let (mut run, _) = start(name, operations + after);
+        let error = run.commit(&state_at(3)).unwrap_err();
+        assert!(matches!(error, Error::Write(_)), "{error}");
+        for result in [
+            run.commit(&state_at(3)),
+            run.metric(&Row { a: 1 }),
+            run.write_file("fields/a", |_| Ok(())).map(drop),
+            run.write_timings(&serde_json::Value::Null),
+            run.finish(&state_at(3)),
+        ] {
+            assert!(matches!(result, Err(Error::Broken { .. })), "{result:?}");
+        }
+        let stored = RunDirectory::open(folder.path().join(name)).unwrap();
+        let found = stored.checkpoint().map_or(0, |c| c.state.step);
+        assert_eq!(found, step, "{name}");
+    }
+    // A file alone does not break the run.
+    let (mut run, _) = start("file", operations + 1);
+    let failed = run.write_file("fields/a", |out| out.write_all(b"a"));
+    assert!(matches!(failed, Err(Error::Write(_))));
+    run.write_file("fields/a", |out| out.write_all(b"a"))
+        .unwrap();
+    run.finish(&state_at(3)).unwrap();
+}
+
+/// Watches the order of operations: what a power failure may take away.
+#[derive(Debug, Default)]
+struct Watching(Mutex<Watched>);
+
+#[derive(Debug, Default)]
+struct Watched {
+    /// With content that is not on the disk.
+    files: BTreeSet<PathBuf>,
+    /// With names that are not on the disk.
+    folders: BTreeSet<PathBuf>,
+    /// The new index is in place, but not for certain.
+    swapping: bool,
+    swaps: usize,
+    removals: usize,
+}
+
+impl Watching {
+    fn named(&self, path: &Path) {
+        let folder = path.parent().unwrap().to_owned();
+        self.0.lock().unwrap().folders.insert(folder);
+    }
+}
+
+impl Storage for Watching {
+    fn create_folder(&self, path: &Path) -> io::Result<()> {
+        self.named(path);
+        Disk.create_folder(path)
+    }
+    fn create_file(&self, path: &Path) -> io::Result<File> {
+        self.0.lock().unwrap().files.insert(path.into());
+        Disk.create_file(path)
+    }
+    fn write(&self, file: &mut File, path: &Path, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().unwrap().files.insert(path.into());
+        Disk.write(file, path, bytes)
+    }
+    fn sync_file(&self, _: &File, path: &Path) -> io::Result<()> {
+        self.0.lock().unwrap().files.remove(path);
+        Ok(())
+    }
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        let mut watched = self.0.lock().unwrap();
+        assert!(
+            !watched.files.contains(from),
+            "{} before its content",
+            to.display()
+        );
+        if to.ends_with("index.json") {
+            let root = to.parent().unwrap();
+            watched.files.remove(&root.join("lock"));
+            assert!(watched.files.is_empty(), "index before {:?}", watched.files);
+            // Of the folder itself only the name of the index may still be missing.
+            watched.folders.remove(root);
+            let folders = &watched.folders;
+            assert!(folders.is_empty(), "index before {folders:?}");
+            watched.swapping = true;
+            watched.swaps += 1;
+        }
+        drop(watched);
+        self.named(to);
+        Disk.rename(from, to)
+    }
+    fn remove_file(&self, path: &Path) -> io::Result<()> {
+        let mut watched = self.0.lock().unwrap();
+        assert!(
+            !watched.swapping,
+            "{} removed before the index",
+            path.display()
+        );
+        watched.removals += 1;
+        Disk.remove_file(path)
+    }
+    fn sync_folder(&self, path: &Path) -> io::Result<()> {
+        let mut watched = self.0.lock().unwrap();
+        watched.folders.remove(path);
+        watched.swapping &= watched.folders.iter().any(|f| path.starts_with(f));
+        Ok(())
+    }
+}
+
+#[test]
+fn a_power_failure_finds_what_the_index_lists() {
+    let folder = common::quick_folder();
+    let storage = Arc::new(Watching::default());
+    let toy = Toy {
+        storage: storage.clone(),
+        interrupt: &Interrupt::never(),
+        pause: Duration::ZERO,
+        stop: STEPS,
+        recover: false,
+        committed: &Cell::new(None),
+    };
+    common::run(&folder.path().join("run"), &toy).unwrap();
+    let watched = storage.0.lock().unwrap();
+    // One at the start, twenty commits, one at the end. All checkpoints go but the last.
+    assert_eq!(watched.swaps, 22);
+    assert_eq!(watched.removals, 19);
+}
+
+/// The storage that all tests above replace. Files in place of folders work for root, too, whom no
+/// permission stops.
+#[test]
+fn the_real_disk_refuses_with_one_line() {
+    let folder = common::quick_folder();
+    let run = folder.path().join("run");
+    fs::write(&run, "not a folder").unwrap();
+    for path in [run.clone(), run.join("deeper")] {
+        let error = RunDirectory::create(&path, &common::identity(), &serde_json::Value::Null, "")
+            .unwrap_err();
+        let message = error.to_string();
+        assert!(matches!(error, Error::Io { .. }), "{message}");
+        assert!(message.contains("run") && !message.contains('\n'));
+    }
+    assert_eq!(fs::read(&run).unwrap(), b"not a folder");
+}
