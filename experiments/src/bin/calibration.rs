@@ -354,7 +354,7 @@ fn diagnostics(
     quick: bool,
     device: &ComputeDevice,
 ) -> Result<Vec<Diagnostics>, Error> {
-    let count = if quick { 3 } else { 12 };
+    let count: usize = if quick { 3 } else { 12 };
     // Kernels of width 65 have a thousand planes; surfaces have millions of nodes.
     let small =
         |one: &&Calibrated| one.network.ratios().width < 65 && one.network.ratios().dimension == 2;
