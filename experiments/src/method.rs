@@ -11,6 +11,7 @@ use solver::{Factors, FlowParams, MeanCurvatureFlow, WillmoreFlow};
 
 use crate::Error;
 use crate::circles::Flow;
+use crate::networks::kernel_width;
 
 /// How mean curvature flow is approximated; a line style in figures.
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -114,7 +115,9 @@ impl Method {
                 (Some(network.odd_part()), network.calibration()?.factors)
             }
             (Self::Hybrid, Scheme::Accurate) => {
-                let accurate = pretrained::find_accurate(needed(network)?.ratios())?;
+                let cells_per_unit = grid.spacing().recip().round() as usize;
+                let width = network.map_or(kernel_width(cells_per_unit), |n| n.ratios().width);
+                let accurate = pretrained::find_accurate(params.ratios(grid, width))?;
                 let factors = accurate.calibration()?.factors;
                 (Some(accurate), factors)
             }

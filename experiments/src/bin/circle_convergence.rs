@@ -11,7 +11,7 @@ use experiments::options::{RunOptions, resolutions};
 use experiments::partial::Partial;
 use experiments::training::{self, NetworkSpec};
 use experiments::{Error, harness};
-use model::{Network, Ratios};
+use model::{Network, Ratios, pretrained};
 use operators::ComputeDevice;
 use report::{
     Axis, Colour, Column, Figure, Format, LegendEntry, LineChart, LineStyle, Marker, OutputDir,
@@ -137,19 +137,35 @@ fn program(options: &Options) -> Result<(), Error> {
         training::training_device(&device)?;
         None
     } else {
-        Some(options.networks.find(&ratios)?)
+        Some(find_networks(options, &ratios)?)
     };
+    // Some resolutions have a network of the accurate recipe only.
+    let missing = |run: &Run| {
+        let k = trained_for.iter().position(|&n| n == run.n);
+        let found = loaded
+            .as_ref()
+            .zip(k)
+            .is_none_or(|(all, k)| all[k].is_some());
+        run.method.is_learned() && run.scheme != Scheme::Accurate && !found
+    };
+    let runs: Vec<Run> = runs.into_iter().filter(|run| !missing(run)).collect();
     let output = options.run.open_output(PROGRAM)?;
     let networks = match loaded {
         Some(networks) => networks,
-        None => retrain(options, &cells, &ratios, &device, &output)?,
+        None => {
+            let trained = retrain(options, &cells, &ratios, &device, &output)?;
+            trained.into_iter().map(Some).collect()
+        }
     };
 
     let parameters = Parameters {
         networks: cells
             .iter()
             .zip(&networks)
-            .map(|(n, network)| (format!("n{n}"), experiments::networks::checksum(network)))
+            .filter_map(|(n, network)| {
+                let checksum = experiments::networks::checksum(network.as_ref()?);
+                Some((format!("n{n}"), checksum))
+            })
             .collect(),
         cells: cells.clone(),
         runs: runs.clone(),
@@ -172,7 +188,7 @@ fn program(options: &Options) -> Result<(), Error> {
         n,
     } in &runs
     {
-        let network = (trained_for.iter().position(|&m| m == n)).map(|k| &networks[k]);
+        let network = (trained_for.iter().position(|&m| m == n)).and_then(|k| networks[k].as_ref());
         let title = format!("{}, {}, n = {n}", flow.title(), method.label_in(scheme));
         let bar = progress.bar(title.clone(), (count * steps) as u64);
         let ensemble = manifest.phase(title, || {
@@ -206,6 +222,21 @@ fn program(options: &Options) -> Result<(), Error> {
         output.as_path().display()
     ));
     Ok(())
+}
+
+/// The networks of the paper's recipe. One may be missing if the accurate recipe has a network with these ratios.
+fn find_networks(options: &Options, ratios: &[Ratios]) -> Result<Vec<Option<Network>>, Error> {
+    if !options.networks.network.is_empty() {
+        let all = options.networks.find(ratios)?;
+        return Ok(all.into_iter().map(Some).collect());
+    }
+    let find =
+        |&wanted: &Ratios| match (pretrained::find(wanted), pretrained::find_accurate(wanted)) {
+            (Ok(network), _) => Ok(Some(network)),
+            (Err(_), Ok(_)) => Ok(None),
+            (Err(error), Err(_)) => Err(error.into()),
+        };
+    ratios.iter().map(find).collect()
 }
 
 fn retrain(
