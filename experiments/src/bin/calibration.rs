@@ -273,13 +273,14 @@ fn surface_energies(
 ) -> Result<Vec<SurfaceRow>, Error> {
     const CELLS: usize = 64;
     let (eps, step) = (1.0 / 32.0, 1.0 / 4096.0);
-    let grid = Grid::<3>::per_unit(CELLS, 1.0)?;
+    // Room for tori whose hole is some interface widths wide.
+    let grid = Grid::<3>::per_unit(CELLS, 1.5)?;
     let mut shapes: Vec<(String, Field<3>, f64)> = Vec::new();
     for radius in [0.2, 0.3, 0.34] {
         let ball = phase_field(grid, &Ball::new([0.0; 3], radius)?, eps)?;
         shapes.push((format!("ball, R = {radius}"), ball, 8.0 * PI));
     }
-    for outer in [0.40, 0.45] {
+    for outer in [0.40, 0.50, 0.60] {
         let torus = phase_field(grid, &Torus::clifford(outer)?, eps)?;
         shapes.push((format!("Clifford torus, {outer:.2}"), torus, 4.0 * PI * PI));
     }

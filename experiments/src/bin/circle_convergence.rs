@@ -53,6 +53,10 @@ struct Options {
     #[arg(long, value_name = "NAME", value_enum)]
     scheme: Option<Scheme>,
 
+    /// Leave nested finite elements of Willmore flow out above this resolution; a circle takes minutes at n = 256
+    #[arg(long, value_name = "N")]
+    elements_up_to: Option<usize>,
+
     /// Train the networks first, instead of loading them
     #[arg(long, conflicts_with = "network")]
     retrain: bool,
@@ -94,8 +98,11 @@ impl Run {
                 if !chosen {
                     continue;
                 }
+                let nested = flow == Flow::Willmore && !method.is_learned();
+                let limit = options.elements_up_to.filter(|_| nested);
+                let affordable = |n: &&usize| limit.is_none_or(|limit| **n <= limit);
                 for scheme in method.chosen_schemes(flow, options.scheme) {
-                    runs.extend(cells.iter().map(|&n| Self {
+                    runs.extend(cells.iter().filter(affordable).map(|&n| Self {
                         flow,
                         method,
                         scheme,
