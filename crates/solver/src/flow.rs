@@ -299,7 +299,8 @@ impl<const D: usize> WillmoreFlow<D> {
             });
         }
         let start = match &self.previous {
-            Some((previous, last)) if self.moved_little(previous)? => {
+            // The first step also relaxes the initial profile, which is nothing to extrapolate.
+            Some((previous, last)) if self.step > 1 && self.moved_little(previous)? => {
                 extrapolate(&self.current, previous, (tau / last).min(2.0))
             }
             _ => self.current.clone(),

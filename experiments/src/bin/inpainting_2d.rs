@@ -35,6 +35,8 @@ const STEP_OVER_H2: f64 = 4.0;
 const PRINTED_STEP: f64 = 1.0 / 16384.0;
 /// The first time step is divided into a ramp that starts this many times halved.
 const HALVINGS: usize = 12;
+/// Parts of the ramp that are shown, too.
+const RAMP_FRAMES: [usize; 4] = [1, 4, 7, 10];
 /// A shape stands still once a step moves it by less than this part of the way it has come.
 const STILL: f64 = 1e-5;
 /// Radius of the disk.
@@ -63,7 +65,7 @@ struct Options {
     #[arg(long, value_name = "N")]
     cells: Option<usize>,
 
-    /// Steps of the disk [default: 2000]
+    /// Steps of the disk [default: 100; the paper shows 2000, but here it stands still after a few]
     #[arg(long, value_name = "COUNT")]
     disk_steps: Option<usize>,
 
@@ -236,7 +238,7 @@ fn program(options: &Options) -> Result<(), Error> {
         .collect();
     let steps_of = |picture: Picture| match (picture, quick) {
         (_, true) => 2,
-        (Picture::Disk, false) => options.disk_steps.unwrap_or(2000),
+        (Picture::Disk, false) => options.disk_steps.unwrap_or(100),
         (Picture::Cross, false) => 50,
     };
     if pictures.iter().any(|&p| steps_of(p) == 0) {
@@ -333,6 +335,7 @@ impl Run {
                 .filter(|&&k| k > 0 && k <= self.steps)
         };
         evolution.also_sample = shown().map(|k| k + HALVINGS).collect();
+        evolution.also_sample.extend(RAMP_FRAMES);
         let grid = evolution.grid()?;
         let nodes = picture.nodes(&grid);
         evolution.region = Some(NamedRegion {
@@ -388,29 +391,35 @@ impl Run {
 
 /// The shapes over time, D outlined in green.
 fn frames(run: &RunOptions, one: &Finished) -> Result<Figure, Error> {
-    let mut shown: Vec<usize> = one.picture.shown().to_vec();
-    shown.retain(|&k| k <= one.steps);
-    if !shown.contains(&one.steps) {
-        shown.push(one.steps);
+    let tau = one.picture.tau();
+    let times = &one.trajectory.evolution.tau;
+    // Steps of the run, under the names that the paper would give them.
+    let mut shown: Vec<(usize, String)> = vec![(0, "step 0".to_owned())];
+    for k in RAMP_FRAMES {
+        let part = (times.time(k) / tau).log2().round();
+        shown.push((k, format!("2^{part} of a step")));
+    }
+    let later = |k: &&usize| **k > 0 && **k < one.steps;
+    for &k in one.picture.shown().iter().filter(later).chain([&one.steps]) {
+        shown.push((k + HALVINGS, format!("step {k}")));
     }
     let title = format!("Inpainting: {}", one.picture.title());
-    let mut figure = Figure::new(run.title(&title), shown.len().min(4));
+    let mut figure = Figure::new(run.title(&title), 4);
     let [[x0, y0], [x1, y1]] = one.picture.region();
-    for k in shown {
-        let step = if k == 0 { 0 } else { k + HALVINGS };
+    for (step, name) in shown {
         let curves = zero_level(&one.trajectory.field(step)?, Interpolation::Profile);
         let loops: Vec<Vec<[f64; 2]>> = curves.into_iter().map(|curve| curve.points).collect();
         let region = Curve::new(vec![vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]]])
             .with_colour(Colour::Custom(Rgb(0, 140, 60)))
             .with_width(1.6);
         figure = figure.with_panel(
-            Shapes::new(format!("step {k}"))
+            Shapes::new(name)
                 .with_curve(Curve::new(loops).filled(Colour::LightGrey))
                 .with_curve(region)
                 .with_window([-0.5, 0.5], [-0.5, 0.5]),
         );
     }
-    let tau = format!("2^{}", one.picture.tau().log2());
+    let tau = format!("2^{}", tau.log2());
     Ok(figure.with_note(format!(
         "n = {}, τ = {tau}; only the values inside the green frame move. The first step is made in {} parts of growing size.",
         one.trajectory.evolution.n,

@@ -4,7 +4,7 @@
 //! curvature at the same relative accuracy, both phases treated alike, and an `F` without wiggles, since `F''` is in every
 //! Hessian. So here
 //!
-//! - `K` is the heat kernel of variance `2 tautilde` per axis, for which a single step is exact to first order in the
+//! - `K` is the heat kernel of variance `2 tautilde` per axis (a wider Gaussian where the kernel's width cuts it off), for which a single step is exact to first order in the
 //!   curvature once `F` keeps the flat interface (`docs/calibration.md`);
 //! - `F` is an odd polynomial, found by linear least squares: no start, no local minima. Each radius counts relative to how
 //!   far its sphere moves, and flat interfaces in many directions must stay where they are;
@@ -23,7 +23,7 @@ use super::distillation::{Distillation, distill_odd};
 use super::levenberg_marquardt::heat_kernel;
 use super::spheres::direction;
 use super::{Observer, SphereData};
-use crate::{Error, Mlp};
+use crate::{Error, Mlp, Ratios};
 
 /// Settings of the accurate recipe.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -297,6 +297,44 @@ fn with_offsets(data: &SphereData, kernel: &[f64]) -> Vec<(Vec<f64>, f64)> {
         .collect()
 }
 
+/// The heat kernel; where the given width cuts off so much of it that its variance falls short by more than one percent, a wider
+/// Gaussian that has the variance `2 tautilde` per axis after the cut. The variance is what moves nearly flat interfaces.
+pub fn kernel_of_full_variance(data: &SphereData) -> Vec<f64> {
+    const SHORT: f64 = 0.01;
+    let wanted = 2.0 * data.ratios.step_over_h2;
+    let kernel_for = |step_over_h2: f64| {
+        let ratios = Ratios {
+            step_over_h2,
+            ..data.ratios
+        };
+        heat_kernel(&SphereData {
+            ratios,
+            ..data.clone()
+        })
+    };
+    let variance = |kernel: &[f64]| -> f64 {
+        let per_length = 1.0 / (data.spacing() * data.spacing() * data.ratios.dimension as f64);
+        (with_offsets(data, kernel).iter())
+            .map(|(offset, weight)| weight * offset.iter().map(|b| b * b).sum::<f64>())
+            .sum::<f64>()
+            * per_length
+    };
+    let kernel = kernel_for(data.ratios.step_over_h2);
+    if variance(&kernel) > (1.0 - SHORT) * wanted {
+        return kernel;
+    }
+    let (mut low, mut high) = (data.ratios.step_over_h2, 4.0 * data.ratios.step_over_h2);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if variance(&kernel_for(middle)) < wanted {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    kernel_for(0.5 * (low + high))
+}
+
 /// Fits kernel and activation: the heat kernel, [`fit`], and a perceptron of the paper's layers, made odd (so that its hidden
 /// layers are twice as wide).
 ///
@@ -309,7 +347,7 @@ pub fn train(
     device: &ComputeDevice,
     observer: &mut dyn Observer<()>,
 ) -> Result<(Vec<f64>, Mlp, OddPolynomial), Error> {
-    let kernel = heat_kernel(data);
+    let kernel = kernel_of_full_variance(data);
     let polynomial = fit(data, params, &kernel, seed)?;
     let target = |z: f64| polynomial.jet(z)[0];
     let activation = distill_odd(&target, &params.distillation, seed, device, observer)?;
@@ -319,7 +357,6 @@ pub fn train(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Ratios;
 
     fn data() -> SphereData {
         let ratios = Ratios {
@@ -378,6 +415,25 @@ mod tests {
             let relative = f64::sqrt(error / motion);
             assert!(relative < bound, "radius {radius}: {relative}");
         }
+    }
+
+    #[test]
+    fn narrow_kernels_keep_the_variance() {
+        let wide = data();
+        assert_eq!(kernel_of_full_variance(&wide), heat_kernel(&wide));
+        let ratios = Ratios {
+            eps_over_h: 4.0,
+            step_over_h2: 4.0,
+            ..wide.ratios
+        };
+        let narrow = SphereData::new(ratios, 256).unwrap();
+        let kernel = kernel_of_full_variance(&narrow);
+        let h = narrow.spacing();
+        let variance: f64 = (with_offsets(&narrow, &kernel).iter())
+            .map(|(b, k)| k * b[0] * b[0] / (h * h))
+            .sum();
+        assert!((variance - 8.0).abs() < 1e-9, "{variance}");
+        assert!((kernel.iter().sum::<f64>() - 1.0).abs() < 1e-12);
     }
 
     #[test]
