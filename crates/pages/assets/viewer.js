@@ -25,9 +25,9 @@ void main() {
   if (!gl_FrontFacing) m = -m;
   vec3 key = normalize(vec3(-0.45, 0.65, 0.75));
   vec3 fill = normalize(vec3(0.8, 0.1, 0.5));
-  float light = 0.62 * max(dot(m, key), 0.0) + 0.16 * max(dot(m, fill), 0.0) + 0.22 + 0.12 * m.y;
+  float light = 0.58 * max(dot(m, key), 0.0) + 0.2 * max(dot(m, fill), 0.0) + 0.3 + 0.1 * m.y;
   float gloss = 0.05 * pow(max(dot(m, normalize(key + vec3(0.0, 0.0, 1.0))), 0.0), 24.0);
-  vec3 linear = vec3(0.83, 0.74, 0.62) * light + gloss;
+  vec3 linear = vec3(0.88, 0.8, 0.69) * light + gloss;
   gl_FragColor = vec4(pow(clamp(linear, 0.0, 1.0), vec3(1.0 / 2.2)), 1.0);
 }`;
 
@@ -42,8 +42,17 @@ function decodeSurface(block) {
   for (let k = 0; k < positions.length; k++) {
     positions[k] = origin[k % 3] + unit[k % 3] * (bytes[2 * k] | (bytes[2 * k + 1] << 8));
   }
-  const corners = new Uint32Array(3 * Number(faces));
   let at = 2 * positions.length;
+  const given = "normals" in block.dataset;
+  const normals = new Float32Array(positions.length);
+  for (let k = 0; given && k < normals.length; k += 3, at += 4) {
+    const x = 2 * ((bytes[at] | (bytes[at + 1] << 8)) / 65535) - 1;
+    const y = 2 * ((bytes[at + 2] | (bytes[at + 3] << 8)) / 65535) - 1;
+    const z = 1 - Math.abs(x) - Math.abs(y);
+    const fold = Math.max(0, -z);
+    normals.set([x < 0 ? x + fold : x - fold, y < 0 ? y + fold : y - fold, z], k);
+  }
+  const corners = new Uint32Array(3 * Number(faces));
   let next = 0;
   for (let k = 0; k < corners.length; k++) {
     let distance = 0;
@@ -60,7 +69,7 @@ function decodeSurface(block) {
   if (at !== bytes.length || next !== Number(vertices)) {
     throw new Error("the data of the surface " + block.dataset.label + " are damaged");
   }
-  return { positions, corners, normals: smoothNormals(positions, corners) };
+  return { positions, corners, normals: given ? normals : smoothNormals(positions, corners) };
 }
 
 // Sums over the faces around a vertex; the cross product weighs them by area.
@@ -85,21 +94,6 @@ function smoothNormals(positions, corners) {
   return normals;
 }
 
-// The ball around the boxes of all surfaces: nothing jumps from step to step.
-function commonBall(blocks) {
-  const low = [Infinity, Infinity, Infinity];
-  const high = [-Infinity, -Infinity, -Infinity];
-  for (const { dataset } of blocks) {
-    const [origin, unit] = [dataset.low, dataset.step].map((list) => list.split(" ").map(Number));
-    for (let i = 0; i < 3; i++) {
-      low[i] = Math.min(low[i], origin[i]);
-      high[i] = Math.max(high[i], origin[i] + 65535 * unit[i]);
-    }
-  }
-  const centre = low.map((v, i) => (v + high[i]) / 2);
-  return { centre, radius: Math.hypot(...low.map((v, i) => (high[i] - v) / 2)) || 1 };
-}
-
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 class SurfaceViewer {
@@ -107,7 +101,11 @@ class SurfaceViewer {
     this.figure = figure;
     this.stage = figure.querySelector(".stage");
     this.blocks = [...figure.querySelectorAll("script[data-vertices]")];
-    this.ball = commonBall(this.blocks);
+    // All surfaces are framed by one ball: nothing jumps from step to step.
+    this.ball = {
+      centre: figure.dataset.centre.split(" ").map(Number),
+      radius: Number(figure.dataset.radius),
+    };
     this.surfaces = new Map();
     this.step = 0;
     this.reset();
@@ -241,7 +239,7 @@ class SurfaceViewer {
     const toward = [0, 1, 2].map((i) => ce * horizontal[i] + se * u[i]);
 
     // In units of the ball's radius it lies between the planes at `distance - 1` and `distance + 1`.
-    const distance = 1.04 / Math.sin(FIELD_OF_VIEW / 2);
+    const distance = 1.08 / Math.sin(FIELD_OF_VIEW / 2);
     const [near, far] = [distance - 1.05, distance + 1.05];
     const focal = this.zoom / Math.tan(FIELD_OF_VIEW / 2);
     const shorter = Math.min(width, height);

@@ -112,6 +112,19 @@ pub enum Error {
         /// Number of vertices.
         vertices: usize,
     },
+    /// Another number of normals than of vertices.
+    #[error(
+        "the surface {label:?} has {normals} normals for {vertices} vertices: every vertex needs \
+         one, or the mesh none"
+    )]
+    Normals {
+        /// Label of the surface.
+        label: String,
+        /// Number of normals.
+        normals: usize,
+        /// Number of vertices.
+        vertices: usize,
+    },
     /// An angle that is no number, or beyond the poles.
     #[error("the view of {title:?} has {name} {value}, but it must be {requirement}")]
     View {

@@ -18,7 +18,7 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::image::Pictures;
 use crate::page::Page;
-use crate::section::{Details, Section};
+use crate::section::Section;
 use crate::text::Text;
 
 use catalogue::CATALOGUE;
@@ -130,12 +130,8 @@ fn finished(mut page: Page, sections: Vec<Section>, problems: &[Problem]) -> Pag
             .iter()
             .map(|p| Text::default().code(&p.file).then(": ").then(&p.problem))
             .collect();
-        let count = match items.len() {
-            1 => "One file is missing or broken".to_owned(),
-            n => format!("{n} files are missing or broken"),
-        };
-        let details = Details::new("Which ones").with(items);
-        page.push(Section::new(count).named("problems").with(details));
+        let section = Section::new("Missing or broken files").named("problems");
+        page.push(section.with(items));
     }
     for section in sections {
         page.push(section);

@@ -15,7 +15,8 @@ const LARGEST: f64 = 1e18;
 /// uses are left out.
 ///
 /// The data are the positions, three little-endian 16-bit numbers each in units of `step` from
-/// `low`, followed by the corners of the faces. A corner is stored as its distance from the lowest
+/// `low`; the normals, if the mesh has them, two such numbers each, see [`octahedral`]; and the
+/// corners of the faces. A corner is stored as its distance from the lowest
 /// number not used before, zero for a vertex that appears for the first time; seven bits to a byte,
 /// low ones first, the eighth bit set if more follow. Neighbouring faces share recent vertices,
 /// so most corners take one byte or two.
@@ -26,6 +27,7 @@ pub(crate) struct Surface {
     pub faces: usize,
     pub low: [f64; 3],
     pub high: [f64; 3],
+    pub has_normals: bool,
     pub data: String,
 }
 
@@ -33,24 +35,25 @@ impl Surface {
     pub fn new(label: &str, mesh: &TriangleMesh) -> Result<Self> {
         check(label, mesh)?;
         let mut number = vec![None; mesh.vertices.len()];
-        let mut used: Vec<[f64; 3]> = Vec::with_capacity(mesh.vertices.len());
+        let mut order = Vec::with_capacity(mesh.vertices.len());
         let mut corners = Vec::with_capacity(4 * mesh.faces.len());
         for &vertex in mesh.faces.as_flattened() {
             let vertex = vertex as usize;
-            let next = used.len();
+            let next = order.len();
             let index = *number[vertex].get_or_insert(next);
             if index == next {
-                used.push(mesh.vertices[vertex]);
+                order.push(vertex);
             }
             push_varint(&mut corners, next - index);
         }
+        let used: Vec<[f64; 3]> = order.iter().map(|&vertex| mesh.vertices[vertex]).collect();
         let ends = |choose: fn(f64, f64) -> f64| {
             used.iter().copied().fold(used[0], |end, x| {
                 std::array::from_fn(|i| choose(end[i], x[i]))
             })
         };
         let (low, high) = (ends(f64::min), ends(f64::max));
-        let mut bytes = Vec::with_capacity(6 * used.len() + corners.len());
+        let mut bytes = Vec::with_capacity(10 * used.len() + corners.len());
         for position in &used {
             for i in 0..3 {
                 let extent = high[i] - low[i];
@@ -62,6 +65,15 @@ impl Surface {
                 bytes.extend(((part * STEPS).round() as u16).to_le_bytes());
             }
         }
+        if let Some(normals) = &mesh.normals {
+            for &vertex in &order {
+                bytes.extend(
+                    octahedral(normals[vertex])
+                        .map(u16::to_le_bytes)
+                        .as_flattened(),
+                );
+            }
+        }
         bytes.extend(corners);
         Ok(Self {
             label: label.to_owned(),
@@ -69,6 +81,7 @@ impl Surface {
             faces: mesh.faces.len(),
             low,
             high,
+            has_normals: mesh.normals.is_some(),
             data: STANDARD.encode(bytes),
         })
     }
@@ -94,6 +107,15 @@ fn check(label: &str, mesh: &TriangleMesh) -> Result<()> {
         });
     }
     let vertices = mesh.vertices.len();
+    if let Some(normals) = &mesh.normals
+        && normals.len() != vertices
+    {
+        return Err(Error::Normals {
+            label: label(),
+            normals: normals.len(),
+            vertices,
+        });
+    }
     for (face, corners) in mesh.faces.iter().enumerate() {
         if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices) {
             return Err(Error::Index {
@@ -105,6 +127,24 @@ fn check(label: &str, mesh: &TriangleMesh) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// A direction as a point of the square from 0 to 65535: the faces of the octahedron
+/// `|x| + |y| + |z| = 1`, seen along the third axis, the lower half folded over the edges (Z. Cigolle and
+/// others: A survey of efficient representations for independent unit vectors, 2014). What is no direction
+/// becomes the third axis.
+fn octahedral(normal: [f64; 3]) -> [u16; 2] {
+    let sum: f64 = normal.iter().map(|v| v.abs()).sum();
+    if !(sum.is_finite() && sum > 0.0) {
+        return octahedral([0.0, 0.0, 1.0]);
+    }
+    let [x, y, z] = normal.map(|v| v / sum);
+    let [x, y] = if z >= 0.0 {
+        [x, y]
+    } else {
+        [(1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y)]
+    };
+    [x, y].map(|v| (0.5 * (v + 1.0) * STEPS).round() as u16)
 }
 
 fn push_varint(bytes: &mut Vec<u8>, mut value: usize) {
@@ -123,7 +163,13 @@ mod tests {
     /// As the script of the page does it.
     fn decoded(surface: &Surface) -> TriangleMesh {
         let bytes = STANDARD.decode(&surface.data).unwrap();
-        let (positions, mut rest) = bytes.split_at(6 * surface.vertices);
+        let (positions, rest) = bytes.split_at(6 * surface.vertices);
+        let length = if surface.has_normals {
+            4 * surface.vertices
+        } else {
+            0
+        };
+        let (normals, mut rest) = rest.split_at(length);
         let step = surface.step();
         let vertices = positions
             .chunks_exact(6)
@@ -134,6 +180,17 @@ mod tests {
                 })
             })
             .collect();
+        let normals = normals.chunks_exact(4).map(|n| {
+            let part =
+                |i: usize| 2.0 * f64::from(u16::from_le_bytes([n[i], n[i + 1]])) / STEPS - 1.0;
+            let [x, y] = [part(0), part(2)];
+            let z = 1.0 - x.abs() - y.abs();
+            let fold = (-z).max(0.0);
+            let normal = [x - fold.copysign(x), y - fold.copysign(y), z];
+            let length = normal.iter().map(|v| v * v).sum::<f64>().sqrt();
+            normal.map(|v| v / length)
+        });
+        let normals: Vec<[f64; 3]> = normals.collect();
         let (mut next, mut corners) = (0, Vec::new());
         while let [_, ..] = rest {
             let (mut distance, mut shift) = (0, 0);
@@ -156,7 +213,7 @@ mod tests {
                 .chunks_exact(3)
                 .map(|f| [f[0], f[1], f[2]])
                 .collect(),
-            normals: None,
+            normals: surface.has_normals.then_some(normals),
         }
     }
 
@@ -192,9 +249,16 @@ mod tests {
         let surface = Surface::new("figure", mesh).unwrap();
         assert!(largest_error(mesh, &surface) <= 0.5 + 1e-6);
         assert_eq!(surface.faces, mesh.faces.len());
-        // In place of the 6 bytes for positions and the 24 for the corners of two faces.
+        let (back, pairs) = (decoded(&surface), mesh.faces.as_flattened().iter());
+        let (before, after) = (mesh.normals.as_ref().unwrap(), back.normals.unwrap());
+        for (&a, &b) in pairs.zip(back.faces.as_flattened()) {
+            let (n, m) = (before[a as usize], after[b as usize]);
+            let difference = (0..3).map(|i| (n[i] - m[i]).abs()).fold(0.0, f64::max);
+            assert!(difference < 1e-4, "{n:?} {m:?}");
+        }
+        // In place of 12 bytes for positions, 12 for normals, and 24 for the corners of two faces.
         let per_vertex = 0.75 * surface.data.len() as f64 / surface.vertices as f64;
-        assert!(per_vertex < 16.0, "{per_vertex} bytes");
+        assert!(per_vertex < 20.0, "{per_vertex} bytes");
     }
 
     #[test]
@@ -223,12 +287,30 @@ mod tests {
             let error = Surface::new("far", &mesh(&vertices, &[[0, 1, 0]])).unwrap_err();
             assert!(matches!(error, Error::Vertex { vertex: 1, .. }));
         }
+        let mut bare = mesh(&[[0.0; 3]; 2], &[[0, 1, 0]]);
+        bare.normals = Some(vec![[0.0, 0.0, 1.0]]);
+        let error = Surface::new("bare", &bare).unwrap_err();
+        assert!(
+            error.to_string().contains("1 normals for 2 vertices"),
+            "{error}"
+        );
         let error = Surface::new("x", &mesh(&[[0.0; 3]; 2], &[[0, 1, 0], [0, 2, 1]])).unwrap_err();
         assert!(
             error
                 .to_string()
                 .contains("face 1 of the surface \"x\" refers to vertex 2")
         );
+    }
+
+    #[test]
+    fn axes_and_what_is_no_direction() {
+        assert_eq!(octahedral([0.0, 0.0, 2.0]), [32768, 32768]);
+        assert_eq!(octahedral([1.0, 0.0, 0.0]), [65535, 32768]);
+        assert_eq!(octahedral([0.0, -3.0, 0.0]), [32768, 0]);
+        assert_eq!(octahedral([0.0, 0.0, -1.0]), [65535, 65535]);
+        for normal in [[0.0; 3], [f64::NAN, 0.0, 1.0], [f64::INFINITY; 3]] {
+            assert_eq!(octahedral(normal), octahedral([0.0, 0.0, 1.0]));
+        }
     }
 
     proptest! {

@@ -105,20 +105,20 @@ impl Table {
         &self.rows
     }
 
-    /// Whether all cells of a column that say something are numbers.
+    /// Whether a column has numbers, if anything.
     fn is_numeric(&self, column: usize) -> bool {
-        let mut cells = self
-            .rows
-            .iter()
-            .map(|row| row[column].as_str())
-            .filter(|cell| !is_missing(cell))
-            .peekable();
-        cells.peek().is_some() && cells.all(is_number)
+        let mut cells = self.rows.iter().map(|row| row[column].as_str());
+        cells.all(|cell| is_missing(cell) || is_number(cell))
     }
 
     pub(crate) fn html(&self) -> String {
         let numeric: Vec<bool> = (0..self.head.len()).map(|k| self.is_numeric(k)).collect();
         let class = |k: usize| if numeric[k] { " class=\"n\"" } else { "" };
+        let head_class = |k: usize| match (numeric[k], is_short(&self.head[k])) {
+            (true, true) => " class=\"n s\"",
+            (false, true) => " class=\"s\"",
+            (_, false) => class(k),
+        };
         let caption = escaped(&self.caption);
         // Wide tables scroll, also by keyboard.
         let mut html = format!(
@@ -126,7 +126,12 @@ impl Table {
              <table>\n<caption>{caption}</caption>\n<thead><tr>"
         );
         for (k, name) in self.head.iter().enumerate() {
-            let _ = write!(html, "<th scope=\"col\"{}>{}</th>", class(k), escaped(name));
+            let _ = write!(
+                html,
+                "<th scope=\"col\"{}>{}</th>",
+                head_class(k),
+                escaped(name)
+            );
         }
         html.push_str("</tr></thead>\n<tbody>\n");
         for row in &self.rows {
@@ -143,6 +148,11 @@ impl Table {
 
 fn words(cells: impl IntoIterator<Item = impl Into<String>>) -> Vec<String> {
     cells.into_iter().map(Into::into).collect()
+}
+
+/// Heads that look better on one line; a minus sign must not end a line, for example.
+fn is_short(head: &str) -> bool {
+    head.chars().count() <= 14
 }
 
 fn is_missing(cell: &str) -> bool {
@@ -212,10 +222,16 @@ mod tests {
         for cell in ["x", "1 2", "nan", "2·10x", "256x256", "·10⁻⁸"] {
             assert!(!is_number(cell), "{cell}");
         }
-        let table = Table::from_csv("t", "a,b,c\nx,1,\ny,–,\n").unwrap();
+        let table = Table::from_csv("t", "a,b,c\nx,1,z\ny,–,3\n").unwrap();
         let numeric: Vec<bool> = (0..3).map(|k| table.is_numeric(k)).collect();
         assert_eq!(numeric, [false, true, false]);
-        assert_eq!(table.html().matches("class=\"n\"").count(), 3);
+        let html = table.html();
+        let count = |part: &str| html.matches(part).count();
+        assert_eq!((count("<td class=\"n\">"), count("<td>")), (2, 4));
+        assert_eq!(
+            (count("<th scope=\"col\" class=\"n s\">"), count("<th ")),
+            (1, 3)
+        );
     }
 
     #[test]

@@ -62,7 +62,7 @@ fn a_folder_becomes_a_section() {
     let html = page.to_html();
     for part in [
         "<h2 id=\"cross\">Willmore flow of a cross</h2>",
-        "<li>a cross: n = 64 only</li>",
+        "<li>In the paper: a cross. Here: n = 64 only.</li>",
         "<img src=\"cross/shapes.png\"",
         "<a href=\"cross/errors.svg\">SVG</a>",
         "data-label=\"001\"><img src=\"cross/turn_001.png\"",

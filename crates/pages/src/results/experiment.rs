@@ -61,7 +61,9 @@ impl<'a> Experiment<'a> {
             section.push(entry.description);
         }
         if let Some(states) = states.get(self.name) {
-            let item = |(what, state): &(String, String)| Text::from(format!("{what}: {state}"));
+            let item = |(what, state): &(String, String)| {
+                Text::from(format!("In the paper: {what}. Here: {state}."))
+            };
             section.push(states.iter().map(item).collect::<Vec<_>>());
         }
         for block in self.figures(&files, entry, problems) {
