@@ -245,7 +245,8 @@ class SurfaceViewer {
     const shorter = Math.min(width, height);
     const [fx, fy] = [(focal * shorter) / width, (focal * shorter) / height];
     const depth = [(far + near) / (far - near), (-2 * far * near) / (far - near)];
-    const row = (direction, scale) => [...direction.map((v) => (scale * v) / ball.radius), (-scale * dot(direction, ball.centre)) / ball.radius];
+    const row = (direction, scale) =>
+      [...direction, -dot(direction, ball.centre)].map((v) => (scale * v) / ball.radius);
     const [x, y, z] = [row(right, fx), row(above, fy), row(toward, -1)];
     z[3] += distance; // Now the distance in front of the eye.
     const rows = [x, y, z.map((v, i) => depth[0] * v + (i === 3 ? depth[1] : 0)), z];

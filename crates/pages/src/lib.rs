@@ -35,7 +35,8 @@
 //! - A page works from a disk, from a server and from a mail; it asks the network for nothing.
 //! - Whatever text comes in is text, never markup.
 //! - Without JavaScript everything but turning and playing is there: sequences are strips, surfaces
-//!   are pictures. Everything can be reached by keyboard and has a text for those who cannot see it.
+//!   are pictures. Everything can be reached by keyboard and has a text for those who cannot see
+//!   it.
 //! - Pictures lie on white, also where the page is dark: figures are drawn for paper.
 //! - The same input gives the same bytes.
 //! - A page opened as `page.html#check` starts everything on it and says in the attribute

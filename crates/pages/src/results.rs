@@ -1,8 +1,8 @@
 //! Pages of results: what the folders of experiments hold, as sections.
 //!
 //! A folder of an experiment has a `manifest.json` and a `summary.json`, figures (PNG, the same as
-//! SVG beside it), numbered pictures (`name_000.png`, `name_001.png`, ...), and tables (Markdown, the
-//! same as CSV beside it). [`index_page`] makes one page of all folders, [`run_page`] one of a
+//! SVG beside it), numbered pictures (`name_000.png`, `name_001.png`, ...), and tables (Markdown,
+//! the same as CSV beside it). [`index_page`] makes one page of all folders, [`run_page`] one of a
 //! single folder.
 
 mod catalogue;

@@ -130,9 +130,9 @@ fn check(label: &str, mesh: &TriangleMesh) -> Result<()> {
 }
 
 /// A direction as a point of the square from 0 to 65535: the faces of the octahedron
-/// `|x| + |y| + |z| = 1`, seen along the third axis, the lower half folded over the edges (Z. Cigolle and
-/// others: A survey of efficient representations for independent unit vectors, 2014). What is no direction
-/// becomes the third axis.
+/// `|x| + |y| + |z| = 1`, seen along the third axis, the lower half folded over the edges
+/// (Z. Cigolle and others: A survey of efficient representations for independent unit vectors,
+/// 2014). What is no direction becomes the third axis.
 fn octahedral(normal: [f64; 3]) -> [u16; 2] {
     let sum: f64 = normal.iter().map(|v| v.abs()).sum();
     if !(sum.is_finite() && sum > 0.0) {

@@ -10,8 +10,8 @@ use pages::{Error, Page, Pictures};
 /// Makes a page to look at of the folder of all results, or of one run.
 ///
 /// The page of all results refers to the pictures beside it, as it is kept under version control
-/// together with them; with --embed, or anywhere else, it has them inside. The page of one run always
-/// has them inside: one file that can be mailed.
+/// together with them; with --embed, or anywhere else, it has them inside. The page of one run
+/// always has them inside: one file that can be mailed.
 #[derive(Parser, Debug)]
 #[command(name = "results_page", version)]
 struct Options {
