@@ -1,0 +1,67 @@
+//! Pages to look at: figures, tables, picture sequences and surfaces to turn in one HTML file.
+//!
+//! ```
+//! use pages::{Details, Facts, Page, Section, Table, Viewer, View, Image};
+//! use geometry::{Grid, phase_field, shapes::Ball};
+//!
+//! fn main() -> Result<(), Box<dyn std::error::Error>> {
+//!     let grid = Grid::<3>::centred(32, 1.0)?;
+//!     let eps = 2.0 * grid.spacing();
+//!     let u = phase_field(grid, &Ball::new([0.0; 3], 0.3)?, eps)?;
+//!     let mesh = surfaces::phase_field_surface(&u, eps)?;
+//!     let picture = render::Scene::new(&u, eps)?
+//!         .quality(render::Quality::Draft)
+//!         .render((160, 120))?;
+//!
+//!     let poster = Image::from_picture(&picture)?;
+//!     let ball = Viewer::new("A ball", poster, View::default(), [("step 0", &mesh)])?;
+//!     let table = Table::from_csv("Errors", "n,error\n64,0.01\n128,0.0025\n")?;
+//!     let details = Details::new("Parameters").with(Facts::new().with("eps", "2 h"));
+//!     let page = Page::new("Balls & spheres")
+//!         .with_lead("What a ball looks like.")
+//!         .with(Section::new("Surface").with(ball))
+//!         .with(Section::new("Numbers").with(table).with(details));
+//!     let html = page.to_html();
+//!     assert!(html.contains("<h1>Balls &amp; spheres</h1>"));
+//! #   let folder = tempfile::tempdir()?;
+//! #   let path = folder.path().join("ball.html");
+//!     page.write(path)?;
+//!     Ok(())
+//! }
+//! ```
+//!
+//! # Conventions
+//!
+//! - A page works from a disk, from a server and from a mail; it asks the network for nothing.
+//! - Whatever text comes in is text, never markup.
+//! - Without JavaScript everything but turning and playing is there: sequences are strips, surfaces
+//!   are pictures. Everything can be reached by keyboard and has a text for those who cannot see
+//!   it.
+//! - Pictures lie on white, also where the page is dark: figures are drawn for paper.
+//! - The same input gives the same bytes.
+//! - A page opened as `page.html#check` starts everything on it and says in the attribute
+//!   `data-check` of its root what did not work; `scripts/check_pages` reads that.
+
+pub mod results;
+
+mod error;
+mod escape;
+mod facts;
+mod frames;
+mod image;
+mod page;
+mod section;
+mod surface;
+mod table;
+mod text;
+mod viewer;
+
+pub use error::{Error, Result};
+pub use facts::Facts;
+pub use frames::Frames;
+pub use image::{Image, Pictures};
+pub use page::Page;
+pub use section::{Block, Details, Figure, Section};
+pub use table::Table;
+pub use text::Text;
+pub use viewer::{View, Viewer};

@@ -1,0 +1,329 @@
+//! Triangle meshes as text: positions of 16 bits, faces of few bytes.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use surfaces::TriangleMesh;
+
+use crate::error::{Error, Result};
+
+/// Steps of the grid that positions are rounded to, along every side of the bounding box.
+const STEPS: f64 = u16::MAX as f64;
+/// Beyond this the single precision of graphics cards overflows.
+const LARGEST: f64 = 1e18;
+
+/// A mesh as the page carries it. Vertices are numbered by their first use, and those that no face
+/// uses are left out.
+///
+/// The data are the positions, three little-endian 16-bit numbers each in units of `step` from
+/// `low`; the normals, if the mesh has them, two such numbers each, see [`octahedral`]; and the
+/// corners of the faces. A corner is stored as its distance from the lowest
+/// number not used before, zero for a vertex that appears for the first time; seven bits to a byte,
+/// low ones first, the eighth bit set if more follow. Neighbouring faces share recent vertices,
+/// so most corners take one byte or two.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Surface {
+    pub label: String,
+    pub vertices: usize,
+    pub faces: usize,
+    pub low: [f64; 3],
+    pub high: [f64; 3],
+    pub has_normals: bool,
+    pub data: String,
+}
+
+impl Surface {
+    pub fn new(label: &str, mesh: &TriangleMesh) -> Result<Self> {
+        check(label, mesh)?;
+        let mut number = vec![None; mesh.vertices.len()];
+        let mut order = Vec::with_capacity(mesh.vertices.len());
+        let mut corners = Vec::with_capacity(4 * mesh.faces.len());
+        for &vertex in mesh.faces.as_flattened() {
+            let vertex = vertex as usize;
+            let next = order.len();
+            let index = *number[vertex].get_or_insert(next);
+            if index == next {
+                order.push(vertex);
+            }
+            push_varint(&mut corners, next - index);
+        }
+        let used: Vec<[f64; 3]> = order.iter().map(|&vertex| mesh.vertices[vertex]).collect();
+        let ends = |choose: fn(f64, f64) -> f64| {
+            used.iter().copied().fold(used[0], |end, x| {
+                std::array::from_fn(|i| choose(end[i], x[i]))
+            })
+        };
+        let (low, high) = (ends(f64::min), ends(f64::max));
+        let mut bytes = Vec::with_capacity(10 * used.len() + corners.len());
+        for position in &used {
+            for i in 0..3 {
+                let extent = high[i] - low[i];
+                let part = if extent > 0.0 {
+                    (position[i] - low[i]) / extent
+                } else {
+                    0.0
+                };
+                bytes.extend(((part * STEPS).round() as u16).to_le_bytes());
+            }
+        }
+        if let Some(normals) = &mesh.normals {
+            for &vertex in &order {
+                bytes.extend(
+                    octahedral(normals[vertex])
+                        .map(u16::to_le_bytes)
+                        .as_flattened(),
+                );
+            }
+        }
+        bytes.extend(corners);
+        Ok(Self {
+            label: label.to_owned(),
+            vertices: used.len(),
+            faces: mesh.faces.len(),
+            low,
+            high,
+            has_normals: mesh.normals.is_some(),
+            data: STANDARD.encode(bytes),
+        })
+    }
+
+    /// Sizes of the units of positions.
+    pub fn step(&self) -> [f64; 3] {
+        std::array::from_fn(|i| (self.high[i] - self.low[i]) / STEPS)
+    }
+}
+
+fn check(label: &str, mesh: &TriangleMesh) -> Result<()> {
+    let label = || label.to_owned();
+    if mesh.faces.is_empty() {
+        return Err(Error::NoFaces { label: label() });
+    }
+    let close = |x: &[f64; 3]| x.iter().all(|v| v.abs() <= LARGEST);
+    if let Some(vertex) = mesh.vertices.iter().position(|x| !close(x)) {
+        return Err(Error::Vertex {
+            label: label(),
+            vertex,
+            position: mesh.vertices[vertex],
+            limit: LARGEST,
+        });
+    }
+    let vertices = mesh.vertices.len();
+    if let Some(normals) = &mesh.normals
+        && normals.len() != vertices
+    {
+        return Err(Error::Normals {
+            label: label(),
+            normals: normals.len(),
+            vertices,
+        });
+    }
+    for (face, corners) in mesh.faces.iter().enumerate() {
+        if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices) {
+            return Err(Error::Index {
+                label: label(),
+                face,
+                vertex,
+                vertices,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// A direction as a point of the square from 0 to 65535: the faces of the octahedron
+/// `|x| + |y| + |z| = 1`, seen along the third axis, the lower half folded over the edges
+/// (Z. Cigolle and others: A survey of efficient representations for independent unit vectors,
+/// 2014). What is no direction becomes the third axis.
+fn octahedral(normal: [f64; 3]) -> [u16; 2] {
+    let sum: f64 = normal.iter().map(|v| v.abs()).sum();
+    if !(sum.is_finite() && sum > 0.0) {
+        return octahedral([0.0, 0.0, 1.0]);
+    }
+    let [x, y, z] = normal.map(|v| v / sum);
+    let [x, y] = if z >= 0.0 {
+        [x, y]
+    } else {
+        [(1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y)]
+    };
+    [x, y].map(|v| (0.5 * (v + 1.0) * STEPS).round() as u16)
+}
+
+fn push_varint(bytes: &mut Vec<u8>, mut value: usize) {
+    while value > 0x7f {
+        bytes.push((value & 0x7f) as u8 | 0x80);
+        value >>= 7;
+    }
+    bytes.push(value as u8);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// As the script of the page does it.
+    fn decoded(surface: &Surface) -> TriangleMesh {
+        let bytes = STANDARD.decode(&surface.data).unwrap();
+        let (positions, rest) = bytes.split_at(6 * surface.vertices);
+        let length = if surface.has_normals {
+            4 * surface.vertices
+        } else {
+            0
+        };
+        let (normals, mut rest) = rest.split_at(length);
+        let step = surface.step();
+        let vertices = positions
+            .chunks_exact(6)
+            .map(|x| {
+                std::array::from_fn(|i| {
+                    let value = u16::from_le_bytes([x[2 * i], x[2 * i + 1]]);
+                    surface.low[i] + step[i] * f64::from(value)
+                })
+            })
+            .collect();
+        let normals = normals.chunks_exact(4).map(|n| {
+            let part =
+                |i: usize| 2.0 * f64::from(u16::from_le_bytes([n[i], n[i + 1]])) / STEPS - 1.0;
+            let [x, y] = [part(0), part(2)];
+            let z = 1.0 - x.abs() - y.abs();
+            let fold = (-z).max(0.0);
+            let normal = [x - fold.copysign(x), y - fold.copysign(y), z];
+            let length = normal.iter().map(|v| v * v).sum::<f64>().sqrt();
+            normal.map(|v| v / length)
+        });
+        let normals: Vec<[f64; 3]> = normals.collect();
+        let (mut next, mut corners) = (0, Vec::new());
+        while let [_, ..] = rest {
+            let (mut distance, mut shift) = (0, 0);
+            loop {
+                let (&byte, tail) = rest.split_first().unwrap();
+                rest = tail;
+                distance |= u32::from(byte & 0x7f) << shift;
+                shift += 7;
+                if byte & 0x80 == 0 {
+                    break;
+                }
+            }
+            corners.push(next - distance);
+            next += u32::from(distance == 0);
+        }
+        assert_eq!(next as usize, surface.vertices);
+        TriangleMesh {
+            vertices,
+            faces: corners
+                .chunks_exact(3)
+                .map(|f| [f[0], f[1], f[2]])
+                .collect(),
+            normals: surface.has_normals.then_some(normals),
+        }
+    }
+
+    /// Largest distance of corners over the step along their axis; the faces must agree.
+    fn largest_error(mesh: &TriangleMesh, surface: &Surface) -> f64 {
+        let back = decoded(surface);
+        assert_eq!(back.faces.len(), mesh.faces.len());
+        let step = surface.step();
+        let pairs = mesh
+            .faces
+            .as_flattened()
+            .iter()
+            .zip(back.faces.as_flattened());
+        pairs
+            .flat_map(|(&a, &b)| {
+                let (x, y) = (mesh.vertices[a as usize], back.vertices[b as usize]);
+                (0..3).map(move |i| {
+                    let error = (x[i] - y[i]).abs();
+                    if step[i] > 0.0 {
+                        error / step[i]
+                    } else {
+                        error
+                    }
+                })
+            })
+            .fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_scanned_figure_survives_and_is_small() {
+        let figure = surfaces::samples::figure(48).unwrap();
+        let mesh = figure.mesh();
+        let surface = Surface::new("figure", mesh).unwrap();
+        assert!(largest_error(mesh, &surface) <= 0.5 + 1e-6);
+        assert_eq!(surface.faces, mesh.faces.len());
+        let (back, pairs) = (decoded(&surface), mesh.faces.as_flattened().iter());
+        let (before, after) = (mesh.normals.as_ref().unwrap(), back.normals.unwrap());
+        for (&a, &b) in pairs.zip(back.faces.as_flattened()) {
+            let (n, m) = (before[a as usize], after[b as usize]);
+            let difference = (0..3).map(|i| (n[i] - m[i]).abs()).fold(0.0, f64::max);
+            assert!(difference < 1e-4, "{n:?} {m:?}");
+        }
+        // In place of 12 bytes for positions, 12 for normals, and 24 for the corners of two faces.
+        let per_vertex = 0.75 * surface.data.len() as f64 / surface.vertices as f64;
+        assert!(per_vertex < 20.0, "{per_vertex} bytes");
+    }
+
+    #[test]
+    fn unused_vertices_do_not_count() {
+        let mesh = TriangleMesh {
+            vertices: vec![[9e9; 3], [0.0; 3], [1.0, 0.0, 5.0], [0.0, 2.0, 5.0]],
+            faces: vec![[3, 1, 2]],
+            normals: None,
+        };
+        let surface = Surface::new("one", &mesh).unwrap();
+        assert_eq!((surface.vertices, surface.high), (3, [1.0, 2.0, 5.0]));
+        assert!(largest_error(&mesh, &surface) < 0.5);
+    }
+
+    #[test]
+    fn what_cannot_be_shown_is_refused() {
+        let mesh = |vertices: &[[f64; 3]], faces: &[[u32; 3]]| TriangleMesh {
+            vertices: vertices.to_vec(),
+            faces: faces.to_vec(),
+            normals: None,
+        };
+        let error = Surface::new("none", &mesh(&[[0.0; 3]], &[])).unwrap_err();
+        assert!(matches!(&error, Error::NoFaces { label } if label == "none"));
+        for value in [f64::NAN, f64::INFINITY, 1e300] {
+            let vertices = [[0.0; 3], [0.0, value, 0.0]];
+            let error = Surface::new("far", &mesh(&vertices, &[[0, 1, 0]])).unwrap_err();
+            assert!(matches!(error, Error::Vertex { vertex: 1, .. }));
+        }
+        let mut bare = mesh(&[[0.0; 3]; 2], &[[0, 1, 0]]);
+        bare.normals = Some(vec![[0.0, 0.0, 1.0]]);
+        let error = Surface::new("bare", &bare).unwrap_err();
+        assert!(
+            error.to_string().contains("1 normals for 2 vertices"),
+            "{error}"
+        );
+        let error = Surface::new("x", &mesh(&[[0.0; 3]; 2], &[[0, 1, 0], [0, 2, 1]])).unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .contains("face 1 of the surface \"x\" refers to vertex 2")
+        );
+    }
+
+    #[test]
+    fn axes_and_what_is_no_direction() {
+        assert_eq!(octahedral([0.0, 0.0, 2.0]), [32768, 32768]);
+        assert_eq!(octahedral([1.0, 0.0, 0.0]), [65535, 32768]);
+        assert_eq!(octahedral([0.0, -3.0, 0.0]), [32768, 0]);
+        assert_eq!(octahedral([0.0, 0.0, -1.0]), [65535, 65535]);
+        for normal in [[0.0; 3], [f64::NAN, 0.0, 1.0], [f64::INFINITY; 3]] {
+            assert_eq!(octahedral(normal), octahedral([0.0, 0.0, 1.0]));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn positions_are_within_half_a_step(
+            vertices in prop::collection::vec(prop::array::uniform3(-1e3..1e3), 1..300),
+            corners in prop::collection::vec(prop::array::uniform3(any::<u32>()), 1..400),
+        ) {
+            let count = vertices.len() as u32;
+            let faces = corners.into_iter().map(|f| f.map(|v| v % count)).collect();
+            let mesh = TriangleMesh { vertices, faces, normals: None };
+            let surface = Surface::new("random", &mesh).unwrap();
+            prop_assert!(largest_error(&mesh, &surface) <= 0.5 + 1e-6);
+        }
+    }
+}
