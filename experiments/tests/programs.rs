@@ -11,6 +11,7 @@ use report::Summary;
 
 const CALIBRATION: &str = env!("CARGO_BIN_EXE_calibration");
 const CIRCLES: &str = env!("CARGO_BIN_EXE_circle_convergence");
+const INPAINTING: &str = env!("CARGO_BIN_EXE_inpainting_2d");
 const LEARNED: &str = env!("CARGO_BIN_EXE_learned_networks");
 const CROSS: &str = env!("CARGO_BIN_EXE_cross");
 const MCF_CROSS: &str = env!("CARGO_BIN_EXE_mcf_cross");
@@ -28,6 +29,7 @@ fn devices_that_are_unknown_or_not_compiled_in() {
         CALIBRATION,
         CIRCLES,
         CROSS,
+        INPAINTING,
         LEARNED,
         MCF_CROSS,
         PERFORMANCE,
@@ -271,6 +273,55 @@ fn the_quick_calibration_predicts_the_energies_and_installs_the_network() {
         &["--quick", "--network", "missing.safetensors"],
         &["missing.safetensors"],
     );
+}
+
+#[test]
+fn the_quick_inpainting_changes_nothing_outside() {
+    let root = tempfile::tempdir().unwrap();
+    let output = run(INPAINTING, root.path(), &["--quick", "--output", "out"]);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && message.is_empty(), "{message}");
+    let folder = root.path().join("out");
+    for name in [
+        "disk_frames.svg",
+        "cross_frames.png",
+        "energies.svg",
+        "steps.csv",
+        "manifest.json",
+    ] {
+        assert!(folder.join(name).exists(), "{name}");
+    }
+    let summary = fs::read_to_string(folder.join("summary.json")).unwrap();
+    let summary = Summary::from_json(&summary).unwrap();
+    for picture in ["disk", "cross"] {
+        let metric = |name: &str| summary.get(&format!("{picture}.{name}")).unwrap();
+        assert!(metric("changed_outside") <= 0.0);
+        assert!(metric("energy_increases") <= 0.0);
+    }
+    assert!(summary.get("disk.distance.step2") < summary.get("disk.distance.step0"));
+    // As printed, tautilde is beyond what the scheme allows at the paper's resolution.
+    refused(
+        INPAINTING,
+        root.path(),
+        &["--printed-tautilde"],
+        &["tautilde"],
+    );
+}
+
+#[test]
+fn the_accurate_recipe_trains_a_network() {
+    let root = tempfile::tempdir().unwrap();
+    let arguments = [
+        "--quick", "--recipe", "accurate", "--only", "n64", "--output", "out",
+    ];
+    let output = run(TRAIN, root.path(), &arguments);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && message.is_empty(), "{message}");
+    let name = "out/networks/accurate_d2_k9_eps1_step0.25.safetensors";
+    let network = model::Network::load(&root.path().join(name)).unwrap();
+    assert!(network.provenance().recipe.contains("least squares"));
+    let paper = ["--quick", "--only", "n64"];
+    refused(TRAIN, root.path(), &paper, &["n64", "n128"]);
 }
 
 #[test]

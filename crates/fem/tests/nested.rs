@@ -271,3 +271,42 @@ fn a_failing_inner_solver_stops_the_flow_with_its_numbers() {
     let error = flow.advance(size).unwrap_err();
     assert!(matches!(error, Error::NonFinite { step: 1, .. }), "{error}");
 }
+
+/// Without calibration `R^4` grows at the rate `2 c/m`, as the flat interface predicts.
+#[test]
+fn discs_grow_at_the_predicted_rate() {
+    let grid = Grid::<2>::centred(96, 1.5).unwrap();
+    let (eps, tau) = (2.0 * grid.spacing(), grid.spacing().powi(2));
+    let device = ComputeDevice::default_compiled().unwrap();
+    let params = FlowParams {
+        eps,
+        mcf_step: tau,
+        newton: NewtonParams::default(),
+        calibration: solver::Factors::PAPER,
+    };
+    for (step, tolerance) in [
+        (FiniteElementStep::implicit(&grid, eps, tau).unwrap(), 0.01),
+        (
+            FiniteElementStep::semi_implicit(&grid, eps, tau).unwrap(),
+            0.02,
+        ),
+    ] {
+        let predicted = step.calibrate().unwrap().factors.speed();
+        let mut flow = WillmoreFlow::new(step, &ball(grid, 0.5, eps), params, &device).unwrap();
+        // The first step also relaxes the profile.
+        let power = |flow: &WillmoreFlow<2>| {
+            let area = zero_set_volume(&flow.field().unwrap());
+            (area / std::f64::consts::PI).powi(2)
+        };
+        flow.advance(tau).unwrap();
+        let before = power(&flow);
+        for _ in 0..4 {
+            flow.advance(tau).unwrap();
+        }
+        let measured = (power(&flow) - before) / (8.0 * tau);
+        assert!(
+            (measured / predicted - 1.0).abs() < tolerance,
+            "{measured} {predicted}"
+        );
+    }
+}

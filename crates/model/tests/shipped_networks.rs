@@ -38,6 +38,40 @@ fn shipped_networks_reach_their_quality() {
 }
 
 #[test]
+fn accurate_networks_treat_both_phases_alike() {
+    let device = ComputeDevice::default_compiled().unwrap();
+    let networks = pretrained::all_accurate().unwrap();
+    assert_eq!(networks.len(), 6);
+    for (name, network) in networks {
+        assert_eq!(
+            name,
+            format!("accurate_{}", pretrained::file_name(network.ratios()))
+        );
+        assert_eq!(
+            pretrained::find_accurate(network.ratios()).unwrap(),
+            network
+        );
+        let activation = network.activation();
+        for w in [-1.3, -0.6, 0.0, 0.2, 1.0] {
+            assert!(
+                (activation.value(w) + activation.value(-w)).abs() < 1e-12,
+                "{name}"
+            );
+        }
+        if network.provenance().reference_cells > 256 || network.ratios().dimension > 2 {
+            continue; // the same code path, many times the time
+        }
+        let data = SphereData::new(network.ratios(), network.provenance().reference_cells).unwrap();
+        let quality = Quality::measure(&network, &data, 8, &device).unwrap();
+        assert!(quality.reference_loss < 7e-8, "{name}: {quality:?}");
+        assert!((quality.flipped_loss / quality.held_out_loss - 1.0).abs() < 1e-6);
+        assert!(quality.transfer_min > -0.002 && quality.transfer_max < 1.0 + 1e-12);
+        assert!(quality.phase_defect < 1e-4, "{name}: {quality:?}");
+        assert!(quality.activation_roughness < 1e-3, "{name}: {quality:?}");
+    }
+}
+
+#[test]
 fn losses_in_the_metadata_are_those_of_the_weights() {
     let device = ComputeDevice::default_compiled().unwrap();
     for (name, network) in pretrained::all().unwrap() {

@@ -500,7 +500,8 @@ fn summary(all: &[Finished], seconds: f64) -> Result<Summary, Error> {
             summary.insert(&format!("{key}.distance.step{k}"), distance)?;
         }
         let records = &one.trajectory.records;
-        let rises = records.iter().filter(|r| r.energy >= r.energy_before);
+        // Where nothing moves any more, the energy stays.
+        let rises = records.iter().filter(|r| r.energy > r.energy_before);
         summary.insert_count(&format!("{key}.energy_increases"), rises.count())?;
         summary.insert_count(&format!("{key}.changed_outside"), one.changed_outside)?;
         summary.insert_count(&format!("{key}.steps"), one.steps)?;
