@@ -262,11 +262,11 @@ pub struct CommonOptions {
 #[derive(Args, Clone, Copy, Debug)]
 pub struct SayOptions {
     /// Print nothing but errors
-    #[arg(long)]
+    #[arg(long, global = true)]
     pub quiet: bool,
 
     /// Print the outcome as one JSON object
-    #[arg(long)]
+    #[arg(long, global = true)]
     pub json: bool,
 }
 

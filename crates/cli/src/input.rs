@@ -11,6 +11,7 @@ use crate::cli::{Ansatz, Holds, InputOptions, Inside};
 use crate::error::Error;
 use crate::outlet::{Plane, Space};
 use crate::shape::{self, BuiltIn, Region};
+use crate::signs;
 
 /// What a run starts from.
 pub struct Start<const D: usize, O> {
@@ -260,7 +261,13 @@ fn place(
     let (grid, side) = grid::<3>(options, 64, 1.0)?;
     let placement = Placement::fit(mesh, &grid, side, 0.0)?;
     bar.set_length(grid.cells() as u64);
-    let distance = MeshDistance::new(&mesh.placed(&placement)).sample(grid, || bar.inc(1))?;
+    let mut distance = MeshDistance::new(&mesh.placed(&placement)).sample(grid, || bar.inc(1))?;
+    let mended = signs::mend(&mut distance);
+    if mended > 0 {
+        bar.suspend(|| {
+            eprintln!("warning: the mesh folds over itself; the side of {mended} nodes was mended")
+        });
+    }
     let eps = eps_over_h * grid.spacing();
     Ok(Start {
         name,

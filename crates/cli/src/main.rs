@@ -10,6 +10,7 @@ mod outlet;
 mod run;
 mod scales;
 mod shape;
+mod signs;
 mod tau;
 
 use std::ffi::OsString;

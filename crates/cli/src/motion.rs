@@ -44,7 +44,9 @@ pub struct Memory {
     pub first_energy: f64,
     /// Willmore energy now; NaN before the first step.
     pub energy: f64,
-    /// Steps in a row, with the largest automatic size, that took away next to nothing.
+    /// 1 while a shape that comes to the side of the box ends the run, 0 if it was there from the beginning.
+    pub free: f64,
+    /// Steps in a row, nearly of the largest automatic size, that took away next to nothing.
     pub still: f64,
 }
 
@@ -54,6 +56,7 @@ impl Memory {
         next: f64::NAN,
         first_energy: f64::NAN,
         energy: f64::NAN,
+        free: 1.0,
         still: 0.0,
     };
 }
@@ -61,9 +64,9 @@ impl Memory {
 /// How often a step is halved before the run gives up.
 const HALVINGS: usize = 24;
 /// A step that takes away less than this part of the energy takes away next to nothing.
-const STILL: f64 = 1e-6;
-/// So many of them in a row are the end.
-const STILL_STEPS: f64 = 2.0;
+const STILL: f64 = 1e-4;
+/// So many of them in a row are the end: larger steps would jump to other minimizers, such as an empty box.
+const STILL_STEPS: f64 = 3.0;
 
 /// A flow with its rule for time steps.
 pub enum Motion<const D: usize> {
@@ -96,7 +99,7 @@ pub enum Motion<const D: usize> {
 impl<const D: usize> Motion<D> {
     /// The largest automatic step in a box: beyond it nothing is left to be seen.
     pub fn largest_step(grid: &Grid<D>) -> f64 {
-        grid.side().powi(4) / 64.0
+        grid.side().powi(4) / 1024.0
     }
 
     /// Steps done and time reached.
@@ -208,7 +211,8 @@ fn willmore<const D: usize>(
     if halvings > 0 || wanted <= left {
         memory.next = Tau::after(&record, largest);
     }
-    let still = record.tau >= largest && (before - record.willmore_energy).abs() < STILL * before;
+    let still =
+        record.tau >= 0.25 * largest && (before - record.willmore_energy).abs() < STILL * before;
     memory.still = if still { memory.still + 1.0 } else { 0.0 };
     Ok(Row {
         step: record.step,

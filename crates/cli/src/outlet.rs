@@ -215,7 +215,7 @@ pub fn write_final<const D: usize, O: Outlet<D>>(
 }
 
 /// Whether a layer of nodes at the side of the box is not outside.
-fn touches_box<const D: usize>(u: &Field<D>) -> bool {
+pub fn touches_box<const D: usize>(u: &Field<D>) -> bool {
     const OUTSIDE: f64 = -0.5;
     let grid = u.grid();
     let at_side = |node: usize| grid.multi_index(node).contains(&0);

@@ -161,7 +161,10 @@ impl Plan {
                 RunDirectory::create(folder, &identity, &manifest, &self.config)?
             }
         };
-        let memory = Memory::START;
+        let memory = Memory {
+            free: f64::from(!outlet::touches_box(&start.field)),
+            ..Memory::START
+        };
         if self.keep.frames.is_some() {
             self.frame(&start.outlet, &start.field, 0, &mut run)?;
         }
@@ -203,12 +206,12 @@ impl Plan {
         let ending = loop {
             let (step, time) = motion.position();
             bar.set_position(step as u64);
-            if self.is_over(step, time, &memory) || motion.is_still(&memory) {
+            let ended = self.is_over(step, time, &memory) || motion.is_still(&memory);
+            if ended || is_gone(&motion.state()?.current, &memory) {
                 break Ending::Done;
             }
             let row = motion.advance(&mut memory, self.stop.time)?;
             run.metric(&row)?;
-            let vanished = row.volume <= 0.0;
             if self
                 .keep
                 .frames
@@ -217,16 +220,11 @@ impl Plan {
                 self.frame(&start.outlet, &motion.state()?.current, row.step, &mut run)?;
             }
             let interrupted = interrupt.requested();
-            if interrupted || vanished || row.step.is_multiple_of(self.keep.checkpoint_every) {
+            if interrupted || row.step.is_multiple_of(self.keep.checkpoint_every) {
                 run.commit(&pack(&motion.state()?, &memory, &start)?)?;
             }
             if interrupted {
                 break Ending::Interrupted;
-            }
-            if matches!(motion, Motion::MeanCurvature { .. })
-                && !outlet::has_interface(&motion.state()?.current)
-            {
-                break Ending::Done;
             }
         };
         let seconds = clock.elapsed().as_secs_f64();
@@ -332,7 +330,8 @@ impl Plan {
             text += "; the shape has vanished";
         }
         if outcome.get("touches_box") == Some(&Value::Bool(true)) {
-            text += "; the shape has come to the side of the box and acts on itself there: use a smaller --side-length";
+            text +=
+                "; the shape has come to the side of the box: start with a smaller --side-length";
         }
         text += &if finished {
             format!("\nResults are in {}", folder.display())
@@ -349,6 +348,11 @@ impl Plan {
         }
         report(self.say, &outcome, &text);
     }
+}
+
+/// Whether the shape has vanished, or has come to the side of the box, where it would act on itself.
+fn is_gone<const D: usize>(u: &Field<D>, memory: &Memory) -> bool {
+    !outlet::has_interface(u) || (memory.free > 0.5 && outlet::touches_box(u))
 }
 
 /// Folder of the pictures of a run.
@@ -393,9 +397,13 @@ fn pack<const D: usize, O: Outlet<D>>(
         next,
         first_energy,
         energy,
+        free,
         still,
     } = *memory;
-    packed = packed.with_array("memory", vec![last, next, first_energy, energy, still]);
+    packed = packed.with_array(
+        "memory",
+        vec![last, next, first_energy, energy, free, still],
+    );
     if let Some(region) = &start.region {
         packed = packed.with_array("region", region.iter().map(|&r| f64::from(r)).collect());
     }
@@ -412,7 +420,7 @@ fn unpack<const D: usize, O: Outlet<D>>(
     let name = notes["name"].as_str().unwrap_or("run").to_owned();
     let outlet = serde_json::from_value(notes["outlet"].clone())
         .map_err(|error| damaged(run, &error.to_string()))?;
-    let [last, next, first_energy, energy, still] = packed.take_array("memory")?[..] else {
+    let [last, next, first_energy, energy, free, still] = packed.take_array("memory")?[..] else {
         return Err(damaged(run, "its checkpoint is of another version"));
     };
     let current = Field::from_values(grid, packed.take_array("current")?)?;
@@ -453,6 +461,7 @@ fn unpack<const D: usize, O: Outlet<D>>(
         next,
         first_energy,
         energy,
+        free,
         still,
     };
     Ok((state, memory, start))

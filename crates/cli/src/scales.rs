@@ -121,12 +121,16 @@ fn shipped(scheme: Scheme, wanted: Ratios) -> Result<(String, Network), Error> {
             ..wanted
         })
     };
-    let available: Vec<String> = (all.iter().map(|(_, network)| network.ratios()))
+    let mut available: Vec<f64> = (all.iter().map(|(_, network)| network.ratios()))
         .filter(|ratios| ratios.dimension == wanted.dimension)
-        .map(|ratios| format!("eps/h = {}", ratios.eps_over_h))
+        .map(|ratios| ratios.eps_over_h)
         .collect();
-    let mut available = available;
+    available.sort_by(f64::total_cmp);
     available.dedup();
+    let available: Vec<String> = available
+        .iter()
+        .map(|eps| format!("eps/h = {eps}"))
+        .collect();
     all.into_iter()
         .filter(|(_, network)| fits(network))
         .max_by_key(|(_, network)| network.ratios().width)

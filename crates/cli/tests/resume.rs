@@ -1,0 +1,195 @@
+//! Runs that are stopped end with the same bytes as runs that are not.
+#![cfg(unix)]
+
+mod common;
+
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use common::{assert_same, program, run, text};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Runs of a second or two with many commits, frames, regions and both flows.
+const RUNS: [&[&str]; 4] = [
+    &[
+        "flow",
+        "builtin:cross",
+        "--cells",
+        "64",
+        "--steps",
+        "60",
+        "--frames",
+        "20",
+        "--checkpoint-every",
+        "2",
+    ],
+    &[
+        "flow",
+        "builtin:torus",
+        "--cells",
+        "32",
+        "--steps",
+        "24",
+        "--frames",
+        "12",
+        "--checkpoint-every",
+        "3",
+    ],
+    &[
+        "inpaint",
+        "builtin:disc",
+        "--cells",
+        "64",
+        "--mask",
+        "box:0.1,0.1,0.9,0.9",
+        "--ansatz",
+        "empty",
+        "--steps",
+        "40",
+        "--checkpoint-every",
+        "1",
+    ],
+    &[
+        "mcf",
+        "builtin:ring",
+        "--method",
+        "fe-implicit",
+        "--steps",
+        "40",
+        "--checkpoint-every",
+        "2",
+    ],
+];
+
+fn start(folder: &Path, arguments: &[&str]) -> Child {
+    let mut command = program(folder);
+    command
+        .args(arguments)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    command.spawn().unwrap()
+}
+
+/// The newest checkpoint in a run.
+fn committed(run: &Path) -> Option<u64> {
+    let entries = std::fs::read_dir(run.join("checkpoints")).ok()?;
+    let step = |name: &str| {
+        name.strip_prefix("step-")?
+            .strip_suffix(".ckpt")?
+            .parse()
+            .ok()
+    };
+    entries
+        .filter_map(|entry| step(entry.ok()?.file_name().to_str()?))
+        .max()
+}
+
+/// Waits until the run has committed this step; false if the process ended before.
+fn wait_for(run: &Path, step: u64, child: &mut Child) -> bool {
+    let clock = Instant::now();
+    while committed(run).is_none_or(|found| found < step) {
+        if child.try_wait().unwrap().is_some() {
+            return false;
+        }
+        assert!(clock.elapsed() < Duration::from_mins(2), "no step {step}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    true
+}
+
+fn with_output<'a>(arguments: &[&'a str], output: &'a str) -> Vec<&'a str> {
+    [arguments, &["--output", output]].concat()
+}
+
+#[test]
+fn killed_runs_are_resumed_to_the_same_bytes() {
+    let seed = std::env::var("WILLMORE_TEST_SEED")
+        .ok()
+        .and_then(|seed| seed.parse().ok());
+    let mut rng = ChaCha8Rng::seed_from_u64(seed.unwrap_or(1));
+    for arguments in RUNS {
+        let folder = tempfile::tempdir().unwrap();
+        let [path, reference] = ["killed", "reference"].map(|name| folder.path().join(name));
+        let whole = run(folder.path(), &with_output(arguments, "reference"));
+        assert!(whole.status.success(), "{}", text(&whole.stderr));
+        let mut child = start(folder.path(), &with_output(arguments, "killed"));
+        let mut kills = 0;
+        for _ in 0..4 {
+            let from = committed(&path).unwrap_or(0);
+            if !wait_for(&path, from + rng.random_range(0..5), &mut child) {
+                break;
+            }
+            std::thread::sleep(Duration::from_micros(rng.random_range(0..20_000)));
+            child.kill().unwrap();
+            child.wait().unwrap();
+            kills += usize::from(!path.join("summary.json").exists());
+            child = start(folder.path(), &["resume", "killed"]);
+        }
+        assert!(child.wait().unwrap().success(), "{arguments:?}");
+        assert!(kills >= 2, "{arguments:?} was killed {kills} times only");
+        assert_same(&path, &reference);
+    }
+}
+
+#[test]
+fn interrupted_runs_end_with_130_and_are_resumed_to_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let [path, reference] = ["stopped", "reference"].map(|name| folder.path().join(name));
+    assert!(
+        run(folder.path(), &with_output(RUNS[0], "reference"))
+            .status
+            .success()
+    );
+    let mut child = start(folder.path(), &with_output(RUNS[0], "stopped"));
+    assert!(wait_for(&path, 4, &mut child));
+    let signal = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .unwrap();
+    assert!(signal.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(!path.join("summary.json").exists());
+    let resumed = run(folder.path(), &["resume", "stopped"]);
+    assert!(resumed.status.success(), "{}", text(&resumed.stderr));
+    assert_same(&path, &reference);
+    // Once more: there is nothing left to do, and nothing is changed.
+    let again = run(folder.path(), &["resume", "stopped"]);
+    assert!(again.status.success());
+    assert_same(&path, &reference);
+}
+
+/// The stored configuration alone makes the same run.
+#[test]
+fn the_configuration_of_a_run_makes_the_same_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let [first, second] = ["first", "second"].map(|name| folder.path().join(name));
+    let arguments = ["flow", "builtin:disc", "--cells", "32", "--steps", "3"];
+    assert!(
+        run(folder.path(), &with_output(&arguments, "first"))
+            .status
+            .success()
+    );
+    let again = [
+        "flow",
+        "--config",
+        "first/config.toml",
+        "--output",
+        "second",
+    ];
+    assert!(run(folder.path(), &again).status.success());
+    assert_same(&first, &second);
+    // What is typed wins.
+    let fewer = [
+        "flow",
+        "--config",
+        "first/config.toml",
+        "--output",
+        "third",
+        "--steps",
+        "2",
+    ];
+    let outcome = common::outcome(folder.path(), &fewer);
+    assert_eq!(outcome["steps"], 2);
+}
