@@ -423,6 +423,11 @@ impl fmt::Display for McfMethod {
 pub struct ResumeOptions {
     /// The folder of the run
     pub run: PathBuf,
+
+    /// Go on from the newest undamaged state of a run in which files are damaged or missing
+    #[arg(long)]
+    pub recover: bool,
+
     #[command(flatten)]
     pub say: SayOptions,
 }

@@ -91,7 +91,7 @@ impl From<Error> for ParseError {
 pub fn one_line(error: &clap::Error) -> String {
     let text = error.to_string();
     let paragraphs = text.split("\n\n").filter(|p| {
-        !(p.starts_with("Usage") || p.starts_with("For more information")) && !p.trim().is_empty()
+        !(p.starts_with("Usage") || p.starts_with("For more information") || p.trim().is_empty())
     });
     let words: Vec<&str> = paragraphs.flat_map(str::split_whitespace).collect();
     let line = words.join(" ");

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use geometry::{Field, Grid, SignedDistance, npy, optimal_profile, phase_field, vti};
 use images::{Frame, Image, Outline, OutlineDistance, Side, Threshold};
-use indicatif::ProgressBar;
 use surfaces::{ClosedMesh, MeshDistance, Placement};
 
-use crate::cli::{Ansatz, Holds, InputOptions, Inside};
+use crate::cli::{Ansatz, Holds, InputOptions, Inside, SayOptions};
 use crate::error::Error;
 use crate::outlet::{Plane, Space};
+use crate::run;
 use crate::shape::{self, BuiltIn, Region};
 use crate::signs;
 
@@ -87,11 +87,7 @@ impl Source<'_> {
 ///
 /// # Errors
 /// [`Error::Options`] for options that do not belong to the input; what reading and placing raise.
-pub fn load(
-    options: &mut InputOptions,
-    eps_over_h: f64,
-    bar: &ProgressBar,
-) -> Result<Loaded, Error> {
+pub fn load(options: &mut InputOptions, eps_over_h: f64, say: SayOptions) -> Result<Loaded, Error> {
     let input = options.input.clone().ok_or_else(|| {
         Error::options(
             "there is no input: give a file or builtin:NAME, or `input = ...` in a --config file",
@@ -119,9 +115,9 @@ pub fn load(
         Source::Mesh(path) => {
             let (mesh, warnings) = ClosedMesh::new(surfaces::read(&path)?)?;
             for warning in &warnings {
-                bar.suspend(|| eprintln!("warning: {}: {warning}", path.display()));
+                warn(say, &format!("{}: {warning}", path.display()));
             }
-            Loaded::Space(place(&mesh, options, eps_over_h, name, bar)?)
+            Loaded::Space(place(&mesh, options, eps_over_h, name, say)?)
         }
         Source::Image(path) => image(&path, options, eps_over_h, name)?,
         Source::Field(path) => field(&path, options, eps_over_h, name)?,
@@ -137,7 +133,7 @@ pub fn load(
                 let (grid, side) = grid::<3>(options, 64, 1.0)?;
                 match shape::built_in(known, side)? {
                     BuiltIn::Mesh(mesh) => {
-                        Loaded::Space(place(&mesh, options, eps_over_h, name, bar)?)
+                        Loaded::Space(place(&mesh, options, eps_over_h, name, say)?)
                     }
                     BuiltIn::Space(shape) => Loaded::Space(Start {
                         name,
@@ -155,6 +151,13 @@ pub fn load(
         Loaded::Space(start) => check_phases(&start.field, &input)?,
     }
     Ok(loaded)
+}
+
+/// Says what was mended.
+fn warn(say: SayOptions, what: &str) {
+    if !say.quiet {
+        eprintln!("warning: {what}");
+    }
 }
 
 /// Options that say nothing about this input.
@@ -256,17 +259,19 @@ fn place(
     options: &mut InputOptions,
     eps_over_h: f64,
     name: String,
-    bar: &ProgressBar,
+    say: SayOptions,
 ) -> Result<Start<3, Space>, Error> {
     let (grid, side) = grid::<3>(options, 64, 1.0)?;
     let placement = Placement::fit(mesh, &grid, side, 0.0)?;
-    bar.set_length(grid.cells() as u64);
+    let progress = run::progress(say);
+    let bar = progress.bar("signed distance", grid.cells() as u64);
     let mut distance = MeshDistance::new(&mesh.placed(&placement)).sample(grid, || bar.inc(1))?;
+    bar.finish();
+    progress.clear();
     let mended = signs::mend(&mut distance);
     if mended > 0 {
-        bar.suspend(|| {
-            eprintln!("warning: the mesh folds over itself; the side of {mended} nodes was mended")
-        });
+        let what = format!("the mesh folds over itself; the side of {mended} nodes was mended");
+        warn(say, &what);
     }
     let eps = eps_over_h * grid.spacing();
     Ok(Start {

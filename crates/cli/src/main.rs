@@ -69,7 +69,7 @@ fn execute(cli: Cli) -> Result<Ending, Error> {
         Command::Info(options) => info::run(&options),
         Command::Check(options) => check::run(options),
         Command::Train(options) => train::run(&options),
-        Command::Completions { shell } => shell::completions(shell),
+        Command::Completions { shell } => Ok(shell::completions(shell)),
         Command::Man => shell::man(),
     }
 }

@@ -6,6 +6,7 @@ use serde::Serialize;
 use solver::{Error as SolverError, FlowState, MeanCurvatureFlow, WillmoreFlow};
 
 use crate::error::Error;
+use crate::outlet::Topology;
 use crate::tau::Tau;
 
 /// A row of `metrics.csv`.
@@ -46,6 +47,8 @@ pub struct Memory {
     pub energy: f64,
     /// 1 while a shape that comes to the side of the box ends the run, 0 if it was there from the beginning.
     pub free: f64,
+    /// The parts of the shape at the beginning.
+    pub topology: Topology,
     /// Steps in a row, nearly of the largest automatic size, that took away next to nothing.
     pub still: f64,
 }
@@ -57,6 +60,10 @@ impl Memory {
         first_energy: f64::NAN,
         energy: f64::NAN,
         free: 1.0,
+        topology: Topology {
+            components: 0,
+            euler_characteristic: None,
+        },
         still: 0.0,
     };
 }

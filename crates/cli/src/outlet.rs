@@ -24,13 +24,21 @@ pub struct Measures {
     pub perimeter: f64,
     /// Area or volume inside.
     pub volume: f64,
-    /// Of a surface.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub euler_characteristic: Option<i64>,
-    /// Closed curves or surfaces.
-    pub components: usize,
+    /// Its parts.
+    #[serde(flatten)]
+    pub topology: Topology,
     /// Whether the shape has come to the side of the box, and so to its own periodic image.
     pub touches_box: bool,
+}
+
+/// The parts of a shape.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Topology {
+    /// Closed curves or surfaces.
+    pub components: usize,
+    /// Of all surfaces together.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub euler_characteristic: Option<i64>,
 }
 
 /// How phase fields in `D` dimensions are shown.
@@ -41,7 +49,13 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
     /// What drawing raises.
     fn picture(&self, u: &Field<D>, eps: f64) -> Result<Picture, Error>;
 
-    /// Writes the shape to files `final.*` and says how many parts it has and its Euler characteristic.
+    /// The parts of the shape.
+    ///
+    /// # Errors
+    /// If there is no shape.
+    fn topology(&self, u: &Field<D>, eps: f64) -> Result<Topology, Error>;
+
+    /// Writes the shape to files `final.*`.
     ///
     /// # Errors
     /// What drawing and writing raise.
@@ -51,7 +65,7 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
         eps: f64,
         format: MeshFormat,
         run: &mut RunDirectory,
-    ) -> Result<(usize, Option<i64>), Error>;
+    ) -> Result<(), Error>;
 
     /// Writes the shape as a mesh to any file.
     ///
@@ -96,19 +110,25 @@ impl Outlet<2> for Plane {
             .picture()?)
     }
 
+    fn topology(&self, u: &Field<2>, _: f64) -> Result<Topology, Error> {
+        Ok(Topology {
+            components: Outline::of_phase_field(u)?.curves().len(),
+            euler_characteristic: None,
+        })
+    }
+
     fn write_shape(
         &self,
         u: &Field<2>,
         _: f64,
         _: MeshFormat,
         run: &mut RunDirectory,
-    ) -> Result<(usize, Option<i64>), Error> {
+    ) -> Result<(), Error> {
         let outline = Outline::of_phase_field(u)?;
         Svg::on_white(self.frame()?)
             .filled(&outline, Rgb::BLACK)
             .write(run.path().join("final.svg"))?;
-        run.adopt_file("final.svg")?;
-        Ok((outline.curves().len(), None))
+        Ok(run.adopt_file("final.svg")?)
     }
 
     fn save(&self, _: &Field<2>, _: f64, path: &Path) -> Result<(), Error> {
@@ -158,19 +178,25 @@ impl Outlet<3> for Space {
         Ok(scene.framing(Framing::Domain).render(PIXELS)?)
     }
 
+    fn topology(&self, u: &Field<3>, eps: f64) -> Result<Topology, Error> {
+        let (closed, _) = ClosedMesh::new(surfaces::phase_field_surface(u, eps)?)?;
+        Ok(Topology {
+            components: closed.components(),
+            euler_characteristic: Some(closed.euler_characteristic()),
+        })
+    }
+
     fn write_shape(
         &self,
         u: &Field<3>,
         eps: f64,
         format: MeshFormat,
         run: &mut RunDirectory,
-    ) -> Result<(usize, Option<i64>), Error> {
+    ) -> Result<(), Error> {
         let name = format!("final.{format}");
         let mesh = self.mesh(u, eps)?;
         surfaces::write(run.path().join(&name), &mesh)?;
-        run.adopt_file(&name)?;
-        let (closed, _) = ClosedMesh::new(mesh)?;
-        Ok((closed.components(), Some(closed.euler_characteristic())))
+        Ok(run.adopt_file(&name)?)
     }
 
     fn save(&self, u: &Field<3>, eps: f64, path: &Path) -> Result<(), Error> {
@@ -199,17 +225,17 @@ pub fn write_final<const D: usize, O: Outlet<D>>(
     run.adopt_file("final.npy")?;
     vti::write(run.path().join("final.vti"), &[("phase_field", u)])?;
     run.adopt_file("final.vti")?;
-    let (components, euler_characteristic) = if has_interface(u) {
+    let topology = if has_interface(u) {
         write_picture(&outlet.picture(u, eps)?, "final.png", run)?;
-        outlet.write_shape(u, eps, format, run)?
+        outlet.write_shape(u, eps, format, run)?;
+        outlet.topology(u, eps)?
     } else {
-        (0, None)
+        Topology::default()
     };
     Ok(Measures {
         perimeter: perimeter(u, eps)?,
         volume: zero_set_volume(u),
-        euler_characteristic,
-        components,
+        topology,
         touches_box: touches_box(u),
     })
 }

@@ -132,7 +132,7 @@ impl Plan {
     /// What the run directory, the flow and the outlets raise.
     pub fn start<const D: usize, O: Outlet<D>>(
         &self,
-        start: Start<D, O>,
+        start: &Start<D, O>,
         motion: impl FnOnce(&Start<D, O>, &FlowState<D>) -> Result<Motion<D>, Error>,
         stored: Option<StoredRun>,
     ) -> Result<Ending, Error> {
@@ -143,7 +143,7 @@ impl Plan {
             step: 0,
             time: 0.0,
         };
-        let motion = motion(&start, &state)?;
+        let motion = motion(start, &state)?;
         let mut run = match stored {
             // It was killed before its first commit.
             Some(stored) => stored.resume(&identity)?.run,
@@ -161,14 +161,17 @@ impl Plan {
                 RunDirectory::create(folder, &identity, &manifest, &self.config)?
             }
         };
+        // Touching sheets have no topology; that is no reason not to flow.
+        let topology = start.outlet.topology(&start.field, self.eps(&start.field));
         let memory = Memory {
+            topology: topology.unwrap_or_default(),
             free: f64::from(!outlet::touches_box(&start.field)),
             ..Memory::START
         };
         if self.keep.frames.is_some() {
             self.frame(&start.outlet, &start.field, 0, &mut run)?;
         }
-        run.commit(&pack(&state, &memory, &start)?)?;
+        run.commit(&pack(&state, &memory, start)?)?;
         self.go_on(run, start, motion, memory)
     }
 
@@ -186,13 +189,13 @@ impl Plan {
         let state = state.ok_or_else(|| damaged(&run, "it has no checkpoint"))?;
         let (state, memory, start) = unpack::<D, O>(state, grid, &run)?;
         let motion = motion(&start, &state)?;
-        self.go_on(run, start, motion, memory)
+        self.go_on(run, &start, motion, memory)
     }
 
     fn go_on<const D: usize, O: Outlet<D>>(
         &self,
         mut run: RunDirectory,
-        start: Start<D, O>,
+        start: &Start<D, O>,
         mut motion: Motion<D>,
         mut memory: Memory,
     ) -> Result<Ending, Error> {
@@ -210,7 +213,14 @@ impl Plan {
             if ended || is_gone(&motion.state()?.current, &memory) {
                 break Ending::Done;
             }
-            let row = motion.advance(&mut memory, self.stop.time)?;
+            let row = match motion.advance(&mut memory, self.stop.time) {
+                Ok(row) => row,
+                Err(error) => {
+                    // What was reached is kept.
+                    run.commit(&pack(&motion.state()?, &memory, start)?)?;
+                    return Err(error);
+                }
+            };
             run.metric(&row)?;
             if self
                 .keep
@@ -221,7 +231,7 @@ impl Plan {
             }
             let interrupted = interrupt.requested();
             if interrupted || row.step.is_multiple_of(self.keep.checkpoint_every) {
-                run.commit(&pack(&motion.state()?, &memory, &start)?)?;
+                run.commit(&pack(&motion.state()?, &memory, start)?)?;
             }
             if interrupted {
                 break Ending::Interrupted;
@@ -235,7 +245,7 @@ impl Plan {
                 let (step, time) = motion.position();
                 json!({ "command": self.command, "finished": false, "steps": step, "time": time })
             }
-            Ending::Done => self.finish(run, &start, &motion, &memory)?,
+            Ending::Done => self.finish(run, start, &motion, &memory)?,
         };
         bar.finish();
         progress.clear();
@@ -304,6 +314,8 @@ impl Plan {
         if let Some(target) = self.stop.energy {
             outcome.insert("energy_reached".into(), (memory.energy <= target).into());
         }
+        let first = memory.topology;
+        outcome.insert("same_topology".into(), (measures.topology == first).into());
         if let Ok(Value::Object(measures)) = serde_json::to_value(&measures) {
             outcome.extend(measures);
         }
@@ -319,34 +331,49 @@ impl Plan {
         let steps = outcome.get("steps").and_then(Value::as_u64).unwrap_or(0);
         let time = number("time").unwrap_or(0.0);
         let finished = outcome.get("finished") == Some(&Value::Bool(true));
-        let mut text = format!("{steps} steps to t = {time:.4e} in {seconds:.1} s");
+        let is = |name: &str, value: bool| outcome.get(name) == Some(&Value::Bool(value));
+        let mut text = vec![format!("{steps} steps to t = {time:.4e} in {seconds:.1} s")];
         if let (Some(first), Some(energy)) = (number("first_energy"), number("energy")) {
-            text += &format!("; Willmore energy {energy:.4}, before {first:.4}");
+            text.push(format!("Willmore energy {energy:.4}, before {first:.4}"));
         }
-        if outcome.get("energy_reached") == Some(&Value::Bool(false)) {
-            text += "; the energy asked for was not reached, go on with more --steps or --time";
-        }
-        if outcome.get("components") == Some(&json!(0)) {
-            text += "; the shape has vanished";
-        }
-        if outcome.get("touches_box") == Some(&Value::Bool(true)) {
-            text +=
-                "; the shape has come to the side of the box: start with a smaller --side-length";
-        }
-        text += &if finished {
-            format!("\nResults are in {}", folder.display())
+        let notes = [
+            (
+                is("energy_reached", false),
+                "the energy asked for was not reached, go on with more --steps or --time",
+            ),
+            (
+                outcome.get("components") == Some(&json!(0)),
+                "the shape has vanished",
+            ),
+            (
+                is("same_topology", false),
+                "parts or holes have come or gone: if they should not, use more --cells or a larger --side-length",
+            ),
+            (
+                is("touches_box", true),
+                "the shape has come to the side of the box: start with a smaller --side-length",
+            ),
+        ];
+        text.extend(
+            notes
+                .into_iter()
+                .filter(|(holds, _)| *holds)
+                .map(|(_, note)| note.to_owned()),
+        );
+        text.push(if finished {
+            format!("results are in {}", folder.display())
         } else {
             format!(
-                "; interrupted. Go on with: willmore resume {}",
+                "interrupted, go on with: willmore resume {}",
                 folder.display()
             )
-        };
+        });
         let mut outcome = outcome;
         if let Value::Object(map) = &mut outcome {
             map.insert("run".into(), folder.to_string_lossy().into());
             map.insert("seconds".into(), seconds.into());
         }
-        report(self.say, &outcome, &text);
+        report(self.say, &outcome, &text.join("\n"));
     }
 }
 
@@ -386,7 +413,7 @@ fn pack<const D: usize, O: Outlet<D>>(
     let outlet = serde_json::to_value(&start.outlet)
         .map_err(|error| Error::options(format!("the view cannot be stored: {error}")))?;
     let mut packed = State::new(state.step as u64, state.time);
-    packed.notes = json!({ "name": start.name, "outlet": outlet });
+    packed.notes = json!({ "name": start.name, "outlet": outlet, "topology": memory.topology });
     packed = packed.with_array("current", state.current.values().to_vec());
     let mut last = f64::NAN;
     if let Some((previous, tau)) = &state.previous {
@@ -399,6 +426,7 @@ fn pack<const D: usize, O: Outlet<D>>(
         energy,
         free,
         still,
+        ..
     } = *memory;
     packed = packed.with_array(
         "memory",
@@ -457,11 +485,14 @@ fn unpack<const D: usize, O: Outlet<D>>(
         step,
         time: packed.time,
     };
+    let topology = serde_json::from_value(notes["topology"].clone())
+        .map_err(|error| damaged(run, &error.to_string()))?;
     let memory = Memory {
         next,
         first_energy,
         energy,
         free,
+        topology,
         still,
     };
     Ok((state, memory, start))

@@ -23,11 +23,11 @@ pub fn mend(distance: &mut Field<3>) -> usize {
             next += 1;
             inside += usize::from(values[node] < 0.0);
             let index = grid.multi_index(node);
-            for axis in 0..3 {
+            for (axis, &i) in index.iter().enumerate() {
                 let stride = grid.stride(axis);
-                at_side |= index[axis] == 0 || index[axis] + 1 == cells;
-                let below = (index[axis] > 0).then(|| node - stride);
-                let above = (index[axis] + 1 < cells).then(|| node + stride);
+                at_side |= i == 0 || i + 1 == cells;
+                let below = (i > 0).then(|| node - stride);
+                let above = (i + 1 < cells).then(|| node + stride);
                 for neighbour in below.into_iter().chain(above) {
                     if !std::mem::replace(&mut seen[neighbour], true) {
                         part.push(neighbour);

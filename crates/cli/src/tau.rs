@@ -100,13 +100,10 @@ impl FromStr for Tau {
                 let (tau, halvings) = rest
                     .split_once(',')
                     .ok_or("a ramp needs a step and a number of halvings, ramp:VALUE,HALVINGS")?;
-                let halvings = match halvings.trim().parse() {
-                    Ok(halvings @ 0..=60) => halvings,
-                    _ => {
-                        return Err(format!(
-                            "{halvings:?} is no number of halvings from 0 to 60"
-                        ));
-                    }
+                let Ok(halvings @ 0..=60) = halvings.trim().parse() else {
+                    return Err(format!(
+                        "{halvings:?} is no number of halvings from 0 to 60"
+                    ));
                 };
                 Ok(Self::Ramp {
                     tau: positive(tau)?,

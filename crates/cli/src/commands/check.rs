@@ -42,12 +42,8 @@ pub fn run(mut options: CheckOptions) -> Result<Ending, Error> {
     scales::check_eps_over_h(options.scheme.eps_over_h)?;
     let device = open_device(&mut options.common)?;
     let say = options.common.say;
-    let progress = run::progress(say);
-    let bar = progress.bar("input", 1);
-    let loaded = input::load(&mut options.input, options.scheme.eps_over_h, &bar);
-    bar.finish();
-    progress.clear();
-    let findings = match loaded? {
+    let loaded = input::load(&mut options.input, options.scheme.eps_over_h, say)?;
+    let findings = match loaded {
         Loaded::Plane(start, _) => findings(&start.field, &options, &device)?,
         Loaded::Space(start) => findings(&start.field, &options, &device)?,
     };
@@ -92,12 +88,7 @@ fn findings<const D: usize>(
                 .map_or(f64::NAN, |(_, v)| *v)
         };
         let steps = halvings(FIRST_STEP, STEPS);
-        let rest = remainder(
-            value,
-            &here.derivatives[..derivatives],
-            &steps,
-            device.epsilon(),
-        );
+        let rest = remainder(value, &here.along[..derivatives], &steps, device.epsilon());
         let rate = rest.rate();
         findings.push(Finding {
             name,
@@ -147,7 +138,7 @@ struct Derivatives {
     /// Steps and energies.
     values: Vec<(f64, f64)>,
     /// First and second derivative in one direction.
-    derivatives: [f64; 2],
+    along: [f64; 2],
     /// Relative to the products.
     asymmetry: f64,
     gradient: Vec<f64>,
@@ -184,14 +175,14 @@ fn derivatives<const D: usize>(
     let dot = |a: &_, b: &_| device.scalar(inner_product::<D>(a, b));
     let (pq, qp) = (dot(&p, &hq)?, dot(&q, &hp)?);
     let scale = (dot(&p, &hp)?.abs() * dot(&q, &hq)?.abs()).sqrt();
-    let derivatives = [dot(&gradient, &p)?, dot(&p, &hp)?];
+    let along = [dot(&gradient, &p)?, dot(&p, &hp)?];
     let mut values = Vec::new();
     for t in [0.0].into_iter().chain(halvings(FIRST_STEP, STEPS)) {
         values.push((t, energy.value(&add_scaled(u.clone(), &p, t))?));
     }
     Ok(Derivatives {
         values,
-        derivatives,
+        along,
         asymmetry: (pq - qp).abs() / scale.max(f64::MIN_POSITIVE),
         gradient: device.values(gradient)?,
     })

@@ -8,13 +8,13 @@ use serde::Serialize;
 use solver::{FlowParams, FlowState, WillmoreFlow};
 
 use super::open_device;
-use crate::cli::{FlowOptions, MeshFormat, SayOptions};
+use crate::cli::{FlowOptions, MeshFormat};
 use crate::config;
 use crate::error::Error;
 use crate::input::{self, Loaded, Start};
 use crate::motion::Motion;
 use crate::outlet::{Outlet, Plane, Space};
-use crate::run::{self, Ending, Plan, Stop};
+use crate::run::{Ending, Plan, Stop};
 use crate::scales::{self, Operator};
 use crate::tau::Tau;
 
@@ -82,13 +82,14 @@ pub fn run<W: Willmore>(mut options: W, stored: Option<StoredRun>) -> Result<End
             plan.network = Some(operator.name.clone());
             let job = Job::new(flow, operator, &plan.device);
             return match dimension {
-                2 => job.resume::<2, Plane>(plan, stored),
-                _ => job.resume::<3, Space>(plan, stored),
+                2 => job.resume::<2, Plane>(&plan, stored),
+                _ => job.resume::<3, Space>(&plan, stored),
             };
         }
         stored => stored,
     };
-    let loaded = load(&mut options, plan.say)?;
+    let flow = options.flow();
+    let loaded = input::load(&mut flow.input, flow.scheme.eps_over_h, plan.say)?;
     let (dimension, h) = match &loaded {
         Loaded::Plane(start, _) => (2, start.field.grid().spacing()),
         Loaded::Space(start) => (3, start.field.grid().spacing()),
@@ -108,8 +109,8 @@ pub fn run<W: Willmore>(mut options: W, stored: Option<StoredRun>) -> Result<End
         None => config::resolved(W::COMMAND, &options)?,
     };
     match loaded {
-        Loaded::Plane(start, _) => job.start(plan, start, stored),
-        Loaded::Space(start) => job.start(plan, start, stored),
+        Loaded::Plane(start, _) => job.start(&plan, &start, stored),
+        Loaded::Space(start) => job.start(&plan, &start, stored),
     }
 }
 
@@ -139,17 +140,6 @@ fn plan<W: Willmore>(options: &mut W) -> Result<Plan, Error> {
     Ok(plan)
 }
 
-/// The input, with its options filled in.
-fn load<W: Willmore>(options: &mut W, say: SayOptions) -> Result<Loaded, Error> {
-    let progress = run::progress(say);
-    let bar = progress.bar("input", 1);
-    let flow = options.flow();
-    let loaded = input::load(&mut flow.input, flow.scheme.eps_over_h, &bar);
-    bar.finish();
-    progress.clear();
-    loaded
-}
-
 /// The flow of a run.
 struct Job {
     operator: Operator,
@@ -170,8 +160,8 @@ impl Job {
 
     fn start<const D: usize, O: Outlet<D>>(
         &self,
-        plan: Plan,
-        start: Start<D, O>,
+        plan: &Plan,
+        start: &Start<D, O>,
         stored: Option<StoredRun>,
     ) -> Result<Ending, Error> {
         plan.start(start, |start, state| self.motion(start, state), stored)
@@ -179,7 +169,7 @@ impl Job {
 
     fn resume<const D: usize, O: Outlet<D>>(
         &self,
-        plan: Plan,
+        plan: &Plan,
         stored: StoredRun,
     ) -> Result<Ending, Error> {
         plan.resume::<D, O>(stored, |start, state| self.motion(start, state))

@@ -1,5 +1,7 @@
 //! `willmore info`.
 
+use std::fmt::Write;
+
 use model::pretrained;
 use operators::{ComputeDevice, DeviceKind};
 use serde_json::json;
@@ -29,12 +31,16 @@ pub fn run(options: &InfoOptions) -> Result<Ending, Error> {
         } else {
             format!("not compiled in; build with --features {kind}")
         };
-        text += &format!("\ndevice {kind}: {state}");
+        let _ = write!(text, "\ndevice {kind}: {state}");
         devices
             .push(json!({ "name": kind.name(), "compiled": kind.is_compiled(), "state": state }));
     }
     let [paper, accurate] = [pretrained::all()?.len(), pretrained::all_accurate()?.len()];
-    text += &format!("\nnetworks: {accurate} accurate, {paper} of the paper's recipe");
+    let _ = write!(
+        text,
+        "
+networks: {accurate} accurate, {paper} of the paper's recipe"
+    );
     let outcome = json!({
         "version": version,
         "devices": devices,

@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::input::{self, Loaded, Start};
 use crate::motion::Motion;
 use crate::outlet::{Plane, Space};
-use crate::run::{self, Ending, Plan, Stop};
+use crate::run::{Ending, Plan, Stop};
 use crate::scales::{self, Operator};
 
 const COMMAND: &str = "mcf";
@@ -54,9 +54,9 @@ pub fn run(mut options: McfOptions, stored: Option<StoredRun>) -> Result<Ending,
         say: options.common.say,
     };
     plan.check()?;
-    let operator = |dimension| match learned {
-        true => scales::operator(dimension, &options.scheme).map(Some),
-        false => Ok(None),
+    let operator = |dimension| -> Result<Option<Operator>, Error> {
+        let find = || scales::operator(dimension, &options.scheme);
+        learned.then(find).transpose()
     };
     let job = |operator| Job {
         operator,
@@ -77,13 +77,8 @@ pub fn run(mut options: McfOptions, stored: Option<StoredRun>) -> Result<Ending,
         }
         stored => stored,
     };
-    let progress = run::progress(plan.say);
-    let bar = progress.bar("input", 1);
     let mut input = options.input.clone();
-    let loaded = input::load(&mut input, options.scheme.eps_over_h, &bar);
-    bar.finish();
-    progress.clear();
-    let loaded = loaded?;
+    let loaded = input::load(&mut input, options.scheme.eps_over_h, plan.say)?;
     let dimension = match &loaded {
         Loaded::Plane(..) => 2,
         Loaded::Space(..) => 3,
@@ -101,8 +96,8 @@ pub fn run(mut options: McfOptions, stored: Option<StoredRun>) -> Result<Ending,
         )?,
     };
     match loaded {
-        Loaded::Plane(start, _) => plan.start(start, |s, state| job.motion(s, state), stored),
-        Loaded::Space(start) => plan.start(start, |s, state| job.motion(s, state), stored),
+        Loaded::Plane(start, _) => plan.start(&start, |s, state| job.motion(s, state), stored),
+        Loaded::Space(start) => plan.start(&start, |s, state| job.motion(s, state), stored),
     }
 }
 

@@ -14,7 +14,11 @@ use crate::run::{self, Ending};
 /// # Errors
 /// [`Error::Runs`] if there is no run, or if it is damaged; what the run raises.
 pub fn run(options: &ResumeOptions) -> Result<Ending, Error> {
-    let stored = RunDirectory::open(&options.run)?;
+    let stored = if options.recover {
+        RunDirectory::recover(&options.run)?
+    } else {
+        RunDirectory::open(&options.run)?
+    };
     if stored.is_finished() {
         let folder = options.run.to_string_lossy();
         let outcome = json!({ "command": stored.identity().kind, "finished": true, "run": folder });

@@ -10,14 +10,11 @@ use crate::error::Error;
 use crate::run::Ending;
 
 /// Prints completions.
-///
-/// # Errors
-/// None: a closed pipe is no failure.
-pub fn completions(shell: Shell) -> Result<Ending, Error> {
+pub fn completions(shell: Shell) -> Ending {
     let mut text = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "willmore", &mut text);
     print(&text);
-    Ok(Ending::Done)
+    Ending::Done
 }
 
 /// Prints the manual page: that of the program, then those of its commands.
