@@ -198,7 +198,7 @@ pub fn built_in(name: &str, side: f64) -> Result<BuiltIn, Error> {
         "rectangle" => BuiltIn::Plane(Box::new(Cuboid::new([half, 0.5 * half])?)),
         "sphere" => BuiltIn::Space(Box::new(Ball::new([0.0; 3], half)?)),
         "cube" => BuiltIn::Space(Box::new(Cuboid::new([half; 3])?)),
-        "torus" => BuiltIn::Space(Box::new(Torus::new(0.65 * half, 0.35 * half)?)),
+        "torus" => BuiltIn::Space(Box::new(Torus::new(0.72 * half, 0.28 * half)?)),
         "coin" => BuiltIn::Space(Box::new(Cylinder::new(half, 0.4 * half)?)),
         "figure" => BuiltIn::Mesh(surfaces::samples::figure(MESH_CELLS)?),
         _ => BuiltIn::Mesh(surfaces::samples::lever(MESH_CELLS)?),

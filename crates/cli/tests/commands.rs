@@ -343,3 +343,78 @@ fn lists_are_complete() {
         );
     }
 }
+
+/// The mask has the pixels of the input, and the region is where its dark pixels are.
+#[test]
+fn images_are_masks_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let frame = Frame::new(60, 60, [0.0, 60.0], 1.0).unwrap();
+    let at =
+        |x, y| geometry::SignedDistanceExt::translated(Ball::new([0.0; 2], 1.0).unwrap(), [x, y]);
+    let disc = geometry::SignedDistanceExt::scaled(at(1.5, 1.5), 20.0).unwrap();
+    let spot = geometry::SignedDistanceExt::scaled(at(5.0, 3.0), 10.0).unwrap();
+    for (name, drawing) in [
+        (
+            "disc.png",
+            Drawing::on_white(frame).filled(&disc, Rgb::BLACK),
+        ),
+        (
+            "spot.png",
+            Drawing::on_white(frame).filled(&spot, Rgb::BLACK),
+        ),
+    ] {
+        drawing
+            .picture()
+            .unwrap()
+            .write_png(folder.path().join(name))
+            .unwrap();
+    }
+    let arguments = [
+        "--cells", "64", "--steps", "1", "--tau", "1e-12", "--ansatz", "empty", "--output", "run",
+    ];
+    let inpaint = ["inpaint", "disc.png", "--mask", "spot.png"];
+    outcome(folder.path(), &[&inpaint[..], &arguments].concat());
+    let grid = Grid::<2>::centred(128, 2.0).unwrap();
+    let u = npy::read(folder.path().join("run/final.npy"), |_| Ok(grid)).unwrap();
+    // 60 pixels are 1.2: the spot reaches from 40 to 60 pixels, the disc from 10 to 50.
+    let at = |pixels: f64| u.interpolate([0.02 * (pixels - 30.0), 0.0]);
+    assert!(
+        at(20.0) > 0.9 && at(36.0) > 0.9,
+        "{} {}",
+        at(20.0),
+        at(36.0)
+    );
+    assert!(at(45.0) < -0.5, "{}", at(45.0));
+}
+
+#[test]
+fn a_handle_that_is_not_resolved_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let coarse = [
+        "flow",
+        "builtin:lever",
+        "--cells",
+        "32",
+        "--side-length",
+        "0.4",
+        "--steps",
+        "6",
+        "--output",
+        "run",
+    ];
+    let outcome = outcome(folder.path(), &coarse);
+    assert_eq!(outcome["same_topology"], false, "{outcome}");
+    let torus = [
+        "flow",
+        "builtin:torus",
+        "--side-length",
+        "0.8",
+        "--steps",
+        "3",
+        "--output",
+        "torus",
+    ];
+    let outcome = common::outcome(folder.path(), &torus);
+    assert_eq!(outcome["same_topology"], true, "{outcome}");
+    assert_eq!(outcome["euler_characteristic"], 0);
+}

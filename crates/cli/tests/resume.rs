@@ -12,7 +12,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// Runs of a second or two with many commits, frames, regions and both flows.
-const RUNS: [&[&str]; 4] = [
+const RUNS: [&[&str]; 5] = [
     &[
         "flow",
         "builtin:cross",
@@ -48,6 +48,16 @@ const RUNS: [&[&str]; 4] = [
         "empty",
         "--steps",
         "40",
+        "--checkpoint-every",
+        "1",
+    ],
+    &[
+        "fair",
+        "builtin:figure",
+        "--cells",
+        "32",
+        "--steps",
+        "16",
         "--checkpoint-every",
         "1",
     ],
@@ -99,6 +109,17 @@ fn wait_for(run: &Path, step: u64, child: &mut Child) -> bool {
     true
 }
 
+/// Ctrl-C.
+fn interrupt(child: &mut Child) {
+    let number = child.id().to_string();
+    let sent = Command::new("kill")
+        .args(["-INT", &number])
+        .status()
+        .unwrap();
+    assert!(sent.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+}
+
 fn with_output<'a>(arguments: &[&'a str], output: &'a str) -> Vec<&'a str> {
     [arguments, &["--output", output]].concat()
 }
@@ -144,12 +165,7 @@ fn interrupted_runs_end_with_130_and_are_resumed_to_the_same_bytes() {
     );
     let mut child = start(folder.path(), &with_output(RUNS[0], "stopped"));
     assert!(wait_for(&path, 4, &mut child));
-    let signal = Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status()
-        .unwrap();
-    assert!(signal.success());
-    assert_eq!(child.wait().unwrap().code(), Some(130));
+    interrupt(&mut child);
     assert!(!path.join("summary.json").exists());
     let resumed = run(folder.path(), &["resume", "stopped"]);
     assert!(resumed.status.success(), "{}", text(&resumed.stderr));
@@ -192,4 +208,36 @@ fn the_configuration_of_a_run_makes_the_same_run() {
     ];
     let outcome = common::outcome(folder.path(), &fewer);
     assert_eq!(outcome["steps"], 2);
+}
+
+#[test]
+fn a_damaged_run_is_refused_and_can_be_recovered() {
+    let folder = tempfile::tempdir().unwrap();
+    let [path, reference] = ["damaged", "reference"].map(|name| folder.path().join(name));
+    assert!(
+        run(folder.path(), &with_output(RUNS[0], "reference"))
+            .status
+            .success()
+    );
+    let mut child = start(folder.path(), &with_output(RUNS[0], "damaged"));
+    assert!(wait_for(&path, 6, &mut child));
+    interrupt(&mut child);
+    let newest = path.join(format!(
+        "checkpoints/step-{:08}.ckpt",
+        committed(&path).unwrap()
+    ));
+    let mut bytes = std::fs::read(&newest).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&newest, bytes).unwrap();
+    let refused = run(folder.path(), &["resume", "damaged"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        text(&refused.stderr).contains("is damaged"),
+        "{}",
+        text(&refused.stderr)
+    );
+    let recovered = run(folder.path(), &["resume", "damaged", "--recover"]);
+    assert!(recovered.status.success(), "{}", text(&recovered.stderr));
+    assert_same(&path, &reference);
 }
