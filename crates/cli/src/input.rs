@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use geometry::{Field, Grid, SignedDistance, npy, optimal_profile, phase_field, vti};
+use geometry::npy::{self, NpyError};
+use geometry::vti::{self, VtiError};
+use geometry::{Field, Grid, SignedDistance, optimal_profile, phase_field};
 use images::{Frame, Image, Outline, OutlineDistance, Side, Threshold};
 use surfaces::{ClosedMesh, MeshDistance, Placement};
 
@@ -50,6 +52,8 @@ enum Source<'a> {
 
 /// Least resolution.
 const FEWEST_CELLS: usize = 8;
+/// Most nodes of a grid: beyond, a flow needs more than 100 GiB.
+const MOST_NODES: f64 = 1e9;
 /// Part of the box that a shape takes: flows make shapes round, and curves grow.
 const PART: f64 = 0.6;
 /// Largest magnitude in a phase field: flows overshoot the phases a little.
@@ -200,6 +204,12 @@ fn grid<const D: usize>(
     }
     let box_side = *options.box_side.get_or_insert(box_side);
     let grid = Grid::<D>::per_unit(cells, box_side)?.with_origin([-0.5 * box_side; D])?;
+    let nodes = (grid.cells() as f64).powi(D as i32);
+    if nodes > MOST_NODES {
+        return Err(Error::options(format!(
+            "--cells {cells} makes {nodes:.1e} nodes in a box of side {box_side}, more than {MOST_NODES:.1e}: use fewer"
+        )));
+    }
     let side = *options.side_length.get_or_insert(PART * box_side);
     if !(side > 0.0 && side <= box_side) {
         return Err(Error::options(format!(
@@ -314,7 +324,7 @@ fn field(
     }))
 }
 
-/// Whether a file of values is in the plane; what is neither is taken for space, whose reader says what is wrong.
+/// Whether a file of values is meant to be in the plane; its reader says what is wrong with it.
 fn is_planar(path: &Path) -> Result<bool, Error> {
     let bytes = std::fs::read(path).map_err(|source| Error::Io {
         action: "read",
@@ -322,9 +332,10 @@ fn is_planar(path: &Path) -> Result<bool, Error> {
         source,
     })?;
     Ok(if has_extension(path, "vti") {
-        vti::decode::<2>(&bytes).is_ok()
+        let layers = |nodes: [u64; 3]| nodes[2] > 1;
+        !matches!(vti::decode::<2>(&bytes), Err(VtiError::NotCubical { nodes, .. }) if layers(nodes))
     } else {
-        npy::decode::<2>(&bytes).is_ok()
+        !matches!(npy::decode::<2>(&bytes), Err(NpyError::Rank { .. }))
     })
 }
 

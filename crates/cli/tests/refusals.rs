@@ -4,6 +4,15 @@ mod common;
 
 use common::{run, text};
 
+/// An array of 2 x 3 zeros.
+fn plane() -> Vec<u8> {
+    let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (2, 3), }";
+    let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    bytes.extend(format!("{header:117}\n").bytes());
+    bytes.extend([0; 48]);
+    bytes
+}
+
 #[test]
 fn every_mistake_is_one_clear_line() {
     let folder = tempfile::tempdir().unwrap();
@@ -14,6 +23,8 @@ fn every_mistake_is_one_clear_line() {
     write("open.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n");
     write("broken.npy", b"no array");
     write("broken.vti", b"<VTKFile");
+    write("flat.vti", b"<VTK/>");
+    write("plane.npy", &plane());
     write("notes.txt", b"");
     write("net.safetensors", b"no network");
     write("syntax.toml", b"steps = 3\ncells = = 4\n");
@@ -69,6 +80,19 @@ fn every_mistake_is_one_clear_line() {
             ],
             "0.33",
         ),
+        (
+            &[
+                "mcf",
+                "builtin:disc",
+                "--box-side",
+                "1e6",
+                "--cells",
+                "1000",
+            ],
+            "makes 1.0e18 nodes",
+        ),
+        (&["flow", "flat.vti"], "no element"),
+        (&["flow", "plane.npy"], "but all its sides must be equal"),
         (
             &["flow", "builtin:disc", "--side-length", "3"],
             "--side-length 3 does not fit the box of side 2",
