@@ -117,6 +117,17 @@ impl<const D: usize> Motion<D> {
         }
     }
 
+    /// The phase field now.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn field(&self) -> Result<Field<D>, Error> {
+        Ok(match self {
+            Self::Willmore { flow, .. } => flow.field()?,
+            Self::MeanCurvature { field, .. } => field.clone(),
+        })
+    }
+
     /// Where it is.
     ///
     /// # Errors

@@ -210,7 +210,7 @@ impl Plan {
             let (step, time) = motion.position();
             bar.set_position(step as u64);
             let ended = self.is_over(step, time, &memory) || motion.is_still(&memory);
-            if ended || is_gone(&motion.state()?.current, &memory) {
+            if ended || is_gone(&motion.field()?, &memory) {
                 break Ending::Done;
             }
             let row = match motion.advance(&mut memory, self.stop.time) {
@@ -227,7 +227,7 @@ impl Plan {
                 .frames
                 .is_some_and(|every| row.step.is_multiple_of(every))
             {
-                self.frame(&start.outlet, &motion.state()?.current, row.step, &mut run)?;
+                self.frame(&start.outlet, &motion.field()?, row.step, &mut run)?;
             }
             let interrupted = interrupt.requested();
             if interrupted || row.step.is_multiple_of(self.keep.checkpoint_every) {

@@ -172,7 +172,8 @@ fn interrupted_runs_end_with_130_and_are_resumed_to_the_same_bytes() {
     let resumed = run(folder.path(), &["resume", "stopped"]);
     assert!(resumed.status.success(), "{}", text(&resumed.stderr));
     assert_same(&path, &reference);
-    // Once more: there is nothing left to do, and nothing is changed.
+    // Once more: there is nothing left to do, but for what a kill right after the last commit leaves.
+    std::fs::write(path.join("checkpoints/step-00000004.ckpt"), "old").unwrap();
     let again = run(folder.path(), &["resume", "stopped"]);
     assert!(again.status.success());
     assert_same(&path, &reference);
@@ -242,4 +243,42 @@ fn a_damaged_run_is_refused_and_can_be_recovered() {
     let recovered = run(folder.path(), &["resume", "damaged", "--recover"]);
     assert!(recovered.status.success(), "{}", text(&recovered.stderr));
     assert_same(&path, &reference);
+}
+
+/// A run holds all that it goes on from: its input may be gone, and the folder elsewhere.
+#[test]
+fn runs_are_resumed_without_their_input_and_elsewhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let (drawing, path) = (folder.path().join("disc.png"), folder.path().join("first"));
+    let frame = images::Frame::new(80, 80, [-1.0, 1.0], 0.025).unwrap();
+    let square = geometry::shapes::Cuboid::new([0.5, 0.5]).unwrap();
+    let picture = images::Drawing::on_white(frame)
+        .filled(&square, render::Rgb::BLACK)
+        .picture();
+    picture.unwrap().write_png(&drawing).unwrap();
+    let arguments = [
+        "flow",
+        "disc.png",
+        "--cells",
+        "64",
+        "--steps",
+        "30",
+        "--checkpoint-every",
+        "3",
+    ];
+    assert!(
+        run(folder.path(), &with_output(&arguments, "reference"))
+            .status
+            .success()
+    );
+    let mut child = start(folder.path(), &with_output(&arguments, "first"));
+    assert!(wait_for(&path, 3, &mut child));
+    interrupt(&mut child);
+    std::fs::remove_file(drawing).unwrap();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let moved = folder.path().join("moved");
+    std::fs::rename(&path, &moved).unwrap();
+    let resumed = run(elsewhere.path(), &["resume", moved.to_str().unwrap()]);
+    assert!(resumed.status.success(), "{}", text(&resumed.stderr));
+    assert_same(&moved, &folder.path().join("reference"));
 }

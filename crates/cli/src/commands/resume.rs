@@ -1,6 +1,6 @@
 //! `willmore resume`.
 
-use runs::RunDirectory;
+use runs::{RunDirectory, StoredRun};
 use serde_json::json;
 
 use super::{flow, mcf};
@@ -20,6 +20,7 @@ pub fn run(options: &ResumeOptions) -> Result<Ending, Error> {
         RunDirectory::open(&options.run)?
     };
     if stored.is_finished() {
+        remove_old_checkpoints(&stored)?;
         let folder = options.run.to_string_lossy();
         let outcome = json!({ "command": stored.identity().kind, "finished": true, "run": folder });
         let text = format!("The run in {folder} is finished already");
@@ -45,4 +46,18 @@ pub fn run(options: &ResumeOptions) -> Result<Ending, Error> {
             path.display()
         ))),
     }
+}
+
+/// What a run that was killed right after its last commit did not come to. Nothing else is touched in a finished run: what
+/// is there besides may be its owner's.
+fn remove_old_checkpoints(stored: &StoredRun) -> Result<(), Error> {
+    let folder = stored.path().join("checkpoints");
+    for path in stored.leftovers().filter(|path| path.starts_with(&folder)) {
+        std::fs::remove_file(path).map_err(|source| Error::Io {
+            action: "remove",
+            path: path.to_owned(),
+            source,
+        })?;
+    }
+    Ok(())
 }
