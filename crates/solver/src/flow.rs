@@ -316,7 +316,9 @@ impl<const D: usize> WillmoreFlow<D> {
             Some(region) => {
                 let mut energy = Constrained::new(energy, region, current);
                 let start = energy.hold(start);
+                // Adding nothing makes 0.0 of -0.0.
                 minimize_timed(&mut energy, current, &start, preconditioner, params, device)
+                    .map(|(u, newton, times)| (energy.hold(u), newton, times))
             }
         }
         .map_err(|error| match error {

@@ -1,0 +1,508 @@
+//! What can be typed.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use clap::builder::PossibleValue;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
+use serde::Serialize;
+
+use crate::shape::Region;
+use crate::tau::Tau;
+
+const EXIT_CODES: &str = "Exit codes: 0 success; 2 bad input or failure, one line on standard error; 130 interrupted (Ctrl-C): \
+the last step was finished and stored, `willmore resume` goes on.";
+
+/// Willmore flow of meshes, images and fields.
+///
+/// Surfaces and curves are made smooth by the gradient flow of their bending energy, with the hybrid scheme of Rumpf, Sassen
+/// and Smoch: a learned step of mean curvature flow inside a minimizing movement.
+#[derive(Parser, Debug)]
+#[command(name = "willmore", version, after_help = EXIT_CODES, max_term_width = 120)]
+#[command(args_override_self = true, disable_help_subcommand = true)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The subcommands.
+#[derive(Subcommand, Debug)]
+pub enum Command {
+    /// Willmore flow of a mesh, an image, a field or a built-in shape
+    #[command(after_help = FLOW_EXAMPLES)]
+    Flow(FlowOptions),
+    /// Continue an interrupted run, to the same final bytes as if it had not been interrupted
+    #[command(after_help = RESUME_EXAMPLES)]
+    Resume(ResumeOptions),
+    /// Smooth a noisy mesh, until a time or a Willmore energy, in the mesh's own coordinates
+    #[command(after_help = FAIR_EXAMPLES)]
+    Fair(FairOptions),
+    /// Fill a region of a shape smoothly; everything outside stays bit for bit
+    #[command(after_help = INPAINT_EXAMPLES)]
+    Inpaint(InpaintOptions),
+    /// Mean curvature flow, by the network or by finite elements
+    #[command(after_help = MCF_EXAMPLES)]
+    Mcf(McfOptions),
+    /// List the networks that come with the program, or show one
+    #[command(after_help = NETWORKS_EXAMPLES)]
+    Networks(NetworksOptions),
+    /// Versions, devices and features of this program
+    #[command(after_help = INFO_EXAMPLES)]
+    Info(InfoOptions),
+    /// Check derivatives, symmetry and device on your own input
+    #[command(after_help = CHECK_EXAMPLES)]
+    Check(CheckOptions),
+    /// Train a network for other ratios than those of the networks that come with the program
+    #[command(after_help = TRAIN_EXAMPLES)]
+    Train(TrainOptions),
+    /// Print completions for a shell
+    #[command(after_help = COMPLETIONS_EXAMPLES)]
+    Completions {
+        /// The shell
+        shell: Shell,
+    },
+    /// Print the manual page
+    #[command(after_help = "Example:\n  willmore man > willmore.1")]
+    Man,
+}
+
+const FLOW_EXAMPLES: &str = "Examples:
+  willmore flow bunny.ply --steps 12 --output runs/bunny
+  willmore flow logo.png --frames 1 --time 1e-4
+  willmore flow builtin:cube --tau doubling:1e-6 --steps 16
+Ctrl-C (exit code 130) leaves a run that `willmore resume DIR` continues.";
+const RESUME_EXAMPLES: &str = "Example:
+  willmore resume runs/bunny";
+const FAIR_EXAMPLES: &str = "Examples:
+  willmore fair scan.stl --energy 26 --save smooth.stl
+  willmore fair scan.obj --time 1e-6 --format obj";
+const INPAINT_EXAMPLES: &str = "Examples:
+  willmore inpaint photo.png --mask damage.png --steps 40
+  willmore inpaint builtin:disc --mask box:0.2,0.2,0.9,0.9 --ansatz empty
+  willmore inpaint bunny.ply --mask ball:0.1,0.2,0,0.15
+Lengths are those of the box, whose centre is 0: see --box-side and --side-length.";
+const MCF_EXAMPLES: &str = "Examples:
+  willmore mcf logo.png --steps 64
+  willmore mcf builtin:torus --method fe-implicit --frames 4";
+const NETWORKS_EXAMPLES: &str = "Examples:
+  willmore networks
+  willmore networks show d2_k17_eps2_step1
+  willmore networks show mine.safetensors";
+const INFO_EXAMPLES: &str = "Example:
+  willmore info --json";
+const CHECK_EXAMPLES: &str = "Examples:
+  willmore check logo.png
+  willmore check builtin:torus --device wgpu";
+const TRAIN_EXAMPLES: &str = "Example:
+  willmore train --dimension 2 --width 25 --eps-over-h 3 --step-over-h2 2.25 --save mine.safetensors
+  willmore flow logo.png --network mine.safetensors";
+const COMPLETIONS_EXAMPLES: &str =
+    "Example:\n  willmore completions bash > ~/.local/share/bash-completion/completions/willmore";
+
+/// Where the shape comes from and how large it is.
+#[derive(Args, Serialize, Clone, Debug)]
+#[serde(rename_all = "kebab-case")]
+pub struct InputOptions {
+    /// A mesh (.obj, .stl, .ply), an image (.png, .jpg), a field (.npy, .vti), or builtin:NAME with NAME one of disc, ring,
+    /// cross, rectangle, sphere, cube, torus, coin, figure, lever
+    pub input: Option<String>,
+
+    /// Cells per unit length [default: 128 in 2D, 64 in 3D]
+    #[arg(long, value_name = "N")]
+    pub cells: Option<usize>,
+
+    /// Side of the periodic box about 0 [default: 2 in 2D, 1 in 3D]
+    #[arg(long, value_name = "LENGTH")]
+    pub box_side: Option<f64>,
+
+    /// Longest side of the mesh, image or built-in shape in the box [default: 0.6 of the box]
+    #[arg(long, value_name = "LENGTH")]
+    pub side_length: Option<f64>,
+
+    /// Which pixels of an image are inside [default: auto]
+    #[arg(long, value_name = "SIDE", value_enum)]
+    pub inside: Option<Inside>,
+
+    /// Grey value from 0 to 1, or opacity, between inside and outside [default: 0.5]
+    #[arg(long, value_name = "VALUE")]
+    pub threshold: Option<f64>,
+
+    /// What the values of a field are [default: phase-field]
+    #[arg(long, value_name = "KIND", value_enum)]
+    pub holds: Option<Holds>,
+}
+
+/// Which pixels of an image are inside.
+#[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum Inside {
+    /// Opaque ones, or those unlike the border
+    Auto,
+    /// Dark ones
+    Dark,
+    /// Light ones
+    Light,
+}
+
+/// What the values of a field are.
+#[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum Holds {
+    /// 1 inside, -1 outside
+    PhaseField,
+    /// Signed distances, negative inside
+    Distance,
+}
+
+/// Which operator, at which scales.
+#[derive(Args, Serialize, Clone, Debug)]
+#[serde(rename_all = "kebab-case")]
+pub struct SchemeOptions {
+    /// Interface width in cells
+    #[arg(long, value_name = "RATIO", default_value_t = 2.0)]
+    pub eps_over_h: f64,
+
+    /// accurate: the most accurate network, calibrated; calibrated: the paper's network, calibrated; paper: as in the paper
+    #[arg(long, value_name = "NAME", value_enum, default_value_t = Scheme::Accurate)]
+    pub scheme: Scheme,
+
+    /// Use this network, as `willmore train` makes them
+    #[arg(long, value_name = "FILE")]
+    pub network: Option<PathBuf>,
+}
+
+/// Which network with which weights.
+#[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scheme {
+    /// The most accurate network, calibrated
+    Accurate,
+    /// The paper's network, calibrated
+    Calibrated,
+    /// As in the paper
+    Paper,
+}
+
+impl fmt::Display for Scheme {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(
+            self.to_possible_value()
+                .as_ref()
+                .map_or("", PossibleValue::get_name),
+        )
+    }
+}
+
+/// How far and in which steps.
+#[derive(Args, Serialize, Clone, Debug)]
+#[serde(rename_all = "kebab-case")]
+pub struct StepOptions {
+    /// Time steps: auto (by the energy), auto:FIRST, VALUE, doubling:FIRST, or ramp:VALUE,HALVINGS, whose first step is
+    /// divided [default: auto; inpaint: a ramp]
+    #[arg(long, value_name = "TAU")]
+    pub tau: Option<Tau>,
+
+    /// Stop after this many steps [default: 20, or 1000 with --time or --energy]
+    #[arg(long, value_name = "COUNT")]
+    pub steps: Option<usize>,
+
+    /// Stop at this time
+    #[arg(long, value_name = "T")]
+    pub time: Option<f64>,
+
+    /// Stop when the Willmore energy is no more than this; a sphere has 8 pi = 25.13
+    #[arg(long, value_name = "W")]
+    pub energy: Option<f64>,
+}
+
+/// What is kept.
+#[derive(Args, Serialize, Clone, Debug)]
+#[serde(rename_all = "kebab-case")]
+pub struct KeepOptions {
+    /// Keep a picture every so many steps, and an animation of them
+    #[arg(long, value_name = "EVERY")]
+    pub frames: Option<usize>,
+
+    /// Steps between two checkpoints
+    #[arg(long, value_name = "STEPS", default_value_t = 5)]
+    pub checkpoint_every: usize,
+
+    /// Folder of the run [default: runs/NAME-COMMAND, with a number if that is there]
+    #[arg(long, value_name = "DIR")]
+    #[serde(skip)]
+    pub output: Option<PathBuf>,
+}
+
+/// Options of every command that computes.
+#[derive(Args, Serialize, Clone, Debug)]
+#[serde(rename_all = "kebab-case")]
+pub struct CommonOptions {
+    /// Where to compute: flex or ndarray (CPU), wgpu or cuda (GPU), if compiled in [default: the first compiled in]
+    #[arg(long, value_name = "NAME")]
+    pub device: Option<String>,
+
+    /// Seed of all random numbers
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+
+    /// Read options from a file, `name = value`; those on the command line win
+    #[arg(long, value_name = "FILE.toml")]
+    #[serde(skip)]
+    pub config: Option<PathBuf>,
+
+    #[command(flatten)]
+    #[serde(skip)]
+    #[allow(missing_docs)]
+    pub say: SayOptions,
+}
+
+/// What is printed.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct SayOptions {
+    /// Print nothing but errors
+    #[arg(long, global = true)]
+    pub quiet: bool,
+
+    /// Print the outcome as one JSON object
+    #[arg(long, global = true)]
+    pub json: bool,
+}
+
+/// Options of `flow`.
+#[derive(Args, Serialize, Clone, Debug)]
+#[allow(missing_docs)]
+pub struct FlowOptions {
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub input: InputOptions,
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub scheme: SchemeOptions,
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub steps: StepOptions,
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub keep: KeepOptions,
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub common: CommonOptions,
+}
+
+/// Options of `fair`.
+#[derive(Args, Serialize, Clone, Debug)]
+#[allow(missing_docs)]
+pub struct FairOptions {
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub flow: FlowOptions,
+
+    /// Format of the mesh in the run's folder
+    #[arg(long, value_name = "NAME", value_enum, default_value_t = MeshFormat::Ply)]
+    pub format: MeshFormat,
+
+    /// Write the mesh to this file too: .ply, .obj or .stl
+    #[arg(long, value_name = "FILE")]
+    pub save: Option<PathBuf>,
+}
+
+/// Formats of meshes.
+#[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs)]
+pub enum MeshFormat {
+    Ply,
+    Obj,
+    Stl,
+}
+
+impl fmt::Display for MeshFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Ply => "ply",
+            Self::Obj => "obj",
+            Self::Stl => "stl",
+        })
+    }
+}
+
+/// Options of `inpaint`.
+#[derive(Args, Serialize, Clone, Debug)]
+#[allow(missing_docs)]
+pub struct InpaintOptions {
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub flow: FlowOptions,
+
+    /// The region that is filled: an image of the size of the input (its dark or opaque pixels), box:x0,y0,x1,y1, ball:x,y,r,
+    /// and in 3D box:x0,y0,z0,x1,y1,z1, ball:x,y,z,r
+    #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
+    pub mask: Option<String>,
+
+    /// What the region holds at the beginning: keep, empty, full, or a shape like the mask
+    #[arg(
+        long,
+        value_name = "SHAPE",
+        default_value = "keep",
+        allow_hyphen_values = true
+    )]
+    pub ansatz: Ansatz,
+}
+
+/// What the inpainted region holds at the beginning.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ansatz {
+    /// What the input has there.
+    Keep,
+    /// Nothing.
+    Empty,
+    /// All inside.
+    Full,
+    /// A shape.
+    Shape(Region),
+}
+
+/// Options of `mcf`.
+#[derive(Args, Serialize, Clone, Debug)]
+#[allow(missing_docs)]
+pub struct McfOptions {
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub input: InputOptions,
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub scheme: SchemeOptions,
+
+    /// By which step
+    #[arg(long, value_name = "NAME", value_enum, default_value_t = McfMethod::Network)]
+    pub method: McfMethod,
+
+    /// Stop after this many steps, of (eps/h)^2/4 cells squared each [default: 20, or 100000 with --time]
+    #[arg(long, value_name = "COUNT")]
+    pub steps: Option<usize>,
+
+    /// Stop with the step that reaches this time
+    #[arg(long, value_name = "T")]
+    pub time: Option<f64>,
+
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub keep: KeepOptions,
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub common: CommonOptions,
+}
+
+/// A step of mean curvature flow.
+#[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum McfMethod {
+    /// The learned operator
+    Network,
+    /// Implicit finite elements
+    FeImplicit,
+    /// Semi-implicit finite elements
+    FeSemi,
+}
+
+impl fmt::Display for McfMethod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(
+            self.to_possible_value()
+                .as_ref()
+                .map_or("", PossibleValue::get_name),
+        )
+    }
+}
+
+/// Options of `resume`.
+#[derive(Args, Clone, Debug)]
+#[allow(missing_docs)]
+pub struct ResumeOptions {
+    /// The folder of the run
+    pub run: PathBuf,
+
+    /// Go on from the newest undamaged state of a run in which files are damaged or missing
+    #[arg(long)]
+    pub recover: bool,
+
+    #[command(flatten)]
+    pub say: SayOptions,
+}
+
+/// Options of `networks`.
+#[derive(Args, Clone, Debug)]
+#[allow(missing_docs)]
+pub struct NetworksOptions {
+    #[command(subcommand)]
+    pub show: Option<NetworksCommand>,
+    #[command(flatten)]
+    pub say: SayOptions,
+}
+
+/// What to do with networks.
+#[derive(Subcommand, Clone, Debug)]
+pub enum NetworksCommand {
+    /// Everything about one network
+    Show {
+        /// Name in the list, or a file
+        network: String,
+    },
+}
+
+/// Options of `info`.
+#[derive(Args, Clone, Debug)]
+#[allow(missing_docs)]
+pub struct InfoOptions {
+    #[command(flatten)]
+    pub say: SayOptions,
+}
+
+/// Options of `check`.
+#[derive(Args, Serialize, Clone, Debug)]
+#[allow(missing_docs)]
+pub struct CheckOptions {
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub input: InputOptions,
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub scheme: SchemeOptions,
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub common: CommonOptions,
+}
+
+/// Options of `train`.
+#[derive(Args, Clone, Debug)]
+#[allow(missing_docs)]
+pub struct TrainOptions {
+    /// Of space: 2 or 3
+    #[arg(long, value_name = "D")]
+    pub dimension: Option<usize>,
+
+    /// Width of the kernel in cells, odd
+    #[arg(long, value_name = "CELLS")]
+    pub width: Option<usize>,
+
+    /// Interface width in cells
+    #[arg(long, value_name = "RATIO")]
+    pub eps_over_h: Option<f64>,
+
+    /// Time step of the mean curvature flow in cells squared [default: (eps/h)^2/4, what the other commands need]
+    #[arg(long, value_name = "RATIO")]
+    pub step_over_h2: Option<f64>,
+
+    /// The file to write, .safetensors
+    #[arg(long, value_name = "FILE")]
+    pub save: Option<PathBuf>,
+
+    /// A network of seconds, for trying out the command
+    #[arg(long)]
+    pub quick: bool,
+
+    #[command(flatten)]
+    pub common: CommonOptions,
+}

@@ -1,0 +1,189 @@
+//! `willmore check`.
+
+use std::fmt::Write;
+use std::sync::Arc;
+
+use geometry::Field;
+use linearize::taylor::{halvings, remainder};
+use model::MeanCurvatureOperator;
+use operators::{ComputeDevice, DeviceKind, add_scaled, inner_product};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde_json::{Value, json};
+use solver::{MinimizingMovement, Objective};
+
+use super::open_device;
+use crate::cli::CheckOptions;
+use crate::error::Error;
+use crate::input::{self, Loaded};
+use crate::run::{self, Ending};
+use crate::scales::{self, Operator};
+
+/// Steps of the Taylor tests.
+const STEPS: usize = 14;
+/// By how much an observed rate may be short of the expected one.
+const SHORT: f64 = 0.3;
+/// Largest asymmetry of the Hessian and largest difference between devices, in units of the rounding error per node.
+const ROUNDING: f64 = 1e4;
+
+/// One check: its name, what was found, and whether that is right.
+struct Finding {
+    name: &'static str,
+    found: Value,
+    words: String,
+    passed: bool,
+}
+
+/// Checks the derivatives of the energy at the input.
+///
+/// # Errors
+/// [`Error::Options`] naming the checks that failed; what reading and the device raise.
+pub fn run(mut options: CheckOptions) -> Result<Ending, Error> {
+    scales::check_eps_over_h(options.scheme.eps_over_h)?;
+    let device = open_device(&mut options.common)?;
+    let say = options.common.say;
+    let loaded = input::load(&mut options.input, options.scheme.eps_over_h, say)?;
+    let findings = match loaded {
+        Loaded::Plane(start, _) => findings(&start.field, &options, &device)?,
+        Loaded::Space(start) => findings(&start.field, &options, &device)?,
+    };
+    let mut text = String::new();
+    for finding in &findings {
+        let verdict = if finding.passed { "ok" } else { "WRONG" };
+        let _ = writeln!(text, "{verdict:6}{}: {}", finding.name, finding.words);
+    }
+    let list: Vec<Value> = (findings.iter())
+        .map(|f| json!({ "name": f.name, "found": f.found, "passed": f.passed }))
+        .collect();
+    let outcome = json!({ "command": "check", "device": options.common.device, "checks": list });
+    run::report(say, &outcome, text.trim_end());
+    let failed: Vec<&str> = findings
+        .iter()
+        .filter(|f| !f.passed)
+        .map(|f| f.name)
+        .collect();
+    if failed.is_empty() {
+        return Ok(Ending::Done);
+    }
+    Err(Error::options(format!(
+        "these checks failed on the device {}: {}; do not trust its results",
+        device.kind(),
+        failed.join(", ")
+    )))
+}
+
+fn findings<const D: usize>(
+    field: &Field<D>,
+    options: &CheckOptions,
+    device: &ComputeDevice,
+) -> Result<Vec<Finding>, Error> {
+    let operator = scales::operator(D, &options.scheme)?;
+    let here = derivatives(field, &operator, options, device)?;
+    let mut findings = Vec::new();
+    for (name, derivatives, expected) in [("gradient", 1, 2.0), ("Hessian", 2, 3.0)] {
+        let value = |t: f64| {
+            here.values
+                .iter()
+                .find(|(s, _)| s.to_bits() == t.to_bits())
+                .map_or(f64::NAN, |(_, v)| *v)
+        };
+        let steps = halvings(FIRST_STEP, STEPS);
+        let rest = remainder(value, &here.along[..derivatives], &steps, device.epsilon());
+        let rate = rest.rate();
+        findings.push(Finding {
+            name,
+            found: json!(rate),
+            words: match rate {
+                Some(rate) => format!("the remainder of the Taylor expansion decays like t^{rate:.2}, expected t^{expected}"),
+                None => "the remainder of the Taylor expansion is rounding error".to_owned(),
+            },
+            passed: rest.is_consistent(SHORT),
+        });
+    }
+    let limit = ROUNDING * device.epsilon();
+    findings.push(Finding {
+        name: "symmetry",
+        found: json!(here.asymmetry),
+        words: format!(
+            "<p, H q> and <q, H p> differ by {:.1e}, at most {limit:.1e} is rounding",
+            here.asymmetry
+        ),
+        passed: here.asymmetry <= limit,
+    });
+    let other = DeviceKind::compiled().find(|&kind| {
+        kind != device.kind() && matches!(kind, DeviceKind::Flex | DeviceKind::NdArray)
+    });
+    if let Some(kind) = other {
+        let cpu = ComputeDevice::open(kind)?;
+        let there = derivatives(field, &operator, options, &cpu)?;
+        let difference = (here.gradient.iter().zip(&there.gradient))
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
+        let largest = there.gradient.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
+        let difference = difference / largest.max(f64::MIN_POSITIVE);
+        findings.push(Finding {
+            name: "device",
+            found: json!(difference),
+            words: format!("gradients differ from those on {kind} by {difference:.1e}, at most {limit:.1e} is rounding"),
+            passed: difference <= limit,
+        });
+    }
+    Ok(findings)
+}
+
+/// The first and largest step of the Taylor tests.
+const FIRST_STEP: f64 = 0.25;
+
+struct Derivatives {
+    /// Steps and energies.
+    values: Vec<(f64, f64)>,
+    /// First and second derivative in one direction.
+    along: [f64; 2],
+    /// Relative to the products.
+    asymmetry: f64,
+    gradient: Vec<f64>,
+}
+
+/// The energy of one time step of the size of the inner one, near the input: at the input itself part of the gradient vanishes.
+fn derivatives<const D: usize>(
+    field: &Field<D>,
+    operator: &Operator,
+    options: &CheckOptions,
+    device: &ComputeDevice,
+) -> Result<Derivatives, Error> {
+    let params = scales::params(field.grid().spacing(), options.scheme.eps_over_h);
+    let mut rng = ChaCha8Rng::seed_from_u64(options.common.seed);
+    let mut direction = || {
+        // Along the interface, where the flow moves values too.
+        let values: Vec<f64> = (field.values().iter())
+            .map(|u| (1.0 - u * u) * rng.random_range(-1.0..1.0))
+            .collect();
+        device.tensor::<D>(&values, field.grid().shape())
+    };
+    let (p, q, moved) = (direction(), direction(), direction());
+    let previous = device.tensor::<D>(field.values(), field.grid().shape());
+    let step = MeanCurvatureOperator::<D>::new(&operator.network, device)?;
+    step.check_grid(field.grid().cells())?;
+    let mut energy = MinimizingMovement::new(Arc::new(step), field.grid().cells(), device)?;
+    energy.set(&previous, params.stiffness(params.mcf_step))?;
+    let u = add_scaled(previous, &moved, 0.1);
+    let (_, gradient) = energy.evaluate(&u)?;
+    let (hp, hq) = (
+        energy.hessian_vector_product(&p)?,
+        energy.hessian_vector_product(&q)?,
+    );
+    let dot = |a: &_, b: &_| device.scalar(inner_product::<D>(a, b));
+    let (pq, qp) = (dot(&p, &hq)?, dot(&q, &hp)?);
+    let scale = (dot(&p, &hp)?.abs() * dot(&q, &hq)?.abs()).sqrt();
+    let along = [dot(&gradient, &p)?, dot(&p, &hp)?];
+    let mut values = Vec::new();
+    for t in [0.0].into_iter().chain(halvings(FIRST_STEP, STEPS)) {
+        values.push((t, energy.value(&add_scaled(u.clone(), &p, t))?));
+    }
+    Ok(Derivatives {
+        values,
+        along,
+        asymmetry: (pq - qp).abs() / scale.max(f64::MIN_POSITIVE),
+        gradient: device.values(gradient)?,
+    })
+}

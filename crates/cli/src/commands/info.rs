@@ -1,0 +1,51 @@
+//! `willmore info`.
+
+use std::fmt::Write;
+
+use model::pretrained;
+use operators::{ComputeDevice, DeviceKind};
+use serde_json::json;
+
+use crate::cli::InfoOptions;
+use crate::error::Error;
+use crate::run::{self, Ending};
+
+/// Says what this program is made of and which devices work.
+///
+/// # Errors
+/// [`Error::Model`] if a network in the program is damaged.
+pub fn run(options: &InfoOptions) -> Result<Ending, Error> {
+    let version = env!("CARGO_PKG_VERSION");
+    let mut devices = Vec::new();
+    let mut text = format!(
+        "willmore {version}\nplatform: {} {}",
+        std::env::consts::OS,
+        std::env::consts::ARCH
+    );
+    for kind in DeviceKind::ALL {
+        let state = if kind.is_compiled() {
+            match ComputeDevice::open(kind) {
+                Ok(device) => format!("works, {:?}", device.dtype()).to_lowercase(),
+                Err(error) => error.to_string(),
+            }
+        } else {
+            format!("not compiled in; build with --features {kind}")
+        };
+        let _ = write!(text, "\ndevice {kind}: {state}");
+        devices
+            .push(json!({ "name": kind.name(), "compiled": kind.is_compiled(), "state": state }));
+    }
+    let [paper, accurate] = [pretrained::all()?.len(), pretrained::all_accurate()?.len()];
+    let _ = write!(
+        text,
+        "
+networks: {accurate} accurate, {paper} of the paper's recipe"
+    );
+    let outcome = json!({
+        "version": version,
+        "devices": devices,
+        "networks": { "accurate": accurate, "paper": paper },
+    });
+    run::report(options.say, &outcome, &text);
+    Ok(Ending::Done)
+}

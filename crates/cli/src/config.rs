@@ -1,0 +1,177 @@
+//! Options from files, and resolved options as files.
+//!
+//! A file has a line `name = value` for every option, named as on the command line; `input` is the input. What it says is put
+//! before what was typed and parsed in the same way, so that both accept the same and refuse the same.
+
+use std::ffi::{OsStr, OsString};
+use std::path::Path;
+
+use clap::parser::ValueSource;
+use clap::{ArgMatches, CommandFactory, FromArgMatches};
+use serde::Serialize;
+use toml::{Table, Value};
+
+use crate::cli::Cli;
+use crate::error::Error;
+
+/// The entry of a resolved configuration that names the subcommand.
+pub const COMMAND: &str = "command";
+
+/// What was typed, together with the configuration file it names.
+///
+/// # Errors
+/// The errors of the command line as clap has them, in one line; [`Error::Config`] and [`Error::Io`] for the file.
+pub fn parse(arguments: &[OsString]) -> Result<Cli, ParseError> {
+    let matches = Cli::command().try_get_matches_from(arguments)?;
+    let Some((command, typed)) = matches.subcommand() else {
+        return Ok(Cli::from_arg_matches(&matches)?);
+    };
+    let file = (typed.try_get_one::<std::path::PathBuf>("config").ok()).flatten();
+    let Some(file) = file else {
+        return Ok(Cli::from_arg_matches(&matches)?);
+    };
+    let text = std::fs::read_to_string(file).map_err(|source| Error::Io {
+        action: "read",
+        path: file.clone(),
+        source,
+    })?;
+    let table = read(&text, file)?;
+    let mut all: Vec<OsString> = vec!["willmore".into(), command.into()];
+    all.extend(from_table(&table, command, file, Some(typed))?);
+    let typed = arguments.iter().skip(1);
+    all.extend(typed.skip_while(|a| *a != command).skip(1).cloned());
+    Ok(parse_file(&all, file)?)
+}
+
+/// The options that a run was started with.
+///
+/// # Errors
+/// [`Error::Config`] if they are none of this program's.
+pub fn parse_resolved(text: &str, path: &Path) -> Result<Cli, Error> {
+    let table = read(text, path)?;
+    let Some(Value::String(command)) = table.get(COMMAND) else {
+        return Err(bad(path, "it does not say which command it is for"));
+    };
+    let mut all: Vec<OsString> = vec!["willmore".into(), command.into()];
+    all.extend(from_table(&table, command, path, None)?);
+    parse_file(&all, path)
+}
+
+/// All options of a run, to be read by [`parse_resolved`] and by `--config`.
+///
+/// # Errors
+/// [`Error::Options`] if an option, such as a path that is no text, cannot be written.
+pub fn resolved(command: &str, options: &impl Serialize) -> Result<String, Error> {
+    let unwritable = |error| Error::options(format!("the options cannot be stored: {error}"));
+    let options = toml::to_string(options).map_err(unwritable)?;
+    Ok(format!("{COMMAND} = {command:?}\n{options}"))
+}
+
+/// Why nothing could be parsed.
+pub enum ParseError {
+    /// What clap says, which may be the help that was asked for.
+    Clap(clap::Error),
+    /// Something about a file.
+    Other(Error),
+}
+
+impl From<clap::Error> for ParseError {
+    fn from(error: clap::Error) -> Self {
+        Self::Clap(error)
+    }
+}
+
+impl From<Error> for ParseError {
+    fn from(error: Error) -> Self {
+        Self::Other(error)
+    }
+}
+
+/// What clap says, on one line.
+pub fn one_line(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let paragraphs = text.split("\n\n").filter(|p| {
+        !(p.starts_with("Usage") || p.starts_with("For more information") || p.trim().is_empty())
+    });
+    let words: Vec<&str> = paragraphs.flat_map(str::split_whitespace).collect();
+    let line = words.join(" ");
+    line.strip_prefix("error: ").unwrap_or(&line).to_owned()
+}
+
+fn bad(path: &Path, message: impl Into<String>) -> Error {
+    Error::Config {
+        path: path.to_owned(),
+        message: message.into(),
+    }
+}
+
+fn read(text: &str, path: &Path) -> Result<Table, Error> {
+    text.parse::<Table>().map_err(|error| {
+        let line = error
+            .span()
+            .map_or(1, |span| 1 + text[..span.start].matches('\n').count());
+        bad(path, format!("line {line}: {}", error.message()))
+    })
+}
+
+fn parse_file(arguments: &[OsString], path: &Path) -> Result<Cli, Error> {
+    let parsed = Cli::command()
+        .try_get_matches_from(arguments)
+        .and_then(|matches| Cli::from_arg_matches(&matches));
+    parsed.map_err(|error| bad(path, one_line(&error)))
+}
+
+/// The entries of a file as they would be typed, but for those that were.
+fn from_table(
+    table: &Table,
+    command: &str,
+    path: &Path,
+    typed: Option<&ArgMatches>,
+) -> Result<Vec<OsString>, Error> {
+    let mut arguments = Vec::new();
+    for (name, value) in table {
+        let id = name.replace('-', "_");
+        if name == COMMAND {
+            if value.as_str() != Some(command) {
+                return Err(bad(
+                    path,
+                    format!("it is for the command {value}, not for {command}"),
+                ));
+            }
+            continue;
+        }
+        if name == "config" {
+            return Err(bad(path, "a configuration cannot name another one"));
+        }
+        let is_typed = |typed: &ArgMatches| {
+            typed.try_contains_id(&id).is_ok()
+                && typed.value_source(&id) == Some(ValueSource::CommandLine)
+        };
+        if typed.is_some_and(is_typed) {
+            continue;
+        }
+        let text = match value {
+            Value::Boolean(false) => continue,
+            Value::Boolean(true) => {
+                arguments.push(format!("--{name}").into());
+                continue;
+            }
+            Value::String(text) => text.clone(),
+            Value::Integer(number) => number.to_string(),
+            Value::Float(number) => number.to_string(),
+            _ => {
+                return Err(bad(
+                    path,
+                    format!("{name} must be a number, a text, true or false"),
+                ));
+            }
+        };
+        let option = if name == "input" {
+            text
+        } else {
+            format!("--{name}={text}")
+        };
+        arguments.push(OsStr::new(&option).to_owned());
+    }
+    Ok(arguments)
+}

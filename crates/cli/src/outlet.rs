@@ -1,0 +1,259 @@
+//! What people look at: pictures, meshes, drawings.
+
+use std::path::Path;
+
+use geometry::measure::{perimeter, zero_set_volume};
+use geometry::{Field, npy, vti};
+use images::{Drawing, Frame, Interface, Outline, Svg};
+use render::{Framing, Picture, Rgb, Scene};
+use runs::RunDirectory;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use surfaces::{ClosedMesh, Placement, TriangleMesh};
+
+use crate::cli::MeshFormat;
+use crate::error::Error;
+
+/// Pixels a side of pictures of surfaces.
+const PIXELS: u32 = 480;
+
+/// Measures of a shape in the units of the box.
+#[derive(Clone, Debug, Serialize)]
+pub struct Measures {
+    /// Length of the curve or area of the surface.
+    pub perimeter: f64,
+    /// Area or volume inside.
+    pub volume: f64,
+    /// Its parts.
+    #[serde(flatten)]
+    pub topology: Topology,
+    /// Whether the shape has come to the side of the box, and so to its own periodic image.
+    pub touches_box: bool,
+}
+
+/// The parts of a shape.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Topology {
+    /// Closed curves or surfaces.
+    pub components: usize,
+    /// Of all surfaces together.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub euler_characteristic: Option<i64>,
+}
+
+/// How phase fields in `D` dimensions are shown.
+pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
+    /// A picture.
+    ///
+    /// # Errors
+    /// What drawing raises.
+    fn picture(&self, u: &Field<D>, eps: f64) -> Result<Picture, Error>;
+
+    /// The parts of the shape.
+    ///
+    /// # Errors
+    /// If there is no shape.
+    fn topology(&self, u: &Field<D>, eps: f64) -> Result<Topology, Error>;
+
+    /// Writes the shape to files `final.*`.
+    ///
+    /// # Errors
+    /// What drawing and writing raise.
+    fn write_shape(
+        &self,
+        u: &Field<D>,
+        eps: f64,
+        format: MeshFormat,
+        run: &mut RunDirectory,
+    ) -> Result<(), Error>;
+
+    /// Writes the shape as a mesh to any file.
+    ///
+    /// # Errors
+    /// [`Error::Options`] in the plane; what writing raises.
+    fn save(&self, u: &Field<D>, eps: f64, path: &Path) -> Result<(), Error>;
+}
+
+/// The pixels of an image in the plane.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Plane {
+    size: [u32; 2],
+    upper_left: [f64; 2],
+    pixel: f64,
+}
+
+impl Plane {
+    /// Of a frame.
+    pub fn new(frame: &Frame) -> Self {
+        Self {
+            size: [frame.width(), frame.height()],
+            upper_left: frame.point([0.0; 2]),
+            pixel: frame.pixel(),
+        }
+    }
+
+    fn frame(&self) -> Result<Frame, Error> {
+        Ok(Frame::new(
+            self.size[0],
+            self.size[1],
+            self.upper_left,
+            self.pixel,
+        )?)
+    }
+}
+
+impl Outlet<2> for Plane {
+    fn picture(&self, u: &Field<2>, eps: f64) -> Result<Picture, Error> {
+        let interface = Interface::new(u, eps)?;
+        Ok(Drawing::on_white(self.frame()?)
+            .filled(&interface, Rgb::BLACK)
+            .picture()?)
+    }
+
+    fn topology(&self, u: &Field<2>, _: f64) -> Result<Topology, Error> {
+        Ok(Topology {
+            components: Outline::of_phase_field(u)?.curves().len(),
+            euler_characteristic: None,
+        })
+    }
+
+    fn write_shape(
+        &self,
+        u: &Field<2>,
+        _: f64,
+        _: MeshFormat,
+        run: &mut RunDirectory,
+    ) -> Result<(), Error> {
+        let outline = Outline::of_phase_field(u)?;
+        Svg::on_white(self.frame()?)
+            .filled(&outline, Rgb::BLACK)
+            .write(run.path().join("final.svg"))?;
+        Ok(run.adopt_file("final.svg")?)
+    }
+
+    fn save(&self, _: &Field<2>, _: f64, path: &Path) -> Result<(), Error> {
+        Err(Error::options(format!(
+            "--save {} needs a surface in space",
+            path.display()
+        )))
+    }
+}
+
+/// From the box to the coordinates of a mesh, `origin + unit p`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Space {
+    origin: [f64; 3],
+    unit: f64,
+}
+
+impl Space {
+    /// The coordinates of the box.
+    pub fn identity() -> Self {
+        Self {
+            origin: [0.0; 3],
+            unit: 1.0,
+        }
+    }
+
+    /// The coordinates of a mesh that was placed in the box.
+    pub fn of(placement: &Placement) -> Self {
+        Self {
+            origin: placement.apply_inverse([0.0; 3]),
+            unit: placement.scale().recip(),
+        }
+    }
+
+    fn mesh(&self, u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
+        let mut mesh = surfaces::phase_field_surface(u, eps)?;
+        for x in &mut mesh.vertices {
+            *x = std::array::from_fn(|i| self.unit.mul_add(x[i], self.origin[i]));
+        }
+        Ok(mesh)
+    }
+}
+
+impl Outlet<3> for Space {
+    fn picture(&self, u: &Field<3>, eps: f64) -> Result<Picture, Error> {
+        let scene = Scene::new(u, eps)?.azimuth(-60.0).elevation(25.0);
+        Ok(scene.framing(Framing::Domain).render(PIXELS)?)
+    }
+
+    fn topology(&self, u: &Field<3>, eps: f64) -> Result<Topology, Error> {
+        let (closed, _) = ClosedMesh::new(surfaces::phase_field_surface(u, eps)?)?;
+        Ok(Topology {
+            components: closed.components(),
+            euler_characteristic: Some(closed.euler_characteristic()),
+        })
+    }
+
+    fn write_shape(
+        &self,
+        u: &Field<3>,
+        eps: f64,
+        format: MeshFormat,
+        run: &mut RunDirectory,
+    ) -> Result<(), Error> {
+        let name = format!("final.{format}");
+        let mesh = self.mesh(u, eps)?;
+        surfaces::write(run.path().join(&name), &mesh)?;
+        Ok(run.adopt_file(&name)?)
+    }
+
+    fn save(&self, u: &Field<3>, eps: f64, path: &Path) -> Result<(), Error> {
+        Ok(surfaces::write(path, &self.mesh(u, eps)?)?)
+    }
+}
+
+/// Whether there is an interface at all.
+pub fn has_interface<const D: usize>(u: &Field<D>) -> bool {
+    let inside = u.values().iter().filter(|u| **u > 0.0).count();
+    inside > 0 && inside < u.grid().len()
+}
+
+/// Writes `final.npy`, `final.vti`, and, unless the shape has vanished, picture and shape.
+///
+/// # Errors
+/// What drawing and writing raise.
+pub fn write_final<const D: usize, O: Outlet<D>>(
+    outlet: &O,
+    u: &Field<D>,
+    eps: f64,
+    format: MeshFormat,
+    run: &mut RunDirectory,
+) -> Result<Measures, Error> {
+    npy::write(run.path().join("final.npy"), u)?;
+    run.adopt_file("final.npy")?;
+    vti::write(run.path().join("final.vti"), &[("phase_field", u)])?;
+    run.adopt_file("final.vti")?;
+    let topology = if has_interface(u) {
+        write_picture(&outlet.picture(u, eps)?, "final.png", run)?;
+        outlet.write_shape(u, eps, format, run)?;
+        outlet.topology(u, eps)?
+    } else {
+        Topology::default()
+    };
+    Ok(Measures {
+        perimeter: perimeter(u, eps)?,
+        volume: zero_set_volume(u),
+        topology,
+        touches_box: touches_box(u),
+    })
+}
+
+/// Whether a layer of nodes at the side of the box is not outside.
+pub fn touches_box<const D: usize>(u: &Field<D>) -> bool {
+    const OUTSIDE: f64 = -0.5;
+    let grid = u.grid();
+    let at_side = |node: usize| grid.multi_index(node).contains(&0);
+    (u.values().iter().enumerate()).any(|(node, u)| *u > OUTSIDE && at_side(node))
+}
+
+/// Adds a picture to a run.
+///
+/// # Errors
+/// What encoding and writing raise.
+pub fn write_picture(picture: &Picture, name: &str, run: &mut RunDirectory) -> Result<(), Error> {
+    let bytes = picture.to_png()?;
+    run.write_file(name, |out| out.write_all(&bytes))?;
+    Ok(())
+}

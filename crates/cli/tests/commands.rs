@@ -1,0 +1,420 @@
+//! What the commands make.
+
+mod common;
+
+use std::path::Path;
+
+use common::outcome;
+use geometry::shapes::{Ball, Cuboid};
+use geometry::{Field, Grid, npy, phase_field, vti};
+use images::{Drawing, Frame};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use render::Rgb;
+use surfaces::ClosedMesh;
+
+const EIGHT_PI: f64 = 8.0 * std::f64::consts::PI;
+
+/// A sphere about (3, -5, 40) whose vertices are moved by noise.
+fn noisy_sphere(path: &Path, radius: f64, noise: f64) {
+    let grid = Grid::<3>::centred(24, 1.0).unwrap();
+    let distance = Field::from_fn(grid, |x| x.iter().map(|x| x * x).sum::<f64>().sqrt() - 0.4);
+    let mut mesh = surfaces::isosurface(&distance).unwrap();
+    mesh.normals = None;
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    for x in &mut mesh.vertices {
+        let factor = radius / 0.4 * (1.0 + noise * rng.random_range(-1.7..1.7));
+        *x = [
+            3.0 + factor * x[0],
+            -5.0 + factor * x[1],
+            40.0 + factor * x[2],
+        ];
+    }
+    surfaces::write(path, &mesh).unwrap();
+}
+
+#[test]
+fn a_noisy_sphere_is_faired_in_its_own_coordinates() {
+    let folder = tempfile::tempdir().unwrap();
+    noisy_sphere(&folder.path().join("noisy.ply"), 7.0, 0.02);
+    let arguments = [
+        "fair",
+        "noisy.ply",
+        "--cells",
+        "40",
+        "--energy",
+        "26",
+        "--save",
+        "smooth.stl",
+        "--output",
+        "run",
+        "--format",
+        "obj",
+    ];
+    let outcome = outcome(folder.path(), &arguments);
+    assert_eq!(outcome["energy_reached"], true, "{outcome}");
+    assert!(
+        outcome["first_energy"].as_f64().unwrap() > 1.4 * EIGHT_PI,
+        "{outcome}"
+    );
+    let energy = outcome["energy"].as_f64().unwrap();
+    assert!((energy / EIGHT_PI - 1.0).abs() < 0.05, "{outcome}");
+    for name in ["smooth.stl", "run/final.obj"] {
+        let (mesh, _) = ClosedMesh::new(surfaces::read(folder.path().join(name)).unwrap()).unwrap();
+        assert_eq!((mesh.components(), mesh.genus()), (1, 0));
+        for x in &mesh.mesh().vertices {
+            let r = (x[0] - 3.0).hypot(x[1] + 5.0).hypot(x[2] - 40.0);
+            assert!((r / 7.0 - 1.0).abs() < 0.05, "{name}: {x:?}");
+        }
+    }
+}
+
+#[test]
+fn inpainting_keeps_what_is_outside_bit_for_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let grid = Grid::<2>::centred(64, 1.0).unwrap();
+    let eps = 2.0 * grid.spacing();
+    let ball = Ball::new([0.0, 0.0], 0.3).unwrap();
+    let field = phase_field(grid, &ball, eps).unwrap();
+    npy::write(folder.path().join("disc.npy"), &field).unwrap();
+    let mask = ["--mask", "box:0.1,0.1,0.45,0.45", "--ansatz", "empty"];
+    let arguments = [
+        "inpaint",
+        "disc.npy",
+        "--box-side",
+        "1",
+        "--steps",
+        "16",
+        "--output",
+        "run",
+    ];
+    outcome(folder.path(), &[&arguments[..], &mask].concat());
+    let after = npy::read(folder.path().join("run/final.npy"), |_| Ok(grid)).unwrap();
+    let inside = |x: [f64; 2]| x.iter().all(|x| 0.1 < *x && *x < 0.45);
+    let mut moved = 0;
+    for (node, (a, b)) in field.values().iter().zip(after.values()).enumerate() {
+        if inside(grid.node(node)) {
+            // The region was empty at first.
+            moved += usize::from(*b > 0.5);
+        } else {
+            assert_eq!(a.to_bits(), b.to_bits(), "{:?}", grid.node(node));
+        }
+    }
+    assert!(moved > 10, "{moved}");
+}
+
+#[test]
+fn inpainting_in_space_keeps_what_is_outside_bit_for_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let grid = Grid::<3>::centred(32, 1.0).unwrap();
+    let field = phase_field(grid, &Cuboid::new([0.25; 3]).unwrap(), 2.0 * grid.spacing()).unwrap();
+    vti::write(folder.path().join("cube.vti"), &[("u", &field)]).unwrap();
+    let arguments = [
+        "inpaint",
+        "cube.vti",
+        "--mask",
+        "ball:0.25,0.25,0.25,0.12",
+        "--steps",
+        "14",
+        "--output",
+        "run",
+    ];
+    outcome(folder.path(), &arguments);
+    let after = vti::read::<3>(folder.path().join("run/final.vti"))
+        .unwrap()
+        .swap_remove(0)
+        .1;
+    let corner = Ball::new([0.25; 3], 0.12).unwrap();
+    let mut moved = 0;
+    for (node, (a, b)) in field.values().iter().zip(after.values()).enumerate() {
+        if geometry::SignedDistance::signed_distance(&corner, grid.node(node)) < 0.0 {
+            moved += usize::from((a - b).abs() > 0.01);
+        } else {
+            assert_eq!(a.to_bits(), b.to_bits(), "{:?}", grid.node(node));
+        }
+    }
+    assert!(moved > 10, "{moved}");
+}
+
+#[test]
+fn drawings_flow_in_their_own_pixels() {
+    let folder = tempfile::tempdir().unwrap();
+    let frame = Frame::new(90, 60, [0.0, 60.0], 1.0).unwrap();
+    let square =
+        geometry::SignedDistanceExt::translated(Cuboid::new([15.0, 15.0]).unwrap(), [30.0, 30.0]);
+    let drawing = Drawing::on_white(frame)
+        .filled(&square, Rgb::BLACK)
+        .picture()
+        .unwrap();
+    drawing.write_png(folder.path().join("square.png")).unwrap();
+    let arguments = [
+        "flow",
+        "square.png",
+        "--cells",
+        "64",
+        "--steps",
+        "6",
+        "--frames",
+        "3",
+        "--output",
+        "run",
+    ];
+    let outcome = outcome(folder.path(), &arguments);
+    assert!(
+        outcome["energy"].as_f64() < outcome["first_energy"].as_f64(),
+        "{outcome}"
+    );
+    // 30 pixels of 90, which are 1.2 long.
+    let area = outcome["volume"].as_f64().unwrap();
+    assert!((area / 0.16 - 1.0).abs() < 0.1, "{outcome}");
+    let after = images::read(folder.path().join("run/final.png")).unwrap();
+    assert_eq!((after.width(), after.height()), (90, 60));
+    assert!(after.grey()[30 * 90 + 30] < 100 && after.grey()[30 * 90 + 60] > 60_000);
+    for name in [
+        "final.svg",
+        "final.npy",
+        "final.vti",
+        "animation.png",
+        "frames/step-000006.png",
+        "metrics.csv",
+    ] {
+        assert!(folder.path().join("run").join(name).exists(), "{name}");
+    }
+    let metrics = std::fs::read_to_string(folder.path().join("run/metrics.csv")).unwrap();
+    assert_eq!(metrics.lines().count(), 7);
+}
+
+/// The area of a disc shrinks by 2 pi per unit of time under mean curvature flow.
+#[test]
+fn discs_shrink_by_every_method() {
+    let folder = tempfile::tempdir().unwrap();
+    for method in ["network", "fe-implicit", "fe-semi"] {
+        let arguments = [
+            "mcf",
+            "builtin:disc",
+            "--cells",
+            "64",
+            "--method",
+            method,
+            "--steps",
+            "40",
+            "--output",
+            method,
+        ];
+        let outcome = outcome(folder.path(), &arguments);
+        let number = |name: &str| outcome[name].as_f64().unwrap();
+        let lost = std::f64::consts::PI * 0.36 - number("volume");
+        let expected = std::f64::consts::TAU * number("time");
+        assert!(
+            (lost / expected - 1.0).abs() < 0.1,
+            "{method}: {lost}, expected {expected}"
+        );
+    }
+}
+
+#[test]
+fn a_shape_that_vanishes_ends_its_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = [
+        "mcf",
+        "builtin:disc",
+        "--cells",
+        "32",
+        "--side-length",
+        "0.4",
+        "--steps",
+        "500",
+        "--output",
+        "run",
+    ];
+    let outcome = outcome(folder.path(), &arguments);
+    assert_eq!(outcome["components"], 0, "{outcome}");
+    assert!(outcome["steps"].as_u64().unwrap() < 200, "{outcome}");
+    assert!(folder.path().join("run/final.npy").exists());
+}
+
+#[test]
+fn time_and_energy_end_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let timed = outcome(
+        folder.path(),
+        &[
+            "flow",
+            "builtin:disc",
+            "--cells",
+            "32",
+            "--time",
+            "1e-3",
+            "--tau",
+            "3e-4",
+            "--output",
+            "a",
+        ],
+    );
+    assert_eq!(timed["steps"], 4);
+    assert!((timed["time"].as_f64().unwrap() - 1e-3).abs() < 1e-15);
+    let sphere = outcome(
+        folder.path(),
+        &[
+            "flow",
+            "builtin:sphere",
+            "--cells",
+            "48",
+            "--steps",
+            "100",
+            "--output",
+            "b",
+        ],
+    );
+    // It stands still, and larger and larger steps would not change that.
+    assert!(sphere["steps"].as_u64().unwrap() < 40, "{sphere}");
+    assert!(
+        (sphere["energy"].as_f64().unwrap() / EIGHT_PI - 1.0).abs() < 0.01,
+        "{sphere}"
+    );
+}
+
+#[test]
+fn derivatives_are_right_on_own_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let outcome = outcome(folder.path(), &["check", "builtin:cross", "--cells", "32"]);
+    let checks = outcome["checks"].as_array().unwrap();
+    assert!(checks.len() >= 3);
+    assert!(
+        checks.iter().all(|check| check["passed"] == true),
+        "{outcome}"
+    );
+}
+
+#[test]
+fn trained_networks_serve_other_ratios() {
+    let folder = tempfile::tempdir().unwrap();
+    let train = [
+        "train",
+        "--dimension",
+        "2",
+        "--width",
+        "13",
+        "--eps-over-h",
+        "1.5",
+        "--quick",
+        "--save",
+        "mine.safetensors",
+    ];
+    outcome(folder.path(), &train);
+    let about = outcome(folder.path(), &["networks", "show", "mine.safetensors"]);
+    assert_eq!(about["ratios"]["width"], 13);
+    let flow = [
+        "flow",
+        "builtin:disc",
+        "--cells",
+        "32",
+        "--eps-over-h",
+        "1.5",
+        "--network",
+        "mine.safetensors",
+        "--steps",
+        "2",
+        "--output",
+        "run",
+    ];
+    let outcome = outcome(folder.path(), &flow);
+    assert!(outcome["energy"].as_f64().unwrap() > 0.0);
+}
+
+#[test]
+fn lists_are_complete() {
+    let folder = tempfile::tempdir().unwrap();
+    let networks = outcome(folder.path(), &["networks"]);
+    assert!(networks.as_array().unwrap().len() >= 11);
+    let info = outcome(folder.path(), &["info"]);
+    assert_eq!(info["devices"].as_array().unwrap().len(), 4);
+    for (arguments, expected) in [
+        (&["completions", "bash"][..], "_willmore"),
+        (&["man"], ".TH"),
+    ] {
+        let output = common::program(folder.path())
+            .args(arguments)
+            .output()
+            .unwrap();
+        assert!(
+            common::text(&output.stdout).contains(expected),
+            "{arguments:?}"
+        );
+    }
+}
+
+/// The mask has the pixels of the input, and the region is where its dark pixels are.
+#[test]
+fn images_are_masks_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let frame = Frame::new(60, 60, [0.0, 60.0], 1.0).unwrap();
+    let at =
+        |x, y| geometry::SignedDistanceExt::translated(Ball::new([0.0; 2], 1.0).unwrap(), [x, y]);
+    let disc = geometry::SignedDistanceExt::scaled(at(1.5, 1.5), 20.0).unwrap();
+    let spot = geometry::SignedDistanceExt::scaled(at(5.0, 3.0), 10.0).unwrap();
+    for (name, drawing) in [
+        (
+            "disc.png",
+            Drawing::on_white(frame).filled(&disc, Rgb::BLACK),
+        ),
+        (
+            "spot.png",
+            Drawing::on_white(frame).filled(&spot, Rgb::BLACK),
+        ),
+    ] {
+        drawing
+            .picture()
+            .unwrap()
+            .write_png(folder.path().join(name))
+            .unwrap();
+    }
+    let arguments = [
+        "--cells", "64", "--steps", "1", "--tau", "1e-12", "--ansatz", "empty", "--output", "run",
+    ];
+    let inpaint = ["inpaint", "disc.png", "--mask", "spot.png"];
+    outcome(folder.path(), &[&inpaint[..], &arguments].concat());
+    let grid = Grid::<2>::centred(128, 2.0).unwrap();
+    let u = npy::read(folder.path().join("run/final.npy"), |_| Ok(grid)).unwrap();
+    // 60 pixels are 1.2: the spot reaches from 40 to 60 pixels, the disc from 10 to 50.
+    let at = |pixels: f64| u.interpolate([0.02 * (pixels - 30.0), 0.0]);
+    assert!(
+        at(20.0) > 0.9 && at(36.0) > 0.9,
+        "{} {}",
+        at(20.0),
+        at(36.0)
+    );
+    assert!(at(45.0) < -0.5, "{}", at(45.0));
+}
+
+#[test]
+fn a_handle_that_is_not_resolved_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let coarse = [
+        "flow",
+        "builtin:lever",
+        "--cells",
+        "32",
+        "--side-length",
+        "0.4",
+        "--steps",
+        "6",
+        "--output",
+        "run",
+    ];
+    let outcome = outcome(folder.path(), &coarse);
+    assert_eq!(outcome["same_topology"], false, "{outcome}");
+    let torus = [
+        "flow",
+        "builtin:torus",
+        "--side-length",
+        "0.8",
+        "--steps",
+        "3",
+        "--output",
+        "torus",
+    ];
+    let outcome = common::outcome(folder.path(), &torus);
+    assert_eq!(outcome["same_topology"], true, "{outcome}");
+    assert_eq!(outcome["euler_characteristic"], 0);
+}

@@ -1,0 +1,380 @@
+//! Whatever is wrong is said in one line on standard error, with exit code 2.
+
+mod common;
+
+use common::{run, text};
+
+/// An array of 2 x 3 zeros.
+fn plane() -> Vec<u8> {
+    let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (2, 3), }";
+    let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    bytes.extend(format!("{header:117}\n").bytes());
+    bytes.extend([0; 48]);
+    bytes
+}
+
+#[test]
+fn every_mistake_is_one_clear_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let write =
+        |name: &str, content: &[u8]| std::fs::write(folder.path().join(name), content).unwrap();
+    write("broken.png", b"no image");
+    write("broken.ply", b"ply\nformat ascii 1.0\n");
+    write("open.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n");
+    write("broken.npy", b"no array");
+    write("broken.vti", b"<VTKFile");
+    write("flat.vti", b"<VTK/>");
+    write("plane.npy", &plane());
+    write("notes.txt", b"");
+    write("net.safetensors", b"no network");
+    write("syntax.toml", b"steps = 3\ncells = = 4\n");
+    write("unknown.toml", b"stepz = 3\n");
+    write("type.toml", b"steps = [3]\n");
+    write("value.toml", b"steps = \"many\"\n");
+    write("other.toml", b"command = \"mcf\"\nsteps = 3\n");
+    let white = render::Picture::new(8, 8, vec![[255; 4]; 64]).unwrap();
+    white.write_png(folder.path().join("white.png")).unwrap();
+    std::fs::create_dir(folder.path().join("full")).unwrap();
+    write("full/mine", b"");
+    let table: &[(&[&str], &str)] = &[
+        (&[], "there is no command"),
+        (&["flaw"], "unrecognized subcommand 'flaw'"),
+        (&["flow"], "there is no input"),
+        (
+            &["flow", "builtin:teapot"],
+            "there is no built-in shape \"teapot\"; there are disc, ",
+        ),
+        (&["flow", "missing.obj"], "missing.obj"),
+        (&["flow", "missing.png"], "missing.png"),
+        (&["flow", "missing.npy"], "missing.npy"),
+        (&["flow", "notes.txt"], "is no input: give a mesh"),
+        (&["flow", "broken.png"], "broken.png"),
+        (&["flow", "broken.ply"], "broken.ply"),
+        (&["flow", "open.obj"], "close the holes"),
+        (&["flow", "broken.npy"], "not an NPY file"),
+        (&["flow", "broken.vti"], "broken.vti"),
+        (
+            &["flow", "white.png", "--inside", "dark"],
+            "nothing is inside",
+        ),
+        (
+            &["flow", "builtin:disc", "--bogus"],
+            "unexpected argument '--bogus'",
+        ),
+        (
+            &["flow", "builtin:disc", "--cells", "many"],
+            "invalid value 'many' for '--cells <N>'",
+        ),
+        (
+            &["flow", "builtin:disc", "--cells", "4"],
+            "--cells 4 resolves nothing",
+        ),
+        (
+            &[
+                "flow",
+                "builtin:disc",
+                "--cells",
+                "10",
+                "--box-side",
+                "0.33",
+            ],
+            "0.33",
+        ),
+        (
+            &[
+                "mcf",
+                "builtin:disc",
+                "--box-side",
+                "1e6",
+                "--cells",
+                "1000",
+            ],
+            "makes 1.0e18 nodes",
+        ),
+        (&["flow", "flat.vti"], "no element"),
+        (&["flow", "plane.npy"], "but all its sides must be equal"),
+        (
+            &["flow", "builtin:disc", "--side-length", "3"],
+            "--side-length 3 does not fit the box of side 2",
+        ),
+        (&["flow", "builtin:disc", "--box-side=-1"], "side"),
+        (
+            &["flow", "builtin:disc", "--steps", "0"],
+            "--steps must be at least 1",
+        ),
+        (
+            &["flow", "builtin:disc", "--frames", "0"],
+            "--frames must be at least 1",
+        ),
+        (
+            &["flow", "builtin:disc", "--checkpoint-every", "0"],
+            "--checkpoint-every must be at least 1",
+        ),
+        (
+            &["flow", "builtin:disc", "--time", "0"],
+            "--time 0 must be positive",
+        ),
+        (
+            &["flow", "builtin:disc", "--energy", "nan"],
+            "--energy NaN must be positive",
+        ),
+        (
+            &["flow", "builtin:disc", "--tau", "fast"],
+            "\"fast\" is no positive number",
+        ),
+        (
+            &["flow", "builtin:disc", "--tau", "halving:1"],
+            "\"halving\" is no rule",
+        ),
+        (
+            &["flow", "builtin:disc", "--tau", "ramp:1"],
+            "a ramp needs a step and a number of halvings",
+        ),
+        (
+            &["flow", "builtin:disc", "--scheme", "best"],
+            "accurate, calibrated, paper",
+        ),
+        (
+            &["flow", "builtin:disc", "--eps-over-h", "3"],
+            "willmore train --dimension 2 --width 25 --eps-over-h 3 --step-over-h2 2.25",
+        ),
+        (
+            &["flow", "builtin:cube", "--eps-over-h", "4"],
+            "willmore train --dimension 3",
+        ),
+        (
+            &["flow", "builtin:disc", "--eps-over-h", "0"],
+            "--eps-over-h 0 is not possible",
+        ),
+        (
+            &["flow", "builtin:disc", "--network", "missing.safetensors"],
+            "missing.safetensors",
+        ),
+        (
+            &["flow", "builtin:disc", "--network", "net.safetensors"],
+            "net.safetensors",
+        ),
+        (&["flow", "builtin:disc", "--device", "abacus"], "abacus"),
+        (
+            &["flow", "builtin:disc", "--inside", "dark"],
+            "--inside has no meaning for a built-in shape",
+        ),
+        (
+            &["flow", "white.png", "--holds", "distance"],
+            "--holds has no meaning for an image",
+        ),
+        (
+            &["flow", "broken.npy", "--cells", "64"],
+            "--cells has no meaning for a field",
+        ),
+        (
+            &["flow", "builtin:disc", "--output", "full"],
+            "holds \"mine\"",
+        ),
+        (
+            &["flow", "--config", "missing.toml"],
+            "cannot read missing.toml",
+        ),
+        (
+            &["flow", "builtin:disc", "--config", "syntax.toml"],
+            "syntax.toml: line 2",
+        ),
+        (
+            &["flow", "builtin:disc", "--config", "unknown.toml"],
+            "unknown.toml: unexpected argument '--stepz'",
+        ),
+        (
+            &["flow", "builtin:disc", "--config", "type.toml"],
+            "type.toml: steps must be a number",
+        ),
+        (
+            &["flow", "builtin:disc", "--config", "value.toml"],
+            "value.toml: invalid value 'many'",
+        ),
+        (
+            &["flow", "builtin:disc", "--config", "other.toml"],
+            "other.toml: it is for the command \"mcf\"",
+        ),
+        (
+            &["fair", "builtin:sphere"],
+            "give --time, --energy or --steps",
+        ),
+        (
+            &["fair", "builtin:disc", "--steps", "1"],
+            "`fair` is for surfaces in space",
+        ),
+        (
+            &["fair", "builtin:sphere", "--steps", "1", "--save", "a.png"],
+            "must end in .ply, .obj or .stl",
+        ),
+        (
+            &[
+                "fair",
+                "builtin:sphere",
+                "--steps",
+                "1",
+                "--save",
+                "no/a.ply",
+            ],
+            "there is no such folder",
+        ),
+        (
+            &["fair", "builtin:sphere", "--steps", "1", "--format", "step"],
+            "ply, obj, stl",
+        ),
+        (&["inpaint", "builtin:disc"], "say which region to fill"),
+        (
+            &["inpaint", "builtin:disc", "--mask", "box:0,0,1"],
+            "has 3 numbers, and a box in 2D has 4",
+        ),
+        (
+            &["inpaint", "builtin:disc", "--mask", "box:1,1,0,0"],
+            "is empty: give the lower corner first",
+        ),
+        (
+            &["inpaint", "builtin:disc", "--mask", "ball:5,5,0.1"],
+            "contains no node",
+        ),
+        (
+            &["inpaint", "builtin:disc", "--mask", "ball:0,0,x"],
+            "is no finite number",
+        ),
+        (
+            &["inpaint", "builtin:cube", "--mask", "white.png"],
+            "is no region in 3D",
+        ),
+        (
+            &["inpaint", "builtin:disc", "--mask", "missing.png"],
+            "missing.png",
+        ),
+        (
+            &[
+                "inpaint",
+                "builtin:disc",
+                "--mask",
+                "ball:0,0,1",
+                "--ansatz",
+                "star",
+            ],
+            "is no ansatz",
+        ),
+        (
+            &["mcf", "builtin:disc", "--method", "magic"],
+            "network, fe-implicit, fe-semi",
+        ),
+        (
+            &[
+                "mcf",
+                "builtin:disc",
+                "--method",
+                "fe-semi",
+                "--scheme",
+                "paper",
+            ],
+            "no meaning for finite elements",
+        ),
+        (
+            &["mcf", "builtin:disc", "--tau", "1"],
+            "unexpected argument '--tau'",
+        ),
+        (&["resume", "missing"], "missing"),
+        (&["resume", "full"], "holds no run"),
+        (
+            &["networks", "show", "none"],
+            "there is no network \"none\"",
+        ),
+        (&["networks", "show", "net.safetensors"], "net.safetensors"),
+        (&["check"], "there is no input"),
+        (&["train"], "train needs --eps-over-h"),
+        (
+            &[
+                "train",
+                "--dimension",
+                "2",
+                "--width",
+                "8",
+                "--eps-over-h",
+                "1",
+                "--save",
+                "a.safetensors",
+            ],
+            "must be odd",
+        ),
+        (
+            &[
+                "train",
+                "--dimension",
+                "2",
+                "--width",
+                "9",
+                "--eps-over-h",
+                "1",
+                "--save",
+                "notes.txt",
+            ],
+            "is there already",
+        ),
+    ];
+    for (arguments, expected) in table {
+        let mut all = arguments.to_vec();
+        // Nothing may be left behind, wherever a run would have been.
+        if all.len() > 1
+            && !all.contains(&"--output")
+            && ["flow", "fair", "inpaint", "mcf"].contains(&all[0])
+        {
+            all.extend(["--output", "run"]);
+        }
+        let output = if all.is_empty() {
+            common::program(folder.path()).output().unwrap()
+        } else {
+            run(folder.path(), &all)
+        };
+        let stderr = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
+        assert!(
+            stderr.starts_with("error: ") && stderr.lines().count() == 1,
+            "{arguments:?}: {stderr}"
+        );
+        assert!(stderr.contains(expected), "{arguments:?}: {stderr}");
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+        assert!(
+            !folder.path().join("run").exists(),
+            "{arguments:?} left something behind"
+        );
+    }
+}
+
+#[test]
+fn help_has_examples_and_exit_codes() {
+    let folder = tempfile::tempdir().unwrap();
+    let help = |arguments: &[&str]| {
+        let output = common::program(folder.path())
+            .args(arguments)
+            .arg("--help")
+            .output()
+            .unwrap();
+        assert!(output.status.success());
+        text(&output.stdout)
+    };
+    assert!(help(&[]).contains("130 interrupted"));
+    let commands = [
+        "flow",
+        "resume",
+        "fair",
+        "inpaint",
+        "mcf",
+        "networks",
+        "info",
+        "check",
+        "train",
+        "completions",
+        "man",
+    ];
+    for command in commands {
+        assert!(
+            help(&[command]).contains(&format!("willmore {command}")),
+            "{command}"
+        );
+        assert!(help(&[command]).contains("Example"), "{command}");
+    }
+}

@@ -1,0 +1,286 @@
+//! Runs that are stopped end with the same bytes as runs that are not.
+#![cfg(unix)]
+
+mod common;
+
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use common::{assert_same, program, run, text};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Runs of a second or two with many commits, frames, regions and both flows.
+const RUNS: [&[&str]; 5] = [
+    &[
+        "flow",
+        "builtin:cross",
+        "--cells",
+        "64",
+        "--steps",
+        "60",
+        "--frames",
+        "20",
+        "--checkpoint-every",
+        "2",
+    ],
+    &[
+        "flow",
+        "builtin:torus",
+        "--cells",
+        "40",
+        "--tau",
+        "1e-6",
+        "--steps",
+        "48",
+        "--frames",
+        "12",
+        "--checkpoint-every",
+        "3",
+    ],
+    &[
+        "inpaint",
+        "builtin:disc",
+        "--cells",
+        "64",
+        "--mask",
+        "box:0.1,0.1,0.9,0.9",
+        "--ansatz",
+        "empty",
+        "--steps",
+        "40",
+        "--checkpoint-every",
+        "1",
+    ],
+    &[
+        "fair",
+        "builtin:figure",
+        "--cells",
+        "48",
+        "--tau",
+        "1e-6",
+        "--steps",
+        "40",
+        "--checkpoint-every",
+        "1",
+    ],
+    &[
+        "mcf",
+        "builtin:ring",
+        "--method",
+        "fe-implicit",
+        "--steps",
+        "40",
+        "--checkpoint-every",
+        "2",
+    ],
+];
+
+fn start(folder: &Path, arguments: &[&str]) -> Child {
+    let mut command = program(folder);
+    command
+        .args(arguments)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    command.spawn().unwrap()
+}
+
+/// The newest checkpoint in a run.
+fn committed(run: &Path) -> Option<u64> {
+    let entries = std::fs::read_dir(run.join("checkpoints")).ok()?;
+    let step = |name: &str| {
+        name.strip_prefix("step-")?
+            .strip_suffix(".ckpt")?
+            .parse()
+            .ok()
+    };
+    entries
+        .filter_map(|entry| step(entry.ok()?.file_name().to_str()?))
+        .max()
+}
+
+/// Waits until the run has committed this step; false if the process ended before.
+fn wait_for(run: &Path, step: u64, child: &mut Child) -> bool {
+    let clock = Instant::now();
+    while committed(run).is_none_or(|found| found < step) {
+        if child.try_wait().unwrap().is_some() {
+            return false;
+        }
+        assert!(clock.elapsed() < Duration::from_mins(2), "no step {step}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    true
+}
+
+/// Ctrl-C.
+fn interrupt(child: &mut Child) {
+    let number = child.id().to_string();
+    let sent = Command::new("kill")
+        .args(["-INT", &number])
+        .status()
+        .unwrap();
+    assert!(sent.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+}
+
+fn with_output<'a>(arguments: &[&'a str], output: &'a str) -> Vec<&'a str> {
+    [arguments, &["--output", output]].concat()
+}
+
+#[test]
+fn killed_runs_are_resumed_to_the_same_bytes() {
+    let seed = std::env::var("WILLMORE_TEST_SEED")
+        .ok()
+        .and_then(|seed| seed.parse().ok());
+    let mut rng = ChaCha8Rng::seed_from_u64(seed.unwrap_or(1));
+    for arguments in RUNS {
+        let folder = tempfile::tempdir().unwrap();
+        let [path, reference] = ["killed", "reference"].map(|name| folder.path().join(name));
+        let whole = run(folder.path(), &with_output(arguments, "reference"));
+        assert!(whole.status.success(), "{}", text(&whole.stderr));
+        let mut child = start(folder.path(), &with_output(arguments, "killed"));
+        let mut kills = 0;
+        for _ in 0..4 {
+            let from = committed(&path).unwrap_or(0);
+            if !wait_for(&path, from + rng.random_range(0..5), &mut child) {
+                break;
+            }
+            std::thread::sleep(Duration::from_micros(rng.random_range(0..20_000)));
+            child.kill().unwrap();
+            child.wait().unwrap();
+            kills += usize::from(!path.join("summary.json").exists());
+            child = start(folder.path(), &["resume", "killed"]);
+        }
+        assert!(child.wait().unwrap().success(), "{arguments:?}");
+        assert!(kills >= 2, "{arguments:?} was killed {kills} times only");
+        assert_same(&path, &reference);
+    }
+}
+
+#[test]
+fn interrupted_runs_end_with_130_and_are_resumed_to_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let [path, reference] = ["stopped", "reference"].map(|name| folder.path().join(name));
+    assert!(
+        run(folder.path(), &with_output(RUNS[0], "reference"))
+            .status
+            .success()
+    );
+    let mut child = start(folder.path(), &with_output(RUNS[0], "stopped"));
+    assert!(wait_for(&path, 4, &mut child));
+    interrupt(&mut child);
+    assert!(!path.join("summary.json").exists());
+    let resumed = run(folder.path(), &["resume", "stopped"]);
+    assert!(resumed.status.success(), "{}", text(&resumed.stderr));
+    assert_same(&path, &reference);
+    // Once more: there is nothing left to do, but for what a kill right after the last commit leaves.
+    std::fs::write(path.join("checkpoints/step-00000004.ckpt"), "old").unwrap();
+    let again = run(folder.path(), &["resume", "stopped"]);
+    assert!(again.status.success());
+    assert_same(&path, &reference);
+}
+
+/// The stored configuration alone makes the same run.
+#[test]
+fn the_configuration_of_a_run_makes_the_same_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let [first, second] = ["first", "second"].map(|name| folder.path().join(name));
+    let arguments = ["flow", "builtin:disc", "--cells", "32", "--steps", "3"];
+    assert!(
+        run(folder.path(), &with_output(&arguments, "first"))
+            .status
+            .success()
+    );
+    let again = [
+        "flow",
+        "--config",
+        "first/config.toml",
+        "--output",
+        "second",
+    ];
+    assert!(run(folder.path(), &again).status.success());
+    assert_same(&first, &second);
+    // What is typed wins.
+    let fewer = [
+        "flow",
+        "--config",
+        "first/config.toml",
+        "--output",
+        "third",
+        "--steps",
+        "2",
+    ];
+    let outcome = common::outcome(folder.path(), &fewer);
+    assert_eq!(outcome["steps"], 2);
+}
+
+#[test]
+fn a_damaged_run_is_refused_and_can_be_recovered() {
+    let folder = tempfile::tempdir().unwrap();
+    let [path, reference] = ["damaged", "reference"].map(|name| folder.path().join(name));
+    assert!(
+        run(folder.path(), &with_output(RUNS[0], "reference"))
+            .status
+            .success()
+    );
+    let mut child = start(folder.path(), &with_output(RUNS[0], "damaged"));
+    assert!(wait_for(&path, 6, &mut child));
+    interrupt(&mut child);
+    let newest = path.join(format!(
+        "checkpoints/step-{:08}.ckpt",
+        committed(&path).unwrap()
+    ));
+    let mut bytes = std::fs::read(&newest).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&newest, bytes).unwrap();
+    let refused = run(folder.path(), &["resume", "damaged"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        text(&refused.stderr).contains("is damaged"),
+        "{}",
+        text(&refused.stderr)
+    );
+    let recovered = run(folder.path(), &["resume", "damaged", "--recover"]);
+    assert!(recovered.status.success(), "{}", text(&recovered.stderr));
+    assert_same(&path, &reference);
+}
+
+/// A run holds all that it goes on from: its input may be gone, and the folder elsewhere.
+#[test]
+fn runs_are_resumed_without_their_input_and_elsewhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let (drawing, path) = (folder.path().join("disc.png"), folder.path().join("first"));
+    let frame = images::Frame::new(80, 80, [-1.0, 1.0], 0.025).unwrap();
+    let square = geometry::shapes::Cuboid::new([0.5, 0.5]).unwrap();
+    let picture = images::Drawing::on_white(frame)
+        .filled(&square, render::Rgb::BLACK)
+        .picture();
+    picture.unwrap().write_png(&drawing).unwrap();
+    let arguments = [
+        "flow",
+        "disc.png",
+        "--cells",
+        "64",
+        "--steps",
+        "30",
+        "--checkpoint-every",
+        "3",
+    ];
+    assert!(
+        run(folder.path(), &with_output(&arguments, "reference"))
+            .status
+            .success()
+    );
+    let mut child = start(folder.path(), &with_output(&arguments, "first"));
+    assert!(wait_for(&path, 3, &mut child));
+    interrupt(&mut child);
+    std::fs::remove_file(drawing).unwrap();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let moved = folder.path().join("moved");
+    std::fs::rename(&path, &moved).unwrap();
+    let resumed = run(elsewhere.path(), &["resume", moved.to_str().unwrap()]);
+    assert!(resumed.status.success(), "{}", text(&resumed.stderr));
+    assert_same(&moved, &folder.path().join("reference"));
+}
