@@ -30,6 +30,10 @@ const CIRCLES: &[(&str, &str)] = &[
         "work_per_step",
         "Hessian-vector products and Newton steps for each step of Willmore flow, mean over the circles.",
     ),
+    (
+        "error_over_cost",
+        "Error of Willmore flow at the end against the time that a circle takes.",
+    ),
 ];
 
 const PLANE: &[(&str, &str)] = &[
@@ -139,17 +143,36 @@ pub(crate) const CATALOGUE: &[Entry] = &[
         title: "Calibration",
         description: "Not in the paper: by which factors the scheme differs from Willmore flow \
                       with each network, predicted and measured.",
+        figures: &[
+            (
+                "discs",
+                "Willmore energy of discs over that of the exact circle, against the radius.",
+            ),
+            (
+                "diagnostics",
+                "Displacement errors, spectra and second derivatives of the operators.",
+            ),
+        ],
+    },
+    Entry {
+        folder: "circle_elements",
+        title: "Flows of circles, finite elements",
+        description: "All finite-element methods at n = 128 and 256 beside the paper's hybrid scheme, by an \
+                      earlier version of the solver.",
         figures: &[(
-            "discs",
-            "Willmore energy of discs over that of the exact circle, against the radius.",
+            "convergence",
+            "Mean L² error over the circles against time.",
         )],
     },
     Entry {
-        folder: "calibrated_circles",
-        title: "Flows of circles, calibrated",
-        description: "Not in the paper: the circles again with the calibrated scheme, by the same \
-                      network.",
-        figures: CIRCLES,
+        folder: "inpainting_2d",
+        title: "Inpainting",
+        description: "Willmore flow of what lies inside the green frame; everything else is held.",
+        figures: &[
+            ("disk_frames", "A disk whose corner was cut out."),
+            ("cross_frames", "A cross whose middle is smoothed."),
+            ("energies", "Willmore energy against time."),
+        ],
     },
     Entry {
         folder: "performance",
