@@ -303,7 +303,7 @@ fn the_quick_inpainting_changes_nothing_outside() {
     refused(
         INPAINTING,
         root.path(),
-        &["--printed-tautilde"],
+        &["--printed-tautilde", "--cells", "1024"],
         &["tautilde"],
     );
 }
