@@ -13,7 +13,7 @@ use report::{
     OutputDir, Series, Shapes, Summary, Table,
 };
 use serde::Serialize;
-use solver::{FlowParams, NewtonParams};
+use solver::{FlowParams, NewtonParams, StepRecord};
 
 use crate::Error;
 use crate::circles::{EPS, Flow, STEP};
@@ -136,7 +136,7 @@ struct StepRow {
     willmore_energy: Option<f64>,
     exit: Option<solver::Exit>,
     newton: Option<usize>,
-    hvp: Option<usize>,
+    hvp: Option<f64>,
     negative_curvature: Option<usize>,
     seconds: Option<f64>,
 }
@@ -567,8 +567,8 @@ impl Comparison<'_> {
                 found.filter(|_| !reference).map(|(_, l2)| *l2).into()
             });
             let count = run.records.len() as f64;
-            let hvp = (count > 0.0)
-                .then(|| run.records.iter().map(|r| r.newton.hvp as f64).sum::<f64>() / count);
+            let hvp =
+                (count > 0.0).then(|| run.records.iter().map(StepRecord::hvp).sum::<f64>() / count);
             let seconds = run.seconds / run.evolution.steps as f64;
             table.push(
                 [label(&run.evolution).into(), n.into()]
@@ -606,15 +606,15 @@ impl Comparison<'_> {
             }
             let count = run.records.len();
             if count > 0 {
-                let mean = |f: &dyn Fn(&solver::StepRecord) -> usize| {
-                    run.records.iter().map(|r| f(r) as f64).sum::<f64>() / count as f64
+                let mean = |f: &dyn Fn(&StepRecord) -> f64| {
+                    run.records.iter().map(f).sum::<f64>() / count as f64
                 };
-                summary.insert(&format!("{key}.hvp_per_step"), mean(&|r| r.newton.hvp))?;
+                summary.insert(&format!("{key}.hvp_per_step"), mean(&StepRecord::hvp))?;
                 summary.insert(
                     &format!("{key}.newton_per_step"),
-                    mean(&|r| r.newton.newton),
+                    mean(&|r| r.newton.newton as f64),
                 )?;
-                let rises = run.records.iter().filter(|r| r.energy >= r.energy_before);
+                let rises = run.records.iter().filter(|r| r.energy > r.energy_before);
                 summary.insert_count(&format!("{key}.energy_increases"), rises.count())?;
             }
             summary.insert(&format!("{key}.seconds"), run.seconds)?;
@@ -653,7 +653,7 @@ fn step_rows(run: &Trajectory, reference: bool) -> Vec<StepRow> {
                 willmore_energy: record.map(|r| r.willmore_energy),
                 exit: record.map(|r| r.newton.exit),
                 newton: record.map(|r| r.newton.newton),
-                hvp: record.map(|r| r.newton.hvp),
+                hvp: record.map(StepRecord::hvp),
                 negative_curvature: record.map(|r| r.newton.negative_curvature),
                 seconds: record.map(|r| r.seconds),
             }

@@ -142,6 +142,9 @@ struct Checkpoint {
     step: usize,
     time: f64,
     previous_tau: Option<f64>,
+    /// Kept motions on coarser grids.
+    #[serde(default)]
+    half_motions: usize,
 }
 
 /// Measures of a shape around the centre of the box.
@@ -277,6 +280,7 @@ impl<const D: usize> Evolution<D> {
                 FlowState {
                     current: field,
                     previous: None,
+                    half_motions: Vec::new(),
                     step: 0,
                     time: 0.0,
                 }
@@ -390,6 +394,7 @@ impl<const D: usize> Evolution<D> {
                 let state = FlowState {
                     current: field,
                     previous: None,
+                    half_motions: Vec::new(),
                     step,
                     time: self.tau.time(step),
                 };
@@ -465,14 +470,24 @@ impl<const D: usize> Trajectory<D> {
             step,
             time,
             previous_tau,
+            half_motions,
         } = checkpoint;
         let previous = match previous_tau {
             Some(tau) => Some((self.read(&checkpoint_name(step, "previous"))?, tau)),
             None => None,
         };
+        let mut grid = self.grid;
+        let half_motions = (0..half_motions)
+            .map(|level| {
+                grid = grid.half()?;
+                let name = checkpoint_name(step, &half_motion_name(level));
+                Ok(npy::read(self.path(&name)?, |_| Ok(grid))?)
+            })
+            .collect::<Result<_, Error>>()?;
         Ok(FlowState {
             current: self.read(&checkpoint_name(step, "current"))?,
             previous,
+            half_motions,
             step,
             time,
         })
@@ -489,7 +504,12 @@ impl<const D: usize> Trajectory<D> {
                 previous,
             )?;
         }
+        for (level, motion) in state.half_motions.iter().enumerate() {
+            let name = checkpoint_name(state.step, &half_motion_name(level));
+            npy::write(self.path(&name)?, motion)?;
+        }
         stored.checkpoint = Some(Checkpoint {
+            half_motions: state.half_motions.len(),
             step: state.step,
             time: state.time,
             previous_tau: state.previous.as_ref().map(|(_, tau)| *tau),
@@ -497,9 +517,14 @@ impl<const D: usize> Trajectory<D> {
         self.folder
             .write("run.json", report::data::to_json(stored)?)?;
         for old in old.iter().filter(|old| old.step != state.step) {
-            for which in ["current", "previous"] {
+            let motions = (0..old.half_motions).map(half_motion_name);
+            for which in ["current", "previous"]
+                .map(str::to_owned)
+                .into_iter()
+                .chain(motions)
+            {
                 // A file that is not there needs no removal.
-                let _ = std::fs::remove_file(self.path(&checkpoint_name(old.step, which))?);
+                let _ = std::fs::remove_file(self.path(&checkpoint_name(old.step, &which))?);
             }
         }
         Ok(())
@@ -508,6 +533,10 @@ impl<const D: usize> Trajectory<D> {
 
 fn sample_name(step: usize) -> String {
     format!("step_{step:05}")
+}
+
+fn half_motion_name(level: usize) -> String {
+    format!("half{level}")
 }
 
 fn checkpoint_name(step: usize, which: &str) -> String {

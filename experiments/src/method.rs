@@ -201,7 +201,8 @@ impl Method {
         })
     }
 
-    /// Willmore flow with this method inside.
+    /// Willmore flow with this method inside; by the learned operator its steps begin on the half grid where networks for that
+    /// are shipped.
     ///
     /// # Errors
     /// As [`Self::mean_curvature_flow`].
@@ -214,7 +215,12 @@ impl Method {
         device: &ComputeDevice,
     ) -> Result<WillmoreFlow<D>, Error> {
         Ok(match self {
-            Self::Hybrid => WillmoreFlow::with_network(needed(network)?, initial, params, device)?,
+            Self::Hybrid => {
+                let network = needed(network)?;
+                let mut flow = WillmoreFlow::with_network(network, initial, params, device)?;
+                flow.begin_on_half_grids(network)?;
+                flow
+            }
             Self::FeImplicit | Self::FeSemi => {
                 let step = self.elements(initial.grid(), &params, linear)?;
                 WillmoreFlow::new(step, initial, params, device)?

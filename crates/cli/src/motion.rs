@@ -140,6 +140,7 @@ impl<const D: usize> Motion<D> {
             } => FlowState {
                 current: field.clone(),
                 previous: None,
+                half_motions: Vec::new(),
                 step: *step,
                 time: *time,
             },

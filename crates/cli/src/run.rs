@@ -140,6 +140,7 @@ impl Plan {
         let state = FlowState {
             current: start.field.clone(),
             previous: None,
+            half_motions: Vec::new(),
             step: 0,
             time: 0.0,
         };
@@ -482,6 +483,7 @@ fn unpack<const D: usize, O: Outlet<D>>(
     let state = FlowState {
         current,
         previous,
+        half_motions: Vec::new(),
         step,
         time: packed.time,
     };

@@ -52,6 +52,7 @@ mod field;
 mod grid;
 mod profile;
 mod reduce;
+mod transfer;
 mod vector;
 
 pub mod contour;

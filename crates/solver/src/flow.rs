@@ -7,7 +7,7 @@ use burn::tensor::Tensor;
 use geometry::measure::{enclosed_volume, perimeter};
 use geometry::{Field, Grid};
 use model::{Factors, MeanCurvatureOperator, Network, Ratios};
-use operators::{ComputeDevice, SpectralFilter, extrapolate, inner_product};
+use operators::{ComputeDevice, SpectralFilter, inner_product};
 use serde::{Deserialize, Serialize};
 
 use crate::newton::{NewtonInfo, NewtonParams, minimize_timed};
@@ -15,6 +15,11 @@ use crate::preconditioner::Preconditioner;
 use crate::region::Constrained;
 use crate::times::PhaseTimes;
 use crate::{Accuracy, Error, Exit, MeanCurvatureStep, MinimizingMovement, Objective, Region};
+
+mod start;
+
+use start::every_other_node;
+pub use start::{Start, StartKind};
 
 /// Scales of a flow.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -63,6 +68,9 @@ pub struct StepRecord {
     pub perimeter: f64,
     /// Area or volume enclosed.
     pub volume: f64,
+    /// Where the minimization began; at rest in records of earlier versions.
+    #[serde(default)]
+    pub start: Start,
     /// What the minimization did.
     pub newton: NewtonInfo,
     /// Wall time, seconds.
@@ -72,6 +80,13 @@ pub struct StepRecord {
     pub times: PhaseTimes,
 }
 
+impl StepRecord {
+    /// Hessian-vector products of the step; those on coarser grids count by their share of this grid's unknowns.
+    pub fn hvp(&self) -> f64 {
+        self.newton.hvp as f64 + self.start.hvp
+    }
+}
+
 /// Where a flow is, for resuming it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlowState<const D: usize> {
@@ -79,6 +94,8 @@ pub struct FlowState<const D: usize> {
     pub current: Field<D>,
     /// The phase field one step ago and the size of that step: what the next step extrapolates.
     pub previous: Option<(Field<D>, f64)>,
+    /// The last motions on the coarser grids on which steps [begin](WillmoreFlow::begin_on), the finest first.
+    pub half_motions: Vec<Field<D>>,
     /// Steps done.
     pub step: usize,
     /// Time reached.
@@ -118,6 +135,9 @@ pub struct WillmoreFlow<const D: usize> {
     energy: MinimizingMovement<D>,
     filter: Option<(f64, SpectralFilter)>,
     region: Option<Region<D>>,
+    /// Where steps begin, if on the half grid, and what that moved last.
+    half: Option<Box<WillmoreFlow<D>>>,
+    half_motion: Option<Field<D>>,
     current: Tensor<D>,
     /// The phase field one step ago and the size of that step.
     previous: Option<(Tensor<D>, f64)>,
@@ -182,6 +202,8 @@ impl<const D: usize> WillmoreFlow<D> {
             energy,
             filter: None,
             region: None,
+            half: None,
+            half_motion: None,
             current,
             previous: None,
             step: 0,
@@ -196,6 +218,9 @@ impl<const D: usize> WillmoreFlow<D> {
     /// [`Error::Region`] if there are not as many marks as nodes, or if none is set.
     pub fn restrict_to(&mut self, nodes: &[bool]) -> Result<(), Error> {
         self.region = Some(Region::new(&self.grid, nodes, &self.device)?);
+        if let Some(half) = &mut self.half {
+            half.restrict_to(&every_other_node(self.grid, nodes))?;
+        }
         Ok(())
     }
 
@@ -224,6 +249,7 @@ impl<const D: usize> WillmoreFlow<D> {
         Ok(FlowState {
             current: self.field()?,
             previous,
+            half_motions: self.half_motions(),
             step: self.step,
             time: self.time,
         })
@@ -243,6 +269,7 @@ impl<const D: usize> WillmoreFlow<D> {
             Some((u, tau)) => Some((fitting(u)?, *tau)),
             None => None,
         };
+        self.set_half_motions(&state.half_motions)?;
         self.current = current;
         self.previous = previous;
         self.step = state.step;
@@ -298,13 +325,9 @@ impl<const D: usize> WillmoreFlow<D> {
                 cg_tolerance: self.params.newton.cg_tolerance,
             });
         }
-        let start = match &self.previous {
-            // The first step also relaxes the initial profile, which is nothing to extrapolate.
-            Some((previous, last)) if self.step > 1 && self.moved_little(previous)? => {
-                extrapolate(&self.current, previous, (tau / last).min(2.0))
-            }
-            _ => self.current.clone(),
-        };
+        let beginning = Instant::now();
+        let (start, origin) = self.start(tau)?;
+        let beginning = beginning.elapsed().as_secs_f64();
         let preconditioner = self.filter.as_ref().map(|(_, filter)| {
             Preconditioner::two_level(filter.clone(), &self.grid, self.params.eps, tau)
                 .within(self.region.clone())
@@ -354,9 +377,13 @@ impl<const D: usize> WillmoreFlow<D> {
             willmore_energy: scale * (newton.energy - fidelity) / (2.0 * tau),
             perimeter: perimeter(&field, self.params.eps)?,
             volume: enclosed_volume(&field),
+            start: origin,
             newton,
             seconds: clock.elapsed().as_secs_f64(),
-            times,
+            times: PhaseTimes {
+                start: beginning,
+                ..times
+            },
         };
         self.previous = Some((std::mem::replace(&mut self.current, u), tau));
         self.step = step;

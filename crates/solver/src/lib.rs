@@ -51,7 +51,8 @@
 //! Plain Newton-CG with Armijo's rule ([`Method::Paper`]) spends most of its work on two things that are cheap to avoid:
 //! a straight update leaves the interface profile, so that steps are cut to pieces; and the profile modes make the Hessian
 //! stiff. [`Method::Preconditioned`] therefore
-//! 1. starts from an extrapolation in `atanh u`, the distance to the interface ([`extrapolate`]),
+//! 1. starts from the same step on the grid of half as many cells, and so on down ([`WillmoreFlow::begin_on`]), or else from an
+//!    extrapolation in `atanh u`, the distance to the interface ([`extrapolate`]),
 //! 2. updates in that variable too ([`retract`]),
 //! 3. cleans the profile with a few linear iterations after every update, before energies are compared,
 //! 4. preconditions with the Hessian of the pure phases, diagonal in Fourier space, plus the Hessian of the geometric problem
@@ -80,7 +81,9 @@ mod times;
 
 pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective, StepFailure};
 pub use error::Error;
-pub use flow::{FlowParams, FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow};
+pub use flow::{
+    FlowParams, FlowState, MeanCurvatureFlow, Start, StartKind, StepRecord, WillmoreFlow,
+};
 pub use model::Factors;
 pub use newton::{Exit, Method, NewtonInfo, NewtonParams, Precision, minimize};
 pub use operators::{extrapolate, retract};

@@ -244,6 +244,7 @@ pub(crate) fn minimize_timed<const D: usize>(
         preconditioner: minimizer.preconditioning.seconds(),
         assembly: minimizer.assembly.seconds(),
         energies: minimizer.objective.energies.seconds(),
+        start: 0.0,
     };
     Ok((u, minimizer.info, times))
 }

@@ -22,6 +22,9 @@ pub struct PhaseTimes {
     pub assembly: f64,
     /// Energies and gradients.
     pub energies: f64,
+    /// Finding the start, on coarser grids.
+    #[serde(default)]
+    pub start: f64,
 }
 
 /// A sum of times.

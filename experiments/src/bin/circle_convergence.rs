@@ -318,7 +318,7 @@ struct StepRow {
     volume: f64,
     exit: solver::Exit,
     newton: usize,
-    hvp: usize,
+    hvp: f64,
     values: usize,
     gradients: usize,
     negative_curvature: usize,
@@ -442,9 +442,9 @@ impl Report<'_> {
             title("Work per step of Willmore flow, mean over the circles"),
             2,
         );
-        let counts: [(&str, fn(&solver::StepRecord) -> usize); 2] = [
-            ("Hessian-vector products", |r| r.newton.hvp),
-            ("Newton steps", |r| r.newton.newton),
+        let counts: [(&str, fn(&solver::StepRecord) -> f64); 2] = [
+            ("Hessian-vector products", |r| r.hvp()),
+            ("Newton steps", |r| r.newton.newton as f64),
         ];
         for (label, count) in counts {
             let mut chart = LineChart::new("", Axis::linear("time t"), Axis::linear(label));
@@ -452,7 +452,7 @@ impl Report<'_> {
             for ensemble in self.of_flow(Flow::Willmore) {
                 let points: Vec<[f64; 2]> = (0..self.steps)
                     .map(|k| {
-                        let mean = ensemble.mean(|result| count(&result.records[k]) as f64);
+                        let mean = ensemble.mean(|result| count(&result.records[k]));
                         [Self::time(k + 1), mean]
                     })
                     .collect();
@@ -572,7 +572,7 @@ impl Report<'_> {
                 volume: r.volume,
                 exit: r.newton.exit,
                 newton: r.newton.newton,
-                hvp: r.newton.hvp,
+                hvp: r.hvp(),
                 values: r.newton.values,
                 gradients: r.newton.gradients,
                 negative_curvature: r.newton.negative_curvature,
@@ -606,7 +606,7 @@ impl Report<'_> {
         let mut table = Table::new(head.into_iter().chain(errors).chain(tail));
         for e in self.ensembles {
             let hvp =
-                (e.flow == Flow::Willmore).then(|| e.mean_of_records(|r| r.newton.hvp as f64));
+                (e.flow == Flow::Willmore).then(|| e.mean_of_records(solver::StepRecord::hvp));
             let head = [e.flow.title().into(), e.n.into(), e.label().into()];
             let errors = self.shown_steps().map(|k| e.mean_error(k).into());
             table.push(head.into_iter().chain(errors).chain([hvp.into()]))?;
@@ -623,7 +623,7 @@ impl Report<'_> {
             }
             if e.flow == Flow::Willmore {
                 let per_step = [
-                    ("hvp", e.mean_of_records(|r| r.newton.hvp as f64)),
+                    ("hvp", e.mean_of_records(solver::StepRecord::hvp)),
                     ("newton", e.mean_of_records(|r| r.newton.newton as f64)),
                 ];
                 for (what, value) in per_step {

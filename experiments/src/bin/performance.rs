@@ -10,6 +10,7 @@ use experiments::networks::{NetworkOptions, convergence_ratios};
 use experiments::options::RunOptions;
 use experiments::products::{Candidates, ProductTimes, median};
 use experiments::{Error, harness, memory};
+use geometry::measure::l2_distance;
 use geometry::shapes::{Ball, Capsule, Cuboid};
 use geometry::{Field, Grid, SignedDistanceExt, phase_field};
 use indicatif::ProgressBar;
@@ -23,6 +24,9 @@ use serde::Serialize;
 use solver::{FlowParams, NewtonParams, PhaseTimes, StepRecord, WillmoreFlow};
 
 const PROGRAM: &str = "performance";
+/// Steps of a comparison with a smaller tolerance, and how much smaller.
+const COMPARED_STEPS: usize = 20;
+const TIGHTER: f64 = 100.0;
 
 /// Cost of Willmore steps by the hybrid scheme on this machine: the cross of the paper (128 steps, eps = 2^-6, tau = tautilde =
 /// 2^-14) at n = 128, 256 and 512, and in 3D a cube at n = 64 and a blob at n = 128 (eps = 2h, tautilde = h^2, tau = 2^-18).
@@ -62,7 +66,10 @@ struct Measurement {
     /// Median over the steps.
     seconds_per_step: f64,
     newton_per_step: f64,
+    /// On this grid.
     hvp_per_step: f64,
+    /// On coarser grids, by their shares of the unknowns.
+    coarser_hvp_per_step: f64,
     /// Wall time of one product during the steps.
     seconds_per_product: f64,
     /// Sums over the steps.
@@ -70,6 +77,9 @@ struct Measurement {
     /// Largest resident memory of the process while the steps ran, in MiB, where the system tells.
     peak_mib: Option<f64>,
     products: ProductTimes,
+    /// `L2` distance to a minimization with a [much smaller](TIGHTER) tolerance after [some steps](COMPARED_STEPS), over the way
+    /// from the start; where it was measured.
+    distance_to_tighter: Option<f64>,
 }
 
 impl Measurement {
@@ -86,23 +96,25 @@ impl Measurement {
     }
 
     /// Parts of the time of a step in seconds, with their names.
-    fn parts(&self) -> [(&'static str, f64); 6] {
+    fn parts(&self) -> [(&'static str, f64); 7] {
         let PhaseTimes {
             products,
             preconditioner,
             assembly,
             energies,
+            start,
         } = self.times;
         // Two pairs of transforms per product, timed alone.
         let calls = self.hvp_per_step * self.steps as f64;
         let convolutions = (calls * self.products.floor_single).min(products);
-        let rest = self.seconds - products - preconditioner - assembly - energies;
+        let rest = self.seconds - products - preconditioner - assembly - energies - start;
         [
             ("convolutions of products", convolutions),
             ("other work of products", products - convolutions),
             ("preconditioner", preconditioner),
             ("coarse assembly", assembly),
             ("energies and gradients", energies),
+            ("start on the half grid", start),
             ("rest", rest.max(0.0)),
         ]
         .map(|(name, seconds)| (name, seconds / self.steps as f64))
@@ -160,6 +172,7 @@ fn program(options: &Options) -> Result<(), Error> {
             mcf_step: STEP,
             tau: STEP,
             steps,
+            compared: n <= 256,
         };
         all.push(manifest.phase(format!("cross, n = {n}"), || {
             case.measure(&initial, network, &device, turns, &bar)
@@ -182,6 +195,7 @@ fn program(options: &Options) -> Result<(), Error> {
             mcf_step: spacing * spacing,
             tau: 0.5_f64.powi(18),
             steps,
+            compared: false,
         };
         all.push(manifest.phase(format!("{name}, n = {n}"), || {
             case.measure(&initial, network, &device, turns, &bar)
@@ -239,9 +253,54 @@ struct Case {
     mcf_step: f64,
     tau: f64,
     steps: usize,
+    /// Whether it is compared with a smaller tolerance.
+    compared: bool,
+}
+
+/// A flow as the experiments run it.
+fn begun<const D: usize>(
+    params: FlowParams,
+    initial: &Field<D>,
+    network: &Network,
+    device: &ComputeDevice,
+) -> Result<WillmoreFlow<D>, Error> {
+    let mut flow = WillmoreFlow::with_network(network, initial, params, device)?;
+    flow.begin_on_half_grids(network)?;
+    Ok(flow)
 }
 
 impl Case {
+    fn params(&self) -> FlowParams {
+        FlowParams {
+            eps: self.eps,
+            mcf_step: self.mcf_step,
+            newton: NewtonParams::default(),
+            calibration: solver::Factors::PAPER,
+        }
+    }
+
+    fn distance_to_tighter<const D: usize>(
+        &self,
+        initial: &Field<D>,
+        network: &Network,
+        device: &ComputeDevice,
+    ) -> Result<f64, Error> {
+        let end = |params| -> Result<Field<D>, Error> {
+            let mut flow = begun(params, initial, network, device)?;
+            for _ in 0..self.steps.min(COMPARED_STEPS) {
+                flow.advance(self.tau)?;
+            }
+            Ok(flow.field()?)
+        };
+        let params = self.params();
+        let mut tighter = params;
+        tighter.newton.tolerance /= TIGHTER;
+        // Linear solves that leave a tenth would take a Newton step for every digit.
+        tighter.newton.cg_tolerance /= TIGHTER.sqrt();
+        let (loose, tight) = (end(params)?, end(tighter)?);
+        Ok(l2_distance(&loose, &tight)? / l2_distance(initial, &tight)?)
+    }
+
     fn measure<const D: usize>(
         &self,
         initial: &Field<D>,
@@ -251,14 +310,8 @@ impl Case {
         bar: &ProgressBar,
     ) -> Result<Measurement, Error> {
         let grid = *initial.grid();
-        let params = FlowParams {
-            eps: self.eps,
-            mcf_step: self.mcf_step,
-            newton: NewtonParams::default(),
-            calibration: solver::Factors::PAPER,
-        };
         memory::forget_peak();
-        let mut flow = WillmoreFlow::with_network(network, initial, params, device)?;
+        let mut flow = begun(self.params(), initial, network, device)?;
         let mut records: Vec<StepRecord> = Vec::new();
         for _ in 0..self.steps {
             records.push(flow.advance(self.tau)?);
@@ -267,6 +320,11 @@ impl Case {
         let peak_mib = memory::peak_mib();
         let field = flow.field()?;
         drop(flow);
+        let distance_to_tighter = if self.compared {
+            Some(self.distance_to_tighter(initial, network, device)?)
+        } else {
+            None
+        };
         let products = Candidates::new(network, &field, device)?.measure(turns);
         let count = records.len() as f64;
         let sum = |f: &dyn Fn(&StepRecord) -> f64| records.iter().map(f).sum::<f64>();
@@ -276,6 +334,7 @@ impl Case {
             preconditioner: sum(&|r| r.times.preconditioner),
             assembly: sum(&|r| r.times.assembly),
             energies: sum(&|r| r.times.energies),
+            start: sum(&|r| r.times.start),
         };
         Ok(Measurement {
             case: self.name,
@@ -288,10 +347,12 @@ impl Case {
             seconds_per_step: median(records.iter().map(|r| r.seconds).collect()),
             newton_per_step: sum(&|r| r.newton.newton as f64) / count,
             hvp_per_step: hvp / count,
+            coarser_hvp_per_step: sum(&|r| r.start.hvp) / count,
             seconds_per_product: times.products / hvp,
             times,
             peak_mib,
             products,
+            distance_to_tighter,
         })
     }
 }
@@ -305,9 +366,11 @@ fn step_table(all: &[Measurement]) -> Result<Table, Error> {
         Column::number("median step [s]", Format::Fixed(3)),
         Column::number("Newton/step", Format::Fixed(1)),
         Column::number("HVP/step", Format::Fixed(1)),
+        Column::number("and on coarser grids", Format::Fixed(1)),
         Column::number("ms/HVP", Format::Fixed(2)),
         Column::number("times two FFT pairs (f32)", Format::Fixed(2)),
         Column::number("peak memory [MiB]", Format::Fixed(0)),
+        Column::number("to 100 times the precision", Format::Scientific(1)),
     ]);
     for m in all {
         table.push([
@@ -318,9 +381,11 @@ fn step_table(all: &[Measurement]) -> Result<Table, Error> {
             m.seconds_per_step.into(),
             m.newton_per_step.into(),
             m.hvp_per_step.into(),
+            m.coarser_hvp_per_step.into(),
             (1e3 * m.seconds_per_product).into(),
             (m.seconds_per_product / m.products.floor_single).into(),
             m.peak_mib.into(),
+            m.distance_to_tighter.into(),
         ])?;
     }
     Ok(table)
@@ -440,8 +505,12 @@ fn summary(all: &[Measurement]) -> Result<Summary, Error> {
         let key = m.key();
         summary.insert(&format!("{key}.seconds"), m.seconds)?;
         summary.insert(&format!("{key}.seconds_per_step"), m.seconds_per_step)?;
-        summary.insert(&format!("{key}.hvp_per_step"), m.hvp_per_step)?;
+        let hvp = m.hvp_per_step + m.coarser_hvp_per_step;
+        summary.insert(&format!("{key}.hvp_per_step"), hvp)?;
         summary.insert(&format!("{key}.newton_per_step"), m.newton_per_step)?;
+        if let Some(distance) = m.distance_to_tighter {
+            summary.insert(&format!("{key}.distance_to_tighter"), distance)?;
+        }
         if let Some(peak) = m.peak_mib {
             summary.insert(&format!("{key}.peak_mib"), peak)?;
         }

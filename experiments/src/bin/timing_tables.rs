@@ -409,21 +409,22 @@ impl Contender {
         let inner: Statistics = (self.elements.as_ref())
             .map_or_else(Statistics::default, FiniteElementStep::statistics);
         let count = records.len();
-        let per_step = |total: usize| total as f64 / count.max(1) as f64;
+        let mean = |total: f64| total / count.max(1) as f64;
+        let per_step = |total: usize| mean(total as f64);
         let step_seconds: Vec<f64> = records.iter().map(|r| r.seconds).collect();
         // Steps become cheaper as corners smooth out: the later ones say most about what is to come.
         let later = &step_seconds[count / 2..];
-        let mean = later.iter().sum::<f64>() / later.len().max(1) as f64;
+        let late = later.iter().sum::<f64>() / later.len().max(1) as f64;
         Timing {
             variant: self.variant,
             n,
             measured_steps: count,
             measured_seconds: self.spent,
-            seconds: self.spent + mean * (STEPS - count) as f64,
+            seconds: self.spent + late * (STEPS - count) as f64,
             step_seconds,
             extrapolated: count < STEPS,
             newton_per_step: per_step(records.iter().map(|r| r.newton.newton).sum()),
-            hvp_per_step: per_step(records.iter().map(|r| r.newton.hvp).sum()),
+            hvp_per_step: mean(records.iter().map(StepRecord::hvp).sum()),
             inner_cg_per_step: per_step(inner.cg),
             factorizations_per_step: per_step(inner.factorizations),
             failure: self.failure.clone(),

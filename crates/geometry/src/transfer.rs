@@ -1,0 +1,125 @@
+//! Fields on the grid of half as many cells, and back.
+
+use rayon::prelude::*;
+
+use crate::{Error, Field, Grid};
+
+impl<const D: usize> Grid<D> {
+    /// The grid of every other node: half as many cells, the same cube.
+    ///
+    /// # Errors
+    /// [`Error::InvalidParameter`] for an odd number of cells; as [`Grid::new`].
+    pub fn half(&self) -> Result<Self, Error> {
+        if !self.cells().is_multiple_of(2) {
+            return Err(Error::InvalidParameter {
+                name: "cells",
+                value: self.cells() as f64,
+                requirement: "even to be halved",
+            });
+        }
+        Self::new(self.cells() / 2, self.side())?.with_origin(self.origin())
+    }
+}
+
+impl<const D: usize> Field<D> {
+    /// The values at every other node, on the [half](Grid::half) grid.
+    ///
+    /// # Errors
+    /// As [`Grid::half`].
+    pub fn every_other(&self) -> Result<Self, Error> {
+        let half = self.grid().half()?;
+        let values = (0..half.len())
+            .into_par_iter()
+            .map(|node| {
+                let index = half.multi_index(node).map(|i| 2 * i);
+                self.values()[self.grid().index(index)]
+            })
+            .collect();
+        Self::from_values(half, values)
+    }
+
+    /// The tensor product of cubic interpolations on the grid of twice as many cells: exact at the nodes of this grid, of fourth
+    /// order between them, `(-u_(i-1) + 9 u_i + 9 u_(i+1) - u_(i+2)) / 16`.
+    ///
+    /// # Errors
+    /// As [`Grid::new`].
+    pub fn refined(&self) -> Result<Self, Error> {
+        let cells = self.grid().cells();
+        let grid = Grid::new(2 * cells, self.grid().side())?.with_origin(self.grid().origin())?;
+        let mut values = self.values().to_vec();
+        for axis in 0..D {
+            // Axes before this one are fine already, those after it still coarse.
+            let line = (axis + 1..D).map(|_| cells).product();
+            values = refined_along(&values, cells, line);
+        }
+        Self::from_values(grid, values)
+    }
+}
+
+/// `cells` periodic layers of `line` values each, over and over, with layers put in between.
+fn refined_along(values: &[f64], cells: usize, line: usize) -> Vec<f64> {
+    let mut fine = vec![0.0; 2 * values.len()];
+    let blocks = fine.par_chunks_mut(2 * cells * line);
+    blocks
+        .zip(values.par_chunks(cells * line))
+        .for_each(|(fine, coarse)| {
+            let layer = |i: usize| &coarse[i % cells * line..][..line];
+            fine.par_chunks_mut(2 * line)
+                .enumerate()
+                .for_each(|(i, pair)| {
+                    let (own, between) = pair.split_at_mut(line);
+                    own.copy_from_slice(layer(i));
+                    let around = [i + cells - 1, i, i + 1, i + 2].map(layer);
+                    for (j, value) in between.iter_mut().enumerate() {
+                        let [a, b, c, d] = around.map(|layer| layer[j]);
+                        *value = (9.0 * (b + c) - a - d) / 16.0;
+                    }
+                });
+        });
+    fine
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wave<const D: usize>(cells: usize) -> Field<D> {
+        let grid = Grid::<D>::centred(cells, 1.5).unwrap();
+        Field::from_fn(grid, |x| {
+            let phase: f64 = (0..D).map(|axis| (axis + 1) as f64 * x[axis]).sum();
+            (phase * std::f64::consts::TAU / 1.5).sin()
+        })
+    }
+
+    fn error<const D: usize>(cells: usize) -> f64 {
+        let coarse = wave::<D>(cells);
+        let fine = coarse.refined().unwrap();
+        assert_eq!(fine.every_other().unwrap(), coarse, "exact at the nodes");
+        let exact = wave::<D>(2 * cells);
+        fine.grid().same_as(exact.grid()).unwrap();
+        let pairs = fine.values().iter().zip(exact.values());
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn interpolation_has_fourth_order() {
+        for errors in [
+            [16, 32, 64].map(error::<1>),
+            [16, 32, 64].map(error::<2>),
+            [16, 32, 64].map(error::<3>),
+        ] {
+            let order = (errors[1] / errors[2]).log2();
+            assert!(
+                (order - 4.0).abs() < 0.1,
+                "observed order {order} from {errors:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn an_odd_grid_has_no_half() {
+        let field = Field::constant(Grid::<2>::new(7, 1.0).unwrap(), 1.0);
+        let text = field.every_other().unwrap_err().to_string();
+        assert!(text.contains("cells = 7"), "{text}");
+    }
+}

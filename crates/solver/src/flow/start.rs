@@ -1,0 +1,215 @@
+//! Where the minimization of a time step begins.
+
+use burn::tensor::Tensor;
+use geometry::{Field, Grid};
+use model::{Factors, Network, Ratios, pretrained};
+use operators::extrapolate;
+use serde::{Deserialize, Serialize};
+
+use super::{FlowState, WillmoreFlow};
+use crate::Error;
+
+/// The origin of a start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StartKind {
+    /// The phase field itself.
+    #[default]
+    Rest,
+    /// The last motion, continued.
+    Extrapolated,
+    /// The motion that the same step makes on the grid of half as many cells.
+    HalfGrid,
+}
+
+/// Where the minimization of a time step began, and what that cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Start {
+    /// Its origin.
+    pub kind: StartKind,
+    /// Hessian-vector products on coarser grids, each counted by its share of this grid's unknowns.
+    pub hvp: f64,
+}
+
+impl<const D: usize> WillmoreFlow<D> {
+    /// Begins every following step with the motion that `half`, a flow on the grid of every other node, makes in that step. A
+    /// step that `half` cannot make begins as if it were not there. The results differ by less than the tolerance of the
+    /// minimization, which still decides on this grid; only the way to them gets shorter.
+    ///
+    /// `half` may itself begin on its half grid. Its state does not matter: it is set anew in every step.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] if its grid is not the half of this one; [`Error::Parameter`] for another `eps` or `tautilde`.
+    pub fn begin_on(&mut self, mut half: Self) -> Result<(), Error> {
+        // The other grid's size and place are in the error.
+        Field::constant(self.grid.half()?, 0.0)
+            .zip_map(&Field::constant(half.grid, 0.0), |a, _| a)?;
+        for (name, own, other) in [
+            ("eps of the half grid", self.params.eps, half.params.eps),
+            (
+                "tautilde of the half grid",
+                self.params.mcf_step,
+                half.params.mcf_step,
+            ),
+        ] {
+            if own.to_bits() != other.to_bits() {
+                return Err(Error::Parameter {
+                    name,
+                    value: other,
+                    expected: "that of the flow, which begins there",
+                });
+            }
+        }
+        if let Some(region) = &self.region {
+            half.restrict_to(&every_other_node(self.grid, region.nodes()))?;
+        }
+        self.half = Some(Box::new(half));
+        Ok(())
+    }
+
+    /// [Begins](Self::begin_on) on the half grid, that on its half, and so on, as far as networks are shipped: those of the paper's
+    /// recipe if the energy is the paper's, else those of the accurate recipe. Says how many grids there are below this one; none
+    /// for an odd number of cells, or without networks.
+    ///
+    /// # Errors
+    /// What building the flows raises.
+    pub fn begin_on_half_grids(&mut self, network: &Network) -> Result<usize, Error> {
+        /// Below this many cells per `eps` the motion is too far off to be of use.
+        const COARSEST: f64 = 2.0;
+        let Some(ratios) = halved(network.ratios()).filter(|r| r.eps_over_h >= COARSEST) else {
+            return Ok(0);
+        };
+        let Ok(grid) = self.grid.half() else {
+            return Ok(0);
+        };
+        let paper = self.params.calibration == Factors::PAPER;
+        let found = if paper {
+            pretrained::find(ratios)
+        } else {
+            pretrained::find_accurate(ratios)
+        };
+        let Ok(network) = found else {
+            return Ok(0);
+        };
+        let mut params = self.params;
+        if !paper {
+            params.calibration = network.calibration()?.factors;
+        }
+        let initial = Field::constant(grid, 1.0);
+        let mut half = Self::with_network(&network, &initial, params, &self.device)?;
+        let levels = 1 + half.begin_on_half_grids(&network)?;
+        self.begin_on(half)?;
+        Ok(levels)
+    }
+
+    /// The start of a step of size `tau`.
+    pub(super) fn start(&mut self, tau: f64) -> Result<(Tensor<D>, Start), Error> {
+        if let Some((moved, hvp)) = self.motion_on_half_grid(tau)? {
+            let before = self.half_motion.replace(moved.clone());
+            let start = match (before, &self.previous) {
+                // The half grid also moves the profile from the one that fits this grid to its own, in every step alike: what it
+                // moves more than in the last step comes on top of the last motion here.
+                (Some(before), Some((previous, _))) if self.step > 1 => {
+                    let change = moved.zip_map(&before, |new, old| new - old)?;
+                    self.current.clone() * 2.0 - previous.clone() + self.on_device(&change)?
+                }
+                _ => self.current.clone() + self.on_device(&moved)?,
+            };
+            let kind = StartKind::HalfGrid;
+            return Ok((start, Start { kind, hvp }));
+        }
+        self.half_motion = None;
+        Ok(match &self.previous {
+            // The first step also relaxes the initial profile, which is nothing to extrapolate.
+            Some((previous, last)) if self.step > 1 && self.moved_little(previous)? => {
+                let start = extrapolate(&self.current, previous, (tau / last).min(2.0));
+                let kind = StartKind::Extrapolated;
+                (start, Start { kind, hvp: 0.0 })
+            }
+            _ => (self.current.clone(), Start::default()),
+        })
+    }
+
+    /// A field on the half grid, interpolated on this one.
+    fn on_device(&self, coarse: &Field<D>) -> Result<Tensor<D>, Error> {
+        let fine = coarse.refined()?;
+        Ok(self.device.tensor(fine.values(), self.grid.shape()))
+    }
+
+    /// What the half grid moves in a step of size `tau` from here, and what that cost.
+    fn motion_on_half_grid(&mut self, tau: f64) -> Result<Option<(Field<D>, f64)>, Error> {
+        if self.half.is_none() {
+            return Ok(None);
+        }
+        let state = self.state()?;
+        let Some(half) = &mut self.half else {
+            return Ok(None);
+        };
+        let previous = match state.previous {
+            Some((u, tau)) => Some((u.every_other()?, tau)),
+            None => None,
+        };
+        let coarse = FlowState {
+            current: state.current.every_other()?,
+            previous,
+            half_motions: half.half_motions(),
+            ..state
+        };
+        half.restore(&coarse)?;
+        let record = match half.advance(tau) {
+            Ok(record) => record,
+            Err(Error::NotConverged { .. } | Error::NonFinite { .. }) => return Ok(None),
+            Err(error) => return Err(error),
+        };
+        let moved = half
+            .field()?
+            .zip_map(&coarse.current, |new, old| new - old)?;
+        let share = half.grid.len() as f64 / self.grid.len() as f64;
+        let hvp = share * (record.newton.hvp as f64 + record.start.hvp);
+        Ok(Some((moved, hvp)))
+    }
+
+    /// The last motions on the coarser grids, the finest first.
+    pub(super) fn half_motions(&self) -> Vec<Field<D>> {
+        let below = self.half.iter().flat_map(|half| half.half_motions());
+        self.half_motion.iter().cloned().chain(below).collect()
+    }
+
+    /// Takes over what [`Self::half_motions`] said.
+    pub(super) fn set_half_motions(&mut self, motions: &[Field<D>]) -> Result<(), Error> {
+        self.half_motion = None;
+        let Some(half) = &mut self.half else {
+            return Ok(());
+        };
+        let (own, below) = match motions.split_first() {
+            Some((own, below)) => (Some(own), below),
+            None => (None, motions),
+        };
+        self.half_motion = match own {
+            Some(own) => Some(Field::from_values(half.grid, own.values().to_vec())?),
+            None => None,
+        };
+        half.set_half_motions(below)
+    }
+}
+
+/// The marks at the nodes of the half grid.
+pub(super) fn every_other_node<const D: usize>(grid: Grid<D>, nodes: &[bool]) -> Vec<bool> {
+    let marks = nodes.iter().enumerate().filter(|(i, _)| {
+        grid.multi_index(*i)
+            .iter()
+            .all(|index| index.is_multiple_of(2))
+    });
+    marks.map(|(_, mark)| *mark).collect()
+}
+
+/// The ratios of a network for the half grid, with a kernel that reaches equally far.
+fn halved(ratios: Ratios) -> Option<Ratios> {
+    let reach = (ratios.width - 1) / 2;
+    reach.is_multiple_of(2).then_some(Ratios {
+        width: reach + 1,
+        eps_over_h: 0.5 * ratios.eps_over_h,
+        step_over_h2: 0.25 * ratios.step_over_h2,
+        ..ratios
+    })
+}

@@ -1,0 +1,151 @@
+//! Steps that begin on the half grid.
+
+mod common;
+
+use common::{device, network, params};
+use geometry::measure::l2_distance;
+use geometry::shapes::Cross;
+use geometry::{Field, Grid, phase_field};
+use model::{Network, pretrained};
+use solver::{Error, Factors, FlowParams, NewtonParams, StartKind, StepRecord, WillmoreFlow};
+
+const EPS: f64 = 1.0 / 64.0;
+/// Both time steps.
+const TAU: f64 = 1.0 / 16384.0;
+
+fn grid() -> Grid<2> {
+    Grid::per_unit(256, 0.75).unwrap()
+}
+
+fn scales(network: &Network) -> FlowParams {
+    FlowParams {
+        eps: EPS,
+        mcf_step: TAU,
+        newton: NewtonParams::default(),
+        calibration: network.calibration().unwrap().factors,
+    }
+}
+
+fn accurate(n: usize, width: usize) -> Network {
+    let grid = Grid::<2>::per_unit(n, 0.75).unwrap();
+    let plain = FlowParams {
+        eps: EPS,
+        mcf_step: TAU,
+        newton: NewtonParams::default(),
+        calibration: Factors::PAPER,
+    };
+    pretrained::find_accurate(plain.ratios(&grid, width)).unwrap()
+}
+
+fn cross() -> Field<2> {
+    phase_field(grid(), &Cross::new(0.27, 0.1).unwrap(), EPS).unwrap()
+}
+
+fn flow(half: bool) -> WillmoreFlow<2> {
+    let network = accurate(256, 33);
+    let mut flow =
+        WillmoreFlow::with_network(&network, &cross(), scales(&network), &device()).unwrap();
+    if half {
+        assert_eq!(flow.begin_on_half_grids(&network).unwrap(), 1);
+    }
+    flow
+}
+
+fn steps(flow: &mut WillmoreFlow<2>, count: usize) -> Vec<StepRecord> {
+    (0..count).map(|_| flow.advance(TAU).unwrap()).collect()
+}
+
+#[test]
+fn the_half_grid_saves_work_and_leaves_the_result() {
+    let (mut plain, mut begun) = (flow(false), flow(true));
+    let (before, after) = (steps(&mut plain, 6), steps(&mut begun, 6));
+    assert!(after.iter().all(|r| r.start.kind == StartKind::HalfGrid));
+    assert!(before.iter().all(|r| r.start.kind != StartKind::HalfGrid));
+    let work = |records: &[StepRecord]| records.iter().map(StepRecord::hvp).sum::<f64>();
+    assert!(
+        work(&after) < 0.8 * work(&before),
+        "{} of {} products",
+        work(&after),
+        work(&before)
+    );
+    assert!(after.iter().all(|r| r.energy < r.energy_before));
+    let (plain, begun) = (plain.field().unwrap(), begun.field().unwrap());
+    let way = l2_distance(&plain, &cross()).unwrap();
+    let difference = l2_distance(&plain, &begun).unwrap() / way;
+    assert!(difference < 2e-3, "{difference} of the way");
+    assert!(difference > 0.0);
+}
+
+#[test]
+fn a_restored_flow_continues_with_the_same_bytes() {
+    let mut whole = flow(true);
+    steps(&mut whole, 3);
+    let state = whole.state().unwrap();
+    assert_eq!(state.half_motions.len(), 1);
+    steps(&mut whole, 2);
+    let mut resumed = flow(true);
+    resumed.restore(&state).unwrap();
+    assert_eq!(resumed.state().unwrap(), state);
+    steps(&mut resumed, 2);
+    assert_eq!(whole.field().unwrap(), resumed.field().unwrap());
+}
+
+#[test]
+fn a_region_is_held_on_both_grids() {
+    let inside: Vec<bool> = (0..grid().len())
+        .map(|node| grid().node(node).iter().all(|x| x.abs() < 0.16))
+        .collect();
+    for region_first in [true, false] {
+        let mut flow = flow(!region_first);
+        flow.restrict_to(&inside).unwrap();
+        if region_first {
+            flow.begin_on_half_grids(&accurate(256, 33)).unwrap();
+        }
+        let record = flow.advance(TAU).unwrap();
+        assert_eq!(record.start.kind, StartKind::HalfGrid);
+        let (u, start) = (flow.field().unwrap(), cross());
+        let mut moved = 0.0_f64;
+        for ((u, start), inside) in u.values().iter().zip(start.values()).zip(&inside) {
+            if *inside {
+                moved = moved.max((u - start).abs());
+            } else {
+                assert_eq!(u.to_bits(), start.to_bits());
+            }
+        }
+        assert!(moved > 0.1, "{moved}");
+    }
+}
+
+#[test]
+fn networks_decide_how_far_down_it_goes() {
+    let network = network();
+    let grid = Grid::<2>::per_unit(128, 0.75).unwrap();
+    let start = Field::constant(grid, 1.0);
+    let mut flow = WillmoreFlow::with_network(&network, &start, params(&grid), &device()).unwrap();
+    assert_eq!(flow.begin_on_half_grids(&network).unwrap(), 0);
+}
+
+#[test]
+fn a_flow_that_does_not_fit_below_is_refused() {
+    let network = accurate(128, 17);
+    let below = |side: f64, eps: f64| {
+        let start = Field::constant(Grid::<2>::per_unit(128, side).unwrap(), 1.0);
+        let params = FlowParams {
+            eps,
+            ..scales(&network)
+        };
+        WillmoreFlow::with_network(&network, &start, params, &device())
+    };
+    assert!(flow(false).begin_on(below(0.75, EPS).unwrap()).is_ok());
+    let error = flow(false).begin_on(below(1.0, EPS).unwrap()).unwrap_err();
+    assert!(matches!(error, Error::Geometry(_)), "{error}");
+    assert!(error.to_string().contains("96"), "{error}");
+    // As near as the network still fits.
+    let error = flow(false)
+        .begin_on(below(0.75, EPS * (1.0 + 1e-13)).unwrap())
+        .unwrap_err();
+    assert!(
+        error.to_string().contains("eps of the half grid"),
+        "{error}"
+    );
+}
