@@ -547,6 +547,7 @@ fn checkpoint_name(step: usize, which: &str) -> String {
 mod tests {
     use super::*;
     use crate::circles::{EPS, STEP};
+    use crate::networks::convergence_ratios;
     use geometry::phase_field;
     use geometry::shapes::Ball;
     use model::pretrained;
@@ -607,13 +608,17 @@ mod tests {
         let store = |name: &str| OutputDir::create(root.path().join(name)).unwrap();
         let device = ComputeDevice::default_compiled().unwrap();
         let bar = Progress::new(true).bar("", 4);
-        let ratios = crate::networks::convergence_ratios(128).unwrap();
-        let network = pretrained::find(ratios).unwrap();
-        for (flow, method) in [
-            (Flow::Willmore, Method::Hybrid),
-            (Flow::MeanCurvature, Method::FeImplicit),
+        for (flow, method, n) in [
+            (Flow::Willmore, Method::Hybrid, 128),
+            (Flow::MeanCurvature, Method::FeImplicit, 128),
+            // Its steps begin on the half grid.
+            (Flow::Willmore, Method::Hybrid, 256),
         ] {
-            let whole = evolution(flow, method);
+            let network = pretrained::find(convergence_ratios(n).unwrap()).unwrap();
+            let whole = Evolution {
+                n,
+                ..evolution(flow, method)
+            };
             assert_eq!(whole.sampled_steps(), [0, 1, 2, 4]);
             let run = |e: &Evolution<2>, folder: &OutputDir| {
                 e.run(&disc, Some(&network), &device, folder, &bar).unwrap()

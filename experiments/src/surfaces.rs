@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use clap::Args;
 use fem::FiniteElementStep;
 use geometry::{Field, Grid};
 use model::{Network, Ratios};
@@ -9,7 +10,7 @@ use operators::ComputeDevice;
 use render::{Axis, Bounds, Framing, Quality, Scene, Tube};
 use report::{Column, Figure, Format, Manifest, OutputDir, Progress, Raster, Summary, Table};
 use serde::Serialize;
-use solver::{FlowParams, NewtonParams};
+use solver::{FlowParams, NewtonParams, StepRecord};
 use surfaces::ClosedMesh;
 
 use crate::circles::Flow;
@@ -57,6 +58,24 @@ pub fn centred_box(n: usize, side: f64) -> Result<Grid<3>, Error> {
     Ok(Grid::per_unit(n, side)?.with_origin([CENTRE - 0.5 * side; 3])?)
 }
 
+/// Which schemes.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct SchemeOptions {
+    /// One scheme alone: paper, calibrated or accurate [default: paper and accurate]
+    #[arg(long, value_name = "NAME", value_enum)]
+    pub scheme: Option<Scheme>,
+}
+
+impl SchemeOptions {
+    /// Those wanted of the hybrid method.
+    pub fn schemes(&self) -> Vec<Scheme> {
+        match self.scheme {
+            Some(scheme) => vec![scheme],
+            None => vec![Scheme::Paper, Scheme::Accurate],
+        }
+    }
+}
+
 /// From where a surface is looked at.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
@@ -76,6 +95,8 @@ pub struct SurfaceRun<'a> {
     pub title: String,
     /// The method.
     pub method: Method,
+    /// The scheme.
+    pub scheme: Scheme,
     /// Cells per unit length.
     pub n: usize,
     /// Sizes of the time steps.
@@ -101,6 +122,8 @@ pub struct Snapshot {
     pub time: f64,
     /// The Willmore energy `w` of the phase field, with the implicit finite-element step and the mass-matrix norm.
     pub w: f64,
+    /// The same as the scheme measures it, with its own operator and calibration: what the flow minimizes.
+    pub w_scheme: f64,
     /// What the paper reports.
     pub paper: Option<f64>,
     /// Perimeter `P_eps`, the area of the surface.
@@ -143,6 +166,7 @@ pub struct Workshop<'a> {
 struct StepRow<'a> {
     surface: &'a str,
     method: Method,
+    scheme: Scheme,
     step: usize,
     time: f64,
     tau: f64,
@@ -153,7 +177,7 @@ struct StepRow<'a> {
     volume: f64,
     exit: solver::Exit,
     newton: usize,
-    hvp: usize,
+    hvp: f64,
     negative_curvature: usize,
     seconds: f64,
 }
@@ -173,7 +197,7 @@ impl Workshop<'_> {
             shape: run.identity.clone(),
             flow: Flow::Willmore,
             method: run.method,
-            scheme: Scheme::Paper,
+            scheme: run.scheme,
             n: run.n,
             side: run.initial.grid().side(),
             centre: CENTRE,
@@ -185,7 +209,8 @@ impl Workshop<'_> {
             steps: run.steps,
             pause_after: None,
         };
-        let title = format!("{}, {}, n = {}", run.title, run.method.label(), run.n);
+        let label = run.method.label_in(run.scheme);
+        let title = format!("{}, {label}, n = {}", run.title, run.n);
         let bar = self.progress.bar(title.clone(), run.steps as u64);
         let store = self.output.subfolder("fields")?.subfolder(&run.key)?;
         let initial = run.initial;
@@ -219,6 +244,14 @@ impl Workshop<'_> {
                         step,
                         time: run.tau.time(step),
                         w: measure.willmore_energy(&u)?,
+                        w_scheme: match step.checked_sub(1) {
+                            Some(last) => trajectory.records[last].willmore_energy,
+                            // Standing still costs 2 tau w.
+                            None => {
+                                let first = &trajectory.records[0];
+                                first.energy_before / (2.0 * first.tau)
+                            }
+                        },
                         paper: paper.filter(|_| !self.options.quick),
                         perimeter: measures.perimeter,
                         volume: measures.volume,
@@ -261,7 +294,7 @@ impl Workshop<'_> {
         let columns = finished.iter().map(|f| f.snapshots.len()).max();
         let labels = finished
             .iter()
-            .map(|f| format!("{}\n{}", f.run.title, f.run.method.label()));
+            .map(|f| format!("{}\n{}", f.run.title, f.label().replace(", ", "\n")));
         let mut figure =
             Figure::new(self.options.title(title), columns.unwrap_or(1)).with_row_labels(labels);
         let (size, quality) = self.picture_size();
@@ -316,18 +349,40 @@ impl Workshop<'_> {
 impl SurfaceRun<'_> {
     /// Name of the files of a step.
     fn name(&self, step: usize) -> String {
-        format!("{}_{}_step{step:03}", self.key, self.method.key())
+        let method = self.method.key_in(self.scheme);
+        format!("{}_{method}_step{step:03}", self.key)
     }
 }
 
 impl Finished<'_> {
+    /// Prefix of its metrics: the surface, and the method unless it is the learned operator in the paper's scheme.
+    pub fn key(&self) -> String {
+        let SurfaceRun {
+            key,
+            method,
+            scheme,
+            ..
+        } = &self.run;
+        match (method, scheme) {
+            (Method::Hybrid, Scheme::Paper) => key.clone(),
+            _ => format!("{key}.{}", method.key_in(*scheme)),
+        }
+    }
+
+    /// Name of the method and scheme.
+    pub fn label(&self) -> String {
+        self.run.method.label_in(self.run.scheme)
+    }
+
     /// Adds the metrics of this run.
     ///
     /// # Errors
     /// [`Error::Report`] for a value that is not finite.
-    pub fn summarize(&self, key: &str, summary: &mut Summary) -> Result<(), Error> {
+    pub fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
+        let key = self.key();
         for s in &self.snapshots {
             summary.insert(&format!("{key}.w.step{}", s.step), s.w)?;
+            summary.insert(&format!("{key}.w_scheme.step{}", s.step), s.w_scheme)?;
             summary.insert(&format!("{key}.perimeter.step{}", s.step), s.perimeter)?;
             summary.insert(&format!("{key}.volume.step{}", s.step), s.volume)?;
             let euler = s.euler_characteristic as f64;
@@ -335,9 +390,9 @@ impl Finished<'_> {
         }
         let records = &self.trajectory.records;
         let count = records.len().max(1) as f64;
-        let hvp: usize = records.iter().map(|r| r.newton.hvp).sum();
-        let rises = records.iter().filter(|r| r.energy >= r.energy_before);
-        summary.insert(&format!("{key}.hvp_per_step"), hvp as f64 / count)?;
+        let hvp: f64 = records.iter().map(StepRecord::hvp).sum();
+        let rises = records.iter().filter(|r| r.energy > r.energy_before);
+        summary.insert(&format!("{key}.hvp_per_step"), hvp / count)?;
         summary.insert_count(&format!("{key}.energy_increases"), rises.count())?;
         summary.insert(&format!("{key}.seconds"), self.trajectory.seconds)?;
         if let Some(peak) = self.peak_mib {
@@ -358,6 +413,7 @@ pub fn table(finished: &[Finished<'_>]) -> Result<Table, Error> {
         Column::number("step", Format::Shortest),
         Column::number("w", Format::Fixed(2)),
         Column::number("w, paper", Format::Fixed(2)),
+        Column::number("w of the scheme", Format::Fixed(2)),
         Column::number("area", Format::Fixed(4)),
         Column::number("volume", Format::Fixed(5)),
         Column::number("Euler characteristic", Format::Fixed(0)),
@@ -366,10 +422,11 @@ pub fn table(finished: &[Finished<'_>]) -> Result<Table, Error> {
         for s in &f.snapshots {
             table.push([
                 f.run.title.as_str().into(),
-                f.run.method.label().into(),
+                f.label().into(),
                 s.step.into(),
                 s.w.into(),
                 s.paper.into(),
+                s.w_scheme.into(),
                 s.perimeter.into(),
                 s.volume.into(),
                 (s.euler_characteristic as f64).into(),
@@ -390,6 +447,7 @@ pub fn write_steps(finished: &[Finished<'_>], output: &OutputDir) -> Result<(), 
             f.trajectory.records.iter().map(|r| StepRow {
                 surface: &f.run.key,
                 method: f.run.method,
+                scheme: f.run.scheme,
                 step: r.step,
                 time: r.time,
                 tau: r.tau,
@@ -400,7 +458,7 @@ pub fn write_steps(finished: &[Finished<'_>], output: &OutputDir) -> Result<(), 
                 volume: r.volume,
                 exit: r.newton.exit,
                 newton: r.newton.newton,
-                hvp: r.newton.hvp,
+                hvp: r.hvp(),
                 negative_curvature: r.newton.negative_curvature,
                 seconds: r.seconds,
             })

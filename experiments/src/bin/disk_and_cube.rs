@@ -5,11 +5,12 @@ use std::time::Instant;
 
 use clap::Parser;
 use experiments::evolution::TimeSteps;
-use experiments::method::Method;
+use experiments::method::{Method, Scheme};
 use experiments::networks::{NetworkOptions, checksum};
 use experiments::options::RunOptions;
 use experiments::surfaces::{
-    Finished, SurfaceRun, View, Workshop, centred_box, ratios, scales, since, table, write_steps,
+    Finished, SchemeOptions, SurfaceRun, View, Workshop, centred_box, ratios, scales, since, table,
+    write_steps,
 };
 use experiments::{Error, harness};
 use geometry::shapes::{Cuboid, Cylinder};
@@ -59,6 +60,22 @@ struct Options {
     /// Methods, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum, default_values_t = [Method::Hybrid, Method::FeImplicit])]
     methods: Vec<Method>,
+
+    #[command(flatten)]
+    schemes: SchemeOptions,
+}
+
+impl Options {
+    /// Finite elements are the paper's reference, unless another scheme is wanted of all.
+    fn variants(&self) -> Vec<(Method, Scheme)> {
+        let schemes = |method: Method| match (method.is_learned(), self.schemes.scheme) {
+            (true, _) => self.schemes.schemes(),
+            (false, None | Some(Scheme::Paper)) => vec![Scheme::Paper],
+            (false, Some(_)) => vec![Scheme::Calibrated],
+        };
+        let variants = |&method: &Method| schemes(method).into_iter().map(move |s| (method, s));
+        self.methods.iter().flat_map(variants).collect()
+    }
 }
 
 #[derive(Serialize)]
@@ -68,7 +85,7 @@ struct Parameters<'a> {
     mcf_step: f64,
     tau: f64,
     steps: usize,
-    methods: &'a [Method],
+    variants: &'a [(Method, Scheme)],
     cube_half_side: f64,
     disk_radius: f64,
     disk_half_height: f64,
@@ -133,13 +150,14 @@ fn program(options: &Options) -> Result<(), Error> {
     let solids = solids(options, n)?;
     let output = options.run.open_output(PROGRAM)?;
     let params = scales(n);
+    let variants = options.variants();
     let parameters = Parameters {
         n,
         eps: params.eps,
         mcf_step: params.mcf_step,
         tau: TAU,
         steps,
-        methods: &options.methods,
+        variants: &variants,
         cube_half_side: options.cube_half_side,
         disk_radius: options.disk_radius,
         disk_half_height: options.disk_half_height,
@@ -158,9 +176,10 @@ fn program(options: &Options) -> Result<(), Error> {
     };
     let mut finished: Vec<Finished<'_>> = Vec::new();
     for solid in &solids {
-        for &method in &options.methods {
+        for &(method, scheme) in &variants {
             // The paper reports energies of the hybrid scheme only.
-            let paper = |k: usize| method.is_learned().then_some(solid.papers[k]);
+            let papers = (method, scheme) == (Method::Hybrid, Scheme::Paper);
+            let paper = |k: usize| papers.then_some(solid.papers[k]);
             let mut shown = vec![(0, paper(0)), (1, paper(1))];
             if steps > 1 {
                 shown.push((steps, paper(2).filter(|_| steps == STEPS)));
@@ -171,6 +190,7 @@ fn program(options: &Options) -> Result<(), Error> {
                     key: solid.key.to_owned(),
                     title: solid.title.to_owned(),
                     method,
+                    scheme,
                     n,
                     tau: TimeSteps::Constant(TAU),
                     steps,
@@ -214,14 +234,10 @@ fn program(options: &Options) -> Result<(), Error> {
     write_steps(&finished, &output)?;
     let mut summary = Summary::new();
     for f in &finished {
-        let key = match f.run.method {
-            Method::Hybrid => f.run.key.clone(),
-            other => format!("{}.{}", f.run.key, other.key()),
-        };
-        f.summarize(&key, &mut summary)?;
+        f.summarize(&mut summary)?;
     }
     for d in &distances {
-        let key = &finished[d.run].run.key;
+        let key = finished[d.run].key();
         summary.insert(&format!("{key}.l2_to_fe.step{}", d.step), d.l2)?;
     }
     summary.insert("seconds", since(clock))?;

@@ -4,7 +4,8 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Parser;
-use experiments::method::Method;
+use experiments::circles::Flow;
+use experiments::method::{Method, Scheme};
 use experiments::networks::{NetworkOptions, checksum};
 use experiments::options::RunOptions;
 use experiments::surfaces::{centred_box, ratios, scales, since};
@@ -20,6 +21,7 @@ use report::{
     Axis, Colour, Column, Figure, Format, LineChart, LineStyle, Marker, Series, Summary, Table,
 };
 use serde::Serialize;
+use solver::StepRecord;
 
 const PROGRAM: &str = "spheres";
 const RADII: [f64; 6] = [0.15, 0.2, 0.25, 0.3, 0.35, 0.4];
@@ -28,6 +30,8 @@ const MCF_STEPS: [usize; 3] = [1, 4, 8];
 /// Steps of Willmore flow, which should leave spheres alone.
 const WILLMORE_STEPS: usize = 20;
 const TAU: f64 = 1.0 / 262_144.0;
+/// Willmore energy of a sphere.
+const SPHERE: f64 = 8.0 * std::f64::consts::PI;
 
 /// The network for surfaces on spheres, n = 64, eps = 2^-5, tautilde = 2^-12: L2 errors of mean curvature flow against
 /// R^2 = r^2 - 4t beside finite elements, Willmore energies w against 8 pi, and the change of the radius in 20 steps of Willmore
@@ -61,17 +65,33 @@ struct Parameters {
 #[derive(Serialize, Clone, Debug)]
 struct Measurement {
     radius: f64,
-    /// Errors of mean curvature flow by method, in the order of [`Method::ALL`], for each of the reported steps.
+    /// Errors of mean curvature flow, in the order of [`variants`], for each of the reported steps.
     mcf: Vec<Vec<f64>>,
     /// `w` with the implicit finite-element step and the mass-matrix norm, as the paper measures.
     w_elements: f64,
-    /// `w` with the learned operator.
+    /// Willmore flow by the learned operator, in every scheme.
+    willmore: Vec<Still>,
+}
+
+/// A sphere under Willmore flow.
+#[derive(Serialize, Clone, Copy, Debug)]
+struct Still {
+    scheme: Scheme,
+    /// `w` as the scheme measures it, by its factors of calibration.
     w_learned: f64,
     /// Radius of the ball with the final volume, less that at the beginning.
     radius_change: f64,
-    /// Steps in which the energy did not fall.
+    /// Steps in which the energy rose.
     energy_increases: usize,
     hvp_per_step: f64,
+}
+
+/// Methods and schemes of mean curvature flow.
+fn variants() -> impl Iterator<Item = (Method, Scheme)> {
+    let schemes = |method: Method| method.schemes(Flow::MeanCurvature).iter();
+    Method::ALL
+        .into_iter()
+        .flat_map(move |method| schemes(method).map(move |&scheme| (method, scheme)))
 }
 
 fn main() -> ExitCode {
@@ -165,8 +185,9 @@ fn measure(
     let params = scales(n);
     let initial = ball(radius, n)?;
     let mut mcf = Vec::new();
-    for method in Method::ALL {
-        let mut flow = method.mean_curvature_flow(Some(network), &initial, &params, device)?;
+    for (method, scheme) in variants() {
+        let (network, _) = method.prepare(scheme, Some(network), initial.grid(), &params)?;
+        let mut flow = method.mean_curvature_flow(network.as_ref(), &initial, &params, device)?;
         let mut errors = Vec::new();
         for step in 1..=MCF_STEPS[MCF_STEPS.len() - 1] {
             flow.advance()?;
@@ -179,60 +200,81 @@ fn measure(
         mcf.push(errors);
     }
     let elements = FiniteElementStep::implicit(initial.grid(), params.eps, params.mcf_step)?;
-    let w_elements = elements.willmore_energy(&initial)?;
-    let mut flow = Method::Hybrid.willmore_flow(
-        Some(network),
-        &initial,
-        params,
-        LinearSolver::default(),
-        device,
-    )?;
-    let mut records = Vec::new();
-    for _ in 0..willmore_steps {
-        records.push(flow.advance(TAU)?);
-    }
-    let steps = records.len() as f64;
-    let first = records.first().map_or(f64::NAN, |r| r.energy_before);
+    let still = |&scheme: &Scheme| stand_still(&initial, scheme, willmore_steps, network, device);
+    let schemes = Method::Hybrid.schemes(Flow::Willmore);
     Ok(Measurement {
         radius,
         mcf,
-        w_elements,
+        w_elements: elements.willmore_energy(&initial)?,
+        willmore: schemes.iter().map(still).collect::<Result<_, _>>()?,
+    })
+}
+
+/// Willmore flow from a sphere.
+fn stand_still(
+    initial: &Field<3>,
+    scheme: Scheme,
+    steps: usize,
+    network: &Network,
+    device: &ComputeDevice,
+) -> Result<Still, Error> {
+    let method = Method::Hybrid;
+    let mut params = scales(initial.grid().spacing().recip().round() as usize);
+    let (network, factors) = method.prepare(scheme, Some(network), initial.grid(), &params)?;
+    params.calibration = factors;
+    let linear = LinearSolver::default();
+    let mut flow = method.willmore_flow(network.as_ref(), initial, params, linear, device)?;
+    let mut records = Vec::new();
+    for _ in 0..steps {
+        records.push(flow.advance(TAU)?);
+    }
+    let count = records.len() as f64;
+    let first = records.first().map_or(f64::NAN, |r| r.energy_before);
+    let rises = records.iter().filter(|r| r.energy > r.energy_before);
+    Ok(Still {
+        scheme,
         // Standing still costs 2 tau w.
         w_learned: first / (2.0 * TAU),
-        radius_change: radius_of(&flow.field()?) - radius_of(&initial),
-        energy_increases: records
-            .iter()
-            .filter(|r| r.energy > r.energy_before)
-            .count(),
-        hvp_per_step: records.iter().map(|r| r.newton.hvp as f64).sum::<f64>() / steps,
+        radius_change: radius_of(&flow.field()?) - radius_of(initial),
+        energy_increases: rises.count(),
+        hvp_per_step: records.iter().map(StepRecord::hvp).sum::<f64>() / count,
     })
 }
 
 fn table(all: &[Measurement], n: usize) -> Result<Table, Error> {
     let head = [Column::number("radius", Format::Fixed(2))];
-    let errors = Method::ALL.iter().flat_map(|method| {
+    let errors = variants().flat_map(|(method, scheme)| {
         MCF_STEPS.map(|step| {
-            let name = format!("MCF error, {}, step {step}", method.label());
+            let name = format!("MCF error, {}, step {step}", method.label_in(scheme));
             Column::number(name, Format::Fixed(5))
         })
     });
-    let tail = [
+    let energies = [
         Column::number("w, FE measure", Format::Fixed(2)),
-        Column::number("w, learned", Format::Fixed(2)),
         Column::number("w / 8π (FE)", Format::Fixed(4)),
-        Column::number("change of radius / h", Format::Fixed(4)),
-        Column::number("HVP/step", Format::Fixed(1)),
     ];
-    let mut table = Table::new(head.into_iter().chain(errors).chain(tail));
+    let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
+    let tail = schemes.flat_map(|&scheme| {
+        let label = Method::Hybrid.label_in(scheme);
+        [
+            Column::number(format!("w, {label}"), Format::Fixed(2)),
+            Column::number(format!("change of radius / h, {label}"), Format::Fixed(4)),
+            Column::number(format!("HVP/step, {label}"), Format::Fixed(1)),
+        ]
+    });
+    let mut table = Table::new(head.into_iter().chain(errors).chain(energies).chain(tail));
     for m in all {
         let errors = m.mcf.iter().flatten().map(|&error| error.into());
-        table.push([m.radius.into()].into_iter().chain(errors).chain([
-            m.w_elements.into(),
-            m.w_learned.into(),
-            (m.w_elements / (8.0 * std::f64::consts::PI)).into(),
-            (m.radius_change * n as f64).into(),
-            m.hvp_per_step.into(),
-        ]))?;
+        let flows = m.willmore.iter().flat_map(|still| {
+            [
+                still.w_learned.into(),
+                (still.radius_change * n as f64).into(),
+                still.hvp_per_step.into(),
+            ]
+        });
+        let energies = [m.w_elements, m.w_elements / SPHERE].map(Into::into);
+        let cells = [m.radius.into()].into_iter().chain(errors);
+        table.push(cells.chain(energies).chain(flows))?;
     }
     Ok(table)
 }
@@ -244,33 +286,40 @@ fn figure(run: &RunOptions, all: &[Measurement], n: usize) -> Figure {
         Axis::linear("radius"),
         Axis::log("L² error"),
     );
-    for (k, method) in Method::ALL.into_iter().enumerate() {
+    for (k, (method, scheme)) in variants().enumerate() {
         let points: Vec<[f64; 2]> = all.iter().map(|m| [m.radius, m.mcf[k][last]]).collect();
         errors = errors.with_series(
-            Series::new(method.label(), points)
-                .with_colour(k)
-                .with_style(method.style())
+            Series::new(method.label_in(scheme), points)
+                .with_colour(method as usize)
+                .with_style(method.style_in(scheme))
                 .with_marker(Marker::Circle),
         );
     }
     let curve = |f: &dyn Fn(&Measurement) -> f64| -> Vec<[f64; 2]> {
         all.iter().map(|m| [m.radius, f(m)]).collect()
     };
-    let sphere = 8.0 * std::f64::consts::PI;
-    let energies = LineChart::new("Willmore energy", Axis::linear("radius"), Axis::linear("w"))
+    let mut energies = LineChart::new("Willmore energy", Axis::linear("radius"), Axis::linear("w"))
         .with_series(
-            Series::new("implicit FE step", curve(&|m| m.w_elements))
+            Series::new("implicit FE measure", curve(&|m| m.w_elements))
                 .with_colour(1)
                 .with_marker(Marker::Square),
-        )
-        .with_series(
-            Series::new("learned operator", curve(&|m| m.w_learned)).with_marker(Marker::Circle),
-        )
-        .with_series(
-            Series::new("exact, 8π", curve(&|_| sphere))
-                .with_colour(Colour::Black)
-                .with_style(LineStyle::Dashed),
         );
+    let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
+    for (k, &scheme) in schemes.enumerate() {
+        energies = energies.with_series(
+            Series::new(
+                Method::Hybrid.label_in(scheme),
+                curve(&|m| m.willmore[k].w_learned),
+            )
+            .with_style(Method::Hybrid.style_in(scheme))
+            .with_marker(Marker::Circle),
+        );
+    }
+    energies = energies.with_series(
+        Series::new("exact, 8π", curve(&|_| SPHERE))
+            .with_colour(Colour::Black)
+            .with_style(LineStyle::Dashed),
+    );
     Figure::new(run.title("Spheres"), 2)
         .with_panel(errors)
         .with_panel(energies)
@@ -280,15 +329,22 @@ fn figure(run: &RunOptions, all: &[Measurement], n: usize) -> Figure {
 fn summary(all: &[Measurement], n: usize, seconds: f64) -> Result<Summary, Error> {
     let mut summary = Summary::new();
     for m in all {
-        let key = format!("spheres.r{:03.0}", 100.0 * m.radius);
-        summary.insert(&format!("{key}.w"), m.w_elements)?;
-        summary.insert(&format!("{key}.w_learned"), m.w_learned)?;
-        let change = m.radius_change * n as f64;
-        summary.insert(&format!("{key}.radius_change_over_h"), change)?;
-        summary.insert_count(&format!("{key}.energy_increases"), m.energy_increases)?;
-        for (method, errors) in Method::ALL.iter().zip(&m.mcf) {
+        let sphere = format!("spheres.r{:03.0}", 100.0 * m.radius);
+        summary.insert(&format!("{sphere}.w"), m.w_elements)?;
+        for still in &m.willmore {
+            let key = match still.scheme {
+                Scheme::Paper => sphere.clone(),
+                other => format!("{sphere}.{}", Method::Hybrid.key_in(other)),
+            };
+            summary.insert(&format!("{key}.w_learned"), still.w_learned)?;
+            let change = still.radius_change * n as f64;
+            summary.insert(&format!("{key}.radius_change_over_h"), change)?;
+            summary.insert_count(&format!("{key}.energy_increases"), still.energy_increases)?;
+        }
+        for ((method, scheme), errors) in variants().zip(&m.mcf) {
             for (step, error) in MCF_STEPS.iter().zip(errors) {
-                summary.insert(&format!("{key}.mcf.{}.l2.step{step}", method.key()), *error)?;
+                let method = method.key_in(scheme);
+                summary.insert(&format!("{sphere}.mcf.{method}.l2.step{step}"), *error)?;
             }
         }
     }
