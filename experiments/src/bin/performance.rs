@@ -80,6 +80,8 @@ struct Measurement {
     /// `L2` distance to a minimization with a [much smaller](TIGHTER) tolerance after [some steps](COMPARED_STEPS), over the way
     /// from the start; where it was measured.
     distance_to_tighter: Option<f64>,
+    /// Pages of memory that the system had to provide per product, from the second step on, all other work of the steps included.
+    pages_per_product: Option<f64>,
 }
 
 impl Measurement {
@@ -313,10 +315,13 @@ impl Case {
         memory::forget_peak();
         let mut flow = begun(self.params(), initial, network, device)?;
         let mut records: Vec<StepRecord> = Vec::new();
+        let mut warm = None;
         for _ in 0..self.steps {
             records.push(flow.advance(self.tau)?);
+            warm = warm.or_else(memory::pages);
             bar.inc(1);
         }
+        let pages = memory::pages().zip(warm).map(|(now, warm)| now - warm);
         let peak_mib = memory::peak_mib();
         let field = flow.field()?;
         drop(flow);
@@ -353,6 +358,10 @@ impl Case {
             peak_mib,
             products,
             distance_to_tighter,
+            pages_per_product: pages.map(|pages| {
+                let later = records.iter().skip(1).map(|r| r.newton.hvp as f64);
+                pages as f64 / later.sum::<f64>().max(1.0)
+            }),
         })
     }
 }
@@ -370,6 +379,7 @@ fn step_table(all: &[Measurement]) -> Result<Table, Error> {
         Column::number("ms/HVP", Format::Fixed(2)),
         Column::number("times two FFT pairs (f32)", Format::Fixed(2)),
         Column::number("peak memory [MiB]", Format::Fixed(0)),
+        Column::number("new pages/HVP", Format::Fixed(1)),
         Column::number("to 100 times the precision", Format::Scientific(1)),
     ]);
     for m in all {
@@ -385,6 +395,7 @@ fn step_table(all: &[Measurement]) -> Result<Table, Error> {
             (1e3 * m.seconds_per_product).into(),
             (m.seconds_per_product / m.products.floor_single).into(),
             m.peak_mib.into(),
+            m.pages_per_product.into(),
             m.distance_to_tighter.into(),
         ])?;
     }
@@ -508,6 +519,9 @@ fn summary(all: &[Measurement]) -> Result<Summary, Error> {
         let hvp = m.hvp_per_step + m.coarser_hvp_per_step;
         summary.insert(&format!("{key}.hvp_per_step"), hvp)?;
         summary.insert(&format!("{key}.newton_per_step"), m.newton_per_step)?;
+        if let Some(pages) = m.pages_per_product {
+            summary.insert(&format!("{key}.pages_per_product"), pages)?;
+        }
         if let Some(distance) = m.distance_to_tighter {
             summary.insert(&format!("{key}.distance_to_tighter"), distance)?;
         }
