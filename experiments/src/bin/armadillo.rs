@@ -10,7 +10,7 @@ use experiments::method::Method;
 use experiments::networks::{NetworkOptions, checksum};
 use experiments::options::RunOptions;
 use experiments::surfaces::{
-    SurfaceRun, View, Workshop, ratios, scales, since, table, write_steps,
+    Setting, SurfaceRun, View, Workshop, ratios, scales, since, table, write_steps,
 };
 use experiments::{Error, harness, memory};
 use render::Axis;
@@ -117,6 +117,7 @@ fn program(options: &Options) -> Result<(), Error> {
             n,
             tau: TimeSteps::Doubling(FIRST_TAU),
             steps,
+            setting: Setting::default(),
             shown: shown.into_iter().map(|step| (step, None)).collect(),
             initial: &initial,
             identity: mesh.about.identity(),

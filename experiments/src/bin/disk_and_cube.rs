@@ -9,7 +9,8 @@ use experiments::method::Method;
 use experiments::networks::{NetworkOptions, checksum};
 use experiments::options::RunOptions;
 use experiments::surfaces::{
-    Finished, SurfaceRun, View, Workshop, centred_box, ratios, scales, since, table, write_steps,
+    Finished, Setting, SurfaceRun, View, Workshop, centred_box, ratios, scales, since, table,
+    write_steps,
 };
 use experiments::{Error, harness};
 use geometry::shapes::{Cuboid, Cylinder};
@@ -174,6 +175,7 @@ fn program(options: &Options) -> Result<(), Error> {
                     n,
                     tau: TimeSteps::Constant(TAU),
                     steps,
+                    setting: Setting::default(),
                     shown,
                     initial: &solid.initial,
                     identity: solid.identity.clone(),

@@ -11,7 +11,7 @@ use experiments::method::Method;
 use experiments::networks::{NetworkOptions, checksum};
 use experiments::options::RunOptions;
 use experiments::surfaces::{
-    SurfaceRun, View, Workshop, ratios, scales, since, table, write_steps,
+    Setting, SurfaceRun, View, Workshop, ratios, scales, since, table, write_steps,
 };
 use experiments::{Error, harness};
 use fem::FiniteElementStep;
@@ -137,6 +137,7 @@ fn program(options: &Options) -> Result<(), Error> {
             n,
             tau: TimeSteps::Constant(TAU),
             steps,
+            setting: Setting::default(),
             shown,
             initial: &initial,
             identity: mesh.about.identity(),
