@@ -291,6 +291,8 @@ fn evolution(
             calibration: solver::Factors::PAPER,
         },
         tau: TimeSteps::Constant(tau),
+        division: None,
+        still: None,
         region: None,
         sample_every: 8 * ratio,
         also_sample: [1, 2, 4].map(|k| k * ratio).to_vec(),

@@ -1,19 +1,20 @@
 //! One shape evolving by one method, kept on disk sample by sample, so that it can be compared with any other run.
 
+use std::ops::Add;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use fem::LinearSolver;
 use geometry::contour::ray_crossing;
-use geometry::measure::{perimeter, zero_set_volume};
+use geometry::measure::{l2_distance, perimeter, zero_set_volume};
 use geometry::{Field, Grid, npy};
 use indicatif::ProgressBar;
 use model::Network;
 use operators::ComputeDevice;
 use report::OutputDir;
 use serde::{Deserialize, Serialize};
-use solver::{Factors, FlowParams, FlowState, StepRecord};
+use solver::{Factors, FlowParams, FlowState, Parts, StepRecord, WillmoreFlow};
 
 use crate::Error;
 use crate::circles::Flow;
@@ -31,13 +32,12 @@ pub enum TimeSteps {
     Constant(f64),
     /// The first one; each of the others is twice as long as the one before.
     Doubling(f64),
-    /// All alike, but for the first: that is divided into `halvings + 1` parts, the first two of length `tau / 2^halvings` and each
-    /// of the others twice as long as the one before. Large steps from corners start so.
-    Ramp {
-        /// The step size in the end.
+    /// The first ones alike; each of the others is twice as long as the one before.
+    Growing {
+        /// Size of the first ones.
         tau: f64,
-        /// How often the first part is halved.
-        halvings: usize,
+        /// How many of them there are.
+        alike: usize,
     },
 }
 
@@ -47,11 +47,7 @@ impl TimeSteps {
         match self {
             Self::Constant(tau) => tau,
             Self::Doubling(first) => first * 2.0_f64.powi(step as i32 - 1),
-            Self::Ramp { tau, halvings } => {
-                // The first and the second part have the same length.
-                let doublings = step.max(2) - 2;
-                tau * 2.0_f64.powi(doublings.min(halvings) as i32 - halvings as i32)
-            }
+            Self::Growing { tau, alike } => tau * 2.0_f64.powi(step.saturating_sub(alike) as i32),
         }
     }
 
@@ -60,7 +56,8 @@ impl TimeSteps {
         match self {
             Self::Constant(tau) => steps as f64 * tau,
             Self::Doubling(first) => first * (2.0_f64.powi(steps as i32) - 1.0),
-            Self::Ramp { .. } => (1..=steps).map(|step| self.size(step)).sum(),
+            // An empty sum is -0.
+            Self::Growing { .. } => (1..=steps).map(|step| self.size(step)).fold(0.0, f64::add),
         }
     }
 
@@ -69,10 +66,22 @@ impl TimeSteps {
         match self {
             Self::Constant(tau) => format!("t{:.4}", -tau.log2()),
             Self::Doubling(first) => format!("doubling{:.4}", -first.log2()),
-            Self::Ramp { tau, halvings } => format!("ramp{:.4}-{halvings}", -tau.log2()),
+            Self::Growing { tau, alike } => format!("t{:.4}-growing{alike}", -tau.log2()),
         }
     }
 }
+
+/// Steps of Willmore flow in parts of adaptive size ([`solver::Parts`]).
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Division {
+    /// The first part of the first step is at most of this size; each other step begins with parts like the last ones before it.
+    pub first: f64,
+    /// The phase field is also kept after `tau / 2^k` of the first step, for these `k`, as far as a part ends there.
+    pub kept: Vec<u32>,
+}
+
+/// A part is halved at most this often with respect to the first part.
+const HALVINGS: i32 = 12;
 
 /// The nodes that may move, under a name.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -105,6 +114,13 @@ pub struct Evolution<const D: usize> {
     pub params: FlowParams,
     /// Sizes of the (outer) time steps.
     pub tau: TimeSteps,
+    /// Whether and how steps of Willmore flow are made in parts. Records and measures are then those of the parts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub division: Option<Division>,
+    /// A run of Willmore flow ends when a whole step in one part moves the phase field by less than this fraction of the way that it
+    /// has come (`L2`).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub still: Option<f64>,
     /// The region in which Willmore flow moves values, if not everywhere.
     pub region: Option<NamedRegion>,
     /// Steps between two samples.
@@ -113,7 +129,7 @@ pub struct Evolution<const D: usize> {
     pub also_sample: Vec<usize>,
     /// Number of steps.
     pub steps: usize,
-    /// Pause after this many steps, with a checkpoint. Does not change the result of the run that continues.
+    /// Pause after this many steps (or parts of steps), with a checkpoint. Does not change the result of the run that continues.
     #[serde(skip)]
     pub pause_after: Option<usize>,
 }
@@ -135,6 +151,24 @@ struct Stored {
     measures: Vec<Measures>,
     seconds: f64,
     checkpoint: Option<Checkpoint>,
+    /// Whole steps that are done, for a run that ended because it stood still.
+    #[serde(default)]
+    still: Option<usize>,
+}
+
+/// Where a run of Willmore flow is.
+struct Position {
+    /// How many records there were at the end of each complete step,
+    ends: Vec<usize>,
+    /// and the parts of the step that is being made.
+    parts: Parts,
+}
+
+impl Position {
+    /// Number of the step that is being made.
+    fn step(&self) -> usize {
+        self.ends.len() + 1
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -177,12 +211,16 @@ impl Measures {
 pub struct Trajectory<const D: usize> {
     /// What was run.
     pub evolution: Evolution<D>,
-    /// Records of the steps of Willmore flow; empty for mean curvature flow.
+    /// Records of the steps (or their parts) of Willmore flow; empty for mean curvature flow.
     pub records: Vec<StepRecord>,
-    /// Measures of the shape after every step, the initial ones first.
+    /// Measures of the shape after every step (or part), the initial ones first.
     pub measures: Vec<Measures>,
+    /// The last step, if the run ended early because it hardly moved any more. Its field is kept.
+    pub still: Option<usize>,
     /// Wall time of all steps, interruptions left out.
     pub seconds: f64,
+    /// How many records there were at the end of each step of Willmore flow.
+    ends: Vec<usize>,
     grid: Grid<D>,
     folder: OutputDir,
 }
@@ -196,6 +234,11 @@ impl<const D: usize> Evolution<D> {
             self.method.key_in(self.scheme),
             self.n,
             self.tau.key()
+                + if self.division.is_some() {
+                    "-parts"
+                } else {
+                    ""
+                }
         )
     }
 
@@ -208,9 +251,59 @@ impl<const D: usize> Evolution<D> {
         Ok(Grid::per_unit(self.n, self.side)?.with_origin(corner)?)
     }
 
-    /// The last step before the end or the pause.
+    /// The last step of a flow that is not divided, before the end or the pause.
     fn last(&self) -> usize {
         self.pause_after.unwrap_or(self.steps).min(self.steps)
+    }
+
+    /// Where the flow is in which step, from the parts that were made.
+    fn position(&self, records: &[StepRecord]) -> Result<Position, Error> {
+        let mut position = Position {
+            ends: Vec::new(),
+            parts: self.parts(1, f64::INFINITY)?,
+        };
+        for (k, record) in records.iter().enumerate() {
+            position.parts.made(record);
+            self.proceed(&mut position, k + 1)?;
+        }
+        Ok(position)
+    }
+
+    /// Goes to the next step if one is complete, after so many records, and says so.
+    fn proceed(&self, position: &mut Position, records: usize) -> Result<bool, Error> {
+        let complete = position.parts.next_size().is_none();
+        if complete {
+            let (step, size) = (position.step(), position.parts.size());
+            // Steps that double begin with twice the size, too.
+            let growth = self.tau.size(step + 1) / self.tau.size(step);
+            position.ends.push(records);
+            position.parts = self.parts(step + 1, growth * size)?;
+        }
+        Ok(complete)
+    }
+
+    /// The parts of a step that begins with parts of at most this size.
+    fn parts(&self, step: usize, first: f64) -> Result<Parts, Error> {
+        let tau = self.tau.size(step);
+        Ok(match &self.division {
+            None => Parts::new(tau, tau, tau)?,
+            Some(division) => {
+                let first = first.min(if step == 1 { division.first } else { tau });
+                let least = first.min(division.first).min(tau) * 2.0_f64.powi(-HALVINGS);
+                Parts::new(tau, first, least)?
+            }
+        })
+    }
+
+    /// `tau` of the first step over the time since the beginning, where that is a power of two whose field is to be kept.
+    fn kept_halvings(&self, position: &Position) -> Option<u32> {
+        let kept = self.division.as_ref().map_or(&[][..], |d| &d.kept);
+        let reached =
+            |k: &&u32| position.parts.progress().to_bits() == 0.5_f64.powi(**k as i32).to_bits();
+        kept.iter()
+            .filter(|_| position.step() == 1)
+            .find(reached)
+            .copied()
     }
 
     /// Whether the phase field after `step` steps is kept.
@@ -254,7 +347,9 @@ impl<const D: usize> Evolution<D> {
             evolution: self.clone(),
             records: Vec::new(),
             measures: Vec::new(),
+            still: None,
             seconds: 0.0,
+            ends: Vec::new(),
             grid,
             folder,
         };
@@ -272,6 +367,7 @@ impl<const D: usize> Evolution<D> {
         let state = match state {
             Some(state) => state,
             None => {
+                trajectory.forget_parts()?;
                 let field = initial(grid, self.params.eps)?;
                 stored
                     .measures
@@ -286,20 +382,34 @@ impl<const D: usize> Evolution<D> {
                 }
             }
         };
-        bar.set_position(state.step as u64);
-        if state.step < self.last() {
-            match self.flow {
-                Flow::Willmore => {
+        match self.flow {
+            Flow::Willmore => {
+                let mut position = self.position(&stored.records)?;
+                bar.set_position(position.ends.len() as u64);
+                if !self.is_over(&position, &stored) {
+                    let from = (&state, &mut position);
                     let step = (network, calibration);
-                    self.willmore(&mut trajectory, &mut stored, &state, step, device, bar)
+                    self.willmore(&mut trajectory, &mut stored, from, step, device, bar)?;
                 }
-                Flow::MeanCurvature => {
-                    self.mean_curvature(&mut trajectory, &mut stored, &state, network, device, bar)
+                trajectory.ends = position.ends;
+            }
+            Flow::MeanCurvature => {
+                bar.set_position(state.step as u64);
+                if state.step < self.last() {
+                    self.mean_curvature(
+                        &mut trajectory,
+                        &mut stored,
+                        &state,
+                        network,
+                        device,
+                        bar,
+                    )?;
                 }
-            }?;
+            }
         }
         trajectory.records = stored.records;
         trajectory.measures = stored.measures;
+        trajectory.still = stored.still;
         trajectory.seconds = stored.seconds;
         Ok(trajectory)
     }
@@ -324,7 +434,7 @@ impl<const D: usize> Evolution<D> {
         &self,
         trajectory: &mut Trajectory<D>,
         stored: &mut Stored,
-        state: &FlowState<D>,
+        (state, position): (&FlowState<D>, &mut Position),
         (network, calibration): (Option<&Network>, Factors),
         device: &ComputeDevice,
         bar: &ProgressBar,
@@ -342,27 +452,66 @@ impl<const D: usize> Evolution<D> {
         }
         flow.restore(state)?;
         let mut last = Instant::now();
-        while flow.steps() < self.last() {
-            let record = flow
-                .advance(self.tau.size(flow.steps() + 1))
-                .map_err(|error| self.failed(error.into()))?;
-            stored.seconds += record.seconds;
+        while !self.is_over(position, stored) {
+            let clock = Instant::now();
+            let advanced = flow.advance_part(&mut position.parts);
+            let Some(record) = advanced.map_err(|error| self.failed(error.into()))? else {
+                break;
+            };
+            // Attempts that failed count, too.
+            stored.seconds += clock.elapsed().as_secs_f64();
             stored.records.push(record);
-            let step = flow.steps();
             let field = flow.field()?;
             stored
                 .measures
                 .push(Measures::of(&field, self.centre, self.params.eps)?);
-            if self.samples(step) {
-                trajectory.keep(step, &field)?;
+            if let Some(halvings) = self.kept_halvings(position) {
+                npy::write(trajectory.path(&part_name(halvings))?, &field)?;
             }
-            bar.inc(1);
-            if step == self.last() || last.elapsed() >= CHECKPOINT_INTERVAL {
+            let step = position.step();
+            if self.proceed(position, stored.records.len())? {
+                if self.stands_still(trajectory, &flow, &record, step)? {
+                    stored.still = Some(step);
+                }
+                if self.samples(step) || stored.still.is_some() {
+                    trajectory.keep(step, &field)?;
+                }
+                bar.inc(1);
+            }
+            if self.is_over(position, stored) || last.elapsed() >= CHECKPOINT_INTERVAL {
                 trajectory.store(stored, &flow.state()?)?;
                 last = Instant::now();
             }
         }
         Ok(())
+    }
+
+    /// Whether the run is at its end or at a pause.
+    fn is_over(&self, position: &Position, stored: &Stored) -> bool {
+        let parts = stored.records.len();
+        position.step() > self.steps
+            || stored.still.is_some()
+            || self.pause_after.is_some_and(|pause| parts >= pause)
+    }
+
+    /// Whether a whole step has moved the phase field by next to nothing.
+    fn stands_still(
+        &self,
+        trajectory: &Trajectory<D>,
+        flow: &WillmoreFlow<D>,
+        record: &StepRecord,
+        step: usize,
+    ) -> Result<bool, Error> {
+        let is_whole = record.tau.to_bits() == self.tau.size(step).to_bits();
+        let (Some(limit), true) = (self.still, is_whole) else {
+            return Ok(false);
+        };
+        let state = flow.state()?;
+        let Some((previous, _)) = &state.previous else {
+            return Ok(false);
+        };
+        let moved = l2_distance(&state.current, previous)?;
+        Ok(moved <= limit * l2_distance(&state.current, &trajectory.field(0)?)?)
     }
 
     fn mean_curvature(
@@ -415,6 +564,51 @@ impl<const D: usize> Trajectory<D> {
         self.read(&sample_name(step))
     }
 
+    /// The phase field at the time `tau / 2^halvings` inside the first step, if it was [to be kept](Division::kept) and a part ended
+    /// there.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] if it cannot be read.
+    pub fn part_field(&self, halvings: u32) -> Result<Option<Field<D>>, Error> {
+        let name = part_name(halvings);
+        if !self.path(&name)?.exists() {
+            return Ok(None);
+        }
+        self.read(&name).map(Some)
+    }
+
+    /// The whole steps of Willmore flow that are done.
+    pub fn steps(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// The records of the parts of a step of Willmore flow, counted from 1; none if it was not made.
+    pub fn parts(&self, step: usize) -> &[StepRecord] {
+        let end = |step: usize| self.ends.get(step.wrapping_sub(1)).copied();
+        let Some(last) = end(step) else { return &[] };
+        &self.records[end(step - 1).unwrap_or(0)..last]
+    }
+
+    /// The record at the end of a step of Willmore flow, counted from 1.
+    pub fn record(&self, step: usize) -> Option<&StepRecord> {
+        self.parts(step).last()
+    }
+
+    /// The measures after so many steps of Willmore flow.
+    ///
+    /// # Errors
+    /// [`Error::Options`] if there were fewer steps.
+    pub fn measures_after(&self, step: usize) -> Result<&Measures, Error> {
+        let records = match step {
+            0 => Some(0),
+            step => self.ends.get(step - 1).copied(),
+        };
+        (records.and_then(|k| self.measures.get(k))).ok_or_else(|| {
+            let steps = self.steps();
+            Error::Options(format!("there is no step {step} in a run of {steps} steps"))
+        })
+    }
+
     /// `L2` distance to a run at a multiple of the resolution (and of the time resolution) at the same time, in the nodes of
     /// this grid: the finer phase field is sampled there.
     ///
@@ -441,10 +635,7 @@ impl<const D: usize> Trajectory<D> {
             fine.values()[fine.grid().index(index)]
         });
         let sampled = Field::from_values(self.grid, sampled.collect())?;
-        Ok(geometry::measure::l2_distance(
-            &self.field(step)?,
-            &sampled,
-        )?)
+        Ok(l2_distance(&self.field(step)?, &sampled)?)
     }
 
     fn path(&self, name: &str) -> Result<PathBuf, Error> {
@@ -458,6 +649,15 @@ impl<const D: usize> Trajectory<D> {
 
     fn keep(&self, step: usize, field: &Field<D>) -> Result<(), Error> {
         Ok(npy::write(self.path(&sample_name(step))?, field)?)
+    }
+
+    /// Removes the fields inside the first step that another run has left: which ones this run will have is not known before.
+    fn forget_parts(&self) -> Result<(), Error> {
+        for &halvings in self.evolution.division.iter().flat_map(|d| &d.kept) {
+            // A file that is not there needs no removal.
+            let _ = std::fs::remove_file(self.path(&part_name(halvings))?);
+        }
+        Ok(())
     }
 
     fn stored(&self) -> Option<Stored> {
@@ -539,6 +739,10 @@ fn half_motion_name(level: usize) -> String {
     format!("half{level}")
 }
 
+fn part_name(halvings: u32) -> String {
+    format!("part_{halvings:02}")
+}
+
 fn checkpoint_name(step: usize, which: &str) -> String {
     format!("checkpoint_{step:05}_{which}")
 }
@@ -570,6 +774,8 @@ mod tests {
                 calibration: solver::Factors::PAPER,
             },
             tau: TimeSteps::Constant(STEP),
+            division: None,
+            still: None,
             region: None,
             sample_every: 2,
             also_sample: vec![1],
@@ -592,14 +798,60 @@ mod tests {
     }
 
     #[test]
-    fn a_ramp_makes_up_for_one_step() {
-        let ramp = TimeSteps::Ramp {
+    fn growing_steps_begin_alike() {
+        let growing = TimeSteps::Growing {
             tau: 0.25,
-            halvings: 3,
+            alike: 3,
         };
-        let sizes: Vec<f64> = (1..=6).map(|step| ramp.size(step)).collect();
-        assert_eq!(sizes, [0.03125, 0.03125, 0.0625, 0.125, 0.25, 0.25]);
-        assert!((ramp.time(4) - 0.25).abs() < 1e-15);
+        let sizes: Vec<f64> = (1..=5).map(|step| growing.size(step)).collect();
+        assert_eq!(sizes, [0.25, 0.25, 0.25, 0.5, 1.0]);
+        assert!((growing.time(5) - 2.25).abs() < 1e-15);
+    }
+
+    /// Parts, what they keep, and standing still: the same after an interruption in the middle of a step.
+    #[test]
+    fn steps_in_parts_are_interrupted_and_end_when_nothing_moves() {
+        let root = tempfile::tempdir().unwrap();
+        let store = |name: &str| OutputDir::create(root.path().join(name)).unwrap();
+        let device = ComputeDevice::default_compiled().unwrap();
+        let bar = Progress::new(true).bar("", 4);
+        let network = pretrained::find(crate::networks::convergence_ratios(128).unwrap()).unwrap();
+        let divided = Evolution {
+            division: Some(Division {
+                first: 0.25 * STEP,
+                kept: vec![1, 2, 3],
+            }),
+            // In the first step that is made in one part.
+            still: Some(0.9),
+            ..evolution(Flow::Willmore, Method::Hybrid)
+        };
+        let run = |e: &Evolution<2>, folder: &OutputDir| {
+            e.run(&disc, Some(&network), &device, folder, &bar).unwrap()
+        };
+        let reference = run(&divided, &store("whole"));
+        let sizes: Vec<f64> = reference.records.iter().map(|r| r.tau / STEP).collect();
+        assert_eq!(sizes, [0.25, 0.25, 0.5, 1.0]);
+        assert_eq!((reference.steps(), reference.still), (2, Some(2)));
+        assert!((reference.record(2).unwrap().time - 2.0 * STEP).abs() < 1e-15);
+        assert_eq!(reference.measures.len(), 5);
+        let paused = Evolution {
+            pause_after: Some(2),
+            ..divided.clone()
+        };
+        let folder = store("interrupted");
+        assert_eq!(run(&paused, &folder).records.len(), 2);
+        for _ in 0..2 {
+            let resumed = run(&divided, &folder);
+            assert_eq!(resumed.measures, reference.measures);
+            assert_eq!(resumed.still, reference.still);
+            for k in [1, 2, 3] {
+                let part = resumed.part_field(k).unwrap();
+                assert_eq!(part, reference.part_field(k).unwrap());
+                // No part ended at an eighth of the step.
+                assert_eq!(part.is_some(), k < 3);
+            }
+            assert_eq!(resumed.field(2).unwrap(), reference.field(2).unwrap());
+        }
     }
 
     #[test]

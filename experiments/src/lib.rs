@@ -27,6 +27,7 @@ pub mod comparison;
 mod error;
 pub mod evolution;
 pub mod harness;
+pub mod inpainting;
 pub mod memory;
 pub mod mesh_flow;
 pub mod meshes;

@@ -13,8 +13,8 @@ use crate::method::{Method, Scheme};
 use crate::networks::{NetworkOptions, checksum};
 use crate::options::RunOptions;
 use crate::surfaces::{
-    Finished, SchemeOptions, Snapshot, SurfaceRun, View, Workshop, ratios, scales, since, table,
-    write_steps,
+    Finished, SchemeOptions, Setting, Snapshot, SurfaceRun, View, Workshop, ratios, scales, since,
+    table, write_steps,
 };
 use crate::{Error, memory};
 
@@ -175,7 +175,10 @@ impl MeshFlow {
                     key: self.program.to_owned(),
                     title: mesh.about.title.clone(),
                     method: Method::Hybrid,
-                    scheme,
+                    setting: Setting {
+                        scheme,
+                        ..Setting::default()
+                    },
                     n,
                     tau: self.tau,
                     steps,

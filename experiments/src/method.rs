@@ -27,10 +27,11 @@ pub enum Method {
 }
 
 /// How the energy of a time step of Willmore flow is weighted.
-#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Scheme {
     /// As in the paper
+    #[default]
     Paper,
     /// Divided by the step's calibration factors; a learned operator with its odd part, which treats both phases alike
     Calibrated,

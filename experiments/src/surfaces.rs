@@ -7,14 +7,14 @@ use fem::FiniteElementStep;
 use geometry::{Field, Grid};
 use model::{Network, Ratios};
 use operators::ComputeDevice;
-use render::{Axis, Bounds, Framing, Quality, Scene, Tube};
+use render::{Axis, Bounds, Framing, Quality, Rgb, Scene, Tube};
 use report::{Column, Figure, Format, Manifest, OutputDir, Progress, Raster, Summary, Table};
 use serde::Serialize;
 use solver::{FlowParams, NewtonParams, StepRecord};
 use surfaces::ClosedMesh;
 
 use crate::circles::Flow;
-use crate::evolution::{Evolution, TimeSteps, Trajectory};
+use crate::evolution::{Division, Evolution, NamedRegion, TimeSteps, Trajectory};
 use crate::method::{Method, Scheme};
 use crate::options::RunOptions;
 use crate::{Error, memory};
@@ -25,6 +25,8 @@ const EPS_OVER_H: f64 = 2.0;
 const MARGIN: f64 = 0.02;
 /// Kernel width of the network for surfaces.
 const WIDTH: usize = 17;
+/// Colour of a surface where it may move, if it may not everywhere.
+const MOVING: Rgb = Rgb(150, 196, 160);
 
 /// The scales of the paper for surfaces at resolution `n`: `eps = 2h`, `tautilde = h^2`.
 pub fn scales(n: usize) -> FlowParams {
@@ -87,6 +89,19 @@ pub struct View {
     pub elevation: f64,
 }
 
+/// How a surface flows; by default as in the paper, everywhere and in whole steps, to the end.
+#[derive(Clone, Debug, Default)]
+pub struct Setting {
+    /// The scheme.
+    pub scheme: Scheme,
+    /// Where it moves.
+    pub region: Option<NamedRegion>,
+    /// Whether and how its steps are made in parts.
+    pub division: Option<Division>,
+    /// When it stands still, see [`Evolution::still`].
+    pub still: Option<f64>,
+}
+
 /// A surface that flows.
 pub struct SurfaceRun<'a> {
     /// Prefix of its metrics and name of its folder.
@@ -95,15 +110,15 @@ pub struct SurfaceRun<'a> {
     pub title: String,
     /// The method.
     pub method: Method,
-    /// The scheme.
-    pub scheme: Scheme,
     /// Cells per unit length.
     pub n: usize,
     /// Sizes of the time steps.
     pub tau: TimeSteps,
     /// Their number.
     pub steps: usize,
-    /// Steps to be shown, and with them the Willmore energy that the paper reports.
+    /// How else it flows.
+    pub setting: Setting,
+    /// Steps to be shown, and with them the Willmore energy that the paper reports. Of a run that ends early, the last one is shown.
     pub shown: Vec<(usize, Option<f64>)>,
     /// The phase field at the beginning.
     pub initial: &'a Field<3>,
@@ -197,20 +212,21 @@ impl Workshop<'_> {
             shape: run.identity.clone(),
             flow: Flow::Willmore,
             method: run.method,
-            scheme: run.scheme,
+            scheme: run.setting.scheme,
             n: run.n,
             side: run.initial.grid().side(),
             centre: CENTRE,
             params,
             tau: run.tau,
-            region: None,
+            division: run.setting.division.clone(),
+            still: run.setting.still,
+            region: run.setting.region.clone(),
             sample_every: run.steps.max(1),
             also_sample: run.shown.iter().map(|(step, _)| *step).collect(),
             steps: run.steps,
             pause_after: None,
         };
-        let label = run.method.label_in(run.scheme);
-        let title = format!("{}, {label}, n = {}", run.title, run.n);
+        let title = format!("{}, {}, n = {}", run.title, run.label(), run.n);
         let bar = self.progress.bar(title.clone(), run.steps as u64);
         let store = self.output.subfolder("fields")?.subfolder(&run.key)?;
         let initial = run.initial;
@@ -228,17 +244,23 @@ impl Workshop<'_> {
         memory::release_freed();
         let measure = FiniteElementStep::implicit(initial.grid(), params.eps, params.mcf_step)?;
         let meshes = self.output.subfolder("meshes")?;
-        let steps = run.shown.iter().filter(|(step, _)| *step <= run.steps);
+        let last = trajectory.steps();
+        let mut shown: Vec<_> = (run.shown.iter().copied())
+            .filter(|(step, _)| *step <= last)
+            .collect();
+        if shown.last().is_none_or(|(step, _)| *step < last) {
+            shown.push((last, None));
+        }
         let snapshots = manifest.phase(format!("{}: measures", run.title), || {
-            steps
-                .map(|&(step, paper)| {
+            (shown.into_iter())
+                .map(|(step, paper)| {
                     let u = trajectory.field(step)?;
                     // The isosurface is closed by construction; whoever uses the file relies on it.
                     let surface = surfaces::phase_field_surface(&u, params.eps)?;
                     let (surface, _) = ClosedMesh::new(surface)?;
                     let name = format!("{}.ply", run.name(step));
                     surfaces::write(meshes.path(&name)?, surface.mesh())?;
-                    let measures = &trajectory.measures[step];
+                    let measures = trajectory.measures_after(step)?;
                     memory::release_freed();
                     Ok(Snapshot {
                         step,
@@ -278,7 +300,7 @@ impl Workshop<'_> {
         }
     }
 
-    /// One row per run: pictures of the shown steps, all in one framing, each also as a file of its own with the mesh.
+    /// One row per run: pictures of the shown steps.
     ///
     /// `decorate` adds tubes to a picture: run, step.
     ///
@@ -294,42 +316,68 @@ impl Workshop<'_> {
         let columns = finished.iter().map(|f| f.snapshots.len()).max();
         let labels = finished
             .iter()
-            .map(|f| format!("{}\n{}", f.run.title, f.label().replace(", ", "\n")));
+            .map(|f| format!("{}\n{}", f.run.title, f.run.label().replace(", ", "\n")));
         let mut figure =
             Figure::new(self.options.title(title), columns.unwrap_or(1)).with_row_labels(labels);
+        for (k, one) in finished.iter().enumerate() {
+            let caption = |snapshot: &Snapshot| caption(k, snapshot);
+            for panel in self.panels(one, &caption, &|step| decorate(k, step))? {
+                figure = figure.with_panel(panel);
+            }
+        }
+        Ok(figure)
+    }
+
+    /// Pictures of the shown steps of a run, all in one framing, each also as a file of its own with the mesh.
+    ///
+    /// `decorate` adds tubes to the picture of a step.
+    ///
+    /// # Errors
+    /// What rendering and writing raise.
+    pub fn panels(
+        &self,
+        finished: &Finished<'_>,
+        caption: &dyn Fn(&Snapshot) -> String,
+        decorate: &dyn Fn(usize) -> Vec<Tube>,
+    ) -> Result<Vec<Raster>, Error> {
+        let Finished {
+            run,
+            trajectory,
+            snapshots,
+            ..
+        } = finished;
         let (size, quality) = self.picture_size();
         let pictures = self.output.subfolder("pictures")?;
         memory::release_freed();
-        for (
-            k,
-            Finished {
-                run,
-                trajectory,
-                snapshots,
-                ..
-            },
-        ) in finished.iter().enumerate()
-        {
-            let eps = trajectory.evolution.params.eps;
-            let scene = |snapshot: &Snapshot| -> Result<Scene<'static>, Error> {
-                Ok(Scene::new(&trajectory.field(snapshot.step)?, eps)?
-                    .up(run.view.up)
-                    .azimuth(run.view.azimuth)
-                    .elevation(run.view.elevation)
-                    .margin(MARGIN)
-                    .quality(quality)
-                    .tubes(decorate(k, snapshot.step)))
-            };
-            // Made twice rather than kept: a scene takes several times the memory of its phase field.
-            let mut bounds: Option<Bounds> = None;
-            for snapshot in snapshots {
-                let one = scene(snapshot)?.bounds();
+        let eps = trajectory.evolution.params.eps;
+        let moving = run.moving()?;
+        let scene = |snapshot: &Snapshot| -> Result<Scene<'static>, Error> {
+            let mut scene = Scene::new(&trajectory.field(snapshot.step)?, eps)?;
+            if let Some(moving) = &moving {
+                scene = scene.highlight_mask(moving, MOVING)?;
+            }
+            Ok(scene
+                .up(run.view.up)
+                .azimuth(run.view.azimuth)
+                .elevation(run.view.elevation)
+                .margin(MARGIN)
+                .quality(quality)
+                .tubes(decorate(snapshot.step)))
+        };
+        // Made twice rather than kept: a scene takes several times the memory of its phase field.
+        let mut bounds: Option<Bounds> = None;
+        for snapshot in snapshots {
+            let tubes = decorate(snapshot.step);
+            let points = tubes.into_iter().flat_map(|tube| tube.points);
+            for one in [scene(snapshot)?.bounds(), Bounds::around(points)] {
                 bounds = match (bounds, one) {
                     (Some(all), Some(one)) => Some(all.union(&one)),
                     (all, one) => all.or(one),
                 };
             }
-            for snapshot in snapshots {
+        }
+        (snapshots.iter())
+            .map(|snapshot| {
                 let mut scene = scene(snapshot)?;
                 if let Some(bounds) = bounds {
                     scene = scene.framing(Framing::Within(bounds));
@@ -338,40 +386,45 @@ impl Workshop<'_> {
                 let picture = scene.render(size)?;
                 picture.write_png(pictures.path(&format!("{name}.png"))?)?;
                 let size = [picture.width() as usize, picture.height() as usize];
-                let raster = Raster::new(size, picture.pixels()).with_caption(caption(k, snapshot));
-                figure = figure.with_panel(raster);
-            }
-        }
-        Ok(figure)
+                Ok(Raster::new(size, picture.pixels()).with_caption(caption(snapshot)))
+            })
+            .collect()
     }
 }
 
 impl SurfaceRun<'_> {
     /// Name of the files of a step.
     fn name(&self, step: usize) -> String {
-        let method = self.method.key_in(self.scheme);
+        let method = self.method.key_in(self.setting.scheme);
         format!("{}_{method}_step{step:03}", self.key)
+    }
+
+    /// Name of method and scheme.
+    pub fn label(&self) -> String {
+        self.method.label_in(self.setting.scheme)
+    }
+
+    /// 1 at the nodes that may move, 0 at the others; nothing if all may.
+    fn moving(&self) -> Result<Option<Field<3>>, Error> {
+        let Some(region) = &self.setting.region else {
+            return Ok(None);
+        };
+        let mask = region.nodes.iter().map(|&moves| f64::from(moves));
+        Ok(Some(Field::from_values(
+            *self.initial.grid(),
+            mask.collect(),
+        )?))
     }
 }
 
 impl Finished<'_> {
     /// Prefix of its metrics: the surface, and the method unless it is the learned operator in the paper's scheme.
     pub fn key(&self) -> String {
-        let SurfaceRun {
-            key,
-            method,
-            scheme,
-            ..
-        } = &self.run;
-        match (method, scheme) {
+        let SurfaceRun { key, method, .. } = &self.run;
+        match (method, self.run.setting.scheme) {
             (Method::Hybrid, Scheme::Paper) => key.clone(),
-            _ => format!("{key}.{}", method.key_in(*scheme)),
+            (_, scheme) => format!("{key}.{}", method.key_in(scheme)),
         }
-    }
-
-    /// Name of the method and scheme.
-    pub fn label(&self) -> String {
-        self.run.method.label_in(self.run.scheme)
     }
 
     /// Adds the metrics of this run.
@@ -380,6 +433,22 @@ impl Finished<'_> {
     /// [`Error::Report`] for a value that is not finite.
     pub fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
         let key = self.key();
+        self.summarize_shapes(&key, summary)?;
+        let records = &self.trajectory.records;
+        let count = records.len().max(1) as f64;
+        let hvp: f64 = records.iter().map(StepRecord::hvp).sum();
+        let rises = records.iter().filter(|r| r.energy > r.energy_before);
+        summary.insert(&format!("{key}.hvp_per_step"), hvp / count)?;
+        summary.insert_count(&format!("{key}.energy_increases"), rises.count())?;
+        summary.insert(&format!("{key}.seconds"), self.trajectory.seconds)?;
+        Ok(())
+    }
+
+    /// Adds the metrics of the shown shapes, and the memory that they took.
+    ///
+    /// # Errors
+    /// [`Error::Report`] for a value that is not finite.
+    pub fn summarize_shapes(&self, key: &str, summary: &mut Summary) -> Result<(), Error> {
         for s in &self.snapshots {
             summary.insert(&format!("{key}.w.step{}", s.step), s.w)?;
             summary.insert(&format!("{key}.w_scheme.step{}", s.step), s.w_scheme)?;
@@ -388,13 +457,6 @@ impl Finished<'_> {
             let euler = s.euler_characteristic as f64;
             summary.insert(&format!("{key}.euler_characteristic.step{}", s.step), euler)?;
         }
-        let records = &self.trajectory.records;
-        let count = records.len().max(1) as f64;
-        let hvp: f64 = records.iter().map(StepRecord::hvp).sum();
-        let rises = records.iter().filter(|r| r.energy > r.energy_before);
-        summary.insert(&format!("{key}.hvp_per_step"), hvp / count)?;
-        summary.insert_count(&format!("{key}.energy_increases"), rises.count())?;
-        summary.insert(&format!("{key}.seconds"), self.trajectory.seconds)?;
         if let Some(peak) = self.peak_mib {
             summary.insert(&format!("{key}.peak_mib"), peak)?;
         }
@@ -422,7 +484,7 @@ pub fn table(finished: &[Finished<'_>]) -> Result<Table, Error> {
         for s in &f.snapshots {
             table.push([
                 f.run.title.as_str().into(),
-                f.label().into(),
+                f.run.label().into(),
                 s.step.into(),
                 s.w.into(),
                 s.paper.into(),
@@ -447,7 +509,7 @@ pub fn write_steps(finished: &[Finished<'_>], output: &OutputDir) -> Result<(), 
             f.trajectory.records.iter().map(|r| StepRow {
                 surface: &f.run.key,
                 method: f.run.method,
-                scheme: f.run.scheme,
+                scheme: f.run.setting.scheme,
                 step: r.step,
                 time: r.time,
                 tau: r.tau,

@@ -298,7 +298,11 @@ fn the_quick_inpainting_changes_nothing_outside() {
         assert!(metric("changed_outside") <= 0.0);
         assert!(metric("energy_increases") <= 0.0);
     }
-    assert!(summary.get("disk.distance.step2") < summary.get("disk.distance.step0"));
+    // Round again, and the rest of the steps is not made.
+    assert!(summary.get("disk.distance.step0").unwrap() > 0.2);
+    assert!(summary.get("disk.distance.step1").unwrap() < 0.02);
+    assert!(summary.get("disk.still_from_step").unwrap() < 5.0);
+    assert!(summary.get("disk.parts_of_step1").unwrap() > 4.0);
     // As printed, tautilde is beyond what the scheme allows at the paper's resolution.
     refused(
         INPAINTING,

@@ -18,6 +18,7 @@ use report::Summary;
 
 const ARMADILLO: &str = env!("CARGO_BIN_EXE_armadillo");
 const DISK_AND_CUBE: &str = env!("CARGO_BIN_EXE_disk_and_cube");
+const INPAINTING: &str = env!("CARGO_BIN_EXE_inpainting_3d");
 const MESH_DISTANCE: &str = env!("CARGO_BIN_EXE_mesh_distance");
 const ROCKER_ARM: &str = env!("CARGO_BIN_EXE_rocker_arm");
 const SPHERES: &str = env!("CARGO_BIN_EXE_spheres");
@@ -70,6 +71,30 @@ fn cube_and_disk_come_near_their_finite_element_runs() {
         let l2 = metric(&format!("{key}.l2_to_fe.step2"));
         assert!(l2 > 0.0 && l2 < 0.02, "{key}: {l2}");
     }
+}
+
+#[test]
+fn quick_inpainting_changes_nothing_outside() {
+    let root = tempfile::tempdir().unwrap();
+    let arguments = ["--quick", "--quiet", "--output", "out"];
+    let summary = metrics(INPAINTING, root.path(), &arguments);
+    let metric = |name: &str| summary.get(name).unwrap_or_else(|| panic!("no {name}"));
+    for (key, last) in [("ball", 5), ("tubes", 8)] {
+        assert!(metric(&format!("{key}.changed_outside")) <= 0.0);
+        assert!(metric(&format!("{key}.energy_increases")) <= 0.0);
+        assert!(metric(&format!("{key}.w.step{last}")) < metric(&format!("{key}.w.step0")));
+        let euler = metric(&format!("{key}.euler_characteristic.step{last}"));
+        assert!((euler - 2.0).abs() < 0.5, "{key}: {euler}");
+        let frames = format!("out/{key}_frames.png");
+        assert!(root.path().join(frames).exists());
+    }
+    let distance = |step: usize| metric(&format!("ball.distance.step{step}"));
+    assert!(distance(5) < distance(1) && distance(1) < distance(0));
+    assert!(metric("tubes.distance.step8") > 0.0);
+    let many = ["--quick", "--extra-steps", "100"];
+    refused(INPAINTING, root.path(), &many, &["--extra-steps 100", "24"]);
+    let device = ["--quick", "--device", "abacus"];
+    refused(INPAINTING, root.path(), &device, &["abacus"]);
 }
 
 #[test]

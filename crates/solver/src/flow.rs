@@ -308,6 +308,15 @@ impl<const D: usize> WillmoreFlow<D> {
     /// # Errors
     /// [`Error::NonFinite`] naming the field, [`Error::NotConverged`]; the flow stays where it was.
     pub fn advance(&mut self, tau: f64) -> Result<StepRecord, Error> {
+        let half_motions = self.half_motions();
+        let made = self.make_step(tau);
+        if made.is_err() {
+            self.set_half_motions(&half_motions)?;
+        }
+        made
+    }
+
+    fn make_step(&mut self, tau: f64) -> Result<StepRecord, Error> {
         let clock = Instant::now();
         let step = self.step + 1;
         let stiffness = self.params.stiffness(tau);

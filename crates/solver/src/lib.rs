@@ -74,6 +74,7 @@ mod error;
 mod flow;
 mod interface;
 mod newton;
+mod parts;
 mod preconditioner;
 mod region;
 mod samples;
@@ -87,6 +88,7 @@ pub use flow::{
 pub use model::Factors;
 pub use newton::{Exit, Method, NewtonInfo, NewtonParams, Precision, minimize};
 pub use operators::{extrapolate, retract};
+pub use parts::Parts;
 pub use preconditioner::Preconditioner;
 pub use region::Region;
 pub use times::PhaseTimes;

@@ -91,6 +91,30 @@ fn a_restored_flow_continues_with_the_same_bytes() {
 }
 
 #[test]
+fn a_step_that_failed_leaves_no_trace() {
+    let mut whole = flow(true);
+    steps(&mut whole, 3);
+    let state = whole.state().unwrap();
+    let step = |fails: bool| {
+        let network = accurate(256, 33);
+        let mut params = scales(&network);
+        params.newton.newton_iterations = 2;
+        let mut flow = WillmoreFlow::with_network(&network, &cross(), params, &device()).unwrap();
+        flow.begin_on_half_grids(&network).unwrap();
+        flow.restore(&state).unwrap();
+        if fails {
+            let error = flow.advance(64.0 * TAU).unwrap_err();
+            assert!(matches!(error, Error::NotConverged { .. }), "{error}");
+            assert_eq!(flow.state().unwrap(), state);
+        }
+        let record = flow.advance(TAU / 64.0).unwrap();
+        assert_eq!(record.start.kind, StartKind::HalfGrid);
+        flow.field().unwrap()
+    };
+    assert_eq!(step(true), step(false));
+}
+
+#[test]
 fn a_region_is_held_on_both_grids() {
     let inside: Vec<bool> = (0..grid().len())
         .map(|node| grid().node(node).iter().all(|x| x.abs() < 0.16))

@@ -9,8 +9,8 @@ use experiments::method::{Method, Scheme};
 use experiments::networks::{NetworkOptions, checksum};
 use experiments::options::RunOptions;
 use experiments::surfaces::{
-    Finished, SchemeOptions, SurfaceRun, View, Workshop, centred_box, ratios, scales, since, table,
-    write_steps,
+    Finished, SchemeOptions, Setting, SurfaceRun, View, Workshop, centred_box, ratios, scales,
+    since, table, write_steps,
 };
 use experiments::{Error, harness};
 use geometry::shapes::{Cuboid, Cylinder};
@@ -190,10 +190,13 @@ fn program(options: &Options) -> Result<(), Error> {
                     key: solid.key.to_owned(),
                     title: solid.title.to_owned(),
                     method,
-                    scheme,
                     n,
                     tau: TimeSteps::Constant(TAU),
                     steps,
+                    setting: Setting {
+                        scheme,
+                        ..Setting::default()
+                    },
                     shown,
                     initial: &solid.initial,
                     identity: solid.identity.clone(),

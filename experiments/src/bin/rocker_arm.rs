@@ -113,7 +113,7 @@ fn clifford<'a>(
         lines_of_report.push(format!(
             "\nNearest Clifford torus, {}: L2 distance {:.4} (paper {PAPERS_L2:.4}), outer radius {:.3}, w = {:.2} (paper \
              {PAPERS_CLIFFORD})",
-            one.label(),
+            one.run.label(),
             torus.fit.l2,
             torus.fit.outer_radius,
             torus.w

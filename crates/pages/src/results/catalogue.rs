@@ -175,6 +175,16 @@ pub(crate) const CATALOGUE: &[Entry] = &[
         ],
     },
     Entry {
+        folder: "inpainting_3d",
+        title: "Inpainting of surfaces",
+        description: "Willmore flow of what lies inside the green box; everything else is held.",
+        figures: &[
+            ("ball_frames", "A ball whose corner was cut out."),
+            ("tubes_frames", "Six tubes that are blended."),
+            ("energies", "Willmore energy against time."),
+        ],
+    },
+    Entry {
         folder: "performance",
         title: "Performance",
         description: "Not in the paper: what a step of the hybrid scheme costs in two and three \
