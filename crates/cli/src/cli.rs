@@ -45,6 +45,9 @@ pub enum Command {
     /// Mean curvature flow, by the network or by finite elements
     #[command(after_help = MCF_EXAMPLES)]
     Mcf(McfOptions),
+    /// Write a built-in shape or another input to a file, possibly with noise and holes: something to try the program on
+    #[command(after_help = SAMPLE_EXAMPLES)]
+    Sample(SampleOptions),
     /// List the networks that come with the program, or show one
     #[command(after_help = NETWORKS_EXAMPLES)]
     Networks(NetworksOptions),
@@ -86,6 +89,10 @@ Lengths are those of the box, whose centre is 0: see --box-side and --side-lengt
 const MCF_EXAMPLES: &str = "Examples:
   willmore mcf logo.png --steps 64
   willmore mcf builtin:torus --method fe-implicit --frames 4";
+const SAMPLE_EXAMPLES: &str = "Examples:
+  willmore sample builtin:figure --noise 0.005 --save scan.ply
+  willmore sample builtin:ring --without ball:0.4,0.2,0.1 --save logo.png
+  willmore sample ball:0.4,0.2,0.15 --save mask.png";
 const NETWORKS_EXAMPLES: &str = "Examples:
   willmore networks
   willmore networks show d2_k17_eps2_step1
@@ -105,8 +112,8 @@ const COMPLETIONS_EXAMPLES: &str =
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct InputOptions {
-    /// A mesh (.obj, .stl, .ply), an image (.png, .jpg), a field (.npy, .vti), or builtin:NAME with NAME one of disc, ring,
-    /// cross, rectangle, sphere, cube, torus, coin, figure, lever
+    /// A mesh (.obj, .stl, .ply), an image (.png, .jpg), a field (.npy, .vti), builtin:NAME with NAME one of disc, ring,
+    /// cross, rectangle, sphere, cube, torus, coin, figure, lever, or a region as box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z
     pub input: Option<String>,
 
     /// Cells per unit length [default: 128 in 2D, 64 in 3D]
@@ -228,6 +235,10 @@ pub struct KeepOptions {
     /// Steps between two checkpoints
     #[arg(long, value_name = "STEPS", default_value_t = 5)]
     pub checkpoint_every: usize,
+
+    /// Leave out index.html, the page of the run for a browser
+    #[arg(long)]
+    pub no_page: bool,
 
     /// Folder of the run [default: runs/NAME-COMMAND, with a number if that is there]
     #[arg(long, value_name = "DIR")]
@@ -415,6 +426,33 @@ impl fmt::Display for McfMethod {
                 .map_or("", PossibleValue::get_name),
         )
     }
+}
+
+/// Options of `sample`.
+#[derive(Args, Clone, Debug)]
+#[allow(missing_docs)]
+pub struct SampleOptions {
+    #[command(flatten)]
+    pub input: InputOptions,
+
+    /// The file to write: a picture (.png), a mesh (.ply, .obj, .stl) or a field (.npy, .vti)
+    #[arg(long, value_name = "FILE")]
+    pub save: Option<PathBuf>,
+
+    /// Cut this region out: box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z; may be given again
+    #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
+    pub without: Vec<Region>,
+
+    /// Move the vertices of a mesh along their normals by random lengths of up to this
+    #[arg(long, value_name = "LENGTH")]
+    pub noise: Option<f64>,
+
+    /// Seed of the noise
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+
+    #[command(flatten)]
+    pub say: SayOptions,
 }
 
 /// Options of `resume`.

@@ -45,6 +45,9 @@ pub enum Error {
         /// What the last attempt said.
         source: Box<solver::Error>,
     },
+    /// From files.
+    #[error(transparent)]
+    Files(#[from] files::Error),
     /// From finite elements.
     #[error(transparent)]
     Fem(#[from] fem::Error),
@@ -63,6 +66,12 @@ pub enum Error {
     /// From devices.
     #[error(transparent)]
     Operators(#[from] operators::Error),
+    /// From the page of a run.
+    #[error(transparent)]
+    Pages(#[from] pages::Error),
+    /// From plots.
+    #[error(transparent)]
+    Report(#[from] report::Error),
     /// From pictures.
     #[error(transparent)]
     Render(#[from] render::Error),

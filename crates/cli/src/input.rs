@@ -48,6 +48,7 @@ enum Source<'a> {
     Image(PathBuf),
     Field(PathBuf),
     BuiltIn(&'a str),
+    Region(Region),
 }
 
 /// Least resolution.
@@ -66,6 +67,9 @@ impl Source<'_> {
         if let Some(name) = input.strip_prefix("builtin:") {
             return Ok(Source::BuiltIn(name));
         }
+        if Region::is_meant(input) {
+            return Ok(Source::Region(input.parse().map_err(Error::Options)?));
+        }
         let path = std::path::absolute(input).map_err(|source| Error::Io {
             action: "find",
             path: input.into(),
@@ -78,8 +82,8 @@ impl Source<'_> {
             "npy" | "vti" => Source::Field(path),
             _ => {
                 return Err(Error::options(format!(
-                    "{input} is no input: give a mesh (.obj, .stl, .ply), an image (.png, .jpg), a field (.npy, .vti), or \
-                     builtin:NAME"
+                    "{input} is no input: give a mesh (.obj, .stl, .ply), an image (.png, .jpg), a field (.npy, .vti), \
+                     builtin:NAME, or a region as box:... or ball:..."
                 )));
             }
         };
@@ -101,6 +105,7 @@ pub fn load(options: &mut InputOptions, eps_over_h: f64, say: SayOptions) -> Res
     refuse_foreign(options, &source)?;
     let name = match &source {
         Source::BuiltIn(name) => (*name).to_owned(),
+        Source::Region(region) => region.name().to_owned(),
         Source::Mesh(path) | Source::Image(path) | Source::Field(path) => {
             options.input = Some(path.to_string_lossy().into_owned());
             let stem = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -125,6 +130,14 @@ pub fn load(options: &mut InputOptions, eps_over_h: f64, say: SayOptions) -> Res
         }
         Source::Image(path) => image(&path, options, eps_over_h, name)?,
         Source::Field(path) => field(&path, options, eps_over_h, name)?,
+        Source::Region(region) if region.dimension() == 2 => {
+            let grid = bare_grid::<2>(options, 128, 2.0)?;
+            plane(name, grid, region.shape::<2>()?.as_ref(), eps_over_h)?
+        }
+        Source::Region(region) => {
+            let grid = bare_grid::<3>(options, 64, 1.0)?;
+            space(name, grid, region.shape::<3>()?.as_ref(), eps_over_h)?
+        }
         Source::BuiltIn(known) => match shape::dimension(known)? {
             2 => {
                 let (grid, side) = grid::<2>(options, 128, 2.0)?;
@@ -139,12 +152,7 @@ pub fn load(options: &mut InputOptions, eps_over_h: f64, say: SayOptions) -> Res
                     BuiltIn::Mesh(mesh) => {
                         Loaded::Space(place(&mesh, options, eps_over_h, name, say)?)
                     }
-                    BuiltIn::Space(shape) => Loaded::Space(Start {
-                        name,
-                        field: phase_field(grid, shape.as_ref(), eps_over_h * grid.spacing())?,
-                        outlet: Space::identity(),
-                        region: None,
-                    }),
+                    BuiltIn::Space(shape) => space(name, grid, shape.as_ref(), eps_over_h)?,
                     BuiltIn::Plane(_) => return Err(Error::options("this shape is in the plane")),
                 }
             }
@@ -171,13 +179,19 @@ fn refuse_foreign(options: &InputOptions, source: &Source<'_>) -> Result<(), Err
         Source::Image(_) => ("an image", true, false),
         Source::Field(_) => ("a field", false, true),
         Source::BuiltIn(_) => ("a built-in shape", false, false),
+        Source::Region(_) => ("a region", false, false),
     };
+    let is_region = matches!(source, Source::Region(_));
     let is_vti = matches!(source, Source::Field(path) if has_extension(path, "vti"));
     for (name, given, allowed) in [
         ("--inside", options.inside.is_some(), is_image),
         ("--threshold", options.threshold.is_some(), is_image),
         ("--holds", options.holds.is_some(), is_field),
-        ("--side-length", options.side_length.is_some(), !is_field),
+        (
+            "--side-length",
+            options.side_length.is_some(),
+            !is_field && !is_region,
+        ),
         ("--cells", options.cells.is_some(), !is_field),
         ("--box-side", options.box_side.is_some(), !is_vti),
     ] {
@@ -196,6 +210,23 @@ fn grid<const D: usize>(
     cells: usize,
     box_side: f64,
 ) -> Result<(Grid<D>, f64), Error> {
+    let grid = bare_grid(options, cells, box_side)?;
+    let box_side = grid.side();
+    let side = *options.side_length.get_or_insert(PART * box_side);
+    if !(side > 0.0 && side <= box_side) {
+        return Err(Error::options(format!(
+            "--side-length {side} does not fit the box of side {box_side}: give a positive length of at most that"
+        )));
+    }
+    Ok((grid, side))
+}
+
+/// The grid about 0.
+fn bare_grid<const D: usize>(
+    options: &mut InputOptions,
+    cells: usize,
+    box_side: f64,
+) -> Result<Grid<D>, Error> {
     let cells = *options.cells.get_or_insert(cells);
     if cells < FEWEST_CELLS {
         return Err(Error::options(format!(
@@ -210,13 +241,21 @@ fn grid<const D: usize>(
             "--cells {cells} makes {nodes:.1e} nodes in a box of side {box_side}, more than {MOST_NODES:.1e}: use fewer"
         )));
     }
-    let side = *options.side_length.get_or_insert(PART * box_side);
-    if !(side > 0.0 && side <= box_side) {
-        return Err(Error::options(format!(
-            "--side-length {side} does not fit the box of side {box_side}: give a positive length of at most that"
-        )));
-    }
-    Ok((grid, side))
+    Ok(grid)
+}
+
+fn space(
+    name: String,
+    grid: Grid<3>,
+    shape: &(impl SignedDistance<3> + ?Sized),
+    eps_over_h: f64,
+) -> Result<Loaded, Error> {
+    Ok(Loaded::Space(Start {
+        name,
+        field: phase_field(grid, shape, eps_over_h * grid.spacing())?,
+        outlet: Space::identity(),
+        region: None,
+    }))
 }
 
 fn plane(
@@ -366,7 +405,11 @@ fn values<const D: usize>(
     }
 }
 
-fn check_phases<const D: usize>(field: &Field<D>, input: &str) -> Result<(), Error> {
+/// Refuses shapes of which there is nothing on the grid, or nothing else.
+///
+/// # Errors
+/// [`Error::Options`].
+pub fn check_phases<const D: usize>(field: &Field<D>, input: &str) -> Result<(), Error> {
     let inside = field.values().iter().filter(|u| **u > 0.0).count();
     let nodes = field.grid().len();
     if inside == 0 || inside == nodes {

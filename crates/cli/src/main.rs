@@ -7,6 +7,7 @@ mod error;
 mod input;
 mod motion;
 mod outlet;
+mod page;
 mod run;
 mod scales;
 mod shape;
@@ -20,7 +21,7 @@ use clap::error::ErrorKind;
 use runs::Interrupt;
 
 use crate::cli::{Cli, Command};
-use crate::commands::{check, flow, info, mcf, networks, resume, shell, train};
+use crate::commands::{check, flow, info, mcf, networks, resume, sample, shell, train};
 use crate::config::ParseError;
 use crate::error::Error;
 use crate::run::Ending;
@@ -67,6 +68,7 @@ fn execute(cli: Cli) -> Result<Ending, Error> {
         Command::Resume(options) => resume::run(&options),
         Command::Networks(options) => networks::run(&options),
         Command::Info(options) => info::run(&options),
+        Command::Sample(options) => sample::run(&options),
         Command::Check(options) => check::run(options),
         Command::Train(options) => train::run(&options),
         Command::Completions { shell } => Ok(shell::completions(shell)),

@@ -16,6 +16,21 @@ use crate::error::Error;
 
 /// Pixels a side of pictures of surfaces.
 const PIXELS: u32 = 480;
+/// Degrees about the vertical axis from which surfaces are seen.
+pub const AZIMUTH: f64 = -60.0;
+/// Degrees above the horizon from which surfaces are seen.
+pub const ELEVATION: f64 = 25.0;
+
+/// Names of files that hold the shape at the beginning, without their extension.
+pub const START: &str = "start";
+/// Names of files that hold the shape at the end, without their extension.
+pub const FINAL: &str = "final";
+/// The picture of the shape at the end.
+pub const PICTURE: &str = "final.png";
+/// The folder of pictures of the shape in between.
+pub const FRAMES: &str = "frames";
+/// The outcome of a run.
+pub const SUMMARY: &str = "summary.json";
 
 /// Measures of a shape in the units of the box.
 #[derive(Clone, Debug, Serialize)]
@@ -55,7 +70,7 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
     /// If there is no shape.
     fn topology(&self, u: &Field<D>, eps: f64) -> Result<Topology, Error>;
 
-    /// Writes the shape to files `final.*`.
+    /// Writes the shape to a file `stem.*`.
     ///
     /// # Errors
     /// What drawing and writing raise.
@@ -63,6 +78,7 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
         &self,
         u: &Field<D>,
         eps: f64,
+        stem: &str,
         format: MeshFormat,
         run: &mut RunDirectory,
     ) -> Result<(), Error>;
@@ -121,14 +137,16 @@ impl Outlet<2> for Plane {
         &self,
         u: &Field<2>,
         _: f64,
+        stem: &str,
         _: MeshFormat,
         run: &mut RunDirectory,
     ) -> Result<(), Error> {
+        let name = format!("{stem}.svg");
         let outline = Outline::of_phase_field(u)?;
         Svg::on_white(self.frame()?)
             .filled(&outline, Rgb::BLACK)
-            .write(run.path().join("final.svg"))?;
-        Ok(run.adopt_file("final.svg")?)
+            .write(run.path().join(&name))?;
+        Ok(run.adopt_file(&name)?)
     }
 
     fn save(&self, _: &Field<2>, _: f64, path: &Path) -> Result<(), Error> {
@@ -163,18 +181,22 @@ impl Space {
         }
     }
 
-    fn mesh(&self, u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
-        let mut mesh = surfaces::phase_field_surface(u, eps)?;
+    /// A mesh in the box, in the coordinates that it came in.
+    pub fn in_own_coordinates(&self, mut mesh: TriangleMesh) -> TriangleMesh {
         for x in &mut mesh.vertices {
             *x = std::array::from_fn(|i| self.unit.mul_add(x[i], self.origin[i]));
         }
-        Ok(mesh)
+        mesh
+    }
+
+    fn mesh(&self, u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
+        Ok(self.in_own_coordinates(surfaces::phase_field_surface(u, eps)?))
     }
 }
 
 impl Outlet<3> for Space {
     fn picture(&self, u: &Field<3>, eps: f64) -> Result<Picture, Error> {
-        let scene = Scene::new(u, eps)?.azimuth(-60.0).elevation(25.0);
+        let scene = Scene::new(u, eps)?.azimuth(AZIMUTH).elevation(ELEVATION);
         Ok(scene.framing(Framing::Domain).render(PIXELS)?)
     }
 
@@ -190,10 +212,11 @@ impl Outlet<3> for Space {
         &self,
         u: &Field<3>,
         eps: f64,
+        stem: &str,
         format: MeshFormat,
         run: &mut RunDirectory,
     ) -> Result<(), Error> {
-        let name = format!("final.{format}");
+        let name = format!("{stem}.{format}");
         let mesh = self.mesh(u, eps)?;
         surfaces::write(run.path().join(&name), &mesh)?;
         Ok(run.adopt_file(&name)?)
@@ -226,8 +249,8 @@ pub fn write_final<const D: usize, O: Outlet<D>>(
     vti::write(run.path().join("final.vti"), &[("phase_field", u)])?;
     run.adopt_file("final.vti")?;
     let topology = if has_interface(u) {
-        write_picture(&outlet.picture(u, eps)?, "final.png", run)?;
-        outlet.write_shape(u, eps, format, run)?;
+        write_picture(&outlet.picture(u, eps)?, PICTURE, run)?;
+        outlet.write_shape(u, eps, FINAL, format, run)?;
         outlet.topology(u, eps)?
     } else {
         Topology::default()

@@ -20,6 +20,7 @@ use crate::error::Error;
 use crate::input::Start;
 use crate::motion::{Memory, Motion};
 use crate::outlet::{self, Outlet};
+use crate::page;
 use crate::scales;
 
 /// How a command ended.
@@ -155,6 +156,7 @@ impl Plan {
                 };
                 let manifest = json!({
                     "command": self.command,
+                    "name": start.name,
                     "program": identity.program,
                     "network": self.network,
                     "device": format!("{} {:?}", self.device.kind(), self.device.dtype()).to_lowercase(),
@@ -169,6 +171,11 @@ impl Plan {
             free: f64::from(!outlet::touches_box(&start.field)),
             ..Memory::START
         };
+        // An inpainted region may have been all of it.
+        if outlet::has_interface(&start.field) {
+            let eps = self.eps(&start.field);
+            (start.outlet).write_shape(&start.field, eps, outlet::START, self.format, &mut run)?;
+        }
         if self.keep.frames.is_some() {
             self.frame(&start.outlet, &start.field, 0, &mut run)?;
         }
@@ -244,10 +251,14 @@ impl Plan {
         let outcome = match ending {
             Ending::Interrupted => {
                 let (step, time) = motion.position();
+                drop(run);
                 json!({ "command": self.command, "finished": false, "steps": step, "time": time })
             }
             Ending::Done => self.finish(run, start, &motion, &memory)?,
         };
+        if !self.keep.no_page {
+            page::write(&RunDirectory::open(&folder)?)?;
+        }
         bar.finish();
         progress.clear();
         self.tell(outcome, &folder, seconds);
@@ -281,7 +292,7 @@ impl Plan {
         }
         outlet::write_picture(
             &outlet.picture(u, self.eps(u))?,
-            &format!("{FRAMES}/step-{step:06}.png"),
+            &format!("{}/step-{step:06}.png", outlet::FRAMES),
             run,
         )
     }
@@ -300,7 +311,8 @@ impl Plan {
             start.outlet.save(u, self.eps(u), path)?;
         }
         if self.keep.frames.is_some() {
-            let animation = Animation::new(frames(&run.path().join(FRAMES))?, DELAY)?.to_apng()?;
+            let animation =
+                Animation::new(frames(&run.path().join(outlet::FRAMES))?, DELAY)?.to_apng()?;
             run.write_file("animation.png", |out| out.write_all(&animation))?;
         }
         let mut outcome = Map::new();
@@ -322,7 +334,7 @@ impl Plan {
         }
         let outcome = Value::Object(outcome);
         let text = format!("{outcome:#}\n");
-        run.write_file("summary.json", |out| out.write_all(text.as_bytes()))?;
+        run.write_file(outlet::SUMMARY, |out| out.write_all(text.as_bytes()))?;
         run.finish(&pack(&state, memory, start)?)?;
         Ok(outcome)
     }
@@ -362,7 +374,12 @@ impl Plan {
                 .map(|(_, note)| note.to_owned()),
         );
         text.push(if finished {
-            format!("results are in {}", folder.display())
+            let page = if self.keep.no_page {
+                String::new()
+            } else {
+                format!(", to look at: {}", folder.join(page::NAME).display())
+            };
+            format!("results are in {}{page}", folder.display())
         } else {
             format!(
                 "interrupted, go on with: willmore resume {}",
@@ -382,9 +399,6 @@ impl Plan {
 fn is_gone<const D: usize>(u: &Field<D>, memory: &Memory) -> bool {
     !outlet::has_interface(u) || (memory.free > 0.5 && outlet::touches_box(u))
 }
-
-/// Folder of the pictures of a run.
-const FRAMES: &str = "frames";
 
 fn damaged(run: &RunDirectory, what: &str) -> Error {
     Error::options(format!(

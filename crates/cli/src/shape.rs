@@ -39,6 +39,20 @@ impl Region {
         text.starts_with("box:") || text.starts_with("ball:")
     }
 
+    /// What the region is called: box or ball.
+    pub fn name(&self) -> &'static str {
+        self.kind.name()
+    }
+
+    /// The dimension of space that its numbers fit; a wrong number of them is left to [`Self::shape`].
+    pub fn dimension(&self) -> usize {
+        let in_space = match self.kind {
+            Kind::Box => 6,
+            Kind::Ball => 4,
+        };
+        if self.numbers.len() < in_space { 2 } else { 3 }
+    }
+
     /// The signed distance in `D` dimensions.
     ///
     /// # Errors

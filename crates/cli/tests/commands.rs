@@ -344,6 +344,115 @@ fn lists_are_complete() {
     }
 }
 
+/// A JPEG file is a drawing as a PNG file is; the region of a mask may be one too.
+#[test]
+fn photographs_are_drawings_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let pixels: u16 = 64;
+    let square: Vec<u8> = (0..pixels)
+        .flat_map(|y| (0..pixels).map(move |x| (16..48).contains(&x) && (16..48).contains(&y)))
+        .map(|inside| if inside { 20 } else { 235 })
+        .collect();
+    for name in ["square.jpg", "mask.JPEG"] {
+        let path = folder.path().join(name);
+        let encoder = jpeg_encoder::Encoder::new_file(path, 95).unwrap();
+        let colour = jpeg_encoder::ColorType::Luma;
+        encoder.encode(&square, pixels, pixels, colour).unwrap();
+    }
+    let common = ["--cells", "48", "--steps", "1", "--tau", "1e-9", "--output"];
+    for (output, command) in [
+        ("flow", &["flow", "square.jpg"][..]),
+        ("inpaint", &["inpaint", "square.jpg", "--mask", "mask.JPEG"]),
+    ] {
+        let outcome = outcome(folder.path(), &[command, &common, &[output]].concat());
+        // Half of 1.2 a side.
+        let area = outcome["volume"].as_f64().unwrap();
+        assert!((area / 0.36 - 1.0).abs() < 0.03, "{outcome}");
+        let after = images::read(folder.path().join(output).join("final.png")).unwrap();
+        assert_eq!((after.width(), after.height()), (64, 64));
+    }
+    // Half of a file is refused in one line, which names it.
+    let bytes = std::fs::read(folder.path().join("square.jpg")).unwrap();
+    std::fs::write(folder.path().join("half.jpg"), &bytes[..bytes.len() / 2]).unwrap();
+    let refused = common::run(folder.path(), &["flow", "half.jpg"]);
+    let line = common::text(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{line}");
+    assert!(
+        line.contains("half.jpg") && line.lines().count() == 1,
+        "{line}"
+    );
+}
+
+#[test]
+fn samples_are_inputs() {
+    let folder = tempfile::tempdir().unwrap();
+    for (input, files) in [
+        ("builtin:ring", &["ring.png", "ring.npy", "ring.vti"][..]),
+        (
+            "box:-0.3,-0.2,-0.3,0.3,0.2,0.3",
+            &["box.ply", "box.stl", "box.vti"],
+        ),
+    ] {
+        for file in files {
+            outcome(
+                folder.path(),
+                &["sample", input, "--cells", "32", "--save", file],
+            );
+            let run = [
+                "flow",
+                file,
+                "--steps",
+                "1",
+                "--output",
+                &format!("run-{file}"),
+            ];
+            outcome(folder.path(), &run);
+        }
+    }
+    // A ball of radius 0.2 whose vertices move by up to 0.01.
+    let noisy = |file: &str, seed: &str| {
+        let ball = [
+            "sample",
+            "ball:0.1,0,0,0.2",
+            "--cells",
+            "32",
+            "--noise",
+            "0.01",
+        ];
+        let saved = ["--seed", seed, "--save", file];
+        outcome(folder.path(), &[&ball[..], &saved].concat());
+        surfaces::read(folder.path().join(file)).unwrap()
+    };
+    let mesh = noisy("ball.ply", "1");
+    let errors = mesh
+        .vertices
+        .iter()
+        .map(|x| (x[0] - 0.1).hypot(x[1]).hypot(x[2]) - 0.2);
+    let (low, high) = errors.fold((0.0, 0.0), |(low, high), e: f64| (e.min(low), e.max(high)));
+    assert!(low < -0.008 && high > 0.008, "{low} {high}");
+    assert!(low > -0.011 && high < 0.011, "{low} {high}");
+    assert_eq!(noisy("same.ply", "1").vertices, mesh.vertices);
+    assert_ne!(noisy("other.ply", "2").vertices, mesh.vertices);
+    // A quarter of a disc.
+    let cut = ["--without", "box:-1,-1,0,1", "--without", "box:-1,-1,1,0"];
+    let disc = [
+        "sample",
+        "builtin:disc",
+        "--cells",
+        "64",
+        "--save",
+        "quarter.npy",
+    ];
+    outcome(folder.path(), &[&disc[..], &cut].concat());
+    let quarter = npy::read(folder.path().join("quarter.npy"), |n| {
+        Grid::<2>::centred(n, 2.0)
+    })
+    .unwrap();
+    let area = geometry::measure::zero_set_volume(&quarter);
+    let expected = 0.25 * std::f64::consts::PI * 0.36;
+    assert!((area / expected - 1.0).abs() < 0.02, "{area}");
+}
+
 /// The mask has the pixels of the input, and the region is where its dark pixels are.
 #[test]
 fn images_are_masks_too() {

@@ -285,6 +285,53 @@ fn every_mistake_is_one_clear_line() {
         ),
         (&["networks", "show", "net.safetensors"], "net.safetensors"),
         (&["check"], "there is no input"),
+        (&["sample", "builtin:disc"], "sample needs --save"),
+        (
+            &["sample", "builtin:disc", "--save", "a.jpg"],
+            "must end in .png, .ply, .obj, .stl, .npy or .vti",
+        ),
+        (
+            &["sample", "builtin:disc", "--save", "a.ply"],
+            "needs a surface in space",
+        ),
+        (
+            &["sample", "builtin:disc", "--save", "white.png"],
+            "is there already",
+        ),
+        (
+            &[
+                "sample",
+                "builtin:disc",
+                "--save",
+                "a.png",
+                "--noise",
+                "0.1",
+            ],
+            "--noise moves the vertices of meshes",
+        ),
+        (
+            &["sample", "builtin:cube", "--save", "a.ply", "--noise=-1"],
+            "--noise -1 must not be negative",
+        ),
+        (
+            &[
+                "sample",
+                "builtin:disc",
+                "--save",
+                "a.png",
+                "--without",
+                "ball:0,0,1",
+            ],
+            "what --without leaves has 0 of",
+        ),
+        (
+            &["sample", "box:0,0,1", "--save", "a.png"],
+            "has 3 numbers, and a box in 2D has 4",
+        ),
+        (
+            &["flow", "ball:0,0,0.5", "--side-length", "1"],
+            "--side-length has no meaning for a region",
+        ),
         (&["train"], "train needs --eps-over-h"),
         (
             &[
@@ -363,6 +410,7 @@ fn help_has_examples_and_exit_codes() {
         "fair",
         "inpaint",
         "mcf",
+        "sample",
         "networks",
         "info",
         "check",

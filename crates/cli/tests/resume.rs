@@ -3,11 +3,9 @@
 
 mod common;
 
-use std::path::Path;
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use common::{assert_same, program, run, text};
+use common::{assert_same, committed, interrupt, run, start, text, wait_for, with_output};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -77,57 +75,6 @@ const RUNS: [&[&str]; 5] = [
     ],
 ];
 
-fn start(folder: &Path, arguments: &[&str]) -> Child {
-    let mut command = program(folder);
-    command
-        .args(arguments)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null());
-    command.spawn().unwrap()
-}
-
-/// The newest checkpoint in a run.
-fn committed(run: &Path) -> Option<u64> {
-    let entries = std::fs::read_dir(run.join("checkpoints")).ok()?;
-    let step = |name: &str| {
-        name.strip_prefix("step-")?
-            .strip_suffix(".ckpt")?
-            .parse()
-            .ok()
-    };
-    entries
-        .filter_map(|entry| step(entry.ok()?.file_name().to_str()?))
-        .max()
-}
-
-/// Waits until the run has committed this step; false if the process ended before.
-fn wait_for(run: &Path, step: u64, child: &mut Child) -> bool {
-    let clock = Instant::now();
-    while committed(run).is_none_or(|found| found < step) {
-        if child.try_wait().unwrap().is_some() {
-            return false;
-        }
-        assert!(clock.elapsed() < Duration::from_mins(2), "no step {step}");
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    true
-}
-
-/// Ctrl-C.
-fn interrupt(child: &mut Child) {
-    let number = child.id().to_string();
-    let sent = Command::new("kill")
-        .args(["-INT", &number])
-        .status()
-        .unwrap();
-    assert!(sent.success());
-    assert_eq!(child.wait().unwrap().code(), Some(130));
-}
-
-fn with_output<'a>(arguments: &[&'a str], output: &'a str) -> Vec<&'a str> {
-    [arguments, &["--output", output]].concat()
-}
-
 #[test]
 fn killed_runs_are_resumed_to_the_same_bytes() {
     let seed = std::env::var("WILLMORE_TEST_SEED")
@@ -171,11 +118,14 @@ fn interrupted_runs_end_with_130_and_are_resumed_to_the_same_bytes() {
     assert!(wait_for(&path, 4, &mut child));
     interrupt(&mut child);
     assert!(!path.join("summary.json").exists());
+    let page = std::fs::read_to_string(path.join("index.html")).unwrap();
+    assert!(page.contains("Not finished: "), "the page of a part");
     let resumed = run(folder.path(), &["resume", "stopped"]);
     assert!(resumed.status.success(), "{}", text(&resumed.stderr));
     assert_same(&path, &reference);
     // Once more: there is nothing left to do, but for what a kill right after the last commit leaves.
     std::fs::write(path.join("checkpoints/step-00000004.ckpt"), "old").unwrap();
+    std::fs::write(path.join(".partial-1-index.html"), "<html>").unwrap();
     let again = run(folder.path(), &["resume", "stopped"]);
     assert!(again.status.success());
     assert_same(&path, &reference);
@@ -245,6 +195,61 @@ fn a_damaged_run_is_refused_and_can_be_recovered() {
     let recovered = run(folder.path(), &["resume", "damaged", "--recover"]);
     assert!(recovered.status.success(), "{}", text(&recovered.stderr));
     assert_same(&path, &reference);
+}
+
+/// A bit that has flipped in any file of a run, stopped or finished, is noticed before anything is done, and the file named.
+#[test]
+fn a_flipped_bit_in_any_file_is_found_and_the_file_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run");
+    let arguments = [
+        "flow",
+        "builtin:torus",
+        "--cells",
+        "24",
+        "--tau",
+        "1e-6",
+        "--steps",
+        "40",
+        "--frames",
+        "2",
+        "--checkpoint-every",
+        "1",
+    ];
+    let mut child = start(folder.path(), &with_output(&arguments, "run"));
+    assert!(wait_for(&path, 3, &mut child));
+    interrupt(&mut child);
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let mut flipped = std::collections::BTreeSet::new();
+    for state in ["stopped", "finished"] {
+        let mut names: Vec<_> = common::files(&path).into_iter().collect();
+        let timings = std::path::PathBuf::from("timings.json");
+        let bytes = std::fs::read(path.join(&timings)).unwrap();
+        names.push((timings, bytes));
+        // The page is no part of the run, and the lock is empty.
+        for (name, bytes) in names {
+            if name.ends_with("index.html") || name.ends_with("lock") {
+                continue;
+            }
+            let mut damaged = bytes.clone();
+            let bit = rng.random_range(0..8 * bytes.len());
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            std::fs::write(path.join(&name), damaged).unwrap();
+            let refused = run(folder.path(), &["resume", "run"]);
+            let (line, name) = (text(&refused.stderr), name.to_string_lossy().into_owned());
+            let what = format!("{state}, bit {bit} of {name}: {line}");
+            assert_eq!(refused.status.code(), Some(2), "{what}");
+            assert!(line.contains(&name) && line.lines().count() == 1, "{what}");
+            std::fs::write(path.join(&name), bytes).unwrap();
+            flipped.insert(name);
+        }
+        assert!(run(folder.path(), &["resume", "run"]).status.success());
+    }
+    let kinds = ["index.json", "metrics.csv", "start.ply", "final.npy"];
+    assert!(
+        kinds.iter().all(|kind| flipped.contains(*kind)),
+        "{flipped:?}"
+    );
 }
 
 /// A run holds all that it goes on from: its input may be gone, and the folder elsewhere.

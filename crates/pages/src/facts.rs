@@ -31,6 +31,32 @@ impl Facts {
         self
     }
 
+    /// Adds a value at the end: maps become names with dots, lists of plain values one line, and
+    /// null is left out.
+    #[must_use]
+    pub fn with_value(mut self, name: &str, value: &Value) -> Self {
+        match value {
+            Value::Object(map) => {
+                for (key, value) in map {
+                    self = self.with_value(&format!("{name}.{key}"), value);
+                }
+                self
+            }
+            Value::Array(values) if values.iter().any(|v| v.is_object() || v.is_array()) => {
+                for (k, value) in values.iter().enumerate() {
+                    self = self.with_value(&format!("{name}[{k}]"), value);
+                }
+                self
+            }
+            Value::Array(values) => {
+                let values: Vec<String> = values.iter().map(plain).collect();
+                self.with(name, values.join(", "))
+            }
+            Value::Null => self,
+            value => self.with(name, plain(value)),
+        }
+    }
+
     /// The metrics in the text of a `summary.json`, a flat map from names to numbers; `name` is for
     /// messages. Numbers have five digits, and a long series `x.step0`, `x.step1`, ... one line.
     ///
@@ -61,11 +87,11 @@ impl Facts {
                 let step = last.rsplit('.').next().unwrap_or_default();
                 facts = facts.with(
                     format!("{first} … {step}"),
-                    format!("{} … {}", shown(from), shown(to)),
+                    format!("{} … {}", five_digits(from), five_digits(to)),
                 );
             } else {
                 for &(metric, value) in group {
-                    facts = facts.with(metric, shown(value));
+                    facts = facts.with(metric, five_digits(value));
                 }
             }
         }
@@ -85,6 +111,13 @@ impl Facts {
         }
         html.push_str("</dl>\n");
         html
+    }
+}
+
+fn plain(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
     }
 }
 
@@ -124,7 +157,7 @@ pub(crate) fn natural(a: &str, b: &str) -> Ordering {
 }
 
 /// A number with five digits; whole numbers as they are.
-pub(crate) fn shown(value: f64) -> String {
+pub fn five_digits(value: f64) -> String {
     const LARGEST_WHOLE: f64 = 1e9;
     if value.fract() == 0.0 && value.abs() < LARGEST_WHOLE {
         return format!("{value:.0}").replace('-', "\u{2212}");
@@ -207,7 +240,7 @@ mod tests {
             (0.0, "0"),
         ];
         for (value, text) in cases {
-            assert_eq!(shown(value), text);
+            assert_eq!(five_digits(value), text);
         }
     }
 

@@ -57,7 +57,7 @@ mod text;
 mod viewer;
 
 pub use error::{Error, Result};
-pub use facts::Facts;
+pub use facts::{Facts, five_digits};
 pub use frames::Frames;
 pub use image::{Image, Pictures};
 pub use page::Page;

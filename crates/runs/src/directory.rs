@@ -1,7 +1,7 @@
 //! A run that is being computed.
 
 use std::collections::HashSet;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,6 +14,7 @@ use sha2::Digest;
 use crate::checkpoint::{self, State};
 use crate::digest::{self, Hashing};
 use crate::index::{Commit, Entry, Index};
+use crate::lock::Lock;
 use crate::metrics::Metrics;
 use crate::{Error, Identity, index, lock, names, seal};
 
@@ -31,7 +32,7 @@ pub struct RunDirectory {
     pub(crate) written: HashSet<String>,
     pub(crate) metrics: Metrics,
     pub(crate) broken: bool,
-    pub(crate) _lock: File,
+    pub(crate) _lock: Lock,
 }
 
 impl RunDirectory {

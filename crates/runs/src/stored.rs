@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 use std::fmt;
-use std::fs::{self, File};
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -12,6 +12,7 @@ use sha2::Digest;
 
 use crate::directory::{write_index, write_timings};
 use crate::index::{Commit, Entry, Extent, Index};
+use crate::lock::Lock;
 use crate::metrics::Metrics;
 use crate::{Checkpoint, Damage, Error, Identity, RunDirectory, State, digest, lock, names, seal};
 
@@ -20,7 +21,7 @@ use crate::{Checkpoint, Damage, Error, Identity, RunDirectory, State, digest, lo
 pub struct StoredRun {
     path: PathBuf,
     storage: Arc<dyn Storage>,
-    lock: File,
+    lock: Lock,
     index: Index,
     checkpoint: Option<Checkpoint>,
     timings: Value,
@@ -134,7 +135,7 @@ impl StoredRun {
     fn new(
         path: PathBuf,
         storage: Arc<dyn Storage>,
-        lock: File,
+        lock: Lock,
         index: Index,
         checkpoint: Option<Checkpoint>,
         timings: Value,
@@ -298,7 +299,7 @@ impl fmt::Display for StoredRun {
     }
 }
 
-fn lock_and_read(storage: &dyn Storage, folder: &Path) -> Result<(File, Index), Error> {
+fn lock_and_read(storage: &dyn Storage, folder: &Path) -> Result<(Lock, Index), Error> {
     let path = folder.join(names::INDEX);
     if path.symlink_metadata().is_err() {
         // Before there is a lock file in somebody's folder.

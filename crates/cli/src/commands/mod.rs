@@ -8,6 +8,7 @@ pub mod inpaint;
 pub mod mcf;
 pub mod networks;
 pub mod resume;
+pub mod sample;
 pub mod shell;
 pub mod train;
 

@@ -7,6 +7,7 @@ use super::{flow, mcf};
 use crate::cli::{Command, ResumeOptions};
 use crate::config;
 use crate::error::Error;
+use crate::page;
 use crate::run::{self, Ending};
 
 /// Continues a run by the options and the state that it stored; its input is not needed again.
@@ -19,16 +20,19 @@ pub fn run(options: &ResumeOptions) -> Result<Ending, Error> {
     } else {
         RunDirectory::open(&options.run)?
     };
+    let path = options.run.join("config.toml");
+    let mut command = config::parse_resolved(&stored.config()?, &path)?.command;
     if stored.is_finished() {
-        remove_old_checkpoints(&stored)?;
+        remove_what_a_kill_left(&stored)?;
+        if !no_page(&command) {
+            page::write(&stored)?;
+        }
         let folder = options.run.to_string_lossy();
         let outcome = json!({ "command": stored.identity().kind, "finished": true, "run": folder });
         let text = format!("The run in {folder} is finished already");
         run::report(options.say, &outcome, &text);
         return Ok(Ending::Done);
     }
-    let path = options.run.join("config.toml");
-    let mut command = config::parse_resolved(&stored.config()?, &path)?.command;
     match &mut command {
         Command::Flow(flow) => flow.common.say = options.say,
         Command::Fair(fair) => fair.flow.common.say = options.say,
@@ -48,9 +52,20 @@ pub fn run(options: &ResumeOptions) -> Result<Ending, Error> {
     }
 }
 
-/// What a run that was killed right after its last commit did not come to. Nothing else is touched in a finished run: what
-/// is there besides may be its owner's.
-fn remove_old_checkpoints(stored: &StoredRun) -> Result<(), Error> {
+/// Whether the run was to have no page.
+fn no_page(command: &Command) -> bool {
+    match command {
+        Command::Flow(flow) => flow.keep.no_page,
+        Command::Fair(fair) => fair.flow.keep.no_page,
+        Command::Inpaint(inpaint) => inpaint.flow.keep.no_page,
+        Command::Mcf(mcf) => mcf.keep.no_page,
+        _ => true,
+    }
+}
+
+/// What a run that was killed right after its last commit did not come to, and half a page. Nothing else is touched in a
+/// finished run: what is there besides may be its owner's.
+fn remove_what_a_kill_left(stored: &StoredRun) -> Result<(), Error> {
     let folder = stored.path().join("checkpoints");
     for path in stored.leftovers().filter(|path| path.starts_with(&folder)) {
         std::fs::remove_file(path).map_err(|source| Error::Io {
@@ -59,5 +74,6 @@ fn remove_old_checkpoints(stored: &StoredRun) -> Result<(), Error> {
             source,
         })?;
     }
+    files::remove_stale(stored.path())?;
     Ok(())
 }

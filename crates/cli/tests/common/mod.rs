@@ -3,7 +3,8 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
 
 /// The program in a folder.
 pub fn program(folder: &Path) -> Command {
@@ -63,4 +64,57 @@ pub fn assert_same(run: &Path, reference: &Path) {
     for (name, bytes) in &expected {
         assert!(found[name] == *bytes, "{} differs", name.display());
     }
+}
+
+/// Starts the program, that nobody listens to.
+pub fn start(folder: &Path, arguments: &[&str]) -> Child {
+    let mut command = program(folder);
+    command
+        .args(arguments)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    command.spawn().unwrap()
+}
+
+/// The newest checkpoint in a run.
+pub fn committed(run: &Path) -> Option<u64> {
+    let entries = std::fs::read_dir(run.join("checkpoints")).ok()?;
+    let step = |name: &str| {
+        name.strip_prefix("step-")?
+            .strip_suffix(".ckpt")?
+            .parse()
+            .ok()
+    };
+    entries
+        .filter_map(|entry| step(entry.ok()?.file_name().to_str()?))
+        .max()
+}
+
+/// Waits until the run has committed this step; false if the process ended before.
+pub fn wait_for(run: &Path, step: u64, child: &mut Child) -> bool {
+    let clock = Instant::now();
+    while committed(run).is_none_or(|found| found < step) {
+        if child.try_wait().unwrap().is_some() {
+            return false;
+        }
+        assert!(clock.elapsed() < Duration::from_mins(2), "no step {step}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    true
+}
+
+/// Ctrl-C.
+pub fn interrupt(child: &mut Child) {
+    let number = child.id().to_string();
+    let sent = Command::new("kill")
+        .args(["-INT", &number])
+        .status()
+        .unwrap();
+    assert!(sent.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+}
+
+/// The arguments of a run in a folder of this name.
+pub fn with_output<'a>(arguments: &[&'a str], output: &'a str) -> Vec<&'a str> {
+    [arguments, &["--output", output]].concat()
 }

@@ -4,7 +4,7 @@ use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use crate::error::{Error, Result};
-use crate::facts::{Facts, shown};
+use crate::facts::{Facts, five_digits};
 
 /// What is read of a manifest; all but the name and the parameters may be absent.
 #[derive(Deserialize)]
@@ -60,7 +60,9 @@ pub(crate) fn facts(name: &str, json: &str) -> Result<Facts> {
         ("started", manifest.started),
         (
             "wall time",
-            manifest.wall_seconds.map(|s| format!("{} s", shown(s))),
+            manifest
+                .wall_seconds
+                .map(|s| format!("{} s", five_digits(s))),
         ),
         ("processors", manifest.cpus.map(|n| n.to_string())),
         ("compiler", manifest.rustc),
@@ -73,47 +75,16 @@ pub(crate) fn facts(name: &str, json: &str) -> Result<Facts> {
         }
     }
     for (name, value) in &manifest.parameters {
-        facts = with_parameter(facts, name, value);
+        facts = facts.with_value(name, value);
     }
     let left_out = manifest.phases.len().saturating_sub(MOST_PHASES);
     for phase in manifest.phases.iter().take(MOST_PHASES) {
-        facts = facts.with(&phase.name, format!("{} s", shown(phase.seconds)));
+        facts = facts.with(&phase.name, format!("{} s", five_digits(phase.seconds)));
     }
     if left_out > 0 {
         facts = facts.with("further parts of the run", left_out.to_string());
     }
     Ok(facts)
-}
-
-/// Maps become names with dots, lists of plain values one line.
-fn with_parameter(mut facts: Facts, name: &str, value: &Value) -> Facts {
-    match value {
-        Value::Object(map) => {
-            for (key, value) in map {
-                facts = with_parameter(facts, &format!("{name}.{key}"), value);
-            }
-            facts
-        }
-        Value::Array(values) if values.iter().any(|v| v.is_object() || v.is_array()) => {
-            for (k, value) in values.iter().enumerate() {
-                facts = with_parameter(facts, &format!("{name}[{k}]"), value);
-            }
-            facts
-        }
-        Value::Array(values) => {
-            let values: Vec<String> = values.iter().map(plain).collect();
-            facts.with(name, values.join(", "))
-        }
-        Value::Null => facts,
-        value => facts.with(name, plain(value)),
-    }
-}
-
-fn plain(value: &Value) -> String {
-    match value {
-        Value::String(text) => text.clone(),
-        other => other.to_string(),
-    }
 }
 
 #[cfg(test)]

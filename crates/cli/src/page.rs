@@ -1,0 +1,310 @@
+//! The page of a run: one HTML file that shows it in a browser, without a network.
+//!
+//! It is made of the files of the run alone, and the same files give the same bytes. It is not one of them: the index does not
+//! know it, so that it may be removed, and is written again by `willmore resume`.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::PathBuf;
+
+use pages::{
+    Details, Facts, Figure, Frames, Image, Page, Section, Table, View, Viewer, five_digits,
+};
+use report::{Axis, LineChart, Marker, Series};
+use runs::StoredRun;
+use serde_json::Value;
+use surfaces::TriangleMesh;
+
+use crate::cli::MeshFormat;
+use crate::error::Error;
+use crate::outlet;
+
+/// Name of the page in the folder of a run.
+pub const NAME: &str = "index.html";
+
+/// Of longer sequences every second, third, ... picture is shown: a page should stay small enough to be mailed.
+const MOST_FRAMES: usize = 60;
+/// The same for rows of the table of steps.
+const MOST_ROWS: usize = 60;
+/// Curves through fewer steps have a mark at each.
+const FEW_STEPS: usize = 40;
+
+/// Writes the page of a run and returns its path.
+///
+/// # Errors
+/// What reading the files of the run, drawing and writing raise.
+pub fn write(run: &StoredRun) -> Result<PathBuf, Error> {
+    let path = run.path().join(NAME);
+    Files { run }.page()?.write(&path)?;
+    Ok(path)
+}
+
+struct Files<'a> {
+    run: &'a StoredRun,
+}
+
+impl Files<'_> {
+    fn page(&self) -> Result<Page, Error> {
+        let manifest = self.run.manifest()?;
+        let text = |name: &str| manifest[name].as_str().unwrap_or_default();
+        let outcome = self.outcome()?;
+        let mut page = Page::new(format!("willmore {} {}", text("command"), text("name")))
+            .with_lead(self.lead(outcome.as_ref()));
+        if let Some(shape) = self.shape()? {
+            page.push(shape);
+        }
+        if let Some(frames) = self.frames()? {
+            page.push(Section::new("Frames").with(frames));
+        }
+        if let Some(steps) = self.steps()? {
+            page.push(steps);
+        }
+        let options: Value = toml::from_str(&self.run.config()?)
+            .map_err(|error| Error::options(format!("the stored options: {error}")))?;
+        let mut numbers = Section::new("Numbers");
+        if let Some(outcome) = &outcome {
+            numbers.push(facts(outcome));
+        }
+        let options = Details::new("Options").with(facts(&options));
+        let program = Details::new("Program, network and device").with(facts(&manifest));
+        Ok(page.with(numbers.with(options).with(program)))
+    }
+
+    /// The outcome of a finished run.
+    fn outcome(&self) -> Result<Option<Value>, Error> {
+        let Some(bytes) = self.read(outlet::SUMMARY)? else {
+            return Ok(None);
+        };
+        let outcome = serde_json::from_slice(&bytes)
+            .map_err(|error| Error::options(format!("the stored outcome: {error}")))?;
+        Ok(Some(outcome))
+    }
+
+    /// What came out, in a sentence.
+    fn lead(&self, outcome: Option<&Value>) -> String {
+        let reached = self.run.checkpoint().map_or((0, 0.0), |checkpoint| {
+            (checkpoint.state.step, checkpoint.state.time)
+        });
+        let (step, time) = (reached.0, five_digits(reached.1));
+        let Some(outcome) = outcome else {
+            return format!("Not finished: {step} steps to the time {time} so far.");
+        };
+        let mut lead = format!("{step} steps to the time {time}.");
+        let number = |name: &str| outcome[name].as_f64().map(five_digits);
+        if let (Some(first), Some(last)) = (number("first_energy"), number("energy")) {
+            let _ = write!(lead, " Willmore energy {last}, before {first}.");
+        }
+        if outcome["components"] == 0 {
+            lead += " The shape has vanished.";
+        }
+        lead
+    }
+
+    /// The shape before and after: drawings in the plane, surfaces to turn in space.
+    fn shape(&self) -> Result<Option<Section>, Error> {
+        let mut section = Section::new("Shape");
+        let mut drawings = false;
+        for (stem, caption) in [(outlet::START, "Before."), (outlet::FINAL, "After.")] {
+            let name = format!("{stem}.svg");
+            if let Some(bytes) = self.read(&name)? {
+                section.push(Figure::new(Image::from_bytes(&name, &bytes)?, caption));
+                drawings = true;
+            }
+        }
+        if drawings {
+            return Ok(Some(section));
+        }
+        let meshes: Vec<(&str, TriangleMesh)> =
+            [(outlet::START, "before"), (outlet::FINAL, "after")]
+                .into_iter()
+                .filter_map(|(stem, label)| Some(self.mesh(stem).transpose()?.map(|m| (label, m))))
+                .collect::<Result<_, _>>()?;
+        // Until it is started, and on paper, the viewer is a picture.
+        let Some(poster) = self.read(outlet::PICTURE)? else {
+            return Ok(None);
+        };
+        if meshes.is_empty() {
+            return Ok(None);
+        }
+        let view = View {
+            azimuth: outlet::AZIMUTH,
+            elevation: outlet::ELEVATION,
+            ..View::default()
+        };
+        let viewer = Viewer::new(
+            "The surface before and after",
+            Image::from_bytes(outlet::PICTURE, &poster)?,
+            view,
+            meshes.iter().map(|(label, mesh)| (*label, mesh)),
+        )?;
+        Ok(Some(section.with(viewer)))
+    }
+
+    /// The surface of that name, in any of the formats.
+    fn mesh(&self, stem: &str) -> Result<Option<TriangleMesh>, Error> {
+        let names = [MeshFormat::Ply, MeshFormat::Obj, MeshFormat::Stl]
+            .map(|format| format!("{stem}.{format}"));
+        let name = names.iter().find(|name| self.has(name));
+        Ok(name
+            .map(|name| surfaces::read(self.run.path().join(name)))
+            .transpose()?)
+    }
+
+    fn frames(&self) -> Result<Option<Frames>, Error> {
+        let names: Vec<&str> = self
+            .run
+            .files()
+            .filter(|name| name.starts_with(outlet::FRAMES))
+            .collect();
+        if names.is_empty() {
+            return Ok(None);
+        }
+        let mut frames = Vec::new();
+        for name in thinned(&names, MOST_FRAMES) {
+            let number = name.trim_matches(|c: char| !c.is_ascii_digit());
+            let step = number.trim_start_matches('0');
+            let label = format!("step {}", if step.is_empty() { "0" } else { step });
+            if let Some(bytes) = self.read(name)? {
+                frames.push((label, Image::from_bytes(name, &bytes)?));
+            }
+        }
+        Ok(Some(Frames::new("The shape over the steps", frames)?))
+    }
+
+    /// Energy and measures over the steps, drawn and as a table.
+    fn steps(&self) -> Result<Option<Section>, Error> {
+        let path = self.run.path().join("metrics.csv");
+        let csv = fs::read_to_string(&path).map_err(|source| Error::Io {
+            action: "read",
+            path,
+            source,
+        })?;
+        if csv.is_empty() {
+            return Ok(None);
+        }
+        let table = Table::from_csv("Steps", &csv)?;
+        let columns = match self.run.identity().grid.cells.len() {
+            2 => [("perimeter", "Length"), ("volume", "Area")],
+            _ => [("perimeter", "Area"), ("volume", "Volume")],
+        };
+        let energy = ("willmore_energy", "Willmore energy");
+        let mut figure = report::Figure::new("", 3);
+        for (column, title) in std::iter::once(energy).chain(columns) {
+            let points = points(&table, column);
+            // Mean curvature flow has no energy.
+            if points.is_empty() {
+                continue;
+            }
+            let mut series = Series::new("", points);
+            if series.points.len() < FEW_STEPS {
+                series = series.with_marker(Marker::Circle);
+            }
+            figure = figure.with_panel(
+                LineChart::new(title, Axis::linear("step"), Axis::linear("")).with_series(series),
+            );
+        }
+        let image = Image::from_bytes("the plot of the steps", figure.to_svg()?.as_bytes())?;
+        let rows: Vec<Vec<String>> = thinned(table.rows(), MOST_ROWS)
+            .map(|row| row.iter().map(|cell| shortened(cell)).collect())
+            .collect();
+        let note = if rows.len() < table.rows().len() {
+            format!(
+                "{} of {} steps; all are in ",
+                rows.len(),
+                table.rows().len()
+            )
+        } else {
+            "All digits are in ".to_owned()
+        };
+        let details = Details::new("Steps as a table")
+            .with(
+                pages::Text::from(note.as_str())
+                    .code("metrics.csv")
+                    .then("."),
+            )
+            .with(Table::new("Steps", table.head(), rows)?);
+        let caption = "Energy and measures of the shape after every step.";
+        Ok(Some(
+            Section::new("Steps")
+                .with(Figure::new(image, caption))
+                .with(details),
+        ))
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.run.files().any(|file| file == name)
+    }
+
+    /// A file, if it belongs to the run.
+    fn read(&self, name: &str) -> Result<Option<Vec<u8>>, Error> {
+        if !self.has(name) {
+            return Ok(None);
+        }
+        let path = self.run.path().join(name);
+        let bytes = fs::read(&path).map_err(|source| Error::Io {
+            action: "read",
+            path,
+            source,
+        })?;
+        Ok(Some(bytes))
+    }
+}
+
+/// Every k-th item, with the smallest k that leaves at most `most`; the last one in any case.
+fn thinned<T>(items: &[T], most: usize) -> impl Iterator<Item = &T> {
+    // One less, as the last one may come on top.
+    let every = items.len().div_ceil(most - 1).max(1);
+    let every = if items.len() <= most { 1 } else { every };
+    let last = items.len().saturating_sub(1);
+    (items.iter().enumerate())
+        .filter(move |(k, _)| k % every == 0 || *k == last)
+        .map(|(_, item)| item)
+}
+
+/// The values of a column over the first one, the step.
+fn points(table: &Table, column: &str) -> Vec<[f64; 2]> {
+    let Some(k) = table.head().iter().position(|head| head == column) else {
+        return Vec::new();
+    };
+    (table.rows().iter())
+        .filter_map(|row| Some([row[0].parse().ok()?, row[k].parse().ok()?]))
+        .collect()
+}
+
+fn shortened(cell: &str) -> String {
+    cell.parse().map_or_else(|_| cell.to_owned(), five_digits)
+}
+
+/// The entries of a map, numbers with five digits.
+fn facts(values: &Value) -> Facts {
+    let Value::Object(map) = values else {
+        return Facts::new();
+    };
+    map.iter()
+        .fold(Facts::new(), |facts, (name, value)| match value {
+            Value::Number(number) => {
+                let value = number
+                    .as_f64()
+                    .map_or_else(|| number.to_string(), five_digits);
+                facts.with(name, value)
+            }
+            value => facts.with_value(name, value),
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_sequences_are_thinned_to_their_ends() {
+        for length in 0..400 {
+            let items: Vec<usize> = (0..length).collect();
+            let kept: Vec<usize> = thinned(&items, 60).copied().collect();
+            assert!(kept.len() <= 60, "{length}: {}", kept.len());
+            assert!(length > 60 || kept == items);
+            assert!(length == 0 || (kept[0] == 0 && kept[kept.len() - 1] == length - 1));
+            assert!(length < 100 || kept.len() > 30, "{length}: {}", kept.len());
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! The page of a run.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::{files, outcome, run, text};
+
+const RUN: [&str; 8] = [
+    "flow",
+    "builtin:cube",
+    "--cells",
+    "24",
+    "--steps",
+    "3",
+    "--frames",
+    "3",
+];
+
+fn with<'a>(options: &[&'a str]) -> Vec<&'a str> {
+    [&RUN[..], options].concat()
+}
+
+fn page(folder: &Path, run: &str) -> String {
+    fs::read_to_string(folder.join(run).join("index.html")).unwrap()
+}
+
+#[test]
+fn a_run_in_space_has_a_page_with_a_surface_to_turn() {
+    let folder = tempfile::tempdir().unwrap();
+    // Also where the mesh is kept without normals.
+    let fair = ["fair", "builtin:cube", "--cells", "24", "--steps", "3"];
+    let stl = ["--format", "stl", "--output", "stl"];
+    outcome(folder.path(), &with(&["--output", "ply"]));
+    outcome(folder.path(), &[&fair[..], &stl].concat());
+    for (name, frames) in [("ply", 2), ("stl", 0)] {
+        let html = page(folder.path(), name);
+        assert_eq!(html.matches("class=\"viewer\"").count(), 1, "{name}");
+        for label in ["before", "after"] {
+            let surface = format!("<script type=\"text/plain\" data-label=\"{label}\"");
+            assert!(html.contains(&surface), "{name}: {label}");
+        }
+        assert_eq!(html.matches("class=\"frame\"").count(), frames, "{name}");
+        // All is inside: the text of a page names no address but that of SVG itself.
+        assert!(!html.contains("src=\"http") && !html.contains("href=\"http"));
+        assert!(html.contains("Willmore energy") && html.contains("builtin:cube"));
+    }
+}
+
+#[test]
+fn a_run_in_the_plane_has_a_page_with_drawings() {
+    let folder = tempfile::tempdir().unwrap();
+    let mcf = ["mcf", "builtin:ring", "--cells", "32", "--steps", "2"];
+    outcome(
+        folder.path(),
+        &[&mcf[..], &["--output", "ring"][..]].concat(),
+    );
+    let html = page(folder.path(), "ring");
+    // Before, after, and the plot of the steps.
+    assert_eq!(html.matches("data:image/svg+xml").count(), 3);
+    let rows = html.split("<tbody>").nth(1).unwrap();
+    assert_eq!(
+        rows.split("</tbody>")
+            .next()
+            .unwrap()
+            .matches("<tr>")
+            .count(),
+        2
+    );
+}
+
+/// The page is none of the files of the run.
+#[test]
+fn a_page_may_go_and_comes_back() {
+    let folder = tempfile::tempdir().unwrap();
+    outcome(folder.path(), &with(&["--output", "run"]));
+    let (path, before) = (
+        folder.path().join("run/index.html"),
+        page(folder.path(), "run"),
+    );
+    let index = fs::read_to_string(folder.path().join("run/index.json")).unwrap();
+    assert!(!index.contains("index.html"));
+    fs::remove_file(&path).unwrap();
+    for damage in [None, Some("half a page")] {
+        if let Some(damage) = damage {
+            fs::write(&path, damage).unwrap();
+        }
+        let resumed = run(folder.path(), &["resume", "run"]);
+        assert!(resumed.status.success(), "{}", text(&resumed.stderr));
+        assert_eq!(page(folder.path(), "run"), before);
+    }
+}
+
+#[test]
+fn a_run_without_a_page_stays_without() {
+    let folder = tempfile::tempdir().unwrap();
+    outcome(folder.path(), &with(&["--output", "with"]));
+    outcome(folder.path(), &with(&["--no-page", "--output", "without"]));
+    outcome(folder.path(), &["resume", "without"]);
+    let names = |run: &str| {
+        files(&folder.path().join(run))
+            .into_keys()
+            .collect::<Vec<_>>()
+    };
+    let mut expected = names("with");
+    expected.retain(|name| name != Path::new("index.html"));
+    assert_eq!(names("without"), expected);
+}
