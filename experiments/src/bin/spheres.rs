@@ -284,6 +284,15 @@ fn table(all: &[Measurement], n: usize) -> Result<Table, Error> {
     Ok(table)
 }
 
+/// Tells schemes apart where lines are short.
+fn marker(scheme: Scheme) -> Marker {
+    match scheme {
+        Scheme::Paper => Marker::Circle,
+        Scheme::Calibrated => Marker::Triangle,
+        Scheme::Accurate => Marker::Diamond,
+    }
+}
+
 fn figure(run: &RunOptions, all: &[Measurement], n: usize) -> Figure {
     let last = MCF_STEPS.len() - 1;
     let mut errors = LineChart::new(
@@ -297,22 +306,18 @@ fn figure(run: &RunOptions, all: &[Measurement], n: usize) -> Figure {
             Series::new(method.label_in(scheme), points)
                 .with_colour(method as usize)
                 .with_style(method.style_in(scheme))
-                .with_marker(Marker::Circle),
+                .with_marker(marker(scheme)),
         );
     }
     let curve = |f: &dyn Fn(&Measurement) -> f64| -> Vec<[f64; 2]> {
         all.iter().map(|m| [m.radius, f(m)]).collect()
     };
-    let mut energies = LineChart::new(
-        "Willmore energy (by the schemes: of the relaxed profile)",
-        Axis::linear("radius"),
-        Axis::linear("w"),
-    )
-    .with_series(
-        Series::new("implicit FE measure", curve(&|m| m.w_elements))
-            .with_colour(1)
-            .with_marker(Marker::Square),
-    );
+    let mut energies = LineChart::new("Willmore energy", Axis::linear("radius"), Axis::linear("w"))
+        .with_series(
+            Series::new("implicit FE measure", curve(&|m| m.w_elements))
+                .with_colour(1)
+                .with_marker(Marker::Square),
+        );
     let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
     for (k, &scheme) in schemes.enumerate() {
         energies = energies.with_series(
@@ -321,7 +326,7 @@ fn figure(run: &RunOptions, all: &[Measurement], n: usize) -> Figure {
                 curve(&|m| m.willmore[k].w_relaxed),
             )
             .with_style(Method::Hybrid.style_in(scheme))
-            .with_marker(Marker::Circle),
+            .with_marker(marker(scheme)),
         );
     }
     energies = energies.with_series(
@@ -332,7 +337,9 @@ fn figure(run: &RunOptions, all: &[Measurement], n: usize) -> Figure {
     Figure::new(run.title("Spheres"), 2)
         .with_panel(errors)
         .with_panel(energies)
-        .with_note(format!("n = {n}, ε = 2/n, inner step 1/n²."))
+        .with_note(format!(
+            "n = {n}, ε = 2/n, inner step 1/n². Energies by the schemes are those after the steps of Willmore flow, of the relaxed profile."
+        ))
 }
 
 fn summary(all: &[Measurement], n: usize, seconds: f64) -> Result<Summary, Error> {
