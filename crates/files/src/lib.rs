@@ -25,8 +25,10 @@ mod atomic;
 mod error;
 mod stale;
 mod storage;
+mod text;
 
 pub use atomic::{probe, write_atomically, write_atomically_on};
 pub use error::{Error, Step};
 pub use stale::{TEMPORARY_PREFIX, remove_stale, stale};
 pub use storage::{Disk, Storage};
+pub use text::shortened;

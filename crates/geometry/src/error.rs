@@ -37,7 +37,7 @@ pub enum Error {
         cells: f64,
     },
     /// A number is outside the range in which the formula makes sense.
-    #[error("{name} = {value} is not allowed: it must be {requirement}")]
+    #[error("{name} = {value:?} is not allowed: it must be {requirement}")]
     InvalidParameter {
         /// What the number is.
         name: &'static str,

@@ -24,6 +24,10 @@ use crate::file::write_atomically;
 use crate::{Error, Field, Grid};
 
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
+/// Longest header, in bytes; version 1.0 of the format allows no more.
+const LONGEST_HEADER: usize = u16::MAX as usize;
+/// Most axes, as NumPy has it.
+const MOST_AXES: usize = 64;
 /// The header is padded so that the data start at a multiple of this.
 const ALIGNMENT: usize = 64;
 
@@ -42,6 +46,14 @@ pub enum NpyError {
         /// Minor version.
         minor: u8,
     },
+    /// The header is longer than that of any array.
+    #[error("the header has {length} bytes, and may have {limit}")]
+    HeaderLength {
+        /// Its bytes.
+        length: usize,
+        /// How many it may have.
+        limit: usize,
+    },
     /// The header is not the dictionary that the format prescribes.
     #[error("the header is malformed at byte {position} of its text: expected {expected}")]
     Header {
@@ -53,7 +65,7 @@ pub enum NpyError {
     /// The element type is not a floating-point number of 4 or 8 bytes.
     #[error("elements have type {found}; save the array as float64 (float32 is accepted too)")]
     DataType {
-        /// The type as written in the header.
+        /// The type as written in the header, shortened.
         found: String,
     },
     /// The array has the wrong number of axes.
@@ -106,6 +118,9 @@ pub fn write<const D: usize>(path: impl AsRef<Path>, field: &Field<D>) -> Result
 /// Reads a field; `grid` makes the grid from the number of cells per side.
 ///
 /// `float32` values are widened; both byte orders and Fortran order are understood.
+///
+/// Memory: at most four times the size of the file and 1 MiB, beside the file; the most is taken by
+/// `float32` values in Fortran order.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Npy`] for a wrong type, rank or shape, for a truncated or overlong file
@@ -226,8 +241,15 @@ fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), NpyError> {
         &[major, minor] => return Err(NpyError::Version { major, minor }),
     };
     let before = bytes.len() - rest.len();
-    rest.split_at_checked(length)
-        .ok_or(truncated(before.saturating_add(length)))
+    let parts = rest.split_at_checked(length);
+    let parts = parts.ok_or(truncated(before.saturating_add(length)))?;
+    if length > LONGEST_HEADER {
+        return Err(NpyError::HeaderLength {
+            length,
+            limit: LONGEST_HEADER,
+        });
+    }
+    Ok(parts)
 }
 
 /// Size and byte order of an element.
@@ -251,7 +273,7 @@ impl Element {
             "f4" => 4,
             _ => {
                 return Err(NpyError::DataType {
-                    found: data_type.into(),
+                    found: files::shortened(data_type, 20),
                 });
             }
         };
@@ -386,6 +408,9 @@ impl Cursor<'_> {
         let mut items = Vec::new();
         self.expect(b'(', "(")?;
         while !self.take(b')') {
+            if items.len() == MOST_AXES {
+                return Err(self.error("at most 64 axes"));
+            }
             items.push(self.integer()?);
             if !self.take(b',') && self.peek() != Some(b')') {
                 return Err(self.error(", or )"));

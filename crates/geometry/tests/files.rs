@@ -1,13 +1,14 @@
 //! NPY and VTI files.
 
+mod common;
+
 use std::fs;
 use std::path::Path;
 
+use common::{BY_VTK, doubles, foreign};
 use geometry::npy::{self, NpyError};
 use geometry::vti::{self, VtiError};
 use geometry::{Error, Field, Grid, file};
-use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 
 fn sample<const D: usize>(cells: usize) -> Field<D> {
     let grid = Grid::centred(cells, 2.0).unwrap();
@@ -72,22 +73,6 @@ fn npy_files_are_those_of_numpy() {
     let grid = Grid::<2>::centred(2, 2.0).unwrap();
     npy::write(&path, &Field::from_values(grid, values).unwrap()).unwrap();
     assert_eq!(fs::read(&path).unwrap(), numpy);
-}
-
-/// Bytes as NumPy writes them: `data` in the given order, little-endian, of the given type.
-fn foreign(dtype: &str, fortran: bool, shape: &str, data: &[&[u8]]) -> Vec<u8> {
-    let order = if fortran { "True" } else { "False" };
-    let text = format!("{{'descr': '{dtype}', 'fortran_order': {order}, 'shape': {shape}, }}");
-    let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
-    bytes.extend(format!("{text:<117}\n").as_bytes());
-    bytes.extend(data.concat());
-    bytes
-}
-
-fn doubles(shape: &str, values: &[f64]) -> Vec<u8> {
-    let data: Vec<[u8; 8]> = values.iter().map(|v| v.to_le_bytes()).collect();
-    let data: Vec<&[u8]> = data.iter().map(|v| &v[..]).collect();
-    foreign("<f8", false, shape, &data)
 }
 
 #[test]
@@ -371,17 +356,6 @@ fn vti_refuses_unusable_arrays() {
     assert!(!path.exists());
 }
 
-/// Written by VTK 9.7: the same two arrays in the encodings it knows, in blocks of 32 bytes where
-/// they are compressed.
-const BY_VTK: [&[u8]; 6] = [
-    include_bytes!("vtk/ascii.vti"),
-    include_bytes!("vtk/inline_f64.vti"),
-    include_bytes!("vtk/inline_zlib_u64.vti"),
-    include_bytes!("vtk/raw_f64_u64.vti"),
-    include_bytes!("vtk/raw_zlib_f64.vti"),
-    include_bytes!("vtk/base64_zlib.vti"),
-];
-
 #[test]
 fn vti_files_of_vtk_are_read() {
     let folder = tempfile::tempdir().unwrap();
@@ -566,39 +540,4 @@ fn vti_refuses_what_is_not_a_cube_of_point_data() {
         vti::read::<3>(folder.path().join("absent")),
         Err(Error::Io { .. })
     ));
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 2000, rng_seed: RngSeed::Fixed(3), ..ProptestConfig::default()
-    })]
-
-    /// Files cut short, or with bytes changed, give values or a typed error.
-    #[test]
-    fn vti_survives_broken_files(
-        file in 0..BY_VTK.len(),
-        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..4),
-        digits in prop::collection::vec((any::<prop::sample::Index>(), b'0'..=b'9'), 0..2),
-        cut in prop_oneof![Just(None), any::<prop::sample::Index>().prop_map(Some)],
-    ) {
-        let mut bytes = BY_VTK[file].to_vec();
-        for (place, byte) in changes {
-            let place = place.index(bytes.len());
-            bytes[place] = byte;
-        }
-        // Numbers that lie are worse than noise.
-        let numbers: Vec<usize> =
-            (0..bytes.len()).filter(|&k| bytes[k].is_ascii_digit()).collect();
-        for (place, digit) in digits {
-            bytes[numbers[place.index(numbers.len())]] = digit;
-        }
-        if let Some(cut) = cut {
-            bytes.truncate(cut.index(bytes.len()));
-        }
-        if let Ok(image) = vti::decode::<3>(&bytes) {
-            for (_, values) in image.arrays {
-                prop_assert_eq!(values.len(), image.cells.pow(3));
-            }
-        }
-    }
 }

@@ -71,8 +71,9 @@ pub enum FormatError {
 /// Colours become grey by the luma of JPEG, `0.299 R + 0.587 G + 0.114 B` of the stored values.
 /// Colour profiles are passed over. Images that Exif says are turned or mirrored are set upright.
 ///
-/// Memory: at most [`LARGEST_IMAGE`] pixels are read, with up to 16 bytes each while decoding beside
-/// those of the file; the size is checked before anything is decoded.
+/// Memory: at most [`LARGEST_IMAGE`] pixels are read, with up to 16 bytes each while decoding; beside
+/// them four times the size of the file, which is at most eight bytes for each of these pixels, and
+/// 32 MiB. The size is checked before anything is decoded.
 ///
 /// # Errors
 /// [`Error::Geometry`] if the file cannot be read; [`Error::Format`] for everything that is wrong
@@ -153,9 +154,7 @@ fn widen(value: u8) -> u16 {
     257 * u16::from(value)
 }
 
-/// The message of a library, in one line of at most 160 characters.
-fn one_line(message: &str) -> String {
-    let words = message.split_whitespace().collect::<Vec<_>>().join(" ");
-    let plain = words.chars().filter(|c| !c.is_control());
-    plain.take(160).collect()
+/// The message of a library.
+fn said(message: &str) -> String {
+    files::shortened(message, 160)
 }

@@ -95,8 +95,8 @@
 //!   `index.json` there is no copy: what can then be saved is in the checkpoints, which
 //!   [`Checkpoint::read`] checks on their own.
 //! - Readers never trust a number in a file before its length agrees. They take at most the length
-//!   of a checkpoint and some fifty times [`Checkpoint::MAX_HEADER`], some ten times the length of
-//!   an index (at most 64 MiB), some fifty times that of `timings.json` (at most 1 MiB), and 64 KiB
+//!   of a checkpoint and 160 times [`Checkpoint::MAX_HEADER`], some ten times the length of
+//!   an index (at most 64 MiB), 160 times that of `timings.json` (at most 1 MiB), and 64 KiB
 //!   for anything else.
 //! - A failed write (full disk, read-only folder) leaves the last commit in place.
 
@@ -114,7 +114,7 @@ mod seal;
 mod stored;
 
 #[cfg(test)]
-mod fuzz;
+mod fuzzing;
 
 pub use checkpoint::{Checkpoint, State};
 pub use digest::fingerprint;

@@ -199,7 +199,7 @@ pub enum Error {
         largest: f64,
     },
     /// A number is outside the range in which it makes sense.
-    #[error("{name} = {value} is not allowed: it must be {requirement}")]
+    #[error("{name} = {value:?} is not allowed: it must be {requirement}")]
     InvalidParameter {
         /// What the number is.
         name: &'static str,

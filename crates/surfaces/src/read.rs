@@ -126,25 +126,40 @@ pub enum FormatError {
 ///
 /// Polygons are cut into triangles from their first corner, which is right for convex ones.
 ///
+/// Memory: at most 64 times the size of the file and 1 MiB, whatever its header announces (the most
+/// is taken by binary PLY files with elements of a byte; usual files take two to six times their
+/// size).
+///
 /// # Errors
 /// [`Error::UnknownFormat`]; [`Error::Geometry`] if the file cannot be read; [`Error::Format`] for
 /// everything that is wrong with its contents. Whether the surface is closed is another matter: see
 /// [`ClosedMesh`](crate::ClosedMesh).
 pub fn read(path: impl AsRef<Path>) -> Result<TriangleMesh, Error> {
     let path = path.as_ref();
-    let format = Format::of(path)?;
+    // Before a long file is read in vain.
+    Format::of(path)?;
     let bytes = std::fs::read(path).map_err(|source| geometry::Error::Io {
         action: "read",
         path: path.into(),
         source,
     })?;
+    decode(&bytes, path)
+}
+
+/// The mesh in the bytes of a file of that name; see [`read`].
+///
+/// # Errors
+/// [`Error::UnknownFormat`] and [`Error::Format`].
+pub fn decode(bytes: &[u8], path: impl AsRef<Path>) -> Result<TriangleMesh, Error> {
+    let path = path.as_ref();
+    let format = Format::of(path)?;
     let mesh = if bytes.is_empty() {
         Err(FormatError::Empty)
     } else {
         match format {
-            Format::Obj => obj::decode(&bytes),
-            Format::Ply => ply::decode(&bytes),
-            Format::Stl => stl::decode(&bytes),
+            Format::Obj => obj::decode(bytes),
+            Format::Ply => ply::decode(bytes),
+            Format::Stl => stl::decode(bytes),
         }
     };
     mesh.map_err(|problem| Error::Format {
@@ -153,21 +168,9 @@ pub fn read(path: impl AsRef<Path>) -> Result<TriangleMesh, Error> {
     })
 }
 
-/// The start of a text, in one line.
+/// The start of a text of a file.
 fn shortened(text: &str) -> String {
-    const LONGEST: usize = 60;
-    let mut line = String::new();
-    for word in text.split_whitespace() {
-        if !line.is_empty() {
-            line.push(' ');
-        }
-        line.extend(word.chars().take(LONGEST + 1));
-        if let Some((end, _)) = line.char_indices().nth(LONGEST) {
-            line.truncate(end);
-            return line + " ...";
-        }
-    }
-    line
+    files::shortened(text, 60)
 }
 
 /// The three coordinates that follow in a line of text.

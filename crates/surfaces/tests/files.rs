@@ -6,29 +6,10 @@ mod common;
 
 use std::fs;
 use std::path::Path;
-use std::sync::LazyLock;
 
-use common::{cube, sphere, torus};
-use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
+use common::files::{ENCODINGS, FACET, decode, encode, ply};
+use common::{cube, torus};
 use surfaces::{ClosedMesh, Error, FormatError, TriangleMesh, read, samples, write};
-
-/// Reads bytes as a file with that extension.
-fn decode(extension: &str, bytes: &[u8]) -> Result<TriangleMesh, Error> {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("mesh").with_extension(extension);
-    fs::write(&path, bytes).unwrap();
-    read(&path)
-}
-
-/// The bytes of a written file.
-fn encode(extension: &str, mesh: &TriangleMesh) -> Vec<u8> {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("mesh").with_extension(extension);
-    write(&path, mesh).unwrap();
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-    fs::read(&path).unwrap()
-}
 
 fn problem(extension: &str, bytes: impl AsRef<[u8]>) -> FormatError {
     match decode(extension, bytes.as_ref()).unwrap_err() {
@@ -188,9 +169,6 @@ fn broken_obj_files_are_explained() {
     assert!(matches!(problem("obj", ""), FormatError::Empty));
 }
 
-const FACET: &str = "facet normal 0 0 1\n outer loop\n  vertex 0 0 0\n  vertex 1 0 0\n  \
-                     vertex 0 1.5e0 0\n endloop\nendfacet\n";
-
 #[test]
 fn stl_variants_are_understood() {
     let expected = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.5, 0.0]];
@@ -292,59 +270,6 @@ fn broken_stl_files_are_explained() {
         assert_eq!(message(text), expected);
     }
 }
-
-/// A tetrahedron in three encodings, with properties and elements that are passed over.
-fn ply(format: &str) -> Vec<u8> {
-    let header = format!(
-        "ply\nformat {format} 1.0\ncomment a b\nelement camera 1\nproperty list uchar float view\n\
-         element vertex 4\nproperty uchar red\nproperty float x\nproperty double y\n\
-         property short z\n\
-         element face 3\nproperty list uchar int vertex_index\nproperty float quality\n\
-         element edge 1\nproperty int a\nend_header\n"
-    );
-    let corners = [
-        [0.0, 0.0, 0.0],
-        [1.0, 0.0, 0.0],
-        [0.0, 1.0, 0.0],
-        [0.0, 0.0, 1.0],
-    ];
-    let faces: [&[i32]; 3] = [&[0, 2, 1], &[0, 1, 3], &[0, 3, 2, 1]];
-    let mut bytes = header.into_bytes();
-    if format == "ascii" {
-        bytes.extend(b"2 1.5 2.5\n0 0 0 0\n1 1 0 0\n2 0 1.0 0\n3 0 0 1\n");
-        bytes.extend(b"3 0 2 1 0.5\n3 0 1 3 0.5\n4 0 3 2 1 0.5\n7\n");
-        return bytes;
-    }
-    let big = format == "binary_big_endian";
-    let mut put = |value: &[u8]| {
-        // Given little-endian.
-        let mut value = value.to_vec();
-        if big {
-            value.reverse();
-        }
-        bytes.extend(value);
-    };
-    put(&[2]);
-    put(&1.5_f32.to_le_bytes());
-    put(&2.5_f32.to_le_bytes());
-    for (colour, [x, y, z]) in corners.into_iter().enumerate() {
-        put(&[colour as u8]);
-        put(&(x as f32).to_le_bytes());
-        put(&f64::to_le_bytes(y));
-        put(&(z as i16).to_le_bytes());
-    }
-    for face in faces {
-        put(&[face.len() as u8]);
-        for v in face {
-            put(&v.to_le_bytes());
-        }
-        put(&0.5_f32.to_le_bytes());
-    }
-    put(&7_i32.to_le_bytes());
-    bytes
-}
-
-const ENCODINGS: [&str; 3] = ["ascii", "binary_little_endian", "binary_big_endian"];
 
 #[test]
 fn ply_variants_are_understood() {
@@ -530,81 +455,4 @@ fn unusable_meshes_are_not_written() {
     );
     assert!(write(folder.path().join("mesh.ply"), &huge).is_ok());
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-}
-
-/// Whatever was read can be checked; whatever was not has one line to say.
-fn exercise(extension: &str, bytes: &[u8]) {
-    match decode(extension, bytes) {
-        Ok(mesh) => {
-            assert!(
-                mesh.faces
-                    .as_flattened()
-                    .iter()
-                    .all(|&v| (v as usize) < mesh.vertices.len())
-            );
-            assert!(mesh.vertices.iter().flatten().all(|v| v.is_finite()));
-            let _ = ClosedMesh::new(mesh);
-        }
-        Err(error) => {
-            let text = error.to_string();
-            assert!(!text.contains('\n') && text.len() < 400, "{text:?}");
-        }
-    }
-}
-
-/// Valid files of all formats.
-static VALID_FILES: LazyLock<Vec<(&str, Vec<u8>)>> = LazyLock::new(|| {
-    let mesh = sphere([0.0; 3], 1.0, 1);
-    let mut files: Vec<_> = ["obj", "ply", "stl"].map(|e| (e, encode(e, &mesh))).into();
-    files.extend(ENCODINGS.map(|format| ("ply", ply(format))));
-    let text = format!("solid a\n{FACET}{FACET}endsolid a\n");
-    files.push(("stl", text.into_bytes()));
-    files
-});
-
-proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 400,
-        rng_seed: RngSeed::Fixed(20),
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    })]
-
-    #[test]
-    fn random_bytes_do_no_harm(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
-        for (extension, start) in [
-            ("obj", ""), ("ply", ""), ("stl", ""),
-            ("stl", "solid "), ("obj", "f "), ("ply", "ply\n"),
-            ("ply", "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n\
-                     property float y\nproperty char z\nelement face 2\n\
-                     property list char ushort vertex_indices\nend_header\n"),
-        ] {
-            exercise(extension, &[start.as_bytes(), &bytes].concat());
-        }
-    }
-
-    #[test]
-    fn corrupted_files_do_no_harm(
-        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
-        cut in prop::option::of(any::<prop::sample::Index>()),
-        doubled in prop::option::of(any::<prop::sample::Index>()),
-    ) {
-        for (extension, mut bytes) in VALID_FILES.clone() {
-            for (index, value) in &changes {
-                // Also near the start, where the headers are.
-                let limit = if value % 2 == 0 { bytes.len() } else { bytes.len().min(300) };
-                let at = index.index(limit);
-                let likely = b"0123456789-+.e \n"[usize::from(*value) % 16];
-                bytes[at] = if value % 3 == 0 { likely } else { *value };
-            }
-            if let Some(index) = doubled {
-                let tail = bytes[index.index(bytes.len())..].to_vec();
-                bytes.extend(tail);
-            }
-            if let Some(index) = cut {
-                bytes.truncate(index.index(bytes.len()));
-            }
-            exercise(extension, &bytes);
-        }
-    }
 }

@@ -4,10 +4,18 @@ use std::path::Path;
 
 use roxmltree::{Document, Node};
 
+use files::shortened;
+
 use super::stream::{Element, Fault, Format, Stream};
 use crate::{Error, Field, Grid};
 
-/// What is wrong with a VTI file.
+/// Most elements, and most attributes, of a file. Those of VTK have some tens.
+const MOST_ELEMENTS: usize = 10_000;
+/// Most values of all arrays together, beyond those that have a byte each in the file: compressed
+/// data can be a thousand times as long, and arrays can share theirs.
+const MOST_VALUES: u64 = 1 << 28;
+
+/// What is wrong with a VTI file. Texts from the file are shortened.
 #[derive(Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VtiError {
@@ -16,6 +24,29 @@ pub enum VtiError {
     Xml {
         /// What the parser said.
         reason: String,
+    },
+    /// More elements, or more attributes, than such files have.
+    #[error(
+        "it has {count} elements or attributes, and may have {limit}: not a file of VTK image data"
+    )]
+    TooManyElements {
+        /// How many, counted by the characters `<` and `=`.
+        count: usize,
+        /// How many it may have.
+        limit: usize,
+    },
+    /// More values than are accepted.
+    #[error(
+        "it has {arrays} arrays of {nodes} values each, and may have {limit} values in all; save \
+         fewer arrays at a time, without compression"
+    )]
+    TooManyValues {
+        /// Number of arrays.
+        arrays: usize,
+        /// Values of an array.
+        nodes: u64,
+        /// Values of all of them that are accepted.
+        limit: u64,
     },
     /// An element is missing.
     #[error("there is no element {element}: not a file of VTK image data")]
@@ -117,6 +148,10 @@ pub enum VtiError {
 /// become those of the grid, whose side is thus `N` and not `N - 1` times the spacing: the
 /// repeated last layer of a periodic grid is not in the file.
 ///
+/// Memory: 24 bytes for every value, 32 times the size of the file, and 2 MiB. There may be as many
+/// values as the file has bytes, or 2^28 if it has fewer (of compressed data, or arrays that share
+/// theirs).
+///
 /// # Errors
 /// [`Error::Io`]; [`Error::Vti`] for what is not understood and for images that are no cubes;
 /// [`Error::NonFinite`] for values that are not finite.
@@ -159,8 +194,18 @@ pub struct Image<const D: usize> {
 pub fn decode<const D: usize>(bytes: &[u8]) -> Result<Image<D>, VtiError> {
     const { assert!(D >= 1 && D <= 3, "VTK image data have one to three axes") };
     let (text, appended) = split(bytes)?;
+    // The parser allocates by these numbers.
+    for mark in ['<', '='] {
+        let count = text.matches(mark).count();
+        if count > MOST_ELEMENTS {
+            return Err(VtiError::TooManyElements {
+                count,
+                limit: MOST_ELEMENTS,
+            });
+        }
+    }
     let document = Document::parse(&text).map_err(|error| VtiError::Xml {
-        reason: error.to_string(),
+        reason: shortened(&error.to_string(), 160),
     })?;
     let file = document.root_element();
     if file.tag_name().name() != "VTKFile" {
@@ -220,7 +265,7 @@ pub fn decode<const D: usize>(bytes: &[u8]) -> Result<Image<D>, VtiError> {
         return Err(VtiError::Attribute {
             element: "ImageData",
             attribute: "Direction",
-            value: image.attribute("Direction").unwrap_or_default().into(),
+            value: excerpt(image.attribute("Direction").unwrap_or_default()),
             requirement: "the identity",
         });
     }
@@ -236,7 +281,7 @@ pub fn decode<const D: usize>(bytes: &[u8]) -> Result<Image<D>, VtiError> {
     };
     let extent: [i64; 6] = numbers(piece, "Piece", "Extent", image.attribute("WholeExtent"))?;
     if extent != whole {
-        let written = |node: Node<'_, '_>, name| node.attribute(name).unwrap_or_default().into();
+        let written = |node: Node<'_, '_>, name| excerpt(node.attribute(name).unwrap_or_default());
         return Err(VtiError::PartialPiece {
             piece: written(piece, "Extent"),
             whole: written(image, "WholeExtent"),
@@ -270,11 +315,22 @@ pub fn decode<const D: usize>(bytes: &[u8]) -> Result<Image<D>, VtiError> {
             .transpose()?
             == Some("base64"),
     };
+    let data_arrays = || points.children().filter(|n| n.has_tag_name("DataArray"));
+    let limit = MOST_VALUES.max(bytes.len() as u64);
+    if reader.nodes.saturating_mul(data_arrays().count() as u64) > limit {
+        return Err(VtiError::TooManyValues {
+            arrays: data_arrays().count(),
+            nodes: reader.nodes,
+            limit,
+        });
+    }
     let mut arrays: Vec<(String, Vec<f64>)> = Vec::new();
-    for array in points.children().filter(|n| n.has_tag_name("DataArray")) {
+    for array in data_arrays() {
         let name = array.attribute("Name").unwrap_or_default();
         if name.is_empty() || arrays.iter().any(|(other, _)| other == name) {
-            return Err(VtiError::Name { name: name.into() });
+            return Err(VtiError::Name {
+                name: excerpt(name),
+            });
         }
         arrays.push((name.into(), reader.values::<D>(array, name)?));
     }
@@ -309,6 +365,11 @@ fn split(bytes: &[u8]) -> Result<(String, &[u8]), VtiError> {
     Ok((closed, data))
 }
 
+/// The start of a text of the file, for a message.
+fn excerpt(text: &str) -> String {
+    shortened(text, 60)
+}
+
 fn child<'a, 'input>(
     parent: Node<'a, 'input>,
     element: &'static str,
@@ -332,7 +393,7 @@ fn one_of<'a>(
     found.copied().ok_or_else(|| VtiError::Attribute {
         element,
         attribute,
-        value: wanted.into(),
+        value: excerpt(wanted),
         requirement: match attribute {
             "type" => "ImageData",
             "byte_order" => "LittleEndian or BigEndian",
@@ -357,7 +418,7 @@ fn numbers<T: std::str::FromStr + Copy, const N: usize>(
     parsed.ok_or_else(|| VtiError::Attribute {
         element,
         attribute,
-        value: text.into(),
+        value: excerpt(text),
         requirement: "a list of as many numbers as VTK prescribes",
     })
 }
@@ -382,15 +443,15 @@ impl Reader<'_> {
         let components = array.attribute("NumberOfComponents").unwrap_or("1");
         if components.trim() != "1" {
             return Err(VtiError::Components {
-                name: name.into(),
-                components: components.into(),
+                name: excerpt(name),
+                components: excerpt(components),
             });
         }
         let kind = array.attribute("type").unwrap_or_default();
         let element = Element::parse(kind).ok_or_else(|| VtiError::Attribute {
             element: "DataArray",
             attribute: "type",
-            value: kind.into(),
+            value: excerpt(kind),
             requirement: "Float32, Float64, or Int or UInt with 8, 16, 32 or 64",
         })?;
         let formats = ["ascii", "binary", "appended"];
@@ -430,13 +491,13 @@ impl Reader<'_> {
     fn parse(&self, text: &str, name: &str) -> Result<Vec<f64>, VtiError> {
         let parsed: Result<Vec<f64>, _> = text.split_ascii_whitespace().map(str::parse).collect();
         let values = parsed.map_err(|_| VtiError::Data {
-            name: name.into(),
+            name: excerpt(name),
             reason: "a word is not a number",
         })?;
         let found = values.len() as u64;
         if found != self.nodes {
             return Err(VtiError::Length {
-                name: name.into(),
+                name: excerpt(name),
                 expected: self.nodes,
                 found,
             });
@@ -455,12 +516,12 @@ impl Reader<'_> {
             .block(self.format, expected)
             .map_err(|fault| match fault {
                 Fault::Length(found) => VtiError::Length {
-                    name: name.into(),
+                    name: excerpt(name),
                     expected,
                     found,
                 },
                 Fault::Broken(reason) => VtiError::Data {
-                    name: name.into(),
+                    name: excerpt(name),
                     reason,
                 },
             })?;

@@ -7,7 +7,7 @@ use zune_jpeg::errors::DecodeErrors;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-use super::{FormatError, Orientation, Pixels, checked, luma, one_line, widen};
+use super::{FormatError, Orientation, Pixels, checked, luma, said, widen};
 
 /// Progressive files have some ten scans; each takes time for the whole image.
 const MOST_SCANS: usize = 64;
@@ -59,5 +59,5 @@ fn unusual(message: &str) -> FormatError {
 #[allow(clippy::needless_pass_by_value, reason = "for map_err")]
 fn refused(error: DecodeErrors) -> FormatError {
     // Some messages come in quotation marks.
-    unusual(one_line(&error.to_string()).trim_matches('"'))
+    unusual(said(&error.to_string()).trim_matches('"'))
 }

@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use png::{BitDepth, ColorType, Decoder, DecodingError, Limits, Transformations};
 
-use super::{FormatError, Orientation, Pixels, checked, luma, one_line, widen};
+use super::{FormatError, Orientation, Pixels, checked, luma, said, widen};
 
 /// Memory for everything but pixels: palettes, colour profiles, rows.
 const LARGEST_CHUNKS: usize = 1 << 24;
@@ -67,6 +67,6 @@ pub(super) fn decode(bytes: &[u8]) -> Result<(Pixels, Orientation), FormatError>
 #[allow(clippy::needless_pass_by_value, reason = "for map_err")]
 fn refused(error: DecodingError) -> FormatError {
     FormatError::Png {
-        message: one_line(&error.to_string()),
+        message: said(&error.to_string()),
     }
 }

@@ -2,6 +2,8 @@
 #![allow(dead_code, reason = "every test program uses some of them")]
 #![allow(clippy::float_cmp, reason = "equal vertices are computed alike")]
 
+pub mod files;
+
 use surfaces::{ClosedMesh, TriangleMesh};
 
 pub fn cube(half: f64) -> TriangleMesh {

@@ -1,0 +1,25 @@
+//! Texts of files in messages.
+
+/// The start of a text, in one line without control characters, for the message that complains of
+/// it: `longest` characters, and ` ...` if there is more.
+///
+/// ```
+/// assert_eq!(files::shortened("a\t b\n c", 60), "a b c");
+/// assert_eq!(files::shortened("some long text", 8), "some lon ...");
+/// ```
+pub fn shortened(text: &str, longest: usize) -> String {
+    let mut line = String::new();
+    // Of a long text, no more than can be needed is looked at.
+    for word in text.split_whitespace() {
+        if !line.is_empty() {
+            line.push(' ');
+        }
+        let plain = word.chars().filter(|c| !c.is_control());
+        line.extend(plain.take(longest + 1));
+        if let Some((end, _)) = line.char_indices().nth(longest) {
+            line.truncate(end);
+            return line + " ...";
+        }
+    }
+    line
+}

@@ -1,0 +1,359 @@
+//! Cases and their check.
+
+use std::any::Any;
+use std::cell::RefCell;
+use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::time::{Duration, Instant};
+
+use proptest::prelude::*;
+use proptest::sample::Index;
+use proptest::test_runner::{RngSeed, TestCaseError, TestError, TestRunner};
+
+use crate::change::{Change, Material, changes};
+use crate::peak_of;
+
+/// Number of cases in a test run that asks for no other.
+const CASES: u32 = 2000;
+/// Longest message of an error, in bytes.
+const LONGEST_MESSAGE: usize = 1000;
+/// Most bytes of a file in the message of a failed test.
+const SHOWN: usize = 2000;
+/// Seconds after which a case hangs. Cases take far less than one, but machines are shared.
+const PATIENCE: u64 = 20;
+
+/// The most memory that a reader may hold at a time, its result included and the file not:
+/// `times` the size of the file and `plus` bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limit {
+    /// Bytes for each byte of the file.
+    pub times: usize,
+    /// Bytes in any case.
+    pub plus: usize,
+}
+
+impl Limit {
+    fn of(self, file: &[u8]) -> usize {
+        self.times * file.len() + self.plus
+    }
+}
+
+/// What was measured.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// Name of the test.
+    pub name: &'static str,
+    /// Files read.
+    pub cases: u64,
+    /// Of these, files that the reader accepted.
+    pub accepted: u64,
+    /// Time of all cases.
+    pub time: Duration,
+    /// Longest time of a case.
+    pub slowest: Duration,
+    /// Most bytes that a case held at a time.
+    pub largest: usize,
+    /// Most bytes that a case held at a time, as part of what it might.
+    pub largest_part: f64,
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}: {} cases in {:.1} s, {} accepted; slowest {:.1} ms; at most {:.1} KiB, {:.0} % of the limit",
+            self.name,
+            self.cases,
+            self.time.as_secs_f64(),
+            self.accepted,
+            1e3 * self.slowest.as_secs_f64(),
+            self.largest as f64 / 1024.0,
+            100.0 * self.largest_part,
+        )
+    }
+}
+
+/// A file and what happens to it.
+#[derive(Clone, Debug)]
+struct Case {
+    file: Index,
+    changes: Vec<Change>,
+    repaired: bool,
+}
+
+/// One reader and the files to change.
+pub struct Fuzz<'a> {
+    name: &'static str,
+    limit: Limit,
+    valid: usize,
+    material: Material,
+    repair: Option<Box<dyn Fn(Vec<u8>) -> Vec<u8> + 'a>>,
+}
+
+impl<'a> Fuzz<'a> {
+    /// A reader under a name, with the memory that its documentation states.
+    pub fn new(name: &'static str, limit: Limit) -> Self {
+        Self {
+            name,
+            limit,
+            valid: 0,
+            // Random bytes begin with nothing.
+            material: Material {
+                files: vec![Vec::new()],
+                words: Vec::new(),
+                pairs: Vec::new(),
+            },
+            repair: None,
+        }
+    }
+
+    /// Files that the reader accepts.
+    #[must_use]
+    pub fn valid(mut self, files: impl IntoIterator<Item = Vec<u8>>) -> Self {
+        let before = self.material.files.len();
+        self.material.files.splice(0..0, files);
+        self.valid += self.material.files.len() - before;
+        self
+    }
+
+    /// Beginnings of files, to be followed by random bytes.
+    #[must_use]
+    pub fn starts<T: AsRef<[u8]>>(mut self, starts: impl IntoIterator<Item = T>) -> Self {
+        let starts = starts.into_iter().map(|s| s.as_ref().to_vec());
+        self.material.files.extend(starts);
+        self
+    }
+
+    /// Words that have a meaning in the format.
+    #[must_use]
+    pub fn words<T: AsRef<[u8]>>(mut self, words: impl IntoIterator<Item = T>) -> Self {
+        let words = words.into_iter().map(|w| w.as_ref().to_vec());
+        self.material.words.extend(words);
+        self
+    }
+
+    /// Words that open and close something, which are nested deeply.
+    #[must_use]
+    pub fn pairs<T: AsRef<[u8]>>(mut self, pairs: impl IntoIterator<Item = [T; 2]>) -> Self {
+        let pairs = pairs.into_iter().map(|p| p.map(|w| w.as_ref().to_vec()));
+        self.material.pairs.extend(pairs);
+        self
+    }
+
+    /// Half of the changed files go through this, such as for checksums that fit again: behind them
+    /// is more to reach.
+    #[must_use]
+    pub fn repair(mut self, repair: impl Fn(Vec<u8>) -> Vec<u8> + 'a) -> Self {
+        self.repair = Some(Box::new(repair));
+        self
+    }
+
+    /// Reads the valid files and changed ones; time and memory of `read` are measured, and `accepted`
+    /// has a look at what it returns. The report is printed, too.
+    ///
+    /// # Panics
+    /// If one of the two panics, if a valid file is refused, if an error is longer than a line, and
+    /// if a limit is exceeded. The message has the shortest case that was found, and the beginning of its bytes.
+    pub fn run<T, E: fmt::Display>(
+        &self,
+        read: impl Fn(&[u8]) -> Result<T, E>,
+        accepted: impl Fn(&[u8], T),
+    ) -> Report {
+        let begun = AtomicU64::new(0);
+        let meter = RefCell::new(Meter::new(self.name, self.limit));
+        let one = |bytes: &[u8]| {
+            begun.fetch_add(1, Ordering::Relaxed);
+            meter.borrow_mut().one(bytes, &read, &accepted)
+        };
+        let (end, ended) = channel();
+        let name = self.name;
+        std::thread::scope(|scope| {
+            let begun = &begun;
+            scope.spawn(move || watch(name, begun, &ended));
+            // Dropped at the end, also that by a panic, and then the watch ends.
+            let _end: Sender<()> = end;
+            for (number, file) in self.material.files[..self.valid].iter().enumerate() {
+                let result = one(file);
+                assert!(
+                    result == Ok(true),
+                    "{name}: valid file {number}: {result:?}"
+                );
+            }
+            let outcome = TestRunner::new(Self::config()).run(&case(), |case| {
+                let result = one(&self.bytes(&case));
+                result.map(|_| ()).map_err(TestCaseError::fail)
+            });
+            match outcome {
+                Ok(()) => {}
+                Err(TestError::Fail(reason, case)) => {
+                    let bytes = self.bytes(&case);
+                    let shown = bytes[..bytes.len().min(SHOWN)].escape_ascii();
+                    let length = bytes.len();
+                    panic!("{name}: {reason}\n{case:?}\n{length} bytes: b\"{shown}\"");
+                }
+                Err(TestError::Abort(reason)) => panic!("{name}: {reason}"),
+            }
+        });
+        let report = meter.into_inner().report;
+        println!("{report}");
+        report
+    }
+
+    fn config() -> ProptestConfig {
+        let number = |name: &str| {
+            let text = std::env::var(name).ok()?;
+            Some(
+                text.parse()
+                    .unwrap_or_else(|_| panic!("{name} is a number")),
+            )
+        };
+        ProptestConfig {
+            cases: number("FUZZ_CASES").unwrap_or(CASES),
+            rng_seed: RngSeed::Fixed(number("FUZZ_SEED").map_or(1, u64::from)),
+            failure_persistence: None,
+            max_shrink_iters: 5000,
+            ..ProptestConfig::default()
+        }
+    }
+
+    fn bytes(&self, case: &Case) -> Vec<u8> {
+        let mut bytes = case.file.get(&self.material.files).clone();
+        for change in &case.changes {
+            change.apply(&mut bytes, &self.material);
+        }
+        match &self.repair {
+            Some(repair) if case.repaired => repair(bytes),
+            _ => bytes,
+        }
+    }
+}
+
+fn case() -> impl Strategy<Value = Case> {
+    let parts = (any::<Index>(), changes(), any::<bool>());
+    parts.prop_map(|(file, changes, repaired)| Case {
+        file,
+        changes,
+        repaired,
+    })
+}
+
+/// Measures readings and judges them.
+struct Meter {
+    limit: Limit,
+    /// Where every file is stored.
+    folder: Option<PathBuf>,
+    report: Report,
+}
+
+impl Meter {
+    fn new(name: &'static str, limit: Limit) -> Self {
+        Self {
+            limit,
+            folder: std::env::var_os("FUZZ_KEEP").map(PathBuf::from),
+            report: Report {
+                name,
+                cases: 0,
+                accepted: 0,
+                time: Duration::ZERO,
+                slowest: Duration::ZERO,
+                largest: 0,
+                largest_part: 0.0,
+            },
+        }
+    }
+
+    fn keep(&self, bytes: &[u8], suffix: &str) {
+        if let Some(folder) = &self.folder {
+            let path = folder.join(format!("{}{suffix}", self.report.name));
+            std::fs::write(path, bytes).expect("the folder of FUZZ_KEEP can be written to");
+        }
+    }
+
+    /// Whether one file is accepted.
+    fn one<T, E: fmt::Display>(
+        &mut self,
+        bytes: &[u8],
+        read: impl Fn(&[u8]) -> Result<T, E>,
+        accepted: impl Fn(&[u8], T),
+    ) -> Result<bool, String> {
+        self.keep(bytes, "");
+        let start = Instant::now();
+        let attempt = catch_unwind(AssertUnwindSafe(|| {
+            let (result, peak) = peak_of(|| read(bytes));
+            let refusal = match result {
+                Ok(value) => {
+                    accepted(bytes, value);
+                    None
+                }
+                Err(error) => Some(error.to_string()),
+            };
+            (refusal, peak)
+        }));
+        let time = start.elapsed();
+        let (refusal, peak) = attempt.map_err(|payload| panic_message(&*payload))?;
+        let limit = self.limit.of(bytes);
+        let report = &mut self.report;
+        report.cases += 1;
+        report.accepted += u64::from(refusal.is_none());
+        report.time += time;
+        let is_slowest = time > report.slowest;
+        report.slowest = report.slowest.max(time);
+        report.largest = report.largest.max(peak);
+        report.largest_part = report.largest_part.max(peak as f64 / limit as f64);
+        if is_slowest {
+            self.keep(bytes, ".slowest");
+        }
+        if peak > limit {
+            let length = bytes.len();
+            return Err(format!(
+                "{peak} bytes of memory for {length} of the file, the limit is {limit}"
+            ));
+        }
+        match refusal {
+            Some(text) if !is_short_line(&text) => {
+                let start: String = text.chars().take(2 * LONGEST_MESSAGE).collect();
+                Err(format!("not one short line: {start:?}"))
+            }
+            refusal => Ok(refusal.is_none()),
+        }
+    }
+}
+
+/// Checks that an error explains itself in one line of bearable length, as every error should that
+/// a user gets to see.
+///
+/// # Panics
+/// If it does not.
+pub fn assert_short_line(error: &impl fmt::Display) {
+    let text = error.to_string();
+    assert!(is_short_line(&text), "not one short line: {text:?}");
+}
+
+fn is_short_line(text: &str) -> bool {
+    !text.is_empty() && text.len() <= LONGEST_MESSAGE && !text.chars().any(char::is_control)
+}
+
+fn panic_message(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<String>().map(String::as_str);
+    let text = text.or_else(|| payload.downcast_ref::<&str>().copied());
+    format!("panic: {}", text.unwrap_or_default())
+}
+
+/// Ends the process if a case takes too long: a thread cannot be ended.
+fn watch(name: &str, begun: &AtomicU64, ended: &Receiver<()>) {
+    let (mut seen, mut seconds) = (0, 0);
+    while ended.recv_timeout(Duration::from_secs(1)) == Err(RecvTimeoutError::Timeout) {
+        let now = begun.load(Ordering::Relaxed);
+        seconds = if now == seen { seconds + 1 } else { 0 };
+        seen = now;
+        if seconds > PATIENCE {
+            eprintln!(
+                "{name}: reading file {now} takes more than {PATIENCE} seconds; FUZZ_KEEP=FOLDER stores it"
+            );
+            std::process::abort();
+        }
+    }
+}
