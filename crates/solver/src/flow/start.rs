@@ -1,12 +1,12 @@
 //! Where the minimization of a time step begins.
 
-use burn::tensor::Tensor;
+use burn::tensor::{Slice, Tensor};
 use geometry::{Field, Grid};
 use model::{Factors, Network, Ratios, pretrained};
 use operators::extrapolate;
 use serde::{Deserialize, Serialize};
 
-use super::{FlowState, WillmoreFlow};
+use super::{WillmoreFlow, download};
 use crate::Error;
 
 /// The origin of a start.
@@ -138,32 +138,23 @@ impl<const D: usize> WillmoreFlow<D> {
 
     /// What the half grid moves in a step of size `tau` from here, and what that cost.
     fn motion_on_half_grid(&mut self, tau: f64) -> Result<Option<(Field<D>, f64)>, Error> {
-        if self.half.is_none() {
-            return Ok(None);
-        }
-        let state = self.state()?;
         let Some(half) = &mut self.half else {
             return Ok(None);
         };
-        let previous = match state.previous {
-            Some((u, tau)) => Some((u.every_other()?, tau)),
+        let every_other = |u: &Tensor<D>| u.clone().slice([Slice::with_step(0, None, 2); D]);
+        let from = every_other(&self.current);
+        half.current = from.clone();
+        half.previous = match &self.previous {
+            Some((u, tau)) => Some((every_other(u), *tau)),
             None => None,
         };
-        let coarse = FlowState {
-            current: state.current.every_other()?,
-            previous,
-            half_motions: half.half_motions(),
-            ..state
-        };
-        half.restore(&coarse)?;
+        (half.step, half.time) = (self.step, self.time);
         let record = match half.advance(tau) {
             Ok(record) => record,
             Err(Error::NotConverged { .. } | Error::NonFinite { .. }) => return Ok(None),
             Err(error) => return Err(error),
         };
-        let moved = half
-            .field()?
-            .zip_map(&coarse.current, |new, old| new - old)?;
+        let moved = download(&half.grid, &(half.current.clone() - from), &half.device)?;
         let share = half.grid.len() as f64 / self.grid.len() as f64;
         let hvp = share * (record.newton.hvp as f64 + record.start.hvp);
         Ok(Some((moved, hvp)))
