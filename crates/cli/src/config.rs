@@ -2,8 +2,15 @@
 //!
 //! A file has a line `name = value` for every option, named as on the command line; `input` is the input. What it says is put
 //! before what was typed and parsed in the same way, so that both accept the same and refuse the same.
+//!
+//! Memory: a file has at most 64 KiB, and takes at most 16 MiB while it is parsed.
+
+#[cfg(test)]
+mod fuzzing;
 
 use std::ffi::{OsStr, OsString};
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 use clap::parser::ValueSource;
@@ -16,6 +23,9 @@ use crate::error::Error;
 
 /// The entry of a resolved configuration that names the subcommand.
 pub const COMMAND: &str = "command";
+
+/// Longest configuration file, in bytes; all options take some thousand.
+const LONGEST: usize = 1 << 16;
 
 /// What was typed, together with the configuration file it names.
 ///
@@ -30,17 +40,32 @@ pub fn parse(arguments: &[OsString]) -> Result<Cli, ParseError> {
     let Some(file) = file else {
         return Ok(Cli::from_arg_matches(&matches)?);
     };
-    let text = std::fs::read_to_string(file).map_err(|source| Error::Io {
+    let mut text = String::new();
+    // One more than accepted, of what may never end.
+    let opened = File::open(file).map(|opened| opened.take(LONGEST as u64 + 1));
+    let read = opened.and_then(|mut opened| opened.read_to_string(&mut text));
+    read.map_err(|source| Error::Io {
         action: "read",
         path: file.clone(),
         source,
     })?;
-    let table = read(&text, file)?;
+    Ok(parse_both(arguments, command, typed, &text, file)?)
+}
+
+/// The options of a file, and what was typed behind them.
+fn parse_both(
+    arguments: &[OsString],
+    command: &str,
+    typed: &ArgMatches,
+    text: &str,
+    path: &Path,
+) -> Result<Cli, Error> {
+    let table = read(text, path)?;
     let mut all: Vec<OsString> = vec!["willmore".into(), command.into()];
-    all.extend(from_table(&table, command, file, Some(typed))?);
+    all.extend(from_table(&table, command, path, Some(typed))?);
     let typed = arguments.iter().skip(1);
     all.extend(typed.skip_while(|a| *a != command).skip(1).cloned());
-    Ok(parse_file(&all, file)?)
+    parse_file(&all, path)
 }
 
 /// The options that a run was started with.
@@ -52,6 +77,9 @@ pub fn parse_resolved(text: &str, path: &Path) -> Result<Cli, Error> {
     let Some(Value::String(command)) = table.get(COMMAND) else {
         return Err(bad(path, "it does not say which command it is for"));
     };
+    if Cli::command().find_subcommand(command).is_none() {
+        return Err(bad(path, format!("{command:?} is no command")));
+    }
     let mut all: Vec<OsString> = vec!["willmore".into(), command.into()];
     all.extend(from_table(&table, command, path, None)?);
     parse_file(&all, path)
@@ -101,11 +129,17 @@ pub fn one_line(error: &clap::Error) -> String {
 fn bad(path: &Path, message: impl Into<String>) -> Error {
     Error::Config {
         path: path.to_owned(),
-        message: message.into(),
+        message: files::shortened(&message.into(), 400),
     }
 }
 
 fn read(text: &str, path: &Path) -> Result<Table, Error> {
+    if text.len() > LONGEST {
+        return Err(bad(
+            path,
+            format!("a configuration has at most {LONGEST} bytes"),
+        ));
+    }
     text.parse::<Table>().map_err(|error| {
         let line = error
             .span()
@@ -143,6 +177,10 @@ fn from_table(
         if name == "config" {
             return Err(bad(path, "a configuration cannot name another one"));
         }
+        let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-';
+        if name.is_empty() || !name.chars().all(is_name) || ["help", "version"].contains(&&**name) {
+            return Err(bad(path, format!("{name:?} is no option")));
+        }
         let is_typed = |typed: &ArgMatches| {
             typed.try_contains_id(&id).is_ok()
                 && typed.value_source(&id) == Some(ValueSource::CommandLine)
@@ -167,6 +205,12 @@ fn from_table(
             }
         };
         let option = if name == "input" {
+            if text.starts_with('-') {
+                return Err(bad(
+                    path,
+                    format!("the input {text:?} looks like an option: put ./ before it"),
+                ));
+            }
             text
         } else {
             format!("--{name}={text}")

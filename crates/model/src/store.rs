@@ -16,6 +16,20 @@ use crate::{Calibration, Error, Mlp, Network, Ratios};
 /// Version of the file format, bumped when a reader of the old one would misread the new one.
 const FORMAT: &str = "1";
 
+/// Longest header of a file, in bytes; that of a shipped network has two thousand. Parsing takes many times its length.
+const LONGEST_HEADER: usize = 1 << 16;
+
+/// Refuses headers that are too long. They come first in a file, after their length; what else can be wrong is found later.
+fn check_header(data: &[u8]) -> Result<(), String> {
+    let length = data.first_chunk().map(|length| u64::from_le_bytes(*length));
+    match length {
+        Some(length) if length > LONGEST_HEADER as u64 => Err(format!(
+            "its header has {length} bytes, and may have {LONGEST_HEADER}"
+        )),
+        _ => Ok(()),
+    }
+}
+
 /// SHA-256 over everything that a network consists of, so that a flipped bit anywhere is noticed.
 fn checksum(network: &Network) -> serde_json::Result<String> {
     let mut hash = Sha256::new();
@@ -54,7 +68,7 @@ impl Network {
     /// `checksum` of all of it.
     ///
     /// # Errors
-    /// [`Error::Weights`] if the metadata cannot be encoded.
+    /// [`Error::Weights`] if the metadata cannot be encoded, or are longer than a reader accepts.
     pub fn to_bytes(&self) -> Result<Vec<u8>, Error> {
         let failed = |reason: String| Error::Weights {
             path: "network".into(),
@@ -97,18 +111,24 @@ impl Network {
                     .map_err(|e| failed(e.to_string()))
             })
             .collect::<Result<Vec<_>, _>>()?;
-        safetensors::serialize(views, Some(metadata)).map_err(|e| failed(e.to_string()))
+        let data =
+            safetensors::serialize(views, Some(metadata)).map_err(|e| failed(e.to_string()))?;
+        check_header(&data).map_err(failed)?;
+        Ok(data)
     }
 
     /// Reads a network, checking format, shapes, ratios, the checksum and that every number is finite.
+    ///
+    /// Memory: at most six times the length of the data and 8 MiB. Nothing runs on a device.
     ///
     /// # Errors
     /// [`Error::Weights`] naming `path` and what is wrong.
     pub fn from_bytes(data: &[u8], path: &Path) -> Result<Self, Error> {
         let failed = |reason: String| Error::Weights {
             path: path.to_owned(),
-            reason,
+            reason: files::shortened(&reason, 240),
         };
+        check_header(data).map_err(failed)?;
         let file = SafeTensors::deserialize(data)
             .map_err(|e| failed(format!("not a safetensors file ({e})")))?;
         let (_, header) = SafeTensors::read_metadata(data)

@@ -1,0 +1,176 @@
+//! Damaged and malicious configurations.
+
+use std::path::Path;
+
+use clap::CommandFactory;
+use fuzzing::{CountingAllocator, Fuzz, Limit, assert_short_line, peak_of};
+
+use super::{LONGEST, parse_both, parse_resolved, resolved};
+use crate::cli::{Cli, Command};
+use crate::error::Error;
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+/// As documented in the module.
+const LIMIT: Limit = Limit {
+    times: 0,
+    plus: 16 << 20,
+};
+
+const PATH: &str = "some/config.toml";
+
+const FLOW: &str = "command = \"flow\"\ninput = \"builtin:cube\"\ncells = 64\nbox-side = 1.0\n\
+                    side-length = 6e-1\nsteps = 12\ntau = \"doubling:1e-6\"\nquiet = true\n# the end\n";
+const INPAINT: &str = "command = 'inpaint'\n\"input\" = 'a b.png'\nmask = \"\"\"box:0.2,0.2,0.9,0.9\"\"\"\n\
+                       threshold = 0.25\ninside = \"dark\"\ntime = 1_000.5\ncells = 0x40\n";
+const FAIR: &str = "command = \"fair\"\ninput = \"\\u00e9.stl\"\nenergy = 26\nsave = \"b.stl\"\n";
+const MCF: &str = "command = \"mcf\"\ninput = \"c.vti\"\nmethod = \"fe-implicit\"\nframes = 4\n";
+
+/// A resolved configuration, as text: the options have no other way to be compared.
+fn text(cli: &Cli) -> Option<String> {
+    match &cli.command {
+        Command::Flow(options) => resolved("flow", options).ok(),
+        Command::Inpaint(options) => resolved("inpaint", options).ok(),
+        Command::Fair(options) => resolved("fair", options).ok(),
+        Command::Mcf(options) => resolved("mcf", options).ok(),
+        _ => None,
+    }
+}
+
+fn utf8(bytes: &[u8]) -> Result<&str, Error> {
+    std::str::from_utf8(bytes).map_err(|error| Error::options(error.to_string()))
+}
+
+fn configurations(name: &'static str) -> Fuzz<'static> {
+    Fuzz::new(name, LIMIT)
+        .starts(["command = ", "command = \"flow\"\n", "["])
+        .words([
+            "command = ",
+            "input = ",
+            "config = \"a\"\n",
+            "help = true\n",
+            "steps = ",
+            "tau = ",
+            "device = ",
+            "network = ",
+            "\"--help\"",
+            "'-'",
+            "true",
+            "false",
+            "nan",
+            "-inf",
+            "1979-05-27T07:32:00Z",
+            "[a]\n",
+            "[[a]]\n",
+            "a.b = 1\n",
+            "\"\"\"",
+            "'''",
+            "\\u0000",
+            "\\",
+            "\n",
+            "=",
+            "#",
+            ",",
+        ])
+        .pairs([
+            ["[", "]"],
+            ["{a=", "}"],
+            ["\"", "\""],
+            ["a.", ""],
+            ["[a.b]\n", ""],
+        ])
+}
+
+/// What was accepted is stored as what gives the same again.
+#[test]
+fn resolved_configurations() {
+    let read = |bytes: &[u8]| parse_resolved(utf8(bytes)?, Path::new(PATH));
+    configurations("resolved configurations")
+        .valid([FLOW, INPAINT, FAIR, MCF].map(|text| text.as_bytes().to_vec()))
+        .run(read, |_, cli| {
+            if let Some(stored) = text(&cli) {
+                let again = parse_resolved(&stored, Path::new(PATH)).unwrap();
+                assert_eq!(text(&again), Some(stored));
+            }
+        });
+}
+
+/// Together with options that were typed.
+#[test]
+fn named_configurations() {
+    let arguments = [
+        "willmore", "flow", "--config", PATH, "a.ply", "--steps", "3",
+    ];
+    let arguments = arguments.map(Into::into);
+    let matches = Cli::command().try_get_matches_from(&arguments).unwrap();
+    let (command, typed) = matches.subcommand().unwrap();
+    let read = |bytes: &[u8]| parse_both(&arguments, command, typed, utf8(bytes)?, Path::new(PATH));
+    configurations("named configurations")
+        .valid([FLOW.as_bytes().to_vec()])
+        .run(read, |_, cli| {
+            let Command::Flow(options) = &cli.command else {
+                panic!("{cli:?}");
+            };
+            assert_eq!(options.input.input.as_deref(), Some("a.ply"));
+        });
+}
+
+/// Files that make the most of every byte.
+#[test]
+fn the_worst_files_stay_within_the_limit() {
+    let keys = (0..5000)
+        .map(|k| format!("k{k}=true\n"))
+        .collect::<Vec<_>>()
+        .concat();
+    for worst in [
+        "a=[".to_owned() + &"0,".repeat(32_000) + "]",
+        "a=[".to_owned() + &"{},".repeat(21_000) + "]",
+        "a=".to_owned() + &"[".repeat(65_000),
+        "a.".repeat(32_000) + "b=1",
+        "[[a]]\n".repeat(10_000),
+        "[a".to_owned() + &".a".repeat(32_000) + "]",
+        keys,
+        "\n".repeat(65_000),
+        "cells=".to_owned() + &"9".repeat(65_000),
+        "input=\"".to_owned() + &"x".repeat(65_000) + "\"",
+        "x".repeat(65_000) + "=1",
+    ] {
+        let file = format!("command = \"flow\"\n{worst}");
+        let (result, peak) = peak_of(|| parse_resolved(&file, Path::new(PATH)));
+        println!("{} bytes: {peak}", file.len());
+        if let Err(error) = &result {
+            assert_short_line(error);
+        }
+        assert!(peak <= LIMIT.plus, "{peak}: {:?}", &worst[..20]);
+    }
+    let long = format!("command = \"flow\"\n{}", "#".repeat(LONGEST));
+    let message = parse_resolved(&long, Path::new(PATH)).unwrap_err();
+    assert_eq!(
+        message.to_string(),
+        format!("{PATH}: a configuration has at most 65536 bytes")
+    );
+}
+
+#[test]
+fn what_is_no_option_is_refused() {
+    for (line, expected) in [
+        ("help = true", "\"help\" is no option"),
+        ("version = true", "\"version\" is no option"),
+        ("\"steps=3\" = true", "\"steps=3\" is no option"),
+        ("\"\" = 1", "\"\" is no option"),
+        (
+            "input = \"--quiet\"",
+            "the input \"--quiet\" looks like an option: put ./ before it",
+        ),
+    ] {
+        let text = format!("command = \"flow\"\n{line}\n");
+        let message = parse_resolved(&text, Path::new(PATH)).unwrap_err();
+        assert_eq!(message.to_string(), format!("{PATH}: {expected}"));
+    }
+    let message = parse_resolved("command = \"--help\"", Path::new(PATH)).unwrap_err();
+    assert_eq!(
+        message.to_string(),
+        format!("{PATH}: \"--help\" is no command")
+    );
+}
