@@ -13,8 +13,8 @@ use crate::method::{Method, Scheme};
 use crate::networks::{NetworkOptions, checksum};
 use crate::options::RunOptions;
 use crate::surfaces::{
-    Finished, SchemeOptions, Setting, Snapshot, SurfaceRun, View, Workshop, ratios, scales, since,
-    table, write_steps,
+    Finished, SIDE, SchemeOptions, Setting, Snapshot, SurfaceRun, View, Workshop, ratios, scales,
+    since, table, write_steps,
 };
 use crate::{Error, memory};
 
@@ -157,6 +157,7 @@ impl MeshFlow {
             network: &networks[0],
             output: &output,
             progress: &progress,
+            side: SIDE,
         };
         let papers = options.mesh.is_the_papers();
         let within = self.shown.iter().filter(|(step, _)| *step <= steps);

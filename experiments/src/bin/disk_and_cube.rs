@@ -9,8 +9,8 @@ use experiments::method::{Method, Scheme};
 use experiments::networks::{NetworkOptions, checksum};
 use experiments::options::RunOptions;
 use experiments::surfaces::{
-    Finished, SchemeOptions, Setting, SurfaceRun, View, Workshop, centred_box, ratios, scales,
-    since, table, write_steps,
+    Finished, SIDE, SchemeOptions, Setting, SurfaceRun, View, Workshop, centred_box, ratios,
+    scales, since, table, write_steps,
 };
 use experiments::{Error, harness};
 use geometry::shapes::{Cuboid, Cylinder};
@@ -173,6 +173,7 @@ fn program(options: &Options) -> Result<(), Error> {
         network: &networks[0],
         output: &output,
         progress: &progress,
+        side: SIDE,
     };
     let mut finished: Vec<Finished<'_>> = Vec::new();
     for solid in &solids {

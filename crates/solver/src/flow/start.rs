@@ -144,10 +144,8 @@ impl<const D: usize> WillmoreFlow<D> {
         let every_other = |u: &Tensor<D>| u.clone().slice([Slice::with_step(0, None, 2); D]);
         let from = every_other(&self.current);
         half.current = from.clone();
-        half.previous = match &self.previous {
-            Some((u, tau)) => Some((every_other(u), *tau)),
-            None => None,
-        };
+        let previous = self.previous.as_ref();
+        half.previous = previous.map(|(u, tau)| (every_other(u), *tau));
         (half.step, half.time) = (self.step, self.time);
         let record = match half.advance(tau) {
             Ok(record) => record,
