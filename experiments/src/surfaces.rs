@@ -24,6 +24,8 @@ const EPS_OVER_H: f64 = 2.0;
 const MARGIN: f64 = 0.02;
 /// Kernel width of the network for surfaces.
 const WIDTH: usize = 17;
+/// The usual side of a picture in pixels.
+pub const SIDE: u32 = 640;
 /// Colour of a surface where it may move, if it may not everywhere.
 const MOVING: Rgb = Rgb(150, 196, 160);
 
@@ -154,6 +156,8 @@ pub struct Workshop<'a> {
     pub output: &'a OutputDir,
     /// Progress bars.
     pub progress: &'a Progress,
+    /// Side of a picture in pixels, except in quick runs.
+    pub side: u32,
 }
 
 #[derive(Serialize)]
@@ -266,7 +270,7 @@ impl Workshop<'_> {
         if self.options.quick {
             (120, Quality::Draft)
         } else {
-            (640, Quality::Standard)
+            (self.side, Quality::Standard)
         }
     }
 

@@ -10,7 +10,7 @@ use experiments::method::Method;
 use experiments::networks::{NetworkOptions, checksum};
 use experiments::options::RunOptions;
 use experiments::surfaces::{
-    Setting, SurfaceRun, View, Workshop, ratios, scales, since, table, write_steps,
+    SIDE, Setting, SurfaceRun, View, Workshop, ratios, scales, since, table, write_steps,
 };
 use experiments::{Error, harness, memory};
 use render::Axis;
@@ -103,6 +103,7 @@ fn program(options: &Options) -> Result<(), Error> {
         network: &networks[0],
         output: &output,
         progress: &progress,
+        side: SIDE,
     };
     let mut shown: Vec<usize> = SHOWN.into_iter().filter(|&s| s <= steps).collect();
     if !shown.contains(&steps) {

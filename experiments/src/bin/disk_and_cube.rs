@@ -9,7 +9,7 @@ use experiments::method::Method;
 use experiments::networks::{NetworkOptions, checksum};
 use experiments::options::RunOptions;
 use experiments::surfaces::{
-    Finished, Setting, SurfaceRun, View, Workshop, centred_box, ratios, scales, since, table,
+    Finished, SIDE, Setting, SurfaceRun, View, Workshop, centred_box, ratios, scales, since, table,
     write_steps,
 };
 use experiments::{Error, harness};
@@ -156,6 +156,7 @@ fn program(options: &Options) -> Result<(), Error> {
         network: &networks[0],
         output: &output,
         progress: &progress,
+        side: SIDE,
     };
     let mut finished: Vec<Finished<'_>> = Vec::new();
     for solid in &solids {

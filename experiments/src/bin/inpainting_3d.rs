@@ -37,6 +37,8 @@ const TUBE: [f64; 2] = [0.11, 0.42];
 const TUBES_REGION: f64 = 0.24;
 /// Radius of the edges of the region in the pictures.
 const EDGE: f64 = 0.003;
+/// Side of a picture in pixels.
+const SIDE: u32 = 480;
 /// Pictures side by side.
 const COLUMNS: usize = 3;
 /// After so many doublings a step has size 8: nothing moves for long.
@@ -242,6 +244,7 @@ fn program(options: &Options) -> Result<(), Error> {
         network: &networks[0],
         output: &output,
         progress: &progress,
+        side: SIDE,
     };
     let starts = (shapes.into_iter())
         .map(|shape| {

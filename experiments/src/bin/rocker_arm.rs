@@ -11,7 +11,7 @@ use experiments::method::Method;
 use experiments::networks::{NetworkOptions, checksum};
 use experiments::options::RunOptions;
 use experiments::surfaces::{
-    Setting, SurfaceRun, View, Workshop, ratios, scales, since, table, write_steps,
+    SIDE, Setting, SurfaceRun, View, Workshop, ratios, scales, since, table, write_steps,
 };
 use experiments::{Error, harness};
 use fem::FiniteElementStep;
@@ -118,6 +118,7 @@ fn program(options: &Options) -> Result<(), Error> {
         network: &networks[0],
         output: &output,
         progress: &progress,
+        side: SIDE,
     };
     let papers = options.mesh.is_the_papers();
     let mut shown: Vec<(usize, Option<f64>)> = SHOWN
