@@ -117,8 +117,8 @@ pub struct Evolution<const D: usize> {
     /// Whether and how steps of Willmore flow are made in parts. Records and measures are then those of the parts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub division: Option<Division>,
-    /// A run of Willmore flow ends when a whole step in one part moves the phase field by less than this fraction of the way that it
-    /// has come (`L2`).
+    /// A run of Willmore flow ends when the phase field moves by less than this fraction of the way that it has come (`L2`) per step; a
+    /// part of a step counts as much as it would if the whole step were like it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub still: Option<f64>,
     /// The region in which Willmore flow moves values, if not everywhere.
@@ -151,7 +151,7 @@ struct Stored {
     measures: Vec<Measures>,
     seconds: f64,
     checkpoint: Option<Checkpoint>,
-    /// Whole steps that are done, for a run that ended because it stood still.
+    /// The last step, of which perhaps not all parts were made, of a run that ended because it stood still.
     #[serde(default)]
     still: Option<usize>,
 }
@@ -212,7 +212,8 @@ pub struct Trajectory<const D: usize> {
     pub records: Vec<StepRecord>,
     /// Measures of the shape after every step (or part), the initial ones first.
     pub measures: Vec<Measures>,
-    /// The last step, if the run ended early because it hardly moved any more. Its field is kept.
+    /// The last step, if the run ended early because it hardly moved any more. It may have ended before this step was complete; the
+    /// field there is kept as that of the step.
     pub still: Option<usize>,
     /// Wall time of all steps, interruptions left out.
     pub seconds: f64,
@@ -254,7 +255,7 @@ impl<const D: usize> Evolution<D> {
     }
 
     /// Where the flow is in which step, from the parts that were made.
-    fn position(&self, records: &[StepRecord]) -> Result<Position, Error> {
+    fn position(&self, Stored { records, still, .. }: &Stored) -> Result<Position, Error> {
         let mut position = Position {
             ends: Vec::new(),
             parts: self.parts(1, f64::INFINITY)?,
@@ -262,6 +263,9 @@ impl<const D: usize> Evolution<D> {
         for (k, record) in records.iter().enumerate() {
             position.parts.made(record);
             self.proceed(&mut position, k + 1)?;
+        }
+        if still.is_some_and(|last| position.ends.len() < last) {
+            position.ends.push(records.len());
         }
         Ok(position)
     }
@@ -380,7 +384,7 @@ impl<const D: usize> Evolution<D> {
         };
         match self.flow {
             Flow::Willmore => {
-                let mut position = self.position(&stored.records)?;
+                let mut position = self.position(&stored)?;
                 bar.set_position(position.ends.len() as u64);
                 if !self.is_over(&position, &stored) {
                     let from = (&state, &mut position);
@@ -465,15 +469,17 @@ impl<const D: usize> Evolution<D> {
                 npy::write(trajectory.path(&part_name(halvings))?, &field)?;
             }
             let step = position.step();
-            if self.proceed(position, stored.records.len())? {
-                if self.stands_still(trajectory, &flow, &record, step)? {
-                    stored.still = Some(step);
+            let complete = self.proceed(position, stored.records.len())?;
+            if self.stands_still(trajectory, &flow, &record, step)? {
+                stored.still = Some(step);
+                if !complete {
+                    position.ends.push(stored.records.len());
                 }
-                if self.samples(step) || stored.still.is_some() {
-                    trajectory.keep(step, &field)?;
-                }
-                bar.inc(1);
             }
+            if stored.still.is_some() || complete && self.samples(step) {
+                trajectory.keep(step, &field)?;
+            }
+            bar.set_position(position.ends.len() as u64);
             if self.is_over(position, stored) || last.elapsed() >= CHECKPOINT_INTERVAL {
                 trajectory.store(stored, &flow.state()?)?;
                 last = Instant::now();
@@ -490,7 +496,7 @@ impl<const D: usize> Evolution<D> {
             || self.pause_after.is_some_and(|pause| parts >= pause)
     }
 
-    /// Whether a whole step has moved the phase field by next to nothing.
+    /// Whether a step of which this is a part moves the phase field by next to nothing.
     fn stands_still(
         &self,
         trajectory: &Trajectory<D>,
@@ -498,15 +504,14 @@ impl<const D: usize> Evolution<D> {
         record: &StepRecord,
         step: usize,
     ) -> Result<bool, Error> {
-        let is_whole = record.tau.to_bits() == self.tau.size(step).to_bits();
-        let (Some(limit), true) = (self.still, is_whole) else {
+        let Some(limit) = self.still else {
             return Ok(false);
         };
         let state = flow.state()?;
         let Some((previous, _)) = &state.previous else {
             return Ok(false);
         };
-        let moved = l2_distance(&state.current, previous)?;
+        let moved = l2_distance(&state.current, previous)? * self.tau.size(step) / record.tau;
         Ok(moved <= limit * l2_distance(&state.current, &trajectory.field(0)?)?)
     }
 
@@ -791,8 +796,7 @@ mod tests {
                 first: 0.25 * STEP,
                 kept: vec![1, 2, 3],
             }),
-            // In the first step that is made in one part.
-            still: Some(0.9),
+            still: Some(0.55),
             ..evolution(Flow::Willmore, Method::Hybrid)
         };
         let run = |e: &Evolution<2>, folder: &OutputDir| {

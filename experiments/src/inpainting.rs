@@ -10,7 +10,7 @@ use crate::Error;
 use crate::evolution::{Division, NamedRegion, Trajectory};
 use crate::options::RunOptions;
 
-/// A shape stands still once a step moves it by less than this part of the way it has come.
+/// A shape stands still once it moves by less than this part of the way it has come per step.
 pub const STILL: f64 = 1e-5;
 /// The first part of the first step, in units of `eps^4`: the time in which a corner becomes about as round as the interface is wide.
 const FIRST_PART: f64 = 32.0;
@@ -123,6 +123,13 @@ impl<'a, const D: usize> Inpainted<'a, D> {
         })
     }
 
+    /// The time in the paper's steps from which on the shape stands still, if it does.
+    pub fn still_from(&self) -> Option<f64> {
+        self.trajectory.still?;
+        let last = self.trajectory.records.last()?;
+        Some((last.time - last.tau) / self.tau)
+    }
+
     fn rows(&self) -> impl Iterator<Item = Row> + '_ {
         let trajectory = self.trajectory;
         (trajectory.records.iter().zip(&trajectory.measures[1..])).map(|(r, m)| Row {
@@ -157,8 +164,8 @@ impl<'a, const D: usize> Inpainted<'a, D> {
         summary.insert_count(&name("changed_outside"), self.changed_outside)?;
         summary.insert_count(&name("steps"), self.trajectory.steps())?;
         summary.insert_count(&name("parts_of_step1"), first.len())?;
-        if let Some(still) = self.trajectory.still {
-            summary.insert_count(&name("still_from_step"), still - 1)?;
+        if let Some(still) = self.still_from() {
+            summary.insert(&name("still_from"), still)?;
         }
         let hvp: usize = records.iter().map(|r| r.newton.hvp).sum();
         summary.insert(&name("hvp_per_part"), hvp as f64 / count.max(1) as f64)?;

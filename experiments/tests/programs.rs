@@ -301,7 +301,7 @@ fn the_quick_inpainting_changes_nothing_outside() {
     // Round again, and the rest of the steps is not made.
     assert!(summary.get("disk.distance.step0").unwrap() > 0.2);
     assert!(summary.get("disk.distance.step1").unwrap() < 0.02);
-    assert!(summary.get("disk.still_from_step").unwrap() < 5.0);
+    assert!(summary.get("disk.still_from").unwrap() < 5.0);
     assert!(summary.get("disk.parts_of_step1").unwrap() > 4.0);
     // As printed, tautilde is beyond what the scheme allows at the paper's resolution.
     refused(

@@ -83,7 +83,8 @@ fn quick_inpainting_changes_nothing_outside() {
         assert!(metric(&format!("{key}.changed_outside")) <= 0.0);
         assert!(metric(&format!("{key}.energy_increases")) <= 0.0);
         assert!(metric(&format!("{key}.w.step{last}")) < metric(&format!("{key}.w.step0")));
-        assert!(metric(&format!("{key}.euler_characteristic.step{last}")) == 2.0);
+        let euler = metric(&format!("{key}.euler_characteristic.step{last}"));
+        assert!((euler - 2.0).abs() < 0.5);
         let frames = format!("out/{key}_frames.png");
         assert!(root.path().join(frames).exists());
     }

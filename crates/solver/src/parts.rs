@@ -11,6 +11,8 @@ use crate::{Error, StepRecord, WillmoreFlow};
 const EASY: usize = 8;
 /// and half as long if it took more than this.
 const HARD: usize = 20;
+/// After a failure so many parts are made before a longer one is tried again: failures are dear.
+const PATIENCE: u32 = 4;
 /// Sizes are the step's divided by `2^k`, `k` at most this, so that places in a step are exact numbers.
 const DEEPEST: u32 = 48;
 
@@ -18,7 +20,7 @@ const DEEPEST: u32 = 48;
 ///
 /// Sizes are `tau / 2^k`, and a part begins at a multiple of its size: the parts add up to `tau` without rounding, none goes beyond
 /// it, and every `tau / 2^k` not smaller than the first part is the end of one. After a part that took few Newton steps the next one
-/// is twice as long, after one that took many half as long, as far as that rule allows.
+/// is twice as long, after one that took many half as long, as far as that rule allows; after a failure that takes a few parts longer.
 ///
 /// What comes next depends on nothing but the [records](StepRecord) of the parts made, so that [`Self::made`] also restores it.
 ///
@@ -40,6 +42,8 @@ pub struct Parts {
     deepest: u32,
     /// and so many of those are made.
     done: u64,
+    /// Parts to be made before one is longer than the one before.
+    wait: u32,
 }
 
 impl Parts {
@@ -72,6 +76,7 @@ impl Parts {
             depth: depth as u32,
             deepest: deepest as u32,
             done: 0,
+            wait: 0,
         })
     }
 
@@ -93,13 +98,20 @@ impl Parts {
     /// Takes note of a part.
     pub fn made(&mut self, part: &StepRecord) {
         let halvings = (self.tau / part.tau).log2().round();
-        self.depth = (halvings.max(0.0) as u32).min(self.deepest);
-        self.done += 1 << (self.deepest - self.depth);
-        let doubled = self.deepest - self.depth + 1;
-        if part.newton.newton > HARD {
-            self.depth = (self.depth + 1).min(self.deepest);
-        } else if part.newton.newton <= EASY && self.done.is_multiple_of(1 << doubled) {
-            self.depth = self.depth.saturating_sub(1);
+        let depth = (halvings.max(0.0) as u32).min(self.deepest);
+        self.wait = if depth > self.depth {
+            PATIENCE
+        } else {
+            self.wait.saturating_sub(1)
+        };
+        self.depth = depth;
+        self.done += 1 << (self.deepest - depth);
+        let doubled = self.deepest - depth + 1;
+        let (easy, hard) = (part.newton.newton <= EASY, part.newton.newton > HARD);
+        if hard {
+            self.depth = (depth + 1).min(self.deepest);
+        } else if easy && self.wait == 0 && self.done.is_multiple_of(1 << doubled) {
+            self.depth = depth.saturating_sub(1);
         }
     }
 }
@@ -250,6 +262,12 @@ mod tests {
                 restored.made(part);
             }
             assert_eq!(restored, parts);
+            // Some fail once.
+            let size = if records.len() % 7 == 5 {
+                0.5 * size
+            } else {
+                size
+            };
             records.push(record(size, newton(records.len())));
             parts.made(&records[records.len() - 1]);
         }

@@ -254,10 +254,11 @@ fn program(options: &Options) -> Result<(), Error> {
         };
         finished.push(run.execute(&networks[0], &device, &store, &progress, &mut manifest)?);
     }
-    for one in &finished {
-        frames(&options.run, one)?.write(&output, &format!("{}_frames", one.picture.key()))?;
-    }
     let measured = (finished.iter().map(Finished::measure)).collect::<Result<Vec<_>, Error>>()?;
+    for (one, measured) in finished.iter().zip(&measured) {
+        let name = format!("{}_frames", one.picture.key());
+        frames(&options.run, one, measured.still_from())?.write(&output, &name)?;
+    }
     inpainting::energies(&options.run, &measured).write(&output, "energies")?;
     output.write("steps.csv", inpainting::steps_csv(&measured)?)?;
     let table = inpainting::table(&measured)?;
@@ -344,7 +345,7 @@ impl Run {
 }
 
 /// The shapes over time, D outlined in green.
-fn frames(run: &RunOptions, one: &Finished) -> Result<Figure, Error> {
+fn frames(run: &RunOptions, one: &Finished, still: Option<f64>) -> Result<Figure, Error> {
     let (picture, trajectory) = (one.picture, &one.trajectory);
     let mut shown = vec![("step 0".to_owned(), trajectory.field(0)?)];
     for k in INSIDE {
@@ -355,7 +356,13 @@ fn frames(run: &RunOptions, one: &Finished) -> Result<Figure, Error> {
     let last = trajectory.steps();
     let later = |k: &usize| (1..last).contains(k);
     for k in (picture.shown().iter().copied().filter(later)).chain([last]) {
-        shown.push((format!("step {k}"), trajectory.field(k)?));
+        let time = trajectory.record(k).map_or(0.0, |r| r.time / picture.tau());
+        let name = if time < k as f64 - 1e-9 {
+            format!("{time:.3} steps")
+        } else {
+            format!("step {k}")
+        };
+        shown.push((name, trajectory.field(k)?));
     }
     let title = format!("Inpainting: {}", picture.title());
     let mut figure = Figure::new(run.title(&title), 4);
@@ -376,8 +383,8 @@ fn frames(run: &RunOptions, one: &Finished) -> Result<Figure, Error> {
                 .with_window([-0.5, 0.5], [-0.5, 0.5]),
         );
     }
-    let end = trajectory.still.map_or(String::new(), |still| {
-        format!(" It stands still from step {} on.", still - 1)
+    let end = still.map_or(String::new(), |still| {
+        format!(" The shape stands still after {still:.3} steps.")
     });
     Ok(figure.with_note(format!(
         "n = {}, τ = 2^{}; only the values inside the green frame move. The first step is made in {} parts.{end}",

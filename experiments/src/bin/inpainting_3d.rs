@@ -363,8 +363,8 @@ fn note(n: usize, measured: &Inpainted<'_, 3>) -> String {
         TimeSteps::Growing { alike, .. } => alike,
         _ => 0,
     };
-    let end = measured.trajectory.still.map_or(String::new(), |still| {
-        format!(" The shape stands still from step {} on.", still - 1)
+    let end = measured.still_from().map_or(String::new(), |still| {
+        format!(" The shape stands still from t = {} τ on.", still.round())
     });
     format!(
         "n = {n}, ε = 2/n, inner step 1/n², τ = 2⁻²¹, doubled every step from step {} on; only the values in the green box move.{end} \
