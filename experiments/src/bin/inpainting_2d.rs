@@ -57,7 +57,7 @@ struct Options {
     #[command(flatten)]
     networks: NetworkOptions,
 
-    /// Cells per unit length; eps = 4/n and tautilde = 4/n^2 follow [default: 512; the paper has 1024, which takes about ten times as long]
+    /// Cells per unit length; eps = 4/n and tautilde = 4/n^2 follow [default: 512; paper: 1024, which has not been run to its end]
     #[arg(long, value_name = "N")]
     cells: Option<usize>,
 
