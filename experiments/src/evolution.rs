@@ -14,7 +14,7 @@ use model::Network;
 use operators::ComputeDevice;
 use report::OutputDir;
 use serde::{Deserialize, Serialize};
-use solver::{Factors, FlowParams, FlowState, Parts, StepRecord, WillmoreFlow};
+use solver::{Factors, FlowParams, FlowState, Parts, StepRecord};
 
 use crate::Error;
 use crate::circles::Flow;
@@ -455,6 +455,8 @@ impl<const D: usize> Evolution<D> {
             flow.restrict_to(&region.nodes)?;
         }
         flow.restore(state)?;
+        let initial = trajectory.field(0)?;
+        let mut before = state.current.clone();
         let mut last = Instant::now();
         while !self.is_over(position, stored) {
             let clock = Instant::now();
@@ -474,7 +476,7 @@ impl<const D: usize> Evolution<D> {
             }
             let step = position.step();
             let complete = self.proceed(position, stored.records.len())?;
-            if self.stands_still(trajectory, &flow, &record, step)? {
+            if self.stands_still([&initial, &before, &field], &record, step)? {
                 stored.still = Some(step);
                 if !complete {
                     position.ends.push(stored.records.len());
@@ -483,6 +485,7 @@ impl<const D: usize> Evolution<D> {
             if stored.still.is_some() || complete && self.samples(step) {
                 trajectory.keep(step, &field)?;
             }
+            before = field;
             bar.set_position(position.ends.len() as u64);
             if self.is_over(position, stored) || last.elapsed() >= CHECKPOINT_INTERVAL {
                 trajectory.store(stored, &flow.state()?)?;
@@ -500,23 +503,19 @@ impl<const D: usize> Evolution<D> {
             || self.pause_after.is_some_and(|pause| parts >= pause)
     }
 
-    /// Whether a step of which this is a part moves the phase field by next to nothing.
+    /// Whether a step of which this is a part moves the phase field by next to nothing; `fields` are the first one, that before the
+    /// part and that after it.
     fn stands_still(
         &self,
-        trajectory: &Trajectory<D>,
-        flow: &WillmoreFlow<D>,
+        [first, before, after]: [&Field<D>; 3],
         record: &StepRecord,
         step: usize,
     ) -> Result<bool, Error> {
         let Some(limit) = self.still else {
             return Ok(false);
         };
-        let state = flow.state()?;
-        let Some((previous, _)) = &state.previous else {
-            return Ok(false);
-        };
-        let moved = l2_distance(&state.current, previous)? * self.tau.size(step) / record.tau;
-        Ok(moved <= limit * l2_distance(&state.current, &trajectory.field(0)?)?)
+        let moved = l2_distance(after, before)? * self.tau.size(step) / record.tau;
+        Ok(moved <= limit * l2_distance(after, first)?)
     }
 
     fn mean_curvature(

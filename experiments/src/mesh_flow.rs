@@ -13,8 +13,8 @@ use crate::method::{Method, Scheme};
 use crate::networks::{NetworkOptions, checksum};
 use crate::options::RunOptions;
 use crate::surfaces::{
-    Finished, SIDE, SchemeOptions, Setting, Snapshot, SurfaceRun, View, Workshop, ratios, scales,
-    since, table, write_steps,
+    Finished, SchemeOptions, Setting, Snapshot, SurfaceRun, View, Workshop, ratios, scales, since,
+    table, write_steps,
 };
 use crate::{Error, memory};
 
@@ -151,14 +151,7 @@ impl MeshFlow {
             mesh.phase_field(grid, params.eps, &bar)
         })?;
         bar.finish();
-        let workshop = Workshop {
-            options: &options.run,
-            device: &device,
-            network: &networks[0],
-            output: &output,
-            progress: &progress,
-            side: SIDE,
-        };
+        let workshop = Workshop::new(&options.run, &device, &networks[0], &output, &progress);
         let papers = options.mesh.is_the_papers();
         let within = self.shown.iter().filter(|(step, _)| *step <= steps);
         let mut shown: Vec<(usize, Option<f64>)> = within.copied().collect();

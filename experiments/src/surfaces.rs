@@ -26,7 +26,7 @@ const MARGIN: f64 = 0.02;
 /// Kernel width of the network for surfaces.
 const WIDTH: usize = 17;
 /// The usual side of a picture in pixels.
-pub const SIDE: u32 = 640;
+const SIDE: u32 = 640;
 /// Colour of a surface where it may move, if it may not everywhere.
 const MOVING: Rgb = Rgb(150, 196, 160);
 
@@ -201,6 +201,26 @@ struct StepRow<'a> {
     seconds: f64,
 }
 
+impl<'a> Workshop<'a> {
+    /// Pictures have the usual size.
+    pub fn new(
+        options: &'a RunOptions,
+        device: &'a ComputeDevice,
+        network: &'a Network,
+        output: &'a OutputDir,
+        progress: &'a Progress,
+    ) -> Self {
+        Self {
+            options,
+            device,
+            network,
+            output,
+            progress,
+            side: SIDE,
+        }
+    }
+}
+
 impl Workshop<'_> {
     /// Runs, continues or looks up a surface, and measures the steps to be shown.
     ///
@@ -265,18 +285,18 @@ impl Workshop<'_> {
                     let name = format!("{}.ply", run.name(step));
                     surfaces::write(meshes.path(&name)?, surface.mesh())?;
                     let measures = trajectory.measures_after(step)?;
+                    let record = trajectory.record(step);
+                    let at_rest = trajectory.records.first();
                     memory::release_freed();
                     Ok(Snapshot {
                         step,
-                        time: run.tau.time(step),
+                        time: record.map_or(0.0, |r| r.time),
                         w: measure.willmore_energy(&u)?,
-                        w_scheme: match step.checked_sub(1) {
-                            Some(last) => trajectory.records[last].willmore_energy,
+                        w_scheme: match (record, at_rest) {
+                            (Some(record), _) => record.willmore_energy,
                             // Standing still costs 2 tau w.
-                            None => {
-                                let first = &trajectory.records[0];
-                                first.energy_before / (2.0 * first.tau)
-                            }
+                            (None, Some(first)) => first.energy_before / (2.0 * first.tau),
+                            (None, None) => f64::NAN,
                         },
                         paper: paper.filter(|_| !self.options.quick),
                         perimeter: measures.perimeter,

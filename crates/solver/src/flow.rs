@@ -217,10 +217,11 @@ impl<const D: usize> WillmoreFlow<D> {
     /// # Errors
     /// [`Error::Region`] if there are not as many marks as nodes, or if none is set.
     pub fn restrict_to(&mut self, nodes: &[bool]) -> Result<(), Error> {
-        self.region = Some(Region::new(&self.grid, nodes, &self.device)?);
+        let region = Region::new(&self.grid, nodes, &self.device)?;
         if let Some(half) = &mut self.half {
             half.restrict_to(&every_other_node(self.grid, nodes))?;
         }
+        self.region = Some(region);
         Ok(())
     }
 

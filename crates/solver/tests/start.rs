@@ -114,6 +114,42 @@ fn a_step_that_failed_leaves_no_trace() {
     assert_eq!(step(true), step(false));
 }
 
+/// Three grids; the middle one gives up on a large step, and then has nothing to say of the lowest.
+#[test]
+fn a_grid_that_gives_up_in_the_middle_of_a_chain() {
+    let on = |n: usize, width: usize, newton_iterations: usize| {
+        let network = accurate(n, width);
+        let mut params = scales(&network);
+        params.newton.newton_iterations = newton_iterations;
+        let grid = Grid::<2>::per_unit(n, 0.75).unwrap();
+        let start = phase_field(grid, &Cross::new(0.27, 0.1).unwrap(), EPS).unwrap();
+        WillmoreFlow::with_network(&network, &start, params, &device()).unwrap()
+    };
+    let chain = || {
+        let (mut flow, mut middle) = (on(256, 33, 60), on(128, 17, 2));
+        middle.begin_on(on(64, 9, 60)).unwrap();
+        flow.begin_on(middle).unwrap();
+        flow
+    };
+    let mut flow = chain();
+    for _ in 0..3 {
+        let record = flow.advance(TAU / 64.0).unwrap();
+        assert_eq!(record.start.kind, StartKind::HalfGrid);
+    }
+    assert_eq!(flow.state().unwrap().half_motions.len(), 2);
+    let record = flow.advance(64.0 * TAU).unwrap();
+    assert_ne!(record.start.kind, StartKind::HalfGrid, "the middle gave up");
+    let state = flow.state().unwrap();
+    assert!(state.half_motions.is_empty());
+    let mut resumed = chain();
+    resumed.restore(&state).unwrap();
+    let [own, other] = [&mut flow, &mut resumed].map(|flow| {
+        flow.advance(TAU / 64.0).unwrap();
+        flow.field().unwrap()
+    });
+    assert_eq!(own, other);
+}
+
 #[test]
 fn a_region_is_held_on_both_grids() {
     let inside: Vec<bool> = (0..grid().len())

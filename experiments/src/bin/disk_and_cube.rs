@@ -9,8 +9,8 @@ use experiments::method::{Method, Scheme};
 use experiments::networks::{NetworkOptions, checksum};
 use experiments::options::RunOptions;
 use experiments::surfaces::{
-    Finished, SIDE, SchemeOptions, Setting, SurfaceRun, View, Workshop, centred_box, ratios,
-    scales, since, table, write_steps,
+    Finished, SchemeOptions, Setting, SurfaceRun, View, Workshop, centred_box, ratios, scales,
+    since, table, write_steps,
 };
 use experiments::{Error, harness};
 use geometry::shapes::{Cuboid, Cylinder};
@@ -167,14 +167,7 @@ fn program(options: &Options) -> Result<(), Error> {
     let mut manifest = options.run.manifest(PROGRAM, &parameters, &device)?;
     let progress = options.run.progress();
     let clock = Instant::now();
-    let workshop = Workshop {
-        options: &options.run,
-        device: &device,
-        network: &networks[0],
-        output: &output,
-        progress: &progress,
-        side: SIDE,
-    };
+    let workshop = Workshop::new(&options.run, &device, &networks[0], &output, &progress);
     let mut finished: Vec<Finished<'_>> = Vec::new();
     for solid in &solids {
         for &(method, scheme) in &variants {

@@ -239,12 +239,8 @@ fn program(options: &Options) -> Result<(), Error> {
     let progress = options.run.progress();
     let clock = Instant::now();
     let workshop = Workshop {
-        options: &options.run,
-        device: &device,
-        network: &networks[0],
-        output: &output,
-        progress: &progress,
         side: SIDE,
+        ..Workshop::new(&options.run, &device, &networks[0], &output, &progress)
     };
     let starts = (shapes.into_iter())
         .map(|shape| {

@@ -118,7 +118,8 @@ impl<const D: usize> WillmoreFlow<D> {
             let kind = StartKind::HalfGrid;
             return Ok((start, Start { kind, hvp }));
         }
-        self.half_motion = None;
+        // Those further down belong to this one.
+        self.set_half_motions(&[])?;
         Ok(match &self.previous {
             // The first step also relaxes the initial profile, which is nothing to extrapolate.
             Some((previous, last)) if self.step > 1 && self.moved_little(previous)? => {
