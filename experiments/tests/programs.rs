@@ -107,6 +107,9 @@ fn resolutions_names_and_outputs_that_cannot_be() {
         &["--cells", "100"],
         &["100", "multiple of 16"],
     );
+    for count in ["0", "31"] {
+        refused(CIRCLES, root.path(), &["--circles", count], &["1..=30"]);
+    }
     // No network was trained for this one.
     refused(CIRCLES, root.path(), &["--cells", "192"], &["n_K = 25"]);
     refused(TRAIN, root.path(), &["--only", "n1024"], &["n1024", "n128"]);

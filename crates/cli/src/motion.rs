@@ -1,6 +1,6 @@
 //! The two flows as one thing that advances.
 
-use geometry::measure::{enclosed_volume, perimeter};
+use geometry::measure::{perimeter, zero_set_volume};
 use geometry::{Field, Grid};
 use serde::Serialize;
 use solver::{Error as SolverError, FlowState, MeanCurvatureFlow, WillmoreFlow};
@@ -179,7 +179,7 @@ impl<const D: usize> Motion<D> {
                     energy: None,
                     willmore_energy: None,
                     perimeter: perimeter(field, *eps)?,
-                    volume: enclosed_volume(field),
+                    volume: zero_set_volume(field),
                     newton: None,
                     hvp: None,
                     halvings: None,

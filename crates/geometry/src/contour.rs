@@ -218,11 +218,13 @@ where
 
 /// Distance along a ray from `start` at which a phase field first changes sign.
 ///
-/// `direction` may have any length; the distance is in units of length. The multilinear
-/// interpolant of `atanh u` is followed in steps of `h/2` up to the last node, and the first
-/// change of sign is refined by bisection to rounding error; along a grid line this is
-/// linear interpolation between the two nodes. Error `O(h^2)`; what is thinner than `h/2` along the
-/// ray may be missed. `None` if the sign never changes, zero if `u = 0` at the start.
+/// `direction` may have any length; the distance is in units of length. `atanh u` is sampled at the start and where the ray crosses the
+/// planes of the grid that are normal to its largest component, which are nodes if it follows a grid line or a diagonal through nodes
+/// (elsewhere the multilinear interpolant), up to the last node. Between the first two samples of unlike sign, the zero is the mean
+/// of two extrapolations, each from up to three samples of one side. So an interface with a corner on the ray is found as well as a smooth one,
+/// where interpolation across the corner has an error of first order (the idea of Harten's subcell resolution, J. Comput. Phys. 83,
+/// 1989). Error `O(h^3)` through nodes, `O(h^2)` elsewhere; what is thinner than the distance of the samples may be missed. `None`
+/// if the sign never changes, zero if `u = 0` at the start.
 ///
 /// # Errors
 /// The start must lie in the box spanned by the nodes, the direction be finite and not zero.
@@ -236,6 +238,8 @@ pub fn ray_crossing<const D: usize>(
     let direction = vector::scale(direction, 1.0 / length);
     finite("start", start)?;
     let mut reach = f64::INFINITY;
+    // Distance to the next plane and from plane to plane; planes of the axis along which they are closest.
+    let (mut next, mut spacing) = (0.0, f64::INFINITY);
     for axis in 0..D {
         let (low, high) = (grid.origin()[axis], grid.coordinate(axis, grid.cells() - 1));
         if !(low..=high).contains(&start[axis]) {
@@ -243,35 +247,69 @@ pub fn ray_crossing<const D: usize>(
                 point: start.to_vec(),
             });
         }
-        if direction[axis] != 0.0 {
-            let end = if direction[axis] > 0.0 { high } else { low };
-            reach = reach.min((end - start[axis]) / direction[axis]);
+        let speed = direction[axis].abs() / grid.spacing();
+        if speed != 0.0 {
+            let ahead = direction[axis] > 0.0;
+            reach = reach.min((if ahead { high } else { low } - start[axis]) / direction[axis]);
+            if 1.0 / speed < spacing {
+                spacing = 1.0 / speed;
+                let cells = (start[axis] - low) / grid.spacing();
+                let cells = if ahead { cells } else { -cells };
+                next = (cells.floor() + 1.0 - cells) * spacing;
+            }
         }
     }
-    let at = |s: f64| {
+    let sample = |s: f64| {
         let x = vector::add(start, vector::scale(direction, s));
-        field.interpolate_with(x, profile_variable)
+        [s, field.interpolate_with(x, profile_variable)]
     };
-    let first = at(0.0);
-    if first == 0.0 {
-        return Ok(Some(0.0));
+    let planes = (0..)
+        .map(|k| next + spacing * f64::from(k))
+        .take_while(|s| *s <= reach * (1.0 + f64::EPSILON));
+    let samples: Vec<[f64; 2]> = std::iter::once(0.0).chain(planes).map(sample).collect();
+    let changed = samples
+        .iter()
+        .position(|[_, value]| value * samples[0][1] <= 0.0);
+    Ok(changed.map(|k| match k {
+        0 => 0.0,
+        _ => {
+            let before: Vec<_> = samples[..k].iter().rev().copied().collect();
+            zero_between(&before, &samples[k..])
+        }
+    }))
+}
+
+/// Samples of `atanh u` beyond this (`|u| = 0.97`) are too far from the interface to extrapolate from.
+const FAR: f64 = 2.09;
+
+/// The zero of a function from samples `[s, value]` on both sides, the closest first.
+fn zero_between(before: &[[f64; 2]], after: &[[f64; 2]]) -> f64 {
+    let ([a, value_a], [b, value_b]) = (before[0], after[0]);
+    let interpolated = a + (b - a) * value_a / (value_a - value_b);
+    let inside = |s: &f64| (a.min(b)..=a.max(b)).contains(s);
+    match [before, after].map(|side| extrapolated_zero(side).filter(inside)) {
+        [Some(first), Some(second)] => 0.5 * (first + second),
+        _ => interpolated,
     }
-    let changed = |s: f64| at(s) * first <= 0.0;
-    let steps = (reach / (0.5 * grid.spacing())).ceil() as usize;
-    let position = |k: usize| reach * (k as f64 / steps as f64);
-    let Some(k) = (1..=steps).find(|&k| changed(position(k))) else {
-        return Ok(None);
+}
+
+/// Inverse extrapolation, `s` as a polynomial in the value, from the samples near the interface as far as they go away from it.
+fn extrapolated_zero(samples: &[[f64; 2]]) -> Option<f64> {
+    let away = |pair: &[[f64; 2]]| pair[1][1].abs() > pair[0][1].abs();
+    let near = |pair: &[[f64; 2]]| pair[1][1].abs() < FAR && pair[0][1] * pair[1][1] >= 0.0;
+    let usable = (samples.windows(2).take(2))
+        .take_while(|pair| away(pair) && near(pair))
+        .count();
+    let samples = &samples[..=usable];
+    let weight = |i: usize| -> f64 {
+        let others = (samples.iter().enumerate()).filter(|(j, _)| *j != i);
+        others
+            .map(|(_, other)| other[1] / (other[1] - samples[i][1]))
+            .product()
     };
-    let (mut low, mut high) = (position(k - 1), position(k));
-    loop {
-        let middle = 0.5 * (low + high);
-        if middle <= low || middle >= high {
-            return Ok(Some(high));
-        }
-        if changed(middle) {
-            high = middle;
-        } else {
-            low = middle;
-        }
-    }
+    (usable > 0).then(|| {
+        (samples.iter().enumerate())
+            .map(|(i, sample)| weight(i) * sample[0])
+            .sum()
+    })
 }

@@ -88,16 +88,6 @@ fn edge_derivative<const D: usize>(
     (27.0 * (at(1) - at(0)) - (at(2) - at(grid.cells() - 1))) / 24.0
 }
 
-/// Area or volume `integral of (1 + u)/2`, positive inside.
-///
-/// For the optimal profile on a flat interface it is exact; curvature adds `O(eps^2)`:
-/// `4 pi^3/27 eps^2` at a circle, `16 pi^3/27 r eps^2` at a sphere of radius `r`. See
-/// [`zero_set_volume`] for a value without this excess.
-pub fn enclosed_volume<const D: usize>(u: &Field<D>) -> f64 {
-    let v = u.values();
-    u.grid().cell_volume() * reduce::sum(v.len(), |i| 0.5 * (1.0 + v[i]))
-}
-
 /// Area or volume of `{u > 0}`, resolved below the size of a cell.
 ///
 /// Every cell is cut into `D!` simplices along its main diagonal (Kuhn's triangulation), on each

@@ -136,6 +136,12 @@ fn rays_find_the_interface() {
     // From outside inwards.
     let back = ray_crossing(&u, [-0.95, 0.0], [1.0, 0.0]).unwrap().unwrap();
     assert!((back - 0.15).abs() < 1e-9, "{back}");
+    // A corner on the ray, wherever it lies between the nodes.
+    for cells in [64, 100, 128, 256] {
+        let u = field(cells, &cross);
+        let corner = ray_crossing(&u, [0.0, 0.0], [1.0, 1.0]).unwrap().unwrap();
+        assert!((corner - 0.27 * 2.0_f64.sqrt()).abs() < 1e-9, "{corner}");
+    }
     // Oblique, second order.
     let angle = 0.7_f64;
     let error = |cells| {
@@ -148,6 +154,17 @@ fn rays_find_the_interface() {
     for cells in [64, 128, 256] {
         let h = 2.0 / cells as f64;
         assert!(error(cells) < h * h, "{cells}");
+    }
+    // Along a diagonal through nodes of any profile, third order.
+    let error = |cells| {
+        let grid = Grid::<2>::centred(cells, 2.0).unwrap();
+        let u = Field::from_fn(grid, |[x, y]| ((0.5 - (x * x + 1.5 * y * y)) * 4.0).tanh());
+        let found = ray_crossing(&u, [0.0, 0.0], [1.0, 1.0]).unwrap().unwrap();
+        (found - 0.4_f64.sqrt()).abs()
+    };
+    for cells in [50, 100, 200, 400] {
+        let h = 2.0 / cells as f64;
+        assert!(error(cells) < 6.0 * h.powi(3), "{cells}: {}", error(cells));
     }
     // In space.
     let grid = Grid::<3>::centred(48, 2.0).unwrap();

@@ -117,25 +117,6 @@ fn perimeter_tends_to_length_and_area_as_eps_vanishes() {
 }
 
 #[test]
-fn enclosed_volume_has_the_documented_excess() {
-    let (radius, eps) = (0.5, 1.0 / 32.0);
-    let area = PI * radius * radius;
-    let excess = 4.0 * PI.powi(3) / 27.0 * eps * eps;
-    let measured = measure::enclosed_volume(&ball::<2>(128, radius, eps));
-    assert!(
-        (measured - area - excess).abs() < 1e-8,
-        "{measured} {area} {excess}"
-    );
-    let volume = 4.0 / 3.0 * PI * radius.powi(3);
-    let excess = 16.0 * PI.powi(3) / 27.0 * radius * eps * eps;
-    let measured = measure::enclosed_volume(&ball::<3>(96, radius, eps));
-    assert!(
-        (measured - volume - excess).abs() < 1e-5,
-        "{measured} {volume} {excess}"
-    );
-}
-
-#[test]
 fn zero_set_volume_converges_with_second_order() {
     let disc = |cells: usize| {
         // eps shrinks with h and leaves no trace.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use burn::tensor::Tensor;
-use geometry::measure::{enclosed_volume, perimeter};
+use geometry::measure::{perimeter, zero_set_volume};
 use geometry::{Field, Grid};
 use model::{Factors, MeanCurvatureOperator, Network, Ratios};
 use operators::{ComputeDevice, SpectralFilter, inner_product};
@@ -66,7 +66,7 @@ pub struct StepRecord {
     pub willmore_energy: f64,
     /// Perimeter `P_eps` of the result.
     pub perimeter: f64,
-    /// Area or volume enclosed.
+    /// Area or volume of `{u > 0}`.
     pub volume: f64,
     /// Where the minimization began; at rest in records of earlier versions.
     #[serde(default)]
@@ -386,7 +386,7 @@ impl<const D: usize> WillmoreFlow<D> {
             energy: scale * newton.energy,
             willmore_energy: scale * (newton.energy - fidelity) / (2.0 * tau),
             perimeter: perimeter(&field, self.params.eps)?,
-            volume: enclosed_volume(&field),
+            volume: zero_set_volume(&field),
             start: origin,
             newton,
             seconds: clock.elapsed().as_secs_f64(),

@@ -57,6 +57,10 @@ struct Options {
     #[arg(long, value_name = "N")]
     elements_up_to: Option<usize>,
 
+    /// Take some of the 30 circles only, evenly chosen
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u8).range(1..=circles::COUNT as i64))]
+    circles: Option<u8>,
+
     /// Train the networks first, instead of loading them
     #[arg(long, conflicts_with = "network")]
     retrain: bool,
@@ -121,11 +125,12 @@ fn main() -> ExitCode {
 }
 
 fn program(options: &Options) -> Result<(), Error> {
-    let (count, steps) = if options.run.quick {
+    let (all, steps) = if options.run.quick {
         (4, 8)
     } else {
         (circles::COUNT, circles::STEPS)
     };
+    let count = options.circles.map_or(all, usize::from);
     let cells = resolutions(&options.cells, options.run.quick, options.full);
     let runs = Run::list(options, &cells);
     let learned = runs.iter().any(|run| run.method.is_learned());
@@ -483,23 +488,21 @@ impl Report<'_> {
         }
         for (k, &(method, scheme)) in curves.iter().enumerate() {
             let own = |e: &&Ensemble| (e.method, e.scheme) == (method, scheme);
-            let points: Vec<[f64; 2]> = (self.of_flow(Flow::Willmore).filter(own))
-                .map(|e| {
-                    let steps = e.steps() as f64;
-                    [
-                        e.mean_of_records(|r| r.seconds) * steps,
-                        e.mean_error(self.steps),
-                    ]
-                })
-                .collect();
+            let (cells, points): (Vec<String>, Vec<[f64; 2]>) =
+                (self.of_flow(Flow::Willmore).filter(own))
+                    .map(|e| {
+                        let seconds = e.mean_of_records(|r| r.seconds) * e.steps() as f64;
+                        (e.n.to_string(), [seconds, e.mean_error(self.steps)])
+                    })
+                    .unzip();
+            let name = format!("{}, n = {}", method.label_in(scheme), cells.join(", "));
             chart = chart.with_series(
-                Series::new(method.label_in(scheme), points)
+                Series::new(name, points)
                     .with_colour(k)
                     .with_style(method.style_in(scheme))
                     .with_marker(Marker::Circle),
             );
         }
-        let cells: Vec<String> = self.cells.iter().map(|n| format!("{n}")).collect();
         Figure::new(
             self.options
                 .title("Willmore flow of circles: accuracy against cost"),
@@ -508,8 +511,7 @@ impl Report<'_> {
         .with_panel(chart)
         .with_shared_legend()
         .with_note(format!(
-            "Each curve from coarse to fine: n = {}. {} time steps; each circle on one core.",
-            cells.join(", "),
+            "{} time steps; each circle on one core.",
             self.steps
         ))
     }
@@ -625,6 +627,7 @@ impl Report<'_> {
                 let per_step = [
                     ("hvp", e.mean_of_records(solver::StepRecord::hvp)),
                     ("newton", e.mean_of_records(|r| r.newton.newton as f64)),
+                    ("seconds", e.mean_of_records(|r| r.seconds)),
                 ];
                 for (what, value) in per_step {
                     summary.insert(&format!("{key}.{what}_per_step"), value)?;
