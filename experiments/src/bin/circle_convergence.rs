@@ -58,8 +58,8 @@ struct Options {
     elements_up_to: Option<usize>,
 
     /// Take some of the 30 circles only, evenly chosen
-    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u8).range(1..=circles::COUNT as i64))]
-    circles: Option<u8>,
+    #[arg(long, value_name = "COUNT")]
+    circles: Option<usize>,
 
     /// Train the networks first, instead of loading them
     #[arg(long, conflicts_with = "network")]
@@ -130,7 +130,13 @@ fn program(options: &Options) -> Result<(), Error> {
     } else {
         (circles::COUNT, circles::STEPS)
     };
-    let count = options.circles.map_or(all, usize::from);
+    let count = options.circles.unwrap_or(all);
+    if !(1..=circles::COUNT).contains(&count) {
+        return Err(Error::Options(format!(
+            "--circles must be from 1 to {}, not {count}",
+            circles::COUNT
+        )));
+    }
     let cells = resolutions(&options.cells, options.run.quick, options.full);
     let runs = Run::list(options, &cells);
     let learned = runs.iter().any(|run| run.method.is_learned());
