@@ -9,8 +9,8 @@ use geometry::shapes::Cross;
 use geometry::{Field, Grid, phase_field};
 use model::Network;
 use report::{
-    Axis, Colour, Column, Curve, Figure, Format, LegendEntry, LineChart, LineStyle, Manifest,
-    OutputDir, Series, Shapes, Summary, Table,
+    Axis, Colour, Column, Curve, Figure, Format, LineChart, Manifest, OutputDir, Shapes, Summary,
+    Table,
 };
 use serde::Serialize;
 use solver::{FlowParams, NewtonParams, StepRecord};
@@ -18,6 +18,7 @@ use solver::{FlowParams, NewtonParams, StepRecord};
 use crate::Error;
 use crate::circles::{EPS, Flow, STEP};
 use crate::evolution::{self, Evolution, TimeSteps};
+use crate::look;
 use crate::method::{Method, Scheme};
 use crate::networks::{NetworkOptions, convergence_ratios};
 use crate::options::{RunOptions, resolutions};
@@ -451,12 +452,8 @@ impl Comparison<'_> {
         all.filter(|wanted| self.runs.iter().any(|run| variant(run) == *wanted))
     }
 
-    fn colour(&self, n: usize) -> usize {
-        self.cells.iter().position(|&c| c == n).unwrap_or(0)
-    }
-
     fn error_figure(&self) -> Result<Figure, Error> {
-        let mut chart = LineChart::new("", Axis::linear("time t"), Axis::linear("L² error"));
+        let mut chart = LineChart::new("", Axis::linear("time t"), Axis::log("L² error"));
         for run in &self.runs {
             if self.is_reference_run(run) {
                 continue;
@@ -469,22 +466,10 @@ impl Comparison<'_> {
                 .into_iter()
                 .map(|(k, l2)| [Self::time(k), l2])
                 .collect();
-            let k = self.colour(n);
-            chart = chart.with_series(
-                Series::new(format!("{}, n = {n}", method.label_in(scheme)), points)
-                    .with_colour(k)
-                    .with_style(method.style_in(scheme))
-                    .with_width(1.8 + 1.2 * (self.cells.len() - 1 - k) as f64),
-            );
+            let curve = look::curve(points, (method, scheme), (n, &self.cells));
+            chart = chart.with_series(curve);
         }
-        let methods = self
-            .variants()
-            .map(|(m, s)| LegendEntry::line(m.label_in(s), Colour::Black, m.style_in(s)));
-        let resolutions = self
-            .cells
-            .iter()
-            .map(|&n| LegendEntry::line(format!("n = {n}"), self.colour(n), LineStyle::Solid));
-        chart = chart.with_entries(methods).with_entries(resolutions);
+        chart = look::legend(chart, self.variants(), &self.cells);
         let title = format!("{}: error over time", self.setting.title);
         Ok(Figure::new(self.options.run.title(&title), 1)
             .with_panel(chart)

@@ -28,6 +28,7 @@ mod error;
 pub mod evolution;
 pub mod harness;
 pub mod inpainting;
+pub mod look;
 pub mod memory;
 pub mod mesh_flow;
 pub mod meshes;

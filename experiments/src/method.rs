@@ -5,7 +5,6 @@ use fem::{FiniteElementStep, LinearSolver};
 use geometry::{Field, Grid};
 use model::{Network, pretrained};
 use operators::ComputeDevice;
-use report::LineStyle;
 use serde::{Deserialize, Serialize};
 use solver::{Factors, FlowParams, MeanCurvatureFlow, WillmoreFlow};
 
@@ -63,15 +62,6 @@ impl Method {
             Self::Hybrid => "learned operator",
             Self::FeImplicit => "FE implicit",
             Self::FeSemi => "FE semi-implicit",
-        }
-    }
-
-    /// Line style in figures, as in the paper.
-    pub fn style(self) -> LineStyle {
-        match self {
-            Self::Hybrid => LineStyle::Solid,
-            Self::FeImplicit => LineStyle::Dashed,
-            Self::FeSemi => LineStyle::Dotted,
         }
     }
 
@@ -148,14 +138,16 @@ impl Method {
         }
     }
 
-    /// Line style in figures in a scheme.
-    pub fn style_in(self, scheme: Scheme) -> LineStyle {
+    /// Colour in figures in a scheme, an entry of the palette.
+    pub fn colour_in(self, scheme: Scheme) -> usize {
         match (self, scheme) {
-            (_, Scheme::Paper) => self.style(),
-            (Self::Hybrid, Scheme::Calibrated) => LineStyle::DashDot,
-            (Self::Hybrid, Scheme::Accurate) => LineStyle::DashDotDot,
-            (Self::FeImplicit, _) => LineStyle::ShortDashed,
-            (Self::FeSemi, _) => LineStyle::WideDotted,
+            (Self::Hybrid, Scheme::Paper) => 0,
+            (Self::Hybrid, Scheme::Calibrated) => 5,
+            (Self::Hybrid, Scheme::Accurate) => 2,
+            (Self::FeImplicit, Scheme::Paper) => 1,
+            (Self::FeImplicit, _) => 4,
+            (Self::FeSemi, Scheme::Paper) => 3,
+            (Self::FeSemi, _) => 6,
         }
     }
 

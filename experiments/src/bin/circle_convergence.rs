@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use experiments::circles::{self, Ensemble, Flow};
+use experiments::look;
 use experiments::method::{Method, Scheme};
 use experiments::networks::{NetworkOptions, convergence_ratios};
 use experiments::options::{RunOptions, resolutions};
@@ -13,10 +14,7 @@ use experiments::training::{self, NetworkSpec};
 use experiments::{Error, harness};
 use model::{Network, Ratios, pretrained};
 use operators::ComputeDevice;
-use report::{
-    Axis, Colour, Column, Figure, Format, LegendEntry, LineChart, LineStyle, Marker, OutputDir,
-    Series, Summary, Table,
-};
+use report::{Axis, Column, Figure, Format, LineChart, Marker, OutputDir, Series, Summary, Table};
 use serde::Serialize;
 
 const PROGRAM: &str = "circle_convergence";
@@ -346,39 +344,22 @@ impl Report<'_> {
         k as f64 * circles::STEP
     }
 
-    /// Colour and line of an ensemble. Curves of several resolutions often coincide, so coarser ones are wider and
-    /// show on both sides of finer ones.
     fn series(&self, ensemble: &Ensemble, points: Vec<[f64; 2]>) -> Series {
-        let k = self.colour(ensemble.n);
-        let name = format!("{}, n = {}", ensemble.label(), ensemble.n);
-        Series::new(name, points)
-            .with_colour(k)
-            .with_style(ensemble.method.style_in(ensemble.scheme))
-            .with_width(1.8 + 1.9 * (self.cells.len() - 1 - k) as f64)
+        let Ensemble {
+            method, scheme, n, ..
+        } = *ensemble;
+        look::curve(points, (method, scheme), (n, self.cells))
     }
 
-    fn colour(&self, n: usize) -> usize {
-        self.cells.iter().position(|&c| c == n).unwrap_or(0)
-    }
-
-    /// Line styles stand for methods, colours for resolutions.
     fn legend(&self, chart: LineChart) -> LineChart {
-        let methods = Method::ALL
+        let variants = Method::ALL
             .into_iter()
             .flat_map(|method| Scheme::ALL.map(|scheme| (method, scheme)))
-            .filter(|&(method, scheme)| {
+            .filter(|wanted| {
                 let mut shown = self.ensembles.iter();
-                shown.any(|e| e.method == method && e.scheme == scheme)
+                shown.any(|e| (e.method, e.scheme) == *wanted)
             });
-        let method = methods.map(|(method, scheme)| {
-            let label = method.label_in(scheme);
-            LegendEntry::line(label, Colour::Black, method.style_in(scheme))
-        });
-        let resolutions = self
-            .cells
-            .iter()
-            .map(|&n| LegendEntry::line(format!("n = {n}"), self.colour(n), LineStyle::Solid));
-        chart.with_entries(method).with_entries(resolutions)
+        look::legend(chart, variants, self.cells)
     }
 
     fn figures(&self, output: &OutputDir) -> Result<(), Error> {
@@ -390,7 +371,7 @@ impl Report<'_> {
             let mut chart = LineChart::new(
                 flow.title(),
                 Axis::linear("time t"),
-                Axis::linear("mean L² error"),
+                Axis::log("mean L² error"),
             );
             for ensemble in self.of_flow(flow) {
                 let points: Vec<[f64; 2]> = (0..=self.steps)
@@ -426,7 +407,7 @@ impl Report<'_> {
             let mut chart = LineChart::new(
                 flow.title(),
                 Axis::linear("initial radius r"),
-                Axis::linear("L² error"),
+                Axis::log("L² error"),
             );
             for ensemble in self.of_flow(flow) {
                 let points: Vec<[f64; 2]> = ensemble
@@ -435,8 +416,13 @@ impl Report<'_> {
                     .zip(&ensemble.results)
                     .map(|(&radius, result)| [radius, result.errors[self.steps]])
                     .collect();
-                let marker = [Marker::Circle, Marker::Square, Marker::Triangle]
-                    [self.colour(ensemble.n).min(2)];
+                let finer = self.cells.iter().filter(|&&n| n > ensemble.n).count();
+                let marker = [
+                    Marker::Circle,
+                    Marker::Square,
+                    Marker::Triangle,
+                    Marker::Diamond,
+                ][finer.min(3)];
                 chart = chart.with_series(
                     self.series(ensemble, points)
                         .with_marker(marker)
@@ -492,7 +478,7 @@ impl Report<'_> {
                 curves.push((e.method, e.scheme));
             }
         }
-        for (k, &(method, scheme)) in curves.iter().enumerate() {
+        for &(method, scheme) in &curves {
             let own = |e: &&Ensemble| (e.method, e.scheme) == (method, scheme);
             let (cells, points): (Vec<String>, Vec<[f64; 2]>) =
                 (self.of_flow(Flow::Willmore).filter(own))
@@ -504,8 +490,7 @@ impl Report<'_> {
             let name = format!("{}, n = {}", method.label_in(scheme), cells.join(", "));
             chart = chart.with_series(
                 Series::new(name, points)
-                    .with_colour(k)
-                    .with_style(method.style_in(scheme))
+                    .with_colour(method.colour_in(scheme))
                     .with_marker(Marker::Circle),
             );
         }

@@ -304,8 +304,7 @@ fn figure(run: &RunOptions, all: &[Measurement], n: usize) -> Figure {
         let points: Vec<[f64; 2]> = all.iter().map(|m| [m.radius, m.mcf[k][last]]).collect();
         errors = errors.with_series(
             Series::new(method.label_in(scheme), points)
-                .with_colour(method as usize)
-                .with_style(method.style_in(scheme))
+                .with_colour(method.colour_in(scheme))
                 .with_marker(marker(scheme)),
         );
     }
@@ -325,7 +324,7 @@ fn figure(run: &RunOptions, all: &[Measurement], n: usize) -> Figure {
                 Method::Hybrid.label_in(scheme),
                 curve(&|m| m.willmore[k].w_relaxed),
             )
-            .with_style(Method::Hybrid.style_in(scheme))
+            .with_colour(Method::Hybrid.colour_in(scheme))
             .with_marker(marker(scheme)),
         );
     }
