@@ -68,8 +68,9 @@ impl<const D: usize> WillmoreFlow<D> {
     }
 
     /// [Begins](Self::begin_on) on the half grid, that on its half, and so on, as far as networks are shipped: those of the paper's
-    /// recipe if the energy is the paper's, else those of the accurate recipe. Says how many grids there are below this one; none
-    /// for an odd number of cells, or without networks.
+    /// recipe if the network is one of them (or its odd part) or the energy is the paper's, else those of the accurate recipe: the relaxed
+    /// profiles of one recipe are alike on all grids. Says how many grids there are below this one; none for an odd number of cells, or
+    /// without networks.
     ///
     /// # Errors
     /// What building the flows raises.
@@ -82,18 +83,23 @@ impl<const D: usize> WillmoreFlow<D> {
         let Ok(grid) = self.grid.half() else {
             return Ok(0);
         };
-        let paper = self.params.calibration == Factors::PAPER;
-        let found = if paper {
+        let papers_energy = self.params.calibration == Factors::PAPER;
+        let papers_recipe = papers_energy
+            || pretrained::find(network.ratios()).is_ok_and(|n| n.kernel() == network.kernel());
+        let found = if papers_recipe {
             pretrained::find(ratios)
         } else {
             pretrained::find_accurate(ratios)
         };
-        let Ok(network) = found else {
+        let Ok(mut network) = found else {
             return Ok(0);
         };
         let mut params = self.params;
-        if !paper {
+        if !papers_energy {
             params.calibration = network.calibration()?.factors;
+            if papers_recipe {
+                network = network.odd_part();
+            }
         }
         let initial = Field::constant(grid, 1.0);
         let mut half = Self::with_network(&network, &initial, params, &self.device)?;
