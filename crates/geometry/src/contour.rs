@@ -250,7 +250,8 @@ pub fn ray_crossing<const D: usize>(
         let speed = direction[axis].abs() / grid.spacing();
         if speed != 0.0 {
             let ahead = direction[axis] > 0.0;
-            reach = reach.min((if ahead { high } else { low } - start[axis]) / direction[axis]);
+            let end = if ahead { high } else { low };
+            reach = reach.min((end - start[axis]) / direction[axis]);
             if 1.0 / speed < spacing {
                 spacing = 1.0 / speed;
                 let cells = (start[axis] - low) / grid.spacing();
@@ -258,6 +259,10 @@ pub fn ray_crossing<const D: usize>(
                 next = (cells.floor() + 1.0 - cells) * spacing;
             }
         }
+    }
+    // A plane through the start, but for rounding, would be sampled twice.
+    if next < 1e-6 * spacing {
+        next += spacing;
     }
     let sample = |s: f64| {
         let x = vector::add(start, vector::scale(direction, s));

@@ -133,6 +133,12 @@ fn rays_find_the_interface() {
     assert!((tip - 0.8).abs() < 1e-9, "{tip}");
     let side = ray_crossing(&u, [-0.5, 0.0], [0.0, -1.0]).unwrap().unwrap();
     assert!((side - 0.27).abs() < 1e-9, "{side}");
+    // From next to a node, close to the interface.
+    for shift in [-1e-15, 1e-15] {
+        let from = [100.0 / 128.0 + shift, 0.0];
+        let tip = ray_crossing(&u, from, [1.0, 0.0]).unwrap().unwrap();
+        assert!((from[0] + tip - 0.8).abs() < 1e-9, "{tip}");
+    }
     // From outside inwards.
     let back = ray_crossing(&u, [-0.95, 0.0], [1.0, 0.0]).unwrap().unwrap();
     assert!((back - 0.15).abs() < 1e-9, "{back}");
