@@ -502,8 +502,9 @@ impl Report<'_> {
         .with_panel(chart)
         .with_shared_legend()
         .with_note(format!(
-            "{} time steps; each circle on one core.",
-            self.steps
+            "{} time steps; mean over {} circles, each on one core.",
+            self.steps,
+            self.ensembles.first().map_or(0, |e| e.radii.len())
         ))
     }
 
