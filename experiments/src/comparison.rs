@@ -19,7 +19,7 @@ use crate::Error;
 use crate::circles::{EPS, Flow, STEP};
 use crate::evolution::{self, Evolution, TimeSteps};
 use crate::look;
-use crate::method::{Method, Scheme};
+use crate::method::{self, Method, Scheme};
 use crate::networks::{NetworkOptions, convergence_ratios};
 use crate::options::{RunOptions, resolutions};
 
@@ -446,10 +446,7 @@ impl Comparison<'_> {
 
     /// Methods and schemes that ran, in the order of legends.
     fn variants(&self) -> impl Iterator<Item = (Method, Scheme)> {
-        let all = Method::ALL
-            .into_iter()
-            .flat_map(|method| Scheme::ALL.map(|scheme| (method, scheme)));
-        all.filter(|wanted| self.runs.iter().any(|run| variant(run) == *wanted))
+        method::variants(|wanted| self.runs.iter().any(|run| variant(run) == wanted))
     }
 
     fn error_figure(&self) -> Result<Figure, Error> {

@@ -1,6 +1,6 @@
 //! How curves look in the figures: colours stand for methods in their schemes, dashes for resolutions.
 
-use report::{Colour, LegendEntry, LineChart, LineStyle, Series};
+use report::{Colour, LegendEntry, LineChart, LineStyle, Marker, Series};
 
 use crate::method::{Method, Scheme};
 
@@ -17,6 +17,17 @@ fn dashes(n: usize, cells: &[usize]) -> LineStyle {
         LineStyle::Dotted,
     ];
     STYLES[rank(n, cells).min(STYLES.len() - 1)]
+}
+
+/// A marker for a resolution.
+pub fn marker(n: usize, cells: &[usize]) -> Marker {
+    const MARKERS: [Marker; 4] = [
+        Marker::Circle,
+        Marker::Square,
+        Marker::Triangle,
+        Marker::Diamond,
+    ];
+    MARKERS[rank(n, cells).min(MARKERS.len() - 1)]
 }
 
 /// The curve of a method at one of several resolutions. Such curves often coincide, so coarser ones are wider and show on both sides of

@@ -43,6 +43,16 @@ impl Scheme {
     pub const ALL: [Self; 3] = [Self::Paper, Self::Calibrated, Self::Accurate];
 }
 
+/// The methods in their schemes that are shown, in the order of legends.
+pub fn variants(
+    shown: impl Fn((Method, Scheme)) -> bool,
+) -> impl Iterator<Item = (Method, Scheme)> {
+    let all = Method::ALL
+        .into_iter()
+        .flat_map(|method| Scheme::ALL.map(|scheme| (method, scheme)));
+    all.filter(move |&variant| shown(variant))
+}
+
 impl Method {
     /// All methods, in the order of legends.
     pub const ALL: [Self; 3] = [Self::Hybrid, Self::FeImplicit, Self::FeSemi];

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use experiments::circles::{self, Ensemble, Flow};
 use experiments::look;
-use experiments::method::{Method, Scheme};
+use experiments::method::{self, Method, Scheme};
 use experiments::networks::{NetworkOptions, convergence_ratios};
 use experiments::options::{RunOptions, resolutions};
 use experiments::partial::Partial;
@@ -352,14 +352,12 @@ impl Report<'_> {
     }
 
     fn legend(&self, chart: LineChart) -> LineChart {
-        let variants = Method::ALL
-            .into_iter()
-            .flat_map(|method| Scheme::ALL.map(|scheme| (method, scheme)))
-            .filter(|wanted| {
-                let mut shown = self.ensembles.iter();
-                shown.any(|e| (e.method, e.scheme) == *wanted)
-            });
-        look::legend(chart, variants, self.cells)
+        let shown = |wanted| {
+            self.ensembles
+                .iter()
+                .any(|e| (e.method, e.scheme) == wanted)
+        };
+        look::legend(chart, method::variants(shown), self.cells)
     }
 
     fn figures(&self, output: &OutputDir) -> Result<(), Error> {
@@ -416,16 +414,9 @@ impl Report<'_> {
                     .zip(&ensemble.results)
                     .map(|(&radius, result)| [radius, result.errors[self.steps]])
                     .collect();
-                let finer = self.cells.iter().filter(|&&n| n > ensemble.n).count();
-                let marker = [
-                    Marker::Circle,
-                    Marker::Square,
-                    Marker::Triangle,
-                    Marker::Diamond,
-                ][finer.min(3)];
                 chart = chart.with_series(
                     self.series(ensemble, points)
-                        .with_marker(marker)
+                        .with_marker(look::marker(ensemble.n, self.cells))
                         .with_width(1.6),
                 );
             }
@@ -472,13 +463,8 @@ impl Report<'_> {
             Axis::log("wall time per circle [s]"),
             Axis::log(format!("mean L² error at t = {last:.4}")),
         );
-        let mut curves: Vec<(Method, Scheme)> = Vec::new();
-        for e in self.of_flow(Flow::Willmore) {
-            if !curves.contains(&(e.method, e.scheme)) {
-                curves.push((e.method, e.scheme));
-            }
-        }
-        for &(method, scheme) in &curves {
+        let shown = |wanted| (self.of_flow(Flow::Willmore)).any(|e| (e.method, e.scheme) == wanted);
+        for (method, scheme) in method::variants(shown) {
             let own = |e: &&Ensemble| (e.method, e.scheme) == (method, scheme);
             let (cells, points): (Vec<String>, Vec<[f64; 2]>) =
                 (self.of_flow(Flow::Willmore).filter(own))
@@ -534,22 +520,16 @@ impl Report<'_> {
                 });
             }
             for (&radius, result) in e.radii.iter().zip(&e.results) {
-                singles.extend(
-                    result
-                        .errors
-                        .iter()
-                        .enumerate()
-                        .map(|(step, &l2)| CircleRow {
-                            flow,
-                            n,
-                            method,
-                            scheme,
-                            radius,
-                            step,
-                            time: Self::time(step),
-                            l2,
-                        }),
-                );
+                singles.extend(self.shown_steps().map(|step| CircleRow {
+                    flow,
+                    n,
+                    method,
+                    scheme,
+                    radius,
+                    step,
+                    time: Self::time(step),
+                    l2: result.errors[step],
+                }));
             }
             steps.extend(e.records().map(|(radius, r)| StepRow {
                 n,
