@@ -1,11 +1,9 @@
 //! The compiled programs: what they refuse, and the quick convergence test.
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{refused, run};
+use crate::common::{refused, run};
 use model::pretrained;
 use report::Summary;
 

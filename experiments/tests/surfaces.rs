@@ -1,11 +1,9 @@
 //! Surfaces: the programs, and what their flows must satisfy.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::{refused, run};
+use crate::common::{refused, run};
 use experiments::method::Method;
 use experiments::surfaces::{centred_box, ratios, scales};
 use fem::{FiniteElementStep, LinearSolver};

@@ -1,6 +1,8 @@
 //! One suite for all backends: operations against their definitions, derivatives against independent ones, and a step
 //! of the flow against double precision on the CPU.
 
+mod support;
+
 use std::sync::Arc;
 
 use burn::tensor::Tensor;
@@ -18,7 +20,7 @@ use solver::{
     Exit, FlowParams, MeanCurvatureStep, MinimizingMovement, NewtonParams, Objective, StepRecord,
     WillmoreFlow,
 };
-use workbench_tests::{
+use support::{
     Backend, backends, convolution, correlation, dot, noise, relative_distance, splitting_network,
 };
 

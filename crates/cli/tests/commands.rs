@@ -1,10 +1,8 @@
 //! What the commands make.
 
-mod common;
-
 use std::path::Path;
 
-use common::outcome;
+use crate::common::{self, outcome};
 use geometry::shapes::{Ball, Cuboid};
 use geometry::{Field, Grid, npy, phase_field, vti};
 use images::{Drawing, Frame};

@@ -1,12 +1,8 @@
 //! Full and read-only disks, where the system lets users mount one.
-#![cfg(target_os = "linux")]
-
-mod common;
-
 use std::path::Path;
 use std::process::{Command, Output};
 
-use common::{assert_same, interrupt, outcome, run, start, text, wait_for, with_output};
+use crate::common::{assert_same, interrupt, outcome, run, start, text, wait_for, with_output};
 
 const RUN: [&str; 10] = [
     "flow",

@@ -1,13 +1,9 @@
 //! Twenty kills at random moments, each followed by a resumption to the same bytes.
-#![cfg(unix)]
-
-mod common;
-
 use std::path::Path;
 use std::process::Child;
 use std::time::{Duration, Instant};
 
-use common::{assert_same, run, start, text, wait_for, with_output};
+use crate::common::{assert_same, run, start, text, wait_for, with_output};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -1,11 +1,9 @@
 //! The page of a run.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::{files, outcome, run, text};
+use crate::common::{files, outcome, run, text};
 
 const RUN: [&str; 8] = [
     "flow",

@@ -1,8 +1,6 @@
 //! Whatever is wrong is said in one line on standard error, with exit code 2.
 
-mod common;
-
-use common::{run, text};
+use crate::common::{self, run, text};
 
 /// An array of 2 x 3 zeros.
 fn plane() -> Vec<u8> {

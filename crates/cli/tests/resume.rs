@@ -1,11 +1,9 @@
 //! Runs that are stopped end with the same bytes as runs that are not.
-#![cfg(unix)]
-
-mod common;
-
 use std::time::Duration;
 
-use common::{assert_same, committed, interrupt, run, start, text, wait_for, with_output};
+use crate::common::{
+    self, assert_same, committed, interrupt, run, start, text, wait_for, with_output,
+};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

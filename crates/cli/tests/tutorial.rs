@@ -8,12 +8,10 @@
 //! - comments `<!-- picture: docs/NAME = FILE -->`: a picture of the tutorial and the file that it is a copy of
 //!   (`scripts/regenerate_tutorial` makes the copies).
 
-mod common;
-
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use common::{program, text};
+use crate::common::{program, text};
 
 /// Larger pictures do not belong into a repository.
 const LARGEST_PICTURE: u64 = 300 * 1024;

@@ -1,11 +1,9 @@
 //! NPY and VTI files.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::{BY_VTK, doubles, foreign};
+use crate::common::{BY_VTK, doubles, foreign};
 use geometry::npy::{self, NpyError};
 use geometry::vti::{self, VtiError};
 use geometry::{Error, Field, Grid, file};

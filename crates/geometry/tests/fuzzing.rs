@@ -1,18 +1,13 @@
 //! Damaged and malicious NPY and VTI files.
 
-mod common;
-
 use std::io::Write;
 
-use common::{BY_VTK, doubles, foreign};
+use crate::common::{BY_VTK, doubles, foreign};
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
-use fuzzing::{CountingAllocator, Fuzz, Limit, assert_short_line, peak_of};
+use fuzzing::{Fuzz, Limit, assert_short_line, peak_of};
 use geometry::npy::{self, NpyError};
 use geometry::vti::{self, Image, VtiError};
-
-#[global_allocator]
-static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 /// As documented at [`npy::read`].
 const NPY: Limit = Limit {

@@ -2,12 +2,10 @@
 
 #![allow(clippy::float_cmp, reason = "where equality is asserted, it is exact")]
 
-mod common;
-
 use std::f64::consts::PI;
 use std::fs;
 
-use common::{Raster, disc, near, square};
+use crate::common::{Raster, disc, near, square};
 use geometry::shapes::{Ball, Cuboid};
 use geometry::{Field, Grid, Rotation, SignedDistance, SignedDistanceExt, phase_field};
 use images::{

@@ -1,11 +1,9 @@
 //! Image files: all kinds of PNG and JPEG, files that are none, and random bytes.
 
-mod common;
-
 use std::fs;
 
-use common::files::{SIZE, chunk, exif, png_files, raster, widened, zlib};
-use common::{Raster, disc, jpeg, png};
+use crate::common::files::{SIZE, chunk, exif, png_files, raster, widened, zlib};
+use crate::common::{Raster, disc, jpeg, png};
 use images::{Error, FormatError, decode, read};
 use jpeg_encoder::ColorType as Jpeg;
 use png::{BitDepth, ColorType};

@@ -1,16 +1,11 @@
 //! Damaged and malicious images.
 
-mod common;
-
-use common::files::{SIZE, chunk, exif, png_files, raster};
-use common::jpeg;
-use fuzzing::{CountingAllocator, Fuzz, Limit};
+use crate::common::files::{SIZE, chunk, exif, png_files, raster};
+use crate::common::jpeg;
+use fuzzing::{Fuzz, Limit};
 use geometry::SignedDistance;
 use images::{Image, Inside, LARGEST_IMAGE, Outline, OutlineDistance, Side, Threshold, decode};
 use jpeg_encoder::ColorType as Jpeg;
-
-#[global_allocator]
-static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 /// As documented at [`images::read`].
 const LIMIT: Limit = Limit {

@@ -2,11 +2,9 @@
 
 #![allow(clippy::float_cmp, reason = "where equality is asserted, it is exact")]
 
-mod common;
-
 use std::f64::consts::PI;
 
-use common::{Raster, disc, jpeg, near, square};
+use crate::common::{Raster, disc, jpeg, near, square};
 use geometry::contour::Polyline;
 use geometry::shapes::{Ball, Cuboid};
 use geometry::{Field, Grid, Rotation, SignedDistance, SignedDistanceExt, optimal_profile};

@@ -5,12 +5,10 @@
     reason = "energies consume tensors, as Burn's methods do"
 )]
 
-mod common;
-
+use crate::common::{self, check, devices, distance, linearization, random, vec};
 use burn::tensor::module::conv2d;
 use burn::tensor::ops::ConvOptions;
 use burn::tensor::{Device, Tensor};
-use common::{check, devices, distance, linearization, random, vec};
 use linearize::dual::{self, Dual};
 use linearize::{Extensions, Graph, Statistics, Value};
 

@@ -1,9 +1,6 @@
 //! Custom operations: a circular convolution and the derivatives of a pointwise function, written as
 //! a backend extension, and an energy that uses both.
-#![cfg(feature = "flex")]
-
-mod common;
-
+use crate::common::{distance, random, vec};
 use burn::backend::autodiff::Autodiff;
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
@@ -15,7 +12,6 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, Dispatch, Flex, FlexDevice, TensorMetadata, backend_extension};
 use burn::tensor::{Device, Tensor, TensorData};
 use burn_router::RouterClient;
-use common::{distance, random, vec};
 use linearize::dual::{self, Dual};
 use linearize::{
     Builder, CustomOpIr, Error, Extensions, Graph, Multilinear, OperationIr, ScalarIr, TensorIr,

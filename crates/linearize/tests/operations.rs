@@ -1,11 +1,9 @@
 //! Every rule, inside an energy, against Burn's autodiff and finite differences of it.
 
-mod common;
-
+use crate::common::{self, check, devices, random, separated, tensor};
 use burn::tensor::module::{conv_transpose2d, conv1d, conv2d, conv3d};
 use burn::tensor::ops::{AvgPoolOptions, ConvOptions, ConvTransposeOptions};
 use burn::tensor::{Bool, Int, Tensor, TensorData, activation};
-use common::{check, devices, random, separated, tensor};
 
 type Energy<const D: usize> = (&'static str, fn(Tensor<D>) -> Tensor<1>);
 

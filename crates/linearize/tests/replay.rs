@@ -1,9 +1,7 @@
 //! Programs as objects: parameters, points, errors, memory, threads.
 
-mod common;
-
+use crate::common::{self, devices, distance, linearization, random, vec};
 use burn::tensor::{DType, Tensor, TensorData};
-use common::{devices, distance, linearization, random, vec};
 use linearize::{Error, Extensions, Graph, Linearization, Value};
 
 /// `Σ c (u − f)² + u⁴`

@@ -2,11 +2,8 @@
 
 use std::path::Path;
 
-use fuzzing::{CountingAllocator, Fuzz, Limit, assert_short_line, peak_of};
+use fuzzing::{Fuzz, Limit, assert_short_line, peak_of};
 use model::{Error, Mlp, Network, PAPER_LAYERS, Provenance, Ratios, parameter_count};
-
-#[global_allocator]
-static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 /// As documented at [`Network::from_bytes`].
 const LIMIT: Limit = Limit {

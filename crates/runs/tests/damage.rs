@@ -1,11 +1,11 @@
 //! Damage is noticed and named, and what does not belong together is refused.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::{STEPS, contents, identity, quick_folder, run_to, uninterrupted, write_contents};
+use crate::common::{
+    self, STEPS, contents, identity, quick_folder, run_to, uninterrupted, write_contents,
+};
 use runs::{Checkpoint, Damage, Error, Identity, RunDirectory, State};
 use serde_json::json;
 

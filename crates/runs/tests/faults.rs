@@ -1,8 +1,6 @@
 //! Every single operation on the disk fails once, or with all after it, and the run ends with the
 //! same bytes nevertheless.
 
-mod common;
-
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
@@ -12,7 +10,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use common::{Quick, STEPS, Toy, contents, run_to, state_at, uninterrupted, write_contents};
+use crate::common::{
+    self, Quick, STEPS, Toy, contents, run_to, state_at, uninterrupted, write_contents,
+};
 use files::{Disk, Storage};
 use runs::{Error, Interrupt, RunDirectory};
 

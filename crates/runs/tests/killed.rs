@@ -1,9 +1,5 @@
 //! The toy as a process of its own: killed, interrupted, and out of space.
 
-#![cfg(unix)]
-
-mod common;
-
 use std::cell::Cell;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
@@ -11,7 +7,9 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use common::{Random, STEPS, Toy, contents, identity, run_to, state_at, uninterrupted};
+use crate::common::{
+    self, Random, STEPS, Toy, contents, identity, run_to, state_at, uninterrupted,
+};
 use files::Disk;
 use runs::{Error, Interrupt, RunDirectory};
 
@@ -19,10 +17,12 @@ use runs::{Error, Interrupt, RunDirectory};
 const FOLDER: &str = "RUNS_TEST_FOLDER";
 const PAUSE: &str = "RUNS_TEST_PAUSE";
 
+/// The process that the other tests start; of itself it does nothing.
 #[test]
-#[ignore = "the process that the other tests start"]
 fn process() {
-    let folder = PathBuf::from(std::env::var_os(FOLDER).expect("started by another test"));
+    let Some(folder) = std::env::var_os(FOLDER).map(PathBuf::from) else {
+        return;
+    };
     let pause = std::env::var(PAUSE).unwrap().parse().unwrap();
     let interrupt = Interrupt::catch().unwrap();
     // Now signals are caught.
@@ -54,7 +54,7 @@ fn start(folder: &Path, pause: u64, before: &str) -> Child {
     Command::new("sh")
         .args(["-c", &format!("{before} exec \"$0\" \"$@\"")])
         .arg(std::env::current_exe().unwrap())
-        .args(["--ignored", "--exact", "process", "--nocapture"])
+        .args(["--exact", "killed::process", "--nocapture"])
         .env(FOLDER, folder)
         .env(PAUSE, pause.to_string())
         .stdout(Stdio::null())
@@ -207,7 +207,7 @@ fn on_a_full_disk_the_last_commit_stays() {
         let process = Command::new("unshare")
             .args(["-rm", "sh", "-c", SCRIPT])
             .arg(std::env::current_exe().unwrap())
-            .args(["--ignored", "--exact", "process", "--nocapture"])
+            .args(["--exact", "killed::process", "--nocapture"])
             .env("SIZE", format!("{size}k"))
             .env("DISK", &disk)
             .env("COPY", &copy)

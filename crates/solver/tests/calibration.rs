@@ -1,10 +1,8 @@
 //! Calibrated flows against exact solutions, and the factors against what the scheme does.
 
-mod common;
-
 use std::f64::consts::PI;
 
-use common::{ball, device, network, params};
+use crate::common::{ball, device, network, params};
 use geometry::measure::{l2_distance, zero_set_volume};
 use geometry::{Field, Grid, exact};
 use model::{Calibration, Network, Ratios, pretrained};

@@ -1,9 +1,7 @@
 //! Flows with the learned operator: discs in 2D, a ball in 3D, and what is refused.
 
-mod common;
-
+use crate::common::{self, Scaled, ball, device, network, network_3d, params};
 use burn::tensor::Tensor;
-use common::{Scaled, ball, device, network, network_3d, params};
 use geometry::measure::{l2_distance, linf, zero_set_volume};
 use geometry::shapes::Cuboid;
 use geometry::{Field, Grid, exact, phase_field};

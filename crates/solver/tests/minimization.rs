@@ -1,8 +1,8 @@
 //! Newton's method on objectives with known minimizers.
 
-mod common;
-
-use common::{DoubleWell, Quadratic, SIDE, Scaled, device, distance, grid_tensor, noise, values};
+use crate::common::{
+    DoubleWell, Quadratic, SIDE, Scaled, device, distance, grid_tensor, noise, values,
+};
 use solver::{Error, Exit, Method, NewtonInfo, NewtonParams, Objective, minimize};
 
 const N: usize = SIDE * SIDE;

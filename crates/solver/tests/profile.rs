@@ -1,8 +1,6 @@
 //! Moves that keep the interface profile.
 
-mod common;
-
-use common::{device, distance, noise, values};
+use crate::common::{device, distance, noise, values};
 use geometry::optimal_profile;
 use solver::{extrapolate, retract};
 

@@ -1,8 +1,6 @@
 //! Flows in which only some unknowns move.
 
-mod common;
-
-use common::{ball, device, network, network_3d, params};
+use crate::common::{ball, device, network, network_3d, params};
 use geometry::shapes::{Ball, HalfSpace};
 use geometry::{Field, Grid, SignedDistanceExt, measure, phase_field};
 use model::Network;

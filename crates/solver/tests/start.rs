@@ -1,8 +1,6 @@
 //! Steps that begin on the half grid.
 
-mod common;
-
-use common::{device, network, params};
+use crate::common::{device, network, params};
 use geometry::measure::l2_distance;
 use geometry::shapes::Cross;
 use geometry::{Field, Grid, phase_field};

@@ -2,11 +2,9 @@
 
 #![allow(clippy::float_cmp, reason = "where equality is asserted, it is exact")]
 
-mod common;
-
 use std::f64::consts::PI;
 
-use common::{closed, cube, reversed, sphere, together, torus, translated};
+use crate::common::{closed, cube, reversed, sphere, together, torus, translated};
 use geometry::Grid;
 use surfaces::{ClosedMesh, Error, Placement, TriangleMesh, Warning};
 

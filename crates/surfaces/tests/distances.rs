@@ -2,11 +2,9 @@
 
 #![allow(clippy::float_cmp, reason = "where equality is asserted, it is exact")]
 
-mod common;
-
 use std::path::PathBuf;
 
-use common::{Numbers, closed, cube, reversed, sphere, together, torus, translated};
+use crate::common::{Numbers, closed, cube, reversed, sphere, together, torus, translated};
 use geometry::{Field, Grid, SignedDistance, shapes};
 use surfaces::{ClosedMesh, MeshDistance, Placement, samples};
 

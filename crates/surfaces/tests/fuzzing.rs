@@ -1,16 +1,11 @@
 //! Damaged and malicious files of meshes.
 
-mod common;
-
 use std::path::Path;
 
-use common::files::{ENCODINGS, FACET, encode, ply};
-use common::sphere;
-use fuzzing::{CountingAllocator, Fuzz, Limit, assert_short_line, peak_of};
+use crate::common::files::{ENCODINGS, FACET, encode, ply};
+use crate::common::sphere;
+use fuzzing::{Fuzz, Limit, assert_short_line, peak_of};
 use surfaces::{ClosedMesh, TriangleMesh, decode};
-
-#[global_allocator]
-static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 /// As documented at [`surfaces::read`].
 const LIMIT: Limit = Limit {

@@ -2,11 +2,9 @@
 
 #![allow(clippy::float_cmp, reason = "where equality is asserted, it is exact")]
 
-mod common;
-
 use std::f64::consts::PI;
 
-use common::Numbers;
+use crate::common::Numbers;
 use geometry::shapes::{Ball, Cuboid, Torus};
 use geometry::{Field, Grid, Rotation, SignedDistance, SignedDistanceExt, phase_field};
 use proptest::prelude::*;

@@ -1,6 +1,4 @@
 //! Running the program.
-#![allow(dead_code, reason = "every test program uses a part of it")]
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};

@@ -1,6 +1,4 @@
 //! Shapes rendered to files without the code under test.
-#![allow(dead_code, reason = "every test file uses a part of it")]
-
 pub mod files;
 
 use images::{Image, decode};

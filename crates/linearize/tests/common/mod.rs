@@ -1,6 +1,4 @@
 //! What the tests share: data, devices, and an oracle that knows nothing of this crate.
-#![allow(dead_code, reason = "each test file uses its part")]
-
 use burn::tensor::{DType, Device, Tensor, TensorData};
 use linearize::{Extensions, Graph, Linearization, Value, dual, taylor};
 

@@ -1,7 +1,5 @@
 //! A toy computation, and what a run directory holds.
 
-#![allow(dead_code, reason = "every test file uses its own part")]
-
 use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::fs::{self, File};

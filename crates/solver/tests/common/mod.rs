@@ -1,6 +1,4 @@
 //! What the tests share: networks, discs and small objectives on the host.
-#![allow(dead_code, reason = "each test file uses its part")]
-
 use burn::tensor::Tensor;
 use geometry::{Field, Grid, phase_field, shapes::Ball};
 use model::training::{SphereData, levenberg_marquardt::heat_kernel};

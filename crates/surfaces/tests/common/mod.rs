@@ -1,5 +1,4 @@
 //! Meshes for the tests.
-#![allow(dead_code, reason = "every test program uses some of them")]
 #![allow(clippy::float_cmp, reason = "equal vertices are computed alike")]
 
 pub mod files;

@@ -1,0 +1,13 @@
+//! The program from outside.
+
+mod commands;
+mod common;
+#[cfg(target_os = "linux")]
+mod disks;
+#[cfg(unix)]
+mod killed;
+mod page;
+mod refusals;
+#[cfg(unix)]
+mod resume;
+mod tutorial;

@@ -1,0 +1,4 @@
+//! Steps and the nested scheme.
+
+mod nested;
+mod steps;

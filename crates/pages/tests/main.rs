@@ -1,0 +1,4 @@
+//! Pages and the page of results.
+
+mod pages;
+mod results;

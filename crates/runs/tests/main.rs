@@ -1,0 +1,7 @@
+//! Run directories against faults, kills and damage.
+
+mod common;
+mod damage;
+mod faults;
+#[cfg(unix)]
+mod killed;

@@ -1,0 +1,9 @@
+//! Minimizations, flows and their parts.
+
+mod calibration;
+mod common;
+mod flow;
+mod minimization;
+mod profile;
+mod region;
+mod start;

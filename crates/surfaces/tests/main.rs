@@ -1,0 +1,11 @@
+//! Meshes: files, distances, isosurfaces.
+
+mod closed;
+mod common;
+mod distances;
+mod files;
+mod fuzzing;
+mod isosurfaces;
+
+#[global_allocator]
+static ALLOCATOR: ::fuzzing::CountingAllocator = ::fuzzing::CountingAllocator;

@@ -1,0 +1,5 @@
+//! The programs from outside.
+
+mod common;
+mod programs;
+mod surfaces;
