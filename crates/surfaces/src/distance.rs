@@ -1,13 +1,14 @@
 //! The exact signed distance to a closed mesh.
 
+use std::collections::HashMap;
+
 use geometry::{Field, Grid, SignedDistance};
-use parry3d_f64::partitioning::{BvhLeafCost, BvhNode};
-use parry3d_f64::query::PointQueryWithLocation;
-use parry3d_f64::shape::{TriMesh, TriMeshFlags, TrianglePointLocation};
 use rayon::prelude::*;
 
+use crate::hierarchy::{Hierarchy, Nearest};
 use crate::mesh::merge_coincident;
-use crate::vector::Vector;
+use crate::triangle::Part;
+use crate::vector::{Vector, scaled_normal};
 use crate::{ClosedMesh, Error};
 
 /// The signed distance to a closed mesh: negative inside, exact to a few units in the last place
@@ -20,11 +21,19 @@ use crate::{ClosedMesh, Error};
 #[derive(Clone, Debug)]
 pub struct MeshDistance {
     /// In coordinates times `scale`.
-    mesh: TriMesh,
+    hierarchy: Hierarchy,
+    /// The vertices of the triangles of the hierarchy.
+    faces: Vec<[u32; 3]>,
+    /// Sums of the unit normals of all faces there, weighted by their angles at vertices.
+    vertex_normals: Vec<Vector>,
+    edge_normals: HashMap<Edge, Vector>,
     /// A power of two that makes the longest side of the bounding box about one: the scaling is
     /// exact, and products of coordinates neither overflow nor underflow.
     scale: f64,
 }
+
+/// Two vertices in ascending order.
+type Edge = [u32; 2];
 
 impl MeshDistance {
     /// Builds the hierarchy.
@@ -35,14 +44,33 @@ impl MeshDistance {
         // Where sheets touch in a vertex, the pseudo-normal is the sum over all of them.
         let merged = merge_coincident(&mesh.vertices);
         let vertices = merged.first.iter().map(|&v| mesh.vertices[v]);
-        let vertices = vertices.map(|x| Vector::from_array(x) * scale).collect();
-        let faces = mesh
-            .faces
+        let vertices: Vec<_> = vertices.map(|x| Vector::from_array(x) * scale).collect();
+        let faces = mesh.faces.iter();
+        let faces: Vec<_> = faces.map(|f| f.map(|v| merged.index[v as usize])).collect();
+        let triangles: Vec<_> = faces
             .iter()
-            .map(|f| f.map(|v| merged.index[v as usize]));
-        let mesh = TriMesh::with_flags(vertices, faces.collect(), TriMeshFlags::ORIENTED)
-            .expect("a closed mesh has faces");
-        Self { mesh, scale }
+            .map(|f| f.map(|v| vertices[v as usize]))
+            .collect();
+        let mut vertex_normals = vec![Vector::ZERO; vertices.len()];
+        let mut edge_normals = HashMap::with_capacity(3 * faces.len() / 2);
+        for (face, triangle) in faces.iter().zip(&triangles) {
+            let normal = scaled_normal(*triangle).normalize_or_zero();
+            for i in 0..3 {
+                let [here, next, last] = [i, i + 1, i + 2].map(|i| triangle[i % 3]);
+                let (a, b) = (next - here, last - here);
+                let angle = a.cross(b).length().atan2(a.dot(b));
+                vertex_normals[face[i] as usize] += normal * angle;
+                *edge_normals.entry(edge(face, i)).or_default() += normal;
+            }
+        }
+        let (hierarchy, order) = Hierarchy::new(&triangles);
+        Self {
+            hierarchy,
+            faces: order.iter().map(|&f| faces[f]).collect(),
+            vertex_normals,
+            edge_normals,
+            scale,
+        }
     }
 
     /// Samples the distance at the nodes of a grid, in parallel over layers of the first axis;
@@ -81,79 +109,39 @@ impl MeshDistance {
 
     /// The signed distance of `x`, and the nearest face; NaN if there is none. A face that is not
     /// far from the nearest one speeds up the search.
-    fn distance_near(&self, x: Vector, near: Option<u32>) -> (f64, Option<u32>) {
+    fn distance_near(&self, x: Vector, near: Option<usize>) -> (f64, Option<usize>) {
         let x = x * self.scale;
-        let guess = near.map(|face| self.project(x, face));
-        let bound = guess.as_ref().map_or(f64::MAX, |g| g.squared_distance);
-        let nearer = self.mesh.bvh().find_best(
-            bound,
-            |node, _| squared_distance_to_box(x, node),
-            |face, _| Some(self.project(x, face)),
-        );
-        match nearer.map(|(_, nearest)| nearest).or(guess) {
+        let guess = near.map(|face| self.hierarchy.project(x, face));
+        match self.hierarchy.nearest(x, guess) {
             Some(nearest) => {
                 let distance = nearest.squared_distance.sqrt() / self.scale;
                 let inside = nearest.offset.dot(self.pseudo_normal(&nearest)) < 0.0;
                 let signed = if inside { -distance } else { distance };
-                (signed, Some(nearest.face))
+                (signed, Some(nearest.triangle))
             }
             None => (f64::NAN, None),
         }
     }
 
-    fn project(&self, x: Vector, face: u32) -> Nearest {
-        let triangle = self.mesh.triangle(face);
-        let (projection, location) = triangle.project_local_point_and_get_location(x, false);
-        let offset = x - projection.point;
-        Nearest {
-            face,
-            location,
-            offset,
-            squared_distance: offset.length_squared(),
-        }
-    }
-
     /// Points outwards at the nearest point; of any length.
     fn pseudo_normal(&self, nearest: &Nearest) -> Vector {
-        let normals = self.mesh.pseudo_normals().expect("the mesh is oriented");
-        let face = nearest.face as usize;
-        match nearest.location {
-            TrianglePointLocation::OnVertex(corner) => {
-                let vertex = self.mesh.indices()[face][corner as usize];
-                normals.vertices_pseudo_normal[vertex as usize]
-            }
-            TrianglePointLocation::OnEdge(edge, _) => {
-                normals.edges_pseudo_normal[face][edge as usize]
-            }
-            TrianglePointLocation::OnFace(..) | TrianglePointLocation::OnSolid => {
-                self.mesh.triangle(nearest.face).scaled_normal()
-            }
+        let face = &self.faces[nearest.triangle];
+        match nearest.part {
+            Part::Corner(i) => self.vertex_normals[face[i] as usize],
+            Part::Edge(i) => self.edge_normals[&edge(face, i)],
+            Part::Inside => scaled_normal(*self.hierarchy.triangle(nearest.triangle)),
         }
     }
+}
+
+/// Edge `i` of a face, from corner `i` to the next.
+fn edge(face: &[u32; 3], i: usize) -> Edge {
+    let (a, b) = (face[i], face[(i + 1) % 3]);
+    [a.min(b), a.max(b)]
 }
 
 impl SignedDistance<3> for MeshDistance {
     fn signed_distance(&self, x: [f64; 3]) -> f64 {
         self.distance_near(Vector::from_array(x), None).0
     }
-}
-
-/// The point of a face nearest to `x`.
-struct Nearest {
-    face: u32,
-    location: TrianglePointLocation,
-    /// From the point to `x`.
-    offset: Vector,
-    squared_distance: f64,
-}
-
-impl BvhLeafCost for Nearest {
-    fn cost(&self) -> f64 {
-        self.squared_distance
-    }
-}
-
-fn squared_distance_to_box(x: Vector, node: &BvhNode) -> f64 {
-    let outside = (node.mins() - x).max(x - node.maxs()).max(Vector::ZERO);
-    outside.length_squared()
 }

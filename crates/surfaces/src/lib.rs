@@ -58,11 +58,13 @@ mod closed;
 mod distance;
 mod error;
 mod format;
+mod hierarchy;
 mod isosurface;
 mod mesh;
 mod placement;
 mod read;
 pub mod samples;
+mod triangle;
 mod vector;
 mod write;
 

@@ -108,12 +108,6 @@ pub enum FormatError {
         /// How many.
         count: usize,
     },
-    /// What the PLY library says.
-    #[error("{message}")]
-    Ply {
-        /// In one line, shortened.
-        message: String,
-    },
 }
 
 /// Reads a mesh; the extension (`.obj`, `.ply`, `.stl`) tells the format.

@@ -1,6 +1,6 @@
-//! The vectors of the library that finds nearest points, and what triangles need of them.
+//! Vectors, and what triangles need of them.
 
-pub(crate) use parry3d_f64::math::Vector;
+pub(crate) use glam::DVec3 as Vector;
 
 use crate::TriangleMesh;
 

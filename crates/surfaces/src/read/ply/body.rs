@@ -1,0 +1,161 @@
+//! The numbers of a PLY file. All types of the format fit into `f64`.
+
+use std::borrow::Cow;
+use std::str::FromStr;
+
+use super::header::{Element, Encoding, Header, Scalar};
+use crate::read::{FormatError, shortened};
+
+/// The values of the properties of one element; one value, or those of a list.
+type Row = [Vec<f64>];
+
+/// What follows the header.
+pub(super) struct Body<'a> {
+    encoding: Encoding,
+    bytes: &'a [u8],
+    position: usize,
+    /// Lines read, of text.
+    lines: usize,
+}
+
+impl<'a> Body<'a> {
+    pub(super) fn new(header: &Header, bytes: &'a [u8], position: usize) -> Self {
+        Self {
+            encoding: header.encoding,
+            bytes,
+            position,
+            lines: header.lines,
+        }
+    }
+
+    /// Reads the elements of a kind and passes on each with its number.
+    pub(super) fn rows(
+        &mut self,
+        element: &Element,
+        mut each: impl FnMut(usize, &Row) -> Result<(), FormatError>,
+    ) -> Result<(), FormatError> {
+        let mut row = vec![Vec::new(); element.properties.len()];
+        for number in 0..element.count {
+            if self.encoding == Encoding::Ascii {
+                self.text_row(element, &mut row)?;
+            } else {
+                self.binary_row(element, &mut row)?;
+            }
+            each(number, &row)?;
+        }
+        Ok(())
+    }
+
+    fn binary_row(&mut self, element: &Element, row: &mut Row) -> Result<(), FormatError> {
+        for (property, values) in element.properties.iter().zip(row) {
+            let count = match property.length {
+                Some(length) => self.numbers(element, length, 1)?.next(),
+                None => Some(1.0),
+            };
+            // A negative length is none.
+            let count = count.unwrap_or_default() as usize;
+            values.clear();
+            values.extend(self.numbers(element, property.scalar, count)?);
+        }
+        Ok(())
+    }
+
+    fn numbers(
+        &mut self,
+        element: &Element,
+        scalar: Scalar,
+        count: usize,
+    ) -> Result<impl Iterator<Item = f64> + use<'a>, FormatError> {
+        let size = scalar.size();
+        let end = self.position.saturating_add(count.saturating_mul(size));
+        let Some(bytes) = self.bytes.get(self.position..end) else {
+            return Err(element.too_short(end, self.bytes.len()));
+        };
+        self.position = end;
+        let big = self.encoding == Encoding::BigEndian;
+        Ok(bytes
+            .chunks_exact(size)
+            .map(move |bytes| scalar.decode(bytes, big)))
+    }
+
+    fn text_row(&mut self, element: &Element, row: &mut Row) -> Result<(), FormatError> {
+        let line = self.line()?;
+        let mut words = line.split_ascii_whitespace();
+        let mut number = |scalar: Scalar| {
+            let word = words.next().unwrap_or_default();
+            scalar.parse_number(word).ok_or_else(|| FormatError::Line {
+                line: self.lines,
+                found: shortened(word),
+                expected: "a number of the type in the header",
+            })
+        };
+        for (property, values) in element.properties.iter().zip(row) {
+            let count = property.length.map_or(Ok(1.0), &mut number)? as usize;
+            values.clear();
+            for _ in 0..count {
+                values.push(number(property.scalar)?);
+            }
+        }
+        Ok(())
+    }
+
+    /// The next line that is not blank.
+    fn line(&mut self) -> Result<Cow<'a, str>, FormatError> {
+        while self.position < self.bytes.len() {
+            let rest = &self.bytes[self.position..];
+            let length = rest.iter().position(|&byte| byte == b'\n');
+            let line = &rest[..length.unwrap_or(rest.len())];
+            self.position += line.len() + 1;
+            self.lines += 1;
+            if !line.trim_ascii().is_empty() {
+                return Ok(String::from_utf8_lossy(line));
+            }
+        }
+        Err(FormatError::EndOfText {
+            line: self.lines,
+            expected: "an element",
+        })
+    }
+}
+
+impl Scalar {
+    fn decode(self, bytes: &[u8], big: bool) -> f64 {
+        /// The value of a type from its bytes in either order.
+        macro_rules! value {
+            ($type:ty) => {{
+                let bytes = bytes.try_into().expect("as many bytes as the type has");
+                f64::from(if big {
+                    <$type>::from_be_bytes(bytes)
+                } else {
+                    <$type>::from_le_bytes(bytes)
+                })
+            }};
+        }
+        match self {
+            Self::I8 => value!(i8),
+            Self::U8 => value!(u8),
+            Self::I16 => value!(i16),
+            Self::U16 => value!(u16),
+            Self::I32 => value!(i32),
+            Self::U32 => value!(u32),
+            Self::F32 => value!(f32),
+            Self::F64 => value!(f64),
+        }
+    }
+
+    fn parse_number(self, word: &str) -> Option<f64> {
+        fn value<T: FromStr + Into<f64>>(word: &str) -> Option<f64> {
+            word.parse::<T>().ok().map(Into::into)
+        }
+        match self {
+            Self::I8 => value::<i8>(word),
+            Self::U8 => value::<u8>(word),
+            Self::I16 => value::<i16>(word),
+            Self::U16 => value::<u16>(word),
+            Self::I32 => value::<i32>(word),
+            Self::U32 => value::<u32>(word),
+            Self::F32 => value::<f32>(word),
+            Self::F64 => value::<f64>(word),
+        }
+    }
+}
