@@ -1,7 +1,7 @@
 //! What the test suite of the backends shares: devices with their tolerances, an operator that needs no training, and
 //! the definitions of the operations as plain sums.
 //!
-//! The suite itself is `tests/backends.rs`. It runs on every backend compiled in
+//! The suite itself is `backends.rs`. It runs on every backend compiled in
 //! (`cargo test -p workbench-tests --features ndarray`), and its executable runs on other machines too. A GPU backend
 //! that cannot be opened fails its tests, unless the environment variable `WILLMORE_ALLOW_MISSING_GPU` is 1.
 
