@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::npy::NpyError;
-use crate::vti::VtiError;
+use crate::npy::error::NpyError;
+use crate::vti::error::VtiError;
 
 /// Errors of grids, fields, shapes and files, each with the numbers needed to act on it.
 #[derive(Debug, thiserror::Error)]

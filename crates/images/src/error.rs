@@ -2,8 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::read::FormatError;
-use crate::selection::Side;
+use crate::read::error::FormatError;
 
 /// Errors of images, outlines, placement and drawings, each with the numbers needed to act on it.
 #[derive(Debug, thiserror::Error)]
@@ -65,7 +64,7 @@ pub enum Error {
     )]
     NothingInside {
         /// The side, with its threshold.
-        side: Side,
+        side: String,
         /// What is compared with the threshold.
         quantity: &'static str,
         /// Its least value.
@@ -80,7 +79,7 @@ pub enum Error {
     )]
     EverythingInside {
         /// The side, with its threshold.
-        side: Side,
+        side: String,
         /// What is compared with the threshold.
         quantity: &'static str,
         /// Its least value.

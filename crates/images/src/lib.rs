@@ -84,6 +84,7 @@ pub use interface::Interface;
 pub use mask::Mask;
 pub use outline::{LARGEST_OUTLINE, Outline};
 pub use placement::Placement;
-pub use read::{FormatError, decode, read};
+pub use read::error::FormatError;
+pub use read::{decode, read};
 pub use selection::{Inside, Side, Threshold};
 pub use svg::Svg;

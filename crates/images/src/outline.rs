@@ -82,14 +82,14 @@ impl Outline {
             let quantity = side.quantity();
             return Err(if inside == 0 {
                 Error::NothingInside {
-                    side,
+                    side: side.to_string(),
                     quantity,
                     low,
                     high,
                 }
             } else {
                 Error::EverythingInside {
-                    side,
+                    side: side.to_string(),
                     quantity,
                     low,
                     high,

@@ -9,7 +9,7 @@ use glam::DVec3;
 use crate::camera::{Axis, Bounds, Camera, Framing, Projection, Subject};
 use crate::colour::Rgb;
 use crate::error::{fraction, require};
-use crate::film::{Film, GroundPlane};
+use crate::film::{Film, GroundPlane, Quality};
 use crate::light::{Lighting, Lights, Material};
 use crate::picture::{Light, Picture, checked};
 use crate::tube::{Tube, Tubes};
@@ -31,29 +31,6 @@ pub enum Background {
     Transparent,
     /// One colour.
     Colour(Rgb),
-}
-
-/// How many rays are spent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Quality {
-    /// For tests and previews.
-    Draft,
-    /// For figures.
-    #[default]
-    Standard,
-    /// For large prints: several times slower.
-    Fine,
-}
-
-impl Quality {
-    /// Rays to the surroundings and to the key light, for each pixel.
-    pub(crate) fn rays(self) -> (usize, usize) {
-        match self {
-            Self::Draft => (8, 4),
-            Self::Standard => (24, 12),
-            Self::Fine => (96, 48),
-        }
-    }
 }
 
 /// A side of a square picture, or width and height, in pixels.

@@ -6,10 +6,10 @@ use crate::axes::{Axes, Margins, draw_lines, snap, title_height};
 use crate::axis::{Axis, Mapping, Scale, Ticks};
 use crate::colour::{ColourMap, FRAME, INK, Rgb};
 use crate::error::{Error, Result};
-use crate::figure::{Context, Drawable, Spot};
 use crate::font;
 use crate::geom::{Point, Rect, clip_polyline, point, thin};
 use crate::legend::LegendEntry;
+use crate::panel::{Context, Drawable, Spot};
 use crate::shapes::Curve;
 use crate::surface::{Scaling, Surface, Text, outline, stroke_dashed};
 

@@ -8,9 +8,9 @@ use resize::px::RGB;
 use crate::axes::{Margins, draw_lines, title_height};
 use crate::colour::{FRAME, INK, Rgb, srgb_decoded, srgb_encoded};
 use crate::error::{Error, Result};
-use crate::figure::{Context, Drawable, Spot};
 use crate::geom::Rect;
 use crate::legend::LegendEntry;
+use crate::panel::{Context, Drawable, Spot};
 use crate::surface::{PNG_SCALE, Scaling, Surface, outline};
 
 /// A panel that shows a picture, with a title above and a caption below.

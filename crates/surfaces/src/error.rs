@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::read::FormatError;
+use crate::read::error::FormatError;
 
 /// Errors of mesh files, checks, placement and isosurfaces, each with the numbers needed to act on
 /// it.

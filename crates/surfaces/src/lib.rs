@@ -72,5 +72,6 @@ pub use error::Error;
 pub use isosurface::{isosurface, phase_field_surface};
 pub use mesh::{BoundingBox, TriangleMesh};
 pub use placement::Placement;
-pub use read::{FormatError, decode, read};
+pub use read::error::FormatError;
+pub use read::{decode, read};
 pub use write::write;
