@@ -83,6 +83,12 @@ pub enum Error {
         /// The point.
         point: Vec<f64>,
     },
+    /// No name of a coordinate axis.
+    #[error("{name:?} is no axis: choose x, y or z")]
+    UnknownAxis {
+        /// What was given.
+        name: String,
+    },
     /// A list of named arrays is unusable.
     #[error("array name {name:?} cannot be written: {reason}")]
     ArrayName {

@@ -53,6 +53,7 @@ mod grid;
 mod profile;
 mod reduce;
 mod transfer;
+mod up;
 mod vector;
 
 pub mod contour;
@@ -69,3 +70,4 @@ pub use error::Error;
 pub use field::Field;
 pub use grid::Grid;
 pub use profile::{distance_from_phase_field, optimal_profile, phase_field};
+pub use up::UpAxis;

@@ -66,7 +66,7 @@ mod tube;
 mod volume;
 
 pub use animation::Animation;
-pub use camera::{Axis, Bounds, Camera, Framing, Projection};
+pub use camera::{Bounds, Camera, Framing, Projection};
 pub use colour::Rgb;
 pub use error::Error;
 pub use film::Quality;

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use geometry::{Field, SignedDistance, distance_from_phase_field};
+use geometry::{Field, SignedDistance, UpAxis, distance_from_phase_field};
 use glam::DVec3;
 
-use crate::camera::{Axis, Bounds, Camera, Framing, Projection, Subject};
+use crate::camera::{Bounds, Camera, Framing, Projection, Subject};
 use crate::colour::Rgb;
 use crate::error::{fraction, require};
 use crate::film::{Film, GroundPlane, Quality};
@@ -134,7 +134,7 @@ impl<'a> Scene<'a> {
 
     /// Sets the axis that points up.
     #[must_use]
-    pub fn up(mut self, axis: Axis) -> Self {
+    pub fn up(mut self, axis: UpAxis) -> Self {
         self.camera.up = axis;
         self
     }

@@ -69,6 +69,7 @@ mod write;
 pub use closed::{ClosedMesh, Warning};
 pub use distance::MeshDistance;
 pub use error::Error;
+pub use format::usual_up_axis;
 pub use isosurface::{isosurface, phase_field_surface};
 pub use mesh::{BoundingBox, TriangleMesh};
 pub use placement::Placement;
