@@ -140,21 +140,6 @@ pub enum Error {
         /// Largest magnitude.
         limit: f64,
     },
-    /// What is placed is larger than the box less its margin.
-    #[error(
-        "a side length of {side_length} with a margin of {margin} on both sides does not fit the \
-         box of side {box_side}; use at most {largest}"
-    )]
-    DoesNotFit {
-        /// Requested longest side.
-        side_length: f64,
-        /// Side of the box.
-        box_side: f64,
-        /// Requested margin.
-        margin: f64,
-        /// Largest side length that fits.
-        largest: f64,
-    },
     /// A region that contains no node.
     #[error(
         "no node of the grid of {nodes} nodes is in the region, so nothing could move; check where \

@@ -5,9 +5,9 @@ use std::path::Path;
 use std::time::Duration;
 
 use geometry::file::write_atomically;
+use srgb::{Rgb, decode, encode};
 
 use crate::Error;
-use crate::colour::{Rgb, decode, encode};
 
 /// Largest side of a picture, in pixels.
 pub const LARGEST_SIDE: u32 = 8192;

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use geometry::{Field, SignedDistance, UpAxis, distance_from_phase_field};
 use glam::DVec3;
+use srgb::Rgb;
 
 use crate::camera::{Bounds, Camera, Framing, Projection, Subject};
-use crate::colour::Rgb;
 use crate::error::{fraction, require};
 use crate::film::{Film, GroundPlane, Quality};
 use crate::light::{Lighting, Lights, Material};

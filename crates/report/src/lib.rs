@@ -79,7 +79,7 @@ mod decoded;
 mod tests;
 
 pub use axis::{Axis, Scale};
-pub use colour::{Colour, ColourMap, OKABE_ITO, Rgb};
+pub use colour::{Colour, ColourMap, OKABE_ITO};
 pub use error::{Error, Result};
 pub use figure::{Figure, Panel};
 pub use heatmap::Heatmap;
@@ -91,6 +91,7 @@ pub use plot::{LineChart, Reference, ReferenceAt, Series};
 pub use progress::Progress;
 pub use raster::Raster;
 pub use shapes::{Curve, Shapes};
+pub use srgb::Rgb;
 pub use style::{LineStyle, Marker};
 pub use summary::Summary;
 pub use table::{Cell, Column, Format, Table};

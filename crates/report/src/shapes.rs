@@ -1,9 +1,10 @@
 //! Plane curves, filled or outlined, at equal aspect: zero level sets as small multiples.
 
 use plotters_backend::text_anchor::HPos;
+use srgb::Rgb;
 
 use crate::axes::{Margins, draw_lines, title_height};
-use crate::colour::{Colour, INK, Rgb, WHITE};
+use crate::colour::{Colour, INK, WHITE};
 use crate::error::{Error, Result};
 use crate::geom::{Point, Rect, clip_loop, clip_polyline, point, thin};
 use crate::legend::{LegendEntry, Sample};
