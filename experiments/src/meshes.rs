@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use geometry::{Field, Grid, npy, optimal_profile, vti};
+use geometry::{Field, Grid, Placement, npy, optimal_profile, vti};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
-use surfaces::{ClosedMesh, MeshDistance, Placement};
+use surfaces::{ClosedMesh, MeshDistance};
 
 use crate::Error;
 use crate::networks::hexadecimal;
@@ -159,8 +159,9 @@ impl MeshOptions {
     /// The chosen mesh or volume, for runs on a grid.
     ///
     /// # Errors
-    /// [`Error::Options`] if it is nowhere; [`Error::Surfaces`] if it is no closed surface or does not fit the box; for a volume
-    /// [`Error::Geometry`] if it cannot be read, [`Error::Options`] if it has another size or its values are no phase field.
+    /// [`Error::Options`] if it is nowhere; [`Error::Surfaces`] if it is no closed surface; [`Error::Geometry`] if it does not fit the
+    /// box; for a volume [`Error::Geometry`] if it cannot be read, [`Error::Options`] if it has another size or its values are no phase
+    /// field.
     pub fn load(&self, known: &KnownMesh, grid: &Grid<3>) -> Result<Loaded, Error> {
         let side_length = self.side_length.unwrap_or(known.side_length);
         if let Some(path) = &self.volume {
@@ -272,7 +273,7 @@ impl Loaded {
 
     fn fitting(self, grid: &Grid<3>) -> Result<Self, Error> {
         if let (Shape::Mesh(mesh), Some(side_length)) = (&self.shape, self.about.side_length) {
-            Placement::fit(mesh, grid, side_length, 0.0)?;
+            Placement::fit(&mesh.bounding_box(), grid, side_length, 0.0)?;
         }
         Ok(self)
     }
@@ -281,7 +282,7 @@ impl Loaded {
     /// a volume.
     ///
     /// # Errors
-    /// [`Error::Surfaces`] if the mesh does not fit.
+    /// [`Error::Geometry`] if the mesh does not fit.
     pub fn phase_field(
         &self,
         grid: Grid<3>,
@@ -344,7 +345,7 @@ fn check_phase_field(u: &Field<3>, path: &Path) -> Result<(), Error> {
 /// Signed distances to a mesh, scaled to a longest side and centred in the box of the grid, at least `margin` from its faces.
 ///
 /// # Errors
-/// [`Error::Surfaces`] if the mesh does not fit.
+/// [`Error::Geometry`] if the mesh does not fit.
 pub fn signed_distance(
     mesh: &ClosedMesh,
     grid: Grid<3>,
@@ -352,7 +353,7 @@ pub fn signed_distance(
     margin: f64,
     bar: &ProgressBar,
 ) -> Result<Field<3>, Error> {
-    let placement = Placement::fit(mesh, &grid, side_length, margin)?;
+    let placement = Placement::fit(&mesh.bounding_box(), &grid, side_length, margin)?;
     bar.set_length(grid.cells() as u64);
     let distance = MeshDistance::new(&mesh.placed(&placement));
     Ok(distance.sample(grid, || bar.inc(1))?)

@@ -4,10 +4,10 @@ use std::time::Instant;
 
 use clap::Args;
 use fem::FiniteElementStep;
-use geometry::{Field, Grid};
+use geometry::{Field, Grid, UpAxis};
 use model::{Network, Ratios};
 use operators::ComputeDevice;
-use render::{Axis, Bounds, Framing, Quality, Rgb, Scene, Tube};
+use render::{Bounds, Framing, Quality, Rgb, Scene, Tube};
 use report::{Column, Figure, Format, Manifest, OutputDir, Progress, Raster, Summary, Table};
 use serde::Serialize;
 use solver::{FlowParams, NewtonParams, StepRecord};
@@ -84,7 +84,7 @@ impl SchemeOptions {
 #[derive(Clone, Copy, Debug)]
 pub struct View {
     /// The axis that points up.
-    pub up: Axis,
+    pub up: UpAxis,
     /// Degrees about it.
     pub azimuth: f64,
     /// Degrees above the horizon.

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use geometry::npy::{self, NpyError};
 use geometry::vti::{self, VtiError};
-use geometry::{Field, Grid, SignedDistance, optimal_profile, phase_field};
+use geometry::{Field, Grid, Placement, SignedDistance, optimal_profile, phase_field};
 use images::{Frame, Image, Outline, OutlineDistance, Side, Threshold};
-use surfaces::{ClosedMesh, MeshDistance, Placement};
+use surfaces::{ClosedMesh, MeshDistance};
 
 use crate::cli::{Ansatz, Holds, InputOptions, Inside, SayOptions};
 use crate::error::Error;
@@ -291,7 +291,7 @@ fn image(
         .threshold
         .map_or_else(Threshold::default, Threshold::At);
     let outline = Outline::of_image(&image, Side::of(&image, inside, threshold)?)?;
-    let placement = images::Placement::fit(&image.bounding_box(), &grid, side, 0.0)?;
+    let placement = Placement::fit(&image.bounding_box(), &grid, side, 0.0)?;
     let distance = OutlineDistance::new(&outline.placed(&placement));
     let start = Start {
         name,
@@ -311,7 +311,7 @@ fn place(
     say: SayOptions,
 ) -> Result<Start<3, Space>, Error> {
     let (grid, side) = grid::<3>(options, 64, 1.0)?;
-    let placement = Placement::fit(mesh, &grid, side, 0.0)?;
+    let placement = Placement::fit(&mesh.bounding_box(), &grid, side, 0.0)?;
     let progress = run::progress(say);
     let bar = progress.bar("signed distance", grid.cells() as u64);
     let mut distance = MeshDistance::new(&mesh.placed(&placement)).sample(grid, || bar.inc(1))?;
@@ -444,7 +444,7 @@ impl ImageFrame {
             )));
         }
         let side = Side::of(&image, images::Inside::Auto, Threshold::default())?;
-        let placement = images::Placement::fit(&image.bounding_box(), grid, self.side, 0.0)?;
+        let placement = Placement::fit(&image.bounding_box(), grid, self.side, 0.0)?;
         let outline = Outline::of_image(&image, side)?.placed(&placement);
         let mask = images::Mask::new(*grid, &OutlineDistance::new(&outline))?;
         Ok(mask.nodes().to_vec())

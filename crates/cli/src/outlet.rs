@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use geometry::measure::{perimeter, zero_set_volume};
-use geometry::{Field, npy, vti};
+use geometry::{Field, Placement, npy, vti};
 use images::{Drawing, Frame, Interface, Outline, Svg};
 use render::{Framing, Picture, Rgb, Scene};
 use runs::RunDirectory;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use surfaces::{ClosedMesh, Placement, TriangleMesh};
+use surfaces::{ClosedMesh, TriangleMesh};
 
 use crate::cli::MeshFormat;
 use crate::error::Error;
@@ -174,7 +174,7 @@ impl Space {
     }
 
     /// The coordinates of a mesh that was placed in the box.
-    pub fn of(placement: &Placement) -> Self {
+    pub fn of(placement: &Placement<3>) -> Self {
         Self {
             origin: placement.apply_inverse([0.0; 3]),
             unit: placement.scale().recip(),

@@ -10,7 +10,7 @@ use faer::{Col, Mat};
 use model::{Calibration, PlanarStep};
 
 use crate::element::{GAUSS_NODES, GAUSS_WEIGHTS};
-use crate::step::Kind;
+use crate::scheme::Kind;
 
 /// A limit that no well-posed step comes near.
 const NEWTON: usize = 40;

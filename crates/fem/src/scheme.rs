@@ -15,6 +15,16 @@ const CACHED_SYSTEMS: usize = 2;
 /// A limit that no well-posed step comes near.
 const NEWTON_LIMIT: usize = 40;
 
+/// Which step of mean curvature flow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Implicit,
+    /// The well interpolated at the nodes.
+    SemiImplicit,
+    /// The well integrated exactly.
+    SemiImplicitExact,
+}
+
 /// How much work the inner solvers did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Statistics {

@@ -9,17 +9,8 @@ use operators::SpectralFilter;
 use solver::{Accuracy, MeanCurvatureStep};
 
 use crate::ops::{FemOps, Registered};
+use crate::scheme::Kind;
 use crate::{Error, LinearSolver, Scheme, Statistics, Tolerances};
-
-/// Which step of mean curvature flow.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
-    Implicit,
-    /// The well interpolated at the nodes.
-    SemiImplicit,
-    /// The well integrated exactly.
-    SemiImplicitExact,
-}
 
 /// A finite-element step of mean curvature flow: `v[u]` of Franken, Rumpf and Wirth's nested scheme.
 ///

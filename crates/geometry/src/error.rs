@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::npy::NpyError;
-use crate::vti::VtiError;
+use crate::npy::error::NpyError;
+use crate::vti::error::VtiError;
 
 /// Errors of grids, fields, shapes and files, each with the numbers needed to act on it.
 #[derive(Debug, thiserror::Error)]
@@ -82,6 +82,44 @@ pub enum Error {
     PointOutside {
         /// The point.
         point: Vec<f64>,
+    },
+    /// What is placed is larger than the box less its margin.
+    #[error(
+        "a side length of {side_length} with a margin of {margin} on both sides does not fit the \
+         box of side {box_side}; use at most {largest}"
+    )]
+    DoesNotFit {
+        /// Requested longest side.
+        side_length: f64,
+        /// Side of the box.
+        box_side: f64,
+        /// Requested margin.
+        margin: f64,
+        /// Largest side length that fits: `box_side - 2 margin`, not below zero.
+        largest: f64,
+    },
+    /// What is not to be moved reaches beyond the box.
+    #[error(
+        "the shape spans {lower:?} to {upper:?}, beyond the box less its margin, {lowest:?} to \
+         {highest:?}; fit it to the box instead, by a side length of at most {largest}"
+    )]
+    Outside {
+        /// Lower corner of the bounding box.
+        lower: Vec<f64>,
+        /// Upper corner.
+        upper: Vec<f64>,
+        /// Lower corner of what is allowed.
+        lowest: Vec<f64>,
+        /// Upper corner.
+        highest: Vec<f64>,
+        /// The largest side length that fits after moving to the centre.
+        largest: f64,
+    },
+    /// No name of a coordinate axis.
+    #[error("{name:?} is no axis: choose x, y or z")]
+    UnknownAxis {
+        /// What was given.
+        name: String,
     },
     /// A list of named arrays is unusable.
     #[error("array name {name:?} cannot be written: {reason}")]

@@ -50,9 +50,11 @@
 mod error;
 mod field;
 mod grid;
+mod placement;
 mod profile;
 mod reduce;
 mod transfer;
+mod up;
 mod vector;
 
 pub mod contour;
@@ -68,4 +70,6 @@ pub use distance::{Rotation, SignedDistance, SignedDistanceExt};
 pub use error::Error;
 pub use field::Field;
 pub use grid::Grid;
+pub use placement::Placement;
 pub use profile::{distance_from_phase_field, optimal_profile, phase_field};
+pub use up::UpAxis;

@@ -178,6 +178,16 @@ impl<const D: usize> BoundingBox<D> {
     pub fn centre(&self) -> [f64; D] {
         std::array::from_fn(|axis| 0.5 * (self.lower[axis] + self.upper[axis]))
     }
+
+    /// Length of the longest side.
+    pub fn longest_side(&self) -> f64 {
+        self.extent().into_iter().fold(0.0, f64::max)
+    }
+
+    /// Whether the point lies in the box or on its faces.
+    pub fn contains(&self, x: [f64; D]) -> bool {
+        (0..D).all(|i| (self.lower[i]..=self.upper[i]).contains(&x[i]))
+    }
 }
 
 /// Bounding box of `{u > 0}`, or `None` if no node is inside.

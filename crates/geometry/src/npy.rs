@@ -18,10 +18,13 @@
 //! The header is parsed here and not by a general reader, so that no file, however broken, can
 //! cause more than a typed error: nothing is allocated on the word of a header.
 
+pub(crate) mod error;
+
 use std::path::Path;
 
 use crate::file::write_atomically;
 use crate::{Error, Field, Grid};
+pub use error::NpyError;
 
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
 /// Longest header, in bytes; version 1.0 of the format allows no more.
@@ -30,75 +33,6 @@ const LONGEST_HEADER: usize = u16::MAX as usize;
 const MOST_AXES: usize = 64;
 /// The header is padded so that the data start at a multiple of this.
 const ALIGNMENT: usize = 64;
-
-/// What is wrong with an NPY file.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum NpyError {
-    /// The magic bytes are missing.
-    #[error("this is not an NPY file (it does not begin with \\x93NUMPY)")]
-    NotNpy,
-    /// A version of the format that does not exist yet.
-    #[error("NPY format {major}.{minor} is not supported; use 1.0, 2.0 or 3.0")]
-    Version {
-        /// Major version.
-        major: u8,
-        /// Minor version.
-        minor: u8,
-    },
-    /// The header is longer than that of any array.
-    #[error("the header has {length} bytes, and may have {limit}")]
-    HeaderLength {
-        /// Its bytes.
-        length: usize,
-        /// How many it may have.
-        limit: usize,
-    },
-    /// The header is not the dictionary that the format prescribes.
-    #[error("the header is malformed at byte {position} of its text: expected {expected}")]
-    Header {
-        /// Where parsing stopped.
-        position: usize,
-        /// What should have come.
-        expected: &'static str,
-    },
-    /// The element type is not a floating-point number of 4 or 8 bytes.
-    #[error("elements have type {found}; save the array as float64 (float32 is accepted too)")]
-    DataType {
-        /// The type as written in the header, shortened.
-        found: String,
-    },
-    /// The array has the wrong number of axes.
-    #[error("the array has shape {shape:?}, but {expected} axes are needed")]
-    Rank {
-        /// Axes needed.
-        expected: usize,
-        /// Shape found.
-        shape: Vec<u64>,
-    },
-    /// The sides of the array differ.
-    #[error("the array has shape {shape:?}, but all its sides must be equal")]
-    NotCubical {
-        /// Shape found.
-        shape: Vec<u64>,
-    },
-    /// The file ends early, or goes on after the data.
-    #[error("the file has {found} bytes where {expected} are needed: truncated, or not one array")]
-    Length {
-        /// Bytes according to the header; saturates at `u64::MAX`.
-        expected: u64,
-        /// Bytes found.
-        found: u64,
-    },
-    /// A value is NaN or infinite.
-    #[error("element {index} (row-major) is {value}; all values must be finite")]
-    NonFinite {
-        /// Row-major index of the first one.
-        index: usize,
-        /// Its value.
-        value: f64,
-    },
-}
 
 /// Writes a field, atomically (see [`write_atomically`]).
 ///

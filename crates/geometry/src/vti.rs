@@ -19,10 +19,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub(crate) mod error;
 mod read;
 mod stream;
 
-pub use read::{Image, VtiError, decode, read};
+pub use error::VtiError;
+pub use read::{Image, decode, read};
 
 use std::collections::HashSet;
 use std::fmt::Write as _;

@@ -6,10 +6,9 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use geometry::shapes::Ball;
-use geometry::{Grid, phase_field};
+use geometry::{Grid, Placement, phase_field};
 use images::{
-    Drawing, Frame, Inside, Interface, Mask, Outline, OutlineDistance, Placement, Side, Svg,
-    Threshold, read,
+    Drawing, Frame, Inside, Interface, Mask, Outline, OutlineDistance, Side, Svg, Threshold, read,
 };
 use render::Rgb;
 

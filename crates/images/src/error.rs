@@ -2,8 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::read::FormatError;
-use crate::selection::Side;
+use crate::read::error::FormatError;
 
 /// Errors of images, outlines, placement and drawings, each with the numbers needed to act on it.
 #[derive(Debug, thiserror::Error)]
@@ -65,7 +64,7 @@ pub enum Error {
     )]
     NothingInside {
         /// The side, with its threshold.
-        side: Side,
+        side: String,
         /// What is compared with the threshold.
         quantity: &'static str,
         /// Its least value.
@@ -80,7 +79,7 @@ pub enum Error {
     )]
     EverythingInside {
         /// The side, with its threshold.
-        side: Side,
+        side: String,
         /// What is compared with the threshold.
         quantity: &'static str,
         /// Its least value.
@@ -140,21 +139,6 @@ pub enum Error {
         position: [f64; 2],
         /// Largest magnitude.
         limit: f64,
-    },
-    /// What is placed is larger than the box less its margin.
-    #[error(
-        "a side length of {side_length} with a margin of {margin} on both sides does not fit the \
-         box of side {box_side}; use at most {largest}"
-    )]
-    DoesNotFit {
-        /// Requested longest side.
-        side_length: f64,
-        /// Side of the box.
-        box_side: f64,
-        /// Requested margin.
-        margin: f64,
-        /// Largest side length that fits.
-        largest: f64,
     },
     /// A region that contains no node.
     #[error(

@@ -1,9 +1,9 @@
 //! Which part of the plane a drawing shows, and how large its pixels are.
 
-use geometry::Grid;
+use geometry::{Grid, Placement};
 
 use crate::error::{positive, require};
-use crate::{Error, Image, Placement};
+use crate::{Error, Image};
 
 /// A raster of square pixels in the plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +52,7 @@ impl Frame {
     ///
     /// # Errors
     /// As [`Frame::new`].
-    pub fn of_image(image: &Image, placement: &Placement) -> Result<Self, Error> {
+    pub fn of_image(image: &Image, placement: &Placement<2>) -> Result<Self, Error> {
         let corner = placement.apply([0.0, f64::from(image.height())]);
         Self::new(image.width(), image.height(), corner, placement.scale())
     }

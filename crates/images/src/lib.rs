@@ -1,9 +1,9 @@
 //! Images in and out of phase fields: PNG and JPEG files, outlines, signed distances, drawings.
 //!
 //! ```
-//! use geometry::{Grid, phase_field};
+//! use geometry::{Grid, Placement, phase_field};
 //! use images::{
-//!     Drawing, Frame, Inside, Interface, Outline, OutlineDistance, Placement, Side, Svg, Threshold,
+//!     Drawing, Frame, Inside, Interface, Outline, OutlineDistance, Side, Svg, Threshold,
 //!     read,
 //! };
 //! use render::Rgb;
@@ -53,7 +53,8 @@
 //! # Conventions
 //!
 //! - Pixels are stored row by row from the top. In the plane the second axis points upwards: the
-//!   image fills `[0, width] x [0, height]` until a [`Placement`] puts it into the box of a grid.
+//!   image fills `[0, width] x [0, height]` until a [`geometry::Placement`] puts it into the box of a
+//!   grid.
 //! - Grey values are compared and mixed as they are stored (sRGB), because edges are blended so by
 //!   drawing programs. A pixel half covered by black on white has the value 0.5.
 //! - Distances are negative inside, phase fields positive. Curves have the inside on their left.
@@ -70,7 +71,6 @@ mod image;
 mod interface;
 mod mask;
 mod outline;
-mod placement;
 mod read;
 mod selection;
 mod svg;
@@ -83,7 +83,7 @@ pub use image::{Image, LARGEST_IMAGE};
 pub use interface::Interface;
 pub use mask::Mask;
 pub use outline::{LARGEST_OUTLINE, Outline};
-pub use placement::Placement;
-pub use read::{FormatError, decode, read};
+pub use read::error::FormatError;
+pub use read::{decode, read};
 pub use selection::{Inside, Side, Threshold};
 pub use svg::Svg;

@@ -1,11 +1,11 @@
 //! Closed curves around a shape.
 
-use geometry::Field;
 use geometry::contour::{Interpolation, Polyline, zero_level_of};
 use geometry::measure::BoundingBox;
+use geometry::{Field, Placement};
 use rayon::prelude::*;
 
-use crate::{Error, Image, Placement, Side};
+use crate::{Error, Image, Side};
 
 /// Largest number of segments of the outline of an image, `2^22`.
 pub const LARGEST_OUTLINE: usize = 1 << 22;
@@ -82,14 +82,14 @@ impl Outline {
             let quantity = side.quantity();
             return Err(if inside == 0 {
                 Error::NothingInside {
-                    side,
+                    side: side.to_string(),
                     quantity,
                     low,
                     high,
                 }
             } else {
                 Error::EverythingInside {
-                    side,
+                    side: side.to_string(),
                     quantity,
                     low,
                     high,
@@ -190,7 +190,7 @@ impl Outline {
 
     /// The outline in the box of a grid.
     #[must_use]
-    pub fn placed(&self, placement: &Placement) -> Self {
+    pub fn placed(&self, placement: &Placement<2>) -> Self {
         let placed = |curve: &Polyline| Polyline {
             points: curve.points.iter().map(|&x| placement.apply(x)).collect(),
             closed: curve.closed,

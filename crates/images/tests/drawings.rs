@@ -7,10 +7,10 @@ use std::fs;
 
 use crate::common::{Raster, disc, near, square};
 use geometry::shapes::{Ball, Cuboid};
-use geometry::{Field, Grid, Rotation, SignedDistance, SignedDistanceExt, phase_field};
+use geometry::{Field, Grid, Placement, Rotation, SignedDistance, SignedDistanceExt, phase_field};
 use images::{
-    Drawing, Frame, Image, Inside, Interface, Outline, OutlineDistance, Placement, Side, Svg,
-    Threshold, decode,
+    Drawing, Frame, Image, Inside, Interface, Outline, OutlineDistance, Side, Svg, Threshold,
+    decode,
 };
 use render::{Picture, Rgb};
 

@@ -7,10 +7,11 @@ use std::f64::consts::PI;
 use crate::common::{Raster, disc, jpeg, near, square};
 use geometry::contour::Polyline;
 use geometry::shapes::{Ball, Cuboid};
-use geometry::{Field, Grid, Rotation, SignedDistance, SignedDistanceExt, optimal_profile};
+use geometry::{
+    Field, Grid, Placement, Rotation, SignedDistance, SignedDistanceExt, optimal_profile,
+};
 use images::{
-    Error, Image, Inside, Interface, Mask, Outline, OutlineDistance, Placement, Side, Threshold,
-    decode,
+    Error, Image, Inside, Interface, Mask, Outline, OutlineDistance, Side, Threshold, decode,
 };
 use proptest::prelude::*;
 
@@ -431,7 +432,7 @@ fn placement_and_its_inverse() {
     );
     assert_eq!(
         message(0.0, 0.2),
-        "side length = 0 is not allowed: it must be finite and positive"
+        "side length = 0.0 is not allowed: it must be finite and positive"
     );
     assert_eq!(
         message(1.0, -0.2),
@@ -446,7 +447,7 @@ fn placement_and_its_inverse() {
         Placement::fit(&point, &grid, 1.0, 0.0)
             .unwrap_err()
             .to_string(),
-        "longest side of the rectangle = 0 is not allowed: it must be finite and positive"
+        "longest side of the bounding box = 0.0 is not allowed: it must be finite and positive"
     );
 }
 

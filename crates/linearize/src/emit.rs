@@ -14,7 +14,6 @@ use burn::backend::ir::{
 use burn::tensor::{DType, Shape, Slice};
 
 use crate::ir::{detach_outputs, each_tensor, like, output, read_only, tensor};
-use crate::precision;
 
 /// A tensor all of whose elements are `factor` times the one element of `scalar` (one if absent).
 #[derive(Clone)]
@@ -152,7 +151,6 @@ impl Emitter {
             OperationIr::BaseFloat(Base::Cast(c)) if c.input.dtype == c.out.dtype => {
                 Some(c.input.clone())
             }
-            OperationIr::Activation(op) => precision::lower(self, op),
             _ => None,
         };
         match one {

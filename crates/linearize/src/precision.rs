@@ -31,9 +31,19 @@ pub(crate) fn restore_reciprocals(operations: &mut [OperationIr]) {
     }
 }
 
+/// [`Emitter::simplify`], with activations that lose digits lowered.
+pub(crate) fn simplify(emitter: &mut Emitter, operation: OperationIr) -> Vec<TensorIr> {
+    if let OperationIr::Activation(activation) = &operation
+        && let Some(output) = lower(emitter, activation)
+    {
+        return vec![output];
+    }
+    emitter.simplify(operation)
+}
+
 /// Some backends compute sigmoids in single precision, and the derivative of `gelu` from another
 /// function that is only close to it. Write both in elementary functions, which are exact.
-pub(crate) fn lower(emitter: &mut Emitter, operation: &Act) -> Option<TensorIr> {
+fn lower(emitter: &mut Emitter, operation: &Act) -> Option<TensorIr> {
     match operation {
         Act::Sigmoid(u) => {
             let negated = emitter.neg(&u.input);

@@ -7,7 +7,7 @@ use burn::backend::ir::{
     BaseOperationIr as Base, NumericOperationIr as Num, OperationIr, TensorId, TensorIr,
     TensorStatus,
 };
-use burn::tensor::{DType, Device, TensorData};
+use burn::tensor::{DType, TensorData};
 
 use crate::conversion::Conversion;
 use crate::emit::Emitter;
@@ -15,7 +15,7 @@ use crate::fusion::fuse;
 use crate::ir::{Line, detach_outputs, each_tensor, name, read_only, rename, with_status};
 use crate::rules::{self, Context};
 use crate::tangent::{Builder, Expression};
-use crate::{Error, Extensions, Graph, Linearization};
+use crate::{Error, Extensions, Graph, precision};
 
 /// Programs ready to run: constants (once), value, primal (once per point), tangent (once per
 /// direction).
@@ -50,11 +50,11 @@ pub(crate) struct Block {
 /// How many operations of which name each program runs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Statistics {
-    /// Run by [`value`](Linearization::value).
+    /// Run by [`value`](crate::Linearization::value).
     pub value: BTreeMap<String, usize>,
-    /// Run by [`at`](Linearization::at).
+    /// Run by [`at`](crate::Linearization::at).
     pub primal: BTreeMap<String, usize>,
-    /// Run by [`apply`](Linearization::apply).
+    /// Run by [`apply`](crate::Linearization::apply).
     pub tangent: BTreeMap<String, usize>,
     /// Number of tensors that `at` keeps for `apply`.
     pub saved: usize,
@@ -63,15 +63,6 @@ pub struct Statistics {
 }
 
 impl Program {
-    /// Load the programs onto a device.
-    ///
-    /// # Errors
-    /// [`Error::NoHandler`] if a custom operation has no handler on the device's backend,
-    /// [`Error::Device`] if that backend is not compiled in.
-    pub fn on(&self, device: &Device, extensions: &Extensions) -> Result<Linearization, Error> {
-        Linearization::new(self, device, extensions)
-    }
-
     /// Operation counts.
     pub fn statistics(&self) -> Statistics {
         Statistics {
@@ -169,7 +160,9 @@ fn simplify(graph: &Graph) -> Simplified {
         &graph.operations,
         graph.outputs.iter().chain([&graph.value]),
     ) {
-        replay(&mut map, operation, |operation| emitter.simplify(operation));
+        replay(&mut map, operation, |operation| {
+            precision::simplify(&mut emitter, operation)
+        });
     }
     let value = map[&graph.value.id].clone();
     let outputs: Vec<TensorIr> = graph.outputs.iter().map(|t| map[&t.id].clone()).collect();
@@ -221,8 +214,29 @@ fn live<'a, 'b>(
         .filter_map(|(operation, keep)| keep.then_some(operation))
 }
 
+impl Graph {
+    /// Transform the graph into a primal and a tangent program.
+    ///
+    /// # Errors
+    /// [`Error::NoRule`] if a tangent reaches an operation that cannot be differentiated.
+    pub fn linearize(&self, extensions: &Extensions) -> Result<Program, Error> {
+        linearize(self, extensions, None)
+    }
+
+    /// As [`linearize`](Self::linearize), with products in the float type `products`: values and gradients keep the type they were
+    /// traced with; what [`at`](crate::Linearization::at) keeps is converted once per point, and
+    /// [`apply`](crate::Linearization::apply) takes and returns tensors of the other type. Products in single precision cost half
+    /// as much, and inexact Newton methods do not need more.
+    ///
+    /// # Errors
+    /// [`Error::NoRule`] if a tangent reaches an operation that cannot be differentiated.
+    pub fn linearize_in(&self, extensions: &Extensions, products: DType) -> Result<Program, Error> {
+        linearize(self, extensions, Some(products))
+    }
+}
+
 /// `products`: the float type of the tangent program, if not that of the graph.
-pub(crate) fn linearize(
+fn linearize(
     graph: &Graph,
     extensions: &Extensions,
     products: Option<DType>,
@@ -594,7 +608,7 @@ mod tests {
     use crate::ir::tensor;
     use TensorStatus::{ReadOnly, ReadWrite};
     use burn::backend::ir::{BinaryOpIr, UnaryOpIr};
-    use burn::tensor::Shape;
+    use burn::tensor::{Device, Shape};
 
     fn t(id: u64) -> TensorIr {
         tensor(id, Shape::from([2, 2]), DType::F64)

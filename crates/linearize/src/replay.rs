@@ -57,12 +57,19 @@ macro_rules! on_backend {
     };
 }
 
+impl Program {
+    /// Load the programs onto a device.
+    ///
+    /// # Errors
+    /// [`Error::NoHandler`] if a custom operation has no handler on the device's backend,
+    /// [`Error::Device`] if that backend is not compiled in.
+    pub fn on(&self, device: &Device, extensions: &Extensions) -> Result<Linearization, Error> {
+        Linearization::new(self, device, extensions)
+    }
+}
+
 impl Linearization {
-    pub(crate) fn new(
-        program: &Program,
-        device: &Device,
-        extensions: &Extensions,
-    ) -> Result<Self, Error> {
+    fn new(program: &Program, device: &Device, extensions: &Extensions) -> Result<Self, Error> {
         let program = &if extensions.fuses_on(device) {
             program.fused()
         } else {

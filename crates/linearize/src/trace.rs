@@ -22,7 +22,7 @@ use burn::tensor::{DType, Device, FloatDType, Shape, Tensor, TensorData};
 use burn_router::{RouterClient, RouterTensor};
 
 use crate::ir::{Line, each_tensor, tensor};
-use crate::{Error, Extensions, Program, Value, precision, program};
+use crate::{Error, Value, precision};
 
 type Tracked = Autodiff<Capture>;
 type Symbol = FloatTensor<Capture>;
@@ -162,25 +162,6 @@ impl Graph {
             let outputs = tracked.iter().map(|t| t.grad(&gradients)).collect();
             Ok((value, outputs))
         })
-    }
-
-    /// Transform the graph into a primal and a tangent program.
-    ///
-    /// # Errors
-    /// [`Error::NoRule`] if a tangent reaches an operation that cannot be differentiated.
-    pub fn linearize(&self, extensions: &Extensions) -> Result<Program, Error> {
-        program::linearize(self, extensions, None)
-    }
-
-    /// As [`linearize`](Self::linearize), with products in the float type `products`: values and gradients keep the type they were
-    /// traced with; what [`at`](crate::Linearization::at) keeps is converted once per point, and
-    /// [`apply`](crate::Linearization::apply) takes and returns tensors of the other type. Products in single precision cost half
-    /// as much, and inexact Newton methods do not need more.
-    ///
-    /// # Errors
-    /// [`Error::NoRule`] if a tangent reaches an operation that cannot be differentiated.
-    pub fn linearize_in(&self, extensions: &Extensions, products: DType) -> Result<Program, Error> {
-        program::linearize(self, extensions, Some(products))
     }
 
     /// Number of recorded operations.

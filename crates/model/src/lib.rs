@@ -51,12 +51,14 @@ mod network;
 mod operator;
 pub mod pretrained;
 mod quality;
+mod ratios;
 mod store;
 pub mod training;
 
 pub use calibration::{Calibration, Factors, PlanarStep, calibrate, normals};
 pub use error::Error;
 pub use mlp::{Mlp, PAPER_LAYERS, TABLE, forward, parameter_count};
-pub use network::{Network, Provenance, Ratios};
+pub use network::{Network, Provenance};
 pub use operator::MeanCurvatureOperator;
 pub use quality::{Quality, REFERENCE_RADII, displacement_errors};
+pub use ratios::Ratios;

@@ -5,18 +5,10 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 
-use crate::fft::{Real, Transform, lock};
+use crate::fft::{CachedSymbol, Real, Transform, lock};
 
 /// Symbols of this many (kernel, grid) pairs are kept; a flow uses one, training one per batch.
 const CACHED_SYMBOLS: usize = 16;
-
-/// The spectrum of a kernel on a grid, normalised, with the data it was made from.
-pub struct CachedSymbol<T: Real> {
-    shape: Vec<usize>,
-    width: usize,
-    kernel: Vec<T>,
-    symbol: Arc<Vec<Complex<T>>>,
-}
 
 /// `F[K]` such that `K*u = F^-1[symbol F[u]]` with [`Transform::filter`], including its normalisation.
 ///

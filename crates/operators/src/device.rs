@@ -78,7 +78,7 @@ impl FromStr for DeviceKind {
     }
 }
 
-fn compiled_names() -> String {
+pub(crate) fn compiled_names() -> String {
     DeviceKind::compiled()
         .map(DeviceKind::name)
         .collect::<Vec<_>>()
@@ -94,47 +94,8 @@ pub struct ComputeDevice {
 }
 
 impl ComputeDevice {
-    /// Opens a device. A GPU is compared with the CPU first, on operations that drivers and tuned kernels have been
-    /// seen to get wrong.
-    ///
-    /// # Errors
-    /// [`Error::NotCompiled`], [`Error::Unavailable`] without a usable adapter, [`Error::WrongArithmetic`].
-    pub fn open(kind: DeviceKind) -> Result<Self, Error> {
-        match kind {
-            #[cfg(feature = "flex")]
-            DeviceKind::Flex => Ok(Self::cpu(kind, Device::flex())),
-            #[cfg(feature = "ndarray")]
-            DeviceKind::NdArray => Ok(Self::cpu(kind, Device::ndarray())),
-            #[cfg(feature = "wgpu")]
-            DeviceKind::Wgpu => crate::device_check::open_gpu(kind, || {
-                Device::wgpu(burn::tensor::DeviceKind::DefaultDevice)
-            }),
-            #[cfg(feature = "cuda")]
-            DeviceKind::Cuda => crate::device_check::open_gpu(kind, || Device::cuda(0)),
-            #[allow(unreachable_patterns)] // reachable unless every backend is compiled in
-            _ => Err(Error::NotCompiled {
-                name: kind.name(),
-                compiled: compiled_names(),
-            }),
-        }
-    }
-
-    /// The first device compiled in: `flex` unless default features are off.
-    ///
-    /// # Errors
-    /// As [`Self::open`]; [`Error::UnknownDevice`] if no backend was compiled in at all.
-    pub fn default_compiled() -> Result<Self, Error> {
-        let kind = DeviceKind::compiled()
-            .next()
-            .ok_or_else(|| Error::UnknownDevice {
-                name: "default".to_owned(),
-                compiled: "no backend".to_owned(),
-            })?;
-        Self::open(kind)
-    }
-
     #[cfg(any(feature = "flex", feature = "ndarray"))]
-    fn cpu(kind: DeviceKind, device: Device) -> Self {
+    pub(crate) fn cpu(kind: DeviceKind, device: Device) -> Self {
         Self {
             kind,
             device,

@@ -34,7 +34,15 @@ pub trait Real: FftNum + Float + bytemuck::Pod + Default {
 /// Plans by grid shape, and the symbols of the kernels used last.
 pub struct Shared<T: Real> {
     plans: Mutex<HashMap<Vec<usize>, Arc<Transform<T>>>>,
-    pub(crate) symbols: Mutex<Vec<crate::convolution::CachedSymbol<T>>>,
+    pub(crate) symbols: Mutex<Vec<CachedSymbol<T>>>,
+}
+
+/// The spectrum of a kernel on a grid, normalised, with the data it was made from.
+pub(crate) struct CachedSymbol<T: Real> {
+    pub shape: Vec<usize>,
+    pub width: usize,
+    pub kernel: Vec<T>,
+    pub symbol: Arc<Vec<Complex<T>>>,
 }
 
 macro_rules! real {

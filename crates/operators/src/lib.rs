@@ -55,6 +55,7 @@ mod fft;
 mod filter;
 #[macro_use]
 mod host;
+mod open;
 mod ops;
 mod profile;
 mod rules;

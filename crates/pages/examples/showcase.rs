@@ -4,9 +4,9 @@ use std::error::Error;
 use std::time::Duration;
 
 use geometry::shapes::{Ball, Torus};
-use geometry::{Field, Grid, SignedDistance, SignedDistanceExt, phase_field};
+use geometry::{Field, Grid, SignedDistance, SignedDistanceExt, UpAxis, phase_field};
 use pages::{Details, Facts, Figure, Frames, Image, Page, Section, Table, Text, View, Viewer};
-use render::{Axis, Framing, Picture, Scene};
+use render::{Framing, Picture, Scene};
 use surfaces::{TriangleMesh, phase_field_surface, samples};
 
 /// A picture of a field and its surface.
@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let figure = samples::figure(64)?;
     let distance = surfaces::MeshDistance::new(&figure).sample(Grid::centred(64, 1.0)?, || ())?;
     let view = View {
-        up: Axis::Y,
+        up: UpAxis::Y,
         azimuth: 205.0,
         elevation: 10.0,
     };

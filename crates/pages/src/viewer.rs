@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use render::Axis;
+use geometry::UpAxis;
 use surfaces::TriangleMesh;
 
 use crate::error::{Error, Result};
@@ -14,7 +14,7 @@ use crate::surface::Surface;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     /// The axis that points up.
-    pub up: Axis,
+    pub up: UpAxis,
     /// Degrees about it.
     pub azimuth: f64,
     /// Degrees above the horizon, from -90 to 90.
@@ -109,11 +109,7 @@ impl Viewer {
 
     pub(crate) fn html(&self) -> String {
         let caption = escaped(&self.caption);
-        let up = match self.view.up {
-            Axis::X => 0,
-            Axis::Y => 1,
-            Axis::Z => 2,
-        };
+        let up = self.view.up.index();
         let mut html = format!(
             "<figure class=\"viewer\" data-caption=\"{caption}\" data-up=\"{up}\" \
              data-azimuth=\"{}\" data-elevation=\"{}\" data-centre=\"{}\" \

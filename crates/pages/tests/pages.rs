@@ -1,7 +1,7 @@
 //! Pages as a whole: what is in them, and what is not.
 
 use geometry::shapes::Ball;
-use geometry::{Grid, phase_field};
+use geometry::{Grid, UpAxis, phase_field};
 use pages::{
     Details, Error, Facts, Figure, Frames, Image, Page, Section, Table, Text, View, Viewer,
 };
@@ -163,6 +163,21 @@ fn pages_are_written_whole_or_an_error_names_them() {
         message.contains("such") && !message.contains('\n'),
         "{message}"
     );
+}
+
+#[test]
+fn viewers_turn_about_the_axis_that_points_up() {
+    for up in UpAxis::ALL {
+        let view = View {
+            up,
+            ..View::default()
+        };
+        let viewer = Viewer::new("ball", picture(), view, [("0", &ball())]).unwrap();
+        let html = Page::new("page")
+            .with(Section::new("s").with(viewer))
+            .to_html();
+        assert!(html.contains(&format!("data-up=\"{}\"", up.index())));
+    }
 }
 
 #[test]

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use geometry::shapes::{Ball, Cross, RoundedBox, Torus};
-use geometry::{Field, Grid, SignedDistance, SignedDistanceExt, phase_field};
-use render::{Axis, Background, Framing, Picture, Rgb, Scene, Tube};
+use geometry::{Field, Grid, SignedDistance, SignedDistanceExt, UpAxis, phase_field};
+use render::{Background, Framing, Picture, Rgb, Scene, Tube};
 
 /// A union of balls of several sizes about the middle of the box.
 fn knobbly() -> impl SignedDistance<3> {
@@ -97,7 +97,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     draw("knobbly", &scene, square)?;
     let cross = field(&Cross::new(0.36, 0.12)?.translated(middle))?;
     let scene = Scene::new(&cross, eps)?
-        .up(Axis::Y)
+        .up(UpAxis::Y)
         .orthographic()
         .background(Background::Transparent)
         .ground_shadow(0.6);

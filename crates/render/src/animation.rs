@@ -6,6 +6,7 @@ use std::time::Duration;
 use geometry::file::write_atomically;
 
 use crate::error::require;
+use crate::picture::encode_png;
 use crate::{Error, Picture};
 
 /// Pictures shown one after the other, for ever, as an animated PNG (APNG).
@@ -57,7 +58,7 @@ impl Animation {
     /// # Errors
     /// [`Error::Encode`].
     pub fn to_apng(&self) -> Result<Vec<u8>, Error> {
-        encode(&self.frames, Some(self.delay))
+        encode_png(&self.frames, Some(self.delay))
     }
 
     /// Writes an APNG file, atomically (see [`write_atomically`]).
@@ -68,43 +69,4 @@ impl Animation {
         let bytes = self.to_apng()?;
         Ok(write_atomically(path, |out| out.write_all(&bytes))?)
     }
-}
-
-/// A PNG file of the first picture or, with a delay, of all. Opaque pictures are stored without
-/// opacity.
-pub(crate) fn encode(frames: &[Picture], delay: Option<Duration>) -> Result<Vec<u8>, Error> {
-    let opaque = frames
-        .iter()
-        .all(|f| f.pixels().iter().all(|p| p[3] == 255));
-    let (colour, channels) = if opaque {
-        (png::ColorType::Rgb, 3)
-    } else {
-        (png::ColorType::Rgba, 4)
-    };
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, frames[0].width(), frames[0].height());
-    encoder.set_color(colour);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-    if let Some(delay) = delay {
-        encoder.set_animated(frames.len() as u32, 0)?;
-        encoder.set_frame_delay(delay.as_secs_f64().mul_add(1e3, 0.5) as u16, 1000)?;
-    }
-    let mut writer = encoder.write_header()?;
-    let shown = if delay.is_some() {
-        frames
-    } else {
-        &frames[..1]
-    };
-    for frame in shown {
-        let data: Vec<u8> = frame
-            .pixels()
-            .iter()
-            .flat_map(|pixel| &pixel[..channels])
-            .copied()
-            .collect();
-        writer.write_image_data(&data)?;
-    }
-    writer.finish()?;
-    Ok(bytes)
 }

@@ -1,30 +1,10 @@
 //! Where a picture is taken from, and what it shows.
 
+use geometry::UpAxis;
 use glam::DVec3;
 
 use crate::Error;
 use crate::error::require;
-
-/// A coordinate axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Axis {
-    /// Axis 0.
-    X,
-    /// Axis 1.
-    Y,
-    /// Axis 2.
-    #[default]
-    Z,
-}
-
-impl Axis {
-    /// The axis and the two that follow it cyclically: right-handed.
-    fn frame(self) -> [DVec3; 3] {
-        let axes = DVec3::AXES;
-        let k = self as usize;
-        [axes[k], axes[(k + 1) % 3], axes[(k + 2) % 3]]
-    }
-}
 
 /// How depth is shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,7 +96,7 @@ pub enum Framing {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// The axis that points up in the picture.
-    pub up: Axis,
+    pub up: UpAxis,
     /// Degrees about the upward axis.
     pub azimuth: f64,
     /// Degrees above the horizon, from -90 to 90.
@@ -133,7 +113,7 @@ impl Default for Camera {
     /// From the front right and a little above, in a mild perspective, `z` pointing up.
     fn default() -> Self {
         Self {
-            up: Axis::Z,
+            up: UpAxis::default(),
             azimuth: 35.0,
             elevation: 22.0,
             projection: Projection::Perspective {
@@ -240,7 +220,7 @@ impl Camera {
     /// The directions of the view.
     pub(crate) fn orientation(&self) -> Result<Orientation, Error> {
         self.check()?;
-        let [up, a, b] = self.up.frame();
+        let [up, a, b] = [0, 1, 2].map(|k| DVec3::AXES[(self.up.index() + k) % 3]);
         let (sin_az, cos_az) = self.azimuth.to_radians().sin_cos();
         let (sin_el, cos_el) = self.elevation.to_radians().sin_cos();
         let horizontal = cos_az * a + sin_az * b;

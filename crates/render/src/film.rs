@@ -13,7 +13,6 @@ use crate::camera::{Ray, View};
 use crate::light::{Lights, Material};
 use crate::picture::{Light, Picture};
 use crate::sampling::{disc, frame, r2};
-use crate::scene::Quality;
 use crate::tube::Tubes;
 use crate::volume::Volume;
 
@@ -24,6 +23,29 @@ const PATTERNS: usize = TILE * TILE;
 /// Rays of light start this far from the surface, in cells: further than the two interpolants of
 /// the distance differ.
 const OFFSET: f64 = 0.2;
+
+/// How many rays are spent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Quality {
+    /// For tests and previews.
+    Draft,
+    /// For figures.
+    #[default]
+    Standard,
+    /// For large prints: several times slower.
+    Fine,
+}
+
+impl Quality {
+    /// Rays to the surroundings and to the key light, for each pixel.
+    fn rays(self) -> (usize, usize) {
+        match self {
+            Self::Draft => (8, 4),
+            Self::Standard => (24, 12),
+            Self::Fine => (96, 48),
+        }
+    }
+}
 
 /// What a ray meets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -53,7 +53,6 @@
 
 mod animation;
 mod camera;
-mod colour;
 mod emptiness;
 mod error;
 mod film;
@@ -66,10 +65,11 @@ mod tube;
 mod volume;
 
 pub use animation::Animation;
-pub use camera::{Axis, Bounds, Camera, Framing, Projection};
-pub use colour::Rgb;
+pub use camera::{Bounds, Camera, Framing, Projection};
 pub use error::Error;
+pub use film::Quality;
 pub use light::{Lighting, Material};
 pub use picture::{LARGEST_SIDE, Picture};
-pub use scene::{Background, Quality, Scene, Size};
+pub use scene::{Background, Scene, Size};
+pub use srgb::Rgb;
 pub use tube::Tube;

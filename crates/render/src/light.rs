@@ -3,10 +3,10 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
+use srgb::Rgb;
 
 use crate::Error;
 use crate::camera::Orientation;
-use crate::colour::Rgb;
 use crate::error::{fraction, require};
 
 /// What the surface is made of: a matte body colour under a faint gloss.

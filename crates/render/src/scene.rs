@@ -3,13 +3,13 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use geometry::{Field, SignedDistance, distance_from_phase_field};
+use geometry::{Field, SignedDistance, UpAxis, distance_from_phase_field};
 use glam::DVec3;
+use srgb::Rgb;
 
-use crate::camera::{Axis, Bounds, Camera, Framing, Projection, Subject};
-use crate::colour::Rgb;
+use crate::camera::{Bounds, Camera, Framing, Projection, Subject};
 use crate::error::{fraction, require};
-use crate::film::{Film, GroundPlane};
+use crate::film::{Film, GroundPlane, Quality};
 use crate::light::{Lighting, Lights, Material};
 use crate::picture::{Light, Picture, checked};
 use crate::tube::{Tube, Tubes};
@@ -31,29 +31,6 @@ pub enum Background {
     Transparent,
     /// One colour.
     Colour(Rgb),
-}
-
-/// How many rays are spent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Quality {
-    /// For tests and previews.
-    Draft,
-    /// For figures.
-    #[default]
-    Standard,
-    /// For large prints: several times slower.
-    Fine,
-}
-
-impl Quality {
-    /// Rays to the surroundings and to the key light, for each pixel.
-    pub(crate) fn rays(self) -> (usize, usize) {
-        match self {
-            Self::Draft => (8, 4),
-            Self::Standard => (24, 12),
-            Self::Fine => (96, 48),
-        }
-    }
 }
 
 /// A side of a square picture, or width and height, in pixels.
@@ -157,7 +134,7 @@ impl<'a> Scene<'a> {
 
     /// Sets the axis that points up.
     #[must_use]
-    pub fn up(mut self, axis: Axis) -> Self {
+    pub fn up(mut self, axis: UpAxis) -> Self {
         self.camera.up = axis;
         self
     }

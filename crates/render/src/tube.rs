@@ -1,10 +1,10 @@
 //! Tubes along polylines.
 
 use glam::DVec3;
+use srgb::Rgb;
 
 use crate::Error;
 use crate::camera::Ray;
-use crate::colour::Rgb;
 use crate::error::require;
 use crate::volume::Lattice;
 

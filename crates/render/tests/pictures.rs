@@ -4,12 +4,12 @@ use std::f64::consts::PI;
 use std::time::Duration;
 
 use geometry::shapes::{Ball, Cross, HalfSpace, RoundedBox};
-use geometry::{Field, Grid, SignedDistance, SignedDistanceExt, phase_field};
+use geometry::{Field, Grid, SignedDistance, SignedDistanceExt, UpAxis, phase_field};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use render::{
-    Animation, Axis, Background, Bounds, Camera, Error, Framing, Lighting, Picture, Quality, Rgb,
-    Scene, Tube,
+    Animation, Background, Bounds, Camera, Error, Framing, Lighting, Picture, Quality, Rgb, Scene,
+    Tube,
 };
 
 const EPS: f64 = 2.0 / 64.0;
@@ -67,7 +67,7 @@ fn the_outline_of_a_ball_is_a_disc_of_the_right_size_and_place() {
         assert!((place[k] - expected[k]).abs() < 0.1, "{place:?}");
     }
     // From +z, y pointing up: from +x to the right.
-    let (_, place) = silhouette(&view.clone().up(Axis::Y).render(160).unwrap());
+    let (_, place) = silhouette(&view.clone().up(UpAxis::Y).render(160).unwrap());
     let expected = [160.0 * 0.6, 160.0 * 0.58];
     for k in 0..2 {
         assert!((place[k] - expected[k]).abs() < 0.1, "{place:?}");
@@ -372,6 +372,41 @@ fn mirrored_scenes_give_mirrored_pictures() {
     }
     let mean = total as f64 / f64::from(4 * 120 * 120);
     assert!(mean < 0.5, "{mean} levels");
+}
+
+/// A shape turned so that its axis `up` becomes the third one.
+struct Upright<'a> {
+    shape: &'a dyn SignedDistance<3>,
+    up: UpAxis,
+}
+
+impl SignedDistance<3> for Upright<'_> {
+    fn signed_distance(&self, x: [f64; 3]) -> f64 {
+        let mut turned = x;
+        turned.rotate_left(2 - self.up.index());
+        self.shape.signed_distance(turned)
+    }
+}
+
+#[test]
+fn a_shape_seen_with_any_axis_up_is_the_turned_shape_seen_with_the_third_up() {
+    let shape = ball([0.0, 0.1, -0.1], 0.2)
+        .union(ball([0.16, 0.2, 0.1], 0.12))
+        .union(ball([0.2, -0.1, -0.15], 0.1));
+    let picture = |shape: &dyn SignedDistance<3>, up| {
+        let view = scene(shape).up(up).azimuth(25.0).elevation(35.0);
+        view.ground_shadow(0.5).perspective(30.0).render(120)
+    };
+    let pictures = UpAxis::ALL.map(|up| {
+        let seen = picture(&shape, up).unwrap();
+        let turned = picture(&Upright { shape: &shape, up }, UpAxis::Z).unwrap();
+        let differences = seen.pixels().as_flattened().iter();
+        let differences = differences.zip(turned.pixels().as_flattened());
+        let far = differences.filter(|(a, b)| a.abs_diff(**b) > 2).count();
+        assert!(far < 120 * 120 / 100, "{far} values differ with {up} up");
+        seen
+    });
+    assert_ne!(pictures[1], pictures[2]);
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! Frame, grid, ticks and labels around a plot: shared by line charts and heat maps.
 
 use plotters_backend::text_anchor::HPos;
+use srgb::Rgb;
 
 use crate::axis::{Axis, Mapping, Scale, Ticks};
-use crate::colour::{FRAME, GRID, INK, Rgb};
+use crate::colour::{FRAME, GRID, INK};
 use crate::error::Result;
 use crate::font;
 use crate::geom::{Point, Rect, point};

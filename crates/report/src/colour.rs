@@ -1,29 +1,6 @@
 //! Colours that survive colour-blindness and printing: a qualitative palette and colour maps.
 
-/// An sRGB colour, 8 bits a channel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Rgb(pub u8, pub u8, pub u8);
-
-/// Linear intensity of an sRGB value (IEC 61966-2-1).
-pub(crate) fn srgb_decoded(value: u8) -> f32 {
-    let v = f32::from(value) / 255.0;
-    if v <= 0.04045 {
-        v / 12.92
-    } else {
-        ((v + 0.055) / 1.055).powf(2.4)
-    }
-}
-
-/// The sRGB value of a linear intensity, clamped to `[0, 1]`.
-pub(crate) fn srgb_encoded(intensity: f32) -> u8 {
-    let v = intensity.clamp(0.0, 1.0);
-    let encoded = if v <= 0.0031308 {
-        12.92 * v
-    } else {
-        1.055 * v.powf(1.0 / 2.4) - 0.055
-    };
-    (255.0 * encoded).round() as u8
-}
+use srgb::Rgb;
 
 pub(crate) const WHITE: Rgb = Rgb(255, 255, 255);
 pub(crate) const INK: Rgb = Rgb(32, 32, 32);

@@ -1,6 +1,6 @@
 //! Test helpers: look at the pixels of an encoded picture.
 
-use crate::colour::Rgb;
+use srgb::Rgb;
 
 /// Width, height and RGB bytes of a PNG file.
 pub(crate) fn rgb(bytes: &[u8]) -> (usize, usize, Vec<u8>) {

@@ -12,9 +12,10 @@ use crate::geom::{Rect, point};
 use crate::heatmap::Heatmap;
 use crate::legend::{Block, LegendEntry};
 use crate::output::OutputDir;
+use crate::panel::{Context, Drawable, Spot};
 use crate::plot::LineChart;
 use crate::raster::Raster;
-use crate::shapes::{Shapes, Window};
+use crate::shapes::Shapes;
 use crate::style::{Fonts, LEADING};
 use crate::surface::{self, Surface, Text};
 
@@ -65,56 +66,6 @@ impl Panel {
             Self::Raster(raster) => raster,
         }
     }
-}
-
-/// What a panel needs to know about the figure around it.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Context {
-    pub fonts: Fonts,
-    /// Room for text as wide as the panel with its margins.
-    pub cell_width: f64,
-    /// Legends are collected below the whole figure.
-    pub shared_legend: bool,
-    /// Common window of the panels of plane curves.
-    pub window: Option<Window>,
-}
-
-/// Where a panel draws its own legend.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Spot {
-    Nowhere,
-    Inside,
-    Below,
-    Right,
-}
-
-/// What the layout asks of a panel.
-pub(crate) trait Drawable {
-    /// Groups of entries for the legend.
-    fn legend(&self) -> Vec<Vec<LegendEntry>>;
-
-    /// Height over width of the plot box, if that is fixed.
-    fn aspect(&self, _context: &Context) -> Result<Option<f64>> {
-        Ok(None)
-    }
-
-    /// Decides about the legend, given the approximate size of the plot box.
-    fn spot(&self, _context: &Context, _width: f64, _height: f64) -> Result<Spot> {
-        Ok(Spot::Nowhere)
-    }
-
-    /// Room needed around a plot box of the given size.
-    fn margins(&self, context: &Context, spot: Spot, width: f64, height: f64) -> Result<Margins>;
-
-    /// Draws the panel with its plot box at `plot`; text may use all of `outer`.
-    fn draw(
-        &self,
-        context: &Context,
-        surface: &mut dyn Surface,
-        spot: Spot,
-        plot: Rect,
-        outer: Rect,
-    ) -> Result<()>;
 }
 
 /// A figure: panels row by row on a grid.

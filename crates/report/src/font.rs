@@ -9,8 +9,7 @@ use std::sync::LazyLock;
 use ab_glyph::{Font, FontRef, GlyphId, ScaleFont};
 use plotters_backend::text_anchor::{HPos, Pos, VPos};
 use plotters_backend::{BackendColor, BackendTextStyle, FontFamily, FontTransform};
-
-use crate::colour::Rgb;
+use srgb::Rgb;
 
 static FONT: LazyLock<FontRef<'static>> = LazyLock::new(|| {
     FontRef::try_from_slice(dejavu::sans::regular()).expect("the embedded font is well formed")

@@ -1,15 +1,16 @@
 //! Heat maps: a two-dimensional array as colours.
 
 use plotters_backend::text_anchor::HPos;
+use srgb::Rgb;
 
 use crate::axes::{Axes, Margins, draw_lines, snap, title_height};
 use crate::axis::{Axis, Mapping, Scale, Ticks};
-use crate::colour::{ColourMap, FRAME, INK, Rgb};
+use crate::colour::{ColourMap, FRAME, INK};
 use crate::error::{Error, Result};
-use crate::figure::{Context, Drawable, Spot};
 use crate::font;
 use crate::geom::{Point, Rect, clip_polyline, point, thin};
 use crate::legend::LegendEntry;
+use crate::panel::{Context, Drawable, Spot};
 use crate::shapes::Curve;
 use crate::surface::{Scaling, Surface, Text, outline, stroke_dashed};
 

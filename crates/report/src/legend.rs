@@ -1,8 +1,9 @@
 //! Legends: what the colours and line styles mean, placed where no data is.
 
 use plotters_backend::text_anchor::HPos;
+use srgb::Rgb;
 
-use crate::colour::{Colour, INK, Rgb, WHITE};
+use crate::colour::{Colour, INK, WHITE};
 use crate::error::Result;
 use crate::font;
 use crate::geom::{Point, Rect, point};

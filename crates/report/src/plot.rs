@@ -6,10 +6,10 @@ use crate::axes::{Axes, Margins, draw_lines, snap, title_height};
 use crate::axis::Axis;
 use crate::colour::{Colour, GREY, INK, WHITE};
 use crate::error::{Error, Result};
-use crate::figure::{Context, Drawable, Spot};
 use crate::font;
 use crate::geom::{Point, Rect, clip_polyline, point, sample, thin};
 use crate::legend::{Block, Legend, LegendEntry, Sample};
+use crate::panel::{Context, Drawable, Spot};
 use crate::style::{CURVE_WIDTH, LEADING, LineStyle, Marker, draw_marker};
 use crate::surface::{Surface, Text, stroke_dashed};
 

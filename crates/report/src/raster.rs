@@ -4,13 +4,14 @@ use plotters_backend::text_anchor::HPos;
 use resize::Pixel;
 use resize::Type::Catrom;
 use resize::px::RGB;
+use srgb::Rgb;
 
 use crate::axes::{Margins, draw_lines, title_height};
-use crate::colour::{FRAME, INK, Rgb, srgb_decoded, srgb_encoded};
+use crate::colour::{FRAME, INK};
 use crate::error::{Error, Result};
-use crate::figure::{Context, Drawable, Spot};
 use crate::geom::Rect;
 use crate::legend::LegendEntry;
+use crate::panel::{Context, Drawable, Spot};
 use crate::surface::{PNG_SCALE, Scaling, Surface, outline};
 
 /// A panel that shows a picture, with a title above and a caption below.
@@ -98,7 +99,7 @@ impl Raster {
             .iter()
             .map(|&[r, g, b, a]| {
                 let opacity = f32::from(a) / 255.0;
-                let on_white = |v| opacity * srgb_decoded(v) + (1.0 - opacity);
+                let on_white = |v| opacity * srgb::decode(v) + (1.0 - opacity);
                 RGB::new(on_white(r), on_white(g), on_white(b))
             })
             .collect();
@@ -117,7 +118,7 @@ impl Raster {
         .map_err(failed)?
         .resize(&source, &mut target)
         .map_err(failed)?;
-        let encode = |p: RGB<f32>| Rgb(srgb_encoded(p.r), srgb_encoded(p.g), srgb_encoded(p.b));
+        let encode = |p: RGB<f32>| Rgb(srgb::encode(p.r), srgb::encode(p.g), srgb::encode(p.b));
         Ok(target.into_iter().map(encode).collect())
     }
 }

@@ -1,14 +1,14 @@
 //! Plane curves, filled or outlined, at equal aspect: zero level sets as small multiples.
 
 use plotters_backend::text_anchor::HPos;
+use srgb::Rgb;
 
 use crate::axes::{Margins, draw_lines, title_height};
-use crate::axis::{Mapping, Scale};
-use crate::colour::{Colour, INK, Rgb, WHITE};
+use crate::colour::{Colour, INK, WHITE};
 use crate::error::{Error, Result};
-use crate::figure::{Context, Drawable, Spot};
 use crate::geom::{Point, Rect, clip_loop, clip_polyline, point, thin};
 use crate::legend::{LegendEntry, Sample};
+use crate::panel::{Context, Drawable, Spot, Window};
 use crate::style::LineStyle;
 use crate::surface::{Surface, outline, stroke_dashed};
 
@@ -115,36 +115,6 @@ impl Curve {
             (Some(fill), LineStyle::None) => LegendEntry::patch(self.label.clone(), fill),
             _ => line,
         })
-    }
-}
-
-/// The part of the plane a drawing shows.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Window {
-    /// Left and right end.
-    pub x: [f64; 2],
-    /// Lower and upper end.
-    pub y: [f64; 2],
-}
-
-impl Window {
-    fn union(self, other: Self) -> Self {
-        let join = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
-        Self {
-            x: join(self.x, other.x),
-            y: join(self.y, other.y),
-        }
-    }
-
-    fn aspect(&self) -> f64 {
-        (self.y[1] - self.y[0]) / (self.x[1] - self.x[0])
-    }
-
-    fn checked(self) -> Result<Self> {
-        for (axis, [low, high]) in [("x", self.x), ("y", self.y)] {
-            Mapping::new(axis, Scale::Linear, low, high)?;
-        }
-        Ok(self)
     }
 }
 

@@ -1,6 +1,7 @@
 //! What lines, markers and letters look like.
 
-use crate::colour::Rgb;
+use srgb::Rgb;
+
 use crate::error::Result;
 use crate::geom::{Point, point};
 use crate::surface::{Surface, disc};

@@ -11,8 +11,8 @@ use plotters_backend::text_anchor::HPos;
 use plotters_backend::{
     BackendColor, BackendCoord, BackendStyle, DrawingBackend, DrawingErrorKind,
 };
+use srgb::Rgb;
 
-use crate::colour::Rgb;
 use crate::error::{Error, Result};
 use crate::font::{CAP_HEIGHT, Label, TOP_TO_BASELINE};
 use crate::geom::{Point, Rect, dash, inside, point, signed_area};

@@ -559,7 +559,7 @@ fn charts_resolve_their_axes() {
     let context = Figure::from(diagonal()).layout().unwrap();
     assert!(context.plots[0].width > 500.0);
     let plot = context.plots[0];
-    let figure_context = crate::figure::Context {
+    let figure_context = crate::panel::Context {
         fonts: crate::style::Fonts::for_columns(1),
         cell_width: 700.0,
         shared_legend: false,

@@ -6,8 +6,22 @@ use burn::tensor::{DType, Tensor};
 use linearize::{Graph, Linearization, Value};
 use model::MeanCurvatureOperator;
 use operators::{ComputeDevice, SpectralFilter};
+use serde::{Deserialize, Serialize};
 
-use crate::{Error, Precision};
+use crate::Error;
+use crate::error::StepFailure;
+
+/// Precision of the linear solves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Precision {
+    /// Hessian-vector products and vectors of conjugate gradients in single precision, if the step allows it: half the cost, and
+    /// the same iterations. Energies, gradients and phase fields keep the precision of the device.
+    #[default]
+    Single,
+    /// Everything in the precision of the device.
+    Device,
+}
 
 /// A step of mean curvature flow, `v[u]`, as the energy sees it.
 ///
@@ -41,9 +55,6 @@ pub trait MeanCurvatureStep<const D: usize>: Send + Sync {
         None
     }
 }
-
-/// Why a step of mean curvature flow failed.
-pub type StepFailure = Box<dyn std::error::Error + Send + Sync>;
 
 /// What the outer iteration asks of an inner solver.
 #[derive(Clone, Copy, Debug, PartialEq)]

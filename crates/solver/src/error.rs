@@ -1,5 +1,8 @@
 use thiserror::Error as ThisError;
 
+/// Why a step of mean curvature flow failed.
+pub type StepFailure = Box<dyn std::error::Error + Send + Sync>;
+
 /// What can stop a minimization or a flow.
 #[derive(Debug, ThisError)]
 pub enum Error {
@@ -66,7 +69,7 @@ pub enum Error {
     },
     /// The step of mean curvature flow failed.
     #[error("the step of mean curvature flow failed: {0}")]
-    Step(crate::StepFailure),
+    Step(StepFailure),
     /// From the network.
     #[error(transparent)]
     Model(#[from] model::Error),

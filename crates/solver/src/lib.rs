@@ -80,13 +80,13 @@ mod region;
 mod samples;
 mod times;
 
-pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective, StepFailure};
-pub use error::Error;
+pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective, Precision};
+pub use error::{Error, StepFailure};
 pub use flow::{
     FlowParams, FlowState, MeanCurvatureFlow, Start, StartKind, StepRecord, WillmoreFlow,
 };
 pub use model::Factors;
-pub use newton::{Exit, Method, NewtonInfo, NewtonParams, Precision, minimize};
+pub use newton::{Exit, Method, NewtonInfo, NewtonParams, minimize};
 pub use operators::{extrapolate, retract};
 pub use parts::Parts;
 pub use preconditioner::Preconditioner;

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::cg::{CgExit, CgLimits, CgSolution, conjugate_gradients, dot};
 use crate::preconditioner::Preconditioner;
 use crate::times::{PhaseTimes, Stopwatch, Timed};
-use crate::{Error, Objective};
+use crate::{Error, Objective, Precision};
 
 /// Which minimization.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -23,18 +23,6 @@ pub enum Method {
     Preconditioned,
     /// Plain Newton-CG with Armijo line search along straight lines.
     Paper,
-}
-
-/// Precision of the linear solves.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Precision {
-    /// Hessian-vector products and vectors of conjugate gradients in single precision, if the step allows it: half the cost, and
-    /// the same iterations. Energies, gradients and phase fields keep the precision of the device.
-    #[default]
-    Single,
-    /// Everything in the precision of the device.
-    Device,
 }
 
 /// Settings of the minimization.

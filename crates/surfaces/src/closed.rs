@@ -2,11 +2,13 @@
 
 use std::fmt;
 
+use geometry::Placement;
+use geometry::measure::BoundingBox;
 use rayon::prelude::*;
 
-use crate::mesh::{BoundingBox, merge_coincident};
+use crate::mesh::merge_coincident;
 use crate::vector::{Vector, corners, scaled_normal, solid_angle};
-use crate::{Error, Placement, TriangleMesh};
+use crate::{Error, TriangleMesh};
 
 /// A triangle mesh that bounds a solid: every edge is run through exactly once in each direction.
 ///
@@ -173,14 +175,14 @@ impl ClosedMesh {
     }
 
     /// The smallest box around the surface.
-    pub fn bounding_box(&self) -> BoundingBox {
+    pub fn bounding_box(&self) -> BoundingBox<3> {
         let bounds = self.mesh.bounding_box();
         bounds.expect("a closed mesh has vertices")
     }
 
     /// The surface scaled and moved.
     #[must_use]
-    pub fn placed(&self, placement: &Placement) -> Self {
+    pub fn placed(&self, placement: &Placement<3>) -> Self {
         let mut placed = self.clone();
         for x in &mut placed.mesh.vertices {
             *x = placement.apply(*x);
@@ -268,7 +270,7 @@ fn check_nesting(mesh: &TriangleMesh, component: &[u32], components: usize) -> R
     struct Part {
         first: usize,
         faces: Vec<[u32; 3]>,
-        bounds: BoundingBox,
+        bounds: BoundingBox<3>,
     }
     let mut parts: Vec<Part> = Vec::with_capacity(components);
     for (face, (&corners, &part)) in mesh.faces.iter().zip(component).enumerate() {
@@ -278,15 +280,15 @@ fn check_nesting(mesh: &TriangleMesh, component: &[u32], components: usize) -> R
             parts.push(Part {
                 first: face,
                 faces: Vec::new(),
-                bounds: BoundingBox { min: x, max: x },
+                bounds: BoundingBox { lower: x, upper: x },
             });
         }
         let part = &mut parts[part as usize];
         part.faces.push(corners);
         for v in corners {
             for (axis, &x) in mesh.vertices[v as usize].iter().enumerate() {
-                part.bounds.min[axis] = part.bounds.min[axis].min(x);
-                part.bounds.max[axis] = part.bounds.max[axis].max(x);
+                part.bounds.lower[axis] = part.bounds.lower[axis].min(x);
+                part.bounds.upper[axis] = part.bounds.upper[axis].max(x);
             }
         }
     }

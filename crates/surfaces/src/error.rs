@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::read::FormatError;
+use crate::read::error::FormatError;
 
 /// Errors of mesh files, checks, placement and isosurfaces, each with the numbers needed to act on
 /// it.
@@ -163,40 +163,6 @@ pub enum Error {
         enclosing: i64,
         /// What it should be: 0 outwards, 1 inwards.
         expected: i64,
-    },
-    /// A mesh does not fit the box.
-    #[error(
-        "with a longest side of {side_length} the mesh does not fit a box of side {box_side} with \
-         a margin of {margin}; the largest side length that fits is {largest}"
-    )]
-    DoesNotFit {
-        /// Longest side of the bounding box after scaling.
-        side_length: f64,
-        /// Side of the box.
-        box_side: f64,
-        /// Margin asked for.
-        margin: f64,
-        /// `box_side - 2 margin`, not below zero.
-        largest: f64,
-    },
-    /// A mesh that is not to be moved reaches beyond the box.
-    #[error(
-        "the mesh spans {min:?} to {max:?}, beyond the box less its margin of {margin}, {low:?} to \
-         {high:?}; fit it to the box instead, by a side length of at most {largest}"
-    )]
-    Outside {
-        /// Lower corner of the bounding box.
-        min: [f64; 3],
-        /// Upper corner.
-        max: [f64; 3],
-        /// Margin asked for.
-        margin: f64,
-        /// Lower corner of what is allowed.
-        low: [f64; 3],
-        /// Upper corner.
-        high: [f64; 3],
-        /// The largest side length that fits after moving to the centre.
-        largest: f64,
     },
     /// A number is outside the range in which it makes sense.
     #[error("{name} = {value:?} is not allowed: it must be {requirement}")]

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use geometry::UpAxis;
+
 use crate::Error;
 
 /// A mesh file format.
@@ -23,4 +25,21 @@ impl Format {
             _ => Err(Error::UnknownFormat { path: path.into() }),
         }
     }
+
+    /// The axis that points up in most files.
+    fn up(self) -> UpAxis {
+        match self {
+            Self::Obj => UpAxis::Y,
+            Self::Ply | Self::Stl => UpAxis::Z,
+        }
+    }
+}
+
+/// The axis that points up in most meshes of that format, by the extension: `y` in OBJ files, which
+/// come from animation, `z` in PLY and STL files, which come from scanners and for printers.
+///
+/// # Errors
+/// [`Error::UnknownFormat`].
+pub fn usual_up_axis(path: impl AsRef<Path>) -> Result<UpAxis, Error> {
+    Format::of(path.as_ref()).map(Format::up)
 }

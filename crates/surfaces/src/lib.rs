@@ -2,8 +2,8 @@
 //! isosurfaces.
 //!
 //! ```
-//! use geometry::{Grid, optimal_profile, phase_field, shapes::Ball};
-//! use surfaces::{ClosedMesh, MeshDistance, Placement, phase_field_surface, read, write};
+//! use geometry::{Grid, Placement, optimal_profile, phase_field, shapes::Ball};
+//! use surfaces::{ClosedMesh, MeshDistance, phase_field_surface, read, write};
 //!
 //! fn main() -> Result<(), surfaces::Error> {
 //!     // A ball as a phase field, its surface as a mesh.
@@ -27,7 +27,7 @@
 //!     }
 //!     let coarse = Grid::<3>::centred(32, 2.0)?;
 //!     let eps = 2.0 * coarse.spacing();
-//!     let placement = Placement::fit(&ball, &coarse, 1.2, 2.0 * eps)?;
+//!     let placement = Placement::fit(&ball.bounding_box(), &coarse, 1.2, 2.0 * eps)?;
 //!     let distance = MeshDistance::new(&ball.placed(&placement));
 //!     let s = distance.sample(coarse, || ())?;
 //!     let u = s.map(|s| optimal_profile(s, eps));
@@ -61,7 +61,6 @@ mod format;
 mod hierarchy;
 mod isosurface;
 mod mesh;
-mod placement;
 mod read;
 pub mod samples;
 mod triangle;
@@ -71,8 +70,9 @@ mod write;
 pub use closed::{ClosedMesh, Warning};
 pub use distance::MeshDistance;
 pub use error::Error;
+pub use format::usual_up_axis;
 pub use isosurface::{isosurface, phase_field_surface};
-pub use mesh::{BoundingBox, TriangleMesh};
-pub use placement::Placement;
-pub use read::{FormatError, decode, read};
+pub use mesh::TriangleMesh;
+pub use read::error::FormatError;
+pub use read::{decode, read};
 pub use write::write;

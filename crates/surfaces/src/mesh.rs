@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use geometry::measure::BoundingBox;
+
 use crate::Error;
 
 /// Triangles over shared vertices, not necessarily closed; see [`ClosedMesh`](crate::ClosedMesh).
@@ -17,15 +19,15 @@ pub struct TriangleMesh {
 
 impl TriangleMesh {
     /// The smallest box with all vertices; `None` without vertices.
-    pub fn bounding_box(&self) -> Option<BoundingBox> {
+    pub fn bounding_box(&self) -> Option<BoundingBox<3>> {
         let (&first, rest) = self.vertices.split_first()?;
         let start = BoundingBox {
-            min: first,
-            max: first,
+            lower: first,
+            upper: first,
         };
         Some(rest.iter().fold(start, |bounds, x| BoundingBox {
-            min: std::array::from_fn(|i| bounds.min[i].min(x[i])),
-            max: std::array::from_fn(|i| bounds.max[i].max(x[i])),
+            lower: std::array::from_fn(|i| bounds.lower[i].min(x[i])),
+            upper: std::array::from_fn(|i| bounds.upper[i].max(x[i])),
         }))
     }
 
@@ -71,37 +73,6 @@ impl TriangleMesh {
             faces: self.faces.iter().map(|f| f.map(&corner)).collect(),
             normals: self.normals.as_deref().map(keep),
         }
-    }
-}
-
-/// An axis-parallel box.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BoundingBox {
-    /// Lower corner.
-    pub min: [f64; 3],
-    /// Upper corner.
-    pub max: [f64; 3],
-}
-
-impl BoundingBox {
-    /// Lengths of the sides.
-    pub fn extent(&self) -> [f64; 3] {
-        std::array::from_fn(|i| self.max[i] - self.min[i])
-    }
-
-    /// The centre.
-    pub fn centre(&self) -> [f64; 3] {
-        std::array::from_fn(|i| 0.5 * (self.min[i] + self.max[i]))
-    }
-
-    /// Length of the longest side.
-    pub fn longest_side(&self) -> f64 {
-        self.extent().into_iter().fold(0.0, f64::max)
-    }
-
-    /// Whether the point lies in the box or on its faces.
-    pub(crate) fn contains(&self, x: [f64; 3]) -> bool {
-        (0..3).all(|i| (self.min[i]..=self.max[i]).contains(&x[i]))
     }
 }
 

@@ -5,8 +5,8 @@
 use std::f64::consts::PI;
 
 use crate::common::{closed, cube, reversed, sphere, together, torus, translated};
-use geometry::Grid;
-use surfaces::{ClosedMesh, Error, Placement, TriangleMesh, Warning};
+use geometry::{Grid, Placement};
+use surfaces::{ClosedMesh, Error, TriangleMesh, Warning};
 
 fn error(mesh: TriangleMesh) -> Error {
     ClosedMesh::new(mesh).unwrap_err()
@@ -280,12 +280,13 @@ fn placement_centres_and_scales() {
     }
     let mesh = closed(mesh);
     let grid = Grid::<3>::new(16, 1.0).unwrap();
-    let placement = Placement::fit(&mesh, &grid, 0.6, 0.2).unwrap();
+    let bounds = mesh.bounding_box();
+    let placement = Placement::fit(&bounds, &grid, 0.6, 0.2).unwrap();
     near(placement.scale(), 0.1, 1e-16);
     let placed = mesh.placed(&placement).bounding_box();
     for (axis, half) in [0.3, 0.1, 0.2].into_iter().enumerate() {
-        near(placed.min[axis], 0.5 - half, 1e-15);
-        near(placed.max[axis], 0.5 + half, 1e-15);
+        near(placed.lower[axis], 0.5 - half, 1e-15);
+        near(placed.upper[axis], 0.5 + half, 1e-15);
     }
     for x in &mesh.mesh().vertices {
         let back = placement.apply_inverse(placement.apply(*x));
@@ -297,27 +298,28 @@ fn placement_centres_and_scales() {
         1e-15,
     );
 
-    let error = Placement::fit(&mesh, &grid, 0.8, 0.2).unwrap_err();
+    let error = Placement::fit(&bounds, &grid, 0.8, 0.2).unwrap_err();
     assert!(
         error
             .to_string()
-            .ends_with("the largest side length that fits is 0.6"),
+            .ends_with("does not fit the box of side 1; use at most 0.6"),
         "{error}"
     );
-    assert!(Placement::fit(&mesh, &grid, f64::NAN, 0.1).is_err());
-    assert!(Placement::fit(&mesh, &grid, 0.0, 0.1).is_err());
-    assert!(Placement::fit(&mesh, &grid, 0.5, -0.1).is_err());
-    assert!(Placement::fit(&mesh, &grid, 1e-9, 0.6).is_err());
+    assert!(Placement::fit(&bounds, &grid, f64::NAN, 0.1).is_err());
+    assert!(Placement::fit(&bounds, &grid, 0.0, 0.1).is_err());
+    assert!(Placement::fit(&bounds, &grid, 0.5, -0.1).is_err());
+    assert!(Placement::fit(&bounds, &grid, 1e-9, 0.6).is_err());
 }
 
 #[test]
 fn placement_may_leave_the_mesh_alone() {
     let mesh = closed(translated(cube(0.25), [0.5, 0.5, 0.5]));
     let grid = Grid::<3>::new(16, 1.0).unwrap();
-    let kept = mesh.placed(&Placement::keep(&mesh, &grid, 0.25).unwrap());
+    let bounds = mesh.bounding_box();
+    let kept = mesh.placed(&Placement::keep(&bounds, &grid, 0.25).unwrap());
     assert_eq!(kept, mesh);
-    let error = Placement::keep(&mesh, &grid, 0.3).unwrap_err();
-    assert!(matches!(error, Error::Outside { .. }), "{error}");
+    let error = Placement::keep(&bounds, &grid, 0.3).unwrap_err();
+    assert!(matches!(error, geometry::Error::Outside { .. }), "{error}");
     let centred = Grid::<3>::centred(16, 1.0).unwrap();
-    assert!(Placement::keep(&mesh, &centred, 0.0).is_err());
+    assert!(Placement::keep(&bounds, &centred, 0.0).is_err());
 }

@@ -5,8 +5,8 @@
 use std::path::PathBuf;
 
 use crate::common::{Numbers, closed, cube, reversed, sphere, together, torus, translated};
-use geometry::{Field, Grid, SignedDistance, shapes};
-use surfaces::{ClosedMesh, MeshDistance, Placement, samples};
+use geometry::{Field, Grid, Placement, SignedDistance, shapes};
+use surfaces::{ClosedMesh, MeshDistance, samples};
 
 type Point = [f64; 3];
 
@@ -83,7 +83,10 @@ fn compare(name: &str, mesh: &ClosedMesh, points: usize) -> f64 {
     for index in 0..points {
         let wide = 0.2 * side;
         let x = if index % 2 == 0 {
-            numbers.point(bounds.min.map(|v| v - wide), bounds.max.map(|v| v + wide))
+            numbers.point(
+                bounds.lower.map(|v| v - wide),
+                bounds.upper.map(|v| v + wide),
+            )
         } else {
             // Close to a corner, an edge or a face: these decide the sign.
             let triangle = triangles[(numbers.next() * triangles.len() as f64) as usize];
@@ -236,7 +239,7 @@ fn results_do_not_depend_on_the_number_of_threads() {
 fn placed_meshes_keep_their_distances() {
     let mesh = closed(translated(torus(5.0, 2.0, 40, 20), [100.0, 3.0, -7.0]));
     let grid = Grid::<3>::new(16, 2.0).unwrap();
-    let placement = Placement::fit(&mesh, &grid, 1.4, 0.3).unwrap();
+    let placement = Placement::fit(&mesh.bounding_box(), &grid, 1.4, 0.3).unwrap();
     let before = MeshDistance::new(&mesh);
     let after = MeshDistance::new(&mesh.placed(&placement));
     for index in 0..grid.len() {

@@ -7,7 +7,8 @@ use std::path::Path;
 
 use crate::common::files::{ENCODINGS, FACET, decode, encode, ply};
 use crate::common::{cube, torus};
-use surfaces::{ClosedMesh, Error, FormatError, TriangleMesh, read, samples, write};
+use geometry::UpAxis;
+use surfaces::{ClosedMesh, Error, FormatError, TriangleMesh, read, samples, usual_up_axis, write};
 
 fn problem(extension: &str, bytes: impl AsRef<[u8]>) -> FormatError {
     match decode(extension, bytes.as_ref()).unwrap_err() {
@@ -419,6 +420,18 @@ fn unknown_extensions_and_missing_files_are_told() {
         )
         .is_err()
     );
+}
+
+#[test]
+fn the_format_tells_which_axis_usually_points_up() {
+    for (path, up) in [
+        ("a.OBJ", UpAxis::Y),
+        ("a.ply", UpAxis::Z),
+        ("a.stl", UpAxis::Z),
+    ] {
+        assert_eq!(usual_up_axis(path).unwrap(), up);
+    }
+    assert!(usual_up_axis("a.npy").is_err());
 }
 
 #[test]

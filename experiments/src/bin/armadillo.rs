@@ -8,7 +8,7 @@ use experiments::harness;
 use experiments::mesh_flow::{Extras, MeshFlow, MeshFlowOptions};
 use experiments::meshes::ARMADILLO;
 use experiments::surfaces::View;
-use render::Axis;
+use geometry::UpAxis;
 
 const ARMADILLO_FLOW: MeshFlow = MeshFlow {
     program: "armadillo",
@@ -19,7 +19,7 @@ const ARMADILLO_FLOW: MeshFlow = MeshFlow {
     tau_in_words: "first step τ = 2⁻²², doubled after every step",
     shown: &[(0, None), (1, None), (8, None), (11, None), (16, None)],
     view: View {
-        up: Axis::Y,
+        up: UpAxis::Y,
         azimuth: 205.0,
         elevation: 8.0,
     },

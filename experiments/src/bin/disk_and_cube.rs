@@ -14,8 +14,7 @@ use experiments::surfaces::{
 };
 use experiments::{Error, harness};
 use geometry::shapes::{Cuboid, Cylinder};
-use geometry::{Field, SignedDistanceExt, phase_field};
-use render::Axis;
+use geometry::{Field, SignedDistanceExt, UpAxis, phase_field};
 use report::Summary;
 use serde::Serialize;
 
@@ -195,7 +194,7 @@ fn program(options: &Options) -> Result<(), Error> {
                     initial: &solid.initial,
                     identity: solid.identity.clone(),
                     view: View {
-                        up: Axis::Z,
+                        up: UpAxis::Z,
                         azimuth: 30.0,
                         elevation: 25.0,
                     },

@@ -15,8 +15,8 @@ use experiments::surfaces::{
 };
 use experiments::{Error, harness};
 use geometry::shapes::{Ball, Cuboid, Cylinder};
-use geometry::{Field, Grid, SignedDistance, SignedDistanceExt, phase_field};
-use render::{Axis, Rgb};
+use geometry::{Field, Grid, SignedDistance, SignedDistanceExt, UpAxis, phase_field};
+use render::Rgb;
 use report::{Figure, Summary};
 use serde::Serialize;
 
@@ -171,7 +171,7 @@ impl Shape {
             Self::Tubes => (25.0, 25.0),
         };
         View {
-            up: Axis::Z,
+            up: UpAxis::Z,
             azimuth,
             elevation,
         }

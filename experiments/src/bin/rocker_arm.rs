@@ -10,7 +10,8 @@ use experiments::meshes::KnownMesh;
 use experiments::surfaces::{Finished, View};
 use experiments::{Error, harness};
 use fem::FiniteElementStep;
-use render::{Axis, Tube};
+use geometry::UpAxis;
+use render::Tube;
 use report::Manifest;
 
 const ROCKER_ARM: KnownMesh = KnownMesh {
@@ -30,7 +31,7 @@ const ROCKER_ARM_FLOW: MeshFlow = MeshFlow {
     tau_in_words: "τ = 2⁻¹²",
     shown: &[(0, Some(276.12)), (1, Some(42.08)), (20, Some(41.46))],
     view: View {
-        up: Axis::Z,
+        up: UpAxis::Z,
         azimuth: 20.0,
         elevation: 20.0,
     },

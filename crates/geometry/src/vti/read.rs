@@ -6,6 +6,7 @@ use roxmltree::{Document, Node};
 
 use files::shortened;
 
+use super::error::VtiError;
 use super::stream::{Element, Fault, Format, Stream};
 use crate::{Error, Field, Grid};
 
@@ -14,132 +15,6 @@ const MOST_ELEMENTS: usize = 10_000;
 /// Most values of all arrays together, beyond those that have a byte each in the file: compressed
 /// data can be a thousand times as long, and arrays can share theirs.
 const MOST_VALUES: u64 = 1 << 28;
-
-/// What is wrong with a VTI file. Texts from the file are shortened.
-#[derive(Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum VtiError {
-    /// The XML cannot be parsed.
-    #[error("it is not well-formed XML: {reason}")]
-    Xml {
-        /// What the parser said.
-        reason: String,
-    },
-    /// More elements, or more attributes, than such files have.
-    #[error(
-        "it has {count} elements or attributes, and may have {limit}: not a file of VTK image data"
-    )]
-    TooManyElements {
-        /// How many, counted by the characters `<` and `=`.
-        count: usize,
-        /// How many it may have.
-        limit: usize,
-    },
-    /// More values than are accepted.
-    #[error(
-        "it has {arrays} arrays of {nodes} values each, and may have {limit} values in all; save \
-         fewer arrays at a time, without compression"
-    )]
-    TooManyValues {
-        /// Number of arrays.
-        arrays: usize,
-        /// Values of an array.
-        nodes: u64,
-        /// Values of all of them that are accepted.
-        limit: u64,
-    },
-    /// An element is missing.
-    #[error("there is no element {element}: not a file of VTK image data")]
-    NoElement {
-        /// The element.
-        element: &'static str,
-    },
-    /// An attribute is missing or has a value that is not understood.
-    #[error("attribute {attribute} of {element} is {value:?}, but must be {requirement}")]
-    Attribute {
-        /// The element.
-        element: &'static str,
-        /// The attribute.
-        attribute: &'static str,
-        /// Its value; empty if it is missing.
-        value: String,
-        /// What is understood.
-        requirement: &'static str,
-    },
-    /// The image is in several pieces, or in none.
-    #[error("the image has {count} pieces; save it as one file with one piece")]
-    Pieces {
-        /// Pieces found.
-        count: usize,
-    },
-    /// The piece is not the whole image.
-    #[error("the piece spans nodes {piece}, but the image {whole}; save the whole image")]
-    PartialPiece {
-        /// First and last node of the piece along x, y and z, as written.
-        piece: String,
-        /// Of the image.
-        whole: String,
-    },
-    /// The image is not a cube of the wanted dimension.
-    #[error(
-        "the image has {nodes:?} nodes along x, y, z; needed are equal numbers (of two or more) \
-         along the first {dimension} and one along the rest"
-    )]
-    NotCubical {
-        /// Nodes along x, y and z.
-        nodes: [u64; 3],
-        /// Dimension wanted.
-        dimension: usize,
-    },
-    /// The nodes are not equally far apart in all directions.
-    #[error("the spacing is {spacing:?}, but must be positive and equal along the used axes")]
-    Spacing {
-        /// Along x, y and z.
-        spacing: [f64; 3],
-    },
-    /// There are no point data.
-    #[error("there are no point data{}", if *.cell_data {
-        ", only cell data: convert them (`Cell Data to Point Data` in ParaView)"
-    } else {
-        ""
-    })]
-    NoPointData {
-        /// Whether there are cell data.
-        cell_data: bool,
-    },
-    /// An array is not scalar.
-    #[error("array {name:?} has {components} components; save scalar arrays alone")]
-    Components {
-        /// Its name.
-        name: String,
-        /// Its components, as written.
-        components: String,
-    },
-    /// Two arrays have one name, or one has none.
-    #[error("array name {name:?} is empty or used twice")]
-    Name {
-        /// The name.
-        name: String,
-    },
-    /// The data of an array are shorter or longer than its nodes need.
-    #[error("array {name:?} has {found} bytes (as text: numbers) where {expected} are needed")]
-    Length {
-        /// Its name.
-        name: String,
-        /// Needed.
-        expected: u64,
-        /// Found, as far as can be told.
-        found: u64,
-    },
-    /// The data of an array cannot be decoded.
-    #[error("the data of array {name:?} cannot be decoded: {reason}")]
-    Data {
-        /// Its name.
-        name: String,
-        /// Where it fails.
-        reason: &'static str,
-    },
-}
 
 /// Reads all point arrays of a file, in its order.
 ///

@@ -36,7 +36,7 @@ use serde::{Deserialize, Serialize};
 
 pub use planar::{PlanarInterface, PlanarStep, solve};
 
-use crate::{Error, Network};
+use crate::Error;
 
 /// The factors of the effective energy and metric; both are 1 for an exact step.
 ///
@@ -165,29 +165,4 @@ pub fn calibrate(normals: &[(impl PlanarStep, f64)]) -> Result<Calibration, Erro
 fn spread(values: &[f64]) -> f64 {
     let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     largest - values.iter().copied().fold(f64::INFINITY, f64::min)
-}
-
-impl Network {
-    /// The calibration of the operator, computed anew (a tenth of a second at `eps = 2h`, seconds at `8h`).
-    ///
-    /// # Errors
-    /// [`Error::Calibration`] if the operator has no flat interface at rest, as after too little training.
-    pub fn calibrate(&self) -> Result<Calibration, Error> {
-        let steps: Vec<_> = normals(self.ratios().dimension)
-            .iter()
-            .map(|&(normal, weight)| (network::NetworkOnPlanes::new(self, normal), weight))
-            .collect();
-        calibrate(&steps)
-    }
-
-    /// Eigenvalues of `J`, the derivative of the operator at its flat interface normal to an axis, largest real part first. The
-    /// first belongs to translations and is 1, the second says how fast disturbed profiles recover, and the rest are between
-    /// the transfer function's values in the pure phases.
-    ///
-    /// # Errors
-    /// As [`Self::calibrate`].
-    pub fn flat_spectrum(&self) -> Result<Vec<[f64; 2]>, Error> {
-        let (normal, _) = normals(self.ratios().dimension)[0];
-        planar::spectrum(&network::NetworkOnPlanes::new(self, normal), POSITIONS[0])
-    }
 }

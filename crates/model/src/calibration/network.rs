@@ -2,11 +2,11 @@
 
 use faer::{Col, Mat};
 
-use super::PlanarStep;
-use crate::{Error, Mlp, Network};
+use super::{POSITIONS, PlanarStep, calibrate, normals, planar};
+use crate::{Calibration, Error, Mlp, Network};
 
 /// `V` for functions of `a . x` with an integer normal `a`: the kernel is summed over the planes `a . b = m`.
-pub(crate) struct NetworkOnPlanes<'a> {
+struct NetworkOnPlanes<'a> {
     activation: &'a Mlp,
     /// `K_m`, the sum of the kernel over each plane, from `m = -reach` to `reach`.
     kernel: Vec<f64>,
@@ -18,7 +18,7 @@ pub(crate) struct NetworkOnPlanes<'a> {
 }
 
 impl<'a> NetworkOnPlanes<'a> {
-    pub(crate) fn new(network: &'a Network, normal: &[isize]) -> Self {
+    fn new(network: &'a Network, normal: &[isize]) -> Self {
         let ratios = network.ratios();
         let (dimension, width) = (ratios.dimension, ratios.width);
         let middle = (width / 2).cast_signed();
@@ -104,6 +104,31 @@ impl PlanarStep for NetworkOnPlanes<'_> {
         Col::from_fn(w.nrows(), |i| {
             -self.activation.jet(smoothed[i])[1] * bent[i]
         })
+    }
+}
+
+impl Network {
+    /// The calibration of the operator, computed anew (a tenth of a second at `eps = 2h`, seconds at `8h`).
+    ///
+    /// # Errors
+    /// [`Error::Calibration`] if the operator has no flat interface at rest, as after too little training.
+    pub fn calibrate(&self) -> Result<Calibration, Error> {
+        let steps: Vec<_> = normals(self.ratios().dimension)
+            .iter()
+            .map(|&(normal, weight)| (NetworkOnPlanes::new(self, normal), weight))
+            .collect();
+        calibrate(&steps)
+    }
+
+    /// Eigenvalues of `J`, the derivative of the operator at its flat interface normal to an axis, largest real part first. The
+    /// first belongs to translations and is 1, the second says how fast disturbed profiles recover, and the rest are between
+    /// the transfer function's values in the pure phases.
+    ///
+    /// # Errors
+    /// As [`Self::calibrate`].
+    pub fn flat_spectrum(&self) -> Result<Vec<[f64; 2]>, Error> {
+        let (normal, _) = normals(self.ratios().dimension)[0];
+        planar::spectrum(&NetworkOnPlanes::new(self, normal), POSITIONS[0])
     }
 }
 

@@ -1,4 +1,7 @@
 //! Colours: sRGB outside, linear inside.
+//!
+//! Light is added and averaged in linear intensities; files and screens take sRGB values
+//! (IEC 61966-2-1).
 
 /// An sRGB colour, 8 bits a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -21,13 +24,13 @@ impl Rgb {
     pub const WHITE: Self = Self(255, 255, 255);
 
     /// Linear intensities in `[0, 1]`.
-    pub(crate) fn linear(self) -> [f32; 3] {
+    pub fn linear(self) -> [f32; 3] {
         [self.0, self.1, self.2].map(decode)
     }
 }
 
-/// Linear intensity of an 8-bit sRGB value (IEC 61966-2-1).
-pub(crate) fn decode(value: u8) -> f32 {
+/// Linear intensity of an 8-bit sRGB value.
+pub fn decode(value: u8) -> f32 {
     let v = f32::from(value) / 255.0;
     if v <= 0.04045 {
         v / 12.92
@@ -37,7 +40,7 @@ pub(crate) fn decode(value: u8) -> f32 {
 }
 
 /// The 8-bit sRGB value of a linear intensity, clamped to `[0, 1]` and rounded.
-pub(crate) fn encode(intensity: f32) -> u8 {
+pub fn encode(intensity: f32) -> u8 {
     let v = intensity.clamp(0.0, 1.0);
     let encoded = if v <= 0.0031308 {
         12.92 * v
