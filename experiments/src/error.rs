@@ -18,14 +18,12 @@ pub enum Error {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// One of the parallel runs failed.
-    #[error("{run}: {source}")]
-    Run {
-        /// Which one.
-        run: String,
-        /// Why.
-        source: Box<solver::Error>,
-    },
+    /// From a flow.
+    #[error(transparent)]
+    Engine(#[from] engine::Error),
+    /// From run directories and stored results.
+    #[error(transparent)]
+    Runs(#[from] runs::Error),
     /// From the finite elements.
     #[error(transparent)]
     Fem(#[from] fem::Error),

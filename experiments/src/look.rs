@@ -1,8 +1,30 @@
 //! How curves look in the figures: colours stand for methods in their schemes, dashes for resolutions.
 
+use engine::{Method, Scheme};
 use report::{Colour, LegendEntry, LineChart, LineStyle, Marker, Series};
 
-use crate::method::{Method, Scheme};
+/// The methods in their schemes that are shown, in the order of legends.
+pub fn variants(
+    shown: impl Fn((Method, Scheme)) -> bool,
+) -> impl Iterator<Item = (Method, Scheme)> {
+    let all = Method::ALL
+        .into_iter()
+        .flat_map(|method| Scheme::ALL.map(|scheme| (method, scheme)));
+    all.filter(move |&variant| shown(variant))
+}
+
+/// Colour of a method in a scheme, an entry of the palette.
+pub fn colour(method: Method, scheme: Scheme) -> usize {
+    match (method, scheme) {
+        (Method::Hybrid, Scheme::Paper) => 0,
+        (Method::Hybrid, Scheme::Calibrated) => 5,
+        (Method::Hybrid, Scheme::Accurate) => 2,
+        (Method::FeImplicit, Scheme::Paper) => 1,
+        (Method::FeImplicit, _) => 4,
+        (Method::FeSemi, Scheme::Paper) => 3,
+        (Method::FeSemi, _) => 6,
+    }
+}
 
 /// How much finer the finest of `cells` is, counted in resolutions.
 fn rank(n: usize, cells: &[usize]) -> usize {
@@ -38,7 +60,7 @@ pub fn curve(
     (n, cells): (usize, &[usize]),
 ) -> Series {
     Series::new(format!("{}, n = {n}", method.label_in(scheme)), points)
-        .with_colour(method.colour_in(scheme))
+        .with_colour(colour(method, scheme))
         .with_style(dashes(n, cells))
         .with_width(1.8 + 1.4 * rank(n, cells) as f64)
 }
@@ -52,7 +74,7 @@ pub fn legend(
     let methods = variants.into_iter().map(|(method, scheme)| {
         LegendEntry::line(
             method.label_in(scheme),
-            method.colour_in(scheme),
+            colour(method, scheme),
             LineStyle::Solid,
         )
     });

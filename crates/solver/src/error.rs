@@ -31,20 +31,6 @@ pub enum Error {
         /// What was asked for.
         tolerance: f64,
     },
-    /// Smaller time steps failed, too.
-    #[error(
-        "step {step}: no step was possible, not even of size {tau:.1e}, halved {halvings} times: {source}"
-    )]
-    TooStiff {
-        /// Time step, counted from 1.
-        step: usize,
-        /// Size of the last attempt.
-        tau: f64,
-        /// How often it had been halved.
-        halvings: u32,
-        /// Why the last attempt failed.
-        source: Box<Self>,
-    },
     /// A parameter out of range.
     #[error("{name} = {value:e} is out of range: {expected}")]
     Parameter {

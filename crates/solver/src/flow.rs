@@ -4,7 +4,6 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use burn::tensor::Tensor;
-use geometry::measure::{perimeter, zero_set_volume};
 use geometry::{Field, Grid};
 use model::{Factors, MeanCurvatureOperator, Network, Ratios};
 use operators::{ComputeDevice, SpectralFilter, inner_product};
@@ -64,23 +63,24 @@ pub struct StepRecord {
     pub energy: f64,
     /// `eps / (2 c tautilde^2) |V[u] - u|^2`, the approximate Willmore energy of the result; `c = 1` without calibration.
     pub willmore_energy: f64,
-    /// Perimeter `P_eps` of the result.
-    pub perimeter: f64,
-    /// Area or volume of `{u > 0}`.
-    pub volume: f64,
-    /// Where the minimization began; at rest in records of earlier versions.
-    #[serde(default)]
+    /// Where the minimization began.
     pub start: Start,
     /// What the minimization did.
     pub newton: NewtonInfo,
-    /// Wall time, seconds.
+    /// Wall time in seconds, which is not stored: records of the same step are the same bytes.
+    #[serde(skip)]
     pub seconds: f64,
-    /// Wall time of the parts of the minimization; zero in records of earlier versions.
-    #[serde(default)]
+    /// Wall time of the phases of the minimization, not stored either.
+    #[serde(skip)]
     pub times: PhaseTimes,
 }
 
 impl StepRecord {
+    /// The Willmore energy before the step, as the scheme measures it: standing still costs `2 tau w`.
+    pub fn energy_at_rest(&self) -> f64 {
+        self.energy_before / (2.0 * self.tau)
+    }
+
     /// Hessian-vector products of the step; those on coarser grids count by their share of this grid's unknowns.
     pub fn hvp(&self) -> f64 {
         self.newton.hvp as f64 + self.start.hvp
@@ -366,7 +366,7 @@ impl<const D: usize> WillmoreFlow<D> {
                 tolerance: self.params.newton.tolerance,
             });
         }
-        let field = download(&self.grid, &u, &self.device).map_err(|_| Error::NonFinite {
+        download(&self.grid, &u, &self.device).map_err(|_| Error::NonFinite {
             step,
             field: "phase field",
         })?;
@@ -385,8 +385,6 @@ impl<const D: usize> WillmoreFlow<D> {
             energy_before: scale * newton.energy_before,
             energy: scale * newton.energy,
             willmore_energy: scale * (newton.energy - fidelity) / (2.0 * tau),
-            perimeter: perimeter(&field, self.params.eps)?,
-            volume: zero_set_volume(&field),
             start: origin,
             newton,
             seconds: clock.elapsed().as_secs_f64(),

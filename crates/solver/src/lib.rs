@@ -74,7 +74,6 @@ mod error;
 mod flow;
 mod interface;
 mod newton;
-mod parts;
 mod preconditioner;
 mod region;
 mod samples;
@@ -88,7 +87,6 @@ pub use flow::{
 pub use model::Factors;
 pub use newton::{Exit, Method, NewtonInfo, NewtonParams, minimize};
 pub use operators::{extrapolate, retract};
-pub use parts::Parts;
 pub use preconditioner::Preconditioner;
 pub use region::Region;
 pub use times::PhaseTimes;

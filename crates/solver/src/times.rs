@@ -23,7 +23,6 @@ pub struct PhaseTimes {
     /// Energies and gradients.
     pub energies: f64,
     /// Finding the start, on coarser grids.
-    #[serde(default)]
     pub start: f64,
 }
 

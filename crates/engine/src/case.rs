@@ -1,0 +1,109 @@
+//! Everything that a result depends on.
+
+use fem::FiniteElementStep;
+use geometry::{Field, Grid};
+use operators::ComputeDevice;
+use runs::fingerprint;
+use serde_json::{Value, json};
+use solver::FlowParams;
+
+use crate::{Error, Flow, Measure, Operator, Scales, Stop, TimeSteps};
+
+/// A flow with everything that its result depends on, but for the device.
+#[derive(Clone, Debug)]
+pub struct Case<const D: usize> {
+    /// Name of the initial shape with its measures.
+    pub shape: String,
+    /// The initial phase field.
+    pub initial: Field<D>,
+    /// The nodes whose values may move, if not all.
+    pub region: Option<Vec<bool>>,
+    /// Which flow.
+    pub flow: Flow,
+    /// The step of mean curvature flow, and the weights of the energy.
+    pub operator: Operator,
+    /// Lengths, and settings of the minimization.
+    pub scales: Scales,
+    /// Sizes of the time steps. Those of mean curvature flow are the inner step.
+    pub steps: TimeSteps,
+    /// When the flow ends: with the first that holds.
+    pub stops: Vec<Stop>,
+    /// What is measured after every step.
+    pub measures: Vec<Measure<D>>,
+}
+
+impl<const D: usize> Case<D> {
+    /// The grid.
+    pub fn grid(&self) -> &Grid<D> {
+        self.initial.grid()
+    }
+
+    /// Flow, shape and operator, for titles and messages.
+    pub fn title(&self) -> String {
+        let cells = self.grid().spacing().recip().round();
+        let operator = self.operator.label();
+        format!(
+            "{} of the {} by {operator} at n = {cells}",
+            self.flow.title(),
+            self.shape
+        )
+    }
+
+    /// The scales and the weights of the energy, as the solver takes them.
+    pub fn params(&self) -> FlowParams {
+        FlowParams {
+            eps: self.scales.eps,
+            mcf_step: self.scales.mcf_step,
+            newton: self.scales.newton,
+            calibration: self.operator.factors,
+        }
+    }
+
+    /// The finite-element step at the scales of the case: the measure of Willmore energies that the paper reports.
+    ///
+    /// # Errors
+    /// [`Error::Fem`] if the scales do not fit the grid.
+    pub fn implicit_elements(&self) -> Result<FiniteElementStep<D>, Error> {
+        let Scales { eps, mcf_step, .. } = self.scales;
+        Ok(FiniteElementStep::implicit(self.grid(), eps, mcf_step)?)
+    }
+
+    /// The largest time step by the energy, `side^4 / 1024`: beyond it nothing is left to be seen.
+    pub(crate) fn largest_step(&self) -> f64 {
+        self.grid().side().powi(4) / 1024.0
+    }
+
+    /// The time at which the flow ends, if there is one.
+    pub(crate) fn end(&self) -> Option<f64> {
+        self.stops.iter().find_map(|stop| match stop {
+            Stop::Time(end) => Some(*end),
+            _ => None,
+        })
+    }
+
+    /// What distinguishes it from other cases, as it stands in checkpoints: fields and networks by their checksums.
+    pub(crate) fn identity(&self, device: &ComputeDevice) -> Value {
+        let grid = self.grid();
+        let bytes = |u: &Field<D>| -> Vec<u8> {
+            u.values()
+                .iter()
+                .flat_map(|value| value.to_le_bytes())
+                .collect()
+        };
+        let marks = |nodes: &Vec<bool>| -> Vec<u8> { nodes.iter().map(|&n| u8::from(n)).collect() };
+        let names: Vec<&str> = self.measures.iter().map(Measure::name).collect();
+        json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "device": format!("{} {:?}", device.kind(), device.dtype()).to_lowercase(),
+            "grid": { "dimension": D, "cells": grid.cells(), "side": grid.side(), "origin": grid.origin().to_vec() },
+            "initial": fingerprint(bytes(&self.initial)),
+            "region": self.region.as_ref().map(marks).map(fingerprint),
+            "flow": self.flow,
+            "operator": self.operator.identity(),
+            "scales": self.scales,
+            "steps": self.steps,
+            "stops": self.stops,
+            "measures": names,
+        })
+    }
+}

@@ -1,0 +1,141 @@
+use std::path::PathBuf;
+
+use model::Ratios;
+use thiserror::Error as ThisError;
+
+/// What can stop a case.
+#[derive(Debug, ThisError)]
+pub enum Error {
+    /// No shipped network fits.
+    #[error(
+        "no network of the {recipe} recipe for {wanted}; there are {available}. Choose one of these interface widths, or train a network: \
+         willmore train --dimension {} --width {} --eps-over-h {} --step-over-h2 {} --save FILE.safetensors, and give it by --network",
+        wanted.dimension, wanted.width, wanted.eps_over_h, wanted.step_over_h2
+    )]
+    MissingNetwork {
+        /// How networks of the scheme are trained.
+        recipe: &'static str,
+        /// What is needed.
+        wanted: Ratios,
+        /// What there is.
+        available: String,
+    },
+    /// A file with a network was given, and no case has a learned operator.
+    #[error("no run of these methods needs a network")]
+    NetworkNotNeeded,
+    /// A shape or a region that cannot be built from its description.
+    #[error("{0}")]
+    Shape(String),
+    /// A parameter out of range.
+    #[error("{name} = {value:e} is out of range: {expected}")]
+    Parameter {
+        /// Which parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The range.
+        expected: &'static str,
+    },
+    /// A time step that failed, with the case that it belongs to.
+    #[error("{case}: {source}")]
+    Step {
+        /// Flow, shape and operator.
+        case: String,
+        /// Why.
+        source: solver::Error,
+    },
+    /// Smaller time steps failed, too.
+    #[error(
+        "{case}: step {step}: no step was possible, not even of size {tau:.1e}, halved {halvings} times: {source}"
+    )]
+    TooStiff {
+        /// Flow, shape and operator.
+        case: String,
+        /// Number of the time step, from 1.
+        step: usize,
+        /// Size of the last attempt.
+        tau: f64,
+        /// How often it had been halved.
+        halvings: u32,
+        /// Why the last attempt failed.
+        source: solver::Error,
+    },
+    /// Two runs whose nodes cannot be compared.
+    #[error(
+        "a run with {cells} cells per side cannot be compared with a reference with {reference}: the latter must be a multiple, in the \
+         same box"
+    )]
+    Incomparable {
+        /// Cells of the run.
+        cells: usize,
+        /// Cells of the reference.
+        reference: usize,
+    },
+    /// A time step that a trajectory does not have.
+    #[error("there is no step {step} in a run of {steps} steps")]
+    NoSuchStep {
+        /// The step.
+        step: usize,
+        /// What there is.
+        steps: usize,
+    },
+    /// A stored run that is not of this case.
+    #[error(
+        "{} holds a run of another case ({difference}); start a new run in another folder", path.display()
+    )]
+    OtherCase {
+        /// The folder.
+        path: PathBuf,
+        /// In what they differ.
+        difference: String,
+    },
+    /// A stored run whose checkpoint cannot be understood.
+    #[error("{} cannot be resumed: {reason}; start a new run", path.display())]
+    Unreadable {
+        /// The folder.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// A file or folder that cannot be used.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// What was attempted.
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// From an observer of another crate.
+    #[error(transparent)]
+    Observer(Box<dyn std::error::Error + Send + Sync>),
+    /// From run directories.
+    #[error(transparent)]
+    Runs(#[from] runs::Error),
+    /// From the finite elements.
+    #[error(transparent)]
+    Fem(#[from] fem::Error),
+    /// From networks.
+    #[error(transparent)]
+    Model(#[from] model::Error),
+    /// From the solver, before the first step.
+    #[error(transparent)]
+    Solver(#[from] solver::Error),
+    /// From the device.
+    #[error(transparent)]
+    Operators(#[from] operators::Error),
+    /// From grids and fields.
+    #[error(transparent)]
+    Geometry(#[from] geometry::Error),
+    /// From meshes.
+    #[error(transparent)]
+    Surfaces(#[from] surfaces::Error),
+}
+
+impl Error {
+    /// Wraps what an observer of another crate raised.
+    pub fn observer(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
+        Self::Observer(error.into())
+    }
+}

@@ -1,0 +1,72 @@
+//! Cases of Willmore flow and mean curvature flow, run and resumed by one loop over time steps.
+//!
+//! ```
+//! use engine::{Case, Flow, Measure, Networks, Operator, Run, Scales, Scheme, StepRule, Stop};
+//! use geometry::{Grid, phase_field, shapes::Cuboid};
+//! use operators::ComputeDevice;
+//! use runs::Interrupt;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // A square becomes round: the bending energy falls towards that of a circle, pi / R.
+//! let grid = Grid::<2>::per_unit(64, 1.0)?.with_origin([-0.5; 2])?;
+//! let scales = Scales::of_grid(grid.spacing(), 2.0);
+//! let network = Networks::default().find(Scheme::Accurate, &scales.needs(2, grid.spacing()))?;
+//! let case = Case {
+//!     shape: "square of side 1/2".to_owned(),
+//!     initial: phase_field(grid, &Cuboid::new([0.25; 2])?, scales.eps)?,
+//!     region: None,
+//!     flow: Flow::Willmore,
+//!     operator: Operator::learned(Scheme::Accurate, network)?,
+//!     scales,
+//!     steps: StepRule::ByEnergy(None).into(),
+//!     stops: vec![Stop::Steps(4)],
+//!     measures: Measure::size(scales.eps),
+//! };
+//! let mut run = Run::new(case, &ComputeDevice::default_compiled()?)?;
+//! run.advance(None, &mut [], &Interrupt::never())?;
+//! for record in run.records() {
+//!     println!("t = {:.2e}: w = {:.1}", record.time, record.willmore_energy().unwrap());
+//! }
+//! # let energies: Vec<f64> = run.records().iter().filter_map(|r| r.willmore_energy()).collect();
+//! # assert!(energies.len() == 4 && energies.windows(2).all(|w| w[1] < w[0]));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! A [`Case`] is everything that a result depends on: initial phase field, region, operator, scales, time steps, stop rules, measures.
+//! A [`Run`] is a case on its way, and [`Run::advance`] the only loop over time steps. Between two steps the solver knows nothing of
+//! files, progress or shapes; [observers](Observer) are told after each accepted step. A [`Store`] keeps a run on disk: one checkpoint
+//! holds the phase fields and all records, and a run that is resumed from it ends with the same bytes.
+//!
+//! New parts have one place each: a step rule in [`StepRule`], a stop rule in [`Stop`], a method in [`Method`], a measure in
+//! [`Measure`], an observer behind [`Observer`], a named shape in [`shapes`].
+
+mod case;
+mod error;
+mod measure;
+mod motion;
+mod observer;
+mod operator;
+mod record;
+mod run;
+pub mod shapes;
+mod steps;
+mod stop;
+mod store;
+mod substeps;
+mod trajectory;
+
+pub use case::Case;
+pub use error::Error;
+pub use measure::Measure;
+pub use observer::{Event, Observer, Samples};
+pub use operator::{
+    Flow, Method, NamedNetwork, NeededNetwork, Networks, Operator, Scales, Scheme, checksum,
+    quarter_square,
+};
+pub use record::{Record, Values, to_csv};
+pub use run::{Ending, Run};
+pub use steps::{StepRule, TimeSteps};
+pub use stop::{Stop, has_interface, touches_side};
+pub use store::{Checkpoints, METRICS, Store, dimension, initial, notes};
+pub use trajectory::Trajectory;

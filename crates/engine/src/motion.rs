@@ -1,0 +1,132 @@
+//! The two flows as one thing that advances.
+
+use fem::{FiniteElementStep, Statistics};
+use geometry::Field;
+use operators::ComputeDevice;
+use solver::{FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow};
+
+use crate::{Case, Error, Flow, Method};
+
+/// A flow between two steps.
+pub(crate) struct Motion<const D: usize> {
+    flow: Either<D>,
+    /// The finite-element step inside, for its statistics.
+    elements: Option<FiniteElementStep<D>>,
+}
+
+enum Either<const D: usize> {
+    Willmore(Box<WillmoreFlow<D>>),
+    MeanCurvature {
+        flow: MeanCurvatureFlow<D>,
+        tau: f64,
+        step: usize,
+    },
+}
+
+impl<const D: usize> Motion<D> {
+    /// The flow of a case, at a state of it.
+    pub(crate) fn new(
+        case: &Case<D>,
+        state: &FlowState<D>,
+        device: &ComputeDevice,
+    ) -> Result<Self, Error> {
+        let (params, operator) = (case.params(), &case.operator);
+        let elements = match operator.method {
+            Method::Hybrid => None,
+            _ => Some(operator.elements(case.grid(), &case.scales)?),
+        };
+        let network = operator.network().map(|named| &named.network);
+        let flow = match case.flow {
+            Flow::Willmore => {
+                let mut flow = match (&elements, network) {
+                    (Some(step), _) => {
+                        WillmoreFlow::new(step.clone(), &case.initial, params, device)?
+                    }
+                    (None, Some(network)) => {
+                        WillmoreFlow::with_network(network, &case.initial, params, device)?
+                    }
+                    (None, None) => unreachable!("a learned operator has a network"),
+                };
+                if let Some(network) = network.filter(|_| operator.half_grids) {
+                    flow.begin_on_half_grids(network)?;
+                }
+                if let Some(region) = &case.region {
+                    flow.restrict_to(region)?;
+                }
+                flow.restore(state)?;
+                Either::Willmore(Box::new(flow))
+            }
+            Flow::MeanCurvature => {
+                let from = &state.current;
+                let flow = match (&elements, network) {
+                    (Some(step), _) => MeanCurvatureFlow::new(step.clone(), from, device)?,
+                    (None, Some(network)) => {
+                        MeanCurvatureFlow::with_network(network, from, &params, device)?
+                    }
+                    (None, None) => unreachable!("a learned operator has a network"),
+                };
+                Either::MeanCurvature {
+                    flow,
+                    tau: params.mcf_step,
+                    step: state.step,
+                }
+            }
+        };
+        Ok(Self { flow, elements })
+    }
+
+    /// Time reached.
+    pub(crate) fn time(&self) -> f64 {
+        match &self.flow {
+            Either::Willmore(flow) => flow.time(),
+            Either::MeanCurvature { tau, step, .. } => *step as f64 * tau,
+        }
+    }
+
+    /// Minimizations made, or steps of mean curvature flow.
+    pub(crate) fn count(&self) -> usize {
+        match &self.flow {
+            Either::Willmore(flow) => flow.steps(),
+            Either::MeanCurvature { step, .. } => *step,
+        }
+    }
+
+    /// One minimization of this size, or one step of mean curvature flow, whose size is that of its operator.
+    pub(crate) fn advance(&mut self, size: f64) -> Result<Option<StepRecord>, solver::Error> {
+        match &mut self.flow {
+            Either::Willmore(flow) => flow.advance(size).map(Some),
+            Either::MeanCurvature { flow, step, .. } => {
+                flow.advance()?;
+                *step += 1;
+                Ok(None)
+            }
+        }
+    }
+
+    /// The phase field.
+    pub(crate) fn field(&self) -> Result<Field<D>, solver::Error> {
+        match &self.flow {
+            Either::Willmore(flow) => flow.field(),
+            Either::MeanCurvature { flow, .. } => flow.field(),
+        }
+    }
+
+    /// All that the following steps depend on.
+    pub(crate) fn state(&self) -> Result<FlowState<D>, solver::Error> {
+        match &self.flow {
+            Either::Willmore(flow) => flow.state(),
+            Either::MeanCurvature { flow, step, .. } => Ok(FlowState {
+                current: flow.field()?,
+                previous: None,
+                half_motions: Vec::new(),
+                step: *step,
+                time: self.time(),
+            }),
+        }
+    }
+
+    /// Work of the linear solves inside finite elements so far.
+    pub(crate) fn statistics(&self) -> Option<Statistics> {
+        self.elements.as_ref().map(FiniteElementStep::statistics)
+    }
+}

@@ -1,0 +1,490 @@
+//! The step of mean curvature flow inside a flow, and the weights of its energy.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use fem::{FiniteElementStep, LinearSolver};
+use geometry::Grid;
+use model::{Network, Ratios, pretrained};
+use runs::fingerprint;
+use serde::{Deserialize, Serialize};
+use solver::{Factors, NewtonParams};
+
+use crate::Error;
+
+/// The geometric flow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Flow {
+    /// Mean curvature flow.
+    #[serde(rename = "mcf")]
+    MeanCurvature,
+    /// Willmore flow.
+    Willmore,
+}
+
+impl Flow {
+    /// Both flows.
+    pub const ALL: [Self; 2] = [Self::MeanCurvature, Self::Willmore];
+
+    /// Name in files and metrics.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::MeanCurvature => "mcf",
+            Self::Willmore => "willmore",
+        }
+    }
+
+    /// Name in titles.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::MeanCurvature => "Mean curvature flow",
+            Self::Willmore => "Willmore flow",
+        }
+    }
+}
+
+/// How a step of mean curvature flow is approximated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
+#[cfg_attr(feature = "clap", value(rename_all = "snake_case"))]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// The learned operator
+    #[cfg_attr(feature = "clap", value(alias = "network"))]
+    Hybrid,
+    /// Implicit finite elements (Franken, Rumpf and Wirth)
+    #[cfg_attr(feature = "clap", value(alias = "fe-implicit"))]
+    FeImplicit,
+    /// Semi-implicit finite elements
+    #[cfg_attr(feature = "clap", value(alias = "fe-semi"))]
+    FeSemi,
+}
+
+/// How the energy of a time step of Willmore flow is weighted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
+#[cfg_attr(feature = "clap", value(rename_all = "snake_case"))]
+#[serde(rename_all = "snake_case")]
+pub enum Scheme {
+    /// As in the paper
+    #[default]
+    Paper,
+    /// Divided by the step's calibration factors; a learned operator with its odd part, which treats both phases alike
+    Calibrated,
+    /// Calibrated, with the operator of the accurate recipe in place of the paper's
+    Accurate,
+}
+
+impl Scheme {
+    /// All schemes, in the order of legends.
+    pub const ALL: [Self; 3] = [Self::Paper, Self::Calibrated, Self::Accurate];
+
+    /// Name in options and files.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::Calibrated => "calibrated",
+            Self::Accurate => "accurate",
+        }
+    }
+}
+
+impl Method {
+    /// All methods, in the order of legends.
+    pub const ALL: [Self; 3] = [Self::Hybrid, Self::FeImplicit, Self::FeSemi];
+
+    /// Name in files and metrics.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Hybrid => "hybrid",
+            Self::FeImplicit => "fe_implicit",
+            Self::FeSemi => "fe_semi",
+        }
+    }
+
+    /// Name in legends.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Hybrid => "learned operator",
+            Self::FeImplicit => "FE implicit",
+            Self::FeSemi => "FE semi-implicit",
+        }
+    }
+
+    /// Name in files and metrics in a scheme.
+    pub fn key_in(self, scheme: Scheme) -> String {
+        match scheme {
+            Scheme::Paper => self.key().to_owned(),
+            scheme => format!("{}_{}", self.key(), scheme.key()),
+        }
+    }
+
+    /// Name in legends in a scheme.
+    pub fn label_in(self, scheme: Scheme) -> String {
+        match scheme {
+            Scheme::Paper => self.label().to_owned(),
+            Scheme::Calibrated => format!("{}, calibrated", self.label()),
+            Scheme::Accurate => "accurate operator, calibrated".to_owned(),
+        }
+    }
+
+    /// Whether the method needs a trained network.
+    pub fn is_learned(self) -> bool {
+        self == Self::Hybrid
+    }
+
+    /// The schemes that make a difference for a flow with this method: mean curvature flow has no energy to be weighted, and
+    /// only operators are learned.
+    pub fn schemes(self, flow: Flow) -> &'static [Scheme] {
+        match (flow, self.is_learned()) {
+            (Flow::Willmore, true) => &Scheme::ALL,
+            (Flow::Willmore, false) => &[Scheme::Paper, Scheme::Calibrated],
+            (Flow::MeanCurvature, true) => &[Scheme::Paper, Scheme::Accurate],
+            (Flow::MeanCurvature, false) => &[Scheme::Paper],
+        }
+    }
+
+    /// Of these, the wanted one, or the paper's where that makes no difference; all if none is wanted.
+    pub fn chosen_schemes(self, flow: Flow, wanted: Option<Scheme>) -> Vec<Scheme> {
+        let available = self.schemes(flow);
+        match wanted {
+            None => available.to_vec(),
+            Some(wanted) if available.contains(&wanted) => vec![wanted],
+            Some(_) => vec![Scheme::Paper],
+        }
+    }
+}
+
+/// The lengths that a phase field and its flow depend on, and the settings of the minimization.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Scales {
+    /// Interface width `eps`.
+    pub eps: f64,
+    /// Inner time step `tautilde` of mean curvature flow.
+    pub mcf_step: f64,
+    /// Settings of the minimization.
+    pub newton: NewtonParams,
+}
+
+impl Scales {
+    /// The scales of a grid of spacing `h`: `eps` in cells, and `tautilde = eps^2 / 4` as in all of the paper's experiments.
+    pub fn of_grid(h: f64, eps_over_h: f64) -> Self {
+        Self {
+            eps: eps_over_h * h,
+            mcf_step: quarter_square(eps_over_h) * h * h,
+            newton: NewtonParams::default(),
+        }
+    }
+
+    /// The network that fits a grid of spacing `h` in `dimension` dimensions, of any kernel width.
+    pub fn needs(&self, dimension: usize, h: f64) -> NeededNetwork {
+        NeededNetwork {
+            dimension,
+            width: None,
+            eps_over_h: self.eps / h,
+            step_over_h2: self.mcf_step / (h * h),
+        }
+    }
+}
+
+/// `tautilde / h^2` for an interface width in cells: `(eps/h)^2 / 4`.
+pub fn quarter_square(eps_over_h: f64) -> f64 {
+    0.25 * eps_over_h * eps_over_h
+}
+
+/// The ratios that a network must have.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct NeededNetwork {
+    /// Of space.
+    pub dimension: usize,
+    /// Width of the kernel in cells; none if it does not matter.
+    pub width: Option<usize>,
+    /// Interface width in cells.
+    pub eps_over_h: f64,
+    /// `tautilde / h^2`.
+    pub step_over_h2: f64,
+}
+
+impl NeededNetwork {
+    /// Exactly these ratios.
+    pub fn exactly(ratios: Ratios) -> Self {
+        Self {
+            dimension: ratios.dimension,
+            width: Some(ratios.width),
+            eps_over_h: ratios.eps_over_h,
+            step_over_h2: ratios.step_over_h2,
+        }
+    }
+
+    /// The same with a kernel of this width.
+    pub fn of_width(self, width: usize) -> Self {
+        Self {
+            width: Some(width),
+            ..self
+        }
+    }
+
+    /// With the width that is wanted, or else the usual one, `8 eps/h + 1`.
+    fn ratios(&self) -> Ratios {
+        let usual = 8 * self.eps_over_h.clamp(1.0, 64.0).ceil() as usize + 1;
+        Ratios {
+            dimension: self.dimension,
+            width: self.width.unwrap_or(usual),
+            eps_over_h: self.eps_over_h,
+            step_over_h2: self.step_over_h2,
+        }
+    }
+
+    fn is_met_by(&self, network: &Network) -> bool {
+        let own = network.ratios();
+        own.matches(&Ratios {
+            width: self.width.unwrap_or(own.width),
+            ..self.ratios()
+        })
+    }
+}
+
+/// A network and what it is called.
+#[derive(Clone, Debug)]
+pub struct NamedNetwork {
+    /// Name of its file without the extension.
+    pub name: String,
+    /// The network.
+    pub network: Network,
+}
+
+/// Where networks come from: files that the user names, before those that are shipped.
+#[derive(Clone, Debug, Default)]
+pub struct Networks {
+    files: Vec<NamedNetwork>,
+}
+
+impl Networks {
+    /// The networks in these files.
+    ///
+    /// # Errors
+    /// [`Error::Model`] for a file that is no network, and for one that meets none of the needs.
+    pub fn load(paths: &[impl AsRef<Path>], needs: &[NeededNetwork]) -> Result<Self, Error> {
+        let mut files = Vec::new();
+        for path in paths.iter().map(AsRef::as_ref) {
+            let network = Network::load(path)?;
+            if !needs.iter().any(|need| need.is_met_by(&network)) {
+                let own = network.ratios();
+                let alike = |need: &&NeededNetwork| {
+                    let width = need.width.unwrap_or(own.width);
+                    usize::from(need.dimension == own.dimension) + usize::from(width == own.width)
+                };
+                // The need that is most like the network makes the most helpful message.
+                let nearest = (needs.iter().max_by_key(alike)).ok_or(Error::NetworkNotNeeded)?;
+                let run = Ratios {
+                    width: nearest.width.unwrap_or(own.width),
+                    ..nearest.ratios()
+                };
+                return Err(model::Error::Mismatch { network: own, run }.into());
+            }
+            files.push(NamedNetwork {
+                name: stem(path),
+                network,
+            });
+        }
+        Ok(Self { files })
+    }
+
+    /// The network of a scheme: that of the last file that fits, else the widest shipped one.
+    ///
+    /// # Errors
+    /// [`Error::MissingNetwork`] naming the ratios and those available.
+    pub fn find(&self, scheme: Scheme, needed: &NeededNetwork) -> Result<NamedNetwork, Error> {
+        let fits = |network: &Network| needed.is_met_by(network);
+        if let Some(own) = self.files.iter().rev().find(|file| fits(&file.network)) {
+            return Ok(own.clone());
+        }
+        let (recipe, shipped) = match scheme {
+            Scheme::Accurate => ("accurate", pretrained::all_accurate()?),
+            Scheme::Calibrated | Scheme::Paper => ("paper's", pretrained::all()?),
+        };
+        let mut available: Vec<f64> = (shipped.iter().map(|(_, network)| network.ratios()))
+            .filter(|ratios| ratios.dimension == needed.dimension)
+            .map(|ratios| ratios.eps_over_h)
+            .collect();
+        (shipped.into_iter())
+            .filter(|(_, network)| fits(network))
+            .max_by_key(|(_, network)| network.ratios().width)
+            .map(|(name, network)| NamedNetwork {
+                name: stem(Path::new(name)),
+                network,
+            })
+            .ok_or_else(|| {
+                available.sort_by(f64::total_cmp);
+                available.dedup();
+                let list: Vec<String> =
+                    (available.iter().map(|eps| format!("eps/h = {eps}"))).collect();
+                Error::MissingNetwork {
+                    recipe,
+                    wanted: needed.ratios(),
+                    available: list.join(", "),
+                }
+            })
+    }
+}
+
+fn stem(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or(path.as_os_str());
+    stem.to_string_lossy().into_owned()
+}
+
+/// SHA-256 of the numbers of a network, in hexadecimal: two networks with the same act alike.
+pub fn checksum(network: &Network) -> String {
+    let mut bytes = network.ratios().to_string().into_bytes();
+    for width in network.activation().layers() {
+        bytes.extend(width.to_le_bytes());
+    }
+    let numbers = network
+        .kernel()
+        .iter()
+        .chain(network.activation().parameters());
+    bytes.extend(numbers.flat_map(|value| value.to_le_bytes()));
+    fingerprint(bytes)
+}
+
+/// The step of mean curvature flow of a case, and what its energy is divided by.
+#[derive(Clone, Debug)]
+pub struct Operator {
+    /// How the step is made.
+    pub method: Method,
+    /// How the energy is weighted.
+    pub scheme: Scheme,
+    /// What the energy is divided by, term by term.
+    pub factors: Factors,
+    /// How the linear systems of implicit finite elements are solved.
+    pub linear: LinearSolver,
+    /// Whether steps of a learned operator begin on coarser grids where networks for those are shipped. The result differs by less
+    /// than the tolerance of the minimization.
+    pub half_grids: bool,
+    network: Option<Arc<NamedNetwork>>,
+}
+
+/// What of an operator a result depends on.
+#[derive(Serialize)]
+pub(crate) struct Identity<'a> {
+    method: Method,
+    scheme: Scheme,
+    factors: Factors,
+    half_grids: bool,
+    network: Option<(&'a str, String)>,
+}
+
+impl Operator {
+    /// A learned operator with the network that [`Networks::find`] has for the scheme: the calibrated scheme takes its odd part.
+    ///
+    /// # Errors
+    /// [`Error::Model`] if the step cannot be calibrated.
+    pub fn learned(scheme: Scheme, network: NamedNetwork) -> Result<Self, Error> {
+        let NamedNetwork { name, network } = network;
+        let (network, factors) = match scheme {
+            Scheme::Paper => (network, Factors::PAPER),
+            // The odd part has the same factors to first order in its difference to the whole.
+            Scheme::Calibrated => (network.odd_part(), network.calibration()?.factors),
+            Scheme::Accurate => {
+                let factors = network.calibration()?.factors;
+                (network, factors)
+            }
+        };
+        Ok(Self {
+            method: Method::Hybrid,
+            scheme,
+            factors,
+            linear: LinearSolver::default(),
+            half_grids: true,
+            network: Some(Arc::new(NamedNetwork { name, network })),
+        })
+    }
+
+    /// Finite elements on grids like this one.
+    ///
+    /// # Errors
+    /// [`Error::Fem`] if the scales do not fit the grid, [`Error::Model`] if the step cannot be calibrated.
+    ///
+    /// # Panics
+    /// If the method is the learned one.
+    pub fn finite_elements<const D: usize>(
+        method: Method,
+        scheme: Scheme,
+        grid: &Grid<D>,
+        scales: &Scales,
+    ) -> Result<Self, Error> {
+        assert!(!method.is_learned(), "a learned operator needs a network");
+        let mut operator = Self {
+            method,
+            scheme,
+            factors: Factors::PAPER,
+            linear: LinearSolver::default(),
+            half_grids: false,
+            network: None,
+        };
+        if scheme != Scheme::Paper {
+            operator.factors = operator.elements(grid, scales)?.calibrate()?.factors;
+        }
+        Ok(operator)
+    }
+
+    /// The operator of a method in a scheme: [`Self::learned`] with the network that meets the need, or [`Self::finite_elements`].
+    ///
+    /// # Errors
+    /// Those of the two, and of [`Networks::find`].
+    pub fn new<const D: usize>(
+        (method, scheme): (Method, Scheme),
+        networks: &Networks,
+        needed: &NeededNetwork,
+        grid: &Grid<D>,
+        scales: &Scales,
+    ) -> Result<Self, Error> {
+        if method.is_learned() {
+            Self::learned(scheme, networks.find(scheme, needed)?)
+        } else {
+            Self::finite_elements(method, scheme, grid, scales)
+        }
+    }
+
+    /// The network, if the operator is learned.
+    pub fn network(&self) -> Option<&NamedNetwork> {
+        self.network.as_deref()
+    }
+
+    /// Name of method and scheme in legends.
+    pub fn label(&self) -> String {
+        self.method.label_in(self.scheme)
+    }
+
+    /// Name of method and scheme in files and metrics.
+    pub fn key(&self) -> String {
+        self.method.key_in(self.scheme)
+    }
+
+    pub(crate) fn identity(&self) -> Identity<'_> {
+        let network = self.network();
+        Identity {
+            method: self.method,
+            scheme: self.scheme,
+            factors: self.factors,
+            half_grids: self.half_grids,
+            network: network.map(|n| (n.name.as_str(), checksum(&n.network))),
+        }
+    }
+
+    /// The finite-element step on a grid.
+    pub(crate) fn elements<const D: usize>(
+        &self,
+        grid: &Grid<D>,
+        scales: &Scales,
+    ) -> Result<FiniteElementStep<D>, Error> {
+        let (eps, step) = (scales.eps, scales.mcf_step);
+        Ok(match self.method {
+            Method::FeSemi => FiniteElementStep::semi_implicit(grid, eps, step)?,
+            Method::FeImplicit | Method::Hybrid => {
+                FiniteElementStep::implicit_with(grid, eps, step, self.linear)?
+            }
+        })
+    }
+}

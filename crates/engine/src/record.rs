@@ -1,0 +1,148 @@
+//! What is known about each minimization of a flow.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use solver::StepRecord;
+
+/// Values of the measures of a case by their names; those that a shape does not have are absent.
+pub type Values = BTreeMap<String, f64>;
+
+/// One minimization of Willmore flow, or one step of mean curvature flow: a time step or a substep of one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// Number of the time step to which it belongs, from 1.
+    pub step: usize,
+    /// Whether it is the end of that step.
+    pub completes_step: bool,
+    /// Time at its end.
+    pub time: f64,
+    /// Its size.
+    pub tau: f64,
+    /// How often it was halved because the minimization failed.
+    pub halvings: u32,
+    /// `L2` distance that the phase field moved,
+    pub moved: f64,
+    /// and `L2` distance from the initial phase field.
+    pub travelled: f64,
+    /// What the minimization did; none for mean curvature flow.
+    pub minimization: Option<StepRecord>,
+    /// The measures of the case.
+    pub measures: Values,
+    /// Wall time in seconds, failed attempts included. Checkpoints do not hold it, since they are the same bytes for the same result.
+    #[serde(skip)]
+    pub seconds: f64,
+}
+
+impl Record {
+    /// The Willmore energy as the scheme measures it.
+    pub fn willmore_energy(&self) -> Option<f64> {
+        self.minimization.map(|made| made.willmore_energy)
+    }
+
+    /// Hessian-vector products; those on coarser grids count by their share of this grid's unknowns.
+    pub fn hvp(&self) -> Option<f64> {
+        self.minimization.map(|made| made.hvp())
+    }
+
+    /// A measure, by its name.
+    pub fn measure(&self, name: &str) -> Option<f64> {
+        self.measures.get(name).copied()
+    }
+}
+
+/// All records as CSV, with a column for each measure.
+pub fn to_csv(records: &[Record]) -> String {
+    let mut names: Vec<&str> = (records.iter())
+        .flat_map(|record| record.measures.keys().map(String::as_str))
+        .collect();
+    names.sort_unstable();
+    names.dedup();
+    let head = [
+        "step",
+        "time",
+        "tau",
+        "energy_before",
+        "energy",
+        "willmore_energy",
+    ];
+    let tail = ["newton", "hvp", "halvings"];
+    let columns: Vec<&str> = (head.iter().chain(&names).chain(&tail).copied()).collect();
+    let mut text = columns.join(",") + "\n";
+    for record in records {
+        let made = record.minimization;
+        let number = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
+        let mut row = vec![
+            record.step.to_string(),
+            record.time.to_string(),
+            record.tau.to_string(),
+            number(made.map(|m| m.energy_before)),
+            number(made.map(|m| m.energy)),
+            number(made.map(|m| m.willmore_energy)),
+        ];
+        row.extend(names.iter().map(|name| number(record.measure(name))));
+        row.push(made.map_or(String::new(), |m| m.newton.newton.to_string()));
+        row.push(number(record.hvp()));
+        row.push(record.halvings.to_string());
+        text += &(row.join(",") + "\n");
+    }
+    text
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use solver::{Exit, NewtonInfo, PhaseTimes, Start};
+
+    /// A minimization of a size that took so many Newton steps.
+    pub(crate) fn record(tau: f64, newton: usize) -> Record {
+        Record {
+            step: 1,
+            completes_step: false,
+            time: 0.0,
+            tau,
+            halvings: 0,
+            moved: 0.0,
+            travelled: 0.0,
+            minimization: Some(StepRecord {
+                step: 1,
+                time: 0.0,
+                tau,
+                energy_before: 1.0,
+                energy: 1.0,
+                willmore_energy: 1.0,
+                start: Start::default(),
+                newton: NewtonInfo {
+                    exit: Exit::Converged,
+                    newton,
+                    hvp: 0,
+                    values: 0,
+                    gradients: 0,
+                    negative_curvature: 0,
+                    energy_before: 1.0,
+                    energy: 1.0,
+                    estimate: 0.0,
+                },
+                seconds: 0.0,
+                times: PhaseTimes::default(),
+            }),
+            measures: Values::from([("volume".to_owned(), 0.5)]),
+            seconds: 1.0,
+        }
+    }
+
+    #[test]
+    fn tables_have_a_column_for_each_measure() {
+        let mut curve = record(0.25, 3);
+        curve.minimization = None;
+        curve.measures.insert("tip".to_owned(), 1.5);
+        let text = to_csv(&[record(0.5, 2), curve]);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(
+            lines[0],
+            "step,time,tau,energy_before,energy,willmore_energy,tip,volume,newton,hvp,halvings"
+        );
+        assert_eq!(lines[1], "1,0,0.5,1,1,1,,0.5,2,0,0");
+        assert_eq!(lines[2], "1,0,0.25,,,,1.5,0.5,,,0");
+    }
+}

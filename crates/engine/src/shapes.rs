@@ -1,0 +1,237 @@
+//! Shapes that can be named: boxes and balls, and those that are built in.
+
+use std::fmt;
+use std::str::FromStr;
+
+use geometry::shapes::{Ball, Cross, Cuboid, Cylinder, Torus};
+use geometry::{SignedDistance, SignedDistanceExt};
+use surfaces::ClosedMesh;
+
+use crate::Error;
+
+/// A box or a ball in the box of the grid, written `box:x0,y0,x1,y1` or `ball:x,y,r`, in 3D with `z`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Region {
+    kind: Kind,
+    numbers: Vec<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Box,
+    Ball,
+}
+
+impl Kind {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Box => "box",
+            Self::Ball => "ball",
+        }
+    }
+}
+
+impl Region {
+    /// Whether a text is meant to be a region, and not the name of a file.
+    pub fn is_meant(text: &str) -> bool {
+        text.starts_with("box:") || text.starts_with("ball:")
+    }
+
+    /// What the region is called: box or ball.
+    pub fn name(&self) -> &'static str {
+        self.kind.name()
+    }
+
+    /// The dimension of space that its numbers fit; a wrong number of them is left to [`Self::shape`].
+    pub fn dimension(&self) -> usize {
+        let in_space = match self.kind {
+            Kind::Box => 6,
+            Kind::Ball => 4,
+        };
+        if self.numbers.len() < in_space { 2 } else { 3 }
+    }
+
+    /// The signed distance in `D` dimensions.
+    ///
+    /// # Errors
+    /// [`Error::Options`] if there are too many or too few numbers, or if they enclose nothing.
+    pub fn shape<const D: usize>(&self) -> Result<Box<dyn SignedDistance<D>>, Error> {
+        let needed = match self.kind {
+            Kind::Box => 2 * D,
+            Kind::Ball => D + 1,
+        };
+        let numbers = &self.numbers;
+        if numbers.len() != needed {
+            return Err(Error::Shape(format!(
+                "{self} has {} numbers, and a {} in {D}D has {needed}",
+                numbers.len(),
+                self.kind.name()
+            )));
+        }
+        let first: [f64; D] = std::array::from_fn(|i| numbers[i]);
+        Ok(match self.kind {
+            Kind::Ball => Box::new(Ball::new(first, numbers[D])?),
+            Kind::Box => {
+                let last: [f64; D] = std::array::from_fn(|i| numbers[D + i]);
+                if (0..D).any(|i| first[i] >= last[i]) {
+                    return Err(Error::Shape(format!(
+                        "{self} is empty: give the lower corner first, then the upper one"
+                    )));
+                }
+                let half = std::array::from_fn(|i| 0.5 * (last[i] - first[i]));
+                let centre = std::array::from_fn(|i| 0.5 * (first[i] + last[i]));
+                Box::new(Cuboid::new(half)?.translated(centre))
+            }
+        })
+    }
+}
+
+impl FromStr for Region {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let advice = "give box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z";
+        let (kind, rest) = match text.split_once(':') {
+            Some(("box", rest)) => (Kind::Box, rest),
+            Some(("ball", rest)) => (Kind::Ball, rest),
+            _ => return Err(format!("{text:?} is no region: {advice}")),
+        };
+        let numbers = rest
+            .split(',')
+            .map(|number| match number.trim().parse::<f64>() {
+                Ok(value) if value.is_finite() => Ok(value),
+                _ => Err(format!(
+                    "{number:?} in {text:?} is no finite number: {advice}"
+                )),
+            })
+            .collect::<Result<_, _>>()?;
+        Ok(Self { kind, numbers })
+    }
+}
+
+impl fmt::Display for Region {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let numbers: Vec<String> = self.numbers.iter().map(ToString::to_string).collect();
+        write!(f, "{}:{}", self.kind.name(), numbers.join(","))
+    }
+}
+
+/// Cells per side of the grid on which built-in meshes are made.
+const MESH_CELLS: usize = 96;
+
+/// A shape that needs no file.
+pub enum BuiltIn {
+    /// In the plane.
+    Plane(Box<dyn SignedDistance<2>>),
+    /// In space.
+    Space(Box<dyn SignedDistance<3>>),
+    /// A mesh that is yet to be placed.
+    Mesh(ClosedMesh),
+}
+
+/// The built-in shapes and whether they are in the plane.
+const BUILT_IN: [(&str, bool); 10] = [
+    ("disc", true),
+    ("ring", true),
+    ("cross", true),
+    ("rectangle", true),
+    ("sphere", false),
+    ("cube", false),
+    ("torus", false),
+    ("coin", false),
+    ("figure", false),
+    ("lever", false),
+];
+
+/// The dimension of a built-in shape.
+///
+/// # Errors
+/// [`Error::Options`] naming those that there are.
+pub fn dimension(name: &str) -> Result<usize, Error> {
+    match BUILT_IN.iter().find(|(known, _)| *known == name) {
+        Some((_, true)) => Ok(2),
+        Some((_, false)) => Ok(3),
+        None => Err(Error::Shape(format!(
+            "there is no built-in shape {name:?}; there are {}",
+            BUILT_IN.map(|(name, _)| name).join(", ")
+        ))),
+    }
+}
+
+/// A built-in shape about 0 with the given longest side.
+///
+/// # Errors
+/// [`Error::Options`] for a name that is none; [`Error::Geometry`] for a side that is not positive.
+pub fn built_in(name: &str, side: f64) -> Result<BuiltIn, Error> {
+    dimension(name)?;
+    let half = 0.5 * side;
+    Ok(match name {
+        "disc" => BuiltIn::Plane(Box::new(Ball::new([0.0; 2], half)?)),
+        "ring" => {
+            let hole = Ball::new([0.0; 2], 0.5 * half)?;
+            BuiltIn::Plane(Box::new(Ball::new([0.0; 2], half)?.difference(hole)))
+        }
+        "cross" => BuiltIn::Plane(Box::new(Cross::new(half, half / 3.0)?)),
+        "rectangle" => BuiltIn::Plane(Box::new(Cuboid::new([half, 0.5 * half])?)),
+        "sphere" => BuiltIn::Space(Box::new(Ball::new([0.0; 3], half)?)),
+        "cube" => BuiltIn::Space(Box::new(Cuboid::new([half; 3])?)),
+        "torus" => BuiltIn::Space(Box::new(Torus::new(0.72 * half, 0.28 * half)?)),
+        "coin" => BuiltIn::Space(Box::new(Cylinder::new(half, 0.4 * half)?)),
+        "figure" => BuiltIn::Mesh(surfaces::samples::figure(MESH_CELLS)?),
+        _ => BuiltIn::Mesh(surfaces::samples::lever(MESH_CELLS)?),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regions_are_read_back_and_measure_distances() {
+        let text = "box:-0.5,-1,0.5,1";
+        let region: Region = text.parse().unwrap();
+        assert_eq!(region.to_string(), text);
+        let shape = region.shape::<2>().unwrap();
+        assert!((shape.signed_distance([0.0, 0.0]) + 0.5).abs() < 1e-15);
+        assert!(region.shape::<3>().is_err());
+        let ball: Region = "ball:0,0,0.5,0.25".parse().unwrap();
+        assert!((ball.shape::<3>().unwrap().signed_distance([0.0; 3]) - 0.25).abs() < 1e-15);
+        for text in [
+            "box",
+            "box:",
+            "ball:1,2,x",
+            "cube:1",
+            "ball:1,nan,1",
+            "box:0,0,inf,1",
+        ] {
+            assert!(text.parse::<Region>().is_err(), "{text:?}");
+        }
+        assert!(
+            "box:1,0,0,1"
+                .parse::<Region>()
+                .unwrap()
+                .shape::<2>()
+                .is_err()
+        );
+        assert!(
+            "ball:0,0,-1"
+                .parse::<Region>()
+                .unwrap()
+                .shape::<2>()
+                .is_err()
+        );
+    }
+
+    #[test]
+    fn built_in_shapes_have_the_side_that_is_asked_for() {
+        for (name, _) in BUILT_IN {
+            let outside = match built_in(name, 0.8).unwrap() {
+                BuiltIn::Plane(shape) => shape.signed_distance([0.4 + 0.1, 0.0]),
+                BuiltIn::Space(shape) => shape.signed_distance([0.4 + 0.1, 0.0, 0.0]),
+                BuiltIn::Mesh(_) => 0.1,
+            };
+            assert!((outside - 0.1).abs() < 1e-12, "{name}: {outside}");
+        }
+        assert!(built_in("teapot", 0.8).is_err());
+    }
+}

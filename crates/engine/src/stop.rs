@@ -1,0 +1,110 @@
+//! When a flow ends.
+
+use std::fmt;
+
+use geometry::Field;
+use serde::Serialize;
+
+use crate::Record;
+
+/// A reason to end; a flow ends with the first that holds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stop {
+    /// So many time steps are made.
+    Steps(usize),
+    /// This time is reached; the last step is cut short to end there.
+    Time(f64),
+    /// The Willmore energy, as the scheme measures it, is no more than this.
+    Energy(f64),
+    /// The phase field moves by less than this fraction of the way that it has come (`L2`) per time step; a substep counts as much as
+    /// it would if the whole step were like it.
+    Motion(f64),
+    /// Three steps in a row, nearly as long as steps by the energy can be, took next to nothing of the energy away. Longer ones would
+    /// jump to other minimizers, such as an empty box.
+    EnergyAtRest,
+    /// Nothing is left inside, or nothing outside.
+    Vanished,
+    /// The shape has come to the side of the box, and so to its own periodic image, and was not there in the beginning.
+    AtTheSide,
+}
+
+/// A step that takes away less than this part of the energy takes away next to nothing.
+const LITTLE: f64 = 1e-4;
+/// So many of them in a row are the end.
+const IN_A_ROW: usize = 3;
+
+/// What a stop rule looks at.
+pub(crate) struct Situation<'a, const D: usize> {
+    pub(crate) initial: &'a Field<D>,
+    pub(crate) field: &'a Field<D>,
+    pub(crate) records: &'a [Record],
+    /// Time steps completed.
+    pub(crate) steps: usize,
+    /// Size of the time step to which the last record belongs.
+    pub(crate) step_size: f64,
+    /// The largest step by the energy.
+    pub(crate) largest: f64,
+}
+
+impl Stop {
+    /// Whether it holds.
+    pub(crate) fn holds<const D: usize>(
+        &self,
+        now: &Situation<'_, D>,
+    ) -> Result<bool, geometry::Error> {
+        let last = now.records.last();
+        Ok(match *self {
+            Self::Steps(steps) => now.steps >= steps,
+            // What is left of a sum of steps after the last one is rounding.
+            Self::Time(end) => last.is_some_and(|r| end - r.time <= 1e-12 * end),
+            Self::Energy(energy) => {
+                (last.and_then(Record::willmore_energy)).is_some_and(|w| w <= energy)
+            }
+            Self::Motion(limit) => {
+                last.is_some_and(|r| r.moved * now.step_size / r.tau <= limit * r.travelled)
+            }
+            Self::EnergyAtRest => {
+                let at_rest = |record: &Record| {
+                    record.minimization.is_some_and(|made| {
+                        let before = made.energy_at_rest();
+                        let change = (before - made.willmore_energy).abs();
+                        record.tau >= 0.25 * now.largest && change < LITTLE * before
+                    })
+                };
+                let last = now.records.len().saturating_sub(IN_A_ROW);
+                now.records.len() >= IN_A_ROW && now.records[last..].iter().all(at_rest)
+            }
+            Self::Vanished => !has_interface(now.field),
+            Self::AtTheSide => touches_side(now.field) && !touches_side(now.initial),
+        })
+    }
+}
+
+impl fmt::Display for Stop {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Steps(steps) => write!(f, "{steps} steps are made"),
+            Self::Time(time) => write!(f, "the time {time:e} is reached"),
+            Self::Energy(energy) => write!(f, "the Willmore energy is at most {energy}"),
+            Self::Motion(_) => f.write_str("the shape is stationary"),
+            Self::EnergyAtRest => f.write_str("the energy is stationary"),
+            Self::Vanished => f.write_str("the shape has vanished"),
+            Self::AtTheSide => f.write_str("the shape has come to the side of the box"),
+        }
+    }
+}
+
+/// Whether there is an interface at all.
+pub fn has_interface<const D: usize>(u: &Field<D>) -> bool {
+    let inside = u.values().iter().filter(|u| **u > 0.0).count();
+    inside > 0 && inside < u.grid().len()
+}
+
+/// Whether a node at the side of the box is not outside.
+pub fn touches_side<const D: usize>(u: &Field<D>) -> bool {
+    const OUTSIDE: f64 = -0.5;
+    let grid = u.grid();
+    let at_side = |node: usize| grid.multi_index(node).contains(&0);
+    (u.values().iter().enumerate()).any(|(node, u)| *u > OUTSIDE && at_side(node))
+}

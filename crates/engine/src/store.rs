@@ -1,0 +1,285 @@
+//! Runs on disk.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use geometry::{Field, Grid};
+use operators::ComputeDevice;
+use runs::{RunDirectory, State, StoredRun};
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
+use solver::FlowState;
+
+use crate::record::to_csv;
+use crate::{Case, Error, Record, Run};
+
+/// The table of all records in a stored run.
+pub const METRICS: &str = "metrics.csv";
+
+/// When there is a checkpoint.
+#[derive(Clone, Copy, Debug)]
+pub enum Checkpoints {
+    /// After every so many minimizations.
+    EverySteps(usize),
+    /// After the first step that ends this long after the last one.
+    Every(Duration),
+}
+
+/// The directory of a run, with a checkpoint from time to time.
+pub struct Store {
+    directory: RunDirectory,
+    checkpoints: Checkpoints,
+    /// What the application keeps in each checkpoint.
+    notes: Value,
+    last: Instant,
+}
+
+impl Store {
+    /// Starts the directory of a run with these files and a first checkpoint. `notes` are kept in all checkpoints, and a run that is
+    /// resumed has to have the same.
+    ///
+    /// # Errors
+    /// [`Error::Runs`].
+    pub fn create<const D: usize>(
+        folder: impl Into<PathBuf>,
+        files: &[(&str, &str)],
+        run: &Run<D>,
+        notes: Value,
+        checkpoints: Checkpoints,
+    ) -> Result<Self, Error> {
+        let state = pack(run, &notes)?;
+        Ok(Self {
+            directory: RunDirectory::create(folder, files, &state)?,
+            checkpoints,
+            notes,
+            last: Instant::now(),
+        })
+    }
+
+    /// Takes a stored run up where its last checkpoint is; `case` is built anew, from the [`initial`] field if need be, and must be the
+    /// stored one.
+    ///
+    /// # Errors
+    /// [`Error::OtherCase`], [`Error::Unreadable`], [`Error::Runs`], and what [`Run::new`] raises.
+    pub fn resume<const D: usize>(
+        stored: StoredRun,
+        case: Case<D>,
+        device: &ComputeDevice,
+        checkpoints: Checkpoints,
+    ) -> Result<(Self, Run<D>), Error> {
+        let run = restore(&stored, case, device)?;
+        let notes = notes(&stored).clone();
+        let (directory, _) = stored.resume()?;
+        let store = Self {
+            directory,
+            checkpoints,
+            notes,
+            last: Instant::now(),
+        };
+        Ok((store, run))
+    }
+
+    /// The directory, to which files can be added.
+    pub fn directory(&mut self) -> &mut RunDirectory {
+        &mut self.directory
+    }
+
+    /// Makes a checkpoint.
+    ///
+    /// # Errors
+    /// [`Error::Runs`].
+    pub fn commit<const D: usize>(&mut self, run: &Run<D>) -> Result<(), Error> {
+        self.write_tables(run)?;
+        self.directory.commit(&pack(run, &self.notes)?)?;
+        self.last = Instant::now();
+        Ok(())
+    }
+
+    /// Makes a checkpoint if it is time for one, or if it `must` be.
+    pub(crate) fn commit_if_due<const D: usize>(
+        &mut self,
+        run: &Run<D>,
+        must: bool,
+    ) -> Result<(), Error> {
+        let due = match self.checkpoints {
+            Checkpoints::EverySteps(steps) => run.count().is_multiple_of(steps),
+            Checkpoints::Every(time) => self.last.elapsed() >= time,
+        };
+        if due || must {
+            self.commit(run)?;
+        }
+        Ok(())
+    }
+
+    /// The last checkpoint of a run that is over, which is kept alone.
+    ///
+    /// # Errors
+    /// [`Error::Runs`].
+    pub fn finish<const D: usize>(mut self, run: &Run<D>) -> Result<(), Error> {
+        self.write_tables(run)?;
+        Ok(self.directory.finish(&pack(run, &self.notes)?)?)
+    }
+
+    fn write_tables<const D: usize>(&mut self, run: &Run<D>) -> Result<(), Error> {
+        let seconds: Vec<f64> = run.records.iter().map(|record| record.seconds).collect();
+        self.directory
+            .write_timings(&json!({ "seconds": seconds }))?;
+        let table = to_csv(&run.records);
+        self.directory
+            .replace_file(METRICS, |out| out.write_all(table.as_bytes()))?;
+        Ok(())
+    }
+}
+
+/// What the application keeps in the checkpoints of a run.
+pub fn notes(stored: &StoredRun) -> &Value {
+    &stored.state().notes["application"]
+}
+
+/// The dimension of a stored run.
+///
+/// # Errors
+/// [`Error::Unreadable`].
+pub fn dimension(stored: &StoredRun) -> Result<usize, Error> {
+    let dimension: usize = read(stored, &stored.state().notes["case"]["grid"]["dimension"])?;
+    match dimension {
+        2 | 3 => Ok(dimension),
+        other => Err(unreadable(
+            stored.path(),
+            format!("{other} is no dimension"),
+        )),
+    }
+}
+
+/// The initial phase field of a stored run, and the nodes whose values move if not all do: a case can be built from them without its
+/// input.
+///
+/// # Errors
+/// [`Error::Unreadable`].
+pub fn initial<const D: usize>(stored: &StoredRun) -> Result<(Field<D>, Option<Vec<bool>>), Error> {
+    let region = stored.state().array("region");
+    let region = region.map(|marks| marks.iter().map(|&mark| mark > 0.5).collect());
+    Ok((field(stored, "initial", grid(stored)?)?, region))
+}
+
+/// All records of a stored run with their wall times.
+pub(crate) fn records(stored: &StoredRun) -> Result<Vec<Record>, Error> {
+    let mut records: Vec<Record> = read(stored, &stored.state().notes["records"])?;
+    let seconds = stored.timings()["seconds"].as_array();
+    for (record, seconds) in records.iter_mut().zip(seconds.into_iter().flatten()) {
+        record.seconds = seconds.as_f64().unwrap_or(0.0);
+    }
+    Ok(records)
+}
+
+fn pack<const D: usize>(run: &Run<D>, notes: &Value) -> Result<State, Error> {
+    let state = run.state()?;
+    let (previous, previous_tau) = state.previous.unzip();
+    let notes = json!({
+        "case": run.case.identity(&run.device),
+        "application": notes,
+        "start": run.start,
+        "records": run.records,
+        "time": state.time,
+        "previous_tau": previous_tau,
+    });
+    let mut packed = State::new(run.count() as u64, notes)
+        .with_array("initial", run.case.initial.values().to_vec())
+        .with_array("current", state.current.into_values());
+    if let Some(previous) = previous {
+        packed = packed.with_array("previous", previous.into_values());
+    }
+    for (level, motion) in state.half_motions.into_iter().enumerate() {
+        packed = packed.with_array(&half_motion(level), motion.into_values());
+    }
+    if let Some(region) = &run.case.region {
+        let marks = region.iter().map(|&moves| f64::from(moves));
+        packed = packed.with_array("region", marks.collect());
+    }
+    Ok(packed)
+}
+
+fn half_motion(level: usize) -> String {
+    format!("half_motion_{level}")
+}
+
+fn restore<const D: usize>(
+    stored: &StoredRun,
+    case: Case<D>,
+    device: &ComputeDevice,
+) -> Result<Run<D>, Error> {
+    let state = stored.state();
+    check_identity(stored, &case.identity(device))?;
+    let grid = *case.grid();
+    let previous = if state.array("previous").is_some() {
+        let tau = read(stored, &state.notes["previous_tau"])?;
+        Some((field(stored, "previous", grid)?, tau))
+    } else {
+        None
+    };
+    let (mut half_motions, mut half) = (Vec::new(), grid);
+    while state.array(&half_motion(half_motions.len())).is_some() {
+        half = half.half()?;
+        half_motions.push(field(stored, &half_motion(half_motions.len()), half)?);
+    }
+    let at = FlowState {
+        current: field(stored, "current", grid)?,
+        previous,
+        half_motions,
+        step: usize::try_from(state.step)
+            .map_err(|error| unreadable(stored.path(), error.to_string()))?,
+        time: read(stored, &state.notes["time"])?,
+    };
+    let start = read(stored, &state.notes["start"])?;
+    Run::at(case, device, start, records(stored)?, &at)
+}
+
+/// Refuses a stored run of another case, and says in what it differs.
+pub(crate) fn check_identity(stored: &StoredRun, wanted: &Value) -> Result<(), Error> {
+    let found = &stored.state().notes["case"];
+    if found == wanted {
+        return Ok(());
+    }
+    let keys = wanted.as_object().into_iter().flat_map(|map| map.keys());
+    let differing: Vec<String> = keys
+        .filter(|key| found[key.as_str()] != wanted[key.as_str()])
+        .map(|key| {
+            format!(
+                "{key}: {} there, {} here",
+                found[key.as_str()],
+                wanted[key.as_str()]
+            )
+        })
+        .collect();
+    Err(Error::OtherCase {
+        path: stored.path().to_owned(),
+        difference: differing.join("; "),
+    })
+}
+
+fn grid<const D: usize>(stored: &StoredRun) -> Result<Grid<D>, Error> {
+    let grid = &stored.state().notes["case"]["grid"];
+    let origin: Vec<f64> = read(stored, &grid["origin"])?;
+    let origin: [f64; D] = origin
+        .try_into()
+        .map_err(|_| unreadable(stored.path(), format!("its grid is not in {D}D")))?;
+    let (cells, side) = (read(stored, &grid["cells"])?, read(stored, &grid["side"])?);
+    Ok(Grid::new(cells, side)?.with_origin(origin)?)
+}
+
+fn field<const D: usize>(stored: &StoredRun, name: &str, grid: Grid<D>) -> Result<Field<D>, Error> {
+    let values = stored.state().array(name);
+    let values = values.ok_or_else(|| unreadable(stored.path(), format!("it has no {name:?}")))?;
+    Ok(Field::from_values(grid, values.to_vec())?)
+}
+
+pub(crate) fn read<T: DeserializeOwned>(stored: &StoredRun, value: &Value) -> Result<T, Error> {
+    T::deserialize(value).map_err(|error| unreadable(stored.path(), error.to_string()))
+}
+
+fn unreadable(path: &Path, reason: String) -> Error {
+    Error::Unreadable {
+        path: path.to_owned(),
+        reason,
+    }
+}

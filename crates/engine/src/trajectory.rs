@@ -1,0 +1,205 @@
+//! Runs that are at their end, kept on disk so that they can be compared.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use geometry::measure::l2_distance;
+use geometry::{Field, npy};
+use operators::ComputeDevice;
+use runs::{Error as RunsError, Interrupt, RunDirectory, StoredRun};
+use serde_json::{Value, json};
+
+use crate::record::Values;
+use crate::store::{self, Checkpoints, check_identity};
+use crate::{Case, Ending, Error, Observer, Record, Run, Samples, Stop, Store};
+
+/// Time between two checkpoints.
+const CHECKPOINTS: Checkpoints = Checkpoints::Every(Duration::from_mins(1));
+
+/// A run at its end: the records of all steps, and the phase fields that were kept.
+pub struct Trajectory<const D: usize> {
+    /// What was run.
+    pub case: Case<D>,
+    /// The measures of the initial phase field.
+    pub start: Values,
+    /// The records of all minimizations, or of all steps of mean curvature flow.
+    pub records: Vec<Record>,
+    /// Whether another stop rule than the number of steps ended the run, perhaps in the middle of a step.
+    pub stopped_early: bool,
+    folder: PathBuf,
+}
+
+impl<const D: usize> Trajectory<D> {
+    /// Runs a case, or continues it, or only looks up what is stored in `folder`; a stored run of another case is replaced.
+    /// Nothing if it was interrupted.
+    ///
+    /// # Errors
+    /// What the run raises, and [`Error::Runs`] if something cannot be stored.
+    pub fn of(
+        case: Case<D>,
+        device: &ComputeDevice,
+        folder: &Path,
+        samples: &Samples,
+        observers: &mut [&mut dyn Observer<D>],
+        interrupt: &Interrupt,
+    ) -> Result<Option<Self>, Error> {
+        let notes = json!({ "samples": samples });
+        let (mut store, mut run) = match found(&case, device, folder, &notes)? {
+            Some(stored) if stored.is_finished() => {
+                let start = store::read(&stored, &stored.state().notes["start"])?;
+                return Ok(Some(Self::new(
+                    case,
+                    start,
+                    store::records(&stored)?,
+                    folder,
+                )));
+            }
+            Some(stored) => Store::resume(stored, case, device, CHECKPOINTS)?,
+            None => {
+                let run = Run::new(case, device)?;
+                (Store::create(folder, &[], &run, notes, CHECKPOINTS)?, run)
+            }
+        };
+        let mut samples = samples.clone();
+        let mut all: Vec<&mut dyn Observer<D>> = vec![&mut samples];
+        for observer in observers {
+            all.push(&mut **observer);
+        }
+        match run.advance(Some(&mut store), &mut all, interrupt)? {
+            Ending::Interrupted => Ok(None),
+            Ending::Stopped(_) => {
+                store.finish(&run)?;
+                Ok(Some(Self::new(run.case, run.start, run.records, folder)))
+            }
+        }
+    }
+
+    fn new(case: Case<D>, start: Values, records: Vec<Record>, folder: &Path) -> Self {
+        let complete = records.last().is_none_or(|last| last.completes_step);
+        let steps = records.last().map_or(0, |last| last.step);
+        let reached = |stop: &Stop| matches!(stop, Stop::Steps(most) if complete && steps >= *most);
+        Self {
+            stopped_early: !case.stops.iter().any(reached),
+            case,
+            start,
+            records,
+            folder: folder.to_owned(),
+        }
+    }
+
+    /// The phase field after a step, which must be one that was kept.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] if it is not there.
+    pub fn field(&self, step: usize) -> Result<Field<D>, Error> {
+        self.read(&Samples::name(step))
+    }
+
+    /// The phase field at the time `tau / 2^halvings` inside the first step, if it was to be kept and a substep ended there.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] if it cannot be read.
+    pub fn part_field(&self, halvings: u32) -> Result<Option<Field<D>>, Error> {
+        let name = Samples::part_name(halvings);
+        if !self.folder.join(&name).exists() {
+            return Ok(None);
+        }
+        self.read(&name).map(Some)
+    }
+
+    fn read(&self, name: &str) -> Result<Field<D>, Error> {
+        let grid = *self.case.grid();
+        Ok(npy::read(self.folder.join(name), |_| Ok(grid))?)
+    }
+
+    /// Time steps made, the one in whose middle the run became stationary included.
+    pub fn steps(&self) -> usize {
+        self.records.last().map_or(0, |last| last.step)
+    }
+
+    /// The records of a time step, counted from 1; none if it was not made.
+    pub fn substeps(&self, step: usize) -> &[Record] {
+        let end = |step: usize| self.records.partition_point(|record| record.step <= step);
+        &self.records[end(step.saturating_sub(1))..end(step)]
+    }
+
+    /// The record at the end of a time step, counted from 1.
+    pub fn record(&self, step: usize) -> Option<&Record> {
+        self.substeps(step).last()
+    }
+
+    /// The measures after a time step; those of the initial phase field for 0.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchStep`].
+    pub fn measures(&self, step: usize) -> Result<&Values, Error> {
+        if step == 0 {
+            return Ok(&self.start);
+        }
+        let steps = self.steps();
+        let record = self.record(step).ok_or(Error::NoSuchStep { step, steps })?;
+        Ok(&record.measures)
+    }
+
+    /// Wall time of all steps in seconds, interruptions left out.
+    pub fn seconds(&self) -> f64 {
+        self.records.iter().map(|record| record.seconds).sum()
+    }
+
+    /// `L2` distance to the phase field of a run at a multiple of the resolution after `there` of its steps, in the nodes of this grid: the
+    /// finer phase field is sampled there.
+    ///
+    /// # Errors
+    /// [`Error::Incomparable`] if the nodes of this grid are not among those of the other.
+    pub fn distance(&self, step: usize, other: &Self, there: usize) -> Result<f64, Error> {
+        let (own, fine) = (*self.case.grid(), *other.case.grid());
+        let in_place =
+            own.side().to_bits() == fine.side().to_bits() && own.origin() == fine.origin();
+        if !in_place || !fine.cells().is_multiple_of(own.cells()) {
+            return Err(Error::Incomparable {
+                cells: own.cells(),
+                reference: fine.cells(),
+            });
+        }
+        let stride = fine.cells() / own.cells();
+        let values = other.field(there)?;
+        let sampled = (0..own.len()).map(|node| {
+            let index = own.multi_index(node).map(|i| i * stride);
+            values.values()[fine.index(index)]
+        });
+        let sampled = Field::from_values(own, sampled.collect())?;
+        Ok(l2_distance(&self.field(step)?, &sampled)?)
+    }
+}
+
+/// The stored run of a case, if there is one to go on from. What else is in the folder, a run of another case or one that is damaged
+/// beyond its checkpoints, is removed: it can be computed again.
+fn found<const D: usize>(
+    case: &Case<D>,
+    device: &ComputeDevice,
+    folder: &Path,
+    notes: &Value,
+) -> Result<Option<StoredRun>, Error> {
+    let stored = match RunDirectory::open(folder) {
+        Err(RunsError::Damaged { .. }) => RunDirectory::recover(folder),
+        result => result,
+    };
+    match stored {
+        Ok(stored) => {
+            let same = check_identity(&stored, &case.identity(device)).is_ok();
+            if same && store::notes(&stored) == notes {
+                return Ok(Some(stored));
+            }
+        }
+        Err(error @ RunsError::Locked { .. }) => return Err(error.into()),
+        Err(_) => {}
+    }
+    match std::fs::remove_dir_all(folder) {
+        Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(Error::Io {
+            action: "remove",
+            path: folder.to_owned(),
+            source,
+        }),
+        _ => Ok(None),
+    }
+}

@@ -1,0 +1,82 @@
+//! Small cases.
+
+use engine::{
+    Case, Flow, Measure, Method, Networks, Operator, Run, Scales, Scheme, StepRule, Stop, TimeSteps,
+};
+use geometry::shapes::{Ball, Cuboid};
+use geometry::{Field, Grid, phase_field};
+use operators::ComputeDevice;
+use runs::Interrupt;
+
+/// Interface width of the paper's curves.
+pub const EPS: f64 = 1.0 / 64.0;
+/// Their time step.
+pub const TAU: f64 = 1.0 / 16384.0;
+
+pub fn device() -> ComputeDevice {
+    ComputeDevice::default_compiled().unwrap()
+}
+
+pub fn scales() -> Scales {
+    Scales {
+        eps: EPS,
+        mcf_step: TAU,
+        newton: solver::NewtonParams::default(),
+    }
+}
+
+pub fn grid(n: usize) -> Grid<2> {
+    Grid::per_unit(n, 0.75)
+        .unwrap()
+        .with_origin([-0.375; 2])
+        .unwrap()
+}
+
+pub fn disc(n: usize, radius: f64) -> Field<2> {
+    phase_field(grid(n), &Ball::new([0.0; 2], radius).unwrap(), EPS).unwrap()
+}
+
+pub fn square(n: usize) -> Field<2> {
+    phase_field(grid(n), &Cuboid::new([0.2; 2]).unwrap(), EPS).unwrap()
+}
+
+/// A flow of this phase field by a method of the paper's scheme.
+pub fn case(flow: Flow, method: Method, initial: Field<2>) -> Case<2> {
+    let grid = *initial.grid();
+    let needed = scales().needs(2, grid.spacing());
+    let operator = Operator::new(
+        (method, Scheme::Paper),
+        &Networks::default(),
+        &needed,
+        &grid,
+        &scales(),
+    );
+    let mut measures = Measure::size(EPS);
+    measures.extend(Measure::crossings(0.0));
+    Case {
+        shape: "shape".to_owned(),
+        initial,
+        region: None,
+        flow,
+        operator: operator.unwrap(),
+        scales: scales(),
+        steps: StepRule::Constant(TAU).into(),
+        stops: vec![Stop::Steps(4)],
+        measures,
+    }
+}
+
+/// Steps made in substeps, the first one at most of this size.
+pub fn divided(tau: f64, first: f64) -> TimeSteps {
+    TimeSteps {
+        rule: StepRule::Constant(tau),
+        first_substep: Some(first),
+    }
+}
+
+/// A case at its end.
+pub fn finished(case: Case<2>) -> Run<2> {
+    let mut run = Run::new(case, &device()).unwrap();
+    run.advance(None, &mut [], &Interrupt::never()).unwrap();
+    run
+}

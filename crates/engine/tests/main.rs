@@ -1,0 +1,6 @@
+//! Runs from their start to their end, in one go and with interruptions.
+
+mod common;
+mod resuming;
+mod steps;
+mod stops;

@@ -1,0 +1,191 @@
+//! The same bytes after interruptions, and what cannot be resumed.
+
+use std::path::Path;
+
+use crate::common::{TAU, case, device, disc, divided, finished, square};
+use engine::{
+    Case, Checkpoints, Ending, Error, Event, Flow, Method, Observer, Samples, StepRule, Stop,
+    Store, Trajectory,
+};
+use runs::{Interrupt, RunDirectory};
+use serde_json::Value;
+
+/// Asks for an end after so many minimizations.
+struct After<'a>(usize, &'a Interrupt);
+
+impl Observer<2> for After<'_> {
+    fn observe(&mut self, event: &mut Event<'_, 2>) -> Result<(), Error> {
+        if event.records.len() == self.0 {
+            self.1.request();
+        }
+        Ok(())
+    }
+}
+
+fn trajectory(case: &Case<2>, folder: &Path, samples: &Samples) -> Trajectory<2> {
+    Trajectory::of(
+        case.clone(),
+        &device(),
+        folder,
+        samples,
+        &mut [],
+        &Interrupt::never(),
+    )
+    .unwrap()
+    .unwrap()
+}
+
+fn interrupted(case: &Case<2>, folder: &Path, samples: &Samples, after: usize) {
+    let interrupt = Interrupt::never();
+    let observers: &mut [&mut dyn Observer<2>] = &mut [&mut After(after, &interrupt)];
+    let ended = Trajectory::of(
+        case.clone(),
+        &device(),
+        folder,
+        samples,
+        observers,
+        &interrupt,
+    );
+    assert!(ended.unwrap().is_none());
+}
+
+fn without_seconds(trajectory: &Trajectory<2>) -> Vec<engine::Record> {
+    let mut records = trajectory.records.clone();
+    for record in &mut records {
+        record.seconds = 0.0;
+        if let Some(made) = &mut record.minimization {
+            (made.seconds, made.times) = (0.0, solver::PhaseTimes::default());
+        }
+    }
+    records
+}
+
+#[test]
+fn an_interrupted_run_continues_with_the_same_bytes() {
+    let root = tempfile::tempdir().unwrap();
+    let samples = Samples {
+        also: vec![1],
+        ..Samples::every(2)
+    };
+    for (flow, method, n) in [
+        (Flow::Willmore, Method::Hybrid, 128),
+        (Flow::MeanCurvature, Method::FeImplicit, 128),
+        // Its steps begin on the half grid.
+        (Flow::Willmore, Method::Hybrid, 256),
+    ] {
+        let folder = |name: &str| root.path().join(format!("{flow:?}{n}{name}"));
+        let whole = case(flow, method, disc(n, 0.2));
+        let reference = trajectory(&whole, &folder("whole"), &samples);
+        let twice = folder("interrupted");
+        interrupted(&whole, &twice, &samples, 2);
+        let resumed = trajectory(&whole, &twice, &samples);
+        assert_eq!(without_seconds(&resumed), without_seconds(&reference));
+        assert_eq!(reference.records.len(), 4);
+        assert_eq!(resumed.start, reference.start);
+        for step in [0, 1, 2, 4] {
+            assert_eq!(resumed.field(step).unwrap(), reference.field(step).unwrap());
+        }
+        assert!(resumed.field(3).is_err());
+        let checkpoint =
+            |folder: &Path| std::fs::read(folder.join("checkpoints/step-00000004.ckpt"));
+        assert_eq!(
+            checkpoint(&twice).unwrap(),
+            checkpoint(&folder("whole")).unwrap()
+        );
+        // Looked up, not computed again: the wall time is that of the first time.
+        let again = trajectory(&whole, &twice, &samples);
+        assert_eq!(again.seconds().to_bits(), resumed.seconds().to_bits());
+        assert_eq!(again.distance(4, &reference, 4).unwrap().to_bits(), 0);
+        let volume = |step: usize| reference.measures(step).unwrap()["volume"];
+        assert_eq!(volume(4) > volume(0), flow == Flow::Willmore);
+        assert!(reference.measures(5).is_err());
+        // Another run does not take these fields for its own.
+        let mut other = whole;
+        other.stops = vec![Stop::Steps(2)];
+        assert_eq!(trajectory(&other, &twice, &samples).records.len(), 2);
+    }
+}
+
+/// Substeps, what they keep, and becoming stationary: the same after an interruption in the middle of a step.
+#[test]
+fn a_run_is_interrupted_inside_a_step() {
+    let root = tempfile::tempdir().unwrap();
+    let mut divided_case = case(Flow::Willmore, Method::Hybrid, disc(128, 0.2));
+    divided_case.steps = divided(TAU, 0.25 * TAU);
+    divided_case.stops.push(Stop::Motion(0.55));
+    let samples = Samples {
+        halvings: vec![1, 2, 3],
+        ..Samples::every(2)
+    };
+    let reference = trajectory(&divided_case, &root.path().join("whole"), &samples);
+    let sizes: Vec<f64> = reference.records.iter().map(|r| r.tau / TAU).collect();
+    assert_eq!(sizes, [0.25, 0.25, 0.5, 1.0]);
+    assert_eq!((reference.steps(), reference.stopped_early), (2, true));
+    assert!((reference.record(2).unwrap().time - 2.0 * TAU).abs() < 1e-15);
+    assert_eq!(reference.substeps(1).len(), 3);
+    let folder = root.path().join("interrupted");
+    interrupted(&divided_case, &folder, &samples, 2);
+    for _ in 0..2 {
+        let resumed = trajectory(&divided_case, &folder, &samples);
+        assert_eq!(without_seconds(&resumed), without_seconds(&reference));
+        assert!(resumed.stopped_early);
+        for k in [1, 2, 3] {
+            let part = resumed.part_field(k).unwrap();
+            assert_eq!(part, reference.part_field(k).unwrap());
+            // No substep ended at an eighth of the step.
+            assert_eq!(part.is_some(), k < 3);
+        }
+        assert_eq!(resumed.field(2).unwrap(), reference.field(2).unwrap());
+    }
+}
+
+/// A region, steps by the energy and an application's notes: from the checkpoint alone.
+#[test]
+fn a_case_is_built_from_its_checkpoint() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = root.path().join("run");
+    let mut inpainting = case(Flow::Willmore, Method::Hybrid, square(128));
+    inpainting.steps = StepRule::ByEnergy(None).into();
+    let grid = *inpainting.grid();
+    let corner = |node: usize| grid.node(node).iter().all(|x| *x > 0.1);
+    inpainting.region = Some((0..grid.len()).map(corner).collect());
+    let reference = finished(inpainting.clone());
+    let every = Checkpoints::EverySteps(3);
+    let mut run = engine::Run::new(inpainting.clone(), &device()).unwrap();
+    let mut store = Store::create(&folder, &[], &run, Value::from("notes"), every).unwrap();
+    let interrupt = Interrupt::never();
+    interrupt.request();
+    let ending = run.advance(Some(&mut store), &mut [], &interrupt).unwrap();
+    assert_eq!((ending, run.records().len()), (Ending::Interrupted, 1));
+    drop(store);
+
+    let stored = RunDirectory::open(&folder).unwrap();
+    assert_eq!(engine::dimension(&stored).unwrap(), 2);
+    assert_eq!(engine::notes(&stored), "notes");
+    let (initial, region) = engine::initial::<2>(&stored).unwrap();
+    let built = Case {
+        initial,
+        region,
+        ..inpainting.clone()
+    };
+    let mut wrong = built.clone();
+    wrong.scales.newton.tolerance *= 0.5;
+    let error = Store::resume(stored, wrong, &device(), every)
+        .err()
+        .unwrap();
+    assert!(error.to_string().contains("scales"), "{error}");
+    let stored = RunDirectory::open(&folder).unwrap();
+    let (mut store, mut run) = Store::resume(stored, built, &device(), every).unwrap();
+    run.advance(Some(&mut store), &mut [], &Interrupt::never())
+        .unwrap();
+    assert_eq!(run.field(), reference.field());
+    let outside = |node: &usize| !corner(*node);
+    let moved = (0..grid.len()).filter(outside).any(|node| {
+        run.field().values()[node].to_bits() != inpainting.initial.values()[node].to_bits()
+    });
+    assert!(!moved);
+    store.finish(&run).unwrap();
+    assert!(RunDirectory::open(&folder).unwrap().is_finished());
+    let table = std::fs::read_to_string(folder.join(engine::METRICS)).unwrap();
+    assert_eq!(table.lines().count(), 5);
+}

@@ -1,0 +1,93 @@
+//! Sizes of steps, and what is done where a minimization fails.
+
+use crate::common::{TAU, case, device, disc, divided, finished, square};
+use engine::{Error, Flow, Method, Record, Run, StepRule, Stop};
+
+/// With three Newton steps a whole step of a square's flow is too much, substeps are not.
+#[test]
+fn a_step_that_is_too_large_is_made_in_substeps() {
+    let mut whole = case(Flow::Willmore, Method::Hybrid, square(128));
+    whole.scales.newton.newton_iterations = 3;
+    let tau = 16.0 * TAU;
+    whole.steps = StepRule::Constant(tau).into();
+    whole.stops = vec![Stop::Steps(1)];
+    let mut run = Run::new(whole.clone(), &device()).unwrap();
+    let error = run.step().unwrap_err();
+    assert!(matches!(error, Error::Step { .. }), "{error}");
+    assert_eq!((run.steps(), run.records().len()), (0, 0));
+
+    whole.steps = divided(tau, tau);
+    let run = finished(whole);
+    let records = run.records();
+    assert!(records.len() > 2 && records[0].tau < tau && records[0].halvings > 0);
+    let sum: f64 = records.iter().map(|r| r.tau).sum();
+    assert_eq!(sum.to_bits(), tau.to_bits());
+    assert!((run.time() - tau).abs() < 1e-15);
+    let falls = |record: &Record| {
+        record
+            .minimization
+            .is_some_and(|m| m.energy < m.energy_before)
+    };
+    assert!(records.iter().all(falls));
+    let ends: Vec<bool> = records.iter().map(|r| r.completes_step).collect();
+    assert!(ends[ends.len() - 1] && ends[..ends.len() - 1].iter().all(|end| !end));
+}
+
+/// A minimization that fails at every size ends the run with the last size that was tried.
+#[test]
+fn halving_gives_up_with_the_size_and_the_step() {
+    let mut hopeless = case(Flow::Willmore, Method::Hybrid, square(128));
+    hopeless.scales.newton.newton_iterations = 1;
+    hopeless.scales.newton.tolerance = 1e-9;
+    hopeless.steps = StepRule::ByEnergy(Some(TAU)).into();
+    let mut run = Run::new(hopeless, &device()).unwrap();
+    let error = run.step().unwrap_err();
+    let message = error.to_string();
+    let Error::TooStiff {
+        step: 1,
+        tau,
+        halvings: 24,
+        ..
+    } = error
+    else {
+        panic!("{message}");
+    };
+    assert!(
+        (tau / TAU * 2.0_f64.powi(24) - 1.0).abs() < 1e-12,
+        "{message}"
+    );
+    assert!(message.contains("Willmore flow of the shape") && message.contains("step 1"));
+}
+
+#[test]
+fn steps_by_the_energy_grow_and_end_at_the_time() {
+    let mut growing = case(Flow::Willmore, Method::Hybrid, square(128));
+    growing.steps = StepRule::ByEnergy(None).into();
+    let end = 5.5 * TAU;
+    growing.stops = vec![Stop::Steps(100), Stop::Time(end)];
+    let run = finished(growing);
+    assert_eq!(run.ended(), Some(Stop::Time(end)));
+    assert!((run.time() - end).abs() <= 1e-12 * end);
+    let sizes: Vec<f64> = run.records().iter().map(|r| r.tau).collect();
+    assert!((sizes[0] - TAU / 16.0).abs() < 1e-18);
+    assert!(sizes.iter().any(|size| *size > 4.0 * sizes[0]), "{sizes:?}");
+}
+
+#[test]
+fn mean_curvature_flow_takes_its_own_step_alone() {
+    let mut other = case(Flow::MeanCurvature, Method::Hybrid, disc(128, 0.2));
+    let run = finished(other.clone());
+    assert_eq!(run.records().len(), 4);
+    assert_eq!(run.time().to_bits(), (4.0 * TAU).to_bits());
+    let radius = run.records()[3].measure("tip").unwrap();
+    assert!(
+        (radius - (0.04 - 8.0 * TAU).sqrt()).abs() < 2e-4,
+        "{radius}"
+    );
+    other.steps = StepRule::Constant(2.0 * TAU).into();
+    let error = Run::new(other, &device()).err().unwrap();
+    assert!(
+        matches!(error, Error::Parameter { name: "tau", .. }),
+        "{error}"
+    );
+}

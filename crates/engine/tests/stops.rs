@@ -1,0 +1,65 @@
+//! Every reason to end.
+
+use crate::common::{EPS, TAU, case, disc, divided, finished, grid};
+use engine::{Flow, Method, StepRule, Stop};
+use geometry::Field;
+
+#[test]
+fn energies_and_vanishing_end_a_run() {
+    let mut one = case(Flow::Willmore, Method::Hybrid, disc(128, 0.15));
+    let exact = std::f64::consts::PI / 0.15;
+    one.stops = vec![Stop::Steps(50), Stop::Energy(0.99 * exact)];
+    let run = finished(one);
+    assert_eq!(run.ended(), Some(Stop::Energy(0.99 * exact)));
+    let energies: Vec<f64> = run
+        .records()
+        .iter()
+        .filter_map(|r| r.willmore_energy())
+        .collect();
+    assert!(energies.len() < 50);
+    let (last, before) = energies.split_last().unwrap();
+    assert!(*last <= 0.99 * exact && before.iter().all(|w| *w > 0.99 * exact));
+
+    let mut small = case(Flow::MeanCurvature, Method::Hybrid, disc(128, 0.03));
+    small.stops = vec![Stop::Steps(50), Stop::Vanished];
+    let run = finished(small);
+    assert_eq!(run.ended(), Some(Stop::Vanished));
+    assert!(run.steps() < 20);
+}
+
+#[test]
+fn a_shape_that_comes_to_the_side_ends_a_run_unless_it_was_there_before() {
+    let mut growing = case(Flow::Willmore, Method::Hybrid, disc(128, 0.34));
+    growing.steps = StepRule::ByEnergy(Some(16.0 * TAU)).into();
+    growing.stops = vec![Stop::Steps(40), Stop::AtTheSide];
+    let run = finished(growing.clone());
+    assert_eq!(run.ended(), Some(Stop::AtTheSide));
+    let band = |x: [f64; 2]| x[1].abs() - 0.1;
+    growing.initial = Field::from_fn(grid(128), |x| geometry::optimal_profile(band(x), EPS));
+    growing.stops = vec![Stop::Steps(1), Stop::AtTheSide];
+    assert_eq!(finished(growing).ended(), Some(Stop::Steps(1)));
+}
+
+/// A disc in a box hardly moves once it is alone with large steps.
+#[test]
+fn stationary_shapes_end_a_run() {
+    let mut slow = case(Flow::Willmore, Method::Hybrid, disc(128, 0.2));
+    slow.steps = divided(TAU, 0.25 * TAU);
+    slow.stops = vec![Stop::Steps(4), Stop::Motion(0.55)];
+    let run = finished(slow);
+    assert_eq!(run.ended(), Some(Stop::Motion(0.55)));
+    let sizes: Vec<f64> = run.records().iter().map(|r| r.tau / TAU).collect();
+    assert_eq!(sizes, [0.25, 0.25, 0.5, 1.0]);
+}
+
+#[test]
+fn a_flat_interface_is_at_rest() {
+    let mut flat = case(Flow::Willmore, Method::Hybrid, disc(128, 0.2));
+    let band = |x: [f64; 2]| x[1].abs() - 0.15;
+    flat.initial = Field::from_fn(grid(128), |x| geometry::optimal_profile(band(x), EPS));
+    let largest = 0.75_f64.powi(4) / 1024.0;
+    flat.steps = StepRule::ByEnergy(Some(largest)).into();
+    flat.stops = vec![Stop::Steps(12), Stop::EnergyAtRest];
+    let run = finished(flat);
+    assert_eq!(run.ended(), Some(Stop::EnergyAtRest));
+}
