@@ -1,21 +1,17 @@
 //! The Clifford torus nearest to a phase field.
 
-use argmin::core::{CostFunction, Executor, State};
-use argmin::solver::neldermead::NelderMead;
+use std::f64::consts::{PI, SQRT_2};
+
+use geometry::measure::l2_distance;
 use geometry::shapes::Torus;
-use geometry::{Field, SignedDistance, measure, optimal_profile};
+use geometry::{Field, Grid, SignedDistance, optimal_profile};
 use serde::Serialize;
 
 use crate::Error;
 
-/// Steps of the simplex method.
-const ITERATIONS: u64 = 400;
-/// Spread of the distances in the simplex at which the search ends.
-const TOLERANCE: f64 = 1e-7;
-
 /// A Clifford torus in space, fitted to a phase field.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct CliffordFit {
+pub struct CliffordTorus {
     /// Its centre.
     pub centre: [f64; 3],
     /// Unit vector along its axis.
@@ -26,113 +22,66 @@ pub struct CliffordFit {
     pub l2: f64,
 }
 
-/// A torus by its centre, the tilt of its axis from a first guess, and its outer radius.
-struct Family<'a> {
-    u: &'a Field<3>,
-    eps: f64,
-    /// The guessed axis, and two vectors that complete it to an orthonormal basis.
-    frame: [[f64; 3]; 3],
-}
-
-impl Family<'_> {
-    fn torus(&self, parameters: &[f64]) -> CliffordFit {
-        let [c0, c1, c2, a, b, outer_radius] = parameters else {
-            unreachable!("six parameters");
-        };
-        let tilted: [f64; 3] =
-            std::array::from_fn(|i| self.frame[0][i] + a * self.frame[1][i] + b * self.frame[2][i]);
-        CliffordFit {
-            centre: [*c0, *c1, *c2],
-            axis: normalized(tilted),
-            outer_radius: *outer_radius,
-            l2: f64::INFINITY,
-        }
-    }
-
-    fn distance(&self, torus: &CliffordFit) -> Result<f64, Error> {
-        Ok(measure::l2_distance(
-            self.u,
-            &torus.phase_field(self.u, self.eps)?,
-        )?)
-    }
-}
-
-impl CostFunction for Family<'_> {
-    type Param = Vec<f64>;
-    type Output = f64;
-
-    fn cost(&self, parameters: &Vec<f64>) -> Result<f64, argmin::core::Error> {
-        // Beyond the positive radii there is no torus, which is no reason to stop.
-        Ok(self
-            .distance(&self.torus(parameters))
-            .unwrap_or(f64::INFINITY))
-    }
-}
-
-impl CliffordFit {
+impl CliffordTorus {
     /// The torus whose phase field is nearest to `u` in `L2`: a simplex search over centre, axis and radius, from the centre of
-    /// mass, the axis of largest moment of inertia and the volume.
+    /// mass, a principal axis of inertia and the volume.
     ///
     /// # Errors
     /// [`Error::Options`] if there is no volume inside or the search fails.
-    pub fn to(u: &Field<3>, eps: f64) -> Result<Self, Error> {
+    pub fn nearest(u: &Field<3>, eps: f64) -> Result<Self, Error> {
         let failed = |reason: &str| Error::Options(format!("no Clifford torus fits: {reason}"));
         let moments = Moments::of(u);
         if moments.volume <= 0.0 {
             return Err(failed("the phase field has no inside"));
         }
         // 2 pi^2 R r^2 with R = sqrt(2) r.
-        let minor = (moments.volume
-            / (2.0 * std::f64::consts::SQRT_2 * std::f64::consts::PI.powi(2)))
-        .cbrt();
-        let radius = minor * (1.0 + std::f64::consts::SQRT_2);
-        let mut best: Option<Self> = None;
-        for frame in moments.frames() {
-            let family = Family { u, eps, frame };
-            let [c0, c1, c2] = moments.centre;
-            let start = vec![c0, c1, c2, 0.0, 0.0, radius];
-            let steps = [
-                0.1 * radius,
-                0.1 * radius,
-                0.1 * radius,
-                0.2,
-                0.2,
-                0.1 * radius,
-            ];
-            let mut simplex = vec![start.clone()];
-            for (i, step) in steps.into_iter().enumerate() {
-                let mut vertex = start.clone();
-                vertex[i] += step;
-                simplex.push(vertex);
-            }
-            let solver = NelderMead::new(simplex)
-                .with_sd_tolerance(TOLERANCE)
-                .map_err(|error| failed(&error.to_string()))?;
-            let result = Executor::new(family, solver)
-                .configure(|state| state.max_iters(ITERATIONS))
-                .run()
-                .map_err(|error| failed(&error.to_string()))?;
-            let family = Family { u, eps, frame };
-            let Some(parameters) = result.state().get_best_param() else {
-                continue;
+        let minor = (moments.volume / (2.0 * SQRT_2 * PI.powi(2))).cbrt();
+        let radius = minor * (1.0 + SQRT_2);
+        let [c0, c1, c2] = moments.centre;
+        let start = [c0, c1, c2, 0.0, 0.0, radius];
+        let steps = [
+            0.1 * radius,
+            0.1 * radius,
+            0.1 * radius,
+            0.2,
+            0.2,
+            0.1 * radius,
+        ];
+        let tori = moments.frames().map(|frame| {
+            let distance = |parameters: &[f64; 6]| {
+                let torus = Self::in_frame(&frame, parameters).phase_field(u.grid(), eps)?;
+                Ok::<_, Error>(l2_distance(u, &torus)?)
             };
-            let mut torus = family.torus(parameters);
-            torus.l2 = family.distance(&torus)?;
-            if best.is_none_or(|best| torus.l2 < best.l2) {
-                best = Some(torus);
+            // Beyond the positive radii there is no torus, which is no reason to stop.
+            let cost = |parameters: &[f64; 6]| distance(parameters).unwrap_or(f64::INFINITY);
+            let (l2, parameters) = nelder_mead(cost, start, steps);
+            Self {
+                l2,
+                ..Self::in_frame(&frame, &parameters)
             }
-        }
-        best.filter(|best| best.l2.is_finite())
-            .ok_or_else(|| failed("the search found none"))
+        });
+        let fits = tori.into_iter().filter(|torus| torus.l2.is_finite());
+        (fits.min_by(|a, b| a.l2.total_cmp(&b.l2))).ok_or_else(|| failed("the search found none"))
     }
 
-    /// The phase field of the torus on the grid of another field.
+    /// A torus by its centre, the tilt of its axis from the first vector of a frame along the two others, and its outer radius.
+    fn in_frame([axis, e, f]: &[[f64; 3]; 3], parameters: &[f64; 6]) -> Self {
+        let [c0, c1, c2, a, b, outer_radius] = *parameters;
+        Self {
+            centre: [c0, c1, c2],
+            axis: normalized(std::array::from_fn(|i| axis[i] + a * e[i] + b * f[i])),
+            outer_radius,
+            l2: f64::INFINITY,
+        }
+    }
+
+    /// The phase field of the torus.
     ///
     /// # Errors
     /// [`Error::Geometry`] for a radius that is not positive.
-    pub fn phase_field(&self, like: &Field<3>, eps: f64) -> Result<Field<3>, Error> {
+    pub fn phase_field(&self, grid: &Grid<3>, eps: f64) -> Result<Field<3>, Error> {
         let torus = Torus::clifford(self.outer_radius)?;
-        Ok(Field::from_fn(*like.grid(), |x| {
+        Ok(Field::from_fn(*grid, |x| {
             let x: [f64; 3] = std::array::from_fn(|i| x[i] - self.centre[i]);
             let height = dot(x, self.axis);
             let across: [f64; 3] = std::array::from_fn(|i| x[i] - height * self.axis[i]);
@@ -148,7 +97,7 @@ impl CliffordFit {
     pub fn minor_circles(&self, count: usize, points: usize) -> Result<Vec<Vec<[f64; 3]>>, Error> {
         let torus = Torus::clifford(self.outer_radius)?;
         let [axis, e, f] = frame_of(self.axis);
-        let angle = |k: usize, of: usize| 2.0 * std::f64::consts::PI * k as f64 / of as f64;
+        let angle = |k: usize, of: usize| 2.0 * PI * k as f64 / of as f64;
         let circle = |k: usize| {
             let (sin, cos) = angle(k, count).sin_cos();
             let outward: [f64; 3] = std::array::from_fn(|i| cos * e[i] + sin * f[i]);
@@ -162,6 +111,66 @@ impl CliffordFit {
         };
         Ok((0..count).map(circle).collect())
     }
+}
+
+/// The best vertex and its cost after a search by the simplex method of Nelder and Mead, from the simplex of a point and its displacements
+/// along the axes, until the standard deviation of the costs in the simplex is small.
+fn nelder_mead<const N: usize>(
+    cost: impl Fn(&[f64; N]) -> f64,
+    start: [f64; N],
+    steps: [f64; N],
+) -> (f64, [f64; N]) {
+    const ITERATIONS: usize = 400;
+    const TOLERANCE: f64 = 1e-7;
+    let vertex = |x: [f64; N]| (cost(&x), x);
+    let along = |from: &[f64; N], to: &[f64; N], t: f64| -> [f64; N] {
+        std::array::from_fn(|i| from[i] + (to[i] - from[i]) * t)
+    };
+    let mut simplex = vec![vertex(start)];
+    for axis in 0..N {
+        let mut x = start;
+        x[axis] += steps[axis];
+        simplex.push(vertex(x));
+    }
+    for _ in 0..ITERATIONS {
+        simplex.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        let mean = simplex.iter().map(|(cost, _)| cost).sum::<f64>() / (N + 1) as f64;
+        let squares: f64 = simplex.iter().map(|(cost, _)| (cost - mean).powi(2)).sum();
+        if (squares / N as f64).sqrt() < TOLERANCE {
+            break;
+        }
+        let (best, second_worst, worst) = (simplex[0], simplex[N - 1], simplex[N]);
+        let centroid: [f64; N] = std::array::from_fn(|i| {
+            simplex[..N].iter().map(|(_, x)| x[i]).sum::<f64>() * (1.0 / N as f64)
+        });
+        let reflected = vertex(along(&centroid, &worst.1, -1.0));
+        if reflected.0 < best.0 {
+            let expanded = vertex(along(&centroid, &reflected.1, 2.0));
+            simplex[N] = if expanded.0 < reflected.0 {
+                expanded
+            } else {
+                reflected
+            };
+        } else if reflected.0 < second_worst.0 {
+            simplex[N] = reflected;
+        } else {
+            let nearer = if reflected.0 < worst.0 {
+                reflected
+            } else {
+                worst
+            };
+            let contracted = vertex(along(&centroid, &nearer.1, 0.5));
+            if contracted.0 < nearer.0 {
+                simplex[N] = contracted;
+            } else {
+                for other in &mut simplex[1..] {
+                    *other = vertex(along(&best.1, &other.1, 0.5));
+                }
+            }
+        }
+    }
+    simplex.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+    simplex[0]
 }
 
 /// Volume, centre of mass and second moments of the inside.
@@ -248,15 +257,14 @@ mod tests {
     fn a_clifford_torus_is_found_in_any_position() {
         let grid = Grid::<3>::new(32, 1.0).unwrap();
         let eps = 2.0 * grid.spacing();
-        let like = Field::constant(grid, 0.0);
-        let torus = CliffordFit {
+        let torus = CliffordTorus {
             centre: [0.52, 0.47, 0.5],
             axis: normalized([0.3, -0.5, 1.0]),
             outer_radius: 0.36,
             l2: 0.0,
         };
-        let u = torus.phase_field(&like, eps).unwrap();
-        let found = CliffordFit::to(&u, eps).unwrap();
+        let u = torus.phase_field(&grid, eps).unwrap();
+        let found = CliffordTorus::nearest(&u, eps).unwrap();
         assert!(found.l2 < 1e-4, "{found:?}");
         assert!((found.outer_radius - 0.36).abs() < 1e-4, "{found:?}");
         assert!(dot(found.axis, torus.axis).abs() > 1.0 - 1e-6, "{found:?}");
@@ -277,6 +285,6 @@ mod tests {
     #[test]
     fn nothing_fits_an_empty_field() {
         let grid = Grid::<3>::new(8, 1.0).unwrap();
-        assert!(CliffordFit::to(&Field::constant(grid, -1.0), 0.1).is_err());
+        assert!(CliffordTorus::nearest(&Field::constant(grid, -1.0), 0.1).is_err());
     }
 }

@@ -21,7 +21,8 @@ pub struct Session<'a> {
     pub output: OutputDir,
     /// Progress bars.
     pub progress: Progress,
-    manifest: Manifest,
+    /// What is run, and the wall times of its parts.
+    pub manifest: Manifest,
     clock: Instant,
 }
 
