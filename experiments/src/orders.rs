@@ -1,30 +1,50 @@
 //! Orders of convergence of runs against the finest of them.
 
 use engine::Trajectory;
-use report::{Axis, Colour, Format, LineChart, LineStyle, Marker, Series, Summary, Table};
+use report::{Axis, Colour, Figure, Format, LineChart, LineStyle, Marker, Series, Summary, Table};
 
 use crate::Error;
+use crate::session::Session;
+
+/// Writes what the sequences of runs say, each with the name of the size that is halved from one run to the next: a figure, a table, and
+/// the orders as metrics `KEY.order.SIZE.pairK`, from the coarsest pair of runs.
+///
+/// # Errors
+/// [`Error::Engine`] if runs cannot be compared, [`Error::Report`].
+pub fn finish<const D: usize>(
+    session: Session<'_>,
+    key: &str,
+    title: &str,
+    sequences: [(&'static str, Vec<(f64, Trajectory<D>)>); 2],
+) -> Result<(), Error> {
+    let mut sizes = Vec::new();
+    for (name, runs) in &sequences {
+        sizes.push((*name, refinements(runs)?));
+    }
+    let figure = Figure::new(format!("{title}: convergence"), 2)
+        .with_panels(sizes.iter().map(|(name, rows)| chart(name, rows)));
+    session.figure(figure.with_shared_legend(), "orders")?;
+    let table = table(&sizes)?;
+    table.write(&session.output, "orders")?;
+    let title = format!("{title}: orders of convergence");
+    session.finish(&title, summary(key, &sizes)?, &table.to_markdown())
+}
 
 /// A run in a sequence in which a size, `h` or `tau`, is halved from one to the next.
 #[derive(Clone, Copy, Debug)]
-pub struct Refinement {
+struct Refinement {
     /// The size.
-    pub size: f64,
+    size: f64,
     /// `L2` distance of its end to that of the finest run, which is small only as long as the finest run is much finer,
-    pub to_finest: f64,
+    to_finest: f64,
     /// and to that of the next one, which is of the order of the error whatever the finest run is.
-    pub to_next: f64,
+    to_next: f64,
     /// The order `p` as the distances to the next fall like `size^p` up to the next run; none for the last.
-    pub order: Option<f64>,
+    order: Option<f64>,
 }
 
 /// What the runs say, coarsest first; the finest one has no row.
-///
-/// # Errors
-/// [`Error::Engine`] if runs cannot be compared.
-pub fn refinements<const D: usize>(
-    runs: &[(f64, Trajectory<D>)],
-) -> Result<Vec<Refinement>, Error> {
+fn refinements<const D: usize>(runs: &[(f64, Trajectory<D>)]) -> Result<Vec<Refinement>, Error> {
     let distance = |(_, coarse): &(f64, Trajectory<D>), (_, fine): &(f64, Trajectory<D>)| {
         coarse.distance(coarse.steps(), fine, fine.steps())
     };
@@ -44,7 +64,7 @@ pub fn refinements<const D: usize>(
 }
 
 /// The refinements of a size as a chart, with slopes 1 and 2 for comparison.
-pub fn chart(name: &str, rows: &[Refinement]) -> LineChart {
+fn chart(name: &str, rows: &[Refinement]) -> LineChart {
     let (first, last) = (rows[0], rows[rows.len() - 1]);
     let guide = |slope: i32| {
         let line = [first, last].map(|row| {
@@ -67,10 +87,7 @@ pub fn chart(name: &str, rows: &[Refinement]) -> LineChart {
 }
 
 /// The refinements of several sizes as a table.
-///
-/// # Errors
-/// [`Error::Report`] for distances that are not finite.
-pub fn table(sizes: &[(&str, Vec<Refinement>)]) -> Result<Table, Error> {
+fn table(sizes: &[(&'static str, Vec<Refinement>)]) -> Result<Table, Error> {
     let rows: Vec<(&str, Refinement)> = sizes
         .iter()
         .flat_map(|(name, rows)| rows.iter().map(|row| (*name, *row)))
@@ -86,11 +103,7 @@ pub fn table(sizes: &[(&str, Vec<Refinement>)]) -> Result<Table, Error> {
         .finish()?)
 }
 
-/// The orders as metrics `KEY.order.SIZE.pairK`, from the coarsest pair of runs.
-///
-/// # Errors
-/// [`Error::Report`] for orders that are not finite.
-pub fn summary(key: &str, sizes: &[(&str, Vec<Refinement>)]) -> Result<Summary, Error> {
+fn summary(key: &str, sizes: &[(&'static str, Vec<Refinement>)]) -> Result<Summary, Error> {
     let mut summary = Summary::new();
     for (name, rows) in sizes {
         for (k, row) in rows.iter().enumerate() {

@@ -1,15 +1,46 @@
 //! Timing: contenders take turns, so that whatever else the machine does burdens them alike.
 
-use engine::{Case, Error as EngineError, Flow, Operator, Run};
+use std::collections::BTreeMap;
+
+use engine::{Case, Flow, Operator, Run};
 use geometry::shapes::Ball;
 use geometry::{Grid, phase_field};
 use indicatif::ProgressBar;
 use operators::ComputeDevice;
-use solver::{Error as SolverError, StepRecord};
+use report::{Format, Summary, Tabulated};
+use solver::StepRecord;
 
 use crate::comparison::cross;
 use crate::networks::{EPS, STEP};
 use crate::{Error, study};
+
+/// What was measured, under the same names in tables, metrics and JSON; what a system does not tell is absent.
+pub type Numbers = BTreeMap<&'static str, f64>;
+
+/// Columns of a table of numbers: heading, format and name.
+pub type Columns = [(&'static str, Format, &'static str)];
+
+/// Adds columns of numbers to a table.
+pub fn with_columns<'a, R>(
+    table: Tabulated<'a, R>,
+    columns: &Columns,
+    of: impl Fn(&'a R) -> &'a Numbers,
+) -> Tabulated<'a, R> {
+    (columns.iter()).fold(table, |table, &(head, format, name)| {
+        table.number(head, format, |row| of(row).get(name).copied())
+    })
+}
+
+/// Numbers as metrics `KEY.NAME`.
+///
+/// # Errors
+/// [`Error::Report`] for one that is not finite.
+pub fn summarize(summary: &mut Summary, key: &str, numbers: &Numbers) -> Result<(), Error> {
+    for (name, value) in numbers {
+        summary.insert(&format!("{key}.{name}"), *value)?;
+    }
+    Ok(())
+}
 
 /// Round after round, everyone who goes on has a turn.
 ///
@@ -54,8 +85,6 @@ pub fn plane(operator: &Operator, n: usize, steps: usize, quick: bool) -> Result
 pub struct Timed<const D: usize> {
     /// The flow.
     pub run: Run<D>,
-    /// Why it ended early, if a minimization did not converge.
-    pub failure: Option<String>,
     bar: ProgressBar,
 }
 
@@ -65,34 +94,17 @@ impl<const D: usize> Timed<D> {
     /// # Errors
     /// [`Error::Engine`] for a case that cannot be.
     pub fn new(case: Case<D>, device: &ComputeDevice, bar: ProgressBar) -> Result<Self, Error> {
-        Ok(Self {
-            run: Run::new(case, device)?,
-            failure: None,
-            bar,
-        })
+        let run = Run::new(case, device)?;
+        Ok(Self { run, bar })
     }
 
-    /// One step.
+    /// One step, if there is one left.
     ///
     /// # Errors
-    /// [`Error::Engine`], but for a minimization that does not converge.
-    pub fn step(&mut self) -> Result<(), Error> {
+    /// [`Error::Engine`].
+    pub fn step(&mut self) -> Result<bool, Error> {
         self.bar.inc(1);
-        match self.run.step() {
-            Ok(_) => Ok(()),
-            Err(EngineError::Step { source, .. })
-                if matches!(source, SolverError::NotConverged { .. }) =>
-            {
-                self.failure = Some(source.to_string());
-                Ok(())
-            }
-            Err(error) => Err(error.into()),
-        }
-    }
-
-    /// Whether there is a next step.
-    pub fn goes_on(&self) -> bool {
-        self.failure.is_none() && self.run.ended().is_none()
+        Ok(self.run.step()?.is_some())
     }
 
     /// What the steps did.
@@ -109,5 +121,23 @@ impl<const D: usize> Timed<D> {
     /// Mean over the steps; 0 without any.
     pub fn mean(&self, of: impl Fn(&StepRecord) -> f64) -> f64 {
         study::mean(self.minimizations(), of).unwrap_or(0.0)
+    }
+
+    /// Time and work of the steps; products on coarser grids count by their shares of the unknowns.
+    pub fn numbers(&self) -> Numbers {
+        let (seconds, products) = (self.seconds(), self.mean(|r| r.newton.hvp as f64));
+        Numbers::from([
+            ("steps", seconds.len() as f64),
+            ("seconds", seconds.iter().sum()),
+            ("seconds_per_step", median(seconds)),
+            ("newton_per_step", self.mean(|r| r.newton.newton as f64)),
+            ("hvp_per_step", self.mean(StepRecord::hvp)),
+            ("hvp_on_this_grid", products),
+            ("hvp_on_coarser_grids", self.mean(|r| r.start.hvp)),
+            (
+                "ms_per_product",
+                1e3 * self.mean(|r| r.times.products) / products.max(1.0),
+            ),
+        ])
     }
 }

@@ -230,7 +230,16 @@ fn reproduced(first: &Path, second: &Path) {
 fn one_circle_is_accurate_and_reproducible_and_not_computed_again() {
     let root = tempfile::tempdir().unwrap();
     let arguments = |folder: &'static str| {
-        ["--quick", "--quiet", "--circles", "1", "--methods", "hybrid", "--output", folder]
+        [
+            "--quick",
+            "--quiet",
+            "--circles",
+            "1",
+            "--methods",
+            "hybrid",
+            "--output",
+            folder,
+        ]
     };
     let runs = ["first", "second"].map(|folder| {
         let output = run(CIRCLES, root.path(), &arguments(folder));
@@ -245,8 +254,14 @@ fn one_circle_is_accurate_and_reproducible_and_not_computed_again() {
         let key = format!("willmore.n128.hybrid{scheme}.l2.step8");
         summary.get(&key).unwrap()
     };
-    assert!(error("_accurate") < 0.003 && error("_calibrated") < 0.004, "{summary:?}");
-    assert!(error("") < 0.03 && error("") > error("_calibrated"), "{summary:?}");
+    assert!(
+        error("_accurate") < 0.003 && error("_calibrated") < 0.004,
+        "{summary:?}"
+    );
+    assert!(
+        error("") < 0.03 && error("") > error("_calibrated"),
+        "{summary:?}"
+    );
     // The wall times of the first run can only come back from its stored parts, which a failure at the end leaves.
     let again = root.path().join("again");
     fs::create_dir_all(again.join("errors.md")).unwrap();
@@ -254,7 +269,11 @@ fn one_circle_is_accurate_and_reproducible_and_not_computed_again() {
     assert_eq!(failed.status.code(), Some(2));
     let steps = fs::read(again.join("steps.csv")).unwrap();
     fs::remove_dir(again.join("errors.md")).unwrap();
-    assert!(run(CIRCLES, root.path(), &arguments("again")).status.success());
+    assert!(
+        run(CIRCLES, root.path(), &arguments("again"))
+            .status
+            .success()
+    );
     assert_eq!(fs::read(again.join("steps.csv")).unwrap(), steps);
     assert!(!again.join("partial").exists());
 }
@@ -471,7 +490,7 @@ fn the_quick_timing_table_has_a_row_for_every_method() {
     let rows: Vec<serde_json::Value> = serde_json::from_str(&seconds).unwrap();
     assert_eq!(rows.len(), 5);
     for row in &rows {
-        let number = |name: &str| row[name].as_f64().unwrap();
+        let number = |name: &str| row["numbers"][name].as_f64().unwrap();
         assert!(number("seconds") >= number("measured_seconds"), "{row}");
     }
     assert!(metric("armadillo.hybrid.hvp") >= 1.0 && metric("armadillo.fe_implicit.hvp") >= 1.0);
@@ -505,15 +524,20 @@ fn the_quick_performance_run_measures_planes_and_solids() {
     assert!(distance > 0.0 && distance < 0.02, "{distance}");
     let all = fs::read_to_string(root.path().join("out/performance.json")).unwrap();
     let all: Vec<serde_json::Value> = serde_json::from_str(&all).unwrap();
-    let unknowns = [96 * 96, 24 * 24 * 24, 32 * 32 * 32];
-    assert_eq!(all.len(), unknowns.len());
-    for (row, unknowns) in all.iter().zip(unknowns) {
-        assert_eq!(row["unknowns"], unknowns);
-        assert!(row["hvp_per_step"].as_f64().unwrap() >= 1.0);
-        // Parts are measured inside the whole, and a product holds the transforms that it is compared with.
-        let parts = row["times"].as_object().unwrap().values();
-        let parts: f64 = parts.map(|seconds| seconds.as_f64().unwrap()).sum();
-        assert!(parts > 0.0 && parts <= row["seconds"].as_f64().unwrap(), "{row}");
+    let grids = [vec![96; 2], vec![24; 3], vec![32; 3]];
+    assert_eq!(all.len(), grids.len());
+    for (row, grid) in all.iter().zip(grids) {
+        assert_eq!(row["cells"], serde_json::json!(grid));
+        let steps = |name: &str| row["steps"][name].as_f64().unwrap();
+        assert!(steps("hvp_per_step") >= 1.0);
+        // No part is negative, and together they are the whole.
+        let parts = row["parts"].as_array().unwrap().iter();
+        let parts: Vec<f64> = parts.map(|part| part[1].as_f64().unwrap()).collect();
+        let (sum, mean) = (parts.iter().sum::<f64>(), steps("seconds") / steps("steps"));
+        assert!(
+            parts.iter().all(|part| *part >= 0.0) && (sum / mean - 1.0).abs() < 1e-9,
+            "{row}"
+        );
     }
     let table = fs::read_to_string(root.path().join("out/steps.md")).unwrap();
     assert!(table.contains("cube, n = 24"));

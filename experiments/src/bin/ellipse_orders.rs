@@ -8,8 +8,9 @@ use experiments::networks::{Chosen, EPS, STEP};
 use experiments::session::Session;
 use experiments::{Error, harness, options::RunOptions, orders, study};
 use geometry::{Grid, phase_field, shapes::Ellipse};
-use report::Figure;
+use serde_json::json;
 
+const TITLE: &str = "Willmore flow of an ellipse, each h with its network";
 const HALF_AXES: [f64; 2] = [0.3, 0.2];
 const SIDE: f64 = 1.25;
 /// Steps of `2^-14`, and how little the minimizations leave: much less than the errors.
@@ -34,18 +35,10 @@ fn main() -> ExitCode {
 }
 
 fn program(options: &RunOptions) -> Result<(), Error> {
-    let (used, steps) = if options.quick {
-        (3, 2)
-    } else {
-        (CELLS.len(), STEPS)
-    };
-    let parameters = serde_json::json!({ "half_axes": HALF_AXES, "side": SIDE, "steps": steps, "tolerance": TOLERANCE, "quick": options.quick });
-    let mut session = Session::open(
-        "ellipse_orders",
-        options,
-        options.open_device()?,
-        &parameters,
-    )?;
+    let (used, steps) = if options.quick { (3, 2) } else { (4, STEPS) };
+    let parameters = json!({ "half_axes": HALF_AXES, "side": SIDE, "steps": steps, "tolerance": TOLERANCE, "quick": options.quick });
+    let device = options.open_device()?;
+    let mut session = Session::open("ellipse_orders", options, device, &parameters)?;
     let mut run = |size: f64, n: usize, parts: usize| {
         let operator = Chosen::default().operator((Method::Hybrid, Scheme::Accurate), n)?;
         let initial = phase_field(Grid::per_unit(n, SIDE)?, &Ellipse::new(HALF_AXES)?, EPS)?;
@@ -53,31 +46,13 @@ fn program(options: &RunOptions) -> Result<(), Error> {
         let mut case = study::case((Flow::Willmore, &operator), "ellipse", initial, time);
         case.scales.newton.tolerance = TOLERANCE;
         let name = format!("n{n}-{parts}");
-        Ok((
-            size,
-            session.trajectory(&name, case, &name, &Samples::every(time.1))?,
-        ))
+        let end = session.trajectory(&name, case, &name, &Samples::every(time.1))?;
+        Ok::<_, Error>((size, end))
     };
-    let in_h: Result<Vec<_>, Error> = CELLS[..used]
-        .iter()
-        .map(|&n| run(1.0 / n as f64, n, 1))
-        .collect();
-    let in_tau: Result<Vec<_>, Error> = PARTS[..used + 1]
-        .iter()
-        .map(|&k| run(STEP / k as f64, 128, k))
-        .collect();
-    let sizes = [
-        ("h", orders::refinements(&in_h?)?),
-        ("tau", orders::refinements(&in_tau?)?),
-    ];
-    let figure = Figure::new("Willmore flow of an ellipse: convergence", 2)
-        .with_panels(sizes.iter().map(|(name, rows)| orders::chart(name, rows)));
-    session.figure(figure.with_shared_legend(), "orders")?;
-    let table = orders::table(&sizes)?;
-    table.write(&session.output, "orders")?;
-    session.finish(
-        "Orders of convergence for an ellipse",
-        orders::summary("ellipse", &sizes)?,
-        &table.to_markdown(),
-    )
+    let in_h = CELLS[..used].iter().map(|&n| run(1.0 / n as f64, n, 1));
+    let in_h = in_h.collect::<Result<Vec<_>, _>>()?;
+    let in_tau = PARTS[..=used].iter().map(|&k| run(STEP / k as f64, 128, k));
+    let in_tau = in_tau.collect::<Result<Vec<_>, _>>()?;
+    let sequences = [("h", in_h), ("tau", in_tau)];
+    orders::finish(session, "ellipse", TITLE, sequences)
 }

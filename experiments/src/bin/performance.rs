@@ -7,9 +7,9 @@ use clap::Parser;
 use engine::{Case, Method, Operator, Run, Scheme, StepRule};
 use experiments::networks::{NetworkOptions, convergence_network};
 use experiments::options::RunOptions;
-use experiments::products::{Candidates, ProductTimes};
+use experiments::products::Candidates;
 use experiments::session::Session;
-use experiments::timing::{self, Timed, median};
+use experiments::timing::{self, Columns, Numbers, Timed};
 use experiments::{Error, harness, memory, surfaces};
 use geometry::measure::l2_distance;
 use geometry::shapes::{Ball, Capsule, Cuboid};
@@ -20,7 +20,7 @@ use report::{
 };
 use serde::Serialize;
 use serde_json::json;
-use solver::{PhaseTimes, StepRecord};
+use solver::StepRecord;
 
 const PROGRAM: &str = "performance";
 /// Steps of a comparison with a smaller tolerance, and how much smaller.
@@ -47,34 +47,57 @@ struct Options {
 /// What was measured for one shape on one grid.
 #[derive(Serialize)]
 struct Measurement {
-    case: String,
-    dimension: usize,
+    case: &'static str,
     n: usize,
-    cells_per_side: usize,
-    unknowns: usize,
-    steps: usize,
-    /// Wall time of all steps.
-    seconds: f64,
-    /// Median over the steps.
-    seconds_per_step: f64,
-    newton_per_step: f64,
-    /// On this grid.
-    hvp_per_step: f64,
-    /// On coarser grids, by their shares of the unknowns.
-    coarser_hvp_per_step: f64,
-    /// Wall time of one product during the steps.
-    seconds_per_product: f64,
-    /// Sums over the steps.
-    times: PhaseTimes,
-    /// Largest resident memory of the process while the steps ran, in MiB, where the system tells.
-    peak_mib: Option<f64>,
-    products: ProductTimes,
-    /// `L2` distance to a minimization with a [much smaller](TIGHTER) tolerance after [some steps](COMPARED_STEPS), over the way
-    /// from the start; where it was measured.
-    distance_to_tighter: Option<f64>,
-    /// Pages of memory that the system had to provide per product, from the second step on, all other work of the steps included.
-    pages_per_product: Option<f64>,
+    cells: Vec<usize>,
+    /// Seconds, work and memory of the steps. Products on coarser grids count by their shares of the unknowns; pages are those that the
+    /// system had to provide from the second step on; `distance_to_tighter` is the `L2` distance to a minimization with a [much
+    /// smaller](TIGHTER) tolerance after [some steps](COMPARED_STEPS), over the way from the start.
+    steps: Numbers,
+    products: Numbers,
+    /// Parts of the time of a step in seconds.
+    parts: [(&'static str, f64); 7],
 }
+
+const STEPS: &Columns = &[
+    ("steps", Format::Shortest, "steps"),
+    ("all steps [s]", Format::Fixed(1), "seconds"),
+    ("median step [s]", Format::Fixed(3), "seconds_per_step"),
+    ("Newton/step", Format::Fixed(1), "newton_per_step"),
+    ("HVP/step", Format::Fixed(1), "hvp_on_this_grid"),
+    (
+        "and on coarser grids",
+        Format::Fixed(1),
+        "hvp_on_coarser_grids",
+    ),
+    ("ms/HVP", Format::Fixed(2), "ms_per_product"),
+    (
+        "times two FFT pairs (f32)",
+        Format::Fixed(2),
+        "product_over_floor",
+    ),
+    ("peak memory [MiB]", Format::Fixed(0), "peak_mib"),
+    ("new pages/HVP", Format::Fixed(1), "pages_per_product"),
+    (
+        "to 100 times the precision",
+        Format::Scientific(1),
+        "distance_to_tighter",
+    ),
+];
+
+const PRODUCTS: &Columns = &[
+    ("Burn, f64 [ms]", Format::Fixed(2), "ms"),
+    ("by hand, f64 [ms]", Format::Fixed(2), "by_hand_ms"),
+    ("Burn / by hand", Format::Fixed(2), "ratio"),
+    ("two FFT pairs, f64 [ms]", Format::Fixed(2), "floor_ms"),
+    ("Burn, f32 [ms]", Format::Fixed(2), "single_ms"),
+    (
+        "two FFT pairs, f32 [ms]",
+        Format::Fixed(2),
+        "floor_single_ms",
+    ),
+    ("energy and gradient [ms]", Format::Fixed(2), "evaluate_ms"),
+];
 
 fn main() -> ExitCode {
     let options = Options::parse();
@@ -126,14 +149,23 @@ fn program(options: &Options) -> Result<(), Error> {
         let case = surfaces::willmore_flow(name, initial, operator, surfaces::scales(n), time);
         all.push(Measurement::of(name, &case, &mut session, turns, false)?);
     }
-    let (steps, products) = (step_table(&all)?, product_table(&all)?);
+    let steps = Table::of(&all).text("shape", |m| format!("{}, n = {}", m.case, m.n));
+    let steps = timing::with_columns(steps.text("grid", Measurement::grid), STEPS, |m| &m.steps)
+        .finish()?;
+    let products = Table::of(&all).text("grid", Measurement::grid);
+    let products = timing::with_columns(products, PRODUCTS, |m| &m.products).finish()?;
     steps.write(&session.output, "steps")?;
     products.write(&session.output, "products")?;
+    let mut summary = Summary::new();
+    for m in &all {
+        timing::summarize(&mut summary, &format!("{}.n{}", m.case, m.n), &m.steps)?;
+        timing::summarize(&mut summary, &format!("hvp.{}", m.grid()), &m.products)?;
+    }
     session.output.write_json("performance.json", &all)?;
     session.figure(figure(&all), "performance")?;
     let report = format!("{}\n{}", steps.to_markdown(), products.to_markdown());
     let title = "Willmore steps by the hybrid scheme on this machine";
-    session.finish(title, summary(&all)?, &report)
+    session.finish(title, summary, &report)
 }
 
 /// A cube of side 1/2, or a body with arms: a ball with three capsules through it.
@@ -171,150 +203,95 @@ fn distance_to_tighter<const D: usize>(
 
 impl Measurement {
     fn of<const D: usize>(
-        name: &str,
+        name: &'static str,
         case: &Case<D>,
         session: &mut Session<'_>,
         turns: f64,
         compared: bool,
     ) -> Result<Self, Error> {
         let grid = *case.grid();
-        let n = (1.0 / grid.spacing()).round() as usize;
+        let (n, device) = (
+            (1.0 / grid.spacing()).round() as usize,
+            session.device.clone(),
+        );
         let bar = session.progress.counter(format!("{name}, n = {n}"));
         memory::forget_peak();
-        let mut timed = Timed::new(case.clone(), &session.device, bar)?;
+        let mut timed = Timed::new(case.clone(), &device, bar)?;
         let mut warm = None;
         session.phase(format!("{name}, n = {n}: steps"), || {
-            while timed.goes_on() {
-                timed.step()?;
+            while timed.step()? {
                 warm = warm.or_else(memory::pages);
             }
-            timed
-                .failure
-                .clone()
-                .map_or(Ok(()), |reason| Err(Error::Options(reason)))
+            Ok(())
         })?;
-        let pages = memory::pages().zip(warm).map(|(now, warm)| now - warm);
+        let pages = memory::pages()
+            .zip(warm)
+            .map(|(now, warm)| (now - warm) as f64);
         let peak_mib = memory::peak_mib();
-        let network = &case
-            .operator
-            .network()
-            .expect("the operator is learned")
-            .network;
-        let device = session.device.clone();
         let (products, distance) = session.phase(format!("{name}, n = {n}: products"), || {
-            let distance = compared
-                .then(|| distance_to_tighter(case, &device))
-                .transpose()?;
+            let distance = compared.then(|| distance_to_tighter(case, &device));
+            let network = &case.operator.network().expect("a learned operator").network;
             let mut candidates = Candidates::new(network, timed.run.field(), &device)?;
-            Ok((
-                candidates.measure(Duration::from_secs_f64(turns))?,
-                distance,
-            ))
+            let products = candidates.measure(Duration::from_secs_f64(turns))?;
+            Ok((products, distance.transpose()?))
         })?;
-        let sum = |of: fn(&StepRecord) -> f64| timed.minimizations().map(of).sum::<f64>();
-        let times = PhaseTimes {
-            products: sum(|r| r.times.products),
-            preconditioner: sum(|r| r.times.preconditioner),
-            assembly: sum(|r| r.times.assembly),
-            energies: sum(|r| r.times.energies),
-            start: sum(|r| r.times.start),
-        };
+        let mut steps = timed.numbers();
         let later = timed.minimizations().skip(1).map(|r| r.newton.hvp as f64);
-        let later = later.sum::<f64>().max(1.0);
+        let pages = pages.map(|pages| pages / later.sum::<f64>().max(1.0));
+        steps.insert(
+            "product_over_floor",
+            steps["ms_per_product"] / products["floor_single_ms"],
+        );
+        let told = [
+            ("pages_per_product", pages),
+            ("peak_mib", peak_mib),
+            ("distance_to_tighter", distance),
+        ];
+        steps.extend(
+            told.into_iter()
+                .filter_map(|(name, value)| Some((name, value?))),
+        );
         Ok(Self {
-            case: name.to_owned(),
-            dimension: D,
+            case: name,
             n,
-            cells_per_side: grid.cells(),
-            unknowns: grid.len(),
-            steps: timed.run.steps(),
-            seconds: sum(|r| r.seconds),
-            seconds_per_step: median(timed.seconds()),
-            newton_per_step: timed.mean(|r| r.newton.newton as f64),
-            hvp_per_step: timed.mean(|r| r.newton.hvp as f64),
-            coarser_hvp_per_step: timed.mean(|r| r.start.hvp),
-            seconds_per_product: times.products / sum(|r| r.newton.hvp as f64),
-            times,
-            peak_mib,
+            cells: vec![grid.cells(); D],
+            parts: parts(&timed, products["floor_single_ms"]),
+            steps,
             products,
-            distance_to_tighter: distance,
-            pages_per_product: pages.map(|pages| pages as f64 / later),
         })
-    }
-
-    fn key(&self) -> String {
-        format!("{}.n{}", self.case, self.n)
     }
 
     fn grid(&self) -> String {
-        vec![self.cells_per_side.to_string(); self.dimension].join("x")
+        let cells: Vec<String> = self.cells.iter().map(ToString::to_string).collect();
+        cells.join("x")
     }
 
-    /// Parts of the time of a step in seconds, with their names.
-    fn parts(&self) -> [(&'static str, f64); 7] {
-        let PhaseTimes {
-            products,
-            preconditioner,
-            assembly,
-            energies,
-            start,
-        } = self.times;
-        // Two pairs of transforms per product, timed alone.
-        let calls = self.hvp_per_step * self.steps as f64;
-        let convolutions = (calls * self.products.floor_single).min(products);
-        let rest = self.seconds - products - preconditioner - assembly - energies - start;
-        [
-            ("convolutions of products", convolutions),
-            ("other work of products", products - convolutions),
-            ("preconditioner", preconditioner),
-            ("coarse assembly", assembly),
-            ("energies and gradients", energies),
-            ("start on the half grid", start),
-            ("rest", rest.max(0.0)),
-        ]
-        .map(|(name, seconds)| (name, seconds / self.steps as f64))
+    fn unknowns(&self) -> f64 {
+        self.cells.iter().product::<usize>() as f64
     }
 }
 
-fn step_table(all: &[Measurement]) -> Result<Table, Error> {
-    let over_floor = |m: &Measurement| m.seconds_per_product / m.products.floor_single;
-    Ok(Table::of(all)
-        .text("shape", |m| format!("{}, n = {}", m.case, m.n))
-        .text("grid", Measurement::grid)
-        .number("steps", Format::Shortest, |m| m.steps)
-        .number("all steps [s]", Format::Fixed(1), |m| m.seconds)
-        .number("median step [s]", Format::Fixed(3), |m| m.seconds_per_step)
-        .number("Newton/step", Format::Fixed(1), |m| m.newton_per_step)
-        .number("HVP/step", Format::Fixed(1), |m| m.hvp_per_step)
-        .number("and on coarser grids", Format::Fixed(1), |m| {
-            m.coarser_hvp_per_step
-        })
-        .number("ms/HVP", Format::Fixed(2), |m| 1e3 * m.seconds_per_product)
-        .number("times two FFT pairs (f32)", Format::Fixed(2), over_floor)
-        .number("peak memory [MiB]", Format::Fixed(0), |m| m.peak_mib)
-        .number("new pages/HVP", Format::Fixed(1), |m| m.pages_per_product)
-        .number("to 100 times the precision", Format::Scientific(1), |m| {
-            m.distance_to_tighter
-        })
-        .finish()?)
-}
-
-fn product_table(all: &[Measurement]) -> Result<Table, Error> {
-    let ms = Format::Fixed(2);
-    Ok(Table::of(all)
-        .text("grid", Measurement::grid)
-        .number("Burn, f64 [ms]", ms, |m| 1e3 * m.products.burn)
-        .number("by hand, f64 [ms]", ms, |m| 1e3 * m.products.by_hand)
-        .number("Burn / by hand", ms, |m| m.products.ratio)
-        .number("two FFT pairs, f64 [ms]", ms, |m| 1e3 * m.products.floor)
-        .number("Burn, f32 [ms]", ms, |m| 1e3 * m.products.burn_single)
-        .number("two FFT pairs, f32 [ms]", ms, |m| {
-            1e3 * m.products.floor_single
-        })
-        .number("energy and gradient [ms]", ms, |m| {
-            1e3 * m.products.evaluate
-        })
-        .finish()?)
+/// Parts of the time of a step, where two pairs of transforms, timed alone, take so many milliseconds.
+fn parts<const D: usize>(timed: &Timed<D>, floor_ms: f64) -> [(&'static str, f64); 7] {
+    let mean = |of: fn(&StepRecord) -> f64| timed.mean(of);
+    let products = mean(|r| r.times.products);
+    let convolutions = (1e-3 * floor_ms * mean(|r| r.newton.hvp as f64)).min(products);
+    let [preconditioner, assembly, energies, start] = [
+        mean(|r| r.times.preconditioner),
+        mean(|r| r.times.assembly),
+        mean(|r| r.times.energies),
+        mean(|r| r.times.start),
+    ];
+    let rest = mean(|r| r.seconds) - products - preconditioner - assembly - energies - start;
+    [
+        ("convolutions of products", convolutions),
+        ("other work of products", products - convolutions),
+        ("preconditioner", preconditioner),
+        ("coarse assembly", assembly),
+        ("energies and gradients", energies),
+        ("start on the half grid", start),
+        ("rest", rest.max(0.0)),
+    ]
 }
 
 /// Exponent of a power law through the first and the last point.
@@ -326,7 +303,7 @@ fn slope(points: &[[f64; 2]]) -> Option<f64> {
 /// Dimensions with their measurements and line styles.
 fn dimensions(all: &[Measurement]) -> [(String, Vec<&Measurement>, LineStyle); 2] {
     [(2, LineStyle::Solid), (3, LineStyle::Dashed)].map(|(dimension, style)| {
-        let rows = all.iter().filter(|m| m.dimension == dimension);
+        let rows = all.iter().filter(|m| m.cells.len() == dimension);
         (format!("{dimension}D"), rows.collect(), style)
     })
 }
@@ -334,7 +311,7 @@ fn dimensions(all: &[Measurement]) -> [(String, Vec<&Measurement>, LineStyle); 2
 fn figure(all: &[Measurement]) -> Figure {
     let mut slopes = Vec::new();
     let cost = dimensions(all).map(|(name, rows, style)| {
-        let curve = Series::of(&name, rows, |m| [m.unknowns as f64, m.seconds_per_step]);
+        let curve = Series::of(&name, rows, |m| [m.unknowns(), m.steps["seconds_per_step"]]);
         slopes.extend(slope(&curve.points).map(|slope| format!("{slope:.2} in {name}")));
         curve
             .with_colour(Colour::Black)
@@ -345,7 +322,7 @@ fn figure(all: &[Measurement]) -> Figure {
     let cost = LineChart::new("cost of a step", axes.0, axes.1).with_curves(cost);
     Figure::new("Willmore steps by the hybrid scheme", 2)
         .with_panel(cost.with_entries([]))
-        .with_panel(parts(all))
+        .with_panel(shares(all))
         .with_shared_legend()
         .with_note(format!(
             "2D: a cross, eps = 2⁻⁶, tau = 2⁻¹⁴. 3D: a cube at n = 64, a blob at n = 128, eps = 2h, tau = 2⁻¹⁸. {} threads. Cost \
@@ -356,59 +333,20 @@ fn figure(all: &[Measurement]) -> Figure {
 }
 
 /// Where the time goes: a colour for each part, a line style for each dimension.
-fn parts(all: &[Measurement]) -> LineChart {
-    let names = all[0].parts().map(|(name, _)| name);
+fn shares(all: &[Measurement]) -> LineChart {
     let axes = (Axis::log("unknowns"), Axis::log("mean per step [s]"));
     let mut chart = LineChart::new("where the time goes", axes.0, axes.1);
-    let mut entries = Vec::new();
+    let (mut phases, mut entries) = (Vec::new(), Vec::new());
     for (dimension, rows, style) in dimensions(all) {
-        for (k, name) in names.into_iter().enumerate() {
-            let points = rows.iter().map(|m| [m.unknowns as f64, m.parts()[k].1]);
+        phases.clear();
+        for (k, (name, _)) in all[0].parts.into_iter().enumerate() {
+            let points = rows.iter().map(|m| [m.unknowns(), m.parts[k].1]);
             let points: Vec<[f64; 2]> = points.filter(|[_, seconds]| *seconds > 0.0).collect();
-            chart = chart.with_series(
-                Series::new(format!("{name}, {dimension}"), points)
-                    .with_colour(k)
-                    .with_style(style)
-                    .with_marker(Marker::Circle),
-            );
+            let curve = Series::new(format!("{name}, {dimension}"), points).with_colour(k);
+            chart = chart.with_series(curve.with_style(style).with_marker(Marker::Circle));
+            phases.push(LegendEntry::line(name, k, LineStyle::Solid));
         }
         entries.push(LegendEntry::line(dimension, Colour::Black, style));
     }
-    let phases = names.into_iter().enumerate();
-    let phases = phases.map(|(k, name)| LegendEntry::line(name, k, LineStyle::Solid));
     chart.with_entries(phases).with_entries(entries)
-}
-
-fn summary(all: &[Measurement]) -> Result<Summary, Error> {
-    let mut summary = Summary::new();
-    for m in all {
-        let (grid, products) = (m.grid(), &m.products);
-        let of_steps = [
-            ("seconds", Some(m.seconds)),
-            ("seconds_per_step", Some(m.seconds_per_step)),
-            (
-                "hvp_per_step",
-                Some(m.hvp_per_step + m.coarser_hvp_per_step),
-            ),
-            ("newton_per_step", Some(m.newton_per_step)),
-            ("pages_per_product", m.pages_per_product),
-            ("distance_to_tighter", m.distance_to_tighter),
-            ("peak_mib", m.peak_mib),
-        ];
-        for (what, value) in of_steps {
-            if let Some(value) = value {
-                summary.insert(&format!("{}.{what}", m.key()), value)?;
-            }
-        }
-        let of_products = [
-            ("ratio", products.ratio),
-            ("ms", 1e3 * products.burn),
-            ("single_ms", 1e3 * products.burn_single),
-            ("over_floor", products.burn / products.floor),
-        ];
-        for (what, value) in of_products {
-            summary.insert(&format!("hvp.{grid}.{what}"), value)?;
-        }
-    }
-    Ok(summary)
 }

@@ -8,11 +8,10 @@ use experiments::meshes::{ARMADILLO, MeshOptions};
 use experiments::networks::{Chosen, NetworkOptions, convergence_network};
 use experiments::options::RunOptions;
 use experiments::session::Session;
-use experiments::timing::{self, Timed, take_turns};
+use experiments::timing::{self, Columns, Numbers, Timed, take_turns};
 use experiments::{Error, harness, surfaces};
 use fem::LinearSolver;
 use report::{Axis, Figure, Format, LineChart, LineStyle, Marker, Series, Summary, Table};
-use serde::Serialize;
 use serde_json::json;
 use solver::{Method as Newton, StepRecord};
 
@@ -106,29 +105,21 @@ impl Variant {
     }
 }
 
-/// What was measured for one row.
-#[derive(Serialize)]
+/// A row at work, and what was measured.
 struct Timing {
-    variant: &'static str,
+    row: &'static Variant,
     n: usize,
-    /// Steps done.
-    measured_steps: usize,
-    /// Wall time of those.
-    measured_seconds: f64,
-    /// The same, step by step.
-    step_seconds: Vec<f64>,
-    /// Wall time of all steps: measured, or with the mean of the later half of the measured steps for each of the rest.
-    seconds: f64,
-    extrapolated: bool,
-    newton_per_step: f64,
-    hvp_per_step: f64,
-    inner_cg_per_step: f64,
-    factorizations_per_step: f64,
+    timed: Timed<2>,
     /// Why the row ended early, if it failed.
     failure: Option<String>,
-    #[serde(skip)]
-    row: &'static Variant,
 }
+
+const COLUMNS: &Columns = &[
+    ("Newton/step", Format::Fixed(1), "newton_per_step"),
+    ("HVP/step", Format::Fixed(0), "hvp_per_step"),
+    ("inner CG/step", Format::Fixed(0), "inner_cg_per_step"),
+    ("Cholesky/step", Format::Fixed(1), "factorizations_per_step"),
+];
 
 fn main() -> ExitCode {
     let options = Options::parse();
@@ -169,7 +160,13 @@ fn program(options: &Options) -> Result<(), Error> {
     table.write(&session.output, "timing")?;
     let surface_table = surface_table(&armadillo)?;
     surface_table.write(&session.output, "armadillo")?;
-    session.output.write_json("timing.json", &timings)?;
+    let json = timings.iter().map(|t| {
+        let (row, seconds) = (t.row.key, t.timed.seconds());
+        json!({ "variant": row, "n": t.n, "numbers": t.numbers(), "step_seconds": seconds, "failure": t.failure })
+    });
+    session
+        .output
+        .write_json("timing.json", &json.collect::<Vec<_>>())?;
     session.figure(figure(&timings), "timing")?;
     let report = format!(
         "{}\n{}\n{}",
@@ -188,8 +185,6 @@ fn measure(
     n: usize,
     budget: f64,
 ) -> Result<Vec<Timing>, Error> {
-    /// The first step costs more than the others: extrapolation needs some of those.
-    const LEAST_STEPS: usize = 3;
     let mut contenders = Vec::new();
     for row in &VARIANTS {
         let mut operator = networks.operator((row.method, Scheme::Paper), n)?;
@@ -199,69 +194,90 @@ fn measure(
         let mut case = timing::plane(&operator, n, STEPS, session.options.quick)?;
         case.scales.newton.method = row.newton;
         let bar = (session.progress).bar(format!("{}, n = {n}", row.label), STEPS as u64);
-        contenders.push((row, Timed::new(case, &session.device, bar)?));
+        let timed = Timed::new(case, &session.device, bar)?;
+        contenders.push(Timing {
+            row,
+            n,
+            timed,
+            failure: None,
+        });
     }
-    let goes_on = |(_, timed): &(&Variant, Timed<2>)| {
-        let seconds = timed.seconds();
-        timed.goes_on() && (seconds.len() < LEAST_STEPS || seconds.iter().sum::<f64>() < budget)
-    };
     session.phase(format!("n = {n}"), || {
-        take_turns(&mut contenders, goes_on, |(_, timed)| timed.step())
+        take_turns(
+            &mut contenders,
+            |timing| timing.goes_on(budget),
+            Timing::step,
+        )
     })?;
-    let timings = contenders
-        .into_iter()
-        .map(|(row, timed)| Timing::of(row, n, timed));
-    Ok(timings.collect())
+    Ok(contenders)
 }
 
 impl Timing {
-    fn of(row: &'static Variant, n: usize, timed: Timed<2>) -> Self {
-        let step_seconds = timed.seconds();
-        let (count, measured) = (step_seconds.len(), step_seconds.iter().sum::<f64>());
-        // Steps become cheaper as corners smooth out: the later ones say most about what is to come.
-        let later = &step_seconds[count / 2..];
-        let late = later.iter().sum::<f64>() / later.len().max(1) as f64;
-        let inner = timed.run.statistics().unwrap_or_default();
-        let per_step = |total: usize| total as f64 / count.max(1) as f64;
-        Self {
-            variant: row.key,
-            n,
-            measured_steps: count,
-            measured_seconds: measured,
-            seconds: measured + late * (STEPS - count) as f64,
-            step_seconds,
-            extrapolated: count < STEPS,
-            newton_per_step: timed.mean(|r| r.newton.newton as f64),
-            hvp_per_step: timed.mean(StepRecord::hvp),
-            inner_cg_per_step: per_step(inner.cg),
-            factorizations_per_step: per_step(inner.factorizations),
-            failure: timed.failure,
-            row,
+    fn goes_on(&self, budget: f64) -> bool {
+        /// The first step costs more than the others: extrapolation needs some of those.
+        const LEAST_STEPS: usize = 3;
+        let seconds = self.timed.seconds();
+        let more = seconds.len() < LEAST_STEPS || seconds.iter().sum::<f64>() < budget;
+        self.failure.is_none() && seconds.len() < STEPS && more
+    }
+
+    fn step(&mut self) -> Result<(), Error> {
+        match self.timed.step() {
+            Err(Error::Engine(engine::Error::Step { source, .. }))
+                if matches!(source, solver::Error::NotConverged { .. }) =>
+            {
+                self.failure = Some(source.to_string());
+                Ok(())
+            }
+            other => other.map(drop),
         }
+    }
+
+    /// Time and work, with the time of all steps in seconds: measured, or with the mean of the later half of the measured steps for each
+    /// of the rest. Steps become cheaper as corners smooth out: the later ones say most about what is to come.
+    fn numbers(&self) -> Numbers {
+        let (mut numbers, seconds) = (self.timed.numbers(), self.timed.seconds());
+        let (count, measured) = (seconds.len(), seconds.iter().sum::<f64>());
+        let later = &seconds[count / 2..];
+        let late = later.iter().sum::<f64>() / later.len().max(1) as f64;
+        let inner = self.timed.run.statistics().unwrap_or_default();
+        let per_step = |total: usize| total as f64 / count.max(1) as f64;
+        numbers.extend([
+            ("measured_steps", count as f64),
+            ("measured_seconds", measured),
+            ("seconds", measured + late * (STEPS - count) as f64),
+            ("inner_cg_per_step", per_step(inner.cg)),
+            ("factorizations_per_step", per_step(inner.factorizations)),
+        ]);
+        numbers
     }
 
     /// Whether there is a time worth showing.
     fn usable(&self) -> bool {
-        self.failure.is_none() && self.measured_steps > 1
+        self.failure.is_none() && self.timed.run.steps() > 1
+    }
+
+    fn seconds(&self) -> Option<f64> {
+        self.usable().then(|| self.numbers()["seconds"])
     }
 
     /// How it was measured.
     fn measured(&self) -> String {
-        let steps = self.measured_steps;
+        let steps = self.timed.run.steps();
         match &self.failure {
             Some(reason) => format!("stopped after {steps} steps: {reason}"),
-            None if self.extrapolated => format!("extrapolated from {steps} steps"),
+            None if steps < STEPS => format!("extrapolated from {steps} steps"),
             None => "all steps".to_owned(),
         }
     }
 
     /// Time of all steps, and of those measured by both, over that of the hybrid scheme.
     fn over_hybrid(&self, all: &[Self]) -> Option<[f64; 2]> {
-        let hybrid = |t: &&Self| t.n == self.n && t.variant == "hybrid" && t.usable();
-        let hybrid = all.iter().find(hybrid).filter(|_| self.usable())?;
-        let common = self.measured_steps.min(hybrid.measured_steps);
-        let sum = |t: &Self| t.step_seconds[..common].iter().sum::<f64>();
-        Some([self.seconds / hybrid.seconds, sum(self) / sum(hybrid)])
+        let hybrid = (all.iter()).find(|t| t.n == self.n && t.row.key == "hybrid")?;
+        let (own, its) = (self.timed.seconds(), hybrid.timed.seconds());
+        let common = own.len().min(its.len());
+        let measured = own[..common].iter().sum::<f64>() / its[..common].iter().sum::<f64>();
+        Some([self.seconds()? / hybrid.seconds()?, measured])
     }
 }
 
@@ -299,13 +315,16 @@ fn surface_steps(
             let case = surfaces::willmore_flow(title, initial.clone(), operator, scales, time);
             let mut timed = Timed::new(case, &device, bar.clone())?;
             timed.step()?;
-            let made = timed.minimizations().next().copied();
-            let failed = || Error::Options(timed.failure.clone().unwrap_or_default());
+            let made = timed
+                .minimizations()
+                .next()
+                .copied()
+                .expect("a step was made");
             Ok(SurfaceStep {
                 surface: title.clone(),
                 method,
                 n,
-                made: made.ok_or_else(failed)?,
+                made,
                 papers_seconds,
             })
         };
@@ -328,27 +347,23 @@ fn surface_table(steps: &[SurfaceStep]) -> Result<Table, Error> {
 }
 
 fn table(timings: &[Timing]) -> Result<Table, Error> {
+    let numbers: Vec<Numbers> = timings.iter().map(Timing::numbers).collect();
+    let rows: Vec<(&Timing, Numbers)> = timings.iter().zip(numbers).collect();
     let times = |t: &Timing, k: usize| t.over_hybrid(timings).map(|times| times[k]);
-    Ok(Table::of(timings)
-        .text("method", |t| t.row.label)
-        .number("n", Format::Shortest, |t| t.n)
-        .number("128 steps [s]", Format::Fixed(1), |t| {
-            t.usable().then_some(t.seconds)
-        })
-        .text("measured", Timing::measured)
-        .number("times hybrid", Format::Fixed(1), |t| times(t, 0))
-        .number("times hybrid, measured steps", Format::Fixed(1), |t| {
-            times(t, 1)
-        })
-        .number("Newton/step", Format::Fixed(1), |t| t.newton_per_step)
-        .number("HVP/step", Format::Fixed(0), |t| t.hvp_per_step)
-        .number("inner CG/step", Format::Fixed(0), |t| t.inner_cg_per_step)
-        .number("Cholesky/step", Format::Fixed(1), |t| {
-            t.factorizations_per_step
-        })
-        .number("paper, other machines [s]", Format::Shortest, |t| {
-            t.row.papers_seconds(t.n)
-        })
+    let table = Table::of(&rows)
+        .text("method", |(t, _)| t.row.label)
+        .number("n", Format::Shortest, |(t, _)| t.n)
+        .number("128 steps [s]", Format::Fixed(1), |(t, _)| t.seconds())
+        .text("measured", |(t, _)| t.measured())
+        .number("times hybrid", Format::Fixed(1), |(t, _)| times(t, 0))
+        .number(
+            "times hybrid, measured steps",
+            Format::Fixed(1),
+            |(t, _)| times(t, 1),
+        );
+    let papers = |(t, _): &(&Timing, Numbers)| t.row.papers_seconds(t.n);
+    Ok(timing::with_columns(table, COLUMNS, |(_, numbers)| numbers)
+        .number("paper, other machines [s]", Format::Shortest, papers)
         .finish()?)
 }
 
@@ -360,12 +375,16 @@ fn figure(timings: &[Timing]) -> Figure {
     let mut chart = LineChart::new("", axes.0, axes.1);
     for (k, row) in VARIANTS.iter().enumerate() {
         let marker = [Marker::Circle, Marker::Square, Marker::Triangle][k % 3];
-        let own = || timings.iter().filter(|t| t.variant == row.key);
-        let ours: Vec<[f64; 2]> = (own().filter(|t| t.usable()))
-            .map(|t| [t.n as f64, t.seconds])
-            .collect();
-        let papers: Vec<[f64; 2]> =
-            (own().filter_map(|t| Some([t.n as f64, row.papers_seconds(t.n)?]))).collect();
+        let own = || timings.iter().filter(|t| t.row.key == row.key);
+        let points = |seconds: &dyn Fn(&Timing) -> Option<f64>| -> Vec<[f64; 2]> {
+            own()
+                .filter_map(|t| Some([t.n as f64, seconds(t)?]))
+                .collect()
+        };
+        let (ours, papers) = (
+            points(&Timing::seconds),
+            points(&|t| row.papers_seconds(t.n)),
+        );
         let ours = Series::new(row.label, ours);
         let papers = Series::new(format!("{} (paper, other machines)", row.label), papers)
             .with_style(LineStyle::Dashed);
@@ -384,17 +403,13 @@ fn figure(timings: &[Timing]) -> Figure {
 fn summary(timings: &[Timing], armadillo: &[SurfaceStep]) -> Result<Summary, Error> {
     let mut summary = Summary::new();
     for timing in timings.iter().filter(|t| t.usable()) {
-        let key = format!("timing.n{}.{}", timing.n, timing.variant);
-        summary.insert(&format!("{key}.seconds"), timing.seconds)?;
-        summary.insert_count(&format!("{key}.measured_steps"), timing.measured_steps)?;
-        if let Some([_, factor]) = timing.over_hybrid(timings) {
-            summary.insert(&format!("{key}.times_hybrid_measured_steps"), factor)?;
-        }
-        summary.insert(&format!("{key}.newton_per_step"), timing.newton_per_step)?;
-        summary.insert(&format!("{key}.hvp_per_step"), timing.hvp_per_step)?;
-        summary.insert(
-            &format!("{key}.inner_cg_per_step"),
-            timing.inner_cg_per_step,
+        let mut numbers = timing.numbers();
+        let factor = timing.over_hybrid(timings);
+        numbers.extend(factor.map(|[_, measured]| ("times_hybrid_measured_steps", measured)));
+        timing::summarize(
+            &mut summary,
+            &format!("timing.n{}.{}", timing.n, timing.row.key),
+            &numbers,
         )?;
     }
     for step in armadillo {
