@@ -1,12 +1,13 @@
 //! Write, flush, rename, flush the folder.
 
+use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use crate::stale::TEMPORARY_PREFIX;
-use crate::storage::Stored;
-use crate::{Disk, Error, Step, Storage};
+use crate::{Disk, Error, Storage};
 
+/// How the names of temporary files begin.
+pub const TEMPORARY_PREFIX: &str = ".partial-";
 /// Large fields are written in pieces of this many bytes.
 const BUFFER: usize = 1 << 16;
 
@@ -16,7 +17,7 @@ const BUFFER: usize = 1 << 16;
 /// the permissions of an ordinary new file.
 ///
 /// # Errors
-/// [`Error`] with the step that failed; an error of `write` is reported as [`Step::Write`].
+/// [`Error`]; the action of an error of `write` is `write`.
 pub fn write_atomically(
     path: impl AsRef<Path>,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -27,25 +28,19 @@ pub fn write_atomically(
 /// [`write_atomically`] on another storage than the disk itself.
 ///
 /// # Errors
-/// [`Error`] with the step that failed.
+/// As [`write_atomically`].
 pub fn write_atomically_on(
     storage: &dyn Storage,
     path: impl AsRef<Path>,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), Error> {
     let path = path.as_ref();
-    let failed = |step| {
-        move |source| Error {
-            step,
-            path: path.into(),
-            source,
-        }
-    };
+    let failed = |action| Error::of(action, path);
     let folder = folder_of(path);
     let (file, temporary) = tempfile::Builder::new()
         .prefix(TEMPORARY_PREFIX)
         .make_in(folder, |path| storage.create_file(path))
-        .map_err(failed(Step::Create))?
+        .map_err(failed("create a file beside"))?
         .into_parts();
     let store = || {
         let mut buffer = BufWriter::with_capacity(
@@ -59,57 +54,78 @@ pub fn write_atomically_on(
         let written = write(&mut buffer).and_then(|()| buffer.flush());
         // Taken apart, or dropping the buffer would write what has just failed again.
         let (stored, _) = buffer.into_parts();
-        written.map_err(failed(Step::Write))?;
-        storage
-            .sync_file(&stored.file, &temporary)
-            .map_err(failed(Step::Flush))?;
+        written.map_err(failed("write"))?;
+        let flushed = storage.sync_file(&stored.file, &temporary);
+        flushed.map_err(failed("flush to disk"))?;
         // Closed before it is renamed, which not every system does with open files.
         drop(stored);
-        storage
-            .rename(&temporary, path)
-            .map_err(failed(Step::Rename))
+        (storage.rename(&temporary, path)).map_err(failed("replace"))
     };
     let stored = store();
     // By hand, so that the storage knows. Only a panic above leaves it to the destructor.
-    match temporary.keep() {
-        Err(e) => stored.and(Err(failed(Step::Rename)(e.error)))?,
-        Ok(temporary) => {
-            if stored.is_err() {
-                // The first error is the one to report.
-                let _ = storage.remove_file(&temporary);
-            }
-            stored?;
-        }
+    let kept = temporary.keep().map_err(|e| failed("replace")(e.error));
+    if let (Err(_), Ok(temporary)) = (&stored, &kept) {
+        // The first error is the one to report.
+        let _ = storage.remove(temporary);
     }
-    storage
-        .sync_folder(folder)
-        .map_err(failed(Step::FlushFolder))
+    stored.and(kept)?;
+    (storage.sync_folder(folder)).map_err(failed("flush the folder of"))
+}
+
+/// Makes a folder that lasts, and those that it is in, unless they are there.
+///
+/// # Errors
+/// [`Error`], also if there is something else of that name.
+pub fn make_folders_on(storage: &dyn Storage, path: impl AsRef<Path>) -> Result<(), Error> {
+    let path = path.as_ref();
+    if path.as_os_str().is_empty() || path.is_dir() {
+        return Ok(());
+    }
+    let folder = folder_of(path);
+    make_folders_on(storage, folder)?;
+    match storage.create_folder(path) {
+        // Somebody else was faster.
+        Err(e) if e.kind() == io::ErrorKind::AlreadyExists && path.is_dir() => return Ok(()),
+        result => result.map_err(Error::of("create the folder", path))?,
+    }
+    (storage.sync_folder(folder)).map_err(Error::of("flush the folder of", path))
 }
 
 /// Proves that files can be made in a folder, by making one and removing it.
 ///
 /// # Errors
-/// [`Error`] with the step that failed.
+/// [`Error`] with the folder.
 pub fn probe(folder: impl AsRef<Path>) -> Result<(), Error> {
     let folder = folder.as_ref();
-    let failed = |step| {
-        move |source| Error {
-            step,
-            path: folder.into(),
-            source,
-        }
-    };
     let mut file = tempfile::Builder::new()
         .prefix(TEMPORARY_PREFIX)
         .tempfile_in(folder)
-        .map_err(failed(Step::Create))?;
-    file.write_all(b"probe").map_err(failed(Step::Write))?;
-    file.close().map_err(failed(Step::Remove))
+        .map_err(Error::of("create a file in", folder))?;
+    file.write_all(b"probe")
+        .and_then(|()| file.close())
+        .map_err(Error::of("write to", folder))
 }
 
 fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
+    }
+}
+
+/// A file on a storage, for code that writes to [`Write`].
+struct Stored<'a> {
+    storage: &'a dyn Storage,
+    file: File,
+    path: &'a Path,
+}
+
+impl Write for Stored<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.storage.write(&mut self.file, self.path, bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
     }
 }

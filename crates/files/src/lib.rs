@@ -2,16 +2,11 @@
 //!
 //! ```
 //! # let folder = tempfile::tempdir().expect("a folder for temporary files");
-//! # let folder = folder.path();
-//! // A process killed earlier may have left the beginning of a file under another name.
-//! files::remove_stale(folder)?;
-//! let path = folder.join("result.txt");
+//! let path = folder.path().join("result.txt");
 //! files::write_atomically(&path, |out| writeln!(out, "{}", 42))?;
 //! assert_eq!(std::fs::read_to_string(&path).unwrap(), "42\n");
 //! # Ok::<(), files::Error>(())
 //! ```
-//!
-//! # Conventions
 //!
 //! - A file is written under a temporary name in its own folder, flushed to the disk and renamed;
 //!   then the folder is flushed. A reader, or a restart after a crash, sees the old file or the new
@@ -23,12 +18,10 @@
 
 mod atomic;
 mod error;
-mod stale;
 mod storage;
 mod text;
 
-pub use atomic::{probe, write_atomically, write_atomically_on};
-pub use error::{Error, Step};
-pub use stale::{TEMPORARY_PREFIX, remove_stale, stale};
+pub use atomic::{TEMPORARY_PREFIX, make_folders_on, probe, write_atomically, write_atomically_on};
+pub use error::Error;
 pub use storage::{Disk, Storage};
 pub use text::shortened;

@@ -1,294 +1,265 @@
-//! The state of a computation as one file.
+//! A commit: the state of a computation, and what the run consists of, in one file.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use sha2::Digest;
+use sha2::{Digest, Sha256};
 
-use crate::digest::{self, Hashing, PIECE};
-use crate::{Damage, Error, Identity};
+use crate::digest::{self, Seal};
+use crate::{Error, names};
 
 /// Not text, not any other format, and changed by programs that convert line ends.
-pub(crate) const MAGIC: [u8; 8] = *b"\x8fckpt\r\n\x1a";
+const MAGIC: [u8; 8] = *b"\x8fckpt\r\n\x1a";
 /// Bumped when a reader of the old format would misread the new one.
-pub(crate) const FORMAT: u32 = 1;
-/// Bytes before the header: magic, format, length of the header.
-pub(crate) const START: usize = 16;
+const FORMAT: u32 = 2;
 /// Bytes after the arrays.
-pub(crate) const END: usize = 32;
+const END: usize = 32;
+/// Longest header in bytes, enough for a third of a million files.
+const MAX_HEADER: usize = 1 << 26;
+/// Values that are written at a time.
+const PIECE: usize = 1 << 13;
 
-/// What the caller needs to go on: all of it, so that the next step has the same bits as without an
-/// interruption.
+/// What a run goes on from: all that the caller needs, so that the next step has the same bits as
+/// without an interruption.
 #[derive(Debug, Clone, PartialEq)]
 pub struct State {
     /// Number of steps done.
     pub step: u64,
-    /// Time of the flow, finite.
-    pub time: f64,
-    /// Small things. JSON has no NaN and no infinity: what may become either belongs in an array.
+    /// Small things, at most [`State::MAX_NOTES`] bytes. JSON has no NaN and no infinity: what may
+    /// become either belongs in an array.
     pub notes: Value,
     /// Named arrays, stored bit by bit. Names differ and are not empty.
     pub arrays: Vec<(String, Vec<f64>)>,
 }
 
 impl State {
-    /// A state without arrays and notes.
-    pub fn new(step: u64, time: f64) -> Self {
+    /// Longest notes in bytes of JSON: 1 MiB. A reader takes 160 times as much memory at worst (small
+    /// maps).
+    pub const MAX_NOTES: usize = 1 << 20;
+
+    /// A state without arrays.
+    pub fn new(step: u64, notes: Value) -> Self {
         Self {
             step,
-            time,
-            notes: Value::Null,
+            notes,
             arrays: Vec::new(),
         }
     }
 
     /// Adds an array.
     #[must_use]
-    pub fn with_array(mut self, name: impl Into<String>, values: Vec<f64>) -> Self {
+    pub fn with_array(mut self, name: &str, values: Vec<f64>) -> Self {
         self.arrays.push((name.into(), values));
         self
     }
 
-    /// Sets the small things.
-    #[must_use]
-    pub fn with_notes(mut self, notes: impl Into<Value>) -> Self {
-        self.notes = notes.into();
-        self
+    /// An array.
+    pub fn array(&self, name: &str) -> Option<&[f64]> {
+        let found = self.arrays.iter().find(|(other, _)| other == name);
+        found.map(|(_, values)| values.as_slice())
     }
 
     /// Takes an array out.
     ///
     /// # Errors
-    /// [`Error::State`] if there is none of that name.
+    /// [`Error::Invalid`] if there is none of that name.
     pub fn take_array(&mut self, name: &str) -> Result<Vec<f64>, Error> {
         let found = self.arrays.iter().position(|(other, _)| other == name);
         match found {
-            Some(i) => Ok(self.arrays.swap_remove(i).1),
-            None => Err(Error::State {
-                step: self.step,
-                reason: format!("it has no array {name:?}"),
-            }),
+            Some(i) => Ok(self.arrays.remove(i).1),
+            None => Err(self.refused(&format!("it has no array {name:?}"))),
         }
+    }
+
+    pub(crate) fn refused(&self, reason: &str) -> Error {
+        let step = self.step;
+        Error::Invalid(format!("the state of step {step} cannot be used: {reason}"))
+    }
+
+    /// Whether the two are stored as the same bytes.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        let same = |(a, b): (&(String, Vec<f64>), &(String, Vec<f64>))| {
+            let bits = |v: &f64| v.to_bits();
+            a.0 == b.0 && a.1.iter().map(bits).eq(b.1.iter().map(bits))
+        };
+        self.notes == other.notes
+            && self.arrays.len() == other.arrays.len()
+            && self.arrays.iter().zip(&other.arrays).all(same)
     }
 }
 
-/// A state with what it belongs to.
-///
-/// # Format
+/// The files of a run, apart from those that it makes itself.
+pub(crate) type Files = BTreeMap<String, Kind>;
+
+/// How a file belongs to a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Kind {
+    /// Written once.
+    Written(Seal),
+    /// Replaced at any time; sealed only when the run is finished.
+    Derived(Option<Seal>),
+}
+
+/// How many checkpoints a run keeps.
+pub(crate) fn kept(finished: bool) -> usize {
+    if finished { 1 } else { 2 }
+}
+
+/// What a checkpoint file says besides notes and arrays. Its format:
 ///
 /// | bytes | content |
 /// |---|---|
 /// | 8 | magic `8f 63 6b 70 74 0d 0a 1a` |
-/// | 4 | format version, little endian: 1 |
-/// | 4 | length of the header, little endian |
-/// | … | header: JSON with `identity`, `step`, `time`, `notes` and `arrays`, a list of `name` and `length` |
+/// | 4 | format version, little endian: 2 |
+/// | 4 + 4 | lengths of the header and of the notes, little endian |
+/// | … | header: this as JSON |
+/// | … | notes: JSON |
 /// | … | the arrays one after the other, `f64`, little endian |
 /// | 32 | SHA-256 of all bytes before |
-#[derive(Debug, Clone, PartialEq)]
-pub struct Checkpoint {
-    /// What the state belongs to.
-    pub identity: Identity,
-    /// The state.
-    pub state: State,
-}
-
-#[derive(Serialize, Deserialize, PartialEq)]
+#[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Header {
-    identity: Identity,
+pub(crate) struct Header {
     step: u64,
-    time: f64,
-    notes: Value,
-    arrays: Vec<ArrayHeader>,
-}
-
-#[derive(Serialize, Deserialize, PartialEq)]
-#[serde(deny_unknown_fields)]
-struct ArrayHeader {
-    name: String,
-    /// Number of values.
-    length: u64,
-}
-
-impl Checkpoint {
-    /// Longest header in bytes: 1 MiB. A reader takes 160 times as much memory for it at
-    /// worst (small maps in the notes), and for the arrays no more than the file is long.
-    pub const MAX_HEADER: usize = 1 << 20;
-
-    /// Reads a checkpoint file.
-    ///
-    /// # Errors
-    /// [`Error::Damaged`], [`Error::Version`] or [`Error::Io`], with the path.
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
-        let path = path.as_ref();
-        let (file, length) = digest::open(path)?;
-        decode(file, length, path)
-    }
-
-    /// Reads a checkpoint from memory; `path` is what errors name.
-    ///
-    /// # Errors
-    /// As [`Checkpoint::read`].
-    pub fn from_bytes(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self, Error> {
-        decode(bytes, bytes.len() as u64, path.as_ref())
-    }
+    pub finished: bool,
+    pub files: Files,
+    /// Names and numbers of values.
+    arrays: Vec<(String, u64)>,
 }
 
 /// The bytes before the arrays, once it is certain that they can be read back.
-pub(crate) fn start(identity: &Identity, state: &State) -> Result<Vec<u8>, Error> {
-    let failed = |reason: String| Error::State {
-        step: state.step,
-        reason,
-    };
+pub(crate) fn start(state: &State, files: &Files, finished: bool) -> Result<Vec<u8>, Error> {
+    let lengths = state
+        .arrays
+        .iter()
+        .map(|(name, v)| (name.clone(), v.len() as u64));
     let header = Header {
-        identity: identity.clone(),
         step: state.step,
-        time: state.time,
-        notes: state.notes.clone(),
-        arrays: state
-            .arrays
-            .iter()
-            .map(|(name, values)| ArrayHeader {
-                name: name.clone(),
-                length: values.len() as u64,
-            })
-            .collect(),
+        finished,
+        files: files.clone(),
+        arrays: lengths.collect(),
     };
-    check_names(&header.arrays).map_err(failed)?;
-    let json = serde_json::to_vec(&header).map_err(|e| failed(e.to_string()))?;
-    if json.len() > Checkpoint::MAX_HEADER {
-        return Err(failed(format!(
-            "its notes and names take {} bytes of at most {}; put numbers into arrays",
-            json.len(),
-            Checkpoint::MAX_HEADER
-        )));
+    if !are_names(&header.arrays) {
+        return Err(state.refused("its arrays need names, and different ones"));
     }
-    // NaN becomes null, and deep nesting is not read: better now than on the day of the restart.
-    let same = serde_json::from_slice(&json).is_ok_and(|back: Header| back == header);
-    if !same {
-        return Err(failed(
-            "its time, grid or notes do not survive as JSON; all numbers must be finite".into(),
-        ));
+    let failed = |e: serde_json::Error| state.refused(&e.to_string());
+    let (header, notes) = (
+        serde_json::to_vec(&header).map_err(failed)?,
+        serde_json::to_vec(&state.notes).map_err(failed)?,
+    );
+    // Deep nesting is not read: better now than on the day of the restart.
+    if !serde_json::from_slice(&notes).is_ok_and(|back: Value| back == state.notes) {
+        return Err(state.refused("its notes are nested too deeply"));
     }
-    let mut bytes = Vec::with_capacity(START + json.len());
-    bytes.extend(MAGIC);
-    bytes.extend(FORMAT.to_le_bytes());
-    bytes.extend((json.len() as u32).to_le_bytes());
-    bytes.extend(json);
-    Ok(bytes)
+    for (what, length, limit) in [
+        ("notes take", notes.len(), State::MAX_NOTES),
+        ("list of files and arrays takes", header.len(), MAX_HEADER),
+    ] {
+        if length > limit {
+            let reason = format!("its {what} {length} bytes, and at most {limit} can be read");
+            return Err(state.refused(&reason));
+        }
+    }
+    let length = |json: &[u8]| (json.len() as u32).to_le_bytes();
+    Ok([
+        &MAGIC[..],
+        &FORMAT.to_le_bytes(),
+        &length(&header),
+        &length(&notes),
+        &header,
+        &notes,
+    ]
+    .concat())
 }
 
 /// Writes a checkpoint, given its [`start`].
 pub(crate) fn write(out: &mut dyn Write, start: &[u8], state: &State) -> io::Result<()> {
-    let mut out = Hashing::new(out);
-    out.write_all(start)?;
-    let mut piece = Vec::with_capacity(PIECE);
-    for (_, values) in &state.arrays {
-        for values in values.chunks(PIECE / 8) {
-            piece.clear();
-            piece.extend(values.iter().flat_map(|v| v.to_le_bytes()));
-            out.write_all(&piece)?;
-        }
-    }
-    out.inner.write_all(&out.hash.finalize())
-}
-
-fn check_names(arrays: &[ArrayHeader]) -> Result<(), String> {
-    let mut names: Vec<&str> = arrays.iter().map(|a| a.name.as_str()).collect();
-    names.sort_unstable();
-    if names.first() == Some(&"") {
-        return Err("an array has no name".into());
-    }
-    match names.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(pair) => Err(format!("two arrays have the name {:?}", pair[0])),
-        None => Ok(()),
-    }
-}
-
-/// Reads a checkpoint of `length` bytes. Nothing is allocated by a number in the file before the
-/// length of the file agrees with it.
-fn decode(source: impl Read, length: u64, path: &Path) -> Result<Checkpoint, Error> {
-    let damaged = |damage| Error::damaged(path, damage);
-    let content = |what: String| damaged(Damage::Content(what));
-    let failed = |e: io::Error| match e.kind() {
-        // It was longer a moment ago.
-        io::ErrorKind::UnexpectedEof => content("it ends early".into()),
-        _ => Error::io("read", path)(e),
+    let mut hash = Sha256::new();
+    let mut put = |bytes: &[u8]| {
+        hash.update(bytes);
+        out.write_all(bytes)
     };
-    let mut source = Hashing::new(source);
-    if length < (START + END) as u64 {
-        return Err(content(format!("its {length} bytes are no checkpoint")));
-    }
-    let mut start = [0; START];
-    source.read_exact(&mut start).map_err(failed)?;
-    if start[..8] != MAGIC {
-        return Err(content("it does not begin as a checkpoint does".into()));
-    }
-    let number = |at: usize| u32::from_le_bytes(std::array::from_fn(|i| start[at + i]));
-    if number(8) != FORMAT {
-        return Err(Error::Version {
-            path: path.into(),
-            found: number(8),
-            supported: FORMAT,
-        });
-    }
-    let header_length = number(12) as usize;
-    let rest = length - (START + END) as u64;
-    if header_length > Checkpoint::MAX_HEADER || header_length as u64 > rest {
-        return Err(content(format!("a header of {header_length} bytes")));
-    }
-    let mut header = vec![0; header_length];
-    source.read_exact(&mut header).map_err(failed)?;
-    let header: Header =
-        serde_json::from_slice(&header).map_err(|e| damaged(Damage::json("its header", &e)))?;
-    check_names(&header.arrays).map_err(content)?;
-    let values = header
-        .arrays
-        .iter()
-        .try_fold(0u64, |sum, a| sum.checked_add(a.length))
-        .and_then(|sum| sum.checked_mul(8));
-    let expected = values.and_then(|bytes| bytes.checked_add((START + END + header_length) as u64));
-    if expected != Some(length) {
-        return Err(damaged(Damage::Length {
-            found: length,
-            expected: expected.unwrap_or(u64::MAX),
-        }));
-    }
-    let mut arrays = Vec::with_capacity(header.arrays.len());
-    let mut piece = vec![0; PIECE.min(rest as usize)];
-    for ArrayHeader { name, length } in header.arrays {
-        let mut values: Vec<f64> = Vec::new();
-        let mut left = usize::try_from(length)
-            .ok()
-            .filter(|&n| values.try_reserve_exact(n).is_ok())
-            .ok_or_else(|| content(format!("{length} values of {name:?} exceed the memory")))?;
-        while left > 0 {
-            let now = left.min(PIECE / 8);
-            let piece = &mut piece[..8 * now];
-            source.read_exact(piece).map_err(failed)?;
-            let read = piece.chunks_exact(8);
-            values.extend(read.map(|b| f64::from_le_bytes(std::array::from_fn(|i| b[i]))));
-            left -= now;
+    put(start)?;
+    for (_, values) in &state.arrays {
+        for values in values.chunks(PIECE) {
+            let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+            put(&bytes)?;
         }
-        arrays.push((name, values));
     }
-    let mut checksum = [0; END];
-    let Hashing {
-        mut inner, hash, ..
-    } = source;
-    inner.read_exact(&mut checksum).map_err(failed)?;
-    if hash.finalize()[..] != checksum {
-        return Err(damaged(Damage::Checksum));
+    out.write_all(&hash.finalize())
+}
+
+/// Whether all have names, and none two have the same.
+fn are_names(arrays: &[(String, u64)]) -> bool {
+    let mut seen = BTreeSet::from([""]);
+    arrays.iter().all(|(name, _)| seen.insert(name))
+}
+
+pub(crate) fn other_version(path: PathBuf, found: u32) -> Error {
+    Error::Version {
+        path,
+        found,
+        supported: FORMAT,
     }
-    Ok(Checkpoint {
-        identity: header.identity,
-        state: State {
-            step: header.step,
-            time: header.time,
-            notes: header.notes,
-            arrays,
-        },
-    })
+}
+
+/// The bytes of a checkpoint, if its checksum holds, and its path.
+pub(crate) fn content(folder: &Path, step: u64) -> Result<(Vec<u8>, PathBuf), Error> {
+    let path = folder.join(names::checkpoint(step));
+    let mut bytes = Vec::new();
+    let read = digest::open(&path)?.read_to_end(&mut bytes);
+    read.map_err(files::Error::of("read", &path))?;
+    match bytes.split_last_chunk::<END>() {
+        Some((all, sum)) if Sha256::digest(all)[..] == sum[..] => {}
+        _ => return Err(digest::wrong_checksum(&path)),
+    }
+    bytes.truncate(bytes.len() - END);
+    Ok((bytes, path))
+}
+
+/// Reads the checkpoint of a step. A length in it is never more than a request: if there are not as
+/// many bytes, it is damaged.
+pub(crate) fn read(folder: &Path, step: u64) -> Result<(Header, State), Error> {
+    let (bytes, path) = content(folder, step)?;
+    let damaged = |what: String| Error::damaged(&path, what);
+    let mut rest = bytes.as_slice();
+    let mut take = |length: usize| {
+        let taken = rest.split_off(..length);
+        taken.ok_or_else(|| damaged("it ends early".into()))
+    };
+    if take(MAGIC.len())? != MAGIC {
+        return Err(damaged("it does not begin as a checkpoint does".into()));
+    }
+    let mut number = || take(4).map(|b| u32::from_le_bytes(std::array::from_fn(|i| b[i])));
+    let (format, in_header, in_notes) = (number()?, number()? as usize, number()? as usize);
+    if format != FORMAT {
+        return Err(other_version(path, format));
+    }
+    if in_header > MAX_HEADER || in_notes > State::MAX_NOTES {
+        let what = format!("it has {in_header} bytes of header and {in_notes} of notes");
+        return Err(damaged(what));
+    }
+    let json = |e: serde_json::Error| Error::json(&path, &e);
+    let header: Header = serde_json::from_slice(take(in_header)?).map_err(json)?;
+    let mut state = State::new(step, serde_json::from_slice(take(in_notes)?).map_err(json)?);
+    if header.step != step || !are_names(&header.arrays) {
+        let what = format!("it is of step {}, or of arrays without names", header.step);
+        return Err(damaged(what));
+    }
+    if let Some(name) = (header.files.keys()).find(|name| names::check(name).is_err()) {
+        return Err(damaged(format!("it lists a file with the name {name:?}")));
+    }
+    for (name, length) in &header.arrays {
+        let bytes = length.checked_mul(8).and_then(|n| usize::try_from(n).ok());
+        let values = take(bytes.unwrap_or(usize::MAX))?.chunks_exact(8);
+        let values = values.map(|b| f64::from_le_bytes(std::array::from_fn(|i| b[i])));
+        state.arrays.push((name.clone(), values.collect()));
+    }
+    if !rest.is_empty() {
+        return Err(damaged(format!("it has {} bytes too many", rest.len())));
+    }
+    Ok((header, state))
 }

@@ -1,15 +1,13 @@
-//! SHA-256 of what passes by.
+//! By what files are recognised.
 
 use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use std::io;
 use std::path::Path;
 
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::{Damage, Error};
-
-/// Bytes that are read at a time.
-pub(crate) const PIECE: usize = 1 << 16;
+use crate::Error;
 
 /// The SHA-256 of some bytes in lower-case hexadecimal digits, for example as the fingerprint of the
 /// options of a run.
@@ -17,7 +15,7 @@ pub fn fingerprint(bytes: impl AsRef<[u8]>) -> String {
     hex(Sha256::digest(bytes))
 }
 
-pub(crate) fn hex(digest: impl AsRef<[u8]>) -> String {
+fn hex(digest: impl AsRef<[u8]>) -> String {
     use std::fmt::Write;
     digest.as_ref().iter().fold(String::new(), |mut text, b| {
         let _ = write!(text, "{b:02x}");
@@ -25,95 +23,54 @@ pub(crate) fn hex(digest: impl AsRef<[u8]>) -> String {
     })
 }
 
-/// Whether a text is the SHA-256 of something, as [`fingerprint`] writes it.
-pub(crate) fn is_digest(text: &str) -> bool {
-    text.len() == 64 && text.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))
+/// Length and checksum of a file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Seal {
+    length: u64,
+    sha256: String,
 }
 
-/// Passes bytes on and keeps their number and checksum.
-pub(crate) struct Hashing<T> {
-    pub inner: T,
-    pub hash: Sha256,
-    pub length: u64,
-}
+impl Seal {
+    /// The seal of a file as it is.
+    pub fn of(path: &Path) -> Result<Self, Error> {
+        let mut hash = Sha256::new();
+        let read = io::copy(&mut open(path)?, &mut hash);
+        Ok(Self {
+            length: read.map_err(files::Error::of("read", path))?,
+            sha256: hex(hash.finalize()),
+        })
+    }
 
-impl<T> Hashing<T> {
-    pub fn new(inner: T) -> Self {
-        Self {
-            inner,
-            hash: Sha256::new(),
-            length: 0,
+    /// Accepts a file with this seal.
+    pub fn check(&self, path: &Path) -> Result<(), Error> {
+        let found = Self::of(path)?;
+        if found.length != self.length {
+            let (found, expected) = (found.length, self.length);
+            let what = format!("it has {found} bytes where it should have {expected}");
+            return Err(Error::damaged(path, what));
         }
-    }
-
-    fn passed(&mut self, bytes: &[u8]) {
-        self.hash.update(bytes);
-        self.length += bytes.len() as u64;
-    }
-}
-
-impl<W: Write> Write for Hashing<W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let written = self.inner.write(bytes)?;
-        self.passed(&bytes[..written]);
-        Ok(written)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.inner.flush()
+        if found != *self {
+            return Err(wrong_checksum(path));
+        }
+        Ok(())
     }
 }
 
-impl<R: Read> Read for Hashing<R> {
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        let read = self.inner.read(bytes)?;
-        self.passed(&bytes[..read]);
-        Ok(read)
-    }
+pub(crate) fn wrong_checksum(path: &Path) -> Error {
+    Error::damaged(path, "its checksum is wrong")
 }
 
-/// Opens an ordinary file for reading and returns its length; anything else is damage.
-pub(crate) fn open(path: &Path) -> Result<(File, u64), Error> {
+/// Opens an ordinary file for reading; anything else is damage.
+pub(crate) fn open(path: &Path) -> Result<File, Error> {
+    use io::ErrorKind::{NotADirectory, NotFound};
     let failed = |source: io::Error| match source.kind() {
-        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
-            Error::damaged(path, Damage::Missing)
-        }
-        _ => Error::io("read", path)(source),
+        NotFound | NotADirectory => Error::damaged(path, "it is missing"),
+        _ => files::Error::of("read", path)(source).into(),
     };
     // A link would lead out of the run, and reading a pipe would wait for ever.
-    let about = fs::symlink_metadata(path).map_err(failed)?;
-    if !about.is_file() {
-        return Err(Error::damaged(path, Damage::NotAFile));
+    if !fs::symlink_metadata(path).map_err(failed)?.is_file() {
+        return Err(Error::damaged(path, "it is not an ordinary file"));
     }
-    Ok((File::open(path).map_err(failed)?, about.len()))
-}
-
-/// Reads a whole file of at most `limit` bytes.
-pub(crate) fn read_small(path: &Path, limit: u64) -> Result<Vec<u8>, Error> {
-    let (file, length) = open(path)?;
-    if length > limit {
-        let damage = Damage::Content(format!(
-            "it has {length} bytes where at most {limit} are possible"
-        ));
-        return Err(Error::damaged(path, damage));
-    }
-    let mut bytes = Vec::new();
-    file.take(limit)
-        .read_to_end(&mut bytes)
-        .map_err(Error::io("read", path))?;
-    Ok(bytes)
-}
-
-/// The checksum of the first `length` bytes of a file, and the number of bytes there really were.
-pub(crate) fn hash_prefix(file: File, length: u64, path: &Path) -> Result<(Sha256, u64), Error> {
-    let mut source = Hashing::new(file.take(length));
-    let mut piece = vec![0; PIECE];
-    loop {
-        match source.read(&mut piece) {
-            Ok(0) => return Ok((source.hash, source.length)),
-            Ok(_) => {}
-            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-            Err(e) => return Err(Error::io("read", path)(e)),
-        }
-    }
+    File::open(path).map_err(failed)
 }

@@ -34,7 +34,7 @@ impl Interrupt {
                 interrupt.0.clone(),
             )
             .and_then(|_| flag::register(signal, interrupt.0.clone()))
-            .map_err(|source| Error::Signals { source })?;
+            .map_err(Error::Signals)?;
         }
         Ok(interrupt)
     }

@@ -2,68 +2,32 @@
 //! ends with the same bytes as if nothing had happened.
 //!
 //! ```
-//! use runs::{Error, GridShape, Identity, Interrupt, Resumed, RunDirectory, State, fingerprint};
-//! use serde::Serialize;
+//! use runs::{Error, RunDirectory, State};
+//! use serde_json::Value;
 //!
-//! #[derive(Serialize)]
-//! struct Row {
-//!     step: u64,
-//!     mean: f64,
-//! }
-//!
-//! fn compute(folder: &std::path::Path, interrupt: &Interrupt) -> Result<bool, Error> {
-//!     let config = "rate = 3.9\n";
-//!     let identity = Identity {
-//!         kind: "logistic map".into(),
-//!         program: "example 1.0".into(),
-//!         grid: GridShape { cells: vec![4], side: 1.0, origin: vec![0.0] },
-//!         network: None,
-//!         options: fingerprint(config),
-//!     };
-//!     let (mut run, state) = match RunDirectory::open(folder) {
-//!         Ok(stored) => {
-//!             let Resumed { run, state, .. } = stored.resume(&identity)?;
-//!             (run, state)
-//!         }
+//! fn compute(folder: &std::path::Path, last: u64) -> Result<(), Error> {
+//!     let (mut run, mut state) = match RunDirectory::open(folder) {
 //!         Err(Error::NoRun { .. }) => {
-//!             let manifest = serde_json::json!({ "experiment": "logistic", "seed": 7 });
-//!             (RunDirectory::create(folder, &identity, &manifest, config)?, None)
+//!             let start = State::new(0, Value::Null).with_array("u", vec![0.1, 0.2]);
+//!             let config = [("config.toml", "rate = 3.9\n")];
+//!             (RunDirectory::create(folder, &config, &start)?, start)
 //!         }
-//!         Err(error) => return Err(error),
+//!         stored => stored?.resume()?,
 //!     };
-//!     let mut state = state.unwrap_or_else(|| {
-//!         State::new(0, 0.0).with_array("u", vec![0.1, 0.2, 0.3, 0.4])
-//!     });
-//!     while state.step < 20 {
-//!         let u = &mut state.arrays[0].1;
-//!         u.iter_mut().for_each(|v| *v *= 3.9 * (1.0 - *v));
-//!         let mean = u.iter().sum::<f64>() / 4.0;
+//!     while state.step < last {
+//!         state.arrays[0].1.iter_mut().for_each(|v| *v *= 3.9 * (1.0 - *v));
 //!         state.step += 1;
-//!         state.time = 0.1 * state.step as f64;
-//!         run.metric(&Row { step: state.step, mean })?;
-//!         if state.step % 10 == 0 {
-//!             let name = format!("fields/step-{:04}.txt", state.step);
-//!             run.write_file(&name, |out| writeln!(out, "{:?}", state.arrays[0].1))?;
-//!         }
-//!         if state.step % 3 == 0 || interrupt.requested() {
+//!         if state.step % 3 == 0 {
 //!             run.commit(&state)?;
 //!         }
-//!         if interrupt.requested() {
-//!             return Ok(false); // and the program ends with Interrupt::EXIT_CODE
-//!         }
 //!     }
-//!     run.write_file("figures/mean.txt", |out| writeln!(out, "a figure"))?;
-//!     run.finish(&state)?;
-//!     Ok(true)
+//!     run.write_file("figures/u.txt", |out| writeln!(out, "{:?}", state.array("u")))?;
+//!     run.finish(&state)
 //! }
 //!
 //! # let root = tempfile::tempdir().expect("a folder for temporary files");
-//! # let folder = root.path().join("run");
-//! let interrupt = Interrupt::never(); // in a program: Interrupt::catch()?
-//! interrupt.request();
-//! assert!(!compute(&folder, &interrupt)?); // one step, then the signal
-//! assert!(compute(&folder, &Interrupt::never())?); // the other nineteen
-//! assert!(RunDirectory::open(&folder)?.is_finished());
+//! compute(&root.path().join("run"), 20)?;
+//! assert!(RunDirectory::open(root.path().join("run"))?.is_finished());
 //! # Ok::<(), Error>(())
 //! ```
 //!
@@ -71,11 +35,9 @@
 //!
 //! | name | content | written |
 //! |---|---|---|
-//! | `index.json` | length and SHA-256 of every file, and its own SHA-256 | replaced at each commit |
-//! | `manifest.json`, `config.toml` | what was asked for, without times | once |
-//! | `metrics.csv` | a row per step | grows |
-//! | `checkpoints/step-00000012.ckpt` | the state ([`Checkpoint`] has the format) | once, the last two kept |
-//! | `figures/`, `fields/`, … | whatever the caller writes | once |
+//! | `checkpoints/step-00000012.ckpt` | the state, and length and SHA-256 of every file | at each commit, the last two kept |
+//! | `config.toml`, `fields/`, … | whatever the caller writes | once |
+//! | `metrics.csv`, … | whatever the caller derives from the state | replaced at any time |
 //! | `timings.json` | wall times and the like, and its own SHA-256 | replaced at any time |
 //! | `lock` | nothing; locked while a process works here | once |
 //!
@@ -83,43 +45,37 @@
 //!
 //! # What is promised
 //!
-//! - The index is the commit point. Files are written and flushed before it and never overwritten, so
-//!   that it describes a whole state of the run whenever the process dies. What it does not list, and
-//!   rows of `metrics.csv` after the committed ones, were written after the commit; resuming removes
-//!   them, and the computation writes them again.
+//! - A checkpoint is the commit. Other files are written and flushed before it and never overwritten,
+//!   so that it describes a whole state of the run whenever the process dies. What it does not list
+//!   was written after it; resuming removes that, and the computation writes it again.
 //! - A run that is a function of its [`State`] ends with the same bytes in every file but
 //!   `timings.json`, however often it was stopped. [`RunDirectory::finish`] keeps one checkpoint
 //!   only, because which other one there is depends on where it was stopped.
 //! - A bit that has flipped in any of the files is noticed when the run is opened, and the file
-//!   named. [`RunDirectory::recover`] goes on from the newest intact commit. Of a damaged
-//!   `index.json` there is no copy: what can then be saved is in the checkpoints, which
-//!   [`Checkpoint::read`] checks on their own.
+//!   named; in files that are replaced at any time, once the run is finished.
+//!   [`RunDirectory::recover`] goes on from the newest intact commit.
 //! - Readers never trust a number in a file before its length agrees. They take at most the length
-//!   of a checkpoint and 160 times [`Checkpoint::MAX_HEADER`], some ten times the length of
-//!   an index (at most 64 MiB), 160 times that of `timings.json` (at most 1 MiB), and 64 KiB
-//!   for anything else.
+//!   of a checkpoint and as much again for the one before it is replaced, twenty times its list of
+//!   files (64 MiB at most), 160 times its notes (at most [`State::MAX_NOTES`]) or `timings.json` (at
+//!   most 1 MiB), and 64 KiB for anything else.
 //! - A failed write (full disk, read-only folder) leaves the last commit in place.
 
+mod cache;
 mod checkpoint;
 mod digest;
 mod directory;
 mod error;
-mod identity;
-mod index;
+mod folder;
 mod interrupt;
 mod lock;
-mod metrics;
 mod names;
-mod seal;
 mod stored;
+mod timings;
 
-#[cfg(test)]
-mod fuzzing;
-
-pub use checkpoint::{Checkpoint, State};
+pub use cache::Cache;
+pub use checkpoint::State;
 pub use digest::fingerprint;
 pub use directory::RunDirectory;
-pub use error::{Damage, Error};
-pub use identity::{GridShape, Identity, NetworkName};
+pub use error::Error;
 pub use interrupt::Interrupt;
-pub use stored::{Resumed, StoredRun};
+pub use stored::StoredRun;

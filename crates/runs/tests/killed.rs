@@ -1,9 +1,5 @@
 //! The toy as a process of its own: killed, interrupted, and out of space.
 
-#![cfg(unix)]
-
-mod common;
-
 use std::cell::Cell;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
@@ -11,7 +7,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use common::{Random, STEPS, Toy, contents, identity, run_to, state_at, uninterrupted};
+use crate::toy::{self, FILES, Random, STEPS, Toy, contents, run_to, state_at, uninterrupted};
 use files::Disk;
 use runs::{Error, Interrupt, RunDirectory};
 
@@ -27,7 +23,7 @@ fn process() {
     let interrupt = Interrupt::catch().unwrap();
     // Now signals are caught.
     std::fs::write(folder.with_extension("ready"), "").unwrap();
-    let result = common::run(
+    let result = toy::run(
         &folder,
         &Toy {
             storage: Arc::new(Disk),
@@ -54,7 +50,7 @@ fn start(folder: &Path, pause: u64, before: &str) -> Child {
     Command::new("sh")
         .args(["-c", &format!("{before} exec \"$0\" \"$@\"")])
         .arg(std::env::current_exe().unwrap())
-        .args(["--ignored", "--exact", "process", "--nocapture"])
+        .args(["--ignored", "--exact", "killed::process", "--nocapture"])
         .env(FOLDER, folder)
         .env(PAUSE, pause.to_string())
         .stdout(Stdio::null())
@@ -115,8 +111,7 @@ fn killed_at_random_moments_it_ends_with_the_same_bytes() {
             let status = child.wait().unwrap();
             if let Ok(stored) = RunDirectory::open(&folder) {
                 leftovers += stored.leftovers().count();
-                let state = stored.checkpoint().map(|c| c.state.clone());
-                assert_eq!(state, state.as_ref().map(|s| state_at(s.step)));
+                assert_eq!(*stored.state(), state_at(stored.state().step));
             }
             match status.signal() {
                 Some(9) => kills += 1,
@@ -146,7 +141,7 @@ fn one_signal_commits_and_two_end_at_once() {
         signal(&child, name);
         assert_eq!(await_end(&mut child).code(), Some(130));
         let stored = RunDirectory::open(&folder).unwrap();
-        let step = stored.checkpoint().unwrap().state.step;
+        let step = stored.state().step;
         assert!(step < 50, "it went on to step {step}");
         drop(stored);
         run_to(&folder, STEPS).unwrap();
@@ -170,8 +165,8 @@ fn where_the_system_refuses_to_write_the_last_commit_stays() {
     let root = tempfile::tempdir().unwrap();
     let folder = root.path().join("run");
     let mut last = 0;
-    // Blocks of 512 bytes. The index is the longest file, and grows.
-    for blocks in [1, 4, 5] {
+    // Blocks of 512 bytes. The checkpoint is the longest file, and grows.
+    for blocks in [1, 3, 4] {
         let limit = format!("trap '' XFSZ; ulimit -f {blocks};");
         let output = start(&folder, 0, &limit).wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(1));
@@ -180,7 +175,7 @@ fn where_the_system_refuses_to_write_the_last_commit_stays() {
         assert!(message.starts_with("could not write"), "{message}");
         assert!(message.contains("File too large"), "{message}");
         if let Ok(stored) = RunDirectory::open(&folder) {
-            last = stored.checkpoint().map_or(0, |c| c.state.step);
+            last = stored.state().step;
         }
     }
     assert!(last > 0, "no run came far enough");
@@ -207,7 +202,7 @@ fn on_a_full_disk_the_last_commit_stays() {
         let process = Command::new("unshare")
             .args(["-rm", "sh", "-c", SCRIPT])
             .arg(std::env::current_exe().unwrap())
-            .args(["--ignored", "--exact", "process", "--nocapture"])
+            .args(["--ignored", "--exact", "killed::process", "--nocapture"])
             .env("SIZE", format!("{size}k"))
             .env("DISK", &disk)
             .env("COPY", &copy)
@@ -233,8 +228,8 @@ fn on_a_full_disk_the_last_commit_stays() {
         assert!(message.starts_with("could not "), "{message}");
         assert!(message.contains("No space left"), "{message}");
         match RunDirectory::open(&run) {
-            Ok(stored) => steps.push(stored.checkpoint().map_or(0, |c| c.state.step)),
-            Err(error) => assert!(matches!(error, Error::NoRun { .. }), "{error}"),
+            Ok(stored) => steps.push(stored.state().step),
+            Err(error) => assert!(matches!(error, Error::NoRun(_)), "{error}"),
         }
         run_to(&run, STEPS).unwrap();
         assert!(contents(&run) == expected, "{size} KiB");
@@ -246,8 +241,7 @@ fn on_a_full_disk_the_last_commit_stays() {
 fn a_run_is_locked_against_other_processes() {
     let root = tempfile::tempdir().unwrap();
     let folder = root.path().join("run");
-    let manifest = serde_json::Value::Null;
-    let run = RunDirectory::create(&folder, &identity(), &manifest, "").unwrap();
+    let run = RunDirectory::create(&folder, &FILES, &state_at(0)).unwrap();
     let output = start(&folder, 0, "").wait_with_output().unwrap();
     let message = String::from_utf8(output.stderr).unwrap();
     assert!(message.contains("another process works on"), "{message}");

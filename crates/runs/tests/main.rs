@@ -1,0 +1,11 @@
+//! What run directories promise.
+
+mod cache;
+mod damage;
+mod faults;
+mod fuzzing;
+mod killed;
+mod toy;
+
+#[global_allocator]
+static ALLOCATOR: ::fuzzing::CountingAllocator = ::fuzzing::CountingAllocator;
