@@ -15,6 +15,9 @@ use crate::{Error, lock, names, timings};
 
 /// A run directory that this process works on. Dropping it gives the lock back; what was not
 /// committed is then forgotten when the run is resumed.
+///
+/// All methods give [`Error::Invalid`] for what cannot be stored, which changes nothing, and
+/// [`Error::Io`]. Names of files are `/`-separated and made of letters, digits, `.`, `-` and `_`.
 #[derive(Debug)]
 pub struct RunDirectory {
     pub(crate) path: PathBuf,
@@ -26,15 +29,13 @@ pub struct RunDirectory {
     pub(crate) _lock: Lock,
 }
 
+#[expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 impl RunDirectory {
     /// Starts a run in a folder that does not exist or is empty: writes `files`, names and texts such
     /// as that of `config.toml`, and then the first checkpoint.
     ///
-    /// A folder in which another process was killed while it started a run counts as empty.
-    ///
-    /// # Errors
-    /// [`Error::Occupied`] if there is anything in the folder, [`Error::Locked`] if somebody else is
-    /// starting a run there, [`Error::Invalid`], [`Error::Io`].
+    /// A folder in which another process was killed while it started a run counts as empty. Anything
+    /// else in it gives [`Error::Occupied`], and another process there [`Error::Locked`].
     pub fn create(
         path: impl Into<PathBuf>,
         files: &[(&str, &str)],
@@ -44,9 +45,6 @@ impl RunDirectory {
     }
 
     /// [`RunDirectory::create`] on another storage than the disk itself.
-    ///
-    /// # Errors
-    /// As [`RunDirectory::create`].
     pub fn create_on(
         storage: Arc<dyn Storage>,
         path: impl Into<PathBuf>,
@@ -95,10 +93,6 @@ impl RunDirectory {
 
     /// Writes a file under a new name such as `fields/step-0010.vti`; folders are made. It belongs to
     /// the run from the next commit on, and never changes. After an error the name is free again.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] for names that are taken, reserved or not made of letters, digits, `.`,
-    /// `-`, `_` and `/`; [`Error::Io`], [`Error::Broken`].
     pub fn write_file(
         &mut self,
         name: &str,
@@ -114,10 +108,7 @@ impl RunDirectory {
 
     /// Takes up a file that other code has written whole at [`path`](RunDirectory::path)`/name`, as
     /// [`RunDirectory::write_file`] would have; make the folder with
-    /// [`RunDirectory::make_folder`].
-    ///
-    /// # Errors
-    /// As [`RunDirectory::write_file`], and [`Error::Damaged`] if there is no such file.
+    /// [`RunDirectory::make_folder`]. [`Error::Damaged`] if there is no such file.
     pub fn adopt_file(&mut self, name: &str) -> Result<(), Error> {
         self.check_new(name)?;
         let seal = self.flushed(name)?;
@@ -126,9 +117,6 @@ impl RunDirectory {
     }
 
     /// Makes a folder in the run directory, unless it exists, and returns its path.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`], [`Error::Io`], [`Error::Broken`].
     pub fn make_folder(&mut self, name: &str) -> Result<PathBuf, Error> {
         self.check_usable()?;
         names::check(name)?;
@@ -140,9 +128,6 @@ impl RunDirectory {
     /// Writes or replaces a file that is derived from the state, such as `metrics.csv`: a crash
     /// leaves an old one or the new one. It belongs to the run from the next commit on, but its
     /// content only once the run is finished.
-    ///
-    /// # Errors
-    /// As [`RunDirectory::write_file`], but the name may be that of another such file.
     pub fn replace_file(
         &mut self,
         name: &str,
@@ -160,9 +145,6 @@ impl RunDirectory {
     /// Replaces `timings.json`, the one file that may differ between two runs of the same
     /// computation: wall times and the like, 1 MiB at most. It stands outside of the commits, and a
     /// crash leaves the old one or the new one.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`], [`Error::Io`], [`Error::Broken`].
     pub fn write_timings(&mut self, timings: &Value) -> Result<(), Error> {
         self.check_usable()?;
         self.store_timings(timings)
@@ -172,19 +154,14 @@ impl RunDirectory {
     /// checkpoints are kept.
     ///
     /// The same state may be committed again, for example on an interruption right after a commit.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`], which changes nothing. After [`Error::Io`] the directory is that of this
-    /// commit or of the last one, and has to be opened again: all further calls give
-    /// [`Error::Broken`].
+    /// After [`Error::Io`] the directory is that of this commit or of the last one, and has to be
+    /// opened again: all further calls give [`Error::Broken`].
     pub fn commit(&mut self, state: &State) -> Result<(), Error> {
         self.commit_as(state, false)
     }
 
     /// Commits the last state, marks the run as finished, and keeps this checkpoint alone.
-    ///
-    /// # Errors
-    /// As [`RunDirectory::commit`], and [`Error::Damaged`] if a derived file is missing.
+    /// [`Error::Damaged`] if a [derived](RunDirectory::replace_file) file is missing.
     pub fn finish(mut self, state: &State) -> Result<(), Error> {
         for name in self.files.keys().cloned().collect::<Vec<_>>() {
             if let Some(Kind::Derived(_)) = self.files.get(&name) {
@@ -279,21 +256,17 @@ impl RunDirectory {
 /// Accepts a folder in which there is nothing but what a process leaves that is killed while it
 /// starts a run with these files.
 fn check_free(path: &Path, files: &Files) -> Result<(), Error> {
-    let occupied = |found: String| Error::Occupied {
-        path: path.into(),
-        found,
-    };
-    if !folder::steps(path)?.is_empty() {
-        return Err(occupied("a run".into()));
-    }
     let other = if path.join(names::LOCK).is_file() {
         let others = folder::others(path, files, &[])?;
         others.into_iter().find(|path| !folder::is_temporary(path))
     } else {
         folder::list(path)?.pop().map(|(path, _)| path)
     };
-    other.map_or(Ok(()), |other| {
-        let name = other.file_name().unwrap_or_default();
-        Err(occupied(name.display().to_string()))
-    })
+    match other {
+        None => Ok(()),
+        Some(other) => Err(Error::Occupied {
+            path: path.into(),
+            found: other.file_name().unwrap_or_default().display().to_string(),
+        }),
+    }
 }

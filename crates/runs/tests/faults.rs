@@ -132,8 +132,8 @@ fn survives(
     fault
 }
 
-#[test]
-fn every_operation_may_fail() {
+/// Lets every `stride`-th operation fail.
+fn operations_fail(stride: usize) {
     let expected = uninterrupted();
     for (dead, piece) in [
         (false, usize::MAX),
@@ -149,7 +149,7 @@ fn every_operation_may_fail() {
             if !survives(&run, &Faulty::new(at, dead, piece), &expected, false) {
                 break;
             }
-            at += 1;
+            at += stride;
         }
         assert!(at > 400, "only {at} operations");
         println!("{at} operations, dead {dead}, pieces of {piece}");
@@ -157,10 +157,21 @@ fn every_operation_may_fail() {
 }
 
 #[test]
-fn every_operation_of_a_resumption_may_fail() {
+fn some_operations_may_fail() {
+    operations_fail(11);
+}
+
+#[test]
+#[ignore = "long"]
+fn every_operation_may_fail() {
+    operations_fail(1);
+}
+
+/// Lets the first operations of resuming a run fail that was killed at some operation.
+fn operations_of_a_resumption_fail(kills: impl Iterator<Item = usize>) {
     let expected = uninterrupted();
     let mut leftovers = 0;
-    for killed_at in 185..205 {
+    for killed_at in kills {
         let folder = toy::quick_folder();
         let left = folder.path().join("left");
         let toy = Toy {
@@ -177,15 +188,22 @@ fn every_operation_of_a_resumption_may_fail() {
         for at in 0..30 {
             let run = folder.path().join(format!("{at}"));
             write_contents(&run, &left);
-            assert!(survives(
-                &run,
-                &Faulty::new(at, at % 2 == 0, 700),
-                &expected,
-                false
-            ));
+            let storage = Faulty::new(at, at % 2 == 0, 700);
+            assert!(survives(&run, &storage, &expected, false));
         }
     }
-    assert!(leftovers > 10, "only {leftovers} leftovers");
+    assert!(leftovers > 2, "only {leftovers} leftovers");
+}
+
+#[test]
+fn some_operations_of_a_resumption_may_fail() {
+    operations_of_a_resumption_fail((185..205).step_by(7));
+}
+
+#[test]
+#[ignore = "long"]
+fn every_operation_of_a_resumption_may_fail() {
+    operations_of_a_resumption_fail(175..215);
 }
 
 #[test]

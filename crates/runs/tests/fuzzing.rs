@@ -216,10 +216,10 @@ fn a_header_that_contradicts_itself_is_refused() {
         ("is missing", |h| {
             h["files"]["d"] = h["files"]["a"].clone();
         }),
-        ("3 bytes where it should have 4", |h| {
+        ("checksum", |h| {
             h["files"]["a"]["written"]["length"] = json!(4);
         }),
-        ("checksum is wrong", |h| {
+        ("checksum", |h| {
             h["files"]["a"]["written"]["sha256"] = json!("5C");
         }),
         ("8 bytes too many", |h| h["arrays"][0][1] = json!(3)),

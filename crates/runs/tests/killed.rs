@@ -18,7 +18,9 @@ const PAUSE: &str = "RUNS_TEST_PAUSE";
 #[test]
 #[ignore = "the process that the other tests start"]
 fn process() {
-    let folder = PathBuf::from(std::env::var_os(FOLDER).expect("started by another test"));
+    let Some(folder) = std::env::var_os(FOLDER).map(PathBuf::from) else {
+        return; // not started by another test
+    };
     let pause = std::env::var(PAUSE).unwrap().parse().unwrap();
     let interrupt = Interrupt::catch().unwrap();
     // Now signals are caught.
@@ -90,6 +92,16 @@ fn await_end(child: &mut Child) -> ExitStatus {
 
 #[test]
 fn killed_at_random_moments_it_ends_with_the_same_bytes() {
+    killed_at_random_moments(4);
+}
+
+#[test]
+#[ignore = "long"]
+fn killed_at_many_moments_it_ends_with_the_same_bytes() {
+    killed_at_random_moments(40);
+}
+
+fn killed_at_random_moments(most: u64) {
     let expected = uninterrupted();
     let root = tempfile::tempdir().unwrap();
     let whole = root.path().join("whole");
@@ -100,7 +112,7 @@ fn killed_at_random_moments_it_ends_with_the_same_bytes() {
 
     let mut random = Random(20);
     let (mut kills, mut runs, mut leftovers) = (0, 0, 0);
-    while kills < 20 {
+    while kills < most {
         runs += 1;
         let folder = root.path().join(format!("run-{runs}"));
         loop {
@@ -120,7 +132,7 @@ fn killed_at_random_moments_it_ends_with_the_same_bytes() {
             if status.success() {
                 break;
             }
-            if kills >= 20 {
+            if kills >= most {
                 run_to(&folder, STEPS).unwrap();
                 break;
             }
