@@ -25,7 +25,6 @@ pub struct RunDirectory {
     pub(crate) files: Files,
     /// Of the checkpoints that are part of the run, the newest first.
     pub(crate) steps: Vec<u64>,
-    pub(crate) broken: bool,
     pub(crate) _lock: Lock,
 }
 
@@ -75,7 +74,6 @@ impl RunDirectory {
             storage,
             files: Files::new(),
             steps: Vec::new(),
-            broken: false,
             _lock: lock,
         };
         run.write_timings(&Value::Null)?;
@@ -118,7 +116,6 @@ impl RunDirectory {
 
     /// Makes a folder in the run directory, unless it exists, and returns its path.
     pub fn make_folder(&mut self, name: &str) -> Result<PathBuf, Error> {
-        self.check_usable()?;
         names::check(name)?;
         let path = self.path.join(name);
         make_folders_on(&*self.storage, &path)?;
@@ -133,9 +130,8 @@ impl RunDirectory {
         name: &str,
         write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<(), Error> {
-        match self.files.get(name) {
-            Some(Kind::Derived(_)) => self.check_usable()?,
-            _ => self.check_new(name)?,
+        if !matches!(self.files.get(name), Some(Kind::Derived(_))) {
+            self.check_new(name)?;
         }
         self.store(name, write)?;
         self.files.insert(name.into(), Kind::Derived(None));
@@ -146,16 +142,15 @@ impl RunDirectory {
     /// computation: wall times and the like, 1 MiB at most. It stands outside of the commits, and a
     /// crash leaves the old one or the new one.
     pub fn write_timings(&mut self, timings: &Value) -> Result<(), Error> {
-        self.check_usable()?;
-        self.store_timings(timings)
+        self.replace_timings(timings)
     }
 
     /// Makes all that was written so far, and this state, what the run is resumed from. The last two
     /// checkpoints are kept.
     ///
     /// The same state may be committed again, for example on an interruption right after a commit.
-    /// After [`Error::Io`] the directory is that of this commit or of the last one, and has to be
-    /// opened again: all further calls give [`Error::Broken`].
+    /// After [`Error::Io`] the directory is that of this commit or of the last one, and the run may go
+    /// on or be opened again.
     pub fn commit(&mut self, state: &State) -> Result<(), Error> {
         self.commit_as(state, false)
     }
@@ -173,15 +168,18 @@ impl RunDirectory {
     }
 
     fn commit_as(&mut self, state: &State, finished: bool) -> Result<(), Error> {
-        self.check_usable()?;
-        self.check_follows(state)?;
+        let last = self.steps.first().copied();
+        let repeats =
+            || checkpoint::read(&self.path, state.step).map(|(_, old)| old.is_same(state));
+        if last > Some(state.step) || last == Some(state.step) && !repeats()? {
+            return Err(state.refused("a commit is of a later step than the last, or repeats it"));
+        }
         let start = checkpoint::start(state, &self.files, finished)?;
-        self.broken = true;
         let path = self.path.join(names::checkpoint(state.step));
         files::write_atomically_on(&*self.storage, path, |out| {
             checkpoint::write(out, &start, state)
         })?;
-        if self.steps.first() != Some(&state.step) {
+        if last != Some(state.step) {
             self.steps.insert(0, state.step);
         }
         // Not before the new checkpoint is on the disk.
@@ -190,34 +188,10 @@ impl RunDirectory {
             let path = self.path.join(names::checkpoint(old));
             (self.storage.remove(&path)).map_err(files::Error::of("remove", path))?;
         }
-        self.broken = false;
-        Ok(())
-    }
-
-    /// Accepts a later state than the last one, or the same.
-    fn check_follows(&self, state: &State) -> Result<(), Error> {
-        let Some(&last) = self.steps.first() else {
-            return Ok(());
-        };
-        let repeats = || checkpoint::read(&self.path, last).map(|(_, old)| old.is_same(state));
-        if state.step < last || state.step == last && !repeats()? {
-            return Err(state.refused(&format!(
-                "it does not follow the checkpoint of step {last}: commit later steps, or the same \
-                 state again"
-            )));
-        }
-        Ok(())
-    }
-
-    fn check_usable(&self) -> Result<(), Error> {
-        if self.broken {
-            return Err(Error::Broken(self.path.clone()));
-        }
         Ok(())
     }
 
     fn check_new(&self, name: &str) -> Result<(), Error> {
-        self.check_usable()?;
         names::check(name)?;
         if self.files.contains_key(name) {
             let reason = "the run has it already, and files are written once: choose another name";
@@ -236,7 +210,7 @@ impl RunDirectory {
         Ok(files::write_atomically_on(&*self.storage, path, write)?)
     }
 
-    pub(crate) fn store_timings(&self, timings: &Value) -> Result<(), Error> {
+    pub(crate) fn replace_timings(&self, timings: &Value) -> Result<(), Error> {
         let text = timings::encode(timings)?;
         self.store(names::TIMINGS, |out| out.write_all(text.as_bytes()))
     }

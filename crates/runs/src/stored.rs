@@ -59,10 +59,7 @@ impl RunDirectory {
     }
 }
 
-#[expect(
-    clippy::missing_errors_doc,
-    reason = "all of them give Error::Io alone"
-)]
+#[expect(clippy::missing_errors_doc, reason = "all give Error::Io alone")]
 impl StoredRun {
     fn find(storage: Arc<dyn Storage>, path: PathBuf, recover: bool) -> Result<Self, Error> {
         // Before there is a lock file in somebody's folder.
@@ -95,7 +92,6 @@ impl StoredRun {
                 storage,
                 files: header.files,
                 steps,
-                broken: false,
                 _lock: lock,
             },
             state,
@@ -170,7 +166,7 @@ impl StoredRun {
     /// removed.
     fn give_up_checkpoints(&self) -> Result<(), Error> {
         if self.recovered {
-            self.run.store_timings(&self.timings)?;
+            self.run.replace_timings(&self.timings)?;
         }
         let folder = self.run.path.join(names::CHECKPOINTS);
         self.remove(|path| path.starts_with(&folder))?;

@@ -51,10 +51,7 @@ fn every_flipped_bit_is_noticed_and_its_file_named() {
         let (mut flips, mut expected) = (0, 0);
         // What is replaced at any time is only checked at the end.
         let unchecked = |name: &str| name == "lock" || name == "metrics.csv" && stop < STEPS;
-        let newest = files
-            .keys()
-            .filter(|name| name.ends_with(".ckpt"))
-            .next_back();
+        let newest = files.keys().rfind(|name| name.starts_with("checkpoints/"));
         let newest = newest.unwrap();
         for (name, bytes) in files.iter().filter(|(name, _)| !unchecked(name)) {
             assert!(!bytes.is_empty(), "{name}");
@@ -63,7 +60,7 @@ fn every_flipped_bit_is_noticed_and_its_file_named() {
             let some = (0..24).map(|_| random.below(8 * bytes.len() as u64) as usize);
             let ends = (0..8).chain(8 * bytes.len() - 8..8 * bytes.len());
             // These hold the other checksums, or their own: every byte.
-            let sealed = name.ends_with(".ckpt") || name == "timings.json";
+            let sealed = name.starts_with("checkpoints/") || name == "timings.json";
             expected += 40 + if sealed { bytes.len() } else { 0 };
             let each = (0..bytes.len()).map(|i| 8 * i + i % 8).filter(|_| sealed);
             for bit in ends.chain(some).chain(each) {
@@ -82,7 +79,9 @@ fn every_flipped_bit_is_noticed_and_its_file_named() {
             fs::remove_file(&path).unwrap();
             match RunDirectory::open(&run) {
                 // The commit before, or none.
-                Ok(stored) => assert!(name.ends_with(".ckpt") && stored.state().step < STEPS),
+                Ok(stored) => {
+                    assert!(name.starts_with("checkpoints/") && stored.state().step < STEPS);
+                }
                 Err(Error::NoRun(_)) => assert!(name == newest && stop == STEPS),
                 Err(_) => assert_eq!(damaged(&run).0, *name, "missing"),
             }

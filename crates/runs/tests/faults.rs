@@ -168,7 +168,7 @@ fn every_operation_may_fail() {
 }
 
 /// Lets the first operations of resuming a run fail that was killed at some operation.
-fn operations_of_a_resumption_fail(kills: impl Iterator<Item = usize>) {
+fn operations_of_a_resumption_fail(kills: impl Iterator<Item = usize>, least: usize) {
     let expected = uninterrupted();
     let mut leftovers = 0;
     for killed_at in kills {
@@ -192,18 +192,18 @@ fn operations_of_a_resumption_fail(kills: impl Iterator<Item = usize>) {
             assert!(survives(&run, &storage, &expected, false));
         }
     }
-    assert!(leftovers > 2, "only {leftovers} leftovers");
+    assert!(leftovers >= least, "only {leftovers} leftovers");
 }
 
 #[test]
 fn some_operations_of_a_resumption_may_fail() {
-    operations_of_a_resumption_fail((185..205).step_by(7));
+    operations_of_a_resumption_fail((185..205).step_by(7), 2);
 }
 
 #[test]
 #[ignore = "long"]
 fn every_operation_of_a_resumption_may_fail() {
-    operations_of_a_resumption_fail(175..215);
+    operations_of_a_resumption_fail(175..215, 20);
 }
 
 #[test]
@@ -227,37 +227,45 @@ fn every_operation_of_a_recovery_may_fail() {
 }
 
 #[test]
-fn after_a_failed_commit_the_run_has_to_be_opened_again() {
+fn after_a_failed_commit_the_run_goes_on_or_is_opened_again() {
     let folder = toy::quick_folder();
     let start = |name: &str, at| {
         let storage = Faulty::new(at, false, usize::MAX);
         let path = folder.path().join(name);
-        let run = RunDirectory::create_on(storage.clone(), path, &FILES, &state_at(0));
-        (run.unwrap(), storage.operations())
+        let run = RunDirectory::create_on(storage.clone(), &path, &FILES, &state_at(0));
+        (run.unwrap(), path, storage.operations())
     };
-    let (_, operations) = start("counted", usize::MAX);
+    let (_, _, operations) = start("counted", usize::MAX);
 
-    // The write of the checkpoint, and the flush of its folder after it is in place.
-    for (name, after, step) in [("checkpoint", 1, 0), ("folder", 4, 3)] {
-        let (mut run, _) = start(name, operations + after);
-        let error = run.commit(&state_at(3)).unwrap_err();
+    // Of a third commit, the write of the checkpoint, the flush of its folder after it is in place,
+    // and the removal of the first.
+    for (name, after, step) in [("checkpoint", 1, 3), ("folder", 4, 6), ("removal", 5, 6)] {
+        let (mut run, path, _) = start(name, operations + 5 + after);
+        run.commit(&state_at(3)).unwrap();
+        let error = run.commit(&state_at(6)).unwrap_err();
         assert!(matches!(error, Error::Io(_)), "{error}");
-        for result in [
-            run.commit(&state_at(3)),
-            run.write_file("fields/a", |_| Ok(())).map(drop),
-            run.replace_file("metrics.csv", |_| Ok(())),
-            run.adopt_file("config.toml"),
-            run.make_folder("fields").map(drop),
-            run.write_timings(&serde_json::Value::Null),
-            run.finish(&state_at(3)),
-        ] {
-            assert!(matches!(result, Err(Error::Broken(_))), "{result:?}");
-        }
-        let stored = RunDirectory::open(folder.path().join(name)).unwrap();
-        assert_eq!(stored.state().step, step, "{name}");
+        let copy = folder.path().join(format!("{name}-copy"));
+        write_contents(&copy, &toy::all_contents(&path));
+        let stored = RunDirectory::open(&copy).unwrap();
+        assert_eq!(*stored.state(), state_at(step), "{name}");
+        drop(stored.resume().unwrap());
+
+        run.commit(&state_at(6)).unwrap();
+        run.write_file("fields/a", |out| out.write_all(b"a"))
+            .unwrap();
+        run.commit(&state_at(9)).unwrap();
+        drop(run);
+        let stored = RunDirectory::open(&path).unwrap();
+        assert_eq!(*stored.state(), state_at(9), "{name}");
+        let (run, state) = stored.resume().unwrap();
+        run.finish(&state).unwrap();
+        let names: Vec<_> = toy::contents(&path).into_keys().collect();
+        let last = "checkpoints/step-00000009.ckpt";
+        let expected = [last, "config.toml", "fields/a", "lock", "manifest.json"];
+        assert_eq!(names, expected, "{name}");
     }
-    // A file alone does not break the run.
-    let (mut run, _) = start("file", operations + 3);
+    // A file alone, and its name is free again.
+    let (mut run, ..) = start("file", operations + 3);
     let failed = run.write_file("fields/a", |out| out.write_all(b"a"));
     assert!(matches!(failed, Err(Error::Io(_))));
     run.write_file("fields/a", |out| out.write_all(b"a"))
