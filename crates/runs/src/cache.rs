@@ -33,8 +33,9 @@ impl Cache {
     pub fn load<R: DeserializeOwned>(&self, name: &str, key: &impl Serialize) -> Option<R> {
         let bytes = fs::read(self.path(name).ok()?).ok()?;
         let (found, result): (Value, Value) = serde_json::from_slice(&bytes).ok()?;
-        let same = found == serde_json::to_value(key).ok()?;
-        same.then(|| serde_json::from_value(result).ok())?
+        // Compared as it is read: both went through the same number formatting.
+        let key: Value = serde_json::from_str(&serde_json::to_string(key).ok()?).ok()?;
+        (found == key).then(|| serde_json::from_value(result).ok())?
     }
 
     /// Stores a part, whole or not at all.

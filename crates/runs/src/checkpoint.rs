@@ -236,7 +236,8 @@ pub(crate) fn read(folder: &Path, step: u64) -> Result<(Header, State), Error> {
         return Err(damaged(what));
     }
     if let Some(name) = (header.files.keys()).find(|name| names::check(name).is_err()) {
-        return Err(damaged(format!("it lists a file with the name {name:?}")));
+        let shown = files::shortened(name, 60);
+        return Err(damaged(format!("it lists a file with the name {shown:?}")));
     }
     for (name, length) in &header.arrays {
         let bytes = length.checked_mul(8).and_then(|n| usize::try_from(n).ok());

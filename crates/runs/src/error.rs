@@ -87,6 +87,7 @@ impl Error {
 
     /// A file that cannot be stored.
     pub(crate) fn file(name: &str, reason: &str) -> Self {
-        Self::Invalid(format!("{name:?} cannot be stored: {reason}"))
+        let shown = files::shortened(name, 600);
+        Self::Invalid(format!("{shown:?} cannot be stored: {reason}"))
     }
 }

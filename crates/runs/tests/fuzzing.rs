@@ -203,7 +203,7 @@ fn fuzzing_changed_timings_are_refused() {
 fn a_header_that_contradicts_itself_is_refused() {
     let run = Fixture::new();
     let original = fs::read(run.checkpoint()).unwrap();
-    let changes: [(&str, fn(&mut Value)); 13] = [
+    let changes: [(&str, fn(&mut Value)); 14] = [
         ("of step 13", |h| h["step"] = json!(13)),
         ("not as expected", |h| h["step"] = json!(-1)),
         ("not as expected", |h| h["finished"] = json!(2)),
@@ -212,6 +212,9 @@ fn a_header_that_contradicts_itself_is_refused() {
         ("without names", |h| h["arrays"][1][0] = json!("u")),
         ("without names", |h| h["arrays"][1][0] = json!("")),
         ("\"../a\"", |h| h["files"]["../a"] = h["files"]["a"].clone()),
+        ("[[[ ...\"", |h| {
+            h["files"]["[".repeat(10_000)] = h["files"]["a"].clone();
+        }),
         ("\"Lock\"", |h| h["files"]["Lock"] = h["files"]["a"].clone()),
         ("is missing", |h| {
             h["files"]["d"] = h["files"]["a"].clone();
@@ -232,6 +235,7 @@ fn a_header_that_contradicts_itself_is_refused() {
         let refused = run.read_checkpoint(&with_header(&original, change));
         let message = refused.unwrap_err().to_string();
         assert!(message.contains(reason), "{message} instead of {reason}");
+        ::fuzzing::assert_short_line(&message);
     }
 }
 
