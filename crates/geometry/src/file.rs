@@ -14,7 +14,7 @@ pub fn write_atomically(
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), Error> {
     files::write_atomically(path, write).map_err(|error| Error::Io {
-        action: error.step.as_str(),
+        action: error.action,
         path: error.path,
         source: error.source,
     })

@@ -158,7 +158,7 @@ fn operations_fail(stride: usize) {
 
 #[test]
 fn some_operations_may_fail() {
-    operations_fail(11);
+    operations_fail(17);
 }
 
 #[test]
