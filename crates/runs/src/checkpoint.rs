@@ -132,24 +132,19 @@ pub(crate) struct Header {
 
 /// The bytes before the arrays, once it is certain that they can be read back.
 pub(crate) fn start(state: &State, files: &Files, finished: bool) -> Result<Vec<u8>, Error> {
-    let lengths = state
-        .arrays
-        .iter()
-        .map(|(name, v)| (name.clone(), v.len() as u64));
+    let lengths = |(name, values): &(String, Vec<f64>)| (name.clone(), values.len() as u64);
     let header = Header {
         step: state.step,
         finished,
         files: files.clone(),
-        arrays: lengths.collect(),
+        arrays: state.arrays.iter().map(lengths).collect(),
     };
     if !are_names(&header.arrays) {
         return Err(state.refused("its arrays need names, and different ones"));
     }
-    let failed = |e: serde_json::Error| state.refused(&e.to_string());
-    let (header, notes) = (
-        serde_json::to_vec(&header).map_err(failed)?,
-        serde_json::to_vec(&state.notes).map_err(failed)?,
-    );
+    let json =
+        (serde_json::to_vec(&header)).and_then(|h| Ok((h, serde_json::to_vec(&state.notes)?)));
+    let (header, notes) = json.map_err(|e| state.refused(&e.to_string()))?;
     // Deep nesting is not read: better now than on the day of the restart.
     if !serde_json::from_slice(&notes).is_ok_and(|back: Value| back == state.notes) {
         return Err(state.refused("its notes are nested too deeply"));
@@ -164,15 +159,8 @@ pub(crate) fn start(state: &State, files: &Files, finished: bool) -> Result<Vec<
         }
     }
     let length = |json: &[u8]| (json.len() as u32).to_le_bytes();
-    Ok([
-        &MAGIC[..],
-        &FORMAT.to_le_bytes(),
-        &length(&header),
-        &length(&notes),
-        &header,
-        &notes,
-    ]
-    .concat())
+    let lengths = [length(&header), length(&notes)].concat();
+    Ok([&MAGIC[..], &FORMAT.to_le_bytes(), &lengths, &header, &notes].concat())
 }
 
 /// Writes a checkpoint, given its [`start`].
@@ -183,11 +171,9 @@ pub(crate) fn write(out: &mut dyn Write, start: &[u8], state: &State) -> io::Res
         out.write_all(bytes)
     };
     put(start)?;
-    for (_, values) in &state.arrays {
-        for values in values.chunks(PIECE) {
-            let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
-            put(&bytes)?;
-        }
+    for values in (state.arrays.iter()).flat_map(|(_, values)| values.chunks(PIECE)) {
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        put(&bytes)?;
     }
     out.write_all(&hash.finalize())
 }
@@ -250,7 +236,8 @@ pub(crate) fn read(folder: &Path, step: u64) -> Result<(Header, State), Error> {
         return Err(damaged(what));
     }
     if let Some(name) = (header.files.keys()).find(|name| names::check(name).is_err()) {
-        return Err(damaged(format!("it lists a file with the name {name:?}")));
+        let shown = files::shortened(name, 60);
+        return Err(damaged(format!("it lists a file with the name {shown:?}")));
     }
     for (name, length) in &header.arrays {
         let bytes = length.checked_mul(8).and_then(|n| usize::try_from(n).ok());
