@@ -54,6 +54,7 @@ mod steps;
 mod stop;
 mod store;
 mod substeps;
+mod table;
 mod trajectory;
 
 pub use case::Case;

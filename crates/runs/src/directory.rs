@@ -139,7 +139,7 @@ impl RunDirectory {
     }
 
     /// Replaces `timings.json`, the one file that may differ between two runs of the same
-    /// computation: wall times and the like, 1 MiB at most. It stands outside of the commits, and a
+    /// computation: wall times and the like, 4 MiB at most. It stands outside of the commits, and a
     /// crash leaves the old one or the new one.
     pub fn write_timings(&mut self, timings: &Value) -> Result<(), Error> {
         self.replace_timings(timings)

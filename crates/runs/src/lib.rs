@@ -55,7 +55,7 @@
 //!   [`RunDirectory::recover`] goes on from the newest intact commit.
 //! - Readers never trust a number in a file before its length agrees. They take at most twice the
 //!   length of a checkpoint, twenty times its list of files (64 MiB at most), 160 times its notes (at
-//!   most [`State::MAX_NOTES`]) or `timings.json` (at most 1 MiB), and 64 KiB for anything else.
+//!   most [`State::MAX_NOTES`]) or `timings.json` (at most 4 MiB), and 64 KiB for anything else.
 //! - A failed write (full disk, read-only folder) leaves the last commit in place.
 
 mod cache;
