@@ -1,17 +1,19 @@
 //! The Clifford torus nearest to a phase field.
 
-use argmin::core::{CostFunction, Executor, State};
-use argmin::solver::neldermead::NelderMead;
+use faer::linalg::solvers::Solve;
+use faer::{Col, Mat, Side};
 use geometry::shapes::Torus;
 use geometry::{Field, SignedDistance, measure, optimal_profile};
 use serde::Serialize;
 
 use crate::Error;
 
-/// Steps of the simplex method.
-const ITERATIONS: u64 = 400;
-/// Spread of the distances in the simplex at which the search ends.
+/// Most steps of the Levenberg-Marquardt method.
+const ITERATIONS: usize = 100;
+/// Length of its last step: lengths are relative to the radius, tilts in radians.
 const TOLERANCE: f64 = 1e-7;
+/// Length of the differences for derivatives.
+const DIFFERENCE: f64 = 1e-5;
 
 /// A Clifford torus in space, fitted to a phase field.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -26,7 +28,7 @@ pub struct CliffordFit {
     pub l2: f64,
 }
 
-/// A torus by its centre, the tilt of its axis from a first guess, and its outer radius.
+/// Tori by centre, tilt of the axis from a first guess, and outer radius.
 struct Family<'a> {
     u: &'a Field<3>,
     eps: f64,
@@ -34,47 +36,79 @@ struct Family<'a> {
     frame: [[f64; 3]; 3],
 }
 
+type Parameters = [f64; 6];
+
 impl Family<'_> {
-    fn torus(&self, parameters: &[f64]) -> CliffordFit {
-        let [c0, c1, c2, a, b, outer_radius] = parameters else {
-            unreachable!("six parameters");
-        };
+    fn torus(&self, [c0, c1, c2, a, b, outer_radius]: Parameters) -> CliffordFit {
         let tilted: [f64; 3] =
             std::array::from_fn(|i| self.frame[0][i] + a * self.frame[1][i] + b * self.frame[2][i]);
         CliffordFit {
-            centre: [*c0, *c1, *c2],
+            centre: [c0, c1, c2],
             axis: normalized(tilted),
-            outer_radius: *outer_radius,
+            outer_radius,
             l2: f64::INFINITY,
         }
     }
 
-    fn distance(&self, torus: &CliffordFit) -> Result<f64, Error> {
-        Ok(measure::l2_distance(
-            self.u,
-            &torus.phase_field(self.u, self.eps)?,
-        )?)
+    /// The phase field of a torus without `u`.
+    fn residual(&self, parameters: Parameters) -> Result<Vec<f64>, Error> {
+        let field = self.torus(parameters).phase_field(self.u, self.eps)?;
+        Ok(field.zip_map(self.u, |v, u| v - u)?.into_values())
     }
-}
 
-impl CostFunction for Family<'_> {
-    type Param = Vec<f64>;
-    type Output = f64;
-
-    fn cost(&self, parameters: &Vec<f64>) -> Result<f64, argmin::core::Error> {
-        // Beyond the positive radii there is no torus, which is no reason to stop.
-        Ok(self
-            .distance(&self.torus(parameters))
-            .unwrap_or(f64::INFINITY))
+    /// Levenberg-Marquardt from the given parameters.
+    fn nearest(&self, start: Parameters) -> Result<CliffordFit, Error> {
+        let radius = start[5];
+        let units = [radius, radius, radius, 1.0, 1.0, radius];
+        let (mut at, mut residual) = (start, self.residual(start)?);
+        let mut damping = 1e-3;
+        for _ in 0..ITERATIONS {
+            let mut derivatives = Vec::with_capacity(at.len());
+            for (k, unit) in units.iter().enumerate() {
+                let mut moved = at;
+                moved[k] += DIFFERENCE * unit;
+                let mut derivative = self.residual(moved)?;
+                for (d, r) in derivative.iter_mut().zip(&residual) {
+                    *d = (*d - r) / DIFFERENCE;
+                }
+                derivatives.push(derivative);
+            }
+            let gradient = Col::from_fn(at.len(), |i| dot(&derivatives[i], &residual));
+            let matrix = Mat::from_fn(at.len(), at.len(), |i, j| {
+                let damped = if i == j { 1.0 + damping } else { 1.0 };
+                damped * dot(&derivatives[i], &derivatives[j])
+            });
+            let Ok(factors) = matrix.llt(Side::Lower) else {
+                break;
+            };
+            let step = factors.solve(&gradient);
+            let next = std::array::from_fn(|k| at[k] - units[k] * step[k]);
+            // Where there is no torus, none is nearer.
+            match self.residual(next) {
+                Ok(found) if dot(&found, &found) < dot(&residual, &residual) => {
+                    (at, residual) = (next, found);
+                    damping *= 0.1;
+                }
+                _ => damping *= 10.0,
+            }
+            if step.norm_l2() < TOLERANCE {
+                break;
+            }
+        }
+        let torus = self.torus(at);
+        Ok(CliffordFit {
+            l2: measure::l2_distance(self.u, &torus.phase_field(self.u, self.eps)?)?,
+            ..torus
+        })
     }
 }
 
 impl CliffordFit {
-    /// The torus whose phase field is nearest to `u` in `L2`: a simplex search over centre, axis and radius, from the centre of
-    /// mass, the axis of largest moment of inertia and the volume.
+    /// The torus whose phase field is nearest to `u` in `L2`: least squares over centre, axis and radius, from the centre of
+    /// mass, each principal axis of inertia and the volume.
     ///
     /// # Errors
-    /// [`Error::Options`] if there is no volume inside or the search fails.
+    /// [`Error::Options`] if there is no volume inside or nothing fits.
     pub fn to(u: &Field<3>, eps: f64) -> Result<Self, Error> {
         let failed = |reason: &str| Error::Options(format!("no Clifford torus fits: {reason}"));
         let moments = Moments::of(u);
@@ -88,36 +122,8 @@ impl CliffordFit {
         let radius = minor * (1.0 + std::f64::consts::SQRT_2);
         let mut best: Option<Self> = None;
         for frame in moments.frames() {
-            let family = Family { u, eps, frame };
             let [c0, c1, c2] = moments.centre;
-            let start = vec![c0, c1, c2, 0.0, 0.0, radius];
-            let steps = [
-                0.1 * radius,
-                0.1 * radius,
-                0.1 * radius,
-                0.2,
-                0.2,
-                0.1 * radius,
-            ];
-            let mut simplex = vec![start.clone()];
-            for (i, step) in steps.into_iter().enumerate() {
-                let mut vertex = start.clone();
-                vertex[i] += step;
-                simplex.push(vertex);
-            }
-            let solver = NelderMead::new(simplex)
-                .with_sd_tolerance(TOLERANCE)
-                .map_err(|error| failed(&error.to_string()))?;
-            let result = Executor::new(family, solver)
-                .configure(|state| state.max_iters(ITERATIONS))
-                .run()
-                .map_err(|error| failed(&error.to_string()))?;
-            let family = Family { u, eps, frame };
-            let Some(parameters) = result.state().get_best_param() else {
-                continue;
-            };
-            let mut torus = family.torus(parameters);
-            torus.l2 = family.distance(&torus)?;
+            let torus = Family { u, eps, frame }.nearest([c0, c1, c2, 0.0, 0.0, radius])?;
             if best.is_none_or(|best| torus.l2 < best.l2) {
                 best = Some(torus);
             }
@@ -134,9 +140,9 @@ impl CliffordFit {
         let torus = Torus::clifford(self.outer_radius)?;
         Ok(Field::from_fn(*like.grid(), |x| {
             let x: [f64; 3] = std::array::from_fn(|i| x[i] - self.centre[i]);
-            let height = dot(x, self.axis);
+            let height = dot(&x, &self.axis);
             let across: [f64; 3] = std::array::from_fn(|i| x[i] - height * self.axis[i]);
-            let in_its_frame = [dot(across, across).sqrt(), 0.0, height];
+            let in_its_frame = [dot(&across, &across).sqrt(), 0.0, height];
             optimal_profile(torus.signed_distance(in_its_frame), eps)
         }))
     }
@@ -211,12 +217,12 @@ impl Moments {
     }
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 fn normalized(a: [f64; 3]) -> [f64; 3] {
-    let length = dot(a, a).sqrt();
+    let length = dot(&a, &a).sqrt();
     a.map(|a| a / length)
 }
 
@@ -229,7 +235,7 @@ fn frame_of(axis: [f64; 3]) -> [[f64; 3]; 3] {
         .unwrap_or(0);
     let mut e = [0.0; 3];
     e[k] = 1.0;
-    let along = dot(e, axis);
+    let along = dot(&e, &axis);
     let e = normalized(std::array::from_fn(|i| e[i] - along * axis[i]));
     let f = [
         axis[1] * e[2] - axis[2] * e[1],
@@ -259,15 +265,18 @@ mod tests {
         let found = CliffordFit::to(&u, eps).unwrap();
         assert!(found.l2 < 1e-4, "{found:?}");
         assert!((found.outer_radius - 0.36).abs() < 1e-4, "{found:?}");
-        assert!(dot(found.axis, torus.axis).abs() > 1.0 - 1e-6, "{found:?}");
+        assert!(
+            dot(&found.axis, &torus.axis).abs() > 1.0 - 1e-6,
+            "{found:?}"
+        );
         for (a, b) in found.centre.iter().zip(torus.centre) {
             assert!((a - b).abs() < 1e-4, "{found:?}");
         }
         for circle in found.minor_circles(3, 16).unwrap() {
             for x in circle {
                 let x: [f64; 3] = std::array::from_fn(|i| x[i] - found.centre[i]);
-                let height = dot(x, found.axis);
-                let across = (dot(x, x) - height * height).sqrt();
+                let height = dot(&x, &found.axis);
+                let across = (dot(&x, &x) - height * height).sqrt();
                 let shape = Torus::clifford(found.outer_radius).unwrap();
                 assert!(shape.signed_distance([across, 0.0, height]).abs() < 1e-12);
             }
