@@ -91,4 +91,4 @@ pub use raster::Raster;
 pub use shapes::{Curve, Shapes, Window};
 pub use style::{LineStyle, Marker};
 pub use summary::Summary;
-pub use table::{Cell, Column, Format, Table};
+pub use table::{Cell, Column, Format, Table, Tabulated};
