@@ -38,6 +38,7 @@ pub mod options;
 pub mod partial;
 pub mod products;
 pub mod quality;
+pub mod results;
 pub mod surfaces;
 pub mod training;
 
