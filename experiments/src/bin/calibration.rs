@@ -163,15 +163,6 @@ impl Calibrated {
         self.name.trim_end_matches(".safetensors")
     }
 
-    fn odd_part(&self) -> Result<Self, Error> {
-        let network = self.network.odd_part();
-        Ok(Self {
-            name: self.name.clone(),
-            calibration: network.calibrate()?,
-            network,
-        })
-    }
-
     /// Cells per unit length at which the network has the scales of the convergence tests.
     fn convergence_cells(&self) -> Option<usize> {
         let ratios = self.network.ratios();
@@ -233,7 +224,17 @@ fn discs(
         };
         variants.push((n, false, one.clone()));
         if !one.name.starts_with("accurate") {
-            variants.push((n, true, one.odd_part()?));
+            let network = one.network.odd_part();
+            let (name, calibration) = (one.name.clone(), network.calibrate()?);
+            variants.push((
+                n,
+                true,
+                Calibrated {
+                    name,
+                    network,
+                    calibration,
+                },
+            ));
         }
     }
     let mut tasks = Vec::new();
@@ -278,13 +279,8 @@ fn disc_energy(
     let grid = Grid::<2>::centred(2 * half as usize, 2.0 * half / n as f64)?;
     let sign = f64::from(phase);
     let disc = phase_field(grid, &Ball::new([0.0, 0.0], radius)?, DISC_SCALES[0])?;
-    let (energy, field) = relaxed(
-        network,
-        &disc.map(|u| sign * u),
-        DISC_SCALES,
-        calibration,
-        device,
-    )?;
+    let disc = disc.map(|u| sign * u);
+    let (energy, field) = relaxed(network, &disc, DISC_SCALES, calibration, device)?;
     let inside = zero_set_volume(&field);
     let area = if phase > 0 {
         inside
@@ -317,22 +313,16 @@ fn discs_figure(discs: &[DiscRow]) -> Figure {
         };
         let curve = |(phase, name): (i8, &str), label, value: fn(&DiscRow) -> f64| {
             let rows = rows.iter().filter(|row| row.phase == phase);
-            Series::of(format!("{name}: {label}"), rows, |row| {
-                [row.radius, value(row)]
-            })
-            .with_colour(usize::from(phase < 0))
+            let point = |row: &DiscRow| [row.radius, value(row)];
+            Series::of(format!("{name}: {label}"), rows, point).with_colour(usize::from(phase < 0))
         };
         let curves = |phase| {
             let measured = curve(phase, "without calibration", |row| row.measured);
             let calibrated = curve(phase, "calibrated", |row| row.calibrated);
             [
-                measured
-                    .with_style(LineStyle::None)
-                    .with_marker(Marker::Circle),
+                measured.with_symbols(Marker::Circle),
                 curve(phase, "predicted", |row| row.predicted),
-                calibrated
-                    .with_style(LineStyle::None)
-                    .with_marker(Marker::Square),
+                calibrated.with_symbols(Marker::Square),
             ]
         };
         let exact = Series::new("exact", [[0.0, 1.0], [0.65, 1.0]])

@@ -288,11 +288,7 @@ fn radial_figure(shown: &[Shown<'_>]) -> Figure {
         });
         let distance = Axis::linear("distance / ε").with_range(0.0, 4.0);
         LineChart::new(one.title(), distance, Axis::linear("K ε²/h²"))
-            .with_series(
-                entries
-                    .with_style(LineStyle::None)
-                    .with_marker(Marker::Circle),
-            )
+            .with_series(entries.with_symbols(Marker::Circle))
             .with_series(thin(heat, LineStyle::Dashed))
             .with_note(format!(
                 "Spread at equal distance: {:.1e} of the largest entry.",
