@@ -35,6 +35,7 @@ pub mod networks;
 pub mod options;
 pub mod products;
 pub mod quality;
+pub mod results;
 pub mod session;
 pub mod surfaces;
 pub mod training;

@@ -34,6 +34,11 @@ impl DeviceKind {
         }
     }
 
+    /// Whether it computes on the processor, in double precision.
+    pub fn is_cpu(self) -> bool {
+        matches!(self, Self::Flex | Self::NdArray)
+    }
+
     /// Whether this build contains the backend.
     pub fn is_compiled(self) -> bool {
         match self {

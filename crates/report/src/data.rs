@@ -15,7 +15,7 @@ use crate::plot::Series;
 /// # Errors
 ///
 /// [`Error::Csv`] if a record is not flat.
-pub fn to_csv<T: Serialize>(records: &[T]) -> Result<String> {
+pub fn to_csv<T: Serialize>(records: impl IntoIterator<Item = T>) -> Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for record in records {
         writer.serialize(record)?;

@@ -144,6 +144,13 @@ impl Figure {
         self
     }
 
+    /// Adds panels, one after the other.
+    #[must_use]
+    pub fn with_panels<P: Into<Panel>>(mut self, panels: impl IntoIterator<Item = P>) -> Self {
+        self.panels.extend(panels.into_iter().map(Into::into));
+        self
+    }
+
     /// Labels the columns.
     #[must_use]
     pub fn with_column_labels<S: Into<String>>(

@@ -94,4 +94,4 @@ pub use shapes::{Curve, Shapes};
 pub use srgb::Rgb;
 pub use style::{LineStyle, Marker};
 pub use summary::Summary;
-pub use table::{Cell, Column, Format, Table};
+pub use table::{Cell, Column, Format, Table, Tabulated};

@@ -4,6 +4,8 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Component, Path, PathBuf};
 
+use serde::Serialize;
+
 use crate::error::{Error, Result};
 
 /// A folder that exists and has been written to.
@@ -66,6 +68,28 @@ impl OutputDir {
     /// [`Error::FileName`] or [`Error::Write`]; an old file of that name is then untouched.
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> Result<PathBuf> {
         self.write_with(name, |file| file.write_all(content.as_ref()))
+    }
+
+    /// Writes [records as CSV](crate::data::to_csv).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Csv`], or as [`OutputDir::write`].
+    pub fn write_csv<T: Serialize>(
+        &self,
+        name: &str,
+        records: impl IntoIterator<Item = T>,
+    ) -> Result<PathBuf> {
+        self.write(name, crate::data::to_csv(records)?)
+    }
+
+    /// Writes any [value as JSON](crate::data::to_json).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Json`], or as [`OutputDir::write`].
+    pub fn write_json(&self, name: &str, value: &impl Serialize) -> Result<PathBuf> {
+        self.write(name, crate::data::to_json(value)?)
     }
 
     /// Writes a file through a callback, replacing an old one only if the callback succeeds.

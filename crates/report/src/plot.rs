@@ -50,6 +50,16 @@ impl Series {
         Self::new(name, points)
     }
 
+    /// A curve with one point for each record.
+    pub fn of<R>(
+        name: impl Into<String>,
+        records: impl IntoIterator<Item = R>,
+        point: impl FnMut(R) -> [f64; 2],
+    ) -> Self {
+        let points: Vec<[f64; 2]> = records.into_iter().map(point).collect();
+        Self::new(name, points)
+    }
+
     /// Sets the colour: a palette index or a [`Colour`].
     #[must_use]
     pub fn with_colour(mut self, colour: impl Into<Colour>) -> Self {
@@ -69,6 +79,12 @@ impl Series {
     pub fn with_marker(mut self, marker: Marker) -> Self {
         self.marker = Some(marker);
         self
+    }
+
+    /// Shows symbols at the data points, and no line.
+    #[must_use]
+    pub fn with_symbols(self, marker: Marker) -> Self {
+        self.with_style(LineStyle::None).with_marker(marker)
     }
 
     /// Sets the width of the line in layout units (2 by default).
@@ -160,6 +176,13 @@ impl LineChart {
     #[must_use]
     pub fn with_series(mut self, series: Series) -> Self {
         self.series.push(series);
+        self
+    }
+
+    /// Adds curves, later ones on top.
+    #[must_use]
+    pub fn with_curves(mut self, curves: impl IntoIterator<Item = Series>) -> Self {
+        self.series.extend(curves);
         self
     }
 

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use serde_json::Number;
+use serde::Serialize;
+use serde_json::{Map, Number, Value};
 
 use crate::error::{Error, Result};
 use crate::output::OutputDir;
@@ -46,6 +47,44 @@ impl Summary {
             value,
         })?;
         self.add(name, number)
+    }
+
+    /// Adds the numbers of a record as `<prefix>.<field>`. Fields that hold text, lists or records are left out.
+    ///
+    /// ```
+    /// #[derive(serde::Serialize)]
+    /// struct Circle {
+    ///     name: &'static str,
+    ///     radius: f64,
+    ///     steps: usize,
+    /// }
+    /// let mut summary = report::Summary::new();
+    /// summary.insert_record("circle", &Circle { name: "first", radius: 0.5, steps: 17 })?;
+    /// assert_eq!(summary.to_json(), "{\n  \"circle.radius\": 0.5,\n  \"circle.steps\": 17\n}\n");
+    /// # Ok::<(), report::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotFinite`] for a field that is NaN, infinite or missing; [`Error::Json`] for what is no record; as
+    /// [`Summary::insert`].
+    pub fn insert_record(&mut self, prefix: &str, record: &impl Serialize) -> Result<()> {
+        let fields: Map<String, Value> = serde_json::to_value(record)
+            .and_then(serde_json::from_value)
+            .map_err(|source| Error::Json {
+                what: format!("the record {prefix:?}"),
+                source,
+            })?;
+        for (field, value) in fields {
+            let name = format!("{prefix}.{field}");
+            match value {
+                Value::Number(number) => self.add(&name, number)?,
+                // JSON knows no NaN.
+                Value::Null => self.insert(&name, f64::NAN)?,
+                _ => {}
+            }
+        }
+        Ok(())
     }
 
     /// Adds a metric that counts something; it is written without a decimal point.

@@ -120,6 +120,26 @@ impl Table {
         }
     }
 
+    /// Starts a table with a row for every record.
+    ///
+    /// ```
+    /// use report::{Format, Table};
+    /// let circles = [(0.1, 2), (0.2, 3)];
+    /// let table = Table::of(&circles)
+    ///     .text("circle", |(radius, _)| format!("R = {radius}"))
+    ///     .number("iterations", Format::Shortest, |&(_, count)| count)
+    ///     .finish()?;
+    /// assert_eq!(table.to_csv()?, "circle,iterations\nR = 0.1,2\nR = 0.2,3\n");
+    /// # Ok::<(), report::Error>(())
+    /// ```
+    pub fn of<R>(records: &[R]) -> Tabulated<'_, R> {
+        Tabulated {
+            records,
+            columns: Vec::new(),
+            rows: records.iter().map(|_| Vec::new()).collect(),
+        }
+    }
+
     /// Adds a row.
     ///
     /// # Errors
@@ -242,6 +262,53 @@ impl Table {
             folder.write(&format!("{stem}.csv"), self.to_csv()?)?,
             folder.write(&format!("{stem}.md"), self.to_markdown())?,
         ])
+    }
+}
+
+/// A [table of records](Table::of) that grows column by column.
+#[derive(Debug, Clone)]
+#[must_use]
+pub struct Tabulated<'a, R> {
+    records: &'a [R],
+    columns: Vec<Column>,
+    rows: Vec<Vec<Cell>>,
+}
+
+impl<'a, R> Tabulated<'a, R> {
+    /// Adds a column of text.
+    pub fn text<S: Into<String>>(
+        self,
+        name: impl Into<String>,
+        value: impl Fn(&'a R) -> S,
+    ) -> Self {
+        self.number(name, Format::Text, |record| {
+            Cell::Text(value(record).into())
+        })
+    }
+
+    /// Adds a column of numbers.
+    pub fn number<C: Into<Cell>>(
+        mut self,
+        name: impl Into<String>,
+        format: Format,
+        value: impl Fn(&'a R) -> C,
+    ) -> Self {
+        self.columns.push(Column::number(name, format));
+        for (row, record) in self.rows.iter_mut().zip(self.records) {
+            row.push(value(record).into());
+        }
+        self
+    }
+
+    /// The finished table.
+    ///
+    /// # Errors
+    ///
+    /// As [`Table::push`].
+    pub fn finish(self) -> Result<Table> {
+        let mut table = Table::new(self.columns);
+        self.rows.into_iter().try_for_each(|row| table.push(row))?;
+        Ok(table)
     }
 }
 

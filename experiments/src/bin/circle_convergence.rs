@@ -10,8 +10,9 @@ use experiments::method::{self, Method, Scheme};
 use experiments::networks::{NetworkOptions, convergence_ratios};
 use experiments::options::{RunOptions, resolutions};
 use experiments::partial::Partial;
-use experiments::training::{self, NetworkSpec};
+use experiments::training::{self, NetworkSpec, Trainer};
 use experiments::{Error, harness};
+use model::training::levenberg_marquardt::LmParams;
 use model::{Network, Ratios, pretrained};
 use operators::ComputeDevice;
 use report::{Axis, Column, Figure, Format, LineChart, Marker, OutputDir, Series, Summary, Table};
@@ -266,12 +267,20 @@ fn retrain(
     let checkpoints = Partial::open(output, "checkpoints")?;
     let folder = output.subfolder("networks")?;
     let mut networks = Vec::new();
+    let recipe = LmParams::new(options.run.quick);
+    let trainer = Trainer {
+        device: &training::training_device(device)?,
+        checkpoints: &checkpoints,
+        progress: &progress,
+        seed: options.run.seed,
+        quick: options.run.quick,
+    };
     for (&n, &ratios) in cells.iter().zip(ratios) {
         let spec = NetworkSpec::new(format!("n{n}"), ratios, n);
-        let settings = training::LmSettings::new(options.run.quick, options.run.seed);
-        let trained =
-            training::levenberg_marquardt(&spec, &settings, device, &checkpoints, &progress)?;
-        trained.network.save(&folder.path(&spec.file_name())?)?;
+        let trained = trainer.train(&spec, "lm", &recipe)?;
+        trained
+            .network
+            .save(&folder.path(&pretrained::file_name(ratios))?)?;
         networks.push(trained.network);
     }
     checkpoints.remove()?;

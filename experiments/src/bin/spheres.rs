@@ -143,9 +143,9 @@ fn program(options: &Options) -> Result<(), Error> {
         })?)
     };
     if let Some(measured) = &quality {
-        let mut losses = quality::table(&["network"]);
-        quality::push(&mut losses, &[&spec.name], measured)?;
-        losses.write(&output, "quality")?;
+        let name = Table::of(std::slice::from_ref(measured)).text("network", |_| &spec.name);
+        let losses = quality::columns(name, |measured| measured);
+        losses.finish()?.write(&output, "quality")?;
     }
     let table = table(&all, n)?;
     table.write(&output, "spheres")?;
@@ -153,7 +153,7 @@ fn program(options: &Options) -> Result<(), Error> {
     figure(&options.run, &all, n).write(&output, "spheres")?;
     let mut summary = summary(&all, n, since(clock))?;
     if let Some(measured) = &quality {
-        quality::insert(&mut summary, &spec.name, measured)?;
+        summary.insert_record(&spec.name, measured)?;
     }
     summary.write(&output)?;
     manifest.write(&output)?;
