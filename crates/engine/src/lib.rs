@@ -54,7 +54,6 @@ mod steps;
 mod stop;
 mod store;
 mod substeps;
-mod table;
 mod trajectory;
 
 pub use case::Case;

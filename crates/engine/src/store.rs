@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use solver::FlowState;
 
 use crate::record::to_csv;
-use crate::{Case, Error, Measure, Record, Run, table};
+use crate::{Case, Error, Record, Run};
 
 /// The table of all records in a stored run.
 pub const METRICS: &str = "metrics.csv";
@@ -164,11 +164,8 @@ pub fn initial<const D: usize>(stored: &StoredRun) -> Result<(Field<D>, Option<V
 
 /// All records of a stored run with their wall times.
 pub(crate) fn records(stored: &StoredRun) -> Result<Vec<Record>, Error> {
-    let names: Vec<String> = read(stored, &stored.state().notes["case"]["measures"])?;
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let rows = stored.state().array("records").unwrap_or_default();
-    let mut records = table::from_rows(rows, &names)
-        .ok_or_else(|| unreadable(stored.path(), "its records have another form".to_owned()))?;
+    let mut records: Vec<Record> = serde_json::from_str(&stored.state().text)
+        .map_err(|error| unreadable(stored.path(), error.to_string()))?;
     let seconds = stored.timings()["seconds"].as_array();
     for (record, seconds) in records.iter_mut().zip(seconds.into_iter().flatten()) {
         record.seconds = seconds.as_f64().unwrap_or(0.0);
@@ -186,15 +183,10 @@ fn pack<const D: usize>(run: &Run<D>, notes: &Value) -> Result<State, Error> {
         "time": state.time,
         "previous_tau": previous_tau,
     });
-    let names: Vec<&str> = run.case.measures.iter().map(Measure::name).collect();
-    let rows = run
-        .records
-        .iter()
-        .flat_map(|record| table::to_row(record, &names));
     let mut packed = State::new(run.count() as u64, notes)
-        .with_array("records", rows.collect())
         .with_array("initial", run.case.initial.values().to_vec())
         .with_array("current", state.current.into_values());
+    packed.text = serde_json::to_string(&run.records).expect("records are numbers and names");
     if let Some(previous) = previous {
         packed = packed.with_array("previous", previous.into_values());
     }

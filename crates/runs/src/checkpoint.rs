@@ -31,6 +31,8 @@ pub struct State {
     /// Small things, at most [`State::MAX_NOTES`] bytes. JSON has no NaN and no infinity: what may
     /// become either belongs in an array.
     pub notes: Value,
+    /// Text of any length, for what grows with the number of steps.
+    pub text: String,
     /// Named arrays, stored bit by bit. Names differ and are not empty.
     pub arrays: Vec<(String, Vec<f64>)>,
 }
@@ -45,6 +47,7 @@ impl State {
         Self {
             step,
             notes,
+            text: String::new(),
             arrays: Vec::new(),
         }
     }
@@ -86,6 +89,7 @@ impl State {
             a.0 == b.0 && a.1.iter().map(bits).eq(b.1.iter().map(bits))
         };
         self.notes == other.notes
+            && self.text == other.text
             && self.arrays.len() == other.arrays.len()
             && self.arrays.iter().zip(&other.arrays).all(same)
     }
@@ -109,7 +113,7 @@ pub(crate) fn kept(finished: bool) -> usize {
     if finished { 1 } else { 2 }
 }
 
-/// What a checkpoint file says besides notes and arrays. Its format:
+/// What a checkpoint file says besides notes, text and arrays. Its format:
 ///
 /// | bytes | content |
 /// |---|---|
@@ -118,6 +122,7 @@ pub(crate) fn kept(finished: bool) -> usize {
 /// | 4 + 4 | lengths of the header and of the notes, little endian |
 /// | … | header: this as JSON |
 /// | … | notes: JSON |
+/// | … | the text, UTF-8 |
 /// | … | the arrays one after the other, `f64`, little endian |
 /// | 32 | SHA-256 of all bytes before |
 #[derive(Debug, Serialize, Deserialize)]
@@ -126,17 +131,21 @@ pub(crate) struct Header {
     step: u64,
     pub finished: bool,
     pub files: Files,
+    /// Bytes of the text.
+    #[serde(default)]
+    text: u64,
     /// Names and numbers of values.
     arrays: Vec<(String, u64)>,
 }
 
-/// The bytes before the arrays, once it is certain that they can be read back.
+/// The bytes before text and arrays, once it is certain that they can be read back.
 pub(crate) fn start(state: &State, files: &Files, finished: bool) -> Result<Vec<u8>, Error> {
     let lengths = |(name, values): &(String, Vec<f64>)| (name.clone(), values.len() as u64);
     let header = Header {
         step: state.step,
         finished,
         files: files.clone(),
+        text: state.text.len() as u64,
         arrays: state.arrays.iter().map(lengths).collect(),
     };
     if !are_names(&header.arrays) {
@@ -171,6 +180,7 @@ pub(crate) fn write(out: &mut dyn Write, start: &[u8], state: &State) -> io::Res
         out.write_all(bytes)
     };
     put(start)?;
+    put(state.text.as_bytes())?;
     for values in (state.arrays.iter()).flat_map(|(_, values)| values.chunks(PIECE)) {
         let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
         put(&bytes)?;
@@ -239,6 +249,8 @@ pub(crate) fn read(folder: &Path, step: u64) -> Result<(Header, State), Error> {
         let shown = files::shortened(name, 60);
         return Err(damaged(format!("it lists a file with the name {shown:?}")));
     }
+    let text = take(usize::try_from(header.text).unwrap_or(usize::MAX))?.to_vec();
+    state.text = String::from_utf8(text).map_err(|e| damaged(e.to_string()))?;
     for (name, length) in &header.arrays {
         let bytes = length.checked_mul(8).and_then(|n| usize::try_from(n).ok());
         let values = take(bytes.unwrap_or(usize::MAX))?.chunks_exact(8);
