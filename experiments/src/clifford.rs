@@ -1,23 +1,17 @@
 //! The Clifford torus nearest to a phase field.
 
-use faer::linalg::solvers::Solve;
-use faer::{Col, Mat, Side};
+use std::f64::consts::{PI, SQRT_2};
+
+use geometry::measure::l2_distance;
 use geometry::shapes::Torus;
-use geometry::{Field, SignedDistance, measure, optimal_profile};
+use geometry::{Field, Grid, SignedDistance, optimal_profile};
 use serde::Serialize;
 
 use crate::Error;
 
-/// Most steps of the Levenberg-Marquardt method.
-const ITERATIONS: usize = 100;
-/// Length of its last step: lengths are relative to the radius, tilts in radians.
-const TOLERANCE: f64 = 1e-7;
-/// Length of the differences for derivatives.
-const DIFFERENCE: f64 = 1e-5;
-
 /// A Clifford torus in space, fitted to a phase field.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct CliffordFit {
+pub struct CliffordTorus {
     /// Its centre.
     pub centre: [f64; 3],
     /// Unit vector along its axis.
@@ -28,121 +22,70 @@ pub struct CliffordFit {
     pub l2: f64,
 }
 
-/// Tori by centre, tilt of the axis from a first guess, and outer radius.
-struct Family<'a> {
-    u: &'a Field<3>,
-    eps: f64,
-    /// The guessed axis, and two vectors that complete it to an orthonormal basis.
-    frame: [[f64; 3]; 3],
-}
-
-type Parameters = [f64; 6];
-
-impl Family<'_> {
-    fn torus(&self, [c0, c1, c2, a, b, outer_radius]: Parameters) -> CliffordFit {
-        let tilted: [f64; 3] =
-            std::array::from_fn(|i| self.frame[0][i] + a * self.frame[1][i] + b * self.frame[2][i]);
-        CliffordFit {
-            centre: [c0, c1, c2],
-            axis: normalized(tilted),
-            outer_radius,
-            l2: f64::INFINITY,
-        }
-    }
-
-    /// The phase field of a torus without `u`.
-    fn residual(&self, parameters: Parameters) -> Result<Vec<f64>, Error> {
-        let field = self.torus(parameters).phase_field(self.u, self.eps)?;
-        Ok(field.zip_map(self.u, |v, u| v - u)?.into_values())
-    }
-
-    /// Levenberg-Marquardt from the given parameters.
-    fn nearest(&self, start: Parameters) -> Result<CliffordFit, Error> {
-        let radius = start[5];
-        let units = [radius, radius, radius, 1.0, 1.0, radius];
-        let (mut at, mut residual) = (start, self.residual(start)?);
-        let mut damping = 1e-3;
-        for _ in 0..ITERATIONS {
-            let mut derivatives = Vec::with_capacity(at.len());
-            for (k, unit) in units.iter().enumerate() {
-                let mut moved = at;
-                moved[k] += DIFFERENCE * unit;
-                let mut derivative = self.residual(moved)?;
-                for (d, r) in derivative.iter_mut().zip(&residual) {
-                    *d = (*d - r) / DIFFERENCE;
-                }
-                derivatives.push(derivative);
-            }
-            let gradient = Col::from_fn(at.len(), |i| dot(&derivatives[i], &residual));
-            let matrix = Mat::from_fn(at.len(), at.len(), |i, j| {
-                let damped = if i == j { 1.0 + damping } else { 1.0 };
-                damped * dot(&derivatives[i], &derivatives[j])
-            });
-            let Ok(factors) = matrix.llt(Side::Lower) else {
-                break;
-            };
-            let step = factors.solve(&gradient);
-            let next = std::array::from_fn(|k| at[k] - units[k] * step[k]);
-            // Where there is no torus, none is nearer.
-            match self.residual(next) {
-                Ok(found) if dot(&found, &found) < dot(&residual, &residual) => {
-                    (at, residual) = (next, found);
-                    damping *= 0.1;
-                }
-                _ => damping *= 10.0,
-            }
-            if step.norm_l2() < TOLERANCE {
-                break;
-            }
-        }
-        let torus = self.torus(at);
-        Ok(CliffordFit {
-            l2: measure::l2_distance(self.u, &torus.phase_field(self.u, self.eps)?)?,
-            ..torus
-        })
-    }
-}
-
-impl CliffordFit {
-    /// The torus whose phase field is nearest to `u` in `L2`: least squares over centre, axis and radius, from the centre of
-    /// mass, each principal axis of inertia and the volume.
+impl CliffordTorus {
+    /// The torus whose phase field is nearest to `u` in `L2`: a simplex search over centre, axis and radius, from the centre of
+    /// mass, a principal axis of inertia and the volume.
     ///
     /// # Errors
-    /// [`Error::Options`] if there is no volume inside or nothing fits.
-    pub fn to(u: &Field<3>, eps: f64) -> Result<Self, Error> {
+    /// [`Error::Options`] if there is no volume inside or the search fails.
+    pub fn nearest(u: &Field<3>, eps: f64) -> Result<Self, Error> {
         let failed = |reason: &str| Error::Options(format!("no Clifford torus fits: {reason}"));
         let moments = Moments::of(u);
         if moments.volume <= 0.0 {
             return Err(failed("the phase field has no inside"));
         }
         // 2 pi^2 R r^2 with R = sqrt(2) r.
-        let minor = (moments.volume
-            / (2.0 * std::f64::consts::SQRT_2 * std::f64::consts::PI.powi(2)))
-        .cbrt();
-        let radius = minor * (1.0 + std::f64::consts::SQRT_2);
-        let mut best: Option<Self> = None;
-        for frame in moments.frames() {
-            let [c0, c1, c2] = moments.centre;
-            let torus = Family { u, eps, frame }.nearest([c0, c1, c2, 0.0, 0.0, radius])?;
-            if best.is_none_or(|best| torus.l2 < best.l2) {
-                best = Some(torus);
+        let minor = (moments.volume / (2.0 * SQRT_2 * PI.powi(2))).cbrt();
+        let radius = minor * (1.0 + SQRT_2);
+        let [c0, c1, c2] = moments.centre;
+        let start = [c0, c1, c2, 0.0, 0.0, radius];
+        let steps = [
+            0.1 * radius,
+            0.1 * radius,
+            0.1 * radius,
+            0.2,
+            0.2,
+            0.1 * radius,
+        ];
+        let tori = moments.frames().map(|frame| {
+            let distance = |parameters: &[f64; 6]| {
+                let torus = Self::in_frame(&frame, parameters).phase_field(u.grid(), eps)?;
+                Ok::<_, Error>(l2_distance(u, &torus)?)
+            };
+            // Beyond the positive radii there is no torus, which is no reason to stop.
+            let cost = |parameters: &[f64; 6]| distance(parameters).unwrap_or(f64::INFINITY);
+            let (l2, parameters) = nelder_mead(cost, start, steps);
+            Self {
+                l2,
+                ..Self::in_frame(&frame, &parameters)
             }
-        }
-        best.filter(|best| best.l2.is_finite())
-            .ok_or_else(|| failed("the search found none"))
+        });
+        let fits = tori.into_iter().filter(|torus| torus.l2.is_finite());
+        (fits.min_by(|a, b| a.l2.total_cmp(&b.l2))).ok_or_else(|| failed("the search found none"))
     }
 
-    /// The phase field of the torus on the grid of another field.
+    /// A torus by its centre, the tilt of its axis from the first vector of a frame along the two others, and its outer radius.
+    fn in_frame([axis, e, f]: &[[f64; 3]; 3], parameters: &[f64; 6]) -> Self {
+        let [c0, c1, c2, a, b, outer_radius] = *parameters;
+        Self {
+            centre: [c0, c1, c2],
+            axis: normalized(std::array::from_fn(|i| axis[i] + a * e[i] + b * f[i])),
+            outer_radius,
+            l2: f64::INFINITY,
+        }
+    }
+
+    /// The phase field of the torus.
     ///
     /// # Errors
     /// [`Error::Geometry`] for a radius that is not positive.
-    pub fn phase_field(&self, like: &Field<3>, eps: f64) -> Result<Field<3>, Error> {
+    pub fn phase_field(&self, grid: &Grid<3>, eps: f64) -> Result<Field<3>, Error> {
         let torus = Torus::clifford(self.outer_radius)?;
-        Ok(Field::from_fn(*like.grid(), |x| {
+        Ok(Field::from_fn(*grid, |x| {
             let x: [f64; 3] = std::array::from_fn(|i| x[i] - self.centre[i]);
-            let height = dot(&x, &self.axis);
+            let height = dot(x, self.axis);
             let across: [f64; 3] = std::array::from_fn(|i| x[i] - height * self.axis[i]);
-            let in_its_frame = [dot(&across, &across).sqrt(), 0.0, height];
+            let in_its_frame = [dot(across, across).sqrt(), 0.0, height];
             optimal_profile(torus.signed_distance(in_its_frame), eps)
         }))
     }
@@ -154,7 +97,7 @@ impl CliffordFit {
     pub fn minor_circles(&self, count: usize, points: usize) -> Result<Vec<Vec<[f64; 3]>>, Error> {
         let torus = Torus::clifford(self.outer_radius)?;
         let [axis, e, f] = frame_of(self.axis);
-        let angle = |k: usize, of: usize| 2.0 * std::f64::consts::PI * k as f64 / of as f64;
+        let angle = |k: usize, of: usize| 2.0 * PI * k as f64 / of as f64;
         let circle = |k: usize| {
             let (sin, cos) = angle(k, count).sin_cos();
             let outward: [f64; 3] = std::array::from_fn(|i| cos * e[i] + sin * f[i]);
@@ -168,6 +111,66 @@ impl CliffordFit {
         };
         Ok((0..count).map(circle).collect())
     }
+}
+
+/// The best vertex and its cost after a search by the simplex method of Nelder and Mead, from the simplex of a point and its displacements
+/// along the axes, until the standard deviation of the costs in the simplex is small.
+fn nelder_mead<const N: usize>(
+    cost: impl Fn(&[f64; N]) -> f64,
+    start: [f64; N],
+    steps: [f64; N],
+) -> (f64, [f64; N]) {
+    const ITERATIONS: usize = 400;
+    const TOLERANCE: f64 = 1e-7;
+    let vertex = |x: [f64; N]| (cost(&x), x);
+    let along = |from: &[f64; N], to: &[f64; N], t: f64| -> [f64; N] {
+        std::array::from_fn(|i| from[i] + (to[i] - from[i]) * t)
+    };
+    let mut simplex = vec![vertex(start)];
+    for axis in 0..N {
+        let mut x = start;
+        x[axis] += steps[axis];
+        simplex.push(vertex(x));
+    }
+    for _ in 0..ITERATIONS {
+        simplex.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        let mean = simplex.iter().map(|(cost, _)| cost).sum::<f64>() / (N + 1) as f64;
+        let squares: f64 = simplex.iter().map(|(cost, _)| (cost - mean).powi(2)).sum();
+        if (squares / N as f64).sqrt() < TOLERANCE {
+            break;
+        }
+        let (best, second_worst, worst) = (simplex[0], simplex[N - 1], simplex[N]);
+        let centroid: [f64; N] = std::array::from_fn(|i| {
+            simplex[..N].iter().map(|(_, x)| x[i]).sum::<f64>() * (1.0 / N as f64)
+        });
+        let reflected = vertex(along(&centroid, &worst.1, -1.0));
+        if reflected.0 < best.0 {
+            let expanded = vertex(along(&centroid, &reflected.1, 2.0));
+            simplex[N] = if expanded.0 < reflected.0 {
+                expanded
+            } else {
+                reflected
+            };
+        } else if reflected.0 < second_worst.0 {
+            simplex[N] = reflected;
+        } else {
+            let nearer = if reflected.0 < worst.0 {
+                reflected
+            } else {
+                worst
+            };
+            let contracted = vertex(along(&centroid, &nearer.1, 0.5));
+            if contracted.0 < nearer.0 {
+                simplex[N] = contracted;
+            } else {
+                for other in &mut simplex[1..] {
+                    *other = vertex(along(&best.1, &other.1, 0.5));
+                }
+            }
+        }
+    }
+    simplex.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+    simplex[0]
 }
 
 /// Volume, centre of mass and second moments of the inside.
@@ -217,12 +220,12 @@ impl Moments {
     }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 fn normalized(a: [f64; 3]) -> [f64; 3] {
-    let length = dot(&a, &a).sqrt();
+    let length = dot(a, a).sqrt();
     a.map(|a| a / length)
 }
 
@@ -235,7 +238,7 @@ fn frame_of(axis: [f64; 3]) -> [[f64; 3]; 3] {
         .unwrap_or(0);
     let mut e = [0.0; 3];
     e[k] = 1.0;
-    let along = dot(&e, &axis);
+    let along = dot(e, axis);
     let e = normalized(std::array::from_fn(|i| e[i] - along * axis[i]));
     let f = [
         axis[1] * e[2] - axis[2] * e[1],
@@ -254,29 +257,25 @@ mod tests {
     fn a_clifford_torus_is_found_in_any_position() {
         let grid = Grid::<3>::new(32, 1.0).unwrap();
         let eps = 2.0 * grid.spacing();
-        let like = Field::constant(grid, 0.0);
-        let torus = CliffordFit {
+        let torus = CliffordTorus {
             centre: [0.52, 0.47, 0.5],
             axis: normalized([0.3, -0.5, 1.0]),
             outer_radius: 0.36,
             l2: 0.0,
         };
-        let u = torus.phase_field(&like, eps).unwrap();
-        let found = CliffordFit::to(&u, eps).unwrap();
+        let u = torus.phase_field(&grid, eps).unwrap();
+        let found = CliffordTorus::nearest(&u, eps).unwrap();
         assert!(found.l2 < 1e-4, "{found:?}");
         assert!((found.outer_radius - 0.36).abs() < 1e-4, "{found:?}");
-        assert!(
-            dot(&found.axis, &torus.axis).abs() > 1.0 - 1e-6,
-            "{found:?}"
-        );
+        assert!(dot(found.axis, torus.axis).abs() > 1.0 - 1e-6, "{found:?}");
         for (a, b) in found.centre.iter().zip(torus.centre) {
             assert!((a - b).abs() < 1e-4, "{found:?}");
         }
         for circle in found.minor_circles(3, 16).unwrap() {
             for x in circle {
                 let x: [f64; 3] = std::array::from_fn(|i| x[i] - found.centre[i]);
-                let height = dot(&x, &found.axis);
-                let across = (dot(&x, &x) - height * height).sqrt();
+                let height = dot(x, found.axis);
+                let across = (dot(x, x) - height * height).sqrt();
                 let shape = Torus::clifford(found.outer_radius).unwrap();
                 assert!(shape.signed_distance([across, 0.0, height]).abs() < 1e-12);
             }
@@ -286,6 +285,6 @@ mod tests {
     #[test]
     fn nothing_fits_an_empty_field() {
         let grid = Grid::<3>::new(8, 1.0).unwrap();
-        assert!(CliffordFit::to(&Field::constant(grid, -1.0), 0.1).is_err());
+        assert!(CliffordTorus::nearest(&Field::constant(grid, -1.0), 0.1).is_err());
     }
 }

@@ -1,48 +1,35 @@
 //! Shapes without a known solution: all methods and resolutions against a finer run.
 
-use std::collections::BTreeMap;
-use std::time::Instant;
+use std::process::ExitCode;
 
-use clap::Args;
+use clap::{CommandFactory, FromArgMatches, Parser};
+use engine::{Flow, Measure, Method, Operator, Samples, Scheme, Trajectory, Values};
 use geometry::contour::{Interpolation, zero_level};
+use geometry::measure::{perimeter, zero_set_volume};
 use geometry::shapes::Cross;
-use geometry::{Field, Grid, phase_field};
-use model::Network;
-use report::{
-    Axis, Colour, Column, Curve, Figure, Format, LineChart, Manifest, OutputDir, Shapes, Summary,
-    Table,
-};
-use serde::Serialize;
-use solver::{FlowParams, NewtonParams, StepRecord};
+use geometry::{Error as GeometryError, Field, Grid, phase_field};
+use report::{Axis, Colour, Curve, Figure, Format, LineChart, OutputDir, Shapes, Summary, Table};
+use serde_json::json;
+use solver::StepRecord;
 
-use crate::Error;
-use crate::circles::{EPS, Flow, STEP};
-use crate::evolution::{self, Evolution, TimeSteps};
-use crate::look;
-use crate::method::{self, Method, Scheme};
-use crate::networks::{NetworkOptions, convergence_ratios};
-use crate::options::{RunOptions, resolutions};
-
-/// The non-convex cross: arms of half length 0.8 and half width 0.27.
-///
-/// # Errors
-/// [`Error::Geometry`] never, for these numbers.
-pub fn cross(grid: Grid<2>, eps: f64) -> Result<Field<2>, Error> {
-    Ok(phase_field(grid, &Cross::new(0.8, 0.27)?, eps)?)
-}
+use crate::networks::{EPS, STEP};
+use crate::session::Session;
+use crate::steps::{self, Rows};
+use crate::study::{self, Study, StudyOptions, Variant};
+use crate::{Error, harness, look};
 
 /// A shape and the flow it undergoes.
 pub struct Setting {
-    /// Name of the program and its folder.
+    /// Name of the program and its folder, and prefix of the metrics.
     pub program: &'static str,
-    /// Prefix of the metrics.
-    pub key: &'static str,
     /// Title of the figures.
     pub title: &'static str,
+    /// What the program does, for its help.
+    pub about: &'static str,
     /// Name of the shape with its measures.
     pub shape: &'static str,
     /// Its phase field.
-    pub initial: fn(Grid<2>, f64) -> Result<Field<2>, Error>,
+    pub initial: fn(Grid<2>) -> Result<Field<2>, GeometryError>,
     /// Which flow.
     pub flow: Flow,
     /// Side of the periodic box.
@@ -57,326 +44,228 @@ pub struct Setting {
     pub window: f64,
 }
 
-/// Options of the comparisons.
-#[derive(Args, Clone, Debug)]
-pub struct ComparisonOptions {
-    /// Common options.
+/// The non-convex cross: arms of half length 0.8 and half width 0.27.
+///
+/// # Errors
+/// [`GeometryError`] never, for these numbers.
+pub fn cross(grid: Grid<2>) -> Result<Field<2>, GeometryError> {
+    phase_field(grid, &Cross::new(0.8, 0.27)?, EPS)
+}
+
+/// The options of a comparison. Runs are kept in the folder `fields` of the output; an interrupted one continues.
+#[derive(Parser, Debug)]
+#[command(version)]
+struct Options {
     #[command(flatten)]
-    pub run: RunOptions,
-
-    /// Networks.
-    #[command(flatten)]
-    pub networks: NetworkOptions,
-
-    /// Cells per unit length, separated by commas [default: 128,256; with --full 128,256,512]
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    pub cells: Vec<usize>,
-
-    /// Methods, separated by commas [default: all; nested finite elements from n = 256 on, where they are stable]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
-    pub methods: Vec<Method>,
-
-    /// One scheme alone, where it makes a difference: paper, calibrated or accurate [default: all]
-    #[arg(long, value_name = "NAME", value_enum)]
-    pub scheme: Option<Scheme>,
+    study: StudyOptions,
 
     /// Cells per unit length of the reference, implicit finite elements [default: twice the finest; paper: 2048]
     #[arg(long, value_name = "N")]
-    pub reference_n: Option<usize>,
-
-    /// Add n = 512
-    #[arg(long, conflicts_with = "cells")]
-    pub full: bool,
+    reference_n: Option<usize>,
 
     /// Number of time steps [default: the paper's]
     #[arg(long, value_name = "COUNT")]
-    pub steps: Option<usize>,
+    steps: Option<usize>,
 }
 
-type Trajectory = evolution::Trajectory<2>;
-
-#[derive(Serialize)]
-struct Parameters<'a> {
-    shape: &'a str,
-    flow: Flow,
-    cells: &'a [usize],
-    reference_n: usize,
-    reference_steps_per_step: usize,
-    side: f64,
-    eps: f64,
-    time_step: f64,
-    steps: usize,
-    networks: BTreeMap<String, String>,
-    quick: bool,
+/// The program of a comparison.
+pub fn main(setting: &Setting) -> ExitCode {
+    let command = Options::command()
+        .name(setting.program)
+        .about(setting.about);
+    let matches = command.get_matches();
+    let options = Options::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    harness::run(|| run(setting, &options))
 }
 
-#[derive(Serialize)]
-struct ErrorRow {
-    n: usize,
-    method: Method,
-    scheme: Scheme,
-    step: usize,
-    time: f64,
-    l2: f64,
-}
-
-#[derive(Serialize)]
-struct StepRow {
-    n: usize,
-    method: Method,
-    scheme: Scheme,
-    reference: bool,
-    step: usize,
-    time: f64,
-    perimeter: f64,
-    area: f64,
-    tip: Option<f64>,
-    diagonal: Option<f64>,
-    energy: Option<f64>,
-    energy_before: Option<f64>,
-    willmore_energy: Option<f64>,
-    exit: Option<solver::Exit>,
-    newton: Option<usize>,
-    hvp: Option<f64>,
-    negative_curvature: Option<usize>,
-    seconds: Option<f64>,
+/// A run with what it is.
+struct Compared {
+    variant: Variant,
+    trajectory: Trajectory<2>,
 }
 
 /// Everything a comparison computed.
 struct Comparison<'a> {
     setting: &'a Setting,
-    options: &'a ComparisonOptions,
     steps: usize,
-    cells: Vec<usize>,
-    runs: Vec<Trajectory>,
-    reference: Trajectory,
+    study: Study,
+    runs: Vec<Compared>,
+    reference: Compared,
     /// The reference at half its resolution, to estimate its error.
-    half: Option<Trajectory>,
+    half: Option<Compared>,
 }
 
-/// Runs a comparison and writes everything.
-///
-/// # Errors
-/// Bad options before anything is written; what the runs raise.
-pub fn run(setting: &Setting, options: &ComparisonOptions) -> Result<(), Error> {
-    let cells = resolutions(&options.cells, options.run.quick, options.full);
+fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
+    let (flow, quick, cells) = (setting.flow, options.study.run.quick, options.study.cells());
     let finest = cells.iter().copied().max().unwrap_or(0);
-    let default = if options.run.quick {
-        finest
-    } else {
-        2 * finest
-    };
-    let reference_n = options.reference_n.unwrap_or(default);
-    for &n in &cells {
-        if !reference_n.is_multiple_of(n) {
-            return Err(Error::Options(format!(
-                "--reference-n {reference_n} must be a multiple of every n compared with it, also of {n}"
-            )));
-        }
+    let reference_n = (options.reference_n).unwrap_or(if quick { finest } else { 2 * finest });
+    if let Some(n) = cells.iter().find(|n| !reference_n.is_multiple_of(**n)) {
+        return Err(Error::Options(format!(
+            "--reference-n {reference_n} must be a multiple of every n compared with it, also of {n}"
+        )));
     }
     let steps = options
         .steps
-        .unwrap_or(if options.run.quick { 2 } else { setting.steps });
+        .unwrap_or(if quick { 2 } else { setting.steps });
     if steps == 0 {
         return Err(Error::Options("--steps must be at least 1".to_owned()));
     }
-    let device = options.run.open_device()?;
-    let plan = plan(setting, options, &cells, steps);
-    let learned: Vec<usize> = plan
-        .iter()
-        .filter(|e| e.method.is_learned())
-        .map(|e| e.n)
-        .collect();
-    let ratios = learned
-        .iter()
-        .map(|&n| convergence_ratios(n))
-        .collect::<Result<Vec<_>, _>>()?;
-    let networks = options.networks.find(&ratios)?;
-    let network_of = |n: usize| (learned.iter().position(|&m| m == n)).map(|k| &networks[k]);
-    let output = options.run.open_output(setting.program)?;
-    let parameters = Parameters {
-        shape: setting.shape,
-        flow: setting.flow,
-        cells: &cells,
-        reference_n,
-        reference_steps_per_step: setting.reference_ratio,
-        side: setting.side,
-        eps: EPS,
-        time_step: STEP,
-        steps,
-        networks: learned
-            .iter()
-            .zip(&networks)
-            .map(|(n, network)| (format!("n{n}"), crate::networks::checksum(network)))
-            .collect(),
-        quick: options.run.quick,
+    let device = options.study.run.open_device()?;
+    // Franken, Rumpf and Wirth: for eps = 2h the nested scheme is unstable.
+    let stable = |method: Method, n| {
+        flow == Flow::MeanCurvature || method.is_learned() || n as f64 * EPS >= 4.0
     };
-    let mut manifest = options
-        .run
-        .manifest(setting.program, &parameters, &device)?;
-    let progress = options.run.progress();
-    let store = output.subfolder("fields")?;
-    let clock = Instant::now();
-    let execute = |manifest: &mut Manifest, evolution: &Evolution<2>, what: &str| {
-        let title = format!("{what}{}, n = {}", label(evolution), evolution.n);
-        let bar = progress.bar(title.clone(), evolution.steps as u64);
-        let network: Option<&Network> = network_of(evolution.n);
-        let trajectory = manifest.phase(title, || {
-            evolution.run(&setting.initial, network, &device, &store, &bar)
-        });
-        bar.finish();
-        trajectory
-    };
-    let runs = plan
-        .iter()
-        .map(|evolution| execute(&mut manifest, evolution, ""))
-        .collect::<Result<Vec<_>, _>>()?;
-    let fine = reference(setting, reference_n, steps);
-    let reference_run = execute(&mut manifest, &fine, "reference: ")?;
-    // The error of the reference is estimated from the same run at half the resolution.
-    let half = if reference_n.is_multiple_of(2) && finest <= reference_n / 2 {
-        let half = reference(setting, reference_n / 2, steps);
-        Some(execute(
-            &mut manifest,
-            &half,
-            "for the reference's error: ",
-        )?)
-    } else {
-        None
-    };
-    let comparison = Comparison {
-        setting,
-        options,
-        steps,
-        cells,
-        runs,
-        reference: reference_run,
-        half,
-    };
-    comparison.write(&output, clock.elapsed().as_secs_f64())?;
-    manifest.write(&output)?;
-    progress.clear();
-    options.run.say(&format!(
-        "{}\n{}\n{}\nResults are in {}",
-        options.run.title(setting.title),
-        comparison.table()?.to_markdown(),
-        comparison.about_the_reference()?,
-        output.as_path().display()
-    ));
-    Ok(())
-}
-
-fn evolution(
-    setting: &Setting,
-    (method, scheme): (Method, Scheme),
-    n: usize,
-    (steps, ratio): (usize, usize),
-) -> Evolution<2> {
-    let tau = STEP / ratio as f64;
-    Evolution {
-        shape: setting.shape.to_owned(),
-        flow: setting.flow,
-        method,
-        scheme,
-        n,
-        side: setting.side,
-        centre: 0.0,
-        params: FlowParams {
-            eps: EPS,
-            mcf_step: if setting.flow == Flow::MeanCurvature {
-                tau
-            } else {
-                STEP
-            },
-            newton: NewtonParams::default(),
-            calibration: solver::Factors::PAPER,
-        },
-        tau: TimeSteps::Constant(tau),
-        division: None,
-        still: None,
-        region: None,
-        sample_every: 8 * ratio,
-        also_sample: [1, 2, 4].map(|k| k * ratio).to_vec(),
-        steps: steps * ratio,
-        pause_after: None,
-    }
-}
-
-fn plan(
-    setting: &Setting,
-    options: &ComparisonOptions,
-    cells: &[usize],
-    steps: usize,
-) -> Vec<Evolution<2>> {
+    let study = Study::new(
+        &options.study.networks,
+        &options.study.variants(flow, stable),
+    )?;
+    let parameters = json!({
+        "shape": setting.shape,
+        "flow": flow,
+        "cells": cells,
+        "reference_n": reference_n,
+        "reference_steps_per_step": setting.reference_ratio,
+        "side": setting.side,
+        "eps": EPS,
+        "time_step": STEP,
+        "steps": steps,
+        "networks": study.checksums(),
+        "quick": quick,
+    });
+    let mut session = Session::open(setting.program, &options.study.run, device, &parameters)?;
     let mut runs = Vec::new();
-    for method in Method::ALL {
-        for &n in cells {
-            // Franken, Rumpf and Wirth: for eps = 2h the nested scheme is unstable.
-            let stable =
-                method.is_learned() || setting.flow == Flow::MeanCurvature || n as f64 * EPS >= 4.0;
-            let chosen = if options.methods.is_empty() {
-                stable
-            } else {
-                options.methods.contains(&method)
-            };
-            if !chosen {
-                continue;
-            }
-            for scheme in method.chosen_schemes(setting.flow, options.scheme) {
-                runs.push(evolution(setting, (method, scheme), n, (steps, 1)));
-            }
-        }
+    for (variant, operator) in &study.plan {
+        runs.push(setting.run(&mut session, "", (*variant, operator), (steps, 1))?);
     }
-    runs
-}
-
-/// The paper's references are implicit finite elements.
-fn reference(setting: &Setting, n: usize, steps: usize) -> Evolution<2> {
-    evolution(
+    // The paper's references are implicit finite elements.
+    let mut finer = |what: &str, n: usize| {
+        let (method, scheme) = (Method::FeImplicit, Scheme::Paper);
+        let operator = study.networks.operator((method, scheme), n)?;
+        let variant = Variant {
+            flow,
+            method,
+            scheme,
+            n,
+        };
+        setting.run(
+            &mut session,
+            what,
+            (variant, &operator),
+            (steps, setting.reference_ratio),
+        )
+    };
+    let reference = finer("reference: ", reference_n)?;
+    // The error of the reference is estimated from the same run at half the resolution.
+    let half = reference_n.is_multiple_of(2) && finest <= reference_n / 2;
+    let half = half
+        .then(|| finer("for the reference's error: ", reference_n / 2))
+        .transpose()?;
+    Comparison {
         setting,
-        (Method::FeImplicit, Scheme::Paper),
-        n,
-        (steps, setting.reference_ratio),
-    )
+        steps,
+        study,
+        runs,
+        reference,
+        half,
+    }
+    .write(session)
 }
 
-fn label(evolution: &Evolution<2>) -> String {
-    evolution.method.label_in(evolution.scheme)
+impl Setting {
+    fn run(
+        &self,
+        session: &mut Session<'_>,
+        what: &str,
+        (variant, operator): (Variant, &Operator),
+        (steps, ratio): (usize, usize),
+    ) -> Result<Compared, Error> {
+        let grid = Grid::<2>::per_unit(variant.n, self.side)?;
+        let steps = (STEP / ratio as f64, steps * ratio);
+        let mut case = study::case(
+            (self.flow, operator),
+            self.shape,
+            (self.initial)(grid)?,
+            steps,
+        );
+        case.measures = Measure::crossings(0.0);
+        case.measures.push(Measure::new("perimeter", |u, _| {
+            perimeter(u, EPS).map(Some)
+        }));
+        case.measures
+            .push(Measure::new("area", |u, _| Ok(Some(zero_set_volume(u)))));
+        let title = format!("{what}{}, n = {}", variant.label(), variant.n);
+        let name = format!("{}-{ratio}", variant.key());
+        let trajectory = session.trajectory(&title, case, &name, &samples(ratio))?;
+        Ok(Compared {
+            variant,
+            trajectory,
+        })
+    }
 }
 
-fn variant(run: &Trajectory) -> (Method, Scheme) {
-    (run.evolution.method, run.evolution.scheme)
+/// The steps whose phase fields are kept and compared.
+fn samples(ratio: usize) -> Samples {
+    Samples {
+        also: [1, 2, 4].map(|k| k * ratio).to_vec(),
+        ..Samples::every(8 * ratio)
+    }
+}
+
+fn time(step: usize) -> f64 {
+    step as f64 * STEP
+}
+
+impl Compared {
+    fn minimizations(&self) -> impl Iterator<Item = &StepRecord> {
+        let records = self.trajectory.records.iter();
+        records.filter_map(|record| record.minimization.as_ref())
+    }
+
+    fn seconds_per_step(&self) -> f64 {
+        self.trajectory.seconds() / self.trajectory.steps() as f64
+    }
+
+    /// The zero level at a time.
+    fn loops(&self, step: usize) -> Result<Curve, Error> {
+        let ratio = (STEP / self.trajectory.case.steps.rule.size(1)).round() as usize;
+        let field = self.trajectory.field(step * ratio)?;
+        let curves = zero_level(&field, Interpolation::Profile).into_iter();
+        Ok(Curve::new(
+            curves.map(|curve| curve.points).collect::<Vec<_>>(),
+        ))
+    }
 }
 
 impl Comparison<'_> {
-    fn sampled(&self) -> Vec<usize> {
-        let any = (Method::Hybrid, Scheme::Paper);
-        evolution(self.setting, any, self.cells[0], (self.steps, 1)).sampled_steps()
+    fn sampled(&self) -> impl Iterator<Item = usize> {
+        (0..=self.steps).filter(|&step| samples(1).holds(step) || step == self.steps)
     }
 
     fn shown(&self) -> Vec<usize> {
-        let sampled = self.sampled();
-        let mut shown: Vec<usize> = self.setting.shown.to_vec();
-        shown.retain(|k| sampled.contains(k));
-        if !shown.contains(&self.steps) {
-            shown.push(self.steps);
-        }
-        shown
+        let drawn = |step: &usize| self.setting.shown.contains(step) || *step == self.steps;
+        self.sampled().filter(drawn).collect()
     }
 
-    fn time(step: usize) -> f64 {
-        step as f64 * STEP
+    fn is_reference(&self, run: &Compared) -> bool {
+        run.variant == self.reference.variant && self.setting.reference_ratio == 1
     }
 
-    fn is_reference_run(&self, run: &Trajectory) -> bool {
-        run.evolution == self.reference.evolution
+    /// Runs that are compared with the reference: all but the reference itself.
+    fn others(&self) -> impl Iterator<Item = &Compared> {
+        self.runs.iter().filter(|run| !self.is_reference(run))
     }
 
-    fn errors(&self, run: &Trajectory) -> Result<Vec<(usize, f64)>, Error> {
-        self.sampled()
-            .into_iter()
-            .map(|k| Ok((k, run.distance(&self.reference, k)?)))
-            .collect()
+    /// Steps and distances to the reference, which makes several steps for each.
+    fn errors(&self, run: &Compared) -> Result<Vec<(usize, f64)>, Error> {
+        let ratio = self.setting.reference_ratio;
+        let error = |k: usize| {
+            Ok((
+                k,
+                run.trajectory
+                    .distance(k, &self.reference.trajectory, k * ratio)?,
+            ))
+        };
+        self.sampled().map(error).collect()
     }
 
     /// Largest distance over time between the reference and the same method at half the resolution.
@@ -384,21 +273,22 @@ impl Comparison<'_> {
         let Some(half) = &self.half else {
             return Ok(None);
         };
-        let distances = half
-            .evolution
-            .sampled_steps()
-            .into_iter()
-            .map(|step| half.distance(&self.reference, step))
-            .collect::<Result<Vec<_>, _>>()?;
-        Ok(Some(distances.into_iter().fold(0.0, f64::max)))
+        let mut largest = 0.0_f64;
+        for step in self.sampled().map(|k| k * self.setting.reference_ratio) {
+            largest = largest.max(half.trajectory.distance(
+                step,
+                &self.reference.trajectory,
+                step,
+            )?);
+        }
+        Ok(Some(largest))
     }
 
     fn about_the_reference(&self) -> Result<String, Error> {
-        let n = self.reference.evolution.n;
-        let ratio = self.setting.reference_ratio;
-        let step = match self.setting.flow {
-            Flow::MeanCurvature if ratio > 1 => format!(", {ratio} steps for each"),
-            _ => String::new(),
+        let (n, ratio) = (self.reference.variant.n, self.setting.reference_ratio);
+        let step = match ratio {
+            1 => String::new(),
+            ratio => format!(", {ratio} steps for each"),
         };
         let estimate = match self.reference_difference()? {
             Some(distance) => format!(
@@ -413,111 +303,94 @@ impl Comparison<'_> {
         ))
     }
 
-    fn write(&self, output: &OutputDir, seconds: f64) -> Result<(), Error> {
-        self.error_figure()?.write(output, "errors")?;
-        self.shape_figure()?.write(output, "shapes")?;
-        self.table()?.write(output, "error_table")?;
-        self.summary(seconds)?.write(output)?;
-        let mut errors = Vec::new();
+    fn write(&self, session: Session<'_>) -> Result<(), Error> {
+        session.figure(self.error_figure()?, "errors")?;
+        session.figure(self.shape_figure()?, "shapes")?;
+        let table = self.table()?;
+        table.write(&session.output, "error_table")?;
+        self.data(&session.output)?;
+        let report = format!("{}\n{}", table.to_markdown(), self.about_the_reference()?);
+        session.finish(self.setting.title, self.summary()?, &report)
+    }
+
+    fn data(&self, output: &OutputDir) -> Result<(), Error> {
+        let leading = &Variant::COLUMNS[1..];
+        let mut errors = Table::data(leading.iter().chain(&["step", "time", "l2"]));
         for run in &self.runs {
             for (step, l2) in self.errors(run)? {
-                errors.push(ErrorRow {
-                    n: run.evolution.n,
-                    method: run.evolution.method,
-                    scheme: run.evolution.scheme,
-                    step,
-                    time: Self::time(step),
-                    l2,
-                });
+                let row = [step.into(), time(step).into(), l2.into()];
+                errors.push(run.variant.cells().into_iter().skip(1).chain(row))?;
             }
         }
-        output.write("errors.csv", report::data::to_csv(&errors)?)?;
-        output.write("errors.json", report::data::to_json(&errors)?)?;
-        let reference = std::iter::once(&self.reference).chain(&self.half);
-        let rows: Vec<StepRow> = self
-            .runs
-            .iter()
-            .flat_map(|run| step_rows(run, false))
-            .chain(reference.flat_map(|run| step_rows(run, true)))
+        output.write("errors.csv", errors.to_csv()?)?;
+        output.write("errors.json", errors.to_json()?)?;
+        let compared = self.runs.iter().map(|run| (run, "false"));
+        let references = std::iter::once(&self.reference).chain(&self.half);
+        let rows: Vec<Rows<'_>> = compared
+            .chain(references.map(|run| (run, "true")))
+            .map(|(run, reference)| Rows {
+                leading: run
+                    .variant
+                    .cells()
+                    .into_iter()
+                    .skip(1)
+                    .chain([reference.into()])
+                    .collect(),
+                start: Some(&run.trajectory.start),
+                records: &run.trajectory.records,
+            })
             .collect();
-        output.write("steps.csv", report::data::to_csv(&rows)?)?;
+        let steps = steps::table(&[leading, &["reference"]].concat(), &rows)?;
+        output.write("steps.csv", steps.to_csv()?)?;
         Ok(())
     }
 
-    /// Methods and schemes that ran, in the order of legends.
-    fn variants(&self) -> impl Iterator<Item = (Method, Scheme)> {
-        method::variants(|wanted| self.runs.iter().any(|run| variant(run) == wanted))
-    }
-
     fn error_figure(&self) -> Result<Figure, Error> {
-        let mut chart = LineChart::new("", Axis::linear("time t"), Axis::log("L² error"));
-        for run in &self.runs {
-            if self.is_reference_run(run) {
-                continue;
-            }
-            let Evolution {
-                n, method, scheme, ..
-            } = run.evolution;
-            let points: Vec<[f64; 2]> = self
-                .errors(run)?
-                .into_iter()
-                .map(|(k, l2)| [Self::time(k), l2])
-                .collect();
-            let curve = look::curve(points, (method, scheme), (n, &self.cells));
-            chart = chart.with_series(curve);
+        let mut curves = Vec::new();
+        for run in self.others() {
+            let points = self.errors(run)?.into_iter().map(|(k, l2)| [time(k), l2]);
+            curves.push(self.study.series(run.variant, points.collect()));
         }
-        chart = look::legend(chart, self.variants(), &self.cells);
-        let title = format!("{}: error over time", self.setting.title);
-        Ok(Figure::new(self.options.run.title(&title), 1)
-            .with_panel(chart)
-            .with_shared_legend()
-            .with_note(format!(
-                "ε = 2⁻⁶, time step 2⁻¹⁴. {}",
-                self.about_the_reference()?
-            )))
+        let chart = LineChart::new("", Axis::linear("time t"), Axis::log("L² error"));
+        Ok(
+            Figure::new(format!("{}: error over time", self.setting.title), 1)
+                .with_panel(self.study.chart(chart, curves))
+                .with_shared_legend()
+                .with_note(format!(
+                    "ε = 2⁻⁶, time step 2⁻¹⁴. {}",
+                    self.about_the_reference()?
+                )),
+        )
     }
 
     /// Rows: methods at their finest resolution, and the reference; columns: times.
     fn shape_figure(&self) -> Result<Figure, Error> {
-        let shown = self.shown();
-        let mut rows: Vec<(&Trajectory, String)> = Vec::new();
-        for (method, scheme) in self.variants() {
-            let finest = self
-                .runs
-                .iter()
-                .filter(|run| variant(run) == (method, scheme) && !self.is_reference_run(run))
-                .max_by_key(|run| run.evolution.n);
-            if let Some(run) = finest {
-                let label = method.label_in(scheme).replace(", ", "\n");
-                rows.push((run, format!("{label}\nn = {}", run.evolution.n)));
+        let mut rows: Vec<(&Compared, String)> = Vec::new();
+        for (method, scheme) in look::variants(|_| true) {
+            let own =
+                |run: &&Compared| (run.variant.method, run.variant.scheme) == (method, scheme);
+            if let Some(run) = self.others().filter(own).max_by_key(|run| run.variant.n) {
+                rows.push((run, run.variant.label().replace(", ", "\n")));
             }
         }
-        let reference = &self.reference;
-        rows.push((
-            reference,
-            format!("reference\nn = {}", reference.evolution.n),
-        ));
-        let window = [-self.setting.window, self.setting.window];
-        let title = format!("{}: shapes", self.setting.title);
-        let mut figure = Figure::new(self.options.run.title(&title), shown.len())
+        rows.push((&self.reference, "reference".to_owned()));
+        let labels = rows
+            .iter()
+            .map(|(run, label)| format!("{label}\nn = {}", run.variant.n));
+        let (shown, half) = (self.shown(), self.setting.window);
+        let mut figure = Figure::new(format!("{}: shapes", self.setting.title), shown.len())
             .with_column_labels(shown.iter().map(|&k| format!("t = {}", time_label(k))))
-            .with_row_labels(rows.iter().map(|(_, label)| label.clone()));
-        let loops = |run: &Trajectory, step: usize| -> Result<Vec<Vec<[f64; 2]>>, Error> {
-            let ratio = (STEP / run.evolution.tau.size(1)).round() as usize;
-            let curves = zero_level(&run.field(step * ratio)?, Interpolation::Profile);
-            Ok(curves.into_iter().map(|curve| curve.points).collect())
-        };
+            .with_row_labels(labels);
         for (run, _) in &rows {
             for &step in &shown {
-                let curve = Curve::new(loops(run, step)?).filled(Colour::LightGrey);
+                let curve = run.loops(step)?.filled(Colour::LightGrey);
+                let window = [-half, half];
                 let mut panel = Shapes::new("")
                     .with_curve(curve)
                     .with_window(window, window);
-                if !self.is_reference_run(run) {
-                    let reference = Curve::new(loops(reference, step)?)
-                        .with_colour(1)
-                        .with_width(1.0);
-                    panel = panel.with_curve(reference);
+                if run.variant != self.reference.variant {
+                    let reference = self.reference.loops(step)?;
+                    panel = panel.with_curve(reference.with_colour(1).with_width(1.0));
                 }
                 figure = figure.with_panel(panel);
             }
@@ -529,120 +402,77 @@ impl Comparison<'_> {
     }
 
     fn table(&self) -> Result<Table, Error> {
-        let shown: Vec<usize> = self.shown().into_iter().filter(|k| *k > 0).collect();
-        let head = [
-            Column::text("method"),
-            Column::number("n", Format::Shortest),
-        ];
-        let errors = shown
+        let all = self
+            .runs
             .iter()
-            .map(|k| Column::number(format!("error, step {k}"), Format::Fixed(5)));
-        let tail = [
-            Column::number("HVP/step", Format::Fixed(1)),
-            Column::number("s/step", Format::Fixed(2)),
-        ];
-        let mut table = Table::new(head.into_iter().chain(errors).chain(tail));
-        for run in &self.runs {
-            let n = run.evolution.n;
-            let reference = self.is_reference_run(run);
-            let errors = self.errors(run)?;
-            let errors = shown.iter().map(|k| {
-                let found = errors.iter().find(|(step, _)| step == k);
-                found.filter(|_| !reference).map(|(_, l2)| *l2).into()
-            });
-            let count = run.records.len() as f64;
-            let hvp =
-                (count > 0.0).then(|| run.records.iter().map(StepRecord::hvp).sum::<f64>() / count);
-            let seconds = run.seconds / run.evolution.steps as f64;
-            table.push(
-                [label(&run.evolution).into(), n.into()]
-                    .into_iter()
-                    .chain(errors)
-                    .chain([hvp.into(), seconds.into()]),
-            )?;
+            .map(|run| self.errors(run))
+            .collect::<Result<Vec<_>, _>>()?;
+        let rows: Vec<(&Compared, Vec<(usize, f64)>)> = self.runs.iter().zip(all).collect();
+        let mut table = Table::of(&rows)
+            .text("method", |(run, _)| run.variant.label())
+            .number("n", Format::Shortest, |(run, _)| run.variant.n);
+        for k in self.shown().into_iter().filter(|k| *k > 0) {
+            table = table.number(
+                format!("error, step {k}"),
+                Format::Fixed(5),
+                |(run, errors)| {
+                    let error = errors.iter().find(|(step, _)| *step == k);
+                    error.filter(|_| !self.is_reference(run)).map(|(_, l2)| *l2)
+                },
+            );
         }
-        Ok(table)
+        let hvp = |run: &Compared| study::mean(run.minimizations(), StepRecord::hvp);
+        Ok(table
+            .number("HVP/step", Format::Fixed(1), |(run, _)| hvp(run))
+            .number("s/step", Format::Fixed(2), |(run, _)| {
+                run.seconds_per_step()
+            })
+            .finish()?)
     }
 
-    fn summary(&self, seconds: f64) -> Result<Summary, Error> {
+    fn summary(&self) -> Result<Summary, Error> {
         let mut summary = Summary::new();
         for run in &self.runs {
-            let Evolution {
-                n, method, scheme, ..
-            } = run.evolution;
-            let key = format!("{}.n{n}.{}", self.setting.key, method.key_in(scheme));
-            if !self.is_reference_run(run) {
+            let key = format!("{}.{}", self.setting.program, run.variant.key());
+            if !self.is_reference(run) {
                 for (step, l2) in self.errors(run)? {
                     summary.insert(&format!("{key}.l2.step{step}"), l2)?;
                 }
             }
-            for (step, m) in run.measures.iter().enumerate() {
-                summary.insert(&format!("{key}.area.step{step}"), m.volume)?;
-                summary.insert(&format!("{key}.perimeter.step{step}"), m.perimeter)?;
-                for (what, value) in [("tip", m.tip), ("diagonal", m.diagonal)] {
-                    if let Some(value) = value {
-                        summary.insert(&format!("{key}.{what}.step{step}"), value)?;
-                    }
+            let mut measured = |step: usize, values: &Values| -> Result<(), Error> {
+                for (name, value) in values {
+                    summary.insert(&format!("{key}.{name}.step{step}"), *value)?;
                 }
+                Ok(())
+            };
+            measured(0, &run.trajectory.start)?;
+            for record in &run.trajectory.records {
+                measured(record.step, &record.measures)?;
             }
-            for r in &run.records {
-                summary.insert(&format!("{key}.energy.step{}", r.step), r.energy)?;
+            for made in run.minimizations() {
+                summary.insert(&format!("{key}.energy.step{}", made.step), made.energy)?;
             }
-            let count = run.records.len();
-            if count > 0 {
-                let mean = |f: &dyn Fn(&StepRecord) -> f64| {
-                    run.records.iter().map(f).sum::<f64>() / count as f64
-                };
-                summary.insert(&format!("{key}.hvp_per_step"), mean(&StepRecord::hvp))?;
-                summary.insert(
-                    &format!("{key}.newton_per_step"),
-                    mean(&|r| r.newton.newton as f64),
-                )?;
-                let rises = run.records.iter().filter(|r| r.energy > r.energy_before);
+            let newton = |made: &StepRecord| made.newton.newton as f64;
+            if let Some(newton) = study::mean(run.minimizations(), newton) {
+                summary.insert(&format!("{key}.newton_per_step"), newton)?;
+                let hvp = study::mean(run.minimizations(), StepRecord::hvp).unwrap_or(f64::NAN);
+                summary.insert(&format!("{key}.hvp_per_step"), hvp)?;
+                let rises = run.minimizations().filter(|r| r.energy > r.energy_before);
                 summary.insert_count(&format!("{key}.energy_increases"), rises.count())?;
             }
-            summary.insert(&format!("{key}.seconds"), run.seconds)?;
+            summary.insert(&format!("{key}.seconds"), run.trajectory.seconds())?;
         }
-        let key = format!("{}.reference", self.setting.key);
-        summary.insert_count(&format!("{key}.n"), self.reference.evolution.n)?;
-        summary.insert(&format!("{key}.seconds"), self.reference.seconds)?;
+        let key = format!("{}.reference", self.setting.program);
+        summary.insert_count(&format!("{key}.n"), self.reference.variant.n)?;
+        summary.insert(
+            &format!("{key}.seconds"),
+            self.reference.trajectory.seconds(),
+        )?;
         if let Some(distance) = self.reference_difference()? {
             summary.insert(&format!("{key}.l2_to_half_n"), distance)?;
         }
-        summary.insert("seconds", seconds)?;
         Ok(summary)
     }
-}
-
-fn step_rows(run: &Trajectory, reference: bool) -> Vec<StepRow> {
-    let e = &run.evolution;
-    run.measures
-        .iter()
-        .enumerate()
-        .map(|(step, m)| {
-            let record = step.checked_sub(1).and_then(|k| run.records.get(k));
-            StepRow {
-                n: e.n,
-                method: e.method,
-                scheme: e.scheme,
-                reference,
-                step,
-                time: e.tau.time(step),
-                perimeter: m.perimeter,
-                area: m.volume,
-                tip: m.tip,
-                diagonal: m.diagonal,
-                energy: record.map(|r| r.energy),
-                energy_before: record.map(|r| r.energy_before),
-                willmore_energy: record.map(|r| r.willmore_energy),
-                exit: record.map(|r| r.newton.exit),
-                newton: record.map(|r| r.newton.newton),
-                hvp: record.map(StepRecord::hvp),
-                negative_curvature: record.map(|r| r.newton.negative_curvature),
-                seconds: record.map(|r| r.seconds),
-            }
-        })
-        .collect()
 }
 
 /// A multiple of `2^-14` as the paper writes it: `0`, `2⁻⁹`, `3·2⁻⁹`.
@@ -675,7 +505,7 @@ mod tests {
     #[test]
     fn the_cross_is_the_documented_one() {
         let grid = Grid::<2>::per_unit(64, 2.0).unwrap();
-        let field = cross(grid, EPS).unwrap();
+        let field = cross(grid).unwrap();
         let area = geometry::measure::zero_set_volume(&field);
         let exact = 2.0 * 1.6 * 0.54 - 0.54 * 0.54;
         assert!((area - exact).abs() < 2e-3, "{area} {exact}");

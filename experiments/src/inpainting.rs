@@ -1,20 +1,63 @@
 //! Inpainting, in any dimension: Willmore flow of the values in a region, the rest held.
 
+use clap::Args;
+use engine::{
+    Case, Flow, Measure, NeededNetwork, Operator, Record, Samples, Scales, Scheme, StepRule, Stop,
+    TimeSteps, Trajectory, checksum, energy_increases, mean_hvp,
+};
 use geometry::measure::l2_distance;
-use geometry::{Field, Grid};
-use render::{Rgb, Tube};
-use report::{Axis, Column, Figure, Format, LineChart, Series, Summary, Table};
-use serde::Serialize;
-use solver::StepRecord;
+use geometry::{Grid, SignedDistance, phase_field};
+use report::{Axis, Figure, Format, LineChart, Series, Summary, Table};
+use serde_json::{Value, json};
 
 use crate::Error;
-use crate::evolution::{Division, NamedRegion, Trajectory};
+use crate::networks::NetworkOptions;
 use crate::options::RunOptions;
+use crate::records::step_rows;
+use crate::session::Session;
 
 /// A shape stands still once it moves by less than this part of the way it has come per step.
-pub const STILL: f64 = 1e-5;
-/// The first part of the first step, in units of `eps^4`: the time in which a corner becomes about as round as the interface is wide.
-const FIRST_PART: f64 = 32.0;
+const STILL: f64 = 1e-5;
+/// The first substep of the first step, in units of `eps^4`: the time in which a corner becomes about as round as the interface is wide.
+const FIRST_SUBSTEP: f64 = 32.0;
+
+/// Options of the programs.
+#[derive(Args, Clone, Debug)]
+pub struct InpaintingOptions {
+    /// Common options.
+    #[command(flatten)]
+    pub run: RunOptions,
+
+    /// Networks.
+    #[command(flatten)]
+    networks: NetworkOptions,
+
+    /// Cells per unit length; eps and tautilde follow [default: that of the paper]
+    #[arg(long, value_name = "N")]
+    cells: Option<usize>,
+
+    /// Weights of the energy and network: paper, calibrated or accurate
+    #[arg(long, value_name = "NAME", value_enum, default_value_t = Scheme::Accurate)]
+    scheme: Scheme,
+}
+
+impl InpaintingOptions {
+    /// Cells per unit length: those chosen, or the usual ones of a quick run or of the paper.
+    pub fn cells(&self, [quick, paper]: [usize; 2]) -> usize {
+        let usual = if self.run.quick { quick } else { paper };
+        self.cells.unwrap_or(usual)
+    }
+
+    /// The learned operator of the chosen scheme.
+    ///
+    /// # Errors
+    /// [`Error::Engine`] if there is no network for it.
+    pub fn operator(&self, needed: &NeededNetwork) -> Result<Operator, Error> {
+        let networks = self.networks.load(&[*needed])?;
+        let network = networks.find(self.scheme, needed)?;
+        Ok(Operator::learned(self.scheme, network)?)
+    }
+}
 
 /// A region `D` with sides along the axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,209 +69,243 @@ pub struct Window<const D: usize> {
 }
 
 impl<const D: usize> Window<D> {
-    /// The nodes inside.
-    pub fn nodes(&self, grid: &Grid<D>) -> NamedRegion {
+    /// Marks of the nodes inside.
+    fn nodes(&self, grid: &Grid<D>) -> Vec<bool> {
         let Self { low, high } = self;
         let inside = |node: usize| {
             let x = grid.node(node);
             (0..D).all(|axis| low[axis] < x[axis] && x[axis] < high[axis])
         };
-        NamedRegion {
-            name: format!("{low:?} to {high:?}"),
-            nodes: (0..grid.len()).map(inside).collect(),
+        (0..grid.len()).map(inside).collect()
+    }
+}
+
+/// A shape that is inpainted.
+pub struct Shape<const D: usize> {
+    /// Prefix of its metrics and files.
+    pub key: &'static str,
+    /// Name in titles and tables.
+    pub title: &'static str,
+    /// The shape with its fault.
+    pub initial: Box<dyn SignedDistance<D>>,
+    /// What it should become, if that is known.
+    pub whole: Option<Box<dyn SignedDistance<D>>>,
+    /// Where it may change.
+    pub region: Window<D>,
+    /// Sizes of the steps, which are made in substeps,
+    pub rule: StepRule,
+    /// and most of them.
+    pub steps: usize,
+    /// The steps that are shown.
+    pub shown: Vec<usize>,
+    /// Of the first step, what is there after `2^-k` of it is shown, for these `k`.
+    pub halvings: &'static [u32],
+}
+
+impl<const D: usize> Shape<D> {
+    /// The shape in its region on a grid.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] for scales without a phase field.
+    pub fn case(
+        &self,
+        grid: Grid<D>,
+        scales: Scales,
+        operator: &Operator,
+    ) -> Result<Case<D>, Error> {
+        Ok(Case {
+            shape: format!("inpainted {}", self.title),
+            initial: phase_field(grid, &self.initial, scales.eps)?,
+            region: Some(self.region.nodes(&grid)),
+            flow: Flow::Willmore,
+            operator: operator.clone(),
+            scales,
+            steps: TimeSteps {
+                rule: self.rule,
+                first_substep: Some(first_substep(scales.eps)),
+            },
+            stops: vec![Stop::Steps(self.steps), Stop::Motion(STILL)],
+            measures: Measure::size(scales.eps),
+        })
+    }
+
+    /// Which phase fields are kept.
+    pub fn samples(&self) -> Samples {
+        Samples {
+            every: self.steps,
+            also: self.shown.clone(),
+            halvings: self.halvings.to_vec(),
         }
     }
 }
 
-impl Window<3> {
-    /// Its edges, to be drawn in pictures.
-    pub fn edges(&self, radius: f64, colour: Rgb) -> Vec<Tube> {
-        (Tube::edges_of_box(self.low, self.high, radius).into_iter())
-            .map(|edge| edge.with_colour(colour))
-            .collect()
-    }
+fn first_substep(eps: f64) -> f64 {
+    FIRST_SUBSTEP * eps.powi(4)
 }
 
-/// How the first step is divided; fields are kept after `tau / 2^k` for these `k`.
-pub fn division(eps: f64, kept: &[u32]) -> Division {
-    Division {
-        first: FIRST_PART * eps.powi(4),
-        kept: kept.to_vec(),
-    }
+/// The parameters of a program, for its manifest.
+pub fn parameters<const D: usize>(
+    (n, scales): (usize, &Scales),
+    operator: &Operator,
+    shapes: &[Shape<D>],
+    quick: bool,
+) -> Value {
+    json!({
+        "n": n, "eps": scales.eps, "mcf_step": scales.mcf_step, "scheme": operator.scheme,
+        "shapes": shapes.iter().map(|shape| shape.key).collect::<Vec<_>>(),
+        "tau": shapes.iter().map(|shape| shape.rule).collect::<Vec<_>>(),
+        "steps": shapes.iter().map(|shape| shape.steps).collect::<Vec<_>>(),
+        "first_substep": first_substep(scales.eps), "still": STILL,
+        "network": operator.network().map(|named| checksum(&named.network)), "quick": quick,
+    })
 }
 
 /// What became of a shape.
 pub struct Inpainted<'a, const D: usize> {
-    /// Prefix of its metrics.
-    pub key: &'static str,
-    /// Name in titles and tables.
-    pub title: &'static str,
-    /// The paper's time step.
-    pub tau: f64,
+    /// What was inpainted.
+    pub shape: &'a Shape<D>,
     /// How it went.
     pub trajectory: &'a Trajectory<D>,
     /// The distance to what it should become, or to the beginning, at the steps that are shown and at the last one.
     pub distances: Vec<(usize, f64)>,
     /// Nodes outside the region whose bits changed.
-    pub changed_outside: usize,
-}
-
-/// One step, or a part of one.
-#[derive(Serialize)]
-struct Row {
-    shape: &'static str,
-    /// In units of the paper's step.
-    step: f64,
-    time: f64,
-    tau: f64,
-    willmore_energy: f64,
-    energy: f64,
-    energy_before: f64,
-    volume: f64,
-    newton: usize,
-    hvp: f64,
-    seconds: f64,
+    changed_outside: usize,
 }
 
 impl<'a, const D: usize> Inpainted<'a, D> {
-    /// Measures a run in which only the values at the marked `nodes` should have moved; `whole` is what it should become, if that is
-    /// known.
+    /// Measures a run.
     ///
     /// # Errors
     /// [`Error::Geometry`] if a stored phase field cannot be read.
-    pub fn measure(
-        (key, title): (&'static str, &'static str),
-        trajectory: &'a Trajectory<D>,
-        nodes: &[bool],
-        shown: &[usize],
-        whole: Option<&Field<D>>,
-    ) -> Result<Self, Error> {
-        let initial = trajectory.field(0)?;
-        let goal = whole.unwrap_or(&initial);
+    pub fn measure(shape: &'a Shape<D>, trajectory: &'a Trajectory<D>) -> Result<Self, Error> {
+        let Case {
+            initial,
+            region,
+            scales,
+            ..
+        } = &trajectory.case;
+        let whole = shape.whole.as_ref();
+        let whole = whole
+            .map(|whole| phase_field(*initial.grid(), whole, scales.eps))
+            .transpose()?;
+        let goal = whole.as_ref().unwrap_or(initial);
         let steps = trajectory.steps();
-        let distances = (shown.iter().copied().filter(|&k| k < steps))
+        let distances = (shape.shown.iter().copied().filter(|&k| k < steps))
             .chain([steps])
             .map(|k| Ok((k, l2_distance(&trajectory.field(k)?, goal)?)))
             .collect::<Result<Vec<_>, Error>>()?;
         let last = trajectory.field(steps)?;
-        let changed_outside = (last.values().iter().zip(initial.values()).zip(nodes))
+        let marks = region.iter().flatten();
+        let changed_outside = (last.values().iter().zip(initial.values()).zip(marks))
             .filter(|((u, start), inside)| !**inside && u.to_bits() != start.to_bits())
             .count();
         Ok(Self {
-            key,
-            title,
-            tau: trajectory.evolution.tau.size(1),
+            shape,
             trajectory,
             distances,
             changed_outside,
         })
     }
 
-    /// The time in the paper's steps from which on the shape stands still, if it does.
-    pub fn still_from(&self) -> Option<f64> {
-        self.trajectory.still?;
-        let last = self.trajectory.records.last()?;
-        Some((last.time - last.tau) / self.tau)
+    /// The paper's time step.
+    pub fn tau(&self) -> f64 {
+        self.shape.rule.size(1)
     }
 
-    fn rows(&self) -> impl Iterator<Item = Row> + '_ {
-        let trajectory = self.trajectory;
-        (trajectory.records.iter().zip(&trajectory.measures[1..])).map(|(r, m)| Row {
-            shape: self.key,
-            step: r.time / self.tau,
-            time: r.time,
-            tau: r.tau,
-            willmore_energy: r.willmore_energy,
-            energy: r.energy,
-            energy_before: r.energy_before,
-            volume: m.volume,
-            newton: r.newton.newton,
-            hvp: r.hvp(),
-            seconds: r.seconds,
-        })
+    /// The time in the paper's steps from which on the shape stands still, if it does.
+    pub fn still_from(&self) -> Option<f64> {
+        let last = self.trajectory.records.last()?;
+        (self.trajectory.stopped_early).then_some((last.time - last.tau) / self.tau())
+    }
+
+    /// Writes the figure of the shown steps.
+    ///
+    /// # Errors
+    /// [`Error::Report`].
+    pub fn write_frames(&self, session: &Session<'_>, figure: Figure) -> Result<(), Error> {
+        let title = session
+            .options
+            .title(&format!("Inpainting: {}", self.shape.title));
+        let name = format!("{}_frames", self.shape.key);
+        Ok(Figure { title, ..figure }.write(&session.output, &name)?)
     }
 
     /// Adds the metrics of this run.
     ///
     /// # Errors
     /// [`Error::Report`] for a value that is not finite.
-    pub fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
-        let name = |metric: &str| format!("{}.{metric}", self.key);
+    fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
+        let name = |metric: &str| format!("{}.{metric}", self.shape.key);
+        let (trajectory, records) = (self.trajectory, &self.trajectory.records);
         for &(k, distance) in &self.distances {
             summary.insert(&name(&format!("distance.step{k}")), distance)?;
         }
-        let records = &self.trajectory.records;
-        let (first, count) = (self.trajectory.parts(1), records.len());
-        // Where nothing moves any more, the energy stays.
-        let rises = records.iter().filter(|r| r.energy > r.energy_before);
-        summary.insert_count(&name("energy_increases"), rises.count())?;
-        summary.insert_count(&name("changed_outside"), self.changed_outside)?;
-        summary.insert_count(&name("steps"), self.trajectory.steps())?;
-        summary.insert_count(&name("parts_of_step1"), first.len())?;
+        for (metric, count) in [
+            ("energy_increases", energy_increases(records)),
+            ("changed_outside", self.changed_outside),
+            ("steps", trajectory.steps()),
+            ("parts_of_step1", trajectory.substeps(1).len()),
+        ] {
+            summary.insert_count(&name(metric), count)?;
+        }
         if let Some(still) = self.still_from() {
             summary.insert(&name("still_from"), still)?;
         }
-        let hvp: f64 = records.iter().map(StepRecord::hvp).sum();
-        summary.insert(&name("hvp_per_part"), hvp / count.max(1) as f64)?;
-        summary.insert(&name("seconds"), self.trajectory.seconds)?;
+        summary.insert(&name("hvp_per_part"), mean_hvp(records))?;
+        summary.insert(&name("seconds"), trajectory.seconds())?;
         Ok(())
     }
 }
 
-/// The records of all steps and parts, as CSV.
+/// Writes the energies, the records of all steps, the table of distances and the metrics, and ends the program.
 ///
 /// # Errors
 /// [`Error::Report`].
-pub fn steps_csv<const D: usize>(all: &[Inpainted<'_, D>]) -> Result<String, Error> {
-    let rows: Vec<Row> = all.iter().flat_map(Inpainted::rows).collect();
-    Ok(report::data::to_csv(&rows)?)
+pub fn finish<const D: usize>(
+    session: Session<'_>,
+    title: &str,
+    mut summary: Summary,
+    all: &[Inpainted<'_, D>],
+) -> Result<(), Error> {
+    let output = &session.output;
+    let energies = all.iter().map(|one| {
+        let point = |r: &Record| Some([r.time, r.willmore_energy()?]);
+        let points: Vec<_> = one.trajectory.records.iter().filter_map(point).collect();
+        let (time, w) = (Axis::log("time t"), Axis::linear("Willmore energy w"));
+        LineChart::new(one.shape.title, time, w).with_series(Series::new("w", points))
+    });
+    Figure::new(session.options.title("Willmore energy while inpainting"), 2)
+        .with_panels(energies)
+        .write(output, "energies")?;
+    let runs = all.iter().map(|one| (one.shape.key, one.trajectory));
+    output.write_csv("steps.csv", step_rows(runs))?;
+    let table = table(all)?;
+    table.write(output, "inpainting")?;
+    all.iter().try_for_each(|one| one.summarize(&mut summary))?;
+    session.finish(title, summary, &table.to_markdown())
 }
 
 /// Distances and energies at the steps that are shown.
-///
-/// # Errors
-/// [`Error::Report`] for a value that is not finite.
-pub fn table<const D: usize>(all: &[Inpainted<'_, D>]) -> Result<Table, Error> {
-    let mut table = Table::new([
-        Column::text("shape"),
-        Column::number("step", Format::Shortest),
-        Column::number("time in steps", Format::Shortest),
-        Column::number(
-            "L² distance to the whole, or to the start",
-            Format::Fixed(5),
-        ),
-        Column::number("Willmore energy", Format::Fixed(3)),
-    ]);
+fn table<const D: usize>(all: &[Inpainted<'_, D>]) -> Result<Table, Error> {
+    let mut rows = Vec::new();
     for one in all {
-        for &(k, distance) in &one.distances {
-            let record = one.trajectory.record(k);
-            table.push([
-                one.title.into(),
-                k.into(),
-                record.map_or(0.0, |r| r.time / one.tau).into(),
-                distance.into(),
-                record.map(|r| r.willmore_energy).into(),
-            ])?;
+        for &(step, distance) in &one.distances {
+            rows.push((one, step, distance, one.trajectory.record(step)));
         }
     }
-    Ok(table)
-}
-
-/// The energies over time.
-pub fn energies<const D: usize>(run: &RunOptions, all: &[Inpainted<'_, D>]) -> Figure {
-    let mut figure = Figure::new(run.title("Willmore energy while inpainting"), 2);
-    for one in all {
-        let points: Vec<[f64; 2]> = (one.trajectory.records.iter())
-            .map(|r| [r.time, r.willmore_energy])
-            .collect();
-        figure = figure.with_panel(
-            LineChart::new(
-                one.title,
-                Axis::log("time t"),
-                Axis::linear("Willmore energy w"),
-            )
-            .with_series(Series::new("w", points)),
-        );
-    }
-    figure
+    Ok(Table::of(&rows)
+        .text("shape", |(one, ..)| one.shape.title)
+        .number("step", Format::Shortest, |(_, step, ..)| *step)
+        .number("time in steps", Format::Shortest, |(one, .., record)| {
+            record.map_or(0.0, |r| r.time / one.tau())
+        })
+        .number(
+            "L² distance to the whole, or to the start",
+            Format::Fixed(5),
+            |(.., distance, _)| *distance,
+        )
+        .number("Willmore energy", Format::Fixed(3), |(.., record)| {
+            record.and_then(Record::willmore_energy)
+        })
+        .finish()?)
 }

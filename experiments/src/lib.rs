@@ -5,7 +5,8 @@
 //! solutions.
 //!
 //! ```
-//! use experiments::circles::{self, Flow};
+//! use engine::Flow;
+//! use experiments::circles;
 //!
 //! // The paper's circles live on boxes just large enough that the phase field's tails do not matter.
 //! let radii = circles::radii(circles::COUNT);
@@ -36,7 +37,10 @@ pub mod options;
 pub mod products;
 pub mod quality;
 pub mod results;
+pub mod records;
 pub mod session;
+pub mod steps;
+pub mod study;
 pub mod surfaces;
 pub mod training;
 

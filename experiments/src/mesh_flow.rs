@@ -1,20 +1,14 @@
 //! Programs that let a mesh flow by several schemes.
 
-use std::time::Instant;
-
 use clap::Args;
-use render::Tube;
-use report::{Manifest, Summary};
-use serde::Serialize;
+use engine::{Method, Operator, Scheme, StepRule, checksum};
+use geometry::UpAxis;
+use serde_json::json;
 
-use crate::evolution::TimeSteps;
-use crate::meshes::{About, KnownMesh, MeshOptions};
-use crate::method::{Method, Scheme};
-use crate::networks::{NetworkOptions, checksum};
-use crate::options::RunOptions;
+use crate::meshes::{KnownMesh, MeshOptions};
+use crate::session::Session;
 use crate::surfaces::{
-    Finished, SchemeOptions, Setting, Snapshot, SurfaceRun, View, Workshop, ratios, scales, since,
-    table, write_steps,
+    self, Flowed, SchemeOptions, Surface, SurfaceOptions, View, needed_network, scales,
 };
 use crate::{Error, memory};
 
@@ -23,27 +17,24 @@ use crate::{Error, memory};
 pub struct MeshFlowOptions {
     /// Common options.
     #[command(flatten)]
-    pub run: RunOptions,
-
-    /// Networks.
-    #[command(flatten)]
-    pub networks: NetworkOptions,
+    surface: SurfaceOptions,
 
     /// The mesh.
     #[command(flatten)]
-    pub mesh: MeshOptions,
+    mesh: MeshOptions,
 
     /// The schemes.
     #[command(flatten)]
-    pub schemes: SchemeOptions,
-
-    /// Cells per unit length; eps = 2/n and tautilde = 1/n^2 follow [default: that of the paper]
-    #[arg(long, value_name = "N")]
-    pub cells: Option<usize>,
+    schemes: SchemeOptions,
 
     /// Number of time steps [default: that of the paper]
     #[arg(long, value_name = "COUNT")]
-    pub steps: Option<usize>,
+    steps: Option<usize>,
+
+    /// The axis that points up in the pictures: x, y or z [default: that of the paper's mesh; of another one the usual one of its format, y
+    /// in OBJ files, z in PLY and STL files]
+    #[arg(long, value_name = "AXIS")]
+    up: Option<UpAxis>,
 }
 
 /// A program: a mesh of the paper, and how it flows there.
@@ -51,13 +42,13 @@ pub struct MeshFlow {
     /// Name of the program, its folder and its metrics.
     pub program: &'static str,
     /// The mesh.
-    pub mesh: &'static KnownMesh,
+    pub mesh: KnownMesh,
     /// Cells per unit length.
     pub cells: usize,
     /// Number of time steps.
     pub steps: usize,
     /// Their sizes.
-    pub tau: TimeSteps,
+    pub tau: StepRule,
     /// The same in words, for the figure.
     pub tau_in_words: &'static str,
     /// Steps to be shown, with the energies that the paper reports.
@@ -66,169 +57,89 @@ pub struct MeshFlow {
     pub view: View,
 }
 
-/// What a program says about the flow of its mesh besides the usual.
-pub struct Extras<'a> {
-    /// Further lines below a picture: run, what is shown.
-    pub caption: Box<dyn Fn(usize, &Snapshot) -> String + 'a>,
-    /// Curves drawn into a picture: run, step.
-    pub tubes: Box<dyn Fn(usize, usize) -> Vec<Tube> + 'a>,
-    /// Further sentences below the figure.
+/// What a program says about its flows besides the usual.
+#[derive(Default)]
+pub struct Remarks {
+    /// Below the figure.
     pub note: String,
-    /// Further metrics.
-    pub metrics: Vec<(String, f64)>,
-    /// Further files.
-    pub files: Vec<(&'static str, String)>,
-    /// Further lines of the report.
+    /// Below the table on standard output.
     pub report: String,
 }
 
-impl Default for Extras<'_> {
-    fn default() -> Self {
-        Self {
-            caption: Box::new(|_, _| String::new()),
-            tubes: Box::new(|_, _| Vec::new()),
-            note: String::new(),
-            metrics: Vec::new(),
-            files: Vec::new(),
-            report: String::new(),
-        }
-    }
-}
-
-#[derive(Serialize)]
-struct Parameters<'a> {
-    mesh: &'a About,
-    n: usize,
-    box_side: f64,
-    eps: f64,
-    mcf_step: f64,
-    tau: TimeSteps,
-    steps: usize,
-    schemes: &'a [Scheme],
-    network: String,
-    quick: bool,
-}
-
 impl MeshFlow {
-    /// Runs the program. `extras` looks at the finished flows.
+    /// Runs the program. `remarks` looks at the flows, and may add to captions, pictures and metrics.
     ///
     /// # Errors
     /// What the options, the mesh and the flows raise.
     pub fn run(
         &self,
         options: &MeshFlowOptions,
-        extras: impl for<'a> FnOnce(&'a [Finished<'a>], &mut Manifest) -> Result<Extras<'a>, Error>,
+        remarks: impl FnOnce(&mut Session<'_>, &mut [Flowed]) -> Result<Remarks, Error>,
     ) -> Result<(), Error> {
-        let quick = options.run.quick;
-        let n = options.cells.unwrap_or(if quick { 32 } else { self.cells });
-        let steps = options.steps.unwrap_or(if quick { 2 } else { self.steps });
+        let run = &options.surface.run;
+        let n = options.surface.cells([32, self.cells]);
+        let steps = options
+            .steps
+            .unwrap_or(if run.quick { 2 } else { self.steps });
         if steps == 0 {
             return Err(Error::Options("--steps must be at least 1".to_owned()));
         }
-        let device = options.run.open_device()?;
-        let networks = options.networks.find(&[ratios()])?;
-        let (grid, params) = (options.mesh.grid(self.mesh, n)?, scales(n));
-        let mesh = options.mesh.load(self.mesh, &grid)?;
-        let output = options.run.open_output(self.program)?;
+        let device = run.open_device()?;
+        let networks = options.surface.networks()?;
+        let network = networks.find(Scheme::Paper, &needed_network())?.network;
+        let (grid, scales) = (options.mesh.grid(&self.mesh, n)?, scales(n));
+        let mesh = options.mesh.load(&self.mesh, &grid)?;
+        let up = options
+            .up
+            .map_or_else(|| options.mesh.up(self.view.up), Ok)?;
         let schemes = options.schemes.schemes();
-        let parameters = Parameters {
-            mesh: &mesh.about,
-            n,
-            box_side: grid.side(),
-            eps: params.eps,
-            mcf_step: params.mcf_step,
-            tau: self.tau,
-            steps,
-            schemes: &schemes,
-            network: checksum(&networks[0]),
-            quick,
-        };
-        let mut manifest = options.run.manifest(self.program, &parameters, &device)?;
-        let progress = options.run.progress();
-        let clock = Instant::now();
-        let bar = progress.bar("signed distance".to_owned(), n as u64);
-        let initial = manifest.phase("signed distance", || {
-            mesh.phase_field(grid, params.eps, &bar)
+        let parameters = json!({
+            "mesh": mesh.about, "n": n, "box_side": grid.side(), "eps": scales.eps, "mcf_step": scales.mcf_step, "tau": self.tau,
+            "steps": steps, "schemes": schemes, "network": checksum(&network), "quick": run.quick,
+        });
+        let mut session = Session::open(self.program, run, device, &parameters)?;
+        let bar = session.progress.bar("signed distance".to_owned(), n as u64);
+        let initial = session.phase("signed distance", || {
+            mesh.phase_field(grid, scales.eps, &bar)
         })?;
         bar.finish();
-        let workshop = Workshop::new(&options.run, &device, &networks[0], &output, &progress);
-        let papers = options.mesh.is_the_papers();
-        let within = self.shown.iter().filter(|(step, _)| *step <= steps);
-        let mut shown: Vec<(usize, Option<f64>)> = within.copied().collect();
-        if shown.iter().all(|(step, _)| *step != steps) {
-            shown.push((steps, None));
-        }
-        let mut finished = Vec::new();
-        for &scheme in &schemes {
+        let mut flowed = Vec::new();
+        for scheme in schemes {
             // The paper reports energies of its own scheme.
-            let comparable = papers && scheme == Scheme::Paper;
-            let shown = shown.iter().map(|&(k, w)| (k, w.filter(|_| comparable)));
-            finished.push(workshop.run(
-                &mut manifest,
-                SurfaceRun {
-                    key: self.program.to_owned(),
-                    title: mesh.about.title.clone(),
-                    method: Method::Hybrid,
-                    setting: Setting {
-                        scheme,
-                        ..Setting::default()
-                    },
-                    n,
-                    tau: self.tau,
-                    steps,
-                    shown: shown.collect(),
-                    initial: &initial,
-                    identity: mesh.about.identity(),
-                    view: self.view,
-                },
-            )?);
+            let comparable = options.mesh.is_the_papers() && scheme == Scheme::Paper;
+            let shown = self
+                .shown
+                .iter()
+                .map(|&(k, w)| (k, w.filter(|_| comparable)));
+            let operator = Operator::new(
+                (Method::Hybrid, scheme),
+                &networks.of(scheme),
+                &needed_network(),
+                &grid,
+                &scales,
+            )?;
+            let title = &mesh.about.title;
+            let time = (self.tau, steps);
+            let surface = Surface {
+                key: self.program,
+                title: title.clone(),
+                case: surfaces::willmore_flow(title, initial.clone(), operator, scales, time),
+                shown: shown.collect(),
+                view: View { up, ..self.view },
+            };
+            flowed.push(surface.flow(&mut session)?);
         }
-        let extras = extras(&finished, &mut manifest)?;
+        let remarks = remarks(&mut session, &mut flowed)?;
         let title = format!("Willmore flow: {}", mesh.about.title);
-        let figure = manifest.phase("pictures", || {
-            workshop.figure(
-                &title,
-                &finished,
-                &|run, s| {
-                    let more = (extras.caption)(run, s);
-                    format!("step {}: w = {:.2}{more}", s.step, s.w)
-                },
-                &extras.tubes,
-            )
-        })?;
-        figure
-            .with_note(format!(
-                "n = {n}, ε = 2/n, inner step 1/n², {}. w: Willmore energy with the implicit finite-element step; a sphere has 8π = 25.13.{}",
-                self.tau_in_words, extras.note
-            ))
-            .write(&output, "surfaces")?;
-        let table = table(&finished)?;
-        table.write(&output, "energies")?;
-        write_steps(&finished, &output)?;
-        let mut summary = Summary::new();
-        for one in &finished {
-            one.summarize(&mut summary)?;
-        }
-        for (name, value) in &extras.metrics {
-            summary.insert(name, *value)?;
-        }
+        let note = format!(
+            "n = {n}, ε = 2/n, inner step 1/n², {}. w: Willmore energy with the implicit finite-element step; a sphere has 8π = 25.13.{}",
+            self.tau_in_words, remarks.note
+        );
+        let table = surfaces::write(&mut session, &title, note, &flowed)?;
+        let mut summary = surfaces::summary(&flowed)?;
         if let Some(peak) = memory::peak_mib() {
             summary.insert(&format!("{}.peak_mib_with_pictures", self.program), peak)?;
         }
-        for (name, text) in &extras.files {
-            output.write(name, text.as_bytes())?;
-        }
-        summary.insert("seconds", since(clock))?;
-        summary.write(&output)?;
-        manifest.write(&output)?;
-        progress.clear();
-        options.run.say(&format!(
-            "{}\n{}{}\nResults are in {}",
-            options.run.title(&title),
-            table.to_markdown(),
-            extras.report,
-            output.as_path().display()
-        ));
-        Ok(())
+        session.finish(&title, summary, &(table + &remarks.report))
     }
 }

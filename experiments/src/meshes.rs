@@ -3,14 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use geometry::{Field, Grid, Placement, npy, optimal_profile, vti};
+use geometry::{Field, Grid, Placement, UpAxis, npy, optimal_profile, vti};
 use indicatif::ProgressBar;
+use runs::fingerprint;
 use serde::Serialize;
-use sha2::{Digest, Sha256};
-use surfaces::{ClosedMesh, MeshDistance};
+use surfaces::{ClosedMesh, MeshDistance, usual_up_axis};
 
 use crate::Error;
-use crate::networks::hexadecimal;
 use crate::surfaces::centred_box;
 
 /// Names a folder that holds the meshes of the paper.
@@ -128,17 +127,6 @@ pub struct About {
     pub warnings: Vec<String>,
 }
 
-impl About {
-    /// What a stored run depends on.
-    pub fn identity(&self) -> String {
-        let source = self.sha256.as_ref().unwrap_or(&self.title);
-        match (self.side_length, self.holds) {
-            (Some(side), _) => format!("{source}, longest side {side}"),
-            (None, holds) => format!("{source}, {holds:?}"),
-        }
-    }
-}
-
 /// Cells per side of the grid on which built-in shapes are made.
 const PROCEDURAL_CELLS: usize = 96;
 
@@ -156,6 +144,14 @@ impl MeshOptions {
         self.mesh.is_none() && self.volume.is_none() && !self.procedural
     }
 
+    /// The axis that points up in pictures: the usual one of the format of a chosen mesh, else that of the program.
+    ///
+    /// # Errors
+    /// [`Error::Surfaces`] for a file of no known format.
+    pub fn up(&self, programs: UpAxis) -> Result<UpAxis, Error> {
+        Ok(self.mesh.as_ref().map_or(Ok(programs), usual_up_axis)?)
+    }
+
     /// The chosen mesh or volume, for runs on a grid.
     ///
     /// # Errors
@@ -163,41 +159,45 @@ impl MeshOptions {
     /// box; for a volume [`Error::Geometry`] if it cannot be read, [`Error::Options`] if it has another size or its values are no phase
     /// field.
     pub fn load(&self, known: &KnownMesh, grid: &Grid<3>) -> Result<Loaded, Error> {
-        let side_length = self.side_length.unwrap_or(known.side_length);
         if let Some(path) = &self.volume {
-            let about = About {
-                holds: Some(self.volume_holds),
-                ..About::of_file(path)?
-            };
-            let values = volume(path, *grid)?;
-            if self.volume_holds == VolumeKind::PhaseField {
-                check_phase_field(&values, path)?;
-            }
-            let shape = Shape::Volume(values);
+            let mut about = About::of_file(path)?;
+            about.holds = Some(self.volume_holds);
+            let shape = Shape::Volume(volume(path, *grid, self.volume_holds)?);
             return Ok(Loaded { shape, about });
         }
+        let (mesh, mut about) = self.mesh(known)?;
+        let side_length = self.side_length.unwrap_or(known.side_length);
+        let placement = Placement::fit(&mesh.bounding_box(), grid, side_length, 0.0)?;
+        about.vertices = Some(mesh.mesh().vertices.len());
+        about.faces = Some(mesh.mesh().faces.len());
+        about.genus = Some(mesh.genus());
+        about.side_length = Some(side_length);
+        let shape = Shape::Mesh(mesh.placed(&placement));
+        Ok(Loaded { shape, about })
+    }
+
+    fn mesh(&self, known: &KnownMesh) -> Result<(ClosedMesh, About), Error> {
         if self.procedural {
-            let mesh = (known.procedural)(PROCEDURAL_CELLS)?;
             let about = About {
                 title: known.procedural_title.to_owned(),
                 ..About::default()
             };
-            return Loaded::mesh(mesh, about, side_length).fitting(grid);
+            return Ok(((known.procedural)(PROCEDURAL_CELLS)?, about));
         }
-        match self.find(known) {
-            Some(path) => {
-                let mut loaded = load(&path, side_length)?;
-                if self.mesh.is_none() {
-                    known.title.clone_into(&mut loaded.about.title);
-                }
-                loaded.fitting(grid)
-            }
-            None => Err(Error::Options(format!(
+        let path = self.find(known).ok_or_else(|| {
+            Error::Options(format!(
                 "{} is not here: run scripts/fetch_meshes, or set {FOLDER_VARIABLE} to a folder that holds it, or give --mesh FILE, \
                  or try the built-in shape with --procedural",
                 known.file
-            ))),
+            ))
+        })?;
+        let (mesh, warnings) = ClosedMesh::new(surfaces::read(&path)?)?;
+        let mut about = About::of_file(&path)?;
+        about.warnings = warnings.iter().map(ToString::to_string).collect();
+        if self.mesh.is_none() {
+            known.title.clone_into(&mut about.title);
         }
+        Ok((mesh, about))
     }
 
     /// The chosen mesh, or the built-in shape if none was chosen and that of the paper is not here.
@@ -224,19 +224,6 @@ impl MeshOptions {
     }
 }
 
-/// Reads and checks a mesh.
-///
-/// # Errors
-/// [`Error::Surfaces`] if it cannot be read or is no closed surface, [`Error::Io`].
-fn load(path: &Path, side_length: f64) -> Result<Loaded, Error> {
-    let (mesh, warnings) = ClosedMesh::new(surfaces::read(path)?)?;
-    let about = About {
-        warnings: warnings.iter().map(ToString::to_string).collect(),
-        ..About::of_file(path)?
-    };
-    Ok(Loaded::mesh(mesh, about, side_length))
-}
-
 impl About {
     fn of_file(path: &Path) -> Result<Self, Error> {
         let bytes = std::fs::read(path).map_err(|source| Error::Io {
@@ -244,117 +231,77 @@ impl About {
             path: path.to_owned(),
             source,
         })?;
-        let hash = Sha256::digest(bytes);
         let name = path.file_name().unwrap_or(path.as_os_str());
         let name = name.to_string_lossy().into_owned();
         Ok(Self {
             title: name.clone(),
             file: Some(name),
-            sha256: Some(hexadecimal(&hash)),
+            sha256: Some(fingerprint(bytes)),
             ..Self::default()
         })
     }
 }
 
 impl Loaded {
-    fn mesh(mesh: ClosedMesh, about: About, side_length: f64) -> Self {
-        let about = About {
-            vertices: Some(mesh.mesh().vertices.len()),
-            faces: Some(mesh.mesh().faces.len()),
-            genus: Some(mesh.genus()),
-            side_length: Some(side_length),
-            ..about
-        };
-        Self {
-            shape: Shape::Mesh(mesh),
-            about,
-        }
-    }
-
-    fn fitting(self, grid: &Grid<3>) -> Result<Self, Error> {
-        if let (Shape::Mesh(mesh), Some(side_length)) = (&self.shape, self.about.side_length) {
-            Placement::fit(&mesh.bounding_box(), grid, side_length, 0.0)?;
-        }
-        Ok(self)
-    }
-
-    /// The phase field on the grid for which the data were loaded: of a mesh scaled to its side length and centred in the box, or of
-    /// a volume.
+    /// The phase field on the grid for which the data were loaded.
     ///
     /// # Errors
-    /// [`Error::Geometry`] if the mesh does not fit.
+    /// [`Error::Geometry`] if the mesh has no distances there.
     pub fn phase_field(
         &self,
         grid: Grid<3>,
         eps: f64,
         bar: &ProgressBar,
     ) -> Result<Field<3>, Error> {
-        let profile = |distance: Field<3>| distance.map(|s| optimal_profile(s, eps));
-        match &self.shape {
-            Shape::Mesh(mesh) => {
-                let side_length = self.about.side_length.unwrap_or(1.0);
-                let distance = signed_distance(mesh, grid, side_length, 0.0, bar)?;
-                Ok(profile(distance))
-            }
-            Shape::Volume(values) => Ok(match self.about.holds {
-                Some(VolumeKind::PhaseField) => values.clone(),
-                _ => profile(values.clone()),
-            }),
+        let distance = match &self.shape {
+            Shape::Mesh(mesh) => &signed_distance(mesh, grid, bar)?,
+            Shape::Volume(values) => values,
+        };
+        if self.about.holds == Some(VolumeKind::PhaseField) {
+            return Ok(distance.clone());
         }
+        Ok(distance.map(|s| optimal_profile(s, eps)))
     }
 }
 
 /// The values of a file on a grid, whatever box the file says.
-fn volume(path: &Path, grid: Grid<3>) -> Result<Field<3>, Error> {
+fn volume(path: &Path, grid: Grid<3>, holds: VolumeKind) -> Result<Field<3>, Error> {
+    /// Flows overshoot the phases of a phase field a little.
+    const LARGEST: f64 = 1.1;
+    let name = path.display();
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
     let field = match extension.to_ascii_lowercase().as_str() {
         "npy" => npy::read(path, |cells| Grid::new(cells, grid.side()))?,
-        "vti" => {
-            let mut arrays = vti::read::<3>(path)?;
-            arrays.swap_remove(0).1
-        }
+        "vti" => vti::read::<3>(path)?.swap_remove(0).1,
         _ => {
-            return Err(Error::Options(format!(
-                "--volume {} must end in .npy or .vti",
-                path.display()
-            )));
+            let message = format!("--volume {name} must end in .npy or .vti");
+            return Err(Error::Options(message));
         }
     };
     let (found, expected) = (field.grid().cells(), grid.cells());
     if found != expected {
         return Err(Error::Options(format!(
-            "{} has {found} nodes per side, and the box {expected}: choose --cells and --box-side with a product of {found}",
-            path.display()
+            "{name} has {found} nodes per side, and the box {expected}: choose --cells and --box-side with a product of {found}"
+        )));
+    }
+    let too_large = field.values().iter().find(|u| u.abs() > LARGEST);
+    if let (VolumeKind::PhaseField, Some(value)) = (holds, too_large) {
+        return Err(Error::Options(format!(
+            "{name} holds the value {value}, which no phase field has; are they signed distances?"
         )));
     }
     Ok(Field::from_values(grid, field.into_values())?)
 }
 
-fn check_phase_field(u: &Field<3>, path: &Path) -> Result<(), Error> {
-    /// Flows overshoot the phases a little.
-    const LARGEST: f64 = 1.1;
-    match u.values().iter().find(|u| u.abs() > LARGEST) {
-        None => Ok(()),
-        Some(value) => Err(Error::Options(format!(
-            "{} holds the value {value}, which no phase field has; are they signed distances?",
-            path.display()
-        ))),
-    }
-}
-
-/// Signed distances to a mesh, scaled to a longest side and centred in the box of the grid, at least `margin` from its faces.
+/// Signed distances to a mesh in the box of the grid.
 ///
 /// # Errors
-/// [`Error::Geometry`] if the mesh does not fit.
+/// [`Error::Geometry`] if one of them is no number.
 pub fn signed_distance(
     mesh: &ClosedMesh,
     grid: Grid<3>,
-    side_length: f64,
-    margin: f64,
     bar: &ProgressBar,
 ) -> Result<Field<3>, Error> {
-    let placement = Placement::fit(&mesh.bounding_box(), &grid, side_length, margin)?;
     bar.set_length(grid.cells() as u64);
-    let distance = MeshDistance::new(&mesh.placed(&placement));
-    Ok(distance.sample(grid, || bar.inc(1))?)
+    Ok(MeshDistance::new(mesh).sample(grid, || bar.inc(1))?)
 }

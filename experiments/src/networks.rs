@@ -1,13 +1,28 @@
-//! Options that name networks.
+//! The scales of the convergence tests, and where networks come from.
 
 use std::path::PathBuf;
 
 use clap::Args;
-use engine::{NeededNetwork, Networks, Scheme};
+use engine::{Method, NamedNetwork, NeededNetwork, Networks, Operator, Scales, Scheme};
+use geometry::Grid;
 use model::Ratios;
+use solver::NewtonParams;
 
 use crate::Error;
-use crate::circles::{EPS, STEP};
+
+/// Interface width `eps = 2^-6`.
+pub const EPS: f64 = 1.0 / 64.0;
+/// Time step `tau = tautilde = 2^-14` of both flows.
+pub const STEP: f64 = 1.0 / 16384.0;
+
+/// The scales of the convergence tests.
+pub fn scales() -> Scales {
+    Scales {
+        eps: EPS,
+        mcf_step: STEP,
+        newton: NewtonParams::default(),
+    }
+}
 
 /// Options for programs that use trained networks.
 #[derive(Args, Clone, Debug, Default)]
@@ -39,25 +54,57 @@ impl Chosen {
             Scheme::Paper | Scheme::Calibrated => self.0.clone(),
         }
     }
+
+    /// The network of a scheme with these ratios.
+    ///
+    /// # Errors
+    /// [`Error::Engine`] if there is none.
+    pub fn find(&self, scheme: Scheme, needed: &NeededNetwork) -> Result<NamedNetwork, Error> {
+        Ok(self.of(scheme).find(scheme, needed)?)
+    }
+
+    /// The operator of a method in a scheme at resolution `n` of the convergence tests.
+    ///
+    /// # Errors
+    /// [`Error::Options`] for a resolution that cannot be, [`Error::Engine`] if there is no network.
+    pub fn operator(
+        &self,
+        (method, scheme): (Method, Scheme),
+        n: usize,
+    ) -> Result<Operator, Error> {
+        Ok(if method.is_learned() {
+            Operator::learned(scheme, self.find(scheme, &convergence_network(n)?)?)?
+        } else {
+            let grid = Grid::<2>::per_unit(n, 1.0)?;
+            Operator::finite_elements(method, scheme, &grid, &scales())?
+        })
+    }
 }
 
 /// The paper's kernel width `n/8 + 1`.
-pub fn kernel_width(cells_per_unit: usize) -> usize {
-    cells_per_unit / 8 + 1
+pub fn kernel_width(n: usize) -> usize {
+    n / 8 + 1
 }
 
-/// The network of the convergence tests, `eps = 2^-6` and `tautilde = 2^-14`, in 2D at resolution `n`.
+/// The ratios of the convergence tests in 2D at resolution `n`.
 ///
 /// # Errors
 /// [`Error::Options`] unless `n` is a multiple of 16, [`Error::Model`] if the scheme does not allow the ratios.
-pub fn convergence_network(cells_per_unit: usize) -> Result<NeededNetwork, Error> {
-    if cells_per_unit == 0 || !cells_per_unit.is_multiple_of(16) {
+pub fn convergence_ratios(n: usize) -> Result<Ratios, Error> {
+    if n == 0 || !n.is_multiple_of(16) {
         return Err(Error::Options(format!(
-            "n = {cells_per_unit} is not possible: the kernel width n/8 + 1 must be odd, so n must be a multiple of 16"
+            "n = {n} is not possible: the kernel width n/8 + 1 must be odd, so n must be a multiple of 16"
         )));
     }
-    let width = kernel_width(cells_per_unit);
-    let ratios = Ratios::of_run(2, width, 1.0 / cells_per_unit as f64, EPS, STEP);
+    let ratios = Ratios::of_run(2, kernel_width(n), 1.0 / n as f64, EPS, STEP);
     ratios.validate()?;
-    Ok(NeededNetwork::exactly(ratios))
+    Ok(ratios)
+}
+
+/// The network of the convergence tests with [these ratios](convergence_ratios).
+///
+/// # Errors
+/// Those of the ratios.
+pub fn convergence_network(n: usize) -> Result<NeededNetwork, Error> {
+    Ok(NeededNetwork::exactly(convergence_ratios(n)?))
 }

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use engine::{Case, Samples, Stop, Trajectory};
 use operators::ComputeDevice;
-use report::{Manifest, OutputDir, Progress, Summary};
+use report::{Figure, Manifest, OutputDir, Progress, Summary};
 use runs::Interrupt;
 use serde::Serialize;
 
@@ -21,7 +21,8 @@ pub struct Session<'a> {
     pub output: OutputDir,
     /// Progress bars.
     pub progress: Progress,
-    manifest: Manifest,
+    /// What is run, and the wall times of its parts.
+    pub manifest: Manifest,
     clock: Instant,
 }
 
@@ -82,6 +83,15 @@ impl<'a> Session<'a> {
         })?;
         bar.finish();
         Ok(trajectory.expect("nobody interrupts it"))
+    }
+
+    /// Writes a figure; its title says so if this is a quick run.
+    ///
+    /// # Errors
+    /// [`Error::Report`].
+    pub fn figure(&self, figure: Figure, stem: &str) -> Result<(), Error> {
+        let title = self.options.title(&figure.title);
+        Ok(Figure { title, ..figure }.write(&self.output, stem)?)
     }
 
     /// Writes the summary, with the wall time since the beginning, and the manifest, and prints a report below the title.

@@ -82,7 +82,7 @@ impl<const D: usize> Case<D> {
     }
 
     /// What distinguishes it from other cases, as it stands in checkpoints: fields and networks by their checksums.
-    pub(crate) fn identity(&self, device: &ComputeDevice) -> Value {
+    pub fn identity(&self, device: &ComputeDevice) -> Value {
         let grid = self.grid();
         let bytes = |u: &Field<D>| -> Vec<u8> {
             u.values()

@@ -64,7 +64,7 @@ pub use operator::{
     Flow, Method, NamedNetwork, NeededNetwork, Networks, Operator, Scales, Scheme, checksum,
     quarter_square,
 };
-pub use record::{Record, Values, to_csv};
+pub use record::{Record, Values, energy_increases, mean_hvp, to_csv};
 pub use run::{Ending, Run};
 pub use steps::{StepRule, TimeSteps};
 pub use stop::{Stop, has_interface, touches_side};

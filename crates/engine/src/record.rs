@@ -51,6 +51,18 @@ impl Record {
     }
 }
 
+/// Minimizations that ended at a higher energy than they began with; where nothing moves any more the energy stays.
+pub fn energy_increases(records: &[Record]) -> usize {
+    let made = records.iter().filter_map(|record| record.minimization);
+    made.filter(|m| m.energy > m.energy_before).count()
+}
+
+/// Hessian-vector products per minimization.
+pub fn mean_hvp(records: &[Record]) -> f64 {
+    let hvp: f64 = records.iter().filter_map(Record::hvp).sum();
+    hvp / records.len().max(1) as f64
+}
+
 /// All records as CSV, with a column for each measure.
 pub fn to_csv(records: &[Record]) -> String {
     let mut names: Vec<&str> = (records.iter())

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use serde_json::{Map, Value};
+
 use crate::axis::power_of_ten;
 use crate::error::{Error, Result};
 use crate::output::OutputDir;
@@ -120,6 +122,12 @@ impl Table {
         }
     }
 
+    /// A table without rows for programs, who want all digits.
+    pub fn data<'a>(names: impl IntoIterator<Item = &'a &'a str>) -> Self {
+        let column = |name: &&str| Column::number(*name, Format::Shortest);
+        Self::new(names.into_iter().map(column))
+    }
+
     /// Starts a table with a row for every record.
     ///
     /// ```
@@ -196,6 +204,25 @@ impl Table {
             }))?;
         }
         crate::data::finished(writer)
+    }
+
+    /// The table as a JSON array with an object for each row, numbers with all their digits, `null` for what is missing.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Json`] never, for finite numbers.
+    pub fn to_json(&self) -> Result<String> {
+        let value = |cell: &Cell| match cell {
+            Cell::Text(text) => Value::from(text.as_str()),
+            Cell::Integer(number) => Value::from(*number),
+            Cell::Number(number) => Value::from(*number),
+            Cell::Missing => Value::Null,
+        };
+        let object = |row: &Vec<Cell>| -> Map<String, Value> {
+            let names = self.columns.iter().map(|column| column.name.clone());
+            names.zip(row.iter().map(value)).collect()
+        };
+        crate::data::to_json(&self.rows.iter().map(object).collect::<Vec<_>>())
     }
 
     /// The table as Markdown with padded columns, numbers as their columns say.

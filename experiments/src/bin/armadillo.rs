@@ -3,19 +3,19 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use experiments::evolution::TimeSteps;
+use engine::StepRule;
 use experiments::harness;
-use experiments::mesh_flow::{Extras, MeshFlow, MeshFlowOptions};
+use experiments::mesh_flow::{MeshFlow, MeshFlowOptions, Remarks};
 use experiments::meshes::ARMADILLO;
 use experiments::surfaces::View;
 use geometry::UpAxis;
 
 const ARMADILLO_FLOW: MeshFlow = MeshFlow {
     program: "armadillo",
-    mesh: &ARMADILLO,
+    mesh: ARMADILLO,
     cells: 128,
     steps: 16,
-    tau: TimeSteps::Doubling(1.0 / 4_194_304.0),
+    tau: StepRule::Doubling(1.0 / 4_194_304.0),
     tau_in_words: "first step τ = 2⁻²², doubled after every step",
     shown: &[(0, None), (1, None), (8, None), (11, None), (16, None)],
     view: View {
@@ -38,5 +38,5 @@ struct Options {
 
 fn main() -> ExitCode {
     let options = Options::parse();
-    harness::run(|| ARMADILLO_FLOW.run(&options.flow, |_, _| Ok(Extras::default())))
+    harness::run(|| ARMADILLO_FLOW.run(&options.flow, |_, _| Ok(Remarks::default())))
 }

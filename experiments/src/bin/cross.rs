@@ -2,15 +2,14 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
-use experiments::circles::Flow;
-use experiments::comparison::{self, ComparisonOptions, Setting};
-use experiments::harness;
+use engine::Flow;
+use experiments::comparison::{self, Setting};
 
-const SETTING: Setting = Setting {
+const CROSS: Setting = Setting {
     program: "cross",
-    key: "cross",
     title: "Willmore flow of a cross",
+    about: "Willmore flow of a non-convex cross, eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7, by all methods and resolutions \
+            (finite elements from n = 256 on, where they are stable): L2 distance to a finer implicit finite-element run, and shapes",
     shape: "cross [-.8,.8] x [-.27,.27]",
     initial: comparison::cross,
     flow: Flow::Willmore,
@@ -21,18 +20,6 @@ const SETTING: Setting = Setting {
     window: 0.95,
 };
 
-/// Willmore flow of a non-convex cross, eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7, by all methods and resolutions:
-/// L2 distance to a finer implicit finite-element run over time, and the shapes.
-///
-/// Runs are kept in the folder `fields` of the output; an interrupted one continues.
-#[derive(Parser, Debug)]
-#[command(name = SETTING.program, version)]
-struct Options {
-    #[command(flatten)]
-    comparison: ComparisonOptions,
-}
-
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| comparison::run(&SETTING, &options.comparison))
+    comparison::main(&CROSS)
 }

@@ -1,27 +1,33 @@
 //! A cube and a thick disk under Willmore flow.
 
 use std::process::ExitCode;
-use std::time::Instant;
 
 use clap::Parser;
-use experiments::evolution::TimeSteps;
-use experiments::method::{Method, Scheme};
-use experiments::networks::{NetworkOptions, checksum};
-use experiments::options::RunOptions;
+use engine::{Method, Operator, Scheme, StepRule, checksum};
+use experiments::session::Session;
 use experiments::surfaces::{
-    Finished, SchemeOptions, Setting, SurfaceRun, View, Workshop, centred_box, ratios, scales,
-    since, table, write_steps,
+    self, Flowed, SchemeOptions, Surface, SurfaceOptions, View, centred_box, needed_network, scales,
 };
 use experiments::{Error, harness};
 use geometry::shapes::{Cuboid, Cylinder};
 use geometry::{Field, SignedDistanceExt, UpAxis, phase_field};
-use report::Summary;
-use serde::Serialize;
+use serde_json::json;
 
 const PROGRAM: &str = "disk_and_cube";
+const TITLE: &str = "Willmore flow of a cube and of a thick disk";
+/// Cells per unit length of a quick run and of the paper.
+const CELLS: [usize; 2] = [24, 64];
 /// Size of a time step.
 const TAU: f64 = 1.0 / 262_144.0;
 const STEPS: usize = 100;
+/// The Willmore energies that the paper reports for the hybrid scheme.
+const CUBES: [(usize, f64); 3] = [(0, 132.65), (1, 52.26), (STEPS, 25.78)];
+const DISKS: [(usize, f64); 3] = [(0, 87.15), (1, 50.49), (STEPS, 25.59)];
+const VIEW: View = View {
+    up: UpAxis::Z,
+    azimuth: 30.0,
+    elevation: 25.0,
+};
 
 /// Willmore flow of a cube and of a thick disk, n = 64, eps = 2^-5, tautilde = 2^-12, tau = 2^-18, by the hybrid scheme and by
 /// nested implicit finite elements: pictures, Willmore energies w and L2 distances after 0, 1 and 100 steps.
@@ -31,14 +37,7 @@ const STEPS: usize = 100;
 #[command(name = PROGRAM, version)]
 struct Options {
     #[command(flatten)]
-    run: RunOptions,
-
-    #[command(flatten)]
-    networks: NetworkOptions,
-
-    /// Cells per unit length; eps = 2/n and tautilde = 1/n^2 follow [default: 64]
-    #[arg(long, value_name = "N")]
-    cells: Option<usize>,
+    surface: SurfaceOptions,
 
     /// Number of time steps [default: 100]
     #[arg(long, value_name = "COUNT")]
@@ -77,202 +76,107 @@ impl Options {
     }
 }
 
-#[derive(Serialize)]
-struct Parameters<'a> {
-    n: usize,
-    eps: f64,
-    mcf_step: f64,
-    tau: f64,
-    steps: usize,
-    variants: &'a [(Method, Scheme)],
-    cube_half_side: f64,
-    disk_radius: f64,
-    disk_half_height: f64,
-    network: String,
-    quick: bool,
-}
-
-/// One of the two solids, with the energies that the paper reports for the hybrid scheme.
-struct Solid {
-    key: &'static str,
-    title: &'static str,
-    initial: Field<3>,
-    papers: [f64; 3],
-    identity: String,
-}
-
-fn solids(options: &Options, n: usize) -> Result<[Solid; 2], Error> {
-    let Options {
-        cube_half_side,
-        disk_radius,
-        disk_half_height,
-        ..
-    } = *options;
-    let (grid, eps) = (centred_box(n, 1.0)?, scales(n).eps);
-    let centre = [0.5; 3];
-    let cube = Cuboid::new([cube_half_side; 3])?.translated(centre);
-    let disk = Cylinder::new(disk_radius, disk_half_height)?.translated(centre);
-    Ok([
-        Solid {
-            key: "cube",
-            title: "cube",
-            initial: phase_field(grid, &cube, eps)?,
-            papers: [132.65, 52.26, 25.78],
-            identity: format!("cube, half side {cube_half_side}"),
-        },
-        Solid {
-            key: "disk",
-            title: "thick disk",
-            initial: phase_field(grid, &disk, eps)?,
-            papers: [87.15, 50.49, 25.59],
-            identity: format!("disk, radius {disk_radius}, half height {disk_half_height}"),
-        },
-    ])
-}
-
 fn main() -> ExitCode {
     let options = Options::parse();
     harness::run(|| program(&options))
 }
 
 fn program(options: &Options) -> Result<(), Error> {
-    let quick = options.run.quick;
-    let n = options.cells.unwrap_or(if quick { 24 } else { 64 });
-    let steps = options.steps.unwrap_or(if quick { 2 } else { STEPS });
+    let Options {
+        cube_half_side,
+        disk_radius,
+        disk_half_height,
+        ..
+    } = *options;
+    let run = &options.surface.run;
+    let n = options.surface.cells(CELLS);
+    let steps = options.steps.unwrap_or(if run.quick { 2 } else { STEPS });
     if steps == 0 || options.methods.is_empty() {
         return Err(Error::Options(
             "--steps must be at least 1, and --methods must name a method".to_owned(),
         ));
     }
-    let device = options.run.open_device()?;
-    let networks = options.networks.find(&[ratios()])?;
-    let solids = solids(options, n)?;
-    let output = options.run.open_output(PROGRAM)?;
-    let params = scales(n);
+    let device = run.open_device()?;
+    let networks = options.surface.networks()?;
+    let network = networks.find(Scheme::Paper, &needed_network())?.network;
+    let (grid, scales) = (centred_box(n, 1.0)?, scales(n));
+    let cube = Cuboid::new([cube_half_side; 3])?.translated([0.5; 3]);
+    let disk = Cylinder::new(disk_radius, disk_half_height)?.translated([0.5; 3]);
+    let solids: [(_, _, Field<3>, _); 2] = [
+        ("cube", "cube", phase_field(grid, &cube, scales.eps)?, CUBES),
+        (
+            "disk",
+            "thick disk",
+            phase_field(grid, &disk, scales.eps)?,
+            DISKS,
+        ),
+    ];
     let variants = options.variants();
-    let parameters = Parameters {
-        n,
-        eps: params.eps,
-        mcf_step: params.mcf_step,
-        tau: TAU,
-        steps,
-        variants: &variants,
-        cube_half_side: options.cube_half_side,
-        disk_radius: options.disk_radius,
-        disk_half_height: options.disk_half_height,
-        network: checksum(&networks[0]),
-        quick,
-    };
-    let mut manifest = options.run.manifest(PROGRAM, &parameters, &device)?;
-    let progress = options.run.progress();
-    let clock = Instant::now();
-    let workshop = Workshop::new(&options.run, &device, &networks[0], &output, &progress);
-    let mut finished: Vec<Finished<'_>> = Vec::new();
-    for solid in &solids {
+    let parameters = json!({
+        "n": n, "eps": scales.eps, "mcf_step": scales.mcf_step, "tau": TAU, "steps": steps, "variants": variants,
+        "cube_half_side": cube_half_side, "disk_radius": disk_radius, "disk_half_height": disk_half_height,
+        "network": checksum(&network), "quick": run.quick,
+    });
+    let mut session = Session::open(PROGRAM, run, device, &parameters)?;
+    let mut all = Vec::new();
+    for (key, title, initial, papers) in &solids {
         for &(method, scheme) in &variants {
-            // The paper reports energies of the hybrid scheme only.
-            let papers = (method, scheme) == (Method::Hybrid, Scheme::Paper);
-            let paper = |k: usize| papers.then_some(solid.papers[k]);
-            let mut shown = vec![(0, paper(0)), (1, paper(1))];
-            if steps > 1 {
-                shown.push((steps, paper(2).filter(|_| steps == STEPS)));
-            }
-            finished.push(workshop.run(
-                &mut manifest,
-                SurfaceRun {
-                    key: solid.key.to_owned(),
-                    title: solid.title.to_owned(),
-                    method,
-                    n,
-                    tau: TimeSteps::Constant(TAU),
-                    steps,
-                    setting: Setting {
-                        scheme,
-                        ..Setting::default()
-                    },
-                    shown,
-                    initial: &solid.initial,
-                    identity: solid.identity.clone(),
-                    view: View {
-                        up: UpAxis::Z,
-                        azimuth: 30.0,
-                        elevation: 25.0,
-                    },
-                },
-            )?);
+            let needed = needed_network();
+            let networks = networks.of(scheme);
+            let operator = Operator::new((method, scheme), &networks, &needed, &grid, &scales)?;
+            let comparable = (method, scheme) == (Method::Hybrid, Scheme::Paper);
+            let time = (StepRule::Constant(TAU), steps);
+            let surface = Surface {
+                key,
+                title: (*title).to_owned(),
+                case: surfaces::willmore_flow(title, initial.clone(), operator, scales, time),
+                shown: papers
+                    .map(|(step, w)| (step, comparable.then_some(w)))
+                    .to_vec(),
+                view: VIEW,
+            };
+            all.push(surface.flow(&mut session)?);
         }
     }
-    let distances = distances(&finished)?;
-    let distance = |run: usize, step: usize| {
-        let found = distances.iter().find(|d| d.run == run && d.step == step);
-        found.map(|d| d.l2)
-    };
-    let caption = |run: usize, snapshot: &experiments::surfaces::Snapshot| {
-        let l2 = distance(run, snapshot.step)
-            .map_or(String::new(), |l2| format!("\nL² distance to FE {l2:.4}"));
-        format!("step {}: w = {:.2}{l2}", snapshot.step, snapshot.w)
-    };
-    let figure = manifest.phase("pictures", || {
-        workshop.figure(
-            "Willmore flow of a cube and of a thick disk",
-            &finished,
-            &caption,
-            &|_, _| Vec::new(),
-        )
-    })?;
-    figure
-        .with_note(format!(
-            "n = {n}, ε = 2/n, inner step 1/n², τ = 2⁻¹⁸. w: Willmore energy with the implicit finite-element step; a sphere has 8π = 25.13."
-        ))
-        .write(&output, "surfaces")?;
-    let table = table(&finished)?;
-    table.write(&output, "energies")?;
-    write_steps(&finished, &output)?;
-    let mut summary = Summary::new();
-    for f in &finished {
-        f.summarize(&mut summary)?;
-    }
-    for d in &distances {
-        let key = finished[d.run].key();
-        summary.insert(&format!("{key}.l2_to_fe.step{}", d.step), d.l2)?;
-    }
-    summary.insert("seconds", since(clock))?;
-    summary.write(&output)?;
-    manifest.write(&output)?;
-    progress.clear();
-    options.run.say(&format!(
-        "{}\n{}\nResults are in {}",
-        options
-            .run
-            .title("Willmore flow of a cube and of a thick disk"),
-        table.to_markdown(),
-        output.as_path().display()
-    ));
-    Ok(())
+    compare_with_finite_elements(&mut all)?;
+    let note = format!(
+        "n = {n}, ε = 2/n, inner step 1/n², τ = 2⁻¹⁸. w: Willmore energy with the implicit finite-element step; a sphere has 8π = 25.13."
+    );
+    let table = surfaces::write(&mut session, TITLE, note, &all)?;
+    session.finish(TITLE, surfaces::summary(&all)?, &table)
 }
 
-/// Distance of a run of the hybrid scheme to finite elements.
-struct Distance {
-    run: usize,
-    step: usize,
-    l2: f64,
-}
-
-fn distances(finished: &[Finished<'_>]) -> Result<Vec<Distance>, Error> {
-    let mut distances = Vec::new();
-    for (run, hybrid) in finished.iter().enumerate() {
+/// Adds the L2 distances between the learned operators and the finite elements, where both ran, to captions and metrics.
+fn compare_with_finite_elements(all: &mut [Flowed]) -> Result<(), Error> {
+    let method = |one: &Flowed| one.trajectory.case.operator.method;
+    for k in 0..all.len() {
         let is_partner =
-            |f: &&Finished<'_>| f.run.key == hybrid.run.key && f.run.method == Method::FeImplicit;
-        if !hybrid.run.method.is_learned() {
-            continue;
-        }
-        let Some(elements) = finished.iter().find(is_partner) else {
+            |one: &&Flowed| one.surface == all[k].surface && method(one) == Method::FeImplicit;
+        let Some(elements) = all
+            .iter()
+            .find(is_partner)
+            .filter(|_| method(&all[k]).is_learned())
+        else {
             continue;
         };
-        for step in hybrid.snapshots.iter().map(|s| s.step).filter(|&s| s > 0) {
-            let l2 = hybrid.trajectory.distance(&elements.trajectory, step)?;
-            distances.push(Distance { run, step, l2 });
+        let shown = all[k].snapshots.iter().map(|shown| shown.step).enumerate();
+        let distance = |(shown, step)| {
+            Ok((
+                shown,
+                step,
+                all[k]
+                    .trajectory
+                    .distance(step, &elements.trajectory, step)?,
+            ))
+        };
+        let distances = shown
+            .filter(|(_, step)| *step > 0)
+            .map(distance)
+            .collect::<Result<Vec<_>, Error>>()?;
+        for (shown, step, l2) in distances {
+            all[k].snapshots[shown].caption += &format!("\nL² distance to FE {l2:.4}");
+            all[k].metrics.push((format!("l2_to_fe.step{step}"), l2));
         }
     }
-    Ok(distances)
+    Ok(())
 }

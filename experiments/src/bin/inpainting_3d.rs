@@ -1,26 +1,22 @@
 //! Inpainting of surfaces: Willmore flow of the values in a region, the rest of the surface held.
 
 use std::process::ExitCode;
-use std::time::Instant;
 
-use clap::{Parser, ValueEnum};
-use experiments::evolution::{NamedRegion, TimeSteps};
-use experiments::inpainting::{self, Inpainted, STILL, Window, division};
-use experiments::method::{Method, Scheme};
-use experiments::networks::{NetworkOptions, checksum};
-use experiments::options::RunOptions;
-use experiments::surfaces::{
-    Finished, Setting, Snapshot, SurfaceRun, View, Workshop, centred_box, ratios, scales, since,
-    table,
-};
+use clap::Parser;
+use engine::StepRule;
+use experiments::inpainting::{self, Inpainted, InpaintingOptions, Shape, Window};
+use experiments::session::Session;
+use experiments::surfaces::{Snapshot, Surface, View, centred_box, needed_network, scales, table};
 use experiments::{Error, harness};
 use geometry::shapes::{Ball, Cuboid, Cylinder};
-use geometry::{Field, Grid, SignedDistance, SignedDistanceExt, UpAxis, phase_field};
-use render::Rgb;
+use geometry::{SignedDistance, SignedDistanceExt, UpAxis};
+use render::{Rgb, Tube};
 use report::{Figure, Summary};
-use serde::Serialize;
 
 const PROGRAM: &str = "inpainting_3d";
+const TITLE: &str = "Inpainting of surfaces";
+/// Cells per unit length of a quick run and of the paper.
+const CELLS: [usize; 2] = [32, 128];
 /// Size of the paper's time steps.
 const TAU: f64 = 1.0 / 2_097_152.0;
 /// Middle of the box.
@@ -49,156 +45,81 @@ const GREEN: Rgb = Rgb(0, 140, 60);
 /// region D move (green in the pictures); all others stay bit for bit.
 ///
 /// Frames are those of the paper's 5 and 8 steps of tau = 2^-21. Further steps follow, each twice as long as the one before, until
-/// nothing moves any more.
+/// nothing moves any more. The paper has n = 128; eps = 2/n and tautilde = 1/n^2.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
 struct Options {
     #[command(flatten)]
-    run: RunOptions,
-
-    #[command(flatten)]
-    networks: NetworkOptions,
-
-    /// Cells per unit length; eps = 2/n and tautilde = 1/n^2 follow [default: 128, as in the paper]
-    #[arg(long, value_name = "N")]
-    cells: Option<usize>,
+    common: InpaintingOptions,
 
     /// Steps beyond the paper's, each twice as long as the one before
     #[arg(long, value_name = "COUNT", default_value_t = 20)]
     extra_steps: usize,
 
     /// One shape alone
-    #[arg(long, value_name = "NAME", value_enum)]
-    only: Option<Shape>,
-
-    /// Weights of the energy and network: paper, calibrated or accurate
-    #[arg(long, value_name = "NAME", value_enum, default_value_t = Scheme::Accurate)]
-    scheme: Scheme,
+    #[arg(long, value_name = "NAME", value_parser = ["ball", "tubes"])]
+    only: Option<String>,
 }
 
-#[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
-#[serde(rename_all = "snake_case")]
-enum Shape {
-    /// The ball with a cut-out corner
-    Ball,
-    /// The six tubes
-    Tubes,
-}
-
-impl Shape {
-    const ALL: [Self; 2] = [Self::Ball, Self::Tubes];
-
-    fn key(self) -> &'static str {
-        match self {
-            Self::Ball => "ball",
-            Self::Tubes => "tubes",
-        }
-    }
-
-    fn title(self) -> &'static str {
-        match self {
-            Self::Ball => "ball with a cut-out corner",
-            Self::Tubes => "six tubes",
-        }
-    }
-
-    /// The paper's frames.
-    fn papers(self) -> &'static [usize] {
-        match self {
-            Self::Ball => &[0, 1, 3, 5],
-            Self::Tubes => &[0, 1, 4, 8],
-        }
-    }
-
-    /// And one on the way to the end.
-    fn shown(self) -> Vec<usize> {
-        let [.., last] = self.papers() else {
-            return Vec::new();
-        };
-        [self.papers(), &[last + 6]].concat()
-    }
-
-    fn initial(self, grid: Grid<3>, eps: f64) -> Result<Field<3>, Error> {
-        let centre = [CENTRE; 3];
-        Ok(match self {
-            Self::Ball => {
-                let half = 0.5 * (0.5 - CORNER);
-                let corner = Cuboid::new([half; 3])?.translated([CORNER + half; 3]);
-                let shape = Ball::new([0.0; 3], RADIUS)?.difference(corner);
-                phase_field(grid, &shape.translated(centre), eps)?
-            }
-            Self::Tubes => {
-                let [radius, end] = TUBE;
-                let pair = Cylinder::new(radius, end)?;
-                // The ansatz in the middle is that they meet.
-                let tubes = move |[x, y, z]: [f64; 3]| {
-                    [[x, y, z], [y, z, x], [z, x, y]]
-                        .map(|x| pair.signed_distance(x))
-                        .into_iter()
-                        .fold(f64::INFINITY, f64::min)
-                };
-                phase_field(grid, &tubes.translated(centre), eps)?
-            }
-        })
-    }
-
-    /// What it should become, if that is known.
-    fn whole(self, grid: Grid<3>, eps: f64) -> Result<Option<Field<3>>, Error> {
-        Ok(match self {
-            Self::Ball => {
-                let ball = Ball::new([CENTRE; 3], RADIUS)?;
-                Some(phase_field(grid, &ball, eps)?)
-            }
-            Self::Tubes => None,
-        })
-    }
-
-    /// D.
-    fn region(self) -> Window<3> {
-        let [low, high] = match self {
-            Self::Ball => BALL_REGION,
-            Self::Tubes => [-TUBES_REGION, TUBES_REGION],
-        };
-        Window {
+/// The shapes with the azimuths from which they are looked at.
+fn shapes(options: &Options) -> Result<Vec<(Shape<3>, f64)>, Error> {
+    let ball = Ball::new([0.0; 3], RADIUS)?;
+    let half = 0.5 * (0.5 - CORNER);
+    let corner = Cuboid::new([half; 3])?.translated([CORNER + half; 3]);
+    let [radius, end] = TUBE;
+    let pair = Cylinder::new(radius, end)?;
+    // The ansatz in the middle is that they meet.
+    let tubes = move |[x, y, z]: [f64; 3]| {
+        let pairs = [[x, y, z], [y, z, x], [z, x, y]].map(|x| pair.signed_distance(x));
+        pairs.into_iter().fold(f64::INFINITY, f64::min)
+    };
+    let shape = |key, title, initial, whole, [low, high]: [f64; 2], papers: [usize; 4]| Shape {
+        key,
+        title,
+        initial,
+        whole,
+        region: Window {
             low: [CENTRE + low; 3],
             high: [CENTRE + high; 3],
-        }
-    }
-
-    fn view(self) -> View {
-        let (azimuth, elevation) = match self {
-            Self::Ball => (30.0, 25.0),
-            Self::Tubes => (25.0, 25.0),
-        };
-        View {
-            up: UpAxis::Z,
-            azimuth,
-            elevation,
-        }
-    }
-}
-
-#[derive(Serialize)]
-struct Parameters {
-    n: usize,
-    eps: f64,
-    mcf_step: f64,
-    tau: f64,
-    scheme: Scheme,
-    shapes: Vec<Shape>,
-    extra_steps: usize,
-    first_part: f64,
-    still: f64,
-    network: String,
-    quick: bool,
-}
-
-/// A shape before it flows.
-struct Start {
-    shape: Shape,
-    initial: Field<3>,
-    whole: Option<Field<3>>,
-    region: NamedRegion,
+        },
+        rule: StepRule::Growing {
+            tau: TAU,
+            alike: papers[3],
+        },
+        steps: papers[3] + options.extra_steps,
+        // The paper's frames, and one on the way to the end.
+        shown: [&papers[..], &[papers[3] + 6]].concat(),
+        halvings: &[],
+    };
+    let shapes = [
+        (
+            shape(
+                "ball",
+                "ball with a cut-out corner",
+                Box::new(ball.difference(corner).translated([CENTRE; 3])),
+                Some(Box::new(Ball::new([CENTRE; 3], RADIUS)?)),
+                BALL_REGION,
+                [0, 1, 3, 5],
+            ),
+            30.0,
+        ),
+        (
+            shape(
+                "tubes",
+                "six tubes",
+                Box::new(tubes.translated([CENTRE; 3])),
+                None,
+                [-TUBES_REGION, TUBES_REGION],
+                [0, 1, 4, 8],
+            ),
+            25.0,
+        ),
+    ];
+    let wanted = |shape: &Shape<3>| options.only.as_ref().is_none_or(|only| only == shape.key);
+    Ok(shapes
+        .into_iter()
+        .filter(|(shape, _)| wanted(shape))
+        .collect())
 }
 
 fn main() -> ExitCode {
@@ -207,159 +128,74 @@ fn main() -> ExitCode {
 }
 
 fn program(options: &Options) -> Result<(), Error> {
-    let quick = options.run.quick;
-    let n = options.cells.unwrap_or(if quick { 32 } else { 128 });
+    let run = &options.common.run;
+    let n = options.common.cells(CELLS);
     if options.extra_steps > MOST_EXTRA {
         return Err(Error::Options(format!(
             "--extra-steps {} is too many: each step is twice as long as the one before; give at most {MOST_EXTRA}",
             options.extra_steps
         )));
     }
-    let device = options.run.open_device()?;
-    let networks = options.networks.find(&[ratios()])?;
-    let (grid, params) = (centred_box(n, 1.0)?, scales(n));
-    let shapes: Vec<Shape> = (Shape::ALL.into_iter())
-        .filter(|p| options.only.is_none_or(|only| only == *p))
-        .collect();
-    let output = options.run.open_output(PROGRAM)?;
-    let parameters = Parameters {
-        n,
-        eps: params.eps,
-        mcf_step: params.mcf_step,
-        tau: TAU,
-        scheme: options.scheme,
-        shapes: shapes.clone(),
-        extra_steps: options.extra_steps,
-        first_part: division(params.eps, &[]).first,
-        still: STILL,
-        network: checksum(&networks[0]),
-        quick,
-    };
-    let mut manifest = options.run.manifest(PROGRAM, &parameters, &device)?;
-    let progress = options.run.progress();
-    let clock = Instant::now();
-    let workshop = Workshop {
-        side: SIDE,
-        ..Workshop::new(&options.run, &device, &networks[0], &output, &progress)
-    };
-    let starts = (shapes.into_iter())
-        .map(|shape| {
-            Ok(Start {
-                shape,
-                initial: shape.initial(grid, params.eps)?,
-                whole: shape.whole(grid, params.eps)?,
-                region: shape.region().nodes(&grid),
-            })
-        })
-        .collect::<Result<Vec<_>, Error>>()?;
-    let mut finished: Vec<Finished<'_>> = Vec::new();
-    for start in &starts {
-        finished.push(workshop.run(&mut manifest, start.run(options, n))?);
+    let device = run.open_device()?;
+    let operator = options.common.operator(&needed_network())?;
+    let (grid, scales) = (centred_box(n, 1.0)?, scales(n));
+    let (shapes, azimuths): (Vec<_>, Vec<_>) = shapes(options)?.into_iter().unzip();
+    let parameters = inpainting::parameters((n, &scales), &operator, &shapes, run.quick);
+    let mut session = Session::open(PROGRAM, run, device, &parameters)?;
+    let mut flowed = Vec::new();
+    for (shape, azimuth) in shapes.iter().zip(azimuths) {
+        let surface = Surface {
+            key: shape.key,
+            title: shape.title.to_owned(),
+            case: shape.case(grid, scales, &operator)?,
+            shown: shape.shown.iter().map(|&step| (step, None)).collect(),
+            view: View {
+                up: UpAxis::Z,
+                azimuth,
+                elevation: 25.0,
+            },
+        };
+        flowed.push(surface.flow(&mut session)?);
     }
-    let measured = (starts.iter().zip(&finished))
-        .map(|(start, finished)| start.measure(finished))
-        .collect::<Result<Vec<_>, Error>>()?;
-    for ((start, finished), measured) in starts.iter().zip(&finished).zip(&measured) {
-        let shape = start.shape;
-        let panels = manifest.phase(format!("{}: pictures", shape.title()), || {
-            let edges = |_: usize| shape.region().edges(EDGE, GREEN);
-            workshop.panels(finished, &|snapshot| caption(measured, snapshot), &edges)
-        })?;
-        let title = format!("Inpainting: {}", shape.title());
-        (panels.into_iter())
-            .fold(
-                Figure::new(options.run.title(&title), COLUMNS),
-                Figure::with_panel,
-            )
-            .with_note(note(n, measured))
-            .write(&output, &format!("{}_frames", shape.key()))?;
+    table(&flowed)?.write(&session.output, "shapes")?;
+    let (mut summary, mut inpainted) = (Summary::new(), Vec::new());
+    for (shape, one) in shapes.iter().zip(&mut flowed) {
+        one.summarize_shapes(shape.key, &mut summary)?;
+        let measured = Inpainted::measure(shape, &one.trajectory)?;
+        decorate(&mut one.snapshots, &measured);
+        let (output, title) = (&session.output, format!("{}: pictures", shape.title));
+        let pictures = (session.manifest).phase(title, || one.pictures(output, run.quick, SIDE))?;
+        let figure = Figure::new("", COLUMNS).with_panels(pictures);
+        measured.write_frames(&session, figure.with_note(note(&measured, n)))?;
+        inpainted.push(measured);
     }
-    inpainting::energies(&options.run, &measured).write(&output, "energies")?;
-    output.write("steps.csv", inpainting::steps_csv(&measured)?)?;
-    table(&finished)?.write(&output, "shapes")?;
-    let table = inpainting::table(&measured)?;
-    table.write(&output, "inpainting")?;
-    let mut summary = Summary::new();
-    for (finished, measured) in finished.iter().zip(&measured) {
-        finished.summarize_shapes(&finished.run.key, &mut summary)?;
-        measured.summarize(&mut summary)?;
-    }
-    summary.insert("seconds", since(clock))?;
-    summary.write(&output)?;
-    manifest.write(&output)?;
-    progress.clear();
-    options.run.say(&format!(
-        "{}\n{}\nResults are in {}",
-        options.run.title("Inpainting of surfaces"),
-        table.to_markdown(),
-        output.as_path().display()
-    ));
-    Ok(())
+    inpainting::finish(session, TITLE, summary, &inpainted)
 }
 
-impl Start {
-    fn run(&self, options: &Options, n: usize) -> SurfaceRun<'_> {
-        let shape = self.shape;
-        let papers = shape.papers().last().copied().unwrap_or_default();
-        SurfaceRun {
-            key: shape.key().to_owned(),
-            title: shape.title().to_owned(),
-            method: Method::Hybrid,
-            n,
-            tau: TimeSteps::Growing {
-                tau: TAU,
-                alike: papers,
-            },
-            steps: papers + options.extra_steps,
-            setting: Setting {
-                scheme: options.scheme,
-                region: Some(self.region.clone()),
-                division: Some(division(scales(n).eps, &[])),
-                still: Some(STILL),
-            },
-            shown: (shape.shown().into_iter())
-                .map(|step| (step, None))
-                .collect(),
-            initial: &self.initial,
-            identity: format!("inpainted {}", shape.title()),
-            view: shape.view(),
+/// Draws the region, and tells the time and the distance to the whole shape.
+fn decorate(snapshots: &mut [Snapshot], measured: &Inpainted<'_, 3>) {
+    let Window { low, high } = measured.shape.region;
+    for snapshot in snapshots {
+        let (step, after) = (snapshot.step, (snapshot.time / TAU).round());
+        snapshot.caption = format!("step {step}");
+        if after > step as f64 {
+            snapshot.caption += &format!(" (t = {after} τ)");
         }
-    }
-
-    fn measure<'a>(&self, finished: &'a Finished<'_>) -> Result<Inpainted<'a, 3>, Error> {
-        let shape = self.shape;
-        Inpainted::measure(
-            (shape.key(), shape.title()),
-            &finished.trajectory,
-            &self.region.nodes,
-            &shape.shown(),
-            self.whole.as_ref(),
-        )
+        snapshot.caption += &format!(": w = {:.2}", snapshot.w);
+        let distance = measured.distances.iter().find(|(k, _)| *k == step);
+        if let Some((_, l2)) = distance.filter(|_| measured.shape.whole.is_some()) {
+            snapshot.caption += &format!("\nL² distance to the ball {l2:.4}");
+        }
+        let edges = Tube::edges_of_box(low, high, EDGE).into_iter();
+        snapshot.tubes = edges.map(|edge| edge.with_colour(GREEN)).collect();
     }
 }
 
-fn caption(measured: &Inpainted<'_, 3>, snapshot: &Snapshot) -> String {
-    let step = snapshot.step;
-    let distance = (measured.distances.iter())
-        .find(|(k, _)| *k == step && measured.key == Shape::Ball.key())
-        .map_or(String::new(), |(_, l2)| {
-            format!("\nL² distance to the ball {l2:.4}")
-        });
-    let after = (snapshot.time / TAU).round();
-    let time = if after > step as f64 {
-        format!(" (t = {after} τ)")
-    } else {
-        String::new()
+fn note(one: &Inpainted<'_, 3>, n: usize) -> String {
+    let StepRule::Growing { alike, .. } = one.shape.rule else {
+        unreachable!("steps grow");
     };
-    format!("step {step}{time}: w = {:.2}{distance}", snapshot.w)
-}
-
-fn note(n: usize, measured: &Inpainted<'_, 3>) -> String {
-    let alike = match measured.trajectory.evolution.tau {
-        TimeSteps::Growing { alike, .. } => alike,
-        _ => 0,
-    };
-    let end = measured.still_from().map_or(String::new(), |still| {
+    let end = one.still_from().map_or(String::new(), |still| {
         format!(" The shape stands still from t = {} τ on.", still.round())
     });
     format!(

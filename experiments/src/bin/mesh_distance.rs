@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use experiments::{Error, harness, meshes};
-use geometry::{Grid, npy, vti};
+use geometry::{Grid, Placement, npy, vti};
 use report::Progress;
 use surfaces::ClosedMesh;
 
@@ -64,7 +64,9 @@ fn program(options: &Options) -> Result<(), Error> {
     let grid = Grid::<3>::new(options.cells, 1.0)?;
     let progress = Progress::new(options.quiet);
     let bar = progress.bar("signed distance".to_owned(), options.cells as u64);
-    let distance = meshes::signed_distance(&mesh, grid, options.side_length, options.margin, &bar)?;
+    let bounds = mesh.bounding_box();
+    let placement = Placement::fit(&bounds, &grid, options.side_length, options.margin)?;
+    let distance = meshes::signed_distance(&mesh.placed(&placement), grid, &bar)?;
     bar.finish();
     if volume {
         vti::write(&options.output, &[("signed_distance", &distance)])?;

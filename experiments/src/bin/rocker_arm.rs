@@ -1,33 +1,32 @@
 //! A machine part of genus one under Willmore flow, and the Clifford torus next to it.
 
+use std::collections::BTreeMap;
 use std::process::ExitCode;
 
 use clap::Parser;
-use experiments::clifford::CliffordFit;
-use experiments::evolution::TimeSteps;
-use experiments::mesh_flow::{Extras, MeshFlow, MeshFlowOptions};
+use engine::StepRule;
+use experiments::clifford::CliffordTorus;
+use experiments::mesh_flow::{MeshFlow, MeshFlowOptions, Remarks};
 use experiments::meshes::KnownMesh;
-use experiments::surfaces::{Finished, View};
+use experiments::session::Session;
+use experiments::surfaces::{Flowed, View};
 use experiments::{Error, harness};
-use fem::FiniteElementStep;
 use geometry::UpAxis;
 use render::Tube;
-use report::Manifest;
 
-const ROCKER_ARM: KnownMesh = KnownMesh {
-    file: "rocker-arm.obj",
-    title: "rocker arm",
-    side_length: 1.0,
-    box_side: 1.25,
-    procedural: surfaces::samples::lever,
-    procedural_title: "built-in lever",
-};
 const ROCKER_ARM_FLOW: MeshFlow = MeshFlow {
     program: "rocker_arm",
-    mesh: &ROCKER_ARM,
+    mesh: KnownMesh {
+        file: "rocker-arm.obj",
+        title: "rocker arm",
+        side_length: 1.0,
+        box_side: 1.25,
+        procedural: surfaces::samples::lever,
+        procedural_title: "built-in lever",
+    },
     cells: 64,
     steps: 20,
-    tau: TimeSteps::Constant(1.0 / 4096.0),
+    tau: StepRule::Constant(1.0 / 4096.0),
     tau_in_words: "τ = 2⁻¹²",
     shown: &[(0, Some(276.12)), (1, Some(42.08)), (20, Some(41.46))],
     view: View {
@@ -55,98 +54,45 @@ struct Options {
 
 fn main() -> ExitCode {
     let options = Options::parse();
-    harness::run(|| ROCKER_ARM_FLOW.run(&options.flow, clifford))
+    harness::run(|| ROCKER_ARM_FLOW.run(&options.flow, clifford_tori))
 }
 
-/// The Clifford torus nearest to a surface.
-struct Torus {
-    fit: CliffordFit,
-    /// Its energy, measured as that of the surface.
-    w: f64,
-    /// The step that it belongs to.
-    step: usize,
-    circles: Vec<Vec<[f64; 3]>>,
-    radius: f64,
-}
-
-impl Torus {
-    fn next_to(one: &Finished<'_>) -> Result<Self, Error> {
-        let params = one.trajectory.evolution.params;
-        let step = one.run.steps;
-        let last = one.trajectory.field(step)?;
-        let fit = CliffordFit::to(&last, params.eps)?;
-        let measure = FiniteElementStep::implicit(last.grid(), params.eps, params.mcf_step)?;
-        Ok(Self {
-            w: measure.willmore_energy(&fit.phase_field(&last, params.eps)?)?,
-            circles: fit.minor_circles(CIRCLES.0, CIRCLES.1)?,
-            fit,
-            step,
-            radius: 0.1 * params.eps,
-        })
-    }
-}
-
-fn clifford<'a>(
-    finished: &'a [Finished<'a>],
-    manifest: &mut Manifest,
-) -> Result<Extras<'a>, Error> {
-    let tori = manifest.phase("Clifford tori", || {
-        finished
-            .iter()
-            .map(Torus::next_to)
-            .collect::<Result<Vec<_>, Error>>()
-    })?;
-    let mut extras = Extras {
+/// Finds the Clifford torus nearest to the last shape of each run, and draws it there.
+fn clifford_tori(session: &mut Session<'_>, all: &mut [Flowed]) -> Result<Remarks, Error> {
+    let mut remarks = Remarks {
         note: " Circles: of the nearest Clifford torus; one has 4π² = 39.48 in the limit."
             .to_owned(),
-        ..Extras::default()
+        ..Remarks::default()
     };
-    let (mut fits, mut lines_of_report) = (Vec::new(), Vec::new());
-    for (one, torus) in finished.iter().zip(&tori) {
-        let key = one.key();
-        for (name, value) in [
-            ("clifford_l2", torus.fit.l2),
-            ("clifford_w", torus.w),
-            ("clifford_outer_radius", torus.fit.outer_radius),
-        ] {
-            extras.metrics.push((format!("{key}.{name}"), value));
-        }
-        lines_of_report.push(format!(
-            "\nNearest Clifford torus, {}: L2 distance {:.4} (paper {PAPERS_L2:.4}), outer radius {:.3}, w = {:.2} (paper \
+    let mut tori = BTreeMap::new();
+    for one in all {
+        let case = &one.trajectory.case;
+        let last = one.trajectory.field(one.trajectory.steps())?;
+        let title = format!("Clifford torus, {}", one.label());
+        let torus = session.phase(title, || CliffordTorus::nearest(&last, case.scales.eps))?;
+        let as_field = torus.phase_field(last.grid(), case.scales.eps)?;
+        let w = case.implicit_elements()?.willmore_energy(&as_field)?;
+        let CliffordTorus {
+            l2, outer_radius, ..
+        } = torus;
+        remarks.report += &format!(
+            "\nNearest Clifford torus, {}: L2 distance {l2:.4} (paper {PAPERS_L2:.4}), outer radius {outer_radius:.3}, w = {w:.2} (paper \
              {PAPERS_CLIFFORD})",
-            one.run.label(),
-            torus.fit.l2,
-            torus.fit.outer_radius,
-            torus.w
-        ));
-        fits.push((one.key(), &torus.fit));
-    }
-    extras.report = lines_of_report.concat();
-    let by_name: std::collections::BTreeMap<_, _> = fits.into_iter().collect();
-    (extras.files).push(("clifford.json", report::data::to_json(&by_name)?));
-    let lines: Vec<(usize, String)> = (tori.iter())
-        .map(|torus| {
-            let line = format!(
-                "\nL² distance to the torus {:.4}\n(which has w = {:.2})",
-                torus.fit.l2, torus.w
-            );
-            (torus.step, line)
-        })
-        .collect();
-    extras.caption = Box::new(move |run, shown| {
-        let (step, line) = &lines[run];
-        if *step == shown.step {
-            line.clone()
-        } else {
-            String::new()
+            one.label()
+        );
+        let circles = torus.minor_circles(CIRCLES.0, CIRCLES.1)?.into_iter();
+        let tube = |circle: Vec<[f64; 3]>| Tube::new(circle, 0.1 * case.scales.eps).closed();
+        if let Some(shown) = one.snapshots.last_mut() {
+            shown.caption += &format!("\nL² distance to the torus {l2:.4}\n(which has w = {w:.2})");
+            shown.tubes = circles.map(tube).collect();
         }
-    });
-    extras.tubes = Box::new(move |run, step| {
-        let torus = &tori[run];
-        let drawn = torus.circles.iter().filter(|_| step == torus.step);
-        drawn
-            .map(|circle| Tube::new(circle.clone(), torus.radius).closed())
-            .collect()
-    });
-    Ok(extras)
+        one.metrics = vec![
+            ("clifford_l2".to_owned(), l2),
+            ("clifford_w".to_owned(), w),
+            ("clifford_outer_radius".to_owned(), outer_radius),
+        ];
+        tori.insert(one.key(), torus);
+    }
+    session.output.write_json("clifford.json", &tori)?;
+    Ok(remarks)
 }

@@ -1,37 +1,38 @@
 //! Spheres by the network for surfaces: mean curvature flow, Willmore energies, and standing still.
 
 use std::process::ExitCode;
-use std::time::Instant;
 
 use clap::Parser;
-use experiments::circles::Flow;
-use experiments::method::{Method, Scheme};
-use experiments::networks::{NetworkOptions, checksum};
-use experiments::options::RunOptions;
-use experiments::surfaces::{centred_box, ratios, scales, since};
-use experiments::training::{NetworkSpec, held_out_radii};
-use experiments::{Error, harness, quality};
-use fem::{FiniteElementStep, LinearSolver};
-use geometry::measure::{l2_distance, zero_set_volume};
-use geometry::shapes::Ball;
-use geometry::{Field, phase_field};
-use model::{Network, Quality};
-use operators::ComputeDevice;
-use report::{
-    Axis, Colour, Column, Figure, Format, LineChart, LineStyle, Marker, Series, Summary, Table,
+use engine::{
+    Case, Flow, Measure, Method, Operator, Record, Run, Scales, Scheme, StepRule, Stop, checksum,
+    energy_increases, mean_hvp,
 };
+use experiments::networks::Chosen;
+use experiments::session::Session;
+use experiments::surfaces::{self, SurfaceOptions, centred_box, needed_network};
+use experiments::training::{NetworkSpec, held_out_radii};
+use experiments::{Error, harness, look, quality};
+use geometry::exact::{WILLMORE_ENERGY_SPHERE, mean_curvature_radius};
+use geometry::shapes::Ball;
+use geometry::{Grid, phase_field};
+use model::Quality;
+use operators::ComputeDevice;
+use report::{Axis, Colour, Figure, Format, LineChart, LineStyle, Marker, Series, Summary, Table};
+use runs::Interrupt;
 use serde::Serialize;
-use solver::StepRecord;
+use serde_json::json;
 
 const PROGRAM: &str = "spheres";
+const TITLE: &str = "Spheres by the network for surfaces";
+/// Cells per unit length of a quick run and of the paper.
+const CELLS: [usize; 2] = [32, 64];
 const RADII: [f64; 6] = [0.15, 0.2, 0.25, 0.3, 0.35, 0.4];
 /// Steps of mean curvature flow after which errors are reported; the smallest sphere vanishes after 23 at n = 64.
 const MCF_STEPS: [usize; 3] = [1, 4, 8];
+const LAST: usize = MCF_STEPS.len() - 1;
 /// Steps of Willmore flow, which should leave spheres alone.
 const WILLMORE_STEPS: usize = 20;
 const TAU: f64 = 1.0 / 262_144.0;
-/// Willmore energy of a sphere.
-const SPHERE: f64 = 8.0 * std::f64::consts::PI;
 
 /// The network for surfaces on spheres, n = 64, eps = 2^-5, tautilde = 2^-12: L2 errors of mean curvature flow against
 /// R^2 = r^2 - 4t beside finite elements, Willmore energies w against 8 pi, and the change of the radius in 20 steps of Willmore
@@ -40,33 +41,15 @@ const SPHERE: f64 = 8.0 * std::f64::consts::PI;
 #[command(name = PROGRAM, version)]
 struct Options {
     #[command(flatten)]
-    run: RunOptions,
-
-    #[command(flatten)]
-    networks: NetworkOptions,
-
-    /// Cells per unit length; eps = 2/n and tautilde = 1/n^2 follow [default: 64]
-    #[arg(long, value_name = "N")]
-    cells: Option<usize>,
-}
-
-#[derive(Serialize)]
-struct Parameters {
-    n: usize,
-    eps: f64,
-    mcf_step: f64,
-    tau: f64,
-    willmore_steps: usize,
-    network: String,
-    quick: bool,
+    surface: SurfaceOptions,
 }
 
 /// What was measured for one radius.
-#[derive(Serialize, Clone, Debug)]
+#[derive(Serialize)]
 struct Measurement {
     radius: f64,
     /// Errors of mean curvature flow, in the order of [`variants`], for each of the reported steps.
-    mcf: Vec<Vec<f64>>,
+    mcf: Vec<[f64; MCF_STEPS.len()]>,
     /// `w` with the implicit finite-element step and the mass-matrix norm, as the paper measures.
     w_elements: f64,
     /// Willmore flow by the learned operator, in every scheme.
@@ -74,15 +57,15 @@ struct Measurement {
 }
 
 /// A sphere under Willmore flow.
-#[derive(Serialize, Clone, Copy, Debug)]
+#[derive(Serialize)]
 struct Still {
     scheme: Scheme,
     /// `w` of the start as the scheme measures it, by its factors of calibration.
     w_learned: f64,
     /// `w` of the end: the profile is now the one of the scheme, which the calibration is about.
     w_relaxed: f64,
-    /// Radius of the ball with the final volume, less that at the beginning.
-    radius_change: f64,
+    /// Radius of the ball with the final volume, less that at the beginning, in cells.
+    radius_change_over_h: f64,
     /// Steps in which the energy rose.
     energy_increases: usize,
     hvp_per_step: f64,
@@ -90,10 +73,7 @@ struct Still {
 
 /// Methods and schemes of mean curvature flow.
 fn variants() -> impl Iterator<Item = (Method, Scheme)> {
-    let schemes = |method: Method| method.schemes(Flow::MeanCurvature).iter();
-    Method::ALL
-        .into_iter()
-        .flat_map(move |method| schemes(method).map(move |&scheme| (method, scheme)))
+    look::variants(|(method, scheme)| method.schemes(Flow::MeanCurvature).contains(&scheme))
 }
 
 fn main() -> ExitCode {
@@ -102,246 +82,227 @@ fn main() -> ExitCode {
 }
 
 fn program(options: &Options) -> Result<(), Error> {
-    let quick = options.run.quick;
-    let n = options.cells.unwrap_or(if quick { 32 } else { 64 });
-    let radii: &[f64] = if quick { &RADII[2..4] } else { &RADII };
-    let willmore_steps = if quick { 2 } else { WILLMORE_STEPS };
-    let device = options.run.open_device()?;
-    let networks = options.networks.find(&[ratios()])?;
-    let network = &networks[0];
-    centred_box(n, 1.0)?;
-    let output = options.run.open_output(PROGRAM)?;
-    let params = scales(n);
-    let parameters = Parameters {
-        n,
-        eps: params.eps,
-        mcf_step: params.mcf_step,
-        tau: TAU,
-        willmore_steps,
-        network: checksum(network),
-        quick,
+    let run = &options.surface.run;
+    let n = options.surface.cells(CELLS);
+    let radii = if run.quick { &RADII[2..4] } else { &RADII };
+    let willmore_steps = if run.quick { 2 } else { WILLMORE_STEPS };
+    let device = run.open_device()?;
+    let networks = options.surface.networks()?;
+    let network = networks.find(Scheme::Paper, &needed_network())?.network;
+    let spheres = Spheres {
+        grid: centred_box(n, 1.0)?,
+        scales: surfaces::scales(n),
+        networks,
+        device: device.clone(),
     };
-    let mut manifest = options.run.manifest(PROGRAM, &parameters, &device)?;
-    let progress = options.run.progress();
-    let clock = Instant::now();
-    let bar = progress.bar("radii".to_owned(), radii.len() as u64);
+    let parameters = json!({
+        "n": n, "eps": spheres.scales.eps, "mcf_step": spheres.scales.mcf_step, "tau": TAU, "willmore_steps": willmore_steps,
+        "network": checksum(&network), "quick": run.quick,
+    });
+    let mut session = Session::open(PROGRAM, run, device, &parameters)?;
+    let bar = session.progress.bar("radii".to_owned(), radii.len() as u64);
     let mut all = Vec::new();
     for &radius in radii {
-        all.push(manifest.phase(format!("radius {radius}"), || {
-            measure(radius, n, willmore_steps, network, &device)
-        })?);
+        let title = format!("radius {radius}");
+        all.push(session.phase(title, || spheres.measure(radius, willmore_steps))?);
         bar.inc(1);
     }
     bar.finish();
-    let spec = NetworkSpec::surfaces();
-    let quality = if quick {
-        None
-    } else {
-        let data = spec.data(false)?;
-        Some(manifest.phase("quality of the network", || {
-            Quality::measure(network, &data, held_out_radii(quick), &device)
-        })?)
-    };
-    if let Some(measured) = &quality {
-        let name = Table::of(std::slice::from_ref(measured)).text("network", |_| &spec.name);
-        let losses = quality::columns(name, |measured| measured);
-        losses.finish()?.write(&output, "quality")?;
+    let mut summary = summary(&all)?;
+    if !run.quick {
+        let spec = NetworkSpec::surfaces();
+        let measured = session.phase("quality of the network", || {
+            let (data, device) = (spec.data(false)?, &spheres.device);
+            Ok(Quality::measure(
+                &network,
+                &data,
+                held_out_radii(false),
+                device,
+            )?)
+        })?;
+        let names = Table::of(std::slice::from_ref(&measured)).text("network", |_| &spec.name);
+        let losses = quality::columns(names, |measured| measured).finish()?;
+        losses.write(&session.output, "quality")?;
+        summary.insert_record(&spec.name, &measured)?;
     }
-    let table = table(&all, n)?;
-    table.write(&output, "spheres")?;
-    output.write("spheres.json", report::data::to_json(&all)?)?;
-    figure(&options.run, &all, n).write(&output, "spheres")?;
-    let mut summary = summary(&all, n, since(clock))?;
-    if let Some(measured) = &quality {
-        summary.insert_record(&spec.name, measured)?;
-    }
-    summary.write(&output)?;
-    manifest.write(&output)?;
-    progress.clear();
-    options.run.say(&format!(
-        "{}\n{}\nResults are in {}",
-        options.run.title("Spheres by the network for surfaces"),
-        table.to_markdown(),
-        output.as_path().display()
-    ));
-    Ok(())
+    let table = table(&all)?;
+    table.write(&session.output, "spheres")?;
+    session.output.write_json("spheres.json", &all)?;
+    let note = format!(
+        "n = {n}, ε = 2/n, inner step 1/n². Energies by the schemes are those after the steps of Willmore flow, of the relaxed profile."
+    );
+    Figure::new(run.title("Spheres"), 2)
+        .with_panels([errors(&all), energies(&all)])
+        .with_note(note)
+        .write(&session.output, "spheres")?;
+    session.finish(TITLE, summary, &table.to_markdown())
 }
 
-fn ball(radius: f64, n: usize) -> Result<Field<3>, Error> {
-    let shape = Ball::new([0.5; 3], radius)?;
-    Ok(phase_field(centred_box(n, 1.0)?, &shape, scales(n).eps)?)
+/// What all spheres share.
+struct Spheres {
+    grid: Grid<3>,
+    scales: Scales,
+    networks: Chosen,
+    device: ComputeDevice,
 }
 
-/// Radius of the ball with the volume of `{u > 0}`.
-fn radius_of(u: &Field<3>) -> f64 {
-    (0.75 * zero_set_volume(u) / std::f64::consts::PI).cbrt()
-}
-
-fn measure(
-    radius: f64,
-    n: usize,
-    willmore_steps: usize,
-    network: &Network,
-    device: &ComputeDevice,
-) -> Result<Measurement, Error> {
-    let params = scales(n);
-    let initial = ball(radius, n)?;
-    let mut mcf = Vec::new();
-    for (method, scheme) in variants() {
-        let (network, _) = method.prepare(scheme, Some(network), initial.grid(), &params)?;
-        let mut flow = method.mean_curvature_flow(network.as_ref(), &initial, &params, device)?;
-        let mut errors = Vec::new();
-        for step in 1..=MCF_STEPS[MCF_STEPS.len() - 1] {
-            flow.advance()?;
-            if MCF_STEPS.contains(&step) {
-                let time = step as f64 * params.mcf_step;
-                let exact = ball((radius * radius - 4.0 * time).max(0.0).sqrt(), n)?;
-                errors.push(l2_distance(&flow.field()?, &exact)?);
-            }
-        }
-        mcf.push(errors);
-    }
-    let elements = FiniteElementStep::implicit(initial.grid(), params.eps, params.mcf_step)?;
-    let still = |&scheme: &Scheme| stand_still(&initial, scheme, willmore_steps, network, device);
-    let schemes = Method::Hybrid.schemes(Flow::Willmore);
-    Ok(Measurement {
-        radius,
-        mcf,
-        w_elements: elements.willmore_energy(&initial)?,
-        willmore: schemes.iter().map(still).collect::<Result<_, _>>()?,
-    })
-}
-
-/// Willmore flow from a sphere.
-fn stand_still(
-    initial: &Field<3>,
-    scheme: Scheme,
-    steps: usize,
-    network: &Network,
-    device: &ComputeDevice,
-) -> Result<Still, Error> {
-    let method = Method::Hybrid;
-    let mut params = scales(initial.grid().spacing().recip().round() as usize);
-    let (network, factors) = method.prepare(scheme, Some(network), initial.grid(), &params)?;
-    params.calibration = factors;
-    let linear = LinearSolver::default();
-    let mut flow = method.willmore_flow(network.as_ref(), initial, params, linear, device)?;
-    let mut records = Vec::new();
-    for _ in 0..steps {
-        records.push(flow.advance(TAU)?);
-    }
-    let count = records.len() as f64;
-    let first = records.first().map_or(f64::NAN, |r| r.energy_before);
-    let rises = records.iter().filter(|r| r.energy > r.energy_before);
-    Ok(Still {
-        scheme,
-        // Standing still costs 2 tau w.
-        w_learned: first / (2.0 * TAU),
-        w_relaxed: records.last().map_or(f64::NAN, |r| r.willmore_energy),
-        radius_change: radius_of(&flow.field()?) - radius_of(initial),
-        energy_increases: rises.count(),
-        hvp_per_step: records.iter().map(StepRecord::hvp).sum::<f64>() / count,
-    })
-}
-
-fn table(all: &[Measurement], n: usize) -> Result<Table, Error> {
-    let head = [Column::number("radius", Format::Fixed(2))];
-    let errors = variants().flat_map(|(method, scheme)| {
-        MCF_STEPS.map(|step| {
-            let name = format!("MCF error, {}, step {step}", method.label_in(scheme));
-            Column::number(name, Format::Fixed(5))
-        })
-    });
-    let energies = [
-        Column::number("w, FE measure", Format::Fixed(2)),
-        Column::number("w / 8π (FE)", Format::Fixed(4)),
-    ];
-    let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
-    let tail = schemes.flat_map(|&scheme| {
-        let label = Method::Hybrid.label_in(scheme);
-        [
-            Column::number(format!("w, {label}"), Format::Fixed(2)),
-            Column::number(format!("w in the end, {label}"), Format::Fixed(2)),
-            Column::number(format!("change of radius / h, {label}"), Format::Fixed(4)),
-            Column::number(format!("HVP/step, {label}"), Format::Fixed(1)),
-        ]
-    });
-    let mut table = Table::new(head.into_iter().chain(errors).chain(energies).chain(tail));
-    for m in all {
-        let errors = m.mcf.iter().flatten().map(|&error| error.into());
-        let flows = m.willmore.iter().flat_map(|still| {
-            [
-                still.w_learned.into(),
-                still.w_relaxed.into(),
-                (still.radius_change * n as f64).into(),
-                still.hvp_per_step.into(),
-            ]
+impl Spheres {
+    fn measure(&self, radius: f64, willmore_steps: usize) -> Result<Measurement, Error> {
+        let mcf_step = self.scales.mcf_step;
+        let still = self.case(
+            radius,
+            Flow::Willmore,
+            (Method::Hybrid, Scheme::Paper),
+            (TAU, 0),
+        )?;
+        let mcf = variants().map(|variant| {
+            let time = (mcf_step, MCF_STEPS[LAST]);
+            let run = self.run(self.case(radius, Flow::MeanCurvature, variant, time)?)?;
+            let error = |step: usize| run.records()[step - 1].measures["l2"];
+            Ok(MCF_STEPS.map(error))
         });
-        let energies = [m.w_elements, m.w_elements / SPHERE].map(Into::into);
-        let cells = [m.radius.into()].into_iter().chain(errors);
-        table.push(cells.chain(energies).chain(flows))?;
+        let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
+        let willmore = schemes.map(|&scheme| self.stand_still(radius, scheme, willmore_steps));
+        Ok(Measurement {
+            radius,
+            mcf: mcf.collect::<Result<_, Error>>()?,
+            w_elements: still.implicit_elements()?.willmore_energy(&still.initial)?,
+            willmore: willmore.collect::<Result<_, _>>()?,
+        })
     }
-    Ok(table)
+
+    fn case(
+        &self,
+        radius: f64,
+        flow: Flow,
+        variant: (Method, Scheme),
+        (tau, steps): (f64, usize),
+    ) -> Result<Case<3>, Error> {
+        let Self { grid, scales, .. } = *self;
+        let (networks, needed) = (self.networks.of(variant.1), needed_network());
+        let ball = move |grid, r| phase_field(grid, &Ball::new([0.5; 3], r)?, scales.eps);
+        let exact = move |grid, t| ball(grid, mean_curvature_radius(radius, t, 3));
+        let measures = match flow {
+            Flow::MeanCurvature => vec![Measure::distance_to(exact)],
+            Flow::Willmore => Measure::size(scales.eps),
+        };
+        Ok(Case {
+            shape: format!("sphere of radius {radius}"),
+            initial: ball(grid, radius)?,
+            region: None,
+            flow,
+            operator: Operator::new(variant, &networks, &needed, &grid, &scales)?,
+            scales,
+            steps: StepRule::Constant(tau).into(),
+            stops: vec![Stop::Steps(steps)],
+            measures,
+        })
+    }
+
+    fn run(&self, case: Case<3>) -> Result<Run<3>, Error> {
+        let mut run = Run::new(case, &self.device)?;
+        run.advance(None, &mut [], &Interrupt::never())?;
+        Ok(run)
+    }
+
+    fn stand_still(&self, radius: f64, scheme: Scheme, steps: usize) -> Result<Still, Error> {
+        let variant = (Method::Hybrid, scheme);
+        let run = self.run(self.case(radius, Flow::Willmore, variant, (TAU, steps))?)?;
+        let records = run.records();
+        let first = records.first().and_then(|record| record.minimization);
+        let last = records.last();
+        // Of the ball with that volume.
+        let radius = |volume: f64| (0.75 * volume / std::f64::consts::PI).cbrt();
+        let end = last.map_or(f64::NAN, |record| record.measures["volume"]);
+        let change = radius(end) - radius(run.start()["volume"]);
+        Ok(Still {
+            scheme,
+            w_learned: first.map_or(f64::NAN, |made| made.energy_at_rest()),
+            w_relaxed: last.and_then(Record::willmore_energy).unwrap_or(f64::NAN),
+            radius_change_over_h: change * self.grid.cells() as f64,
+            energy_increases: energy_increases(records),
+            hvp_per_step: mean_hvp(records),
+        })
+    }
 }
 
-/// Tells schemes apart where lines are short.
-fn marker(scheme: Scheme) -> Marker {
-    match scheme {
+fn table(all: &[Measurement]) -> Result<Table, Error> {
+    let mut table = Table::of(all).number("radius", Format::Fixed(2), |m| m.radius);
+    for (k, (method, scheme)) in variants().enumerate() {
+        for (j, step) in MCF_STEPS.into_iter().enumerate() {
+            let name = format!("MCF error, {}, step {step}", method.label_in(scheme));
+            table = table.number(name, Format::Fixed(5), move |m| m.mcf[k][j]);
+        }
+    }
+    table = (table.number("w, FE measure", Format::Fixed(2), |m| m.w_elements)).number(
+        "w / 8π (FE)",
+        Format::Fixed(4),
+        |m| m.w_elements / WILLMORE_ENERGY_SPHERE,
+    );
+    for (k, &scheme) in Method::Hybrid.schemes(Flow::Willmore).iter().enumerate() {
+        let label = Method::Hybrid.label_in(scheme);
+        table = table
+            .number(format!("w, {label}"), Format::Fixed(2), move |m| {
+                m.willmore[k].w_learned
+            })
+            .number(
+                format!("w in the end, {label}"),
+                Format::Fixed(2),
+                move |m| m.willmore[k].w_relaxed,
+            )
+            .number(
+                format!("change of radius / h, {label}"),
+                Format::Fixed(4),
+                move |m| m.willmore[k].radius_change_over_h,
+            )
+            .number(format!("HVP/step, {label}"), Format::Fixed(1), move |m| {
+                m.willmore[k].hvp_per_step
+            });
+    }
+    Ok(table.finish()?)
+}
+
+/// The curve of a method; markers tell schemes apart where lines are short.
+fn curve(
+    (method, scheme): (Method, Scheme),
+    all: &[Measurement],
+    value: impl Fn(&Measurement) -> f64,
+) -> Series {
+    let marker = match scheme {
         Scheme::Paper => Marker::Circle,
         Scheme::Calibrated => Marker::Triangle,
         Scheme::Accurate => Marker::Diamond,
-    }
-}
-
-fn figure(run: &RunOptions, all: &[Measurement], n: usize) -> Figure {
-    let last = MCF_STEPS.len() - 1;
-    let mut errors = LineChart::new(
-        format!("Mean curvature flow, {} steps", MCF_STEPS[last]),
-        Axis::linear("radius"),
-        Axis::log("L² error"),
-    );
-    for (k, (method, scheme)) in variants().enumerate() {
-        let points: Vec<[f64; 2]> = all.iter().map(|m| [m.radius, m.mcf[k][last]]).collect();
-        errors = errors.with_series(
-            Series::new(method.label_in(scheme), points)
-                .with_colour(method.colour_in(scheme))
-                .with_marker(marker(scheme)),
-        );
-    }
-    let curve = |f: &dyn Fn(&Measurement) -> f64| -> Vec<[f64; 2]> {
-        all.iter().map(|m| [m.radius, f(m)]).collect()
     };
-    let mut energies = LineChart::new("Willmore energy", Axis::linear("radius"), Axis::linear("w"))
-        .with_series(
-            Series::new("implicit FE measure", curve(&|m| m.w_elements))
-                .with_colour(1)
-                .with_marker(Marker::Square),
-        );
-    let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
-    for (k, &scheme) in schemes.enumerate() {
-        energies = energies.with_series(
-            Series::new(
-                Method::Hybrid.label_in(scheme),
-                curve(&|m| m.willmore[k].w_relaxed),
-            )
-            .with_colour(Method::Hybrid.colour_in(scheme))
-            .with_marker(marker(scheme)),
-        );
-    }
-    energies = energies.with_series(
-        Series::new("exact, 8π", curve(&|_| SPHERE))
-            .with_colour(Colour::Black)
-            .with_style(LineStyle::Dashed),
-    );
-    Figure::new(run.title("Spheres"), 2)
-        .with_panel(errors)
-        .with_panel(energies)
-        .with_note(format!(
-            "n = {n}, ε = 2/n, inner step 1/n². Energies by the schemes are those after the steps of Willmore flow, of the relaxed profile."
-        ))
+    Series::of(method.label_in(scheme), all, |m| [m.radius, value(m)])
+        .with_colour(look::colour(method, scheme))
+        .with_marker(marker)
 }
 
-fn summary(all: &[Measurement], n: usize, seconds: f64) -> Result<Summary, Error> {
+fn errors(all: &[Measurement]) -> LineChart {
+    let title = format!("Mean curvature flow, {} steps", MCF_STEPS[LAST]);
+    let curves = variants()
+        .enumerate()
+        .map(|(k, variant)| curve(variant, all, |m| m.mcf[k][LAST]));
+    LineChart::new(title, Axis::linear("radius"), Axis::log("L² error")).with_curves(curves)
+}
+
+fn energies(all: &[Measurement]) -> LineChart {
+    let elements = Series::of("implicit FE measure", all, |m| [m.radius, m.w_elements]);
+    let schemes = Method::Hybrid.schemes(Flow::Willmore).iter().enumerate();
+    let relaxed = schemes
+        .map(|(k, &scheme)| curve((Method::Hybrid, scheme), all, |m| m.willmore[k].w_relaxed));
+    let exact = Series::of("exact, 8π", all, |m| [m.radius, WILLMORE_ENERGY_SPHERE]);
+    LineChart::new("Willmore energy", Axis::linear("radius"), Axis::linear("w"))
+        .with_series(elements.with_colour(1).with_marker(Marker::Square))
+        .with_curves(relaxed)
+        .with_series(
+            exact
+                .with_colour(Colour::Black)
+                .with_style(LineStyle::Dashed),
+        )
+}
+
+fn summary(all: &[Measurement]) -> Result<Summary, Error> {
     let mut summary = Summary::new();
     for m in all {
         let sphere = format!("spheres.r{:03.0}", 100.0 * m.radius);
@@ -351,11 +312,7 @@ fn summary(all: &[Measurement], n: usize, seconds: f64) -> Result<Summary, Error
                 Scheme::Paper => sphere.clone(),
                 other => format!("{sphere}.{}", Method::Hybrid.key_in(other)),
             };
-            summary.insert(&format!("{key}.w_learned"), still.w_learned)?;
-            summary.insert(&format!("{key}.w_relaxed"), still.w_relaxed)?;
-            let change = still.radius_change * n as f64;
-            summary.insert(&format!("{key}.radius_change_over_h"), change)?;
-            summary.insert_count(&format!("{key}.energy_increases"), still.energy_increases)?;
+            summary.insert_record(&key, still)?;
         }
         for ((method, scheme), errors) in variants().zip(&m.mcf) {
             for (step, error) in MCF_STEPS.iter().zip(errors) {
@@ -364,6 +321,5 @@ fn summary(all: &[Measurement], n: usize, seconds: f64) -> Result<Summary, Error
             }
         }
     }
-    summary.insert("seconds", seconds)?;
     Ok(summary)
 }

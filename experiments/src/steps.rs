@@ -1,0 +1,85 @@
+//! The steps of runs as a table.
+
+use std::collections::BTreeSet;
+
+use engine::{Record, Values};
+use report::{Cell, Table};
+
+use crate::Error;
+
+/// A run in a table of steps.
+pub struct Rows<'a> {
+    /// Which run it is: a cell for each leading column.
+    pub leading: Vec<Cell>,
+    /// The measures of the initial phase field, if there is to be a row for them.
+    pub start: Option<&'a Values>,
+    /// Its steps.
+    pub records: &'a [Record],
+}
+
+/// A row for every step: the leading columns, step, time and size, a column for every measure, and what the minimization did.
+///
+/// # Errors
+/// [`Error::Report`] for numbers that are not finite.
+pub fn table(leading: &[&str], runs: &[Rows<'_>]) -> Result<Table, Error> {
+    let records = || runs.iter().flat_map(|run| run.records);
+    let values = records().map(|record| &record.measures);
+    let values = values.chain(runs.iter().filter_map(|run| run.start));
+    let measures: BTreeSet<&str> = values.flat_map(|v| v.keys().map(String::as_str)).collect();
+    let minimization = MINIMIZATION.map(|(name, _)| name);
+    let names = (leading.iter().chain(&["step", "time", "tau"]))
+        .chain(&measures)
+        .chain(&minimization)
+        .chain(&["halvings", "seconds"]);
+    let mut table = Table::data(names);
+    let measured = |values: &Values| -> Vec<Cell> {
+        let value = |name: &&str| values.get(*name).copied().into();
+        measures.iter().map(value).collect()
+    };
+    for run in runs {
+        if let Some(start) = run.start {
+            let mut row = run.leading.clone();
+            row.extend([0_usize.into(), 0.0.into(), Cell::Missing]);
+            row.extend(measured(start));
+            row.resize(table.columns().len(), Cell::Missing);
+            table.push(row)?;
+        }
+        for record in run.records {
+            let mut row = run.leading.clone();
+            row.extend([record.step.into(), record.time.into(), record.tau.into()]);
+            row.extend(measured(&record.measures));
+            row.extend(MINIMIZATION.map(|(_, of)| of(record)));
+            row.extend([(record.halvings as usize).into(), record.seconds.into()]);
+            table.push(row)?;
+        }
+    }
+    Ok(table)
+}
+
+/// Columns that are empty for mean curvature flow.
+const MINIMIZATION: [(&str, fn(&Record) -> Cell); 10] = [
+    ("energy_before", |r| {
+        r.minimization.map(|m| m.energy_before).into()
+    }),
+    ("energy", |r| r.minimization.map(|m| m.energy).into()),
+    ("willmore_energy", |r| r.willmore_energy().into()),
+    ("exit", |r| exit(r)),
+    ("newton", |r| r.minimization.map(|m| m.newton.newton).into()),
+    ("hvp", |r| r.hvp().into()),
+    ("values", |r| r.minimization.map(|m| m.newton.values).into()),
+    ("gradients", |r| {
+        r.minimization.map(|m| m.newton.gradients).into()
+    }),
+    ("negative_curvature", |r| {
+        r.minimization.map(|m| m.newton.negative_curvature).into()
+    }),
+    ("estimate", |r| {
+        r.minimization.map(|m| m.newton.estimate).into()
+    }),
+];
+
+/// Why a minimization ended, as serde writes it.
+fn exit(record: &Record) -> Cell {
+    let exit = serde_json::to_value(record.minimization.map(|made| made.newton.exit));
+    exit.ok().as_ref().and_then(|name| name.as_str()).into()
+}

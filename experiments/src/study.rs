@@ -1,0 +1,223 @@
+//! Studies in the plane at the scales of the convergence tests: methods in their schemes at several resolutions.
+
+use std::collections::BTreeMap;
+
+use clap::Args;
+use engine::{
+    Case, Error as EngineError, Flow, Method, Operator, Scales, Scheme, StepRule, Stop, checksum,
+};
+use geometry::Field;
+use report::{Cell, LineChart, Series};
+use serde::Serialize;
+use solver::StepRecord;
+
+use crate::networks::{Chosen, NetworkOptions, STEP, convergence_network, scales};
+use crate::options::{RunOptions, resolutions};
+use crate::{Error, look};
+
+/// Options of the studies.
+#[derive(Args, Clone, Debug)]
+pub struct StudyOptions {
+    /// Common options.
+    #[command(flatten)]
+    pub run: RunOptions,
+
+    /// Networks.
+    #[command(flatten)]
+    pub networks: NetworkOptions,
+
+    /// Cells per unit length, separated by commas [default: 128,256; with --full 128,256,512]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub cells: Vec<usize>,
+
+    /// Add n = 512
+    #[arg(long, conflicts_with = "cells")]
+    pub full: bool,
+
+    /// Methods, separated by commas [default: all for mean curvature flow; for Willmore flow see above]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
+    pub methods: Vec<Method>,
+
+    /// One scheme alone, where it makes a difference: paper, calibrated, or accurate, which is calibrated with the network of
+    /// the accurate recipe [default: all]
+    #[arg(long, value_name = "NAME", value_enum)]
+    pub scheme: Option<Scheme>,
+}
+
+impl StudyOptions {
+    /// Resolutions in increasing order.
+    pub fn cells(&self) -> Vec<usize> {
+        resolutions(&self.cells, self.run.quick, self.full)
+    }
+
+    /// The chosen methods in their schemes at all resolutions; without a choice those that are `usual` at a resolution.
+    pub fn variants(&self, flow: Flow, usual: impl Fn(Method, usize) -> bool) -> Vec<Variant> {
+        let chosen = |method: Method, n: usize| match &self.methods[..] {
+            [] => usual(method, n),
+            methods => methods.contains(&method),
+        };
+        let mut variants = Vec::new();
+        for method in Method::ALL {
+            for scheme in method.chosen_schemes(flow, self.scheme) {
+                let cells = self.cells().into_iter().filter(|&n| chosen(method, n));
+                variants.extend(cells.map(|n| Variant {
+                    flow,
+                    method,
+                    scheme,
+                    n,
+                }));
+            }
+        }
+        variants
+    }
+}
+
+/// A curve in the figures of a study.
+#[derive(Serialize, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Variant {
+    /// Which flow.
+    pub flow: Flow,
+    /// Which method.
+    pub method: Method,
+    /// Which scheme of Willmore flow.
+    pub scheme: Scheme,
+    /// Cells per unit length.
+    pub n: usize,
+}
+
+impl Variant {
+    /// Columns of tables that say which variant it is.
+    pub const COLUMNS: [&str; 4] = ["flow", "n", "method", "scheme"];
+
+    /// Their cells.
+    pub fn cells(&self) -> [Cell; 4] {
+        let texts = [self.flow.key(), self.method.key(), self.scheme.key()];
+        let [flow, method, scheme] = texts.map(Cell::from);
+        [flow, self.n.into(), method, scheme]
+    }
+
+    /// Name in metrics after the flow or shape, such as `n128.hybrid_calibrated`.
+    pub fn key(&self) -> String {
+        format!("n{}.{}", self.n, self.method.key_in(self.scheme))
+    }
+
+    /// Name in legends.
+    pub fn label(&self) -> String {
+        self.method.label_in(self.scheme)
+    }
+
+    fn look(&self) -> (Method, Scheme) {
+        (self.method, self.scheme)
+    }
+}
+
+/// What is compared with what, with all operators.
+pub struct Study {
+    /// All resolutions.
+    pub cells: Vec<usize>,
+    /// Variants with their operators.
+    pub plan: Vec<(Variant, Operator)>,
+    /// Where the networks come from.
+    pub networks: Chosen,
+}
+
+impl Study {
+    /// The operators of all variants; variants without a network are left out if the accurate recipe has one for the resolution.
+    ///
+    /// # Errors
+    /// What the networks refuse: see [`NetworkOptions::load`] and [`Chosen::operator`].
+    pub fn new(options: &NetworkOptions, variants: &[Variant]) -> Result<Self, Error> {
+        let learned = variants.iter().filter(|v| v.method.is_learned());
+        let needs = learned
+            .map(|v| convergence_network(v.n))
+            .collect::<Result<Vec<_>, _>>()?;
+        let networks = options.load(&needs)?;
+        let mut study = Self {
+            cells: variants.iter().map(|v| v.n).collect(),
+            plan: Vec::new(),
+            networks,
+        };
+        study.cells.sort_unstable();
+        study.cells.dedup();
+        for variant in variants {
+            match study.networks.operator(variant.look(), variant.n) {
+                Ok(operator) => study.plan.push((*variant, operator)),
+                Err(Error::Engine(EngineError::MissingNetwork { .. }))
+                    if study
+                        .networks
+                        .find(Scheme::Accurate, &convergence_network(variant.n)?)
+                        .is_ok() => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(study)
+    }
+
+    /// The variants.
+    pub fn variants(&self) -> impl Iterator<Item = Variant> {
+        self.plan.iter().map(|(variant, _)| *variant)
+    }
+
+    /// Checksums of the networks of the paper's recipe, for the manifest.
+    pub fn checksums(&self) -> BTreeMap<String, String> {
+        let learned = self
+            .plan
+            .iter()
+            .filter(|(variant, _)| variant.scheme == Scheme::Paper);
+        let named = learned.filter_map(|(variant, operator)| {
+            Some((
+                format!("n{}", variant.n),
+                checksum(&operator.network()?.network),
+            ))
+        });
+        named.collect()
+    }
+
+    /// The curve of a variant.
+    pub fn series(&self, variant: Variant, points: Vec<[f64; 2]>) -> Series {
+        look::curve(points, variant.look(), (variant.n, &self.cells))
+    }
+
+    /// A chart of such curves with the legend for all variants.
+    pub fn chart(&self, chart: LineChart, curves: impl IntoIterator<Item = Series>) -> LineChart {
+        let shown =
+            look::variants(|wanted| self.variants().any(|variant| variant.look() == wanted));
+        look::legend(chart.with_curves(curves), shown, &self.cells)
+    }
+}
+
+/// A flow at the scales of the convergence tests in equal steps, with nothing measured; the inner step of mean curvature flow is its step.
+pub fn case(
+    (flow, operator): (Flow, &Operator),
+    shape: impl Into<String>,
+    initial: Field<2>,
+    (tau, steps): (f64, usize),
+) -> Case<2> {
+    let mcf_step = match flow {
+        Flow::MeanCurvature => tau,
+        Flow::Willmore => STEP,
+    };
+    Case {
+        shape: shape.into(),
+        initial,
+        region: None,
+        flow,
+        operator: operator.clone(),
+        scales: Scales {
+            mcf_step,
+            ..scales()
+        },
+        steps: StepRule::Constant(tau).into(),
+        stops: vec![Stop::Steps(steps)],
+        measures: Vec::new(),
+    }
+}
+
+/// Mean over minimizations; nothing without any.
+pub fn mean<'a>(
+    minimizations: impl Iterator<Item = &'a StepRecord>,
+    of: impl Fn(&StepRecord) -> f64,
+) -> Option<f64> {
+    let values: Vec<f64> = minimizations.map(of).collect();
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
