@@ -36,7 +36,6 @@ pub mod networks;
 pub mod options;
 pub mod products;
 pub mod quality;
-pub mod records;
 pub mod session;
 pub mod steps;
 pub mod study;

@@ -6,10 +6,9 @@ use geometry::UpAxis;
 use serde_json::json;
 
 use crate::meshes::{KnownMesh, MeshOptions};
+use crate::options::FigureOptions;
 use crate::session::Session;
-use crate::surfaces::{
-    self, Flowed, SchemeOptions, Surface, SurfaceOptions, View, needed_network, scales,
-};
+use crate::surfaces::{self, Flowed, SchemeOptions, Surface, View, needed_network, scales};
 use crate::{Error, memory};
 
 /// Options of the programs.
@@ -17,7 +16,7 @@ use crate::{Error, memory};
 pub struct MeshFlowOptions {
     /// Common options.
     #[command(flatten)]
-    surface: SurfaceOptions,
+    figure: FigureOptions,
 
     /// The mesh.
     #[command(flatten)]
@@ -76,8 +75,8 @@ impl MeshFlow {
         options: &MeshFlowOptions,
         remarks: impl FnOnce(&mut Session<'_>, &mut [Flowed]) -> Result<Remarks, Error>,
     ) -> Result<(), Error> {
-        let run = &options.surface.run;
-        let n = options.surface.cells([32, self.cells]);
+        let run = &options.figure.run;
+        let n = options.figure.cells([32, self.cells]);
         let steps = options
             .steps
             .unwrap_or(if run.quick { 2 } else { self.steps });
@@ -85,7 +84,7 @@ impl MeshFlow {
             return Err(Error::Options("--steps must be at least 1".to_owned()));
         }
         let device = run.open_device()?;
-        let networks = options.surface.networks()?;
+        let networks = options.figure.networks.load(&[needed_network()])?;
         let network = networks.find(Scheme::Paper, &needed_network())?.network;
         let (grid, scales) = (options.mesh.grid(&self.mesh, n)?, scales(n));
         let mesh = options.mesh.load(&self.mesh, &grid)?;
@@ -120,14 +119,14 @@ impl MeshFlow {
             )?;
             let title = &mesh.about.title;
             let time = (self.tau, steps);
+            let case = surfaces::willmore_flow(title, initial.clone(), operator, scales, time);
             let surface = Surface {
                 key: self.program,
                 title: title.clone(),
-                case: surfaces::willmore_flow(title, initial.clone(), operator, scales, time),
                 shown: shown.collect(),
                 view: View { up, ..self.view },
             };
-            flowed.push(surface.flow(&mut session)?);
+            flowed.push(surface.flow(case, &mut session)?);
         }
         let remarks = remarks(&mut session, &mut flowed)?;
         let title = format!("Willmore flow: {}", mesh.about.title);

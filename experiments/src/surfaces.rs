@@ -10,10 +10,8 @@ use render::{Bounds, Framing, Quality, Rgb, Scene, Tube};
 use report::{Figure, Format, OutputDir, Raster, Summary, Table};
 use surfaces::ClosedMesh;
 
-use crate::networks::{Chosen, NetworkOptions};
-use crate::options::RunOptions;
-use crate::records::step_rows;
 use crate::session::Session;
+use crate::steps::steps_csv;
 use crate::{Error, memory};
 
 /// Interface width of surfaces, in cells.
@@ -66,38 +64,6 @@ pub fn willmore_flow(
     }
 }
 
-/// Options of the programs with surfaces.
-#[derive(Args, Clone, Debug)]
-pub struct SurfaceOptions {
-    /// Common options.
-    #[command(flatten)]
-    pub run: RunOptions,
-
-    /// Networks.
-    #[command(flatten)]
-    networks: NetworkOptions,
-
-    /// Cells per unit length; eps = 2/n and tautilde = 1/n^2 follow [default: that of the paper]
-    #[arg(long, value_name = "N")]
-    cells: Option<usize>,
-}
-
-impl SurfaceOptions {
-    /// Cells per unit length: those chosen, or the usual ones of a quick run or of the paper.
-    pub fn cells(&self, [quick, paper]: [usize; 2]) -> usize {
-        let usual = if self.run.quick { quick } else { paper };
-        self.cells.unwrap_or(usual)
-    }
-
-    /// Where networks come from.
-    ///
-    /// # Errors
-    /// [`Error::Engine`] if one of the user's is not for surfaces.
-    pub fn networks(&self) -> Result<Chosen, Error> {
-        self.networks.load(&[needed_network()])
-    }
-}
-
 /// Which schemes.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct SchemeOptions {
@@ -125,19 +91,28 @@ pub struct View {
     pub elevation: f64,
 }
 
-/// A surface that is to flow.
+/// What is shown of a surface that flows.
 pub struct Surface {
     /// Prefix of its metrics and files.
     pub key: &'static str,
     /// Name in titles and tables.
     pub title: String,
-    /// How it flows.
-    pub case: Case<3>,
     /// Steps to be shown, and the Willmore energies that the paper reports for them. Of a run that ends early the last one is shown.
     pub shown: Vec<(usize, Option<f64>)>,
     /// Direction of view.
     pub view: View,
 }
+
+/// The measures of a shown step: name in metrics, column and digits in tables. `w` is the Willmore energy of the phase field with the
+/// implicit finite-element step and the mass-matrix norm, `w_scheme` what the flow minimizes, with its own operator and calibration;
+/// the Euler characteristic is that of the isosurface `u = 0`.
+const MEASURES: [(&str, &str, usize); 5] = [
+    ("w", "w", 2),
+    ("w_scheme", "w of the scheme", 2),
+    ("perimeter", "area", 4),
+    ("volume", "volume", 5),
+    ("euler_characteristic", "Euler characteristic", 0),
+];
 
 /// A shown step.
 pub struct Snapshot {
@@ -145,31 +120,26 @@ pub struct Snapshot {
     pub step: usize,
     /// Its time.
     pub time: f64,
-    /// The Willmore energy `w` of the phase field, with the implicit finite-element step and the mass-matrix norm.
-    pub w: f64,
-    /// The same as the scheme measures it, with its own operator and calibration: what the flow minimizes.
-    w_scheme: f64,
-    /// What the paper reports.
+    measures: [f64; MEASURES.len()],
+    /// The Willmore energy that the paper reports.
     paper: Option<f64>,
-    /// Perimeter `P_eps`, the area of the surface.
-    perimeter: f64,
-    /// Volume inside.
-    volume: f64,
-    /// Euler characteristic of the isosurface `u = 0`.
-    euler_characteristic: f64,
     /// What stands below the picture.
     pub caption: String,
     /// Curves drawn into the picture.
     pub tubes: Vec<Tube>,
 }
 
+impl Snapshot {
+    /// The Willmore energy.
+    pub fn w(&self) -> f64 {
+        self.measures[0]
+    }
+}
+
 /// A surface that has flowed.
 pub struct Flowed {
-    /// Prefix of its metrics and files, whatever the method.
-    pub surface: &'static str,
-    /// Name in titles and tables.
-    pub title: String,
-    view: View,
+    /// What is shown of it.
+    pub surface: Surface,
     /// All steps.
     pub trajectory: Trajectory<3>,
     /// The shown ones.
@@ -185,38 +155,30 @@ impl Surface {
     ///
     /// # Errors
     /// What the flow and the measurement raise.
-    pub fn flow(self, session: &mut Session<'_>) -> Result<Flowed, Error> {
-        let Self { key, title, .. } = self;
-        let n = self.case.grid().spacing().recip().round();
-        let run = format!("{title}, {}, n = {n}", self.case.operator.label());
-        let folder = format!("{key}-{}", self.case.operator.key());
+    pub fn flow(self, case: Case<3>, session: &mut Session<'_>) -> Result<Flowed, Error> {
+        let n = case.grid().spacing().recip().round();
+        let run = format!("{}, {}, n = {n}", self.title, case.operator.label());
+        let folder = format!("{}-{}", self.key, case.operator.key());
         let mut samples = Samples::every(usize::MAX);
         samples.also = self.shown.iter().map(|(step, _)| *step).collect();
-        let trajectory = session.trajectory(&run, self.case, &folder, &samples)?;
+        let trajectory = session.trajectory(&run, case, &folder, &samples)?;
         let mut flowed = Flowed {
-            surface: key,
-            title,
-            view: self.view,
+            surface: self,
             trajectory,
             snapshots: Vec::new(),
             metrics: Vec::new(),
             peak_mib: memory::peak_mib(),
         };
         memory::release_freed();
-        let papers = |step: usize| {
-            let found = self.shown.iter().find(|(shown, _)| *shown == step);
-            found.and_then(|(_, w)| w.filter(|_| !session.options.quick))
-        };
         let last = flowed.trajectory.steps();
-        let mut steps: Vec<usize> = samples.also.into_iter().filter(|k| *k < last).collect();
-        steps.push(last);
-        let measures = format!("{}: measures", flowed.title);
+        samples.also.retain(|step| *step < last);
+        samples.also.push(last);
+        let measures = format!("{}: measures", flowed.surface.title);
+        let (output, quick) = (&session.output, session.options.quick);
         flowed.snapshots = session.manifest.phase(measures, || {
-            let snapshot = |step| flowed.snapshot(step, papers(step), &session.output);
-            steps
-                .into_iter()
-                .map(snapshot)
-                .collect::<Result<_, Error>>()
+            let steps = samples.also.into_iter();
+            let snapshots = steps.map(|step| flowed.snapshot(step, output, quick));
+            snapshots.collect::<Result<_, Error>>()
         })?;
         Ok(flowed)
     }
@@ -224,12 +186,7 @@ impl Surface {
 
 impl Flowed {
     /// Measures the phase field after a step, and writes its isosurface.
-    fn snapshot(
-        &self,
-        step: usize,
-        paper: Option<f64>,
-        output: &OutputDir,
-    ) -> Result<Snapshot, Error> {
+    fn snapshot(&self, step: usize, output: &OutputDir, quick: bool) -> Result<Snapshot, Error> {
         let (case, u) = (&self.trajectory.case, self.trajectory.field(step)?);
         // The isosurface is closed by construction; whoever uses the file relies on it.
         let (mesh, _) = ClosedMesh::new(surfaces::phase_field_surface(&u, case.scales.eps)?)?;
@@ -238,18 +195,22 @@ impl Flowed {
         let record = self.trajectory.record(step);
         let at_rest = |first: &Record| first.minimization.map(|made| made.energy_at_rest());
         let at_start = || self.trajectory.records.first().and_then(at_rest);
-        let measures = self.trajectory.measures(step)?;
+        let w_scheme = record.map_or_else(at_start, Record::willmore_energy);
+        let measured = self.trajectory.measures(step)?;
         let w = case.implicit_elements()?.willmore_energy(&u)?;
         memory::release_freed();
+        let reported = self.surface.shown.iter().find(|(shown, _)| *shown == step);
         Ok(Snapshot {
             step,
             time: record.map_or(0.0, |r| r.time),
-            w,
-            w_scheme: (record.map_or_else(at_start, Record::willmore_energy)).unwrap_or(f64::NAN),
-            paper,
-            perimeter: measures["perimeter"],
-            volume: measures["volume"],
-            euler_characteristic: mesh.euler_characteristic() as f64,
+            measures: [
+                w,
+                w_scheme.unwrap_or(f64::NAN),
+                measured["perimeter"],
+                measured["volume"],
+                mesh.euler_characteristic() as f64,
+            ],
+            paper: reported.filter(|_| !quick).and_then(|(_, w)| *w),
             caption: format!("step {step}: w = {w:.2}"),
             tubes: Vec::new(),
         })
@@ -258,7 +219,7 @@ impl Flowed {
     /// Name of the files of a step.
     fn file(&self, step: usize) -> String {
         let operator = self.trajectory.case.operator.key();
-        format!("{}_{operator}_step{step:03}", self.surface)
+        format!("{}_{operator}_step{step:03}", self.surface.key)
     }
 
     /// Name of method and scheme.
@@ -270,29 +231,10 @@ impl Flowed {
     pub fn key(&self) -> String {
         let operator = &self.trajectory.case.operator;
         if operator.method.is_learned() && operator.scheme == Scheme::Paper {
-            self.surface.to_owned()
+            self.surface.key.to_owned()
         } else {
-            format!("{}.{}", self.surface, operator.key())
+            format!("{}.{}", self.surface.key, operator.key())
         }
-    }
-
-    /// Adds the metrics of the run.
-    ///
-    /// # Errors
-    /// [`Error::Report`] for a value that is not finite.
-    pub fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
-        let (key, records) = (self.key(), &self.trajectory.records);
-        self.summarize_shapes(&key, summary)?;
-        summary.insert(&format!("{key}.hvp_per_step"), mean_hvp(records))?;
-        summary.insert_count(
-            &format!("{key}.energy_increases"),
-            energy_increases(records),
-        )?;
-        summary.insert(&format!("{key}.seconds"), self.trajectory.seconds())?;
-        for (name, value) in &self.metrics {
-            summary.insert(&format!("{key}.{name}"), *value)?;
-        }
-        Ok(())
     }
 
     /// Adds the metrics of the shown shapes, and the memory that they took.
@@ -300,15 +242,9 @@ impl Flowed {
     /// # Errors
     /// [`Error::Report`] for a value that is not finite.
     pub fn summarize_shapes(&self, key: &str, summary: &mut Summary) -> Result<(), Error> {
-        for s in &self.snapshots {
-            for (name, value) in [
-                ("w", s.w),
-                ("w_scheme", s.w_scheme),
-                ("perimeter", s.perimeter),
-                ("volume", s.volume),
-                ("euler_characteristic", s.euler_characteristic),
-            ] {
-                summary.insert(&format!("{key}.{name}.step{}", s.step), value)?;
+        for shown in &self.snapshots {
+            for ((name, ..), value) in MEASURES.iter().zip(shown.measures) {
+                summary.insert(&format!("{key}.{name}.step{}", shown.step), value)?;
             }
         }
         if let Some(peak) = self.peak_mib {
@@ -359,16 +295,16 @@ impl Flowed {
     }
 
     fn scene(&self, snapshot: &Snapshot) -> Result<Scene<'static>, Error> {
-        let case = &self.trajectory.case;
+        let (case, view) = (&self.trajectory.case, self.surface.view);
         let mut scene = Scene::new(&self.trajectory.field(snapshot.step)?, case.scales.eps)?;
         if let Some(region) = &case.region {
             let mask = region.iter().map(|&moves| f64::from(moves)).collect();
             scene = scene.highlight_mask(&Field::from_values(*case.grid(), mask)?, MOVING)?;
         }
         Ok(scene
-            .up(self.view.up)
-            .azimuth(self.view.azimuth)
-            .elevation(self.view.elevation)
+            .up(view.up)
+            .azimuth(view.azimuth)
+            .elevation(view.elevation)
             .margin(MARGIN)
             .tubes(snapshot.tubes.clone()))
     }
@@ -390,14 +326,17 @@ pub fn write(
         (all.iter().map(|one| one.pictures(output, quick, SIDE))).collect::<Result<Vec<_>, _>>()
     })?;
     let columns = pictures.iter().map(Vec::len).max();
-    let row = |one: &Flowed| format!("{}\n{}", one.title, one.label().replace(", ", "\n"));
+    let row = |one: &Flowed| {
+        let operator = one.label().replace(", ", "\n");
+        format!("{}\n{operator}", one.surface.title)
+    };
     Figure::new(session.options.title(title), columns.unwrap_or(1))
         .with_row_labels(all.iter().map(row))
         .with_panels(pictures.into_iter().flatten())
         .with_note(note)
         .write(output, "surfaces")?;
-    let runs = all.iter().map(|one| (one.surface, &one.trajectory));
-    output.write_csv("steps.csv", step_rows(runs))?;
+    let runs = all.iter().map(|one| (one.surface.key, &one.trajectory));
+    output.write("steps.csv", steps_csv("surface", runs)?)?;
     let table = table(all)?;
     table.write(output, "energies")?;
     Ok(table.to_markdown())
@@ -409,7 +348,17 @@ pub fn write(
 /// [`Error::Report`] for a value that is not finite.
 pub fn summary(all: &[Flowed]) -> Result<Summary, Error> {
     let mut summary = Summary::new();
-    all.iter().try_for_each(|one| one.summarize(&mut summary))?;
+    for one in all {
+        let (key, records) = (one.key(), &one.trajectory.records);
+        one.summarize_shapes(&key, &mut summary)?;
+        summary.insert(&format!("{key}.hvp_per_step"), mean_hvp(records))?;
+        let increases = energy_increases(records);
+        summary.insert_count(&format!("{key}.energy_increases"), increases)?;
+        summary.insert(&format!("{key}.seconds"), one.trajectory.seconds())?;
+        for (name, value) in &one.metrics {
+            summary.insert(&format!("{key}.{name}"), *value)?;
+        }
+    }
     Ok(summary)
 }
 
@@ -421,17 +370,17 @@ pub fn table(all: &[Flowed]) -> Result<Table, Error> {
     let rows: Vec<(&Flowed, &Snapshot)> = (all.iter())
         .flat_map(|one| one.snapshots.iter().map(move |shown| (one, shown)))
         .collect();
-    Ok(Table::of(&rows)
-        .text("surface", |(one, _)| one.title.as_str())
+    let mut table = Table::of(&rows)
+        .text("surface", |(one, _)| one.surface.title.as_str())
         .text("method", |(one, _)| one.label())
-        .number("step", Format::Shortest, |(_, s)| s.step)
-        .number("w", Format::Fixed(2), |(_, s)| s.w)
-        .number("w, paper", Format::Fixed(2), |(_, s)| s.paper)
-        .number("w of the scheme", Format::Fixed(2), |(_, s)| s.w_scheme)
-        .number("area", Format::Fixed(4), |(_, s)| s.perimeter)
-        .number("volume", Format::Fixed(5), |(_, s)| s.volume)
-        .number("Euler characteristic", Format::Fixed(0), |(_, s)| {
-            s.euler_characteristic
-        })
-        .finish()?)
+        .number("step", Format::Shortest, |(_, shown)| shown.step);
+    for (k, (_, name, digits)) in MEASURES.into_iter().enumerate() {
+        table = table.number(name, Format::Fixed(digits), move |(_, shown)| {
+            shown.measures[k]
+        });
+        if k == 0 {
+            table = table.number("w, paper", Format::Fixed(2), |(_, shown)| shown.paper);
+        }
+    }
+    Ok(table.finish()?)
 }

@@ -4,9 +4,10 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use engine::{Method, Operator, Scheme, StepRule, checksum};
+use experiments::options::FigureOptions;
 use experiments::session::Session;
 use experiments::surfaces::{
-    self, Flowed, SchemeOptions, Surface, SurfaceOptions, View, centred_box, needed_network, scales,
+    self, Flowed, SchemeOptions, Surface, View, centred_box, needed_network, scales,
 };
 use experiments::{Error, harness};
 use geometry::shapes::{Cuboid, Cylinder};
@@ -37,7 +38,7 @@ const VIEW: View = View {
 #[command(name = PROGRAM, version)]
 struct Options {
     #[command(flatten)]
-    surface: SurfaceOptions,
+    figure: FigureOptions,
 
     /// Number of time steps [default: 100]
     #[arg(long, value_name = "COUNT")]
@@ -88,8 +89,8 @@ fn program(options: &Options) -> Result<(), Error> {
         disk_half_height,
         ..
     } = *options;
-    let run = &options.surface.run;
-    let n = options.surface.cells(CELLS);
+    let run = &options.figure.run;
+    let n = options.figure.cells(CELLS);
     let steps = options.steps.unwrap_or(if run.quick { 2 } else { STEPS });
     if steps == 0 || options.methods.is_empty() {
         return Err(Error::Options(
@@ -97,7 +98,7 @@ fn program(options: &Options) -> Result<(), Error> {
         ));
     }
     let device = run.open_device()?;
-    let networks = options.surface.networks()?;
+    let networks = options.figure.networks.load(&[needed_network()])?;
     let network = networks.find(Scheme::Paper, &needed_network())?.network;
     let (grid, scales) = (centred_box(n, 1.0)?, scales(n));
     let cube = Cuboid::new([cube_half_side; 3])?.translated([0.5; 3]);
@@ -126,16 +127,16 @@ fn program(options: &Options) -> Result<(), Error> {
             let operator = Operator::new((method, scheme), &networks, &needed, &grid, &scales)?;
             let comparable = (method, scheme) == (Method::Hybrid, Scheme::Paper);
             let time = (StepRule::Constant(TAU), steps);
+            let case = surfaces::willmore_flow(title, initial.clone(), operator, scales, time);
             let surface = Surface {
                 key,
                 title: (*title).to_owned(),
-                case: surfaces::willmore_flow(title, initial.clone(), operator, scales, time),
                 shown: papers
                     .map(|(step, w)| (step, comparable.then_some(w)))
                     .to_vec(),
                 view: VIEW,
             };
-            all.push(surface.flow(&mut session)?);
+            all.push(surface.flow(case, &mut session)?);
         }
     }
     compare_with_finite_elements(&mut all)?;
@@ -150,8 +151,9 @@ fn program(options: &Options) -> Result<(), Error> {
 fn compare_with_finite_elements(all: &mut [Flowed]) -> Result<(), Error> {
     let method = |one: &Flowed| one.trajectory.case.operator.method;
     for k in 0..all.len() {
-        let is_partner =
-            |one: &&Flowed| one.surface == all[k].surface && method(one) == Method::FeImplicit;
+        let is_partner = |one: &&Flowed| {
+            one.surface.key == all[k].surface.key && method(one) == Method::FeImplicit
+        };
         let Some(elements) = all
             .iter()
             .find(is_partner)

@@ -66,7 +66,13 @@ fn shapes(options: &Options) -> Result<Vec<Shape<2>>, Error> {
     let disk = Ball::new([0.0; 2], RADIUS)?;
     let corner = Cuboid::new([0.5 * (0.5 - CORNER); 2])?.translated([0.5 * (CORNER + 0.5); 2]);
     let [length, width] = CROSS;
-    let steps = |papers: usize| if options.common.run.quick { 5 } else { papers };
+    let steps = |papers: usize| {
+        if options.common.figure.run.quick {
+            5
+        } else {
+            papers
+        }
+    };
     let shapes = [
         Shape {
             key: "disk",
@@ -107,8 +113,8 @@ fn main() -> ExitCode {
 }
 
 fn program(options: &Options) -> Result<(), Error> {
-    let run = &options.common.run;
-    let n = options.common.cells(CELLS);
+    let run = &options.common.figure.run;
+    let n = options.common.figure.cells(CELLS);
     let grid = Grid::<2>::per_unit(n, 1.0)?.with_origin([-0.5; 2])?;
     let mut scales = Scales::of_grid(1.0 / n as f64, EPS_OVER_H);
     // Steps are large here, tau/tautilde^2 up to 2^29: in single precision products would lose the slow modes of the Hessian.

@@ -128,8 +128,8 @@ fn main() -> ExitCode {
 }
 
 fn program(options: &Options) -> Result<(), Error> {
-    let run = &options.common.run;
-    let n = options.common.cells(CELLS);
+    let run = &options.common.figure.run;
+    let n = options.common.figure.cells(CELLS);
     if options.extra_steps > MOST_EXTRA {
         return Err(Error::Options(format!(
             "--extra-steps {} is too many: each step is twice as long as the one before; give at most {MOST_EXTRA}",
@@ -147,7 +147,6 @@ fn program(options: &Options) -> Result<(), Error> {
         let surface = Surface {
             key: shape.key,
             title: shape.title.to_owned(),
-            case: shape.case(grid, scales, &operator)?,
             shown: shape.shown.iter().map(|&step| (step, None)).collect(),
             view: View {
                 up: UpAxis::Z,
@@ -155,7 +154,8 @@ fn program(options: &Options) -> Result<(), Error> {
                 elevation: 25.0,
             },
         };
-        flowed.push(surface.flow(&mut session)?);
+        let case = shape.case(grid, scales, &operator)?;
+        flowed.push(surface.flow(case, &mut session)?);
     }
     table(&flowed)?.write(&session.output, "shapes")?;
     let (mut summary, mut inpainted) = (Summary::new(), Vec::new());
@@ -181,7 +181,7 @@ fn decorate(snapshots: &mut [Snapshot], measured: &Inpainted<'_, 3>) {
         if after > step as f64 {
             snapshot.caption += &format!(" (t = {after} τ)");
         }
-        snapshot.caption += &format!(": w = {:.2}", snapshot.w);
+        snapshot.caption += &format!(": w = {:.2}", snapshot.w());
         let distance = measured.distances.iter().find(|(k, _)| *k == step);
         if let Some((_, l2)) = distance.filter(|_| measured.shape.whole.is_some()) {
             snapshot.caption += &format!("\nL² distance to the ball {l2:.4}");

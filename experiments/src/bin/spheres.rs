@@ -8,8 +8,9 @@ use engine::{
     energy_increases, mean_hvp,
 };
 use experiments::networks::Chosen;
+use experiments::options::FigureOptions;
 use experiments::session::Session;
-use experiments::surfaces::{self, SurfaceOptions, centred_box, needed_network};
+use experiments::surfaces::{self, centred_box, needed_network};
 use experiments::training::{NetworkSpec, held_out_radii};
 use experiments::{Error, harness, look, quality};
 use geometry::exact::{WILLMORE_ENERGY_SPHERE, mean_curvature_radius};
@@ -41,7 +42,7 @@ const TAU: f64 = 1.0 / 262_144.0;
 #[command(name = PROGRAM, version)]
 struct Options {
     #[command(flatten)]
-    surface: SurfaceOptions,
+    figure: FigureOptions,
 }
 
 /// What was measured for one radius.
@@ -82,12 +83,12 @@ fn main() -> ExitCode {
 }
 
 fn program(options: &Options) -> Result<(), Error> {
-    let run = &options.surface.run;
-    let n = options.surface.cells(CELLS);
+    let run = &options.figure.run;
+    let n = options.figure.cells(CELLS);
     let radii = if run.quick { &RADII[2..4] } else { &RADII };
     let willmore_steps = if run.quick { 2 } else { WILLMORE_STEPS };
     let device = run.open_device()?;
-    let networks = options.surface.networks()?;
+    let networks = options.figure.networks.load(&[needed_network()])?;
     let network = networks.find(Scheme::Paper, &needed_network())?.network;
     let spheres = Spheres {
         grid: centred_box(n, 1.0)?,
