@@ -2,14 +2,17 @@
 
 use clap::Args;
 use engine::{
-    Case, Flow, Measure, NeededNetwork, Operator, Record, Samples, Scales, Scheme, StepRule, Stop,
-    Trajectory, energy_increases, mean_hvp,
+    Case, Flow, Measure, Method, NeededNetwork, Operator, Record, Samples, Scales, Scheme,
+    StepRule, Stop, Trajectory, checksum, energy_increases, mean_hvp,
 };
 use geometry::{Field, Grid, UpAxis};
 use render::{Bounds, Framing, Quality, Rgb, Scene, Tube};
 use report::{Figure, Format, OutputDir, Raster, Summary, Table};
+use serde_json::{Value, json};
 use surfaces::ClosedMesh;
 
+use crate::networks::Chosen;
+use crate::options::FigureOptions;
 use crate::session::Session;
 use crate::steps::steps_csv;
 use crate::{Error, memory};
@@ -41,6 +44,64 @@ pub fn needed_network() -> NeededNetwork {
 /// [`Error::Geometry`] unless `n` times the side is a whole number, at least 2.
 pub fn centred_box(n: usize, side: f64) -> Result<Grid<3>, Error> {
     Ok(Grid::per_unit(n, side)?.with_origin([0.5 - 0.5 * side; 3])?)
+}
+
+/// What surfaces at one resolution share.
+pub struct Setting {
+    /// Cells per unit length.
+    pub n: usize,
+    /// The box.
+    pub grid: Grid<3>,
+    /// The paper's scales.
+    pub scales: Scales,
+    networks: Chosen,
+}
+
+impl Setting {
+    /// A box of the given side, with the usual numbers of cells per unit length of a quick run and of the paper.
+    ///
+    /// # Errors
+    /// [`Error::Engine`] if one of the user's networks is not for surfaces, [`Error::Geometry`] as [`centred_box`].
+    pub fn new(options: &FigureOptions, usual: [usize; 2], side: f64) -> Result<Self, Error> {
+        let n = options.cells(usual);
+        Ok(Self {
+            networks: options.networks.load(&[needed_network()])?,
+            grid: centred_box(n, side)?,
+            scales: scales(n),
+            n,
+        })
+    }
+
+    /// The operator of a method in a scheme.
+    ///
+    /// # Errors
+    /// As [`Operator::new`].
+    pub fn operator(&self, variant: (Method, Scheme)) -> Result<Operator, Error> {
+        let (networks, needed) = (self.networks.of(variant.1), needed_network());
+        Ok(Operator::new(
+            variant,
+            &networks,
+            &needed,
+            &self.grid,
+            &self.scales,
+        )?)
+    }
+
+    /// The parameters of a program for its manifest: the common ones, and others.
+    ///
+    /// # Errors
+    /// As [`Self::operator`].
+    pub fn parameters(&self, others: Value) -> Result<Value, Error> {
+        let papers = self.operator((Method::Hybrid, Scheme::Paper))?;
+        let mut parameters = json!({
+            "n": self.n, "box_side": self.grid.side(), "eps": self.scales.eps, "mcf_step": self.scales.mcf_step,
+            "network": papers.network().map(|named| checksum(&named.network)),
+        });
+        if let (Value::Object(all), Value::Object(others)) = (&mut parameters, others) {
+            all.extend(others);
+        }
+        Ok(parameters)
+    }
 }
 
 /// Willmore flow as in the paper: everywhere, in whole steps.
@@ -92,6 +153,7 @@ pub struct View {
 }
 
 /// What is shown of a surface that flows.
+#[derive(Clone)]
 pub struct Surface {
     /// Prefix of its metrics and files.
     pub key: &'static str,
@@ -237,6 +299,24 @@ impl Flowed {
         }
     }
 
+    fn row_label(&self) -> String {
+        let operator = self.label().replace(", ", "\n");
+        format!("{}\n{operator}", self.surface.title)
+    }
+
+    fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
+        let (key, records) = (self.key(), &self.trajectory.records);
+        self.summarize_shapes(&key, summary)?;
+        summary.insert(&format!("{key}.hvp_per_step"), mean_hvp(records))?;
+        let increases = energy_increases(records);
+        summary.insert_count(&format!("{key}.energy_increases"), increases)?;
+        summary.insert(&format!("{key}.seconds"), self.trajectory.seconds())?;
+        for (name, value) in &self.metrics {
+            summary.insert(&format!("{key}.{name}"), *value)?;
+        }
+        Ok(())
+    }
+
     /// Adds the metrics of the shown shapes, and the memory that they took.
     ///
     /// # Errors
@@ -310,56 +390,88 @@ impl Flowed {
     }
 }
 
-/// Writes a figure with a row of pictures for each run, the table of the shown steps and the records of all steps, and returns the table
-/// as text.
-///
-/// # Errors
-/// What rendering and writing raise.
-pub fn write(
-    session: &mut Session<'_>,
-    title: &str,
-    note: String,
-    all: &[Flowed],
-) -> Result<String, Error> {
-    let (output, quick) = (&session.output, session.options.quick);
-    let pictures = session.manifest.phase("pictures", || {
-        (all.iter().map(|one| one.pictures(output, quick, SIDE))).collect::<Result<Vec<_>, _>>()
-    })?;
-    let columns = pictures.iter().map(Vec::len).max();
-    let row = |one: &Flowed| {
-        let operator = one.label().replace(", ", "\n");
-        format!("{}\n{operator}", one.surface.title)
-    };
-    Figure::new(session.options.title(title), columns.unwrap_or(1))
-        .with_row_labels(all.iter().map(row))
-        .with_panels(pictures.into_iter().flatten())
-        .with_note(note)
-        .write(output, "surfaces")?;
-    let runs = all.iter().map(|one| (one.surface.key, &one.trajectory));
-    output.write("steps.csv", steps_csv("surface", runs)?)?;
-    let table = table(all)?;
-    table.write(output, "energies")?;
-    Ok(table.to_markdown())
+/// Surfaces under Willmore flow by several methods, as a program shows them.
+pub struct SurfaceFlows {
+    /// Name of the program.
+    pub program: &'static str,
+    /// Title of the figure.
+    pub title: String,
+    /// The surfaces with their initial phase fields.
+    pub surfaces: Vec<(Surface, Field<3>)>,
+    /// Methods in their schemes.
+    pub variants: Vec<(Method, Scheme)>,
+    /// Sizes of the time steps, their number,
+    pub time: (StepRule, usize),
+    /// and their sizes in words, for the figure.
+    pub tau_in_words: &'static str,
 }
 
-/// The metrics of all runs.
-///
-/// # Errors
-/// [`Error::Report`] for a value that is not finite.
-pub fn summary(all: &[Flowed]) -> Result<Summary, Error> {
-    let mut summary = Summary::new();
-    for one in all {
-        let (key, records) = (one.key(), &one.trajectory.records);
-        one.summarize_shapes(&key, &mut summary)?;
-        summary.insert(&format!("{key}.hvp_per_step"), mean_hvp(records))?;
-        let increases = energy_increases(records);
-        summary.insert_count(&format!("{key}.energy_increases"), increases)?;
-        summary.insert(&format!("{key}.seconds"), one.trajectory.seconds())?;
-        for (name, value) in &one.metrics {
-            summary.insert(&format!("{key}.{name}"), *value)?;
+/// What a program says about its flows besides the usual.
+#[derive(Default)]
+pub struct Remarks {
+    /// Below the figure.
+    pub note: String,
+    /// Below the table on standard output.
+    pub report: String,
+}
+
+impl SurfaceFlows {
+    /// Lets all surfaces flow, and writes a figure with a row of pictures for each run, the table of the shown steps, the records of all
+    /// steps and the metrics. `remarks` looks at the flows, and may add to captions, pictures and metrics.
+    ///
+    /// # Errors
+    /// What flows, rendering and writing raise.
+    pub fn run(
+        self,
+        mut session: Session<'_>,
+        setting: &Setting,
+        remarks: impl FnOnce(&mut Session<'_>, &mut [Flowed]) -> Result<Remarks, Error>,
+    ) -> Result<(), Error> {
+        let mut all = Vec::new();
+        for (surface, initial) in &self.surfaces {
+            for &variant in &self.variants {
+                let mut surface = surface.clone();
+                // The paper reports energies of its own scheme.
+                let papers = variant == (Method::Hybrid, Scheme::Paper);
+                surface
+                    .shown
+                    .iter_mut()
+                    .for_each(|(_, w)| *w = w.filter(|_| papers));
+                let (title, operator) = (&surface.title, setting.operator(variant)?);
+                let case =
+                    willmore_flow(title, initial.clone(), operator, setting.scales, self.time);
+                all.push(surface.flow(case, &mut session)?);
+            }
         }
+        let remarks = remarks(&mut session, &mut all)?;
+        let (output, quick) = (&session.output, session.options.quick);
+        let pictures = session.manifest.phase("pictures", || {
+            (all.iter().map(|one| one.pictures(output, quick, SIDE))).collect::<Result<Vec<_>, _>>()
+        })?;
+        let columns = pictures.iter().map(Vec::len).max();
+        let figure = Figure::new(&self.title, columns.unwrap_or(1))
+            .with_row_labels(all.iter().map(Flowed::row_label))
+            .with_panels(pictures.into_iter().flatten())
+            .with_note(format!(
+                "n = {}, ε = 2/n, inner step 1/n², {}. w: Willmore energy with the implicit finite-element step; a sphere has 8π = 25.13.{}",
+                setting.n, self.tau_in_words, remarks.note
+            ));
+        session.figure(figure, "surfaces")?;
+        let runs = all.iter().map(|one| (one.surface.key, &one.trajectory));
+        output.write("steps.csv", steps_csv("surface", runs)?)?;
+        let table = table(&all)?;
+        table.write(output, "energies")?;
+        let mut summary = Summary::new();
+        all.iter().try_for_each(|one| one.summarize(&mut summary))?;
+        if let Some(peak) = memory::peak_mib() {
+            summary.insert(&format!("{}.peak_mib_with_pictures", self.program), peak)?;
+        }
+        session.finish(
+            &self.title,
+            summary,
+            &(table.to_markdown() + &remarks.report),
+        )
     }
-    Ok(summary)
 }
 
 /// Shown steps of all runs, beside the paper's energies.
