@@ -127,6 +127,8 @@ fn nelder_mead<const N: usize>(
     let along = |from: &[f64; N], to: &[f64; N], t: f64| -> [f64; N] {
         std::array::from_fn(|i| from[i] + (to[i] - from[i]) * t)
     };
+    type Vertex<const N: usize> = (f64, [f64; N]);
+    let better = |a: Vertex<N>, b: Vertex<N>| if a.0 < b.0 { a } else { b };
     let mut simplex = vec![vertex(start)];
     for axis in 0..N {
         let mut x = start;
@@ -147,19 +149,11 @@ fn nelder_mead<const N: usize>(
         let reflected = vertex(along(&centroid, &worst.1, -1.0));
         if reflected.0 < best.0 {
             let expanded = vertex(along(&centroid, &reflected.1, 2.0));
-            simplex[N] = if expanded.0 < reflected.0 {
-                expanded
-            } else {
-                reflected
-            };
+            simplex[N] = better(expanded, reflected);
         } else if reflected.0 < second_worst.0 {
             simplex[N] = reflected;
         } else {
-            let nearer = if reflected.0 < worst.0 {
-                reflected
-            } else {
-                worst
-            };
+            let nearer = better(reflected, worst);
             let contracted = vertex(along(&centroid, &nearer.1, 0.5));
             if contracted.0 < nearer.0 {
                 simplex[N] = contracted;

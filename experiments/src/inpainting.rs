@@ -44,27 +44,6 @@ impl InpaintingOptions {
     }
 }
 
-/// A region `D` with sides along the axes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Window<const D: usize> {
-    /// The corner with the smallest coordinates.
-    pub low: [f64; D],
-    /// The corner with the largest.
-    pub high: [f64; D],
-}
-
-impl<const D: usize> Window<D> {
-    /// Marks of the nodes inside.
-    fn nodes(&self, grid: &Grid<D>) -> Vec<bool> {
-        let Self { low, high } = self;
-        let inside = |node: usize| {
-            let x = grid.node(node);
-            (0..D).all(|axis| low[axis] < x[axis] && x[axis] < high[axis])
-        };
-        (0..grid.len()).map(inside).collect()
-    }
-}
-
 /// A shape that is inpainted.
 pub struct Shape<const D: usize> {
     /// Prefix of its metrics and files.
@@ -75,8 +54,8 @@ pub struct Shape<const D: usize> {
     pub initial: Box<dyn SignedDistance<D>>,
     /// What it should become, if that is known.
     pub whole: Option<Box<dyn SignedDistance<D>>>,
-    /// Where it may change.
-    pub region: Window<D>,
+    /// Where it may change: `D` holds the points all of whose coordinates lie between these.
+    pub region: [f64; 2],
     /// Sizes of the steps, which are made in substeps,
     pub rule: StepRule,
     /// and most of them.
@@ -98,10 +77,12 @@ impl<const D: usize> Shape<D> {
         scales: Scales,
         operator: &Operator,
     ) -> Result<Case<D>, Error> {
+        let [low, high] = self.region;
+        let moves = |node| grid.node(node).iter().all(|x| low < *x && *x < high);
         Ok(Case {
             shape: format!("inpainted {}", self.title),
             initial: phase_field(grid, &self.initial, scales.eps)?,
-            region: Some(self.region.nodes(&grid)),
+            region: Some((0..grid.len()).map(moves).collect()),
             flow: Flow::Willmore,
             operator: operator.clone(),
             scales,
