@@ -36,6 +36,7 @@ pub mod networks;
 pub mod options;
 pub mod products;
 pub mod quality;
+pub mod results;
 pub mod session;
 pub mod steps;
 pub mod study;

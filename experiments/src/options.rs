@@ -73,10 +73,7 @@ impl RunOptions {
         parameters: &impl Serialize,
         device: &ComputeDevice,
     ) -> Result<Manifest, Error> {
-        let place = match device.kind() {
-            DeviceKind::Flex | DeviceKind::NdArray => "cpu",
-            DeviceKind::Wgpu | DeviceKind::Cuda => "gpu",
-        };
+        let place = if device.kind().is_cpu() { "cpu" } else { "gpu" };
         let dtype = format!("{:?}", device.dtype()).to_lowercase();
         Ok(Manifest::start(program)
             .with_parameters(parameters)?

@@ -15,7 +15,7 @@ use geometry::shapes::{Ball, Capsule, Cuboid};
 use geometry::{Field, Grid, SignedDistanceExt, phase_field};
 use indicatif::ProgressBar;
 use model::{Network, Ratios};
-use operators::{ComputeDevice, DeviceKind};
+use operators::ComputeDevice;
 use report::{
     Axis, Colour, Column, Figure, Format, LegendEntry, LineChart, LineStyle, Marker, Series,
     Summary, Table,
@@ -134,7 +134,7 @@ fn program(options: &Options) -> Result<(), Error> {
         return Err(Error::Options("--turns must be positive".to_owned()));
     }
     let device = options.run.open_device()?;
-    if !matches!(device.kind(), DeviceKind::Flex | DeviceKind::NdArray) {
+    if !device.kind().is_cpu() {
         return Err(Error::Options(format!(
             "{PROGRAM} compares with products written for the CPU: choose --device flex or ndarray, not {}",
             device.kind()

@@ -110,9 +110,7 @@ fn findings<const D: usize>(
         ),
         passed: here.asymmetry <= limit,
     });
-    let other = DeviceKind::compiled().find(|&kind| {
-        kind != device.kind() && matches!(kind, DeviceKind::Flex | DeviceKind::NdArray)
-    });
+    let other = DeviceKind::compiled().find(|&kind| kind != device.kind() && kind.is_cpu());
     if let Some(kind) = other {
         let cpu = ComputeDevice::open(kind)?;
         let there = derivatives(field, &operator, options, &cpu)?;

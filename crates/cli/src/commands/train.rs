@@ -1,8 +1,8 @@
 //! `willmore train`.
 
-use model::training::least_squares::{self, LeastSquaresParams};
-use model::training::{Distillation, Progress, SphereData};
-use model::{Network, Provenance, Quality, Ratios};
+use model::Ratios;
+use model::training::least_squares::LeastSquaresParams;
+use model::training::{Checkpoint, Progress, SphereData, Trained, Training};
 use runs::Interrupt;
 use serde_json::json;
 
@@ -47,51 +47,33 @@ pub fn run(options: &TrainOptions) -> Result<Ending, Error> {
     }
     let device = open_device(&mut options.common.clone())?;
     let mut data = SphereData::new(ratios, (CELLS * eps_over_h / 2.0).round() as usize)?;
-    let mut params = LeastSquaresParams::default();
     if options.quick {
-        data.count = 12;
-        params.distillation = Distillation {
-            starts: 1,
-            start_iterations: 10,
-            iterations: 10,
-        };
+        data = data.quick();
     }
-    let seed = options.common.seed;
+    let training = Training {
+        recipe: &LeastSquaresParams::new(options.quick),
+        data,
+        seed: options.common.seed,
+        held_out: if options.quick { 2 } else { HELD_OUT },
+    };
     let interrupt = Interrupt::catch()?;
     let progress = run::progress(options.common.say);
     let bar = progress.bar("training", 1);
-    let mut training_loss = 0.0;
-    let mut observer = |state: &Progress, (): &()| {
-        bar.set_length(state.of as u64);
-        bar.set_position(state.iteration as u64);
-        training_loss = state.training_loss;
+    let mut observer = |at: &Progress, _: &Checkpoint<()>| {
+        bar.set_length(at.of as u64);
+        bar.set_position(at.iteration as u64);
         Ok(!interrupt.requested())
     };
-    let trained = least_squares::train(&data, &params, seed, &device, &mut observer);
+    let trained = training.run(&mut Checkpoint::default(), &device, &mut observer);
     bar.finish();
     progress.clear();
-    let (kernel, activation, _) = match trained {
+    let Trained {
+        network, quality, ..
+    } = match trained {
         Err(model::Error::Interrupted { .. }) => return Ok(Ending::Interrupted),
         trained => trained?,
     };
-    let mut provenance = Provenance {
-        recipe: "least squares, heat kernel".to_owned(),
-        reference_cells: data.cells,
-        seed,
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        training_loss,
-        held_out_loss: 0.0,
-        flipped_loss: 0.0,
-    };
-    let network = Network::new(ratios, kernel, activation, provenance.clone())?;
-    let held_out = if options.quick { 2 } else { HELD_OUT };
-    let quality = Quality::measure(&network, &data, held_out, &device)?;
-    provenance.held_out_loss = quality.held_out_loss;
-    provenance.flipped_loss = quality.flipped_loss;
-    let calibration = network.calibrate()?;
-    let network = network
-        .with_provenance(provenance)
-        .with_calibration(Some(calibration));
+    let calibration = network.calibration()?;
     network.save(save)?;
     let outcome = json!({
         "command": "train",
