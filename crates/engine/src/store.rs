@@ -121,9 +121,10 @@ impl Store {
     }
 
     fn write_tables<const D: usize>(&mut self, run: &Run<D>) -> Result<(), Error> {
-        let seconds: Vec<f64> = run.records.iter().map(|record| record.seconds).collect();
-        self.directory
-            .write_timings(&json!({ "seconds": seconds }))?;
+        let micros = run.records.iter().map(|r| (1e6 * r.seconds) as u64);
+        let micros: Vec<String> = micros.map(|time| time.to_string()).collect();
+        let timings = json!({ "microseconds": micros.join(" ") });
+        self.directory.write_timings(&timings)?;
         let table = to_csv(&run.records);
         self.directory
             .replace_file(METRICS, |out| out.write_all(table.as_bytes()))?;
@@ -164,12 +165,27 @@ pub fn initial<const D: usize>(stored: &StoredRun) -> Result<(Field<D>, Option<V
 
 /// All records of a stored run with their wall times.
 pub(crate) fn records(stored: &StoredRun) -> Result<Vec<Record>, Error> {
-    let mut records: Vec<Record> = read(stored, &stored.state().notes["records"])?;
-    let seconds = stored.timings()["seconds"].as_array();
-    for (record, seconds) in records.iter_mut().zip(seconds.into_iter().flatten()) {
-        record.seconds = seconds.as_f64().unwrap_or(0.0);
+    let text = as_text(stored.state().array("records").unwrap_or_default());
+    let mut records: Vec<Record> = serde_json::from_slice(&text)
+        .map_err(|error| unreadable(stored.path(), error.to_string()))?;
+    let micros = stored.timings()["microseconds"]
+        .as_str()
+        .unwrap_or_default();
+    for (record, time) in records.iter_mut().zip(micros.split_whitespace()) {
+        record.seconds = 1e-6 * time.parse().unwrap_or(0.0);
     }
     Ok(records)
+}
+
+/// Text as numbers of eight bytes each, filled up with blanks: notes are for small things.
+fn as_numbers(text: &[u8]) -> Vec<f64> {
+    let byte = |chunk: &[u8], i: usize| chunk.get(i).copied().unwrap_or(b' ');
+    let number = |chunk| f64::from_le_bytes(std::array::from_fn(|i| byte(chunk, i)));
+    text.chunks(8).map(number).collect()
+}
+
+fn as_text(numbers: &[f64]) -> Vec<u8> {
+    numbers.iter().flat_map(|n| n.to_le_bytes()).collect()
 }
 
 fn pack<const D: usize>(run: &Run<D>, notes: &Value) -> Result<State, Error> {
@@ -179,11 +195,12 @@ fn pack<const D: usize>(run: &Run<D>, notes: &Value) -> Result<State, Error> {
         "case": run.case.identity(&run.device),
         "application": notes,
         "start": run.start,
-        "records": run.records,
         "time": state.time,
         "previous_tau": previous_tau,
     });
+    let records = serde_json::to_vec(&run.records).expect("records are numbers and names");
     let mut packed = State::new(run.count() as u64, notes)
+        .with_array("records", as_numbers(&records))
         .with_array("initial", run.case.initial.values().to_vec())
         .with_array("current", state.current.into_values());
     if let Some(previous) = previous {
