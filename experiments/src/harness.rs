@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use operators::ComputeDevice;
 
-use crate::{Error, memory};
+use crate::Error;
 
 /// Runs a program: success is exit code 0, a failure one line on standard error and exit code 2.
 pub fn run(program: impl FnOnce() -> Result<(), Error>) -> ExitCode {
-    memory::keep_freed();
+    engine::keep_freed();
     match program() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -230,7 +230,16 @@ fn reproduced(first: &Path, second: &Path) {
 fn one_circle_is_accurate_and_reproducible_and_not_computed_again() {
     let root = tempfile::tempdir().unwrap();
     let arguments = |folder: &'static str| {
-        ["--quick", "--quiet", "--circles", "1", "--methods", "hybrid", "--output", folder]
+        [
+            "--quick",
+            "--quiet",
+            "--circles",
+            "1",
+            "--methods",
+            "hybrid",
+            "--output",
+            folder,
+        ]
     };
     let runs = ["first", "second"].map(|folder| {
         let output = run(CIRCLES, root.path(), &arguments(folder));
@@ -245,8 +254,14 @@ fn one_circle_is_accurate_and_reproducible_and_not_computed_again() {
         let key = format!("willmore.n128.hybrid{scheme}.l2.step8");
         summary.get(&key).unwrap()
     };
-    assert!(error("_accurate") < 0.003 && error("_calibrated") < 0.004, "{summary:?}");
-    assert!(error("") < 0.03 && error("") > error("_calibrated"), "{summary:?}");
+    assert!(
+        error("_accurate") < 0.003 && error("_calibrated") < 0.004,
+        "{summary:?}"
+    );
+    assert!(
+        error("") < 0.03 && error("") > error("_calibrated"),
+        "{summary:?}"
+    );
     // The wall times of the first run can only come back from its stored parts, which a failure at the end leaves.
     let again = root.path().join("again");
     fs::create_dir_all(again.join("errors.md")).unwrap();
@@ -254,7 +269,11 @@ fn one_circle_is_accurate_and_reproducible_and_not_computed_again() {
     assert_eq!(failed.status.code(), Some(2));
     let steps = fs::read(again.join("steps.csv")).unwrap();
     fs::remove_dir(again.join("errors.md")).unwrap();
-    assert!(run(CIRCLES, root.path(), &arguments("again")).status.success());
+    assert!(
+        run(CIRCLES, root.path(), &arguments("again"))
+            .status
+            .success()
+    );
     assert_eq!(fs::read(again.join("steps.csv")).unwrap(), steps);
     assert!(!again.join("partial").exists());
 }
@@ -513,7 +532,10 @@ fn the_quick_performance_run_measures_planes_and_solids() {
         // Parts are measured inside the whole, and a product holds the transforms that it is compared with.
         let parts = row["times"].as_object().unwrap().values();
         let parts: f64 = parts.map(|seconds| seconds.as_f64().unwrap()).sum();
-        assert!(parts > 0.0 && parts <= row["seconds"].as_f64().unwrap(), "{row}");
+        assert!(
+            parts > 0.0 && parts <= row["seconds"].as_f64().unwrap(),
+            "{row}"
+        );
     }
     let table = fs::read_to_string(root.path().join("out/steps.md")).unwrap();
     assert!(table.contains("cube, n = 24"));

@@ -592,6 +592,11 @@ fn files_hold_the_pictures() {
     let (colour, control, frames) = decoded(&std::fs::read(&path).unwrap());
     assert!(colour == png::ColorType::Rgba && control.is_none());
     assert_eq!(frames[0], picture.pixels().as_flattened());
+    for picture in [&picture, &picture.over(Rgb::WHITE)] {
+        let again = Picture::from_png(&picture.to_png().unwrap()).unwrap();
+        assert_eq!(again.pixels(), picture.pixels());
+    }
+    assert!(Picture::from_png(b"no picture").is_err());
     let (colour, _, frames) = decoded(&picture.over(Rgb::WHITE).to_png().unwrap());
     assert_eq!(
         (colour, frames[0].len()),

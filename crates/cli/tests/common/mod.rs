@@ -64,6 +64,13 @@ pub fn assert_same(run: &Path, reference: &Path) {
     }
 }
 
+/// Says that a part of a test cannot run on this machine; unlike what is printed, that is shown of tests that pass, too.
+#[cfg(target_os = "linux")]
+pub fn skip(what: &str, reason: &str) {
+    use std::io::Write;
+    writeln!(std::io::stderr(), "SKIPPED {what}: {reason}").unwrap();
+}
+
 /// Starts the program, that nobody listens to.
 pub fn start(folder: &Path, arguments: &[&str]) -> Child {
     let mut command = program(folder);
