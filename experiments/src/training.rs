@@ -6,10 +6,10 @@ use model::training::{Checkpoint, Progress as Iteration, Recipe, SphereData, Tra
 use model::{Error as ModelError, Ratios};
 use operators::{ComputeDevice, DeviceKind};
 use report::Progress;
+use runs::Cache;
 use serde::Serialize;
 
 use crate::Error;
-use crate::partial::Partial;
 
 /// Least time between two checkpoints.
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(3);
@@ -120,7 +120,7 @@ pub struct Trainer<'a> {
     /// A [`training_device`].
     pub device: &'a ComputeDevice,
     /// Where interrupted trainings are kept.
-    pub checkpoints: &'a Partial,
+    pub checkpoints: &'a Cache,
     /// Where the bars go.
     pub progress: &'a Progress,
     /// Seed of all random numbers.
@@ -133,7 +133,7 @@ impl Trainer<'_> {
     /// Trains a network by a recipe of the given name, continuing from a checkpoint.
     ///
     /// # Errors
-    /// [`Error::Model`] if the training fails, [`Error::Report`] if a checkpoint cannot be stored.
+    /// [`Error::Model`] if the training fails, [`Error::Runs`] if a checkpoint cannot be stored.
     pub fn train<R: Recipe>(
         &self,
         spec: &NetworkSpec,
@@ -160,7 +160,7 @@ impl Trainer<'_> {
             bar.set_message(format!("{name}  {:.2e}", at.held_out_loss));
             if stored.elapsed() >= CHECKPOINT_INTERVAL {
                 (self.checkpoints.store(&name, &key, checkpoint))
-                    .map_err(|error| ModelError::Training(error.line()))?;
+                    .map_err(|error| ModelError::Training(error.to_string()))?;
                 stored = Instant::now();
             }
             Ok(true)

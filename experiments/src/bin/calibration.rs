@@ -6,30 +6,32 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use experiments::circles;
-use experiments::method::Method;
-use experiments::networks::checksum;
+use engine::{
+    Case, Flow, NamedNetwork, Operator, Record, Run, Scales, Scheme, StepRule, Stop, checksum,
+};
+use experiments::networks::{EPS, STEP};
 use experiments::options::RunOptions;
-use experiments::results::Results;
+use experiments::session::Session;
 use experiments::{Error, harness};
-use fem::{FiniteElementStep, LinearSolver};
+use fem::FiniteElementStep;
 use geometry::measure::zero_set_volume;
 use geometry::shapes::{Ball, Torus};
 use geometry::{Field, Grid, phase_field};
 use model::training::SphereData;
 use model::{Calibration, Network, displacement_errors, pretrained};
 use operators::ComputeDevice;
+use report::Summary;
 use report::{
     Axis, Colour, Figure, Format, LineChart, LineStyle, Marker, OutputDir, Progress, Series, Table,
 };
 use serde::Serialize;
 use serde_json::json;
-use solver::{Factors, FlowParams, NewtonParams};
+use solver::{Factors, NewtonParams};
 
 const PROGRAM: &str = "calibration";
 
 /// Interface width and inner time step of the discs, as in the convergence tests.
-const DISC_SCALES: [f64; 2] = [circles::EPS, circles::STEP];
+const DISC_SCALES: [f64; 2] = [EPS, STEP];
 const RADII: [f64; 7] = [0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6];
 const QUICK_RADII: [f64; 2] = [0.15, 0.3];
 /// Distance of a disc to the box's boundary.
@@ -86,11 +88,11 @@ fn program(options: &Options) -> Result<(), Error> {
         "time_step": STEP_RATIO * inner_step,
         "quick": run.quick,
     });
-    let mut results = Results::begin(run, PROGRAM, &parameters, &device)?;
+    let mut session = Session::open(PROGRAM, run, device.clone(), &parameters)?;
     let install = (options.install.as_ref())
         .map(OutputDir::create)
         .transpose()?;
-    let manifest = &mut results.manifest;
+    let manifest = &mut session.manifest;
     let mut all = Vec::new();
     for (name, network) in networks {
         let calibration = manifest.phase(name.clone(), || network.calibrate())?;
@@ -104,27 +106,35 @@ fn program(options: &Options) -> Result<(), Error> {
             calibration,
         });
     }
-    let progress = &results.progress;
+    let progress = &session.progress;
     let discs = manifest.phase("discs", || discs(&all, run.quick, &device, progress))?;
     let surfaces = manifest.phase("balls and tori", || surfaces(&all, run.quick, &device))?;
     let diagnosed = manifest.phase("diagnostics", || diagnostics(&all, run.quick, &device))?;
 
-    results.figure(diagnostics_figure(&diagnosed), "diagnostics")?;
-    results.figure(discs_figure(&discs), "discs")?;
-    let output = &results.output;
+    session.figure(diagnostics_figure(&diagnosed), "diagnostics")?;
+    session.figure(discs_figure(&discs), "discs")?;
+    let output = &session.output;
     output.write_json("diagnostics.json", &diagnosed)?;
     output.write_json("discs.json", &discs)?;
     output.write_csv("discs.csv", &discs)?;
     output.write_csv("surfaces.csv", &surfaces)?;
-    results.table(&calibration_table(&all)?, "calibration")?;
-    results.table(&discs_table(&discs)?, "discs_table")?;
-    results.table(&surfaces_table(&surfaces)?, "surfaces_table")?;
+    let mut tables = Vec::new();
+    for (table, name) in [
+        (calibration_table(&all)?, "calibration"),
+        (discs_table(&discs)?, "discs_table"),
+        (surfaces_table(&surfaces)?, "surfaces_table"),
+    ] {
+        table.write(output, name)?;
+        tables.push(table.to_markdown());
+    }
+    let mut summary = Summary::new();
     for one in &all {
         let (key, calibration) = (one.key(), &one.calibration);
-        results.summary.insert_record(key, calibration)?;
-        results.summary.insert_record(key, &calibration.factors)?;
+        summary.insert_record(key, calibration)?;
+        summary.insert_record(key, &calibration.factors)?;
     }
-    results.finish("Calibration of the learned operators and of finite elements")
+    let title = "Calibration of the learned operators and of finite elements";
+    session.finish(title, summary, &tables.join("\n"))
 }
 
 impl Options {
@@ -181,16 +191,32 @@ fn relaxed<const D: usize>(
     calibration: Factors,
     device: &ComputeDevice,
 ) -> Result<(f64, Field<D>), Error> {
-    let params = FlowParams {
-        eps,
-        mcf_step,
-        newton: NewtonParams::default(),
-        calibration,
+    let network = NamedNetwork {
+        name: String::new(),
+        network: network.clone(),
     };
-    let linear = LinearSolver::default();
-    let mut flow = Method::Hybrid.willmore_flow(Some(network), initial, params, linear, device)?;
-    let record = flow.advance(STEP_RATIO * mcf_step)?;
-    Ok((record.willmore_energy, flow.field()?))
+    let operator = Operator {
+        factors: calibration,
+        ..Operator::learned(Scheme::Paper, network)?
+    };
+    let case = Case {
+        shape: "surface at rest".to_owned(),
+        initial: initial.clone(),
+        region: None,
+        flow: Flow::Willmore,
+        operator,
+        scales: Scales {
+            eps,
+            mcf_step,
+            newton: NewtonParams::default(),
+        },
+        steps: StepRule::Constant(STEP_RATIO * mcf_step).into(),
+        stops: vec![Stop::Steps(1)],
+        measures: Vec::new(),
+    };
+    let mut run = Run::new(case, device)?;
+    let energy = run.step()?.and_then(Record::willmore_energy);
+    Ok((energy.unwrap_or(f64::NAN), run.field().clone()))
 }
 
 /// The Willmore energy that the scheme sees in a disc.
@@ -248,7 +274,7 @@ fn discs(
     let rows = harness::in_parallel(&order, harness::workers(device), |i| {
         let ((n, odd_part, one), radius, phase) = tasks[i];
         let factors = one.calibration.factors;
-        let offset = one.calibration.spontaneous_curvature / circles::EPS * f64::from(phase);
+        let offset = one.calibration.spontaneous_curvature / EPS * f64::from(phase);
         let energy = |factors| disc_energy(&one.network, *n, radius, phase, factors, device);
         let row = DiscRow {
             network: one.name.clone(),

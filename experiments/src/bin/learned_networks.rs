@@ -5,14 +5,15 @@ use std::f64::consts::{PI, SQRT_2, TAU};
 use std::process::ExitCode;
 
 use clap::Parser;
-use experiments::networks::{NetworkOptions, checksum};
+use engine::{NeededNetwork, Scheme, checksum};
+use experiments::networks::NetworkOptions;
 use experiments::options::RunOptions;
-use experiments::results::Results;
+use experiments::session::Session;
 use experiments::training::{NetworkSpec, held_out_radii};
 use experiments::{Error, harness, quality};
 use model::training::levenberg_marquardt::{heat_kernel, splitting_activation};
 use model::{Network, Quality};
-use report::{Axis, Colour, Figure, Heatmap, LineChart, LineStyle, Marker, Series, Table};
+use report::{Axis, Colour, Figure, Heatmap, LineChart, LineStyle, Marker, Series, Summary, Table};
 use serde::Serialize;
 use serde_json::json;
 
@@ -39,25 +40,26 @@ fn program(options: &Options) -> Result<(), Error> {
     let mut specs = NetworkSpec::convergence();
     specs.truncate(if run.quick { 1 } else { specs.len() });
     let device = run.open_device()?;
-    let ratios: Vec<_> = specs.iter().map(|spec| spec.ratios).collect();
-    let networks = options.networks.find(&ratios)?;
+    let needs: Vec<_> = (specs.iter().map(|spec| NeededNetwork::exactly(spec.ratios))).collect();
+    let chosen = options.networks.load(&needs)?;
+    let found = needs.iter().map(|need| Ok(chosen.find(Scheme::Paper, need)?.network));
+    let networks: Vec<Network> = found.collect::<Result<_, Error>>()?;
     let names = specs.iter().map(|spec| &spec.name);
     let checksums: BTreeMap<_, _> = names.zip(networks.iter().map(checksum)).collect();
     let held_out_radii = held_out_radii(run.quick);
     let parameters =
         json!({"networks": checksums, "held_out_radii": held_out_radii, "quick": run.quick});
-    let mut results = Results::begin(run, PROGRAM, &parameters, &device)?;
+    let mut session = Session::open(PROGRAM, run, device.clone(), &parameters)?;
+    let mut summary = Summary::new();
 
-    let bar = results.progress.bar("held-out losses", specs.len() as u64);
+    let bar = session.progress.bar("held-out losses", specs.len() as u64);
     let mut shown = Vec::new();
     for (spec, network) in specs.iter().zip(&networks) {
         let data = spec.data(false)?;
-        let quality = results
-            .manifest
-            .phase(format!("quality of {}", spec.name), || {
-                Quality::measure(network, &data, held_out_radii, &device)
-            })?;
-        results.summary.insert_record(&spec.name, &quality)?;
+        let quality = session.phase(format!("quality of {}", spec.name), || {
+            Ok(Quality::measure(network, &data, held_out_radii, &device)?)
+        })?;
+        summary.insert_record(&spec.name, &quality)?;
         shown.push(Shown::new(spec, network, &heat_kernel(&data), quality));
         bar.inc(1);
     }
@@ -69,10 +71,10 @@ fn program(options: &Options) -> Result<(), Error> {
         (transfer_figure(&shown), "transfer"),
         (radial_figure(&shown), "radial_symmetry"),
     ] {
-        results.figure(figure.with_width(width), name)?;
+        session.figure(figure.with_width(width), name)?;
     }
     let all = || shown.iter();
-    let output = &results.output;
+    let output = &session.output;
     output.write_csv("kernels.csv", all().flat_map(|one| &one.kernel))?;
     output.write_csv("activations.csv", all().flat_map(|one| &one.activation))?;
     output.write_csv("transfer.csv", all().flat_map(|one| &one.transfer))?;
@@ -82,8 +84,9 @@ fn program(options: &Options) -> Result<(), Error> {
     output.write_json("networks.json", &origins)?;
     let table = Table::of(&shown).text("network", |one| &one.spec.name);
     let table = quality::columns(table, |one| &one.quality);
-    results.table(&table.finish()?, "quality")?;
-    results.finish("Quality of the learned operators")
+    let table = table.finish()?;
+    table.write(output, "quality")?;
+    session.finish("Quality of the learned operators", summary, &table.to_markdown())
 }
 
 /// A network with the curves that show it.

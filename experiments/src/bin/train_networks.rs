@@ -5,8 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
 use experiments::options::RunOptions;
-use experiments::partial::Partial;
-use experiments::results::Results;
+use experiments::session::Session;
 use experiments::training::{NetworkSpec, Trainer, training_device};
 use experiments::{Error, harness, quality};
 use model::training::adam::AdamParams;
@@ -14,9 +13,11 @@ use model::training::least_squares::LeastSquaresParams;
 use model::training::levenberg_marquardt::LmParams;
 use model::training::{self, CurvePoint, Trained};
 use model::{Network, pretrained};
+use report::Summary;
 use report::{
     Axis, Colour, Figure, LegendEntry, LineChart, LineStyle, Manifest, OutputDir, Series, Table,
 };
+use runs::Cache;
 use serde::Serialize;
 use serde_json::json;
 
@@ -102,24 +103,25 @@ fn program(options: &Options) -> Result<(), Error> {
         "accurate": settings.accurate,
         "quick": run.quick,
     });
-    let mut results = Results::begin(run, PROGRAM, &parameters, &device)?;
+    let mut session = Session::open(PROGRAM, run, device.clone(), &parameters)?;
     let install = (options.install.as_ref())
         .map(OutputDir::create)
         .transpose()?;
+    let unfinished = session.output.as_path().join("checkpoints");
     if options.restart {
-        Partial::open(&results.output, "checkpoints")?.remove()?;
+        Cache::open(&unfinished)?.remove()?;
     }
-    let checkpoints = Partial::open(&results.output, "checkpoints")?;
-    let folder = results.output.subfolder("networks")?;
+    let checkpoints = Cache::open(unfinished)?;
+    let folder = session.output.subfolder("networks")?;
     let mut trainings = Trainings {
         trainer: Trainer {
             device: &device,
             checkpoints: &checkpoints,
-            progress: &results.progress,
+            progress: &session.progress,
             seed: run.seed,
             quick: run.quick,
         },
-        manifest: &mut results.manifest,
+        manifest: &mut session.manifest,
         chosen: &specs,
         folder: &folder,
         finished: Vec::new(),
@@ -132,24 +134,25 @@ fn program(options: &Options) -> Result<(), Error> {
             one.save(install, if accurate { "accurate_" } else { "" })?;
         }
     }
-    write(&all, &mut results)?;
-    results.say(&format!("Networks are in {}", folder.as_path().display()));
+    let (table, summary) = write(&all, &session)?;
     checkpoints.remove()?;
-    results.finish("Quality of the trained networks")
+    let folder = folder.as_path().display();
+    let report = format!("{}\nNetworks are in {folder}", table.to_markdown());
+    session.finish("Quality of the trained networks", summary, &report)
 }
 
 /// Curves, figure, metrics and table.
-fn write(all: &[Finished], results: &mut Results<'_>) -> Result<(), Error> {
-    results.figure(figure(all), "learning_curves")?;
+fn write(all: &[Finished], session: &Session<'_>) -> Result<(Table, Summary), Error> {
+    session.figure(figure(all), "learning_curves")?;
     let rows: Vec<CurveRow<'_>> = all.iter().flat_map(Finished::curve).collect();
-    results.output.write_csv("learning_curves.csv", &rows)?;
-    results.output.write_json("learning_curves.json", &rows)?;
+    session.output.write_csv("learning_curves.csv", &rows)?;
+    session.output.write_json("learning_curves.json", &rows)?;
+    let mut summary = Summary::new();
     for one in all {
         let key = match one.recipe {
             Recipe::Lm => format!("train.{}", one.spec.name),
             _ => format!("train.{}.{}", one.spec.name, one.key()),
         };
-        let summary = &mut results.summary;
         summary.insert_record(&key, &one.trained.quality)?;
         summary.insert(&format!("{key}.seconds"), one.trained.seconds())?;
         summary.insert_count(&format!("{key}.iterations"), one.trained.curve.len())?;
@@ -158,7 +161,9 @@ fn write(all: &[Finished], results: &mut Results<'_>) -> Result<(), Error> {
         .text("network", |one| &one.spec.name)
         .text("recipe", Finished::key);
     let table = quality::columns(table, |one| &one.trained.quality);
-    results.table(&table.finish()?, "quality")
+    let table = table.finish()?;
+    table.write(&session.output, "quality")?;
+    Ok((table, summary))
 }
 
 /// The settings of every recipe.
