@@ -2,8 +2,8 @@
 
 use clap::Args;
 use engine::{
-    Case, Flow, Measure, NeededNetwork, Operator, Record, Samples, Scales, Scheme, StepRule, Stop,
-    TimeSteps, Trajectory, checksum, energy_increases, mean_hvp,
+    Case, Flow, Measure, Operator, Record, Samples, Scales, Scheme, StepRule, Stop, TimeSteps,
+    Trajectory, checksum, energy_increases, mean_hvp,
 };
 use geometry::measure::l2_distance;
 use geometry::{Grid, SignedDistance, phase_field};
@@ -29,19 +29,7 @@ pub struct InpaintingOptions {
 
     /// Weights of the energy and network: paper, calibrated or accurate
     #[arg(long, value_name = "NAME", value_enum, default_value_t = Scheme::Accurate)]
-    scheme: Scheme,
-}
-
-impl InpaintingOptions {
-    /// The learned operator of the chosen scheme.
-    ///
-    /// # Errors
-    /// [`Error::Engine`] if there is no network for it.
-    pub fn operator(&self, needed: &NeededNetwork) -> Result<Operator, Error> {
-        let networks = self.figure.networks.load(&[*needed])?;
-        let network = networks.find(self.scheme, needed)?;
-        Ok(Operator::learned(self.scheme, network)?)
-    }
+    pub scheme: Scheme,
 }
 
 /// A shape that is inpainted.
@@ -90,7 +78,7 @@ impl<const D: usize> Shape<D> {
                 rule: self.rule,
                 first_substep: Some(first_substep(scales.eps)),
             },
-            stops: vec![Stop::Steps(self.steps), Stop::Motion(STILL)],
+            stops: vec![Stop::Motion(STILL), Stop::Steps(self.steps)],
             measures: Measure::size(scales.eps),
         })
     }
@@ -181,7 +169,8 @@ impl<'a, const D: usize> Inpainted<'a, D> {
     /// The time in the paper's steps from which on the shape stands still, if it does.
     pub fn still_from(&self) -> Option<f64> {
         let last = self.trajectory.records.last()?;
-        (self.trajectory.stopped_early).then_some((last.time - last.tau) / self.tau())
+        let stands_still = matches!(self.trajectory.ended, Stop::Motion(_));
+        stands_still.then_some((last.time - last.tau) / self.tau())
     }
 
     /// Writes the figure of the shown steps.

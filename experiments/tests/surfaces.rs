@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::{refused, run};
-use engine::{Method, Operator, Record, Run, Scheme, StepRule, energy_increases};
+use engine::{Operator, Record, Run, Scheme, StepRule, energy_increases};
 use experiments::networks::Chosen;
 use experiments::surfaces::{centred_box, needed_network, scales, willmore_flow};
 use geometry::exact::WILLMORE_ENERGY_CLIFFORD_TORUS;
@@ -259,10 +259,8 @@ fn a_volume_flows_like_the_shape_it_was_made_from() {
 
 fn flow(initial: &Field<3>, n: usize, steps: usize) -> (Field<3>, Vec<Record>) {
     let device = ComputeDevice::default_compiled().unwrap();
-    let variant = (Method::Hybrid, Scheme::Paper);
-    let networks = Chosen::default().of(variant.1);
-    let (grid, needed) = (initial.grid(), needed_network());
-    let operator = Operator::new(variant, &networks, &needed, grid, &scales(n)).unwrap();
+    let network = Chosen::default().find(Scheme::Paper, &needed_network());
+    let operator = Operator::learned(Scheme::Paper, network.unwrap()).unwrap();
     let time = (StepRule::Constant(TAU), steps);
     let case = willmore_flow("shape", initial.clone(), operator, scales(n), time);
     let mut run = Run::new(case, &device).unwrap();

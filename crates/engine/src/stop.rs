@@ -3,12 +3,12 @@
 use std::fmt;
 
 use geometry::Field;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::Record;
 
 /// A reason to end; a flow ends with the first that holds.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stop {
     /// So many time steps are made.

@@ -180,6 +180,7 @@ fn pack<const D: usize>(run: &Run<D>, notes: &Value) -> Result<State, Error> {
         "case": run.case.identity(&run.device),
         "application": notes,
         "start": run.start,
+        "ended": run.ended(),
         "time": state.time,
         "previous_tau": previous_tau,
     });

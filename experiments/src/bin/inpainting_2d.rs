@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use engine::{NeededNetwork, Scales, StepRule};
+use engine::{NeededNetwork, Operator, Scales, StepRule};
 use experiments::inpainting::{self, Inpainted, InpaintingOptions, Shape};
 use experiments::session::Session;
 use experiments::{Error, harness};
@@ -117,7 +117,9 @@ fn program(options: &Options) -> Result<(), Error> {
     let ratios = Ratios::of_run(2, WIDTH, 1.0 / n as f64, scales.eps, scales.mcf_step);
     ratios.validate()?;
     let device = run.open_device()?;
-    let operator = options.common.operator(&NeededNetwork::exactly(ratios))?;
+    let (scheme, needed) = (options.common.scheme, NeededNetwork::exactly(ratios));
+    let networks = options.common.figure.networks.load(&[needed])?;
+    let operator = Operator::learned(scheme, networks.find(scheme, &needed)?)?;
     let shapes = shapes(options)?;
     if shapes.iter().any(|shape| shape.steps == 0) {
         return Err(Error::Options("--disk-steps must be at least 1".to_owned()));

@@ -3,10 +3,10 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use engine::StepRule;
+use engine::{Method, StepRule};
 use experiments::inpainting::{self, Inpainted, InpaintingOptions, Shape};
 use experiments::session::Session;
-use experiments::surfaces::{Snapshot, Surface, View, centred_box, needed_network, scales, table};
+use experiments::surfaces::{Setting, Snapshot, Surface, View, table};
 use experiments::{Error, harness};
 use geometry::shapes::{Ball, Cuboid, Cylinder};
 use geometry::{SignedDistance, SignedDistanceExt, UpAxis};
@@ -115,7 +115,6 @@ fn main() -> ExitCode {
 
 fn program(options: &Options) -> Result<(), Error> {
     let run = &options.common.figure.run;
-    let n = options.common.figure.cells(CELLS);
     if options.extra_steps > MOST_EXTRA {
         return Err(Error::Options(format!(
             "--extra-steps {} is too many: each step is twice as long as the one before; give at most {MOST_EXTRA}",
@@ -123,8 +122,11 @@ fn program(options: &Options) -> Result<(), Error> {
         )));
     }
     let device = run.open_device()?;
-    let operator = options.common.operator(&needed_network())?;
-    let (grid, scales) = (centred_box(n, 1.0)?, scales(n));
+    let setting = Setting::new(&options.common.figure, CELLS, 1.0)?;
+    let Setting {
+        n, grid, scales, ..
+    } = setting;
+    let operator = setting.operator((Method::Hybrid, options.common.scheme))?;
     let (shapes, azimuths): (Vec<_>, Vec<_>) = shapes(options)?.into_iter().unzip();
     let parameters = inpainting::parameters((n, &scales), &operator, &shapes, run.quick);
     let mut session = Session::open(PROGRAM, run, device, &parameters)?;

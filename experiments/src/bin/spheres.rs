@@ -4,11 +4,11 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use engine::{
-    Case, Flow, Measure, Method, Record, Run, Scheme, StepRule, Stop, energy_increases, mean_hvp,
+    Case, Flow, Measure, Method, Record, Run, Scheme, StepRule, energy_increases, mean_hvp,
 };
 use experiments::options::FigureOptions;
 use experiments::session::Session;
-use experiments::surfaces::Setting;
+use experiments::surfaces::{self, Setting};
 use experiments::training::{NetworkSpec, held_out_radii};
 use experiments::{Error, harness, look, quality};
 use geometry::exact::{WILLMORE_ENERGY_SPHERE, mean_curvature_radius};
@@ -182,16 +182,16 @@ impl Spheres {
             Flow::MeanCurvature => vec![Measure::distance_to(exact)],
             Flow::Willmore => Measure::size(scales.eps),
         };
+        let (initial, operator) = (ball(grid, radius)?, self.setting.operator(variant)?);
+        let (shape, time) = (
+            format!("sphere of radius {radius}"),
+            (StepRule::Constant(tau), steps),
+        );
+        let case = surfaces::willmore_flow(&shape, initial, operator, scales, time);
         Ok(Case {
-            shape: format!("sphere of radius {radius}"),
-            initial: ball(grid, radius)?,
-            region: None,
             flow,
-            operator: self.setting.operator(variant)?,
-            scales,
-            steps: StepRule::Constant(tau).into(),
-            stops: vec![Stop::Steps(steps)],
             measures,
+            ..case
         })
     }
 
