@@ -218,6 +218,7 @@ impl NeededNetwork {
     }
 
     /// The same with a kernel of this width.
+    #[must_use]
     pub fn of_width(self, width: usize) -> Self {
         Self {
             width: Some(width),

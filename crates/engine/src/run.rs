@@ -192,7 +192,7 @@ impl<const D: usize> Run<D> {
                         step: self.control.step(),
                         tau: size,
                         halvings,
-                        source,
+                        source: Box::new(source),
                     });
                 }
                 Err(source) => return Err(self.failed(source)),
@@ -201,8 +201,10 @@ impl<const D: usize> Run<D> {
     }
 
     fn failed(&self, source: solver::Error) -> Error {
-        let case = self.case.title();
-        Error::Step { case, source }
+        Error::Step {
+            case: self.case.title(),
+            source: Box::new(source),
+        }
     }
 
     /// The first stop rule that holds, where the last record belongs to a time step of this size.

@@ -48,6 +48,7 @@ const HALVINGS: u32 = 24;
 
 impl StepRule {
     /// The rule with everything filled in, for an inner step `mcf_step`.
+    #[must_use]
     pub fn resolved(self, mcf_step: f64) -> Self {
         match self {
             Self::ByEnergy(None) => Self::ByEnergy(Some(mcf_step / 16.0)),

@@ -195,10 +195,8 @@ fn relaxed<const D: usize>(
         name: String::new(),
         network: network.clone(),
     };
-    let operator = Operator {
-        factors: calibration,
-        ..Operator::learned(Scheme::Paper, network)?
-    };
+    let mut operator = Operator::learned(Scheme::Paper, network)?;
+    operator.factors = calibration;
     let case = Case {
         shape: "surface at rest".to_owned(),
         initial: initial.clone(),

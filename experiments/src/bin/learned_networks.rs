@@ -42,7 +42,9 @@ fn program(options: &Options) -> Result<(), Error> {
     let device = run.open_device()?;
     let needs: Vec<_> = (specs.iter().map(|spec| NeededNetwork::exactly(spec.ratios))).collect();
     let chosen = options.networks.load(&needs)?;
-    let found = needs.iter().map(|need| Ok(chosen.find(Scheme::Paper, need)?.network));
+    let found = needs
+        .iter()
+        .map(|need| Ok(chosen.find(Scheme::Paper, need)?.network));
     let networks: Vec<Network> = found.collect::<Result<_, Error>>()?;
     let names = specs.iter().map(|spec| &spec.name);
     let checksums: BTreeMap<_, _> = names.zip(networks.iter().map(checksum)).collect();
@@ -86,7 +88,11 @@ fn program(options: &Options) -> Result<(), Error> {
     let table = quality::columns(table, |one| &one.quality);
     let table = table.finish()?;
     table.write(output, "quality")?;
-    session.finish("Quality of the learned operators", summary, &table.to_markdown())
+    session.finish(
+        "Quality of the learned operators",
+        summary,
+        &table.to_markdown(),
+    )
 }
 
 /// A network with the curves that show it.
