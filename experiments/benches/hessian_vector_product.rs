@@ -2,7 +2,7 @@
 //! `performance` writes the same comparison as a table, with ratios taken within turns.
 
 use divan::Bencher;
-use experiments::products::Candidates;
+use experiments::products::{Candidates, Work};
 use geometry::{Grid, phase_field, shapes::Ball};
 use model::{Ratios, pretrained};
 use operators::ComputeDevice;
@@ -10,7 +10,7 @@ use operators::ComputeDevice;
 const CELLS: [usize; 3] = [256, 512, 1024];
 const SOLID: [usize; 2] = [64, 128];
 
-fn bench<const D: usize>(bencher: Bencher<'_, '_>, cells: usize, part: fn(&mut Candidates<D>)) {
+fn bench<const D: usize>(bencher: Bencher<'_, '_>, cells: usize, work: Work) {
     let device = ComputeDevice::default_compiled().expect("a device");
     let network = pretrained::find(Ratios {
         dimension: D,
@@ -23,43 +23,43 @@ fn bench<const D: usize>(bencher: Bencher<'_, '_>, cells: usize, part: fn(&mut C
     let u = phase_field(grid, &ball, 2.0 * grid.spacing()).expect("a phase field");
     let mut candidates =
         Candidates::<D>::new(&network.expect("shipped"), &u, &device).expect("equal products");
-    bencher.bench_local(|| part(&mut candidates));
+    bencher.bench_local(|| candidates.run(work));
 }
 
 /// The product through Burn in double precision.
 #[divan::bench(args = CELLS)]
 fn burn_2d(bencher: Bencher<'_, '_>, cells: usize) {
-    bench::<2>(bencher, cells, Candidates::burn);
+    bench::<2>(bencher, cells, Work::Burn);
 }
 
 /// The product through Burn in single precision.
 #[divan::bench(args = CELLS)]
 fn burn_single_2d(bencher: Bencher<'_, '_>, cells: usize) {
-    bench::<2>(bencher, cells, Candidates::burn_single);
+    bench::<2>(bencher, cells, Work::BurnSingle);
 }
 
 /// The product by hand.
 #[divan::bench(args = CELLS)]
 fn by_hand_2d(bencher: Bencher<'_, '_>, cells: usize) {
-    bench::<2>(bencher, cells, Candidates::by_hand);
+    bench::<2>(bencher, cells, Work::ByHand);
 }
 
 /// Energy and gradient.
 #[divan::bench(args = CELLS)]
 fn evaluate_2d(bencher: Bencher<'_, '_>, cells: usize) {
-    bench::<2>(bencher, cells, Candidates::evaluate);
+    bench::<2>(bencher, cells, Work::Evaluate);
 }
 
 /// The product through Burn in double precision.
 #[divan::bench(args = SOLID)]
 fn burn_3d(bencher: Bencher<'_, '_>, cells: usize) {
-    bench::<3>(bencher, cells, Candidates::burn);
+    bench::<3>(bencher, cells, Work::Burn);
 }
 
 /// The product by hand.
 #[divan::bench(args = SOLID)]
 fn by_hand_3d(bencher: Bencher<'_, '_>, cells: usize) {
-    bench::<3>(bencher, cells, Candidates::by_hand);
+    bench::<3>(bencher, cells, Work::ByHand);
 }
 
 fn main() {

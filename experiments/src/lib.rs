@@ -34,6 +34,7 @@ pub mod mesh_flow;
 pub mod meshes;
 pub mod networks;
 pub mod options;
+pub mod orders;
 pub mod products;
 pub mod quality;
 pub mod results;
@@ -41,6 +42,7 @@ pub mod session;
 pub mod steps;
 pub mod study;
 pub mod surfaces;
+pub mod timing;
 pub mod training;
 
 pub use error::Error;

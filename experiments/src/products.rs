@@ -21,6 +21,7 @@ use serde::Serialize;
 use solver::{MinimizingMovement, Objective, Precision};
 
 use crate::Error;
+use crate::timing::{median, take_turns};
 
 /// `c = tau / tautilde^2` of a typical step: `tau = tautilde = 2^-14`.
 const STIFFNESS: f64 = 16384.0;
@@ -95,12 +96,40 @@ impl ByHand {
     }
 }
 
+/// What takes turns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Work {
+    /// The product through Burn in double precision.
+    Burn,
+    /// The product through Burn in single precision.
+    BurnSingle,
+    /// The product by hand in double precision.
+    ByHand,
+    /// Two pairs of transforms, the least that a product needs, in double precision.
+    Floor,
+    /// Two pairs of transforms in single precision.
+    FloorSingle,
+    /// Energy and gradient.
+    Evaluate,
+}
+
+impl Work {
+    /// All of it.
+    pub const ALL: [Self; 6] = [
+        Self::Burn,
+        Self::BurnSingle,
+        Self::ByHand,
+        Self::Floor,
+        Self::FloorSingle,
+        Self::Evaluate,
+    ];
+}
+
 /// All candidates at one point, with one direction.
 pub struct Candidates<const D: usize> {
     double: MinimizingMovement<D>,
     single: MinimizingMovement<D>,
     by_hand: ByHand,
-    /// Two pairs of transforms, the least that a product needs, in both precisions.
     floor: SpectralFilter,
     u: Tensor<D>,
     p: Tensor<D>,
@@ -111,17 +140,17 @@ pub struct Candidates<const D: usize> {
 /// Medians in seconds over many turns, in which all candidates follow each other.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct ProductTimes {
-    /// Product through Burn in double precision.
+    /// [`Work::Burn`].
     pub burn: f64,
-    /// Product through Burn in single precision.
+    /// [`Work::BurnSingle`].
     pub burn_single: f64,
-    /// Product by hand in double precision.
+    /// [`Work::ByHand`].
     pub by_hand: f64,
-    /// Two pairs of transforms in double precision.
+    /// [`Work::Floor`].
     pub floor: f64,
-    /// Two pairs of transforms in single precision.
+    /// [`Work::FloorSingle`].
     pub floor_single: f64,
-    /// Energy and gradient.
+    /// [`Work::Evaluate`].
     pub evaluate: f64,
     /// Median of the ratios of `burn` to `by_hand` in the same turn.
     pub ratio: f64,
@@ -177,66 +206,53 @@ impl<const D: usize> Candidates<D> {
         Ok(candidates)
     }
 
-    /// The product through Burn in double precision.
-    pub fn burn(&mut self) {
-        let product = self.double.hessian_vector_product(black_box(&self.p));
-        black_box(product.expect("worked in the constructor"));
-    }
-
-    /// The product through Burn in single precision.
-    pub fn burn_single(&mut self) {
-        let product = self
-            .single
-            .hessian_vector_product(black_box(&self.p_single));
-        black_box(product.expect("the same as in double precision"));
-    }
-
-    /// The product by hand.
-    pub fn by_hand(&mut self) {
-        black_box(self.by_hand.product(black_box(&self.p_host)));
-    }
-
-    /// Two pairs of transforms in double precision.
-    pub fn floor(&mut self) {
-        let once = operators::spectral_filter(black_box(self.p.clone()), &self.floor);
-        black_box(operators::spectral_filter(once, &self.floor));
-    }
-
-    /// Two pairs of transforms in single precision.
-    pub fn floor_single(&mut self) {
-        let once = operators::spectral_filter(black_box(self.p_single.clone()), &self.floor);
-        black_box(operators::spectral_filter(once, &self.floor));
-    }
-
-    /// Energy and gradient.
-    pub fn evaluate(&mut self) {
-        let evaluation = self.double.evaluate(black_box(&self.u));
-        black_box(evaluation.expect("worked in the constructor"));
+    /// Does a piece of work once.
+    pub fn run(&mut self, work: Work) {
+        let filtered = |p: &Tensor<D>| {
+            let once = operators::spectral_filter(black_box(p.clone()), &self.floor);
+            black_box(operators::spectral_filter(once, &self.floor));
+        };
+        match work {
+            Work::Burn => {
+                let product = self.double.hessian_vector_product(black_box(&self.p));
+                black_box(product.expect("worked in the constructor"));
+            }
+            Work::BurnSingle => {
+                let product = (self.single).hessian_vector_product(black_box(&self.p_single));
+                black_box(product.expect("the same as in double precision"));
+            }
+            Work::ByHand => {
+                black_box(self.by_hand.product(black_box(&self.p_host)));
+            }
+            Work::Floor => filtered(&self.p),
+            Work::FloorSingle => filtered(&self.p_single),
+            Work::Evaluate => {
+                let evaluation = self.double.evaluate(black_box(&self.u));
+                black_box(evaluation.expect("worked in the constructor"));
+            }
+        }
     }
 
     /// Measures all candidates in turns, for at least this time and eleven turns.
-    pub fn measure(&mut self, budget: Duration) -> ProductTimes {
+    ///
+    /// # Errors
+    /// None, but for those of [`take_turns`].
+    pub fn measure(&mut self, budget: Duration) -> Result<ProductTimes, Error> {
         const LEAST: usize = 11;
-        let parts: [fn(&mut Self); 6] = [
-            Self::burn,
-            Self::burn_single,
-            Self::by_hand,
-            Self::floor,
-            Self::floor_single,
-            Self::evaluate,
-        ];
-        let mut times: [Vec<f64>; 6] = Default::default();
         let clock = Instant::now();
-        while times[0].len() < LEAST || clock.elapsed() < budget {
-            for (part, times) in parts.iter().zip(&mut times) {
-                let clock = Instant::now();
-                part(self);
-                times.push(clock.elapsed().as_secs_f64());
-            }
-        }
+        let mut contenders = Work::ALL.map(|work| (work, Vec::new()));
+        let goes_on =
+            |(_, times): &(Work, Vec<f64>)| times.len() < LEAST || clock.elapsed() < budget;
+        take_turns(&mut contenders, goes_on, |(work, times)| {
+            let clock = Instant::now();
+            self.run(*work);
+            times.push(clock.elapsed().as_secs_f64());
+            Ok(())
+        })?;
+        let times = contenders.map(|(_, times)| times);
         let ratios = times[0].iter().zip(&times[2]).map(|(a, b)| a / b).collect();
         let [burn, burn_single, by_hand, floor, floor_single, evaluate] = times.map(median);
-        ProductTimes {
+        Ok(ProductTimes {
             burn,
             burn_single,
             by_hand,
@@ -244,12 +260,6 @@ impl<const D: usize> Candidates<D> {
             floor_single,
             evaluate,
             ratio: median(ratios),
-        }
+        })
     }
-}
-
-/// The middle value; 0 for none.
-pub fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }

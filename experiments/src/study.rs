@@ -158,19 +158,12 @@ impl Study {
         self.plan.iter().map(|(variant, _)| *variant)
     }
 
-    /// Checksums of the networks of the paper's recipe, for the manifest.
+    /// Checksums of the networks of the variants, for the manifest.
     pub fn checksums(&self) -> BTreeMap<String, String> {
-        let learned = self
-            .plan
-            .iter()
-            .filter(|(variant, _)| variant.scheme == Scheme::Paper);
-        let named = learned.filter_map(|(variant, operator)| {
-            Some((
-                format!("n{}", variant.n),
-                checksum(&operator.network()?.network),
-            ))
-        });
-        named.collect()
+        let of = |(variant, operator): &(Variant, Operator)| {
+            Some((variant.key(), checksum(&operator.network()?.network)))
+        };
+        self.plan.iter().filter_map(of).collect()
     }
 
     /// The curve of a variant.

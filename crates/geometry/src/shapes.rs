@@ -156,6 +156,55 @@ impl<const D: usize> SignedDistance<D> for Cross<D> {
     }
 }
 
+/// The ellipse with the given half axes. Exact everywhere, and smooth but on the segment between its centres of curvature.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ellipse {
+    half_axes: [f64; 2],
+}
+
+impl Ellipse {
+    /// The ellipse `(x/a)^2 + (y/b)^2 <= 1`.
+    ///
+    /// # Errors
+    /// The half axes must be finite and positive.
+    pub fn new(half_axes: [f64; 2]) -> Result<Self, Error> {
+        for value in half_axes {
+            positive("half axis", value)?;
+        }
+        Ok(Self { half_axes })
+    }
+}
+
+impl SignedDistance<2> for Ellipse {
+    /// The point of the boundary nearest to `x` is `(a^2 x / (s + a^2), b^2 y / (s + b^2))`, in units where the shorter half axis `b`
+    /// is 1, for the largest `s` that puts it on the boundary; bisection finds that to the last bit.
+    fn signed_distance(&self, x: [f64; 2]) -> f64 {
+        let ([a, b], [x, y]) = (self.half_axes, x.map(f64::abs));
+        let ([a, b], [x, y]) = if a < b {
+            ([b, a], [y, x])
+        } else {
+            ([a, b], [x, y])
+        };
+        let (ratio, along, across) = ((a / b).powi(2), x / b * (a / b), y / b);
+        let outside = |s: f64| (along / (s + ratio)).hypot(across / (s + 1.0)) > 1.0;
+        let (mut low, mut high) = (across - 1.0, along.hypot(across) - 1.0);
+        loop {
+            let s = 0.5 * (low + high);
+            if !(low < s && s < high) {
+                break;
+            }
+            if outside(s) { low = s } else { high = s }
+        }
+        let nearest = (ratio * x / (high + ratio) / a).min(1.0);
+        let distance = (x - a * nearest).hypot(y - b * (1.0 - nearest * nearest).sqrt());
+        if (x / a).hypot(y / b) > 1.0 {
+            distance
+        } else {
+            -distance
+        }
+    }
+}
+
 /// The points within `radius` of a segment. Exact everywhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule<const D: usize> {

@@ -4,7 +4,9 @@
 
 use std::f64::consts::PI;
 
-use geometry::shapes::{Ball, Capsule, Cross, Cuboid, Cylinder, HalfSpace, RoundedBox, Torus};
+use geometry::shapes::{
+    Ball, Capsule, Cross, Cuboid, Cylinder, Ellipse, HalfSpace, RoundedBox, Torus,
+};
 use geometry::{Error, Grid, Rotation, SignedDistance, SignedDistanceExt, phase_field};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -139,7 +141,13 @@ fn check_against_lattice<const D: usize>(cases: Vec<Case<D>>, cells: usize, poin
 
 #[test]
 fn distances_agree_with_brute_force_in_2d() {
-    check_against_lattice(generic_cases::<2>(), 300, 150);
+    let mut cases = generic_cases::<2>();
+    cases.extend([[0.6, 0.3], [0.2, 0.5], [0.4, 0.4]].map(|[a, b]| {
+        case("ellipse", Ellipse::new([a, b]), move |[x, y]| {
+            (x / a).hypot(y / b) <= 1.0
+        })
+    }));
+    check_against_lattice(cases, 300, 150);
 }
 
 #[test]
@@ -334,6 +342,7 @@ fn impossible_shapes_are_refused() {
     refused(RoundedBox::new([1.0, 0.5], 0.6).map(drop));
     refused(RoundedBox::new([1.0, 0.5], f64::NAN).map(drop));
     refused(Cross::<2>::new(0.2, 0.8).map(drop));
+    refused(Ellipse::new([0.2, 0.0]).map(drop));
     refused(Torus::new(0.2, 0.2).map(drop));
     refused(Torus::clifford(f64::INFINITY).map(drop));
     refused(Cylinder::new(0.1, 0.0).map(drop));

@@ -255,7 +255,7 @@ impl Report {
             let chart = LineChart::new("", Axis::linear("time t"), Axis::linear(label));
             let mut chart = self.chart(chart, Flow::Willmore, |e| {
                 let of_step =
-                    |k: usize| e.mean(|circle| circle.minimizations().nth(k).map_or(0.0, count));
+                    |k: usize| e.mean(|circle| circle.records[k].minimization.as_ref().map_or(0.0, count));
                 (0..self.steps).map(|k| [time(k + 1), of_step(k)]).collect()
             });
             let points = chart.series.iter().flat_map(|curve| &curve.points);

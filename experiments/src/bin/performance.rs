@@ -4,24 +4,23 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
-use experiments::circles::{EPS, STEP};
-use experiments::comparison::cross;
-use experiments::networks::{NetworkOptions, convergence_ratios};
+use engine::{Case, Method, Operator, Run, Scheme, StepRule};
+use experiments::networks::{NetworkOptions, convergence_network};
 use experiments::options::RunOptions;
-use experiments::products::{Candidates, ProductTimes, median};
-use experiments::{Error, harness, memory};
+use experiments::products::{Candidates, ProductTimes};
+use experiments::session::Session;
+use experiments::timing::{self, Timed, median};
+use experiments::{Error, harness, memory, surfaces};
 use geometry::measure::l2_distance;
 use geometry::shapes::{Ball, Capsule, Cuboid};
 use geometry::{Field, Grid, SignedDistanceExt, phase_field};
-use indicatif::ProgressBar;
-use model::{Network, Ratios};
-use operators::ComputeDevice;
+use operators::{ComputeDevice, DeviceKind};
 use report::{
-    Axis, Colour, Column, Figure, Format, LegendEntry, LineChart, LineStyle, Marker, Series,
-    Summary, Table,
+    Axis, Colour, Figure, Format, LegendEntry, LineChart, LineStyle, Marker, Series, Summary, Table,
 };
 use serde::Serialize;
-use solver::{FlowParams, NewtonParams, PhaseTimes, StepRecord, WillmoreFlow};
+use serde_json::json;
+use solver::{PhaseTimes, StepRecord};
 
 const PROGRAM: &str = "performance";
 /// Steps of a comparison with a smaller tolerance, and how much smaller.
@@ -45,17 +44,10 @@ struct Options {
     turns: f64,
 }
 
-#[derive(Serialize)]
-struct Parameters {
-    turns: f64,
-    quick: bool,
-    threads: usize,
-}
-
 /// What was measured for one shape on one grid.
-#[derive(Serialize, Clone, Debug)]
+#[derive(Serialize)]
 struct Measurement {
-    case: &'static str,
+    case: String,
     dimension: usize,
     n: usize,
     cells_per_side: usize,
@@ -84,13 +76,174 @@ struct Measurement {
     pages_per_product: Option<f64>,
 }
 
+fn main() -> ExitCode {
+    let options = Options::parse();
+    harness::run(|| program(&options))
+}
+
+fn program(options: &Options) -> Result<(), Error> {
+    let (run, quick) = (&options.run, options.run.quick);
+    if !(options.turns.is_finite() && options.turns > 0.0) {
+        return Err(Error::Options("--turns must be positive".to_owned()));
+    }
+    let device = run.open_device()?;
+    if !matches!(device.kind(), DeviceKind::Flex | DeviceKind::NdArray) {
+        return Err(Error::Options(format!(
+            "{PROGRAM} compares with products written for the CPU: choose --device flex or ndarray, not {}",
+            device.kind()
+        )));
+    }
+    let planes: &[usize] = if quick { &[128] } else { &[128, 256, 512] };
+    let solids = match quick {
+        true => [("cube", 24, 2), ("blob", 32, 2)],
+        false => [("cube", 64, 20), ("blob", 128, 8)],
+    };
+    let mut needs =
+        (planes.iter().map(|&n| convergence_network(n))).collect::<Result<Vec<_>, _>>()?;
+    needs.push(surfaces::needed_network());
+    let networks = options.networks.load(&needs)?;
+    let turns = if quick { 0.05 } else { options.turns };
+    let parameters =
+        json!({ "turns": turns, "quick": quick, "threads": rayon::current_num_threads() });
+    let mut session = Session::open(PROGRAM, run, device, &parameters)?;
+    let mut all = Vec::new();
+    for &n in planes {
+        let operator = networks.operator((Method::Hybrid, Scheme::Paper), n)?;
+        let case = timing::plane(&operator, n, if quick { 2 } else { 128 }, quick)?;
+        all.push(Measurement::of(
+            "cross",
+            &case,
+            &mut session,
+            turns,
+            n <= 256,
+        )?);
+    }
+    for (name, n, steps) in solids {
+        let network = networks.find(Scheme::Paper, &surfaces::needed_network())?;
+        let operator = Operator::learned(Scheme::Paper, network)?;
+        let time = (StepRule::Constant(0.5_f64.powi(18)), steps);
+        let initial = solid_shape(name, n)?;
+        let case = surfaces::willmore_flow(name, initial, operator, surfaces::scales(n), time);
+        all.push(Measurement::of(name, &case, &mut session, turns, false)?);
+    }
+    let (steps, products) = (step_table(&all)?, product_table(&all)?);
+    steps.write(&session.output, "steps")?;
+    products.write(&session.output, "products")?;
+    session.output.write_json("performance.json", &all)?;
+    session.figure(figure(&all), "performance")?;
+    let report = format!("{}\n{}", steps.to_markdown(), products.to_markdown());
+    let title = "Willmore steps by the hybrid scheme on this machine";
+    session.finish(title, summary(&all)?, &report)
+}
+
+/// A cube of side 1/2, or a body with arms: a ball with three capsules through it.
+fn solid_shape(name: &str, n: usize) -> Result<Field<3>, Error> {
+    let (grid, eps) = (Grid::<3>::per_unit(n, 1.0)?, surfaces::scales(n).eps);
+    if name == "cube" {
+        return Ok(phase_field(grid, &Cuboid::new([0.25, 0.25, 0.25])?, eps)?);
+    }
+    let arm = |to: [f64; 3], radius| Capsule::new([0.0; 3], to, radius);
+    let blob = Ball::new([0.0; 3], 0.2)?
+        .union(arm([0.25, 0.1, 0.05], 0.1)?)
+        .union(arm([-0.2, 0.2, -0.1], 0.09)?)
+        .union(arm([0.0, -0.25, 0.15], 0.11)?);
+    Ok(phase_field(grid, &blob, eps)?)
+}
+
+/// Distance of the end of some steps to that with a smaller tolerance.
+fn distance_to_tighter<const D: usize>(
+    case: &Case<D>,
+    device: &ComputeDevice,
+) -> Result<f64, Error> {
+    let end = |case: Case<D>| -> Result<Field<D>, Error> {
+        let mut run = Run::new(case, device)?;
+        while run.steps() < COMPARED_STEPS && run.step()?.is_some() {}
+        Ok(run.field().clone())
+    };
+    let mut tighter = case.clone();
+    let newton = &mut tighter.scales.newton;
+    newton.tolerance /= TIGHTER;
+    // Linear solves that leave a tenth would take a Newton step for every digit.
+    newton.cg_tolerance /= TIGHTER.sqrt();
+    let (loose, tight) = (end(case.clone())?, end(tighter)?);
+    Ok(l2_distance(&loose, &tight)? / l2_distance(&case.initial, &tight)?)
+}
+
 impl Measurement {
-    fn key(&self) -> String {
-        format!("{}.n{}", self.case, self.n)
+    fn of<const D: usize>(
+        name: &str,
+        case: &Case<D>,
+        session: &mut Session<'_>,
+        turns: f64,
+        compared: bool,
+    ) -> Result<Self, Error> {
+        let grid = *case.grid();
+        let n = (1.0 / grid.spacing()).round() as usize;
+        let bar = session.progress.counter(format!("{name}, n = {n}"));
+        memory::forget_peak();
+        let mut timed = Timed::new(case.clone(), &session.device, bar)?;
+        let mut warm = None;
+        session.phase(format!("{name}, n = {n}: steps"), || {
+            while timed.goes_on() {
+                timed.step()?;
+                warm = warm.or_else(memory::pages);
+            }
+            timed
+                .failure
+                .clone()
+                .map_or(Ok(()), |reason| Err(Error::Options(reason)))
+        })?;
+        let pages = memory::pages().zip(warm).map(|(now, warm)| now - warm);
+        let peak_mib = memory::peak_mib();
+        let network = &case
+            .operator
+            .network()
+            .expect("the operator is learned")
+            .network;
+        let device = session.device.clone();
+        let (products, distance) = session.phase(format!("{name}, n = {n}: products"), || {
+            let distance = compared
+                .then(|| distance_to_tighter(case, &device))
+                .transpose()?;
+            let mut candidates = Candidates::new(network, timed.run.field(), &device)?;
+            Ok((
+                candidates.measure(Duration::from_secs_f64(turns))?,
+                distance,
+            ))
+        })?;
+        let sum = |of: fn(&StepRecord) -> f64| timed.minimizations().map(of).sum::<f64>();
+        let times = PhaseTimes {
+            products: sum(|r| r.times.products),
+            preconditioner: sum(|r| r.times.preconditioner),
+            assembly: sum(|r| r.times.assembly),
+            energies: sum(|r| r.times.energies),
+            start: sum(|r| r.times.start),
+        };
+        let later = timed.minimizations().skip(1).map(|r| r.newton.hvp as f64);
+        let later = later.sum::<f64>().max(1.0);
+        Ok(Self {
+            case: name.to_owned(),
+            dimension: D,
+            n,
+            cells_per_side: grid.cells(),
+            unknowns: grid.len(),
+            steps: timed.run.steps(),
+            seconds: sum(|r| r.seconds),
+            seconds_per_step: median(timed.seconds()),
+            newton_per_step: timed.mean(|r| r.newton.newton as f64),
+            hvp_per_step: timed.mean(|r| r.newton.hvp as f64),
+            coarser_hvp_per_step: timed.mean(|r| r.start.hvp),
+            seconds_per_product: times.products / sum(|r| r.newton.hvp as f64),
+            times,
+            peak_mib,
+            products,
+            distance_to_tighter: distance,
+            pages_per_product: pages.map(|pages| pages as f64 / later),
+        })
     }
 
-    fn label(&self) -> String {
-        format!("{}, n = {}", self.case, self.n)
+    fn key(&self) -> String {
+        format!("{}.n{}", self.case, self.n)
     }
 
     fn grid(&self) -> String {
@@ -123,310 +276,45 @@ impl Measurement {
     }
 }
 
-fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
-}
-
-fn program(options: &Options) -> Result<(), Error> {
-    let quick = options.run.quick;
-    if !(options.turns.is_finite() && options.turns > 0.0) {
-        return Err(Error::Options("--turns must be positive".to_owned()));
-    }
-    let device = options.run.open_device()?;
-    if !device.kind().is_cpu() {
-        return Err(Error::Options(format!(
-            "{PROGRAM} compares with products written for the CPU: choose --device flex or ndarray, not {}",
-            device.kind()
-        )));
-    }
-    let planes: &[usize] = if quick { &[128] } else { &[128, 256, 512] };
-    let solid = Ratios {
-        dimension: 3,
-        width: 17,
-        eps_over_h: 2.0,
-        step_over_h2: 1.0,
-    };
-    let mut ratios = planes
-        .iter()
-        .map(|&n| convergence_ratios(n))
-        .collect::<Result<Vec<_>, _>>()?;
-    ratios.push(solid);
-    let networks = options.networks.find(&ratios)?;
-    let output = options.run.open_output(PROGRAM)?;
-    let turns = if quick { 0.05 } else { options.turns };
-    let parameters = Parameters {
-        turns,
-        quick,
-        threads: rayon::current_num_threads(),
-    };
-    let mut manifest = options.run.manifest(PROGRAM, &parameters, &device)?;
-    let progress = options.run.progress();
-    let turns = Duration::from_secs_f64(turns);
-    let mut all = Vec::new();
-    for (&n, network) in planes.iter().zip(&networks) {
-        let steps = if quick { 2 } else { 128 };
-        let bar = progress.bar(format!("cross, n = {n}"), steps as u64);
-        let initial = cross_or_disc(n, quick)?;
-        let case = Case {
-            name: "cross",
-            eps: EPS,
-            mcf_step: STEP,
-            tau: STEP,
-            steps,
-            compared: n <= 256,
-        };
-        all.push(manifest.phase(format!("cross, n = {n}"), || {
-            case.measure(&initial, network, &device, turns, &bar)
-        })?);
-        bar.finish();
-    }
-    let network = &networks[networks.len() - 1];
-    let solids = if quick {
-        [("cube", 24, 2), ("blob", 32, 2)]
-    } else {
-        [("cube", 64, 20), ("blob", 128, 8)]
-    };
-    for (name, n, steps) in solids {
-        let spacing = 1.0 / n as f64;
-        let bar = progress.bar(format!("{name}, n = {n}"), steps as u64);
-        let initial = solid_shape(name, n)?;
-        let case = Case {
-            name,
-            eps: 2.0 * spacing,
-            mcf_step: spacing * spacing,
-            tau: 0.5_f64.powi(18),
-            steps,
-            compared: false,
-        };
-        all.push(manifest.phase(format!("{name}, n = {n}"), || {
-            case.measure(&initial, network, &device, turns, &bar)
-        })?);
-        bar.finish();
-    }
-
-    let (steps, products) = (step_table(&all)?, product_table(&all)?);
-    steps.write(&output, "steps")?;
-    products.write(&output, "products")?;
-    output.write("performance.json", report::data::to_json(&all)?)?;
-    figure(&options.run, &all).write(&output, "performance")?;
-    summary(&all)?.write(&output)?;
-    manifest.write(&output)?;
-    progress.clear();
-    options.run.say(&format!(
-        "{}\n{}\n{}\nResults are in {}",
-        options
-            .run
-            .title("Willmore steps by the hybrid scheme on this machine"),
-        steps.to_markdown(),
-        products.to_markdown(),
-        output.as_path().display()
-    ));
-    Ok(())
-}
-
-fn cross_or_disc(n: usize, quick: bool) -> Result<Field<2>, Error> {
-    if quick {
-        let grid = Grid::per_unit(n, 0.75)?;
-        return Ok(phase_field(grid, &Ball::new([0.0, 0.0], 0.2)?, EPS)?);
-    }
-    cross(Grid::per_unit(n, 2.0)?, EPS)
-}
-
-/// A cube of side 1/2, or a body with arms: a ball with three capsules through it.
-fn solid_shape(name: &str, n: usize) -> Result<Field<3>, Error> {
-    let grid = Grid::<3>::per_unit(n, 1.0)?;
-    let eps = 2.0 * grid.spacing();
-    if name == "cube" {
-        return Ok(phase_field(grid, &Cuboid::new([0.25, 0.25, 0.25])?, eps)?);
-    }
-    let arm = |to: [f64; 3], radius| Capsule::new([0.0; 3], to, radius);
-    let blob = Ball::new([0.0; 3], 0.2)?
-        .union(arm([0.25, 0.1, 0.05], 0.1)?)
-        .union(arm([-0.2, 0.2, -0.1], 0.09)?)
-        .union(arm([0.0, -0.25, 0.15], 0.11)?);
-    Ok(phase_field(grid, &blob, eps)?)
-}
-
-/// A flow to be measured.
-struct Case {
-    name: &'static str,
-    eps: f64,
-    mcf_step: f64,
-    tau: f64,
-    steps: usize,
-    /// Whether it is compared with a smaller tolerance.
-    compared: bool,
-}
-
-/// A flow as the experiments run it.
-fn begun<const D: usize>(
-    params: FlowParams,
-    initial: &Field<D>,
-    network: &Network,
-    device: &ComputeDevice,
-) -> Result<WillmoreFlow<D>, Error> {
-    let mut flow = WillmoreFlow::with_network(network, initial, params, device)?;
-    flow.begin_on_half_grids(network)?;
-    Ok(flow)
-}
-
-impl Case {
-    fn params(&self) -> FlowParams {
-        FlowParams {
-            eps: self.eps,
-            mcf_step: self.mcf_step,
-            newton: NewtonParams::default(),
-            calibration: solver::Factors::PAPER,
-        }
-    }
-
-    fn distance_to_tighter<const D: usize>(
-        &self,
-        initial: &Field<D>,
-        network: &Network,
-        device: &ComputeDevice,
-    ) -> Result<f64, Error> {
-        let end = |params| -> Result<Field<D>, Error> {
-            let mut flow = begun(params, initial, network, device)?;
-            for _ in 0..self.steps.min(COMPARED_STEPS) {
-                flow.advance(self.tau)?;
-            }
-            Ok(flow.field()?)
-        };
-        let params = self.params();
-        let mut tighter = params;
-        tighter.newton.tolerance /= TIGHTER;
-        // Linear solves that leave a tenth would take a Newton step for every digit.
-        tighter.newton.cg_tolerance /= TIGHTER.sqrt();
-        let (loose, tight) = (end(params)?, end(tighter)?);
-        Ok(l2_distance(&loose, &tight)? / l2_distance(initial, &tight)?)
-    }
-
-    fn measure<const D: usize>(
-        &self,
-        initial: &Field<D>,
-        network: &Network,
-        device: &ComputeDevice,
-        turns: Duration,
-        bar: &ProgressBar,
-    ) -> Result<Measurement, Error> {
-        let grid = *initial.grid();
-        memory::forget_peak();
-        let mut flow = begun(self.params(), initial, network, device)?;
-        let mut records: Vec<StepRecord> = Vec::new();
-        let mut warm = None;
-        for _ in 0..self.steps {
-            records.push(flow.advance(self.tau)?);
-            warm = warm.or_else(memory::pages);
-            bar.inc(1);
-        }
-        let pages = memory::pages().zip(warm).map(|(now, warm)| now - warm);
-        let peak_mib = memory::peak_mib();
-        let field = flow.field()?;
-        drop(flow);
-        let distance_to_tighter = if self.compared {
-            Some(self.distance_to_tighter(initial, network, device)?)
-        } else {
-            None
-        };
-        let products = Candidates::new(network, &field, device)?.measure(turns);
-        let count = records.len() as f64;
-        let sum = |f: &dyn Fn(&StepRecord) -> f64| records.iter().map(f).sum::<f64>();
-        let hvp = sum(&|r| r.newton.hvp as f64);
-        let times = PhaseTimes {
-            products: sum(&|r| r.times.products),
-            preconditioner: sum(&|r| r.times.preconditioner),
-            assembly: sum(&|r| r.times.assembly),
-            energies: sum(&|r| r.times.energies),
-            start: sum(&|r| r.times.start),
-        };
-        Ok(Measurement {
-            case: self.name,
-            dimension: D,
-            n: (1.0 / grid.spacing()).round() as usize,
-            cells_per_side: grid.cells(),
-            unknowns: grid.len(),
-            steps: self.steps,
-            seconds: sum(&|r| r.seconds),
-            seconds_per_step: median(records.iter().map(|r| r.seconds).collect()),
-            newton_per_step: sum(&|r| r.newton.newton as f64) / count,
-            hvp_per_step: hvp / count,
-            coarser_hvp_per_step: sum(&|r| r.start.hvp) / count,
-            seconds_per_product: times.products / hvp,
-            times,
-            peak_mib,
-            products,
-            distance_to_tighter,
-            pages_per_product: pages.map(|pages| {
-                let later = records.iter().skip(1).map(|r| r.newton.hvp as f64);
-                pages as f64 / later.sum::<f64>().max(1.0)
-            }),
-        })
-    }
-}
-
 fn step_table(all: &[Measurement]) -> Result<Table, Error> {
-    let mut table = Table::new([
-        Column::text("shape"),
-        Column::text("grid"),
-        Column::number("steps", Format::Shortest),
-        Column::number("all steps [s]", Format::Fixed(1)),
-        Column::number("median step [s]", Format::Fixed(3)),
-        Column::number("Newton/step", Format::Fixed(1)),
-        Column::number("HVP/step", Format::Fixed(1)),
-        Column::number("and on coarser grids", Format::Fixed(1)),
-        Column::number("ms/HVP", Format::Fixed(2)),
-        Column::number("times two FFT pairs (f32)", Format::Fixed(2)),
-        Column::number("peak memory [MiB]", Format::Fixed(0)),
-        Column::number("new pages/HVP", Format::Fixed(1)),
-        Column::number("to 100 times the precision", Format::Scientific(1)),
-    ]);
-    for m in all {
-        table.push([
-            m.label().into(),
-            m.grid().into(),
-            m.steps.into(),
-            m.seconds.into(),
-            m.seconds_per_step.into(),
-            m.newton_per_step.into(),
-            m.hvp_per_step.into(),
-            m.coarser_hvp_per_step.into(),
-            (1e3 * m.seconds_per_product).into(),
-            (m.seconds_per_product / m.products.floor_single).into(),
-            m.peak_mib.into(),
-            m.pages_per_product.into(),
-            m.distance_to_tighter.into(),
-        ])?;
-    }
-    Ok(table)
+    let over_floor = |m: &Measurement| m.seconds_per_product / m.products.floor_single;
+    Ok(Table::of(all)
+        .text("shape", |m| format!("{}, n = {}", m.case, m.n))
+        .text("grid", Measurement::grid)
+        .number("steps", Format::Shortest, |m| m.steps)
+        .number("all steps [s]", Format::Fixed(1), |m| m.seconds)
+        .number("median step [s]", Format::Fixed(3), |m| m.seconds_per_step)
+        .number("Newton/step", Format::Fixed(1), |m| m.newton_per_step)
+        .number("HVP/step", Format::Fixed(1), |m| m.hvp_per_step)
+        .number("and on coarser grids", Format::Fixed(1), |m| {
+            m.coarser_hvp_per_step
+        })
+        .number("ms/HVP", Format::Fixed(2), |m| 1e3 * m.seconds_per_product)
+        .number("times two FFT pairs (f32)", Format::Fixed(2), over_floor)
+        .number("peak memory [MiB]", Format::Fixed(0), |m| m.peak_mib)
+        .number("new pages/HVP", Format::Fixed(1), |m| m.pages_per_product)
+        .number("to 100 times the precision", Format::Scientific(1), |m| {
+            m.distance_to_tighter
+        })
+        .finish()?)
 }
 
 fn product_table(all: &[Measurement]) -> Result<Table, Error> {
-    let mut table = Table::new([
-        Column::text("grid"),
-        Column::number("Burn, f64 [ms]", Format::Fixed(2)),
-        Column::number("by hand, f64 [ms]", Format::Fixed(2)),
-        Column::number("Burn / by hand", Format::Fixed(2)),
-        Column::number("two FFT pairs, f64 [ms]", Format::Fixed(2)),
-        Column::number("Burn, f32 [ms]", Format::Fixed(2)),
-        Column::number("two FFT pairs, f32 [ms]", Format::Fixed(2)),
-        Column::number("energy and gradient [ms]", Format::Fixed(2)),
-    ]);
-    for m in all {
-        let p = m.products;
-        table.push([
-            m.grid().into(),
-            (1e3 * p.burn).into(),
-            (1e3 * p.by_hand).into(),
-            p.ratio.into(),
-            (1e3 * p.floor).into(),
-            (1e3 * p.burn_single).into(),
-            (1e3 * p.floor_single).into(),
-            (1e3 * p.evaluate).into(),
-        ])?;
-    }
-    Ok(table)
+    let ms = Format::Fixed(2);
+    Ok(Table::of(all)
+        .text("grid", Measurement::grid)
+        .number("Burn, f64 [ms]", ms, |m| 1e3 * m.products.burn)
+        .number("by hand, f64 [ms]", ms, |m| 1e3 * m.products.by_hand)
+        .number("Burn / by hand", ms, |m| m.products.ratio)
+        .number("two FFT pairs, f64 [ms]", ms, |m| 1e3 * m.products.floor)
+        .number("Burn, f32 [ms]", ms, |m| 1e3 * m.products.burn_single)
+        .number("two FFT pairs, f32 [ms]", ms, |m| {
+            1e3 * m.products.floor_single
+        })
+        .number("energy and gradient [ms]", ms, |m| {
+            1e3 * m.products.evaluate
+        })
+        .finish()?)
 }
 
 /// Exponent of a power law through the first and the last point.
@@ -435,72 +323,29 @@ fn slope(points: &[[f64; 2]]) -> Option<f64> {
     (last[0] > first[0]).then(|| (last[1] / first[1]).ln() / (last[0] / first[0]).ln())
 }
 
-/// Line style in figures.
-fn style(dimension: usize) -> LineStyle {
-    if dimension == 2 {
-        LineStyle::Solid
-    } else {
-        LineStyle::Dashed
-    }
+/// Dimensions with their measurements and line styles.
+fn dimensions(all: &[Measurement]) -> [(String, Vec<&Measurement>, LineStyle); 2] {
+    [(2, LineStyle::Solid), (3, LineStyle::Dashed)].map(|(dimension, style)| {
+        let rows = all.iter().filter(|m| m.dimension == dimension);
+        (format!("{dimension}D"), rows.collect(), style)
+    })
 }
 
-fn figure(run: &RunOptions, all: &[Measurement]) -> Figure {
-    let mut cost = LineChart::new(
-        "cost of a step",
-        Axis::log("unknowns"),
-        Axis::log("median step [s]"),
-    );
+fn figure(all: &[Measurement]) -> Figure {
     let mut slopes = Vec::new();
-    for dimension in [2, 3] {
-        let points: Vec<[f64; 2]> = all
-            .iter()
-            .filter(|m| m.dimension == dimension)
-            .map(|m| [m.unknowns as f64, m.seconds_per_step])
-            .collect();
-        if let Some(slope) = slope(&points) {
-            slopes.push(format!("{slope:.2} in {dimension}D"));
-        }
-        cost = cost.with_series(
-            Series::new(format!("{dimension}D"), points)
-                .with_colour(Colour::Black)
-                .with_style(style(dimension))
-                .with_marker(Marker::Circle),
-        );
-    }
-    let mut parts = LineChart::new(
-        "where the time goes",
-        Axis::log("unknowns"),
-        Axis::log("mean per step [s]"),
-    );
-    let mut entries = Vec::new();
-    for dimension in [2, 3] {
-        let rows: Vec<&Measurement> = all.iter().filter(|m| m.dimension == dimension).collect();
-        let Some(first) = rows.first() else { continue };
-        let style = style(dimension);
-        let name = format!("{dimension}D");
-        entries.push(LegendEntry::line(name, Colour::Black, style));
-        for (k, (name, _)) in first.parts().into_iter().enumerate() {
-            let points: Vec<[f64; 2]> = rows
-                .iter()
-                .map(|m| [m.unknowns as f64, m.parts()[k].1])
-                .filter(|[_, seconds]| *seconds > 0.0)
-                .collect();
-            parts = parts.with_series(
-                Series::new(format!("{name}, {dimension}D"), points)
-                    .with_colour(k)
-                    .with_style(style)
-                    .with_marker(Marker::Circle),
-            );
-        }
-    }
-    let names = all.first().map(Measurement::parts).unwrap_or_default();
-    let phases = names
-        .iter()
-        .enumerate()
-        .map(|(k, (name, _))| LegendEntry::line(*name, k, LineStyle::Solid));
-    Figure::new(run.title("Willmore steps by the hybrid scheme"), 2)
+    let cost = dimensions(all).map(|(name, rows, style)| {
+        let curve = Series::of(&name, rows, |m| [m.unknowns as f64, m.seconds_per_step]);
+        slopes.extend(slope(&curve.points).map(|slope| format!("{slope:.2} in {name}")));
+        curve
+            .with_colour(Colour::Black)
+            .with_style(style)
+            .with_marker(Marker::Circle)
+    });
+    let axes = (Axis::log("unknowns"), Axis::log("median step [s]"));
+    let cost = LineChart::new("cost of a step", axes.0, axes.1).with_curves(cost);
+    Figure::new("Willmore steps by the hybrid scheme", 2)
         .with_panel(cost.with_entries([]))
-        .with_panel(parts.with_entries(phases).with_entries(entries))
+        .with_panel(parts(all))
         .with_shared_legend()
         .with_note(format!(
             "2D: a cross, eps = 2⁻⁶, tau = 2⁻¹⁴. 3D: a cube at n = 64, a blob at n = 128, eps = 2h, tau = 2⁻¹⁸. {} threads. Cost \
@@ -510,33 +355,60 @@ fn figure(run: &RunOptions, all: &[Measurement]) -> Figure {
         ))
 }
 
+/// Where the time goes: a colour for each part, a line style for each dimension.
+fn parts(all: &[Measurement]) -> LineChart {
+    let names = all[0].parts().map(|(name, _)| name);
+    let axes = (Axis::log("unknowns"), Axis::log("mean per step [s]"));
+    let mut chart = LineChart::new("where the time goes", axes.0, axes.1);
+    let mut entries = Vec::new();
+    for (dimension, rows, style) in dimensions(all) {
+        for (k, name) in names.into_iter().enumerate() {
+            let points = rows.iter().map(|m| [m.unknowns as f64, m.parts()[k].1]);
+            let points: Vec<[f64; 2]> = points.filter(|[_, seconds]| *seconds > 0.0).collect();
+            chart = chart.with_series(
+                Series::new(format!("{name}, {dimension}"), points)
+                    .with_colour(k)
+                    .with_style(style)
+                    .with_marker(Marker::Circle),
+            );
+        }
+        entries.push(LegendEntry::line(dimension, Colour::Black, style));
+    }
+    let phases = names.into_iter().enumerate();
+    let phases = phases.map(|(k, name)| LegendEntry::line(name, k, LineStyle::Solid));
+    chart.with_entries(phases).with_entries(entries)
+}
+
 fn summary(all: &[Measurement]) -> Result<Summary, Error> {
     let mut summary = Summary::new();
     for m in all {
-        let key = m.key();
-        summary.insert(&format!("{key}.seconds"), m.seconds)?;
-        summary.insert(&format!("{key}.seconds_per_step"), m.seconds_per_step)?;
-        let hvp = m.hvp_per_step + m.coarser_hvp_per_step;
-        summary.insert(&format!("{key}.hvp_per_step"), hvp)?;
-        summary.insert(&format!("{key}.newton_per_step"), m.newton_per_step)?;
-        if let Some(pages) = m.pages_per_product {
-            summary.insert(&format!("{key}.pages_per_product"), pages)?;
+        let (grid, products) = (m.grid(), &m.products);
+        let of_steps = [
+            ("seconds", Some(m.seconds)),
+            ("seconds_per_step", Some(m.seconds_per_step)),
+            (
+                "hvp_per_step",
+                Some(m.hvp_per_step + m.coarser_hvp_per_step),
+            ),
+            ("newton_per_step", Some(m.newton_per_step)),
+            ("pages_per_product", m.pages_per_product),
+            ("distance_to_tighter", m.distance_to_tighter),
+            ("peak_mib", m.peak_mib),
+        ];
+        for (what, value) in of_steps {
+            if let Some(value) = value {
+                summary.insert(&format!("{}.{what}", m.key()), value)?;
+            }
         }
-        if let Some(distance) = m.distance_to_tighter {
-            summary.insert(&format!("{key}.distance_to_tighter"), distance)?;
+        let of_products = [
+            ("ratio", products.ratio),
+            ("ms", 1e3 * products.burn),
+            ("single_ms", 1e3 * products.burn_single),
+            ("over_floor", products.burn / products.floor),
+        ];
+        for (what, value) in of_products {
+            summary.insert(&format!("hvp.{grid}.{what}"), value)?;
         }
-        if let Some(peak) = m.peak_mib {
-            summary.insert(&format!("{key}.peak_mib"), peak)?;
-        }
-        let grid = m.grid();
-        summary.insert(&format!("hvp.{grid}.ratio"), m.products.ratio)?;
-        summary.insert(&format!("hvp.{grid}.ms"), 1e3 * m.products.burn)?;
-        summary.insert(
-            &format!("hvp.{grid}.single_ms"),
-            1e3 * m.products.burn_single,
-        )?;
-        let floor = m.products.burn / m.products.floor;
-        summary.insert(&format!("hvp.{grid}.over_floor"), floor)?;
     }
     Ok(summary)
 }

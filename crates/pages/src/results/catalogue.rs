@@ -99,6 +99,15 @@ pub(crate) const CATALOGUE: &[Entry] = &[
         figures: PLANE,
     },
     Entry {
+        folder: "ellipse_orders",
+        title: "Orders of convergence",
+        description: "Not in the paper: Willmore flow of an ellipse with the grid spacing and the time step halved again and again.",
+        figures: &[(
+            "orders",
+            "L² distances at t = 2⁻¹⁰ between successive runs, and to the finest run.",
+        )],
+    },
+    Entry {
         folder: "timing_tables",
         title: "Computing time",
         description: "128 Willmore steps of the cross by every method, which take turns on one \

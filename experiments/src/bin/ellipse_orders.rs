@@ -1,0 +1,83 @@
+//! The order of convergence of Willmore flow of an ellipse in h and in tau, against its own finest run.
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use engine::{Flow, Method, Samples, Scheme};
+use experiments::networks::{Chosen, EPS, STEP};
+use experiments::session::Session;
+use experiments::{Error, harness, options::RunOptions, orders, study};
+use geometry::{Grid, phase_field, shapes::Ellipse};
+use report::Figure;
+
+const HALF_AXES: [f64; 2] = [0.3, 0.2];
+const SIDE: f64 = 1.25;
+/// Steps of `2^-14`, and how little the minimizations leave: much less than the errors.
+const STEPS: usize = 16;
+const TOLERANCE: f64 = 1e-4;
+/// Cells per unit length at `tau = 2^-14`, and parts of that at `n = 128`.
+const CELLS: [usize; 4] = [64, 128, 256, 512];
+const PARTS: [usize; 5] = [1, 2, 4, 8, 16];
+
+/// Willmore flow of the ellipse with half axes 0.3 and 0.2 by the calibrated scheme with the accurate network, eps = 2^-6, tautilde =
+/// 2^-14, until t = 2^-10: L2 distances between runs with h and tau halved, and the orders of convergence.
+#[derive(Parser, Debug)]
+#[command(name = "ellipse_orders", version)]
+struct Options {
+    #[command(flatten)]
+    run: RunOptions,
+}
+
+fn main() -> ExitCode {
+    let options = Options::parse();
+    harness::run(|| program(&options.run))
+}
+
+fn program(options: &RunOptions) -> Result<(), Error> {
+    let (used, steps) = if options.quick {
+        (3, 2)
+    } else {
+        (CELLS.len(), STEPS)
+    };
+    let parameters = serde_json::json!({ "half_axes": HALF_AXES, "side": SIDE, "steps": steps, "tolerance": TOLERANCE, "quick": options.quick });
+    let mut session = Session::open(
+        "ellipse_orders",
+        options,
+        options.open_device()?,
+        &parameters,
+    )?;
+    let mut run = |size: f64, n: usize, parts: usize| {
+        let operator = Chosen::default().operator((Method::Hybrid, Scheme::Accurate), n)?;
+        let initial = phase_field(Grid::per_unit(n, SIDE)?, &Ellipse::new(HALF_AXES)?, EPS)?;
+        let time = (STEP / parts as f64, steps * parts);
+        let mut case = study::case((Flow::Willmore, &operator), "ellipse", initial, time);
+        case.scales.newton.tolerance = TOLERANCE;
+        let name = format!("n{n}-{parts}");
+        Ok((
+            size,
+            session.trajectory(&name, case, &name, &Samples::every(time.1))?,
+        ))
+    };
+    let in_h: Result<Vec<_>, Error> = CELLS[..used]
+        .iter()
+        .map(|&n| run(1.0 / n as f64, n, 1))
+        .collect();
+    let in_tau: Result<Vec<_>, Error> = PARTS[..used + 1]
+        .iter()
+        .map(|&k| run(STEP / k as f64, 128, k))
+        .collect();
+    let sizes = [
+        ("h", orders::refinements(&in_h?)?),
+        ("tau", orders::refinements(&in_tau?)?),
+    ];
+    let figure = Figure::new("Willmore flow of an ellipse: convergence", 2)
+        .with_panels(sizes.iter().map(|(name, rows)| orders::chart(name, rows)));
+    session.figure(figure.with_shared_legend(), "orders")?;
+    let table = orders::table(&sizes)?;
+    table.write(&session.output, "orders")?;
+    session.finish(
+        "Orders of convergence for an ellipse",
+        orders::summary("ellipse", &sizes)?,
+        &table.to_markdown(),
+    )
+}

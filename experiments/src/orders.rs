@@ -1,0 +1,104 @@
+//! Orders of convergence of runs against the finest of them.
+
+use engine::Trajectory;
+use report::{Axis, Colour, Format, LineChart, LineStyle, Marker, Series, Summary, Table};
+
+use crate::Error;
+
+/// A run in a sequence in which a size, `h` or `tau`, is halved from one to the next.
+#[derive(Clone, Copy, Debug)]
+pub struct Refinement {
+    /// The size.
+    pub size: f64,
+    /// `L2` distance of its end to that of the finest run, which is small only as long as the finest run is much finer,
+    pub to_finest: f64,
+    /// and to that of the next one, which is of the order of the error whatever the finest run is.
+    pub to_next: f64,
+    /// The order `p` as the distances to the next fall like `size^p` up to the next run; none for the last.
+    pub order: Option<f64>,
+}
+
+/// What the runs say, coarsest first; the finest one has no row.
+///
+/// # Errors
+/// [`Error::Engine`] if runs cannot be compared.
+pub fn refinements<const D: usize>(
+    runs: &[(f64, Trajectory<D>)],
+) -> Result<Vec<Refinement>, Error> {
+    let distance = |(_, coarse): &(f64, Trajectory<D>), (_, fine): &(f64, Trajectory<D>)| {
+        coarse.distance(coarse.steps(), fine, fine.steps())
+    };
+    let mut rows: Vec<Refinement> = Vec::new();
+    for pair in runs.windows(2) {
+        rows.push(Refinement {
+            size: pair[0].0,
+            to_finest: distance(&pair[0], &runs[runs.len() - 1])?,
+            to_next: distance(&pair[0], &pair[1])?,
+            order: None,
+        });
+    }
+    for k in 1..rows.len() {
+        rows[k - 1].order = Some((rows[k - 1].to_next / rows[k].to_next).log2());
+    }
+    Ok(rows)
+}
+
+/// The refinements of a size as a chart, with slopes 1 and 2 for comparison.
+pub fn chart(name: &str, rows: &[Refinement]) -> LineChart {
+    let (first, last) = (rows[0], rows[rows.len() - 1]);
+    let guide = |slope: i32| {
+        let line = [first, last].map(|row| {
+            [
+                row.size,
+                first.to_next * (row.size / first.size).powi(slope),
+            ]
+        });
+        Series::new(format!("slope {slope}"), line).with_colour(Colour::Grey)
+    };
+    LineChart::new("", Axis::log(name), Axis::log("L² distance at the end")).with_curves([
+        Series::of("to the next finer run", rows, |row| [row.size, row.to_next])
+            .with_marker(Marker::Circle),
+        Series::of("to the finest run", rows, |row| [row.size, row.to_finest])
+            .with_colour(1)
+            .with_marker(Marker::Square),
+        guide(1).with_style(LineStyle::Dashed),
+        guide(2).with_style(LineStyle::Dotted),
+    ])
+}
+
+/// The refinements of several sizes as a table.
+///
+/// # Errors
+/// [`Error::Report`] for distances that are not finite.
+pub fn table(sizes: &[(&str, Vec<Refinement>)]) -> Result<Table, Error> {
+    let rows: Vec<(&str, Refinement)> = sizes
+        .iter()
+        .flat_map(|(name, rows)| rows.iter().map(|row| (*name, *row)))
+        .collect();
+    Ok(Table::of(&rows)
+        .text("refined", |(name, _)| *name)
+        .number("size", Format::Scientific(2), |(_, row)| row.size)
+        .number("to the finest", Format::Scientific(2), |(_, row)| {
+            row.to_finest
+        })
+        .number("to the next", Format::Scientific(2), |(_, row)| row.to_next)
+        .number("order", Format::Fixed(2), |(_, row)| row.order)
+        .finish()?)
+}
+
+/// The orders as metrics `KEY.order.SIZE.pairK`, from the coarsest pair of runs.
+///
+/// # Errors
+/// [`Error::Report`] for orders that are not finite.
+pub fn summary(key: &str, sizes: &[(&str, Vec<Refinement>)]) -> Result<Summary, Error> {
+    let mut summary = Summary::new();
+    for (name, rows) in sizes {
+        for (k, row) in rows.iter().enumerate() {
+            summary.insert(&format!("{key}.to_next.{name}.pair{}", k + 1), row.to_next)?;
+            if let Some(order) = row.order {
+                summary.insert(&format!("{key}.order.{name}.pair{}", k + 1), order)?;
+            }
+        }
+    }
+    Ok(summary)
+}
