@@ -147,7 +147,7 @@ fn compare_with_finite_elements(all: &mut [Flowed]) -> Result<Remarks, Error> {
         for shown in one.snapshots.iter_mut().filter(|shown| shown.step > 0) {
             let step = shown.step;
             let l2 = one.trajectory.distance(step, &elements.trajectory, step)?;
-            shown.caption += &format!("\nL² distance to FE {l2:.4}");
+            shown.caption = format!("{}\nL² distance to FE {l2:.4}", shown.caption);
             one.metrics.push((format!("l2_to_fe.step{step}"), l2));
         }
     }

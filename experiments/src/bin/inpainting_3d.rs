@@ -165,15 +165,12 @@ fn decorate(snapshots: &mut [Snapshot], measured: &Inpainted<'_, 3>) {
     let [low, high] = measured.shape.region;
     for snapshot in snapshots {
         let (step, after) = (snapshot.step, (snapshot.time / TAU).round());
-        snapshot.caption = format!("step {step}");
-        if after > step as f64 {
-            snapshot.caption += &format!(" (t = {after} τ)");
-        }
-        snapshot.caption += &format!(": w = {:.2}", snapshot.w());
+        let time = (after > step as f64).then(|| format!(" (t = {after} τ)"));
         let distance = measured.distances.iter().find(|(k, _)| *k == step);
-        if let Some((_, l2)) = distance.filter(|_| measured.shape.whole.is_some()) {
-            snapshot.caption += &format!("\nL² distance to the ball {l2:.4}");
-        }
+        let distance = distance.filter(|_| measured.shape.whole.is_some());
+        let distance = distance.map(|(_, l2)| format!("\nL² distance to the ball {l2:.4}"));
+        let [time, distance] = [time, distance].map(Option::unwrap_or_default);
+        snapshot.caption = format!("step {step}{time}: w = {:.2}{distance}", snapshot.w());
         let edges = Tube::edges_of_box([low; 3], [high; 3], EDGE).into_iter();
         snapshot.tubes = edges.map(|edge| edge.with_colour(GREEN)).collect();
     }
