@@ -22,6 +22,8 @@ use toml::{Table, Value};
 use crate::cli::Cli;
 use crate::error::Error;
 
+/// The file of all options, resolved, in the folder of a run.
+pub const FILE: &str = "config.toml";
 /// The entry of a resolved configuration that names the subcommand.
 pub const COMMAND: &str = "command";
 

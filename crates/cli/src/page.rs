@@ -19,9 +19,9 @@ use serde_json::Value;
 use surfaces::TriangleMesh;
 
 use crate::cli::MeshFormat;
+use crate::config;
 use crate::error::Error;
 use crate::outlet;
-use crate::run::CONFIG;
 
 /// Name of the page in the folder of a run.
 pub const NAME: &str = "index.html";
@@ -60,7 +60,7 @@ impl Files<'_> {
         if !table.rows().is_empty() {
             page.push(self.steps(&table)?);
         }
-        let options: Value = toml::from_str(&self.run.read_text(CONFIG)?)
+        let options: Value = toml::from_str(&self.run.read_text(config::FILE)?)
             .map_err(|error| Error::options(format!("the stored options: {error}")))?;
         let mut numbers = Section::new("Numbers");
         if let Some(outcome) = &outcome {

@@ -14,6 +14,7 @@ use runs::{Interrupt, RunDirectory, StoredRun};
 use serde_json::{Value, json};
 
 use crate::cli::{KeepOptions, MeshFormat, SayOptions};
+use crate::config;
 use crate::error::Error;
 use crate::outlet::{self, Outlet};
 use crate::page;
@@ -36,8 +37,6 @@ pub struct Plan<O> {
     pub say: SayOptions,
 }
 
-/// The file of all options, resolved.
-pub const CONFIG: &str = "config.toml";
 /// Time that a picture is shown.
 const DELAY: Duration = Duration::from_millis(200);
 
@@ -46,7 +45,7 @@ impl<O> Plan<O> {
     pub fn start<const D: usize>(
         &self,
         case: Case<D>,
-        config: &str,
+        options: &str,
         device: &ComputeDevice,
     ) -> Result<ExitCode, Error>
     where
@@ -68,7 +67,7 @@ impl<O> Plan<O> {
             Some(folder) => folder.clone(),
             None => free_folder(&format!("{}-{}", self.name, self.command)),
         };
-        let files = [(CONFIG, config)];
+        let files = [(config::FILE, options)];
         let store = Store::create(folder, &files, &run, notes, self.checkpoints())?;
         self.go_on(store, run)
     }

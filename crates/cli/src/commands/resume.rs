@@ -10,7 +10,6 @@ use crate::cli::{Command, ResumeOptions, SayOptions};
 use crate::config;
 use crate::error::Error;
 use crate::page;
-use crate::run::CONFIG;
 
 /// Continues a run by the options and the state that it stored; its input is not needed again.
 pub fn run(options: &ResumeOptions, say: SayOptions) -> Result<ExitCode, Error> {
@@ -19,8 +18,8 @@ pub fn run(options: &ResumeOptions, say: SayOptions) -> Result<ExitCode, Error> 
     } else {
         RunDirectory::open(&options.run)?
     };
-    let path = options.run.join(CONFIG);
-    let command = config::parse_resolved(&stored.read_text(CONFIG)?, &path)?.command;
+    let path = options.run.join(config::FILE);
+    let command = config::parse_resolved(&stored.read_text(config::FILE)?, &path)?.command;
     let keep = match &command {
         Command::Flow(flow) => &flow.keep,
         Command::Fair(fair) => &fair.flow.keep,
