@@ -81,7 +81,7 @@ impl<const D: usize> Timed<D> {
         match self.run.step() {
             Ok(_) => Ok(()),
             Err(EngineError::Step { source, .. })
-                if matches!(source, SolverError::NotConverged { .. }) =>
+                if matches!(*source, SolverError::NotConverged { .. }) =>
             {
                 self.failure = Some(source.to_string());
                 Ok(())

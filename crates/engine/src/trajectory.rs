@@ -147,8 +147,8 @@ impl<const D: usize> Trajectory<D> {
     /// [`Error::Incomparable`] if the nodes of this grid are not among those of the other.
     pub fn distance(&self, step: usize, other: &Self, there: usize) -> Result<f64, Error> {
         let (own, fine) = (*self.case.grid(), *other.case.grid());
-        let in_place =
-            own.side().to_bits() == fine.side().to_bits() && own.origin() == fine.origin();
+        let in_place = own.side().to_bits() == fine.side().to_bits()
+            && own.origin().map(f64::to_bits) == fine.origin().map(f64::to_bits);
         if !in_place || !fine.cells().is_multiple_of(own.cells()) {
             return Err(Error::Incomparable {
                 cells: own.cells(),

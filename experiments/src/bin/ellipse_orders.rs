@@ -62,7 +62,7 @@ fn program(options: &RunOptions) -> Result<(), Error> {
         .iter()
         .map(|&n| run(1.0 / n as f64, n, 1))
         .collect();
-    let in_tau: Result<Vec<_>, Error> = PARTS[..used + 1]
+    let in_tau: Result<Vec<_>, Error> = PARTS[..=used]
         .iter()
         .map(|&k| run(STEP / k as f64, 128, k))
         .collect();
