@@ -23,53 +23,54 @@ pub struct CliffordTorus {
 }
 
 impl CliffordTorus {
-    /// The torus whose phase field is nearest to `u` in `L2`: a simplex search over centre, axis and radius, from the centre of
-    /// mass, a principal axis of inertia and the volume.
+    /// The torus whose phase field is nearest to `u` in `L2`: the best of three simplex searches over centre, axis and radius, from
+    /// the centre of mass, the volume and each of the coordinate axes.
     ///
     /// # Errors
     /// [`Error::Options`] if there is no volume inside or the search fails.
     pub fn nearest(u: &Field<3>, eps: f64) -> Result<Self, Error> {
         let failed = |reason: &str| Error::Options(format!("no Clifford torus fits: {reason}"));
-        let moments = Moments::of(u);
-        if moments.volume <= 0.0 {
+        let inside = |u: f64| 0.5 * (1.0 + u.clamp(-1.0, 1.0));
+        let sum: f64 = u.values().iter().map(|&u| inside(u)).sum();
+        if sum <= 0.0 {
             return Err(failed("the phase field has no inside"));
         }
+        let mut centre = [0.0; 3];
+        for (i, &value) in u.values().iter().enumerate() {
+            for (c, x) in centre.iter_mut().zip(u.grid().node(i)) {
+                *c += inside(value) * x / sum;
+            }
+        }
         // 2 pi^2 R r^2 with R = sqrt(2) r.
-        let minor = (moments.volume / (2.0 * SQRT_2 * PI.powi(2))).cbrt();
+        let minor = (sum * u.grid().cell_volume() / (2.0 * SQRT_2 * PI.powi(2))).cbrt();
         let radius = minor * (1.0 + SQRT_2);
-        let [c0, c1, c2] = moments.centre;
+        let [c0, c1, c2] = centre;
         let start = [c0, c1, c2, 0.0, 0.0, radius];
-        let steps = [
-            0.1 * radius,
-            0.1 * radius,
-            0.1 * radius,
-            0.2,
-            0.2,
-            0.1 * radius,
-        ];
-        let tori = moments.frames().map(|frame| {
+        let length = 0.1 * radius;
+        let steps = [length, length, length, 0.2, 0.2, length];
+        let tori = [0, 1, 2].map(|along| {
             let distance = |parameters: &[f64; 6]| {
-                let torus = Self::in_frame(&frame, parameters).phase_field(u.grid(), eps)?;
+                let torus = Self::near_axis(along, parameters).phase_field(u.grid(), eps)?;
                 Ok::<_, Error>(l2_distance(u, &torus)?)
             };
             // Beyond the positive radii there is no torus, which is no reason to stop.
             let cost = |parameters: &[f64; 6]| distance(parameters).unwrap_or(f64::INFINITY);
             let (l2, parameters) = nelder_mead(cost, start, steps);
-            Self {
-                l2,
-                ..Self::in_frame(&frame, &parameters)
-            }
+            let torus = Self::near_axis(along, &parameters);
+            Self { l2, ..torus }
         });
         let fits = tori.into_iter().filter(|torus| torus.l2.is_finite());
         (fits.min_by(|a, b| a.l2.total_cmp(&b.l2))).ok_or_else(|| failed("the search found none"))
     }
 
-    /// A torus by its centre, the tilt of its axis from the first vector of a frame along the two others, and its outer radius.
-    fn in_frame([axis, e, f]: &[[f64; 3]; 3], parameters: &[f64; 6]) -> Self {
+    /// A torus by its centre, the tilt of its axis from a coordinate axis towards the two others, and its outer radius.
+    fn near_axis(along: usize, parameters: &[f64; 6]) -> Self {
         let [c0, c1, c2, a, b, outer_radius] = *parameters;
+        let mut axis = [1.0, a, b];
+        axis.rotate_right(along);
         Self {
             centre: [c0, c1, c2],
-            axis: normalized(std::array::from_fn(|i| axis[i] + a * e[i] + b * f[i])),
+            axis: normalized(axis),
             outer_radius,
             l2: f64::INFINITY,
         }
@@ -120,12 +121,14 @@ fn nelder_mead<const N: usize>(
     start: [f64; N],
     steps: [f64; N],
 ) -> (f64, [f64; N]) {
-    const ITERATIONS: usize = 400;
-    const TOLERANCE: f64 = 1e-7;
+    const ITERATIONS: usize = 1000;
+    const TOLERANCE: f64 = 1e-9;
     let vertex = |x: [f64; N]| (cost(&x), x);
     let along = |from: &[f64; N], to: &[f64; N], t: f64| -> [f64; N] {
         std::array::from_fn(|i| from[i] + (to[i] - from[i]) * t)
     };
+    type Vertex<const N: usize> = (f64, [f64; N]);
+    let better = |a: Vertex<N>, b: Vertex<N>| if a.0 < b.0 { a } else { b };
     let mut simplex = vec![vertex(start)];
     for axis in 0..N {
         let mut x = start;
@@ -146,19 +149,11 @@ fn nelder_mead<const N: usize>(
         let reflected = vertex(along(&centroid, &worst.1, -1.0));
         if reflected.0 < best.0 {
             let expanded = vertex(along(&centroid, &reflected.1, 2.0));
-            simplex[N] = if expanded.0 < reflected.0 {
-                expanded
-            } else {
-                reflected
-            };
+            simplex[N] = better(expanded, reflected);
         } else if reflected.0 < second_worst.0 {
             simplex[N] = reflected;
         } else {
-            let nearer = if reflected.0 < worst.0 {
-                reflected
-            } else {
-                worst
-            };
+            let nearer = better(reflected, worst);
             let contracted = vertex(along(&centroid, &nearer.1, 0.5));
             if contracted.0 < nearer.0 {
                 simplex[N] = contracted;
@@ -171,53 +166,6 @@ fn nelder_mead<const N: usize>(
     }
     simplex.sort_by(|(a, _), (b, _)| a.total_cmp(b));
     simplex[0]
-}
-
-/// Volume, centre of mass and second moments of the inside.
-struct Moments {
-    volume: f64,
-    centre: [f64; 3],
-    second: [[f64; 3]; 3],
-}
-
-impl Moments {
-    fn of(u: &Field<3>) -> Self {
-        let grid = u.grid();
-        let inside = |u: f64| 0.5 * (1.0 + u.clamp(-1.0, 1.0));
-        let sum: f64 = u.values().iter().map(|&u| inside(u)).sum();
-        let mut centre = [0.0; 3];
-        for (i, &value) in u.values().iter().enumerate() {
-            for (c, x) in centre.iter_mut().zip(grid.node(i)) {
-                *c += inside(value) * x / sum;
-            }
-        }
-        let mut second = [[0.0; 3]; 3];
-        for (i, &value) in u.values().iter().enumerate() {
-            let x = grid.node(i);
-            for (j, row) in second.iter_mut().enumerate() {
-                for (k, entry) in row.iter_mut().enumerate() {
-                    *entry += inside(value) * (x[j] - centre[j]) * (x[k] - centre[k]) / sum;
-                }
-            }
-        }
-        Self {
-            volume: sum * grid.cell_volume(),
-            centre,
-            second,
-        }
-    }
-
-    /// The principal axes, each as the first vector of a frame: the axis of a torus that is still far from round need not
-    /// be the one of largest inertia.
-    fn frames(&self) -> [[[f64; 3]; 3]; 3] {
-        let matrix = faer::Mat::from_fn(3, 3, |i, j| self.second[i][j]);
-        let axes = match matrix.self_adjoint_eigen(faer::Side::Lower) {
-            Ok(eigen) => [0, 1, 2].map(|k| std::array::from_fn(|i| eigen.U()[(i, k)])),
-            // Of a matrix that is not finite, which the fit will report.
-            Err(_) => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-        };
-        axes.map(frame_of)
-    }
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -257,27 +205,29 @@ mod tests {
     fn a_clifford_torus_is_found_in_any_position() {
         let grid = Grid::<3>::new(32, 1.0).unwrap();
         let eps = 2.0 * grid.spacing();
-        let torus = CliffordTorus {
-            centre: [0.52, 0.47, 0.5],
-            axis: normalized([0.3, -0.5, 1.0]),
-            outer_radius: 0.36,
-            l2: 0.0,
-        };
-        let u = torus.phase_field(&grid, eps).unwrap();
-        let found = CliffordTorus::nearest(&u, eps).unwrap();
-        assert!(found.l2 < 1e-4, "{found:?}");
-        assert!((found.outer_radius - 0.36).abs() < 1e-4, "{found:?}");
-        assert!(dot(found.axis, torus.axis).abs() > 1.0 - 1e-6, "{found:?}");
-        for (a, b) in found.centre.iter().zip(torus.centre) {
-            assert!((a - b).abs() < 1e-4, "{found:?}");
-        }
-        for circle in found.minor_circles(3, 16).unwrap() {
-            for x in circle {
-                let x: [f64; 3] = std::array::from_fn(|i| x[i] - found.centre[i]);
-                let height = dot(x, found.axis);
-                let across = (dot(x, x) - height * height).sqrt();
-                let shape = Torus::clifford(found.outer_radius).unwrap();
-                assert!(shape.signed_distance([across, 0.0, height]).abs() < 1e-12);
+        for axis in [[0.3, -0.5, 1.0], [1.0, 1.0, -1.0]] {
+            let torus = CliffordTorus {
+                centre: [0.52, 0.47, 0.5],
+                axis: normalized(axis),
+                outer_radius: 0.36,
+                l2: 0.0,
+            };
+            let u = torus.phase_field(&grid, eps).unwrap();
+            let found = CliffordTorus::nearest(&u, eps).unwrap();
+            assert!(found.l2 < 1e-4, "{found:?}");
+            assert!((found.outer_radius - 0.36).abs() < 1e-4, "{found:?}");
+            assert!(dot(found.axis, torus.axis).abs() > 1.0 - 1e-6, "{found:?}");
+            for (a, b) in found.centre.iter().zip(torus.centre) {
+                assert!((a - b).abs() < 1e-4, "{found:?}");
+            }
+            for circle in found.minor_circles(3, 16).unwrap() {
+                for x in circle {
+                    let x: [f64; 3] = std::array::from_fn(|i| x[i] - found.centre[i]);
+                    let height = dot(x, found.axis);
+                    let across = (dot(x, x) - height * height).sqrt();
+                    let shape = Torus::clifford(found.outer_radius).unwrap();
+                    assert!(shape.signed_distance([across, 0.0, height]).abs() < 1e-12);
+                }
             }
         }
     }

@@ -4,13 +4,13 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use operators::{ComputeDevice, DeviceKind};
+use operators::ComputeDevice;
 
-use crate::{Error, memory};
+use crate::Error;
 
 /// Runs a program: success is exit code 0, a failure one line on standard error and exit code 2.
 pub fn run(program: impl FnOnce() -> Result<(), Error>) -> ExitCode {
-    memory::keep_freed();
+    engine::keep_freed();
     match program() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -22,9 +22,10 @@ pub fn run(program: impl FnOnce() -> Result<(), Error>) -> ExitCode {
 
 /// How many tasks run side by side: one per processor, or one on a GPU, which they would only share.
 pub fn workers(device: &ComputeDevice) -> usize {
-    match device.kind() {
-        DeviceKind::Flex | DeviceKind::NdArray => rayon::current_num_threads(),
-        DeviceKind::Wgpu | DeviceKind::Cuda => 1,
+    if device.kind().is_cpu() {
+        rayon::current_num_threads()
+    } else {
+        1
     }
 }
 

@@ -2,8 +2,8 @@
 
 use clap::Args;
 use engine::{
-    Case, Flow, Measure, NeededNetwork, Operator, Record, Samples, Scales, Scheme, StepRule, Stop,
-    TimeSteps, Trajectory, checksum, energy_increases, mean_hvp,
+    Case, Flow, Measure, Operator, Record, Samples, Scales, Scheme, StepRule, Stop, TimeSteps,
+    Trajectory, checksum, energy_increases, mean_hvp,
 };
 use geometry::measure::l2_distance;
 use geometry::{Grid, SignedDistance, phase_field};
@@ -11,10 +11,9 @@ use report::{Axis, Figure, Format, LineChart, Series, Summary, Table};
 use serde_json::{Value, json};
 
 use crate::Error;
-use crate::networks::NetworkOptions;
-use crate::options::RunOptions;
-use crate::records::step_rows;
+use crate::options::FigureOptions;
 use crate::session::Session;
+use crate::steps::steps_csv;
 
 /// A shape stands still once it moves by less than this part of the way it has come per step.
 const STILL: f64 = 1e-5;
@@ -26,58 +25,11 @@ const FIRST_SUBSTEP: f64 = 32.0;
 pub struct InpaintingOptions {
     /// Common options.
     #[command(flatten)]
-    pub run: RunOptions,
-
-    /// Networks.
-    #[command(flatten)]
-    networks: NetworkOptions,
-
-    /// Cells per unit length; eps and tautilde follow [default: that of the paper]
-    #[arg(long, value_name = "N")]
-    cells: Option<usize>,
+    pub figure: FigureOptions,
 
     /// Weights of the energy and network: paper, calibrated or accurate
     #[arg(long, value_name = "NAME", value_enum, default_value_t = Scheme::Accurate)]
-    scheme: Scheme,
-}
-
-impl InpaintingOptions {
-    /// Cells per unit length: those chosen, or the usual ones of a quick run or of the paper.
-    pub fn cells(&self, [quick, paper]: [usize; 2]) -> usize {
-        let usual = if self.run.quick { quick } else { paper };
-        self.cells.unwrap_or(usual)
-    }
-
-    /// The learned operator of the chosen scheme.
-    ///
-    /// # Errors
-    /// [`Error::Engine`] if there is no network for it.
-    pub fn operator(&self, needed: &NeededNetwork) -> Result<Operator, Error> {
-        let networks = self.networks.load(&[*needed])?;
-        let network = networks.find(self.scheme, needed)?;
-        Ok(Operator::learned(self.scheme, network)?)
-    }
-}
-
-/// A region `D` with sides along the axes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Window<const D: usize> {
-    /// The corner with the smallest coordinates.
-    pub low: [f64; D],
-    /// The corner with the largest.
-    pub high: [f64; D],
-}
-
-impl<const D: usize> Window<D> {
-    /// Marks of the nodes inside.
-    fn nodes(&self, grid: &Grid<D>) -> Vec<bool> {
-        let Self { low, high } = self;
-        let inside = |node: usize| {
-            let x = grid.node(node);
-            (0..D).all(|axis| low[axis] < x[axis] && x[axis] < high[axis])
-        };
-        (0..grid.len()).map(inside).collect()
-    }
+    pub scheme: Scheme,
 }
 
 /// A shape that is inpainted.
@@ -90,8 +42,8 @@ pub struct Shape<const D: usize> {
     pub initial: Box<dyn SignedDistance<D>>,
     /// What it should become, if that is known.
     pub whole: Option<Box<dyn SignedDistance<D>>>,
-    /// Where it may change.
-    pub region: Window<D>,
+    /// Where it may change: `D` holds the points all of whose coordinates lie between these.
+    pub region: [f64; 2],
     /// Sizes of the steps, which are made in substeps,
     pub rule: StepRule,
     /// and most of them.
@@ -113,10 +65,12 @@ impl<const D: usize> Shape<D> {
         scales: Scales,
         operator: &Operator,
     ) -> Result<Case<D>, Error> {
+        let [low, high] = self.region;
+        let moves = |node| grid.node(node).iter().all(|x| low < *x && *x < high);
         Ok(Case {
             shape: format!("inpainted {}", self.title),
             initial: phase_field(grid, &self.initial, scales.eps)?,
-            region: Some(self.region.nodes(&grid)),
+            region: Some((0..grid.len()).map(moves).collect()),
             flow: Flow::Willmore,
             operator: operator.clone(),
             scales,
@@ -124,7 +78,7 @@ impl<const D: usize> Shape<D> {
                 rule: self.rule,
                 first_substep: Some(first_substep(scales.eps)),
             },
-            stops: vec![Stop::Steps(self.steps), Stop::Motion(STILL)],
+            stops: vec![Stop::Motion(STILL), Stop::Steps(self.steps)],
             measures: Measure::size(scales.eps),
         })
     }
@@ -215,7 +169,8 @@ impl<'a, const D: usize> Inpainted<'a, D> {
     /// The time in the paper's steps from which on the shape stands still, if it does.
     pub fn still_from(&self) -> Option<f64> {
         let last = self.trajectory.records.last()?;
-        (self.trajectory.stopped_early).then_some((last.time - last.tau) / self.tau())
+        let stands_still = matches!(self.trajectory.ended, Stop::Motion(_));
+        stands_still.then_some((last.time - last.tau) / self.tau())
     }
 
     /// Writes the figure of the shown steps.
@@ -223,11 +178,9 @@ impl<'a, const D: usize> Inpainted<'a, D> {
     /// # Errors
     /// [`Error::Report`].
     pub fn write_frames(&self, session: &Session<'_>, figure: Figure) -> Result<(), Error> {
-        let title = session
-            .options
-            .title(&format!("Inpainting: {}", self.shape.title));
+        let title = format!("Inpainting: {}", self.shape.title);
         let name = format!("{}_frames", self.shape.key);
-        Ok(Figure { title, ..figure }.write(&session.output, &name)?)
+        session.figure(Figure { title, ..figure }, &name)
     }
 
     /// Adds the metrics of this run.
@@ -274,11 +227,10 @@ pub fn finish<const D: usize>(
         let (time, w) = (Axis::log("time t"), Axis::linear("Willmore energy w"));
         LineChart::new(one.shape.title, time, w).with_series(Series::new("w", points))
     });
-    Figure::new(session.options.title("Willmore energy while inpainting"), 2)
-        .with_panels(energies)
-        .write(output, "energies")?;
+    let energies = Figure::new("Willmore energy while inpainting", 2).with_panels(energies);
+    session.figure(energies, "energies")?;
     let runs = all.iter().map(|one| (one.shape.key, one.trajectory));
-    output.write_csv("steps.csv", step_rows(runs))?;
+    output.write("steps.csv", steps_csv("shape", runs)?)?;
     let table = table(all)?;
     table.write(output, "inpainting")?;
     all.iter().try_for_each(|one| one.summarize(&mut summary))?;

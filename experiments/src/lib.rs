@@ -37,7 +37,6 @@ pub mod options;
 pub mod orders;
 pub mod products;
 pub mod quality;
-pub mod records;
 pub mod session;
 pub mod steps;
 pub mod study;

@@ -1,23 +1,22 @@
 //! Programs that let a mesh flow by several schemes.
 
 use clap::Args;
-use engine::{Method, Operator, Scheme, StepRule, checksum};
+use engine::{Method, StepRule};
 use geometry::UpAxis;
 use serde_json::json;
 
+use crate::Error;
 use crate::meshes::{KnownMesh, MeshOptions};
+use crate::options::FigureOptions;
 use crate::session::Session;
-use crate::surfaces::{
-    self, Flowed, SchemeOptions, Surface, SurfaceOptions, View, needed_network, scales,
-};
-use crate::{Error, memory};
+use crate::surfaces::{Flowed, Remarks, SchemeOptions, Setting, Surface, SurfaceFlows, View};
 
 /// Options of the programs.
 #[derive(Args, Clone, Debug)]
 pub struct MeshFlowOptions {
     /// Common options.
     #[command(flatten)]
-    surface: SurfaceOptions,
+    figure: FigureOptions,
 
     /// The mesh.
     #[command(flatten)]
@@ -57,17 +56,8 @@ pub struct MeshFlow {
     pub view: View,
 }
 
-/// What a program says about its flows besides the usual.
-#[derive(Default)]
-pub struct Remarks {
-    /// Below the figure.
-    pub note: String,
-    /// Below the table on standard output.
-    pub report: String,
-}
-
 impl MeshFlow {
-    /// Runs the program. `remarks` looks at the flows, and may add to captions, pictures and metrics.
+    /// Runs the program. `remarks` is that of [`SurfaceFlows::run`].
     ///
     /// # Errors
     /// What the options, the mesh and the flows raise.
@@ -76,70 +66,45 @@ impl MeshFlow {
         options: &MeshFlowOptions,
         remarks: impl FnOnce(&mut Session<'_>, &mut [Flowed]) -> Result<Remarks, Error>,
     ) -> Result<(), Error> {
-        let run = &options.surface.run;
-        let n = options.surface.cells([32, self.cells]);
-        let steps = options
-            .steps
-            .unwrap_or(if run.quick { 2 } else { self.steps });
+        let run = &options.figure.run;
+        let steps = (options.steps).unwrap_or(if run.quick { 2 } else { self.steps });
         if steps == 0 {
             return Err(Error::Options("--steps must be at least 1".to_owned()));
         }
         let device = run.open_device()?;
-        let networks = options.surface.networks()?;
-        let network = networks.find(Scheme::Paper, &needed_network())?.network;
-        let (grid, scales) = (options.mesh.grid(&self.mesh, n)?, scales(n));
-        let mesh = options.mesh.load(&self.mesh, &grid)?;
-        let up = options
-            .up
-            .map_or_else(|| options.mesh.up(self.view.up), Ok)?;
+        let side = options.mesh.box_side(&self.mesh);
+        let setting = Setting::new(&options.figure, [32, self.cells], side)?;
+        let mesh = options.mesh.load(&self.mesh, &setting.grid)?;
+        let up = (options.up).map_or_else(|| options.mesh.up(self.view.up), Ok)?;
         let schemes = options.schemes.schemes();
-        let parameters = json!({
-            "mesh": mesh.about, "n": n, "box_side": grid.side(), "eps": scales.eps, "mcf_step": scales.mcf_step, "tau": self.tau,
-            "steps": steps, "schemes": schemes, "network": checksum(&network), "quick": run.quick,
-        });
+        let parameters = setting.parameters(json!({
+            "mesh": mesh.about, "tau": self.tau, "steps": steps, "schemes": schemes, "quick": run.quick,
+        }))?;
         let mut session = Session::open(self.program, run, device, &parameters)?;
-        let bar = session.progress.bar("signed distance".to_owned(), n as u64);
+        let bar = session.progress.bar("signed distance", setting.n as u64);
         let initial = session.phase("signed distance", || {
-            mesh.phase_field(grid, scales.eps, &bar)
+            mesh.phase_field(setting.grid, setting.scales.eps, &bar)
         })?;
         bar.finish();
-        let mut flowed = Vec::new();
-        for scheme in schemes {
-            // The paper reports energies of its own scheme.
-            let comparable = options.mesh.is_the_papers() && scheme == Scheme::Paper;
-            let shown = self
-                .shown
-                .iter()
-                .map(|&(k, w)| (k, w.filter(|_| comparable)));
-            let operator = Operator::new(
-                (Method::Hybrid, scheme),
-                &networks.of(scheme),
-                &needed_network(),
-                &grid,
-                &scales,
-            )?;
-            let title = &mesh.about.title;
-            let time = (self.tau, steps);
-            let surface = Surface {
-                key: self.program,
-                title: title.clone(),
-                case: surfaces::willmore_flow(title, initial.clone(), operator, scales, time),
-                shown: shown.collect(),
-                view: View { up, ..self.view },
-            };
-            flowed.push(surface.flow(&mut session)?);
-        }
-        let remarks = remarks(&mut session, &mut flowed)?;
-        let title = format!("Willmore flow: {}", mesh.about.title);
-        let note = format!(
-            "n = {n}, ε = 2/n, inner step 1/n², {}. w: Willmore energy with the implicit finite-element step; a sphere has 8π = 25.13.{}",
-            self.tau_in_words, remarks.note
-        );
-        let table = surfaces::write(&mut session, &title, note, &flowed)?;
-        let mut summary = surfaces::summary(&flowed)?;
-        if let Some(peak) = memory::peak_mib() {
-            summary.insert(&format!("{}.peak_mib_with_pictures", self.program), peak)?;
-        }
-        session.finish(&title, summary, &(table + &remarks.report))
+        let papers = options.mesh.is_the_papers();
+        let shown = (self.shown.iter()).map(|&(step, w)| (step, w.filter(|_| papers)));
+        let surface = Surface {
+            key: self.program,
+            title: mesh.about.title.clone(),
+            shown: shown.collect(),
+            view: View { up, ..self.view },
+        };
+        let flows = SurfaceFlows {
+            program: self.program,
+            title: format!("Willmore flow: {}", surface.title),
+            surfaces: vec![(surface, initial)],
+            variants: schemes
+                .into_iter()
+                .map(|scheme| (Method::Hybrid, scheme))
+                .collect(),
+            time: (self.tau, steps),
+            tau_in_words: self.tau_in_words,
+        };
+        flows.run(session, &setting, remarks)
     }
 }

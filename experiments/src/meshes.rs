@@ -131,12 +131,17 @@ pub struct About {
 const PROCEDURAL_CELLS: usize = 96;
 
 impl MeshOptions {
+    /// Side of the box.
+    pub fn box_side(&self, known: &KnownMesh) -> f64 {
+        self.box_side.unwrap_or(known.box_side)
+    }
+
     /// The box around the point (0.5, 0.5, 0.5), with `n` cells per unit length.
     ///
     /// # Errors
     /// [`Error::Geometry`] unless `n` times its side is a whole number.
     pub fn grid(&self, known: &KnownMesh, n: usize) -> Result<Grid<3>, Error> {
-        centred_box(n, self.box_side.unwrap_or(known.box_side))
+        centred_box(n, self.box_side(known))
     }
 
     /// Whether nothing but the mesh of the paper was asked for.

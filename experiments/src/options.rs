@@ -8,6 +8,7 @@ use report::{Manifest, OutputDir, Progress};
 use serde::Serialize;
 
 use crate::Error;
+use crate::networks::NetworkOptions;
 
 /// Options of every program.
 #[derive(Args, Clone, Debug)]
@@ -72,10 +73,7 @@ impl RunOptions {
         parameters: &impl Serialize,
         device: &ComputeDevice,
     ) -> Result<Manifest, Error> {
-        let place = match device.kind() {
-            DeviceKind::Flex | DeviceKind::NdArray => "cpu",
-            DeviceKind::Wgpu | DeviceKind::Cuda => "gpu",
-        };
+        let place = if device.kind().is_cpu() { "cpu" } else { "gpu" };
         let dtype = format!("{:?}", device.dtype()).to_lowercase();
         Ok(Manifest::start(program)
             .with_parameters(parameters)?
@@ -99,6 +97,30 @@ impl RunOptions {
             // A closed pipe (`| head`) is no reason to fail after the results have been written.
             let _ = writeln!(std::io::stdout(), "{text}");
         }
+    }
+}
+
+/// Options of a figure at one resolution.
+#[derive(Args, Clone, Debug)]
+pub struct FigureOptions {
+    /// Common options.
+    #[command(flatten)]
+    pub run: RunOptions,
+
+    /// Networks.
+    #[command(flatten)]
+    pub networks: NetworkOptions,
+
+    /// Cells per unit length; eps and tautilde follow [default: that of the paper]
+    #[arg(long, value_name = "N")]
+    cells: Option<usize>,
+}
+
+impl FigureOptions {
+    /// Cells per unit length: those chosen, or the usual ones of a quick run or of the paper.
+    pub fn cells(&self, [quick, paper]: [usize; 2]) -> usize {
+        let usual = if self.run.quick { quick } else { paper };
+        self.cells.unwrap_or(usual)
     }
 }
 

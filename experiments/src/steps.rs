@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use engine::{Record, Values};
+use engine::{Record, Trajectory, Values};
 use report::{Cell, Table};
 
 use crate::Error;
@@ -15,6 +15,27 @@ pub struct Rows<'a> {
     pub start: Option<&'a Values>,
     /// Its steps.
     pub records: &'a [Record],
+}
+
+/// The steps of runs by any names, with method and scheme, as CSV.
+///
+/// # Errors
+/// [`Error::Report`] for numbers that are not finite.
+pub fn steps_csv<'a, const D: usize>(
+    named: &str,
+    runs: impl Iterator<Item = (&'a str, &'a Trajectory<D>)>,
+) -> Result<String, Error> {
+    let rows = runs.map(|(name, run)| {
+        let operator = &run.case.operator;
+        let leading = [name, operator.method.key(), operator.scheme.key()];
+        Rows {
+            leading: leading.map(Cell::from).to_vec(),
+            start: None,
+            records: &run.records,
+        }
+    });
+    let rows: Vec<Rows<'_>> = rows.collect();
+    Ok(table(&[named, "method", "scheme"], &rows)?.to_csv()?)
 }
 
 /// A row for every step: the leading columns, step, time and size, a column for every measure, and what the minimization did.

@@ -2,18 +2,19 @@
 
 use clap::Args;
 use engine::{
-    Case, Flow, Measure, NeededNetwork, Operator, Record, Samples, Scales, Scheme, StepRule, Stop,
-    Trajectory, energy_increases, mean_hvp,
+    Case, Flow, Measure, Method, NeededNetwork, Operator, Record, Samples, Scales, Scheme,
+    StepRule, Stop, Trajectory, checksum, energy_increases, mean_hvp,
 };
 use geometry::{Field, Grid, UpAxis};
 use render::{Bounds, Framing, Quality, Rgb, Scene, Tube};
 use report::{Figure, Format, OutputDir, Raster, Summary, Table};
+use serde_json::{Value, json};
 use surfaces::ClosedMesh;
 
-use crate::networks::{Chosen, NetworkOptions};
-use crate::options::RunOptions;
-use crate::records::step_rows;
+use crate::networks::Chosen;
+use crate::options::FigureOptions;
 use crate::session::Session;
+use crate::steps::steps_csv;
 use crate::{Error, memory};
 
 /// Interface width of surfaces, in cells.
@@ -45,6 +46,64 @@ pub fn centred_box(n: usize, side: f64) -> Result<Grid<3>, Error> {
     Ok(Grid::per_unit(n, side)?.with_origin([0.5 - 0.5 * side; 3])?)
 }
 
+/// What surfaces at one resolution share.
+pub struct Setting {
+    /// Cells per unit length.
+    pub n: usize,
+    /// The box.
+    pub grid: Grid<3>,
+    /// The paper's scales.
+    pub scales: Scales,
+    networks: Chosen,
+}
+
+impl Setting {
+    /// A box of the given side, with the usual numbers of cells per unit length of a quick run and of the paper.
+    ///
+    /// # Errors
+    /// [`Error::Engine`] if one of the user's networks is not for surfaces, [`Error::Geometry`] as [`centred_box`].
+    pub fn new(options: &FigureOptions, usual: [usize; 2], side: f64) -> Result<Self, Error> {
+        let n = options.cells(usual);
+        Ok(Self {
+            networks: options.networks.load(&[needed_network()])?,
+            grid: centred_box(n, side)?,
+            scales: scales(n),
+            n,
+        })
+    }
+
+    /// The operator of a method in a scheme.
+    ///
+    /// # Errors
+    /// As [`Operator::new`].
+    pub fn operator(&self, variant: (Method, Scheme)) -> Result<Operator, Error> {
+        let (networks, needed) = (self.networks.of(variant.1), needed_network());
+        Ok(Operator::new(
+            variant,
+            &networks,
+            &needed,
+            &self.grid,
+            &self.scales,
+        )?)
+    }
+
+    /// The parameters of a program for its manifest: the common ones, and others.
+    ///
+    /// # Errors
+    /// As [`Self::operator`].
+    pub fn parameters(&self, others: Value) -> Result<Value, Error> {
+        let papers = self.operator((Method::Hybrid, Scheme::Paper))?;
+        let mut parameters = json!({
+            "n": self.n, "box_side": self.grid.side(), "eps": self.scales.eps, "mcf_step": self.scales.mcf_step,
+            "network": papers.network().map(|named| checksum(&named.network)),
+        });
+        if let (Value::Object(all), Value::Object(others)) = (&mut parameters, others) {
+            all.extend(others);
+        }
+        Ok(parameters)
+    }
+}
+
 /// Willmore flow as in the paper: everywhere, in whole steps.
 pub fn willmore_flow(
     shape: &str,
@@ -63,38 +122,6 @@ pub fn willmore_flow(
         steps: rule.into(),
         stops: vec![Stop::Steps(steps)],
         measures: Measure::size(scales.eps),
-    }
-}
-
-/// Options of the programs with surfaces.
-#[derive(Args, Clone, Debug)]
-pub struct SurfaceOptions {
-    /// Common options.
-    #[command(flatten)]
-    pub run: RunOptions,
-
-    /// Networks.
-    #[command(flatten)]
-    networks: NetworkOptions,
-
-    /// Cells per unit length; eps = 2/n and tautilde = 1/n^2 follow [default: that of the paper]
-    #[arg(long, value_name = "N")]
-    cells: Option<usize>,
-}
-
-impl SurfaceOptions {
-    /// Cells per unit length: those chosen, or the usual ones of a quick run or of the paper.
-    pub fn cells(&self, [quick, paper]: [usize; 2]) -> usize {
-        let usual = if self.run.quick { quick } else { paper };
-        self.cells.unwrap_or(usual)
-    }
-
-    /// Where networks come from.
-    ///
-    /// # Errors
-    /// [`Error::Engine`] if one of the user's is not for surfaces.
-    pub fn networks(&self) -> Result<Chosen, Error> {
-        self.networks.load(&[needed_network()])
     }
 }
 
@@ -125,19 +152,29 @@ pub struct View {
     pub elevation: f64,
 }
 
-/// A surface that is to flow.
+/// What is shown of a surface that flows.
+#[derive(Clone)]
 pub struct Surface {
     /// Prefix of its metrics and files.
     pub key: &'static str,
     /// Name in titles and tables.
     pub title: String,
-    /// How it flows.
-    pub case: Case<3>,
     /// Steps to be shown, and the Willmore energies that the paper reports for them. Of a run that ends early the last one is shown.
     pub shown: Vec<(usize, Option<f64>)>,
     /// Direction of view.
     pub view: View,
 }
+
+/// The measures of a shown step: name in metrics, column and digits in tables. `w` is the Willmore energy of the phase field with the
+/// implicit finite-element step and the mass-matrix norm, `w_scheme` what the flow minimizes, with its own operator and calibration;
+/// the Euler characteristic is that of the isosurface `u = 0`.
+const MEASURES: [(&str, &str, usize); 5] = [
+    ("w", "w", 2),
+    ("w_scheme", "w of the scheme", 2),
+    ("perimeter", "area", 4),
+    ("volume", "volume", 5),
+    ("euler_characteristic", "Euler characteristic", 0),
+];
 
 /// A shown step.
 pub struct Snapshot {
@@ -145,31 +182,26 @@ pub struct Snapshot {
     pub step: usize,
     /// Its time.
     pub time: f64,
-    /// The Willmore energy `w` of the phase field, with the implicit finite-element step and the mass-matrix norm.
-    pub w: f64,
-    /// The same as the scheme measures it, with its own operator and calibration: what the flow minimizes.
-    w_scheme: f64,
-    /// What the paper reports.
+    measures: [f64; MEASURES.len()],
+    /// The Willmore energy that the paper reports.
     paper: Option<f64>,
-    /// Perimeter `P_eps`, the area of the surface.
-    perimeter: f64,
-    /// Volume inside.
-    volume: f64,
-    /// Euler characteristic of the isosurface `u = 0`.
-    euler_characteristic: f64,
     /// What stands below the picture.
     pub caption: String,
     /// Curves drawn into the picture.
     pub tubes: Vec<Tube>,
 }
 
+impl Snapshot {
+    /// The Willmore energy.
+    pub fn w(&self) -> f64 {
+        self.measures[0]
+    }
+}
+
 /// A surface that has flowed.
 pub struct Flowed {
-    /// Prefix of its metrics and files, whatever the method.
-    pub surface: &'static str,
-    /// Name in titles and tables.
-    pub title: String,
-    view: View,
+    /// What is shown of it.
+    pub surface: Surface,
     /// All steps.
     pub trajectory: Trajectory<3>,
     /// The shown ones.
@@ -185,38 +217,30 @@ impl Surface {
     ///
     /// # Errors
     /// What the flow and the measurement raise.
-    pub fn flow(self, session: &mut Session<'_>) -> Result<Flowed, Error> {
-        let Self { key, title, .. } = self;
-        let n = self.case.grid().spacing().recip().round();
-        let run = format!("{title}, {}, n = {n}", self.case.operator.label());
-        let folder = format!("{key}-{}", self.case.operator.key());
+    pub fn flow(self, case: Case<3>, session: &mut Session<'_>) -> Result<Flowed, Error> {
+        let n = case.grid().spacing().recip().round();
+        let run = format!("{}, {}, n = {n}", self.title, case.operator.label());
+        let folder = format!("{}-{}", self.key, case.operator.key());
         let mut samples = Samples::every(usize::MAX);
         samples.also = self.shown.iter().map(|(step, _)| *step).collect();
-        let trajectory = session.trajectory(&run, self.case, &folder, &samples)?;
+        let trajectory = session.trajectory(&run, case, &folder, &samples)?;
         let mut flowed = Flowed {
-            surface: key,
-            title,
-            view: self.view,
+            surface: self,
             trajectory,
             snapshots: Vec::new(),
             metrics: Vec::new(),
             peak_mib: memory::peak_mib(),
         };
         memory::release_freed();
-        let papers = |step: usize| {
-            let found = self.shown.iter().find(|(shown, _)| *shown == step);
-            found.and_then(|(_, w)| w.filter(|_| !session.options.quick))
-        };
         let last = flowed.trajectory.steps();
-        let mut steps: Vec<usize> = samples.also.into_iter().filter(|k| *k < last).collect();
-        steps.push(last);
-        let measures = format!("{}: measures", flowed.title);
+        samples.also.retain(|step| *step < last);
+        samples.also.push(last);
+        let measures = format!("{}: measures", flowed.surface.title);
+        let (output, quick) = (&session.output, session.options.quick);
         flowed.snapshots = session.manifest.phase(measures, || {
-            let snapshot = |step| flowed.snapshot(step, papers(step), &session.output);
-            steps
-                .into_iter()
-                .map(snapshot)
-                .collect::<Result<_, Error>>()
+            let steps = samples.also.into_iter();
+            let snapshots = steps.map(|step| flowed.snapshot(step, output, quick));
+            snapshots.collect::<Result<_, Error>>()
         })?;
         Ok(flowed)
     }
@@ -224,12 +248,7 @@ impl Surface {
 
 impl Flowed {
     /// Measures the phase field after a step, and writes its isosurface.
-    fn snapshot(
-        &self,
-        step: usize,
-        paper: Option<f64>,
-        output: &OutputDir,
-    ) -> Result<Snapshot, Error> {
+    fn snapshot(&self, step: usize, output: &OutputDir, quick: bool) -> Result<Snapshot, Error> {
         let (case, u) = (&self.trajectory.case, self.trajectory.field(step)?);
         // The isosurface is closed by construction; whoever uses the file relies on it.
         let (mesh, _) = ClosedMesh::new(surfaces::phase_field_surface(&u, case.scales.eps)?)?;
@@ -238,18 +257,22 @@ impl Flowed {
         let record = self.trajectory.record(step);
         let at_rest = |first: &Record| first.minimization.map(|made| made.energy_at_rest());
         let at_start = || self.trajectory.records.first().and_then(at_rest);
-        let measures = self.trajectory.measures(step)?;
+        let w_scheme = record.map_or_else(at_start, Record::willmore_energy);
+        let measured = self.trajectory.measures(step)?;
         let w = case.implicit_elements()?.willmore_energy(&u)?;
         memory::release_freed();
+        let reported = self.surface.shown.iter().find(|(shown, _)| *shown == step);
         Ok(Snapshot {
             step,
             time: record.map_or(0.0, |r| r.time),
-            w,
-            w_scheme: (record.map_or_else(at_start, Record::willmore_energy)).unwrap_or(f64::NAN),
-            paper,
-            perimeter: measures["perimeter"],
-            volume: measures["volume"],
-            euler_characteristic: mesh.euler_characteristic() as f64,
+            measures: [
+                w,
+                w_scheme.unwrap_or(f64::NAN),
+                measured["perimeter"],
+                measured["volume"],
+                mesh.euler_characteristic() as f64,
+            ],
+            paper: reported.filter(|_| !quick).and_then(|(_, w)| *w),
             caption: format!("step {step}: w = {w:.2}"),
             tubes: Vec::new(),
         })
@@ -258,7 +281,7 @@ impl Flowed {
     /// Name of the files of a step.
     fn file(&self, step: usize) -> String {
         let operator = self.trajectory.case.operator.key();
-        format!("{}_{operator}_step{step:03}", self.surface)
+        format!("{}_{operator}_step{step:03}", self.surface.key)
     }
 
     /// Name of method and scheme.
@@ -270,24 +293,23 @@ impl Flowed {
     pub fn key(&self) -> String {
         let operator = &self.trajectory.case.operator;
         if operator.method.is_learned() && operator.scheme == Scheme::Paper {
-            self.surface.to_owned()
+            self.surface.key.to_owned()
         } else {
-            format!("{}.{}", self.surface, operator.key())
+            format!("{}.{}", self.surface.key, operator.key())
         }
     }
 
-    /// Adds the metrics of the run.
-    ///
-    /// # Errors
-    /// [`Error::Report`] for a value that is not finite.
-    pub fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
+    fn row_label(&self) -> String {
+        let operator = self.label().replace(", ", "\n");
+        format!("{}\n{operator}", self.surface.title)
+    }
+
+    fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
         let (key, records) = (self.key(), &self.trajectory.records);
         self.summarize_shapes(&key, summary)?;
         summary.insert(&format!("{key}.hvp_per_step"), mean_hvp(records))?;
-        summary.insert_count(
-            &format!("{key}.energy_increases"),
-            energy_increases(records),
-        )?;
+        let increases = energy_increases(records);
+        summary.insert_count(&format!("{key}.energy_increases"), increases)?;
         summary.insert(&format!("{key}.seconds"), self.trajectory.seconds())?;
         for (name, value) in &self.metrics {
             summary.insert(&format!("{key}.{name}"), *value)?;
@@ -300,15 +322,9 @@ impl Flowed {
     /// # Errors
     /// [`Error::Report`] for a value that is not finite.
     pub fn summarize_shapes(&self, key: &str, summary: &mut Summary) -> Result<(), Error> {
-        for s in &self.snapshots {
-            for (name, value) in [
-                ("w", s.w),
-                ("w_scheme", s.w_scheme),
-                ("perimeter", s.perimeter),
-                ("volume", s.volume),
-                ("euler_characteristic", s.euler_characteristic),
-            ] {
-                summary.insert(&format!("{key}.{name}.step{}", s.step), value)?;
+        for shown in &self.snapshots {
+            for ((name, ..), value) in MEASURES.iter().zip(shown.measures) {
+                summary.insert(&format!("{key}.{name}.step{}", shown.step), value)?;
             }
         }
         if let Some(peak) = self.peak_mib {
@@ -359,58 +375,103 @@ impl Flowed {
     }
 
     fn scene(&self, snapshot: &Snapshot) -> Result<Scene<'static>, Error> {
-        let case = &self.trajectory.case;
+        let (case, view) = (&self.trajectory.case, self.surface.view);
         let mut scene = Scene::new(&self.trajectory.field(snapshot.step)?, case.scales.eps)?;
         if let Some(region) = &case.region {
             let mask = region.iter().map(|&moves| f64::from(moves)).collect();
             scene = scene.highlight_mask(&Field::from_values(*case.grid(), mask)?, MOVING)?;
         }
         Ok(scene
-            .up(self.view.up)
-            .azimuth(self.view.azimuth)
-            .elevation(self.view.elevation)
+            .up(view.up)
+            .azimuth(view.azimuth)
+            .elevation(view.elevation)
             .margin(MARGIN)
             .tubes(snapshot.tubes.clone()))
     }
 }
 
-/// Writes a figure with a row of pictures for each run, the table of the shown steps and the records of all steps, and returns the table
-/// as text.
-///
-/// # Errors
-/// What rendering and writing raise.
-pub fn write(
-    session: &mut Session<'_>,
-    title: &str,
-    note: String,
-    all: &[Flowed],
-) -> Result<String, Error> {
-    let (output, quick) = (&session.output, session.options.quick);
-    let pictures = session.manifest.phase("pictures", || {
-        (all.iter().map(|one| one.pictures(output, quick, SIDE))).collect::<Result<Vec<_>, _>>()
-    })?;
-    let columns = pictures.iter().map(Vec::len).max();
-    let row = |one: &Flowed| format!("{}\n{}", one.title, one.label().replace(", ", "\n"));
-    Figure::new(session.options.title(title), columns.unwrap_or(1))
-        .with_row_labels(all.iter().map(row))
-        .with_panels(pictures.into_iter().flatten())
-        .with_note(note)
-        .write(output, "surfaces")?;
-    let runs = all.iter().map(|one| (one.surface, &one.trajectory));
-    output.write_csv("steps.csv", step_rows(runs))?;
-    let table = table(all)?;
-    table.write(output, "energies")?;
-    Ok(table.to_markdown())
+/// Surfaces under Willmore flow by several methods, as a program shows them.
+pub struct SurfaceFlows {
+    /// Name of the program.
+    pub program: &'static str,
+    /// Title of the figure.
+    pub title: String,
+    /// The surfaces with their initial phase fields.
+    pub surfaces: Vec<(Surface, Field<3>)>,
+    /// Methods in their schemes.
+    pub variants: Vec<(Method, Scheme)>,
+    /// Sizes of the time steps, their number,
+    pub time: (StepRule, usize),
+    /// and their sizes in words, for the figure.
+    pub tau_in_words: &'static str,
 }
 
-/// The metrics of all runs.
-///
-/// # Errors
-/// [`Error::Report`] for a value that is not finite.
-pub fn summary(all: &[Flowed]) -> Result<Summary, Error> {
-    let mut summary = Summary::new();
-    all.iter().try_for_each(|one| one.summarize(&mut summary))?;
-    Ok(summary)
+/// What a program says about its flows besides the usual.
+#[derive(Default)]
+pub struct Remarks {
+    /// Below the figure.
+    pub note: String,
+    /// Below the table on standard output.
+    pub report: String,
+}
+
+impl SurfaceFlows {
+    /// Lets all surfaces flow, and writes a figure with a row of pictures for each run, the table of the shown steps, the records of all
+    /// steps and the metrics. `remarks` looks at the flows, and may add to captions, pictures and metrics.
+    ///
+    /// # Errors
+    /// What flows, rendering and writing raise.
+    pub fn run(
+        self,
+        mut session: Session<'_>,
+        setting: &Setting,
+        remarks: impl FnOnce(&mut Session<'_>, &mut [Flowed]) -> Result<Remarks, Error>,
+    ) -> Result<(), Error> {
+        let mut all = Vec::new();
+        for (surface, initial) in &self.surfaces {
+            for &variant in &self.variants {
+                let mut surface = surface.clone();
+                // The paper reports energies of its own scheme.
+                let papers = variant == (Method::Hybrid, Scheme::Paper);
+                surface
+                    .shown
+                    .iter_mut()
+                    .for_each(|(_, w)| *w = w.filter(|_| papers));
+                let (title, operator) = (&surface.title, setting.operator(variant)?);
+                let case =
+                    willmore_flow(title, initial.clone(), operator, setting.scales, self.time);
+                all.push(surface.flow(case, &mut session)?);
+            }
+        }
+        let remarks = remarks(&mut session, &mut all)?;
+        let (output, quick) = (&session.output, session.options.quick);
+        let pictures = session.manifest.phase("pictures", || {
+            (all.iter().map(|one| one.pictures(output, quick, SIDE))).collect::<Result<Vec<_>, _>>()
+        })?;
+        let columns = pictures.iter().map(Vec::len).max();
+        let figure = Figure::new(&self.title, columns.unwrap_or(1))
+            .with_row_labels(all.iter().map(Flowed::row_label))
+            .with_panels(pictures.into_iter().flatten())
+            .with_note(format!(
+                "n = {}, ε = 2/n, inner step 1/n², {}. w: Willmore energy with the implicit finite-element step; a sphere has 8π = 25.13.{}",
+                setting.n, self.tau_in_words, remarks.note
+            ));
+        session.figure(figure, "surfaces")?;
+        let runs = all.iter().map(|one| (one.surface.key, &one.trajectory));
+        output.write("steps.csv", steps_csv("surface", runs)?)?;
+        let table = table(&all)?;
+        table.write(output, "energies")?;
+        let mut summary = Summary::new();
+        all.iter().try_for_each(|one| one.summarize(&mut summary))?;
+        if let Some(peak) = memory::peak_mib() {
+            summary.insert(&format!("{}.peak_mib_with_pictures", self.program), peak)?;
+        }
+        session.finish(
+            &self.title,
+            summary,
+            &(table.to_markdown() + &remarks.report),
+        )
+    }
 }
 
 /// Shown steps of all runs, beside the paper's energies.
@@ -421,17 +482,17 @@ pub fn table(all: &[Flowed]) -> Result<Table, Error> {
     let rows: Vec<(&Flowed, &Snapshot)> = (all.iter())
         .flat_map(|one| one.snapshots.iter().map(move |shown| (one, shown)))
         .collect();
-    Ok(Table::of(&rows)
-        .text("surface", |(one, _)| one.title.as_str())
+    let mut table = Table::of(&rows)
+        .text("surface", |(one, _)| one.surface.title.as_str())
         .text("method", |(one, _)| one.label())
-        .number("step", Format::Shortest, |(_, s)| s.step)
-        .number("w", Format::Fixed(2), |(_, s)| s.w)
-        .number("w, paper", Format::Fixed(2), |(_, s)| s.paper)
-        .number("w of the scheme", Format::Fixed(2), |(_, s)| s.w_scheme)
-        .number("area", Format::Fixed(4), |(_, s)| s.perimeter)
-        .number("volume", Format::Fixed(5), |(_, s)| s.volume)
-        .number("Euler characteristic", Format::Fixed(0), |(_, s)| {
-            s.euler_characteristic
-        })
-        .finish()?)
+        .number("step", Format::Shortest, |(_, shown)| shown.step);
+    for (k, (_, name, digits)) in MEASURES.into_iter().enumerate() {
+        table = table.number(name, Format::Fixed(digits), move |(_, shown)| {
+            shown.measures[k]
+        });
+        if k == 0 {
+            table = table.number("w, paper", Format::Fixed(2), |(_, shown)| shown.paper);
+        }
+    }
+    Ok(table.finish()?)
 }

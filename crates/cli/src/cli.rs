@@ -3,13 +3,14 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use clap::builder::PossibleValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use engine::shapes::Region;
+use engine::{Scheme, StepRule};
+use geometry::UpAxis;
 use serde::Serialize;
 
-use crate::shape::Region;
-use crate::tau::Tau;
+use crate::ansatz::Ansatz;
 
 const EXIT_CODES: &str = "Exit codes: 0 success; 2 bad input or failure, one line on standard error; 130 interrupted (Ctrl-C): \
 the last step was finished and stored, `willmore resume` goes on.";
@@ -25,6 +26,8 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
+    #[command(flatten)]
+    pub say: SayOptions,
 }
 
 /// The subcommands.
@@ -50,10 +53,13 @@ pub enum Command {
     Sample(SampleOptions),
     /// List the networks that come with the program, or show one
     #[command(after_help = NETWORKS_EXAMPLES)]
-    Networks(NetworksOptions),
+    Networks {
+        #[command(subcommand)]
+        show: Option<NetworksCommand>,
+    },
     /// Versions, devices and features of this program
     #[command(after_help = INFO_EXAMPLES)]
-    Info(InfoOptions),
+    Info,
     /// Check derivatives, symmetry and device on your own input
     #[command(after_help = CHECK_EXAMPLES)]
     Check(CheckOptions),
@@ -172,56 +178,12 @@ pub struct SchemeOptions {
     pub eps_over_h: f64,
 
     /// accurate: the most accurate network, calibrated; calibrated: the paper's network, calibrated; paper: as in the paper
-    #[arg(long, value_name = "NAME", value_enum, default_value_t = Scheme::Accurate)]
+    #[arg(long, value_name = "NAME", value_enum, default_value = "accurate")]
     pub scheme: Scheme,
 
     /// Use this network, as `willmore train` makes them
     #[arg(long, value_name = "FILE")]
     pub network: Option<PathBuf>,
-}
-
-/// Which network with which weights.
-#[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
-#[serde(rename_all = "kebab-case")]
-pub enum Scheme {
-    /// The most accurate network, calibrated
-    Accurate,
-    /// The paper's network, calibrated
-    Calibrated,
-    /// As in the paper
-    Paper,
-}
-
-impl fmt::Display for Scheme {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(
-            self.to_possible_value()
-                .as_ref()
-                .map_or("", PossibleValue::get_name),
-        )
-    }
-}
-
-/// How far and in which steps.
-#[derive(Args, Serialize, Clone, Debug)]
-#[serde(rename_all = "kebab-case")]
-pub struct StepOptions {
-    /// Time steps: auto (by the energy), auto:FIRST, VALUE, doubling:FIRST, or ramp:VALUE,HALVINGS, whose first step is
-    /// divided [default: auto; inpaint: a ramp]
-    #[arg(long, value_name = "TAU")]
-    pub tau: Option<Tau>,
-
-    /// Stop after this many steps [default: 20, or 1000 with --time or --energy]
-    #[arg(long, value_name = "COUNT")]
-    pub steps: Option<usize>,
-
-    /// Stop at this time
-    #[arg(long, value_name = "T")]
-    pub time: Option<f64>,
-
-    /// Stop when the Willmore energy is no more than this; a sphere has 8 pi = 25.13
-    #[arg(long, value_name = "W")]
-    pub energy: Option<f64>,
 }
 
 /// What is kept.
@@ -235,6 +197,10 @@ pub struct KeepOptions {
     /// Steps between two checkpoints
     #[arg(long, value_name = "STEPS", default_value_t = 5)]
     pub checkpoint_every: usize,
+
+    /// Axis that points up in pictures and on the page: x, y or z [default: y for .obj, otherwise z]
+    #[arg(long, value_name = "AXIS")]
+    pub up: Option<UpAxis>,
 
     /// Leave out index.html, the page of the run for a browser
     #[arg(long)]
@@ -262,11 +228,6 @@ pub struct CommonOptions {
     #[arg(long, value_name = "FILE.toml")]
     #[serde(skip)]
     pub config: Option<PathBuf>,
-
-    #[command(flatten)]
-    #[serde(skip)]
-    #[allow(missing_docs)]
-    pub say: SayOptions,
 }
 
 /// What is printed.
@@ -283,7 +244,6 @@ pub struct SayOptions {
 
 /// Options of `flow`.
 #[derive(Args, Serialize, Clone, Debug)]
-#[allow(missing_docs)]
 pub struct FlowOptions {
     #[command(flatten)]
     #[serde(flatten)]
@@ -291,9 +251,24 @@ pub struct FlowOptions {
     #[command(flatten)]
     #[serde(flatten)]
     pub scheme: SchemeOptions,
-    #[command(flatten)]
-    #[serde(flatten)]
-    pub steps: StepOptions,
+
+    /// Time steps: auto (by the energy), auto:FIRST, VALUE, doubling:FIRST, growing:VALUE,COUNT, which doubles after so many,
+    /// or ramp:VALUE,HALVINGS, whose first step is divided [default: auto; inpaint: a ramp]
+    #[arg(long, value_name = "TAU")]
+    pub tau: Option<StepRule>,
+
+    /// Stop after this many steps [default: 20, or 1000 with --time or --energy]
+    #[arg(long, value_name = "COUNT")]
+    pub steps: Option<usize>,
+
+    /// Stop at this time
+    #[arg(long, value_name = "T")]
+    pub time: Option<f64>,
+
+    /// Stop when the Willmore energy is no more than this; a sphere has 8 pi = 25.13
+    #[arg(long, value_name = "W")]
+    pub energy: Option<f64>,
+
     #[command(flatten)]
     #[serde(flatten)]
     pub keep: KeepOptions,
@@ -304,7 +279,6 @@ pub struct FlowOptions {
 
 /// Options of `fair`.
 #[derive(Args, Serialize, Clone, Debug)]
-#[allow(missing_docs)]
 pub struct FairOptions {
     #[command(flatten)]
     #[serde(flatten)]
@@ -322,7 +296,6 @@ pub struct FairOptions {
 /// Formats of meshes.
 #[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
-#[allow(missing_docs)]
 pub enum MeshFormat {
     Ply,
     Obj,
@@ -341,7 +314,6 @@ impl fmt::Display for MeshFormat {
 
 /// Options of `inpaint`.
 #[derive(Args, Serialize, Clone, Debug)]
-#[allow(missing_docs)]
 pub struct InpaintOptions {
     #[command(flatten)]
     #[serde(flatten)]
@@ -362,22 +334,8 @@ pub struct InpaintOptions {
     pub ansatz: Ansatz,
 }
 
-/// What the inpainted region holds at the beginning.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Ansatz {
-    /// What the input has there.
-    Keep,
-    /// Nothing.
-    Empty,
-    /// All inside.
-    Full,
-    /// A shape.
-    Shape(Region),
-}
-
 /// Options of `mcf`.
 #[derive(Args, Serialize, Clone, Debug)]
-#[allow(missing_docs)]
 pub struct McfOptions {
     #[command(flatten)]
     #[serde(flatten)]
@@ -387,7 +345,7 @@ pub struct McfOptions {
     pub scheme: SchemeOptions,
 
     /// By which step
-    #[arg(long, value_name = "NAME", value_enum, default_value_t = McfMethod::Network)]
+    #[arg(long, value_name = "NAME", value_enum, default_value = "network")]
     pub method: McfMethod,
 
     /// Stop after this many steps, of (eps/h)^2/4 cells squared each [default: 20, or 100000 with --time]
@@ -418,19 +376,8 @@ pub enum McfMethod {
     FeSemi,
 }
 
-impl fmt::Display for McfMethod {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(
-            self.to_possible_value()
-                .as_ref()
-                .map_or("", PossibleValue::get_name),
-        )
-    }
-}
-
 /// Options of `sample`.
 #[derive(Args, Clone, Debug)]
-#[allow(missing_docs)]
 pub struct SampleOptions {
     #[command(flatten)]
     pub input: InputOptions,
@@ -451,13 +398,13 @@ pub struct SampleOptions {
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
 
-    #[command(flatten)]
-    pub say: SayOptions,
+    /// Axis that points up in a picture: x, y or z [default: y for .obj, otherwise z]
+    #[arg(long, value_name = "AXIS")]
+    pub up: Option<UpAxis>,
 }
 
 /// Options of `resume`.
 #[derive(Args, Clone, Debug)]
-#[allow(missing_docs)]
 pub struct ResumeOptions {
     /// The folder of the run
     pub run: PathBuf,
@@ -465,19 +412,6 @@ pub struct ResumeOptions {
     /// Go on from the newest undamaged state of a run in which files are damaged or missing
     #[arg(long)]
     pub recover: bool,
-
-    #[command(flatten)]
-    pub say: SayOptions,
-}
-
-/// Options of `networks`.
-#[derive(Args, Clone, Debug)]
-#[allow(missing_docs)]
-pub struct NetworksOptions {
-    #[command(subcommand)]
-    pub show: Option<NetworksCommand>,
-    #[command(flatten)]
-    pub say: SayOptions,
 }
 
 /// What to do with networks.
@@ -490,17 +424,8 @@ pub enum NetworksCommand {
     },
 }
 
-/// Options of `info`.
-#[derive(Args, Clone, Debug)]
-#[allow(missing_docs)]
-pub struct InfoOptions {
-    #[command(flatten)]
-    pub say: SayOptions,
-}
-
 /// Options of `check`.
 #[derive(Args, Serialize, Clone, Debug)]
-#[allow(missing_docs)]
 pub struct CheckOptions {
     #[command(flatten)]
     #[serde(flatten)]
@@ -515,7 +440,6 @@ pub struct CheckOptions {
 
 /// Options of `train`.
 #[derive(Args, Clone, Debug)]
-#[allow(missing_docs)]
 pub struct TrainOptions {
     /// Of space: 2 or 3
     #[arg(long, value_name = "D")]

@@ -6,9 +6,10 @@
 //! Memory: a file has at most 64 KiB, and takes at most 16 MiB while it is parsed.
 
 #[cfg(test)]
+#[path = "../tests/configurations.rs"]
 mod fuzzing;
 
-use std::ffi::{OsStr, OsString};
+use std::ffi::OsString;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -21,6 +22,8 @@ use toml::{Table, Value};
 use crate::cli::Cli;
 use crate::error::Error;
 
+/// The file of all options, resolved, in the folder of a run.
+pub const FILE: &str = "config.toml";
 /// The entry of a resolved configuration that names the subcommand.
 pub const COMMAND: &str = "command";
 
@@ -28,9 +31,6 @@ pub const COMMAND: &str = "command";
 const LONGEST: usize = 1 << 16;
 
 /// What was typed, together with the configuration file it names.
-///
-/// # Errors
-/// The errors of the command line as clap has them, in one line; [`Error::Config`] and [`Error::Io`] for the file.
 pub fn parse(arguments: &[OsString]) -> Result<Cli, ParseError> {
     let matches = Cli::command().try_get_matches_from(arguments)?;
     let Some((command, typed)) = matches.subcommand() else {
@@ -44,11 +44,7 @@ pub fn parse(arguments: &[OsString]) -> Result<Cli, ParseError> {
     // One more than accepted, of what may never end.
     let opened = File::open(file).map(|opened| opened.take(LONGEST as u64 + 1));
     let read = opened.and_then(|mut opened| opened.read_to_string(&mut text));
-    read.map_err(|source| Error::Io {
-        action: "read",
-        path: file.clone(),
-        source,
-    })?;
+    read.map_err(Error::io("read", file))?;
     Ok(parse_both(arguments, command, typed, &text, file)?)
 }
 
@@ -69,9 +65,6 @@ fn parse_both(
 }
 
 /// The options that a run was started with.
-///
-/// # Errors
-/// [`Error::Config`] if they are none of this program's.
 pub fn parse_resolved(text: &str, path: &Path) -> Result<Cli, Error> {
     let table = read(text, path)?;
     let Some(Value::String(command)) = table.get(COMMAND) else {
@@ -86,9 +79,6 @@ pub fn parse_resolved(text: &str, path: &Path) -> Result<Cli, Error> {
 }
 
 /// All options of a run, to be read by [`parse_resolved`] and by `--config`.
-///
-/// # Errors
-/// [`Error::Options`] if an option, such as a path that is no text, cannot be written.
 pub fn resolved(command: &str, options: &impl Serialize) -> Result<String, Error> {
     let unwritable = |error| Error::options(format!("the options cannot be stored: {error}"));
     let options = toml::to_string(options).map_err(unwritable)?;
@@ -162,25 +152,23 @@ fn from_table(
     path: &Path,
     typed: Option<&ArgMatches>,
 ) -> Result<Vec<OsString>, Error> {
+    let refused = |message: String| Err(bad(path, message));
     let mut arguments = Vec::new();
     for (name, value) in table {
-        let id = name.replace('-', "_");
         if name == COMMAND {
             if value.as_str() != Some(command) {
-                return Err(bad(
-                    path,
-                    format!("it is for the command {value}, not for {command}"),
-                ));
+                return refused(format!("it is for the command {value}, not for {command}"));
             }
             continue;
         }
         if name == "config" {
-            return Err(bad(path, "a configuration cannot name another one"));
+            return refused("a configuration cannot name another one".to_owned());
         }
         let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-';
         if name.is_empty() || !name.chars().all(is_name) || ["help", "version"].contains(&&**name) {
-            return Err(bad(path, format!("{name:?} is no option")));
+            return refused(format!("{name:?} is no option"));
         }
+        let id = name.replace('-', "_");
         let is_typed = |typed: &ArgMatches| {
             typed.try_contains_id(&id).is_ok()
                 && typed.value_source(&id) == Some(ValueSource::CommandLine)
@@ -190,32 +178,23 @@ fn from_table(
         }
         let text = match value {
             Value::Boolean(false) => continue,
-            Value::Boolean(true) => {
-                arguments.push(format!("--{name}").into());
-                continue;
-            }
-            Value::String(text) => text.clone(),
-            Value::Integer(number) => number.to_string(),
-            Value::Float(number) => number.to_string(),
-            _ => {
-                return Err(bad(
-                    path,
-                    format!("{name} must be a number, a text, true or false"),
+            Value::Boolean(true) => None,
+            Value::String(text) => Some(text.clone()),
+            Value::Integer(number) => Some(number.to_string()),
+            Value::Float(number) => Some(number.to_string()),
+            _ => return refused(format!("{name} must be a number, a text, true or false")),
+        };
+        let argument = match text {
+            Some(text) if name == "input" && text.starts_with('-') => {
+                return refused(format!(
+                    "the input {text:?} looks like an option: put ./ before it"
                 ));
             }
+            Some(text) if name == "input" => text,
+            Some(text) => format!("--{name}={text}"),
+            None => format!("--{name}"),
         };
-        let option = if name == "input" {
-            if text.starts_with('-') {
-                return Err(bad(
-                    path,
-                    format!("the input {text:?} looks like an option: put ./ before it"),
-                ));
-            }
-            text
-        } else {
-            format!("--{name}={text}")
-        };
-        arguments.push(OsStr::new(&option).to_owned());
+        arguments.push(argument.into());
     }
     Ok(arguments)
 }

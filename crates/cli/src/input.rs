@@ -2,18 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
+use engine::shapes::{self, BuiltIn, Region};
 use geometry::npy::{self, NpyError};
 use geometry::vti::{self, VtiError};
-use geometry::{Field, Grid, Placement, SignedDistance, optimal_profile, phase_field};
+use geometry::{Field, Grid, Placement, SignedDistance, UpAxis, optimal_profile, phase_field};
 use images::{Frame, Image, Outline, OutlineDistance, Side, Threshold};
 use surfaces::{ClosedMesh, MeshDistance};
 
-use crate::cli::{Ansatz, Holds, InputOptions, Inside, SayOptions};
+use crate::cli::{Holds, InputOptions, Inside, SayOptions};
 use crate::error::Error;
-use crate::outlet::{Plane, Space};
-use crate::run;
-use crate::shape::{self, BuiltIn, Region};
-use crate::signs;
+use crate::outlet::Space;
 
 /// What a run starts from.
 pub struct Start<const D: usize, O> {
@@ -30,7 +28,7 @@ pub struct Start<const D: usize, O> {
 /// What a run starts from, in the dimension of the input.
 pub enum Loaded {
     /// In the plane.
-    Plane(Start<2, Plane>, ImageFrame),
+    Plane(Start<2, crate::outlet::Plane>, ImageFrame),
     /// In space.
     Space(Start<3, Space>),
 }
@@ -62,6 +60,44 @@ const LARGEST_PHASE: f64 = 1.1;
 /// Pixels a side of pictures of boxes.
 const PIXELS: u32 = 512;
 
+/// The path of a file from wherever the program may run later.
+pub fn absolute(path: impl AsRef<Path>) -> Result<PathBuf, Error> {
+    let path = path.as_ref();
+    std::path::absolute(path).map_err(Error::io("find", path))
+}
+
+/// The extension of a file in lower case.
+pub fn extension(path: &Path) -> String {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+    extension.to_ascii_lowercase()
+}
+
+/// Reads the input and fills in the options that were left to it.
+pub fn load(options: &mut InputOptions, eps_over_h: f64, say: SayOptions) -> Result<Loaded, Error> {
+    let input = options.input.clone().ok_or_else(|| {
+        Error::options(
+            "there is no input: give a file or builtin:NAME, or `input = ...` in a --config file",
+        )
+    })?;
+    let source = Source::of(&input)?;
+    source.refuse_foreign(options)?;
+    if let Source::Mesh(path) | Source::Image(path) | Source::Field(path) = &source {
+        options.input = Some(path.to_string_lossy().into_owned());
+    }
+    let mut reader = Reader {
+        name: source.name(),
+        options,
+        eps_over_h,
+        say,
+    };
+    let loaded = reader.load(source)?;
+    match &loaded {
+        Loaded::Plane(start, _) => check_phases(&start.field, &input)?,
+        Loaded::Space(start) => check_phases(&start.field, &input)?,
+    }
+    Ok(loaded)
+}
+
 impl Source<'_> {
     fn of(input: &str) -> Result<Source<'_>, Error> {
         if let Some(name) = input.strip_prefix("builtin:") {
@@ -70,307 +106,261 @@ impl Source<'_> {
         if Region::is_meant(input) {
             return Ok(Source::Region(input.parse().map_err(Error::Options)?));
         }
-        let path = std::path::absolute(input).map_err(|source| Error::Io {
-            action: "find",
-            path: input.into(),
-            source,
-        })?;
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-        let source = match extension.to_ascii_lowercase().as_str() {
-            "obj" | "stl" | "ply" => Source::Mesh(path),
-            "png" | "jpg" | "jpeg" => Source::Image(path),
-            "npy" | "vti" => Source::Field(path),
-            _ => {
+        let path = absolute(input)?;
+        match &*extension(&path) {
+            "obj" | "stl" | "ply" => Ok(Source::Mesh(path)),
+            "png" | "jpg" | "jpeg" => Ok(Source::Image(path)),
+            "npy" | "vti" => Ok(Source::Field(path)),
+            _ => Err(Error::options(format!(
+                "{input} is no input: give a mesh (.obj, .stl, .ply), an image (.png, .jpg), a field (.npy, .vti), \
+                 builtin:NAME, or a region as box:... or ball:..."
+            ))),
+        }
+    }
+
+    /// A name for folders.
+    fn name(&self) -> String {
+        let path = match self {
+            Self::BuiltIn(name) => return (*name).to_owned(),
+            Self::Region(region) => return region.name().to_owned(),
+            Self::Mesh(path) | Self::Image(path) | Self::Field(path) => path,
+        };
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let other = |c: char| !(c.is_ascii_alphanumeric() || "-_".contains(c));
+        stem.replace(other, "_")
+    }
+
+    /// Options that say nothing about this input.
+    fn refuse_foreign(&self, options: &InputOptions) -> Result<(), Error> {
+        let what = match self {
+            Self::Mesh(_) => "a mesh",
+            Self::Image(_) => "an image",
+            Self::Field(_) => "a field",
+            Self::BuiltIn(_) => "a built-in shape",
+            Self::Region(_) => "a region",
+        };
+        let is_image = matches!(self, Self::Image(_));
+        let is_field = matches!(self, Self::Field(_));
+        let is_vti = matches!(self, Self::Field(path) if extension(path) == "vti");
+        let has_side = !is_field && !matches!(self, Self::Region(_));
+        for (name, given, allowed) in [
+            ("--inside", options.inside.is_some(), is_image),
+            ("--threshold", options.threshold.is_some(), is_image),
+            ("--holds", options.holds.is_some(), is_field),
+            ("--side-length", options.side_length.is_some(), has_side),
+            ("--cells", options.cells.is_some(), !is_field),
+            ("--box-side", options.box_side.is_some(), !is_vti),
+        ] {
+            if given && !allowed {
                 return Err(Error::options(format!(
-                    "{input} is no input: give a mesh (.obj, .stl, .ply), an image (.png, .jpg), a field (.npy, .vti), \
-                     builtin:NAME, or a region as box:... or ball:..."
+                    "{name} has no meaning for {what}: leave it out"
                 )));
             }
-        };
-        Ok(source)
+        }
+        Ok(())
     }
 }
 
-/// Reads the input and fills in the options that were left to it.
-///
-/// # Errors
-/// [`Error::Options`] for options that do not belong to the input; what reading and placing raise.
-pub fn load(options: &mut InputOptions, eps_over_h: f64, say: SayOptions) -> Result<Loaded, Error> {
-    let input = options.input.clone().ok_or_else(|| {
-        Error::options(
-            "there is no input: give a file or builtin:NAME, or `input = ...` in a --config file",
-        )
-    })?;
-    let source = Source::of(&input)?;
-    refuse_foreign(options, &source)?;
-    let name = match &source {
-        Source::BuiltIn(name) => (*name).to_owned(),
-        Source::Region(region) => region.name().to_owned(),
-        Source::Mesh(path) | Source::Image(path) | Source::Field(path) => {
-            options.input = Some(path.to_string_lossy().into_owned());
-            let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-            stem.chars()
-                .map(|c| {
-                    if c.is_ascii_alphanumeric() || "-_".contains(c) {
-                        c
-                    } else {
-                        '_'
-                    }
-                })
-                .collect()
-        }
-    };
-    let loaded = match source {
-        Source::Mesh(path) => {
-            let (mesh, warnings) = ClosedMesh::new(surfaces::read(&path)?)?;
-            for warning in &warnings {
-                warn(say, &format!("{}: {warning}", path.display()));
-            }
-            Loaded::Space(place(&mesh, options, eps_over_h, name, say)?)
-        }
-        Source::Image(path) => image(&path, options, eps_over_h, name)?,
-        Source::Field(path) => field(&path, options, eps_over_h, name)?,
-        Source::Region(region) if region.dimension() == 2 => {
-            let grid = bare_grid::<2>(options, 128, 2.0)?;
-            plane(name, grid, region.shape::<2>()?.as_ref(), eps_over_h)?
-        }
-        Source::Region(region) => {
-            let grid = bare_grid::<3>(options, 64, 1.0)?;
-            space(name, grid, region.shape::<3>()?.as_ref(), eps_over_h)?
-        }
-        Source::BuiltIn(known) => match shape::dimension(known)? {
-            2 => {
-                let (grid, side) = grid::<2>(options, 128, 2.0)?;
-                match shape::built_in(known, side)? {
-                    BuiltIn::Plane(shape) => plane(name, grid, shape.as_ref(), eps_over_h)?,
-                    _ => return Err(Error::options("this shape is not in the plane")),
+/// What inputs are read with.
+struct Reader<'a> {
+    name: String,
+    options: &'a mut InputOptions,
+    eps_over_h: f64,
+    say: SayOptions,
+}
+
+/// Cells per unit length and side of the box, unless they are chosen.
+fn usual_box<const D: usize>() -> (usize, f64) {
+    if D == 2 { (128, 2.0) } else { (64, 1.0) }
+}
+
+impl Reader<'_> {
+    fn load(&mut self, source: Source<'_>) -> Result<Loaded, Error> {
+        match source {
+            Source::Mesh(path) => {
+                let (mesh, warnings) = ClosedMesh::new(surfaces::read(&path)?)?;
+                for warning in &warnings {
+                    self.say.warn(&format!("{}: {warning}", path.display()));
                 }
+                self.mesh(&mesh, surfaces::usual_up_axis(&path)?)
             }
-            _ => {
-                let (grid, side) = grid::<3>(options, 64, 1.0)?;
-                match shape::built_in(known, side)? {
-                    BuiltIn::Mesh(mesh) => {
-                        Loaded::Space(place(&mesh, options, eps_over_h, name, say)?)
-                    }
-                    BuiltIn::Space(shape) => space(name, grid, shape.as_ref(), eps_over_h)?,
-                    BuiltIn::Plane(_) => return Err(Error::options("this shape is in the plane")),
-                }
+            Source::Image(path) => self.image(&path),
+            Source::Field(path) if is_planar(&path)? => {
+                let field = self.values(&path)?;
+                self.plane(field)
             }
-        },
-    };
-    match &loaded {
-        Loaded::Plane(start, _) => check_phases(&start.field, &input)?,
-        Loaded::Space(start) => check_phases(&start.field, &input)?,
+            Source::Field(path) => {
+                let field = self.values(&path)?;
+                Ok(self.space(field))
+            }
+            Source::Region(region) if region.dimension() == 2 => {
+                let grid = self.grid()?;
+                self.plane(self.sampled(grid, region.shape::<2>()?.as_ref())?)
+            }
+            Source::Region(region) => {
+                let grid = self.grid()?;
+                Ok(self.space(self.sampled(grid, region.shape::<3>()?.as_ref())?))
+            }
+            Source::BuiltIn(name) => self.built_in(name),
+        }
     }
-    Ok(loaded)
-}
 
-/// Says what was mended.
-fn warn(say: SayOptions, what: &str) {
-    if !say.quiet {
-        eprintln!("warning: {what}");
-    }
-}
-
-/// Options that say nothing about this input.
-fn refuse_foreign(options: &InputOptions, source: &Source<'_>) -> Result<(), Error> {
-    let (what, is_image, is_field) = match source {
-        Source::Mesh(_) => ("a mesh", false, false),
-        Source::Image(_) => ("an image", true, false),
-        Source::Field(_) => ("a field", false, true),
-        Source::BuiltIn(_) => ("a built-in shape", false, false),
-        Source::Region(_) => ("a region", false, false),
-    };
-    let is_region = matches!(source, Source::Region(_));
-    let is_vti = matches!(source, Source::Field(path) if has_extension(path, "vti"));
-    for (name, given, allowed) in [
-        ("--inside", options.inside.is_some(), is_image),
-        ("--threshold", options.threshold.is_some(), is_image),
-        ("--holds", options.holds.is_some(), is_field),
-        (
-            "--side-length",
-            options.side_length.is_some(),
-            !is_field && !is_region,
-        ),
-        ("--cells", options.cells.is_some(), !is_field),
-        ("--box-side", options.box_side.is_some(), !is_vti),
-    ] {
-        if given && !allowed {
+    /// The grid about 0.
+    fn grid<const D: usize>(&mut self) -> Result<Grid<D>, Error> {
+        let (cells, box_side) = usual_box::<D>();
+        let cells = *self.options.cells.get_or_insert(cells);
+        if cells < FEWEST_CELLS {
             return Err(Error::options(format!(
-                "{name} has no meaning for {what}: leave it out"
+                "--cells {cells} resolves nothing: use at least {FEWEST_CELLS} per unit length"
             )));
         }
+        let box_side = *self.options.box_side.get_or_insert(box_side);
+        let grid = Grid::<D>::per_unit(cells, box_side)?.with_origin([-0.5 * box_side; D])?;
+        let nodes = (grid.cells() as f64).powi(D as i32);
+        if nodes > MOST_NODES {
+            return Err(Error::options(format!(
+                "--cells {cells} makes {nodes:.1e} nodes in a box of side {box_side}, more than {MOST_NODES:.1e}: use fewer"
+            )));
+        }
+        Ok(grid)
     }
-    Ok(())
-}
 
-/// The grid about 0, and the longest side of what is in it.
-fn grid<const D: usize>(
-    options: &mut InputOptions,
-    cells: usize,
-    box_side: f64,
-) -> Result<(Grid<D>, f64), Error> {
-    let grid = bare_grid(options, cells, box_side)?;
-    let box_side = grid.side();
-    let side = *options.side_length.get_or_insert(PART * box_side);
-    if !(side > 0.0 && side <= box_side) {
-        return Err(Error::options(format!(
-            "--side-length {side} does not fit the box of side {box_side}: give a positive length of at most that"
-        )));
+    /// The longest side of what is in the box.
+    fn side(&mut self, box_side: f64) -> Result<f64, Error> {
+        let side = *self.options.side_length.get_or_insert(PART * box_side);
+        if !(side > 0.0 && side <= box_side) {
+            return Err(Error::options(format!(
+                "--side-length {side} does not fit the box of side {box_side}: give a positive length of at most that"
+            )));
+        }
+        Ok(side)
     }
-    Ok((grid, side))
-}
 
-/// The grid about 0.
-fn bare_grid<const D: usize>(
-    options: &mut InputOptions,
-    cells: usize,
-    box_side: f64,
-) -> Result<Grid<D>, Error> {
-    let cells = *options.cells.get_or_insert(cells);
-    if cells < FEWEST_CELLS {
-        return Err(Error::options(format!(
-            "--cells {cells} resolves nothing: use at least {FEWEST_CELLS} per unit length"
-        )));
+    fn sampled<const D: usize>(
+        &self,
+        grid: Grid<D>,
+        shape: &(impl SignedDistance<D> + ?Sized),
+    ) -> Result<Field<D>, Error> {
+        let eps = self.eps_over_h * grid.spacing();
+        Ok(phase_field(grid, shape, eps)?)
     }
-    let box_side = *options.box_side.get_or_insert(box_side);
-    let grid = Grid::<D>::per_unit(cells, box_side)?.with_origin([-0.5 * box_side; D])?;
-    let nodes = (grid.cells() as f64).powi(D as i32);
-    if nodes > MOST_NODES {
-        return Err(Error::options(format!(
-            "--cells {cells} makes {nodes:.1e} nodes in a box of side {box_side}, more than {MOST_NODES:.1e}: use fewer"
-        )));
+
+    fn space(&self, field: Field<3>) -> Loaded {
+        self.placed(field, Space::identity())
     }
-    Ok(grid)
-}
 
-fn space(
-    name: String,
-    grid: Grid<3>,
-    shape: &(impl SignedDistance<3> + ?Sized),
-    eps_over_h: f64,
-) -> Result<Loaded, Error> {
-    Ok(Loaded::Space(Start {
-        name,
-        field: phase_field(grid, shape, eps_over_h * grid.spacing())?,
-        outlet: Space::identity(),
-        region: None,
-    }))
-}
-
-fn plane(
-    name: String,
-    grid: Grid<2>,
-    shape: &(impl SignedDistance<2> + ?Sized),
-    eps_over_h: f64,
-) -> Result<Loaded, Error> {
-    let start = Start {
-        name,
-        field: phase_field(grid, shape, eps_over_h * grid.spacing())?,
-        outlet: Plane::new(&Frame::of_box(&grid, PIXELS)?),
-        region: None,
-    };
-    let side = grid.side();
-    Ok(Loaded::Plane(start, ImageFrame { size: None, side }))
-}
-
-fn image(
-    path: &Path,
-    options: &mut InputOptions,
-    eps_over_h: f64,
-    name: String,
-) -> Result<Loaded, Error> {
-    let (grid, side) = grid::<2>(options, 128, 2.0)?;
-    let image = images::read(path)?;
-    let inside = match options.inside {
-        None | Some(Inside::Auto) => images::Inside::Auto,
-        Some(Inside::Dark) => images::Inside::Dark,
-        Some(Inside::Light) => images::Inside::Light,
-    };
-    let threshold = options
-        .threshold
-        .map_or_else(Threshold::default, Threshold::At);
-    let outline = Outline::of_image(&image, Side::of(&image, inside, threshold)?)?;
-    let placement = Placement::fit(&image.bounding_box(), &grid, side, 0.0)?;
-    let distance = OutlineDistance::new(&outline.placed(&placement));
-    let start = Start {
-        name,
-        field: phase_field(grid, &distance, eps_over_h * grid.spacing())?,
-        outlet: Plane::new(&Frame::of_image(&image, &placement)?),
-        region: None,
-    };
-    let size = Some([image.width(), image.height()]);
-    Ok(Loaded::Plane(start, ImageFrame { size, side }))
-}
-
-fn place(
-    mesh: &ClosedMesh,
-    options: &mut InputOptions,
-    eps_over_h: f64,
-    name: String,
-    say: SayOptions,
-) -> Result<Start<3, Space>, Error> {
-    let (grid, side) = grid::<3>(options, 64, 1.0)?;
-    let placement = Placement::fit(&mesh.bounding_box(), &grid, side, 0.0)?;
-    let progress = run::progress(say);
-    let bar = progress.bar("signed distance", grid.cells() as u64);
-    let mut distance = MeshDistance::new(&mesh.placed(&placement)).sample(grid, || bar.inc(1))?;
-    bar.finish();
-    progress.clear();
-    let mended = signs::mend(&mut distance);
-    if mended > 0 {
-        let what = format!("the mesh folds over itself; the side of {mended} nodes was mended");
-        warn(say, &what);
-    }
-    let eps = eps_over_h * grid.spacing();
-    Ok(Start {
-        name,
-        field: distance.map(|s| optimal_profile(s, eps)),
-        outlet: Space::of(&placement),
-        region: None,
-    })
-}
-
-fn has_extension(path: &Path, wanted: &str) -> bool {
-    path.extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case(wanted))
-}
-
-fn field(
-    path: &Path,
-    options: &mut InputOptions,
-    eps_over_h: f64,
-    name: String,
-) -> Result<Loaded, Error> {
-    let holds = *options.holds.get_or_insert(Holds::PhaseField);
-    if is_planar(path)? {
-        let field = values::<2>(path, options, 2.0, holds, eps_over_h)?;
-        let grid = *field.grid();
-        let start = Start {
-            name,
+    fn placed(&self, field: Field<3>, outlet: Space) -> Loaded {
+        Loaded::Space(Start {
+            name: self.name.clone(),
             field,
-            outlet: Plane::new(&Frame::of_box(&grid, PIXELS)?),
+            outlet,
+            region: None,
+        })
+    }
+
+    fn plane(&self, field: Field<2>) -> Result<Loaded, Error> {
+        let frame = Frame::of_box(field.grid(), PIXELS)?;
+        let side = field.grid().side();
+        Ok(self.framed(field, frame, ImageFrame { size: None, side }))
+    }
+
+    fn framed(&self, field: Field<2>, frame: Frame, of_image: ImageFrame) -> Loaded {
+        let start = Start {
+            name: self.name.clone(),
+            field,
+            outlet: crate::outlet::Plane::new(&frame),
             region: None,
         };
-        let side = grid.side();
-        return Ok(Loaded::Plane(start, ImageFrame { size: None, side }));
+        Loaded::Plane(start, of_image)
     }
-    Ok(Loaded::Space(Start {
-        name,
-        field: values::<3>(path, options, 1.0, holds, eps_over_h)?,
-        outlet: Space::identity(),
-        region: None,
-    }))
+
+    fn built_in(&mut self, name: &str) -> Result<Loaded, Error> {
+        if shapes::dimension(name)? == 2 {
+            let grid = self.grid::<2>()?;
+            let shape = shapes::built_in(name, self.side(grid.side())?)?;
+            let BuiltIn::Plane(shape) = shape else {
+                return Err(Error::options(format!("{name} is not in the plane")));
+            };
+            return self.plane(self.sampled(grid, shape.as_ref())?);
+        }
+        let grid = self.grid::<3>()?;
+        match shapes::built_in(name, self.side(grid.side())?)? {
+            BuiltIn::Mesh(mesh) => self.mesh(&mesh, UpAxis::default()),
+            BuiltIn::Space(shape) => Ok(self.space(self.sampled(grid, shape.as_ref())?)),
+            BuiltIn::Plane(_) => Err(Error::options(format!("{name} is in the plane"))),
+        }
+    }
+
+    fn image(&mut self, path: &Path) -> Result<Loaded, Error> {
+        let grid = self.grid::<2>()?;
+        let side = self.side(grid.side())?;
+        let image = images::read(path)?;
+        let inside = match self.options.inside {
+            None | Some(Inside::Auto) => images::Inside::Auto,
+            Some(Inside::Dark) => images::Inside::Dark,
+            Some(Inside::Light) => images::Inside::Light,
+        };
+        let threshold = (self.options.threshold).map_or_else(Threshold::default, Threshold::At);
+        let outline = Outline::of_image(&image, Side::of(&image, inside, threshold)?)?;
+        let placement = Placement::fit(&image.bounding_box(), &grid, side, 0.0)?;
+        let distance = OutlineDistance::new(&outline.placed(&placement));
+        let size = Some([image.width(), image.height()]);
+        Ok(self.framed(
+            self.sampled(grid, &distance)?,
+            Frame::of_image(&image, &placement)?,
+            ImageFrame { size, side },
+        ))
+    }
+
+    fn mesh(&mut self, mesh: &ClosedMesh, up: UpAxis) -> Result<Loaded, Error> {
+        let grid = self.grid::<3>()?;
+        let side = self.side(grid.side())?;
+        let placement = Placement::fit(&mesh.bounding_box(), &grid, side, 0.0)?;
+        let progress = self.say.progress();
+        let bar = progress.bar("signed distance", grid.cells() as u64);
+        let distance = MeshDistance::new(&mesh.placed(&placement));
+        let mut distance = distance.sample(grid, || bar.inc(1))?;
+        bar.finish();
+        progress.clear();
+        let mended = surfaces::mend_signs(&mut distance);
+        if mended > 0 {
+            self.say.warn(&format!(
+                "the mesh folds over itself; the side of {mended} nodes was mended"
+            ));
+        }
+        let eps = self.eps_over_h * grid.spacing();
+        let field = distance.map(|s| optimal_profile(s, eps));
+        Ok(self.placed(field, Space::of(&placement, up)))
+    }
+
+    fn values<const D: usize>(&mut self, path: &Path) -> Result<Field<D>, Error> {
+        let holds = *self.options.holds.get_or_insert(Holds::PhaseField);
+        let field = if extension(path) == "vti" {
+            let mut arrays = vti::read::<D>(path)?;
+            arrays.swap_remove(0).1
+        } else {
+            let (_, side) = usual_box::<D>();
+            let side = *self.options.box_side.get_or_insert(side);
+            npy::read(path, |cells| Grid::centred(cells, side))?
+        };
+        if holds == Holds::Distance {
+            let eps = self.eps_over_h * field.grid().spacing();
+            return Ok(field.map(|s| optimal_profile(s, eps)));
+        }
+        match field.values().iter().find(|u| u.abs() > LARGEST_PHASE) {
+            None => Ok(field),
+            Some(value) => Err(Error::options(format!(
+                "{} holds the value {value}, which no phase field has; give --holds distance if these are signed distances",
+                path.display()
+            ))),
+        }
+    }
 }
 
 /// Whether a file of values is meant to be in the plane; its reader says what is wrong with it.
 fn is_planar(path: &Path) -> Result<bool, Error> {
-    let bytes = std::fs::read(path).map_err(|source| Error::Io {
-        action: "read",
-        path: path.to_owned(),
-        source,
-    })?;
-    Ok(if has_extension(path, "vti") {
+    let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
+    Ok(if extension(path) == "vti" {
         let layers = |nodes: [u64; 3]| nodes[2] > 1;
         !matches!(vti::decode::<2>(&bytes), Err(VtiError::NotCubical { nodes, .. }) if layers(nodes))
     } else {
@@ -378,37 +368,7 @@ fn is_planar(path: &Path) -> Result<bool, Error> {
     })
 }
 
-fn values<const D: usize>(
-    path: &Path,
-    options: &mut InputOptions,
-    box_side: f64,
-    holds: Holds,
-    eps_over_h: f64,
-) -> Result<Field<D>, Error> {
-    let field = if has_extension(path, "vti") {
-        let mut arrays = vti::read::<D>(path)?;
-        arrays.swap_remove(0).1
-    } else {
-        let side = *options.box_side.get_or_insert(box_side);
-        npy::read(path, |cells| Grid::centred(cells, side))?
-    };
-    let eps = eps_over_h * field.grid().spacing();
-    if holds == Holds::Distance {
-        return Ok(field.map(|s| optimal_profile(s, eps)));
-    }
-    match field.values().iter().find(|u| u.abs() > LARGEST_PHASE) {
-        None => Ok(field),
-        Some(value) => Err(Error::options(format!(
-            "{} holds the value {value}, which no phase field has; give --holds distance if these are signed distances",
-            path.display()
-        ))),
-    }
-}
-
 /// Refuses shapes of which there is nothing on the grid, or nothing else.
-///
-/// # Errors
-/// [`Error::Options`].
 pub fn check_phases<const D: usize>(field: &Field<D>, input: &str) -> Result<(), Error> {
     let inside = field.values().iter().filter(|u| **u > 0.0).count();
     let nodes = field.grid().len();
@@ -421,23 +381,19 @@ pub fn check_phases<const D: usize>(field: &Field<D>, input: &str) -> Result<(),
 }
 
 impl ImageFrame {
-    /// The nodes inside the mask, as a region or an image.
-    ///
-    /// # Errors
-    /// [`Error::Options`] for an image of another size than the input; what reading raises.
+    /// The nodes inside the mask, which is a region, or an image of the size of the input.
     pub fn mask(&self, mask: &str, grid: &Grid<2>) -> Result<Vec<bool>, Error> {
         if Region::is_meant(mask) {
             return nodes(mask, grid);
         }
         let image: Image = images::read(mask)?;
         let size = [image.width(), image.height()];
-        let fits = self.size.map_or(size[0] == size[1], |input| input == size);
-        if !fits {
-            let needed = self
-                .size
-                .map_or("a square, which fills the box".to_owned(), |[w, h]| {
-                    format!("{w} x {h} pixels, as the input")
-                });
+        let needed = match self.size {
+            None if size[0] != size[1] => Some("a square, which fills the box".to_owned()),
+            Some([w, h]) if size != [w, h] => Some(format!("{w} x {h} pixels, as the input")),
+            _ => None,
+        };
+        if let Some(needed) = needed {
             return Err(Error::options(format!(
                 "--mask {mask} has {} x {} pixels; it must be {needed}",
                 size[0], size[1]
@@ -452,9 +408,6 @@ impl ImageFrame {
 }
 
 /// The nodes inside a region.
-///
-/// # Errors
-/// [`Error::Options`] if it is no region, or if no node is inside.
 pub fn nodes<const D: usize>(mask: &str, grid: &Grid<D>) -> Result<Vec<bool>, Error> {
     if !Region::is_meant(mask) {
         return Err(Error::options(format!(
@@ -475,28 +428,4 @@ pub fn nodes<const D: usize>(mask: &str, grid: &Grid<D>) -> Result<Vec<bool>, Er
         )));
     }
     Ok(nodes)
-}
-
-/// The phase field with the ansatz in the region.
-///
-/// # Errors
-/// As [`Region::shape`].
-pub fn with_ansatz<const D: usize>(
-    field: Field<D>,
-    region: &[bool],
-    ansatz: &Ansatz,
-    eps: f64,
-) -> Result<Field<D>, Error> {
-    let inner = match ansatz {
-        Ansatz::Keep => return Ok(field),
-        Ansatz::Empty => Field::constant(*field.grid(), -1.0),
-        Ansatz::Full => Field::constant(*field.grid(), 1.0),
-        Ansatz::Shape(shape) => phase_field(*field.grid(), shape.shape::<D>()?.as_ref(), eps)?,
-    };
-    let mut field = field;
-    let values = field.values_mut().iter_mut().zip(inner.values());
-    for ((value, inner), _) in values.zip(region).filter(|(_, inside)| **inside) {
-        *value = *inner;
-    }
-    Ok(field)
 }

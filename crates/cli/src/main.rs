@@ -1,35 +1,31 @@
 //! `willmore`: Willmore flow from the command line.
 
+mod ansatz;
 mod cli;
 mod commands;
 mod config;
 mod error;
 mod input;
-mod motion;
 mod outlet;
 mod page;
 mod run;
-mod scales;
-mod shape;
-mod signs;
-mod tau;
+mod say;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
-use runs::Interrupt;
 
 use crate::cli::{Cli, Command};
-use crate::commands::{check, flow, info, mcf, networks, resume, sample, shell, train};
+use crate::commands::{check, flow, info, networks, resume, sample, shell, train};
 use crate::config::ParseError;
 use crate::error::Error;
-use crate::run::Ending;
 
 /// Bad input, or failure.
 const FAILURE: u8 = 2;
 
 fn main() -> ExitCode {
+    engine::keep_freed();
     let arguments: Vec<OsString> = std::env::args_os().collect();
     let ended = match config::parse(&arguments) {
         Ok(cli) => execute(cli),
@@ -49,28 +45,25 @@ fn main() -> ExitCode {
             ))),
         },
     };
-    match ended {
-        Ok(Ending::Done) => ExitCode::SUCCESS,
-        Ok(Ending::Interrupted) => ExitCode::from(Interrupt::EXIT_CODE),
-        Err(error) => {
-            eprintln!("error: {}", error.line());
-            ExitCode::from(FAILURE)
-        }
-    }
+    ended.unwrap_or_else(|error| {
+        eprintln!("error: {}", error.line());
+        ExitCode::from(FAILURE)
+    })
 }
 
-fn execute(cli: Cli) -> Result<Ending, Error> {
+fn execute(cli: Cli) -> Result<ExitCode, Error> {
+    let say = cli.say;
     match cli.command {
-        Command::Flow(options) => flow::run(options, None),
-        Command::Fair(options) => flow::run(options, None),
-        Command::Inpaint(options) => flow::run(options, None),
-        Command::Mcf(options) => mcf::run(options, None),
-        Command::Resume(options) => resume::run(&options),
-        Command::Networks(options) => networks::run(&options),
-        Command::Info(options) => info::run(&options),
-        Command::Sample(options) => sample::run(&options),
-        Command::Check(options) => check::run(options),
-        Command::Train(options) => train::run(&options),
+        Command::Flow(options) => flow::run(options, say, None),
+        Command::Fair(options) => flow::run(options, say, None),
+        Command::Inpaint(options) => flow::run(options, say, None),
+        Command::Mcf(options) => flow::run(options, say, None),
+        Command::Resume(options) => resume::run(&options, say),
+        Command::Networks { show } => networks::run(show.as_ref(), say),
+        Command::Info => info::run(say),
+        Command::Sample(options) => sample::run(options, say),
+        Command::Check(options) => check::run(options, say),
+        Command::Train(options) => train::run(options, say),
         Command::Completions { shell } => Ok(shell::completions(shell)),
         Command::Man => shell::man(),
     }

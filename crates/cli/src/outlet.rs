@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use geometry::measure::{perimeter, zero_set_volume};
-use geometry::{Field, Placement, npy, vti};
+use engine::has_interface;
+use geometry::{Field, Placement, UpAxis, npy, vti};
 use images::{Drawing, Frame, Interface, Outline, Svg};
 use render::{Framing, Picture, Rgb, Scene};
 use runs::RunDirectory;
@@ -32,48 +32,27 @@ pub const FRAMES: &str = "frames";
 /// The outcome of a run.
 pub const SUMMARY: &str = "summary.json";
 
-/// Measures of a shape in the units of the box.
-#[derive(Clone, Debug, Serialize)]
-pub struct Measures {
-    /// Length of the curve or area of the surface.
-    pub perimeter: f64,
-    /// Area or volume inside.
-    pub volume: f64,
-    /// Its parts.
-    #[serde(flatten)]
-    pub topology: Topology,
-    /// Whether the shape has come to the side of the box, and so to its own periodic image.
-    pub touches_box: bool,
-}
-
 /// The parts of a shape.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Topology {
     /// Closed curves or surfaces.
     pub components: usize,
     /// Of all surfaces together.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub euler_characteristic: Option<i64>,
 }
 
 /// How phase fields in `D` dimensions are shown.
 pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
+    /// Lets the axis that was chosen point up, or says which one does.
+    fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error>;
+
     /// A picture.
-    ///
-    /// # Errors
-    /// What drawing raises.
     fn picture(&self, u: &Field<D>, eps: f64) -> Result<Picture, Error>;
 
     /// The parts of the shape.
-    ///
-    /// # Errors
-    /// If there is no shape.
     fn topology(&self, u: &Field<D>, eps: f64) -> Result<Topology, Error>;
 
     /// Writes the shape to a file `stem.*`.
-    ///
-    /// # Errors
-    /// What drawing and writing raise.
     fn write_shape(
         &self,
         u: &Field<D>,
@@ -84,9 +63,6 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
     ) -> Result<(), Error>;
 
     /// Writes the shape as a mesh to any file.
-    ///
-    /// # Errors
-    /// [`Error::Options`] in the plane; what writing raises.
     fn save(&self, u: &Field<D>, eps: f64, path: &Path) -> Result<(), Error>;
 }
 
@@ -109,21 +85,25 @@ impl Plane {
     }
 
     fn frame(&self) -> Result<Frame, Error> {
-        Ok(Frame::new(
-            self.size[0],
-            self.size[1],
-            self.upper_left,
-            self.pixel,
-        )?)
+        let [width, height] = self.size;
+        Ok(Frame::new(width, height, self.upper_left, self.pixel)?)
     }
 }
 
 impl Outlet<2> for Plane {
+    fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error> {
+        match up {
+            None => Ok(()),
+            Some(axis) => Err(Error::options(format!(
+                "--up {axis} has no meaning in the plane: leave it out"
+            ))),
+        }
+    }
+
     fn picture(&self, u: &Field<2>, eps: f64) -> Result<Picture, Error> {
         let interface = Interface::new(u, eps)?;
-        Ok(Drawing::on_white(self.frame()?)
-            .filled(&interface, Rgb::BLACK)
-            .picture()?)
+        let drawing = Drawing::on_white(self.frame()?).filled(&interface, Rgb::BLACK);
+        Ok(drawing.picture()?)
     }
 
     fn topology(&self, u: &Field<2>, _: f64) -> Result<Topology, Error> {
@@ -157,11 +137,12 @@ impl Outlet<2> for Plane {
     }
 }
 
-/// From the box to the coordinates of a mesh, `origin + unit p`.
+/// From the box to the coordinates of a mesh, `origin + unit p`, and its upward axis.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Space {
     origin: [f64; 3],
     unit: f64,
+    up: UpAxis,
 }
 
 impl Space {
@@ -170,14 +151,16 @@ impl Space {
         Self {
             origin: [0.0; 3],
             unit: 1.0,
+            up: UpAxis::default(),
         }
     }
 
     /// The coordinates of a mesh that was placed in the box.
-    pub fn of(placement: &Placement<3>) -> Self {
+    pub fn of(placement: &Placement<3>, up: UpAxis) -> Self {
         Self {
             origin: placement.apply_inverse([0.0; 3]),
             unit: placement.scale().recip(),
+            up,
         }
     }
 
@@ -195,9 +178,14 @@ impl Space {
 }
 
 impl Outlet<3> for Space {
+    fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error> {
+        self.up = *up.get_or_insert(self.up);
+        Ok(())
+    }
+
     fn picture(&self, u: &Field<3>, eps: f64) -> Result<Picture, Error> {
-        let scene = Scene::new(u, eps)?.azimuth(AZIMUTH).elevation(ELEVATION);
-        Ok(scene.framing(Framing::Domain).render(PIXELS)?)
+        let scene = Scene::new(u, eps)?.up(self.up).framing(Framing::Domain);
+        Ok(scene.azimuth(AZIMUTH).elevation(ELEVATION).render(PIXELS)?)
     }
 
     fn topology(&self, u: &Field<3>, eps: f64) -> Result<Topology, Error> {
@@ -227,54 +215,27 @@ impl Outlet<3> for Space {
     }
 }
 
-/// Whether there is an interface at all.
-pub fn has_interface<const D: usize>(u: &Field<D>) -> bool {
-    let inside = u.values().iter().filter(|u| **u > 0.0).count();
-    inside > 0 && inside < u.grid().len()
-}
-
-/// Writes `final.npy`, `final.vti`, and, unless the shape has vanished, picture and shape.
-///
-/// # Errors
-/// What drawing and writing raise.
+/// Writes `final.npy`, `final.vti`, and, unless the shape has vanished, picture and shape, of which it returns the parts.
 pub fn write_final<const D: usize, O: Outlet<D>>(
     outlet: &O,
     u: &Field<D>,
     eps: f64,
     format: MeshFormat,
     run: &mut RunDirectory,
-) -> Result<Measures, Error> {
+) -> Result<Topology, Error> {
     npy::write(run.path().join("final.npy"), u)?;
     run.adopt_file("final.npy")?;
     vti::write(run.path().join("final.vti"), &[("phase_field", u)])?;
     run.adopt_file("final.vti")?;
-    let topology = if has_interface(u) {
-        write_picture(&outlet.picture(u, eps)?, PICTURE, run)?;
-        outlet.write_shape(u, eps, FINAL, format, run)?;
-        outlet.topology(u, eps)?
-    } else {
-        Topology::default()
-    };
-    Ok(Measures {
-        perimeter: perimeter(u, eps)?,
-        volume: zero_set_volume(u),
-        topology,
-        touches_box: touches_box(u),
-    })
-}
-
-/// Whether a layer of nodes at the side of the box is not outside.
-pub fn touches_box<const D: usize>(u: &Field<D>) -> bool {
-    const OUTSIDE: f64 = -0.5;
-    let grid = u.grid();
-    let at_side = |node: usize| grid.multi_index(node).contains(&0);
-    (u.values().iter().enumerate()).any(|(node, u)| *u > OUTSIDE && at_side(node))
+    if !has_interface(u) {
+        return Ok(Topology::default());
+    }
+    write_picture(&outlet.picture(u, eps)?, PICTURE, run)?;
+    outlet.write_shape(u, eps, FINAL, format, run)?;
+    outlet.topology(u, eps)
 }
 
 /// Adds a picture to a run.
-///
-/// # Errors
-/// What encoding and writing raise.
 pub fn write_picture(picture: &Picture, name: &str, run: &mut RunDirectory) -> Result<(), Error> {
     let bytes = picture.to_png()?;
     run.write_file(name, |out| out.write_all(&bytes))?;

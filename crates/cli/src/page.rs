@@ -1,21 +1,25 @@
 //! The page of a run: one HTML file that shows it in a browser, without a network.
 //!
-//! It is made of the files of the run alone, and the same files give the same bytes. It is not one of them: the index does not
-//! know it, so that it may be removed, and is written again by `willmore resume`.
+//! It is made of the files of the run alone, and the same files give the same bytes. It is not one of them: the checkpoint
+//! does not know it, so that it may be removed, and is written again by `willmore resume`.
 
 use std::fmt::Write;
 use std::fs;
 use std::path::PathBuf;
 
+use engine::METRICS;
+use geometry::UpAxis;
 use pages::{
     Details, Facts, Figure, Frames, Image, Page, Section, Table, View, Viewer, five_digits,
 };
 use report::{Axis, LineChart, Marker, Series};
 use runs::StoredRun;
+use serde::Deserialize;
 use serde_json::Value;
 use surfaces::TriangleMesh;
 
 use crate::cli::MeshFormat;
+use crate::config;
 use crate::error::Error;
 use crate::outlet;
 
@@ -30,9 +34,6 @@ const MOST_ROWS: usize = 60;
 const FEW_STEPS: usize = 40;
 
 /// Writes the page of a run and returns its path.
-///
-/// # Errors
-/// What reading the files of the run, drawing and writing raise.
 pub fn write(run: &StoredRun) -> Result<PathBuf, Error> {
     let path = run.path().join(NAME);
     Files { run }.page()?.write(&path)?;
@@ -45,59 +46,38 @@ struct Files<'a> {
 
 impl Files<'_> {
     fn page(&self) -> Result<Page, Error> {
-        let manifest = self.run.manifest()?;
-        let text = |name: &str| manifest[name].as_str().unwrap_or_default();
-        let outcome = self.outcome()?;
+        let about = &engine::notes(self.run)["about"];
+        let text = |name: &str| about[name].as_str().unwrap_or_default();
+        let (outcome, table) = (self.outcome()?, self.table()?);
         let mut page = Page::new(format!("willmore {} {}", text("command"), text("name")))
-            .with_lead(self.lead(outcome.as_ref()));
+            .with_lead(lead(outcome.as_ref(), &table));
         if let Some(shape) = self.shape()? {
             page.push(shape);
         }
         if let Some(frames) = self.frames()? {
             page.push(Section::new("Frames").with(frames));
         }
-        if let Some(steps) = self.steps()? {
-            page.push(steps);
+        if !table.rows().is_empty() {
+            page.push(self.steps(&table)?);
         }
-        let options: Value = toml::from_str(&self.run.config()?)
+        let options: Value = toml::from_str(&self.run.read_text(config::FILE)?)
             .map_err(|error| Error::options(format!("the stored options: {error}")))?;
         let mut numbers = Section::new("Numbers");
         if let Some(outcome) = &outcome {
             numbers.push(facts(outcome));
         }
         let options = Details::new("Options").with(facts(&options));
-        let program = Details::new("Program, network and device").with(facts(&manifest));
+        let program = Details::new("Program, network and device").with(facts(about));
         Ok(page.with(numbers.with(options).with(program)))
     }
 
     /// The outcome of a finished run.
     fn outcome(&self) -> Result<Option<Value>, Error> {
-        let Some(bytes) = self.read(outlet::SUMMARY)? else {
-            return Ok(None);
-        };
-        let outcome = serde_json::from_slice(&bytes)
-            .map_err(|error| Error::options(format!("the stored outcome: {error}")))?;
-        Ok(Some(outcome))
-    }
-
-    /// What came out, in a sentence.
-    fn lead(&self, outcome: Option<&Value>) -> String {
-        let reached = self.run.checkpoint().map_or((0, 0.0), |checkpoint| {
-            (checkpoint.state.step, checkpoint.state.time)
-        });
-        let (step, time) = (reached.0, five_digits(reached.1));
-        let Some(outcome) = outcome else {
-            return format!("Not finished: {step} steps to the time {time} so far.");
-        };
-        let mut lead = format!("{step} steps to the time {time}.");
-        let number = |name: &str| outcome[name].as_f64().map(five_digits);
-        if let (Some(first), Some(last)) = (number("first_energy"), number("energy")) {
-            let _ = write!(lead, " Willmore energy {last}, before {first}.");
-        }
-        if outcome["components"] == 0 {
-            lead += " The shape has vanished.";
-        }
-        lead
+        let bytes = self.read(outlet::SUMMARY)?;
+        let outcome = bytes
+            .map(|bytes| serde_json::from_slice(&bytes))
+            .transpose();
+        outcome.map_err(|error| Error::options(format!("the stored outcome: {error}")))
     }
 
     /// The shape before and after: drawings in the plane, surfaces to turn in space.
@@ -126,10 +106,11 @@ impl Files<'_> {
         if meshes.is_empty() {
             return Ok(None);
         }
+        let up = UpAxis::deserialize(&engine::notes(self.run)["outlet"]["up"]);
         let view = View {
+            up: up.unwrap_or_default(),
             azimuth: outlet::AZIMUTH,
             elevation: outlet::ELEVATION,
-            ..View::default()
         };
         let viewer = Viewer::new(
             "The surface before and after",
@@ -142,20 +123,15 @@ impl Files<'_> {
 
     /// The surface of that name, in any of the formats.
     fn mesh(&self, stem: &str) -> Result<Option<TriangleMesh>, Error> {
-        let names = [MeshFormat::Ply, MeshFormat::Obj, MeshFormat::Stl]
-            .map(|format| format!("{stem}.{format}"));
-        let name = names.iter().find(|name| self.has(name));
-        Ok(name
-            .map(|name| surfaces::read(self.run.path().join(name)))
-            .transpose()?)
+        let formats = [MeshFormat::Ply, MeshFormat::Obj, MeshFormat::Stl];
+        let mut names = formats.iter().map(|format| format!("{stem}.{format}"));
+        let path = (names.find(|name| self.has(name))).map(|name| self.run.path().join(name));
+        Ok(path.map(surfaces::read).transpose()?)
     }
 
     fn frames(&self) -> Result<Option<Frames>, Error> {
-        let names: Vec<&str> = self
-            .run
-            .files()
-            .filter(|name| name.starts_with(outlet::FRAMES))
-            .collect();
+        let files = self.run.files();
+        let names: Vec<&str> = files.filter(|f| f.starts_with(outlet::FRAMES)).collect();
         if names.is_empty() {
             return Ok(None);
         }
@@ -171,26 +147,21 @@ impl Files<'_> {
         Ok(Some(Frames::new("The shape over the steps", frames)?))
     }
 
+    /// The records of all steps.
+    fn table(&self) -> Result<Table, Error> {
+        Ok(Table::from_csv("Steps", &self.run.read_text(METRICS)?)?)
+    }
+
     /// Energy and measures over the steps, drawn and as a table.
-    fn steps(&self) -> Result<Option<Section>, Error> {
-        let path = self.run.path().join("metrics.csv");
-        let csv = fs::read_to_string(&path).map_err(|source| Error::Io {
-            action: "read",
-            path,
-            source,
-        })?;
-        if csv.is_empty() {
-            return Ok(None);
-        }
-        let table = Table::from_csv("Steps", &csv)?;
-        let columns = match self.run.identity().grid.cells.len() {
+    fn steps(&self, table: &Table) -> Result<Section, Error> {
+        let columns = match engine::dimension(self.run)? {
             2 => [("perimeter", "Length"), ("volume", "Area")],
             _ => [("perimeter", "Area"), ("volume", "Volume")],
         };
         let energy = ("willmore_energy", "Willmore energy");
         let mut figure = report::Figure::new("", 3);
         for (column, title) in std::iter::once(energy).chain(columns) {
-            let points = points(&table, column);
+            let points = points(table, column);
             // Mean curvature flow has no energy.
             if points.is_empty() {
                 continue;
@@ -207,28 +178,18 @@ impl Files<'_> {
         let rows: Vec<Vec<String>> = thinned(table.rows(), MOST_ROWS)
             .map(|row| row.iter().map(|cell| shortened(cell)).collect())
             .collect();
-        let note = if rows.len() < table.rows().len() {
-            format!(
-                "{} of {} steps; all are in ",
-                rows.len(),
-                table.rows().len()
-            )
+        let (shown, all) = (rows.len(), table.rows().len());
+        let note = if shown < all {
+            format!("{shown} of {all} steps; all are in ")
         } else {
             "All digits are in ".to_owned()
         };
         let details = Details::new("Steps as a table")
-            .with(
-                pages::Text::from(note.as_str())
-                    .code("metrics.csv")
-                    .then("."),
-            )
+            .with(pages::Text::from(note.as_str()).code(METRICS).then("."))
             .with(Table::new("Steps", table.head(), rows)?);
         let caption = "Energy and measures of the shape after every step.";
-        Ok(Some(
-            Section::new("Steps")
-                .with(Figure::new(image, caption))
-                .with(details),
-        ))
+        let figure = Figure::new(image, caption);
+        Ok(Section::new("Steps").with(figure).with(details))
     }
 
     fn has(&self, name: &str) -> bool {
@@ -241,13 +202,28 @@ impl Files<'_> {
             return Ok(None);
         }
         let path = self.run.path().join(name);
-        let bytes = fs::read(&path).map_err(|source| Error::Io {
-            action: "read",
-            path,
-            source,
-        })?;
-        Ok(Some(bytes))
+        Ok(Some(fs::read(&path).map_err(Error::io("read", path))?))
     }
+}
+
+/// What came out, in a sentence.
+fn lead(outcome: Option<&Value>, table: &Table) -> String {
+    let (step, time) = match table.rows().last().map(Vec::as_slice) {
+        Some([step, time, ..]) => (step.as_str(), shortened(time)),
+        _ => ("0", "0".to_owned()),
+    };
+    let Some(outcome) = outcome else {
+        return format!("Not finished: {step} steps to the time {time} so far.");
+    };
+    let mut lead = format!("{step} steps to the time {time}.");
+    let number = |name: &str| outcome[name].as_f64().map(five_digits);
+    if let (Some(first), Some(last)) = (number("first_energy"), number("energy")) {
+        let _ = write!(lead, " Willmore energy {last}, before {first}.");
+    }
+    if outcome["components"] == 0 {
+        lead += " The shape has vanished.";
+    }
+    lead
 }
 
 /// Every k-th item, with the smallest k that leaves at most `most`; the last one in any case.

@@ -227,6 +227,7 @@ fn a_shape_that_vanishes_ends_its_run() {
     ];
     let outcome = outcome(folder.path(), &arguments);
     assert_eq!(outcome["components"], 0, "{outcome}");
+    assert_eq!(outcome["ended"], "the shape has vanished");
     assert!(outcome["steps"].as_u64().unwrap() < 200, "{outcome}");
     assert!(folder.path().join("run/final.npy").exists());
 }
@@ -250,6 +251,7 @@ fn time_and_energy_end_runs() {
         ],
     );
     assert_eq!(timed["steps"], 4);
+    assert_eq!(timed["ended"], "the time 1e-3 is reached");
     assert!((timed["time"].as_f64().unwrap() - 1e-3).abs() < 1e-15);
     let sphere = outcome(
         folder.path(),
@@ -266,6 +268,7 @@ fn time_and_energy_end_runs() {
     );
     // It stands still, and larger and larger steps would not change that.
     assert!(sphere["steps"].as_u64().unwrap() < 40, "{sphere}");
+    assert_eq!(sphere["ended"], "the energy is stationary");
     assert!(
         (sphere["energy"].as_f64().unwrap() / EIGHT_PI - 1.0).abs() < 0.01,
         "{sphere}"

@@ -1,8 +1,11 @@
-//! Full and read-only disks, where the system lets users mount one.
+//! Full and read-only disks. Where the system lets users mount one (Linux, user namespaces or root) they are real; a limit on the
+//! length of files and a folder in which nobody can write take their place everywhere. What cannot run says `SKIPPED`.
 use std::path::Path;
 use std::process::{Command, Output};
 
-use crate::common::{assert_same, interrupt, outcome, run, start, text, wait_for, with_output};
+use crate::common::{
+    assert_same, committed, interrupt, outcome, run, skip, start, text, wait_for, with_output,
+};
 
 const RUN: [&str; 10] = [
     "flow",
@@ -32,11 +35,27 @@ fn on_a_disk(folder: &Path, script: [&str; 2], size: usize, arguments: &[&str]) 
         .output();
     match process {
         Ok(output) if output.status.code() != Some(77) => Some(output),
-        other => {
-            println!("SKIPPED, no disk can be mounted: {other:?}");
+        Ok(output) => {
+            skip("a disk", &text(&output.stderr));
+            None
+        }
+        Err(error) => {
+            skip("a disk", &error.to_string());
             None
         }
     }
+}
+
+/// Runs the program where no file may have more than so many blocks of 512 bytes.
+fn with_short_files(folder: &Path, blocks: usize, arguments: &[&str]) -> Output {
+    let script = "trap '' XFSZ; ulimit -f \"$BLOCKS\" || exit 77; exec \"$0\" \"$@\"";
+    Command::new("sh")
+        .current_dir(folder)
+        .args(["-c", script, env!("CARGO_BIN_EXE_willmore")])
+        .args(arguments)
+        .env("BLOCKS", blocks.to_string())
+        .output()
+        .unwrap()
 }
 
 fn assert_refused(output: &Output, reason: &str) {
@@ -45,6 +64,19 @@ fn assert_refused(output: &Output, reason: &str) {
     assert!(error.starts_with("error: "), "{error}");
     assert_eq!(error.lines().count(), 1, "{error}");
     assert!(error.contains(reason), "{error}");
+}
+
+/// Goes on with what a refused run has left, if anything, and returns whether there was something.
+fn go_on(folder: &Path, left: &str, reference: &Path) -> bool {
+    let was_there = committed(&folder.join(left)).is_some();
+    let again = if was_there {
+        run(folder, &["resume", left])
+    } else {
+        run(folder, &with_output(&RUN, left))
+    };
+    assert!(again.status.success(), "{}", text(&again.stderr));
+    assert_same(&folder.join(left), reference);
+    was_there
 }
 
 /// Disks of all sizes up to one that is large enough. With more room the run goes on to the same bytes.
@@ -64,28 +96,47 @@ fn on_a_full_disk_there_is_one_line_and_the_run_goes_on_later() {
         let Some(output) = on_a_disk(attempt.path(), [mount, keep], size, &arguments) else {
             return;
         };
-        let copy = attempt.path().join("copy");
         if output.status.success() {
-            assert_same(&copy, &reference);
+            assert_same(&attempt.path().join("copy"), &reference);
             println!("{size} KiB are enough; {resumed} runs were resumed");
             break;
         }
         assert_refused(&output, "No space left");
-        let again = if copy.join("index.json").exists() {
-            resumed += 1;
-            run(attempt.path(), &["resume", "copy"])
-        } else {
-            run(attempt.path(), &with_output(&RUN, "copy"))
-        };
-        assert!(again.status.success(), "{size}: {}", text(&again.stderr));
-        assert_same(&copy, &reference);
+        resumed += usize::from(go_on(attempt.path(), "copy", &reference));
     }
     assert!(resumed >= 2, "{resumed} runs were resumed");
+}
+
+/// The same without a disk.
+#[test]
+fn where_files_must_be_short_there_is_one_line_and_the_run_goes_on_later() {
+    let folder = tempfile::tempdir().unwrap();
+    outcome(folder.path(), &with_output(&RUN, "reference"));
+    let reference = folder.path().join("reference");
+    let mut resumed = 0;
+    for blocks in (2..).step_by(10) {
+        let attempt = tempfile::tempdir_in(folder.path()).unwrap();
+        let arguments = with_output(&RUN, "run");
+        let arguments = [&arguments[..], &["--quiet"]].concat();
+        let output = with_short_files(attempt.path(), blocks, &arguments);
+        if output.status.success() {
+            assert_same(&attempt.path().join("run"), &reference);
+            println!("{blocks} blocks are enough; {resumed} runs were resumed");
+            break;
+        }
+        assert_refused(&output, "File too large");
+        resumed += usize::from(go_on(attempt.path(), "run", &reference));
+    }
+    assert!(resumed >= 1, "{resumed} runs were resumed");
 }
 
 #[test]
 fn on_a_read_only_disk_there_is_one_line() {
     let folder = tempfile::tempdir().unwrap();
+    // Not even root can write there.
+    let nowhere = run(folder.path(), &with_output(&RUN, "/proc/self/run"));
+    assert_refused(&nowhere, "/proc/self");
+
     std::fs::create_dir(folder.path().join("disk")).unwrap();
     let read_only = "mount -t tmpfs -o ro tmpfs \"$DISK\" || exit 77";
     let new = with_output(&RUN, "disk/run");

@@ -46,6 +46,29 @@ fn a_run_in_space_has_a_page_with_a_surface_to_turn() {
     }
 }
 
+/// Most OBJ files have y up; every other axis can be chosen, and a run that is resumed keeps it.
+#[test]
+fn the_axis_that_points_up_is_that_of_the_format_or_chosen() {
+    let folder = tempfile::tempdir().unwrap();
+    let cut = ["--without", "box:-0.5,-0.5,0.1,0.5,0.5,0.5"];
+    for (file, up) in [("box.obj", "1"), ("box.ply", "2")] {
+        let sample = ["sample", "builtin:cube", "--cells", "24", "--save", file];
+        outcome(folder.path(), &[&sample[..], &cut].concat());
+        let flow = ["flow", file, "--cells", "24", "--steps", "1", "--output"];
+        for (chosen, up) in [(&[][..], up), (&["--up", "x"], "0")] {
+            let name = format!("{file}-{up}");
+            outcome(folder.path(), &[&flow[..], &[&name], chosen].concat());
+            let expected = format!("data-up=\"{up}\"");
+            assert!(page(folder.path(), &name).contains(&expected), "{name}");
+        }
+    }
+    let picture = |run: &str| fs::read(folder.path().join(run).join("final.png")).unwrap();
+    assert_ne!(picture("box.obj-1"), picture("box.obj-0"));
+    fs::remove_file(folder.path().join("box.obj-1/index.html")).unwrap();
+    outcome(folder.path(), &["resume", "box.obj-1"]);
+    assert!(page(folder.path(), "box.obj-1").contains("data-up=\"1\""));
+}
+
 #[test]
 fn a_run_in_the_plane_has_a_page_with_drawings() {
     let folder = tempfile::tempdir().unwrap();
@@ -77,8 +100,9 @@ fn a_page_may_go_and_comes_back() {
         folder.path().join("run/index.html"),
         page(folder.path(), "run"),
     );
-    let index = fs::read_to_string(folder.path().join("run/index.json")).unwrap();
-    assert!(!index.contains("index.html"));
+    let checkpoint = folder.path().join("run/checkpoints/step-00000003.ckpt");
+    let listed = text(&fs::read(checkpoint).unwrap());
+    assert!(listed.contains("final.ply") && !listed.contains("index.html"));
     fs::remove_file(&path).unwrap();
     for damage in [None, Some("half a page")] {
         if let Some(damage) = damage {

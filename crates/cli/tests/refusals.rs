@@ -34,6 +34,8 @@ fn every_mistake_is_one_clear_line() {
     white.write_png(folder.path().join("white.png")).unwrap();
     std::fs::create_dir(folder.path().join("full")).unwrap();
     write("full/mine", b"");
+    std::fs::create_dir(folder.path().join("old")).unwrap();
+    write("old/index.json", b"{}");
     let table: &[(&[&str], &str)] = &[
         (&[], "there is no command"),
         (&["flaw"], "unrecognized subcommand 'flaw'"),
@@ -165,10 +167,7 @@ fn every_mistake_is_one_clear_line() {
             &["flow", "broken.npy", "--cells", "64"],
             "--cells has no meaning for a field",
         ),
-        (
-            &["flow", "builtin:disc", "--output", "full"],
-            "holds \"mine\"",
-        ),
+        (&["flow", "builtin:disc", "--output", "full"], "holds mine"),
         (
             &["flow", "--config", "missing.toml"],
             "cannot read missing.toml",
@@ -275,6 +274,15 @@ fn every_mistake_is_one_clear_line() {
             &["mcf", "builtin:disc", "--tau", "1"],
             "unexpected argument '--tau'",
         ),
+        (
+            &["flow", "builtin:disc", "--up", "z"],
+            "--up z has no meaning in the plane",
+        ),
+        (
+            &["flow", "builtin:cube", "--up", "w"],
+            "\"w\" is no axis: choose x, y or z",
+        ),
+        (&["resume", "old"], "format version 1"),
         (&["resume", "missing"], "missing"),
         (&["resume", "full"], "holds no run"),
         (

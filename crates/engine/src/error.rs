@@ -42,7 +42,7 @@ pub enum Error {
         /// Flow, shape and operator.
         case: String,
         /// Why.
-        source: solver::Error,
+        source: Box<solver::Error>,
     },
     /// Smaller time steps failed, too.
     #[error(
@@ -58,7 +58,7 @@ pub enum Error {
         /// How often it had been halved.
         halvings: u32,
         /// Why the last attempt failed.
-        source: solver::Error,
+        source: Box<solver::Error>,
     },
     /// Two runs whose nodes cannot be compared.
     #[error(

@@ -44,6 +44,7 @@
 mod case;
 mod error;
 mod measure;
+mod memory;
 mod motion;
 mod observer;
 mod operator;
@@ -59,6 +60,7 @@ mod trajectory;
 pub use case::Case;
 pub use error::Error;
 pub use measure::Measure;
+pub use memory::keep_freed;
 pub use observer::{Event, Observer, Samples};
 pub use operator::{
     Flow, Method, NamedNetwork, NeededNetwork, Networks, Operator, Scales, Scheme, checksum,

@@ -17,7 +17,7 @@ pub(crate) struct Motion<const D: usize> {
 enum Either<const D: usize> {
     Willmore(Box<WillmoreFlow<D>>),
     MeanCurvature {
-        flow: MeanCurvatureFlow<D>,
+        flow: Box<MeanCurvatureFlow<D>>,
         tau: f64,
         step: usize,
     },
@@ -66,7 +66,7 @@ impl<const D: usize> Motion<D> {
                     (None, None) => unreachable!("a learned operator has a network"),
                 };
                 Either::MeanCurvature {
-                    flow,
+                    flow: Box::new(flow),
                     tau: params.mcf_step,
                     step: state.step,
                 }

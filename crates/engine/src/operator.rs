@@ -67,13 +67,13 @@ pub enum Method {
 #[cfg_attr(feature = "clap", value(rename_all = "snake_case"))]
 #[serde(rename_all = "snake_case")]
 pub enum Scheme {
+    /// Calibrated, with the operator of the accurate recipe in place of the paper's
+    Accurate,
+    /// Divided by the step's calibration factors; a learned operator with its odd part, which treats both phases alike
+    Calibrated,
     /// As in the paper
     #[default]
     Paper,
-    /// Divided by the step's calibration factors; a learned operator with its odd part, which treats both phases alike
-    Calibrated,
-    /// Calibrated, with the operator of the accurate recipe in place of the paper's
-    Accurate,
 }
 
 impl Scheme {
@@ -218,6 +218,7 @@ impl NeededNetwork {
     }
 
     /// The same with a kernel of this width.
+    #[must_use]
     pub fn of_width(self, width: usize) -> Self {
         Self {
             width: Some(width),

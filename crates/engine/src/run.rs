@@ -85,7 +85,7 @@ impl<const D: usize> Run<D> {
             records,
             ended: None,
         };
-        run.ended = run.stop(step_size)?;
+        run.ended = run.stop(step_size);
         Ok(run)
     }
 
@@ -118,7 +118,7 @@ impl<const D: usize> Run<D> {
         record.completes_step = self.control.accept(&record)?;
         self.field = field;
         self.records.push(record);
-        self.ended = self.stop(step_size)?;
+        self.ended = self.stop(step_size);
         Ok(self.records.last())
     }
 
@@ -192,7 +192,7 @@ impl<const D: usize> Run<D> {
                         step: self.control.step(),
                         tau: size,
                         halvings,
-                        source,
+                        source: Box::new(source),
                     });
                 }
                 Err(source) => return Err(self.failed(source)),
@@ -201,26 +201,27 @@ impl<const D: usize> Run<D> {
     }
 
     fn failed(&self, source: solver::Error) -> Error {
-        let case = self.case.title();
-        Error::Step { case, source }
+        Error::Step {
+            case: self.case.title(),
+            source: Box::new(source),
+        }
     }
 
     /// The first stop rule that holds, where the last record belongs to a time step of this size.
-    fn stop(&self, step_size: f64) -> Result<Option<Stop>, Error> {
+    fn stop(&self, step_size: f64) -> Option<Stop> {
         let now = Situation {
             initial: &self.case.initial,
             field: &self.field,
             records: &self.records,
-            steps: self.control.step() - 1,
+            steps: self.steps(),
             step_size,
             largest: self.case.largest_step(),
         };
-        for stop in &self.case.stops {
-            if stop.holds(&now)? {
-                return Ok(Some(*stop));
-            }
-        }
-        Ok(None)
+        self.case
+            .stops
+            .iter()
+            .find(|stop| stop.holds(&now))
+            .copied()
     }
 
     /// What is run.

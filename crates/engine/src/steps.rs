@@ -48,6 +48,7 @@ const HALVINGS: u32 = 24;
 
 impl StepRule {
     /// The rule with everything filled in, for an inner step `mcf_step`.
+    #[must_use]
     pub fn resolved(self, mcf_step: f64) -> Self {
         match self {
             Self::ByEnergy(None) => Self::ByEnergy(Some(mcf_step / 16.0)),
@@ -230,13 +231,13 @@ impl FromStr for StepRule {
                  ramp:VALUE,HALVINGS"
             )),
         };
-        let pair = |rest: &str, name: &str| match rest.split_once(',') {
+        let pair = |rest: &str, rule: &str, name: &str| match rest.split_once(',') {
             Some((tau, count)) => match count.trim().parse::<u32>() {
                 Ok(count @ 0..=60) => Ok((positive(tau)?, count)),
                 _ => Err(format!("{count:?} is no number of {name} from 0 to 60")),
             },
             None => Err(format!(
-                "a step and a number of {name} are needed, VALUE,COUNT"
+                "a {rule} needs a step and a number of {name}, VALUE,COUNT"
             )),
         };
         match text.split_once(':') {
@@ -245,13 +246,13 @@ impl FromStr for StepRule {
             Some(("auto", first)) => Ok(Self::ByEnergy(Some(positive(first)?))),
             Some(("doubling", first)) => Ok(Self::Doubling(positive(first)?)),
             Some(("growing", rest)) => {
-                pair(rest, "equal steps").map(|(tau, alike)| Self::Growing {
+                pair(rest, "growing rule", "equal steps").map(|(tau, alike)| Self::Growing {
                     tau,
                     alike: alike as usize,
                 })
             }
             Some(("ramp", rest)) => {
-                pair(rest, "halvings").map(|(tau, halvings)| Self::Ramp { tau, halvings })
+                pair(rest, "ramp", "halvings").map(|(tau, halvings)| Self::Ramp { tau, halvings })
             }
             Some((rule, _)) => Err(format!(
                 "{rule:?} is no rule; there are auto, doubling, growing and ramp"

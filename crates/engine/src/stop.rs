@@ -3,12 +3,12 @@
 use std::fmt;
 
 use geometry::Field;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::Record;
 
 /// A reason to end; a flow ends with the first that holds.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stop {
     /// So many time steps are made.
@@ -49,12 +49,9 @@ pub(crate) struct Situation<'a, const D: usize> {
 
 impl Stop {
     /// Whether it holds.
-    pub(crate) fn holds<const D: usize>(
-        &self,
-        now: &Situation<'_, D>,
-    ) -> Result<bool, geometry::Error> {
+    pub(crate) fn holds<const D: usize>(&self, now: &Situation<'_, D>) -> bool {
         let last = now.records.last();
-        Ok(match *self {
+        match *self {
             Self::Steps(steps) => now.steps >= steps,
             // What is left of a sum of steps after the last one is rounding.
             Self::Time(end) => last.is_some_and(|r| end - r.time <= 1e-12 * end),
@@ -77,7 +74,7 @@ impl Stop {
             }
             Self::Vanished => !has_interface(now.field),
             Self::AtTheSide => touches_side(now.field) && !touches_side(now.initial),
-        })
+        }
     }
 }
 

@@ -164,7 +164,8 @@ pub fn initial<const D: usize>(stored: &StoredRun) -> Result<(Field<D>, Option<V
 
 /// All records of a stored run with their wall times.
 pub(crate) fn records(stored: &StoredRun) -> Result<Vec<Record>, Error> {
-    let mut records: Vec<Record> = read(stored, &stored.state().notes["records"])?;
+    let mut records: Vec<Record> = serde_json::from_str(&stored.state().text)
+        .map_err(|error| unreadable(stored.path(), error.to_string()))?;
     let seconds = stored.timings()["seconds"].as_array();
     for (record, seconds) in records.iter_mut().zip(seconds.into_iter().flatten()) {
         record.seconds = seconds.as_f64().unwrap_or(0.0);
@@ -179,13 +180,14 @@ fn pack<const D: usize>(run: &Run<D>, notes: &Value) -> Result<State, Error> {
         "case": run.case.identity(&run.device),
         "application": notes,
         "start": run.start,
-        "records": run.records,
+        "ended": run.ended(),
         "time": state.time,
         "previous_tau": previous_tau,
     });
     let mut packed = State::new(run.count() as u64, notes)
         .with_array("initial", run.case.initial.values().to_vec())
         .with_array("current", state.current.into_values());
+    packed.text = serde_json::to_string(&run.records).expect("records are numbers and names");
     if let Some(previous) = previous {
         packed = packed.with_array("previous", previous.into_values());
     }

@@ -24,8 +24,8 @@ pub struct Trajectory<const D: usize> {
     pub start: Values,
     /// The records of all minimizations, or of all steps of mean curvature flow.
     pub records: Vec<Record>,
-    /// Whether another stop rule than the number of steps ended the run, perhaps in the middle of a step.
-    pub stopped_early: bool,
+    /// The stop rule that ended the run, perhaps in the middle of a step.
+    pub ended: Stop,
     folder: PathBuf,
 }
 
@@ -46,13 +46,14 @@ impl<const D: usize> Trajectory<D> {
         let notes = json!({ "samples": samples });
         let (mut store, mut run) = match found(&case, device, folder, &notes)? {
             Some(stored) if stored.is_finished() => {
-                let start = store::read(&stored, &stored.state().notes["start"])?;
-                return Ok(Some(Self::new(
+                let notes = &stored.state().notes;
+                return Ok(Some(Self {
                     case,
-                    start,
-                    store::records(&stored)?,
-                    folder,
-                )));
+                    start: store::read(&stored, &notes["start"])?,
+                    records: store::records(&stored)?,
+                    ended: store::read(&stored, &notes["ended"])?,
+                    folder: folder.to_owned(),
+                }));
             }
             Some(stored) => Store::resume(stored, case, device, CHECKPOINTS)?,
             None => {
@@ -67,23 +68,16 @@ impl<const D: usize> Trajectory<D> {
         }
         match run.advance(Some(&mut store), &mut all, interrupt)? {
             Ending::Interrupted => Ok(None),
-            Ending::Stopped(_) => {
+            Ending::Stopped(ended) => {
                 store.finish(&run)?;
-                Ok(Some(Self::new(run.case, run.start, run.records, folder)))
+                Ok(Some(Self {
+                    case: run.case,
+                    start: run.start,
+                    records: run.records,
+                    ended,
+                    folder: folder.to_owned(),
+                }))
             }
-        }
-    }
-
-    fn new(case: Case<D>, start: Values, records: Vec<Record>, folder: &Path) -> Self {
-        let complete = records.last().is_none_or(|last| last.completes_step);
-        let steps = records.last().map_or(0, |last| last.step);
-        let reached = |stop: &Stop| matches!(stop, Stop::Steps(most) if complete && steps >= *most);
-        Self {
-            stopped_early: !case.stops.iter().any(reached),
-            case,
-            start,
-            records,
-            folder: folder.to_owned(),
         }
     }
 
@@ -153,8 +147,8 @@ impl<const D: usize> Trajectory<D> {
     /// [`Error::Incomparable`] if the nodes of this grid are not among those of the other.
     pub fn distance(&self, step: usize, other: &Self, there: usize) -> Result<f64, Error> {
         let (own, fine) = (*self.case.grid(), *other.case.grid());
-        let in_place =
-            own.side().to_bits() == fine.side().to_bits() && own.origin() == fine.origin();
+        let in_place = own.side().to_bits() == fine.side().to_bits()
+            && own.origin().map(f64::to_bits) == fine.origin().map(f64::to_bits);
         if !in_place || !fine.cells().is_multiple_of(own.cells()) {
             return Err(Error::Incomparable {
                 cells: own.cells(),

@@ -1,7 +1,7 @@
 //! Every reason to end.
 
 use crate::common::{EPS, TAU, case, disc, divided, finished, grid};
-use engine::{Flow, Method, StepRule, Stop};
+use engine::{Flow, Method, Record, StepRule, Stop};
 use geometry::Field;
 
 #[test]
@@ -14,7 +14,7 @@ fn energies_and_vanishing_end_a_run() {
     let energies: Vec<f64> = run
         .records()
         .iter()
-        .filter_map(|r| r.willmore_energy())
+        .filter_map(Record::willmore_energy)
         .collect();
     assert!(energies.len() < 50);
     let (last, before) = energies.split_last().unwrap();

@@ -22,14 +22,12 @@ pub trait Storage: fmt::Debug + Send + Sync {
     }
 
     /// Writes at the current position and returns how many bytes were written.
-    fn write(&self, file: &mut File, path: &Path, bytes: &[u8]) -> io::Result<usize> {
-        let _ = path;
+    fn write(&self, file: &mut File, _path: &Path, bytes: &[u8]) -> io::Result<usize> {
         file.write(bytes)
     }
 
     /// Flushes a file's content to the disk.
-    fn sync_file(&self, file: &File, path: &Path) -> io::Result<()> {
-        let _ = path;
+    fn sync_file(&self, file: &File, _path: &Path) -> io::Result<()> {
         file.sync_all()
     }
 

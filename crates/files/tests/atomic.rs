@@ -5,7 +5,7 @@ use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use files::{Disk, Step, Storage, TEMPORARY_PREFIX};
+use files::{Disk, Storage};
 
 fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(folder)
@@ -60,14 +60,14 @@ impl Storage for Failing {
 
 #[test]
 fn every_step_may_fail() {
-    let steps = [
-        (Step::Create, "old"),
-        (Step::Write, "old"),
-        (Step::Flush, "old"),
-        (Step::Rename, "old"),
-        (Step::FlushFolder, "new"),
+    let actions = [
+        ("create a file beside", "old"),
+        ("write", "old"),
+        ("flush to disk", "old"),
+        ("replace", "old"),
+        ("flush the folder of", "new"),
     ];
-    for (at, (step, content)) in steps.into_iter().enumerate() {
+    for (at, (action, content)) in actions.into_iter().enumerate() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("state");
         fs::write(&path, "old").unwrap();
@@ -77,7 +77,7 @@ fn every_step_may_fail() {
         };
         let error =
             files::write_atomically_on(&storage, &path, |out| out.write_all(b"new")).unwrap_err();
-        assert_eq!(error.step, step);
+        assert_eq!(error.action, action);
         assert_eq!(error.path, path);
         assert_eq!(error.source.kind(), io::ErrorKind::StorageFull);
         let message = error.to_string();
@@ -97,7 +97,7 @@ fn a_failing_or_panicking_producer_leaves_the_old_file() {
         Err(io::Error::other("the solver gave up"))
     })
     .unwrap_err();
-    assert_eq!(error.step, Step::Write);
+    assert_eq!(error.action, "write");
     assert!(error.to_string().contains("the solver gave up"));
     let panicked = std::panic::catch_unwind(|| {
         files::write_atomically(&path, |_| std::panic::resume_unwind(Box::new("stop")))
@@ -108,33 +108,13 @@ fn a_failing_or_panicking_producer_leaves_the_old_file() {
 }
 
 #[test]
-fn only_temporary_files_are_stale() {
-    let folder = tempfile::tempdir().unwrap();
-    let left = format!("{TEMPORARY_PREFIX}Xy12");
-    fs::write(folder.path().join(&left), "half").unwrap();
-    fs::write(folder.path().join("result"), "whole").unwrap();
-    fs::create_dir(folder.path().join(format!("{TEMPORARY_PREFIX}folder"))).unwrap();
-    assert_eq!(
-        files::stale(folder.path()).unwrap(),
-        [folder.path().join(&left)]
-    );
-    assert_eq!(
-        files::remove_stale(folder.path()).unwrap(),
-        [folder.path().join(&left)]
-    );
-    assert_eq!(names(folder.path()), [".partial-folder", "result"]);
-    let error = files::stale(folder.path().join("result")).unwrap_err();
-    assert_eq!(error.step, Step::Search);
-}
-
-#[test]
 fn probing_finds_a_folder_that_is_none() {
     let folder = tempfile::tempdir().unwrap();
     files::probe(folder.path()).unwrap();
     assert!(names(folder.path()).is_empty());
     fs::write(folder.path().join("file"), "").unwrap();
     let error = files::probe(folder.path().join("file")).unwrap_err();
-    assert_eq!(error.step, Step::Create);
+    assert_eq!(error.action, "create a file in");
 }
 
 #[cfg(unix)]

@@ -5,6 +5,7 @@
 
 use burn::tensor::Tensor;
 use operators::{HermiteTable, TableRange};
+use serde::Serialize;
 
 use crate::Error;
 
@@ -21,7 +22,7 @@ pub const TABLE: TableRange = TableRange {
 /// A scalar perceptron with its parameters in one flat vector.
 ///
 /// Layer after layer: the weights `[inputs, outputs]` row-major, then the biases.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Mlp {
     layers: Vec<usize>,
     parameters: Vec<f64>,

@@ -37,6 +37,11 @@ impl Ratios {
             && close(self.step_over_h2, other.step_over_h2)
     }
 
+    /// Time step of the mean curvature flow over the squared interface width, `tautilde / eps^2`.
+    pub fn step_over_eps2(&self) -> f64 {
+        self.step_over_h2 / self.eps_over_h.powi(2)
+    }
+
     /// Number of kernel entries, `n_K^D`.
     pub fn kernel_len(&self) -> usize {
         self.width.pow(self.dimension as u32)

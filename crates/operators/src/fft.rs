@@ -8,11 +8,10 @@ use std::any::TypeId;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
+use fourier::{Planned, Plans};
 use rayon::prelude::*;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::num_complex::Complex;
 use rustfft::num_traits::Float;
-use rustfft::{Fft, FftNum, FftPlanner};
 
 /// Columns of the first axis that are transformed together: two cache lines of complex doubles.
 const BLOCK: usize = 8;
@@ -20,7 +19,7 @@ const BLOCK: usize = 8;
 const PARALLEL_FROM: usize = 1 << 15;
 
 /// Floating-point type of a grid: `f64` or `f32`.
-pub trait Real: FftNum + Float + bytemuck::Pod + Default {
+pub trait Real: Planned + Float + bytemuck::Pod + Default {
     /// Conversion from a double, rounding if needed.
     fn of(value: f64) -> Self;
     /// The value as a double, exactly.
@@ -81,10 +80,7 @@ pub struct Transform<T: Real> {
     /// Complex numbers per slab (one index of the first axis) after the transform of the remaining axes.
     columns: usize,
     half: usize,
-    real: Arc<dyn RealToComplex<T>>,
-    real_inverse: Arc<dyn ComplexToReal<T>>,
-    /// Forward and inverse plans of all axes but the last.
-    complex: Vec<[Arc<dyn Fft<T>>; 2]>,
+    plans: Plans<T>,
     pool: Mutex<Vec<Vec<Complex<T>>>>,
 }
 
@@ -115,24 +111,12 @@ impl<T: Real> Transform<T> {
         );
         let last = shape[shape.len() - 1];
         let half = last / 2 + 1;
-        let mut planner = RealFftPlanner::new();
-        let (real, real_inverse) = (
-            planner.plan_fft_forward(last),
-            planner.plan_fft_inverse(last),
-        );
-        let mut planner = FftPlanner::new();
-        let complex = shape[..shape.len() - 1]
-            .iter()
-            .map(|&n| [planner.plan_fft_forward(n), planner.plan_fft_inverse(n)])
-            .collect();
         let columns = shape[1..shape.len() - 1].iter().product::<usize>() * half;
         Self {
             shape: shape.to_vec(),
             columns,
             half,
-            real,
-            real_inverse,
-            complex,
+            plans: T::plans(shape),
             pool: Mutex::new(Vec::new()),
         }
     }
@@ -159,7 +143,7 @@ impl<T: Real> Transform<T> {
         let mut spectrum = vec![Complex::default(); self.spectrum_len()];
         self.over_blocks(&mut spectrum, |work, first, chunk| {
             gather(&rows, self.columns, first, n0, chunk);
-            self.complex[0][0].process_with_scratch(chunk, &mut work.scratch);
+            self.plans.complex[0][0].process_with_scratch(chunk, &mut work.scratch);
         });
         self.give_back(rows);
         spectrum
@@ -172,7 +156,7 @@ impl<T: Real> Transform<T> {
             let n0 = self.shape[0];
             let columns = &mut work.columns[..chunk.len()];
             columns.copy_from_slice(&spectrum[first * n0..][..chunk.len()]);
-            self.complex[0][1].process_with_scratch(columns, &mut work.scratch);
+            self.plans.complex[0][1].process_with_scratch(columns, &mut work.scratch);
             scatter(columns, n0, chunk);
         });
         let result = self.slabs_inverse(&blocks);
@@ -212,9 +196,9 @@ impl<T: Real> Transform<T> {
         self.over_blocks(&mut blocks, |work, first, chunk| {
             let columns = &mut work.columns[..chunk.len()];
             gather(&rows, self.columns, first, n0, columns);
-            self.complex[0][0].process_with_scratch(columns, &mut work.scratch);
+            self.plans.complex[0][0].process_with_scratch(columns, &mut work.scratch);
             multiply(first * n0, columns);
-            self.complex[0][1].process_with_scratch(columns, &mut work.scratch);
+            self.plans.complex[0][1].process_with_scratch(columns, &mut work.scratch);
             scatter(columns, n0, chunk);
         });
         self.give_back(rows);
@@ -239,11 +223,12 @@ impl<T: Real> Transform<T> {
         let last = self.shape[self.shape.len() - 1];
         for (line, out) in x.chunks_exact(last).zip(slab.chunks_exact_mut(self.half)) {
             work.row.copy_from_slice(line);
-            self.real
+            self.plans
+                .real
                 .process_with_scratch(
                     &mut work.row,
                     out,
-                    &mut work.scratch[..self.real.get_scratch_len()],
+                    &mut work.scratch[..self.plans.real.get_scratch_len()],
                 )
                 .expect("row and spectrum have the plan's lengths");
         }
@@ -255,7 +240,7 @@ impl<T: Real> Transform<T> {
         let mut trailing = self.half;
         for axis in (1..self.shape.len() - 1).rev() {
             let n = self.shape[axis];
-            let fft = &self.complex[axis][direction];
+            let fft = &self.plans.complex[axis][direction];
             for matrix in slab.chunks_exact_mut(n * trailing) {
                 for first in (0..trailing).step_by(BLOCK) {
                     let width = BLOCK.min(trailing - first);
@@ -294,11 +279,12 @@ impl<T: Real> Transform<T> {
                 if last.is_multiple_of(2) {
                     line[self.half - 1].im = T::zero();
                 }
-                self.real_inverse
+                self.plans
+                    .real_inverse
                     .process_with_scratch(
                         line,
                         out,
-                        &mut work.scratch[..self.real_inverse.get_scratch_len()],
+                        &mut work.scratch[..self.plans.real_inverse.get_scratch_len()],
                     )
                     .expect("row and spectrum have the plan's lengths");
             }
@@ -347,13 +333,14 @@ impl<T: Real> Transform<T> {
 
     fn work(&self) -> Work<T> {
         let scratch = self
+            .plans
             .complex
             .iter()
             .flatten()
             .map(|fft| fft.get_inplace_scratch_len())
             .chain([
-                self.real.get_scratch_len(),
-                self.real_inverse.get_scratch_len(),
+                self.plans.real.get_scratch_len(),
+                self.plans.real_inverse.get_scratch_len(),
             ])
             .max()
             .unwrap_or(0);

@@ -10,6 +10,9 @@ pub enum Error {
     /// The PNG encoder failed.
     #[error("the picture could not be encoded as PNG")]
     Encode(#[from] png::EncodingError),
+    /// Bytes that are no picture of this crate.
+    #[error("the picture cannot be read: {0}")]
+    Decode(#[from] png::DecodingError),
     /// A number is outside its allowed range.
     #[error("{name} is {value}, but must be {requirement}")]
     Parameter {

@@ -77,7 +77,7 @@ impl Manifest {
             dtype: None,
             backend: None,
             seed: None,
-            started: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
+            started: rfc3339(SystemTime::now()),
             wall_seconds: 0.0,
             phases: Vec::new(),
             clock: Instant::now(),
@@ -168,8 +168,29 @@ fn commit() -> Option<String> {
     })
 }
 
+/// Date and time of day in UTC to the second, as RFC 3339 writes them.
+fn rfc3339(moment: SystemTime) -> String {
+    const DAY: u64 = 86400;
+    // A clock before 1970 is wrong anyway.
+    let since = moment.duration_since(SystemTime::UNIX_EPOCH);
+    let seconds = since.map_or(0, |since| since.as_secs());
+    let (days, second) = (seconds / DAY, seconds % DAY);
+    // Counted from 1 March of the year 0, so that the leap day is the last of a year; 400 years have 146097 days.
+    let days = days + 719_468;
+    let (cycle, day) = (days / 146_097, days % 146_097);
+    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
+    let day = day - (365 * year + year / 4 - year / 100);
+    let month = (5 * day + 2) / 153;
+    let day = day - (153 * month + 2) / 5 + 1;
+    let (year, month) = (400 * cycle + year + month / 10, (month + 2) % 12 + 1);
+    let (hour, minute, second) = (second / 3600, second / 60 % 60, second % 60);
+    format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z")
+}
+
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
 
     #[derive(Serialize)]
@@ -210,11 +231,30 @@ mod tests {
         );
         assert!(json["cpus"].as_u64().unwrap() >= 1);
         let started = json["started"].as_str().unwrap();
-        assert!(humantime::parse_rfc3339(started).is_ok() && started.ends_with('Z'));
+        assert!(
+            started.len() == 20 && started.starts_with("20"),
+            "{started}"
+        );
         let phase = json["phases"][0]["seconds"].as_f64().unwrap();
         assert!(phase >= 0.02 && json["wall_seconds"].as_f64().unwrap() >= phase);
         assert!(!text.contains(env!("CARGO_MANIFEST_DIR")));
         assert!(!text.contains(root.path().to_str().unwrap()));
+    }
+
+    #[test]
+    fn moments_are_dates_and_times() {
+        for (seconds, expected) in [
+            (0, "1970-01-01T00:00:00Z"),
+            (68_255_999, "1972-02-29T23:59:59Z"),
+            (951_868_800, "2000-03-01T00:00:00Z"),
+            (1_767_225_599, "2025-12-31T23:59:59Z"),
+            (4_107_542_400, "2100-03-01T00:00:00Z"),
+        ] {
+            assert_eq!(
+                rfc3339(SystemTime::UNIX_EPOCH + Duration::from_secs(seconds)),
+                expected
+            );
+        }
     }
 
     #[test]

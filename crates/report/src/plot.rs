@@ -81,6 +81,12 @@ impl Series {
         self
     }
 
+    /// Shows symbols at the data points, and no line.
+    #[must_use]
+    pub fn with_symbols(self, marker: Marker) -> Self {
+        self.with_style(LineStyle::None).with_marker(marker)
+    }
+
     /// Sets the width of the line in layout units (2 by default).
     #[must_use]
     pub fn with_width(mut self, width: f64) -> Self {

@@ -11,16 +11,17 @@ use crate::{Error, names};
 
 /// A folder of finished parts. Each is stored with everything it depends on, its key, and only used
 /// if that is the same.
+///
+/// All methods give [`Error::Io`], and [`Error::Invalid`] for names that are not made of letters,
+/// digits, `.`, `-` and `_`, and content that JSON does not know.
 #[derive(Debug, Clone)]
 pub struct Cache {
     folder: PathBuf,
 }
 
+#[expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 impl Cache {
     /// Opens a folder, which is made unless it exists.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if no files can be made in it.
     pub fn open(folder: impl Into<PathBuf>) -> Result<Self, Error> {
         let folder = folder.into();
         fs::create_dir_all(&folder).map_err(files::Error::of("create the folder", &folder))?;
@@ -32,15 +33,12 @@ impl Cache {
     pub fn load<R: DeserializeOwned>(&self, name: &str, key: &impl Serialize) -> Option<R> {
         let bytes = fs::read(self.path(name).ok()?).ok()?;
         let (found, result): (Value, Value) = serde_json::from_slice(&bytes).ok()?;
-        let same = found == serde_json::to_value(key).ok()?;
-        same.then(|| serde_json::from_value(result).ok())?
+        // Compared as it is read: both went through the same number formatting.
+        let key: Value = serde_json::from_str(&serde_json::to_string(key).ok()?).ok()?;
+        (found == key).then(|| serde_json::from_value(result).ok())?
     }
 
     /// Stores a part, whole or not at all.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] for a name that is not made of letters, digits, `.`, `-` and `_`, or content
-    /// that JSON does not know; [`Error::Io`].
     pub fn store(
         &self,
         name: &str,
@@ -63,9 +61,6 @@ impl Cache {
     }
 
     /// Removes the folder with all its parts, after the final results have been written.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
     pub fn remove(self) -> Result<(), Error> {
         fs::remove_dir_all(&self.folder).map_err(files::Error::of("remove", self.folder))?;
         Ok(())

@@ -31,6 +31,8 @@ pub struct State {
     /// Small things, at most [`State::MAX_NOTES`] bytes. JSON has no NaN and no infinity: what may
     /// become either belongs in an array.
     pub notes: Value,
+    /// Text of any length, for what grows with the number of steps.
+    pub text: String,
     /// Named arrays, stored bit by bit. Names differ and are not empty.
     pub arrays: Vec<(String, Vec<f64>)>,
 }
@@ -45,6 +47,7 @@ impl State {
         Self {
             step,
             notes,
+            text: String::new(),
             arrays: Vec::new(),
         }
     }
@@ -86,6 +89,7 @@ impl State {
             a.0 == b.0 && a.1.iter().map(bits).eq(b.1.iter().map(bits))
         };
         self.notes == other.notes
+            && self.text == other.text
             && self.arrays.len() == other.arrays.len()
             && self.arrays.iter().zip(&other.arrays).all(same)
     }
@@ -109,7 +113,7 @@ pub(crate) fn kept(finished: bool) -> usize {
     if finished { 1 } else { 2 }
 }
 
-/// What a checkpoint file says besides notes and arrays. Its format:
+/// What a checkpoint file says besides notes, text and arrays. Its format:
 ///
 /// | bytes | content |
 /// |---|---|
@@ -118,6 +122,7 @@ pub(crate) fn kept(finished: bool) -> usize {
 /// | 4 + 4 | lengths of the header and of the notes, little endian |
 /// | … | header: this as JSON |
 /// | … | notes: JSON |
+/// | … | the text, UTF-8 |
 /// | … | the arrays one after the other, `f64`, little endian |
 /// | 32 | SHA-256 of all bytes before |
 #[derive(Debug, Serialize, Deserialize)]
@@ -126,30 +131,29 @@ pub(crate) struct Header {
     step: u64,
     pub finished: bool,
     pub files: Files,
+    /// Bytes of the text.
+    #[serde(default)]
+    text: u64,
     /// Names and numbers of values.
     arrays: Vec<(String, u64)>,
 }
 
-/// The bytes before the arrays, once it is certain that they can be read back.
+/// The bytes before text and arrays, once it is certain that they can be read back.
 pub(crate) fn start(state: &State, files: &Files, finished: bool) -> Result<Vec<u8>, Error> {
-    let lengths = state
-        .arrays
-        .iter()
-        .map(|(name, v)| (name.clone(), v.len() as u64));
+    let lengths = |(name, values): &(String, Vec<f64>)| (name.clone(), values.len() as u64);
     let header = Header {
         step: state.step,
         finished,
         files: files.clone(),
-        arrays: lengths.collect(),
+        text: state.text.len() as u64,
+        arrays: state.arrays.iter().map(lengths).collect(),
     };
     if !are_names(&header.arrays) {
         return Err(state.refused("its arrays need names, and different ones"));
     }
-    let failed = |e: serde_json::Error| state.refused(&e.to_string());
-    let (header, notes) = (
-        serde_json::to_vec(&header).map_err(failed)?,
-        serde_json::to_vec(&state.notes).map_err(failed)?,
-    );
+    let json =
+        (serde_json::to_vec(&header)).and_then(|h| Ok((h, serde_json::to_vec(&state.notes)?)));
+    let (header, notes) = json.map_err(|e| state.refused(&e.to_string()))?;
     // Deep nesting is not read: better now than on the day of the restart.
     if !serde_json::from_slice(&notes).is_ok_and(|back: Value| back == state.notes) {
         return Err(state.refused("its notes are nested too deeply"));
@@ -164,15 +168,8 @@ pub(crate) fn start(state: &State, files: &Files, finished: bool) -> Result<Vec<
         }
     }
     let length = |json: &[u8]| (json.len() as u32).to_le_bytes();
-    Ok([
-        &MAGIC[..],
-        &FORMAT.to_le_bytes(),
-        &length(&header),
-        &length(&notes),
-        &header,
-        &notes,
-    ]
-    .concat())
+    let lengths = [length(&header), length(&notes)].concat();
+    Ok([&MAGIC[..], &FORMAT.to_le_bytes(), &lengths, &header, &notes].concat())
 }
 
 /// Writes a checkpoint, given its [`start`].
@@ -183,11 +180,10 @@ pub(crate) fn write(out: &mut dyn Write, start: &[u8], state: &State) -> io::Res
         out.write_all(bytes)
     };
     put(start)?;
-    for (_, values) in &state.arrays {
-        for values in values.chunks(PIECE) {
-            let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
-            put(&bytes)?;
-        }
+    put(state.text.as_bytes())?;
+    for values in (state.arrays.iter()).flat_map(|(_, values)| values.chunks(PIECE)) {
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        put(&bytes)?;
     }
     out.write_all(&hash.finalize())
 }
@@ -250,8 +246,11 @@ pub(crate) fn read(folder: &Path, step: u64) -> Result<(Header, State), Error> {
         return Err(damaged(what));
     }
     if let Some(name) = (header.files.keys()).find(|name| names::check(name).is_err()) {
-        return Err(damaged(format!("it lists a file with the name {name:?}")));
+        let shown = files::shortened(name, 60);
+        return Err(damaged(format!("it lists a file with the name {shown:?}")));
     }
+    let text = take(usize::try_from(header.text).unwrap_or(usize::MAX))?.to_vec();
+    state.text = String::from_utf8(text).map_err(|e| damaged(e.to_string()))?;
     for (name, length) in &header.arrays {
         let bytes = length.checked_mul(8).and_then(|n| usize::try_from(n).ok());
         let values = take(bytes.unwrap_or(usize::MAX))?.chunks_exact(8);

@@ -45,20 +45,14 @@ impl Seal {
     /// Accepts a file with this seal.
     pub fn check(&self, path: &Path) -> Result<(), Error> {
         let found = Self::of(path)?;
-        if found.length != self.length {
-            let (found, expected) = (found.length, self.length);
-            let what = format!("it has {found} bytes where it should have {expected}");
-            return Err(Error::damaged(path, what));
-        }
-        if found != *self {
-            return Err(wrong_checksum(path));
-        }
-        Ok(())
+        (found == *self)
+            .then_some(())
+            .ok_or_else(|| wrong_checksum(path))
     }
 }
 
 pub(crate) fn wrong_checksum(path: &Path) -> Error {
-    Error::damaged(path, "its checksum is wrong")
+    Error::damaged(path, "it is not as it was written, by its checksum")
 }
 
 /// Opens an ordinary file for reading; anything else is damage.

@@ -15,6 +15,9 @@ use crate::{Error, lock, names, timings};
 
 /// A run directory that this process works on. Dropping it gives the lock back; what was not
 /// committed is then forgotten when the run is resumed.
+///
+/// All methods give [`Error::Invalid`] for what cannot be stored, which changes nothing, and
+/// [`Error::Io`]. Names of files are `/`-separated and made of letters, digits, `.`, `-` and `_`.
 #[derive(Debug)]
 pub struct RunDirectory {
     pub(crate) path: PathBuf,
@@ -22,19 +25,16 @@ pub struct RunDirectory {
     pub(crate) files: Files,
     /// Of the checkpoints that are part of the run, the newest first.
     pub(crate) steps: Vec<u64>,
-    pub(crate) broken: bool,
     pub(crate) _lock: Lock,
 }
 
+#[expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 impl RunDirectory {
     /// Starts a run in a folder that does not exist or is empty: writes `files`, names and texts such
     /// as that of `config.toml`, and then the first checkpoint.
     ///
-    /// A folder in which another process was killed while it started a run counts as empty.
-    ///
-    /// # Errors
-    /// [`Error::Occupied`] if there is anything in the folder, [`Error::Locked`] if somebody else is
-    /// starting a run there, [`Error::Invalid`], [`Error::Io`].
+    /// A folder in which another process was killed while it started a run counts as empty. Anything
+    /// else in it gives [`Error::Occupied`], and another process there [`Error::Locked`].
     pub fn create(
         path: impl Into<PathBuf>,
         files: &[(&str, &str)],
@@ -44,9 +44,6 @@ impl RunDirectory {
     }
 
     /// [`RunDirectory::create`] on another storage than the disk itself.
-    ///
-    /// # Errors
-    /// As [`RunDirectory::create`].
     pub fn create_on(
         storage: Arc<dyn Storage>,
         path: impl Into<PathBuf>,
@@ -77,7 +74,6 @@ impl RunDirectory {
             storage,
             files: Files::new(),
             steps: Vec::new(),
-            broken: false,
             _lock: lock,
         };
         run.write_timings(&Value::Null)?;
@@ -95,10 +91,6 @@ impl RunDirectory {
 
     /// Writes a file under a new name such as `fields/step-0010.vti`; folders are made. It belongs to
     /// the run from the next commit on, and never changes. After an error the name is free again.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] for names that are taken, reserved or not made of letters, digits, `.`,
-    /// `-`, `_` and `/`; [`Error::Io`], [`Error::Broken`].
     pub fn write_file(
         &mut self,
         name: &str,
@@ -114,10 +106,7 @@ impl RunDirectory {
 
     /// Takes up a file that other code has written whole at [`path`](RunDirectory::path)`/name`, as
     /// [`RunDirectory::write_file`] would have; make the folder with
-    /// [`RunDirectory::make_folder`].
-    ///
-    /// # Errors
-    /// As [`RunDirectory::write_file`], and [`Error::Damaged`] if there is no such file.
+    /// [`RunDirectory::make_folder`]. [`Error::Damaged`] if there is no such file.
     pub fn adopt_file(&mut self, name: &str) -> Result<(), Error> {
         self.check_new(name)?;
         let seal = self.flushed(name)?;
@@ -126,11 +115,7 @@ impl RunDirectory {
     }
 
     /// Makes a folder in the run directory, unless it exists, and returns its path.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`], [`Error::Io`], [`Error::Broken`].
     pub fn make_folder(&mut self, name: &str) -> Result<PathBuf, Error> {
-        self.check_usable()?;
         names::check(name)?;
         let path = self.path.join(name);
         make_folders_on(&*self.storage, &path)?;
@@ -140,17 +125,13 @@ impl RunDirectory {
     /// Writes or replaces a file that is derived from the state, such as `metrics.csv`: a crash
     /// leaves an old one or the new one. It belongs to the run from the next commit on, but its
     /// content only once the run is finished.
-    ///
-    /// # Errors
-    /// As [`RunDirectory::write_file`], but the name may be that of another such file.
     pub fn replace_file(
         &mut self,
         name: &str,
         write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<(), Error> {
-        match self.files.get(name) {
-            Some(Kind::Derived(_)) => self.check_usable()?,
-            _ => self.check_new(name)?,
+        if !matches!(self.files.get(name), Some(Kind::Derived(_))) {
+            self.check_new(name)?;
         }
         self.store(name, write)?;
         self.files.insert(name.into(), Kind::Derived(None));
@@ -158,33 +139,24 @@ impl RunDirectory {
     }
 
     /// Replaces `timings.json`, the one file that may differ between two runs of the same
-    /// computation: wall times and the like, 1 MiB at most. It stands outside of the commits, and a
+    /// computation: wall times and the like, 4 MiB at most. It stands outside of the commits, and a
     /// crash leaves the old one or the new one.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`], [`Error::Io`], [`Error::Broken`].
     pub fn write_timings(&mut self, timings: &Value) -> Result<(), Error> {
-        self.check_usable()?;
-        self.store_timings(timings)
+        self.replace_timings(timings)
     }
 
     /// Makes all that was written so far, and this state, what the run is resumed from. The last two
     /// checkpoints are kept.
     ///
     /// The same state may be committed again, for example on an interruption right after a commit.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`], which changes nothing. After [`Error::Io`] the directory is that of this
-    /// commit or of the last one, and has to be opened again: all further calls give
-    /// [`Error::Broken`].
+    /// After [`Error::Io`] the directory is that of this commit or of the last one, and the run may go
+    /// on or be opened again.
     pub fn commit(&mut self, state: &State) -> Result<(), Error> {
         self.commit_as(state, false)
     }
 
     /// Commits the last state, marks the run as finished, and keeps this checkpoint alone.
-    ///
-    /// # Errors
-    /// As [`RunDirectory::commit`], and [`Error::Damaged`] if a derived file is missing.
+    /// [`Error::Damaged`] if a [derived](RunDirectory::replace_file) file is missing.
     pub fn finish(mut self, state: &State) -> Result<(), Error> {
         for name in self.files.keys().cloned().collect::<Vec<_>>() {
             if let Some(Kind::Derived(_)) = self.files.get(&name) {
@@ -196,15 +168,18 @@ impl RunDirectory {
     }
 
     fn commit_as(&mut self, state: &State, finished: bool) -> Result<(), Error> {
-        self.check_usable()?;
-        self.check_follows(state)?;
+        let last = self.steps.first().copied();
+        let repeats =
+            || checkpoint::read(&self.path, state.step).map(|(_, old)| old.is_same(state));
+        if last > Some(state.step) || last == Some(state.step) && !repeats()? {
+            return Err(state.refused("a commit is of a later step than the last, or repeats it"));
+        }
         let start = checkpoint::start(state, &self.files, finished)?;
-        self.broken = true;
         let path = self.path.join(names::checkpoint(state.step));
         files::write_atomically_on(&*self.storage, path, |out| {
             checkpoint::write(out, &start, state)
         })?;
-        if self.steps.first() != Some(&state.step) {
+        if last != Some(state.step) {
             self.steps.insert(0, state.step);
         }
         // Not before the new checkpoint is on the disk.
@@ -213,34 +188,10 @@ impl RunDirectory {
             let path = self.path.join(names::checkpoint(old));
             (self.storage.remove(&path)).map_err(files::Error::of("remove", path))?;
         }
-        self.broken = false;
-        Ok(())
-    }
-
-    /// Accepts a later state than the last one, or the same.
-    fn check_follows(&self, state: &State) -> Result<(), Error> {
-        let Some(&last) = self.steps.first() else {
-            return Ok(());
-        };
-        let repeats = || checkpoint::read(&self.path, last).map(|(_, old)| old.is_same(state));
-        if state.step < last || state.step == last && !repeats()? {
-            return Err(state.refused(&format!(
-                "it does not follow the checkpoint of step {last}: commit later steps, or the same \
-                 state again"
-            )));
-        }
-        Ok(())
-    }
-
-    fn check_usable(&self) -> Result<(), Error> {
-        if self.broken {
-            return Err(Error::Broken(self.path.clone()));
-        }
         Ok(())
     }
 
     fn check_new(&self, name: &str) -> Result<(), Error> {
-        self.check_usable()?;
         names::check(name)?;
         if self.files.contains_key(name) {
             let reason = "the run has it already, and files are written once: choose another name";
@@ -259,7 +210,7 @@ impl RunDirectory {
         Ok(files::write_atomically_on(&*self.storage, path, write)?)
     }
 
-    pub(crate) fn store_timings(&self, timings: &Value) -> Result<(), Error> {
+    pub(crate) fn replace_timings(&self, timings: &Value) -> Result<(), Error> {
         let text = timings::encode(timings)?;
         self.store(names::TIMINGS, |out| out.write_all(text.as_bytes()))
     }
@@ -279,21 +230,17 @@ impl RunDirectory {
 /// Accepts a folder in which there is nothing but what a process leaves that is killed while it
 /// starts a run with these files.
 fn check_free(path: &Path, files: &Files) -> Result<(), Error> {
-    let occupied = |found: String| Error::Occupied {
-        path: path.into(),
-        found,
-    };
-    if !folder::steps(path)?.is_empty() {
-        return Err(occupied("a run".into()));
-    }
     let other = if path.join(names::LOCK).is_file() {
         let others = folder::others(path, files, &[])?;
         others.into_iter().find(|path| !folder::is_temporary(path))
     } else {
         folder::list(path)?.pop().map(|(path, _)| path)
     };
-    other.map_or(Ok(()), |other| {
-        let name = other.file_name().unwrap_or_default();
-        Err(occupied(name.display().to_string()))
-    })
+    match other {
+        None => Ok(()),
+        Some(other) => Err(Error::Occupied {
+            path: path.into(),
+            found: other.file_name().unwrap_or_default().display().to_string(),
+        }),
+    }
 }

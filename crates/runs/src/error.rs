@@ -54,9 +54,6 @@ pub enum Error {
     /// calling program, which changes nothing.
     #[error("{0}")]
     Invalid(String),
-    /// An earlier commit has failed, and nobody knows whether it is on the disk.
-    #[error("writing to the run in {} has failed before: open it again to go on", .0.display())]
-    Broken(PathBuf),
     /// The operating system refused.
     #[error(transparent)]
     Io(#[from] files::Error),
@@ -90,6 +87,7 @@ impl Error {
 
     /// A file that cannot be stored.
     pub(crate) fn file(name: &str, reason: &str) -> Self {
-        Self::Invalid(format!("{name:?} cannot be stored: {reason}"))
+        let shown = files::shortened(name, 600);
+        Self::Invalid(format!("{shown:?} cannot be stored: {reason}"))
     }
 }

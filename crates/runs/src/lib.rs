@@ -45,19 +45,17 @@
 //!
 //! # What is promised
 //!
-//! - A checkpoint is the commit. Other files are written and flushed before it and never overwritten,
-//!   so that it describes a whole state of the run whenever the process dies. What it does not list
-//!   was written after it; resuming removes that, and the computation writes it again.
+//! - A checkpoint is the commit. Other files are written and flushed before it, so that it describes
+//!   a whole state of the run whenever the process dies. What it does not list was written after it;
+//!   resuming removes that, and the computation writes it again.
 //! - A run that is a function of its [`State`] ends with the same bytes in every file but
-//!   `timings.json`, however often it was stopped. [`RunDirectory::finish`] keeps one checkpoint
-//!   only, because which other one there is depends on where it was stopped.
+//!   `timings.json`, however often it was stopped: only the last checkpoint stays.
 //! - A bit that has flipped in any of the files is noticed when the run is opened, and the file
 //!   named; in files that are replaced at any time, once the run is finished.
 //!   [`RunDirectory::recover`] goes on from the newest intact commit.
-//! - Readers never trust a number in a file before its length agrees. They take at most the length
-//!   of a checkpoint and as much again for the one before it is replaced, twenty times its list of
-//!   files (64 MiB at most), 160 times its notes (at most [`State::MAX_NOTES`]) or `timings.json` (at
-//!   most 1 MiB), and 64 KiB for anything else.
+//! - Readers never trust a number in a file before its length agrees. They take at most twice the
+//!   length of a checkpoint, twenty times its list of files (64 MiB at most), 160 times its notes (at
+//!   most [`State::MAX_NOTES`]) or `timings.json` (at most 4 MiB), and 64 KiB for anything else.
 //! - A failed write (full disk, read-only folder) leaves the last commit in place.
 
 mod cache;

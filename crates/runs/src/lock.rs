@@ -24,18 +24,19 @@ impl Drop for Lock {
 /// Locks a run directory.
 pub(crate) fn lock(storage: &dyn Storage, folder: &Path) -> Result<Lock, Error> {
     let path = folder.join(names::LOCK);
-    let made = match path.exists() {
-        true => None,
-        false => match storage.create_file(&path) {
+    let locked = || Error::Locked(folder.into());
+    let file = if path.symlink_metadata().is_ok() {
+        digest::open(&path)?
+    } else {
+        match storage.create_file(&path) {
             // Somebody else was faster.
-            Err(e) if e.kind() == AlreadyExists => None,
-            made => Some(made.map_err(files::Error::of("create", &path))?),
-        },
+            Err(e) if e.kind() == AlreadyExists => return Err(locked()),
+            made => made.map_err(files::Error::of("create", &path))?,
+        }
     };
-    let file = made.map_or_else(|| digest::open(&path), Ok)?;
     match file.try_lock() {
         Ok(()) => Ok(Lock(file)),
-        Err(TryLockError::WouldBlock) => Err(Error::Locked(folder.into())),
+        Err(TryLockError::WouldBlock) => Err(locked()),
         Err(TryLockError::Error(source)) => Err(files::Error::of("lock", path)(source).into()),
     }
 }

@@ -23,10 +23,10 @@ pub struct StoredRun {
     leftovers: Vec<PathBuf>,
 }
 
+#[expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 impl RunDirectory {
     /// Opens a run and checks every file of it; nothing is changed.
     ///
-    /// # Errors
     /// [`Error::NoRun`], [`Error::Locked`], [`Error::Version`], [`Error::Io`]; and
     /// [`Error::Damaged`] with the file, and the step from which [`RunDirectory::recover`] would go
     /// on.
@@ -35,9 +35,6 @@ impl RunDirectory {
     }
 
     /// [`RunDirectory::open`] on another storage than the disk itself.
-    ///
-    /// # Errors
-    /// As [`RunDirectory::open`].
     pub fn open_on(
         storage: Arc<dyn Storage>,
         path: impl Into<PathBuf>,
@@ -47,18 +44,13 @@ impl RunDirectory {
 
     /// Opens a damaged run at the newest commit all of whose files are intact: the last one if
     /// only the checkpoint before it or the timings are damaged, else the one before it. What
-    /// came later is given up when the run is resumed, and computed again to the same bits.
-    ///
-    /// # Errors
-    /// As [`RunDirectory::open`] if no commit is intact.
+    /// came later is given up when the run is resumed, and computed again to the same bits. As
+    /// [`RunDirectory::open`] if no commit is intact.
     pub fn recover(path: impl Into<PathBuf>) -> Result<StoredRun, Error> {
         Self::recover_on(Arc::new(Disk), path)
     }
 
     /// [`RunDirectory::recover`] on another storage than the disk itself.
-    ///
-    /// # Errors
-    /// As [`RunDirectory::recover`].
     pub fn recover_on(
         storage: Arc<dyn Storage>,
         path: impl Into<PathBuf>,
@@ -67,6 +59,7 @@ impl RunDirectory {
     }
 }
 
+#[expect(clippy::missing_errors_doc, reason = "all give Error::Io alone")]
 impl StoredRun {
     fn find(storage: Arc<dyn Storage>, path: PathBuf, recover: bool) -> Result<Self, Error> {
         // Before there is a lock file in somebody's folder.
@@ -99,7 +92,6 @@ impl StoredRun {
                 storage,
                 files: header.files,
                 steps,
-                broken: false,
                 _lock: lock,
             },
             state,
@@ -129,11 +121,7 @@ impl StoredRun {
         self.run.files.keys().map(String::as_str)
     }
 
-    /// The text of a file of the run.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] if it is none of the [files](StoredRun::files), [`Error::Damaged`],
-    /// [`Error::Io`].
+    /// The text of one of the [files](StoredRun::files) of the run; [`Error::Invalid`] if it is none.
     pub fn read_text(&self, name: &str) -> Result<String, Error> {
         if !self.run.files.contains_key(name) {
             return Err(Error::Invalid(format!("the run has no file {name:?}")));
@@ -156,9 +144,6 @@ impl StoredRun {
 
     /// Removes old checkpoints and temporary files, which are what a kill right after the last commit
     /// of a finished run leaves behind, and nothing else.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
     pub fn tidy(&self) -> Result<(), Error> {
         self.give_up_checkpoints()?;
         self.remove(folder::is_temporary)
@@ -166,9 +151,6 @@ impl StoredRun {
 
     /// Goes on with the run, also with a finished one: removes everything that is not part of the
     /// commit.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
     pub fn resume(mut self) -> Result<(RunDirectory, State), Error> {
         self.give_up_checkpoints()?;
         self.remove(|_| true)?;
@@ -184,7 +166,7 @@ impl StoredRun {
     /// removed.
     fn give_up_checkpoints(&self) -> Result<(), Error> {
         if self.recovered {
-            self.run.store_timings(&self.timings)?;
+            self.run.replace_timings(&self.timings)?;
         }
         let folder = self.run.path.join(names::CHECKPOINTS);
         self.remove(|path| path.starts_with(&folder))?;

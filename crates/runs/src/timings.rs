@@ -9,7 +9,7 @@ use crate::digest::{self, fingerprint};
 use crate::{Error, names};
 
 /// Longest file in bytes.
-const LONGEST: u64 = 1 << 20;
+const LONGEST: u64 = 4 << 20;
 
 /// The text of the file, if it can be read again.
 pub(crate) fn encode(timings: &Value) -> Result<String, Error> {

@@ -1,13 +1,24 @@
 //! Damage is noticed and named, and what does not belong together is refused.
 
-use std::fs;
+use std::fs::{self, File};
+use std::io;
 use std::path::Path;
+use std::sync::{Arc, Mutex};
 
-use crate::common::{
-    self, STEPS, contents, identity, quick_folder, run_to, uninterrupted, write_contents,
+use files::{Disk, Storage};
+
+use crate::toy::{
+    self, FILES, STEPS, contents, quick_folder, run_to, uninterrupted, write_contents,
 };
-use runs::{Checkpoint, Damage, Error, Identity, RunDirectory, State};
+use runs::{Error, RunDirectory, State};
 use serde_json::json;
+use sha2::{Digest, Sha256};
+
+/// A checkpoint with other content and the checksum that goes with it.
+pub fn rehashed(bytes: &[u8]) -> Vec<u8> {
+    let end = bytes.len().saturating_sub(32);
+    [&bytes[..end], Sha256::digest(&bytes[..end]).as_slice()].concat()
+}
 
 /// The name of the damaged file and the step of the fallback.
 fn damaged(folder: &Path) -> (String, Option<u64>) {
@@ -34,18 +45,23 @@ fn every_flipped_bit_is_noticed_and_its_file_named() {
         let run = folder.path().join("run");
         run_to(&run, stop).unwrap();
         // What came after the last commit is not part of the run.
-        drop(RunDirectory::open(&run).unwrap().resume(&identity()));
-        let files = common::all_contents(&run);
+        drop(RunDirectory::open(&run).unwrap().resume().unwrap());
+        let files = toy::all_contents(&run);
         assert!(files.len() > 10, "{:?}", files.keys());
-        let mut flips = 0;
-        for (name, bytes) in files.iter().filter(|(name, _)| *name != "lock") {
+        let (mut flips, mut expected) = (0, 0);
+        // What is replaced at any time is only checked at the end.
+        let unchecked = |name: &str| name == "lock" || name == "metrics.csv" && stop < STEPS;
+        let newest = files.keys().rfind(|name| name.starts_with("checkpoints/"));
+        let newest = newest.unwrap();
+        for (name, bytes) in files.iter().filter(|(name, _)| !unchecked(name)) {
             assert!(!bytes.is_empty(), "{name}");
             let path = run.join(name);
-            let mut random = common::Random(bytes.len() as u64);
+            let mut random = toy::Random(bytes.len() as u64);
             let some = (0..24).map(|_| random.below(8 * bytes.len() as u64) as usize);
             let ends = (0..8).chain(8 * bytes.len() - 8..8 * bytes.len());
             // These hold the other checksums, or their own: every byte.
-            let sealed = name == "index.json" || name == "timings.json";
+            let sealed = name.starts_with("checkpoints/") || name == "timings.json";
+            expected += 40 + if sealed { bytes.len() } else { 0 };
             let each = (0..bytes.len()).map(|i| 8 * i + i % 8).filter(|_| sealed);
             for bit in ends.chain(some).chain(each) {
                 let mut flipped = bytes.clone();
@@ -58,15 +74,16 @@ fn every_flipped_bit_is_noticed_and_its_file_named() {
                 fs::write(&path, &bytes[..shorter]).unwrap();
                 assert_eq!(damaged(&run).0, *name, "{shorter} bytes");
             }
-            if name != "metrics.csv" {
-                fs::write(&path, [bytes.as_slice(), b" "].concat()).unwrap();
-                assert_eq!(damaged(&run).0, *name, "one byte more");
-            }
+            fs::write(&path, [bytes.as_slice(), b" "].concat()).unwrap();
+            assert_eq!(damaged(&run).0, *name, "one byte more");
             fs::remove_file(&path).unwrap();
-            if name == "index.json" {
-                assert!(matches!(RunDirectory::open(&run), Err(Error::NoRun { .. })));
-            } else {
-                assert_eq!(damaged(&run).0, *name, "missing");
+            match RunDirectory::open(&run) {
+                // The commit before, or none.
+                Ok(stored) => {
+                    assert!(name.starts_with("checkpoints/") && stored.state().step < STEPS);
+                }
+                Err(Error::NoRun(_)) => assert!(name == newest && stop == STEPS),
+                Err(_) => assert_eq!(damaged(&run).0, *name, "missing"),
             }
             fs::create_dir(&path).unwrap();
             assert_eq!(damaged(&run).0, *name, "a folder");
@@ -86,8 +103,7 @@ fn every_flipped_bit_is_noticed_and_its_file_named() {
         fs::create_dir(run.join("lock")).unwrap();
         assert_eq!(damaged(&run).0, "lock");
         println!("{flips} flipped bits");
-        // 24 and the ends for each file, and the sealed ones whole.
-        assert!(flips > 40 * (files.len() - 1) + 2000, "{flips}");
+        assert_eq!(flips, expected);
     }
 }
 
@@ -97,23 +113,13 @@ fn recovery_ends_with_the_same_bytes() {
     let original = quick_folder();
     run_to(original.path().join("run").as_path(), 32).unwrap();
     // Commits at 27 and 30; the field of step 30 came between them.
-    let original = common::all_contents(&original.path().join("run"));
-    let rows: Vec<usize> = original["metrics.csv"]
-        .iter()
-        .enumerate()
-        .filter(|(_, b)| **b == b'\n')
-        .map(|(i, _)| i)
-        .collect();
+    let original = toy::all_contents(&original.path().join("run"));
     let cases = [
         ("checkpoints/step-00000030.ckpt", 200, Some(27)),
         ("checkpoints/step-00000027.ckpt", 200, Some(30)),
         ("fields/step-0030.raw", 5, Some(27)),
         ("fields/step-0020.raw", 5, None),
         ("timings.json", 90, Some(30)),
-        // In the rows 29 and 4.
-        ("metrics.csv", rows[28] + 2, Some(27)),
-        ("metrics.csv", rows[3] + 2, None),
-        ("index.json", 300, None),
         ("config.toml", 2, None),
     ];
     for (name, byte, fallback) in cases {
@@ -130,12 +136,12 @@ fn recovery_ends_with_the_same_bytes() {
             continue;
         };
         let stored = RunDirectory::recover(run).unwrap();
-        assert_eq!(stored.checkpoint().unwrap().state, common::state_at(step));
-        let resumed = stored.resume(&identity()).unwrap();
-        assert_eq!(resumed.run.committed_step(), step);
-        let gone = "checkpoints/step-00000030.ckpt";
-        assert_eq!(resumed.removed.contains(&run.join(gone)), step == 27);
-        assert!(resumed.removed_metrics > 0);
+        assert_eq!(*stored.state(), toy::state_at(step));
+        let gone = run.join("checkpoints/step-00000030.ckpt");
+        assert_eq!(stored.leftovers().any(|left| left == gone), step == 27);
+        let (resumed, state) = stored.resume().unwrap();
+        assert_eq!(state.step, step);
+        assert_eq!(gone.exists(), step == 30);
         drop(resumed);
         RunDirectory::open(run).unwrap();
         run_to(run, STEPS).unwrap();
@@ -154,67 +160,109 @@ fn what_a_killed_process_leaves_is_removed_and_told() {
         fs::write(run.join(name), "half").unwrap();
     }
     let stored = RunDirectory::open(&run).unwrap();
+    assert!(!stored.is_finished());
+    let files: Vec<_> = stored.files().collect();
+    let written = [
+        "fields/step-0010.raw",
+        "fields/step-0020.raw",
+        "fields/step-0030.raw",
+    ];
+    assert_eq!(files[0], "config.toml");
+    assert_eq!(files[1..4], written);
     assert_eq!(
-        stored.to_string(),
-        "logistic map at step 30, not finished, 6 files"
+        files[4..],
+        ["frames/first/a.png", "manifest.json", "metrics.csv"]
     );
-    assert_eq!(stored.config().unwrap(), "rate = 3.9\n");
-    assert_eq!(stored.manifest().unwrap()["steps"], STEPS);
+    assert_eq!(stored.read_text("config.toml").unwrap(), "rate = 3.9\n");
+    assert!(stored.read_text("lock").is_err());
+    // What is in a folder that goes is not listed.
     let listed: Vec<_> = stored.leftovers().map(Path::to_owned).collect();
-    let expected = ["extra", "extra/deep", left[0], left[1]].map(|name| run.join(name));
+    let expected = ["extra", left[0], left[1]].map(|name| run.join(name));
     assert_eq!(listed, expected);
-    // Another run leaves everything where it is.
-    let mut other = identity();
-    other.options = "none".into();
-    assert!(matches!(stored.resume(&other), Err(Error::Mismatch { .. })));
+    drop(stored);
     assert!(run.join("extra/deep").exists());
-    let resumed = RunDirectory::open(&run)
-        .unwrap()
-        .resume(&identity())
-        .unwrap();
-    assert_eq!(resumed.removed, expected);
-    // The rows of steps 31 and 32.
-    assert!(resumed.removed_metrics > 10);
-    assert!(!run.join("extra").exists());
+    drop(RunDirectory::open(&run).unwrap().resume().unwrap());
+    assert!(expected.iter().all(|path| !path.exists()));
 }
 
 #[test]
-fn what_was_made_with_something_else_is_refused_with_both_values() {
+fn only_checkpoints_and_temporary_files_are_tidied_away() {
     let folder = quick_folder();
     let run = folder.path().join("run");
-    run_to(&run, 5).unwrap();
-    let refusal = |change: &dyn Fn(&mut Identity)| {
-        let mut other = identity();
-        change(&mut other);
-        let stored = RunDirectory::open(&run).unwrap();
-        let checkpoint = stored.checkpoint().unwrap().identity.clone();
-        let of_checkpoint = checkpoint.require(&other, Path::new("step.ckpt"));
-        assert!(matches!(of_checkpoint, Err(Error::Mismatch { .. })));
-        let message = stored.resume(&other).unwrap_err().to_string();
-        assert!(!message.contains('\n'), "{message}");
-        message
+    run_to(&run, STEPS).unwrap();
+    let expected = toy::all_contents(&run);
+    let left = ["fields/.partial-Xy12", "checkpoints/step-00000057.ckpt"];
+    for name in left.iter().chain(&["fields/mine", "mine/.partial-x"]) {
+        fs::create_dir_all(run.join(name).parent().unwrap()).unwrap();
+        fs::write(run.join(name), "half").unwrap();
+    }
+    fs::create_dir(run.join(".partial-folder")).unwrap();
+    let stored = RunDirectory::open(&run).unwrap();
+    assert_eq!(stored.leftovers().count(), 5);
+    stored.tidy().unwrap();
+    stored.tidy().unwrap();
+    assert!(left.iter().all(|name| !run.join(name).exists()));
+    assert!(run.join(".partial-folder").exists());
+    assert!(run.join("fields/mine").exists() && run.join("mine/.partial-x").exists());
+    drop(stored.resume().unwrap());
+    assert!(toy::all_contents(&run) == expected);
+}
+
+#[test]
+fn a_finished_run_can_be_extended() {
+    let folder = quick_folder();
+    let run = folder.path().join("run");
+    let written = |run: &mut RunDirectory, text: &str| {
+        run.replace_file("metrics.csv", |out| out.write_all(text.as_bytes()))
+            .unwrap();
     };
-    let message = refusal(&|i| i.kind = "tent map".into());
-    assert!(message.contains("kind") && message.contains("\"logistic map\""));
-    assert!(message.contains("\"tent map\""), "{message}");
-    let message = refusal(&|i| i.grid.cells = vec![8, 8]);
-    assert!(message.contains("grid"), "{message}");
-    assert!(message.contains("[4, 4]") && message.contains("[8, 8]"));
-    let message = refusal(&|i| i.grid.side = 2.5);
-    assert!(message.contains("2.5"), "{message}");
-    let message = refusal(&|i| i.network.as_mut().unwrap().checksum = "5c".into());
-    let weights = runs::fingerprint("weights");
-    assert!(message.contains("network") && message.contains(&weights));
-    assert!(message.contains("5c"), "{message}");
-    let message = refusal(&|i| i.network = None);
-    assert!(message.contains("none now"), "{message}");
-    let message = refusal(&|i| i.options = "ab".into());
-    assert!(message.contains("options") && message.contains(&identity().options));
-    assert!(message.contains("fingerprint ab"), "{message}");
-    // The program alone is the caller's business.
-    let mut newer = identity();
-    newer.program = "toy 0.2".into();
-    RunDirectory::open(&run).unwrap().resume(&newer).unwrap();
+    let mut first = RunDirectory::create(&run, &FILES, &toy::state_at(0)).unwrap();
+    written(&mut first, "first");
+    first.finish(&toy::state_at(3)).unwrap();
+    fs::write(run.join("metrics.csv"), "changed").unwrap();
+    assert_eq!(damaged(&run), ("metrics.csv".to_owned(), None));
+    fs::write(run.join("metrics.csv"), "first").unwrap();
+
+    let (mut again, state) = RunDirectory::open(&run).unwrap().resume().unwrap();
+    assert_eq!(state, toy::state_at(3));
+    assert!(again.write_file("metrics.csv", |_| Ok(())).is_err());
+    again.commit(&toy::state_at(6)).unwrap();
+    drop(again);
+    fs::write(run.join("metrics.csv"), "half").unwrap();
+    let stored = RunDirectory::open(&run).unwrap();
+    assert!(!stored.is_finished());
+    assert_eq!(stored.read_text("metrics.csv").unwrap(), "half");
+    let (mut again, _) = stored.resume().unwrap();
+    written(&mut again, "second");
+    again.finish(&toy::state_at(9)).unwrap();
+    let stored = RunDirectory::open(&run).unwrap();
+    assert!(stored.is_finished() && stored.state().step == 9);
+    assert_eq!(fs::read_dir(run.join("checkpoints")).unwrap().count(), 1);
+}
+
+/// As it is kept for a moment by a process that is forked and has not yet become another program.
+#[derive(Debug, Default)]
+struct Copying(Mutex<Vec<File>>);
+
+impl Storage for Copying {
+    fn create_file(&self, path: &Path) -> io::Result<File> {
+        let file = Disk.create_file(path)?;
+        self.0.lock().unwrap().push(file.try_clone()?);
+        Ok(file)
+    }
+}
+
+#[test]
+fn a_lock_ends_though_others_hold_copies_of_its_file() {
+    let folder = quick_folder();
+    let run = folder.path().join("run");
+    let copies = Arc::new(Copying::default());
+    let first = RunDirectory::create_on(copies.clone(), &run, &[], &toy::state_at(0)).unwrap();
+    let refused = RunDirectory::open(&run).unwrap_err();
+    assert!(matches!(refused, Error::Locked(_)), "{refused}");
+    drop(first);
+    RunDirectory::open(&run).unwrap();
+    assert!(!copies.0.lock().unwrap().is_empty());
 }
 
 #[test]
@@ -224,43 +272,45 @@ fn other_versions_are_refused_with_both_values() {
     run_to(&run, 5).unwrap();
     let path = run.join("checkpoints/step-00000003.ckpt");
     let mut bytes = fs::read(&path).unwrap();
-    assert_eq!(&bytes[..12], b"\x8fckpt\r\n\x1a\x01\0\0\0");
-    bytes[8] = 7;
-    let error = Checkpoint::from_bytes(&bytes, &path).unwrap_err();
+    assert_eq!(&bytes[..12], b"\x8fckpt\r\n\x1a\x02\0\0\0");
+    for version in [1, 7] {
+        bytes[8] = version;
+        fs::write(&path, rehashed(&bytes)).unwrap();
+        let message = RunDirectory::open(&run).unwrap_err().to_string();
+        assert!(message.contains(&format!("version {version}")), "{message}");
+        assert!(message.contains("version 2") && message.contains("step-00000003"));
+    }
+    // Before its first checkpoint, a run of version 1 has this alone.
+    let old = folder.path().join("old");
+    fs::create_dir(&old).unwrap();
+    fs::write(old.join("index.json"), "{}").unwrap();
+    let error = RunDirectory::open(&old).unwrap_err();
+    assert!(matches!(error, Error::Version { found: 1, .. }), "{error}");
     let message = error.to_string();
-    assert!(message.contains("version 7") && message.contains("version 1"));
-    assert!(message.contains("step-00000003"), "{message}");
+    assert!(message.contains("index.json") && message.contains("finish the run"));
+    assert!(!old.join("lock").exists());
 }
 
 #[test]
 fn a_run_is_not_started_over_anything() {
-    let start = |path: &Path| RunDirectory::create(path, &identity(), &json!({}), "");
+    let start = |path: &Path| RunDirectory::create(path, &FILES, &toy::state_at(0));
     let folder = quick_folder();
     let run = folder.path().join("run");
     let first = start(&run).unwrap();
     let message = start(&run).unwrap_err().to_string();
-    assert!(message.contains("a run") && message.contains("resume it"));
-    assert!(matches!(
-        RunDirectory::open(&run),
-        Err(Error::Locked { .. })
-    ));
+    assert!(message.contains("a run") && message.contains("resume the run"));
+    assert!(matches!(RunDirectory::open(&run), Err(Error::Locked(_))));
     drop(first);
     let stored = RunDirectory::open(&run).unwrap();
-    assert!(matches!(
-        RunDirectory::open(&run),
-        Err(Error::Locked { .. })
-    ));
-    assert!(stored.checkpoint().is_none() && !stored.is_finished());
+    assert!(matches!(RunDirectory::open(&run), Err(Error::Locked(_))));
+    assert!(stored.state().step == 0 && !stored.is_finished());
 
     let other = folder.path().join("other");
     fs::create_dir(&other).unwrap();
-    assert!(matches!(
-        RunDirectory::open(&other),
-        Err(Error::NoRun { .. })
-    ));
+    assert!(matches!(RunDirectory::open(&other), Err(Error::NoRun(_))));
     fs::write(other.join("config.toml"), "mine").unwrap();
     let message = start(&other).unwrap_err().to_string();
-    assert!(message.contains("config.toml") && message.contains("empty folder"));
+    assert!(message.contains("config.toml") && message.contains("empty"));
     // Even where a process was killed at the start, only its own files are.
     fs::write(other.join("lock"), "").unwrap();
     fs::write(other.join("thesis.tex"), "mine").unwrap();
@@ -271,90 +321,73 @@ fn a_run_is_not_started_over_anything() {
 
 #[test]
 fn misuse_is_refused_and_changes_nothing() {
-    #[derive(serde::Serialize)]
-    struct Row {
-        a: f64,
-    }
-    #[derive(serde::Serialize)]
-    struct Other {
-        b: f64,
-    }
     let folder = quick_folder();
-    let mut run =
-        RunDirectory::create(folder.path().join("run"), &identity(), &json!({}), "").unwrap();
+    let path = folder.path().join("run");
+    let deep = (0..200).fold(json!(0), |inner, _| json!([inner]));
+    let refused = RunDirectory::create(&path, &[], &State::new(0, deep.clone()));
+    assert!(refused.unwrap_err().to_string().contains("deeply"));
+    let refused = RunDirectory::create(&path, &[("../a", "")], &toy::state_at(0));
+    assert!(matches!(refused, Err(Error::Invalid(_))));
+    assert!(!path.exists());
+    let mut run = RunDirectory::create(&path, &FILES, &State::new(0, json!(null))).unwrap();
     for name in [
         "", "/a", "a/", "../a", "a/../b", ".hidden", "a b", "a\\b", "ü",
     ] {
         let error = run.write_file(name, |_| Ok(())).unwrap_err();
-        assert!(matches!(error, Error::Name { .. }), "{name:?}");
+        assert!(matches!(error, Error::Invalid(_)), "{name:?}");
+        assert!(run.replace_file(name, |_| Ok(())).is_err());
     }
-    for name in ["index.json", "Lock", "metrics.csv", "checkpoints/a"] {
+    for name in ["timings.json", "Lock", "checkpoints/a"] {
         let message = run.write_file(name, |_| Ok(())).unwrap_err().to_string();
         assert!(message.contains("itself"), "{message}");
     }
-    assert!(matches!(
-        run.adopt_file("fields/absent"),
-        Err(Error::Damaged {
-            damage: Damage::Missing,
-            ..
-        })
-    ));
+    let absent = run.adopt_file("fields/absent").unwrap_err();
+    assert!(matches!(absent, Error::Damaged { .. }) && absent.to_string().contains("is missing"));
+    assert!(run.write_timings(&deep).is_err());
+    assert!(run.write_timings(&json!("x".repeat(1 << 20))).is_err());
     // A failing producer leaves the name free.
     let failed = run.write_file("a/b", |_| Err(std::io::Error::other("no")));
-    assert!(matches!(failed, Err(Error::Write(_))));
+    assert!(matches!(failed, Err(Error::Io(_))));
     run.write_file("a/b", |out| out.write_all(b"x")).unwrap();
     assert!(matches!(
         run.write_file("a/b", |_| Ok(())),
-        Err(Error::Exists { .. })
-    ));
-
-    run.metric(&Row { a: 1.5 }).unwrap();
-    let error = run.metric(&Other { b: 1.0 }).unwrap_err().to_string();
-    assert!(
-        error.contains("\"a\"") && error.contains("\"b\""),
-        "{error}"
-    );
-    assert!(matches!(
-        run.metric(&[1.0, 2.0]),
-        Err(Error::Columns { .. })
+        Err(Error::Invalid(_))
     ));
 
     let unusable = |state: &State, run: &mut RunDirectory, reason: &str| {
         let message = run.commit(state).unwrap_err().to_string();
         assert!(message.contains(reason), "{message}");
     };
-    unusable(&State::new(1, f64::NAN), &mut run, "finite");
-    let twice = State::new(1, 0.0)
-        .with_array("u", vec![])
-        .with_array("u", vec![]);
-    unusable(&twice, &mut run, "two arrays");
-    unusable(
-        &State::new(1, 0.0).with_array("", vec![]),
-        &mut run,
-        "no name",
-    );
-    let long = State::new(1, 0.0).with_notes("x".repeat(Checkpoint::MAX_HEADER));
+    let state = |step| State::new(step, json!(0.1 + 0.2));
+    unusable(&State::new(1, deep), &mut run, "deeply");
+    let twice = state(1).with_array("u", vec![]).with_array("u", vec![]);
+    unusable(&twice, &mut run, "different");
+    unusable(&state(1).with_array("", vec![]), &mut run, "names");
+    let long = State::new(1, json!("x".repeat(State::MAX_NOTES)));
     unusable(&long, &mut run, "1048576");
     // Bits, not numbers.
     let odd = vec![f64::NAN, -0.0, f64::NEG_INFINITY, f64::from_bits(1)];
-    let mut state = State::new(4, 0.1 + 0.2).with_array("odd", odd.clone());
-    run.commit(&state).unwrap();
-    run.commit(&state).unwrap();
-    state.time = 0.5;
-    unusable(&state, &mut run, "step 4");
-    unusable(&State::new(3, 0.0), &mut run, "step 3");
-    run.metric(&Row { a: 2.5 }).unwrap();
-    run.commit(&State::new(5, 0.5).with_array("odd", odd.clone()))
+    let fourth = state(4).with_array("odd", odd.clone());
+    run.commit(&fourth).unwrap();
+    run.commit(&fourth).unwrap();
+    unusable(&state(4), &mut run, "step 4");
+    unusable(
+        &state(4).with_array("odd", vec![0.0; 4]),
+        &mut run,
+        "step 4",
+    );
+    unusable(&State::new(4, json!(0)), &mut run, "step 4");
+    unusable(&state(3), &mut run, "step 3");
+    run.commit(&state(5).with_array("odd", odd.clone()))
         .unwrap();
     drop(run);
 
-    let stored = RunDirectory::open(folder.path().join("run")).unwrap();
-    assert_eq!(stored.files().last(), Some("a/b"));
-    let resumed = stored.resume(&identity()).unwrap();
-    let mut state = resumed.state.unwrap();
+    let stored = RunDirectory::open(&path).unwrap();
+    assert_eq!(stored.files().next(), Some("a/b"));
+    let (_, mut state) = stored.resume().unwrap();
     let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(state.array("odd").unwrap()), bits(&odd));
     assert_eq!(bits(&state.take_array("odd").unwrap()), bits(&odd));
     assert!(state.take_array("odd").is_err());
-    let metrics = fs::read(resumed.run.path().join("metrics.csv")).unwrap();
-    assert_eq!(metrics, b"a\n1.5\n2.5\n");
+    assert_eq!(state.notes, json!(0.1 + 0.2));
 }

@@ -7,9 +7,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::common::{
-    self, Random, STEPS, Toy, contents, identity, run_to, state_at, uninterrupted,
-};
+use crate::toy::{self, FILES, Random, STEPS, Toy, contents, run_to, state_at, uninterrupted};
 use files::Disk;
 use runs::{Error, Interrupt, RunDirectory};
 
@@ -17,17 +15,17 @@ use runs::{Error, Interrupt, RunDirectory};
 const FOLDER: &str = "RUNS_TEST_FOLDER";
 const PAUSE: &str = "RUNS_TEST_PAUSE";
 
-/// The process that the other tests start; of itself it does nothing.
 #[test]
+#[ignore = "the process that the other tests start"]
 fn process() {
     let Some(folder) = std::env::var_os(FOLDER).map(PathBuf::from) else {
-        return;
+        return; // not started by another test
     };
     let pause = std::env::var(PAUSE).unwrap().parse().unwrap();
     let interrupt = Interrupt::catch().unwrap();
     // Now signals are caught.
     std::fs::write(folder.with_extension("ready"), "").unwrap();
-    let result = common::run(
+    let result = toy::run(
         &folder,
         &Toy {
             storage: Arc::new(Disk),
@@ -54,7 +52,7 @@ fn start(folder: &Path, pause: u64, before: &str) -> Child {
     Command::new("sh")
         .args(["-c", &format!("{before} exec \"$0\" \"$@\"")])
         .arg(std::env::current_exe().unwrap())
-        .args(["--exact", "killed::process", "--nocapture"])
+        .args(["--ignored", "--exact", "killed::process", "--nocapture"])
         .env(FOLDER, folder)
         .env(PAUSE, pause.to_string())
         .stdout(Stdio::null())
@@ -94,6 +92,16 @@ fn await_end(child: &mut Child) -> ExitStatus {
 
 #[test]
 fn killed_at_random_moments_it_ends_with_the_same_bytes() {
+    killed_at_random_moments(3);
+}
+
+#[test]
+#[ignore = "long"]
+fn killed_at_many_moments_it_ends_with_the_same_bytes() {
+    killed_at_random_moments(40);
+}
+
+fn killed_at_random_moments(most: u64) {
     let expected = uninterrupted();
     let root = tempfile::tempdir().unwrap();
     let whole = root.path().join("whole");
@@ -104,7 +112,7 @@ fn killed_at_random_moments_it_ends_with_the_same_bytes() {
 
     let mut random = Random(20);
     let (mut kills, mut runs, mut leftovers) = (0, 0, 0);
-    while kills < 20 {
+    while kills < most {
         runs += 1;
         let folder = root.path().join(format!("run-{runs}"));
         loop {
@@ -115,8 +123,7 @@ fn killed_at_random_moments_it_ends_with_the_same_bytes() {
             let status = child.wait().unwrap();
             if let Ok(stored) = RunDirectory::open(&folder) {
                 leftovers += stored.leftovers().count();
-                let state = stored.checkpoint().map(|c| c.state.clone());
-                assert_eq!(state, state.as_ref().map(|s| state_at(s.step)));
+                assert_eq!(*stored.state(), state_at(stored.state().step));
             }
             match status.signal() {
                 Some(9) => kills += 1,
@@ -125,7 +132,7 @@ fn killed_at_random_moments_it_ends_with_the_same_bytes() {
             if status.success() {
                 break;
             }
-            if kills >= 20 {
+            if kills >= most {
                 run_to(&folder, STEPS).unwrap();
                 break;
             }
@@ -146,7 +153,7 @@ fn one_signal_commits_and_two_end_at_once() {
         signal(&child, name);
         assert_eq!(await_end(&mut child).code(), Some(130));
         let stored = RunDirectory::open(&folder).unwrap();
-        let step = stored.checkpoint().unwrap().state.step;
+        let step = stored.state().step;
         assert!(step < 50, "it went on to step {step}");
         drop(stored);
         run_to(&folder, STEPS).unwrap();
@@ -170,8 +177,8 @@ fn where_the_system_refuses_to_write_the_last_commit_stays() {
     let root = tempfile::tempdir().unwrap();
     let folder = root.path().join("run");
     let mut last = 0;
-    // Blocks of 512 bytes. The index is the longest file, and grows.
-    for blocks in [1, 4, 5] {
+    // Blocks of 512 bytes. The checkpoint is the longest file, and grows.
+    for blocks in [1, 3, 4] {
         let limit = format!("trap '' XFSZ; ulimit -f {blocks};");
         let output = start(&folder, 0, &limit).wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(1));
@@ -180,7 +187,7 @@ fn where_the_system_refuses_to_write_the_last_commit_stays() {
         assert!(message.starts_with("could not write"), "{message}");
         assert!(message.contains("File too large"), "{message}");
         if let Ok(stored) = RunDirectory::open(&folder) {
-            last = stored.checkpoint().map_or(0, |c| c.state.step);
+            last = stored.state().step;
         }
     }
     assert!(last > 0, "no run came far enough");
@@ -207,7 +214,7 @@ fn on_a_full_disk_the_last_commit_stays() {
         let process = Command::new("unshare")
             .args(["-rm", "sh", "-c", SCRIPT])
             .arg(std::env::current_exe().unwrap())
-            .args(["--exact", "killed::process", "--nocapture"])
+            .args(["--ignored", "--exact", "killed::process", "--nocapture"])
             .env("SIZE", format!("{size}k"))
             .env("DISK", &disk)
             .env("COPY", &copy)
@@ -233,8 +240,8 @@ fn on_a_full_disk_the_last_commit_stays() {
         assert!(message.starts_with("could not "), "{message}");
         assert!(message.contains("No space left"), "{message}");
         match RunDirectory::open(&run) {
-            Ok(stored) => steps.push(stored.checkpoint().map_or(0, |c| c.state.step)),
-            Err(error) => assert!(matches!(error, Error::NoRun { .. }), "{error}"),
+            Ok(stored) => steps.push(stored.state().step),
+            Err(error) => assert!(matches!(error, Error::NoRun(_)), "{error}"),
         }
         run_to(&run, STEPS).unwrap();
         assert!(contents(&run) == expected, "{size} KiB");
@@ -246,8 +253,7 @@ fn on_a_full_disk_the_last_commit_stays() {
 fn a_run_is_locked_against_other_processes() {
     let root = tempfile::tempdir().unwrap();
     let folder = root.path().join("run");
-    let manifest = serde_json::Value::Null;
-    let run = RunDirectory::create(&folder, &identity(), &manifest, "").unwrap();
+    let run = RunDirectory::create(&folder, &FILES, &state_at(0)).unwrap();
     let output = start(&folder, 0, "").wait_with_output().unwrap();
     let message = String::from_utf8(output.stderr).unwrap();
     assert!(message.contains("another process works on"), "{message}");

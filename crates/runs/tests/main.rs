@@ -1,7 +1,11 @@
-//! Run directories against faults, kills and damage.
+//! What run directories promise.
 
-mod common;
+mod cache;
 mod damage;
 mod faults;
-#[cfg(unix)]
+mod fuzzing;
 mod killed;
+mod toy;
+
+#[global_allocator]
+static ALLOCATOR: ::fuzzing::CountingAllocator = ::fuzzing::CountingAllocator;

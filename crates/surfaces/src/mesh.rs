@@ -3,6 +3,8 @@
 use std::collections::HashMap;
 
 use geometry::measure::BoundingBox;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 use crate::Error;
 
@@ -29,6 +31,17 @@ impl TriangleMesh {
             lower: std::array::from_fn(|i| bounds.lower[i].min(x[i])),
             upper: std::array::from_fn(|i| bounds.upper[i].max(x[i])),
         }))
+    }
+
+    /// Moves every vertex along its normal by a random length of up to `noise`, as a scanner errs. The normals are dropped: they are
+    /// no longer those of the surface. A mesh without normals stays as it is.
+    pub fn roughen(&mut self, noise: f64, seed: u64) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let normals = self.normals.take().unwrap_or_default();
+        for (x, normal) in self.vertices.iter_mut().zip(&normals) {
+            let length = noise * rng.random_range(-1.0..=1.0);
+            *x = std::array::from_fn(|i| length.mul_add(normal[i], x[i]));
+        }
     }
 
     /// Checks that all numbers are finite and at most `limit`, and all indices in range.

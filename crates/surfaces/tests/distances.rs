@@ -5,8 +5,9 @@
 use std::path::PathBuf;
 
 use crate::common::{Numbers, closed, cube, reversed, sphere, together, torus, translated};
-use geometry::{Field, Grid, Placement, SignedDistance, shapes};
-use surfaces::{ClosedMesh, MeshDistance, samples};
+use geometry::shapes::{self, Ball};
+use geometry::{Field, Grid, Placement, SignedDistance};
+use surfaces::{ClosedMesh, MeshDistance, mend_signs, samples};
 
 type Point = [f64; 3];
 
@@ -261,4 +262,23 @@ fn scanned_meshes_agree_with_brute_force() {
         let worst = compare(name, &mesh, 300);
         println!("{name}: 300 points, largest error {worst:.1e} of the longest side");
     }
+}
+
+#[test]
+fn wrong_signs_are_mended_and_right_ones_stay() {
+    let ball = Ball::new([0.0; 3], 0.3).unwrap();
+    let grid = Grid::<3>::centred(16, 1.0).unwrap();
+    let right = Field::from_fn(grid, |x| ball.signed_distance(x));
+    let mut mended = right.clone();
+    assert_eq!(mend_signs(&mut mended), 0);
+    assert_eq!(mended, right);
+    // A ray of wrong signs from the surface to the side of the box, and one to the centre.
+    let wrong = Field::from_fn(grid, |x| {
+        let s = ball.signed_distance(x);
+        let on_ray = x[1].abs() < 0.01 && x[2].abs() < 0.01 && x[0] > -0.01;
+        if on_ray && s.abs() > 0.05 { -s } else { s }
+    });
+    let mut mended = wrong.clone();
+    assert!(mend_signs(&mut mended) > 4);
+    assert_eq!(mended, right);
 }

@@ -5,9 +5,9 @@ use std::process::ExitCode;
 use clap::Parser;
 use engine::StepRule;
 use experiments::harness;
-use experiments::mesh_flow::{MeshFlow, MeshFlowOptions, Remarks};
+use experiments::mesh_flow::{MeshFlow, MeshFlowOptions};
 use experiments::meshes::ARMADILLO;
-use experiments::surfaces::View;
+use experiments::surfaces::{Remarks, View};
 use geometry::UpAxis;
 
 const ARMADILLO_FLOW: MeshFlow = MeshFlow {

@@ -6,34 +6,51 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use experiments::circles;
-use experiments::method::Method;
-use experiments::networks::checksum;
+use engine::{
+    Case, Flow, NamedNetwork, Operator, Record, Run, Scales, Scheme, StepRule, Stop, checksum,
+};
+use experiments::networks::{EPS, STEP};
 use experiments::options::RunOptions;
+use experiments::session::Session;
 use experiments::{Error, harness};
-use fem::{FiniteElementStep, LinearSolver};
+use fem::FiniteElementStep;
 use geometry::measure::zero_set_volume;
 use geometry::shapes::{Ball, Torus};
 use geometry::{Field, Grid, phase_field};
 use model::training::SphereData;
 use model::{Calibration, Network, displacement_errors, pretrained};
 use operators::ComputeDevice;
+use report::Summary;
 use report::{
-    Axis, Colour, Column, Figure, Format, LineChart, LineStyle, Marker, OutputDir, Series, Summary,
-    Table,
+    Axis, Colour, Figure, Format, LineChart, LineStyle, Marker, OutputDir, Progress, Series, Table,
 };
 use serde::Serialize;
-use solver::{Factors, FlowParams, NewtonParams};
+use serde_json::json;
+use solver::{Factors, NewtonParams};
 
 const PROGRAM: &str = "calibration";
-/// Interface width of the discs, as in the convergence tests.
-const EPS: f64 = circles::EPS;
-/// Inner time step of the discs.
-const STEP: f64 = circles::STEP;
-/// Time step of the measurement: the disc hardly moves, and its profile relaxes all the same.
-const TAU: f64 = STEP / 8.0;
-/// Distance of the interface to the box's boundary.
+
+/// Interface width and inner time step of the discs, as in the convergence tests.
+const DISC_SCALES: [f64; 2] = [EPS, STEP];
+const RADII: [f64; 7] = [0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6];
+const QUICK_RADII: [f64; 2] = [0.15, 0.3];
+/// Distance of a disc to the box's boundary.
 const MARGIN: f64 = 0.3;
+
+/// Interface width and inner time step of the surfaces, for `n = 64`.
+const SURFACE_SCALES: [f64; 2] = [1.0 / 32.0, 1.0 / 4096.0];
+const SURFACE_CELLS: usize = 64;
+/// Room for tori whose hole is some interface widths wide.
+const SURFACE_SIDE: f64 = 1.5;
+const BALLS: [f64; 3] = [0.2, 0.3, 0.34];
+/// Outer radii of the Clifford tori.
+const TORI: [f64; 3] = [0.40, 0.50, 0.60];
+
+/// The measurement's time step over the inner one: the interface hardly moves, and its profile relaxes all the same.
+const STEP_RATIO: f64 = 1.0 / 8.0;
+
+/// `eps/h` and `tautilde/h^2` of the finite-element steps of the experiments.
+const ELEMENTS: [[f64; 2]; 2] = [[2.0, 1.0], [4.0, 4.0]];
 
 /// Calibrates the shipped networks, or others, and the finite-element steps; compares the predicted Willmore energy of discs of
 /// either phase with the one that the scheme finds, and the energy of balls and Clifford tori with the exact one; draws what
@@ -53,20 +70,151 @@ struct Options {
     install: Option<PathBuf>,
 }
 
-#[derive(Serialize)]
-struct Parameters {
-    networks: BTreeMap<String, String>,
-    eps: f64,
-    inner_step: f64,
-    time_step: f64,
-    quick: bool,
+fn main() -> ExitCode {
+    let options = Options::parse();
+    harness::run(|| program(&options))
+}
+
+fn program(options: &Options) -> Result<(), Error> {
+    let run = &options.run;
+    let networks = options.networks()?;
+    let device = run.open_device()?;
+    let checksums = networks.iter().map(|(name, one)| (name, checksum(one)));
+    let [eps, inner_step] = DISC_SCALES;
+    let parameters = json!({
+        "networks": checksums.collect::<BTreeMap<_, _>>(),
+        "eps": eps,
+        "inner_step": inner_step,
+        "time_step": STEP_RATIO * inner_step,
+        "quick": run.quick,
+    });
+    let mut session = Session::open(PROGRAM, run, device.clone(), &parameters)?;
+    let install = (options.install.as_ref())
+        .map(OutputDir::create)
+        .transpose()?;
+    let manifest = &mut session.manifest;
+    let mut all = Vec::new();
+    for (name, network) in networks {
+        let calibration = manifest.phase(name.clone(), || network.calibrate())?;
+        let network = network.with_calibration(Some(calibration));
+        if let Some(install) = &install {
+            network.save(&install.path(&name)?)?;
+        }
+        all.push(Calibrated {
+            name,
+            network,
+            calibration,
+        });
+    }
+    let progress = &session.progress;
+    let discs = manifest.phase("discs", || discs(&all, run.quick, &device, progress))?;
+    let surfaces = manifest.phase("balls and tori", || surfaces(&all, run.quick, &device))?;
+    let diagnosed = manifest.phase("diagnostics", || diagnostics(&all, run.quick, &device))?;
+
+    session.figure(diagnostics_figure(&diagnosed), "diagnostics")?;
+    session.figure(discs_figure(&discs), "discs")?;
+    let output = &session.output;
+    output.write_json("diagnostics.json", &diagnosed)?;
+    output.write_json("discs.json", &discs)?;
+    output.write_csv("discs.csv", &discs)?;
+    output.write_csv("surfaces.csv", &surfaces)?;
+    let mut tables = Vec::new();
+    for (table, name) in [
+        (calibration_table(&all)?, "calibration"),
+        (discs_table(&discs)?, "discs_table"),
+        (surfaces_table(&surfaces)?, "surfaces_table"),
+    ] {
+        table.write(output, name)?;
+        tables.push(table.to_markdown());
+    }
+    let mut summary = Summary::new();
+    for one in &all {
+        let (key, calibration) = (one.key(), &one.calibration);
+        summary.insert_record(key, calibration)?;
+        summary.insert_record(key, &calibration.factors)?;
+    }
+    let title = "Calibration of the learned operators and of finite elements";
+    session.finish(title, summary, &tables.join("\n"))
+}
+
+impl Options {
+    /// File names and networks.
+    fn networks(&self) -> Result<Vec<(String, Network)>, Error> {
+        let mut networks = Vec::new();
+        for path in &self.network {
+            let network = Network::load(path)?;
+            networks.push((pretrained::file_name(network.ratios()), network));
+        }
+        if networks.is_empty() {
+            let shipped = [pretrained::all()?, pretrained::all_accurate()?].concat();
+            networks.extend(
+                shipped
+                    .into_iter()
+                    .map(|(name, one)| (name.to_owned(), one)),
+            );
+        }
+        if self.run.quick {
+            networks.truncate(1);
+        }
+        Ok(networks)
+    }
 }
 
 /// A network under its name.
+#[derive(Clone)]
 struct Calibrated {
     name: String,
     network: Network,
     calibration: Calibration,
+}
+
+impl Calibrated {
+    fn key(&self) -> &str {
+        self.name.trim_end_matches(".safetensors")
+    }
+
+    /// Cells per unit length at which the network has the scales of the convergence tests.
+    fn convergence_cells(&self) -> Option<usize> {
+        let ratios = self.network.ratios();
+        let [eps, step] = DISC_SCALES;
+        let n = (ratios.eps_over_h / eps).round();
+        let fits = ratios.dimension == 2 && (ratios.step_over_h2 - n * n * step).abs() < 1e-9;
+        fits.then_some(n as usize)
+    }
+}
+
+/// Willmore energy and phase field after one small step.
+fn relaxed<const D: usize>(
+    network: &Network,
+    initial: &Field<D>,
+    [eps, mcf_step]: [f64; 2],
+    calibration: Factors,
+    device: &ComputeDevice,
+) -> Result<(f64, Field<D>), Error> {
+    let network = NamedNetwork {
+        name: String::new(),
+        network: network.clone(),
+    };
+    let mut operator = Operator::learned(Scheme::Paper, network)?;
+    operator.factors = calibration;
+    let case = Case {
+        shape: "surface at rest".to_owned(),
+        initial: initial.clone(),
+        region: None,
+        flow: Flow::Willmore,
+        operator,
+        scales: Scales {
+            eps,
+            mcf_step,
+            newton: NewtonParams::default(),
+        },
+        steps: StepRule::Constant(STEP_RATIO * mcf_step).into(),
+        stops: vec![Stop::Steps(1)],
+        measures: Vec::new(),
+    };
+    let mut run = Run::new(case, device)?;
+    let energy = run.step()?.and_then(Record::willmore_energy);
+    Ok((energy.unwrap_or(f64::NAN), run.field().clone()))
 }
 
 /// The Willmore energy that the scheme sees in a disc.
@@ -85,173 +233,135 @@ struct DiscRow {
     calibrated: f64,
 }
 
-fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
-}
-
-fn program(options: &Options) -> Result<(), Error> {
-    let run = &options.run;
-    let mut networks = Vec::new();
-    if options.network.is_empty() {
-        for (name, network) in pretrained::all()?
-            .into_iter()
-            .chain(pretrained::all_accurate()?)
-        {
-            networks.push((name.to_owned(), network));
-        }
-    }
-    for path in &options.network {
-        let network = Network::load(path)?;
-        networks.push((pretrained::file_name(network.ratios()), network));
-    }
-    if run.quick {
-        networks.truncate(1);
-    }
-    let device = run.open_device()?;
-    let output = run.open_output(PROGRAM)?;
-    let install = (options.install.as_ref())
-        .map(OutputDir::create)
-        .transpose()?;
-    let parameters = Parameters {
-        networks: (networks.iter())
-            .map(|(name, network)| (name.clone(), checksum(network)))
-            .collect(),
-        eps: EPS,
-        inner_step: STEP,
-        time_step: TAU,
-        quick: run.quick,
-    };
-    let mut manifest = run.manifest(PROGRAM, &parameters, &device)?;
-    let mut all = Vec::new();
-    for (name, network) in networks {
-        let calibration = manifest.phase(name.clone(), || network.calibrate())?;
-        if let Some(install) = &install {
-            let network = network.clone().with_calibration(Some(calibration));
-            network.save(&install.path(&name)?)?;
-        }
-        all.push(Calibrated {
-            name,
-            network,
-            calibration,
-        });
-    }
-
-    let radii: &[f64] = if run.quick {
-        &[0.15, 0.3]
-    } else {
-        &[0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6]
-    };
-    let progress = run.progress();
-    let mut discs = Vec::new();
-    for one in &all {
+/// Discs of either phase by every network with the scales of the convergence tests up to `n = 256`, and by its odd part.
+fn discs(
+    all: &[Calibrated],
+    quick: bool,
+    device: &ComputeDevice,
+    progress: &Progress,
+) -> Result<Vec<DiscRow>, Error> {
+    let radii = if quick { &QUICK_RADII[..] } else { &RADII };
+    let mut variants = Vec::new();
+    for one in all {
         let Some(n) = one.convergence_cells().filter(|&n| n <= 256) else {
             continue;
         };
-        let bar = progress.bar(one.name.clone(), 4 * radii.len() as u64);
-        let is_odd = one.name.starts_with("accurate");
-        for odd_part in [false, true].into_iter().filter(|odd| !(is_odd && *odd)) {
-            let (network, calibration) = if odd_part {
-                let odd = one.network.odd_part();
-                let calibration = odd.calibrate()?;
-                (odd, calibration)
-            } else {
-                (one.network.clone(), one.calibration)
-            };
-            let tasks: Vec<(f64, i8)> = radii.iter().flat_map(|&r| [(r, 1), (r, -1)]).collect();
-            let order: Vec<usize> = (0..tasks.len()).rev().collect();
-            let rows = manifest.phase(format!("discs of {}", one.name), || {
-                harness::in_parallel(&order, harness::workers(&device), |i| {
-                    let (radius, phase) = tasks[i];
-                    let measured =
-                        disc_energy(&network, n, radius, phase, Factors::PAPER, &device)?;
-                    let calibrated =
-                        disc_energy(&network, n, radius, phase, calibration.factors, &device)?;
-                    bar.inc(1);
-                    let offset = calibration.spontaneous_curvature / EPS * f64::from(phase);
-                    let predicted = calibration.factors.energy * (1.0 - offset * radius).powi(2);
-                    Ok(DiscRow {
-                        network: one.name.clone(),
-                        odd_part,
-                        phase,
-                        radius,
-                        measured,
-                        predicted,
-                        calibrated,
-                    })
-                })
-            })?;
-            discs.extend(rows);
-        }
-        bar.finish();
-    }
-
-    let surfaces = manifest.phase("balls and tori", || {
-        surface_energies(&all, run.quick, &device)
-    })?;
-    let diagnosed = manifest.phase("diagnostics", || diagnostics(&all, run.quick, &device))?;
-    diagnostics_figure(run, &diagnosed).write(&output, "diagnostics")?;
-    output.write("diagnostics.json", report::data::to_json(&diagnosed)?)?;
-    output.write("surfaces.csv", report::data::to_csv(&surfaces)?)?;
-    let surfaces = surface_table(&surfaces)?;
-    surfaces.write(&output, "surfaces_table")?;
-    figure(run, &discs).write(&output, "discs")?;
-    output.write("discs.csv", report::data::to_csv(&discs)?)?;
-    output.write("discs.json", report::data::to_json(&discs)?)?;
-    let table = table(&all, &elements()?)?;
-    table.write(&output, "calibration")?;
-    let discs = disc_table(&discs)?;
-    discs.write(&output, "discs_table")?;
-    summary(&all)?.write(&output)?;
-    manifest.write(&output)?;
-    progress.clear();
-    run.say(&format!(
-        "{}\n{}\n{}\n{}\nResults are in {}",
-        run.title("Calibration of the learned operators and of finite elements"),
-        table.to_markdown(),
-        discs.to_markdown(),
-        surfaces.to_markdown(),
-        output.as_path().display()
-    ));
-    Ok(())
-}
-
-impl Calibrated {
-    /// Cells per unit length at which the network has the scales of the convergence tests.
-    fn convergence_cells(&self) -> Option<usize> {
-        let ratios = self.network.ratios();
-        let n = (ratios.eps_over_h / EPS).round();
-        let fits = ratios.dimension == 2 && (ratios.step_over_h2 - n * n * STEP).abs() < 1e-9;
-        fits.then_some(n as usize)
-    }
-}
-
-/// The finite-element steps at the ratios of the experiments.
-fn elements() -> Result<Vec<(String, Calibration)>, Error> {
-    let mut all = Vec::new();
-    for (eps_over_h, step_over_h2) in [(2.0, 1.0), (4.0, 4.0)] {
-        let grid = Grid::<2>::centred(16, 16.0)?;
-        for (name, step) in [
-            (
-                "implicit",
-                FiniteElementStep::implicit(&grid, eps_over_h, step_over_h2)?,
-            ),
-            (
-                "semi-implicit",
-                FiniteElementStep::semi_implicit(&grid, eps_over_h, step_over_h2)?,
-            ),
-        ] {
-            let name = format!("FE {name}, 2D, eps = {eps_over_h} h, step = {step_over_h2} h²");
-            all.push((name, step.calibrate()?));
+        variants.push((n, false, one.clone()));
+        if !one.name.starts_with("accurate") {
+            let network = one.network.odd_part();
+            let (name, calibration) = (one.name.clone(), network.calibrate()?);
+            variants.push((
+                n,
+                true,
+                Calibrated {
+                    name,
+                    network,
+                    calibration,
+                },
+            ));
         }
     }
-    let grid = Grid::<3>::centred(8, 8.0)?;
-    let step = FiniteElementStep::implicit(&grid, 2.0, 1.0)?;
-    all.push((
-        "FE implicit, 3D, eps = 2 h, step = 1 h²".to_owned(),
-        step.calibrate()?,
-    ));
-    Ok(all)
+    let mut tasks = Vec::new();
+    for variant in &variants {
+        for &radius in radii {
+            tasks.extend([1, -1].map(|phase| (variant, radius, phase)));
+        }
+    }
+    let order: Vec<usize> = (0..tasks.len()).rev().collect();
+    let bar = progress.bar("discs", tasks.len() as u64);
+    let rows = harness::in_parallel(&order, harness::workers(device), |i| {
+        let ((n, odd_part, one), radius, phase) = tasks[i];
+        let factors = one.calibration.factors;
+        let offset = one.calibration.spontaneous_curvature / EPS * f64::from(phase);
+        let energy = |factors| disc_energy(&one.network, *n, radius, phase, factors, device);
+        let row = DiscRow {
+            network: one.name.clone(),
+            odd_part: *odd_part,
+            phase,
+            radius,
+            measured: energy(Factors::PAPER)?,
+            predicted: factors.energy * (1.0 - offset * radius).powi(2),
+            calibrated: energy(factors)?,
+        };
+        bar.inc(1);
+        Ok(row)
+    });
+    bar.finish();
+    rows
+}
+
+/// Willmore energy of a relaxed disc over that of its zero level set, `pi / R`.
+fn disc_energy(
+    network: &Network,
+    n: usize,
+    radius: f64,
+    phase: i8,
+    calibration: Factors,
+    device: &ComputeDevice,
+) -> Result<f64, Error> {
+    let half = ((radius + MARGIN) * n as f64).ceil();
+    let grid = Grid::<2>::centred(2 * half as usize, 2.0 * half / n as f64)?;
+    let sign = f64::from(phase);
+    let disc = phase_field(grid, &Ball::new([0.0, 0.0], radius)?, DISC_SCALES[0])?;
+    let disc = disc.map(|u| sign * u);
+    let (energy, field) = relaxed(network, &disc, DISC_SCALES, calibration, device)?;
+    let inside = zero_set_volume(&field);
+    let area = if phase > 0 {
+        inside
+    } else {
+        grid.side().powi(2) - inside
+    };
+    Ok(energy * (area / PI).sqrt() / PI)
+}
+
+fn discs_table(discs: &[DiscRow]) -> report::Result<Table> {
+    let fixed = Format::Fixed(4);
+    Table::of(discs)
+        .text("network", |r| &r.network)
+        .text("F", |r| if r.odd_part { "odd part" } else { "whole" })
+        .number("phase", Format::Shortest, |r| f64::from(r.phase))
+        .number("R", Format::Shortest, |r| r.radius)
+        .number("w R/π", fixed, |r| r.measured)
+        .number("predicted", fixed, |r| r.predicted)
+        .number("calibrated w R/π", fixed, |r| r.calibrated)
+        .finish()
+}
+
+/// Measured and predicted energies over the radius; colour: phase.
+fn discs_figure(discs: &[DiscRow]) -> Figure {
+    let panel = |rows: &[DiscRow]| {
+        let part = if rows[0].odd_part {
+            "odd part of F"
+        } else {
+            "F"
+        };
+        let curve = |(phase, name): (i8, &str), label, value: fn(&DiscRow) -> f64| {
+            let rows = rows.iter().filter(|row| row.phase == phase);
+            let point = |row: &DiscRow| [row.radius, value(row)];
+            Series::of(format!("{name}: {label}"), rows, point).with_colour(usize::from(phase < 0))
+        };
+        let curves = |phase| {
+            let measured = curve(phase, "without calibration", |row| row.measured);
+            let calibrated = curve(phase, "calibrated", |row| row.calibrated);
+            [
+                measured.with_symbols(Marker::Circle),
+                curve(phase, "predicted", |row| row.predicted),
+                calibrated.with_symbols(Marker::Square),
+            ]
+        };
+        let exact = Series::new("exact", [[0.0, 1.0], [0.65, 1.0]])
+            .with_colour(Colour::Black)
+            .with_style(LineStyle::Dashed);
+        let title = format!("{}, {part}", rows[0].network);
+        LineChart::new(title, Axis::linear("radius R"), Axis::linear("w R/π"))
+            .with_curves(curves((1, "disc")))
+            .with_curves(curves((-1, "complement of a disc")))
+            .with_series(exact)
+    };
+    let same = |a: &DiscRow, b: &DiscRow| a.network == b.network && a.odd_part == b.odd_part;
+    Figure::new("Willmore energy of discs, w R/π", 2)
+        .with_panels(discs.chunk_by(same).map(panel))
+        .with_shared_legend()
 }
 
 /// The Willmore energy that the scheme sees in a surface whose energy is known.
@@ -265,22 +375,20 @@ struct SurfaceRow {
     calibrated: f64,
 }
 
-/// Balls and Clifford tori at `n = 64`, `eps = 2^-5`, after one small step.
-fn surface_energies(
+/// Balls and Clifford tori.
+fn surfaces(
     all: &[Calibrated],
     quick: bool,
     device: &ComputeDevice,
 ) -> Result<Vec<SurfaceRow>, Error> {
-    const CELLS: usize = 64;
-    let (eps, step) = (1.0 / 32.0, 1.0 / 4096.0);
-    // Room for tori whose hole is some interface widths wide.
-    let grid = Grid::<3>::per_unit(CELLS, 1.5)?;
+    let grid = Grid::<3>::per_unit(SURFACE_CELLS, SURFACE_SIDE)?;
+    let eps = SURFACE_SCALES[0];
     let mut shapes: Vec<(String, Field<3>, f64)> = Vec::new();
-    for radius in [0.2, 0.3, 0.34] {
+    for radius in BALLS {
         let ball = phase_field(grid, &Ball::new([0.0; 3], radius)?, eps)?;
         shapes.push((format!("ball, R = {radius}"), ball, 8.0 * PI));
     }
-    for outer in [0.40, 0.50, 0.60] {
+    for outer in TORI {
         let torus = phase_field(grid, &Torus::clifford(outer)?, eps)?;
         shapes.push((format!("Clifford torus, {outer:.2}"), torus, 4.0 * PI * PI));
     }
@@ -291,22 +399,8 @@ fn surface_energies(
     for one in all.iter().filter(|one| one.network.ratios().dimension == 3) {
         let network = one.network.odd_part();
         for (surface, initial, exact) in &shapes {
-            let energy = |calibration: Factors| -> Result<f64, Error> {
-                let params = FlowParams {
-                    eps,
-                    mcf_step: step,
-                    newton: NewtonParams::default(),
-                    calibration,
-                };
-                let linear = LinearSolver::default();
-                let mut flow = Method::Hybrid.willmore_flow(
-                    Some(&network),
-                    initial,
-                    params,
-                    linear,
-                    device,
-                )?;
-                Ok(flow.advance(step / 8.0)?.willmore_energy / exact)
+            let energy = |factors| -> Result<f64, Error> {
+                Ok(relaxed(&network, initial, SURFACE_SCALES, factors, device)?.0 / exact)
             };
             rows.push(SurfaceRow {
                 network: one.name.clone(),
@@ -319,23 +413,14 @@ fn surface_energies(
     Ok(rows)
 }
 
-fn surface_table(rows: &[SurfaceRow]) -> Result<Table, Error> {
-    let number = |name: &str| Column::number(name, Format::Fixed(4));
-    let mut table = Table::new([
-        Column::text("network"),
-        Column::text("surface"),
-        number("w / exact"),
-        number("calibrated w / exact"),
-    ]);
-    for row in rows {
-        table.push([
-            row.network.as_str().into(),
-            row.surface.as_str().into(),
-            row.measured.into(),
-            row.calibrated.into(),
-        ])?;
-    }
-    Ok(table)
+fn surfaces_table(rows: &[SurfaceRow]) -> report::Result<Table> {
+    let fixed = Format::Fixed(4);
+    Table::of(rows)
+        .text("network", |r| &r.network)
+        .text("surface", |r| &r.surface)
+        .number("w / exact", fixed, |r| r.measured)
+        .number("calibrated w / exact", fixed, |r| r.calibrated)
+        .finish()
 }
 
 /// What tells good networks from bad ones.
@@ -359,253 +444,104 @@ fn diagnostics(
     // Kernels of width 65 have a thousand planes; surfaces have millions of nodes.
     let small =
         |one: &&Calibrated| one.network.ratios().width < 65 && one.network.ratios().dimension == 2;
-    all.iter()
-        .filter(small)
-        .map(|one| {
-            let ratios = one.network.ratios();
-            let data = SphereData::new(ratios, one.network.provenance().reference_cells)?;
-            let mut displacement = Vec::new();
-            for i in 0..count {
-                let radius = 0.05 * (0.42_f64 / 0.05).powf(i as f64 / (count - 1) as f64);
-                let curvature = data.eps() / radius;
-                let errors = displacement_errors(&one.network, &data, radius, device)?;
-                displacement.push([curvature, errors[0]]);
-                displacement.push([-curvature, errors[1]]);
-            }
-            displacement.sort_by(|a, b| a[0].total_cmp(&b[0]));
-            let bend = (0..=400).map(|i| {
-                let w = f64::from(i) / 200.0 - 1.0;
-                [w, one.network.activation().jet(w)[2]]
-            });
-            Ok(Diagnostics {
-                network: one.name.trim_end_matches(".safetensors").to_owned(),
-                displacement,
-                spectrum: one.network.flat_spectrum()?,
-                bend: bend.collect(),
-            })
+    let diagnose = |one: &Calibrated| {
+        let cells = one.network.provenance().reference_cells;
+        let data = SphereData::new(one.network.ratios(), cells)?;
+        let mut displacement = Vec::new();
+        for i in 0..count {
+            let radius = 0.05 * (0.42_f64 / 0.05).powf(i as f64 / (count - 1) as f64);
+            let curvature = data.eps() / radius;
+            let errors = displacement_errors(&one.network, &data, radius, device)?;
+            displacement.push([curvature, errors[0]]);
+            displacement.push([-curvature, errors[1]]);
+        }
+        displacement.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let bend = (0..=400).map(|i| {
+            let w = f64::from(i) / 200.0 - 1.0;
+            [w, one.network.activation().jet(w)[2]]
+        });
+        Ok(Diagnostics {
+            network: one.key().to_owned(),
+            displacement,
+            spectrum: one.network.flat_spectrum()?,
+            bend: bend.collect(),
         })
-        .collect()
-}
-
-fn diagnostics_figure(run: &RunOptions, all: &[Diagnostics]) -> Figure {
-    let style = |one: &Diagnostics| {
-        if one.network.starts_with("accurate") {
-            LineStyle::Dashed
-        } else {
-            LineStyle::Solid
-        }
     };
-    let mut panels = [
-        LineChart::new(
-            "Error of one step of mean curvature flow",
-            Axis::linear("curvature ε κ (positive: disc)"),
-            Axis::linear("relative error of the displacement"),
-        ),
-        LineChart::new(
-            "Spectrum of the flat interface",
-            Axis::linear("number of the eigenvalue"),
-            Axis::linear("real part"),
-        ),
-        LineChart::new(
-            "Second derivative of F",
-            Axis::linear("w"),
-            Axis::linear("F''(w)"),
-        ),
-    ];
-    for (k, one) in all.iter().enumerate() {
-        let spectrum: Vec<[f64; 2]> = (one.spectrum.iter().take(40).enumerate())
-            .map(|(i, value)| [(i + 1) as f64, value[0]])
-            .collect();
-        let curves = [one.displacement.clone(), spectrum, one.bend.clone()];
-        panels = {
-            let mut curves = curves.into_iter();
-            panels.map(|panel| {
-                let points = curves.next().unwrap_or_default();
-                panel.with_series(
-                    Series::new(one.network.clone(), points)
-                        .with_colour(k % 8)
-                        .with_style(style(one)),
-                )
-            })
-        };
-    }
-    let mut figure = Figure::new(run.title("Diagnostics of the learned operators"), 2);
-    for panel in panels {
-        figure = figure.with_panel(panel);
-    }
-    figure.with_shared_legend()
+    all.iter().filter(small).map(diagnose).collect()
 }
 
-/// Willmore energy of a relaxed disc over that of its zero level set, `pi / R`.
-fn disc_energy(
-    network: &Network,
-    n: usize,
-    radius: f64,
-    phase: i8,
-    calibration: Factors,
-    device: &ComputeDevice,
-) -> Result<f64, Error> {
-    let half = ((radius + MARGIN) * n as f64).ceil();
-    let grid = Grid::<2>::centred(2 * half as usize, 2.0 * half / n as f64)?;
-    let sign = f64::from(phase);
-    let disc = phase_field(grid, &Ball::new([0.0, 0.0], radius)?, EPS)?;
-    let values = disc.values().iter().map(|u| sign * u).collect();
-    let disc = Field::from_values(grid, values)?;
-    let params = FlowParams {
-        eps: EPS,
-        mcf_step: STEP,
-        newton: NewtonParams::default(),
-        calibration,
-    };
-    let linear = LinearSolver::default();
-    let mut flow = Method::Hybrid.willmore_flow(Some(network), &disc, params, linear, device)?;
-    let record = flow.advance(TAU)?;
-    let field = flow.field()?;
-    let inside = zero_set_volume(&field);
-    let area = if phase > 0 {
-        inside
-    } else {
-        grid.side().powi(2) - inside
-    };
-    Ok(record.willmore_energy * (area / PI).sqrt() / PI)
-}
-
-fn table(all: &[Calibrated], elements: &[(String, Calibration)]) -> Result<Table, Error> {
-    let number = |name: &str| Column::number(name, Format::Fixed(4));
-    let small = |name: &str| Column::number(name, Format::Scientific(1));
-    let mut table = Table::new([
-        Column::text("network"),
-        number("c"),
-        number("m"),
-        number("c/m"),
-        number("displacement"),
-        number("cos² of ψ and w'"),
-        small("ε κ₀"),
-        small("eigenvalue - 1"),
-        small("spread over positions"),
-        small("spread over normals"),
-    ]);
-    let learned = all.iter().map(|one| (&one.name, &one.calibration));
-    for (name, c) in learned.chain(elements.iter().map(|(name, c)| (name, c))) {
-        table.push([
-            name.as_str().into(),
-            c.factors.energy.into(),
-            c.factors.metric.into(),
-            c.factors.speed().into(),
-            c.displacement.into(),
-            c.alignment.into(),
-            c.spontaneous_curvature.into(),
-            (c.eigenvalue - 1.0).into(),
-            c.position_spread.into(),
-            c.normal_spread.into(),
-        ])?;
-    }
-    Ok(table)
-}
-
-fn disc_table(discs: &[DiscRow]) -> Result<Table, Error> {
-    let number = |name: &str| Column::number(name, Format::Fixed(4));
-    let mut table = Table::new([
-        Column::text("network"),
-        Column::text("F"),
-        Column::number("phase", Format::Shortest),
-        Column::number("R", Format::Shortest),
-        number("w R/π"),
-        number("predicted"),
-        number("calibrated w R/π"),
-    ]);
-    for row in discs {
-        table.push([
-            row.network.as_str().into(),
-            if row.odd_part { "odd part" } else { "whole" }.into(),
-            f64::from(row.phase).into(),
-            row.radius.into(),
-            row.measured.into(),
-            row.predicted.into(),
-            row.calibrated.into(),
-        ])?;
-    }
-    Ok(table)
-}
-
-fn summary(all: &[Calibrated]) -> Result<Summary, Error> {
-    let mut summary = Summary::new();
-    for one in all {
-        let key = one.name.trim_end_matches(".safetensors");
-        let c = &one.calibration;
-        for (name, value) in [
-            ("energy", c.factors.energy),
-            ("metric", c.factors.metric),
-            ("spontaneous_curvature", c.spontaneous_curvature),
-            ("displacement", c.displacement),
-            ("alignment", c.alignment),
-            ("eigenvalue", c.eigenvalue),
-            ("position_spread", c.position_spread),
-            ("normal_spread", c.normal_spread),
-        ] {
-            summary.insert(&format!("{key}.{name}"), value)?;
-        }
-    }
-    Ok(summary)
-}
-
-/// Measured and predicted energies over the radius; colour: phase.
-fn figure(run: &RunOptions, discs: &[DiscRow]) -> Figure {
-    let mut panels: Vec<(&str, bool)> = Vec::new();
-    for row in discs {
-        if !panels.contains(&(&row.network[..], row.odd_part)) {
-            panels.push((&row.network, row.odd_part));
-        }
-    }
-    let mut figure = Figure::new(run.title("Willmore energy of discs, w R/π"), 2);
-    for (network, odd_part) in panels {
-        let title = if odd_part { "odd part of F" } else { "F" };
-        let mut chart = LineChart::new(
-            format!("{network}, {title}"),
-            Axis::linear("radius R"),
-            Axis::linear("w R/π"),
-        );
-        for (k, phase) in [1, -1].into_iter().enumerate() {
-            let points = |f: fn(&DiscRow) -> f64| -> Vec<[f64; 2]> {
-                let rows = discs.iter().filter(|row| {
-                    row.network == network && row.odd_part == odd_part && row.phase == phase
-                });
-                rows.map(|row| [row.radius, f(row)]).collect()
-            };
-            let name = if phase > 0 {
-                "disc"
+fn diagnostics_figure(all: &[Diagnostics]) -> Figure {
+    let chart = |title, x, y, points: fn(&Diagnostics) -> Vec<[f64; 2]>| {
+        let curves = all.iter().enumerate().map(|(k, one)| {
+            let accurate = one.network.starts_with("accurate");
+            let style = if accurate {
+                LineStyle::Dashed
             } else {
-                "complement of a disc"
+                LineStyle::Solid
             };
-            chart = chart
-                .with_series(
-                    Series::new(
-                        format!("{name}: without calibration"),
-                        points(|r| r.measured),
-                    )
-                    .with_colour(k)
-                    .with_style(LineStyle::None)
-                    .with_marker(Marker::Circle),
-                )
-                .with_series(
-                    Series::new(format!("{name}: predicted"), points(|r| r.predicted))
-                        .with_colour(k),
-                )
-                .with_series(
-                    Series::new(format!("{name}: calibrated"), points(|r| r.calibrated))
-                        .with_colour(k)
-                        .with_style(LineStyle::None)
-                        .with_marker(Marker::Square),
-                );
-        }
-        let ends = [0.0, 0.65].map(|r| [r, 1.0]).to_vec();
-        figure = figure.with_panel(
-            chart.with_series(
-                Series::new("exact", ends)
-                    .with_colour(Colour::Black)
-                    .with_style(LineStyle::Dashed),
-            ),
-        );
+            Series::new(one.network.clone(), points(one))
+                .with_colour(k % 8)
+                .with_style(style)
+        });
+        LineChart::new(title, Axis::linear(x), Axis::linear(y)).with_curves(curves)
+    };
+    let displacement = chart(
+        "Error of one step of mean curvature flow",
+        "curvature ε κ (positive: disc)",
+        "relative error of the displacement",
+        |one| one.displacement.clone(),
+    );
+    let spectrum = chart(
+        "Spectrum of the flat interface",
+        "number of the eigenvalue",
+        "real part",
+        |one| {
+            let first = one.spectrum.iter().take(40).enumerate();
+            first.map(|(i, value)| [(i + 1) as f64, value[0]]).collect()
+        },
+    );
+    let bend = chart("Second derivative of F", "w", "F''(w)", |one| {
+        one.bend.clone()
+    });
+    Figure::new("Diagnostics of the learned operators", 2)
+        .with_panels([displacement, spectrum, bend])
+        .with_shared_legend()
+}
+
+/// The finite-element steps of the experiments.
+fn elements() -> Result<Vec<(String, Calibration)>, Error> {
+    let (plane, space) = (Grid::<2>::centred(16, 16.0)?, Grid::<3>::centred(8, 8.0)?);
+    let mut all = Vec::new();
+    let mut add = |kind, dimension, [eps, step]: [f64; 2], calibration| {
+        let name = format!("FE {kind}, {dimension}D, eps = {eps} h, step = {step} h²");
+        all.push((name, calibration));
+    };
+    for ratios @ [eps, step] in ELEMENTS {
+        let implicit = FiniteElementStep::implicit(&plane, eps, step)?;
+        add("implicit", 2, ratios, implicit.calibrate()?);
+        let semi_implicit = FiniteElementStep::semi_implicit(&plane, eps, step)?;
+        add("semi-implicit", 2, ratios, semi_implicit.calibrate()?);
     }
-    figure.with_shared_legend()
+    let [eps, step] = ELEMENTS[0];
+    let implicit = FiniteElementStep::implicit(&space, eps, step)?;
+    add("implicit", 3, ELEMENTS[0], implicit.calibrate()?);
+    Ok(all)
+}
+
+fn calibration_table(all: &[Calibrated]) -> Result<Table, Error> {
+    let learned = all.iter().map(|one| (one.name.clone(), one.calibration));
+    let rows: Vec<(String, Calibration)> = learned.chain(elements()?).collect();
+    let (fixed, small) = (Format::Fixed(4), Format::Scientific(1));
+    let table = Table::of(&rows)
+        .text("network", |(name, _)| name)
+        .number("c", fixed, |(_, c)| c.factors.energy)
+        .number("m", fixed, |(_, c)| c.factors.metric)
+        .number("c/m", fixed, |(_, c)| c.factors.speed())
+        .number("displacement", fixed, |(_, c)| c.displacement)
+        .number("cos² of ψ and w'", fixed, |(_, c)| c.alignment)
+        .number("ε κ₀", small, |(_, c)| c.spontaneous_curvature)
+        .number("eigenvalue - 1", small, |(_, c)| c.eigenvalue - 1.0)
+        .number("spread over positions", small, |(_, c)| c.position_spread)
+        .number("spread over normals", small, |(_, c)| c.normal_spread);
+    Ok(table.finish()?)
 }

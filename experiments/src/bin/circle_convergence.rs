@@ -65,9 +65,10 @@ fn main() -> ExitCode {
 
 fn program(options: &Options) -> Result<(), Error> {
     let run = &options.study.run;
-    let (all, steps) = match run.quick {
-        true => (4, 8),
-        false => (circles::COUNT, circles::STEPS),
+    let (all, steps) = if run.quick {
+        (4, 8)
+    } else {
+        (circles::COUNT, circles::STEPS)
     };
     let count = options.circles.unwrap_or(all);
     if !(1..=circles::COUNT).contains(&count) {
@@ -78,9 +79,10 @@ fn program(options: &Options) -> Result<(), Error> {
         return Err(Error::Options(message));
     }
     let (variants, device) = (options.variants(), run.open_device()?);
-    let study = match options.retrain {
-        true => Study::new(&retrained(options, &variants, &device)?, &variants)?,
-        false => Study::new(&options.study.networks, &variants)?,
+    let study = if options.retrain {
+        Study::new(&retrained(options, &variants, &device)?, &variants)?
+    } else {
+        Study::new(&options.study.networks, &variants)?
     };
     let parameters = json!({
         "cells": study.cells,

@@ -3,26 +3,24 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use engine::{Method, Operator, Scheme, StepRule, checksum};
+use engine::{Method, Scheme, StepRule};
+use experiments::options::FigureOptions;
 use experiments::session::Session;
-use experiments::surfaces::{
-    self, Flowed, SchemeOptions, Surface, SurfaceOptions, View, centred_box, needed_network, scales,
-};
+use experiments::surfaces::{Flowed, Remarks, SchemeOptions, Setting, Surface, SurfaceFlows, View};
 use experiments::{Error, harness};
 use geometry::shapes::{Cuboid, Cylinder};
-use geometry::{Field, SignedDistanceExt, UpAxis, phase_field};
+use geometry::{SignedDistanceExt, UpAxis, phase_field};
 use serde_json::json;
 
 const PROGRAM: &str = "disk_and_cube";
-const TITLE: &str = "Willmore flow of a cube and of a thick disk";
 /// Cells per unit length of a quick run and of the paper.
 const CELLS: [usize; 2] = [24, 64];
 /// Size of a time step.
 const TAU: f64 = 1.0 / 262_144.0;
 const STEPS: usize = 100;
 /// The Willmore energies that the paper reports for the hybrid scheme.
-const CUBES: [(usize, f64); 3] = [(0, 132.65), (1, 52.26), (STEPS, 25.78)];
-const DISKS: [(usize, f64); 3] = [(0, 87.15), (1, 50.49), (STEPS, 25.59)];
+const CUBE: [(usize, f64); 3] = [(0, 132.65), (1, 52.26), (STEPS, 25.78)];
+const DISK: [(usize, f64); 3] = [(0, 87.15), (1, 50.49), (STEPS, 25.59)];
 const VIEW: View = View {
     up: UpAxis::Z,
     azimuth: 30.0,
@@ -37,7 +35,7 @@ const VIEW: View = View {
 #[command(name = PROGRAM, version)]
 struct Options {
     #[command(flatten)]
-    surface: SurfaceOptions,
+    figure: FigureOptions,
 
     /// Number of time steps [default: 100]
     #[arg(long, value_name = "COUNT")]
@@ -82,101 +80,76 @@ fn main() -> ExitCode {
 }
 
 fn program(options: &Options) -> Result<(), Error> {
-    let Options {
-        cube_half_side,
-        disk_radius,
-        disk_half_height,
-        ..
-    } = *options;
-    let run = &options.surface.run;
-    let n = options.surface.cells(CELLS);
-    let steps = options.steps.unwrap_or(if run.quick { 2 } else { STEPS });
-    if steps == 0 || options.methods.is_empty() {
+    let (half, radius, half_height) = (
+        options.cube_half_side,
+        options.disk_radius,
+        options.disk_half_height,
+    );
+    let run = &options.figure.run;
+    let steps = (options.steps).unwrap_or(if run.quick { 2 } else { STEPS });
+    let variants = options.variants();
+    if steps == 0 || variants.is_empty() {
         return Err(Error::Options(
             "--steps must be at least 1, and --methods must name a method".to_owned(),
         ));
     }
     let device = run.open_device()?;
-    let networks = options.surface.networks()?;
-    let network = networks.find(Scheme::Paper, &needed_network())?.network;
-    let (grid, scales) = (centred_box(n, 1.0)?, scales(n));
-    let cube = Cuboid::new([cube_half_side; 3])?.translated([0.5; 3]);
-    let disk = Cylinder::new(disk_radius, disk_half_height)?.translated([0.5; 3]);
-    let solids: [(_, _, Field<3>, _); 2] = [
-        ("cube", "cube", phase_field(grid, &cube, scales.eps)?, CUBES),
+    let setting = Setting::new(&options.figure, CELLS, 1.0)?;
+    let (grid, eps) = (setting.grid, setting.scales.eps);
+    let cube = Cuboid::new([half; 3])?.translated([0.5; 3]);
+    let disk = Cylinder::new(radius, half_height)?.translated([0.5; 3]);
+    let surfaces = vec![
         (
-            "disk",
-            "thick disk",
-            phase_field(grid, &disk, scales.eps)?,
-            DISKS,
+            surface("cube", "cube", CUBE),
+            phase_field(grid, &cube, eps)?,
+        ),
+        (
+            surface("disk", "thick disk", DISK),
+            phase_field(grid, &disk, eps)?,
         ),
     ];
-    let variants = options.variants();
-    let parameters = json!({
-        "n": n, "eps": scales.eps, "mcf_step": scales.mcf_step, "tau": TAU, "steps": steps, "variants": variants,
-        "cube_half_side": cube_half_side, "disk_radius": disk_radius, "disk_half_height": disk_half_height,
-        "network": checksum(&network), "quick": run.quick,
-    });
-    let mut session = Session::open(PROGRAM, run, device, &parameters)?;
-    let mut all = Vec::new();
-    for (key, title, initial, papers) in &solids {
-        for &(method, scheme) in &variants {
-            let needed = needed_network();
-            let networks = networks.of(scheme);
-            let operator = Operator::new((method, scheme), &networks, &needed, &grid, &scales)?;
-            let comparable = (method, scheme) == (Method::Hybrid, Scheme::Paper);
-            let time = (StepRule::Constant(TAU), steps);
-            let surface = Surface {
-                key,
-                title: (*title).to_owned(),
-                case: surfaces::willmore_flow(title, initial.clone(), operator, scales, time),
-                shown: papers
-                    .map(|(step, w)| (step, comparable.then_some(w)))
-                    .to_vec(),
-                view: VIEW,
-            };
-            all.push(surface.flow(&mut session)?);
-        }
-    }
-    compare_with_finite_elements(&mut all)?;
-    let note = format!(
-        "n = {n}, ε = 2/n, inner step 1/n², τ = 2⁻¹⁸. w: Willmore energy with the implicit finite-element step; a sphere has 8π = 25.13."
-    );
-    let table = surfaces::write(&mut session, TITLE, note, &all)?;
-    session.finish(TITLE, surfaces::summary(&all)?, &table)
+    let parameters = setting.parameters(json!({
+        "tau": TAU, "steps": steps, "variants": variants, "cube_half_side": half, "disk_radius": radius,
+        "disk_half_height": half_height, "quick": run.quick,
+    }))?;
+    let session = Session::open(PROGRAM, run, device, &parameters)?;
+    let flows = SurfaceFlows {
+        program: PROGRAM,
+        title: "Willmore flow of a cube and of a thick disk".to_owned(),
+        surfaces,
+        variants,
+        time: (StepRule::Constant(TAU), steps),
+        tau_in_words: "τ = 2⁻¹⁸",
+    };
+    flows.run(session, &setting, |_, all| {
+        compare_with_finite_elements(all)
+    })
 }
 
-/// Adds the L2 distances between the learned operators and the finite elements, where both ran, to captions and metrics.
-fn compare_with_finite_elements(all: &mut [Flowed]) -> Result<(), Error> {
+fn surface(key: &'static str, title: &str, energies: [(usize, f64); 3]) -> Surface {
+    Surface {
+        key,
+        title: title.to_owned(),
+        shown: energies.map(|(step, w)| (step, Some(w))).to_vec(),
+        view: VIEW,
+    }
+}
+
+/// Adds the L2 distances of the learned operators to the finite elements, where both ran, to captions and metrics.
+fn compare_with_finite_elements(all: &mut [Flowed]) -> Result<Remarks, Error> {
     let method = |one: &Flowed| one.trajectory.case.operator.method;
-    for k in 0..all.len() {
-        let is_partner =
-            |one: &&Flowed| one.surface == all[k].surface && method(one) == Method::FeImplicit;
-        let Some(elements) = all
-            .iter()
-            .find(is_partner)
-            .filter(|_| method(&all[k]).is_learned())
-        else {
+    let (elements, mut others): (Vec<_>, Vec<_>) =
+        (all.iter_mut()).partition(|one| method(one) == Method::FeImplicit);
+    for one in others.iter_mut().filter(|one| method(one).is_learned()) {
+        let Some(elements) = elements.iter().find(|e| e.surface.key == one.surface.key) else {
             continue;
         };
-        let shown = all[k].snapshots.iter().map(|shown| shown.step).enumerate();
-        let distance = |(shown, step)| {
-            Ok((
-                shown,
-                step,
-                all[k]
-                    .trajectory
-                    .distance(step, &elements.trajectory, step)?,
-            ))
-        };
-        let distances = shown
-            .filter(|(_, step)| *step > 0)
-            .map(distance)
-            .collect::<Result<Vec<_>, Error>>()?;
-        for (shown, step, l2) in distances {
-            all[k].snapshots[shown].caption += &format!("\nL² distance to FE {l2:.4}");
-            all[k].metrics.push((format!("l2_to_fe.step{step}"), l2));
+        for shown in one.snapshots.iter_mut().filter(|shown| shown.step > 0) {
+            let step = shown.step;
+            let l2 = one.trajectory.distance(step, &elements.trajectory, step)?;
+            shown.caption = format!("{}\nL² distance to FE {l2:.4}", shown.caption);
+            one.metrics.push((format!("l2_to_fe.step{step}"), l2));
         }
     }
-    Ok(())
+    Ok(Remarks::default())
 }

@@ -3,8 +3,8 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use engine::{NeededNetwork, Scales, StepRule};
-use experiments::inpainting::{self, Inpainted, InpaintingOptions, Shape, Window};
+use engine::{NeededNetwork, Operator, Scales, StepRule};
+use experiments::inpainting::{self, Inpainted, InpaintingOptions, Shape};
 use experiments::session::Session;
 use experiments::{Error, harness};
 use geometry::contour::{Interpolation, zero_level};
@@ -29,12 +29,12 @@ const INSIDE: &[u32] = &[12, 9, 6, 3];
 const RADIUS: f64 = 0.35;
 /// The cut-out corner: everything right of and above this.
 const CORNER: f64 = 0.12;
-/// The region of the disk reaches from here to the corner of the box.
+/// The region of the disk along both axes: to the corner of the box.
 const DISK_REGION: [f64; 2] = [0.08, 0.42];
 /// Half length and half width of the arms of the cross.
 const CROSS: [f64; 2] = [0.4, 0.1];
-/// Half side of the region of the cross.
-const CROSS_REGION: f64 = 0.22;
+/// The region of the cross along both axes.
+const CROSS_REGION: [f64; 2] = [-0.22, 0.22];
 const GREEN: Rgb = Rgb(0, 140, 60);
 
 /// Inpainting: a disk whose corner was cut out grows round again (tau = 2^-7), the middle of a cross is smoothed (tau = 2^-14). Only
@@ -66,17 +66,15 @@ fn shapes(options: &Options) -> Result<Vec<Shape<2>>, Error> {
     let disk = Ball::new([0.0; 2], RADIUS)?;
     let corner = Cuboid::new([0.5 * (0.5 - CORNER); 2])?.translated([0.5 * (CORNER + 0.5); 2]);
     let [length, width] = CROSS;
-    let steps = |papers: usize| if options.common.run.quick { 5 } else { papers };
+    let quick = options.common.figure.run.quick;
+    let steps = |papers: usize| if quick { 5 } else { papers };
     let shapes = [
         Shape {
             key: "disk",
             title: "disk with a cut-out corner",
             initial: Box::new(disk.difference(corner)),
             whole: Some(Box::new(disk)),
-            region: Window {
-                low: [DISK_REGION[0]; 2],
-                high: [DISK_REGION[1]; 2],
-            },
+            region: DISK_REGION,
             rule: StepRule::Constant(1.0 / 128.0),
             steps: steps(options.disk_steps.unwrap_or(2000)),
             shown: vec![0, 1, 100, 500, 1000, 1500, 2000],
@@ -87,10 +85,7 @@ fn shapes(options: &Options) -> Result<Vec<Shape<2>>, Error> {
             title: "cross",
             initial: Box::new(Cross::new(length, width)?),
             whole: None,
-            region: Window {
-                low: [-CROSS_REGION; 2],
-                high: [CROSS_REGION; 2],
-            },
+            region: CROSS_REGION,
             rule: StepRule::Constant(1.0 / 16384.0),
             steps: steps(50),
             shown: vec![0, 1, 5, 10, 20, 35, 50],
@@ -107,8 +102,8 @@ fn main() -> ExitCode {
 }
 
 fn program(options: &Options) -> Result<(), Error> {
-    let run = &options.common.run;
-    let n = options.common.cells(CELLS);
+    let run = &options.common.figure.run;
+    let n = options.common.figure.cells(CELLS);
     let grid = Grid::<2>::per_unit(n, 1.0)?.with_origin([-0.5; 2])?;
     let mut scales = Scales::of_grid(1.0 / n as f64, EPS_OVER_H);
     // Steps are large here, tau/tautilde^2 up to 2^29: in single precision products would lose the slow modes of the Hessian.
@@ -122,7 +117,9 @@ fn program(options: &Options) -> Result<(), Error> {
     let ratios = Ratios::of_run(2, WIDTH, 1.0 / n as f64, scales.eps, scales.mcf_step);
     ratios.validate()?;
     let device = run.open_device()?;
-    let operator = options.common.operator(&NeededNetwork::exactly(ratios))?;
+    let (scheme, needed) = (options.common.scheme, NeededNetwork::exactly(ratios));
+    let networks = options.common.figure.networks.load(&[needed])?;
+    let operator = Operator::learned(scheme, networks.find(scheme, &needed)?)?;
     let shapes = shapes(options)?;
     if shapes.iter().any(|shape| shape.steps == 0) {
         return Err(Error::Options("--disk-steps must be at least 1".to_owned()));
@@ -165,9 +162,8 @@ fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure, Error> {
     let end = one.still_from().map_or(String::new(), |still| {
         format!(" The shape stands still after {still:.3} steps.")
     });
-    let panels = shown
-        .into_iter()
-        .map(|(name, field)| panel(name, &field, one.shape.region));
+    let shown = shown.into_iter();
+    let panels = shown.map(|(name, field)| panel(name, &field, one.shape.region));
     Ok(Figure::new("", 4).with_panels(panels).with_note(format!(
         "n = {n}, τ = 2^{}; only the values inside the green frame move. The first step is made in {} parts.{end}",
         tau.log2(),
@@ -175,16 +171,13 @@ fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure, Error> {
     )))
 }
 
-fn panel(name: String, field: &Field<2>, region: Window<2>) -> Shapes {
+fn panel(name: String, field: &Field<2>, [low, high]: [f64; 2]) -> Shapes {
     let curves = zero_level(field, Interpolation::Profile);
     let loops: Vec<Vec<[f64; 2]>> = curves.into_iter().map(|curve| curve.points).collect();
-    let Window {
-        low: [x0, y0],
-        high: [x1, y1],
-    } = region;
-    let frame = Curve::new(vec![vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]]]);
+    let frame = vec![[low, low], [high, low], [high, high], [low, high]];
+    let frame = Curve::new(vec![frame]).with_colour(Colour::Custom(GREEN));
     Shapes::new(name)
         .with_curve(Curve::new(loops).filled(Colour::LightGrey))
-        .with_curve(frame.with_colour(Colour::Custom(GREEN)).with_width(1.6))
+        .with_curve(frame.with_width(1.6))
         .with_window([-0.5, 0.5], [-0.5, 0.5])
 }

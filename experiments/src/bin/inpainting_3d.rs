@@ -3,10 +3,10 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use engine::StepRule;
-use experiments::inpainting::{self, Inpainted, InpaintingOptions, Shape, Window};
+use engine::{Method, StepRule};
+use experiments::inpainting::{self, Inpainted, InpaintingOptions, Shape};
 use experiments::session::Session;
-use experiments::surfaces::{Snapshot, Surface, View, centred_box, needed_network, scales, table};
+use experiments::surfaces::{Setting, Snapshot, Surface, View, table};
 use experiments::{Error, harness};
 use geometry::shapes::{Ball, Cuboid, Cylinder};
 use geometry::{SignedDistance, SignedDistanceExt, UpAxis};
@@ -25,12 +25,12 @@ const CENTRE: f64 = 0.5;
 const RADIUS: f64 = 0.34;
 /// The cut-out corner: everything beyond this along all three axes, from the middle.
 const CORNER: f64 = 0.05;
-/// The region of the ball, from the middle along all three axes.
-const BALL_REGION: [f64; 2] = [0.0, 0.39];
+/// The region of the ball along all three axes.
+const BALL_REGION: [f64; 2] = [CENTRE, CENTRE + 0.39];
 /// Radius of the tubes, and where they end.
 const TUBE: [f64; 2] = [0.11, 0.42];
-/// Half side of the region of the tubes.
-const TUBES_REGION: f64 = 0.24;
+/// The region of the tubes along all three axes.
+const TUBES_REGION: [f64; 2] = [CENTRE - 0.24, CENTRE + 0.24];
 /// Radius of the edges of the region in the pictures.
 const EDGE: f64 = 0.003;
 /// Side of a picture in pixels.
@@ -61,7 +61,7 @@ struct Options {
     only: Option<String>,
 }
 
-/// The shapes with the azimuths from which they are looked at.
+/// The shapes with the azimuths from which they are looked at. The last step shown is one on the way to the end.
 fn shapes(options: &Options) -> Result<Vec<(Shape<3>, f64)>, Error> {
     let ball = Ball::new([0.0; 3], RADIUS)?;
     let half = 0.5 * (0.5 - CORNER);
@@ -73,53 +73,39 @@ fn shapes(options: &Options) -> Result<Vec<(Shape<3>, f64)>, Error> {
         let pairs = [[x, y, z], [y, z, x], [z, x, y]].map(|x| pair.signed_distance(x));
         pairs.into_iter().fold(f64::INFINITY, f64::min)
     };
-    let shape = |key, title, initial, whole, [low, high]: [f64; 2], papers: [usize; 4]| Shape {
-        key,
-        title,
-        initial,
-        whole,
-        region: Window {
-            low: [CENTRE + low; 3],
-            high: [CENTRE + high; 3],
-        },
-        rule: StepRule::Growing {
-            tau: TAU,
-            alike: papers[3],
-        },
-        steps: papers[3] + options.extra_steps,
-        // The paper's frames, and one on the way to the end.
-        shown: [&papers[..], &[papers[3] + 6]].concat(),
+    let ball_shape = Shape {
+        key: "ball",
+        title: "ball with a cut-out corner",
+        initial: Box::new(ball.difference(corner).translated([CENTRE; 3])),
+        whole: Some(Box::new(ball.translated([CENTRE; 3]))),
+        region: BALL_REGION,
+        rule: growing(5),
+        steps: 5 + options.extra_steps,
+        shown: vec![0, 1, 3, 5, 11],
         halvings: &[],
     };
-    let shapes = [
-        (
-            shape(
-                "ball",
-                "ball with a cut-out corner",
-                Box::new(ball.difference(corner).translated([CENTRE; 3])),
-                Some(Box::new(Ball::new([CENTRE; 3], RADIUS)?)),
-                BALL_REGION,
-                [0, 1, 3, 5],
-            ),
-            30.0,
-        ),
-        (
-            shape(
-                "tubes",
-                "six tubes",
-                Box::new(tubes.translated([CENTRE; 3])),
-                None,
-                [-TUBES_REGION, TUBES_REGION],
-                [0, 1, 4, 8],
-            ),
-            25.0,
-        ),
-    ];
+    let tubes_shape = Shape {
+        key: "tubes",
+        title: "six tubes",
+        initial: Box::new(tubes.translated([CENTRE; 3])),
+        whole: None,
+        region: TUBES_REGION,
+        rule: growing(8),
+        steps: 8 + options.extra_steps,
+        shown: vec![0, 1, 4, 8, 14],
+        halvings: &[],
+    };
     let wanted = |shape: &Shape<3>| options.only.as_ref().is_none_or(|only| only == shape.key);
-    Ok(shapes
-        .into_iter()
-        .filter(|(shape, _)| wanted(shape))
-        .collect())
+    let shapes = [(ball_shape, 30.0), (tubes_shape, 25.0)].into_iter();
+    Ok(shapes.filter(|(shape, _)| wanted(shape)).collect())
+}
+
+/// The paper's steps, and further ones each twice as long as the one before.
+fn growing(papers: usize) -> StepRule {
+    StepRule::Growing {
+        tau: TAU,
+        alike: papers,
+    }
 }
 
 fn main() -> ExitCode {
@@ -128,8 +114,7 @@ fn main() -> ExitCode {
 }
 
 fn program(options: &Options) -> Result<(), Error> {
-    let run = &options.common.run;
-    let n = options.common.cells(CELLS);
+    let run = &options.common.figure.run;
     if options.extra_steps > MOST_EXTRA {
         return Err(Error::Options(format!(
             "--extra-steps {} is too many: each step is twice as long as the one before; give at most {MOST_EXTRA}",
@@ -137,8 +122,11 @@ fn program(options: &Options) -> Result<(), Error> {
         )));
     }
     let device = run.open_device()?;
-    let operator = options.common.operator(&needed_network())?;
-    let (grid, scales) = (centred_box(n, 1.0)?, scales(n));
+    let setting = Setting::new(&options.common.figure, CELLS, 1.0)?;
+    let Setting {
+        n, grid, scales, ..
+    } = setting;
+    let operator = setting.operator((Method::Hybrid, options.common.scheme))?;
     let (shapes, azimuths): (Vec<_>, Vec<_>) = shapes(options)?.into_iter().unzip();
     let parameters = inpainting::parameters((n, &scales), &operator, &shapes, run.quick);
     let mut session = Session::open(PROGRAM, run, device, &parameters)?;
@@ -147,7 +135,6 @@ fn program(options: &Options) -> Result<(), Error> {
         let surface = Surface {
             key: shape.key,
             title: shape.title.to_owned(),
-            case: shape.case(grid, scales, &operator)?,
             shown: shape.shown.iter().map(|&step| (step, None)).collect(),
             view: View {
                 up: UpAxis::Z,
@@ -155,7 +142,8 @@ fn program(options: &Options) -> Result<(), Error> {
                 elevation: 25.0,
             },
         };
-        flowed.push(surface.flow(&mut session)?);
+        let case = shape.case(grid, scales, &operator)?;
+        flowed.push(surface.flow(case, &mut session)?);
     }
     table(&flowed)?.write(&session.output, "shapes")?;
     let (mut summary, mut inpainted) = (Summary::new(), Vec::new());
@@ -174,19 +162,16 @@ fn program(options: &Options) -> Result<(), Error> {
 
 /// Draws the region, and tells the time and the distance to the whole shape.
 fn decorate(snapshots: &mut [Snapshot], measured: &Inpainted<'_, 3>) {
-    let Window { low, high } = measured.shape.region;
+    let [low, high] = measured.shape.region;
     for snapshot in snapshots {
         let (step, after) = (snapshot.step, (snapshot.time / TAU).round());
-        snapshot.caption = format!("step {step}");
-        if after > step as f64 {
-            snapshot.caption += &format!(" (t = {after} τ)");
-        }
-        snapshot.caption += &format!(": w = {:.2}", snapshot.w);
+        let time = (after > step as f64).then(|| format!(" (t = {after} τ)"));
         let distance = measured.distances.iter().find(|(k, _)| *k == step);
-        if let Some((_, l2)) = distance.filter(|_| measured.shape.whole.is_some()) {
-            snapshot.caption += &format!("\nL² distance to the ball {l2:.4}");
-        }
-        let edges = Tube::edges_of_box(low, high, EDGE).into_iter();
+        let distance = distance.filter(|_| measured.shape.whole.is_some());
+        let distance = distance.map(|(_, l2)| format!("\nL² distance to the ball {l2:.4}"));
+        let [time, distance] = [time, distance].map(Option::unwrap_or_default);
+        snapshot.caption = format!("step {step}{time}: w = {:.2}{distance}", snapshot.w());
+        let edges = Tube::edges_of_box([low; 3], [high; 3], EDGE).into_iter();
         snapshot.tubes = edges.map(|edge| edge.with_colour(GREEN)).collect();
     }
 }

@@ -117,9 +117,10 @@ fn program(options: &Options) -> Result<(), Error> {
         )));
     }
     let planes: &[usize] = if quick { &[128] } else { &[128, 256, 512] };
-    let solids = match quick {
-        true => [("cube", 24, 2), ("blob", 32, 2)],
-        false => [("cube", 64, 20), ("blob", 128, 8)],
+    let solids = if quick {
+        [("cube", 24, 2), ("blob", 32, 2)]
+    } else {
+        [("cube", 64, 20), ("blob", 128, 8)]
     };
     let mut needs =
         (planes.iter().map(|&n| convergence_network(n))).collect::<Result<Vec<_>, _>>()?;

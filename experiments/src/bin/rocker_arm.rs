@@ -6,10 +6,10 @@ use std::process::ExitCode;
 use clap::Parser;
 use engine::StepRule;
 use experiments::clifford::CliffordTorus;
-use experiments::mesh_flow::{MeshFlow, MeshFlowOptions, Remarks};
+use experiments::mesh_flow::{MeshFlow, MeshFlowOptions};
 use experiments::meshes::KnownMesh;
 use experiments::session::Session;
-use experiments::surfaces::{Flowed, View};
+use experiments::surfaces::{Flowed, Remarks, View};
 use experiments::{Error, harness};
 use geometry::UpAxis;
 use render::Tube;
@@ -75,15 +75,17 @@ fn clifford_tori(session: &mut Session<'_>, all: &mut [Flowed]) -> Result<Remark
         let CliffordTorus {
             l2, outer_radius, ..
         } = torus;
-        remarks.report += &format!(
-            "\nNearest Clifford torus, {}: L2 distance {l2:.4} (paper {PAPERS_L2:.4}), outer radius {outer_radius:.3}, w = {w:.2} (paper \
+        remarks.report = format!(
+            "{}\nNearest Clifford torus, {}: L2 distance {l2:.4} (paper {PAPERS_L2:.4}), outer radius {outer_radius:.3}, w = {w:.2} (paper \
              {PAPERS_CLIFFORD})",
+            remarks.report,
             one.label()
         );
         let circles = torus.minor_circles(CIRCLES.0, CIRCLES.1)?.into_iter();
         let tube = |circle: Vec<[f64; 3]>| Tube::new(circle, 0.1 * case.scales.eps).closed();
         if let Some(shown) = one.snapshots.last_mut() {
-            shown.caption += &format!("\nL² distance to the torus {l2:.4}\n(which has w = {w:.2})");
+            let torus = format!("L² distance to the torus {l2:.4}\n(which has w = {w:.2})");
+            shown.caption = format!("{}\n{torus}", shown.caption);
             shown.tubes = circles.map(tube).collect();
         }
         one.metrics = vec![

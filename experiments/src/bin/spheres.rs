@@ -4,17 +4,16 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use engine::{
-    Case, Flow, Measure, Method, Operator, Record, Run, Scales, Scheme, StepRule, Stop, checksum,
-    energy_increases, mean_hvp,
+    Case, Flow, Measure, Method, Record, Run, Scheme, StepRule, energy_increases, mean_hvp,
 };
-use experiments::networks::Chosen;
+use experiments::options::FigureOptions;
 use experiments::session::Session;
-use experiments::surfaces::{self, SurfaceOptions, centred_box, needed_network};
+use experiments::surfaces::{self, Setting};
 use experiments::training::{NetworkSpec, held_out_radii};
 use experiments::{Error, harness, look, quality};
 use geometry::exact::{WILLMORE_ENERGY_SPHERE, mean_curvature_radius};
+use geometry::phase_field;
 use geometry::shapes::Ball;
-use geometry::{Grid, phase_field};
 use model::Quality;
 use operators::ComputeDevice;
 use report::{Axis, Colour, Figure, Format, LineChart, LineStyle, Marker, Series, Summary, Table};
@@ -33,6 +32,8 @@ const LAST: usize = MCF_STEPS.len() - 1;
 /// Steps of Willmore flow, which should leave spheres alone.
 const WILLMORE_STEPS: usize = 20;
 const TAU: f64 = 1.0 / 262_144.0;
+/// The hybrid scheme as in the paper.
+const PAPERS: (Method, Scheme) = (Method::Hybrid, Scheme::Paper);
 
 /// The network for surfaces on spheres, n = 64, eps = 2^-5, tautilde = 2^-12: L2 errors of mean curvature flow against
 /// R^2 = r^2 - 4t beside finite elements, Willmore energies w against 8 pi, and the change of the radius in 20 steps of Willmore
@@ -41,7 +42,7 @@ const TAU: f64 = 1.0 / 262_144.0;
 #[command(name = PROGRAM, version)]
 struct Options {
     #[command(flatten)]
-    surface: SurfaceOptions,
+    figure: FigureOptions,
 }
 
 /// What was measured for one radius.
@@ -71,6 +72,16 @@ struct Still {
     hvp_per_step: f64,
 }
 
+/// Columns of tables with their digits.
+const COLUMNS: [(&str, usize, fn(&Still) -> f64); 4] = [
+    ("w", 2, |still| still.w_learned),
+    ("w in the end", 2, |still| still.w_relaxed),
+    ("change of radius / h", 4, |still| {
+        still.radius_change_over_h
+    }),
+    ("HVP/step", 1, |still| still.hvp_per_step),
+];
+
 /// Methods and schemes of mean curvature flow.
 fn variants() -> impl Iterator<Item = (Method, Scheme)> {
     look::variants(|(method, scheme)| method.schemes(Flow::MeanCurvature).contains(&scheme))
@@ -82,23 +93,16 @@ fn main() -> ExitCode {
 }
 
 fn program(options: &Options) -> Result<(), Error> {
-    let run = &options.surface.run;
-    let n = options.surface.cells(CELLS);
+    let run = &options.figure.run;
     let radii = if run.quick { &RADII[2..4] } else { &RADII };
     let willmore_steps = if run.quick { 2 } else { WILLMORE_STEPS };
     let device = run.open_device()?;
-    let networks = options.surface.networks()?;
-    let network = networks.find(Scheme::Paper, &needed_network())?.network;
     let spheres = Spheres {
-        grid: centred_box(n, 1.0)?,
-        scales: surfaces::scales(n),
-        networks,
+        setting: Setting::new(&options.figure, CELLS, 1.0)?,
         device: device.clone(),
     };
-    let parameters = json!({
-        "n": n, "eps": spheres.scales.eps, "mcf_step": spheres.scales.mcf_step, "tau": TAU, "willmore_steps": willmore_steps,
-        "network": checksum(&network), "quick": run.quick,
-    });
+    let others = json!({ "tau": TAU, "willmore_steps": willmore_steps, "quick": run.quick });
+    let parameters = spheres.setting.parameters(others)?;
     let mut session = Session::open(PROGRAM, run, device, &parameters)?;
     let bar = session.progress.bar("radii".to_owned(), radii.len() as u64);
     let mut all = Vec::new();
@@ -110,15 +114,11 @@ fn program(options: &Options) -> Result<(), Error> {
     bar.finish();
     let mut summary = summary(&all)?;
     if !run.quick {
-        let spec = NetworkSpec::surfaces();
+        let (spec, papers) = (NetworkSpec::surfaces(), spheres.setting.operator(PAPERS)?);
+        let network = &papers.network().expect("it is learned").network;
         let measured = session.phase("quality of the network", || {
-            let (data, device) = (spec.data(false)?, &spheres.device);
-            Ok(Quality::measure(
-                &network,
-                &data,
-                held_out_radii(false),
-                device,
-            )?)
+            let (data, count) = (spec.data(false)?, held_out_radii(false));
+            Ok(Quality::measure(network, &data, count, &spheres.device)?)
         })?;
         let names = Table::of(std::slice::from_ref(&measured)).text("network", |_| &spec.name);
         let losses = quality::columns(names, |measured| measured).finish()?;
@@ -129,32 +129,29 @@ fn program(options: &Options) -> Result<(), Error> {
     table.write(&session.output, "spheres")?;
     session.output.write_json("spheres.json", &all)?;
     let note = format!(
-        "n = {n}, ε = 2/n, inner step 1/n². Energies by the schemes are those after the steps of Willmore flow, of the relaxed profile."
+        "n = {}, ε = 2/n, inner step 1/n². Energies by the schemes are those after the steps of Willmore flow, of the relaxed profile.",
+        spheres.setting.n
     );
-    Figure::new(run.title("Spheres"), 2)
-        .with_panels([errors(&all), energies(&all)])
-        .with_note(note)
-        .write(&session.output, "spheres")?;
+    let panels = [errors(&all), energies(&all)];
+    session.figure(
+        Figure::new("Spheres", 2)
+            .with_panels(panels)
+            .with_note(note),
+        "spheres",
+    )?;
     session.finish(TITLE, summary, &table.to_markdown())
 }
 
 /// What all spheres share.
 struct Spheres {
-    grid: Grid<3>,
-    scales: Scales,
-    networks: Chosen,
+    setting: Setting,
     device: ComputeDevice,
 }
 
 impl Spheres {
     fn measure(&self, radius: f64, willmore_steps: usize) -> Result<Measurement, Error> {
-        let mcf_step = self.scales.mcf_step;
-        let still = self.case(
-            radius,
-            Flow::Willmore,
-            (Method::Hybrid, Scheme::Paper),
-            (TAU, 0),
-        )?;
+        let mcf_step = self.setting.scales.mcf_step;
+        let still = self.case(radius, Flow::Willmore, PAPERS, (TAU, 0))?;
         let mcf = variants().map(|variant| {
             let time = (mcf_step, MCF_STEPS[LAST]);
             let run = self.run(self.case(radius, Flow::MeanCurvature, variant, time)?)?;
@@ -178,24 +175,23 @@ impl Spheres {
         variant: (Method, Scheme),
         (tau, steps): (f64, usize),
     ) -> Result<Case<3>, Error> {
-        let Self { grid, scales, .. } = *self;
-        let (networks, needed) = (self.networks.of(variant.1), needed_network());
+        let Setting { grid, scales, .. } = self.setting;
         let ball = move |grid, r| phase_field(grid, &Ball::new([0.5; 3], r)?, scales.eps);
         let exact = move |grid, t| ball(grid, mean_curvature_radius(radius, t, 3));
         let measures = match flow {
             Flow::MeanCurvature => vec![Measure::distance_to(exact)],
             Flow::Willmore => Measure::size(scales.eps),
         };
+        let (initial, operator) = (ball(grid, radius)?, self.setting.operator(variant)?);
+        let (shape, time) = (
+            format!("sphere of radius {radius}"),
+            (StepRule::Constant(tau), steps),
+        );
+        let case = surfaces::willmore_flow(&shape, initial, operator, scales, time);
         Ok(Case {
-            shape: format!("sphere of radius {radius}"),
-            initial: ball(grid, radius)?,
-            region: None,
             flow,
-            operator: Operator::new(variant, &networks, &needed, &grid, &scales)?,
-            scales,
-            steps: StepRule::Constant(tau).into(),
-            stops: vec![Stop::Steps(steps)],
             measures,
+            ..case
         })
     }
 
@@ -219,7 +215,7 @@ impl Spheres {
             scheme,
             w_learned: first.map_or(f64::NAN, |made| made.energy_at_rest()),
             w_relaxed: last.and_then(Record::willmore_energy).unwrap_or(f64::NAN),
-            radius_change_over_h: change * self.grid.cells() as f64,
+            radius_change_over_h: change * self.setting.n as f64,
             energy_increases: energy_increases(records),
             hvp_per_step: mean_hvp(records),
         })
@@ -234,30 +230,18 @@ fn table(all: &[Measurement]) -> Result<Table, Error> {
             table = table.number(name, Format::Fixed(5), move |m| m.mcf[k][j]);
         }
     }
+    let relative = |m: &Measurement| m.w_elements / WILLMORE_ENERGY_SPHERE;
     table = (table.number("w, FE measure", Format::Fixed(2), |m| m.w_elements)).number(
         "w / 8π (FE)",
         Format::Fixed(4),
-        |m| m.w_elements / WILLMORE_ENERGY_SPHERE,
+        relative,
     );
     for (k, &scheme) in Method::Hybrid.schemes(Flow::Willmore).iter().enumerate() {
-        let label = Method::Hybrid.label_in(scheme);
-        table = table
-            .number(format!("w, {label}"), Format::Fixed(2), move |m| {
-                m.willmore[k].w_learned
-            })
-            .number(
-                format!("w in the end, {label}"),
-                Format::Fixed(2),
-                move |m| m.willmore[k].w_relaxed,
-            )
-            .number(
-                format!("change of radius / h, {label}"),
-                Format::Fixed(4),
-                move |m| m.willmore[k].radius_change_over_h,
-            )
-            .number(format!("HVP/step, {label}"), Format::Fixed(1), move |m| {
-                m.willmore[k].hvp_per_step
-            });
+        for (name, digits, value) in COLUMNS {
+            let name = format!("{name}, {}", Method::Hybrid.label_in(scheme));
+            let value = move |m: &Measurement| value(&m.willmore[k]);
+            table = table.number(name, Format::Fixed(digits), value);
+        }
     }
     Ok(table.finish()?)
 }

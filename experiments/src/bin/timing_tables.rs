@@ -224,7 +224,7 @@ impl Timing {
     fn step(&mut self) -> Result<(), Error> {
         match self.timed.step() {
             Err(Error::Engine(engine::Error::Step { source, .. }))
-                if matches!(source, solver::Error::NotConverged { .. }) =>
+                if matches!(*source, solver::Error::NotConverged { .. }) =>
             {
                 self.failure = Some(source.to_string());
                 Ok(())

@@ -5,18 +5,21 @@ use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
 use experiments::options::RunOptions;
-use experiments::partial::Partial;
-use experiments::training::{
-    self, AccurateSettings, AdamSettings, CurvePoint, LmSettings, NetworkSpec, Trained,
-    training_device,
-};
+use experiments::session::Session;
+use experiments::training::{NetworkSpec, Trainer, training_device};
 use experiments::{Error, harness, quality};
 use model::training::adam::AdamParams;
-use operators::ComputeDevice;
+use model::training::least_squares::LeastSquaresParams;
+use model::training::levenberg_marquardt::LmParams;
+use model::training::{self, CurvePoint, Trained};
+use model::{Network, pretrained};
+use report::Summary;
 use report::{
-    Axis, Colour, Figure, LegendEntry, LineChart, LineStyle, OutputDir, Progress, Series, Summary,
+    Axis, Colour, Figure, LegendEntry, LineChart, LineStyle, Manifest, OutputDir, Series, Table,
 };
+use runs::Cache;
 use serde::Serialize;
+use serde_json::json;
 
 const PROGRAM: &str = "train_networks";
 
@@ -68,14 +71,250 @@ struct Options {
     restart: bool,
 }
 
-#[derive(Serialize)]
-struct Parameters<'a> {
+impl Recipe {
+    /// Name in data, metrics and checkpoints, name in the legend, and how its curves look.
+    fn look(self) -> (&'static str, &'static str, LineStyle) {
+        match self {
+            Self::Lm | Self::Both => ("lm", "Levenberg-Marquardt", LineStyle::Solid),
+            Self::Adam => ("adam", "Adam", LineStyle::Dashed),
+            Self::Accurate => {
+                let label = "distillation of the least-squares fit";
+                ("accurate", label, LineStyle::DashDotDot)
+            }
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    let options = Options::parse();
+    harness::run(|| program(&options))
+}
+
+fn program(options: &Options) -> Result<(), Error> {
+    let run = &options.run;
+    let specs = options.chosen()?;
+    let device = training_device(&run.open_device()?)?;
+    let settings = options.settings()?;
+    let parameters = json!({
+        "recipe": options.recipe,
+        "networks": specs,
+        "levenberg_marquardt": settings.lm,
+        "adam": settings.adam,
+        "accurate": settings.accurate,
+        "quick": run.quick,
+    });
+    let mut session = Session::open(PROGRAM, run, device.clone(), &parameters)?;
+    let install = (options.install.as_ref())
+        .map(OutputDir::create)
+        .transpose()?;
+    let unfinished = session.output.as_path().join("checkpoints");
+    if options.restart {
+        Cache::open(&unfinished)?.remove()?;
+    }
+    let checkpoints = Cache::open(unfinished)?;
+    let folder = session.output.subfolder("networks")?;
+    let mut trainings = Trainings {
+        trainer: Trainer {
+            device: &device,
+            checkpoints: &checkpoints,
+            progress: &session.progress,
+            seed: run.seed,
+            quick: run.quick,
+        },
+        manifest: &mut session.manifest,
+        chosen: &specs,
+        folder: &folder,
+        finished: Vec::new(),
+    };
+    trainings.by(options.recipe, &settings, !options.only.is_empty())?;
+    let all = trainings.finished;
+    if let Some(install) = &install {
+        for one in all.iter().filter(|one| one.recipe == all[0].recipe) {
+            let accurate = one.recipe == Recipe::Accurate;
+            one.save(install, if accurate { "accurate_" } else { "" })?;
+        }
+    }
+    let (table, summary) = write(&all, &session)?;
+    checkpoints.remove()?;
+    let folder = folder.as_path().display();
+    let report = format!("{}\nNetworks are in {folder}", table.to_markdown());
+    session.finish("Quality of the trained networks", summary, &report)
+}
+
+/// Curves, figure, metrics and table.
+fn write(all: &[Finished], session: &Session<'_>) -> Result<(Table, Summary), Error> {
+    session.figure(figure(all), "learning_curves")?;
+    let rows: Vec<CurveRow<'_>> = all.iter().flat_map(Finished::curve).collect();
+    session.output.write_csv("learning_curves.csv", &rows)?;
+    session.output.write_json("learning_curves.json", &rows)?;
+    let mut summary = Summary::new();
+    for one in all {
+        let key = match one.recipe {
+            Recipe::Lm => format!("train.{}", one.spec.name),
+            _ => format!("train.{}.{}", one.spec.name, one.key()),
+        };
+        summary.insert_record(&key, &one.trained.quality)?;
+        summary.insert(&format!("{key}.seconds"), one.trained.seconds())?;
+        summary.insert_count(&format!("{key}.iterations"), one.trained.curve.len())?;
+    }
+    let table = Table::of(all)
+        .text("network", |one| &one.spec.name)
+        .text("recipe", Finished::key);
+    let table = quality::columns(table, |one| &one.trained.quality);
+    let table = table.finish()?;
+    table.write(&session.output, "quality")?;
+    Ok((table, summary))
+}
+
+/// The settings of every recipe.
+struct Settings {
+    lm: LmParams,
+    adam: AdamParams,
+    accurate: LeastSquaresParams,
+}
+
+impl Options {
+    fn chosen(&self) -> Result<Vec<NetworkSpec>, Error> {
+        let mut specs = match self.recipe {
+            Recipe::Accurate => NetworkSpec::accurate(),
+            Recipe::Lm | Recipe::Adam | Recipe::Both => NetworkSpec::paper(),
+        };
+        let names: Vec<&str> = specs.iter().map(|spec| &spec.name[..]).collect();
+        if let Some(unknown) = self.only.iter().find(|name| !names.contains(&&name[..])) {
+            return Err(Error::Options(format!(
+                "no network is called '{unknown}'; there are {}",
+                names.join(", ")
+            )));
+        }
+        if !self.only.is_empty() {
+            specs.retain(|spec| self.only.contains(&spec.name));
+        }
+        Ok(specs)
+    }
+
+    fn settings(&self) -> Result<Settings, Error> {
+        let (quick, rate) = (self.run.quick, self.adam_rate);
+        let epochs = if quick { 2 } else { self.adam_epochs };
+        if epochs == 0 {
+            return Err(Error::Options(
+                "--adam-epochs must be at least 1".to_owned(),
+            ));
+        }
+        if !(rate.is_finite() && rate > 0.0) {
+            let message = format!("--adam-rate must be positive, not {rate}");
+            return Err(Error::Options(message));
+        }
+        Ok(Settings {
+            lm: LmParams::new(quick),
+            adam: AdamParams {
+                epochs,
+                learning_rate: rate,
+                final_learning_rate: 0.05 * rate,
+                ..AdamParams::default()
+            },
+            accurate: LeastSquaresParams::new(quick),
+        })
+    }
+}
+
+/// Trainings one after the other. Those of the chosen networks are kept and saved at once.
+struct Trainings<'a> {
+    trainer: Trainer<'a>,
+    manifest: &'a mut Manifest,
+    chosen: &'a [NetworkSpec],
+    folder: &'a OutputDir,
+    finished: Vec<Finished>,
+}
+
+struct Finished {
     recipe: Recipe,
-    networks: &'a [NetworkSpec],
-    levenberg_marquardt: &'a LmSettings,
-    adam: &'a AdamSettings,
-    accurate: &'a AccurateSettings,
-    quick: bool,
+    spec: NetworkSpec,
+    trained: Trained,
+}
+
+impl Trainings<'_> {
+    /// All by one recipe. Compared with another, Adam trains networks outside of the progression only where they are `wanted`.
+    fn by(&mut self, recipe: Recipe, settings: &Settings, wanted: bool) -> Result<(), Error> {
+        for spec in self.chosen {
+            match recipe {
+                Recipe::Lm | Recipe::Both => self.train(Recipe::Lm, spec, &settings.lm)?,
+                Recipe::Accurate => self.train(Recipe::Accurate, spec, &settings.accurate)?,
+                Recipe::Adam => break,
+            };
+        }
+        match recipe {
+            Recipe::Adam => self.progressively(&settings.adam, true),
+            Recipe::Both => self.progressively(&settings.adam, wanted),
+            Recipe::Lm | Recipe::Accurate => Ok(()),
+        }
+    }
+
+    fn train<R: training::Recipe>(
+        &mut self,
+        recipe: Recipe,
+        spec: &NetworkSpec,
+        params: &R,
+    ) -> Result<Network, Error> {
+        let (key, label, _) = recipe.look();
+        let train = || self.trainer.train(spec, key, params);
+        let trained = (self.manifest).phase(format!("{} by {label}", spec.name), train)?;
+        let network = trained.network.clone();
+        if self.chosen.contains(spec) {
+            let finished = Finished {
+                recipe,
+                spec: spec.clone(),
+                trained,
+            };
+            let prefix = match recipe {
+                Recipe::Lm | Recipe::Both => "",
+                Recipe::Adam => "adam_",
+                Recipe::Accurate => "accurate_",
+            };
+            finished.save(self.folder, prefix)?;
+            self.finished.push(finished);
+        }
+        Ok(network)
+    }
+
+    /// The paper's progressive training up to the finest of the chosen networks: each starts from the refined kernel
+    /// and the activation of the one before. The others have no coarser one and are trained `alone`, from a random start.
+    fn progressively(&mut self, first: &AdamParams, alone: bool) -> Result<(), Error> {
+        let mut stages = NetworkSpec::convergence();
+        let others = self.chosen.iter().filter(|spec| !stages.contains(spec));
+        let others: Vec<_> = others.filter(|_| alone).cloned().collect();
+        while stages.pop_if(|spec| !self.chosen.contains(spec)).is_some() {}
+        let mut params = first.clone();
+        for spec in &stages {
+            let network = self.train(Recipe::Adam, spec, &params)?;
+            params = params.refined(&network);
+        }
+        for spec in &others {
+            self.train(Recipe::Adam, spec, first)?;
+        }
+        Ok(())
+    }
+}
+
+impl Finished {
+    fn save(&self, folder: &OutputDir, prefix: &str) -> Result<(), Error> {
+        let name = format!("{prefix}{}", pretrained::file_name(self.spec.ratios));
+        Ok(self.trained.network.save(&folder.path(&name)?)?)
+    }
+
+    fn key(&self) -> &'static str {
+        self.recipe.look().0
+    }
+
+    fn curve(&self) -> impl Iterator<Item = CurveRow<'_>> {
+        self.trained.curve.iter().map(|point| CurveRow {
+            network: &self.spec.name,
+            recipe: self.key(),
+            iteration: point.iteration,
+            seconds: point.seconds,
+            training_loss: point.training_loss,
+            held_out_loss: point.held_out_loss,
+        })
+    }
 }
 
 #[derive(Serialize)]
@@ -88,307 +327,45 @@ struct CurveRow<'a> {
     held_out_loss: f64,
 }
 
-fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
-}
-
-fn program(options: &Options) -> Result<(), Error> {
-    let run = &options.run;
-    let specs = chosen(options.recipe, &options.only)?;
-    let device = training_device(&run.open_device()?)?;
-    let epochs = if run.quick { 2 } else { options.adam_epochs };
-    if epochs == 0 {
-        return Err(Error::Options(
-            "--adam-epochs must be at least 1".to_owned(),
-        ));
-    }
-    if !(options.adam_rate.is_finite() && options.adam_rate > 0.0) {
-        return Err(Error::Options(format!(
-            "--adam-rate must be positive, not {}",
-            options.adam_rate
-        )));
-    }
-    let settings = Settings {
-        accurate: AccurateSettings::new(run.quick, run.seed),
-        lm: LmSettings::new(run.quick, run.seed),
-        adam: AdamSettings {
-            params: AdamParams {
-                epochs,
-                learning_rate: options.adam_rate,
-                final_learning_rate: 0.05 * options.adam_rate,
-                ..AdamParams::default()
-            },
-            seed: run.seed,
-            quick: run.quick,
-        },
-    };
-    let output = run.open_output(PROGRAM)?;
-    let install = options
-        .install
-        .as_ref()
-        .map(OutputDir::create)
-        .transpose()?;
-    let folder = output.subfolder("networks")?;
-    let mut checkpoints = Partial::open(&output, "checkpoints")?;
-    if options.restart {
-        checkpoints.remove()?;
-        checkpoints = Partial::open(&output, "checkpoints")?;
-    }
-    let parameters = Parameters {
-        recipe: options.recipe,
-        networks: &specs,
-        levenberg_marquardt: &settings.lm,
-        adam: &settings.adam,
-        accurate: &settings.accurate,
-        quick: run.quick,
-    };
-    let mut manifest = run.manifest(PROGRAM, &parameters, &device)?;
-    let progress = run.progress();
-
-    let mut by_lm = Vec::new();
-    if matches!(options.recipe, Recipe::Lm | Recipe::Both) {
-        for spec in &specs {
-            let trained =
-                manifest.phase(format!("{} by Levenberg-Marquardt", spec.name), || {
-                    training::levenberg_marquardt(
-                        spec,
-                        &settings.lm,
-                        &device,
-                        &checkpoints,
-                        &progress,
-                    )
-                })?;
-            let name = spec.file_name();
-            trained.network.save(&folder.path(&name)?)?;
-            by_lm.push(trained);
-        }
-    }
-    let mut by_adam = Vec::new();
-    if matches!(options.recipe, Recipe::Adam | Recipe::Both) {
-        let mut compared = specs.clone();
-        if options.recipe == Recipe::Both && options.only.is_empty() {
-            compared.retain(in_the_chain);
-        }
-        by_adam = manifest.phase("Adam", || {
-            settings.progressively(&compared, &device, &checkpoints, &progress)
-        })?;
-        for trained in &by_adam {
-            let name = format!("adam_{}", trained.spec.file_name());
-            trained.network.save(&folder.path(&name)?)?;
-        }
-    }
-    let mut accurate = Vec::new();
-    if options.recipe == Recipe::Accurate {
-        for spec in &specs {
-            let trained = manifest.phase(format!("{} by least squares", spec.name), || {
-                training::accurate(spec, &settings.accurate, &device, &progress)
-            })?;
-            trained.network.save(&folder.path(&accurate_name(spec))?)?;
-            accurate.push(trained);
-        }
-    }
-    if let Some(install) = &install {
-        let trained = if by_lm.is_empty() { &by_adam } else { &by_lm };
-        for one in trained {
-            one.network.save(&install.path(&one.spec.file_name())?)?;
-        }
-        for one in &accurate {
-            one.network
-                .save(&install.path(&accurate_name(&one.spec))?)?;
-        }
-    }
-
-    let all: Vec<(&'static str, &Trained)> = by_lm
-        .iter()
-        .map(|trained| ("lm", trained))
-        .chain(by_adam.iter().map(|trained| ("adam", trained)))
-        .chain(accurate.iter().map(|trained| ("accurate", trained)))
-        .collect();
-    figure(run, &all).write(&output, "learning_curves")?;
-    write_data(&output, &all)?;
-    let mut table = quality::table(&["network", "recipe"]);
-    let mut summary = Summary::new();
-    for (recipe, trained) in &all {
-        let name = &trained.spec.name;
-        quality::push(&mut table, &[name, recipe], &trained.quality)?;
-        let key = match *recipe {
-            "lm" => format!("train.{name}"),
-            other => format!("train.{name}.{other}"),
-        };
-        quality::insert(&mut summary, &key, &trained.quality)?;
-        summary.insert(&format!("{key}.seconds"), trained.seconds())?;
-        summary.insert_count(&format!("{key}.iterations"), trained.curve.len())?;
-    }
-    table.write(&output, "quality")?;
-    summary.write(&output)?;
-    manifest.write(&output)?;
-    checkpoints.remove()?;
-    progress.clear();
-    run.say(&format!(
-        "{}\n{}\nNetworks are in {}, results in {}",
-        run.title("Quality of the trained networks"),
-        table.to_markdown(),
-        folder.as_path().display(),
-        output.as_path().display()
-    ));
-    Ok(())
-}
-
-fn accurate_name(spec: &NetworkSpec) -> String {
-    format!("accurate_{}", spec.file_name())
-}
-
-fn chosen(recipe: Recipe, only: &[String]) -> Result<Vec<NetworkSpec>, Error> {
-    let mut specs = match recipe {
-        Recipe::Accurate => NetworkSpec::accurate(),
-        Recipe::Lm | Recipe::Adam | Recipe::Both => NetworkSpec::shipped(),
-    };
-    let names: Vec<&str> = specs.iter().map(|spec| &spec.name[..]).collect();
-    if let Some(unknown) = only.iter().find(|name| !names.contains(&&name[..])) {
-        return Err(Error::Options(format!(
-            "no network is called '{unknown}'; there are {}",
-            names.join(", ")
-        )));
-    }
-    if !only.is_empty() {
-        specs.retain(|spec| only.contains(&spec.name));
-    }
-    Ok(specs)
-}
-
-/// Whether a network belongs to the progressive refinement from n = 128 to n = 512.
-fn in_the_chain(spec: &NetworkSpec) -> bool {
-    !["inpainting", "surfaces"].contains(&&spec.name[..])
-}
-
-struct Settings {
-    accurate: AccurateSettings,
-    lm: LmSettings,
-    adam: AdamSettings,
-}
-
-impl Settings {
-    /// The paper's progressive training up to the finest of the chosen networks: each starts from the refined kernel
-    /// and the activation of the one before. The others have no coarser one and start at random.
-    fn progressively(
-        &self,
-        chosen: &[NetworkSpec],
-        device: &ComputeDevice,
-        checkpoints: &Partial,
-        progress: &Progress,
-    ) -> Result<Vec<Trained>, Error> {
-        let mut finished: Vec<Trained> = Vec::new();
-        let mut settings = self.adam.clone();
-        let finest = chosen
-            .iter()
-            .filter(|s| in_the_chain(s))
-            .map(|s| s.cells)
-            .max()
-            .unwrap_or(0);
-        let stages = NetworkSpec::paper()
-            .into_iter()
-            .filter(|spec| in_the_chain(spec) && spec.cells <= finest);
-        for spec in stages {
-            let start = finished.last().map(|coarse| &coarse.network);
-            finished.push(training::adam(
-                &spec,
-                &settings,
-                start,
-                device,
-                checkpoints,
-                progress,
-            )?);
-            settings.params.epochs = settings.params.epochs.div_ceil(4);
-            // The entries of a refined kernel are 2^-D times as large, and Adam's steps do not scale with them.
-            let shrinkage = 0.5_f64.powi(spec.ratios.dimension as i32);
-            settings.params.learning_rate *= shrinkage;
-            settings.params.final_learning_rate *= shrinkage;
-        }
-        finished.retain(|trained| chosen.contains(&trained.spec));
-        for spec in chosen.iter().filter(|spec| !in_the_chain(spec)) {
-            let settings = &self.adam;
-            finished.push(training::adam(
-                spec,
-                settings,
-                None,
-                device,
-                checkpoints,
-                progress,
-            )?);
-        }
-        Ok(finished)
-    }
-}
-
-/// Held-out loss over wall time and over iterations; colour: network, line style: method.
-fn figure(run: &RunOptions, all: &[(&'static str, &Trained)]) -> Figure {
+/// Held-out loss over wall time and over iterations; colour: network, line style: recipe.
+fn figure(all: &[Finished]) -> Figure {
     let mut names: Vec<&str> = Vec::new();
-    for (_, trained) in all {
-        if !names.contains(&&trained.spec.name[..]) {
-            names.push(&trained.spec.name);
+    for one in all {
+        if !names.contains(&&one.spec.name[..]) {
+            names.push(&one.spec.name);
         }
     }
-    let style = |recipe: &str| match recipe {
-        "lm" => LineStyle::Solid,
-        "accurate" => LineStyle::DashDotDot,
-        _ => LineStyle::Dashed,
+    let recipes = [Recipe::Lm, Recipe::Adam, Recipe::Accurate];
+    let recipes = recipes.map(|recipe| all.iter().find(|one| one.recipe == recipe));
+    let legend = |chart: LineChart| {
+        let recipes = recipes.iter().flatten().map(|one| {
+            let (_, label, style) = one.recipe.look();
+            LegendEntry::line(label, Colour::Black, style)
+        });
+        let networks = names.iter().enumerate();
+        let networks = networks.map(|(k, name)| LegendEntry::line(*name, k, LineStyle::Solid));
+        chart.with_entries(recipes).with_entries(networks)
     };
-    let mut figure = Figure::new(run.title("Learning curves"), 2);
-    let abscissas: [(&str, fn(&CurvePoint) -> f64); 2] = [
-        ("wall time [s]", |point| point.seconds),
-        ("iteration or epoch", |point| point.iteration as f64),
-    ];
-    for (label, abscissa) in abscissas {
-        let mut chart = LineChart::new("", Axis::log(label), Axis::log("held-out loss"));
-        for (recipe, trained) in all {
-            let points: Vec<[f64; 2]> = trained
-                .curve
-                .iter()
-                .map(|point| [abscissa(point), point.held_out_loss])
-                .collect();
-            let colour = names.iter().position(|name| *name == trained.spec.name);
-            chart = chart.with_series(
-                Series::new(format!("{} {recipe}", trained.spec.name), points)
-                    .with_colour(colour.unwrap_or(0))
-                    .with_style(style(recipe)),
-            );
-        }
-        let methods = [
-            ("lm", "Levenberg-Marquardt"),
-            ("adam", "Adam"),
-            ("accurate", "distillation of the least-squares fit"),
-        ]
-        .into_iter()
-        .filter(|(key, _)| all.iter().any(|(recipe, _)| recipe == key))
-        .map(|(key, label)| LegendEntry::line(label, Colour::Black, style(key)));
-        let networks = names
-            .iter()
-            .enumerate()
-            .map(|(k, name)| LegendEntry::line(*name, k, LineStyle::Solid));
-        figure = figure.with_panel(chart.with_entries(methods).with_entries(networks));
-    }
-    figure.with_shared_legend().with_note(
-        "Loss: mean squared nodal error on spheres not trained on. Levenberg-Marquardt uses all sampled points in each \
-         iteration; an epoch of Adam is one pass over all radii in batches of 10 grids.",
-    )
-}
-
-fn write_data(output: &OutputDir, all: &[(&'static str, &Trained)]) -> Result<(), Error> {
-    let rows: Vec<CurveRow<'_>> = all
-        .iter()
-        .flat_map(|(recipe, trained)| {
-            trained.curve.iter().map(|point| CurveRow {
-                network: &trained.spec.name,
-                recipe,
-                iteration: point.iteration,
-                seconds: point.seconds,
-                training_loss: point.training_loss,
-                held_out_loss: point.held_out_loss,
+    let chart = |label: &str, abscissa: fn(&CurvePoint) -> f64| {
+        let curves = all.iter().map(|one| {
+            let (key, _, style) = one.recipe.look();
+            let colour = names.iter().position(|name| *name == one.spec.name);
+            let name = format!("{} {key}", one.spec.name);
+            Series::of(name, &one.trained.curve, |at| {
+                [abscissa(at), at.held_out_loss]
             })
-        })
-        .collect();
-    output.write("learning_curves.csv", report::data::to_csv(&rows)?)?;
-    output.write("learning_curves.json", report::data::to_json(&rows)?)?;
-    Ok(())
+            .with_colour(colour.unwrap_or(0))
+            .with_style(style)
+        });
+        let chart = LineChart::new("", Axis::log(label), Axis::log("held-out loss"));
+        legend(chart.with_curves(curves))
+    };
+    Figure::new("Learning curves", 2)
+        .with_panel(chart("wall time [s]", |point| point.seconds))
+        .with_panel(chart("iteration or epoch", |point| point.iteration as f64))
+        .with_shared_legend()
+        .with_note(
+            "Loss: mean squared nodal error on spheres not trained on. Levenberg-Marquardt uses all sampled points in each \
+             iteration; an epoch of Adam is one pass over all radii in batches of 10 grids.",
+        )
 }

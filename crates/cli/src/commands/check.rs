@@ -1,23 +1,23 @@
 //! `willmore check`.
 
 use std::fmt::Write;
+use std::process::ExitCode;
 use std::sync::Arc;
 
+use engine::Method;
 use geometry::Field;
 use linearize::taylor::{halvings, remainder};
-use model::MeanCurvatureOperator;
+use model::{Factors, MeanCurvatureOperator, Network};
 use operators::{ComputeDevice, DeviceKind, add_scaled, inner_product};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
-use solver::{MinimizingMovement, Objective};
+use solver::{FlowParams, MinimizingMovement, Objective};
 
-use super::open_device;
-use crate::cli::CheckOptions;
+use super::{check_eps_over_h, open_device, operator};
+use crate::cli::{CheckOptions, SayOptions};
 use crate::error::Error;
 use crate::input::{self, Loaded};
-use crate::run::{self, Ending};
-use crate::scales::{self, Operator};
 
 /// Steps of the Taylor tests.
 const STEPS: usize = 14;
@@ -35,13 +35,9 @@ struct Finding {
 }
 
 /// Checks the derivatives of the energy at the input.
-///
-/// # Errors
-/// [`Error::Options`] naming the checks that failed; what reading and the device raise.
-pub fn run(mut options: CheckOptions) -> Result<Ending, Error> {
-    scales::check_eps_over_h(options.scheme.eps_over_h)?;
+pub fn run(mut options: CheckOptions, say: SayOptions) -> Result<ExitCode, Error> {
+    check_eps_over_h(options.scheme.eps_over_h)?;
     let device = open_device(&mut options.common)?;
-    let say = options.common.say;
     let loaded = input::load(&mut options.input, options.scheme.eps_over_h, say)?;
     let findings = match loaded {
         Loaded::Plane(start, _) => findings(&start.field, &options, &device)?,
@@ -56,14 +52,14 @@ pub fn run(mut options: CheckOptions) -> Result<Ending, Error> {
         .map(|f| json!({ "name": f.name, "found": f.found, "passed": f.passed }))
         .collect();
     let outcome = json!({ "command": "check", "device": options.common.device, "checks": list });
-    run::report(say, &outcome, text.trim_end());
+    say.report(&outcome, text.trim_end());
     let failed: Vec<&str> = findings
         .iter()
         .filter(|f| !f.passed)
         .map(|f| f.name)
         .collect();
     if failed.is_empty() {
-        return Ok(Ending::Done);
+        return Ok(ExitCode::SUCCESS);
     }
     Err(Error::options(format!(
         "these checks failed on the device {}: {}; do not trust its results",
@@ -77,8 +73,18 @@ fn findings<const D: usize>(
     options: &CheckOptions,
     device: &ComputeDevice,
 ) -> Result<Vec<Finding>, Error> {
-    let operator = scales::operator(D, &options.scheme)?;
-    let here = derivatives(field, &operator, options, device)?;
+    let (scales, operator) = operator(&options.scheme, Method::Hybrid, field.grid())?;
+    let network = operator.network();
+    let network = &network.expect("a learned operator has one").network;
+    let params = FlowParams {
+        eps: scales.eps,
+        mcf_step: scales.mcf_step,
+        newton: scales.newton,
+        calibration: Factors::PAPER,
+    };
+    let at =
+        |device: &ComputeDevice| derivatives(field, network, &params, options.common.seed, device);
+    let here = at(device)?;
     let mut findings = Vec::new();
     for (name, derivatives, expected) in [("gradient", 1, 2.0), ("Hessian", 2, 3.0)] {
         let value = |t: f64| {
@@ -110,12 +116,10 @@ fn findings<const D: usize>(
         ),
         passed: here.asymmetry <= limit,
     });
-    let other = DeviceKind::compiled().find(|&kind| {
-        kind != device.kind() && matches!(kind, DeviceKind::Flex | DeviceKind::NdArray)
-    });
+    let other = DeviceKind::compiled().find(|&kind| kind != device.kind() && kind.is_cpu());
     if let Some(kind) = other {
         let cpu = ComputeDevice::open(kind)?;
-        let there = derivatives(field, &operator, options, &cpu)?;
+        let there = at(&cpu)?;
         let difference = (here.gradient.iter().zip(&there.gradient))
             .map(|(a, b)| (a - b).abs())
             .fold(0.0, f64::max);
@@ -147,12 +151,12 @@ struct Derivatives {
 /// The energy of one time step of the size of the inner one, near the input: at the input itself part of the gradient vanishes.
 fn derivatives<const D: usize>(
     field: &Field<D>,
-    operator: &Operator,
-    options: &CheckOptions,
+    network: &Network,
+    params: &FlowParams,
+    seed: u64,
     device: &ComputeDevice,
 ) -> Result<Derivatives, Error> {
-    let params = scales::params(field.grid().spacing(), options.scheme.eps_over_h);
-    let mut rng = ChaCha8Rng::seed_from_u64(options.common.seed);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut direction = || {
         // Along the interface, where the flow moves values too.
         let values: Vec<f64> = (field.values().iter())
@@ -162,7 +166,7 @@ fn derivatives<const D: usize>(
     };
     let (p, q, moved) = (direction(), direction(), direction());
     let previous = device.tensor::<D>(field.values(), field.grid().shape());
-    let step = MeanCurvatureOperator::<D>::new(&operator.network, device)?;
+    let step = MeanCurvatureOperator::<D>::new(network, device)?;
     step.check_grid(field.grid().cells())?;
     let mut energy = MinimizingMovement::new(Arc::new(step), field.grid().cells(), device)?;
     energy.set(&previous, params.stiffness(params.mcf_step))?;

@@ -1,57 +1,53 @@
 //! `willmore fair`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::flow::Willmore;
-use crate::cli::{FairOptions, FlowOptions, MeshFormat};
+use engine::StepRule;
+
+use super::flow::{FlowCommand, Shared};
+use crate::cli::{FairOptions, MeshFormat};
 use crate::error::Error;
-use crate::input::Loaded;
+use crate::input::{self, Loaded};
 
-impl Willmore for FairOptions {
-    const COMMAND: &'static str = "fair";
+impl FlowCommand for FairOptions {
+    const NAME: &'static str = "fair";
 
-    fn flow(&mut self) -> &mut FlowOptions {
-        &mut self.flow
+    fn shared(&mut self) -> Shared<'_> {
+        self.flow.shared()
     }
 
     fn check(&mut self) -> Result<(), Error> {
-        let steps = &self.flow.steps;
-        if steps.time.is_none() && steps.energy.is_none() && steps.steps.is_none() {
+        let flow = &self.flow;
+        if flow.time.is_none() && flow.energy.is_none() && flow.steps.is_none() {
             return Err(Error::options(
                 "say how smooth the mesh is to become: give --time, --energy or --steps",
             ));
         }
         if let Some(save) = &self.save {
-            let extension = save.extension().and_then(|e| e.to_str()).unwrap_or("");
-            if !["ply", "obj", "stl"].contains(&extension.to_ascii_lowercase().as_str()) {
-                return Err(Error::options(format!(
-                    "--save {} must end in .ply, .obj or .stl",
-                    save.display()
-                )));
+            let refused = |reason| Error::options(format!("--save {}{reason}", save.display()));
+            if !["ply", "obj", "stl"].contains(&&*input::extension(save)) {
+                return Err(refused(" must end in .ply, .obj or .stl"));
             }
-            let absolute = std::path::absolute(save).map_err(|source| Error::Io {
-                action: "find",
-                path: save.clone(),
-                source,
-            })?;
-            if !absolute.parent().is_some_and(std::path::Path::is_dir) {
-                return Err(Error::options(format!(
-                    "--save {}: there is no such folder",
-                    save.display()
-                )));
+            let absolute = input::absolute(save)?;
+            if !absolute.parent().is_some_and(Path::is_dir) {
+                return Err(refused(": there is no such folder"));
             }
             self.save = Some(absolute);
         }
         Ok(())
     }
 
-    fn prepare(&self, input: Loaded, _: f64) -> Result<Loaded, Error> {
+    fn prepare(&self, input: Loaded) -> Result<Loaded, Error> {
         match input {
             Loaded::Space(..) => Ok(input),
             Loaded::Plane(..) => Err(Error::options(
                 "`fair` is for surfaces in space; for images and shapes in the plane there is `willmore flow`",
             )),
         }
+    }
+
+    fn rule(&mut self, mcf_step: f64) -> StepRule {
+        self.flow.rule(mcf_step)
     }
 
     fn mesh(&self) -> (MeshFormat, Option<PathBuf>) {

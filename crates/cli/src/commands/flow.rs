@@ -1,56 +1,56 @@
-//! `willmore flow`, and what it has in common with `fair` and `inpaint`.
+//! `willmore flow`, and what it has in common with the other commands that make runs.
 
 use std::path::PathBuf;
+use std::process::ExitCode;
 
+use engine::{Case, Flow, Measure, Method, StepRule, Stop};
+use geometry::Field;
 use operators::ComputeDevice;
 use runs::StoredRun;
 use serde::Serialize;
-use solver::{FlowParams, FlowState, WillmoreFlow};
 
-use super::open_device;
-use crate::cli::{FlowOptions, MeshFormat};
+use super::{check_eps_over_h, open_device, operator};
+use crate::cli::{
+    CommonOptions, FlowOptions, InputOptions, KeepOptions, MeshFormat, SayOptions, SchemeOptions,
+};
 use crate::config;
 use crate::error::Error;
 use crate::input::{self, Loaded, Start};
-use crate::motion::Motion;
-use crate::outlet::{Outlet, Plane, Space};
-use crate::run::{Ending, Plan, Stop};
-use crate::scales::{self, Operator};
-use crate::tau::Tau;
+use crate::outlet::{Outlet, Space};
+use crate::run::Plan;
 
 /// Steps of a run that has no other end.
 const STEPS: usize = 20;
-/// Steps of a run that ends at a time or an energy.
-const MANY_STEPS: usize = 1000;
 
-/// A command that is Willmore flow of something.
-pub trait Willmore: Serialize {
+/// A command that makes a run.
+pub trait FlowCommand: Serialize {
     /// Its name.
-    const COMMAND: &'static str;
+    const NAME: &'static str;
+    /// The flow.
+    const FLOW: Flow = Flow::Willmore;
+    /// Steps of a run that ends at a time or an energy.
+    const MANY_STEPS: usize = 1000;
 
-    /// The options of the flow.
-    fn flow(&mut self) -> &mut FlowOptions;
+    /// The options that all of them have.
+    fn shared(&mut self) -> Shared<'_>;
+
+    /// How the inner step is made.
+    fn method(&self) -> Method {
+        Method::Hybrid
+    }
 
     /// Refuses options before anything is read.
-    ///
-    /// # Errors
-    /// [`Error::Options`].
     fn check(&mut self) -> Result<(), Error> {
         Ok(())
     }
 
-    /// The rule for time steps unless one is chosen, for an inner step `mcf_step`.
-    fn tau(&self, _mcf_step: f64) -> Tau {
-        Tau::Auto(None)
-    }
-
-    /// What becomes of the input before it flows, with interface width `eps`.
-    ///
-    /// # Errors
-    /// What belongs to the command.
-    fn prepare(&self, input: Loaded, _eps: f64) -> Result<Loaded, Error> {
+    /// What becomes of the input before it flows.
+    fn prepare(&self, input: Loaded) -> Result<Loaded, Error> {
         Ok(input)
     }
+
+    /// The rule for time steps, filled in for an inner step `mcf_step`.
+    fn rule(&mut self, mcf_step: f64) -> StepRule;
 
     /// Format of meshes, and a file besides those of the run.
     fn mesh(&self) -> (MeshFormat, Option<PathBuf>) {
@@ -58,143 +58,173 @@ pub trait Willmore: Serialize {
     }
 }
 
-impl Willmore for FlowOptions {
-    const COMMAND: &'static str = "flow";
-
-    fn flow(&mut self) -> &mut FlowOptions {
-        self
-    }
+/// Options of all commands that make runs.
+pub struct Shared<'a> {
+    pub input: &'a mut InputOptions,
+    pub scheme: &'a SchemeOptions,
+    pub steps: &'a mut Option<usize>,
+    pub time: Option<f64>,
+    pub energy: Option<f64>,
+    pub keep: &'a mut KeepOptions,
+    pub common: &'a mut CommonOptions,
 }
 
-/// Runs, or continues what was stored.
-///
-/// # Errors
-/// What any part of the run raises.
-pub fn run<W: Willmore>(mut options: W, stored: Option<StoredRun>) -> Result<Ending, Error> {
-    options.check()?;
-    let mut plan = plan(&mut options)?;
-    let stored = match stored {
-        Some(stored) if stored.checkpoint().is_some() => {
-            plan.config = stored.config()?;
-            let flow = options.flow();
-            let dimension = stored.identity().grid.cells.len();
-            let operator = scales::operator(dimension, &flow.scheme)?;
-            plan.network = Some(operator.name.clone());
-            let job = Job::new(flow, operator, &plan.device);
-            return match dimension {
-                2 => job.resume::<2, Plane>(&plan, stored),
-                _ => job.resume::<3, Space>(&plan, stored),
-            };
+impl FlowCommand for FlowOptions {
+    const NAME: &'static str = "flow";
+
+    fn shared(&mut self) -> Shared<'_> {
+        Shared {
+            input: &mut self.input,
+            scheme: &self.scheme,
+            steps: &mut self.steps,
+            time: self.time,
+            energy: self.energy,
+            keep: &mut self.keep,
+            common: &mut self.common,
         }
-        stored => stored,
-    };
-    let flow = options.flow();
-    let loaded = input::load(&mut flow.input, flow.scheme.eps_over_h, plan.say)?;
-    let (dimension, h) = match &loaded {
-        Loaded::Plane(start, _) => (2, start.field.grid().spacing()),
-        Loaded::Space(start) => (3, start.field.grid().spacing()),
-    };
-    let flow = options.flow();
-    let operator = scales::operator(dimension, &flow.scheme)?;
-    let params = scales::params(h, flow.scheme.eps_over_h);
-    let chosen = flow.steps.tau;
-    let tau = chosen.unwrap_or_else(|| options.tau(params.mcf_step));
-    let loaded = options.prepare(loaded, params.eps)?;
-    let flow = options.flow();
-    flow.steps.tau = Some(tau.resolved(params.mcf_step));
-    plan.network = Some(operator.name.clone());
-    let job = Job::new(flow, operator, &plan.device);
-    plan.config = match &stored {
-        Some(stored) => stored.config()?,
-        None => config::resolved(W::COMMAND, &options)?,
-    };
-    match loaded {
-        Loaded::Plane(start, _) => job.start(&plan, &start, stored),
-        Loaded::Space(start) => job.start(&plan, &start, stored),
+    }
+
+    fn rule(&mut self, mcf_step: f64) -> StepRule {
+        let rule = self.tau.unwrap_or(StepRule::ByEnergy(None));
+        *self.tau.insert(rule.resolved(mcf_step))
     }
 }
 
-/// What is known before the input is read.
-fn plan<W: Willmore>(options: &mut W) -> Result<Plan, Error> {
-    let (format, save) = options.mesh();
-    let flow = options.flow();
-    let until = flow.steps.time.is_some() || flow.steps.energy.is_some();
-    let steps = if until { MANY_STEPS } else { STEPS };
-    let plan = Plan {
-        command: W::COMMAND,
-        config: String::new(),
-        network: None,
-        eps_over_h: flow.scheme.eps_over_h,
-        stop: Stop {
-            steps: *flow.steps.steps.get_or_insert(steps),
-            time: flow.steps.time,
-            energy: flow.steps.energy,
-        },
-        keep: flow.keep.clone(),
-        format,
-        save,
-        device: open_device(&mut flow.common)?,
-        say: flow.common.say,
-    };
-    plan.check()?;
-    Ok(plan)
+impl Shared<'_> {
+    /// Refuses what cannot be done before anything is computed.
+    fn check(&self) -> Result<(), Error> {
+        check_eps_over_h(self.scheme.eps_over_h)?;
+        for (name, value) in [("--time", self.time), ("--energy", self.energy)] {
+            if let Some(value) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
+                return Err(Error::options(format!("{name} {value} must be positive")));
+            }
+        }
+        for (name, value) in [
+            ("--steps", *self.steps),
+            ("--frames", self.keep.frames),
+            ("--checkpoint-every", Some(self.keep.checkpoint_every)),
+        ] {
+            if value == Some(0) {
+                return Err(Error::options(format!("{name} must be at least 1")));
+            }
+        }
+        Ok(())
+    }
+
+    /// When the run ends.
+    fn stops(&self, rule: StepRule) -> Vec<Stop> {
+        let mut stops: Vec<Stop> = (self.steps.map(Stop::Steps).into_iter())
+            .chain(self.time.map(Stop::Time))
+            .chain(self.energy.map(Stop::Energy))
+            .collect();
+        if matches!(rule, StepRule::ByEnergy(_)) {
+            stops.push(Stop::EnergyAtRest);
+        }
+        stops.extend([Stop::Vanished, Stop::AtTheSide]);
+        stops
+    }
 }
 
-/// The flow of a run.
-struct Job {
-    operator: Operator,
-    eps_over_h: f64,
-    tau: Tau,
+/// Makes a run, or continues one that is stored.
+pub fn run<C: FlowCommand>(
+    mut command: C,
+    say: SayOptions,
+    stored: Option<StoredRun>,
+) -> Result<ExitCode, Error> {
+    command.check()?;
+    let shared = command.shared();
+    let until = shared.time.is_some() || shared.energy.is_some();
+    let steps = if until { C::MANY_STEPS } else { STEPS };
+    shared.steps.get_or_insert(steps);
+    shared.check()?;
+    let device = open_device(shared.common)?;
+    let mut job = Job {
+        command,
+        device,
+        say,
+    };
+    if let Some(stored) = stored {
+        return match engine::dimension(&stored)? {
+            2 => job.resume::<2, crate::outlet::Plane>(stored),
+            _ => job.resume::<3, Space>(stored),
+        };
+    }
+    let shared = job.command.shared();
+    let loaded = input::load(shared.input, shared.scheme.eps_over_h, say)?;
+    match job.command.prepare(loaded)? {
+        Loaded::Plane(start, _) => job.start(start),
+        Loaded::Space(start) => job.start(start),
+    }
+}
+
+/// A command with its device.
+struct Job<C> {
+    command: C,
     device: ComputeDevice,
+    say: SayOptions,
 }
 
-impl Job {
-    fn new(flow: &FlowOptions, operator: Operator, device: &ComputeDevice) -> Self {
-        Self {
-            operator,
-            eps_over_h: flow.scheme.eps_over_h,
-            tau: flow.steps.tau.unwrap_or(Tau::Auto(None)),
-            device: device.clone(),
-        }
-    }
-
+impl<C: FlowCommand> Job<C> {
     fn start<const D: usize, O: Outlet<D>>(
-        &self,
-        plan: &Plan,
-        start: &Start<D, O>,
-        stored: Option<StoredRun>,
-    ) -> Result<Ending, Error> {
-        plan.start(start, |start, state| self.motion(start, state), stored)
+        mut self,
+        mut start: Start<D, O>,
+    ) -> Result<ExitCode, Error> {
+        start.outlet.turn(&mut self.command.shared().keep.up)?;
+        let case = self.case(&start.name, start.field, start.region)?;
+        let config = config::resolved(C::NAME, &self.command)?;
+        let plan = self.plan(start.name, start.outlet);
+        plan.start(case, &config, &self.device)
     }
 
     fn resume<const D: usize, O: Outlet<D>>(
-        &self,
-        plan: &Plan,
+        mut self,
         stored: StoredRun,
-    ) -> Result<Ending, Error> {
-        plan.resume::<D, O>(stored, |start, state| self.motion(start, state))
+    ) -> Result<ExitCode, Error> {
+        let notes = engine::notes(&stored);
+        let name = notes["about"]["name"].as_str().unwrap_or("run").to_owned();
+        let outlet = O::deserialize(&notes["outlet"]).map_err(|reason| {
+            let path = stored.path().display();
+            Error::options(format!(
+                "{path} cannot be resumed: {reason}; start a new run"
+            ))
+        })?;
+        let (field, region) = engine::initial(&stored)?;
+        let case = self.case(&name, field, region)?;
+        self.plan(name, outlet).resume(stored, case, &self.device)
     }
 
-    fn motion<const D: usize, O>(
-        &self,
-        start: &Start<D, O>,
-        state: &FlowState<D>,
-    ) -> Result<Motion<D>, Error> {
-        let grid = start.field.grid();
-        let params = FlowParams {
-            calibration: self.operator.factors,
-            ..scales::params(grid.spacing(), self.eps_over_h)
-        };
-        let (network, device) = (&self.operator.network, &self.device);
-        let mut flow = WillmoreFlow::with_network(network, &start.field, params, device)?;
-        if let Some(region) = &start.region {
-            flow.restrict_to(region)?;
-        }
-        flow.restore(state)?;
-        Ok(Motion::Willmore {
-            flow: Box::new(flow),
-            tau: self.tau.resolved(params.mcf_step),
-            largest: Motion::largest_step(grid),
+    fn case<const D: usize>(
+        &mut self,
+        name: &str,
+        initial: Field<D>,
+        region: Option<Vec<bool>>,
+    ) -> Result<Case<D>, Error> {
+        let method = self.command.method();
+        let (scales, operator) = operator(self.command.shared().scheme, method, initial.grid())?;
+        let rule = self.command.rule(scales.mcf_step);
+        Ok(Case {
+            shape: name.to_owned(),
+            initial,
+            region,
+            flow: C::FLOW,
+            operator,
+            scales,
+            steps: rule.into(),
+            stops: self.command.shared().stops(rule),
+            measures: Measure::size(scales.eps),
         })
+    }
+
+    fn plan<O>(&mut self, name: String, outlet: O) -> Plan<O> {
+        let (format, save) = self.command.mesh();
+        Plan {
+            command: C::NAME,
+            name,
+            outlet,
+            keep: self.command.shared().keep.clone(),
+            format,
+            save,
+            say: self.say,
+        }
     }
 }

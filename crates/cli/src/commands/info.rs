@@ -1,20 +1,17 @@
 //! `willmore info`.
 
 use std::fmt::Write;
+use std::process::ExitCode;
 
 use model::pretrained;
 use operators::{ComputeDevice, DeviceKind};
 use serde_json::json;
 
-use crate::cli::InfoOptions;
+use crate::cli::SayOptions;
 use crate::error::Error;
-use crate::run::{self, Ending};
 
 /// Says what this program is made of and which devices work.
-///
-/// # Errors
-/// [`Error::Model`] if a network in the program is damaged.
-pub fn run(options: &InfoOptions) -> Result<Ending, Error> {
+pub fn run(say: SayOptions) -> Result<ExitCode, Error> {
     let version = env!("CARGO_PKG_VERSION");
     let mut devices = Vec::new();
     let mut text = format!(
@@ -46,6 +43,6 @@ networks: {accurate} accurate, {paper} of the paper's recipe"
         "devices": devices,
         "networks": { "accurate": accurate, "paper": paper },
     });
-    run::report(options.say, &outcome, &text);
-    Ok(Ending::Done)
+    say.report(&outcome, &text);
+    Ok(ExitCode::SUCCESS)
 }

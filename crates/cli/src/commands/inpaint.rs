@@ -1,58 +1,54 @@
 //! `willmore inpaint`.
 
-use geometry::Field;
+use engine::StepRule;
+use engine::shapes::Region;
 
-use super::flow::Willmore;
-use crate::cli::{FlowOptions, InpaintOptions};
+use super::flow::{FlowCommand, Shared};
+use crate::cli::InpaintOptions;
 use crate::error::Error;
 use crate::input::{self, Loaded, Start};
-use crate::shape::Region;
-use crate::tau::Tau;
 
 /// The usual step in units of the inner one.
 const STEP: f64 = 16.0;
 /// The first step is divided into a ramp that starts this many times halved: at the border of the region there is a jump.
 const HALVINGS: u32 = 12;
 
-impl Willmore for InpaintOptions {
-    const COMMAND: &'static str = "inpaint";
+impl FlowCommand for InpaintOptions {
+    const NAME: &'static str = "inpaint";
 
-    fn flow(&mut self) -> &mut FlowOptions {
-        &mut self.flow
+    fn shared(&mut self) -> Shared<'_> {
+        self.flow.shared()
     }
 
     fn check(&mut self) -> Result<(), Error> {
         let mask = self.mask()?;
         if !Region::is_meant(mask) {
-            let absolute = std::path::absolute(mask).map_err(|source| Error::Io {
-                action: "find",
-                path: mask.into(),
-                source,
-            })?;
+            let absolute = input::absolute(mask)?;
             self.mask = Some(absolute.to_string_lossy().into_owned());
         }
         Ok(())
     }
 
-    fn tau(&self, mcf_step: f64) -> Tau {
-        Tau::Ramp {
-            tau: STEP * mcf_step,
-            halvings: HALVINGS,
-        }
-    }
-
-    fn prepare(&self, input: Loaded, eps: f64) -> Result<Loaded, Error> {
+    fn prepare(&self, input: Loaded) -> Result<Loaded, Error> {
         let mask = self.mask()?;
         Ok(match input {
             Loaded::Plane(start, frame) => {
                 let region = frame.mask(mask, start.field.grid())?;
-                Loaded::Plane(self.restrict(start, region, eps)?, frame)
+                Loaded::Plane(self.restrict(start, region)?, frame)
             }
             Loaded::Space(start) => {
                 let region = input::nodes(mask, start.field.grid())?;
-                Loaded::Space(self.restrict(start, region, eps)?)
+                Loaded::Space(self.restrict(start, region)?)
             }
         })
+    }
+
+    fn rule(&mut self, mcf_step: f64) -> StepRule {
+        self.flow.tau.get_or_insert(StepRule::Ramp {
+            tau: STEP * mcf_step,
+            halvings: HALVINGS,
+        });
+        self.flow.rule(mcf_step)
     }
 }
 
@@ -67,11 +63,10 @@ impl InpaintOptions {
         &self,
         start: Start<D, O>,
         region: Vec<bool>,
-        eps: f64,
     ) -> Result<Start<D, O>, Error> {
-        let field: Field<D> = input::with_ansatz(start.field, &region, &self.ansatz, eps)?;
+        let eps = self.flow.scheme.eps_over_h * start.field.grid().spacing();
         Ok(Start {
-            field,
+            field: self.ansatz.put_into(start.field, &region, eps)?,
             region: Some(region),
             ..start
         })

@@ -12,15 +12,14 @@ pub mod sample;
 pub mod shell;
 pub mod train;
 
+use engine::{Method, Networks, Operator, Scales, Scheme};
+use geometry::Grid;
 use operators::{ComputeDevice, DeviceKind};
 
-use crate::cli::CommonOptions;
+use crate::cli::{CommonOptions, SchemeOptions};
 use crate::error::Error;
 
 /// Opens the device and writes its name into the options.
-///
-/// # Errors
-/// [`Error::Operators`] for a name that is unknown, not compiled in, or without hardware.
 pub fn open_device(options: &mut CommonOptions) -> Result<ComputeDevice, Error> {
     let device = match &options.device {
         Some(name) => ComputeDevice::open(name.parse::<DeviceKind>()?)?,
@@ -28,4 +27,32 @@ pub fn open_device(options: &mut CommonOptions) -> Result<ComputeDevice, Error> 
     };
     options.device = Some(device.kind().name().to_owned());
     Ok(device)
+}
+
+/// Refuses widths of the interface that make no sense.
+pub fn check_eps_over_h(eps_over_h: f64) -> Result<(), Error> {
+    if (0.5..=64.0).contains(&eps_over_h) {
+        return Ok(());
+    }
+    Err(Error::options(format!(
+        "--eps-over-h {eps_over_h} is not possible: an interface is from 0.5 to 64 cells wide"
+    )))
+}
+
+/// The scales of a grid, and the operator for them.
+pub fn operator<const D: usize>(
+    options: &SchemeOptions,
+    method: Method,
+    grid: &Grid<D>,
+) -> Result<(Scales, Operator), Error> {
+    let scales = Scales::of_grid(grid.spacing(), options.eps_over_h);
+    let needed = scales.needs(D, grid.spacing());
+    let networks = Networks::load(options.network.as_slice(), &[needed])?;
+    let scheme = if method.is_learned() {
+        options.scheme
+    } else {
+        Scheme::Paper
+    };
+    let operator = Operator::new((method, scheme), &networks, &needed, grid, &scales)?;
+    Ok((scales, operator))
 }

@@ -1,27 +1,23 @@
 //! `willmore networks`.
 
 use std::path::Path;
+use std::process::ExitCode;
 
 use model::{Network, pretrained};
 use serde_json::{Value, json};
 
-use crate::cli::{NetworksCommand, NetworksOptions};
+use crate::cli::{NetworksCommand, SayOptions};
 use crate::error::Error;
-use crate::run::{self, Ending};
-use crate::scales::stem;
 
 /// Lists the networks, or shows one.
-///
-/// # Errors
-/// [`Error::Model`] for a file that is no network; [`Error::Options`] for a name that is none.
-pub fn run(options: &NetworksOptions) -> Result<Ending, Error> {
+pub fn run(show: Option<&NetworksCommand>, say: SayOptions) -> Result<ExitCode, Error> {
     let shipped = || -> Result<Vec<(String, Network)>, Error> {
         let all = pretrained::all_accurate()?
             .into_iter()
             .chain(pretrained::all()?);
         Ok(all.map(|(name, network)| (stem(name), network)).collect())
     };
-    match &options.show {
+    match show {
         None => {
             let all = shipped()?;
             let lines: Vec<String> = (all.iter())
@@ -31,7 +27,7 @@ pub fn run(options: &NetworksOptions) -> Result<Ending, Error> {
                 .iter()
                 .map(|(name, network)| about(name, network))
                 .collect();
-            run::report(options.say, &Value::Array(list), &lines.join("\n"));
+            say.report(&Value::Array(list), &lines.join("\n"));
         }
         Some(NetworksCommand::Show { network: wanted }) => {
             let all = shipped()?;
@@ -46,10 +42,10 @@ pub fn run(options: &NetworksOptions) -> Result<Ending, Error> {
                 }
             };
             let about = about(&stem(wanted), &network);
-            run::report(options.say, &about, &format!("{about:#}"));
+            say.report(&about, &format!("{about:#}"));
         }
     }
-    Ok(Ending::Done)
+    Ok(ExitCode::SUCCESS)
 }
 
 fn about(name: &str, network: &Network) -> Value {
@@ -60,4 +56,9 @@ fn about(name: &str, network: &Network) -> Value {
         "provenance": network.provenance(),
         "calibration": network.stored_calibration(),
     })
+}
+
+/// The name of a network's file without its extension.
+fn stem(name: &str) -> String {
+    name.trim_end_matches(".safetensors").to_owned()
 }

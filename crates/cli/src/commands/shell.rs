@@ -1,27 +1,24 @@
 //! `willmore completions` and `willmore man`.
 
 use std::io::Write;
+use std::process::ExitCode;
 
 use clap::CommandFactory;
 use clap_complete::Shell;
 
 use crate::cli::Cli;
 use crate::error::Error;
-use crate::run::Ending;
 
 /// Prints completions.
-pub fn completions(shell: Shell) -> Ending {
+pub fn completions(shell: Shell) -> ExitCode {
     let mut text = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "willmore", &mut text);
     print(&text);
-    Ending::Done
+    ExitCode::SUCCESS
 }
 
 /// Prints the manual page: that of the program, then those of its commands.
-///
-/// # Errors
-/// [`Error::Io`] if a page cannot be made.
-pub fn man() -> Result<Ending, Error> {
+pub fn man() -> Result<ExitCode, Error> {
     let mut text = Vec::new();
     let mut command = Cli::command();
     command.build();
@@ -29,14 +26,10 @@ pub fn man() -> Result<Ending, Error> {
     for page in pages {
         clap_mangen::Man::new(page.clone())
             .render(&mut text)
-            .map_err(|source| Error::Io {
-                action: "make the manual page of",
-                path: page.get_name().into(),
-                source,
-            })?;
+            .map_err(Error::io("make the manual page of", page.get_name()))?;
     }
     print(&text);
-    Ok(Ending::Done)
+    Ok(ExitCode::SUCCESS)
 }
 
 fn print(text: &[u8]) {

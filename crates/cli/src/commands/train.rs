@@ -1,16 +1,17 @@
 //! `willmore train`.
 
-use model::training::least_squares::{self, LeastSquaresParams};
-use model::training::{Distillation, Progress, SphereData};
-use model::{Network, Provenance, Quality, Ratios};
+use std::process::ExitCode;
+
+use engine::quarter_square;
+use model::Ratios;
+use model::training::least_squares::LeastSquaresParams;
+use model::training::{Checkpoint, Progress, SphereData, Trained, Training};
 use runs::Interrupt;
 use serde_json::json;
 
-use super::open_device;
-use crate::cli::TrainOptions;
+use super::{check_eps_over_h, open_device};
+use crate::cli::{SayOptions, TrainOptions};
 use crate::error::Error;
-use crate::run::{self, Ending};
-use crate::scales;
 
 /// Cells per unit length of the training grid for `eps = 2h`; it grows with the interface, so that the same spheres fit.
 const CELLS: f64 = 128.0;
@@ -18,24 +19,21 @@ const CELLS: f64 = 128.0;
 const HELD_OUT: usize = 20;
 
 /// Trains a network by the accurate recipe and writes it to a file.
-///
-/// # Errors
-/// [`Error::Options`] for missing or impossible options; [`Error::Model`].
-pub fn run(options: &TrainOptions) -> Result<Ending, Error> {
+pub fn run(mut options: TrainOptions, say: SayOptions) -> Result<ExitCode, Error> {
     let missing = |name: &str| {
         Error::options(format!(
             "train needs --{name}; for example: willmore train --dimension 2 --width 25 --eps-over-h 3 --save mine.safetensors"
         ))
     };
     let eps_over_h = options.eps_over_h.ok_or_else(|| missing("eps-over-h"))?;
-    scales::check_eps_over_h(eps_over_h)?;
+    check_eps_over_h(eps_over_h)?;
     let ratios = Ratios {
         dimension: options.dimension.ok_or_else(|| missing("dimension"))?,
         width: options.width.ok_or_else(|| missing("width"))?,
         eps_over_h,
         step_over_h2: options
             .step_over_h2
-            .unwrap_or_else(|| scales::step_over_h2(eps_over_h)),
+            .unwrap_or_else(|| quarter_square(eps_over_h)),
     };
     ratios.validate()?;
     let save = options.save.as_ref().ok_or_else(|| missing("save"))?;
@@ -45,53 +43,35 @@ pub fn run(options: &TrainOptions) -> Result<Ending, Error> {
             save.display()
         )));
     }
-    let device = open_device(&mut options.common.clone())?;
+    let device = open_device(&mut options.common)?;
     let mut data = SphereData::new(ratios, (CELLS * eps_over_h / 2.0).round() as usize)?;
-    let mut params = LeastSquaresParams::default();
     if options.quick {
-        data.count = 12;
-        params.distillation = Distillation {
-            starts: 1,
-            start_iterations: 10,
-            iterations: 10,
-        };
+        data = data.quick();
     }
-    let seed = options.common.seed;
+    let training = Training {
+        recipe: &LeastSquaresParams::new(options.quick),
+        data,
+        seed: options.common.seed,
+        held_out: if options.quick { 2 } else { HELD_OUT },
+    };
     let interrupt = Interrupt::catch()?;
-    let progress = run::progress(options.common.say);
+    let progress = say.progress();
     let bar = progress.bar("training", 1);
-    let mut training_loss = 0.0;
-    let mut observer = |state: &Progress, (): &()| {
-        bar.set_length(state.of as u64);
-        bar.set_position(state.iteration as u64);
-        training_loss = state.training_loss;
+    let mut observer = |at: &Progress, _: &Checkpoint<()>| {
+        bar.set_length(at.of as u64);
+        bar.set_position(at.iteration as u64);
         Ok(!interrupt.requested())
     };
-    let trained = least_squares::train(&data, &params, seed, &device, &mut observer);
+    let trained = training.run(&mut Checkpoint::default(), &device, &mut observer);
     bar.finish();
     progress.clear();
-    let (kernel, activation, _) = match trained {
-        Err(model::Error::Interrupted { .. }) => return Ok(Ending::Interrupted),
+    let Trained {
+        network, quality, ..
+    } = match trained {
+        Err(model::Error::Interrupted { .. }) => return Ok(ExitCode::from(Interrupt::EXIT_CODE)),
         trained => trained?,
     };
-    let mut provenance = Provenance {
-        recipe: "least squares, heat kernel".to_owned(),
-        reference_cells: data.cells,
-        seed,
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        training_loss,
-        held_out_loss: 0.0,
-        flipped_loss: 0.0,
-    };
-    let network = Network::new(ratios, kernel, activation, provenance.clone())?;
-    let held_out = if options.quick { 2 } else { HELD_OUT };
-    let quality = Quality::measure(&network, &data, held_out, &device)?;
-    provenance.held_out_loss = quality.held_out_loss;
-    provenance.flipped_loss = quality.flipped_loss;
-    let calibration = network.calibrate()?;
-    let network = network
-        .with_provenance(provenance)
-        .with_calibration(Some(calibration));
+    let calibration = network.calibration()?;
     network.save(save)?;
     let outcome = json!({
         "command": "train",
@@ -105,6 +85,6 @@ pub fn run(options: &TrainOptions) -> Result<Ending, Error> {
         quality.held_out_loss,
         save.display()
     );
-    run::report(options.common.say, &outcome, &text);
-    Ok(Ending::Done)
+    say.report(&outcome, &text);
+    Ok(ExitCode::SUCCESS)
 }

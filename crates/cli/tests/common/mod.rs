@@ -64,6 +64,14 @@ pub fn assert_same(run: &Path, reference: &Path) {
     }
 }
 
+/// Says that a part of a test cannot run on this machine; unlike what is printed, that is shown of tests that pass, too.
+#[cfg(target_os = "linux")]
+pub fn skip(what: &str, reason: &str) {
+    use std::io::Write;
+    let line = format!("SKIPPED {what}: {reason}\n");
+    std::io::stderr().write_all(line.as_bytes()).unwrap();
+}
+
 /// Starts the program, that nobody listens to.
 pub fn start(folder: &Path, arguments: &[&str]) -> Child {
     let mut command = program(folder);

@@ -8,12 +8,12 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::{Observer, Progress, SphereData};
+use super::{Observer, Progress, Recipe, SphereData};
 use crate::mlp::forward;
-use crate::{Error, Mlp};
+use crate::{Error, Mlp, Network};
 
 /// Settings of the training.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AdamParams {
     /// Passes over all radii.
     pub epochs: usize,
@@ -25,6 +25,9 @@ pub struct AdamParams {
     pub final_learning_rate: f64,
     /// Held-out radii for the learning curve.
     pub held_out: usize,
+    /// Kernel and activation to start from; `None` is [`paper_start`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub start: Option<(Vec<f64>, Mlp)>,
 }
 
 impl Default for AdamParams {
@@ -35,6 +38,7 @@ impl Default for AdamParams {
             learning_rate: 2e-2,
             final_learning_rate: 1e-3,
             held_out: 10,
+            start: None,
         }
     }
 }
@@ -91,142 +95,177 @@ fn batch<const R: usize>(
     (stack(&|r| r), stack(&|r| data.shrunk(r)))
 }
 
-/// Trains kernel and activation from a start; `state` resumes an earlier run with the same bytes.
-///
-/// # Errors
-/// [`Error::Diverged`], [`Error::Interrupted`], [`Error::Training`].
-pub fn train(
-    data: &SphereData,
-    params: &AdamParams,
-    start: (&[f64], &Mlp),
-    seed: u64,
-    state: Option<AdamState>,
-    device: &ComputeDevice,
-    observer: &mut dyn Observer<AdamState>,
-) -> Result<(Vec<f64>, Mlp, AdamState), Error> {
-    if data.ratios.dimension == 2 {
-        train_in::<2, 3>(data, params, start, seed, state, device, observer)
-    } else {
-        train_in::<3, 4>(data, params, start, seed, state, device, observer)
+impl AdamParams {
+    /// The next stage of the progressive training, on a grid of half the spacing: from the refined kernel and the activation
+    /// of `coarse`, with a quarter of the epochs. The entries of a refined kernel are `2^-D` times as large, and Adam's steps
+    /// do not scale with them, so the learning rates do.
+    #[must_use]
+    pub fn refined(&self, coarse: &Network) -> Self {
+        let ratios = coarse.ratios();
+        let (kernel, _) = refine_kernel(coarse.kernel(), ratios.dimension, ratios.width);
+        let shrinkage = 0.5_f64.powi(ratios.dimension as i32);
+        Self {
+            epochs: self.epochs.div_ceil(4),
+            learning_rate: self.learning_rate * shrinkage,
+            final_learning_rate: self.final_learning_rate * shrinkage,
+            start: Some((kernel, coarse.activation().clone())),
+            ..self.clone()
+        }
+    }
+
+    fn train_in<const D: usize, const R: usize>(
+        &self,
+        data: &SphereData,
+        seed: u64,
+        state: Option<AdamState>,
+        device: &ComputeDevice,
+        observer: &mut dyn Observer<AdamState>,
+    ) -> Result<(Vec<f64>, Mlp), Error> {
+        data.validate()?;
+        if self.batch == 0 || self.epochs == 0 {
+            return Err(Error::Training(
+                "Adam needs at least one epoch and one radius per batch".to_owned(),
+            ));
+        }
+        let (kernel, activation) = match &self.start {
+            Some(start) => start.clone(),
+            None => paper_start(data, seed),
+        };
+        if kernel.len() != data.ratios.kernel_len() {
+            return Err(Error::Shape {
+                what: "kernel to start from",
+                expected: data.ratios.kernel_len().to_string(),
+                found: kernel.len().to_string(),
+            });
+        }
+        let layers = activation.layers().to_vec();
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let radii = data.draw_radii(data.count, &mut rng);
+        let held_out = data.draw_radii(self.held_out.max(1), &mut rng);
+        let (held_spheres, held_targets) = batch::<R>(data, &held_out, device);
+
+        let mut state = match state {
+            Some(state) => state,
+            None => {
+                let parameters = [&kernel[..], activation.parameters()].concat();
+                let zeros = vec![0.0; parameters.len()];
+                AdamState {
+                    moments: [zeros.clone(), zeros],
+                    parameters,
+                    updates: 0,
+                    epoch: 0,
+                }
+            }
+        };
+        let n = kernel.len() + activation.parameters().len();
+        if state.parameters.len() != n || state.moments.iter().any(|m| m.len() != n) {
+            return Err(Error::Shape {
+                what: "training checkpoint",
+                expected: n.to_string(),
+                found: state.parameters.len().to_string(),
+            });
+        }
+        let adam: Adam = AdamConfig::new().with_epsilon(1e-10).build();
+        let upload = |values: &[f64]| device.tensor::<1>(values, [n]);
+        let mut parameters = upload(&state.parameters);
+        let mut momentum = (state.updates > 0).then(|| {
+            let [first, second] = &state.moments;
+            BurnState::new(AdaptiveMomentumState::new(
+                state.updates,
+                upload(first),
+                upload(second),
+            ))
+        });
+        let width = data.ratios.width;
+        while state.epoch < self.epochs {
+            // Every epoch has its own stream, so that a resumed training draws what an uninterrupted one would.
+            let mut order: Vec<usize> = (0..radii.len()).collect();
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            rng.set_stream(1 + state.epoch as u64);
+            order.shuffle(&mut rng);
+            let progress = state.epoch as f64 / (self.epochs.max(2) - 1) as f64;
+            let rate =
+                self.learning_rate * (self.final_learning_rate / self.learning_rate).powf(progress);
+            let mut sum = 0.0;
+            let mut batches = 0.0;
+            for chunk in order.chunks(self.batch) {
+                let chosen: Vec<f64> = chunk.iter().map(|&i| radii[i]).collect();
+                let (spheres, targets) = batch::<R>(data, &chosen, device);
+                let variable = parameters.clone().autodiff().require_grad();
+                let value = loss::<D, R>(&variable, width, &layers, spheres, targets);
+                let gradients = value.clone().backward();
+                let gradient = variable
+                    .grad(&gradients)
+                    .ok_or_else(|| Error::Training("autodiff returned no gradient".to_owned()))?;
+                sum += device.scalar(value.inner())?;
+                batches += 1.0;
+                let (next, next_momentum) = adam.step(rate, parameters, gradient, momentum);
+                (parameters, momentum) = (next, next_momentum);
+                state.updates += 1;
+            }
+            state.epoch += 1;
+            state.parameters = device.values(parameters.clone())?;
+            if let Some(m) = &momentum {
+                state.moments = [
+                    device.values(m.momentum.moment_1.clone())?,
+                    device.values(m.momentum.moment_2.clone())?,
+                ];
+            }
+            if state.parameters.iter().any(|p| !p.is_finite()) {
+                return Err(Error::Diverged {
+                    iteration: state.epoch,
+                    what: "a parameter",
+                });
+            }
+            let held = loss::<D, R>(
+                &parameters,
+                width,
+                &layers,
+                held_spheres.clone(),
+                held_targets.clone(),
+            );
+            let progress = Progress {
+                iteration: state.epoch,
+                of: self.epochs,
+                training_loss: sum / batches,
+                held_out_loss: device.scalar(held)?,
+            };
+            if !observer.observe(&progress, &state)? {
+                return Err(Error::Interrupted {
+                    iteration: state.epoch,
+                });
+            }
+        }
+        let (kernel, activation) = state.parameters.split_at(kernel.len());
+        let activation = Mlp::new(layers, activation.to_vec())?;
+        Ok((kernel.to_vec(), activation))
     }
 }
 
-fn train_in<const D: usize, const R: usize>(
-    data: &SphereData,
-    params: &AdamParams,
-    start: (&[f64], &Mlp),
-    seed: u64,
-    state: Option<AdamState>,
-    device: &ComputeDevice,
-    observer: &mut dyn Observer<AdamState>,
-) -> Result<(Vec<f64>, Mlp, AdamState), Error> {
-    data.validate()?;
-    if params.batch == 0 || params.epochs == 0 {
-        return Err(Error::Training(
-            "Adam needs at least one epoch and one radius per batch".to_owned(),
-        ));
-    }
-    let layers = start.1.layers().to_vec();
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let radii = data.draw_radii(data.count, &mut rng);
-    let held_out = data.draw_radii(params.held_out.max(1), &mut rng);
-    let (held_spheres, held_targets) = batch::<R>(data, &held_out, device);
+impl Recipe for AdamParams {
+    type State = AdamState;
 
-    let mut state = match state {
-        Some(state) => state,
-        None => {
-            let parameters = [start.0, start.1.parameters()].concat();
-            let zeros = vec![0.0; parameters.len()];
-            AdamState {
-                moments: [zeros.clone(), zeros],
-                parameters,
-                updates: 0,
-                epoch: 0,
-            }
-        }
-    };
-    let n = start.0.len() + start.1.parameters().len();
-    if state.parameters.len() != n || state.moments.iter().any(|m| m.len() != n) {
-        return Err(Error::Shape {
-            what: "training checkpoint",
-            expected: n.to_string(),
-            found: state.parameters.len().to_string(),
-        });
-    }
-    let adam: Adam = AdamConfig::new().with_epsilon(1e-10).build();
-    let upload = |values: &[f64]| device.tensor::<1>(values, [n]);
-    let mut parameters = upload(&state.parameters);
-    let mut momentum = (state.updates > 0).then(|| {
-        let [first, second] = &state.moments;
-        BurnState::new(AdaptiveMomentumState::new(
-            state.updates,
-            upload(first),
-            upload(second),
-        ))
-    });
-    let width = data.ratios.width;
-    while state.epoch < params.epochs {
-        // Every epoch has its own stream, so that a resumed training draws what an uninterrupted one would.
-        let mut order: Vec<usize> = (0..radii.len()).collect();
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(1 + state.epoch as u64);
-        order.shuffle(&mut rng);
-        let progress = state.epoch as f64 / (params.epochs.max(2) - 1) as f64;
-        let rate = params.learning_rate
-            * (params.final_learning_rate / params.learning_rate).powf(progress);
-        let mut sum = 0.0;
-        let mut batches = 0.0;
-        for chunk in order.chunks(params.batch) {
-            let chosen: Vec<f64> = chunk.iter().map(|&i| radii[i]).collect();
-            let (spheres, targets) = batch::<R>(data, &chosen, device);
-            let variable = parameters.clone().autodiff().require_grad();
-            let value = loss::<D, R>(&variable, width, &layers, spheres, targets);
-            let gradients = value.clone().backward();
-            let gradient = variable
-                .grad(&gradients)
-                .ok_or_else(|| Error::Training("autodiff returned no gradient".to_owned()))?;
-            sum += device.scalar(value.inner())?;
-            batches += 1.0;
-            let (next, next_momentum) = adam.step(rate, parameters, gradient, momentum);
-            (parameters, momentum) = (next, next_momentum);
-            state.updates += 1;
-        }
-        state.epoch += 1;
-        state.parameters = device.values(parameters.clone())?;
-        if let Some(m) = &momentum {
-            state.moments = [
-                device.values(m.momentum.moment_1.clone())?,
-                device.values(m.momentum.moment_2.clone())?,
-            ];
-        }
-        if state.parameters.iter().any(|p| !p.is_finite()) {
-            return Err(Error::Diverged {
-                iteration: state.epoch,
-                what: "a parameter",
-            });
-        }
-        let held = loss::<D, R>(
-            &parameters,
-            width,
-            &layers,
-            held_spheres.clone(),
-            held_targets.clone(),
-        );
-        let progress = Progress {
-            iteration: state.epoch,
-            of: params.epochs,
-            training_loss: sum / batches,
-            held_out_loss: device.scalar(held)?,
-        };
-        if !observer.observe(&progress, &state)? {
-            return Err(Error::Interrupted {
-                iteration: state.epoch,
-            });
+    fn train(
+        &self,
+        data: &SphereData,
+        seed: u64,
+        state: Option<AdamState>,
+        device: &ComputeDevice,
+        observer: &mut dyn Observer<AdamState>,
+    ) -> Result<(Vec<f64>, Mlp), Error> {
+        if data.ratios.dimension == 2 {
+            self.train_in::<2, 3>(data, seed, state, device, observer)
+        } else {
+            self.train_in::<3, 4>(data, seed, state, device, observer)
         }
     }
-    let (kernel, activation) = state.parameters.split_at(start.0.len());
-    let activation = Mlp::new(layers, activation.to_vec())?;
-    Ok((kernel.to_vec(), activation, state))
+
+    fn describe(&self, data: &SphereData, iterations: usize) -> String {
+        format!(
+            "Adam, {} radii, batches of {}, {iterations} epochs, learning rate {} to {}",
+            data.count, self.batch, self.learning_rate, self.final_learning_rate
+        )
+    }
 }
 
 /// The paper's start: kernel zero, activation parameters normal. It does not say how wide: weights and biases have standard
@@ -313,44 +352,32 @@ mod tests {
         for dimension in [2, 3] {
             let mut data = data(dimension);
             data.cells = if dimension == 2 { 32 } else { 16 };
-            let start = paper_start(&data, 3);
-            let run = |params: &AdamParams, state, losses: &mut Vec<f64>| {
-                let mut watch = |p: &Progress, _: &AdamState| {
-                    losses.push(p.held_out_loss);
-                    Ok(true)
-                };
-                train(
-                    &data,
-                    params,
-                    (&start.0, &start.1),
-                    3,
-                    state,
-                    &device,
-                    &mut watch,
-                )
-                .unwrap()
+            let run = |state, observer: &mut dyn Observer<AdamState>| {
+                params().train(&data, 3, state, &device, observer)
             };
             let mut losses = Vec::new();
-            let (kernel, activation, whole) = run(&params(), None, &mut losses);
+            let mut last = None;
+            let whole = run(None, &mut |p: &Progress, s: &AdamState| {
+                losses.push(p.held_out_loss);
+                last = Some(s.clone());
+                Ok(true)
+            })
+            .unwrap();
             assert!(losses[3] < losses[0], "{dimension}D {losses:?}");
             // Stopped after two epochs of the same schedule, then resumed.
             let mut half = None;
-            let mut stop = |p: &Progress, s: &AdamState| {
+            let stopped = run(None, &mut |p: &Progress, s: &AdamState| {
                 half = Some(s.clone());
                 Ok(p.iteration < 2)
-            };
-            let stopped = train(
-                &data,
-                &params(),
-                (&start.0, &start.1),
-                3,
-                None,
-                &device,
-                &mut stop,
-            );
+            });
             assert!(matches!(stopped, Err(Error::Interrupted { iteration: 2 })));
-            let (k, a, resumed) = run(&params(), half, &mut losses);
-            assert_eq!((k, a, resumed), (kernel, activation, whole));
+            let mut resumed_last = None;
+            let resumed = run(half, &mut |_: &Progress, s: &AdamState| {
+                resumed_last = Some(s.clone());
+                Ok(true)
+            })
+            .unwrap();
+            assert_eq!((resumed, resumed_last), (whole, last));
         }
     }
 

@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use super::distillation::{Distillation, distill_odd};
 use super::levenberg_marquardt::heat_kernel;
 use super::spheres::direction;
-use super::{Observer, SphereData};
+use super::{Observer, Recipe, SphereData};
 use crate::{Error, Mlp, Ratios};
 
 /// Settings of the accurate recipe.
@@ -335,23 +335,53 @@ pub fn kernel_of_full_variance(data: &SphereData) -> Vec<f64> {
     kernel_for(0.5 * (low + high))
 }
 
-/// Fits kernel and activation: the heat kernel, [`fit`], and a perceptron of the paper's layers, made odd (so that its hidden
-/// layers are twice as wide).
-///
-/// # Errors
-/// As [`fit`]; [`Error::Interrupted`] if the observer says so.
-pub fn train(
-    data: &SphereData,
-    params: &LeastSquaresParams,
-    seed: u64,
-    device: &ComputeDevice,
-    observer: &mut dyn Observer<()>,
-) -> Result<(Vec<f64>, Mlp, OddPolynomial), Error> {
-    let kernel = kernel_of_full_variance(data);
-    let polynomial = fit(data, params, &kernel, seed)?;
-    let target = |z: f64| polynomial.jet(z)[0];
-    let activation = distill_odd(&target, &params.distillation, seed, device, observer)?;
-    Ok((kernel, activation, polynomial))
+impl LeastSquaresParams {
+    /// The settings of the shipped networks, or of a smoke test of seconds.
+    pub fn new(quick: bool) -> Self {
+        let mut params = Self::default();
+        if quick {
+            params.distillation = Distillation {
+                starts: 1,
+                start_iterations: 10,
+                iterations: 10,
+            };
+        }
+        params
+    }
+}
+
+impl Recipe for LeastSquaresParams {
+    type State = ();
+
+    /// The heat kernel, [`fit`], and a perceptron of the paper's layers, made odd (so that its hidden layers are twice as wide).
+    fn train(
+        &self,
+        data: &SphereData,
+        seed: u64,
+        _: Option<()>,
+        device: &ComputeDevice,
+        observer: &mut dyn Observer<()>,
+    ) -> Result<(Vec<f64>, Mlp), Error> {
+        let kernel = kernel_of_full_variance(data);
+        let polynomial = fit(data, self, &kernel, seed)?;
+        let target = |z: f64| polynomial.jet(z)[0];
+        let activation = distill_odd(&target, &self.distillation, seed, device, observer)?;
+        Ok((kernel, activation))
+    }
+
+    fn describe(&self, _: &SphereData, _: usize) -> String {
+        format!(
+            "least squares, heat kernel, {} radii of {} to {} eps, {} x {} points each, {} flat interfaces, odd polynomial \
+             of degree {}",
+            self.radii,
+            self.range[0],
+            self.range[1],
+            self.shells,
+            self.directions,
+            self.normals,
+            2 * self.terms - 1
+        )
+    }
 }
 
 #[cfg(test)]
@@ -462,8 +492,9 @@ mod tests {
         let device = ComputeDevice::default_compiled().unwrap();
         let data = data();
         let params = LeastSquaresParams::default();
-        let (_, mlp, polynomial) =
-            train(&data, &params, 1, &device, &mut |_: &_, (): &()| Ok(true)).unwrap();
+        let mut observer = |_: &_, (): &()| Ok(true);
+        let (kernel, mlp) = (params.train(&data, 1, None, &device, &mut observer)).unwrap();
+        let polynomial = fit(&data, &params, &kernel, 1).unwrap();
         let mut worst = [0.0_f64; 3];
         for i in -100..=100 {
             let z = f64::from(i) / 100.0;

@@ -13,7 +13,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::{BandSamples, Observer, Orbits, Progress, SphereData};
+use super::{BandSamples, Observer, Orbits, Progress, Recipe, SphereData};
 use crate::mlp::{forward_with, layout, parameter_count};
 use crate::{Error, Mlp, PAPER_LAYERS};
 
@@ -410,125 +410,144 @@ pub(super) fn random_activation(rng: &mut ChaCha8Rng) -> Vec<f64> {
     parameters
 }
 
-/// Trains kernel and activation; returns the kernel and activation that are best on held-out samples.
-///
-/// `state` resumes an earlier run. The observer sees every iteration, may store the state, and can stop the training.
-///
-/// # Errors
-/// [`Error::Diverged`], [`Error::Interrupted`], [`Error::Training`].
-pub fn train(
-    data: &SphereData,
-    params: &LmParams,
-    start: (&[f64], &Mlp),
-    seed: u64,
-    state: Option<LmState>,
-    device: &ComputeDevice,
-    observer: &mut dyn Observer<LmState>,
-) -> Result<(Vec<f64>, Mlp, LmState), Error> {
-    data.validate()?;
-    let orbits = Orbits::new(data.ratios.dimension, data.ratios.width);
-    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5EED);
-    let samples = |rng: &mut ChaCha8Rng, flipped: f64| {
-        BandSamples::draw(
-            data,
-            &orbits,
-            params.shells,
-            params.directions,
-            flipped,
-            rng,
-        )
-    };
-    let (training, held_out) = (samples(&mut rng, params.flipped), samples(&mut rng, 0.0));
-    let heat = orbits.average(&heat_kernel(data));
-    let activation_len = parameter_count(&PAPER_LAYERS);
-    let mut ridge: Vec<f64> = orbits
-        .sizes()
-        .iter()
-        .map(|&s| params.kernel_ridge * s as f64)
-        .collect();
-    ridge.extend(vec![params.activation_ridge; activation_len]);
-    let centre = [heat, vec![0.0; activation_len]].concat();
-    let n = orbits.count();
-    let scale = training.identity_loss;
-    let held_scale = held_out.identity_loss;
-    let held_out = Problem::new(
-        &held_out,
-        orbits.sizes(),
-        &PAPER_LAYERS,
-        (vec![0.0; ridge.len()], centre.clone()),
-        device,
-    );
-    let problem = Problem::new(
-        &training,
-        orbits.sizes(),
-        &PAPER_LAYERS,
-        (ridge, centre),
-        device,
-    );
-    drop(training);
-
-    let mut state = match state {
-        Some(state) if state.parameters.len() == n + activation_len => state,
-        Some(state) => {
-            return Err(Error::Shape {
-                what: "training checkpoint",
-                expected: (n + activation_len).to_string(),
-                found: state.parameters.len().to_string(),
-            });
+impl LmParams {
+    /// The settings of the shipped networks, or of a smoke test of seconds.
+    pub fn new(quick: bool) -> Self {
+        let mut params = Self::default();
+        if quick {
+            (params.iterations, params.directions, params.starts) = (8, 1, 1);
         }
-        None => {
-            let parameters = [orbits.average(start.0), start.1.parameters().to_vec()].concat();
-            LmState {
-                best: parameters.clone(),
-                parameters,
-                damping: 1e-3,
-                iteration: 0,
-                best_loss: f64::INFINITY,
-                improved_at: 0,
-                improved_to: f64::INFINITY,
+        params
+    }
+
+    /// The splitting scheme: the given kernel, one value per orbit, and [`splitting_start`].
+    fn start(
+        &self,
+        data: &SphereData,
+        heat: &[f64],
+        seed: u64,
+        device: &ComputeDevice,
+    ) -> Result<LmState, Error> {
+        let activation = splitting_start(data.ratios.step_over_eps2(), self, seed, device)?;
+        let parameters = [heat, activation.parameters()].concat();
+        Ok(LmState {
+            best: parameters.clone(),
+            parameters,
+            damping: 1e-3,
+            iteration: 0,
+            best_loss: f64::INFINITY,
+            improved_at: 0,
+            improved_to: f64::INFINITY,
+        })
+    }
+}
+
+impl Recipe for LmParams {
+    type State = LmState;
+
+    /// Kernel and activation are those that are best on held-out samples.
+    fn train(
+        &self,
+        data: &SphereData,
+        seed: u64,
+        state: Option<LmState>,
+        device: &ComputeDevice,
+        observer: &mut dyn Observer<LmState>,
+    ) -> Result<(Vec<f64>, Mlp), Error> {
+        data.validate()?;
+        let orbits = Orbits::new(data.ratios.dimension, data.ratios.width);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5EED);
+        let samples = |rng: &mut ChaCha8Rng, flipped: f64| {
+            BandSamples::draw(data, &orbits, self.shells, self.directions, flipped, rng)
+        };
+        let (training, held_out) = (samples(&mut rng, self.flipped), samples(&mut rng, 0.0));
+        let heat = orbits.average(&heat_kernel(data));
+        let activation_len = parameter_count(&PAPER_LAYERS);
+        let mut ridge: Vec<f64> = orbits
+            .sizes()
+            .iter()
+            .map(|&s| self.kernel_ridge * s as f64)
+            .collect();
+        ridge.extend(vec![self.activation_ridge; activation_len]);
+        let centre = [heat.clone(), vec![0.0; activation_len]].concat();
+        let n = orbits.count();
+        let scale = training.identity_loss;
+        let held_scale = held_out.identity_loss;
+        let held_out = Problem::new(
+            &held_out,
+            orbits.sizes(),
+            &PAPER_LAYERS,
+            (vec![0.0; ridge.len()], centre.clone()),
+            device,
+        );
+        let problem = Problem::new(
+            &training,
+            orbits.sizes(),
+            &PAPER_LAYERS,
+            (ridge, centre),
+            device,
+        );
+        drop(training);
+
+        let mut state = match state {
+            Some(state) if state.parameters.len() == n + activation_len => state,
+            Some(state) => {
+                return Err(Error::Shape {
+                    what: "training checkpoint",
+                    expected: (n + activation_len).to_string(),
+                    found: state.parameters.len().to_string(),
+                });
+            }
+            None => self.start(data, &heat, seed, device)?,
+        };
+        while state.iteration < self.iterations
+            && state.iteration <= state.improved_at + self.patience
+        {
+            let Some(next) = problem.step(&state.parameters, &mut state.damping)? else {
+                break;
+            };
+            state.parameters = next;
+            state.iteration += 1;
+            let (loss, _) = problem.value(&state.parameters)?;
+            let (held, _) = held_out.value(&state.parameters)?;
+            let held = held * held_scale;
+            if !held.is_finite() {
+                return Err(Error::Diverged {
+                    iteration: state.iteration,
+                    what: "held-out loss",
+                });
+            }
+            if held < state.best_loss {
+                state.best_loss = held;
+                state.best.clone_from(&state.parameters);
+            }
+            if held < 0.99 * state.improved_to {
+                state.improved_to = held;
+                state.improved_at = state.iteration;
+            }
+            let progress = Progress {
+                iteration: state.iteration,
+                of: self.iterations,
+                training_loss: loss * scale,
+                held_out_loss: held,
+            };
+            if !observer.observe(&progress, &state)? {
+                return Err(Error::Interrupted {
+                    iteration: state.iteration,
+                });
             }
         }
-    };
-    while state.iteration < params.iterations
-        && state.iteration <= state.improved_at + params.patience
-    {
-        let Some(next) = problem.step(&state.parameters, &mut state.damping)? else {
-            break;
-        };
-        state.parameters = next;
-        state.iteration += 1;
-        let (loss, _) = problem.value(&state.parameters)?;
-        let (held, _) = held_out.value(&state.parameters)?;
-        let held = held * held_scale;
-        if !held.is_finite() {
-            return Err(Error::Diverged {
-                iteration: state.iteration,
-                what: "held-out loss",
-            });
-        }
-        if held < state.best_loss {
-            state.best_loss = held;
-            state.best.clone_from(&state.parameters);
-        }
-        if held < 0.99 * state.improved_to {
-            state.improved_to = held;
-            state.improved_at = state.iteration;
-        }
-        let progress = Progress {
-            iteration: state.iteration,
-            of: params.iterations,
-            training_loss: loss * scale,
-            held_out_loss: held,
-        };
-        if !observer.observe(&progress, &state)? {
-            return Err(Error::Interrupted {
-                iteration: state.iteration,
-            });
-        }
+        let (kernel, activation) = state.best.split_at(n);
+        let activation = Mlp::new(PAPER_LAYERS.to_vec(), activation.to_vec())?;
+        Ok((orbits.expand(kernel), activation))
     }
-    let (kernel, activation) = state.best.split_at(n);
-    let activation = Mlp::new(PAPER_LAYERS.to_vec(), activation.to_vec())?;
-    Ok((orbits.expand(kernel), activation, state))
+
+    fn describe(&self, data: &SphereData, iterations: usize) -> String {
+        format!(
+            "Levenberg-Marquardt, {} radii, {} x {} points each, {iterations} iterations",
+            data.count, self.shells, self.directions
+        )
+    }
 }
 
 #[cfg(test)]
@@ -606,22 +625,13 @@ mod tests {
         let device = ComputeDevice::default_compiled().unwrap();
         for dimension in [2, 3] {
             let data = data(dimension);
-            let start = splitting_start(0.25, &params(), 1, &device).unwrap();
-            let kernel = heat_kernel(&data);
             let run = |state, observer: &mut dyn Observer<LmState>| {
-                train(
-                    &data,
-                    &params(),
-                    (&kernel, &start),
-                    2,
-                    state,
-                    &device,
-                    observer,
-                )
+                params().train(&data, 2, state, &device, observer)
             };
-            let mut losses = Vec::new();
-            let whole = run(None, &mut |p: &Progress, _: &LmState| {
+            let (mut losses, mut last) = (Vec::new(), None);
+            let whole = run(None, &mut |p: &Progress, s: &LmState| {
                 losses.push(p.held_out_loss);
+                last = Some(s.clone());
                 Ok(true)
             })
             .unwrap();
@@ -635,8 +645,13 @@ mod tests {
                 Ok(p.iteration < 3)
             });
             assert!(matches!(stopped, Err(Error::Interrupted { iteration: 3 })));
-            let resumed = run(half, &mut |_: &Progress, _: &LmState| Ok(true)).unwrap();
-            assert_eq!(resumed, whole);
+            let mut resumed_last = None;
+            let resumed = run(half, &mut |_: &Progress, s: &LmState| {
+                resumed_last = Some(s.clone());
+                Ok(true)
+            })
+            .unwrap();
+            assert_eq!((resumed, resumed_last), (whole, last));
         }
     }
 

@@ -3,15 +3,19 @@
 //! [`adam`] is the paper's: mini-batches of whole grids, refined progressively. [`levenberg_marquardt`] solves the same
 //! least-squares problem on sampled points and gets to its floor in a minute. [`least_squares`] asks for another thing, the
 //! same relative accuracy at every curvature, which is what the calibrated Willmore scheme needs.
+//!
+//! Each is a [`Recipe`]; a [`Training`] runs any of them.
 
 pub mod adam;
 mod distillation;
 pub mod least_squares;
 pub mod levenberg_marquardt;
+mod recipe;
 mod spheres;
 mod symmetry;
 
 pub use distillation::Distillation;
+pub use recipe::{Checkpoint, CurvePoint, Recipe, Trained, Training};
 pub use spheres::{BandSamples, SphereData};
 pub use symmetry::Orbits;
 

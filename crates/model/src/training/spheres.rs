@@ -5,12 +5,13 @@ use geometry::optimal_profile;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::Orbits;
 use crate::{Error, Ratios};
 
 /// The paper's data: radii uniform in `[r_min, r_max]` on the unit cube, at the grid the ratios were chosen for.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SphereData {
     /// Ratios of the operator to be trained.
     pub ratios: Ratios,
@@ -37,6 +38,12 @@ impl SphereData {
         };
         data.validate()?;
         Ok(data)
+    }
+
+    /// Few radii, for a smoke test.
+    #[must_use]
+    pub fn quick(self) -> Self {
+        Self { count: 12, ..self }
     }
 
     /// Checks the settings after a change.

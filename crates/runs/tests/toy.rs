@@ -9,30 +9,17 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use files::Storage;
-use runs::{Error, GridShape, Identity, Interrupt, NetworkName, Resumed, RunDirectory, State};
-use serde::Serialize;
+use runs::{Error, Interrupt, RunDirectory, State};
 use serde_json::json;
 use tempfile::TempDir;
 
 pub const STEPS: u64 = 60;
 const CELLS: usize = 16;
 
-pub fn identity() -> Identity {
-    Identity {
-        kind: "logistic map".into(),
-        program: "toy 0.1".into(),
-        grid: GridShape {
-            cells: vec![4, 4],
-            side: 2.0,
-            origin: vec![-1.0, -1.0],
-        },
-        network: Some(NetworkName {
-            name: "plane".into(),
-            checksum: runs::fingerprint("weights"),
-        }),
-        options: runs::fingerprint("rate = 3.9"),
-    }
-}
+pub const FILES: [(&str, &str); 2] = [
+    ("config.toml", "rate = 3.9\n"),
+    ("manifest.json", "{ \"steps\": 60 }\n"),
+];
 
 /// The disk, but without waiting for it.
 #[derive(Debug)]
@@ -58,32 +45,32 @@ pub fn quick_folder() -> TempDir {
     tempfile::tempdir().unwrap()
 }
 
-#[derive(Serialize)]
-struct Row {
-    step: u64,
-    time: f64,
-    mean: f64,
-}
-
 fn beginning() -> State {
     let values = (0..CELLS).map(|i| (i as f64 + 0.5) / CELLS as f64);
-    State::new(0, 0.0)
+    State::new(0, json!({ "time": 0.0, "largest": 0.0 }))
         .with_array("u", values.collect())
         .with_array("means", Vec::new())
-        .with_notes(json!({ "largest": 0.0 }))
 }
 
 fn step(state: &mut State) {
     state.step += 1;
-    state.time += 0.1;
+    let time = state.notes["time"].as_f64().unwrap() + 0.1;
     let u = &mut state.arrays[0].1;
     for v in u.iter_mut() {
         *v *= 3.9 * (1.0 - *v);
     }
     let mean = u.iter().sum::<f64>() / CELLS as f64;
     let largest = state.notes["largest"].as_f64().unwrap().max(mean);
-    state.notes = json!({ "largest": largest });
+    state.notes = json!({ "time": time, "largest": largest });
     state.arrays[1].1.push(mean);
+}
+
+fn write_metrics(run: &mut RunDirectory, state: &State) -> Result<(), Error> {
+    let means = state.array("means").unwrap();
+    run.replace_file("metrics.csv", |out| {
+        writeln!(out, "step,mean")?;
+        (means.iter().zip(1..)).try_for_each(|(mean, step)| writeln!(out, "{step},{mean}"))
+    })
 }
 
 pub fn state_at(step_number: u64) -> State {
@@ -110,41 +97,27 @@ pub struct Toy<'a> {
 
 /// Starts or resumes the toy, commits every 3 steps and writes a field every 10.
 pub fn run(folder: &Path, toy: &Toy) -> Result<(), Error> {
-    let identity = identity();
     let mut opened = RunDirectory::open_on(toy.storage.clone(), folder);
     if toy.recover && matches!(opened, Err(Error::Damaged { .. })) {
         opened = RunDirectory::recover_on(toy.storage.clone(), folder);
     }
-    let (mut run, state) = match opened {
-        Ok(mut stored) if stored.is_finished() => {
-            stored.remove_leftovers()?;
-            return Ok(());
-        }
+    let (mut run, mut state) = match opened {
+        Ok(stored) if stored.is_finished() => return stored.tidy(),
         Ok(stored) => {
-            let step = stored.checkpoint().map_or(0, |c| c.state.step);
-            toy.committed.set(Some(step));
-            let Resumed { run, state, .. } = stored.resume(&identity)?;
-            (run, state)
+            toy.committed.set(Some(stored.state().step));
+            stored.resume()?
         }
-        Err(Error::NoRun { .. }) => {
-            let manifest = json!({ "experiment": "logistic", "steps": STEPS });
-            let storage = toy.storage.clone();
-            let run =
-                RunDirectory::create_on(storage, folder, &identity, &manifest, "rate = 3.9\n")?;
+        Err(Error::NoRun(_)) => {
+            let start = beginning();
+            let run = RunDirectory::create_on(toy.storage.clone(), folder, &FILES, &start)?;
             toy.committed.set(Some(0));
-            (run, None)
+            (run, start)
         }
         Err(error) => return Err(error),
     };
-    let mut state = state.unwrap_or_else(beginning);
     while state.step < STEPS.min(toy.stop) {
         step(&mut state);
         std::thread::sleep(toy.pause);
-        run.metric(&Row {
-            step: state.step,
-            time: state.time,
-            mean: state.arrays[1].1.last().copied().unwrap(),
-        })?;
         if state.step.is_multiple_of(10) {
             let name = format!("fields/step-{:04}.raw", state.step);
             let values = state.arrays[0].1.iter().flat_map(|v| v.to_le_bytes());
@@ -160,6 +133,7 @@ pub fn run(folder: &Path, toy: &Toy) -> Result<(), Error> {
         }
         let interrupted = toy.interrupt.requested();
         if state.step.is_multiple_of(3) || interrupted {
+            write_metrics(&mut run, &state)?;
             run.commit(&state)?;
             toy.committed.set(Some(state.step));
             run.write_timings(&json!({ "seconds": std::process::id() }))?;
@@ -170,6 +144,7 @@ pub fn run(folder: &Path, toy: &Toy) -> Result<(), Error> {
     }
     if toy.stop >= STEPS {
         run.write_file("figures/mean.svg", |out| writeln!(out, "{}", state.notes))?;
+        write_metrics(&mut run, &state)?;
         run.finish(&state)?;
         toy.committed.set(Some(state.step));
     }
@@ -215,9 +190,6 @@ pub fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 pub fn write_contents(folder: &Path, contents: &BTreeMap<String, Vec<u8>>) {
-    for name in ["checkpoints", "figures", "fields"] {
-        fs::create_dir_all(folder.join(name)).unwrap();
-    }
     for (name, bytes) in contents {
         let path = folder.join(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();

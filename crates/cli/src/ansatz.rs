@@ -1,0 +1,74 @@
+//! What an inpainted region holds at the beginning.
+
+use std::str::FromStr;
+
+use engine::shapes::Region;
+use geometry::{Field, phase_field};
+use serde::{Serialize, Serializer};
+
+use crate::error::Error;
+
+/// What the inpainted region holds at the beginning.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ansatz {
+    /// What the input has there.
+    Keep,
+    /// Nothing.
+    Empty,
+    /// All inside.
+    Full,
+    /// A shape.
+    Shape(Region),
+}
+
+impl Ansatz {
+    /// The phase field with the ansatz in the region.
+    pub fn put_into<const D: usize>(
+        &self,
+        mut field: Field<D>,
+        region: &[bool],
+        eps: f64,
+    ) -> Result<Field<D>, Error> {
+        let grid = *field.grid();
+        let inner = match self {
+            Self::Keep => return Ok(field),
+            Self::Empty => Field::constant(grid, -1.0),
+            Self::Full => Field::constant(grid, 1.0),
+            Self::Shape(shape) => phase_field(grid, shape.shape::<D>()?.as_ref(), eps)?,
+        };
+        let values = field.values_mut().iter_mut().zip(inner.values());
+        for ((value, inner), _) in values.zip(region).filter(|(_, inside)| **inside) {
+            *value = *inner;
+        }
+        Ok(field)
+    }
+}
+
+impl FromStr for Ansatz {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Ok(match text {
+            "keep" => Self::Keep,
+            "empty" => Self::Empty,
+            "full" => Self::Full,
+            text if Region::is_meant(text) => Self::Shape(text.parse()?),
+            text => {
+                return Err(format!(
+                    "{text:?} is no ansatz: give keep, empty, full, box:... or ball:..."
+                ));
+            }
+        })
+    }
+}
+
+impl Serialize for Ansatz {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Keep => serializer.serialize_str("keep"),
+            Self::Empty => serializer.serialize_str("empty"),
+            Self::Full => serializer.serialize_str("full"),
+            Self::Shape(region) => serializer.collect_str(region),
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! What is printed.
+
+use std::io::Write;
+
+use report::Progress;
+use serde_json::Value;
+
+use crate::cli::SayOptions;
+
+impl SayOptions {
+    /// Prints the outcome of a command: an object, or a text for people.
+    pub fn report(self, outcome: &Value, text: &str) {
+        // A closed pipe (`| head`) is no reason to fail after the results have been written.
+        if self.json {
+            let _ = writeln!(std::io::stdout(), "{outcome}");
+        } else if !self.quiet {
+            let _ = writeln!(std::io::stdout(), "{text}");
+        }
+    }
+
+    /// Says what was mended.
+    pub fn warn(self, what: &str) {
+        if !self.quiet {
+            eprintln!("warning: {what}");
+        }
+    }
+
+    /// Progress bars, if anybody wants to see them.
+    pub fn progress(self) -> Progress {
+        Progress::new(self.quiet || self.json)
+    }
+}

@@ -1,0 +1,202 @@
+//! What all ways to train share: the history, the checkpoint, the measured quality and the account of the origin.
+
+use std::time::Instant;
+
+use operators::ComputeDevice;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use super::{Observer, Progress, SphereData};
+use crate::{Error, Mlp, Network, Provenance, Quality};
+
+/// A way to train, with its settings.
+pub trait Recipe: Serialize {
+    /// What the training needs to go on with the same bytes after an interruption; `()` for one that starts over.
+    type State: Clone + Serialize + DeserializeOwned;
+
+    /// Finds kernel and activation. The observer sees every iteration, and may stop the training.
+    ///
+    /// # Errors
+    /// [`Error::Training`] for impossible settings, [`Error::Shape`] for a state of other settings, [`Error::Diverged`],
+    /// [`Error::Interrupted`], [`Error::Operators`].
+    fn train(
+        &self,
+        data: &SphereData,
+        seed: u64,
+        state: Option<Self::State>,
+        device: &ComputeDevice,
+        observer: &mut dyn Observer<Self::State>,
+    ) -> Result<(Vec<f64>, Mlp), Error>;
+
+    /// Method and settings in words, after so many iterations.
+    fn describe(&self, data: &SphereData, iterations: usize) -> String;
+}
+
+/// Everything that the result of a training depends on.
+#[derive(Clone, Debug, Serialize)]
+pub struct Training<'a, R> {
+    /// How to train.
+    pub recipe: &'a R,
+    /// What to train on.
+    pub data: SphereData,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Number of held-out radii on which the quality is measured.
+    pub held_out: usize,
+}
+
+/// One point of a learning curve.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CurvePoint {
+    /// Finished iterations or epochs.
+    pub iteration: usize,
+    /// Wall time since the start of the training, interruptions left out.
+    pub seconds: f64,
+    /// Loss on the training samples.
+    pub training_loss: f64,
+    /// Loss on held-out samples.
+    pub held_out_loss: f64,
+}
+
+/// Where a training stands. To be stored now and then; the default stands at the start.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Checkpoint<State> {
+    /// State after the last iteration.
+    pub state: Option<State>,
+    /// How the loss went.
+    pub curve: Vec<CurvePoint>,
+}
+
+impl<State> Default for Checkpoint<State> {
+    fn default() -> Self {
+        Self {
+            state: None,
+            curve: Vec::new(),
+        }
+    }
+}
+
+/// A finished training.
+#[derive(Clone, Debug)]
+pub struct Trained {
+    /// The network with its provenance, and with its calibration if it has one: hardly trained networks have no flat interface.
+    pub network: Network,
+    /// How the loss went.
+    pub curve: Vec<CurvePoint>,
+    /// Measured quality.
+    pub quality: Quality,
+}
+
+impl Trained {
+    /// Wall time of the training.
+    pub fn seconds(&self) -> f64 {
+        self.curve.last().map_or(0.0, |point| point.seconds)
+    }
+}
+
+impl<R: Recipe> Training<'_, R> {
+    /// Trains on from a checkpoint, keeps it up to date, and measures the result.
+    ///
+    /// # Errors
+    /// As [`Recipe::train`] and [`Quality::measure`], and whatever the observer raises.
+    pub fn run(
+        &self,
+        checkpoint: &mut Checkpoint<R::State>,
+        device: &ComputeDevice,
+        observer: &mut dyn Observer<Checkpoint<R::State>>,
+    ) -> Result<Trained, Error> {
+        let state = checkpoint.state.clone();
+        if state.is_none() {
+            checkpoint.curve.clear();
+        }
+        let before = checkpoint.curve.last().map_or(0.0, |point| point.seconds);
+        let clock = Instant::now();
+        let mut record = |progress: &Progress, state: &R::State| {
+            checkpoint.state = Some(state.clone());
+            checkpoint.curve.push(CurvePoint {
+                iteration: progress.iteration,
+                seconds: before + clock.elapsed().as_secs_f64(),
+                training_loss: progress.training_loss,
+                held_out_loss: progress.held_out_loss,
+            });
+            observer.observe(progress, checkpoint)
+        };
+        let (kernel, activation) =
+            (self.recipe).train(&self.data, self.seed, state, device, &mut record)?;
+        self.finish(kernel, activation, checkpoint.curve.clone(), device)
+    }
+
+    /// Measures the result and puts the network together.
+    fn finish(
+        &self,
+        kernel: Vec<f64>,
+        activation: Mlp,
+        curve: Vec<CurvePoint>,
+        device: &ComputeDevice,
+    ) -> Result<Trained, Error> {
+        let mut provenance = Provenance {
+            recipe: self.recipe.describe(&self.data, curve.len()),
+            reference_cells: self.data.cells,
+            seed: self.seed,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            training_loss: curve.last().map_or(0.0, |point| point.training_loss),
+            held_out_loss: 0.0,
+            flipped_loss: 0.0,
+        };
+        let network = Network::new(self.data.ratios, kernel, activation, provenance.clone())?;
+        let quality = Quality::measure(&network, &self.data, self.held_out, device)?;
+        provenance.held_out_loss = quality.held_out_loss;
+        provenance.flipped_loss = quality.flipped_loss;
+        let calibration = network.calibrate().ok();
+        Ok(Trained {
+            network: network
+                .with_provenance(provenance)
+                .with_calibration(calibration),
+            curve,
+            quality,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Ratios;
+    use crate::training::levenberg_marquardt::{LmParams, LmState};
+
+    #[test]
+    fn an_interrupted_training_goes_on_from_its_stored_checkpoint() {
+        let device = ComputeDevice::default_compiled().unwrap();
+        let ratios = Ratios {
+            dimension: 2,
+            width: 9,
+            eps_over_h: 1.0,
+            step_over_h2: 0.25,
+        };
+        let training = Training {
+            recipe: &LmParams::new(true),
+            data: SphereData::new(ratios, 64).unwrap().quick(),
+            seed: 1,
+            held_out: 2,
+        };
+        let run = |checkpoint: &mut Checkpoint<LmState>, last: usize| {
+            training.run(checkpoint, &device, &mut |p: &Progress, _: &_| {
+                Ok(p.iteration < last)
+            })
+        };
+        let whole = run(&mut Checkpoint::default(), 100).unwrap();
+        let mut checkpoint = Checkpoint::default();
+        let stopped = run(&mut checkpoint, 3);
+        assert!(matches!(stopped, Err(Error::Interrupted { iteration: 3 })));
+        let stored = serde_json::to_string(&checkpoint).unwrap();
+        let mut found = serde_json::from_str(&stored).unwrap();
+        let resumed = run(&mut found, 100).unwrap();
+        assert_eq!(resumed.network, whole.network);
+        let losses = |trained: &Trained| -> Vec<(usize, f64)> {
+            let curve = trained.curve.iter();
+            curve.map(|p| (p.iteration, p.held_out_loss)).collect()
+        };
+        assert_eq!(losses(&resumed), losses(&whole));
+        assert!(resumed.curve.is_sorted_by_key(|point| point.seconds));
+    }
+}
