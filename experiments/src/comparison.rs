@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
-use engine::{Flow, Measure, Method, Operator, Samples, Scheme, Trajectory, Values};
+use engine::{Flow, Measure, Method, Operator, Samples, Scheme, Trajectory, energy_increases};
 use geometry::contour::{Interpolation, zero_level};
 use geometry::measure::{perimeter, zero_set_volume};
 use geometry::shapes::Cross;
@@ -78,10 +78,14 @@ pub fn main(setting: &Setting) -> ExitCode {
     harness::run(|| run(setting, &options))
 }
 
-/// A run with what it is.
+/// A run and its distances to the reference.
 struct Compared {
     variant: Variant,
     trajectory: Trajectory<2>,
+    /// Its steps for each of `2^-14`.
+    ratio: usize,
+    /// Steps of `2^-14` and `L2` distances; none for the reference itself.
+    errors: Vec<(usize, f64)>,
 }
 
 /// Everything a comparison computed.
@@ -98,27 +102,24 @@ struct Comparison<'a> {
 fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
     let (flow, quick, cells) = (setting.flow, options.study.run.quick, options.study.cells());
     let finest = cells.iter().copied().max().unwrap_or(0);
-    let reference_n = (options.reference_n).unwrap_or(if quick { finest } else { 2 * finest });
+    let usual = if quick { finest } else { 2 * finest };
+    let reference_n = options.reference_n.unwrap_or(usual);
     if let Some(n) = cells.iter().find(|n| !reference_n.is_multiple_of(**n)) {
         return Err(Error::Options(format!(
             "--reference-n {reference_n} must be a multiple of every n compared with it, also of {n}"
         )));
     }
-    let steps = options
-        .steps
-        .unwrap_or(if quick { 2 } else { setting.steps });
+    let usual = if quick { 2 } else { setting.steps };
+    let steps = options.steps.unwrap_or(usual);
     if steps == 0 {
         return Err(Error::Options("--steps must be at least 1".to_owned()));
     }
     let device = options.study.run.open_device()?;
     // Franken, Rumpf and Wirth: for eps = 2h the nested scheme is unstable.
-    let stable = |method: Method, n| {
-        flow == Flow::MeanCurvature || method.is_learned() || n as f64 * EPS >= 4.0
-    };
-    let study = Study::new(
-        &options.study.networks,
-        &options.study.variants(flow, stable),
-    )?;
+    let nested = |method: Method| flow == Flow::Willmore && !method.is_learned();
+    let stable = |method, n| !nested(method) || n as f64 * EPS >= 4.0;
+    let variants = options.study.variants(flow, stable);
+    let study = Study::new(&options.study.networks, &variants)?;
     let parameters = json!({
         "shape": setting.shape,
         "flow": flow,
@@ -147,28 +148,27 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
             scheme,
             n,
         };
-        setting.run(
-            &mut session,
-            what,
-            (variant, &operator),
-            (steps, setting.reference_ratio),
-        )
+        let time = (steps, setting.reference_ratio);
+        setting.run(&mut session, what, (variant, &operator), time)
     };
     let reference = finer("reference: ", reference_n)?;
     // The error of the reference is estimated from the same run at half the resolution.
-    let half = reference_n.is_multiple_of(2) && finest <= reference_n / 2;
-    let half = half
-        .then(|| finer("for the reference's error: ", reference_n / 2))
-        .transpose()?;
-    Comparison {
+    let mut half = None;
+    if reference_n.is_multiple_of(2) && finest <= reference_n / 2 {
+        half = Some(finer("for the reference's error: ", reference_n / 2)?);
+    }
+    for run in runs.iter_mut().chain(&mut half) {
+        run.compare(&reference, steps)?;
+    }
+    let comparison = Comparison {
         setting,
         steps,
         study,
         runs,
         reference,
         half,
-    }
-    .write(session)
+    };
+    comparison.write(session)
 }
 
 impl Setting {
@@ -179,26 +179,22 @@ impl Setting {
         (variant, operator): (Variant, &Operator),
         (steps, ratio): (usize, usize),
     ) -> Result<Compared, Error> {
-        let grid = Grid::<2>::per_unit(variant.n, self.side)?;
-        let steps = (STEP / ratio as f64, steps * ratio);
-        let mut case = study::case(
-            (self.flow, operator),
-            self.shape,
-            (self.initial)(grid)?,
-            steps,
-        );
+        let initial = (self.initial)(Grid::<2>::per_unit(variant.n, self.side)?)?;
+        let time = (STEP / ratio as f64, steps * ratio);
+        let mut case = study::case((self.flow, operator), self.shape, initial, time);
         case.measures = Measure::crossings(0.0);
-        case.measures.push(Measure::new("perimeter", |u, _| {
-            perimeter(u, EPS).map(Some)
-        }));
-        case.measures
-            .push(Measure::new("area", |u, _| Ok(Some(zero_set_volume(u)))));
+        case.measures.extend([
+            Measure::new("perimeter", |u, _| perimeter(u, EPS).map(Some)),
+            Measure::new("area", |u, _| Ok(Some(zero_set_volume(u)))),
+        ]);
         let title = format!("{what}{}, n = {}", variant.label(), variant.n);
         let name = format!("{}-{ratio}", variant.key());
         let trajectory = session.trajectory(&title, case, &name, &samples(ratio))?;
         Ok(Compared {
             variant,
             trajectory,
+            ratio,
+            errors: Vec::new(),
         })
     }
 }
@@ -211,105 +207,76 @@ fn samples(ratio: usize) -> Samples {
     }
 }
 
+fn sampled(steps: usize) -> impl Iterator<Item = usize> {
+    (0..=steps).filter(move |&step| samples(1).holds(step) || step == steps)
+}
+
 fn time(step: usize) -> f64 {
     step as f64 * STEP
 }
 
 impl Compared {
+    fn compare(&mut self, reference: &Self, steps: usize) -> Result<(), Error> {
+        if (self.variant, self.ratio) == (reference.variant, reference.ratio) {
+            return Ok(());
+        }
+        for k in sampled(steps) {
+            let (own, its) = (k * self.ratio, k * reference.ratio);
+            let l2 = (self.trajectory).distance(own, &reference.trajectory, its)?;
+            self.errors.push((k, l2));
+        }
+        Ok(())
+    }
+
     fn minimizations(&self) -> impl Iterator<Item = &StepRecord> {
         let records = self.trajectory.records.iter();
         records.filter_map(|record| record.minimization.as_ref())
     }
 
-    fn seconds_per_step(&self) -> f64 {
-        self.trajectory.seconds() / self.trajectory.steps() as f64
-    }
-
     /// The zero level at a time.
     fn loops(&self, step: usize) -> Result<Curve, Error> {
-        let ratio = (STEP / self.trajectory.case.steps.rule.size(1)).round() as usize;
-        let field = self.trajectory.field(step * ratio)?;
+        let field = self.trajectory.field(step * self.ratio)?;
         let curves = zero_level(&field, Interpolation::Profile).into_iter();
-        Ok(Curve::new(
-            curves.map(|curve| curve.points).collect::<Vec<_>>(),
-        ))
+        let points: Vec<_> = curves.map(|curve| curve.points).collect();
+        Ok(Curve::new(points))
     }
 }
 
 impl Comparison<'_> {
-    fn sampled(&self) -> impl Iterator<Item = usize> {
-        (0..=self.steps).filter(|&step| samples(1).holds(step) || step == self.steps)
-    }
-
     fn shown(&self) -> Vec<usize> {
         let drawn = |step: &usize| self.setting.shown.contains(step) || *step == self.steps;
-        self.sampled().filter(drawn).collect()
-    }
-
-    fn is_reference(&self, run: &Compared) -> bool {
-        run.variant == self.reference.variant && self.setting.reference_ratio == 1
-    }
-
-    /// Runs that are compared with the reference: all but the reference itself.
-    fn others(&self) -> impl Iterator<Item = &Compared> {
-        self.runs.iter().filter(|run| !self.is_reference(run))
-    }
-
-    /// Steps and distances to the reference, which makes several steps for each.
-    fn errors(&self, run: &Compared) -> Result<Vec<(usize, f64)>, Error> {
-        let ratio = self.setting.reference_ratio;
-        let error = |k: usize| {
-            Ok((
-                k,
-                run.trajectory
-                    .distance(k, &self.reference.trajectory, k * ratio)?,
-            ))
-        };
-        self.sampled().map(error).collect()
+        sampled(self.steps).filter(drawn).collect()
     }
 
     /// Largest distance over time between the reference and the same method at half the resolution.
-    fn reference_difference(&self) -> Result<Option<f64>, Error> {
-        let Some(half) = &self.half else {
-            return Ok(None);
-        };
-        let mut largest = 0.0_f64;
-        for step in self.sampled().map(|k| k * self.setting.reference_ratio) {
-            largest = largest.max(half.trajectory.distance(
-                step,
-                &self.reference.trajectory,
-                step,
-            )?);
-        }
-        Ok(Some(largest))
+    fn reference_difference(&self) -> Option<f64> {
+        let errors = self.half.as_ref()?.errors.iter();
+        Some(errors.map(|(_, l2)| *l2).fold(0.0, f64::max))
     }
 
-    fn about_the_reference(&self) -> Result<String, Error> {
-        let (n, ratio) = (self.reference.variant.n, self.setting.reference_ratio);
-        let step = match ratio {
+    fn about_the_reference(&self) -> String {
+        let n = self.reference.variant.n;
+        let step = match self.reference.ratio {
             1 => String::new(),
             ratio => format!(", {ratio} steps for each"),
         };
-        let estimate = match self.reference_difference()? {
-            Some(distance) => format!(
-                "; it differs from n = {} by at most {distance:.1e}, so its own error in h is about {:.0e}",
-                n / 2,
-                distance / 3.0
-            ),
-            None => String::new(),
-        };
-        Ok(format!(
-            "Reference: implicit finite elements, n = {n}{step}{estimate}."
-        ))
+        let estimate = self.reference_difference().map(|distance| {
+            let (half, error) = (n / 2, distance / 3.0);
+            format!(
+                "; it differs from n = {half} by at most {distance:.1e}, so its own error in h is about {error:.0e}"
+            )
+        });
+        let estimate = estimate.unwrap_or_default();
+        format!("Reference: implicit finite elements, n = {n}{step}{estimate}.")
     }
 
     fn write(&self, session: Session<'_>) -> Result<(), Error> {
-        session.figure(self.error_figure()?, "errors")?;
+        session.figure(self.error_figure(), "errors")?;
         session.figure(self.shape_figure()?, "shapes")?;
         let table = self.table()?;
         table.write(&session.output, "error_table")?;
         self.data(&session.output)?;
-        let report = format!("{}\n{}", table.to_markdown(), self.about_the_reference()?);
+        let report = format!("{}\n{}", table.to_markdown(), self.about_the_reference());
         session.finish(self.setting.title, self.summary()?, &report)
     }
 
@@ -317,116 +284,94 @@ impl Comparison<'_> {
         let leading = &Variant::COLUMNS[1..];
         let mut errors = Table::data(leading.iter().chain(&["step", "time", "l2"]));
         for run in &self.runs {
-            for (step, l2) in self.errors(run)? {
+            for &(step, l2) in &run.errors {
                 let row = [step.into(), time(step).into(), l2.into()];
                 errors.push(run.variant.cells().into_iter().skip(1).chain(row))?;
             }
         }
         output.write("errors.csv", errors.to_csv()?)?;
         output.write("errors.json", errors.to_json()?)?;
-        let compared = self.runs.iter().map(|run| (run, "false"));
         let references = std::iter::once(&self.reference).chain(&self.half);
-        let rows: Vec<Rows<'_>> = compared
-            .chain(references.map(|run| (run, "true")))
-            .map(|(run, reference)| Rows {
-                leading: run
-                    .variant
-                    .cells()
-                    .into_iter()
-                    .skip(1)
-                    .chain([reference.into()])
-                    .collect(),
+        let compared = self.runs.iter().map(|run| (run, "false"));
+        let rows = compared.chain(references.map(|run| (run, "true")));
+        let rows = rows.map(|(run, reference)| {
+            let cells = run.variant.cells().into_iter().skip(1);
+            Rows {
+                leading: cells.chain([reference.into()]).collect(),
                 start: Some(&run.trajectory.start),
                 records: &run.trajectory.records,
-            })
-            .collect();
-        let steps = steps::table(&[leading, &["reference"]].concat(), &rows)?;
+            }
+        });
+        let leading = [leading, &["reference"]].concat();
+        let steps = steps::table(&leading, &rows.collect::<Vec<_>>())?;
         output.write("steps.csv", steps.to_csv()?)?;
         Ok(())
     }
 
-    fn error_figure(&self) -> Result<Figure, Error> {
-        let mut curves = Vec::new();
-        for run in self.others() {
-            let points = self.errors(run)?.into_iter().map(|(k, l2)| [time(k), l2]);
-            curves.push(self.study.series(run.variant, points.collect()));
-        }
+    fn error_figure(&self) -> Figure {
+        let compared = self.runs.iter().filter(|run| !run.errors.is_empty());
+        let curves = compared.map(|run| {
+            let points = run.errors.iter().map(|&(k, l2)| [time(k), l2]);
+            self.study.series(run.variant, points.collect())
+        });
         let chart = LineChart::new("", Axis::linear("time t"), Axis::log("L² error"));
-        Ok(
-            Figure::new(format!("{}: error over time", self.setting.title), 1)
-                .with_panel(self.study.chart(chart, curves))
-                .with_shared_legend()
-                .with_note(format!(
-                    "ε = 2⁻⁶, time step 2⁻¹⁴. {}",
-                    self.about_the_reference()?
-                )),
-        )
+        let reference = self.about_the_reference();
+        Figure::new(format!("{}: error over time", self.setting.title), 1)
+            .with_panel(self.study.chart(chart, curves))
+            .with_shared_legend()
+            .with_note(format!("ε = 2⁻⁶, time step 2⁻¹⁴. {reference}"))
     }
 
     /// Rows: methods at their finest resolution, and the reference; columns: times.
     fn shape_figure(&self) -> Result<Figure, Error> {
         let mut rows: Vec<(&Compared, String)> = Vec::new();
-        for (method, scheme) in look::variants(|_| true) {
-            let own =
-                |run: &&Compared| (run.variant.method, run.variant.scheme) == (method, scheme);
-            if let Some(run) = self.others().filter(own).max_by_key(|run| run.variant.n) {
+        for shown in look::variants(|_| true) {
+            let own = |run: &&Compared| run.variant.look() == shown && !run.errors.is_empty();
+            if let Some(run) = self.runs.iter().filter(own).max_by_key(|run| run.variant.n) {
                 rows.push((run, run.variant.label().replace(", ", "\n")));
             }
         }
         rows.push((&self.reference, "reference".to_owned()));
-        let labels = rows
-            .iter()
-            .map(|(run, label)| format!("{label}\nn = {}", run.variant.n));
+        let label = |(run, label): &(&Compared, String)| format!("{label}\nn = {}", run.variant.n);
         let (shown, half) = (self.shown(), self.setting.window);
         let mut figure = Figure::new(format!("{}: shapes", self.setting.title), shown.len())
             .with_column_labels(shown.iter().map(|&k| format!("t = {}", time_label(k))))
-            .with_row_labels(labels);
+            .with_row_labels(rows.iter().map(label))
+            .with_note(format!(
+                "Orange: the reference. {}",
+                self.about_the_reference()
+            ));
         for (run, _) in &rows {
             for &step in &shown {
                 let curve = run.loops(step)?.filled(Colour::LightGrey);
-                let window = [-half, half];
-                let mut panel = Shapes::new("")
-                    .with_curve(curve)
-                    .with_window(window, window);
-                if run.variant != self.reference.variant {
+                let panel = Shapes::new("").with_window([-half, half], [-half, half]);
+                let mut panel = panel.with_curve(curve);
+                if !run.errors.is_empty() {
                     let reference = self.reference.loops(step)?;
                     panel = panel.with_curve(reference.with_colour(1).with_width(1.0));
                 }
                 figure = figure.with_panel(panel);
             }
         }
-        Ok(figure.with_note(format!(
-            "Orange: the reference. {}",
-            self.about_the_reference()?
-        )))
+        Ok(figure)
     }
 
     fn table(&self) -> Result<Table, Error> {
-        let all = self
-            .runs
-            .iter()
-            .map(|run| self.errors(run))
-            .collect::<Result<Vec<_>, _>>()?;
-        let rows: Vec<(&Compared, Vec<(usize, f64)>)> = self.runs.iter().zip(all).collect();
-        let mut table = Table::of(&rows)
-            .text("method", |(run, _)| run.variant.label())
-            .number("n", Format::Shortest, |(run, _)| run.variant.n);
+        let mut table = Table::of(&self.runs)
+            .text("method", |run| run.variant.label())
+            .number("n", Format::Shortest, |run| run.variant.n);
         for k in self.shown().into_iter().filter(|k| *k > 0) {
-            table = table.number(
-                format!("error, step {k}"),
-                Format::Fixed(5),
-                |(run, errors)| {
-                    let error = errors.iter().find(|(step, _)| *step == k);
-                    error.filter(|_| !self.is_reference(run)).map(|(_, l2)| *l2)
-                },
-            );
+            let error = |run: &Compared| {
+                let found = run.errors.iter().find(|(step, _)| *step == k);
+                found.map(|(_, l2)| *l2)
+            };
+            table = table.number(format!("error, step {k}"), Format::Fixed(5), error);
         }
         let hvp = |run: &Compared| study::mean(run.minimizations(), StepRecord::hvp);
+        let seconds = |run: &Compared| run.trajectory.seconds() / run.trajectory.steps() as f64;
         Ok(table
-            .number("HVP/step", Format::Fixed(1), |(run, _)| hvp(run))
-            .number("s/step", Format::Fixed(2), |(run, _)| {
-                run.seconds_per_step()
-            })
+            .number("HVP/step", Format::Fixed(1), hvp)
+            .number("s/step", Format::Fixed(2), seconds)
             .finish()?)
     }
 
@@ -434,41 +379,35 @@ impl Comparison<'_> {
         let mut summary = Summary::new();
         for run in &self.runs {
             let key = format!("{}.{}", self.setting.program, run.variant.key());
-            if !self.is_reference(run) {
-                for (step, l2) in self.errors(run)? {
-                    summary.insert(&format!("{key}.l2.step{step}"), l2)?;
-                }
-            }
-            let mut measured = |step: usize, values: &Values| -> Result<(), Error> {
-                for (name, value) in values {
-                    summary.insert(&format!("{key}.{name}.step{step}"), *value)?;
-                }
-                Ok(())
+            let mut of_step = |what: &str, step: usize, value: f64| {
+                summary.insert(&format!("{key}.{what}.step{step}"), value)
             };
-            measured(0, &run.trajectory.start)?;
-            for record in &run.trajectory.records {
-                measured(record.step, &record.measures)?;
+            for &(step, l2) in &run.errors {
+                of_step("l2", step, l2)?;
+            }
+            for step in 0..=self.steps {
+                for (name, value) in run.trajectory.measures(step)? {
+                    of_step(name, step, *value)?;
+                }
             }
             for made in run.minimizations() {
-                summary.insert(&format!("{key}.energy.step{}", made.step), made.energy)?;
+                of_step("energy", made.step, made.energy)?;
             }
-            let newton = |made: &StepRecord| made.newton.newton as f64;
-            if let Some(newton) = study::mean(run.minimizations(), newton) {
+            let newton = study::mean(run.minimizations(), |made| made.newton.newton as f64);
+            let hvp = study::mean(run.minimizations(), StepRecord::hvp);
+            if let Some((newton, hvp)) = newton.zip(hvp) {
                 summary.insert(&format!("{key}.newton_per_step"), newton)?;
-                let hvp = study::mean(run.minimizations(), StepRecord::hvp).unwrap_or(f64::NAN);
                 summary.insert(&format!("{key}.hvp_per_step"), hvp)?;
-                let rises = run.minimizations().filter(|r| r.energy > r.energy_before);
-                summary.insert_count(&format!("{key}.energy_increases"), rises.count())?;
+                let rises = energy_increases(&run.trajectory.records);
+                summary.insert_count(&format!("{key}.energy_increases"), rises)?;
             }
             summary.insert(&format!("{key}.seconds"), run.trajectory.seconds())?;
         }
         let key = format!("{}.reference", self.setting.program);
+        let seconds = self.reference.trajectory.seconds();
         summary.insert_count(&format!("{key}.n"), self.reference.variant.n)?;
-        summary.insert(
-            &format!("{key}.seconds"),
-            self.reference.trajectory.seconds(),
-        )?;
-        if let Some(distance) = self.reference_difference()? {
+        summary.insert(&format!("{key}.seconds"), seconds)?;
+        if let Some(distance) = self.reference_difference() {
             summary.insert(&format!("{key}.l2_to_half_n"), distance)?;
         }
         Ok(summary)

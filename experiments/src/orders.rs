@@ -15,10 +15,10 @@ pub fn finish<const D: usize>(
     session: Session<'_>,
     key: &str,
     title: &str,
-    sequences: [(&'static str, Vec<(f64, Trajectory<D>)>); 2],
+    sequences: &[(&'static str, Vec<(f64, Trajectory<D>)>)],
 ) -> Result<(), Error> {
     let mut sizes = Vec::new();
-    for (name, runs) in &sequences {
+    for (name, runs) in sequences {
         sizes.push((*name, refinements(runs)?));
     }
     let figure = Figure::new(format!("{title}: convergence"), 2)

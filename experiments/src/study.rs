@@ -106,7 +106,8 @@ impl Variant {
         self.method.label_in(self.scheme)
     }
 
-    fn look(&self) -> (Method, Scheme) {
+    /// What decides its colour in figures.
+    pub fn look(&self) -> (Method, Scheme) {
         (self.method, self.scheme)
     }
 }

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use engine::{Flow, Method};
-use experiments::circles::{self, Ensemble};
+use experiments::circles::{self, Circle, Ensemble};
 use experiments::networks::{EPS, NetworkOptions, STEP, convergence_ratios};
 use experiments::session::Session;
 use experiments::steps::{self, Rows};
@@ -185,90 +185,85 @@ impl Report {
         (self.of_flow(flow).last()).map(|e| e.mean(|circle| circle.travelled))
     }
 
-    /// A chart with a curve for each variant of a flow.
-    fn chart(
-        &self,
-        chart: LineChart,
-        flow: Flow,
-        points: impl Fn(&Ensemble) -> Vec<[f64; 2]>,
-    ) -> LineChart {
-        let curves = self
-            .of_flow(flow)
-            .map(|e| self.study.series(e.variant, points(e)));
-        self.study.chart(chart, curves)
+    /// A chart for each flow with a curve for each variant.
+    fn flows(&self, x: &str, y: &str, curve: impl Fn(&Ensemble) -> Series) -> [LineChart; 2] {
+        Flow::ALL.map(|flow| {
+            let chart = LineChart::new(flow.title(), Axis::linear(x), Axis::log(y));
+            self.study.chart(chart, self.of_flow(flow).map(&curve))
+        })
     }
 
     fn figures(&self, session: &Session<'_>) -> Result<(), Error> {
-        let radii: Vec<f64> = self.ensembles[0].circles.iter().map(|c| c.radius).collect();
-        let (count, last) = (radii.len(), time(self.steps));
-        let over_time = Flow::ALL.map(|flow| {
-            let axes = (Axis::linear("time t"), Axis::log("mean L² error"));
-            let chart = LineChart::new(flow.title(), axes.0, axes.1);
-            let chart = self.chart(chart, flow, |e| {
-                (0..=self.steps)
-                    .map(|k| [time(k), e.mean_error(k)])
-                    .collect()
-            });
-            match self.scale(flow) {
-                Some(scale) => chart.with_note(format!(
-                    "For scale: mean ‖u(t) − u(0)‖ = {scale:.3} at t = {last:.4}."
-                )),
-                None => chart,
-            }
-        });
-        let figure = Figure::new("Error on circles over time", 2)
-            .with_panels(over_time)
-            .with_shared_legend()
-            .with_note(format!(
-                "ε = 2⁻⁶, τ = 2⁻¹⁴, h = 1/n; mean over {count} circles with radii between {:.3} and {:.3}.",
-                radii[0], radii[count - 1]
-            ));
-        session.figure(figure, "convergence")?;
-
-        let over_radius = Flow::ALL.map(|flow| {
-            let axes = (Axis::linear("initial radius r"), Axis::log("L² error"));
-            let curves = self.of_flow(flow).map(|e| {
-                let errors = e.circles.iter().map(|c| [c.radius, c.error(self.steps)]);
-                let marker = look::marker(e.variant.n, &self.study.cells);
-                let curve = self.study.series(e.variant, errors.collect());
-                curve.with_marker(marker).with_width(1.6)
-            });
-            self.study
-                .chart(LineChart::new(flow.title(), axes.0, axes.1), curves)
-        });
-        let figure = Figure::new(
-            format!("Error on circles at t = {last:.4} over the radius"),
-            2,
-        )
-        .with_panels(over_radius)
-        .with_shared_legend();
-        session.figure(figure, "error_over_radius")?;
-        session.figure(self.work(), "work_per_step")?;
+        let two = |title: &str, charts: [LineChart; 2]| {
+            Figure::new(title, 2)
+                .with_panels(charts)
+                .with_shared_legend()
+        };
+        let last = time(self.steps);
+        let title = format!("Error on circles at t = {last:.4} over the radius");
+        session.figure(
+            two("Error on circles over time", self.over_time()).with_note(self.circles()),
+            "convergence",
+        )?;
+        session.figure(two(&title, self.over_radius()), "error_over_radius")?;
+        let title = "Work per step of Willmore flow, mean over the circles";
+        session.figure(two(title, self.work()), "work_per_step")?;
         session.figure(self.cost(), "error_over_cost")
     }
 
+    fn circles(&self) -> String {
+        let radii: Vec<f64> = self.ensembles[0].circles.iter().map(|c| c.radius).collect();
+        let (count, first, last) = (radii.len(), radii[0], radii[radii.len() - 1]);
+        format!(
+            "ε = 2⁻⁶, τ = 2⁻¹⁴, h = 1/n; mean over {count} circles with radii between {first:.3} and {last:.3}."
+        )
+    }
+
+    fn over_time(&self) -> [LineChart; 2] {
+        let mut charts = self.flows("time t", "mean L² error", |e| {
+            let points = (0..=self.steps).map(|k| [time(k), e.mean_error(k)]);
+            self.study.series(e.variant, points.collect())
+        });
+        for (chart, flow) in charts.iter_mut().zip(Flow::ALL) {
+            let end = time(self.steps);
+            chart.note = self.scale(flow).map(|scale| {
+                format!("For scale: mean ‖u(t) − u(0)‖ = {scale:.3} at t = {end:.4}.")
+            });
+        }
+        charts
+    }
+
+    fn over_radius(&self) -> [LineChart; 2] {
+        self.flows("initial radius r", "L² error", |e| {
+            let points = e.circles.iter().map(|c| [c.radius, c.error(self.steps)]);
+            let curve = self.study.series(e.variant, points.collect());
+            let marker = look::marker(e.variant.n, &self.study.cells);
+            curve.with_marker(marker).with_width(1.6)
+        })
+    }
+
     /// Work of each step.
-    fn work(&self) -> Figure {
+    fn work(&self) -> [LineChart; 2] {
         let counts: [(&str, fn(&StepRecord) -> f64); 2] = [
             ("Hessian-vector products", StepRecord::hvp),
             ("Newton steps", |r| r.newton.newton as f64),
         ];
-        let charts = counts.map(|(label, count)| {
-            let chart = LineChart::new("", Axis::linear("time t"), Axis::linear(label));
-            let mut chart = self.chart(chart, Flow::Willmore, |e| {
-                let of_step = |k: usize| {
-                    e.mean(|circle| circle.records[k].minimization.as_ref().map_or(0.0, count))
+        counts.map(|(label, count)| {
+            let mut highest = 1.0_f64;
+            let curves = self.of_flow(Flow::Willmore).map(|e| {
+                let of = |circle: &Circle, k: usize| {
+                    circle.records[k].minimization.as_ref().map_or(0.0, count)
                 };
-                (0..self.steps).map(|k| [time(k + 1), of_step(k)]).collect()
+                let points = (0..self.steps).map(|k| [time(k + 1), e.mean(|circle| of(circle, k))]);
+                let points: Vec<[f64; 2]> = points.collect();
+                highest = points.iter().map(|point| point[1]).fold(highest, f64::max);
+                self.study.series(e.variant, points).with_width(1.8)
             });
-            let points = chart.series.iter().flat_map(|curve| &curve.points);
-            let highest = points.map(|point| point[1]).fold(1.0, f64::max);
-            chart.y = chart.y.with_range(0.0, 1.1 * highest);
-            chart
-        });
-        Figure::new("Work per step of Willmore flow, mean over the circles", 2)
-            .with_panels(charts)
-            .with_shared_legend()
+            let curves: Vec<Series> = curves.collect();
+            let y = Axis::linear(label).with_range(0.0, 1.1 * highest);
+            self.study
+                .chart(LineChart::new("", Axis::linear("time t"), y), curves)
+        })
     }
 
     /// Error at the end over the mean wall time of a circle, a curve for each method and scheme.

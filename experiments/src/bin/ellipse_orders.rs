@@ -54,5 +54,5 @@ fn program(options: &RunOptions) -> Result<(), Error> {
     let in_tau = PARTS[..=used].iter().map(|&k| run(STEP / k as f64, 128, k));
     let in_tau = in_tau.collect::<Result<Vec<_>, _>>()?;
     let sequences = [("h", in_h), ("tau", in_tau)];
-    orders::finish(session, "ellipse", TITLE, sequences)
+    orders::finish(session, "ellipse", TITLE, &sequences)
 }

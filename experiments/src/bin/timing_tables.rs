@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use engine::{Method, Scheme, StepRule, checksum};
+use engine::{Method, Operator, Scheme, StepRule, checksum};
 use experiments::meshes::{ARMADILLO, MeshOptions};
 use experiments::networks::{Chosen, NetworkOptions, convergence_network};
 use experiments::options::RunOptions;
@@ -13,7 +13,7 @@ use experiments::{Error, harness, surfaces};
 use fem::LinearSolver;
 use report::{Axis, Figure, Format, LineChart, LineStyle, Marker, Series, Summary, Table};
 use serde_json::json;
-use solver::{Method as Newton, StepRecord};
+use solver::Method as Newton;
 
 const PROGRAM: &str = "timing_tables";
 /// Time steps of the table, until `t = 2^-7`.
@@ -56,47 +56,55 @@ struct Variant {
 }
 
 const VARIANTS: [Variant; 5] = [
+    row("hybrid", "hybrid", Method::Hybrid, None),
     Variant {
-        key: "hybrid",
-        label: "hybrid",
-        method: Method::Hybrid,
-        newton: Newton::Preconditioned,
-        linear: LinearSolver::ConjugateGradients,
-        papers_seconds: None,
-    },
-    Variant {
-        key: "hybrid_plain_newton",
-        label: "hybrid, plain Newton-CG",
-        method: Method::Hybrid,
         newton: Newton::Paper,
-        linear: LinearSolver::ConjugateGradients,
-        papers_seconds: Some([122.0, 1020.0]),
+        ..row(
+            "hybrid_plain_newton",
+            "hybrid, plain Newton-CG",
+            Method::Hybrid,
+            Some([122.0, 1020.0]),
+        )
     },
+    row(
+        "fe_implicit",
+        "FE implicit, FFT-CG inside",
+        Method::FeImplicit,
+        None,
+    ),
     Variant {
-        key: "fe_implicit",
-        label: "FE implicit, FFT-CG inside",
-        method: Method::FeImplicit,
-        newton: Newton::Preconditioned,
-        linear: LinearSolver::ConjugateGradients,
-        papers_seconds: None,
-    },
-    Variant {
-        key: "fe_implicit_direct",
-        label: "FE implicit, Cholesky inside",
-        method: Method::FeImplicit,
-        newton: Newton::Preconditioned,
         linear: LinearSolver::Direct,
-        papers_seconds: Some([4970.0, 28622.0]),
+        ..row(
+            "fe_implicit_direct",
+            "FE implicit, Cholesky inside",
+            Method::FeImplicit,
+            Some([4970.0, 28622.0]),
+        )
     },
+    row(
+        "fe_semi",
+        "FE semi-implicit",
+        Method::FeSemi,
+        Some([4307.0, 22045.0]),
+    ),
+];
+
+/// A row with the usual solvers.
+const fn row(
+    key: &'static str,
+    label: &'static str,
+    method: Method,
+    papers_seconds: Option<[f64; 2]>,
+) -> Variant {
     Variant {
-        key: "fe_semi",
-        label: "FE semi-implicit",
-        method: Method::FeSemi,
+        key,
+        label,
+        method,
         newton: Newton::Preconditioned,
         linear: LinearSolver::ConjugateGradients,
-        papers_seconds: Some([4307.0, 22045.0]),
-    },
-];
+        papers_seconds,
+    }
+}
 
 impl Variant {
     fn papers_seconds(&self, n: usize) -> Option<f64> {
@@ -281,13 +289,12 @@ impl Timing {
     }
 }
 
-/// One step of a surface.
+/// One step of a surface, and what the paper reports in seconds.
 struct SurfaceStep {
     surface: String,
     method: Method,
     n: usize,
-    made: StepRecord,
-    /// What the paper reports.
+    numbers: Numbers,
     papers_seconds: f64,
 }
 
@@ -306,25 +313,18 @@ fn surface_steps(
     let device = session.device.clone();
     session.phase("armadillo", || {
         let mesh = options.mesh.load_or_built_in(&ARMADILLO, &grid)?;
-        let initial = mesh.phase_field(grid, scales.eps, &bar)?;
+        let (surface, initial) = (&mesh.about.title, mesh.phase_field(grid, scales.eps, &bar)?);
         let step = |(method, papers_seconds)| {
-            let source = networks.of(Scheme::Paper);
-            let variant = (method, Scheme::Paper);
-            let operator = engine::Operator::new(variant, &source, &needed, &grid, &scales)?;
-            let title = &mesh.about.title;
-            let case = surfaces::willmore_flow(title, initial.clone(), operator, scales, time);
+            let (variant, source) = ((method, Scheme::Paper), networks.of(Scheme::Paper));
+            let operator = Operator::new(variant, &source, &needed, &grid, &scales)?;
+            let case = surfaces::willmore_flow(surface, initial.clone(), operator, scales, time);
             let mut timed = Timed::new(case, &device, bar.clone())?;
             timed.step()?;
-            let made = timed
-                .minimizations()
-                .next()
-                .copied()
-                .expect("a step was made");
             Ok(SurfaceStep {
-                surface: title.clone(),
+                surface: surface.clone(),
                 method,
                 n,
-                made,
+                numbers: timed.numbers(),
                 papers_seconds,
             })
         };
@@ -333,13 +333,16 @@ fn surface_steps(
 }
 
 fn surface_table(steps: &[SurfaceStep]) -> Result<Table, Error> {
-    Ok(Table::of(steps)
+    const COLUMNS: &Columns = &[
+        ("one step [s]", Format::Fixed(2), "seconds"),
+        ("Newton", Format::Fixed(0), "newton_per_step"),
+        ("HVP", Format::Fixed(0), "hvp_on_this_grid"),
+    ];
+    let table = Table::of(steps)
         .text("surface", |s| &s.surface)
         .text("method", |s| s.method.label())
-        .number("n", Format::Shortest, |s| s.n)
-        .number("one step [s]", Format::Fixed(2), |s| s.made.seconds)
-        .number("Newton", Format::Shortest, |s| s.made.newton.newton)
-        .number("HVP", Format::Shortest, |s| s.made.newton.hvp)
+        .number("n", Format::Shortest, |s| s.n);
+    Ok(timing::with_columns(table, COLUMNS, |s| &s.numbers)
         .number("paper, other machines [s]", Format::Shortest, |s| {
             s.papers_seconds
         })
@@ -414,8 +417,8 @@ fn summary(timings: &[Timing], armadillo: &[SurfaceStep]) -> Result<Summary, Err
     }
     for step in armadillo {
         let key = format!("timing.armadillo.{}", step.method.key());
-        summary.insert(&format!("{key}.seconds"), step.made.seconds)?;
-        summary.insert_count(&format!("{key}.hvp"), step.made.newton.hvp)?;
+        summary.insert(&format!("{key}.seconds"), step.numbers["seconds"])?;
+        summary.insert(&format!("{key}.hvp"), step.numbers["hvp_on_this_grid"])?;
     }
     Ok(summary)
 }
