@@ -28,7 +28,7 @@ pub struct Start<const D: usize, O> {
 /// What a run starts from, in the dimension of the input.
 pub enum Loaded {
     /// In the plane.
-    Plane(Start<2, crate::outlet::Plane>, ImageFrame),
+    Plane(Start<2, Frame>, ImageFrame),
     /// In space.
     Space(Start<3, Space>),
 }
@@ -268,7 +268,7 @@ impl Reader<'_> {
         let start = Start {
             name: self.name.clone(),
             field,
-            outlet: crate::outlet::Plane::new(&frame),
+            outlet: frame,
             region: None,
         };
         Loaded::Plane(start, of_image)

@@ -66,31 +66,8 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
     fn save(&self, u: &Field<D>, eps: f64, path: &Path) -> Result<(), Error>;
 }
 
-/// The pixels of an image in the plane.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Plane {
-    size: [u32; 2],
-    upper_left: [f64; 2],
-    pixel: f64,
-}
-
-impl Plane {
-    /// Of a frame.
-    pub fn new(frame: &Frame) -> Self {
-        Self {
-            size: [frame.width(), frame.height()],
-            upper_left: frame.point([0.0; 2]),
-            pixel: frame.pixel(),
-        }
-    }
-
-    fn frame(&self) -> Result<Frame, Error> {
-        let [width, height] = self.size;
-        Ok(Frame::new(width, height, self.upper_left, self.pixel)?)
-    }
-}
-
-impl Outlet<2> for Plane {
+/// As the pixels of an image in the plane.
+impl Outlet<2> for Frame {
     fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error> {
         match up {
             None => Ok(()),
@@ -102,7 +79,7 @@ impl Outlet<2> for Plane {
 
     fn picture(&self, u: &Field<2>, eps: f64) -> Result<Picture, Error> {
         let interface = Interface::new(u, eps)?;
-        let drawing = Drawing::on_white(self.frame()?).filled(&interface, Rgb::BLACK);
+        let drawing = Drawing::on_white(*self).filled(&interface, Rgb::BLACK);
         Ok(drawing.picture()?)
     }
 
@@ -123,7 +100,7 @@ impl Outlet<2> for Plane {
     ) -> Result<(), Error> {
         let name = format!("{stem}.svg");
         let outline = Outline::of_phase_field(u)?;
-        Svg::on_white(self.frame()?)
+        Svg::on_white(*self)
             .filled(&outline, Rgb::BLACK)
             .write(run.path().join(&name))?;
         Ok(run.adopt_file(&name)?)

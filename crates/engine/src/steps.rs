@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use serde::{Serialize, Serializer};
 
-use crate::substeps::Substeps;
+use crate::substeps::{EASY, HARD, Substeps};
 use crate::{Error, Record};
 
 /// A rule for the sizes of time steps, written `auto`, `auto:FIRST`, `TAU`, `doubling:FIRST`, `growing:TAU,ALIKE` or `ramp:TAU,HALVINGS`.
@@ -39,10 +39,6 @@ pub enum StepRule {
 const LITTLE: f64 = 0.1;
 /// and shrink when they take away more than this.
 const MUCH: f64 = 0.3;
-/// They grow while the minimization takes at most this many Newton steps,
-pub(crate) const EASY: usize = 8;
-/// and shrink when it takes more than this.
-pub(crate) const HARD: usize = 20;
 /// How often a step by the energy is halved before the run gives up.
 const HALVINGS: u32 = 24;
 

@@ -3,9 +3,12 @@
 //! A large step from a shape with corners is too much for one minimization: the corners move by many widths of the interface,
 //! and the minimizer is in another valley. In substeps that begin small and grow it is reached.
 
-use crate::steps::{EASY, HARD};
 use crate::{Error, Record};
 
+/// Steps and substeps of adaptive size grow while the minimization takes at most this many Newton steps,
+pub(crate) const EASY: usize = 8;
+/// and shrink when it takes more than this.
+pub(crate) const HARD: usize = 20;
 /// After a failure so many substeps are made before a longer one is tried again: failures are dear.
 const PATIENCE: u32 = 4;
 /// A substep is halved at most this often with respect to the first one.

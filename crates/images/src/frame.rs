@@ -1,12 +1,13 @@
 //! Which part of the plane a drawing shows, and how large its pixels are.
 
 use geometry::{Grid, Placement};
+use serde::{Deserialize, Serialize};
 
 use crate::error::{positive, require};
 use crate::{Error, Image};
 
 /// A raster of square pixels in the plane.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
     size: [u32; 2],
     upper_left: [f64; 2],

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use engine::{Case, Flow, Measure, Method, StepRule, Stop};
 use geometry::Field;
+use images::Frame;
 use operators::ComputeDevice;
 use runs::StoredRun;
 use serde::Serialize;
@@ -145,7 +146,7 @@ pub fn run<C: FlowCommand>(
     };
     if let Some(stored) = stored {
         return match engine::dimension(&stored)? {
-            2 => job.resume::<2, crate::outlet::Plane>(stored),
+            2 => job.resume::<2, Frame>(stored),
             _ => job.resume::<3, Space>(stored),
         };
     }
