@@ -252,11 +252,7 @@ fn a_flipped_bit_in_any_file_is_found_and_the_file_named() {
         kinds.iter().all(|kind| flipped.contains(*kind)),
         "{flipped:?}"
     );
-<<<<<<< HEAD
-    assert!(flipped.iter().any(|name| name.contains(".ckpt")));
-=======
     assert!(flipped.iter().any(|name| name.contains("step-")));
->>>>>>> cli
 }
 
 /// A run holds all that it goes on from: its input may be gone, and the folder elsewhere.
