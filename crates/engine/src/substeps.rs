@@ -165,7 +165,10 @@ mod tests {
 
     #[test]
     fn the_records_restore_the_substeps() {
-        let start = Substeps::new(1.0, 0.01, 0.01).unwrap();
+        let start = Substeps {
+            deepest: 13,
+            ..Substeps::new(1.0, 0.01, 0.01).unwrap()
+        };
         let newton = |k: usize| [3, 9, 25, 2, 2][k % 5];
         let (mut substeps, mut records) = (start, Vec::new());
         while !substeps.is_complete() {
