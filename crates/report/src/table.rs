@@ -132,7 +132,7 @@ impl Table {
     ///
     /// ```
     /// use report::{Format, Table};
-    /// let circles = [(0.1, 2), (0.2, 3)];
+    /// let circles = [(0.1, 2_usize), (0.2, 3)];
     /// let table = Table::of(&circles)
     ///     .text("circle", |(radius, _)| format!("R = {radius}"))
     ///     .number("iterations", Format::Shortest, |&(_, count)| count)
