@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::hierarchy::{Hierarchy, Nearest};
 use crate::mesh::merge_coincident;
+use crate::normals::angle_weighted_normals;
 use crate::triangle::Part;
 use crate::vector::{Vector, scaled_normal};
 use crate::{ClosedMesh, Error};
@@ -51,15 +52,11 @@ impl MeshDistance {
             .iter()
             .map(|f| f.map(|v| vertices[v as usize]))
             .collect();
-        let mut vertex_normals = vec![Vector::ZERO; vertices.len()];
+        let vertex_normals = angle_weighted_normals(&vertices, &faces);
         let mut edge_normals = HashMap::with_capacity(3 * faces.len() / 2);
         for (face, triangle) in faces.iter().zip(&triangles) {
             let normal = scaled_normal(*triangle).normalize_or_zero();
             for i in 0..3 {
-                let [here, next, last] = [i, i + 1, i + 2].map(|i| triangle[i % 3]);
-                let (a, b) = (next - here, last - here);
-                let angle = a.cross(b).length().atan2(a.dot(b));
-                vertex_normals[face[i] as usize] += normal * angle;
                 *edge_normals.entry(edge(face, i)).or_default() += normal;
             }
         }

@@ -183,3 +183,15 @@ fn within(limit: f64) -> String {
         String::new()
     }
 }
+
+/// Refuses what is not a positive number.
+pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64, Error> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(value);
+    }
+    Err(Error::InvalidParameter {
+        name,
+        value,
+        requirement: "finite and positive",
+    })
+}

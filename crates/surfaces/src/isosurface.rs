@@ -6,7 +6,7 @@ use geometry::{Field, Grid, distance_from_phase_field};
 use rayon::prelude::*;
 
 use crate::vector::Vector;
-use crate::{Error, TriangleMesh};
+use crate::{Error, TriangleMesh, positive};
 
 /// The surface `{u = 0}` of a phase field, around `{u > 0}`.
 ///
@@ -16,13 +16,7 @@ use crate::{Error, TriangleMesh};
 /// # Errors
 /// `eps` must be finite and positive; otherwise as [`isosurface`].
 pub fn phase_field_surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
-    if !(eps.is_finite() && eps > 0.0) {
-        return Err(Error::InvalidParameter {
-            name: "eps",
-            value: eps,
-            requirement: "finite and positive",
-        });
-    }
+    positive("eps", eps)?;
     u.check_finite()?;
     isosurface(&u.map(|u| distance_from_phase_field(u, eps)))
 }

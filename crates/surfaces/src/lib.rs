@@ -54,25 +54,32 @@
 //! - Meshes are not periodic: they lie in the box of a grid, with a margin of a few `eps`.
 //! - Same input, same bytes, for any number of threads.
 
+mod carried;
 mod closed;
 mod distance;
 mod error;
 mod format;
 mod hierarchy;
 mod isosurface;
+mod level_set;
 mod mesh;
+mod normals;
 mod read;
 pub mod samples;
 mod signs;
+mod smoothing;
 mod triangle;
 mod vector;
 mod write;
 
+pub use carried::CarriedVertices;
 pub use closed::{ClosedMesh, Warning};
 pub use distance::MeshDistance;
 pub use error::Error;
+use error::positive;
 pub use format::usual_up_axis;
 pub use isosurface::{isosurface, phase_field_surface};
+pub use level_set::LevelSet;
 pub use mesh::TriangleMesh;
 pub use read::error::FormatError;
 pub use read::{decode, read};

@@ -1,0 +1,194 @@
+//! Smoothing of meshes by their edges, and the noise that there is to smooth.
+
+use crate::TriangleMesh;
+use crate::vector::Vector;
+
+/// The median of the absolute value of a normally distributed number over its standard deviation.
+const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_082;
+
+/// The neighbours of every vertex along edges, in ascending order.
+struct Umbrellas {
+    /// Where the neighbours of a vertex begin.
+    begin: Vec<usize>,
+    neighbours: Vec<u32>,
+}
+
+impl Umbrellas {
+    fn of(mesh: &TriangleMesh) -> Self {
+        let mut edges: Vec<[u32; 2]> = (mesh.faces.iter())
+            .flat_map(|&[a, b, c]| [[a, b], [b, a], [b, c], [c, b], [c, a], [a, c]])
+            .collect();
+        edges.sort_unstable();
+        edges.dedup();
+        let mut begin = vec![0; mesh.vertices.len() + 1];
+        for [vertex, _] in &edges {
+            begin[*vertex as usize + 1] += 1;
+        }
+        for vertex in 0..mesh.vertices.len() {
+            begin[vertex + 1] += begin[vertex];
+        }
+        let neighbours = edges.into_iter().map(|[_, neighbour]| neighbour).collect();
+        Self { begin, neighbours }
+    }
+
+    fn of_vertex(&self, vertex: usize) -> &[u32] {
+        &self.neighbours[self.begin[vertex]..self.begin[vertex + 1]]
+    }
+
+    /// `L x = x - (mean of the neighbours)`; zero where there are none.
+    fn laplacian(&self, x: &[Vector]) -> Vec<Vector> {
+        let at = |vertex: usize| {
+            let around = self.of_vertex(vertex);
+            if around.is_empty() {
+                return Vector::ZERO;
+            }
+            let sum: Vector = around.iter().map(|&n| x[n as usize]).sum();
+            x[vertex] - sum / around.len() as f64
+        };
+        (0..x.len()).map(at).collect()
+    }
+
+    /// Taubin's smoothing of a field on the vertices.
+    fn smooth(&self, x: &mut [Vector], iterations: usize, factors: [f64; 2]) {
+        for factor in std::iter::repeat_n(factors, iterations).flatten() {
+            if factor != 0.0 {
+                let steps = self.laplacian(x);
+                for (x, step) in x.iter_mut().zip(steps) {
+                    *x -= factor * step;
+                }
+            }
+        }
+    }
+
+    /// Sum of the squares of the coefficients of `L L x` at a vertex.
+    fn squared_weights(&self, vertex: usize, weights: &mut Vec<(u32, f64)>) -> f64 {
+        weights.clear();
+        weights.push((vertex as u32, 1.0));
+        let around = self.of_vertex(vertex);
+        let share = 1.0 / around.len() as f64;
+        for &near in around {
+            weights.push((near, -2.0 * share));
+            let next = self.of_vertex(near as usize);
+            let part = share / next.len() as f64;
+            weights.extend(next.iter().map(|&far| (far, part)));
+        }
+        weights.sort_unstable_by_key(|(vertex, _)| *vertex);
+        let groups = weights.chunk_by(|a, b| a.0 == b.0);
+        groups
+            .map(|group| group.iter().map(|(_, w)| w).sum::<f64>().powi(2))
+            .sum()
+    }
+}
+
+impl TriangleMesh {
+    /// Taubin's smoothing: so many times a step `x - lambda L x` that shrinks, and one `x - mu L x` with `mu < -lambda < 0` that
+    /// inflates, where `L x` is a vertex less the mean of its neighbours.
+    ///
+    /// With `mu = 0` it is Laplacian smoothing. G. Taubin: A signal processing approach to fair surface design. SIGGRAPH (1995).
+    #[must_use]
+    pub fn smoothed(&self, iterations: usize, lambda: f64, mu: f64) -> Self {
+        let mut x: Vec<Vector> = (self.vertices.iter())
+            .map(|&x| Vector::from_array(x))
+            .collect();
+        Umbrellas::of(self).smooth(&mut x, iterations, [lambda, mu]);
+        Self {
+            vertices: x.iter().map(Vector::to_array).collect(),
+            faces: self.faces.clone(),
+            normals: None,
+        }
+    }
+
+    /// The smooth surface with what it is off the rough one on the average over neighbours: `x + A (y - x)` with the vertices `y` of
+    /// `rough`, where `A` is Taubin's smoothing of a field on the edges.
+    ///
+    /// Every smoothing takes something of the long waves along; what `y - x` has of these is it, while noise averages out. What is
+    /// wrong in the end is the product of two small errors, `(1 - A)(y - x)`; J. W. Tukey called this twicing.
+    #[must_use]
+    pub fn with_long_waves_of(&self, rough: &Self) -> Self {
+        /// Waves longer than some five edges pass.
+        const TIMES: usize = 20;
+        const FACTORS: [f64; 2] = [0.5, -0.47];
+        let umbrellas = Umbrellas::of(self);
+        let pairs = self.vertices.iter().zip(&rough.vertices);
+        let mut offset: Vec<Vector> = pairs
+            .map(|(&x, &y)| Vector::from_array(y) - Vector::from_array(x))
+            .collect();
+        umbrellas.smooth(&mut offset, TIMES, FACTORS);
+        self.moved_by(&offset)
+    }
+
+    /// All vertices moved along their normals by the same length, so that the closed surface encloses `volume`.
+    #[must_use]
+    pub fn with_volume(&self, volume: f64) -> Self {
+        /// Newton steps; the volume is a polynomial of third degree in the length, nearly linear.
+        const STEPS: usize = 4;
+        let mut moved = self.clone();
+        for _ in 0..STEPS {
+            let (now, derivative) = moved.volume_and_derivative();
+            if derivative == 0.0 {
+                break;
+            }
+            let length = (volume - now) / derivative;
+            let offset = moved.vertex_normals();
+            let offset: Vec<_> = (offset.into_iter())
+                .map(|n| length * Vector::from_array(n))
+                .collect();
+            moved = moved.moved_by(&offset);
+        }
+        moved
+    }
+
+    /// The enclosed volume, and its derivative where all vertices move along their normals.
+    fn volume_and_derivative(&self) -> (f64, f64) {
+        let normals = self.vertex_normals();
+        let normal = |v: u32| Vector::from_array(normals[v as usize]);
+        let sixths = self.faces.iter().map(|&face| {
+            let [a, b, c] = crate::vector::corners(self, face);
+            let [n, o, p] = face.map(normal);
+            let derivative = n.dot(b.cross(c)) + o.dot(c.cross(a)) + p.dot(a.cross(b));
+            (a.dot(b.cross(c)), derivative)
+        });
+        let (volume, derivative) = sixths.fold((0.0, 0.0), |(v, d), (w, e)| (v + w, d + e));
+        (volume / 6.0, derivative / 6.0)
+    }
+
+    fn moved_by(&self, offset: &[Vector]) -> Self {
+        let pairs = self.vertices.iter().zip(offset);
+        Self {
+            vertices: pairs
+                .map(|(&x, &by)| (Vector::from_array(x) + by).to_array())
+                .collect(),
+            faces: self.faces.clone(),
+            normals: None,
+        }
+    }
+
+    /// The standard deviation of the noise of the vertices along their normals, as far as it is independent from vertex to vertex.
+    ///
+    /// It is the median of `|n . L L x|` over the vertices, each divided by the norm of its coefficients: twice the Laplacian `L`
+    /// takes away what varies slowly, and the median what bends in few places, such as edges. A surface without noise has a
+    /// small one, by its curvature. Zero for a mesh without faces.
+    pub fn noise(&self) -> f64 {
+        let umbrellas = Umbrellas::of(self);
+        let x: Vec<Vector> = (self.vertices.iter())
+            .map(|&x| Vector::from_array(x))
+            .collect();
+        let twice = umbrellas.laplacian(&umbrellas.laplacian(&x));
+        // Normals of the smoothed mesh: noise turns those of the mesh itself, towards the plane of their neighbours.
+        let normals = self.smoothed(3, 0.5, -0.53).vertex_normals();
+        let mut weights = Vec::new();
+        let mut sizes: Vec<f64> = (0..x.len())
+            .filter(|&v| umbrellas.of_vertex(v).len() > 2)
+            .map(|v| {
+                let squares = umbrellas.squared_weights(v, &mut weights);
+                twice[v].dot(Vector::from_array(normals[v])).abs() / squares.sqrt()
+            })
+            .collect();
+        if sizes.is_empty() {
+            return 0.0;
+        }
+        let middle = sizes.len() / 2;
+        let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+        *median / MEDIAN_OF_NORMAL
+    }
+}
