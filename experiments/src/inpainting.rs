@@ -3,7 +3,7 @@
 use clap::Args;
 use engine::{
     Case, Flow, Measure, Operator, Record, Samples, Scales, Scheme, StepRule, Stop, TimeSteps,
-    Trajectory, checksum, energy_increases, mean_hvp,
+    Trajectory, energy_increases, mean_hvp,
 };
 use geometry::measure::l2_distance;
 use geometry::{Grid, SignedDistance, phase_field};
@@ -110,7 +110,7 @@ pub fn parameters<const D: usize>(
         "tau": shapes.iter().map(|shape| shape.rule).collect::<Vec<_>>(),
         "steps": shapes.iter().map(|shape| shape.steps).collect::<Vec<_>>(),
         "first_substep": first_substep(scales.eps), "still": STILL,
-        "network": operator.network().map(|named| checksum(&named.network)), "quick": quick,
+        "network": operator.network().map(|named| named.network.fingerprint()), "quick": quick,
     })
 }
 

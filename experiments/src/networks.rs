@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use engine::{Method, NamedNetwork, NeededNetwork, Networks, Operator, Scales, Scheme};
+use engine::{Method, Operator, Scales, Scheme};
 use geometry::Grid;
-use model::Ratios;
+use model::{NamedNetwork, NeededNetwork, Networks, Ratios};
 use solver::NewtonParams;
 
 use crate::Error;
@@ -36,7 +36,7 @@ impl NetworkOptions {
     /// Where the networks of the paper's and the calibrated scheme come from.
     ///
     /// # Errors
-    /// [`Error::Engine`] if a file is no network or meets none of the needs.
+    /// [`Error::Model`] if a file is no network or meets none of the needs.
     pub fn load(&self, needs: &[NeededNetwork]) -> Result<Chosen, Error> {
         Ok(Chosen(Networks::load(&self.network, needs)?))
     }
@@ -58,15 +58,15 @@ impl Chosen {
     /// The network of a scheme with these ratios.
     ///
     /// # Errors
-    /// [`Error::Engine`] if there is none.
+    /// [`Error::Model`] if there is none.
     pub fn find(&self, scheme: Scheme, needed: &NeededNetwork) -> Result<NamedNetwork, Error> {
-        Ok(self.of(scheme).find(scheme, needed)?)
+        Ok(self.of(scheme).find(scheme.shipped(), needed)?)
     }
 
     /// The operator of a method in a scheme at resolution `n` of the convergence tests.
     ///
     /// # Errors
-    /// [`Error::Options`] for a resolution that cannot be, [`Error::Engine`] if there is no network.
+    /// [`Error::Options`] for a resolution that cannot be, [`Error::Model`] if there is no network.
     pub fn operator(
         &self,
         (method, scheme): (Method, Scheme),

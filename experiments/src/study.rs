@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 
 use clap::Args;
-use engine::{
-    Case, Error as EngineError, Flow, Method, Operator, Scales, Scheme, StepRule, Stop, checksum,
-};
+use engine::{Case, Flow, Method, Operator, Scales, Scheme, StepRule, Stop};
 use geometry::Field;
 use report::{Cell, LineChart, Series};
 use serde::Serialize;
@@ -143,7 +141,7 @@ impl Study {
         for variant in variants {
             match study.networks.operator(variant.look(), variant.n) {
                 Ok(operator) => study.plan.push((*variant, operator)),
-                Err(Error::Engine(EngineError::MissingNetwork { .. }))
+                Err(Error::Model(model::Error::MissingNetwork { .. }))
                     if study
                         .networks
                         .find(Scheme::Accurate, &convergence_network(variant.n)?)
@@ -162,7 +160,7 @@ impl Study {
     /// Checksums of the networks of the variants, for the manifest.
     pub fn checksums(&self) -> BTreeMap<String, String> {
         let of = |(variant, operator): &(Variant, Operator)| {
-            Some((variant.key(), checksum(&operator.network()?.network)))
+            Some((variant.key(), operator.network()?.network.fingerprint()))
         };
         self.plan.iter().filter_map(of).collect()
     }

@@ -2,10 +2,11 @@
 
 use clap::Args;
 use engine::{
-    Case, Flow, Measure, Method, NeededNetwork, Operator, Record, Samples, Scales, Scheme,
-    StepRule, Stop, Trajectory, checksum, energy_increases, mean_hvp,
+    Case, Flow, Measure, Method, Operator, Record, Samples, Scales, Scheme, StepRule, Stop,
+    Trajectory, energy_increases, mean_hvp,
 };
 use geometry::{Field, Grid, UpAxis};
+use model::NeededNetwork;
 use render::{Bounds, Framing, Quality, Rgb, Scene, Tube};
 use report::{Figure, Format, OutputDir, Raster, Summary, Table};
 use serde_json::{Value, json};
@@ -61,7 +62,7 @@ impl Setting {
     /// A box of the given side, with the usual numbers of cells per unit length of a quick run and of the paper.
     ///
     /// # Errors
-    /// [`Error::Engine`] if one of the user's networks is not for surfaces, [`Error::Geometry`] as [`centred_box`].
+    /// [`Error::Model`] if one of the user's networks is not for surfaces, [`Error::Geometry`] as [`centred_box`].
     pub fn new(options: &FigureOptions, usual: [usize; 2], side: f64) -> Result<Self, Error> {
         let n = options.cells(usual);
         Ok(Self {
@@ -95,7 +96,7 @@ impl Setting {
         let papers = self.operator((Method::Hybrid, Scheme::Paper))?;
         let mut parameters = json!({
             "n": self.n, "box_side": self.grid.side(), "eps": self.scales.eps, "mcf_step": self.scales.mcf_step,
-            "network": papers.network().map(|named| checksum(&named.network)),
+            "network": papers.network().map(|named| named.network.fingerprint()),
         });
         if let (Value::Object(all), Value::Object(others)) = (&mut parameters, others) {
             all.extend(others);

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use geometry::Field;
+use geometry::measure::{has_interface, touches_side};
 use serde::{Deserialize, Serialize};
 
 use crate::Record;
@@ -90,18 +91,4 @@ impl fmt::Display for Stop {
             Self::AtTheSide => f.write_str("the shape has come to the side of the box"),
         }
     }
-}
-
-/// Whether there is an interface at all.
-pub fn has_interface<const D: usize>(u: &Field<D>) -> bool {
-    let inside = u.values().iter().filter(|u| **u > 0.0).count();
-    inside > 0 && inside < u.grid().len()
-}
-
-/// Whether a node at the side of the box is not outside.
-pub fn touches_side<const D: usize>(u: &Field<D>) -> bool {
-    const OUTSIDE: f64 = -0.5;
-    let grid = u.grid();
-    let at_side = |node: usize| grid.multi_index(node).contains(&0);
-    (u.values().iter().enumerate()).any(|(node, u)| *u > OUTSIDE && at_side(node))
 }

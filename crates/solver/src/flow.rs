@@ -106,7 +106,7 @@ pub struct FlowState<const D: usize> {
 ///
 /// ```
 /// use geometry::{Grid, phase_field, shapes::Ball};
-/// use model::pretrained;
+/// use model::Shipped;
 /// use operators::ComputeDevice;
 /// use solver::{Factors, FlowParams, NewtonParams, WillmoreFlow};
 ///
@@ -119,7 +119,7 @@ pub struct FlowState<const D: usize> {
 ///     newton: NewtonParams::default(),
 ///     calibration: Factors::PAPER,
 /// };
-/// let network = pretrained::find(params.ratios(&grid, 17))?;
+/// let network = Shipped::Paper.find(params.ratios(&grid, 17))?;
 /// let disc = phase_field(grid, &Ball::<2>::new([0.0, 0.0], 0.2)?, params.eps)?;
 /// let mut flow = WillmoreFlow::with_network(&network, &disc, params, &device)?;
 /// let record = flow.advance(params.mcf_step)?;

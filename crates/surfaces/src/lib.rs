@@ -63,6 +63,7 @@ mod isosurface;
 mod mesh;
 mod read;
 pub mod samples;
+pub mod shapes;
 mod signs;
 mod triangle;
 mod vector;

@@ -6,9 +6,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use engine::{
-    Case, Flow, NamedNetwork, Operator, Record, Run, Scales, Scheme, StepRule, Stop, checksum,
-};
+use engine::{Case, Flow, Operator, Record, Run, Scales, Scheme, StepRule, Stop};
 use experiments::networks::{EPS, STEP};
 use experiments::options::RunOptions;
 use experiments::session::Session;
@@ -18,7 +16,7 @@ use geometry::measure::zero_set_volume;
 use geometry::shapes::{Ball, Torus};
 use geometry::{Field, Grid, phase_field};
 use model::training::SphereData;
-use model::{Calibration, Network, displacement_errors, pretrained};
+use model::{Calibration, NamedNetwork, Network, Shipped, displacement_errors};
 use operators::ComputeDevice;
 use report::Summary;
 use report::{
@@ -79,7 +77,7 @@ fn program(options: &Options) -> Result<(), Error> {
     let run = &options.run;
     let networks = options.networks()?;
     let device = run.open_device()?;
-    let checksums = networks.iter().map(|(name, one)| (name, checksum(one)));
+    let checksums = networks.iter().map(|(name, one)| (name, one.fingerprint()));
     let [eps, inner_step] = DISC_SCALES;
     let parameters = json!({
         "networks": checksums.collect::<BTreeMap<_, _>>(),
@@ -143,10 +141,10 @@ impl Options {
         let mut networks = Vec::new();
         for path in &self.network {
             let network = Network::load(path)?;
-            networks.push((pretrained::file_name(network.ratios()), network));
+            networks.push((network.ratios().file_name(), network));
         }
         if networks.is_empty() {
-            let shipped = [pretrained::all()?, pretrained::all_accurate()?].concat();
+            let shipped = [Shipped::Paper.all()?, Shipped::Accurate.all()?].concat();
             networks.extend(
                 shipped
                     .into_iter()

@@ -135,7 +135,7 @@ fn retrained(
     let mut cells = options.study.cells();
     cells.retain(|n| variants.iter().any(|v| v.method.is_learned() && v.n == *n));
     if cells.is_empty() {
-        return Err(engine::Error::NetworkNotNeeded.into());
+        return Err(model::Error::NetworkNotNeeded.into());
     }
     let (device, output) = (training_device(device)?, run.open_output(PROGRAM)?);
     let (folder, progress) = (output.subfolder("networks")?, run.progress());
@@ -152,7 +152,7 @@ fn retrained(
         let ratios = convergence_ratios(n)?;
         let spec = NetworkSpec::new(format!("n{n}"), ratios, n);
         let trained = trainer.train(&spec, "lm", &LmParams::new(run.quick))?;
-        let path = folder.path(&model::pretrained::file_name(ratios))?;
+        let path = folder.path(&ratios.file_name())?;
         trained.network.save(&path)?;
         network.push(path);
     }

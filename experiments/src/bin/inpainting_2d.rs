@@ -3,14 +3,14 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use engine::{NeededNetwork, Operator, Scales, StepRule};
+use engine::{Operator, Scales, StepRule};
 use experiments::inpainting::{self, Inpainted, InpaintingOptions, Shape};
 use experiments::session::Session;
 use experiments::{Error, harness};
 use geometry::contour::{Interpolation, zero_level};
 use geometry::shapes::{Ball, Cross, Cuboid};
 use geometry::{Field, Grid, SignedDistanceExt};
-use model::Ratios;
+use model::{NeededNetwork, Ratios};
 use report::{Colour, Curve, Figure, Rgb, Shapes, Summary};
 use solver::{NewtonParams, Precision};
 

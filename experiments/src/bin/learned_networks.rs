@@ -5,14 +5,14 @@ use std::f64::consts::{PI, SQRT_2, TAU};
 use std::process::ExitCode;
 
 use clap::Parser;
-use engine::{NeededNetwork, Scheme, checksum};
+use engine::Scheme;
 use experiments::networks::NetworkOptions;
 use experiments::options::RunOptions;
 use experiments::session::Session;
 use experiments::training::{NetworkSpec, held_out_radii};
 use experiments::{Error, harness, quality};
 use model::training::levenberg_marquardt::{heat_kernel, splitting_activation};
-use model::{Network, Quality};
+use model::{NeededNetwork, Network, Quality};
 use report::{Axis, Colour, Figure, Heatmap, LineChart, LineStyle, Marker, Series, Summary, Table};
 use serde::Serialize;
 use serde_json::json;
@@ -47,7 +47,9 @@ fn program(options: &Options) -> Result<(), Error> {
         .map(|need| Ok(chosen.find(Scheme::Paper, need)?.network));
     let networks: Vec<Network> = found.collect::<Result<_, Error>>()?;
     let names = specs.iter().map(|spec| &spec.name);
-    let checksums: BTreeMap<_, _> = names.zip(networks.iter().map(checksum)).collect();
+    let checksums: BTreeMap<_, _> = names
+        .zip(networks.iter().map(Network::fingerprint))
+        .collect();
     let held_out_radii = held_out_radii(run.quick);
     let parameters =
         json!({"networks": checksums, "held_out_radii": held_out_radii, "quick": run.quick});

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use engine::{Method, Operator, Scheme, StepRule, checksum};
+use engine::{Method, Operator, Scheme, StepRule};
 use experiments::meshes::{ARMADILLO, MeshOptions};
 use experiments::networks::{Chosen, NetworkOptions, convergence_network};
 use experiments::options::RunOptions;
@@ -148,7 +148,7 @@ fn program(options: &Options) -> Result<(), Error> {
     let networks = options.networks.load(&needs)?;
     let checksums = cells.iter().zip(&needs).map(|(n, needed)| {
         let network = networks.find(Scheme::Paper, needed)?.network;
-        Ok((format!("n{n}"), checksum(&network).into()))
+        Ok((format!("n{n}"), network.fingerprint().into()))
     });
     let parameters = json!({
         "networks": checksums.collect::<Result<serde_json::Map<_, _>, Error>>()?,

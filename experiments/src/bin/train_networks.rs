@@ -8,11 +8,11 @@ use experiments::options::RunOptions;
 use experiments::session::Session;
 use experiments::training::{NetworkSpec, Trainer, training_device};
 use experiments::{Error, harness, quality};
+use model::Network;
 use model::training::adam::AdamParams;
 use model::training::least_squares::LeastSquaresParams;
 use model::training::levenberg_marquardt::LmParams;
 use model::training::{self, CurvePoint, Trained};
-use model::{Network, pretrained};
 use report::Summary;
 use report::{
     Axis, Colour, Figure, LegendEntry, LineChart, LineStyle, Manifest, OutputDir, Series, Table,
@@ -297,7 +297,7 @@ impl Trainings<'_> {
 
 impl Finished {
     fn save(&self, folder: &OutputDir, prefix: &str) -> Result<(), Error> {
-        let name = format!("{prefix}{}", pretrained::file_name(self.spec.ratios));
+        let name = format!("{prefix}{}", self.spec.ratios.file_name());
         Ok(self.trained.network.save(&folder.path(&name)?)?)
     }
 
