@@ -4,13 +4,13 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use operators::ComputeDevice;
+use operators::{ComputeDevice, memory};
 
 use crate::Error;
 
 /// Runs a program: success is exit code 0, a failure one line on standard error and exit code 2.
 pub fn run(program: impl FnOnce() -> Result<(), Error>) -> ExitCode {
-    engine::keep_freed();
+    memory::keep_freed();
     match program() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

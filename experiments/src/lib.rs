@@ -23,13 +23,11 @@
 //! - Results are collected in a fixed order: the same input gives the same bytes, wall times aside.
 
 pub mod circles;
-pub mod clifford;
 pub mod comparison;
 mod error;
 pub mod harness;
 pub mod inpainting;
 pub mod look;
-pub mod memory;
 pub mod mesh_flow;
 pub mod meshes;
 pub mod networks;

@@ -7,16 +7,17 @@ use engine::{
 };
 use geometry::{Field, Grid, UpAxis};
 use model::NeededNetwork;
+use operators::memory;
 use render::{Bounds, Framing, Quality, Rgb, Scene, Tube};
 use report::{Figure, Format, OutputDir, Raster, Summary, Table};
 use serde_json::{Value, json};
 use surfaces::ClosedMesh;
 
+use crate::Error;
 use crate::networks::Chosen;
 use crate::options::FigureOptions;
 use crate::session::Session;
 use crate::steps::steps_csv;
-use crate::{Error, memory};
 
 /// Interface width of surfaces, in cells.
 const EPS_OVER_H: f64 = 2.0;

@@ -76,16 +76,6 @@ pub enum Error {
         /// Why.
         reason: String,
     },
-    /// A file or folder that cannot be used.
-    #[error("cannot {action} {}: {source}", path.display())]
-    Io {
-        /// What was attempted.
-        action: &'static str,
-        /// The file or folder.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
     /// From an observer of another crate.
     #[error(transparent)]
     Observer(Box<dyn std::error::Error + Send + Sync>),
@@ -107,9 +97,6 @@ pub enum Error {
     /// From grids and fields.
     #[error(transparent)]
     Geometry(#[from] geometry::Error),
-    /// From meshes.
-    #[error(transparent)]
-    Surfaces(#[from] surfaces::Error),
 }
 
 impl Error {

@@ -45,7 +45,6 @@
 mod case;
 mod error;
 mod measure;
-mod memory;
 mod motion;
 mod observer;
 mod operator;
@@ -60,7 +59,6 @@ mod trajectory;
 pub use case::Case;
 pub use error::Error;
 pub use measure::Measure;
-pub use memory::keep_freed;
 pub use observer::{Event, Observer, Samples};
 pub use operator::{Flow, Method, Operator, Scales, Scheme, quarter_square};
 pub use record::{Record, Values, energy_increases, mean_hvp, to_csv};

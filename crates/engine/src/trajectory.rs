@@ -189,11 +189,9 @@ fn found<const D: usize>(
         Err(_) => {}
     }
     match std::fs::remove_dir_all(folder) {
-        Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(Error::Io {
-            action: "remove",
-            path: folder.to_owned(),
-            source,
-        }),
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(RunsError::from(files::Error::of("remove", folder)(error)).into())
+        }
         _ => Ok(None),
     }
 }

@@ -10,11 +10,11 @@ use experiments::options::RunOptions;
 use experiments::products::Candidates;
 use experiments::session::Session;
 use experiments::timing::{self, Columns, Numbers, Timed};
-use experiments::{Error, harness, memory, surfaces};
+use experiments::{Error, harness, surfaces};
 use geometry::measure::l2_distance;
 use geometry::shapes::{Ball, Capsule, Cuboid};
 use geometry::{Field, Grid, SignedDistanceExt, phase_field};
-use operators::{ComputeDevice, DeviceKind};
+use operators::{ComputeDevice, DeviceKind, memory};
 use report::{
     Axis, Colour, Figure, Format, LegendEntry, LineChart, LineStyle, Marker, Series, Summary, Table,
 };

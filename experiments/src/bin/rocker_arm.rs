@@ -5,13 +5,12 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use engine::StepRule;
-use experiments::clifford::CliffordTorus;
 use experiments::mesh_flow::{MeshFlow, MeshFlowOptions};
 use experiments::meshes::KnownMesh;
 use experiments::session::Session;
 use experiments::surfaces::{Flowed, Remarks, View};
 use experiments::{Error, harness};
-use geometry::UpAxis;
+use geometry::{CliffordTorus, UpAxis};
 use render::Tube;
 
 const ROCKER_ARM_FLOW: MeshFlow = MeshFlow {
@@ -69,7 +68,9 @@ fn clifford_tori(session: &mut Session<'_>, all: &mut [Flowed]) -> Result<Remark
         let case = &one.trajectory.case;
         let last = one.trajectory.field(one.trajectory.steps())?;
         let title = format!("Clifford torus, {}", one.label());
-        let torus = session.phase(title, || CliffordTorus::nearest(&last, case.scales.eps))?;
+        let torus = session.phase(title, || {
+            Ok(CliffordTorus::nearest(&last, case.scales.eps)?)
+        })?;
         let as_field = torus.phase_field(last.grid(), case.scales.eps)?;
         let w = case.implicit_elements()?.willmore_energy(&as_field)?;
         let CliffordTorus {
