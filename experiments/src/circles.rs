@@ -154,9 +154,6 @@ pub struct Ensemble {
 
 impl Ensemble {
     /// Runs `count` circles side by side, largest first, with results of an interrupted run where there are any.
-    ///
-    /// # Errors
-    /// [`Error::Engine`] of the first circle that fails; [`Error::Runs`] if a part cannot be stored.
     pub fn run(
         (variant, operator): &(Variant, Operator),
         (count, steps): (usize, usize),

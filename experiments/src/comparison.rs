@@ -8,7 +8,9 @@ use geometry::contour::{Interpolation, zero_level};
 use geometry::measure::{perimeter, zero_set_volume};
 use geometry::shapes::Cross;
 use geometry::{Error as GeometryError, Field, Grid, phase_field};
-use report::{Axis, Colour, Curve, Figure, Format, LineChart, OutputDir, Shapes, Summary, Table};
+use report::{
+    Axis, Colour, Curve, Figure, Format, LineChart, OutputDir, Shapes, Summary, Table, Tabulated,
+};
 use serde_json::json;
 use solver::StepRecord;
 
@@ -45,9 +47,6 @@ pub struct Setting {
 }
 
 /// The non-convex cross: arms of half length 0.8 and half width 0.27.
-///
-/// # Errors
-/// [`GeometryError`] never, for these numbers.
 pub fn cross(grid: Grid<2>) -> Result<Field<2>, GeometryError> {
     phase_field(grid, &Cross::new(0.8, 0.27)?, EPS)
 }
@@ -131,9 +130,8 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
         "time_step": STEP,
         "steps": steps,
         "networks": study.checksums(),
-        "quick": quick,
     });
-    let mut session = Session::open(setting.program, &options.study.run, device, &parameters)?;
+    let mut session = Session::open(setting.program, &options.study.run, device, parameters)?;
     let mut runs = Vec::new();
     for (variant, operator) in &study.plan {
         runs.push(setting.run(&mut session, "", (*variant, operator), (steps, 1))?);
@@ -270,14 +268,14 @@ impl Comparison<'_> {
         format!("Reference: implicit finite elements, n = {n}{step}{estimate}.")
     }
 
-    fn write(&self, session: Session<'_>) -> Result<(), Error> {
+    fn write(&self, mut session: Session<'_>) -> Result<(), Error> {
         session.figure(self.error_figure(), "errors")?;
         session.figure(self.shape_figure()?, "shapes")?;
-        let table = self.table()?;
-        table.write(&session.output, "error_table")?;
+        session.table(self.table(), "error_table")?;
+        session.remark(self.about_the_reference());
         self.data(&session.output)?;
-        let report = format!("{}\n{}", table.to_markdown(), self.about_the_reference());
-        session.finish(self.setting.title, self.summary()?, &report)
+        self.summarize(&mut session.summary)?;
+        session.finish(self.setting.title)
     }
 
     fn data(&self, output: &OutputDir) -> Result<(), Error> {
@@ -356,7 +354,7 @@ impl Comparison<'_> {
         Ok(figure)
     }
 
-    fn table(&self) -> Result<Table, Error> {
+    fn table(&self) -> Tabulated<'_, Compared> {
         let mut table = Table::of(&self.runs)
             .text("method", |run| run.variant.label())
             .number("n", Format::Shortest, |run| run.variant.n);
@@ -369,14 +367,12 @@ impl Comparison<'_> {
         }
         let hvp = |run: &Compared| study::mean(run.minimizations(), StepRecord::hvp);
         let seconds = |run: &Compared| run.trajectory.seconds() / run.trajectory.steps() as f64;
-        Ok(table
+        table
             .number("HVP/step", Format::Fixed(1), hvp)
             .number("s/step", Format::Fixed(2), seconds)
-            .finish()?)
     }
 
-    fn summary(&self) -> Result<Summary, Error> {
-        let mut summary = Summary::new();
+    fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
         for run in &self.runs {
             let key = format!("{}.{}", self.setting.program, run.variant.key());
             let mut of_step = |what: &str, step: usize, value: f64| {
@@ -410,7 +406,7 @@ impl Comparison<'_> {
         if let Some(distance) = self.reference_difference() {
             summary.insert(&format!("{key}.l2_to_half_n"), distance)?;
         }
-        Ok(summary)
+        Ok(())
     }
 }
 

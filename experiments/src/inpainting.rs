@@ -56,9 +56,6 @@ pub struct Shape<const D: usize> {
 
 impl<const D: usize> Shape<D> {
     /// The shape in its region on a grid.
-    ///
-    /// # Errors
-    /// [`Error::Geometry`] for scales without a phase field.
     pub fn case(
         &self,
         grid: Grid<D>,
@@ -102,7 +99,6 @@ pub fn parameters<const D: usize>(
     (n, scales): (usize, &Scales),
     operator: &Operator,
     shapes: &[Shape<D>],
-    quick: bool,
 ) -> Value {
     json!({
         "n": n, "eps": scales.eps, "mcf_step": scales.mcf_step, "scheme": operator.scheme,
@@ -110,7 +106,7 @@ pub fn parameters<const D: usize>(
         "tau": shapes.iter().map(|shape| shape.rule).collect::<Vec<_>>(),
         "steps": shapes.iter().map(|shape| shape.steps).collect::<Vec<_>>(),
         "first_substep": first_substep(scales.eps), "still": STILL,
-        "network": operator.network().map(|named| named.network.fingerprint()), "quick": quick,
+        "network": operator.network().map(|named| named.network.fingerprint()),
     })
 }
 
@@ -128,9 +124,6 @@ pub struct Inpainted<'a, const D: usize> {
 
 impl<'a, const D: usize> Inpainted<'a, D> {
     /// Measures a run.
-    ///
-    /// # Errors
-    /// [`Error::Geometry`] if a stored phase field cannot be read.
     pub fn measure(shape: &'a Shape<D>, trajectory: &'a Trajectory<D>) -> Result<Self, Error> {
         let Case {
             initial,
@@ -174,9 +167,6 @@ impl<'a, const D: usize> Inpainted<'a, D> {
     }
 
     /// Writes the figure of the shown steps.
-    ///
-    /// # Errors
-    /// [`Error::Report`].
     pub fn write_frames(&self, session: &Session<'_>, figure: Figure) -> Result<(), Error> {
         let title = format!("Inpainting: {}", self.shape.title);
         let name = format!("{}_frames", self.shape.key);
@@ -184,9 +174,6 @@ impl<'a, const D: usize> Inpainted<'a, D> {
     }
 
     /// Adds the metrics of this run.
-    ///
-    /// # Errors
-    /// [`Error::Report`] for a value that is not finite.
     fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
         let name = |metric: &str| format!("{}.{metric}", self.shape.key);
         let (trajectory, records) = (self.trajectory, &self.trajectory.records);
@@ -211,13 +198,9 @@ impl<'a, const D: usize> Inpainted<'a, D> {
 }
 
 /// Writes the energies, the records of all steps, the table of distances and the metrics, and ends the program.
-///
-/// # Errors
-/// [`Error::Report`].
 pub fn finish<const D: usize>(
-    session: Session<'_>,
+    mut session: Session<'_>,
     title: &str,
-    mut summary: Summary,
     all: &[Inpainted<'_, D>],
 ) -> Result<(), Error> {
     let output = &session.output;
@@ -231,21 +214,21 @@ pub fn finish<const D: usize>(
     session.figure(energies, "energies")?;
     let runs = all.iter().map(|one| (one.shape.key, one.trajectory));
     output.write("steps.csv", steps_csv("shape", runs)?)?;
-    let table = table(all)?;
-    table.write(output, "inpainting")?;
-    all.iter().try_for_each(|one| one.summarize(&mut summary))?;
-    session.finish(title, summary, &table.to_markdown())
+    table(&mut session, all)?;
+    let summary = &mut session.summary;
+    all.iter().try_for_each(|one| one.summarize(summary))?;
+    session.finish(title)
 }
 
 /// Distances and energies at the steps that are shown.
-fn table<const D: usize>(all: &[Inpainted<'_, D>]) -> Result<Table, Error> {
+fn table<const D: usize>(session: &mut Session<'_>, all: &[Inpainted<'_, D>]) -> Result<(), Error> {
     let mut rows = Vec::new();
     for one in all {
         for &(step, distance) in &one.distances {
             rows.push((one, step, distance, one.trajectory.record(step)));
         }
     }
-    Ok(Table::of(&rows)
+    let table = Table::of(&rows)
         .text("shape", |(one, ..)| one.shape.title)
         .number("step", Format::Shortest, |(_, step, ..)| *step)
         .number("time in steps", Format::Shortest, |(one, .., record)| {
@@ -258,6 +241,6 @@ fn table<const D: usize>(all: &[Inpainted<'_, D>]) -> Result<Table, Error> {
         )
         .number("Willmore energy", Format::Fixed(3), |(.., record)| {
             record.and_then(Record::willmore_energy)
-        })
-        .finish()?)
+        });
+    session.table(table, "inpainting")
 }

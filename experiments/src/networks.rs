@@ -56,9 +56,6 @@ impl Chosen {
     }
 
     /// The network of a scheme with these ratios.
-    ///
-    /// # Errors
-    /// [`Error::Model`] if there is none.
     pub fn find(&self, scheme: Scheme, needed: &NeededNetwork) -> Result<NamedNetwork, Error> {
         Ok(self.of(scheme).find(scheme.shipped(), needed)?)
     }
@@ -102,9 +99,6 @@ pub fn convergence_ratios(n: usize) -> Result<Ratios, Error> {
 }
 
 /// The network of the convergence tests with [these ratios](convergence_ratios).
-///
-/// # Errors
-/// Those of the ratios.
 pub fn convergence_network(n: usize) -> Result<NeededNetwork, Error> {
     Ok(NeededNetwork::exactly(convergence_ratios(n)?))
 }

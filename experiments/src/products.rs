@@ -215,9 +215,6 @@ impl<const D: usize> Candidates<D> {
 
     /// Measures all candidates in turns, for at least this time and eleven turns: medians in milliseconds, the median `ratio` of the
     /// product through Burn to that by hand in the same turn, and what the former costs `over_floor`, its transforms alone.
-    ///
-    /// # Errors
-    /// None: turns do not fail.
     pub fn measure(&mut self, budget: Duration) -> Result<Numbers, Error> {
         const LEAST: usize = 11;
         const NAMES: [&str; 6] = [

@@ -122,9 +122,6 @@ pub struct Study {
 
 impl Study {
     /// The operators of all variants; variants without a network are left out if the accurate recipe has one for the resolution.
-    ///
-    /// # Errors
-    /// What the networks refuse: see [`NetworkOptions::load`] and [`Chosen::operator`].
     pub fn new(options: &NetworkOptions, variants: &[Variant]) -> Result<Self, Error> {
         let learned = variants.iter().filter(|v| v.method.is_learned());
         let needs = learned

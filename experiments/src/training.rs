@@ -86,9 +86,6 @@ impl NetworkSpec {
     }
 
     /// The training data.
-    ///
-    /// # Errors
-    /// [`Error::Model`] for ratios that cannot be trained.
     pub fn data(&self, quick: bool) -> Result<SphereData, Error> {
         let data = SphereData::new(self.ratios, self.cells)?;
         Ok(if quick { data.quick() } else { data })
@@ -131,9 +128,6 @@ pub struct Trainer<'a> {
 
 impl Trainer<'_> {
     /// Trains a network by a recipe of the given name, continuing from a checkpoint.
-    ///
-    /// # Errors
-    /// [`Error::Model`] if the training fails, [`Error::Runs`] if a checkpoint cannot be stored.
     pub fn train<R: Recipe>(
         &self,
         spec: &NetworkSpec,

@@ -41,6 +41,11 @@
 //!
 //! New parts have one place each: a step rule in [`StepRule`], a stop rule in [`Stop`], a method in [`Method`], a measure in
 //! [`Measure`], an observer behind [`Observer`].
+//!
+//! Errors of the crates below, such as [`Error::Runs`] and [`Error::Geometry`], pass through as they are; functions that refuse something
+//! themselves say what.
+
+#![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 
 mod case;
 mod error;

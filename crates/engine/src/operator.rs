@@ -281,9 +281,6 @@ impl Operator {
     }
 
     /// The operator of a method in a scheme: [`Self::learned`] with the network that meets the need, or [`Self::finite_elements`].
-    ///
-    /// # Errors
-    /// Those of the two, and of [`Networks::find`].
     pub fn new<const D: usize>(
         (method, scheme): (Method, Scheme),
         networks: &Networks,

@@ -37,9 +37,6 @@ pub struct Store {
 impl Store {
     /// Starts the directory of a run with these files and a first checkpoint. `notes` are kept in all checkpoints, and a run that is
     /// resumed has to have the same.
-    ///
-    /// # Errors
-    /// [`Error::Runs`].
     pub fn create<const D: usize>(
         folder: impl Into<PathBuf>,
         files: &[(&str, &str)],
@@ -58,9 +55,6 @@ impl Store {
 
     /// Takes a stored run up where its last checkpoint is; `case` is built anew, from the [`initial`] field if need be, and must be the
     /// stored one.
-    ///
-    /// # Errors
-    /// [`Error::OtherCase`], [`Error::Unreadable`], [`Error::Runs`], and what [`Run::new`] raises.
     pub fn resume<const D: usize>(
         stored: StoredRun,
         case: Case<D>,
@@ -85,9 +79,6 @@ impl Store {
     }
 
     /// Makes a checkpoint.
-    ///
-    /// # Errors
-    /// [`Error::Runs`].
     pub fn commit<const D: usize>(&mut self, run: &Run<D>) -> Result<(), Error> {
         self.write_tables(run)?;
         self.directory.commit(&pack(run, &self.notes)?)?;
@@ -112,9 +103,6 @@ impl Store {
     }
 
     /// The last checkpoint of a run that is over, which is kept alone.
-    ///
-    /// # Errors
-    /// [`Error::Runs`].
     pub fn finish<const D: usize>(mut self, run: &Run<D>) -> Result<(), Error> {
         self.write_tables(run)?;
         Ok(self.directory.finish(&pack(run, &self.notes)?)?)
@@ -137,9 +125,6 @@ pub fn notes(stored: &StoredRun) -> &Value {
 }
 
 /// The dimension of a stored run.
-///
-/// # Errors
-/// [`Error::Unreadable`].
 pub fn dimension(stored: &StoredRun) -> Result<usize, Error> {
     let dimension: usize = read(stored, &stored.state().notes["case"]["grid"]["dimension"])?;
     match dimension {
@@ -153,9 +138,6 @@ pub fn dimension(stored: &StoredRun) -> Result<usize, Error> {
 
 /// The initial phase field of a stored run, and the nodes whose values move if not all do: a case can be built from them without its
 /// input.
-///
-/// # Errors
-/// [`Error::Unreadable`].
 pub fn initial<const D: usize>(stored: &StoredRun) -> Result<(Field<D>, Option<Vec<bool>>), Error> {
     let region = stored.state().array("region");
     let region = region.map(|marks| marks.iter().map(|&mark| mark > 0.5).collect());

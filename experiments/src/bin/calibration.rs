@@ -18,9 +18,9 @@ use geometry::{Field, Grid, phase_field};
 use model::training::SphereData;
 use model::{Calibration, NamedNetwork, Network, Shipped, displacement_errors};
 use operators::ComputeDevice;
-use report::Summary;
 use report::{
     Axis, Colour, Figure, Format, LineChart, LineStyle, Marker, OutputDir, Progress, Series, Table,
+    Tabulated,
 };
 use serde::Serialize;
 use serde_json::json;
@@ -69,8 +69,7 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
+    harness::main(program)
 }
 
 fn program(options: &Options) -> Result<(), Error> {
@@ -84,9 +83,8 @@ fn program(options: &Options) -> Result<(), Error> {
         "eps": eps,
         "inner_step": inner_step,
         "time_step": STEP_RATIO * inner_step,
-        "quick": run.quick,
     });
-    let mut session = Session::open(PROGRAM, run, device.clone(), &parameters)?;
+    let mut session = Session::open(PROGRAM, run, device.clone(), parameters)?;
     let install = (options.install.as_ref())
         .map(OutputDir::create)
         .transpose()?;
@@ -116,23 +114,15 @@ fn program(options: &Options) -> Result<(), Error> {
     output.write_json("discs.json", &discs)?;
     output.write_csv("discs.csv", &discs)?;
     output.write_csv("surfaces.csv", &surfaces)?;
-    let mut tables = Vec::new();
-    for (table, name) in [
-        (calibration_table(&all)?, "calibration"),
-        (discs_table(&discs)?, "discs_table"),
-        (surfaces_table(&surfaces)?, "surfaces_table"),
-    ] {
-        table.write(output, name)?;
-        tables.push(table.to_markdown());
-    }
-    let mut summary = Summary::new();
+    calibration_table(&mut session, &all)?;
+    session.table(discs_table(&discs), "discs_table")?;
+    session.table(surfaces_table(&surfaces), "surfaces_table")?;
     for one in &all {
         let (key, calibration) = (one.key(), &one.calibration);
-        summary.insert_record(key, calibration)?;
-        summary.insert_record(key, &calibration.factors)?;
+        session.summary.insert_record(key, calibration)?;
+        session.summary.insert_record(key, &calibration.factors)?;
     }
-    let title = "Calibration of the learned operators and of finite elements";
-    session.finish(title, summary, &tables.join("\n"))
+    session.finish("Calibration of the learned operators and of finite elements")
 }
 
 impl Options {
@@ -312,7 +302,7 @@ fn disc_energy(
     Ok(energy * (area / PI).sqrt() / PI)
 }
 
-fn discs_table(discs: &[DiscRow]) -> report::Result<Table> {
+fn discs_table(discs: &[DiscRow]) -> Tabulated<'_, DiscRow> {
     let fixed = Format::Fixed(4);
     Table::of(discs)
         .text("network", |r| &r.network)
@@ -322,7 +312,6 @@ fn discs_table(discs: &[DiscRow]) -> report::Result<Table> {
         .number("w R/π", fixed, |r| r.measured)
         .number("predicted", fixed, |r| r.predicted)
         .number("calibrated w R/π", fixed, |r| r.calibrated)
-        .finish()
 }
 
 /// Measured and predicted energies over the radius; colour: phase.
@@ -411,14 +400,13 @@ fn surfaces(
     Ok(rows)
 }
 
-fn surfaces_table(rows: &[SurfaceRow]) -> report::Result<Table> {
+fn surfaces_table(rows: &[SurfaceRow]) -> Tabulated<'_, SurfaceRow> {
     let fixed = Format::Fixed(4);
     Table::of(rows)
         .text("network", |r| &r.network)
         .text("surface", |r| &r.surface)
         .number("w / exact", fixed, |r| r.measured)
         .number("calibrated w / exact", fixed, |r| r.calibrated)
-        .finish()
 }
 
 /// What tells good networks from bad ones.
@@ -526,7 +514,7 @@ fn elements() -> Result<Vec<(String, Calibration)>, Error> {
     Ok(all)
 }
 
-fn calibration_table(all: &[Calibrated]) -> Result<Table, Error> {
+fn calibration_table(session: &mut Session<'_>, all: &[Calibrated]) -> Result<(), Error> {
     let learned = all.iter().map(|one| (one.name.clone(), one.calibration));
     let rows: Vec<(String, Calibration)> = learned.chain(elements()?).collect();
     let (fixed, small) = (Format::Fixed(4), Format::Scientific(1));
@@ -541,5 +529,5 @@ fn calibration_table(all: &[Calibrated]) -> Result<Table, Error> {
         .number("eigenvalue - 1", small, |(_, c)| c.eigenvalue - 1.0)
         .number("spread over positions", small, |(_, c)| c.position_spread)
         .number("spread over normals", small, |(_, c)| c.normal_spread);
-    Ok(table.finish()?)
+    session.table(table, "calibration")
 }

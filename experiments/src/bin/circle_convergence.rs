@@ -13,7 +13,9 @@ use experiments::training::{NetworkSpec, Trainer, training_device};
 use experiments::{Error, harness, look};
 use model::training::levenberg_marquardt::LmParams;
 use operators::ComputeDevice;
-use report::{Axis, Figure, Format, LineChart, Marker, OutputDir, Series, Summary, Table};
+use report::{
+    Axis, Figure, Format, LineChart, Marker, OutputDir, Series, Summary, Table, Tabulated,
+};
 use runs::Cache;
 use serde_json::json;
 use solver::StepRecord;
@@ -59,8 +61,7 @@ impl Options {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
+    harness::main(program)
 }
 
 fn program(options: &Options) -> Result<(), Error> {
@@ -93,9 +94,8 @@ fn program(options: &Options) -> Result<(), Error> {
         "time_step": STEP,
         "networks": study.checksums(),
         "retrained": options.retrain,
-        "quick": run.quick,
     });
-    let mut session = Session::open(PROGRAM, run, device, &parameters)?;
+    let mut session = Session::open(PROGRAM, run, device, parameters)?;
     let finished = Cache::open(session.output.as_path().join("partial"))?;
     let mut ensembles = Vec::new();
     for planned in &study.plan {
@@ -115,14 +115,10 @@ fn program(options: &Options) -> Result<(), Error> {
     };
     report.figures(&session)?;
     report.data(&session.output)?;
-    let table = report.table()?;
-    table.write(&session.output, "errors")?;
+    session.table(report.table(), "errors")?;
+    report.summarize(&mut session.summary)?;
     finished.remove()?;
-    session.finish(
-        "Mean L2 distance to the exact solution",
-        report.summary()?,
-        &table.to_markdown(),
-    )
+    session.finish("Mean L2 distance to the exact solution")
 }
 
 /// Trains the networks of all resolutions, and says where they are.
@@ -351,7 +347,7 @@ impl Report {
         Ok(())
     }
 
-    fn table(&self) -> Result<Table, Error> {
+    fn table(&self) -> Tabulated<'_, Ensemble> {
         let mut table = Table::of(&self.ensembles)
             .text("flow", |e| e.variant.flow.title())
             .number("n", Format::Shortest, |e| e.variant.n)
@@ -360,11 +356,10 @@ impl Report {
             table = table.number(format!("step {k}"), Format::Fixed(5), |e| e.mean_error(k));
         }
         let hvp = |e: &Ensemble| e.mean_of_steps(StepRecord::hvp);
-        Ok(table.number("HVP/step", Format::Fixed(1), hvp).finish()?)
+        table.number("HVP/step", Format::Fixed(1), hvp)
     }
 
-    fn summary(&self) -> Result<Summary, Error> {
-        let mut summary = Summary::new();
+    fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
         for e in &self.ensembles {
             let key = e.key();
             for k in self.shown_steps() {
@@ -393,6 +388,6 @@ impl Report {
                 summary.insert(&format!("{}.scale", flow.key()), scale)?;
             }
         }
-        Ok(summary)
+        Ok(())
     }
 }

@@ -13,7 +13,7 @@ use experiments::training::{NetworkSpec, held_out_radii};
 use experiments::{Error, harness, quality};
 use model::training::levenberg_marquardt::{heat_kernel, splitting_activation};
 use model::{NeededNetwork, Network, Quality};
-use report::{Axis, Colour, Figure, Heatmap, LineChart, LineStyle, Marker, Series, Summary, Table};
+use report::{Axis, Colour, Figure, Heatmap, LineChart, LineStyle, Marker, Series, Table};
 use serde::Serialize;
 use serde_json::json;
 
@@ -31,8 +31,7 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
+    harness::main(program)
 }
 
 fn program(options: &Options) -> Result<(), Error> {
@@ -51,11 +50,8 @@ fn program(options: &Options) -> Result<(), Error> {
         .zip(networks.iter().map(Network::fingerprint))
         .collect();
     let held_out_radii = held_out_radii(run.quick);
-    let parameters =
-        json!({"networks": checksums, "held_out_radii": held_out_radii, "quick": run.quick});
-    let mut session = Session::open(PROGRAM, run, device.clone(), &parameters)?;
-    let mut summary = Summary::new();
-
+    let parameters = json!({"networks": checksums, "held_out_radii": held_out_radii});
+    let mut session = Session::open(PROGRAM, run, device.clone(), parameters)?;
     let bar = session.progress.bar("held-out losses", specs.len() as u64);
     let mut shown = Vec::new();
     for (spec, network) in specs.iter().zip(&networks) {
@@ -63,7 +59,7 @@ fn program(options: &Options) -> Result<(), Error> {
         let quality = session.phase(format!("quality of {}", spec.name), || {
             Ok(Quality::measure(network, &data, held_out_radii, &device)?)
         })?;
-        summary.insert_record(&spec.name, &quality)?;
+        session.summary.insert_record(&spec.name, &quality)?;
         shown.push(Shown::new(spec, network, &heat_kernel(&data), quality));
         bar.inc(1);
     }
@@ -87,14 +83,8 @@ fn program(options: &Options) -> Result<(), Error> {
         .collect();
     output.write_json("networks.json", &origins)?;
     let table = Table::of(&shown).text("network", |one| &one.spec.name);
-    let table = quality::columns(table, |one| &one.quality);
-    let table = table.finish()?;
-    table.write(output, "quality")?;
-    session.finish(
-        "Quality of the learned operators",
-        summary,
-        &table.to_markdown(),
-    )
+    session.table(quality::columns(table, |one| &one.quality), "quality")?;
+    session.finish("Quality of the learned operators")
 }
 
 /// A network with the curves that show it.

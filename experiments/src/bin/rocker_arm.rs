@@ -52,8 +52,7 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| ROCKER_ARM_FLOW.run(&options.flow, clifford_tori))
+    harness::main(|options: &Options| ROCKER_ARM_FLOW.run(&options.flow, clifford_tori))
 }
 
 /// Finds the Clifford torus nearest to the last shape of each run, and draws it there.
@@ -76,12 +75,11 @@ fn clifford_tori(session: &mut Session<'_>, all: &mut [Flowed]) -> Result<Remark
         let CliffordTorus {
             l2, outer_radius, ..
         } = torus;
-        remarks.report = format!(
-            "{}\nNearest Clifford torus, {}: L2 distance {l2:.4} (paper {PAPERS_L2:.4}), outer radius {outer_radius:.3}, w = {w:.2} (paper \
+        remarks.report.push(format!(
+            "Nearest Clifford torus, {}: L2 distance {l2:.4} (paper {PAPERS_L2:.4}), outer radius {outer_radius:.3}, w = {w:.2} (paper \
              {PAPERS_CLIFFORD})",
-            remarks.report,
             one.label()
-        );
+        ));
         let circles = torus.minor_circles(CIRCLES.0, CIRCLES.1)?.into_iter();
         let tube = |circle: Vec<[f64; 3]>| Tube::new(circle, 0.1 * case.scales.eps).closed();
         if let Some(shown) = one.snapshots.last_mut() {

@@ -18,6 +18,8 @@ use solver::Method as Newton;
 const PROGRAM: &str = "timing_tables";
 /// Time steps of the table, until `t = 2^-7`.
 const STEPS: usize = 128;
+/// Heading of the column with the paper's times.
+const PAPERS: &str = "paper, other machines [s]";
 
 /// Wall time of 128 Willmore steps of the cross (eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7) by the hybrid scheme and by
 /// nested finite elements, taking turns step by step on this machine, with the numbers of Newton steps, Hessian-vector products and
@@ -130,8 +132,7 @@ const COLUMNS: &Columns = &[
 ];
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
+    harness::main(program)
 }
 
 fn program(options: &Options) -> Result<(), Error> {
@@ -155,19 +156,17 @@ fn program(options: &Options) -> Result<(), Error> {
         "cells": cells,
         "budget": budget,
         "steps": STEPS,
-        "quick": quick,
     });
-    let mut session = Session::open(PROGRAM, run, device, &parameters)?;
+    let mut session = Session::open(PROGRAM, run, device, parameters)?;
     let mut timings = Vec::new();
     for &n in cells {
         timings.extend(measure(&mut session, &networks, n, budget)?);
     }
     let armadillo = surface_steps(options, &networks, &mut session)?;
 
-    let table = table(&timings)?;
-    table.write(&session.output, "timing")?;
-    let surface_table = surface_table(&armadillo)?;
-    surface_table.write(&session.output, "armadillo")?;
+    table(&mut session, &timings)?;
+    session.remark(run.title("One Willmore step of a surface"));
+    surface_table(&mut session, &armadillo)?;
     let json = timings.iter().map(|t| {
         let (row, seconds) = (t.row.key, t.timed.seconds());
         json!({ "variant": row, "n": t.n, "numbers": t.numbers(), "step_seconds": seconds, "failure": t.failure })
@@ -176,14 +175,8 @@ fn program(options: &Options) -> Result<(), Error> {
         .output
         .write_json("timing.json", &json.collect::<Vec<_>>())?;
     session.figure(figure(&timings), "timing")?;
-    let report = format!(
-        "{}\n{}\n{}",
-        table.to_markdown(),
-        run.title("One Willmore step of a surface"),
-        surface_table.to_markdown()
-    );
-    let title = "128 Willmore steps of the cross: wall time on this machine";
-    session.finish(title, summary(&timings, &armadillo)?, &report)
+    summarize(&mut session.summary, &timings, &armadillo)?;
+    session.finish("128 Willmore steps of the cross: wall time on this machine")
 }
 
 /// All rows at a resolution.
@@ -332,7 +325,7 @@ fn surface_steps(
     })
 }
 
-fn surface_table(steps: &[SurfaceStep]) -> Result<Table, Error> {
+fn surface_table(session: &mut Session<'_>, steps: &[SurfaceStep]) -> Result<(), Error> {
     const COLUMNS: &Columns = &[
         ("one step [s]", Format::Fixed(2), "seconds"),
         ("Newton", Format::Fixed(0), "newton_per_step"),
@@ -342,14 +335,12 @@ fn surface_table(steps: &[SurfaceStep]) -> Result<Table, Error> {
         .text("surface", |s| &s.surface)
         .text("method", |s| s.method.label())
         .number("n", Format::Shortest, |s| s.n);
-    Ok(timing::with_columns(table, COLUMNS, |s| &s.numbers)
-        .number("paper, other machines [s]", Format::Shortest, |s| {
-            s.papers_seconds
-        })
-        .finish()?)
+    let table = timing::with_columns(table, COLUMNS, |s| &s.numbers);
+    let papers = |s: &SurfaceStep| s.papers_seconds;
+    session.table(table.number(PAPERS, Format::Shortest, papers), "armadillo")
 }
 
-fn table(timings: &[Timing]) -> Result<Table, Error> {
+fn table(session: &mut Session<'_>, timings: &[Timing]) -> Result<(), Error> {
     let numbers: Vec<Numbers> = timings.iter().map(Timing::numbers).collect();
     let rows: Vec<(&Timing, Numbers)> = timings.iter().zip(numbers).collect();
     let times = |t: &Timing, k: usize| t.over_hybrid(timings).map(|times| times[k]);
@@ -365,9 +356,8 @@ fn table(timings: &[Timing]) -> Result<Table, Error> {
             |(t, _)| times(t, 1),
         );
     let papers = |(t, _): &(&Timing, Numbers)| t.row.papers_seconds(t.n);
-    Ok(timing::with_columns(table, COLUMNS, |(_, numbers)| numbers)
-        .number("paper, other machines [s]", Format::Shortest, papers)
-        .finish()?)
+    let table = timing::with_columns(table, COLUMNS, |(_, numbers)| numbers);
+    session.table(table.number(PAPERS, Format::Shortest, papers), "timing")
 }
 
 fn figure(timings: &[Timing]) -> Figure {
@@ -403,22 +393,22 @@ fn figure(timings: &[Timing]) -> Figure {
         )
 }
 
-fn summary(timings: &[Timing], armadillo: &[SurfaceStep]) -> Result<Summary, Error> {
-    let mut summary = Summary::new();
+fn summarize(
+    summary: &mut Summary,
+    timings: &[Timing],
+    armadillo: &[SurfaceStep],
+) -> Result<(), Error> {
     for timing in timings.iter().filter(|t| t.usable()) {
         let mut numbers = timing.numbers();
         let factor = timing.over_hybrid(timings);
         numbers.extend(factor.map(|[_, measured]| ("times_hybrid_measured_steps", measured)));
-        timing::summarize(
-            &mut summary,
-            &format!("timing.n{}.{}", timing.n, timing.row.key),
-            &numbers,
-        )?;
+        let key = format!("timing.n{}.{}", timing.n, timing.row.key);
+        timing::summarize(summary, &key, &numbers)?;
     }
     for step in armadillo {
         let key = format!("timing.armadillo.{}", step.method.key());
         summary.insert(&format!("{key}.seconds"), step.numbers["seconds"])?;
         summary.insert(&format!("{key}.hvp"), step.numbers["hvp_on_this_grid"])?;
     }
-    Ok(summary)
+    Ok(())
 }

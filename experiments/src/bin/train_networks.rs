@@ -13,7 +13,6 @@ use model::training::adam::AdamParams;
 use model::training::least_squares::LeastSquaresParams;
 use model::training::levenberg_marquardt::LmParams;
 use model::training::{self, CurvePoint, Trained};
-use report::Summary;
 use report::{
     Axis, Colour, Figure, LegendEntry, LineChart, LineStyle, Manifest, OutputDir, Series, Table,
 };
@@ -86,8 +85,7 @@ impl Recipe {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
+    harness::main(program)
 }
 
 fn program(options: &Options) -> Result<(), Error> {
@@ -101,9 +99,8 @@ fn program(options: &Options) -> Result<(), Error> {
         "levenberg_marquardt": settings.lm,
         "adam": settings.adam,
         "accurate": settings.accurate,
-        "quick": run.quick,
     });
-    let mut session = Session::open(PROGRAM, run, device.clone(), &parameters)?;
+    let mut session = Session::open(PROGRAM, run, device.clone(), parameters)?;
     let install = (options.install.as_ref())
         .map(OutputDir::create)
         .transpose()?;
@@ -134,20 +131,19 @@ fn program(options: &Options) -> Result<(), Error> {
             one.save(install, if accurate { "accurate_" } else { "" })?;
         }
     }
-    let (table, summary) = write(&all, &session)?;
+    write(&all, &mut session)?;
     checkpoints.remove()?;
-    let folder = folder.as_path().display();
-    let report = format!("{}\nNetworks are in {folder}", table.to_markdown());
-    session.finish("Quality of the trained networks", summary, &report)
+    session.remark(format!("Networks are in {}", folder.as_path().display()));
+    session.finish("Quality of the trained networks")
 }
 
 /// Curves, figure, metrics and table.
-fn write(all: &[Finished], session: &Session<'_>) -> Result<(Table, Summary), Error> {
+fn write(all: &[Finished], session: &mut Session<'_>) -> Result<(), Error> {
     session.figure(figure(all), "learning_curves")?;
     let rows: Vec<CurveRow<'_>> = all.iter().flat_map(Finished::curve).collect();
     session.output.write_csv("learning_curves.csv", &rows)?;
     session.output.write_json("learning_curves.json", &rows)?;
-    let mut summary = Summary::new();
+    let summary = &mut session.summary;
     for one in all {
         let key = match one.recipe {
             Recipe::Lm => format!("train.{}", one.spec.name),
@@ -160,10 +156,10 @@ fn write(all: &[Finished], session: &Session<'_>) -> Result<(Table, Summary), Er
     let table = Table::of(all)
         .text("network", |one| &one.spec.name)
         .text("recipe", Finished::key);
-    let table = quality::columns(table, |one| &one.trained.quality);
-    let table = table.finish()?;
-    table.write(&session.output, "quality")?;
-    Ok((table, summary))
+    session.table(
+        quality::columns(table, |one| &one.trained.quality),
+        "quality",
+    )
 }
 
 /// The settings of every recipe.
