@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use engine::{Case, Flow, Measure, Operator, Record, Run, Values};
+use engine::{Case, Flow, Measure, Operator, Record, Run, Values, minimizations};
 use geometry::exact::{mean_curvature_radius, willmore_radius};
 use geometry::measure::l2_distance;
 use geometry::shapes::Ball;
@@ -89,7 +89,7 @@ fn case(
     let initial = exact(flow, radius, grid, 0.0)?;
     Ok(Case {
         measures,
-        ..study::case((flow, operator), shape, initial, (STEP, steps))
+        ..study::case((flow, operator), &shape, initial, (STEP, steps))
     })
 }
 
@@ -136,10 +136,6 @@ impl Circle {
             k => &self.records[k - 1].measures,
         };
         values["l2"]
-    }
-
-    fn minimizations(&self) -> impl Iterator<Item = &StepRecord> {
-        (self.records.iter()).filter_map(|record| record.minimization.as_ref())
     }
 }
 
@@ -216,7 +212,7 @@ impl Ensemble {
 
     /// All minimizations of Willmore flow.
     pub fn minimizations(&self) -> impl Iterator<Item = &StepRecord> {
-        self.circles.iter().flat_map(Circle::minimizations)
+        (self.circles.iter()).flat_map(|circle| minimizations(&circle.records))
     }
 
     /// Mean of a quantity over all minimizations; nothing for mean curvature flow.

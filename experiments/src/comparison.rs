@@ -3,7 +3,9 @@
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
-use engine::{Flow, Measure, Method, Operator, Samples, Scheme, Trajectory, energy_increases};
+use engine::{
+    Flow, Measure, Method, Operator, Samples, Scheme, Trajectory, energy_increases, minimizations,
+};
 use geometry::contour::{Interpolation, zero_level};
 use geometry::measure::{perimeter, zero_set_volume};
 use geometry::shapes::Cross;
@@ -227,8 +229,7 @@ impl Compared {
     }
 
     fn minimizations(&self) -> impl Iterator<Item = &StepRecord> {
-        let records = self.trajectory.records.iter();
-        records.filter_map(|record| record.minimization.as_ref())
+        minimizations(&self.trajectory.records)
     }
 
     /// The zero level at a time.
@@ -292,13 +293,10 @@ impl Comparison<'_> {
         let references = std::iter::once(&self.reference).chain(&self.half);
         let compared = self.runs.iter().map(|run| (run, "false"));
         let rows = compared.chain(references.map(|run| (run, "true")));
-        let rows = rows.map(|(run, reference)| {
-            let cells = run.variant.cells().into_iter().skip(1);
-            Rows {
-                leading: cells.chain([reference.into()]).collect(),
-                start: Some(&run.trajectory.start),
-                records: &run.trajectory.records,
-            }
+        let rows = rows.map(|(run, reference)| Rows {
+            leading: [&run.variant.cells()[1..], &[reference.into()]].concat(),
+            start: Some(&run.trajectory.start),
+            records: &run.trajectory.records,
         });
         let leading = [leading, &["reference"]].concat();
         let steps = steps::table(&leading, &rows.collect::<Vec<_>>())?;

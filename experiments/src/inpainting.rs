@@ -2,8 +2,8 @@
 
 use clap::Args;
 use engine::{
-    Case, Flow, Measure, Operator, Record, Samples, Scales, Scheme, StepRule, Stop, TimeSteps,
-    Trajectory, energy_increases, mean_hvp,
+    Case, Operator, Record, Samples, Scales, Scheme, StepRule, Stop, Trajectory, energy_increases,
+    mean_hvp,
 };
 use geometry::measure::l2_distance;
 use geometry::{Grid, SignedDistance, phase_field};
@@ -14,6 +14,7 @@ use crate::Error;
 use crate::options::FigureOptions;
 use crate::session::Session;
 use crate::steps::steps_csv;
+use crate::surfaces::willmore_flow;
 
 /// A shape stands still once it moves by less than this part of the way it has come per step.
 const STILL: f64 = 1e-5;
@@ -64,20 +65,14 @@ impl<const D: usize> Shape<D> {
     ) -> Result<Case<D>, Error> {
         let [low, high] = self.region;
         let moves = |node| grid.node(node).iter().all(|x| low < *x && *x < high);
-        Ok(Case {
-            shape: format!("inpainted {}", self.title),
-            initial: phase_field(grid, &self.initial, scales.eps)?,
-            region: Some((0..grid.len()).map(moves).collect()),
-            flow: Flow::Willmore,
-            operator: operator.clone(),
-            scales,
-            steps: TimeSteps {
-                rule: self.rule,
-                first_substep: Some(first_substep(scales.eps)),
-            },
-            stops: vec![Stop::Motion(STILL), Stop::Steps(self.steps)],
-            measures: Measure::size(scales.eps),
-        })
+        let title = format!("inpainted {}", self.title);
+        let initial = phase_field(grid, &self.initial, scales.eps)?;
+        let time = (self.rule, self.steps);
+        let mut case = willmore_flow(&title, initial, operator.clone(), scales, time);
+        case.region = Some((0..grid.len()).map(moves).collect());
+        case.steps.first_substep = Some(first_substep(scales.eps));
+        case.stops.insert(0, Stop::Motion(STILL));
+        Ok(case)
     }
 
     /// Which phase fields are kept.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use clap::Args;
-use engine::{Case, Flow, Method, Operator, Scales, Scheme, StepRule, Stop};
+use engine::{Case, Flow, Method, Operator, Scales, Scheme, StepRule};
 use geometry::Field;
 use report::{Cell, LineChart, Series};
 use serde::Serialize;
@@ -11,6 +11,7 @@ use solver::StepRecord;
 
 use crate::networks::{Chosen, NetworkOptions, STEP, convergence_network, scales};
 use crate::options::{RunOptions, resolutions};
+use crate::surfaces::willmore_flow;
 use crate::{Error, look};
 
 /// Options of the studies.
@@ -178,7 +179,7 @@ impl Study {
 /// A flow at the scales of the convergence tests in equal steps, with nothing measured; the inner step of mean curvature flow is its step.
 pub fn case(
     (flow, operator): (Flow, &Operator),
-    shape: impl Into<String>,
+    shape: &str,
     initial: Field<2>,
     (tau, steps): (f64, usize),
 ) -> Case<2> {
@@ -186,19 +187,15 @@ pub fn case(
         Flow::MeanCurvature => tau,
         Flow::Willmore => STEP,
     };
+    let scales = Scales {
+        mcf_step,
+        ..scales()
+    };
+    let time = (StepRule::Constant(tau), steps);
     Case {
-        shape: shape.into(),
-        initial,
-        region: None,
         flow,
-        operator: operator.clone(),
-        scales: Scales {
-            mcf_step,
-            ..scales()
-        },
-        steps: StepRule::Constant(tau).into(),
-        stops: vec![Stop::Steps(steps)],
         measures: Vec::new(),
+        ..willmore_flow(shape, initial, operator.clone(), scales, time)
     }
 }
 

@@ -95,13 +95,13 @@ impl Setting {
 }
 
 /// Willmore flow as in the paper: everywhere, in whole steps.
-pub fn willmore_flow(
+pub fn willmore_flow<const D: usize>(
     shape: &str,
-    initial: Field<3>,
+    initial: Field<D>,
     operator: Operator,
     scales: Scales,
     (rule, steps): (StepRule, usize),
-) -> Case<3> {
+) -> Case<D> {
     Case {
         shape: shape.to_owned(),
         initial,

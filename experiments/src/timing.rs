@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use engine::{Case, Flow, Operator, Run};
+use engine::{Case, Flow, Operator, Run, minimizations};
 use geometry::shapes::Ball;
 use geometry::{Grid, phase_field};
 use indicatif::ProgressBar;
@@ -94,8 +94,7 @@ impl<const D: usize> Timed<D> {
 
     /// What the steps did.
     pub fn minimizations(&self) -> impl Iterator<Item = &StepRecord> {
-        let records = self.run.records().iter();
-        records.filter_map(|record| record.minimization.as_ref())
+        minimizations(self.run.records())
     }
 
     /// Wall times of the steps in seconds.

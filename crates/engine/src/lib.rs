@@ -66,7 +66,7 @@ pub use error::Error;
 pub use measure::Measure;
 pub use observer::{Event, Observer, Samples};
 pub use operator::{Flow, Method, Operator, Scales, Scheme, quarter_square};
-pub use record::{Record, Values, energy_increases, mean_hvp, to_csv};
+pub use record::{Record, Values, energy_increases, mean_hvp, minimizations, to_csv};
 pub use run::{Ending, Run};
 pub use steps::{StepRule, TimeSteps};
 pub use stop::Stop;

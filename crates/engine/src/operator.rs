@@ -6,6 +6,7 @@ use fem::{FiniteElementStep, LinearSolver};
 use geometry::Grid;
 use model::{NamedNetwork, NeededNetwork, Networks, Shipped};
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 use solver::{Factors, NewtonParams};
 
 use crate::Error;
@@ -216,16 +217,6 @@ pub struct Operator {
     network: Option<Arc<NamedNetwork>>,
 }
 
-/// What of an operator a result depends on.
-#[derive(Serialize)]
-pub(crate) struct Identity<'a> {
-    method: Method,
-    scheme: Scheme,
-    factors: Factors,
-    half_grids: bool,
-    network: Option<(&'a str, String)>,
-}
-
 impl Operator {
     /// A learned operator with the network that [`Networks::find`] has for the scheme: the calibrated scheme takes its odd part.
     ///
@@ -310,15 +301,16 @@ impl Operator {
         self.method.key_in(self.scheme)
     }
 
-    pub(crate) fn identity(&self) -> Identity<'_> {
-        let network = self.network();
-        Identity {
-            method: self.method,
-            scheme: self.scheme,
-            factors: self.factors,
-            half_grids: self.half_grids,
-            network: network.map(|n| (n.name.as_str(), n.network.fingerprint())),
-        }
+    /// What of it a result depends on.
+    pub(crate) fn identity(&self) -> Value {
+        let network = |named: &NamedNetwork| json!([named.name, named.network.fingerprint()]);
+        json!({
+            "method": self.method,
+            "scheme": self.scheme,
+            "factors": self.factors,
+            "half_grids": self.half_grids,
+            "network": self.network().map(network),
+        })
     }
 
     /// The finite-element step on a grid.

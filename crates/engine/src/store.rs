@@ -44,13 +44,17 @@ impl Store {
         notes: Value,
         checkpoints: Checkpoints,
     ) -> Result<Self, Error> {
-        let state = pack(run, &notes)?;
-        Ok(Self {
-            directory: RunDirectory::create(folder, files, &state)?,
+        let directory = RunDirectory::create(folder, files, &pack(run, &notes)?)?;
+        Ok(Self::at(directory, notes, checkpoints))
+    }
+
+    fn at(directory: RunDirectory, notes: Value, checkpoints: Checkpoints) -> Self {
+        Self {
+            directory,
             checkpoints,
             notes,
             last: Instant::now(),
-        })
+        }
     }
 
     /// Takes a stored run up where its last checkpoint is; `case` is built anew, from the [`initial`] field if need be, and must be the
@@ -64,13 +68,7 @@ impl Store {
         let run = restore(&stored, case, device)?;
         let notes = notes(&stored).clone();
         let (directory, _) = stored.resume()?;
-        let store = Self {
-            directory,
-            checkpoints,
-            notes,
-            last: Instant::now(),
-        };
-        Ok((store, run))
+        Ok((Self::at(directory, notes, checkpoints), run))
     }
 
     /// The directory, to which files can be added.
@@ -226,14 +224,9 @@ pub(crate) fn check_identity(stored: &StoredRun, wanted: &Value) -> Result<(), E
     }
     let keys = wanted.as_object().into_iter().flat_map(|map| map.keys());
     let differing: Vec<String> = keys
-        .filter(|key| found[key.as_str()] != wanted[key.as_str()])
-        .map(|key| {
-            format!(
-                "{key}: {} there, {} here",
-                found[key.as_str()],
-                wanted[key.as_str()]
-            )
-        })
+        .map(|key| (key, &found[key], &wanted[key]))
+        .filter(|(_, there, here)| there != here)
+        .map(|(key, there, here)| format!("{key}: {there} there, {here} here"))
         .collect();
     Err(Error::OtherCase {
         path: stored.path().to_owned(),

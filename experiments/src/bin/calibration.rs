@@ -6,10 +6,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use engine::{Case, Flow, Operator, Record, Run, Scales, Scheme, StepRule, Stop};
+use engine::{Operator, Record, Run, Scales, Scheme, StepRule};
 use experiments::networks::{EPS, STEP};
 use experiments::options::RunOptions;
 use experiments::session::Session;
+use experiments::surfaces::willmore_flow;
 use experiments::{Error, harness};
 use fem::FiniteElementStep;
 use geometry::measure::zero_set_volume;
@@ -185,21 +186,13 @@ fn relaxed<const D: usize>(
     };
     let mut operator = Operator::learned(Scheme::Paper, network)?;
     operator.factors = calibration;
-    let case = Case {
-        shape: "surface at rest".to_owned(),
-        initial: initial.clone(),
-        region: None,
-        flow: Flow::Willmore,
-        operator,
-        scales: Scales {
-            eps,
-            mcf_step,
-            newton: NewtonParams::default(),
-        },
-        steps: StepRule::Constant(STEP_RATIO * mcf_step).into(),
-        stops: vec![Stop::Steps(1)],
-        measures: Vec::new(),
+    let scales = Scales {
+        eps,
+        mcf_step,
+        newton: NewtonParams::default(),
     };
+    let time = (StepRule::Constant(STEP_RATIO * mcf_step), 1);
+    let case = willmore_flow("surface at rest", initial.clone(), operator, scales, time);
     let mut run = Run::new(case, device)?;
     let energy = run.step()?.and_then(Record::willmore_energy);
     Ok((energy.unwrap_or(f64::NAN), run.field().clone()))
@@ -236,17 +229,10 @@ fn discs(
         };
         variants.push((n, false, one.clone()));
         if !one.name.starts_with("accurate") {
-            let network = one.network.odd_part();
-            let (name, calibration) = (one.name.clone(), network.calibrate()?);
-            variants.push((
-                n,
-                true,
-                Calibrated {
-                    name,
-                    network,
-                    calibration,
-                },
-            ));
+            let mut odd = one.clone();
+            odd.network = one.network.odd_part();
+            odd.calibration = odd.network.calibrate()?;
+            variants.push((n, true, odd));
         }
     }
     let mut tasks = Vec::new();

@@ -14,7 +14,7 @@ use experiments::{Error, harness, look};
 use model::training::levenberg_marquardt::LmParams;
 use operators::ComputeDevice;
 use report::{
-    Axis, Figure, Format, LineChart, Marker, OutputDir, Series, Summary, Table, Tabulated,
+    Axis, Cell, Figure, Format, LineChart, Marker, OutputDir, Series, Summary, Table, Tabulated,
 };
 use runs::Cache;
 use serde_json::json;
@@ -190,20 +190,19 @@ impl Report {
     }
 
     fn figures(&self, session: &Session<'_>) -> Result<(), Error> {
-        let two = |title: &str, charts: [LineChart; 2]| {
-            Figure::new(title, 2)
-                .with_panels(charts)
-                .with_shared_legend()
-        };
         let last = time(self.steps);
-        let title = format!("Error on circles at t = {last:.4} over the radius");
-        session.figure(
-            two("Error on circles over time", self.over_time()).with_note(self.circles()),
-            "convergence",
-        )?;
-        session.figure(two(&title, self.over_radius()), "error_over_radius")?;
-        let title = "Work per step of Willmore flow, mean over the circles";
-        session.figure(two(title, self.work()), "work_per_step")?;
+        let over_time = "Error on circles over time".to_owned();
+        let over_radius = format!("Error on circles at t = {last:.4} over the radius");
+        let work = "Work per step of Willmore flow, mean over the circles".to_owned();
+        for (title, charts, stem) in [
+            (over_time, self.over_time(), "convergence"),
+            (over_radius, self.over_radius(), "error_over_radius"),
+            (work, self.work(), "work_per_step"),
+        ] {
+            let mut figure = Figure::new(title, 2).with_panels(charts);
+            figure.note = (stem == "convergence").then(|| self.circles());
+            session.figure(figure.with_shared_legend(), stem)?;
+        }
         session.figure(self.cost(), "error_over_cost")
     }
 
@@ -294,51 +293,33 @@ impl Report {
     }
 
     fn data(&self, output: &OutputDir) -> Result<(), Error> {
-        let errors = ["step", "time", "l2_mean", "l2_min", "l2_max"];
-        let mut curves = Table::data(Variant::COLUMNS.iter().chain(&errors));
-        let single = ["radius", "step", "time", "l2"];
-        let mut circles = Table::data(Variant::COLUMNS.iter().chain(&single));
+        let table = |columns: &[&'static str]| Table::data(Variant::COLUMNS.iter().chain(columns));
+        let mut curves = table(&["step", "time", "l2_mean", "l2_min", "l2_max"]);
+        let mut circles = table(&["radius", "step", "time", "l2"]);
         let mut runs = Vec::new();
         for e in &self.ensembles {
             for k in 0..=self.steps {
                 let [least, most] = e.error_range(k);
-                let row = [
-                    k.into(),
-                    time(k).into(),
-                    e.mean_error(k).into(),
-                    least.into(),
-                    most.into(),
-                ];
-                curves.push(e.variant.cells().into_iter().chain(row))?;
+                let errors = [time(k), e.mean_error(k), least, most].map(Cell::from);
+                let row = e.variant.cells().into_iter().chain([k.into()]);
+                curves.push(row.chain(errors))?;
             }
             for circle in &e.circles {
                 for k in self.shown_steps() {
-                    let row = [
-                        circle.radius.into(),
-                        k.into(),
-                        time(k).into(),
-                        circle.error(k).into(),
-                    ];
-                    circles.push(e.variant.cells().into_iter().chain(row))?;
+                    let errors = [time(k), circle.error(k)].map(Cell::from);
+                    let row = (e.variant.cells().into_iter()).chain([circle.radius.into()]);
+                    circles.push(row.chain([k.into()]).chain(errors))?;
                 }
             }
-            runs.extend(
-                e.circles
-                    .iter()
-                    .filter(|_| e.variant.flow == Flow::Willmore)
-                    .map(|circle| Rows {
-                        leading: (e.variant.cells().into_iter().skip(1))
-                            .chain([circle.radius.into()])
-                            .collect(),
-                        start: None,
-                        records: &circle.records,
-                    }),
-            );
+            if e.variant.flow == Flow::Willmore {
+                runs.extend(e.circles.iter().map(|circle| Rows {
+                    leading: [&e.variant.cells()[1..], &[circle.radius.into()]].concat(),
+                    start: None,
+                    records: &circle.records,
+                }));
+            }
         }
-        let leading: Vec<&str> = (Variant::COLUMNS[1..].iter().copied())
-            .chain(["radius"])
-            .collect();
-        let steps = steps::table(&leading, &runs)?;
+        let steps = steps::table(&[&Variant::COLUMNS[1..], &["radius"]].concat(), &runs)?;
         output.write("curves.json", curves.to_json()?)?;
         output.write("steps.json", steps.to_json()?)?;
         for (name, table) in [("curves", curves), ("circles", circles), ("steps", steps)] {

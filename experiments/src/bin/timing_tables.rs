@@ -58,55 +58,47 @@ struct Variant {
 }
 
 const VARIANTS: [Variant; 5] = [
-    row("hybrid", "hybrid", Method::Hybrid, None),
     Variant {
-        newton: Newton::Paper,
-        ..row(
-            "hybrid_plain_newton",
-            "hybrid, plain Newton-CG",
-            Method::Hybrid,
-            Some([122.0, 1020.0]),
-        )
-    },
-    row(
-        "fe_implicit",
-        "FE implicit, FFT-CG inside",
-        Method::FeImplicit,
-        None,
-    ),
-    Variant {
-        linear: LinearSolver::Direct,
-        ..row(
-            "fe_implicit_direct",
-            "FE implicit, Cholesky inside",
-            Method::FeImplicit,
-            Some([4970.0, 28622.0]),
-        )
-    },
-    row(
-        "fe_semi",
-        "FE semi-implicit",
-        Method::FeSemi,
-        Some([4307.0, 22045.0]),
-    ),
-];
-
-/// A row with the usual solvers.
-const fn row(
-    key: &'static str,
-    label: &'static str,
-    method: Method,
-    papers_seconds: Option<[f64; 2]>,
-) -> Variant {
-    Variant {
-        key,
-        label,
-        method,
+        key: "hybrid",
+        label: "hybrid",
+        method: Method::Hybrid,
         newton: Newton::Preconditioned,
         linear: LinearSolver::ConjugateGradients,
-        papers_seconds,
-    }
-}
+        papers_seconds: None,
+    },
+    Variant {
+        key: "hybrid_plain_newton",
+        label: "hybrid, plain Newton-CG",
+        method: Method::Hybrid,
+        newton: Newton::Paper,
+        linear: LinearSolver::ConjugateGradients,
+        papers_seconds: Some([122.0, 1020.0]),
+    },
+    Variant {
+        key: "fe_implicit",
+        label: "FE implicit, FFT-CG inside",
+        method: Method::FeImplicit,
+        newton: Newton::Preconditioned,
+        linear: LinearSolver::ConjugateGradients,
+        papers_seconds: None,
+    },
+    Variant {
+        key: "fe_implicit_direct",
+        label: "FE implicit, Cholesky inside",
+        method: Method::FeImplicit,
+        newton: Newton::Preconditioned,
+        linear: LinearSolver::Direct,
+        papers_seconds: Some([4970.0, 28622.0]),
+    },
+    Variant {
+        key: "fe_semi",
+        label: "FE semi-implicit",
+        method: Method::FeSemi,
+        newton: Newton::Preconditioned,
+        linear: LinearSolver::ConjugateGradients,
+        papers_seconds: Some([4307.0, 22045.0]),
+    },
+];
 
 impl Variant {
     fn papers_seconds(&self, n: usize) -> Option<f64> {
