@@ -91,7 +91,7 @@ impl Store {
         must: bool,
     ) -> Result<(), Error> {
         let due = match self.checkpoints {
-            Checkpoints::EverySteps(steps) => run.count().is_multiple_of(steps),
+            Checkpoints::EverySteps(steps) => run.records.len().is_multiple_of(steps),
             Checkpoints::Every(time) => self.last.elapsed() >= time,
         };
         if due || must {
@@ -164,7 +164,7 @@ fn pack<const D: usize>(run: &Run<D>, notes: &Value) -> Result<State, Error> {
         "time": state.time,
         "previous_tau": previous_tau,
     });
-    let mut packed = State::new(run.count() as u64, notes)
+    let mut packed = State::new(run.records.len() as u64, notes)
         .with_array("initial", run.case.initial.values().to_vec())
         .with_array("current", state.current.into_values());
     packed.text = serde_json::to_string(&run.records).expect("records are numbers and names");

@@ -102,6 +102,19 @@ pub struct FlowState<const D: usize> {
     pub time: f64,
 }
 
+impl<const D: usize> FlowState<D> {
+    /// A flow of which nothing is known but where it is.
+    pub fn new(current: Field<D>, step: usize, time: f64) -> Self {
+        Self {
+            current,
+            previous: None,
+            half_motions: Vec::new(),
+            step,
+            time,
+        }
+    }
+}
+
 /// Willmore flow of a phase field by minimizing movements (def:minProblem).
 ///
 /// ```

@@ -135,14 +135,7 @@ fn retrained(
     }
     let (device, output) = (training_device(device)?, run.open_output(PROGRAM)?);
     let (folder, progress) = (output.subfolder("networks")?, run.progress());
-    let checkpoints = Cache::open(output.as_path().join("checkpoints"))?;
-    let trainer = Trainer {
-        device: &device,
-        checkpoints: &checkpoints,
-        progress: &progress,
-        seed: run.seed,
-        quick: run.quick,
-    };
+    let trainer = Trainer::open(run, &device, &output, &progress, false)?;
     let mut network = Vec::new();
     for n in cells {
         let ratios = convergence_ratios(n)?;
@@ -152,7 +145,7 @@ fn retrained(
         trained.network.save(&path)?;
         network.push(path);
     }
-    checkpoints.remove()?;
+    trainer.checkpoints.remove()?;
     Ok(NetworkOptions { network })
 }
 

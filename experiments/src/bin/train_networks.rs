@@ -16,7 +16,6 @@ use model::training::{self, CurvePoint, Trained};
 use report::{
     Axis, Colour, Figure, LegendEntry, LineChart, LineStyle, Manifest, OutputDir, Series, Table,
 };
-use runs::Cache;
 use serde::Serialize;
 use serde_json::json;
 
@@ -104,27 +103,18 @@ fn program(options: &Options) -> Result<(), Error> {
     let install = (options.install.as_ref())
         .map(OutputDir::create)
         .transpose()?;
-    let unfinished = session.output.as_path().join("checkpoints");
-    if options.restart {
-        Cache::open(&unfinished)?.remove()?;
-    }
-    let checkpoints = Cache::open(unfinished)?;
     let folder = session.output.subfolder("networks")?;
+    let (output, progress) = (&session.output, &session.progress);
+    let trainer = Trainer::open(run, &device, output, progress, options.restart)?;
     let mut trainings = Trainings {
-        trainer: Trainer {
-            device: &device,
-            checkpoints: &checkpoints,
-            progress: &session.progress,
-            seed: run.seed,
-            quick: run.quick,
-        },
+        trainer,
         manifest: &mut session.manifest,
         chosen: &specs,
         folder: &folder,
         finished: Vec::new(),
     };
     trainings.by(options.recipe, &settings, !options.only.is_empty())?;
-    let all = trainings.finished;
+    let (all, checkpoints) = (trainings.finished, trainings.trainer.checkpoints);
     if let Some(install) = &install {
         for one in all.iter().filter(|one| one.recipe == all[0].recipe) {
             let accurate = one.recipe == Recipe::Accurate;
