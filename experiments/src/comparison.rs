@@ -1,5 +1,6 @@
 //! Shapes without a known solution: all methods and resolutions against a finer run.
 
+use std::collections::BTreeMap;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
@@ -86,7 +87,7 @@ struct Compared {
     /// Its steps for each of `2^-14`.
     ratio: usize,
     /// Steps of `2^-14` and `L2` distances; none for the reference itself.
-    errors: Vec<(usize, f64)>,
+    errors: BTreeMap<usize, f64>,
 }
 
 /// Everything a comparison computed.
@@ -194,7 +195,7 @@ impl Setting {
             variant,
             trajectory,
             ratio,
-            errors: Vec::new(),
+            errors: BTreeMap::new(),
         })
     }
 }
@@ -223,7 +224,7 @@ impl Compared {
         for k in sampled(steps) {
             let (own, its) = (k * self.ratio, k * reference.ratio);
             let l2 = (self.trajectory).distance(own, &reference.trajectory, its)?;
-            self.errors.push((k, l2));
+            self.errors.insert(k, l2);
         }
         Ok(())
     }
@@ -249,8 +250,8 @@ impl Comparison<'_> {
 
     /// Largest distance over time between the reference and the same method at half the resolution.
     fn reference_difference(&self) -> Option<f64> {
-        let errors = self.half.as_ref()?.errors.iter();
-        Some(errors.map(|(_, l2)| *l2).fold(0.0, f64::max))
+        let errors = self.half.as_ref()?.errors.values();
+        Some(errors.copied().fold(0.0, f64::max))
     }
 
     fn about_the_reference(&self) -> String {
@@ -283,7 +284,7 @@ impl Comparison<'_> {
         let leading = &Variant::COLUMNS[1..];
         let mut errors = Table::data(leading.iter().chain(&["step", "time", "l2"]));
         for run in &self.runs {
-            for &(step, l2) in &run.errors {
+            for (&step, &l2) in &run.errors {
                 let row = [step.into(), time(step).into(), l2.into()];
                 errors.push(run.variant.cells().into_iter().skip(1).chain(row))?;
             }
@@ -307,7 +308,7 @@ impl Comparison<'_> {
     fn error_figure(&self) -> Figure {
         let compared = self.runs.iter().filter(|run| !run.errors.is_empty());
         let curves = compared.map(|run| {
-            let points = run.errors.iter().map(|&(k, l2)| [time(k), l2]);
+            let points = run.errors.iter().map(|(&k, &l2)| [time(k), l2]);
             self.study.series(run.variant, points.collect())
         });
         let chart = LineChart::new("", Axis::linear("time t"), Axis::log("L² error"));
@@ -357,10 +358,7 @@ impl Comparison<'_> {
             .text("method", |run| run.variant.label())
             .number("n", Format::Shortest, |run| run.variant.n);
         for k in self.shown().into_iter().filter(|k| *k > 0) {
-            let error = |run: &Compared| {
-                let found = run.errors.iter().find(|(step, _)| *step == k);
-                found.map(|(_, l2)| *l2)
-            };
+            let error = |run: &Compared| run.errors.get(&k).copied();
             table = table.number(format!("error, step {k}"), Format::Fixed(5), error);
         }
         let hvp = |run: &Compared| study::mean(run.minimizations(), StepRecord::hvp);
@@ -376,7 +374,7 @@ impl Comparison<'_> {
             let mut of_step = |what: &str, step: usize, value: f64| {
                 summary.insert(&format!("{key}.{what}.step{step}"), value)
             };
-            for &(step, l2) in &run.errors {
+            for (&step, &l2) in &run.errors {
                 of_step("l2", step, l2)?;
             }
             for step in 0..=self.steps {

@@ -78,12 +78,7 @@ impl Chosen {
     }
 }
 
-/// The paper's kernel width `n/8 + 1`.
-pub fn kernel_width(n: usize) -> usize {
-    n / 8 + 1
-}
-
-/// The ratios of the convergence tests in 2D at resolution `n`.
+/// The ratios of the convergence tests in 2D at resolution `n`, with the paper's kernel width `n/8 + 1`.
 ///
 /// # Errors
 /// [`Error::Options`] unless `n` is a multiple of 16, [`Error::Model`] if the scheme does not allow the ratios.
@@ -93,7 +88,7 @@ pub fn convergence_ratios(n: usize) -> Result<Ratios, Error> {
             "n = {n} is not possible: the kernel width n/8 + 1 must be odd, so n must be a multiple of 16"
         )));
     }
-    let ratios = Ratios::of_run(2, kernel_width(n), 1.0 / n as f64, EPS, STEP);
+    let ratios = Ratios::of_run(2, n / 8 + 1, 1.0 / n as f64, EPS, STEP);
     ratios.validate()?;
     Ok(ratios)
 }
