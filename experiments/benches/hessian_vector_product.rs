@@ -4,7 +4,7 @@
 use divan::Bencher;
 use experiments::products::{Candidates, Work};
 use geometry::{Grid, phase_field, shapes::Ball};
-use model::{Ratios, pretrained};
+use model::{Ratios, Shipped};
 use operators::ComputeDevice;
 
 const CELLS: [usize; 3] = [256, 512, 1024];
@@ -12,7 +12,7 @@ const SOLID: [usize; 2] = [64, 128];
 
 fn bench<const D: usize>(bencher: Bencher<'_, '_>, cells: usize, work: Work) {
     let device = ComputeDevice::default_compiled().expect("a device");
-    let network = pretrained::find(Ratios {
+    let network = Shipped::Paper.find(Ratios {
         dimension: D,
         width: 17,
         eps_over_h: 2.0,

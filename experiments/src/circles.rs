@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use engine::{Case, Flow, Measure, Operator, Record, Run, Values};
+use engine::{Case, Flow, Measure, Operator, Record, Run, Values, minimizations};
 use geometry::exact::{mean_curvature_radius, willmore_radius};
 use geometry::measure::l2_distance;
 use geometry::shapes::Ball;
@@ -89,7 +89,7 @@ fn case(
     let initial = exact(flow, radius, grid, 0.0)?;
     Ok(Case {
         measures,
-        ..study::case((flow, operator), shape, initial, (STEP, steps))
+        ..study::case((flow, operator), &shape, initial, (STEP, steps))
     })
 }
 
@@ -137,10 +137,6 @@ impl Circle {
         };
         values["l2"]
     }
-
-    fn minimizations(&self) -> impl Iterator<Item = &StepRecord> {
-        (self.records.iter()).filter_map(|record| record.minimization.as_ref())
-    }
 }
 
 /// All circles of one variant.
@@ -154,9 +150,6 @@ pub struct Ensemble {
 
 impl Ensemble {
     /// Runs `count` circles side by side, largest first, with results of an interrupted run where there are any.
-    ///
-    /// # Errors
-    /// [`Error::Engine`] of the first circle that fails; [`Error::Runs`] if a part cannot be stored.
     pub fn run(
         (variant, operator): &(Variant, Operator),
         (count, steps): (usize, usize),
@@ -219,7 +212,7 @@ impl Ensemble {
 
     /// All minimizations of Willmore flow.
     pub fn minimizations(&self) -> impl Iterator<Item = &StepRecord> {
-        self.circles.iter().flat_map(Circle::minimizations)
+        (self.circles.iter()).flat_map(|circle| minimizations(&circle.records))
     }
 
     /// Mean of a quantity over all minimizations; nothing for mean curvature flow.

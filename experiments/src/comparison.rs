@@ -1,14 +1,19 @@
 //! Shapes without a known solution: all methods and resolutions against a finer run.
 
+use std::collections::BTreeMap;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
-use engine::{Flow, Measure, Method, Operator, Samples, Scheme, Trajectory, energy_increases};
+use engine::{
+    Flow, Measure, Method, Operator, Samples, Scheme, Trajectory, energy_increases, minimizations,
+};
 use geometry::contour::{Interpolation, zero_level};
 use geometry::measure::{perimeter, zero_set_volume};
 use geometry::shapes::Cross;
 use geometry::{Error as GeometryError, Field, Grid, phase_field};
-use report::{Axis, Colour, Curve, Figure, Format, LineChart, OutputDir, Shapes, Summary, Table};
+use report::{
+    Axis, Colour, Curve, Figure, Format, LineChart, OutputDir, Shapes, Summary, Table, Tabulated,
+};
 use serde_json::json;
 use solver::StepRecord;
 
@@ -45,9 +50,6 @@ pub struct Setting {
 }
 
 /// The non-convex cross: arms of half length 0.8 and half width 0.27.
-///
-/// # Errors
-/// [`GeometryError`] never, for these numbers.
 pub fn cross(grid: Grid<2>) -> Result<Field<2>, GeometryError> {
     phase_field(grid, &Cross::new(0.8, 0.27)?, EPS)
 }
@@ -85,7 +87,7 @@ struct Compared {
     /// Its steps for each of `2^-14`.
     ratio: usize,
     /// Steps of `2^-14` and `L2` distances; none for the reference itself.
-    errors: Vec<(usize, f64)>,
+    errors: BTreeMap<usize, f64>,
 }
 
 /// Everything a comparison computed.
@@ -131,9 +133,8 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
         "time_step": STEP,
         "steps": steps,
         "networks": study.checksums(),
-        "quick": quick,
     });
-    let mut session = Session::open(setting.program, &options.study.run, device, &parameters)?;
+    let mut session = Session::open(setting.program, &options.study.run, device, parameters)?;
     let mut runs = Vec::new();
     for (variant, operator) in &study.plan {
         runs.push(setting.run(&mut session, "", (*variant, operator), (steps, 1))?);
@@ -194,7 +195,7 @@ impl Setting {
             variant,
             trajectory,
             ratio,
-            errors: Vec::new(),
+            errors: BTreeMap::new(),
         })
     }
 }
@@ -223,14 +224,13 @@ impl Compared {
         for k in sampled(steps) {
             let (own, its) = (k * self.ratio, k * reference.ratio);
             let l2 = (self.trajectory).distance(own, &reference.trajectory, its)?;
-            self.errors.push((k, l2));
+            self.errors.insert(k, l2);
         }
         Ok(())
     }
 
     fn minimizations(&self) -> impl Iterator<Item = &StepRecord> {
-        let records = self.trajectory.records.iter();
-        records.filter_map(|record| record.minimization.as_ref())
+        minimizations(&self.trajectory.records)
     }
 
     /// The zero level at a time.
@@ -250,8 +250,8 @@ impl Comparison<'_> {
 
     /// Largest distance over time between the reference and the same method at half the resolution.
     fn reference_difference(&self) -> Option<f64> {
-        let errors = self.half.as_ref()?.errors.iter();
-        Some(errors.map(|(_, l2)| *l2).fold(0.0, f64::max))
+        let errors = self.half.as_ref()?.errors.values();
+        Some(errors.copied().fold(0.0, f64::max))
     }
 
     fn about_the_reference(&self) -> String {
@@ -270,21 +270,21 @@ impl Comparison<'_> {
         format!("Reference: implicit finite elements, n = {n}{step}{estimate}.")
     }
 
-    fn write(&self, session: Session<'_>) -> Result<(), Error> {
+    fn write(&self, mut session: Session<'_>) -> Result<(), Error> {
         session.figure(self.error_figure(), "errors")?;
         session.figure(self.shape_figure()?, "shapes")?;
-        let table = self.table()?;
-        table.write(&session.output, "error_table")?;
+        session.table(self.table(), "error_table")?;
+        session.remark(self.about_the_reference());
         self.data(&session.output)?;
-        let report = format!("{}\n{}", table.to_markdown(), self.about_the_reference());
-        session.finish(self.setting.title, self.summary()?, &report)
+        self.summarize(&mut session.summary)?;
+        session.finish(self.setting.title)
     }
 
     fn data(&self, output: &OutputDir) -> Result<(), Error> {
         let leading = &Variant::COLUMNS[1..];
         let mut errors = Table::data(leading.iter().chain(&["step", "time", "l2"]));
         for run in &self.runs {
-            for &(step, l2) in &run.errors {
+            for (&step, &l2) in &run.errors {
                 let row = [step.into(), time(step).into(), l2.into()];
                 errors.push(run.variant.cells().into_iter().skip(1).chain(row))?;
             }
@@ -294,13 +294,10 @@ impl Comparison<'_> {
         let references = std::iter::once(&self.reference).chain(&self.half);
         let compared = self.runs.iter().map(|run| (run, "false"));
         let rows = compared.chain(references.map(|run| (run, "true")));
-        let rows = rows.map(|(run, reference)| {
-            let cells = run.variant.cells().into_iter().skip(1);
-            Rows {
-                leading: cells.chain([reference.into()]).collect(),
-                start: Some(&run.trajectory.start),
-                records: &run.trajectory.records,
-            }
+        let rows = rows.map(|(run, reference)| Rows {
+            leading: [&run.variant.cells()[1..], &[reference.into()]].concat(),
+            start: Some(&run.trajectory.start),
+            records: &run.trajectory.records,
         });
         let leading = [leading, &["reference"]].concat();
         let steps = steps::table(&leading, &rows.collect::<Vec<_>>())?;
@@ -311,7 +308,7 @@ impl Comparison<'_> {
     fn error_figure(&self) -> Figure {
         let compared = self.runs.iter().filter(|run| !run.errors.is_empty());
         let curves = compared.map(|run| {
-            let points = run.errors.iter().map(|&(k, l2)| [time(k), l2]);
+            let points = run.errors.iter().map(|(&k, &l2)| [time(k), l2]);
             self.study.series(run.variant, points.collect())
         });
         let chart = LineChart::new("", Axis::linear("time t"), Axis::log("L² error"));
@@ -356,33 +353,28 @@ impl Comparison<'_> {
         Ok(figure)
     }
 
-    fn table(&self) -> Result<Table, Error> {
+    fn table(&self) -> Tabulated<'_, Compared> {
         let mut table = Table::of(&self.runs)
             .text("method", |run| run.variant.label())
             .number("n", Format::Shortest, |run| run.variant.n);
         for k in self.shown().into_iter().filter(|k| *k > 0) {
-            let error = |run: &Compared| {
-                let found = run.errors.iter().find(|(step, _)| *step == k);
-                found.map(|(_, l2)| *l2)
-            };
+            let error = |run: &Compared| run.errors.get(&k).copied();
             table = table.number(format!("error, step {k}"), Format::Fixed(5), error);
         }
         let hvp = |run: &Compared| study::mean(run.minimizations(), StepRecord::hvp);
         let seconds = |run: &Compared| run.trajectory.seconds() / run.trajectory.steps() as f64;
-        Ok(table
+        table
             .number("HVP/step", Format::Fixed(1), hvp)
             .number("s/step", Format::Fixed(2), seconds)
-            .finish()?)
     }
 
-    fn summary(&self) -> Result<Summary, Error> {
-        let mut summary = Summary::new();
+    fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
         for run in &self.runs {
             let key = format!("{}.{}", self.setting.program, run.variant.key());
             let mut of_step = |what: &str, step: usize, value: f64| {
                 summary.insert(&format!("{key}.{what}.step{step}"), value)
             };
-            for &(step, l2) in &run.errors {
+            for (&step, &l2) in &run.errors {
                 of_step("l2", step, l2)?;
             }
             for step in 0..=self.steps {
@@ -410,7 +402,7 @@ impl Comparison<'_> {
         if let Some(distance) = self.reference_difference() {
             summary.insert(&format!("{key}.l2_to_half_n"), distance)?;
         }
-        Ok(summary)
+        Ok(())
     }
 }
 

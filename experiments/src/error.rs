@@ -1,5 +1,3 @@
-use std::path::PathBuf;
-
 use thiserror::Error as ThisError;
 
 /// What can stop an experiment.
@@ -8,16 +6,9 @@ pub enum Error {
     /// Options that contradict each other or the experiment.
     #[error("{0}")]
     Options(String),
-    /// A file or folder of an experiment that cannot be used.
-    #[error("cannot {action} {}: {source}", path.display())]
-    Io {
-        /// What was attempted.
-        action: &'static str,
-        /// The file or folder.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
+    /// A file that cannot be read.
+    #[error(transparent)]
+    Files(#[from] files::Error),
     /// From a flow.
     #[error(transparent)]
     Engine(#[from] engine::Error),

@@ -1,16 +1,22 @@
 //! The outermost layer of every program, and running many independent tasks.
 
 use std::process::ExitCode;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use operators::ComputeDevice;
+use clap::Parser;
+use operators::{ComputeDevice, memory};
 
 use crate::Error;
 
+/// Runs a program with the options of the command line.
+pub fn main<O: Parser>(program: impl FnOnce(&O) -> Result<(), Error>) -> ExitCode {
+    let options = O::parse();
+    run(|| program(&options))
+}
+
 /// Runs a program: success is exit code 0, a failure one line on standard error and exit code 2.
 pub fn run(program: impl FnOnce() -> Result<(), Error>) -> ExitCode {
-    engine::keep_freed();
+    memory::keep_freed();
     match program() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -41,40 +47,36 @@ pub fn in_parallel<R: Send>(
     workers: usize,
     task: impl Fn(usize) -> Result<R, Error> + Sync,
 ) -> Result<Vec<R>, Error> {
-    let next = AtomicUsize::new(0);
-    let failed = AtomicBool::new(false);
-    let results = Mutex::new(Vec::with_capacity(order.len()));
+    let (next, failed) = (AtomicUsize::new(0), AtomicBool::new(false));
     let work = || {
+        let mut results = Vec::new();
         while !failed.load(Ordering::Relaxed) {
             let Some(&number) = order.get(next.fetch_add(1, Ordering::Relaxed)) else {
                 break;
             };
             let result = task(number);
-            if result.is_err() {
-                failed.store(true, Ordering::Relaxed);
-            }
-            let mut results = results
-                .lock()
-                .unwrap_or_else(std::sync::PoisonError::into_inner);
+            failed.fetch_or(result.is_err(), Ordering::Relaxed);
             results.push((number, result));
         }
+        results
     };
-    if workers <= 1 {
-        work();
+    let mut results = if workers <= 1 {
+        work()
     } else {
         let pools = (0..workers.min(order.len()).max(1))
             .map(|_| rayon::ThreadPoolBuilder::new().num_threads(1).build())
             .collect::<Result<Vec<_>, _>>()
             .map_err(|error| Error::Options(format!("cannot start threads: {error}")))?;
         std::thread::scope(|scope| {
-            for pool in &pools {
-                scope.spawn(|| pool.install(work));
-            }
-        });
-    }
-    let mut results = results
-        .into_inner()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
+            let threads: Vec<_> = (pools.iter())
+                .map(|pool| scope.spawn(move || pool.install(work)))
+                .collect();
+            let results = threads.into_iter().map(std::thread::ScopedJoinHandle::join);
+            results
+                .flat_map(|of| of.expect("tasks do not panic"))
+                .collect()
+        })
+    };
     results.sort_by_key(|(number, _)| *number);
     results.into_iter().map(|(_, result)| result).collect()
 }

@@ -2,8 +2,8 @@
 
 use clap::Args;
 use engine::{
-    Case, Flow, Measure, Operator, Record, Samples, Scales, Scheme, StepRule, Stop, TimeSteps,
-    Trajectory, checksum, energy_increases, mean_hvp,
+    Case, Operator, Record, Samples, Scales, Scheme, StepRule, Stop, Trajectory, energy_increases,
+    mean_hvp,
 };
 use geometry::measure::l2_distance;
 use geometry::{Grid, SignedDistance, phase_field};
@@ -14,6 +14,7 @@ use crate::Error;
 use crate::options::FigureOptions;
 use crate::session::Session;
 use crate::steps::steps_csv;
+use crate::surfaces::willmore_flow;
 
 /// A shape stands still once it moves by less than this part of the way it has come per step.
 const STILL: f64 = 1e-5;
@@ -56,9 +57,6 @@ pub struct Shape<const D: usize> {
 
 impl<const D: usize> Shape<D> {
     /// The shape in its region on a grid.
-    ///
-    /// # Errors
-    /// [`Error::Geometry`] for scales without a phase field.
     pub fn case(
         &self,
         grid: Grid<D>,
@@ -67,20 +65,14 @@ impl<const D: usize> Shape<D> {
     ) -> Result<Case<D>, Error> {
         let [low, high] = self.region;
         let moves = |node| grid.node(node).iter().all(|x| low < *x && *x < high);
-        Ok(Case {
-            shape: format!("inpainted {}", self.title),
-            initial: phase_field(grid, &self.initial, scales.eps)?,
-            region: Some((0..grid.len()).map(moves).collect()),
-            flow: Flow::Willmore,
-            operator: operator.clone(),
-            scales,
-            steps: TimeSteps {
-                rule: self.rule,
-                first_substep: Some(first_substep(scales.eps)),
-            },
-            stops: vec![Stop::Motion(STILL), Stop::Steps(self.steps)],
-            measures: Measure::size(scales.eps),
-        })
+        let title = format!("inpainted {}", self.title);
+        let initial = phase_field(grid, &self.initial, scales.eps)?;
+        let time = (self.rule, self.steps);
+        let mut case = willmore_flow(&title, initial, operator.clone(), scales, time);
+        case.region = Some((0..grid.len()).map(moves).collect());
+        case.steps.first_substep = Some(first_substep(scales.eps));
+        case.stops.insert(0, Stop::Motion(STILL));
+        Ok(case)
     }
 
     /// Which phase fields are kept.
@@ -102,7 +94,6 @@ pub fn parameters<const D: usize>(
     (n, scales): (usize, &Scales),
     operator: &Operator,
     shapes: &[Shape<D>],
-    quick: bool,
 ) -> Value {
     json!({
         "n": n, "eps": scales.eps, "mcf_step": scales.mcf_step, "scheme": operator.scheme,
@@ -110,7 +101,7 @@ pub fn parameters<const D: usize>(
         "tau": shapes.iter().map(|shape| shape.rule).collect::<Vec<_>>(),
         "steps": shapes.iter().map(|shape| shape.steps).collect::<Vec<_>>(),
         "first_substep": first_substep(scales.eps), "still": STILL,
-        "network": operator.network().map(|named| checksum(&named.network)), "quick": quick,
+        "network": operator.network().map(|named| named.network.fingerprint()),
     })
 }
 
@@ -128,9 +119,6 @@ pub struct Inpainted<'a, const D: usize> {
 
 impl<'a, const D: usize> Inpainted<'a, D> {
     /// Measures a run.
-    ///
-    /// # Errors
-    /// [`Error::Geometry`] if a stored phase field cannot be read.
     pub fn measure(shape: &'a Shape<D>, trajectory: &'a Trajectory<D>) -> Result<Self, Error> {
         let Case {
             initial,
@@ -174,9 +162,6 @@ impl<'a, const D: usize> Inpainted<'a, D> {
     }
 
     /// Writes the figure of the shown steps.
-    ///
-    /// # Errors
-    /// [`Error::Report`].
     pub fn write_frames(&self, session: &Session<'_>, figure: Figure) -> Result<(), Error> {
         let title = format!("Inpainting: {}", self.shape.title);
         let name = format!("{}_frames", self.shape.key);
@@ -184,9 +169,6 @@ impl<'a, const D: usize> Inpainted<'a, D> {
     }
 
     /// Adds the metrics of this run.
-    ///
-    /// # Errors
-    /// [`Error::Report`] for a value that is not finite.
     fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
         let name = |metric: &str| format!("{}.{metric}", self.shape.key);
         let (trajectory, records) = (self.trajectory, &self.trajectory.records);
@@ -211,13 +193,9 @@ impl<'a, const D: usize> Inpainted<'a, D> {
 }
 
 /// Writes the energies, the records of all steps, the table of distances and the metrics, and ends the program.
-///
-/// # Errors
-/// [`Error::Report`].
 pub fn finish<const D: usize>(
-    session: Session<'_>,
+    mut session: Session<'_>,
     title: &str,
-    mut summary: Summary,
     all: &[Inpainted<'_, D>],
 ) -> Result<(), Error> {
     let output = &session.output;
@@ -231,21 +209,21 @@ pub fn finish<const D: usize>(
     session.figure(energies, "energies")?;
     let runs = all.iter().map(|one| (one.shape.key, one.trajectory));
     output.write("steps.csv", steps_csv("shape", runs)?)?;
-    let table = table(all)?;
-    table.write(output, "inpainting")?;
-    all.iter().try_for_each(|one| one.summarize(&mut summary))?;
-    session.finish(title, summary, &table.to_markdown())
+    table(&mut session, all)?;
+    let summary = &mut session.summary;
+    all.iter().try_for_each(|one| one.summarize(summary))?;
+    session.finish(title)
 }
 
 /// Distances and energies at the steps that are shown.
-fn table<const D: usize>(all: &[Inpainted<'_, D>]) -> Result<Table, Error> {
+fn table<const D: usize>(session: &mut Session<'_>, all: &[Inpainted<'_, D>]) -> Result<(), Error> {
     let mut rows = Vec::new();
     for one in all {
         for &(step, distance) in &one.distances {
             rows.push((one, step, distance, one.trajectory.record(step)));
         }
     }
-    Ok(Table::of(&rows)
+    let table = Table::of(&rows)
         .text("shape", |(one, ..)| one.shape.title)
         .number("step", Format::Shortest, |(_, step, ..)| *step)
         .number("time in steps", Format::Shortest, |(one, .., record)| {
@@ -258,6 +236,6 @@ fn table<const D: usize>(all: &[Inpainted<'_, D>]) -> Result<Table, Error> {
         )
         .number("Willmore energy", Format::Fixed(3), |(.., record)| {
             record.and_then(Record::willmore_energy)
-        })
-        .finish()?)
+        });
+    session.table(table, "inpainting")
 }

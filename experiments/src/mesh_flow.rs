@@ -58,9 +58,6 @@ pub struct MeshFlow {
 
 impl MeshFlow {
     /// Runs the program. `remarks` is that of [`SurfaceFlows::run`].
-    ///
-    /// # Errors
-    /// What the options, the mesh and the flows raise.
     pub fn run(
         &self,
         options: &MeshFlowOptions,
@@ -78,9 +75,9 @@ impl MeshFlow {
         let up = (options.up).map_or_else(|| options.mesh.up(self.view.up), Ok)?;
         let schemes = options.schemes.schemes();
         let parameters = setting.parameters(json!({
-            "mesh": mesh.about, "tau": self.tau, "steps": steps, "schemes": schemes, "quick": run.quick,
+            "mesh": mesh.about, "tau": self.tau, "steps": steps, "schemes": schemes,
         }))?;
-        let mut session = Session::open(self.program, run, device, &parameters)?;
+        let mut session = Session::open(self.program, run, device, parameters)?;
         let bar = session.progress.bar("signed distance", setting.n as u64);
         let initial = session.phase("signed distance", || {
             mesh.phase_field(setting.grid, setting.scales.eps, &bar)

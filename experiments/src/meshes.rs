@@ -137,9 +137,6 @@ impl MeshOptions {
     }
 
     /// The box around the point (0.5, 0.5, 0.5), with `n` cells per unit length.
-    ///
-    /// # Errors
-    /// [`Error::Geometry`] unless `n` times its side is a whole number.
     pub fn grid(&self, known: &KnownMesh, n: usize) -> Result<Grid<3>, Error> {
         centred_box(n, self.box_side(known))
     }
@@ -150,9 +147,6 @@ impl MeshOptions {
     }
 
     /// The axis that points up in pictures: the usual one of the format of a chosen mesh, else that of the program.
-    ///
-    /// # Errors
-    /// [`Error::Surfaces`] for a file of no known format.
     pub fn up(&self, programs: UpAxis) -> Result<UpAxis, Error> {
         Ok(self.mesh.as_ref().map_or(Ok(programs), usual_up_axis)?)
     }
@@ -206,9 +200,6 @@ impl MeshOptions {
     }
 
     /// The chosen mesh, or the built-in shape if none was chosen and that of the paper is not here.
-    ///
-    /// # Errors
-    /// As [`Self::load`].
     pub fn load_or_built_in(&self, known: &KnownMesh, grid: &Grid<3>) -> Result<Loaded, Error> {
         let nothing = self.volume.is_none() && self.find(known).is_none();
         let procedural = self.procedural || nothing;
@@ -231,11 +222,7 @@ impl MeshOptions {
 
 impl About {
     fn of_file(path: &Path) -> Result<Self, Error> {
-        let bytes = std::fs::read(path).map_err(|source| Error::Io {
-            action: "read",
-            path: path.to_owned(),
-            source,
-        })?;
+        let bytes = std::fs::read(path).map_err(files::Error::of("read", path))?;
         let name = path.file_name().unwrap_or(path.as_os_str());
         let name = name.to_string_lossy().into_owned();
         Ok(Self {
@@ -249,9 +236,6 @@ impl About {
 
 impl Loaded {
     /// The phase field on the grid for which the data were loaded.
-    ///
-    /// # Errors
-    /// [`Error::Geometry`] if the mesh has no distances there.
     pub fn phase_field(
         &self,
         grid: Grid<3>,
@@ -299,9 +283,6 @@ fn volume(path: &Path, grid: Grid<3>, holds: VolumeKind) -> Result<Field<3>, Err
 }
 
 /// Signed distances to a mesh in the box of the grid.
-///
-/// # Errors
-/// [`Error::Geometry`] if one of them is no number.
 pub fn signed_distance(
     mesh: &ClosedMesh,
     grid: Grid<3>,

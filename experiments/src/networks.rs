@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use engine::{Method, NamedNetwork, NeededNetwork, Networks, Operator, Scales, Scheme};
+use engine::{Method, Operator, Scales, Scheme};
 use geometry::Grid;
-use model::Ratios;
+use model::{NamedNetwork, NeededNetwork, Networks, Ratios};
 use solver::NewtonParams;
 
 use crate::Error;
@@ -36,7 +36,7 @@ impl NetworkOptions {
     /// Where the networks of the paper's and the calibrated scheme come from.
     ///
     /// # Errors
-    /// [`Error::Engine`] if a file is no network or meets none of the needs.
+    /// [`Error::Model`] if a file is no network or meets none of the needs.
     pub fn load(&self, needs: &[NeededNetwork]) -> Result<Chosen, Error> {
         Ok(Chosen(Networks::load(&self.network, needs)?))
     }
@@ -56,17 +56,14 @@ impl Chosen {
     }
 
     /// The network of a scheme with these ratios.
-    ///
-    /// # Errors
-    /// [`Error::Engine`] if there is none.
     pub fn find(&self, scheme: Scheme, needed: &NeededNetwork) -> Result<NamedNetwork, Error> {
-        Ok(self.of(scheme).find(scheme, needed)?)
+        Ok(self.of(scheme).find(scheme.shipped(), needed)?)
     }
 
     /// The operator of a method in a scheme at resolution `n` of the convergence tests.
     ///
     /// # Errors
-    /// [`Error::Options`] for a resolution that cannot be, [`Error::Engine`] if there is no network.
+    /// [`Error::Options`] for a resolution that cannot be, [`Error::Model`] if there is no network.
     pub fn operator(
         &self,
         (method, scheme): (Method, Scheme),
@@ -81,12 +78,7 @@ impl Chosen {
     }
 }
 
-/// The paper's kernel width `n/8 + 1`.
-pub fn kernel_width(n: usize) -> usize {
-    n / 8 + 1
-}
-
-/// The ratios of the convergence tests in 2D at resolution `n`.
+/// The ratios of the convergence tests in 2D at resolution `n`, with the paper's kernel width `n/8 + 1`.
 ///
 /// # Errors
 /// [`Error::Options`] unless `n` is a multiple of 16, [`Error::Model`] if the scheme does not allow the ratios.
@@ -96,15 +88,12 @@ pub fn convergence_ratios(n: usize) -> Result<Ratios, Error> {
             "n = {n} is not possible: the kernel width n/8 + 1 must be odd, so n must be a multiple of 16"
         )));
     }
-    let ratios = Ratios::of_run(2, kernel_width(n), 1.0 / n as f64, EPS, STEP);
+    let ratios = Ratios::of_run(2, n / 8 + 1, 1.0 / n as f64, EPS, STEP);
     ratios.validate()?;
     Ok(ratios)
 }
 
 /// The network of the convergence tests with [these ratios](convergence_ratios).
-///
-/// # Errors
-/// Those of the ratios.
 pub fn convergence_network(n: usize) -> Result<NeededNetwork, Error> {
     Ok(NeededNetwork::exactly(convergence_ratios(n)?))
 }

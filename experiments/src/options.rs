@@ -4,8 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use operators::{ComputeDevice, DeviceKind};
-use report::{Manifest, OutputDir, Progress};
-use serde::Serialize;
+use report::{OutputDir, Progress};
 
 use crate::Error;
 use crate::networks::NetworkOptions;
@@ -37,9 +36,6 @@ pub struct RunOptions {
 
 impl RunOptions {
     /// Opens the device.
-    ///
-    /// # Errors
-    /// [`Error::Operators`] for a name that is unknown, not compiled in, or without hardware.
     pub fn open_device(&self) -> Result<ComputeDevice, Error> {
         Ok(match &self.device {
             Some(name) => ComputeDevice::open(name.parse::<DeviceKind>()?)?,
@@ -48,9 +44,6 @@ impl RunOptions {
     }
 
     /// Creates and checks the output folder; to be called when everything else has been checked.
-    ///
-    /// # Errors
-    /// [`Error::Report`] if it cannot be written.
     pub fn open_output(&self, program: &str) -> Result<OutputDir, Error> {
         let default = || PathBuf::from("results").join(program);
         Ok(OutputDir::create(
@@ -63,39 +56,12 @@ impl RunOptions {
         Progress::new(self.quiet)
     }
 
-    /// Starts the manifest of a run.
-    ///
-    /// # Errors
-    /// [`Error::Report`] if the parameters do not serialise to a map.
-    pub fn manifest(
-        &self,
-        program: &str,
-        parameters: &impl Serialize,
-        device: &ComputeDevice,
-    ) -> Result<Manifest, Error> {
-        let place = if device.kind().is_cpu() { "cpu" } else { "gpu" };
-        let dtype = format!("{:?}", device.dtype()).to_lowercase();
-        Ok(Manifest::start(program)
-            .with_parameters(parameters)?
-            .with_backend(device.kind().name(), place, dtype)
-            .with_seed(self.seed))
-    }
-
     /// A title, marked if this is a quick run.
     pub fn title(&self, title: &str) -> String {
         if self.quick {
             format!("{title} (quick run)")
         } else {
             title.to_owned()
-        }
-    }
-
-    /// Prints a text on standard output, unless quiet.
-    pub fn say(&self, text: &str) {
-        use std::io::Write;
-        if !self.quiet {
-            // A closed pipe (`| head`) is no reason to fail after the results have been written.
-            let _ = writeln!(std::io::stdout(), "{text}");
         }
     }
 }

@@ -1,18 +1,15 @@
 //! Orders of convergence of runs against the finest of them.
 
 use engine::Trajectory;
-use report::{Axis, Colour, Figure, Format, LineChart, LineStyle, Marker, Series, Summary, Table};
+use report::{Axis, Colour, Figure, Format, LineChart, LineStyle, Marker, Series, Table};
 
 use crate::Error;
 use crate::session::Session;
 
 /// Writes what the sequences of runs say, each with the name of the size that is halved from one run to the next: a figure, a table, and
 /// the orders as metrics `KEY.order.SIZE.pairK`, from the coarsest pair of runs.
-///
-/// # Errors
-/// [`Error::Engine`] if runs cannot be compared, [`Error::Report`].
 pub fn finish<const D: usize>(
-    session: Session<'_>,
+    mut session: Session<'_>,
     key: &str,
     title: &str,
     sequences: &[(&'static str, Vec<(f64, Trajectory<D>)>)],
@@ -24,10 +21,17 @@ pub fn finish<const D: usize>(
     let figure = Figure::new(format!("{title}: convergence"), 2)
         .with_panels(sizes.iter().map(|(name, rows)| chart(name, rows)));
     session.figure(figure.with_shared_legend(), "orders")?;
-    let table = table(&sizes)?;
-    table.write(&session.output, "orders")?;
-    let title = format!("{title}: orders of convergence");
-    session.finish(&title, summary(key, &sizes)?, &table.to_markdown())
+    table(&mut session, &sizes)?;
+    for (name, rows) in &sizes {
+        for (k, row) in rows.iter().enumerate() {
+            let metric = |what: &str| format!("{key}.{what}.{name}.pair{}", k + 1);
+            session.summary.insert(&metric("to_next"), row.to_next)?;
+            if let Some(order) = row.order {
+                session.summary.insert(&metric("order"), order)?;
+            }
+        }
+    }
+    session.finish(&format!("{title}: orders of convergence"))
 }
 
 /// A run in a sequence in which a size, `h` or `tau`, is halved from one to the next.
@@ -87,31 +91,21 @@ fn chart(name: &str, rows: &[Refinement]) -> LineChart {
 }
 
 /// The refinements of several sizes as a table.
-fn table(sizes: &[(&'static str, Vec<Refinement>)]) -> Result<Table, Error> {
+fn table(
+    session: &mut Session<'_>,
+    sizes: &[(&'static str, Vec<Refinement>)],
+) -> Result<(), Error> {
     let rows: Vec<(&str, Refinement)> = sizes
         .iter()
         .flat_map(|(name, rows)| rows.iter().map(|row| (*name, *row)))
         .collect();
-    Ok(Table::of(&rows)
+    let table = Table::of(&rows)
         .text("refined", |(name, _)| *name)
         .number("size", Format::Scientific(2), |(_, row)| row.size)
         .number("to the finest", Format::Scientific(2), |(_, row)| {
             row.to_finest
         })
         .number("to the next", Format::Scientific(2), |(_, row)| row.to_next)
-        .number("order", Format::Fixed(2), |(_, row)| row.order)
-        .finish()?)
-}
-
-fn summary(key: &str, sizes: &[(&'static str, Vec<Refinement>)]) -> Result<Summary, Error> {
-    let mut summary = Summary::new();
-    for (name, rows) in sizes {
-        for (k, row) in rows.iter().enumerate() {
-            summary.insert(&format!("{key}.to_next.{name}.pair{}", k + 1), row.to_next)?;
-            if let Some(order) = row.order {
-                summary.insert(&format!("{key}.order.{name}.pair{}", k + 1), order)?;
-            }
-        }
-    }
-    Ok(summary)
+        .number("order", Format::Fixed(2), |(_, row)| row.order);
+    session.table(table, "orders")
 }

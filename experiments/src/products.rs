@@ -112,17 +112,15 @@ pub enum Work {
     Evaluate,
 }
 
-impl Work {
-    /// All of it.
-    pub const ALL: [Self; 6] = [
-        Self::Burn,
-        Self::BurnSingle,
-        Self::ByHand,
-        Self::Floor,
-        Self::FloorSingle,
-        Self::Evaluate,
-    ];
-}
+/// All of it, with the names of the times.
+const ALL: [(Work, &str); 6] = [
+    (Work::Burn, "ms"),
+    (Work::BurnSingle, "single_ms"),
+    (Work::ByHand, "by_hand_ms"),
+    (Work::Floor, "floor_ms"),
+    (Work::FloorSingle, "floor_single_ms"),
+    (Work::Evaluate, "evaluate_ms"),
+];
 
 /// All candidates at one point, with one direction.
 pub struct Candidates<const D: usize> {
@@ -215,21 +213,10 @@ impl<const D: usize> Candidates<D> {
 
     /// Measures all candidates in turns, for at least this time and eleven turns: medians in milliseconds, the median `ratio` of the
     /// product through Burn to that by hand in the same turn, and what the former costs `over_floor`, its transforms alone.
-    ///
-    /// # Errors
-    /// None: turns do not fail.
     pub fn measure(&mut self, budget: Duration) -> Result<Numbers, Error> {
         const LEAST: usize = 11;
-        const NAMES: [&str; 6] = [
-            "ms",
-            "single_ms",
-            "by_hand_ms",
-            "floor_ms",
-            "floor_single_ms",
-            "evaluate_ms",
-        ];
         let clock = Instant::now();
-        let mut contenders = Work::ALL.map(|work| (work, Vec::new()));
+        let mut contenders = ALL.map(|(work, _)| (work, Vec::new()));
         let goes_on =
             |(_, times): &(Work, Vec<f64>)| times.len() < LEAST || clock.elapsed() < budget;
         take_turns(&mut contenders, goes_on, |(work, times)| {
@@ -240,7 +227,8 @@ impl<const D: usize> Candidates<D> {
         })?;
         let times = contenders.map(|(_, times)| times);
         let ratios = times[0].iter().zip(&times[2]).map(|(a, b)| a / b).collect();
-        let mut numbers: Numbers = NAMES.into_iter().zip(times.map(median)).collect();
+        let names = ALL.map(|(_, name)| name).into_iter();
+        let mut numbers: Numbers = names.zip(times.map(median)).collect();
         numbers.insert("ratio", median(ratios));
         numbers.insert("over_floor", numbers["ms"] / numbers["floor_ms"]);
         Ok(numbers)

@@ -1,17 +1,18 @@
 //! What every program does between its options and its results.
 
+use std::io::Write;
 use std::time::Instant;
 
 use engine::{Case, Samples, Stop, Trajectory};
 use operators::ComputeDevice;
-use report::{Figure, Manifest, OutputDir, Progress, Summary};
+use report::{Figure, Manifest, OutputDir, Progress, Summary, Tabulated};
 use runs::Interrupt;
-use serde::Serialize;
+use serde_json::Value;
 
 use crate::Error;
 use crate::options::RunOptions;
 
-/// A program whose options are checked: its device, its output folder, its manifest.
+/// A program whose options are checked, and what it has to say so far.
 pub struct Session<'a> {
     /// Common options.
     pub options: &'a RunOptions,
@@ -23,24 +24,33 @@ pub struct Session<'a> {
     pub progress: Progress,
     /// What is run, and the wall times of its parts.
     pub manifest: Manifest,
+    /// The metrics.
+    pub summary: Summary,
+    /// What is printed in the end.
+    report: Vec<String>,
     clock: Instant,
 }
 
 impl<'a> Session<'a> {
     /// Opens the output folder of a program and begins its manifest; to be called when everything else has been checked.
-    ///
-    /// # Errors
-    /// [`Error::Report`] if the folder cannot be written.
     pub fn open(
         program: &str,
         options: &'a RunOptions,
         device: ComputeDevice,
-        parameters: &impl Serialize,
+        mut parameters: Value,
     ) -> Result<Self, Error> {
+        parameters["quick"] = options.quick.into();
         let output = options.open_output(program)?;
+        let place = if device.kind().is_cpu() { "cpu" } else { "gpu" };
+        let dtype = format!("{:?}", device.dtype()).to_lowercase();
         Ok(Self {
-            manifest: options.manifest(program, parameters, &device)?,
+            manifest: Manifest::start(program)
+                .with_parameters(&parameters)?
+                .with_backend(device.kind().name(), place, dtype)
+                .with_seed(options.seed),
             progress: options.progress(),
+            summary: Summary::new(),
+            report: Vec::new(),
             clock: Instant::now(),
             options,
             device,
@@ -49,9 +59,6 @@ impl<'a> Session<'a> {
     }
 
     /// Does a part of the work, whose wall time stands in the manifest.
-    ///
-    /// # Errors
-    /// That of the work.
     pub fn phase<T>(
         &mut self,
         title: impl Into<String>,
@@ -61,9 +68,6 @@ impl<'a> Session<'a> {
     }
 
     /// Runs a case, continues it, or looks it up in the folder `fields/NAME` of the output.
-    ///
-    /// # Errors
-    /// What the case raises.
     pub fn trajectory<const D: usize>(
         &mut self,
         title: &str,
@@ -86,28 +90,40 @@ impl<'a> Session<'a> {
     }
 
     /// Writes a figure; its title says so if this is a quick run.
-    ///
-    /// # Errors
-    /// [`Error::Report`].
     pub fn figure(&self, figure: Figure, stem: &str) -> Result<(), Error> {
         let title = self.options.title(&figure.title);
         Ok(Figure { title, ..figure }.write(&self.output, stem)?)
     }
 
-    /// Writes the summary, with the wall time since the beginning, and the manifest, and prints a report below the title.
-    ///
-    /// # Errors
-    /// [`Error::Report`].
-    pub fn finish(mut self, title: &str, mut summary: Summary, report: &str) -> Result<(), Error> {
-        summary.insert("seconds", self.clock.elapsed().as_secs_f64())?;
-        summary.write(&self.output)?;
+    /// Writes a table, which is printed in the end, too.
+    pub fn table<R>(&mut self, table: Tabulated<'_, R>, stem: &str) -> Result<(), Error> {
+        let table = table.finish()?;
+        table.write(&self.output, stem)?;
+        self.remark(table.to_markdown());
+        Ok(())
+    }
+
+    /// Adds a text to what is printed in the end.
+    pub fn remark(&mut self, text: impl Into<String>) {
+        self.report.push(text.into());
+    }
+
+    /// Writes the metrics, with the wall time since the beginning, and the manifest, and prints the tables and remarks below the title.
+    pub fn finish(mut self, title: &str) -> Result<(), Error> {
+        let seconds = self.clock.elapsed().as_secs_f64();
+        self.summary.insert("seconds", seconds)?;
+        self.summary.write(&self.output)?;
         self.manifest.write(&self.output)?;
         self.progress.clear();
-        self.options.say(&format!(
-            "{}\n{report}\nResults are in {}",
-            self.options.title(title),
-            self.output.as_path().display()
-        ));
+        if !self.options.quiet {
+            let (title, report) = (self.options.title(title), self.report.join("\n"));
+            let folder = self.output.as_path().display();
+            // A closed pipe (`| head`) is no reason to fail after the results have been written.
+            let _ = writeln!(
+                std::io::stdout(),
+                "{title}\n{report}\nResults are in {folder}"
+            );
+        }
         Ok(())
     }
 }

@@ -18,9 +18,6 @@ pub struct Rows<'a> {
 }
 
 /// The steps of runs by any names, with method and scheme, as CSV.
-///
-/// # Errors
-/// [`Error::Report`] for numbers that are not finite.
 pub fn steps_csv<'a, const D: usize>(
     named: &str,
     runs: impl Iterator<Item = (&'a str, &'a Trajectory<D>)>,
@@ -39,9 +36,6 @@ pub fn steps_csv<'a, const D: usize>(
 }
 
 /// A row for every step: the leading columns, step, time and size, a column for every measure, and what the minimization did.
-///
-/// # Errors
-/// [`Error::Report`] for numbers that are not finite.
 pub fn table(leading: &[&str], runs: &[Rows<'_>]) -> Result<Table, Error> {
     let records = || runs.iter().flat_map(|run| run.records);
     let values = records().map(|record| &record.measures);

@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 
 use clap::Args;
-use engine::{
-    Case, Error as EngineError, Flow, Method, Operator, Scales, Scheme, StepRule, Stop, checksum,
-};
+use engine::{Case, Flow, Method, Operator, Scales, Scheme, StepRule};
 use geometry::Field;
 use report::{Cell, LineChart, Series};
 use serde::Serialize;
@@ -13,6 +11,7 @@ use solver::StepRecord;
 
 use crate::networks::{Chosen, NetworkOptions, STEP, convergence_network, scales};
 use crate::options::{RunOptions, resolutions};
+use crate::surfaces::willmore_flow;
 use crate::{Error, look};
 
 /// Options of the studies.
@@ -124,9 +123,6 @@ pub struct Study {
 
 impl Study {
     /// The operators of all variants; variants without a network are left out if the accurate recipe has one for the resolution.
-    ///
-    /// # Errors
-    /// What the networks refuse: see [`NetworkOptions::load`] and [`Chosen::operator`].
     pub fn new(options: &NetworkOptions, variants: &[Variant]) -> Result<Self, Error> {
         let learned = variants.iter().filter(|v| v.method.is_learned());
         let needs = learned
@@ -143,7 +139,7 @@ impl Study {
         for variant in variants {
             match study.networks.operator(variant.look(), variant.n) {
                 Ok(operator) => study.plan.push((*variant, operator)),
-                Err(Error::Engine(EngineError::MissingNetwork { .. }))
+                Err(Error::Model(model::Error::MissingNetwork { .. }))
                     if study
                         .networks
                         .find(Scheme::Accurate, &convergence_network(variant.n)?)
@@ -162,7 +158,7 @@ impl Study {
     /// Checksums of the networks of the variants, for the manifest.
     pub fn checksums(&self) -> BTreeMap<String, String> {
         let of = |(variant, operator): &(Variant, Operator)| {
-            Some((variant.key(), checksum(&operator.network()?.network)))
+            Some((variant.key(), operator.network()?.network.fingerprint()))
         };
         self.plan.iter().filter_map(of).collect()
     }
@@ -183,7 +179,7 @@ impl Study {
 /// A flow at the scales of the convergence tests in equal steps, with nothing measured; the inner step of mean curvature flow is its step.
 pub fn case(
     (flow, operator): (Flow, &Operator),
-    shape: impl Into<String>,
+    shape: &str,
     initial: Field<2>,
     (tau, steps): (f64, usize),
 ) -> Case<2> {
@@ -191,19 +187,15 @@ pub fn case(
         Flow::MeanCurvature => tau,
         Flow::Willmore => STEP,
     };
+    let scales = Scales {
+        mcf_step,
+        ..scales()
+    };
+    let time = (StepRule::Constant(tau), steps);
     Case {
-        shape: shape.into(),
-        initial,
-        region: None,
         flow,
-        operator: operator.clone(),
-        scales: Scales {
-            mcf_step,
-            ..scales()
-        },
-        steps: StepRule::Constant(tau).into(),
-        stops: vec![Stop::Steps(steps)],
         measures: Vec::new(),
+        ..willmore_flow(shape, initial, operator.clone(), scales, time)
     }
 }
 

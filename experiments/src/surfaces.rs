@@ -2,20 +2,22 @@
 
 use clap::Args;
 use engine::{
-    Case, Flow, Measure, Method, NeededNetwork, Operator, Record, Samples, Scales, Scheme,
-    StepRule, Stop, Trajectory, checksum, energy_increases, mean_hvp,
+    Case, Flow, Measure, Method, Operator, Record, Samples, Scales, Scheme, StepRule, Stop,
+    Trajectory, energy_increases, mean_hvp,
 };
 use geometry::{Field, Grid, UpAxis};
+use model::NeededNetwork;
+use operators::memory;
 use render::{Bounds, Framing, Quality, Rgb, Scene, Tube};
 use report::{Figure, Format, OutputDir, Raster, Summary, Table};
 use serde_json::{Value, json};
 use surfaces::ClosedMesh;
 
+use crate::Error;
 use crate::networks::Chosen;
 use crate::options::FigureOptions;
 use crate::session::Session;
 use crate::steps::steps_csv;
-use crate::{Error, memory};
 
 /// Interface width of surfaces, in cells.
 const EPS_OVER_H: f64 = 2.0;
@@ -39,9 +41,6 @@ pub fn needed_network() -> NeededNetwork {
 }
 
 /// The box of the given side around `(0.5, 0.5, 0.5)` with `n` cells per unit length; the nodes of the unit box are `i/n`.
-///
-/// # Errors
-/// [`Error::Geometry`] unless `n` times the side is a whole number, at least 2.
 pub fn centred_box(n: usize, side: f64) -> Result<Grid<3>, Error> {
     Ok(Grid::per_unit(n, side)?.with_origin([0.5 - 0.5 * side; 3])?)
 }
@@ -59,9 +58,6 @@ pub struct Setting {
 
 impl Setting {
     /// A box of the given side, with the usual numbers of cells per unit length of a quick run and of the paper.
-    ///
-    /// # Errors
-    /// [`Error::Engine`] if one of the user's networks is not for surfaces, [`Error::Geometry`] as [`centred_box`].
     pub fn new(options: &FigureOptions, usual: [usize; 2], side: f64) -> Result<Self, Error> {
         let n = options.cells(usual);
         Ok(Self {
@@ -73,9 +69,6 @@ impl Setting {
     }
 
     /// The operator of a method in a scheme.
-    ///
-    /// # Errors
-    /// As [`Operator::new`].
     pub fn operator(&self, variant: (Method, Scheme)) -> Result<Operator, Error> {
         let (networks, needed) = (self.networks.of(variant.1), needed_network());
         Ok(Operator::new(
@@ -88,14 +81,11 @@ impl Setting {
     }
 
     /// The parameters of a program for its manifest: the common ones, and others.
-    ///
-    /// # Errors
-    /// As [`Self::operator`].
     pub fn parameters(&self, others: Value) -> Result<Value, Error> {
         let papers = self.operator((Method::Hybrid, Scheme::Paper))?;
         let mut parameters = json!({
             "n": self.n, "box_side": self.grid.side(), "eps": self.scales.eps, "mcf_step": self.scales.mcf_step,
-            "network": papers.network().map(|named| checksum(&named.network)),
+            "network": papers.network().map(|named| named.network.fingerprint()),
         });
         if let (Value::Object(all), Value::Object(others)) = (&mut parameters, others) {
             all.extend(others);
@@ -105,13 +95,13 @@ impl Setting {
 }
 
 /// Willmore flow as in the paper: everywhere, in whole steps.
-pub fn willmore_flow(
+pub fn willmore_flow<const D: usize>(
     shape: &str,
-    initial: Field<3>,
+    initial: Field<D>,
     operator: Operator,
     scales: Scales,
     (rule, steps): (StepRule, usize),
-) -> Case<3> {
+) -> Case<D> {
     Case {
         shape: shape.to_owned(),
         initial,
@@ -214,9 +204,6 @@ pub struct Flowed {
 
 impl Surface {
     /// Lets the surface flow, or continues or looks up its run, and measures the steps to be shown.
-    ///
-    /// # Errors
-    /// What the flow and the measurement raise.
     pub fn flow(self, case: Case<3>, session: &mut Session<'_>) -> Result<Flowed, Error> {
         let n = case.grid().spacing().recip().round();
         let run = format!("{}, {}, n = {n}", self.title, case.operator.label());
@@ -318,9 +305,6 @@ impl Flowed {
     }
 
     /// Adds the metrics of the shown shapes, and the memory that they took.
-    ///
-    /// # Errors
-    /// [`Error::Report`] for a value that is not finite.
     pub fn summarize_shapes(&self, key: &str, summary: &mut Summary) -> Result<(), Error> {
         for shown in &self.snapshots {
             for ((name, ..), value) in MEASURES.iter().zip(shown.measures) {
@@ -334,9 +318,6 @@ impl Flowed {
     }
 
     /// Pictures of the shown steps with this side in pixels (less in a quick run), all in one framing, each also as a file of its own.
-    ///
-    /// # Errors
-    /// What rendering and writing raise.
     pub fn pictures(
         &self,
         output: &OutputDir,
@@ -412,15 +393,12 @@ pub struct Remarks {
     /// Below the figure.
     pub note: String,
     /// Below the table on standard output.
-    pub report: String,
+    pub report: Vec<String>,
 }
 
 impl SurfaceFlows {
     /// Lets all surfaces flow, and writes a figure with a row of pictures for each run, the table of the shown steps, the records of all
     /// steps and the metrics. `remarks` looks at the flows, and may add to captions, pictures and metrics.
-    ///
-    /// # Errors
-    /// What flows, rendering and writing raise.
     pub fn run(
         self,
         mut session: Session<'_>,
@@ -459,26 +437,21 @@ impl SurfaceFlows {
         session.figure(figure, "surfaces")?;
         let runs = all.iter().map(|one| (one.surface.key, &one.trajectory));
         output.write("steps.csv", steps_csv("surface", runs)?)?;
-        let table = table(&all)?;
-        table.write(output, "energies")?;
-        let mut summary = Summary::new();
-        all.iter().try_for_each(|one| one.summarize(&mut summary))?;
+        table(&mut session, &all, "energies")?;
+        for text in remarks.report {
+            session.remark(text);
+        }
+        let summary = &mut session.summary;
+        all.iter().try_for_each(|one| one.summarize(summary))?;
         if let Some(peak) = memory::peak_mib() {
             summary.insert(&format!("{}.peak_mib_with_pictures", self.program), peak)?;
         }
-        session.finish(
-            &self.title,
-            summary,
-            &(table.to_markdown() + &remarks.report),
-        )
+        session.finish(&self.title)
     }
 }
 
-/// Shown steps of all runs, beside the paper's energies.
-///
-/// # Errors
-/// [`Error::Report`] for a value that is not finite.
-pub fn table(all: &[Flowed]) -> Result<Table, Error> {
+/// Writes the shown steps of all runs, beside the paper's energies.
+pub fn table(session: &mut Session<'_>, all: &[Flowed], stem: &str) -> Result<(), Error> {
     let rows: Vec<(&Flowed, &Snapshot)> = (all.iter())
         .flat_map(|one| one.snapshots.iter().map(move |shown| (one, shown)))
         .collect();
@@ -494,5 +467,5 @@ pub fn table(all: &[Flowed]) -> Result<Table, Error> {
             table = table.number("w, paper", Format::Fixed(2), |(_, shown)| shown.paper);
         }
     }
-    Ok(table.finish()?)
+    session.table(table, stem)
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use engine::{Case, Flow, Operator, Run};
+use engine::{Case, Flow, Operator, Run, minimizations};
 use geometry::shapes::Ball;
 use geometry::{Grid, phase_field};
 use indicatif::ProgressBar;
@@ -32,9 +32,6 @@ pub fn with_columns<'a, R>(
 }
 
 /// Numbers as metrics `KEY.NAME`.
-///
-/// # Errors
-/// [`Error::Report`] for one that is not finite.
 pub fn summarize(summary: &mut Summary, key: &str, numbers: &Numbers) -> Result<(), Error> {
     for (name, value) in numbers {
         summary.insert(&format!("{key}.{name}"), *value)?;
@@ -43,9 +40,6 @@ pub fn summarize(summary: &mut Summary, key: &str, numbers: &Numbers) -> Result<
 }
 
 /// Round after round, everyone who goes on has a turn.
-///
-/// # Errors
-/// That of a turn.
 pub fn take_turns<C>(
     contenders: &mut [C],
     goes_on: impl Fn(&C) -> bool,
@@ -67,9 +61,6 @@ pub fn median(mut values: Vec<f64>) -> f64 {
 }
 
 /// What is timed in the plane: the cross in steps of `2^-14`, or for a smoke test a disc on a small box.
-///
-/// # Errors
-/// [`Error::Geometry`] for a resolution that cannot be.
 pub fn plane(operator: &Operator, n: usize, steps: usize, quick: bool) -> Result<Case<2>, Error> {
     let (shape, initial) = if quick {
         let disc = Ball::new([0.0, 0.0], 0.2)?;
@@ -90,18 +81,12 @@ pub struct Timed<const D: usize> {
 
 impl<const D: usize> Timed<D> {
     /// A case at its start, and the bar that shows its steps.
-    ///
-    /// # Errors
-    /// [`Error::Engine`] for a case that cannot be.
     pub fn new(case: Case<D>, device: &ComputeDevice, bar: ProgressBar) -> Result<Self, Error> {
         let run = Run::new(case, device)?;
         Ok(Self { run, bar })
     }
 
     /// One step, if there is one left.
-    ///
-    /// # Errors
-    /// [`Error::Engine`].
     pub fn step(&mut self) -> Result<bool, Error> {
         self.bar.inc(1);
         Ok(self.run.step()?.is_some())
@@ -109,8 +94,7 @@ impl<const D: usize> Timed<D> {
 
     /// What the steps did.
     pub fn minimizations(&self) -> impl Iterator<Item = &StepRecord> {
-        let records = self.run.records().iter();
-        records.filter_map(|record| record.minimization.as_ref())
+        minimizations(self.run.records())
     }
 
     /// Wall times of the steps in seconds.

@@ -5,11 +5,12 @@ use std::time::{Duration, Instant};
 use model::training::{Checkpoint, Progress as Iteration, Recipe, SphereData, Trained, Training};
 use model::{Error as ModelError, Ratios};
 use operators::{ComputeDevice, DeviceKind};
-use report::Progress;
+use report::{OutputDir, Progress};
 use runs::Cache;
 use serde::Serialize;
 
 use crate::Error;
+use crate::options::RunOptions;
 
 /// Least time between two checkpoints.
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(3);
@@ -86,9 +87,6 @@ impl NetworkSpec {
     }
 
     /// The training data.
-    ///
-    /// # Errors
-    /// [`Error::Model`] for ratios that cannot be trained.
     pub fn data(&self, quick: bool) -> Result<SphereData, Error> {
         let data = SphereData::new(self.ratios, self.cells)?;
         Ok(if quick { data.quick() } else { data })
@@ -115,25 +113,36 @@ pub fn held_out_radii(quick: bool) -> usize {
 }
 
 /// What the trainings of a program share.
-#[derive(Clone, Copy, Debug)]
 pub struct Trainer<'a> {
-    /// A [`training_device`].
-    pub device: &'a ComputeDevice,
-    /// Where interrupted trainings are kept.
-    pub checkpoints: &'a Cache,
-    /// Where the bars go.
-    pub progress: &'a Progress,
-    /// Seed of all random numbers.
-    pub seed: u64,
-    /// Few radii, for a smoke test.
-    pub quick: bool,
+    device: &'a ComputeDevice,
+    progress: &'a Progress,
+    options: &'a RunOptions,
+    /// Where interrupted trainings are kept; to be removed when the networks have been saved.
+    pub checkpoints: Cache,
 }
 
-impl Trainer<'_> {
+impl<'a> Trainer<'a> {
+    /// Trainings on a [`training_device`] that are kept in a folder of the output until they are all finished, or `restart`ed.
+    pub fn open(
+        options: &'a RunOptions,
+        device: &'a ComputeDevice,
+        output: &OutputDir,
+        progress: &'a Progress,
+        restart: bool,
+    ) -> Result<Self, Error> {
+        let folder = output.as_path().join("checkpoints");
+        if restart {
+            Cache::open(&folder)?.remove()?;
+        }
+        Ok(Self {
+            checkpoints: Cache::open(folder)?,
+            device,
+            progress,
+            options,
+        })
+    }
+
     /// Trains a network by a recipe of the given name, continuing from a checkpoint.
-    ///
-    /// # Errors
-    /// [`Error::Model`] if the training fails, [`Error::Runs`] if a checkpoint cannot be stored.
     pub fn train<R: Recipe>(
         &self,
         spec: &NetworkSpec,
@@ -142,9 +151,9 @@ impl Trainer<'_> {
     ) -> Result<Trained, Error> {
         let training = Training {
             recipe,
-            data: spec.data(self.quick)?,
-            seed: self.seed,
-            held_out: held_out_radii(self.quick),
+            data: spec.data(self.options.quick)?,
+            seed: self.options.seed,
+            held_out: held_out_radii(self.options.quick),
         };
         let name = format!("{}-{recipe_name}", spec.name);
         let key = (&training, env!("CARGO_PKG_VERSION"));

@@ -7,7 +7,7 @@ use crate::common::{refused, run};
 use engine::{Method, Record, Run, Scheme};
 use experiments::networks::Chosen;
 use experiments::timing;
-use model::pretrained;
+use model::Shipped;
 use operators::ComputeDevice;
 use report::Summary;
 
@@ -59,7 +59,7 @@ fn devices_that_are_unknown_or_not_compiled_in() {
 #[test]
 fn weights_that_are_missing_damaged_or_of_another_run() {
     let root = tempfile::tempdir().unwrap();
-    let networks = pretrained::all().unwrap();
+    let networks = Shipped::Paper.all().unwrap();
     let with_width = |width: usize| {
         let mut all = networks.iter().map(|(_, network)| network);
         all.find(|network| network.ratios().dimension == 2 && network.ratios().width == width)

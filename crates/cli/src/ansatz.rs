@@ -2,9 +2,9 @@
 
 use std::str::FromStr;
 
-use engine::shapes::Region;
 use geometry::{Field, phase_field};
 use serde::{Serialize, Serializer};
+use surfaces::shapes::Region;
 
 use crate::error::Error;
 

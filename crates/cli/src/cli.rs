@@ -5,10 +5,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use engine::shapes::Region;
 use engine::{Scheme, StepRule};
 use geometry::UpAxis;
 use serde::Serialize;
+use surfaces::shapes::Region;
 
 use crate::ansatz::Ansatz;
 

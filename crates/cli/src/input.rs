@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use engine::shapes::{self, BuiltIn, Region};
 use geometry::npy::{self, NpyError};
 use geometry::vti::{self, VtiError};
 use geometry::{Field, Grid, Placement, SignedDistance, UpAxis, optimal_profile, phase_field};
 use images::{Frame, Image, Outline, OutlineDistance, Side, Threshold};
+use surfaces::shapes::{self, BuiltIn, Region};
 use surfaces::{ClosedMesh, MeshDistance};
 
 use crate::cli::{Holds, InputOptions, Inside, SayOptions};

@@ -25,7 +25,7 @@ use crate::error::Error;
 const FAILURE: u8 = 2;
 
 fn main() -> ExitCode {
-    engine::keep_freed();
+    operators::memory::keep_freed();
     let arguments: Vec<OsString> = std::env::args_os().collect();
     let ended = match config::parse(&arguments) {
         Ok(cli) => execute(cli),

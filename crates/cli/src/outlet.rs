@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use engine::has_interface;
+use geometry::measure::has_interface;
 use geometry::{Field, Placement, UpAxis, npy, vti};
 use images::{Drawing, Frame, Interface, Outline, Svg};
 use render::{Framing, Picture, Rgb, Scene};

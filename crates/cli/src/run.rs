@@ -4,10 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use engine::{
-    Case, Checkpoints, Ending, Event, Observer, Record, Run, Stop, Store, checksum, has_interface,
-    touches_side,
-};
+use engine::{Case, Checkpoints, Ending, Event, Observer, Record, Run, Stop, Store};
+use geometry::measure::{has_interface, touches_side};
 use operators::ComputeDevice;
 use render::{Animation, Picture};
 use runs::{Interrupt, RunDirectory, StoredRun};
@@ -57,7 +55,7 @@ impl<O> Plan<O> {
                 "command": self.command,
                 "name": self.name,
                 "program": format!("willmore {}", env!("CARGO_PKG_VERSION")),
-                "network": network.map(|n| json!({ "name": n.name, "checksum": checksum(&n.network) })),
+                "network": network.map(|n| json!({ "name": n.name, "checksum": n.network.fingerprint() })),
                 "device": format!("{} {:?}", device.kind(), device.dtype()).to_lowercase(),
             },
             "outlet": self.outlet,

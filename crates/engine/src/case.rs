@@ -60,9 +60,6 @@ impl<const D: usize> Case<D> {
     }
 
     /// The finite-element step at the scales of the case: the measure of Willmore energies that the paper reports.
-    ///
-    /// # Errors
-    /// [`Error::Fem`] if the scales do not fit the grid.
     pub fn implicit_elements(&self) -> Result<FiniteElementStep<D>, Error> {
         let Scales { eps, mcf_step, .. } = self.scales;
         Ok(FiniteElementStep::implicit(self.grid(), eps, mcf_step)?)

@@ -1,31 +1,10 @@
 use std::path::PathBuf;
 
-use model::Ratios;
 use thiserror::Error as ThisError;
 
 /// What can stop a case.
 #[derive(Debug, ThisError)]
 pub enum Error {
-    /// No shipped network fits.
-    #[error(
-        "no network of the {recipe} recipe for {wanted}; there are {available}. Choose one of these interface widths, or train a network: \
-         willmore train --dimension {} --width {} --eps-over-h {} --step-over-h2 {} --save FILE.safetensors, and give it by --network",
-        wanted.dimension, wanted.width, wanted.eps_over_h, wanted.step_over_h2
-    )]
-    MissingNetwork {
-        /// How networks of the scheme are trained.
-        recipe: &'static str,
-        /// What is needed.
-        wanted: Ratios,
-        /// What there is.
-        available: String,
-    },
-    /// A file with a network was given, and no case has a learned operator.
-    #[error("no run of these methods needs a network")]
-    NetworkNotNeeded,
-    /// A shape or a region that cannot be built from its description.
-    #[error("{0}")]
-    Shape(String),
     /// A parameter out of range.
     #[error("{name} = {value:e} is out of range: {expected}")]
     Parameter {
@@ -97,16 +76,6 @@ pub enum Error {
         /// Why.
         reason: String,
     },
-    /// A file or folder that cannot be used.
-    #[error("cannot {action} {}: {source}", path.display())]
-    Io {
-        /// What was attempted.
-        action: &'static str,
-        /// The file or folder.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
     /// From an observer of another crate.
     #[error(transparent)]
     Observer(Box<dyn std::error::Error + Send + Sync>),
@@ -128,9 +97,6 @@ pub enum Error {
     /// From grids and fields.
     #[error(transparent)]
     Geometry(#[from] geometry::Error),
-    /// From meshes.
-    #[error(transparent)]
-    Surfaces(#[from] surfaces::Error),
 }
 
 impl Error {

@@ -1,8 +1,9 @@
 //! Cases of Willmore flow and mean curvature flow, run and resumed by one loop over time steps.
 //!
 //! ```
-//! use engine::{Case, Flow, Measure, Networks, Operator, Run, Scales, Scheme, StepRule, Stop};
+//! use engine::{Case, Flow, Measure, Operator, Run, Scales, Scheme, StepRule, Stop};
 //! use geometry::{Grid, phase_field, shapes::Cuboid};
+//! use model::Networks;
 //! use operators::ComputeDevice;
 //! use runs::Interrupt;
 //!
@@ -10,7 +11,7 @@
 //! // A square becomes round: the bending energy falls towards that of a circle, pi / R.
 //! let grid = Grid::<2>::per_unit(64, 1.0)?.with_origin([-0.5; 2])?;
 //! let scales = Scales::of_grid(grid.spacing(), 2.0);
-//! let network = Networks::default().find(Scheme::Accurate, &scales.needs(2, grid.spacing()))?;
+//! let network = Networks::default().find(Scheme::Accurate.shipped(), &scales.needs(2, grid.spacing()))?;
 //! let case = Case {
 //!     shape: "square of side 1/2".to_owned(),
 //!     initial: phase_field(grid, &Cuboid::new([0.25; 2])?, scales.eps)?,
@@ -39,18 +40,21 @@
 //! holds the phase fields and all records, and a run that is resumed from it ends with the same bytes.
 //!
 //! New parts have one place each: a step rule in [`StepRule`], a stop rule in [`Stop`], a method in [`Method`], a measure in
-//! [`Measure`], an observer behind [`Observer`], a named shape in [`shapes`].
+//! [`Measure`], an observer behind [`Observer`].
+//!
+//! Errors of the crates below, such as [`Error::Runs`] and [`Error::Geometry`], pass through as they are; functions that refuse something
+//! themselves say what.
+
+#![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 
 mod case;
 mod error;
 mod measure;
-mod memory;
 mod motion;
 mod observer;
 mod operator;
 mod record;
 mod run;
-pub mod shapes;
 mod steps;
 mod stop;
 mod store;
@@ -60,15 +64,11 @@ mod trajectory;
 pub use case::Case;
 pub use error::Error;
 pub use measure::Measure;
-pub use memory::keep_freed;
 pub use observer::{Event, Observer, Samples};
-pub use operator::{
-    Flow, Method, NamedNetwork, NeededNetwork, Networks, Operator, Scales, Scheme, checksum,
-    quarter_square,
-};
-pub use record::{Record, Values, energy_increases, mean_hvp, to_csv};
+pub use operator::{Flow, Method, Operator, Scales, Scheme, quarter_square};
+pub use record::{Record, Values, energy_increases, mean_hvp, minimizations, to_csv};
 pub use run::{Ending, Run};
 pub use steps::{StepRule, TimeSteps};
-pub use stop::{Stop, has_interface, touches_side};
+pub use stop::Stop;
 pub use store::{Checkpoints, METRICS, Store, dimension, initial, notes};
 pub use trajectory::Trajectory;

@@ -63,9 +63,6 @@ impl<const D: usize> Measure<D> {
     }
 
     /// Its value.
-    ///
-    /// # Errors
-    /// [`Error::Geometry`].
     pub fn of(&self, field: &Field<D>, time: f64) -> Result<Option<f64>, Error> {
         Ok((self.of)(field, time)?)
     }

@@ -16,11 +16,7 @@ pub(crate) struct Motion<const D: usize> {
 
 enum Either<const D: usize> {
     Willmore(Box<WillmoreFlow<D>>),
-    MeanCurvature {
-        flow: Box<MeanCurvatureFlow<D>>,
-        tau: f64,
-        step: usize,
-    },
+    MeanCurvature(Box<MeanCurvatureFlow<D>>),
 }
 
 impl<const D: usize> Motion<D> {
@@ -65,41 +61,17 @@ impl<const D: usize> Motion<D> {
                     }
                     (None, None) => unreachable!("a learned operator has a network"),
                 };
-                Either::MeanCurvature {
-                    flow: Box::new(flow),
-                    tau: params.mcf_step,
-                    step: state.step,
-                }
+                Either::MeanCurvature(Box::new(flow))
             }
         };
         Ok(Self { flow, elements })
-    }
-
-    /// Time reached.
-    pub(crate) fn time(&self) -> f64 {
-        match &self.flow {
-            Either::Willmore(flow) => flow.time(),
-            Either::MeanCurvature { tau, step, .. } => *step as f64 * tau,
-        }
-    }
-
-    /// Minimizations made, or steps of mean curvature flow.
-    pub(crate) fn count(&self) -> usize {
-        match &self.flow {
-            Either::Willmore(flow) => flow.steps(),
-            Either::MeanCurvature { step, .. } => *step,
-        }
     }
 
     /// One minimization of this size, or one step of mean curvature flow, whose size is that of its operator.
     pub(crate) fn advance(&mut self, size: f64) -> Result<Option<StepRecord>, solver::Error> {
         match &mut self.flow {
             Either::Willmore(flow) => flow.advance(size).map(Some),
-            Either::MeanCurvature { flow, step, .. } => {
-                flow.advance()?;
-                *step += 1;
-                Ok(None)
-            }
+            Either::MeanCurvature(flow) => flow.advance().map(|()| None),
         }
     }
 
@@ -107,21 +79,15 @@ impl<const D: usize> Motion<D> {
     pub(crate) fn field(&self) -> Result<Field<D>, solver::Error> {
         match &self.flow {
             Either::Willmore(flow) => flow.field(),
-            Either::MeanCurvature { flow, .. } => flow.field(),
+            Either::MeanCurvature(flow) => flow.field(),
         }
     }
 
-    /// All that the following steps depend on.
-    pub(crate) fn state(&self) -> Result<FlowState<D>, solver::Error> {
+    /// All that the following steps depend on, after so many minimizations or steps and at this time.
+    pub(crate) fn state(&self, count: usize, time: f64) -> Result<FlowState<D>, solver::Error> {
         match &self.flow {
             Either::Willmore(flow) => flow.state(),
-            Either::MeanCurvature { flow, step, .. } => Ok(FlowState {
-                current: flow.field()?,
-                previous: None,
-                half_motions: Vec::new(),
-                step: *step,
-                time: self.time(),
-            }),
+            Either::MeanCurvature(flow) => Ok(FlowState::new(flow.field()?, count, time)),
         }
     }
 

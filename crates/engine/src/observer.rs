@@ -31,9 +31,6 @@ impl<const D: usize> Event<'_, D> {
     }
 
     /// Writes the phase field to a file of the run; nothing where the run is not stored.
-    ///
-    /// # Errors
-    /// [`Error::Geometry`] and [`Error::Runs`].
     pub fn write_field(&mut self, name: &str) -> Result<(), Error> {
         if let Some(directory) = &mut self.directory {
             npy::write(directory.path().join(name), self.field)?;

@@ -1,13 +1,12 @@
 //! The step of mean curvature flow inside a flow, and the weights of its energy.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use fem::{FiniteElementStep, LinearSolver};
 use geometry::Grid;
-use model::{Network, Ratios, pretrained};
-use runs::fingerprint;
+use model::{NamedNetwork, NeededNetwork, Networks, Shipped};
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 use solver::{Factors, NewtonParams};
 
 use crate::Error;
@@ -86,6 +85,14 @@ impl Scheme {
             Self::Paper => "paper",
             Self::Calibrated => "calibrated",
             Self::Accurate => "accurate",
+        }
+    }
+
+    /// The shipped networks for it.
+    pub fn shipped(self) -> Shipped {
+        match self {
+            Self::Paper | Self::Calibrated => Shipped::Paper,
+            Self::Accurate => Shipped::Accurate,
         }
     }
 }
@@ -193,162 +200,6 @@ pub fn quarter_square(eps_over_h: f64) -> f64 {
     0.25 * eps_over_h * eps_over_h
 }
 
-/// The ratios that a network must have.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct NeededNetwork {
-    /// Of space.
-    pub dimension: usize,
-    /// Width of the kernel in cells; none if it does not matter.
-    pub width: Option<usize>,
-    /// Interface width in cells.
-    pub eps_over_h: f64,
-    /// `tautilde / h^2`.
-    pub step_over_h2: f64,
-}
-
-impl NeededNetwork {
-    /// Exactly these ratios.
-    pub fn exactly(ratios: Ratios) -> Self {
-        Self {
-            dimension: ratios.dimension,
-            width: Some(ratios.width),
-            eps_over_h: ratios.eps_over_h,
-            step_over_h2: ratios.step_over_h2,
-        }
-    }
-
-    /// The same with a kernel of this width.
-    #[must_use]
-    pub fn of_width(self, width: usize) -> Self {
-        Self {
-            width: Some(width),
-            ..self
-        }
-    }
-
-    /// With the width that is wanted, or else the usual one, `8 eps/h + 1`.
-    fn ratios(&self) -> Ratios {
-        let usual = 8 * self.eps_over_h.clamp(1.0, 64.0).ceil() as usize + 1;
-        Ratios {
-            dimension: self.dimension,
-            width: self.width.unwrap_or(usual),
-            eps_over_h: self.eps_over_h,
-            step_over_h2: self.step_over_h2,
-        }
-    }
-
-    fn is_met_by(&self, network: &Network) -> bool {
-        let own = network.ratios();
-        own.matches(&Ratios {
-            width: self.width.unwrap_or(own.width),
-            ..self.ratios()
-        })
-    }
-}
-
-/// A network and what it is called.
-#[derive(Clone, Debug)]
-pub struct NamedNetwork {
-    /// Name of its file without the extension.
-    pub name: String,
-    /// The network.
-    pub network: Network,
-}
-
-/// Where networks come from: files that the user names, before those that are shipped.
-#[derive(Clone, Debug, Default)]
-pub struct Networks {
-    files: Vec<NamedNetwork>,
-}
-
-impl Networks {
-    /// The networks in these files.
-    ///
-    /// # Errors
-    /// [`Error::Model`] for a file that is no network, and for one that meets none of the needs.
-    pub fn load(paths: &[impl AsRef<Path>], needs: &[NeededNetwork]) -> Result<Self, Error> {
-        let mut files = Vec::new();
-        for path in paths.iter().map(AsRef::as_ref) {
-            let network = Network::load(path)?;
-            if !needs.iter().any(|need| need.is_met_by(&network)) {
-                let own = network.ratios();
-                let alike = |need: &&NeededNetwork| {
-                    let width = need.width.unwrap_or(own.width);
-                    usize::from(need.dimension == own.dimension) + usize::from(width == own.width)
-                };
-                // The need that is most like the network makes the most helpful message.
-                let nearest = (needs.iter().max_by_key(alike)).ok_or(Error::NetworkNotNeeded)?;
-                let run = Ratios {
-                    width: nearest.width.unwrap_or(own.width),
-                    ..nearest.ratios()
-                };
-                return Err(model::Error::Mismatch { network: own, run }.into());
-            }
-            files.push(NamedNetwork {
-                name: stem(path),
-                network,
-            });
-        }
-        Ok(Self { files })
-    }
-
-    /// The network of a scheme: that of the last file that fits, else the widest shipped one.
-    ///
-    /// # Errors
-    /// [`Error::MissingNetwork`] naming the ratios and those available.
-    pub fn find(&self, scheme: Scheme, needed: &NeededNetwork) -> Result<NamedNetwork, Error> {
-        let fits = |network: &Network| needed.is_met_by(network);
-        if let Some(own) = self.files.iter().rev().find(|file| fits(&file.network)) {
-            return Ok(own.clone());
-        }
-        let (recipe, shipped) = match scheme {
-            Scheme::Accurate => ("accurate", pretrained::all_accurate()?),
-            Scheme::Calibrated | Scheme::Paper => ("paper's", pretrained::all()?),
-        };
-        let mut available: Vec<f64> = (shipped.iter().map(|(_, network)| network.ratios()))
-            .filter(|ratios| ratios.dimension == needed.dimension)
-            .map(|ratios| ratios.eps_over_h)
-            .collect();
-        (shipped.into_iter())
-            .filter(|(_, network)| fits(network))
-            .max_by_key(|(_, network)| network.ratios().width)
-            .map(|(name, network)| NamedNetwork {
-                name: stem(Path::new(name)),
-                network,
-            })
-            .ok_or_else(|| {
-                available.sort_by(f64::total_cmp);
-                available.dedup();
-                let list: Vec<String> =
-                    (available.iter().map(|eps| format!("eps/h = {eps}"))).collect();
-                Error::MissingNetwork {
-                    recipe,
-                    wanted: needed.ratios(),
-                    available: list.join(", "),
-                }
-            })
-    }
-}
-
-fn stem(path: &Path) -> String {
-    let stem = path.file_stem().unwrap_or(path.as_os_str());
-    stem.to_string_lossy().into_owned()
-}
-
-/// SHA-256 of the numbers of a network, in hexadecimal: two networks with the same act alike.
-pub fn checksum(network: &Network) -> String {
-    let mut bytes = network.ratios().to_string().into_bytes();
-    for width in network.activation().layers() {
-        bytes.extend(width.to_le_bytes());
-    }
-    let numbers = network
-        .kernel()
-        .iter()
-        .chain(network.activation().parameters());
-    bytes.extend(numbers.flat_map(|value| value.to_le_bytes()));
-    fingerprint(bytes)
-}
-
 /// The step of mean curvature flow of a case, and what its energy is divided by.
 #[derive(Clone, Debug)]
 pub struct Operator {
@@ -364,16 +215,6 @@ pub struct Operator {
     /// than the tolerance of the minimization.
     pub half_grids: bool,
     network: Option<Arc<NamedNetwork>>,
-}
-
-/// What of an operator a result depends on.
-#[derive(Serialize)]
-pub(crate) struct Identity<'a> {
-    method: Method,
-    scheme: Scheme,
-    factors: Factors,
-    half_grids: bool,
-    network: Option<(&'a str, String)>,
 }
 
 impl Operator {
@@ -431,9 +272,6 @@ impl Operator {
     }
 
     /// The operator of a method in a scheme: [`Self::learned`] with the network that meets the need, or [`Self::finite_elements`].
-    ///
-    /// # Errors
-    /// Those of the two, and of [`Networks::find`].
     pub fn new<const D: usize>(
         (method, scheme): (Method, Scheme),
         networks: &Networks,
@@ -442,7 +280,7 @@ impl Operator {
         scales: &Scales,
     ) -> Result<Self, Error> {
         if method.is_learned() {
-            Self::learned(scheme, networks.find(scheme, needed)?)
+            Self::learned(scheme, networks.find(scheme.shipped(), needed)?)
         } else {
             Self::finite_elements(method, scheme, grid, scales)
         }
@@ -463,15 +301,16 @@ impl Operator {
         self.method.key_in(self.scheme)
     }
 
-    pub(crate) fn identity(&self) -> Identity<'_> {
-        let network = self.network();
-        Identity {
-            method: self.method,
-            scheme: self.scheme,
-            factors: self.factors,
-            half_grids: self.half_grids,
-            network: network.map(|n| (n.name.as_str(), checksum(&n.network))),
-        }
+    /// What of it a result depends on.
+    pub(crate) fn identity(&self) -> Value {
+        let network = |named: &NamedNetwork| json!([named.name, named.network.fingerprint()]);
+        json!({
+            "method": self.method,
+            "scheme": self.scheme,
+            "factors": self.factors,
+            "half_grids": self.half_grids,
+            "network": self.network().map(network),
+        })
     }
 
     /// The finite-element step on a grid.

@@ -1,6 +1,6 @@
 //! What is known about each minimization of a flow.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 use solver::StepRecord;
@@ -51,10 +51,15 @@ impl Record {
     }
 }
 
+/// What the minimizations did; nothing for mean curvature flow.
+pub fn minimizations(records: &[Record]) -> impl Iterator<Item = &StepRecord> {
+    (records.iter()).filter_map(|record| record.minimization.as_ref())
+}
+
 /// Minimizations that ended at a higher energy than they began with; where nothing moves any more the energy stays.
 pub fn energy_increases(records: &[Record]) -> usize {
-    let made = records.iter().filter_map(|record| record.minimization);
-    made.filter(|m| m.energy > m.energy_before).count()
+    let risen = |made: &&StepRecord| made.energy > made.energy_before;
+    minimizations(records).filter(risen).count()
 }
 
 /// Hessian-vector products per minimization.
@@ -65,25 +70,16 @@ pub fn mean_hvp(records: &[Record]) -> f64 {
 
 /// All records as CSV, with a column for each measure.
 pub fn to_csv(records: &[Record]) -> String {
-    let mut names: Vec<&str> = (records.iter())
-        .flat_map(|record| record.measures.keys().map(String::as_str))
-        .collect();
-    names.sort_unstable();
-    names.dedup();
-    let head = [
-        "step",
-        "time",
-        "tau",
-        "energy_before",
-        "energy",
-        "willmore_energy",
-    ];
+    let names = records.iter().flat_map(|record| record.measures.keys());
+    let names: BTreeSet<&str> = names.map(String::as_str).collect();
+    let head = ["step", "time", "tau"];
+    let energies = ["energy_before", "energy", "willmore_energy"];
     let tail = ["newton", "hvp", "halvings"];
-    let columns: Vec<&str> = (head.iter().chain(&names).chain(&tail).copied()).collect();
-    let mut text = columns.join(",") + "\n";
+    let columns = head.iter().chain(&energies).chain(&names).chain(&tail);
+    let mut text = columns.copied().collect::<Vec<_>>().join(",") + "\n";
+    let number = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
     for record in records {
         let made = record.minimization;
-        let number = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
         let mut row = vec![
             record.step.to_string(),
             record.time.to_string(),

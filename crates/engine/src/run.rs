@@ -11,7 +11,6 @@ use solver::{FlowState, StepRecord};
 use crate::motion::Motion;
 use crate::record::Values;
 use crate::steps::StepControl;
-use crate::stop::Situation;
 use crate::{Case, Error, Event, Flow, Observer, Record, Stop, Store};
 
 /// How a run ended.
@@ -42,13 +41,7 @@ impl<const D: usize> Run<D> {
     /// What the case's parts refuse: [`Error::Parameter`], [`Error::Solver`], [`Error::Fem`], [`Error::Geometry`].
     pub fn new(case: Case<D>, device: &ComputeDevice) -> Result<Self, Error> {
         let start = values(&case, &case.initial, 0.0)?;
-        let state = FlowState {
-            current: case.initial.clone(),
-            previous: None,
-            half_motions: Vec::new(),
-            step: 0,
-            time: 0.0,
-        };
+        let state = FlowState::new(case.initial.clone(), 0, 0.0);
         Self::at(case, device, start, Vec::new(), &state)
     }
 
@@ -102,12 +95,14 @@ impl<const D: usize> Run<D> {
         let field = self.motion.field().map_err(|source| self.failed(source))?;
         let seconds = clock.elapsed().as_secs_f64();
         let step_size = self.control.step_size();
-        let time = self.motion.time();
+        let mcf_step = self.case.scales.mcf_step;
+        let count = self.records.len() + 1;
+        let time = minimization.map_or(count as f64 * mcf_step, |made| made.time);
         let mut record = Record {
             step: self.control.step(),
             completes_step: false,
             time,
-            tau: minimization.map_or(self.case.scales.mcf_step, |made| made.tau),
+            tau: minimization.map_or(mcf_step, |made| made.tau),
             halvings,
             moved: l2_distance(&field, &self.field)?,
             travelled: l2_distance(&field, &self.case.initial)?,
@@ -209,19 +204,8 @@ impl<const D: usize> Run<D> {
 
     /// The first stop rule that holds, where the last record belongs to a time step of this size.
     fn stop(&self, step_size: f64) -> Option<Stop> {
-        let now = Situation {
-            initial: &self.case.initial,
-            field: &self.field,
-            records: &self.records,
-            steps: self.steps(),
-            step_size,
-            largest: self.case.largest_step(),
-        };
-        self.case
-            .stops
-            .iter()
-            .find(|stop| stop.holds(&now))
-            .copied()
+        let mut stops = self.case.stops.iter();
+        stops.find(|stop| stop.holds(self, step_size)).copied()
     }
 
     /// What is run.
@@ -256,7 +240,7 @@ impl<const D: usize> Run<D> {
 
     /// Time reached.
     pub fn time(&self) -> f64 {
-        self.motion.time()
+        self.records.last().map_or(0.0, |last| last.time)
     }
 
     /// Work of the linear solves inside finite elements so far; none for a learned operator.
@@ -264,12 +248,8 @@ impl<const D: usize> Run<D> {
         self.motion.statistics()
     }
 
-    pub(crate) fn count(&self) -> usize {
-        self.motion.count()
-    }
-
     pub(crate) fn state(&self) -> Result<FlowState<D>, Error> {
-        Ok(self.motion.state()?)
+        Ok(self.motion.state(self.records.len(), self.time())?)
     }
 }
 

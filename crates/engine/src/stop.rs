@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-use geometry::Field;
+use geometry::measure::{has_interface, touches_side};
 use serde::{Deserialize, Serialize};
 
-use crate::Record;
+use crate::{Record, Run};
 
 /// A reason to end; a flow ends with the first that holds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,46 +34,34 @@ const LITTLE: f64 = 1e-4;
 /// So many of them in a row are the end.
 const IN_A_ROW: usize = 3;
 
-/// What a stop rule looks at.
-pub(crate) struct Situation<'a, const D: usize> {
-    pub(crate) initial: &'a Field<D>,
-    pub(crate) field: &'a Field<D>,
-    pub(crate) records: &'a [Record],
-    /// Time steps completed.
-    pub(crate) steps: usize,
-    /// Size of the time step to which the last record belongs.
-    pub(crate) step_size: f64,
-    /// The largest step by the energy.
-    pub(crate) largest: f64,
-}
-
 impl Stop {
-    /// Whether it holds.
-    pub(crate) fn holds<const D: usize>(&self, now: &Situation<'_, D>) -> bool {
-        let last = now.records.last();
+    /// Whether it holds for a run whose last record belongs to a time step of this size.
+    pub(crate) fn holds<const D: usize>(&self, run: &Run<D>, step_size: f64) -> bool {
+        let last = run.records.last();
         match *self {
-            Self::Steps(steps) => now.steps >= steps,
+            Self::Steps(steps) => run.steps() >= steps,
             // What is left of a sum of steps after the last one is rounding.
             Self::Time(end) => last.is_some_and(|r| end - r.time <= 1e-12 * end),
             Self::Energy(energy) => {
                 (last.and_then(Record::willmore_energy)).is_some_and(|w| w <= energy)
             }
             Self::Motion(limit) => {
-                last.is_some_and(|r| r.moved * now.step_size / r.tau <= limit * r.travelled)
+                last.is_some_and(|r| r.moved * step_size / r.tau <= limit * r.travelled)
             }
             Self::EnergyAtRest => {
+                let largest = run.case.largest_step();
                 let at_rest = |record: &Record| {
                     record.minimization.is_some_and(|made| {
                         let before = made.energy_at_rest();
                         let change = (before - made.willmore_energy).abs();
-                        record.tau >= 0.25 * now.largest && change < LITTLE * before
+                        record.tau >= 0.25 * largest && change < LITTLE * before
                     })
                 };
-                let last = now.records.len().saturating_sub(IN_A_ROW);
-                now.records.len() >= IN_A_ROW && now.records[last..].iter().all(at_rest)
+                let last = run.records.last_chunk::<IN_A_ROW>();
+                last.is_some_and(|records| records.iter().all(at_rest))
             }
-            Self::Vanished => !has_interface(now.field),
-            Self::AtTheSide => touches_side(now.field) && !touches_side(now.initial),
+            Self::Vanished => !has_interface(run.field()),
+            Self::AtTheSide => touches_side(run.field()) && !touches_side(&run.case.initial),
         }
     }
 }
@@ -90,18 +78,4 @@ impl fmt::Display for Stop {
             Self::AtTheSide => f.write_str("the shape has come to the side of the box"),
         }
     }
-}
-
-/// Whether there is an interface at all.
-pub fn has_interface<const D: usize>(u: &Field<D>) -> bool {
-    let inside = u.values().iter().filter(|u| **u > 0.0).count();
-    inside > 0 && inside < u.grid().len()
-}
-
-/// Whether a node at the side of the box is not outside.
-pub fn touches_side<const D: usize>(u: &Field<D>) -> bool {
-    const OUTSIDE: f64 = -0.5;
-    let grid = u.grid();
-    let at_side = |node: usize| grid.multi_index(node).contains(&0);
-    (u.values().iter().enumerate()).any(|(node, u)| *u > OUTSIDE && at_side(node))
 }

@@ -37,9 +37,6 @@ pub struct Store {
 impl Store {
     /// Starts the directory of a run with these files and a first checkpoint. `notes` are kept in all checkpoints, and a run that is
     /// resumed has to have the same.
-    ///
-    /// # Errors
-    /// [`Error::Runs`].
     pub fn create<const D: usize>(
         folder: impl Into<PathBuf>,
         files: &[(&str, &str)],
@@ -47,20 +44,21 @@ impl Store {
         notes: Value,
         checkpoints: Checkpoints,
     ) -> Result<Self, Error> {
-        let state = pack(run, &notes)?;
-        Ok(Self {
-            directory: RunDirectory::create(folder, files, &state)?,
+        let directory = RunDirectory::create(folder, files, &pack(run, &notes)?)?;
+        Ok(Self::at(directory, notes, checkpoints))
+    }
+
+    fn at(directory: RunDirectory, notes: Value, checkpoints: Checkpoints) -> Self {
+        Self {
+            directory,
             checkpoints,
             notes,
             last: Instant::now(),
-        })
+        }
     }
 
     /// Takes a stored run up where its last checkpoint is; `case` is built anew, from the [`initial`] field if need be, and must be the
     /// stored one.
-    ///
-    /// # Errors
-    /// [`Error::OtherCase`], [`Error::Unreadable`], [`Error::Runs`], and what [`Run::new`] raises.
     pub fn resume<const D: usize>(
         stored: StoredRun,
         case: Case<D>,
@@ -70,13 +68,7 @@ impl Store {
         let run = restore(&stored, case, device)?;
         let notes = notes(&stored).clone();
         let (directory, _) = stored.resume()?;
-        let store = Self {
-            directory,
-            checkpoints,
-            notes,
-            last: Instant::now(),
-        };
-        Ok((store, run))
+        Ok((Self::at(directory, notes, checkpoints), run))
     }
 
     /// The directory, to which files can be added.
@@ -85,9 +77,6 @@ impl Store {
     }
 
     /// Makes a checkpoint.
-    ///
-    /// # Errors
-    /// [`Error::Runs`].
     pub fn commit<const D: usize>(&mut self, run: &Run<D>) -> Result<(), Error> {
         self.write_tables(run)?;
         self.directory.commit(&pack(run, &self.notes)?)?;
@@ -102,7 +91,7 @@ impl Store {
         must: bool,
     ) -> Result<(), Error> {
         let due = match self.checkpoints {
-            Checkpoints::EverySteps(steps) => run.count().is_multiple_of(steps),
+            Checkpoints::EverySteps(steps) => run.records.len().is_multiple_of(steps),
             Checkpoints::Every(time) => self.last.elapsed() >= time,
         };
         if due || must {
@@ -112,9 +101,6 @@ impl Store {
     }
 
     /// The last checkpoint of a run that is over, which is kept alone.
-    ///
-    /// # Errors
-    /// [`Error::Runs`].
     pub fn finish<const D: usize>(mut self, run: &Run<D>) -> Result<(), Error> {
         self.write_tables(run)?;
         Ok(self.directory.finish(&pack(run, &self.notes)?)?)
@@ -137,9 +123,6 @@ pub fn notes(stored: &StoredRun) -> &Value {
 }
 
 /// The dimension of a stored run.
-///
-/// # Errors
-/// [`Error::Unreadable`].
 pub fn dimension(stored: &StoredRun) -> Result<usize, Error> {
     let dimension: usize = read(stored, &stored.state().notes["case"]["grid"]["dimension"])?;
     match dimension {
@@ -153,9 +136,6 @@ pub fn dimension(stored: &StoredRun) -> Result<usize, Error> {
 
 /// The initial phase field of a stored run, and the nodes whose values move if not all do: a case can be built from them without its
 /// input.
-///
-/// # Errors
-/// [`Error::Unreadable`].
 pub fn initial<const D: usize>(stored: &StoredRun) -> Result<(Field<D>, Option<Vec<bool>>), Error> {
     let region = stored.state().array("region");
     let region = region.map(|marks| marks.iter().map(|&mark| mark > 0.5).collect());
@@ -184,7 +164,7 @@ fn pack<const D: usize>(run: &Run<D>, notes: &Value) -> Result<State, Error> {
         "time": state.time,
         "previous_tau": previous_tau,
     });
-    let mut packed = State::new(run.count() as u64, notes)
+    let mut packed = State::new(run.records.len() as u64, notes)
         .with_array("initial", run.case.initial.values().to_vec())
         .with_array("current", state.current.into_values());
     packed.text = serde_json::to_string(&run.records).expect("records are numbers and names");
@@ -244,14 +224,9 @@ pub(crate) fn check_identity(stored: &StoredRun, wanted: &Value) -> Result<(), E
     }
     let keys = wanted.as_object().into_iter().flat_map(|map| map.keys());
     let differing: Vec<String> = keys
-        .filter(|key| found[key.as_str()] != wanted[key.as_str()])
-        .map(|key| {
-            format!(
-                "{key}: {} there, {} here",
-                found[key.as_str()],
-                wanted[key.as_str()]
-            )
-        })
+        .map(|key| (key, &found[key], &wanted[key]))
+        .filter(|(_, there, here)| there != here)
+        .map(|(key, there, here)| format!("{key}: {there} there, {here} here"))
         .collect();
     Err(Error::OtherCase {
         path: stored.path().to_owned(),

@@ -32,9 +32,6 @@ pub struct Trajectory<const D: usize> {
 impl<const D: usize> Trajectory<D> {
     /// Runs a case, or continues it, or only looks up what is stored in `folder`; a stored run of another case is replaced.
     /// Nothing if it was interrupted.
-    ///
-    /// # Errors
-    /// What the run raises, and [`Error::Runs`] if something cannot be stored.
     pub fn of(
         case: Case<D>,
         device: &ComputeDevice,
@@ -82,17 +79,11 @@ impl<const D: usize> Trajectory<D> {
     }
 
     /// The phase field after a step, which must be one that was kept.
-    ///
-    /// # Errors
-    /// [`Error::Geometry`] if it is not there.
     pub fn field(&self, step: usize) -> Result<Field<D>, Error> {
         self.read(&Samples::name(step))
     }
 
     /// The phase field at the time `tau / 2^halvings` inside the first step, if it was to be kept and a substep ended there.
-    ///
-    /// # Errors
-    /// [`Error::Geometry`] if it cannot be read.
     pub fn part_field(&self, halvings: u32) -> Result<Option<Field<D>>, Error> {
         let name = Samples::part_name(halvings);
         if !self.folder.join(&name).exists() {
@@ -123,9 +114,6 @@ impl<const D: usize> Trajectory<D> {
     }
 
     /// The measures after a time step; those of the initial phase field for 0.
-    ///
-    /// # Errors
-    /// [`Error::NoSuchStep`].
     pub fn measures(&self, step: usize) -> Result<&Values, Error> {
         if step == 0 {
             return Ok(&self.start);
@@ -189,11 +177,9 @@ fn found<const D: usize>(
         Err(_) => {}
     }
     match std::fs::remove_dir_all(folder) {
-        Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(Error::Io {
-            action: "remove",
-            path: folder.to_owned(),
-            source,
-        }),
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(RunsError::from(files::Error::of("remove", folder)(error)).into())
+        }
         _ => Ok(None),
     }
 }

@@ -36,6 +36,9 @@ pub enum Error {
         /// Their product.
         cells: f64,
     },
+    /// The search for the torus nearest to a phase field.
+    #[error("no Clifford torus fits: {0}")]
+    NoCliffordTorus(&'static str),
     /// A number is outside the range in which the formula makes sense.
     #[error("{name} = {value:?} is not allowed: it must be {requirement}")]
     InvalidParameter {

@@ -57,6 +57,7 @@ mod transfer;
 mod up;
 mod vector;
 
+mod clifford;
 pub mod contour;
 pub mod distance;
 pub mod exact;
@@ -66,6 +67,7 @@ pub mod npy;
 pub mod shapes;
 pub mod vti;
 
+pub use clifford::CliffordTorus;
 pub use distance::{Rotation, SignedDistance, SignedDistanceExt};
 pub use error::Error;
 pub use field::Field;

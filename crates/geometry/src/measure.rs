@@ -44,6 +44,20 @@ pub fn mean<const D: usize>(u: &Field<D>) -> f64 {
     reduce::sum(v.len(), |i| v[i]) / v.len() as f64
 }
 
+/// Whether there is an interface at all.
+pub fn has_interface<const D: usize>(u: &Field<D>) -> bool {
+    let inside = u.values().iter().filter(|u| **u > 0.0).count();
+    inside > 0 && inside < u.grid().len()
+}
+
+/// Whether a node at the side of the box is not outside.
+pub fn touches_side<const D: usize>(u: &Field<D>) -> bool {
+    const OUTSIDE: f64 = -0.5;
+    let grid = u.grid();
+    let at_side = |node: usize| grid.multi_index(node).contains(&0);
+    (u.values().iter().enumerate()).any(|(node, u)| *u > OUTSIDE && at_side(node))
+}
+
 /// Perimeter `P_eps[u] = 1/2 integral of eps |grad u|^2 + Psi(u)/eps`, `Psi(u) = 9/16 (1-u^2)^2`.
 ///
 /// For phase fields it tends to the length (area in 3D) of the interface as `eps -> 0`; at a

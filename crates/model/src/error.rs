@@ -15,17 +15,23 @@ pub enum Error {
         /// The run's ratios.
         run: Ratios,
     },
-    /// No shipped network has these ratios.
+    /// No shipped network fits.
     #[error(
-        "no trained network for {wanted}; available: {available}. Choose one of these ratios, or train one with \
-         `cargo run -p experiments --bin train_networks`"
+        "no network of the {recipe} recipe for {wanted}; there are {available}. Choose one of these interface widths, or train a network: \
+         willmore train --dimension {} --width {} --eps-over-h {} --step-over-h2 {} --save FILE.safetensors, and give it by --network",
+        wanted.dimension, wanted.width, wanted.eps_over_h, wanted.step_over_h2
     )]
-    NotFound {
-        /// What the run needs.
-        wanted: String,
+    MissingNetwork {
+        /// How the networks are trained.
+        recipe: &'static str,
+        /// What is needed.
+        wanted: Ratios,
         /// What there is.
         available: String,
     },
+    /// A file with a network was given, and no case has a learned operator.
+    #[error("no run of these methods needs a network")]
+    NetworkNotNeeded,
     /// The kernel does not fit on the grid.
     #[error(
         "the kernel is {width} cells wide, but the grid has only {cells}; use a larger box or a finer grid"

@@ -2,14 +2,14 @@
 //!
 //! ```
 //! use geometry::{Grid, exact::mean_curvature_radius, measure::l2_distance, phase_field, shapes::Ball};
-//! use model::{MeanCurvatureOperator, Ratios, pretrained};
+//! use model::{MeanCurvatureOperator, Ratios, Shipped};
 //! use operators::ComputeDevice;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // One step of mean curvature flow of a disc, at h = 1/128 with eps = 2 h and tautilde = h^2.
 //! let grid = Grid::<2>::per_unit(128, 1.0)?;
 //! let (eps, step) = (2.0 * grid.spacing(), grid.spacing().powi(2));
-//! let network = pretrained::find(Ratios::of_run(2, 17, grid.spacing(), eps, step))?;
+//! let network = Shipped::Paper.find(Ratios::of_run(2, 17, grid.spacing(), eps, step))?;
 //!
 //! let device = ComputeDevice::default_compiled()?;
 //! let operator = MeanCurvatureOperator::<2>::new(&network, &device)?;
@@ -28,8 +28,8 @@
 //! `K` is a convolution kernel of odd width `n_K` and `F: R -> R` a perceptron `1-32-16-8-4-2-1` ([`Mlp`]), trained so that
 //! shrinking spheres follow mean curvature flow (Bretin, Denis, Masnou and Terii, J. Comput. Phys. 470,
 //! 2022; the form used by Rumpf, Sassen and Smoch, eq:mcf_operator_discrete). The operator depends only on the ratios `eps / h` and
-//! `tautilde / h^2` ([`Ratios`]), so one network serves every grid that has them. [`pretrained::find`] returns the shipped
-//! ones.
+//! `tautilde / h^2` ([`Ratios`]), so one network serves every grid that has them. [`Networks`]
+//! chooses among the user's and the shipped ones.
 //!
 //! # Training
 //!
@@ -48,8 +48,9 @@ pub mod calibration;
 mod error;
 mod mlp;
 mod network;
+mod networks;
 mod operator;
-pub mod pretrained;
+mod pretrained;
 mod quality;
 mod ratios;
 mod store;
@@ -59,6 +60,8 @@ pub use calibration::{Calibration, Factors, PlanarStep, calibrate, normals};
 pub use error::Error;
 pub use mlp::{Mlp, PAPER_LAYERS, TABLE, forward, parameter_count};
 pub use network::{Network, Provenance};
+pub use networks::{NamedNetwork, NeededNetwork, Networks};
 pub use operator::MeanCurvatureOperator;
+pub use pretrained::Shipped;
 pub use quality::{Quality, REFERENCE_RADII, displacement_errors};
 pub use ratios::Ratios;

@@ -1,6 +1,7 @@
 //! A trained operator: kernel, activation, and the ratios it was trained for.
 
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 use crate::{Calibration, Error, Mlp, Ratios};
 
@@ -113,6 +114,17 @@ impl Network {
     /// How it came to be.
     pub fn provenance(&self) -> &Provenance {
         &self.provenance
+    }
+
+    /// SHA-256 of the numbers, in hexadecimal: two networks with the same act alike.
+    pub fn fingerprint(&self) -> String {
+        let mut bytes = self.ratios.to_string().into_bytes();
+        for width in self.activation.layers() {
+            bytes.extend(width.to_le_bytes());
+        }
+        let numbers = self.kernel.iter().chain(self.activation.parameters());
+        bytes.extend(numbers.flat_map(|value| value.to_le_bytes()));
+        format!("{:x}", Sha256::digest(bytes))
     }
 
     /// The calibration stored with the weights, if there is one.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{Error, Network, Ratios};
+use crate::{Error, NeededNetwork, Network, Networks, Ratios};
 
 macro_rules! shipped {
     ($($name:literal),* $(,)?) => {
@@ -11,7 +11,7 @@ macro_rules! shipped {
 }
 
 /// File names and contents. `train_networks` in the experiments package makes these files.
-const SHIPPED: &[(&str, &[u8])] = shipped![
+const PAPER: &[(&str, &[u8])] = shipped![
     "d2_k17_eps2_step1.safetensors",
     "d2_k33_eps4_step4.safetensors",
     "d2_k65_eps8_step16.safetensors",
@@ -29,66 +29,58 @@ const ACCURATE: &[(&str, &[u8])] = shipped![
     "accurate_d3_k17_eps2_step1.safetensors",
 ];
 
-/// The name under which a network with these ratios is shipped.
-pub fn file_name(ratios: Ratios) -> String {
-    let Ratios {
-        dimension,
-        width,
-        eps_over_h,
-        step_over_h2,
-    } = ratios;
-    format!("d{dimension}_k{width}_eps{eps_over_h}_step{step_over_h2}.safetensors")
+impl Ratios {
+    /// The name under which a network of the paper's recipe with these ratios is shipped.
+    pub fn file_name(self) -> String {
+        let Self {
+            dimension,
+            width,
+            eps_over_h,
+            step_over_h2,
+        } = self;
+        format!("d{dimension}_k{width}_eps{eps_over_h}_step{step_over_h2}.safetensors")
+    }
 }
 
-/// All shipped networks of the paper's recipe with their file names.
-///
-/// # Errors
-/// [`Error::Weights`] if a file in the program is damaged.
-pub fn all() -> Result<Vec<(&'static str, Network)>, Error> {
-    read(SHIPPED)
+/// The networks of a recipe that ship with the library.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shipped {
+    /// The paper's recipe.
+    Paper,
+    /// The accurate recipe ([`crate::training::least_squares`]), whose activations are odd.
+    Accurate,
 }
 
-/// All shipped networks of the accurate recipe ([`crate::training::least_squares`]) with their file names.
-///
-/// # Errors
-/// [`Error::Weights`] if a file in the program is damaged.
-pub fn all_accurate() -> Result<Vec<(&'static str, Network)>, Error> {
-    read(ACCURATE)
-}
+impl Shipped {
+    /// All of them with their file names.
+    ///
+    /// # Errors
+    /// [`Error::Weights`] if a file in the program is damaged.
+    pub fn all(self) -> Result<Vec<(&'static str, Network)>, Error> {
+        let files = match self {
+            Self::Paper => PAPER,
+            Self::Accurate => ACCURATE,
+        };
+        files
+            .iter()
+            .map(|(name, data)| Ok((*name, Network::from_bytes(data, Path::new(name))?)))
+            .collect()
+    }
 
-/// The shipped network of the paper's recipe with these ratios.
-///
-/// # Errors
-/// [`Error::NotFound`] naming the ratios wanted and those available.
-pub fn find(wanted: Ratios) -> Result<Network, Error> {
-    one_of(all()?, wanted)
-}
+    /// The one with these ratios.
+    ///
+    /// # Errors
+    /// [`Error::MissingNetwork`] naming the ratios wanted and those available.
+    pub fn find(self, wanted: Ratios) -> Result<Network, Error> {
+        let named = Networks::default().find(self, &NeededNetwork::exactly(wanted))?;
+        Ok(named.network)
+    }
 
-/// The shipped network of the accurate recipe with these ratios; its activation is odd.
-///
-/// # Errors
-/// [`Error::NotFound`] naming the ratios wanted and those available.
-pub fn find_accurate(wanted: Ratios) -> Result<Network, Error> {
-    one_of(all_accurate()?, wanted)
-}
-
-fn read(files: &[(&'static str, &[u8])]) -> Result<Vec<(&'static str, Network)>, Error> {
-    files
-        .iter()
-        .map(|(name, data)| Ok((*name, Network::from_bytes(data, Path::new(name))?)))
-        .collect()
-}
-
-fn one_of(all: Vec<(&'static str, Network)>, wanted: Ratios) -> Result<Network, Error> {
-    let available: Vec<String> = all
-        .iter()
-        .map(|(_, n)| format!("({})", n.ratios()))
-        .collect();
-    all.into_iter()
-        .map(|(_, network)| network)
-        .find(|network| network.ratios().matches(&wanted))
-        .ok_or_else(|| Error::NotFound {
-            wanted: wanted.to_string(),
-            available: available.join(", "),
-        })
+    /// Name of the recipe in messages.
+    pub(crate) fn recipe(self) -> &'static str {
+        match self {
+            Self::Paper => "paper's",
+            Self::Accurate => "accurate",
+        }
+    }
 }

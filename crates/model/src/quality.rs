@@ -217,13 +217,13 @@ fn radial_asymmetry(network: &Network) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pretrained;
+    use crate::Shipped;
 
     /// The same function with `w` forty times as large: beyond the table, but not worse.
     #[test]
     fn losses_hold_beyond_the_table_of_the_activation() {
         const SCALE: f64 = 40.0;
-        let (_, network) = pretrained::all().unwrap().remove(0);
+        let (_, network) = Shipped::Paper.all().unwrap().remove(0);
         let device = ComputeDevice::default_compiled().unwrap();
         let mut data =
             SphereData::new(network.ratios(), network.provenance().reference_cells).unwrap();

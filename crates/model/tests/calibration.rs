@@ -2,7 +2,7 @@
 
 use faer::{Col, Mat};
 use model::calibration::{Calibration, PlanarStep, calibrate, solve};
-use model::{Error, Mlp, Network, PAPER_LAYERS, Ratios, parameter_count, pretrained};
+use model::{Error, Mlp, Network, PAPER_LAYERS, Ratios, Shipped, parameter_count};
 
 /// An explicit step of the Allen-Cahn equation along an axis, `u + t (u'' - Psi'(u) / (2 eps^2))`, with the mobility and the
 /// forcing of choice. Its derivative is symmetric, so that `psi = w'`, and it takes the curvature `force / mobility` for flat.
@@ -124,7 +124,7 @@ fn steps_without_an_interface_at_rest_are_refused_with_the_eigenvalue() {
     let ratios = ratios(2, 17, 2.0, 1.0);
     let count = parameter_count(&PAPER_LAYERS);
     let activation = Mlp::new(PAPER_LAYERS.to_vec(), vec![0.1; count]).unwrap();
-    let trained = pretrained::find(ratios).unwrap();
+    let trained = Shipped::Paper.find(ratios).unwrap();
     let provenance = trained.provenance().clone();
     let untrained = Network::new(ratios, trained.kernel().to_vec(), activation, provenance);
     let error = untrained.unwrap().calibration().unwrap_err();
@@ -162,7 +162,7 @@ fn close(a: &Calibration, b: &Calibration, tolerance: f64) -> bool {
 
 #[test]
 fn shipped_networks_carry_their_calibration() {
-    for (name, network) in pretrained::all().unwrap() {
+    for (name, network) in Shipped::Paper.all().unwrap() {
         let stored = *network.stored_calibration().expect(name);
         let found = network.calibrate().unwrap();
         assert!(close(&stored, &found, 1e-8), "{name}: {stored:?} {found:?}");
@@ -184,7 +184,7 @@ fn shipped_networks_carry_their_calibration() {
 
 #[test]
 fn networks_of_the_accurate_recipe_carry_theirs_and_are_nearly_exact() {
-    for (name, network) in pretrained::all_accurate().unwrap() {
+    for (name, network) in Shipped::Accurate.all().unwrap() {
         let ratios = network.ratios();
         let stored = *network.stored_calibration().expect(name);
         if ratios.width < 65 {
@@ -219,7 +219,7 @@ fn networks_of_the_accurate_recipe_carry_theirs_and_are_nearly_exact() {
 #[test]
 fn the_factor_is_the_square_of_the_displacement_but_for_the_angle_between_the_null_vectors() {
     // A is nearly parallel to w', so c = displacement^2 m cos^2 up to the rest of A.
-    for (name, network) in pretrained::all().unwrap() {
+    for (name, network) in Shipped::Paper.all().unwrap() {
         let c = network.calibration().unwrap();
         let product = c.displacement.powi(2) * c.factors.metric * c.alignment;
         assert!(
@@ -231,7 +231,7 @@ fn the_factor_is_the_square_of_the_displacement_but_for_the_angle_between_the_nu
 
 #[test]
 fn odd_parts_have_the_same_factors_and_no_spontaneous_curvature() {
-    for (name, network) in pretrained::all().unwrap() {
+    for (name, network) in Shipped::Paper.all().unwrap() {
         if network.ratios().width > 17 {
             continue; // the same code path, many times the time
         }
@@ -250,7 +250,7 @@ fn odd_parts_have_the_same_factors_and_no_spontaneous_curvature() {
 
 #[test]
 fn files_with_and_without_a_calibration_are_read() {
-    let (_, network) = pretrained::all().unwrap().remove(0);
+    let (_, network) = Shipped::Paper.all().unwrap().remove(0);
     let path = std::path::Path::new("network.safetensors");
     for network in [network.clone().with_calibration(None), network] {
         let data = network.to_bytes().unwrap();

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use model::training::SphereData;
-use model::{Error, Network, Quality, Ratios, pretrained};
+use model::{Error, Network, Quality, Ratios, Shipped};
 use operators::ComputeDevice;
 
 /// Bounds of the loss on the reference radii, for both phases.
@@ -14,10 +14,10 @@ fn bounds(ratios: Ratios) -> (f64, f64) {
 #[test]
 fn shipped_networks_reach_their_quality() {
     let device = ComputeDevice::default_compiled().unwrap();
-    let networks = pretrained::all().unwrap();
+    let networks = Shipped::Paper.all().unwrap();
     assert_eq!(networks.len(), 5);
     for (name, network) in networks {
-        assert_eq!(name, pretrained::file_name(network.ratios()));
+        assert_eq!(name, network.ratios().file_name());
         let cells = network.provenance().reference_cells;
         let data = SphereData::new(network.ratios(), cells).unwrap();
         let quality = Quality::measure(&network, &data, 8, &device).unwrap();
@@ -40,17 +40,11 @@ fn shipped_networks_reach_their_quality() {
 #[test]
 fn accurate_networks_treat_both_phases_alike() {
     let device = ComputeDevice::default_compiled().unwrap();
-    let networks = pretrained::all_accurate().unwrap();
+    let networks = Shipped::Accurate.all().unwrap();
     assert_eq!(networks.len(), 6);
     for (name, network) in networks {
-        assert_eq!(
-            name,
-            format!("accurate_{}", pretrained::file_name(network.ratios()))
-        );
-        assert_eq!(
-            pretrained::find_accurate(network.ratios()).unwrap(),
-            network
-        );
+        assert_eq!(name, format!("accurate_{}", network.ratios().file_name()));
+        assert_eq!(Shipped::Accurate.find(network.ratios()).unwrap(), network);
         let activation = network.activation();
         for w in [-1.3, -0.6, 0.0, 0.2, 1.0] {
             assert!(
@@ -74,7 +68,7 @@ fn accurate_networks_treat_both_phases_alike() {
 #[test]
 fn losses_in_the_metadata_are_those_of_the_weights() {
     let device = ComputeDevice::default_compiled().unwrap();
-    for (name, network) in pretrained::all().unwrap() {
+    for (name, network) in Shipped::Paper.all().unwrap() {
         let provenance = network.provenance();
         if provenance.reference_cells > 256 || network.ratios().dimension > 2 {
             continue; // the same code path, many times the time
@@ -101,16 +95,17 @@ fn find_names_what_is_wanted_and_available() {
         eps_over_h: 3.0,
         step_over_h2: 1.0,
     };
-    let message = pretrained::find(wanted).unwrap_err().to_string();
+    let message = Shipped::Paper.find(wanted).unwrap_err().to_string();
     assert!(
-        message.contains("eps/h = 3") && message.contains("n_K = 65"),
+        message.contains("eps/h = 3") && message.contains("eps/h = 8"),
         "{message}"
     );
-    let network = pretrained::find(Ratios {
-        eps_over_h: 2.0,
-        ..wanted
-    })
-    .unwrap();
+    let network = Shipped::Paper
+        .find(Ratios {
+            eps_over_h: 2.0,
+            ..wanted
+        })
+        .unwrap();
     let mismatch = network.check_fits(wanted).unwrap_err();
     assert!(matches!(mismatch, Error::Mismatch { .. }));
     let message = mismatch.to_string();
@@ -121,7 +116,7 @@ fn find_names_what_is_wanted_and_available() {
 }
 
 fn sample() -> Network {
-    pretrained::all().unwrap().remove(0).1
+    Shipped::Paper.all().unwrap().remove(0).1
 }
 
 #[test]

@@ -40,6 +40,7 @@
     allow(dead_code, unused_macros, unused_imports)
 )]
 
+pub mod memory;
 pub mod slices;
 
 mod composed;

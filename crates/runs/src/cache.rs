@@ -52,14 +52,6 @@ impl Cache {
         Ok(())
     }
 
-    /// Removes one part, if it is there.
-    pub fn forget(&self, name: &str) {
-        if let Ok(path) = self.path(name) {
-            // Nothing to remove is as good.
-            let _ = fs::remove_file(path);
-        }
-    }
-
     /// Removes the folder with all its parts, after the final results have been written.
     pub fn remove(self) -> Result<(), Error> {
         fs::remove_dir_all(&self.folder).map_err(files::Error::of("remove", self.folder))?;

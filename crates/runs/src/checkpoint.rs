@@ -65,18 +65,6 @@ impl State {
         found.map(|(_, values)| values.as_slice())
     }
 
-    /// Takes an array out.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] if there is none of that name.
-    pub fn take_array(&mut self, name: &str) -> Result<Vec<f64>, Error> {
-        let found = self.arrays.iter().position(|(other, _)| other == name);
-        match found {
-            Some(i) => Ok(self.arrays.remove(i).1),
-            None => Err(self.refused(&format!("it has no array {name:?}"))),
-        }
-    }
-
     pub(crate) fn refused(&self, reason: &str) -> Error {
         let step = self.step;
         Error::Invalid(format!("the state of step {step} cannot be used: {reason}"))

@@ -141,8 +141,9 @@ impl RunDirectory {
     /// Replaces `timings.json`, the one file that may differ between two runs of the same
     /// computation: wall times and the like, 4 MiB at most. It stands outside of the commits, and a
     /// crash leaves the old one or the new one.
-    pub fn write_timings(&mut self, timings: &Value) -> Result<(), Error> {
-        self.replace_timings(timings)
+    pub fn write_timings(&self, timings: &Value) -> Result<(), Error> {
+        let text = timings::encode(timings)?;
+        self.store(names::TIMINGS, |out| out.write_all(text.as_bytes()))
     }
 
     /// Makes all that was written so far, and this state, what the run is resumed from. The last two
@@ -208,11 +209,6 @@ impl RunDirectory {
         let path = self.path.join(name);
         make_folders_on(&*self.storage, path.parent().unwrap_or(&self.path))?;
         Ok(files::write_atomically_on(&*self.storage, path, write)?)
-    }
-
-    pub(crate) fn replace_timings(&self, timings: &Value) -> Result<(), Error> {
-        let text = timings::encode(timings)?;
-        self.store(names::TIMINGS, |out| out.write_all(text.as_bytes()))
     }
 
     /// The seal of a file, which then lasts.

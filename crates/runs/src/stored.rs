@@ -31,15 +31,7 @@ impl RunDirectory {
     /// [`Error::Damaged`] with the file, and the step from which [`RunDirectory::recover`] would go
     /// on.
     pub fn open(path: impl Into<PathBuf>) -> Result<StoredRun, Error> {
-        Self::open_on(Arc::new(Disk), path)
-    }
-
-    /// [`RunDirectory::open`] on another storage than the disk itself.
-    pub fn open_on(
-        storage: Arc<dyn Storage>,
-        path: impl Into<PathBuf>,
-    ) -> Result<StoredRun, Error> {
-        StoredRun::find(storage, path.into(), false)
+        StoredRun::find_on(Arc::new(Disk), path, false)
     }
 
     /// Opens a damaged run at the newest commit all of whose files are intact: the last one if
@@ -47,21 +39,22 @@ impl RunDirectory {
     /// came later is given up when the run is resumed, and computed again to the same bits. As
     /// [`RunDirectory::open`] if no commit is intact.
     pub fn recover(path: impl Into<PathBuf>) -> Result<StoredRun, Error> {
-        Self::recover_on(Arc::new(Disk), path)
-    }
-
-    /// [`RunDirectory::recover`] on another storage than the disk itself.
-    pub fn recover_on(
-        storage: Arc<dyn Storage>,
-        path: impl Into<PathBuf>,
-    ) -> Result<StoredRun, Error> {
-        StoredRun::find(storage, path.into(), true)
+        StoredRun::find_on(Arc::new(Disk), path, true)
     }
 }
 
-#[expect(clippy::missing_errors_doc, reason = "all give Error::Io alone")]
+#[expect(
+    clippy::missing_errors_doc,
+    reason = "said where runs are opened; all others give Error::Io alone"
+)]
 impl StoredRun {
-    fn find(storage: Arc<dyn Storage>, path: PathBuf, recover: bool) -> Result<Self, Error> {
+    /// [`RunDirectory::open`], or [`RunDirectory::recover`], on another storage than the disk itself.
+    pub fn find_on(
+        storage: Arc<dyn Storage>,
+        path: impl Into<PathBuf>,
+        recover: bool,
+    ) -> Result<Self, Error> {
+        let path = path.into();
         // Before there is a lock file in somebody's folder.
         commits(&path)?;
         let lock = lock::lock(&*storage, &path)?;
@@ -166,7 +159,7 @@ impl StoredRun {
     /// removed.
     fn give_up_checkpoints(&self) -> Result<(), Error> {
         if self.recovered {
-            self.run.replace_timings(&self.timings)?;
+            self.run.write_timings(&self.timings)?;
         }
         let folder = self.run.path.join(names::CHECKPOINTS);
         self.remove(|path| path.starts_with(&folder))?;

@@ -14,7 +14,7 @@ use crate::toy::{
     self, FILES, Quick, STEPS, Toy, contents, run_to, state_at, uninterrupted, write_contents,
 };
 use files::{Disk, Storage};
-use runs::{Error, Interrupt, RunDirectory};
+use runs::{Error, Interrupt, RunDirectory, StoredRun};
 
 /// Fails at operation `at`, and also at all later ones if the process is to count as dead.
 #[derive(Debug)]
@@ -109,7 +109,7 @@ fn survives(
     if let Err(error) = &result {
         let message = error.to_string();
         assert!(!message.contains('\n') && message.len() > 20, "{message}");
-        match RunDirectory::open_on(Arc::new(Quick), folder) {
+        match StoredRun::find_on(Arc::new(Quick), folder, false) {
             Ok(stored) => {
                 let step = stored.state().step;
                 // The commit that failed may have failed after it was done.

@@ -53,7 +53,7 @@ impl Fixture {
 
     /// Errors name the file, or one that it lists.
     fn open(&self) -> Result<StoredRun, Error> {
-        let opened = RunDirectory::open_on(Arc::new(Quick), &self.folder);
+        let opened = StoredRun::find_on(Arc::new(Quick), &self.folder, false);
         if let Err(error) = &opened {
             let folder = self.folder.to_str().unwrap();
             assert!(error.to_string().contains(folder), "{error}");
@@ -191,7 +191,7 @@ fn fuzzing_changed_timings_are_refused() {
         |bytes| run.read_timings(bytes),
         |bytes, stored| {
             let timings = stored.timings().clone();
-            let (mut resumed, _) = stored.resume().unwrap();
+            let (resumed, _) = stored.resume().unwrap();
             resumed.write_timings(&timings).unwrap();
             let text = fs::read(run.folder.join("timings.json")).unwrap();
             assert_eq!(text, bytes);

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use files::Storage;
-use runs::{Error, Interrupt, RunDirectory, State};
+use runs::{Error, Interrupt, RunDirectory, State, StoredRun};
 use serde_json::json;
 use tempfile::TempDir;
 
@@ -97,9 +97,9 @@ pub struct Toy<'a> {
 
 /// Starts or resumes the toy, commits every 3 steps and writes a field every 10.
 pub fn run(folder: &Path, toy: &Toy) -> Result<(), Error> {
-    let mut opened = RunDirectory::open_on(toy.storage.clone(), folder);
+    let mut opened = StoredRun::find_on(toy.storage.clone(), folder, false);
     if toy.recover && matches!(opened, Err(Error::Damaged { .. })) {
-        opened = RunDirectory::recover_on(toy.storage.clone(), folder);
+        opened = StoredRun::find_on(toy.storage.clone(), folder, true);
     }
     let (mut run, mut state) = match opened {
         Ok(stored) if stored.is_finished() => return stored.tidy(),

@@ -102,11 +102,24 @@ pub struct FlowState<const D: usize> {
     pub time: f64,
 }
 
+impl<const D: usize> FlowState<D> {
+    /// A flow of which nothing is known but where it is.
+    pub fn new(current: Field<D>, step: usize, time: f64) -> Self {
+        Self {
+            current,
+            previous: None,
+            half_motions: Vec::new(),
+            step,
+            time,
+        }
+    }
+}
+
 /// Willmore flow of a phase field by minimizing movements (def:minProblem).
 ///
 /// ```
 /// use geometry::{Grid, phase_field, shapes::Ball};
-/// use model::pretrained;
+/// use model::Shipped;
 /// use operators::ComputeDevice;
 /// use solver::{Factors, FlowParams, NewtonParams, WillmoreFlow};
 ///
@@ -119,7 +132,7 @@ pub struct FlowState<const D: usize> {
 ///     newton: NewtonParams::default(),
 ///     calibration: Factors::PAPER,
 /// };
-/// let network = pretrained::find(params.ratios(&grid, 17))?;
+/// let network = Shipped::Paper.find(params.ratios(&grid, 17))?;
 /// let disc = phase_field(grid, &Ball::<2>::new([0.0, 0.0], 0.2)?, params.eps)?;
 /// let mut flow = WillmoreFlow::with_network(&network, &disc, params, &device)?;
 /// let record = flow.advance(params.mcf_step)?;

@@ -2,7 +2,7 @@
 //!
 //! ```
 //! use geometry::{Grid, exact::willmore_radius, measure::l2_distance, phase_field, shapes::Ball};
-//! use model::pretrained;
+//! use model::Shipped;
 //! use operators::ComputeDevice;
 //! use solver::{Factors, FlowParams, NewtonParams, WillmoreFlow};
 //!
@@ -16,7 +16,7 @@
 //!     newton: NewtonParams::default(),
 //!     calibration: Factors::PAPER,
 //! };
-//! let network = pretrained::find(params.ratios(&grid, 17))?;
+//! let network = Shipped::Paper.find(params.ratios(&grid, 17))?;
 //! let disc = |radius| phase_field(grid, &Ball::<2>::new([0.0, 0.0], radius)?, params.eps);
 //!
 //! let mut flow = WillmoreFlow::with_network(&network, &disc(0.2)?, params, &device)?;

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use crate::common::{ball, device, network, params};
 use geometry::measure::{l2_distance, zero_set_volume};
 use geometry::{Field, Grid, exact};
-use model::{Calibration, Network, Ratios, pretrained};
+use model::{Calibration, Network, Ratios, Shipped};
 use solver::{Error, Factors, FlowParams, WillmoreFlow};
 
 /// A radius of the reference experiment, `2^-4 pi`.
@@ -68,7 +68,7 @@ fn the_same_network_flows_along_the_exact_solution_once_calibrated() {
 
 #[test]
 fn the_accurate_operator_keeps_to_a_circle_within_twelve_ten_thousandths() {
-    let network = pretrained::find_accurate(network().ratios()).unwrap();
+    let network = Shipped::Accurate.find(network().ratios()).unwrap();
     let factors = network.calibration().unwrap().factors;
     for phase in [1.0, -1.0] {
         let found = errors(&network, RADIUS, phase, factors);
@@ -188,7 +188,7 @@ fn energies_of_spheres_are_as_predicted() {
         eps_over_h: 2.0,
         step_over_h2: 1.0,
     };
-    let network = pretrained::find(ratios).unwrap();
+    let network = Shipped::Paper.find(ratios).unwrap();
     let calibration = network.calibration().unwrap();
     let grid = Grid::<3>::centred(64, 1.0).unwrap();
     for (calibration, expected) in [

@@ -4,7 +4,7 @@ use crate::common::{device, network, params};
 use geometry::measure::l2_distance;
 use geometry::shapes::Cross;
 use geometry::{Field, Grid, phase_field};
-use model::{Network, Ratios, pretrained};
+use model::{Network, Ratios, Shipped};
 use solver::{Error, Factors, FlowParams, NewtonParams, StartKind, StepRecord, WillmoreFlow};
 
 const EPS: f64 = 1.0 / 64.0;
@@ -36,7 +36,7 @@ fn ratios(n: usize, width: usize) -> Ratios {
 }
 
 fn accurate(n: usize, width: usize) -> Network {
-    pretrained::find_accurate(ratios(n, width)).unwrap()
+    Shipped::Accurate.find(ratios(n, width)).unwrap()
 }
 
 fn cross() -> Field<2> {
@@ -190,7 +190,7 @@ fn networks_decide_how_far_down_it_goes() {
 /// The calibrated scheme with the network of the paper's recipe: below, an accurate one would have another relaxed profile.
 #[test]
 fn below_the_odd_part_of_a_network_of_the_papers_is_another() {
-    let whole = pretrained::find(ratios(256, 33)).unwrap();
+    let whole = Shipped::Paper.find(ratios(256, 33)).unwrap();
     let (odd, params) = (whole.odd_part(), scales(&whole));
     let work = |half: bool| -> f64 {
         let mut flow = WillmoreFlow::with_network(&odd, &cross(), params, &device()).unwrap();

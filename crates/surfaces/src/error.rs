@@ -31,6 +31,9 @@ pub enum Error {
     /// Grids, fields and the operating system.
     #[error(transparent)]
     Geometry(#[from] geometry::Error),
+    /// A shape or a region that cannot be built from its description.
+    #[error("{0}")]
+    Shape(String),
     /// A mesh without faces.
     #[error("the mesh has no faces; a surface needs at least four")]
     NoFaces,

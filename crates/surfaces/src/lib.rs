@@ -66,6 +66,7 @@ mod mesh;
 mod normals;
 mod read;
 pub mod samples;
+pub mod shapes;
 mod signs;
 mod smoothing;
 mod triangle;

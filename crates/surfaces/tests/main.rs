@@ -6,6 +6,7 @@ mod distances;
 mod files;
 mod fuzzing;
 mod isosurfaces;
+mod shapes;
 
 #[global_allocator]
 static ALLOCATOR: ::fuzzing::CountingAllocator = ::fuzzing::CountingAllocator;

@@ -37,6 +37,7 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| ARMADILLO_FLOW.run(&options.flow, |_, _| Ok(Remarks::default())))
+    harness::main(|options: &Options| {
+        ARMADILLO_FLOW.run(&options.flow, |_, _| Ok(Remarks::default()))
+    })
 }

@@ -6,23 +6,22 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use engine::{
-    Case, Flow, NamedNetwork, Operator, Record, Run, Scales, Scheme, StepRule, Stop, checksum,
-};
+use engine::{Operator, Record, Run, Scales, Scheme, StepRule};
 use experiments::networks::{EPS, STEP};
 use experiments::options::RunOptions;
 use experiments::session::Session;
+use experiments::surfaces::willmore_flow;
 use experiments::{Error, harness};
 use fem::FiniteElementStep;
 use geometry::measure::zero_set_volume;
 use geometry::shapes::{Ball, Torus};
 use geometry::{Field, Grid, phase_field};
 use model::training::SphereData;
-use model::{Calibration, Network, displacement_errors, pretrained};
+use model::{Calibration, NamedNetwork, Network, Shipped, displacement_errors};
 use operators::ComputeDevice;
-use report::Summary;
 use report::{
     Axis, Colour, Figure, Format, LineChart, LineStyle, Marker, OutputDir, Progress, Series, Table,
+    Tabulated,
 };
 use serde::Serialize;
 use serde_json::json;
@@ -71,24 +70,22 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
+    harness::main(program)
 }
 
 fn program(options: &Options) -> Result<(), Error> {
     let run = &options.run;
     let networks = options.networks()?;
     let device = run.open_device()?;
-    let checksums = networks.iter().map(|(name, one)| (name, checksum(one)));
+    let checksums = networks.iter().map(|(name, one)| (name, one.fingerprint()));
     let [eps, inner_step] = DISC_SCALES;
     let parameters = json!({
         "networks": checksums.collect::<BTreeMap<_, _>>(),
         "eps": eps,
         "inner_step": inner_step,
         "time_step": STEP_RATIO * inner_step,
-        "quick": run.quick,
     });
-    let mut session = Session::open(PROGRAM, run, device.clone(), &parameters)?;
+    let mut session = Session::open(PROGRAM, run, device.clone(), parameters)?;
     let install = (options.install.as_ref())
         .map(OutputDir::create)
         .transpose()?;
@@ -118,23 +115,15 @@ fn program(options: &Options) -> Result<(), Error> {
     output.write_json("discs.json", &discs)?;
     output.write_csv("discs.csv", &discs)?;
     output.write_csv("surfaces.csv", &surfaces)?;
-    let mut tables = Vec::new();
-    for (table, name) in [
-        (calibration_table(&all)?, "calibration"),
-        (discs_table(&discs)?, "discs_table"),
-        (surfaces_table(&surfaces)?, "surfaces_table"),
-    ] {
-        table.write(output, name)?;
-        tables.push(table.to_markdown());
-    }
-    let mut summary = Summary::new();
+    calibration_table(&mut session, &all)?;
+    session.table(discs_table(&discs), "discs_table")?;
+    session.table(surfaces_table(&surfaces), "surfaces_table")?;
     for one in &all {
         let (key, calibration) = (one.key(), &one.calibration);
-        summary.insert_record(key, calibration)?;
-        summary.insert_record(key, &calibration.factors)?;
+        session.summary.insert_record(key, calibration)?;
+        session.summary.insert_record(key, &calibration.factors)?;
     }
-    let title = "Calibration of the learned operators and of finite elements";
-    session.finish(title, summary, &tables.join("\n"))
+    session.finish("Calibration of the learned operators and of finite elements")
 }
 
 impl Options {
@@ -143,10 +132,10 @@ impl Options {
         let mut networks = Vec::new();
         for path in &self.network {
             let network = Network::load(path)?;
-            networks.push((pretrained::file_name(network.ratios()), network));
+            networks.push((network.ratios().file_name(), network));
         }
         if networks.is_empty() {
-            let shipped = [pretrained::all()?, pretrained::all_accurate()?].concat();
+            let shipped = [Shipped::Paper.all()?, Shipped::Accurate.all()?].concat();
             networks.extend(
                 shipped
                     .into_iter()
@@ -197,21 +186,13 @@ fn relaxed<const D: usize>(
     };
     let mut operator = Operator::learned(Scheme::Paper, network)?;
     operator.factors = calibration;
-    let case = Case {
-        shape: "surface at rest".to_owned(),
-        initial: initial.clone(),
-        region: None,
-        flow: Flow::Willmore,
-        operator,
-        scales: Scales {
-            eps,
-            mcf_step,
-            newton: NewtonParams::default(),
-        },
-        steps: StepRule::Constant(STEP_RATIO * mcf_step).into(),
-        stops: vec![Stop::Steps(1)],
-        measures: Vec::new(),
+    let scales = Scales {
+        eps,
+        mcf_step,
+        newton: NewtonParams::default(),
     };
+    let time = (StepRule::Constant(STEP_RATIO * mcf_step), 1);
+    let case = willmore_flow("surface at rest", initial.clone(), operator, scales, time);
     let mut run = Run::new(case, device)?;
     let energy = run.step()?.and_then(Record::willmore_energy);
     Ok((energy.unwrap_or(f64::NAN), run.field().clone()))
@@ -248,17 +229,10 @@ fn discs(
         };
         variants.push((n, false, one.clone()));
         if !one.name.starts_with("accurate") {
-            let network = one.network.odd_part();
-            let (name, calibration) = (one.name.clone(), network.calibrate()?);
-            variants.push((
-                n,
-                true,
-                Calibrated {
-                    name,
-                    network,
-                    calibration,
-                },
-            ));
+            let mut odd = one.clone();
+            odd.network = one.network.odd_part();
+            odd.calibration = odd.network.calibrate()?;
+            variants.push((n, true, odd));
         }
     }
     let mut tasks = Vec::new();
@@ -314,7 +288,7 @@ fn disc_energy(
     Ok(energy * (area / PI).sqrt() / PI)
 }
 
-fn discs_table(discs: &[DiscRow]) -> report::Result<Table> {
+fn discs_table(discs: &[DiscRow]) -> Tabulated<'_, DiscRow> {
     let fixed = Format::Fixed(4);
     Table::of(discs)
         .text("network", |r| &r.network)
@@ -324,7 +298,6 @@ fn discs_table(discs: &[DiscRow]) -> report::Result<Table> {
         .number("w R/π", fixed, |r| r.measured)
         .number("predicted", fixed, |r| r.predicted)
         .number("calibrated w R/π", fixed, |r| r.calibrated)
-        .finish()
 }
 
 /// Measured and predicted energies over the radius; colour: phase.
@@ -413,14 +386,13 @@ fn surfaces(
     Ok(rows)
 }
 
-fn surfaces_table(rows: &[SurfaceRow]) -> report::Result<Table> {
+fn surfaces_table(rows: &[SurfaceRow]) -> Tabulated<'_, SurfaceRow> {
     let fixed = Format::Fixed(4);
     Table::of(rows)
         .text("network", |r| &r.network)
         .text("surface", |r| &r.surface)
         .number("w / exact", fixed, |r| r.measured)
         .number("calibrated w / exact", fixed, |r| r.calibrated)
-        .finish()
 }
 
 /// What tells good networks from bad ones.
@@ -528,7 +500,7 @@ fn elements() -> Result<Vec<(String, Calibration)>, Error> {
     Ok(all)
 }
 
-fn calibration_table(all: &[Calibrated]) -> Result<Table, Error> {
+fn calibration_table(session: &mut Session<'_>, all: &[Calibrated]) -> Result<(), Error> {
     let learned = all.iter().map(|one| (one.name.clone(), one.calibration));
     let rows: Vec<(String, Calibration)> = learned.chain(elements()?).collect();
     let (fixed, small) = (Format::Fixed(4), Format::Scientific(1));
@@ -543,5 +515,5 @@ fn calibration_table(all: &[Calibrated]) -> Result<Table, Error> {
         .number("eigenvalue - 1", small, |(_, c)| c.eigenvalue - 1.0)
         .number("spread over positions", small, |(_, c)| c.position_spread)
         .number("spread over normals", small, |(_, c)| c.normal_spread);
-    Ok(table.finish()?)
+    session.table(table, "calibration")
 }

@@ -13,7 +13,9 @@ use experiments::training::{NetworkSpec, Trainer, training_device};
 use experiments::{Error, harness, look};
 use model::training::levenberg_marquardt::LmParams;
 use operators::ComputeDevice;
-use report::{Axis, Figure, Format, LineChart, Marker, OutputDir, Series, Summary, Table};
+use report::{
+    Axis, Cell, Figure, Format, LineChart, Marker, OutputDir, Series, Summary, Table, Tabulated,
+};
 use runs::Cache;
 use serde_json::json;
 use solver::StepRecord;
@@ -59,8 +61,7 @@ impl Options {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
+    harness::main(program)
 }
 
 fn program(options: &Options) -> Result<(), Error> {
@@ -93,9 +94,8 @@ fn program(options: &Options) -> Result<(), Error> {
         "time_step": STEP,
         "networks": study.checksums(),
         "retrained": options.retrain,
-        "quick": run.quick,
     });
-    let mut session = Session::open(PROGRAM, run, device, &parameters)?;
+    let mut session = Session::open(PROGRAM, run, device, parameters)?;
     let finished = Cache::open(session.output.as_path().join("partial"))?;
     let mut ensembles = Vec::new();
     for planned in &study.plan {
@@ -115,14 +115,10 @@ fn program(options: &Options) -> Result<(), Error> {
     };
     report.figures(&session)?;
     report.data(&session.output)?;
-    let table = report.table()?;
-    table.write(&session.output, "errors")?;
+    session.table(report.table(), "errors")?;
+    report.summarize(&mut session.summary)?;
     finished.remove()?;
-    session.finish(
-        "Mean L2 distance to the exact solution",
-        report.summary()?,
-        &table.to_markdown(),
-    )
+    session.finish("Mean L2 distance to the exact solution")
 }
 
 /// Trains the networks of all resolutions, and says where they are.
@@ -135,28 +131,21 @@ fn retrained(
     let mut cells = options.study.cells();
     cells.retain(|n| variants.iter().any(|v| v.method.is_learned() && v.n == *n));
     if cells.is_empty() {
-        return Err(engine::Error::NetworkNotNeeded.into());
+        return Err(model::Error::NetworkNotNeeded.into());
     }
     let (device, output) = (training_device(device)?, run.open_output(PROGRAM)?);
     let (folder, progress) = (output.subfolder("networks")?, run.progress());
-    let checkpoints = Cache::open(output.as_path().join("checkpoints"))?;
-    let trainer = Trainer {
-        device: &device,
-        checkpoints: &checkpoints,
-        progress: &progress,
-        seed: run.seed,
-        quick: run.quick,
-    };
+    let trainer = Trainer::open(run, &device, &output, &progress, false)?;
     let mut network = Vec::new();
     for n in cells {
         let ratios = convergence_ratios(n)?;
         let spec = NetworkSpec::new(format!("n{n}"), ratios, n);
         let trained = trainer.train(&spec, "lm", &LmParams::new(run.quick))?;
-        let path = folder.path(&model::pretrained::file_name(ratios))?;
+        let path = folder.path(&ratios.file_name())?;
         trained.network.save(&path)?;
         network.push(path);
     }
-    checkpoints.remove()?;
+    trainer.checkpoints.remove()?;
     Ok(NetworkOptions { network })
 }
 
@@ -194,20 +183,19 @@ impl Report {
     }
 
     fn figures(&self, session: &Session<'_>) -> Result<(), Error> {
-        let two = |title: &str, charts: [LineChart; 2]| {
-            Figure::new(title, 2)
-                .with_panels(charts)
-                .with_shared_legend()
-        };
         let last = time(self.steps);
-        let title = format!("Error on circles at t = {last:.4} over the radius");
-        session.figure(
-            two("Error on circles over time", self.over_time()).with_note(self.circles()),
-            "convergence",
-        )?;
-        session.figure(two(&title, self.over_radius()), "error_over_radius")?;
-        let title = "Work per step of Willmore flow, mean over the circles";
-        session.figure(two(title, self.work()), "work_per_step")?;
+        let over_time = "Error on circles over time".to_owned();
+        let over_radius = format!("Error on circles at t = {last:.4} over the radius");
+        let work = "Work per step of Willmore flow, mean over the circles".to_owned();
+        for (title, charts, stem) in [
+            (over_time, self.over_time(), "convergence"),
+            (over_radius, self.over_radius(), "error_over_radius"),
+            (work, self.work(), "work_per_step"),
+        ] {
+            let mut figure = Figure::new(title, 2).with_panels(charts);
+            figure.note = (stem == "convergence").then(|| self.circles());
+            session.figure(figure.with_shared_legend(), stem)?;
+        }
         session.figure(self.cost(), "error_over_cost")
     }
 
@@ -298,51 +286,33 @@ impl Report {
     }
 
     fn data(&self, output: &OutputDir) -> Result<(), Error> {
-        let errors = ["step", "time", "l2_mean", "l2_min", "l2_max"];
-        let mut curves = Table::data(Variant::COLUMNS.iter().chain(&errors));
-        let single = ["radius", "step", "time", "l2"];
-        let mut circles = Table::data(Variant::COLUMNS.iter().chain(&single));
+        let table = |columns: &[&'static str]| Table::data(Variant::COLUMNS.iter().chain(columns));
+        let mut curves = table(&["step", "time", "l2_mean", "l2_min", "l2_max"]);
+        let mut circles = table(&["radius", "step", "time", "l2"]);
         let mut runs = Vec::new();
         for e in &self.ensembles {
             for k in 0..=self.steps {
                 let [least, most] = e.error_range(k);
-                let row = [
-                    k.into(),
-                    time(k).into(),
-                    e.mean_error(k).into(),
-                    least.into(),
-                    most.into(),
-                ];
-                curves.push(e.variant.cells().into_iter().chain(row))?;
+                let errors = [time(k), e.mean_error(k), least, most].map(Cell::from);
+                let row = e.variant.cells().into_iter().chain([k.into()]);
+                curves.push(row.chain(errors))?;
             }
             for circle in &e.circles {
                 for k in self.shown_steps() {
-                    let row = [
-                        circle.radius.into(),
-                        k.into(),
-                        time(k).into(),
-                        circle.error(k).into(),
-                    ];
-                    circles.push(e.variant.cells().into_iter().chain(row))?;
+                    let errors = [time(k), circle.error(k)].map(Cell::from);
+                    let row = (e.variant.cells().into_iter()).chain([circle.radius.into()]);
+                    circles.push(row.chain([k.into()]).chain(errors))?;
                 }
             }
-            runs.extend(
-                e.circles
-                    .iter()
-                    .filter(|_| e.variant.flow == Flow::Willmore)
-                    .map(|circle| Rows {
-                        leading: (e.variant.cells().into_iter().skip(1))
-                            .chain([circle.radius.into()])
-                            .collect(),
-                        start: None,
-                        records: &circle.records,
-                    }),
-            );
+            if e.variant.flow == Flow::Willmore {
+                runs.extend(e.circles.iter().map(|circle| Rows {
+                    leading: [&e.variant.cells()[1..], &[circle.radius.into()]].concat(),
+                    start: None,
+                    records: &circle.records,
+                }));
+            }
         }
-        let leading: Vec<&str> = (Variant::COLUMNS[1..].iter().copied())
-            .chain(["radius"])
-            .collect();
-        let steps = steps::table(&leading, &runs)?;
+        let steps = steps::table(&[&Variant::COLUMNS[1..], &["radius"]].concat(), &runs)?;
         output.write("curves.json", curves.to_json()?)?;
         output.write("steps.json", steps.to_json()?)?;
         for (name, table) in [("curves", curves), ("circles", circles), ("steps", steps)] {
@@ -351,7 +321,7 @@ impl Report {
         Ok(())
     }
 
-    fn table(&self) -> Result<Table, Error> {
+    fn table(&self) -> Tabulated<'_, Ensemble> {
         let mut table = Table::of(&self.ensembles)
             .text("flow", |e| e.variant.flow.title())
             .number("n", Format::Shortest, |e| e.variant.n)
@@ -360,11 +330,10 @@ impl Report {
             table = table.number(format!("step {k}"), Format::Fixed(5), |e| e.mean_error(k));
         }
         let hvp = |e: &Ensemble| e.mean_of_steps(StepRecord::hvp);
-        Ok(table.number("HVP/step", Format::Fixed(1), hvp).finish()?)
+        table.number("HVP/step", Format::Fixed(1), hvp)
     }
 
-    fn summary(&self) -> Result<Summary, Error> {
-        let mut summary = Summary::new();
+    fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
         for e in &self.ensembles {
             let key = e.key();
             for k in self.shown_steps() {
@@ -393,6 +362,6 @@ impl Report {
                 summary.insert(&format!("{}.scale", flow.key()), scale)?;
             }
         }
-        Ok(summary)
+        Ok(())
     }
 }

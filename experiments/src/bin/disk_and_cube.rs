@@ -75,8 +75,7 @@ impl Options {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
+    harness::main(program)
 }
 
 fn program(options: &Options) -> Result<(), Error> {
@@ -110,9 +109,9 @@ fn program(options: &Options) -> Result<(), Error> {
     ];
     let parameters = setting.parameters(json!({
         "tau": TAU, "steps": steps, "variants": variants, "cube_half_side": half, "disk_radius": radius,
-        "disk_half_height": half_height, "quick": run.quick,
+        "disk_half_height": half_height,
     }))?;
-    let session = Session::open(PROGRAM, run, device, &parameters)?;
+    let session = Session::open(PROGRAM, run, device, parameters)?;
     let flows = SurfaceFlows {
         program: PROGRAM,
         title: "Willmore flow of a cube and of a thick disk".to_owned(),

@@ -30,15 +30,15 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options.run))
+    harness::main(|options: &Options| program(&options.run))
 }
 
 fn program(options: &RunOptions) -> Result<(), Error> {
     let (used, steps) = if options.quick { (3, 2) } else { (4, STEPS) };
-    let parameters = json!({ "half_axes": HALF_AXES, "side": SIDE, "steps": steps, "tolerance": TOLERANCE, "quick": options.quick });
+    let parameters =
+        json!({ "half_axes": HALF_AXES, "side": SIDE, "steps": steps, "tolerance": TOLERANCE });
     let device = options.open_device()?;
-    let mut session = Session::open("ellipse_orders", options, device, &parameters)?;
+    let mut session = Session::open("ellipse_orders", options, device, parameters)?;
     let mut run = |size: f64, n: usize, parts: usize| {
         let operator = Chosen::default().operator((Method::Hybrid, Scheme::Accurate), n)?;
         let initial = phase_field(Grid::per_unit(n, SIDE)?, &Ellipse::new(HALF_AXES)?, EPS)?;

@@ -3,15 +3,15 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use engine::{NeededNetwork, Operator, Scales, StepRule};
+use engine::{Operator, Scales, StepRule};
 use experiments::inpainting::{self, Inpainted, InpaintingOptions, Shape};
 use experiments::session::Session;
 use experiments::{Error, harness};
 use geometry::contour::{Interpolation, zero_level};
 use geometry::shapes::{Ball, Cross, Cuboid};
 use geometry::{Field, Grid, SignedDistanceExt};
-use model::Ratios;
-use report::{Colour, Curve, Figure, Rgb, Shapes, Summary};
+use model::{NeededNetwork, Ratios};
+use report::{Colour, Curve, Figure, Rgb, Shapes};
 use solver::{NewtonParams, Precision};
 
 const PROGRAM: &str = "inpainting_2d";
@@ -97,8 +97,7 @@ fn shapes(options: &Options) -> Result<Vec<Shape<2>>, Error> {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
+    harness::main(program)
 }
 
 fn program(options: &Options) -> Result<(), Error> {
@@ -124,8 +123,8 @@ fn program(options: &Options) -> Result<(), Error> {
     if shapes.iter().any(|shape| shape.steps == 0) {
         return Err(Error::Options("--disk-steps must be at least 1".to_owned()));
     }
-    let parameters = inpainting::parameters((n, &scales), &operator, &shapes, run.quick);
-    let mut session = Session::open(PROGRAM, run, device, &parameters)?;
+    let parameters = inpainting::parameters((n, &scales), &operator, &shapes);
+    let mut session = Session::open(PROGRAM, run, device, parameters)?;
     let mut trajectories = Vec::new();
     for shape in &shapes {
         let case = shape.case(grid, scales, &operator)?;
@@ -138,7 +137,7 @@ fn program(options: &Options) -> Result<(), Error> {
     for one in &inpainted {
         one.write_frames(&session, frames(one, n)?)?;
     }
-    inpainting::finish(session, "Inpainting", Summary::new(), &inpainted)
+    inpainting::finish(session, "Inpainting", &inpainted)
 }
 
 /// The shapes over time, D outlined in green.

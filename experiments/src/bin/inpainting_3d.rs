@@ -11,7 +11,7 @@ use experiments::{Error, harness};
 use geometry::shapes::{Ball, Cuboid, Cylinder};
 use geometry::{SignedDistance, SignedDistanceExt, UpAxis};
 use render::{Rgb, Tube};
-use report::{Figure, Summary};
+use report::Figure;
 
 const PROGRAM: &str = "inpainting_3d";
 const TITLE: &str = "Inpainting of surfaces";
@@ -109,8 +109,7 @@ fn growing(papers: usize) -> StepRule {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
+    harness::main(program)
 }
 
 fn program(options: &Options) -> Result<(), Error> {
@@ -128,8 +127,8 @@ fn program(options: &Options) -> Result<(), Error> {
     } = setting;
     let operator = setting.operator((Method::Hybrid, options.common.scheme))?;
     let (shapes, azimuths): (Vec<_>, Vec<_>) = shapes(options)?.into_iter().unzip();
-    let parameters = inpainting::parameters((n, &scales), &operator, &shapes, run.quick);
-    let mut session = Session::open(PROGRAM, run, device, &parameters)?;
+    let parameters = inpainting::parameters((n, &scales), &operator, &shapes);
+    let mut session = Session::open(PROGRAM, run, device, parameters)?;
     let mut flowed = Vec::new();
     for (shape, azimuth) in shapes.iter().zip(azimuths) {
         let surface = Surface {
@@ -145,10 +144,10 @@ fn program(options: &Options) -> Result<(), Error> {
         let case = shape.case(grid, scales, &operator)?;
         flowed.push(surface.flow(case, &mut session)?);
     }
-    table(&flowed)?.write(&session.output, "shapes")?;
-    let (mut summary, mut inpainted) = (Summary::new(), Vec::new());
+    table(&mut session, &flowed, "shapes")?;
+    let mut inpainted = Vec::new();
     for (shape, one) in shapes.iter().zip(&mut flowed) {
-        one.summarize_shapes(shape.key, &mut summary)?;
+        one.summarize_shapes(shape.key, &mut session.summary)?;
         let measured = Inpainted::measure(shape, &one.trajectory)?;
         decorate(&mut one.snapshots, &measured);
         let (output, title) = (&session.output, format!("{}: pictures", shape.title));
@@ -157,7 +156,7 @@ fn program(options: &Options) -> Result<(), Error> {
         measured.write_frames(&session, figure.with_note(note(&measured, n)))?;
         inpainted.push(measured);
     }
-    inpainting::finish(session, TITLE, summary, &inpainted)
+    inpainting::finish(session, TITLE, &inpainted)
 }
 
 /// Draws the region, and tells the time and the distance to the whole shape.

@@ -5,15 +5,15 @@ use std::f64::consts::{PI, SQRT_2, TAU};
 use std::process::ExitCode;
 
 use clap::Parser;
-use engine::{NeededNetwork, Scheme, checksum};
+use engine::Scheme;
 use experiments::networks::NetworkOptions;
 use experiments::options::RunOptions;
 use experiments::session::Session;
 use experiments::training::{NetworkSpec, held_out_radii};
 use experiments::{Error, harness, quality};
 use model::training::levenberg_marquardt::{heat_kernel, splitting_activation};
-use model::{Network, Quality};
-use report::{Axis, Colour, Figure, Heatmap, LineChart, LineStyle, Marker, Series, Summary, Table};
+use model::{NeededNetwork, Network, Quality};
+use report::{Axis, Colour, Figure, Heatmap, LineChart, LineStyle, Marker, Series, Table};
 use serde::Serialize;
 use serde_json::json;
 
@@ -31,8 +31,7 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
+    harness::main(program)
 }
 
 fn program(options: &Options) -> Result<(), Error> {
@@ -47,13 +46,12 @@ fn program(options: &Options) -> Result<(), Error> {
         .map(|need| Ok(chosen.find(Scheme::Paper, need)?.network));
     let networks: Vec<Network> = found.collect::<Result<_, Error>>()?;
     let names = specs.iter().map(|spec| &spec.name);
-    let checksums: BTreeMap<_, _> = names.zip(networks.iter().map(checksum)).collect();
+    let checksums: BTreeMap<_, _> = names
+        .zip(networks.iter().map(Network::fingerprint))
+        .collect();
     let held_out_radii = held_out_radii(run.quick);
-    let parameters =
-        json!({"networks": checksums, "held_out_radii": held_out_radii, "quick": run.quick});
-    let mut session = Session::open(PROGRAM, run, device.clone(), &parameters)?;
-    let mut summary = Summary::new();
-
+    let parameters = json!({"networks": checksums, "held_out_radii": held_out_radii});
+    let mut session = Session::open(PROGRAM, run, device.clone(), parameters)?;
     let bar = session.progress.bar("held-out losses", specs.len() as u64);
     let mut shown = Vec::new();
     for (spec, network) in specs.iter().zip(&networks) {
@@ -61,7 +59,7 @@ fn program(options: &Options) -> Result<(), Error> {
         let quality = session.phase(format!("quality of {}", spec.name), || {
             Ok(Quality::measure(network, &data, held_out_radii, &device)?)
         })?;
-        summary.insert_record(&spec.name, &quality)?;
+        session.summary.insert_record(&spec.name, &quality)?;
         shown.push(Shown::new(spec, network, &heat_kernel(&data), quality));
         bar.inc(1);
     }
@@ -85,14 +83,8 @@ fn program(options: &Options) -> Result<(), Error> {
         .collect();
     output.write_json("networks.json", &origins)?;
     let table = Table::of(&shown).text("network", |one| &one.spec.name);
-    let table = quality::columns(table, |one| &one.quality);
-    let table = table.finish()?;
-    table.write(output, "quality")?;
-    session.finish(
-        "Quality of the learned operators",
-        summary,
-        &table.to_markdown(),
-    )
+    session.table(quality::columns(table, |one| &one.quality), "quality")?;
+    session.finish("Quality of the learned operators")
 }
 
 /// A network with the curves that show it.

@@ -10,13 +10,13 @@ use experiments::options::RunOptions;
 use experiments::products::Candidates;
 use experiments::session::Session;
 use experiments::timing::{self, Columns, Numbers, Timed};
-use experiments::{Error, harness, memory, surfaces};
+use experiments::{Error, harness, surfaces};
 use geometry::measure::l2_distance;
 use geometry::shapes::{Ball, Capsule, Cuboid};
 use geometry::{Field, Grid, SignedDistanceExt, phase_field};
-use operators::{ComputeDevice, DeviceKind};
+use operators::{ComputeDevice, DeviceKind, memory};
 use report::{
-    Axis, Colour, Figure, Format, LegendEntry, LineChart, LineStyle, Marker, Series, Summary, Table,
+    Axis, Colour, Figure, Format, LegendEntry, LineChart, LineStyle, Marker, Series, Table,
 };
 use serde::Serialize;
 use serde_json::json;
@@ -100,8 +100,7 @@ const PRODUCTS: &Columns = &[
 ];
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
+    harness::main(program)
 }
 
 fn program(options: &Options) -> Result<(), Error> {
@@ -127,9 +126,8 @@ fn program(options: &Options) -> Result<(), Error> {
     needs.push(surfaces::needed_network());
     let networks = options.networks.load(&needs)?;
     let turns = if quick { 0.05 } else { options.turns };
-    let parameters =
-        json!({ "turns": turns, "quick": quick, "threads": rayon::current_num_threads() });
-    let mut session = Session::open(PROGRAM, run, device, &parameters)?;
+    let parameters = json!({ "turns": turns, "threads": rayon::current_num_threads() });
+    let mut session = Session::open(PROGRAM, run, device, parameters)?;
     let mut all = Vec::new();
     for &n in planes {
         let operator = networks.operator((Method::Hybrid, Scheme::Paper), n)?;
@@ -151,22 +149,19 @@ fn program(options: &Options) -> Result<(), Error> {
         all.push(Measurement::of(name, &case, &mut session, turns, false)?);
     }
     let steps = Table::of(&all).text("shape", |m| format!("{}, n = {}", m.case, m.n));
-    let steps = timing::with_columns(steps.text("grid", Measurement::grid), STEPS, |m| &m.steps)
-        .finish()?;
+    let steps = timing::with_columns(steps.text("grid", Measurement::grid), STEPS, |m| &m.steps);
+    session.table(steps, "steps")?;
     let products = Table::of(&all).text("grid", Measurement::grid);
-    let products = timing::with_columns(products, PRODUCTS, |m| &m.products).finish()?;
-    steps.write(&session.output, "steps")?;
-    products.write(&session.output, "products")?;
-    let mut summary = Summary::new();
+    let products = timing::with_columns(products, PRODUCTS, |m| &m.products);
+    session.table(products, "products")?;
+    let summary = &mut session.summary;
     for m in &all {
-        timing::summarize(&mut summary, &format!("{}.n{}", m.case, m.n), &m.steps)?;
-        timing::summarize(&mut summary, &format!("hvp.{}", m.grid()), &m.products)?;
+        timing::summarize(summary, &format!("{}.n{}", m.case, m.n), &m.steps)?;
+        timing::summarize(summary, &format!("hvp.{}", m.grid()), &m.products)?;
     }
     session.output.write_json("performance.json", &all)?;
     session.figure(figure(&all), "performance")?;
-    let report = format!("{}\n{}", steps.to_markdown(), products.to_markdown());
-    let title = "Willmore steps by the hybrid scheme on this machine";
-    session.finish(title, summary, &report)
+    session.finish("Willmore steps by the hybrid scheme on this machine")
 }
 
 /// A cube of side 1/2, or a body with arms: a ball with three capsules through it.

@@ -5,13 +5,12 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use engine::StepRule;
-use experiments::clifford::CliffordTorus;
 use experiments::mesh_flow::{MeshFlow, MeshFlowOptions};
 use experiments::meshes::KnownMesh;
 use experiments::session::Session;
 use experiments::surfaces::{Flowed, Remarks, View};
 use experiments::{Error, harness};
-use geometry::UpAxis;
+use geometry::{CliffordTorus, UpAxis};
 use render::Tube;
 
 const ROCKER_ARM_FLOW: MeshFlow = MeshFlow {
@@ -53,8 +52,7 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| ROCKER_ARM_FLOW.run(&options.flow, clifford_tori))
+    harness::main(|options: &Options| ROCKER_ARM_FLOW.run(&options.flow, clifford_tori))
 }
 
 /// Finds the Clifford torus nearest to the last shape of each run, and draws it there.
@@ -69,18 +67,19 @@ fn clifford_tori(session: &mut Session<'_>, all: &mut [Flowed]) -> Result<Remark
         let case = &one.trajectory.case;
         let last = one.trajectory.field(one.trajectory.steps())?;
         let title = format!("Clifford torus, {}", one.label());
-        let torus = session.phase(title, || CliffordTorus::nearest(&last, case.scales.eps))?;
+        let torus = session.phase(title, || {
+            Ok(CliffordTorus::nearest(&last, case.scales.eps)?)
+        })?;
         let as_field = torus.phase_field(last.grid(), case.scales.eps)?;
         let w = case.implicit_elements()?.willmore_energy(&as_field)?;
         let CliffordTorus {
             l2, outer_radius, ..
         } = torus;
-        remarks.report = format!(
-            "{}\nNearest Clifford torus, {}: L2 distance {l2:.4} (paper {PAPERS_L2:.4}), outer radius {outer_radius:.3}, w = {w:.2} (paper \
+        remarks.report.push(format!(
+            "Nearest Clifford torus, {}: L2 distance {l2:.4} (paper {PAPERS_L2:.4}), outer radius {outer_radius:.3}, w = {w:.2} (paper \
              {PAPERS_CLIFFORD})",
-            remarks.report,
             one.label()
-        );
+        ));
         let circles = torus.minor_circles(CIRCLES.0, CIRCLES.1)?.into_iter();
         let tube = |circle: Vec<[f64; 3]>| Tube::new(circle, 0.1 * case.scales.eps).closed();
         if let Some(shown) = one.snapshots.last_mut() {

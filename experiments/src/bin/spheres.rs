@@ -88,8 +88,7 @@ fn variants() -> impl Iterator<Item = (Method, Scheme)> {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
+    harness::main(program)
 }
 
 fn program(options: &Options) -> Result<(), Error> {
@@ -101,9 +100,9 @@ fn program(options: &Options) -> Result<(), Error> {
         setting: Setting::new(&options.figure, CELLS, 1.0)?,
         device: device.clone(),
     };
-    let others = json!({ "tau": TAU, "willmore_steps": willmore_steps, "quick": run.quick });
+    let others = json!({ "tau": TAU, "willmore_steps": willmore_steps });
     let parameters = spheres.setting.parameters(others)?;
-    let mut session = Session::open(PROGRAM, run, device, &parameters)?;
+    let mut session = Session::open(PROGRAM, run, device, parameters)?;
     let bar = session.progress.bar("radii".to_owned(), radii.len() as u64);
     let mut all = Vec::new();
     for &radius in radii {
@@ -112,7 +111,8 @@ fn program(options: &Options) -> Result<(), Error> {
         bar.inc(1);
     }
     bar.finish();
-    let mut summary = summary(&all)?;
+    table(&mut session, &all)?;
+    summarize(&mut session.summary, &all)?;
     if !run.quick {
         let (spec, papers) = (NetworkSpec::surfaces(), spheres.setting.operator(PAPERS)?);
         let network = &papers.network().expect("it is learned").network;
@@ -123,10 +123,8 @@ fn program(options: &Options) -> Result<(), Error> {
         let names = Table::of(std::slice::from_ref(&measured)).text("network", |_| &spec.name);
         let losses = quality::columns(names, |measured| measured).finish()?;
         losses.write(&session.output, "quality")?;
-        summary.insert_record(&spec.name, &measured)?;
+        session.summary.insert_record(&spec.name, &measured)?;
     }
-    let table = table(&all)?;
-    table.write(&session.output, "spheres")?;
     session.output.write_json("spheres.json", &all)?;
     let note = format!(
         "n = {}, ε = 2/n, inner step 1/n². Energies by the schemes are those after the steps of Willmore flow, of the relaxed profile.",
@@ -139,7 +137,7 @@ fn program(options: &Options) -> Result<(), Error> {
             .with_note(note),
         "spheres",
     )?;
-    session.finish(TITLE, summary, &table.to_markdown())
+    session.finish(TITLE)
 }
 
 /// What all spheres share.
@@ -222,7 +220,7 @@ impl Spheres {
     }
 }
 
-fn table(all: &[Measurement]) -> Result<Table, Error> {
+fn table(session: &mut Session<'_>, all: &[Measurement]) -> Result<(), Error> {
     let mut table = Table::of(all).number("radius", Format::Fixed(2), |m| m.radius);
     for (k, (method, scheme)) in variants().enumerate() {
         for (j, step) in MCF_STEPS.into_iter().enumerate() {
@@ -243,7 +241,7 @@ fn table(all: &[Measurement]) -> Result<Table, Error> {
             table = table.number(name, Format::Fixed(digits), value);
         }
     }
-    Ok(table.finish()?)
+    session.table(table, "spheres")
 }
 
 /// The curve of a method; markers tell schemes apart where lines are short.
@@ -286,8 +284,7 @@ fn energies(all: &[Measurement]) -> LineChart {
         )
 }
 
-fn summary(all: &[Measurement]) -> Result<Summary, Error> {
-    let mut summary = Summary::new();
+fn summarize(summary: &mut Summary, all: &[Measurement]) -> Result<(), Error> {
     for m in all {
         let sphere = format!("spheres.r{:03.0}", 100.0 * m.radius);
         summary.insert(&format!("{sphere}.w"), m.w_elements)?;
@@ -305,5 +302,5 @@ fn summary(all: &[Measurement]) -> Result<Summary, Error> {
             }
         }
     }
-    Ok(summary)
+    Ok(())
 }

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use engine::{Method, Operator, Scheme, StepRule, checksum};
+use engine::{Method, Operator, Scheme, StepRule};
 use experiments::meshes::{ARMADILLO, MeshOptions};
 use experiments::networks::{Chosen, NetworkOptions, convergence_network};
 use experiments::options::RunOptions;
@@ -18,6 +18,8 @@ use solver::Method as Newton;
 const PROGRAM: &str = "timing_tables";
 /// Time steps of the table, until `t = 2^-7`.
 const STEPS: usize = 128;
+/// Heading of the column with the paper's times.
+const PAPERS: &str = "paper, other machines [s]";
 
 /// Wall time of 128 Willmore steps of the cross (eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7) by the hybrid scheme and by
 /// nested finite elements, taking turns step by step on this machine, with the numbers of Newton steps, Hessian-vector products and
@@ -56,55 +58,47 @@ struct Variant {
 }
 
 const VARIANTS: [Variant; 5] = [
-    row("hybrid", "hybrid", Method::Hybrid, None),
     Variant {
-        newton: Newton::Paper,
-        ..row(
-            "hybrid_plain_newton",
-            "hybrid, plain Newton-CG",
-            Method::Hybrid,
-            Some([122.0, 1020.0]),
-        )
-    },
-    row(
-        "fe_implicit",
-        "FE implicit, FFT-CG inside",
-        Method::FeImplicit,
-        None,
-    ),
-    Variant {
-        linear: LinearSolver::Direct,
-        ..row(
-            "fe_implicit_direct",
-            "FE implicit, Cholesky inside",
-            Method::FeImplicit,
-            Some([4970.0, 28622.0]),
-        )
-    },
-    row(
-        "fe_semi",
-        "FE semi-implicit",
-        Method::FeSemi,
-        Some([4307.0, 22045.0]),
-    ),
-];
-
-/// A row with the usual solvers.
-const fn row(
-    key: &'static str,
-    label: &'static str,
-    method: Method,
-    papers_seconds: Option<[f64; 2]>,
-) -> Variant {
-    Variant {
-        key,
-        label,
-        method,
+        key: "hybrid",
+        label: "hybrid",
+        method: Method::Hybrid,
         newton: Newton::Preconditioned,
         linear: LinearSolver::ConjugateGradients,
-        papers_seconds,
-    }
-}
+        papers_seconds: None,
+    },
+    Variant {
+        key: "hybrid_plain_newton",
+        label: "hybrid, plain Newton-CG",
+        method: Method::Hybrid,
+        newton: Newton::Paper,
+        linear: LinearSolver::ConjugateGradients,
+        papers_seconds: Some([122.0, 1020.0]),
+    },
+    Variant {
+        key: "fe_implicit",
+        label: "FE implicit, FFT-CG inside",
+        method: Method::FeImplicit,
+        newton: Newton::Preconditioned,
+        linear: LinearSolver::ConjugateGradients,
+        papers_seconds: None,
+    },
+    Variant {
+        key: "fe_implicit_direct",
+        label: "FE implicit, Cholesky inside",
+        method: Method::FeImplicit,
+        newton: Newton::Preconditioned,
+        linear: LinearSolver::Direct,
+        papers_seconds: Some([4970.0, 28622.0]),
+    },
+    Variant {
+        key: "fe_semi",
+        label: "FE semi-implicit",
+        method: Method::FeSemi,
+        newton: Newton::Preconditioned,
+        linear: LinearSolver::ConjugateGradients,
+        papers_seconds: Some([4307.0, 22045.0]),
+    },
+];
 
 impl Variant {
     fn papers_seconds(&self, n: usize) -> Option<f64> {
@@ -130,8 +124,7 @@ const COLUMNS: &Columns = &[
 ];
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
+    harness::main(program)
 }
 
 fn program(options: &Options) -> Result<(), Error> {
@@ -148,26 +141,24 @@ fn program(options: &Options) -> Result<(), Error> {
     let networks = options.networks.load(&needs)?;
     let checksums = cells.iter().zip(&needs).map(|(n, needed)| {
         let network = networks.find(Scheme::Paper, needed)?.network;
-        Ok((format!("n{n}"), checksum(&network).into()))
+        Ok((format!("n{n}"), network.fingerprint().into()))
     });
     let parameters = json!({
         "networks": checksums.collect::<Result<serde_json::Map<_, _>, Error>>()?,
         "cells": cells,
         "budget": budget,
         "steps": STEPS,
-        "quick": quick,
     });
-    let mut session = Session::open(PROGRAM, run, device, &parameters)?;
+    let mut session = Session::open(PROGRAM, run, device, parameters)?;
     let mut timings = Vec::new();
     for &n in cells {
         timings.extend(measure(&mut session, &networks, n, budget)?);
     }
     let armadillo = surface_steps(options, &networks, &mut session)?;
 
-    let table = table(&timings)?;
-    table.write(&session.output, "timing")?;
-    let surface_table = surface_table(&armadillo)?;
-    surface_table.write(&session.output, "armadillo")?;
+    table(&mut session, &timings)?;
+    session.remark(run.title("One Willmore step of a surface"));
+    surface_table(&mut session, &armadillo)?;
     let json = timings.iter().map(|t| {
         let (row, seconds) = (t.row.key, t.timed.seconds());
         json!({ "variant": row, "n": t.n, "numbers": t.numbers(), "step_seconds": seconds, "failure": t.failure })
@@ -176,14 +167,8 @@ fn program(options: &Options) -> Result<(), Error> {
         .output
         .write_json("timing.json", &json.collect::<Vec<_>>())?;
     session.figure(figure(&timings), "timing")?;
-    let report = format!(
-        "{}\n{}\n{}",
-        table.to_markdown(),
-        run.title("One Willmore step of a surface"),
-        surface_table.to_markdown()
-    );
-    let title = "128 Willmore steps of the cross: wall time on this machine";
-    session.finish(title, summary(&timings, &armadillo)?, &report)
+    summarize(&mut session.summary, &timings, &armadillo)?;
+    session.finish("128 Willmore steps of the cross: wall time on this machine")
 }
 
 /// All rows at a resolution.
@@ -332,7 +317,7 @@ fn surface_steps(
     })
 }
 
-fn surface_table(steps: &[SurfaceStep]) -> Result<Table, Error> {
+fn surface_table(session: &mut Session<'_>, steps: &[SurfaceStep]) -> Result<(), Error> {
     const COLUMNS: &Columns = &[
         ("one step [s]", Format::Fixed(2), "seconds"),
         ("Newton", Format::Fixed(0), "newton_per_step"),
@@ -342,14 +327,12 @@ fn surface_table(steps: &[SurfaceStep]) -> Result<Table, Error> {
         .text("surface", |s| &s.surface)
         .text("method", |s| s.method.label())
         .number("n", Format::Shortest, |s| s.n);
-    Ok(timing::with_columns(table, COLUMNS, |s| &s.numbers)
-        .number("paper, other machines [s]", Format::Shortest, |s| {
-            s.papers_seconds
-        })
-        .finish()?)
+    let table = timing::with_columns(table, COLUMNS, |s| &s.numbers);
+    let papers = |s: &SurfaceStep| s.papers_seconds;
+    session.table(table.number(PAPERS, Format::Shortest, papers), "armadillo")
 }
 
-fn table(timings: &[Timing]) -> Result<Table, Error> {
+fn table(session: &mut Session<'_>, timings: &[Timing]) -> Result<(), Error> {
     let numbers: Vec<Numbers> = timings.iter().map(Timing::numbers).collect();
     let rows: Vec<(&Timing, Numbers)> = timings.iter().zip(numbers).collect();
     let times = |t: &Timing, k: usize| t.over_hybrid(timings).map(|times| times[k]);
@@ -365,9 +348,8 @@ fn table(timings: &[Timing]) -> Result<Table, Error> {
             |(t, _)| times(t, 1),
         );
     let papers = |(t, _): &(&Timing, Numbers)| t.row.papers_seconds(t.n);
-    Ok(timing::with_columns(table, COLUMNS, |(_, numbers)| numbers)
-        .number("paper, other machines [s]", Format::Shortest, papers)
-        .finish()?)
+    let table = timing::with_columns(table, COLUMNS, |(_, numbers)| numbers);
+    session.table(table.number(PAPERS, Format::Shortest, papers), "timing")
 }
 
 fn figure(timings: &[Timing]) -> Figure {
@@ -403,22 +385,22 @@ fn figure(timings: &[Timing]) -> Figure {
         )
 }
 
-fn summary(timings: &[Timing], armadillo: &[SurfaceStep]) -> Result<Summary, Error> {
-    let mut summary = Summary::new();
+fn summarize(
+    summary: &mut Summary,
+    timings: &[Timing],
+    armadillo: &[SurfaceStep],
+) -> Result<(), Error> {
     for timing in timings.iter().filter(|t| t.usable()) {
         let mut numbers = timing.numbers();
         let factor = timing.over_hybrid(timings);
         numbers.extend(factor.map(|[_, measured]| ("times_hybrid_measured_steps", measured)));
-        timing::summarize(
-            &mut summary,
-            &format!("timing.n{}.{}", timing.n, timing.row.key),
-            &numbers,
-        )?;
+        let key = format!("timing.n{}.{}", timing.n, timing.row.key);
+        timing::summarize(summary, &key, &numbers)?;
     }
     for step in armadillo {
         let key = format!("timing.armadillo.{}", step.method.key());
         summary.insert(&format!("{key}.seconds"), step.numbers["seconds"])?;
         summary.insert(&format!("{key}.hvp"), step.numbers["hvp_on_this_grid"])?;
     }
-    Ok(summary)
+    Ok(())
 }

@@ -8,16 +8,14 @@ use experiments::options::RunOptions;
 use experiments::session::Session;
 use experiments::training::{NetworkSpec, Trainer, training_device};
 use experiments::{Error, harness, quality};
+use model::Network;
 use model::training::adam::AdamParams;
 use model::training::least_squares::LeastSquaresParams;
 use model::training::levenberg_marquardt::LmParams;
 use model::training::{self, CurvePoint, Trained};
-use model::{Network, pretrained};
-use report::Summary;
 use report::{
     Axis, Colour, Figure, LegendEntry, LineChart, LineStyle, Manifest, OutputDir, Series, Table,
 };
-use runs::Cache;
 use serde::Serialize;
 use serde_json::json;
 
@@ -86,8 +84,7 @@ impl Recipe {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    harness::run(|| program(&options))
+    harness::main(program)
 }
 
 fn program(options: &Options) -> Result<(), Error> {
@@ -101,53 +98,42 @@ fn program(options: &Options) -> Result<(), Error> {
         "levenberg_marquardt": settings.lm,
         "adam": settings.adam,
         "accurate": settings.accurate,
-        "quick": run.quick,
     });
-    let mut session = Session::open(PROGRAM, run, device.clone(), &parameters)?;
+    let mut session = Session::open(PROGRAM, run, device.clone(), parameters)?;
     let install = (options.install.as_ref())
         .map(OutputDir::create)
         .transpose()?;
-    let unfinished = session.output.as_path().join("checkpoints");
-    if options.restart {
-        Cache::open(&unfinished)?.remove()?;
-    }
-    let checkpoints = Cache::open(unfinished)?;
     let folder = session.output.subfolder("networks")?;
+    let (output, progress) = (&session.output, &session.progress);
+    let trainer = Trainer::open(run, &device, output, progress, options.restart)?;
     let mut trainings = Trainings {
-        trainer: Trainer {
-            device: &device,
-            checkpoints: &checkpoints,
-            progress: &session.progress,
-            seed: run.seed,
-            quick: run.quick,
-        },
+        trainer,
         manifest: &mut session.manifest,
         chosen: &specs,
         folder: &folder,
         finished: Vec::new(),
     };
     trainings.by(options.recipe, &settings, !options.only.is_empty())?;
-    let all = trainings.finished;
+    let (all, checkpoints) = (trainings.finished, trainings.trainer.checkpoints);
     if let Some(install) = &install {
         for one in all.iter().filter(|one| one.recipe == all[0].recipe) {
             let accurate = one.recipe == Recipe::Accurate;
             one.save(install, if accurate { "accurate_" } else { "" })?;
         }
     }
-    let (table, summary) = write(&all, &session)?;
+    write(&all, &mut session)?;
     checkpoints.remove()?;
-    let folder = folder.as_path().display();
-    let report = format!("{}\nNetworks are in {folder}", table.to_markdown());
-    session.finish("Quality of the trained networks", summary, &report)
+    session.remark(format!("Networks are in {}", folder.as_path().display()));
+    session.finish("Quality of the trained networks")
 }
 
 /// Curves, figure, metrics and table.
-fn write(all: &[Finished], session: &Session<'_>) -> Result<(Table, Summary), Error> {
+fn write(all: &[Finished], session: &mut Session<'_>) -> Result<(), Error> {
     session.figure(figure(all), "learning_curves")?;
     let rows: Vec<CurveRow<'_>> = all.iter().flat_map(Finished::curve).collect();
     session.output.write_csv("learning_curves.csv", &rows)?;
     session.output.write_json("learning_curves.json", &rows)?;
-    let mut summary = Summary::new();
+    let summary = &mut session.summary;
     for one in all {
         let key = match one.recipe {
             Recipe::Lm => format!("train.{}", one.spec.name),
@@ -160,10 +146,10 @@ fn write(all: &[Finished], session: &Session<'_>) -> Result<(Table, Summary), Er
     let table = Table::of(all)
         .text("network", |one| &one.spec.name)
         .text("recipe", Finished::key);
-    let table = quality::columns(table, |one| &one.trained.quality);
-    let table = table.finish()?;
-    table.write(&session.output, "quality")?;
-    Ok((table, summary))
+    session.table(
+        quality::columns(table, |one| &one.trained.quality),
+        "quality",
+    )
 }
 
 /// The settings of every recipe.
@@ -297,7 +283,7 @@ impl Trainings<'_> {
 
 impl Finished {
     fn save(&self, folder: &OutputDir, prefix: &str) -> Result<(), Error> {
-        let name = format!("{prefix}{}", pretrained::file_name(self.spec.ratios));
+        let name = format!("{prefix}{}", self.spec.ratios.file_name());
         Ok(self.trained.network.save(&folder.path(&name)?)?)
     }
 

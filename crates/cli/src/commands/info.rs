@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::process::ExitCode;
 
-use model::pretrained;
+use model::Shipped;
 use operators::{ComputeDevice, DeviceKind};
 use serde_json::json;
 
@@ -32,7 +32,7 @@ pub fn run(say: SayOptions) -> Result<ExitCode, Error> {
         devices
             .push(json!({ "name": kind.name(), "compiled": kind.is_compiled(), "state": state }));
     }
-    let [paper, accurate] = [pretrained::all()?.len(), pretrained::all_accurate()?.len()];
+    let [paper, accurate] = [Shipped::Paper.all()?.len(), Shipped::Accurate.all()?.len()];
     let _ = write!(
         text,
         "

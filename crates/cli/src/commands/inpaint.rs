@@ -1,7 +1,7 @@
 //! `willmore inpaint`.
 
 use engine::StepRule;
-use engine::shapes::Region;
+use surfaces::shapes::Region;
 
 use super::flow::{FlowCommand, Shared};
 use crate::cli::InpaintOptions;

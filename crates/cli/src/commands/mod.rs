@@ -12,8 +12,9 @@ pub mod sample;
 pub mod shell;
 pub mod train;
 
-use engine::{Method, Networks, Operator, Scales, Scheme};
+use engine::{Method, Operator, Scales, Scheme};
 use geometry::Grid;
+use model::Networks;
 use operators::{ComputeDevice, DeviceKind};
 
 use crate::cli::{CommonOptions, SchemeOptions};

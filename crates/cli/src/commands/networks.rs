@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use model::{Network, pretrained};
+use model::{Network, Shipped};
 use serde_json::{Value, json};
 
 use crate::cli::{NetworksCommand, SayOptions};
@@ -12,9 +12,10 @@ use crate::error::Error;
 /// Lists the networks, or shows one.
 pub fn run(show: Option<&NetworksCommand>, say: SayOptions) -> Result<ExitCode, Error> {
     let shipped = || -> Result<Vec<(String, Network)>, Error> {
-        let all = pretrained::all_accurate()?
+        let all = Shipped::Accurate
+            .all()?
             .into_iter()
-            .chain(pretrained::all()?);
+            .chain(Shipped::Paper.all()?);
         Ok(all.map(|(name, network)| (stem(name), network)).collect())
     };
     match show {

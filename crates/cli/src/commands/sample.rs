@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use engine::shapes::Region;
 use geometry::{Field, npy, phase_field, vti};
 use serde_json::json;
+use surfaces::shapes::Region;
 
 use crate::cli::{SampleOptions, SayOptions};
 use crate::error::Error;

@@ -1,10 +1,11 @@
 //! Small cases.
 
 use engine::{
-    Case, Flow, Measure, Method, Networks, Operator, Run, Scales, Scheme, StepRule, Stop, TimeSteps,
+    Case, Flow, Measure, Method, Operator, Run, Scales, Scheme, StepRule, Stop, TimeSteps,
 };
 use geometry::shapes::{Ball, Cuboid};
 use geometry::{Field, Grid, phase_field};
+use model::Networks;
 use operators::ComputeDevice;
 use runs::Interrupt;
 

@@ -16,11 +16,11 @@
 //! planes and several normals.
 //!
 //! ```
-//! use model::{Ratios, pretrained};
+//! use model::{Ratios, Shipped};
 //!
 //! # fn main() -> Result<(), model::Error> {
 //! let ratios = Ratios { dimension: 2, width: 17, eps_over_h: 2.0, step_over_h2: 1.0 };
-//! let calibration = pretrained::find(ratios)?.calibrate()?;
+//! let calibration = Shipped::Paper.find(ratios)?.calibrate()?;
 //! println!("c = {:.4}, m = {:.4}", calibration.factors.energy, calibration.factors.metric);
 //! assert!((calibration.factors.energy - 0.932).abs() < 0.002);
 //! // The left null vector is not the interface's translation, as it would be for a gradient flow.

@@ -137,7 +137,7 @@ mod tests {
     use super::super::planar::{flat_interface, optimal_interface};
     use super::super::{normals, solve};
     use super::*;
-    use crate::pretrained;
+    use crate::Shipped;
 
     fn dot(a: &Col<f64>, b: &Col<f64>) -> f64 {
         a.iter().zip(b.iter()).map(|(a, b)| a * b).sum()
@@ -146,7 +146,7 @@ mod tests {
     /// For a symmetric kernel `psi = K * w'` and `<A, psi> = -<T * w', w'>`, without an eigenvalue problem.
     #[test]
     fn factors_have_a_closed_form_for_symmetric_kernels() {
-        for (name, network) in pretrained::all().unwrap() {
+        for (name, network) in Shipped::Paper.all().unwrap() {
             if network.ratios().width > 17 {
                 continue; // the same code path, many times the time
             }
@@ -178,7 +178,7 @@ mod tests {
 
     #[test]
     fn planes_keep_the_sums_of_the_kernel_and_see_half_its_variance() {
-        for (name, network) in pretrained::all().unwrap() {
+        for (name, network) in Shipped::Paper.all().unwrap() {
             let dimension = network.ratios().dimension;
             for &(normal, _) in normals(dimension) {
                 let step = NetworkOnPlanes::new(&network, normal);

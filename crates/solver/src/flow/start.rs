@@ -2,7 +2,7 @@
 
 use burn::tensor::{Slice, Tensor};
 use geometry::{Field, Grid};
-use model::{Factors, Network, Ratios, pretrained};
+use model::{Factors, Network, Ratios, Shipped};
 use operators::extrapolate;
 use serde::{Deserialize, Serialize};
 
@@ -85,11 +85,13 @@ impl<const D: usize> WillmoreFlow<D> {
         };
         let papers_energy = self.params.calibration == Factors::PAPER;
         let papers_recipe = papers_energy
-            || pretrained::find(network.ratios()).is_ok_and(|n| n.kernel() == network.kernel());
+            || Shipped::Paper
+                .find(network.ratios())
+                .is_ok_and(|n| n.kernel() == network.kernel());
         let found = if papers_recipe {
-            pretrained::find(ratios)
+            Shipped::Paper.find(ratios)
         } else {
-            pretrained::find_accurate(ratios)
+            Shipped::Accurate.find(ratios)
         };
         let Ok(mut network) = found else {
             return Ok(0);

@@ -2,7 +2,7 @@
 use burn::tensor::Tensor;
 use geometry::{Field, Grid, phase_field, shapes::Ball};
 use model::training::{SphereData, levenberg_marquardt::heat_kernel};
-use model::{Network, Ratios, pretrained};
+use model::{Network, Ratios, Shipped};
 use operators::ComputeDevice;
 use solver::{Error, FlowParams, NewtonParams, Objective};
 
@@ -21,7 +21,7 @@ fn ratios(dimension: usize) -> Ratios {
 
 /// The shipped network with `n_K = 17`, `eps = 2h`, `tautilde = h^2`.
 pub fn network() -> Network {
-    pretrained::find(ratios(2)).unwrap()
+    Shipped::Paper.find(ratios(2)).unwrap()
 }
 
 /// A 3D operator that depends on no training in 3D: the heat kernel, with the activation of the 2D network.

@@ -5,9 +5,8 @@ use std::str::FromStr;
 
 use geometry::shapes::{Ball, Cross, Cuboid, Cylinder, Torus};
 use geometry::{SignedDistance, SignedDistanceExt};
-use surfaces::ClosedMesh;
 
-use crate::Error;
+use crate::{ClosedMesh, Error, samples};
 
 /// A box or a ball in the box of the grid, written `box:x0,y0,x1,y1` or `ball:x,y,r`, in 3D with `z`.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,7 +53,7 @@ impl Region {
     /// The signed distance in `D` dimensions.
     ///
     /// # Errors
-    /// [`Error::Options`] if there are too many or too few numbers, or if they enclose nothing.
+    /// [`Error::Shape`] if there are too many or too few numbers, or if they enclose nothing.
     pub fn shape<const D: usize>(&self) -> Result<Box<dyn SignedDistance<D>>, Error> {
         let needed = match self.kind {
             Kind::Box => 2 * D,
@@ -146,7 +145,7 @@ const BUILT_IN: [(&str, bool); 10] = [
 /// The dimension of a built-in shape.
 ///
 /// # Errors
-/// [`Error::Options`] naming those that there are.
+/// [`Error::Shape`] naming those that there are.
 pub fn dimension(name: &str) -> Result<usize, Error> {
     match BUILT_IN.iter().find(|(known, _)| *known == name) {
         Some((_, true)) => Ok(2),
@@ -161,7 +160,7 @@ pub fn dimension(name: &str) -> Result<usize, Error> {
 /// A built-in shape about 0 with the given longest side.
 ///
 /// # Errors
-/// [`Error::Options`] for a name that is none; [`Error::Geometry`] for a side that is not positive.
+/// [`Error::Shape`] for a name that is none; [`Error::Geometry`] for a side that is not positive.
 pub fn built_in(name: &str, side: f64) -> Result<BuiltIn, Error> {
     dimension(name)?;
     let half = 0.5 * side;
@@ -177,61 +176,7 @@ pub fn built_in(name: &str, side: f64) -> Result<BuiltIn, Error> {
         "cube" => BuiltIn::Space(Box::new(Cuboid::new([half; 3])?)),
         "torus" => BuiltIn::Space(Box::new(Torus::new(0.72 * half, 0.28 * half)?)),
         "coin" => BuiltIn::Space(Box::new(Cylinder::new(half, 0.4 * half)?)),
-        "figure" => BuiltIn::Mesh(surfaces::samples::figure(MESH_CELLS)?),
-        _ => BuiltIn::Mesh(surfaces::samples::lever(MESH_CELLS)?),
+        "figure" => BuiltIn::Mesh(samples::figure(MESH_CELLS)?),
+        _ => BuiltIn::Mesh(samples::lever(MESH_CELLS)?),
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn regions_are_read_back_and_measure_distances() {
-        let text = "box:-0.5,-1,0.5,1";
-        let region: Region = text.parse().unwrap();
-        assert_eq!(region.to_string(), text);
-        let shape = region.shape::<2>().unwrap();
-        assert!((shape.signed_distance([0.0, 0.0]) + 0.5).abs() < 1e-15);
-        assert!(region.shape::<3>().is_err());
-        let ball: Region = "ball:0,0,0.5,0.25".parse().unwrap();
-        assert!((ball.shape::<3>().unwrap().signed_distance([0.0; 3]) - 0.25).abs() < 1e-15);
-        for text in [
-            "box",
-            "box:",
-            "ball:1,2,x",
-            "cube:1",
-            "ball:1,nan,1",
-            "box:0,0,inf,1",
-        ] {
-            assert!(text.parse::<Region>().is_err(), "{text:?}");
-        }
-        assert!(
-            "box:1,0,0,1"
-                .parse::<Region>()
-                .unwrap()
-                .shape::<2>()
-                .is_err()
-        );
-        assert!(
-            "ball:0,0,-1"
-                .parse::<Region>()
-                .unwrap()
-                .shape::<2>()
-                .is_err()
-        );
-    }
-
-    #[test]
-    fn built_in_shapes_have_the_side_that_is_asked_for() {
-        for (name, _) in BUILT_IN {
-            let outside = match built_in(name, 0.8).unwrap() {
-                BuiltIn::Plane(shape) => shape.signed_distance([0.4 + 0.1, 0.0]),
-                BuiltIn::Space(shape) => shape.signed_distance([0.4 + 0.1, 0.0, 0.0]),
-                BuiltIn::Mesh(_) => 0.1,
-            };
-            assert!((outside - 0.1).abs() < 1e-12, "{name}: {outside}");
-        }
-        assert!(built_in("teapot", 0.8).is_err());
-    }
 }

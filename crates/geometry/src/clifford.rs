@@ -2,12 +2,12 @@
 
 use std::f64::consts::{PI, SQRT_2};
 
-use geometry::measure::l2_distance;
-use geometry::shapes::Torus;
-use geometry::{Field, Grid, SignedDistance, optimal_profile};
 use serde::Serialize;
 
-use crate::Error;
+use crate::measure::l2_distance;
+use crate::shapes::Torus;
+use crate::vector::{dot, norm, sub};
+use crate::{Error, Field, Grid, SignedDistance, optimal_profile};
 
 /// A Clifford torus in space, fitted to a phase field.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -27,13 +27,12 @@ impl CliffordTorus {
     /// the centre of mass, the volume and each of the coordinate axes.
     ///
     /// # Errors
-    /// [`Error::Options`] if there is no volume inside or the search fails.
+    /// [`Error::NoCliffordTorus`] if there is no volume inside or the search fails.
     pub fn nearest(u: &Field<3>, eps: f64) -> Result<Self, Error> {
-        let failed = |reason: &str| Error::Options(format!("no Clifford torus fits: {reason}"));
         let inside = |u: f64| 0.5 * (1.0 + u.clamp(-1.0, 1.0));
         let sum: f64 = u.values().iter().map(|&u| inside(u)).sum();
         if sum <= 0.0 {
-            return Err(failed("the phase field has no inside"));
+            return Err(Error::NoCliffordTorus("the phase field has no inside"));
         }
         let mut centre = [0.0; 3];
         for (i, &value) in u.values().iter().enumerate() {
@@ -51,7 +50,7 @@ impl CliffordTorus {
         let tori = [0, 1, 2].map(|along| {
             let distance = |parameters: &[f64; 6]| {
                 let torus = Self::near_axis(along, parameters).phase_field(u.grid(), eps)?;
-                Ok::<_, Error>(l2_distance(u, &torus)?)
+                l2_distance(u, &torus)
             };
             // Beyond the positive radii there is no torus, which is no reason to stop.
             let cost = |parameters: &[f64; 6]| distance(parameters).unwrap_or(f64::INFINITY);
@@ -60,7 +59,8 @@ impl CliffordTorus {
             Self { l2, ..torus }
         });
         let fits = tori.into_iter().filter(|torus| torus.l2.is_finite());
-        (fits.min_by(|a, b| a.l2.total_cmp(&b.l2))).ok_or_else(|| failed("the search found none"))
+        (fits.min_by(|a, b| a.l2.total_cmp(&b.l2)))
+            .ok_or(Error::NoCliffordTorus("the search found none"))
     }
 
     /// A torus by its centre, the tilt of its axis from a coordinate axis towards the two others, and its outer radius.
@@ -79,14 +79,14 @@ impl CliffordTorus {
     /// The phase field of the torus.
     ///
     /// # Errors
-    /// [`Error::Geometry`] for a radius that is not positive.
+    /// A radius that is not positive.
     pub fn phase_field(&self, grid: &Grid<3>, eps: f64) -> Result<Field<3>, Error> {
         let torus = Torus::clifford(self.outer_radius)?;
         Ok(Field::from_fn(*grid, |x| {
-            let x: [f64; 3] = std::array::from_fn(|i| x[i] - self.centre[i]);
+            let x = sub(x, self.centre);
             let height = dot(x, self.axis);
             let across: [f64; 3] = std::array::from_fn(|i| x[i] - height * self.axis[i]);
-            let in_its_frame = [dot(across, across).sqrt(), 0.0, height];
+            let in_its_frame = [norm(across), 0.0, height];
             optimal_profile(torus.signed_distance(in_its_frame), eps)
         }))
     }
@@ -94,7 +94,7 @@ impl CliffordTorus {
     /// Circles around the tube, as closed polylines.
     ///
     /// # Errors
-    /// [`Error::Geometry`] for a radius that is not positive.
+    /// A radius that is not positive.
     pub fn minor_circles(&self, count: usize, points: usize) -> Result<Vec<Vec<[f64; 3]>>, Error> {
         let torus = Torus::clifford(self.outer_radius)?;
         let [axis, e, f] = frame_of(self.axis);
@@ -168,12 +168,8 @@ fn nelder_mead<const N: usize>(
     simplex[0]
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
 fn normalized(a: [f64; 3]) -> [f64; 3] {
-    let length = dot(a, a).sqrt();
+    let length = norm(a);
     a.map(|a| a / length)
 }
 
@@ -199,7 +195,6 @@ fn frame_of(axis: [f64; 3]) -> [[f64; 3]; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use geometry::Grid;
 
     #[test]
     fn a_clifford_torus_is_found_in_any_position() {
