@@ -39,7 +39,7 @@ pub enum Command {
     /// Continue an interrupted run, to the same final bytes as if it had not been interrupted
     #[command(after_help = RESUME_EXAMPLES)]
     Resume(ResumeOptions),
-    /// Smooth a noisy mesh, until a time or a Willmore energy, in the mesh's own coordinates
+    /// Take the noise off a mesh: its vertices move, everything else of the file stays
     #[command(after_help = FAIR_EXAMPLES)]
     Fair(FairOptions),
     /// Fill a region of a shape smoothly; everything outside stays bit for bit
@@ -85,8 +85,9 @@ Ctrl-C (exit code 130) leaves a run that `willmore resume DIR` continues.";
 const RESUME_EXAMPLES: &str = "Example:
   willmore resume runs/bunny";
 const FAIR_EXAMPLES: &str = "Examples:
-  willmore fair scan.stl --energy 26 --save smooth.stl
-  willmore fair scan.obj --time 1e-6 --format obj";
+  willmore fair scan.stl --save smooth.stl
+  willmore fair scan.obj --noise 0.2 --keep box:-5,-5,0,5,5,2
+  willmore fair scan.ply --energy-ratio 0.5 --remesh";
 const INPAINT_EXAMPLES: &str = "Examples:
   willmore inpaint photo.png --mask damage.png --steps 40
   willmore inpaint builtin:disc --mask box:0.2,0.2,0.9,0.9 --ansatz empty
@@ -284,19 +285,50 @@ pub struct FairOptions {
     #[serde(flatten)]
     pub flow: FlowOptions,
 
-    /// Format of the mesh in the run's folder
-    #[arg(long, value_name = "NAME", value_enum, default_value_t = MeshFormat::Ply)]
-    pub format: MeshFormat,
+    /// Take off noise of this standard deviation along the normals, in the units of the mesh [default: estimated from the mesh,
+    /// unless --time, --energy, --energy-ratio or --steps says when to stop]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub noise: Option<f64>,
+
+    /// Stop when the Willmore energy is no more than this part of that at the beginning
+    #[arg(long, value_name = "PART", allow_hyphen_values = true)]
+    pub energy_ratio: Option<f64>,
+
+    /// Leave everything in this region where it is: box:x0,y0,z0,x1,y1,z1 or ball:x,y,z,r in the coordinates of the mesh
+    #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
+    pub keep: Option<String>,
+
+    /// Write a new mesh, the zero level set on the grid, in place of the input with its vertices moved
+    #[arg(long)]
+    pub remesh: bool,
+
+    /// Go on even if the grid is too coarse for thin parts of the mesh
+    #[arg(long)]
+    pub allow_loss: bool,
+
+    /// Format of the mesh in the run's folder [default: that of the input]
+    #[arg(long, value_name = "NAME", value_enum)]
+    pub format: Option<MeshFormat>,
 
     /// Write the mesh to this file too: .ply, .obj or .stl
     #[arg(long, value_name = "FILE")]
     pub save: Option<PathBuf>,
+
+    /// Write over the file of --save if it is there
+    #[arg(long)]
+    pub force: bool,
+
+    /// Whether an option other than --noise says when to stop.
+    #[arg(skip)]
+    #[serde(skip)]
+    pub ends: bool,
 }
 
 /// Formats of meshes.
-#[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(ValueEnum, Serialize, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
 pub enum MeshFormat {
+    #[default]
     Ply,
     Obj,
     Stl,

@@ -11,7 +11,8 @@ use surfaces::{ClosedMesh, MeshDistance};
 
 use crate::cli::{Holds, InputOptions, Inside, SayOptions};
 use crate::error::Error;
-use crate::outlet::Space;
+use crate::outlet::{Outlet, Space, Topology};
+use crate::own::OwnMesh;
 
 /// What a run starts from.
 pub struct Start<const D: usize, O> {
@@ -55,6 +56,12 @@ const FEWEST_CELLS: usize = 8;
 const MOST_NODES: f64 = 1e9;
 /// Part of the box that a shape takes: flows make shapes round, and curves grow.
 const PART: f64 = 0.6;
+/// Cells per unit length from which a mesh whose vertices follow the flow gets the first that hold it,
+const OWN_CELLS: [usize; 3] = [128, 160, 192];
+/// and the part of the box that it takes: it moves by little.
+const OWN_PART: f64 = 0.9;
+/// Memory of a flow, measured at 128 and 192 cells.
+const BYTES_PER_NODE: f64 = 300.0;
 /// Largest magnitude in a phase field: flows overshoot the phases a little.
 const LARGEST_PHASE: f64 = 1.1;
 /// Pixels a side of pictures of boxes.
@@ -96,6 +103,89 @@ pub fn load(options: &mut InputOptions, eps_over_h: f64, say: SayOptions) -> Res
         Loaded::Space(start) => check_phases(&start.field, &input)?,
     }
     Ok(loaded)
+}
+
+/// The path of the input if it is the file of a mesh, from wherever the program may run later.
+pub fn mesh_file(options: &mut InputOptions) -> Result<Option<PathBuf>, Error> {
+    let Some(input) = &options.input else {
+        return Ok(None);
+    };
+    Ok(match Source::of(input)? {
+        Source::Mesh(path) => {
+            options.input = Some(path.to_string_lossy().into_owned());
+            Some(path)
+        }
+        _ => None,
+    })
+}
+
+/// A mesh whose vertices follow the flow, on the coarsest grid that holds its parts and holes.
+pub fn load_own(
+    options: &mut InputOptions,
+    own: OwnMesh,
+    path: &Path,
+    (eps_over_h, allow_loss): (f64, bool),
+    say: SayOptions,
+) -> Result<Loaded, Error> {
+    let source = Source::Mesh(path.to_owned());
+    source.refuse_foreign(options)?;
+    let grids = options
+        .cells
+        .map_or(OWN_CELLS.to_vec(), |cells| vec![cells]);
+    let up = surfaces::usual_up_axis(path)?;
+    let mut reader = Reader {
+        name: source.name(),
+        options,
+        eps_over_h,
+        say,
+    };
+    let (mut start, mut found) = (None, Topology::default());
+    for cells in grids {
+        reader.options.cells = Some(cells);
+        let grid = reader.grid::<3>()?;
+        let side = reader.longest(OWN_PART, grid.side())?;
+        let eps = eps_over_h * grid.spacing();
+        let placement = Placement::fit(&own.fairing().start().bounding_box(), &grid, side, 0.0)?;
+        let field = reader.mesh_field(own.fairing().start(), &placement, grid)?;
+        let space = Space::of(&placement, up);
+        // Touching sheets have no topology.
+        found = space.topology(&field, eps).unwrap_or_default();
+        start = Some((field, space, cells));
+        if found == own.topology() {
+            break;
+        }
+    }
+    let Some((field, mut space, cells)) = start else {
+        return Err(Error::options("there is no grid to choose from"));
+    };
+    if found != own.topology() {
+        let thin = 2.0 * field.grid().spacing() * space.unit();
+        let message = format!(
+            "with --cells {cells} parts and gaps thinner than {thin:.3e} ({:.2} % of the longest side) are lost: the mesh has {}, \
+             the grid {found}",
+            100.0 * thin / own.longest_side(),
+            own.topology(),
+        );
+        if !allow_loss {
+            return Err(Error::options(format!(
+                "{message}; use more --cells, or --allow-loss to go on without them"
+            )));
+        }
+        say.warn(&message);
+    }
+    say.note(&format!(
+        "grid: {cells} cells per unit length, {:.3e} wide (--cells); about {:.1} GB of memory",
+        field.grid().spacing() * space.unit(),
+        BYTES_PER_NODE * field.grid().len() as f64 * 1e-9,
+    ));
+    let region = own.nodes(&field, &space)?;
+    space.own = Some(own);
+    Ok(Loaded::Space(Start {
+        name: reader.name,
+        field,
+        outlet: space,
+        region,
+    }))
 }
 
 impl Source<'_> {
@@ -227,7 +317,12 @@ impl Reader<'_> {
 
     /// The longest side of what is in the box.
     fn side(&mut self, box_side: f64) -> Result<f64, Error> {
-        let side = *self.options.side_length.get_or_insert(PART * box_side);
+        self.longest(PART, box_side)
+    }
+
+    /// The longest side, a part of the box unless it is chosen.
+    fn longest(&mut self, part: f64, box_side: f64) -> Result<f64, Error> {
+        let side = *self.options.side_length.get_or_insert(part * box_side);
         if !(side > 0.0 && side <= box_side) {
             return Err(Error::options(format!(
                 "--side-length {side} does not fit the box of side {box_side}: give a positive length of at most that"
@@ -316,21 +411,30 @@ impl Reader<'_> {
         let grid = self.grid::<3>()?;
         let side = self.side(grid.side())?;
         let placement = Placement::fit(&mesh.bounding_box(), &grid, side, 0.0)?;
+        let field = self.mesh_field(mesh, &placement, grid)?;
+        Ok(self.placed(field, Space::of(&placement, up)))
+    }
+
+    fn mesh_field(
+        &self,
+        mesh: &ClosedMesh,
+        placement: &Placement<3>,
+        grid: Grid<3>,
+    ) -> Result<Field<3>, Error> {
         let progress = self.say.progress();
         let bar = progress.bar("signed distance", grid.cells() as u64);
-        let distance = MeshDistance::new(&mesh.placed(&placement));
+        let distance = MeshDistance::new(&mesh.placed(placement));
         let mut distance = distance.sample(grid, || bar.inc(1))?;
         bar.finish();
         progress.clear();
         let mended = surfaces::mend_signs(&mut distance);
         if mended > 0 {
             self.say.warn(&format!(
-                "the mesh folds over itself; the side of {mended} nodes was mended"
+                "the mesh crosses itself: {mended} nodes of the grid, which its faces put on the wrong side, were put right"
             ));
         }
         let eps = self.eps_over_h * grid.spacing();
-        let field = distance.map(|s| optimal_profile(s, eps));
-        Ok(self.placed(field, Space::of(&placement, up)))
+        Ok(distance.map(|s| optimal_profile(s, eps)))
     }
 
     fn values<const D: usize>(&mut self, path: &Path) -> Result<Field<D>, Error> {

@@ -7,6 +7,7 @@ mod config;
 mod error;
 mod input;
 mod outlet;
+mod own;
 mod page;
 mod run;
 mod say;

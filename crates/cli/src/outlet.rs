@@ -1,18 +1,21 @@
 //! What people look at: pictures, meshes, drawings.
 
+use std::fmt;
 use std::path::Path;
 
+use engine::{Measure, Stop};
 use geometry::measure::has_interface;
 use geometry::{Field, Placement, UpAxis, npy, vti};
 use images::{Drawing, Frame, Interface, Outline, Svg};
 use render::{Framing, Picture, Rgb, Scene};
-use runs::RunDirectory;
+use runs::{RunDirectory, StoredRun};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use surfaces::{ClosedMesh, TriangleMesh};
 
 use crate::cli::MeshFormat;
 use crate::error::Error;
+use crate::own::{Faired, OwnMesh};
 
 /// Pixels a side of pictures of surfaces.
 const PIXELS: u32 = 480;
@@ -41,6 +44,26 @@ pub struct Topology {
     pub euler_characteristic: Option<i64>,
 }
 
+impl Topology {
+    /// Of a surface.
+    pub fn of(surface: &ClosedMesh) -> Self {
+        Self {
+            components: surface.components(),
+            euler_characteristic: Some(surface.euler_characteristic()),
+        }
+    }
+}
+
+impl fmt::Display for Topology {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} closed parts", self.components)?;
+        match self.euler_characteristic {
+            Some(number) => write!(f, " of Euler characteristic {number}"),
+            None => Ok(()),
+        }
+    }
+}
+
 /// How phase fields in `D` dimensions are shown.
 pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
     /// Lets the axis that was chosen point up, or says which one does.
@@ -64,6 +87,31 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
 
     /// Writes the shape as a mesh to any file.
     fn save(&self, u: &Field<D>, eps: f64, path: &Path) -> Result<(), Error>;
+
+    /// What becomes of the mesh whose vertices follow the flow, if there is one.
+    fn faired(&self, _: &Field<D>, _: &Field<D>, _: f64) -> Result<Option<Faired>, Error> {
+        Ok(None)
+    }
+
+    /// What is measured besides,
+    fn measures(&self, _: &Field<D>, _: f64) -> Result<Vec<Measure<D>>, Error> {
+        Ok(Vec::new())
+    }
+
+    /// and what may end the flow besides.
+    fn stop(&self) -> Option<Stop> {
+        None
+    }
+
+    /// Adds to the folder of a run what it takes to resume it,
+    fn store(&self, _: &mut RunDirectory) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// and takes it from there.
+    fn restore(&mut self, _: &StoredRun) -> Result<(), Error> {
+        Ok(())
+    }
 }
 
 /// As the pixels of an image in the plane.
@@ -120,6 +168,9 @@ pub struct Space {
     origin: [f64; 3],
     unit: f64,
     up: UpAxis,
+    /// The mesh whose vertices follow the flow, if it is one.
+    #[serde(default)]
+    pub own: Option<OwnMesh>,
 }
 
 impl Space {
@@ -129,6 +180,7 @@ impl Space {
             origin: [0.0; 3],
             unit: 1.0,
             up: UpAxis::default(),
+            own: None,
         }
     }
 
@@ -138,13 +190,29 @@ impl Space {
             origin: placement.apply_inverse([0.0; 3]),
             unit: placement.scale().recip(),
             up,
+            own: None,
         }
+    }
+
+    /// The length in the mesh's units of a unit of the box.
+    pub fn unit(&self) -> f64 {
+        self.unit
+    }
+
+    /// A point of the box in the coordinates that the mesh came in,
+    pub fn to_own(&self, x: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|i| self.unit.mul_add(x[i], self.origin[i]))
+    }
+
+    /// and the other way round.
+    pub fn placement(&self) -> Result<Placement<3>, Error> {
+        Ok(Placement::about(self.origin, self.unit.recip())?)
     }
 
     /// A mesh in the box, in the coordinates that it came in.
     pub fn in_own_coordinates(&self, mut mesh: TriangleMesh) -> TriangleMesh {
         for x in &mut mesh.vertices {
-            *x = std::array::from_fn(|i| self.unit.mul_add(x[i], self.origin[i]));
+            *x = self.to_own(*x);
         }
         mesh
     }
@@ -167,10 +235,7 @@ impl Outlet<3> for Space {
 
     fn topology(&self, u: &Field<3>, eps: f64) -> Result<Topology, Error> {
         let (closed, _) = ClosedMesh::new(surfaces::phase_field_surface(u, eps)?)?;
-        Ok(Topology {
-            components: closed.components(),
-            euler_characteristic: Some(closed.euler_characteristic()),
-        })
+        Ok(Topology::of(&closed))
     }
 
     fn write_shape(
@@ -190,6 +255,30 @@ impl Outlet<3> for Space {
     fn save(&self, u: &Field<3>, eps: f64, path: &Path) -> Result<(), Error> {
         Ok(surfaces::write(path, &self.mesh(u, eps)?)?)
     }
+
+    fn faired(&self, start: &Field<3>, u: &Field<3>, eps: f64) -> Result<Option<Faired>, Error> {
+        let own = self.own.as_ref();
+        own.map(|own| own.faired(start, u, eps, self)).transpose()
+    }
+
+    fn measures(&self, start: &Field<3>, eps: f64) -> Result<Vec<Measure<3>>, Error> {
+        let own = self.own.iter();
+        own.map(|own| own.measure(start, eps, self)).collect()
+    }
+
+    fn stop(&self) -> Option<Stop> {
+        self.own.as_ref().and_then(|own| own.stop(self))
+    }
+
+    fn store(&self, run: &mut RunDirectory) -> Result<(), Error> {
+        self.own.as_ref().map_or(Ok(()), |own| own.store(run))
+    }
+
+    fn restore(&mut self, stored: &StoredRun) -> Result<(), Error> {
+        self.own
+            .as_mut()
+            .map_or(Ok(()), |own| own.load_from(stored))
+    }
 }
 
 /// Writes `final.npy`, `final.vti`, and, unless the shape has vanished, picture and shape, of which it returns the parts.
@@ -197,7 +286,8 @@ pub fn write_final<const D: usize, O: Outlet<D>>(
     outlet: &O,
     u: &Field<D>,
     eps: f64,
-    format: MeshFormat,
+    faired: Option<&Faired>,
+    format: Option<MeshFormat>,
     run: &mut RunDirectory,
 ) -> Result<Topology, Error> {
     npy::write(run.path().join("final.npy"), u)?;
@@ -208,7 +298,14 @@ pub fn write_final<const D: usize, O: Outlet<D>>(
         return Ok(Topology::default());
     }
     write_picture(&outlet.picture(u, eps)?, PICTURE, run)?;
-    outlet.write_shape(u, eps, FINAL, format, run)?;
+    if let Some(faired) = faired {
+        let extension = format.map_or(faired.extension.clone(), |format| format.to_string());
+        let name = format!("{FINAL}.{extension}");
+        faired.write(&run.path().join(&name))?;
+        run.adopt_file(&name)?;
+    } else {
+        outlet.write_shape(u, eps, FINAL, format.unwrap_or_default(), run)?;
+    }
     outlet.topology(u, eps)
 }
 

@@ -22,6 +22,7 @@ use crate::cli::MeshFormat;
 use crate::config;
 use crate::error::Error;
 use crate::outlet;
+use crate::own;
 
 /// Name of the page in the folder of a run.
 pub const NAME: &str = "index.html";
@@ -95,7 +96,7 @@ impl Files<'_> {
             return Ok(Some(section));
         }
         let meshes: Vec<(&str, TriangleMesh)> =
-            [(outlet::START, "before"), (outlet::FINAL, "after")]
+            [(self.before(), "before"), (outlet::FINAL, "after")]
                 .into_iter()
                 .filter_map(|(stem, label)| Some(self.mesh(stem).transpose()?.map(|m| (label, m))))
                 .collect::<Result<_, _>>()?;
@@ -119,6 +120,16 @@ impl Files<'_> {
             meshes.iter().map(|(label, mesh)| (*label, mesh)),
         )?;
         Ok(Some(section.with(viewer)))
+    }
+
+    /// What shows the shape at the beginning: the mesh itself where its vertices follow the flow.
+    fn before(&self) -> &'static str {
+        let is_input = |name: &str| name.starts_with(own::INPUT);
+        if self.run.files().any(is_input) {
+            own::INPUT
+        } else {
+            outlet::START
+        }
     }
 
     /// The surface of that name, in any of the formats.

@@ -15,6 +15,7 @@ use crate::cli::{KeepOptions, MeshFormat, SayOptions};
 use crate::config;
 use crate::error::Error;
 use crate::outlet::{self, Outlet};
+use crate::own::Faired;
 use crate::page;
 
 /// Everything about a run but its case.
@@ -28,7 +29,7 @@ pub struct Plan<O> {
     /// What is kept.
     pub keep: KeepOptions,
     /// Format of meshes.
-    pub format: MeshFormat,
+    pub format: Option<MeshFormat>,
     /// A mesh to be written besides.
     pub save: Option<PathBuf>,
     /// What is printed.
@@ -66,7 +67,9 @@ impl<O> Plan<O> {
             None => free_folder(&format!("{}-{}", self.name, self.command)),
         };
         let files = [(config::FILE, options)];
-        let store = Store::create(folder, &files, &run, notes, self.checkpoints())?;
+        let mut store = Store::create(folder, &files, &run, notes, self.checkpoints())?;
+        self.outlet.store(store.directory())?;
+        store.commit(&run)?;
         self.go_on(store, run)
     }
 
@@ -133,9 +136,22 @@ impl<O> Plan<O> {
         let (case, u) = (run.case(), run.field());
         let eps = case.scales.eps;
         let directory = store.directory();
-        let topology = outlet::write_final(&self.outlet, u, eps, self.format, directory)?;
+        // What has vanished leaves no vertices behind.
+        let faired = has_interface(u).then(|| self.outlet.faired(&case.initial, u, eps));
+        let faired = faired.transpose()?.flatten();
+        let topology = outlet::write_final(
+            &self.outlet,
+            u,
+            eps,
+            faired.as_ref(),
+            self.format,
+            directory,
+        )?;
         if let Some(path) = &self.save {
-            self.outlet.save(u, eps, path)?;
+            match &faired {
+                Some(faired) => faired.write(path)?,
+                None => self.outlet.save(u, eps, path)?,
+            }
         }
         if self.keep.frames.is_some() {
             let frames = frames(&directory.path().join(outlet::FRAMES))?;
@@ -143,7 +159,10 @@ impl<O> Plan<O> {
             directory.write_file("animation.png", |out| out.write_all(&animation))?;
         }
         // Touching sheets have no topology; that is no reason not to flow.
-        let before = self.outlet.topology(&case.initial, eps).unwrap_or_default();
+        let before = match &faired {
+            Some(faired) => faired.topology,
+            None => self.outlet.topology(&case.initial, eps).unwrap_or_default(),
+        };
         let mut outcome = json!({
             "command": self.command,
             "finished": true,
@@ -171,6 +190,9 @@ impl<O> Plan<O> {
                 outcome["energy_reached"] = reached.into();
             }
         }
+        if let Some(Faired { report, .. }) = faired {
+            outcome["mesh"] = report;
+        }
         let text = format!("{outcome:#}\n");
         directory.write_file(outlet::SUMMARY, |out| out.write_all(text.as_bytes()))?;
         store.finish(run)?;
@@ -191,7 +213,25 @@ impl<O> Plan<O> {
         if let (Some(first), Some(energy)) = (number("first_energy"), number("energy")) {
             text.push(format!("Willmore energy {energy:.4}, before {first:.4}"));
         }
+        let mesh = &outcome["mesh"];
+        if let Some(moved) = mesh["displacement_rms"].as_f64() {
+            let of = |name: &str| mesh[name].as_f64().unwrap_or(f64::NAN);
+            text.push(format!(
+                "vertices moved by {moved:.3e} (root mean square) and {:.3e} at most, {:.3} % and {:.3} % of the longest side; \
+                 volume {:+.4} %, area {:+.3} %",
+                of("displacement_largest"),
+                of("displacement_rms_percent"),
+                of("displacement_largest_percent"),
+                of("volume_change_percent"),
+                of("area_change_percent"),
+            ));
+        }
+        let left_behind = mesh["left_behind_percent"].as_f64().unwrap_or(0.0) > 1.0;
         let notes = [
+            (
+                left_behind,
+                "vertices could not follow the surface, which has gone further than 4 interface widths: use --remesh for a new mesh",
+            ),
             (
                 outcome["energy_reached"] == false,
                 "the energy asked for was not reached, go on with more --steps or --time",
@@ -250,7 +290,7 @@ impl<const D: usize, O: Outlet<D>> Observer<D> for Pictures<'_, O> {
         } = self.0;
         let mut write = || -> Result<(), Error> {
             if step == 0 {
-                outlet.write_shape(u, eps, outlet::START, *format, run)?;
+                outlet.write_shape(u, eps, outlet::START, format.unwrap_or_default(), run)?;
             }
             if keep.frames.is_some_and(|every| step.is_multiple_of(every)) {
                 let name = format!("{}/step-{step:06}.png", outlet::FRAMES);

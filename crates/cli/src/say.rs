@@ -25,6 +25,13 @@ impl SayOptions {
         }
     }
 
+    /// Says what was chosen.
+    pub fn note(self, what: &str) {
+        if !self.quiet && !self.json {
+            eprintln!("{what}");
+        }
+    }
+
     /// Progress bars, if anybody wants to see them.
     pub fn progress(self) -> Progress {
         Progress::new(self.quiet || self.json)

@@ -63,7 +63,7 @@ mod trajectory;
 
 pub use case::Case;
 pub use error::Error;
-pub use measure::Measure;
+pub use measure::{DISPLACEMENT, Measure};
 pub use observer::{Event, Observer, Samples};
 pub use operator::{Flow, Method, Operator, Scales, Scheme, quarter_square};
 pub use record::{Record, Values, energy_increases, mean_hvp, minimizations, to_csv};

@@ -9,6 +9,9 @@ use geometry::{Field, Grid};
 
 use crate::Error;
 
+/// The name of a measure of how far the surface has gone since the beginning, a length in the box.
+pub const DISPLACEMENT: &str = "displacement";
+
 type Function<const D: usize> =
     dyn Fn(&Field<D>, f64) -> Result<Option<f64>, geometry::Error> + Send + Sync;
 

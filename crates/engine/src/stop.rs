@@ -5,7 +5,7 @@ use std::fmt;
 use geometry::measure::{has_interface, touches_side};
 use serde::{Deserialize, Serialize};
 
-use crate::{Record, Run};
+use crate::{DISPLACEMENT, Record, Run};
 
 /// A reason to end; a flow ends with the first that holds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,6 +17,10 @@ pub enum Stop {
     Time(f64),
     /// The Willmore energy, as the scheme measures it, is no more than this.
     Energy(f64),
+    /// The Willmore energy, as the scheme measures it, is no more than this part of that at the beginning.
+    EnergyRatio(f64),
+    /// The measure [`DISPLACEMENT`](crate::DISPLACEMENT) has this value or more.
+    Displacement(f64),
     /// The phase field moves by less than this fraction of the way that it has come (`L2`) per time step; a substep counts as much as
     /// it would if the whole step were like it.
     Motion(f64),
@@ -45,6 +49,16 @@ impl Stop {
             Self::Energy(energy) => {
                 (last.and_then(Record::willmore_energy)).is_some_and(|w| w <= energy)
             }
+            Self::EnergyRatio(ratio) => {
+                let first = run.records.first().and_then(|r| r.minimization);
+                let first = first.map(|made| made.energy_at_rest());
+                let last = last.and_then(Record::willmore_energy);
+                (first.zip(last)).is_some_and(|(first, last)| last <= ratio * first)
+            }
+            Self::Displacement(length) => {
+                let gone = last.and_then(|record| record.measure(DISPLACEMENT));
+                gone.is_some_and(|gone| gone >= length)
+            }
             Self::Motion(limit) => {
                 last.is_some_and(|r| r.moved * step_size / r.tau <= limit * r.travelled)
             }
@@ -72,6 +86,13 @@ impl fmt::Display for Stop {
             Self::Steps(steps) => write!(f, "{steps} steps are made"),
             Self::Time(time) => write!(f, "the time {time:e} is reached"),
             Self::Energy(energy) => write!(f, "the Willmore energy is at most {energy}"),
+            Self::EnergyRatio(ratio) => {
+                write!(
+                    f,
+                    "the Willmore energy is at most {ratio} times that of the start"
+                )
+            }
+            Self::Displacement(_) => f.write_str("the surface has gone as far as it was to go"),
             Self::Motion(_) => f.write_str("the shape is stationary"),
             Self::EnergyAtRest => f.write_str("the energy is stationary"),
             Self::Vanished => f.write_str("the shape has vanished"),

@@ -74,6 +74,18 @@ impl<const D: usize> Placement<D> {
         })
     }
 
+    /// The map `p = (x - origin) scale`.
+    ///
+    /// # Errors
+    /// The scale must be finite and positive.
+    pub fn about(origin: [f64; D], scale: f64) -> Result<Self, Error> {
+        Ok(Self {
+            centre: origin,
+            scale: positive("scale", scale)?,
+            target: [0.0; D],
+        })
+    }
+
     /// The point `p` of the point `x`.
     pub fn apply(&self, x: [f64; D]) -> [f64; D] {
         std::array::from_fn(|i| (x[i] - self.centre[i]) * self.scale + self.target[i])

@@ -9,7 +9,7 @@ use crate::{Error, positive};
 /// The distances `-(4 eps/3) atanh u` of a phase field as a function with a continuous gradient: the tensor product of
 /// Catmull-Rom splines, of third order where `u` is smooth.
 #[derive(Clone, Debug)]
-pub struct LevelSet {
+pub(crate) struct LevelSet {
     distance: Field<3>,
 }
 
@@ -25,7 +25,7 @@ impl LevelSet {
     ///
     /// # Errors
     /// `eps` must be finite and positive, the values finite.
-    pub fn new(u: &Field<3>, eps: f64) -> Result<Self, Error> {
+    pub(crate) fn new(u: &Field<3>, eps: f64) -> Result<Self, Error> {
         positive("eps", eps)?;
         u.check_finite()?;
         let distance = u.map(|u| distance_from_phase_field(u, eps));
@@ -33,18 +33,18 @@ impl LevelSet {
     }
 
     /// The grid.
-    pub fn grid(&self) -> &Grid<3> {
+    pub(crate) fn grid(&self) -> &Grid<3> {
         self.distance.grid()
     }
 
     /// The distance at `x`, negative inside.
-    pub fn value(&self, x: [f64; 3]) -> f64 {
+    pub(crate) fn value(&self, x: [f64; 3]) -> f64 {
         self.value_and_gradient(Vector::from_array(x)).0
     }
 
     /// The point where the distance has the value `level`, by Newton's method along the gradient from `x`. Where the gradient
     /// vanishes on the way, as in the middle of a plate, it ends; it goes no further than `reach` from `x`.
-    pub fn project(&self, x: [f64; 3], level: f64, reach: f64) -> [f64; 3] {
+    pub(crate) fn project(&self, x: [f64; 3], level: f64, reach: f64) -> [f64; 3] {
         let start = Vector::from_array(x);
         let spacing = self.grid().spacing();
         let mut at = start;
@@ -64,7 +64,7 @@ impl LevelSet {
     }
 
     /// Many points at once, in parallel.
-    pub fn values(&self, points: &[[f64; 3]]) -> Vec<f64> {
+    pub(crate) fn values(&self, points: &[[f64; 3]]) -> Vec<f64> {
         points.par_iter().map(|&x| self.value(x)).collect()
     }
 

@@ -54,10 +54,10 @@
 //! - Meshes are not periodic: they lie in the box of a grid, with a margin of a few `eps`.
 //! - Same input, same bytes, for any number of threads.
 
-mod carried;
 mod closed;
 mod distance;
 mod error;
+mod fairing;
 mod format;
 mod hierarchy;
 mod isosurface;
@@ -65,6 +65,7 @@ mod level_set;
 mod mesh;
 mod normals;
 mod read;
+mod rewrite;
 pub mod samples;
 pub mod shapes;
 mod signs;
@@ -73,16 +74,16 @@ mod triangle;
 mod vector;
 mod write;
 
-pub use carried::CarriedVertices;
 pub use closed::{ClosedMesh, Warning};
 pub use distance::MeshDistance;
 pub use error::Error;
 use error::positive;
+pub use fairing::{Fairing, Followed, root_mean_square};
 pub use format::usual_up_axis;
 pub use isosurface::{isosurface, phase_field_surface};
-pub use level_set::LevelSet;
 pub use mesh::TriangleMesh;
 pub use read::error::FormatError;
 pub use read::{decode, read};
+pub use rewrite::rewrite;
 pub use signs::mend_signs;
 pub use write::write;

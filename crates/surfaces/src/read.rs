@@ -1,9 +1,9 @@
 //! Mesh files in.
 
 pub(crate) mod error;
-mod obj;
-mod ply;
-mod stl;
+pub(crate) mod obj;
+pub(crate) mod ply;
+pub(crate) mod stl;
 
 use std::path::Path;
 

@@ -99,49 +99,56 @@ impl TriangleMesh {
     }
 
     /// The smooth surface with what it is off the rough one on the average over neighbours: `x + A (y - x)` with the vertices `y` of
-    /// `rough`, where `A` is Taubin's smoothing of a field on the edges.
+    /// `rough`, where `A` is Taubin's smoothing of a field on the edges, which lets half of waves of length `wavelength` pass, and
+    /// in no case those shorter than some five edges.
     ///
     /// Every smoothing takes something of the long waves along; what `y - x` has of these is it, while noise averages out. What is
     /// wrong in the end is the product of two small errors, `(1 - A)(y - x)`; J. W. Tukey called this twicing.
     #[must_use]
-    pub fn with_long_waves_of(&self, rough: &Self) -> Self {
-        /// Waves longer than some five edges pass.
-        const TIMES: usize = 20;
+    pub fn with_long_waves_of(&self, rough: &Self, wavelength: f64) -> Self {
         const FACTORS: [f64; 2] = [0.5, -0.47];
+        const ROUNDS: [f64; 2] = [20.0, 400.0];
+        // On a lattice of equilateral triangles a wave has the eigenvalue (wave number times edge)^2 / 4.
+        let wave = std::f64::consts::TAU / wavelength * self.mean_edge();
+        let eigenvalue = 0.25 * wave * wave;
+        let round: f64 = FACTORS.iter().map(|f| 1.0 - f * eigenvalue).product();
+        let rounds = (0.5_f64.ln() / round.ln())
+            .clamp(ROUNDS[0], ROUNDS[1])
+            .round() as usize;
         let umbrellas = Umbrellas::of(self);
         let pairs = self.vertices.iter().zip(&rough.vertices);
         let mut offset: Vec<Vector> = pairs
             .map(|(&x, &y)| Vector::from_array(y) - Vector::from_array(x))
             .collect();
-        umbrellas.smooth(&mut offset, TIMES, FACTORS);
+        umbrellas.smooth(&mut offset, rounds, FACTORS);
         self.moved_by(&offset)
     }
 
-    /// All vertices moved along their normals by the same length, so that the closed surface encloses `volume`.
+    /// All vertices that may move moved along their normals by the same length, so that the closed surface encloses `volume`.
     #[must_use]
-    pub fn with_volume(&self, volume: f64) -> Self {
+    pub fn with_volume(&self, volume: f64, moves: impl Fn(usize) -> bool) -> Self {
         /// Newton steps; the volume is a polynomial of third degree in the length, nearly linear.
         const STEPS: usize = 4;
         let mut moved = self.clone();
         for _ in 0..STEPS {
-            let (now, derivative) = moved.volume_and_derivative();
+            let normals = moved.vertex_normals().into_iter().enumerate();
+            let normals: Vec<Vector> = normals
+                .map(|(v, n)| if moves(v) { n.into() } else { Vector::ZERO })
+                .collect();
+            let (now, derivative) = moved.volume_and_derivative(&normals);
             if derivative == 0.0 {
                 break;
             }
             let length = (volume - now) / derivative;
-            let offset = moved.vertex_normals();
-            let offset: Vec<_> = (offset.into_iter())
-                .map(|n| length * Vector::from_array(n))
-                .collect();
+            let offset: Vec<_> = normals.into_iter().map(|n| length * n).collect();
             moved = moved.moved_by(&offset);
         }
         moved
     }
 
-    /// The enclosed volume, and its derivative where all vertices move along their normals.
-    fn volume_and_derivative(&self) -> (f64, f64) {
-        let normals = self.vertex_normals();
-        let normal = |v: u32| Vector::from_array(normals[v as usize]);
+    /// The enclosed volume, and its derivative for velocities of the vertices.
+    fn volume_and_derivative(&self, velocities: &[Vector]) -> (f64, f64) {
+        let normal = |v: u32| velocities[v as usize];
         let sixths = self.faces.iter().map(|&face| {
             let [a, b, c] = crate::vector::corners(self, face);
             let [n, o, p] = face.map(normal);
@@ -150,6 +157,14 @@ impl TriangleMesh {
         });
         let (volume, derivative) = sixths.fold((0.0, 0.0), |(v, d), (w, e)| (v + w, d + e));
         (volume / 6.0, derivative / 6.0)
+    }
+
+    fn mean_edge(&self) -> f64 {
+        let edges = self.faces.iter().flat_map(|&face| {
+            let [a, b, c] = crate::vector::corners(self, face);
+            [a.distance(b), b.distance(c), c.distance(a)]
+        });
+        edges.sum::<f64>() / (3 * self.faces.len()).max(1) as f64
     }
 
     fn moved_by(&self, offset: &[Vector]) -> Self {

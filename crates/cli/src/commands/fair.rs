@@ -1,13 +1,23 @@
 //! `willmore fair`.
 
+use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 use engine::StepRule;
 
 use super::flow::{FlowCommand, Shared};
-use crate::cli::{FairOptions, MeshFormat};
+use crate::cli::{FairOptions, MeshFormat, SayOptions};
 use crate::error::Error;
 use crate::input::{self, Loaded};
+use crate::own::{Noise, OwnMesh};
+
+/// Energies below this have only balls, which have `8 pi`.
+const BALL: f64 = 1.2 * 8.0 * PI;
+/// Most steps that take off noise: the last one ends at 64 times the fourth power of the width of a cell.
+const STEPS: usize = 10;
+/// The first step in units of the square of the inner one, which is the fourth power of a length: it takes off waves of a few
+/// cells only. The others double.
+const FIRST: f64 = 1.0 / 16.0;
 
 impl FlowCommand for FairOptions {
     const NAME: &'static str = "fair";
@@ -18,10 +28,31 @@ impl FlowCommand for FairOptions {
 
     fn check(&mut self) -> Result<(), Error> {
         let flow = &self.flow;
-        if flow.time.is_none() && flow.energy.is_none() && flow.steps.is_none() {
-            return Err(Error::options(
-                "say how smooth the mesh is to become: give --time, --energy or --steps",
-            ));
+        self.ends = self.energy_ratio.is_some()
+            || flow.time.is_some()
+            || flow.energy.is_some()
+            || flow.steps.is_some();
+        if self.noise.is_some() || !self.ends {
+            self.flow.steps.get_or_insert(STEPS);
+        }
+        for (name, value) in [
+            ("--noise", self.noise),
+            ("--energy-ratio", self.energy_ratio),
+        ] {
+            if let Some(value) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
+                return Err(Error::options(format!("{name} {value} must be positive")));
+            }
+        }
+        if let Some(ratio) = self.energy_ratio.filter(|ratio| *ratio >= 1.0) {
+            return Err(Error::options(format!(
+                "--energy-ratio {ratio} is reached before the first step: give a part below 1"
+            )));
+        }
+        if let Some(energy) = self.flow.energy.filter(|energy| *energy < BALL) {
+            return Err(Error::options(format!(
+                "--energy {energy} has only a ball, which has 8 pi = 25.13, and nothing of the shape would be left: leave it out to take \
+                 off the noise, or give --energy-ratio 0.5 for half the energy that there is"
+            )));
         }
         if let Some(save) = &self.save {
             let refused = |reason| Error::options(format!("--save {}{reason}", save.display()));
@@ -37,6 +68,67 @@ impl FlowCommand for FairOptions {
         Ok(())
     }
 
+    fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
+        if let Some(save) = self
+            .save
+            .as_ref()
+            .filter(|save| save.exists() && !self.force)
+        {
+            return Err(Error::options(format!(
+                "--save {} is there already: give another name, or --force to write over it",
+                save.display()
+            )));
+        }
+        let ends = self.ends;
+        let eps_over_h = self.flow.scheme.eps_over_h;
+        let input = &mut self.flow.input;
+        let path = match (input::mesh_file(input)?, self.remesh) {
+            (Some(path), false) => path,
+            (path, _) => {
+                let reason = match path {
+                    Some(_) => "--remesh leaves no vertices by which noise could be measured",
+                    None => "only a mesh in a file has noise to take off",
+                };
+                if self.noise.is_some() || self.keep.is_some() || !ends {
+                    return Err(Error::options(format!(
+                        "{reason}: say how smooth the surface is to become, by --energy-ratio, --time, --energy or --steps, without \
+                         --noise and --keep"
+                    )));
+                }
+                return input::load(input, eps_over_h, say);
+            }
+        };
+        let bytes = std::fs::read(&path).map_err(Error::io("read", &path))?;
+        let noise = match self.noise {
+            Some(noise) => Noise::Of(noise),
+            None if ends => Noise::None,
+            None => Noise::Estimated,
+        };
+        let estimated = matches!(noise, Noise::Estimated);
+        let (own, warnings) = OwnMesh::new(&path, bytes, noise, self.keep.clone())?;
+        for warning in warnings {
+            say.warn(&format!("{}: {warning}", path.display()));
+        }
+        if estimated {
+            say.note(&format!(
+                "noise: {:.3e}, {:.3} % of the longest side, estimated (--noise)",
+                own.fairing().noise(),
+                100.0 * own.fairing().noise() / own.longest_side()
+            ));
+            self.noise = Some(own.fairing().noise());
+        }
+        let input = &mut self.flow.input;
+        input::load_own(input, own, &path, (eps_over_h, self.allow_loss), say)
+    }
+
+    fn ends(&self) -> bool {
+        self.noise.is_some() || self.energy_ratio.is_some() || !self.ends
+    }
+
+    fn energy_ratio(&self) -> Option<f64> {
+        self.energy_ratio
+    }
+
     fn prepare(&self, input: Loaded) -> Result<Loaded, Error> {
         match input {
             Loaded::Space(..) => Ok(input),
@@ -47,10 +139,14 @@ impl FlowCommand for FairOptions {
     }
 
     fn rule(&mut self, mcf_step: f64) -> StepRule {
+        if self.noise.is_some() {
+            let first = FIRST * mcf_step * mcf_step;
+            self.flow.tau.get_or_insert(StepRule::Doubling(first));
+        }
         self.flow.rule(mcf_step)
     }
 
-    fn mesh(&self) -> (MeshFormat, Option<PathBuf>) {
+    fn mesh(&self) -> (Option<MeshFormat>, Option<PathBuf>) {
         (self.format, self.save.clone())
     }
 }

@@ -32,6 +32,22 @@ pub trait FlowCommand: Serialize {
     /// Steps of a run that ends at a time or an energy.
     const MANY_STEPS: usize = 1000;
 
+    /// Reads the input.
+    fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
+        let shared = self.shared();
+        input::load(shared.input, shared.scheme.eps_over_h, say)
+    }
+
+    /// Whether something besides time and energy ends it.
+    fn ends(&self) -> bool {
+        false
+    }
+
+    /// The Willmore energy at which it ends, as a part of that at the beginning.
+    fn energy_ratio(&self) -> Option<f64> {
+        None
+    }
+
     /// The options that all of them have.
     fn shared(&mut self) -> Shared<'_>;
 
@@ -54,8 +70,8 @@ pub trait FlowCommand: Serialize {
     fn rule(&mut self, mcf_step: f64) -> StepRule;
 
     /// Format of meshes, and a file besides those of the run.
-    fn mesh(&self) -> (MeshFormat, Option<PathBuf>) {
-        (MeshFormat::Ply, None)
+    fn mesh(&self) -> (Option<MeshFormat>, Option<PathBuf>) {
+        (None, None)
     }
 }
 
@@ -133,8 +149,9 @@ pub fn run<C: FlowCommand>(
     stored: Option<StoredRun>,
 ) -> Result<ExitCode, Error> {
     command.check()?;
+    let ends = command.ends();
     let shared = command.shared();
-    let until = shared.time.is_some() || shared.energy.is_some();
+    let until = ends || shared.time.is_some() || shared.energy.is_some();
     let steps = if until { C::MANY_STEPS } else { STEPS };
     shared.steps.get_or_insert(steps);
     shared.check()?;
@@ -150,8 +167,7 @@ pub fn run<C: FlowCommand>(
             _ => job.resume::<3, Space>(stored),
         };
     }
-    let shared = job.command.shared();
-    let loaded = input::load(shared.input, shared.scheme.eps_over_h, say)?;
+    let loaded = job.command.load(say)?;
     match job.command.prepare(loaded)? {
         Loaded::Plane(start, _) => job.start(start),
         Loaded::Space(start) => job.start(start),
@@ -171,7 +187,7 @@ impl<C: FlowCommand> Job<C> {
         mut start: Start<D, O>,
     ) -> Result<ExitCode, Error> {
         start.outlet.turn(&mut self.command.shared().keep.up)?;
-        let case = self.case(&start.name, start.field, start.region)?;
+        let case = self.case(&start.name, start.field, start.region, &start.outlet)?;
         let config = config::resolved(C::NAME, &self.command)?;
         let plan = self.plan(start.name, start.outlet);
         plan.start(case, &config, &self.device)
@@ -183,14 +199,15 @@ impl<C: FlowCommand> Job<C> {
     ) -> Result<ExitCode, Error> {
         let notes = engine::notes(&stored);
         let name = notes["about"]["name"].as_str().unwrap_or("run").to_owned();
-        let outlet = O::deserialize(&notes["outlet"]).map_err(|reason| {
+        let mut outlet = O::deserialize(&notes["outlet"]).map_err(|reason| {
             let path = stored.path().display();
             Error::options(format!(
                 "{path} cannot be resumed: {reason}; start a new run"
             ))
         })?;
         let (field, region) = engine::initial(&stored)?;
-        let case = self.case(&name, field, region)?;
+        outlet.restore(&stored)?;
+        let case = self.case(&name, field, region, &outlet)?;
         self.plan(name, outlet).resume(stored, case, &self.device)
     }
 
@@ -199,10 +216,16 @@ impl<C: FlowCommand> Job<C> {
         name: &str,
         initial: Field<D>,
         region: Option<Vec<bool>>,
+        outlet: &impl Outlet<D>,
     ) -> Result<Case<D>, Error> {
         let method = self.command.method();
         let (scales, operator) = operator(self.command.shared().scheme, method, initial.grid())?;
         let rule = self.command.rule(scales.mcf_step);
+        let mut stops = self.command.shared().stops(rule);
+        stops.extend(self.command.energy_ratio().map(Stop::EnergyRatio));
+        stops.extend(outlet.stop());
+        let mut measures = Measure::size(scales.eps);
+        measures.extend(outlet.measures(&initial, scales.eps)?);
         Ok(Case {
             shape: name.to_owned(),
             initial,
@@ -211,8 +234,8 @@ impl<C: FlowCommand> Job<C> {
             operator,
             scales,
             steps: rule.into(),
-            stops: self.command.shared().stops(rule),
-            measures: Measure::size(scales.eps),
+            stops,
+            measures,
         })
     }
 

@@ -80,3 +80,40 @@ fn read_faces(
         polygons.push(face, &corners)
     })
 }
+
+/// The file with other coordinates of vertices, and other normals if it has some.
+pub(crate) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<u8>, FormatError> {
+    let (header, begin) = Header::parse(bytes)?;
+    let normals = moved.vertex_normals();
+    let mut body = Body::new(&header, bytes, begin);
+    for element in &header.elements {
+        if element.name != "vertex" {
+            body.rows(element, |_, _| Ok(()))?;
+            continue;
+        }
+        let new = [
+            (["x", "y", "z"], &moved.vertices),
+            (["nx", "ny", "nz"], &normals),
+        ];
+        let columns: Vec<_> = (new.iter())
+            .flat_map(|(names, values)| (0..3).map(move |axis| (names[axis], axis, *values)))
+            .filter_map(|(name, axis, values)| Some((element.scalar(name)?, axis, values)))
+            .collect();
+        if columns
+            .iter()
+            .any(|(column, ..)| element.properties[*column].scalar.is_integer())
+        {
+            return Err(FormatError::Undeclared {
+                missing: "x, y and z of vertex as float or double",
+            });
+        }
+        let value = |number: usize, column: usize| {
+            let new = columns.iter().find(|(c, ..)| *c == column);
+            new.and_then(|(_, axis, values)| Some(values.get(number)?[*axis]))
+        };
+        return body.rewritten(element, value);
+    }
+    Err(FormatError::Undeclared {
+        missing: "an element vertex",
+    })
+}

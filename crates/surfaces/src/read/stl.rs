@@ -7,6 +7,7 @@
 use super::{FormatError, position, shortened};
 use crate::TriangleMesh;
 use crate::mesh::merge_coincident;
+use crate::vector::{Vector, corners, scaled_normal};
 
 /// Comment and number of facets.
 const HEADER: usize = 84;
@@ -134,4 +135,46 @@ fn ascii(text: &str) -> Result<Vec<[f64; 3]>, FormatError> {
         });
     }
     Ok(corners)
+}
+
+/// The file with other corners of its facets, and normals to fit them.
+pub(crate) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Vec<u8> {
+    let corners = |face: &[u32; 3]| corners(moved, *face);
+    let normal = |face| scaled_normal(corners(face)).normalize_or_zero();
+    if binary_length(bytes).is_some_and(|(_, length)| length == bytes.len() as u64) {
+        let mut out = bytes.to_vec();
+        for (facet, face) in out[HEADER..].chunks_exact_mut(FACET).zip(&moved.faces) {
+            let vectors = std::iter::once(normal(face)).chain(corners(face));
+            let numbers = vectors.flat_map(|v| v.to_array());
+            for (bytes, number) in facet.as_chunks_mut().0.iter_mut().zip(numbers) {
+                *bytes = (number as f32).to_le_bytes();
+            }
+        }
+        return out;
+    }
+    let mut faces = moved.faces.iter();
+    let mut vertices = Vec::new().into_iter();
+    let mut out = Vec::with_capacity(bytes.len());
+    for line in bytes.split_inclusive(|&byte| byte == b'\n') {
+        let text = String::from_utf8_lossy(line);
+        let keyword = text.split_whitespace().next().unwrap_or_default();
+        let numbers = if keyword.eq_ignore_ascii_case("facet") {
+            let face = faces.next();
+            vertices = face.map_or(Vec::new(), |f| corners(f).to_vec()).into_iter();
+            face.map(|face| ("facet normal", normal(face)))
+        } else if keyword.eq_ignore_ascii_case("vertex") {
+            vertices.next().map(|x| ("vertex", x))
+        } else {
+            None
+        };
+        let Some((words, Vector { x, y, z })) = numbers else {
+            out.extend_from_slice(line);
+            continue;
+        };
+        let indent = line.len() - line.trim_ascii_start().len();
+        out.extend_from_slice(&line[..indent]);
+        out.extend_from_slice(format!("{words} {x:e} {y:e} {z:e}").as_bytes());
+        out.extend_from_slice(&line[line.trim_ascii_end().len()..]);
+    }
+    out
 }

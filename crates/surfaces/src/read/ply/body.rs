@@ -46,6 +46,51 @@ impl<'a> Body<'a> {
         Ok(())
     }
 
+    /// The whole file with the next element's values replaced where `value` has one for the number of a row and of a property.
+    pub(super) fn rewritten(
+        &mut self,
+        element: &Element,
+        value: impl Fn(usize, usize) -> Option<f64>,
+    ) -> Result<Vec<u8>, FormatError> {
+        let mut out = self.bytes[..self.position].to_vec();
+        let mut row = vec![Vec::new(); element.properties.len()];
+        for number in 0..element.count {
+            let begin = self.position;
+            if self.encoding == Encoding::Ascii {
+                self.text_row(element, &mut row)?;
+                let line = &self.bytes[begin..self.position.min(self.bytes.len())];
+                let text = String::from_utf8_lossy(line);
+                let mut words: Vec<Cow<str>> =
+                    text.split_ascii_whitespace().map(Cow::from).collect();
+                let mut word = 0;
+                for (column, (property, values)) in element.properties.iter().zip(&row).enumerate()
+                {
+                    if let Some(value) = value(number, column) {
+                        words[word] = value.to_string().into();
+                    }
+                    word += usize::from(property.length.is_some()) + values.len();
+                }
+                out.extend_from_slice(words.join(" ").as_bytes());
+                out.extend_from_slice(&line[line.trim_ascii_end().len()..]);
+                continue;
+            }
+            self.binary_row(element, &mut row)?;
+            out.extend_from_slice(&self.bytes[begin..self.position]);
+            let mut at = out.len() - (self.position - begin);
+            for (column, (property, values)) in element.properties.iter().zip(&row).enumerate() {
+                if let Some(value) = value(number, column) {
+                    let big = self.encoding == Encoding::BigEndian;
+                    let bytes = property.scalar.encode(value, big);
+                    out[at..at + bytes.len()].copy_from_slice(&bytes);
+                }
+                at +=
+                    property.length.map_or(0, Scalar::size) + values.len() * property.scalar.size();
+            }
+        }
+        out.extend_from_slice(&self.bytes[self.position.min(self.bytes.len())..]);
+        Ok(out)
+    }
+
     fn binary_row(&mut self, element: &Element, row: &mut Row) -> Result<(), FormatError> {
         for (property, values) in element.properties.iter().zip(row) {
             let count = match property.length {
@@ -141,6 +186,18 @@ impl Scalar {
             Self::F32 => value!(f32),
             Self::F64 => value!(f64),
         }
+    }
+
+    /// The bytes of a floating-point number of this type.
+    fn encode(self, value: f64, big: bool) -> Vec<u8> {
+        let mut bytes = match self {
+            Self::F32 => (value as f32).to_le_bytes().to_vec(),
+            _ => value.to_le_bytes().to_vec(),
+        };
+        if big {
+            bytes.reverse();
+        }
+        bytes
     }
 
     fn parse_number(self, word: &str) -> Option<f64> {

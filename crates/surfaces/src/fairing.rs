@@ -1,0 +1,201 @@
+//! A noisy mesh, and what becomes of its vertices while a phase field flows.
+
+use geometry::{Field, Placement};
+use rayon::prelude::*;
+
+use crate::level_set::LevelSet;
+use crate::{ClosedMesh, Error, TriangleMesh};
+
+/// Most rounds of Taubin's smoothing before the flow, and their factors.
+const ROUNDS: usize = 12;
+const TAUBIN: [f64; 2] = [0.5, -0.53];
+/// Noise is off when the zero level set is this many standard deviations from the rough vertices, root of the mean square: those of
+/// the noise itself, and a little that the flow takes off the shape, which is given back.
+const OFF: f64 = 1.05;
+/// Waves of so many interface widths are long.
+const LONG: f64 = 4.0;
+/// A vertex that is further from the zero level set at the beginning than so many standard deviations of the noise, or than so many
+/// interface widths, belongs to something that the grid does not resolve.
+const RESOLVED: (f64, f64) = (3.0, 0.25);
+/// How far from where they began, in interface widths, vertices are looked for: a level set that is further off was not followed.
+const REACH: f64 = 4.0;
+
+/// A closed mesh whose vertices follow the zero level set of a phase field, with its noise taken off, if there is some.
+///
+/// Noise that is independent from vertex to vertex has waves as short as the edges, which a grid of such a width shows as facets and
+/// not as noise. So first Taubin's smoothing along the edges takes off the shortest waves, as long as the vertices move by less than the
+/// standard deviation of the noise. From the phase field of this [start](Self::start) Willmore flow takes off longer ones, until
+/// the vertices have gone [far enough](Self::target). The zero level set takes the vertices along, but for those parts of the mesh that
+/// the grid does not resolve, which keep their distance from it. Last, what the flow took off the long waves is given back
+/// ([`TriangleMesh::with_long_waves_of`]), and the volume is made that of the rough mesh.
+///
+/// Without noise the vertices follow the level set, and that is all.
+#[derive(Clone, Debug)]
+pub struct Fairing {
+    rough: ClosedMesh,
+    start: ClosedMesh,
+    noise: f64,
+    /// Vertices that stay, if any do.
+    kept: Vec<bool>,
+}
+
+/// The vertices of the start of a fairing in the box of a grid.
+#[derive(Clone, Debug)]
+pub struct Followed {
+    placement: Placement<3>,
+    vertices: Vec<[f64; 3]>,
+    /// The levels that they keep: zero, or more where the grid does not resolve the mesh.
+    levels: Vec<f64>,
+    eps: f64,
+}
+
+impl Fairing {
+    /// Of a mesh with noise of this standard deviation along its normals, see [`TriangleMesh::noise`]; zero for none. `kept` says of a
+    /// position whether its vertex stays.
+    pub fn new(rough: ClosedMesh, noise: f64, kept: impl Fn([f64; 3]) -> bool) -> Self {
+        Self {
+            start: without_short_waves(&rough, noise),
+            noise,
+            kept: rough.mesh().vertices.iter().map(|&x| kept(x)).collect(),
+            rough,
+        }
+    }
+
+    /// The mesh as it was given.
+    pub fn rough(&self) -> &ClosedMesh {
+        &self.rough
+    }
+
+    /// The mesh from which the flow starts.
+    pub fn start(&self) -> &ClosedMesh {
+        &self.start
+    }
+
+    /// Standard deviation of the noise.
+    pub fn noise(&self) -> f64 {
+        self.noise
+    }
+
+    /// Whether a vertex stays.
+    pub fn keeps(&self) -> &[bool] {
+        &self.kept
+    }
+
+    /// How far the vertices have gone when the noise is off, root of the mean square.
+    pub fn target(&self) -> f64 {
+        OFF * self.noise
+    }
+
+    /// The vertices in the box where the start was placed, whose phase field there is `start`.
+    ///
+    /// # Errors
+    /// `eps` must be finite and positive, the values finite.
+    pub fn follow(
+        &self,
+        placement: Placement<3>,
+        start: &Field<3>,
+        eps: f64,
+    ) -> Result<Followed, Error> {
+        let vertices = self.start.mesh().vertices.iter();
+        let vertices: Vec<_> = vertices.map(|&x| placement.apply(x)).collect();
+        let own = (RESOLVED.0 * self.noise * placement.scale()).max(RESOLVED.1 * eps);
+        // Zero up to `own`, all of it from twice that.
+        let kept = |s: f64| {
+            let t = (s.abs() / own - 1.0).clamp(0.0, 1.0);
+            s * t * t * (3.0 - 2.0 * t)
+        };
+        let levels = LevelSet::new(start, eps)?.values(&vertices);
+        Ok(Followed {
+            placement,
+            vertices,
+            levels: levels.into_iter().map(kept).collect(),
+            eps,
+        })
+    }
+
+    /// How far the zero level set of `u` is from the rough vertices, root of the mean square.
+    ///
+    /// # Errors
+    /// The values must be finite.
+    pub fn displacement(&self, followed: &Followed, u: &Field<3>) -> Result<f64, Error> {
+        let now = followed.at(u)?;
+        Ok(root_mean_square(&self.rough.mesh().vertices, &now).0)
+    }
+
+    /// The mesh, when the phase field is `u`.
+    ///
+    /// # Errors
+    /// The values must be finite.
+    pub fn faired(&self, followed: &Followed, u: &Field<3>) -> Result<TriangleMesh, Error> {
+        let mut mesh = TriangleMesh {
+            vertices: followed.at(u)?,
+            faces: self.rough.mesh().faces.clone(),
+            normals: None,
+        };
+        if self.noise > 0.0 {
+            let wavelength = LONG * followed.eps / followed.placement.scale();
+            mesh = mesh.with_long_waves_of(self.start.mesh(), wavelength);
+        }
+        let own = self.rough.mesh().vertices.iter().zip(&self.kept);
+        for (x, (own, _)) in mesh
+            .vertices
+            .iter_mut()
+            .zip(own)
+            .filter(|(_, (_, kept))| **kept)
+        {
+            *x = *own;
+        }
+        Ok(if self.noise > 0.0 {
+            mesh.with_volume(self.rough.volume(), |vertex| !self.kept[vertex])
+        } else {
+            mesh
+        })
+    }
+}
+
+impl Followed {
+    /// Where the level sets of `u` have taken the vertices, in the coordinates of the mesh.
+    fn at(&self, u: &Field<3>) -> Result<Vec<[f64; 3]>, Error> {
+        let now = LevelSet::new(u, self.eps)?;
+        let pairs = self.vertices.par_iter().zip(&self.levels);
+        let moved = pairs.map(|(&x, &level)| now.project(x, level, REACH * self.eps));
+        Ok(moved.map(|x| self.placement.apply_inverse(x)).collect())
+    }
+
+    /// The part of the vertices that the zero level set of `u` has left behind.
+    ///
+    /// # Errors
+    /// The values must be finite.
+    pub fn left_behind(&self, u: &Field<3>) -> Result<f64, Error> {
+        let now = LevelSet::new(u, self.eps)?;
+        let pairs = self.vertices.par_iter().zip(&self.levels);
+        let off = pairs.filter(|&(&x, &level)| {
+            let moved = now.project(x, level, REACH * self.eps);
+            (now.value(moved) - level).abs() > RESOLVED.1 * self.eps
+        });
+        Ok(off.count() as f64 / self.vertices.len().max(1) as f64)
+    }
+}
+
+/// As many rounds of Taubin's smoothing as move the vertices by no more than the noise.
+fn without_short_waves(rough: &ClosedMesh, noise: f64) -> ClosedMesh {
+    let mut smooth = rough.clone();
+    for rounds in 1..=ROUNDS {
+        let next = rough.mesh().smoothed(rounds, TAUBIN[0], TAUBIN[1]);
+        let moved = root_mean_square(&rough.mesh().vertices, &next.vertices).0;
+        match ClosedMesh::new(next) {
+            Ok((next, _)) if moved <= noise => smooth = next,
+            // Also where slivers lose their area.
+            _ => break,
+        }
+    }
+    smooth
+}
+
+/// Of the distances between the points of two lists, with the largest.
+pub fn root_mean_square(from: &[[f64; 3]], to: &[[f64; 3]]) -> (f64, f64) {
+    let squares = from.iter().zip(to);
+    let squares = squares.map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>());
+    let (sum, largest) = squares.fold((0.0, 0.0_f64), |(s, l), d| (s + d, l.max(d)));
+    ((sum / from.len().max(1) as f64).sqrt(), largest.sqrt())
+}
