@@ -7,7 +7,6 @@ use clap::{CommandFactory, FromArgMatches, Parser};
 use engine::{
     Flow, Measure, Method, Operator, Samples, Scheme, Trajectory, energy_increases, minimizations,
 };
-use geometry::contour::{Interpolation, zero_level};
 use geometry::measure::{perimeter, zero_set_volume};
 use geometry::shapes::Cross;
 use geometry::{Error as GeometryError, Field, Grid, phase_field};
@@ -236,9 +235,7 @@ impl Compared {
     /// The zero level at a time.
     fn loops(&self, step: usize) -> Result<Curve, Error> {
         let field = self.trajectory.field(step * self.ratio)?;
-        let curves = zero_level(&field, Interpolation::Profile).into_iter();
-        let points: Vec<_> = curves.map(|curve| curve.points).collect();
-        Ok(Curve::new(points))
+        Ok(look::outline(&field))
     }
 }
 

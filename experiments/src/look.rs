@@ -1,7 +1,9 @@
 //! How curves look in the figures: colours stand for methods in their schemes, dashes for resolutions.
 
 use engine::{Method, Scheme};
-use report::{Colour, LegendEntry, LineChart, LineStyle, Marker, Series};
+use geometry::Field;
+use geometry::contour::{Interpolation, zero_level};
+use report::{Colour, Curve, LegendEntry, LineChart, LineStyle, Marker, Series};
 
 /// The methods in their schemes that are shown, in the order of legends.
 pub fn variants(
@@ -81,4 +83,10 @@ pub fn legend(
     let resolutions = (cells.iter())
         .map(|&n| LegendEntry::line(format!("n = {n}"), Colour::Black, dashes(n, cells)));
     chart.with_entries(methods).with_entries(resolutions)
+}
+
+/// The zero level of a phase field.
+pub fn outline(field: &Field<2>) -> Curve {
+    let curves = zero_level(field, Interpolation::Profile).into_iter();
+    Curve::new(curves.map(|curve| curve.points).collect::<Vec<_>>())
 }

@@ -9,7 +9,7 @@ use crate::Error;
 use crate::meshes::{KnownMesh, MeshOptions};
 use crate::options::FigureOptions;
 use crate::session::Session;
-use crate::surfaces::{Flowed, Remarks, SchemeOptions, Setting, Surface, SurfaceFlows, View};
+use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, View};
 
 /// Options of the programs.
 #[derive(Args, Clone, Debug)]
@@ -61,7 +61,7 @@ impl MeshFlow {
     pub fn run(
         &self,
         options: &MeshFlowOptions,
-        remarks: impl FnOnce(&mut Session<'_>, &mut [Flowed]) -> Result<Remarks, Error>,
+        remarks: impl FnOnce(&mut Session<'_>, &mut [Flowed]) -> Result<String, Error>,
     ) -> Result<(), Error> {
         let run = &options.figure.run;
         let steps = (options.steps).unwrap_or(if run.quick { 2 } else { self.steps });

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use engine::{Record, Trajectory, Values};
 use report::{Cell, Table};
+use solver::StepRecord;
 
 use crate::Error;
 
@@ -63,7 +64,8 @@ pub fn table(leading: &[&str], runs: &[Rows<'_>]) -> Result<Table, Error> {
             let mut row = run.leading.clone();
             row.extend([record.step.into(), record.time.into(), record.tau.into()]);
             row.extend(measured(&record.measures));
-            row.extend(MINIMIZATION.map(|(_, of)| of(record)));
+            let made = record.minimization.as_ref();
+            row.extend(MINIMIZATION.map(|(_, of)| made.map_or(Cell::Missing, of)));
             row.extend([(record.halvings as usize).into(), record.seconds.into()]);
             table.push(row)?;
         }
@@ -72,29 +74,23 @@ pub fn table(leading: &[&str], runs: &[Rows<'_>]) -> Result<Table, Error> {
 }
 
 /// Columns that are empty for mean curvature flow.
-const MINIMIZATION: [(&str, fn(&Record) -> Cell); 10] = [
-    ("energy_before", |r| {
-        r.minimization.map(|m| m.energy_before).into()
+const MINIMIZATION: [(&str, fn(&StepRecord) -> Cell); 10] = [
+    ("energy_before", |made| made.energy_before.into()),
+    ("energy", |made| made.energy.into()),
+    ("willmore_energy", |made| made.willmore_energy.into()),
+    ("exit", exit),
+    ("newton", |made| made.newton.newton.into()),
+    ("hvp", |made| made.hvp().into()),
+    ("values", |made| made.newton.values.into()),
+    ("gradients", |made| made.newton.gradients.into()),
+    ("negative_curvature", |made| {
+        made.newton.negative_curvature.into()
     }),
-    ("energy", |r| r.minimization.map(|m| m.energy).into()),
-    ("willmore_energy", |r| r.willmore_energy().into()),
-    ("exit", |r| exit(r)),
-    ("newton", |r| r.minimization.map(|m| m.newton.newton).into()),
-    ("hvp", |r| r.hvp().into()),
-    ("values", |r| r.minimization.map(|m| m.newton.values).into()),
-    ("gradients", |r| {
-        r.minimization.map(|m| m.newton.gradients).into()
-    }),
-    ("negative_curvature", |r| {
-        r.minimization.map(|m| m.newton.negative_curvature).into()
-    }),
-    ("estimate", |r| {
-        r.minimization.map(|m| m.newton.estimate).into()
-    }),
+    ("estimate", |made| made.newton.estimate.into()),
 ];
 
 /// Why a minimization ended, as serde writes it.
-fn exit(record: &Record) -> Cell {
-    let exit = serde_json::to_value(record.minimization.map(|made| made.newton.exit));
-    exit.ok().as_ref().and_then(|name| name.as_str()).into()
+fn exit(made: &StepRecord) -> Cell {
+    let exit = serde_json::to_value(made.newton.exit).ok();
+    exit.as_ref().and_then(|name| name.as_str()).into()
 }

@@ -196,8 +196,6 @@ pub struct Flowed {
     pub trajectory: Trajectory<3>,
     /// The shown ones.
     pub snapshots: Vec<Snapshot>,
-    /// Further metrics.
-    pub metrics: Vec<(String, f64)>,
     /// Largest resident memory of the process until the last step was done, in MiB, where the system tells.
     peak_mib: Option<f64>,
 }
@@ -215,7 +213,6 @@ impl Surface {
             surface: self,
             trajectory,
             snapshots: Vec::new(),
-            metrics: Vec::new(),
             peak_mib: memory::peak_mib(),
         };
         memory::release_freed();
@@ -298,9 +295,6 @@ impl Flowed {
         let increases = energy_increases(records);
         summary.insert_count(&format!("{key}.energy_increases"), increases)?;
         summary.insert(&format!("{key}.seconds"), self.trajectory.seconds())?;
-        for (name, value) in &self.metrics {
-            summary.insert(&format!("{key}.{name}"), *value)?;
-        }
         Ok(())
     }
 
@@ -387,23 +381,15 @@ pub struct SurfaceFlows {
     pub tau_in_words: &'static str,
 }
 
-/// What a program says about its flows besides the usual.
-#[derive(Default)]
-pub struct Remarks {
-    /// Below the figure.
-    pub note: String,
-    /// Below the table on standard output.
-    pub report: Vec<String>,
-}
-
 impl SurfaceFlows {
     /// Lets all surfaces flow, and writes a figure with a row of pictures for each run, the table of the shown steps, the records of all
-    /// steps and the metrics. `remarks` looks at the flows, and may add to captions, pictures and metrics.
+    /// steps and the metrics. `remarks` looks at the flows, may add to captions, pictures and metrics, and says what else the note of the
+    /// figure should say.
     pub fn run(
         self,
         mut session: Session<'_>,
         setting: &Setting,
-        remarks: impl FnOnce(&mut Session<'_>, &mut [Flowed]) -> Result<Remarks, Error>,
+        remarks: impl FnOnce(&mut Session<'_>, &mut [Flowed]) -> Result<String, Error>,
     ) -> Result<(), Error> {
         let mut all = Vec::new();
         for (surface, initial) in &self.surfaces {
@@ -421,6 +407,7 @@ impl SurfaceFlows {
                 all.push(surface.flow(case, &mut session)?);
             }
         }
+        table(&mut session, &all, "energies")?;
         let remarks = remarks(&mut session, &mut all)?;
         let (output, quick) = (&session.output, session.options.quick);
         let pictures = session.manifest.phase("pictures", || {
@@ -431,16 +418,12 @@ impl SurfaceFlows {
             .with_row_labels(all.iter().map(Flowed::row_label))
             .with_panels(pictures.into_iter().flatten())
             .with_note(format!(
-                "n = {}, ε = 2/n, inner step 1/n², {}. w: Willmore energy with the implicit finite-element step; a sphere has 8π = 25.13.{}",
-                setting.n, self.tau_in_words, remarks.note
+                "n = {}, ε = 2/n, inner step 1/n², {}. w: Willmore energy with the implicit finite-element step; a sphere has 8π = 25.13.{remarks}",
+                setting.n, self.tau_in_words
             ));
         session.figure(figure, "surfaces")?;
         let runs = all.iter().map(|one| (one.surface.key, &one.trajectory));
         output.write("steps.csv", steps_csv("surface", runs)?)?;
-        table(&mut session, &all, "energies")?;
-        for text in remarks.report {
-            session.remark(text);
-        }
         let summary = &mut session.summary;
         all.iter().try_for_each(|one| one.summarize(summary))?;
         if let Some(peak) = memory::peak_mib() {

@@ -7,7 +7,7 @@ use engine::StepRule;
 use experiments::harness;
 use experiments::mesh_flow::{MeshFlow, MeshFlowOptions};
 use experiments::meshes::ARMADILLO;
-use experiments::surfaces::{Remarks, View};
+use experiments::surfaces::View;
 use geometry::UpAxis;
 
 const ARMADILLO_FLOW: MeshFlow = MeshFlow {
@@ -37,7 +37,5 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    harness::main(|options: &Options| {
-        ARMADILLO_FLOW.run(&options.flow, |_, _| Ok(Remarks::default()))
-    })
+    harness::main(|options: &Options| ARMADILLO_FLOW.run(&options.flow, |_, _| Ok(String::new())))
 }

@@ -6,7 +6,7 @@ use clap::Parser;
 use engine::{Method, Scheme, StepRule};
 use experiments::options::FigureOptions;
 use experiments::session::Session;
-use experiments::surfaces::{Flowed, Remarks, SchemeOptions, Setting, Surface, SurfaceFlows, View};
+use experiments::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, View};
 use experiments::{Error, harness};
 use geometry::shapes::{Cuboid, Cylinder};
 use geometry::{SignedDistanceExt, UpAxis, phase_field};
@@ -120,9 +120,7 @@ fn program(options: &Options) -> Result<(), Error> {
         time: (StepRule::Constant(TAU), steps),
         tau_in_words: "τ = 2⁻¹⁸",
     };
-    flows.run(session, &setting, |_, all| {
-        compare_with_finite_elements(all)
-    })
+    flows.run(session, &setting, compare_with_finite_elements)
 }
 
 fn surface(key: &'static str, title: &str, energies: [(usize, f64); 3]) -> Surface {
@@ -135,7 +133,10 @@ fn surface(key: &'static str, title: &str, energies: [(usize, f64); 3]) -> Surfa
 }
 
 /// Adds the L2 distances of the learned operators to the finite elements, where both ran, to captions and metrics.
-fn compare_with_finite_elements(all: &mut [Flowed]) -> Result<Remarks, Error> {
+fn compare_with_finite_elements(
+    session: &mut Session<'_>,
+    all: &mut [Flowed],
+) -> Result<String, Error> {
     let method = |one: &Flowed| one.trajectory.case.operator.method;
     let (elements, mut others): (Vec<_>, Vec<_>) =
         (all.iter_mut()).partition(|one| method(one) == Method::FeImplicit);
@@ -143,12 +144,14 @@ fn compare_with_finite_elements(all: &mut [Flowed]) -> Result<Remarks, Error> {
         let Some(elements) = elements.iter().find(|e| e.surface.key == one.surface.key) else {
             continue;
         };
+        let key = one.key();
         for shown in one.snapshots.iter_mut().filter(|shown| shown.step > 0) {
             let step = shown.step;
             let l2 = one.trajectory.distance(step, &elements.trajectory, step)?;
             shown.caption = format!("{}\nL² distance to FE {l2:.4}", shown.caption);
-            one.metrics.push((format!("l2_to_fe.step{step}"), l2));
+            let metric = format!("{key}.l2_to_fe.step{step}");
+            session.summary.insert(&metric, l2)?;
         }
     }
-    Ok(Remarks::default())
+    Ok(String::new())
 }

@@ -6,8 +6,7 @@ use clap::Parser;
 use engine::{Operator, Scales, StepRule};
 use experiments::inpainting::{self, Inpainted, InpaintingOptions, Shape};
 use experiments::session::Session;
-use experiments::{Error, harness};
-use geometry::contour::{Interpolation, zero_level};
+use experiments::{Error, harness, look};
 use geometry::shapes::{Ball, Cross, Cuboid};
 use geometry::{Field, Grid, SignedDistanceExt};
 use model::{NeededNetwork, Ratios};
@@ -171,12 +170,10 @@ fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure, Error> {
 }
 
 fn panel(name: String, field: &Field<2>, [low, high]: [f64; 2]) -> Shapes {
-    let curves = zero_level(field, Interpolation::Profile);
-    let loops: Vec<Vec<[f64; 2]>> = curves.into_iter().map(|curve| curve.points).collect();
     let frame = vec![[low, low], [high, low], [high, high], [low, high]];
     let frame = Curve::new(vec![frame]).with_colour(Colour::Custom(GREEN));
     Shapes::new(name)
-        .with_curve(Curve::new(loops).filled(Colour::LightGrey))
+        .with_curve(look::outline(field).filled(Colour::LightGrey))
         .with_curve(frame.with_width(1.6))
         .with_window([-0.5, 0.5], [-0.5, 0.5])
 }

@@ -238,15 +238,9 @@ impl Measurement {
             "product_over_floor",
             steps["ms_per_product"] / products["floor_single_ms"],
         );
-        let told = [
-            ("pages_per_product", pages),
-            ("peak_mib", peak_mib),
-            ("distance_to_tighter", distance),
-        ];
-        steps.extend(
-            told.into_iter()
-                .filter_map(|(name, value)| Some((name, value?))),
-        );
+        steps.extend(pages.map(|pages| ("pages_per_product", pages)));
+        steps.extend(peak_mib.map(|peak| ("peak_mib", peak)));
+        steps.extend(distance.map(|distance| ("distance_to_tighter", distance)));
         Ok(Self {
             case: name,
             n,

@@ -8,7 +8,7 @@ use engine::StepRule;
 use experiments::mesh_flow::{MeshFlow, MeshFlowOptions};
 use experiments::meshes::KnownMesh;
 use experiments::session::Session;
-use experiments::surfaces::{Flowed, Remarks, View};
+use experiments::surfaces::{Flowed, View};
 use experiments::{Error, harness};
 use geometry::{CliffordTorus, UpAxis};
 use render::Tube;
@@ -56,12 +56,7 @@ fn main() -> ExitCode {
 }
 
 /// Finds the Clifford torus nearest to the last shape of each run, and draws it there.
-fn clifford_tori(session: &mut Session<'_>, all: &mut [Flowed]) -> Result<Remarks, Error> {
-    let mut remarks = Remarks {
-        note: " Circles: of the nearest Clifford torus; one has 4π² = 39.48 in the limit."
-            .to_owned(),
-        ..Remarks::default()
-    };
+fn clifford_tori(session: &mut Session<'_>, all: &mut [Flowed]) -> Result<String, Error> {
     let mut tori = BTreeMap::new();
     for one in all {
         let case = &one.trajectory.case;
@@ -75,7 +70,7 @@ fn clifford_tori(session: &mut Session<'_>, all: &mut [Flowed]) -> Result<Remark
         let CliffordTorus {
             l2, outer_radius, ..
         } = torus;
-        remarks.report.push(format!(
+        session.remark(format!(
             "Nearest Clifford torus, {}: L2 distance {l2:.4} (paper {PAPERS_L2:.4}), outer radius {outer_radius:.3}, w = {w:.2} (paper \
              {PAPERS_CLIFFORD})",
             one.label()
@@ -87,13 +82,13 @@ fn clifford_tori(session: &mut Session<'_>, all: &mut [Flowed]) -> Result<Remark
             shown.caption = format!("{}\n{torus}", shown.caption);
             shown.tubes = circles.map(tube).collect();
         }
-        one.metrics = vec![
-            ("clifford_l2".to_owned(), l2),
-            ("clifford_w".to_owned(), w),
-            ("clifford_outer_radius".to_owned(), outer_radius),
-        ];
+        let metrics = [("l2", l2), ("w", w), ("outer_radius", outer_radius)];
+        for (name, value) in metrics {
+            let metric = format!("{}.clifford_{name}", one.key());
+            session.summary.insert(&metric, value)?;
+        }
         tori.insert(one.key(), torus);
     }
     session.output.write_json("clifford.json", &tori)?;
-    Ok(remarks)
+    Ok(" Circles: of the nearest Clifford torus; one has 4π² = 39.48 in the limit.".to_owned())
 }
