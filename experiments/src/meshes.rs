@@ -214,10 +214,14 @@ impl MeshOptions {
         if let Some(path) = &self.mesh {
             return Some(path.clone());
         }
-        let named = std::env::var_os(FOLDER_VARIABLE).map(PathBuf::from);
-        let folder = named.unwrap_or_else(|| PathBuf::from(FOLDER));
-        Some(folder.join(known.file)).filter(|path| path.exists())
+        Some(folder().join(known.file)).filter(|path| path.exists())
     }
+}
+
+/// The folder that holds the meshes of the paper, if they are here.
+pub fn folder() -> PathBuf {
+    let named = std::env::var_os(FOLDER_VARIABLE).map(PathBuf::from);
+    named.unwrap_or_else(|| PathBuf::from(FOLDER))
 }
 
 impl About {

@@ -80,7 +80,7 @@ pub enum Command {
 const FLOW_EXAMPLES: &str = "Examples:
   willmore flow bunny.ply --steps 12 --output runs/bunny
   willmore flow logo.png --frames 1 --time 1e-4
-  willmore flow builtin:cube --tau doubling:1e-6 --steps 16
+  willmore flow builtin:cube --tau doubling:1e-6 --steps 10
 Ctrl-C (exit code 130) leaves a run that `willmore resume DIR` continues.";
 const RESUME_EXAMPLES: &str = "Example:
   willmore resume runs/bunny";

@@ -30,9 +30,14 @@ pub const COMMAND: &str = "command";
 /// Longest configuration file, in bytes; all options take some thousand.
 const LONGEST: usize = 1 << 16;
 
+/// The program's options. Negative numbers are values, to be refused for what they are.
+fn program() -> clap::Command {
+    Cli::command().mut_subcommands(|command| command.allow_negative_numbers(true))
+}
+
 /// What was typed, together with the configuration file it names.
 pub fn parse(arguments: &[OsString]) -> Result<Cli, ParseError> {
-    let matches = Cli::command().try_get_matches_from(arguments)?;
+    let matches = program().try_get_matches_from(arguments)?;
     let Some((command, typed)) = matches.subcommand() else {
         return Ok(Cli::from_arg_matches(&matches)?);
     };
@@ -70,7 +75,7 @@ pub fn parse_resolved(text: &str, path: &Path) -> Result<Cli, Error> {
     let Some(Value::String(command)) = table.get(COMMAND) else {
         return Err(bad(path, "it does not say which command it is for"));
     };
-    if Cli::command().find_subcommand(command).is_none() {
+    if program().find_subcommand(command).is_none() {
         return Err(bad(path, format!("{command:?} is no command")));
     }
     let mut all: Vec<OsString> = vec!["willmore".into(), command.into()];
@@ -139,7 +144,7 @@ fn read(text: &str, path: &Path) -> Result<Table, Error> {
 }
 
 fn parse_file(arguments: &[OsString], path: &Path) -> Result<Cli, Error> {
-    let parsed = Cli::command()
+    let parsed = program()
         .try_get_matches_from(arguments)
         .and_then(|matches| Cli::from_arg_matches(&matches));
     parsed.map_err(|error| bad(path, one_line(&error)))

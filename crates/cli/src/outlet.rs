@@ -99,8 +99,8 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
     }
 
     /// and what may end the flow besides.
-    fn stop(&self) -> Option<Stop> {
-        None
+    fn stops(&self, _: &Field<D>) -> Vec<Stop> {
+        Vec::new()
     }
 
     /// Adds to the folder of a run what it takes to resume it,
@@ -266,8 +266,9 @@ impl Outlet<3> for Space {
         own.map(|own| own.measure(start, eps, self)).collect()
     }
 
-    fn stop(&self) -> Option<Stop> {
-        self.own.as_ref().and_then(|own| own.stop(self))
+    fn stops(&self, start: &Field<3>) -> Vec<Stop> {
+        let own = self.own.as_ref();
+        own.map_or(Vec::new(), |own| own.stops(start.grid().spacing(), self))
     }
 
     fn store(&self, run: &mut RunDirectory) -> Result<(), Error> {

@@ -174,9 +174,15 @@ impl OwnMesh {
     }
 
     /// When the noise is off.
-    pub fn stop(&self, space: &Space) -> Option<Stop> {
-        let target = self.fairing().target() / space.unit();
-        (target > 0.0).then_some(Stop::Displacement(target))
+    pub fn stops(&self, spacing: f64, space: &Space) -> Vec<Stop> {
+        if self.noise == 0.0 {
+            return Vec::new();
+        }
+        let scale = space.unit().recip();
+        vec![
+            Stop::Time(self.fairing().time(spacing, scale)),
+            Stop::Displacement(scale * self.fairing().farthest()),
+        ]
     }
 
     /// The mesh with the vertices where the phase field `u` has taken them.

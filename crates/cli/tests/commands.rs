@@ -1,5 +1,6 @@
 //! What the commands make.
 
+use std::fs;
 use std::path::Path;
 
 use crate::common::{self, outcome};
@@ -31,8 +32,89 @@ fn noisy_sphere(path: &Path, radius: f64, noise: f64) {
     surfaces::write(path, &mesh).unwrap();
 }
 
+/// Distances from (3, -5, 40): their mean, and the root of the mean square of what they are off it.
+fn radii(path: &Path) -> (f64, f64) {
+    let (mesh, _) = ClosedMesh::new(surfaces::read(path).unwrap()).unwrap();
+    assert_eq!((mesh.components(), mesh.genus()), (1, 0));
+    let radius = |x: &[f64; 3]| (x[0] - 3.0).hypot(x[1] + 5.0).hypot(x[2] - 40.0);
+    let all: Vec<f64> = mesh.mesh().vertices.iter().map(radius).collect();
+    let mean = all.iter().sum::<f64>() / all.len() as f64;
+    let off = all.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / all.len() as f64;
+    (mean, off.sqrt())
+}
+
 #[test]
-fn a_noisy_sphere_is_faired_in_its_own_coordinates() {
+fn the_noise_of_a_sphere_is_taken_off_and_all_else_of_its_file_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    noisy_sphere(&at("noisy.obj"), 7.0, 0.02);
+    let text = fs::read_to_string(at("noisy.obj")).unwrap();
+    let with_groups = text.replacen("\nf ", "\ng skin\nusemtl red\nf ", 1);
+    fs::write(at("noisy.obj"), &with_groups).unwrap();
+    let arguments = [
+        "fair",
+        "noisy.obj",
+        "--cells",
+        "48",
+        "--save",
+        "smooth.stl",
+        "--output",
+        "run",
+    ];
+    let outcome = outcome(folder.path(), &arguments);
+    let mesh = &outcome["mesh"];
+    let number = |name: &str| mesh[name].as_f64().unwrap();
+    let noise = 0.02 * 7.0 * 1.7 / 3.0_f64.sqrt();
+    assert!((number("noise") / noise - 1.0).abs() < 0.25, "{mesh}");
+    assert!(number("volume_change_percent").abs() < 1e-6, "{mesh}");
+    assert!(
+        number("displacement_rms") < 1.5 * noise && number("left_behind_percent") < 1e-9,
+        "{mesh}"
+    );
+    assert_eq!(outcome["same_topology"], true);
+    let (_, before) = radii(&at("noisy.obj"));
+    for name in ["smooth.stl", "run/final.obj"] {
+        let (mean, off) = radii(&at(name));
+        assert!(
+            (mean / 7.0 - 1.0).abs() < 0.01 && off < 0.4 * before,
+            "{name}: {mean} {off}"
+        );
+    }
+    let faired = fs::read_to_string(at("run/final.obj")).unwrap();
+    let lines = |text: &str| -> Vec<String> {
+        let other = |line: &&str| !line.starts_with("v ");
+        text.lines().filter(other).map(str::to_owned).collect()
+    };
+    assert_eq!(lines(&faired), lines(&with_groups));
+    assert_eq!(
+        fs::read(at("run/input.obj")).unwrap(),
+        with_groups.as_bytes()
+    );
+    // The other half stays where it is.
+    let keep = "box:-10,-20,40,20,20,60";
+    let arguments = [
+        "fair",
+        "noisy.obj",
+        "--cells",
+        "48",
+        "--keep",
+        keep,
+        "--output",
+        "half",
+    ];
+    common::outcome(folder.path(), &arguments);
+    let [noisy, half] =
+        ["noisy.obj", "half/final.obj"].map(|name| surfaces::read(at(name)).unwrap());
+    let mut moved = 0;
+    for (a, b) in noisy.vertices.iter().zip(&half.vertices) {
+        assert!(a == b || a[2] < 40.0, "{a:?} {b:?}");
+        moved += usize::from(a != b);
+    }
+    assert!(moved > noisy.vertices.len() / 3, "{moved}");
+}
+
+#[test]
+fn a_new_mesh_is_made_on_demand_and_the_energy_falls_by_the_ratio() {
     let folder = tempfile::tempdir().unwrap();
     noisy_sphere(&folder.path().join("noisy.ply"), 7.0, 0.02);
     let arguments = [
@@ -40,31 +122,68 @@ fn a_noisy_sphere_is_faired_in_its_own_coordinates() {
         "noisy.ply",
         "--cells",
         "40",
-        "--energy",
-        "26",
-        "--save",
-        "smooth.stl",
-        "--output",
-        "run",
+        "--energy-ratio",
+        "0.7",
+        "--remesh",
         "--format",
         "obj",
     ];
-    let outcome = outcome(folder.path(), &arguments);
-    assert_eq!(outcome["energy_reached"], true, "{outcome}");
+    let outcome = outcome(
+        folder.path(),
+        &[&arguments[..], &["--output", "run"]].concat(),
+    );
+    let number = |name: &str| outcome[name].as_f64().unwrap();
     assert!(
-        outcome["first_energy"].as_f64().unwrap() > 1.4 * EIGHT_PI,
+        number("energy") <= 0.7 * number("first_energy"),
         "{outcome}"
     );
-    let energy = outcome["energy"].as_f64().unwrap();
-    assert!((energy / EIGHT_PI - 1.0).abs() < 0.05, "{outcome}");
-    for name in ["smooth.stl", "run/final.obj"] {
-        let (mesh, _) = ClosedMesh::new(surfaces::read(folder.path().join(name)).unwrap()).unwrap();
-        assert_eq!((mesh.components(), mesh.genus()), (1, 0));
-        for x in &mesh.mesh().vertices {
-            let r = (x[0] - 3.0).hypot(x[1] + 5.0).hypot(x[2] - 40.0);
-            assert!((r / 7.0 - 1.0).abs() < 0.05, "{name}: {x:?}");
+    assert!(number("energy") > 0.98 * EIGHT_PI, "{outcome}");
+    let (mean, _) = radii(&folder.path().join("run/final.obj"));
+    assert!((mean / 7.0 - 1.0).abs() < 0.05, "{mean}");
+}
+
+/// Two plates with less than a cell between them.
+#[test]
+fn a_mesh_that_no_grid_holds_is_refused_with_numbers_unless_losses_are_allowed() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = String::new();
+    for (plate, low) in [0.0, 0.0505].into_iter().enumerate() {
+        for bits in 0..8 {
+            let [x, y, z] = [4, 2, 1].map(|bit| f64::from(u8::from(bits & bit > 0)));
+            text += &format!("v {x} {y} {}\n", low + 0.05 * z);
+        }
+        for [a, b, c, d] in [
+            [0, 1, 3, 2],
+            [4, 6, 7, 5],
+            [0, 4, 5, 1],
+            [2, 3, 7, 6],
+            [0, 2, 6, 4],
+            [1, 5, 7, 3],
+        ] {
+            let [a, b, c, d] = [a, b, c, d].map(|v| v + 8 * plate + 1);
+            text += &format!("f {a} {b} {c} {d}\n");
         }
     }
+    fs::write(folder.path().join("plates.obj"), text).unwrap();
+    let arguments = [
+        "fair",
+        "plates.obj",
+        "--noise",
+        "1e-4",
+        "--cells",
+        "48",
+        "--output",
+        "run",
+    ];
+    let refused = common::run(folder.path(), &arguments);
+    let message = common::text(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{message}");
+    assert!(
+        message.contains("2 closed parts") && message.contains("--allow-loss"),
+        "{message}"
+    );
+    let outcome = outcome(folder.path(), &[&arguments[..], &["--allow-loss"]].concat());
+    assert_eq!(outcome["same_topology"], false, "{outcome}");
 }
 
 #[test]

@@ -194,7 +194,19 @@ fn every_mistake_is_one_clear_line() {
         ),
         (
             &["fair", "builtin:sphere"],
-            "give --time, --energy or --steps",
+            "say how smooth the surface is to become",
+        ),
+        (
+            &["fair", "builtin:sphere", "--energy", "26"],
+            "nothing of the shape would be left",
+        ),
+        (
+            &["fair", "builtin:sphere", "--energy-ratio", "2"],
+            "reached before the first step",
+        ),
+        (
+            &["fair", "builtin:sphere", "--noise", "-1"],
+            "--noise -1 must be positive",
         ),
         (
             &["fair", "builtin:disc", "--steps", "1"],

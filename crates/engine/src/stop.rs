@@ -1,5 +1,6 @@
 //! When a flow ends.
 
+use std::f64::consts::PI;
 use std::fmt;
 
 use geometry::measure::{has_interface, touches_side};
@@ -27,6 +28,8 @@ pub enum Stop {
     /// Three steps in a row, nearly as long as steps by the energy can be, took next to nothing of the energy away. Longer ones would
     /// jump to other minimizers, such as an empty box.
     EnergyAtRest,
+    /// In space, the Willmore energy is less than half of that of a sphere, which no closed surface has: the phase field is none any more.
+    NoSurface,
     /// Nothing is left inside, or nothing outside.
     Vanished,
     /// The shape has come to the side of the box, and so to its own periodic image, and was not there in the beginning.
@@ -74,6 +77,10 @@ impl Stop {
                 let last = run.records.last_chunk::<IN_A_ROW>();
                 last.is_some_and(|records| records.iter().all(at_rest))
             }
+            Self::NoSurface => {
+                let energy = last.and_then(Record::willmore_energy);
+                D == 3 && energy.is_some_and(|energy| energy < 4.0 * PI)
+            }
             Self::Vanished => !has_interface(run.field()),
             Self::AtTheSide => touches_side(run.field()) && !touches_side(&run.case.initial),
         }
@@ -95,6 +102,9 @@ impl fmt::Display for Stop {
             Self::Displacement(_) => f.write_str("the surface has gone as far as it was to go"),
             Self::Motion(_) => f.write_str("the shape is stationary"),
             Self::EnergyAtRest => f.write_str("the energy is stationary"),
+            Self::NoSurface => f.write_str(
+                "the Willmore energy is less than any closed surface has, 8 pi: the time steps were too long for the shape",
+            ),
             Self::Vanished => f.write_str("the shape has vanished"),
             Self::AtTheSide => f.write_str("the shape has come to the side of the box"),
         }

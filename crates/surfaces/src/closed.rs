@@ -251,7 +251,10 @@ fn area(mesh: &TriangleMesh) -> f64 {
 }
 
 /// Signed volume behind some of the faces.
-fn volume<'a>(mesh: &TriangleMesh, faces: impl IntoIterator<Item = &'a [u32; 3]>) -> f64 {
+pub(crate) fn volume<'a>(
+    mesh: &TriangleMesh,
+    faces: impl IntoIterator<Item = &'a [u32; 3]>,
+) -> f64 {
     // From a point close by, so that far-away meshes do not lose digits.
     let origin = mesh.vertices.first().copied().unwrap_or_default();
     let origin = Vector::from_array(origin);

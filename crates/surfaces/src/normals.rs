@@ -1,9 +1,20 @@
 //! Normals of vertices.
 
 use crate::TriangleMesh;
-use crate::vector::{Vector, scaled_normal};
+use crate::vector::{Vector, corners, scaled_normal};
 
 impl TriangleMesh {
+    /// The unit normal of a face; zero for a face without area.
+    pub fn face_normal(&self, face: [u32; 3]) -> [f64; 3] {
+        let normal = scaled_normal(corners(self, face)).normalize_or_zero();
+        normal.to_array()
+    }
+
+    /// The volume that a closed surface encloses, `1/6 sum a . (b x c)`.
+    pub fn volume(&self) -> f64 {
+        crate::closed::volume(self, &self.faces)
+    }
+
     /// Outward unit normals of the vertices: the sums of the unit normals of the faces there, weighted by their angles; zero for
     /// a vertex of no face.
     pub fn vertex_normals(&self) -> Vec<[f64; 3]> {

@@ -1,7 +1,7 @@
 //! Smoothing of meshes by their edges, and the noise that there is to smooth.
 
 use crate::TriangleMesh;
-use crate::vector::Vector;
+use crate::vector::{Vector, corners};
 
 /// The median of the absolute value of a normally distributed number over its standard deviation.
 const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_082;
@@ -100,14 +100,14 @@ impl TriangleMesh {
 
     /// The smooth surface with what it is off the rough one on the average over neighbours: `x + A (y - x)` with the vertices `y` of
     /// `rough`, where `A` is Taubin's smoothing of a field on the edges, which lets half of waves of length `wavelength` pass, and
-    /// in no case those shorter than some five edges.
+    /// in no case those shorter than some four edges.
     ///
     /// Every smoothing takes something of the long waves along; what `y - x` has of these is it, while noise averages out. What is
     /// wrong in the end is the product of two small errors, `(1 - A)(y - x)`; J. W. Tukey called this twicing.
     #[must_use]
     pub fn with_long_waves_of(&self, rough: &Self, wavelength: f64) -> Self {
         const FACTORS: [f64; 2] = [0.5, -0.47];
-        const ROUNDS: [f64; 2] = [20.0, 400.0];
+        const ROUNDS: [f64; 2] = [12.0, 400.0];
         // On a lattice of equilateral triangles a wave has the eigenvalue (wave number times edge)^2 / 4.
         let wave = std::f64::consts::TAU / wavelength * self.mean_edge();
         let eigenvalue = 0.25 * wave * wave;
@@ -135,33 +135,33 @@ impl TriangleMesh {
             let normals: Vec<Vector> = normals
                 .map(|(v, n)| if moves(v) { n.into() } else { Vector::ZERO })
                 .collect();
-            let (now, derivative) = moved.volume_and_derivative(&normals);
+            let derivative = moved.volume_derivative(&normals);
             if derivative == 0.0 {
                 break;
             }
-            let length = (volume - now) / derivative;
+            let length = (volume - moved.volume()) / derivative;
             let offset: Vec<_> = normals.into_iter().map(|n| length * n).collect();
             moved = moved.moved_by(&offset);
         }
         moved
     }
 
-    /// The enclosed volume, and its derivative for velocities of the vertices.
-    fn volume_and_derivative(&self, velocities: &[Vector]) -> (f64, f64) {
-        let normal = |v: u32| velocities[v as usize];
+    /// The derivative of the enclosed volume for velocities of the vertices.
+    fn volume_derivative(&self, velocities: &[Vector]) -> f64 {
+        // From a point close by, so that far-away meshes do not lose digits.
+        let origin = self.vertices.first().copied().unwrap_or_default();
         let sixths = self.faces.iter().map(|&face| {
-            let [a, b, c] = crate::vector::corners(self, face);
-            let [n, o, p] = face.map(normal);
-            let derivative = n.dot(b.cross(c)) + o.dot(c.cross(a)) + p.dot(a.cross(b));
-            (a.dot(b.cross(c)), derivative)
+            let [a, b, c] = corners(self, face).map(|x| x - Vector::from_array(origin));
+            let [u, v, w] = face.map(|vertex| velocities[vertex as usize]);
+            u.dot(b.cross(c)) + v.dot(c.cross(a)) + w.dot(a.cross(b))
         });
-        let (volume, derivative) = sixths.fold((0.0, 0.0), |(v, d), (w, e)| (v + w, d + e));
-        (volume / 6.0, derivative / 6.0)
+        sixths.sum::<f64>() / 6.0
     }
 
-    fn mean_edge(&self) -> f64 {
+    /// Mean length of the edges, each as often as it has faces.
+    pub(crate) fn mean_edge(&self) -> f64 {
         let edges = self.faces.iter().flat_map(|&face| {
-            let [a, b, c] = crate::vector::corners(self, face);
+            let [a, b, c] = corners(self, face);
             [a.distance(b), b.distance(c), c.distance(a)]
         });
         edges.sum::<f64>() / (3 * self.faces.len()).max(1) as f64

@@ -3,6 +3,7 @@
 mod closed;
 mod common;
 mod distances;
+mod fairing;
 mod files;
 mod fuzzing;
 mod isosurfaces;

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 use engine::StepRule;
+use surfaces::Fairing;
 
 use super::flow::{FlowCommand, Shared};
 use crate::cli::{FairOptions, MeshFormat, SayOptions};
@@ -13,12 +14,6 @@ use crate::own::{Noise, OwnMesh};
 
 /// Energies below this have only balls, which have `8 pi`.
 const BALL: f64 = 1.2 * 8.0 * PI;
-/// Most steps that take off noise: the last one ends at 64 times the fourth power of the width of a cell.
-const STEPS: usize = 10;
-/// The first step in units of the square of the inner one, which is the fourth power of a length: it takes off waves of a few
-/// cells only. The others double.
-const FIRST: f64 = 1.0 / 16.0;
-
 impl FlowCommand for FairOptions {
     const NAME: &'static str = "fair";
 
@@ -32,9 +27,6 @@ impl FlowCommand for FairOptions {
             || flow.time.is_some()
             || flow.energy.is_some()
             || flow.steps.is_some();
-        if self.noise.is_some() || !self.ends {
-            self.flow.steps.get_or_insert(STEPS);
-        }
         for (name, value) in [
             ("--noise", self.noise),
             ("--energy-ratio", self.energy_ratio),
@@ -140,7 +132,9 @@ impl FlowCommand for FairOptions {
 
     fn rule(&mut self, mcf_step: f64) -> StepRule {
         if self.noise.is_some() {
-            let first = FIRST * mcf_step * mcf_step;
+            // The inner step is (eps/2)^2.
+            let spacing = 2.0 * mcf_step.sqrt() / self.flow.scheme.eps_over_h;
+            let first = Fairing::first_step(spacing);
             self.flow.tau.get_or_insert(StepRule::Doubling(first));
         }
         self.flow.rule(mcf_step)

@@ -137,7 +137,7 @@ impl Shared<'_> {
         if matches!(rule, StepRule::ByEnergy(_)) {
             stops.push(Stop::EnergyAtRest);
         }
-        stops.extend([Stop::Vanished, Stop::AtTheSide]);
+        stops.extend([Stop::NoSurface, Stop::Vanished, Stop::AtTheSide]);
         stops
     }
 }
@@ -223,7 +223,7 @@ impl<C: FlowCommand> Job<C> {
         let rule = self.command.rule(scales.mcf_step);
         let mut stops = self.command.shared().stops(rule);
         stops.extend(self.command.energy_ratio().map(Stop::EnergyRatio));
-        stops.extend(outlet.stop());
+        stops.extend(outlet.stops(&initial));
         let mut measures = Measure::size(scales.eps);
         measures.extend(outlet.measures(&initial, scales.eps)?);
         Ok(Case {

@@ -1,0 +1,205 @@
+//! Noise, its smoothing, vertices that follow a level set, and files with moved vertices.
+
+use geometry::{Grid, Placement, optimal_profile};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, decode, rewrite};
+
+use crate::common::{cube, sphere, torus};
+
+/// Normally distributed noise of this standard deviation along the normals.
+fn with_noise(mesh: &TriangleMesh, deviation: f64) -> TriangleMesh {
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let mut noisy = mesh.clone();
+    for (x, normal) in noisy.vertices.iter_mut().zip(mesh.vertex_normals()) {
+        let sum: f64 = (0..12).map(|_| rng.random::<f64>()).sum();
+        *x = std::array::from_fn(|i| x[i] + deviation * (sum - 6.0) * normal[i]);
+    }
+    noisy
+}
+
+fn radii(mesh: &TriangleMesh) -> (f64, f64) {
+    let radius = |x: &[f64; 3]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let mean = mesh.vertices.iter().map(radius).sum::<f64>() / mesh.vertices.len() as f64;
+    let off = mesh.vertices.iter().map(|x| (radius(x) - mean).powi(2));
+    (mean, (off.sum::<f64>() / mesh.vertices.len() as f64).sqrt())
+}
+
+#[test]
+fn noise_is_estimated_to_five_percent_and_is_next_to_nothing_on_a_smooth_surface() {
+    for clean in [sphere([0.0; 3], 1.0, 5), torus(1.0, 0.4, 120, 60)] {
+        assert!(clean.noise() < 2e-4, "{}", clean.noise());
+        for deviation in [0.002, 0.01] {
+            let estimate = with_noise(&clean, deviation).noise();
+            assert!(
+                (estimate / deviation - 1.0).abs() < 0.05,
+                "{estimate} for {deviation}"
+            );
+        }
+    }
+}
+
+#[test]
+fn smoothing_keeps_size_with_taubins_factors_and_shrinks_with_laplacian_ones() {
+    let noisy = with_noise(&sphere([0.0; 3], 1.0, 4), 0.01);
+    let (_, before) = radii(&noisy);
+    let (mean, off) = radii(&noisy.smoothed(20, 0.5, -0.53));
+    assert!(
+        (mean - 1.0).abs() < 0.005 && off < 0.4 * before,
+        "{mean} {off}"
+    );
+    let (mean, _) = radii(&noisy.smoothed(20, 0.5, 0.0));
+    assert!(mean < 0.97, "{mean}");
+}
+
+#[test]
+fn the_volume_is_made_what_it_should_be() {
+    let mesh = with_noise(&torus(1.0, 0.4, 60, 30), 0.01);
+    // Far away from the origin, where digits are lost.
+    let mut far = mesh.clone();
+    far.vertices.iter_mut().flatten().for_each(|x| *x += 1e5);
+    for (mesh, digits) in [(mesh, 1e-12), (far, 1e-6)] {
+        let target = 1.01 * mesh.volume();
+        let made = mesh.with_volume(target, |vertex| vertex % 2 == 0);
+        assert!((made.volume() / target - 1.0).abs() < digits);
+        assert!(
+            (0..mesh.vertices.len()).all(|v| v % 2 == 0 || made.vertices[v] == mesh.vertices[v])
+        );
+    }
+}
+
+/// A level set that has moved takes the vertices along; what the grid does not resolve keeps its distance.
+#[test]
+fn vertices_follow_a_sphere_that_grows() {
+    let grid = Grid::<3>::centred(64, 1.0).unwrap();
+    let eps = 2.0 * grid.spacing();
+    let field = |radius: f64| {
+        geometry::Field::from_fn(grid, |x| {
+            let r = x.iter().map(|x| x * x).sum::<f64>().sqrt();
+            optimal_profile(r - radius, eps)
+        })
+    };
+    let mut mesh = sphere([0.0; 3], 1.0, 4);
+    // A thorn of which the grid knows nothing.
+    mesh.vertices[0] = mesh.vertices[0].map(|x| 1.4 * x);
+    let (closed, _) = ClosedMesh::new(mesh).unwrap();
+    let fairing = Fairing::new(closed, 0.0, |x| x[2] < -0.9);
+    // The radius 1 of the mesh is 0.3 in the box.
+    let placement = Placement::about([0.0; 3], 0.3).unwrap();
+    let followed = fairing.follow(placement, &field(0.3), eps).unwrap();
+    let grown = field(0.33);
+    assert_eq!(followed.left_behind(&grown).unwrap(), 0.0);
+    let moved = fairing.faired(&followed, &grown).unwrap();
+    for (vertex, x) in moved.vertices.iter().enumerate() {
+        let radius = x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let expected = match vertex {
+            0 => 1.5,
+            _ if fairing.keeps()[vertex] => 1.0,
+            _ => 1.1,
+        };
+        assert!(
+            (radius - expected).abs() < 2e-3,
+            "{vertex}: {radius}, not {expected}"
+        );
+    }
+    assert!(fairing.keeps().contains(&true));
+    let displacement = fairing.displacement(&followed, &grown).unwrap();
+    assert!((displacement - 0.1).abs() < 1e-3, "{displacement}");
+    assert!(followed.left_behind(&field(0.02)).unwrap() > 0.5);
+}
+
+/// Without a flow: the zero level set of the start, long waves given back.
+#[test]
+fn a_fairing_takes_off_noise_before_the_flow_begins() {
+    let noisy = with_noise(&sphere([0.0; 3], 0.3, 5), 0.003);
+    let volume = noisy.volume();
+    let (closed, _) = ClosedMesh::new(noisy.clone()).unwrap();
+    let fairing = Fairing::new(closed, noisy.noise(), |_| false);
+    let grid = Grid::<3>::centred(64, 1.0).unwrap();
+    let eps = 2.0 * grid.spacing();
+    let placement = Placement::about([0.0; 3], 1.0).unwrap();
+    let distance = MeshDistance::new(fairing.start())
+        .sample(grid, || ())
+        .unwrap();
+    let start = distance.map(|s| optimal_profile(s, eps));
+    let followed = fairing.follow(placement, &start, eps).unwrap();
+    let faired = fairing.faired(&followed, &start).unwrap();
+    let ((_, before), (_, after)) = (radii(&noisy), radii(&faired));
+    assert!(after < 0.5 * before, "{after} of {before}");
+    assert!((faired.volume() / volume - 1.0).abs() < 1e-12);
+    assert!(fairing.time(grid.spacing(), 1.0) > 0.0);
+}
+
+const QUAD: &str = "# a pyramid\r\nmtllib a.mtl\r\nv 0 0 0 1 0.5 0\r\nv 1 0 0\r\nv 1 1 0\r\nv 0 1 0\r\nv 0.5 0.5 1\r\nvt 0 0\r\nvn 0 0 -1\r\nvn 9 9 9\r\n\
+    usemtl red\r\nf 4/1/1 3/1/1 2/1/1 1/1/1\r\ng sides\r\nf 1//2 2//2 5//2\r\nf 2 3 5\r\nf -3 -2 -1\r\nf 4 1 5\r\n";
+
+#[test]
+fn an_obj_file_keeps_everything_but_positions_and_normals() {
+    let mut mesh = decode(QUAD.as_bytes(), "a.obj").unwrap();
+    for x in &mut mesh.vertices {
+        *x = [x[2], 2.0 * x[0], 2.0 * x[1] + 0.125];
+    }
+    let bytes = rewrite(QUAD.as_bytes(), "a.obj", &mesh).unwrap();
+    let text = String::from_utf8(bytes.clone()).unwrap();
+    assert_eq!(decode(&bytes, "a.obj").unwrap().vertices, mesh.vertices);
+    let kept = |text: &str| -> Vec<String> {
+        let other = |line: &&str| !line.starts_with("v ") && !line.starts_with("vn");
+        text.split("\r\n")
+            .filter(other)
+            .map(str::to_owned)
+            .collect()
+    };
+    assert_eq!(kept(&text), kept(QUAD));
+    // The colour stays, the normals follow: the quadrangle now faces the other way along the first axis.
+    assert!(text.contains("v 0 0 0.125 1 0.5 0\r\n"), "{text}");
+    assert!(text.contains("vn -1 0 0\r\n"), "{text}");
+}
+
+#[test]
+fn ply_and_stl_files_keep_everything_but_positions_and_normals() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut closed, _) = ClosedMesh::new(cube(1.0))
+        .map(|(c, w)| (c.into_mesh(), w))
+        .unwrap();
+    closed.normals = Some(closed.vertex_normals());
+    for name in ["cube.ply", "cube.stl"] {
+        let path = folder.path().join(name);
+        surfaces::write(&path, &closed).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let mut moved = decode(&bytes, name).unwrap();
+        assert_eq!(rewrite(&bytes, name, &moved).unwrap(), bytes, "{name}");
+        moved
+            .vertices
+            .iter_mut()
+            .for_each(|x| *x = [2.0 * x[0], x[1], x[2] + 1.0]);
+        let again = rewrite(&bytes, name, &moved).unwrap();
+        assert_eq!(again.len(), bytes.len());
+        let read = decode(&again, name).unwrap();
+        assert_eq!(
+            (read.vertices, read.faces),
+            (moved.vertices, moved.faces),
+            "{name}"
+        );
+    }
+    let ascii = "ply\nformat ascii 1.0\ncomment mine\nelement vertex 4\nproperty uchar red\nproperty float x\nproperty list uchar int \
+        who\nproperty float y\nproperty float z\nelement face 4\nproperty list uchar int vertex_indices\nproperty int label\n\
+        end_header\n7 0 2 5 6 0 0\n8 1 0 0 0\n9 0 1 3 1 0\n10 0 0 0 1\n3 0 2 1 11\n3 0 1 3 12\n3 1 2 3 13\n3 0 3 2 14\n";
+    let mut mesh = decode(ascii.as_bytes(), "a.ply").unwrap();
+    mesh.vertices[0] = [-0.5, 0.25, 0.0];
+    let text = String::from_utf8(rewrite(ascii.as_bytes(), "a.ply", &mesh).unwrap()).unwrap();
+    assert_eq!(
+        text,
+        ascii.replace("7 0 2 5 6 0 0\n", "7 -0.5 2 5 6 0.25 0\n")
+    );
+    let whole = ascii.replace("float", "int");
+    assert!(rewrite(whole.as_bytes(), "a.ply", &mesh).is_err());
+    let stl = "solid of me\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 1 0 0\n   vertex 0 1 0\n  endloop\n endfacet\n\
+        endsolid of me\n";
+    let mut mesh = decode(stl.as_bytes(), "a.stl").unwrap();
+    mesh.vertices[1] = [0.0, 0.0, 2.0];
+    let text = String::from_utf8(rewrite(stl.as_bytes(), "a.stl", &mesh).unwrap()).unwrap();
+    assert!(
+        text.contains(" facet normal -1e0 0e0 0e0\n") && text.contains("   vertex 0e0 0e0 2e0\n"),
+        "{text}"
+    );
+}
