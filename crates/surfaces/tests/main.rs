@@ -6,6 +6,7 @@ mod distances;
 mod files;
 mod fuzzing;
 mod isosurfaces;
+mod remeshing;
 mod shapes;
 
 #[global_allocator]

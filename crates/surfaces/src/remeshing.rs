@@ -1,0 +1,395 @@
+//! Zero level sets as meshes of well-shaped triangles.
+
+use geometry::Field;
+
+use crate::half_edges::{HalfEdges, next, previous};
+use crate::level_set::LevelSet;
+use crate::vector::{Vector, scaled_normal};
+use crate::{ClosedMesh, Error, TriangleMesh, isosurface};
+
+/// Length of edges that is aimed at, in cells: chords as long as this err by as much as the triangles of marching tetrahedra,
+const LENGTH: f64 = 0.8;
+/// and the lengths at which edges are split and collapsed, in parts of it: either brings the new edges closer to it.
+const LONG: f64 = 4.0 / 3.0;
+const SHORT: f64 = 4.0 / 5.0;
+/// Rounds of the remeshing,
+const ROUNDS: usize = 6;
+/// and those that look after the triangles that are still bad.
+const MENDING: usize = 8;
+/// Degrees above which an angle is good.
+const GOOD: f64 = 30.0;
+/// Degrees to which no operation but by need may reduce an angle.
+const FAIR: f64 = 20.0;
+/// Cosine of the angle between a face and the normals of the level set at its corners that no operation makes smaller.
+const AGREEING: f64 = 0.5;
+/// How far from the level set, in cells, points are projected,
+const REACH: f64 = 0.5;
+/// and are on it then.
+const ON: f64 = 1e-4;
+
+/// The surface `{u = 0}` of a phase field, around `{u > 0}`, as a mesh of well-shaped triangles: what to give to other programs.
+pub fn remeshed_surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
+    let level_set = LevelSet::new(u, eps)?;
+    let marched = isosurface(level_set.distance())?;
+    let Some(mut remeshing) = Remeshing::new(&level_set, &marched) else {
+        return Ok(marched);
+    };
+    for _ in 0..ROUNDS {
+        remeshing.split_long_edges();
+        remeshing.collapse_short_edges();
+        remeshing.flip_edges();
+        remeshing.relax();
+    }
+    for _ in 0..MENDING {
+        if !remeshing.mend() {
+            break;
+        }
+    }
+    Ok(match ClosedMesh::new(remeshing.finish()) {
+        Ok((closed, warnings)) if warnings.is_empty() => closed.into_mesh(),
+        _ => marched,
+    })
+}
+
+/// A vertex.
+#[derive(Clone, Copy)]
+struct Point {
+    x: Vector,
+    /// The unit gradient of the level set.
+    normal: Vector,
+}
+
+type Corners = [Point; 3];
+
+/// How good triangles are: the worst of them counts.
+#[derive(Clone, Copy)]
+struct Verdict {
+    /// The smallest cosine between the normals of a face and of its corners.
+    agreement: f64,
+    /// The smallest angle, in degrees.
+    angle: f64,
+}
+
+impl Verdict {
+    fn on(triangles: impl IntoIterator<Item = Corners>) -> Self {
+        let mut verdict = Self {
+            agreement: 1.0,
+            angle: 60.0,
+        };
+        for triangle in triangles {
+            let normal = scaled_normal(triangle.map(|p| p.x)).normalize_or_zero();
+            for corner in triangle {
+                verdict.agreement = verdict.agreement.min(normal.dot(corner.normal));
+            }
+            verdict.angle = verdict.angle.min(smallest_angle(triangle));
+        }
+        verdict
+    }
+
+    /// Whether it is as good as it has to be, or no worse than before.
+    fn is_acceptable_after(self, before: Self) -> bool {
+        self.agreement >= before.agreement.min(AGREEING) && self.angle >= before.angle.min(FAIR)
+    }
+
+    fn is_better_than(self, before: Self) -> bool {
+        self.agreement >= before.agreement.min(AGREEING) && self.angle > before.angle + 1e-3
+    }
+}
+
+/// The smallest angle of a triangle, which is opposite the shortest side, in degrees.
+fn smallest_angle(triangle: Corners) -> f64 {
+    let [a, b, c] = triangle.map(|p| p.x);
+    let sides = [b - a, c - b, a - c];
+    let [u, v, w] = sides.map(Vector::length_squared);
+    let sum = u + v + w;
+    // Twice the product of the lengths of the other two and the cosine.
+    let cosine = sum - 2.0 * u.min(v).min(w);
+    (2.0 * sides[0].cross(sides[1]).length())
+        .atan2(cosine)
+        .to_degrees()
+}
+
+/// A change of the mesh that can be judged before it is made.
+#[derive(Clone, Copy)]
+enum Change {
+    Flip(u32),
+    Collapse(u32, Point),
+    Move(u32, Point),
+}
+
+/// The mesh on its way.
+struct Remeshing<'a> {
+    level_set: &'a LevelSet,
+    spacing: f64,
+    surface: HalfEdges,
+    points: Vec<Point>,
+}
+
+impl<'a> Remeshing<'a> {
+    fn new(level_set: &'a LevelSet, mesh: &TriangleMesh) -> Option<Self> {
+        let normals = mesh.normals.as_ref()?.iter();
+        let points = mesh
+            .vertices
+            .iter()
+            .zip(normals)
+            .map(|(&x, &normal)| Point {
+                x: Vector::from_array(x),
+                normal: Vector::from_array(normal),
+            });
+        let mut remeshing = Self {
+            level_set,
+            spacing: level_set.grid().spacing(),
+            surface: HalfEdges::new(mesh.vertices.len(), &mesh.faces)?,
+            points: points.collect(),
+        };
+        for v in 0..mesh.vertices.len() as u32 {
+            if let Some(point) = remeshing.on_level_set(remeshing.point(v).x) {
+                remeshing.try_out(Change::Move(v, point), Verdict::is_acceptable_after);
+            }
+        }
+        Some(remeshing)
+    }
+
+    fn point(&self, v: u32) -> Point {
+        self.points[v as usize]
+    }
+
+    fn corners(&self, h: u32) -> Corners {
+        [h, next(h), previous(h)].map(|h| self.point(self.surface.from(h)))
+    }
+
+    fn length(&self, h: u32) -> f64 {
+        let [from, to] = [self.surface.from(h), self.surface.to(h)];
+        self.point(from).x.distance(self.point(to).x)
+    }
+
+    /// The point of the level set next to a place; `None` where there is none close by, and next to the faces of the box, where the
+    /// surface may have a cap.
+    fn on_level_set(&self, x: Vector) -> Option<Point> {
+        let (grid, spacing) = (self.level_set.grid(), self.spacing);
+        let inner = |axis: usize| {
+            let place = (x[axis] - grid.origin()[axis]) / spacing;
+            (2.0..grid.cells() as f64 - 3.0).contains(&place)
+        };
+        if !(0..3).all(inner) {
+            return None;
+        }
+        let x = self.level_set.project(x.to_array(), 0.0, REACH * spacing);
+        let x = Vector::from_array(x);
+        let (value, gradient) = self.level_set.value_and_gradient(x);
+        let normal = gradient.try_normalize()?;
+        (value.abs() <= ON * spacing * gradient.length()).then_some(Point { x, normal })
+    }
+
+    fn middle(&self, h: u32) -> Option<Point> {
+        let [from, to] = [self.surface.from(h), self.surface.to(h)];
+        self.on_level_set(self.point(from).x.midpoint(self.point(to).x))
+    }
+
+    /// The triangles that a change replaces, and those in their place; `None` if the topology forbids it.
+    fn verdicts(&self, change: Change) -> Option<[Verdict; 2]> {
+        let surface = &self.surface;
+        match change {
+            Change::Flip(h) => {
+                if !surface.can_flip(h) {
+                    return None;
+                }
+                let ([a, b, c], [_, _, d]) = (self.corners(h), self.corners(surface.twin(h)));
+                let before = Verdict::on([[a, b, c], [b, a, d]]);
+                Some([before, Verdict::on([[d, c, a], [c, d, b]])])
+            }
+            Change::Move(v, point) => {
+                let before = surface.around(v).map(|h| self.corners(h));
+                let after = surface.around(v).map(|h| {
+                    let [_, b, c] = self.corners(h);
+                    [point, b, c]
+                });
+                Some([Verdict::on(before), Verdict::on(after)])
+            }
+            Change::Collapse(h, point) => {
+                let ends = [surface.from(h), surface.to(h)];
+                let around = || ends.iter().flat_map(|&v| surface.around(v));
+                let before = Verdict::on(around().map(|h| self.corners(h)));
+                let kept = around().filter(|&g| {
+                    ![surface.to(g), surface.opposite(g)]
+                        .iter()
+                        .any(|v| ends.contains(v))
+                });
+                let after = Verdict::on(kept.map(|h| {
+                    let [_, b, c] = self.corners(h);
+                    [point, b, c]
+                }));
+                surface.can_collapse(h).then_some([before, after])
+            }
+        }
+    }
+
+    fn make(&mut self, change: Change) {
+        match change {
+            Change::Flip(h) => self.surface.flip(h),
+            Change::Move(v, point) => self.points[v as usize] = point,
+            Change::Collapse(h, point) => {
+                let v = self.surface.from(h);
+                self.surface.collapse(h);
+                self.points[v as usize] = point;
+            }
+        }
+    }
+
+    /// Makes a change if the verdicts after and before are as they should.
+    fn try_out(&mut self, change: Change, wanted: impl Fn(Verdict, Verdict) -> bool) -> bool {
+        let verdicts = self.verdicts(change);
+        let good = verdicts.is_some_and(|[before, after]| wanted(after, before));
+        if good {
+            self.make(change);
+        }
+        good
+    }
+
+    fn split_long_edges(&mut self) {
+        for h in 0..self.surface.len() {
+            if self.surface.leads(h)
+                && self.length(h) > LONG * LENGTH * self.spacing
+                && let Some(point) = self.middle(h)
+            {
+                let (here, there) = (self.corners(h), self.corners(self.surface.twin(h)));
+                let halves = |[a, b, c]: Corners| [[a, point, c], [point, b, c]];
+                let after = Verdict::on(halves(here).into_iter().chain(halves(there)));
+                let before = Verdict::on([here, there]);
+                if after.agreement >= before.agreement.min(AGREEING)
+                    && after.angle >= before.angle.min(0.5 * FAIR)
+                {
+                    self.surface.split(h);
+                    self.points.push(point);
+                }
+            }
+        }
+    }
+
+    /// Whether all edges stay short if an edge collapses to a point.
+    fn stay_short(&self, h: u32, point: Point) -> bool {
+        let ends = [self.surface.from(h), self.surface.to(h)];
+        let mut around = ends.iter().flat_map(|&v| self.surface.around(v));
+        around.all(|g| {
+            let x = self.point(self.surface.to(g)).x;
+            x.distance(point.x) <= LONG * LENGTH * self.spacing
+        })
+    }
+
+    fn collapse_short_edges(&mut self) {
+        for h in 0..self.surface.len() {
+            if self.surface.leads(h) && self.length(h) < SHORT * LENGTH * self.spacing {
+                let ends = [self.surface.from(h), self.surface.to(h)].map(|v| self.point(v));
+                let places = self.middle(h).into_iter().chain(ends);
+                for place in places.collect::<Vec<_>>() {
+                    if self.stay_short(h, place)
+                        && self.try_out(Change::Collapse(h, place), Verdict::is_acceptable_after)
+                    {
+                        break;
+                    }
+                }
+            }
+        }
+    }
+
+    fn flip_edges(&mut self) {
+        for h in 0..self.surface.len() {
+            if self.surface.leads(h) {
+                self.try_out(Change::Flip(h), Verdict::is_better_than);
+            }
+        }
+    }
+
+    /// Moves every vertex to the centre of the triangles around it, along the surface.
+    fn relax(&mut self) {
+        for v in self.surface.vertices().collect::<Vec<_>>() {
+            if let Some(point) = self.on_level_set(self.centre(v)) {
+                self.try_out(Change::Move(v, point), Verdict::is_acceptable_after);
+            }
+        }
+    }
+
+    /// The mean of the triangles around a vertex, in its tangent plane.
+    fn centre(&self, v: u32) -> Vector {
+        let Point { x, normal } = self.point(v);
+        let (mut sum, mut area) = (Vector::ZERO, 0.0);
+        for h in self.surface.around(v) {
+            let corners = self.corners(h).map(|p| p.x);
+            let weight = scaled_normal(corners).length();
+            sum += weight / 3.0 * corners.into_iter().sum::<Vector>();
+            area += weight;
+        }
+        let step = if area > 0.0 {
+            sum / area - x
+        } else {
+            Vector::ZERO
+        };
+        x + step.reject_from_normalized(normal)
+    }
+
+    /// Makes the best of the changes at every bad triangle; whether there were some.
+    fn mend(&mut self) -> bool {
+        let mut mended = false;
+        for h in (0..self.surface.len()).step_by(3) {
+            if !self.surface.exists(h) || smallest_angle(self.corners(h)) >= GOOD {
+                continue;
+            }
+            let mut best: Option<(f64, Change)> = None;
+            for change in self.changes(h) {
+                if let Some([before, after]) = self.verdicts(change)
+                    && after.is_better_than(before)
+                    && best.is_none_or(|(angle, _)| after.angle > angle)
+                {
+                    best = Some((after.angle, change));
+                }
+            }
+            if let Some((_, change)) = best {
+                self.make(change);
+                mended = true;
+            }
+        }
+        mended
+    }
+
+    /// What may be done about a triangle.
+    fn changes(&self, h: u32) -> Vec<Change> {
+        let mut changes = Vec::new();
+        for side in [h, next(h), previous(h)] {
+            changes.push(Change::Flip(side));
+            let v = self.surface.from(side);
+            let ends = [v, self.surface.to(side)].map(|v| self.point(v));
+            let places = self.middle(side).into_iter().chain(ends);
+            let places = places.filter(|&place| self.stay_short(side, place));
+            changes.extend(places.map(|place| Change::Collapse(side, place)));
+            let moved = self.steps(v).filter_map(|x| self.on_level_set(x));
+            changes.extend(moved.map(|point| Change::Move(v, point)));
+        }
+        changes
+    }
+
+    /// Places around a vertex in its tangent plane.
+    fn steps(&self, v: u32) -> impl Iterator<Item = Vector> {
+        let Point { x, normal } = self.point(v);
+        let (a, b) = normal.any_orthonormal_pair();
+        let steps = [0.2, 0.1, 0.05].map(|part| part * LENGTH * self.spacing);
+        let directions = [a, b, -a, -b, a + b, a - b, b - a, -a - b];
+        let around = steps
+            .into_iter()
+            .flat_map(move |step| directions.map(|direction| x + step * direction));
+        around.chain([self.centre(v)])
+    }
+
+    fn finish(self) -> TriangleMesh {
+        let mesh = TriangleMesh {
+            vertices: self.points.iter().map(|p| p.x.to_array()).collect(),
+            faces: self.surface.faces().collect(),
+            normals: Some(self.points.iter().map(|p| p.normal.to_array()).collect()),
+        };
+        let kept: Vec<usize> = self.surface.vertices().map(|v| v as usize).collect();
+        let mut index = vec![0; mesh.vertices.len()];
+        for (new, &old) in kept.iter().enumerate() {
+            index[old] = new as u32;
+        }
+        mesh.reindexed(&kept, |v| index[v as usize])
+    }
+}
