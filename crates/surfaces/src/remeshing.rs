@@ -8,7 +8,7 @@ use crate::vector::{Vector, scaled_normal};
 use crate::{ClosedMesh, Error, TriangleMesh, isosurface};
 
 /// Length of edges that is aimed at, in cells: chords as long as this err by as much as the triangles of marching tetrahedra,
-const LENGTH: f64 = 0.8;
+const LENGTH: f64 = 2.0 / 3.0;
 /// and the lengths at which edges are split and collapsed, in parts of it: either brings the new edges closer to it.
 const LONG: f64 = 4.0 / 3.0;
 const SHORT: f64 = 4.0 / 5.0;
@@ -163,22 +163,29 @@ impl<'a> Remeshing<'a> {
         self.point(from).x.distance(self.point(to).x)
     }
 
-    /// The point of the level set next to a place; `None` where there is none close by, and next to the faces of the box, where the
-    /// surface may have a cap.
-    fn on_level_set(&self, x: Vector) -> Option<Point> {
-        let (grid, spacing) = (self.level_set.grid(), self.spacing);
-        let inner = |axis: usize| {
-            let place = (x[axis] - grid.origin()[axis]) / spacing;
-            (2.0..grid.cells() as f64 - 3.0).contains(&place)
+    /// Whether a place is between the nodes: what lies further out is a cap, which stays as it is.
+    fn is_free(&self, x: Vector) -> bool {
+        let grid = self.level_set.grid();
+        let between = |axis: usize| {
+            let place = (x[axis] - grid.origin()[axis]) / self.spacing;
+            (0.0..=grid.cells() as f64 - 1.0).contains(&place)
         };
-        if !(0..3).all(inner) {
-            return None;
-        }
-        let x = self.level_set.project(x.to_array(), 0.0, REACH * spacing);
-        let x = Vector::from_array(x);
+        (0..3).all(between)
+    }
+
+    fn has_free_ends(&self, h: u32) -> bool {
+        let ends = [self.surface.from(h), self.surface.to(h)];
+        ends.into_iter().all(|v| self.is_free(self.point(v).x))
+    }
+
+    /// The point of the level set next to a place; `None` where there is none close by.
+    fn on_level_set(&self, x: Vector) -> Option<Point> {
+        let reach = REACH * self.spacing;
+        let x = Vector::from_array(self.level_set.project(x.to_array(), 0.0, reach));
         let (value, gradient) = self.level_set.value_and_gradient(x);
         let normal = gradient.try_normalize()?;
-        (value.abs() <= ON * spacing * gradient.length()).then_some(Point { x, normal })
+        let on = value.abs() <= ON * self.spacing * gradient.length() && self.is_free(x);
+        on.then_some(Point { x, normal })
     }
 
     fn middle(&self, h: u32) -> Option<Point> {
@@ -191,7 +198,7 @@ impl<'a> Remeshing<'a> {
         let surface = &self.surface;
         match change {
             Change::Flip(h) => {
-                if !surface.can_flip(h) {
+                if !self.has_free_ends(h) || !surface.can_flip(h) {
                     return None;
                 }
                 let ([a, b, c], [_, _, d]) = (self.corners(h), self.corners(surface.twin(h)));
@@ -199,6 +206,9 @@ impl<'a> Remeshing<'a> {
                 Some([before, Verdict::on([[d, c, a], [c, d, b]])])
             }
             Change::Move(v, point) => {
+                if !self.is_free(self.point(v).x) {
+                    return None;
+                }
                 let before = surface.around(v).map(|h| self.corners(h));
                 let after = surface.around(v).map(|h| {
                     let [_, b, c] = self.corners(h);
@@ -207,6 +217,9 @@ impl<'a> Remeshing<'a> {
                 Some([Verdict::on(before), Verdict::on(after)])
             }
             Change::Collapse(h, point) => {
+                if !self.has_free_ends(h) || !surface.can_collapse(h) {
+                    return None;
+                }
                 let ends = [surface.from(h), surface.to(h)];
                 let around = || ends.iter().flat_map(|&v| surface.around(v));
                 let before = Verdict::on(around().map(|h| self.corners(h)));
@@ -219,7 +232,7 @@ impl<'a> Remeshing<'a> {
                     let [_, b, c] = self.corners(h);
                     [point, b, c]
                 }));
-                surface.can_collapse(h).then_some([before, after])
+                Some([before, after])
             }
         }
     }
@@ -249,6 +262,7 @@ impl<'a> Remeshing<'a> {
     fn split_long_edges(&mut self) {
         for h in 0..self.surface.len() {
             if self.surface.leads(h)
+                && self.has_free_ends(h)
                 && self.length(h) > LONG * LENGTH * self.spacing
                 && let Some(point) = self.middle(h)
             {
@@ -380,6 +394,45 @@ impl<'a> Remeshing<'a> {
     }
 
     fn finish(self) -> TriangleMesh {
+        if std::env::var("DIAG").is_ok() {
+            let mut kinds = std::collections::BTreeMap::new();
+            for h in (0..self.surface.len()).step_by(3) {
+                if !self.surface.exists(h) {
+                    continue;
+                }
+                let c = self.corners(h);
+                let a = smallest_angle(c);
+                if a < 25.0 {
+                    let off = c
+                        .iter()
+                        .filter(|p| self.on_level_set(p.x).is_none())
+                        .count();
+                    let moved = c
+                        .iter()
+                        .filter(|p| {
+                            self.on_level_set(p.x)
+                                .is_some_and(|q| q.x.distance(p.x) > 1e-3 * self.spacing)
+                        })
+                        .count();
+                    let v = Verdict::on([c]);
+                    let val = c.map(|p| {
+                        let (v, g) = self.level_set.value_and_gradient(p.x);
+                        (
+                            (v / self.spacing * 1000.0).round() / 1000.0,
+                            (100.0 * g.length()).round() / 100.0,
+                        )
+                    });
+                    let valence = [h, next(h), previous(h)]
+                        .map(|h| self.surface.valence(self.surface.from(h)));
+                    *kinds.entry((off, moved)).or_insert(0) += 1;
+                    eprintln!(
+                        "bad {a:.1} off {off} moved {moved} agreement {:.2} {val:?} {valence:?}",
+                        v.agreement
+                    );
+                }
+            }
+            eprintln!("{kinds:?}");
+        }
         let mesh = TriangleMesh {
             vertices: self.points.iter().map(|p| p.x.to_array()).collect(),
             faces: self.surface.faces().collect(),
