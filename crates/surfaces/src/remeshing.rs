@@ -14,8 +14,10 @@ const LONG: f64 = 4.0 / 3.0;
 const SHORT: f64 = 4.0 / 5.0;
 /// Rounds of the remeshing,
 const ROUNDS: usize = 3;
-/// and at most so many that mend the triangles that are still bad.
+/// and at most so many that mend the triangles that are still bad,
 const MENDING: usize = 8;
+/// and the part of all triangles that they look at, at most: where most are bad, there is no smooth surface, and no end.
+const MENDED: f64 = 0.25;
 /// Degrees from which on an angle is good.
 const GOOD: f64 = 30.0;
 /// Angles of fewer degrees may only become larger.
@@ -60,11 +62,7 @@ pub fn remeshed_surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
         remeshing.flip_edges();
         remeshing.relax();
     }
-    for _ in 0..MENDING {
-        if !remeshing.mend() {
-            break;
-        }
-    }
+    remeshing.mend();
     Ok(match ClosedMesh::new(remeshing.finish()) {
         Ok((closed, warnings)) if warnings.is_empty() => closed.into_mesh(),
         _ => marched,
@@ -156,18 +154,12 @@ impl<'a> Remeshing<'a> {
                 x: Vector::from_array(x),
                 normal: Vector::from_array(normal),
             });
-        let mut remeshing = Self {
+        Some(Self {
             level_set,
             spacing: level_set.grid().spacing(),
             surface: HalfEdges::new(mesh.vertices.len(), &mesh.faces)?,
             points: points.collect(),
-        };
-        for v in 0..mesh.vertices.len() as u32 {
-            if let Some(point) = remeshing.on_level_set(remeshing.point(v).x) {
-                remeshing.try_out(Change::Move(v, point), Verdict::is_acceptable_after);
-            }
-        }
-        Some(remeshing)
+        })
     }
 
     fn point(&self, v: u32) -> Point {
@@ -284,12 +276,9 @@ impl<'a> Remeshing<'a> {
                 && let Some(point) = self.middle(h)
             {
                 let (here, there) = (self.corners(h), self.corners(self.surface.twin(h)));
-                let halves = |[a, b, c]: Corners| [[a, point, c], [point, b, c]];
-                let after = Verdict::on(halves(here).into_iter().chain(halves(there)));
-                let before = Verdict::on([here, there]);
-                if after.agreement >= before.agreement.min(AGREEING)
-                    && after.angle >= before.angle.min(0.5 * FAIR)
-                {
+                let halves = [here, there].map(|[a, b, c]| [[a, point, c], [point, b, c]]);
+                let after = Verdict::on(halves.into_iter().flatten());
+                if after.is_acceptable_after(Verdict::on([here, there])) {
                     self.surface.split(h);
                     self.points.push(point);
                 }
@@ -339,11 +328,15 @@ impl<'a> Remeshing<'a> {
         }
     }
 
-    /// Moves every vertex to the centre of the triangles around it, along the surface.
+    /// Moves every vertex to the centre of the triangles around it, along the surface, or at least on the level set.
     fn relax(&mut self) {
         for v in self.surface.vertices().collect::<Vec<_>>() {
-            if let Some(point) = self.on_level_set(self.centre(v)) {
-                self.try_out(Change::Move(v, point), Verdict::is_acceptable_after);
+            for place in [self.centre(v), self.point(v).x] {
+                if let Some(point) = self.on_level_set(place)
+                    && self.try_out(Change::Move(v, point), Verdict::is_acceptable_after)
+                {
+                    break;
+                }
             }
         }
     }
@@ -366,28 +359,38 @@ impl<'a> Remeshing<'a> {
         x + step.reject_from_normalized(normal)
     }
 
-    /// Makes the best of the changes at every bad triangle; whether there were some.
-    fn mend(&mut self) -> bool {
-        let mut mended = false;
-        for h in (0..self.surface.len()).step_by(3) {
-            if !self.surface.exists(h) || smallest_angle(self.corners(h)) >= GOOD {
-                continue;
-            }
-            let mut best: Option<(f64, Change)> = None;
-            for change in self.changes(h) {
-                if let Some([before, after]) = self.verdicts(change)
-                    && after.is_better_than(before)
-                    && best.is_none_or(|(angle, _)| after.angle > angle)
-                {
-                    best = Some((after.angle, change));
+    /// Makes the best of all changes at every triangle that is still bad, until none is better than what is there.
+    fn mend(&mut self) {
+        let mut left = (MENDED * f64::from(self.surface.len() / 3)) as usize;
+        for _ in 0..MENDING {
+            let mut mended = false;
+            for h in (0..self.surface.len()).step_by(3) {
+                let bad = self.surface.exists(h) && smallest_angle(self.corners(h)) < GOOD;
+                if bad && self.has_free_ends(h) && left > 0 {
+                    left -= 1;
+                    mended |= self.mend_triangle(h);
                 }
             }
-            if let Some((_, change)) = best {
-                self.make(change);
-                mended = true;
+            if !mended {
+                break;
             }
         }
-        mended
+    }
+
+    fn mend_triangle(&mut self, h: u32) -> bool {
+        let mut best: Option<(f64, Change)> = None;
+        for change in self.changes(h) {
+            if let Some([before, after]) = self.verdicts(change)
+                && after.is_better_than(before)
+                && best.is_none_or(|(angle, _)| after.angle > angle)
+            {
+                best = Some((after.angle, change));
+            }
+        }
+        if let Some((_, change)) = best {
+            self.make(change);
+        }
+        best.is_some()
     }
 
     /// What may be done about a triangle.

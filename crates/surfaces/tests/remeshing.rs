@@ -235,76 +235,132 @@ fn spheres_are_as_accurate_as_those_of_marching_tetrahedra() {
 }
 
 #[test]
-fn hard() {
-    let h: f64 = 1.0 / 32.0;
-    let mut list: Vec<(String, Field<3>)> = Vec::new();
+fn thin_and_small_parts_keep_their_topology() {
+    let h = 1.0_f64 / 32.0;
     for radius in [0.3, 0.5, 0.7, 1.0, 1.5, 2.0] {
+        let ball = |x: f64| Ball::new([x, 0.0, 0.0], 0.15).unwrap();
+        let neck = Capsule::new([-0.2, 0.0, 0.0], [0.2, 0.0, 0.0], radius * h).unwrap();
+        let dumbbell = ball(-0.2).union(ball(0.2)).union(neck);
+        let plate = Cuboid::new([0.3, 0.3, radius * h]).unwrap();
+        let crumb = Ball::new([0.0; 3], radius * h).unwrap();
         for offset in [[0.0; 3], [0.4, 0.3, 0.1], [0.5, 0.5, 0.5]] {
             let grid = grid(32, offset);
-            let balls = Ball::new([-0.2, 0.0, 0.0], 0.15)
-                .unwrap()
-                .union(Ball::new([0.2, 0.0, 0.0], 0.15).unwrap());
-            let neck = Capsule::new([-0.2, 0.0, 0.0], [0.2, 0.0, 0.0], radius * h).unwrap();
-            list.push((
-                format!("neck {radius}"),
-                phase_field(grid, &balls.union(neck), 2.0 * h).unwrap(),
-            ));
-            let plate = Cuboid::new([0.3, 0.3, radius * h]).unwrap();
-            list.push((
-                format!("plate {radius}"),
-                phase_field(grid, &plate, 2.0 * h).unwrap(),
-            ));
-            let ball = Ball::new([0.0; 3], radius * h).unwrap();
-            list.push((
-                format!("ball {radius}"),
-                phase_field(grid, &ball, 2.0 * h).unwrap(),
-            ));
+            for (name, u) in [
+                ("dumbbell", phase_field(grid, &dumbbell, 2.0 * h).unwrap()),
+                ("plate", phase_field(grid, &plate, 2.0 * h).unwrap()),
+                ("crumb", phase_field(grid, &crumb, 2.0 * h).unwrap()),
+            ] {
+                if phase_field_surface(&u, 2.0 * h).unwrap().faces.is_empty() {
+                    continue;
+                }
+                let [_, remeshed] = both(&u, 2.0 * h);
+                let angles = smallest_angles(remeshed.mesh());
+                let crossings = crossings(remeshed.mesh(), h);
+                println!(
+                    "{name} of {radius} cells: from {:.1} degrees, {crossings} crossings, below 25 {}, shortest {}",
+                    angles[0],
+                    part_below(&angles, 25.0),
+                    shortest_edge(remeshed.mesh()) / h
+                );
+                assert!(
+                    angles[0] > 15.0,
+                    "{name} of {radius} cells: {} degrees",
+                    angles[0]
+                );
+                assert_eq!(crossings, 0, "{name} of {radius} cells");
+            }
         }
     }
+}
+
+#[test]
+fn caps_stay_where_they_are() {
+    let grid = Grid::<3>::centred(32, 1.0).unwrap();
+    let eps = 2.0 * grid.spacing();
+    let cylinder = |[x, y, _]: [f64; 3]| x.hypot(y) - 0.3;
+    let u = phase_field(grid, &cylinder, eps).unwrap();
+    let [marched, remeshed] = both(&u, eps);
+    let (a, b) = (marched.bounding_box(), remeshed.bounding_box());
+    assert_eq!((a.lower[2], a.upper[2]), (b.lower[2], b.upper[2]));
+    let volume = PI * 0.09 * 31.0 / 32.0;
+    assert!((remeshed.volume() / volume - 1.0).abs() < 2e-3);
+    assert_eq!(crossings(remeshed.mesh(), grid.spacing()), 0);
+    // All that is left of the bad triangles.
+    let bad = part_below(&smallest_angles(remeshed.mesh()), 15.0);
+    assert!(bad < 0.2, "{bad}");
+}
+
+#[test]
+fn fields_without_a_smooth_surface_stay_closed() {
+    let grid = Grid::<3>::centred(16, 1.0).unwrap();
     let mut numbers = Numbers(5);
-    let g = grid(24, [0.0; 3]);
-    let values = (0..g.len()).map(|_| if numbers.next() < 0.3 { 1.0 } else { -1.0 });
-    list.push((
-        "noise".into(),
-        Field::from_values(g, values.collect()).unwrap(),
-    ));
-    let values = (0..g.len()).map(|_| 2.0 * numbers.next() - 1.2);
-    list.push((
-        "smooth noise".into(),
-        Field::from_values(g, values.collect()).unwrap(),
-    ));
-    list.push((
-        "cylinder".into(),
-        Field::from_fn(g, |[x, y, _]| 0.3 - x.hypot(y)),
-    ));
-    let cuboid = Cuboid::new([0.25; 3]).unwrap();
-    list.push((
-        "cuboid".into(),
-        phase_field(grid(32, [0.0; 3]), &cuboid, 2.0 * h).unwrap(),
-    ));
-    for (name, u) in list {
-        let h = u.grid().spacing();
-        if phase_field_surface(&u, 2.0 * h).unwrap().faces.is_empty() {
-            continue;
+    for levels in [1.0, 2.0, 1e3] {
+        let values =
+            (0..grid.len()).map(|_| ((2.0 * numbers.next() - 1.4) * levels).round() / levels);
+        let u = Field::from_values(grid, values.collect()).unwrap();
+        both(&u.map(|u| u.clamp(-1.0, 1.0)), 2.0 * grid.spacing());
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let grid = grid(32, [0.1, 0.2, 0.3]);
+    let eps = 2.0 * grid.spacing();
+    let u = phase_field(grid, &Torus::new(0.27, 0.1).unwrap(), eps).unwrap();
+    let by = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| remeshed_surface(&u, eps).unwrap())
+    };
+    assert_eq!(by(1), by(3));
+}
+
+#[test]
+fn wrong_fields_and_widths_are_refused() {
+    let grid = Grid::<3>::centred(8, 1.0).unwrap();
+    let mut u = Field::constant(grid, -1.0);
+    assert!(remeshed_surface(&u, 0.1).unwrap().faces.is_empty());
+    for eps in [0.0, -1.0, f64::NAN] {
+        let error = remeshed_surface(&u, eps).unwrap_err();
+        assert!(matches!(error, Error::InvalidParameter { .. }));
+    }
+    u.values_mut()[17] = f64::NAN;
+    let error = remeshed_surface(&u, 0.1).unwrap_err();
+    assert!(error.to_string().contains("node 17 is NaN"), "{error}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 60,
+        rng_seed: RngSeed::Fixed(21),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    /// Random smooth fields, also rounded ones.
+    #[test]
+    fn the_topology_is_that_of_marching_tetrahedra(
+        seed in any::<u64>(),
+        cells in 3..16_usize,
+        levels in prop::sample::select(vec![0.0, 2.0]),
+    ) {
+        let grid = Grid::<3>::new(cells, 1.0).unwrap();
+        let mut numbers = Numbers(seed);
+        let waves: Vec<([f64; 3], f64, f64)> = (0..6)
+            .map(|_| (numbers.point([-9.0; 3], [9.0; 3]), 6.3 * numbers.next(), numbers.next()))
+            .collect();
+        let u = Field::from_fn(grid, |x| {
+            let wave = |(k, phase, amplitude): &([f64; 3], f64, f64)| {
+                amplitude * (dot(*k, x) + phase).sin()
+            };
+            let u = waves.iter().map(wave).sum::<f64>().tanh();
+            if levels > 0.0 { (u * levels).round() / levels } else { u }
+        });
+        let eps = 2.0 * grid.spacing();
+        if !phase_field_surface(&u, eps).unwrap().faces.is_empty() {
+            both(&u, eps);
         }
-        let [marched, remeshed] = both(&u, 2.0 * h);
-        let (before, after) = (
-            smallest_angles(marched.mesh()),
-            smallest_angles(remeshed.mesh()),
-        );
-        println!(
-            "{name}: {} {:.1}% -> {} min {:.2} <15 {:.2}% <25 {:.2}% shortest {:.2} volume {:.6} {:.6} crossings {} {}",
-            before.len(),
-            100.0 * part_below(&before, 15.0),
-            after.len(),
-            after[0],
-            100.0 * part_below(&after, 15.0),
-            100.0 * part_below(&after, 25.0),
-            shortest_edge(remeshed.mesh()) / h,
-            marched.volume(),
-            remeshed.volume(),
-            crossings(marched.mesh(), h),
-            crossings(remeshed.mesh(), h)
-        );
     }
 }
