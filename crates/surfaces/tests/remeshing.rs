@@ -224,10 +224,10 @@ fn spheres_are_as_accurate_as_those_of_marching_tetrahedra() {
         }
         previous = Some(errors);
         let mesh = remeshed_surface(&u, 2.0 * h).unwrap();
-        let off = mesh.vertices.iter().map(|&x| ball.signed_distance(x).abs());
-        let off = off.fold(0.0, f64::max);
-        println!("off {off:e}");
         for (x, normal) in mesh.vertices.iter().zip(mesh.normals.unwrap()) {
+            // Third order, as vertices on edges of the lattice.
+            let error = ball.signed_distance(*x).abs();
+            assert!(error < 0.07 * (h / 0.3).powi(3) * 0.3, "{error} at {x:?}");
             let cosine = dot(unit(minus(*x, centre)), normal);
             assert!((cosine - 1.0).abs() < 1e-4, "{cosine} at {x:?}");
         }
@@ -256,12 +256,6 @@ fn thin_and_small_parts_keep_their_topology() {
                 let [_, remeshed] = both(&u, 2.0 * h);
                 let angles = smallest_angles(remeshed.mesh());
                 let crossings = crossings(remeshed.mesh(), h);
-                println!(
-                    "{name} of {radius} cells: from {:.1} degrees, {crossings} crossings, below 25 {}, shortest {}",
-                    angles[0],
-                    part_below(&angles, 25.0),
-                    shortest_edge(remeshed.mesh()) / h
-                );
                 assert!(
                     angles[0] > 15.0,
                     "{name} of {radius} cells: {} degrees",
@@ -292,7 +286,7 @@ fn caps_stay_where_they_are() {
 
 #[test]
 fn fields_without_a_smooth_surface_stay_closed() {
-    let grid = Grid::<3>::centred(16, 1.0).unwrap();
+    let grid = Grid::<3>::centred(12, 1.0).unwrap();
     let mut numbers = Numbers(5);
     for levels in [1.0, 2.0, 1e3] {
         let values =
@@ -333,7 +327,7 @@ fn wrong_fields_and_widths_are_refused() {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        cases: 60,
+        cases: 40,
         rng_seed: RngSeed::Fixed(21),
         failure_persistence: None,
         ..ProptestConfig::default()
@@ -343,7 +337,7 @@ proptest! {
     #[test]
     fn the_topology_is_that_of_marching_tetrahedra(
         seed in any::<u64>(),
-        cells in 3..16_usize,
+        cells in 3..13_usize,
         levels in prop::sample::select(vec![0.0, 2.0]),
     ) {
         let grid = Grid::<3>::new(cells, 1.0).unwrap();
