@@ -51,6 +51,8 @@
 //! - A [`TriangleMesh`] may be anything; a [`ClosedMesh`] bounds a solid, and only that has a
 //!   volume and a [`MeshDistance`].
 //! - Vertices and faces are counted from zero, lines of files from one.
+//! - Two kinds of isosurfaces: [`phase_field_surface`] is quick and has the symmetries of the field, for measurements and pictures;
+//!   [`remeshed_surface`] has well-shaped triangles, for files that other programs read.
 //! - Meshes are not periodic: they lie in the box of a grid, with a margin of a few `eps`.
 //! - Same input, same bytes, for any number of threads.
 
