@@ -218,7 +218,7 @@ impl Space {
     }
 
     fn mesh(&self, u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
-        Ok(self.in_own_coordinates(surfaces::phase_field_surface(u, eps)?))
+        Ok(self.in_own_coordinates(surfaces::remeshed_surface(u, eps)?))
     }
 }
 

@@ -32,6 +32,11 @@ impl LevelSet {
         Ok(Self { distance })
     }
 
+    /// The distances at the nodes.
+    pub(crate) fn distance(&self) -> &Field<3> {
+        &self.distance
+    }
+
     /// The grid.
     pub(crate) fn grid(&self) -> &Grid<3> {
         self.distance.grid()
@@ -68,7 +73,8 @@ impl LevelSet {
         points.par_iter().map(|&x| self.value(x)).collect()
     }
 
-    fn value_and_gradient(&self, x: Vector) -> (f64, Vector) {
+    /// The distance at `x` and its gradient.
+    pub(crate) fn value_and_gradient(&self, x: Vector) -> (f64, Vector) {
         let grid = self.grid();
         let cells = grid.cells();
         let mut nodes = [[0; 4]; 3];

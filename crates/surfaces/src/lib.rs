@@ -51,6 +51,8 @@
 //! - A [`TriangleMesh`] may be anything; a [`ClosedMesh`] bounds a solid, and only that has a
 //!   volume and a [`MeshDistance`].
 //! - Vertices and faces are counted from zero, lines of files from one.
+//! - Two kinds of isosurfaces: [`phase_field_surface`] is quick and has the symmetries of the field, for measurements and pictures;
+//!   [`remeshed_surface`] has well-shaped triangles, for files that other programs read.
 //! - Meshes are not periodic: they lie in the box of a grid, with a margin of a few `eps`.
 //! - Same input, same bytes, for any number of threads.
 
@@ -59,12 +61,14 @@ mod distance;
 mod error;
 mod fairing;
 mod format;
+mod half_edges;
 mod hierarchy;
 mod isosurface;
 mod level_set;
 mod mesh;
 mod normals;
 mod read;
+mod remeshing;
 mod rewrite;
 pub mod samples;
 pub mod shapes;
@@ -84,6 +88,7 @@ pub use isosurface::{isosurface, phase_field_surface};
 pub use mesh::TriangleMesh;
 pub use read::error::FormatError;
 pub use read::{decode, read};
+pub use remeshing::remeshed_surface;
 pub use rewrite::rewrite;
 pub use signs::mend_signs;
 pub use write::write;

@@ -7,6 +7,7 @@ mod fairing;
 mod files;
 mod fuzzing;
 mod isosurfaces;
+mod remeshing;
 mod shapes;
 
 #[global_allocator]

@@ -48,7 +48,7 @@ pub fn run(mut options: SampleOptions, say: SayOptions) -> Result<ExitCode, Erro
         Loaded::Plane(start, _) => write(start, options, &path)?,
         Loaded::Space(start) if noise > 0.0 => {
             let u = without(start.field, &options.without)?;
-            let mut mesh = surfaces::phase_field_surface(&u, eps(&u))?;
+            let mut mesh = surfaces::remeshed_surface(&u, eps(&u))?;
             mesh.roughen(noise, options.seed);
             surfaces::write(&path, &start.outlet.in_own_coordinates(mesh))?;
         }
