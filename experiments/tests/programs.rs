@@ -13,6 +13,7 @@ use report::Summary;
 
 const CALIBRATION: &str = env!("CARGO_BIN_EXE_calibration");
 const CIRCLES: &str = env!("CARGO_BIN_EXE_circle_convergence");
+const DENOISING: &str = env!("CARGO_BIN_EXE_denoising");
 const INPAINTING: &str = env!("CARGO_BIN_EXE_inpainting_2d");
 const LEARNED: &str = env!("CARGO_BIN_EXE_learned_networks");
 const CROSS: &str = env!("CARGO_BIN_EXE_cross");
@@ -494,6 +495,33 @@ fn the_quick_timing_table_has_a_row_for_every_method() {
         assert!(number("seconds") >= number("measured_seconds"), "{row}");
     }
     assert!(metric("armadillo.hybrid.hvp") >= 1.0 && metric("armadillo.fe_implicit.hvp") >= 1.0);
+}
+
+#[test]
+#[ignore = "a whole quick run: see scripts/test_long"]
+fn the_quick_denoising_takes_off_noise_and_keeps_the_volume() {
+    let root = tempfile::tempdir().unwrap();
+    let output = run(
+        DENOISING,
+        root.path(),
+        &["--quick", "--quiet", "--output", "out"],
+    );
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && message.is_empty(), "{message}");
+    let text = fs::read_to_string(root.path().join("out/summary.json")).unwrap();
+    let summary = Summary::from_json(&text).unwrap();
+    for mesh in ["figure", "lever"] {
+        let metric = |name: &str| summary.get(&format!("{mesh}.noise0.3.{name}")).unwrap();
+        assert!(metric("fair.rms") < 0.5 * metric("noisy.rms"), "{text}");
+        assert!(
+            metric("fair.normals") < 0.5 * metric("noisy.normals"),
+            "{text}"
+        );
+        assert!(
+            (metric("fair.volume") - metric("noisy.volume")).abs() < 1e-6,
+            "{text}"
+        );
+    }
 }
 
 #[test]
