@@ -103,12 +103,12 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
         Vec::new()
     }
 
-    /// Adds to the folder of a run what it takes to resume it,
-    fn store(&self, _: &mut RunDirectory) -> Result<(), Error> {
-        Ok(())
+    /// The name and the bytes of a file that it takes to resume a run, if there is one,
+    fn input(&self) -> Option<(&str, &[u8])> {
+        None
     }
 
-    /// and takes it from there.
+    /// and what becomes of it there.
     fn restore(&mut self, _: &StoredRun) -> Result<(), Error> {
         Ok(())
     }
@@ -229,7 +229,12 @@ impl Outlet<3> for Space {
     }
 
     fn picture(&self, u: &Field<3>, eps: f64) -> Result<Picture, Error> {
-        let scene = Scene::new(u, eps)?.up(self.up).framing(Framing::Domain);
+        // A mesh whose vertices follow moves by so little that the pictures of a film do not jump.
+        let framing = match self.own {
+            Some(_) => Framing::Surface,
+            None => Framing::Domain,
+        };
+        let scene = Scene::new(u, eps)?.up(self.up).framing(framing);
         Ok(scene.azimuth(AZIMUTH).elevation(ELEVATION).render(PIXELS)?)
     }
 
@@ -271,8 +276,8 @@ impl Outlet<3> for Space {
         own.map_or(Vec::new(), |own| own.stops(start.grid().spacing(), self))
     }
 
-    fn store(&self, run: &mut RunDirectory) -> Result<(), Error> {
-        self.own.as_ref().map_or(Ok(()), |own| own.store(run))
+    fn input(&self) -> Option<(&str, &[u8])> {
+        self.own.as_ref().map(OwnMesh::input)
     }
 
     fn restore(&mut self, stored: &StoredRun) -> Result<(), Error> {

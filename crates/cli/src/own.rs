@@ -7,7 +7,7 @@ use std::sync::Arc;
 use engine::{DISPLACEMENT, Measure, Stop};
 use geometry::file::write_atomically;
 use geometry::{Field, SignedDistance};
-use runs::{RunDirectory, StoredRun};
+use runs::StoredRun;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use surfaces::shapes::Region;
@@ -41,6 +41,7 @@ struct Loaded {
 }
 
 /// What there is to take off.
+#[derive(Clone, Copy)]
 pub enum Noise {
     /// Nothing: the flow ends for another reason, and vertices simply follow.
     None,
@@ -125,11 +126,9 @@ impl OwnMesh {
         self.load(bytes, mesh, closed)
     }
 
-    /// Puts a copy of the input into the folder of a run.
-    pub fn store(&self, run: &mut RunDirectory) -> Result<(), Error> {
-        let bytes = &self.loaded().bytes;
-        run.write_file(&self.file, |out| out.write_all(bytes))?;
-        Ok(())
+    /// The copy of the input for the folder of a run, and its name.
+    pub fn input(&self) -> (&str, &[u8]) {
+        (&self.file, &self.loaded().bytes)
     }
 
     fn loaded(&self) -> &Loaded {

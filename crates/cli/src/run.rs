@@ -66,10 +66,9 @@ impl<O> Plan<O> {
             Some(folder) => folder.clone(),
             None => free_folder(&format!("{}-{}", self.name, self.command)),
         };
-        let files = [(config::FILE, options)];
-        let mut store = Store::create(folder, &files, &run, notes, self.checkpoints())?;
-        self.outlet.store(store.directory())?;
-        store.commit(&run)?;
+        let mut files = vec![(config::FILE, options.as_bytes())];
+        files.extend(self.outlet.input());
+        let store = Store::create(folder, &files, &run, notes, self.checkpoints())?;
         self.go_on(store, run)
     }
 

@@ -1,5 +1,6 @@
 //! What the commands make.
 
+use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
@@ -107,8 +108,9 @@ fn the_noise_of_a_sphere_is_taken_off_and_all_else_of_its_file_stays() {
         ["noisy.obj", "half/final.obj"].map(|name| surfaces::read(at(name)).unwrap());
     let mut moved = 0;
     for (a, b) in noisy.vertices.iter().zip(&half.vertices) {
-        assert!(a == b || a[2] < 40.0, "{a:?} {b:?}");
-        moved += usize::from(a != b);
+        let stays = a.map(f64::to_bits) == b.map(f64::to_bits);
+        assert!(stays || a[2] < 40.0, "{a:?} {b:?}");
+        moved += usize::from(!stays);
     }
     assert!(moved > noisy.vertices.len() / 3, "{moved}");
 }
@@ -147,10 +149,11 @@ fn a_new_mesh_is_made_on_demand_and_the_energy_falls_by_the_ratio() {
 fn a_mesh_that_no_grid_holds_is_refused_with_numbers_unless_losses_are_allowed() {
     let folder = tempfile::tempdir().unwrap();
     let mut text = String::new();
-    for (plate, low) in [0.0, 0.0505].into_iter().enumerate() {
+    // The gap is nowhere near a node.
+    for (plate, [low, high]) in [[0.0, 0.05], [0.0505, 0.13]].into_iter().enumerate() {
         for bits in 0..8 {
             let [x, y, z] = [4, 2, 1].map(|bit| f64::from(u8::from(bits & bit > 0)));
-            text += &format!("v {x} {y} {}\n", low + 0.05 * z);
+            let _ = writeln!(text, "v {x} {y} {}", low + (high - low) * z);
         }
         for [a, b, c, d] in [
             [0, 1, 3, 2],
@@ -161,7 +164,7 @@ fn a_mesh_that_no_grid_holds_is_refused_with_numbers_unless_losses_are_allowed()
             [1, 5, 7, 3],
         ] {
             let [a, b, c, d] = [a, b, c, d].map(|v| v + 8 * plate + 1);
-            text += &format!("f {a} {b} {c} {d}\n");
+            let _ = writeln!(text, "f {a} {b} {c} {d}");
         }
     }
     fs::write(folder.path().join("plates.obj"), text).unwrap();

@@ -114,7 +114,9 @@ fn killed_runs_are_resumed_to_the_same_bytes() {
             kills += usize::from(!path.join("summary.json").exists());
             child = start(folder.path(), &["resume", "killed"]);
         }
-        assert!(child.wait().unwrap().success(), "{arguments:?}");
+        let ended = child.wait_with_output().unwrap();
+        let message = text(&ended.stderr);
+        assert!(ended.status.success(), "{arguments:?}: {message}");
         assert_same(&path, &reference);
     }
     assert!(kills >= RUNS.len(), "{kills} kills in all");

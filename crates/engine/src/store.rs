@@ -39,7 +39,7 @@ impl Store {
     /// resumed has to have the same.
     pub fn create<const D: usize>(
         folder: impl Into<PathBuf>,
-        files: &[(&str, &str)],
+        files: &[(&str, &[u8])],
         run: &Run<D>,
         notes: Value,
         checkpoints: Checkpoints,

@@ -37,7 +37,7 @@ impl RunDirectory {
     /// else in it gives [`Error::Occupied`], and another process there [`Error::Locked`].
     pub fn create(
         path: impl Into<PathBuf>,
-        files: &[(&str, &str)],
+        files: &[(&str, &[u8])],
         state: &State,
     ) -> Result<Self, Error> {
         Self::create_on(Arc::new(Disk), path, files, state)
@@ -47,7 +47,7 @@ impl RunDirectory {
     pub fn create_on(
         storage: Arc<dyn Storage>,
         path: impl Into<PathBuf>,
-        files: &[(&str, &str)],
+        files: &[(&str, &[u8])],
         state: &State,
     ) -> Result<Self, Error> {
         let path = path.into();
@@ -77,8 +77,8 @@ impl RunDirectory {
             _lock: lock,
         };
         run.write_timings(&Value::Null)?;
-        for (name, text) in files {
-            run.write_file(name, |out| out.write_all(text.as_bytes()))?;
+        for (name, bytes) in files {
+            run.write_file(name, |out| out.write_all(bytes))?;
         }
         run.commit(state)?;
         Ok(run)

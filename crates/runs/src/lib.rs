@@ -9,7 +9,7 @@
 //!     let (mut run, mut state) = match RunDirectory::open(folder) {
 //!         Err(Error::NoRun { .. }) => {
 //!             let start = State::new(0, Value::Null).with_array("u", vec![0.1, 0.2]);
-//!             let config = [("config.toml", "rate = 3.9\n")];
+//!             let config = [("config.toml", &b"rate = 3.9\n"[..])];
 //!             (RunDirectory::create(folder, &config, &start)?, start)
 //!         }
 //!         stored => stored?.resume()?,

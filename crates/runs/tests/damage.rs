@@ -326,7 +326,7 @@ fn misuse_is_refused_and_changes_nothing() {
     let deep = (0..200).fold(json!(0), |inner, _| json!([inner]));
     let refused = RunDirectory::create(&path, &[], &State::new(0, deep.clone()));
     assert!(refused.unwrap_err().to_string().contains("deeply"));
-    let refused = RunDirectory::create(&path, &[("../a", "")], &toy::state_at(0));
+    let refused = RunDirectory::create(&path, &[("../a", b"")], &toy::state_at(0));
     assert!(matches!(refused, Err(Error::Invalid(_))));
     assert!(!path.exists());
     let mut run = RunDirectory::create(&path, &FILES, &State::new(0, json!(null))).unwrap();

@@ -34,7 +34,7 @@ impl Fixture {
         let state = State::new(12, json!({ "a": [1, 2.5, null], "b": "text" }))
             .with_array("u", vec![0.1, -2.0, f64::NAN, 1e300])
             .with_array("empty", vec![]);
-        let files = [("a", "abc"), ("fields/b", "")];
+        let files = [("a", &b"abc"[..]), ("fields/b", b"")];
         let storage = Arc::new(Quick);
         let mut run = RunDirectory::create_on(storage, &folder, &files, &state).unwrap();
         run.replace_file("c.csv", |_| Ok(())).unwrap();

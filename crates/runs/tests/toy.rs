@@ -16,9 +16,9 @@ use tempfile::TempDir;
 pub const STEPS: u64 = 60;
 const CELLS: usize = 16;
 
-pub const FILES: [(&str, &str); 2] = [
-    ("config.toml", "rate = 3.9\n"),
-    ("manifest.json", "{ \"steps\": 60 }\n"),
+pub const FILES: [(&str, &[u8]); 2] = [
+    ("config.toml", b"rate = 3.9\n"),
+    ("manifest.json", b"{ \"steps\": 60 }\n"),
 ];
 
 /// The disk, but without waiting for it.

@@ -78,7 +78,7 @@ pub fn start(folder: &Path, arguments: &[&str]) -> Child {
     command
         .args(arguments)
         .stdout(Stdio::null())
-        .stderr(Stdio::null());
+        .stderr(Stdio::piped());
     command.spawn().unwrap()
 }
 
