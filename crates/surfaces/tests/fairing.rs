@@ -1,5 +1,7 @@
 //! Noise, its smoothing, vertices that follow a level set, and files with moved vertices.
 
+#![allow(clippy::float_cmp, reason = "where equality is asserted, it is exact")]
+
 use geometry::{Grid, Placement, optimal_profile};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
