@@ -56,8 +56,9 @@ fn a_disc_grows_as_the_exact_solution() {
         let circumference = 2.0 * std::f64::consts::PI * found;
         let perimeter = perimeter(&field, params(&grid()).eps).unwrap();
         assert!((perimeter / circumference - 1.0).abs() < 0.02, "{record:?}");
-        // E = w_tautilde: pi / R in the limit.
-        assert!((record.willmore_energy / exact::willmore_energy_circle(found) - 1.0).abs() < 0.15);
+        // E = w_tautilde: pi / R in the limit, times the factor of the paper's network, .93 for slow bends and .96 for this radius.
+        let factor = record.willmore_energy / exact::willmore_energy_circle(found);
+        assert!((factor - 0.96).abs() < 0.01, "{factor}");
     }
     // An independent implementation has .0032 and .0191.
     assert!((0.001..0.006).contains(&errors[0]), "{errors:?}");
@@ -227,7 +228,7 @@ fn steps_of_changing_size_share_one_trace() {
     let radius = exact::willmore_radius(RADIUS, time, 2);
     let error = l2_distance(&flow.field().unwrap(), &ball(grid(), radius)).unwrap();
     let motion = l2_distance(&ball(grid(), radius), &ball(grid(), RADIUS)).unwrap();
-    assert!(error < 0.3 * motion, "{error} {motion}");
+    assert!(error < 0.1 * motion, "{error} {motion}");
 }
 
 #[test]
