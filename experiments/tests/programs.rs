@@ -497,29 +497,33 @@ fn the_quick_timing_table_has_a_row_for_every_method() {
     assert!(metric("armadillo.hybrid.hvp") >= 1.0 && metric("armadillo.fe_implicit.hvp") >= 1.0);
 }
 
+/// The metrics of a quick run into the folder `out`.
+fn quick_summary(program: &str, root: &Path) -> Summary {
+    let output = run(program, root, &["--quick", "--quiet", "--output", "out"]);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && message.is_empty(), "{message}");
+    let text = fs::read_to_string(root.join("out/summary.json")).unwrap();
+    Summary::from_json(&text).unwrap()
+}
+
 #[test]
 #[ignore = "a whole quick run: see scripts/test_long"]
 fn the_quick_denoising_takes_off_noise_and_keeps_the_volume() {
     let root = tempfile::tempdir().unwrap();
-    let output = run(
-        DENOISING,
-        root.path(),
-        &["--quick", "--quiet", "--output", "out"],
-    );
-    let message = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success() && message.is_empty(), "{message}");
-    let text = fs::read_to_string(root.path().join("out/summary.json")).unwrap();
-    let summary = Summary::from_json(&text).unwrap();
+    let summary = quick_summary(DENOISING, root.path());
     for mesh in ["figure", "lever"] {
         let metric = |name: &str| summary.get(&format!("{mesh}.noise0.3.{name}")).unwrap();
-        assert!(metric("fair.rms") < 0.5 * metric("noisy.rms"), "{text}");
+        assert!(
+            metric("fair.rms") < 0.5 * metric("noisy.rms"),
+            "{summary:?}"
+        );
         assert!(
             metric("fair.normals") < 0.5 * metric("noisy.normals"),
-            "{text}"
+            "{summary:?}"
         );
         assert!(
             (metric("fair.volume") - metric("noisy.volume")).abs() < 1e-6,
-            "{text}"
+            "{summary:?}"
         );
     }
 }
@@ -529,15 +533,7 @@ fn the_quick_denoising_takes_off_noise_and_keeps_the_volume() {
 fn the_quick_performance_run_measures_planes_and_solids() {
     let root = tempfile::tempdir().unwrap();
     refused(PERFORMANCE, root.path(), &["--turns", "0"], &["--turns"]);
-    let output = run(
-        PERFORMANCE,
-        root.path(),
-        &["--quick", "--quiet", "--output", "out"],
-    );
-    let message = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success() && message.is_empty(), "{message}");
-    let text = fs::read_to_string(root.path().join("out/summary.json")).unwrap();
-    let summary = Summary::from_json(&text).unwrap();
+    let summary = quick_summary(PERFORMANCE, root.path());
     let metric = |name: &str| summary.get(name).unwrap();
     // The work is that of the same flow by the library.
     let operator = Chosen::default()

@@ -144,6 +144,34 @@ fn a_new_mesh_is_made_on_demand_and_the_energy_falls_by_the_ratio() {
     assert!((mean / 7.0 - 1.0).abs() < 0.05, "{mean}");
 }
 
+#[test]
+fn steps_that_are_too_long_end_where_there_is_no_surface_any_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let flow = |steps: &str| {
+        let cube = [
+            "flow",
+            "builtin:cube",
+            "--cells",
+            "32",
+            "--tau",
+            "doubling:1e-6",
+        ];
+        outcome(
+            folder.path(),
+            &[&cube[..], &["--steps", steps, "--no-page"]].concat(),
+        )
+    };
+    let (sensible, too_long) = (flow("10"), flow("16"));
+    let energy = sensible["energy"].as_f64().unwrap();
+    assert!((energy / EIGHT_PI - 1.0).abs() < 0.05, "{sensible}");
+    let reason = too_long["ended"].as_str().unwrap();
+    assert!(
+        reason.contains("less than any closed surface has"),
+        "{too_long}"
+    );
+    assert!(too_long["steps"].as_u64().unwrap() < 16, "{too_long}");
+}
+
 /// Two plates with less than a cell between them.
 #[test]
 fn a_mesh_that_no_grid_holds_is_refused_with_numbers_unless_losses_are_allowed() {

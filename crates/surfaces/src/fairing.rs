@@ -194,8 +194,8 @@ impl Followed {
 /// As many rounds of Taubin's smoothing as move the vertices by no more than the noise.
 fn without_short_waves(rough: &ClosedMesh, noise: f64) -> ClosedMesh {
     let mut smooth = rough.clone();
-    for rounds in 1..=ROUNDS {
-        let next = rough.mesh().smoothed(rounds, TAUBIN[0], TAUBIN[1]);
+    for _ in 0..ROUNDS {
+        let next = smooth.mesh().smoothed(1, TAUBIN[0], TAUBIN[1]);
         let moved = root_mean_square(&rough.mesh().vertices, &next.vertices).0;
         match ClosedMesh::new(next) {
             Ok((next, _)) if moved <= noise => smooth = next,

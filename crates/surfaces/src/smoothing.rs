@@ -112,7 +112,8 @@ impl TriangleMesh {
         let wave = std::f64::consts::TAU / wavelength * self.mean_edge();
         let eigenvalue = 0.25 * wave * wave;
         let round: f64 = FACTORS.iter().map(|f| 1.0 - f * eigenvalue).product();
-        let rounds = (0.5_f64.ln() / round.ln())
+        // Edges too long for such waves have none of these, and get the fewest rounds.
+        let rounds = (0.5_f64.ln() / round.max(0.0).ln())
             .clamp(ROUNDS[0], ROUNDS[1])
             .round() as usize;
         let umbrellas = Umbrellas::of(self);

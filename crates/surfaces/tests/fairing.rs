@@ -54,6 +54,22 @@ fn smoothing_keeps_size_with_taubins_factors_and_shrinks_with_laplacian_ones() {
     assert!(mean < 0.97, "{mean}");
 }
 
+/// On edges that are long for the wave length, too, only the average of the noise comes back.
+#[test]
+fn long_waves_are_given_back_without_the_noise() {
+    let clean = sphere([0.0; 3], 1.0, 4);
+    let noisy = with_noise(&clean, 0.01);
+    for wavelength in [1.0, 0.3, 0.03] {
+        let mut small = clean.clone();
+        small.vertices.iter_mut().flatten().for_each(|x| *x *= 0.97);
+        let (mean, off) = radii(&small.with_long_waves_of(&noisy, wavelength));
+        assert!(
+            (mean - 1.0).abs() < 0.005 && off < 0.006,
+            "{wavelength}: {mean} {off}"
+        );
+    }
+}
+
 #[test]
 fn the_volume_is_made_what_it_should_be() {
     let mesh = with_noise(&torus(1.0, 0.4, 60, 30), 0.01);

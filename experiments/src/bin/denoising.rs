@@ -61,6 +61,8 @@ struct Clean {
 
 /// What became of a noisy mesh by one method.
 struct Row {
+    /// Of the mesh and its noise, in metrics.
+    key: String,
     mesh: String,
     noise: f64,
     method: &'static str,
@@ -96,7 +98,9 @@ fn program(options: &Options) -> Result<(), Error> {
     for clean in &meshes {
         for &noise in noises {
             let noisy = clean.with_noise(noise, options.run.seed);
+            let key = clean.key(noise);
             let of_case = |method, iterations, quality, seconds| Row {
+                key: key.clone(),
                 mesh: clean.name.clone(),
                 noise,
                 method,
@@ -127,16 +131,12 @@ fn program(options: &Options) -> Result<(), Error> {
                     .map(|count| clean.quality(&smoothed(count)))
                     .collect();
                 let seconds = clock.elapsed().as_secs_f64() / ITERATIONS as f64;
-                let best = |by: fn(&Quality) -> f64| {
-                    (2..ITERATIONS).min_by(|&a, &b| by(&all[a]).total_cmp(&by(&all[b])))
-                };
-                let best = best(|quality| quality.rms).unwrap_or(2);
+                let best = (2..ITERATIONS).min_by(|&a, &b| all[a].rms.total_cmp(&all[b].rms));
+                let best = best.unwrap_or(2);
                 let least = all[2..].iter().map(|q| q.normals).fold(f64::MAX, f64::min);
                 rows.push(of_case(method, Some(best + 1), all[best], seconds));
-                let key = clean.key(noise, method);
-                session
-                    .summary
-                    .insert(&format!("{key}.least_normals"), least)?;
+                let metric = format!("{key}.{}.least_normals", method.to_lowercase());
+                session.summary.insert(&metric, least)?;
                 shown.push((method, smoothed(best + 1)));
                 let points = all.iter().enumerate();
                 let points: Vec<_> = points
@@ -249,10 +249,9 @@ impl Clean {
         }
     }
 
-    fn key(&self, noise: f64, method: &str) -> String {
-        let method = method.to_lowercase();
+    fn key(&self, noise: f64) -> String {
         let name = self.name.replace('-', "_").to_lowercase();
-        format!("{name}.noise{noise}.{method}")
+        format!("{name}.noise{noise}")
     }
 
     /// A picture of a mesh, from its distance on a grid.
@@ -336,8 +335,7 @@ fn summarize(session: &mut Session<'_>, rows: &[Row]) -> Result<(), Error> {
         .number("seconds", Format::Fixed(2), |row| row.seconds);
     session.table(table, "denoising")?;
     for row in rows {
-        let name = row.mesh.replace('-', "_").to_lowercase();
-        let key = format!("{name}.noise{}.{}", row.noise, row.method.to_lowercase());
+        let key = format!("{}.{}", row.key, row.method.to_lowercase());
         let Quality {
             rms,
             normals,
@@ -347,13 +345,12 @@ fn summarize(session: &mut Session<'_>, rows: &[Row]) -> Result<(), Error> {
             session.summary.insert(&format!("{key}.{metric}"), value)?;
         }
     }
-    for cases in rows.chunk_by(|a, b| a.mesh == b.mesh && a.noise.to_bits() == b.noise.to_bits()) {
+    for cases in rows.chunk_by(|a, b| a.key == b.key) {
         let rms = |method: &str| {
             let row = cases.iter().find(|row| row.method == method);
             row.map_or(f64::NAN, |row| row.quality.rms)
         };
-        let name = cases[0].mesh.replace('-', "_").to_lowercase();
-        let key = format!("{name}.noise{}.fair_over_taubin", cases[0].noise);
+        let key = format!("{}.fair_over_taubin", cases[0].key);
         session.summary.insert(&key, rms("fair") / rms("Taubin"))?;
     }
     Ok(())

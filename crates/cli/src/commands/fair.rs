@@ -14,6 +14,7 @@ use crate::own::{Noise, OwnMesh};
 
 /// Energies below this have only balls, which have `8 pi`.
 const BALL: f64 = 1.2 * 8.0 * PI;
+
 impl FlowCommand for FairOptions {
     const NAME: &'static str = "fair";
 
