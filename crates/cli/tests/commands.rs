@@ -152,7 +152,7 @@ fn steps_that_are_too_long_end_where_there_is_no_surface_any_more() {
             "flow",
             "builtin:cube",
             "--cells",
-            "32",
+            "48",
             "--tau",
             "doubling:1e-6",
         ];
