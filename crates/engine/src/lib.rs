@@ -48,6 +48,7 @@
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 
 mod case;
+mod control;
 mod error;
 mod measure;
 mod motion;
@@ -62,13 +63,14 @@ mod substeps;
 mod trajectory;
 
 pub use case::Case;
+pub use control::ErrorControl;
 pub use error::Error;
 pub use measure::{DISPLACEMENT, Measure};
 pub use observer::{Event, Observer, Samples};
 pub use operator::{Flow, Method, Operator, Scales, Scheme, quarter_square};
 pub use record::{Record, Values, energy_increases, mean_hvp, minimizations, to_csv};
 pub use run::{Ending, Run};
-pub use steps::{StepRule, TimeSteps};
+pub use steps::{Order, StepRule, TimeSteps};
 pub use stop::Stop;
 pub use store::{Checkpoints, METRICS, Store, dimension, initial, notes};
 pub use trajectory::Trajectory;

@@ -5,13 +5,14 @@ use geometry::Field;
 use operators::ComputeDevice;
 use solver::{FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow};
 
-use crate::{Case, Error, Flow, Method};
+use crate::{Case, Error, Flow, Method, Order};
 
 /// A flow between two steps.
 pub(crate) struct Motion<const D: usize> {
     flow: Either<D>,
     /// The finite-element step inside, for its statistics.
     elements: Option<FiniteElementStep<D>>,
+    order: Order,
 }
 
 enum Either<const D: usize> {
@@ -64,14 +65,29 @@ impl<const D: usize> Motion<D> {
                 Either::MeanCurvature(Box::new(flow))
             }
         };
-        Ok(Self { flow, elements })
+        Ok(Self {
+            flow,
+            elements,
+            order: case.steps.order,
+        })
     }
 
-    /// One minimization of this size, or one step of mean curvature flow, whose size is that of its operator.
-    pub(crate) fn advance(&mut self, size: f64) -> Result<Option<StepRecord>, solver::Error> {
+    /// One time step of this size, or one step of mean curvature flow, whose size is that of its operator. A step of second order is made
+    /// only if `accept` takes it; the second value says so.
+    pub(crate) fn advance(
+        &mut self,
+        size: f64,
+        accept: impl FnOnce(&StepRecord) -> bool,
+    ) -> Result<(Option<StepRecord>, bool), solver::Error> {
         match &mut self.flow {
-            Either::Willmore(flow) => flow.advance(size).map(Some),
-            Either::MeanCurvature(flow) => flow.advance().map(|()| None),
+            Either::Willmore(flow) if self.order == Order::First => {
+                Ok((Some(flow.advance(size)?), true))
+            }
+            Either::Willmore(flow) => {
+                let (record, accepted) = flow.advance_second_order(size, accept)?;
+                Ok((Some(record), accepted))
+            }
+            Either::MeanCurvature(flow) => Ok((flow.advance().map(|()| None)?, true)),
         }
     }
 

@@ -19,8 +19,11 @@ pub struct Record {
     pub time: f64,
     /// Its size.
     pub tau: f64,
-    /// How often it was halved because the minimization failed.
+    /// How often it was made again, shorter: because the minimization failed, or because a controlled step was too long.
     pub halvings: u32,
+    /// Hessian-vector products of steps that were too long.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub refused_hvp: f64,
     /// `L2` distance that the phase field moved,
     pub moved: f64,
     /// and `L2` distance from the initial phase field.
@@ -42,13 +45,18 @@ impl Record {
 
     /// Hessian-vector products; those on coarser grids count by their share of this grid's unknowns.
     pub fn hvp(&self) -> Option<f64> {
-        self.minimization.map(|made| made.hvp())
+        self.minimization.map(|made| made.hvp() + self.refused_hvp)
     }
 
     /// A measure, by its name.
     pub fn measure(&self, name: &str) -> Option<f64> {
         self.measures.get(name).copied()
     }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
+fn is_zero(number: &f64) -> bool {
+    number.to_bits() == 0
 }
 
 /// What the minimizations did; nothing for mean curvature flow.
@@ -110,6 +118,7 @@ pub(crate) mod tests {
             time: 0.0,
             tau,
             halvings: 0,
+            refused_hvp: 0.0,
             moved: 0.0,
             travelled: 0.0,
             minimization: Some(StepRecord {
@@ -120,6 +129,7 @@ pub(crate) mod tests {
                 energy: 1.0,
                 willmore_energy: 1.0,
                 start: Start::default(),
+                estimates: None,
                 newton: NewtonInfo {
                     exit: Exit::Converged,
                     newton,

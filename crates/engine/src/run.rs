@@ -10,7 +10,7 @@ use solver::{FlowState, StepRecord};
 
 use crate::motion::Motion;
 use crate::record::Values;
-use crate::steps::StepControl;
+use crate::steps::{Lengths, StepControl};
 use crate::{Case, Error, Event, Flow, Observer, Record, Stop, Store};
 
 /// How a run ended.
@@ -61,8 +61,12 @@ impl<const D: usize> Run<D> {
                 expected: "the inner step, for mean curvature flow",
             });
         }
-        let scales = (mcf_step, case.largest_step());
-        let mut control = StepControl::new(case.steps, scales, case.end())?;
+        let lengths = Lengths {
+            eps: case.scales.eps,
+            mcf_step,
+            largest: case.largest_step(),
+        };
+        let mut control = StepControl::new(case.steps, lengths, case.end())?;
         let mut step_size = control.step_size();
         for record in &records {
             step_size = control.step_size();
@@ -91,7 +95,11 @@ impl<const D: usize> Run<D> {
             return Ok(None);
         }
         let clock = Instant::now();
-        let (halvings, minimization) = self.attempt()?;
+        let Attempt {
+            halvings,
+            refused_hvp,
+            minimization,
+        } = self.attempt()?;
         let field = self.motion.field().map_err(|source| self.failed(source))?;
         let seconds = clock.elapsed().as_secs_f64();
         let step_size = self.control.step_size();
@@ -104,6 +112,7 @@ impl<const D: usize> Run<D> {
             time,
             tau: minimization.map_or(mcf_step, |made| made.tau),
             halvings,
+            refused_hvp,
             moved: l2_distance(&field, &self.field)?,
             travelled: l2_distance(&field, &self.case.initial)?,
             minimization,
@@ -169,14 +178,30 @@ impl<const D: usize> Run<D> {
             .try_for_each(|observer| observer.observe(&mut event))
     }
 
-    /// A minimization that succeeds, and how often its size was halved.
-    fn attempt(&mut self) -> Result<(u32, Option<StepRecord>), Error> {
+    /// A step that succeeds and is short enough.
+    fn attempt(&mut self) -> Result<Attempt, Error> {
         use solver::Error::{NonFinite, NotConverged};
         let (mut size, most) = (self.control.next_size(), self.control.halvings());
-        let mut halvings = 0;
+        let (mut halvings, mut refused_hvp) = (0, 0.0);
         loop {
-            match self.motion.advance(size) {
-                Ok(made) => return Ok((halvings, made)),
+            let mut shorter = None;
+            let accept = |made: &StepRecord| {
+                shorter = self.control.shorter(made).filter(|_| halvings < most);
+                shorter.is_none()
+            };
+            match self.motion.advance(size, accept) {
+                Ok((minimization, true)) => {
+                    return Ok(Attempt {
+                        halvings,
+                        refused_hvp,
+                        minimization,
+                    });
+                }
+                Ok((refused, false)) => {
+                    refused_hvp += refused.map_or(0.0, |made| made.hvp());
+                    size = shorter.unwrap_or(0.5 * size);
+                    halvings += 1;
+                }
                 Err(NotConverged { .. } | NonFinite { .. }) if halvings < most => {
                     size *= 0.5;
                     halvings += 1;
@@ -251,6 +276,15 @@ impl<const D: usize> Run<D> {
     pub(crate) fn state(&self) -> Result<FlowState<D>, Error> {
         Ok(self.motion.state(self.records.len(), self.time())?)
     }
+}
+
+/// A step that was made.
+struct Attempt {
+    /// How often it was tried with a longer size,
+    halvings: u32,
+    /// and Hessian-vector products of those tries that were refused.
+    refused_hvp: f64,
+    minimization: Option<StepRecord>,
 }
 
 fn values<const D: usize>(case: &Case<D>, field: &Field<D>, time: f64) -> Result<Values, Error> {

@@ -5,10 +5,14 @@ use std::str::FromStr;
 
 use serde::{Serialize, Serializer};
 
-use crate::substeps::{EASY, HARD, Substeps};
-use crate::{Error, Record};
+use solver::StepRecord;
 
-/// A rule for the sizes of time steps, written `auto`, `auto:FIRST`, `TAU`, `doubling:FIRST`, `growing:TAU,ALIKE` or `ramp:TAU,HALVINGS`.
+use crate::control::Controller;
+use crate::substeps::{EASY, HARD, Substeps};
+use crate::{Error, ErrorControl, Record};
+
+/// A rule for the sizes of time steps, written `auto`, `auto:FIRST`, `TAU`, `doubling:FIRST`, `growing:TAU,ALIKE`, `graded:FIRST,PART`,
+/// `ramp:TAU,HALVINGS` or `controlled`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepRule {
     /// By the energy: twice as long after a step that took little of it away, half as long after one that took much. The first one
@@ -25,6 +29,15 @@ pub enum StepRule {
         /// How many of them there are.
         alike: usize,
     },
+    /// In proportion to the time reached: `part` of it, and `first` at least.
+    Graded {
+        /// Size of the first ones.
+        first: f64,
+        /// Part of the time reached.
+        part: f64,
+    },
+    /// As long as [`ErrorControl`] allows: every controlled step is a step.
+    Controlled,
     /// All alike, but for the first: that is divided into `halvings + 1` steps, the first two of length `tau / 2^halvings` and each
     /// of the others twice as long as the one before.
     Ramp {
@@ -58,6 +71,8 @@ impl StepRule {
         match self {
             Self::ByEnergy(first) => first.unwrap_or(f64::NAN),
             Self::Constant(tau) => tau,
+            Self::Graded { first, .. } => first,
+            Self::Controlled => f64::INFINITY,
             Self::Doubling(first) => first * doublings(step - 1),
             Self::Growing { tau, alike } => tau * doublings(step.saturating_sub(alike)),
             Self::Ramp { tau, halvings } => {
@@ -74,10 +89,42 @@ impl StepRule {
 pub struct TimeSteps {
     /// Sizes of the steps.
     pub rule: StepRule,
-    /// If steps are made in substeps of adaptive size: the largest size of the very first one. Every other step begins with substeps
-    /// like the last ones before it.
+    /// If steps of first order are made in substeps of adaptive size: the largest size of the very first one. Every other step begins with
+    /// substeps like the last ones before it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_substep: Option<f64>,
+    /// How a step is made.
+    #[serde(skip_serializing_if = "Order::is_first")]
+    pub order: Order,
+}
+
+/// How a time step is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Order {
+    /// As one minimization: implicit Euler, the scheme of the paper.
+    #[default]
+    First,
+    /// As two minimizations ([`solver::WillmoreFlow::advance_second_order`]).
+    Second,
+    /// In second-order steps whose sizes are controlled; the steps of the rule end when they are due.
+    Controlled(ErrorControl),
+}
+
+impl Order {
+    fn is_first(&self) -> bool {
+        *self == Self::First
+    }
+}
+
+impl TimeSteps {
+    /// Steps of second order as long as their errors allow.
+    pub fn controlled(control: ErrorControl) -> Self {
+        Self {
+            order: Order::Controlled(control),
+            ..StepRule::Controlled.into()
+        }
+    }
 }
 
 impl From<StepRule> for TimeSteps {
@@ -85,8 +132,20 @@ impl From<StepRule> for TimeSteps {
         Self {
             rule,
             first_substep: None,
+            order: Order::First,
         }
     }
+}
+
+/// The lengths and times of a flow that step sizes depend on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lengths {
+    /// Interface width.
+    pub(crate) eps: f64,
+    /// Inner time step.
+    pub(crate) mcf_step: f64,
+    /// The longest step that shows anything.
+    pub(crate) largest: f64,
 }
 
 /// Where in its time steps a flow is, and what size comes next. It depends on nothing but the records so far, so that
@@ -106,16 +165,30 @@ pub(crate) struct StepControl {
     size: f64,
     /// Substeps of the present step.
     substeps: Option<Substeps>,
+    /// The size of controlled steps, and the time at which the present step is complete.
+    controller: Option<Controller>,
+    due: f64,
 }
 
 impl StepControl {
     /// Before the first step.
     pub(crate) fn new(
         steps: TimeSteps,
-        (mcf_step, largest): (f64, f64),
+        Lengths {
+            eps,
+            mcf_step,
+            largest,
+        }: Lengths,
         end: Option<f64>,
     ) -> Result<Self, Error> {
         let rule = steps.rule.resolved(mcf_step);
+        let controller = match steps.order {
+            Order::Controlled(control) => Some(Controller::new(control, eps, largest)?),
+            _ if rule == StepRule::Controlled => {
+                Some(Controller::new(ErrorControl::default(), eps, largest)?)
+            }
+            _ => None,
+        };
         let mut control = Self {
             steps: TimeSteps { rule, ..steps },
             end: end.unwrap_or(f64::INFINITY),
@@ -125,6 +198,8 @@ impl StepControl {
             wanted: rule.size(1),
             size: f64::NAN,
             substeps: None,
+            controller,
+            due: f64::INFINITY,
         };
         control.begin(f64::INFINITY)?;
         Ok(control)
@@ -133,7 +208,9 @@ impl StepControl {
     /// Begins a step whose substeps, if there are any, are at first at most of this size.
     fn begin(&mut self, substep: f64) -> Result<(), Error> {
         self.size = self.wanted.min(self.end - self.time);
-        if let Some(very_first) = self.steps.first_substep {
+        self.due = self.time + self.size;
+        let first_substep = self.steps.first_substep;
+        if let Some(very_first) = first_substep.filter(|_| self.controller.is_none()) {
             let largest = if self.completed == 0 {
                 very_first
             } else {
@@ -148,12 +225,25 @@ impl StepControl {
 
     /// The size of the present step by the rule.
     pub(crate) fn step_size(&self) -> f64 {
-        self.wanted
+        if self.wanted.is_finite() {
+            self.wanted
+        } else {
+            self.next_size()
+        }
     }
 
     /// The size of the next minimization.
     pub(crate) fn next_size(&self) -> f64 {
-        self.substeps.map_or(self.size, |substeps| substeps.size())
+        match (self.controller, self.substeps) {
+            (Some(controller), _) => controller.size(self.due - self.time),
+            (None, Some(substeps)) => substeps.size(),
+            (None, None) => self.size,
+        }
+    }
+
+    /// The size with which a controlled step is made again, if it was too long.
+    pub(crate) fn shorter(&self, made: &StepRecord) -> Option<f64> {
+        self.controller?.shorter(made)
     }
 
     /// How often that size may be halved where a minimization fails.
@@ -161,6 +251,7 @@ impl StepControl {
         match (self.steps.rule, self.substeps) {
             (_, Some(substeps)) => substeps.halvings(),
             (StepRule::ByEnergy(_), None) => HALVINGS,
+            _ if self.controller.is_some() => HALVINGS,
             _ => 0,
         }
     }
@@ -177,6 +268,15 @@ impl StepControl {
     pub(crate) fn accept(&mut self, record: &Record) -> Result<bool, Error> {
         self.time = record.time;
         let mut substep = f64::INFINITY;
+        if let Some(controller) = &mut self.controller {
+            controller.accept(record);
+            if self.due.is_finite()
+                && self.due - self.time > 1e-12 * self.due
+                && self.wanted.is_finite()
+            {
+                return Ok(false);
+            }
+        }
         if let Some(substeps) = &mut self.substeps {
             substeps.made(record);
             if !substeps.is_complete() {
@@ -190,6 +290,7 @@ impl StepControl {
             // A step that was cut short by the end says nothing about the next one.
             StepRule::ByEnergy(_) if self.size < before && record.halvings == 0 => before,
             StepRule::ByEnergy(_) => after(record).min(self.largest),
+            StepRule::Graded { first, part } => first.max(part * self.time),
             rule => rule.size(self.step()),
         };
         // Steps that double begin with twice the size, too.
@@ -223,8 +324,8 @@ impl FromStr for StepRule {
         let positive = |text: &str| match text.trim().parse::<f64>() {
             Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
             _ => Err(format!(
-                "{text:?} is no positive number; give auto, auto:FIRST, VALUE, doubling:FIRST, growing:VALUE,ALIKE or \
-                 ramp:VALUE,HALVINGS"
+                "{text:?} is no positive number; give auto, auto:FIRST, controlled, VALUE, doubling:FIRST, graded:VALUE,PART, \
+                 growing:VALUE,ALIKE or ramp:VALUE,HALVINGS"
             )),
         };
         let pair = |rest: &str, rule: &str, name: &str| match rest.split_once(',') {
@@ -238,6 +339,7 @@ impl FromStr for StepRule {
         };
         match text.split_once(':') {
             None if text == "auto" => Ok(Self::ByEnergy(None)),
+            None if text == "controlled" => Ok(Self::Controlled),
             None => Ok(Self::Constant(positive(text)?)),
             Some(("auto", first)) => Ok(Self::ByEnergy(Some(positive(first)?))),
             Some(("doubling", first)) => Ok(Self::Doubling(positive(first)?)),
@@ -250,8 +352,15 @@ impl FromStr for StepRule {
             Some(("ramp", rest)) => {
                 pair(rest, "ramp", "halvings").map(|(tau, halvings)| Self::Ramp { tau, halvings })
             }
+            Some(("graded", rest)) => match rest.split_once(',') {
+                Some((first, part)) => Ok(Self::Graded {
+                    first: positive(first)?,
+                    part: positive(part)?,
+                }),
+                None => Err("a graded rule needs a step and a part, VALUE,PART".to_owned()),
+            },
             Some((rule, _)) => Err(format!(
-                "{rule:?} is no rule; there are auto, doubling, growing and ramp"
+                "{rule:?} is no rule; there are auto, controlled, doubling, graded, growing and ramp"
             )),
         }
     }
@@ -263,6 +372,8 @@ impl fmt::Display for StepRule {
             Self::ByEnergy(None) => f.write_str("auto"),
             Self::ByEnergy(Some(first)) => write!(f, "auto:{first:e}"),
             Self::Constant(tau) => write!(f, "{tau:e}"),
+            Self::Controlled => f.write_str("controlled"),
+            Self::Graded { first, part } => write!(f, "graded:{first:e},{part}"),
             Self::Doubling(first) => write!(f, "doubling:{first:e}"),
             Self::Growing { tau, alike } => write!(f, "growing:{tau:e},{alike}"),
             Self::Ramp { tau, halvings } => write!(f, "ramp:{tau:e},{halvings}"),
@@ -288,6 +399,8 @@ mod tests {
             "3e-5",
             "doubling:2e-7",
             "growing:6.1e-5,3",
+            "graded:1e-6,0.2",
+            "controlled",
             "ramp:1.1e-3,12",
         ] {
             let rule: StepRule = text.parse().unwrap();

@@ -171,6 +171,9 @@ fn pack<const D: usize>(run: &Run<D>, notes: &Value) -> Result<State, Error> {
     if let Some(previous) = previous {
         packed = packed.with_array("previous", previous.into_values());
     }
+    if let Some(rate) = state.rate {
+        packed = packed.with_array("rate", rate.into_values());
+    }
     for (level, motion) in state.half_motions.into_iter().enumerate() {
         packed = packed.with_array(&half_motion(level), motion.into_values());
     }
@@ -199,6 +202,10 @@ fn restore<const D: usize>(
     } else {
         None
     };
+    let rate = match state.array("rate") {
+        Some(_) => Some(field(stored, "rate", grid)?),
+        None => None,
+    };
     let (mut half_motions, mut half) = (Vec::new(), grid);
     while state.array(&half_motion(half_motions.len())).is_some() {
         half = half.half()?;
@@ -207,6 +214,7 @@ fn restore<const D: usize>(
     let at = FlowState {
         current: field(stored, "current", grid)?,
         previous,
+        rate,
         half_motions,
         step: usize::try_from(state.step)
             .map_err(|error| unreadable(stored.path(), error.to_string()))?,

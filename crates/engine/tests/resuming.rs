@@ -4,8 +4,8 @@ use std::path::Path;
 
 use crate::common::{TAU, case, device, disc, divided, finished, square};
 use engine::{
-    Case, Checkpoints, Ending, Error, Event, Flow, Method, Observer, Samples, StepRule, Stop,
-    Store, Trajectory,
+    Case, Checkpoints, Ending, Error, ErrorControl, Event, Flow, Method, Observer, Order, Samples,
+    StepRule, Stop, Store, TimeSteps, Trajectory,
 };
 use runs::{Interrupt, RunDirectory};
 use serde_json::Value;
@@ -136,6 +136,40 @@ fn a_run_is_interrupted_inside_a_step() {
             // No substep ended at an eighth of the step.
             assert_eq!(part.is_some(), k < 3);
         }
+        assert_eq!(resumed.field(2).unwrap(), reference.field(2).unwrap());
+    }
+}
+
+/// Controlled steps, one of which is refused at first, between marks: the same after an interruption between two of them.
+#[test]
+fn a_controlled_run_continues_with_the_same_bytes() {
+    let root = tempfile::tempdir().unwrap();
+    let mut controlled = case(Flow::Willmore, Method::Hybrid, square(128));
+    controlled.steps = TimeSteps {
+        order: Order::Controlled(ErrorControl::default()),
+        ..StepRule::Ramp {
+            tau: 2.0 * TAU,
+            halvings: 1,
+        }
+        .into()
+    };
+    controlled.stops = vec![Stop::Steps(2)];
+    let samples = Samples::every(1);
+    let reference = trajectory(&controlled, &root.path().join("whole"), &samples);
+    let ends = [1, 2].map(|step| reference.record(step).unwrap().time / TAU);
+    assert!((ends[0] - 1.0).abs() < 1e-12 && (ends[1] - 2.0).abs() < 1e-12);
+    assert!(reference.substeps(1).len() > 3);
+    assert!(
+        reference
+            .records
+            .iter()
+            .any(|record| record.refused_hvp > 0.0)
+    );
+    for after in [2, 5] {
+        let folder = root.path().join(after.to_string());
+        interrupted(&controlled, &folder, &samples, after);
+        let resumed = trajectory(&controlled, &folder, &samples);
+        assert_eq!(without_seconds(&resumed), without_seconds(&reference));
         assert_eq!(resumed.field(2).unwrap(), reference.field(2).unwrap());
     }
 }

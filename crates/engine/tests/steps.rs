@@ -1,7 +1,7 @@
 //! Sizes of steps, and what is done where a minimization fails.
 
-use crate::common::{TAU, case, device, disc, divided, finished, square};
-use engine::{Error, Flow, Method, Record, Run, StepRule, Stop};
+use crate::common::{EPS, TAU, case, device, disc, divided, finished, square};
+use engine::{Error, ErrorControl, Flow, Method, Record, Run, StepRule, Stop, TimeSteps};
 
 /// With three Newton steps a whole step of a square's flow is too much, substeps are not.
 #[test]
@@ -71,6 +71,50 @@ fn steps_by_the_energy_grow_and_end_at_the_time() {
     let sizes: Vec<f64> = run.records().iter().map(|r| r.tau).collect();
     assert!((sizes[0] - TAU / 16.0).abs() < 1e-18);
     assert!(sizes.iter().any(|size| *size > 4.0 * sizes[0]), "{sizes:?}");
+}
+
+/// A square from its corners on: steps grow, none moves the interface too far, the energy falls, and the result is that of ten times stricter
+/// control within the estimated error.
+#[test]
+fn controlled_steps_are_as_accurate_as_they_say() {
+    let run = |relative, longest| {
+        let mut controlled = case(Flow::Willmore, Method::Hybrid, square(128));
+        controlled.scales.newton.tolerance = 1e-3;
+        controlled.steps = TimeSteps::controlled(ErrorControl {
+            relative,
+            longest,
+            first: None,
+        });
+        controlled.stops = vec![Stop::Time(4.0 * TAU)];
+        finished(controlled)
+    };
+    let (usual, strict) = (run(0.02, 1.0), run(0.002, 0.3));
+    let steps = |run: &Run<2>| -> Vec<_> {
+        let made = run.records().iter().map(|r| r.minimization.unwrap());
+        made.collect()
+    };
+    let made = steps(&usual);
+    assert!((made[0].tau - 16.0 * EPS.powi(4)).abs() < 1e-18);
+    assert!((usual.time() - 4.0 * TAU).abs() < 1e-15);
+    assert!(usual.records().iter().all(|record| record.completes_step));
+    let longest = made.iter().map(|step| step.tau).fold(0.0, f64::max);
+    assert!(longest > 8.0 * made[0].tau && steps(&strict).len() > made.len());
+    for step in &made[1..] {
+        assert!(step.energy < step.energy_before, "{step:?}");
+        assert!(step.estimates.unwrap().displacement < 1.7 * EPS, "{step:?}");
+    }
+    let errors = made.iter().filter_map(|step| step.estimates.unwrap().error);
+    let estimated: f64 = errors.sum();
+    let crossing = |run: &Run<2>| {
+        let last = run.records().last().unwrap();
+        [last.measures["tip"], last.measures["diagonal"]]
+    };
+    let pairs = crossing(&usual).into_iter().zip(crossing(&strict));
+    let error = pairs.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+    assert!(
+        error < 3.0 * estimated && estimated < 10.0 * error,
+        "{estimated:e} estimated, {error:e}"
+    );
 }
 
 #[test]

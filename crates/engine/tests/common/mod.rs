@@ -72,6 +72,7 @@ pub fn divided(tau: f64, first: f64) -> TimeSteps {
     TimeSteps {
         rule: StepRule::Constant(tau),
         first_substep: Some(first),
+        ..StepRule::Constant(tau).into()
     }
 }
 

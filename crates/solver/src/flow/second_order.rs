@@ -66,7 +66,7 @@ impl<const D: usize> WillmoreFlow<D> {
 
         let moved = middle.zip_map(&before, displacement)?;
         let further = moved.map(|y| FURTHER * y);
-        let anchor = self.anchor(&before, &middle, &further)?;
+        let anchor = anchor(&before, &middle, &further)?;
         let start = middle.zip_map(&further, displaced)?;
         let second = self.stage(&anchor, &moved, &start, stage)?;
         let after = download(&self.grid, &second.u, &self.device)?;
@@ -89,28 +89,6 @@ impl<const D: usize> WillmoreFlow<D> {
             self.time += tau;
         }
         Ok((record, accepted))
-    }
-
-    /// `u_k + (1 + sqrt 2)(U - u_k)`: for long steps as a displacement, for short ones as a linear combination.
-    ///
-    /// A linear combination is no profile. Beyond one `eps` it overshoots the pure phases without being further away, and the step lags. A
-    /// displaced phase field is one, but the `L2` metric measures it in a straight line: on a surface of curvature `h` steps of length `d` go
-    /// too far by a part of order `h d`, which is of first order in time. Either is used where its error is the smaller one, and the order stays two.
-    fn anchor(
-        &self,
-        before: &Field<D>,
-        middle: &Field<D>,
-        further: &Field<D>,
-    ) -> Result<Field<D>, Error> {
-        /// The displacement of the anchor, in units of `4 eps / 3`, at which both count alike.
-        const ALIKE: f64 = 0.1;
-        let longest = largest(further, middle);
-        let weight = longest * longest / (longest * longest + ALIKE * ALIKE);
-        let along = before.zip_map(further, displaced)?;
-        let straight = before.zip_map(middle, |u, v| u + FURTHER * (v - u))?;
-        Ok(along.zip_map(&straight, |along, straight| {
-            straight + weight * (along - straight)
-        })?)
     }
 
     /// One stage: the minimization from an anchor, weighted for the displacement that is expected of it.
@@ -228,6 +206,27 @@ impl<const D: usize> WillmoreFlow<D> {
             },
         }
     }
+}
+
+/// `u_k + (1 + sqrt 2)(U - u_k)`: for long steps as a displacement, for short ones as a linear combination.
+///
+/// A linear combination is no profile. Beyond one `eps` it overshoots the pure phases without being further away, and the step lags. A
+/// displaced phase field is one, but the `L2` metric measures it in a straight line: on a surface of curvature `h` steps of length `d` go
+/// too far by a part of order `h d`, which is of first order in time. Either is used where its error is the smaller one, and the order stays two.
+fn anchor<const D: usize>(
+    before: &Field<D>,
+    middle: &Field<D>,
+    further: &Field<D>,
+) -> Result<Field<D>, Error> {
+    /// The displacement of the anchor, in units of `4 eps / 3`, at which both count alike.
+    const ALIKE: f64 = 0.1;
+    let longest = largest(further, middle);
+    let weight = longest * longest / (longest * longest + ALIKE * ALIKE);
+    let along = before.zip_map(further, displaced)?;
+    let straight = before.zip_map(middle, |u, v| u + FURTHER * (v - u))?;
+    Ok(along.zip_map(&straight, |along, straight| {
+        straight + weight * (along - straight)
+    })?)
 }
 
 /// The largest size of a displacement on the interface of `u`.

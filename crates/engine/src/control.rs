@@ -1,0 +1,215 @@
+//! Sizes of second-order time steps by their errors.
+
+use serde::{Deserialize, Serialize};
+use solver::{StepEstimates, StepRecord};
+
+use crate::{Error, Record};
+
+/// What limits the size of controlled steps.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ErrorControl {
+    /// The estimated time error of a step over how far the interface moves in it.
+    pub relative: f64,
+    /// The longest displacement of a stage over the interface width `eps`.
+    pub longest: f64,
+    /// Size of the first step; `16 eps^4`, in which a corner gets a radius of about `2 eps`, if it is not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first: Option<f64>,
+}
+
+impl Default for ErrorControl {
+    fn default() -> Self {
+        Self {
+            relative: 0.02,
+            longest: 1.0,
+            first: None,
+        }
+    }
+}
+
+/// A step that is this much worse than it may be is made again, shorter.
+const WORSE: f64 = 1.5;
+/// Steps aim at this part of what they may be.
+const AIM: f64 = 0.9;
+/// The next step is at most this times as long.
+const GROWTH: f64 = 2.0;
+/// For the sake of its error alone no step is shorter than this part of the time reached: from a corner the rates of the first steps
+/// mean nothing.
+const LEAST: f64 = 0.1;
+
+/// The size of the next controlled step. It depends on nothing but the records so far.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Controller {
+    control: ErrorControl,
+    eps: f64,
+    largest: f64,
+    size: f64,
+    time: f64,
+    begun: bool,
+}
+
+impl Controller {
+    pub(crate) fn new(control: ErrorControl, eps: f64, largest: f64) -> Result<Self, Error> {
+        let size = control.first.unwrap_or(16.0 * eps.powi(4));
+        for (name, value) in [
+            ("relative error of a step", control.relative),
+            ("longest displacement of a stage", control.longest),
+            ("first step", size),
+        ] {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::Parameter {
+                    name,
+                    value,
+                    expected: "positive and finite",
+                });
+            }
+        }
+        Ok(Self {
+            control,
+            eps,
+            largest,
+            size,
+            time: 0.0,
+            begun: false,
+        })
+    }
+
+    /// The size of the next step where so much time is left: the last two before the end share it.
+    pub(crate) fn size(&self, left: f64) -> f64 {
+        if self.size >= left * (1.0 - 1e-9) {
+            left
+        } else {
+            self.size.min(0.5 * left)
+        }
+    }
+
+    /// By which factors a step could have been longer: for its error, which is of third order and counts against a motion of first order, and
+    /// for its displacement.
+    fn room(&self, estimates: &StepEstimates) -> (f64, f64) {
+        let allowed = self.control.relative * estimates.motion;
+        let by_error = match estimates.error {
+            Some(error) if error > 0.0 => (allowed / error).sqrt(),
+            Some(_) => f64::INFINITY,
+            None => GROWTH / AIM,
+        };
+        let displacement = estimates.displacement.max(f64::MIN_POSITIVE);
+        (by_error, self.control.longest * self.eps / displacement)
+    }
+
+    /// The size with which a step is made again, if it was too long. The first one is never.
+    pub(crate) fn shorter(&self, made: &StepRecord) -> Option<f64> {
+        let estimates = made.estimates?;
+        let (by_error, by_displacement) = self.room(&estimates);
+        let least = LEAST * self.time;
+        let too_far = WORSE * by_displacement < AIM;
+        let too_wrong = WORSE * by_error * by_error < 1.0 && made.tau > 1.2 * least;
+        if !self.begun || !(too_far || too_wrong) {
+            return None;
+        }
+        let shorter = made.tau * (0.85 * by_error.min(by_displacement)).clamp(0.25, 0.85);
+        Some(if too_far { shorter } else { shorter.max(least) })
+    }
+
+    /// Takes note of an accepted step.
+    pub(crate) fn accept(&mut self, record: &Record) {
+        let made = record.tau;
+        self.time = record.time;
+        self.begun = true;
+        let Some(estimates) = record.minimization.and_then(|made| made.estimates) else {
+            return;
+        };
+        let (by_error, by_displacement) = self.room(&estimates);
+        let by_error = (AIM * by_error).max(LEAST * self.time / made);
+        let growth = by_error.min(AIM * by_displacement).clamp(0.3, GROWTH);
+        // A step that was cut short to end at a given time says little about the next one.
+        let before = if record.halvings == 0 {
+            self.size
+        } else {
+            made
+        };
+        let next = if made > 0.5 * before {
+            made * growth
+        } else {
+            (before * growth.min(1.0)).max(made * growth)
+        };
+        self.size = next.min(self.largest);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::tests::record;
+
+    const EPS: f64 = 0.1;
+
+    fn controller() -> Controller {
+        Controller::new(ErrorControl::default(), EPS, 1.0).unwrap()
+    }
+
+    fn made(tau: f64, error: Option<f64>, displacement: f64) -> Record {
+        let mut made = record(tau, 3);
+        let estimates = StepEstimates {
+            error,
+            motion: 0.1,
+            displacement,
+        };
+        made.minimization.as_mut().unwrap().estimates = Some(estimates);
+        made.time = 4.0 * tau;
+        made
+    }
+
+    #[test]
+    fn the_error_of_the_next_step_is_what_it_may_be() {
+        let mut control = controller();
+        assert!((control.size(1.0) - 16.0 * EPS.powi(4)).abs() < 1e-18);
+        // An error four times smaller than it may be allows twice the size, but for caution.
+        control.accept(&made(1e-3, Some(0.25 * 0.02 * 0.1), 0.01 * EPS));
+        assert!((control.size(1.0) / (2.0 * AIM * 1e-3) - 1.0).abs() < 1e-12);
+        control.accept(&made(1e-3, Some(1e-12), 0.01 * EPS));
+        assert!(
+            (control.size(1.0) - 2e-3).abs() < 1e-12,
+            "growth is limited"
+        );
+        control.accept(&made(1e-3, Some(1e-12), EPS));
+        assert!((control.size(1.0) - AIM * 1e-3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_too_long_is_made_again() {
+        let mut control = controller();
+        let long = |record: &Record| record.minimization.unwrap();
+        let far = made(1e-3, None, 3.0 * EPS);
+        assert_eq!(control.shorter(&long(&far)), None, "the first step");
+        control.accept(&made(1e-3, None, 0.1 * EPS));
+        let shorter = control.shorter(&long(&far)).unwrap();
+        assert!((shorter / (0.85 / 3.0 * 1e-3) - 1.0).abs() < 1e-12);
+        let wrong = made(1e-2, Some(4.0 * 0.02 * 0.1), 0.1 * EPS);
+        let shorter = control.shorter(&long(&wrong)).unwrap();
+        assert!((shorter / (0.5 * 0.85 * 1e-2) - 1.0).abs() < 1e-12);
+        let good = made(1e-3, Some(0.02 * 0.1), EPS);
+        assert_eq!(control.shorter(&long(&good)), None);
+    }
+
+    #[test]
+    fn the_end_is_met_and_forgotten() {
+        let mut control = controller();
+        control.size = 1e-3;
+        assert!((control.size(1.5e-3) - 0.75e-3).abs() < 1e-18);
+        assert!((control.size(0.4e-3) - 0.4e-3).abs() < 1e-18);
+        control.accept(&made(0.1e-3, Some(0.02 * 0.1), 0.1 * EPS));
+        assert!(control.size(1.0) > 0.8e-3);
+    }
+
+    #[test]
+    fn what_is_no_limit_is_refused() {
+        for relative in [0.0, -1.0, f64::NAN] {
+            let control = ErrorControl {
+                relative,
+                ..ErrorControl::default()
+            };
+            let error = Controller::new(control, EPS, 1.0).unwrap_err();
+            assert!(matches!(error, Error::Parameter { .. }), "{error}");
+        }
+    }
+}
