@@ -1,4 +1,4 @@
-//! Everything that a result depends on.
+//! A flow and everything that its result depends on.
 
 use fem::FiniteElementStep;
 use geometry::{Field, Grid};
@@ -18,17 +18,17 @@ pub struct Case<const D: usize> {
     pub initial: Field<D>,
     /// The nodes whose values may move, if not all.
     pub region: Option<Vec<bool>>,
-    /// Which flow.
+    /// Mean curvature flow or Willmore flow.
     pub flow: Flow,
     /// The step of mean curvature flow, and the weights of the energy.
     pub operator: Operator,
-    /// Lengths, and settings of the minimization.
+    /// Interface width, inner time step, and settings of the minimization.
     pub scales: Scales,
     /// Sizes of the time steps. Those of mean curvature flow are the inner step.
     pub steps: TimeSteps,
-    /// When the flow ends: with the first that holds.
+    /// The flow ends with the first of these rules that holds.
     pub stops: Vec<Stop>,
-    /// What is measured after every step.
+    /// Functionals of the phase field that are evaluated after every step.
     pub measures: Vec<Measure<D>>,
 }
 
@@ -65,7 +65,7 @@ impl<const D: usize> Case<D> {
         Ok(FiniteElementStep::implicit(self.grid(), eps, mcf_step)?)
     }
 
-    /// The largest time step by the energy, `side^4 / 1024`: beyond it nothing is left to be seen.
+    /// The largest time step by the energy, `side^4 / 1024`: in such times shapes as large as the box become stationary.
     pub(crate) fn largest_step(&self) -> f64 {
         self.grid().side().powi(4) / 1024.0
     }
@@ -78,7 +78,7 @@ impl<const D: usize> Case<D> {
         })
     }
 
-    /// What distinguishes it from other cases, as it stands in checkpoints: fields and networks by their checksums.
+    /// What distinguishes this case from others, as stored in checkpoints; fields and networks are stored as checksums.
     pub fn identity(&self, device: &ComputeDevice) -> Value {
         let grid = self.grid();
         let bytes = |u: &Field<D>| -> Vec<u8> {

@@ -35,11 +35,11 @@
 //! ```
 //!
 //! A [`Case`] is everything that a result depends on: initial phase field, region, operator, scales, time steps, stop rules, measures.
-//! A [`Run`] is a case on its way, and [`Run::advance`] the only loop over time steps. Between two steps the solver knows nothing of
-//! files, progress or shapes; [observers](Observer) are told after each accepted step. A [`Store`] keeps a run on disk: one checkpoint
+//! A [`Run`] computes a case, and [`Run::advance`] is the only loop over time steps. The solver knows nothing of files, progress or
+//! shapes; [observers](Observer) are called after each accepted step. A [`Store`] keeps a run on disk: one checkpoint
 //! holds the phase fields and all records, and a run that is resumed from it ends with the same bytes.
 //!
-//! New parts have one place each: a step rule in [`StepRule`], a stop rule in [`Stop`], a method in [`Method`], a measure in
+//! Extensions have one place each: a step rule in [`StepRule`], a stop rule in [`Stop`], a method in [`Method`], a measure in
 //! [`Measure`], an observer behind [`Observer`].
 //!
 //! Errors of the crates below, such as [`Error::Runs`] and [`Error::Geometry`], pass through as they are; functions that refuse something

@@ -1,4 +1,4 @@
-//! The two flows as one thing that advances.
+//! Mean curvature flow and Willmore flow behind one interface.
 
 use fem::{FiniteElementStep, Statistics};
 use geometry::Field;
@@ -7,7 +7,7 @@ use solver::{FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow};
 
 use crate::{Case, Error, Flow, Method, Order};
 
-/// A flow between two steps.
+/// The solver's flow of a case, between two steps.
 pub(crate) struct Motion<const D: usize> {
     flow: Either<D>,
     /// The finite-element step inside, for its statistics.

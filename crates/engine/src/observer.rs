@@ -1,4 +1,4 @@
-//! Who is told about the steps of a run.
+//! Observers, which are called after every step of a run.
 
 use geometry::{Field, npy};
 use indicatif::ProgressBar;
@@ -8,13 +8,13 @@ use crate::{Case, Error, Record, Stop};
 
 /// A run at its start, or after an accepted step.
 pub struct Event<'a, const D: usize> {
-    /// What is run.
+    /// The case that is run.
     pub case: &'a Case<D>,
-    /// The phase field.
+    /// The phase field at this time.
     pub field: &'a Field<D>,
     /// All records so far; none at the start.
     pub records: &'a [Record],
-    /// Why the run is over, if it is.
+    /// The stop rule that ended the run, if it is over.
     pub ended: Option<Stop>,
     /// Where the run is stored, if it is.
     pub directory: Option<&'a mut RunDirectory>,
@@ -40,8 +40,8 @@ impl<const D: usize> Event<'_, D> {
     }
 }
 
-/// Something that is told about a run: first at its start, then after every accepted step. A run that is resumed tells of the steps
-/// after its checkpoint only.
+/// An observer of a run: it is called at the start and after every accepted step. When a run is resumed, it is called for the steps
+/// after the checkpoint only.
 pub trait Observer<const D: usize> {
     /// Looks at the run.
     ///
@@ -63,9 +63,9 @@ impl<const D: usize> Observer<D> for ProgressBar {
 /// Keeps phase fields of time steps as `step_00008.npy`, that of the last one always.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Samples {
-    /// Steps between two that are kept.
+    /// The phase field of every so many steps is kept; with 0 only the initial one.
     pub every: usize,
-    /// Further steps.
+    /// Further steps whose phase fields are kept.
     pub also: Vec<usize>,
     /// Of the first step, made in substeps, the phase field after `tau / 2^k` is kept as `part_04.npy` for these `k`, if a substep ends
     /// there.
@@ -73,7 +73,7 @@ pub struct Samples {
 }
 
 impl Samples {
-    /// Every so many steps.
+    /// Keeps the phase field of every so many steps.
     pub fn every(steps: usize) -> Self {
         Self {
             every: steps,

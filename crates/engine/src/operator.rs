@@ -88,7 +88,7 @@ impl Scheme {
         }
     }
 
-    /// The shipped networks for it.
+    /// The recipe of the shipped networks that this scheme uses.
     pub fn shipped(self) -> Shipped {
         match self {
             Self::Paper | Self::Calibrated => Shipped::Paper,
@@ -200,14 +200,14 @@ pub fn quarter_square(eps_over_h: f64) -> f64 {
     0.25 * eps_over_h * eps_over_h
 }
 
-/// The step of mean curvature flow of a case, and what its energy is divided by.
+/// The step of mean curvature flow of a case, with the weights of its energy.
 #[derive(Clone, Debug)]
 pub struct Operator {
-    /// How the step is made.
+    /// How the step of mean curvature flow is computed.
     pub method: Method,
     /// How the energy is weighted.
     pub scheme: Scheme,
-    /// What the energy is divided by, term by term.
+    /// The calibration factors by which the terms of the energy are divided.
     pub factors: Factors,
     /// How the linear systems of implicit finite elements are solved.
     pub linear: LinearSolver,
@@ -301,7 +301,7 @@ impl Operator {
         self.method.key_in(self.scheme)
     }
 
-    /// What of it a result depends on.
+    /// What a result depends on, for the identity of a case.
     pub(crate) fn identity(&self) -> Value {
         let network = |named: &NamedNetwork| json!([named.name, named.network.fingerprint()]);
         json!({

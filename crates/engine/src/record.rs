@@ -1,4 +1,4 @@
-//! What is known about each minimization of a flow.
+//! Records of the minimizations of a flow.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,24 +13,24 @@ pub type Values = BTreeMap<String, f64>;
 pub struct Record {
     /// Number of the time step to which it belongs, from 1.
     pub step: usize,
-    /// Whether it is the end of that step.
+    /// Whether that time step is complete.
     pub completes_step: bool,
-    /// Time at its end.
+    /// Time at the end of the step.
     pub time: f64,
-    /// Its size.
+    /// Step size.
     pub tau: f64,
     /// How often it was made again, shorter: because the minimization failed, or because a controlled step was too long.
     pub halvings: u32,
     /// Hessian-vector products of steps that were too long.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub refused_hvp: f64,
-    /// `L2` distance that the phase field moved,
+    /// `L2` distance to the phase field before the step.
     pub moved: f64,
-    /// and `L2` distance from the initial phase field.
+    /// `L2` distance to the initial phase field.
     pub travelled: f64,
-    /// What the minimization did; none for mean curvature flow.
+    /// Energies, iterations and times of the minimization; none for mean curvature flow.
     pub minimization: Option<StepRecord>,
-    /// The measures of the case.
+    /// Values of the case's measures after the step.
     pub measures: Values,
     /// Wall time in seconds, failed attempts included. Checkpoints do not hold it, since they are the same bytes for the same result.
     #[serde(skip)]
@@ -48,7 +48,7 @@ impl Record {
         self.minimization.map(|made| made.hvp() + self.refused_hvp)
     }
 
-    /// A measure, by its name.
+    /// The value of the measure with this name.
     pub fn measure(&self, name: &str) -> Option<f64> {
         self.measures.get(name).copied()
     }
@@ -59,12 +59,12 @@ fn is_zero(number: &f64) -> bool {
     number.to_bits() == 0
 }
 
-/// What the minimizations did; nothing for mean curvature flow.
+/// The minimizations behind the records; none for mean curvature flow.
 pub fn minimizations(records: &[Record]) -> impl Iterator<Item = &StepRecord> {
     (records.iter()).filter_map(|record| record.minimization.as_ref())
 }
 
-/// Minimizations that ended at a higher energy than they began with; where nothing moves any more the energy stays.
+/// Minimizations that ended at a higher energy than they began with; where the shape is stationary the energy stays.
 pub fn energy_increases(records: &[Record]) -> usize {
     let risen = |made: &&StepRecord| made.energy > made.energy_before;
     minimizations(records).filter(risen).count()

@@ -13,16 +13,16 @@ use crate::record::Values;
 use crate::steps::{Lengths, StepControl};
 use crate::{Case, Error, Event, Flow, Observer, Record, Stop, Store};
 
-/// How a run ended.
+/// Why [`Run::advance`] returned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Ending {
-    /// A stop rule holds.
+    /// This stop rule holds.
     Stopped(Stop),
-    /// It was interrupted, and can be resumed.
+    /// The run was interrupted; it can be resumed.
     Interrupted,
 }
 
-/// A case on its way.
+/// A case that is being computed: its flow, its place in the time steps, and the records so far.
 pub struct Run<const D: usize> {
     pub(crate) case: Case<D>,
     pub(crate) device: ComputeDevice,
@@ -35,17 +35,17 @@ pub struct Run<const D: usize> {
 }
 
 impl<const D: usize> Run<D> {
-    /// A case at its start.
+    /// Starts a case.
     ///
     /// # Errors
-    /// What the case's parts refuse: [`Error::Parameter`], [`Error::Solver`], [`Error::Fem`], [`Error::Geometry`].
+    /// If something in the case is not possible: [`Error::Parameter`], [`Error::Solver`], [`Error::Fem`], [`Error::Geometry`].
     pub fn new(case: Case<D>, device: &ComputeDevice) -> Result<Self, Error> {
         let start = values(&case, &case.initial, 0.0)?;
         let state = FlowState::new(case.initial.clone(), 0, 0.0);
         Self::at(case, device, start, Vec::new(), &state)
     }
 
-    /// A case at a state that it had after these records.
+    /// Restores a case to the state that it had after these records.
     pub(crate) fn at(
         case: Case<D>,
         device: &ComputeDevice,
@@ -86,7 +86,7 @@ impl<const D: usize> Run<D> {
         Ok(run)
     }
 
-    /// One step: a minimization of the size that comes next, halved where that is allowed and it fails. Nothing once a stop rule holds.
+    /// Makes one step: a minimization of the next size, halved if it fails and the rule allows that. None once a stop rule holds.
     ///
     /// # Errors
     /// [`Error::Step`], [`Error::TooStiff`]; the run stays where it was.
@@ -126,11 +126,11 @@ impl<const D: usize> Run<D> {
         Ok(self.records.last())
     }
 
-    /// All steps up to the end, or until `interrupt` asks for an end; observers are told after each. With a store there are
-    /// checkpoints, the last one where a step failed, too; the store is not finished, so that more can be added to it.
+    /// Makes all steps until a stop rule holds or `interrupt` is set, and calls the observers after each. With a store, checkpoints are
+    /// written, the last one also when a step fails; the store is left open, so that files can be added to it.
     ///
     /// # Errors
-    /// As [`Self::step`], and what observers and the store raise.
+    /// As [`Self::step`], and the errors of observers and of the store.
     pub fn advance(
         &mut self,
         mut store: Option<&mut Store>,
@@ -233,12 +233,12 @@ impl<const D: usize> Run<D> {
         stops.find(|stop| stop.holds(self, step_size)).copied()
     }
 
-    /// What is run.
+    /// The case that is run.
     pub fn case(&self) -> &Case<D> {
         &self.case
     }
 
-    /// The phase field.
+    /// The phase field at the present time.
     pub fn field(&self) -> &Field<D> {
         &self.field
     }
@@ -253,17 +253,17 @@ impl<const D: usize> Run<D> {
         &self.records
     }
 
-    /// Why the run is over, if it is.
+    /// The stop rule that ended the run, if it is over.
     pub fn ended(&self) -> Option<Stop> {
         self.ended
     }
 
-    /// Time steps completed.
+    /// Number of completed time steps.
     pub fn steps(&self) -> usize {
         self.control.step() - 1
     }
 
-    /// Time reached.
+    /// The present time.
     pub fn time(&self) -> f64 {
         self.records.last().map_or(0.0, |last| last.time)
     }

@@ -18,15 +18,15 @@ pub enum StepRule {
     /// By the energy: twice as long after a step that took little of it away, half as long after one that took much. The first one
     /// is a sixteenth of the inner step unless it is given, since corners move fast at first. A step that fails is halved.
     ByEnergy(Option<f64>),
-    /// All alike.
+    /// Constant steps.
     Constant(f64),
-    /// The first one; each of the others is twice as long as the one before.
+    /// The size of the first step; each of the others is twice as long as the one before.
     Doubling(f64),
     /// The first `alike` ones have size `tau`; each of the others is twice as long as the one before.
     Growing {
-        /// Size of the first ones.
+        /// Size of the first steps.
         tau: f64,
-        /// How many of them there are.
+        /// Number of steps of that size.
         alike: usize,
     },
     /// In proportion to the time reached: `part` of it, and `first` at least.
@@ -41,14 +41,14 @@ pub enum StepRule {
     /// All alike, but for the first: that is divided into `halvings + 1` steps, the first two of length `tau / 2^halvings` and each
     /// of the others twice as long as the one before.
     Ramp {
-        /// The size in the end.
+        /// The size after the first step.
         tau: f64,
         /// How often the first step is halved.
         halvings: u32,
     },
 }
 
-/// Steps by the energy grow while they take away less than this part of it,
+/// Steps by the energy grow while they take away less than this fraction of it,
 const LITTLE: f64 = 0.1;
 /// and shrink when they take away more than this.
 const MUCH: f64 = 0.3;
@@ -56,7 +56,7 @@ const MUCH: f64 = 0.3;
 const HALVINGS: u32 = 24;
 
 impl StepRule {
-    /// The rule with everything filled in, for an inner step `mcf_step`.
+    /// The rule with its default values filled in, for an inner step `mcf_step`.
     #[must_use]
     pub fn resolved(self, mcf_step: f64) -> Self {
         match self {
@@ -87,10 +87,10 @@ impl StepRule {
 /// How the time of a flow is divided into steps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TimeSteps {
-    /// Sizes of the steps.
+    /// The rule for the sizes of the steps.
     pub rule: StepRule,
-    /// If steps of first order are made in substeps of adaptive size: the largest size of the very first one. Every other step begins with
-    /// substeps like the last ones before it.
+    /// The largest size of the very first substep, if steps of first order are made in substeps of adaptive size. Every other step begins
+    /// with substeps like the last ones before it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_substep: Option<f64>,
     /// How a step is made.
@@ -155,7 +155,7 @@ pub(crate) struct StepControl {
     steps: TimeSteps,
     /// The time at which the flow ends, if any.
     end: f64,
-    /// Steps by the energy grow up to this: beyond it nothing is left to be seen.
+    /// The largest size of steps by the energy.
     largest: f64,
     /// Steps completed, and the time reached.
     completed: usize,
@@ -171,7 +171,7 @@ pub(crate) struct StepControl {
 }
 
 impl StepControl {
-    /// Before the first step.
+    /// The place before the first step.
     pub(crate) fn new(
         steps: TimeSteps,
         Lengths {
@@ -261,7 +261,7 @@ impl StepControl {
         self.completed + 1
     }
 
-    /// Takes note of a minimization, and says whether it completes the present step.
+    /// Moves on by a minimization; true if it completes the present step.
     ///
     /// # Errors
     /// [`Error::Parameter`] if the next step cannot be divided into substeps.

@@ -12,33 +12,34 @@ use crate::{DISPLACEMENT, Record, Run};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stop {
-    /// So many time steps are made.
+    /// This many time steps are made.
     Steps(usize),
     /// This time is reached; the last step is cut short to end there.
     Time(f64),
     /// The Willmore energy, as the scheme measures it, is no more than this.
     Energy(f64),
-    /// The Willmore energy, as the scheme measures it, is no more than this part of that at the beginning.
+    /// The Willmore energy, as the scheme measures it, is no more than this fraction of its initial value.
     EnergyRatio(f64),
     /// The measure [`DISPLACEMENT`](crate::DISPLACEMENT) has this value or more.
     Displacement(f64),
     /// The phase field moves by less than this fraction of the way that it has come (`L2`) per time step; a substep counts as much as
     /// it would if the whole step were like it.
     Motion(f64),
-    /// Three steps in a row, nearly as long as steps by the energy can be, took next to nothing of the energy away. Longer ones would
+    /// Three steps in a row, nearly as long as steps by the energy can be, lowered the energy by almost nothing. Longer ones would
     /// jump to other minimizers, such as an empty box.
     EnergyAtRest,
-    /// In space, the Willmore energy is less than half of that of a sphere, which no closed surface has: the phase field is none any more.
+    /// In space, the Willmore energy is less than half of that of a sphere, which no closed surface has: the phase field does not describe
+    /// a surface any more.
     NoSurface,
-    /// Nothing is left inside, or nothing outside.
+    /// One of the two phases has vanished.
     Vanished,
-    /// The shape has come to the side of the box, and so to its own periodic image, and was not there in the beginning.
+    /// The shape has reached the side of the box, and so its own periodic image, where it was not in the beginning.
     AtTheSide,
 }
 
-/// A step that takes away less than this part of the energy takes away next to nothing.
+/// A step that lowers the energy by less than this fraction counts as almost nothing.
 const LITTLE: f64 = 1e-4;
-/// So many of them in a row are the end.
+/// Number of such steps in a row that end a run.
 const IN_A_ROW: usize = 3;
 
 impl Stop {

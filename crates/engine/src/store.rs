@@ -1,4 +1,4 @@
-//! Runs on disk.
+//! Runs that are stored in directories.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -16,10 +16,10 @@ use crate::{Case, Error, Record, Run};
 /// The table of all records in a stored run.
 pub const METRICS: &str = "metrics.csv";
 
-/// When there is a checkpoint.
+/// When checkpoints are written.
 #[derive(Clone, Copy, Debug)]
 pub enum Checkpoints {
-    /// After every so many minimizations.
+    /// After this many minimizations.
     EverySteps(usize),
     /// After the first step that ends this long after the last one.
     Every(Duration),
@@ -76,7 +76,7 @@ impl Store {
         &mut self.directory
     }
 
-    /// Makes a checkpoint.
+    /// Writes a checkpoint.
     pub fn commit<const D: usize>(&mut self, run: &Run<D>) -> Result<(), Error> {
         self.write_tables(run)?;
         self.directory.commit(&pack(run, &self.notes)?)?;
@@ -84,7 +84,7 @@ impl Store {
         Ok(())
     }
 
-    /// Makes a checkpoint if it is time for one, or if it `must` be.
+    /// Writes a checkpoint if one is due, or if it `must` be.
     pub(crate) fn commit_if_due<const D: usize>(
         &mut self,
         run: &Run<D>,
@@ -100,7 +100,7 @@ impl Store {
         Ok(())
     }
 
-    /// The last checkpoint of a run that is over, which is kept alone.
+    /// Writes the last checkpoint of a run that is over, and removes the others.
     pub fn finish<const D: usize>(mut self, run: &Run<D>) -> Result<(), Error> {
         self.write_tables(run)?;
         Ok(self.directory.finish(&pack(run, &self.notes)?)?)

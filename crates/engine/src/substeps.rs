@@ -69,7 +69,7 @@ impl Substeps {
         })
     }
 
-    /// Whether the step is made.
+    /// Whether the substeps fill the step.
     pub(crate) fn is_complete(&self) -> bool {
         self.done >= 1 << self.deepest
     }
@@ -84,7 +84,7 @@ impl Substeps {
         self.deepest - self.depth
     }
 
-    /// Takes note of a substep.
+    /// Moves on by a substep and chooses the size of the next one.
     pub(crate) fn made(&mut self, record: &Record) {
         let halvings = (self.tau / record.tau).log2().round();
         let depth = (halvings.max(0.0) as u32).min(self.deepest);

@@ -1,4 +1,4 @@
-//! Runs that are at their end, kept on disk so that they can be compared.
+//! Finished runs that are kept on disk, so that they can be compared.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -13,12 +13,12 @@ use crate::record::Values;
 use crate::store::{self, Checkpoints, check_identity};
 use crate::{Case, Ending, Error, Observer, Record, Run, Samples, Stop, Store};
 
-/// Time between two checkpoints.
+/// One checkpoint a minute.
 const CHECKPOINTS: Checkpoints = Checkpoints::Every(Duration::from_mins(1));
 
-/// A run at its end: the records of all steps, and the phase fields that were kept.
+/// A finished run: the records of all steps, and the phase fields that were kept.
 pub struct Trajectory<const D: usize> {
-    /// What was run.
+    /// The case that was run.
     pub case: Case<D>,
     /// The measures of the initial phase field.
     pub start: Values,
@@ -31,7 +31,7 @@ pub struct Trajectory<const D: usize> {
 
 impl<const D: usize> Trajectory<D> {
     /// Runs a case, or continues it, or only looks up what is stored in `folder`; a stored run of another case is replaced.
-    /// Nothing if it was interrupted.
+    /// None if it was interrupted.
     pub fn of(
         case: Case<D>,
         device: &ComputeDevice,

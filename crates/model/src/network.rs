@@ -31,7 +31,7 @@ impl Ratios {
     }
 }
 
-/// How a network came to be and how good it is; stored with the weights.
+/// How a network was trained and how good it is; stored with the weights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
     /// Training method and its settings, in words.
@@ -61,7 +61,7 @@ pub struct Network {
 }
 
 impl Network {
-    /// Puts a network together.
+    /// A network of a kernel and an activation.
     ///
     /// `kernel`: `n_K^D` values, row-major, centre in the middle.
     ///
@@ -111,12 +111,12 @@ impl Network {
         &self.activation
     }
 
-    /// How it came to be.
+    /// How it was trained.
     pub fn provenance(&self) -> &Provenance {
         &self.provenance
     }
 
-    /// SHA-256 of the numbers, in hexadecimal: two networks with the same act alike.
+    /// SHA-256 of the numbers, in hexadecimal: networks with the same fingerprint are the same operator.
     pub fn fingerprint(&self) -> String {
         let mut bytes = self.ratios.to_string().into_bytes();
         for width in self.activation.layers() {
@@ -173,7 +173,7 @@ impl Network {
         })
     }
 
-    /// The same operator with another account of its origin.
+    /// The same operator with another provenance.
     #[must_use]
     pub fn with_provenance(mut self, provenance: Provenance) -> Self {
         self.provenance = provenance;

@@ -1,4 +1,4 @@
-//! Which network a run takes.
+//! The choice of the network for a run.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use crate::{Error, Network, Ratios, Shipped};
 /// The ratios that a network must have.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct NeededNetwork {
-    /// Of space.
+    /// Dimension of space, 2 or 3.
     pub dimension: usize,
     /// Width of the kernel in cells; none if it does not matter.
     pub width: Option<usize>,
@@ -20,7 +20,7 @@ pub struct NeededNetwork {
 }
 
 impl NeededNetwork {
-    /// Exactly these ratios.
+    /// The need for exactly these ratios.
     pub fn exactly(ratios: Ratios) -> Self {
         Self {
             dimension: ratios.dimension,
@@ -59,7 +59,7 @@ impl NeededNetwork {
     }
 }
 
-/// A network and what it is called.
+/// A network and its name.
 #[derive(Clone, Debug)]
 pub struct NamedNetwork {
     /// Name of its file without the extension.
@@ -106,7 +106,7 @@ impl Networks {
         Ok(Self { files })
     }
 
-    /// A network: that of the last file that fits, else the widest shipped one.
+    /// The network of the last file that meets the need, else the widest shipped one.
     ///
     /// # Errors
     /// [`Error::MissingNetwork`] naming the ratios and those available.

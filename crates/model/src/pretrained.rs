@@ -10,7 +10,7 @@ macro_rules! shipped {
     };
 }
 
-/// File names and contents. `train_networks` in the experiments package makes these files.
+/// File names and contents of the networks of the paper's recipe. `train_networks` in the experiments package makes these files.
 const PAPER: &[(&str, &[u8])] = shipped![
     "d2_k17_eps2_step1.safetensors",
     "d2_k33_eps4_step4.safetensors",
@@ -19,7 +19,7 @@ const PAPER: &[(&str, &[u8])] = shipped![
     "d3_k17_eps2_step1.safetensors",
 ];
 
-/// Those of the accurate recipe.
+/// File names and contents of the networks of the accurate recipe.
 const ACCURATE: &[(&str, &[u8])] = shipped![
     "accurate_d2_k9_eps1_step0.25.safetensors",
     "accurate_d2_k17_eps2_step1.safetensors",
@@ -52,7 +52,7 @@ pub enum Shipped {
 }
 
 impl Shipped {
-    /// All of them with their file names.
+    /// All shipped networks of the recipe with their file names.
     ///
     /// # Errors
     /// [`Error::Weights`] if a file in the program is damaged.
@@ -67,7 +67,7 @@ impl Shipped {
             .collect()
     }
 
-    /// The one with these ratios.
+    /// The shipped network with these ratios.
     ///
     /// # Errors
     /// [`Error::MissingNetwork`] naming the ratios wanted and those available.

@@ -24,7 +24,7 @@ impl DeviceKind {
     /// All kinds, compiled in or not.
     pub const ALL: [Self; 4] = [Self::Flex, Self::NdArray, Self::Wgpu, Self::Cuda];
 
-    /// The name users type.
+    /// The name in options and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Flex => "flex",
@@ -157,7 +157,7 @@ impl ComputeDevice {
         }
     }
 
-    /// A tensor with these values. Burn casts to the device's default precision unless told; this tells it.
+    /// A tensor with these values in the device's working precision, which may differ from Burn's default.
     pub fn tensor<const R: usize>(&self, values: &[f64], shape: [usize; R]) -> Tensor<R> {
         let data = TensorData::new(values.to_vec(), shape);
         Tensor::from_data(data, (&self.device, self.dtype))

@@ -20,7 +20,7 @@ const PARALLEL_FROM: usize = 1 << 15;
 pub(crate) enum Operand<'a, T> {
     /// Entries whose memory can be reused for results.
     Given(Vec<T>),
-    /// Entries that stay as they are.
+    /// Entries that are only read.
     Lent(&'a [T]),
 }
 
@@ -118,7 +118,7 @@ impl Target<'_> {
 /// Where the entries of an operand are while a task runs.
 enum Source<'a, T> {
     Lent(&'a [T]),
-    /// The same for all entries.
+    /// One value for all entries.
     Single(T),
     /// In the memory of an output.
     Reused(usize),

@@ -26,7 +26,7 @@ pub enum Error {
     Unavailable {
         /// The device.
         name: &'static str,
-        /// What the driver said.
+        /// The message of the driver.
         reason: String,
     },
     /// The device's arithmetic disagrees with the CPU.
@@ -46,7 +46,7 @@ pub enum Error {
     /// A tensor could not be read back.
     #[error("a result could not be read from the device: {reason}")]
     Read {
-        /// What the backend said.
+        /// The message of the backend.
         reason: String,
     },
     /// An empty or non-finite table interval.

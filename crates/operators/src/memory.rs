@@ -1,8 +1,8 @@
-//! How programs use memory.
+//! Memory of the process: what the allocator keeps, and how much is in use.
 
 /// Tells the allocator of glibc to keep memory that was freed. By default it returns vectors of megabytes to the system at once
 /// and gets them back page by page, which costs the energies and gradients of a flow half of their time. Other allocators keep
-/// memory anyway. For the first line of a program.
+/// memory anyway. To be called first in a program.
 pub fn keep_freed() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {
@@ -18,7 +18,7 @@ pub fn keep_freed() {
     }
 }
 
-/// Gives kept memory back to the system: after one kind of work, before another that needs much.
+/// Gives kept memory back to the system, for instance between two computations with large vectors of different sizes.
 pub fn release_freed() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {

@@ -1,4 +1,5 @@
-//! Pages and the page of results.
+//! Pages, the page of results, and the documents of the repository.
 
+mod documents;
 mod pages;
 mod results;

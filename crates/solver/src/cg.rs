@@ -25,7 +25,7 @@ pub(crate) struct CgSolution<const D: usize> {
     pub exit: CgExit,
 }
 
-/// Settings of one solve.
+/// Tolerance and iteration limit of one solve.
 #[derive(Clone, Copy)]
 pub(crate) struct CgLimits {
     /// Reduction of the residual in the norm of the preconditioner.
@@ -37,7 +37,7 @@ pub(crate) struct CgLimits {
 /// curvature above it where the energy is convex, so steps are near 1 there.
 const LONGEST_STEP: f64 = 1e10;
 
-/// Sum of products, read back to the host.
+/// The inner product `sum_i a_i b_i`, read back to the host.
 pub(crate) fn dot<const D: usize>(
     a: &Tensor<D>,
     b: &Tensor<D>,
@@ -47,7 +47,7 @@ pub(crate) fn dot<const D: usize>(
 }
 
 /// Solves `H p = -g` at the objective's point until the residual's norm `sqrt(r . M r)` is reduced, a direction of
-/// negative curvature appears (Steihaug), or the limit is reached. Vectors have the precision of the products.
+/// negative curvature appears (Steihaug), or the limit is reached. Vectors have the precision of the Hessian-vector products.
 pub(crate) fn conjugate_gradients<const D: usize>(
     objective: &mut impl Objective<D>,
     gradient: &Tensor<D>,

@@ -39,7 +39,7 @@ pub trait MeanCurvatureStep<const D: usize>: Send + Sync {
     /// Rules and handlers of the custom operations in that graph.
     fn extensions(&self) -> linearize::Extensions;
 
-    /// Whether products of its derivatives may be computed in single precision.
+    /// Whether Hessian-vector products may be computed in single precision.
     fn allows_single_precision(&self) -> bool {
         false
     }
@@ -142,7 +142,7 @@ pub struct MinimizingMovement<const D: usize> {
 }
 
 impl<const D: usize> MinimizingMovement<D> {
-    /// Traces the energy for grids of `cells^D` and loads it on the device. Products have the device's precision.
+    /// Traces the energy for grids of `cells^D` and loads it on the device. Hessian-vector products have the device's precision.
     ///
     /// # Errors
     /// [`Error::Linearize`] if the step contains an operation without a rule.
@@ -154,7 +154,7 @@ impl<const D: usize> MinimizingMovement<D> {
         Self::with_precision(step, cells, Precision::Device, device)
     }
 
-    /// As [`Self::new`], with products in single precision if asked for and if the step allows it.
+    /// As [`Self::new`], with Hessian-vector products in single precision if asked for and if the step allows it.
     ///
     /// # Errors
     /// As [`Self::new`].

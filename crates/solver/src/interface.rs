@@ -6,7 +6,7 @@
 //! `c/2 |V[u] - u|^2` becomes `tau/2 int q^2 (Lap phi)^2`, up to lower order terms in the curvature. It does not depend on
 //! how the step of mean curvature flow is computed.
 //!
-//! So the coarse part of the preconditioner is `Z (M + tau (S M^-1 S + B))^-1 Z^T` on hat functions `phi_j` of a lattice of
+//! So the coarse correction of the preconditioner is `Z (M + tau (S M^-1 S + B))^-1 Z^T` on hat functions `phi_j` of a lattice of
 //! spacing `4 eps`, evaluated at the foot point on the interface: `Z = q phi_j`, `M = int q^2 phi_j phi_k`,
 //! `S = int q^2 grad phi_j . grad phi_k` with tangential gradients, and `B = 4 int q^2 (kappa^2 grad phi_j . grad phi_k +
 //! kappa^4 phi_j phi_k)` for the terms of lower order. Nothing of it needs a Hessian-vector product.
@@ -23,8 +23,8 @@ use crate::samples::{MOST_CORNERS, Samples};
 const SPACING: f64 = 4.0;
 /// More functions than this cost more than they save.
 const MOST_COLUMNS: usize = 2000;
-/// With more than this part of the interface curved more sharply than `1/eps` (corners, in the first steps), displacements
-/// along normals say nothing about the slow modes, and the correction is left out.
+/// With more than this fraction of the interface curved more sharply than `1/eps` (corners, in the first steps), displacements
+/// along normals are not the slow modes, and the correction is left out.
 const SHARP: f64 = 1e-3;
 /// Weight of the terms of lower order; with too little of them the correction is too large where the interface is curved.
 const BENT: f64 = 4.0;
@@ -136,7 +136,7 @@ fn coarse_matrix<const D: usize>(samples: &Samples<D>, tau: f64) -> Option<Mat<f
     }))
 }
 
-/// The parts of `M`, `S` and `B` that belong to one cell of the lattice.
+/// What one cell of the lattice adds to `M`, `S` and `B`.
 fn local_matrices<const D: usize>(samples: &Samples<D>, cell: usize) -> [Local; 3] {
     let [mut mass, mut stiffness, mut bent] = [[[0.0; MOST_CORNERS]; MOST_CORNERS]; 3];
     let unit = samples.spacing.powi(-2);

@@ -58,9 +58,9 @@
 //! 4. preconditions with the Hessian of the pure phases, diagonal in Fourier space, plus the Hessian of the geometric problem
 //!    for displacements of the interface, on a coarse lattice ([`Preconditioner`]),
 //! 5. uses the full Hessian and stops at negative curvature (Steihaug),
-//! 6. computes products and vectors of the linear solves in single precision where the step allows it ([`Precision`]),
+//! 6. computes Hessian-vector products and vectors of the linear solves in single precision where the step allows it ([`Precision`]),
 //! 7. stops when the Newton decrement is a small fraction of the motion, a test that no scaling of the energy changes and that
-//!    standing still does not pass.
+//!    `u = u_k` does not pass unless it is stationary.
 //!
 //! # Conventions
 //!

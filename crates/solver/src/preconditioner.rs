@@ -26,7 +26,7 @@ struct Scales<const D: usize> {
 }
 
 impl<const D: usize> From<SpectralFilter> for Preconditioner<D> {
-    /// The part for the pure phases alone.
+    /// The approximation in the pure phases alone.
     fn from(phase: SpectralFilter) -> Self {
         Self {
             phase,
@@ -38,7 +38,7 @@ impl<const D: usize> From<SpectralFilter> for Preconditioner<D> {
 }
 
 impl<const D: usize> Preconditioner<D> {
-    /// Both parts, for phase fields with interface width `eps` and a step of size `tau`.
+    /// With the coarse correction, for phase fields with interface width `eps` and a step of size `tau`.
     pub fn two_level(phase: SpectralFilter, grid: &Grid<D>, eps: f64, tau: f64) -> Self {
         let grid = *grid;
         Self {
@@ -77,7 +77,7 @@ impl<const D: usize> Preconditioner<D> {
         })
     }
 
-    /// Applies the part for the pure phases alone.
+    /// Applies the approximation in the pure phases alone.
     pub(crate) fn apply_phase(&self, r: &Tensor<D>) -> Tensor<D> {
         self.projected(spectral_filter(r.clone(), &self.phase))
     }

@@ -12,7 +12,7 @@ use crate::{Error, Objective};
 #[derive(Clone)]
 pub struct Region<const D: usize> {
     nodes: Arc<[bool]>,
-    /// 1 inside, 0 outside.
+    /// The indicator function of the region: 1 inside, 0 outside.
     inside: Tensor<D>,
     outside: Tensor<D, Bool>,
 }

@@ -67,7 +67,7 @@ fn along(corner: usize, axis: usize, fraction: f64) -> (f64, f64) {
 
 /// All nodes of an interface, and the lattice cells that hold their foot points.
 pub(crate) struct Samples<const D: usize> {
-    /// In the order of the grid.
+    /// The nodes in the order of the grid.
     pub nodes: Vec<Sample<D>>,
     /// Positions in `nodes`, cell by cell, and where each cell begins.
     order: Vec<u32>,
@@ -82,7 +82,7 @@ pub(crate) struct Samples<const D: usize> {
 
 impl<const D: usize> Samples<D> {
     /// The interface of `u`, whose width is `eps`, on a lattice of about the given spacing.
-    /// With a `region` only its nodes.
+    /// With a `region`, only its nodes count.
     pub(crate) fn new(
         grid: &Grid<D>,
         u: &[f64],
@@ -164,7 +164,7 @@ fn grouped<const D: usize>(samples: &[Sample<D>], cells: usize) -> (Vec<u32>, Ve
 struct Lattice<'a, const D: usize> {
     grid: &'a Grid<D>,
     eps: f64,
-    /// Cells per side.
+    /// Lattice cells per side of the box.
     cells: usize,
     /// Grid cells per lattice cell.
     width: f64,
@@ -175,7 +175,7 @@ impl<const D: usize> Lattice<'_, D> {
         -4.0 / 3.0 * self.eps * u.clamp(-0.999_999, 0.999_999).atanh()
     }
 
-    /// What a node is to the interface, if it belongs to it. Its cell is still that of the whole lattice.
+    /// The sample of a node, if the node belongs to the interface. Its cell is still that of the whole lattice.
     fn sample(&self, node: usize, u: &[f64]) -> Option<Sample<D>> {
         let weight = 1.0 - u[node] * u[node];
         if weight < WINDOW {

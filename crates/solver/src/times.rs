@@ -1,4 +1,4 @@
-//! Where the time of a step goes.
+//! Wall times of the phases of a minimization.
 
 use std::cell::Cell;
 use std::time::Instant;
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Error, Objective};
 
-/// Wall time of the parts of a minimization, in seconds. What is missing from a step's time are vector operations, line searches
+/// Wall times of the phases of a minimization in seconds. Their sum is less than the step's time by vector operations, line searches
 /// and measurements.
 ///
 /// On a GPU, which works while the host goes on, only sums mean something.
@@ -18,15 +18,15 @@ pub struct PhaseTimes {
     pub products: f64,
     /// Applications of the preconditioner.
     pub preconditioner: f64,
-    /// Assembly of its coarse part.
+    /// Assembly of its coarse correction.
     pub assembly: f64,
     /// Energies and gradients.
     pub energies: f64,
-    /// Finding the start, on coarser grids.
+    /// Minimizations on coarser grids that find the start.
     pub start: f64,
 }
 
-/// A sum of times.
+/// Adds up wall times.
 #[derive(Default)]
 pub(crate) struct Stopwatch(Cell<f64>);
 

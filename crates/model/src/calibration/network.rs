@@ -10,7 +10,7 @@ struct NetworkOnPlanes<'a> {
     activation: &'a Mlp,
     /// `K_m`, the sum of the kernel over each plane, from `m = -reach` to `reach`.
     kernel: Vec<f64>,
-    /// `1/2 sum K_b |b_t|^2 / (D - 1)` over each plane, `b_t` the part of `b` in the plane.
+    /// `1/2 sum K_b |b_t|^2 / (D - 1)` over each plane, `b_t` the component of `b` in the plane.
     moments: Vec<f64>,
     spacing: f64,
     eps: f64,

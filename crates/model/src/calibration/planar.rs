@@ -62,7 +62,7 @@ impl<S: PlanarStep + ?Sized> PlanarStep for &S {
     }
 }
 
-/// The flat interface of a step at one position, and what it says about the scheme's energy.
+/// The flat interface of a step at one position, and the factors of the scheme's energy that follow from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanarInterface {
     /// `c = <A, psi>^2 / (|psi|^2 tautilde^2 |q'|^2)`.
@@ -91,9 +91,9 @@ const SHIFT: f64 = 1.003;
 const INVERSE: usize = 24;
 /// Largest residual of the eigenvector, relative to it.
 const RESIDUAL: f64 = 1e-8;
-/// Most planes of a dense problem.
+/// Largest number of planes of a dense problem.
 const MOST_PLANES: f64 = 8192.0;
-/// Farthest that the eigenvalue of translations may be from 1.
+/// Largest distance of the eigenvalue of translations from 1.
 const OFF: f64 = 1e-2;
 
 /// Solves for the flat interface at `position` (in plane distances, from a plane).

@@ -15,7 +15,7 @@ use crate::{Error, Mlp, Network};
 /// Settings of the training.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AdamParams {
-    /// Passes over all radii.
+    /// Number of passes over all radii.
     pub epochs: usize,
     /// Radii per mini-batch, 10 in the paper.
     pub batch: usize,
@@ -23,7 +23,7 @@ pub struct AdamParams {
     pub learning_rate: f64,
     /// Learning rate of the last epoch; geometric in between.
     pub final_learning_rate: f64,
-    /// Held-out radii for the learning curve.
+    /// Number of held-out radii for the learning curve.
     pub held_out: usize,
     /// Kernel and activation to start from; `None` is [`paper_start`].
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -50,9 +50,9 @@ pub struct AdamState {
     pub parameters: Vec<f64>,
     /// First and second moment of the gradient.
     pub moments: [Vec<f64>; 2],
-    /// Updates so far.
+    /// Number of updates so far.
     pub updates: usize,
-    /// Finished epochs.
+    /// Number of finished epochs.
     pub epoch: usize,
 }
 
@@ -268,8 +268,8 @@ impl Recipe for AdamParams {
     }
 }
 
-/// The paper's start: kernel zero, activation parameters normal. It does not say how wide: weights and biases have standard
-/// deviation `1/sqrt(inputs of the layer)`, so that the Gaussian units begin neither flat nor saturated.
+/// The paper's start: the kernel is zero, the activation's parameters are normally distributed. The paper gives no standard deviation; here
+/// it is `1/sqrt(inputs of the layer)`, so that the Gaussian units begin neither flat nor saturated.
 pub fn paper_start(data: &SphereData, seed: u64) -> (Vec<f64>, Mlp) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let layers = crate::PAPER_LAYERS.to_vec();

@@ -34,9 +34,9 @@ pub struct LeastSquaresParams {
     pub range: [f64; 2],
     /// Strata across the interface band, per radius.
     pub shells: usize,
-    /// Random points per stratum.
+    /// Number of random points per stratum.
     pub directions: usize,
-    /// Normals of flat interfaces.
+    /// Number of normals of flat interfaces.
     pub normals: usize,
     /// Weight of the flat interfaces against the spheres, as a factor of the residual.
     pub flat: f64,
@@ -113,7 +113,7 @@ impl OddPolynomial {
 
 /// Half-width of the sampled band in units of `eps`.
 const BAND: f64 = 7.0;
-/// Samples across a flat interface.
+/// Number of samples across a flat interface.
 const ACROSS: usize = 64;
 /// Weight of `F(1) = 1`.
 const PHASE: f64 = 1e3;

@@ -23,19 +23,19 @@ const CHUNK: usize = 2048;
 /// Settings of the training.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LmParams {
-    /// Strata across the interface band, per radius.
+    /// Number of strata across the interface band, per radius.
     pub shells: usize,
-    /// Random points per stratum.
+    /// Number of random points per stratum.
     pub directions: usize,
     /// Weight of the exchanged phases `-u` in the loss.
     pub flipped: f64,
-    /// Ridge of the kernel toward the heat kernel; keeps its transfer function in `[0, 1]` where the data say nothing.
+    /// Ridge of the kernel toward the heat kernel; keeps its transfer function in `[0, 1]` where the data do not determine it.
     pub kernel_ridge: f64,
     /// Ridge of the activation's parameters.
     pub activation_ridge: f64,
-    /// Upper bound of iterations.
+    /// Largest number of iterations.
     pub iterations: usize,
-    /// Random starts of the activation.
+    /// Number of random starts of the activation.
     pub starts: usize,
     /// Stop when the held-out loss has not improved by one percent over this many iterations.
     pub patience: usize,
@@ -61,7 +61,7 @@ impl Default for LmParams {
 pub struct LmState {
     /// Kernel (one value per orbit), then activation parameters.
     pub parameters: Vec<f64>,
-    /// Damping.
+    /// Damping of the next step: the diagonal of the Gauss-Newton matrix is multiplied by one plus this.
     pub damping: f64,
     /// Finished iterations.
     pub iteration: usize,
@@ -71,7 +71,7 @@ pub struct LmState {
     pub best_loss: f64,
     /// Iteration of the last improvement by one percent.
     pub improved_at: usize,
-    /// Loss it had then.
+    /// Held-out loss at that iteration.
     pub improved_to: f64,
 }
 
@@ -88,7 +88,7 @@ pub(super) struct Problem<'a> {
     centre: Vec<f64>,
     /// Gradient of the kernel's sum, which is held at 1 so that `F(+-1) = +-1`.
     sum: Vec<f64>,
-    /// What the residuals are multiplied by, if not the identity. The rows then make a single chunk.
+    /// A matrix by which the residuals are multiplied. The rows then make a single chunk.
     pub(super) mix: Option<Mat<f64>>,
     device: &'a ComputeDevice,
 }

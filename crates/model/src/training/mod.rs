@@ -1,8 +1,8 @@
 //! Learning the operator from shrinking spheres (alg:mcf_training), in three ways.
 //!
 //! [`adam`] is the paper's: mini-batches of whole grids, refined progressively. [`levenberg_marquardt`] solves the same
-//! least-squares problem on sampled points and gets to its floor in a minute. [`least_squares`] asks for another thing, the
-//! same relative accuracy at every curvature, which is what the calibrated Willmore scheme needs.
+//! least-squares problem on sampled points and gets to its floor in a minute. [`least_squares`] has another goal, the
+//! same relative accuracy at every curvature, which the calibrated Willmore scheme needs.
 //!
 //! Each is a [`Recipe`]; a [`Training`] runs any of them.
 
@@ -21,12 +21,12 @@ pub use symmetry::Orbits;
 
 use crate::Error;
 
-/// One iteration or epoch of a training, for progress displays and learning curves.
+/// The progress of a training after an iteration or epoch, for displays and learning curves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
-    /// Finished iterations.
+    /// Number of finished iterations.
     pub iteration: usize,
-    /// Planned iterations.
+    /// Number of planned iterations.
     pub of: usize,
     /// Loss (eq:mcf_scheme_optimization_discrete) on the training data.
     pub training_loss: f64,
@@ -34,7 +34,7 @@ pub struct Progress {
     pub held_out_loss: f64,
 }
 
-/// Watches a training.
+/// An observer of a training.
 pub trait Observer<State> {
     /// Called after every iteration; `Ok(false)` stops the training with [`Error::Interrupted`].
     ///

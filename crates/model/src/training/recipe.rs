@@ -1,4 +1,4 @@
-//! What all ways to train share: the history, the checkpoint, the measured quality and the account of the origin.
+//! The frame of all recipes: learning curve, checkpoint, measured quality, provenance.
 
 use std::time::Instant;
 
@@ -9,12 +9,12 @@ use serde::{Deserialize, Serialize};
 use super::{Observer, Progress, SphereData};
 use crate::{Error, Mlp, Network, Provenance, Quality};
 
-/// A way to train, with its settings.
+/// A method of training with its settings.
 pub trait Recipe: Serialize {
     /// What the training needs to go on with the same bytes after an interruption; `()` for one that starts over.
     type State: Clone + Serialize + DeserializeOwned;
 
-    /// Finds kernel and activation. The observer sees every iteration, and may stop the training.
+    /// Trains kernel and activation. The observer is called after every iteration and may stop the training.
     ///
     /// # Errors
     /// [`Error::Training`] for impossible settings, [`Error::Shape`] for a state of other settings, [`Error::Diverged`],
@@ -35,9 +35,9 @@ pub trait Recipe: Serialize {
 /// Everything that the result of a training depends on.
 #[derive(Clone, Debug, Serialize)]
 pub struct Training<'a, R> {
-    /// How to train.
+    /// The method and its settings.
     pub recipe: &'a R,
-    /// What to train on.
+    /// The training data.
     pub data: SphereData,
     /// Seed of all random numbers.
     pub seed: u64,
@@ -58,12 +58,12 @@ pub struct CurvePoint {
     pub held_out_loss: f64,
 }
 
-/// Where a training stands. To be stored now and then; the default stands at the start.
+/// A checkpoint of a training; the default is its start.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Checkpoint<State> {
     /// State after the last iteration.
     pub state: Option<State>,
-    /// How the loss went.
+    /// The learning curve.
     pub curve: Vec<CurvePoint>,
 }
 
@@ -81,9 +81,9 @@ impl<State> Default for Checkpoint<State> {
 pub struct Trained {
     /// The network with its provenance, and with its calibration if it has one: hardly trained networks have no flat interface.
     pub network: Network,
-    /// How the loss went.
+    /// The learning curve.
     pub curve: Vec<CurvePoint>,
-    /// Measured quality.
+    /// The measured quality of the network.
     pub quality: Quality,
 }
 
@@ -126,7 +126,7 @@ impl<R: Recipe> Training<'_, R> {
         self.finish(kernel, activation, checkpoint.curve.clone(), device)
     }
 
-    /// Measures the result and puts the network together.
+    /// Measures the trained operator and makes a network of it.
     fn finish(
         &self,
         kernel: Vec<f64>,

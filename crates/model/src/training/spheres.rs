@@ -40,7 +40,7 @@ impl SphereData {
         Ok(data)
     }
 
-    /// Few radii, for a smoke test.
+    /// The same with few radii, for a smoke test.
     #[must_use]
     pub fn quick(self) -> Self {
         Self { count: 12, ..self }
@@ -94,7 +94,7 @@ impl SphereData {
             .collect()
     }
 
-    /// Radius after the step.
+    /// The radius `sqrt(r^2 - 2 (D - 1) tautilde)` after the step.
     pub fn shrunk(&self, radius: f64) -> f64 {
         mean_curvature_radius(radius, self.step(), self.ratios.dimension)
     }
