@@ -60,6 +60,16 @@ impl Default for NewtonParams {
 }
 
 impl NewtonParams {
+    /// For steps of second order, whose minimizations are short and begin near their ends: a tighter tolerance, since what the
+    /// minimizations leave enters the [estimated error](crate::StepEstimates), and looser linear solves.
+    pub fn second_order() -> Self {
+        Self {
+            tolerance: 0.015,
+            cg_tolerance: 0.3,
+            ..Self::default()
+        }
+    }
+
     /// Checks the ranges.
     ///
     /// # Errors

@@ -28,7 +28,7 @@ const FARTHEST: f64 = 1.5;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepEstimates {
     /// The estimated local time error, from the rates of the two stages and of the step before: of third order in the step. None in the
-    /// first two steps, which lack that rate, or have that of a corner.
+    /// first three steps, which lack that rate, or have that of a corner.
     pub error: Option<f64>,
     /// How far the interface moved.
     pub motion: f64,
@@ -140,7 +140,7 @@ impl<const D: usize> WillmoreFlow<D> {
         const FIRST: f64 = 1.0 / (6.0 * GAMMA * (1.0 - GAMMA));
         const SECOND: f64 = (2.0 - 3.0 * GAMMA) / (6.0 * (1.0 - GAMMA));
         /// Steps that have no estimate.
-        const WITHOUT: usize = 2;
+        const WITHOUT: usize = 3;
         let unit = 4.0 * self.params.eps / 3.0;
         let between = |to: &Field<D>, from: &Field<D>| -> Result<f64, Error> {
             Ok(unit * largest(&to.zip_map(from, displacement)?, middle))
