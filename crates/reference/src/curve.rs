@@ -138,7 +138,7 @@ impl Curve {
                 // Where the line to the point is normal to the curve, by Newton's method in the frame of the curve.
                 let local = (target - series.at(alpha)) * Complex::cis(-self.angle_at(alpha));
                 best = best.min(local.norm());
-                let slope = 1.0 - local.im * self.bend_at(alpha);
+                let slope = 1.0 - local.im * self.scale * self.curvature_at(alpha);
                 alpha += local.re / slope.max(0.1);
                 if local.re.abs() < 1e-14 {
                     break;
@@ -171,9 +171,9 @@ impl Curve {
         alpha + self.real_part(&self.angle, alpha)
     }
 
-    /// `d theta / d alpha`, the curvature times the scale.
-    pub(crate) fn bend_at(&self, alpha: f64) -> f64 {
-        1.0 + self.real_part(&self.grid.derivative(&self.angle), alpha)
+    /// The curvature at `alpha`.
+    pub fn curvature_at(&self, alpha: f64) -> f64 {
+        (1.0 + self.real_part(&self.grid.derivative(&self.angle), alpha)) / self.scale
     }
 
     fn real_part(&self, coefficients: &[Complex<f64>], alpha: f64) -> f64 {
@@ -231,6 +231,21 @@ impl Curve {
         angle[points / 2] = Complex::ZERO;
         Self {
             grid: Grid::new(self.grid.folds, points),
+            angle,
+            ..self.clone()
+        }
+    }
+
+    /// The same curve without the use of its rotational symmetry.
+    pub(crate) fn unfolded(&self) -> Self {
+        let folds = self.grid.folds;
+        let grid = Grid::new(1, self.grid.points * folds);
+        let mut angle = vec![Complex::ZERO; grid.points / 2 + 1];
+        for (spread, c) in angle.iter_mut().step_by(folds).zip(&self.angle) {
+            *spread = *c;
+        }
+        Self {
+            grid,
             angle,
             ..self.clone()
         }

@@ -2,6 +2,7 @@
 //!
 //! - [`planar`]: Willmore flow and curve shortening of plane curves, also of polygons, to about 1e-8 of their size.
 //! - [`revolution`]: Willmore and mean curvature flow of spheres, disks, tori and other surfaces of revolution, to about 1e-6.
+//! - [`equilibria`]: axisymmetric vesicles of given area and volume, and closed elastic curves of given length and area.
 //!
 //! Curves are counterclockwise, with the curvature `kappa` of a circle positive; surfaces have the sum `h` of their principal
 //! curvatures positive on spheres. Energies are `1/2 int kappa^2` and `1/2 int h^2`, which is `8 pi` for spheres. [`Flow`] states
@@ -10,6 +11,7 @@
 mod corner;
 mod curve;
 mod dense;
+pub mod equilibria;
 mod error;
 mod exponential;
 mod flow;

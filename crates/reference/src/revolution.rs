@@ -139,8 +139,8 @@ impl Surface {
         let mut alpha = (widest as f64 + 0.5) * TAU / points.len() as f64;
         for _ in 0..5 {
             // Newton's method for an upright tangent.
-            alpha += self.profile.angle_at(alpha).cos()
-                / (self.profile.angle_at(alpha).sin() * self.profile.bend_at(alpha));
+            let (sin, cos) = self.profile.angle_at(alpha).sin_cos();
+            alpha += cos / (sin * self.profile.curvature_at(alpha) * self.profile.scale);
         }
         self.profile.point(alpha)[0]
     }

@@ -1,5 +1,6 @@
 //! Tests of the exact references.
 
+mod equilibria;
 mod finite_differences;
 mod planar;
 mod revolution;
