@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use realfft::num_complex::Complex;
 
-use crate::Error;
 use crate::spectral::{Coefficients, Grid, Series, power_sum};
+use crate::{Error, Flow};
 
 /// A smooth simple closed curve at a time, counterclockwise, by its tangent angle `theta` over `alpha = 2 pi s / length`, where `s`
 /// is the arc length: `theta(alpha) - alpha` is a Fourier series, so that all measures are exact to rounding.
@@ -192,6 +192,11 @@ impl Curve {
         ]
     }
 
+    /// The rate `dt / dtau` of the time against that of the curve scaled to length `2 pi`.
+    pub(crate) fn clock(&self, flow: Flow) -> f64 {
+        self.scale.powi(flow.order())
+    }
+
     /// The same curve on fewer points where it shows the last third of its modes to be negligible, or on more where they are not
     /// small against the tolerance; numbers of points are `2^k` and `3 2^k`.
     pub(crate) fn fitted(&self, tolerance: f64) -> Result<Self, Error> {
@@ -204,12 +209,7 @@ impl Curve {
         } else {
             (points / 3 * 2, points / 3 * 4)
         };
-        let tail = |first: usize| {
-            self.angle[first..]
-                .iter()
-                .map(|c| c.norm())
-                .fold(0.0, f64::max)
-        };
+        let tail = |first: usize| largest(&self.angle[first..]);
         if points > FEWEST_POINTS && tail(fewer / 3) < NEGLIGIBLE * tolerance {
             self.with_points(fewer).fitted(tolerance)
         } else if tail(points / 3) <= tolerance {
@@ -254,12 +254,12 @@ impl Curve {
     /// The same curve with as many folds as its series shows, at most so many.
     pub(crate) fn folded(&self, most: usize) -> Self {
         let vanish = |folds: usize| {
-            let others = self
-                .angle
-                .iter()
-                .enumerate()
-                .filter(move |(j, _)| j % folds != 0);
-            others.map(|(_, c)| c.norm()).fold(0.0, f64::max) < 1e-12
+            let mut others = self.angle.clone();
+            others
+                .iter_mut()
+                .step_by(folds)
+                .for_each(|c| *c = Complex::ZERO);
+            largest(&others) < 1e-12
         };
         let divides = |folds: &usize| self.grid.points.is_multiple_of(2 * folds);
         match (2..=most)
@@ -275,6 +275,10 @@ impl Curve {
             _ => self.clone(),
         }
     }
+}
+
+fn largest(coefficients: &[Complex<f64>]) -> f64 {
+    coefficients.iter().map(|c| c.norm()).fold(0.0, f64::max)
 }
 
 fn to_segment(p: [f64; 2], [a, b]: [[f64; 2]; 2]) -> f64 {

@@ -13,8 +13,8 @@ use std::f64::consts::PI;
 
 use crate::dense::Newton;
 use crate::flow::Nodes;
-use crate::revolution::{Surface, odd, sines};
-use crate::spectral::Grid;
+use crate::revolution::Surface;
+use crate::spectral::{Grid, odd, sines};
 use crate::{Curve, Error, Flow, Shape};
 
 /// A branch of vesicles.
@@ -281,7 +281,7 @@ impl Path {
         longest: f64,
         mut set: impl FnMut(&mut Problem, f64) -> Condition,
     ) -> Result<(), Error> {
-        const SHORTEST: f64 = 1e-3;
+        const SHORTEST: f64 = 1e-2;
         let mut left = to - from;
         let mut length = longest;
         while left != 0.0 {

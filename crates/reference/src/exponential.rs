@@ -2,7 +2,85 @@
 
 use realfft::num_complex::Complex;
 
-type Vector = Vec<Complex<f64>>;
+use crate::flow::{Nodes, Rates};
+use crate::spectral::Coefficients;
+use crate::stepping::{Attempts, Method};
+use crate::{Curve, Flow};
+
+/// Flows of plane curves, and of the profiles of surfaces that do not meet their axis. Two half steps are compared with one whole
+/// step, and their difference is extrapolated.
+pub(crate) struct Exponential {
+    pub(crate) flow: Flow,
+    /// Whether the curve is a profile.
+    pub(crate) revolution: bool,
+}
+
+impl Method for Exponential {
+    const ORDER: f64 = 5.0;
+
+    fn attempts<'a>(&'a self, curve: &'a Curve) -> Attempts<'a> {
+        let modes = curve.angle.len();
+        let decay = |j: usize| -curve.grid.wave(j).powi(self.flow.order());
+        let linear: Vec<f64> = (0..modes).map(decay).chain([0.0; 4]).collect();
+        let scalars = [
+            curve.scale.ln(),
+            curve.centre[0],
+            curve.centre[1],
+            curve.time,
+        ];
+        let start = with_scalars(&curve.angle, scalars);
+        let at_start = self.nonlinear(curve, &linear, &start);
+        Box::new(move |length| {
+            let nonlinear = |state: &[Complex<f64>]| self.nonlinear(curve, &linear, state);
+            let once = Step::new(&linear, length).take(&nonlinear, &start, &at_start);
+            let half = Step::new(&linear, length / 2.0);
+            let middle = half.take(&nonlinear, &start, &at_start);
+            let twice = half.take(&nonlinear, &middle, &nonlinear(&middle));
+            let difference = |i: usize| (twice[i] - once[i]) / 15.0;
+            let squares = (0..=modes).map(|i| difference(i).norm_sqr()).sum::<f64>();
+            let late = difference(modes + 3).re / curve.clock(self.flow);
+            let end: Coefficients = (0..twice.len()).map(|i| twice[i] + difference(i)).collect();
+            let (angle, scalars) = end.split_at(modes);
+            let end = Curve {
+                grid: curve.grid.clone(),
+                angle: angle.to_vec(),
+                scale: scalars[0].re.exp(),
+                centre: [scalars[1].re, scalars[2].re],
+                time: scalars[3].re,
+            };
+            (end, (2.0 * squares + late * late).sqrt())
+        })
+    }
+}
+
+impl Exponential {
+    /// The state is the coefficients of the tangent angle, then the logarithm of the scale, the centre and the time.
+    fn nonlinear(&self, curve: &Curve, linear: &[f64], state: &[Complex<f64>]) -> Coefficients {
+        let (angle, scalars) = state.split_at(curve.angle.len());
+        let scale = scalars[0].re.exp();
+        let axis = self.revolution.then(|| scalars[1].re / scale);
+        let nodes = Nodes::new(&curve.grid, angle, axis);
+        let rates = Rates::new(
+            &curve.grid,
+            &nodes,
+            &self.flow.velocity(&curve.grid, &nodes),
+        );
+        let [x, y] = rates.centre;
+        let clock = scale.powi(self.flow.order());
+        let all = with_scalars(&rates.angle, [rates.log_scale, scale * x, scale * y, clock]);
+        (0..all.len())
+            .map(|i| all[i] - state[i] * linear[i])
+            .collect()
+    }
+}
+
+fn with_scalars(angle: &[Complex<f64>], scalars: [f64; 4]) -> Coefficients {
+    angle
+        .iter()
+        .copied()
+        .chain(scalars.map(Complex::from))
+        .collect()
+}
 
 /// Factors of one step for each entry of `L`.
 struct Factors {
@@ -15,10 +93,10 @@ struct Factors {
 }
 
 /// A step of fixed length; entries with `L = 0` take the step of the classical Runge-Kutta method.
-pub(crate) struct Step(Vec<Factors>);
+struct Step(Vec<Factors>);
 
 impl Step {
-    pub(crate) fn new(linear: &[f64], length: f64) -> Self {
+    fn new(linear: &[f64], length: f64) -> Self {
         let factors = |l: &f64| {
             let z = l * length;
             let [p1, p2, p3] = phi(z);
@@ -34,13 +112,13 @@ impl Step {
     }
 
     /// The step from `u`, where the nonlinear term is `start`.
-    pub(crate) fn take(
+    fn take(
         &self,
-        nonlinear: &impl Fn(&[Complex<f64>]) -> Vector,
+        nonlinear: &impl Fn(&[Complex<f64>]) -> Coefficients,
         u: &[Complex<f64>],
         start: &[Complex<f64>],
-    ) -> Vector {
-        let stage = |from: &[Complex<f64>], term: &dyn Fn(usize) -> Complex<f64>| -> Vector {
+    ) -> Coefficients {
+        let stage = |from: &[Complex<f64>], term: &dyn Fn(usize) -> Complex<f64>| -> Coefficients {
             let entries = self.0.iter().zip(from).enumerate();
             entries
                 .map(|(i, (f, u))| u * f.half + term(i) * f.stage)

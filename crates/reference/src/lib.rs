@@ -20,6 +20,7 @@ pub mod revolution;
 mod rosenbrock;
 mod shape;
 mod spectral;
+mod stepping;
 
 pub use curve::Curve;
 pub use error::Error;

@@ -8,14 +8,11 @@
 
 use std::f64::consts::{PI, TAU};
 
-use realfft::num_complex::Complex;
-
-use crate::flow::{Nodes, Rates};
-use crate::planar::{Exponential, Plane, checked};
-use crate::rosenbrock::Step;
+use crate::exponential::Exponential;
+use crate::flow::Nodes;
+use crate::rosenbrock::Rosenbrock;
 use crate::shape::MOST_ROUNDING;
-use crate::spectral::Coefficients;
-use crate::{Accuracy, Curve, Error, Flow, Shape};
+use crate::{Accuracy, Curve, Error, Flow, Shape, stepping};
 
 /// The accuracy of surfaces: errors of about 1e-6 of their size.
 pub const ACCURACY: Accuracy = Accuracy {
@@ -42,17 +39,18 @@ pub fn evolve(
     times: &[f64],
     accuracy: &Accuracy,
 ) -> Result<Vec<Surface>, Error> {
-    let start = Surface::from_shape(shape, flow, accuracy.rounding)?;
-    let off_axis = start.off_axis;
+    let Surface { profile, off_axis } = Surface::from_shape(shape, flow, accuracy.rounding)?;
     let profiles = if off_axis {
-        Exponential::new(flow, Plane::Meridian, accuracy.tolerance, start.profile).run(times)
+        let method = Exponential {
+            flow,
+            revolution: true,
+        };
+        stepping::run(&method, flow, accuracy.tolerance, profile, times)
     } else {
-        Rosenbrock::new(flow, accuracy.tolerance, start.profile).run(times)
+        stepping::run(&Rosenbrock(flow), flow, accuracy.tolerance, profile, times)
     };
-    Ok(profiles?
-        .into_iter()
-        .map(|profile| Surface { profile, off_axis })
-        .collect())
+    let surface = |profile| Surface { profile, off_axis };
+    Ok(profiles?.into_iter().map(surface).collect())
 }
 
 /// A surface of revolution about the y axis.
@@ -167,125 +165,5 @@ impl Surface {
                 .map(|(i, weight)| weight * value(&nodes, i))
                 .sum()
         }
-    }
-}
-
-/// Coefficients of `sum_j a_j sin(folds j alpha)`, `0 < j < points / 2`.
-pub(crate) fn odd(sines: &[f64]) -> Coefficients {
-    let ends = [Complex::ZERO];
-    let inner = sines.iter().map(|a| Complex::new(0.0, -a / 2.0));
-    ends.into_iter().chain(inner).chain(ends).collect()
-}
-
-/// The inverse of [`odd`].
-pub(crate) fn sines(coefficients: &[Complex<f64>]) -> impl Iterator<Item = f64> {
-    coefficients[1..coefficients.len() - 1]
-        .iter()
-        .map(|c| -2.0 * c.im)
-}
-
-/// The state is the sines of the tangent angle, then the logarithm of the scale and the height of the centre.
-struct Rosenbrock {
-    flow: Flow,
-    tolerance: f64,
-    curve: Curve,
-    /// Length of the next step.
-    step: f64,
-}
-
-impl Rosenbrock {
-    fn new(flow: Flow, tolerance: f64, curve: Curve) -> Self {
-        const FIRST_STEP: f64 = 1e-5;
-        let first = if curve.time > 0.0 {
-            curve.time / 8.0
-        } else {
-            FIRST_STEP * curve.scale.powi(flow.order())
-        };
-        Self {
-            flow,
-            tolerance,
-            curve,
-            step: first,
-        }
-    }
-
-    fn run(mut self, times: &[f64]) -> Result<Vec<Curve>, Error> {
-        checked(times, self.curve.time)?;
-        let mut curves = Vec::with_capacity(times.len());
-        for &time in times {
-            while self.curve.time < time {
-                self.advance(time)?;
-            }
-            curves.push(self.curve.clone());
-        }
-        Ok(curves)
-    }
-
-    /// One step, at most to the given time.
-    fn advance(&mut self, time: f64) -> Result<(), Error> {
-        self.curve = self.curve.fitted(self.tolerance)?;
-        let curve = &self.curve;
-        let rates = |state: &[f64]| self.rates(state);
-        let start: Vec<f64> = sines(&curve.angle)
-            .chain([curve.scale.ln(), curve.centre[1]])
-            .collect();
-        let step = Step::new(&rates, &start);
-        let left = time - curve.time;
-        let mut length = self.step;
-        loop {
-            let taken = length.min(left);
-            let (end, difference) = step.take(taken);
-            let error = (difference[..start.len() - 1]
-                .iter()
-                .map(|d| d * d)
-                .sum::<f64>()
-                / 2.0)
-                .sqrt();
-            let factor = 0.9 * (self.tolerance / error).powf(0.25);
-            if error <= self.tolerance && end.iter().all(|x| x.is_finite()) {
-                let (angle, scalars) = end.split_at(start.len() - 2);
-                self.curve = Curve {
-                    grid: curve.grid.clone(),
-                    angle: odd(angle),
-                    scale: scalars[0].exp(),
-                    centre: [0.0, scalars[1]],
-                    time: if taken < left {
-                        curve.time + taken
-                    } else {
-                        time
-                    },
-                };
-                self.step = if taken < length {
-                    length.max(taken * factor.min(4.0))
-                } else {
-                    length * factor.min(4.0)
-                };
-                return Ok(());
-            }
-            // A number that is not finite counts as a large error.
-            length = taken
-                * if factor.is_finite() {
-                    factor.clamp(0.1, 0.9)
-                } else {
-                    0.1
-                };
-            if length < 1e-13 * curve.time.max(1e-30) {
-                return Err(Error::StepTooShort { time: curve.time });
-            }
-        }
-    }
-
-    fn rates(&self, state: &[f64]) -> Vec<f64> {
-        let grid = &self.curve.grid;
-        let (angle, scalars) = state.split_at(state.len() - 2);
-        let nodes = Nodes::new(grid, &odd(angle), Some(0.0));
-        let rates = Rates::new(grid, &nodes, &self.flow.velocity(grid, &nodes));
-        let scale = scalars[0].exp();
-        let clock = scale.powi(-self.flow.order());
-        let scalars = [rates.log_scale, scale * rates.centre[1]];
-        sines(&rates.angle)
-            .chain(scalars)
-            .map(|rate| rate * clock)
-            .collect()
     }
 }

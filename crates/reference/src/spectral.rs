@@ -177,3 +177,17 @@ pub(crate) fn power_sum(coefficients: &[Complex<f64>], z: Complex<f64>) -> Compl
         .rev()
         .fold(Complex::ZERO, |sum, c| sum * z + c)
 }
+
+/// Coefficients of `sum_j a_j sin(folds j alpha)`, `0 < j < points / 2`.
+pub(crate) fn odd(sines: &[f64]) -> Coefficients {
+    let ends = [Complex::ZERO];
+    let inner = sines.iter().map(|a| Complex::new(0.0, -a / 2.0));
+    ends.into_iter().chain(inner).chain(ends).collect()
+}
+
+/// The inverse of [`odd`].
+pub(crate) fn sines(coefficients: &[Complex<f64>]) -> impl Iterator<Item = f64> {
+    coefficients[1..coefficients.len() - 1]
+        .iter()
+        .map(|c| -2.0 * c.im)
+}

@@ -63,11 +63,11 @@ fn an_independent_method_agrees() {
     let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-5, "{a} {b}");
     for (a, b) in [(1.2, 0.8), (0.8, 1.2)] {
         let [equator, pole] =
-            finite_differences::willmore(finite_differences::ellipse(a, b), Axis::At(0.0), 0.02);
+            finite_differences::willmore(finite_differences::ellipse(a, b), Axis::At(0.0), 0.006);
         let surface = &evolve(
             &Shape::ellipse(a, b).unwrap(),
             Flow::Willmore,
-            &[0.02],
+            &[0.006],
             &ACCURACY,
         )
         .unwrap()[0];
@@ -75,11 +75,11 @@ fn an_independent_method_agrees() {
         close(surface.poles().unwrap()[1], pole);
     }
     // The profile of a torus, in polar coordinates about the centre of its circle.
-    let [outer, _] = finite_differences::willmore(|_| 1.0, Axis::At(-2.0), 0.05);
+    let [outer, _] = finite_differences::willmore(|_| 1.0, Axis::At(-2.0), 0.02);
     let surface = &evolve(
         &Shape::circle([2.0, 0.0], 1.0).unwrap(),
         Flow::Willmore,
-        &[0.05],
+        &[0.02],
         &ACCURACY,
     )
     .unwrap()[0];
