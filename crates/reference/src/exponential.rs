@@ -1,0 +1,197 @@
+//! Exponential time differencing of order four (Cox, Matthews, J. Comput. Phys. 176, 2002) for `u' = L u + N(u)`, `L` diagonal.
+
+use realfft::num_complex::Complex;
+
+use crate::flow::{Nodes, Rates};
+use crate::spectral::Coefficients;
+use crate::stepping::{Attempts, Method};
+use crate::{Curve, Flow};
+
+/// Flows of plane curves, and of the profiles of surfaces that do not meet their axis. Two half steps are compared with one whole
+/// step, and their difference is extrapolated.
+pub(crate) struct Exponential {
+    pub(crate) flow: Flow,
+    /// Whether the curve is a profile.
+    pub(crate) revolution: bool,
+}
+
+impl Method for Exponential {
+    const ORDER: f64 = 5.0;
+
+    fn attempts<'a>(&'a self, curve: &'a Curve) -> Attempts<'a> {
+        let modes = curve.angle.len();
+        let decay = |j: usize| -curve.grid.wave(j).powi(self.flow.order());
+        let linear: Vec<f64> = (0..modes).map(decay).chain([0.0; 4]).collect();
+        let scalars = [
+            curve.scale.ln(),
+            curve.centre[0],
+            curve.centre[1],
+            curve.time,
+        ];
+        let start = with_scalars(&curve.angle, scalars);
+        let at_start = self.nonlinear(curve, &linear, &start);
+        Box::new(move |length| {
+            let nonlinear = |state: &[Complex<f64>]| self.nonlinear(curve, &linear, state);
+            let once = Step::new(&linear, length).take(&nonlinear, &start, &at_start);
+            let half = Step::new(&linear, length / 2.0);
+            let middle = half.take(&nonlinear, &start, &at_start);
+            let twice = half.take(&nonlinear, &middle, &nonlinear(&middle));
+            let difference = |i: usize| (twice[i] - once[i]) / 15.0;
+            let squares = (0..=modes).map(|i| difference(i).norm_sqr()).sum::<f64>();
+            let late = difference(modes + 3).re / curve.clock(self.flow);
+            let end: Coefficients = (0..twice.len()).map(|i| twice[i] + difference(i)).collect();
+            let (angle, scalars) = end.split_at(modes);
+            let end = Curve {
+                grid: curve.grid.clone(),
+                angle: angle.to_vec(),
+                scale: scalars[0].re.exp(),
+                centre: [scalars[1].re, scalars[2].re],
+                time: scalars[3].re,
+            };
+            (end, (2.0 * squares + late * late).sqrt())
+        })
+    }
+}
+
+impl Exponential {
+    /// The state is the coefficients of the tangent angle, then the logarithm of the scale, the centre and the time.
+    fn nonlinear(&self, curve: &Curve, linear: &[f64], state: &[Complex<f64>]) -> Coefficients {
+        let (angle, scalars) = state.split_at(curve.angle.len());
+        let scale = scalars[0].re.exp();
+        let axis = self.revolution.then(|| scalars[1].re / scale);
+        let nodes = Nodes::new(&curve.grid, angle, axis);
+        let rates = Rates::new(
+            &curve.grid,
+            &nodes,
+            &self.flow.velocity(&curve.grid, &nodes),
+        );
+        let [x, y] = rates.centre;
+        let clock = scale.powi(self.flow.order());
+        let all = with_scalars(&rates.angle, [rates.log_scale, scale * x, scale * y, clock]);
+        (0..all.len())
+            .map(|i| all[i] - state[i] * linear[i])
+            .collect()
+    }
+}
+
+fn with_scalars(angle: &[Complex<f64>], scalars: [f64; 4]) -> Coefficients {
+    angle
+        .iter()
+        .copied()
+        .chain(scalars.map(Complex::from))
+        .collect()
+}
+
+/// Factors of one step for each entry of `L`.
+struct Factors {
+    whole: f64,
+    half: f64,
+    /// Of the inner stages.
+    stage: f64,
+    /// Of the nonlinear term at the start, in the middle and at the end.
+    weights: [f64; 3],
+}
+
+/// A step of fixed length; entries with `L = 0` take the step of the classical Runge-Kutta method.
+struct Step(Vec<Factors>);
+
+impl Step {
+    fn new(linear: &[f64], length: f64) -> Self {
+        let factors = |l: &f64| {
+            let z = l * length;
+            let [p1, p2, p3] = phi(z);
+            Factors {
+                whole: z.exp(),
+                half: (z / 2.0).exp(),
+                stage: length / 2.0 * phi(z / 2.0)[0],
+                weights: [p1 - 3.0 * p2 + 4.0 * p3, 2.0 * p2 - 4.0 * p3, 4.0 * p3 - p2]
+                    .map(|w| w * length),
+            }
+        };
+        Self(linear.iter().map(factors).collect())
+    }
+
+    /// The step from `u`, where the nonlinear term is `start`.
+    fn take(
+        &self,
+        nonlinear: &impl Fn(&[Complex<f64>]) -> Coefficients,
+        u: &[Complex<f64>],
+        start: &[Complex<f64>],
+    ) -> Coefficients {
+        let stage = |from: &[Complex<f64>], term: &dyn Fn(usize) -> Complex<f64>| -> Coefficients {
+            let entries = self.0.iter().zip(from).enumerate();
+            entries
+                .map(|(i, (f, u))| u * f.half + term(i) * f.stage)
+                .collect()
+        };
+        let a = stage(u, &|i| start[i]);
+        let at_a = nonlinear(&a);
+        let b = stage(u, &|i| at_a[i]);
+        let at_b = nonlinear(&b);
+        let c = stage(&a, &|i| at_b[i] * 2.0 - start[i]);
+        let at_c = nonlinear(&c);
+        let end = |(i, f): (usize, &Factors)| {
+            u[i] * f.whole
+                + start[i] * f.weights[0]
+                + (at_a[i] + at_b[i]) * f.weights[1]
+                + at_c[i] * f.weights[2]
+        };
+        self.0.iter().enumerate().map(end).collect()
+    }
+}
+
+/// `phi_1, phi_2, phi_3` at `z <= 0`, `phi_k(z) = (phi_{k-1}(z) - 1 / (k-1)!) / z`, `phi_0 = exp`: by the series for small `z`,
+/// where the recursion cancels.
+fn phi(z: f64) -> [f64; 3] {
+    if z < -1.0 {
+        let first = z.exp_m1() / z;
+        let second = (first - 1.0) / z;
+        [first, second, (second - 0.5) / z]
+    } else {
+        // Horner's scheme of sum_n z^n / (n + 3)!.
+        let third = (0..18)
+            .rev()
+            .fold(1.0, |sum, n| 1.0 + sum * z / f64::from(n + 4))
+            / 6.0;
+        let second = 0.5 + z * third;
+        [1.0 + z * second, second, third]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_formulas_of_phi_agree() {
+        let (left, right) = (phi(-1.0 - 1e-12), phi(-1.0 + 1e-12));
+        for k in 0..3 {
+            assert!((left[k] - right[k]).abs() < 2e-12);
+        }
+        assert!((phi(-2.0)[2] - ((-2.0_f64).exp() - 1.0 + 2.0 - 2.0) / -8.0).abs() < 1e-15);
+    }
+
+    /// `u' = -100 (u - cos t) - sin t`, `t' = 1` has the solution `cos t`.
+    #[test]
+    fn order_is_four() {
+        let error = |steps: u32| {
+            let step = Step::new(&[-3.0, 0.0], 1.0 / f64::from(steps));
+            let nonlinear = |u: &[Complex<f64>]| {
+                let t = u[1].re;
+                vec![
+                    Complex::from(t.cos() * u[0].re * u[0].re),
+                    Complex::from(1.0),
+                ]
+            };
+            let mut u = vec![Complex::from(2.0), Complex::from(0.0)];
+            for _ in 0..steps {
+                let start = nonlinear(&u);
+                u = step.take(&nonlinear, &u, &start);
+            }
+            u[0].re
+        };
+        let exact = error(512);
+        let ratio = (error(16) - exact) / (error(32) - exact);
+        assert!((ratio.log2() - 4.0).abs() < 0.3, "order {}", ratio.log2());
+    }
+}

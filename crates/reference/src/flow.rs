@@ -1,0 +1,164 @@
+//! The flows of curves and of surfaces of revolution, in the frame of equal arc length.
+
+use realfft::num_complex::Complex;
+
+use crate::spectral::{Coefficients, Grid, Series};
+
+/// A gradient flow in `L2`, of a plane curve or of the surface that it generates about the y axis.
+///
+/// `kappa` is the curvature of the curve; `h = kappa` in the plane, and on a surface `h = kappa + sin(theta) / x`, the sum of the
+/// principal curvatures, positive for spheres.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flow {
+    /// Of `1/2 int h^2`: the outward normal velocity is `h'' + h (|A|^2 - h^2 / 2)`, in which `h''` is the Laplacian along the curve
+    /// or on the surface and `|A|^2` the sum of the squared principal curvatures. In the plane that is `kappa_ss + kappa^3 / 2`, and
+    /// the radius of a circle grows as `R^4 = R_0^4 + 2 t`; spheres stand still.
+    Willmore,
+    /// Of the length or the area: the outward normal velocity is `-h`. In the plane this is curve shortening.
+    MeanCurvature,
+}
+
+impl Flow {
+    /// Order of the derivatives of the tangent angle.
+    pub(crate) fn order(self) -> i32 {
+        match self {
+            Flow::Willmore => 4,
+            Flow::MeanCurvature => 2,
+        }
+    }
+
+    /// The outward normal velocity at the nodes.
+    pub(crate) fn velocity(self, grid: &Grid, nodes: &Nodes) -> Vec<f64> {
+        match self {
+            Flow::Willmore => nodes.willmore(grid),
+            Flow::MeanCurvature => nodes.h.iter().map(|h| -h).collect(),
+        }
+    }
+}
+
+/// How accurately to compute.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Accuracy {
+    /// A polygon starts with the self-similar solutions of its corners, over this fraction of its shortest edge; at most 1/80. In the
+    /// plane that is exact, on surfaces of revolution the error is of third order in it.
+    pub rounding: f64,
+    /// Root mean square of the error of the tangent angle in one time step.
+    pub tolerance: f64,
+}
+
+/// Geometry at the nodes of the curve scaled to length `2 pi`.
+pub(crate) struct Nodes {
+    /// Unit tangent.
+    pub(crate) tangent: Coefficients,
+    pub(crate) curvature: Vec<f64>,
+    /// The curvature of the parallels, `sin(theta) / x`; zero in the plane.
+    pub(crate) parallel: Vec<f64>,
+    /// `cos(theta) / x`; zero in the plane.
+    widening: Vec<f64>,
+    /// Distance from the axis; zero in the plane.
+    pub(crate) radius: Vec<f64>,
+    pub(crate) h: Vec<f64>,
+}
+
+impl Nodes {
+    /// `axis`: the x coordinate of the centre over the scale, for surfaces of revolution.
+    pub(crate) fn new(grid: &Grid, angle: &[Complex<f64>], axis: Option<f64>) -> Self {
+        let angles = grid.values(angle);
+        let tangent: Coefficients = angles
+            .iter()
+            .zip(&grid.turns)
+            .map(|(a, turn)| turn * Complex::cis(*a))
+            .collect();
+        let curvature: Vec<f64> = grid
+            .values(&grid.derivative(angle))
+            .into_iter()
+            .map(|a| 1.0 + a)
+            .collect();
+        let zero = vec![0.0; grid.points];
+        let Some(axis) = axis else {
+            return Self {
+                tangent,
+                h: curvature.clone(),
+                curvature,
+                parallel: zero.clone(),
+                widening: zero.clone(),
+                radius: zero,
+            };
+        };
+        let positions = Series::positions(grid, &angles).at_nodes(grid);
+        let radius: Vec<f64> = positions.iter().map(|x| axis + x.re).collect();
+        let parallel: Vec<f64> = tangent.iter().zip(&radius).map(|(t, r)| t.im / r).collect();
+        Self {
+            widening: tangent.iter().zip(&radius).map(|(t, r)| t.re / r).collect(),
+            h: curvature
+                .iter()
+                .zip(&parallel)
+                .map(|(a, b)| a + b)
+                .collect(),
+            tangent,
+            curvature,
+            parallel,
+            radius,
+        }
+    }
+
+    /// `h'' + h (|A|^2 - h^2 / 2)`, in which the bracket is half the squared difference of the principal curvatures.
+    pub(crate) fn willmore(&self, grid: &Grid) -> Vec<f64> {
+        let slope = grid.derivative(&grid.coefficients(self.h.clone()));
+        let (first, second) = (grid.values(&slope), grid.values(&grid.derivative(&slope)));
+        let value = |i: usize| {
+            let difference = self.curvature[i] - self.parallel[i];
+            second[i] + self.widening[i] * first[i] + self.h[i] * difference * difference / 2.0
+        };
+        (0..grid.points).map(value).collect()
+    }
+}
+
+/// How a curve of length `2 pi` changes with a velocity.
+pub(crate) struct Rates {
+    /// Coefficients of the rate of the tangent angle.
+    pub(crate) angle: Coefficients,
+    /// Rate of the logarithm of the scale.
+    pub(crate) log_scale: f64,
+    /// Rate of the centre.
+    pub(crate) centre: [f64; 2],
+}
+
+impl Rates {
+    /// The outward normal velocity `V` moves the points also along the curve, by `-S`, so that they stay equally spaced:
+    /// `S_s = kappa V - mean(kappa V)`, `theta_t = -V_s - kappa S`.
+    pub(crate) fn new(grid: &Grid, nodes: &Nodes, velocity: &[f64]) -> Self {
+        let stretching = grid.coefficients(
+            nodes
+                .curvature
+                .iter()
+                .zip(velocity)
+                .map(|(k, v)| k * v)
+                .collect(),
+        );
+        let sliding = grid.values(&grid.antiderivative(&stretching));
+        let turning = grid.coefficients(
+            nodes
+                .curvature
+                .iter()
+                .zip(&sliding)
+                .map(|(k, s)| k * s)
+                .collect(),
+        );
+        let slope = grid.derivative(&grid.coefficients(velocity.to_vec()));
+        let moved = velocity.iter().zip(&sliding).zip(&nodes.tangent);
+        // The outward normal is the tangent turned to the right.
+        let sum: Complex<f64> = moved.map(|((v, s), t)| -t * Complex::new(*s, *v)).sum();
+        // A curve with rotational symmetry keeps its centre.
+        let centre = if grid.folds == 1 {
+            sum / grid.points as f64
+        } else {
+            Complex::ZERO
+        };
+        Self {
+            angle: slope.iter().zip(&turning).map(|(v, s)| -v - s).collect(),
+            log_scale: stretching[0].re,
+            centre: [centre.re, centre.im],
+        }
+    }
+}

@@ -1,0 +1,28 @@
+//! Exact flows and equilibria of curves and of surfaces of revolution, to compare other methods with. No phase fields are used.
+//!
+//! - [`planar`]: Willmore flow and curve shortening of plane curves, also of polygons, to about 1e-8 of their size.
+//! - [`revolution`]: Willmore and mean curvature flow of spheres, disks, tori and other surfaces of revolution, to about 1e-6.
+//! - [`equilibria`]: axisymmetric vesicles of given area and volume, and closed elastic curves of given length and area.
+//!
+//! Curves are counterclockwise, with the curvature `kappa` of a circle positive; surfaces have the sum `h` of their principal
+//! curvatures positive on spheres. Energies are `1/2 int kappa^2` and `1/2 int h^2`, which is `8 pi` for spheres. [`Flow`] states
+//! the normal velocities; time is that of the `L2` gradient flow. Coordinates and times have any consistent units.
+
+mod corner;
+mod curve;
+mod dense;
+pub mod equilibria;
+mod error;
+mod exponential;
+mod flow;
+pub mod planar;
+pub mod revolution;
+mod rosenbrock;
+mod shape;
+mod spectral;
+mod stepping;
+
+pub use curve::Curve;
+pub use error::Error;
+pub use flow::{Accuracy, Flow};
+pub use shape::Shape;

@@ -1,0 +1,167 @@
+//! Vesicles and elastic curves.
+
+use std::f64::consts::{PI, TAU};
+
+use reference::Error;
+use reference::equilibria::{Branch, elastica, vesicles};
+
+fn energies(branch: Branch, volumes: &[f64]) -> Vec<f64> {
+    let vesicles = vesicles(branch, 0.0, volumes).unwrap();
+    vesicles.iter().map(|v| v.energy() / (8.0 * PI)).collect()
+}
+
+/// Steps of the classical Runge-Kutta method.
+fn integrate<const N: usize>(
+    mut y: [f64; N],
+    length: f64,
+    f: impl Fn(&[f64; N]) -> [f64; N],
+) -> [f64; N] {
+    const STEPS: usize = 20_000;
+    let step = length / STEPS as f64;
+    let moved = |y: &[f64; N], k: &[f64; N], by: f64| std::array::from_fn(|i| y[i] + by * k[i]);
+    for _ in 0..STEPS {
+        let a = f(&y);
+        let b = f(&moved(&y, &a, step / 2.0));
+        let c = f(&moved(&y, &b, step / 2.0));
+        let d = f(&moved(&y, &c, step));
+        for i in 0..N {
+            y[i] += step / 6.0 * (a[i] + 2.0 * (b[i] + c[i]) + d[i]);
+        }
+    }
+    y
+}
+
+/// Energies of an independent solver of the shape equations.
+#[test]
+fn energies_of_vesicles_are_the_known_ones() {
+    let prolate = energies(Branch::Prolate, &[0.95, 0.9, 0.8, 0.7]);
+    let oblate = energies(Branch::Oblate, &[0.7, 0.65, 0.6]);
+    let known = [1.0956, 1.1896, 1.3874, 1.6433, 1.6991, 1.8262, 1.9557];
+    for (energy, known) in prolate.into_iter().chain(oblate).zip(known) {
+        assert!((energy - known).abs() < 6e-5, "{energy} {known}");
+    }
+}
+
+/// Seifert, Berndl, Lipowsky (1991): prolate above 0.652, stomatocytes below 0.592.
+#[test]
+fn branches_cross_where_they_should() {
+    let around = [0.653, 0.651];
+    let (prolate, oblate) = (
+        energies(Branch::Prolate, &around),
+        energies(Branch::Oblate, &around),
+    );
+    assert!(prolate[0] < oblate[0] && prolate[1] > oblate[1]);
+    let around = [0.594, 0.589];
+    let (oblate, cups) = (
+        energies(Branch::Oblate, &around),
+        energies(Branch::Stomatocyte, &around),
+    );
+    assert!(oblate[0] < cups[0] && oblate[1] > cups[1]);
+}
+
+/// The shape equations of Seifert, Berndl and Lipowsky for `(r, psi, psi', gamma)` over the arc length, from pole to pole or equator.
+#[test]
+fn vesicles_solve_the_shape_equations_from_their_pole() {
+    let cases = [
+        (Branch::Prolate, 0.0, 0.8),
+        (Branch::Oblate, 0.0, 0.62),
+        (Branch::Prolate, 1.5, 0.85),
+        (Branch::Oblate, -1.0, 0.7),
+    ];
+    for (branch, c, volume) in cases {
+        let vesicle = &vesicles(branch, c, &[volume]).unwrap()[0];
+        assert!((vesicle.surface.area() - 4.0 * PI).abs() < 1e-9);
+        assert!((vesicle.surface.reduced_volume() - volume).abs() < 1e-9);
+        let (pressure, tension) = (-vesicle.pressure, vesicle.tension);
+        let profile = vesicle.surface.profile();
+        let (start, pole) = (1e-3, profile.curvature_at(0.0));
+        let slope = (pole - c).powi(2) / 2.0 - pole * pole / 2.0 + tension;
+        let equations = |&[r, psi, u, gamma]: &[f64; 4]| {
+            let (sin, cos) = psi.sin_cos();
+            let bending =
+                -u / r * cos + sin * cos / (r * r) + gamma / r * sin + pressure * r / 2.0 * cos;
+            let multiplier =
+                (u - c).powi(2) / 2.0 - sin * sin / (2.0 * r * r) + pressure * r * sin + tension;
+            [cos, u, bending, multiplier]
+        };
+        let length = profile.length() / 4.0 - start;
+        let [r, psi, ..] = integrate(
+            [start, pole * start, pole, slope * start],
+            length,
+            equations,
+        );
+        let errors = [r - profile.point(PI / 2.0)[0], psi - PI / 2.0];
+        assert!(
+            errors.iter().all(|e| e.abs() < 1e-4),
+            "{branch:?} {errors:?}"
+        );
+    }
+}
+
+#[test]
+fn pressure_and_tension_are_derivatives_of_the_energy() {
+    let step = 1e-4;
+    for (branch, c, volume) in [
+        (Branch::Oblate, 0.0, 0.65),
+        (Branch::Prolate, 1.0, 0.8),
+        (Branch::Stomatocyte, 0.0, 0.63),
+    ] {
+        let all = vesicles(branch, c, &[volume + step, volume, volume - step]).unwrap();
+        let slope = (all[0].energy() - all[2].energy()) / (2.0 * step * 4.0 / 3.0 * PI);
+        assert!(
+            (slope - all[1].pressure).abs() < 1e-4 * slope.abs(),
+            "{slope} {}",
+            all[1].pressure
+        );
+        // Larger by a factor, with the spontaneous curvature smaller: w does not change.
+        let bending = c * (c * all[1].surface.area() - all[1].surface.mean_curvature());
+        let scaling = 3.0 * all[1].pressure * all[1].surface.volume()
+            - 2.0 * all[1].tension * all[1].surface.area();
+        assert!((scaling - bending).abs() < 1e-6, "{scaling} {bending}");
+    }
+}
+
+#[test]
+fn elastic_curves_close_and_enclose_their_area() {
+    let quotients = [0.95, 0.7, 0.4];
+    for (curve, quotient) in elastica(&quotients).unwrap().iter().zip(quotients) {
+        let (pressure, tension, curvature) =
+            (curve.pressure, curve.tension, curve.curve.curvature_at(0.0));
+        // x, y, theta, kappa, its derivative, area, energy.
+        let equations = |&[x, y, theta, k, slope, ..]: &[f64; 7]| {
+            let (sin, cos) = theta.sin_cos();
+            let bending = tension * k - k.powi(3) / 2.0 - pressure;
+            [
+                cos,
+                sin,
+                k,
+                slope,
+                bending,
+                (x * sin - y * cos) / 2.0,
+                k * k / 2.0,
+            ]
+        };
+        let end = integrate([0.0, 0.0, 0.0, curvature, 0.0, 0.0, 0.0], TAU, equations);
+        let exact = [
+            0.0,
+            0.0,
+            TAU,
+            curvature,
+            0.0,
+            PI * quotient,
+            curve.curve.energy(),
+        ];
+        for (end, exact) in end.into_iter().zip(exact) {
+            assert!((end - exact).abs() < 1e-7, "{end} {exact}");
+        }
+    }
+}
+
+#[test]
+fn ends_of_branches_are_reported() {
+    assert!(matches!(elastica(&[1.1]), Err(Error::NoEquilibrium { .. })));
+    assert!(matches!(
+        vesicles(Branch::Stomatocyte, 0.0, &[0.7]),
+        Err(Error::NoEquilibrium { .. })
+    ));
+}
