@@ -2,21 +2,20 @@
 //! (eq:analyticSolutionMCFCircle and `R(t) = (r^4 + 2t)^(1/4)`).
 
 use std::f64::consts::PI;
+use std::path::Path;
 
-use engine::{Case, Flow, Measure, Operator, Record, Run, Values, minimizations};
+use engine::{Samples, Trajectory, minimizations};
+use geometry::Error as GeometryError;
 use geometry::exact::{mean_curvature_radius, willmore_radius};
 use geometry::measure::l2_distance;
 use geometry::shapes::Ball;
-use geometry::{Error as GeometryError, Field, Grid, phase_field};
 use indicatif::ProgressBar;
-use operators::ComputeDevice;
-use runs::Cache;
-use serde::{Deserialize, Serialize};
+use runs::Interrupt;
 use solver::StepRecord;
 
-use crate::Error;
 use crate::harness::{in_parallel, workers};
 use crate::networks::{EPS, STEP};
+use crate::prelude::*;
 use crate::study::{self, Variant};
 
 /// Number of circles.
@@ -94,87 +93,56 @@ fn case(
 }
 
 /// What came out for one circle.
-#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Circle {
     /// Initial radius.
     pub radius: f64,
     /// Exact `L2` distance between the last and the first time, for scale.
     pub travelled: f64,
-    /// The steps,
-    pub records: Vec<Record>,
-    start: Values,
-    /// and their wall times, which records do not store.
-    seconds: Vec<f64>,
+    pub trajectory: Trajectory<2>,
 }
 
 impl Circle {
-    fn of(
-        case: Case<2>,
-        radius: f64,
-        device: &ComputeDevice,
-        bar: &ProgressBar,
-    ) -> Result<Self, Error> {
-        let mut run = Run::new(case, device)?;
-        while run.step()?.is_some() {
-            bar.inc(1);
-        }
-        let initial = &run.case().initial;
-        let last = exact(run.case().flow, radius, *initial.grid(), run.time())?;
-        Ok(Self {
-            radius,
-            travelled: l2_distance(&last, initial)?,
-            records: run.records().to_vec(),
-            start: run.start().clone(),
-            seconds: run.records().iter().map(|record| record.seconds).collect(),
-        })
-    }
-
     /// `L2` distance to the exact solution after `k` steps.
     pub fn error(&self, k: usize) -> f64 {
         let values = match k {
-            0 => &self.start,
-            k => &self.records[k - 1].measures,
+            0 => &self.trajectory.start,
+            k => &self.trajectory.records[k - 1].measures,
         };
         values["l2"]
     }
 }
 
-/// All circles of one variant.
-#[derive(Clone, Debug)]
+/// All circles of one variant, in the order of their radii.
 pub struct Ensemble {
-    /// Flow, method, scheme and resolution.
     pub variant: Variant,
-    /// Results in the order of the radii.
     pub circles: Vec<Circle>,
 }
 
 impl Ensemble {
-    /// Runs `count` circles side by side, largest first, with results of an interrupted run where there are any.
+    /// Runs `count` circles side by side, largest first; those of an interrupted run are in `folder`.
     pub fn run(
         (variant, operator): &(Variant, Operator),
         (count, steps): (usize, usize),
         device: &ComputeDevice,
-        finished: &Cache,
+        folder: &Path,
         bar: &ProgressBar,
     ) -> Result<Self, Error> {
         let Variant { flow, n, .. } = *variant;
-        // Circles grow with their numbers.
-        let order: Vec<usize> = (0..count).rev().collect();
         let radii = radii(count);
-        let circles = in_parallel(&order, workers(device), |i| {
+        let circles = in_parallel(count, workers(device), |i| {
             let case = case((flow, operator, n), radii[i], steps)?;
-            let name = format!("{}-n{n}-{}-{i:02}", flow.key(), operator.key());
-            let key = case.identity(device);
-            if let Some(mut circle) = finished.load::<Circle>(&name, &key) {
-                bar.inc(steps as u64);
-                for (record, seconds) in circle.records.iter_mut().zip(&circle.seconds) {
-                    record.seconds = *seconds;
-                }
-                return Ok(circle);
-            }
-            let circle = Circle::of(case, radii[i], device, bar)?;
-            finished.store(&name, &key, &circle)?;
-            Ok(circle)
+            let folder = folder.join(format!("{}-n{n}-{}-{i:02}", flow.key(), operator.key()));
+            let (ends, never) = (Samples::every(usize::MAX), Interrupt::never());
+            let trajectory = Trajectory::of(case, device, &folder, &ends, &mut [], &never)?;
+            let trajectory = trajectory.expect("nobody interrupts it");
+            let (initial, end) = (&trajectory.case.initial, steps as f64 * STEP);
+            let last = exact(flow, radii[i], *initial.grid(), end)?;
+            bar.inc(1);
+            Ok(Circle {
+                radius: radii[i],
+                travelled: l2_distance(&last, initial)?,
+                trajectory,
+            })
         })?;
         Ok(Self {
             variant: *variant,
@@ -203,16 +171,14 @@ impl Ensemble {
 
     /// Mean wall time of a step.
     pub fn seconds_per_step(&self) -> f64 {
-        let steps = self
-            .circles
-            .first()
-            .map_or(1, |circle| circle.seconds.len());
-        self.mean(|circle| circle.seconds.iter().sum()) / steps as f64
+        let steps = self.circles[0].trajectory.records.len();
+        self.mean(|circle| circle.trajectory.seconds()) / steps as f64
     }
 
     /// All minimizations of Willmore flow.
     pub fn minimizations(&self) -> impl Iterator<Item = &StepRecord> {
-        (self.circles.iter()).flat_map(|circle| minimizations(&circle.records))
+        let records = self.circles.iter().map(|circle| &circle.trajectory.records);
+        records.flat_map(|records| minimizations(records))
     }
 
     /// Mean of a quantity over all minimizations; nothing for mean curvature flow.

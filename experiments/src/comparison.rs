@@ -1,40 +1,32 @@
 //! Shapes without a known solution: all methods and resolutions against a finer run.
 
 use std::collections::BTreeMap;
-use std::process::ExitCode;
 
-use clap::{CommandFactory, FromArgMatches, Parser};
-use engine::{
-    Flow, Measure, Method, Operator, Samples, Scheme, Trajectory, energy_increases, minimizations,
-};
+use clap::{CommandFactory, FromArgMatches};
+use engine::{Samples, Trajectory, energy_increases, minimizations};
+use geometry::Error as GeometryError;
 use geometry::measure::{perimeter, zero_set_volume};
 use geometry::shapes::Cross;
-use geometry::{Error as GeometryError, Field, Grid, phase_field};
-use report::{
-    Axis, Colour, Curve, Figure, Format, LineChart, OutputDir, Shapes, Summary, Table, Tabulated,
-};
-use serde_json::json;
+use report::{Curve, OutputDir, Shapes, Table};
 use solver::StepRecord;
 
+use crate::look;
 use crate::networks::{EPS, STEP};
-use crate::session::Session;
+use crate::prelude::*;
 use crate::steps::{self, Rows};
 use crate::study::{self, Study, StudyOptions, Variant};
-use crate::{Error, harness, look};
 
 /// A shape and the flow it undergoes.
 pub struct Setting {
     /// Name of the program and its folder, and prefix of the metrics.
     pub program: &'static str,
-    /// Title of the figures.
+    /// Of the figures.
     pub title: &'static str,
     /// What the program does, for its help.
     pub about: &'static str,
     /// Name of the shape with its measures.
     pub shape: &'static str,
-    /// Its phase field.
     pub initial: fn(Grid<2>) -> Result<Field<2>, GeometryError>,
-    /// Which flow.
     pub flow: Flow,
     /// Side of the periodic box.
     pub side: f64,
@@ -79,6 +71,9 @@ pub fn main(setting: &Setting) -> ExitCode {
     harness::run(|| run(setting, &options))
 }
 
+/// What is measured of the shapes.
+const MEASURES: [&str; 4] = ["tip", "diagonal", "perimeter", "area"];
+
 /// A run and its distances to the reference.
 struct Compared {
     variant: Variant,
@@ -95,9 +90,8 @@ struct Comparison<'a> {
     steps: usize,
     study: Study,
     runs: Vec<Compared>,
-    reference: Compared,
-    /// The reference at half its resolution, to estimate its error.
-    half: Option<Compared>,
+    /// The reference, and perhaps the same at half its resolution, to estimate its error.
+    references: Vec<Compared>,
 }
 
 fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
@@ -105,16 +99,16 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
     let finest = cells.iter().copied().max().unwrap_or(0);
     let usual = if quick { finest } else { 2 * finest };
     let reference_n = options.reference_n.unwrap_or(usual);
-    if let Some(n) = cells.iter().find(|n| !reference_n.is_multiple_of(**n)) {
-        return Err(Error::Options(format!(
-            "--reference-n {reference_n} must be a multiple of every n compared with it, also of {n}"
-        )));
+    for n in &cells {
+        require(
+            reference_n.is_multiple_of(*n),
+            format!(
+                "--reference-n {reference_n} must be a multiple of every n compared with it, also of {n}"
+            ),
+        )?;
     }
-    let usual = if quick { 2 } else { setting.steps };
-    let steps = options.steps.unwrap_or(usual);
-    if steps == 0 {
-        return Err(Error::Options("--steps must be at least 1".to_owned()));
-    }
+    let steps = (options.steps).unwrap_or(if quick { 2 } else { setting.steps });
+    require(steps > 0, "--steps must be at least 1")?;
     let device = options.study.run.open_device()?;
     // Franken, Rumpf and Wirth: for eps = 2h the nested scheme is unstable.
     let nested = |method: Method| flow == Flow::Willmore && !method.is_learned();
@@ -139,34 +133,35 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
         runs.push(setting.run(&mut session, "", (*variant, operator), (steps, 1))?);
     }
     // The paper's references are implicit finite elements.
-    let mut finer = |what: &str, n: usize| {
+    let half = reference_n / 2;
+    let halved = (reference_n.is_multiple_of(2) && finest <= half).then_some(half);
+    let named = [
+        ("reference: ", Some(reference_n)),
+        ("for the reference's error: ", halved),
+    ];
+    let mut references: Vec<Compared> = Vec::new();
+    for (what, n) in named.into_iter().filter_map(|(what, n)| Some((what, n?))) {
         let (method, scheme) = (Method::FeImplicit, Scheme::Paper);
-        let operator = study.networks.operator((method, scheme), n)?;
         let variant = Variant {
             flow,
             method,
             scheme,
             n,
         };
+        let operator = study.networks.operator(variant.look(), n)?;
         let time = (steps, setting.reference_ratio);
-        setting.run(&mut session, what, (variant, &operator), time)
-    };
-    let reference = finer("reference: ", reference_n)?;
-    // The error of the reference is estimated from the same run at half the resolution.
-    let mut half = None;
-    if reference_n.is_multiple_of(2) && finest <= reference_n / 2 {
-        half = Some(finer("for the reference's error: ", reference_n / 2)?);
+        references.push(setting.run(&mut session, what, (variant, &operator), time)?);
     }
-    for run in runs.iter_mut().chain(&mut half) {
-        run.compare(&reference, steps)?;
+    let (reference, half) = references.split_at_mut(1);
+    for run in runs.iter_mut().chain(half) {
+        run.compare(&reference[0], steps)?;
     }
     let comparison = Comparison {
         setting,
         steps,
         study,
         runs,
-        reference,
-        half,
+        references,
     };
     comparison.write(session)
 }
@@ -232,6 +227,11 @@ impl Compared {
         minimizations(&self.trajectory.records)
     }
 
+    /// The mean over all minimizations; nothing for mean curvature flow.
+    fn mean(&self, of: fn(&StepRecord) -> f64) -> Option<f64> {
+        study::mean(self.minimizations(), of)
+    }
+
     /// The zero level at a time.
     fn loops(&self, step: usize) -> Result<Curve, Error> {
         let field = self.trajectory.field(step * self.ratio)?;
@@ -245,35 +245,44 @@ impl Comparison<'_> {
         sampled(self.steps).filter(drawn).collect()
     }
 
+    fn reference(&self) -> &Compared {
+        &self.references[0]
+    }
+
     /// Largest distance over time between the reference and the same method at half the resolution.
     fn reference_difference(&self) -> Option<f64> {
-        let errors = self.half.as_ref()?.errors.values();
+        let errors = self.references.get(1)?.errors.values();
         Some(errors.copied().fold(0.0, f64::max))
     }
 
     fn about_the_reference(&self) -> String {
-        let n = self.reference.variant.n;
-        let step = match self.reference.ratio {
+        let n = self.reference().variant.n;
+        let step = match self.reference().ratio {
             1 => String::new(),
             ratio => format!(", {ratio} steps for each"),
         };
-        let estimate = self.reference_difference().map(|distance| {
+        let estimate = self.reference_difference().map_or(String::new(), |distance| {
             let (half, error) = (n / 2, distance / 3.0);
             format!(
                 "; it differs from n = {half} by at most {distance:.1e}, so its own error in h is about {error:.0e}"
             )
         });
-        let estimate = estimate.unwrap_or_default();
         format!("Reference: implicit finite elements, n = {n}{step}{estimate}.")
     }
 
     fn write(&self, mut session: Session<'_>) -> Result<(), Error> {
         session.figure(self.error_figure(), "errors")?;
         session.figure(self.shape_figure()?, "shapes")?;
-        session.table(self.table(), "error_table")?;
+        session.sheet(self.sheet(), "error_table")?;
         session.remark(self.about_the_reference());
         self.data(&session.output)?;
-        self.summarize(&mut session.summary)?;
+        let reference = self.reference();
+        let metrics = [
+            ("reference.n", reference.variant.n.into()),
+            ("reference.seconds", reference.trajectory.seconds().into()),
+            ("reference.l2_to_half_n", self.reference_difference().into()),
+        ];
+        session.metrics(self.setting.program, metrics)?;
         session.finish(self.setting.title)
     }
 
@@ -282,15 +291,13 @@ impl Comparison<'_> {
         let mut errors = Table::data(leading.iter().chain(&["step", "time", "l2"]));
         for run in &self.runs {
             for (&step, &l2) in &run.errors {
-                let row = [step.into(), time(step).into(), l2.into()];
-                errors.push(run.variant.cells().into_iter().skip(1).chain(row))?;
+                errors.push(run.variant.row([step.into()], [time(step), l2]).skip(1))?;
             }
         }
         output.write("errors.csv", errors.to_csv()?)?;
         output.write("errors.json", errors.to_json()?)?;
-        let references = std::iter::once(&self.reference).chain(&self.half);
         let compared = self.runs.iter().map(|run| (run, "false"));
-        let rows = compared.chain(references.map(|run| (run, "true")));
+        let rows = compared.chain(self.references.iter().map(|run| (run, "true")));
         let rows = rows.map(|(run, reference)| Rows {
             leading: [&run.variant.cells()[1..], &[reference.into()]].concat(),
             start: Some(&run.trajectory.start),
@@ -325,23 +332,21 @@ impl Comparison<'_> {
                 rows.push((run, run.variant.label().replace(", ", "\n")));
             }
         }
-        rows.push((&self.reference, "reference".to_owned()));
+        rows.push((self.reference(), "reference".to_owned()));
         let label = |(run, label): &(&Compared, String)| format!("{label}\nn = {}", run.variant.n);
         let (shown, half) = (self.shown(), self.setting.window);
+        let note = format!("Orange: the reference. {}", self.about_the_reference());
         let mut figure = Figure::new(format!("{}: shapes", self.setting.title), shown.len())
             .with_column_labels(shown.iter().map(|&k| format!("t = {}", time_label(k))))
             .with_row_labels(rows.iter().map(label))
-            .with_note(format!(
-                "Orange: the reference. {}",
-                self.about_the_reference()
-            ));
+            .with_note(note);
         for (run, _) in &rows {
             for &step in &shown {
                 let curve = run.loops(step)?.filled(Colour::LightGrey);
                 let panel = Shapes::new("").with_window([-half, half], [-half, half]);
                 let mut panel = panel.with_curve(curve);
                 if !run.errors.is_empty() {
-                    let reference = self.reference.loops(step)?;
+                    let reference = self.reference().loops(step)?;
                     panel = panel.with_curve(reference.with_colour(1).with_width(1.0));
                 }
                 figure = figure.with_panel(panel);
@@ -350,56 +355,39 @@ impl Comparison<'_> {
         Ok(figure)
     }
 
-    fn table(&self) -> Tabulated<'_, Compared> {
-        let mut table = Table::of(&self.runs)
+    /// Errors, measures and energies over time, and the work.
+    fn sheet(&self) -> Sheet<'_, Compared> {
+        let mut sheet = Sheet::of(&self.runs)
+            .keyed(|run, name| format!("{}.{}.{name}", self.setting.program, run.variant.key()))
             .text("method", |run| run.variant.label())
-            .number("n", Format::Shortest, |run| run.variant.n);
+            .column("n", Shortest, |run| run.variant.n);
         for k in self.shown().into_iter().filter(|k| *k > 0) {
             let error = |run: &Compared| run.errors.get(&k).copied();
-            table = table.number(format!("error, step {k}"), Format::Fixed(5), error);
+            sheet = sheet.column(format!("error, step {k}"), Fixed(5), error);
         }
-        let hvp = |run: &Compared| study::mean(run.minimizations(), StepRecord::hvp);
-        let seconds = |run: &Compared| run.trajectory.seconds() / run.trajectory.steps() as f64;
-        table
-            .number("HVP/step", Format::Fixed(1), hvp)
-            .number("s/step", Format::Fixed(2), seconds)
-    }
-
-    fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
-        for run in &self.runs {
-            let key = format!("{}.{}", self.setting.program, run.variant.key());
-            let mut of_step = |what: &str, step: usize, value: f64| {
-                summary.insert(&format!("{key}.{what}.step{step}"), value)
-            };
-            for (&step, &l2) in &run.errors {
-                of_step("l2", step, l2)?;
+        for k in 0..=self.steps {
+            let energy = |run: &Compared| Some(run.trajectory.record(k)?.minimization?.energy);
+            sheet = sheet
+                .metric(&format!("l2.step{k}"), |run| run.errors.get(&k).copied())
+                .metric(&format!("energy.step{k}"), energy);
+            for name in MEASURES {
+                sheet = sheet.metric(&format!("{name}.step{k}"), |run| {
+                    run.trajectory.measures(k).ok()?.get(name).copied()
+                });
             }
-            for step in 0..=self.steps {
-                for (name, value) in run.trajectory.measures(step)? {
-                    of_step(name, step, *value)?;
-                }
-            }
-            for made in run.minimizations() {
-                of_step("energy", made.step, made.energy)?;
-            }
-            let newton = study::mean(run.minimizations(), |made| made.newton.newton as f64);
-            let hvp = study::mean(run.minimizations(), StepRecord::hvp);
-            if let Some((newton, hvp)) = newton.zip(hvp) {
-                summary.insert(&format!("{key}.newton_per_step"), newton)?;
-                summary.insert(&format!("{key}.hvp_per_step"), hvp)?;
-                let rises = energy_increases(&run.trajectory.records);
-                summary.insert_count(&format!("{key}.energy_increases"), rises)?;
-            }
-            summary.insert(&format!("{key}.seconds"), run.trajectory.seconds())?;
         }
-        let key = format!("{}.reference", self.setting.program);
-        let seconds = self.reference.trajectory.seconds();
-        summary.insert_count(&format!("{key}.n"), self.reference.variant.n)?;
-        summary.insert(&format!("{key}.seconds"), seconds)?;
-        if let Some(distance) = self.reference_difference() {
-            summary.insert(&format!("{key}.l2_to_half_n"), distance)?;
-        }
-        Ok(())
+        let hvp = |run: &Compared| run.mean(StepRecord::hvp);
+        let newton = |run: &Compared| run.mean(|made| made.newton.newton as f64);
+        let per_step = |run: &Compared| run.trajectory.seconds() / run.trajectory.steps() as f64;
+        let increases = |run: &Compared| energy_increases(&run.trajectory.records);
+        sheet
+            .measure("hvp_per_step", ("HVP/step", Fixed(1)), hvp)
+            .column("s/step", Fixed(2), per_step)
+            .metric("newton_per_step", newton)
+            .metric("energy_increases", |run| {
+                newton(run).map(|_| increases(run))
+            })
+            .metric("seconds", |run| run.trajectory.seconds())
     }
 }
 

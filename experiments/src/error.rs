@@ -1,42 +1,31 @@
 use thiserror::Error as ThisError;
 
-/// What can stop an experiment.
+/// What can stop an experiment. Errors of the libraries pass through.
 #[derive(Debug, ThisError)]
 pub enum Error {
     /// Options that contradict each other or the experiment.
     #[error("{0}")]
     Options(String),
-    /// A file that cannot be read.
     #[error(transparent)]
     Files(#[from] files::Error),
-    /// From a flow.
     #[error(transparent)]
     Engine(#[from] engine::Error),
-    /// From run directories and stored results.
     #[error(transparent)]
     Runs(#[from] runs::Error),
-    /// From the finite elements.
     #[error(transparent)]
     Fem(#[from] fem::Error),
-    /// From networks and training.
     #[error(transparent)]
     Model(#[from] model::Error),
-    /// From the device.
     #[error(transparent)]
     Operators(#[from] operators::Error),
-    /// From the flows.
     #[error(transparent)]
     Solver(#[from] solver::Error),
-    /// From the geometry.
     #[error(transparent)]
     Geometry(#[from] geometry::Error),
-    /// From meshes.
     #[error(transparent)]
     Surfaces(#[from] surfaces::Error),
-    /// From pictures of surfaces.
     #[error(transparent)]
     Render(#[from] render::Error),
-    /// From figures, tables and output files.
     #[error(transparent)]
     Report(#[from] report::Error),
 }
@@ -56,4 +45,11 @@ impl Error {
         }
         line.split_whitespace().collect::<Vec<_>>().join(" ")
     }
+}
+
+/// Refuses options with this message unless the condition holds.
+pub fn require(holds: bool, message: impl Into<String>) -> Result<(), Error> {
+    holds
+        .then_some(())
+        .ok_or_else(|| Error::Options(message.into()))
 }

@@ -1,7 +1,9 @@
 //! The outermost layer of every program, and running many independent tasks.
 
+use std::collections::BTreeMap;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::Parser;
 use operators::{ComputeDevice, memory};
@@ -35,50 +37,44 @@ pub fn workers(device: &ComputeDevice) -> usize {
     }
 }
 
-/// Runs `count` tasks, started in the given order on `workers` threads; results come back by task number.
+/// Runs `count` tasks on `workers` threads, the last one first; results come back by task number.
 ///
 /// Each worker is a pool of its own, so that the parallel loops inside a task stay on its thread: a task waiting in
 /// such a loop would otherwise take up another whole task.
-///
-/// # Errors
-/// That of the failed task with the lowest number; no new tasks are started after a failure.
 pub fn in_parallel<R: Send>(
-    order: &[usize],
+    count: usize,
     workers: usize,
     task: impl Fn(usize) -> Result<R, Error> + Sync,
 ) -> Result<Vec<R>, Error> {
-    let (next, failed) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let (started, results) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
     let work = || {
-        let mut results = Vec::new();
-        while !failed.load(Ordering::Relaxed) {
-            let Some(&number) = order.get(next.fetch_add(1, Ordering::Relaxed)) else {
-                break;
-            };
+        while let Some(number) = count.checked_sub(1 + started.fetch_add(1, Ordering::Relaxed)) {
             let result = task(number);
-            failed.fetch_or(result.is_err(), Ordering::Relaxed);
-            results.push((number, result));
-        }
-        results
-    };
-    let mut results = if workers <= 1 {
-        work()
-    } else {
-        let pools = (0..workers.min(order.len()).max(1))
-            .map(|_| rayon::ThreadPoolBuilder::new().num_threads(1).build())
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(|error| Error::Options(format!("cannot start threads: {error}")))?;
-        std::thread::scope(|scope| {
-            let threads: Vec<_> = (pools.iter())
-                .map(|pool| scope.spawn(move || pool.install(work)))
-                .collect();
-            let results = threads.into_iter().map(std::thread::ScopedJoinHandle::join);
+            if result.is_err() {
+                started.store(count, Ordering::Relaxed);
+            }
             results
-                .flat_map(|of| of.expect("tasks do not panic"))
-                .collect()
-        })
+                .lock()
+                .expect("tasks do not panic")
+                .insert(number, result);
+        }
     };
-    results.sort_by_key(|(number, _)| *number);
-    results.into_iter().map(|(_, result)| result).collect()
+    if workers <= 1 {
+        work();
+    } else {
+        let pool = |_| rayon::ThreadPoolBuilder::new().num_threads(1).build();
+        let pools = (0..workers.min(count))
+            .map(pool)
+            .collect::<Result<Vec<_>, _>>();
+        let pools = pools.map_err(|e| Error::Options(format!("cannot start threads: {e}")))?;
+        std::thread::scope(|scope| {
+            for pool in &pools {
+                scope.spawn(|| pool.install(work));
+            }
+        });
+    }
+    let results = results.into_inner().expect("tasks do not panic");
+    results.into_values().collect()
 }
 
 #[cfg(test)]
@@ -87,24 +83,23 @@ mod tests {
 
     #[test]
     fn results_come_back_in_order_whatever_the_schedule() {
-        let order: Vec<usize> = (0..50).rev().collect();
-        let squares = in_parallel(&order, 3, |i| Ok(i * i)).unwrap();
+        let squares = in_parallel(50, 3, |i| Ok(i * i)).unwrap();
         assert_eq!(squares, (0..50).map(|i| i * i).collect::<Vec<_>>());
     }
 
     #[test]
     fn a_failure_stops_the_rest() {
         let started = AtomicUsize::new(0);
-        let error = in_parallel(&(0..1000).collect::<Vec<_>>(), 2, |i| {
+        let error = in_parallel(1000, 2, |i| {
             started.fetch_add(1, Ordering::Relaxed);
-            if i == 3 {
-                return Err(Error::Options("task 3".to_owned()));
+            if i == 996 {
+                return Err(Error::Options("task 996".to_owned()));
             }
             std::thread::sleep(std::time::Duration::from_millis(2));
             Ok(i)
         })
         .unwrap_err();
-        assert_eq!(error.line(), "task 3");
+        assert_eq!(error.line(), "task 996");
         assert!(started.load(Ordering::Relaxed) < 100);
     }
 }

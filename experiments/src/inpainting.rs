@@ -1,18 +1,12 @@
 //! Inpainting, in any dimension: Willmore flow of the values in a region, the rest held.
 
 use clap::Args;
-use engine::{
-    Case, Operator, Record, Samples, Scales, Scheme, StepRule, Stop, Trajectory, energy_increases,
-    mean_hvp,
-};
+use engine::{Samples, Stop, Trajectory, energy_increases, mean_hvp};
+use geometry::SignedDistance;
 use geometry::measure::l2_distance;
-use geometry::{Grid, SignedDistance, phase_field};
-use report::{Axis, Figure, Format, LineChart, Series, Summary, Table};
-use serde_json::{Value, json};
+use serde_json::Value;
 
-use crate::Error;
-use crate::options::FigureOptions;
-use crate::session::Session;
+use crate::prelude::*;
 use crate::steps::steps_csv;
 use crate::surfaces::willmore_flow;
 
@@ -21,10 +15,8 @@ const STILL: f64 = 1e-5;
 /// The first substep of the first step, in units of `eps^4`: the time in which a corner becomes about as round as the interface is wide.
 const FIRST_SUBSTEP: f64 = 32.0;
 
-/// Options of the programs.
 #[derive(Args, Clone, Debug)]
 pub struct InpaintingOptions {
-    /// Common options.
     #[command(flatten)]
     pub figure: FigureOptions,
 
@@ -49,7 +41,6 @@ pub struct Shape<const D: usize> {
     pub rule: StepRule,
     /// and most of them.
     pub steps: usize,
-    /// The steps that are shown.
     pub shown: Vec<usize>,
     /// Of the first step, what is there after `2^-k` of it is shown, for these `k`.
     pub halvings: &'static [u32],
@@ -107,9 +98,7 @@ pub fn parameters<const D: usize>(
 
 /// What became of a shape.
 pub struct Inpainted<'a, const D: usize> {
-    /// What was inpainted.
     pub shape: &'a Shape<D>,
-    /// How it went.
     pub trajectory: &'a Trajectory<D>,
     /// The distance to what it should become, or to the beginning, at the steps that are shown and at the last one.
     pub distances: Vec<(usize, f64)>,
@@ -118,7 +107,6 @@ pub struct Inpainted<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Inpainted<'a, D> {
-    /// Measures a run.
     pub fn measure(shape: &'a Shape<D>, trajectory: &'a Trajectory<D>) -> Result<Self, Error> {
         let Case {
             initial,
@@ -167,29 +155,6 @@ impl<'a, const D: usize> Inpainted<'a, D> {
         let name = format!("{}_frames", self.shape.key);
         session.figure(Figure { title, ..figure }, &name)
     }
-
-    /// Adds the metrics of this run.
-    fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
-        let name = |metric: &str| format!("{}.{metric}", self.shape.key);
-        let (trajectory, records) = (self.trajectory, &self.trajectory.records);
-        for &(k, distance) in &self.distances {
-            summary.insert(&name(&format!("distance.step{k}")), distance)?;
-        }
-        for (metric, count) in [
-            ("energy_increases", energy_increases(records)),
-            ("changed_outside", self.changed_outside),
-            ("steps", trajectory.steps()),
-            ("parts_of_step1", trajectory.substeps(1).len()),
-        ] {
-            summary.insert_count(&name(metric), count)?;
-        }
-        if let Some(still) = self.still_from() {
-            summary.insert(&name("still_from"), still)?;
-        }
-        summary.insert(&name("hvp_per_part"), mean_hvp(records))?;
-        summary.insert(&name("seconds"), trajectory.seconds())?;
-        Ok(())
-    }
 }
 
 /// Writes the energies, the records of all steps, the table of distances and the metrics, and ends the program.
@@ -209,33 +174,37 @@ pub fn finish<const D: usize>(
     session.figure(energies, "energies")?;
     let runs = all.iter().map(|one| (one.shape.key, one.trajectory));
     output.write("steps.csv", steps_csv("shape", runs)?)?;
-    table(&mut session, all)?;
-    let summary = &mut session.summary;
-    all.iter().try_for_each(|one| one.summarize(summary))?;
-    session.finish(title)
-}
-
-/// Distances and energies at the steps that are shown.
-fn table<const D: usize>(session: &mut Session<'_>, all: &[Inpainted<'_, D>]) -> Result<(), Error> {
     let mut rows = Vec::new();
     for one in all {
         for &(step, distance) in &one.distances {
             rows.push((one, step, distance, one.trajectory.record(step)));
         }
     }
-    let table = Table::of(&rows)
+    let distance = ("L² distance to the whole, or to the start", Fixed(5));
+    let shown = Sheet::of(&rows)
+        .keyed(|(one, step, ..), name| format!("{}.{name}.step{step}", one.shape.key))
         .text("shape", |(one, ..)| one.shape.title)
-        .number("step", Format::Shortest, |(_, step, ..)| *step)
-        .number("time in steps", Format::Shortest, |(one, .., record)| {
+        .column("step", Shortest, |(_, step, ..)| *step)
+        .column("time in steps", Shortest, |(one, .., record)| {
             record.map_or(0.0, |r| r.time / one.tau())
         })
-        .number(
-            "L² distance to the whole, or to the start",
-            Format::Fixed(5),
-            |(.., distance, _)| *distance,
-        )
-        .number("Willmore energy", Format::Fixed(3), |(.., record)| {
+        .measure("distance", distance, |(.., distance, _)| *distance)
+        .column("Willmore energy", Fixed(3), |(.., record)| {
             record.and_then(Record::willmore_energy)
         });
-    session.table(table, "inpainting")
+    session.sheet(shown, "inpainting")?;
+    for one in all {
+        let (trajectory, records) = (one.trajectory, &one.trajectory.records);
+        let metrics = [
+            ("energy_increases", energy_increases(records).into()),
+            ("changed_outside", one.changed_outside.into()),
+            ("steps", trajectory.steps().into()),
+            ("parts_of_step1", trajectory.substeps(1).len().into()),
+            ("still_from", one.still_from().into()),
+            ("hvp_per_part", mean_hvp(records).into()),
+            ("seconds", trajectory.seconds().into()),
+        ];
+        session.metrics(one.shape.key, metrics)?;
+    }
+    session.finish(title)
 }

@@ -34,24 +34,14 @@ fn rank(n: usize, cells: &[usize]) -> usize {
 }
 
 fn dashes(n: usize, cells: &[usize]) -> LineStyle {
-    const STYLES: [LineStyle; 4] = [
-        LineStyle::Solid,
-        LineStyle::Dashed,
-        LineStyle::ShortDashed,
-        LineStyle::Dotted,
-    ];
-    STYLES[rank(n, cells).min(STYLES.len() - 1)]
+    use LineStyle::{Dashed, Dotted, ShortDashed, Solid};
+    [Solid, Dashed, ShortDashed, Dotted][rank(n, cells).min(3)]
 }
 
 /// A marker for a resolution.
 pub fn marker(n: usize, cells: &[usize]) -> Marker {
-    const MARKERS: [Marker; 4] = [
-        Marker::Circle,
-        Marker::Square,
-        Marker::Triangle,
-        Marker::Diamond,
-    ];
-    MARKERS[rank(n, cells).min(MARKERS.len() - 1)]
+    use Marker::{Circle, Diamond, Square, Triangle};
+    [Circle, Square, Triangle, Diamond][rank(n, cells).min(3)]
 }
 
 /// The curve of a method at one of several resolutions. Such curves often coincide, so coarser ones are wider and show on both sides of
@@ -74,11 +64,8 @@ pub fn legend(
     cells: &[usize],
 ) -> LineChart {
     let methods = variants.into_iter().map(|(method, scheme)| {
-        LegendEntry::line(
-            method.label_in(scheme),
-            colour(method, scheme),
-            LineStyle::Solid,
-        )
+        let (label, colour) = (method.label_in(scheme), colour(method, scheme));
+        LegendEntry::line(label, colour, LineStyle::Solid)
     });
     let resolutions = (cells.iter())
         .map(|&n| LegendEntry::line(format!("n = {n}"), Colour::Black, dashes(n, cells)));

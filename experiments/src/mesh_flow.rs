@@ -1,28 +1,20 @@
 //! Programs that let a mesh flow by several schemes.
 
 use clap::Args;
-use engine::{Method, StepRule};
 use geometry::UpAxis;
-use serde_json::json;
 
-use crate::Error;
 use crate::meshes::{KnownMesh, MeshOptions};
-use crate::options::FigureOptions;
-use crate::session::Session;
+use crate::prelude::*;
 use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, View};
 
-/// Options of the programs.
 #[derive(Args, Clone, Debug)]
 pub struct MeshFlowOptions {
-    /// Common options.
     #[command(flatten)]
     figure: FigureOptions,
 
-    /// The mesh.
     #[command(flatten)]
     mesh: MeshOptions,
 
-    /// The schemes.
     #[command(flatten)]
     schemes: SchemeOptions,
 
@@ -40,19 +32,14 @@ pub struct MeshFlowOptions {
 pub struct MeshFlow {
     /// Name of the program, its folder and its metrics.
     pub program: &'static str,
-    /// The mesh.
     pub mesh: KnownMesh,
-    /// Cells per unit length.
     pub cells: usize,
-    /// Number of time steps.
     pub steps: usize,
-    /// Their sizes.
     pub tau: StepRule,
     /// The same in words, for the figure.
     pub tau_in_words: &'static str,
     /// Steps to be shown, with the energies that the paper reports.
     pub shown: &'static [(usize, Option<f64>)],
-    /// Direction of view.
     pub view: View,
 }
 
@@ -65,9 +52,7 @@ impl MeshFlow {
     ) -> Result<(), Error> {
         let run = &options.figure.run;
         let steps = (options.steps).unwrap_or(if run.quick { 2 } else { self.steps });
-        if steps == 0 {
-            return Err(Error::Options("--steps must be at least 1".to_owned()));
-        }
+        require(steps > 0, "--steps must be at least 1")?;
         let device = run.open_device()?;
         let side = options.mesh.box_side(&self.mesh);
         let setting = Setting::new(&options.figure, [32, self.cells], side)?;
@@ -84,21 +69,19 @@ impl MeshFlow {
         })?;
         bar.finish();
         let papers = options.mesh.is_the_papers();
-        let shown = (self.shown.iter()).map(|&(step, w)| (step, w.filter(|_| papers)));
+        let energy = |&(step, w): &(usize, Option<f64>)| (step, w.filter(|_| papers));
         let surface = Surface {
             key: self.program,
-            title: mesh.about.title.clone(),
-            shown: shown.collect(),
+            title: mesh.title.clone(),
+            shown: self.shown.iter().map(energy).collect(),
             view: View { up, ..self.view },
         };
+        let variants = schemes.into_iter().map(|scheme| (Method::Hybrid, scheme));
         let flows = SurfaceFlows {
             program: self.program,
             title: format!("Willmore flow: {}", surface.title),
             surfaces: vec![(surface, initial)],
-            variants: schemes
-                .into_iter()
-                .map(|scheme| (Method::Hybrid, scheme))
-                .collect(),
+            variants: variants.collect(),
             time: (self.tau, steps),
             tau_in_words: self.tau_in_words,
         };

@@ -3,14 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use geometry::{Field, Grid, Placement, UpAxis, npy, optimal_profile, vti};
+use geometry::{Placement, UpAxis, npy, optimal_profile, vti};
 use indicatif::ProgressBar;
 use runs::fingerprint;
-use serde::Serialize;
+use serde_json::Value;
 use surfaces::{ClosedMesh, MeshDistance, usual_up_axis};
 
-use crate::Error;
-use crate::surfaces::centred_box;
+use crate::prelude::*;
 
 /// Names a folder that holds the meshes of the paper.
 pub const FOLDER_VARIABLE: &str = "WORKBENCH_MESHES";
@@ -65,9 +64,7 @@ pub enum VolumeKind {
 
 /// A mesh of the paper, and what stands in for it.
 pub struct KnownMesh {
-    /// Name of the file.
     pub file: &'static str,
-    /// Name in titles.
     pub title: &'static str,
     /// Longest side, unless chosen otherwise.
     pub side_length: f64,
@@ -75,7 +72,6 @@ pub struct KnownMesh {
     pub box_side: f64,
     /// Makes the built-in shape at a resolution.
     pub procedural: fn(usize) -> Result<ClosedMesh, surfaces::Error>,
-    /// Its name in titles.
     pub procedural_title: &'static str,
 }
 
@@ -94,37 +90,15 @@ pub const ARMADILLO: KnownMesh = KnownMesh {
 /// Initial data with their provenance.
 pub struct Loaded {
     shape: Shape,
-    /// What it is.
-    pub about: About,
+    /// What they are, in titles.
+    pub title: String,
+    /// File with its checksum, measures, what was mended: for manifests.
+    pub about: Value,
 }
 
 enum Shape {
-    /// Closed and oriented outwards.
-    Mesh(ClosedMesh),
-    Volume(Field<3>),
-}
-
-/// Provenance of initial data, for manifests.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct About {
-    /// Name in titles.
-    pub title: String,
-    /// Name of the file, none for a built-in shape.
-    pub file: Option<String>,
-    /// SHA-256 of the file.
-    pub sha256: Option<String>,
-    /// What a volume holds.
-    pub holds: Option<VolumeKind>,
-    /// Number of vertices of a mesh.
-    pub vertices: Option<usize>,
-    /// Number of faces.
-    pub faces: Option<usize>,
-    /// `1 - chi / 2` of a connected surface.
-    pub genus: Option<i64>,
-    /// Longest side of a mesh in the box.
-    pub side_length: Option<f64>,
-    /// What was mended.
-    pub warnings: Vec<String>,
+    Distance(MeshDistance),
+    Volume(Field<3>, VolumeKind),
 }
 
 /// Cells per side of the grid on which built-in shapes are made.
@@ -134,11 +108,6 @@ impl MeshOptions {
     /// Side of the box.
     pub fn box_side(&self, known: &KnownMesh) -> f64 {
         self.box_side.unwrap_or(known.box_side)
-    }
-
-    /// The box around the point (0.5, 0.5, 0.5), with `n` cells per unit length.
-    pub fn grid(&self, known: &KnownMesh, n: usize) -> Result<Grid<3>, Error> {
-        centred_box(n, self.box_side(known))
     }
 
     /// Whether nothing but the mesh of the paper was asked for.
@@ -152,37 +121,37 @@ impl MeshOptions {
     }
 
     /// The chosen mesh or volume, for runs on a grid.
-    ///
-    /// # Errors
-    /// [`Error::Options`] if it is nowhere; [`Error::Surfaces`] if it is no closed surface; [`Error::Geometry`] if it does not fit the
-    /// box; for a volume [`Error::Geometry`] if it cannot be read, [`Error::Options`] if it has another size or its values are no phase
-    /// field.
     pub fn load(&self, known: &KnownMesh, grid: &Grid<3>) -> Result<Loaded, Error> {
         if let Some(path) = &self.volume {
-            let mut about = About::of_file(path)?;
-            about.holds = Some(self.volume_holds);
-            let shape = Shape::Volume(volume(path, *grid, self.volume_holds)?);
-            return Ok(Loaded { shape, about });
+            let (title, mut about) = about_file(path)?;
+            about["holds"] = json!(self.volume_holds);
+            let values = volume(path, *grid, self.volume_holds)?;
+            return Ok(Loaded {
+                shape: Shape::Volume(values, self.volume_holds),
+                title,
+                about,
+            });
         }
-        let (mesh, mut about) = self.mesh(known)?;
+        let (mesh, title, mut about) = if self.procedural {
+            let title = known.procedural_title.to_owned();
+            ((known.procedural)(PROCEDURAL_CELLS)?, title, json!({}))
+        } else {
+            self.read(known)?
+        };
         let side_length = self.side_length.unwrap_or(known.side_length);
         let placement = Placement::fit(&mesh.bounding_box(), grid, side_length, 0.0)?;
-        about.vertices = Some(mesh.mesh().vertices.len());
-        about.faces = Some(mesh.mesh().faces.len());
-        about.genus = Some(mesh.genus());
-        about.side_length = Some(side_length);
-        let shape = Shape::Mesh(mesh.placed(&placement));
-        Ok(Loaded { shape, about })
+        about["vertices"] = mesh.mesh().vertices.len().into();
+        about["faces"] = mesh.mesh().faces.len().into();
+        about["genus"] = mesh.genus().into();
+        about["side_length"] = side_length.into();
+        Ok(Loaded {
+            shape: Shape::Distance(MeshDistance::new(&mesh.placed(&placement))),
+            title,
+            about,
+        })
     }
 
-    fn mesh(&self, known: &KnownMesh) -> Result<(ClosedMesh, About), Error> {
-        if self.procedural {
-            let about = About {
-                title: known.procedural_title.to_owned(),
-                ..About::default()
-            };
-            return Ok(((known.procedural)(PROCEDURAL_CELLS)?, about));
-        }
+    fn read(&self, known: &KnownMesh) -> Result<(ClosedMesh, String, Value), Error> {
         let path = self.find(known).ok_or_else(|| {
             Error::Options(format!(
                 "{} is not here: run scripts/fetch_meshes, or set {FOLDER_VARIABLE} to a folder that holds it, or give --mesh FILE, \
@@ -191,30 +160,24 @@ impl MeshOptions {
             ))
         })?;
         let (mesh, warnings) = ClosedMesh::new(surfaces::read(&path)?)?;
-        let mut about = About::of_file(&path)?;
-        about.warnings = warnings.iter().map(ToString::to_string).collect();
+        let (mut title, mut about) = about_file(&path)?;
+        about["warnings"] = warnings.iter().map(ToString::to_string).collect();
         if self.mesh.is_none() {
-            known.title.clone_into(&mut about.title);
+            known.title.clone_into(&mut title);
         }
-        Ok((mesh, about))
+        Ok((mesh, title, about))
     }
 
     /// The chosen mesh, or the built-in shape if none was chosen and that of the paper is not here.
     pub fn load_or_built_in(&self, known: &KnownMesh, grid: &Grid<3>) -> Result<Loaded, Error> {
-        let nothing = self.volume.is_none() && self.find(known).is_none();
-        let procedural = self.procedural || nothing;
-        Self {
-            procedural,
-            ..self.clone()
-        }
-        .load(known, grid)
+        let mut options = self.clone();
+        options.procedural |= self.volume.is_none() && self.find(known).is_none();
+        options.load(known, grid)
     }
 
     fn find(&self, known: &KnownMesh) -> Option<PathBuf> {
-        if let Some(path) = &self.mesh {
-            return Some(path.clone());
-        }
-        Some(folder().join(known.file)).filter(|path| path.exists())
+        let papers = Some(folder().join(known.file)).filter(|path| path.exists());
+        self.mesh.clone().or(papers)
     }
 }
 
@@ -224,18 +187,13 @@ pub fn folder() -> PathBuf {
     named.unwrap_or_else(|| PathBuf::from(FOLDER))
 }
 
-impl About {
-    fn of_file(path: &Path) -> Result<Self, Error> {
-        let bytes = std::fs::read(path).map_err(files::Error::of("read", path))?;
-        let name = path.file_name().unwrap_or(path.as_os_str());
-        let name = name.to_string_lossy().into_owned();
-        Ok(Self {
-            title: name.clone(),
-            file: Some(name),
-            sha256: Some(fingerprint(bytes)),
-            ..Self::default()
-        })
-    }
+/// Name and checksum of a file.
+fn about_file(path: &Path) -> Result<(String, Value), Error> {
+    let bytes = std::fs::read(path).map_err(files::Error::of("read", path))?;
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    let name = name.to_string_lossy().into_owned();
+    let about = json!({ "file": name, "sha256": fingerprint(bytes) });
+    Ok((name, about))
 }
 
 impl Loaded {
@@ -246,14 +204,12 @@ impl Loaded {
         eps: f64,
         bar: &ProgressBar,
     ) -> Result<Field<3>, Error> {
-        let distance = match &self.shape {
-            Shape::Mesh(mesh) => &signed_distance(mesh, grid, bar)?,
-            Shape::Volume(values) => values,
-        };
-        if self.about.holds == Some(VolumeKind::PhaseField) {
-            return Ok(distance.clone());
-        }
-        Ok(distance.map(|s| optimal_profile(s, eps)))
+        let profile = |distance: &Field<3>| distance.map(|s| optimal_profile(s, eps));
+        Ok(match &self.shape {
+            Shape::Distance(distance) => profile(&sampled(distance, grid, bar)?),
+            Shape::Volume(values, VolumeKind::SignedDistance) => profile(values),
+            Shape::Volume(values, VolumeKind::PhaseField) => values.clone(),
+        })
     }
 }
 
@@ -272,26 +228,28 @@ fn volume(path: &Path, grid: Grid<3>, holds: VolumeKind) -> Result<Field<3>, Err
         }
     };
     let (found, expected) = (field.grid().cells(), grid.cells());
-    if found != expected {
-        return Err(Error::Options(format!(
+    require(
+        found == expected,
+        format!(
             "{name} has {found} nodes per side, and the box {expected}: choose --cells and --box-side with a product of {found}"
-        )));
-    }
-    let too_large = field.values().iter().find(|u| u.abs() > LARGEST);
-    if let (VolumeKind::PhaseField, Some(value)) = (holds, too_large) {
-        return Err(Error::Options(format!(
-            "{name} holds the value {value}, which no phase field has; are they signed distances?"
-        )));
-    }
+        ),
+    )?;
+    let largest = field.values().iter().map(|u| u.abs()).fold(0.0, f64::max);
+    require(
+        holds != VolumeKind::PhaseField || largest <= LARGEST,
+        format!(
+            "{name} holds values up to {largest}, which no phase field has; are they signed distances?"
+        ),
+    )?;
     Ok(Field::from_values(grid, field.into_values())?)
 }
 
-/// Signed distances to a mesh in the box of the grid.
-pub fn signed_distance(
-    mesh: &ClosedMesh,
+/// Signed distances at the nodes of a grid.
+pub fn sampled(
+    distance: &MeshDistance,
     grid: Grid<3>,
     bar: &ProgressBar,
 ) -> Result<Field<3>, Error> {
     bar.set_length(grid.cells() as u64);
-    Ok(MeshDistance::new(mesh).sample(grid, || bar.inc(1))?)
+    Ok(distance.sample(grid, || bar.inc(1))?)
 }

@@ -8,7 +8,7 @@ use geometry::Grid;
 use model::{NamedNetwork, NeededNetwork, Networks, Ratios};
 use solver::NewtonParams;
 
-use crate::Error;
+use crate::{Error, require};
 
 /// Interface width `eps = 2^-6`.
 pub const EPS: f64 = 1.0 / 64.0;
@@ -34,9 +34,6 @@ pub struct NetworkOptions {
 
 impl NetworkOptions {
     /// Where the networks of the paper's and the calibrated scheme come from.
-    ///
-    /// # Errors
-    /// [`Error::Model`] if a file is no network or meets none of the needs.
     pub fn load(&self, needs: &[NeededNetwork]) -> Result<Chosen, Error> {
         Ok(Chosen(Networks::load(&self.network, needs)?))
     }
@@ -61,9 +58,6 @@ impl Chosen {
     }
 
     /// The operator of a method in a scheme at resolution `n` of the convergence tests.
-    ///
-    /// # Errors
-    /// [`Error::Options`] for a resolution that cannot be, [`Error::Model`] if there is no network.
     pub fn operator(
         &self,
         (method, scheme): (Method, Scheme),
@@ -78,22 +72,15 @@ impl Chosen {
     }
 }
 
-/// The ratios of the convergence tests in 2D at resolution `n`, with the paper's kernel width `n/8 + 1`.
-///
-/// # Errors
-/// [`Error::Options`] unless `n` is a multiple of 16, [`Error::Model`] if the scheme does not allow the ratios.
-pub fn convergence_ratios(n: usize) -> Result<Ratios, Error> {
-    if n == 0 || !n.is_multiple_of(16) {
-        return Err(Error::Options(format!(
+/// The network of the convergence tests in 2D at resolution `n`, with the paper's kernel width `n/8 + 1`.
+pub fn convergence_network(n: usize) -> Result<NeededNetwork, Error> {
+    require(
+        n > 0 && n.is_multiple_of(16),
+        format!(
             "n = {n} is not possible: the kernel width n/8 + 1 must be odd, so n must be a multiple of 16"
-        )));
-    }
+        ),
+    )?;
     let ratios = Ratios::of_run(2, n / 8 + 1, 1.0 / n as f64, EPS, STEP);
     ratios.validate()?;
-    Ok(ratios)
-}
-
-/// The network of the convergence tests with [these ratios](convergence_ratios).
-pub fn convergence_network(n: usize) -> Result<NeededNetwork, Error> {
-    Ok(NeededNetwork::exactly(convergence_ratios(n)?))
+    Ok(NeededNetwork::exactly(ratios))
 }

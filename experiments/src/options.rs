@@ -35,7 +35,6 @@ pub struct RunOptions {
 }
 
 impl RunOptions {
-    /// Opens the device.
     pub fn open_device(&self) -> Result<ComputeDevice, Error> {
         Ok(match &self.device {
             Some(name) => ComputeDevice::open(name.parse::<DeviceKind>()?)?,
@@ -45,13 +44,11 @@ impl RunOptions {
 
     /// Creates and checks the output folder; to be called when everything else has been checked.
     pub fn open_output(&self, program: &str) -> Result<OutputDir, Error> {
-        let default = || PathBuf::from("results").join(program);
-        Ok(OutputDir::create(
-            self.output.clone().unwrap_or_else(default),
-        )?)
+        let folder = self.output.clone();
+        let folder = folder.unwrap_or_else(|| PathBuf::from("results").join(program));
+        Ok(OutputDir::create(folder)?)
     }
 
-    /// Progress bars, unless quiet.
     pub fn progress(&self) -> Progress {
         Progress::new(self.quiet)
     }
@@ -69,11 +66,9 @@ impl RunOptions {
 /// Options of a figure at one resolution.
 #[derive(Args, Clone, Debug)]
 pub struct FigureOptions {
-    /// Common options.
     #[command(flatten)]
     pub run: RunOptions,
 
-    /// Networks.
     #[command(flatten)]
     pub networks: NetworkOptions,
 
@@ -88,18 +83,4 @@ impl FigureOptions {
         let usual = if self.run.quick { quick } else { paper };
         self.cells.unwrap_or(usual)
     }
-}
-
-/// Cells per unit length of a convergence study, in increasing order: those chosen, or 128 for a smoke test, or 128 and 256, or
-/// with `full` 512 too.
-pub fn resolutions(chosen: &[usize], quick: bool, full: bool) -> Vec<usize> {
-    let mut cells = match (chosen, quick, full) {
-        ([], true, _) => vec![128],
-        ([], false, false) => vec![128, 256],
-        ([], false, true) => vec![128, 256, 512],
-        (chosen, ..) => chosen.to_vec(),
-    };
-    cells.sort_unstable();
-    cells.dedup();
-    cells
 }

@@ -1,10 +1,8 @@
 //! Orders of convergence of runs against the finest of them.
 
 use engine::Trajectory;
-use report::{Axis, Colour, Figure, Format, LineChart, LineStyle, Marker, Series, Table};
 
-use crate::Error;
-use crate::session::Session;
+use crate::prelude::*;
 
 /// Writes what the sequences of runs say, each with the name of the size that is halved from one run to the next: a figure, a table, and
 /// the orders as metrics `KEY.order.SIZE.pairK`, from the coarsest pair of runs.
@@ -21,16 +19,18 @@ pub fn finish<const D: usize>(
     let figure = Figure::new(format!("{title}: convergence"), 2)
         .with_panels(sizes.iter().map(|(name, rows)| chart(name, rows)));
     session.figure(figure.with_shared_legend(), "orders")?;
-    table(&mut session, &sizes)?;
-    for (name, rows) in &sizes {
-        for (k, row) in rows.iter().enumerate() {
-            let metric = |what: &str| format!("{key}.{what}.{name}.pair{}", k + 1);
-            session.summary.insert(&metric("to_next"), row.to_next)?;
-            if let Some(order) = row.order {
-                session.summary.insert(&metric("order"), order)?;
-            }
-        }
-    }
+    let rows: Vec<(&str, usize, Refinement)> = (sizes.iter())
+        .flat_map(|(name, rows)| (1..).zip(rows).map(|(k, row)| (*name, k, *row)))
+        .collect();
+    let (order, next) = (("order", Fixed(2)), ("to the next", Scientific(2)));
+    let sheet = Sheet::of(&rows)
+        .keyed(|(size, k, _), name| format!("{key}.{name}.{size}.pair{k}"))
+        .text("refined", |(name, ..)| *name)
+        .column("size", Scientific(2), |(.., row)| row.size)
+        .column("to the finest", Scientific(2), |(.., row)| row.to_finest)
+        .measure("to_next", next, |(.., row)| row.to_next)
+        .measure("order", order, |(.., row)| row.order);
+    session.sheet(sheet, "orders")?;
     session.finish(&format!("{title}: orders of convergence"))
 }
 
@@ -88,24 +88,4 @@ fn chart(name: &str, rows: &[Refinement]) -> LineChart {
         guide(1).with_style(LineStyle::Dashed),
         guide(2).with_style(LineStyle::Dotted),
     ])
-}
-
-/// The refinements of several sizes as a table.
-fn table(
-    session: &mut Session<'_>,
-    sizes: &[(&'static str, Vec<Refinement>)],
-) -> Result<(), Error> {
-    let rows: Vec<(&str, Refinement)> = sizes
-        .iter()
-        .flat_map(|(name, rows)| rows.iter().map(|row| (*name, *row)))
-        .collect();
-    let table = Table::of(&rows)
-        .text("refined", |(name, _)| *name)
-        .number("size", Format::Scientific(2), |(_, row)| row.size)
-        .number("to the finest", Format::Scientific(2), |(_, row)| {
-            row.to_finest
-        })
-        .number("to the next", Format::Scientific(2), |(_, row)| row.to_next)
-        .number("order", Format::Fixed(2), |(_, row)| row.order);
-    session.table(table, "orders")
 }

@@ -1,7 +1,9 @@
-//! The quality of networks as columns of a table. Its metrics are the fields of [`Quality`].
+//! The quality of networks as columns of a table; its metrics are all fields of [`Quality`].
 
 use model::Quality;
-use report::{Format, Tabulated};
+use report::Format;
+
+use crate::sheet::Sheet;
 
 const LOSS: Format = Format::Scientific(2);
 const TRANSFER: Format = Format::Fixed(5);
@@ -20,12 +22,9 @@ const COLUMNS: [(&str, Format, fn(&Quality) -> f64); 10] = [
 ];
 
 /// Adds the columns of the quality to a table.
-pub fn columns<'a, R>(
-    table: Tabulated<'a, R>,
-    quality: impl Fn(&'a R) -> &'a Quality,
-) -> Tabulated<'a, R> {
-    let add = |table: Tabulated<'a, R>, (name, format, value): (_, _, fn(&Quality) -> f64)| {
-        table.number::<f64>(name, format, |row| value(quality(row)))
+pub fn columns<'a, R>(sheet: Sheet<'a, R>, of: impl Fn(&'a R) -> &'a Quality) -> Sheet<'a, R> {
+    let add = |sheet: Sheet<'a, R>, (head, format, value): (_, _, fn(&Quality) -> f64)| {
+        sheet.column::<f64>(head, format, |row| value(of(row)))
     };
-    COLUMNS.into_iter().fold(table, add)
+    COLUMNS.into_iter().fold(sheet, add)
 }

@@ -5,26 +5,22 @@ use std::time::Instant;
 
 use engine::{Case, Samples, Stop, Trajectory};
 use operators::ComputeDevice;
-use report::{Figure, Manifest, OutputDir, Progress, Summary, Tabulated};
+use report::{Cell, Figure, Manifest, OutputDir, Progress, Summary};
 use runs::Interrupt;
 use serde_json::Value;
 
 use crate::Error;
 use crate::options::RunOptions;
+use crate::sheet::Sheet;
 
 /// A program whose options are checked, and what it has to say so far.
 pub struct Session<'a> {
-    /// Common options.
     pub options: &'a RunOptions,
-    /// Where tensors live.
     pub device: ComputeDevice,
-    /// Where results go.
     pub output: OutputDir,
-    /// Progress bars.
     pub progress: Progress,
     /// What is run, and the wall times of its parts.
     pub manifest: Manifest,
-    /// The metrics.
     pub summary: Summary,
     /// What is printed in the end.
     report: Vec<String>,
@@ -95,12 +91,32 @@ impl<'a> Session<'a> {
         Ok(Figure { title, ..figure }.write(&self.output, stem)?)
     }
 
-    /// Writes a table, which is printed in the end, too.
-    pub fn table<R>(&mut self, table: Tabulated<'_, R>, stem: &str) -> Result<(), Error> {
-        let table = table.finish()?;
+    /// Writes a table, which is printed in the end, too, and adds its metrics.
+    pub fn sheet<R>(&mut self, sheet: Sheet<'_, R>, stem: &str) -> Result<(), Error> {
+        let (table, mut metrics) = (sheet.table.finish()?, sheet.metrics.into_iter());
         table.write(&self.output, stem)?;
         self.remark(table.to_markdown());
+        metrics.try_for_each(|(name, value)| self.metric(&name, value))
+    }
+
+    /// Adds a metric, unless its value is missing.
+    pub fn metric(&mut self, name: &str, value: impl Into<Cell>) -> Result<(), Error> {
+        match value.into() {
+            Cell::Integer(count) => self.summary.insert_count(name, count as usize)?,
+            Cell::Number(value) => self.summary.insert(name, value)?,
+            Cell::Text(_) | Cell::Missing => {}
+        }
         Ok(())
+    }
+
+    /// Adds metrics `KEY.NAME`.
+    pub fn metrics<const N: usize>(
+        &mut self,
+        key: &str,
+        metrics: [(&str, Cell); N],
+    ) -> Result<(), Error> {
+        let mut metrics = metrics.into_iter();
+        metrics.try_for_each(|(name, value)| self.metric(&format!("{key}.{name}"), value))
     }
 
     /// Adds a text to what is printed in the end.
@@ -126,4 +142,10 @@ impl<'a> Session<'a> {
         }
         Ok(())
     }
+}
+
+/// Removes a folder of partial results, after the final ones have been written.
+pub fn remove_folder(folder: &OutputDir) -> Result<(), Error> {
+    let path = folder.as_path();
+    Ok(std::fs::remove_dir_all(path).map_err(files::Error::of("remove", path))?)
 }

@@ -25,9 +25,10 @@ pub fn steps_csv<'a, const D: usize>(
 ) -> Result<String, Error> {
     let rows = runs.map(|(name, run)| {
         let operator = &run.case.operator;
-        let leading = [name, operator.method.key(), operator.scheme.key()];
         Rows {
-            leading: leading.map(Cell::from).to_vec(),
+            leading: [name, operator.method.key(), operator.scheme.key()]
+                .map(Cell::from)
+                .to_vec(),
             start: None,
             records: &run.records,
         }
@@ -48,25 +49,21 @@ pub fn table(leading: &[&str], runs: &[Rows<'_>]) -> Result<Table, Error> {
         .chain(&minimization)
         .chain(&["halvings", "seconds"]);
     let mut table = Table::data(names);
-    let measured = |values: &Values| -> Vec<Cell> {
-        let value = |name: &&str| values.get(*name).copied().into();
-        measures.iter().map(value).collect()
-    };
     for run in runs {
-        if let Some(start) = run.start {
+        let start = run.start.map(|values| (None, values));
+        let steps = run.records.iter().map(|r| (Some(r), &r.measures));
+        for (record, values) in start.into_iter().chain(steps) {
             let mut row = run.leading.clone();
-            row.extend([0_usize.into(), 0.0.into(), Cell::Missing]);
-            row.extend(measured(start));
-            row.resize(table.columns().len(), Cell::Missing);
-            table.push(row)?;
-        }
-        for record in run.records {
-            let mut row = run.leading.clone();
-            row.extend([record.step.into(), record.time.into(), record.tau.into()]);
-            row.extend(measured(&record.measures));
-            let made = record.minimization.as_ref();
+            row.extend(match record {
+                Some(r) => [r.step.into(), r.time.into(), r.tau.into()],
+                None => [0_usize.into(), 0.0.into(), Cell::Missing],
+            });
+            let value = |name: &&str| values.get(*name).copied().into();
+            row.extend(measures.iter().map(value));
+            let made = record.and_then(|r| r.minimization.as_ref());
             row.extend(MINIMIZATION.map(|(_, of)| made.map_or(Cell::Missing, of)));
-            row.extend([(record.halvings as usize).into(), record.seconds.into()]);
+            row.push(record.map(|r| r.halvings as usize).into());
+            row.push(record.map(|r| r.seconds).into());
             table.push(row)?;
         }
     }
@@ -75,18 +72,16 @@ pub fn table(leading: &[&str], runs: &[Rows<'_>]) -> Result<Table, Error> {
 
 /// Columns that are empty for mean curvature flow.
 const MINIMIZATION: [(&str, fn(&StepRecord) -> Cell); 10] = [
-    ("energy_before", |made| made.energy_before.into()),
-    ("energy", |made| made.energy.into()),
-    ("willmore_energy", |made| made.willmore_energy.into()),
+    ("energy_before", |m| m.energy_before.into()),
+    ("energy", |m| m.energy.into()),
+    ("willmore_energy", |m| m.willmore_energy.into()),
     ("exit", exit),
-    ("newton", |made| made.newton.newton.into()),
-    ("hvp", |made| made.hvp().into()),
-    ("values", |made| made.newton.values.into()),
-    ("gradients", |made| made.newton.gradients.into()),
-    ("negative_curvature", |made| {
-        made.newton.negative_curvature.into()
-    }),
-    ("estimate", |made| made.newton.estimate.into()),
+    ("newton", |m| m.newton.newton.into()),
+    ("hvp", |m| m.hvp().into()),
+    ("values", |m| m.newton.values.into()),
+    ("gradients", |m| m.newton.gradients.into()),
+    ("negative_curvature", |m| m.newton.negative_curvature.into()),
+    ("estimate", |m| m.newton.estimate.into()),
 ];
 
 /// Why a minimization ended, as serde writes it.

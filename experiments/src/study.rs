@@ -1,27 +1,22 @@
 //! Studies in the plane at the scales of the convergence tests: methods in their schemes at several resolutions.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use clap::Args;
-use engine::{Case, Flow, Method, Operator, Scales, Scheme, StepRule};
-use geometry::Field;
-use report::{Cell, LineChart, Series};
-use serde::Serialize;
+use report::Cell;
 use solver::StepRecord;
 
+use crate::look;
 use crate::networks::{Chosen, NetworkOptions, STEP, convergence_network, scales};
-use crate::options::{RunOptions, resolutions};
+use crate::prelude::*;
 use crate::surfaces::willmore_flow;
-use crate::{Error, look};
 
 /// Options of the studies.
 #[derive(Args, Clone, Debug)]
 pub struct StudyOptions {
-    /// Common options.
     #[command(flatten)]
     pub run: RunOptions,
 
-    /// Networks.
     #[command(flatten)]
     pub networks: NetworkOptions,
 
@@ -46,7 +41,15 @@ pub struct StudyOptions {
 impl StudyOptions {
     /// Resolutions in increasing order.
     pub fn cells(&self) -> Vec<usize> {
-        resolutions(&self.cells, self.run.quick, self.full)
+        let mut cells = match (&self.cells[..], self.run.quick, self.full) {
+            ([], true, _) => vec![128],
+            ([], false, false) => vec![128, 256],
+            ([], false, true) => vec![128, 256, 512],
+            (chosen, ..) => chosen.to_vec(),
+        };
+        cells.sort_unstable();
+        cells.dedup();
+        cells
     }
 
     /// The chosen methods in their schemes at all resolutions; without a choice those that are `usual` at a resolution.
@@ -74,11 +77,8 @@ impl StudyOptions {
 /// A curve in the figures of a study.
 #[derive(Serialize, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Variant {
-    /// Which flow.
     pub flow: Flow,
-    /// Which method.
     pub method: Method,
-    /// Which scheme of Willmore flow.
     pub scheme: Scheme,
     /// Cells per unit length.
     pub n: usize,
@@ -93,6 +93,15 @@ impl Variant {
         let texts = [self.flow.key(), self.method.key(), self.scheme.key()];
         let [flow, method, scheme] = texts.map(Cell::from);
         [flow, self.n.into(), method, scheme]
+    }
+
+    /// A row of a data table: those cells, and others.
+    pub fn row<const N: usize, const M: usize>(
+        &self,
+        which: [Cell; N],
+        numbers: [f64; M],
+    ) -> impl Iterator<Item = Cell> {
+        (self.cells().into_iter().chain(which)).chain(numbers.map(Cell::from))
     }
 
     /// Name in metrics after the flow or shape, such as `n128.hybrid_calibrated`.
@@ -113,11 +122,9 @@ impl Variant {
 
 /// What is compared with what, with all operators.
 pub struct Study {
-    /// All resolutions.
     pub cells: Vec<usize>,
     /// Variants with their operators.
     pub plan: Vec<(Variant, Operator)>,
-    /// Where the networks come from.
     pub networks: Chosen,
 }
 
@@ -125,32 +132,24 @@ impl Study {
     /// The operators of all variants; variants without a network are left out if the accurate recipe has one for the resolution.
     pub fn new(options: &NetworkOptions, variants: &[Variant]) -> Result<Self, Error> {
         let learned = variants.iter().filter(|v| v.method.is_learned());
-        let needs = learned
-            .map(|v| convergence_network(v.n))
-            .collect::<Result<Vec<_>, _>>()?;
-        let networks = options.load(&needs)?;
-        let mut study = Self {
-            cells: variants.iter().map(|v| v.n).collect(),
-            plan: Vec::new(),
-            networks,
-        };
-        study.cells.sort_unstable();
-        study.cells.dedup();
+        let needs = learned.map(|v| convergence_network(v.n));
+        let networks = options.load(&needs.collect::<Result<Vec<_>, _>>()?)?;
+        let cells: BTreeSet<usize> = variants.iter().map(|v| v.n).collect();
+        let mut plan = Vec::new();
         for variant in variants {
-            match study.networks.operator(variant.look(), variant.n) {
-                Ok(operator) => study.plan.push((*variant, operator)),
-                Err(Error::Model(model::Error::MissingNetwork { .. }))
-                    if study
-                        .networks
-                        .find(Scheme::Accurate, &convergence_network(variant.n)?)
-                        .is_ok() => {}
-                Err(error) => return Err(error),
+            let other = || networks.find(Scheme::Accurate, &convergence_network(variant.n)?);
+            match networks.operator(variant.look(), variant.n) {
+                Err(Error::Model(model::Error::MissingNetwork { .. })) if other().is_ok() => {}
+                operator => plan.push((*variant, operator?)),
             }
         }
-        Ok(study)
+        Ok(Self {
+            cells: cells.into_iter().collect(),
+            plan,
+            networks,
+        })
     }
 
-    /// The variants.
     pub fn variants(&self) -> impl Iterator<Item = Variant> {
         self.plan.iter().map(|(variant, _)| *variant)
     }

@@ -1,22 +1,17 @@
 //! Surfaces under Willmore flow: their scales, the shown steps of a run, and the pictures, tables and metrics of those.
 
 use clap::Args;
-use engine::{
-    Case, Flow, Measure, Method, Operator, Record, Samples, Scales, Scheme, StepRule, Stop,
-    Trajectory, energy_increases, mean_hvp,
-};
-use geometry::{Field, Grid, UpAxis};
+use engine::{Samples, Stop, Trajectory, energy_increases, mean_hvp};
+use geometry::UpAxis;
 use model::NeededNetwork;
 use operators::memory;
 use render::{Bounds, Framing, Quality, Rgb, Scene, Tube};
-use report::{Figure, Format, OutputDir, Raster, Summary, Table};
-use serde_json::{Value, json};
+use report::{OutputDir, Raster};
+use serde_json::Value;
 use surfaces::ClosedMesh;
 
-use crate::Error;
 use crate::networks::Chosen;
-use crate::options::FigureOptions;
-use crate::session::Session;
+use crate::prelude::*;
 use crate::steps::steps_csv;
 
 /// Interface width of surfaces, in cells.
@@ -49,9 +44,7 @@ pub fn centred_box(n: usize, side: f64) -> Result<Grid<3>, Error> {
 pub struct Setting {
     /// Cells per unit length.
     pub n: usize,
-    /// The box.
     pub grid: Grid<3>,
-    /// The paper's scales.
     pub scales: Scales,
     networks: Chosen,
 }
@@ -68,16 +61,10 @@ impl Setting {
         })
     }
 
-    /// The operator of a method in a scheme.
     pub fn operator(&self, variant: (Method, Scheme)) -> Result<Operator, Error> {
         let (networks, needed) = (self.networks.of(variant.1), needed_network());
-        Ok(Operator::new(
-            variant,
-            &networks,
-            &needed,
-            &self.grid,
-            &self.scales,
-        )?)
+        let (grid, scales) = (&self.grid, &self.scales);
+        Ok(Operator::new(variant, &networks, &needed, grid, scales)?)
     }
 
     /// The parameters of a program for its manifest: the common ones, and others.
@@ -115,7 +102,6 @@ pub fn willmore_flow<const D: usize>(
     }
 }
 
-/// Which schemes.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct SchemeOptions {
     /// One scheme alone: paper, calibrated or accurate [default: paper and accurate]
@@ -124,7 +110,6 @@ pub struct SchemeOptions {
 }
 
 impl SchemeOptions {
-    /// Those wanted of the learned operator.
     pub fn schemes(&self) -> Vec<Scheme> {
         let wanted = self.scheme.map(|scheme| vec![scheme]);
         wanted.unwrap_or_else(|| vec![Scheme::Paper, Scheme::Accurate])
@@ -147,17 +132,14 @@ pub struct View {
 pub struct Surface {
     /// Prefix of its metrics and files.
     pub key: &'static str,
-    /// Name in titles and tables.
     pub title: String,
     /// Steps to be shown, and the Willmore energies that the paper reports for them. Of a run that ends early the last one is shown.
     pub shown: Vec<(usize, Option<f64>)>,
-    /// Direction of view.
     pub view: View,
 }
 
-/// The measures of a shown step: name in metrics, column and digits in tables. `w` is the Willmore energy of the phase field with the
-/// implicit finite-element step and the mass-matrix norm, `w_scheme` what the flow minimizes, with its own operator and calibration;
-/// the Euler characteristic is that of the isosurface `u = 0`.
+/// The measures of a shown step: name in metrics, column and digits in tables. `w` is the Willmore energy with the implicit finite-element
+/// step and the mass-matrix norm, `w_scheme` what the flow minimizes; the Euler characteristic is that of the isosurface `u = 0`.
 const MEASURES: [(&str, &str, usize); 5] = [
     ("w", "w", 2),
     ("w_scheme", "w of the scheme", 2),
@@ -168,9 +150,7 @@ const MEASURES: [(&str, &str, usize); 5] = [
 
 /// A shown step.
 pub struct Snapshot {
-    /// Its number.
     pub step: usize,
-    /// Its time.
     pub time: f64,
     measures: [f64; MEASURES.len()],
     /// The Willmore energy that the paper reports.
@@ -190,11 +170,9 @@ impl Snapshot {
 
 /// A surface that has flowed.
 pub struct Flowed {
-    /// What is shown of it.
     pub surface: Surface,
-    /// All steps.
     pub trajectory: Trajectory<3>,
-    /// The shown ones.
+    /// The shown steps.
     pub snapshots: Vec<Snapshot>,
     /// Largest resident memory of the process until the last step was done, in MiB, where the system tells.
     peak_mib: Option<f64>,
@@ -217,12 +195,11 @@ impl Surface {
         };
         memory::release_freed();
         let last = flowed.trajectory.steps();
-        samples.also.retain(|step| *step < last);
-        samples.also.push(last);
+        let steps = samples.also.into_iter().filter(|step| *step < last);
+        let steps = steps.chain([last]);
         let measures = format!("{}: measures", flowed.surface.title);
         let (output, quick) = (&session.output, session.options.quick);
         flowed.snapshots = session.manifest.phase(measures, || {
-            let steps = samples.also.into_iter();
             let snapshots = steps.map(|step| flowed.snapshot(step, output, quick));
             snapshots.collect::<Result<_, Error>>()
         })?;
@@ -288,29 +265,6 @@ impl Flowed {
         format!("{}\n{operator}", self.surface.title)
     }
 
-    fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
-        let (key, records) = (self.key(), &self.trajectory.records);
-        self.summarize_shapes(&key, summary)?;
-        summary.insert(&format!("{key}.hvp_per_step"), mean_hvp(records))?;
-        let increases = energy_increases(records);
-        summary.insert_count(&format!("{key}.energy_increases"), increases)?;
-        summary.insert(&format!("{key}.seconds"), self.trajectory.seconds())?;
-        Ok(())
-    }
-
-    /// Adds the metrics of the shown shapes, and the memory that they took.
-    pub fn summarize_shapes(&self, key: &str, summary: &mut Summary) -> Result<(), Error> {
-        for shown in &self.snapshots {
-            for ((name, ..), value) in MEASURES.iter().zip(shown.measures) {
-                summary.insert(&format!("{key}.{name}.step{}", shown.step), value)?;
-            }
-        }
-        if let Some(peak) = self.peak_mib {
-            summary.insert(&format!("{key}.peak_mib"), peak)?;
-        }
-        Ok(())
-    }
-
     /// Pictures of the shown steps with this side in pixels (less in a quick run), all in one framing, each also as a file of its own.
     pub fn pictures(
         &self,
@@ -319,22 +273,16 @@ impl Flowed {
         side: u32,
     ) -> Result<Vec<Raster>, Error> {
         memory::release_freed();
-        let (side, quality) = if quick {
-            (120, Quality::Draft)
-        } else {
-            (side, Quality::Standard)
-        };
+        let usual = (side, Quality::Standard);
+        let (side, quality) = if quick { (120, Quality::Draft) } else { usual };
         // Scenes are made twice rather than kept: one takes several times the memory of its phase field.
-        let mut bounds: Option<Bounds> = None;
+        let mut bounds = Vec::new();
         for snapshot in &self.snapshots {
             let tubes = snapshot.tubes.iter().flat_map(|tube| tube.points.clone());
-            for one in [self.scene(snapshot)?.bounds(), Bounds::around(tubes)] {
-                bounds = match (bounds, one) {
-                    (Some(all), Some(one)) => Some(all.union(&one)),
-                    (all, one) => all.or(one),
-                };
-            }
+            bounds.extend([self.scene(snapshot)?.bounds(), Bounds::around(tubes)]);
         }
+        let bounds = bounds.into_iter().flatten();
+        let bounds = bounds.reduce(|all, one| all.union(&one));
         let folder = output.subfolder("pictures")?;
         let picture = |snapshot: &Snapshot| {
             let mut scene = self.scene(snapshot)?.quality(quality);
@@ -367,13 +315,10 @@ impl Flowed {
 
 /// Surfaces under Willmore flow by several methods, as a program shows them.
 pub struct SurfaceFlows {
-    /// Name of the program.
     pub program: &'static str,
-    /// Title of the figure.
     pub title: String,
     /// The surfaces with their initial phase fields.
     pub surfaces: Vec<(Surface, Field<3>)>,
-    /// Methods in their schemes.
     pub variants: Vec<(Method, Scheme)>,
     /// Sizes of the time steps, their number,
     pub time: (StepRule, usize),
@@ -395,23 +340,22 @@ impl SurfaceFlows {
         for (surface, initial) in &self.surfaces {
             for &variant in &self.variants {
                 let mut surface = surface.clone();
-                // The paper reports energies of its own scheme.
-                let papers = variant == (Method::Hybrid, Scheme::Paper);
-                surface
-                    .shown
-                    .iter_mut()
-                    .for_each(|(_, w)| *w = w.filter(|_| papers));
+                if variant != (Method::Hybrid, Scheme::Paper) {
+                    // The paper reports energies of its own scheme.
+                    surface.shown.iter_mut().for_each(|(_, w)| *w = None);
+                }
                 let (title, operator) = (&surface.title, setting.operator(variant)?);
                 let case =
                     willmore_flow(title, initial.clone(), operator, setting.scales, self.time);
                 all.push(surface.flow(case, &mut session)?);
             }
         }
-        table(&mut session, &all, "energies")?;
+        write_snapshots(&mut session, &all, "energies", Flowed::key)?;
         let remarks = remarks(&mut session, &mut all)?;
         let (output, quick) = (&session.output, session.options.quick);
         let pictures = session.manifest.phase("pictures", || {
-            (all.iter().map(|one| one.pictures(output, quick, SIDE))).collect::<Result<Vec<_>, _>>()
+            let pictures = all.iter().map(|one| one.pictures(output, quick, SIDE));
+            pictures.collect::<Result<Vec<_>, _>>()
         })?;
         let columns = pictures.iter().map(Vec::len).max();
         let figure = Figure::new(&self.title, columns.unwrap_or(1))
@@ -424,31 +368,43 @@ impl SurfaceFlows {
         session.figure(figure, "surfaces")?;
         let runs = all.iter().map(|one| (one.surface.key, &one.trajectory));
         output.write("steps.csv", steps_csv("surface", runs)?)?;
-        let summary = &mut session.summary;
-        all.iter().try_for_each(|one| one.summarize(summary))?;
-        if let Some(peak) = memory::peak_mib() {
-            summary.insert(&format!("{}.peak_mib_with_pictures", self.program), peak)?;
+        for one in &all {
+            let records = &one.trajectory.records;
+            let metrics = [
+                ("hvp_per_step", mean_hvp(records).into()),
+                ("energy_increases", energy_increases(records).into()),
+                ("seconds", one.trajectory.seconds().into()),
+            ];
+            session.metrics(&one.key(), metrics)?;
         }
+        let peak = format!("{}.peak_mib_with_pictures", self.program);
+        session.metric(&peak, memory::peak_mib())?;
         session.finish(&self.title)
     }
 }
 
-/// Writes the shown steps of all runs, beside the paper's energies.
-pub fn table(session: &mut Session<'_>, all: &[Flowed], stem: &str) -> Result<(), Error> {
+/// Writes the shown steps of all runs, beside the paper's energies. Metrics begin with `key`.
+pub fn write_snapshots(
+    session: &mut Session<'_>,
+    all: &[Flowed],
+    stem: &str,
+    key: impl Fn(&Flowed) -> String,
+) -> Result<(), Error> {
     let rows: Vec<(&Flowed, &Snapshot)> = (all.iter())
         .flat_map(|one| one.snapshots.iter().map(move |shown| (one, shown)))
         .collect();
-    let mut table = Table::of(&rows)
+    let mut sheet = Sheet::of(&rows)
+        .keyed(|(one, shown), name| format!("{}.{name}.step{}", key(one), shown.step))
         .text("surface", |(one, _)| one.surface.title.as_str())
         .text("method", |(one, _)| one.label())
-        .number("step", Format::Shortest, |(_, shown)| shown.step);
-    for (k, (_, name, digits)) in MEASURES.into_iter().enumerate() {
-        table = table.number(name, Format::Fixed(digits), move |(_, shown)| {
-            shown.measures[k]
-        });
+        .column("step", Shortest, |(_, shown)| shown.step);
+    for (k, (name, head, digits)) in MEASURES.into_iter().enumerate() {
+        let value = |(_, shown): &(&Flowed, &Snapshot)| shown.measures[k];
+        sheet = sheet.measure(name, (head, Fixed(digits)), value);
         if k == 0 {
-            table = table.number("w, paper", Format::Fixed(2), |(_, shown)| shown.paper);
+            sheet = sheet.column("w, paper", Fixed(2), |(_, shown)| shown.paper);
         }
     }
-    session.table(table, stem)
+    session.sheet(sheet, stem)?;
+    (all.iter()).try_for_each(|one| session.metric(&format!("{}.peak_mib", key(one)), one.peak_mib))
 }

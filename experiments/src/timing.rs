@@ -2,42 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use engine::{Case, Flow, Operator, Run, minimizations};
+use engine::minimizations;
 use geometry::shapes::Ball;
-use geometry::{Grid, phase_field};
 use indicatif::ProgressBar;
-use operators::ComputeDevice;
-use report::{Format, Summary, Tabulated};
 use solver::StepRecord;
 
 use crate::comparison::cross;
-use crate::networks::{EPS, STEP};
-use crate::{Error, study};
+use crate::networks::{Chosen, EPS, NetworkOptions, STEP, convergence_network};
+use crate::prelude::*;
+use crate::{study, surfaces};
 
 /// What was measured, under the same names in tables, metrics and JSON; what a system does not tell is absent.
 pub type Numbers = BTreeMap<&'static str, f64>;
-
-/// Columns of a table of numbers: heading, format and name.
-pub type Columns = [(&'static str, Format, &'static str)];
-
-/// Adds columns of numbers to a table.
-pub fn with_columns<'a, R>(
-    table: Tabulated<'a, R>,
-    columns: &Columns,
-    of: impl Fn(&'a R) -> &'a Numbers,
-) -> Tabulated<'a, R> {
-    (columns.iter()).fold(table, |table, &(head, format, name)| {
-        table.number(head, format, |row| of(row).get(name).copied())
-    })
-}
-
-/// Numbers as metrics `KEY.NAME`.
-pub fn summarize(summary: &mut Summary, key: &str, numbers: &Numbers) -> Result<(), Error> {
-    for (name, value) in numbers {
-        summary.insert(&format!("{key}.{name}"), *value)?;
-    }
-    Ok(())
-}
 
 /// Round after round, everyone who goes on has a turn.
 pub fn take_turns<C>(
@@ -60,6 +36,13 @@ pub fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
+/// The networks of the convergence tests at some resolutions, and that of surfaces.
+pub fn networks(options: &NetworkOptions, cells: &[usize]) -> Result<Chosen, Error> {
+    let needs = cells.iter().map(|&n| convergence_network(n));
+    let needs = needs.chain([Ok(surfaces::needed_network())]);
+    options.load(&needs.collect::<Result<Vec<_>, _>>()?)
+}
+
 /// What is timed in the plane: the cross in steps of `2^-14`, or for a smoke test a disc on a small box.
 pub fn plane(operator: &Operator, n: usize, steps: usize, quick: bool) -> Result<Case<2>, Error> {
     let (shape, initial) = if quick {
@@ -74,7 +57,6 @@ pub fn plane(operator: &Operator, n: usize, steps: usize, quick: bool) -> Result
 
 /// Willmore flow that is timed step by step.
 pub struct Timed<const D: usize> {
-    /// The flow.
     pub run: Run<D>,
     bar: ProgressBar,
 }
@@ -110,6 +92,7 @@ impl<const D: usize> Timed<D> {
     /// Time and work of the steps; products on coarser grids count by their shares of the unknowns.
     pub fn numbers(&self) -> Numbers {
         let (seconds, products) = (self.seconds(), self.mean(|r| r.newton.hvp as f64));
+        let ms = 1e3 * self.mean(|r| r.times.products);
         Numbers::from([
             ("steps", seconds.len() as f64),
             ("seconds", seconds.iter().sum()),
@@ -118,10 +101,7 @@ impl<const D: usize> Timed<D> {
             ("hvp_per_step", self.mean(StepRecord::hvp)),
             ("hvp_on_this_grid", products),
             ("hvp_on_coarser_grids", self.mean(|r| r.start.hvp)),
-            (
-                "ms_per_product",
-                1e3 * self.mean(|r| r.times.products) / products.max(1.0),
-            ),
+            ("ms_per_product", ms / products.max(1.0)),
         ])
     }
 }

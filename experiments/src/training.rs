@@ -1,13 +1,15 @@
 //! The networks of the experiments, and training them with a progress bar and checkpoints.
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
+use indicatif::ProgressBar;
 use model::training::{Checkpoint, Progress as Iteration, Recipe, SphereData, Trained, Training};
 use model::{Error as ModelError, Ratios};
 use operators::{ComputeDevice, DeviceKind};
-use report::{OutputDir, Progress};
-use runs::Cache;
 use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
 
 use crate::Error;
 use crate::options::RunOptions;
@@ -19,8 +21,7 @@ const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(3);
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NetworkSpec {
     /// Name in files and metrics.
-    pub name: String,
-    /// Ratios of the operator.
+    pub name: &'static str,
     pub ratios: Ratios,
     /// Cells per unit length of the training grid.
     pub cells: usize,
@@ -51,19 +52,14 @@ const NETWORKS: [(&str, Ratios, usize); 6] = [
 ];
 
 impl NetworkSpec {
-    /// A network by name, ratios and reference resolution.
-    pub fn new(name: impl Into<String>, ratios: Ratios, cells: usize) -> Self {
-        Self {
-            name: name.into(),
+    fn named(wanted: impl Fn(&str) -> bool) -> Vec<Self> {
+        let spec = |(name, ratios, cells)| Self {
+            name,
             ratios,
             cells,
-        }
-    }
-
-    fn named(wanted: impl Fn(&str) -> bool) -> Vec<Self> {
-        let chosen = NETWORKS.into_iter().filter(|(name, ..)| wanted(name));
-        let spec = |(name, ratios, cells)| Self::new(name, ratios, cells);
-        chosen.map(spec).collect()
+        };
+        let all = NETWORKS.into_iter().map(spec);
+        all.filter(|spec| wanted(spec.name)).collect()
     }
 
     /// The networks of the accurate recipe: those of the paper's, and one for `eps = h`.
@@ -81,12 +77,10 @@ impl NetworkSpec {
         Self::named(|name| ["n128", "n256", "n512"].contains(&name))
     }
 
-    /// The network of the surfaces.
     pub fn surfaces() -> Self {
         Self::named(|name| name == "surfaces").remove(0)
     }
 
-    /// The training data.
     pub fn data(&self, quick: bool) -> Result<SphereData, Error> {
         let data = SphereData::new(self.ratios, self.cells)?;
         Ok(if quick { data.quick() } else { data })
@@ -94,9 +88,6 @@ impl NetworkSpec {
 }
 
 /// Training needs double precision: the given device if it has that, else a CPU.
-///
-/// # Errors
-/// [`Error::Options`] if no CPU backend was compiled in.
 pub fn training_device(device: &ComputeDevice) -> Result<ComputeDevice, Error> {
     if device.kind().is_cpu() {
         return Ok(device.clone());
@@ -112,71 +103,70 @@ pub fn held_out_radii(quick: bool) -> usize {
     if quick { 4 } else { 20 }
 }
 
-/// What the trainings of a program share.
-pub struct Trainer<'a> {
-    device: &'a ComputeDevice,
-    progress: &'a Progress,
-    options: &'a RunOptions,
-    /// Where interrupted trainings are kept; to be removed when the networks have been saved.
-    pub checkpoints: Cache,
+/// Trains a network by a recipe on a [`training_device`], continuing from the checkpoint in a file.
+pub fn train<R: Recipe>(
+    (spec, recipe): (&NetworkSpec, &R),
+    options: &RunOptions,
+    device: &ComputeDevice,
+    file: &Path,
+    bar: &ProgressBar,
+) -> Result<Trained, Error> {
+    let training = Training {
+        recipe,
+        data: spec.data(options.quick)?,
+        seed: options.seed,
+        held_out: held_out_radii(options.quick),
+    };
+    let key = serde_json::to_value((&training, env!("CARGO_PKG_VERSION")));
+    let key = key.expect("settings are numbers and names");
+    let mut checkpoint: Checkpoint<R::State> = load(file, &key).unwrap_or_default();
+    bar.set_position(checkpoint.curve.len() as u64);
+    bar.reset_eta();
+    let mut stored = Instant::now();
+    let mut observer = |at: &Iteration, checkpoint: &Checkpoint<R::State>| {
+        bar.set_length(at.of as u64);
+        bar.set_position(at.iteration as u64);
+        bar.set_message(format!("{}  {:.2e}", spec.name, at.held_out_loss));
+        if stored.elapsed() >= CHECKPOINT_INTERVAL {
+            store(file, &key, checkpoint).map_err(|e| ModelError::Training(e.to_string()))?;
+            stored = Instant::now();
+        }
+        Ok(true)
+    };
+    let trained = training.run(&mut checkpoint, device, &mut observer)?;
+    store(file, &key, &checkpoint)?;
+    bar.finish();
+    Ok(trained)
 }
 
-impl<'a> Trainer<'a> {
-    /// Trainings on a [`training_device`] that are kept in a folder of the output until they are all finished, or `restart`ed.
-    pub fn open(
-        options: &'a RunOptions,
-        device: &'a ComputeDevice,
-        output: &OutputDir,
-        progress: &'a Progress,
-        restart: bool,
-    ) -> Result<Self, Error> {
-        let folder = output.as_path().join("checkpoints");
-        if restart {
-            Cache::open(&folder)?.remove()?;
-        }
-        Ok(Self {
-            checkpoints: Cache::open(folder)?,
-            device,
-            progress,
-            options,
-        })
-    }
+/// What is stored in a file, if it is there, readable, and belongs to this key.
+fn load<T: DeserializeOwned>(file: &Path, key: &Value) -> Option<T> {
+    let (found, stored): (Value, T) = serde_json::from_slice(&std::fs::read(file).ok()?).ok()?;
+    (found == *key).then_some(stored)
+}
 
-    /// Trains a network by a recipe of the given name, continuing from a checkpoint.
-    pub fn train<R: Recipe>(
-        &self,
-        spec: &NetworkSpec,
-        recipe_name: &str,
-        recipe: &R,
-    ) -> Result<Trained, Error> {
-        let training = Training {
-            recipe,
-            data: spec.data(self.options.quick)?,
-            seed: self.options.seed,
-            held_out: held_out_radii(self.options.quick),
-        };
-        let name = format!("{}-{recipe_name}", spec.name);
-        let key = (&training, env!("CARGO_PKG_VERSION"));
-        let mut checkpoint: Checkpoint<R::State> =
-            self.checkpoints.load(&name, &key).unwrap_or_default();
-        let bar = self.progress.bar(name.clone(), 1);
-        bar.set_position(checkpoint.curve.len() as u64);
-        bar.reset_eta();
-        let mut stored = Instant::now();
-        let mut observer = |at: &Iteration, checkpoint: &Checkpoint<R::State>| {
-            bar.set_length(at.of as u64);
-            bar.set_position(at.iteration as u64);
-            bar.set_message(format!("{name}  {:.2e}", at.held_out_loss));
-            if stored.elapsed() >= CHECKPOINT_INTERVAL {
-                (self.checkpoints.store(&name, &key, checkpoint))
-                    .map_err(|error| ModelError::Training(error.to_string()))?;
-                stored = Instant::now();
-            }
-            Ok(true)
-        };
-        let trained = training.run(&mut checkpoint, self.device, &mut observer)?;
-        self.checkpoints.store(&name, &key, &checkpoint)?;
-        bar.finish();
-        Ok(trained)
+/// Stores something with all that it depends on, its key, whole or not at all.
+fn store(file: &Path, key: &Value, stored: &impl Serialize) -> Result<(), files::Error> {
+    let text = serde_json::to_string(&(key, stored)).map_err(std::io::Error::from);
+    files::write_atomically(file, |out| out.write_all(text?.as_bytes()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn checkpoints_belong_to_their_keys() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("part.json");
+        let (key, values) = (json!({ "x": 0.1 + 0.2 }), vec![1.0 / 3.0, -0.0]);
+        assert_eq!(load::<Vec<f64>>(&file, &key), None);
+        store(&file, &key, &values).unwrap();
+        let bits = |values: Vec<f64>| values.into_iter().map(f64::to_bits).collect::<Vec<_>>();
+        assert_eq!(load(&file, &key).map(bits), Some(bits(values)));
+        assert_eq!(load::<Vec<f64>>(&file, &json!({ "x": 0.3 })), None);
+        std::fs::write(&file, "{").unwrap();
+        assert_eq!(load::<Vec<f64>>(&file, &key), None);
     }
 }

@@ -125,12 +125,6 @@ fn resolutions_names_and_outputs_that_cannot_be() {
         );
         refused(program, root.path(), &["--steps", "0"], &["--steps"]);
     }
-    refused(
-        CIRCLES,
-        root.path(),
-        &["--methods", "fe_semi", "--retrain"],
-        &["network"],
-    );
     refused(TIMING, root.path(), &["--budget", "0"], &["--budget"]);
     fs::write(root.path().join("results"), "a file of the user").unwrap();
     for program in [

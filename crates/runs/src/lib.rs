@@ -58,7 +58,6 @@
 //!   most [`State::MAX_NOTES`]) or `timings.json` (at most 4 MiB), and 64 KiB for anything else.
 //! - A failed write (full disk, read-only folder) leaves the last commit in place.
 
-mod cache;
 mod checkpoint;
 mod digest;
 mod directory;
@@ -70,7 +69,6 @@ mod names;
 mod stored;
 mod timings;
 
-pub use cache::Cache;
 pub use checkpoint::State;
 pub use digest::fingerprint;
 pub use directory::RunDirectory;

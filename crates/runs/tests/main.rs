@@ -1,6 +1,5 @@
 //! What run directories promise.
 
-mod cache;
 mod damage;
 mod faults;
 mod fuzzing;

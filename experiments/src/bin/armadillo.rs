@@ -1,12 +1,8 @@
 //! A scanned figure under Willmore flow with time steps that double.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use engine::StepRule;
-use experiments::harness;
 use experiments::mesh_flow::{MeshFlow, MeshFlowOptions};
 use experiments::meshes::ARMADILLO;
+use experiments::prelude::*;
 use experiments::surfaces::View;
 use geometry::UpAxis;
 

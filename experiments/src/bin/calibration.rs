@@ -3,41 +3,25 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
-use clap::Parser;
-use engine::{Operator, Record, Run, Scales, Scheme, StepRule};
-use experiments::networks::{EPS, STEP};
-use experiments::options::RunOptions;
-use experiments::session::Session;
-use experiments::surfaces::willmore_flow;
-use experiments::{Error, harness};
+use experiments::networks::{EPS, STEP, scales};
+use experiments::prelude::*;
+use experiments::surfaces::{self, willmore_flow};
 use fem::FiniteElementStep;
 use geometry::measure::zero_set_volume;
 use geometry::shapes::{Ball, Torus};
-use geometry::{Field, Grid, phase_field};
 use model::training::SphereData;
 use model::{Calibration, NamedNetwork, Network, Shipped, displacement_errors};
-use operators::ComputeDevice;
-use report::{
-    Axis, Colour, Figure, Format, LineChart, LineStyle, Marker, OutputDir, Progress, Series, Table,
-    Tabulated,
-};
-use serde::Serialize;
-use serde_json::json;
-use solver::{Factors, NewtonParams};
+use report::{OutputDir, Progress};
+use solver::Factors;
 
 const PROGRAM: &str = "calibration";
 
-/// Interface width and inner time step of the discs, as in the convergence tests.
-const DISC_SCALES: [f64; 2] = [EPS, STEP];
 const RADII: [f64; 7] = [0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6];
 const QUICK_RADII: [f64; 2] = [0.15, 0.3];
 /// Distance of a disc to the box's boundary.
 const MARGIN: f64 = 0.3;
 
-/// Interface width and inner time step of the surfaces, for `n = 64`.
-const SURFACE_SCALES: [f64; 2] = [1.0 / 32.0, 1.0 / 4096.0];
 const SURFACE_CELLS: usize = 64;
 /// Room for tori whose hole is some interface widths wide.
 const SURFACE_SIDE: f64 = 1.5;
@@ -77,35 +61,36 @@ fn program(options: &Options) -> Result<(), Error> {
     let run = &options.run;
     let networks = options.networks()?;
     let device = run.open_device()?;
-    let checksums = networks.iter().map(|(name, one)| (name, one.fingerprint()));
-    let [eps, inner_step] = DISC_SCALES;
+    let checksums = networks
+        .iter()
+        .map(|one| (&one.name, one.network.fingerprint()));
     let parameters = json!({
         "networks": checksums.collect::<BTreeMap<_, _>>(),
-        "eps": eps,
-        "inner_step": inner_step,
-        "time_step": STEP_RATIO * inner_step,
+        "eps": EPS,
+        "inner_step": STEP,
+        "time_step": STEP_RATIO * STEP,
     });
     let mut session = Session::open(PROGRAM, run, device.clone(), parameters)?;
-    let install = (options.install.as_ref())
-        .map(OutputDir::create)
-        .transpose()?;
+    let install = options.install.as_ref().map(OutputDir::create);
+    let install = install.transpose()?;
     let manifest = &mut session.manifest;
     let mut all = Vec::new();
-    for (name, network) in networks {
+    for NamedNetwork { name, network } in networks {
         let calibration = manifest.phase(name.clone(), || network.calibrate())?;
         let network = network.with_calibration(Some(calibration));
         if let Some(install) = &install {
             network.save(&install.path(&name)?)?;
         }
         all.push(Calibrated {
-            name,
-            network,
+            named: NamedNetwork { name, network },
             calibration,
         });
     }
     let progress = &session.progress;
     let discs = manifest.phase("discs", || discs(&all, run.quick, &device, progress))?;
-    let surfaces = manifest.phase("balls and tori", || surfaces(&all, run.quick, &device))?;
+    let surfaces = manifest.phase("balls and tori", || {
+        balls_and_tori(&all, run.quick, &device)
+    })?;
     let diagnosed = manifest.phase("diagnostics", || diagnostics(&all, run.quick, &device))?;
 
     session.figure(diagnostics_figure(&diagnosed), "diagnostics")?;
@@ -115,9 +100,13 @@ fn program(options: &Options) -> Result<(), Error> {
     output.write_json("discs.json", &discs)?;
     output.write_csv("discs.csv", &discs)?;
     output.write_csv("surfaces.csv", &surfaces)?;
-    calibration_table(&mut session, &all)?;
-    session.table(discs_table(&discs), "discs_table")?;
-    session.table(surfaces_table(&surfaces), "surfaces_table")?;
+    let learned = all
+        .iter()
+        .map(|one| (one.named.name.clone(), one.calibration));
+    let rows: Vec<(String, Calibration)> = learned.chain(elements()?).collect();
+    session.sheet(calibrations_table(&rows), "calibration")?;
+    session.sheet(discs_table(&discs), "discs_table")?;
+    session.sheet(surfaces_table(&surfaces), "surfaces_table")?;
     for one in &all {
         let (key, calibration) = (one.key(), &one.calibration);
         session.summary.insert_record(key, calibration)?;
@@ -127,24 +116,23 @@ fn program(options: &Options) -> Result<(), Error> {
 }
 
 impl Options {
-    /// File names and networks.
-    fn networks(&self) -> Result<Vec<(String, Network)>, Error> {
-        let mut networks = Vec::new();
-        for path in &self.network {
+    /// Networks under their file names.
+    fn networks(&self) -> Result<Vec<NamedNetwork>, Error> {
+        let shipped = [Shipped::Paper.all()?, Shipped::Accurate.all()?].concat();
+        let shipped = shipped.into_iter().map(|(name, network)| NamedNetwork {
+            name: name.to_owned(),
+            network,
+        });
+        let chosen = self.network.iter().map(|path| {
             let network = Network::load(path)?;
-            networks.push((network.ratios().file_name(), network));
-        }
+            let name = network.ratios().file_name();
+            Ok(NamedNetwork { name, network })
+        });
+        let mut networks = chosen.collect::<Result<Vec<_>, Error>>()?;
         if networks.is_empty() {
-            let shipped = [Shipped::Paper.all()?, Shipped::Accurate.all()?].concat();
-            networks.extend(
-                shipped
-                    .into_iter()
-                    .map(|(name, one)| (name.to_owned(), one)),
-            );
+            networks.extend(shipped);
         }
-        if self.run.quick {
-            networks.truncate(1);
-        }
+        networks.truncate(if self.run.quick { 1 } else { usize::MAX });
         Ok(networks)
     }
 }
@@ -152,50 +140,47 @@ impl Options {
 /// A network under its name.
 #[derive(Clone)]
 struct Calibrated {
-    name: String,
-    network: Network,
+    named: NamedNetwork,
     calibration: Calibration,
 }
 
 impl Calibrated {
     fn key(&self) -> &str {
-        self.name.trim_end_matches(".safetensors")
+        self.named.name.trim_end_matches(".safetensors")
     }
 
     /// Cells per unit length at which the network has the scales of the convergence tests.
     fn convergence_cells(&self) -> Option<usize> {
-        let ratios = self.network.ratios();
-        let [eps, step] = DISC_SCALES;
-        let n = (ratios.eps_over_h / eps).round();
-        let fits = ratios.dimension == 2 && (ratios.step_over_h2 - n * n * step).abs() < 1e-9;
+        let ratios = self.named.network.ratios();
+        let n = (ratios.eps_over_h / EPS).round();
+        let fits = ratios.dimension == 2 && (ratios.step_over_h2 - n * n * STEP).abs() < 1e-9;
         fits.then_some(n as usize)
     }
-}
 
-/// Willmore energy and phase field after one small step.
-fn relaxed<const D: usize>(
-    network: &Network,
-    initial: &Field<D>,
-    [eps, mcf_step]: [f64; 2],
-    calibration: Factors,
-    device: &ComputeDevice,
-) -> Result<(f64, Field<D>), Error> {
-    let network = NamedNetwork {
-        name: String::new(),
-        network: network.clone(),
-    };
-    let mut operator = Operator::learned(Scheme::Paper, network)?;
-    operator.factors = calibration;
-    let scales = Scales {
-        eps,
-        mcf_step,
-        newton: NewtonParams::default(),
-    };
-    let time = (StepRule::Constant(STEP_RATIO * mcf_step), 1);
-    let case = willmore_flow("surface at rest", initial.clone(), operator, scales, time);
-    let mut run = Run::new(case, device)?;
-    let energy = run.step()?.and_then(Record::willmore_energy);
-    Ok((energy.unwrap_or(f64::NAN), run.field().clone()))
+    /// The odd part of the operator, calibrated anew.
+    fn odd_part(&self) -> Result<Self, Error> {
+        let mut odd = self.clone();
+        odd.named.network = self.named.network.odd_part();
+        odd.calibration = odd.named.network.calibrate()?;
+        Ok(odd)
+    }
+
+    /// Willmore energy and phase field after one small step with these factors.
+    fn relaxed<const D: usize>(
+        &self,
+        initial: &Field<D>,
+        scales: Scales,
+        factors: Factors,
+        device: &ComputeDevice,
+    ) -> Result<(f64, Field<D>), Error> {
+        let mut operator = Operator::learned(Scheme::Paper, self.named.clone())?;
+        operator.factors = factors;
+        let time = (StepRule::Constant(STEP_RATIO * scales.mcf_step), 1);
+        let case = willmore_flow("surface at rest", initial.clone(), operator, scales, time);
+        let mut run = Run::new(case, device)?;
+        let energy = run.step()?.and_then(Record::willmore_energy);
+        Ok((energy.unwrap_or(f64::NAN), run.field().clone()))
+    }
 }
 
 /// The Willmore energy that the scheme sees in a disc.
@@ -224,15 +209,11 @@ fn discs(
     let radii = if quick { &QUICK_RADII[..] } else { &RADII };
     let mut variants = Vec::new();
     for one in all {
-        let Some(n) = one.convergence_cells().filter(|&n| n <= 256) else {
-            continue;
-        };
-        variants.push((n, false, one.clone()));
-        if !one.name.starts_with("accurate") {
-            let mut odd = one.clone();
-            odd.network = one.network.odd_part();
-            odd.calibration = odd.network.calibrate()?;
-            variants.push((n, true, odd));
+        if let Some(n) = one.convergence_cells().filter(|&n| n <= 256) {
+            variants.push((n, false, one.clone()));
+            if !one.key().starts_with("accurate") {
+                variants.push((n, true, one.odd_part()?));
+            }
         }
     }
     let mut tasks = Vec::new();
@@ -241,16 +222,26 @@ fn discs(
             tasks.extend([1, -1].map(|phase| (variant, radius, phase)));
         }
     }
-    let order: Vec<usize> = (0..tasks.len()).rev().collect();
     let bar = progress.bar("discs", tasks.len() as u64);
-    let rows = harness::in_parallel(&order, harness::workers(device), |i| {
-        let ((n, odd_part, one), radius, phase) = tasks[i];
-        let factors = one.calibration.factors;
-        let offset = one.calibration.spontaneous_curvature / EPS * f64::from(phase);
-        let energy = |factors| disc_energy(&one.network, *n, radius, phase, factors, device);
+    let rows = harness::in_parallel(tasks.len(), harness::workers(device), |i| {
+        let (&(n, odd_part, ref one), radius, phase) = tasks[i];
+        let (sign, factors) = (f64::from(phase), one.calibration.factors);
+        let offset = one.calibration.spontaneous_curvature / EPS * sign;
+        let half = ((radius + MARGIN) * n as f64).ceil();
+        let grid = Grid::<2>::centred(2 * half as usize, 2.0 * half / n as f64)?;
+        let disc = phase_field(grid, &Ball::new([0.0, 0.0], radius)?, EPS)?;
+        let disc = disc.map(|u| sign * u);
+        // Over that of the zero level set of the relaxed disc, `pi / R`.
+        let energy = |factors| -> Result<f64, Error> {
+            let (energy, field) = one.relaxed(&disc, scales(), factors, device)?;
+            let inside = zero_set_volume(&field);
+            let outside = grid.side().powi(2) - inside;
+            let area = if phase > 0 { inside } else { outside };
+            Ok(energy * (area / PI).sqrt() / PI)
+        };
         let row = DiscRow {
-            network: one.name.clone(),
-            odd_part: *odd_part,
+            network: one.named.name.clone(),
+            odd_part,
             phase,
             radius,
             measured: energy(Factors::PAPER)?,
@@ -264,72 +255,39 @@ fn discs(
     rows
 }
 
-/// Willmore energy of a relaxed disc over that of its zero level set, `pi / R`.
-fn disc_energy(
-    network: &Network,
-    n: usize,
-    radius: f64,
-    phase: i8,
-    calibration: Factors,
-    device: &ComputeDevice,
-) -> Result<f64, Error> {
-    let half = ((radius + MARGIN) * n as f64).ceil();
-    let grid = Grid::<2>::centred(2 * half as usize, 2.0 * half / n as f64)?;
-    let sign = f64::from(phase);
-    let disc = phase_field(grid, &Ball::new([0.0, 0.0], radius)?, DISC_SCALES[0])?;
-    let disc = disc.map(|u| sign * u);
-    let (energy, field) = relaxed(network, &disc, DISC_SCALES, calibration, device)?;
-    let inside = zero_set_volume(&field);
-    let area = if phase > 0 {
-        inside
-    } else {
-        grid.side().powi(2) - inside
-    };
-    Ok(energy * (area / PI).sqrt() / PI)
-}
-
-fn discs_table(discs: &[DiscRow]) -> Tabulated<'_, DiscRow> {
-    let fixed = Format::Fixed(4);
-    Table::of(discs)
+fn discs_table(discs: &[DiscRow]) -> Sheet<'_, DiscRow> {
+    Sheet::of(discs)
         .text("network", |r| &r.network)
         .text("F", |r| if r.odd_part { "odd part" } else { "whole" })
-        .number("phase", Format::Shortest, |r| f64::from(r.phase))
-        .number("R", Format::Shortest, |r| r.radius)
-        .number("w R/π", fixed, |r| r.measured)
-        .number("predicted", fixed, |r| r.predicted)
-        .number("calibrated w R/π", fixed, |r| r.calibrated)
+        .column("phase", Shortest, |r| f64::from(r.phase))
+        .column("R", Shortest, |r| r.radius)
+        .column("w R/π", Fixed(4), |r| r.measured)
+        .column("predicted", Fixed(4), |r| r.predicted)
+        .column("calibrated w R/π", Fixed(4), |r| r.calibrated)
 }
 
 /// Measured and predicted energies over the radius; colour: phase.
 fn discs_figure(discs: &[DiscRow]) -> Figure {
     let panel = |rows: &[DiscRow]| {
-        let part = if rows[0].odd_part {
-            "odd part of F"
-        } else {
-            "F"
-        };
-        let curve = |(phase, name): (i8, &str), label, value: fn(&DiscRow) -> f64| {
-            let rows = rows.iter().filter(|row| row.phase == phase);
-            let point = |row: &DiscRow| [row.radius, value(row)];
-            Series::of(format!("{name}: {label}"), rows, point).with_colour(usize::from(phase < 0))
-        };
-        let curves = |phase| {
-            let measured = curve(phase, "without calibration", |row| row.measured);
-            let calibrated = curve(phase, "calibrated", |row| row.calibrated);
-            [
-                measured.with_symbols(Marker::Circle),
-                curve(phase, "predicted", |row| row.predicted),
-                calibrated.with_symbols(Marker::Square),
-            ]
-        };
-        let exact = Series::new("exact", [[0.0, 1.0], [0.65, 1.0]])
-            .with_colour(Colour::Black)
-            .with_style(LineStyle::Dashed);
+        let part = ["F", "odd part of F"][usize::from(rows[0].odd_part)];
         let title = format!("{}, {part}", rows[0].network);
-        LineChart::new(title, Axis::linear("radius R"), Axis::linear("w R/π"))
-            .with_curves(curves((1, "disc")))
-            .with_curves(curves((-1, "complement of a disc")))
-            .with_series(exact)
+        let mut chart = LineChart::new(title, Axis::linear("radius R"), Axis::linear("w R/π"));
+        for (colour, phase, name) in [(0, 1, "disc"), (1, -1, "complement of a disc")] {
+            let curve = |label, value: fn(&DiscRow) -> f64| {
+                let rows = rows.iter().filter(|row| row.phase == phase);
+                let point = |row: &DiscRow| [row.radius, value(row)];
+                Series::of(format!("{name}: {label}"), rows, point).with_colour(colour)
+            };
+            let measured = curve("without calibration", |row| row.measured);
+            let calibrated = curve("calibrated", |row| row.calibrated);
+            chart = chart.with_curves([
+                measured.with_symbols(Marker::Circle),
+                curve("predicted", |row| row.predicted),
+                calibrated.with_symbols(Marker::Square),
+            ]);
+        }
+        let exact = Series::new("exact", [[0.0, 1.0], [0.65, 1.0]]).with_colour(Colour::Black);
+        chart.with_series(exact.with_style(LineStyle::Dashed))
     };
     let same = |a: &DiscRow, b: &DiscRow| a.network == b.network && a.odd_part == b.odd_part;
     Figure::new("Willmore energy of discs, w R/π", 2)
@@ -349,34 +307,38 @@ struct SurfaceRow {
 }
 
 /// Balls and Clifford tori.
-fn surfaces(
+fn balls_and_tori(
     all: &[Calibrated],
     quick: bool,
     device: &ComputeDevice,
 ) -> Result<Vec<SurfaceRow>, Error> {
     let grid = Grid::<3>::per_unit(SURFACE_CELLS, SURFACE_SIDE)?;
-    let eps = SURFACE_SCALES[0];
+    let scales = surfaces::scales(SURFACE_CELLS);
     let mut shapes: Vec<(String, Field<3>, f64)> = Vec::new();
     for radius in BALLS {
-        let ball = phase_field(grid, &Ball::new([0.0; 3], radius)?, eps)?;
+        let ball = phase_field(grid, &Ball::new([0.0; 3], radius)?, scales.eps)?;
         shapes.push((format!("ball, R = {radius}"), ball, 8.0 * PI));
     }
     for outer in TORI {
-        let torus = phase_field(grid, &Torus::clifford(outer)?, eps)?;
+        let torus = phase_field(grid, &Torus::clifford(outer)?, scales.eps)?;
         shapes.push((format!("Clifford torus, {outer:.2}"), torus, 4.0 * PI * PI));
     }
     if quick {
         shapes.truncate(1);
     }
     let mut rows = Vec::new();
-    for one in all.iter().filter(|one| one.network.ratios().dimension == 3) {
-        let network = one.network.odd_part();
+    for one in all
+        .iter()
+        .filter(|one| one.named.network.ratios().dimension == 3)
+    {
+        let mut odd = one.clone();
+        odd.named.network = one.named.network.odd_part();
         for (surface, initial, exact) in &shapes {
             let energy = |factors| -> Result<f64, Error> {
-                Ok(relaxed(&network, initial, SURFACE_SCALES, factors, device)?.0 / exact)
+                Ok(odd.relaxed(initial, scales, factors, device)?.0 / exact)
             };
             rows.push(SurfaceRow {
-                network: one.name.clone(),
+                network: one.named.name.clone(),
                 surface: surface.clone(),
                 measured: energy(Factors::PAPER)?,
                 calibrated: energy(one.calibration.factors)?,
@@ -386,13 +348,12 @@ fn surfaces(
     Ok(rows)
 }
 
-fn surfaces_table(rows: &[SurfaceRow]) -> Tabulated<'_, SurfaceRow> {
-    let fixed = Format::Fixed(4);
-    Table::of(rows)
+fn surfaces_table(rows: &[SurfaceRow]) -> Sheet<'_, SurfaceRow> {
+    Sheet::of(rows)
         .text("network", |r| &r.network)
         .text("surface", |r| &r.surface)
-        .number("w / exact", fixed, |r| r.measured)
-        .number("calibrated w / exact", fixed, |r| r.calibrated)
+        .column("w / exact", Fixed(4), |r| r.measured)
+        .column("calibrated w / exact", Fixed(4), |r| r.calibrated)
 }
 
 /// What tells good networks from bad ones.
@@ -414,46 +375,37 @@ fn diagnostics(
 ) -> Result<Vec<Diagnostics>, Error> {
     let count: usize = if quick { 3 } else { 12 };
     // Kernels of width 65 have a thousand planes; surfaces have millions of nodes.
-    let small =
-        |one: &&Calibrated| one.network.ratios().width < 65 && one.network.ratios().dimension == 2;
-    let diagnose = |one: &Calibrated| {
-        let cells = one.network.provenance().reference_cells;
-        let data = SphereData::new(one.network.ratios(), cells)?;
+    let networks = all.iter().map(|one| (one.key(), &one.named.network));
+    let small = networks
+        .filter(|(_, network)| network.ratios().width < 65 && network.ratios().dimension == 2);
+    let diagnose = |(name, network): (&str, &Network)| {
+        let data = SphereData::new(network.ratios(), network.provenance().reference_cells)?;
         let mut displacement = Vec::new();
         for i in 0..count {
             let radius = 0.05 * (0.42_f64 / 0.05).powf(i as f64 / (count - 1) as f64);
             let curvature = data.eps() / radius;
-            let errors = displacement_errors(&one.network, &data, radius, device)?;
-            displacement.push([curvature, errors[0]]);
-            displacement.push([-curvature, errors[1]]);
+            let [convex, concave] = displacement_errors(network, &data, radius, device)?;
+            displacement.extend([[curvature, convex], [-curvature, concave]]);
         }
         displacement.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        let bend = (0..=400).map(|i| {
-            let w = f64::from(i) / 200.0 - 1.0;
-            [w, one.network.activation().jet(w)[2]]
-        });
+        let bend = (0..=400).map(|i| f64::from(i) / 200.0 - 1.0);
         Ok(Diagnostics {
-            network: one.key().to_owned(),
+            network: name.to_owned(),
             displacement,
-            spectrum: one.network.flat_spectrum()?,
-            bend: bend.collect(),
+            spectrum: network.flat_spectrum()?,
+            bend: bend.map(|w| [w, network.activation().jet(w)[2]]).collect(),
         })
     };
-    all.iter().filter(small).map(diagnose).collect()
+    small.map(diagnose).collect()
 }
 
 fn diagnostics_figure(all: &[Diagnostics]) -> Figure {
     let chart = |title, x, y, points: fn(&Diagnostics) -> Vec<[f64; 2]>| {
         let curves = all.iter().enumerate().map(|(k, one)| {
             let accurate = one.network.starts_with("accurate");
-            let style = if accurate {
-                LineStyle::Dashed
-            } else {
-                LineStyle::Solid
-            };
-            Series::new(one.network.clone(), points(one))
-                .with_colour(k % 8)
-                .with_style(style)
+            let style = [LineStyle::Solid, LineStyle::Dashed][usize::from(accurate)];
+            let curve = Series::new(one.network.clone(), points(one));
+            curve.with_colour(k % 8).with_style(style)
         });
         LineChart::new(title, Axis::linear(x), Axis::linear(y)).with_curves(curves)
     };
@@ -472,9 +424,8 @@ fn diagnostics_figure(all: &[Diagnostics]) -> Figure {
             first.map(|(i, value)| [(i + 1) as f64, value[0]]).collect()
         },
     );
-    let bend = chart("Second derivative of F", "w", "F''(w)", |one| {
-        one.bend.clone()
-    });
+    let bend = |one: &Diagnostics| one.bend.clone();
+    let bend = chart("Second derivative of F", "w", "F''(w)", bend);
     Figure::new("Diagnostics of the learned operators", 2)
         .with_panels([displacement, spectrum, bend])
         .with_shared_legend()
@@ -494,26 +445,22 @@ fn elements() -> Result<Vec<(String, Calibration)>, Error> {
         let semi_implicit = FiniteElementStep::semi_implicit(&plane, eps, step)?;
         add("semi-implicit", 2, ratios, semi_implicit.calibrate()?);
     }
-    let [eps, step] = ELEMENTS[0];
-    let implicit = FiniteElementStep::implicit(&space, eps, step)?;
+    let implicit = FiniteElementStep::implicit(&space, ELEMENTS[0][0], ELEMENTS[0][1])?;
     add("implicit", 3, ELEMENTS[0], implicit.calibrate()?);
     Ok(all)
 }
 
-fn calibration_table(session: &mut Session<'_>, all: &[Calibrated]) -> Result<(), Error> {
-    let learned = all.iter().map(|one| (one.name.clone(), one.calibration));
-    let rows: Vec<(String, Calibration)> = learned.chain(elements()?).collect();
-    let (fixed, small) = (Format::Fixed(4), Format::Scientific(1));
-    let table = Table::of(&rows)
+fn calibrations_table(rows: &[(String, Calibration)]) -> Sheet<'_, (String, Calibration)> {
+    let small = Scientific(1);
+    Sheet::of(rows)
         .text("network", |(name, _)| name)
-        .number("c", fixed, |(_, c)| c.factors.energy)
-        .number("m", fixed, |(_, c)| c.factors.metric)
-        .number("c/m", fixed, |(_, c)| c.factors.speed())
-        .number("displacement", fixed, |(_, c)| c.displacement)
-        .number("cos² of ψ and w'", fixed, |(_, c)| c.alignment)
-        .number("ε κ₀", small, |(_, c)| c.spontaneous_curvature)
-        .number("eigenvalue - 1", small, |(_, c)| c.eigenvalue - 1.0)
-        .number("spread over positions", small, |(_, c)| c.position_spread)
-        .number("spread over normals", small, |(_, c)| c.normal_spread);
-    session.table(table, "calibration")
+        .column("c", Fixed(4), |(_, c)| c.factors.energy)
+        .column("m", Fixed(4), |(_, c)| c.factors.metric)
+        .column("c/m", Fixed(4), |(_, c)| c.factors.speed())
+        .column("displacement", Fixed(4), |(_, c)| c.displacement)
+        .column("cos² of ψ and w'", Fixed(4), |(_, c)| c.alignment)
+        .column("ε κ₀", small, |(_, c)| c.spontaneous_curvature)
+        .column("eigenvalue - 1", small, |(_, c)| c.eigenvalue - 1.0)
+        .column("spread over positions", small, |(_, c)| c.position_spread)
+        .column("spread over normals", small, |(_, c)| c.normal_spread)
 }

@@ -1,23 +1,14 @@
 //! Convergence test on circles: mean curvature flow and Willmore flow against the exact solutions.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use engine::{Flow, Method};
+use engine::Flow;
 use experiments::circles::{self, Circle, Ensemble};
-use experiments::networks::{EPS, NetworkOptions, STEP, convergence_ratios};
-use experiments::session::Session;
+use experiments::look;
+use experiments::networks::{EPS, STEP};
+use experiments::prelude::*;
+use experiments::session::remove_folder;
 use experiments::steps::{self, Rows};
 use experiments::study::{Study, StudyOptions, Variant};
-use experiments::training::{NetworkSpec, Trainer, training_device};
-use experiments::{Error, harness, look};
-use model::training::levenberg_marquardt::LmParams;
-use operators::ComputeDevice;
-use report::{
-    Axis, Cell, Figure, Format, LineChart, Marker, OutputDir, Series, Summary, Table, Tabulated,
-};
-use runs::Cache;
-use serde_json::json;
+use report::{OutputDir, Table};
 use solver::StepRecord;
 
 const PROGRAM: &str = "circle_convergence";
@@ -41,10 +32,6 @@ struct Options {
     /// Take some of the 30 circles only, evenly chosen
     #[arg(long, value_name = "COUNT")]
     circles: Option<usize>,
-
-    /// Train the networks first, instead of loading them
-    #[arg(long, conflicts_with = "network")]
-    retrain: bool,
 }
 
 impl Options {
@@ -72,19 +59,15 @@ fn program(options: &Options) -> Result<(), Error> {
         (circles::COUNT, circles::STEPS)
     };
     let count = options.circles.unwrap_or(all);
-    if !(1..=circles::COUNT).contains(&count) {
-        let message = format!(
+    require(
+        (1..=circles::COUNT).contains(&count),
+        format!(
             "--circles must be from 1 to {}, not {count}",
             circles::COUNT
-        );
-        return Err(Error::Options(message));
-    }
+        ),
+    )?;
     let (variants, device) = (options.variants(), run.open_device()?);
-    let study = if options.retrain {
-        Study::new(&retrained(options, &variants, &device)?, &variants)?
-    } else {
-        Study::new(&options.study.networks, &variants)?
-    };
+    let study = Study::new(&options.study.networks, &variants)?;
     let parameters = json!({
         "cells": study.cells,
         "runs": study.variants().collect::<Vec<_>>(),
@@ -93,18 +76,17 @@ fn program(options: &Options) -> Result<(), Error> {
         "eps": EPS,
         "time_step": STEP,
         "networks": study.checksums(),
-        "retrained": options.retrain,
     });
     let mut session = Session::open(PROGRAM, run, device, parameters)?;
-    let finished = Cache::open(session.output.as_path().join("partial"))?;
+    let finished = session.output.subfolder("partial")?;
     let mut ensembles = Vec::new();
     for planned in &study.plan {
         let Variant { flow, n, .. } = planned.0;
         let title = format!("{}, {}, n = {n}", flow.title(), planned.0.label());
-        let bar = session.progress.bar(title.clone(), (count * steps) as u64);
-        let device = session.device.clone();
+        let bar = session.progress.bar(title.clone(), count as u64);
+        let (device, folder) = (session.device.clone(), finished.as_path());
         ensembles.push(session.phase(title, || {
-            Ensemble::run(planned, (count, steps), &device, &finished, &bar)
+            Ensemble::run(planned, (count, steps), &device, folder, &bar)
         })?);
         bar.finish();
     }
@@ -115,38 +97,10 @@ fn program(options: &Options) -> Result<(), Error> {
     };
     report.figures(&session)?;
     report.data(&session.output)?;
-    session.table(report.table(), "errors")?;
-    report.summarize(&mut session.summary)?;
-    finished.remove()?;
+    session.sheet(report.sheet(), "errors")?;
+    report.metrics(&mut session)?;
+    remove_folder(&finished)?;
     session.finish("Mean L2 distance to the exact solution")
-}
-
-/// Trains the networks of all resolutions, and says where they are.
-fn retrained(
-    options: &Options,
-    variants: &[Variant],
-    device: &ComputeDevice,
-) -> Result<NetworkOptions, Error> {
-    let run = &options.study.run;
-    let mut cells = options.study.cells();
-    cells.retain(|n| variants.iter().any(|v| v.method.is_learned() && v.n == *n));
-    if cells.is_empty() {
-        return Err(model::Error::NetworkNotNeeded.into());
-    }
-    let (device, output) = (training_device(device)?, run.open_output(PROGRAM)?);
-    let (folder, progress) = (output.subfolder("networks")?, run.progress());
-    let trainer = Trainer::open(run, &device, &output, &progress, false)?;
-    let mut network = Vec::new();
-    for n in cells {
-        let ratios = convergence_ratios(n)?;
-        let spec = NetworkSpec::new(format!("n{n}"), ratios, n);
-        let trained = trainer.train(&spec, "lm", &LmParams::new(run.quick))?;
-        let path = folder.path(&ratios.file_name())?;
-        trained.network.save(&path)?;
-        network.push(path);
-    }
-    trainer.checkpoints.remove()?;
-    Ok(NetworkOptions { network })
 }
 
 /// Turns the ensembles into files.
@@ -183,17 +137,17 @@ impl Report {
     }
 
     fn figures(&self, session: &Session<'_>) -> Result<(), Error> {
-        let last = time(self.steps);
-        let over_time = "Error on circles over time".to_owned();
-        let over_radius = format!("Error on circles at t = {last:.4} over the radius");
+        let end = time(self.steps);
+        let over_radius = format!("Error on circles at t = {end:.4} over the radius");
         let work = "Work per step of Willmore flow, mean over the circles".to_owned();
+        let over_time = Figure::new("Error on circles over time", 2).with_panels(self.over_time());
+        let over_time = over_time.with_shared_legend().with_note(self.circles());
+        session.figure(over_time, "convergence")?;
         for (title, charts, stem) in [
-            (over_time, self.over_time(), "convergence"),
             (over_radius, self.over_radius(), "error_over_radius"),
             (work, self.work(), "work_per_step"),
         ] {
-            let mut figure = Figure::new(title, 2).with_panels(charts);
-            figure.note = (stem == "convergence").then(|| self.circles());
+            let figure = Figure::new(title, 2).with_panels(charts);
             session.figure(figure.with_shared_legend(), stem)?;
         }
         session.figure(self.cost(), "error_over_cost")
@@ -238,46 +192,42 @@ impl Report {
         ];
         counts.map(|(label, count)| {
             let mut highest = 1.0_f64;
-            let curves = self.of_flow(Flow::Willmore).map(|e| {
+            let mut curves = Vec::new();
+            for e in self.of_flow(Flow::Willmore) {
                 let of = |circle: &Circle, k: usize| {
-                    circle.records[k].minimization.as_ref().map_or(0.0, count)
+                    let made = &circle.trajectory.records[k].minimization;
+                    made.as_ref().map_or(0.0, count)
                 };
-                let points = (0..self.steps).map(|k| [time(k + 1), e.mean(|circle| of(circle, k))]);
-                let points: Vec<[f64; 2]> = points.collect();
+                let point = |k| [time(k + 1), e.mean(|circle| of(circle, k))];
+                let points: Vec<[f64; 2]> = (0..self.steps).map(point).collect();
                 highest = points.iter().map(|point| point[1]).fold(highest, f64::max);
-                self.study.series(e.variant, points).with_width(1.8)
-            });
-            let curves: Vec<Series> = curves.collect();
+                curves.push(self.study.series(e.variant, points).with_width(1.8));
+            }
             let y = Axis::linear(label).with_range(0.0, 1.1 * highest);
-            self.study
-                .chart(LineChart::new("", Axis::linear("time t"), y), curves)
+            let chart = LineChart::new("", Axis::linear("time t"), y);
+            self.study.chart(chart, curves)
         })
     }
 
     /// Error at the end over the mean wall time of a circle, a curve for each method and scheme.
     fn cost(&self) -> Figure {
-        let (steps, variant) = (self.steps, |e: &Ensemble| {
-            (e.variant.method, e.variant.scheme)
-        });
-        let axes = (
-            Axis::log("wall time per circle [s]"),
-            Axis::log(format!("mean L² error at t = {:.4}", time(steps))),
-        );
-        let shown =
-            look::variants(|wanted| self.of_flow(Flow::Willmore).any(|e| variant(e) == wanted));
-        let curves = shown.map(|wanted| {
-            let own: Vec<&Ensemble> = (self.of_flow(Flow::Willmore))
-                .filter(|e| variant(e) == wanted)
+        let steps = self.steps;
+        let own = |look| (self.of_flow(Flow::Willmore)).filter(move |e| e.variant.look() == look);
+        let shown = look::variants(|look| own(look).next().is_some());
+        let curves = shown.map(|(method, scheme)| {
+            let cells: Vec<String> = own((method, scheme))
+                .map(|e| e.variant.n.to_string())
                 .collect();
-            let cells: Vec<String> = own.iter().map(|e| e.variant.n.to_string()).collect();
-            let name = format!("{}, n = {}", own[0].variant.label(), cells.join(", "));
+            let name = format!("{}, n = {}", method.label_in(scheme), cells.join(", "));
             let point = |e: &Ensemble| [e.seconds_per_step() * steps as f64, e.mean_error(steps)];
-            Series::of(name, own, point)
-                .with_colour(look::colour(wanted.0, wanted.1))
+            Series::of(name, own((method, scheme)), point)
+                .with_colour(look::colour(method, scheme))
                 .with_marker(Marker::Circle)
         });
+        let error = Axis::log(format!("mean L² error at t = {:.4}", time(steps)));
+        let chart = LineChart::new("", Axis::log("wall time per circle [s]"), error);
         Figure::new("Willmore flow of circles: accuracy against cost", 1)
-            .with_panel(LineChart::new("", axes.0, axes.1).with_curves(curves))
+            .with_panel(chart.with_curves(curves))
             .with_shared_legend()
             .with_note(format!(
                 "{steps} time steps; mean over {} circles, each on one core.",
@@ -293,22 +243,20 @@ impl Report {
         for e in &self.ensembles {
             for k in 0..=self.steps {
                 let [least, most] = e.error_range(k);
-                let errors = [time(k), e.mean_error(k), least, most].map(Cell::from);
-                let row = e.variant.cells().into_iter().chain([k.into()]);
-                curves.push(row.chain(errors))?;
+                let errors = [time(k), e.mean_error(k), least, most];
+                curves.push(e.variant.row([k.into()], errors))?;
             }
             for circle in &e.circles {
                 for k in self.shown_steps() {
-                    let errors = [time(k), circle.error(k)].map(Cell::from);
-                    let row = (e.variant.cells().into_iter()).chain([circle.radius.into()]);
-                    circles.push(row.chain([k.into()]).chain(errors))?;
+                    let which = [circle.radius.into(), k.into()];
+                    circles.push(e.variant.row(which, [time(k), circle.error(k)]))?;
                 }
             }
             if e.variant.flow == Flow::Willmore {
                 runs.extend(e.circles.iter().map(|circle| Rows {
                     leading: [&e.variant.cells()[1..], &[circle.radius.into()]].concat(),
                     start: None,
-                    records: &circle.records,
+                    records: &circle.trajectory.records,
                 }));
             }
         }
@@ -321,47 +269,35 @@ impl Report {
         Ok(())
     }
 
-    fn table(&self) -> Tabulated<'_, Ensemble> {
-        let mut table = Table::of(&self.ensembles)
+    /// The mean errors, and of Willmore flow the work.
+    fn sheet(&self) -> Sheet<'_, Ensemble> {
+        let mut sheet = Sheet::of(&self.ensembles)
+            .keyed(|e, name| format!("{}.{name}", e.key()))
             .text("flow", |e| e.variant.flow.title())
-            .number("n", Format::Shortest, |e| e.variant.n)
+            .column("n", Shortest, |e| e.variant.n)
             .text("method", |e| e.variant.label());
         for k in self.shown_steps() {
-            table = table.number(format!("step {k}"), Format::Fixed(5), |e| e.mean_error(k));
+            let (metric, head) = (format!("l2.step{k}"), format!("step {k}"));
+            sheet = sheet.measure(&metric, (&head, Fixed(5)), |e| e.mean_error(k));
         }
         let hvp = |e: &Ensemble| e.mean_of_steps(StepRecord::hvp);
-        table.number("HVP/step", Format::Fixed(1), hvp)
+        sheet.measure("hvp_per_step", ("HVP/step", Fixed(1)), hvp)
     }
 
-    fn summarize(&self, summary: &mut Summary) -> Result<(), Error> {
-        for e in &self.ensembles {
-            let key = e.key();
-            for k in self.shown_steps() {
-                summary.insert(&format!("{key}.l2.step{k}"), e.mean_error(k))?;
-            }
-            if e.variant.flow == Flow::Willmore {
-                let per_step = [
-                    ("hvp", e.mean_of_steps(StepRecord::hvp)),
-                    ("newton", e.mean_of_steps(|r| r.newton.newton as f64)),
-                    ("seconds", Some(e.seconds_per_step())),
-                ];
-                for (what, value) in per_step {
-                    summary.insert(&format!("{key}.{what}_per_step"), value.unwrap_or(f64::NAN))?;
-                }
-                let counts = [
-                    ("energy_increases", e.energy_increases()),
-                    ("negative_curvature", e.negative_curvature()),
-                ];
-                for (what, count) in counts {
-                    summary.insert_count(&format!("{key}.{what}"), count)?;
-                }
-            }
+    /// Further metrics of Willmore flow, and the scale of both flows.
+    fn metrics(&self, session: &mut Session<'_>) -> Result<(), Error> {
+        for e in self.of_flow(Flow::Willmore) {
+            let newton = e.mean_of_steps(|r| r.newton.newton as f64);
+            let metrics = [
+                ("newton_per_step", newton.into()),
+                ("seconds_per_step", e.seconds_per_step().into()),
+                ("energy_increases", e.energy_increases().into()),
+                ("negative_curvature", e.negative_curvature().into()),
+            ];
+            session.metrics(&e.key(), metrics)?;
         }
-        for flow in Flow::ALL {
-            if let Some(scale) = self.scale(flow) {
-                summary.insert(&format!("{}.scale", flow.key()), scale)?;
-            }
-        }
-        Ok(())
+        let scales = Flow::ALL.map(|flow| (flow.key(), self.scale(flow)));
+        (scales.into_iter())
+            .try_for_each(|(flow, scale)| session.metric(&format!("{flow}.scale"), scale))
     }
 }

@@ -1,9 +1,7 @@
 //! The cross under Willmore flow.
 
-use std::process::ExitCode;
-
-use engine::Flow;
 use experiments::comparison::{self, Setting};
+use experiments::prelude::*;
 
 const CROSS: Setting = Setting {
     program: "cross",

@@ -1,24 +1,18 @@
 //! Noise taken off meshes by Willmore flow, by Taubin's smoothing and by Laplacian smoothing.
 
 use std::path::PathBuf;
-use std::process::ExitCode;
 use std::time::Instant;
 
-use clap::Parser;
-use engine::{
-    Case, DISPLACEMENT, Flow, Measure, Method, Operator, Run, Scales, Scheme, StepRule, Stop,
-};
-use experiments::meshes::{folder, signed_distance};
-use experiments::session::Session;
-use experiments::surfaces::centred_box;
-use experiments::{Error, harness, options::RunOptions};
-use geometry::{Field, Placement, SignedDistance, UpAxis, optimal_profile};
+use engine::{DISPLACEMENT, Stop};
+use experiments::meshes::{folder, sampled};
+use experiments::prelude::*;
+use experiments::surfaces::{centred_box, willmore_flow};
+use geometry::{Placement, SignedDistance, UpAxis, optimal_profile};
 use model::Networks;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use render::Scene;
-use report::{Axis, Figure, Format, LineChart, LineStyle, Raster, Series, Table};
-use serde_json::json;
+use report::Raster;
 use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, samples, usual_up_axis};
 
 const TITLE: &str = "Noise of meshes taken off";
@@ -60,15 +54,22 @@ struct Clean {
 }
 
 /// What became of a noisy mesh by one method.
-struct Row {
-    /// Of the mesh and its noise, in metrics.
-    key: String,
-    mesh: String,
+struct Row<'a> {
+    clean: &'a Clean,
     noise: f64,
     method: &'static str,
     iterations: Option<usize>,
     quality: Quality,
     seconds: f64,
+    result: TriangleMesh,
+}
+
+impl Row<'_> {
+    /// Prefix of its metrics.
+    fn key(&self) -> String {
+        let method = self.method.to_lowercase();
+        format!("{}.{method}", self.clean.key(self.noise))
+    }
 }
 
 /// How near a mesh is to the clean one.
@@ -84,11 +85,9 @@ struct Quality {
 
 fn program(options: &Options) -> Result<(), Error> {
     let device = options.run.open_device()?;
-    let (noises, cells) = if options.run.quick {
-        (&NOISES[..1], 64)
-    } else {
-        (&NOISES[..], CELLS)
-    };
+    let quick = options.run.quick;
+    let noises = if quick { &NOISES[..1] } else { &NOISES };
+    let cells = if quick { 64 } else { CELLS };
     let meshes = clean_meshes(options)?;
     let names: Vec<&str> = meshes.iter().map(|clean| clean.name.as_str()).collect();
     let parameters = json!({ "meshes": names, "noise_percent": noises, "cells": cells, "side": SIDE,
@@ -97,89 +96,92 @@ fn program(options: &Options) -> Result<(), Error> {
     let (mut rows, mut charts, mut pictures) = (Vec::new(), Vec::new(), Vec::new());
     for clean in &meshes {
         for &noise in noises {
-            let noisy = clean.with_noise(noise, options.run.seed);
-            let key = clean.key(noise);
-            let of_case = |method, iterations, quality, seconds| Row {
-                key: key.clone(),
-                mesh: clean.name.clone(),
-                noise,
-                method,
-                iterations,
-                quality,
-                seconds,
-            };
-            rows.push(of_case("noisy", None, clean.quality(&noisy), 0.0));
-            let clock = Instant::now();
-            let title = format!("{}, noise {noise} %", clean.name);
-            let faired = fair(&mut session, &noisy, cells, &title)?;
-            let quality = clean.quality(&faired);
-            rows.push(of_case(
-                "fair",
-                None,
-                quality,
-                clock.elapsed().as_secs_f64(),
-            ));
-            let mut curves = Vec::new();
-            let mut shown = vec![
-                ("clean", clean.mesh.mesh().clone()),
-                ("noisy", noisy.clone()),
-            ];
-            for (method, factors) in [("Taubin", TAUBIN), ("Laplacian", LAPLACIAN)] {
-                let clock = Instant::now();
-                let smoothed = |count| noisy.smoothed(count, factors[0], factors[1]);
-                let all: Vec<Quality> = (1..=ITERATIONS)
-                    .map(|count| clean.quality(&smoothed(count)))
-                    .collect();
-                let seconds = clock.elapsed().as_secs_f64() / ITERATIONS as f64;
-                let best = (2..ITERATIONS).min_by(|&a, &b| all[a].rms.total_cmp(&all[b].rms));
-                let best = best.unwrap_or(2);
-                let least = all[2..].iter().map(|q| q.normals).fold(f64::MAX, f64::min);
-                rows.push(of_case(method, Some(best + 1), all[best], seconds));
-                let metric = format!("{key}.{}.least_normals", method.to_lowercase());
-                session.summary.insert(&metric, least)?;
-                shown.push((method, smoothed(best + 1)));
-                let points = all.iter().enumerate();
-                let points: Vec<_> = points
-                    .map(|(k, quality)| [(k + 1) as f64, quality.rms])
-                    .collect();
-                curves.push(Series::new(method, points).with_colour(curves.len() + 1));
-            }
-            shown.push(("fair", faired));
-            let ends = [1.0, ITERATIONS as f64].map(|x| [x, quality.rms]);
-            curves.push(Series::new("fair", ends).with_colour(0));
-            let level = [1.0, ITERATIONS as f64].map(|x| [x, clean.quality(&noisy).rms]);
-            curves.push(
-                Series::new("noisy", level)
-                    .with_colour(4)
-                    .with_style(LineStyle::Dotted),
-            );
-            let axes = (
-                Axis::linear("iterations"),
-                Axis::log("distance, % of the longest side"),
-            );
-            charts.push(LineChart::new(title, axes.0, axes.1).with_curves(curves));
+            let (methods, chart) = denoise(&mut session, clean, noise, cells)?;
+            charts.push(chart);
             if noise.to_bits() == noises[0].to_bits() {
-                let draw = || {
-                    shown
-                        .iter()
-                        .map(|(name, mesh)| clean.picture(name, mesh))
-                        .collect::<Result<Vec<_>, _>>()
-                };
-                pictures.extend(session.phase("pictures", draw)?);
+                let results = [0, 2, 3, 1].map(|k| (methods[k].method, &methods[k].result));
+                let shown = [("clean", clean.mesh.mesh())].into_iter().chain(results);
+                let drawn = shown.map(|(name, mesh)| clean.picture(name, mesh));
+                pictures.extend(session.phase::<Vec<_>>("pictures", || drawn.collect())?);
             }
+            rows.extend(methods);
         }
     }
-    summarize(&mut session, &rows)?;
-    let figure = Figure::new(
-        format!("{TITLE}: distance to the clean surface"),
-        noises.len(),
-    );
-    session.figure(figure.with_panels(charts).with_shared_legend(), "distances")?;
-    let figure = Figure::new(format!("{TITLE}: noise of {} %", noises[0]), 5)
+    let table = Sheet::of(&rows)
+        .keyed(|row, name| format!("{}.{name}", row.key()))
+        .text("mesh", |row| &row.clean.name)
+        .column("noise, %", Shortest, |row| row.noise)
+        .text("method", |row| row.method)
+        .column("iterations", Shortest, |row| row.iterations)
+        .measure("rms", ("distance, %", Fixed(4)), |row| row.quality.rms)
+        .measure("normals", ("normals, degrees", Fixed(2)), |row| {
+            row.quality.normals
+        })
+        .measure("volume", ("volume, %", Fixed(3)), |row| row.quality.volume)
+        .column("seconds", Fixed(2), |row| row.seconds);
+    session.sheet(table, "denoising")?;
+    let title = format!("{TITLE}: distance to the clean surface");
+    let figure = Figure::new(title, noises.len()).with_panels(charts);
+    session.figure(figure.with_shared_legend(), "distances")?;
+    let surfaces = Figure::new(format!("{TITLE}: noise of {} %", noises[0]), 5)
         .with_row_labels(names)
         .with_panels(pictures);
-    session.figure(figure, "surfaces")?;
+    session.figure(surfaces, "surfaces")?;
     session.finish(TITLE)
+}
+
+/// A mesh with noise, and what `fair`, Taubin's and Laplacian smoothing make of it, and the distances over the number of iterations.
+fn denoise<'a>(
+    session: &mut Session<'_>,
+    clean: &'a Clean,
+    noise: f64,
+    cells: usize,
+) -> Result<(Vec<Row<'a>>, LineChart), Error> {
+    let noisy = clean.with_noise(noise, session.options.seed);
+    let row = |method, iterations, result: TriangleMesh, seconds| Row {
+        clean,
+        noise,
+        method,
+        iterations,
+        quality: clean.quality(&result),
+        seconds,
+        result,
+    };
+    let title = format!("{}, noise {noise} %", clean.name);
+    let clock = Instant::now();
+    let faired = fair(session, &noisy, cells, &title)?;
+    let fair = row("fair", None, faired, clock.elapsed().as_secs_f64());
+    let mut rows = vec![row("noisy", None, noisy.clone(), 0.0)];
+    let mut curves = Vec::new();
+    for (colour, method, factors) in [(1, "Taubin", TAUBIN), (2, "Laplacian", LAPLACIAN)] {
+        let clock = Instant::now();
+        let smoothed = |count| noisy.smoothed(count, factors[0], factors[1]);
+        let all = (1..=ITERATIONS).map(|count| clean.quality(&smoothed(count)));
+        let all: Vec<Quality> = all.collect();
+        let seconds = clock.elapsed().as_secs_f64() / ITERATIONS as f64;
+        let best = (2..ITERATIONS).min_by(|&a, &b| all[a].rms.total_cmp(&all[b].rms));
+        let best = best.unwrap_or(2) + 1;
+        let least = all[2..].iter().map(|q| q.normals).fold(f64::MAX, f64::min);
+        let row = row(method, Some(best), smoothed(best), seconds);
+        session.metric(&format!("{}.least_normals", row.key()), least)?;
+        rows.push(row);
+        let points = (1..).zip(&all);
+        let curve = Series::of(method, points, |(k, quality)| [f64::from(k), quality.rms]);
+        curves.push(curve.with_colour(colour));
+    }
+    let ratio = fair.quality.rms / rows[1].quality.rms;
+    session.metric(&format!("{}.fair_over_taubin", clean.key(noise)), ratio)?;
+    let level = |name, quality: &Quality| {
+        let ends = [1.0, ITERATIONS as f64].map(|x| [x, quality.rms]);
+        Series::new(name, ends)
+    };
+    curves.push(level("fair", &fair.quality).with_colour(0));
+    let noisy = level("noisy", &rows[0].quality).with_colour(4);
+    curves.push(noisy.with_style(LineStyle::Dotted));
+    rows.insert(1, fair);
+    let distance = Axis::log("distance, % of the longest side");
+    let chart = LineChart::new(title, Axis::linear("iterations"), distance);
+    Ok((rows, chart.with_curves(curves)))
 }
 
 /// The built-in shapes, and the meshes that are chosen or here.
@@ -196,11 +198,8 @@ fn clean_meshes(options: &Options) -> Result<Vec<Clean>, Error> {
     for path in files {
         let (mesh, _) = ClosedMesh::new(surfaces::read(&path)?)?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
-        meshes.push(Clean::new(
-            &name.replace('.', "_"),
-            mesh,
-            usual_up_axis(&path)?,
-        ));
+        let name = name.replace('.', "_");
+        meshes.push(Clean::new(&name, mesh, usual_up_axis(&path)?));
     }
     Ok(meshes)
 }
@@ -231,10 +230,8 @@ impl Clean {
     }
 
     fn quality(&self, mesh: &TriangleMesh) -> Quality {
-        let squares = mesh
-            .vertices
-            .iter()
-            .map(|&x| self.distance.signed_distance(x).powi(2));
+        let vertices = mesh.vertices.iter();
+        let squares = vertices.map(|&x| self.distance.signed_distance(x).powi(2));
         let rms = (squares.sum::<f64>() / mesh.vertices.len() as f64).sqrt();
         let clean = self.mesh.mesh();
         let angles = mesh.faces.iter().map(|&face| {
@@ -262,11 +259,8 @@ impl Clean {
         let mut distance = MeshDistance::new(&mesh.placed(&placement)).sample(grid, || ())?;
         surfaces::mend_signs(&mut distance);
         let scene = Scene::from_signed_distance(&distance)?.up(self.up);
-        let picture = scene
-            .azimuth(-60.0)
-            .elevation(25.0)
-            .margin(0.02)
-            .render(DRAWN.1)?;
+        let scene = scene.azimuth(-60.0).elevation(25.0).margin(0.02);
+        let picture = scene.render(DRAWN.1)?;
         let size = [picture.width() as usize, picture.height() as usize];
         Ok(Raster::new(size, picture.pixels()).with_caption(caption))
     }
@@ -285,7 +279,8 @@ fn fair(
     let scales = Scales::of_grid(grid.spacing(), 2.0);
     let placement = Placement::fit(&fairing.start().bounding_box(), &grid, SIDE, 0.0)?;
     let bar = session.progress.bar(title.to_owned(), cells as u64);
-    let mut distance = signed_distance(&fairing.start().placed(&placement), grid, &bar)?;
+    let distance = MeshDistance::new(&fairing.start().placed(&placement));
+    let mut distance = sampled(&distance, grid, &bar)?;
     surfaces::mend_signs(&mut distance);
     let initial: Field<3> = distance.map(|s| optimal_profile(s, scales.eps));
     let followed = fairing.follow(placement, &initial, scales.eps)?;
@@ -297,19 +292,14 @@ fn fair(
         let gone = measured.0.displacement(&measured.1, u).ok();
         Ok(gone.map(|gone| gone * placement.scale()))
     });
+    let rule = StepRule::Doubling(Fairing::first_step(grid.spacing()));
     let case = Case {
-        shape: title.to_owned(),
-        initial,
-        region: None,
-        flow: Flow::Willmore,
-        operator,
-        scales,
-        steps: StepRule::Doubling(Fairing::first_step(grid.spacing())).into(),
         stops: vec![
             Stop::Time(fairing.time(grid.spacing(), placement.scale())),
             Stop::Displacement(fairing.farthest() * placement.scale()),
         ],
         measures: vec![displacement],
+        ..willmore_flow(title, initial, operator, scales, (rule, 0))
     };
     let device = session.device.clone();
     let faired = session.phase(title, || {
@@ -319,39 +309,4 @@ fn fair(
     })?;
     bar.finish();
     Ok(faired)
-}
-
-fn summarize(session: &mut Session<'_>, rows: &[Row]) -> Result<(), Error> {
-    let table = Table::of(rows)
-        .text("mesh", |row| row.mesh.as_str())
-        .number("noise, %", Format::Shortest, |row| row.noise)
-        .text("method", |row| row.method)
-        .number("iterations", Format::Shortest, |row| row.iterations)
-        .number("distance, %", Format::Fixed(4), |row| row.quality.rms)
-        .number("normals, degrees", Format::Fixed(2), |row| {
-            row.quality.normals
-        })
-        .number("volume, %", Format::Fixed(3), |row| row.quality.volume)
-        .number("seconds", Format::Fixed(2), |row| row.seconds);
-    session.table(table, "denoising")?;
-    for row in rows {
-        let key = format!("{}.{}", row.key, row.method.to_lowercase());
-        let Quality {
-            rms,
-            normals,
-            volume,
-        } = row.quality;
-        for (metric, value) in [("rms", rms), ("normals", normals), ("volume", volume)] {
-            session.summary.insert(&format!("{key}.{metric}"), value)?;
-        }
-    }
-    for cases in rows.chunk_by(|a, b| a.key == b.key) {
-        let rms = |method: &str| {
-            let row = cases.iter().find(|row| row.method == method);
-            row.map_or(f64::NAN, |row| row.quality.rms)
-        };
-        let key = format!("{}.fair_over_taubin", cases[0].key);
-        session.summary.insert(&key, rms("fair") / rms("Taubin"))?;
-    }
-    Ok(())
 }

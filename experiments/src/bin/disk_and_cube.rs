@@ -1,16 +1,9 @@
 //! A cube and a thick disk under Willmore flow.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use engine::{Method, Scheme, StepRule};
-use experiments::options::FigureOptions;
-use experiments::session::Session;
+use experiments::prelude::*;
 use experiments::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, View};
-use experiments::{Error, harness};
 use geometry::shapes::{Cuboid, Cylinder};
-use geometry::{SignedDistanceExt, UpAxis, phase_field};
-use serde_json::json;
+use geometry::{SignedDistanceExt, UpAxis};
 
 const PROGRAM: &str = "disk_and_cube";
 /// Cells per unit length of a quick run and of the paper.
@@ -18,9 +11,12 @@ const CELLS: [usize; 2] = [24, 64];
 /// Size of a time step.
 const TAU: f64 = 1.0 / 262_144.0;
 const STEPS: usize = 100;
+/// Half the side of the cube, radius and half the height of the disk; the paper does not say, but these fit its initial energies.
+const CUBE_HALF_SIDE: f64 = 0.25;
+const DISK: [f64; 2] = [0.29, 0.1];
 /// The Willmore energies that the paper reports for the hybrid scheme.
-const CUBE: [(usize, f64); 3] = [(0, 132.65), (1, 52.26), (STEPS, 25.78)];
-const DISK: [(usize, f64); 3] = [(0, 87.15), (1, 50.49), (STEPS, 25.59)];
+const CUBE_ENERGIES: [(usize, f64); 3] = [(0, 132.65), (1, 52.26), (STEPS, 25.78)];
+const DISK_ENERGIES: [(usize, f64); 3] = [(0, 87.15), (1, 50.49), (STEPS, 25.59)];
 const VIEW: View = View {
     up: UpAxis::Z,
     azimuth: 30.0,
@@ -40,18 +36,6 @@ struct Options {
     /// Number of time steps [default: 100]
     #[arg(long, value_name = "COUNT")]
     steps: Option<usize>,
-
-    /// Half the side of the cube; the paper does not say, but its initial energy fits a cube of side 0.5
-    #[arg(long, value_name = "LENGTH", default_value_t = 0.25)]
-    cube_half_side: f64,
-
-    /// Radius of the disk; the paper does not say, but its initial energy fits about 0.29
-    #[arg(long, value_name = "LENGTH", default_value_t = 0.29)]
-    disk_radius: f64,
-
-    /// Half the height of the disk; the paper does not say
-    #[arg(long, value_name = "LENGTH", default_value_t = 0.1)]
-    disk_half_height: f64,
 
     /// Methods, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum, default_values_t = [Method::Hybrid, Method::FeImplicit])]
@@ -79,43 +63,35 @@ fn main() -> ExitCode {
 }
 
 fn program(options: &Options) -> Result<(), Error> {
-    let (half, radius, half_height) = (
-        options.cube_half_side,
-        options.disk_radius,
-        options.disk_half_height,
-    );
+    let [radius, half_height] = DISK;
     let run = &options.figure.run;
     let steps = (options.steps).unwrap_or(if run.quick { 2 } else { STEPS });
     let variants = options.variants();
-    if steps == 0 || variants.is_empty() {
-        return Err(Error::Options(
-            "--steps must be at least 1, and --methods must name a method".to_owned(),
-        ));
-    }
+    require(
+        steps > 0 && !variants.is_empty(),
+        "--steps must be at least 1, and --methods must name a method",
+    )?;
     let device = run.open_device()?;
     let setting = Setting::new(&options.figure, CELLS, 1.0)?;
     let (grid, eps) = (setting.grid, setting.scales.eps);
-    let cube = Cuboid::new([half; 3])?.translated([0.5; 3]);
+    let cube = Cuboid::new([CUBE_HALF_SIDE; 3])?.translated([0.5; 3]);
     let disk = Cylinder::new(radius, half_height)?.translated([0.5; 3]);
-    let surfaces = vec![
-        (
-            surface("cube", "cube", CUBE),
-            phase_field(grid, &cube, eps)?,
-        ),
-        (
-            surface("disk", "thick disk", DISK),
-            phase_field(grid, &disk, eps)?,
-        ),
-    ];
+    let (cube, disk) = (
+        phase_field(grid, &cube, eps)?,
+        phase_field(grid, &disk, eps)?,
+    );
     let parameters = setting.parameters(json!({
-        "tau": TAU, "steps": steps, "variants": variants, "cube_half_side": half, "disk_radius": radius,
+        "tau": TAU, "steps": steps, "variants": variants, "cube_half_side": CUBE_HALF_SIDE, "disk_radius": radius,
         "disk_half_height": half_height,
     }))?;
     let session = Session::open(PROGRAM, run, device, parameters)?;
     let flows = SurfaceFlows {
         program: PROGRAM,
         title: "Willmore flow of a cube and of a thick disk".to_owned(),
-        surfaces,
+        surfaces: vec![
+            (surface("cube", "cube", CUBE_ENERGIES), cube),
+            (surface("disk", "thick disk", DISK_ENERGIES), disk),
+        ],
         variants,
         time: (StepRule::Constant(TAU), steps),
         tau_in_words: "τ = 2⁻¹⁸",
@@ -149,8 +125,7 @@ fn compare_with_finite_elements(
             let step = shown.step;
             let l2 = one.trajectory.distance(step, &elements.trajectory, step)?;
             shown.caption = format!("{}\nL² distance to FE {l2:.4}", shown.caption);
-            let metric = format!("{key}.l2_to_fe.step{step}");
-            session.summary.insert(&metric, l2)?;
+            session.metric(&format!("{key}.l2_to_fe.step{step}"), l2)?;
         }
     }
     Ok(String::new())

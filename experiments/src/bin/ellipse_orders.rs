@@ -1,14 +1,10 @@
 //! The order of convergence of Willmore flow of an ellipse in h and in tau, against its own finest run.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use engine::{Flow, Method, Samples, Scheme};
+use engine::Samples;
 use experiments::networks::{Chosen, EPS, STEP};
-use experiments::session::Session;
-use experiments::{Error, harness, options::RunOptions, orders, study};
-use geometry::{Grid, phase_field, shapes::Ellipse};
-use serde_json::json;
+use experiments::prelude::*;
+use experiments::{orders, study};
+use geometry::shapes::Ellipse;
 
 const TITLE: &str = "Willmore flow of an ellipse, each h with its network";
 const HALF_AXES: [f64; 2] = [0.3, 0.2];
@@ -50,9 +46,9 @@ fn program(options: &RunOptions) -> Result<(), Error> {
         Ok::<_, Error>((size, end))
     };
     let in_h = CELLS[..used].iter().map(|&n| run(1.0 / n as f64, n, 1));
-    let in_h = in_h.collect::<Result<Vec<_>, _>>()?;
+    let in_h = in_h.collect::<Result<_, _>>()?;
     let in_tau = PARTS[..=used].iter().map(|&k| run(STEP / k as f64, 128, k));
-    let in_tau = in_tau.collect::<Result<Vec<_>, _>>()?;
+    let in_tau = in_tau.collect::<Result<_, _>>()?;
     let sequences = [("h", in_h), ("tau", in_tau)];
     orders::finish(session, "ellipse", TITLE, &sequences)
 }

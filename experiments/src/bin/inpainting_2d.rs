@@ -1,17 +1,13 @@
 //! Inpainting in 2D: Willmore flow of the values in a region, the rest of the image held.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use engine::{Operator, Scales, StepRule};
 use experiments::inpainting::{self, Inpainted, InpaintingOptions, Shape};
-use experiments::session::Session;
-use experiments::{Error, harness, look};
+use experiments::look;
+use experiments::prelude::*;
+use geometry::SignedDistanceExt;
 use geometry::shapes::{Ball, Cross, Cuboid};
-use geometry::{Field, Grid, SignedDistanceExt};
 use model::{NeededNetwork, Ratios};
-use report::{Colour, Curve, Figure, Rgb, Shapes};
-use solver::{NewtonParams, Precision};
+use report::{Curve, Rgb, Shapes};
+use solver::Precision;
 
 const PROGRAM: &str = "inpainting_2d";
 /// Cells per unit length of a quick run and of the paper.
@@ -47,52 +43,40 @@ struct Options {
     #[command(flatten)]
     common: InpaintingOptions,
 
-    /// Most steps of the disk [default: 2000, as in the paper; it stands still long before]
-    #[arg(long, value_name = "COUNT")]
-    disk_steps: Option<usize>,
-
     /// Use tautilde = 2^-14 as the paper's caption prints it. At the paper's n = 1024 that is 4 eps^2, beyond the bound 8/9 eps^2 of
     /// the scheme, which refuses it; at n = 256 it is the default
     #[arg(long)]
     printed_tautilde: bool,
-
-    /// One image alone
-    #[arg(long, value_name = "NAME", value_parser = ["disk", "cross"])]
-    only: Option<String>,
 }
 
-fn shapes(options: &Options) -> Result<Vec<Shape<2>>, Error> {
+fn shapes(quick: bool) -> Result<[Shape<2>; 2], Error> {
     let disk = Ball::new([0.0; 2], RADIUS)?;
     let corner = Cuboid::new([0.5 * (0.5 - CORNER); 2])?.translated([0.5 * (CORNER + 0.5); 2]);
     let [length, width] = CROSS;
-    let quick = options.common.figure.run.quick;
     let steps = |papers: usize| if quick { 5 } else { papers };
-    let shapes = [
-        Shape {
-            key: "disk",
-            title: "disk with a cut-out corner",
-            initial: Box::new(disk.difference(corner)),
-            whole: Some(Box::new(disk)),
-            region: DISK_REGION,
-            rule: StepRule::Constant(1.0 / 128.0),
-            steps: steps(options.disk_steps.unwrap_or(2000)),
-            shown: vec![0, 1, 100, 500, 1000, 1500, 2000],
-            halvings: INSIDE,
-        },
-        Shape {
-            key: "cross",
-            title: "cross",
-            initial: Box::new(Cross::new(length, width)?),
-            whole: None,
-            region: CROSS_REGION,
-            rule: StepRule::Constant(1.0 / 16384.0),
-            steps: steps(50),
-            shown: vec![0, 1, 5, 10, 20, 35, 50],
-            halvings: INSIDE,
-        },
-    ];
-    let wanted = |shape: &Shape<2>| options.only.as_ref().is_none_or(|only| only == shape.key);
-    Ok(shapes.into_iter().filter(wanted).collect())
+    let disk = Shape {
+        key: "disk",
+        title: "disk with a cut-out corner",
+        initial: Box::new(disk.difference(corner)),
+        whole: Some(Box::new(disk)),
+        region: DISK_REGION,
+        rule: StepRule::Constant(1.0 / 128.0),
+        steps: steps(2000),
+        shown: vec![0, 1, 100, 500, 1000, 1500, 2000],
+        halvings: INSIDE,
+    };
+    let cross = Shape {
+        key: "cross",
+        title: "cross",
+        initial: Box::new(Cross::new(length, width)?),
+        whole: None,
+        region: CROSS_REGION,
+        rule: StepRule::Constant(1.0 / 16384.0),
+        steps: steps(50),
+        shown: vec![0, 1, 5, 10, 20, 35, 50],
+        halvings: INSIDE,
+    };
+    Ok([disk, cross])
 }
 
 fn main() -> ExitCode {
@@ -105,10 +89,7 @@ fn program(options: &Options) -> Result<(), Error> {
     let grid = Grid::<2>::per_unit(n, 1.0)?.with_origin([-0.5; 2])?;
     let mut scales = Scales::of_grid(1.0 / n as f64, EPS_OVER_H);
     // Steps are large here, tau/tautilde^2 up to 2^29: in single precision products would lose the slow modes of the Hessian.
-    scales.newton = NewtonParams {
-        precision: Precision::Device,
-        ..NewtonParams::default()
-    };
+    scales.newton.precision = Precision::Device;
     if options.printed_tautilde {
         scales.mcf_step = PRINTED_STEP;
     }
@@ -118,10 +99,7 @@ fn program(options: &Options) -> Result<(), Error> {
     let (scheme, needed) = (options.common.scheme, NeededNetwork::exactly(ratios));
     let networks = options.common.figure.networks.load(&[needed])?;
     let operator = Operator::learned(scheme, networks.find(scheme, &needed)?)?;
-    let shapes = shapes(options)?;
-    if shapes.iter().any(|shape| shape.steps == 0) {
-        return Err(Error::Options("--disk-steps must be at least 1".to_owned()));
-    }
+    let shapes = shapes(run.quick)?;
     let parameters = inpainting::parameters((n, &scales), &operator, &shapes);
     let mut session = Session::open(PROGRAM, run, device, parameters)?;
     let mut trajectories = Vec::new();
@@ -130,9 +108,9 @@ fn program(options: &Options) -> Result<(), Error> {
         let folder = format!("{}-{}", shape.key, operator.key());
         trajectories.push(session.trajectory(shape.title, case, &folder, &shape.samples())?);
     }
-    let inpainted = (shapes.iter().zip(&trajectories))
-        .map(|(shape, trajectory)| Inpainted::measure(shape, trajectory))
-        .collect::<Result<Vec<_>, Error>>()?;
+    let inpainted = shapes.iter().zip(&trajectories);
+    let inpainted = inpainted.map(|(shape, trajectory)| Inpainted::measure(shape, trajectory));
+    let inpainted = inpainted.collect::<Result<Vec<_>, Error>>()?;
     for one in &inpainted {
         one.write_frames(&session, frames(one, n)?)?;
     }

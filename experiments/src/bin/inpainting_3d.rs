@@ -1,17 +1,11 @@
 //! Inpainting of surfaces: Willmore flow of the values in a region, the rest of the surface held.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use engine::{Method, StepRule};
 use experiments::inpainting::{self, Inpainted, InpaintingOptions, Shape};
-use experiments::session::Session;
-use experiments::surfaces::{Setting, Snapshot, Surface, View, table};
-use experiments::{Error, harness};
+use experiments::prelude::*;
+use experiments::surfaces::{Flowed, Setting, Snapshot, Surface, View, write_snapshots};
 use geometry::shapes::{Ball, Cuboid, Cylinder};
 use geometry::{SignedDistance, SignedDistanceExt, UpAxis};
 use render::{Rgb, Tube};
-use report::Figure;
 
 const PROGRAM: &str = "inpainting_3d";
 const TITLE: &str = "Inpainting of surfaces";
@@ -55,14 +49,10 @@ struct Options {
     /// Steps beyond the paper's, each twice as long as the one before
     #[arg(long, value_name = "COUNT", default_value_t = 20)]
     extra_steps: usize,
-
-    /// One shape alone
-    #[arg(long, value_name = "NAME", value_parser = ["ball", "tubes"])]
-    only: Option<String>,
 }
 
 /// The shapes with the azimuths from which they are looked at. The last step shown is one on the way to the end.
-fn shapes(options: &Options) -> Result<Vec<(Shape<3>, f64)>, Error> {
+fn shapes(extra_steps: usize) -> Result<[(Shape<3>, f64); 2], Error> {
     let ball = Ball::new([0.0; 3], RADIUS)?;
     let half = 0.5 * (0.5 - CORNER);
     let corner = Cuboid::new([half; 3])?.translated([CORNER + half; 3]);
@@ -80,7 +70,7 @@ fn shapes(options: &Options) -> Result<Vec<(Shape<3>, f64)>, Error> {
         whole: Some(Box::new(ball.translated([CENTRE; 3]))),
         region: BALL_REGION,
         rule: growing(5),
-        steps: 5 + options.extra_steps,
+        steps: 5 + extra_steps,
         shown: vec![0, 1, 3, 5, 11],
         halvings: &[],
     };
@@ -91,13 +81,11 @@ fn shapes(options: &Options) -> Result<Vec<(Shape<3>, f64)>, Error> {
         whole: None,
         region: TUBES_REGION,
         rule: growing(8),
-        steps: 8 + options.extra_steps,
+        steps: 8 + extra_steps,
         shown: vec![0, 1, 4, 8, 14],
         halvings: &[],
     };
-    let wanted = |shape: &Shape<3>| options.only.as_ref().is_none_or(|only| only == shape.key);
-    let shapes = [(ball_shape, 30.0), (tubes_shape, 25.0)].into_iter();
-    Ok(shapes.filter(|(shape, _)| wanted(shape)).collect())
+    Ok([(ball_shape, 30.0), (tubes_shape, 25.0)])
 }
 
 /// The paper's steps, and further ones each twice as long as the one before.
@@ -114,19 +102,20 @@ fn main() -> ExitCode {
 
 fn program(options: &Options) -> Result<(), Error> {
     let run = &options.common.figure.run;
-    if options.extra_steps > MOST_EXTRA {
-        return Err(Error::Options(format!(
-            "--extra-steps {} is too many: each step is twice as long as the one before; give at most {MOST_EXTRA}",
-            options.extra_steps
-        )));
-    }
+    let extra_steps = options.extra_steps;
+    require(
+        extra_steps <= MOST_EXTRA,
+        format!(
+            "--extra-steps {extra_steps} is too many: each step is twice as long as the one before; give at most {MOST_EXTRA}"
+        ),
+    )?;
     let device = run.open_device()?;
     let setting = Setting::new(&options.common.figure, CELLS, 1.0)?;
     let Setting {
         n, grid, scales, ..
     } = setting;
     let operator = setting.operator((Method::Hybrid, options.common.scheme))?;
-    let (shapes, azimuths): (Vec<_>, Vec<_>) = shapes(options)?.into_iter().unzip();
+    let (shapes, azimuths): (Vec<_>, Vec<_>) = shapes(extra_steps)?.into_iter().unzip();
     let parameters = inpainting::parameters((n, &scales), &operator, &shapes);
     let mut session = Session::open(PROGRAM, run, device, parameters)?;
     let mut flowed = Vec::new();
@@ -144,10 +133,10 @@ fn program(options: &Options) -> Result<(), Error> {
         let case = shape.case(grid, scales, &operator)?;
         flowed.push(surface.flow(case, &mut session)?);
     }
-    table(&mut session, &flowed, "shapes")?;
+    let key = |one: &Flowed| one.surface.key.to_owned();
+    write_snapshots(&mut session, &flowed, "shapes", key)?;
     let mut inpainted = Vec::new();
     for (shape, one) in shapes.iter().zip(&mut flowed) {
-        one.summarize_shapes(shape.key, &mut session.summary)?;
         let measured = Inpainted::measure(shape, &one.trajectory)?;
         decorate(&mut one.snapshots, &measured);
         let (output, title) = (&session.output, format!("{}: pictures", shape.title));

@@ -2,20 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, SQRT_2, TAU};
-use std::process::ExitCode;
 
-use clap::Parser;
-use engine::Scheme;
 use experiments::networks::NetworkOptions;
-use experiments::options::RunOptions;
-use experiments::session::Session;
+use experiments::prelude::*;
+use experiments::quality;
 use experiments::training::{NetworkSpec, held_out_radii};
-use experiments::{Error, harness, quality};
 use model::training::levenberg_marquardt::{heat_kernel, splitting_activation};
 use model::{NeededNetwork, Network, Quality};
-use report::{Axis, Colour, Figure, Heatmap, LineChart, LineStyle, Marker, Series, Table};
-use serde::Serialize;
-use serde_json::json;
+use report::Heatmap;
 
 const PROGRAM: &str = "learned_networks";
 
@@ -41,14 +35,11 @@ fn program(options: &Options) -> Result<(), Error> {
     let device = run.open_device()?;
     let needs: Vec<_> = (specs.iter().map(|spec| NeededNetwork::exactly(spec.ratios))).collect();
     let chosen = options.networks.load(&needs)?;
-    let found = needs
-        .iter()
-        .map(|need| Ok(chosen.find(Scheme::Paper, need)?.network));
-    let networks: Vec<Network> = found.collect::<Result<_, Error>>()?;
-    let names = specs.iter().map(|spec| &spec.name);
-    let checksums: BTreeMap<_, _> = names
-        .zip(networks.iter().map(Network::fingerprint))
-        .collect();
+    let find = |need| Ok(chosen.find(Scheme::Paper, need)?.network);
+    let networks: Vec<Network> = needs.iter().map(find).collect::<Result<_, Error>>()?;
+    let fingerprints = networks.iter().map(Network::fingerprint);
+    let names = specs.iter().map(|spec| spec.name);
+    let checksums: BTreeMap<_, _> = names.zip(fingerprints).collect();
     let held_out_radii = held_out_radii(run.quick);
     let parameters = json!({"networks": checksums, "held_out_radii": held_out_radii});
     let mut session = Session::open(PROGRAM, run, device.clone(), parameters)?;
@@ -59,7 +50,7 @@ fn program(options: &Options) -> Result<(), Error> {
         let quality = session.phase(format!("quality of {}", spec.name), || {
             Ok(Quality::measure(network, &data, held_out_radii, &device)?)
         })?;
-        session.summary.insert_record(&spec.name, &quality)?;
+        session.summary.insert_record(spec.name, &quality)?;
         shown.push(Shown::new(spec, network, &heat_kernel(&data), quality));
         bar.inc(1);
     }
@@ -79,11 +70,11 @@ fn program(options: &Options) -> Result<(), Error> {
     output.write_csv("activations.csv", all().flat_map(|one| &one.activation))?;
     output.write_csv("transfer.csv", all().flat_map(|one| &one.transfer))?;
     let origins: BTreeMap<_, _> = all()
-        .map(|one| (&one.spec.name, (&one.quality, one.network.provenance())))
+        .map(|one| (one.spec.name, (&one.quality, one.network.provenance())))
         .collect();
     output.write_json("networks.json", &origins)?;
-    let table = Table::of(&shown).text("network", |one| &one.spec.name);
-    session.table(quality::columns(table, |one| &one.quality), "quality")?;
+    let table = Sheet::of(&shown).text("network", |one| one.spec.name);
+    session.sheet(quality::columns(table, |one| &one.quality), "quality")?;
     session.finish("Quality of the learned operators")
 }
 
@@ -132,7 +123,7 @@ impl<'a> Shown<'a> {
         let kernel = kernel_rows(spec, network, heat);
         let activation = (0..=400).map(|i| -1.0 + f64::from(i) / 200.0);
         let activation = activation.map(|w| ActivationRow {
-            network: &spec.name,
+            network: spec.name,
             w,
             activation: network.activation().value(w),
             splitting: splitting_activation(spec.ratios.step_over_eps2(), w),
@@ -156,24 +147,22 @@ impl<'a> Shown<'a> {
 }
 
 fn kernel_rows<'a>(spec: &'a NetworkSpec, network: &Network, heat: &[f64]) -> Vec<KernelRow<'a>> {
-    let width = spec.ratios.width;
+    let (width, eps_over_h) = (spec.ratios.width, spec.ratios.eps_over_h);
     let middle = (width / 2).cast_signed();
+    let row = |(i, (&kernel, &heat_kernel)): (usize, (&f64, &f64))| {
+        let [offset_x, offset_y] = [i / width, i % width].map(|k| k.cast_signed() - middle);
+        KernelRow {
+            network: spec.name,
+            offset_x,
+            offset_y,
+            distance_over_eps: (offset_x as f64).hypot(offset_y as f64) / eps_over_h,
+            kernel,
+            heat_kernel,
+            density: kernel * eps_over_h.powi(2),
+        }
+    };
     let entries = network.kernel().iter().zip(heat).enumerate();
-    entries
-        .map(|(i, (&kernel, &heat_kernel))| {
-            let [offset_x, offset_y] = [i / width, i % width].map(|k| k.cast_signed() - middle);
-            let distance = (offset_x as f64).hypot(offset_y as f64);
-            KernelRow {
-                network: &spec.name,
-                offset_x,
-                offset_y,
-                distance_over_eps: distance / spec.ratios.eps_over_h,
-                kernel,
-                heat_kernel,
-                density: kernel * spec.ratios.eps_over_h.powi(2),
-            }
-        })
-        .collect()
+    entries.map(row).collect()
 }
 
 /// Transfer functions along an axis or a diagonal, that of the heat kernel being `exp(-tautilde k^2)`.
@@ -183,32 +172,29 @@ fn transfer_rows<'a>(
     diagonal: bool,
 ) -> Vec<TransferRow<'a>> {
     let n = spec.cells;
-    (0..=n / 2)
-        .map(|j| {
-            let wave = TAU * j as f64 / n as f64;
-            // The imaginary part vanishes: learned kernels are symmetric.
-            let transfer = kernel.iter().map(|row| {
-                let steps = row.offset_x + if diagonal { row.offset_y } else { 0 };
-                row.kernel * (wave * steps as f64).cos()
-            });
-            let length = wave * if diagonal { SQRT_2 } else { 1.0 };
-            TransferRow {
-                network: &spec.name,
-                direction: if diagonal { "diagonal" } else { "axis" },
-                eps_k: length * spec.ratios.eps_over_h,
-                transfer: transfer.sum(),
-                heat: (-spec.ratios.step_over_h2 * length * length).exp(),
-            }
-        })
-        .collect()
+    let row = |j: usize| {
+        let wave = TAU * j as f64 / n as f64;
+        // The imaginary part vanishes: learned kernels are symmetric.
+        let transfer = kernel.iter().map(|row| {
+            let steps = row.offset_x + if diagonal { row.offset_y } else { 0 };
+            row.kernel * (wave * steps as f64).cos()
+        });
+        let length = wave * if diagonal { SQRT_2 } else { 1.0 };
+        TransferRow {
+            network: spec.name,
+            direction: if diagonal { "diagonal" } else { "axis" },
+            eps_k: length * spec.ratios.eps_over_h,
+            transfer: transfer.sum(),
+            heat: (-spec.ratios.step_over_h2 * length * length).exp(),
+        }
+    };
+    (0..=n / 2).map(row).collect()
 }
 
 /// A thin black curve to compare with.
 fn thin(curve: Series, style: LineStyle) -> Series {
-    curve
-        .with_colour(Colour::Black)
-        .with_style(style)
-        .with_width(1.5)
+    let curve = curve.with_colour(Colour::Black);
+    curve.with_style(style).with_width(1.5)
 }
 
 /// Kernels as colours above the activations, as in the paper.

@@ -1,9 +1,7 @@
 //! The cross under mean curvature flow.
 
-use std::process::ExitCode;
-
-use engine::Flow;
 use experiments::comparison::{self, Setting};
+use experiments::prelude::*;
 
 const MCF_CROSS: Setting = Setting {
     program: "mcf_cross",

@@ -2,13 +2,12 @@
 
 use std::ffi::OsStr;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
-use clap::Parser;
-use experiments::{Error, harness, meshes};
-use geometry::{Grid, Placement, npy, vti};
+use experiments::meshes;
+use experiments::prelude::*;
+use geometry::{Placement, npy, vti};
 use report::Progress;
-use surfaces::ClosedMesh;
+use surfaces::{ClosedMesh, MeshDistance};
 
 /// Writes the signed distance to a closed triangle mesh, negative inside, at the nodes i/n of the unit cube. The mesh is scaled so
 /// that the longest side of its bounding box has the given length, and its bounding box is centred at (0.5, 0.5, 0.5).
@@ -27,10 +26,6 @@ struct Options {
     #[arg(long, value_name = "LENGTH", default_value_t = 0.8)]
     side_length: f64,
 
-    /// Least distance of the mesh from the faces of the box
-    #[arg(long, value_name = "LENGTH", default_value_t = 0.0)]
-    margin: f64,
-
     /// The array to write: NPY, shape (n, n, n), f64, or a VTI file for ParaView
     #[arg(long, value_name = "FILE")]
     output: PathBuf,
@@ -45,27 +40,23 @@ fn main() -> ExitCode {
 }
 
 fn program(options: &Options) -> Result<(), Error> {
+    let (path, output) = (options.mesh.display(), options.output.display());
     let extension = options.output.extension().map(OsStr::to_ascii_lowercase);
-    let volume = match extension.as_deref().and_then(|e| e.to_str()) {
-        Some("npy") => false,
-        Some("vti") => true,
-        _ => {
-            return Err(Error::Options(format!(
-                "--output {} must end in .npy or .vti",
-                options.output.display()
-            )));
-        }
-    };
+    let volume = extension.as_ref().is_some_and(|name| name == "vti");
+    require(
+        volume || extension.is_some_and(|name| name == "npy"),
+        format!("--output {output} must end in .npy or .vti"),
+    )?;
     let (mesh, warnings) = ClosedMesh::new(surfaces::read(&options.mesh)?)?;
     for warning in &warnings {
-        eprintln!("warning: {}: {warning}", options.mesh.display());
+        eprintln!("warning: {path}: {warning}");
     }
     let grid = Grid::<3>::new(options.cells, 1.0)?;
     let progress = Progress::new(options.quiet);
     let bar = progress.bar("signed distance".to_owned(), options.cells as u64);
-    let bounds = mesh.bounding_box();
-    let placement = Placement::fit(&bounds, &grid, options.side_length, options.margin)?;
-    let distance = meshes::signed_distance(&mesh.placed(&placement), grid, &bar)?;
+    let placement = Placement::fit(&mesh.bounding_box(), &grid, options.side_length, 0.0)?;
+    let distance = MeshDistance::new(&mesh.placed(&placement));
+    let distance = meshes::sampled(&distance, grid, &bar)?;
     bar.finish();
     if volume {
         vti::write(&options.output, &[("signed_distance", &distance)])?;
@@ -75,12 +66,10 @@ fn program(options: &Options) -> Result<(), Error> {
     progress.clear();
     if !options.quiet {
         println!(
-            "{}: {} vertices, {} faces, genus {}; signed distance in {}",
-            options.mesh.display(),
+            "{path}: {} vertices, {} faces, genus {}; signed distance in {output}",
             mesh.mesh().vertices.len(),
             mesh.mesh().faces.len(),
-            mesh.genus(),
-            options.output.display()
+            mesh.genus()
         );
     }
     Ok(())

@@ -1,11 +1,8 @@
 //! The rectangle under Willmore flow.
 
-use std::process::ExitCode;
-
-use engine::Flow;
 use experiments::comparison::{self, Setting};
 use experiments::networks::EPS;
-use geometry::phase_field;
+use experiments::prelude::*;
 use geometry::shapes::Cuboid;
 
 const RECTANGLE: Setting = Setting {

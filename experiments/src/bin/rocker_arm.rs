@@ -1,15 +1,11 @@
 //! A machine part of genus one under Willmore flow, and the Clifford torus next to it.
 
 use std::collections::BTreeMap;
-use std::process::ExitCode;
 
-use clap::Parser;
-use engine::StepRule;
 use experiments::mesh_flow::{MeshFlow, MeshFlowOptions};
 use experiments::meshes::KnownMesh;
-use experiments::session::Session;
+use experiments::prelude::*;
 use experiments::surfaces::{Flowed, View};
-use experiments::{Error, harness};
 use geometry::{CliffordTorus, UpAxis};
 use render::Tube;
 
@@ -82,10 +78,8 @@ fn clifford_tori(session: &mut Session<'_>, all: &mut [Flowed]) -> Result<String
             shown.caption = format!("{}\n{torus}", shown.caption);
             shown.tubes = circles.map(tube).collect();
         }
-        let metrics = [("l2", l2), ("w", w), ("outer_radius", outer_radius)];
-        for (name, value) in metrics {
-            let metric = format!("{}.clifford_{name}", one.key());
-            session.summary.insert(&metric, value)?;
+        for (name, value) in [("l2", l2), ("w", w), ("outer_radius", outer_radius)] {
+            session.metric(&format!("{}.clifford_{name}", one.key()), value)?;
         }
         tori.insert(one.key(), torus);
     }

@@ -1,25 +1,13 @@
 //! Spheres by the network for surfaces: mean curvature flow, Willmore energies, and standing still.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use engine::{
-    Case, Flow, Measure, Method, Record, Run, Scheme, StepRule, energy_increases, mean_hvp,
-};
-use experiments::options::FigureOptions;
-use experiments::session::Session;
+use engine::{energy_increases, mean_hvp};
+use experiments::prelude::*;
 use experiments::surfaces::{self, Setting};
 use experiments::training::{NetworkSpec, held_out_radii};
-use experiments::{Error, harness, look, quality};
+use experiments::{look, quality};
 use geometry::exact::{WILLMORE_ENERGY_SPHERE, mean_curvature_radius};
-use geometry::phase_field;
 use geometry::shapes::Ball;
 use model::Quality;
-use operators::ComputeDevice;
-use report::{Axis, Colour, Figure, Format, LineChart, LineStyle, Marker, Series, Summary, Table};
-use runs::Interrupt;
-use serde::Serialize;
-use serde_json::json;
 
 const PROGRAM: &str = "spheres";
 const TITLE: &str = "Spheres by the network for surfaces";
@@ -72,14 +60,14 @@ struct Still {
     hvp_per_step: f64,
 }
 
-/// Columns of tables with their digits.
-const COLUMNS: [(&str, usize, fn(&Still) -> f64); 4] = [
-    ("w", 2, |still| still.w_learned),
-    ("w in the end", 2, |still| still.w_relaxed),
-    ("change of radius / h", 4, |still| {
-        still.radius_change_over_h
+/// Measures of standing still: metric, heading, digits, value.
+const MEASURES: [(&str, &str, usize, fn(&Still) -> f64); 4] = [
+    ("w_learned", "w", 2, |s| s.w_learned),
+    ("w_relaxed", "w in the end", 2, |s| s.w_relaxed),
+    ("radius_change_over_h", "change of radius / h", 4, |s| {
+        s.radius_change_over_h
     }),
-    ("HVP/step", 1, |still| still.hvp_per_step),
+    ("hvp_per_step", "HVP/step", 1, |s| s.hvp_per_step),
 ];
 
 /// Methods and schemes of mean curvature flow.
@@ -95,71 +83,67 @@ fn program(options: &Options) -> Result<(), Error> {
     let run = &options.figure.run;
     let radii = if run.quick { &RADII[2..4] } else { &RADII };
     let willmore_steps = if run.quick { 2 } else { WILLMORE_STEPS };
-    let device = run.open_device()?;
-    let spheres = Spheres {
-        setting: Setting::new(&options.figure, CELLS, 1.0)?,
-        device: device.clone(),
-    };
+    let (setting, device) = (
+        Setting::new(&options.figure, CELLS, 1.0)?,
+        run.open_device()?,
+    );
     let others = json!({ "tau": TAU, "willmore_steps": willmore_steps });
-    let parameters = spheres.setting.parameters(others)?;
-    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let parameters = setting.parameters(others)?;
+    let mut session = Session::open(PROGRAM, run, device.clone(), parameters)?;
     let bar = session.progress.bar("radii".to_owned(), radii.len() as u64);
     let mut all = Vec::new();
     for &radius in radii {
-        let title = format!("radius {radius}");
-        all.push(session.phase(title, || spheres.measure(radius, willmore_steps))?);
+        let sphere = Sphere {
+            setting: &setting,
+            device: &device,
+            radius,
+        };
+        let measure = || sphere.measure(willmore_steps);
+        all.push(session.phase(format!("radius {radius}"), measure)?);
         bar.inc(1);
     }
     bar.finish();
-    table(&mut session, &all)?;
-    summarize(&mut session.summary, &all)?;
+    session.sheet(sheet(&all), "spheres")?;
     if !run.quick {
-        let (spec, papers) = (NetworkSpec::surfaces(), spheres.setting.operator(PAPERS)?);
+        let (spec, papers) = (NetworkSpec::surfaces(), setting.operator(PAPERS)?);
         let network = &papers.network().expect("it is learned").network;
         let measured = session.phase("quality of the network", || {
             let (data, count) = (spec.data(false)?, held_out_radii(false));
-            Ok(Quality::measure(network, &data, count, &spheres.device)?)
+            Ok(Quality::measure(network, &data, count, &device)?)
         })?;
-        let names = Table::of(std::slice::from_ref(&measured)).text("network", |_| &spec.name);
-        let losses = quality::columns(names, |measured| measured).finish()?;
-        losses.write(&session.output, "quality")?;
-        session.summary.insert_record(&spec.name, &measured)?;
+        let names = Sheet::of(std::slice::from_ref(&measured)).text("network", |_| spec.name);
+        session.sheet(quality::columns(names, |measured| measured), "quality")?;
+        session.summary.insert_record(spec.name, &measured)?;
     }
     session.output.write_json("spheres.json", &all)?;
     let note = format!(
         "n = {}, ε = 2/n, inner step 1/n². Energies by the schemes are those after the steps of Willmore flow, of the relaxed profile.",
-        spheres.setting.n
+        setting.n
     );
-    let panels = [errors(&all), energies(&all)];
-    session.figure(
-        Figure::new("Spheres", 2)
-            .with_panels(panels)
-            .with_note(note),
-        "spheres",
-    )?;
+    let figure = Figure::new("Spheres", 2).with_panels([errors(&all), energies(&all)]);
+    session.figure(figure.with_note(note), "spheres")?;
     session.finish(TITLE)
 }
 
-/// What all spheres share.
-struct Spheres {
-    setting: Setting,
-    device: ComputeDevice,
+/// A ball with its setting.
+struct Sphere<'a> {
+    setting: &'a Setting,
+    device: &'a ComputeDevice,
+    radius: f64,
 }
 
-impl Spheres {
-    fn measure(&self, radius: f64, willmore_steps: usize) -> Result<Measurement, Error> {
-        let mcf_step = self.setting.scales.mcf_step;
-        let still = self.case(radius, Flow::Willmore, PAPERS, (TAU, 0))?;
+impl Sphere<'_> {
+    fn measure(&self, willmore_steps: usize) -> Result<Measurement, Error> {
+        let time = (self.setting.scales.mcf_step, MCF_STEPS[LAST]);
+        let still = self.case(Flow::Willmore, PAPERS, (TAU, 0))?;
         let mcf = variants().map(|variant| {
-            let time = (mcf_step, MCF_STEPS[LAST]);
-            let run = self.run(self.case(radius, Flow::MeanCurvature, variant, time)?)?;
-            let error = |step: usize| run.records()[step - 1].measures["l2"];
-            Ok(MCF_STEPS.map(error))
+            let run = self.run(self.case(Flow::MeanCurvature, variant, time)?)?;
+            Ok(MCF_STEPS.map(|step| run.records()[step - 1].measures["l2"]))
         });
         let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
-        let willmore = schemes.map(|&scheme| self.stand_still(radius, scheme, willmore_steps));
+        let willmore = schemes.map(|&scheme| self.stand_still(scheme, willmore_steps));
         Ok(Measurement {
-            radius,
+            radius: self.radius,
             mcf: mcf.collect::<Result<_, Error>>()?,
             w_elements: still.implicit_elements()?.willmore_energy(&still.initial)?,
             willmore: willmore.collect::<Result<_, _>>()?,
@@ -168,40 +152,33 @@ impl Spheres {
 
     fn case(
         &self,
-        radius: f64,
         flow: Flow,
         variant: (Method, Scheme),
         (tau, steps): (f64, usize),
     ) -> Result<Case<3>, Error> {
-        let Setting { grid, scales, .. } = self.setting;
+        let (grid, scales, radius) = (self.setting.grid, self.setting.scales, self.radius);
         let ball = move |grid, r| phase_field(grid, &Ball::new([0.5; 3], r)?, scales.eps);
         let exact = move |grid, t| ball(grid, mean_curvature_radius(radius, t, 3));
-        let measures = match flow {
-            Flow::MeanCurvature => vec![Measure::distance_to(exact)],
-            Flow::Willmore => Measure::size(scales.eps),
-        };
         let (initial, operator) = (ball(grid, radius)?, self.setting.operator(variant)?);
-        let (shape, time) = (
+        let (shape, rule) = (
             format!("sphere of radius {radius}"),
-            (StepRule::Constant(tau), steps),
+            StepRule::Constant(tau),
         );
-        let case = surfaces::willmore_flow(&shape, initial, operator, scales, time);
-        Ok(Case {
-            flow,
-            measures,
-            ..case
-        })
+        let mut case = surfaces::willmore_flow(&shape, initial, operator, scales, (rule, steps));
+        if flow == Flow::MeanCurvature {
+            case.measures = vec![Measure::distance_to(exact)];
+        }
+        Ok(Case { flow, ..case })
     }
 
     fn run(&self, case: Case<3>) -> Result<Run<3>, Error> {
-        let mut run = Run::new(case, &self.device)?;
-        run.advance(None, &mut [], &Interrupt::never())?;
+        let mut run = Run::new(case, self.device)?;
+        while run.step()?.is_some() {}
         Ok(run)
     }
 
-    fn stand_still(&self, radius: f64, scheme: Scheme, steps: usize) -> Result<Still, Error> {
-        let variant = (Method::Hybrid, scheme);
-        let run = self.run(self.case(radius, Flow::Willmore, variant, (TAU, steps))?)?;
+    fn stand_still(&self, scheme: Scheme, steps: usize) -> Result<Still, Error> {
+        let run = self.run(self.case(Flow::Willmore, (Method::Hybrid, scheme), (TAU, steps))?)?;
         let records = run.records();
         let first = records.first().and_then(|record| record.minimization);
         let last = records.last();
@@ -220,28 +197,38 @@ impl Spheres {
     }
 }
 
-fn table(session: &mut Session<'_>, all: &[Measurement]) -> Result<(), Error> {
-    let mut table = Table::of(all).number("radius", Format::Fixed(2), |m| m.radius);
+/// The errors of mean curvature flow and the energies, a row for each radius.
+fn sheet(all: &[Measurement]) -> Sheet<'_, Measurement> {
+    let mut sheet = Sheet::of(all)
+        .keyed(|m, name| format!("spheres.r{:03.0}.{name}", 100.0 * m.radius))
+        .column("radius", Fixed(2), |m| m.radius);
     for (k, (method, scheme)) in variants().enumerate() {
         for (j, step) in MCF_STEPS.into_iter().enumerate() {
-            let name = format!("MCF error, {}, step {step}", method.label_in(scheme));
-            table = table.number(name, Format::Fixed(5), move |m| m.mcf[k][j]);
+            let head = format!("MCF error, {}, step {step}", method.label_in(scheme));
+            let metric = format!("mcf.{}.l2.step{step}", method.key_in(scheme));
+            sheet = sheet.measure(&metric, (&head, Fixed(5)), |m| m.mcf[k][j]);
         }
     }
     let relative = |m: &Measurement| m.w_elements / WILLMORE_ENERGY_SPHERE;
-    table = (table.number("w, FE measure", Format::Fixed(2), |m| m.w_elements)).number(
+    sheet = (sheet.measure("w", ("w, FE measure", Fixed(2)), |m| m.w_elements)).column(
         "w / 8π (FE)",
-        Format::Fixed(4),
+        Fixed(4),
         relative,
     );
     for (k, &scheme) in Method::Hybrid.schemes(Flow::Willmore).iter().enumerate() {
-        for (name, digits, value) in COLUMNS {
-            let name = format!("{name}, {}", Method::Hybrid.label_in(scheme));
-            let value = move |m: &Measurement| value(&m.willmore[k]);
-            table = table.number(name, Format::Fixed(digits), value);
+        let prefix = match scheme {
+            Scheme::Paper => String::new(),
+            other => format!("{}.", Method::Hybrid.key_in(other)),
+        };
+        let label = Method::Hybrid.label_in(scheme);
+        for (name, head, digits, value) in MEASURES {
+            let (name, head) = (format!("{prefix}{name}"), format!("{head}, {label}"));
+            sheet = sheet.measure(&name, (&head, Fixed(digits)), |m| value(&m.willmore[k]));
         }
+        let increases = format!("{prefix}energy_increases");
+        sheet = sheet.metric(&increases, |m| m.willmore[k].energy_increases);
     }
-    session.table(table, "spheres")
+    sheet
 }
 
 /// The curve of a method; markers tell schemes apart where lines are short.
@@ -273,34 +260,11 @@ fn energies(all: &[Measurement]) -> LineChart {
     let schemes = Method::Hybrid.schemes(Flow::Willmore).iter().enumerate();
     let relaxed = schemes
         .map(|(k, &scheme)| curve((Method::Hybrid, scheme), all, |m| m.willmore[k].w_relaxed));
-    let exact = Series::of("exact, 8π", all, |m| [m.radius, WILLMORE_ENERGY_SPHERE]);
+    let exact = Series::of("exact, 8π", all, |m| [m.radius, WILLMORE_ENERGY_SPHERE])
+        .with_colour(Colour::Black)
+        .with_style(LineStyle::Dashed);
     LineChart::new("Willmore energy", Axis::linear("radius"), Axis::linear("w"))
         .with_series(elements.with_colour(1).with_marker(Marker::Square))
         .with_curves(relaxed)
-        .with_series(
-            exact
-                .with_colour(Colour::Black)
-                .with_style(LineStyle::Dashed),
-        )
-}
-
-fn summarize(summary: &mut Summary, all: &[Measurement]) -> Result<(), Error> {
-    for m in all {
-        let sphere = format!("spheres.r{:03.0}", 100.0 * m.radius);
-        summary.insert(&format!("{sphere}.w"), m.w_elements)?;
-        for still in &m.willmore {
-            let key = match still.scheme {
-                Scheme::Paper => sphere.clone(),
-                other => format!("{sphere}.{}", Method::Hybrid.key_in(other)),
-            };
-            summary.insert_record(&key, still)?;
-        }
-        for ((method, scheme), errors) in variants().zip(&m.mcf) {
-            for (step, error) in MCF_STEPS.iter().zip(errors) {
-                let method = method.key_in(scheme);
-                summary.insert(&format!("{sphere}.mcf.{method}.l2.step{step}"), *error)?;
-            }
-        }
-    }
-    Ok(())
+        .with_series(exact)
 }

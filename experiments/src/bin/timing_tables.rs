@@ -1,24 +1,19 @@
 //! Time of the methods for the same flow on the same machine.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use engine::{Method, Operator, Scheme, StepRule};
+use engine::Method::{FeImplicit, FeSemi, Hybrid};
 use experiments::meshes::{ARMADILLO, MeshOptions};
 use experiments::networks::{Chosen, NetworkOptions, convergence_network};
-use experiments::options::RunOptions;
-use experiments::session::Session;
-use experiments::timing::{self, Columns, Numbers, Timed, take_turns};
-use experiments::{Error, harness, surfaces};
-use fem::LinearSolver;
-use report::{Axis, Figure, Format, LineChart, LineStyle, Marker, Series, Summary, Table};
-use serde_json::json;
-use solver::Method as Newton;
+use experiments::prelude::*;
+use experiments::surfaces;
+use experiments::timing::{self, Numbers, Timed, take_turns};
+use fem::LinearSolver::{self, ConjugateGradients, Direct};
+use solver::Method::{self as Newton, Paper, Preconditioned};
 
 const PROGRAM: &str = "timing_tables";
 /// Time steps of the table, until `t = 2^-7`.
 const STEPS: usize = 128;
-/// Heading of the column with the paper's times.
+/// Headings of the columns with the times over those of the hybrid scheme, and with the paper's.
+const MEASURED: &str = "times hybrid, measured steps";
 const PAPERS: &str = "paper, other machines [s]";
 
 /// Wall time of 128 Willmore steps of the cross (eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7) by the hybrid scheme and by
@@ -61,51 +56,44 @@ const VARIANTS: [Variant; 5] = [
     Variant {
         key: "hybrid",
         label: "hybrid",
-        method: Method::Hybrid,
-        newton: Newton::Preconditioned,
-        linear: LinearSolver::ConjugateGradients,
+        method: Hybrid,
+        newton: Preconditioned,
+        linear: ConjugateGradients,
         papers_seconds: None,
     },
     Variant {
         key: "hybrid_plain_newton",
         label: "hybrid, plain Newton-CG",
-        method: Method::Hybrid,
-        newton: Newton::Paper,
-        linear: LinearSolver::ConjugateGradients,
+        method: Hybrid,
+        newton: Paper,
+        linear: ConjugateGradients,
         papers_seconds: Some([122.0, 1020.0]),
     },
     Variant {
         key: "fe_implicit",
         label: "FE implicit, FFT-CG inside",
-        method: Method::FeImplicit,
-        newton: Newton::Preconditioned,
-        linear: LinearSolver::ConjugateGradients,
+        method: FeImplicit,
+        newton: Preconditioned,
+        linear: ConjugateGradients,
         papers_seconds: None,
     },
     Variant {
         key: "fe_implicit_direct",
         label: "FE implicit, Cholesky inside",
-        method: Method::FeImplicit,
-        newton: Newton::Preconditioned,
-        linear: LinearSolver::Direct,
+        method: FeImplicit,
+        newton: Preconditioned,
+        linear: Direct,
         papers_seconds: Some([4970.0, 28622.0]),
     },
     Variant {
         key: "fe_semi",
         label: "FE semi-implicit",
-        method: Method::FeSemi,
-        newton: Newton::Preconditioned,
-        linear: LinearSolver::ConjugateGradients,
+        method: FeSemi,
+        newton: Preconditioned,
+        linear: ConjugateGradients,
         papers_seconds: Some([4307.0, 22045.0]),
     },
 ];
-
-impl Variant {
-    fn papers_seconds(&self, n: usize) -> Option<f64> {
-        let column = [256, 512].iter().position(|&m| m == n)?;
-        self.papers_seconds.map(|seconds| seconds[column])
-    }
-}
 
 /// A row at work, and what was measured.
 struct Timing {
@@ -116,11 +104,11 @@ struct Timing {
     failure: Option<String>,
 }
 
-const COLUMNS: &Columns = &[
-    ("Newton/step", Format::Fixed(1), "newton_per_step"),
-    ("HVP/step", Format::Fixed(0), "hvp_per_step"),
-    ("inner CG/step", Format::Fixed(0), "inner_cg_per_step"),
-    ("Cholesky/step", Format::Fixed(1), "factorizations_per_step"),
+const COLUMNS: [(&str, Format, &str); 4] = [
+    ("Newton/step", Fixed(1), "newton_per_step"),
+    ("HVP/step", Fixed(0), "hvp_per_step"),
+    ("inner CG/step", Fixed(0), "inner_cg_per_step"),
+    ("Cholesky/step", Fixed(1), "factorizations_per_step"),
 ];
 
 fn main() -> ExitCode {
@@ -129,20 +117,19 @@ fn main() -> ExitCode {
 
 fn program(options: &Options) -> Result<(), Error> {
     let (run, quick) = (&options.run, options.run.quick);
-    if !(options.budget.is_finite() && options.budget > 0.0) {
-        return Err(Error::Options("--budget must be positive".to_owned()));
-    }
+    require(
+        options.budget.is_finite() && options.budget > 0.0,
+        "--budget must be positive",
+    )?;
     let cells = if quick { &[128][..] } else { &options.cells };
     let budget = if quick { 0.1 } else { options.budget };
-    let mut needs =
-        (cells.iter().map(|&n| convergence_network(n))).collect::<Result<Vec<_>, _>>()?;
-    needs.push(surfaces::needed_network());
+    let networks = timing::networks(&options.networks, cells)?;
     let device = run.open_device()?;
-    let networks = options.networks.load(&needs)?;
-    let checksums = cells.iter().zip(&needs).map(|(n, needed)| {
-        let network = networks.find(Scheme::Paper, needed)?.network;
-        Ok((format!("n{n}"), network.fingerprint().into()))
-    });
+    let checksum = |&n| {
+        let found = networks.find(Scheme::Paper, &convergence_network(n)?)?;
+        Ok((format!("n{n}"), found.network.fingerprint().into()))
+    };
+    let checksums = cells.iter().map(checksum);
     let parameters = json!({
         "networks": checksums.collect::<Result<serde_json::Map<_, _>, Error>>()?,
         "cells": cells,
@@ -154,20 +141,46 @@ fn program(options: &Options) -> Result<(), Error> {
     for &n in cells {
         timings.extend(measure(&mut session, &networks, n, budget)?);
     }
-    let armadillo = surface_steps(options, &networks, &mut session)?;
+    let n = if quick { 32 } else { 64 };
+    let (surface, steps) = surface_steps(options, &networks, &mut session, n)?;
 
-    table(&mut session, &timings)?;
+    let rows: Vec<_> = timings.iter().map(|t| (t, t.numbers())).collect();
+    let times = |t: &Timing, k: usize| t.over_hybrid(&timings).map(|times| times[k]);
+    let table = Sheet::of(&rows)
+        .text("method", |(t, _)| t.row.label)
+        .column("n", Shortest, |(t, _)| t.n)
+        .column("128 steps [s]", Fixed(1), |(t, _)| t.seconds())
+        .text("measured", |(t, _)| t.measured())
+        .column("times hybrid", Fixed(1), |(t, _)| times(t, 0))
+        .column(MEASURED, Fixed(1), |(t, _)| times(t, 1))
+        .columns(&COLUMNS, |(_, numbers)| numbers)
+        .column(PAPERS, Shortest, |(t, _)| t.papers_seconds());
+    session.sheet(table, "timing")?;
     session.remark(run.title("One Willmore step of a surface"));
-    surface_table(&mut session, &armadillo)?;
-    let json = timings.iter().map(|t| {
+    let steps = Sheet::of(&steps)
+        .keyed(|(method, ..), name| format!("timing.armadillo.{}.{name}", method.key()))
+        .text("surface", |_| &surface)
+        .text("method", |(method, ..)| method.label())
+        .column("n", Shortest, |_| n)
+        .measure("seconds", ("one step [s]", Fixed(2)), |s| s.1["seconds"])
+        .column("Newton", Fixed(0), |s| s.1["newton_per_step"])
+        .measure("hvp", ("HVP", Fixed(0)), |s| s.1["hvp_on_this_grid"])
+        .column(PAPERS, Shortest, |s| s.2);
+    session.sheet(steps, "armadillo")?;
+    let json = rows.iter().map(|(t, numbers)| {
         let (row, seconds) = (t.row.key, t.timed.seconds());
-        json!({ "variant": row, "n": t.n, "numbers": t.numbers(), "step_seconds": seconds, "failure": t.failure })
+        json!({ "variant": row, "n": t.n, "numbers": numbers, "step_seconds": seconds, "failure": t.failure })
     });
-    session
-        .output
-        .write_json("timing.json", &json.collect::<Vec<_>>())?;
+    let json: Vec<_> = json.collect();
+    session.output.write_json("timing.json", &json)?;
     session.figure(figure(&timings), "timing")?;
-    summarize(&mut session.summary, &timings, &armadillo)?;
+    for (timing, mut numbers) in rows.into_iter().filter(|(t, _)| t.usable()) {
+        numbers.extend(times(timing, 1).map(|times| ("times_hybrid_measured_steps", times)));
+        for (name, value) in numbers {
+            let metric = format!("timing.n{}.{}.{name}", timing.n, timing.row.key);
+            session.metric(&metric, value)?;
+        }
+    }
     session.finish("128 Willmore steps of the cross: wall time on this machine")
 }
 
@@ -187,30 +200,25 @@ fn measure(
         let mut case = timing::plane(&operator, n, STEPS, session.options.quick)?;
         case.scales.newton.method = row.newton;
         let bar = (session.progress).bar(format!("{}, n = {n}", row.label), STEPS as u64);
-        let timed = Timed::new(case, &session.device, bar)?;
         contenders.push(Timing {
             row,
             n,
-            timed,
+            timed: Timed::new(case, &session.device, bar)?,
             failure: None,
         });
     }
     session.phase(format!("n = {n}"), || {
-        take_turns(
-            &mut contenders,
-            |timing| timing.goes_on(budget),
-            Timing::step,
-        )
+        let goes_on = |timing: &Timing| timing.goes_on(budget);
+        take_turns(&mut contenders, goes_on, Timing::step)
     })?;
     Ok(contenders)
 }
 
 impl Timing {
     fn goes_on(&self, budget: f64) -> bool {
-        /// The first step costs more than the others: extrapolation needs some of those.
-        const LEAST_STEPS: usize = 3;
+        // The first step costs more than the others: extrapolation needs some of those.
         let seconds = self.timed.seconds();
-        let more = seconds.len() < LEAST_STEPS || seconds.iter().sum::<f64>() < budget;
+        let more = seconds.len() < 3 || seconds.iter().sum::<f64>() < budget;
         self.failure.is_none() && seconds.len() < STEPS && more
     }
 
@@ -254,6 +262,11 @@ impl Timing {
         self.usable().then(|| self.numbers()["seconds"])
     }
 
+    fn papers_seconds(&self) -> Option<f64> {
+        let column = [256, 512].iter().position(|&n| n == self.n)?;
+        self.row.papers_seconds.map(|seconds| seconds[column])
+    }
+
     /// How it was measured.
     fn measured(&self) -> String {
         let steps = self.timed.run.steps();
@@ -274,108 +287,55 @@ impl Timing {
     }
 }
 
-/// One step of a surface, and what the paper reports in seconds.
-struct SurfaceStep {
-    surface: String,
-    method: Method,
-    n: usize,
-    numbers: Numbers,
-    papers_seconds: f64,
-}
-
-/// One step of tau = 2^-18 of the armadillo at n = 64, eps = 2^-5, tautilde = 2^-12, by the hybrid scheme and nested finite elements.
+/// One step of tau = 2^-18 of the armadillo by the hybrid scheme and nested finite elements, eps = 2h, tautilde = h^2: its name, and for
+/// each method what was measured and the seconds that the paper reports.
 fn surface_steps(
     options: &Options,
     networks: &Chosen,
     session: &mut Session<'_>,
-) -> Result<Vec<SurfaceStep>, Error> {
-    const METHODS: [(Method, f64); 2] = [(Method::Hybrid, 807.0), (Method::FeImplicit, 14589.0)];
-    let n = if options.run.quick { 32 } else { 64 };
+    n: usize,
+) -> Result<(String, Vec<(Method, Numbers, f64)>), Error> {
+    const METHODS: [(Method, f64); 2] = [(Hybrid, 807.0), (FeImplicit, 14589.0)];
     let time = (StepRule::Constant(0.5_f64.powi(18)), 1);
     let (scales, needed) = (surfaces::scales(n), surfaces::needed_network());
     let bar = session.progress.bar("signed distance".to_owned(), n as u64);
-    let grid = options.mesh.grid(&ARMADILLO, n)?;
+    let grid = surfaces::centred_box(n, options.mesh.box_side(&ARMADILLO))?;
     let device = session.device.clone();
     session.phase("armadillo", || {
         let mesh = options.mesh.load_or_built_in(&ARMADILLO, &grid)?;
-        let (surface, initial) = (&mesh.about.title, mesh.phase_field(grid, scales.eps, &bar)?);
-        let step = |(method, papers_seconds)| {
+        let initial = mesh.phase_field(grid, scales.eps, &bar)?;
+        let mut steps = Vec::new();
+        for (method, papers_seconds) in METHODS {
             let (variant, source) = ((method, Scheme::Paper), networks.of(Scheme::Paper));
             let operator = Operator::new(variant, &source, &needed, &grid, &scales)?;
-            let case = surfaces::willmore_flow(surface, initial.clone(), operator, scales, time);
+            let initial = initial.clone();
+            let case = surfaces::willmore_flow(&mesh.title, initial, operator, scales, time);
             let mut timed = Timed::new(case, &device, bar.clone())?;
             timed.step()?;
-            Ok(SurfaceStep {
-                surface: surface.clone(),
-                method,
-                n,
-                numbers: timed.numbers(),
-                papers_seconds,
-            })
-        };
-        METHODS.into_iter().map(step).collect()
+            steps.push((method, timed.numbers(), papers_seconds));
+        }
+        Ok((mesh.title, steps))
     })
 }
 
-fn surface_table(session: &mut Session<'_>, steps: &[SurfaceStep]) -> Result<(), Error> {
-    const COLUMNS: &Columns = &[
-        ("one step [s]", Format::Fixed(2), "seconds"),
-        ("Newton", Format::Fixed(0), "newton_per_step"),
-        ("HVP", Format::Fixed(0), "hvp_on_this_grid"),
-    ];
-    let table = Table::of(steps)
-        .text("surface", |s| &s.surface)
-        .text("method", |s| s.method.label())
-        .number("n", Format::Shortest, |s| s.n);
-    let table = timing::with_columns(table, COLUMNS, |s| &s.numbers);
-    let papers = |s: &SurfaceStep| s.papers_seconds;
-    session.table(table.number(PAPERS, Format::Shortest, papers), "armadillo")
-}
-
-fn table(session: &mut Session<'_>, timings: &[Timing]) -> Result<(), Error> {
-    let numbers: Vec<Numbers> = timings.iter().map(Timing::numbers).collect();
-    let rows: Vec<(&Timing, Numbers)> = timings.iter().zip(numbers).collect();
-    let times = |t: &Timing, k: usize| t.over_hybrid(timings).map(|times| times[k]);
-    let table = Table::of(&rows)
-        .text("method", |(t, _)| t.row.label)
-        .number("n", Format::Shortest, |(t, _)| t.n)
-        .number("128 steps [s]", Format::Fixed(1), |(t, _)| t.seconds())
-        .text("measured", |(t, _)| t.measured())
-        .number("times hybrid", Format::Fixed(1), |(t, _)| times(t, 0))
-        .number(
-            "times hybrid, measured steps",
-            Format::Fixed(1),
-            |(t, _)| times(t, 1),
-        );
-    let papers = |(t, _): &(&Timing, Numbers)| t.row.papers_seconds(t.n);
-    let table = timing::with_columns(table, COLUMNS, |(_, numbers)| numbers);
-    session.table(table.number(PAPERS, Format::Shortest, papers), "timing")
-}
-
+/// Seconds over the resolution: solid lines for this machine, dashed ones for the paper.
 fn figure(timings: &[Timing]) -> Figure {
-    let axes = (
-        Axis::log("cells per unit length n"),
-        Axis::log("seconds for 128 steps"),
-    );
-    let mut chart = LineChart::new("", axes.0, axes.1);
+    let mut curves = Vec::new();
     for (k, row) in VARIANTS.iter().enumerate() {
         let marker = [Marker::Circle, Marker::Square, Marker::Triangle][k % 3];
-        let own = || timings.iter().filter(|t| t.row.key == row.key);
-        let points = |seconds: &dyn Fn(&Timing) -> Option<f64>| -> Vec<[f64; 2]> {
-            own()
-                .filter_map(|t| Some([t.n as f64, seconds(t)?]))
-                .collect()
+        let mut curve = |name: String, style, seconds: fn(&Timing) -> Option<f64>| {
+            let own = timings.iter().filter(|t| t.row.key == row.key);
+            let points = own.filter_map(|t| Some([t.n as f64, seconds(t)?]));
+            let curve = Series::new(name, points.collect::<Vec<_>>()).with_style(style);
+            curves.push(curve.with_colour(k).with_marker(marker));
         };
-        let (ours, papers) = (
-            points(&Timing::seconds),
-            points(&|t| row.papers_seconds(t.n)),
-        );
-        let ours = Series::new(row.label, ours);
-        let papers = Series::new(format!("{} (paper, other machines)", row.label), papers)
-            .with_style(LineStyle::Dashed);
-        let curves = [ours, papers].map(|curve| curve.with_colour(k).with_marker(marker));
-        chart = chart.with_curves(curves.into_iter().filter(|curve| !curve.points.is_empty()));
+        curve(row.label.to_owned(), LineStyle::Solid, Timing::seconds);
+        let papers = format!("{} (paper, other machines)", row.label);
+        curve(papers, LineStyle::Dashed, Timing::papers_seconds);
     }
+    curves.retain(|curve| !curve.points.is_empty());
+    let n = Axis::log("cells per unit length n");
+    let chart = LineChart::new("", n, Axis::log("seconds for 128 steps")).with_curves(curves);
     Figure::new("Willmore flow of a cross: wall time", 1)
         .with_panel(chart)
         .with_shared_legend()
@@ -383,24 +343,4 @@ fn figure(timings: &[Timing]) -> Figure {
             "Solid: this machine, one run, long rows extrapolated (see the table). Dashed: the paper's times on an A100 (hybrid) and \
              on 64 cores (finite elements).",
         )
-}
-
-fn summarize(
-    summary: &mut Summary,
-    timings: &[Timing],
-    armadillo: &[SurfaceStep],
-) -> Result<(), Error> {
-    for timing in timings.iter().filter(|t| t.usable()) {
-        let mut numbers = timing.numbers();
-        let factor = timing.over_hybrid(timings);
-        numbers.extend(factor.map(|[_, measured]| ("times_hybrid_measured_steps", measured)));
-        let key = format!("timing.n{}.{}", timing.n, timing.row.key);
-        timing::summarize(summary, &key, &numbers)?;
-    }
-    for step in armadillo {
-        let key = format!("timing.armadillo.{}", step.method.key());
-        summary.insert(&format!("{key}.seconds"), step.numbers["seconds"])?;
-        summary.insert(&format!("{key}.hvp"), step.numbers["hvp_on_this_grid"])?;
-    }
-    Ok(())
 }

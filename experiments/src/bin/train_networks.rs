@@ -1,23 +1,18 @@
 //! Trains the networks that ship with the library.
 
-use std::path::PathBuf;
-use std::process::ExitCode;
+use std::collections::BTreeSet;
 
-use clap::{Parser, ValueEnum};
-use experiments::options::RunOptions;
-use experiments::session::Session;
-use experiments::training::{NetworkSpec, Trainer, training_device};
-use experiments::{Error, harness, quality};
+use clap::ValueEnum;
+use experiments::prelude::*;
+use experiments::quality;
+use experiments::session::remove_folder;
+use experiments::training::{NetworkSpec, train, training_device};
 use model::Network;
 use model::training::adam::AdamParams;
 use model::training::least_squares::LeastSquaresParams;
 use model::training::levenberg_marquardt::LmParams;
 use model::training::{self, CurvePoint, Trained};
-use report::{
-    Axis, Colour, Figure, LegendEntry, LineChart, LineStyle, Manifest, OutputDir, Series, Table,
-};
-use serde::Serialize;
-use serde_json::json;
+use report::OutputDir;
 
 const PROGRAM: &str = "train_networks";
 
@@ -55,18 +50,6 @@ struct Options {
     /// Epochs of Adam at n = 128; every refinement gets a quarter of the epochs before it
     #[arg(long, value_name = "COUNT", default_value_t = 200)]
     adam_epochs: usize,
-
-    /// Learning rate of Adam's first epoch at n = 128; it falls to a twentieth, and every refinement starts with a quarter
-    #[arg(long, value_name = "RATE", default_value_t = AdamParams::default().learning_rate)]
-    adam_rate: f64,
-
-    /// Copy the networks trained by Levenberg-Marquardt (with --recipe adam or accurate those) to this folder, too
-    #[arg(long, value_name = "DIR")]
-    install: Option<PathBuf>,
-
-    /// Forget the checkpoints of an interrupted training
-    #[arg(long)]
-    restart: bool,
 }
 
 impl Recipe {
@@ -89,74 +72,42 @@ fn main() -> ExitCode {
 
 fn program(options: &Options) -> Result<(), Error> {
     let run = &options.run;
-    let specs = options.chosen()?;
+    let chosen = options.chosen()?;
+    require(options.adam_epochs > 0, "--adam-epochs must be at least 1")?;
     let device = training_device(&run.open_device()?)?;
-    let settings = options.settings()?;
+    let (lm, accurate) = (LmParams::new(run.quick), LeastSquaresParams::new(run.quick));
+    let adam = AdamParams {
+        epochs: if run.quick { 2 } else { options.adam_epochs },
+        ..AdamParams::default()
+    };
     let parameters = json!({
         "recipe": options.recipe,
-        "networks": specs,
-        "levenberg_marquardt": settings.lm,
-        "adam": settings.adam,
-        "accurate": settings.accurate,
+        "networks": chosen,
+        "levenberg_marquardt": lm,
+        "adam": adam,
+        "accurate": accurate,
     });
-    let mut session = Session::open(PROGRAM, run, device.clone(), parameters)?;
-    let install = (options.install.as_ref())
-        .map(OutputDir::create)
-        .transpose()?;
-    let folder = session.output.subfolder("networks")?;
-    let (output, progress) = (&session.output, &session.progress);
-    let trainer = Trainer::open(run, &device, output, progress, options.restart)?;
+    let session = Session::open(PROGRAM, run, device, parameters)?;
     let mut trainings = Trainings {
-        trainer,
-        manifest: &mut session.manifest,
-        chosen: &specs,
-        folder: &folder,
+        checkpoints: session.output.subfolder("checkpoints")?,
+        folder: session.output.subfolder("networks")?,
+        session,
+        chosen: chosen.clone(),
         finished: Vec::new(),
     };
-    trainings.by(options.recipe, &settings, !options.only.is_empty())?;
-    let (all, checkpoints) = (trainings.finished, trainings.trainer.checkpoints);
-    if let Some(install) = &install {
-        for one in all.iter().filter(|one| one.recipe == all[0].recipe) {
-            let accurate = one.recipe == Recipe::Accurate;
-            one.save(install, if accurate { "accurate_" } else { "" })?;
-        }
-    }
-    write(&all, &mut session)?;
-    checkpoints.remove()?;
-    session.remark(format!("Networks are in {}", folder.as_path().display()));
-    session.finish("Quality of the trained networks")
-}
-
-/// Curves, figure, metrics and table.
-fn write(all: &[Finished], session: &mut Session<'_>) -> Result<(), Error> {
-    session.figure(figure(all), "learning_curves")?;
-    let rows: Vec<CurveRow<'_>> = all.iter().flat_map(Finished::curve).collect();
-    session.output.write_csv("learning_curves.csv", &rows)?;
-    session.output.write_json("learning_curves.json", &rows)?;
-    let summary = &mut session.summary;
-    for one in all {
-        let key = match one.recipe {
-            Recipe::Lm => format!("train.{}", one.spec.name),
-            _ => format!("train.{}.{}", one.spec.name, one.key()),
+    for spec in &chosen {
+        match options.recipe {
+            Recipe::Lm | Recipe::Both => trainings.train(Recipe::Lm, spec, &lm)?,
+            Recipe::Accurate => trainings.train(Recipe::Accurate, spec, &accurate)?,
+            Recipe::Adam => break,
         };
-        summary.insert_record(&key, &one.trained.quality)?;
-        summary.insert(&format!("{key}.seconds"), one.trained.seconds())?;
-        summary.insert_count(&format!("{key}.iterations"), one.trained.curve.len())?;
     }
-    let table = Table::of(all)
-        .text("network", |one| &one.spec.name)
-        .text("recipe", Finished::key);
-    session.table(
-        quality::columns(table, |one| &one.trained.quality),
-        "quality",
-    )
-}
-
-/// The settings of every recipe.
-struct Settings {
-    lm: LmParams,
-    adam: AdamParams,
-    accurate: LeastSquaresParams,
+    match options.recipe {
+        Recipe::Adam => trainings.progressively(&adam, true)?,
+        Recipe::Both => trainings.progressively(&adam, !options.only.is_empty())?,
+        Recipe::Lm | Recipe::Accurate => {}
+    }
+    trainings.write()
 }
 
 impl Options {
@@ -165,50 +116,30 @@ impl Options {
             Recipe::Accurate => NetworkSpec::accurate(),
             Recipe::Lm | Recipe::Adam | Recipe::Both => NetworkSpec::paper(),
         };
-        let names: Vec<&str> = specs.iter().map(|spec| &spec.name[..]).collect();
-        if let Some(unknown) = self.only.iter().find(|name| !names.contains(&&name[..])) {
-            return Err(Error::Options(format!(
-                "no network is called '{unknown}'; there are {}",
-                names.join(", ")
-            )));
+        let names: Vec<&str> = specs.iter().map(|spec| spec.name).collect();
+        for name in &self.only {
+            require(
+                names.contains(&name.as_str()),
+                format!(
+                    "no network is called '{name}'; there are {}",
+                    names.join(", ")
+                ),
+            )?;
         }
         if !self.only.is_empty() {
-            specs.retain(|spec| self.only.contains(&spec.name));
+            specs.retain(|spec| self.only.iter().any(|name| name == spec.name));
         }
         Ok(specs)
-    }
-
-    fn settings(&self) -> Result<Settings, Error> {
-        let (quick, rate) = (self.run.quick, self.adam_rate);
-        let epochs = if quick { 2 } else { self.adam_epochs };
-        if epochs == 0 {
-            return Err(Error::Options(
-                "--adam-epochs must be at least 1".to_owned(),
-            ));
-        }
-        if !(rate.is_finite() && rate > 0.0) {
-            let message = format!("--adam-rate must be positive, not {rate}");
-            return Err(Error::Options(message));
-        }
-        Ok(Settings {
-            lm: LmParams::new(quick),
-            adam: AdamParams {
-                epochs,
-                learning_rate: rate,
-                final_learning_rate: 0.05 * rate,
-                ..AdamParams::default()
-            },
-            accurate: LeastSquaresParams::new(quick),
-        })
     }
 }
 
 /// Trainings one after the other. Those of the chosen networks are kept and saved at once.
 struct Trainings<'a> {
-    trainer: Trainer<'a>,
-    manifest: &'a mut Manifest,
-    chosen: &'a [NetworkSpec],
-    folder: &'a OutputDir,
+    session: Session<'a>,
+    /// Where interrupted trainings are kept until all are finished.
+    checkpoints: OutputDir,
+    folder: OutputDir,
+    chosen: Vec<NetworkSpec>,
     finished: Vec<Finished>,
 }
 
@@ -219,22 +150,6 @@ struct Finished {
 }
 
 impl Trainings<'_> {
-    /// All by one recipe. Compared with another, Adam trains networks outside of the progression only where they are `wanted`.
-    fn by(&mut self, recipe: Recipe, settings: &Settings, wanted: bool) -> Result<(), Error> {
-        for spec in self.chosen {
-            match recipe {
-                Recipe::Lm | Recipe::Both => self.train(Recipe::Lm, spec, &settings.lm)?,
-                Recipe::Accurate => self.train(Recipe::Accurate, spec, &settings.accurate)?,
-                Recipe::Adam => break,
-            };
-        }
-        match recipe {
-            Recipe::Adam => self.progressively(&settings.adam, true),
-            Recipe::Both => self.progressively(&settings.adam, wanted),
-            Recipe::Lm | Recipe::Accurate => Ok(()),
-        }
-    }
-
     fn train<R: training::Recipe>(
         &mut self,
         recipe: Recipe,
@@ -242,22 +157,28 @@ impl Trainings<'_> {
         params: &R,
     ) -> Result<Network, Error> {
         let (key, label, _) = recipe.look();
-        let train = || self.trainer.train(spec, key, params);
-        let trained = (self.manifest).phase(format!("{} by {label}", spec.name), train)?;
+        let name = format!("{}-{key}", spec.name);
+        let file = self.checkpoints.path(&format!("{name}.json"))?;
+        let session = &mut self.session;
+        let bar = session.progress.bar(name, 1);
+        let (run, device) = (session.options, session.device.clone());
+        let trained = session.phase(format!("{} by {label}", spec.name), || {
+            train((spec, params), run, &device, &file, &bar)
+        })?;
         let network = trained.network.clone();
         if self.chosen.contains(spec) {
-            let finished = Finished {
-                recipe,
-                spec: spec.clone(),
-                trained,
-            };
             let prefix = match recipe {
                 Recipe::Lm | Recipe::Both => "",
                 Recipe::Adam => "adam_",
                 Recipe::Accurate => "accurate_",
             };
-            finished.save(self.folder, prefix)?;
-            self.finished.push(finished);
+            let file = format!("{prefix}{}", spec.ratios.file_name());
+            network.save(&self.folder.path(&file)?)?;
+            self.finished.push(Finished {
+                recipe,
+                spec: spec.clone(),
+                trained,
+            });
         }
         Ok(network)
     }
@@ -279,22 +200,47 @@ impl Trainings<'_> {
         }
         Ok(())
     }
+
+    /// Curves, figure, metrics and table.
+    fn write(self) -> Result<(), Error> {
+        let (mut session, all) = (self.session, self.finished);
+        session.figure(figure(&all), "learning_curves")?;
+        let rows: Vec<CurveRow> = all.iter().flat_map(Finished::curve).collect();
+        session.output.write_csv("learning_curves.csv", &rows)?;
+        session.output.write_json("learning_curves.json", &rows)?;
+        for one in &all {
+            session
+                .summary
+                .insert_record(&one.key(), &one.trained.quality)?;
+        }
+        let sheet = Sheet::of(&all)
+            .keyed(|one, name| format!("{}.{name}", one.key()))
+            .text("network", |one| one.spec.name)
+            .text("recipe", |one| one.recipe.look().0)
+            .metric("seconds", |one| one.trained.seconds())
+            .metric("iterations", |one| one.trained.curve.len());
+        let sheet = quality::columns(sheet, |one| &one.trained.quality);
+        session.sheet(sheet, "quality")?;
+        remove_folder(&self.checkpoints)?;
+        let folder = self.folder.as_path().display();
+        session.remark(format!("Networks are in {folder}"));
+        session.finish("Quality of the trained networks")
+    }
 }
 
 impl Finished {
-    fn save(&self, folder: &OutputDir, prefix: &str) -> Result<(), Error> {
-        let name = format!("{prefix}{}", self.spec.ratios.file_name());
-        Ok(self.trained.network.save(&folder.path(&name)?)?)
+    /// Prefix of its metrics.
+    fn key(&self) -> String {
+        match self.recipe {
+            Recipe::Lm => format!("train.{}", self.spec.name),
+            other => format!("train.{}.{}", self.spec.name, other.look().0),
+        }
     }
 
-    fn key(&self) -> &'static str {
-        self.recipe.look().0
-    }
-
-    fn curve(&self) -> impl Iterator<Item = CurveRow<'_>> {
+    fn curve(&self) -> impl Iterator<Item = CurveRow> {
         self.trained.curve.iter().map(|point| CurveRow {
-            network: &self.spec.name,
-            recipe: self.key(),
+            network: self.spec.name,
+            recipe: self.recipe.look().0,
             iteration: point.iteration,
             seconds: point.seconds,
             training_loss: point.training_loss,
@@ -304,8 +250,8 @@ impl Finished {
 }
 
 #[derive(Serialize)]
-struct CurveRow<'a> {
-    network: &'a str,
+struct CurveRow {
+    network: &'static str,
     recipe: &'static str,
     iteration: usize,
     seconds: f64,
@@ -315,36 +261,29 @@ struct CurveRow<'a> {
 
 /// Held-out loss over wall time and over iterations; colour: network, line style: recipe.
 fn figure(all: &[Finished]) -> Figure {
-    let mut names: Vec<&str> = Vec::new();
-    for one in all {
-        if !names.contains(&&one.spec.name[..]) {
-            names.push(&one.spec.name);
-        }
-    }
-    let recipes = [Recipe::Lm, Recipe::Adam, Recipe::Accurate];
-    let recipes = recipes.map(|recipe| all.iter().find(|one| one.recipe == recipe));
-    let legend = |chart: LineChart| {
-        let recipes = recipes.iter().flatten().map(|one| {
-            let (_, label, style) = one.recipe.look();
-            LegendEntry::line(label, Colour::Black, style)
-        });
-        let networks = names.iter().enumerate();
-        let networks = networks.map(|(k, name)| LegendEntry::line(*name, k, LineStyle::Solid));
-        chart.with_entries(recipes).with_entries(networks)
-    };
+    let mut names: Vec<&str> = all.iter().map(|one| one.spec.name).collect();
+    let mut seen = BTreeSet::new();
+    names.retain(|name| seen.insert(*name));
+    let recipes = [Recipe::Lm, Recipe::Adam, Recipe::Accurate].into_iter();
+    let used = |recipe: &Recipe| all.iter().any(|one| one.recipe == *recipe);
+    let entry = |recipe: Recipe| LegendEntry::line(recipe.look().1, Colour::Black, recipe.look().2);
+    let recipes: Vec<_> = recipes.filter(used).map(entry).collect();
+    let networks = names.iter().enumerate();
+    let networks = networks.map(|(k, name)| LegendEntry::line(*name, k, LineStyle::Solid));
+    let networks: Vec<_> = networks.collect();
     let chart = |label: &str, abscissa: fn(&CurvePoint) -> f64| {
         let curves = all.iter().map(|one| {
             let (key, _, style) = one.recipe.look();
             let colour = names.iter().position(|name| *name == one.spec.name);
             let name = format!("{} {key}", one.spec.name);
-            Series::of(name, &one.trained.curve, |at| {
-                [abscissa(at), at.held_out_loss]
-            })
-            .with_colour(colour.unwrap_or(0))
-            .with_style(style)
+            let point = |at: &CurvePoint| [abscissa(at), at.held_out_loss];
+            let curve = Series::of(name, &one.trained.curve, point).with_style(style);
+            curve.with_colour(colour.unwrap_or(0))
         });
-        let chart = LineChart::new("", Axis::log(label), Axis::log("held-out loss"));
-        legend(chart.with_curves(curves))
+        LineChart::new("", Axis::log(label), Axis::log("held-out loss"))
+            .with_curves(curves)
+            .with_entries(recipes.clone())
+            .with_entries(networks.clone())
     };
     Figure::new("Learning curves", 2)
         .with_panel(chart("wall time [s]", |point| point.seconds))
