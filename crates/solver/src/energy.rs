@@ -123,19 +123,22 @@ pub trait Objective<const D: usize> {
 
 /// The energy of one minimizing movement (eq:fully_discrete_willmore_flow_energy), scaled by `N / (2 eps)`:
 ///
-/// `E(u) = 1/2 |u - u_k|^2 + c/2 |V[u] - u|^2`, with sums over the grid in the step's inner product and
+/// `E(u) = 1/2 |u - a|^2 + c/2 |V[u] - u|^2`, with sums over the grid in the step's inner product and
 /// `c = tau / tautilde^2`,
 ///
-/// so that its Hessian is the identity (or mass matrix) plus what the curvature adds. `u_k` and `c` are inputs of the traced graph: one
-/// trace serves a whole run.
+/// so that its Hessian is the identity (or mass matrix) plus what the curvature adds. The anchor `a` is `u_k` in an implicit Euler step.
+/// Stages of second-order steps have other anchors, and weigh the motion by positive numbers that are fixed during the minimization:
+/// `1/2 |s (u - a)|^2`. Anchor, `c` and `s` are inputs of the traced graph: one trace serves a whole run.
 pub struct MinimizingMovement<const D: usize> {
     linearization: Linearization,
     product_dtype: Option<DType>,
     step: Arc<dyn MeanCurvatureStep<D>>,
     device: ComputeDevice,
-    previous: Value,
+    anchor: Value,
     stiffness: f64,
     stiffness_tensor: Value,
+    /// `s`, where the motion is weighted.
+    factors: Option<Value>,
 }
 
 impl<const D: usize> MinimizingMovement<D> {
@@ -161,20 +164,42 @@ impl<const D: usize> MinimizingMovement<D> {
         products: Precision,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
-        let zeros = Tensor::<D>::zeros([cells; D], (device.device(), device.dtype()));
-        let previous = Value::from(zeros);
+        Self::trace(step, cells, products, false, device)
+    }
+
+    /// As [`Self::with_precision`], with factors of the motion, which are 1 until they are [set](Self::set_factors).
+    pub(crate) fn weighted(
+        step: Arc<dyn MeanCurvatureStep<D>>,
+        cells: usize,
+        products: Precision,
+        device: &ComputeDevice,
+    ) -> Result<Self, Error> {
+        Self::trace(step, cells, products, true, device)
+    }
+
+    fn trace(
+        step: Arc<dyn MeanCurvatureStep<D>>,
+        cells: usize,
+        products: Precision,
+        weighted: bool,
+        device: &ComputeDevice,
+    ) -> Result<Self, Error> {
+        let options = (device.device(), device.dtype());
+        let anchor = Value::from(Tensor::<D>::zeros([cells; D], options));
         let stiffness_tensor = Value::from(device.tensor::<1>(&[1.0], [1]));
-        let graph = Graph::gradient(
-            std::slice::from_ref(&previous),
-            &[previous.clone(), stiffness_tensor.clone()],
-            |inputs| {
-                let u = inputs.variable::<D>(0);
-                let motion = u.clone() - inputs.parameter::<D>(0);
-                let residual = step.apply(u.clone()) - u;
-                let square = |x: Tensor<D>| (x.clone() * step.mass(x)).sum();
-                (square(motion) + square(residual) * inputs.parameter::<1>(1)) * 0.5
-            },
-        )?;
+        let factors = weighted.then(|| Value::from(Tensor::<D>::ones([cells; D], options)));
+        let mut parameters = vec![anchor.clone(), stiffness_tensor.clone()];
+        parameters.extend(factors.clone());
+        let graph = Graph::gradient(std::slice::from_ref(&anchor), &parameters, |inputs| {
+            let u = inputs.variable::<D>(0);
+            let mut motion = u.clone() - inputs.parameter::<D>(0);
+            if weighted {
+                motion = motion * inputs.parameter::<D>(2);
+            }
+            let residual = step.apply(u.clone()) - u;
+            let square = |x: Tensor<D>| (x.clone() * step.mass(x)).sum();
+            (square(motion) + square(residual) * inputs.parameter::<1>(1)) * 0.5
+        })?;
         let extensions = step.extensions();
         let single = products == Precision::Single && step.allows_single_precision();
         let product_dtype = (single && device.dtype() != DType::F32).then_some(DType::F32);
@@ -187,17 +212,18 @@ impl<const D: usize> MinimizingMovement<D> {
             product_dtype,
             step,
             device: device.clone(),
-            previous,
+            anchor,
             stiffness: 1.0,
             stiffness_tensor,
+            factors,
         })
     }
 
-    /// Sets `u_k` and `c = tau / tautilde^2`.
+    /// Sets the anchor and `c = tau / tautilde^2`.
     ///
     /// # Errors
     /// [`Error::Parameter`] unless `c` is positive and finite.
-    pub fn set(&mut self, previous: &Tensor<D>, stiffness: f64) -> Result<(), Error> {
+    pub fn set(&mut self, anchor: &Tensor<D>, stiffness: f64) -> Result<(), Error> {
         if !(stiffness.is_finite() && stiffness > 0.0) {
             return Err(Error::Parameter {
                 name: "tau / tautilde^2",
@@ -205,13 +231,20 @@ impl<const D: usize> MinimizingMovement<D> {
                 expected: "positive and finite",
             });
         }
-        self.previous = previous.clone().into();
+        self.anchor = anchor.clone().into();
         if self.stiffness.to_bits() != stiffness.to_bits() {
             self.stiffness = stiffness;
             self.stiffness_tensor = self.device.tensor::<1>(&[stiffness], [1]).into();
         }
         self.linearization.forget();
         Ok(())
+    }
+
+    /// Sets the factors `s` of the motion.
+    pub(crate) fn set_factors(&mut self, factors: &Tensor<D>) {
+        debug_assert!(self.factors.is_some(), "the energy is not weighted");
+        self.factors = Some(factors.clone().into());
+        self.linearization.forget();
     }
 
     /// `c = tau / tautilde^2`.
@@ -231,8 +264,10 @@ impl<const D: usize> MinimizingMovement<D> {
         }
     }
 
-    fn parameters(&self) -> [Value; 2] {
-        [self.previous.clone(), self.stiffness_tensor.clone()]
+    fn parameters(&self) -> Vec<Value> {
+        let mut parameters = vec![self.anchor.clone(), self.stiffness_tensor.clone()];
+        parameters.extend(self.factors.clone());
+        parameters
     }
 }
 

@@ -15,8 +15,10 @@ use crate::region::Constrained;
 use crate::times::PhaseTimes;
 use crate::{Accuracy, Error, Exit, MeanCurvatureStep, MinimizingMovement, Objective, Region};
 
+mod second_order;
 mod start;
 
+pub use second_order::StepEstimates;
 use start::every_other_node;
 pub use start::{Start, StartKind};
 
@@ -67,6 +69,9 @@ pub struct StepRecord {
     pub start: Start,
     /// What the minimization did.
     pub newton: NewtonInfo,
+    /// How long the step was against what limits it, if it was of second order.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub estimates: Option<StepEstimates>,
     /// Wall time in seconds, which is not stored: records of the same step are the same bytes.
     #[serde(skip)]
     pub seconds: f64,
@@ -94,6 +99,8 @@ pub struct FlowState<const D: usize> {
     pub current: Field<D>,
     /// The phase field one step ago and the size of that step: what the next step extrapolates.
     pub previous: Option<(Field<D>, f64)>,
+    /// The rate of displacement at the end of the last step, in `atanh u` per time: what second-order steps continue.
+    pub rate: Option<Field<D>>,
     /// The last motions on the coarser grids on which steps [begin](WillmoreFlow::begin_on), the finest first.
     pub half_motions: Vec<Field<D>>,
     /// Steps done.
@@ -108,6 +115,7 @@ impl<const D: usize> FlowState<D> {
         Self {
             current,
             previous: None,
+            rate: None,
             half_motions: Vec::new(),
             step,
             time,
@@ -146,6 +154,8 @@ pub struct WillmoreFlow<const D: usize> {
     device: ComputeDevice,
     mcf: Arc<dyn MeanCurvatureStep<D>>,
     energy: MinimizingMovement<D>,
+    /// The same with weights of the motion, from the first second-order step on.
+    weighted: Option<MinimizingMovement<D>>,
     filter: Option<(f64, SpectralFilter)>,
     region: Option<Region<D>>,
     /// Where steps begin, if on the half grid, and what that moved last.
@@ -154,6 +164,8 @@ pub struct WillmoreFlow<const D: usize> {
     current: Tensor<D>,
     /// The phase field one step ago and the size of that step.
     previous: Option<(Tensor<D>, f64)>,
+    /// The rate of displacement at the end of the last step, if that was of second order.
+    rate: Option<Field<D>>,
     step: usize,
     time: f64,
 }
@@ -213,12 +225,14 @@ impl<const D: usize> WillmoreFlow<D> {
             device: device.clone(),
             mcf,
             energy,
+            weighted: None,
             filter: None,
             region: None,
             half: None,
             half_motion: None,
             current,
             previous: None,
+            rate: None,
             step: 0,
             time: 0.0,
         })
@@ -263,6 +277,7 @@ impl<const D: usize> WillmoreFlow<D> {
         Ok(FlowState {
             current: self.field()?,
             previous,
+            rate: self.rate.clone(),
             half_motions: self.half_motions(),
             step: self.step,
             time: self.time,
@@ -283,7 +298,12 @@ impl<const D: usize> WillmoreFlow<D> {
             Some((u, tau)) => Some((fitting(u)?, *tau)),
             None => None,
         };
+        let rate = match &state.rate {
+            Some(rate) => Some(Field::from_values(self.grid, rate.values().to_vec())?),
+            None => None,
+        };
         self.set_half_motions(&state.half_motions)?;
+        self.rate = rate;
         self.current = current;
         self.previous = previous;
         self.step = state.step;
@@ -332,36 +352,81 @@ impl<const D: usize> WillmoreFlow<D> {
 
     fn make_step(&mut self, tau: f64) -> Result<StepRecord, Error> {
         let clock = Instant::now();
+        let (start, origin) = self.start(tau)?;
+        let beginning = clock.elapsed().as_secs_f64();
+        let anchor = self.current.clone();
+        let minimum = self.minimize(&Movement {
+            anchor: &anchor,
+            factors: None,
+            start: &start,
+            tau,
+        })?;
+        let (scale, newton) = (self.energy_scale(), minimum.newton);
+        let record = StepRecord {
+            step: self.step + 1,
+            time: self.time + tau,
+            tau,
+            energy_before: scale * newton.energy_before,
+            energy: scale * newton.energy,
+            willmore_energy: minimum.willmore_energy,
+            start: origin,
+            newton,
+            estimates: None,
+            seconds: clock.elapsed().as_secs_f64(),
+            times: PhaseTimes {
+                start: beginning,
+                ..minimum.times
+            },
+        };
+        self.previous = Some((std::mem::replace(&mut self.current, minimum.u), tau));
+        self.step += 1;
+        self.time += tau;
+        Ok(record)
+    }
+
+    /// The scaled energy counts points; this makes it the paper's, with true L2 norms: `2 eps h^D`, over the factor of the metric.
+    fn energy_scale(&self) -> f64 {
+        2.0 * self.params.eps * self.grid.cell_volume() / self.params.calibration.metric
+    }
+
+    /// Minimizes the energy of a movement from the present phase field, with respect to which the tolerance is meant.
+    fn minimize(&mut self, movement: &Movement<'_, D>) -> Result<Minimum<D>, Error> {
+        let Movement {
+            anchor,
+            factors,
+            start,
+            tau,
+        } = *movement;
         let step = self.step + 1;
         let stiffness = self.params.stiffness(tau);
-        self.energy.set(&self.current, stiffness)?;
-        if self
-            .filter
-            .as_ref()
-            .is_none_or(|(c, _)| c.to_bits() != stiffness.to_bits())
-        {
-            let filter = self.mcf.phase_preconditioner(self.grid.cells(), stiffness);
-            self.filter = Some((stiffness, filter));
-            self.mcf.set_accuracy(&Accuracy {
-                stiffness,
-                tolerance: self.params.newton.tolerance,
-                cg_tolerance: self.params.newton.cg_tolerance,
-            });
-        }
-        let beginning = Instant::now();
-        let (start, origin) = self.start(tau)?;
-        let beginning = beginning.elapsed().as_secs_f64();
+        self.prepare(stiffness);
         let preconditioner = self.filter.as_ref().map(|(_, filter)| {
             Preconditioner::two_level(filter.clone(), &self.grid, self.params.eps, tau)
                 .within(self.region.clone())
         });
-        let (params, device) = (self.params.newton, &self.device);
-        let (energy, current) = (&mut self.energy, &self.current);
+        let (params, device, current) = (self.params.newton, &self.device, &self.current);
+        let energy = match factors {
+            None => &mut self.energy,
+            Some(factors) => {
+                let energy = match &mut self.weighted {
+                    Some(energy) => energy,
+                    none => none.insert(MinimizingMovement::weighted(
+                        self.mcf.clone(),
+                        self.grid.cells(),
+                        params.precision,
+                        device,
+                    )?),
+                };
+                energy.set_factors(factors);
+                energy
+            }
+        };
+        energy.set(anchor, stiffness)?;
         let (u, newton, times) = match &self.region {
-            None => minimize_timed(energy, current, &start, preconditioner, params, device),
+            None => minimize_timed(energy, current, start, preconditioner, params, device),
             Some(region) => {
                 let mut energy = Constrained::new(energy, region, current);
-                let start = energy.hold(start);
+                let start = energy.hold(start.clone());
                 // Adding nothing makes 0.0 of -0.0.
                 minimize_timed(&mut energy, current, &start, preconditioner, params, device)
                     .map(|(u, newton, times)| (energy.hold(u), newton, times))
@@ -383,34 +448,52 @@ impl<const D: usize> WillmoreFlow<D> {
             step,
             field: "phase field",
         })?;
-        // The scaled energy counts points; eps h^D makes it the paper's (true L2 norms).
-        let metric = self.params.calibration.metric;
-        let scale = 2.0 * self.params.eps * self.grid.cell_volume() / metric;
-        let motion = u.clone() - self.current.clone();
+        let mut motion = u.clone() - anchor.clone();
+        if let Some(factors) = factors {
+            motion = motion * factors.clone();
+        }
         let fidelity = 0.5
             * self
                 .device
                 .scalar((motion.clone() * self.mcf.mass(motion)).sum())?;
-        let record = StepRecord {
-            step,
-            time: self.time + tau,
-            tau,
-            energy_before: scale * newton.energy_before,
-            energy: scale * newton.energy,
-            willmore_energy: scale * (newton.energy - fidelity) / (2.0 * tau),
-            start: origin,
+        Ok(Minimum {
+            u,
+            willmore_energy: self.energy_scale() * (newton.energy - fidelity) / (2.0 * tau),
             newton,
-            seconds: clock.elapsed().as_secs_f64(),
-            times: PhaseTimes {
-                start: beginning,
-                ..times
-            },
-        };
-        self.previous = Some((std::mem::replace(&mut self.current, u), tau));
-        self.step = step;
-        self.time += tau;
-        Ok(record)
+            times,
+        })
     }
+
+    /// Fits preconditioner and accuracy to a weight of the curvature.
+    fn prepare(&mut self, stiffness: f64) {
+        let prepared = self.filter.as_ref().map(|(c, _)| c.to_bits());
+        if prepared == Some(stiffness.to_bits()) {
+            return;
+        }
+        let filter = self.mcf.phase_preconditioner(self.grid.cells(), stiffness);
+        self.filter = Some((stiffness, filter));
+        self.mcf.set_accuracy(&Accuracy {
+            stiffness,
+            tolerance: self.params.newton.tolerance,
+            cg_tolerance: self.params.newton.cg_tolerance,
+        });
+    }
+}
+
+/// One minimization: what it is centred at, the factors of the motion if it is weighted, where it begins, and its time step.
+struct Movement<'a, const D: usize> {
+    anchor: &'a Tensor<D>,
+    factors: Option<&'a Tensor<D>>,
+    start: &'a Tensor<D>,
+    tau: f64,
+}
+
+/// The result of one minimization.
+struct Minimum<const D: usize> {
+    u: Tensor<D>,
+    willmore_energy: f64,
+    newton: NewtonInfo,
+    times: PhaseTimes,
 }
 
 /// Mean curvature flow by repeated application of a step: the learned operator (eq:mcf_operator_discrete) or another.

@@ -69,6 +69,7 @@
 //! seven digits, so that a minimization can end with [`Exit::Precision`] before a tight tolerance.
 
 mod cg;
+mod displacement;
 mod energy;
 mod error;
 mod flow;
@@ -82,7 +83,8 @@ mod times;
 pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective, Precision};
 pub use error::{Error, StepFailure};
 pub use flow::{
-    FlowParams, FlowState, MeanCurvatureFlow, Start, StartKind, StepRecord, WillmoreFlow,
+    FlowParams, FlowState, MeanCurvatureFlow, Start, StartKind, StepEstimates, StepRecord,
+    WillmoreFlow,
 };
 pub use model::Factors;
 pub use newton::{Exit, Method, NewtonInfo, NewtonParams, minimize};

@@ -6,4 +6,5 @@ mod flow;
 mod minimization;
 mod profile;
 mod region;
+mod second_order;
 mod start;

@@ -10,7 +10,7 @@ pub fn device() -> ComputeDevice {
     ComputeDevice::default_compiled().unwrap()
 }
 
-fn ratios(dimension: usize) -> Ratios {
+pub fn ratios(dimension: usize) -> Ratios {
     Ratios {
         dimension,
         width: 17,

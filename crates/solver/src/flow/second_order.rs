@@ -1,0 +1,246 @@
+//! Time steps of second order, as two minimizations.
+//!
+//! The diagonally implicit Runge-Kutta method SDIRK2 (Alexander 1977; `gamma = 1 - 1/sqrt 2`, L-stable) is, written in the states
+//! themselves, two implicit Euler steps of size `gamma tau`: from `u_k` to `U`, and from the anchor `u_k + (1 + sqrt 2)(U - u_k)` to
+//! `u_{k+1}`. Both are minimizing movements. The anchor is formed by displacement, in `atanh u`, so that it is a phase field with the
+//! optimal profile again; and motions are weighted by the [factor](crate::displacement::metric_weight) by which the `L2` metric is too weak for
+//! long ones. See `docs/time-steps.md`.
+
+use std::time::Instant;
+
+use burn::tensor::Tensor;
+use geometry::Field;
+use serde::{Deserialize, Serialize};
+
+use super::{Minimum, Movement, StepRecord, WillmoreFlow, download};
+use crate::displacement::{displaced, displacement, metric_weight, on_interface};
+use crate::times::PhaseTimes;
+use crate::{Error, NewtonInfo, Start, StartKind};
+
+/// `gamma = 1 - 1/sqrt 2`: the size of a stage over that of the step.
+const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
+/// `1 + sqrt 2 = (1 - gamma) / gamma`: how much further than the first stage the anchor of the second is displaced.
+const FURTHER: f64 = 1.0 + std::f64::consts::SQRT_2;
+/// The longest displacement that a start anticipates, in units of `4 eps / 3`.
+const FARTHEST: f64 = 1.5;
+
+/// Lengths that say how good a step of second order is, largest over the interface.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StepEstimates {
+    /// The estimated local time error, from the rates of the two stages and of the step before: of third order in the step. None in the
+    /// first two steps, which lack that rate, or have that of a corner.
+    pub error: Option<f64>,
+    /// How far the interface moved.
+    pub motion: f64,
+    /// The longer of the displacements of the two stages, from `u_k` to `U` and from there to `u_{k+1}`.
+    pub displacement: f64,
+}
+
+/// The rates of displacement of a step, in `atanh u` per time, at its stages.
+struct Rates<const D: usize> {
+    first: Field<D>,
+    second: Field<D>,
+}
+
+impl<const D: usize> WillmoreFlow<D> {
+    /// One step of second order of size `tau`, in two minimizations, if `accept` takes it: it is shown the record with its
+    /// [estimates](StepEstimates). Otherwise the flow stays where it was. Starts on half grids are not used.
+    ///
+    /// In the record, `energy_before` and `energy` are `2 tau w` of the Willmore energies before and after the step, as the scheme measures them.
+    ///
+    /// # Errors
+    /// As [`Self::advance`]; the flow stays where it was.
+    pub fn advance_second_order(
+        &mut self,
+        tau: f64,
+        accept: impl FnOnce(&StepRecord) -> bool,
+    ) -> Result<(StepRecord, bool), Error> {
+        let clock = Instant::now();
+        let before = self.field()?;
+        let stage = GAMMA * tau;
+
+        let anticipated = self.anticipated(stage)?;
+        let start = before.zip_map(&limited(&anticipated), displaced)?;
+        let first = self.stage(&before, &anticipated, &start, stage)?;
+        let middle = download(&self.grid, &first.u, &self.device)?;
+
+        let moved = middle.zip_map(&before, displacement)?;
+        let further = moved.map(|y| FURTHER * y);
+        let anchor = self.anchor(&before, &middle, &further)?;
+        let start = middle.zip_map(&further, displaced)?;
+        let second = self.stage(&anchor, &moved, &start, stage)?;
+        let after = download(&self.grid, &second.u, &self.device)?;
+
+        let rate = |to: &Field<D>, from: &Field<D>| -> Result<Field<D>, Error> {
+            Ok(to.zip_map(from, |u, v| displacement(u, v) / stage)?)
+        };
+        let rates = Rates {
+            first: rate(&middle, &before)?,
+            second: rate(&after, &anchor)?,
+        };
+        let estimates = self.estimates([&before, &middle, &after], &rates, tau)?;
+        let record = self.second_order_record(tau, &first, &second, estimates, clock);
+        let accepted = accept(&record);
+        if accepted {
+            self.current = second.u;
+            self.previous = None;
+            self.rate = Some(rates.second);
+            self.step += 1;
+            self.time += tau;
+        }
+        Ok((record, accepted))
+    }
+
+    /// `u_k + (1 + sqrt 2)(U - u_k)`: for long steps as a displacement, for short ones as a linear combination.
+    ///
+    /// A linear combination is no profile. Beyond one `eps` it overshoots the pure phases without being further away, and the step lags. A
+    /// displaced phase field is one, but the `L2` metric measures it in a straight line: on a surface of curvature `h` steps of length `d` go
+    /// too far by a part of order `h d`, which is of first order in time. Either is used where its error is the smaller one, and the order stays two.
+    fn anchor(
+        &self,
+        before: &Field<D>,
+        middle: &Field<D>,
+        further: &Field<D>,
+    ) -> Result<Field<D>, Error> {
+        /// The displacement of the anchor, in units of `4 eps / 3`, at which both count alike.
+        const ALIKE: f64 = 0.1;
+        let longest = largest(further, middle);
+        let weight = longest * longest / (longest * longest + ALIKE * ALIKE);
+        let along = before.zip_map(further, displaced)?;
+        let straight = before.zip_map(middle, |u, v| u + FURTHER * (v - u))?;
+        Ok(along.zip_map(&straight, |along, straight| {
+            straight + weight * (along - straight)
+        })?)
+    }
+
+    /// One stage: the minimization from an anchor, weighted for the displacement that is expected of it.
+    fn stage(
+        &mut self,
+        anchor: &Field<D>,
+        expected: &Field<D>,
+        start: &Field<D>,
+        tau: f64,
+    ) -> Result<Minimum<D>, Error> {
+        let tensor = |field: &Field<D>| -> Tensor<D> {
+            self.device.tensor(field.values(), self.grid.shape())
+        };
+        let factors = tensor(&expected.map(|y| metric_weight(y).sqrt()));
+        let (anchor, start) = (tensor(anchor), tensor(start));
+        self.minimize(&Movement {
+            anchor: &anchor,
+            factors: Some(&factors),
+            start: &start,
+            tau,
+        })
+    }
+
+    /// The displacement in the time `tau` at the rate of the last step, on the interface.
+    fn anticipated(&self, tau: f64) -> Result<Field<D>, Error> {
+        /// Where `(1 - u^2)^2` is less than this, rates are not continued.
+        const WINDOW: f64 = 1e-3;
+        let Some(rate) = &self.rate else {
+            return Ok(Field::constant(self.grid, 0.0));
+        };
+        let window = self.field()?.map(|u| {
+            let weight = on_interface(u);
+            weight / (weight + WINDOW)
+        });
+        Ok(rate.zip_map(&window, |rate, window| rate * window * tau)?)
+    }
+
+    /// The lengths that a step is judged by, `[u_k, U, u_{k+1}]` being its states.
+    ///
+    /// The rates at the times `0`, `gamma tau` and `tau` of the step are `F_0`, that of the second stage of the step before, `F_1` and `F_2`.
+    /// The quadrature with weights `b` that is exact for quadratic rates differs from the step's own, `1 - gamma` and `gamma`, by the local error:
+    /// `tau |b_0 F_0 + (b_1 - 1 + gamma) F_1 + (b_2 - gamma) F_2|`.
+    fn estimates(
+        &self,
+        [before, middle, after]: [&Field<D>; 3],
+        rates: &Rates<D>,
+        tau: f64,
+    ) -> Result<StepEstimates, Error> {
+        const FIRST: f64 = 1.0 / (6.0 * GAMMA * (1.0 - GAMMA));
+        const SECOND: f64 = (2.0 - 3.0 * GAMMA) / (6.0 * (1.0 - GAMMA));
+        /// Steps that have no estimate.
+        const WITHOUT: usize = 2;
+        let unit = 4.0 * self.params.eps / 3.0;
+        let between = |to: &Field<D>, from: &Field<D>| -> Result<f64, Error> {
+            Ok(unit * largest(&to.zip_map(from, displacement)?, middle))
+        };
+        let error = match &self.rate {
+            Some(start) if self.step >= WITHOUT => {
+                let stages = rates.first.zip_map(&rates.second, |first, second| {
+                    (FIRST - 1.0 + GAMMA) * first + (SECOND - GAMMA) * second
+                })?;
+                let error = stages.zip_map(start, |stages, start| {
+                    tau * (stages + (1.0 - FIRST - SECOND) * start)
+                })?;
+                Some(unit * largest(&error, middle))
+            }
+            _ => None,
+        };
+        Ok(StepEstimates {
+            error,
+            motion: between(after, before)?,
+            displacement: between(middle, before)?.max(between(after, middle)?),
+        })
+    }
+
+    fn second_order_record(
+        &self,
+        tau: f64,
+        first: &Minimum<D>,
+        second: &Minimum<D>,
+        estimates: StepEstimates,
+        clock: Instant,
+    ) -> StepRecord {
+        let (one, two) = (first.newton, second.newton);
+        // At u_k nothing has moved, and the energy is that of the curvature.
+        let at_rest = self.energy_scale() * one.energy_before / (2.0 * GAMMA * tau);
+        let kind = match self.rate {
+            Some(_) => StartKind::Extrapolated,
+            None => StartKind::Rest,
+        };
+        StepRecord {
+            step: self.step + 1,
+            time: self.time + tau,
+            tau,
+            energy_before: 2.0 * tau * at_rest,
+            energy: 2.0 * tau * second.willmore_energy,
+            willmore_energy: second.willmore_energy,
+            start: Start { kind, hvp: 0.0 },
+            newton: NewtonInfo {
+                newton: one.newton + two.newton,
+                hvp: one.hvp + two.hvp,
+                values: one.values + two.values,
+                gradients: one.gradients + two.gradients,
+                negative_curvature: one.negative_curvature + two.negative_curvature,
+                ..two
+            },
+            estimates: Some(estimates),
+            seconds: clock.elapsed().as_secs_f64(),
+            times: PhaseTimes {
+                products: first.times.products + second.times.products,
+                preconditioner: first.times.preconditioner + second.times.preconditioner,
+                assembly: first.times.assembly + second.times.assembly,
+                energies: first.times.energies + second.times.energies,
+                start: 0.0,
+            },
+        }
+    }
+}
+
+/// The largest size of a displacement on the interface of `u`.
+fn largest<const D: usize>(displacement: &Field<D>, u: &Field<D>) -> f64 {
+    let values = displacement.values().iter().zip(u.values());
+    let on = values.filter(|(_, u)| on_interface(**u) > 0.5);
+    on.fold(0.0, |most: f64, (y, _)| most.max(y.abs()))
+}
+
+/// The displacements, scaled down so that none is longer than a start may anticipate.
+fn limited<const D: usize>(displacement: &Field<D>) -> Field<D> {
+    let values = displacement.values().iter();
+    let longest = values.fold(0.0, |most: f64, y| most.max(y.abs()));
+    let factor = (FARTHEST / longest.max(FARTHEST)).min(1.0);
+    displacement.map(|y| factor * y)
+}

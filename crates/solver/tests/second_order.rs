@@ -1,0 +1,194 @@
+//! Time steps of second order: their order, their estimates, and what is not accepted.
+
+use crate::common::{device, ratios};
+use geometry::measure::l2_distance;
+use geometry::shapes::{Ellipse, Torus};
+use geometry::{Field, Grid, SignedDistance, phase_field};
+use model::Shipped;
+use solver::{Error, FlowParams, NewtonParams, StepRecord, WillmoreFlow};
+
+/// `2^-14`, the time step of the paper's experiments in 2D.
+const UNIT: f64 = 6.103_515_625e-5;
+
+/// Accurate enough that errors are those of the time steps.
+fn newton() -> NewtonParams {
+    NewtonParams {
+        tolerance: 1e-4,
+        cg_tolerance: 0.01,
+        ..NewtonParams::default()
+    }
+}
+
+fn flow_of<const D: usize>(cells: usize, shape: &impl SignedDistance<D>) -> WillmoreFlow<D> {
+    let grid = Grid::per_unit(cells, 1.0).unwrap();
+    let network = Shipped::Accurate.find(ratios(D)).unwrap();
+    let params = FlowParams {
+        eps: 2.0 * grid.spacing(),
+        mcf_step: grid.spacing().powi(2),
+        newton: newton(),
+        calibration: network.calibration().unwrap().factors,
+    };
+    let start = phase_field(grid, shape, params.eps).unwrap();
+    WillmoreFlow::with_network(&network, &start, params, &device()).unwrap()
+}
+
+fn ellipse() -> WillmoreFlow<2> {
+    flow_of(64, &Ellipse::new([0.3, 0.2]).unwrap())
+}
+
+fn step<const D: usize>(flow: &mut WillmoreFlow<D>, tau: f64) -> StepRecord {
+    let (record, accepted) = flow.advance_second_order(tau, |_| true).unwrap();
+    assert!(accepted);
+    record
+}
+
+/// Distances of runs with 2, 4, 8, ... steps from one with four times as many as the longest of them, from a start whose profile has
+/// relaxed.
+fn time_errors<const D: usize>(
+    flow: &mut WillmoreFlow<D>,
+    time: f64,
+    halvings: u32,
+    step: impl Fn(&mut WillmoreFlow<D>, f64),
+) -> Vec<f64> {
+    for _ in 0..4 {
+        step(flow, 0.25 * time);
+    }
+    let start = flow.state().unwrap();
+    let mut after = |count: u32| -> Field<D> {
+        flow.restore(&start).unwrap();
+        for _ in 0..count {
+            step(flow, time / f64::from(count));
+        }
+        flow.field().unwrap()
+    };
+    let truth = after(8 << halvings);
+    let counts = (0..=halvings).map(|k| 2 << k);
+    counts
+        .map(|count| l2_distance(&after(count), &truth).unwrap())
+        .collect()
+}
+
+fn mean_order(errors: &[f64]) -> f64 {
+    let halvings = (errors.len() - 1) as f64;
+    (errors[0] / errors[errors.len() - 1]).log2() / halvings
+}
+
+#[test]
+fn the_order_is_two_in_the_plane() {
+    let second_order = |flow: &mut WillmoreFlow<2>, tau| {
+        step(flow, tau);
+    };
+    let euler = |flow: &mut WillmoreFlow<2>, tau| {
+        flow.advance(tau).unwrap();
+    };
+    let errors = time_errors(&mut ellipse(), 16.0 * UNIT, 3, second_order);
+    let first_order = time_errors(&mut ellipse(), 16.0 * UNIT, 3, euler);
+    let order = mean_order(&errors);
+    assert!((order - 2.0).abs() < 0.15, "{order}: {errors:?}");
+    let order = mean_order(&first_order);
+    assert!((order - 1.0).abs() < 0.15, "{order}: {first_order:?}");
+    let pairs = errors.iter().zip(&first_order);
+    assert!(
+        pairs.clone().all(|(two, one)| 10.0 * two < *one),
+        "{errors:?} {first_order:?}"
+    );
+}
+
+#[test]
+fn the_order_is_two_in_space() {
+    let mut flow = flow_of(32, &Torus::new(0.26, 0.15).unwrap());
+    let errors = time_errors(&mut flow, 4.0 * UNIT, 2, |flow, tau| {
+        step(flow, tau);
+    });
+    let order = mean_order(&errors);
+    assert!((order - 2.0).abs() < 0.3, "{order}: {errors:?}");
+}
+
+#[test]
+fn the_local_error_is_as_estimated() {
+    let mut flow = ellipse();
+    let tau = 2.0 * UNIT;
+    for _ in 0..4 {
+        step(&mut flow, tau);
+    }
+    for _ in 0..3 {
+        let before = flow.state().unwrap();
+        for _ in 0..16 {
+            step(&mut flow, tau / 16.0);
+        }
+        let truth = flow.field().unwrap();
+        flow.restore(&before).unwrap();
+        let estimates = step(&mut flow, tau).estimates.unwrap();
+        let made = flow.field().unwrap();
+        // The largest distance between the interfaces: the phase fields differ by the slope times it.
+        let slope = |u: f64| (1.0 - u * u) * 0.75 * 32.0;
+        let pairs = made.values().iter().zip(truth.values());
+        let on = pairs.filter(|(u, _)| u.abs() < 0.5);
+        let error = on.fold(0.0, |most: f64, (u, v)| most.max((u - v).abs() / slope(*u)));
+        let estimated = estimates.error.unwrap();
+        assert!(
+            error < 3.0 * estimated && estimated < 10.0 * error,
+            "{estimated:e} estimated, {error:e}"
+        );
+        assert!(estimates.displacement < estimates.motion);
+    }
+}
+
+#[test]
+fn the_energy_falls_in_long_steps_too() {
+    let mut flow = ellipse();
+    for tau in [1.0, 8.0, 64.0, 64.0].map(|steps| steps * UNIT) {
+        let record = step(&mut flow, tau);
+        assert!(record.energy < record.energy_before, "{record:?}");
+    }
+}
+
+#[test]
+fn a_step_that_is_not_accepted_leaves_no_trace() {
+    let (mut flow, mut other) = (ellipse(), ellipse());
+    step(&mut flow, UNIT);
+    step(&mut other, UNIT);
+    let state = flow.state().unwrap();
+    let (_, accepted) = flow.advance_second_order(4.0 * UNIT, |_| false).unwrap();
+    assert!(!accepted);
+    assert_eq!(flow.state().unwrap(), state);
+    let error = flow.advance_second_order(f64::NAN, |_| true).unwrap_err();
+    assert!(matches!(error, Error::Parameter { .. }), "{error}");
+    assert_eq!(flow.state().unwrap(), state);
+    step(&mut flow, 2.0 * UNIT);
+    step(&mut other, 2.0 * UNIT);
+    assert_eq!(flow.state().unwrap(), other.state().unwrap());
+}
+
+#[test]
+fn a_restored_flow_continues_with_the_same_bytes() {
+    let (mut whole, mut restored) = (ellipse(), ellipse());
+    step(&mut whole, UNIT);
+    step(&mut whole, UNIT);
+    restored.restore(&whole.state().unwrap()).unwrap();
+    for tau in [UNIT, 2.0 * UNIT] {
+        let (one, two) = (step(&mut whole, tau), step(&mut restored, tau));
+        assert_eq!(one.newton, two.newton);
+        assert_eq!(one.estimates, two.estimates);
+    }
+    assert_eq!(whole.state().unwrap(), restored.state().unwrap());
+}
+
+#[test]
+fn outside_a_region_nothing_moves() {
+    let mut flow = ellipse();
+    let grid = *flow.field().unwrap().grid();
+    let inside: Vec<bool> = (0..grid.len()).map(|i| grid.node(i)[0] > 0.1).collect();
+    flow.restrict_to(&inside).unwrap();
+    let start = flow.field().unwrap();
+    for _ in 0..2 {
+        let record = step(&mut flow, 4.0 * UNIT);
+        assert!(record.energy < record.energy_before);
+    }
+    let end = flow.field().unwrap();
+    let values = start.values().iter().zip(end.values()).zip(&inside);
+    for ((before, after), &moves) in values.clone() {
+        assert!(moves || before.to_bits() == after.to_bits());
+    }
+    assert!(values.clone().any(|((a, b), _)| (a - b).abs() > 0.1));
+}
