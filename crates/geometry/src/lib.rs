@@ -66,6 +66,7 @@ pub mod measure;
 pub mod npy;
 pub mod shapes;
 pub mod vti;
+pub mod zero_set;
 
 pub use clifford::CliffordTorus;
 pub use distance::{Rotation, SignedDistance, SignedDistanceExt};
@@ -75,3 +76,4 @@ pub use grid::Grid;
 pub use placement::Placement;
 pub use profile::{distance_from_phase_field, optimal_profile, phase_field};
 pub use up::UpAxis;
+pub use zero_set::ZeroSet;

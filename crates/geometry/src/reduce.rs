@@ -15,5 +15,6 @@ pub(crate) fn sum(len: usize, term: impl Fn(usize) -> f64 + Sync) -> f64 {
                 .sum()
         })
         .collect();
-    partial.iter().sum()
+    // Not `sum`, which is -0.0 of nothing.
+    partial.iter().fold(0.0, |total, part| total + part)
 }

@@ -7,6 +7,7 @@ mod files;
 mod fuzzing;
 mod grids;
 mod measures;
+mod zero_sets;
 
 #[global_allocator]
 static ALLOCATOR: ::fuzzing::CountingAllocator = ::fuzzing::CountingAllocator;

@@ -1,0 +1,278 @@
+//! Measures of the zero set against exact values, their derivatives, and where they do not hold.
+
+use std::f64::consts::PI;
+
+use geometry::shapes::{Ball, Cuboid, Ellipse, Torus};
+use geometry::zero_set::{Sizes, ball_perimeter, reduced_volume};
+use geometry::{
+    Error, Field, Grid, SignedDistance, SignedDistanceExt, ZeroSet, exact, phase_field,
+};
+
+/// The ellipsoid of revolution about the third axis: the distance is that of the ellipse which is its profile.
+struct Spheroid(Ellipse);
+
+impl SignedDistance<3> for Spheroid {
+    fn signed_distance(&self, [x, y, z]: [f64; 3]) -> f64 {
+        self.0.signed_distance([x.hypot(y), z])
+    }
+}
+
+/// At 64 cells per unit length and `eps = 2h`.
+fn measured<const D: usize>(side: f64, shape: &impl SignedDistance<D>) -> ZeroSet {
+    let grid = Grid::<D>::per_unit(64, side).unwrap();
+    let eps = 2.0 * grid.spacing();
+    ZeroSet::of(&phase_field(grid, shape, eps).unwrap(), eps).unwrap()
+}
+
+/// Perimeter, volume and integrals of k and k^2/2 of the spheroid by the midpoint rule on its profile (spectral in the angle).
+fn spheroid(a: f64, c: f64) -> [f64; 4] {
+    let n = 20_000;
+    let mut sums = [0.0; 4];
+    for i in 0..n {
+        let t = PI * (f64::from(i) + 0.5) / f64::from(n);
+        let (s, co) = t.sin_cos();
+        let speed = (a * a * co * co + c * c * s * s).sqrt();
+        let area = 2.0 * PI * a * s * speed * PI / f64::from(n);
+        let k = a * c / speed.powi(3) + c / (a * speed);
+        sums[0] += area;
+        sums[2] += k * area;
+        sums[3] += 0.5 * k * k * area;
+    }
+    sums[1] = 4.0 / 3.0 * PI * a * a * c;
+    sums
+}
+
+fn ellipse(a: f64, b: f64) -> [f64; 4] {
+    let n = 2000;
+    let mut sums = [0.0, PI * a * b, 2.0 * PI, 0.0];
+    for i in 0..n {
+        let (s, c) = (2.0 * PI * f64::from(i) / f64::from(n)).sin_cos();
+        let speed = (a * a * s * s + b * b * c * c).sqrt();
+        let length = speed * 2.0 * PI / f64::from(n);
+        sums[0] += length;
+        sums[3] += 0.5 * (a * b / speed.powi(3)).powi(2) * length;
+    }
+    sums
+}
+
+fn close(found: &ZeroSet, exact: [f64; 4]) {
+    let values = [
+        found.perimeter,
+        found.volume,
+        found.mean_curvature,
+        found.willmore_energy,
+    ];
+    for ((value, exact), bound) in values.iter().zip(exact).zip([1e-6, 1e-8, 1e-5, 5e-4]) {
+        assert!(
+            (value / exact - 1.0).abs() < bound,
+            "{value} {exact}: {found:?}"
+        );
+    }
+    assert!(found.sizes_hold(), "{found:?}");
+}
+
+#[test]
+fn spheres_and_discs() {
+    for radius in [0.17, 0.25, 0.3] {
+        let sphere = Ball::new([0.003, 0.005, 0.002], radius).unwrap();
+        let exact = [
+            4.0 * PI * radius * radius,
+            4.0 / 3.0 * PI * radius.powi(3),
+            8.0 * PI * radius,
+            exact::WILLMORE_ENERGY_SPHERE,
+        ];
+        close(&measured(1.0, &sphere), exact);
+        let disc = Ball::new([0.003, 0.005], radius).unwrap();
+        let exact = [
+            2.0 * PI * radius,
+            PI * radius * radius,
+            2.0 * PI,
+            exact::willmore_energy_circle(radius),
+        ];
+        close(&measured(1.0, &disc), exact);
+    }
+}
+
+#[test]
+fn spheroids_ellipses_and_a_torus() {
+    for [a, c] in [[0.3, 0.2], [0.2, 0.3]] {
+        let profile = Ellipse::new([a, c]).unwrap();
+        close(&measured(1.0, &Spheroid(profile)), spheroid(a, c));
+        close(&measured(1.0, &profile), ellipse(a, c));
+    }
+    let (major, minor) = (0.32, 0.17);
+    let torus = measured(1.25, &Torus::new(major, minor).unwrap());
+    let area = 4.0 * PI * PI * major * minor;
+    let energy = exact::willmore_energy_torus(major, minor);
+    close(&torus, [area, 0.5 * area * minor, area / minor, energy]);
+}
+
+#[test]
+fn what_bends_too_sharply_is_said_to() {
+    let disc = measured(1.0, &Ball::new([0.003, 0.005], 0.25).unwrap());
+    assert!(disc.curvatures_hold(), "{disc:?}");
+    assert!((disc.smallest_radius - 16.0).abs() < 0.6, "{disc:?}");
+    // Sizes hold for longer than curvatures.
+    let small = measured(1.0, &Ball::new([0.003, 0.005], 0.1).unwrap());
+    assert!(small.sizes_hold() && !small.curvatures_hold(), "{small:?}");
+    assert!((small.perimeter / (0.2 * PI) - 1.0).abs() < 1e-5);
+    let corners = measured(1.0, &Cuboid::new([0.3, 0.2]).unwrap());
+    let edges = measured(1.0, &Cuboid::new([0.3, 0.2, 0.25]).unwrap());
+    let sheet = measured(1.0, &Ellipse::new([0.3, 0.06]).unwrap());
+    let near = |x: f64| Ball::new([x, 0.0], 0.15).unwrap();
+    let contact = measured(1.0, &near(-0.17).union(near(0.17)));
+    for shape in [corners, edges, sheet, contact] {
+        assert!(!shape.sizes_hold() && !shape.curvatures_hold(), "{shape:?}");
+    }
+}
+
+#[test]
+fn no_zero_set_has_no_size() {
+    let grid = Grid::<2>::new(16, 2.0).unwrap();
+    for (value, volume) in [(-1.0, 0.0), (1.0, 4.0)] {
+        let found = ZeroSet::of(&Field::constant(grid, value), 0.25).unwrap();
+        let sums = [
+            found.perimeter,
+            found.mean_curvature,
+            found.willmore_energy,
+            found.spread,
+        ];
+        assert!(sums.iter().all(|sum| sum.to_bits() == 0), "{found:?}");
+        assert!((found.volume - volume).abs() < 1e-14);
+        assert!(found.smallest_radius.is_infinite());
+    }
+    let u = Field::constant(grid, 0.0);
+    for eps in [0.0, f64::NAN] {
+        assert!(matches!(
+            ZeroSet::of(&u, eps),
+            Err(Error::InvalidParameter { .. })
+        ));
+    }
+    let broken = u.map(|_| f64::NAN);
+    assert!(matches!(
+        ZeroSet::of(&broken, 0.25),
+        Err(Error::NonFinite { .. })
+    ));
+}
+
+#[test]
+fn reduced_volumes_are_one_for_balls() {
+    assert!((reduced_volume(2, 2.0 * PI * 0.3, PI * 0.09) - 1.0).abs() < 1e-14);
+    assert!((reduced_volume(3, 4.0 * PI * 0.09, 4.0 / 3.0 * PI * 0.027) - 1.0).abs() < 1e-14);
+    // A cube: 6 sqrt(pi) / 6^(3/2).
+    let cube = (PI / 6.0).sqrt();
+    assert!((reduced_volume(3, 6.0, 1.0) - cube).abs() < 1e-14);
+    assert!((ball_perimeter(3, 1.0) - 6.0 * cube.powf(2.0 / 3.0)).abs() < 1e-13);
+}
+
+/// A phase field that is no exact profile, and a direction in which noise moves its interface and bends its profile.
+fn perturbed<const D: usize>() -> (Field<D>, Vec<f64>, f64) {
+    let grid = Grid::<D>::centred(32, 1.0).unwrap();
+    let eps = 2.0 * grid.spacing();
+    let wave = |x: [f64; D], k: f64| {
+        x.iter()
+            .enumerate()
+            .map(|(i, x)| (k * x + i as f64).sin())
+            .sum::<f64>()
+    };
+    let ball = Ball::new([0.01; D], 0.27).unwrap();
+    let u = phase_field(grid, &ball, eps).unwrap();
+    let bend = Field::from_fn(grid, |x| 0.05 * wave(x, 14.0));
+    let u = u.zip_map(&bend, |u, b| u + b * (1.0 - u * u)).unwrap();
+    let noise = Field::from_fn(grid, |x| (1e4 * wave(x, 97.0)).sin() + wave(x, 7.0));
+    let p = u.zip_map(&noise, |u, b| b * (1.0 - u * u)).unwrap();
+    (u, p.into_values(), eps)
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Remainders of first and second order fall by four and by eight when the step is halved.
+fn taylor<const D: usize>() {
+    let (u, p, eps) = perturbed::<D>();
+    let moved = |t: f64| {
+        let values = u.values().iter().zip(&p).map(|(u, p)| u + t * p).collect();
+        Sizes::of(&Field::from_values(*u.grid(), values).unwrap(), eps).unwrap()
+    };
+    for weights in [[1.0, 0.0], [0.0, 1.0], [0.7, -2.0]] {
+        let value = |s: &Sizes<D>| weights[0] * s.perimeter() + weights[1] * s.volume();
+        let at = moved(0.0);
+        let combined: Vec<f64> = (at.perimeter_gradient().iter())
+            .zip(at.volume_gradient())
+            .map(|(perimeter, volume)| weights[0] * perimeter + weights[1] * volume)
+            .collect();
+        let (start, slope) = (value(&at), dot(&combined, &p));
+        let hessian = at.second_derivative(weights);
+        let product = |p: &[f64]| {
+            let mut product = vec![0.0; p.len()];
+            hessian.multiply(|node| p[node], |node, value| product[node] = value);
+            product
+        };
+        let curvature = dot(&p, &product(&p));
+        let remainders = [0.01, 0.005, 0.0025].map(|t| {
+            let first = value(&moved(t)) - start - t * slope;
+            [first, first - 0.5 * t * t * curvature]
+        });
+        for pair in remainders.windows(2) {
+            for (order, least) in [1.9, 2.8].into_iter().enumerate() {
+                let rate = (pair[0][order] / pair[1][order]).abs().log2();
+                assert!(
+                    rate > least,
+                    "{D}D {weights:?} order {order}: {rate} of {remainders:?}"
+                );
+            }
+        }
+        let q: Vec<f64> = p
+            .iter()
+            .enumerate()
+            .map(|(i, p)| p * (i as f64).cos())
+            .collect();
+        let (one, other) = (dot(&q, &product(&p)), dot(&p, &product(&q)));
+        assert!(
+            (one - other).abs() < 1e-12 * one.abs().max(curvature.abs()),
+            "{one} {other}"
+        );
+    }
+}
+
+#[test]
+fn derivatives_of_the_sizes_pass_taylor_tests() {
+    taylor::<2>();
+    taylor::<3>();
+}
+
+#[test]
+fn gradients_of_the_sizes_are_those_of_a_moving_interface() {
+    // d(perimeter) = int k v, d(volume) = int v for the normal velocity v = 1: motion 3 q / (4 eps).
+    let grid = Grid::<3>::per_unit(64, 1.0).unwrap();
+    let (eps, radius) = (2.0 * grid.spacing(), 0.25);
+    let u = phase_field(
+        grid,
+        &Ball::new([0.003, 0.005, 0.002], radius).unwrap(),
+        eps,
+    )
+    .unwrap();
+    let sizes = Sizes::of(&u, eps).unwrap();
+    let outwards: Vec<f64> = (u.values().iter())
+        .map(|u| 0.75 / eps * (1.0 - u * u))
+        .collect();
+    let area = 4.0 * PI * radius * radius;
+    let volume = dot(&sizes.volume_gradient(), &outwards);
+    let perimeter = dot(&sizes.perimeter_gradient(), &outwards);
+    assert!((volume / area - 1.0).abs() < 1e-6, "{volume} {area}");
+    assert!(
+        (perimeter / (area * 2.0 / radius) - 1.0).abs() < 1e-5,
+        "{perimeter}"
+    );
+    let curvature = sizes.mean_curvature();
+    for (node, k) in curvature.iter().enumerate().filter(|(_, k)| **k != 0.0) {
+        let distance = -4.0 / 3.0 * eps * u.values()[node].atanh();
+        if distance.abs() < 3.0 * grid.spacing() {
+            assert!(
+                (k * (radius + distance) / 2.0 - 1.0).abs() < 1e-3,
+                "{k} at {distance}"
+            );
+        }
+    }
+}
