@@ -54,7 +54,7 @@ pub enum Error {
     },
     /// The curve cannot be resolved any more, as before a singularity.
     #[error(
-        "{points} points do not resolve the curve at time {time:.6e}; the flow may be singular there"
+        "{points} points do not resolve the curve at time {time:.6e}; the flow may be singular there, or the start needs more points"
     )]
     Unresolved {
         /// Points of the curve.

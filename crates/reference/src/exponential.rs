@@ -3,7 +3,7 @@
 use realfft::num_complex::Complex;
 
 use crate::flow::{Nodes, Rates};
-use crate::spectral::Coefficients;
+use crate::spectral::{Coefficients, collect};
 use crate::stepping::{Attempts, Method};
 use crate::{Curve, Flow};
 
@@ -39,7 +39,7 @@ impl Method for Exponential {
             let difference = |i: usize| (twice[i] - once[i]) / 15.0;
             let squares = (0..=modes).map(|i| difference(i).norm_sqr()).sum::<f64>();
             let late = difference(modes + 3).re / curve.clock(self.flow);
-            let end: Coefficients = (0..twice.len()).map(|i| twice[i] + difference(i)).collect();
+            let end = collect(twice.len(), |i| twice[i] + difference(i));
             let (angle, scalars) = end.split_at(modes);
             let end = Curve {
                 grid: curve.grid.clone(),
@@ -68,9 +68,7 @@ impl Exponential {
         let [x, y] = rates.centre;
         let clock = scale.powi(self.flow.order());
         let all = with_scalars(&rates.angle, [rates.log_scale, scale * x, scale * y, clock]);
-        (0..all.len())
-            .map(|i| all[i] - state[i] * linear[i])
-            .collect()
+        collect(all.len(), |i| all[i] - state[i] * linear[i])
     }
 }
 
