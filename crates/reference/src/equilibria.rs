@@ -13,6 +13,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use crate::dense::Newton;
+use crate::error::below_one;
 use crate::flow::Nodes;
 use crate::revolution::Surface;
 use crate::shape::MOST_ROUNDING;
@@ -76,7 +77,7 @@ pub struct Elastica {
 /// ```
 ///
 /// # Errors
-/// [`Error::NoEquilibrium`] beyond the ends of a branch.
+/// Reduced volumes must be between 0 and 1; [`Error::NoEquilibrium`] beyond the ends of a branch.
 pub fn vesicles(
     branch: Branch,
     spontaneous_curvature: f64,
@@ -89,7 +90,7 @@ pub fn vesicles(
     };
     path.bend(spontaneous_curvature)?;
     let vesicle = |&ratio: &f64| {
-        path.follow(ratio)?;
+        path.follow(below_one("reduced volume", ratio)?)?;
         let scale = path.problem.scale(&path.state);
         let [pressure, tension] = path.problem.multipliers(&path.state);
         Ok(Vesicle {
@@ -105,11 +106,11 @@ pub fn vesicles(
 /// The elastic curves with the given isoperimetric quotients `4 pi area / length^2`.
 ///
 /// # Errors
-/// [`Error::NoEquilibrium`] beyond the ends of the branch.
+/// Quotients must be between 0 and 1; [`Error::NoEquilibrium`] beyond the ends of the branch.
 pub fn elastica(quotients: &[f64]) -> Result<Vec<Elastica>, Error> {
     let mut path = Path::new(Kind::Elastica, &Shape::ellipse(1.5, 1.0)?)?;
     let curve = |&ratio: &f64| {
-        path.follow(ratio)?;
+        path.follow(below_one("isoperimetric quotient", ratio)?)?;
         let [pressure, tension] = path.problem.multipliers(&path.state);
         Ok(Elastica {
             curve: path.problem.curve(&path.state, 1.0),

@@ -98,3 +98,28 @@ pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64, Error> {
         })
     }
 }
+
+/// All coordinates must be finite.
+pub(crate) fn finite(points: &[[f64; 2]]) -> Result<(), Error> {
+    match points.iter().flatten().find(|x| !x.is_finite()) {
+        Some(&value) => Err(Error::InvalidParameter {
+            name: "coordinate",
+            requirement: "finite",
+            value,
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Reduced volumes and isoperimetric quotients.
+pub(crate) fn below_one(name: &'static str, value: f64) -> Result<f64, Error> {
+    if value > 0.0 && value < 1.0 {
+        Ok(value)
+    } else {
+        Err(Error::InvalidParameter {
+            name,
+            requirement: "between 0 and 1",
+            value,
+        })
+    }
+}

@@ -11,7 +11,7 @@ use crate::{Curve, Error, Flow};
 /// The direction and the length of the edge that leaves a vertex, and the exterior angle there.
 pub(crate) struct Edge {
     direction: f64,
-    length: f64,
+    pub(crate) length: f64,
     pub(crate) angle: f64,
 }
 

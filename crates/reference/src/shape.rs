@@ -1,10 +1,10 @@
 //! Shapes to start from.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use realfft::num_complex::Complex;
 
-use crate::error::positive;
+use crate::error::{finite, positive};
 use crate::polygon::{edges, rounded};
 use crate::spectral::{Grid, collect, power_sum};
 use crate::{Curve, Error, Flow};
@@ -24,8 +24,10 @@ impl Shape {
     /// last one where the direction is turned round.
     ///
     /// # Errors
-    /// It must turn once, by less than half a turn at each vertex.
+    /// Its edges must have lengths, and it must turn once, by less than 179 degrees at each vertex.
     pub fn polygon(mut vertices: Vec<[f64; 2]>) -> Result<Self, Error> {
+        const SHARPEST: f64 = 179.0 / 180.0 * PI;
+        finite(&vertices)?;
         let turning = |vertices: &[[f64; 2]]| {
             let angles = edges(vertices).into_iter().map(|edge| edge.angle);
             angles.sum::<f64>() / TAU
@@ -34,6 +36,13 @@ impl Shape {
             vertices.reverse();
         }
         once(turning(&vertices))?;
+        for edge in edges(&vertices) {
+            positive("length of an edge", edge.length)?;
+            positive(
+                "179 degrees minus an exterior angle",
+                SHARPEST - edge.angle.abs(),
+            )?;
+        }
         Ok(Self(Outline::Polygon(vertices)))
     }
 
@@ -104,6 +113,7 @@ impl Shape {
                 value: points.len() as f64,
             });
         }
+        finite(points)?;
         let mut points = points.to_vec();
         if shoelace(&points) < 0.0 {
             points[1..].reverse();

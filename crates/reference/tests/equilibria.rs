@@ -159,7 +159,10 @@ fn elastic_curves_close_and_enclose_their_area() {
 
 #[test]
 fn ends_of_branches_are_reported() {
-    assert!(matches!(elastica(&[1.1]), Err(Error::NoEquilibrium { .. })));
+    for quotient in [1.1, 0.0, f64::NAN] {
+        let result = elastica(&[quotient]);
+        assert!(matches!(result, Err(Error::InvalidParameter { .. })));
+    }
     assert!(matches!(
         vesicles(Branch::Stomatocyte, 0.0, &[0.7]),
         Err(Error::NoEquilibrium { .. })

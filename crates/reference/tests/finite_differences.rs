@@ -104,6 +104,14 @@ impl Polar {
     }
 }
 
+/// Points of the curve, from its bottom.
+pub fn points(radius: impl Fn(f64) -> f64) -> [[f64; 2]; 128] {
+    std::array::from_fn(|i| {
+        let angle = TAU * i as f64 / 128.0 - PI / 2.0;
+        [radius(angle) * angle.cos(), radius(angle) * angle.sin()]
+    })
+}
+
 /// The radius of an ellipse in polar coordinates.
 pub fn ellipse(a: f64, b: f64) -> impl Fn(f64) -> f64 + Copy {
     move |angle: f64| 1.0 / (angle.cos() / a).hypot(angle.sin() / b)
