@@ -26,21 +26,13 @@ impl Flow {
             Flow::MeanCurvature => 2,
         }
     }
-
-    /// The outward normal velocity at the nodes.
-    pub(crate) fn velocity(self, grid: &Grid, nodes: &Nodes) -> Vec<f64> {
-        match self {
-            Flow::Willmore => nodes.willmore(grid),
-            Flow::MeanCurvature => nodes.h.iter().map(|h| -h).collect(),
-        }
-    }
 }
 
 /// How accurately to compute.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Accuracy {
     /// A polygon starts with the self-similar solutions of its corners, over this fraction of its shortest edge; at most 1/80. In the
-    /// plane that is exact, on surfaces of revolution the error is of third order in it.
+    /// plane that is exact, on surfaces of revolution the error is of nearly third order in it.
     pub rounding: f64,
     /// Root mean square of the error of the tangent angle in one time step.
     pub tolerance: f64,
@@ -103,7 +95,7 @@ impl Nodes {
     }
 }
 
-/// How a curve of length `2 pi` changes with a velocity.
+/// How a curve of length `2 pi` changes.
 pub(crate) struct Rates {
     /// Coefficients of the rate of the tangent angle.
     pub(crate) angle: Coefficients,
@@ -116,7 +108,11 @@ pub(crate) struct Rates {
 impl Rates {
     /// The outward normal velocity `V` moves the points also along the curve, by `-S`, so that they stay equally spaced:
     /// `S_s = kappa V - mean(kappa V)`, `theta_t = -V_s - kappa S`.
-    pub(crate) fn new(grid: &Grid, nodes: &Nodes, velocity: &[f64]) -> Self {
+    pub(crate) fn new(flow: Flow, grid: &Grid, nodes: &Nodes) -> Self {
+        let velocity = match flow {
+            Flow::Willmore => nodes.willmore(grid),
+            Flow::MeanCurvature => nodes.h.iter().map(|h| -h).collect(),
+        };
         let curvature = &nodes.curvature;
         let stretching = grid.expand(|i| curvature[i] * velocity[i]);
         let sliding = grid.values(&grid.antiderivative(&stretching));
