@@ -12,7 +12,7 @@ pub enum Axis {
 
 /// Willmore flow of `r(phi)` about the origin until `time`: the radii at `phi = 0` and `phi = pi / 2`.
 pub fn willmore(start: impl Fn(f64) -> f64 + Copy, axis: Axis, time: f64) -> [f64; 2] {
-    let levels = [32, 64, 128].map(|nodes| Polar { nodes, axis }.run(start, time));
+    let levels = [24, 48, 96].map(|nodes| Polar { nodes, axis }.run(start, time));
     // Removes the errors of order two and four.
     let extrapolated = |i: usize| {
         let finer =
