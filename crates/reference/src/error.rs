@@ -87,39 +87,35 @@ pub enum Error {
     },
 }
 
-pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64, Error> {
-    if value > 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err(Error::InvalidParameter {
-            name,
-            requirement: "positive and finite",
-            value,
-        })
-    }
+/// The value, of which the requirement must hold.
+pub(crate) fn checked(
+    name: &'static str,
+    requirement: &'static str,
+    value: f64,
+    holds: bool,
+) -> Result<f64, Error> {
+    let error = Error::InvalidParameter {
+        name,
+        requirement,
+        value,
+    };
+    holds.then_some(value).ok_or(error)
 }
 
-/// All coordinates must be finite.
+pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64, Error> {
+    let holds = value > 0.0 && value.is_finite();
+    checked(name, "positive and finite", value, holds)
+}
+
 pub(crate) fn finite(points: &[[f64; 2]]) -> Result<(), Error> {
-    match points.iter().flatten().find(|x| !x.is_finite()) {
-        Some(&value) => Err(Error::InvalidParameter {
-            name: "coordinate",
-            requirement: "finite",
-            value,
-        }),
-        None => Ok(()),
+    for &x in points.iter().flatten() {
+        checked("coordinate", "finite", x, x.is_finite())?;
     }
+    Ok(())
 }
 
 /// Reduced volumes and isoperimetric quotients.
 pub(crate) fn below_one(name: &'static str, value: f64) -> Result<f64, Error> {
-    if value > 0.0 && value < 1.0 {
-        Ok(value)
-    } else {
-        Err(Error::InvalidParameter {
-            name,
-            requirement: "between 0 and 1",
-            value,
-        })
-    }
+    let holds = value > 0.0 && value < 1.0;
+    checked(name, "between 0 and 1", value, holds)
 }

@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use realfft::num_complex::Complex;
 
-use crate::error::{finite, positive};
+use crate::error::{checked, finite, positive};
 use crate::polygon::{edges, rounded};
 use crate::spectral::{Grid, collect, power_sum};
 use crate::{Curve, Error, Flow};
@@ -20,8 +20,8 @@ enum Outline {
 }
 
 impl Shape {
-    /// The polygon with the given vertices, in either direction. Its arc length starts in the middle of the first edge, or of the
-    /// last one where the direction is turned round.
+    /// The polygon with the given vertices, in either direction. Its arc length starts in the middle of the first edge, or, of
+    /// clockwise vertices, of the edge between the last two.
     ///
     /// # Errors
     /// Its edges must have lengths, and it must turn once, by less than 179 degrees at each vertex.
@@ -38,10 +38,8 @@ impl Shape {
         once(turning(&vertices))?;
         for edge in edges(&vertices) {
             positive("length of an edge", edge.length)?;
-            positive(
-                "179 degrees minus an exterior angle",
-                SHARPEST - edge.angle.abs(),
-            )?;
+            let turn = edge.angle.abs();
+            checked("exterior angle", "below 179 degrees", turn, turn < SHARPEST)?;
         }
         Ok(Self(Outline::Polygon(vertices)))
     }
@@ -84,18 +82,17 @@ impl Shape {
     /// The ellipse with the given half axes along x and y about the origin, from its lowest point.
     ///
     /// # Errors
-    /// The half axes must be positive and finite, one at most a hundred times the other.
+    /// The half axes must be positive and finite, one at most twenty times the other.
     pub fn ellipse(a: f64, b: f64) -> Result<Self, Error> {
         positive("first half axis", a)?;
         positive("second half axis", b)?;
         let aspect = (a / b).max(b / a);
-        if aspect > 100.0 {
-            return Err(Error::InvalidParameter {
-                name: "ratio of the half axes",
-                requirement: "at most 100",
-                value: aspect,
-            });
-        }
+        checked(
+            "ratio of the half axes",
+            "at most 20",
+            aspect,
+            aspect <= 20.0,
+        )?;
         let count = 32 * aspect.ceil() as usize;
         Self::smooth(&sampled(count, |u| [a * u.cos(), b * u.sin()]))
     }
@@ -106,13 +103,9 @@ impl Shape {
     /// # Errors
     /// There must be an even number of at least eight points, and the curve must turn once.
     pub fn smooth(points: &[[f64; 2]]) -> Result<Self, Error> {
-        if points.len() < 8 || points.len() % 2 == 1 {
-            return Err(Error::InvalidParameter {
-                name: "number of points",
-                requirement: "even and at least 8",
-                value: points.len() as f64,
-            });
-        }
+        let (count, even) = (points.len() as f64, points.len().is_multiple_of(2));
+        checked("number of points", "even", count, even)?;
+        checked("number of points", "at least 8", count, count >= 8.0)?;
         finite(points)?;
         let mut points = points.to_vec();
         if shoelace(&points) < 0.0 {
@@ -128,13 +121,8 @@ impl Shape {
         rounding: f64,
         most_folds: usize,
     ) -> Result<Curve, Error> {
-        if !(rounding > 0.0 && rounding <= MOST_ROUNDING) {
-            return Err(Error::InvalidParameter {
-                name: "rounding",
-                requirement: "positive and at most 1/80",
-                value: rounding,
-            });
-        }
+        let holds = rounding > 0.0 && rounding <= MOST_ROUNDING;
+        checked("rounding", "positive and at most 1/80", rounding, holds)?;
         match &self.0 {
             Outline::Smooth(curve) => Ok(curve.folded(most_folds)),
             Outline::Polygon(vertices) => rounded(vertices, flow, rounding, most_folds),

@@ -216,6 +216,14 @@ fn what_cannot_be_computed_is_refused() {
         evolve(&square, Flow::Willmore, &[0.2, 0.1], &ACCURACY),
         Err(Error::TimesNotIncreasing { .. })
     ));
+    for (rounding, tolerance) in [(0.1, 1e-8), (f64::NAN, 1e-8), (0.01, 0.0), (0.01, f64::NAN)] {
+        let accuracy = Accuracy {
+            rounding,
+            tolerance,
+        };
+        let result = evolve(&square, Flow::Willmore, &[0.1], &accuracy);
+        assert!(matches!(result, Err(Error::InvalidParameter { .. })));
+    }
     // The circle vanishes at t = 1/2.
     let circle = Shape::circle([0.0, 0.0], 1.0).unwrap();
     assert!(matches!(
