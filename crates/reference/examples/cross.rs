@@ -1,4 +1,4 @@
-//! The cross of the experiments under Willmore flow, at times that are multiples of 2^-14.
+//! The cross and the rectangle of the experiments under Willmore flow, at times that are multiples of 2^-14.
 
 use reference::{Error, Flow, Shape, planar};
 

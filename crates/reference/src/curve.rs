@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use realfft::num_complex::Complex;
 
-use crate::spectral::{Coefficients, Grid, Series, power_sum};
+use crate::flow::Nodes;
+use crate::spectral::{Coefficients, Grid, Series, collect, power_sum};
 use crate::{Error, Flow};
 
 /// A smooth simple closed curve at a time, counterclockwise, by its tangent angle `theta` over `alpha = 2 pi s / length`, where `s`
@@ -35,17 +36,10 @@ impl Curve {
 
     /// Enclosed area, `1/2 int x dy - y dx`.
     pub fn area(&self) -> f64 {
-        let angle = self.grid.values(&self.angle);
-        let positions = Series::positions(&self.grid, &angle).at_nodes(&self.grid);
-        let tangents = angle
-            .iter()
-            .zip(&self.grid.turns)
-            .map(|(a, turn)| turn * Complex::cis(*a));
-        let sum: f64 = positions
-            .iter()
-            .zip(tangents)
-            .map(|(x, t)| (x.conj() * t).im)
-            .sum();
+        let positions = self.series().at_nodes(&self.grid);
+        let tangent = Nodes::new(&self.grid, &self.angle, None).tangent;
+        let term = |i: usize| (positions[i].conj() * tangent[i]).im;
+        let sum: f64 = (0..self.grid.points).map(term).sum();
         PI * self.scale * self.scale * sum / self.grid.points as f64
     }
 
@@ -62,12 +56,10 @@ impl Curve {
 
     /// Points at equal distances of arc length, over the whole curve.
     pub fn points(&self) -> Vec<[f64; 2]> {
-        let positions = self.series().at_nodes(&self.grid);
-        let folds =
-            (0..self.grid.folds).map(|k| Complex::cis(TAU * k as f64 / self.grid.folds as f64));
-        folds
-            .flat_map(|turn| positions.iter().map(move |x| self.placed(turn * x)))
-            .collect()
+        let (grid, positions) = (&self.grid, self.series().at_nodes(&self.grid));
+        let turn = |fold: usize| Complex::cis(TAU * fold as f64 / grid.folds as f64);
+        let point = |i: usize| positions[i % grid.points] * turn(i / grid.points);
+        collect(grid.folds * grid.points, |i| self.placed(point(i)))
     }
 
     /// The point at `alpha = 2 pi s / length`.
@@ -91,15 +83,14 @@ impl Curve {
         let [x, y] = direction.map(|d| d / direction[0].hypot(direction[1]));
         let turned = |z: Complex<f64>| z * Complex::new(x, -y);
         let series = self.series();
-        let period = TAU / self.grid.folds as f64;
-        let nodes = series.at_nodes(&self.grid);
-        let count = nodes.len() * self.grid.folds;
+        let nodes: Vec<[f64; 2]> = self.points();
+        let count = nodes.len();
         let node = |i: usize| {
-            let turn = Complex::cis(period * (i / nodes.len() % self.grid.folds) as f64);
-            turned(nodes[i % nodes.len()] * turn)
+            let [a, b] = [0, 1].map(|k| nodes[i % count][k] - self.centre[k]);
+            turned(Complex::new(a, b))
         };
-        let crossings = (0..count)
-            .filter(|&i| (node(i).im <= 0.0) != (node(i + 1).im <= 0.0) && node(i).re > 0.0);
+        let changes = |i: &usize| (node(*i).im <= 0.0) != (node(i + 1).im <= 0.0);
+        let crossings = (0..count).filter(|i| changes(i) && node(*i).re > 0.0);
         let refine = |i: usize| {
             // The root of the imaginary part between two nodes, by Newton's method from the secant.
             let (a, b) = (node(i).im, node(i + 1).im);
@@ -124,13 +115,8 @@ impl Curve {
         let nodes = self.points();
         let distance = |p: &[f64; 2]| {
             let squared = |q: &[f64; 2]| (q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2);
-            let order = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
-            let (nearest, _) = nodes
-                .iter()
-                .map(squared)
-                .enumerate()
-                .min_by(order)
-                .expect("a curve has points");
+            let closer = |a: &usize, b: &usize| squared(&nodes[*a]).total_cmp(&squared(&nodes[*b]));
+            let nearest = (0..nodes.len()).min_by(closer).expect("a curve has points");
             let target = Complex::new(p[0] - self.centre[0], p[1] - self.centre[1]) / self.scale;
             let mut alpha = (nearest as f64 + 0.5) * TAU / nodes.len() as f64;
             let mut best = squared(&nodes[nearest]).sqrt() / self.scale;
@@ -153,17 +139,10 @@ impl Curve {
     pub fn largest_distance_to(&self, segments: &[[[f64; 2]; 2]]) -> f64 {
         const POINTS: usize = 4096;
         let points = self.points();
-        let nearest = |p: &[f64; 2]| {
-            segments
-                .iter()
-                .map(|s| to_segment(*p, *s))
-                .fold(f64::INFINITY, f64::min)
-        };
-        points
-            .iter()
-            .step_by(points.len().div_ceil(POINTS))
-            .map(nearest)
-            .fold(0.0, f64::max)
+        let distances = |p: [f64; 2]| segments.iter().map(move |s| to_segment(p, *s));
+        let nearest = |p: &[f64; 2]| distances(*p).fold(f64::INFINITY, f64::min);
+        let some = points.iter().step_by(points.len().div_ceil(POINTS));
+        some.map(nearest).fold(0.0, f64::max)
     }
 
     /// `theta(alpha)`, the angle of the tangent against the x axis.
@@ -255,18 +234,14 @@ impl Curve {
     pub(crate) fn folded(&self, most: usize) -> Self {
         let vanish = |folds: usize| {
             let mut others = self.angle.clone();
-            others
-                .iter_mut()
-                .step_by(folds)
-                .for_each(|c| *c = Complex::ZERO);
+            for c in others.iter_mut().step_by(folds) {
+                *c = Complex::ZERO;
+            }
             largest(&others) < 1e-12
         };
         let divides = |folds: &usize| self.grid.points.is_multiple_of(2 * folds);
-        match (2..=most)
-            .rev()
-            .filter(divides)
-            .find(|&folds| vanish(folds))
-        {
+        let mut all = (2..=most).rev().filter(divides);
+        match all.find(|&folds| vanish(folds)) {
             Some(folds) if self.grid.folds == 1 => Self {
                 grid: Grid::new(folds, self.grid.points / folds),
                 angle: self.angle.iter().copied().step_by(folds).collect(),

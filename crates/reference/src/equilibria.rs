@@ -10,11 +10,14 @@
 //! the tangent angle at equal arc length, along branches from nearly round shapes.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use crate::dense::Newton;
+use crate::error::below_one;
 use crate::flow::Nodes;
 use crate::revolution::Surface;
-use crate::spectral::{Grid, odd, sines};
+use crate::shape::MOST_ROUNDING;
+use crate::spectral::{Grid, collect, odd, sines};
 use crate::{Curve, Error, Flow, Shape};
 
 /// A branch of vesicles.
@@ -74,7 +77,7 @@ pub struct Elastica {
 /// ```
 ///
 /// # Errors
-/// [`Error::NoEquilibrium`] beyond the ends of a branch.
+/// Reduced volumes must be between 0 and 1; [`Error::NoEquilibrium`] beyond the ends of a branch.
 pub fn vesicles(
     branch: Branch,
     spontaneous_curvature: f64,
@@ -87,11 +90,9 @@ pub fn vesicles(
     };
     path.bend(spontaneous_curvature)?;
     let vesicle = |&ratio: &f64| {
-        path.follow(ratio)?;
-        let (scale, [pressure, tension]) = (
-            path.problem.scale(&path.state),
-            path.problem.multipliers(&path.state),
-        );
+        path.follow(below_one("reduced volume", ratio)?)?;
+        let scale = path.problem.scale(&path.state);
+        let [pressure, tension] = path.problem.multipliers(&path.state);
         Ok(Vesicle {
             surface: path.problem.surface(&path.state, scale),
             spontaneous_curvature,
@@ -105,11 +106,11 @@ pub fn vesicles(
 /// The elastic curves with the given isoperimetric quotients `4 pi area / length^2`.
 ///
 /// # Errors
-/// [`Error::NoEquilibrium`] beyond the ends of the branch.
+/// Quotients must be between 0 and 1; [`Error::NoEquilibrium`] beyond the ends of the branch.
 pub fn elastica(quotients: &[f64]) -> Result<Vec<Elastica>, Error> {
     let mut path = Path::new(Kind::Elastica, &Shape::ellipse(1.5, 1.0)?)?;
     let curve = |&ratio: &f64| {
-        path.follow(ratio)?;
+        path.follow(below_one("isoperimetric quotient", ratio)?)?;
         let [pressure, tension] = path.problem.multipliers(&path.state);
         Ok(Elastica {
             curve: path.problem.curve(&path.state, 1.0),
@@ -141,7 +142,7 @@ enum Condition {
 #[derive(Clone)]
 struct Problem {
     kind: Kind,
-    grid: std::sync::Arc<Grid>,
+    grid: Arc<Grid>,
     spontaneous_curvature: f64,
 }
 
@@ -188,21 +189,13 @@ impl Problem {
         let nodes = Nodes::new(&self.grid, &odd(&state[..self.sines()]), axis);
         let [pressure, tension] = self.multipliers(state);
         let force = state.get(self.sines() + 2).copied().unwrap_or(0.0);
-        let at = |(i, velocity): (usize, f64)| {
+        let velocity = nodes.willmore(&self.grid);
+        let equation = self.grid.expand(|i| {
             let product = nodes.curvature[i] * nodes.parallel[i];
             let stretch = (bend * bend / 2.0 + tension) * nodes.h[i];
-            stretch - velocity - 2.0 * bend * product - pressure + force * nodes.tangent[i].re
-        };
-        let equation = nodes
-            .willmore(&self.grid)
-            .into_iter()
-            .enumerate()
-            .map(at)
-            .collect();
-        let mut result: Vec<f64> = self.grid.coefficients(equation)[..self.grid.points / 2]
-            .iter()
-            .map(|c| c.re)
-            .collect();
+            stretch - velocity[i] - 2.0 * bend * product - pressure + force * nodes.tangent[i].re
+        });
+        let mut result = collect(self.grid.points / 2, |j| equation[j].re);
         if self.grid.folds == 1 {
             result.push(nodes.tangent.iter().map(|t| t.re).sum::<f64>() / self.grid.points as f64);
         }
@@ -213,14 +206,15 @@ impl Problem {
         result
     }
 
-    fn solve(&self, start: Vec<f64>, condition: Condition) -> Result<Vec<f64>, Error> {
+    /// The solution near the start: one farther away is on another branch.
+    fn solve(&self, start: &[f64], condition: Condition) -> Result<Vec<f64>, Error> {
         const TOLERANCE: f64 = 1e-8;
-        let newton = Newton::solve(
-            &|state: &[f64]| self.residual(state, condition),
-            start,
-            TOLERANCE,
-        );
-        if newton.step <= TOLERANCE {
+        const NEAR: f64 = 0.5;
+        let residual = |state: &[f64]| self.residual(state, condition);
+        let newton = Newton::solve(&residual, start.to_vec(), TOLERANCE);
+        let moved = |i: usize| (newton.solution[i] - start[i]).abs();
+        let near = (0..self.sines()).all(|i| moved(i) < NEAR);
+        if near && newton.step <= TOLERANCE {
             return Ok(newton.solution);
         }
         Err(Error::NoEquilibrium {
@@ -244,7 +238,7 @@ impl Path {
     fn new(kind: Kind, shape: &Shape) -> Result<Self, Error> {
         const POINTS: usize = 64;
         let curve = shape
-            .curve(Flow::Willmore, crate::shape::MOST_ROUNDING, 2)?
+            .curve(Flow::Willmore, MOST_ROUNDING, 2)?
             .with_points(POINTS);
         let problem = Problem {
             kind,
@@ -253,7 +247,7 @@ impl Path {
         };
         let state: Vec<f64> = sines(&curve.angle).chain([0.0; 2]).collect();
         let ratio = problem.ratio(&state);
-        let state = problem.solve(state, Condition::Ratio(ratio))?;
+        let state = problem.solve(&state, Condition::Ratio(ratio))?;
         Ok(Self { problem, state })
     }
 
@@ -287,7 +281,7 @@ impl Path {
         while left != 0.0 {
             let step = left.clamp(-length, length);
             let condition = set(&mut self.problem, to - (left - step));
-            match self.problem.solve(self.state.clone(), condition) {
+            match self.problem.solve(&self.state, condition) {
                 Ok(state) => {
                     self.state = state;
                     self.refine(condition)?;
@@ -313,7 +307,7 @@ impl Path {
             let multipliers = self.state[self.problem.sines()..].to_vec();
             self.state = sines(&fitted.angle).chain(multipliers).collect();
             self.problem.grid = fitted.grid;
-            self.state = self.problem.solve(self.state.clone(), condition)?;
+            self.state = self.problem.solve(&self.state, condition)?;
         }
     }
 
@@ -323,11 +317,9 @@ impl Path {
         const STEP: f64 = 0.1;
         self.follow(BIFURCATION)?;
         let oblate = self.problem.curve(&self.state, 1.0).unfolded();
-        let multipliers = self.problem.multipliers(&self.state);
-        self.state = sines(&oblate.angle)
-            .chain(multipliers)
-            .chain([0.0])
-            .collect();
+        let [pressure, tension] = self.problem.multipliers(&self.state);
+        let rest = [pressure, tension, 0.0];
+        self.state = sines(&oblate.angle).chain(rest).collect();
         self.problem.grid = oblate.grid;
         // At no asymmetry at all the equations are singular.
         let mut asymmetry = STEP / 2.0;

@@ -54,7 +54,7 @@ pub enum Error {
     },
     /// The curve cannot be resolved any more, as before a singularity.
     #[error(
-        "{points} points do not resolve the curve at time {time:.6e}; the flow may be singular there"
+        "{points} points do not resolve the curve at time {time:.6e}; the flow may be singular there, or the start needs more points"
     )]
     Unresolved {
         /// Points of the curve.
@@ -87,14 +87,35 @@ pub enum Error {
     },
 }
 
+/// The value, of which the requirement must hold.
+pub(crate) fn checked(
+    name: &'static str,
+    requirement: &'static str,
+    value: f64,
+    holds: bool,
+) -> Result<f64, Error> {
+    let error = Error::InvalidParameter {
+        name,
+        requirement,
+        value,
+    };
+    holds.then_some(value).ok_or(error)
+}
+
 pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64, Error> {
-    if value > 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err(Error::InvalidParameter {
-            name,
-            requirement: "positive and finite",
-            value,
-        })
+    let holds = value > 0.0 && value.is_finite();
+    checked(name, "positive and finite", value, holds)
+}
+
+pub(crate) fn finite(points: &[[f64; 2]]) -> Result<(), Error> {
+    for &x in points.iter().flatten() {
+        checked("coordinate", "finite", x, x.is_finite())?;
     }
+    Ok(())
+}
+
+/// Reduced volumes and isoperimetric quotients.
+pub(crate) fn below_one(name: &'static str, value: f64) -> Result<f64, Error> {
+    let holds = value > 0.0 && value < 1.0;
+    checked(name, "between 0 and 1", value, holds)
 }

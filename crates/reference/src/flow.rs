@@ -2,7 +2,7 @@
 
 use realfft::num_complex::Complex;
 
-use crate::spectral::{Coefficients, Grid, Series};
+use crate::spectral::{Coefficients, Grid, Series, collect};
 
 /// A gradient flow in `L2`, of a plane curve or of the surface that it generates about the y axis.
 ///
@@ -26,21 +26,13 @@ impl Flow {
             Flow::MeanCurvature => 2,
         }
     }
-
-    /// The outward normal velocity at the nodes.
-    pub(crate) fn velocity(self, grid: &Grid, nodes: &Nodes) -> Vec<f64> {
-        match self {
-            Flow::Willmore => nodes.willmore(grid),
-            Flow::MeanCurvature => nodes.h.iter().map(|h| -h).collect(),
-        }
-    }
 }
 
 /// How accurately to compute.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Accuracy {
     /// A polygon starts with the self-similar solutions of its corners, over this fraction of its shortest edge; at most 1/80. In the
-    /// plane that is exact, on surfaces of revolution the error is of third order in it.
+    /// plane that is exact, on surfaces of revolution the error is of nearly third order in it.
     pub rounding: f64,
     /// Root mean square of the error of the tangent angle in one time step.
     pub tolerance: f64,
@@ -63,38 +55,27 @@ pub(crate) struct Nodes {
 impl Nodes {
     /// `axis`: the x coordinate of the centre over the scale, for surfaces of revolution.
     pub(crate) fn new(grid: &Grid, angle: &[Complex<f64>], axis: Option<f64>) -> Self {
+        let n = grid.points;
         let angles = grid.values(angle);
-        let tangent: Coefficients = angles
-            .iter()
-            .zip(&grid.turns)
-            .map(|(a, turn)| turn * Complex::cis(*a))
-            .collect();
-        let curvature: Vec<f64> = grid
-            .values(&grid.derivative(angle))
-            .into_iter()
-            .map(|a| 1.0 + a)
-            .collect();
-        let zero = vec![0.0; grid.points];
+        let bend = grid.values(&grid.derivative(angle));
+        let tangent = collect(n, |i| grid.turns[i] * Complex::cis(angles[i]));
+        let curvature = collect(n, |i| 1.0 + bend[i]);
         let Some(axis) = axis else {
             return Self {
                 tangent,
                 h: curvature.clone(),
                 curvature,
-                parallel: zero.clone(),
-                widening: zero.clone(),
-                radius: zero,
+                parallel: vec![0.0; n],
+                widening: vec![0.0; n],
+                radius: vec![0.0; n],
             };
         };
         let positions = Series::positions(grid, &angles).at_nodes(grid);
-        let radius: Vec<f64> = positions.iter().map(|x| axis + x.re).collect();
-        let parallel: Vec<f64> = tangent.iter().zip(&radius).map(|(t, r)| t.im / r).collect();
+        let radius = collect(n, |i| axis + positions[i].re);
+        let parallel = collect(n, |i| tangent[i].im / radius[i]);
         Self {
-            widening: tangent.iter().zip(&radius).map(|(t, r)| t.re / r).collect(),
-            h: curvature
-                .iter()
-                .zip(&parallel)
-                .map(|(a, b)| a + b)
-                .collect(),
+            widening: collect(n, |i| tangent[i].re / radius[i]),
+            h: collect(n, |i| curvature[i] + parallel[i]),
             tangent,
             curvature,
             parallel,
@@ -110,11 +91,11 @@ impl Nodes {
             let difference = self.curvature[i] - self.parallel[i];
             second[i] + self.widening[i] * first[i] + self.h[i] * difference * difference / 2.0
         };
-        (0..grid.points).map(value).collect()
+        collect(grid.points, value)
     }
 }
 
-/// How a curve of length `2 pi` changes with a velocity.
+/// How a curve of length `2 pi` changes.
 pub(crate) struct Rates {
     /// Coefficients of the rate of the tangent angle.
     pub(crate) angle: Coefficients,
@@ -127,28 +108,19 @@ pub(crate) struct Rates {
 impl Rates {
     /// The outward normal velocity `V` moves the points also along the curve, by `-S`, so that they stay equally spaced:
     /// `S_s = kappa V - mean(kappa V)`, `theta_t = -V_s - kappa S`.
-    pub(crate) fn new(grid: &Grid, nodes: &Nodes, velocity: &[f64]) -> Self {
-        let stretching = grid.coefficients(
-            nodes
-                .curvature
-                .iter()
-                .zip(velocity)
-                .map(|(k, v)| k * v)
-                .collect(),
-        );
+    pub(crate) fn new(flow: Flow, grid: &Grid, nodes: &Nodes) -> Self {
+        let velocity = match flow {
+            Flow::Willmore => nodes.willmore(grid),
+            Flow::MeanCurvature => nodes.h.iter().map(|h| -h).collect(),
+        };
+        let curvature = &nodes.curvature;
+        let stretching = grid.expand(|i| curvature[i] * velocity[i]);
         let sliding = grid.values(&grid.antiderivative(&stretching));
-        let turning = grid.coefficients(
-            nodes
-                .curvature
-                .iter()
-                .zip(&sliding)
-                .map(|(k, s)| k * s)
-                .collect(),
-        );
-        let slope = grid.derivative(&grid.coefficients(velocity.to_vec()));
-        let moved = velocity.iter().zip(&sliding).zip(&nodes.tangent);
+        let turning = grid.expand(|i| curvature[i] * sliding[i]);
+        let slope = grid.derivative(&grid.expand(|i| velocity[i]));
         // The outward normal is the tangent turned to the right.
-        let sum: Complex<f64> = moved.map(|((v, s), t)| -t * Complex::new(*s, *v)).sum();
+        let moved = |i: usize| -nodes.tangent[i] * Complex::new(sliding[i], velocity[i]);
+        let sum: Complex<f64> = (0..grid.points).map(moved).sum();
         // A curve with rotational symmetry keeps its centre.
         let centre = if grid.folds == 1 {
             sum / grid.points as f64
@@ -156,7 +128,7 @@ impl Rates {
             Complex::ZERO
         };
         Self {
-            angle: slope.iter().zip(&turning).map(|(v, s)| -v - s).collect(),
+            angle: collect(slope.len(), |j| -slope[j] - turning[j]),
             log_scale: stretching[0].re,
             centre: [centre.re, centre.im],
         }

@@ -16,6 +16,7 @@ mod error;
 mod exponential;
 mod flow;
 pub mod planar;
+mod polygon;
 pub mod revolution;
 mod rosenbrock;
 mod shape;

@@ -75,11 +75,8 @@ impl Surface {
     /// The surface with a profile that must be symmetric about the axis and start on it.
     pub(crate) fn about_axis(mut profile: Curve) -> Result<Self, Error> {
         const ROUNDING: f64 = 1e-9;
-        let asymmetry = profile
-            .angle
-            .iter()
-            .map(|c| c.re.abs())
-            .fold(profile.centre[0].abs() / profile.scale, f64::max);
+        let even = profile.angle.iter().map(|c| c.re.abs()).fold(0.0, f64::max);
+        let asymmetry = (profile.centre[0].abs() / profile.scale).max(even);
         if asymmetry > ROUNDING {
             return Err(Error::NoProfile);
         }
@@ -135,12 +132,14 @@ impl Surface {
         let order = |a: &usize, b: &usize| points[*a][0].total_cmp(&points[*b][0]);
         let widest = (0..points.len()).max_by(order).expect("a curve has points");
         let mut alpha = (widest as f64 + 0.5) * TAU / points.len() as f64;
+        let mut largest = points[widest][0];
         for _ in 0..5 {
-            // Newton's method for an upright tangent.
+            // Newton's method for an upright tangent, which a flat wall may lead astray.
             let (sin, cos) = self.profile.angle_at(alpha).sin_cos();
             alpha += cos / (sin * self.profile.curvature_at(alpha) * self.profile.scale);
+            largest = largest.max(self.profile.point(alpha)[0]);
         }
-        self.profile.point(alpha)[0]
+        largest
     }
 
     /// The heights of the lower and the upper pole. None for surfaces that do not meet the axis.
@@ -151,19 +150,13 @@ impl Surface {
     /// The integral over the profile, scaled to length `2 pi` with its mirror image or beside the axis.
     fn integral(&self, value: impl Fn(&Nodes, usize) -> f64) -> f64 {
         let grid = &self.profile.grid;
-        let nodes = Nodes::new(
-            grid,
-            &self.profile.angle,
-            Some(self.profile.centre[0] / self.profile.scale),
-        );
+        let axis = self.profile.centre[0] / self.profile.scale;
+        let nodes = Nodes::new(grid, &self.profile.angle, Some(axis));
         if self.off_axis {
             (0..grid.points).map(|i| value(&nodes, i)).sum::<f64>() * TAU / grid.points as f64
         } else {
-            grid.pole_weights()
-                .iter()
-                .enumerate()
-                .map(|(i, weight)| weight * value(&nodes, i))
-                .sum()
+            let weights = grid.pole_weights().iter().enumerate();
+            weights.map(|(i, weight)| weight * value(&nodes, i)).sum()
         }
     }
 }

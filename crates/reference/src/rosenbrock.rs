@@ -39,53 +39,68 @@ impl Rosenbrock {
     fn rates(&self, curve: &Curve, state: &[f64]) -> Vec<f64> {
         let (angle, scalars) = state.split_at(state.len() - 3);
         let nodes = Nodes::new(&curve.grid, &odd(angle), Some(0.0));
-        let rates = Rates::new(&curve.grid, &nodes, &self.0.velocity(&curve.grid, &nodes));
+        let rates = Rates::new(self.0, &curve.grid, &nodes);
         let scale = scalars[0].exp();
-        let scalars = [
-            rates.log_scale,
-            scale * rates.centre[1],
-            scale.powi(self.0.order()),
-        ];
+        let height = scale * rates.centre[1];
+        let scalars = [rates.log_scale, height, scale.powi(self.0.order())];
         sines(&rates.angle).chain(scalars).collect()
     }
 }
 
 const GAMMA: f64 = 0.25;
-/// Where the second and the later stages are evaluated, in terms of the stages before; the last is the embedded solution of order
-/// three, to which its stage is added.
-const AT: [f64; 15] = [
-    1.544,
-    0.9466785280815826,
-    0.2557011698983284,
-    3.314825187068521,
-    2.896124015972201,
-    0.9986419139977817,
-    1.221224509226641,
-    6.019134481288629,
-    12.53708332932087,
-    -0.687886036105895,
-    1.221224509226641,
-    6.019134481288629,
-    12.53708332932087,
-    -0.687886036105895,
-    1.0,
+/// Where the stages are evaluated, in terms of the stages before; the last is the embedded solution of order three, to which its
+/// stage is added.
+const AT: [[f64; 5]; 6] = [
+    [0.0; 5],
+    [1.544, 0.0, 0.0, 0.0, 0.0],
+    [0.9466785280815826, 0.2557011698983284, 0.0, 0.0, 0.0],
+    [
+        3.314825187068521,
+        2.896124015972201,
+        0.9986419139977817,
+        0.0,
+        0.0,
+    ],
+    [
+        1.221224509226641,
+        6.019134481288629,
+        12.53708332932087,
+        -0.687886036105895,
+        0.0,
+    ],
+    [
+        1.221224509226641,
+        6.019134481288629,
+        12.53708332932087,
+        -0.687886036105895,
+        1.0,
+    ],
 ];
-const COUPLING: [f64; 15] = [
-    -5.6688,
-    -2.430093356833875,
-    -0.2063599157091915,
-    -0.1073529058151375,
-    -9.594562251023355,
-    -20.47028614809616,
-    7.496443313967647,
-    -10.24680431464352,
-    -33.99990352819905,
-    11.7089089320616,
-    8.083246795921522,
-    -7.981132988064893,
-    -31.52159432874371,
-    16.31930543123136,
-    -6.058818238834054,
+const COUPLING: [[f64; 5]; 6] = [
+    [0.0; 5],
+    [-5.6688, 0.0, 0.0, 0.0, 0.0],
+    [-2.430093356833875, -0.2063599157091915, 0.0, 0.0, 0.0],
+    [
+        -0.1073529058151375,
+        -9.594562251023355,
+        -20.47028614809616,
+        0.0,
+        0.0,
+    ],
+    [
+        7.496443313967647,
+        -10.24680431464352,
+        -33.99990352819905,
+        11.7089089320616,
+        0.0,
+    ],
+    [
+        8.083246795921522,
+        -7.981132988064893,
+        -31.52159432874371,
+        16.31930543123136,
+        -6.058818238834054,
+    ],
 ];
 
 /// A step, for several lengths.
@@ -116,11 +131,9 @@ impl<F: Fn(&[f64]) -> Vec<f64>> Step<F> {
         let factors = Factors::new(matrix);
         let mut stages: Vec<Vec<f64>> = Vec::new();
         let mut at = self.start.clone();
-        for stage in 0..6 {
-            let first = (0..stage).sum::<usize>();
-            let weights = first..first + stage;
-            at = combined(&self.start, &AT[weights.clone()], &stages, 1.0);
-            let right = combined(&(self.f)(&at), &COUPLING[weights], &stages, 1.0 / length);
+        for (places, couplings) in AT.iter().zip(&COUPLING) {
+            at = combined(&self.start, places, &stages, 1.0);
+            let right = combined(&(self.f)(&at), couplings, &stages, 1.0 / length);
             stages.push(factors.solve(&right));
         }
         let last = stages.pop().expect("there are six stages");

@@ -34,12 +34,12 @@ impl Grid {
             points,
             forward: plans.real,
             inverse: plans.real_inverse,
-            phases: (0..=points / 2)
-                .map(|j| Complex::cis(PI * j as f64 / points as f64))
-                .collect(),
-            turns: (0..points)
-                .map(|i| Complex::cis((i as f64 + 0.5) * TAU / (folds * points) as f64))
-                .collect(),
+            phases: collect(points / 2 + 1, |j| {
+                Complex::cis(PI * j as f64 / points as f64)
+            }),
+            turns: collect(points, |i| {
+                Complex::cis((i as f64 + 0.5) * TAU / (folds * points) as f64)
+            }),
             pole_weights: OnceLock::new(),
         })
     }
@@ -51,6 +51,11 @@ impl Grid {
     /// The wave number of mode `j`.
     pub(crate) fn wave(&self, j: usize) -> f64 {
         (self.folds * j) as f64
+    }
+
+    /// The coefficients of the function with the given values at the nodes.
+    pub(crate) fn expand(&self, value: impl Fn(usize) -> f64) -> Coefficients {
+        self.coefficients(collect(self.points, value))
     }
 
     pub(crate) fn coefficients(&self, mut values: Vec<f64>) -> Coefficients {
@@ -67,11 +72,7 @@ impl Grid {
     }
 
     pub(crate) fn values(&self, coefficients: &[Complex<f64>]) -> Vec<f64> {
-        let mut shifted: Coefficients = coefficients
-            .iter()
-            .zip(&self.phases)
-            .map(|(c, phase)| c * phase)
-            .collect();
+        let mut shifted = collect(self.phases.len(), |j| coefficients[j] * self.phases[j]);
         shifted[0].im = 0.0;
         shifted[self.points / 2] = Complex::ZERO;
         let mut result = self.inverse.make_output_vec();
@@ -82,17 +83,14 @@ impl Grid {
     }
 
     pub(crate) fn derivative(&self, coefficients: &[Complex<f64>]) -> Coefficients {
-        let times_wave = |(j, c): (usize, &Complex<f64>)| c * Complex::new(0.0, self.wave(j));
-        coefficients.iter().enumerate().map(times_wave).collect()
+        collect(coefficients.len(), |j| coefficients[j] * I * self.wave(j))
     }
 
     /// The antiderivative of mean zero of the function without its mean.
     pub(crate) fn antiderivative(&self, coefficients: &[Complex<f64>]) -> Coefficients {
-        let by_wave = |(j, c): (usize, &Complex<f64>)| match j {
-            0 => Complex::ZERO,
-            _ => c / Complex::new(0.0, self.wave(j)),
-        };
-        coefficients.iter().enumerate().map(by_wave).collect()
+        let mut result = collect(coefficients.len(), |j| coefficients[j] / (I * self.wave(j)));
+        result[0] = Complex::ZERO;
+        result
     }
 
     /// Weights of the integral over `0 < alpha < pi` of a function that is odd about 0 and, with two folds, even about `pi / 2`,
@@ -101,17 +99,16 @@ impl Grid {
         self.pole_weights.get_or_init(|| {
             let nodes = self.folds * self.points / 2;
             let scale = (4 * self.folds) as f64 / nodes as f64;
-            let weight = |alpha: f64| {
-                (1..nodes)
-                    .step_by(2)
-                    .map(|k| (k as f64 * alpha).sin() / k as f64)
-                    .sum::<f64>()
-            };
-            (0..self.points / 2)
-                .map(|i| scale * weight(self.node(i)))
-                .collect()
+            let odd = || (1..nodes).step_by(2).map(|k| k as f64);
+            let weight = |alpha: f64| odd().map(|k| (k * alpha).sin() / k).sum::<f64>();
+            collect(self.points / 2, |i| scale * weight(self.node(i)))
         })
     }
+}
+
+/// `f(0), f(1), ...`.
+pub(crate) fn collect<T>(count: usize, f: impl Fn(usize) -> T) -> Vec<T> {
+    (0..count).map(f).collect()
 }
 
 /// The function `e^{i alpha} sum_j q_j e^{i folds j alpha}` over positive and negative `j`, that of a curve with `folds`-fold symmetry.
@@ -126,56 +123,43 @@ pub(crate) struct Series {
 impl Series {
     /// The positions of the curve of length `2 pi` about its centre, by integration of its unit tangent `e^{i (alpha + angle)}`.
     pub(crate) fn positions(grid: &Grid, angle: &[f64]) -> Self {
-        let cos = grid.coefficients(angle.iter().map(|a| a.cos()).collect());
-        let sin = grid.coefficients(angle.iter().map(|a| a.sin()).collect());
+        let (cos, sin) = (
+            grid.expand(|i| angle[i].cos()),
+            grid.expand(|i| angle[i].sin()),
+        );
         let integrated = |tangent: Complex<f64>, wave: f64| match wave {
             0.0 => Complex::ZERO, // how far the curve is from being closed
-            _ => tangent / Complex::new(0.0, wave),
+            _ => tangent / (I * wave),
         };
-        let pairs = || cos.iter().zip(&sin).enumerate();
+        let positive = |j: usize| integrated(cos[j] + I * sin[j], 1.0 + grid.wave(j));
+        let negative = |j: usize| integrated(cos[j].conj() + I * sin[j].conj(), 1.0 - grid.wave(j));
         Self {
             folds: grid.folds,
-            positive: pairs()
-                .map(|(j, (c, s))| integrated(c + I * s, 1.0 + grid.wave(j)))
-                .collect(),
-            negative: pairs()
-                .map(|(j, (c, s))| integrated(c.conj() + I * s.conj(), 1.0 - grid.wave(j)))
-                .collect(),
+            positive: collect(cos.len(), positive),
+            negative: collect(cos.len(), negative),
         }
     }
 
     pub(crate) fn at_nodes(&self, grid: &Grid) -> Coefficients {
-        let pairs = || self.positive.iter().zip(&self.negative);
-        let real = grid.values(
-            &pairs()
-                .map(|(p, n)| (p + n.conj()) * 0.5)
-                .collect::<Coefficients>(),
-        );
-        let imaginary = grid.values(
-            &pairs()
-                .map(|(p, n)| (p - n.conj()) * Complex::new(0.0, -0.5))
-                .collect::<Coefficients>(),
-        );
-        let values = real.into_iter().zip(imaginary).zip(&grid.turns);
-        values
-            .map(|((x, y), turn)| turn * Complex::new(x, y))
-            .collect()
+        let (p, n) = (&self.positive, &self.negative);
+        let real = grid.values(&collect(p.len(), |j| (p[j] + n[j].conj()) / 2.0));
+        let imaginary = grid.values(&collect(p.len(), |j| (p[j] - n[j].conj()) / (2.0 * I)));
+        collect(grid.points, |i| {
+            grid.turns[i] * Complex::new(real[i], imaginary[i])
+        })
     }
 
     pub(crate) fn at(&self, alpha: f64) -> Complex<f64> {
         let step = Complex::cis(self.folds as f64 * alpha);
-        let sum = power_sum(&self.positive, step) + power_sum(&self.negative, step.conj())
-            - self.positive[0];
-        sum * Complex::cis(alpha)
+        let negative = power_sum(&self.negative, step.conj()) - self.negative[0];
+        (power_sum(&self.positive, step) + negative) * Complex::cis(alpha)
     }
 }
 
 /// `sum_j c_j z^j`.
 pub(crate) fn power_sum(coefficients: &[Complex<f64>], z: Complex<f64>) -> Complex<f64> {
-    coefficients
-        .iter()
-        .rev()
-        .fold(Complex::ZERO, |sum, c| sum * z + c)
+    let terms = coefficients.iter().rev();
+    terms.fold(Complex::ZERO, |sum, c| sum * z + c)
 }
 
 /// Coefficients of `sum_j a_j sin(folds j alpha)`, `0 < j < points / 2`.
@@ -187,7 +171,6 @@ pub(crate) fn odd(sines: &[f64]) -> Coefficients {
 
 /// The inverse of [`odd`].
 pub(crate) fn sines(coefficients: &[Complex<f64>]) -> impl Iterator<Item = f64> {
-    coefficients[1..coefficients.len() - 1]
-        .iter()
-        .map(|c| -2.0 * c.im)
+    let inner = &coefficients[1..coefficients.len() - 1];
+    inner.iter().map(|c| -2.0 * c.im)
 }

@@ -1,5 +1,6 @@
 //! Time steps chosen by their errors.
 
+use crate::error::positive;
 use crate::{Curve, Error, Flow};
 
 /// Steps of different lengths from one curve: the curve at their end, and the root mean square of the error of its tangent angle.
@@ -23,6 +24,7 @@ pub(crate) fn run(
     times: &[f64],
 ) -> Result<Vec<Curve>, Error> {
     const FIRST_STEP: f64 = 1e-5;
+    positive("tolerance", tolerance)?;
     let passed = start.time / start.clock(flow);
     let mut run = Run {
         flow,

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use reference::Error;
-use reference::equilibria::{Branch, elastica, vesicles};
+use reference::equilibria::{Branch, Vesicle, elastica, vesicles};
 
 fn energies(branch: Branch, volumes: &[f64]) -> Vec<f64> {
     let vesicles = vesicles(branch, 0.0, volumes).unwrap();
@@ -42,21 +42,34 @@ fn energies_of_vesicles_are_the_known_ones() {
     }
 }
 
-/// Seifert, Berndl, Lipowsky (1991): prolate above 0.652, stomatocytes below 0.592.
+/// Seifert, Berndl, Lipowsky (1991): prolate above 0.652, cups below about 0.592.
 #[test]
 fn branches_cross_where_they_should() {
-    let around = [0.653, 0.651];
-    let (prolate, oblate) = (
-        energies(Branch::Prolate, &around),
-        energies(Branch::Oblate, &around),
-    );
+    let volumes = [0.653, 0.651, 0.5925, 0.5895];
+    let oblate = energies(Branch::Oblate, &volumes);
+    let prolate = energies(Branch::Prolate, &volumes[..2]);
     assert!(prolate[0] < oblate[0] && prolate[1] > oblate[1]);
-    let around = [0.594, 0.589];
-    let (oblate, cups) = (
-        energies(Branch::Oblate, &around),
-        energies(Branch::Stomatocyte, &around),
+    let cups = vesicles(Branch::Stomatocyte, 0.0, &[0.5925, 0.591, 0.5895]).unwrap();
+    assert!(oblate[2] < cups[0].energy() / (8.0 * PI));
+    assert!(oblate[3] > cups[2].energy() / (8.0 * PI));
+    derivatives_agree(&cups);
+}
+
+/// Of three neighbours on a branch.
+fn derivatives_agree(vesicles: &[Vesicle]) {
+    let rise = vesicles[0].energy() - vesicles[2].energy();
+    let slope = rise / (vesicles[0].surface.volume() - vesicles[2].surface.volume());
+    let (middle, surface) = (&vesicles[1], &vesicles[1].surface);
+    assert!(
+        (slope / middle.pressure - 1.0).abs() < 1e-4,
+        "{slope} {}",
+        middle.pressure
     );
-    assert!(oblate[0] < cups[0] && oblate[1] > cups[1]);
+    // When all lengths grow, and the spontaneous curvature falls, by the same factor, the energy stays.
+    let c = middle.spontaneous_curvature;
+    let bending = c * (c * surface.area() - surface.mean_curvature());
+    let scaling = 3.0 * middle.pressure * surface.volume() - 2.0 * middle.tension * surface.area();
+    assert!((scaling - bending).abs() < 1e-6, "{scaling} {bending}");
 }
 
 /// The shape equations of Seifert, Berndl and Lipowsky for `(r, psi, psi', gamma)` over the arc length, from pole to pole or equator.
@@ -101,23 +114,8 @@ fn vesicles_solve_the_shape_equations_from_their_pole() {
 #[test]
 fn pressure_and_tension_are_derivatives_of_the_energy() {
     let step = 1e-4;
-    for (branch, c, volume) in [
-        (Branch::Oblate, 0.0, 0.65),
-        (Branch::Prolate, 1.0, 0.8),
-        (Branch::Stomatocyte, 0.0, 0.63),
-    ] {
-        let all = vesicles(branch, c, &[volume + step, volume, volume - step]).unwrap();
-        let slope = (all[0].energy() - all[2].energy()) / (2.0 * step * 4.0 / 3.0 * PI);
-        assert!(
-            (slope - all[1].pressure).abs() < 1e-4 * slope.abs(),
-            "{slope} {}",
-            all[1].pressure
-        );
-        // Larger by a factor, with the spontaneous curvature smaller: w does not change.
-        let bending = c * (c * all[1].surface.area() - all[1].surface.mean_curvature());
-        let scaling = 3.0 * all[1].pressure * all[1].surface.volume()
-            - 2.0 * all[1].tension * all[1].surface.area();
-        assert!((scaling - bending).abs() < 1e-6, "{scaling} {bending}");
+    for (branch, c, volume) in [(Branch::Oblate, 0.0, 0.65), (Branch::Prolate, 1.0, 0.8)] {
+        derivatives_agree(&vesicles(branch, c, &[volume + step, volume, volume - step]).unwrap());
     }
 }
 
@@ -159,7 +157,10 @@ fn elastic_curves_close_and_enclose_their_area() {
 
 #[test]
 fn ends_of_branches_are_reported() {
-    assert!(matches!(elastica(&[1.1]), Err(Error::NoEquilibrium { .. })));
+    for quotient in [1.1, 0.0, f64::NAN] {
+        let result = elastica(&[quotient]);
+        assert!(matches!(result, Err(Error::InvalidParameter { .. })));
+    }
     assert!(matches!(
         vesicles(Branch::Stomatocyte, 0.0, &[0.7]),
         Err(Error::NoEquilibrium { .. })

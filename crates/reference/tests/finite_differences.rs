@@ -12,7 +12,7 @@ pub enum Axis {
 
 /// Willmore flow of `r(phi)` about the origin until `time`: the radii at `phi = 0` and `phi = pi / 2`.
 pub fn willmore(start: impl Fn(f64) -> f64 + Copy, axis: Axis, time: f64) -> [f64; 2] {
-    let levels = [32, 64, 128].map(|nodes| Polar { nodes, axis }.run(start, time));
+    let levels = [24, 48, 96].map(|nodes| Polar { nodes, axis }.run(start, time));
     // Removes the errors of order two and four.
     let extrapolated = |i: usize| {
         let finer =
@@ -102,6 +102,14 @@ impl Polar {
         };
         (0..n).map(rate).collect()
     }
+}
+
+/// Points of the curve, from its bottom.
+pub fn points(radius: impl Fn(f64) -> f64) -> [[f64; 2]; 128] {
+    std::array::from_fn(|i| {
+        let angle = TAU * i as f64 / 128.0 - PI / 2.0;
+        [radius(angle) * angle.cos(), radius(angle) * angle.sin()]
+    })
 }
 
 /// The radius of an ellipse in polar coordinates.

@@ -142,16 +142,17 @@ fn corners_are_the_limit_of_rounded_ones() {
 
 #[test]
 fn an_independent_method_agrees() {
-    let (a, b, time) = (1.2, 0.8, 0.02);
-    let [tip, side] =
-        finite_differences::willmore(finite_differences::ellipse(a, b), Axis::None, time);
-    let shape = Shape::ellipse(a, b).unwrap();
-    let curve = &evolve(&shape, Flow::Willmore, &[time], &ACCURACY).unwrap()[0];
-    let errors = [
-        tip - curve.distance_along([1.0, 0.0]).unwrap(),
-        side - curve.distance_along([0.0, 1.0]).unwrap(),
-    ];
-    assert!(errors.iter().all(|e| e.abs() < 1e-6), "{errors:?}");
+    // The second has no symmetry, so that its centre moves.
+    let ellipse = |angle: f64| finite_differences::ellipse(1.2, 0.8)(angle);
+    let egg = |angle: f64| 1.0 + 0.1 * angle.cos() + 0.1 * (2.0 * angle).sin();
+    let radii: [&dyn Fn(f64) -> f64; 2] = [&ellipse, &egg];
+    for radius in radii {
+        let [right, top] = finite_differences::willmore(radius, Axis::None, 0.01);
+        let shape = Shape::smooth(&finite_differences::points(radius)).unwrap();
+        let curve = &evolve(&shape, Flow::Willmore, &[0.01], &ACCURACY).unwrap()[0];
+        let error = curve.largest_distance_of(&[[right, 0.0], [0.0, top]]);
+        assert!(error < 1e-6, "{error:e}");
+    }
 }
 
 #[test]
@@ -183,9 +184,20 @@ fn distances_are_those_of_the_curve() {
 fn what_cannot_be_computed_is_refused() {
     let crossing = Shape::polygon(vec![[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]);
     assert!(matches!(crossing, Err(Error::Turning { .. })));
+    for vertices in [
+        vec![[0.0, 0.0], [1.0, 0.0]],
+        vec![[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
+    ] {
+        let polygon = Shape::polygon(vertices);
+        assert!(matches!(
+            polygon,
+            Err(Error::InvalidParameter { .. } | Error::Turning { .. })
+        ));
+    }
+    assert!(matches!(Shape::polygon(vec![]), Err(Error::Turning { .. })));
     assert!(matches!(
         Shape::circle([0.0, f64::NAN], 1.0),
-        Err(Error::Turning { .. })
+        Err(Error::InvalidParameter { .. })
     ));
     assert!(matches!(
         Shape::cross(0.2, 0.3),
@@ -204,6 +216,14 @@ fn what_cannot_be_computed_is_refused() {
         evolve(&square, Flow::Willmore, &[0.2, 0.1], &ACCURACY),
         Err(Error::TimesNotIncreasing { .. })
     ));
+    for (rounding, tolerance) in [(0.1, 1e-8), (f64::NAN, 1e-8), (0.01, 0.0), (0.01, f64::NAN)] {
+        let accuracy = Accuracy {
+            rounding,
+            tolerance,
+        };
+        let result = evolve(&square, Flow::Willmore, &[0.1], &accuracy);
+        assert!(matches!(result, Err(Error::InvalidParameter { .. })));
+    }
     // The circle vanishes at t = 1/2.
     let circle = Shape::circle([0.0, 0.0], 1.0).unwrap();
     assert!(matches!(
