@@ -63,11 +63,9 @@ impl MeshFlow {
             "mesh": mesh.about, "tau": self.tau, "steps": steps, "schemes": schemes,
         }))?;
         let mut session = Session::open(self.program, run, device, parameters)?;
-        let bar = session.progress.bar("signed distance", setting.n as u64);
-        let initial = session.phase("signed distance", || {
-            mesh.phase_field(setting.grid, setting.scales.eps, &bar)
+        let initial = session.phase("signed distance", |stage| {
+            mesh.phase_field(setting.grid, setting.scales.eps, &stage.bar)
         })?;
-        bar.finish();
         let papers = options.mesh.is_the_papers();
         let energy = |&(step, w): &(usize, Option<f64>)| (step, w.filter(|_| papers));
         let surface = Surface {

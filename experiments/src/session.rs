@@ -4,6 +4,7 @@ use std::io::Write;
 use std::time::Instant;
 
 use engine::{Case, Samples, Stop, Trajectory};
+use indicatif::ProgressBar;
 use operators::ComputeDevice;
 use report::{Cell, Figure, Manifest, OutputDir, Progress, Summary};
 use runs::Interrupt;
@@ -25,6 +26,14 @@ pub struct Session<'a> {
     /// What is printed in the end.
     report: Vec<String>,
     clock: Instant,
+}
+
+/// What a part of the work needs, and the bar that shows how far it is.
+pub struct Stage<'a> {
+    pub options: &'a RunOptions,
+    pub device: &'a ComputeDevice,
+    pub output: &'a OutputDir,
+    pub bar: ProgressBar,
 }
 
 impl<'a> Session<'a> {
@@ -58,9 +67,18 @@ impl<'a> Session<'a> {
     pub fn phase<T>(
         &mut self,
         title: impl Into<String>,
-        work: impl FnOnce() -> Result<T, Error>,
+        work: impl FnOnce(&Stage<'_>) -> Result<T, Error>,
     ) -> Result<T, Error> {
-        self.manifest.phase(title, work)
+        let title = title.into();
+        let stage = Stage {
+            options: self.options,
+            device: &self.device,
+            output: &self.output,
+            bar: self.progress.bar(title.clone(), 0),
+        };
+        let done = self.manifest.phase(title, || work(&stage));
+        stage.bar.finish();
+        done
     }
 
     /// Runs a case, continues it, or looks it up in the folder `fields/NAME` of the output.
@@ -76,12 +94,14 @@ impl<'a> Session<'a> {
             Stop::Steps(steps) => Some(*steps as u64),
             _ => None,
         });
-        let mut bar = self.progress.bar(title.to_owned(), steps.unwrap_or(0));
-        let (device, never) = (&self.device, Interrupt::never());
-        let trajectory = self.manifest.phase(title, || {
-            Trajectory::of(case, device, &folder, samples, &mut [&mut bar], &never)
+        let never = Interrupt::never();
+        let trajectory = self.phase(title, |stage| {
+            stage.bar.set_length(steps.unwrap_or(0));
+            let bar = &mut stage.bar.clone();
+            let trajectory =
+                Trajectory::of(case, stage.device, &folder, samples, &mut [bar], &never);
+            Ok(trajectory?)
         })?;
-        bar.finish();
         Ok(trajectory.expect("nobody interrupts it"))
     }
 

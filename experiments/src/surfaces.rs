@@ -6,12 +6,13 @@ use geometry::UpAxis;
 use model::NeededNetwork;
 use operators::memory;
 use render::{Bounds, Framing, Quality, Rgb, Scene, Tube};
-use report::{OutputDir, Raster};
+use report::Raster;
 use serde_json::Value;
 use surfaces::ClosedMesh;
 
 use crate::networks::Chosen;
 use crate::prelude::*;
+use crate::session::Stage;
 use crate::steps::steps_csv;
 
 /// Interface width of surfaces, in cells.
@@ -198,10 +199,8 @@ impl Surface {
         let steps = samples.also.into_iter().filter(|step| *step < last);
         let steps = steps.chain([last]);
         let measures = format!("{}: measures", flowed.surface.title);
-        let (output, quick) = (&session.output, session.options.quick);
-        flowed.snapshots = session.manifest.phase(measures, || {
-            let snapshots = steps.map(|step| flowed.snapshot(step, output, quick));
-            snapshots.collect::<Result<_, Error>>()
+        flowed.snapshots = session.phase(measures, |stage| {
+            steps.map(|step| flowed.snapshot(step, stage)).collect()
         })?;
         Ok(flowed)
     }
@@ -209,12 +208,12 @@ impl Surface {
 
 impl Flowed {
     /// Measures the phase field after a step, and writes its isosurface.
-    fn snapshot(&self, step: usize, output: &OutputDir, quick: bool) -> Result<Snapshot, Error> {
+    fn snapshot(&self, step: usize, stage: &Stage<'_>) -> Result<Snapshot, Error> {
         let (case, u) = (&self.trajectory.case, self.trajectory.field(step)?);
         // The isosurface is closed by construction; whoever uses the file relies on it.
         let (mesh, _) = ClosedMesh::new(surfaces::phase_field_surface(&u, case.scales.eps)?)?;
         let file = format!("{}.ply", self.file(step));
-        surfaces::write(output.subfolder("meshes")?.path(&file)?, mesh.mesh())?;
+        surfaces::write(stage.output.subfolder("meshes")?.path(&file)?, mesh.mesh())?;
         let record = self.trajectory.record(step);
         let at_rest = |first: &Record| first.minimization.map(|made| made.energy_at_rest());
         let at_start = || self.trajectory.records.first().and_then(at_rest);
@@ -233,7 +232,9 @@ impl Flowed {
                 measured["volume"],
                 mesh.euler_characteristic() as f64,
             ],
-            paper: reported.filter(|_| !quick).and_then(|(_, w)| *w),
+            paper: reported
+                .filter(|_| !stage.options.quick)
+                .and_then(|(_, w)| *w),
             caption: format!("step {step}: w = {w:.2}"),
             tubes: Vec::new(),
         })
@@ -266,13 +267,9 @@ impl Flowed {
     }
 
     /// Pictures of the shown steps with this side in pixels (less in a quick run), all in one framing, each also as a file of its own.
-    pub fn pictures(
-        &self,
-        output: &OutputDir,
-        quick: bool,
-        side: u32,
-    ) -> Result<Vec<Raster>, Error> {
+    pub fn pictures(&self, stage: &Stage<'_>, side: u32) -> Result<Vec<Raster>, Error> {
         memory::release_freed();
+        let quick = stage.options.quick;
         let usual = (side, Quality::Standard);
         let (side, quality) = if quick { (120, Quality::Draft) } else { usual };
         // Scenes are made twice rather than kept: one takes several times the memory of its phase field.
@@ -283,7 +280,7 @@ impl Flowed {
         }
         let bounds = bounds.into_iter().flatten();
         let bounds = bounds.reduce(|all, one| all.union(&one));
-        let folder = output.subfolder("pictures")?;
+        let folder = stage.output.subfolder("pictures")?;
         let picture = |snapshot: &Snapshot| {
             let mut scene = self.scene(snapshot)?.quality(quality);
             if let Some(bounds) = bounds {
@@ -352,9 +349,8 @@ impl SurfaceFlows {
         }
         write_snapshots(&mut session, &all, "energies", Flowed::key)?;
         let remarks = remarks(&mut session, &mut all)?;
-        let (output, quick) = (&session.output, session.options.quick);
-        let pictures = session.manifest.phase("pictures", || {
-            let pictures = all.iter().map(|one| one.pictures(output, quick, SIDE));
+        let pictures = session.phase("pictures", |stage| {
+            let pictures = all.iter().map(|one| one.pictures(stage, SIDE));
             pictures.collect::<Result<Vec<_>, _>>()
         })?;
         let columns = pictures.iter().map(Vec::len).max();
@@ -367,6 +363,7 @@ impl SurfaceFlows {
             ));
         session.figure(figure, "surfaces")?;
         let runs = all.iter().map(|one| (one.surface.key, &one.trajectory));
+        let output = &session.output;
         output.write("steps.csv", steps_csv("surface", runs)?)?;
         for one in &all {
             let records = &one.trajectory.records;

@@ -58,19 +58,18 @@ pub fn plane(operator: &Operator, n: usize, steps: usize, quick: bool) -> Result
 /// Willmore flow that is timed step by step.
 pub struct Timed<const D: usize> {
     pub run: Run<D>,
-    bar: ProgressBar,
 }
 
 impl<const D: usize> Timed<D> {
-    /// A case at its start, and the bar that shows its steps.
-    pub fn new(case: Case<D>, device: &ComputeDevice, bar: ProgressBar) -> Result<Self, Error> {
+    /// A case at its start.
+    pub fn new(case: Case<D>, device: &ComputeDevice) -> Result<Self, Error> {
         let run = Run::new(case, device)?;
-        Ok(Self { run, bar })
+        Ok(Self { run })
     }
 
-    /// One step, if there is one left.
-    pub fn step(&mut self) -> Result<bool, Error> {
-        self.bar.inc(1);
+    /// One step, if there is one left, which the bar counts.
+    pub fn step(&mut self, bar: &ProgressBar) -> Result<bool, Error> {
+        bar.inc(1);
         Ok(self.run.step()?.is_some())
     }
 

@@ -3,7 +3,6 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use indicatif::ProgressBar;
 use model::training::{Checkpoint, Progress as Iteration, Recipe, SphereData, Trained, Training};
 use model::{Error as ModelError, Ratios};
 use operators::{ComputeDevice, DeviceKind};
@@ -12,7 +11,7 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use crate::Error;
-use crate::options::RunOptions;
+use crate::session::Stage;
 
 /// Least time between two checkpoints.
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(3);
@@ -106,10 +105,13 @@ pub fn held_out_radii(quick: bool) -> usize {
 /// Trains a network by a recipe on a [`training_device`], continuing from the checkpoint in a file.
 pub fn train<R: Recipe>(
     (spec, recipe): (&NetworkSpec, &R),
-    options: &RunOptions,
-    device: &ComputeDevice,
     file: &Path,
-    bar: &ProgressBar,
+    Stage {
+        options,
+        device,
+        bar,
+        ..
+    }: &Stage<'_>,
 ) -> Result<Trained, Error> {
     let training = Training {
         recipe,
@@ -135,7 +137,6 @@ pub fn train<R: Recipe>(
     };
     let trained = training.run(&mut checkpoint, device, &mut observer)?;
     store(file, &key, &checkpoint)?;
-    bar.finish();
     Ok(trained)
 }
 

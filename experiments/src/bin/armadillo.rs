@@ -23,8 +23,6 @@ const ARMADILLO_FLOW: MeshFlow = MeshFlow {
 
 /// Willmore flow of the armadillo, n = 128, eps = 2^-6, tautilde = 2^-14, with tau = 2^-22 doubled after every step: pictures and
 /// Willmore energies at steps 0, 1, 8, 11 and 16.
-///
-/// Steps are kept in the folder `fields` of the output; an interrupted run continues.
 #[derive(Parser, Debug)]
 #[command(name = ARMADILLO_FLOW.program, version)]
 struct Options {

@@ -6,13 +6,14 @@ use std::path::PathBuf;
 
 use experiments::networks::{EPS, STEP, scales};
 use experiments::prelude::*;
+use experiments::session::Stage;
 use experiments::surfaces::{self, willmore_flow};
 use fem::FiniteElementStep;
 use geometry::measure::zero_set_volume;
 use geometry::shapes::{Ball, Torus};
 use model::training::SphereData;
 use model::{Calibration, NamedNetwork, Network, Shipped, displacement_errors};
-use report::{OutputDir, Progress};
+use report::OutputDir;
 use solver::Factors;
 
 const PROGRAM: &str = "calibration";
@@ -70,13 +71,12 @@ fn program(options: &Options) -> Result<(), Error> {
         "inner_step": STEP,
         "time_step": STEP_RATIO * STEP,
     });
-    let mut session = Session::open(PROGRAM, run, device.clone(), parameters)?;
+    let mut session = Session::open(PROGRAM, run, device, parameters)?;
     let install = options.install.as_ref().map(OutputDir::create);
     let install = install.transpose()?;
-    let manifest = &mut session.manifest;
     let mut all = Vec::new();
     for NamedNetwork { name, network } in networks {
-        let calibration = manifest.phase(name.clone(), || network.calibrate())?;
+        let calibration = session.phase(&name, |_| Ok(network.calibrate()?))?;
         let network = network.with_calibration(Some(calibration));
         if let Some(install) = &install {
             network.save(&install.path(&name)?)?;
@@ -86,12 +86,9 @@ fn program(options: &Options) -> Result<(), Error> {
             calibration,
         });
     }
-    let progress = &session.progress;
-    let discs = manifest.phase("discs", || discs(&all, run.quick, &device, progress))?;
-    let surfaces = manifest.phase("balls and tori", || {
-        balls_and_tori(&all, run.quick, &device)
-    })?;
-    let diagnosed = manifest.phase("diagnostics", || diagnostics(&all, run.quick, &device))?;
+    let discs = session.phase("discs", |stage| discs(&all, stage))?;
+    let surfaces = session.phase("balls and tori", |stage| balls_and_tori(&all, stage))?;
+    let diagnosed = session.phase("diagnostics", |stage| diagnostics(&all, stage))?;
 
     session.figure(diagnostics_figure(&diagnosed), "diagnostics")?;
     session.figure(discs_figure(&discs), "discs")?;
@@ -200,12 +197,8 @@ struct DiscRow {
 }
 
 /// Discs of either phase by every network with the scales of the convergence tests up to `n = 256`, and by its odd part.
-fn discs(
-    all: &[Calibrated],
-    quick: bool,
-    device: &ComputeDevice,
-    progress: &Progress,
-) -> Result<Vec<DiscRow>, Error> {
+fn discs(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<DiscRow>, Error> {
+    let quick = stage.options.quick;
     let radii = if quick { &QUICK_RADII[..] } else { &RADII };
     let mut variants = Vec::new();
     for one in all {
@@ -222,8 +215,8 @@ fn discs(
             tasks.extend([1, -1].map(|phase| (variant, radius, phase)));
         }
     }
-    let bar = progress.bar("discs", tasks.len() as u64);
-    let rows = harness::in_parallel(tasks.len(), harness::workers(device), |i| {
+    stage.bar.set_length(tasks.len() as u64);
+    harness::in_parallel(tasks.len(), harness::workers(stage.device), |i| {
         let (&(n, odd_part, ref one), radius, phase) = tasks[i];
         let (sign, factors) = (f64::from(phase), one.calibration.factors);
         let offset = one.calibration.spontaneous_curvature / EPS * sign;
@@ -233,7 +226,7 @@ fn discs(
         let disc = disc.map(|u| sign * u);
         // Over that of the zero level set of the relaxed disc, `pi / R`.
         let energy = |factors| -> Result<f64, Error> {
-            let (energy, field) = one.relaxed(&disc, scales(), factors, device)?;
+            let (energy, field) = one.relaxed(&disc, scales(), factors, stage.device)?;
             let inside = zero_set_volume(&field);
             let outside = grid.side().powi(2) - inside;
             let area = if phase > 0 { inside } else { outside };
@@ -248,11 +241,9 @@ fn discs(
             predicted: factors.energy * (1.0 - offset * radius).powi(2),
             calibrated: energy(factors)?,
         };
-        bar.inc(1);
+        stage.bar.inc(1);
         Ok(row)
-    });
-    bar.finish();
-    rows
+    })
 }
 
 fn discs_table(discs: &[DiscRow]) -> Sheet<'_, DiscRow> {
@@ -307,11 +298,7 @@ struct SurfaceRow {
 }
 
 /// Balls and Clifford tori.
-fn balls_and_tori(
-    all: &[Calibrated],
-    quick: bool,
-    device: &ComputeDevice,
-) -> Result<Vec<SurfaceRow>, Error> {
+fn balls_and_tori(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<SurfaceRow>, Error> {
     let grid = Grid::<3>::per_unit(SURFACE_CELLS, SURFACE_SIDE)?;
     let scales = surfaces::scales(SURFACE_CELLS);
     let mut shapes: Vec<(String, Field<3>, f64)> = Vec::new();
@@ -323,7 +310,7 @@ fn balls_and_tori(
         let torus = phase_field(grid, &Torus::clifford(outer)?, scales.eps)?;
         shapes.push((format!("Clifford torus, {outer:.2}"), torus, 4.0 * PI * PI));
     }
-    if quick {
+    if stage.options.quick {
         shapes.truncate(1);
     }
     let mut rows = Vec::new();
@@ -335,7 +322,7 @@ fn balls_and_tori(
         odd.named.network = one.named.network.odd_part();
         for (surface, initial, exact) in &shapes {
             let energy = |factors| -> Result<f64, Error> {
-                Ok(odd.relaxed(initial, scales, factors, device)?.0 / exact)
+                Ok(odd.relaxed(initial, scales, factors, stage.device)?.0 / exact)
             };
             rows.push(SurfaceRow {
                 network: one.named.name.clone(),
@@ -368,12 +355,8 @@ struct Diagnostics {
     bend: Vec<[f64; 2]>,
 }
 
-fn diagnostics(
-    all: &[Calibrated],
-    quick: bool,
-    device: &ComputeDevice,
-) -> Result<Vec<Diagnostics>, Error> {
-    let count: usize = if quick { 3 } else { 12 };
+fn diagnostics(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<Diagnostics>, Error> {
+    let count: usize = if stage.options.quick { 3 } else { 12 };
     // Kernels of width 65 have a thousand planes; surfaces have millions of nodes.
     let networks = all.iter().map(|one| (one.key(), &one.named.network));
     let small = networks
@@ -384,7 +367,7 @@ fn diagnostics(
         for i in 0..count {
             let radius = 0.05 * (0.42_f64 / 0.05).powf(i as f64 / (count - 1) as f64);
             let curvature = data.eps() / radius;
-            let [convex, concave] = displacement_errors(network, &data, radius, device)?;
+            let [convex, concave] = displacement_errors(network, &data, radius, stage.device)?;
             displacement.extend([[curvature, convex], [-curvature, concave]]);
         }
         displacement.sort_by(|a, b| a[0].total_cmp(&b[0]));

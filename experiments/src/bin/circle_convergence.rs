@@ -17,8 +17,6 @@ const SHOWN_STEPS: [usize; 5] = [1, 8, 16, 32, 64];
 
 /// Mean curvature flow by all methods and Willmore flow by the learned operator (with --full by all) of 30 circles, eps = 2^-6, 64
 /// steps of 2^-14: L2 distance to the exact solution over time, mean over the radii 0.05 pi + 0.15 pi i/30.
-///
-/// An interrupted run continues with the circles that are missing.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
 struct Options {
@@ -83,12 +81,12 @@ fn program(options: &Options) -> Result<(), Error> {
     for planned in &study.plan {
         let Variant { flow, n, .. } = planned.0;
         let title = format!("{}, {}, n = {n}", flow.title(), planned.0.label());
-        let bar = session.progress.bar(title.clone(), count as u64);
-        let (device, folder) = (session.device.clone(), finished.as_path());
-        ensembles.push(session.phase(title, || {
-            Ensemble::run(planned, (count, steps), &device, folder, &bar)
-        })?);
-        bar.finish();
+        let ensemble = session.phase(title, |stage| {
+            stage.bar.set_length(count as u64);
+            let folder = finished.as_path();
+            Ensemble::run(planned, (count, steps), stage.device, folder, &stage.bar)
+        })?;
+        ensembles.push(ensemble);
     }
     let report = Report {
         study,

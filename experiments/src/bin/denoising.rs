@@ -102,7 +102,7 @@ fn program(options: &Options) -> Result<(), Error> {
                 let results = [0, 2, 3, 1].map(|k| (methods[k].method, &methods[k].result));
                 let shown = [("clean", clean.mesh.mesh())].into_iter().chain(results);
                 let drawn = shown.map(|(name, mesh)| clean.picture(name, mesh));
-                pictures.extend(session.phase::<Vec<_>>("pictures", || drawn.collect())?);
+                pictures.extend(session.phase::<Vec<_>>("pictures", |_| drawn.collect())?);
             }
             rows.extend(methods);
         }
@@ -278,9 +278,10 @@ fn fair(
     let grid = centred_box(cells, 1.0)?;
     let scales = Scales::of_grid(grid.spacing(), 2.0);
     let placement = Placement::fit(&fairing.start().bounding_box(), &grid, SIDE, 0.0)?;
-    let bar = session.progress.bar(title.to_owned(), cells as u64);
     let distance = MeshDistance::new(&fairing.start().placed(&placement));
-    let mut distance = sampled(&distance, grid, &bar)?;
+    let mut distance = session.phase(format!("{title}: signed distance"), |stage| {
+        sampled(&distance, grid, &stage.bar)
+    })?;
     surfaces::mend_signs(&mut distance);
     let initial: Field<3> = distance.map(|s| optimal_profile(s, scales.eps));
     let followed = fairing.follow(placement, &initial, scales.eps)?;
@@ -301,12 +302,11 @@ fn fair(
         measures: vec![displacement],
         ..willmore_flow(title, initial, operator, scales, (rule, 0))
     };
-    let device = session.device.clone();
-    let faired = session.phase(title, || {
-        let mut run = Run::new(case, &device)?;
-        while run.step()?.is_some() {}
+    session.phase(title, |stage| {
+        let mut run = Run::new(case, stage.device)?;
+        while run.step()?.is_some() {
+            stage.bar.inc(1);
+        }
         Ok(fairing.faired(&followed, run.field())?)
-    })?;
-    bar.finish();
-    Ok(faired)
+    })
 }

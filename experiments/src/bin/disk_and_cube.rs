@@ -25,8 +25,6 @@ const VIEW: View = View {
 
 /// Willmore flow of a cube and of a thick disk, n = 64, eps = 2^-5, tautilde = 2^-12, tau = 2^-18, by the hybrid scheme and by
 /// nested implicit finite elements: pictures, Willmore energies w and L2 distances after 0, 1 and 100 steps.
-///
-/// Runs are kept in the folder `fields` of the output; an interrupted one continues.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
 struct Options {

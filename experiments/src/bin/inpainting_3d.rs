@@ -139,8 +139,8 @@ fn program(options: &Options) -> Result<(), Error> {
     for (shape, one) in shapes.iter().zip(&mut flowed) {
         let measured = Inpainted::measure(shape, &one.trajectory)?;
         decorate(&mut one.snapshots, &measured);
-        let (output, title) = (&session.output, format!("{}: pictures", shape.title));
-        let pictures = (session.manifest).phase(title, || one.pictures(output, run.quick, SIDE))?;
+        let title = format!("{}: pictures", shape.title);
+        let pictures = session.phase(title, |stage| one.pictures(stage, SIDE))?;
         let figure = Figure::new("", COLUMNS).with_panels(pictures);
         measured.write_frames(&session, figure.with_note(note(&measured, n)))?;
         inpainted.push(measured);

@@ -42,19 +42,21 @@ fn program(options: &Options) -> Result<(), Error> {
     let checksums: BTreeMap<_, _> = names.zip(fingerprints).collect();
     let held_out_radii = held_out_radii(run.quick);
     let parameters = json!({"networks": checksums, "held_out_radii": held_out_radii});
-    let mut session = Session::open(PROGRAM, run, device.clone(), parameters)?;
-    let bar = session.progress.bar("held-out losses", specs.len() as u64);
+    let mut session = Session::open(PROGRAM, run, device, parameters)?;
     let mut shown = Vec::new();
     for (spec, network) in specs.iter().zip(&networks) {
         let data = spec.data(false)?;
-        let quality = session.phase(format!("quality of {}", spec.name), || {
-            Ok(Quality::measure(network, &data, held_out_radii, &device)?)
+        let quality = session.phase(format!("quality of {}", spec.name), |stage| {
+            Ok(Quality::measure(
+                network,
+                &data,
+                held_out_radii,
+                stage.device,
+            )?)
         })?;
         session.summary.insert_record(spec.name, &quality)?;
         shown.push(Shown::new(spec, network, &heat_kernel(&data), quality));
-        bar.inc(1);
     }
-    bar.finish();
 
     let width = if shown.len() == 1 { 480.0 } else { 960.0 };
     for (figure, name) in [

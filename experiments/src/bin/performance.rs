@@ -182,14 +182,13 @@ impl Measurement {
         compared: bool,
     ) -> Result<Self, Error> {
         let grid = *case.grid();
-        let (n, device) = (grid.spacing().recip().round(), session.device.clone());
+        let n = grid.spacing().recip().round();
         let name = format!("{case_name}, n = {n}");
-        let bar = session.progress.counter(name.clone());
         memory::forget_peak();
-        let mut timed = Timed::new(case.clone(), &device, bar)?;
+        let mut timed = Timed::new(case.clone(), &session.device)?;
         let mut warm = None;
-        session.phase(format!("{name}: steps"), || {
-            while timed.step()? {
+        session.phase(format!("{name}: steps"), |stage| {
+            while timed.step(&stage.bar)? {
                 warm = warm.or_else(memory::pages);
             }
             Ok(())
@@ -199,10 +198,10 @@ impl Measurement {
         let pages = memory::pages().zip(warm);
         let pages = pages.map(|(now, warm)| (now - warm) as f64 / later);
         let peak_mib = memory::peak_mib();
-        let (products, distance) = session.phase(format!("{name}: products"), || {
-            let distance = compared.then(|| distance_to_tighter(case, &device));
+        let (products, distance) = session.phase(format!("{name}: products"), |stage| {
+            let distance = compared.then(|| distance_to_tighter(case, stage.device));
             let network = &case.operator.network().expect("a learned operator").network;
-            let candidates = products::candidates(network, timed.run.field(), &device)?;
+            let candidates = products::candidates(network, timed.run.field(), stage.device)?;
             let products = products::measure(candidates, Duration::from_secs_f64(turns))?;
             Ok((products, distance.transpose()?))
         })?;

@@ -38,8 +38,6 @@ const CIRCLES: (usize, usize) = (12, 96);
 
 /// Willmore flow of the rocker arm, n = 64, eps = 2^-5, tau = tautilde = 2^-12: pictures and Willmore energies at steps 0, 1 and 20,
 /// and the Clifford torus whose phase field is nearest to the last one in L2.
-///
-/// Steps are kept in the folder `fields` of the output; an interrupted run continues.
 #[derive(Parser, Debug)]
 #[command(name = ROCKER_ARM_FLOW.program, version)]
 struct Options {
@@ -58,7 +56,7 @@ fn clifford_tori(session: &mut Session<'_>, all: &mut [Flowed]) -> Result<String
         let case = &one.trajectory.case;
         let last = one.trajectory.field(one.trajectory.steps())?;
         let title = format!("Clifford torus, {}", one.label());
-        let torus = session.phase(title, || {
+        let torus = session.phase(title, |_| {
             Ok(CliffordTorus::nearest(&last, case.scales.eps)?)
         })?;
         let as_field = torus.phase_field(last.grid(), case.scales.eps)?;

@@ -83,33 +83,30 @@ fn program(options: &Options) -> Result<(), Error> {
     let run = &options.figure.run;
     let radii = if run.quick { &RADII[2..4] } else { &RADII };
     let willmore_steps = if run.quick { 2 } else { WILLMORE_STEPS };
-    let (setting, device) = (
-        Setting::new(&options.figure, CELLS, 1.0)?,
-        run.open_device()?,
-    );
+    let device = run.open_device()?;
+    let setting = Setting::new(&options.figure, CELLS, 1.0)?;
     let others = json!({ "tau": TAU, "willmore_steps": willmore_steps });
     let parameters = setting.parameters(others)?;
-    let mut session = Session::open(PROGRAM, run, device.clone(), parameters)?;
-    let bar = session.progress.bar("radii".to_owned(), radii.len() as u64);
+    let mut session = Session::open(PROGRAM, run, device, parameters)?;
     let mut all = Vec::new();
     for &radius in radii {
-        let sphere = Sphere {
-            setting: &setting,
-            device: &device,
-            radius,
-        };
-        let measure = || sphere.measure(willmore_steps);
-        all.push(session.phase(format!("radius {radius}"), measure)?);
-        bar.inc(1);
+        let measured = session.phase(format!("radius {radius}"), |stage| {
+            let sphere = Sphere {
+                setting: &setting,
+                device: stage.device,
+                radius,
+            };
+            sphere.measure(willmore_steps)
+        })?;
+        all.push(measured);
     }
-    bar.finish();
     session.sheet(sheet(&all), "spheres")?;
     if !run.quick {
         let (spec, papers) = (NetworkSpec::surfaces(), setting.operator(PAPERS)?);
         let network = &papers.network().expect("it is learned").network;
-        let measured = session.phase("quality of the network", || {
+        let measured = session.phase("quality of the network", |stage| {
             let (data, count) = (spec.data(false)?, held_out_radii(false));
-            Ok(Quality::measure(network, &data, count, &device)?)
+            Ok(Quality::measure(network, &data, count, stage.device)?)
         })?;
         let names = Sheet::of(std::slice::from_ref(&measured)).text("network", |_| spec.name);
         session.sheet(quality::columns(names, |measured| measured), "quality")?;

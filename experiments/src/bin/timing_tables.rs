@@ -7,6 +7,7 @@ use experiments::prelude::*;
 use experiments::surfaces;
 use experiments::timing::{self, Numbers, Timed, take_turns};
 use fem::LinearSolver::{self, ConjugateGradients, Direct};
+use indicatif::ProgressBar;
 use solver::Method::{self as Newton, Paper, Preconditioned};
 
 const PROGRAM: &str = "timing_tables";
@@ -199,17 +200,17 @@ fn measure(
         operator.linear = row.linear;
         let mut case = timing::plane(&operator, n, STEPS, session.options.quick)?;
         case.scales.newton.method = row.newton;
-        let bar = (session.progress).bar(format!("{}, n = {n}", row.label), STEPS as u64);
         contenders.push(Timing {
             row,
             n,
-            timed: Timed::new(case, &session.device, bar)?,
+            timed: Timed::new(case, &session.device)?,
             failure: None,
         });
     }
-    session.phase(format!("n = {n}"), || {
+    session.phase(format!("n = {n}"), |stage| {
+        stage.bar.set_length((VARIANTS.len() * STEPS) as u64);
         let goes_on = |timing: &Timing| timing.goes_on(budget);
-        take_turns(&mut contenders, goes_on, Timing::step)
+        take_turns(&mut contenders, goes_on, |timing| timing.step(&stage.bar))
     })?;
     Ok(contenders)
 }
@@ -222,8 +223,8 @@ impl Timing {
         self.failure.is_none() && seconds.len() < STEPS && more
     }
 
-    fn step(&mut self) -> Result<(), Error> {
-        match self.timed.step() {
+    fn step(&mut self, bar: &ProgressBar) -> Result<(), Error> {
+        match self.timed.step(bar) {
             Err(Error::Engine(engine::Error::Step { source, .. }))
                 if matches!(*source, solver::Error::NotConverged { .. }) =>
             {
@@ -298,20 +299,18 @@ fn surface_steps(
     const METHODS: [(Method, f64); 2] = [(Hybrid, 807.0), (FeImplicit, 14589.0)];
     let time = (StepRule::Constant(0.5_f64.powi(18)), 1);
     let (scales, needed) = (surfaces::scales(n), surfaces::needed_network());
-    let bar = session.progress.bar("signed distance".to_owned(), n as u64);
     let grid = surfaces::centred_box(n, options.mesh.box_side(&ARMADILLO))?;
-    let device = session.device.clone();
-    session.phase("armadillo", || {
+    session.phase("armadillo", |stage| {
         let mesh = options.mesh.load_or_built_in(&ARMADILLO, &grid)?;
-        let initial = mesh.phase_field(grid, scales.eps, &bar)?;
+        let initial = mesh.phase_field(grid, scales.eps, &stage.bar)?;
         let mut steps = Vec::new();
         for (method, papers_seconds) in METHODS {
             let (variant, source) = ((method, Scheme::Paper), networks.of(Scheme::Paper));
             let operator = Operator::new(variant, &source, &needed, &grid, &scales)?;
             let initial = initial.clone();
             let case = surfaces::willmore_flow(&mesh.title, initial, operator, scales, time);
-            let mut timed = Timed::new(case, &device, bar.clone())?;
-            timed.step()?;
+            let mut timed = Timed::new(case, stage.device)?;
+            timed.step(&stage.bar)?;
             steps.push((method, timed.numbers(), papers_seconds));
         }
         Ok((mesh.title, steps))

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use clap::ValueEnum;
 use experiments::prelude::*;
 use experiments::quality;
-use experiments::session::remove_folder;
+use experiments::session::{Stage, remove_folder};
 use experiments::training::{NetworkSpec, train, training_device};
 use model::Network;
 use model::training::adam::AdamParams;
@@ -31,8 +31,6 @@ enum Recipe {
 }
 
 /// Trains the networks: n = 128, 256, 512 of the convergence tests, the one for inpainting, and the one for surfaces in 3D.
-///
-/// An interrupted training continues from its last checkpoint.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
 struct Options {
@@ -159,12 +157,8 @@ impl Trainings<'_> {
         let (key, label, _) = recipe.look();
         let name = format!("{}-{key}", spec.name);
         let file = self.checkpoints.path(&format!("{name}.json"))?;
-        let session = &mut self.session;
-        let bar = session.progress.bar(name, 1);
-        let (run, device) = (session.options, session.device.clone());
-        let trained = session.phase(format!("{} by {label}", spec.name), || {
-            train((spec, params), run, &device, &file, &bar)
-        })?;
+        let work = |stage: &Stage<'_>| train((spec, params), &file, stage);
+        let trained = (self.session).phase(format!("{} by {label}", spec.name), work)?;
         let network = trained.network.clone();
         if self.chosen.contains(spec) {
             let prefix = match recipe {
