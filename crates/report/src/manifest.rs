@@ -88,20 +88,10 @@ impl Manifest {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameters`] if it does not, [`Error::Json`] if it does not serialise at all.
+    /// [`Error::Json`] if it does not.
     pub fn with_parameters(mut self, parameters: &impl Serialize) -> Result<Self> {
-        let value = serde_json::to_value(parameters).map_err(|source| Error::Json {
-            what: "the run parameters".to_owned(),
-            source,
-        })?;
-        match value {
-            Value::Object(map) => self.parameters = map,
-            _ => {
-                return Err(Error::Parameters {
-                    experiment: self.experiment,
-                });
-            }
-        }
+        let map = serde_json::to_value(parameters).and_then(serde_json::from_value);
+        self.parameters = map.map_err(Error::json("the run parameters"))?;
         Ok(self)
     }
 
@@ -141,7 +131,7 @@ impl Manifest {
     ///
     /// # Errors
     ///
-    /// [`Error::Write`].
+    /// [`Error::File`].
     pub fn write(&mut self, folder: &OutputDir) -> Result<PathBuf> {
         self.wall_seconds = self.clock.elapsed().as_secs_f64();
         folder.write("manifest.json", crate::data::to_json(self)?)
@@ -262,6 +252,6 @@ mod tests {
         let error = Manifest::start("circle")
             .with_parameters(&[1, 2])
             .unwrap_err();
-        assert!(matches!(error, Error::Parameters { .. }));
+        assert!(error.to_string().contains("expected a map"));
     }
 }

@@ -24,14 +24,10 @@ pub struct Progress {
 impl Progress {
     /// Progress bars on standard error if it is a terminal and not `quiet`.
     pub fn new(quiet: bool) -> Self {
-        Self::on(!quiet && std::io::stderr().is_terminal())
-    }
-
-    fn on(visible: bool) -> Self {
-        let target = if visible {
-            ProgressDrawTarget::stderr()
-        } else {
+        let target = if quiet || !std::io::stderr().is_terminal() {
             ProgressDrawTarget::hidden()
+        } else {
+            ProgressDrawTarget::stderr()
         };
         Self {
             bars: MultiProgress::with_draw_target(target),
@@ -63,11 +59,6 @@ impl Progress {
             .expect("the templates are fixed and valid")
             .progress_chars("━╸ ");
         self.bars.add(bar).with_style(style).with_message(message)
-    }
-
-    /// Writes a line to standard error above the bars, even when they are hidden.
-    pub fn println(&self, line: &str) {
-        self.bars.suspend(|| eprintln!("{line}"));
     }
 
     /// Takes all bars off the screen.

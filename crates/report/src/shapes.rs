@@ -1,24 +1,21 @@
 //! Plane curves, filled or outlined, at equal aspect: zero level sets as small multiples.
 
-use plotters_backend::text_anchor::HPos;
 use srgb::Rgb;
 
-use crate::axes::{Margins, draw_lines, title_height};
-use crate::colour::{Colour, INK, WHITE};
+use crate::axes::Margins;
+use crate::axis::{Mapping, Scale};
+use crate::colour::Colour;
 use crate::error::{Error, Result};
 use crate::geom::{Point, Rect, clip_loop, clip_polyline, point, thin};
-use crate::legend::{LegendEntry, Sample};
-use crate::panel::{Context, Drawable, Spot, Window};
+use crate::panel::Drawable;
 use crate::style::LineStyle;
-use crate::surface::{Surface, outline, stroke_dashed};
+use crate::surface::Surface;
 
-/// A set of polylines drawn alike, such as all components of one zero level set.
+/// Closed polylines drawn alike, such as all components of one zero level set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     /// Polylines as lists of `[x, y]`, `y` pointing up. The end need not repeat the start.
     pub loops: Vec<Vec<[f64; 2]>>,
-    /// Whether the ends of each polyline are joined. Only closed curves are filled.
-    pub closed: bool,
     /// Colour of the outline.
     pub colour: Colour,
     /// Line style of the outline; [`LineStyle::None`] leaves it out.
@@ -27,29 +24,18 @@ pub struct Curve {
     pub width: f64,
     /// Colour of the region inside an odd number of the polylines, if it is to be filled.
     pub fill: Option<Colour>,
-    /// Legend label; empty keeps it out of the legend.
-    pub label: String,
 }
 
 impl Curve {
-    /// A closed, solid outline in near-black.
+    /// A solid outline in near-black.
     pub fn new(loops: impl Into<Vec<Vec<[f64; 2]>>>) -> Self {
         Self {
             loops: loops.into(),
-            closed: true,
             colour: Colour::Black,
             style: LineStyle::Solid,
             width: 1.6,
             fill: None,
-            label: String::new(),
         }
-    }
-
-    /// Leaves the ends of the polylines apart.
-    #[must_use]
-    pub fn open(mut self) -> Self {
-        self.closed = false;
-        self
     }
 
     /// Sets the colour of the outline.
@@ -80,41 +66,11 @@ impl Curve {
         self
     }
 
-    /// Names the curve in the legend.
-    #[must_use]
-    pub fn with_label(mut self, label: impl Into<String>) -> Self {
-        self.label = label.into();
-        self
-    }
-
-    /// Finite points only, with the first repeated at the end of closed curves.
-    pub(crate) fn closed_loops(&self) -> impl Iterator<Item = Vec<[f64; 2]>> {
-        self.loops.iter().map(|ring| {
-            let mut points: Vec<[f64; 2]> = ring
-                .iter()
-                .copied()
-                .filter(|p| p.iter().all(|c| c.is_finite()))
-                .collect();
-            if self.closed && points.len() > 2 && points.first() != points.last() {
-                points.push(points[0]);
-            }
-            points
-        })
-    }
-
-    pub(crate) fn legend_entry(&self) -> Option<LegendEntry> {
-        if self.label.is_empty() {
-            return None;
-        }
-        let line = LegendEntry {
-            label: self.label.clone(),
-            colour: self.colour,
-            sample: Sample::Line(self.style, None),
-        };
-        Some(match (self.fill, self.style) {
-            (Some(fill), LineStyle::None) => LegendEntry::patch(self.label.clone(), fill),
-            _ => line,
-        })
+    /// Finite points only.
+    fn finite(&self) -> impl Iterator<Item = Vec<[f64; 2]>> {
+        let finite = |p: &&[f64; 2]| p.iter().all(|c| c.is_finite());
+        let rings = self.loops.iter();
+        rings.map(move |ring| ring.iter().filter(finite).copied().collect())
     }
 }
 
@@ -123,22 +79,19 @@ impl Curve {
 pub struct Shapes {
     /// Caption above the drawing; may be empty.
     pub caption: String,
-    /// Curves, later ones on top. A panel without curves stays empty.
+    /// Curves, later ones on top.
     pub curves: Vec<Curve>,
-    /// What to show; `None` shows all curves of all such panels in the figure at one scale.
-    pub window: Option<Window>,
-    /// Whether a thin frame is drawn around the window.
-    pub frame: bool,
+    /// The ends of what is shown in `x` and `y`; `None` shows all curves. Panels to be compared need a common one.
+    pub window: Option<[[f64; 2]; 2]>,
 }
 
 impl Shapes {
-    /// A framed panel showing all of its curves.
+    /// A panel showing all of its curves.
     pub fn new(caption: impl Into<String>) -> Self {
         Self {
             caption: caption.into(),
             curves: Vec::new(),
             window: None,
-            frame: true,
         }
     }
 
@@ -152,120 +105,89 @@ impl Shapes {
     /// Fixes what is shown.
     #[must_use]
     pub fn with_window(mut self, x: [f64; 2], y: [f64; 2]) -> Self {
-        self.window = Some(Window { x, y });
+        self.window = Some([x, y]);
         self
     }
 
-    /// Leaves the frame out.
-    #[must_use]
-    pub fn without_frame(mut self) -> Self {
-        self.frame = false;
-        self
-    }
-
-    /// The smallest window around all finite points.
-    fn bounds(&self) -> Option<Window> {
-        let points = self.curves.iter().flat_map(Curve::closed_loops).flatten();
-        points
-            .map(|[x, y]| Window {
-                x: [x, x],
-                y: [y, y],
-            })
-            .reduce(Window::union)
-    }
-
-    /// The common window of all panels that do not fix their own, with a margin.
-    pub(crate) fn common_window<'a>(panels: impl Iterator<Item = &'a Self>) -> Option<Window> {
-        let bounds = panels
-            .filter(|p| p.window.is_none())
-            .filter_map(Self::bounds)
-            .reduce(Window::union)?;
-        let longest = (bounds.x[1] - bounds.x[0]).max(bounds.y[1] - bounds.y[0]);
-        let margin = if longest > 0.0 { 0.06 * longest } else { 1.0 };
-        let grow = |[low, high]: [f64; 2]| [low - margin, high + margin];
-        Some(Window {
-            x: grow(bounds.x),
-            y: grow(bounds.y),
-        })
-    }
-
-    fn window(&self, context: &Context) -> Result<Window> {
-        let window = self.window.or(context.window);
-        window
+    /// The window around all finite points, with a margin.
+    fn bounds(&self) -> Result<[[f64; 2]; 2]> {
+        let points = self.curves.iter().flat_map(Curve::finite).flatten();
+        let join = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        let bounds = points
+            .map(|point| point.map(|c| [c, c]))
+            .reduce(|a, b| [join(a[0], b[0]), join(a[1], b[1])])
             .ok_or_else(|| Error::Empty {
                 chart: self.caption.clone(),
-            })?
-            .checked()
+            })?;
+        let longest = bounds
+            .map(|[low, high]| high - low)
+            .into_iter()
+            .fold(0.0, f64::max);
+        let margin = if longest > 0.0 { 0.06 * longest } else { 1.0 };
+        Ok(bounds.map(|[low, high]| [low - margin, high + margin]))
+    }
+
+    /// The curves with the window they are seen through.
+    pub(crate) fn checked(&self) -> Result<Seen<'_>> {
+        let [x, y] = match self.window {
+            Some(window) => window,
+            None => self.bounds()?,
+        };
+        Ok(Seen {
+            shapes: self,
+            x: Mapping::new("x", Scale::Linear, x[0], x[1])?,
+            y: Mapping::new("y", Scale::Linear, y[0], y[1])?,
+        })
     }
 }
 
-impl Drawable for Shapes {
-    fn legend(&self) -> Vec<Vec<LegendEntry>> {
-        vec![self.curves.iter().filter_map(Curve::legend_entry).collect()]
+/// Curves with the window they are seen through.
+pub(crate) struct Seen<'a> {
+    shapes: &'a Shapes,
+    x: Mapping,
+    y: Mapping,
+}
+
+impl Drawable for Seen<'_> {
+    fn aspect(&self) -> Option<f64> {
+        Some((self.y.high - self.y.low) / (self.x.high - self.x.low))
     }
 
-    fn aspect(&self, context: &Context) -> Result<Option<f64>> {
-        Ok(Some(self.window(context)?.aspect()))
+    fn margins(&self, _: f64, _: f64) -> Margins {
+        Margins::even(1.0)
     }
 
-    fn margins(&self, context: &Context, _: Spot, _: f64, _: f64) -> Result<Margins> {
-        let top = title_height(&self.caption, context.fonts.label, context.cell_width);
-        Ok(Margins {
-            left: 1.0,
-            right: 1.0,
-            top: top + 1.0,
-            bottom: 1.0,
-        })
-    }
-
-    fn draw(
-        &self,
-        context: &Context,
-        surface: &mut dyn Surface,
-        _: Spot,
-        plot: Rect,
-        outer: Rect,
-    ) -> Result<()> {
-        let window = self.window(context)?;
-        // Far outside points are pulled in, or their coordinates overflow later on.
-        let fraction =
-            |value: f64, [low, high]: [f64; 2]| ((value - low) / (high - low)).clamp(-1e4, 1e4);
+    fn draw(&self, surface: &mut dyn Surface, plot: Rect) -> Result<()> {
         let place = |[x, y]: [f64; 2]| -> Point {
             point(
-                plot.x + fraction(x, window.x) * plot.width,
-                plot.bottom() - fraction(y, window.y) * plot.height,
+                plot.x + self.x.fraction(x) * plot.width,
+                plot.bottom() - self.y.fraction(y) * plot.height,
             )
         };
-        surface.rect(plot, WHITE)?;
-        for curve in &self.curves {
+        for curve in &self.shapes.curves {
             let placed: Vec<Vec<Point>> = curve
-                .closed_loops()
+                .finite()
                 .map(|ring| thin(&ring.into_iter().map(place).collect::<Vec<_>>(), 0.2))
                 .collect();
-            if let Some(fill) = curve.fill.filter(|_| curve.closed) {
-                let inside: Vec<Vec<Point>> =
-                    placed.iter().map(|ring| clip_loop(ring, &plot)).collect();
+            if let Some(fill) = curve.fill {
+                let inside: Vec<_> = placed.iter().map(|ring| clip_loop(ring, &plot)).collect();
                 surface.fill(&inside, fill.rgb())?;
             }
-            if curve.style != LineStyle::None {
-                for piece in placed.iter().flat_map(|ring| clip_polyline(ring, &plot)) {
-                    let (width, pattern) = (curve.width, curve.style.pattern());
-                    stroke_dashed(surface, &piece, width, curve.colour.rgb(), pattern)?;
+            if curve.style == LineStyle::None {
+                continue;
+            }
+            for mut ring in placed {
+                ring.extend(ring.first().copied());
+                for piece in clip_polyline(&ring, &plot) {
+                    surface.dashed(
+                        &piece,
+                        curve.width,
+                        curve.colour.rgb(),
+                        curve.style.pattern(),
+                    )?;
                 }
             }
         }
-        if self.frame {
-            outline(surface, plot, 1.0, Rgb(170, 170, 170))?;
-        }
-        let em = context.fonts.label;
-        let at = (plot.centre().x, outer.y);
-        draw_lines(
-            surface,
-            &self.caption,
-            (em, INK),
-            HPos::Center,
-            at,
-            context.cell_width,
-        )
+        surface.outline(plot, Rgb(170, 170, 170))
     }
 }

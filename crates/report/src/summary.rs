@@ -71,10 +71,7 @@ impl Summary {
     pub fn insert_record(&mut self, prefix: &str, record: &impl Serialize) -> Result<()> {
         let fields: Map<String, Value> = serde_json::to_value(record)
             .and_then(serde_json::from_value)
-            .map_err(|source| Error::Json {
-                what: format!("the record {prefix:?}"),
-                source,
-            })?;
+            .map_err(Error::json(format!("the record {prefix:?}")))?;
         for (field, value) in fields {
             let name = format!("{prefix}.{field}");
             match value {
@@ -115,27 +112,9 @@ impl Summary {
         self.metrics.get(name).and_then(Number::as_f64)
     }
 
-    /// All metrics in order of their names.
-    pub fn iter(&self) -> impl Iterator<Item = (&str, f64)> {
-        self.metrics
-            .iter()
-            .filter_map(|(name, number)| Some((name.as_str(), number.as_f64()?)))
-    }
-
     /// The summary as indented JSON with sorted keys and a final newline.
     pub fn to_json(&self) -> String {
-        let mut text = String::from("{");
-        for (k, (name, number)) in self.metrics.iter().enumerate() {
-            let comma = if k == 0 { "" } else { "," };
-            // Names need no escaping: their grammar allows nothing special.
-            text.extend([comma, "\n  \"", name, "\": ", &number.to_string()]);
-        }
-        text.push_str(if self.metrics.is_empty() {
-            "}\n"
-        } else {
-            "\n}\n"
-        });
-        text
+        crate::data::to_json(&self.metrics).expect("the keys are text")
     }
 
     /// Reads what [`Summary::to_json`] wrote.
@@ -146,10 +125,7 @@ impl Summary {
     /// not allowed.
     pub fn from_json(text: &str) -> Result<Self> {
         let numbers: BTreeMap<String, Number> =
-            serde_json::from_str(text).map_err(|source| Error::Json {
-                what: "the summary".to_owned(),
-                source,
-            })?;
+            serde_json::from_str(text).map_err(Error::json("the summary"))?;
         let mut summary = Self::new();
         for (name, number) in numbers {
             summary.add(&name, number)?;
@@ -161,7 +137,7 @@ impl Summary {
     ///
     /// # Errors
     ///
-    /// [`Error::Write`].
+    /// [`Error::File`].
     pub fn write(&self, folder: &OutputDir) -> Result<PathBuf> {
         folder.write("summary.json", self.to_json())
     }
@@ -227,7 +203,7 @@ mod tests {
             backwards.insert(name, value).unwrap();
         }
         assert_eq!(forwards.to_json(), backwards.to_json());
-        let keys: Vec<&str> = forwards.iter().map(|(name, _)| name).collect();
+        let keys: Vec<&String> = forwards.metrics.keys().collect();
         assert_eq!(keys, ["a", "b.one", "b.two"]);
         assert!(serde_json::from_str::<serde_json::Value>(&Summary::new().to_json()).is_ok());
     }
