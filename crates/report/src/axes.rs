@@ -2,11 +2,11 @@
 
 use plotters_backend::text_anchor::HPos;
 
-use crate::axis::{Axis, Mapping, Scale, Ticks};
+use crate::axis::{Axis, Mapping, Scale, Ticks, Window};
 use crate::colour::{FRAME, GRID, INK, MINOR_GRID};
 use crate::error::Result;
 use crate::font::{self, TextStyle};
-use crate::geom::{Point, Rect, point};
+use crate::geom::{Rect, point};
 use crate::style::Fonts;
 use crate::surface::Surface;
 
@@ -47,12 +47,17 @@ const LABEL_GAP: f64 = 7.0;
 /// An axis with known ends and what it takes to draw it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Ruler<'a> {
-    pub axis: &'a Axis,
+    pub label: &'a str,
     pub map: Mapping,
     pub fonts: Fonts,
 }
 
-impl Ruler<'_> {
+impl<'a> Ruler<'a> {
+    pub fn new(axis: &'a Axis, map: Mapping, fonts: Fonts) -> Self {
+        let label = &axis.label;
+        Self { label, map, fonts }
+    }
+
     fn ticks_along(&self, width: f64) -> Ticks {
         let em = self.fonts.tick;
         let extent = |label: &str| font::width(label, em) + 2.0 * em;
@@ -70,7 +75,7 @@ impl Ruler<'_> {
 
     /// Room for the label, if there is one.
     fn label_room(&self) -> f64 {
-        if self.axis.label.is_empty() {
+        if self.label.is_empty() {
             return 0.0;
         }
         LABEL_GAP + 1.1 * self.fonts.label
@@ -109,22 +114,19 @@ impl Ruler<'_> {
         }
         let below = y + 0.6 * em + LABEL_GAP + 0.5 * self.fonts.label;
         if let Some(factor) = &ticks.factor {
-            surface.text(
-                factor,
-                point(plot.right(), below),
-                number.aligned(HPos::Right),
-            )?;
+            let corner = point(plot.right(), below);
+            surface.text(factor, corner, number.aligned(HPos::Right))?;
         }
         let label = TextStyle::new(self.fonts.label, INK);
-        surface.text(&self.axis.label, point(plot.centre().x, below), label)
+        surface.text(self.label, point(plot.centre().x, below), label)
     }
 
     /// Ticks, numbers and label of a vertical axis at the left edge of `area`, or outside at its right edge.
     pub fn draw_up(&self, surface: &mut dyn Surface, area: Rect, right: bool) -> Result<()> {
-        let (edge, side) = if right {
-            (area.right(), 1.0)
+        let (edge, beside, side, align) = if right {
+            (area.right(), TICK + TICK_GAP, 1.0, HPos::Left)
         } else {
-            (area.x, -1.0)
+            (area.x, -TICK_GAP, -1.0, HPos::Right)
         };
         let ticks = self.ticks_up(area.height);
         let at = |value: f64| snap(area.bottom() - self.map.fraction(value) * area.height);
@@ -132,37 +134,38 @@ impl Ruler<'_> {
             surface.stroke(&[point(edge, y), point(edge + length, y)], 1.0, FRAME)?;
         }
         let number = TextStyle::new(self.fonts.tick, INK);
-        let align = if right { HPos::Left } else { HPos::Right };
-        let beside = if right {
-            edge + TICK + TICK_GAP
-        } else {
-            edge - TICK_GAP
-        };
         for (value, label) in &ticks.major {
-            surface.text(label, point(beside, at(*value)), number.aligned(align))?;
+            let place = point(edge + beside, at(*value));
+            surface.text(label, place, number.aligned(align))?;
         }
         if let Some(factor) = &ticks.factor {
             let above = point(area.x, area.y - 0.9 * self.fonts.tick);
             surface.text(factor, above, number.aligned(HPos::Left))?;
         }
         let away = self.widest(&ticks) + LABEL_GAP + 0.5 * self.fonts.label;
-        let middle = point(beside + side * away, area.centre().y);
-        surface.text(
-            &self.axis.label,
-            middle,
-            TextStyle::new(self.fonts.label, INK).upwards(),
-        )
+        let middle = point(edge + beside + side * away, area.centre().y);
+        let upwards = TextStyle::new(self.fonts.label, INK).upwards();
+        surface.text(self.label, middle, upwards)
     }
 }
 
 /// A pair of axes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Axes<'a> {
-    pub x: Ruler<'a>,
-    pub y: Ruler<'a>,
+    pub window: Window,
+    x: Ruler<'a>,
+    y: Ruler<'a>,
 }
 
-impl Axes<'_> {
+impl<'a> Axes<'a> {
+    pub fn new(window: Window, [x, y]: [&'a Axis; 2], fonts: Fonts) -> Self {
+        Self {
+            window,
+            x: Ruler::new(x, window.x, fonts),
+            y: Ruler::new(y, window.y, fonts),
+        }
+    }
+
     /// Room for ticks and labels around a plot box of about this size.
     pub fn margins(&self, width: f64, height: f64) -> Margins {
         let (left, top) = self.y.room_up(height);
@@ -175,31 +178,24 @@ impl Axes<'_> {
         }
     }
 
-    /// The place of a data point in the plot box.
-    pub fn place(&self, plot: &Rect, [x, y]: [f64; 2]) -> Point {
-        point(
-            plot.x + self.x.map.fraction(x) * plot.width,
-            plot.bottom() - self.y.map.fraction(y) * plot.height,
-        )
-    }
-
     /// Grid lines; goes under the data.
     pub fn draw_grid(&self, surface: &mut dyn Surface, plot: Rect) -> Result<()> {
-        let x = |value: f64| snap(self.place(&plot, [value, self.y.map.low]).x);
-        let y = |value: f64| snap(self.place(&plot, [self.x.map.low, value]).y);
-        let level = |y: f64| [point(plot.x, y), point(plot.right(), y)];
         let (along, up) = (self.x.ticks_along(plot.width), self.y.ticks_up(plot.height));
+        let level = |value: f64| {
+            let y = snap(plot.bottom() - self.y.map.fraction(value) * plot.height);
+            [point(plot.x, y), point(plot.right(), y)]
+        };
         if self.y.map.scale == Scale::Log {
             for &value in &up.minor {
-                surface.stroke(&level(y(value)), 1.0, MINOR_GRID)?;
+                surface.stroke(&level(value), 1.0, MINOR_GRID)?;
             }
         }
         for (value, _) in &along.major {
-            let ends = [point(x(*value), plot.y), point(x(*value), plot.bottom())];
-            surface.stroke(&ends, 1.0, GRID)?;
+            let x = snap(plot.x + self.x.map.fraction(*value) * plot.width);
+            surface.stroke(&[point(x, plot.y), point(x, plot.bottom())], 1.0, GRID)?;
         }
         for (value, _) in &up.major {
-            surface.stroke(&level(y(*value)), 1.0, GRID)?;
+            surface.stroke(&level(*value), 1.0, GRID)?;
         }
         Ok(())
     }

@@ -1,30 +1,25 @@
 //! Axes: ranges, the map from values to positions, ticks and their labels.
 
 use crate::error::{Error, Result};
+use crate::geom::{Point, Rect, point};
 
 /// How values are spread along an axis or a colour bar.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Scale {
-    /// Equal differences are equally far apart.
-    #[default]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Scale {
     Linear,
-    /// Equal ratios are equally far apart; values that are not positive cannot be shown.
     Log,
 }
 
-/// One axis of a chart.
+/// One axis of a chart. Its label says what is measured, with its unit or scaling; without a range it ends with the data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// What is measured, with its unit or scaling.
-    pub label: String,
-    /// Linear or logarithmic.
-    pub scale: Scale,
-    /// Ends of the axis; `None` takes them from the data.
-    pub range: Option<[f64; 2]>,
+    pub(crate) label: String,
+    pub(crate) scale: Scale,
+    pub(crate) range: Option<[f64; 2]>,
 }
 
 impl Axis {
-    /// A linear axis with an automatic range.
+    /// A linear axis.
     pub fn linear(label: impl Into<String>) -> Self {
         Self {
             label: label.into(),
@@ -33,7 +28,7 @@ impl Axis {
         }
     }
 
-    /// A logarithmic axis (base 10) with an automatic range.
+    /// A logarithmic axis (base 10); values that are not positive cannot be shown.
     pub fn log(label: impl Into<String>) -> Self {
         Self {
             scale: Scale::Log,
@@ -142,6 +137,37 @@ impl Mapping {
             }
         }
         best.unwrap_or_default()
+    }
+}
+
+/// The ends of two axes: points of the plane to places in a plot box.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Window {
+    pub x: Mapping,
+    pub y: Mapping,
+}
+
+impl Window {
+    /// A window at equal scales, named in errors by the labels of its axes.
+    pub fn linear([x, y]: [&str; 2], ends: [[f64; 2]; 2]) -> Result<Self> {
+        let mapping = |label, [low, high]: [f64; 2]| Mapping::new(label, Scale::Linear, low, high);
+        Ok(Self {
+            x: mapping(x, ends[0])?,
+            y: mapping(y, ends[1])?,
+        })
+    }
+
+    /// Height over width.
+    pub fn aspect(&self) -> f64 {
+        (self.y.high - self.y.low) / (self.x.high - self.x.low)
+    }
+
+    pub fn place(&self, plot: &Rect, [x, y]: [f64; 2]) -> Point {
+        let (right, up) = (self.x.fraction(x), self.y.fraction(y));
+        point(
+            plot.x + right * plot.width,
+            plot.bottom() - up * plot.height,
+        )
     }
 }
 

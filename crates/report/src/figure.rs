@@ -413,8 +413,8 @@ pub(crate) mod tests {
     use super::*;
     use crate::colour::{WHITE, viridis};
     use crate::{
-        Axis, Colour, Curve, Heatmap, LineChart, LineStyle, Marker, OKABE_ITO, Raster, Scale,
-        Series, Shapes,
+        Axis, Colour, Curve, Heatmap, LineChart, LineStyle, Marker, OKABE_ITO, Raster, Series,
+        Shapes,
     };
 
     const BLUE: Rgb = OKABE_ITO[0];
@@ -841,10 +841,7 @@ pub(crate) mod tests {
             scale in -320..300_i32,
             logs in any::<[bool; 2]>(),
         ) {
-            let [x, y] = logs.map(|log| Axis {
-                scale: if log { Scale::Log } else { Scale::Linear },
-                ..Axis::linear("a")
-            });
+            let [x, y] = logs.map(|log| if log { Axis::log("a") } else { Axis::linear("a") });
             // Numbers of all sizes, and numbers all of one size.
             let even: Vec<[f64; 2]> = points
                 .iter()

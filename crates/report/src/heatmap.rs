@@ -1,7 +1,9 @@
 //! Heat maps: a two-dimensional array as colours.
 
+use srgb::Rgb;
+
 use crate::axes::{Axes, Margins, Ruler};
-use crate::axis::{Axis, Mapping, Scale};
+use crate::axis::{Axis, Window};
 use crate::colour::{FRAME, viridis};
 use crate::error::{Error, Result};
 use crate::geom::Rect;
@@ -10,29 +12,22 @@ use crate::style::Fonts;
 use crate::surface::Surface;
 
 /// An array as viridis colours, with a colour bar.
-///
-/// Values are in grid order: `values[i * shape[1] + j]` belongs to the `i`-th position along the
-/// horizontal axis and the `j`-th along the vertical one (row-major, last axis fastest, `y` up).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Heatmap {
-    /// Title above the plot; may be empty.
-    pub title: String,
-    /// Horizontal axis (axis 0 of the array). Its range, `[0, 1]` if there is none, spans the outer
-    /// edges of the cells.
-    pub x: Axis,
-    /// Vertical axis (axis 1 of the array), likewise.
-    pub y: Axis,
-    /// Number of cells along `x` and `y`.
-    pub shape: [usize; 2],
-    /// The array. Values that cannot be shown (NaN, or not positive on a logarithmic colour axis)
-    /// are drawn grey.
-    pub values: Vec<f64>,
-    /// Label, scale and range of the colour bar. An automatic range spans the data.
-    pub bar: Axis,
+    pub(crate) title: String,
+    x: Axis,
+    y: Axis,
+    shape: [usize; 2],
+    values: Vec<f64>,
+    bar: Axis,
 }
 
 impl Heatmap {
-    /// A heat map on the unit square with an automatic, linear colour range.
+    /// A heat map on the unit square with an automatic, linear colour range, which spans the data.
+    ///
+    /// Values are in grid order: `values[i * shape[1] + j]` belongs to the `i`-th position along the
+    /// horizontal axis and the `j`-th along the vertical one (row-major, last axis fastest, `y` up).
+    /// Values that cannot be shown (NaN, or not positive on a logarithmic colour axis) are drawn grey.
     pub fn new(title: impl Into<String>, shape: [usize; 2], values: impl Into<Vec<f64>>) -> Self {
         Self {
             title: title.into(),
@@ -44,7 +39,7 @@ impl Heatmap {
         }
     }
 
-    /// Sets both axes. A range on an axis is the extent of the array in that direction.
+    /// Sets both axes. Their ranges are the outer edges of the cells.
     #[must_use]
     pub fn with_axes(mut self, x: Axis, y: Axis) -> Self {
         (self.x, self.y) = (x, y);
@@ -61,27 +56,20 @@ impl Heatmap {
     /// The heat map with the ends of its axes.
     pub(crate) fn checked(&self, fonts: Fonts) -> Result<Coloured<'_>> {
         Error::check_shape(&self.title, self.shape, self.values.len())?;
-        let side = |axis: &'_ Axis| {
-            let [low, high] = axis.range.unwrap_or([0.0, 1.0]);
-            Mapping::new(&axis.label, Scale::Linear, low, high)
-        };
         let mut values = self.values.iter().copied().filter(|&v| self.bar.shows(v));
         let first = values.next();
-        let padding = if values.all(|v| Some(v) == first) {
-            0.05
-        } else {
-            0.0
-        };
+        let constant = values.all(|v| Some(v) == first);
+        let padding = if constant { 0.05 } else { 0.0 };
         let colours = self.bar.resolve(self.values.iter().copied(), padding)?;
         let chart = self.title.clone();
-        let ruler = |axis, map| Ruler { axis, map, fonts };
+        let bar = Ruler::new(&self.bar, colours.ok_or(Error::Empty { chart })?, fonts);
+        let ends = [&self.x, &self.y].map(|axis| axis.range.unwrap_or([0.0, 1.0]));
+        let window = Window::linear([&self.x.label, &self.y.label], ends)?;
+        let axes = Axes::new(window, [&self.x, &self.y], fonts);
         Ok(Coloured {
             map: self,
-            axes: Axes {
-                x: ruler(&self.x, side(&self.x)?),
-                y: ruler(&self.y, side(&self.y)?),
-            },
-            bar: ruler(&self.bar, colours.ok_or(Error::Empty { chart })?),
+            axes,
+            bar,
         })
     }
 }
@@ -98,8 +86,7 @@ const BAR_WIDTH: f64 = 14.0;
 
 impl Drawable for Coloured<'_> {
     fn aspect(&self) -> Option<f64> {
-        let length = |ruler: &Ruler<'_>| ruler.map.high - ruler.map.low;
-        Some(length(&self.axes.y) / length(&self.axes.x))
+        Some(self.axes.window.aspect())
     }
 
     fn margins(&self, width: f64, height: f64) -> Margins {
@@ -115,25 +102,18 @@ impl Drawable for Coloured<'_> {
     fn draw(&self, surface: &mut dyn Surface, plot: Rect) -> Result<()> {
         let [columns, rows] = self.map.shape;
         // Row by row from the top, as a picture stores them.
-        let cells = (0..rows)
-            .rev()
-            .flat_map(|j| (0..columns).map(move |i| (i, j)));
-        let colour = |(i, j)| {
-            let value: f64 = self.map.values[i * rows + j];
-            let known = self.map.bar.shows(value);
-            viridis(if known {
-                self.bar.map.fraction(value)
-            } else {
-                f64::NAN
-            })
+        let column = |j: usize| (0..columns).map(move |i| i * rows + j);
+        let values = (0..rows).rev().flat_map(column).map(|k| self.map.values[k]);
+        let colour = |value: f64| match self.bar.map.fraction(value) {
+            share if self.map.bar.shows(value) => viridis(share),
+            _ => viridis(f64::NAN),
         };
-        surface.image(plot, columns, &cells.map(colour).collect::<Vec<_>>(), false)?;
+        let cells: Vec<Rgb> = values.map(colour).collect();
+        surface.image(plot, columns, &cells, false)?;
         self.axes.draw_frame(surface, plot)?;
         let bar = Rect::new(plot.right() + BAR_GAP, plot.y, BAR_WIDTH, plot.height);
-        let shades: Vec<_> = (0..=255)
-            .rev()
-            .map(|k| viridis(f64::from(k) / 255.0))
-            .collect();
+        let shades = (0..=255).rev().map(|k| viridis(f64::from(k) / 255.0));
+        let shades: Vec<Rgb> = shades.collect();
         surface.image(bar, 1, &shades, false)?;
         surface.outline(bar, FRAME)?;
         self.bar.draw_up(surface, bar, true)

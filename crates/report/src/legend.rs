@@ -12,14 +12,10 @@ use crate::surface::Surface;
 /// A piece of line and what it stands for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LegendEntry {
-    /// What it stands for.
-    pub label: String,
-    /// Colour of the line.
-    pub colour: Colour,
-    /// Line style.
-    pub style: LineStyle,
-    /// The symbol in its middle.
-    pub marker: Option<Marker>,
+    pub(crate) label: String,
+    pub(crate) colour: Colour,
+    pub(crate) style: LineStyle,
+    pub(crate) marker: Option<Marker>,
 }
 
 impl LegendEntry {

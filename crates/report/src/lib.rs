@@ -65,13 +65,13 @@ mod summary;
 mod surface;
 mod table;
 
-pub use axis::{Axis, Scale};
+pub use axis::Axis;
 pub use colour::{Colour, OKABE_ITO};
 pub use error::{Error, Result};
 pub use figure::Figure;
 pub use heatmap::Heatmap;
 pub use legend::LegendEntry;
-pub use manifest::{Manifest, Phase};
+pub use manifest::Manifest;
 pub use output::OutputDir;
 pub use panel::Panel;
 pub use plot::{LineChart, Series};

@@ -1,7 +1,7 @@
 //! Line charts.
 
-use crate::axes::{Axes, Margins, Ruler};
-use crate::axis::Axis;
+use crate::axes::{Axes, Margins};
+use crate::axis::{Axis, Window};
 use crate::colour::Colour;
 use crate::error::{Error, Result};
 use crate::geom::{Point, Rect, clip_polyline, thin};
@@ -13,23 +13,18 @@ use crate::surface::Surface;
 /// A named curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// Legend label; empty keeps the curve out of the legend.
-    pub name: String,
-    /// Data points `[x, y]` in drawing order. Points that are not finite, or not positive on a
-    /// logarithmic axis, are left out and interrupt the curve.
+    pub(crate) name: String,
+    /// Data points `[x, y]` in drawing order.
     pub points: Vec<[f64; 2]>,
-    /// Colour.
-    pub colour: Colour,
-    /// Line style.
-    pub style: LineStyle,
-    /// Symbol at the data points; crowded ones are thinned out.
-    pub marker: Option<Marker>,
-    /// Width of the line in layout units.
-    pub width: f64,
+    colour: Colour,
+    style: LineStyle,
+    marker: Option<Marker>,
+    width: f64,
 }
 
 impl Series {
-    /// A solid curve in the first colour of the palette.
+    /// A solid curve in the first colour of the palette through points `[x, y]` in drawing order. Points that are not finite, or not
+    /// positive on a logarithmic axis, are left out and interrupt the curve. Without a name it is not in the legend.
     pub fn new(name: impl Into<String>, points: impl Into<Vec<[f64; 2]>>) -> Self {
         Self {
             name: name.into(),
@@ -65,7 +60,7 @@ impl Series {
         self
     }
 
-    /// Marks the data points.
+    /// Marks the data points, but for those too close to others.
     #[must_use]
     pub fn with_marker(mut self, marker: Marker) -> Self {
         self.marker = Some(marker);
@@ -86,26 +81,19 @@ impl Series {
     }
 }
 
-/// Curves over a pair of axes.
+/// Curves over a pair of axes, later ones on top.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LineChart {
-    /// Title above the plot; may be empty.
-    pub title: String,
-    /// Horizontal axis.
-    pub x: Axis,
-    /// Vertical axis.
-    pub y: Axis,
-    /// Curves, later ones on top.
-    pub series: Vec<Series>,
-    /// Groups of legend entries in place of one entry per named series: with line style for the
-    /// method and colour for the resolution, two small groups explain many curves.
-    pub entries: Option<Vec<Vec<LegendEntry>>>,
-    /// A remark in small type below the plot.
-    pub note: Option<String>,
+    pub(crate) title: String,
+    x: Axis,
+    y: Axis,
+    pub(crate) series: Vec<Series>,
+    entries: Option<Vec<Vec<LegendEntry>>>,
+    pub(crate) note: Option<String>,
 }
 
 impl LineChart {
-    /// An empty chart.
+    /// An empty chart; the title above it may be empty.
     pub fn new(title: impl Into<String>, x: Axis, y: Axis) -> Self {
         Self {
             title: title.into(),
@@ -124,14 +112,15 @@ impl LineChart {
         self
     }
 
-    /// Adds curves, later ones on top.
+    /// Adds curves.
     #[must_use]
     pub fn with_curves(mut self, curves: impl IntoIterator<Item = Series>) -> Self {
         self.series.extend(curves);
         self
     }
 
-    /// Replaces the legend by groups of entries; call it once for every group.
+    /// Replaces the legend by groups of entries; call it once for every group. With line style for the method and colour for the
+    /// resolution, two small groups explain many curves.
     #[must_use]
     pub fn with_entries(mut self, group: impl IntoIterator<Item = LegendEntry>) -> Self {
         let groups = self.entries.get_or_insert_default();
@@ -139,7 +128,7 @@ impl LineChart {
         self
     }
 
-    /// Adds a remark below the plot.
+    /// Adds a remark in small type below the plot.
     #[must_use]
     pub fn with_note(mut self, note: impl Into<String>) -> Self {
         self.note = Some(note.into());
@@ -178,11 +167,7 @@ impl LineChart {
             let chart = self.title.clone();
             return Err(Error::Empty { chart });
         };
-        let ruler = |axis, map| Ruler { axis, map, fonts };
-        let axes = Axes {
-            x: ruler(&self.x, x),
-            y: ruler(&self.y, y),
-        };
+        let axes = Axes::new(Window { x, y }, [&self.x, &self.y], fonts);
         Ok(Plot { chart: self, axes })
     }
 }
@@ -209,7 +194,10 @@ impl Drawable for Plot<'_> {
             let colour = series.colour.rgb();
             let mut symbols = Vec::new();
             for run in series.points.split(|&p| !self.chart.shows(p)) {
-                let placed: Vec<Point> = run.iter().map(|&p| self.axes.place(&plot, p)).collect();
+                let placed: Vec<Point> = run
+                    .iter()
+                    .map(|&p| self.axes.window.place(&plot, p))
+                    .collect();
                 if series.style != LineStyle::None {
                     for piece in clip_polyline(&thin(&placed, 0.2), &bounds) {
                         surface.dashed(&piece, series.width, colour, series.style.pattern())?;

@@ -13,17 +13,14 @@ use crate::surface::{PNG_SCALE, Surface};
 /// It is averaged, in linear light, over the pixels of the figure, two per layout unit. Transparent pixels show the white page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Raster {
-    /// Caption below the picture; may be empty.
-    pub caption: String,
-    /// Columns and rows.
-    pub size: [usize; 2],
-    /// Red, green, blue and opacity (not multiplied into the colour), sRGB, row by row from the
-    /// top.
-    pub pixels: Vec<[u8; 4]>,
+    pub(crate) caption: String,
+    size: [usize; 2],
+    pixels: Vec<[u8; 4]>,
 }
 
 impl Raster {
-    /// A picture of `size` columns and rows without caption.
+    /// A picture of `size` columns and rows. Pixels are red, green, blue and opacity (not multiplied into the colour), sRGB, row by row
+    /// from the top.
     pub fn new(size: [usize; 2], pixels: impl Into<Vec<[u8; 4]>>) -> Self {
         Self {
             caption: String::new(),

@@ -3,10 +3,10 @@
 use srgb::Rgb;
 
 use crate::axes::Margins;
-use crate::axis::{Mapping, Scale};
+use crate::axis::Window;
 use crate::colour::Colour;
 use crate::error::{Error, Result};
-use crate::geom::{Point, Rect, clip_loop, clip_polyline, point, thin};
+use crate::geom::{Point, Rect, clip_loop, clip_polyline, thin};
 use crate::panel::Drawable;
 use crate::style::LineStyle;
 use crate::surface::Surface;
@@ -14,20 +14,15 @@ use crate::surface::Surface;
 /// Closed polylines drawn alike, such as all components of one zero level set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// Polylines as lists of `[x, y]`, `y` pointing up. The end need not repeat the start.
-    pub loops: Vec<Vec<[f64; 2]>>,
-    /// Colour of the outline.
-    pub colour: Colour,
-    /// Line style of the outline; [`LineStyle::None`] leaves it out.
-    pub style: LineStyle,
-    /// Width of the outline in layout units.
-    pub width: f64,
-    /// Colour of the region inside an odd number of the polylines, if it is to be filled.
-    pub fill: Option<Colour>,
+    loops: Vec<Vec<[f64; 2]>>,
+    colour: Colour,
+    style: LineStyle,
+    width: f64,
+    fill: Option<Colour>,
 }
 
 impl Curve {
-    /// A solid outline in near-black.
+    /// A solid outline in near-black along polylines `[x, y]`, `y` pointing up, whose ends are joined.
     pub fn new(loops: impl Into<Vec<Vec<[f64; 2]>>>) -> Self {
         Self {
             loops: loops.into(),
@@ -45,7 +40,7 @@ impl Curve {
         self
     }
 
-    /// Sets the line style of the outline.
+    /// Sets the line style of the outline; [`LineStyle::None`] leaves it out.
     #[must_use]
     pub fn with_style(mut self, style: LineStyle) -> Self {
         self.style = style;
@@ -59,7 +54,7 @@ impl Curve {
         self
     }
 
-    /// Fills the inside.
+    /// Fills the region inside an odd number of the polylines.
     #[must_use]
     pub fn filled(mut self, colour: impl Into<Colour>) -> Self {
         self.fill = Some(colour.into());
@@ -74,15 +69,12 @@ impl Curve {
     }
 }
 
-/// A panel of plane curves.
+/// A panel of plane curves, later ones on top, with a caption above.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shapes {
-    /// Caption above the drawing; may be empty.
-    pub caption: String,
-    /// Curves, later ones on top.
-    pub curves: Vec<Curve>,
-    /// The ends of what is shown in `x` and `y`; `None` shows all curves. Panels to be compared need a common one.
-    pub window: Option<[[f64; 2]; 2]>,
+    pub(crate) caption: String,
+    curves: Vec<Curve>,
+    window: Option<[[f64; 2]; 2]>,
 }
 
 impl Shapes {
@@ -102,7 +94,7 @@ impl Shapes {
         self
     }
 
-    /// Fixes what is shown.
+    /// Fixes the ends of what is shown. Panels to be compared need the same.
     #[must_use]
     pub fn with_window(mut self, x: [f64; 2], y: [f64; 2]) -> Self {
         self.window = Some([x, y]);
@@ -115,28 +107,22 @@ impl Shapes {
         let join = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
         let bounds = points
             .map(|point| point.map(|c| [c, c]))
-            .reduce(|a, b| [join(a[0], b[0]), join(a[1], b[1])])
-            .ok_or_else(|| Error::Empty {
-                chart: self.caption.clone(),
-            })?;
-        let longest = bounds
-            .map(|[low, high]| high - low)
-            .into_iter()
-            .fold(0.0, f64::max);
+            .reduce(|a, b| [join(a[0], b[0]), join(a[1], b[1])]);
+        let chart = self.caption.clone();
+        let bounds = bounds.ok_or(Error::Empty { chart })?;
+        let [width, height] = bounds.map(|[low, high]| high - low);
+        let longest = width.max(height);
         let margin = if longest > 0.0 { 0.06 * longest } else { 1.0 };
         Ok(bounds.map(|[low, high]| [low - margin, high + margin]))
     }
 
     /// The curves with the window they are seen through.
     pub(crate) fn checked(&self) -> Result<Seen<'_>> {
-        let [x, y] = match self.window {
-            Some(window) => window,
-            None => self.bounds()?,
-        };
+        let window = self.window.map_or_else(|| self.bounds(), Ok)?;
+        let window = Window::linear(["x", "y"], window)?;
         Ok(Seen {
             shapes: self,
-            x: Mapping::new("x", Scale::Linear, x[0], x[1])?,
-            y: Mapping::new("y", Scale::Linear, y[0], y[1])?,
+            window,
         })
     }
 }
@@ -144,13 +130,12 @@ impl Shapes {
 /// Curves with the window they are seen through.
 pub(crate) struct Seen<'a> {
     shapes: &'a Shapes,
-    x: Mapping,
-    y: Mapping,
+    window: Window,
 }
 
 impl Drawable for Seen<'_> {
     fn aspect(&self) -> Option<f64> {
-        Some((self.y.high - self.y.low) / (self.x.high - self.x.low))
+        Some(self.window.aspect())
     }
 
     fn margins(&self, _: f64, _: f64) -> Margins {
@@ -158,17 +143,13 @@ impl Drawable for Seen<'_> {
     }
 
     fn draw(&self, surface: &mut dyn Surface, plot: Rect) -> Result<()> {
-        let place = |[x, y]: [f64; 2]| -> Point {
-            point(
-                plot.x + self.x.fraction(x) * plot.width,
-                plot.bottom() - self.y.fraction(y) * plot.height,
-            )
-        };
         for curve in &self.shapes.curves {
-            let placed: Vec<Vec<Point>> = curve
-                .finite()
-                .map(|ring| thin(&ring.into_iter().map(place).collect::<Vec<_>>(), 0.2))
-                .collect();
+            let place = |ring: Vec<[f64; 2]>| -> Vec<Point> {
+                let placed: Vec<Point> =
+                    ring.iter().map(|&p| self.window.place(&plot, p)).collect();
+                thin(&placed, 0.2)
+            };
+            let placed: Vec<Vec<Point>> = curve.finite().map(place).collect();
             if let Some(fill) = curve.fill {
                 let inside: Vec<_> = placed.iter().map(|ring| clip_loop(ring, &plot)).collect();
                 surface.fill(&inside, fill.rgb())?;
@@ -176,15 +157,11 @@ impl Drawable for Seen<'_> {
             if curve.style == LineStyle::None {
                 continue;
             }
+            let (colour, pattern) = (curve.colour.rgb(), curve.style.pattern());
             for mut ring in placed {
                 ring.extend(ring.first().copied());
                 for piece in clip_polyline(&ring, &plot) {
-                    surface.dashed(
-                        &piece,
-                        curve.width,
-                        curve.colour.rgb(),
-                        curve.style.pattern(),
-                    )?;
+                    surface.dashed(&piece, curve.width, colour, pattern)?;
                 }
             }
         }

@@ -7,6 +7,8 @@
 //! What plotters' charts would draw on their own is not used: their bitmaps fill polygons one pixel too wide, leave holes where a wide
 //! curve crosses itself, and stretch no picture; their axes know no small ticks and no factor common to all labels.
 
+use std::f64::consts::TAU;
+
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use plotters::prelude::{BitMapBackend, Color, DrawingBackend, RGBColor, SVGBackend, ShapeStyle};
@@ -43,11 +45,8 @@ impl dyn Surface + '_ {
     pub fn outline(&mut self, area: Rect, colour: Rgb) -> Result<()> {
         let [a, b, c, d] = area.corners();
         for (from, to) in [(a, b), (d, c)] {
-            self.stroke(
-                &[point(from.x - 0.5, from.y), point(to.x + 0.5, to.y)],
-                1.0,
-                colour,
-            )?;
+            let ends = [point(from.x - 0.5, from.y), point(to.x + 0.5, to.y)];
+            self.stroke(&ends, 1.0, colour)?;
         }
         self.stroke(&[a, d], 1.0, colour)?;
         self.stroke(&[b, c], 1.0, colour)
@@ -123,13 +122,10 @@ impl Surface for SvgSurface<'_> {
 
     /// The backend has polygons of one loop: this one goes around all of them, over bridges walked both ways.
     fn fill(&mut self, loops: &[Vec<Point>], colour: Rgb) -> Result<()> {
-        let starts = loops.iter().filter_map(|ring| ring.first());
-        let around = loops
-            .iter()
-            .flat_map(|ring| ring.iter().chain(ring.first()));
-        let path = around
-            .chain(starts.rev())
-            .map(|&p| to_device(p, Self::SCALE));
+        let starts = loops.iter().filter_map(|ring| ring.first()).rev();
+        let around = (loops.iter()).flat_map(|ring| ring.iter().chain(ring.first()));
+        let path = around.chain(starts);
+        let path = path.map(|&p| to_device(p, Self::SCALE));
         drawn(self.backend.fill_polygon(path, &ink(colour, 0.0)))
     }
 
@@ -143,14 +139,10 @@ impl Surface for SvgSurface<'_> {
         let (x, y) = to_device(point(area.x, area.y), Self::SCALE);
         let (right, bottom) = to_device(point(area.right(), area.bottom()), Self::SCALE);
         let (width, height) = (right - x, bottom - y);
-        let rendering = if smooth {
-            ""
-        } else {
-            " style=\"image-rendering:pixelated\""
-        };
+        let rendering = if smooth { "auto" } else { "pixelated" };
         self.images.push(format!(
-            "<image x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" preserveAspectRatio=\"none\"{rendering} \
-             href=\"data:image/png;base64,{encoded}\"/>\n"
+            "<image x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" preserveAspectRatio=\"none\" \
+             style=\"image-rendering:{rendering}\" href=\"data:image/png;base64,{encoded}\"/>\n"
         ));
         Ok(())
     }
@@ -174,11 +166,8 @@ pub(crate) fn svg(
     };
     let size = format!("<svg width=\"{w}\" height=\"{h}\"");
     let look = "stroke-linejoin=\"round\" fill-rule=\"evenodd\"";
-    let document = document.replacen(
-        &size,
-        &format!("<svg width=\"{width}\" height=\"{height}\" {look}"),
-        1,
-    );
+    let sized = format!("<svg width=\"{width}\" height=\"{height}\" {look}");
+    let document = document.replacen(&size, &sized, 1);
     let page = "<rect width=\"100%\" height=\"100%\" fill=\"#FFFFFF\"/>\n";
     Ok(document.replacen(">\n", &format!(">\n{page}{images}"), 1))
 }
@@ -268,15 +257,11 @@ impl Surface for PngSurface<'_> {
 /// A regular polygon that passes for a disc at the sizes used for markers and joins.
 pub(crate) fn disc(centre: Point, radius: f64) -> Vec<Point> {
     let sides = if radius < 2.0 { 12 } else { 24 };
-    let angles = (0..sides).map(|k| std::f64::consts::TAU * f64::from(k) / f64::from(sides));
-    angles
-        .map(|angle| {
-            point(
-                centre.x + radius * angle.cos(),
-                centre.y + radius * angle.sin(),
-            )
-        })
-        .collect()
+    let corner = |k| {
+        let (sin, cos) = (TAU * f64::from(k) / f64::from(sides)).sin_cos();
+        point(centre.x + radius * cos, centre.y + radius * sin)
+    };
+    (0..sides).map(corner).collect()
 }
 
 /// Draws a PNG file of the given size in layout units.
