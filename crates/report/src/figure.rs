@@ -194,7 +194,7 @@ impl Figure {
         let room = width - PADDING - left - COLUMN_GAP * (columns - 1) as f64;
         let cell = |panel| Cell::new(panel, fonts, room / columns as f64, !self.shared_legend);
         let mut cells = self.panels.iter().map(cell).collect::<Result<Vec<_>>>()?;
-        let legend_top = arrange(&mut cells, columns, room, (left, top));
+        let legend_top = arrange(&mut cells, columns, room, (left, top)) + AIR;
         let legend = Block::new(&self.collected_legend(), fonts.legend, inner);
         let note_top = legend_top + legend.height;
         let note = self.note.as_deref().unwrap_or("");

@@ -1,7 +1,7 @@
 //! The embedded typeface, so that pictures come out the same on every machine: no system font is ever consulted.
 //!
-//! The fonts of plotters will not do: its bitmaps are set 6.5 per cent larger than its SVG documents and moved up or down by the size of
-//! the letters, so a figure would differ from its twin.
+//! The fonts of plotters will not do: its bitmaps set them 6.5 per cent larger than its SVG documents and on another baseline, so a figure
+//! would differ from its twin.
 
 use std::convert::Infallible;
 use std::sync::LazyLock;

@@ -7,15 +7,6 @@ use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// A stack of progress bars. Nothing is drawn when standard error is not a terminal or `quiet` is
 /// set, so logs stay clean; everything else works alike.
-///
-/// ```
-/// let progress = report::Progress::new(true);
-/// let bar = progress.bar("time steps", 100);
-/// for _ in 0..100 {
-///     bar.inc(1);
-/// }
-/// bar.finish();
-/// ```
 #[derive(Debug, Clone)]
 pub struct Progress {
     bars: MultiProgress,

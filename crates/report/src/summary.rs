@@ -12,8 +12,8 @@ use crate::output::OutputDir;
 /// Metric names and their values, sorted by name.
 ///
 /// Names are lower-case words of ASCII letters, digits and `_` (not at their start), the first one starting with a letter, joined by
-/// `.`, such as `circle.error_l2`. Values are finite. The same content gives the same bytes: floats
-/// are written with the fewest digits that read back exactly.
+/// `.`, such as `circle.error_l2`. Values are finite. The same content gives the same bytes: floats have the fewest digits that read
+/// back exactly.
 ///
 /// ```
 /// let mut summary = report::Summary::new();
@@ -50,19 +50,6 @@ impl Summary {
     }
 
     /// Adds the numbers of a record as `<prefix>.<field>`. Fields that hold text, lists or records are left out.
-    ///
-    /// ```
-    /// #[derive(serde::Serialize)]
-    /// struct Circle {
-    ///     name: &'static str,
-    ///     radius: f64,
-    ///     steps: usize,
-    /// }
-    /// let mut summary = report::Summary::new();
-    /// summary.insert_record("circle", &Circle { name: "first", radius: 0.5, steps: 17 })?;
-    /// assert_eq!(summary.to_json(), "{\n  \"circle.radius\": 0.5,\n  \"circle.steps\": 17\n}\n");
-    /// # Ok::<(), report::Error>(())
-    /// ```
     ///
     /// # Errors
     ///
@@ -167,6 +154,33 @@ mod tests {
             assert!(error.to_string().contains("\"torus.energy\""), "{error}");
         }
         assert_eq!(summary, Summary::new());
+    }
+
+    #[test]
+    fn the_numbers_of_a_record_are_metrics() {
+        #[derive(Serialize)]
+        struct Circle {
+            name: &'static str,
+            radius: f64,
+            steps: usize,
+        }
+        let circle = |radius| Circle {
+            name: "first",
+            radius,
+            steps: 17,
+        };
+        let mut summary = Summary::new();
+        summary.insert_record("circle", &circle(0.5)).unwrap();
+        let expected = "{\n  \"circle.radius\": 0.5,\n  \"circle.steps\": 17\n}\n";
+        assert_eq!(summary.to_json(), expected);
+        let error = summary
+            .insert_record("other", &circle(f64::NAN))
+            .unwrap_err();
+        assert!(error.to_string().contains("\"other.radius\""), "{error}");
+        assert!(matches!(
+            summary.insert_record("no", &[1, 2]).unwrap_err(),
+            Error::Json { .. }
+        ));
     }
 
     #[test]

@@ -4,8 +4,9 @@
 //! pixel. SVG coordinates are multiples of 1/8 unit; a PNG has two pixels per unit and is drawn
 //! three times finer still, then averaged, which smooths every edge alike.
 //!
-//! What plotters' charts would draw on their own is not used: their bitmaps fill polygons one pixel too wide, leave holes where a wide
-//! curve crosses itself, and stretch no picture; their axes know no small ticks and no factor common to all labels.
+//! The charts of plotters are not used. Its bitmaps fill polygons one pixel too wide, leave holes where a wide curve crosses itself and
+//! know dashes of one length only; its SVG documents stretch no picture; its axes have no small ticks and no factor common to all labels;
+//! its plots side by side do not line up.
 
 use std::f64::consts::TAU;
 

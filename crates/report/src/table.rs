@@ -90,14 +90,6 @@ struct Column {
 }
 
 /// A table with typed columns.
-///
-/// ```
-/// use report::{Cell, Table};
-/// let mut table = Table::data(&["method", "error"]);
-/// table.push([Cell::from("implicit"), 1.25e-3.into()])?;
-/// assert_eq!(table.to_csv()?, "method,error\nimplicit,0.00125\n");
-/// # Ok::<(), report::Error>(())
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     columns: Vec<Column>,
