@@ -89,7 +89,8 @@ pub struct LineChart {
     y: Axis,
     pub(crate) series: Vec<Series>,
     entries: Option<Vec<Vec<LegendEntry>>>,
-    pub(crate) note: Option<String>,
+    /// A remark in small type below the plot.
+    pub note: Option<String>,
 }
 
 impl LineChart {

@@ -21,6 +21,8 @@ pub enum LineStyle {
     Dotted,
     /// Dashes and dots in turn.
     DashDot,
+    /// Dashes, each followed by two dots.
+    DashDotDot,
     /// No line: only the markers are drawn.
     None,
 }
@@ -34,6 +36,7 @@ impl LineStyle {
             Self::ShortDashed => &[4.6, 3.2],
             Self::Dotted => &[2.2, 3.2],
             Self::DashDot => &[9.0, 3.5, 2.2, 3.5],
+            Self::DashDotDot => &[9.0, 3.2, 2.2, 3.2, 2.2, 3.2],
         }
     }
 }
