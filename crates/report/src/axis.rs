@@ -1,30 +1,25 @@
 //! Axes: ranges, the map from values to positions, ticks and their labels.
 
 use crate::error::{Error, Result};
+use crate::geom::{Point, Rect, point};
 
 /// How values are spread along an axis or a colour bar.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Scale {
-    /// Equal differences are equally far apart.
-    #[default]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Scale {
     Linear,
-    /// Equal ratios are equally far apart; values that are not positive cannot be shown.
     Log,
 }
 
-/// One axis of a chart.
+/// One axis of a chart. Its label says what is measured, with its unit or scaling; without a range it ends with the data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// What is measured, with its unit or scaling.
-    pub label: String,
-    /// Linear or logarithmic.
-    pub scale: Scale,
-    /// Ends of the axis; `None` takes them from the data.
-    pub range: Option<[f64; 2]>,
+    pub(crate) label: String,
+    pub(crate) scale: Scale,
+    pub(crate) range: Option<[f64; 2]>,
 }
 
 impl Axis {
-    /// A linear axis with an automatic range.
+    /// A linear axis.
     pub fn linear(label: impl Into<String>) -> Self {
         Self {
             label: label.into(),
@@ -33,12 +28,11 @@ impl Axis {
         }
     }
 
-    /// A logarithmic axis (base 10) with an automatic range.
+    /// A logarithmic axis (base 10); values that are not positive cannot be shown.
     pub fn log(label: impl Into<String>) -> Self {
         Self {
-            label: label.into(),
             scale: Scale::Log,
-            range: None,
+            ..Self::linear(label)
         }
     }
 
@@ -55,7 +49,7 @@ impl Axis {
         value.is_finite() && (self.scale == Scale::Linear || value >= f64::MIN_POSITIVE)
     }
 
-    /// The axis with both ends known. `None` if there is neither a range nor a value to show.
+    /// The axis with both ends known; `padding` is a share of an automatic range. `None` if there is neither a range nor a value to show.
     pub(crate) fn resolve(
         &self,
         values: impl Iterator<Item = f64>,
@@ -64,14 +58,10 @@ impl Axis {
         if let Some([low, high]) = self.range {
             return Mapping::new(&self.label, self.scale, low, high).map(Some);
         }
-        let (low, high) = values
-            .filter(|&v| self.shows(v))
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| {
-                (lo.min(v), hi.max(v))
-            });
-        if low > high {
+        let shown = values.filter(|&v| self.shows(v)).map(|v| (v, v));
+        let Some((low, high)) = shown.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))) else {
             return Ok(None);
-        }
+        };
         let (low, high) = match self.scale {
             Scale::Linear => {
                 let span = match high - low {
@@ -88,10 +78,8 @@ impl Axis {
                     _ => 1.0,
                 };
                 let factor = 10.0_f64.powf(padding * span);
-                (
-                    (low / factor).max(f64::MIN_POSITIVE),
-                    (high * factor).min(f64::MAX),
-                )
+                let low = (low / factor).max(f64::MIN_POSITIVE);
+                (low, (high * factor).min(f64::MAX))
             }
         };
         Mapping::new(&self.label, self.scale, low, high).map(Some)
@@ -108,38 +96,26 @@ pub(crate) struct Mapping {
 
 impl Mapping {
     pub fn new(label: &str, scale: Scale, low: f64, high: f64) -> Result<Self> {
-        let valid = low.is_finite()
-            && high.is_finite()
-            && (high - low).is_finite()
+        let valid = (high - low).is_finite()
             && high - low > narrowest(low, high)
             && (scale == Scale::Linear || low >= f64::MIN_POSITIVE);
         if valid {
-            Ok(Self { scale, low, high })
-        } else {
-            Err(Error::Range {
-                axis: label.to_owned(),
-                low,
-                high,
-            })
+            return Ok(Self { scale, low, high });
         }
+        let axis = label.to_owned();
+        Err(Error::Range { axis, low, high })
     }
 
-    /// 0 at the low end, 1 at the high end.
+    /// 0 at the low end, 1 at the high end; far outside values are pulled in, or their coordinates overflow later on.
     pub fn fraction(&self, value: f64) -> f64 {
-        match self.scale {
+        let fraction = match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
             Scale::Log => {
                 let low = self.low.log10();
                 (value.log10() - low) / (self.high.log10() - low)
             }
-        }
-    }
-
-    /// Whether a value lies on the axis, up to rounding.
-    pub fn holds(&self, value: f64) -> bool {
-        value.is_finite()
-            && (self.scale == Scale::Linear || value > 0.0)
-            && (-1e-9..=1.0 + 1e-9).contains(&self.fraction(value))
+        };
+        fraction.clamp(-1e4, 1e4)
     }
 
     /// Ticks for an axis `length` units long. `extent` is the room a label takes along the axis.
@@ -147,7 +123,10 @@ impl Mapping {
         let most = ((length / 28.0) as usize).clamp(2, 12);
         let mut best = None;
         for target in (1..=most).rev() {
-            let ticks = self.ticks_for(target);
+            let ticks = match self.scale {
+                Scale::Linear => linear_ticks(self.low, self.high, target),
+                Scale::Log => log_ticks(self.low, self.high, target),
+            };
             let fits = ticks.fit(self, length, &extent);
             let enough = ticks.major.len() >= 2;
             if fits && enough {
@@ -159,12 +138,36 @@ impl Mapping {
         }
         best.unwrap_or_default()
     }
+}
 
-    fn ticks_for(&self, target: usize) -> Ticks {
-        match self.scale {
-            Scale::Linear => linear_ticks(self.low, self.high, target),
-            Scale::Log => log_ticks(self.low, self.high, target),
-        }
+/// The ends of two axes: points of the plane to places in a plot box.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Window {
+    pub x: Mapping,
+    pub y: Mapping,
+}
+
+impl Window {
+    /// A window at equal scales, named in errors by the labels of its axes.
+    pub fn linear([x, y]: [&str; 2], ends: [[f64; 2]; 2]) -> Result<Self> {
+        let mapping = |label, [low, high]: [f64; 2]| Mapping::new(label, Scale::Linear, low, high);
+        Ok(Self {
+            x: mapping(x, ends[0])?,
+            y: mapping(y, ends[1])?,
+        })
+    }
+
+    /// Height over width.
+    pub fn aspect(&self) -> f64 {
+        (self.y.high - self.y.low) / (self.x.high - self.x.low)
+    }
+
+    pub fn place(&self, plot: &Rect, [x, y]: [f64; 2]) -> Point {
+        let (right, up) = (self.x.fraction(x), self.y.fraction(y));
+        point(
+            plot.x + right * plot.width,
+            plot.bottom() - up * plot.height,
+        )
     }
 }
 
@@ -194,128 +197,84 @@ fn narrowest(low: f64, high: f64) -> f64 {
 /// The smallest of 1, 2, 5 times a power of ten that is at least `raw`.
 fn nice_step(raw: f64) -> f64 {
     let power = 10.0_f64.powf(raw.log10().floor());
-    let leading = raw / power;
-    let nice = [1.0, 2.0, 5.0]
-        .into_iter()
-        .find(|&m| leading <= m * (1.0 + 1e-9))
-        .unwrap_or(10.0);
-    nice * power
+    let nice = [1.0, 2.0, 5.0].map(|m| m * power);
+    let found = nice.into_iter().find(|step| raw <= step * (1.0 + 1e-9));
+    found.unwrap_or(10.0 * power)
 }
 
 fn linear_ticks(low: f64, high: f64, target: usize) -> Ticks {
     let step = nice_step((high - low) / target as f64);
     let slack = 1e-9 * (high - low) / step;
     let (first, last) = ((low / step - slack).ceil(), (high / step + slack).floor());
-    let count = (last - first).max(-1.0) as usize + usize::from(last >= first);
+    let count = (last - first + 1.0).max(0.0) as usize;
     let values: Vec<f64> = (0..count).map(|k| (first + k as f64) * step).collect();
     let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-    let exponent = if largest > 0.0 && !(1e-3..1e5).contains(&largest) {
-        (largest * (1.0 + 1e-9)).log10().floor() as i32
-    } else {
-        0
+    let power = |size: f64| (size * (1.0 + 1e-9)).log10().floor() as i32;
+    let exponent = match largest {
+        0.0 | 1e-3..1e5 => 0,
+        _ => power(largest),
     };
-    let step_exponent = (step * (1.0 + 1e-9)).log10().floor() as i32;
     // Zero alone needs no decimals, however small the step.
-    let decimals = match usize::try_from(exponent - step_exponent) {
+    let decimals = match usize::try_from(exponent - power(step)) {
         Ok(decimals) if largest > 0.0 => decimals,
         _ => 0,
     };
     let unit = 10.0_f64.powi(exponent);
-    let major = values
-        .into_iter()
-        .map(|value| (value, signed(&format!("{:.decimals$}", value / unit))))
-        .collect();
-    let factor = (exponent != 0).then(|| format!("×{}", power_of_ten(exponent)));
+    let label = |value: f64| signed(&format!("{:.decimals$}", value / unit));
     Ticks {
-        major,
+        major: values.into_iter().map(|v| (v, label(v))).collect(),
         minor: Vec::new(),
-        factor,
+        factor: (exponent != 0).then(|| format!("×{}", power_of_ten(exponent))),
     }
 }
 
+/// Powers of ten, as far apart as must be; where few are in sight, some of their multiples too; plain numbers where there are none.
 fn log_ticks(low: f64, high: f64, target: usize) -> Ticks {
+    const ALL: [i32; 9] = [1, 2, 3, 4, 5, 6, 7, 8, 9];
+    let value = |(m, k): (i32, i32)| f64::from(m) * 10.0_f64.powi(k);
     let (bottom, top) = (low.log10() - 1e-9, high.log10() + 1e-9);
-    let inside = |value: f64| (bottom..=top).contains(&value.log10());
-    let (first, last) = (bottom.ceil() as i32, top.floor() as i32);
-    let decades: Vec<i32> = (first..=last).collect();
     let within = |mantissas: &[i32]| -> Vec<(i32, i32)> {
-        (first - 1..=last)
+        (bottom.floor() as i32..=top.floor() as i32)
             .flat_map(|k| mantissas.iter().map(move |&m| (m, k)))
-            .filter(|&(m, k)| inside(f64::from(m) * 10.0_f64.powi(k)))
+            .filter(|&tick| (bottom..=top).contains(&value(tick).log10()))
             .collect()
     };
-    let value = |(m, k): (i32, i32)| f64::from(m) * 10.0_f64.powi(k);
-    // Mantissas are labelled too, if there is room, where few powers of ten are in sight.
-    let families: [&[i32]; 3] = [&[1, 2, 3, 4, 5, 6, 7, 8, 9], &[1, 2, 5], &[1, 3]];
-    let chosen = (decades.len() <= 2)
-        .then(|| {
-            families
-                .into_iter()
-                .find(|f| (2..=target).contains(&within(f).len()))
-        })
-        .flatten();
-    if chosen.is_none() && decades.len() >= 2 {
-        let stride = i32::try_from(decades.len().div_ceil(target)).unwrap_or(i32::MAX);
-        let (labelled, rest): (Vec<i32>, Vec<i32>) =
-            decades.iter().partition(|&&k| k.rem_euclid(stride) == 0);
-        let minor = if stride == 1 {
-            within(&[2, 3, 4, 5, 6, 7, 8, 9])
-                .into_iter()
-                .map(value)
-                .collect()
-        } else {
-            rest.into_iter().map(|k| 10.0_f64.powi(k)).collect()
-        };
-        let major = labelled
+    let decades = within(&[1]);
+    let stride = i32::try_from(decades.len().div_ceil(target)).unwrap_or(i32::MAX);
+    let multiples = [&ALL[..], &[1, 2, 5], &[1, 3]].map(within);
+    let labelled = match multiples
+        .into_iter()
+        .find(|ticks| (2..=target).contains(&ticks.len()))
+    {
+        Some(ticks) if decades.len() <= 2 => ticks,
+        _ if decades.len() >= 2 => decades
             .into_iter()
-            .map(|k| (10.0_f64.powi(k), power_of_ten(k)))
-            .collect();
-        return Ticks {
-            major,
-            minor,
-            factor: None,
-        };
-    }
-    let Some(mantissas) = chosen else {
-        // A narrow range: plain numbers.
-        return linear_ticks(low, high, target);
+            .filter(|(_, k)| k.rem_euclid(stride) == 0)
+            .collect(),
+        _ => return linear_ticks(low, high, target),
     };
-    let labelled = within(mantissas);
-    let minor = within(&[1, 2, 3, 4, 5, 6, 7, 8, 9])
+    let minor = within(if stride == 1 { &ALL } else { &[1] })
         .into_iter()
-        .filter(|tick| !labelled.contains(tick))
-        .map(value)
-        .collect();
-    let major = labelled
-        .into_iter()
-        .map(|(m, k)| {
-            let label = if m == 1 {
-                power_of_ten(k)
-            } else {
-                format!("{m}·{}", power_of_ten(k))
-            };
-            (value((m, k)), label)
-        })
-        .collect();
+        .filter(|tick| !labelled.contains(tick));
+    let label = |(m, k): (i32, i32)| match m {
+        1 => power_of_ten(k),
+        _ => format!("{m}·{}", power_of_ten(k)),
+    };
     Ticks {
-        major,
-        minor,
+        minor: minor.map(value).collect(),
+        major: labelled.iter().map(|&t| (value(t), label(t))).collect(),
         factor: None,
     }
 }
 
 /// `10⁻³` for -3.
 pub(crate) fn power_of_ten(exponent: i32) -> String {
-    format!("10{}", superscript(exponent))
-}
-
-fn superscript(number: i32) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-    number
-        .to_string()
+    let digits = exponent.to_string();
+    let raised = digits
         .chars()
-        .map(|c| c.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize]))
-        .collect()
+        .map(|c| c.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize]));
+    format!("10{}", raised.collect::<String>())
 }
 
 /// A real minus sign, and none on zero.
@@ -356,7 +315,6 @@ mod tests {
         ] {
             assert!((map.fraction(value) - fraction).abs() < 1e-12);
         }
-        assert!(!map.holds(0.0) && !map.holds(-1.0) && !map.holds(2.0) && map.holds(0.5));
     }
 
     #[test]
@@ -438,7 +396,7 @@ mod tests {
             let ticks = map.ticks(length, extent);
             prop_assert!(ticks.major.len() <= 13);
             for (value, _) in &ticks.major {
-                prop_assert!(map.holds(*value), "{value} of {map:?}");
+                prop_assert!((-1e-9..=1.0 + 1e-9).contains(&map.fraction(*value)), "{value}");
             }
             if length > 400.0 {
                 prop_assert!(ticks.major.len() >= 2, "{ticks:?}");

@@ -1,11 +1,13 @@
-//! Colours that survive colour-blindness and printing: a qualitative palette and colour maps.
+//! Colours that survive colour-blindness and printing: a qualitative palette and a colour map.
 
+use plotters::style::colors::colormaps::ViridisRGB;
 use srgb::Rgb;
 
 pub(crate) const WHITE: Rgb = Rgb(255, 255, 255);
 pub(crate) const INK: Rgb = Rgb(32, 32, 32);
 pub(crate) const GREY: Rgb = Rgb(110, 110, 110);
 pub(crate) const GRID: Rgb = Rgb(226, 226, 226);
+pub(crate) const MINOR_GRID: Rgb = Rgb(243, 243, 243);
 pub(crate) const FRAME: Rgb = Rgb(70, 70, 70);
 
 /// The palette of Okabe and Ito ("Color Universal Design", 2008), ordered so that the first entries
@@ -27,14 +29,6 @@ pub const OKABE_ITO: [Rgb; 8] = [
 pub enum Colour {
     /// Entry of [`OKABE_ITO`], modulo its length.
     Palette(usize),
-    /// Entry `index` of `count` equally spaced ones on viridis, for an ordered family (resolutions,
-    /// step sizes). The yellow end, too light on white, is left out.
-    Sequential {
-        /// Position in the family, from 0.
-        index: usize,
-        /// Size of the family.
-        count: usize,
-    },
     /// Near-black, for exact solutions.
     Black,
     /// Middle grey, for guides.
@@ -50,10 +44,6 @@ impl Colour {
     pub fn rgb(self) -> Rgb {
         match self {
             Self::Palette(index) => OKABE_ITO[index % OKABE_ITO.len()],
-            Self::Sequential { index, count } => {
-                let last = count.saturating_sub(1).max(1) as f64;
-                viridis(0.85 * (index as f64 / last).min(1.0))
-            }
             Self::Black => Rgb(20, 20, 20),
             Self::Grey => Rgb(130, 130, 130),
             Self::LightGrey => Rgb(214, 214, 214),
@@ -74,64 +64,30 @@ impl From<Rgb> for Colour {
     }
 }
 
-/// How a number becomes a colour in a heat map.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum ColourMap {
-    /// Viridis: perceptually uniform, dark to light.
-    #[default]
-    Viridis,
-    /// Blue, white, red, for signed data. Its automatic range is symmetric about 0.
-    BlueWhiteRed,
-}
-
-impl ColourMap {
-    /// The colour at `t` in `[0, 1]`; values outside are clamped, NaN is light grey.
-    pub fn at(self, t: f64) -> Rgb {
-        if t.is_nan() {
-            return Rgb(200, 200, 200);
-        }
-        let t = t.clamp(0.0, 1.0);
-        match self {
-            Self::Viridis => viridis(t),
-            Self::BlueWhiteRed => convert(colorous::RED_BLUE.eval_continuous(1.0 - t)),
-        }
+/// The colour map viridis, perceptually uniform and dark to light, at `t` in `[0, 1]`; values outside are clamped, NaN is light grey.
+pub(crate) fn viridis(t: f64) -> Rgb {
+    if t.is_nan() {
+        return Rgb(200, 200, 200);
     }
-}
-
-fn viridis(t: f64) -> Rgb {
-    convert(colorous::VIRIDIS.eval_continuous(t))
-}
-
-fn convert(colour: colorous::Color) -> Rgb {
-    Rgb(colour.r, colour.g, colour.b)
+    let colour = ViridisRGB::get_color(t.clamp(0.0, 1.0) as f32);
+    Rgb(colour.0, colour.1, colour.2)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn luminance(Rgb(r, g, b): Rgb) -> f64 {
-        0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b)
-    }
-
     #[test]
     fn viridis_grows_lighter() {
+        let luminance = |Rgb(r, g, b): Rgb| {
+            0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b)
+        };
         let light: Vec<f64> = (0..=50)
-            .map(|k| luminance(ColourMap::Viridis.at(f64::from(k) / 50.0)))
+            .map(|k| luminance(viridis(f64::from(k) / 50.0)))
             .collect();
         assert!(light.windows(2).all(|w| w[1] > w[0]));
-    }
-
-    #[test]
-    fn diverging_map_is_blue_white_red() {
-        let (low, middle, high) = (
-            ColourMap::BlueWhiteRed.at(0.0),
-            ColourMap::BlueWhiteRed.at(0.5),
-            ColourMap::BlueWhiteRed.at(1.0),
-        );
-        assert!(low.2 > low.0 && high.0 > high.2);
-        assert!(luminance(middle) > 235.0, "{middle:?}");
-        assert!(luminance(ColourMap::BlueWhiteRed.at(f64::NAN)) < 235.0);
+        assert_eq!(viridis(7.0), viridis(1.0));
+        assert_eq!(viridis(f64::NAN), Rgb(200, 200, 200));
     }
 
     #[test]

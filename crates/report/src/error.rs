@@ -1,23 +1,14 @@
 //! The one error type of the crate.
 
-use std::path::PathBuf;
-
 /// What can go wrong while describing, drawing or writing results.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A chart, heat map or drawing without a single point that can be drawn.
+    /// A panel without a single point or pixel that can be drawn.
     #[error(
-        "nothing to draw in {chart:?}: no series has a finite point \
-         (positive on a logarithmic axis)"
+        "nothing to draw in {chart:?}: it has no finite point (positive on a logarithmic axis) and no pixel"
     )]
     Empty {
-        /// Title of the panel.
-        chart: String,
-    },
-    /// A picture without pixels.
-    #[error("the picture {chart:?} has no pixels")]
-    NoPixels {
         /// Title or caption of the panel.
         chart: String,
     },
@@ -40,7 +31,7 @@ pub enum Error {
     /// An array whose length does not match its shape.
     #[error("the array of {chart:?} has {found} values where its shape {shape:?} needs {expected}")]
     ArrayShape {
-        /// Title of the panel.
+        /// Title or caption of the panel.
         chart: String,
         /// Shape as given.
         shape: [usize; 2],
@@ -51,23 +42,19 @@ pub enum Error {
     },
     /// A figure size that leaves no room to draw, or more pixels than can be meant.
     #[error(
-        "a figure of {width} x {height} units cannot be drawn: give it between {min} and {max} \
+        "a figure of {width} x {height} units cannot be drawn: give it between 80 and 2600 \
          a side and at least 40 for every panel"
     )]
     FigureSize {
-        /// Width in layout units (pixels at scale 1).
+        /// Width in layout units (CSS pixels).
         width: f64,
-        /// Height in layout units (pixels at scale 1).
+        /// Height in layout units, 0 if it is not known.
         height: f64,
-        /// Smallest allowed side.
-        min: f64,
-        /// Largest allowed side.
-        max: f64,
     },
-    /// A metric, table cell or data point that is NaN or infinite.
+    /// A metric or table cell that is NaN or infinite.
     #[error("{what} is {value}, which is not a finite number")]
     NotFinite {
-        /// Name of the metric, column or series, with the row where there is one.
+        /// Name of the metric or column, with the row where there is one.
         what: String,
         /// The offending value.
         value: f64,
@@ -99,22 +86,9 @@ pub enum Error {
         /// Number of cells given.
         found: usize,
     },
-    /// An output folder that cannot be created or written.
-    #[error("cannot write to folder {}: {source}", path.display())]
-    Folder {
-        /// The folder.
-        path: PathBuf,
-        /// What the operating system said.
-        source: std::io::Error,
-    },
-    /// A file that could not be written; what was there before is untouched.
-    #[error("cannot write {}: {source}", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the operating system or the producer of the content said.
-        source: std::io::Error,
-    },
+    /// A file or folder that could not be written; what was there before is untouched.
+    #[error(transparent)]
+    File(#[from] files::Error),
     /// A file name that is not a single plain component.
     #[error("file name {name:?} is not allowed: give one plain name without separators")]
     FileName {
@@ -129,12 +103,6 @@ pub enum Error {
         /// The cause.
         source: serde_json::Error,
     },
-    /// Run parameters that are not a map from names to values.
-    #[error("the run parameters of {experiment:?} must serialise to a map, for example a struct")]
-    Parameters {
-        /// Name of the experiment.
-        experiment: String,
-    },
     /// A record that cannot be turned into a CSV row.
     #[error("cannot write the records as CSV: {source}")]
     Csv {
@@ -148,6 +116,28 @@ pub enum Error {
         /// What the backend said.
         cause: String,
     },
+}
+
+impl Error {
+    /// Whether an array has the length that its shape says, and that is not 0.
+    pub(crate) fn check_shape(chart: &str, shape: [usize; 2], found: usize) -> Result<()> {
+        let (chart, expected) = (chart.to_owned(), shape[0].saturating_mul(shape[1]));
+        match found == expected {
+            true if found == 0 => Err(Self::Empty { chart }),
+            true => Ok(()),
+            false => Err(Self::ArrayShape {
+                chart,
+                shape,
+                expected,
+                found,
+            }),
+        }
+    }
+
+    pub(crate) fn json(what: impl Into<String>) -> impl FnOnce(serde_json::Error) -> Self {
+        let what = what.into();
+        move |source| Self::Json { what, source }
+    }
 }
 
 /// Shorthand used throughout the crate.

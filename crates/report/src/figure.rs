@@ -1,77 +1,25 @@
 //! Figures: panels on a grid, with a heading, row and column labels and a common legend.
 
 use std::collections::HashSet;
+use std::ops::RangeInclusive;
 
 use plotters_backend::text_anchor::HPos;
 
-use crate::axes::{Margins, draw_lines, title_height};
+use crate::axes::Margins;
 use crate::colour::{GREY, INK};
 use crate::error::{Error, Result};
-use crate::font;
-use crate::geom::{Rect, point};
-use crate::heatmap::Heatmap;
+use crate::font::{self, AIR, LEADING, TextStyle};
+use crate::geom::{Point, Rect, point};
 use crate::legend::{Block, LegendEntry};
 use crate::output::OutputDir;
-use crate::panel::{Context, Drawable, Spot};
-use crate::plot::LineChart;
-use crate::raster::Raster;
-use crate::shapes::Shapes;
-use crate::style::{Fonts, LEADING};
-use crate::surface::{self, Surface, Text};
-
-/// One cell of a figure.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub enum Panel {
-    /// A line chart.
-    Line(LineChart),
-    /// A heat map.
-    Heatmap(Heatmap),
-    /// Plane curves.
-    Shapes(Shapes),
-    /// A picture.
-    Raster(Raster),
-}
-
-impl From<LineChart> for Panel {
-    fn from(chart: LineChart) -> Self {
-        Self::Line(chart)
-    }
-}
-
-impl From<Heatmap> for Panel {
-    fn from(map: Heatmap) -> Self {
-        Self::Heatmap(map)
-    }
-}
-
-impl From<Shapes> for Panel {
-    fn from(shapes: Shapes) -> Self {
-        Self::Shapes(shapes)
-    }
-}
-
-impl From<Raster> for Panel {
-    fn from(raster: Raster) -> Self {
-        Self::Raster(raster)
-    }
-}
-
-impl Panel {
-    fn drawable(&self) -> &dyn Drawable {
-        match self {
-            Self::Line(chart) => chart,
-            Self::Heatmap(map) => map,
-            Self::Shapes(shapes) => shapes,
-            Self::Raster(raster) => raster,
-        }
-    }
-}
+use crate::panel::{Drawable, Panel};
+use crate::style::Fonts;
+use crate::surface::{self, Surface};
 
 /// A figure: panels row by row on a grid.
 ///
 /// Sizes are in layout units, one CSS pixel each when a README shows the figure at its own width.
-/// The PNG has two pixels per unit.
+/// The PNG has two pixels per unit. Legends are below the panels, where they cover nothing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
     /// Heading above all panels; may be empty.
@@ -84,14 +32,12 @@ pub struct Figure {
     pub column_labels: Vec<String>,
     /// Labels left of the rows, read upwards; may be empty.
     pub row_labels: Vec<String>,
-    /// One legend below all panels instead of one in each. Labelled plane curves always go there.
+    /// One legend below all panels instead of one below each.
     pub shared_legend: bool,
     /// A remark in small type at the bottom.
     pub note: Option<String>,
-    /// Width.
+    /// Width; the height follows from the panels.
     pub width: f64,
-    /// Height; `None` chooses one that suits the panels.
-    pub height: Option<f64>,
 }
 
 impl<P: Into<Panel>> From<P> for Figure {
@@ -103,23 +49,8 @@ impl<P: Into<Panel>> From<P> for Figure {
 const PADDING: f64 = 12.0;
 const COLUMN_GAP: f64 = 16.0;
 const ROW_GAP: f64 = 14.0;
-const SMALLEST_SIDE: f64 = 80.0;
-const LARGEST_SIDE: f64 = 2600.0;
+const SIDES: RangeInclusive<f64> = 80.0..=2600.0;
 const SMALLEST_PLOT: f64 = 40.0;
-
-/// Where everything is.
-pub(crate) struct Layout {
-    pub width: f64,
-    pub height: f64,
-    /// Plot box of every panel.
-    pub plots: Vec<Rect>,
-    outers: Vec<Rect>,
-    spots: Vec<Spot>,
-    context: Context,
-    legend: Vec<Vec<LegendEntry>>,
-    legend_top: f64,
-    note_top: f64,
-}
 
 impl Figure {
     /// A figure without panels, 800 units wide.
@@ -133,7 +64,6 @@ impl Figure {
             shared_legend: false,
             note: None,
             width: 800.0,
-            height: None,
         }
     }
 
@@ -144,7 +74,7 @@ impl Figure {
         self
     }
 
-    /// Adds panels, one after the other.
+    /// Adds panels, row by row.
     #[must_use]
     pub fn with_panels<P: Into<Panel>>(mut self, panels: impl IntoIterator<Item = P>) -> Self {
         self.panels.extend(panels.into_iter().map(Into::into));
@@ -189,23 +119,14 @@ impl Figure {
         self
     }
 
-    /// Fixes width and height.
-    #[must_use]
-    pub fn with_size(mut self, width: f64, height: f64) -> Self {
-        (self.width, self.height) = (width, Some(height));
-        self
-    }
-
     /// The figure as an SVG document. Text stays text, in a sans-serif family.
     ///
     /// # Errors
     ///
-    /// If there is nothing to draw, a range or array does not fit, or the size leaves no room.
+    /// If there is nothing to draw, a range or array does not fit, or the width leaves no room.
     pub fn to_svg(&self) -> Result<String> {
         let layout = self.layout()?;
-        surface::svg(layout.width as u32, layout.height as u32, |s| {
-            self.draw(&layout, s)
-        })
+        surface::svg(layout.size, |s| self.draw(&layout, s))
     }
 
     /// The figure as a PNG file, two pixels per layout unit.
@@ -215,9 +136,7 @@ impl Figure {
     /// As [`Figure::to_svg`].
     pub fn to_png(&self) -> Result<Vec<u8>> {
         let layout = self.layout()?;
-        surface::png(layout.width as u32, layout.height as u32, |s| {
-            self.draw(&layout, s)
-        })
+        surface::png(layout.size, |s| self.draw(&layout, s))
     }
 
     /// Writes `<stem>.svg` and `<stem>.png`.
@@ -232,319 +151,717 @@ impl Figure {
         Ok(())
     }
 
-    fn size_error(&self, height: f64) -> Error {
-        Error::FigureSize {
-            width: self.width,
-            height,
-            min: SMALLEST_SIDE,
-            max: LARGEST_SIDE,
-        }
-    }
-
     /// Unique entries of all panels, in order of appearance; the k-th groups of all go together.
     fn collected_legend(&self) -> Vec<Vec<LegendEntry>> {
         let mut seen = HashSet::new();
         let mut groups: Vec<Vec<LegendEntry>> = Vec::new();
-        for panel in &self.panels {
-            if !self.shared_legend && matches!(panel, Panel::Line(_)) {
-                continue;
-            }
-            for (k, group) in panel.drawable().legend().into_iter().enumerate() {
-                if groups.len() <= k {
-                    groups.push(Vec::new());
-                }
+        for panel in self.panels.iter().filter(|_| self.shared_legend) {
+            for (k, group) in panel.legend().into_iter().enumerate() {
+                groups.resize_with(groups.len().max(k + 1), Vec::new);
                 groups[k].extend(group.into_iter().filter(|e| seen.insert(e.label.clone())));
             }
         }
-        groups.retain(|group| !group.is_empty());
         groups
     }
 
-    pub(crate) fn layout(&self) -> Result<Layout> {
+    fn columns(&self) -> usize {
+        self.columns.clamp(1, self.panels.len())
+    }
+
+    fn layout(&self) -> Result<Layout<'_>> {
         if self.panels.is_empty() {
             return Err(Error::NoPanels);
         }
-        let sides = SMALLEST_SIDE..=LARGEST_SIDE;
-        let height_given = self.height.unwrap_or(SMALLEST_SIDE);
-        if !sides.contains(&self.width) || !sides.contains(&height_given) {
-            return Err(self.size_error(height_given));
-        }
-        let width = self.width.round();
-        let columns = self.columns.clamp(1, self.panels.len());
-        let fonts = Fonts::for_columns(columns);
-        let label_strip = (LEADING * fonts.label + 4.0).ceil();
-        let lines = |label: &String| label.lines().count();
-        let label_lines = self.row_labels.iter().map(lines).max().unwrap_or(0);
-        let left = PADDING + label_strip * label_lines as f64;
-        let gaps = COLUMN_GAP * (columns - 1) as f64;
-        let room = width - PADDING - left - gaps;
-        let cell_width = room / columns as f64;
-        let context = Context {
-            fonts,
-            cell_width,
-            shared_legend: self.shared_legend,
-            window: Shapes::common_window(self.panels.iter().filter_map(|panel| match panel {
-                Panel::Shapes(shapes) => Some(shapes),
-                _ => None,
-            })),
+        let refused = |height: f64| {
+            let width = self.width;
+            Err(Error::FigureSize { width, height })
         };
+        if !SIDES.contains(&self.width) {
+            return refused(0.0);
+        }
+        let (width, columns) = (self.width.round(), self.columns());
+        let (inner, fonts) = (width - 2.0 * PADDING, Fonts::for_columns(columns));
+        let strip = strip(fonts);
+        let lines = self.row_labels.iter().map(|label| label.lines().count());
+        let left = PADDING + strip * lines.max().unwrap_or(0) as f64;
+        let heading = match font::height(&self.title, fonts.heading, inner) {
+            0.0 => PADDING,
+            height => PADDING + height + 5.0,
+        };
+        let labelled = !self.column_labels.is_empty();
+        let top = heading + if labelled { strip } else { 0.0 };
 
-        let heading = match title_height(&self.title, fonts.heading, width - 2.0 * PADDING) {
-            height if height > 0.0 => height + 5.0,
-            _ => 0.0,
-        };
-        let column_strip = if self.column_labels.is_empty() {
-            0.0
-        } else {
-            label_strip
-        };
-        let top = PADDING + heading + column_strip;
-        let legend = self.collected_legend();
-        let legend_height = if legend.is_empty() {
-            0.0
-        } else {
-            6.0 + Block::within(&legend, fonts.legend, width - 2.0 * PADDING).height()
-        };
-        let note_height = self.note.as_ref().map_or(0.0, |note| {
-            let lines = font::wrap(note, fonts.note, width - 2.0 * PADDING).len();
-            6.0 + lines as f64 * LEADING * fonts.note
-        });
-        let bottom = PADDING + legend_height + note_height;
-
-        let grid = Grid {
-            columns,
-            room,
-            fixed: self.height.map(|h| h - top - bottom),
-            context,
-        };
-        let (plan, spots) = grid.plan(&self.panels)?;
-        let boxes = plan.boxes(left, top, self.panels.len());
-        let height = (top + plan.height() + bottom).round();
-        if !sides.contains(&height) {
-            return Err(self.size_error(height));
+        let room = width - PADDING - left - COLUMN_GAP * (columns - 1) as f64;
+        let cell = |panel| Cell::new(panel, fonts, room / columns as f64, !self.shared_legend);
+        let mut cells = self.panels.iter().map(cell).collect::<Result<Vec<_>>>()?;
+        let legend_top = arrange(&mut cells, columns, room, (left, top)) + AIR;
+        let legend = Block::new(&self.collected_legend(), fonts.legend, inner);
+        let note_top = legend_top + legend.height;
+        let note = self.note.as_deref().unwrap_or("");
+        let height = (note_top + font::height(note, fonts.note, inner) + PADDING).round();
+        let small = |cell: &Cell<'_>| cell.plot.width.min(cell.plot.height) < SMALLEST_PLOT;
+        if !SIDES.contains(&height) || cells.iter().any(small) {
+            return refused(height);
         }
-        if plan.plot_width < SMALLEST_PLOT || plan.rows.iter().any(|r| r.0 < SMALLEST_PLOT) {
-            return Err(self.size_error(height));
-        }
-        let (mut plots, mut outers) = (Vec::new(), Vec::new());
-        for (panel, (plot, mut outer)) in self.panels.iter().zip(boxes) {
-            let fitted = panel
-                .drawable()
-                .aspect(&context)?
-                .map_or(plot, |a| plot.fitted(a));
-            // The title stays with a plot box that is less high than its row.
-            outer.y += fitted.y - plot.y;
-            outer.height -= fitted.y - plot.y;
-            plots.push(whole(fitted));
-            outers.push(outer);
-        }
+        cells.iter_mut().for_each(Cell::fit);
         Ok(Layout {
-            width,
-            height,
-            plots,
-            outers,
-            spots,
-            context,
+            size: (width as u32, height as u32),
+            fonts,
+            cells,
             legend,
-            legend_top: height - bottom + 6.0,
-            note_top: height - PADDING - note_height + 6.0,
+            legend_top,
+            note_top,
         })
     }
 
-    fn draw(&self, layout: &Layout, surface: &mut dyn Surface) -> Result<()> {
-        let fonts = layout.context.fonts;
-        let (middle, inner) = (0.5 * layout.width, layout.width - 2.0 * PADDING);
-        let heading = (fonts.heading, INK);
+    fn draw(&self, layout: &Layout<'_>, surface: &mut dyn Surface) -> Result<()> {
+        let (fonts, columns, strip) = (layout.fonts, self.columns(), strip(layout.fonts));
+        let (middle, inner) = (0.5 * self.width.round(), self.width - 2.0 * PADDING);
+        let heading = TextStyle::new(fonts.heading, INK);
+        draw_lines(surface, &self.title, heading, point(middle, PADDING), inner)?;
+
+        let label = TextStyle::new(fonts.label, INK);
+        for (text, cell) in self.column_labels.iter().zip(&layout.cells[..columns]) {
+            let at = point(cell.plot.centre().x, cell.outer.y - 0.5 * strip);
+            surface.text(text, at, label)?;
+        }
+        let rows = layout.cells.iter().step_by(columns);
+        for (text, cell) in self.row_labels.iter().zip(rows) {
+            for (k, line) in text.lines().enumerate() {
+                let x = PADDING + (k as f64 + 0.45) * strip;
+                surface.text(line, point(x, cell.plot.centre().y), label.upwards())?;
+            }
+        }
+        for cell in &layout.cells {
+            cell.draw(surface)?;
+        }
+        let legend_top = point(middle, layout.legend_top);
+        layout.legend.draw(surface, legend_top)?;
+        let note = self.note.as_deref().unwrap_or("");
+        let style = TextStyle::new(fonts.note, GREY).aligned(HPos::Left);
+        let at = point(PADDING + 4.0, layout.note_top + AIR);
+        draw_lines(surface, note, style, at, inner)
+    }
+}
+
+/// Room for one line of row or column labels.
+fn strip(fonts: Fonts) -> f64 {
+    (LEADING * fonts.label + 4.0).ceil()
+}
+
+/// Draws wrapped lines below `top`, where they are centred or begin.
+fn draw_lines(
+    surface: &mut dyn Surface,
+    text: &str,
+    style: TextStyle,
+    top: Point,
+    width: f64,
+) -> Result<()> {
+    for (k, line) in font::wrap(text, style.em, width).iter().enumerate() {
+        let y = top.y + (k as f64 + 0.5) * LEADING * style.em;
+        surface.text(line, point(top.x, y), style)?;
+    }
+    Ok(())
+}
+
+/// Where everything is.
+struct Layout<'a> {
+    size: (u32, u32),
+    fonts: Fonts,
+    cells: Vec<Cell<'a>>,
+    legend: Block,
+    legend_top: f64,
+    note_top: f64,
+}
+
+/// A panel and its place.
+struct Cell<'a> {
+    panel: &'a Panel,
+    content: Box<dyn Drawable + 'a>,
+    legend: Block,
+    fonts: Fonts,
+    /// Room for text as wide as the panel with its margins.
+    text_width: f64,
+    /// The box of the data,
+    plot: Rect,
+    /// and that with the margins which the panels of a row or column share.
+    outer: Rect,
+}
+
+impl<'a> Cell<'a> {
+    fn new(panel: &'a Panel, fonts: Fonts, text_width: f64, own_legend: bool) -> Result<Self> {
+        let mut legend = panel.legend();
+        legend.retain(|_| own_legend);
+        Ok(Self {
+            panel,
+            content: panel.checked(fonts)?,
+            legend: Block::new(&legend, fonts.legend, text_width),
+            fonts,
+            text_width,
+            plot: Rect::new(0.0, 0.0, text_width - 70.0, 0.5 * text_width),
+            outer: Rect::new(0.0, 0.0, 0.0, 0.0),
+        })
+    }
+
+    /// Height of the plot box, if it is this wide in one of so many columns.
+    fn height(&self, width: f64, columns: usize) -> f64 {
+        match self.content.aspect() {
+            None if columns == 1 => 0.52 * self.text_width,
+            None => 0.66 * self.text_width,
+            // A single panel would otherwise be as tall as the figure is wide.
+            Some(aspect) if columns == 1 => {
+                (aspect.min(1.2) * width).min((0.62 * self.text_width).max(440.0))
+            }
+            Some(aspect) => aspect.min(1.2) * width,
+        }
+    }
+
+    /// Room for axes and texts around the plot box.
+    fn margins(&self) -> Margins {
+        let (remark, style) = self.panel.remark(self.fonts);
+        let title = self.panel.title();
+        let mut margins = self.content.margins(self.plot.width, self.plot.height);
+        margins.top += font::height(title, self.fonts.title, self.text_width);
+        margins.bottom += self.legend.height + font::height(remark, style.em, self.text_width);
+        margins
+    }
+
+    /// Gives the plot box its own shape within its row; the title stays with it.
+    fn fit(&mut self) {
+        let whole = self.plot.height / self.plot.width;
+        let fitted = self.plot.fitted(self.content.aspect().unwrap_or(whole));
+        self.outer.y += fitted.y - self.plot.y;
+        self.plot = fitted;
+    }
+
+    fn draw(&self, surface: &mut dyn Surface) -> Result<()> {
+        let (plot, outer, middle) = (self.plot, self.outer, self.plot.centre().x);
+        let (title, style) = (self.panel.title(), TextStyle::new(self.fonts.title, INK));
         draw_lines(
             surface,
-            &self.title,
-            heading,
-            HPos::Center,
-            (middle, PADDING),
-            inner,
+            title,
+            style,
+            point(middle, outer.y),
+            self.text_width,
         )?;
-
-        let columns = self.columns.clamp(1, self.panels.len());
-        let strip = LEADING * fonts.label + 4.0;
-        let mut label = Text {
-            line: "",
-            at: point(0.0, 0.0),
-            em: fonts.label,
-            colour: INK,
-            align: HPos::Center,
-            vertical: false,
+        self.content.draw(surface, plot)?;
+        let mut below = plot.bottom() + self.content.margins(plot.width, plot.height).bottom;
+        let half = 0.5 * self.legend.width;
+        let centre = middle.min(outer.right() - half).max(outer.x + half);
+        self.legend.draw(surface, point(centre, below))?;
+        below += self.legend.height;
+        let (remark, style) = self.panel.remark(self.fonts);
+        let x = match style.align {
+            HPos::Left => outer.x + 4.0,
+            _ => middle,
         };
-        for (text, k) in self.column_labels.iter().zip(0..columns) {
-            let top = layout.outers[k].y;
-            label.at = point(layout.plots[k].centre().x, top - 0.5 * strip);
-            surface.text(Text {
-                line: text,
-                ..label
-            })?;
-        }
-        label.vertical = true;
-        for (text, plot) in self
-            .row_labels
-            .iter()
-            .zip(layout.plots.iter().step_by(columns))
-        {
-            for (k, line) in text.lines().enumerate() {
-                label.at = point(PADDING + (k as f64 + 0.45) * strip, plot.centre().y);
-                surface.text(Text { line, ..label })?;
-            }
-        }
-
-        for (k, panel) in self.panels.iter().enumerate() {
-            let (plot, outer) = (layout.plots[k], layout.outers[k]);
-            panel
-                .drawable()
-                .draw(&layout.context, surface, layout.spots[k], plot, outer)?;
-        }
-
-        if !layout.legend.is_empty() {
-            let block = Block::within(&layout.legend, fonts.legend, inner);
-            let left = (middle - 0.5 * block.width()).max(0.0).round();
-            block.draw(surface, point(left, layout.legend_top), false)?;
-        }
-        if let Some(note) = &self.note {
-            let at = (PADDING + 4.0, layout.note_top);
-            draw_lines(surface, note, (fonts.note, GREY), HPos::Left, at, inner)?;
-        }
-        Ok(())
+        draw_lines(
+            surface,
+            remark,
+            style,
+            point(x, below + AIR),
+            self.text_width,
+        )
     }
 }
 
-/// Inputs of the grid layout.
-struct Grid {
-    columns: usize,
-    /// Width for the panels with their margins, without gaps.
-    room: f64,
-    /// Height for all rows, if the figure's is fixed.
-    fixed: Option<f64>,
-    context: Context,
+/// Gives all cells their places, with plot boxes of one width and of one height in a row, and says where they end.
+fn arrange(cells: &mut [Cell<'_>], columns: usize, room: f64, (left, top): (f64, f64)) -> f64 {
+    let mut sides = vec![Margins::default(); columns];
+    let mut rows = vec![Margins::default(); cells.len().div_ceil(columns)];
+    // Margins depend on the tick labels, those on the sizes, and those on the margins.
+    for _ in 0..4 {
+        sides.fill(Margins::default());
+        rows.fill(Margins::default());
+        for (k, cell) in cells.iter().enumerate() {
+            let needed = cell.margins();
+            sides[k % columns] = sides[k % columns].max(needed);
+            rows[k / columns] = rows[k / columns].max(needed);
+        }
+        let taken: f64 = sides.iter().map(|side| side.left + side.right).sum();
+        let width = ((room - taken) / columns as f64).floor();
+        for row in cells.chunks_mut(columns) {
+            let heights = row.iter().map(|cell| cell.height(width, columns));
+            let height = heights.fold(0.0, f64::max).floor();
+            for cell in row {
+                (cell.plot.width, cell.plot.height) = (width, height);
+            }
+        }
+    }
+    let mut y = top;
+    for (row, ends) in cells.chunks_mut(columns).zip(&rows) {
+        let mut x = left;
+        let height = row[0].plot.height;
+        for (cell, side) in row.iter_mut().zip(&sides) {
+            (cell.plot.x, cell.plot.y) = (x + side.left, y + ends.top);
+            let width = side.left + cell.plot.width + side.right;
+            cell.outer = Rect::new(x, y, width, ends.top + height + ends.bottom);
+            x += width + COLUMN_GAP;
+        }
+        y += ends.top + height + ends.bottom + ROW_GAP;
+    }
+    y - ROW_GAP
 }
 
-/// Sizes of plot boxes and of the margins around them, which align along rows and columns.
-#[derive(Debug, Clone, Default)]
-struct Plan {
-    plot_width: f64,
-    /// Left and right margin of every column.
-    columns: Vec<(f64, f64)>,
-    /// Plot height, top and bottom margin of every row.
-    rows: Vec<(f64, f64, f64)>,
-}
+#[cfg(test)]
+pub(crate) mod tests {
+    use std::io::Cursor;
 
-impl Grid {
-    fn plan(&self, panels: &[Panel]) -> Result<(Plan, Vec<Spot>)> {
-        let rows = panels.len().div_ceil(self.columns);
-        let mut plan = Plan {
-            plot_width: (self.context.cell_width - 70.0).max(SMALLEST_PLOT),
-            columns: vec![(0.0, 0.0); self.columns],
-            rows: vec![(0.0, 0.0, 0.0); rows],
+    use proptest::prelude::*;
+    use srgb::Rgb;
+
+    use super::*;
+    use crate::colour::{WHITE, viridis};
+    use crate::{
+        Axis, Colour, Curve, Heatmap, LineChart, LineStyle, Marker, OKABE_ITO, Raster, Series,
+        Shapes,
+    };
+
+    const BLUE: Rgb = OKABE_ITO[0];
+    const VERMILLION: Rgb = OKABE_ITO[1];
+
+    /// A decoded picture.
+    pub(crate) struct Picture {
+        width: usize,
+        height: usize,
+        pixels: Vec<u8>,
+    }
+
+    impl Picture {
+        pub fn new(bytes: &[u8]) -> Self {
+            let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
+            let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+            let info = reader.next_frame(&mut pixels).unwrap();
+            assert_eq!(info.color_type, png::ColorType::Rgb);
+            let (width, height) = (info.width as usize, info.height as usize);
+            Self {
+                width,
+                height,
+                pixels,
+            }
+        }
+
+        pub fn pixel(&self, x: usize, y: usize) -> Rgb {
+            let k = 3 * (y * self.width + x);
+            Rgb(self.pixels[k], self.pixels[k + 1], self.pixels[k + 2])
+        }
+
+        /// The pixel at a place in layout units.
+        fn at(&self, x: f64, y: f64) -> Rgb {
+            self.pixel((2.0 * x) as usize, (2.0 * y) as usize)
+        }
+
+        /// Whether `colour` occurs within `reach` layout units of a point.
+        fn has_near(&self, colour: Rgb, x: f64, y: f64, reach: f64) -> bool {
+            let range = |c: f64, limit: usize| {
+                let from = (2.0 * (c - reach)).max(0.0) as usize;
+                from..=((2.0 * (c + reach)) as usize).min(limit - 1)
+            };
+            range(y, self.height)
+                .any(|row| range(x, self.width).any(|column| self.pixel(column, row) == colour))
+        }
+
+        /// Number of pixels of exactly this colour.
+        pub fn count(&self, Rgb(r, g, b): Rgb) -> usize {
+            self.pixels
+                .chunks_exact(3)
+                .filter(|p| *p == [r, g, b])
+                .count()
+        }
+    }
+
+    fn picture(figure: &Figure) -> Picture {
+        Picture::new(&figure.to_png().unwrap())
+    }
+
+    /// The plot box of the first panel.
+    fn plot(figure: &Figure) -> Rect {
+        figure.layout().unwrap().cells[0].plot
+    }
+
+    fn unit_square(title: &str) -> LineChart {
+        let axis = |label: &str| Axis::linear(label).with_range(0.0, 1.0);
+        LineChart::new(title, axis("time t [s]"), axis("length <L>"))
+    }
+
+    /// The straight line from corner to corner of the plot.
+    fn diagonal() -> LineChart {
+        unit_square("Diagonal & more")
+            .with_series(Series::new("straight", vec![[0.0, 0.0], [1.0, 1.0]]))
+    }
+
+    /// The place of a point of a chart of the unit square, in layout units.
+    fn place(figure: &Figure, [x, y]: [f64; 2]) -> (f64, f64) {
+        let plot = plot(figure);
+        (plot.x + x * plot.width, plot.bottom() - y * plot.height)
+    }
+
+    #[test]
+    fn a_curve_is_where_its_points_are() {
+        let figure = Figure::from(diagonal());
+        let (picture, size) = (picture(&figure), figure.layout().unwrap().size);
+        assert_eq!(
+            (picture.width, picture.height),
+            (2 * size.0 as usize, 2 * size.1 as usize)
+        );
+        assert_eq!(picture.pixel(0, 0), WHITE);
+        for t in [0.1, 0.25, 0.5, 0.75, 0.9] {
+            let (x, y) = place(&figure, [t, t]);
+            assert!(picture.has_near(BLUE, x, y, 0.5), "nothing at {t}");
+            let (x, y) = place(&figure, [t, 1.0 - t + 0.15]);
+            assert!(!picture.has_near(BLUE, x, y, 1.0), "something beside {t}");
+        }
+    }
+
+    #[test]
+    fn a_power_law_is_straight_on_logarithmic_axes() {
+        let steps = (0..=60).map(|k| 10.0_f64.powf(-3.0 + f64::from(k) / 20.0));
+        let axes = (
+            Axis::log("h").with_range(1e-3, 1.0),
+            Axis::log("e").with_range(1e-6, 1.0),
+        );
+        let chart =
+            LineChart::new("", axes.0, axes.1).with_series(Series::of("", steps, |h| [h, h * h]));
+        let figure = Figure::from(chart);
+        let picture = picture(&figure);
+        for t in [0.2, 0.5, 0.8] {
+            let (x, y) = place(&figure, [t, t]);
+            assert!(picture.has_near(BLUE, x, y, 0.6), "not straight at {t}");
+        }
+    }
+
+    #[test]
+    fn points_that_cannot_be_shown_interrupt_the_curve() {
+        let points = [0.1, 0.4, f64::NAN, 0.6, 0.9].map(|t| [t, t]);
+        let figure = Figure::from(unit_square("Gap").with_series(Series::new("", points)));
+        let picture = picture(&figure);
+        let shown = |t: f64| {
+            let (x, y) = place(&figure, [t, t]);
+            picture.has_near(BLUE, x, y, 0.5)
         };
-        self.set_heights(panels, &mut plan)?;
-        let mut spots = vec![Spot::Nowhere; panels.len()];
-        // Margins depend on the tick labels, those on the sizes, and those on the margins; whether
-        // a legend fits inside is settled once the sizes are about right.
-        for round in 0..4 {
-            if round == 1 {
-                for (k, panel) in panels.iter().enumerate() {
-                    let height = plan.rows[k / self.columns].0;
-                    spots[k] = panel
-                        .drawable()
-                        .spot(&self.context, plan.plot_width, height)?;
+        assert!(shown(0.25) && shown(0.75) && !shown(0.5));
+    }
+
+    #[test]
+    fn nothing_to_draw_is_an_error_that_names_the_panel() {
+        let bad = Series::new("bad", vec![[0.0, 0.0], [1.0, -1.0], [f64::NAN, 1.0]]);
+        let empty = LineChart::new("c", Axis::linear("t"), Axis::log("W")).with_series(bad);
+        let panels = [
+            Panel::from(empty),
+            Heatmap::new("c", [2, 2], vec![f64::NAN; 4]).into(),
+            Shapes::new("c").into(),
+            Raster::new([0, 3], vec![]).with_caption("c").into(),
+        ];
+        for panel in panels {
+            let error = Figure::from(panel).to_svg().unwrap_err();
+            assert!(
+                matches!(&error, Error::Empty { chart } if chart == "c"),
+                "{error}"
+            );
+        }
+        assert!(matches!(
+            Figure::new("", 2).to_svg().unwrap_err(),
+            Error::NoPanels
+        ));
+    }
+
+    #[test]
+    fn sizes_and_shapes_that_do_not_fit_are_refused() {
+        for width in [10.0, 1e9, f64::NAN, 90.0] {
+            let error = Figure::from(diagonal())
+                .with_width(width)
+                .to_svg()
+                .unwrap_err();
+            assert!(
+                matches!(error, Error::FigureSize { .. }),
+                "{width}: {error}"
+            );
+        }
+        let panels = [
+            (Panel::from(Heatmap::new("u", [3, 4], vec![0.0; 11])), 11),
+            (Raster::new([3, 4], vec![[0; 4]; 13]).into(), 13),
+            (Raster::new([usize::MAX, 2], vec![[0; 4]; 3]).into(), 3),
+        ];
+        for (panel, length) in panels {
+            let error = Figure::from(panel).to_svg().unwrap_err();
+            assert!(
+                matches!(error, Error::ArrayShape { found, .. } if found == length),
+                "{error}"
+            );
+        }
+        let figure = Figure::from(diagonal()).with_width(700.0);
+        assert_eq!(figure.layout().unwrap().size.0, 700);
+    }
+
+    #[test]
+    fn an_svg_holds_all_texts_and_no_nan() {
+        let broken = Series::new(
+            "broken",
+            vec![[0.0, f64::NAN], [0.5, 0.1], [0.9, f64::INFINITY]],
+        );
+        let chart = diagonal().with_series(broken).with_note("A remark.");
+        let figure = Figure::new("Two", 2)
+            .with_panel(chart)
+            .with_panel(Shapes::new("caption").with_curve(Curve::new(vec![square(1.0)])))
+            .with_column_labels(["left", "right"])
+            .with_row_labels(["only row\nsecond line"])
+            .with_note("Another.");
+        let svg = figure.to_svg().unwrap();
+        for text in [
+            "Two",
+            "Diagonal &amp; more",
+            "time t [s]",
+            "length &lt;L&gt;",
+            "straight",
+            "broken",
+            "A remark.",
+            "0.5",
+            "caption",
+            "left",
+            "right",
+            "only row",
+            "second line",
+            "Another.",
+        ] {
+            assert!(svg.contains(&format!(">\n{text}\n</text>")), "no {text:?}");
+        }
+        assert!(!svg.contains("NaN") && !svg.contains("inf"));
+        assert!(svg.contains("sans-serif") && svg.trim_end().ends_with("</svg>"));
+    }
+
+    #[test]
+    fn legends_show_every_curve_below_the_panel_or_the_figure() {
+        let two = || {
+            let falling = Series::new("falling", vec![[0.0, 1.0], [1.0, 0.0]]);
+            diagonal().with_series(falling.with_colour(1).with_style(LineStyle::Dashed))
+        };
+        let nameless = |mut chart: LineChart| {
+            chart
+                .series
+                .iter_mut()
+                .for_each(|series| series.name.clear());
+            chart
+        };
+        let (with, without) = (Figure::from(two()), Figure::from(nameless(two())));
+        assert_eq!(plot(&with), plot(&without));
+        let (with, without) = (picture(&with), picture(&without));
+        assert!(with.height > without.height + 30);
+        for colour in [BLUE, VERMILLION] {
+            assert!(with.count(colour) > without.count(colour) + 40);
+        }
+
+        let own = LegendEntry::line("method A", Colour::Black, LineStyle::Dashed);
+        let figure = Figure::new("", 2)
+            .with_panels([two(), two(), two().with_entries([own])])
+            .with_shared_legend();
+        let svg = figure.to_svg().unwrap();
+        for label in ["straight", "falling", "method A"] {
+            assert_eq!(
+                svg.matches(&format!(">\n{label}\n</text>")).count(),
+                1,
+                "{label}"
+            );
+        }
+    }
+
+    #[test]
+    fn markers_are_drawn_without_a_line_between_them() {
+        let points = Series::new("", vec![[0.25, 0.5], [0.75, 0.5]]);
+        let figure = Figure::from(unit_square("").with_series(points.with_symbols(Marker::Square)));
+        let picture = picture(&figure);
+        let (x, y) = place(&figure, [0.25, 0.5]);
+        assert!(picture.has_near(BLUE, x + 2.5, y + 2.5, 0.3));
+        let (x, y) = place(&figure, [0.4, 0.5]);
+        assert!(!picture.has_near(BLUE, x, y, 2.0));
+    }
+
+    #[test]
+    fn heat_map_cells_have_their_colours_and_orientation() {
+        // Axis 0 goes right, axis 1 up: only the cell at x = last, y = first is hot, and one is unknown.
+        let mut values = vec![0.0; 12];
+        (values[3 * 3], values[2]) = (1.0, f64::NAN);
+        let axis = |label, high| Axis::linear(label).with_range(0.0, high);
+        let map = Heatmap::new("Hot cell", [4, 3], values)
+            .with_axes(axis("x", 4.0), axis("y", 3.0))
+            .with_bar(Axis::linear("value"));
+        let figure = Figure::from(map);
+        let (picture, plot) = (picture(&figure), plot(&figure));
+        assert!(
+            (plot.height / plot.width - 0.75).abs() < 0.01,
+            "equal aspect"
+        );
+        let colour = |x: f64, y: f64| {
+            picture.at(
+                plot.x + x / 4.0 * plot.width,
+                plot.bottom() - y / 3.0 * plot.height,
+            )
+        };
+        assert_eq!(
+            (colour(3.5, 0.5), colour(0.2, 2.8)),
+            (viridis(1.0), viridis(f64::NAN))
+        );
+        for (x, y) in [(0.2, 0.2), (3.5, 2.5), (2.5, 0.5)] {
+            assert_eq!(colour(x, y), viridis(0.0), "{x}, {y}");
+        }
+        // Colours in between occur in the colour bar alone.
+        let middle = viridis(128.0 / 255.0);
+        assert!(picture.has_near(middle, plot.right() + 17.0, plot.centre().y, 3.0));
+        let svg = figure.to_svg().unwrap();
+        assert_eq!(svg.matches("<image").count(), 2);
+        assert_eq!(svg.matches("pixelated").count(), 2);
+        assert!(svg.contains("value"));
+    }
+
+    fn square(half: f64) -> Vec<[f64; 2]> {
+        vec![[-half, -half], [half, -half], [half, half], [-half, half]]
+    }
+
+    #[test]
+    fn shapes_are_filled_with_holes_and_cut_off_at_the_window() {
+        let ring = Curve::new(vec![square(1.0), square(0.5)]).filled(Colour::Palette(1));
+        let seen = Shapes::new("cut").with_window([-2.0, 0.75], [-2.0, 0.75]);
+        let figure = Figure::new("Squares", 2)
+            .with_panel(Shapes::new("ring").with_curve(ring.clone()))
+            .with_panel(seen.with_curve(ring));
+        let (picture, layout) = (picture(&figure), figure.layout().unwrap());
+        let (left, right) = (layout.cells[0].plot, layout.cells[1].plot);
+        assert!((left.width - left.height).abs() <= 1.0);
+        // The window is [-1.12, 1.12]: 6 per cent of the longest side more on each side.
+        let unit = left.width / 2.24;
+        let at =
+            |x: f64, y: f64| picture.at(left.centre().x + x * unit, left.centre().y - y * unit);
+        for (x, y) in [(0.75, 0.0), (0.0, -0.75), (0.9, 0.9)] {
+            assert_eq!(at(x, y), VERMILLION);
+        }
+        for (x, y) in [(0.0, 0.0), (0.4, 0.4), (1.05, 0.0)] {
+            assert_eq!(at(x, y), WHITE);
+        }
+        let y = right.centre().y;
+        assert!(picture.has_near(VERMILLION, right.right() - 3.0, y, 0.5));
+        assert!(!picture.has_near(VERMILLION, right.right() + 3.0, y, 2.0));
+    }
+
+    #[test]
+    fn panels_line_up() {
+        let figure = Figure::new("Grid", 2).with_panels([diagonal(), diagonal(), diagonal()]);
+        let layout = figure.layout().unwrap();
+        let plots: Vec<Rect> = layout.cells.iter().map(|cell| cell.plot).collect();
+        assert_eq!((plots[0].y, plots[0].height), (plots[1].y, plots[1].height));
+        assert_eq!((plots[0].x, plots[0].width), (plots[2].x, plots[2].width));
+        assert!(plots[1].x > plots[0].right() && plots[2].y > plots[0].bottom());
+        let (width, height) = layout.size;
+        assert!(plots[1].right() <= f64::from(width) && plots[2].bottom() < f64::from(height));
+    }
+
+    #[test]
+    fn mixed_panels_are_written_twice_with_the_same_bytes() {
+        let figure = Figure::new("Mixed", 2)
+            .with_panel(diagonal())
+            .with_panel(Heatmap::new("u", [2, 2], vec![1.0, 2.0, 3.0, 4.0]))
+            .with_panel(Shapes::new("s").with_curve(Curve::new(vec![square(1.0)])))
+            .with_panel(half(30, 20));
+        let root = tempfile::tempdir().unwrap();
+        let folder = OutputDir::create(root.path()).unwrap();
+        figure.write(&folder, "first").unwrap();
+        figure.clone().write(&folder, "second").unwrap();
+        let read = |name: &str| std::fs::read(root.path().join(name)).unwrap();
+        assert!(read("first.svg") == read("second.svg"));
+        assert!(read("first.png") == read("second.png"));
+        let picture = Picture::new(&read("first.png"));
+        for colour in [BLUE, viridis(1.0), INK, OKABE_ITO[2]] {
+            assert!(picture.count(colour) > 50, "{colour:?}");
+        }
+    }
+
+    /// A picture of one colour whose left half is transparent.
+    fn half(columns: usize, rows: usize) -> Raster {
+        let [left, right] = [[9, 9, 9, 0], [0, 158, 115, 255]];
+        let pixel = |k: usize| {
+            if k % columns < columns / 2 {
+                left
+            } else {
+                right
+            }
+        };
+        let pixels: Vec<[u8; 4]> = (0..columns * rows).map(pixel).collect();
+        Raster::new([columns, rows], pixels)
+    }
+
+    #[test]
+    fn pictures_keep_their_shape_and_show_the_page_where_they_are_transparent() {
+        let green = OKABE_ITO[2];
+        for (columns, rows) in [(300, 200), (60, 40), (1500, 1000)] {
+            let figure = Figure::from(half(columns, rows).with_caption("step 100"));
+            let (picture, plot) = (picture(&figure), plot(&figure));
+            assert!((plot.height / plot.width - 2.0 / 3.0).abs() < 0.01);
+            let at = |x, y| picture.at(plot.x + x * plot.width, plot.y + y * plot.height);
+            for y in [0.02, 0.5, 0.98] {
+                assert_eq!((at(0.02, y), at(0.45, y)), (WHITE, WHITE), "{columns} {y}");
+                assert_eq!((at(0.55, y), at(0.98, y)), (green, green), "{columns} {y}");
+            }
+            let svg = figure.to_svg().unwrap();
+            assert_eq!(svg.matches("<image").count(), 1);
+            assert!(!svg.contains("pixelated") && svg.contains(">\nstep 100\n</text>"));
+        }
+    }
+
+    #[test]
+    fn pictures_of_the_right_size_are_copied_and_others_averaged_in_linear_light() {
+        let shown = |size: [usize; 2], pixels: Vec<[u8; 4]>| {
+            let figure = Figure::from(Raster::new(size, pixels)).with_width(200.0);
+            (picture(&figure), plot(&figure))
+        };
+        // The layout depends on the ratio of the sides alone.
+        let (_, plot) = shown([1, 1], vec![[0; 4]]);
+        let size = [2 * plot.width as usize, 2 * plot.height as usize];
+        let noise = |k: usize| [k * 37, k * 91, k * 53].map(|v| (v % 256) as u8);
+        let opaque = |[r, g, b]: [u8; 3]| [r, g, b, 255];
+        let (copied, _) = shown(
+            size,
+            (0..size[0] * size[1]).map(|k| opaque(noise(k))).collect(),
+        );
+        for (x, y) in [(0, 0), (7, 3), (size[0] - 1, size[1] - 1)] {
+            let [r, g, b] = noise(y * size[0] + x);
+            let at = (2 * plot.x as usize + x, 2 * plot.y as usize + y);
+            assert_eq!(copied.pixel(at.0, at.1), Rgb(r, g, b), "{x} {y}");
+        }
+        // A fine chessboard of black and white has half the light of white.
+        let double = [2 * size[0], 2 * size[1]];
+        let white = |k: usize| (k % double[0] + k / double[0]) % 2;
+        let board = (0..double[0] * double[1]).map(|k| opaque([255 * white(k) as u8; 3]));
+        let (averaged, plot) = shown(double, board.collect());
+        let centre = averaged.at(plot.centre().x, plot.centre().y);
+        assert!(centre.0.abs_diff(188) <= 1, "{centre:?}");
+    }
+
+    proptest! {
+        #[test]
+        fn any_data_gives_a_drawing_or_a_typed_error(
+            points in prop::collection::vec([any::<f64>(), any::<f64>()], 0..20),
+            scale in -320..300_i32,
+            logs in any::<[bool; 2]>(),
+        ) {
+            let [x, y] = logs.map(|log| if log { Axis::log("a") } else { Axis::linear("a") });
+            // Numbers of all sizes, and numbers all of one size.
+            let even: Vec<[f64; 2]> = points
+                .iter()
+                .map(|p| p.map(|c| 10.0_f64.powi(scale) * c.to_bits() as f64 / 1e19))
+                .collect();
+            for data in [points, even] {
+                let loops = Curve::new(vec![data.clone()]).filled(0);
+                let chart = LineChart::new("Any", x.clone(), y.clone())
+                    .with_series(Series::new("any", data).with_style(LineStyle::Dashed));
+                let shapes = Shapes::new("Any").with_curve(loops);
+                for figure in [Figure::from(chart), Figure::from(shapes)] {
+                    match figure.with_width(400.0).to_svg() {
+                        Ok(svg) => prop_assert!(!svg.contains("NaN") && !svg.contains("inf")),
+                        Err(error) => prop_assert!(
+                            matches!(error, Error::Empty { .. } | Error::Range { .. } | Error::FigureSize { .. }),
+                            "{error}"
+                        ),
+                    }
                 }
             }
-            self.refine(panels, &spots, &mut plan)?;
         }
-        Ok((plan, spots))
     }
-
-    fn refine(&self, panels: &[Panel], spots: &[Spot], plan: &mut Plan) -> Result<()> {
-        let mut columns = vec![Margins::default(); self.columns];
-        let mut rows = vec![Margins::default(); plan.rows.len()];
-        for (k, panel) in panels.iter().enumerate() {
-            let (row, column) = (k / self.columns, k % self.columns);
-            let (width, height) = (plan.plot_width, plan.rows[row].0);
-            let needed = panel
-                .drawable()
-                .margins(&self.context, spots[k], width, height)?;
-            columns[column] = columns[column].max(needed);
-            rows[row] = rows[row].max(needed);
-        }
-        plan.columns = columns.iter().map(|m| (m.left, m.right)).collect();
-        for (row, margins) in plan.rows.iter_mut().zip(rows) {
-            (row.1, row.2) = (margins.top, margins.bottom);
-        }
-        let taken: f64 = plan.columns.iter().map(|(left, right)| left + right).sum();
-        plan.plot_width = ((self.room - taken) / self.columns as f64).floor();
-        self.set_heights(panels, plan)
-    }
-
-    fn set_heights(&self, panels: &[Panel], plan: &mut Plan) -> Result<()> {
-        let rows = plan.rows.len() as f64;
-        let fixed = self.fixed.map(|height| {
-            let margins: f64 = plan.rows.iter().map(|r| r.1 + r.2).sum();
-            (height - margins - ROW_GAP * (rows - 1.0)) / rows
-        });
-        let share = if self.columns == 1 { 0.52 } else { 0.66 };
-        for (row, members) in plan.rows.iter_mut().zip(panels.chunks(self.columns)) {
-            let mut height = 0.0_f64;
-            for panel in members {
-                let own = match panel.drawable().aspect(&self.context)? {
-                    Some(aspect) => (aspect * plan.plot_width).min(1.2 * plan.plot_width),
-                    None => share * self.context.cell_width,
-                };
-                height = height.max(own);
-            }
-            // A single equal-aspect panel would otherwise be as tall as the figure is wide.
-            let limit = match self.columns {
-                1 => (0.62 * self.context.cell_width).max(440.0),
-                _ => f64::MAX,
-            };
-            row.0 = fixed.unwrap_or(height.min(limit)).floor();
-        }
-        Ok(())
-    }
-}
-
-impl Plan {
-    fn height(&self) -> f64 {
-        let rows: f64 = self
-            .rows
-            .iter()
-            .map(|(plot, top, bottom)| plot + top + bottom)
-            .sum();
-        rows + ROW_GAP * (self.rows.len() - 1) as f64
-    }
-
-    /// Plot boxes and the boxes with margins around them.
-    fn boxes(&self, left: f64, top: f64, count: usize) -> Vec<(Rect, Rect)> {
-        let mut boxes = Vec::with_capacity(count);
-        let mut y = top;
-        for &(height, above, below) in &self.rows {
-            let mut x = left;
-            for &(before, after) in &self.columns {
-                let plot = Rect::new(x + before, y + above, self.plot_width, height);
-                let width = before + self.plot_width + after;
-                let outer = Rect::new(x, y, width, above + height + below);
-                boxes.push((plot, outer));
-                x += width + COLUMN_GAP;
-            }
-            y += above + height + below + ROW_GAP;
-        }
-        boxes.truncate(count);
-        boxes
-    }
-}
-
-/// Puts the corners of a plot box on whole units, so that its frame is crisp.
-fn whole(plot: Rect) -> Rect {
-    let (x, y) = (plot.x.round(), plot.y.round());
-    Rect::new(
-        x,
-        y,
-        (plot.right().round() - x).max(1.0),
-        (plot.bottom().round() - y).max(1.0),
-    )
 }

@@ -6,33 +6,27 @@
 //! ```
 //! use report::{Axis, Figure, LineChart, LineStyle, Manifest, Marker, OutputDir, Series, Summary};
 //!
-//! fn main() -> Result<(), report::Error> {
-//!     let root = std::env::temp_dir().join("report-first-steps");
-//!     let folder = OutputDir::create(&root)?; // fails now, not after hours of computing
-//!     let mut manifest = Manifest::start("decay").with_seed(1);
+//! # fn main() -> Result<(), report::Error> {
+//! let root = std::env::temp_dir().join("report-first-steps");
+//! let folder = OutputDir::create(&root)?; // fails now, not after hours of computing
+//! let mut manifest = Manifest::start("decay").with_seed(1);
 //!
-//!     let error = |n: f64| model(n);
-//!     let points: Vec<[f64; 2]> = [32.0, 64.0, 128.0, 256.0].map(|n| [1.0 / n, error(n)]).into();
-//!     let order: Vec<[f64; 2]> = points.iter().map(|[h, _]| [*h, h.powi(2)]).collect();
-//!     let chart = LineChart::new("Convergence", Axis::log("h"), Axis::log("L² error"))
-//!         .with_series(Series::new("measured", points.clone()).with_marker(Marker::Circle))
-//!         .with_series(
-//!             Series::new("order 2", order).with_colour(1).with_style(LineStyle::Dashed),
-//!         );
-//!     manifest.phase("plot", || Figure::from(chart).write(&folder, "convergence"))?;
+//! let steps = [32.0, 64.0, 128.0, 256.0].map(f64::recip);
+//! let error = |h: f64| 0.7 * h.powi(2) + 0.1 * h.powi(3);
+//! let measured = Series::of("measured", steps, |h| [h, error(h)]).with_marker(Marker::Circle);
+//! let order = Series::of("order 2", steps, |h| [h, h.powi(2)]).with_style(LineStyle::Dashed);
+//! let chart = LineChart::new("Convergence", Axis::log("h"), Axis::log("L² error"))
+//!     .with_curves([measured, order.with_colour(1)]);
+//! manifest.phase("plot", || Figure::from(chart).write(&folder, "convergence"))?;
 //!
-//!     let mut summary = Summary::new();
-//!     summary.insert("error_finest", points[3][1])?;
-//!     summary.write(&folder)?;
-//!     manifest.write(&folder)?;
-//!     assert!(folder.path("convergence.png")?.exists());
-//! #   std::fs::remove_dir_all(&root).expect("the folder was made above");
-//!     Ok(())
-//! }
-//!
-//! fn model(n: f64) -> f64 {
-//!     0.7 / (n * n) + 0.1 / (n * n * n)
-//! }
+//! let mut summary = Summary::new();
+//! summary.insert("error_finest", error(steps[3]))?;
+//! summary.write(&folder)?;
+//! manifest.write(&folder)?;
+//! assert!(folder.path("convergence.png")?.exists());
+//! # std::fs::remove_dir_all(&root).expect("the folder was made above");
+//! # Ok(())
+//! # }
 //! ```
 //!
 //! # Conventions
@@ -41,8 +35,7 @@
 //!   is drawn to the right, axis 1 upwards.
 //! - Sizes are in layout units: one CSS pixel in SVG, two pixels in PNG. Figures are 800 units wide
 //!   unless told otherwise, made to be read at that width.
-//! - Colours come from the palette of Okabe and Ito ([`OKABE_ITO`]), viridis, and a blue-white-red
-//!   map, all safe for the colour-blind.
+//! - Colours come from the palette of Okabe and Ito ([`OKABE_ITO`]) and from viridis, both safe for the colour-blind.
 //! - Text is set in the embedded `DejaVu Sans` 2.37 (from the `dejavu` crate; Bitstream Vera
 //!   licence, changes in the public domain) in PNG, and in a sans-serif family in SVG. No system
 //!   font is used.
@@ -50,11 +43,10 @@
 //!   interrupts its curve; [`Summary`] and [`Table`] refuse it.
 //! - The same input gives the same bytes, manifests aside.
 
-pub mod data;
-
 mod axes;
 mod axis;
 mod colour;
+mod data;
 mod error;
 mod figure;
 mod font;
@@ -73,25 +65,20 @@ mod summary;
 mod surface;
 mod table;
 
-#[cfg(test)]
-mod decoded;
-#[cfg(test)]
-mod tests;
-
-pub use axis::{Axis, Scale};
-pub use colour::{Colour, ColourMap, OKABE_ITO};
+pub use axis::Axis;
+pub use colour::{Colour, OKABE_ITO};
 pub use error::{Error, Result};
-pub use figure::{Figure, Panel};
+pub use figure::Figure;
 pub use heatmap::Heatmap;
-pub use legend::{Legend, LegendEntry, Sample};
-pub use manifest::{Manifest, Phase};
+pub use legend::LegendEntry;
+pub use manifest::Manifest;
 pub use output::OutputDir;
-pub use panel::Window;
-pub use plot::{LineChart, Reference, ReferenceAt, Series};
+pub use panel::Panel;
+pub use plot::{LineChart, Series};
 pub use progress::Progress;
 pub use raster::Raster;
 pub use shapes::{Curve, Shapes};
 pub use srgb::Rgb;
 pub use style::{LineStyle, Marker};
 pub use summary::Summary;
-pub use table::{Cell, Column, Format, Table, Tabulated};
+pub use table::{Cell, Format, Table, Tabulated};

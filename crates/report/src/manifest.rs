@@ -12,50 +12,33 @@ use crate::output::OutputDir;
 
 /// A named part of a run and how long it took.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Phase {
-    /// What was done.
-    pub name: String,
-    /// Wall time in seconds.
-    pub seconds: f64,
+struct Phase {
+    name: String,
+    seconds: f64,
 }
 
-/// What is needed to repeat a run. It holds nothing about who ran it where: no host name, no user,
-/// no paths.
+/// What is needed to repeat a run, and its wall times. It holds nothing about who ran it where: no host name, no user, no paths.
+///
+/// Beside what is set here, these are the version of the workspace, the commit of the sources, the compiler, the target triple, the
+/// number of processors available, and the start of the run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Manifest {
-    /// Name of the experiment.
-    pub experiment: String,
-    /// All parameters, by name.
-    pub parameters: Map<String, Value>,
-    /// Version of the workspace.
-    pub version: String,
-    /// Commit of the sources, if they are a git checkout; `-modified` is appended if tracked files
-    /// differ from it.
-    pub commit: Option<String>,
-    /// Compiler version.
-    pub rustc: String,
-    /// Target triple.
-    pub target: String,
-    /// Operating system.
-    pub os: String,
-    /// Processor architecture.
-    pub arch: String,
-    /// Number of processors available to the run.
-    pub cpus: usize,
-    /// Device the tensors lived on, such as `cpu`.
-    pub device: Option<String>,
-    /// Number format of the tensors, such as `f64`.
-    pub dtype: Option<String>,
-    /// Tensor backend, such as `flex`.
-    pub backend: Option<String>,
-    /// Seed of all random numbers.
-    pub seed: Option<u64>,
-    /// Start of the run, RFC 3339 in UTC.
-    pub started: String,
-    /// Wall time of the whole run in seconds, set when the manifest is written.
-    pub wall_seconds: f64,
-    /// Parts of the run in order.
-    pub phases: Vec<Phase>,
+    experiment: String,
+    parameters: Map<String, Value>,
+    version: &'static str,
+    commit: Option<String>,
+    rustc: &'static str,
+    target: &'static str,
+    os: &'static str,
+    arch: &'static str,
+    cpus: usize,
+    device: Option<String>,
+    dtype: Option<String>,
+    backend: Option<String>,
+    seed: Option<u64>,
+    started: String,
+    wall_seconds: f64,
+    phases: Vec<Phase>,
     #[serde(skip)]
     clock: Instant,
 }
@@ -66,12 +49,12 @@ impl Manifest {
         Self {
             experiment: experiment.into(),
             parameters: Map::new(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
+            version: env!("CARGO_PKG_VERSION"),
             commit: commit(),
-            rustc: env!("REPORT_RUSTC").to_owned(),
-            target: env!("REPORT_TARGET").to_owned(),
-            os: std::env::consts::OS.to_owned(),
-            arch: std::env::consts::ARCH.to_owned(),
+            rustc: env!("REPORT_RUSTC"),
+            target: env!("REPORT_TARGET"),
+            os: std::env::consts::OS,
+            arch: std::env::consts::ARCH,
             cpus: std::thread::available_parallelism().map_or(1, usize::from),
             device: None,
             dtype: None,
@@ -88,20 +71,10 @@ impl Manifest {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameters`] if it does not, [`Error::Json`] if it does not serialise at all.
+    /// [`Error::Json`] if it does not.
     pub fn with_parameters(mut self, parameters: &impl Serialize) -> Result<Self> {
-        let value = serde_json::to_value(parameters).map_err(|source| Error::Json {
-            what: "the run parameters".to_owned(),
-            source,
-        })?;
-        match value {
-            Value::Object(map) => self.parameters = map,
-            _ => {
-                return Err(Error::Parameters {
-                    experiment: self.experiment,
-                });
-            }
-        }
+        let map = serde_json::to_value(parameters).and_then(serde_json::from_value);
+        self.parameters = map.map_err(Error::json("the run parameters"))?;
         Ok(self)
     }
 
@@ -141,14 +114,15 @@ impl Manifest {
     ///
     /// # Errors
     ///
-    /// [`Error::Write`].
+    /// [`Error::File`].
     pub fn write(&mut self, folder: &OutputDir) -> Result<PathBuf> {
         self.wall_seconds = self.clock.elapsed().as_secs_f64();
         folder.write("manifest.json", crate::data::to_json(self)?)
     }
 }
 
-/// Commit of the checkout this crate was built from, if it still is there and git knows it.
+/// Commit of the checkout this crate was built from, if it still is there and git knows it; `-modified` is appended if tracked files
+/// differ from it.
 fn commit() -> Option<String> {
     let git = |arguments: &[&str]| -> Option<String> {
         let output = Command::new("git")
@@ -262,6 +236,6 @@ mod tests {
         let error = Manifest::start("circle")
             .with_parameters(&[1, 2])
             .unwrap_err();
-        assert!(matches!(error, Error::Parameters { .. }));
+        assert!(error.to_string().contains("expected a map"));
     }
 }

@@ -1,7 +1,6 @@
 //! An output folder that is checked early and whose files are never half written.
 
 use std::fs;
-use std::io::{self, Write};
 use std::path::{Component, Path, PathBuf};
 
 use serde::Serialize;
@@ -20,15 +19,11 @@ impl OutputDir {
     ///
     /// # Errors
     ///
-    /// [`Error::Folder`] with the path and the cause.
+    /// [`Error::File`] with the path and the cause.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
         let path = path.into();
-        let failed = |source| Error::Folder {
-            path: path.clone(),
-            source,
-        };
-        fs::create_dir_all(&path).map_err(failed)?;
-        files::probe(&path).map_err(|error| failed(error.source))?;
+        fs::create_dir_all(&path).map_err(files::Error::of("create the folder", &path))?;
+        files::probe(&path)?;
         Ok(Self { path })
     }
 
@@ -36,7 +31,7 @@ impl OutputDir {
     ///
     /// # Errors
     ///
-    /// [`Error::FileName`] unless `name` is one plain component, [`Error::Folder`] as above.
+    /// [`Error::FileName`] unless `name` is one plain component, [`Error::File`] as above.
     pub fn subfolder(&self, name: &str) -> Result<Self> {
         Self::create(self.path(name)?)
     }
@@ -65,16 +60,21 @@ impl OutputDir {
     ///
     /// # Errors
     ///
-    /// [`Error::FileName`] or [`Error::Write`]; an old file of that name is then untouched.
+    /// [`Error::FileName`] or [`Error::File`]; an old file of that name is then untouched.
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> Result<PathBuf> {
-        self.write_with(name, |file| file.write_all(content.as_ref()))
+        let path = self.path(name)?;
+        files::write_atomically(&path, |file| file.write_all(content.as_ref()))?;
+        Ok(path)
     }
 
-    /// Writes [records as CSV](crate::data::to_csv).
+    /// Writes records as CSV with a header from their field names (RFC 4180 quoting, line feeds).
+    ///
+    /// Records are flat structs of numbers, text and options (`None` is an empty field). Floats have the fewest digits that read back
+    /// exactly; NaN and infinities are `NaN` and `inf`.
     ///
     /// # Errors
     ///
-    /// [`Error::Csv`], or as [`OutputDir::write`].
+    /// [`Error::Csv`] if a record is not flat, or as [`OutputDir::write`].
     pub fn write_csv<T: Serialize>(
         &self,
         name: &str,
@@ -83,32 +83,13 @@ impl OutputDir {
         self.write(name, crate::data::to_csv(records)?)
     }
 
-    /// Writes any [value as JSON](crate::data::to_json).
+    /// Writes any value as indented JSON with a final newline. JSON knows no NaN and no infinity: they become `null`.
     ///
     /// # Errors
     ///
-    /// [`Error::Json`], or as [`OutputDir::write`].
+    /// [`Error::Json`] if the value has, for example, a map with keys that are not text, or as [`OutputDir::write`].
     pub fn write_json(&self, name: &str, value: &impl Serialize) -> Result<PathBuf> {
         self.write(name, crate::data::to_json(value)?)
-    }
-
-    /// Writes a file through a callback, replacing an old one only if the callback succeeds.
-    ///
-    /// See [`files::write_atomically`].
-    ///
-    /// # Errors
-    ///
-    /// [`Error::FileName`] or [`Error::Write`]; an old file of that name is then untouched.
-    pub fn write_with(
-        &self,
-        name: &str,
-        produce: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-    ) -> Result<PathBuf> {
-        let path = self.path(name)?;
-        match files::write_atomically(&path, produce) {
-            Ok(()) => Ok(path),
-            Err(files::Error { source, .. }) => Err(Error::Write { path, source }),
-        }
     }
 }
 
@@ -145,34 +126,13 @@ mod tests {
     }
 
     #[test]
-    fn a_failing_producer_leaves_the_old_file() {
-        let root = tempfile::tempdir().unwrap();
-        let folder = OutputDir::create(root.path()).unwrap();
-        folder.write("state.json", "old").unwrap();
-        let error = folder
-            .write_with("state.json", |file| {
-                file.write_all(b"half of the ne")?;
-                Err(io::Error::other("the solver gave up"))
-            })
-            .unwrap_err();
-        assert!(matches!(error, Error::Write { .. }));
-        let message = error.to_string();
-        assert!(message.contains("state.json") && message.contains("the solver gave up"));
-        assert_eq!(
-            fs::read_to_string(root.path().join("state.json")).unwrap(),
-            "old"
-        );
-        assert_eq!(names(root.path()), ["state.json"]);
-    }
-
-    #[test]
     fn a_file_in_place_of_the_folder_is_reported_on_one_line() {
         let root = tempfile::tempdir().unwrap();
         let blocked = root.path().join("results");
         fs::write(&blocked, "not a folder").unwrap();
         for path in [blocked.clone(), blocked.join("deeper")] {
             let error = OutputDir::create(&path).unwrap_err();
-            assert!(matches!(&error, Error::Folder { path: p, .. } if *p == path));
+            assert!(matches!(&error, Error::File(error) if error.path == path));
             let message = error.to_string();
             assert!(
                 message.contains("results") && !message.contains('\n'),

@@ -1,89 +1,106 @@
-//! What a figure and its panels tell each other.
+//! The cells of a figure.
+
+use plotters_backend::text_anchor::HPos;
 
 use crate::axes::Margins;
-use crate::axis::{Mapping, Scale};
+use crate::colour::{GREY, INK};
 use crate::error::Result;
+use crate::font::TextStyle;
 use crate::geom::Rect;
+use crate::heatmap::Heatmap;
 use crate::legend::LegendEntry;
+use crate::plot::LineChart;
+use crate::raster::Raster;
+use crate::shapes::Shapes;
 use crate::style::Fonts;
 use crate::surface::Surface;
 
-/// The part of the plane a drawing shows.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Window {
-    /// Left and right end.
-    pub x: [f64; 2],
-    /// Lower and upper end.
-    pub y: [f64; 2],
+/// One cell of a figure.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Panel {
+    /// A line chart.
+    Line(LineChart),
+    /// A heat map.
+    Heatmap(Heatmap),
+    /// Plane curves.
+    Shapes(Shapes),
+    /// A picture.
+    Raster(Raster),
 }
 
-impl Window {
-    pub(crate) fn union(self, other: Self) -> Self {
-        let join = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
-        Self {
-            x: join(self.x, other.x),
-            y: join(self.y, other.y),
+impl From<LineChart> for Panel {
+    fn from(chart: LineChart) -> Self {
+        Self::Line(chart)
+    }
+}
+
+impl From<Heatmap> for Panel {
+    fn from(map: Heatmap) -> Self {
+        Self::Heatmap(map)
+    }
+}
+
+impl From<Shapes> for Panel {
+    fn from(shapes: Shapes) -> Self {
+        Self::Shapes(shapes)
+    }
+}
+
+impl From<Raster> for Panel {
+    fn from(raster: Raster) -> Self {
+        Self::Raster(raster)
+    }
+}
+
+impl Panel {
+    /// What is drawn, checked.
+    pub(crate) fn checked(&self, fonts: Fonts) -> Result<Box<dyn Drawable + '_>> {
+        Ok(match self {
+            Self::Line(chart) => Box::new(chart.checked(fonts)?),
+            Self::Heatmap(map) => Box::new(map.checked(fonts)?),
+            Self::Shapes(shapes) => Box::new(shapes.checked()?),
+            Self::Raster(raster) => Box::new(raster.checked()?),
+        })
+    }
+
+    /// Text above.
+    pub(crate) fn title(&self) -> &str {
+        match self {
+            Self::Line(chart) => &chart.title,
+            Self::Heatmap(map) => &map.title,
+            Self::Shapes(shapes) => &shapes.caption,
+            Self::Raster(_) => "",
         }
     }
 
-    pub(crate) fn aspect(&self) -> f64 {
-        (self.y[1] - self.y[0]) / (self.x[1] - self.x[0])
-    }
-
-    pub(crate) fn checked(self) -> Result<Self> {
-        for (axis, [low, high]) in [("x", self.x), ("y", self.y)] {
-            Mapping::new(axis, Scale::Linear, low, high)?;
+    /// Text below.
+    pub(crate) fn remark(&self, fonts: Fonts) -> (&str, TextStyle) {
+        let note = TextStyle::new(fonts.note, GREY).aligned(HPos::Left);
+        match self {
+            Self::Line(chart) => (chart.note.as_deref().unwrap_or(""), note),
+            Self::Raster(raster) => (&raster.caption, TextStyle::new(fonts.label, INK)),
+            Self::Heatmap(_) | Self::Shapes(_) => ("", note),
         }
-        Ok(self)
     }
-}
 
-/// What a panel needs to know about the figure around it.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Context {
-    pub fonts: Fonts,
-    /// Room for text as wide as the panel with its margins.
-    pub cell_width: f64,
-    /// Legends are collected below the whole figure.
-    pub shared_legend: bool,
-    /// Common window of the panels of plane curves.
-    pub window: Option<Window>,
-}
-
-/// Where a panel draws its own legend.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Spot {
-    Nowhere,
-    Inside,
-    Below,
-    Right,
-}
-
-/// What the layout asks of a panel.
-pub(crate) trait Drawable {
     /// Groups of entries for the legend.
-    fn legend(&self) -> Vec<Vec<LegendEntry>>;
+    pub(crate) fn legend(&self) -> Vec<Vec<LegendEntry>> {
+        match self {
+            Self::Line(chart) => chart.legend(),
+            _ => Vec::new(),
+        }
+    }
+}
 
+/// What the layout asks of a panel whose content is checked.
+pub(crate) trait Drawable {
     /// Height over width of the plot box, if that is fixed.
-    fn aspect(&self, _context: &Context) -> Result<Option<f64>> {
-        Ok(None)
-    }
+    fn aspect(&self) -> Option<f64>;
 
-    /// Decides about the legend, given the approximate size of the plot box.
-    fn spot(&self, _context: &Context, _width: f64, _height: f64) -> Result<Spot> {
-        Ok(Spot::Nowhere)
-    }
+    /// Room for axes around a plot box of the given size.
+    fn margins(&self, width: f64, height: f64) -> Margins;
 
-    /// Room needed around a plot box of the given size.
-    fn margins(&self, context: &Context, spot: Spot, width: f64, height: f64) -> Result<Margins>;
-
-    /// Draws the panel with its plot box at `plot`; text may use all of `outer`.
-    fn draw(
-        &self,
-        context: &Context,
-        surface: &mut dyn Surface,
-        spot: Spot,
-        plot: Rect,
-        outer: Rect,
-    ) -> Result<()>;
+    /// Draws into the plot box, and axes around it.
+    fn draw(&self, surface: &mut dyn Surface, plot: Rect) -> Result<()>;
 }

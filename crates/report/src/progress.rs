@@ -7,15 +7,6 @@ use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// A stack of progress bars. Nothing is drawn when standard error is not a terminal or `quiet` is
 /// set, so logs stay clean; everything else works alike.
-///
-/// ```
-/// let progress = report::Progress::new(true);
-/// let bar = progress.bar("time steps", 100);
-/// for _ in 0..100 {
-///     bar.inc(1);
-/// }
-/// bar.finish();
-/// ```
 #[derive(Debug, Clone)]
 pub struct Progress {
     bars: MultiProgress,
@@ -24,14 +15,10 @@ pub struct Progress {
 impl Progress {
     /// Progress bars on standard error if it is a terminal and not `quiet`.
     pub fn new(quiet: bool) -> Self {
-        Self::on(!quiet && std::io::stderr().is_terminal())
-    }
-
-    fn on(visible: bool) -> Self {
-        let target = if visible {
-            ProgressDrawTarget::stderr()
-        } else {
+        let target = if quiet || !std::io::stderr().is_terminal() {
             ProgressDrawTarget::hidden()
+        } else {
+            ProgressDrawTarget::stderr()
         };
         Self {
             bars: MultiProgress::with_draw_target(target),
@@ -63,11 +50,6 @@ impl Progress {
             .expect("the templates are fixed and valid")
             .progress_chars("━╸ ");
         self.bars.add(bar).with_style(style).with_message(message)
-    }
-
-    /// Writes a line to standard error above the bars, even when they are hidden.
-    pub fn println(&self, line: &str) {
-        self.bars.suspend(|| eprintln!("{line}"));
     }
 
     /// Takes all bars off the screen.

@@ -1,55 +1,32 @@
 //! Pictures made elsewhere as panels, such as rendered surfaces.
 
-use plotters_backend::text_anchor::HPos;
-use resize::Pixel;
-use resize::Type::Catrom;
-use resize::px::RGB;
 use srgb::Rgb;
 
-use crate::axes::{Margins, draw_lines, title_height};
-use crate::colour::{FRAME, INK};
+use crate::axes::Margins;
 use crate::error::{Error, Result};
 use crate::geom::Rect;
-use crate::legend::LegendEntry;
-use crate::panel::{Context, Drawable, Spot};
-use crate::surface::{PNG_SCALE, Scaling, Surface, outline};
+use crate::panel::Drawable;
+use crate::surface::{PNG_SCALE, Surface};
 
-/// A panel that shows a picture, with a title above and a caption below.
+/// A panel that shows a picture, with a caption below.
 ///
-/// It is resampled, in linear light by the cubic filter of Catmull and Rom, to two pixels per
-/// layout unit. Transparent pixels show the white page.
+/// It is averaged, in linear light, over the pixels of the figure, two per layout unit. Transparent pixels show the white page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Raster {
-    /// Title above the picture; may be empty.
-    pub title: String,
-    /// Caption below the picture; may be empty.
-    pub caption: String,
-    /// Columns and rows.
-    pub size: [usize; 2],
-    /// Red, green, blue and opacity (not multiplied into the colour), sRGB, row by row from the
-    /// top.
-    pub pixels: Vec<[u8; 4]>,
-    /// Whether a thin frame is drawn around the picture.
-    pub frame: bool,
+    pub(crate) caption: String,
+    size: [usize; 2],
+    pixels: Vec<[u8; 4]>,
 }
 
 impl Raster {
-    /// A picture of `size` columns and rows without title, caption and frame.
+    /// A picture of `size` columns and rows. Pixels are red, green, blue and opacity (not multiplied into the colour), sRGB, row by row
+    /// from the top.
     pub fn new(size: [usize; 2], pixels: impl Into<Vec<[u8; 4]>>) -> Self {
         Self {
-            title: String::new(),
             caption: String::new(),
             size,
             pixels: pixels.into(),
-            frame: false,
         }
-    }
-
-    /// Sets the title above the picture.
-    #[must_use]
-    pub fn with_title(mut self, title: impl Into<String>) -> Self {
-        self.title = title.into();
-        self
     }
 
     /// Sets the caption below the picture.
@@ -59,128 +36,63 @@ impl Raster {
         self
     }
 
-    /// Draws a thin frame around the picture.
-    #[must_use]
-    pub fn with_frame(mut self) -> Self {
-        self.frame = true;
-        self
+    pub(crate) fn checked(&self) -> Result<&Self> {
+        Error::check_shape(&self.caption, self.size, self.pixels.len())?;
+        Ok(self)
     }
 
-    /// Name of the panel in errors.
-    fn name(&self) -> String {
-        if self.title.is_empty() {
-            self.caption.clone()
-        } else {
-            self.title.clone()
-        }
-    }
-
-    fn check(&self) -> Result<()> {
-        let [columns, rows] = self.size;
-        let expected = columns.saturating_mul(rows);
-        if self.pixels.len() != expected {
-            return Err(Error::ArrayShape {
-                chart: self.name(),
-                shape: self.size,
-                expected,
-                found: self.pixels.len(),
-            });
-        }
-        if expected == 0 {
-            return Err(Error::NoPixels { chart: self.name() });
-        }
-        Ok(())
-    }
-
-    /// The picture on white, in linear light, in another size.
-    fn resampled(&self, columns: usize, rows: usize) -> Result<Vec<Rgb>> {
-        let source: Vec<RGB<f32>> = self
-            .pixels
-            .iter()
-            .map(|&[r, g, b, a]| {
-                let opacity = f32::from(a) / 255.0;
-                let on_white = |v| opacity * srgb::decode(v) + (1.0 - opacity);
-                RGB::new(on_white(r), on_white(g), on_white(b))
-            })
-            .collect();
-        let mut target = vec![RGB::new(0.0, 0.0, 0.0); columns * rows];
-        let failed = |error: resize::Error| Error::Draw {
-            cause: error.to_string(),
+    /// The picture on white in another size: every pixel is the mean over what it covers.
+    fn averaged(&self, columns: usize, rows: usize) -> Vec<Rgb> {
+        let light = |&[r, g, b, a]: &[u8; 4]| {
+            let opacity = f32::from(a) / 255.0;
+            [r, g, b].map(|v| opacity * srgb::decode(v) + (1.0 - opacity))
         };
-        resize::new(
-            self.size[0],
-            self.size[1],
-            columns,
-            rows,
-            Pixel::RGBF32,
-            Catrom,
-        )
-        .map_err(failed)?
-        .resize(&source, &mut target)
-        .map_err(failed)?;
-        let encode = |p: RGB<f32>| Rgb(srgb::encode(p.r), srgb::encode(p.g), srgb::encode(p.b));
-        Ok(target.into_iter().map(encode).collect())
+        let source: Vec<[f32; 3]> = self.pixels.iter().map(light).collect();
+        let across = shares(self.size[0], columns);
+        let mut target = Vec::with_capacity(columns * rows);
+        for down in shares(self.size[1], rows) {
+            for along in &across {
+                let mut sum = [0.0; 3];
+                for (row, height) in &down {
+                    for (column, width) in along {
+                        let pixel = source[row * self.size[0] + column];
+                        sum = [0, 1, 2].map(|c| sum[c] + height * width * pixel[c]);
+                    }
+                }
+                let [r, g, b] = sum.map(srgb::encode);
+                target.push(Rgb(r, g, b));
+            }
+        }
+        target
     }
 }
 
-/// Space between picture and caption.
-const GAP: f64 = 4.0;
+/// What each of `to` equal parts of a line covers of `from` others: their numbers and shares.
+fn shares(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
+    let part = |k: usize| {
+        // In units of 1 / to of a source pixel, which keeps them exact.
+        let (start, end) = (k * from, (k + 1) * from);
+        let share = move |i: usize| end.min((i + 1) * to) - start.max(i * to);
+        (start / to..end.div_ceil(to))
+            .map(|i| (i, share(i) as f32 / from as f32))
+            .collect()
+    };
+    (0..to).map(part).collect()
+}
 
-impl Drawable for Raster {
-    fn legend(&self) -> Vec<Vec<LegendEntry>> {
-        Vec::new()
+impl Drawable for &Raster {
+    fn aspect(&self) -> Option<f64> {
+        Some(self.size[1] as f64 / self.size[0] as f64)
     }
 
-    fn aspect(&self, _: &Context) -> Result<Option<f64>> {
-        self.check()?;
-        Ok(Some(self.size[1] as f64 / self.size[0] as f64))
+    fn margins(&self, _: f64, _: f64) -> Margins {
+        Margins::even(1.0)
     }
 
-    fn margins(&self, context: &Context, _: Spot, _: f64, _: f64) -> Result<Margins> {
-        let fonts = context.fonts;
-        let caption = match title_height(&self.caption, fonts.label, context.cell_width) {
-            height if height > 0.0 => GAP + height,
-            _ => 0.0,
-        };
-        Ok(Margins {
-            left: 1.0,
-            right: 1.0,
-            top: 1.0 + title_height(&self.title, fonts.title, context.cell_width),
-            bottom: 1.0 + caption,
-        })
-    }
-
-    fn draw(
-        &self,
-        context: &Context,
-        surface: &mut dyn Surface,
-        _: Spot,
-        plot: Rect,
-        outer: Rect,
-    ) -> Result<()> {
-        let pixels = |side: f64| (side * f64::from(PNG_SCALE)) as usize;
-        let (columns, rows) = (pixels(plot.width), pixels(plot.height));
-        let cells = self.resampled(columns, rows)?;
-        surface.image(plot, columns, &cells, Scaling::Smooth)?;
-        if self.frame {
-            outline(surface, plot, 1.0, FRAME)?;
-        }
-        let middle = plot.centre().x;
-        let lines = [
-            (&self.title, context.fonts.title, outer.y),
-            (&self.caption, context.fonts.label, plot.bottom() + GAP),
-        ];
-        for (text, em, top) in lines {
-            let at = (middle, top);
-            draw_lines(
-                surface,
-                text,
-                (em, INK),
-                HPos::Center,
-                at,
-                context.cell_width,
-            )?;
-        }
-        Ok(())
+    fn draw(&self, surface: &mut dyn Surface, plot: Rect) -> Result<()> {
+        let pixels = |side: f64| side as usize * PNG_SCALE as usize;
+        let columns = pixels(plot.width);
+        let cells = self.averaged(columns, pixels(plot.height));
+        surface.image(plot, columns, &cells, true)
     }
 }

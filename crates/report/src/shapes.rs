@@ -1,55 +1,36 @@
 //! Plane curves, filled or outlined, at equal aspect: zero level sets as small multiples.
 
-use plotters_backend::text_anchor::HPos;
 use srgb::Rgb;
 
-use crate::axes::{Margins, draw_lines, title_height};
-use crate::colour::{Colour, INK, WHITE};
+use crate::axes::Margins;
+use crate::axis::Window;
+use crate::colour::Colour;
 use crate::error::{Error, Result};
-use crate::geom::{Point, Rect, clip_loop, clip_polyline, point, thin};
-use crate::legend::{LegendEntry, Sample};
-use crate::panel::{Context, Drawable, Spot, Window};
+use crate::geom::{Point, Rect, clip_loop, clip_polyline, thin};
+use crate::panel::Drawable;
 use crate::style::LineStyle;
-use crate::surface::{Surface, outline, stroke_dashed};
+use crate::surface::Surface;
 
-/// A set of polylines drawn alike, such as all components of one zero level set.
+/// Closed polylines drawn alike, such as all components of one zero level set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// Polylines as lists of `[x, y]`, `y` pointing up. The end need not repeat the start.
-    pub loops: Vec<Vec<[f64; 2]>>,
-    /// Whether the ends of each polyline are joined. Only closed curves are filled.
-    pub closed: bool,
-    /// Colour of the outline.
-    pub colour: Colour,
-    /// Line style of the outline; [`LineStyle::None`] leaves it out.
-    pub style: LineStyle,
-    /// Width of the outline in layout units.
-    pub width: f64,
-    /// Colour of the region inside an odd number of the polylines, if it is to be filled.
-    pub fill: Option<Colour>,
-    /// Legend label; empty keeps it out of the legend.
-    pub label: String,
+    loops: Vec<Vec<[f64; 2]>>,
+    colour: Colour,
+    style: LineStyle,
+    width: f64,
+    fill: Option<Colour>,
 }
 
 impl Curve {
-    /// A closed, solid outline in near-black.
+    /// A solid outline in near-black along polylines `[x, y]`, `y` pointing up, whose ends are joined.
     pub fn new(loops: impl Into<Vec<Vec<[f64; 2]>>>) -> Self {
         Self {
             loops: loops.into(),
-            closed: true,
             colour: Colour::Black,
             style: LineStyle::Solid,
             width: 1.6,
             fill: None,
-            label: String::new(),
         }
-    }
-
-    /// Leaves the ends of the polylines apart.
-    #[must_use]
-    pub fn open(mut self) -> Self {
-        self.closed = false;
-        self
     }
 
     /// Sets the colour of the outline.
@@ -59,7 +40,7 @@ impl Curve {
         self
     }
 
-    /// Sets the line style of the outline.
+    /// Sets the line style of the outline; [`LineStyle::None`] leaves it out.
     #[must_use]
     pub fn with_style(mut self, style: LineStyle) -> Self {
         self.style = style;
@@ -73,72 +54,36 @@ impl Curve {
         self
     }
 
-    /// Fills the inside.
+    /// Fills the region inside an odd number of the polylines.
     #[must_use]
     pub fn filled(mut self, colour: impl Into<Colour>) -> Self {
         self.fill = Some(colour.into());
         self
     }
 
-    /// Names the curve in the legend.
-    #[must_use]
-    pub fn with_label(mut self, label: impl Into<String>) -> Self {
-        self.label = label.into();
-        self
-    }
-
-    /// Finite points only, with the first repeated at the end of closed curves.
-    pub(crate) fn closed_loops(&self) -> impl Iterator<Item = Vec<[f64; 2]>> {
-        self.loops.iter().map(|ring| {
-            let mut points: Vec<[f64; 2]> = ring
-                .iter()
-                .copied()
-                .filter(|p| p.iter().all(|c| c.is_finite()))
-                .collect();
-            if self.closed && points.len() > 2 && points.first() != points.last() {
-                points.push(points[0]);
-            }
-            points
-        })
-    }
-
-    pub(crate) fn legend_entry(&self) -> Option<LegendEntry> {
-        if self.label.is_empty() {
-            return None;
-        }
-        let line = LegendEntry {
-            label: self.label.clone(),
-            colour: self.colour,
-            sample: Sample::Line(self.style, None),
-        };
-        Some(match (self.fill, self.style) {
-            (Some(fill), LineStyle::None) => LegendEntry::patch(self.label.clone(), fill),
-            _ => line,
-        })
+    /// Finite points only.
+    fn finite(&self) -> impl Iterator<Item = Vec<[f64; 2]>> {
+        let finite = |p: &&[f64; 2]| p.iter().all(|c| c.is_finite());
+        let rings = self.loops.iter();
+        rings.map(move |ring| ring.iter().filter(finite).copied().collect())
     }
 }
 
-/// A panel of plane curves.
+/// A panel of plane curves, later ones on top, with a caption above.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shapes {
-    /// Caption above the drawing; may be empty.
-    pub caption: String,
-    /// Curves, later ones on top. A panel without curves stays empty.
-    pub curves: Vec<Curve>,
-    /// What to show; `None` shows all curves of all such panels in the figure at one scale.
-    pub window: Option<Window>,
-    /// Whether a thin frame is drawn around the window.
-    pub frame: bool,
+    pub(crate) caption: String,
+    curves: Vec<Curve>,
+    window: Option<[[f64; 2]; 2]>,
 }
 
 impl Shapes {
-    /// A framed panel showing all of its curves.
+    /// A panel showing all of its curves.
     pub fn new(caption: impl Into<String>) -> Self {
         Self {
             caption: caption.into(),
             curves: Vec::new(),
             window: None,
-            frame: true,
         }
     }
 
@@ -149,123 +94,77 @@ impl Shapes {
         self
     }
 
-    /// Fixes what is shown.
+    /// Fixes the ends of what is shown. Panels to be compared need the same.
     #[must_use]
     pub fn with_window(mut self, x: [f64; 2], y: [f64; 2]) -> Self {
-        self.window = Some(Window { x, y });
+        self.window = Some([x, y]);
         self
     }
 
-    /// Leaves the frame out.
-    #[must_use]
-    pub fn without_frame(mut self) -> Self {
-        self.frame = false;
-        self
-    }
-
-    /// The smallest window around all finite points.
-    fn bounds(&self) -> Option<Window> {
-        let points = self.curves.iter().flat_map(Curve::closed_loops).flatten();
-        points
-            .map(|[x, y]| Window {
-                x: [x, x],
-                y: [y, y],
-            })
-            .reduce(Window::union)
-    }
-
-    /// The common window of all panels that do not fix their own, with a margin.
-    pub(crate) fn common_window<'a>(panels: impl Iterator<Item = &'a Self>) -> Option<Window> {
-        let bounds = panels
-            .filter(|p| p.window.is_none())
-            .filter_map(Self::bounds)
-            .reduce(Window::union)?;
-        let longest = (bounds.x[1] - bounds.x[0]).max(bounds.y[1] - bounds.y[0]);
+    /// The window around all finite points, with a margin.
+    fn bounds(&self) -> Result<[[f64; 2]; 2]> {
+        let points = self.curves.iter().flat_map(Curve::finite).flatten();
+        let join = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        let bounds = points
+            .map(|point| point.map(|c| [c, c]))
+            .reduce(|a, b| [join(a[0], b[0]), join(a[1], b[1])]);
+        let chart = self.caption.clone();
+        let bounds = bounds.ok_or(Error::Empty { chart })?;
+        let [width, height] = bounds.map(|[low, high]| high - low);
+        let longest = width.max(height);
         let margin = if longest > 0.0 { 0.06 * longest } else { 1.0 };
-        let grow = |[low, high]: [f64; 2]| [low - margin, high + margin];
-        Some(Window {
-            x: grow(bounds.x),
-            y: grow(bounds.y),
-        })
+        Ok(bounds.map(|[low, high]| [low - margin, high + margin]))
     }
 
-    fn window(&self, context: &Context) -> Result<Window> {
-        let window = self.window.or(context.window);
-        window
-            .ok_or_else(|| Error::Empty {
-                chart: self.caption.clone(),
-            })?
-            .checked()
+    /// The curves with the window they are seen through.
+    pub(crate) fn checked(&self) -> Result<Seen<'_>> {
+        let window = self.window.map_or_else(|| self.bounds(), Ok)?;
+        let window = Window::linear(["x", "y"], window)?;
+        Ok(Seen {
+            shapes: self,
+            window,
+        })
     }
 }
 
-impl Drawable for Shapes {
-    fn legend(&self) -> Vec<Vec<LegendEntry>> {
-        vec![self.curves.iter().filter_map(Curve::legend_entry).collect()]
+/// Curves with the window they are seen through.
+pub(crate) struct Seen<'a> {
+    shapes: &'a Shapes,
+    window: Window,
+}
+
+impl Drawable for Seen<'_> {
+    fn aspect(&self) -> Option<f64> {
+        Some(self.window.aspect())
     }
 
-    fn aspect(&self, context: &Context) -> Result<Option<f64>> {
-        Ok(Some(self.window(context)?.aspect()))
+    fn margins(&self, _: f64, _: f64) -> Margins {
+        Margins::even(1.0)
     }
 
-    fn margins(&self, context: &Context, _: Spot, _: f64, _: f64) -> Result<Margins> {
-        let top = title_height(&self.caption, context.fonts.label, context.cell_width);
-        Ok(Margins {
-            left: 1.0,
-            right: 1.0,
-            top: top + 1.0,
-            bottom: 1.0,
-        })
-    }
-
-    fn draw(
-        &self,
-        context: &Context,
-        surface: &mut dyn Surface,
-        _: Spot,
-        plot: Rect,
-        outer: Rect,
-    ) -> Result<()> {
-        let window = self.window(context)?;
-        // Far outside points are pulled in, or their coordinates overflow later on.
-        let fraction =
-            |value: f64, [low, high]: [f64; 2]| ((value - low) / (high - low)).clamp(-1e4, 1e4);
-        let place = |[x, y]: [f64; 2]| -> Point {
-            point(
-                plot.x + fraction(x, window.x) * plot.width,
-                plot.bottom() - fraction(y, window.y) * plot.height,
-            )
-        };
-        surface.rect(plot, WHITE)?;
-        for curve in &self.curves {
-            let placed: Vec<Vec<Point>> = curve
-                .closed_loops()
-                .map(|ring| thin(&ring.into_iter().map(place).collect::<Vec<_>>(), 0.2))
-                .collect();
-            if let Some(fill) = curve.fill.filter(|_| curve.closed) {
-                let inside: Vec<Vec<Point>> =
-                    placed.iter().map(|ring| clip_loop(ring, &plot)).collect();
+    fn draw(&self, surface: &mut dyn Surface, plot: Rect) -> Result<()> {
+        for curve in &self.shapes.curves {
+            let place = |ring: Vec<[f64; 2]>| -> Vec<Point> {
+                let placed: Vec<Point> =
+                    ring.iter().map(|&p| self.window.place(&plot, p)).collect();
+                thin(&placed, 0.2)
+            };
+            let placed: Vec<Vec<Point>> = curve.finite().map(place).collect();
+            if let Some(fill) = curve.fill {
+                let inside: Vec<_> = placed.iter().map(|ring| clip_loop(ring, &plot)).collect();
                 surface.fill(&inside, fill.rgb())?;
             }
-            if curve.style != LineStyle::None {
-                for piece in placed.iter().flat_map(|ring| clip_polyline(ring, &plot)) {
-                    let (width, pattern) = (curve.width, curve.style.pattern());
-                    stroke_dashed(surface, &piece, width, curve.colour.rgb(), pattern)?;
+            if curve.style == LineStyle::None {
+                continue;
+            }
+            let (colour, pattern) = (curve.colour.rgb(), curve.style.pattern());
+            for mut ring in placed {
+                ring.extend(ring.first().copied());
+                for piece in clip_polyline(&ring, &plot) {
+                    surface.dashed(&piece, curve.width, colour, pattern)?;
                 }
             }
         }
-        if self.frame {
-            outline(surface, plot, 1.0, Rgb(170, 170, 170))?;
-        }
-        let em = context.fonts.label;
-        let at = (plot.centre().x, outer.y);
-        draw_lines(
-            surface,
-            &self.caption,
-            (em, INK),
-            HPos::Center,
-            at,
-            context.cell_width,
-        )
+        surface.outline(plot, Rgb(170, 170, 170))
     }
 }

@@ -2,6 +2,7 @@
 
 use srgb::Rgb;
 
+use crate::colour::WHITE;
 use crate::error::Result;
 use crate::geom::{Point, point};
 use crate::surface::{Surface, disc};
@@ -14,16 +15,14 @@ pub enum LineStyle {
     Solid,
     /// Long dashes.
     Dashed,
+    /// Short dashes.
+    ShortDashed,
     /// Dots.
     Dotted,
     /// Dashes and dots in turn.
     DashDot,
     /// Dashes, each followed by two dots.
     DashDotDot,
-    /// Short dashes.
-    ShortDashed,
-    /// Dots far apart.
-    WideDotted,
     /// No line: only the markers are drawn.
     None,
 }
@@ -34,11 +33,10 @@ impl LineStyle {
         match self {
             Self::Solid | Self::None => &[],
             Self::Dashed => &[8.5, 4.5],
+            Self::ShortDashed => &[4.6, 3.2],
             Self::Dotted => &[2.2, 3.2],
             Self::DashDot => &[9.0, 3.5, 2.2, 3.5],
             Self::DashDotDot => &[9.0, 3.2, 2.2, 3.2, 2.2, 3.2],
-            Self::ShortDashed => &[4.6, 3.2],
-            Self::WideDotted => &[2.2, 7.5],
         }
     }
 }
@@ -54,15 +52,7 @@ pub enum Marker {
     Diamond,
     /// A triangle pointing up.
     Triangle,
-    /// Two crossing strokes.
-    Cross,
 }
-
-/// Half the size of a marker.
-pub(crate) const MARKER_RADIUS: f64 = 3.8;
-
-/// Width of data curves.
-pub(crate) const CURVE_WIDTH: f64 = 2.0;
 
 /// Draws one marker with a thin white rim, so that it stands out from its curve.
 pub(crate) fn draw_marker(
@@ -71,33 +61,23 @@ pub(crate) fn draw_marker(
     at: Point,
     colour: Rgb,
 ) -> Result<()> {
-    if marker == Marker::Cross {
-        let r = 0.85 * MARKER_RADIUS;
-        for s in [-1.0, 1.0] {
-            let ends = [point(at.x - r, at.y - s * r), point(at.x + r, at.y + s * r)];
-            surface.stroke(&ends, 1.8, colour)?;
-        }
-        return Ok(());
+    const RADIUS: f64 = 3.8;
+    for (r, colour) in [(RADIUS + 1.0, WHITE), (RADIUS, colour)] {
+        let corners = |list: &[(f64, f64)]| -> Vec<Point> {
+            let corner = |&(x, y)| point(at.x + x * r, at.y + y * r);
+            list.iter().map(corner).collect()
+        };
+        let symbol = match marker {
+            Marker::Circle => disc(at, r),
+            Marker::Square => {
+                corners(&[(-0.88, -0.88), (0.88, -0.88), (0.88, 0.88), (-0.88, 0.88)])
+            }
+            Marker::Diamond => corners(&[(0.0, -1.2), (1.2, 0.0), (0.0, 1.2), (-1.2, 0.0)]),
+            Marker::Triangle => corners(&[(0.0, -1.15), (1.1, 0.8), (-1.1, 0.8)]),
+        };
+        surface.fill(&[symbol], colour)?;
     }
-    surface.fill(
-        &[symbol(marker, at, MARKER_RADIUS + 1.0)],
-        crate::colour::WHITE,
-    )?;
-    surface.fill(&[symbol(marker, at, MARKER_RADIUS)], colour)
-}
-
-fn symbol(marker: Marker, at: Point, r: f64) -> Vec<Point> {
-    let corners = |list: &[(f64, f64)]| {
-        list.iter()
-            .map(|&(x, y)| point(at.x + x * r, at.y + y * r))
-            .collect()
-    };
-    match marker {
-        Marker::Circle => disc(at, r),
-        Marker::Square => corners(&[(-0.88, -0.88), (0.88, -0.88), (0.88, 0.88), (-0.88, 0.88)]),
-        Marker::Diamond => corners(&[(0.0, -1.2), (1.2, 0.0), (0.0, 1.2), (-1.2, 0.0)]),
-        Marker::Triangle | Marker::Cross => corners(&[(0.0, -1.15), (1.1, 0.8), (-1.1, 0.8)]),
-    }
+    Ok(())
 }
 
 /// Letter sizes (em, in layout units) of one figure.
@@ -129,6 +109,3 @@ impl Fonts {
         }
     }
 }
-
-/// Distance from one line of text to the next, in em.
-pub(crate) const LEADING: f64 = 1.35;

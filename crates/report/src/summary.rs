@@ -12,8 +12,8 @@ use crate::output::OutputDir;
 /// Metric names and their values, sorted by name.
 ///
 /// Names are lower-case words of ASCII letters, digits and `_` (not at their start), the first one starting with a letter, joined by
-/// `.`, such as `circle.error_l2`. Values are finite. The same content gives the same bytes: floats
-/// are written with the fewest digits that read back exactly.
+/// `.`, such as `circle.error_l2`. Values are finite. The same content gives the same bytes: floats have the fewest digits that read
+/// back exactly.
 ///
 /// ```
 /// let mut summary = report::Summary::new();
@@ -51,19 +51,6 @@ impl Summary {
 
     /// Adds the numbers of a record as `<prefix>.<field>`. Fields that hold text, lists or records are left out.
     ///
-    /// ```
-    /// #[derive(serde::Serialize)]
-    /// struct Circle {
-    ///     name: &'static str,
-    ///     radius: f64,
-    ///     steps: usize,
-    /// }
-    /// let mut summary = report::Summary::new();
-    /// summary.insert_record("circle", &Circle { name: "first", radius: 0.5, steps: 17 })?;
-    /// assert_eq!(summary.to_json(), "{\n  \"circle.radius\": 0.5,\n  \"circle.steps\": 17\n}\n");
-    /// # Ok::<(), report::Error>(())
-    /// ```
-    ///
     /// # Errors
     ///
     /// [`Error::NotFinite`] for a field that is NaN, infinite or missing; [`Error::Json`] for what is no record; as
@@ -71,10 +58,7 @@ impl Summary {
     pub fn insert_record(&mut self, prefix: &str, record: &impl Serialize) -> Result<()> {
         let fields: Map<String, Value> = serde_json::to_value(record)
             .and_then(serde_json::from_value)
-            .map_err(|source| Error::Json {
-                what: format!("the record {prefix:?}"),
-                source,
-            })?;
+            .map_err(Error::json(format!("the record {prefix:?}")))?;
         for (field, value) in fields {
             let name = format!("{prefix}.{field}");
             match value {
@@ -115,27 +99,9 @@ impl Summary {
         self.metrics.get(name).and_then(Number::as_f64)
     }
 
-    /// All metrics in order of their names.
-    pub fn iter(&self) -> impl Iterator<Item = (&str, f64)> {
-        self.metrics
-            .iter()
-            .filter_map(|(name, number)| Some((name.as_str(), number.as_f64()?)))
-    }
-
     /// The summary as indented JSON with sorted keys and a final newline.
     pub fn to_json(&self) -> String {
-        let mut text = String::from("{");
-        for (k, (name, number)) in self.metrics.iter().enumerate() {
-            let comma = if k == 0 { "" } else { "," };
-            // Names need no escaping: their grammar allows nothing special.
-            text.extend([comma, "\n  \"", name, "\": ", &number.to_string()]);
-        }
-        text.push_str(if self.metrics.is_empty() {
-            "}\n"
-        } else {
-            "\n}\n"
-        });
-        text
+        crate::data::to_json(&self.metrics).expect("the keys are text")
     }
 
     /// Reads what [`Summary::to_json`] wrote.
@@ -146,10 +112,7 @@ impl Summary {
     /// not allowed.
     pub fn from_json(text: &str) -> Result<Self> {
         let numbers: BTreeMap<String, Number> =
-            serde_json::from_str(text).map_err(|source| Error::Json {
-                what: "the summary".to_owned(),
-                source,
-            })?;
+            serde_json::from_str(text).map_err(Error::json("the summary"))?;
         let mut summary = Self::new();
         for (name, number) in numbers {
             summary.add(&name, number)?;
@@ -161,7 +124,7 @@ impl Summary {
     ///
     /// # Errors
     ///
-    /// [`Error::Write`].
+    /// [`Error::File`].
     pub fn write(&self, folder: &OutputDir) -> Result<PathBuf> {
         folder.write("summary.json", self.to_json())
     }
@@ -191,6 +154,33 @@ mod tests {
             assert!(error.to_string().contains("\"torus.energy\""), "{error}");
         }
         assert_eq!(summary, Summary::new());
+    }
+
+    #[test]
+    fn the_numbers_of_a_record_are_metrics() {
+        #[derive(Serialize)]
+        struct Circle {
+            name: &'static str,
+            radius: f64,
+            steps: usize,
+        }
+        let circle = |radius| Circle {
+            name: "first",
+            radius,
+            steps: 17,
+        };
+        let mut summary = Summary::new();
+        summary.insert_record("circle", &circle(0.5)).unwrap();
+        let expected = "{\n  \"circle.radius\": 0.5,\n  \"circle.steps\": 17\n}\n";
+        assert_eq!(summary.to_json(), expected);
+        let error = summary
+            .insert_record("other", &circle(f64::NAN))
+            .unwrap_err();
+        assert!(error.to_string().contains("\"other.radius\""), "{error}");
+        assert!(matches!(
+            summary.insert_record("no", &[1, 2]).unwrap_err(),
+            Error::Json { .. }
+        ));
     }
 
     #[test]
@@ -227,7 +217,7 @@ mod tests {
             backwards.insert(name, value).unwrap();
         }
         assert_eq!(forwards.to_json(), backwards.to_json());
-        let keys: Vec<&str> = forwards.iter().map(|(name, _)| name).collect();
+        let keys: Vec<&String> = forwards.metrics.keys().collect();
         assert_eq!(keys, ["a", "b.one", "b.two"]);
         assert!(serde_json::from_str::<serde_json::Value>(&Summary::new().to_json()).is_ok());
     }

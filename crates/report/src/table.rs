@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use serde_json::{Map, Value};
+use serde::Serialize;
+use serde_json::{Map, Value, json};
 
 use crate::axis::power_of_ten;
 use crate::error::{Error, Result};
@@ -11,44 +12,17 @@ use crate::output::OutputDir;
 /// How Markdown shows the numbers of a column. CSV always carries all digits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// Text, aligned left.
-    Text,
     /// The fewest digits that read back exactly.
     Shortest,
     /// This many decimals.
     Fixed(usize),
     /// One digit before and this many after the point, times a power of ten: `1.25·10⁻³`.
     Scientific(usize),
-    /// A fraction as per cent with this many decimals: 0.125 is `12.5 %`.
-    Percent(usize),
-}
-
-/// Head of a column.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Column {
-    /// Name, with its unit or scaling.
-    pub name: String,
-    /// How numbers are shown.
-    pub format: Format,
-}
-
-impl Column {
-    /// A column of text.
-    pub fn text(name: impl Into<String>) -> Self {
-        Self::number(name, Format::Text)
-    }
-
-    /// A column of numbers.
-    pub fn number(name: impl Into<String>, format: Format) -> Self {
-        Self {
-            name: name.into(),
-            format,
-        }
-    }
 }
 
 /// One cell.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
 pub enum Cell {
     /// Text, whatever the format of the column.
     Text(String),
@@ -66,21 +40,9 @@ impl From<&str> for Cell {
     }
 }
 
-impl From<String> for Cell {
-    fn from(text: String) -> Self {
-        Self::Text(text)
-    }
-}
-
 impl From<f64> for Cell {
     fn from(number: f64) -> Self {
         Self::Number(number)
-    }
-}
-
-impl From<i64> for Cell {
-    fn from(number: i64) -> Self {
-        Self::Integer(number)
     }
 }
 
@@ -96,17 +58,38 @@ impl<C: Into<Cell>> From<Option<C>> for Cell {
     }
 }
 
+impl Cell {
+    /// With all digits, as CSV has it.
+    fn whole(&self) -> String {
+        match self {
+            Self::Text(text) => text.clone(),
+            Self::Integer(number) => number.to_string(),
+            Self::Number(number) => crate::data::shortest(*number),
+            Self::Missing => String::new(),
+        }
+    }
+
+    /// As Markdown has it.
+    fn shown(&self, format: Option<Format>) -> String {
+        match (self, format) {
+            (Self::Missing, _) => "–".to_owned(),
+            (Self::Number(number), Some(Format::Fixed(decimals))) => format!("{number:.decimals$}"),
+            (Self::Number(number), Some(Format::Scientific(decimals))) => {
+                scientific(*number, decimals)
+            }
+            _ => escaped(&self.whole()),
+        }
+    }
+}
+
+/// Name of a column with its unit or scaling, and how its numbers are shown; without a format it is text.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Column {
+    name: String,
+    format: Option<Format>,
+}
+
 /// A table with typed columns.
-///
-/// ```
-/// use report::{Column, Format, Table};
-/// let mut table =
-///     Table::new([Column::text("method"), Column::number("error", Format::Scientific(1))]);
-/// table.push(["implicit".into(), 1.25e-3.into()])?;
-/// assert_eq!(table.to_csv()?, "method,error\nimplicit,0.00125\n");
-/// assert!(table.to_markdown().contains("| implicit | 1.3·10⁻³ |"));
-/// # Ok::<(), report::Error>(())
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     columns: Vec<Column>,
@@ -114,18 +97,16 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table without rows.
-    pub fn new(columns: impl IntoIterator<Item = Column>) -> Self {
-        Self {
-            columns: columns.into_iter().collect(),
-            rows: Vec::new(),
-        }
-    }
-
     /// A table without rows for programs, who want all digits.
     pub fn data<'a>(names: impl IntoIterator<Item = &'a &'a str>) -> Self {
-        let column = |name: &&str| Column::number(*name, Format::Shortest);
-        Self::new(names.into_iter().map(column))
+        let column = |name: &&str| Column {
+            name: (*name).to_owned(),
+            format: Some(Format::Shortest),
+        };
+        Self {
+            columns: names.into_iter().map(column).collect(),
+            rows: Vec::new(),
+        }
     }
 
     /// Starts a table with a row for every record.
@@ -141,11 +122,9 @@ impl Table {
     /// # Ok::<(), report::Error>(())
     /// ```
     pub fn of<R>(records: &[R]) -> Tabulated<'_, R> {
-        Tabulated {
-            records,
-            columns: Vec::new(),
-            rows: records.iter().map(|_| Vec::new()).collect(),
-        }
+        let mut table = Self::data(&[]);
+        table.rows = records.iter().map(|_| Vec::new()).collect();
+        Tabulated { records, table }
     }
 
     /// Adds a row.
@@ -154,17 +133,24 @@ impl Table {
     ///
     /// [`Error::RowLength`], or [`Error::NotFinite`] naming column and row.
     pub fn push(&mut self, cells: impl IntoIterator<Item = Cell>) -> Result<()> {
-        let cells: Vec<Cell> = cells.into_iter().collect();
-        let row = self.rows.len();
-        if cells.len() != self.columns.len() {
-            let (expected, found) = (self.columns.len(), cells.len());
+        self.rows.push(cells.into_iter().collect());
+        let checked = self.check(self.rows.len() - 1);
+        if checked.is_err() {
+            self.rows.pop();
+        }
+        checked
+    }
+
+    fn check(&self, row: usize) -> Result<()> {
+        let (found, expected) = (self.rows[row].len(), self.columns.len());
+        if found != expected {
             return Err(Error::RowLength {
                 row,
                 expected,
                 found,
             });
         }
-        for (cell, column) in cells.iter().zip(&self.columns) {
+        for (cell, column) in self.rows[row].iter().zip(&self.columns) {
             match *cell {
                 Cell::Number(value) if !value.is_finite() => {
                     let what = format!("column {:?} of table row {row}", column.name);
@@ -173,18 +159,12 @@ impl Table {
                 _ => {}
             }
         }
-        self.rows.push(cells);
         Ok(())
     }
 
-    /// The heads of the columns.
-    pub fn columns(&self) -> &[Column] {
-        &self.columns
-    }
-
-    /// The rows.
-    pub fn rows(&self) -> &[Vec<Cell>] {
-        &self.rows
+    /// The names of the columns.
+    pub fn columns(&self) -> impl ExactSizeIterator<Item = &str> {
+        self.columns.iter().map(|column| column.name.as_str())
     }
 
     /// The table as CSV (RFC 4180 quoting, line feeds), numbers with all their digits.
@@ -194,14 +174,9 @@ impl Table {
     /// [`Error::Csv`] if the table has no columns.
     pub fn to_csv(&self) -> Result<String> {
         let mut writer = csv::Writer::from_writer(Vec::new());
-        writer.write_record(self.columns.iter().map(|column| column.name.as_str()))?;
+        writer.write_record(self.columns())?;
         for row in &self.rows {
-            writer.write_record(row.iter().map(|cell| match cell {
-                Cell::Text(text) => text.clone(),
-                Cell::Integer(number) => number.to_string(),
-                Cell::Number(number) => crate::data::shortest(*number),
-                Cell::Missing => String::new(),
-            }))?;
+            writer.write_record(row.iter().map(Cell::whole))?;
         }
         crate::data::finished(writer)
     }
@@ -212,78 +187,54 @@ impl Table {
     ///
     /// [`Error::Json`] never, for finite numbers.
     pub fn to_json(&self) -> Result<String> {
-        let value = |cell: &Cell| match cell {
-            Cell::Text(text) => Value::from(text.as_str()),
-            Cell::Integer(number) => Value::from(*number),
-            Cell::Number(number) => Value::from(*number),
-            Cell::Missing => Value::Null,
-        };
         let object = |row: &Vec<Cell>| -> Map<String, Value> {
-            let names = self.columns.iter().map(|column| column.name.clone());
-            names.zip(row.iter().map(value)).collect()
+            let names = self.columns().map(str::to_owned);
+            names.zip(row.iter().map(|cell| json!(cell))).collect()
         };
         crate::data::to_json(&self.rows.iter().map(object).collect::<Vec<_>>())
     }
 
     /// The table as Markdown with padded columns, numbers as their columns say.
     pub fn to_markdown(&self) -> String {
-        let heads = self
-            .columns
-            .iter()
-            .map(|column| escaped(&column.name))
-            .collect();
-        let body = self.rows.iter().map(|row| {
-            row.iter()
-                .zip(&self.columns)
-                .map(|(cell, c)| shown(cell, c.format))
-                .collect()
-        });
-        let lines: Vec<Vec<String>> = std::iter::once(heads).chain(body).collect();
-        let widths: Vec<usize> = (0..self.columns.len())
-            .map(|k| {
-                lines
-                    .iter()
-                    .map(|line| line[k].chars().count())
-                    .fold(3, usize::max)
+        // Every column with its width, its cells padded to it.
+        let columns: Vec<(usize, Vec<String>)> = (self.columns.iter().enumerate())
+            .map(|(k, column)| {
+                let cells = self.rows.iter().map(|row| row[k].shown(column.format));
+                let cells: Vec<String> = [escaped(&column.name)].into_iter().chain(cells).collect();
+                let lengths = cells.iter().map(|cell| cell.chars().count());
+                let width = lengths.fold(3, usize::max);
+                let padded = |cell: &String| match column.format {
+                    None => format!("{cell:<width$}"),
+                    Some(_) => format!("{cell:>width$}"),
+                };
+                (width, cells.iter().map(padded).collect())
             })
             .collect();
-        let mut text = String::new();
-        for (number, line) in lines.iter().enumerate() {
-            for ((cell, &width), column) in line.iter().zip(&widths).zip(&self.columns) {
-                let padded = if column.format == Format::Text {
-                    format!("| {cell:<width$} ")
-                } else {
-                    format!("| {cell:>width$} ")
-                };
-                text.push_str(&padded);
-            }
-            text.push_str("|\n");
-            if number == 0 {
-                for (&width, column) in widths.iter().zip(&self.columns) {
-                    let rule = "-".repeat(width);
-                    text.push_str(if column.format == Format::Text {
-                        "|:"
-                    } else {
-                        "|-"
-                    });
-                    text.push_str(&rule);
-                    text.push(if column.format == Format::Text {
-                        '-'
-                    } else {
-                        ':'
-                    });
+        let line = |number: usize| -> String {
+            let cells = columns
+                .iter()
+                .map(|(_, cells)| format!("| {} ", cells[number]));
+            cells.collect::<String>() + "|\n"
+        };
+        let rules = columns
+            .iter()
+            .zip(&self.columns)
+            .map(|((width, _), column)| {
+                let rule = "-".repeat(*width);
+                match column.format {
+                    None => format!("|:{rule}-"),
+                    Some(_) => format!("|-{rule}:"),
                 }
-                text.push_str("|\n");
-            }
-        }
-        text
+            });
+        let body: String = (1..=self.rows.len()).map(line).collect();
+        format!("{}{}|\n{body}", line(0), rules.collect::<String>())
     }
 
     /// Writes `<stem>.csv` and `<stem>.md`.
     ///
     /// # Errors
     ///
-    /// As [`Table::to_csv`], or [`Error::Write`].
+    /// As [`Table::to_csv`], or [`Error::File`].
     pub fn write(&self, folder: &OutputDir, stem: &str) -> Result<[PathBuf; 2]> {
         Ok([
             folder.write(&format!("{stem}.csv"), self.to_csv()?)?,
@@ -297,8 +248,7 @@ impl Table {
 #[must_use]
 pub struct Tabulated<'a, R> {
     records: &'a [R],
-    columns: Vec<Column>,
-    rows: Vec<Vec<Cell>>,
+    table: Table,
 }
 
 impl<'a, R> Tabulated<'a, R> {
@@ -308,21 +258,28 @@ impl<'a, R> Tabulated<'a, R> {
         name: impl Into<String>,
         value: impl Fn(&'a R) -> S,
     ) -> Self {
-        self.number(name, Format::Text, |record| {
-            Cell::Text(value(record).into())
-        })
+        self.column(name.into(), None, |record| Cell::Text(value(record).into()))
     }
 
     /// Adds a column of numbers.
     pub fn number<C: Into<Cell>>(
-        mut self,
+        self,
         name: impl Into<String>,
         format: Format,
         value: impl Fn(&'a R) -> C,
     ) -> Self {
-        self.columns.push(Column::number(name, format));
-        for (row, record) in self.rows.iter_mut().zip(self.records) {
-            row.push(value(record).into());
+        self.column(name.into(), Some(format), |record| value(record).into())
+    }
+
+    fn column(
+        mut self,
+        name: String,
+        format: Option<Format>,
+        cell: impl Fn(&'a R) -> Cell,
+    ) -> Self {
+        self.table.columns.push(Column { name, format });
+        for (row, record) in self.table.rows.iter_mut().zip(self.records) {
+            row.push(cell(record));
         }
         self
     }
@@ -333,9 +290,8 @@ impl<'a, R> Tabulated<'a, R> {
     ///
     /// As [`Table::push`].
     pub fn finish(self) -> Result<Table> {
-        let mut table = Table::new(self.columns);
-        self.rows.into_iter().try_for_each(|row| table.push(row))?;
-        Ok(table)
+        (0..self.records.len()).try_for_each(|row| self.table.check(row))?;
+        Ok(self.table)
     }
 }
 
@@ -346,28 +302,15 @@ fn escaped(text: &str) -> String {
         .replace(['\n', '\r'], " ")
 }
 
-fn shown(cell: &Cell, format: Format) -> String {
-    match cell {
-        Cell::Text(text) => escaped(text),
-        Cell::Integer(number) => number.to_string(),
-        Cell::Missing => "–".to_owned(),
-        Cell::Number(number) => match format {
-            Format::Text | Format::Shortest => crate::data::shortest(*number),
-            Format::Fixed(decimals) => format!("{number:.decimals$}"),
-            Format::Scientific(decimals) => scientific(*number, decimals),
-            Format::Percent(decimals) => format!("{:.decimals$} %", 100.0 * number),
-        },
-    }
-}
-
 /// `1.25·10⁻³`; plain where the power is 10⁰.
 fn scientific(number: f64, decimals: usize) -> String {
     let text = format!("{number:.decimals$e}");
     match text.split_once('e') {
-        Some((mantissa, exponent)) => match exponent.parse() {
-            Ok(0) | Err(_) => mantissa.to_owned(),
-            Ok(exponent) => format!("{mantissa}·{}", power_of_ten(exponent)),
-        },
+        Some((mantissa, "0")) => mantissa.to_owned(),
+        Some((mantissa, power)) => {
+            let power = power.parse().expect("the exponent is an integer");
+            format!("{mantissa}·{}", power_of_ten(power))
+        }
         None => text,
     }
 }
@@ -377,30 +320,17 @@ mod tests {
     use super::*;
 
     fn example() -> Table {
-        let mut table = Table::new([
-            Column::text("method"),
-            Column::number("N", Format::Shortest),
-            Column::number("error", Format::Scientific(2)),
-            Column::number("share", Format::Percent(1)),
-        ]);
-        let number = 1.0 / 3.0;
-        table
-            .push([
-                "a|b, \"c\"".into(),
-                128_usize.into(),
-                1.2345e-6.into(),
-                number.into(),
-            ])
-            .unwrap();
-        table
-            .push([
-                "plain".into(),
-                64_usize.into(),
-                None::<f64>.into(),
-                1.0.into(),
-            ])
-            .unwrap();
-        table
+        let rows = [
+            ("a|b, \"c\"", 128_usize, Some(1.2345e-6), 1.0 / 3.0),
+            ("plain", 64, None, 1.0),
+        ];
+        Table::of(&rows)
+            .text("method", |row| row.0)
+            .number("N", Format::Shortest, |row| row.1)
+            .number("error", Format::Scientific(2), |row| row.2)
+            .number("share", Format::Fixed(3), |row| row.3)
+            .finish()
+            .unwrap()
     }
 
     #[test]
@@ -435,7 +365,7 @@ mod tests {
             "{text}"
         );
         assert!(
-            lines[2].contains("33.3 %") && lines[3].contains(" – "),
+            lines[2].contains("0.333") && lines[3].contains(" – "),
             "{text}"
         );
         let widths: Vec<usize> = lines.iter().map(|line| line.chars().count()).collect();
@@ -462,6 +392,6 @@ mod tests {
             error.contains("\"error\"") && error.contains("row 2"),
             "{error}"
         );
-        assert_eq!(table.rows().len(), 2);
+        assert_eq!(table.rows.len(), 2);
     }
 }
