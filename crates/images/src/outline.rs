@@ -175,17 +175,8 @@ impl Outline {
 
     /// The smallest rectangle around all curves.
     pub fn bounding_box(&self) -> BoundingBox<2> {
-        let mut bounds = BoundingBox {
-            lower: [f64::INFINITY; 2],
-            upper: [f64::NEG_INFINITY; 2],
-        };
-        for point in self.curves.iter().flat_map(|curve| &curve.points) {
-            for (axis, &x) in point.iter().enumerate() {
-                bounds.lower[axis] = bounds.lower[axis].min(x);
-                bounds.upper[axis] = bounds.upper[axis].max(x);
-            }
-        }
-        bounds
+        let points = self.curves.iter().flat_map(|curve| &curve.points).copied();
+        BoundingBox::around(points).expect("an outline has curves")
     }
 
     /// The outline in the box of a grid.
