@@ -21,10 +21,14 @@ use crate::own::{Faired, OwnMesh};
 const PIXELS: u32 = 480;
 /// Room around a surface for its flow, as a part of its longest side.
 const ROOM: f64 = 0.06;
-/// Degrees about the vertical axis from which surfaces are seen.
-pub const AZIMUTH: f64 = -60.0;
-/// Degrees above the horizon from which surfaces are seen.
-pub const ELEVATION: f64 = 25.0;
+/// From where surfaces are seen, with this axis pointing up.
+pub fn view(up: UpAxis) -> View {
+    View {
+        up,
+        azimuth: -60.0,
+        elevation: 25.0,
+    }
+}
 
 /// Names of files that hold the shape at the beginning, without their extension.
 pub const START: &str = "start";
@@ -231,11 +235,7 @@ impl Outlet<3> for Space {
     }
 
     fn picture(&self, start: &Field<3>, u: &Field<3>, eps: f64) -> Result<Picture, Error> {
-        let mut scene = Scene::new(u, eps)?.view(View {
-            up: self.up,
-            azimuth: AZIMUTH,
-            elevation: ELEVATION,
-        });
+        let mut scene = Scene::new(u, eps)?.view(view(self.up));
         // Room to grow, and more only for what grows beyond it, so that the pictures of a film do not jump.
         let start = bounding_box(start).map(|bounds| {
             let room = ROOM * bounds.longest_side();

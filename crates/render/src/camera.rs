@@ -36,14 +36,20 @@ impl Default for View {
 }
 
 impl View {
-    /// The directions of the view.
+    /// Accepts finite angles, and elevations from -90 to 90 degrees.
     ///
     /// # Errors
-    /// [`Error::Parameter`] unless the angles are finite and the elevation is from -90 to 90.
-    pub(crate) fn orientation(&self) -> Result<Orientation, Error> {
+    /// [`Error::Parameter`] for others.
+    pub fn check(&self) -> Result<(), Error> {
         require("azimuth", self.azimuth, "finite", |_| true)?;
         let range = "between -90 and 90 degrees";
         require("elevation", self.elevation, range, |v| v.abs() <= 90.0)?;
+        Ok(())
+    }
+
+    /// The directions of the view.
+    pub(crate) fn orientation(&self) -> Result<Orientation, Error> {
+        self.check()?;
         let [up, a, b] = [0, 1, 2].map(|k| DVec3::AXES[(self.up.index() + k) % 3]);
         let (sin_az, cos_az) = self.azimuth.to_radians().sin_cos();
         let (sin_el, cos_el) = self.elevation.to_radians().sin_cos();

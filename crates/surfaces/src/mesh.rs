@@ -37,7 +37,10 @@ impl TriangleMesh {
     }
 
     /// Checks that all numbers are finite and at most `limit`, and all indices in range.
-    pub(crate) fn check(&self, limit: f64) -> Result<(), Error> {
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteVertex`], [`Error::IndexOutOfRange`], [`Error::Normals`].
+    pub fn check(&self, limit: f64) -> Result<(), Error> {
         let count = self.vertices.len();
         let representable = |x: &[f64; 3]| x.iter().all(|v| v.abs() <= limit);
         if let Some(vertex) = self.vertices.iter().position(|x| !representable(x)) {
