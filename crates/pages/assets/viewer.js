@@ -43,6 +43,11 @@ function decodeSurface(block) {
     positions[k] = origin[k % 3] + unit[k % 3] * (bytes[2 * k] | (bytes[2 * k + 1] << 8));
   }
   let at = 2 * positions.length;
+  const given = "normals" in block.dataset;
+  const normals = new Float32Array(positions.length);
+  for (let k = 0; given && k < normals.length; k++, at += 2) {
+    normals[k] = (2 * (bytes[at] | (bytes[at + 1] << 8))) / 65535 - 1;
+  }
   const corners = new Uint32Array(3 * Number(faces));
   let next = 0;
   for (let k = 0; k < corners.length; k++) {
@@ -60,7 +65,7 @@ function decodeSurface(block) {
   if (at !== bytes.length || next !== Number(vertices)) {
     throw new Error("the data of the surface " + block.dataset.label + " are damaged");
   }
-  return { positions, corners, normals: smoothNormals(positions, corners) };
+  return { positions, corners, normals: given ? normals : smoothNormals(positions, corners) };
 }
 
 // Sums over the faces around a vertex; the cross product weighs them by area.

@@ -16,7 +16,7 @@ const LARGEST: f64 = 1e18;
 /// uses are left out.
 ///
 /// The data are the positions, three little-endian 16-bit numbers each in units of `step` from
-/// `low`, and the corners of the faces. A corner is stored as its distance from the lowest
+/// `low`; the normals, if the mesh has them, likewise from -1 to 1; and the corners of the faces. A corner is stored as its distance from the lowest
 /// number not used before, zero for a vertex that appears for the first time; seven bits to a byte,
 /// low ones first, the eighth bit set if more follow. Neighbouring faces share recent vertices,
 /// so most corners take one byte or two.
@@ -27,6 +27,7 @@ pub(crate) struct Surface {
     pub faces: usize,
     pub low: [f64; 3],
     pub high: [f64; 3],
+    pub has_normals: bool,
     pub data: String,
 }
 
@@ -72,6 +73,11 @@ impl Surface {
                 bytes.extend(((part * STEPS).round() as u16).to_le_bytes());
             }
         }
+        if let Some(normals) = &mesh.normals {
+            for value in order.iter().flat_map(|&vertex| normals[vertex]) {
+                bytes.extend(((0.5 * (value + 1.0) * STEPS).round() as u16).to_le_bytes());
+            }
+        }
         bytes.extend(corners);
         Ok(Self {
             label,
@@ -79,6 +85,7 @@ impl Surface {
             faces: mesh.faces.len(),
             low,
             high,
+            has_normals: mesh.normals.is_some(),
             data: STANDARD.encode(bytes),
         })
     }
@@ -105,7 +112,13 @@ mod tests {
     /// As the script of the page does it.
     fn decoded(surface: &Surface) -> TriangleMesh {
         let bytes = STANDARD.decode(&surface.data).unwrap();
-        let (positions, mut rest) = bytes.split_at(6 * surface.vertices);
+        let (positions, rest) = bytes.split_at(6 * surface.vertices);
+        let length = if surface.has_normals {
+            positions.len()
+        } else {
+            0
+        };
+        let (normals, mut rest) = rest.split_at(length);
         let step = surface.step();
         let vertices = positions
             .chunks_exact(6)
@@ -116,6 +129,13 @@ mod tests {
                 })
             })
             .collect();
+        let normals = normals.chunks_exact(6).map(|n| {
+            std::array::from_fn(|i| {
+                let value = u16::from_le_bytes([n[2 * i], n[2 * i + 1]]);
+                2.0 * f64::from(value) / STEPS - 1.0
+            })
+        });
+        let normals: Vec<[f64; 3]> = normals.collect();
         let (mut next, mut corners) = (0, Vec::new());
         while let [_, ..] = rest {
             let (mut distance, mut shift) = (0, 0);
@@ -138,7 +158,7 @@ mod tests {
                 .chunks_exact(3)
                 .map(|f| [f[0], f[1], f[2]])
                 .collect(),
-            normals: None,
+            normals: surface.has_normals.then_some(normals),
         }
     }
 
@@ -174,9 +194,16 @@ mod tests {
         let surface = Surface::new("figure", mesh).unwrap();
         assert!(largest_error(mesh, &surface) <= 0.5 + 1e-6);
         assert_eq!(surface.faces, mesh.faces.len());
-        // In place of 12 bytes for positions and 24 for the corners of two faces.
+        let (back, pairs) = (decoded(&surface), mesh.faces.as_flattened().iter());
+        let (before, after) = (mesh.normals.as_ref().unwrap(), back.normals.unwrap());
+        for (&a, &b) in pairs.zip(back.faces.as_flattened()) {
+            let (n, m) = (before[a as usize], after[b as usize]);
+            let difference = (0..3).map(|i| (n[i] - m[i]).abs()).fold(0.0, f64::max);
+            assert!(difference < 2e-5, "{n:?} {m:?}");
+        }
+        // In place of 12 bytes for positions, 12 for normals, and 24 for the corners of two faces.
         let per_vertex = 0.75 * surface.data.len() as f64 / surface.vertices as f64;
-        assert!(per_vertex < 15.0, "{per_vertex} bytes");
+        assert!(per_vertex < 21.0, "{per_vertex} bytes");
     }
 
     #[test]

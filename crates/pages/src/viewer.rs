@@ -26,8 +26,8 @@ pub struct Viewer {
 impl Viewer {
     /// A viewer of surfaces with a label each. All are seen in one scale and from one direction.
     ///
-    /// Positions are rounded to 1/65535 of the bounding box. Normals are those of the triangles
-    /// around a vertex, weighted by area.
+    /// Positions are rounded to 1/65535 of the bounding box. Where a mesh has no normals, they are
+    /// those of the triangles around a vertex, weighted by area.
     ///
     /// # Errors
     /// [`Error::Empty`] without surfaces or faces, [`Error::Surface`] for meshes that cannot be
@@ -75,7 +75,7 @@ impl Render for Viewer {
                 // No script: a block of data, which browsers neither run nor show.
                 @for surface in &self.surfaces {
                     script type="text/plain" data-label=(surface.label) data-vertices=(surface.vertices)
-                        data-faces=(surface.faces)
+                        data-faces=(surface.faces) data-normals[surface.has_normals]
                         data-low=(listed(surface.low)) data-step=(listed(surface.step())) {
                         (PreEscaped(&surface.data))
                     }

@@ -32,7 +32,7 @@ pub enum Quality {
 impl Quality {
     fn effort(self) -> Effort {
         let [sky, key, pixels] = match self {
-            Self::Draft => [96, 8, 192],
+            Self::Draft => [64, 8, 160],
             Self::Standard => [160, 24, 400],
         };
         Effort { sky, key, pixels }
