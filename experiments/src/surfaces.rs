@@ -2,10 +2,11 @@
 
 use clap::Args;
 use engine::{Samples, Stop, Trajectory, energy_increases, mean_hvp};
-use geometry::UpAxis;
+use geometry::measure::BoundingBox;
 use model::NeededNetwork;
 use operators::memory;
-use render::{Bounds, Framing, Quality, Rgb, Scene, Tube};
+pub use render::View;
+use render::{Quality, Rgb, Scene, Tube};
 use report::Raster;
 use serde_json::Value;
 use surfaces::ClosedMesh;
@@ -19,8 +20,6 @@ use crate::steps::steps_csv;
 const EPS_OVER_H: f64 = 2.0;
 /// Kernel width of the network for surfaces.
 const WIDTH: usize = 17;
-/// Room around a surface, as a fraction of the picture.
-const MARGIN: f64 = 0.02;
 /// The usual side of a picture in pixels.
 const SIDE: u32 = 640;
 /// Colour of a surface where it may move, if it may not everywhere.
@@ -115,17 +114,6 @@ impl SchemeOptions {
         let wanted = self.scheme.map(|scheme| vec![scheme]);
         wanted.unwrap_or_else(|| vec![Scheme::Paper, Scheme::Accurate])
     }
-}
-
-/// From where a surface is looked at.
-#[derive(Clone, Copy, Debug)]
-pub struct View {
-    /// The axis that points up.
-    pub up: UpAxis,
-    /// Degrees about it.
-    pub azimuth: f64,
-    /// Degrees above the horizon.
-    pub elevation: f64,
 }
 
 /// What is shown of a surface that flows.
@@ -273,20 +261,20 @@ impl Flowed {
         let usual = (side, Quality::Standard);
         let (side, quality) = if quick { (120, Quality::Draft) } else { usual };
         // Scenes are made twice rather than kept: one takes several times the memory of its phase field.
-        let mut bounds = Vec::new();
+        let mut points = Vec::new();
         for snapshot in &self.snapshots {
-            let tubes = snapshot.tubes.iter().flat_map(|tube| tube.points.clone());
-            bounds.extend([self.scene(snapshot)?.bounds(), Bounds::around(tubes)]);
+            points.extend(snapshot.tubes.iter().flat_map(|tube| tube.points.clone()));
+            let bounds = self.scene(snapshot)?.bounds();
+            points.extend((bounds.iter()).flat_map(|bounds| [bounds.lower, bounds.upper]));
         }
-        let bounds = bounds.into_iter().flatten();
-        let bounds = bounds.reduce(|all, one| all.union(&one));
+        let bounds = BoundingBox::around(points);
         let folder = stage.output.subfolder("pictures")?;
         let picture = |snapshot: &Snapshot| {
             let mut scene = self.scene(snapshot)?.quality(quality);
             if let Some(bounds) = bounds {
-                scene = scene.framing(Framing::Within(bounds));
+                scene = scene.within(bounds);
             }
-            let picture = scene.render(side)?;
+            let picture = scene.render([side; 2])?;
             picture.write_png(folder.path(&format!("{}.png", self.file(snapshot.step)))?)?;
             let size = [picture.width() as usize, picture.height() as usize];
             Ok(Raster::new(size, picture.pixels()).with_caption(&snapshot.caption))
@@ -294,19 +282,14 @@ impl Flowed {
         self.snapshots.iter().map(picture).collect()
     }
 
-    fn scene(&self, snapshot: &Snapshot) -> Result<Scene<'static>, Error> {
-        let (case, view) = (&self.trajectory.case, self.surface.view);
+    fn scene(&self, snapshot: &Snapshot) -> Result<Scene, Error> {
+        let case = &self.trajectory.case;
         let mut scene = Scene::new(&self.trajectory.field(snapshot.step)?, case.scales.eps)?;
         if let Some(region) = &case.region {
             let mask = region.iter().map(|&moves| f64::from(moves)).collect();
             scene = scene.highlight_mask(&Field::from_values(*case.grid(), mask)?, MOVING)?;
         }
-        Ok(scene
-            .up(view.up)
-            .azimuth(view.azimuth)
-            .elevation(view.elevation)
-            .margin(MARGIN)
-            .tubes(snapshot.tubes.clone()))
+        Ok(scene.view(self.surface.view).tubes(snapshot.tubes.clone()))
     }
 }
 

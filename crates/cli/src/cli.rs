@@ -119,8 +119,8 @@ const COMPLETIONS_EXAMPLES: &str =
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct InputOptions {
-    /// A mesh (.obj, .stl, .ply), an image (.png, .jpg), a field (.npy, .vti), builtin:NAME with NAME one of disc, ring,
-    /// cross, rectangle, sphere, cube, torus, coin, figure, lever, or a region as box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z
+    /// A mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), a field (.npy, .vti), builtin:NAME with
+    /// NAME one of disc, ring, cross, rectangle, sphere, cube, torus, coin, figure, lever, or a region as box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z
     pub input: Option<String>,
 
     /// Cells per unit length [default: 128 in 2D, 64 in 3D]

@@ -199,11 +199,13 @@ impl Source<'_> {
         let path = absolute(input)?;
         match &*extension(&path) {
             "obj" | "stl" | "ply" => Ok(Source::Mesh(path)),
-            "png" | "jpg" | "jpeg" => Ok(Source::Image(path)),
+            "png" | "jpg" | "jpeg" | "webp" | "gif" | "tif" | "tiff" | "bmp" => {
+                Ok(Source::Image(path))
+            }
             "npy" | "vti" => Ok(Source::Field(path)),
             _ => Err(Error::options(format!(
-                "{input} is no input: give a mesh (.obj, .stl, .ply), an image (.png, .jpg), a field (.npy, .vti), \
-                 builtin:NAME, or a region as box:... or ball:..."
+                "{input} is no input: give a mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), \
+                 a field (.npy, .vti), builtin:NAME, or a region as box:... or ball:..."
             ))),
         }
     }
@@ -506,8 +508,7 @@ impl ImageFrame {
         let side = Side::of(&image, images::Inside::Auto, Threshold::default())?;
         let placement = Placement::fit(&image.bounding_box(), grid, self.side, 0.0)?;
         let outline = Outline::of_image(&image, side)?.placed(&placement);
-        let mask = images::Mask::new(*grid, &OutlineDistance::new(&outline))?;
-        Ok(mask.nodes().to_vec())
+        Ok(images::mask(*grid, &OutlineDistance::new(&outline))?)
     }
 }
 

@@ -4,10 +4,10 @@ use std::fmt;
 use std::path::Path;
 
 use engine::{Measure, Stop};
-use geometry::measure::has_interface;
+use geometry::measure::{BoundingBox, bounding_box, has_interface};
 use geometry::{Field, Placement, UpAxis, npy, vti};
 use images::{Drawing, Frame, Interface, Outline, Svg};
-use render::{Framing, Picture, Rgb, Scene};
+use render::{Picture, Rgb, Scene, View};
 use runs::{RunDirectory, StoredRun};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -19,10 +19,16 @@ use crate::own::{Faired, OwnMesh};
 
 /// Pixels a side of pictures of surfaces.
 const PIXELS: u32 = 480;
-/// Degrees about the vertical axis from which surfaces are seen.
-pub const AZIMUTH: f64 = -60.0;
-/// Degrees above the horizon from which surfaces are seen.
-pub const ELEVATION: f64 = 25.0;
+/// Room around a surface for its flow, as a part of its longest side.
+const ROOM: f64 = 0.06;
+/// From where surfaces are seen, with this axis pointing up.
+pub fn view(up: UpAxis) -> View {
+    View {
+        up,
+        azimuth: -60.0,
+        elevation: 25.0,
+    }
+}
 
 /// Names of files that hold the shape at the beginning, without their extension.
 pub const START: &str = "start";
@@ -69,8 +75,8 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
     /// Lets the axis that was chosen point up, or says which one does.
     fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error>;
 
-    /// A picture.
-    fn picture(&self, u: &Field<D>, eps: f64) -> Result<Picture, Error>;
+    /// A picture, in the same frame for all steps of a flow from `start`.
+    fn picture(&self, start: &Field<D>, u: &Field<D>, eps: f64) -> Result<Picture, Error>;
 
     /// The parts of the shape.
     fn topology(&self, u: &Field<D>, eps: f64) -> Result<Topology, Error>;
@@ -125,7 +131,7 @@ impl Outlet<2> for Frame {
         }
     }
 
-    fn picture(&self, u: &Field<2>, eps: f64) -> Result<Picture, Error> {
+    fn picture(&self, _: &Field<2>, u: &Field<2>, eps: f64) -> Result<Picture, Error> {
         let interface = Interface::new(u, eps)?;
         let drawing = Drawing::on_white(*self).filled(&interface, Rgb::BLACK);
         Ok(drawing.picture()?)
@@ -228,14 +234,21 @@ impl Outlet<3> for Space {
         Ok(())
     }
 
-    fn picture(&self, u: &Field<3>, eps: f64) -> Result<Picture, Error> {
-        // A mesh whose vertices follow moves by so little that the pictures of a film do not jump.
-        let framing = match self.own {
-            Some(_) => Framing::Surface,
-            None => Framing::Domain,
-        };
-        let scene = Scene::new(u, eps)?.up(self.up).framing(framing);
-        Ok(scene.azimuth(AZIMUTH).elevation(ELEVATION).render(PIXELS)?)
+    fn picture(&self, start: &Field<3>, u: &Field<3>, eps: f64) -> Result<Picture, Error> {
+        let mut scene = Scene::new(u, eps)?.view(view(self.up));
+        // Room to grow, and more only for what grows beyond it, so that the pictures of a film do not jump.
+        let start = bounding_box(start).map(|bounds| {
+            let room = ROOM * bounds.longest_side();
+            [
+                bounds.lower.map(|x| x - room),
+                bounds.upper.map(|x| x + room),
+            ]
+        });
+        let now = scene.bounds().map(|bounds| [bounds.lower, bounds.upper]);
+        if let Some(frame) = BoundingBox::around(start.into_iter().chain(now).flatten()) {
+            scene = scene.within(frame);
+        }
+        Ok(scene.render([PIXELS; 2])?)
     }
 
     fn topology(&self, u: &Field<3>, eps: f64) -> Result<Topology, Error> {
@@ -290,6 +303,7 @@ impl Outlet<3> for Space {
 /// Writes `final.npy`, `final.vti`, and, unless the shape has vanished, picture and shape, of which it returns the parts.
 pub fn write_final<const D: usize, O: Outlet<D>>(
     outlet: &O,
+    start: &Field<D>,
     u: &Field<D>,
     eps: f64,
     faired: Option<&Faired>,
@@ -303,7 +317,7 @@ pub fn write_final<const D: usize, O: Outlet<D>>(
     if !has_interface(u) {
         return Ok(Topology::default());
     }
-    write_picture(&outlet.picture(u, eps)?, PICTURE, run)?;
+    write_picture(&outlet.picture(start, u, eps)?, PICTURE, run)?;
     if let Some(faired) = faired {
         let extension = format.map_or(faired.extension.clone(), |format| format.to_string());
         let name = format!("{FINAL}.{extension}");

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use engine::METRICS;
 use geometry::UpAxis;
 use pages::{
-    Details, Facts, Figure, Frames, Image, Page, Section, Table, View, Viewer, five_digits,
+    Details, Facts, Figure, Frames, Image, Page, Section, Table, Text, Viewer, five_digits,
 };
 use report::{Axis, LineChart, Marker, Series};
 use runs::StoredRun;
@@ -108,11 +108,7 @@ impl Files<'_> {
             return Ok(None);
         }
         let up = UpAxis::deserialize(&engine::notes(self.run)["outlet"]["up"]);
-        let view = View {
-            up: up.unwrap_or_default(),
-            azimuth: outlet::AZIMUTH,
-            elevation: outlet::ELEVATION,
-        };
+        let view = outlet::view(up.unwrap_or_default());
         let viewer = Viewer::new(
             "The surface before and after",
             Image::from_bytes(outlet::PICTURE, &poster)?,
@@ -191,12 +187,12 @@ impl Files<'_> {
             .collect();
         let (shown, all) = (rows.len(), table.rows().len());
         let note = if shown < all {
-            format!("{shown} of {all} steps; all are in ")
+            format!("{shown} of {all} steps; all are in `{METRICS}`.")
         } else {
-            "All digits are in ".to_owned()
+            format!("All digits are in `{METRICS}`.")
         };
         let details = Details::new("Steps as a table")
-            .with(pages::Text::from(note.as_str()).code(METRICS).then("."))
+            .with(Text::markdown(&note))
             .with(Table::new("Steps", table.head(), rows)?);
         let caption = "Energy and measures of the shape after every step.";
         let figure = Figure::new(image, caption);
@@ -267,16 +263,9 @@ fn facts(values: &Value) -> Facts {
     let Value::Object(map) = values else {
         return Facts::new();
     };
-    map.iter()
-        .fold(Facts::new(), |facts, (name, value)| match value {
-            Value::Number(number) => {
-                let value = number
-                    .as_f64()
-                    .map_or_else(|| number.to_string(), five_digits);
-                facts.with(name, value)
-            }
-            value => facts.with_value(name, value),
-        })
+    map.iter().fold(Facts::new(), |facts, (name, value)| {
+        facts.with_value(name, value)
+    })
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use engine::{Case, Checkpoints, Ending, Event, Observer, Record, Run, Stop, Store};
 use geometry::measure::{has_interface, touches_side};
 use operators::ComputeDevice;
-use render::{Animation, Picture};
+use render::Picture;
 use runs::{Interrupt, RunDirectory, StoredRun};
 use serde_json::{Value, json};
 
@@ -140,6 +140,7 @@ impl<O> Plan<O> {
         let faired = faired.transpose()?.flatten();
         let topology = outlet::write_final(
             &self.outlet,
+            &case.initial,
             u,
             eps,
             faired.as_ref(),
@@ -154,7 +155,7 @@ impl<O> Plan<O> {
         }
         if self.keep.frames.is_some() {
             let frames = frames(&directory.path().join(outlet::FRAMES))?;
-            let animation = Animation::new(frames, DELAY)?.to_apng()?;
+            let animation = render::animation(&frames, DELAY)?;
             directory.write_file("animation.png", |out| out.write_all(&animation))?;
         }
         // Touching sheets have no topology; that is no reason not to flow.
@@ -273,7 +274,8 @@ struct Pictures<'a, O>(&'a Plan<O>);
 
 impl<const D: usize, O: Outlet<D>> Observer<D> for Pictures<'_, O> {
     fn observe(&mut self, event: &mut Event<'_, D>) -> Result<(), engine::Error> {
-        let (u, eps) = (event.field, event.case.scales.eps);
+        let (case, u) = (event.case, event.field);
+        let eps = case.scales.eps;
         let (Some(step), Some(run)) = (event.step(), event.directory.as_deref_mut()) else {
             return Ok(());
         };
@@ -293,7 +295,8 @@ impl<const D: usize, O: Outlet<D>> Observer<D> for Pictures<'_, O> {
             }
             if keep.frames.is_some_and(|every| step.is_multiple_of(every)) {
                 let name = format!("{}/step-{step:06}.png", outlet::FRAMES);
-                outlet::write_picture(&outlet.picture(u, eps)?, &name, run)?;
+                let picture = outlet.picture(&case.initial, u, eps)?;
+                outlet::write_picture(&picture, &name, run)?;
             }
             Ok(())
         };

@@ -5,78 +5,29 @@ use proptest::sample::{Index, select};
 
 /// Longest file, in bytes. Larger ones take longer, and show nothing else.
 const LONGEST: usize = 1 << 16;
-
-/// Numbers as text that are hard to bear.
-const NUMBERS: [&str; 37] = [
-    "",
-    "0",
-    "-0",
-    "-1",
-    "1",
-    "2",
-    "3",
-    "127",
-    "128",
-    "255",
-    "256",
-    "65535",
-    "65536",
-    "2147483647",
-    "2147483648",
-    "-2147483649",
-    "4294967295",
-    "4294967296",
-    "1152921504606846976",
-    "2305843009213693952",
-    "9223372036854775807",
-    "9223372036854775808",
-    "-9223372036854775808",
-    "18446744073709551615",
-    "18446744073709551616",
-    "99999999999999999999999999999999999999999999999999999999999999999999999999999999",
-    "1e12",
-    "1e308",
-    "-1e308",
-    "1e309",
-    "1e-320",
-    "1e999999999999",
-    "0.1",
-    "nan",
-    "inf",
-    "-inf",
-    "0x10",
-];
-
-/// The same as bits of whole and floating-point numbers, of which the low bytes are taken.
-const BITS: [u64; 24] = [
-    0,
-    1,
-    2,
-    0x7f,
-    0x80,
-    0xff,
-    0x100,
-    0x7fff,
-    0xffff,
-    0x1_0000,
-    0x7fff_ffff,
-    0x8000_0000,
-    0xffff_ffff,
-    0x1_0000_0000,
-    0x7f80_0000, // infinity, single precision
-    0x7fc0_0000, // NaN
-    0x7f7f_ffff, // the largest
-    1 << 60,
-    1 << 61,
-    1 << 63,
-    0x7ff0_0000_0000_0000, // infinity, double precision
-    0x7ff8_0000_0000_0000, // NaN
-    0x7fef_ffff_ffff_ffff, // the largest
-    u64::MAX,
-];
-
 /// Bytes that stand at the beginning of most headers.
 const EARLY: usize = 256;
+
+/// Numbers as text that are hard to bear, apart from powers of two.
+const NUMBERS: &str = "-0 -1 -2147483649 -9223372036854775808 1e12 1e308 -1e308 1e309 1e-320 1e999999999999 \
+     0.1 nan inf -inf 0x10 99999999999999999999999999999999999999999999999999999999999999999999999999999999";
+
+/// Powers of two, and one less.
+fn powers() -> impl Iterator<Item = u128> {
+    let powers = [0, 1, 7, 8, 16, 31, 32, 61, 63, 64];
+    powers.into_iter().flat_map(|k| [(1 << k) - 1, 1 << k])
+}
+
+/// The same as bits of whole and floating-point numbers, of which the low bytes are taken.
+fn bits() -> Vec<u64> {
+    let single = [f32::INFINITY, f32::NAN, f32::MAX].map(|v| u64::from(v.to_bits()));
+    let double = [f64::INFINITY, f64::NAN, f64::MAX].map(f64::to_bits);
+    powers()
+        .map(|v| v as u64)
+        .chain(single)
+        .chain(double)
+        .collect()
+}
 
 /// A place in a file, which can be its end.
 #[derive(Clone, Debug)]
@@ -104,31 +55,33 @@ fn place() -> impl Strategy<Value = Place> {
     ]
 }
 
+/// What comes in place of bytes.
+#[derive(Clone, Debug)]
+pub(crate) enum Block {
+    Bytes(Vec<u8>),
+    /// The same, but for these bits of the first.
+    Same(u8),
+    /// A word of the format.
+    Word(Index),
+    /// Another file, from there on.
+    File(Index, Place),
+}
+
 /// One change to a file.
 #[derive(Clone, Debug)]
 pub(crate) enum Change {
-    Set(Place, u8),
-    Flip(Place, u8),
-    Truncate(Place),
-    Insert(Place, Vec<u8>),
-    Remove(Place, usize),
-    /// So many bytes once more, so often.
-    Repeat(Place, usize, usize),
+    /// From a place on, so many bytes become a block, so often.
+    Replace(Place, usize, Block, usize),
     /// Lines, or what there is between line breaks, change places.
     Swap(Place, Place),
-    /// From here on another file, from there on.
-    Splice(Place, Index, Place),
     /// A number in the text becomes another.
     Number(Index, String),
-    /// Bytes become a number: 2 to the power of this many, this one, big-endian.
-    Bits(Place, u32, u64, bool),
-    /// A word of the format, so often.
-    Word(Place, Index, usize),
     /// A pair of words around so many bytes, so often.
     Nest(Place, usize, Index, usize),
 }
 
 /// What a change can take from.
+#[derive(Default)]
 pub(crate) struct Material {
     /// Whole files and beginnings of files.
     pub files: Vec<Vec<u8>>,
@@ -141,30 +94,25 @@ pub(crate) struct Material {
 impl Change {
     /// Changes the bytes, of which [`LONGEST`] remain.
     pub fn apply(&self, bytes: &mut Vec<u8>, material: &Material) {
-        let length = bytes.len();
         match self {
-            Self::Set(at, value) => {
+            Self::Replace(at, count, block, times) => {
                 let at = at.of(bytes);
-                if at < length {
-                    bytes[at] = *value;
-                }
-            }
-            Self::Flip(at, bit) => {
-                let at = at.of(bytes);
-                if at < length {
-                    bytes[at] ^= 1 << (bit % 8);
-                }
-            }
-            Self::Truncate(at) => bytes.truncate(at.of(bytes)),
-            Self::Insert(at, more) => insert(bytes, at.of(bytes), more, 1),
-            Self::Remove(at, count) => {
-                let at = at.of(bytes);
-                bytes.drain(at..length.min(at + count));
-            }
-            Self::Repeat(at, count, times) => {
-                let at = at.of(bytes);
-                let block = bytes[at..length.min(at + count)].to_vec();
-                insert(bytes, at, &block, *times);
+                let end = bytes.len().min(at.saturating_add(*count));
+                let block = match block {
+                    Block::Bytes(block) => block.clone(),
+                    Block::Same(bits) => {
+                        let mut same = bytes[at..end].to_vec();
+                        same.iter_mut().take(1).for_each(|byte| *byte ^= bits);
+                        same
+                    }
+                    Block::Word(_) if material.words.is_empty() => Vec::new(),
+                    Block::Word(which) => which.get(&material.words).clone(),
+                    Block::File(which, from) => {
+                        let file: &Vec<u8> = which.get(&material.files);
+                        file[from.of(file)..].to_vec()
+                    }
+                };
+                replace(bytes, at..end, &block, *times);
             }
             Self::Swap(one, other) => {
                 let mut lines: Vec<&[u8]> = bytes.split_inclusive(|&b| b == b'\n').collect();
@@ -175,41 +123,19 @@ impl Change {
                     *bytes = lines.concat();
                 }
             }
-            Self::Splice(at, other, from) => {
-                let at = at.of(bytes);
-                let other: &Vec<u8> = other.get(&material.files);
-                bytes.truncate(at);
-                bytes.extend(&other[from.of(other)..]);
-            }
             Self::Number(which, text) => {
                 let numbers = numbers(bytes);
                 if !numbers.is_empty() {
-                    let range = which.get(&numbers).clone();
-                    bytes.splice(range, text.bytes());
-                }
-            }
-            Self::Bits(at, power, number, big_endian) => {
-                let at = at.of(bytes);
-                let size = 1 << power;
-                let mut number = number.to_le_bytes()[..size].to_vec();
-                if *big_endian {
-                    number.reverse();
-                }
-                let end = length.min(at + size);
-                bytes[at..end].copy_from_slice(&number[..end - at]);
-            }
-            Self::Word(at, which, times) => {
-                if !material.words.is_empty() {
-                    let word: &Vec<u8> = which.get(&material.words);
-                    insert(bytes, at.of(bytes), word, *times);
+                    replace(bytes, which.get(&numbers).clone(), text.as_bytes(), 1);
                 }
             }
             Self::Nest(at, count, which, times) => {
                 if !material.pairs.is_empty() {
                     let [open, close] = which.get(&material.pairs);
                     let at = at.of(bytes);
-                    insert(bytes, length.min(at + count), close, *times);
-                    insert(bytes, at, open, *times);
+                    let end = bytes.len().min(at + count);
+                    replace(bytes, end..end, close, *times);
+                    replace(bytes, at..at, open, *times);
                 }
             }
         }
@@ -217,9 +143,9 @@ impl Change {
     }
 }
 
-fn insert(bytes: &mut Vec<u8>, at: usize, block: &[u8], times: usize) {
+fn replace(bytes: &mut Vec<u8>, range: std::ops::Range<usize>, block: &[u8], times: usize) {
     let times = times.min(LONGEST / block.len().max(1));
-    bytes.splice(at..at, block.repeat(times));
+    bytes.splice(range, block.repeat(times));
 }
 
 /// Where numbers stand in a text.
@@ -237,32 +163,46 @@ fn numbers(bytes: &[u8]) -> Vec<std::ops::Range<usize>> {
     found
 }
 
+/// Bytes that become as many others.
+fn overwritten() -> impl Strategy<Value = Vec<u8>> {
+    let number = (0..4_u32, select(bits()), any::<bool>()).prop_map(|(power, number, big)| {
+        let mut number = number.to_le_bytes()[..1 << power].to_vec();
+        if big {
+            number.reverse();
+        }
+        number
+    });
+    prop_oneof![2 => any::<u8>().prop_map(|byte| vec![byte]), 3 => number]
+}
+
 fn change() -> impl Strategy<Value = Change> {
-    let byte = any::<u8>;
     let which = any::<Index>;
     let count = || prop_oneof![3 => 1..9_usize, 2 => 1..65_usize, 1 => 1..2000_usize];
     let times = || prop_oneof![8 => 1..4_usize, 2 => 4..200_usize, 1 => Just(20_000)];
     let more = prop_oneof![
-        3 => prop::collection::vec(byte(), 1..9),
-        1 => prop::collection::vec(byte(), 1..300),
+        3 => prop::collection::vec(any::<u8>(), 1..9),
+        1 => prop::collection::vec(any::<u8>(), 1..300),
     ];
+    let texts = NUMBERS.split_whitespace().map(str::to_owned);
+    let texts = texts.chain(powers().map(|v| v.to_string()));
+    let texts: Vec<String> = texts.chain([String::new()]).collect();
     let number = prop_oneof![
-        2 => select(&NUMBERS[..]).prop_map(String::from),
+        3 => select(texts),
         1 => (0..300_u16).prop_map(|n| n.to_string()),
     ];
+    let rest = usize::MAX;
     prop_oneof![
-        2 => (place(), byte()).prop_map(|(at, v)| Change::Set(at, v)),
-        2 => (place(), byte()).prop_map(|(at, v)| Change::Flip(at, v)),
-        1 => place().prop_map(Change::Truncate),
-        2 => (place(), more).prop_map(|(at, v)| Change::Insert(at, v)),
-        2 => (place(), count()).prop_map(|(at, n)| Change::Remove(at, n)),
-        2 => (place(), count(), times()).prop_map(|(at, n, t)| Change::Repeat(at, n, t)),
+        5 => (place(), overwritten()).prop_map(|(at, v)| Change::Replace(at, v.len(), Block::Bytes(v), 1)),
+        2 => (place(), 0..8_u8).prop_map(|(at, bit)| Change::Replace(at, 1, Block::Same(1 << bit), 1)),
+        1 => place().prop_map(move |at| Change::Replace(at, rest, Block::Bytes(Vec::new()), 1)),
+        2 => (place(), more).prop_map(|(at, v)| Change::Replace(at, 0, Block::Bytes(v), 1)),
+        2 => (place(), count()).prop_map(|(at, n)| Change::Replace(at, n, Block::Bytes(Vec::new()), 1)),
+        2 => (place(), count(), times()).prop_map(|(at, n, t)| Change::Replace(at, n, Block::Same(0), t + 1)),
+        3 => (place(), which(), times()).prop_map(|(at, w, t)| Change::Replace(at, 0, Block::Word(w), t)),
+        1 => (place(), which(), place())
+            .prop_map(move |(at, f, from)| Change::Replace(at, rest, Block::File(f, from), 1)),
         1 => (place(), place()).prop_map(|(a, b)| Change::Swap(a, b)),
-        1 => (place(), which(), place()).prop_map(|(a, f, b)| Change::Splice(a, f, b)),
         4 => (which(), number).prop_map(|(n, text)| Change::Number(n, text)),
-        3 => (place(), 0..4_u32, select(&BITS[..]), any::<bool>())
-            .prop_map(|(at, p, n, big)| Change::Bits(at, p, n, big)),
-        3 => (place(), which(), times()).prop_map(|(at, w, t)| Change::Word(at, w, t)),
         1 => (place(), count(), which(), times()).prop_map(|(at, n, w, t)| Change::Nest(at, n, w, t)),
     ]
 }

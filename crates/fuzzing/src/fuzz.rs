@@ -42,7 +42,7 @@ impl Limit {
 }
 
 /// What was measured.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Report {
     /// Name of the test.
     pub name: &'static str,
@@ -76,13 +76,8 @@ impl fmt::Display for Report {
     }
 }
 
-/// A file and what happens to it.
-#[derive(Clone, Debug)]
-struct Case {
-    file: Index,
-    changes: Vec<Change>,
-    repaired: bool,
-}
+/// A file, what happens to it, and whether it is repaired then.
+type Case = (Index, Vec<Change>, bool);
 
 /// One reader and the files to change.
 pub struct Fuzz<'a> {
@@ -103,8 +98,7 @@ impl<'a> Fuzz<'a> {
             // Random bytes begin with nothing.
             material: Material {
                 files: vec![Vec::new()],
-                words: Vec::new(),
-                pairs: Vec::new(),
+                ..Material::default()
             },
             repair: None,
         }
@@ -182,10 +176,13 @@ impl<'a> Fuzz<'a> {
                     "{name}: valid file {number}: {result:?}"
                 );
             }
-            let outcome = TestRunner::new(Self::config()).run(&case(), |case| {
-                let result = one(&self.bytes(&case));
-                result.map(|_| ()).map_err(TestCaseError::fail)
-            });
+            let outcome = TestRunner::new(Self::config()).run(
+                &(any::<Index>(), changes(), any::<bool>()),
+                |case| {
+                    let result = one(&self.bytes(&case));
+                    result.map(|_| ()).map_err(TestCaseError::fail)
+                },
+            );
             match outcome {
                 Ok(()) => {}
                 Err(TestError::Fail(reason, case)) => {
@@ -219,25 +216,16 @@ impl<'a> Fuzz<'a> {
         }
     }
 
-    fn bytes(&self, case: &Case) -> Vec<u8> {
-        let mut bytes = case.file.get(&self.material.files).clone();
-        for change in &case.changes {
+    fn bytes(&self, (file, changes, repaired): &Case) -> Vec<u8> {
+        let mut bytes = file.get(&self.material.files).clone();
+        for change in changes {
             change.apply(&mut bytes, &self.material);
         }
         match &self.repair {
-            Some(repair) if case.repaired => repair(bytes),
+            Some(repair) if *repaired => repair(bytes),
             _ => bytes,
         }
     }
-}
-
-fn case() -> impl Strategy<Value = Case> {
-    let parts = (any::<Index>(), changes(), any::<bool>());
-    parts.prop_map(|(file, changes, repaired)| Case {
-        file,
-        changes,
-        repaired,
-    })
 }
 
 /// Measures readings and judges them.
@@ -255,12 +243,7 @@ impl Meter {
             folder: std::env::var_os("FUZZ_KEEP").map(PathBuf::from),
             report: Report {
                 name,
-                cases: 0,
-                accepted: 0,
-                time: Duration::ZERO,
-                slowest: Duration::ZERO,
-                largest: 0,
-                largest_part: 0.0,
+                ..Report::default()
             },
         }
     }

@@ -17,7 +17,7 @@
 //! let report = Fuzz::new("numbers", Limit { times: 9, plus: 64 })
 //!     .valid([b"12".to_vec(), b"4294967295".to_vec()])
 //!     .words(["+", "_"])
-//!     .run(read, |bytes, number| assert!(bytes.len() < 11 || number < 1_000_000));
+//!     .run(read, |bytes, number| assert!(bytes.len() > 8 || number < 100_000_000));
 //! assert!(report.largest > 0);
 //! ```
 //!

@@ -183,6 +183,18 @@ pub struct BoundingBox<const D: usize> {
 }
 
 impl<const D: usize> BoundingBox<D> {
+    /// The smallest box with all points, if there are any.
+    pub fn around(points: impl IntoIterator<Item = [f64; D]>) -> Option<Self> {
+        let box_of = |point| Self {
+            lower: point,
+            upper: point,
+        };
+        points.into_iter().map(box_of).reduce(|a, b| Self {
+            lower: std::array::from_fn(|axis| a.lower[axis].min(b.lower[axis])),
+            upper: std::array::from_fn(|axis| a.upper[axis].max(b.upper[axis])),
+        })
+    }
+
     /// Extent along each axis.
     pub fn extent(&self) -> [f64; D] {
         std::array::from_fn(|axis| self.upper[axis] - self.lower[axis])

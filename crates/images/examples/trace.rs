@@ -8,7 +8,7 @@ use std::time::Instant;
 use geometry::shapes::Ball;
 use geometry::{Grid, Placement, phase_field};
 use images::{
-    Drawing, Frame, Inside, Interface, Mask, Outline, OutlineDistance, Side, Svg, Threshold, read,
+    Drawing, Frame, Inside, Interface, Outline, OutlineDistance, Side, Svg, Threshold, mask, read,
 };
 use render::Rgb;
 
@@ -52,12 +52,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     let region = Ball::new([0.05, 0.02], 0.2)?;
     told(&format!(
         "{} nodes in the region",
-        Mask::new(grid, &region)?.count()
+        mask(grid, &region)?
+            .iter()
+            .filter(|&&inside| inside)
+            .count()
     ));
     let frame = Frame::of_box(&grid, 800)?;
     let drawing = Drawing::on_white(frame)
         .filled(&interface, Rgb::BLACK)
-        .outlined(&region, Rgb::GREEN, 4.0)?;
+        .filled(&region, Rgb::GREEN);
     drawing.picture()?.write_png(folder.join("region.png"))?;
     let curves = Outline::of_phase_field(&u)?;
     let svg = Svg::on_white(frame)

@@ -4,7 +4,6 @@ use geometry::SignedDistance;
 use rayon::prelude::*;
 use render::{Picture, Rgb};
 
-use crate::error::positive;
 use crate::{Error, Frame};
 
 /// Pixels at an edge are cut into this many parts along both axes.
@@ -27,8 +26,6 @@ pub struct Drawing<'a> {
 struct Layer<'a> {
     shape: &'a (dyn SignedDistance<2> + 'a),
     colour: Rgb,
-    /// Of a line along the outline, in units of length; none for the whole shape.
-    half_width: Option<f64>,
 }
 
 impl<'a> Drawing<'a> {
@@ -52,31 +49,8 @@ impl<'a> Drawing<'a> {
     /// Fills a shape.
     #[must_use]
     pub fn filled(mut self, shape: &'a impl SignedDistance<2>, colour: Rgb) -> Self {
-        self.layers.push(Layer {
-            shape,
-            colour,
-            half_width: None,
-        });
+        self.layers.push(Layer { shape, colour });
         self
-    }
-
-    /// Draws a line along the boundary of a shape, `width` pixels wide, half of it inside.
-    ///
-    /// # Errors
-    /// The width must be finite and positive.
-    pub fn outlined(
-        mut self,
-        shape: &'a impl SignedDistance<2>,
-        colour: Rgb,
-        width: f64,
-    ) -> Result<Self, Error> {
-        let half_width = 0.5 * positive("width of the line", width)? * self.frame.pixel();
-        self.layers.push(Layer {
-            shape,
-            colour,
-            half_width: Some(half_width),
-        });
-        Ok(self)
     }
 
     /// The picture.
@@ -144,10 +118,9 @@ impl Layer<'_> {
         let s = |x: [f64; 2]| self.shape.signed_distance(x);
         // Nothing is near: a point in the pixel is at most 0.71 sides from a corner. Fields that have
         // lost their profile may be steep, so that only the signs tell.
-        let reach = side + self.half_width.unwrap_or(0.0);
-        let [inside, outside] = [-1.0, 1.0].map(|sign| corners.iter().all(|s| sign * s > reach));
+        let [inside, outside] = [-1.0, 1.0].map(|sign| corners.iter().all(|s| sign * s > side));
         if inside || outside {
-            return f64::from(u8::from(inside && self.half_width.is_none()));
+            return f64::from(u8::from(inside));
         }
         let part = side / f64::from(PARTS);
         let step = 0.25 * part;
@@ -163,11 +136,7 @@ impl Layer<'_> {
             // On the line in the middle of a shape the gradient means nothing.
             let slope = if length > 0.5 { length } else { 1.0 };
             let depth = -s([x, y]) / slope;
-            let within = |depth: f64| half_plane(depth / part, gradient);
-            sum += match self.half_width {
-                None => within(depth),
-                Some(half) => within(half + depth) - within(depth - half),
-            };
+            sum += half_plane(depth / part, gradient);
         }
         sum / f64::from(PARTS * PARTS)
     }

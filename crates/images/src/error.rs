@@ -57,27 +57,14 @@ pub enum Error {
         /// How many.
         actual: usize,
     },
-    /// No pixel is on the chosen side of the threshold.
+    /// All pixels are on the chosen side of the threshold, or none is.
     #[error(
-        "nothing is inside: no pixel is {side}; {quantity} ranges from {low:.4} to {high:.4}, so \
-         choose a threshold in between, or another side"
+        "{inside} is inside: {inside} is {side}; {quantity} ranges from {low:.4} to {high:.4}, so choose \
+         a threshold in between, or another side"
     )]
-    NothingInside {
-        /// The side, with its threshold.
-        side: String,
-        /// What is compared with the threshold.
-        quantity: &'static str,
-        /// Its least value.
-        low: f64,
-        /// Its largest value.
-        high: f64,
-    },
-    /// All pixels are on the chosen side of the threshold.
-    #[error(
-        "everything is inside: all pixels are {side}; {quantity} ranges from {low:.4} to \
-         {high:.4}, so choose a threshold in between, or another side"
-    )]
-    EverythingInside {
+    OneSided {
+        /// "everything" or "nothing".
+        inside: &'static str,
         /// The side, with its threshold.
         side: String,
         /// What is compared with the threshold.

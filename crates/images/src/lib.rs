@@ -1,4 +1,4 @@
-//! Images in and out of phase fields: PNG and JPEG files, outlines, signed distances, drawings.
+//! Images in and out of phase fields: image files, outlines, signed distances, drawings.
 //!
 //! ```
 //! use geometry::{Grid, Placement, phase_field};
@@ -81,7 +81,7 @@ pub use error::Error;
 pub use frame::Frame;
 pub use image::{Image, LARGEST_IMAGE};
 pub use interface::Interface;
-pub use mask::Mask;
+pub use mask::mask;
 pub use outline::{LARGEST_OUTLINE, Outline};
 pub use read::error::FormatError;
 pub use read::{decode, read};

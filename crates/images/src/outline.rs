@@ -67,7 +67,7 @@ impl Outline {
     /// pixel if they are hard. Corners are cut off by half a pixel.
     ///
     /// # Errors
-    /// [`Error::NothingInside`], [`Error::EverythingInside`], or [`Error::Noise`] for more than
+    /// [`Error::OneSided`], or [`Error::Noise`] for more than
     /// [`LARGEST_OUTLINE`] segments.
     pub fn of_image(image: &Image, side: Side) -> Result<Self, Error> {
         let [width, height] = [image.width(), image.height()].map(|n| n as usize);
@@ -79,21 +79,12 @@ impl Outline {
         if inside == 0 || inside == pixels {
             let values = (0..pixels).map(|p| side.value(image.pixel(p)));
             let (low, high) = range(values);
-            let quantity = side.quantity();
-            return Err(if inside == 0 {
-                Error::NothingInside {
-                    side: side.to_string(),
-                    quantity,
-                    low,
-                    high,
-                }
-            } else {
-                Error::EverythingInside {
-                    side: side.to_string(),
-                    quantity,
-                    low,
-                    high,
-                }
+            return Err(Error::OneSided {
+                inside: if inside == 0 { "nothing" } else { "everything" },
+                side: side.to_string(),
+                quantity: side.quantity(),
+                low,
+                high,
             });
         }
         let changes = |row: usize| {
@@ -175,17 +166,8 @@ impl Outline {
 
     /// The smallest rectangle around all curves.
     pub fn bounding_box(&self) -> BoundingBox<2> {
-        let mut bounds = BoundingBox {
-            lower: [f64::INFINITY; 2],
-            upper: [f64::NEG_INFINITY; 2],
-        };
-        for point in self.curves.iter().flat_map(|curve| &curve.points) {
-            for (axis, &x) in point.iter().enumerate() {
-                bounds.lower[axis] = bounds.lower[axis].min(x);
-                bounds.upper[axis] = bounds.upper[axis].max(x);
-            }
-        }
-        bounds
+        let points = self.curves.iter().flat_map(|curve| &curve.points).copied();
+        BoundingBox::around(points).expect("an outline has curves")
     }
 
     /// The outline in the box of a grid.

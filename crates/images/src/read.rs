@@ -2,32 +2,36 @@
 
 pub(crate) mod error;
 mod jpeg;
-mod orientation;
-mod png;
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{Cursor, Read};
 use std::path::Path;
+
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
 use crate::image::{LARGEST_IMAGE, pixels};
 use crate::{Error, Image};
 use error::FormatError;
-use orientation::Orientation;
 
 /// Largest image file, in bytes: eight bytes a pixel, as many as the largest image has at 16 bits
 /// without compression.
 const LARGEST_FILE: u64 = 8 * LARGEST_IMAGE as u64;
+/// Most bytes for each pixel while decoding.
+const DEEPEST: u64 = 16;
 
-/// Reads an image: PNG or JPEG, told by its first bytes and not by its extension.
+/// Reads an image, of a format that is told by its first bytes and not by its extension.
 ///
-/// - PNG: all colour types and depths, interlaced or not, with transparency; of an animation the
-///   first picture.
+/// - PNG: all colour types and depths, interlaced or not, with transparency.
 /// - JPEG: baseline and progressive, grey, YCbCr, RGB, CMYK and YCCK with 8 bits.
+/// - WebP, GIF, TIFF and BMP, as the crate `image` reads them.
+///
+/// Of an animation it is the first picture.
 ///
 /// Colours become grey by the luma of JPEG, `0.299 R + 0.587 G + 0.114 B` of the stored values.
 /// Colour profiles are passed over. Images that Exif says are turned or mirrored are set upright.
 ///
-/// Memory: at most [`LARGEST_IMAGE`] pixels are read, with up to 16 bytes each while decoding; beside
+/// Memory: at most [`LARGEST_IMAGE`] pixels are read, with up to 24 bytes each while decoding; beside
 /// them four times the size of the file, which is at most eight bytes for each of these pixels, and
 /// 32 MiB. The size is checked before anything is decoded.
 ///
@@ -66,28 +70,75 @@ pub fn read(path: impl AsRef<Path>) -> Result<Image, Error> {
 /// # Errors
 /// Whatever is wrong with them, in one line.
 pub fn decode(bytes: &[u8]) -> Result<Image, FormatError> {
-    let (pixels, orientation) = match bytes {
-        [] => return Err(FormatError::Empty),
-        [0x89, b'P', b'N', b'G', ..] => png::decode(bytes)?,
-        [0xff, 0xd8, 0xff, ..] => jpeg::decode(bytes)?,
-        _ => {
-            return Err(FormatError::UnknownFormat {
-                start: bytes.iter().take(8).copied().collect(),
-            });
-        }
+    if bytes.is_empty() {
+        return Err(FormatError::Empty);
+    }
+    let unknown = || FormatError::UnknownFormat {
+        start: bytes.iter().take(8).copied().collect(),
     };
-    let size = orientation.size(pixels.size);
-    let [grey, opacity] =
-        [Some(pixels.grey), pixels.opacity].map(|v| v.map(|v| orientation.apply(pixels.size, v)));
-    let image = Image::new(size[0], size[1], grey.unwrap_or_default(), opacity);
-    Ok(image.expect("the decoders check the size and fill all pixels"))
+    let name = match image::guess_format(bytes).map_err(|_| unknown())? {
+        ImageFormat::Png => "PNG",
+        ImageFormat::Jpeg => "JPEG",
+        ImageFormat::WebP => "WebP",
+        ImageFormat::Gif => "GIF",
+        ImageFormat::Tiff => "TIFF",
+        ImageFormat::Bmp => "BMP",
+        _ => return Err(unknown()),
+    };
+    let (mut image, orientation) = match name {
+        "JPEG" => jpeg::decode(bytes)?,
+        _ => other(name, bytes)?,
+    };
+    image.apply_orientation(orientation.unwrap_or(Orientation::NoTransforms));
+    Ok(converted(image))
 }
 
-/// What the decoders give.
-struct Pixels {
-    size: [u32; 2],
-    grey: Vec<u16>,
-    opacity: Option<Vec<u16>>,
+/// What the crate `image` reads.
+fn other(
+    format: &'static str,
+    bytes: &[u8],
+) -> Result<(DynamicImage, Option<Orientation>), FormatError> {
+    let refused = |error: image::ImageError| FormatError::damaged(format, &error.to_string());
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let mut reader = reader.expect("reading from memory does not fail");
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(DEEPEST * LARGEST_IMAGE as u64);
+    reader.limits(limits);
+    let mut decoder = reader.into_decoder().map_err(refused)?;
+    let (width, height) = decoder.dimensions();
+    checked(width, height)?;
+    let orientation = decoder.orientation().map_err(refused)?;
+    let image = DynamicImage::from_decoder(decoder).map_err(refused)?;
+    Ok((image, Some(orientation)))
+}
+
+/// Grey values and opacities of 16 bits.
+fn converted(image: DynamicImage) -> Image {
+    let image = match image {
+        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => image.into_rgba16().into(),
+        image => image,
+    };
+    let (colour, bytes) = (image.color(), image.as_bytes());
+    let channels = usize::from(colour.channel_count());
+    let sample = |pixel: usize, channel: usize| {
+        let at = pixel * channels + channel;
+        if usize::from(colour.bytes_per_pixel()) == channels {
+            // From 8 to 16 bits: 255 becomes 65535.
+            257 * u16::from(bytes[at])
+        } else {
+            u16::from_ne_bytes([bytes[2 * at], bytes[2 * at + 1]])
+        }
+    };
+    let [width, height] = [image.width(), image.height()];
+    let pixels = 0..width as usize * height as usize;
+    let grey = pixels.clone().map(|pixel| match channels {
+        1 | 2 => sample(pixel, 0),
+        _ => luma([0, 1, 2].map(|channel| sample(pixel, channel))),
+    });
+    let opacity = pixels.map(|pixel| sample(pixel, channels - 1));
+    let opacity = colour.has_alpha().then(|| opacity.collect());
+    let image = Image::new(width, height, grey.collect(), opacity);
+    image.expect("the size is checked and all pixels are filled")
 }
 
 /// The number of pixels, if it is accepted.
@@ -103,14 +154,4 @@ fn checked(width: u32, height: u32) -> Result<usize, FormatError> {
 fn luma([r, g, b]: [u16; 3]) -> u16 {
     let sum = 299 * u32::from(r) + 587 * u32::from(g) + 114 * u32::from(b);
     ((sum + 500) / 1000) as u16
-}
-
-/// From 8 to 16 bits: 255 becomes 65535.
-fn widen(value: u8) -> u16 {
-    257 * u16::from(value)
-}
-
-/// The message of a library.
-fn said(message: &str) -> String {
-    files::shortened(message, 160)
 }

@@ -1,8 +1,8 @@
-//! Image files: all kinds of PNG and JPEG, files that are none, and random bytes.
+//! Image files of all kinds, and files that are none.
 
 use std::fs;
 
-use crate::common::files::{SIZE, chunk, exif, png_files, raster, widened, zlib};
+use crate::common::files::{SIZE, chunk, exif, other_files, png_files, raster, widened, zlib};
 use crate::common::{Raster, disc, jpeg, png};
 use images::{Error, FormatError, decode, read};
 use jpeg_encoder::ColorType as Jpeg;
@@ -27,6 +27,22 @@ fn every_kind_of_png_is_read() {
     ))
     .unwrap();
     assert_eq!(image.opacity(), None);
+}
+
+#[test]
+fn other_formats_are_read_whole_or_not_at_all() {
+    for (name, file, expected) in other_files() {
+        assert_eq!(decode(&file).unwrap(), expected, "{name}");
+        for length in 10..file.len() {
+            match decode(&file[..length]) {
+                Ok(image) => assert_eq!(image, expected, "{name}: {length} of {}", file.len()),
+                Err(error) => {
+                    let text = error.to_string();
+                    assert!(text.contains(name) && !text.contains('\n'), "{text}");
+                }
+            }
+        }
+    }
 }
 
 #[test]
@@ -188,9 +204,9 @@ fn files_that_are_no_images_are_explained() {
     };
     assert_eq!(message(b""), "the file is empty");
     assert_eq!(
-        message(b"GIF89a"),
-        "it begins with the bytes [47, 49, 46, 38, 39, 61], which is neither PNG nor JPEG; save it \
-         as one of these"
+        message(b"GI a"),
+        "it begins with the bytes [47, 49, 20, 61], which is none of PNG, JPEG, WebP, GIF, TIFF and \
+         BMP; save it as one of these"
     );
     let good = png(
         SIZE,
@@ -198,10 +214,10 @@ fn files_that_are_no_images_are_explained() {
         BitDepth::Eight,
         &raster().bytes(),
     );
-    for length in 4..good.len() - 12 {
+    for length in 8..good.len() - 12 {
         let text = message(&good[..length]);
         assert!(
-            text.starts_with("damaged or truncated PNG: "),
+            text.starts_with("damaged, truncated or unusual PNG: "),
             "{length}: {text}"
         );
         assert!(!text.contains('\n') && text.len() < 200, "{text}");

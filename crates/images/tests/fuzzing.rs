@@ -1,6 +1,6 @@
 //! Damaged and malicious images.
 
-use crate::common::files::{SIZE, chunk, exif, png_files, raster};
+use crate::common::files::{SIZE, chunk, exif, other_files, png_files, raster};
 use crate::common::jpeg;
 use fuzzing::{Fuzz, Limit};
 use geometry::SignedDistance;
@@ -10,7 +10,7 @@ use jpeg_encoder::ColorType as Jpeg;
 /// As documented at [`images::read`].
 const LIMIT: Limit = Limit {
     times: 4,
-    plus: 16 * LARGEST_IMAGE + (32 << 20),
+    plus: 24 * LARGEST_IMAGE + (32 << 20),
 };
 
 /// Whatever was read has an outline or a reason.
@@ -30,7 +30,8 @@ fn check(_: &[u8], image: Image) {
 
 /// Valid files of all kinds.
 fn valid_files() -> Vec<Vec<u8>> {
-    let mut files: Vec<Vec<u8>> = png_files().into_iter().map(|(_, file, _)| file).collect();
+    let files = png_files().into_iter().chain(other_files());
+    let mut files: Vec<Vec<u8>> = files.map(|(_, file, _)| file).collect();
     let raster = raster();
     for progressive in [false, true] {
         let grey = raster.bytes();
@@ -80,7 +81,13 @@ fn with_right_sums(bytes: &[u8]) -> Vec<u8> {
 fn fuzzing_images() {
     Fuzz::new("images", LIMIT)
         .valid(valid_files())
-        .starts([&b"\x89PNG\r\n\x1a\n"[..], &[0xff, 0xd8, 0xff]])
+        .starts([
+            &b"\x89PNG\r\n\x1a\n"[..],
+            &[0xff, 0xd8, 0xff],
+            b"BM",
+            b"GIF89a",
+            b"RIFF\x40\0\0\0WEBPVP8 ",
+        ])
         .words([
             &b"IHDR"[..],
             b"IDAT",

@@ -45,12 +45,8 @@ function decodeSurface(block) {
   let at = 2 * positions.length;
   const given = "normals" in block.dataset;
   const normals = new Float32Array(positions.length);
-  for (let k = 0; given && k < normals.length; k += 3, at += 4) {
-    const x = 2 * ((bytes[at] | (bytes[at + 1] << 8)) / 65535) - 1;
-    const y = 2 * ((bytes[at + 2] | (bytes[at + 3] << 8)) / 65535) - 1;
-    const z = 1 - Math.abs(x) - Math.abs(y);
-    const fold = Math.max(0, -z);
-    normals.set([x < 0 ? x + fold : x - fold, y < 0 ? y + fold : y - fold, z], k);
+  for (let k = 0; given && k < normals.length; k++, at += 2) {
+    normals[k] = (2 * (bytes[at] | (bytes[at + 1] << 8))) / 65535 - 1;
   }
   const corners = new Uint32Array(3 * Number(faces));
   let next = 0;

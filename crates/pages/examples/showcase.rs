@@ -3,19 +3,20 @@
 use std::error::Error;
 use std::time::Duration;
 
+use geometry::measure::BoundingBox;
 use geometry::shapes::{Ball, Torus};
-use geometry::{Field, Grid, SignedDistance, SignedDistanceExt, UpAxis, phase_field};
+use geometry::{Field, Grid, SignedDistance, UpAxis, phase_field};
 use pages::{Details, Facts, Figure, Frames, Image, Page, Section, Table, Text, View, Viewer};
-use render::{Framing, Picture, Scene};
+use render::{Picture, Scene, animation};
 use surfaces::{TriangleMesh, phase_field_surface, samples};
 
 /// A picture of a field and its surface.
 fn drawn(u: &Field<3>, eps: f64) -> Result<(Picture, TriangleMesh), Box<dyn Error>> {
-    let framing = Framing::Ball {
-        centre: [0.0; 3],
-        radius: 0.45,
+    let bounds = BoundingBox {
+        lower: [-0.38, -0.38, -0.3],
+        upper: [0.38, 0.38, 0.3],
     };
-    let picture = Scene::new(u, eps)?.framing(framing).render((480, 360))?;
+    let picture = Scene::new(u, eps)?.within(bounds).render([480, 360])?;
     Ok((picture, phase_field_surface(u, eps)?))
 }
 
@@ -47,19 +48,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     let poster = Image::from_picture(&steps[0].1.0)?;
     let viewer = Viewer::new("A torus becomes a ball", poster, View::default(), surfaces)?;
 
-    // A figure that stands along the second axis, drawn from its signed distance.
+    // A figure that stands along the second axis.
     let figure = samples::figure(64)?;
-    let distance = surfaces::MeshDistance::new(&figure).sample(Grid::centred(64, 1.0)?, || ())?;
     let view = View {
         up: UpAxis::Y,
         azimuth: 205.0,
         elevation: 10.0,
     };
-    let picture = Scene::from_signed_distance(&distance)?
-        .up(view.up)
-        .azimuth(view.azimuth)
-        .elevation(view.elevation)
-        .render((480, 480))?;
+    let scene = Scene::of_mesh(figure.mesh().clone()).view(view);
+    let picture = scene.render([480; 2])?;
     let standing = Viewer::new(
         "A figure of the crate surfaces",
         Image::from_picture(&picture)?,
@@ -67,10 +64,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         [("figure", figure.mesh())],
     )?;
 
-    let turning = Scene::new(&phase_field(grid, &torus.translated([0.0; 3]), eps)?, eps)?
-        .elevation(35.0)
-        .turntable(12, 160, Duration::from_millis(90))?;
-    let turning = Image::from_bytes("turntable", &turning.to_apng()?)?;
+    let pictures: Vec<Picture> = steps
+        .iter()
+        .map(|(_, (picture, _))| picture.clone())
+        .collect();
+    let film = animation(&pictures, Duration::from_millis(200))?;
+    let film = Image::from_bytes("film", &film)?;
 
     let csv = "method,n,error,order\nlearned operator,128,0.0012,\nimplicit,128,0.0028,2.0\n\
                implicit,256,7.0e-4,2.0\n<script>alert(1)</script>,1,2,3\n";
@@ -81,17 +80,13 @@ fn main() -> Result<(), Box<dyn Error>> {
             .with("markup", "<b>&amp;</b>"),
     );
     let page = Page::new("One of everything")
-        .with_lead(
-            Text::from("What the crate ")
-                .code("pages")
-                .then(" can show."),
-        )
+        .with_lead(Text::markdown("What the crate `pages` can show."))
         .with(Section::new("Surfaces").with(viewer).with(standing))
         .with(Section::new("A sequence").with(Frames::new("The same as pictures", frames)?))
-        .with(Section::new("An animation").with(Figure::new(turning, "The Clifford torus.")))
+        .with(Section::new("An animation").with(Figure::new(film, "The same.")))
         .with(
             Section::new("Numbers")
-                .with("Text is text: <i>not slanted</i>.")
+                .with(Text::from("Text is text: <i>not slanted</i>."))
                 .with(Table::from_csv("Errors", csv)?)
                 .with(details),
         );

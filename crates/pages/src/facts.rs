@@ -2,12 +2,11 @@
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
-use std::fmt::Write;
 
+use maud::{Markup, Render, html};
 use serde_json::Value;
 
 use crate::error::{Error, Result};
-use crate::escape::escaped;
 
 /// A list of names with values, such as the metrics of a run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -31,8 +30,8 @@ impl Facts {
         self
     }
 
-    /// Adds a value at the end: maps become names with dots, lists of plain values one line, and
-    /// null is left out.
+    /// Adds a value at the end: maps become names with dots, lists of plain values one line,
+    /// numbers have five digits unless they are whole, and null is left out.
     #[must_use]
     pub fn with_value(mut self, name: &str, value: &Value) -> Self {
         match value {
@@ -102,21 +101,24 @@ impl Facts {
     pub fn entries(&self) -> &[(String, String)] {
         &self.entries
     }
+}
 
-    pub(crate) fn html(&self) -> String {
-        let mut html = "<dl class=\"facts\">\n".to_owned();
-        for (name, value) in &self.entries {
-            let (name, value) = (escaped(name), escaped(value));
-            let _ = writeln!(html, "<div><dt>{name}</dt><dd>{value}</dd></div>");
+impl Render for Facts {
+    fn render(&self) -> Markup {
+        html! {
+            dl.facts {
+                @for (name, value) in &self.entries {
+                    div { dt { (name) } dd { (value) } }
+                }
+            }
         }
-        html.push_str("</dl>\n");
-        html
     }
 }
 
 fn plain(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
+        Value::Number(number) if number.is_f64() => five_digits(number.as_f64().unwrap_or(0.0)),
         other => other.to_string(),
     }
 }
@@ -178,6 +180,8 @@ pub fn five_digits(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::fmt::Write;
+
     use super::*;
     use proptest::prelude::*;
 

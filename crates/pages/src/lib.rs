@@ -1,7 +1,7 @@
 //! Pages to look at: figures, tables, picture sequences and surfaces to turn in one HTML file.
 //!
 //! ```
-//! use pages::{Details, Facts, Page, Section, Table, Viewer, View, Image};
+//! use pages::{Details, Facts, Image, Page, Section, Table, View, Viewer};
 //! use geometry::{Grid, phase_field, shapes::Ball};
 //!
 //! fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -11,7 +11,7 @@
 //!     let mesh = surfaces::phase_field_surface(&u, eps)?;
 //!     let picture = render::Scene::new(&u, eps)?
 //!         .quality(render::Quality::Draft)
-//!         .render((160, 120))?;
+//!         .render([160, 120])?;
 //!
 //!     let poster = Image::from_picture(&picture)?;
 //!     let ball = Viewer::new("A ball", poster, View::default(), [("step 0", &mesh)])?;
@@ -33,7 +33,8 @@
 //! # Conventions
 //!
 //! - A page works from a disk, from a server and from a mail; it asks the network for nothing.
-//! - Whatever text comes in is text, never markup.
+//! - Whatever text comes in is text, never markup, but for [`Text::markdown`] and the cells of tables
+//!   in Markdown, which cannot bring in scripts or pictures.
 //! - Without JavaScript everything but turning and playing is there: sequences are strips, surfaces
 //!   are pictures. Everything can be reached by keyboard and has a text for those who cannot see
 //!   it.
@@ -45,12 +46,9 @@
 pub mod results;
 
 mod error;
-mod escape;
 mod facts;
-mod frames;
 mod image;
 mod page;
-mod section;
 mod surface;
 mod table;
 mod text;
@@ -58,10 +56,9 @@ mod viewer;
 
 pub use error::{Error, Result};
 pub use facts::{Facts, five_digits};
-pub use frames::Frames;
-pub use image::{Image, Pictures};
-pub use page::Page;
-pub use section::{Block, Details, Figure, Section};
+pub use image::Image;
+pub use page::{Details, Figure, Frames, Page, Section};
+pub use render::View;
 pub use table::Table;
 pub use text::Text;
-pub use viewer::{View, Viewer};
+pub use viewer::Viewer;

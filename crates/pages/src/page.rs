@@ -1,17 +1,16 @@
 //! Pages: one HTML file with everything in it.
 
 use std::collections::HashSet;
-use std::fmt::Write;
 use std::path::Path;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use geometry::file::write_atomically;
+use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 use sha2::{Digest, Sha256};
 
-use crate::error::Result;
-use crate::escape::{escaped, identifier};
-use crate::section::{Needs, Section};
+use crate::error::{Error, Result};
+use crate::image::Image;
 use crate::text::Text;
 
 const STYLE: &str = include_str!("../assets/page.css");
@@ -25,10 +24,10 @@ const CONTENTS_FROM: usize = 3;
 
 /// A page with a title and sections.
 ///
-/// Its HTML needs nothing but linked pictures, if there are any: style and scripts are inside, and
-/// a content security policy forbids the browser to load anything else from anywhere, or to run
-/// any other script. The same page gives the same bytes.
-#[derive(Clone, Debug, PartialEq)]
+/// Its HTML needs nothing else: style, scripts and pictures are inside, and a content security policy
+/// forbids the browser to load anything from anywhere, or to run any other script. The same page
+/// gives the same bytes.
+#[derive(Clone, Debug)]
 pub struct Page {
     title: String,
     lead: Vec<Text>,
@@ -66,49 +65,58 @@ impl Page {
 
     /// The page as HTML.
     pub fn to_html(&self) -> String {
-        let mut needs = Needs::default();
-        for section in &self.sections {
-            section.add_needs(&mut needs);
-        }
-        let title = escaped(&self.title);
-        let script = script(needs);
-        let policy = policy(needs, &script);
-        let mut html = format!(
-            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-             <meta http-equiv=\"Content-Security-Policy\" content=\"{policy}\">\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <meta name=\"color-scheme\" content=\"light dark\">\n\
-             <title>{title}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
-             <header>\n<h1>{title}</h1>\n"
-        );
-        for text in &self.lead {
-            let _ = writeln!(html, "<p>{}</p>", text.html());
-        }
-        html.push_str("</header>\n");
         let ids = self.ids();
-        if ids.len() >= CONTENTS_FROM {
-            html.push_str("<nav aria-label=\"Contents\"><ol>\n");
-            for (section, id) in self.sections.iter().zip(&ids) {
-                let title = escaped(&section.title);
-                let _ = writeln!(html, "<li><a href=\"#{id}\">{title}</a></li>");
+        let sections = || self.sections.iter().zip(&ids);
+        let main = html! {
+            main {
+                @for (section, id) in sections() {
+                    section aria-labelledby=(id) {
+                        h2 id=(id) { (section.title) }
+                        (PreEscaped(&section.body))
+                    }
+                }
             }
-            html.push_str("</ol></nav>\n");
-        }
-        html.push_str("<main>\n");
-        for (section, id) in self.sections.iter().zip(&ids) {
-            section.write(&mut html, id);
-        }
-        let _ = write!(
-            html,
-            "</main>\n<script>{script}</script>\n</body>\n</html>\n"
-        );
-        html
+        };
+        // Text has no tags, so that these are those of the crate.
+        let has = |class: &str| main.0.contains(&format!("<figure class=\"{class}\""));
+        let script = script(has("frames"), has("viewer"));
+        let page = html! {
+            (DOCTYPE)
+            html lang="en" {
+                head {
+                    meta charset="utf-8";
+                    meta http-equiv="Content-Security-Policy" content=(PreEscaped(policy(&script)));
+                    meta name="viewport" content="width=device-width, initial-scale=1";
+                    meta name="color-scheme" content="light dark";
+                    title { (self.title) }
+                    style { (PreEscaped(STYLE)) }
+                }
+                body {
+                    header {
+                        h1 { (self.title) }
+                        @for text in &self.lead { (text) }
+                    }
+                    @if ids.len() >= CONTENTS_FROM {
+                        nav aria-label="Contents" {
+                            ol {
+                                @for (section, id) in sections() {
+                                    li { a href={ "#" (id) } { (section.title) } }
+                                }
+                            }
+                        }
+                    }
+                    (main)
+                    script { (PreEscaped(script)) }
+                }
+            }
+        };
+        page.into_string()
     }
 
     /// Writes the page, atomically.
     ///
     /// # Errors
-    /// [`Error::Write`](crate::Error::Write).
+    /// [`Error::Write`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         let html = self.to_html();
         Ok(write_atomically(path, |out| {
@@ -122,46 +130,206 @@ impl Page {
         let unique = |section: &Section| {
             let wanted = identifier(&section.name);
             let numbered = (2..).map(|k| format!("{wanted}-{k}"));
-            let id = std::iter::once(wanted.clone())
-                .chain(numbered)
-                .find(|id| !taken.contains(id))
-                .unwrap_or(wanted);
-            taken.insert(id.clone());
-            id
+            let mut free = std::iter::once(wanted.clone()).chain(numbered);
+            let id = free.find(|id| taken.insert(id.clone()));
+            id.expect("some number is free")
         };
         self.sections.iter().map(unique).collect()
     }
 }
 
-/// The scripts that the page needs, in one scope of their own.
-fn script(needs: Needs) -> String {
-    let parts = [
-        (needs.frames || needs.viewer, CONTROLS),
-        (needs.frames, FRAMES),
-        (needs.viewer, VIEWER),
-        (true, CHECK),
-    ];
-    let mut script = "(() => {\n\"use strict\";\n".to_owned();
-    for (_, part) in parts.iter().filter(|(needed, _)| *needed) {
-        script.push_str(part);
+/// A name as an identifier for links inside the page.
+fn identifier(name: &str) -> String {
+    let mut id = String::new();
+    for character in name.chars().flat_map(char::to_lowercase) {
+        if character.is_alphanumeric() || character == '_' {
+            id.push(character);
+        } else if !id.is_empty() && !id.ends_with('-') {
+            id.push('-');
+        }
     }
-    script.push_str("})();\n");
-    script
+    let id = id.trim_end_matches('-');
+    if id.is_empty() { "section" } else { id }.to_owned()
 }
 
-/// What the browser may load: nothing but the style and the script, by their hashes, and pictures.
-fn policy(needs: Needs, script: &str) -> String {
+/// The scripts that the page needs, in one scope of their own.
+fn script(frames: bool, viewer: bool) -> String {
+    let parts = [
+        (frames || viewer, CONTROLS),
+        (frames, FRAMES),
+        (viewer, VIEWER),
+        (true, CHECK),
+    ];
+    let needed = parts.into_iter().filter(|(needed, _)| *needed);
+    let parts: String = needed.map(|(_, part)| part).collect();
+    format!("(() => {{\n\"use strict\";\n{parts}}})();\n")
+}
+
+/// What the browser may load: nothing but the style and the script, by their hashes, and pictures
+/// inside.
+fn policy(script: &str) -> String {
     let hash = |text: &str| STANDARD.encode(Sha256::digest(text));
-    // Of pages without a server, `file:` are the neighbours.
-    let pictures = if needs.linked_pictures {
-        "data: 'self' file:"
-    } else {
-        "data:"
-    };
     format!(
-        "default-src 'none'; img-src {pictures}; style-src 'sha256-{}'; script-src 'sha256-{}'; \
+        "default-src 'none'; img-src data:; style-src 'sha256-{}'; script-src 'sha256-{}'; \
          base-uri 'none'; form-action 'none'",
         hash(STYLE),
         hash(script)
     )
+}
+
+/// A part of a page under a heading of its own.
+#[derive(Clone, Debug)]
+pub struct Section {
+    title: String,
+    name: String,
+    body: String,
+}
+
+impl Section {
+    /// An empty section.
+    pub fn new(title: impl Into<String>) -> Self {
+        let title = title.into();
+        Self {
+            name: title.clone(),
+            title,
+            body: String::new(),
+        }
+    }
+
+    /// Gives the section a name of its own for links to it, `page.html#name`; without, it is the
+    /// title in small letters.
+    #[must_use]
+    pub fn named(mut self, name: impl Into<String>) -> Self {
+        self.name = name.into();
+        self
+    }
+
+    /// Adds a [`Text`], [`Figure`], [`Table`](crate::Table), [`Facts`](crate::Facts), [`Frames`],
+    /// [`Viewer`](crate::Viewer) or [`Details`].
+    #[must_use]
+    pub fn with(mut self, block: impl Render) -> Self {
+        self.push(block);
+        self
+    }
+
+    /// Adds a block.
+    pub fn push(&mut self, block: impl Render) {
+        block.render_to(&mut self.body);
+    }
+}
+
+/// Blocks behind a line that opens them.
+#[derive(Clone, Debug)]
+pub struct Details {
+    summary: String,
+    body: String,
+}
+
+impl Details {
+    /// Nothing yet behind the given line.
+    pub fn new(summary: impl Into<String>) -> Self {
+        Self {
+            summary: summary.into(),
+            body: String::new(),
+        }
+    }
+
+    /// Adds a block.
+    #[must_use]
+    pub fn with(mut self, block: impl Render) -> Self {
+        block.render_to(&mut self.body);
+        self
+    }
+}
+
+impl Render for Details {
+    fn render(&self) -> Markup {
+        html! { details { summary { (self.summary) } (PreEscaped(&self.body)) } }
+    }
+}
+
+/// A picture with a caption, which also is what readers are told who cannot see the picture.
+#[derive(Clone, Debug)]
+pub struct Figure {
+    image: Image,
+    caption: String,
+}
+
+impl Figure {
+    /// A picture with a caption.
+    pub fn new(image: Image, caption: impl Into<String>) -> Self {
+        Self {
+            image,
+            caption: caption.into(),
+        }
+    }
+}
+
+impl Render for Figure {
+    fn render(&self) -> Markup {
+        let figure = html! {
+            figure { (self.image.html(&self.caption)) figcaption { (self.caption) } }
+        };
+        if self.image.is_animated() {
+            // What moves can be put away.
+            html! { details open { summary { "Animation" } (figure) } }
+        } else {
+            figure
+        }
+    }
+}
+
+/// Pictures of which one is shown at a time, chosen by a slider or played. Without JavaScript they
+/// are a strip that scrolls.
+#[derive(Clone, Debug)]
+pub struct Frames {
+    caption: String,
+    frames: Vec<(String, Image)>,
+}
+
+impl Frames {
+    /// A sequence of pictures with a label each, such as the step of a flow.
+    ///
+    /// # Errors
+    /// [`Error::Empty`] without pictures.
+    pub fn new(caption: impl Into<String>, frames: Vec<(String, Image)>) -> Result<Self> {
+        let caption = caption.into();
+        if frames.is_empty() {
+            return Err(Error::Empty {
+                what: "the sequence of pictures",
+                title: caption,
+            });
+        }
+        Ok(Self { caption, frames })
+    }
+}
+
+impl Render for Frames {
+    fn render(&self) -> Markup {
+        html! {
+            figure.frames {
+                div.strip tabindex="0" role="region" aria-label=(self.caption) {
+                    @for (label, image) in &self.frames {
+                        div.frame data-label=(label) {
+                            (image.html(&format!("{}, {label}", self.caption)))
+                            span { (label) }
+                        }
+                    }
+                }
+                figcaption { (self.caption) }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn identifiers_are_single_words() {
+        assert_eq!(identifier("Willmore flow, n = 128"), "willmore-flow-n-128");
+        assert_eq!(identifier("rocker_arm"), "rocker_arm");
+        assert_eq!(identifier("<?\"!"), "section");
+    }
 }

@@ -5,156 +5,419 @@
 //! the same as CSV beside it). [`index_page`] makes one page of all folders, [`run_page`] one of a
 //! single folder.
 
-mod catalogue;
-mod experiment;
-mod manifest;
-mod readme;
-
 use std::collections::BTreeSet;
-use std::fmt;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use serde::Deserialize;
+use serde_json::Value;
 
 use crate::error::{Error, Result};
-use crate::image::Pictures;
-use crate::page::Page;
-use crate::section::Section;
+use crate::facts::{Facts, five_digits, natural};
+use crate::image::Image;
+use crate::page::{Details, Figure, Frames, Page, Section};
+use crate::table::Table;
 use crate::text::Text;
 
-use catalogue::CATALOGUE;
-use experiment::Experiment;
+/// Longer tables are folded away.
+const LONGEST_OPEN_TABLE: usize = 24;
+/// Longer CSV files are data and no tables to read.
+const LONGEST_CSV: usize = 60;
+/// More phases than these are too many to read.
+const MOST_PHASES: usize = 40;
 
-/// Something that a page lacks because its file is missing or broken.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Problem {
-    /// The file, relative to the folder of the page.
-    pub file: String,
-    /// What is wrong with it.
-    pub problem: String,
+/// An experiment and the figures that it must have.
+#[derive(Deserialize)]
+struct Entry {
+    /// Name of its folder.
+    folder: String,
+    title: String,
+    /// What it is, in a sentence or two.
+    description: String,
+    /// Names of figures without extension, with their captions.
+    figures: Vec<(String, String)>,
 }
 
-impl fmt::Display for Problem {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.file, self.problem)
+/// All experiments whose results are kept, in the paper's order; others are shown after them.
+static CATALOGUE: LazyLock<Vec<Entry>> = LazyLock::new(|| {
+    #[derive(Deserialize)]
+    struct Catalogue {
+        experiment: Vec<Entry>,
     }
-}
+    let text = include_str!("../assets/catalogue.toml");
+    let catalogue: Catalogue = toml::from_str(text).expect("a test reads it");
+    catalogue.experiment
+});
 
-impl Problem {
-    fn new(file: impl Into<String>, problem: impl Into<String>) -> Self {
-        Self {
-            file: file.into(),
-            problem: problem.into(),
-        }
-    }
-
-    fn missing(file: impl Into<String>) -> Self {
-        Self::new(file, "it is missing")
-    }
-
-    /// Without the path of the folder, so that pages are the same wherever they are made.
-    fn because(file: impl Into<String>, error: &Error) -> Self {
-        let problem = match error {
-            Error::Read { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
-                "it is missing".to_owned()
-            }
-            Error::Read { source, .. } => format!("it cannot be read: {source}"),
-            Error::Picture { problem, .. } => format!("no intact PNG or SVG picture: {problem}"),
-            Error::Table { problem, .. } => format!("no table: {problem}"),
-            Error::Json {
-                expected, problem, ..
-            } => format!("not {expected}: {problem}"),
-            other => other.to_string(),
-        };
-        Self::new(file, problem)
-    }
-}
-
-/// The page of all experiments in a folder, in the paper's order, and what is missing from it. It
-/// is to lie in that folder if pictures are linked.
+/// The page of all experiments in a folder, in the paper's order after its `README.md`, and what is
+/// missing or broken.
 ///
 /// # Errors
-/// [`Error::Read`] if the folder cannot be read. Files are no errors but problems.
-pub fn index_page(folder: &Path, pictures: Pictures) -> Result<(Page, Vec<Problem>)> {
+/// [`Error::Read`] if the folder cannot be read. Files are none.
+pub fn index_page(folder: &Path) -> Result<(Page, Vec<Error>)> {
     let mut problems = Vec::new();
-    let states = match readme::read(&folder.join("README.md")) {
-        Ok(states) => states,
-        Err(error) => {
-            problems.push(Problem::because("README.md", &error));
-            readme::States::default()
+    let mut found: BTreeSet<String> = entries(folder, true)?.into_iter().collect();
+    let mut names = Vec::new();
+    for Entry { folder, .. } in CATALOGUE.iter() {
+        match found.take(folder) {
+            Some(name) => names.push(name),
+            None => problems.push(Error::Missing(folder.clone())),
         }
-    };
-    let mut found: BTreeSet<String> = folders(folder)?;
+    }
+    names.extend(found);
+    let page = Page::new("Results of the Willmore flow workbench");
     let mut sections = Vec::new();
-    for entry in CATALOGUE {
-        if !found.remove(entry.folder) {
-            problems.push(Problem::missing(entry.folder));
-            continue;
-        }
-        sections
-            .push(Experiment::new(folder, entry.folder, pictures).section(&states, &mut problems));
+    if let Some(text) = kept(read(folder, "README.md"), &mut problems) {
+        let section = |target: &str| {
+            let name = target.split('/').next()?;
+            names.iter().find(|other| *other == name).cloned()
+        };
+        let text = Text::linked(without_title(&text), section);
+        sections.push(Section::new("Beside the paper").with(text));
     }
-    for name in &found {
-        sections.push(Experiment::new(folder, name, pictures).section(&states, &mut problems));
+    for name in &names {
+        sections.push(experiment(folder, name, None, &mut problems));
     }
-    let mut lead = Text::from(
-        "Figures, tables and numbers of all committed runs, in the paper's order. What they show \
-         beside the results of Rumpf, Sassen and Smoch is in ",
-    );
-    lead = match pictures {
-        Pictures::Linked => lead.link("README.md", "README.md")?,
-        Pictures::Embedded => lead.code("results/README.md"),
-    };
-    let page = Page::new("Results of the Willmore flow workbench").with_lead(lead.then("."));
     Ok((finished(page, sections, &problems), problems))
 }
 
-/// The page of one run, with its pictures inside, and what is missing from it.
+/// The page of one run, and what is missing or broken.
 ///
 /// # Errors
-/// [`Error::Read`] if the folder cannot be read. Files are no errors but problems.
-pub fn run_page(folder: &Path) -> Result<(Page, Vec<Problem>)> {
-    folders(folder)?;
+/// [`Error::Read`] if the folder cannot be read. Files are none.
+pub fn run_page(folder: &Path) -> Result<(Page, Vec<Error>)> {
+    entries(folder, false)?;
     let mut problems = Vec::new();
-    let run = Experiment::new(folder, "", Pictures::Embedded);
-    let section = run.section(&readme::States::default(), &mut problems);
-    let page = Page::new(section.title.clone());
-    Ok((
-        finished(page, vec![section.retitled("Results")], &problems),
-        problems,
-    ))
+    let name = manifest(folder, "manifest.json").map(|(name, _)| name);
+    let name = name.unwrap_or_default();
+    let section = experiment(folder, "", Some(&name), &mut problems);
+    let page = Page::new(title(&name));
+    Ok((finished(page, vec![section], &problems), problems))
 }
 
-fn finished(mut page: Page, sections: Vec<Section>, problems: &[Problem]) -> Page {
-    if !problems.is_empty() {
-        let items: Vec<Text> = problems
-            .iter()
-            .map(|p| Text::default().code(&p.file).then(": ").then(&p.problem))
-            .collect();
-        let section = Section::new("Missing or broken files").named("problems");
-        page.push(section.with(items));
+fn finished(page: Page, sections: Vec<Section>, problems: &[Error]) -> Page {
+    let mut first = Section::new("Missing or broken files").named("problems");
+    for problem in problems {
+        first.push(Text::from(problem.to_string()));
     }
-    for section in sections {
-        page.push(section);
-    }
-    page
+    let first = (!problems.is_empty()).then_some(first);
+    first.into_iter().chain(sections).fold(page, Page::with)
 }
 
-/// Names of the folders inside a folder, without hidden ones.
-fn folders(folder: &Path) -> Result<BTreeSet<String>> {
+fn title(name: &str) -> String {
+    let entry = CATALOGUE.iter().find(|entry| entry.folder == name);
+    entry.map_or_else(|| spelled_out(name), |entry| entry.title.clone())
+}
+
+/// The section of the experiment in the folder `root/folder`, which is `name`, or that of the folder.
+fn experiment(root: &Path, folder: &str, name: Option<&str>, problems: &mut Vec<Error>) -> Section {
+    let path = |file: &str| {
+        if folder.is_empty() {
+            file.to_owned()
+        } else {
+            format!("{folder}/{file}")
+        }
+    };
+    let heading = name.map_or_else(|| title(folder), |_| "Results".to_owned());
+    let name = name.unwrap_or(folder);
+    let mut section = Section::new(heading).named(name);
+    let files = kept(entries(&root.join(folder), false), problems).unwrap_or_default();
+    let facts = kept(manifest(root, &path("manifest.json")), problems);
+    let entry = CATALOGUE.iter().find(|entry| entry.folder == name);
+    if let Some(entry) = entry {
+        section.push(Text::markdown(&entry.description));
+    }
+    let (single, sequences) = pictures(&files);
+    let captions = entry.map_or(&[][..], |entry| &entry.figures);
+    for (file, caption) in ordered(single, captions) {
+        let Some(file) = file else {
+            problems.push(Error::Missing(path(&caption)));
+            continue;
+        };
+        if let Some(image) = kept(image(root, &path(&file)), problems) {
+            section.push(Figure::new(image, caption));
+        }
+    }
+    for (name, files) in sequences {
+        let frames = files.iter().filter_map(|file| {
+            let image = kept(image(root, &path(file)), problems)?;
+            Some((number_of(file)?.1.to_owned(), image))
+        });
+        if let Ok(frames) = Frames::new(format!("{}.", spelled_out(&name)), frames.collect()) {
+            section.push(frames);
+        }
+    }
+    let mut folded = Vec::new();
+    for (file, marked) in tables(&files) {
+        let caption = spelled_out(stem_of(file));
+        let table = read(root, &path(file)).and_then(|text| {
+            if marked {
+                Table::from_markdown(path(file), &text)
+            } else {
+                Table::from_csv(path(file), &text)
+            }
+        });
+        let Some(table) = kept(table, problems) else {
+            continue;
+        };
+        let (rows, table) = (table.rows().len(), table.with_caption(&caption));
+        if marked && rows <= LONGEST_OPEN_TABLE {
+            section.push(table);
+        } else if marked || rows <= LONGEST_CSV {
+            folded.push(Details::new(format!("{caption} ({rows} rows)")).with(table));
+        }
+    }
+    let summary = path("summary.json");
+    let summary = read(root, &summary).and_then(|json| Facts::from_summary(&summary, &json));
+    if let Some(summary) = kept(summary, problems) {
+        folded.push(Details::new("Metrics").with(summary));
+    }
+    if let Some((_, facts)) = facts {
+        folded.push(Details::new("How it was computed").with(facts));
+    }
+    folded.into_iter().fold(section, Section::with)
+}
+
+/// What is there; otherwise a problem more.
+fn kept<T>(result: Result<T>, problems: &mut Vec<Error>) -> Option<T> {
+    result.map_err(|error| problems.push(error)).ok()
+}
+
+/// Names of the files in a folder, or of the folders, without hidden ones, in natural order.
+fn entries(folder: &Path, folders: bool) -> Result<Vec<String>> {
     let failed = |source| Error::Read {
         path: folder.into(),
         source,
     };
-    let mut names = BTreeSet::new();
+    let mut names = Vec::new();
     for entry in fs::read_dir(folder).map_err(failed)? {
         let entry = entry.map_err(failed)?;
-        let name = entry.file_name();
-        // Names that are not text cannot be linked; nothing here makes such.
-        if let Some(name) = name.to_str().filter(|name| !name.starts_with('.'))
-            && entry.path().is_dir()
+        // Names that are not text are none of ours.
+        if let Ok(name) = entry.file_name().into_string()
+            && !name.starts_with('.')
+            && entry.path().is_dir() == folders
         {
-            names.insert(name.to_owned());
+            names.push(name);
         }
     }
+    names.sort_by(|a, b| natural(a, b));
     Ok(names)
+}
+
+/// A file, with errors that do not say where the page is made.
+fn read_bytes(root: &Path, file: &str) -> Result<Vec<u8>> {
+    fs::read(root.join(file)).map_err(|source| Error::Read {
+        path: PathBuf::from(file),
+        source,
+    })
+}
+
+fn read(root: &Path, file: &str) -> Result<String> {
+    Ok(String::from_utf8_lossy(&read_bytes(root, file)?).into_owned())
+}
+
+fn image(root: &Path, file: &str) -> Result<Image> {
+    Image::from_bytes(file, &read_bytes(root, file)?)
+}
+
+/// The experiment of a manifest, and the important facts: program, machine, seed, times, parameters.
+fn manifest(root: &Path, file: &str) -> Result<(String, Facts)> {
+    const KEYS: [&str; 12] = [
+        "experiment",
+        "version",
+        "commit",
+        "device",
+        "backend",
+        "dtype",
+        "seed",
+        "started",
+        "wall_seconds",
+        "cpus",
+        "rustc",
+        "target",
+    ];
+    let failed = |problem: String| Error::Json {
+        name: file.to_owned(),
+        expected: "the manifest of a run",
+        problem,
+    };
+    let manifest: Value =
+        serde_json::from_str(&read(root, file)?).map_err(|error| failed(error.to_string()))?;
+    let (Some(name), Value::Object(parameters)) =
+        (manifest["experiment"].as_str(), &manifest["parameters"])
+    else {
+        return Err(failed("it names no experiment or no parameters".to_owned()));
+    };
+    let named = KEYS.into_iter().map(|key| (key, &manifest[key]));
+    let parameters = parameters.iter().map(|(key, value)| (key.as_str(), value));
+    let facts = named
+        .chain(parameters)
+        .fold(Facts::new(), |facts, (key, value)| {
+            facts.with_value(key, value)
+        });
+    let phases = manifest["phases"].as_array().map_or(&[][..], Vec::as_slice);
+    let facts = phases.iter().take(MOST_PHASES).fold(facts, |facts, phase| {
+        let seconds = phase["seconds"].as_f64().unwrap_or(f64::NAN);
+        facts.with(
+            phase["name"].as_str().unwrap_or_default(),
+            format!("{} s", five_digits(seconds)),
+        )
+    });
+    Ok((name.to_owned(), facts))
+}
+
+/// A Markdown text without the line of its title.
+fn without_title(text: &str) -> &str {
+    match text.split_once('\n') {
+        Some((first, rest)) if first.starts_with("# ") => rest,
+        _ => text,
+    }
+}
+
+/// Files of the captions, or, where there is none, its name; then other files with their names.
+fn ordered(
+    mut single: Vec<String>,
+    captions: &[(String, String)],
+) -> Vec<(Option<String>, String)> {
+    let mut figures = Vec::new();
+    for (stem, caption) in captions {
+        let place = single.iter().position(|file| stem_of(file) == *stem);
+        figures.push(match place {
+            Some(place) => (Some(single.remove(place)), caption.clone()),
+            None => (None, format!("{stem}.png")),
+        });
+    }
+    figures.extend(single.into_iter().map(|file| {
+        let caption = format!("{}.", spelled_out(stem_of(&file)));
+        (Some(file), caption)
+    }));
+    figures
+}
+
+/// Tables in Markdown, and those in CSV that are not there in Markdown.
+fn tables(files: &[String]) -> impl Iterator<Item = (&str, bool)> {
+    let has = |file: String| files.contains(&file);
+    files
+        .iter()
+        .filter_map(move |file| match extension_of(file) {
+            "md" if file != "README.md" => Some((file.as_str(), true)),
+            "csv" if !has(format!("{}.md", stem_of(file))) => Some((file.as_str(), false)),
+            _ => None,
+        })
+}
+
+/// Single pictures, a PNG before the SVG of the same name, and numbered ones by their name.
+fn pictures(files: &[String]) -> (Vec<String>, Vec<(String, Vec<String>)>) {
+    let (mut single, mut sequences) = (Vec::new(), Vec::<(String, Vec<String>)>::new());
+    let has = |stem: &str, extension: &str| files.contains(&format!("{stem}.{extension}"));
+    for file in files {
+        let stem = stem_of(file);
+        match (extension_of(file), number_of(file)) {
+            ("png", Some((name, _))) => match sequences.iter_mut().find(|(n, _)| n == name) {
+                Some((_, files)) => files.push(file.clone()),
+                None => sequences.push((name.to_owned(), vec![file.clone()])),
+            },
+            ("png" | "apng", _) => single.push(file.clone()),
+            ("svg", _) if !has(stem, "png") && !has(stem, "apng") => single.push(file.clone()),
+            _ => {}
+        }
+    }
+    // One number is no sequence.
+    let (sequences, ones): (Vec<_>, Vec<_>) = sequences.into_iter().partition(|(_, f)| f.len() > 1);
+    single.extend(ones.into_iter().flat_map(|(_, files)| files));
+    (single, sequences)
+}
+
+fn extension_of(file: &str) -> &str {
+    file.rsplit_once('.').map_or("", |(_, extension)| extension)
+}
+
+fn stem_of(file: &str) -> &str {
+    file.rsplit_once('.').map_or(file, |(stem, _)| stem)
+}
+
+/// `name` and `012` of `name_012.png`.
+fn number_of(file: &str) -> Option<(&str, &str)> {
+    let (name, number) = stem_of(file).rsplit_once(['_', '-'])?;
+    let is_number = number.len() >= 3 && number.bytes().all(|b| b.is_ascii_digit());
+    is_number.then_some((name, number))
+}
+
+/// `Error over radius` of `error_over_radius`.
+fn spelled_out(name: &str) -> String {
+    let text = name.replace(['_', '-'], " ");
+    let mut characters = text.chars();
+    match characters.next() {
+        Some(first) => first.to_uppercase().chain(characters).collect(),
+        None => "Results".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    #[test]
+    fn every_experiment_is_in_the_catalogue_once() {
+        let folders: HashSet<&str> = CATALOGUE.iter().map(|e| e.folder.as_str()).collect();
+        assert_eq!(folders.len(), CATALOGUE.len());
+        assert!(CATALOGUE.iter().all(|entry| !entry.figures.is_empty()));
+        assert_eq!(title("cross"), "Willmore flow of a cross");
+        assert_eq!(title("error_over_radius"), "Error over radius");
+        assert_eq!(title(""), "Results");
+    }
+
+    #[test]
+    fn pictures_are_sorted_into_figures_and_sequences() {
+        let files = [
+            "a.png",
+            "a.svg",
+            "b.svg",
+            "turn_000.png",
+            "turn_001.png",
+            "x-123.png",
+            "t.csv",
+        ];
+        let files: Vec<String> = files.map(str::to_owned).into();
+        let (single, sequences) = pictures(&files);
+        assert_eq!(single, ["a.png", "b.svg", "x-123.png"]);
+        let turn = vec!["turn_000.png".to_owned(), "turn_001.png".to_owned()];
+        assert_eq!(sequences, [("turn".to_owned(), turn)]);
+    }
+
+    #[test]
+    fn parameters_are_flat_and_absent_facts_left_out() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |json: &str| fs::write(folder.path().join("m.json"), json).unwrap();
+        write(
+            r#"{"experiment": "x", "parameters": {"n": [64, 128], "a": {"b": true, "c": null},
+            "l": [{"d": "e"}]}, "dtype": "f64", "seed": null, "wall_seconds": 1.5,
+            "phases": [{"name": "p", "seconds": 2}]}"#,
+        );
+        let (name, facts) = manifest(folder.path(), "m.json").unwrap();
+        let entries: Vec<(&str, &str)> = (facts.entries().iter())
+            .map(|(name, value)| (name.as_str(), value.as_str()))
+            .collect();
+        let expected = [
+            ("experiment", "x"),
+            ("dtype", "f64"),
+            ("wall_seconds", "1.5000"),
+            ("a.b", "true"),
+            ("l[0].d", "e"),
+            ("n", "64, 128"),
+            ("p", "2 s"),
+        ];
+        assert_eq!((name.as_str(), &entries[..]), ("x", &expected[..]));
+        for json in ["", "{}", "[]", "{\"experiment\": 3, \"parameters\": {}}"] {
+            write(json);
+            let message = manifest(folder.path(), "m.json").unwrap_err().to_string();
+            assert!(
+                message.contains("m.json") && !message.contains('\n'),
+                "{message}"
+            );
+        }
+    }
 }

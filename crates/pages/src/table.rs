@@ -1,9 +1,10 @@
 //! Tables from rows, CSV or Markdown.
 
-use std::fmt::Write;
+use maud::{Markup, Render, html};
+use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
 
 use crate::error::{Error, Result};
-use crate::escape::escaped;
+use crate::text::inline;
 
 /// A table of text, its columns of numbers aligned right.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -11,39 +12,39 @@ pub struct Table {
     caption: String,
     head: Vec<String>,
     rows: Vec<Vec<String>>,
+    /// Whether the cells are Markdown.
+    marked: bool,
 }
 
 impl Table {
     /// A table from its parts.
     ///
     /// # Errors
-    /// [`Error::RowLength`]; [`Error::Table`] without columns.
+    /// [`Error::Table`] without columns, and for rows of other lengths.
     pub fn new(
         caption: impl Into<String>,
         head: impl IntoIterator<Item = impl Into<String>>,
         rows: impl IntoIterator<Item = impl IntoIterator<Item = impl Into<String>>>,
     ) -> Result<Self> {
-        let (caption, head) = (caption.into(), words(head));
-        if head.is_empty() {
-            return Err(Error::Table {
-                name: caption,
-                problem: "it has no columns".to_owned(),
-            });
-        }
+        let (name, head) = (caption.into(), words(head));
         let rows: Vec<Vec<String>> = rows.into_iter().map(words).collect();
-        if let Some(row) = rows.iter().position(|row| row.len() != head.len()) {
-            return Err(Error::RowLength {
-                name: caption,
-                row,
-                expected: head.len(),
-                found: rows[row].len(),
-            });
-        }
-        Ok(Self {
-            caption,
-            head,
-            rows,
-        })
+        let other = rows.iter().position(|row| row.len() != head.len());
+        let problem = match other {
+            _ if head.is_empty() => "it has no columns".to_owned(),
+            Some(row) => {
+                let (found, expected) = (rows[row].len(), head.len());
+                format!("row {row} has {found} cells where there are {expected} columns")
+            }
+            None => {
+                return Ok(Self {
+                    caption: name,
+                    head,
+                    rows,
+                    marked: false,
+                });
+            }
+        };
+        Err(Error::Table { name, problem })
     }
 
     /// A table from CSV with a head.
@@ -74,25 +75,37 @@ impl Table {
     /// # Errors
     /// [`Error::Table`] without one; as [`Table::new`].
     pub fn from_markdown(caption: impl Into<String>, markdown: &str) -> Result<Self> {
-        let caption = caption.into();
-        let lines: Vec<&str> = markdown.lines().map(str::trim).collect();
-        let rule = lines.iter().position(|line| is_rule(line));
-        let Some(rule) = rule.filter(|&line| line > 0 && lines[line - 1].starts_with('|')) else {
+        let mut rows: Vec<Vec<String>> = Vec::new();
+        for (event, range) in Parser::new_ext(markdown, Options::ENABLE_TABLES).into_offset_iter() {
+            match event {
+                Event::Start(Tag::TableHead | Tag::TableRow) => rows.push(Vec::new()),
+                Event::Start(Tag::TableCell) => {
+                    let cell = markdown[range].trim().to_owned();
+                    rows.last_mut()
+                        .into_iter()
+                        .for_each(|row| row.push(cell.clone()));
+                }
+                Event::End(TagEnd::Table) => break,
+                _ => {}
+            }
+        }
+        if rows.is_empty() {
             return Err(Error::Table {
-                name: caption,
+                name: caption.into(),
                 problem: "it has no line such as |---|---| below a line of heads".to_owned(),
             });
-        };
-        let rows = lines[rule + 1..]
-            .iter()
-            .take_while(|line| line.starts_with('|'))
-            .map(|line| cells(line));
-        Self::new(caption, cells(lines[rule - 1]), rows)
+        }
+        let head = rows.remove(0);
+        let mut table = Self::new(caption, head, rows)?;
+        table.marked = true;
+        Ok(table)
     }
 
-    /// Its caption.
-    pub fn caption(&self) -> &str {
-        &self.caption
+    /// The table under another caption.
+    #[must_use]
+    pub(crate) fn with_caption(mut self, caption: &str) -> Self {
+        caption.clone_into(&mut self.caption);
+        self
     }
 
     /// Names of the columns.
@@ -111,38 +124,42 @@ impl Table {
         cells.all(|cell| is_missing(cell) || is_number(cell))
     }
 
-    pub(crate) fn html(&self) -> String {
+    fn cell(&self, text: &str) -> Markup {
+        if self.marked {
+            inline(text)
+        } else {
+            html! { (text) }
+        }
+    }
+}
+
+impl Render for Table {
+    fn render(&self) -> Markup {
         let numeric: Vec<bool> = (0..self.head.len()).map(|k| self.is_numeric(k)).collect();
-        let class = |k: usize| if numeric[k] { " class=\"n\"" } else { "" };
-        let head_class = |k: usize| match (numeric[k], is_short(&self.head[k])) {
-            (true, true) => " class=\"n s\"",
-            (false, true) => " class=\"s\"",
-            (_, false) => class(k),
-        };
-        let caption = escaped(&self.caption);
         // Wide tables scroll, also by keyboard.
-        let mut html = format!(
-            "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\">\
-             <table>\n<caption>{caption}</caption>\n<thead><tr>"
-        );
-        for (k, name) in self.head.iter().enumerate() {
-            let _ = write!(
-                html,
-                "<th scope=\"col\"{}>{}</th>",
-                head_class(k),
-                escaped(name)
-            );
-        }
-        html.push_str("</tr></thead>\n<tbody>\n");
-        for row in &self.rows {
-            html.push_str("<tr>");
-            for (k, cell) in row.iter().enumerate() {
-                let _ = write!(html, "<td{}>{}</td>", class(k), escaped(cell));
+        html! {
+            div.scroll tabindex="0" role="region" aria-label=(self.caption) {
+                table {
+                    caption { (self.caption) }
+                    thead {
+                        tr {
+                            @for (name, numeric) in self.head.iter().zip(&numeric) {
+                                th scope="col" class=[head_class(name, *numeric)] { (self.cell(name)) }
+                            }
+                        }
+                    }
+                    tbody {
+                        @for row in &self.rows {
+                            tr {
+                                @for (cell, numeric) in row.iter().zip(&numeric) {
+                                    td class=[numeric.then_some("n")] { (self.cell(cell)) }
+                                }
+                            }
+                        }
+                    }
+                }
             }
-            html.push_str("</tr>\n");
         }
-        html.push_str("</tbody></table></div>\n");
-        html
     }
 }
 
@@ -150,9 +167,14 @@ fn words(cells: impl IntoIterator<Item = impl Into<String>>) -> Vec<String> {
     cells.into_iter().map(Into::into).collect()
 }
 
-/// Heads that look better on one line; a minus sign must not end a line, for example.
-fn is_short(head: &str) -> bool {
-    head.chars().count() <= 14
+/// Numbers stand on the right, and short heads on one line: a minus sign must not end a line.
+fn head_class(head: &str, numeric: bool) -> Option<&'static str> {
+    match (numeric, head.chars().count() <= 14) {
+        (true, true) => Some("n s"),
+        (true, false) => Some("n"),
+        (false, true) => Some("s"),
+        (false, false) => None,
+    }
 }
 
 fn is_missing(cell: &str) -> bool {
@@ -176,29 +198,6 @@ fn is_number(cell: &str) -> bool {
         .is_ok_and(f64::is_finite)
 }
 
-/// Whether a line of Markdown separates the heads of a table from its rows.
-fn is_rule(line: &str) -> bool {
-    line.starts_with('|') && line.contains('-') && line.chars().all(|c| "|:- ".contains(c))
-}
-
-/// The cells of a line of a Markdown table; `\|` and `\\` stand for themselves.
-fn cells(line: &str) -> Vec<String> {
-    let line = line.strip_prefix('|').unwrap_or(line);
-    let (mut cells, mut cell) = (Vec::new(), String::new());
-    let mut characters = line.chars().peekable();
-    while let Some(character) = characters.next() {
-        match character {
-            '\\' if matches!(characters.peek(), Some('|' | '\\')) => cell.extend(characters.next()),
-            '|' => cells.push(std::mem::take(&mut cell)),
-            _ => cell.push(character),
-        }
-    }
-    if !cell.trim().is_empty() {
-        cells.push(cell);
-    }
-    cells.iter().map(|cell| cell.trim().to_owned()).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -209,9 +208,12 @@ mod tests {
             "Intro.\n\n| method | \\|F\\| \\\\ |\n|:--|--:|\n| a | 1.5 |\n| b | – |\n\nEnd";
         let table = Table::from_markdown("t", markdown).unwrap();
         let csv = Table::from_csv("t", "method,|F| \\\na,1.5\nb,–\n").unwrap();
-        assert_eq!(table, csv);
-        assert_eq!(table.head(), ["method", "|F| \\"]);
+        assert_eq!(table.render().0, csv.render().0);
         assert_eq!(table.rows(), [["a", "1.5"], ["b", "–"]]);
+        assert_eq!(csv.head(), ["method", "|F| \\"]);
+        let linked = "| a |\n|---|\n| [b](c.png) `d` |\n";
+        let html = Table::from_markdown("t", linked).unwrap().render().0;
+        assert!(html.contains("<td>b <code>d</code></td>"), "{html}");
     }
 
     #[test]
@@ -225,7 +227,7 @@ mod tests {
         let table = Table::from_csv("t", "a,b,c\nx,1,z\ny,–,3\n").unwrap();
         let numeric: Vec<bool> = (0..3).map(|k| table.is_numeric(k)).collect();
         assert_eq!(numeric, [false, true, false]);
-        let html = table.html();
+        let html = table.render().0;
         let count = |part: &str| html.matches(part).count();
         assert_eq!((count("<td class=\"n\">"), count("<td>")), (2, 4));
         assert_eq!(

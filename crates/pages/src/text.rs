@@ -1,72 +1,155 @@
-//! Running text with links.
+//! Running text.
 
-use crate::error::Result;
-use crate::escape::{escaped, relative_address};
+use maud::{Markup, PreEscaped, Render};
+use pulldown_cmark::{CowStr, Event, HeadingLevel, Options, Parser, Tag, TagEnd, html};
 
-/// Text that may hold links to files beside the page and names in typewriter letters.
+/// A paragraph, or several.
 ///
 /// ```
 /// use pages::Text;
-/// let text = Text::from("The data are in ").link("errors.csv", "cross/errors.csv")?.then(".");
-/// # let _ = text;
-/// # Ok::<(), pages::Error>(())
+/// let [plain, marked] = [Text::from("2 < 3 `n`"), Text::markdown("2 < 3 `n`")];
+/// assert_eq!(maud::html!((plain)).0, "<p>2 &lt; 3 `n`</p>");
+/// assert_eq!(maud::html!((marked)).0, "<p>2 &lt; 3 <code>n</code></p>\n");
 /// ```
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Text {
-    html: String,
-}
+#[derive(Clone, Debug)]
+pub struct Text(Markup);
 
 impl Text {
-    /// Adds plain text.
-    #[must_use]
-    pub fn then(mut self, text: &str) -> Self {
-        self.html.push_str(&escaped(text));
-        self
+    /// Text in Markdown, headings one level down. HTML in it is shown as it is written; of links
+    /// to files only the text is left, as a page is a file of its own.
+    pub fn markdown(text: &str) -> Self {
+        Self(rendered(events(text, |_| None)))
     }
 
-    /// Adds a name in typewriter letters.
-    #[must_use]
-    pub fn code(mut self, name: &str) -> Self {
-        self.html.push_str("<code>");
-        self.html.push_str(&escaped(name));
-        self.html.push_str("</code>");
-        self
-    }
-
-    /// Adds a link to a file, given relative to the page.
-    ///
-    /// # Errors
-    /// [`Error::Link`](crate::Error::Link) unless the path is relative.
-    pub fn link(mut self, label: &str, path: &str) -> Result<Self> {
-        let address = relative_address(path)?;
-        self.html.push_str("<a href=\"");
-        self.html.push_str(&address);
-        self.html.push_str("\">");
-        self.html.push_str(&escaped(label));
-        self.html.push_str("</a>");
-        Ok(self)
-    }
-
-    /// This text followed by another.
-    #[must_use]
-    pub fn appended(mut self, text: &Self) -> Self {
-        self.html.push_str(&text.html);
-        self
-    }
-
-    pub(crate) fn html(&self) -> &str {
-        &self.html
+    /// The same with links to some files that lead to a section of the page; `section` gives its
+    /// name.
+    pub(crate) fn linked(text: &str, section: impl Fn(&str) -> Option<String>) -> Self {
+        Self(rendered(events(text, section)))
     }
 }
 
-impl From<&str> for Text {
-    fn from(text: &str) -> Self {
-        Self::default().then(text)
+impl<T: AsRef<str>> From<T> for Text {
+    fn from(text: T) -> Self {
+        let text = text.as_ref();
+        Self(maud::html! { p { (text) } })
     }
 }
 
-impl From<String> for Text {
-    fn from(text: String) -> Self {
-        Self::from(text.as_str())
+impl Render for Text {
+    fn render(&self) -> Markup {
+        self.0.clone()
+    }
+}
+
+/// Markdown within a line.
+pub(crate) fn inline(text: &str) -> Markup {
+    let is_block = |event: &Event<'_>| {
+        matches!(
+            event,
+            Event::Start(Tag::Paragraph) | Event::End(TagEnd::Paragraph)
+        )
+    };
+    rendered(events(text, |_| None).filter(|event| !is_block(event)))
+}
+
+fn rendered<'a>(events: impl Iterator<Item = Event<'a>>) -> Markup {
+    let mut text = String::new();
+    html::push_html(&mut text, events);
+    PreEscaped(text)
+}
+
+/// The parts of a text, without what a page must not have.
+fn events<'a>(
+    text: &'a str,
+    section: impl Fn(&str) -> Option<String> + 'a,
+) -> impl Iterator<Item = Event<'a>> {
+    let mut kept = true;
+    Parser::new_ext(text, Options::ENABLE_TABLES).filter_map(move |event| match event {
+        Event::Html(html) | Event::InlineHtml(html) => Some(Event::Text(html)),
+        Event::Start(Tag::HtmlBlock) => Some(Event::Start(Tag::Paragraph)),
+        Event::End(TagEnd::HtmlBlock) => Some(Event::End(TagEnd::Paragraph)),
+        // Of a picture the text is left.
+        Event::Start(Tag::Image { .. }) | Event::End(TagEnd::Image) => None,
+        Event::Start(Tag::Link {
+            link_type,
+            dest_url,
+            title,
+            id,
+        }) => {
+            let outside = ["https://", "http://"]
+                .iter()
+                .any(|s| dest_url.starts_with(s));
+            let target = if outside {
+                Some(dest_url)
+            } else {
+                section(&dest_url).map(|name| CowStr::from(format!("#{name}")))
+            };
+            kept = target.is_some();
+            target.map(|dest_url| {
+                Event::Start(Tag::Link {
+                    link_type,
+                    dest_url,
+                    title,
+                    id,
+                })
+            })
+        }
+        Event::End(TagEnd::Link) => kept.then_some(event),
+        Event::Start(Tag::Heading {
+            level,
+            id,
+            classes,
+            attrs,
+        }) => Some(Event::Start(Tag::Heading {
+            level: below(level),
+            id,
+            classes,
+            attrs,
+        })),
+        Event::End(TagEnd::Heading(level)) => Some(Event::End(TagEnd::Heading(below(level)))),
+        other => Some(other),
+    })
+}
+
+/// The next lower level of headings.
+fn below(level: HeadingLevel) -> HeadingLevel {
+    HeadingLevel::try_from(level as usize + 1).unwrap_or(HeadingLevel::H6)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn links_lead_outside_or_to_sections() {
+        let text = "[a](b) [c](https://d.org) ![e](f.png) <b>g</b> javascript: [x](javascript:y)";
+        let Text(PreEscaped(html)) =
+            Text::linked(text, |target| (target == "b").then(|| "b-2".to_owned()));
+        assert_eq!(
+            html,
+            "<p><a href=\"#b-2\">a</a> <a href=\"https://d.org\">c</a> e &lt;b&gt;g&lt;/b&gt; javascript: x</p>\n"
+        );
+        assert_eq!(inline("[a](b) **c**").0, "a <strong>c</strong>");
+    }
+
+    /// Any characters, those that mean something in HTML or Markdown more often than others.
+    fn text() -> impl Strategy<Value = String> {
+        let special = "<>&\"'\0\t\n-:/ &amp;*_`[](){}!|#\\"
+            .chars()
+            .collect::<Vec<_>>();
+        let character = prop_oneof![prop::sample::select(special), any::<char>()];
+        prop::collection::vec(character, 0..60).prop_map(String::from_iter)
+    }
+
+    proptest! {
+        #[test]
+        fn no_text_becomes_a_script_or_a_picture(text in text(), tag in 0..3_usize) {
+            let tag = ["<script>", "<img src=x onerror=y>", "[x](<javascript:\">)"][tag];
+            for Text(PreEscaped(html)) in [Text::markdown(&format!("{text}{tag}")), Text::from(format!("{text}{tag}"))] {
+                prop_assert!(!html.contains("<script") && !html.contains("<img"), "{html}");
+                prop_assert!(!html.contains("href=\"j"), "{html}");
+            }
+        }
     }
 }

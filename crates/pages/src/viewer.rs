@@ -1,42 +1,18 @@
 //! Surfaces to turn.
 
-use std::fmt::Write;
-
-use geometry::UpAxis;
+use geometry::measure::BoundingBox;
+use maud::{Markup, PreEscaped, Render, html};
+use render::View;
 use surfaces::TriangleMesh;
 
 use crate::error::{Error, Result};
-use crate::escape::escaped;
 use crate::image::Image;
 use crate::surface::Surface;
-
-/// From where surfaces are seen at first; the angles are those of [`render::Camera`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
-    /// The axis that points up.
-    pub up: UpAxis,
-    /// Degrees about it.
-    pub azimuth: f64,
-    /// Degrees above the horizon, from -90 to 90.
-    pub elevation: f64,
-}
-
-impl Default for View {
-    /// That of [`render::Camera`].
-    fn default() -> Self {
-        let camera = render::Camera::default();
-        Self {
-            up: camera.up,
-            azimuth: camera.azimuth,
-            elevation: camera.elevation,
-        }
-    }
-}
 
 /// Surfaces, such as the steps of a flow, of which one is shown and can be turned. A picture stands
 /// in for them until they are started, and wherever they cannot be: without JavaScript or WebGL,
 /// and on paper.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Viewer {
     caption: String,
     poster: Image,
@@ -54,9 +30,8 @@ impl Viewer {
     /// those of the triangles around a vertex, weighted by area.
     ///
     /// # Errors
-    /// [`Error::Empty`] without surfaces; [`Error::NoFaces`], [`Error::Vertex`], [`Error::Index`]
-    /// [`Error::Normals`] for
-    /// meshes that cannot be shown; [`Error::View`].
+    /// [`Error::Empty`] without surfaces or faces, [`Error::Surface`] for meshes that cannot be
+    /// shown, [`Error::Render`] for angles that are not finite or beyond the poles.
     pub fn new<'a>(
         caption: impl Into<String>,
         poster: Image,
@@ -64,20 +39,7 @@ impl Viewer {
         surfaces: impl IntoIterator<Item = (&'a str, &'a TriangleMesh)>,
     ) -> Result<Self> {
         let caption = caption.into();
-        let angles = [
-            ("azimuth", view.azimuth, f64::MAX, "finite"),
-            ("elevation", view.elevation, 90.0, "between -90 and 90"),
-        ];
-        for (name, value, limit, requirement) in angles {
-            if value.is_nan() || value.abs() > limit {
-                return Err(Error::View {
-                    title: caption,
-                    name,
-                    value,
-                    requirement,
-                });
-            }
-        }
+        view.check()?;
         let (mut encoded, mut points) = (Vec::new(), Vec::new());
         for (label, mesh) in surfaces {
             encoded.push(Surface::new(label, mesh)?);
@@ -89,7 +51,6 @@ impl Viewer {
             return Err(Error::Empty {
                 what: "the viewer",
                 title: caption,
-                item: "surface",
             });
         }
         let (centre, radius) = ball(&points);
@@ -102,45 +63,26 @@ impl Viewer {
             radius,
         })
     }
+}
 
-    pub(crate) fn is_linked(&self) -> bool {
-        self.poster.is_linked()
-    }
-
-    pub(crate) fn html(&self) -> String {
-        let caption = escaped(&self.caption);
-        let up = self.view.up.index();
-        let mut html = format!(
-            "<figure class=\"viewer\" data-caption=\"{caption}\" data-up=\"{up}\" \
-             data-azimuth=\"{}\" data-elevation=\"{}\" data-centre=\"{}\" \
-             data-radius=\"{:e}\">\n<div class=\"stage\">{}</div>\n",
-            self.view.azimuth,
-            self.view.elevation,
-            listed(self.centre),
-            self.radius,
-            self.poster.html(&self.caption)
-        );
-        for surface in &self.surfaces {
-            // No script: a block of data, which browsers neither run nor show.
-            let _ = writeln!(
-                html,
-                "<script type=\"text/plain\" data-label=\"{}\" data-vertices=\"{}\" \
-                 data-faces=\"{}\"{} data-low=\"{}\" data-step=\"{}\">{}</script>",
-                escaped(&surface.label),
-                surface.vertices,
-                surface.faces,
-                if surface.has_normals {
-                    " data-normals"
-                } else {
-                    ""
-                },
-                listed(surface.low),
-                listed(surface.step()),
-                surface.data
-            );
+impl Render for Viewer {
+    fn render(&self) -> Markup {
+        html! {
+            figure.viewer data-caption=(self.caption) data-up=(self.view.up.index())
+                data-azimuth=(self.view.azimuth) data-elevation=(self.view.elevation)
+                data-centre=(listed(self.centre)) data-radius=(format!("{:e}", self.radius)) {
+                div.stage { (self.poster.html(&self.caption)) }
+                // No script: a block of data, which browsers neither run nor show.
+                @for surface in &self.surfaces {
+                    script type="text/plain" data-label=(surface.label) data-vertices=(surface.vertices)
+                        data-faces=(surface.faces) data-normals[surface.has_normals]
+                        data-low=(listed(surface.low)) data-step=(listed(surface.step())) {
+                        (PreEscaped(&surface.data))
+                    }
+                }
+                figcaption { (self.caption) }
+            }
         }
-        let _ = writeln!(html, "<figcaption>{caption}</figcaption>\n</figure>");
-        html
     }
 }
 
@@ -150,13 +92,7 @@ fn listed(values: [f64; 3]) -> String {
 
 /// The ball around points with the centre of their bounding box.
 fn ball(points: &[[f64; 3]]) -> ([f64; 3], f64) {
-    let centre = std::array::from_fn(|i| {
-        let values = points.iter().map(|x| x[i]);
-        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-            (low.min(v), high.max(v))
-        });
-        0.5 * (low + high)
-    });
+    let centre = BoundingBox::around(points.iter().copied()).map_or([0.0; 3], |b| b.centre());
     let radius = points.iter().map(|x| {
         let squares = (0..3).map(|i| (x[i] - centre[i]).powi(2));
         squares.sum::<f64>().sqrt()

@@ -28,16 +28,16 @@ fn page(text: &str) -> Page {
     let surfaces = [(text, &ball), ("1", &ball)];
     let details = Details::new(text)
         .with(Facts::new().with(text, text))
-        .with(vec![Text::from(text), Text::default().code(text)]);
+        .with(Text::from(text))
+        .with(Text::markdown(text));
     Page::new(text).with_lead(text).with(
         Section::new(text)
-            .with(text)
-            .with(Figure::new(picture(), text).with_alternative(text))
+            .with(Text::from(text))
+            .with(Figure::new(picture(), text))
             .with(Table::new(text, [text, "b"], [[text, "2"]]).unwrap())
             .with(Frames::new(text, frames).unwrap())
             .with(Viewer::new(text, picture(), View::default(), surfaces).unwrap())
-            .with(details)
-            .with(Text::default().link(text, "a&b/x y.svg").unwrap()),
+            .with(details),
     )
 }
 
@@ -67,20 +67,17 @@ fn text_is_never_markup() {
     };
     assert_eq!(names(&plain), names(&nasty));
     assert!(tags(&nasty).iter().all(|tag| !tag.contains(" onload=\"")));
-    assert!(!nasty.contains(NASTY) && !nasty.contains("alert('1')"));
-    assert!(nasty.contains("alert(&#39;1&#39;)"));
+    assert!(!nasty.contains(NASTY) && !nasty.contains("<script>alert"));
+    assert!(nasty.contains("&lt;script&gt;alert('1')"));
 }
 
 #[test]
 fn a_page_refers_to_nothing_elsewhere() {
     let html = page("text").to_html();
     let addresses = addresses(&html);
-    assert_eq!(addresses.len(), 5);
+    assert_eq!(addresses.len(), 4);
     for address in addresses {
-        assert!(
-            address.starts_with("data:image/png;base64,") || address == "a%26b/x%20y.svg",
-            "{address}"
-        );
+        assert!(address.starts_with("data:image/png;base64,"), "{address}");
     }
     for word in [
         "://",
@@ -128,7 +125,9 @@ fn the_same_page_gives_the_same_bytes_and_only_what_it_needs() {
     let html = page("text").to_html();
     assert_eq!(html, page("text").to_html());
     assert!(html.contains("createShader") && html.contains("figure.frames"));
-    let simple = Page::new("t").with(Section::new("s").with("p")).to_html();
+    let simple = Page::new("t")
+        .with(Section::new("s").with(Text::from("p")))
+        .to_html();
     assert!(!simple.contains("createShader") && !simple.contains("figure.frames"));
     // Four kilobytes of style, three of checks, and hardly anything else.
     assert!(simple.len() < 12_000, "{}", simple.len());
@@ -187,13 +186,10 @@ fn what_shows_nothing_is_refused() {
     let error = Viewer::new("ball", picture(), View::default(), []).unwrap_err();
     assert!(matches!(&error, Error::Empty { title, .. } if title == "ball"));
     let ball = ball();
-    for (azimuth, elevation) in [(f64::NAN, 0.0), (f64::INFINITY, 0.0), (0.0, 90.5)] {
-        let view = View {
-            azimuth,
-            elevation,
-            ..View::default()
-        };
-        let error = Viewer::new("ball", picture(), view, [("0", &ball)]).unwrap_err();
-        assert!(matches!(error, Error::View { .. }), "{azimuth} {elevation}");
-    }
+    let view = View {
+        elevation: 90.5,
+        ..View::default()
+    };
+    let error = Viewer::new("ball", picture(), view, [("0", &ball)]).unwrap_err();
+    assert!(matches!(error, Error::Render(_)), "{error}");
 }

@@ -3,11 +3,11 @@
 use std::error::Error;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use geometry::shapes::{Ball, Cross, RoundedBox, Torus};
 use geometry::{Field, Grid, SignedDistance, SignedDistanceExt, UpAxis, phase_field};
-use render::{Background, Framing, Picture, Rgb, Scene, Tube};
+use render::{Picture, Rgb, Scene, Tube, View};
 
 /// A union of balls of several sizes about the middle of the box.
 fn knobbly() -> impl SignedDistance<3> {
@@ -52,55 +52,53 @@ fn main() -> Result<(), Box<dyn Error>> {
     let field = |shape: &dyn SignedDistance<3>| -> Result<Field<3>, geometry::Error> {
         phase_field(grid, shape, eps)
     };
-    let draw =
-        |name: &str, scene: &Scene<'_>, size: (u32, u32)| -> Result<Picture, Box<dyn Error>> {
-            let start = Instant::now();
-            let picture = scene.render(size)?;
-            picture.write_png(folder.join(format!("{name}.png")))?;
-            println!("{name}: {:.2} s", start.elapsed().as_secs_f64());
-            Ok(picture)
-        };
-    let square = (800, 800);
+    let draw = |name: &str, scene: &Scene| -> Result<Picture, Box<dyn Error>> {
+        let start = Instant::now();
+        let picture = scene.render([800; 2])?;
+        picture.write_png(folder.join(format!("{name}.png")))?;
+        println!("{name}: {:.2} s", start.elapsed().as_secs_f64());
+        Ok(picture)
+    };
 
     let ball = field(&Ball::new(middle, 0.33)?)?;
-    draw("ball", &Scene::new(&ball, eps)?.ground_shadow(0.5), square)?;
+    draw("ball", &Scene::new(&ball, eps)?)?;
 
     let torus = field(&Torus::clifford(0.36)?.translated(middle))?;
-    let scene = Scene::new(&torus, eps)?.elevation(38.0);
-    draw("torus", &scene, square)?;
-    let scene = scene
-        .colour(Rgb::SKY)
-        .tube(Tube::new(circle(0.36, 0.0), 0.005).closed())
-        .tube(
-            Tube::new(circle(0.211, 0.149), 0.005)
-                .closed()
-                .with_colour(Rgb::VERMILLION),
-        );
-    draw("torus_circles", &scene, square)?;
-    scene
-        .turntable(8, 240, Duration::from_millis(80))?
-        .write_apng(folder.join("turntable.png"))?;
+    let scene = Scene::new(&torus, eps)?.view(View {
+        elevation: 38.0,
+        ..View::default()
+    });
+    draw("torus", &scene)?;
+    let scene = scene.colour(Rgb::SKY).tubes([
+        Tube::new(circle(0.36, 0.0), 0.005).closed(),
+        Tube::new(circle(0.211, 0.149), 0.005)
+            .closed()
+            .with_colour(Rgb::VERMILLION),
+    ]);
+    draw("torus_circles", &scene)?;
 
     let cube = field(&RoundedBox::new([0.26; 3], 0.06)?.translated(middle))?;
-    draw("cube", &Scene::new(&cube, eps)?.ground_shadow(0.5), square)?;
+    draw("cube", &Scene::new(&cube, eps)?)?;
+    let near = Ball::new([0.76, 0.6, 0.7], 0.17)?;
+    let mask = Field::from_fn(grid, |x| f64::from(u8::from(near.signed_distance(x) < 0.0)));
     let boxed = Scene::new(&cube, eps)?
         .colour(Rgb::SKY)
-        .framing(Framing::Domain)
         .tubes(Tube::edges_of_box([0.0; 3], [1.0; 3], 0.004))
-        .highlight(Ball::new([0.76, 0.6, 0.7], 0.17)?, Rgb::VERMILLION);
-    draw("boxed", &boxed, square)?;
+        .highlight_mask(&mask, Rgb::VERMILLION)?;
+    draw("boxed", &boxed)?;
 
     let start = Instant::now();
     let union = field(&knobbly())?;
     let scene = Scene::new(&union, eps)?;
     println!("field and scene: {:.2} s", start.elapsed().as_secs_f64());
-    draw("knobbly", &scene, square)?;
+    draw("knobbly", &scene)?;
     let cross = field(&Cross::new(0.36, 0.12)?.translated(middle))?;
     let scene = Scene::new(&cross, eps)?
-        .up(UpAxis::Y)
-        .orthographic()
-        .background(Background::Transparent)
-        .ground_shadow(0.6);
-    draw("cross", &scene, (960, 640))?;
+        .view(View {
+            up: UpAxis::Y,
+            ..View::default()
+        })
+        .transparent();
+    draw("cross", &scene)?;
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Where a picture is taken from, and what it shows.
+//! Where a picture is taken from.
 
 use geometry::UpAxis;
 use glam::DVec3;
@@ -6,214 +6,44 @@ use glam::DVec3;
 use crate::Error;
 use crate::error::require;
 
-/// How depth is shown.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Projection {
-    /// Parallel rays: no foreshortening, sizes in several pictures can be compared.
-    Orthographic,
-    /// Rays from one point.
-    Perspective {
-        /// Angle that the shorter side of the picture subtends, in degrees: from 1 to 120.
-        field_of_view: f64,
-    },
-}
+/// Angle that the shorter side of a picture subtends, in degrees: a mild perspective.
+const FIELD_OF_VIEW: f64 = 22.0;
+/// Part of the picture left free on each side.
+const MARGIN: f64 = 0.02;
 
-/// An axis-parallel box.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
-    /// Smallest coordinates.
-    pub low: [f64; 3],
-    /// Largest coordinates.
-    pub high: [f64; 3],
-}
-
-impl Bounds {
-    /// The smallest box around points, if there are any.
-    pub fn around(points: impl IntoIterator<Item = [f64; 3]>) -> Option<Self> {
-        points
-            .into_iter()
-            .map(|p| Self { low: p, high: p })
-            .reduce(|a, b| a.union(&b))
-    }
-
-    /// The smallest box around two.
-    #[must_use]
-    pub fn union(&self, other: &Self) -> Self {
-        Self {
-            low: std::array::from_fn(|i| self.low[i].min(other.low[i])),
-            high: std::array::from_fn(|i| self.high[i].max(other.high[i])),
-        }
-    }
-
-    /// The middle.
-    pub fn centre(&self) -> [f64; 3] {
-        std::array::from_fn(|i| 0.5 * (self.low[i] + self.high[i]))
-    }
-
-    /// Half the diagonal: the radius of the ball around the box.
-    pub fn radius(&self) -> f64 {
-        0.5 * DVec3::from(self.high).distance(self.low.into())
-    }
-
-    fn corners(&self) -> [DVec3; 8] {
-        std::array::from_fn(|k| {
-            let pick = |axis: usize| {
-                if k >> axis & 1 == 1 {
-                    self.high[axis]
-                } else {
-                    self.low[axis]
-                }
-            };
-            DVec3::new(pick(0), pick(1), pick(2))
-        })
-    }
-}
-
-/// What fills the picture.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub enum Framing {
-    /// The surface and the tubes, as tightly as the margin allows.
-    #[default]
-    Surface,
-    /// The box of the grid: alike for all steps of a flow.
-    Domain,
-    /// A given box, such as the union of the [`bounds`](crate::Scene::bounds) of several scenes.
-    Within(Bounds),
-    /// A given ball: alike for all directions of view.
-    Ball {
-        /// Its centre.
-        centre: [f64; 3],
-        /// Its radius.
-        radius: f64,
-    },
-}
-
-/// Direction, projection and framing of a view.
-///
-/// The camera looks at the middle of what is framed from the direction
+/// The direction that a surface is looked at from:
 /// `cos(el) (cos(az) a + sin(az) b) + sin(el) up`, where `az` is the azimuth, `el` the elevation
 /// and `up`, `a`, `b` are consecutive axes (`z`, `x`, `y` if `z` points up).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Camera {
+pub struct View {
     /// The axis that points up in the picture.
     pub up: UpAxis,
     /// Degrees about the upward axis.
     pub azimuth: f64,
     /// Degrees above the horizon, from -90 to 90.
     pub elevation: f64,
-    /// How depth is shown.
-    pub projection: Projection,
-    /// What fills the picture.
-    pub framing: Framing,
-    /// Part of the picture left free on each side, at least 0 and below 0.45.
-    pub margin: f64,
 }
 
-impl Default for Camera {
-    /// From the front right and a little above, in a mild perspective, `z` pointing up.
+impl Default for View {
+    /// From the front right and a little above, `z` pointing up.
     fn default() -> Self {
         Self {
             up: UpAxis::default(),
             azimuth: 35.0,
             elevation: 22.0,
-            projection: Projection::Perspective {
-                field_of_view: 22.0,
-            },
-            framing: Framing::Surface,
-            margin: 0.07,
         }
     }
 }
 
-/// A ray of unit direction.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Ray {
-    pub origin: DVec3,
-    pub direction: DVec3,
-}
-
-impl Ray {
-    pub fn at(&self, t: f64) -> DVec3 {
-        self.origin + t * self.direction
-    }
-}
-
-/// Orthonormal directions seen from the subject, and the axis that points up.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Orientation {
-    /// Rightwards in the picture.
-    pub right: DVec3,
-    /// Upwards in the picture.
-    pub above: DVec3,
-    /// Towards the camera.
-    pub toward: DVec3,
-    pub up: DVec3,
-}
-
-/// A camera fitted to its subject.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct View {
-    orientation: Orientation,
-    target: DVec3,
-    /// Distance of the eye from the target plane.
-    distance: f64,
-    orthographic: bool,
-    /// Size of a pixel in the target plane.
-    pixel: f64,
-    size: [f64; 2],
-}
-
-/// What a camera is fitted to.
-pub(crate) enum Subject {
-    Points(Vec<DVec3>),
-    Ball(DVec3, f64),
-}
-
-impl Subject {
-    pub fn bounds(bounds: &Bounds) -> Result<Self, Error> {
-        for (low, high) in bounds.low.into_iter().zip(bounds.high) {
-            require("lower end of the framed box", low, "finite", |_| true)?;
-            require("side of the framed box", high - low, "at least 0", |v| {
-                v >= 0.0
-            })?;
-        }
-        require(
-            "diagonal of the framed box",
-            bounds.radius(),
-            "positive",
-            |v| v > 0.0,
-        )?;
-        Ok(Self::Points(bounds.corners().into()))
-    }
-
-    pub fn ball(centre: [f64; 3], radius: f64) -> Result<Self, Error> {
-        for value in centre {
-            require("centre of the framed ball", value, "finite", |_| true)?;
-        }
-        require("radius of the framed ball", radius, "positive", |v| v > 0.0)?;
-        Ok(Self::Ball(centre.into(), radius))
-    }
-}
-
-impl Camera {
-    /// Checks the numbers of the camera; those of the framing are checked with the subject.
-    fn check(&self) -> Result<(), Error> {
+impl View {
+    /// Accepts finite angles, and elevations from -90 to 90 degrees.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for others.
+    pub fn check(&self) -> Result<(), Error> {
         require("azimuth", self.azimuth, "finite", |_| true)?;
-        require(
-            "elevation",
-            self.elevation,
-            "between -90 and 90 degrees",
-            |v| v.abs() <= 90.0,
-        )?;
-        require("margin", self.margin, "at least 0 and below 0.45", |v| {
-            (0.0..0.45).contains(&v)
-        })?;
-        if let Projection::Perspective { field_of_view } = self.projection {
-            let range = "between 1 and 120 degrees";
-            require("field of view", field_of_view, range, |v| {
-                (1.0..=120.0).contains(&v)
-            })?;
-        }
+        let range = "between -90 and 90 degrees";
+        require("elevation", self.elevation, range, |v| v.abs() <= 90.0)?;
         Ok(())
     }
 
@@ -232,10 +62,42 @@ impl Camera {
             up,
         })
     }
+}
 
-    /// Fits the camera to its subject in a picture of `size` pixels.
-    pub(crate) fn view(&self, subject: &Subject, size: [u32; 2]) -> Result<View, Error> {
-        let orientation = self.orientation()?;
+/// Orthonormal directions seen from the subject, and the axis that points up.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Orientation {
+    /// Rightwards in the picture.
+    pub right: DVec3,
+    /// Upwards in the picture.
+    pub above: DVec3,
+    /// Towards the camera.
+    pub toward: DVec3,
+    pub up: DVec3,
+}
+
+/// A camera fitted to its subject.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Camera {
+    orientation: Orientation,
+    pub position: DVec3,
+    /// Pixels for each unit of slope against the axis of view.
+    focal: f64,
+    middle: [f64; 2],
+}
+
+impl Camera {
+    /// The camera that comes as close as it can with all points, which are around `centre`, in a
+    /// picture of `size` pixels.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if the points have no extent in the picture.
+    pub fn fit(
+        orientation: Orientation,
+        points: &[DVec3],
+        centre: DVec3,
+        size: [u32; 2],
+    ) -> Result<Self, Error> {
         let Orientation {
             right,
             above,
@@ -244,112 +106,55 @@ impl Camera {
         } = orientation;
         let size = size.map(f64::from);
         let shorter = size[0].min(size[1]);
-        let used = size.map(|side| side / shorter * (1.0 - 2.0 * self.margin));
-        let tangent = match self.projection {
-            Projection::Orthographic => None,
-            Projection::Perspective { field_of_view } => {
-                Some((0.5 * field_of_view).to_radians().tan())
-            }
+        let tangent = (0.5 * FIELD_OF_VIEW).to_radians().tan();
+        let slopes = size.map(|side| side / shorter * (1.0 - 2.0 * MARGIN) * tangent);
+        let placed: Vec<DVec3> = points
+            .iter()
+            .map(|&p| p - centre)
+            .map(|p| DVec3::new(p.dot(right), p.dot(above), p.dot(toward)))
+            .collect();
+        // Half the extent and the middle along one direction of the picture, seen through a slit
+        // that opens towards the back with the given slope.
+        let across = |axis: usize, slope: f64| {
+            let most = |sign: f64| {
+                let values = placed.iter().map(|p| sign * p[axis] + slope * p.z);
+                values.fold(f64::NEG_INFINITY, f64::max)
+            };
+            let (after, before) = (most(1.0), most(-1.0));
+            (0.5 * (after + before), 0.5 * (after - before))
         };
-        // Half the shorter side of the picture in the target plane, and the distance of the eye.
-        let (target, half, distance) = match subject {
-            Subject::Points(points) => {
-                let placed = || {
-                    points
-                        .iter()
-                        .map(|p| DVec3::new(p.dot(right), p.dot(above), p.dot(toward)))
-                };
-                // Over all points, the largest value of a function.
-                let most =
-                    |f: &dyn Fn(DVec3) -> f64| placed().map(f).fold(f64::NEG_INFINITY, f64::max);
-                let nearest = most(&|p| p.z);
-                let depth = nearest + most(&|p| -p.z);
-                // Half the extent and the middle along one direction of the picture, seen through
-                // a slit that opens towards the back with the given slope.
-                let across = |axis: usize, slope: f64| {
-                    let after = most(&|p| p[axis] + slope * p.z);
-                    let before = most(&|p| -p[axis] + slope * p.z);
-                    (0.5 * (after + before), 0.5 * (after - before))
-                };
-                let middle = nearest - 0.5 * depth;
-                let (x, y, half, distance) = match tangent {
-                    None => {
-                        let ((a, x), (b, y)) = (across(0, 0.0), across(1, 0.0));
-                        let half = (a / used[0]).max(b / used[1]);
-                        (x, y, half, DVec3::new(a, b, depth).length())
-                    }
-                    Some(tangent) => {
-                        // The eye is where the slits of both directions are wide enough.
-                        let slopes = used.map(|side| side * tangent);
-                        let wide = |axis: usize| across(axis, slopes[axis]).0 / slopes[axis];
-                        let eye = wide(0).max(wide(1));
-                        // Where the picture is wider than need be, centring takes a narrower slit.
-                        let centred = |axis: usize| {
-                            let narrowed =
-                                (0..4).fold(slopes[axis], |slope, _| across(axis, slope).0 / eye);
-                            across(axis, narrowed).1
-                        };
-                        let distance = eye - middle;
-                        let (x, y) = (centred(0), centred(1));
-                        (x, y, distance * tangent, distance)
-                    }
-                };
-                (x * right + y * above + middle * toward, half, distance)
-            }
-            &Subject::Ball(centre, radius) => {
-                let narrow = used[0].min(used[1]);
-                match tangent {
-                    None => (centre, radius / narrow, 2.0 * radius),
-                    Some(tangent) => {
-                        let distance = radius * (1.0 + (narrow * tangent).powi(-2)).sqrt();
-                        (centre, distance * tangent, distance)
-                    }
-                }
-            }
+        // The eye is where the slits of both directions are wide enough.
+        let wide = |axis: usize| across(axis, slopes[axis]).0 / slopes[axis];
+        let eye = wide(0).max(wide(1));
+        let nearest = placed
+            .iter()
+            .fold(f64::NEG_INFINITY, |z, p| f64::max(z, p.z));
+        let range = "positive and not too small for its place";
+        require("extent of what is framed", eye - nearest, range, |d| {
+            d > 1e-9 * (1.0 + centre.length())
+        })?;
+        // Where the picture is wider than need be, centring takes a narrower slit.
+        let centred = |axis: usize| {
+            let narrowed = (0..4).fold(slopes[axis], |slope, _| across(axis, slope).0 / eye);
+            across(axis, narrowed).1
         };
-        // A subject seen edge-on may have no extent in the picture.
-        let half = require("extent of what is framed", half, "positive", |v| v > 0.0)?;
-        Ok(View {
+        Ok(Self {
             orientation,
-            target,
-            distance,
-            orthographic: tangent.is_none(),
-            pixel: 2.0 * half / shorter,
-            size,
+            position: centre + centred(0) * right + centred(1) * above + eye * toward,
+            focal: 0.5 * shorter / tangent,
+            middle: size.map(|side| 0.5 * side),
         })
     }
-}
 
-impl View {
-    /// The ray through the point `(x, y)` of the picture, in pixels from its upper left corner.
-    pub fn ray(&self, x: f64, y: f64) -> Ray {
-        let Orientation {
-            right,
-            above,
-            toward,
-            ..
-        } = self.orientation;
-        let sideways = self.pixel * (x - 0.5 * self.size[0]) * right
-            + self.pixel * (0.5 * self.size[1] - y) * above;
-        if self.orthographic {
-            Ray {
-                origin: self.target + sideways + self.distance * toward,
-                direction: -toward,
-            }
-        } else {
-            Ray {
-                origin: self.target + self.distance * toward,
-                direction: (sideways - self.distance * toward).normalize(),
-            }
-        }
-    }
-
-    /// Size of a pixel at the distance `t` along a ray.
-    pub fn footprint(&self, t: f64) -> f64 {
-        if self.orthographic {
-            self.pixel
-        } else {
-            self.pixel * t / self.distance
-        }
+    /// Place in the picture, in pixels from its upper left corner, and the reciprocal of the
+    /// distance along the axis of view, which is linear in the picture; zero behind the camera.
+    pub fn project(&self, p: DVec3) -> [f64; 3] {
+        let offset = p - self.position;
+        let near = (-offset.dot(self.orientation.toward)).recip().max(0.0);
+        [
+            self.middle[0] + self.focal * near * offset.dot(self.orientation.right),
+            self.middle[1] - self.focal * near * offset.dot(self.orientation.above),
+            near,
+        ]
     }
 }

@@ -7,6 +7,9 @@ pub enum Error {
     /// A field, grid or file was refused by [`geometry`].
     #[error(transparent)]
     Geometry(#[from] geometry::Error),
+    /// A surface cannot be found.
+    #[error(transparent)]
+    Surface(#[from] surfaces::Error),
     /// The PNG encoder failed.
     #[error("the picture could not be encoded as PNG")]
     Encode(#[from] png::EncodingError),
@@ -25,8 +28,8 @@ pub enum Error {
     },
     /// The camera is to be fitted to a surface that is not there.
     #[error(
-        "the field has no zero level set and there is no tube, so nothing can be framed; use \
-         Framing::Domain or Framing::Within for a picture that may be empty"
+        "there is no surface and no tube, so nothing can be framed; say within which box for a \
+         picture that may be empty"
     )]
     NothingToFrame,
     /// A tube with too few points.
@@ -62,20 +65,16 @@ pub enum Error {
     NoFrames,
     /// The pictures of an animation differ in size.
     #[error(
-        "picture {index} of the animation has {width} x {height} pixels, but the first has \
-         {first_width} x {first_height}"
+        "picture {index} of the animation has {} x {} pixels, but the first has {} x {}",
+        size[0], size[1], first[0], first[1]
     )]
     FrameSize {
         /// Which picture, from 0.
         index: usize,
-        /// Its pixels in a row.
-        width: u32,
-        /// Its rows.
-        height: u32,
-        /// Pixels in a row of the first.
-        first_width: u32,
-        /// Rows of the first.
-        first_height: u32,
+        /// Its width and height.
+        size: [u32; 2],
+        /// Those of the first.
+        first: [u32; 2],
     },
 }
 
@@ -95,9 +94,4 @@ pub(crate) fn require(
             requirement,
         })
     }
-}
-
-/// Accepts numbers from zero to one.
-pub(crate) fn fraction(name: &'static str, value: f64) -> Result<f64, Error> {
-    require(name, value, "between 0 and 1", |v| (0.0..=1.0).contains(&v))
 }

@@ -1,13 +1,12 @@
-//! Pictures: light in, sRGB pixels out.
+//! Pictures, and animations of them, as PNG files.
 
-use std::ops::{Add, Mul};
 use std::path::Path;
 use std::time::Duration;
 
 use geometry::file::write_atomically;
-use srgb::{Rgb, decode, encode};
 
 use crate::Error;
+use crate::error::require;
 
 /// Largest side of a picture, in pixels.
 pub const LARGEST_SIDE: u32 = 8192;
@@ -22,70 +21,6 @@ pub(crate) fn checked(size: [u32; 2]) -> Result<[u32; 2], Error> {
         height: size[1],
         limit: LARGEST_SIDE,
     })
-}
-
-/// Linear intensities, multiplied by the opacity.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Light {
-    rgb: [f32; 3],
-    alpha: f32,
-}
-
-impl Light {
-    pub fn opaque(rgb: [f32; 3]) -> Self {
-        Self { rgb, alpha: 1.0 }
-    }
-
-    pub fn black(alpha: f32) -> Self {
-        Self {
-            rgb: [0.0; 3],
-            alpha,
-        }
-    }
-
-    fn decode([r, g, b, a]: [u8; 4]) -> Self {
-        let alpha = f32::from(a) / 255.0;
-        Self {
-            rgb: [r, g, b].map(|v| alpha * decode(v)),
-            alpha,
-        }
-    }
-
-    /// This in front of something else.
-    pub fn over(self, behind: Self) -> Self {
-        self + behind * (1.0 - self.alpha)
-    }
-
-    /// The sRGB value, not multiplied by the opacity.
-    pub fn encode(self) -> [u8; 4] {
-        if self.alpha <= 0.0 {
-            return [0; 4];
-        }
-        let [r, g, b] = self.rgb.map(|v| encode(v / self.alpha));
-        [r, g, b, (255.0 * self.alpha.min(1.0)).round() as u8]
-    }
-}
-
-impl Add for Light {
-    type Output = Self;
-
-    fn add(self, other: Self) -> Self {
-        Self {
-            rgb: std::array::from_fn(|c| self.rgb[c] + other.rgb[c]),
-            alpha: self.alpha + other.alpha,
-        }
-    }
-}
-
-impl Mul<f32> for Light {
-    type Output = Self;
-
-    fn mul(self, factor: f32) -> Self {
-        Self {
-            rgb: self.rgb.map(|v| v * factor),
-            alpha: self.alpha * factor,
-        }
-    }
 }
 
 /// A picture: 8-bit sRGB with straight (not premultiplied) opacity, row by row from the top.
@@ -140,19 +75,6 @@ impl Picture {
         self.pixels[y as usize * self.size[0] as usize + x as usize]
     }
 
-    /// The picture in front of a colour, blended in linear light.
-    #[must_use]
-    pub fn over(&self, colour: Rgb) -> Self {
-        let behind = Light::opaque(colour.linear());
-        let pixels = self.pixels.iter();
-        Self {
-            size: self.size,
-            pixels: pixels
-                .map(|&p| Light::decode(p).over(behind).encode())
-                .collect(),
-        }
-    }
-
     /// The picture in the bytes of a PNG file as this crate writes them: eight bits, with or without opacity; the first one of an
     /// animation.
     ///
@@ -188,13 +110,32 @@ impl Picture {
     }
 }
 
-/// A PNG file of the first picture or, with a delay, of all. Opaque pictures are stored without
+/// The bytes of an animated PNG file (APNG): pictures shown one after the other, for ever, each for
+/// `delay`, rounded to milliseconds. Viewers that know no APNG show the first picture.
+///
+/// # Errors
+/// There must be a picture, all must have one size, and the delay must be from one millisecond to a
+/// minute; [`Error::Encode`].
+pub fn animation(frames: &[Picture], delay: Duration) -> Result<Vec<u8>, Error> {
+    let first = frames.first().ok_or(Error::NoFrames)?;
+    if let Some(index) = frames.iter().position(|frame| frame.size != first.size) {
+        return Err(Error::FrameSize {
+            index,
+            size: frames[index].size,
+            first: first.size,
+        });
+    }
+    let (name, range) = ("delay in milliseconds", "between 1 and 60000");
+    let milliseconds = 1e3 * delay.as_secs_f64();
+    require(name, milliseconds, range, |v| (1.0..=60e3).contains(&v))?;
+    encode_png(frames, Some(milliseconds.round() as u16))
+}
+
+/// A PNG file, animated if there is a delay in milliseconds. Opaque pictures are stored without
 /// opacity.
-pub(crate) fn encode_png(frames: &[Picture], delay: Option<Duration>) -> Result<Vec<u8>, Error> {
-    let opaque = frames
-        .iter()
-        .all(|f| f.pixels().iter().all(|p| p[3] == 255));
-    let (colour, channels) = if opaque {
+fn encode_png(frames: &[Picture], delay: Option<u16>) -> Result<Vec<u8>, Error> {
+    let mut pixels = frames.iter().flat_map(|frame| &frame.pixels);
+    let (colour, channels) = if pixels.all(|pixel| pixel[3] == 255) {
         (png::ColorType::Rgb, 3)
     } else {
         (png::ColorType::Rgba, 4)
@@ -206,22 +147,12 @@ pub(crate) fn encode_png(frames: &[Picture], delay: Option<Duration>) -> Result<
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
     if let Some(delay) = delay {
         encoder.set_animated(frames.len() as u32, 0)?;
-        encoder.set_frame_delay(delay.as_secs_f64().mul_add(1e3, 0.5) as u16, 1000)?;
+        encoder.set_frame_delay(delay, 1000)?;
     }
     let mut writer = encoder.write_header()?;
-    let shown = if delay.is_some() {
-        frames
-    } else {
-        &frames[..1]
-    };
-    for frame in shown {
-        let data: Vec<u8> = frame
-            .pixels()
-            .iter()
-            .flat_map(|pixel| &pixel[..channels])
-            .copied()
-            .collect();
-        writer.write_image_data(&data)?;
+    for frame in frames {
+        let channels = frame.pixels.iter().flat_map(|pixel| &pixel[..channels]);
+        writer.write_image_data(&channels.copied().collect::<Vec<u8>>())?;
     }
     writer.finish()?;
     Ok(bytes)

@@ -1,227 +1,131 @@
 //! Scenes: a surface and how it is shown.
 
-use std::sync::Arc;
-use std::time::Duration;
-
-use geometry::{Field, SignedDistance, UpAxis, distance_from_phase_field};
+use geometry::measure::BoundingBox;
+use geometry::{Field, distance_from_phase_field};
 use glam::DVec3;
+use rayon::prelude::*;
 use srgb::Rgb;
+use surfaces::{TriangleMesh, isosurface};
 
-use crate::camera::{Bounds, Camera, Framing, Projection, Subject};
-use crate::error::{fraction, require};
-use crate::film::{Film, GroundPlane, Quality};
-use crate::light::{Lighting, Lights, Material};
-use crate::picture::{Light, Picture, checked};
-use crate::tube::{Tube, Tubes};
-use crate::volume::{Lattice, Spline, Volume, padded};
-use crate::{Animation, Error};
+use crate::Error;
+use crate::camera::{Camera, View};
+use crate::error::require;
+use crate::light::Lights;
+use crate::model::{Model, Tube};
+use crate::picture::{Picture, checked};
+use crate::raster::Triangle;
+use crate::shadow::{Effort, arriving};
 
-/// Distances from a phase field are trusted up to this many `eps`.
-const TRUSTED: f64 = 3.0;
-/// Signed distances are clamped at this many cells: the interpolant needs no more.
-const NEEDED: f64 = 6.0;
+/// Rows of a picture drawn at once.
+const BAND: usize = 8;
 
-/// What is behind the surface.
+/// How much is spent on a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Background {
-    /// White.
+pub enum Quality {
+    /// For tests and previews.
+    Draft,
+    /// For figures.
     #[default]
-    White,
-    /// Nothing: the picture has an opacity channel.
-    Transparent,
-    /// One colour.
-    Colour(Rgb),
+    Standard,
 }
 
-/// A side of a square picture, or width and height, in pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Size([u32; 2]);
-
-impl From<u32> for Size {
-    fn from(side: u32) -> Self {
-        Self([side; 2])
+impl Quality {
+    fn effort(self) -> Effort {
+        let [sky, key, pixels] = match self {
+            Self::Draft => [64, 8, 160],
+            Self::Standard => [160, 24, 400],
+        };
+        Effort { sky, key, pixels }
     }
-}
 
-impl From<(u32, u32)> for Size {
-    fn from((width, height): (u32, u32)) -> Self {
-        Self([width, height])
+    /// Samples of a pixel along each axis.
+    fn samples(self) -> usize {
+        match self {
+            Self::Draft => 3,
+            Self::Standard => 4,
+        }
     }
-}
-
-/// Colour of the part of the surface where a function of the position is negative.
-#[derive(Clone)]
-struct Highlight<'a> {
-    region: Arc<dyn Fn(DVec3) -> f64 + Send + Sync + 'a>,
-    colour: Rgb,
 }
 
 /// A surface, the view of it, and its looks.
 ///
 /// Setters never fail; everything is checked by [`Scene::render`].
 #[derive(Clone)]
-pub struct Scene<'a> {
-    lattice: Lattice,
-    domain: Bounds,
-    volume: Arc<Volume>,
-    camera: Camera,
-    material: Material,
-    lighting: Lighting,
-    background: Background,
-    ground_shadow: Option<f64>,
+pub struct Scene {
+    mesh: TriangleMesh,
+    view: View,
+    framed: Option<BoundingBox<3>>,
+    colour: Rgb,
+    transparent: bool,
     tubes: Vec<Tube>,
-    highlights: Vec<Highlight<'a>>,
+    /// A colour, and where it is: where the value at a vertex, interpolated, exceeds one half.
+    highlight: Option<(Vec<f64>, Rgb)>,
     quality: Quality,
 }
 
-impl<'a> Scene<'a> {
-    /// The surface `u = 0` of a phase field, which is positive inside.
-    ///
-    /// The interface is found as the zero of the distance `-(4 eps / 3) atanh u`, smoothly clamped
-    /// at `3 eps`; what `u` does further away is not seen. A cubic B-spline makes a smooth surface
-    /// of it. The solid ends at the faces of the grid's box.
+impl Scene {
+    /// The surface `u = 0` of a phase field, which is positive inside: that of the distances
+    /// `-(4 eps / 3) atanh u`.
     ///
     /// # Errors
     /// `u` must be finite, and `eps` finite and positive.
     pub fn new(u: &Field<3>, eps: f64) -> Result<Self, Error> {
         require("eps", eps, "positive", |v| v > 0.0)?;
-        let h = u.grid().spacing();
-        let limit = TRUSTED * eps / h;
-        Self::with_distance(u, limit, |v| distance_from_phase_field(v, eps) / h)
+        u.check_finite()?;
+        Self::from_signed_distance(&u.map(|v| distance_from_phase_field(v, eps)))
     }
 
     /// The surface of a signed distance, which is negative inside; only its zeros, and its slope
-    /// there, matter.
+    /// there, matter. It is smoothed a little, so that edges are rounded over two cells and have no
+    /// teeth; what is smooth moves by `h^2 / 3` times the mean curvature, which no picture shows.
     ///
     /// # Errors
     /// The field must be finite.
     pub fn from_signed_distance(distance: &Field<3>) -> Result<Self, Error> {
-        let h = distance.grid().spacing();
-        Self::with_distance(distance, NEEDED, |v| v / h)
+        distance.check_finite()?;
+        Ok(Self::of_mesh(isosurface(&smoothed(distance)?)?))
     }
 
-    fn with_distance(
-        field: &Field<3>,
-        limit: f64,
-        distance: impl Fn(f64) -> f64 + Sync,
-    ) -> Result<Self, Error> {
-        field.check_finite()?;
-        let grid = field.grid();
-        Ok(Self {
-            lattice: Lattice::new(grid),
-            domain: Bounds {
-                low: grid.origin(),
-                high: grid.origin().map(|low| low + grid.side()),
-            },
-            volume: Arc::new(Volume::new(field, limit, distance)),
-            camera: Camera::default(),
-            material: Material::default(),
-            lighting: Lighting::default(),
-            background: Background::default(),
-            ground_shadow: None,
+    /// A mesh. Light is computed at its vertices: large triangles look flat.
+    pub fn of_mesh(mesh: TriangleMesh) -> Self {
+        Self {
+            mesh,
+            view: View::default(),
+            framed: None,
+            colour: Rgb::CLAY,
+            transparent: false,
             tubes: Vec::new(),
-            highlights: Vec::new(),
+            highlight: None,
             quality: Quality::default(),
-        })
+        }
     }
 
-    /// Sets the whole camera.
+    /// Sets the direction of view.
     #[must_use]
-    pub fn camera(mut self, camera: Camera) -> Self {
-        self.camera = camera;
+    pub fn view(mut self, view: View) -> Self {
+        self.view = view;
         self
     }
 
-    /// Sets the axis that points up.
+    /// Lets a box fill the picture, such as that around the surfaces of several scenes, and not the
+    /// surface with its tubes.
     #[must_use]
-    pub fn up(mut self, axis: UpAxis) -> Self {
-        self.camera.up = axis;
-        self
-    }
-
-    /// Sets the azimuth of the camera in degrees; see [`Camera`].
-    #[must_use]
-    pub fn azimuth(mut self, degrees: f64) -> Self {
-        self.camera.azimuth = degrees;
-        self
-    }
-
-    /// Sets the elevation of the camera in degrees.
-    #[must_use]
-    pub fn elevation(mut self, degrees: f64) -> Self {
-        self.camera.elevation = degrees;
-        self
-    }
-
-    /// Uses parallel rays.
-    #[must_use]
-    pub fn orthographic(mut self) -> Self {
-        self.camera.projection = Projection::Orthographic;
-        self
-    }
-
-    /// Uses rays from one point, for the given angle of view in degrees.
-    #[must_use]
-    pub fn perspective(mut self, field_of_view: f64) -> Self {
-        self.camera.projection = Projection::Perspective { field_of_view };
-        self
-    }
-
-    /// Sets what fills the picture.
-    #[must_use]
-    pub fn framing(mut self, framing: Framing) -> Self {
-        self.camera.framing = framing;
-        self
-    }
-
-    /// Sets the part of the picture left free on each side.
-    #[must_use]
-    pub fn margin(mut self, margin: f64) -> Self {
-        self.camera.margin = margin;
-        self
-    }
-
-    /// Sets the material of the surface.
-    #[must_use]
-    pub fn material(mut self, material: Material) -> Self {
-        self.material = material;
+    pub fn within(mut self, bounds: BoundingBox<3>) -> Self {
+        self.framed = Some(bounds);
         self
     }
 
     /// Sets the body colour of the surface.
     #[must_use]
     pub fn colour(mut self, colour: Rgb) -> Self {
-        self.material.colour = colour;
+        self.colour = colour;
         self
     }
 
-    /// Sets the lights.
+    /// Leaves out the white background: the picture has an opacity channel.
     #[must_use]
-    pub fn lighting(mut self, lighting: Lighting) -> Self {
-        self.lighting = lighting;
-        self
-    }
-
-    /// Sets the background.
-    #[must_use]
-    pub fn background(mut self, background: Background) -> Self {
-        self.background = background;
-        self
-    }
-
-    /// Lets the surface stand on an invisible ground that receives its shadow, of the given
-    /// strength from 0 (none) to 1 (full). The ground is seen from above only, and
-    /// [`Framing::Surface`] makes room for the shadow.
-    #[must_use]
-    pub fn ground_shadow(mut self, strength: f64) -> Self {
-        self.ground_shadow = Some(strength);
-        self
-    }
-
-    /// Adds a tube.
-    #[must_use]
-    pub fn tube(mut self, tube: Tube) -> Self {
-        self.tubes.push(tube);
+    pub fn transparent(mut self) -> Self {
+        self.transparent = true;
         self
     }
 
@@ -232,174 +136,198 @@ impl<'a> Scene<'a> {
         self
     }
 
-    /// Gives another colour to the part of the surface inside a shape, where its signed distance
-    /// (any function of its sign will do) is negative. Later calls win.
-    #[must_use]
-    pub fn highlight(mut self, shape: impl SignedDistance<3> + Send + 'a, colour: Rgb) -> Self {
-        let lattice = self.lattice;
-        self.highlights.push(Highlight {
-            region: Arc::new(move |p| shape.signed_distance(lattice.position(p))),
-            colour,
-        });
-        self
-    }
-
     /// Gives another colour to the part of the surface where a mask of zeros and ones, smoothed
-    /// over a cell by a cubic B-spline, exceeds one half: an inpainting domain, for example.
+    /// over a cell, exceeds one half: an inpainting domain, for example.
     ///
     /// # Errors
     /// The mask must be finite.
     pub fn highlight_mask(mut self, mask: &Field<3>, colour: Rgb) -> Result<Self, Error> {
         mask.check_finite()?;
-        let (from, to) = (self.lattice, Lattice::new(mask.grid()));
-        let (size, values) = padded(mask, |v| v);
-        let spline = Spline::new(size, values);
-        self.highlights.push(Highlight {
-            region: Arc::new(move |p| 0.5 - spline.value(to.place(from.position(p)))),
-            colour,
-        });
+        let mask = smoothed(mask)?;
+        let values = self.mesh.vertices.iter().map(|&x| mask.interpolate(x));
+        self.highlight = Some((values.collect(), colour));
         Ok(self)
     }
 
-    /// Sets how many rays are spent.
+    /// Sets how much is spent.
     #[must_use]
     pub fn quality(mut self, quality: Quality) -> Self {
         self.quality = quality;
         self
     }
 
-    /// The box around the surface, if there is one; tubes are left out. Found where the edges of
-    /// the grid cross the surface, so it may be short of it by a small part of a cell.
-    pub fn bounds(&self) -> Option<Bounds> {
-        Bounds::around(
-            self.volume
-                .crossings
-                .iter()
-                .map(|&p| self.lattice.position(p)),
-        )
+    /// The box around the surface, if there is one; tubes are left out.
+    pub fn bounds(&self) -> Option<BoundingBox<3>> {
+        self.mesh.bounding_box()
     }
 
-    /// Points that outline the surface and the tubes, in lattice coordinates.
-    fn outline(&self, tubes: &Tubes) -> Vec<DVec3> {
-        let mut points = self.volume.crossings.clone();
-        points.extend(tubes.extent());
-        points
-    }
-
-    /// What the camera is fitted to, in lattice coordinates.
-    fn subject(
-        &self,
-        mut outline: Vec<DVec3>,
-        ground: Option<&GroundPlane>,
-        lights: &Lights,
-    ) -> Result<Subject, Error> {
-        let within = |bounds: &Bounds| {
-            let [low, high] = [bounds.low, bounds.high].map(|p| self.lattice.place(p).to_array());
-            Subject::bounds(&Bounds { low, high })
-        };
-        match &self.camera.framing {
-            Framing::Surface => {
-                if outline.is_empty() {
-                    return Err(Error::NothingToFrame);
-                }
-                if let Some(ground) = ground {
-                    let shadow: Vec<DVec3> = outline
-                        .iter()
-                        .filter_map(|&p| ground.shadow_of(p, lights.key))
-                        .collect();
-                    outline.extend(shadow);
-                }
-                Ok(Subject::Points(outline))
-            }
-            Framing::Domain => within(&self.domain),
-            Framing::Within(bounds) => within(bounds),
-            &Framing::Ball { centre, radius } => {
-                let centre = self.lattice.place(centre).to_array();
-                Subject::ball(centre, self.lattice.length(radius))
-            }
-        }
-    }
-
-    /// Draws the picture. It takes some 50 bytes of memory for each pixel.
+    /// Draws the picture of `[width, height]` pixels.
     ///
     /// # Errors
     /// A number out of range, nothing to frame, or a size that cannot be drawn.
-    pub fn render(&self, size: impl Into<Size>) -> Result<Picture, Error> {
-        let size = checked(size.into().0)?;
-        self.material.check()?;
-        let tubes = Tubes::new(&self.tubes, &self.lattice)?;
-        let orientation = self.camera.orientation()?;
-        let lights = self.lighting.resolve(&orientation)?;
-        let outline = self.outline(&tubes);
-        let up = orientation.up;
-        let ground = match self.ground_shadow {
-            None => None,
-            Some(strength) => Some(GroundPlane {
-                up,
-                height: outline
-                    .iter()
-                    .map(|p| p.dot(up))
-                    .fold(f64::INFINITY, f64::min),
-                strength: fraction("strength of the ground shadow", strength)?,
-            }),
-        };
-        let subject = self.subject(outline, ground.as_ref(), &lights)?;
-        let view = self.camera.view(&subject, size)?;
-        // The last highlight that holds a point wins; colour 0 is that of the material.
-        let region = |p: DVec3| {
-            let holds = |h: &Highlight<'_>| (h.region)(p) < 0.0;
-            self.highlights.iter().rposition(holds).map_or(0, |k| k + 1)
-        };
-        let highlights = self.highlights.iter().map(|h| h.colour);
-        let film = Film {
-            volume: &self.volume,
-            view,
-            lights,
-            material: self.material,
-            region: &region,
-            surface_colours: std::iter::once(self.material.colour)
-                .chain(highlights)
-                .map(Rgb::linear)
+    pub fn render(&self, size: [u32; 2]) -> Result<Picture, Error> {
+        let size = checked(size)?;
+        let mut model = Model::new(&self.mesh);
+        let mut colours = vec![self.colour.linear()];
+        for (index, tube) in self.tubes.iter().enumerate() {
+            model.push(tube, index, colours.len())?;
+            colours.push(tube.colour.linear());
+        }
+        let per_side = self.quality.samples();
+        let camera = self.camera(&model, size.map(|side| per_side as u32 * side))?;
+        let lights = Lights::new(&self.view.orientation()?);
+        let drawing = Drawing {
+            arriving: arriving(&model, &lights, self.quality.effort()),
+            triangles: (model.triangles.iter())
+                .map(|corners| corners.map(|v| camera.project(model.vertices[v as usize].place)))
+                .map(Triangle::new)
                 .collect(),
-            tube_colours: self.tubes.iter().map(|t| t.colour.linear()).collect(),
-            tubes,
-            ground,
-            background: match self.background {
-                Background::White => Light::opaque(Rgb::WHITE.linear()),
-                Background::Transparent => Light::default(),
-                Background::Colour(colour) => Light::opaque(colour.linear()),
-            },
-            quality: self.quality,
-            size,
+            highlight: (self.highlight.as_ref()).map(|(mask, colour)| (&**mask, colour.linear())),
+            background: if self.transparent { [0.0; 4] } else { [1.0; 4] },
+            per_side,
+            model,
+            colours,
+            camera,
+            lights,
+            size: size.map(|side| side as usize),
         };
-        Ok(film.draw())
+        Ok(Picture::from_parts(size, drawing.pixels()))
     }
 
-    /// Draws one turn about the upward axis, counter-clockwise seen from above, in `frames`
-    /// pictures. The framing is replaced by the ball around the surface, so that nothing jumps.
-    ///
-    /// # Errors
-    /// As [`Scene::render`] and [`Animation::new`].
-    pub fn turntable(
-        &self,
-        frames: usize,
-        size: impl Into<Size>,
-        delay: Duration,
-    ) -> Result<Animation, Error> {
-        let size = size.into();
-        let bounds = self.bounds().ok_or(Error::NothingToFrame)?;
-        let framing = Framing::Ball {
-            centre: bounds.centre(),
-            radius: bounds.radius(),
+    /// The camera, fitted to what is to fill the picture.
+    fn camera(&self, model: &Model, size: [u32; 2]) -> Result<Camera, Error> {
+        let points: Vec<DVec3> = match &self.framed {
+            None => model.vertices.iter().map(|vertex| vertex.place).collect(),
+            Some(bounds) => {
+                for (low, extent) in bounds.lower.into_iter().zip(bounds.extent()) {
+                    require("lower end of the framed box", low, "finite", |_| true)?;
+                    let side = "side of the framed box";
+                    require(side, extent, "at least 0", |v| v >= 0.0)?;
+                }
+                let corner =
+                    |k: usize, axis: usize| [bounds.lower, bounds.upper][k >> axis & 1][axis];
+                (0..8)
+                    .map(|k| DVec3::from(std::array::from_fn(|axis| corner(k, axis))))
+                    .collect()
+            }
         };
-        let pictures = (0..frames).map(|k| {
-            // The camera goes clockwise, so the subject seems to turn the other way.
-            let turn = 360.0 * k as f64 / frames as f64;
-            self.clone()
-                .framing(framing)
-                .azimuth(self.camera.azimuth - turn)
-                .render(size)
-        });
-        Animation::new(pictures.collect::<Result<_, _>>()?, delay)
+        let sum: DVec3 = points.iter().sum();
+        if points.is_empty() {
+            return Err(Error::NothingToFrame);
+        }
+        let centre = sum / points.len() as f64;
+        Camera::fit(self.view.orientation()?, &points, centre, size)
     }
+}
+
+/// The nodal values with the weights (1, 4, 1)/6 of a cubic B-spline along every axis, twice.
+fn smoothed(field: &Field<3>) -> Result<Field<3>, Error> {
+    let (grid, cells) = (field.grid(), field.grid().cells());
+    let mut values = field.values().to_vec();
+    for axis in [0, 1, 2, 0, 1, 2] {
+        let stride = grid.stride(axis);
+        let along = |at: usize| {
+            let k = at / stride % cells;
+            let neighbour = |l: usize| values[at - k * stride + l % cells * stride];
+            (neighbour(k + cells - 1) + 4.0 * values[at] + neighbour(k + 1)) / 6.0
+        };
+        values = (0..values.len()).into_par_iter().map(along).collect();
+    }
+    Ok(Field::from_values(*grid, values)?)
+}
+
+/// Everything needed to draw.
+struct Drawing<'a> {
+    model: Model,
+    /// As they are seen, in units of samples.
+    triangles: Vec<Triangle>,
+    arriving: Vec<[f64; 2]>,
+    colours: Vec<[f32; 3]>,
+    highlight: Option<(&'a [f64], [f32; 3])>,
+    background: [f32; 4],
+    camera: Camera,
+    lights: Lights,
+    size: [usize; 2],
+    per_side: usize,
+}
+
+impl Drawing<'_> {
+    fn pixels(&self) -> Vec<[u8; 4]> {
+        let [width, height] = self.size;
+        let mut pixels = vec![[0; 4]; width * height];
+        let bands = pixels.par_chunks_mut(BAND * width).enumerate();
+        bands.for_each(|(band, pixels)| self.band(BAND * band, pixels));
+        pixels
+    }
+
+    /// Some whole rows.
+    fn band(&self, first: usize, pixels: &mut [[u8; 4]]) {
+        let per_side = self.per_side;
+        let columns = per_side * self.size[0];
+        let from = per_side * first;
+        let rows = per_side * (pixels.len() / self.size[0]);
+        // What is nearest, and how near.
+        let mut samples = vec![(0.0, usize::MAX); columns * rows];
+        for (index, triangle) in self.triangles.iter().enumerate() {
+            triangle.scan(columns, from..from + rows, |x, y, near| {
+                let sample = &mut samples[(y - from) * columns + x];
+                if near > sample.0 {
+                    *sample = (near, index);
+                }
+            });
+        }
+        for (at, pixel) in pixels.iter_mut().enumerate() {
+            // Linear intensities times opacities, and opacities.
+            let mut sum = [0.0; 4];
+            for part in 0..per_side * per_side {
+                let x = at % self.size[0] * per_side + part % per_side;
+                let y = at / self.size[0] * per_side + part / per_side;
+                let (_, triangle) = samples[y * columns + x];
+                let light = if triangle == usize::MAX {
+                    self.background
+                } else {
+                    let [r, g, b] = self.shade(triangle, [x, y + from].map(|v| v as f64 + 0.5));
+                    [r, g, b, 1.0]
+                };
+                sum = std::array::from_fn(|c| sum[c] + light[c]);
+            }
+            *pixel = encoded(sum, (per_side * per_side) as f32);
+        }
+    }
+
+    /// The colour of a triangle at a point of the picture.
+    fn shade(&self, triangle: usize, [x, y]: [f64; 2]) -> [f32; 3] {
+        let corners = self.model.triangles[triangle].map(|vertex| vertex as usize);
+        let weights = self.triangles[triangle].perspective_weights(x, y);
+        let vertices = corners.map(|vertex| &self.model.vertices[vertex]);
+        let mean = |value: &dyn Fn(usize) -> DVec3| -> DVec3 {
+            (0..3).map(|k| weights[k] * value(k)).sum()
+        };
+        let place = mean(&|k| vertices[k].place);
+        let toward = (self.camera.position - place).normalize();
+        let normal = mean(&|k| vertices[k].normal)
+            .try_normalize()
+            .unwrap_or(toward);
+        let light = mean(&|k| {
+            let [key, open] = self.arriving[corners[k]];
+            DVec3::new(key, open, 0.0)
+        });
+        let body = match (self.highlight, vertices[0].colour) {
+            (Some((mask, colour)), 0) if mean(&|k| DVec3::splat(mask[corners[k]])).x > 0.5 => {
+                colour
+            }
+            (_, colour) => self.colours[colour],
+        };
+        self.lights.shade(body, normal, toward, [light.x, light.y])
+    }
+}
+
+/// The sRGB value of a sum of `count` samples, not multiplied by the opacity.
+fn encoded(sum: [f32; 4], count: f32) -> [u8; 4] {
+    let [r, g, b, opacity] = sum;
+    if opacity <= 0.0 {
+        return [0; 4];
+    }
+    let [r, g, b] = [r, g, b].map(|v| srgb::encode(v / opacity));
+    [r, g, b, (255.0 * opacity / count).round() as u8]
 }

@@ -12,15 +12,7 @@ use crate::Error;
 /// The SHA-256 of some bytes in lower-case hexadecimal digits, for example as the fingerprint of the
 /// options of a run.
 pub fn fingerprint(bytes: impl AsRef<[u8]>) -> String {
-    hex(Sha256::digest(bytes))
-}
-
-fn hex(digest: impl AsRef<[u8]>) -> String {
-    use std::fmt::Write;
-    digest.as_ref().iter().fold(String::new(), |mut text, b| {
-        let _ = write!(text, "{b:02x}");
-        text
-    })
+    format!("{:x}", Sha256::digest(bytes))
 }
 
 /// Length and checksum of a file.
@@ -38,7 +30,7 @@ impl Seal {
         let read = io::copy(&mut open(path)?, &mut hash);
         Ok(Self {
             length: read.map_err(files::Error::of("read", path))?,
-            sha256: hex(hash.finalize()),
+            sha256: format!("{:x}", hash.finalize()),
         })
     }
 

@@ -22,15 +22,7 @@ pub struct TriangleMesh {
 impl TriangleMesh {
     /// The smallest box with all vertices; `None` without vertices.
     pub fn bounding_box(&self) -> Option<BoundingBox<3>> {
-        let (&first, rest) = self.vertices.split_first()?;
-        let start = BoundingBox {
-            lower: first,
-            upper: first,
-        };
-        Some(rest.iter().fold(start, |bounds, x| BoundingBox {
-            lower: std::array::from_fn(|i| bounds.lower[i].min(x[i])),
-            upper: std::array::from_fn(|i| bounds.upper[i].max(x[i])),
-        }))
+        BoundingBox::around(self.vertices.iter().copied())
     }
 
     /// Moves every vertex along its normal by a random length of up to `noise`, as a scanner errs. The normals are dropped: they are
@@ -45,7 +37,10 @@ impl TriangleMesh {
     }
 
     /// Checks that all numbers are finite and at most `limit`, and all indices in range.
-    pub(crate) fn check(&self, limit: f64) -> Result<(), Error> {
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteVertex`], [`Error::IndexOutOfRange`], [`Error::Normals`].
+    pub fn check(&self, limit: f64) -> Result<(), Error> {
         let count = self.vertices.len();
         let representable = |x: &[f64; 3]| x.iter().all(|v| v.abs() <= limit);
         if let Some(vertex) = self.vertices.iter().position(|x| !representable(x)) {

@@ -11,7 +11,7 @@ use geometry::{Placement, SignedDistance, UpAxis, optimal_profile};
 use model::Networks;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use render::Scene;
+use render::{Scene, View};
 use report::Raster;
 use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, samples, usual_up_axis};
 
@@ -25,8 +25,8 @@ const SIDE: f64 = 0.9;
 const TAUBIN: [f64; 2] = [0.5, -0.53];
 const LAPLACIAN: [f64; 2] = [0.5, 0.0];
 const ITERATIONS: usize = 30;
-/// Cells of the grid on which meshes are drawn, and pixels a side.
-const DRAWN: (usize, u32) = (160, 420);
+/// Side of a picture in pixels.
+const DRAWN: u32 = 420;
 
 /// Independent normally distributed noise along the normals of clean meshes, taken off by `willmore fair` at its defaults, by Taubin's
 /// and by Laplacian smoothing with the number of iterations that comes nearest to the clean mesh: distances, normals and volumes.
@@ -251,16 +251,14 @@ impl Clean {
         format!("{name}.noise{noise}")
     }
 
-    /// A picture of a mesh, from its distance on a grid.
+    /// A picture of a mesh, in the frame of the clean one.
     fn picture(&self, caption: &str, mesh: &TriangleMesh) -> Result<Raster, Error> {
-        let grid = centred_box(DRAWN.0, 1.0)?;
-        let placement = Placement::fit(&self.mesh.bounding_box(), &grid, 0.8, 0.0)?;
-        let (mesh, _) = ClosedMesh::new(mesh.clone())?;
-        let mut distance = MeshDistance::new(&mesh.placed(&placement)).sample(grid, || ())?;
-        surfaces::mend_signs(&mut distance);
-        let scene = Scene::from_signed_distance(&distance)?.up(self.up);
-        let scene = scene.azimuth(-60.0).elevation(25.0).margin(0.02);
-        let picture = scene.render(DRAWN.1)?;
+        let scene = Scene::of_mesh(mesh.clone()).view(View {
+            up: self.up,
+            azimuth: -60.0,
+            elevation: 25.0,
+        });
+        let picture = scene.within(self.mesh.bounding_box()).render([DRAWN; 2])?;
         let size = [picture.width() as usize, picture.height() as usize];
         Ok(Raster::new(size, picture.pixels()).with_caption(caption))
     }

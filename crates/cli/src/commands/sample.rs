@@ -75,7 +75,7 @@ fn write<const D: usize, O: Outlet<D>>(
     match &*input::extension(path) {
         "npy" => npy::write(path, &u)?,
         "vti" => vti::write(path, &[("phase_field", &u)])?,
-        "png" => start.outlet.picture(&u, eps(&u))?.write_png(path)?,
+        "png" => start.outlet.picture(&u, &u, eps(&u))?.write_png(path)?,
         _ => start.outlet.save(&u, eps(&u), path)?,
     }
     Ok(())

@@ -15,8 +15,8 @@ pub enum FormatError {
     },
     /// The first bytes are not those of a known format.
     #[error(
-        "it begins with the bytes {start:02x?}, which is neither PNG nor JPEG; save it as one of \
-         these"
+        "it begins with the bytes {start:02x?}, which is none of PNG, JPEG, WebP, GIF, TIFF and \
+         BMP; save it as one of these"
     )]
     UnknownFormat {
         /// Up to eight bytes.
@@ -32,16 +32,21 @@ pub enum FormatError {
         /// Largest number of pixels.
         limit: usize,
     },
-    /// What the PNG library says.
-    #[error("damaged or truncated PNG: {message}")]
-    Png {
+    /// What the library of the format says.
+    #[error("damaged, truncated or unusual {format}: {message}; try saving it as PNG")]
+    Damaged {
+        /// Name of the format.
+        format: &'static str,
         /// In one line, shortened.
         message: String,
     },
-    /// What the JPEG library says.
-    #[error("damaged, truncated or unusual JPEG: {message}; try saving it as PNG")]
-    Jpeg {
-        /// In one line, shortened.
-        message: String,
-    },
+}
+
+impl FormatError {
+    /// The message of a library.
+    pub(crate) fn damaged(format: &'static str, message: &str) -> Self {
+        // Some messages come in quotation marks.
+        let message = files::shortened(message, 160).trim_matches('"').to_owned();
+        Self::Damaged { format, message }
+    }
 }

@@ -1,19 +1,20 @@
-//! JPEG in.
+//! JPEG in. Not by the crate `image`, which accepts files that end early and fills in grey.
 
 use std::io::Cursor;
 
+use image::DynamicImage;
+use image::metadata::Orientation;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::errors::DecodeErrors;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-use super::{FormatError, Orientation, Pixels, checked, luma, said, widen};
+use super::{FormatError, checked};
 
 /// Progressive files have some ten scans; each takes time for the whole image.
 const MOST_SCANS: usize = 64;
 
-pub(super) fn decode(bytes: &[u8]) -> Result<(Pixels, Orientation), FormatError> {
-    // Strict: what is missing from a file is not to become grey.
+pub(super) fn decode(bytes: &[u8]) -> Result<(DynamicImage, Option<Orientation>), FormatError> {
     let options = DecoderOptions::default()
         .set_max_width(usize::from(u16::MAX))
         .set_max_height(usize::from(u16::MAX))
@@ -22,8 +23,8 @@ pub(super) fn decode(bytes: &[u8]) -> Result<(Pixels, Orientation), FormatError>
     let mut decoder = JpegDecoder::new_with_options(Cursor::new(bytes), options);
     decoder.decode_headers().map_err(refused)?;
     let (width, height) = decoder.dimensions().ok_or_else(|| unusual("no size"))?;
-    let size = [width, height].map(|n| n as u32);
-    let count = checked(size[0], size[1])?;
+    let [width, height] = [width, height].map(|n| n as u32);
+    let count = checked(width, height)?;
     let (output, channels) = match decoder.input_colorspace() {
         Some(ColorSpace::Luma | ColorSpace::YCbCr) => (ColorSpace::Luma, 1),
         Some(ColorSpace::RGB | ColorSpace::CMYK | ColorSpace::YCCK) => (ColorSpace::RGB, 3),
@@ -32,32 +33,21 @@ pub(super) fn decode(bytes: &[u8]) -> Result<(Pixels, Orientation), FormatError>
     decoder.set_options(options.jpeg_set_out_colorspace(output));
     let mut data = vec![0; channels * count];
     decoder.decode_into(&mut data).map_err(refused)?;
-    let grey = match channels {
-        1 => data.into_iter().map(widen).collect(),
-        _ => data
-            .as_chunks::<3>()
-            .0
-            .iter()
-            .map(|colour| luma(colour.map(widen)))
-            .collect(),
+    let image = match channels {
+        1 => image::GrayImage::from_raw(width, height, data).map(DynamicImage::from),
+        _ => image::RgbImage::from_raw(width, height, data).map(DynamicImage::from),
     };
-    let orientation = Orientation::from_exif(decoder.exif().map_or(&[], |exif| exif));
-    let pixels = Pixels {
-        size,
-        grey,
-        opacity: None,
-    };
-    Ok((pixels, orientation))
+    let orientation = decoder
+        .exif()
+        .and_then(|exif| Orientation::from_exif_chunk(exif));
+    Ok((image.expect("as many values as pixels"), orientation))
 }
 
 fn unusual(message: &str) -> FormatError {
-    FormatError::Jpeg {
-        message: message.into(),
-    }
+    FormatError::damaged("JPEG", message)
 }
 
 #[allow(clippy::needless_pass_by_value, reason = "for map_err")]
 fn refused(error: DecodeErrors) -> FormatError {
-    // Some messages come in quotation marks.
-    unusual(said(&error.to_string()).trim_matches('"'))
+    unusual(&error.to_string())
 }

@@ -185,6 +185,27 @@ pub fn png_files() -> Vec<(&'static str, Vec<u8>, Image)> {
     files
 }
 
+/// The same picture in the formats that the crate `image` reads beside PNG, with the grey values
+/// expected.
+pub fn other_files() -> Vec<(&'static str, Vec<u8>, Image)> {
+    let bytes = raster().bytes();
+    let colours = bytes.iter().flat_map(|&v| [v; 3]).collect();
+    let picture = image::RgbImage::from_raw(SIZE[0], SIZE[1], colours).unwrap();
+    let expected = Image::new(SIZE[0], SIZE[1], widened(bytes), None).unwrap();
+    [
+        ("BMP", image::ImageFormat::Bmp),
+        ("GIF", image::ImageFormat::Gif),
+        ("TIFF", image::ImageFormat::Tiff),
+        ("WebP", image::ImageFormat::WebP),
+    ]
+    .map(|(name, format)| {
+        let mut file = std::io::Cursor::new(Vec::new());
+        picture.write_to(&mut file, format).unwrap();
+        (name, file.into_inner(), expected.clone())
+    })
+    .into()
+}
+
 /// Appends a PNG chunk.
 pub fn chunk(bytes: &mut Vec<u8>, name: [u8; 4], data: &[u8]) {
     bytes.extend((data.len() as u32).to_be_bytes());
