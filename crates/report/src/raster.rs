@@ -10,7 +10,8 @@ use crate::surface::{PNG_SCALE, Surface};
 
 /// A panel that shows a picture, with a caption below.
 ///
-/// It is averaged, in linear light, over the pixels of the figure, two per layout unit. Transparent pixels show the white page.
+/// It is averaged, in linear light, over the pixels of the figure, two per layout unit, or interpolated linearly if these are smaller
+/// than its own. Transparent pixels show the white page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Raster {
     pub(crate) caption: String,
@@ -67,14 +68,19 @@ impl Raster {
     }
 }
 
-/// What each of `to` equal parts of a line covers of `from` others: their numbers and shares.
+/// What each of `to` equal parts of a line covers of `from` others, with their numbers and shares. Parts that are smaller than the others
+/// are widened to the size of one around their middle, which interpolates linearly.
 fn shares(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
     let part = |k: usize| {
-        // In units of 1 / to of a source pixel, which keeps them exact.
-        let (start, end) = (k * from, (k + 1) * from);
-        let share = move |i: usize| end.min((i + 1) * to) - start.max(i * to);
-        (start / to..end.div_ceil(to))
-            .map(|i| (i, share(i) as f32 / from as f32))
+        // In units of 1 / (2 to) of the others, which keeps them exact.
+        let (middle, half, other) = ((2 * k + 1) * from, from.max(to), 2 * to);
+        let (start, end) = (
+            middle.saturating_sub(half),
+            (middle + half).min(other * from),
+        );
+        let share = move |i: usize| end.min((i + 1) * other) - start.max(i * other);
+        (start / other..end.div_ceil(other))
+            .map(|i| (i, share(i) as f32 / (end - start) as f32))
             .collect()
     };
     (0..to).map(part).collect()
@@ -94,5 +100,28 @@ impl Drawable for &Raster {
         let columns = pixels(plot.width);
         let cells = self.averaged(columns, pixels(plot.height));
         surface.image(plot, columns, &cells, true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_are_means_or_linear_interpolation() {
+        assert_eq!(shares(2, 2), [[(0, 1.0)], [(1, 1.0)]]);
+        assert_eq!(shares(4, 2), [[(0, 0.5), (1, 0.5)], [(2, 0.5), (3, 0.5)]]);
+        assert_eq!(
+            shares(2, 4)[..3],
+            [
+                vec![(0, 1.0)],
+                vec![(0, 0.75), (1, 0.25)],
+                vec![(0, 0.25), (1, 0.75)]
+            ]
+        );
+        for part in shares(7, 5).into_iter().chain(shares(5, 7)) {
+            let whole: f32 = part.iter().map(|(_, share)| share).sum();
+            assert!((whole - 1.0).abs() < 1e-6);
+        }
     }
 }
