@@ -1,5 +1,6 @@
 //! Image files in.
 
+pub(crate) mod colours;
 pub(crate) mod error;
 mod jpeg;
 mod orientation;

@@ -39,7 +39,7 @@ impl Orientation {
     }
 
     /// The values of the upright image, from those of a stored one of the given size.
-    pub fn apply(self, stored: [u32; 2], values: Vec<u16>) -> Vec<u16> {
+    pub fn apply<T: Copy>(self, stored: [u32; 2], values: Vec<T>) -> Vec<T> {
         if !self.transposed && self.mirrored == [false; 2] {
             return values;
         }
