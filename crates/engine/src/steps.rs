@@ -78,6 +78,10 @@ pub struct TimeSteps {
     /// like the last ones before it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_substep: Option<f64>,
+    /// If the interface may move by no more than so many widths of it in a step, up to 3: a longer step is halved, up to
+    /// twelve times.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub longest_move: Option<f64>,
 }
 
 impl From<StepRule> for TimeSteps {
@@ -85,6 +89,7 @@ impl From<StepRule> for TimeSteps {
         Self {
             rule,
             first_substep: None,
+            longest_move: None,
         }
     }
 }
