@@ -1,16 +1,19 @@
 //! What can be typed.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use engine::{Scheme, StepRule};
 use geometry::UpAxis;
+use model::Network;
 use serde::Serialize;
 use surfaces::shapes::Region;
 
 use crate::ansatz::Ansatz;
+use crate::commands::check_eps_over_h;
+use crate::error::Error;
 
 const EXIT_CODES: &str = "Exit codes: 0 success; 2 bad input or failure, one line on standard error; 130 interrupted (Ctrl-C): \
 the last step was finished and stored, `willmore resume` goes on.";
@@ -79,27 +82,33 @@ pub enum Command {
 
 const FLOW_EXAMPLES: &str = "Examples:
   willmore flow bunny.ply --steps 12 --output runs/bunny
-  willmore flow logo.png --frames 1 --time 1e-4
+  willmore flow logo.png --frames 1 --save smooth.svg
   willmore flow builtin:cube --tau doubling:1e-6 --steps 10
+Lengths, areas, volumes and times (length^4) are in the units of the mesh, in pixels of the image, or in those of the box.
+The Willmore energy is 1/2 int h^2 dA in space, h the sum of the principal curvatures (a sphere has 8 pi, no closed surface less),
+and 1/2 int kappa^2 ds in the plane (a circle of radius R has pi / R).
 Ctrl-C (exit code 130) leaves a run that `willmore resume DIR` continues.";
-const RESUME_EXAMPLES: &str = "Example:
-  willmore resume runs/bunny";
+const RESUME_EXAMPLES: &str = "Examples:
+  willmore resume runs/bunny
+  willmore resume runs/bunny --steps 40";
 const FAIR_EXAMPLES: &str = "Examples:
   willmore fair scan.stl --save smooth.stl
   willmore fair scan.obj --noise 0.2 --keep box:-5,-5,0,5,5,2
   willmore fair scan.ply --energy-ratio 0.5 --remesh";
 const INPAINT_EXAMPLES: &str = "Examples:
-  willmore inpaint photo.png --mask damage.png --steps 40
+  willmore inpaint drawing.png --mask damage.png --steps 40
   willmore inpaint builtin:disc --mask box:0.2,0.2,0.9,0.9 --ansatz empty
   willmore inpaint bunny.ply --mask ball:0.1,0.2,0,0.15
-Lengths are those of the box, whose centre is 0: see --box-side and --side-length.";
+Regions are in the coordinates of the input: of the mesh or field, in pixels from the lower left corner of an image, of the box about 0.";
 const MCF_EXAMPLES: &str = "Examples:
   willmore mcf logo.png --steps 64
   willmore mcf builtin:torus --method fe-implicit --frames 4";
 const SAMPLE_EXAMPLES: &str = "Examples:
   willmore sample builtin:figure --noise 0.005 --save scan.ply
   willmore sample builtin:ring --without ball:0.4,0.2,0.1 --save logo.png
-  willmore sample ball:0.4,0.2,0.15 --save mask.png";
+  willmore sample ball:0.4,0.2,0.15 --save mask.png
+  willmore sample scan.obj --save scan.stl
+  willmore sample scan.obj --repair --save whole.ply";
 const NETWORKS_EXAMPLES: &str = "Examples:
   willmore networks
   willmore networks show d2_k17_eps2_step1
@@ -123,15 +132,15 @@ pub struct InputOptions {
     /// NAME one of disc, ring, cross, rectangle, sphere, cube, torus, coin, figure, lever, or a region as box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z
     pub input: Option<String>,
 
-    /// Cells per unit length [default: 128 in 2D, 64 in 3D]
+    /// Cells per unit length of the box [default: 128 in 2D, 64 in 3D; of a mesh or image the first that hold its thin parts]
     #[arg(long, value_name = "N")]
     pub cells: Option<usize>,
 
-    /// Side of the periodic box about 0 [default: 2 in 2D, 1 in 3D]
+    /// Side of the periodic box [default: 2 in 2D, 1 in 3D]
     #[arg(long, value_name = "LENGTH")]
     pub box_side: Option<f64>,
 
-    /// Longest side of the mesh, image or built-in shape in the box [default: 0.6 of the box]
+    /// Longest side of the shape in the box, which is made around a mesh or image in its own units [default: 0.6 of the box]
     #[arg(long, value_name = "LENGTH")]
     pub side_length: Option<f64>,
 
@@ -142,6 +151,10 @@ pub struct InputOptions {
     /// Grey value from 0 to 1, or opacity, between inside and outside [default: 0.5]
     #[arg(long, value_name = "VALUE")]
     pub threshold: Option<f64>,
+
+    /// Mend a mesh that is open, crosses itself or is not oriented alike: a new mesh is made, and it is said what was changed
+    #[arg(long)]
+    pub repair: bool,
 
     /// What the values of a field are [default: phase-field]
     #[arg(long, value_name = "KIND", value_enum)]
@@ -174,9 +187,9 @@ pub enum Holds {
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct SchemeOptions {
-    /// Interface width in cells
-    #[arg(long, value_name = "RATIO", default_value_t = 2.0)]
-    pub eps_over_h: f64,
+    /// Interface width in cells [default: 2, or that of --network]
+    #[arg(long, value_name = "RATIO")]
+    pub eps_over_h: Option<f64>,
 
     /// accurate: the most accurate network, calibrated; calibrated: the paper's network, calibrated; paper: as in the paper
     #[arg(long, value_name = "NAME", value_enum, default_value = "accurate")]
@@ -211,6 +224,22 @@ pub struct KeepOptions {
     #[arg(long, value_name = "DIR")]
     #[serde(skip)]
     pub output: Option<PathBuf>,
+
+    /// Write the result to this file too: a mesh (.ply, .obj, .stl) in space, a picture (.png, .svg) in the plane
+    #[arg(long, value_name = "FILE")]
+    pub save: Option<PathBuf>,
+
+    #[command(flatten)]
+    #[serde(skip)]
+    pub force: ForceOption,
+}
+
+/// What is there stays, unless this is given.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct ForceOption {
+    /// Write over what is there: a file, or the run in a folder
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Options of every command that computes.
@@ -258,15 +287,15 @@ pub struct FlowOptions {
     #[arg(long, value_name = "TAU")]
     pub tau: Option<StepRule>,
 
-    /// Stop after this many steps [default: 20, or 1000 with --time or --energy]
+    /// Stop after this many steps [default: 20, or 1000 where something else ends the run]
     #[arg(long, value_name = "COUNT")]
     pub steps: Option<usize>,
 
-    /// Stop at this time
+    /// Stop at this time, a length to the fourth power in the units of the input
     #[arg(long, value_name = "T")]
     pub time: Option<f64>,
 
-    /// Stop when the Willmore energy is no more than this; a sphere has 8 pi = 25.13
+    /// Stop when the Willmore energy is no more than this; a sphere has 8 pi = 25.13, a circle of radius R pi / R
     #[arg(long, value_name = "W")]
     pub energy: Option<f64>,
 
@@ -314,14 +343,6 @@ pub struct FairOptions {
     /// Format of the mesh in the run's folder [default: that of the input]
     #[arg(long, value_name = "NAME", value_enum)]
     pub format: Option<MeshFormat>,
-
-    /// Write the mesh to this file too: .ply, .obj or .stl
-    #[arg(long, value_name = "FILE")]
-    pub save: Option<PathBuf>,
-
-    /// Write over the file of --save if it is there
-    #[arg(long)]
-    pub force: bool,
 
     /// Whether an option other than --noise says when to stop.
     #[arg(skip)]
@@ -389,7 +410,7 @@ pub struct McfOptions {
     #[arg(long, value_name = "COUNT")]
     pub steps: Option<usize>,
 
-    /// Stop with the step that reaches this time
+    /// Stop with the step that reaches this time, a squared length in the units of the input
     #[arg(long, value_name = "T")]
     pub time: Option<f64>,
 
@@ -435,9 +456,16 @@ pub struct SampleOptions {
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
 
+    /// Write the zero level set on the grid in place of a mesh that is converted as it is, as with --cells and --without
+    #[arg(long)]
+    pub resample: bool,
+
     /// Axis that points up in a picture: x, y or z [default: y for .obj, otherwise z]
     #[arg(long, value_name = "AXIS")]
     pub up: Option<UpAxis>,
+
+    #[command(flatten)]
+    pub force: ForceOption,
 }
 
 /// Options of `resume`.
@@ -449,6 +477,13 @@ pub struct ResumeOptions {
     /// Go on from the newest undamaged state of a run in which files are damaged or missing
     #[arg(long)]
     pub recover: bool,
+
+    /// Go on to so many steps in all, also with a finished run
+    #[arg(long, value_name = "COUNT")]
+    pub steps: Option<usize>,
+
+    #[command(flatten)]
+    pub force: ForceOption,
 }
 
 /// What to do with networks.
@@ -503,5 +538,37 @@ pub struct TrainOptions {
     pub quick: bool,
 
     #[command(flatten)]
+    pub force: ForceOption,
+
+    #[command(flatten)]
     pub common: CommonOptions,
+}
+
+impl SchemeOptions {
+    /// Interface width in cells.
+    pub fn eps_over_h(&self) -> f64 {
+        self.eps_over_h.unwrap_or(2.0)
+    }
+
+    /// Takes the width of the interface from the network, unless it is given.
+    pub fn fill_in(&mut self) -> Result<(), Error> {
+        if let (None, Some(path)) = (self.eps_over_h, &self.network) {
+            self.eps_over_h = Some(Network::load(path)?.ratios().eps_over_h);
+        }
+        self.eps_over_h = Some(self.eps_over_h());
+        check_eps_over_h(self.eps_over_h())
+    }
+}
+
+impl ForceOption {
+    /// Refuses a file that is there.
+    pub fn check(self, name: &str, path: &Path) -> Result<(), Error> {
+        if path.exists() && !self.force {
+            return Err(Error::options(format!(
+                "{name} {} is there already: give another name, or --force to write over it",
+                path.display()
+            )));
+        }
+        Ok(())
+    }
 }

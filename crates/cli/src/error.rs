@@ -18,6 +18,9 @@ pub enum Error {
         path: PathBuf,
         source: std::io::Error,
     },
+    /// A mesh that bounds nothing, and that can be repaired.
+    #[error("{0}, or give --repair")]
+    Mendable(#[source] surfaces::Error),
     /// Time steps became too small.
     #[error("{0}; the shape is not resolved, use more --cells")]
     TooStiff(#[source] engine::Error),
@@ -72,6 +75,17 @@ impl Error {
             action,
             path,
             source,
+        }
+    }
+
+    /// What is wrong with a mesh.
+    pub fn mesh(error: surfaces::Error) -> Self {
+        use surfaces::Error::{MixedOrientation, Nesting, NonManifold, Open};
+        match error {
+            Open { .. } | NonManifold { .. } | MixedOrientation { .. } | Nesting { .. } => {
+                Self::Mendable(error)
+            }
+            error => error.into(),
         }
     }
 

@@ -2,10 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use geometry::measure::BoundingBox;
 use geometry::npy::{self, NpyError};
 use geometry::vti::{self, VtiError};
-use geometry::{Field, Grid, Placement, SignedDistance, UpAxis, optimal_profile, phase_field};
-use images::{Frame, Image, Outline, OutlineDistance, Side, Threshold};
+use geometry::{
+    Field, Grid, Placement, SignedDistance, UpAxis, optimal_profile, phase_field, thin_part,
+};
+use images::{Frame, Image, Outline, OutlineDistance, Side, Threshold, Tones};
 use surfaces::shapes::{self, BuiltIn, Region};
 use surfaces::{ClosedMesh, MeshDistance};
 
@@ -13,6 +16,7 @@ use crate::cli::{Holds, InputOptions, Inside, SayOptions};
 use crate::error::Error;
 use crate::outlet::{Outlet, Space, Topology};
 use crate::own::OwnMesh;
+use crate::plane::Plane;
 
 /// What a run starts from.
 pub struct Start<const D: usize, O> {
@@ -29,18 +33,13 @@ pub struct Start<const D: usize, O> {
 /// What a run starts from, in the dimension of the input.
 pub enum Loaded {
     /// In the plane.
-    Plane(Start<2, Frame>, ImageFrame),
+    Plane(Start<2, Plane>, ImageFrame),
     /// In space.
     Space(Start<3, Space>),
 }
 
-/// The image that a mask has to fit.
-pub struct ImageFrame {
-    /// Pixels of the input, if it is an image.
-    size: Option<[u32; 2]>,
-    /// Longest side in the box.
-    side: f64,
-}
+/// The image that a mask has to fit, and that is repaired: the input, if it is one.
+pub struct ImageFrame(Option<(PathBuf, [u32; 2])>);
 
 enum Source<'a> {
     Mesh(PathBuf),
@@ -60,6 +59,22 @@ const PART: f64 = 0.6;
 const OWN_CELLS: [usize; 3] = [128, 160, 192];
 /// and the part of the box that it takes: it moves by little.
 const OWN_PART: f64 = 0.9;
+/// Cells per unit length among which the coarsest that holds all thin parts is taken,
+const IMAGE_CELLS: [usize; 5] = [128, 192, 256, 384, 512];
+/// and those for meshes.
+const MESH_CELLS: [usize; 3] = [64, 96, 128];
+/// Parts and gaps of less than so many interface widths are thin.
+const THIN: f64 = 1.5;
+/// Where more than this part of the boundary is at thin parts a finer grid is taken, or it is told,
+const THIN_PART: f64 = 0.02;
+/// and more than this is refused.
+const MOST_LOST: f64 = 0.25;
+/// Rays by which the thickness of a mesh is measured.
+const MOST_RAYS: usize = 4096;
+/// Cells along a mesh that is repaired.
+const REPAIR_CELLS: usize = 160;
+/// Images with more than this part of their pixels between two tones are no drawings.
+const PHOTOGRAPH: f64 = 0.05;
 /// Memory of a flow, measured at 128 and 192 cells.
 const BYTES_PER_NODE: f64 = 300.0;
 /// Largest magnitude in a phase field: flows overshoot the phases a little.
@@ -119,6 +134,20 @@ pub fn mesh_file(options: &mut InputOptions) -> Result<Option<PathBuf>, Error> {
     })
 }
 
+/// The closed mesh in a file, possibly after a repair.
+pub fn closed(path: &Path, repairs: bool, say: SayOptions) -> Result<ClosedMesh, Error> {
+    let mesh = surfaces::read(path)?;
+    let warn = |what: &dyn std::fmt::Display| say.warn(&format!("{}: {what}", path.display()));
+    if repairs {
+        let repaired = surfaces::repair(&mesh, REPAIR_CELLS)?;
+        warn(&repaired);
+        return Ok(repaired.mesh);
+    }
+    let (mesh, warnings) = ClosedMesh::new(mesh).map_err(Error::mesh)?;
+    warnings.iter().for_each(|warning| warn(warning));
+    Ok(mesh)
+}
+
 /// A mesh whose vertices follow the flow, on the coarsest grid that holds its parts and holes.
 pub fn load_own(
     options: &mut InputOptions,
@@ -142,12 +171,10 @@ pub fn load_own(
     let (mut start, mut found) = (None, Topology::default());
     for cells in grids {
         reader.options.cells = Some(cells);
-        let grid = reader.grid::<3>()?;
-        let side = reader.longest(OWN_PART, grid.side())?;
+        let grid = reader.grid_around(&own.fairing().start().bounding_box(), OWN_PART)?;
         let eps = eps_over_h * grid.spacing();
-        let placement = Placement::fit(&own.fairing().start().bounding_box(), &grid, side, 0.0)?;
-        let field = reader.mesh_field(own.fairing().start(), &placement, grid)?;
-        let space = Space::of(&placement, up);
+        let field = reader.mesh_field(own.fairing().start(), grid)?;
+        let space = Space::new(up);
         // Touching sheets have no topology.
         found = space.topology(&field, eps).unwrap_or_default();
         start = Some((field, space, cells));
@@ -159,7 +186,7 @@ pub fn load_own(
         return Err(Error::options("there is no grid to choose from"));
     };
     if found != own.topology() {
-        let thin = 2.0 * field.grid().spacing() * space.unit();
+        let thin = 2.0 * field.grid().spacing();
         let message = format!(
             "with --cells {cells} parts and gaps thinner than {thin:.3e} ({:.2} % of the longest side) are lost: the mesh has {}, \
              the grid {found}",
@@ -173,12 +200,24 @@ pub fn load_own(
         }
         say.warn(&message);
     }
+    let width = THIN * eps_over_h * field.grid().spacing();
+    let mesh = own.fairing().rough();
+    let sides = mesh.mesh().sides(MOST_RAYS);
+    let thin = thin_part(&MeshDistance::new(mesh), sides, width);
+    if thin >= THIN_PART {
+        reader.tell_thin(
+            thin,
+            (width, cells),
+            "where vertices follow less well",
+            false,
+        )?;
+    }
     say.note(&format!(
         "grid: {cells} cells per unit length, {:.3e} wide (--cells); about {:.1} GB of memory",
-        field.grid().spacing() * space.unit(),
+        field.grid().spacing(),
         BYTES_PER_NODE * field.grid().len() as f64 * 1e-9,
     ));
-    let region = own.nodes(&field, &space)?;
+    let region = own.nodes(&field)?;
     space.own = Some(own);
     Ok(Loaded::Space(Start {
         name: reader.name,
@@ -239,6 +278,7 @@ impl Source<'_> {
             ("--inside", options.inside.is_some(), is_image),
             ("--threshold", options.threshold.is_some(), is_image),
             ("--holds", options.holds.is_some(), is_field),
+            ("--repair", options.repair, matches!(self, Self::Mesh(_))),
             ("--side-length", options.side_length.is_some(), has_side),
             ("--cells", options.cells.is_some(), !is_field),
             ("--box-side", options.box_side.is_some(), !is_vti),
@@ -262,7 +302,7 @@ struct Reader<'a> {
 }
 
 /// Cells per unit length and side of the box, unless they are chosen.
-fn usual_box<const D: usize>() -> (usize, f64) {
+pub fn usual_box<const D: usize>() -> (usize, f64) {
     if D == 2 { (128, 2.0) } else { (64, 1.0) }
 }
 
@@ -270,11 +310,13 @@ impl Reader<'_> {
     fn load(&mut self, source: Source<'_>) -> Result<Loaded, Error> {
         match source {
             Source::Mesh(path) => {
-                let (mesh, warnings) = ClosedMesh::new(surfaces::read(&path)?)?;
-                for warning in &warnings {
-                    self.say.warn(&format!("{}: {warning}", path.display()));
-                }
-                self.mesh(&mesh, surfaces::usual_up_axis(&path)?)
+                let mesh = closed(&path, self.options.repair, self.say)?;
+                let distance = MeshDistance::new(&mesh);
+                let sides = mesh.mesh().sides(MOST_RAYS);
+                let grid =
+                    self.grid_holding(&mesh.bounding_box(), &MESH_CELLS, &distance, &sides)?;
+                let field = self.mesh_field(&mesh, grid)?;
+                Ok(self.space(field, surfaces::usual_up_axis(&path)?))
             }
             Source::Image(path) => self.image(&path),
             Source::Field(path) if is_planar(&path)? => {
@@ -283,7 +325,7 @@ impl Reader<'_> {
             }
             Source::Field(path) => {
                 let field = self.values(&path)?;
-                Ok(self.space(field))
+                Ok(self.space(field, UpAxis::default()))
             }
             Source::Region(region) if region.dimension() == 2 => {
                 let grid = self.grid()?;
@@ -291,7 +333,8 @@ impl Reader<'_> {
             }
             Source::Region(region) => {
                 let grid = self.grid()?;
-                Ok(self.space(self.sampled(grid, region.shape::<3>()?.as_ref())?))
+                let field = self.sampled(grid, region.shape::<3>()?.as_ref())?;
+                Ok(self.space(field, UpAxis::default()))
             }
             Source::BuiltIn(name) => self.built_in(name),
         }
@@ -317,13 +360,77 @@ impl Reader<'_> {
         Ok(grid)
     }
 
-    /// The longest side of what is in the box.
-    fn side(&mut self, box_side: f64) -> Result<f64, Error> {
-        self.longest(PART, box_side)
+    /// The grid about what has these bounds, in their own units, where their longest side is that part of the box unless it is chosen.
+    fn grid_around<const D: usize>(
+        &mut self,
+        bounds: &BoundingBox<D>,
+        part: f64,
+    ) -> Result<Grid<D>, Error> {
+        let grid = self.grid::<D>()?;
+        let side = self.side(part, grid.side())?;
+        let own = bounds.longest_side() / side * grid.side();
+        let corner = bounds.centre().map(|x| x - 0.5 * own);
+        Ok(Grid::new(grid.cells(), own)?.with_origin(corner)?)
     }
 
-    /// The longest side, a part of the box unless it is chosen.
-    fn longest(&mut self, part: f64, box_side: f64) -> Result<f64, Error> {
+    /// The coarsest of some grids about a shape that holds its thin parts and gaps.
+    fn grid_holding<const D: usize>(
+        &mut self,
+        bounds: &BoundingBox<D>,
+        grids: &[usize],
+        shape: &(impl SignedDistance<D> + ?Sized),
+        sides: &(impl Iterator<Item = ([f64; D], [f64; D], f64)> + Clone),
+    ) -> Result<Grid<D>, Error> {
+        let chosen = self.options.cells;
+        let last = chosen.unwrap_or(grids[grids.len() - 1]);
+        let mut grids = chosen
+            .map_or(grids.to_vec(), |cells| vec![cells])
+            .into_iter();
+        loop {
+            let cells = grids.next().unwrap_or(last);
+            self.options.cells = Some(cells);
+            let grid = self.grid_around(bounds, PART)?;
+            let width = THIN * self.eps_over_h * grid.spacing();
+            let thin = thin_part(shape, sides.clone(), width);
+            if thin >= THIN_PART && cells < last {
+                continue;
+            }
+            if thin >= THIN_PART {
+                self.tell_thin(
+                    thin,
+                    (width, cells),
+                    "which will not last",
+                    chosen.is_none(),
+                )?;
+            }
+            return Ok(grid);
+        }
+    }
+
+    /// Says that thin parts are lost, or refuses to lose many unless the grid was chosen.
+    fn tell_thin(
+        &self,
+        part: f64,
+        (width, cells): (f64, usize),
+        what: &str,
+        refuses: bool,
+    ) -> Result<(), Error> {
+        let message = format!(
+            "{:.1} % of the boundary is at parts or gaps thinner than {width:.3e}, {THIN} interface widths with --cells {cells}, \
+             {what}",
+            100.0 * part
+        );
+        if refuses && part >= MOST_LOST {
+            return Err(Error::options(format!(
+                "{message}: give a larger --side-length, or --cells to go on all the same"
+            )));
+        }
+        self.say.warn(&message);
+        Ok(())
+    }
+
+    /// The longest side of what is in the box, a part of that unless it is chosen.
+    fn side(&mut self, part: f64, box_side: f64) -> Result<f64, Error> {
         let side = *self.options.side_length.get_or_insert(part * box_side);
         if !(side > 0.0 && side <= box_side) {
             return Err(Error::options(format!(
@@ -342,30 +449,25 @@ impl Reader<'_> {
         Ok(phase_field(grid, shape, eps)?)
     }
 
-    fn space(&self, field: Field<3>) -> Loaded {
-        self.placed(field, Space::identity())
-    }
-
-    fn placed(&self, field: Field<3>, outlet: Space) -> Loaded {
+    fn space(&self, field: Field<3>, up: UpAxis) -> Loaded {
         Loaded::Space(Start {
             name: self.name.clone(),
             field,
-            outlet,
+            outlet: Space::new(up),
             region: None,
         })
     }
 
     fn plane(&self, field: Field<2>) -> Result<Loaded, Error> {
         let frame = Frame::of_box(field.grid(), PIXELS)?;
-        let side = field.grid().side();
-        Ok(self.framed(field, frame, ImageFrame { size: None, side }))
+        Ok(self.framed(field, frame, ImageFrame(None)))
     }
 
     fn framed(&self, field: Field<2>, frame: Frame, of_image: ImageFrame) -> Loaded {
         let start = Start {
             name: self.name.clone(),
             field,
-            outlet: frame,
+            outlet: Plane::new(frame),
             region: None,
         };
         Loaded::Plane(start, of_image)
@@ -374,23 +476,26 @@ impl Reader<'_> {
     fn built_in(&mut self, name: &str) -> Result<Loaded, Error> {
         if shapes::dimension(name)? == 2 {
             let grid = self.grid::<2>()?;
-            let shape = shapes::built_in(name, self.side(grid.side())?)?;
+            let shape = shapes::built_in(name, self.side(PART, grid.side())?)?;
             let BuiltIn::Plane(shape) = shape else {
                 return Err(Error::options(format!("{name} is not in the plane")));
             };
             return self.plane(self.sampled(grid, shape.as_ref())?);
         }
         let grid = self.grid::<3>()?;
-        match shapes::built_in(name, self.side(grid.side())?)? {
-            BuiltIn::Mesh(mesh) => self.mesh(&mesh, UpAxis::default()),
-            BuiltIn::Space(shape) => Ok(self.space(self.sampled(grid, shape.as_ref())?)),
-            BuiltIn::Plane(_) => Err(Error::options(format!("{name} is in the plane"))),
-        }
+        let side = self.side(PART, grid.side())?;
+        let field = match shapes::built_in(name, side)? {
+            BuiltIn::Mesh(mesh) => {
+                let placement = Placement::fit(&mesh.bounding_box(), &grid, side, 0.0)?;
+                self.mesh_field(&mesh.placed(&placement), grid)?
+            }
+            BuiltIn::Space(shape) => self.sampled(grid, shape.as_ref())?,
+            BuiltIn::Plane(_) => return Err(Error::options(format!("{name} is in the plane"))),
+        };
+        Ok(self.space(field, UpAxis::default()))
     }
 
     fn image(&mut self, path: &Path) -> Result<Loaded, Error> {
-        let grid = self.grid::<2>()?;
-        let side = self.side(grid.side())?;
         let image = images::read(path)?;
         let inside = match self.options.inside {
             None | Some(Inside::Auto) => images::Inside::Auto,
@@ -398,34 +503,27 @@ impl Reader<'_> {
             Some(Inside::Light) => images::Inside::Light,
         };
         let threshold = (self.options.threshold).map_or_else(Threshold::default, Threshold::At);
-        let outline = Outline::of_image(&image, Side::of(&image, inside, threshold)?)?;
-        let placement = Placement::fit(&image.bounding_box(), &grid, side, 0.0)?;
-        let distance = OutlineDistance::new(&outline.placed(&placement));
-        let size = Some([image.width(), image.height()]);
+        let side = Side::of(&image, inside, threshold)?;
+        let tones = Tones::of(&image, side);
+        if self.options.inside.is_none() && self.options.threshold.is_none() {
+            refuse_photographs(&tones, side, path)?;
+        }
+        let outline = Outline::of_image(&image, side)?.smoothed(tones.raster())?;
+        let distance = OutlineDistance::new(&outline);
+        let sides = outline.sides();
+        let grid = self.grid_holding(&image.bounding_box(), &IMAGE_CELLS, &distance, &sides)?;
+        let [width, height] = [image.width(), image.height()];
         Ok(self.framed(
             self.sampled(grid, &distance)?,
-            Frame::of_image(&image, &placement)?,
-            ImageFrame { size, side },
+            Frame::new(width, height, [0.0, f64::from(height)], 1.0)?,
+            ImageFrame(Some((path.to_owned(), [width, height]))),
         ))
     }
 
-    fn mesh(&mut self, mesh: &ClosedMesh, up: UpAxis) -> Result<Loaded, Error> {
-        let grid = self.grid::<3>()?;
-        let side = self.side(grid.side())?;
-        let placement = Placement::fit(&mesh.bounding_box(), &grid, side, 0.0)?;
-        let field = self.mesh_field(mesh, &placement, grid)?;
-        Ok(self.placed(field, Space::of(&placement, up)))
-    }
-
-    fn mesh_field(
-        &self,
-        mesh: &ClosedMesh,
-        placement: &Placement<3>,
-        grid: Grid<3>,
-    ) -> Result<Field<3>, Error> {
+    fn mesh_field(&self, mesh: &ClosedMesh, grid: Grid<3>) -> Result<Field<3>, Error> {
         let progress = self.say.progress();
         let bar = progress.bar("signed distance", grid.cells() as u64);
-        let distance = MeshDistance::new(&mesh.placed(placement));
+        let distance = MeshDistance::new(mesh);
         let mut distance = distance.sample(grid, || bar.inc(1))?;
         bar.finish();
         progress.clear();
@@ -463,6 +561,23 @@ impl Reader<'_> {
     }
 }
 
+/// Refuses images that are no drawings, unless it is said what is to be inside.
+fn refuse_photographs(tones: &Tones, side: Side, path: &Path) -> Result<(), Error> {
+    if tones.between < PHOTOGRAPH {
+        return Ok(());
+    }
+    Err(Error::options(format!(
+        "{} has continuous tones, as a photograph: {:.0} % of its pixels have none of two. A shape has two: with --threshold {:.2}, which \
+         separates them best, the pixels {}, {:.0} % of all, would be inside, and all other tones of them would be lost; say so by \
+         --threshold or --inside",
+        path.display(),
+        100.0 * tones.between,
+        tones.threshold,
+        side.at(tones.threshold),
+        100.0 * tones.inside,
+    )))
+}
+
 /// Whether a file of values is meant to be in the plane; its reader says what is wrong with it.
 fn is_planar(path: &Path) -> Result<bool, Error> {
     let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
@@ -487,16 +602,18 @@ pub fn check_phases<const D: usize>(field: &Field<D>, input: &str) -> Result<(),
 }
 
 impl ImageFrame {
-    /// The nodes inside the mask, which is a region, or an image of the size of the input.
-    pub fn mask(&self, mask: &str, grid: &Grid<2>) -> Result<Vec<bool>, Error> {
+    /// The mask, which is a region, or an image of the size of the input.
+    pub fn mask(&self, mask: &str, grid: &Grid<2>) -> Result<Box<dyn SignedDistance<2>>, Error> {
         if Region::is_meant(mask) {
-            return nodes(mask, grid);
+            return region(mask);
         }
         let image: Image = images::read(mask)?;
         let size = [image.width(), image.height()];
-        let needed = match self.size {
+        let needed = match &self.0 {
             None if size[0] != size[1] => Some("a square, which fills the box".to_owned()),
-            Some([w, h]) if size != [w, h] => Some(format!("{w} x {h} pixels, as the input")),
+            Some((_, [w, h])) if size != [*w, *h] => {
+                Some(format!("{w} x {h} pixels, as the input"))
+            }
             _ => None,
         };
         if let Some(needed) = needed {
@@ -506,14 +623,30 @@ impl ImageFrame {
             )));
         }
         let side = Side::of(&image, images::Inside::Auto, Threshold::default())?;
-        let placement = Placement::fit(&image.bounding_box(), grid, self.side, 0.0)?;
-        let outline = Outline::of_image(&image, side)?.placed(&placement);
-        Ok(images::mask(*grid, &OutlineDistance::new(&outline))?)
+        let mut outline = Outline::of_image(&image, side)?;
+        if self.0.is_none() {
+            let fills = Placement::fit(&image.bounding_box(), grid, grid.side(), 0.0)?;
+            outline = outline.placed(&fills);
+        }
+        Ok(Box::new(OutlineDistance::new(&outline)))
+    }
+
+    /// The plane with the image that is repaired in a mask, if it is one.
+    pub fn repaired(&self, plane: Plane, mask: &dyn SignedDistance<2>) -> Result<Plane, Error> {
+        let Some((path, _)) = &self.0 else {
+            return Ok(plane);
+        };
+        let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
+        let picture = images::colours(&bytes).map_err(|problem| images::Error::Format {
+            path: path.clone(),
+            problem,
+        })?;
+        Ok(plane.repairing(picture, mask))
     }
 }
 
-/// The nodes inside a region.
-pub fn nodes<const D: usize>(mask: &str, grid: &Grid<D>) -> Result<Vec<bool>, Error> {
+/// A region that is a mask.
+pub fn region<const D: usize>(mask: &str) -> Result<Box<dyn SignedDistance<D>>, Error> {
     if !Region::is_meant(mask) {
         return Err(Error::options(format!(
             "--mask {mask} is no region in {D}D: give box:... or ball:..."
@@ -522,7 +655,15 @@ pub fn nodes<const D: usize>(mask: &str, grid: &Grid<D>) -> Result<Vec<bool>, Er
     let region: Region = mask
         .parse()
         .map_err(|reason| Error::options(format!("--mask: {reason}")))?;
-    let shape = region.shape::<D>()?;
+    Ok(region.shape::<D>()?)
+}
+
+/// The nodes inside a mask, of which there must be some.
+pub fn nodes<const D: usize>(
+    mask: &str,
+    shape: &dyn SignedDistance<D>,
+    grid: &Grid<D>,
+) -> Result<Vec<bool>, Error> {
     let nodes: Vec<bool> = (0..grid.len())
         .map(|i| shape.signed_distance(grid.node(i)) < 0.0)
         .collect();

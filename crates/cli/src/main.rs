@@ -9,6 +9,7 @@ mod input;
 mod outlet;
 mod own;
 mod page;
+mod plane;
 mod run;
 mod say;
 

@@ -5,16 +5,16 @@ use std::path::Path;
 
 use engine::{Measure, Stop};
 use geometry::measure::{BoundingBox, bounding_box, has_interface};
-use geometry::{Field, Placement, UpAxis, npy, vti};
-use images::{Drawing, Frame, Interface, Outline, Svg};
-use render::{Picture, Rgb, Scene, View};
+use geometry::{Field, UpAxis, npy, vti};
+use render::{Picture, Scene, View};
 use runs::{RunDirectory, StoredRun};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use surfaces::{ClosedMesh, TriangleMesh};
+use surfaces::ClosedMesh;
 
 use crate::cli::MeshFormat;
 use crate::error::Error;
+use crate::input::extension;
 use crate::own::{Faired, OwnMesh};
 
 /// Pixels a side of pictures of surfaces.
@@ -38,6 +38,10 @@ pub const FINAL: &str = "final";
 pub const PICTURE: &str = "final.png";
 /// The folder of pictures of the shape in between.
 pub const FRAMES: &str = "frames";
+/// The frames one after the other.
+pub const ANIMATION: &str = "animation.png";
+/// The fields of the frames with their times.
+pub const SERIES: &str = "frames.pvd";
 /// The outcome of a run.
 pub const SUMMARY: &str = "summary.json";
 
@@ -91,7 +95,22 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
         run: &mut RunDirectory,
     ) -> Result<(), Error>;
 
-    /// Writes the shape as a mesh to any file.
+    /// The extensions of files that hold it.
+    const SAVED: &'static [&'static str];
+
+    /// Refuses other files.
+    fn check_saved(path: &Path) -> Result<(), Error> {
+        if Self::SAVED.contains(&&*extension(path)) {
+            return Ok(());
+        }
+        Err(Error::options(format!(
+            "--save {}: a result in {D}D is saved as .{}",
+            path.display(),
+            Self::SAVED.join(" or .")
+        )))
+    }
+
+    /// Writes the shape to any such file.
     fn save(&self, u: &Field<D>, eps: f64, path: &Path) -> Result<(), Error>;
 
     /// What becomes of the mesh whose vertices follow the flow, if there is one.
@@ -109,70 +128,21 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
         Vec::new()
     }
 
-    /// The name and the bytes of a file that it takes to resume a run, if there is one,
-    fn input(&self) -> Option<(&str, &[u8])> {
-        None
+    /// Names and bytes of the files that it takes to resume a run,
+    fn inputs(&self) -> Result<Vec<(&str, Vec<u8>)>, Error> {
+        Ok(Vec::new())
     }
 
-    /// and what becomes of it there.
+    /// and what becomes of them there.
     fn restore(&mut self, _: &StoredRun) -> Result<(), Error> {
         Ok(())
     }
 }
 
-/// As the pixels of an image in the plane.
-impl Outlet<2> for Frame {
-    fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error> {
-        match up {
-            None => Ok(()),
-            Some(axis) => Err(Error::options(format!(
-                "--up {axis} has no meaning in the plane: leave it out"
-            ))),
-        }
-    }
-
-    fn picture(&self, _: &Field<2>, u: &Field<2>, eps: f64) -> Result<Picture, Error> {
-        let interface = Interface::new(u, eps)?;
-        let drawing = Drawing::on_white(*self).filled(&interface, Rgb::BLACK);
-        Ok(drawing.picture()?)
-    }
-
-    fn topology(&self, u: &Field<2>, _: f64) -> Result<Topology, Error> {
-        Ok(Topology {
-            components: Outline::of_phase_field(u)?.curves().len(),
-            euler_characteristic: None,
-        })
-    }
-
-    fn write_shape(
-        &self,
-        u: &Field<2>,
-        _: f64,
-        stem: &str,
-        _: MeshFormat,
-        run: &mut RunDirectory,
-    ) -> Result<(), Error> {
-        let name = format!("{stem}.svg");
-        let outline = Outline::of_phase_field(u)?;
-        Svg::on_white(*self)
-            .filled(&outline, Rgb::BLACK)
-            .write(run.path().join(&name))?;
-        Ok(run.adopt_file(&name)?)
-    }
-
-    fn save(&self, _: &Field<2>, _: f64, path: &Path) -> Result<(), Error> {
-        Err(Error::options(format!(
-            "--save {} needs a surface in space",
-            path.display()
-        )))
-    }
-}
-
-/// From the box to the coordinates of a mesh, `origin + unit p`, and its upward axis.
+/// As surfaces in space.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Space {
-    origin: [f64; 3],
-    unit: f64,
+    /// The axis that points up.
     up: UpAxis,
     /// The mesh whose vertices follow the flow, if it is one.
     #[serde(default)]
@@ -180,51 +150,9 @@ pub struct Space {
 }
 
 impl Space {
-    /// The coordinates of the box.
-    pub fn identity() -> Self {
-        Self {
-            origin: [0.0; 3],
-            unit: 1.0,
-            up: UpAxis::default(),
-            own: None,
-        }
-    }
-
-    /// The coordinates of a mesh that was placed in the box.
-    pub fn of(placement: &Placement<3>, up: UpAxis) -> Self {
-        Self {
-            origin: placement.apply_inverse([0.0; 3]),
-            unit: placement.scale().recip(),
-            up,
-            own: None,
-        }
-    }
-
-    /// The length in the mesh's units of a unit of the box.
-    pub fn unit(&self) -> f64 {
-        self.unit
-    }
-
-    /// A point of the box in the coordinates that the mesh came in,
-    pub fn to_own(&self, x: [f64; 3]) -> [f64; 3] {
-        std::array::from_fn(|i| self.unit.mul_add(x[i], self.origin[i]))
-    }
-
-    /// and the other way round.
-    pub fn placement(&self) -> Result<Placement<3>, Error> {
-        Ok(Placement::about(self.origin, self.unit.recip())?)
-    }
-
-    /// A mesh in the box, in the coordinates that it came in.
-    pub fn in_own_coordinates(&self, mut mesh: TriangleMesh) -> TriangleMesh {
-        for x in &mut mesh.vertices {
-            *x = self.to_own(*x);
-        }
-        mesh
-    }
-
-    fn mesh(&self, u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
-        Ok(self.in_own_coordinates(surfaces::remeshed_surface(u, eps)?))
+    /// With this axis upwards.
+    pub fn new(up: UpAxis) -> Self {
+        Self { up, own: None }
     }
 }
 
@@ -265,32 +193,34 @@ impl Outlet<3> for Space {
         run: &mut RunDirectory,
     ) -> Result<(), Error> {
         let name = format!("{stem}.{format}");
-        let mesh = self.mesh(u, eps)?;
+        let mesh = surfaces::remeshed_surface(u, eps)?;
         surfaces::write(run.path().join(&name), &mesh)?;
         Ok(run.adopt_file(&name)?)
     }
 
+    const SAVED: &'static [&'static str] = &["ply", "obj", "stl"];
+
     fn save(&self, u: &Field<3>, eps: f64, path: &Path) -> Result<(), Error> {
-        Ok(surfaces::write(path, &self.mesh(u, eps)?)?)
+        Ok(surfaces::write(path, &surfaces::remeshed_surface(u, eps)?)?)
     }
 
     fn faired(&self, start: &Field<3>, u: &Field<3>, eps: f64) -> Result<Option<Faired>, Error> {
         let own = self.own.as_ref();
-        own.map(|own| own.faired(start, u, eps, self)).transpose()
+        own.map(|own| own.faired(start, u, eps)).transpose()
     }
 
     fn measures(&self, start: &Field<3>, eps: f64) -> Result<Vec<Measure<3>>, Error> {
         let own = self.own.iter();
-        own.map(|own| own.measure(start, eps, self)).collect()
+        own.map(|own| own.measure(start, eps)).collect()
     }
 
     fn stops(&self, start: &Field<3>) -> Vec<Stop> {
         let own = self.own.as_ref();
-        own.map_or(Vec::new(), |own| own.stops(start.grid().spacing(), self))
+        own.map_or(Vec::new(), |own| own.stops(start.grid().spacing()))
     }
 
-    fn input(&self) -> Option<(&str, &[u8])> {
-        self.own.as_ref().map(OwnMesh::input)
+    fn inputs(&self) -> Result<Vec<(&str, Vec<u8>)>, Error> {
+        Ok(self.own.iter().map(OwnMesh::input).collect())
     }
 
     fn restore(&mut self, stored: &StoredRun) -> Result<(), Error> {
@@ -327,6 +257,12 @@ pub fn write_final<const D: usize, O: Outlet<D>>(
         outlet.write_shape(u, eps, FINAL, format.unwrap_or_default(), run)?;
     }
     outlet.topology(u, eps)
+}
+
+/// Whether a file is written at the end of a run.
+pub fn is_of_end(name: &str) -> bool {
+    let stem = name.split('.').next();
+    stem == Some(FINAL) || [SUMMARY, ANIMATION, SERIES].contains(&name)
 }
 
 /// Adds a picture to a run.

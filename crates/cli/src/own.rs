@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use engine::{DISPLACEMENT, Measure, Stop};
 use geometry::file::write_atomically;
-use geometry::{Field, SignedDistance};
+use geometry::{Field, Placement, SignedDistance};
 use runs::StoredRun;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -14,7 +14,7 @@ use surfaces::shapes::Region;
 use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, root_mean_square};
 
 use crate::error::Error;
-use crate::outlet::{Space, Topology};
+use crate::outlet::Topology;
 
 /// The name of the copy of the input, without its extension.
 pub const INPUT: &str = "input";
@@ -40,6 +40,11 @@ struct Loaded {
     fairing: Fairing,
 }
 
+/// The grid has the coordinates of the mesh.
+fn in_place() -> Result<Placement<3>, Error> {
+    Ok(Placement::about([0.0; 3], 1.0)?)
+}
+
 /// What there is to take off.
 #[derive(Clone, Copy)]
 pub enum Noise {
@@ -60,7 +65,7 @@ impl OwnMesh {
         keep: Option<String>,
     ) -> Result<(Self, Vec<String>), Error> {
         let mesh = surfaces::decode(&bytes, path)?;
-        let (closed, warnings) = ClosedMesh::new(mesh.clone())?;
+        let (closed, warnings) = ClosedMesh::new(mesh.clone()).map_err(Error::mesh)?;
         let mut own = Self {
             file: format!("{INPUT}.{}", crate::input::extension(path)),
             noise: match noise {
@@ -127,8 +132,8 @@ impl OwnMesh {
     }
 
     /// The copy of the input for the folder of a run, and its name.
-    pub fn input(&self) -> (&str, &[u8]) {
-        (&self.file, &self.loaded().bytes)
+    pub fn input(&self) -> (&str, Vec<u8>) {
+        (&self.file, self.loaded().bytes.clone())
     }
 
     fn loaded(&self) -> &Loaded {
@@ -146,12 +151,11 @@ impl OwnMesh {
     }
 
     /// The nodes that may move: those outside of what is kept.
-    pub fn nodes(&self, field: &Field<3>, space: &Space) -> Result<Option<Vec<bool>>, Error> {
+    pub fn nodes(&self, field: &Field<3>) -> Result<Option<Vec<bool>>, Error> {
         let grid = field.grid();
         Ok(self.region()?.map(|region| {
-            let own = |node| space.to_own(grid.node(node));
             (0..grid.len())
-                .map(|node| region.signed_distance(own(node)) > 0.0)
+                .map(|node| region.signed_distance(grid.node(node)) > 0.0)
                 .collect()
         }))
     }
@@ -161,43 +165,35 @@ impl OwnMesh {
         Topology::of(self.fairing().rough())
     }
 
-    /// How far the vertices have gone, root of the mean square, in the box.
-    pub fn measure(&self, start: &Field<3>, eps: f64, space: &Space) -> Result<Measure<3>, Error> {
-        let (fairing, unit) = (self.fairing().clone(), space.unit());
-        let followed = fairing.follow(space.placement()?, start, eps)?;
+    /// How far the vertices have gone, root of the mean square.
+    pub fn measure(&self, start: &Field<3>, eps: f64) -> Result<Measure<3>, Error> {
+        let fairing = self.fairing().clone();
+        let followed = fairing.follow(in_place()?, start, eps)?;
         Ok(Measure::new(DISPLACEMENT, move |u, _| {
             // A field that is not finite stops the run elsewhere.
-            let gone = fairing.displacement(&followed, u).ok();
-            Ok(gone.map(|gone| gone / unit))
+            Ok(fairing.displacement(&followed, u).ok())
         }))
     }
 
     /// When the noise is off.
-    pub fn stops(&self, spacing: f64, space: &Space) -> Vec<Stop> {
+    pub fn stops(&self, spacing: f64) -> Vec<Stop> {
         if self.noise == 0.0 {
             return Vec::new();
         }
-        let scale = space.unit().recip();
         vec![
-            Stop::Time(self.fairing().time(spacing, scale)),
-            Stop::Displacement(scale * self.fairing().farthest()),
+            Stop::Time(self.fairing().time(spacing, 1.0)),
+            Stop::Displacement(self.fairing().farthest()),
         ]
     }
 
     /// The mesh with the vertices where the phase field `u` has taken them.
-    pub fn faired(
-        &self,
-        start: &Field<3>,
-        u: &Field<3>,
-        eps: f64,
-        space: &Space,
-    ) -> Result<Faired, Error> {
+    pub fn faired(&self, start: &Field<3>, u: &Field<3>, eps: f64) -> Result<Faired, Error> {
         let Loaded {
             bytes,
             mesh,
             fairing,
         } = self.loaded();
-        let followed = fairing.follow(space.placement()?, start, eps)?;
+        let followed = fairing.follow(in_place()?, start, eps)?;
         let moved = fairing.faired(&followed, u)?;
         let key = |x: &[f64; 3]| x.map(|v| (v + 0.0).to_bits());
         let pairs = fairing.rough().mesh().vertices.iter().zip(&moved.vertices);

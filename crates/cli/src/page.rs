@@ -138,7 +138,9 @@ impl Files<'_> {
 
     fn frames(&self) -> Result<Option<Frames>, Error> {
         let files = self.run.files();
-        let names: Vec<&str> = files.filter(|f| f.starts_with(outlet::FRAMES)).collect();
+        let names: Vec<&str> = files
+            .filter(|f| f.starts_with(outlet::FRAMES) && f.ends_with(".png"))
+            .collect();
         if names.is_empty() {
             return Ok(None);
         }
@@ -162,16 +164,19 @@ impl Files<'_> {
     /// Energy and measures over the steps, drawn and as a table.
     fn steps(&self, table: &Table) -> Result<Section, Error> {
         let columns = match engine::dimension(self.run)? {
-            2 => [("perimeter", "Length"), ("volume", "Area")],
-            _ => [("perimeter", "Area"), ("volume", "Volume")],
+            2 => [("length", "Length"), ("area", "Area")],
+            _ => [("area", "Area"), ("volume", "Volume")],
         };
         let energy = ("willmore_energy", "Willmore energy");
         let mut figure = report::Figure::new("", 3);
         for (column, title) in std::iter::once(energy).chain(columns) {
-            let points = points(table, column);
+            let mut points = points(table, column);
             // Mean curvature flow has no energy.
             if points.is_empty() {
                 continue;
+            }
+            if let Some(start) = self.start(column) {
+                points.insert(0, [0.0, start]);
             }
             let mut series = Series::new("", points);
             if series.points.len() < FEW_STEPS {
@@ -194,9 +199,22 @@ impl Files<'_> {
         let details = Details::new("Steps as a table")
             .with(Text::markdown(&note))
             .with(Table::new("Steps", table.head(), rows)?);
-        let caption = "Energy and measures of the shape after every step.";
+        let caption = "Energy and measures of the shape at the beginning and after every step.";
         let figure = Figure::new(image, caption);
         Ok(Section::new("Steps").with(figure).with(details))
+    }
+
+    /// What a column has before the first step.
+    fn start(&self, column: &str) -> Option<f64> {
+        let first: Value = serde_json::from_str(&self.run.state().text).ok()?;
+        let first = &first[0]["minimization"];
+        match column {
+            // The energy of a step that stands still.
+            "willmore_energy" => {
+                Some(first["energy_before"].as_f64()? / (2.0 * first["tau"].as_f64()?))
+            }
+            measure => self.run.state().notes["start"][measure].as_f64(),
+        }
     }
 
     fn has(&self, name: &str) -> bool {
@@ -263,9 +281,34 @@ fn facts(values: &Value) -> Facts {
     let Value::Object(map) = values else {
         return Facts::new();
     };
-    map.iter().fold(Facts::new(), |facts, (name, value)| {
-        facts.with_value(name, value)
+    map.iter().fold(Facts::new(), |facts, (key, value)| {
+        let name = &named(key);
+        match value {
+            Value::Number(number) => {
+                let value = number
+                    .as_f64()
+                    .map_or_else(|| number.to_string(), five_digits);
+                facts.with(name, value)
+            }
+            value => facts.with_value(name, value),
+        }
     })
+}
+
+/// A key of the outcome or an option in words.
+fn named(key: &str) -> String {
+    let known = match key {
+        "energy" => "Willmore energy",
+        "first_energy" => "Willmore energy at the beginning",
+        "energy_over_8_pi" => "Willmore energy over that of a sphere",
+        "components" => "closed parts",
+        "mesh" => "movement of the vertices",
+        "same_topology" => "as many parts and holes as before",
+        "touches_box" => "touches the side of the box",
+        "shortened_steps" => "steps that were shortened",
+        other => return other.replace('_', " "),
+    };
+    known.to_owned()
 }
 
 #[cfg(test)]

@@ -1,11 +1,14 @@
 //! A run from its start, or from where it was stopped, to its end.
 
+use std::f64::consts::PI;
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use engine::{Case, Checkpoints, Ending, Event, Observer, Record, Run, Stop, Store};
 use geometry::measure::{has_interface, touches_side};
+use geometry::vti;
 use operators::ComputeDevice;
 use render::Picture;
 use runs::{Interrupt, RunDirectory, StoredRun};
@@ -14,7 +17,8 @@ use serde_json::{Value, json};
 use crate::cli::{KeepOptions, MeshFormat, SayOptions};
 use crate::config;
 use crate::error::Error;
-use crate::outlet::{self, Outlet};
+use crate::input::extension;
+use crate::outlet::{self, Outlet, Topology};
 use crate::own::Faired;
 use crate::page;
 
@@ -30,8 +34,6 @@ pub struct Plan<O> {
     pub keep: KeepOptions,
     /// Format of meshes.
     pub format: Option<MeshFormat>,
-    /// A mesh to be written besides.
-    pub save: Option<PathBuf>,
     /// What is printed.
     pub say: SayOptions,
 }
@@ -66,23 +68,41 @@ impl<O> Plan<O> {
             Some(folder) => folder.clone(),
             None => free_folder(&format!("{}-{}", self.name, self.command)),
         };
+        if self.keep.force.force {
+            make_way(&folder)?;
+        }
+        let inputs = self.outlet.inputs()?;
         let mut files = vec![(config::FILE, options.as_bytes())];
-        files.extend(self.outlet.input());
+        files.extend(inputs.iter().map(|(name, bytes)| (*name, &bytes[..])));
         let store = Store::create(folder, &files, &run, notes, self.checkpoints())?;
         self.go_on(store, run)
     }
 
-    /// Continues a run from its last checkpoint.
+    /// Continues a run from its last checkpoint, a finished one to more steps.
     pub fn resume<const D: usize>(
         &self,
         stored: StoredRun,
         case: Case<D>,
         device: &ComputeDevice,
+        steps: Option<usize>,
     ) -> Result<ExitCode, Error>
     where
         O: Outlet<D>,
     {
-        let (store, run) = Store::resume(stored, case, device, self.checkpoints())?;
+        let checkpoints = self.checkpoints();
+        let (store, run) = if let Some(steps) = steps {
+            let mut notes = engine::notes(&stored).clone();
+            notes["steps"] = steps.into();
+            Store::extend(
+                stored,
+                case,
+                device,
+                (checkpoints, notes),
+                outlet::is_of_end,
+            )?
+        } else {
+            Store::resume(stored, case, device, checkpoints)?
+        };
         self.go_on(store, run)
     }
 
@@ -104,7 +124,10 @@ impl<O> Plan<O> {
         let title = format!("{} of {}", self.command, self.name);
         let mut bar = progress.bar(title, steps.unwrap_or(0));
         let clock = Instant::now();
-        let mut pictures = Pictures(self);
+        let mut pictures = Pictures {
+            plan: self,
+            topology: None,
+        };
         let observers: &mut [&mut dyn Observer<D>] = &mut [&mut bar, &mut pictures];
         let ending = run.advance(Some(&mut store), observers, &interrupt)?;
         let seconds = clock.elapsed().as_secs_f64();
@@ -147,7 +170,7 @@ impl<O> Plan<O> {
             self.format,
             directory,
         )?;
-        if let Some(path) = &self.save {
+        if let Some(path) = self.keep.save.as_ref().filter(|_| has_interface(u)) {
             match &faired {
                 Some(faired) => faired.write(path)?,
                 None => self.outlet.save(u, eps, path)?,
@@ -156,7 +179,9 @@ impl<O> Plan<O> {
         if self.keep.frames.is_some() {
             let frames = frames(&directory.path().join(outlet::FRAMES))?;
             let animation = render::animation(&frames, DELAY)?;
-            directory.write_file("animation.png", |out| out.write_all(&animation))?;
+            directory.write_file(outlet::ANIMATION, |out| out.write_all(&animation))?;
+            let series = series(directory.path(), run.records());
+            directory.write_file(outlet::SERIES, |out| out.write_all(series.as_bytes()))?;
         }
         // Touching sheets have no topology; that is no reason not to flow.
         let before = match &faired {
@@ -171,6 +196,13 @@ impl<O> Plan<O> {
             "components": topology.components,
             "same_topology": topology == before,
             "touches_box": touches_side(u),
+            "grid": {
+                "cells": case.grid().cells(),
+                "spacing": case.grid().spacing(),
+                "origin": case.grid().origin().to_vec(),
+                "interface_width": eps,
+            },
+            "shortened_steps": run.records().iter().filter(|record| record.halvings > 0).count(),
         });
         if let Some(number) = topology.euler_characteristic {
             outcome["euler_characteristic"] = number.into();
@@ -183,6 +215,9 @@ impl<O> Plan<O> {
         if let (Some(first), Some(energy)) = (first.and_then(|r| r.minimization), energy) {
             outcome["first_energy"] = first.energy_at_rest().into();
             outcome["energy"] = energy.into();
+            if D == 3 {
+                outcome["energy_over_8_pi"] = (energy / (8.0 * PI)).into();
+            }
         }
         for stop in &case.stops {
             if let Stop::Energy(target) = stop {
@@ -211,8 +246,17 @@ impl<O> Plan<O> {
             "{steps} steps to t = {time:.4e} in {seconds:.1} s{reason}"
         )];
         if let (Some(first), Some(energy)) = (number("first_energy"), number("energy")) {
-            text.push(format!("Willmore energy {energy:.4}, before {first:.4}"));
+            let spheres = number("energy_over_8_pi");
+            let spheres = spheres.map_or(String::new(), |w| format!(" = {w:.4} x 8 pi"));
+            text.push(format!(
+                "Willmore energy {energy:.5}{spheres}, before {first:.5}"
+            ));
         }
+        let sizes = ["length", "area", "volume"].iter().filter_map(|name| {
+            let size = number(name)?;
+            Some(format!("{name} {size:.5}"))
+        });
+        text.push(sizes.collect::<Vec<_>>().join(", "));
         let mesh = &outcome["mesh"];
         if let Some(moved) = mesh["displacement_rms"].as_f64() {
             let of = |name: &str| mesh[name].as_f64().unwrap_or(f64::NAN);
@@ -234,11 +278,11 @@ impl<O> Plan<O> {
             ),
             (
                 outcome["energy_reached"] == false,
-                "the energy asked for was not reached, go on with more --steps or --time",
+                "the energy asked for was not reached: `willmore resume` goes on with more --steps",
             ),
             (
-                outcome["components"] == 0 && ended != Some(Stop::Vanished),
-                "the shape has vanished",
+                outcome["shortened_steps"].as_u64().unwrap_or(0) > 0,
+                "some steps were made shorter than they were to be, since the interface would have moved by more than 2 widths of it",
             ),
             (
                 outcome["same_topology"] == false,
@@ -246,7 +290,7 @@ impl<O> Plan<O> {
             ),
             (
                 outcome["touches_box"] == true,
-                "the shape has come to the side of the box: start with a smaller --side-length",
+                "the shape touches the side of the box: a smaller --side-length gives it room",
             ),
         ];
         let holding = notes.into_iter().filter(|(holds, _)| *holds);
@@ -269,8 +313,11 @@ impl<O> Plan<O> {
     }
 }
 
-/// Writes the shape at the beginning, and pictures of it in between.
-struct Pictures<'a, O>(&'a Plan<O>);
+/// Writes the shape at the beginning, and pictures of it in between, and says when its parts or holes change.
+struct Pictures<'a, O> {
+    plan: &'a Plan<O>,
+    topology: Option<Topology>,
+}
 
 impl<const D: usize, O: Outlet<D>> Observer<D> for Pictures<'_, O> {
     fn observe(&mut self, event: &mut Event<'_, D>) -> Result<(), engine::Error> {
@@ -288,19 +335,41 @@ impl<const D: usize, O: Outlet<D>> Observer<D> for Pictures<'_, O> {
             keep,
             format,
             ..
-        } = self.0;
+        } = self.plan;
         let mut write = || -> Result<(), Error> {
             if step == 0 {
                 outlet.write_shape(u, eps, outlet::START, format.unwrap_or_default(), run)?;
             }
             if keep.frames.is_some_and(|every| step.is_multiple_of(every)) {
-                let name = format!("{}/step-{step:06}.png", outlet::FRAMES);
+                let name = format!("{}/step-{step:06}", outlet::FRAMES);
                 let picture = outlet.picture(&case.initial, u, eps)?;
-                outlet::write_picture(&picture, &name, run)?;
+                outlet::write_picture(&picture, &format!("{name}.png"), run)?;
+                let values = format!("{name}.vti");
+                vti::write(run.path().join(&values), &[("phase_field", u)])?;
+                run.adopt_file(&values)?;
             }
             Ok(())
         };
-        write().map_err(engine::Error::observer)
+        write().map_err(engine::Error::observer)?;
+        // Touching sheets have no topology.
+        let topology = outlet.topology(u, eps).ok();
+        if let Some((before, now)) = self.topology.zip(topology).filter(|(a, b)| a != b) {
+            let time = event.records.last().map_or(0.0, |record| record.time);
+            self.plan.say.note(&format!(
+                "step {step}, t = {time:.4e}: parts or holes have come or gone, {now} where there were {before}"
+            ));
+        }
+        self.topology = topology.or(self.topology);
+        Ok(())
+    }
+}
+
+/// Removes the run in a folder, if there is one that nobody works on. A folder of something else stays.
+fn make_way(folder: &Path) -> Result<(), Error> {
+    match RunDirectory::recover(folder) {
+        Ok(_) => std::fs::remove_dir_all(folder).map_err(Error::io("remove", folder)),
+        Err(locked @ runs::Error::Locked(_)) => Err(locked.into()),
+        Err(_) => Ok(()),
     }
 }
 
@@ -314,6 +383,22 @@ fn free_folder(name: &str) -> PathBuf {
         .expect("some number is free")
 }
 
+/// The fields of the frames in a folder with their times, for `ParaView`.
+fn series(run: &Path, records: &[Record]) -> String {
+    let mut text =
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n  <Collection>\n"
+            .to_owned();
+    let complete = records.iter().filter(|record| record.completes_step);
+    let times = complete.map(|record| (record.step, record.time));
+    for (step, time) in std::iter::once((0, 0.0)).chain(times) {
+        let name = format!("{}/step-{step:06}.vti", outlet::FRAMES);
+        if run.join(&name).exists() {
+            let _ = writeln!(text, "    <DataSet timestep=\"{time}\" file=\"{name}\"/>");
+        }
+    }
+    text + "  </Collection>\n</VTKFile>\n"
+}
+
 /// The pictures in a folder, in the order of their names.
 fn frames(folder: &Path) -> Result<Vec<Picture>, Error> {
     let entries = std::fs::read_dir(folder).map_err(Error::io("read", folder))?;
@@ -321,6 +406,7 @@ fn frames(folder: &Path) -> Result<Vec<Picture>, Error> {
         .map(|entry| Ok(entry?.path()))
         .collect::<Result<_, _>>()
         .map_err(Error::io("read", folder))?;
+    paths.retain(|path| extension(path) == "png");
     paths.sort();
     let read = |path: &PathBuf| {
         let bytes = std::fs::read(path).map_err(Error::io("read", path))?;

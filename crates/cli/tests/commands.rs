@@ -144,34 +144,6 @@ fn a_new_mesh_is_made_on_demand_and_the_energy_falls_by_the_ratio() {
     assert!((mean / 7.0 - 1.0).abs() < 0.05, "{mean}");
 }
 
-#[test]
-fn steps_that_are_too_long_end_where_there_is_no_surface_any_more() {
-    let folder = tempfile::tempdir().unwrap();
-    let flow = |steps: &str| {
-        let cube = [
-            "flow",
-            "builtin:cube",
-            "--cells",
-            "48",
-            "--tau",
-            "doubling:1e-6",
-        ];
-        outcome(
-            folder.path(),
-            &[&cube[..], &["--steps", steps, "--no-page"]].concat(),
-        )
-    };
-    let (sensible, too_long) = (flow("10"), flow("16"));
-    let energy = sensible["energy"].as_f64().unwrap();
-    assert!((energy / EIGHT_PI - 1.0).abs() < 0.05, "{sensible}");
-    let reason = too_long["ended"].as_str().unwrap();
-    assert!(
-        reason.contains("less than any closed surface has"),
-        "{too_long}"
-    );
-    assert!(too_long["steps"].as_u64().unwrap() < 16, "{too_long}");
-}
-
 /// Two plates with less than a cell between them.
 #[test]
 fn a_mesh_that_no_grid_holds_is_refused_with_numbers_unless_losses_are_allowed() {
@@ -312,9 +284,8 @@ fn drawings_flow_in_their_own_pixels() {
         outcome["energy"].as_f64() < outcome["first_energy"].as_f64(),
         "{outcome}"
     );
-    // 30 pixels of 90, which are 1.2 long.
-    let area = outcome["volume"].as_f64().unwrap();
-    assert!((area / 0.16 - 1.0).abs() < 0.1, "{outcome}");
+    let area = outcome["area"].as_f64().unwrap();
+    assert!((area / 900.0 - 1.0).abs() < 0.1, "{outcome}");
     let after = images::read(folder.path().join("run/final.png")).unwrap();
     assert_eq!((after.width(), after.height()), (90, 60));
     assert!(after.grey()[30 * 90 + 30] < 100 && after.grey()[30 * 90 + 60] > 60_000);
@@ -351,7 +322,7 @@ fn discs_shrink_by_every_method() {
         ];
         let outcome = outcome(folder.path(), &arguments);
         let number = |name: &str| outcome[name].as_f64().unwrap();
-        let lost = std::f64::consts::PI * 0.36 - number("volume");
+        let lost = std::f64::consts::PI * 0.36 - number("area");
         let expected = std::f64::consts::TAU * number("time");
         assert!(
             (lost / expected - 1.0).abs() < 0.1,
@@ -510,15 +481,14 @@ fn photographs_are_drawings_too() {
         let colour = jpeg_encoder::ColorType::Luma;
         encoder.encode(&square, pixels, pixels, colour).unwrap();
     }
-    let common = ["--cells", "48", "--steps", "1", "--tau", "1e-9", "--output"];
+    let common = ["--cells", "48", "--steps", "1", "--tau", "1e-2", "--output"];
     for (output, command) in [
         ("flow", &["flow", "square.jpg"][..]),
         ("inpaint", &["inpaint", "square.jpg", "--mask", "mask.JPEG"]),
     ] {
         let outcome = outcome(folder.path(), &[command, &common, &[output]].concat());
-        // Half of 1.2 a side.
-        let area = outcome["volume"].as_f64().unwrap();
-        assert!((area / 0.36 - 1.0).abs() < 0.03, "{outcome}");
+        let area = outcome["area"].as_f64().unwrap();
+        assert!((area / 1024.0 - 1.0).abs() < 0.03, "{outcome}");
         let after = images::read(folder.path().join(output).join("final.png")).unwrap();
         assert_eq!((after.width(), after.height()), (64, 64));
     }
@@ -630,7 +600,7 @@ fn images_are_masks_too() {
             .unwrap();
     }
     let arguments = [
-        "--cells", "64", "--steps", "1", "--tau", "1e-12", "--ansatz", "empty", "--output", "run",
+        "--cells", "64", "--steps", "1", "--tau", "1e-5", "--ansatz", "empty", "--output", "run",
     ];
     let inpaint = ["inpaint", "disc.png", "--mask", "spot.png"];
     outcome(folder.path(), &[&inpaint[..], &arguments].concat());

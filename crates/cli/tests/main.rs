@@ -4,10 +4,12 @@ mod commands;
 mod common;
 #[cfg(target_os = "linux")]
 mod disks;
+mod examples;
 #[cfg(unix)]
 mod killed;
 mod page;
 mod refusals;
 #[cfg(unix)]
 mod resume;
+mod trust;
 mod tutorial;

@@ -214,7 +214,7 @@ fn every_mistake_is_one_clear_line() {
         ),
         (
             &["fair", "builtin:sphere", "--steps", "1", "--save", "a.png"],
-            "must end in .ply, .obj or .stl",
+            "a result in 3D is saved as .ply or .obj or .stl",
         ),
         (
             &[
@@ -310,7 +310,7 @@ fn every_mistake_is_one_clear_line() {
         ),
         (
             &["sample", "builtin:disc", "--save", "a.ply"],
-            "needs a surface in space",
+            "a result in 2D is saved as .png or .svg",
         ),
         (
             &["sample", "builtin:disc", "--save", "white.png"],

@@ -2,6 +2,8 @@ use std::path::PathBuf;
 
 use thiserror::Error as ThisError;
 
+use crate::Stop;
+
 /// What can stop a case.
 #[derive(Debug, ThisError)]
 pub enum Error {
@@ -67,6 +69,14 @@ pub enum Error {
         path: PathBuf,
         /// In what they differ.
         difference: String,
+    },
+    /// A stored run that cannot go on.
+    #[error("the run in {} cannot go on: {stop}", path.display())]
+    Over {
+        /// The folder.
+        path: PathBuf,
+        /// Why.
+        stop: Stop,
     },
     /// A stored run whose checkpoint cannot be understood.
     #[error("{} cannot be resumed: {reason}; start a new run", path.display())]

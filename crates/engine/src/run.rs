@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use geometry::Field;
-use geometry::measure::l2_distance;
+use geometry::measure::{has_interface, l2_distance};
 use operators::ComputeDevice;
 use runs::Interrupt;
 use solver::{FlowState, StepRecord};
@@ -183,6 +183,17 @@ impl<const D: usize> Run<D> {
         use solver::Error::{NonFinite, NotConverged};
         let (mut size, most) = (self.control.next_size(), self.control.halvings());
         let (mut halvings, mut refused_hvp) = (0, 0.0);
+        let longest = self.case.steps.longest_move;
+        let before = longest.map(|_| self.state()).transpose()?;
+        // What was too long for the last step is not tried again at once.
+        let last = self
+            .records
+            .last()
+            .filter(|last| longest.is_some() && last.halvings > 0);
+        while last.is_some_and(|last| size > 2.0 * last.tau) && halvings < SHORTER {
+            size *= 0.5;
+            halvings += 1;
+        }
         loop {
             let mut shorter = None;
             let accept = |made: &StepRecord| {
@@ -191,11 +202,21 @@ impl<const D: usize> Run<D> {
             };
             match self.motion.advance(size, accept) {
                 Ok((minimization, true)) => {
-                    return Ok(Attempt {
+                    let made = Attempt {
                         halvings,
                         refused_hvp,
                         minimization,
-                    });
+                    };
+                    let (Some(longest), Some(before)) = (longest, &before) else {
+                        return Ok(made);
+                    };
+                    if halvings >= SHORTER || !self.has_gone_too_far(longest)? {
+                        return Ok(made);
+                    }
+                    self.motion = Motion::new(&self.case, before, &self.device)?;
+                    refused_hvp += minimization.map_or(0.0, |made| made.hvp());
+                    size *= 0.5;
+                    halvings += 1;
                 }
                 Ok((refused, false)) => {
                     refused_hvp += refused.map_or(0.0, |made| made.hvp());
@@ -218,6 +239,15 @@ impl<const D: usize> Run<D> {
                 Err(source) => return Err(self.failed(source)),
             }
         }
+    }
+
+    /// Whether the interface has moved by more than so many of its widths in the step that was just made, also to where there was no
+    /// interface, or away altogether.
+    fn has_gone_too_far(&self, widths: f64) -> Result<bool, Error> {
+        let now = self.motion.field().map_err(|source| self.failed(source))?;
+        Ok(!has_interface(&now)
+            || has_gone_further(&self.field, &now, widths)
+            || has_gone_further(&now, &self.field, widths))
     }
 
     fn failed(&self, source: solver::Error) -> Error {
@@ -285,6 +315,34 @@ struct Attempt {
     /// and Hessian-vector products of those tries that were refused.
     refused_hvp: f64,
     minimization: Option<StepRecord>,
+}
+
+/// How often a step that moves the interface too far is halved.
+const SHORTER: u32 = 12;
+/// The part of the interface that may move further: that of parts that vanish.
+const VANISHING: f64 = 0.02;
+
+/// Whether the interface has moved by more than so many of its widths: where `u = tanh(3 s / (4 eps))` changes its sign, the new
+/// phase field is nearly that of a phase.
+fn has_gone_further<const D: usize>(u: &Field<D>, now: &Field<D>, widths: f64) -> bool {
+    let (grid, limit) = (u.grid(), (0.75 * widths).tanh());
+    let (mut all, mut far) = (0_usize, 0_usize);
+    for node in 0..grid.len() {
+        let index = grid.multi_index(node);
+        for axis in 0..D {
+            let mut next = index;
+            next[axis] += 1;
+            let next = grid.index(next);
+            let [a, b] = [node, next].map(|k| u.values()[k]);
+            if (a > 0.0) == (b > 0.0) {
+                continue;
+            }
+            let [c, d] = [node, next].map(|k| now.values()[k]);
+            all += 1;
+            far += usize::from((c + (d - c) * a / (a - b)).abs() > limit);
+        }
+    }
+    far as f64 > VANISHING * all as f64
 }
 
 fn values<const D: usize>(case: &Case<D>, field: &Field<D>, time: f64) -> Result<Values, Error> {

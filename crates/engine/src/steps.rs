@@ -93,6 +93,10 @@ pub struct TimeSteps {
     /// with substeps like the last ones before it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_substep: Option<f64>,
+    /// If steps are of first order and the interface may move by no more than so many widths of it in a step, up to 3: a longer step is halved, up to
+    /// twelve times.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub longest_move: Option<f64>,
     /// How a step is made.
     #[serde(skip_serializing_if = "Order::is_first")]
     pub order: Order,
@@ -133,6 +137,7 @@ impl From<StepRule> for TimeSteps {
             rule,
             first_substep: None,
             order: Order::First,
+            longest_move: None,
         }
     }
 }

@@ -3,7 +3,8 @@
 use std::f64::consts::PI;
 use std::fmt;
 
-use geometry::measure::{has_interface, touches_side};
+use geometry::Field;
+use geometry::measure::has_interface;
 use serde::{Deserialize, Serialize};
 
 use crate::{DISPLACEMENT, Record, Run};
@@ -33,7 +34,8 @@ pub enum Stop {
     NoSurface,
     /// One of the two phases has vanished.
     Vanished,
-    /// The shape has reached the side of the box, and so its own periodic image, where it was not in the beginning.
+    /// The shape has come within two interface widths of the side of the box, and so near to its own periodic image, and was not there
+    /// in the beginning.
     AtTheSide,
 }
 
@@ -83,9 +85,18 @@ impl Stop {
                 D == 3 && energy.is_some_and(|energy| energy < 4.0 * PI)
             }
             Self::Vanished => !has_interface(run.field()),
-            Self::AtTheSide => touches_side(run.field()) && !touches_side(&run.case.initial),
+            Self::AtTheSide => is_near_side(run.field()) && !is_near_side(&run.case.initial),
         }
     }
+}
+
+/// Whether the shape is within two interface widths of the side of the box.
+fn is_near_side<const D: usize>(u: &Field<D>) -> bool {
+    let last = u.grid().cells() - 1;
+    u.values().iter().enumerate().any(|(node, &u_here)| {
+        // `tanh(3/2) = 0.905`.
+        u_here > -0.9 && (u.grid().multi_index(node).iter()).any(|&i| i == 0 || i == last)
+    })
 }
 
 impl fmt::Display for Stop {
@@ -107,7 +118,9 @@ impl fmt::Display for Stop {
                 "the Willmore energy is less than any closed surface has, 8 pi: the time steps were too long for the shape",
             ),
             Self::Vanished => f.write_str("the shape has vanished"),
-            Self::AtTheSide => f.write_str("the shape has come to the side of the box"),
+            Self::AtTheSide => f.write_str(
+                "the shape has come to the side of the box, near to its own periodic image",
+            ),
         }
     }
 }

@@ -65,9 +65,30 @@ impl Store {
         device: &ComputeDevice,
         checkpoints: Checkpoints,
     ) -> Result<(Self, Run<D>), Error> {
-        let run = restore(&stored, case, device)?;
+        let run = restore(&stored, case, device, &[])?;
         let notes = notes(&stored).clone();
         let (directory, _) = stored.resume()?;
+        Ok((Self::at(directory, notes, checkpoints), run))
+    }
+
+    /// Goes on with a finished run under other stop rules, and with other notes; `case` is the stored one but for those. The files of its
+    /// end, which `ends` names, are removed.
+    ///
+    /// # Errors
+    /// As [`Self::resume`]; [`Error::Over`] if one of the stop rules holds already.
+    pub fn extend<const D: usize>(
+        stored: StoredRun,
+        case: Case<D>,
+        device: &ComputeDevice,
+        (checkpoints, notes): (Checkpoints, Value),
+        ends: impl Fn(&str) -> bool,
+    ) -> Result<(Self, Run<D>), Error> {
+        let run = restore(&stored, case, device, &["stops"])?;
+        if let Some(stop) = run.ended() {
+            let path = stored.path().to_owned();
+            return Err(Error::Over { path, stop });
+        }
+        let directory = stored.reopen(&pack(&run, &notes)?, ends)?;
         Ok((Self::at(directory, notes, checkpoints), run))
     }
 
@@ -192,9 +213,14 @@ fn restore<const D: usize>(
     stored: &StoredRun,
     case: Case<D>,
     device: &ComputeDevice,
+    differing: &[&str],
 ) -> Result<Run<D>, Error> {
     let state = stored.state();
-    check_identity(stored, &case.identity(device))?;
+    let mut wanted = case.identity(device);
+    for &key in differing {
+        wanted[key] = state.notes["case"][key].clone();
+    }
+    check_identity(stored, &wanted)?;
     let grid = *case.grid();
     let previous = if state.array("previous").is_some() {
         let tau = read(stored, &state.notes["previous_tau"])?;

@@ -5,6 +5,7 @@ use geometry::measure::BoundingBox;
 use geometry::{Field, Placement};
 use rayon::prelude::*;
 
+use crate::error::positive;
 use crate::{Error, Image, Side};
 
 /// Largest number of segments of the outline of an image, `2^22`.
@@ -122,6 +123,24 @@ impl Outline {
         Self::new(curves)
     }
 
+    /// The same curves without the raster of an image, whose bending energy would outweigh that of the shape.
+    ///
+    /// Points every half unit move towards the middle of their neighbours again and again, but none goes further than `tolerance` from
+    /// where it was; then each curve gets back the area that it has lost by this. Of an image, [`Tones::raster`](crate::Tones::raster) says how far the points of its outline may be off.
+    ///
+    /// # Errors
+    /// The tolerance must be finite and positive.
+    pub fn smoothed(&self, tolerance: f64) -> Result<Self, Error> {
+        positive("tolerance", tolerance)?;
+        let smoothed = |curve: &Polyline| Polyline {
+            points: smoothed(&every_half_unit(curve), tolerance),
+            closed: true,
+        };
+        Ok(Self {
+            curves: self.curves.par_iter().map(smoothed).collect(),
+        })
+    }
+
     /// The interface of a phase field: marching squares on `atanh u`, as
     /// [`contour::zero_level`](geometry::contour::zero_level), in the whole box of the grid with
     /// its repeated last layer. Where `u > 0` at a face of the box the curve runs along
@@ -154,6 +173,21 @@ impl Outline {
         &self.curves
     }
 
+    /// The middle of each segment with its outward normal and its length.
+    pub fn sides(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2], f64)> + Clone {
+        self.curves.iter().flat_map(|curve| {
+            let ends = curve.points.iter().skip(1).chain(&curve.points[..1]);
+            let pairs = curve.points.iter().zip(ends);
+            let sides = pairs.map(|(a, b)| {
+                let along = [b[0] - a[0], b[1] - a[1]];
+                let length = along[0].hypot(along[1]);
+                let normal = [along[1], -along[0]].map(|x| x / length);
+                ([0, 1].map(|i| 0.5 * (a[i] + b[i])), normal, length)
+            });
+            sides.filter(|(_, _, length)| *length > 0.0)
+        })
+    }
+
     /// The enclosed area, less that of the holes.
     pub fn area(&self) -> f64 {
         self.curves.iter().map(Polyline::signed_area).sum()
@@ -181,6 +215,67 @@ impl Outline {
             curves: self.curves.iter().map(placed).collect(),
         }
     }
+}
+
+/// Points of a closed curve at equal distances, at least eight of them.
+fn every_half_unit(curve: &Polyline) -> Vec<[f64; 2]> {
+    let length = curve.length();
+    let count = ((2.0 * length).ceil() as usize).max(8);
+    let ends = curve.points.iter().skip(1).chain(&curve.points[..1]);
+    let mut segments = curve.points.iter().zip(ends);
+    let (mut points, mut passed) = (Vec::with_capacity(count), 0.0);
+    let mut segment = segments.next();
+    for k in 0..count {
+        let at = length * k as f64 / count as f64;
+        while let Some((a, b)) = segment {
+            let part = (b[0] - a[0]).hypot(b[1] - a[1]);
+            if at <= passed + part {
+                let t = (at - passed) / part.max(f64::MIN_POSITIVE);
+                points.push([0, 1].map(|i| a[i] + t * (b[i] - a[i])));
+                break;
+            }
+            passed += part;
+            segment = segments.next();
+        }
+    }
+    points
+}
+
+/// Rounds of smoothing, which take off waves of up to some 60 units.
+const ROUNDS: usize = 1500;
+
+/// A closed curve that is as short as it can be, none of whose points goes further than that, moved along its normals to the area that it
+/// had.
+fn smoothed(original: &[[f64; 2]], farthest: f64) -> Vec<[f64; 2]> {
+    let count = original.len();
+    let mut points = original.to_vec();
+    let mut next = points.clone();
+    for _ in 0..ROUNDS {
+        for (k, point) in next.iter_mut().enumerate() {
+            let [before, after] = [points[(k + count - 1) % count], points[(k + 1) % count]];
+            let wanted =
+                [0, 1].map(|i| 0.25 * (before[i] + after[i]) + 0.5 * points[k][i] - original[k][i]);
+            let shorter = (farthest / wanted[0].hypot(wanted[1])).min(1.0);
+            *point = [0, 1].map(|i| original[k][i] + shorter * wanted[i]);
+        }
+        std::mem::swap(&mut points, &mut next);
+    }
+    let curve = |points: &[[f64; 2]]| Polyline {
+        points: points.to_vec(),
+        closed: true,
+    };
+    let smooth = curve(&points);
+    let lost = curve(original).signed_area() - smooth.signed_area();
+    let outwards = lost / smooth.length();
+    let moved = (0..count).map(|k| {
+        let [before, after] = [points[(k + count - 1) % count], points[(k + 1) % count]];
+        let along = [after[0] - before[0], after[1] - before[1]];
+        let length = along[0].hypot(along[1]).max(f64::MIN_POSITIVE);
+        // The inside is on the left.
+        let normal = [along[1] / length, -along[0] / length];
+        [0, 1].map(|i| points[k][i] + outwards * normal[i])
+    });
+    moved.collect()
 }
 
 /// The zero level set of a lattice, closed along its edges: beyond them is outside.

@@ -9,6 +9,7 @@ use std::path::Path;
 
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use render::Picture;
 
 use crate::image::{LARGEST_IMAGE, pixels};
 use crate::{Error, Image};
@@ -70,6 +71,30 @@ pub fn read(path: impl AsRef<Path>) -> Result<Image, Error> {
 /// # Errors
 /// Whatever is wrong with them, in one line.
 pub fn decode(bytes: &[u8]) -> Result<Image, FormatError> {
+    upright(bytes, Tones::Grey).map(converted)
+}
+
+/// The image in the bytes of a file with its colours and opacities, 8 bits each.
+///
+/// # Errors
+/// As [`decode`].
+pub fn colours(bytes: &[u8]) -> Result<Picture, FormatError> {
+    let image = upright(bytes, Tones::Colours)?.into_rgba8();
+    let pixels = image.pixels().map(|pixel| pixel.0).collect();
+    let picture = Picture::new(image.width(), image.height(), pixels);
+    picture.map_err(|error| FormatError::damaged("image", &error.to_string()))
+}
+
+/// What is wanted of an image.
+#[derive(Clone, Copy, PartialEq)]
+enum Tones {
+    /// Its luma.
+    Grey,
+    Colours,
+}
+
+/// The decoded image, set upright.
+fn upright(bytes: &[u8], tones: Tones) -> Result<DynamicImage, FormatError> {
     if bytes.is_empty() {
         return Err(FormatError::Empty);
     }
@@ -86,11 +111,11 @@ pub fn decode(bytes: &[u8]) -> Result<Image, FormatError> {
         _ => return Err(unknown()),
     };
     let (mut image, orientation) = match name {
-        "JPEG" => jpeg::decode(bytes)?,
+        "JPEG" => jpeg::decode(bytes, tones)?,
         _ => other(name, bytes)?,
     };
     image.apply_orientation(orientation.unwrap_or(Orientation::NoTransforms));
-    Ok(converted(image))
+    Ok(image)
 }
 
 /// What the crate `image` reads.

@@ -97,6 +97,16 @@ impl Side {
         threshold
     }
 
+    /// The same side of another threshold.
+    #[must_use]
+    pub fn at(self, threshold: f64) -> Self {
+        match self {
+            Self::Dark(_) => Self::Dark(threshold),
+            Self::Light(_) => Self::Light(threshold),
+            Self::Opaque(_) => Self::Opaque(threshold),
+        }
+    }
+
     /// What is compared with the threshold, from grey value and opacity.
     pub(crate) fn value(self, [grey, opacity]: [f64; 2]) -> f64 {
         match self {
@@ -132,6 +142,85 @@ impl fmt::Display for Side {
             Self::Opaque(threshold) => ("more opaque than", threshold),
         };
         write!(f, "{words} {threshold:.4}")
+    }
+}
+
+/// How the values of an image divide into two tones.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tones {
+    /// The threshold that separates them best, see [`Threshold::Otsu`].
+    pub threshold: f64,
+    /// The part of the pixels that has neither tone and is not at an edge between them: next to nothing in a drawing, much in
+    /// a photograph.
+    pub between: f64,
+    /// The part of the pixels inside, with this threshold.
+    pub inside: f64,
+    /// The part of the pairs of neighbouring pixels on different sides of it that have the two tones and nothing in between.
+    pub hard: f64,
+}
+
+/// Values further than this part of their contrast from both tones are between them.
+const BETWEEN: f64 = 0.2;
+/// Edges with more than this part of the contrast between two neighbours are hard.
+const HARD: f64 = 0.9;
+/// So many pixels from an edge its blending ends.
+const BLENDED: usize = 2;
+
+impl Tones {
+    /// Of what the side compares.
+    pub fn of(image: &Image, side: Side) -> Self {
+        let threshold = otsu(image, side);
+        let pixels = image.grey().len();
+        let value = |pixel: usize| side.value(image.pixel(pixel));
+        let median = |above: bool| {
+            let class = (0..pixels).map(value);
+            let mut class: Vec<f64> = class.filter(|v| (*v > threshold) == above).collect();
+            let middle = class.len() / 2;
+            match class.len() {
+                0 => threshold,
+                _ => *class.select_nth_unstable_by(middle, f64::total_cmp).1,
+            }
+        };
+        let tones = [median(false), median(true)];
+        let far = BETWEEN * (tones[1] - tones[0]);
+        let [width, height] = [image.width(), image.height()].map(|n| n as usize);
+        let is_at_edge = |pixel: usize| {
+            let (x, y) = (pixel % width, pixel / width);
+            let above = value(pixel) > threshold;
+            let columns = x.saturating_sub(BLENDED)..(x + BLENDED + 1).min(width);
+            let mut rows = y.saturating_sub(BLENDED)..(y + BLENDED + 1).min(height);
+            rows.any(|row| (columns.clone()).any(|x| (value(row * width + x) > threshold) != above))
+        };
+        let is_between = |pixel: &usize| {
+            let value = value(*pixel);
+            tones.iter().all(|tone| (value - tone).abs() > far) && !is_at_edge(*pixel)
+        };
+        let (mut edges, mut hard) = (0.0_f64, 0.0);
+        for pixel in 0..pixels {
+            let right = (pixel % width + 1 < width).then_some(pixel + 1);
+            let below = (pixel / width + 1 < height).then_some(pixel + width);
+            for next in right.into_iter().chain(below) {
+                let [a, b] = [pixel, next].map(value);
+                if (a > threshold) != (b > threshold) {
+                    edges += 1.0;
+                    hard += f64::from(u8::from((a - b).abs() > HARD * (tones[1] - tones[0])));
+                }
+            }
+        }
+        let separated = side.at(threshold);
+        let is_inside = |pixel: &usize| separated.depth(image.pixel(*pixel)) > 0.0;
+        let part = |count: usize| count as f64 / pixels as f64;
+        Self {
+            threshold,
+            between: part((0..pixels).filter(is_between).count()),
+            inside: part((0..pixels).filter(is_inside).count()),
+            hard: hard / edges.max(1.0),
+        }
+    }
+
+    /// How far points of the outline may be off, in pixels: a tenth where edges are blended, and more than half where they are hard.
+    pub fn raster(&self) -> f64 {
+        0.1 + 0.5 * self.hard
     }
 }
 

@@ -5,6 +5,7 @@ mod drawings;
 mod files;
 mod fuzzing;
 mod outlines;
+mod tones;
 
 #[global_allocator]
 static ALLOCATOR: ::fuzzing::CountingAllocator = ::fuzzing::CountingAllocator;

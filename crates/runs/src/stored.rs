@@ -155,6 +155,27 @@ impl StoredRun {
         Ok((self.run, self.state))
     }
 
+    /// Goes on with a finished run by a commit of `state`, of the same step, after which the files that `ends` names do not belong to the
+    /// run any more: they are removed.
+    pub fn reopen(self, state: &State, ends: impl Fn(&str) -> bool) -> Result<RunDirectory, Error> {
+        let (mut run, _) = self.resume()?;
+        let ended: Vec<String> = run
+            .files
+            .keys()
+            .filter(|name| ends(name))
+            .cloned()
+            .collect();
+        run.files.retain(|name, _| !ends(name));
+        // The one commit that there is gives way to this one.
+        run.steps.clear();
+        run.commit(state)?;
+        for name in ended {
+            let path = run.path.join(name);
+            (run.storage.remove(&path)).map_err(files::Error::of("remove", path))?;
+        }
+        Ok(run)
+    }
+
     /// Makes the commit the last one: after this, no checkpoint lists a file that is about to be
     /// removed.
     fn give_up_checkpoints(&self) -> Result<(), Error> {

@@ -7,6 +7,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::Error;
+use crate::vector::{corners, scaled_normal};
 
 /// Triangles over shared vertices, not necessarily closed; see [`ClosedMesh`](crate::ClosedMesh).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -23,6 +24,23 @@ impl TriangleMesh {
     /// The smallest box with all vertices; `None` without vertices.
     pub fn bounding_box(&self) -> Option<BoundingBox<3>> {
         BoundingBox::around(self.vertices.iter().copied())
+    }
+
+    /// The centres of faces with their normals and areas; of large meshes those of every k-th face, at most `most` of them.
+    pub fn sides(&self, most: usize) -> impl Iterator<Item = ([f64; 3], [f64; 3], f64)> + Clone {
+        let faces = (self.faces.iter()).step_by(self.faces.len().div_ceil(most).max(1));
+        let sides = faces.map(|face| {
+            let corners = corners(self, *face);
+            let normal = scaled_normal(corners);
+            let length = normal.length();
+            let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+            (
+                centre.to_array(),
+                (normal / length).to_array(),
+                0.5 * length,
+            )
+        });
+        sides.filter(|(_, _, area)| *area > 0.0)
     }
 
     /// Moves every vertex along its normal by a random length of up to `noise`, as a scanner errs. The normals are dropped: they are

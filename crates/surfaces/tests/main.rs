@@ -8,6 +8,7 @@ mod files;
 mod fuzzing;
 mod isosurfaces;
 mod remeshing;
+mod repairing;
 mod shapes;
 
 #[global_allocator]

@@ -14,7 +14,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 use solver::{FlowParams, MinimizingMovement, Objective};
 
-use super::{check_eps_over_h, open_device, operator};
+use super::{open_device, operator};
 use crate::cli::{CheckOptions, SayOptions};
 use crate::error::Error;
 use crate::input::{self, Loaded};
@@ -36,9 +36,9 @@ struct Finding {
 
 /// Checks the derivatives of the energy at the input.
 pub fn run(mut options: CheckOptions, say: SayOptions) -> Result<ExitCode, Error> {
-    check_eps_over_h(options.scheme.eps_over_h)?;
+    options.scheme.fill_in()?;
     let device = open_device(&mut options.common)?;
-    let loaded = input::load(&mut options.input, options.scheme.eps_over_h, say)?;
+    let loaded = input::load(&mut options.input, options.scheme.eps_over_h(), say)?;
     let findings = match loaded {
         Loaded::Plane(start, _) => findings(&start.field, &options, &device)?,
         Loaded::Space(start) => findings(&start.field, &options, &device)?,

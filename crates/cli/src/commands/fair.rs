@@ -1,9 +1,8 @@
 //! `willmore fair`.
 
 use std::f64::consts::PI;
-use std::path::{Path, PathBuf};
 
-use engine::StepRule;
+use engine::{Scales, StepRule};
 use surfaces::Fairing;
 
 use super::flow::{FlowCommand, Shared};
@@ -47,33 +46,12 @@ impl FlowCommand for FairOptions {
                  off the noise, or give --energy-ratio 0.5 for half the energy that there is"
             )));
         }
-        if let Some(save) = &self.save {
-            let refused = |reason| Error::options(format!("--save {}{reason}", save.display()));
-            if !["ply", "obj", "stl"].contains(&&*input::extension(save)) {
-                return Err(refused(" must end in .ply, .obj or .stl"));
-            }
-            let absolute = input::absolute(save)?;
-            if !absolute.parent().is_some_and(Path::is_dir) {
-                return Err(refused(": there is no such folder"));
-            }
-            self.save = Some(absolute);
-        }
         Ok(())
     }
 
     fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
-        if let Some(save) = self
-            .save
-            .as_ref()
-            .filter(|save| save.exists() && !self.force)
-        {
-            return Err(Error::options(format!(
-                "--save {} is there already: give another name, or --force to write over it",
-                save.display()
-            )));
-        }
         let ends = self.ends;
-        let eps_over_h = self.flow.scheme.eps_over_h;
+        let eps_over_h = self.flow.scheme.eps_over_h();
         let input = &mut self.flow.input;
         let path = match (input::mesh_file(input)?, self.remesh) {
             (Some(path), false) => path,
@@ -91,6 +69,11 @@ impl FlowCommand for FairOptions {
                 return input::load(input, eps_over_h, say);
             }
         };
+        if input.repair {
+            return Err(Error::options(
+                "--repair makes a new mesh: write it by `willmore sample --repair --save`, which can then be faired, or give --remesh",
+            ));
+        }
         let bytes = std::fs::read(&path).map_err(Error::io("read", &path))?;
         let noise = match self.noise {
             Some(noise) => Noise::Of(noise),
@@ -131,17 +114,16 @@ impl FlowCommand for FairOptions {
         }
     }
 
-    fn rule(&mut self, mcf_step: f64) -> StepRule {
+    fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
         if self.noise.is_some() {
-            // The inner step is (eps/2)^2.
-            let spacing = 2.0 * mcf_step.sqrt() / self.flow.scheme.eps_over_h;
+            let spacing = scales.eps / self.flow.scheme.eps_over_h();
             let first = Fairing::first_step(spacing);
             self.flow.tau.get_or_insert(StepRule::Doubling(first));
         }
-        self.flow.rule(mcf_step)
+        self.flow.rule(scales, unit)
     }
 
-    fn mesh(&self) -> (Option<MeshFormat>, Option<PathBuf>) {
-        (self.format, self.save.clone())
+    fn format(&self) -> Option<MeshFormat> {
+        self.format
     }
 }

@@ -1,16 +1,16 @@
 //! `willmore flow`, and what it has in common with the other commands that make runs.
 
-use std::path::PathBuf;
+use std::path::Path;
 use std::process::ExitCode;
 
-use engine::{Case, Flow, Measure, Method, StepRule, Stop};
+use engine::{Case, Flow, Measure, Method, Scales, StepRule, Stop, TimeSteps};
 use geometry::Field;
-use images::Frame;
+use geometry::measure::{perimeter, zero_set_volume};
 use operators::ComputeDevice;
 use runs::StoredRun;
 use serde::Serialize;
 
-use super::{check_eps_over_h, open_device, operator};
+use super::{open_device, operator};
 use crate::cli::{
     CommonOptions, FlowOptions, InputOptions, KeepOptions, MeshFormat, SayOptions, SchemeOptions,
 };
@@ -18,10 +18,15 @@ use crate::config;
 use crate::error::Error;
 use crate::input::{self, Loaded, Start};
 use crate::outlet::{Outlet, Space};
+use crate::plane::Plane;
 use crate::run::Plan;
 
 /// Steps of a run that has no other end.
 const STEPS: usize = 20;
+/// In a step the interface moves by at most so many widths of it.
+const LONGEST_MOVE: f64 = 2.0;
+/// What can be saved.
+const SAVED: [&str; 5] = ["ply", "obj", "stl", "png", "svg"];
 
 /// A command that makes a run.
 pub trait FlowCommand: Serialize {
@@ -35,7 +40,7 @@ pub trait FlowCommand: Serialize {
     /// Reads the input.
     fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
         let shared = self.shared();
-        input::load(shared.input, shared.scheme.eps_over_h, say)
+        input::load(shared.input, shared.scheme.eps_over_h(), say)
     }
 
     /// Whether something besides time and energy ends it.
@@ -66,19 +71,20 @@ pub trait FlowCommand: Serialize {
         Ok(input)
     }
 
-    /// The rule for time steps, filled in for an inner step `mcf_step`.
-    fn rule(&mut self, mcf_step: f64) -> StepRule;
+    /// The rule for time steps, filled in for these scales and the length that a unit of the usual box has: time steps that follow from
+    /// the inner step do so in a box of that size.
+    fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule;
 
-    /// Format of meshes, and a file besides those of the run.
-    fn mesh(&self) -> (Option<MeshFormat>, Option<PathBuf>) {
-        (None, None)
+    /// Format of meshes.
+    fn format(&self) -> Option<MeshFormat> {
+        None
     }
 }
 
 /// Options of all commands that make runs.
 pub struct Shared<'a> {
     pub input: &'a mut InputOptions,
-    pub scheme: &'a SchemeOptions,
+    pub scheme: &'a mut SchemeOptions,
     pub steps: &'a mut Option<usize>,
     pub time: Option<f64>,
     pub energy: Option<f64>,
@@ -92,7 +98,7 @@ impl FlowCommand for FlowOptions {
     fn shared(&mut self) -> Shared<'_> {
         Shared {
             input: &mut self.input,
-            scheme: &self.scheme,
+            scheme: &mut self.scheme,
             steps: &mut self.steps,
             time: self.time,
             energy: self.energy,
@@ -101,16 +107,18 @@ impl FlowCommand for FlowOptions {
         }
     }
 
-    fn rule(&mut self, mcf_step: f64) -> StepRule {
+    fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
         let rule = self.tau.unwrap_or(StepRule::ByEnergy(None));
-        *self.tau.insert(rule.resolved(mcf_step))
+        *self
+            .tau
+            .insert(rule.resolved(scales.mcf_step * unit.powi(2)))
     }
 }
 
 impl Shared<'_> {
     /// Refuses what cannot be done before anything is computed.
-    fn check(&self) -> Result<(), Error> {
-        check_eps_over_h(self.scheme.eps_over_h)?;
+    fn check(&mut self) -> Result<(), Error> {
+        self.scheme.fill_in()?;
         for (name, value) in [("--time", self.time), ("--energy", self.energy)] {
             if let Some(value) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
                 return Err(Error::options(format!("{name} {value} must be positive")));
@@ -123,6 +131,24 @@ impl Shared<'_> {
         ] {
             if value == Some(0) {
                 return Err(Error::options(format!("{name} must be at least 1")));
+            }
+        }
+        let force = self.keep.force;
+        if let Some(save) = &mut self.keep.save {
+            if !SAVED.contains(&&*input::extension(save)) {
+                return Err(Error::options(format!(
+                    "--save {} must end in .{}",
+                    save.display(),
+                    SAVED.join(", .")
+                )));
+            }
+            *save = input::absolute(&*save)?;
+            force.check("--save", save)?;
+            if !save.parent().is_some_and(Path::is_dir) {
+                return Err(Error::options(format!(
+                    "--save {}: there is no such folder",
+                    save.display()
+                )));
             }
         }
         Ok(())
@@ -146,14 +172,20 @@ impl Shared<'_> {
 pub fn run<C: FlowCommand>(
     mut command: C,
     say: SayOptions,
-    stored: Option<StoredRun>,
+    stored: Option<(StoredRun, Option<usize>)>,
 ) -> Result<ExitCode, Error> {
     command.check()?;
     let ends = command.ends();
-    let shared = command.shared();
+    let mut shared = command.shared();
     let until = ends || shared.time.is_some() || shared.energy.is_some();
     let steps = if until { C::MANY_STEPS } else { STEPS };
     shared.steps.get_or_insert(steps);
+    if let Some((stored, more)) = &stored {
+        // A run that has gone on once notes its steps.
+        let noted = engine::notes(stored)["steps"].as_u64();
+        let steps = more.or(noted.map(|steps| steps as usize));
+        *shared.steps = steps.or(*shared.steps);
+    }
     shared.check()?;
     let device = open_device(shared.common)?;
     let mut job = Job {
@@ -161,10 +193,10 @@ pub fn run<C: FlowCommand>(
         device,
         say,
     };
-    if let Some(stored) = stored {
+    if let Some((stored, more)) = stored {
         return match engine::dimension(&stored)? {
-            2 => job.resume::<2, Frame>(stored),
-            _ => job.resume::<3, Space>(stored),
+            2 => job.resume::<2, Plane>(stored, more),
+            _ => job.resume::<3, Space>(stored, more),
         };
     }
     let loaded = job.command.load(say)?;
@@ -186,7 +218,9 @@ impl<C: FlowCommand> Job<C> {
         mut self,
         mut start: Start<D, O>,
     ) -> Result<ExitCode, Error> {
-        start.outlet.turn(&mut self.command.shared().keep.up)?;
+        let keep = self.command.shared().keep;
+        start.outlet.turn(&mut keep.up)?;
+        keep.save.as_deref().map_or(Ok(()), O::check_saved)?;
         let case = self.case(&start.name, start.field, start.region, &start.outlet)?;
         let config = config::resolved(C::NAME, &self.command)?;
         let plan = self.plan(start.name, start.outlet);
@@ -196,6 +230,7 @@ impl<C: FlowCommand> Job<C> {
     fn resume<const D: usize, O: Outlet<D>>(
         mut self,
         stored: StoredRun,
+        more: Option<usize>,
     ) -> Result<ExitCode, Error> {
         let notes = engine::notes(&stored);
         let name = notes["about"]["name"].as_str().unwrap_or("run").to_owned();
@@ -208,7 +243,8 @@ impl<C: FlowCommand> Job<C> {
         let (field, region) = engine::initial(&stored)?;
         outlet.restore(&stored)?;
         let case = self.case(&name, field, region, &outlet)?;
-        self.plan(name, outlet).resume(stored, case, &self.device)
+        self.plan(name, outlet)
+            .resume(stored, case, &self.device, more)
     }
 
     fn case<const D: usize>(
@@ -220,11 +256,20 @@ impl<C: FlowCommand> Job<C> {
     ) -> Result<Case<D>, Error> {
         let method = self.command.method();
         let (scales, operator) = operator(self.command.shared().scheme, method, initial.grid())?;
-        let rule = self.command.rule(scales.mcf_step);
+        let box_side = self.command.shared().input.box_side;
+        let unit = initial.grid().side() / box_side.unwrap_or(input::usual_box::<D>().1);
+        let rule = self.command.rule(&scales, unit);
         let mut stops = self.command.shared().stops(rule);
         stops.extend(self.command.energy_ratio().map(Stop::EnergyRatio));
         stops.extend(outlet.stops(&initial));
-        let mut measures = Measure::size(scales.eps);
+        let (eps, [boundary, inside]) = match D {
+            2 => (scales.eps, ["length", "area"]),
+            _ => (scales.eps, ["area", "volume"]),
+        };
+        let mut measures = vec![
+            Measure::new(boundary, move |u, _| perimeter(u, eps).map(Some)),
+            Measure::new(inside, |u, _| Ok(Some(zero_set_volume(u)))),
+        ];
         measures.extend(outlet.measures(&initial, scales.eps)?);
         Ok(Case {
             shape: name.to_owned(),
@@ -233,21 +278,22 @@ impl<C: FlowCommand> Job<C> {
             flow: C::FLOW,
             operator,
             scales,
-            steps: rule.into(),
+            steps: TimeSteps {
+                longest_move: (C::FLOW == Flow::Willmore).then_some(LONGEST_MOVE),
+                ..rule.into()
+            },
             stops,
             measures,
         })
     }
 
     fn plan<O>(&mut self, name: String, outlet: O) -> Plan<O> {
-        let (format, save) = self.command.mesh();
         Plan {
             command: C::NAME,
             name,
             outlet,
+            format: self.command.format(),
             keep: self.command.shared().keep.clone(),
-            format,
-            save,
             say: self.say,
         }
     }

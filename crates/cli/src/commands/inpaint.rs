@@ -1,6 +1,6 @@
 //! `willmore inpaint`.
 
-use engine::StepRule;
+use engine::{Scales, StepRule};
 use surfaces::shapes::Region;
 
 use super::flow::{FlowCommand, Shared};
@@ -32,23 +32,26 @@ impl FlowCommand for InpaintOptions {
     fn prepare(&self, input: Loaded) -> Result<Loaded, Error> {
         let mask = self.mask()?;
         Ok(match input {
-            Loaded::Plane(start, frame) => {
-                let region = frame.mask(mask, start.field.grid())?;
-                Loaded::Plane(self.restrict(start, region)?, frame)
+            Loaded::Plane(mut start, image) => {
+                let shape = image.mask(mask, start.field.grid())?;
+                let region = input::nodes(mask, shape.as_ref(), start.field.grid())?;
+                start.outlet = image.repaired(start.outlet, shape.as_ref())?;
+                Loaded::Plane(self.restrict(start, region)?, image)
             }
             Loaded::Space(start) => {
-                let region = input::nodes(mask, start.field.grid())?;
+                let shape = input::region(mask)?;
+                let region = input::nodes(mask, shape.as_ref(), start.field.grid())?;
                 Loaded::Space(self.restrict(start, region)?)
             }
         })
     }
 
-    fn rule(&mut self, mcf_step: f64) -> StepRule {
+    fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
         self.flow.tau.get_or_insert(StepRule::Ramp {
-            tau: STEP * mcf_step,
+            tau: STEP * scales.mcf_step * unit.powi(2),
             halvings: HALVINGS,
         });
-        self.flow.rule(mcf_step)
+        self.flow.rule(scales, unit)
     }
 }
 
@@ -64,7 +67,7 @@ impl InpaintOptions {
         start: Start<D, O>,
         region: Vec<bool>,
     ) -> Result<Start<D, O>, Error> {
-        let eps = self.flow.scheme.eps_over_h * start.field.grid().spacing();
+        let eps = self.flow.scheme.eps_over_h() * start.field.grid().spacing();
         Ok(Start {
             field: self.ansatz.put_into(start.field, &region, eps)?,
             region: Some(region),

@@ -1,6 +1,6 @@
 //! `willmore mcf`.
 
-use engine::{Flow, Method, Scheme, StepRule};
+use engine::{Flow, Method, Scales, Scheme, StepRule};
 
 use super::flow::{FlowCommand, Shared};
 use crate::cli::{McfMethod, McfOptions, SchemeOptions};
@@ -14,7 +14,7 @@ impl FlowCommand for McfOptions {
     fn shared(&mut self) -> Shared<'_> {
         Shared {
             input: &mut self.input,
-            scheme: &self.scheme,
+            scheme: &mut self.scheme,
             steps: &mut self.steps,
             time: self.time,
             energy: None,
@@ -44,7 +44,7 @@ impl FlowCommand for McfOptions {
         Ok(())
     }
 
-    fn rule(&mut self, mcf_step: f64) -> StepRule {
-        StepRule::Constant(mcf_step)
+    fn rule(&mut self, scales: &Scales, _: f64) -> StepRule {
+        StepRule::Constant(scales.mcf_step)
     }
 }

@@ -46,7 +46,7 @@ pub fn operator<const D: usize>(
     method: Method,
     grid: &Grid<D>,
 ) -> Result<(Scales, Operator), Error> {
-    let scales = Scales::of_grid(grid.spacing(), options.eps_over_h);
+    let scales = Scales::of_grid(grid.spacing(), options.eps_over_h());
     let needed = scales.needs(D, grid.spacing());
     let networks = Networks::load(options.network.as_slice(), &[needed])?;
     let scheme = if method.is_learned() {

@@ -19,12 +19,12 @@ pub fn run(options: &ResumeOptions, say: SayOptions) -> Result<ExitCode, Error> 
         RunDirectory::open(&options.run)?
     };
     let path = options.run.join(config::FILE);
-    let command = config::parse_resolved(&stored.read_text(config::FILE)?, &path)?.command;
-    let keep = match &command {
-        Command::Flow(flow) => &flow.keep,
-        Command::Fair(fair) => &fair.flow.keep,
-        Command::Inpaint(inpaint) => &inpaint.flow.keep,
-        Command::Mcf(mcf) => &mcf.keep,
+    let mut command = config::parse_resolved(&stored.read_text(config::FILE)?, &path)?.command;
+    let keep = match &mut command {
+        Command::Flow(flow) => &mut flow.keep,
+        Command::Fair(fair) => &mut fair.flow.keep,
+        Command::Inpaint(inpaint) => &mut inpaint.flow.keep,
+        Command::Mcf(mcf) => &mut mcf.keep,
         _ => {
             let path = path.display();
             return Err(Error::options(format!(
@@ -32,7 +32,8 @@ pub fn run(options: &ResumeOptions, say: SayOptions) -> Result<ExitCode, Error> 
             )));
         }
     };
-    if stored.is_finished() {
+    keep.force = options.force;
+    if stored.is_finished() && options.steps.is_none() {
         // Nothing else is touched in a finished run: what is there besides may be its owner's.
         stored.tidy()?;
         if !keep.no_page {
@@ -41,15 +42,18 @@ pub fn run(options: &ResumeOptions, say: SayOptions) -> Result<ExitCode, Error> 
         let folder = options.run.to_string_lossy();
         let command = &engine::notes(&stored)["about"]["command"];
         let outcome = json!({ "command": command, "finished": true, "run": folder });
-        let text = format!("The run in {folder} is finished already");
+        let text = format!(
+            "The run in {folder} is finished already; willmore resume {folder} --steps N goes on to N steps in all"
+        );
         say.report(&outcome, &text);
         return Ok(ExitCode::SUCCESS);
     }
+    let steps = options.steps;
     match command {
-        Command::Flow(options) => flow::run(options, say, Some(stored)),
-        Command::Fair(options) => flow::run(options, say, Some(stored)),
-        Command::Inpaint(options) => flow::run(options, say, Some(stored)),
-        Command::Mcf(options) => flow::run(options, say, Some(stored)),
+        Command::Flow(options) => flow::run(options, say, Some((stored, steps))),
+        Command::Fair(options) => flow::run(options, say, Some((stored, steps))),
+        Command::Inpaint(options) => flow::run(options, say, Some((stored, steps))),
+        Command::Mcf(options) => flow::run(options, say, Some((stored, steps))),
         _ => unreachable!("no other command makes runs"),
     }
 }

@@ -7,7 +7,7 @@ use geometry::{Field, npy, phase_field, vti};
 use serde_json::json;
 use surfaces::shapes::Region;
 
-use crate::cli::{SampleOptions, SayOptions};
+use crate::cli::{InputOptions, SampleOptions, SayOptions};
 use crate::error::Error;
 use crate::input::{self, Loaded, Start};
 use crate::outlet::Outlet;
@@ -28,11 +28,7 @@ pub fn run(mut options: SampleOptions, say: SayOptions) -> Result<ExitCode, Erro
             "--save {shown} must end in .png, .ply, .obj, .stl, .npy or .vti"
         )));
     }
-    if path.exists() {
-        return Err(Error::options(format!(
-            "{shown} is there already: remove it, or give another file"
-        )));
-    }
+    options.force.check("--save", &path)?;
     let noise = options.noise.unwrap_or(0.0);
     if !(noise.is_finite() && noise >= 0.0) {
         return Err(Error::options(format!(
@@ -44,21 +40,45 @@ pub fn run(mut options: SampleOptions, say: SayOptions) -> Result<ExitCode, Erro
             "--noise moves the vertices of meshes: leave it out, or save a mesh in place of {shown}"
         )));
     }
+    let done = || {
+        let outcome = json!({ "command": "sample", "file": path });
+        say.report(&outcome, &format!("wrote {shown}"));
+        Ok(ExitCode::SUCCESS)
+    };
+    let InputOptions {
+        cells,
+        box_side,
+        side_length,
+        ..
+    } = &options.input;
+    let on_grid =
+        options.resample || cells.is_some() || box_side.is_some() || side_length.is_some();
+    if is_mesh && options.without.is_empty() && !on_grid {
+        if let Some(from) = input::mesh_file(&mut options.input)? {
+            let mut mesh = if options.input.repair {
+                input::closed(&from, true, say)?.into_mesh()
+            } else {
+                surfaces::read(&from)?
+            };
+            if noise > 0.0 {
+                mesh.normals = Some(mesh.vertex_normals());
+                mesh.roughen(noise, options.seed);
+            }
+            surfaces::write(&path, &mesh)?;
+            return done();
+        }
+    }
     match input::load(&mut options.input, EPS_OVER_H, say)? {
         Loaded::Plane(start, _) => write(start, options, &path)?,
         Loaded::Space(start) if noise > 0.0 => {
             let u = without(start.field, &options.without)?;
             let mut mesh = surfaces::remeshed_surface(&u, eps(&u))?;
             mesh.roughen(noise, options.seed);
-            surfaces::write(&path, &start.outlet.in_own_coordinates(mesh))?;
+            surfaces::write(&path, &mesh)?;
         }
         Loaded::Space(start) => write(start, options, &path)?,
     }
-    say.report(
-        &json!({ "command": "sample", "file": path }),
-        &format!("wrote {shown}"),
-    );
-    Ok(ExitCode::SUCCESS)
+    done()
 }
 
 fn eps<const D: usize>(u: &Field<D>) -> f64 {
@@ -76,7 +96,10 @@ fn write<const D: usize, O: Outlet<D>>(
         "npy" => npy::write(path, &u)?,
         "vti" => vti::write(path, &[("phase_field", &u)])?,
         "png" => start.outlet.picture(&u, &u, eps(&u))?.write_png(path)?,
-        _ => start.outlet.save(&u, eps(&u), path)?,
+        _ => {
+            O::check_saved(path)?;
+            start.outlet.save(&u, eps(&u), path)?;
+        }
     }
     Ok(())
 }

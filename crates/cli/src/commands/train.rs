@@ -37,12 +37,7 @@ pub fn run(mut options: TrainOptions, say: SayOptions) -> Result<ExitCode, Error
     };
     ratios.validate()?;
     let save = options.save.as_ref().ok_or_else(|| missing("save"))?;
-    if save.exists() {
-        return Err(Error::options(format!(
-            "--save {} is there already: give another name",
-            save.display()
-        )));
-    }
+    options.force.check("--save", save)?;
     let device = open_device(&mut options.common)?;
     let mut data = SphereData::new(ratios, (CELLS * eps_over_h / 2.0).round() as usize)?;
     if options.quick {

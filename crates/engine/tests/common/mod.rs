@@ -70,6 +70,7 @@ pub fn case(flow: Flow, method: Method, initial: Field<2>) -> Case<2> {
 /// Steps made in substeps, the first one at most of this size.
 pub fn divided(tau: f64, first: f64) -> TimeSteps {
     TimeSteps {
+        longest_move: None,
         rule: StepRule::Constant(tau),
         first_substep: Some(first),
         ..StepRule::Constant(tau).into()

@@ -9,12 +9,15 @@ use zune_jpeg::errors::DecodeErrors;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-use super::{FormatError, checked};
+use super::{FormatError, Tones, checked};
 
 /// Progressive files have some ten scans; each takes time for the whole image.
 const MOST_SCANS: usize = 64;
 
-pub(super) fn decode(bytes: &[u8]) -> Result<(DynamicImage, Option<Orientation>), FormatError> {
+pub(super) fn decode(
+    bytes: &[u8],
+    tones: Tones,
+) -> Result<(DynamicImage, Option<Orientation>), FormatError> {
     let options = DecoderOptions::default()
         .set_max_width(usize::from(u16::MAX))
         .set_max_height(usize::from(u16::MAX))
@@ -26,8 +29,11 @@ pub(super) fn decode(bytes: &[u8]) -> Result<(DynamicImage, Option<Orientation>)
     let [width, height] = [width, height].map(|n| n as u32);
     let count = checked(width, height)?;
     let (output, channels) = match decoder.input_colorspace() {
-        Some(ColorSpace::Luma | ColorSpace::YCbCr) => (ColorSpace::Luma, 1),
-        Some(ColorSpace::RGB | ColorSpace::CMYK | ColorSpace::YCCK) => (ColorSpace::RGB, 3),
+        Some(ColorSpace::Luma) => (ColorSpace::Luma, 1),
+        Some(ColorSpace::YCbCr) if tones == Tones::Grey => (ColorSpace::Luma, 1),
+        Some(ColorSpace::YCbCr | ColorSpace::RGB | ColorSpace::CMYK | ColorSpace::YCCK) => {
+            (ColorSpace::RGB, 3)
+        }
         _ => return Err(unusual("unknown colours")),
     };
     decoder.set_options(options.jpeg_set_out_colorspace(output));

@@ -1,0 +1,448 @@
+//! What a person can rely on: nothing is lost, everything is in the units of the input, and what cannot be done is said.
+
+use std::f64::consts::PI;
+use std::fs;
+use std::path::Path;
+
+use geometry::shapes::{Ball, Cuboid};
+use geometry::{SignedDistance, SignedDistanceExt};
+use images::{Drawing, Frame};
+use render::{Picture, Rgb};
+
+use crate::common::{outcome, run, text};
+
+fn refused(folder: &Path, arguments: &[&str]) -> String {
+    let output = run(folder, arguments);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+    text(&output.stderr)
+}
+
+/// A drawing of so many pixels a side.
+fn draw(path: &Path, pixels: u32, shape: &impl SignedDistance<2>) {
+    let frame = Frame::new(pixels, pixels, [0.0, f64::from(pixels)], 1.0).unwrap();
+    let drawing = Drawing::on_white(frame).filled(shape, Rgb::BLACK);
+    drawing.picture().unwrap().write_png(path).unwrap();
+}
+
+fn disc(centre: [f64; 2], radius: f64) -> impl SignedDistance<2> {
+    Ball::new(centre, radius).unwrap()
+}
+
+#[test]
+fn nothing_is_written_over_what_is_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    draw(&at("disc.png"), 64, &disc([32.0; 2], 20.0));
+    outcome(
+        folder.path(),
+        &[
+            "sample",
+            "builtin:lever",
+            "--cells",
+            "32",
+            "--save",
+            "lever.ply",
+        ],
+    );
+    let quick = [
+        "--cells",
+        "32",
+        "--steps",
+        "1",
+        "--no-page",
+        "--output",
+        "run",
+    ];
+    let commands: [(&[&str], &str); 6] = [
+        (
+            &["sample", "builtin:disc", "--save", "mine.png"],
+            "mine.png",
+        ),
+        (&["flow", "disc.png", "--save", "mine.svg"], "mine.svg"),
+        (&["flow", "builtin:cube", "--save", "mine.stl"], "mine.stl"),
+        (
+            &[
+                "inpaint",
+                "disc.png",
+                "--mask",
+                "ball:50,32,6",
+                "--save",
+                "disc.png",
+            ],
+            "disc.png",
+        ),
+        (&["fair", "lever.ply", "--save", "lever.ply"], "lever.ply"),
+        (&["mcf", "builtin:disc", "--save", "mine.png"], "mine.png"),
+    ];
+    for (command, file) in commands {
+        if !at(file).exists() {
+            fs::write(at(file), "mine").unwrap();
+        }
+        let before = fs::read(at(file)).unwrap();
+        let runs = command[0] != "sample";
+        let all = [command, if runs { &quick[..] } else { &[] }].concat();
+        let line = refused(folder.path(), &all);
+        assert!(
+            line.contains(file) && line.contains("--force"),
+            "{command:?}: {line}"
+        );
+        assert_eq!(fs::read(at(file)).unwrap(), before, "{command:?}");
+        assert!(!at("run").exists(), "{command:?}");
+        outcome(folder.path(), &[&all[..], &["--force"]].concat());
+        assert_ne!(fs::read(at(file)).unwrap(), before, "{command:?}");
+        if runs {
+            fs::remove_dir_all(at("run")).unwrap();
+        }
+    }
+    // A run gives way to another one on demand only, and what is no run never does.
+    let flow = [
+        "flow",
+        "builtin:disc",
+        "--cells",
+        "16",
+        "--steps",
+        "1",
+        "--output",
+    ];
+    outcome(folder.path(), &[&flow[..], &["run"]].concat());
+    assert!(
+        refused(folder.path(), &[&flow[..], &["run"]].concat())
+            .contains("cannot start a run in run")
+    );
+    outcome(folder.path(), &[&flow[..], &["run", "--force"]].concat());
+    fs::create_dir(at("own")).unwrap();
+    fs::write(at("own/thesis.txt"), "years").unwrap();
+    let line = refused(folder.path(), &[&flow[..], &["own", "--force"]].concat());
+    assert!(line.contains("holds thesis.txt"), "{line}");
+    assert!(at("own/thesis.txt").exists());
+}
+
+/// A ring of radii 150 and 75 pixels has the energy `pi / 150 + pi / 75`.
+#[test]
+fn energies_lengths_and_areas_of_images_are_those_of_their_pixels() {
+    let folder = tempfile::tempdir().unwrap();
+    let ring = disc([250.0; 2], 150.0).difference(disc([250.0; 2], 75.0));
+    draw(&folder.path().join("ring.png"), 500, &ring);
+    let flow = [
+        "flow", "ring.png", "--steps", "1", "--tau", "1", "--output", "run",
+    ];
+    let outcome = outcome(folder.path(), &flow);
+    for (name, expected, tolerance) in [
+        ("first_energy", PI / 150.0 + PI / 75.0, 0.08),
+        ("energy", PI / 150.0 + PI / 75.0, 0.08),
+        ("length", 450.0 * PI, 0.005),
+        ("area", PI * (150.0 * 150.0 - 75.0 * 75.0), 0.005),
+    ] {
+        let found = outcome[name].as_f64().unwrap();
+        assert!(
+            (found / expected - 1.0).abs() < tolerance,
+            "{name}: {found}, not {expected}"
+        );
+    }
+    assert_eq!(outcome["time"], 1.0);
+    assert!((outcome["grid"]["spacing"].as_f64().unwrap() - 500.0 / 1.2 / 128.0).abs() < 1e-9);
+}
+
+/// A sphere about (3, -5, 40) of radius 7.
+#[test]
+fn meshes_and_fields_lie_where_their_input_lay() {
+    let folder = tempfile::tempdir().unwrap();
+    let grid = geometry::Grid::<3>::new(24, 20.0).unwrap();
+    let grid = grid.with_origin([-7.0, -15.0, 30.0]).unwrap();
+    let ball = Ball::new([3.0, -5.0, 40.0], 7.0).unwrap();
+    let distance = geometry::Field::from_fn(grid, |x| ball.signed_distance(x));
+    let mesh = surfaces::isosurface(&distance).unwrap();
+    surfaces::write(folder.path().join("ball.stl"), &mesh).unwrap();
+    let flow = [
+        "flow", "ball.stl", "--cells", "48", "--steps", "2", "--frames", "1",
+    ];
+    let found = outcome(folder.path(), &[&flow[..], &["--output", "run"]].concat());
+    for (name, expected) in [
+        ("area", 4.0 * PI * 49.0),
+        ("volume", 4.0 / 3.0 * PI * 343.0),
+        ("energy", 8.0 * PI),
+        ("energy_over_8_pi", 1.0),
+    ] {
+        let value = found[name].as_f64().unwrap();
+        assert!(
+            (value / expected - 1.0).abs() < 0.03,
+            "{name}: {value}, not {expected}"
+        );
+    }
+    let u = geometry::vti::read::<3>(folder.path().join("run/final.vti")).unwrap();
+    let bounds = geometry::measure::bounding_box(&u[0].1).unwrap();
+    let centre = bounds.centre();
+    for (found, expected) in centre.iter().zip([3.0, -5.0, 40.0]) {
+        assert!((found - expected).abs() < 0.3, "{centre:?}");
+    }
+    let series = fs::read_to_string(folder.path().join("run/frames.pvd")).unwrap();
+    assert_eq!(series.matches("<DataSet").count(), 3, "{series}");
+    for part in series.split("file=\"").skip(1) {
+        let name = part.split_once('"').unwrap().0;
+        assert!(folder.path().join("run").join(name).is_file(), "{name}");
+    }
+}
+
+/// A blue disc on yellow paper of which a part is missing, and a red mark that is not to change.
+#[test]
+fn inpainting_copies_the_pixels_outside_of_the_mask_in_their_colours() {
+    let folder = tempfile::tempdir().unwrap();
+    let (ink, paper, mark) = (
+        [20, 30, 200, 255],
+        [250, 240, 150, 255],
+        [200, 190, 120, 255],
+    );
+    let pixel = |k: usize| {
+        let [x, y] = [k % 160, k / 160].map(|i| i as f64 + 0.5);
+        if (x - 80.0).hypot(y - 80.0) < 50.0 && (x - 125.0).hypot(y - 80.0) > 14.0 {
+            ink
+        } else if x < 10.0 && y < 12.0 {
+            mark
+        } else {
+            paper
+        }
+    };
+    let picture = Picture::new(160, 160, (0..160 * 160).map(pixel).collect()).unwrap();
+    picture.write_png(folder.path().join("disc.png")).unwrap();
+    let inpaint = [
+        "inpaint",
+        "disc.png",
+        "--mask",
+        "ball:125,80,18",
+        "--steps",
+        "16",
+    ];
+    outcome(
+        folder.path(),
+        &[&inpaint[..], &["--save", "whole.png", "--output", "run"]].concat(),
+    );
+    let read = |name: &str| {
+        let bytes = fs::read(folder.path().join(name)).unwrap();
+        images::colours(&bytes).unwrap()
+    };
+    let repaired = read("whole.png");
+    assert_eq!(read("run/final.png").pixels(), repaired.pixels());
+    let mut changed = 0;
+    for (k, (before, after)) in picture.pixels().iter().zip(repaired.pixels()).enumerate() {
+        let [x, y] = [k % 160, k / 160].map(|i| i as f64 + 0.5);
+        if (x - 125.0).hypot(y - 80.0) >= 18.0 {
+            assert_eq!(before, after, "pixel {x}, {y}");
+        }
+        changed += usize::from(before != after);
+    }
+    // The bite is filled with ink, up to where the disc ends.
+    assert!(changed > 250, "{changed}");
+    assert_eq!(repaired.pixel(118, 80), ink);
+    assert_eq!(repaired.pixel(140, 80), paper);
+}
+
+#[test]
+fn photographs_are_refused_until_it_is_said_what_is_inside() {
+    let folder = tempfile::tempdir().unwrap();
+    let shade = |k: usize| {
+        let [x, y] = [k % 120, k / 120].map(|i| i as f64 / 120.0);
+        let v = (255.0 * (0.5 + 0.3 * (7.0 * x).sin() * (5.0 * y).cos() + 0.2 * x)) as u8;
+        [v, v, v, 255]
+    };
+    let picture = Picture::new(120, 120, (0..120 * 120).map(shade).collect()).unwrap();
+    picture.write_png(folder.path().join("photo.png")).unwrap();
+    for command in ["flow", "inpaint", "mcf"] {
+        let mask: &[&str] = if command == "inpaint" {
+            &["--mask", "ball:60,60,20"]
+        } else {
+            &[]
+        };
+        let quick = [
+            "photo.png",
+            "--cells",
+            "48",
+            "--steps",
+            "1",
+            "--output",
+            command,
+        ];
+        let all = [&[command], &quick[..], mask].concat();
+        let line = refused(folder.path(), &all);
+        assert!(
+            line.contains("continuous tones") && line.contains("--threshold 0."),
+            "{line}"
+        );
+        outcome(folder.path(), &[&all[..], &["--threshold", "0.5"]].concat());
+    }
+}
+
+/// Strokes of 5 pixels of 500: with 128 cells per unit length a pixel is a third of a cell.
+#[test]
+fn thin_strokes_get_the_cells_that_they_need_or_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let stroke = |half: f64| {
+        let shape = Cuboid::new([150.0, half])
+            .unwrap()
+            .translated([250.0, 250.0]);
+        draw(&folder.path().join("stroke.png"), 500, &shape);
+    };
+    let flow = ["flow", "stroke.png", "--steps", "3", "--output"];
+    stroke(3.5);
+    let found = outcome(folder.path(), &[&flow[..], &["fine"]].concat());
+    assert!(
+        found["grid"]["spacing"].as_f64().unwrap() < 500.0 / 1.2 / 150.0,
+        "{found}"
+    );
+    assert_eq!(found["components"], 1, "{found}");
+    stroke(0.8);
+    let line = refused(folder.path(), &[&flow[..], &["hair"]].concat());
+    assert!(
+        line.contains("% of the boundary") && line.contains("--cells 512"),
+        "{line}"
+    );
+    let warned = run(
+        folder.path(),
+        &[&flow[..], &["coarse", "--cells", "128"]].concat(),
+    );
+    assert!(
+        text(&warned.stderr).contains("will not last"),
+        "{}",
+        text(&warned.stderr)
+    );
+}
+
+#[test]
+fn a_finished_run_goes_on_to_more_steps() {
+    let folder = tempfile::tempdir().unwrap();
+    let flow = [
+        "flow",
+        "builtin:cross",
+        "--cells",
+        "32",
+        "--frames",
+        "2",
+        "--tau",
+        "1e-6",
+    ];
+    outcome(
+        folder.path(),
+        &[&flow[..], &["--steps", "4", "--output", "run"]].concat(),
+    );
+    let again = run(folder.path(), &["resume", "run"]);
+    assert_eq!(again.status.code(), Some(0));
+    let line = refused(folder.path(), &["resume", "run", "--steps", "3"]);
+    assert!(line.contains("cannot go on: 3 steps are made"), "{line}");
+    let more = outcome(folder.path(), &["resume", "run", "--steps", "8"]);
+    assert_eq!(more["steps"], 8, "{more}");
+    let whole = outcome(
+        folder.path(),
+        &[&flow[..], &["--steps", "8", "--output", "whole"]].concat(),
+    );
+    assert_eq!(more["energy"], whole["energy"]);
+    for name in [
+        "final.npy",
+        "metrics.csv",
+        "animation.png",
+        "frames.pvd",
+        "summary.json",
+    ] {
+        let [a, b] =
+            ["run", "whole"].map(|run| fs::read(folder.path().join(run).join(name)).unwrap());
+        assert!(a == b, "{name}");
+    }
+    assert_eq!(
+        outcome(folder.path(), &["resume", "run", "--steps", "10"])["steps"],
+        10
+    );
+}
+
+#[test]
+fn long_steps_are_shortened_and_the_shape_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let cube = [
+        "flow",
+        "builtin:cube",
+        "--cells",
+        "48",
+        "--tau",
+        "doubling:1e-6",
+        "--steps",
+        "16",
+    ];
+    let found = outcome(
+        folder.path(),
+        &[&cube[..], &["--no-page", "--output", "run"]].concat(),
+    );
+    let energy = found["energy_over_8_pi"].as_f64().unwrap();
+    assert!((energy - 1.0).abs() < 0.05, "{found}");
+    assert_eq!(found["components"], 1);
+    assert!(
+        found["ended"]
+            .as_str()
+            .unwrap()
+            .contains("near to its own periodic image"),
+        "{found}"
+    );
+    assert!(found["shortened_steps"].as_u64().unwrap() > 0, "{found}");
+}
+
+#[test]
+fn meshes_are_converted_as_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let mesh = surfaces::samples::lever(48).unwrap().into_mesh();
+    surfaces::write(at("lever.obj"), &mesh).unwrap();
+    outcome(
+        folder.path(),
+        &["sample", "lever.obj", "--save", "lever.ply"],
+    );
+    let converted = surfaces::read(at("lever.ply")).unwrap();
+    assert_eq!(
+        converted.faces,
+        surfaces::read(at("lever.obj")).unwrap().faces
+    );
+    outcome(
+        folder.path(),
+        &[
+            "sample",
+            "lever.obj",
+            "--resample",
+            "--cells",
+            "32",
+            "--save",
+            "new.ply",
+        ],
+    );
+    assert_ne!(
+        surfaces::read(at("new.ply")).unwrap().faces.len(),
+        mesh.faces.len()
+    );
+}
+
+/// A box without its lid.
+#[test]
+fn open_meshes_are_refused_and_repaired_on_demand() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let mut mesh = surfaces::samples::lever(48).unwrap().into_mesh();
+    mesh.normals = None;
+    let highest = mesh.faces.iter().max_by(|a, b| {
+        let z = |face: &[u32; 3]| mesh.vertices[face[0] as usize][2];
+        z(a).total_cmp(&z(b))
+    });
+    let highest = *highest.unwrap();
+    mesh.faces
+        .retain(|face| !face.iter().any(|v| highest.contains(v)));
+    surfaces::write(at("open.obj"), &mesh).unwrap();
+    let flow = [
+        "flow", "open.obj", "--cells", "32", "--steps", "1", "--output", "run",
+    ];
+    assert!(refused(folder.path(), &flow).contains("--repair"));
+    let fair = ["fair", "open.obj", "--repair", "--output", "run"];
+    assert!(refused(folder.path(), &fair).contains("willmore sample --repair"));
+    let output = run(
+        folder.path(),
+        &["sample", "open.obj", "--repair", "--save", "whole.ply"],
+    );
+    assert!(text(&output.stderr).contains("of the new surface closes holes"));
+    let (whole, _) = surfaces::ClosedMesh::new(surfaces::read(at("whole.ply")).unwrap()).unwrap();
+    let lever = surfaces::samples::lever(48).unwrap();
+    assert_eq!(whole.euler_characteristic(), lever.euler_characteristic());
+    assert!((whole.volume() / lever.volume() - 1.0).abs() < 0.02);
+    outcome(folder.path(), &[&flow[..], &["--repair"]].concat());
+}

@@ -1,0 +1,87 @@
+//! What tells drawings from photographs, and the raster from the shape.
+
+use geometry::SignedDistance;
+use images::{Image, Inside, Outline, OutlineDistance, Side, Threshold, Tones, colours};
+
+const PIXELS: u32 = 160;
+
+/// The image with these grey values, from 0 to 1, at the centres of its pixels.
+fn image(grey: impl Fn(f64, f64) -> f64) -> Image {
+    let values = (0..PIXELS * PIXELS).map(|k| {
+        let [x, y] = [k % PIXELS, k / PIXELS].map(|i| f64::from(i) + 0.5);
+        (65535.0 * grey(x, y)) as u16
+    });
+    Image::new(PIXELS, PIXELS, values.collect(), None).unwrap()
+}
+
+fn radius(x: f64, y: f64) -> f64 {
+    (x - 80.0).hypot(y - 80.0)
+}
+
+#[test]
+fn drawings_have_two_tones_and_photographs_do_not() {
+    let blended = image(|x, y| (radius(x, y) - 60.0 + 0.5).clamp(0.0, 1.0));
+    let hard = image(|x, y| f64::from(u8::from(radius(x, y) > 60.0)));
+    let photograph = image(|x, y| 0.5 + 0.4 * (0.05 * x).sin() * (0.07 * y).cos());
+    let tones = |image: &Image| {
+        let side = Side::of(image, Inside::Auto, Threshold::default()).unwrap();
+        Tones::of(image, side)
+    };
+    let [blended, hard, photograph] = [&blended, &hard, &photograph].map(tones);
+    assert!(blended.between < 1e-9 && hard.between < 1e-9 && photograph.between > 0.2);
+    assert!(
+        blended.raster() < 0.3 && hard.raster() > 0.59,
+        "{blended:?} {hard:?}"
+    );
+    let part = std::f64::consts::PI * 3600.0 / 25600.0;
+    assert!((blended.inside / part - 1.0).abs() < 0.01, "{blended:?}");
+}
+
+/// A disc of radius 60 with hard edges: its outline goes along the raster, and is 5 % too long.
+#[test]
+fn smoothed_outlines_have_the_length_of_the_shape_and_stay_near() {
+    let hard = image(|x, y| f64::from(u8::from(radius(x, y) > 60.0)));
+    let rough = Outline::of_image(&hard, Side::Dark(0.5)).unwrap();
+    let smooth = rough.smoothed(0.6).unwrap();
+    let circumference = std::f64::consts::TAU * 60.0;
+    assert!(rough.length() > 1.02 * circumference, "{}", rough.length());
+    let length = smooth.length();
+    assert!(
+        (length / circumference - 1.0).abs() < 0.006,
+        "{length}, not {circumference}"
+    );
+    let distance = OutlineDistance::new(&rough);
+    let points = smooth.curves().iter().flat_map(|curve| &curve.points);
+    let far = points.map(|&x| distance.signed_distance(x).abs());
+    assert!(far.fold(0.0, f64::max) < 1.2);
+    assert!((smooth.area() / rough.area() - 1.0).abs() < 1e-4);
+    assert!(rough.smoothed(0.0).is_err());
+    // Sides are as long as the outline, with normals of length 1.
+    let sides: f64 = smooth
+        .sides()
+        .map(|(_, n, side)| n[0].hypot(n[1]) * side)
+        .sum();
+    assert!((sides / length - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn colours_are_those_of_the_file() {
+    let pixels: Vec<[u8; 4]> = (0..48).map(|k| [k, 5 * k, 255 - k, 255 - 3 * k]).collect();
+    let picture = render::Picture::new(8, 6, pixels).unwrap();
+    let again = colours(&picture.to_png().unwrap()).unwrap();
+    assert_eq!(again.pixels(), picture.pixels());
+    let mut jpeg = Vec::new();
+    let red: Vec<u8> = [200, 30, 40].repeat(64);
+    let encoder = jpeg_encoder::Encoder::new(&mut jpeg, 95);
+    encoder
+        .encode(&red, 8, 8, jpeg_encoder::ColorType::Rgb)
+        .unwrap();
+    for pixel in colours(&jpeg).unwrap().pixels() {
+        let near = |a: u8, b: u8| a.abs_diff(b) < 8;
+        assert!(
+            near(pixel[0], 200) && near(pixel[1], 30) && near(pixel[2], 40),
+            "{pixel:?}"
+        );
+    }
+    assert!(colours(b"no image").is_err());
+}

@@ -1,0 +1,111 @@
+//! Meshes that bound nothing properly.
+
+use surfaces::{ClosedMesh, TriangleMesh, repair, samples};
+
+/// The mesh without the faces whose centres are near a point.
+fn with_hole(mesh: &TriangleMesh, at: [f64; 3], radius: f64) -> TriangleMesh {
+    let mut open = mesh.clone();
+    open.normals = None;
+    open.faces.retain(|face| {
+        let centre: [f64; 3] = std::array::from_fn(|i| {
+            face.iter()
+                .map(|&v| mesh.vertices[v as usize][i])
+                .sum::<f64>()
+                / 3.0
+        });
+        (0..3).map(|i| (centre[i] - at[i]).powi(2)).sum::<f64>() > radius * radius
+    });
+    assert!(open.faces.len() < mesh.faces.len());
+    open
+}
+
+/// A sphere of radius 0.4.
+fn sphere() -> TriangleMesh {
+    let grid = geometry::Grid::<3>::centred(32, 1.0).unwrap();
+    let radius = |x: [f64; 3]| x[0].hypot(x[1]).hypot(x[2]) - 0.4;
+    surfaces::isosurface(&geometry::Field::from_fn(grid, radius)).unwrap()
+}
+
+fn radii(mesh: &ClosedMesh) -> (f64, f64) {
+    let radius = |x: &[f64; 3]| x[0].hypot(x[1]).hypot(x[2]);
+    let radii = mesh.mesh().vertices.iter().map(radius);
+    radii.fold((f64::MAX, 0.0), |(low, high), r| (low.min(r), high.max(r)))
+}
+
+#[test]
+fn holes_are_closed_and_all_else_stays() {
+    let open = with_hole(&sphere(), [0.4, 0.0, 0.0], 0.12);
+    assert!(ClosedMesh::new(open.clone()).is_err());
+    let repaired = repair(&open, 64).unwrap();
+    let mesh = &repaired.mesh;
+    assert_eq!((mesh.components(), mesh.genus()), (1, 0));
+    let (low, high) = radii(mesh);
+    assert!(low > 0.36 && high < 0.41, "{low} {high}");
+    // A cap of this size has 2 % of the area.
+    assert!(
+        repaired.added < 0.03 && repaired.dropped < 0.01,
+        "{repaired}"
+    );
+    assert_eq!(repaired.turned, 0);
+}
+
+#[test]
+fn faces_of_mixed_orientation_agree() {
+    let mut mixed = sphere();
+    mixed.normals = None;
+    for face in mixed.faces.iter_mut().step_by(3) {
+        face.swap(0, 1);
+    }
+    assert!(ClosedMesh::new(mixed.clone()).is_err());
+    let repaired = repair(&mixed, 48).unwrap();
+    assert!((repaired.turned as f64 / mixed.faces.len() as f64 - 1.0 / 3.0).abs() < 0.01);
+    let (low, high) = radii(&repaired.mesh);
+    assert!(low > 0.39 && high < 0.41, "{low} {high}");
+    // Inside out as a whole, too.
+    for face in &mut mixed.faces {
+        face.swap(0, 1);
+    }
+    assert!(repair(&mixed, 48).unwrap().mesh.volume() > 0.2);
+}
+
+#[test]
+fn what_crosses_itself_becomes_one() {
+    let mut two = sphere();
+    two.normals = None;
+    let (count, faces) = (two.vertices.len() as u32, two.faces.clone());
+    let moved: Vec<_> = two
+        .vertices
+        .iter()
+        .map(|x| [x[0] + 0.3, x[1], x[2]])
+        .collect();
+    two.vertices.extend(moved);
+    two.faces
+        .extend(faces.iter().map(|face| face.map(|v| v + count)));
+    let repaired = repair(&two, 64).unwrap();
+    assert_eq!((repaired.mesh.components(), repaired.mesh.genus()), (1, 0));
+    // Two balls of radius r at a distance d have 4/3 pi r^3 + pi r^2 d - pi d^3 / 12 together.
+    let pi = std::f64::consts::PI;
+    let expected = 4.0 / 3.0 * pi * 0.064 + pi * 0.16 * 0.3 - pi * 0.027 / 12.0;
+    let found = repaired.mesh.volume();
+    assert!(
+        (found / expected - 1.0).abs() < 0.02,
+        "{found}, not {expected}"
+    );
+    assert!(repaired.dropped > 0.2, "{repaired}");
+}
+
+#[test]
+fn a_closed_mesh_stays_as_it_is() {
+    let lever = samples::lever(64).unwrap();
+    let repaired = repair(lever.mesh(), 96).unwrap();
+    assert_eq!(
+        repaired.mesh.euler_characteristic(),
+        lever.euler_characteristic()
+    );
+    assert!((repaired.mesh.volume() / lever.volume() - 1.0).abs() < 0.01);
+    assert!(
+        repaired.added < 1e-3 && repaired.dropped < 1e-3,
+        "{repaired}"
+    );
+    assert!(repair(&TriangleMesh::default(), 32).is_err());
+}
