@@ -282,10 +282,15 @@ pub struct FlowOptions {
     #[serde(flatten)]
     pub scheme: SchemeOptions,
 
-    /// Time steps: auto (by the energy), auto:FIRST, VALUE, doubling:FIRST, growing:VALUE,COUNT, which doubles after so many,
-    /// or ramp:VALUE,HALVINGS, whose first step is divided [default: auto; inpaint: a ramp]
+    /// Time steps: controlled (of second order, by their error), auto (by the energy), auto:FIRST, VALUE, doubling:FIRST,
+    /// graded:FIRST,PART (of the time reached), growing:VALUE,COUNT, which doubles after so many, or ramp:VALUE,HALVINGS, whose first
+    /// step is divided [default: controlled; inpaint: a ramp; fair: doubling]
     #[arg(long, value_name = "TAU")]
     pub tau: Option<StepRule>,
+
+    /// The time error of controlled steps that is allowed, as a part of how far the surface moves [default: 0.02]
+    #[arg(long, value_name = "PART", allow_hyphen_values = true)]
+    pub tolerance: Option<f64>,
 
     /// Stop after this many steps [default: 20, or 1000 where something else ends the run]
     #[arg(long, value_name = "COUNT")]

@@ -13,6 +13,7 @@ use operators::ComputeDevice;
 use render::Picture;
 use runs::{Interrupt, RunDirectory, StoredRun};
 use serde_json::{Value, json};
+use solver::StepEstimates;
 
 use crate::cli::{KeepOptions, MeshFormat, SayOptions};
 use crate::config;
@@ -204,6 +205,9 @@ impl<O> Plan<O> {
             },
             "shortened_steps": run.records().iter().filter(|record| record.halvings > 0).count(),
         });
+        if let Some(accuracy) = time_accuracy(run.records(), eps) {
+            outcome["time_steps"] = accuracy;
+        }
         if let Some(number) = topology.euler_characteristic {
             outcome["euler_characteristic"] = number.into();
         }
@@ -250,6 +254,14 @@ impl<O> Plan<O> {
             let spheres = spheres.map_or(String::new(), |w| format!(" = {w:.4} x 8 pi"));
             text.push(format!(
                 "Willmore energy {energy:.5}{spheres}, before {first:.5}"
+            ));
+        }
+        if let (Some(error), Some(path)) = (
+            outcome["time_steps"]["estimated_error"].as_f64(),
+            outcome["time_steps"]["path"].as_f64(),
+        ) {
+            text.push(format!(
+                "time error about {error:.1e} (estimated), after a way of {path:.3}"
             ));
         }
         let sizes = ["length", "area", "volume"].iter().filter_map(|name| {
@@ -381,6 +393,22 @@ fn free_folder(name: &str) -> PathBuf {
         .chain(numbered)
         .find(|folder| !folder.exists())
         .expect("some number is free")
+}
+
+/// What controlled steps say of themselves: the sum of their estimated errors, the way of the place that moves farthest in each, and the
+/// longest displacement of a stage in interface widths.
+fn time_accuracy(records: &[Record], eps: f64) -> Option<Value> {
+    let made = |record: &Record| record.minimization?.estimates;
+    let estimates: Vec<StepEstimates> = records.iter().filter_map(made).collect();
+    if estimates.is_empty() {
+        return None;
+    }
+    let longest = estimates.iter().map(|e| e.displacement).fold(0.0, f64::max);
+    Some(json!({
+        "estimated_error": estimates.iter().filter_map(|e| e.error).sum::<f64>(),
+        "path": estimates.iter().map(|e| e.motion).sum::<f64>(),
+        "longest_displacement_in_widths": longest / eps,
+    }))
 }
 
 /// The fields of the frames in a folder with their times, for `ParaView`.

@@ -35,6 +35,12 @@ impl FlowCommand for FairOptions {
                 return Err(Error::options(format!("{name} {value} must be positive")));
             }
         }
+        let usual = if self.ends {
+            StepRule::Controlled
+        } else {
+            StepRule::Doubling(f64::NAN)
+        };
+        self.flow.check_tolerance(usual)?;
         if let Some(ratio) = self.energy_ratio.filter(|ratio| *ratio >= 1.0) {
             return Err(Error::options(format!(
                 "--energy-ratio {ratio} is reached before the first step: give a part below 1"
@@ -99,6 +105,10 @@ impl FlowCommand for FairOptions {
 
     fn ends(&self) -> bool {
         self.noise.is_some() || self.energy_ratio.is_some() || !self.ends
+    }
+
+    fn tolerance(&self) -> Option<f64> {
+        self.flow.tolerance
     }
 
     fn energy_ratio(&self) -> Option<f64> {

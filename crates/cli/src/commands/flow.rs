@@ -3,12 +3,13 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use engine::{Case, Flow, Measure, Method, Scales, StepRule, Stop, TimeSteps};
+use engine::{Case, ErrorControl, Flow, Measure, Method, Scales, StepRule, Stop, TimeSteps};
 use geometry::Field;
 use geometry::measure::{perimeter, zero_set_volume};
 use operators::ComputeDevice;
 use runs::StoredRun;
 use serde::Serialize;
+use solver::NewtonParams;
 
 use super::{open_device, operator};
 use crate::cli::{
@@ -75,6 +76,11 @@ pub trait FlowCommand: Serialize {
     /// the inner step do so in a box of that size.
     fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule;
 
+    /// The time error of controlled steps, as a part of the motion.
+    fn tolerance(&self) -> Option<f64> {
+        None
+    }
+
     /// Format of meshes.
     fn format(&self) -> Option<MeshFormat> {
         None
@@ -107,11 +113,40 @@ impl FlowCommand for FlowOptions {
         }
     }
 
+    fn check(&mut self) -> Result<(), Error> {
+        self.check_tolerance(StepRule::Controlled)
+    }
+
+    fn tolerance(&self) -> Option<f64> {
+        self.tolerance
+    }
+
     fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
-        let rule = self.tau.unwrap_or(StepRule::ByEnergy(None));
+        let rule = self.tau.unwrap_or(StepRule::Controlled);
         *self
             .tau
             .insert(rule.resolved(scales.mcf_step * unit.powi(2)))
+    }
+}
+
+impl FlowOptions {
+    /// Refuses a tolerance that is none, or that the time steps do not look at.
+    pub fn check_tolerance(&self, usual: StepRule) -> Result<(), Error> {
+        let Some(tolerance) = self.tolerance else {
+            return Ok(());
+        };
+        if !(tolerance > 0.0 && tolerance < 1.0) {
+            return Err(Error::options(format!(
+                "--tolerance {tolerance} must be between 0 and 1, a part of how far the surface moves"
+            )));
+        }
+        let rule = self.tau.unwrap_or(usual);
+        if rule != StepRule::Controlled {
+            return Err(Error::options(format!(
+                "--tolerance {tolerance} is for controlled time steps: give --tau controlled, or leave it out"
+            )));
+        }
+        Ok(())
     }
 }
 
@@ -160,7 +195,7 @@ impl Shared<'_> {
             .chain(self.time.map(Stop::Time))
             .chain(self.energy.map(Stop::Energy))
             .collect();
-        if matches!(rule, StepRule::ByEnergy(_)) {
+        if matches!(rule, StepRule::ByEnergy(_) | StepRule::Controlled) {
             stops.push(Stop::EnergyAtRest);
         }
         stops.extend([Stop::NoSurface, Stop::Vanished, Stop::AtTheSide]);
@@ -255,10 +290,26 @@ impl<C: FlowCommand> Job<C> {
         outlet: &impl Outlet<D>,
     ) -> Result<Case<D>, Error> {
         let method = self.command.method();
-        let (scales, operator) = operator(self.command.shared().scheme, method, initial.grid())?;
+        let (mut scales, operator) =
+            operator(self.command.shared().scheme, method, initial.grid())?;
         let box_side = self.command.shared().input.box_side;
         let unit = initial.grid().side() / box_side.unwrap_or(input::usual_box::<D>().1);
         let rule = self.command.rule(&scales, unit);
+        let steps = match rule {
+            StepRule::Controlled => {
+                scales.newton = NewtonParams {
+                    precision: scales.newton.precision,
+                    ..NewtonParams::second_order()
+                };
+                let mut control = ErrorControl::default();
+                control.relative = self.command.tolerance().unwrap_or(control.relative);
+                TimeSteps::controlled(control)
+            }
+            rule => TimeSteps {
+                longest_move: (C::FLOW == Flow::Willmore).then_some(LONGEST_MOVE),
+                ..rule.into()
+            },
+        };
         let mut stops = self.command.shared().stops(rule);
         stops.extend(self.command.energy_ratio().map(Stop::EnergyRatio));
         stops.extend(outlet.stops(&initial));
@@ -278,10 +329,7 @@ impl<C: FlowCommand> Job<C> {
             flow: C::FLOW,
             operator,
             scales,
-            steps: TimeSteps {
-                longest_move: (C::FLOW == Flow::Willmore).then_some(LONGEST_MOVE),
-                ..rule.into()
-            },
+            steps,
             stops,
             measures,
         })

@@ -21,6 +21,10 @@ impl FlowCommand for InpaintOptions {
     }
 
     fn check(&mut self) -> Result<(), Error> {
+        self.flow.check_tolerance(StepRule::Ramp {
+            tau: f64::NAN,
+            halvings: HALVINGS,
+        })?;
         let mask = self.mask()?;
         if !Region::is_meant(mask) {
             let absolute = input::absolute(mask)?;
@@ -44,6 +48,10 @@ impl FlowCommand for InpaintOptions {
                 Loaded::Space(self.restrict(start, region)?)
             }
         })
+    }
+
+    fn tolerance(&self) -> Option<f64> {
+        self.flow.tolerance
     }
 
     fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
