@@ -171,17 +171,19 @@ impl<const D: usize> Run<D> {
 
     /// A minimization that succeeds, and how often its size was halved.
     fn attempt(&mut self) -> Result<(u32, Option<StepRecord>), Error> {
-        use solver::Error::{NonFinite, NotConverged};
+        use solver::Error::{NonFinite, NotConverged, NotHeld};
         let (mut size, most) = (self.control.next_size(), self.control.halvings());
         let mut halvings = 0;
         loop {
             match self.motion.advance(size) {
                 Ok(made) => return Ok((halvings, made)),
-                Err(NotConverged { .. } | NonFinite { .. }) if halvings < most => {
+                Err(NotConverged { .. } | NonFinite { .. } | NotHeld { .. }) if halvings < most => {
                     size *= 0.5;
                     halvings += 1;
                 }
-                Err(source @ (NotConverged { .. } | NonFinite { .. })) if most > 0 => {
+                Err(source @ (NotConverged { .. } | NonFinite { .. } | NotHeld { .. }))
+                    if most > 0 =>
+                {
                     return Err(Error::TooStiff {
                         case: self.case.title(),
                         step: self.control.step(),

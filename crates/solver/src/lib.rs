@@ -69,6 +69,7 @@
 //! seven digits, so that a minimization can end with [`Exit::Precision`] before a tight tolerance.
 
 mod cg;
+mod constraints;
 mod displacement;
 mod energy;
 mod error;
@@ -80,6 +81,7 @@ mod region;
 mod samples;
 mod times;
 
+pub use constraints::Constraints;
 pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective, Precision};
 pub use error::{Error, StepFailure};
 pub use flow::{
