@@ -8,9 +8,9 @@
 //! mean curvature = h^D sum k delta(d) G        Willmore energy = h^D sum k^2/2 delta(d) G,     k = div(grad d / G)
 //! ```
 //!
-//! with central differences of sixth order, over the nodes with `|d| < 10h` (`6h` for curvatures). By the coarea formula each is the average over the level
-//! sets of `d` of what belongs to one of them, and the sums are those of smooth functions. That the interface has a width does not
-//! matter: `d` need not be a distance, only smooth.
+//! with central differences of sixth order, over the nodes with `|d| < 10h` (`6h` for curvatures). By the coarea formula each is the
+//! average over the level sets of `d` of what belongs to one of them, and the sums are those of smooth functions. That the interface has a
+//! width does not matter: `d` need not be a distance, only smooth.
 
 use crate::{Error, Field, Grid, vector};
 

@@ -62,6 +62,12 @@
 //! 7. stops when the Newton decrement is a small fraction of the motion, a test that no scaling of the energy changes and that
 //!    standing still does not pass.
 //!
+//! # Constraints
+//!
+//! [`WillmoreFlow::constrain`] holds the perimeter and the volume of the zero set, or one of them, at targets, without penalties: steps minimize
+//! among the phase fields that have them. The multipliers are the tension and the pressure in the records. Two constraints leave a ball no
+//! freedom at all, and a shape near one little; a target far from the present value is reached best by small changes in small steps.
+//!
 //! # Conventions
 //!
 //! Grids, norms and signs are those of [`geometry`]. Energies in [`StepRecord`] are in the paper's units with true L2 norms.

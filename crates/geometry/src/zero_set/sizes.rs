@@ -190,9 +190,10 @@ impl<const D: usize> SizeHessian<D> {
                 slope,
                 bent: first[place] * curvature,
                 normal: sizes.normals[place],
-                second: match active[place] {
-                    true => sizes.second_at(place, weights),
-                    false => [0.0; 3],
+                second: if active[place] {
+                    sizes.second_at(place, weights)
+                } else {
+                    [0.0; 3]
                 },
             }
         };
