@@ -128,6 +128,8 @@ pub(crate) mod tests {
                 energy_before: 1.0,
                 energy: 1.0,
                 willmore_energy: 1.0,
+                tension: None,
+                pressure: None,
                 start: Start::default(),
                 estimates: None,
                 newton: NewtonInfo {

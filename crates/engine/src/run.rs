@@ -180,7 +180,7 @@ impl<const D: usize> Run<D> {
 
     /// A step that succeeds and is short enough.
     fn attempt(&mut self) -> Result<Attempt, Error> {
-        use solver::Error::{NonFinite, NotConverged};
+        use solver::Error::{NonFinite, NotConverged, NotHeld};
         let (mut size, most) = (self.control.next_size(), self.control.halvings());
         let (mut halvings, mut refused_hvp) = (0, 0.0);
         let longest = self.case.steps.longest_move;
@@ -223,11 +223,13 @@ impl<const D: usize> Run<D> {
                     size = shorter.unwrap_or(0.5 * size);
                     halvings += 1;
                 }
-                Err(NotConverged { .. } | NonFinite { .. }) if halvings < most => {
+                Err(NotConverged { .. } | NonFinite { .. } | NotHeld { .. }) if halvings < most => {
                     size *= 0.5;
                     halvings += 1;
                 }
-                Err(source @ (NotConverged { .. } | NonFinite { .. })) if most > 0 => {
+                Err(source @ (NotConverged { .. } | NonFinite { .. } | NotHeld { .. }))
+                    if most > 0 =>
+                {
                     return Err(Error::TooStiff {
                         case: self.case.title(),
                         step: self.control.step(),

@@ -8,11 +8,11 @@
 //! mean curvature = h^D sum k delta(d) G        Willmore energy = h^D sum k^2/2 delta(d) G,     k = div(grad d / G)
 //! ```
 //!
-//! with central differences of sixth order, over the nodes with `|d| < 8h` (`6h` for curvatures). By the coarea formula each is the average over the level
-//! sets of `d` of what belongs to one of them, and the sums are those of smooth functions. That the interface has a width does not
-//! matter: `d` need not be a distance, only smooth.
+//! with central differences of sixth order, over the nodes with `|d| < 10h` (`6h` for curvatures). By the coarea formula each is the
+//! average over the level sets of `d` of what belongs to one of them, and the sums are those of smooth functions. That the interface has a
+//! width does not matter: `d` need not be a distance, only smooth.
 
-use crate::{Error, Field, vector};
+use crate::{Error, Field, Grid, vector};
 
 mod layer;
 mod sizes;
@@ -188,6 +188,19 @@ pub fn ball_perimeter(dimension: usize, volume: f64) -> f64 {
 pub fn reduced_volume(dimension: usize, perimeter: f64, volume: f64) -> f64 {
     let d = dimension as f64;
     (ball_perimeter(dimension, volume) / perimeter).powf(d / (d - 1.0))
+}
+
+/// The least length (2D) or area (3D) of a set of this volume in the periodic box: that of a ball, or of a cylinder or slab across the box where
+/// that is less (in 3D a conjecture: Hauswirth, Perez, Romon and Ros, The periodic isoperimetric problem, 2004).
+pub fn least_perimeter<const D: usize>(grid: &Grid<D>, volume: f64) -> f64 {
+    let side = grid.side();
+    // The complement has the same perimeter.
+    let volume = volume.min(side.powi(D as i32) - volume);
+    let across = (1..=D).map(|ball| {
+        let length = side.powi((D - ball) as i32);
+        length * ball_perimeter(ball, volume / length)
+    });
+    across.fold(f64::INFINITY, f64::min)
 }
 
 /// Volume of the unit ball.

@@ -23,6 +23,8 @@ pub(crate) struct CgSolution<const D: usize> {
     pub slope: f64,
     pub iterations: usize,
     pub exit: CgExit,
+    /// `-g - H p`, in the precision of the products.
+    pub residual: Tensor<D>,
 }
 
 /// Tolerance and iteration limit of one solve.
@@ -101,5 +103,6 @@ pub(crate) fn conjugate_gradients<const D: usize>(
         slope,
         iterations,
         exit,
+        residual,
     })
 }

@@ -31,6 +31,43 @@ pub enum Error {
         /// What was asked for.
         tolerance: f64,
     },
+    /// Perimeter or volume could not be brought to its target in a step.
+    #[error(
+        "step {step}: the {measure} could not be brought from {value} to {target}; use smaller time steps, or change the target slowly"
+    )]
+    NotHeld {
+        /// Time step, counted from 1.
+        step: usize,
+        /// Which measure.
+        measure: &'static str,
+        /// Its value before the step.
+        value: f64,
+        /// What was asked for.
+        target: f64,
+    },
+    /// No set of a volume has so small a perimeter.
+    #[error(
+        "a perimeter of {perimeter} cannot enclose a volume of {volume}: the reduced volume would be {reduced_volume}, above 1; the perimeter \
+         has to be at least {least}"
+    )]
+    PerimeterTooSmall {
+        /// The target of the perimeter.
+        perimeter: f64,
+        /// The target of the volume.
+        volume: f64,
+        /// The least perimeter.
+        least: f64,
+        /// The volume over that of the ball of the same perimeter.
+        reduced_volume: f64,
+    },
+    /// A volume that the box does not hold.
+    #[error("a volume of {volume} does not fit a box of volume {box_volume}")]
+    VolumeTooLarge {
+        /// The target of the volume.
+        volume: f64,
+        /// The volume of the box.
+        box_volume: f64,
+    },
     /// A parameter out of range.
     #[error("{name} = {value:e} is out of range: {expected}")]
     Parameter {

@@ -9,9 +9,10 @@ use model::{Factors, MeanCurvatureOperator, Network, Ratios};
 use operators::{ComputeDevice, SpectralFilter, inner_product};
 use serde::{Deserialize, Serialize};
 
+use crate::constraints::{Constraints, Held};
 use crate::newton::{NewtonInfo, NewtonParams, minimize_timed};
 use crate::preconditioner::Preconditioner;
-use crate::region::Constrained;
+use crate::region::Restricted;
 use crate::times::PhaseTimes;
 use crate::{Accuracy, Error, Exit, MeanCurvatureStep, MinimizingMovement, Objective, Region};
 
@@ -69,6 +70,13 @@ pub struct StepRecord {
     pub start: Start,
     /// What the minimization did.
     pub newton: NewtonInfo,
+    /// The surface tension `sigma` that holds the perimeter: `w + sigma A + p V` is stationary but for the motion, `w` being the Willmore
+    /// energy, `A` the perimeter, and `V` the volume. Energy per length (2D) or area (3D); positive where the interface wants to grow.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tension: Option<f64>,
+    /// The pressure `p` that holds the volume, likewise: energy per area (2D) or volume (3D), positive where the inside wants to grow.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pressure: Option<f64>,
     /// How long the step was against what limits it, if it was of second order.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub estimates: Option<StepEstimates>,
@@ -158,6 +166,7 @@ pub struct WillmoreFlow<const D: usize> {
     weighted: Option<MinimizingMovement<D>>,
     filter: Option<(f64, SpectralFilter)>,
     region: Option<Region<D>>,
+    constraints: Constraints,
     /// Where steps begin, if on the half grid, and what that moved last.
     half: Option<Box<WillmoreFlow<D>>>,
     half_motion: Option<Field<D>>,
@@ -228,6 +237,7 @@ impl<const D: usize> WillmoreFlow<D> {
             weighted: None,
             filter: None,
             region: None,
+            constraints: Constraints::default(),
             half: None,
             half_motion: None,
             current,
@@ -249,6 +259,17 @@ impl<const D: usize> WillmoreFlow<D> {
             half.restrict_to(&every_other_node(self.grid, nodes))?;
         }
         self.region = Some(region);
+        Ok(())
+    }
+
+    /// Holds perimeter and volume at these values in all following steps, from the next one on exactly: to a relative `1e-12` in double
+    /// precision. A target that is not the present value is reached in the next step, so change it slowly. Nothing is held by default.
+    ///
+    /// # Errors
+    /// As [`Constraints::check`].
+    pub fn constrain(&mut self, constraints: Constraints) -> Result<(), Error> {
+        constraints.check(&self.grid)?;
+        self.constraints = constraints;
         Ok(())
     }
 
@@ -369,6 +390,8 @@ impl<const D: usize> WillmoreFlow<D> {
             energy_before: scale * newton.energy_before,
             energy: scale * newton.energy,
             willmore_energy: minimum.willmore_energy,
+            tension: minimum.tension,
+            pressure: minimum.pressure,
             start: origin,
             newton,
             estimates: None,
@@ -422,18 +445,48 @@ impl<const D: usize> WillmoreFlow<D> {
             }
         };
         energy.set(anchor, stiffness)?;
+        let (eps, region) = (self.params.eps, self.region.as_ref());
+        let mut held = Held::new(&self.constraints, self.grid, eps, region, device);
+        let holding = held.as_mut();
         let (u, newton, times) = match &self.region {
-            None => minimize_timed(energy, current, start, preconditioner, params, device),
+            None => minimize_timed(
+                energy,
+                holding,
+                current,
+                start,
+                preconditioner,
+                params,
+                device,
+            ),
             Some(region) => {
-                let mut energy = Constrained::new(energy, region, current);
+                let mut energy = Restricted::new(energy, region, current);
                 let start = energy.hold(start.clone());
                 // Adding nothing makes 0.0 of -0.0.
-                minimize_timed(&mut energy, current, &start, preconditioner, params, device)
-                    .map(|(u, newton, times)| (energy.hold(u), newton, times))
+                minimize_timed(
+                    &mut energy,
+                    holding,
+                    current,
+                    &start,
+                    preconditioner,
+                    params,
+                    device,
+                )
+                .map(|(u, newton, times)| (energy.hold(u), newton, times))
             }
         }
         .map_err(|error| match error {
             Error::NonFinite { field, .. } => Error::NonFinite { step, field },
+            Error::NotHeld {
+                measure,
+                value,
+                target,
+                ..
+            } => Error::NotHeld {
+                step,
+                measure,
+                value,
+                target,
+            },
             other => other,
         })?;
         if newton.exit == Exit::IterationLimit {
@@ -456,8 +509,14 @@ impl<const D: usize> WillmoreFlow<D> {
             * self
                 .device
                 .scalar((motion.clone() * self.mcf.mass(motion)).sum())?;
+        // The energy of standing still is 2 tau w.
+        let unit = self.energy_scale() / (2.0 * tau);
+        let multipliers = held.map(|held| held.multipliers().map(|value| unit * value));
+        let [tension, pressure] = multipliers.unwrap_or_default();
         Ok(Minimum {
             u,
+            tension: self.constraints.perimeter.map(|_| tension),
+            pressure: self.constraints.volume.map(|_| pressure),
             willmore_energy: self.energy_scale() * (newton.energy - fidelity) / (2.0 * tau),
             newton,
             times,
@@ -492,6 +551,8 @@ struct Movement<'a, const D: usize> {
 struct Minimum<const D: usize> {
     u: Tensor<D>,
     willmore_energy: f64,
+    tension: Option<f64>,
+    pressure: Option<f64>,
     newton: NewtonInfo,
     times: PhaseTimes,
 }

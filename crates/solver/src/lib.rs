@@ -62,6 +62,12 @@
 //! 7. stops when the Newton decrement is a small fraction of the motion, a test that no scaling of the energy changes and that
 //!    `u = u_k` does not pass unless it is stationary.
 //!
+//! # Constraints
+//!
+//! [`WillmoreFlow::constrain`] holds the perimeter and the volume of the zero set, or one of them, at targets, without penalties: steps minimize
+//! among the phase fields that have them. The multipliers are the tension and the pressure in the records. Two constraints leave a ball no
+//! freedom at all, and a shape near one little; a target far from the present value is reached best by small changes in small steps.
+//!
 //! # Conventions
 //!
 //! Grids, norms and signs are those of [`geometry`]. Energies in [`StepRecord`] are in the paper's units with true L2 norms.
@@ -69,6 +75,7 @@
 //! seven digits, so that a minimization can end with [`Exit::Precision`] before a tight tolerance.
 
 mod cg;
+mod constraints;
 mod displacement;
 mod energy;
 mod error;
@@ -80,6 +87,7 @@ mod region;
 mod samples;
 mod times;
 
+pub use constraints::Constraints;
 pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective, Precision};
 pub use error::{Error, StepFailure};
 pub use flow::{

@@ -10,6 +10,7 @@ use operators::{ComputeDevice, retract};
 use serde::{Deserialize, Serialize};
 
 use crate::cg::{CgExit, CgLimits, CgSolution, conjugate_gradients, dot};
+use crate::constraints::{Held, Place, Tangent};
 use crate::preconditioner::Preconditioner;
 use crate::times::{PhaseTimes, Stopwatch, Timed};
 use crate::{Error, Objective, Precision};
@@ -163,10 +164,12 @@ struct Point<const D: usize> {
     u: Tensor<D>,
     energy: f64,
     gradient: Tensor<D>,
+    tangent: Option<Tangent<D>>,
 }
 
-struct Minimizer<'a, const D: usize, O> {
+struct Minimizer<'a, 'h, const D: usize, O> {
     objective: Timed<'a, O>,
+    held: Option<&'a mut Held<'h, D>>,
     params: NewtonParams,
     device: &'a ComputeDevice,
     preconditioner: Option<Preconditioner<D>>,
@@ -190,13 +193,22 @@ pub fn minimize<const D: usize>(
     params: NewtonParams,
     device: &ComputeDevice,
 ) -> Result<(Tensor<D>, NewtonInfo), Error> {
-    let (u, info, _) = minimize_timed(objective, previous, start, preconditioner, params, device)?;
+    let (u, info, _) = minimize_timed(
+        objective,
+        None,
+        previous,
+        start,
+        preconditioner,
+        params,
+        device,
+    )?;
     Ok((u, info))
 }
 
-/// [`minimize`] with the time of its parts.
+/// [`minimize`] with the time of its parts, and with measures held at targets.
 pub(crate) fn minimize_timed<const D: usize>(
     objective: &mut impl Objective<D>,
+    held: Option<&mut Held<'_, D>>,
     previous: &Tensor<D>,
     start: &Tensor<D>,
     preconditioner: Option<Preconditioner<D>>,
@@ -214,6 +226,7 @@ pub(crate) fn minimize_timed<const D: usize>(
     }
     let mut minimizer = Minimizer {
         objective,
+        held,
         params,
         device,
         preconditioner: preconditioner.filter(|_| params.method == Method::Preconditioned),
@@ -247,34 +260,63 @@ pub(crate) fn minimize_timed<const D: usize>(
     Ok((u, minimizer.info, times))
 }
 
-impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
-    fn point(&mut self, u: Tensor<D>) -> Result<Point<D>, Error> {
+impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
+    /// The phase field near `u` at which the energy counts; none if nothing near it fulfils the constraints.
+    fn place(&self, u: Tensor<D>) -> Result<Option<Place<D>>, Error> {
+        match &self.held {
+            Some(held) => held.restored(u, |u| self.objective.hold(u)),
+            None => Ok(Some(Place { u, tangent: None })),
+        }
+    }
+
+    /// The place at the previous phase field.
+    fn rest(&self) -> Result<Place<D>, Error> {
+        match (self.place(self.previous.clone())?, &self.held) {
+            (Some(rest), _) => Ok(rest),
+            (None, Some(held)) => Err(held.lost(self.previous)?),
+            (None, None) => unreachable!("without constraints every place is one"),
+        }
+    }
+
+    fn point(&mut self, Place { u, tangent }: Place<D>) -> Result<Point<D>, Error> {
         let (energy, gradient) = self.objective.evaluate(&u)?;
         self.info.gradients += 1;
         Ok(Point {
             u,
-            energy,
+            energy: energy + self.excess(tangent.as_ref()),
             gradient,
+            tangent,
         })
     }
 
-    /// A point that may turn out to be too far: none where the mean curvature step fails.
+    /// A point that may turn out to be too far: none where the mean curvature step fails, or the constraints are out of reach.
     fn trial(&mut self, u: Tensor<D>) -> Result<Option<Point<D>>, Error> {
-        match self.point(u) {
+        let Some(place) = self.place(u)? else {
+            return Ok(None);
+        };
+        match self.point(place) {
             Ok(point) => Ok(Some(point).filter(|point| point.energy.is_finite())),
             Err(Error::Step(_)) => Ok(None),
             Err(error) => Err(error),
         }
     }
 
-    fn energy(&mut self, u: &Tensor<D>) -> Result<f64, Error> {
+    fn energy(&mut self, place: &Place<D>) -> Result<f64, Error> {
         self.info.values += 1;
-        self.objective.value(u)
+        Ok(self.objective.value(&place.u)? + self.excess(place.tangent.as_ref()))
+    }
+
+    /// What the energy counts for constraints that are not met to rounding.
+    fn excess(&self, tangent: Option<&Tangent<D>>) -> f64 {
+        match (&self.held, tangent) {
+            (Some(held), Some(tangent)) => held.excess(tangent),
+            _ => 0.0,
+        }
     }
 
     fn solve(
         &mut self,
-        gradient: &Tensor<D>,
+        point: &Point<D>,
         limits: CgLimits,
         level: Level,
     ) -> Result<CgSolution<D>, Error> {
@@ -287,8 +329,14 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
                 (None, _) => r.clone(),
             })
         };
-        let solution =
-            conjugate_gradients(&mut self.objective, gradient, &precondition, limits, device)?;
+        let (objective, gradient) = (&mut self.objective, &point.gradient);
+        let solution = match (&mut self.held, &point.tangent) {
+            (Some(held), Some(tangent)) => {
+                let keep = matches!(level, Level::Both);
+                held.solve(objective, (gradient, tangent), &precondition, limits, keep)?
+            }
+            _ => conjugate_gradients(objective, gradient, &precondition, limits, device)?,
+        };
         self.info.hvp += solution.iterations;
         if solution.exit == CgExit::NegativeCurvature {
             self.info.negative_curvature += 1;
@@ -314,8 +362,11 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
         let motion = dot(&motion, &motion, self.device)?;
         let decrement = slope.abs() / self.objective.unit();
         self.info.estimate = (decrement / motion.max(f64::MIN_POSITIVE)).sqrt();
-        let rounding = self.device.epsilon() * self.device.epsilon() * self.unknowns;
-        Ok(if decrement <= rounding {
+        let smallest = match &self.held {
+            Some(held) => held.noise(),
+            None => self.device.epsilon(),
+        };
+        Ok(if decrement <= smallest * smallest * self.unknowns {
             Some(Exit::Stationary)
         } else if self.info.estimate <= self.params.tolerance {
             Some(Exit::Converged)
@@ -324,10 +375,10 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
         })
     }
 
-    fn finish(&mut self, exit: Exit, point: Point<D>) -> Tensor<D> {
+    fn finish(&mut self, exit: Exit, (u, energy): (Tensor<D>, f64)) -> Tensor<D> {
         self.info.exit = exit;
-        self.info.energy = point.energy;
-        point.u
+        self.info.energy = energy;
+        u
     }
 
     /// A few preconditioned iterations on the new Hessian: they remove the stiff error that a long step leaves in the
@@ -343,14 +394,18 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
             return Ok(point);
         }
         for _ in 0..ROUNDS {
-            let solution = self.solve(&point.gradient, limits, Level::Phase)?;
+            let solution = self.solve(&point, limits, Level::Phase)?;
             // The full step nearly always lowers the energy: it is evaluated with its gradient at once.
             let full = point.u.clone() - solution.direction.clone() * solution.slope.signum();
             let next = match self.trial(full)? {
                 Some(next) if next.energy < point.energy => next,
                 _ => match self.straight(&point, &solution, 0.5, 0.05, 0.0)? {
-                    Some((u, _)) => self.point(u)?,
-                    None => return self.point(point.u),
+                    Some((place, _)) => self.point(place)?,
+                    None => {
+                        // The objective's own point is another by now.
+                        let Point { u, tangent, .. } = point;
+                        return self.point(Place { u, tangent });
+                    }
                 },
             };
             let worthwhile = point.energy - next.energy > WORTHWHILE * point.energy;
@@ -370,13 +425,15 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
         longest: f64,
         shortest: f64,
         sufficient: f64,
-    ) -> Result<Option<(Tensor<D>, f64)>, Error> {
+    ) -> Result<Option<(Place<D>, f64)>, Error> {
         let (mut t, sign) = (longest, -solution.slope.signum());
         while t >= shortest {
             let u = point.u.clone() + solution.direction.clone() * (sign * t);
-            let energy = self.energy(&u)?;
-            if energy < point.energy - sufficient * t * solution.slope.abs() {
-                return Ok(Some((u, energy)));
+            if let Some(place) = self.place(u)? {
+                let energy = self.energy(&place)?;
+                if energy < point.energy - sufficient * t * solution.slope.abs() {
+                    return Ok(Some((place, energy)));
+                }
             }
             t *= 0.5;
         }
@@ -386,7 +443,11 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
     fn preconditioned(&mut self, start: &Tensor<D>) -> Result<Tensor<D>, Error> {
         const HOPELESS: f64 = 50.0;
         const SHORTEST: f64 = 0.02;
-        let mut point = self.point(start.clone())?;
+        let place = match self.place(start.clone())? {
+            Some(place) => place,
+            None => self.rest()?,
+        };
+        let mut point = self.point(place)?;
         if !point.energy.is_finite() {
             return Err(Error::NonFinite {
                 step: 0,
@@ -395,8 +456,11 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
         }
         point = self.clean(point)?;
         if point.energy > self.info.energy_before {
-            // An extrapolation that made things worse is dropped.
-            point = self.point(self.previous.clone())?;
+            // An extrapolation that made things worse is dropped. Where a target moves, so does the energy of standing still.
+            let rest = self.point(self.rest()?)?;
+            if rest.energy < point.energy {
+                point = rest;
+            }
         }
         let limits = CgLimits {
             tolerance: self.params.cg_tolerance,
@@ -407,23 +471,21 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
                 self.assembly
                     .time(|| preconditioner.follow(&point.u, self.device))?;
             }
-            let solution = self.solve(&point.gradient, limits, Level::Both)?;
+            let solution = self.solve(&point, limits, Level::Both)?;
             let sign = -solution.slope.signum();
             let decrease = solution.slope.abs();
             let done = self.converged(&point, solution.slope)?;
             self.info.newton += 1;
             if let Some(exit) = done {
                 let u = retract(&point.u, &solution.direction, sign);
-                let u = self.objective.hold(u);
-                let energy = self.energy(&u)?;
-                if energy <= point.energy {
-                    point = Point {
-                        u,
-                        energy,
-                        gradient: point.gradient,
-                    };
+                let mut end = (point.u, point.energy);
+                if let Some(place) = self.place(self.objective.hold(u))? {
+                    let energy = self.energy(&place)?;
+                    if energy <= end.1 {
+                        end = (place.u, energy);
+                    }
                 }
-                return Ok(self.finish(exit, point));
+                return Ok(self.finish(exit, end));
             }
             let mut t = 1.0;
             let mut next = None;
@@ -443,15 +505,15 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
             point = match next {
                 Some(next) => next,
                 None => match self.straight(&point, &solution, 1.0, 1e-6, 1e-4)? {
-                    Some((u, _)) => self.point(u)?,
+                    Some((place, _)) => self.point(place)?,
                     None => {
                         let exit = self.stuck(decrease, point.energy);
-                        return Ok(self.finish(exit, point));
+                        return Ok(self.finish(exit, (point.u, point.energy)));
                     }
                 },
             };
         }
-        Ok(self.finish(Exit::IterationLimit, point))
+        Ok(self.finish(Exit::IterationLimit, (point.u, point.energy)))
     }
 
     /// No step lowered the energy: either the expected decrease drowns in rounding, or the method failed.
@@ -465,7 +527,8 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
 
     /// alg:hybrid_scheme: from `u_k`, conjugate gradients with a forcing sequence, Armijo backtracking on a straight line.
     fn paper(&mut self) -> Result<Tensor<D>, Error> {
-        let mut point = self.point(self.previous.clone())?;
+        let rest = self.rest()?;
+        let mut point = self.point(rest)?;
         let first = dot(&point.gradient, &point.gradient, self.device)?.sqrt();
         while self.info.newton < self.params.newton_iterations {
             let norm = dot(&point.gradient, &point.gradient, self.device)?.sqrt();
@@ -474,28 +537,25 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, D, O> {
                 tolerance: forcing.min(self.params.cg_tolerance),
                 iterations: self.params.cg_iterations,
             };
-            let solution = self.solve(&point.gradient, limits, Level::Both)?;
+            let solution = self.solve(&point, limits, Level::Both)?;
             let done = self.converged(&point, solution.slope)?;
             self.info.newton += 1;
             let next = self.straight(&point, &solution, 1.0, 1e-6, 1e-4)?;
             match (done, next) {
                 (Some(exit), next) => {
-                    if let Some((u, energy)) = next {
-                        point = Point {
-                            u,
-                            energy,
-                            gradient: point.gradient,
-                        };
-                    }
-                    return Ok(self.finish(exit, point));
+                    let end = match next {
+                        Some((place, energy)) => (place.u, energy),
+                        None => (point.u, point.energy),
+                    };
+                    return Ok(self.finish(exit, end));
                 }
-                (None, Some((u, _))) => point = self.point(u)?,
+                (None, Some((place, _))) => point = self.point(place)?,
                 (None, None) => {
                     let exit = self.stuck(solution.slope.abs(), point.energy);
-                    return Ok(self.finish(exit, point));
+                    return Ok(self.finish(exit, (point.u, point.energy)));
                 }
             }
         }
-        Ok(self.finish(Exit::IterationLimit, point))
+        Ok(self.finish(Exit::IterationLimit, (point.u, point.energy)))
     }
 }

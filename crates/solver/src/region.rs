@@ -58,13 +58,13 @@ impl<const D: usize> Region<D> {
 }
 
 /// An objective as a function of the values in a region.
-pub(crate) struct Constrained<'a, const D: usize, O> {
+pub(crate) struct Restricted<'a, const D: usize, O> {
     objective: &'a mut O,
     region: &'a Region<D>,
     fixed: &'a Tensor<D>,
 }
 
-impl<'a, const D: usize, O> Constrained<'a, D, O> {
+impl<'a, const D: usize, O> Restricted<'a, D, O> {
     /// Outside the region the values are those of `fixed`.
     pub(crate) fn new(objective: &'a mut O, region: &'a Region<D>, fixed: &'a Tensor<D>) -> Self {
         Self {
@@ -75,7 +75,7 @@ impl<'a, const D: usize, O> Constrained<'a, D, O> {
     }
 }
 
-impl<const D: usize, O: Objective<D>> Objective<D> for Constrained<'_, D, O> {
+impl<const D: usize, O: Objective<D>> Objective<D> for Restricted<'_, D, O> {
     fn value(&mut self, u: &Tensor<D>) -> Result<f64, Error> {
         self.objective.value(u)
     }

@@ -2,6 +2,7 @@
 
 mod calibration;
 mod common;
+mod constraints;
 mod flow;
 mod minimization;
 mod profile;

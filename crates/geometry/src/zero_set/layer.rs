@@ -11,10 +11,15 @@ use crate::{Error, Field, Grid, distance_from_phase_field, reduce, vector};
 const WIDTH: f64 = 1.25;
 /// The wider of the two Gaussians in widths of the narrower.
 const WIDER: f64 = 1.5;
-/// Nodes farther than this from the zero set, in spacings, have no weight.
-const REACH: f64 = 8.0;
+/// Nodes farther than this from the zero set, in spacings, have no weight. Where that jumps to zero it is below rounding, so that the sums are
+/// smooth functions of the nodal values.
+const REACH: f64 = 10.0;
 /// Central difference of sixth order: weights of the neighbours at one, two and three spacings; antisymmetric.
 const WEIGHTS: [f64; 3] = [45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0];
+/// Neighbours along an axis in a difference.
+pub(super) const NEIGHBOURS: usize = 6;
+/// Work on fewer values than this is not worth another thread.
+const SHARE: usize = 1 << 13;
 /// Place of a node that is not in the layer.
 const NOWHERE: u32 = u32::MAX;
 
@@ -104,7 +109,7 @@ impl<const D: usize> Layer<D> {
             });
         }
         let around = |i: usize| [1, 2, 3].map(|step| [(i + 3 * n - step) % n, (i + step) % n]);
-        let distance: Vec<f64> = (u.values().par_iter())
+        let distance: Vec<f64> = (u.values().par_iter().with_min_len(SHARE))
             .map(|&u| distance_from_phase_field(u, eps))
             .collect();
         let mut layer = Self {
@@ -119,7 +124,9 @@ impl<const D: usize> Layer<D> {
         };
         layer.find_nodes();
         let gradient = |&node: &u32| layer.gradient(node as usize, |i| layer.distance[i]);
-        layer.gradients = layer.nodes.par_iter().map(gradient).collect();
+        layer.gradients = (layer.nodes.par_iter().with_min_len(SHARE))
+            .map(gradient)
+            .collect();
         Ok(layer)
     }
 
@@ -178,17 +185,27 @@ impl<const D: usize> Layer<D> {
         }
     }
 
+    /// For each axis the places of the neighbours of a place, in the order of [`Self::weights`]; beyond the last where there is none.
+    pub(super) fn places_around(&self, place: usize) -> [[u32; NEIGHBOURS]; D] {
+        let (mut places, mut term) = ([[NOWHERE; NEIGHBOURS]; D], 0);
+        self.differences(self.nodes[place] as usize, |axis, _, node| {
+            places[axis][term % NEIGHBOURS] = self.places[node];
+            term += 1;
+        });
+        places
+    }
+
+    /// The weights of the neighbours along an axis in a difference.
+    pub(super) fn weights(&self) -> [f64; NEIGHBOURS] {
+        let [near, middle, far] = WEIGHTS.map(|weight| weight / self.grid.spacing());
+        [near, -near, middle, -middle, far, -far]
+    }
+
     /// The gradient of a function of the nodes of the grid.
     fn gradient(&self, node: usize, of: impl Fn(usize) -> f64) -> [f64; D] {
         let mut sums = [0.0; D];
         self.differences(node, |axis, weight, node| sums[axis] += weight * of(node));
         sums
-    }
-
-    /// The gradient of a function of the places of the layer, zero elsewhere.
-    pub(super) fn gradient_at(&self, place: usize, values: &[f64]) -> [f64; D] {
-        let at = |node: usize| values.get(self.places[node] as usize).copied();
-        self.gradient(self.nodes[place] as usize, |node| at(node).unwrap_or(0.0))
     }
 
     /// The derivatives of a vector field on the layer, zero elsewhere; the first index is that of the derivative.
@@ -215,7 +232,8 @@ impl<const D: usize> Layer<D> {
 
     /// A function of the places of the layer, in parallel.
     pub(super) fn map<T: Send>(&self, f: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
-        (0..self.nodes.len()).into_par_iter().map(f).collect()
+        let places = (0..self.nodes.len()).into_par_iter();
+        places.with_min_len(SHARE).map(f).collect()
     }
 
     /// Area or volume of the inside.

@@ -186,6 +186,8 @@ impl<const D: usize> WillmoreFlow<D> {
             energy_before: 2.0 * tau * at_rest,
             energy: 2.0 * tau * second.willmore_energy,
             willmore_energy: second.willmore_energy,
+            tension: second.tension,
+            pressure: second.pressure,
             start: Start { kind, hvp: 0.0 },
             newton: NewtonInfo {
                 newton: one.newton + two.newton,

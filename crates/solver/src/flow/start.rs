@@ -156,9 +156,18 @@ impl<const D: usize> WillmoreFlow<D> {
         let previous = self.previous.as_ref();
         half.previous = previous.map(|(u, tau)| (every_other(u), *tau));
         (half.step, half.time) = (self.step, self.time);
+        half.constraints = if self.constraints.is_empty() {
+            self.constraints
+        } else {
+            let here = download(&self.grid, &self.current, &self.device)?;
+            let there = download(&half.grid, &half.current, &half.device)?;
+            self.constraints.carried(&here, &there, self.params.eps)?
+        };
         let record = match half.advance(tau) {
             Ok(record) => record,
-            Err(Error::NotConverged { .. } | Error::NonFinite { .. }) => return Ok(None),
+            Err(Error::NotConverged { .. } | Error::NonFinite { .. } | Error::NotHeld { .. }) => {
+                return Ok(None);
+            }
             Err(error) => return Err(error),
         };
         let moved = download(&half.grid, &(half.current.clone() - from), &half.device)?;

@@ -1,0 +1,564 @@
+//! Perimeter and volume held at targets, by Lagrange multipliers inside the minimization of each step.
+//!
+//! With `C` the perimeter and the volume of the zero set ([`geometry::zero_set`]) and `C*` their targets, a step minimizes its energy `E`
+//! under `C(u) = C*`. All iterates fulfil that, so that the energy alone says which is better:
+//!
+//! - Conjugate gradients solve `H p = -(g + A lambda)` for motions with `A^T p = 0`, `A` being the gradients of `C`, `g` that of `E`, and
+//!   `H` the second derivative of `E + lambda C`. For that the preconditioner `P` is projected, `P - P A (A^T P A)^-1 A^T P`, whose spectrum
+//!   with `H` lies within that of `P`: constraints cost no iterations. What is left of the residual corrects the multipliers.
+//! - Every trial is [restored](Held::restored) to `C = C*` by Newton's method for one or two numbers: displacements of the interface along its
+//!   normal that are constant (for the volume) and proportional to the mean curvature (for the perimeter), which keep the profile.
+
+use std::sync::Arc;
+
+use burn::tensor::{DType, Tensor};
+use geometry::zero_set::{SizeHessian, Sizes, least_perimeter, reduced_volume};
+use geometry::{Field, Grid};
+use operators::{ComputeDevice, HostUpdate, HostVectors, inner_product, retract, update_on_host};
+use serde::{Deserialize, Serialize};
+
+use crate::cg::{CgExit, CgLimits, CgSolution, conjugate_gradients, dot};
+use crate::{Error, Objective, Region};
+
+/// What is held, relative to the target, in double precision.
+const TOLERANCE: f64 = 1e-12;
+/// The same in units of the precision of the device.
+const ROUNDINGS: f64 = 16.0;
+/// Root mean square of motions that are nothing but the noise of restoring, in units of the tolerance.
+const NOISE: f64 = 100.0;
+/// Corrections after which a target counts as out of reach.
+const CORRECTIONS: usize = 16;
+/// Longest displacement of one correction, in units of `4 eps / 3`.
+const LONGEST: f64 = 0.5;
+/// Gradients that differ by less than this part are the same constraint.
+const DEPENDENT: f64 = 1e-12;
+/// Balls that are measured are round to this part of their perimeter.
+const SLACK: f64 = 1e-4;
+/// The measures in the order of [`Sizes`].
+const NAMES: [&str; 2] = ["perimeter", "volume"];
+
+/// Values at which perimeter and volume of the zero set, as [`geometry::zero_set`] measures them, are held in the following steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Constraints {
+    /// The length (2D) or area (3D), if it is held.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub perimeter: Option<f64>,
+    /// The area (2D) or volume (3D) of the inside, if it is held.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub volume: Option<f64>,
+}
+
+impl Constraints {
+    /// Perimeter and volume of a phase field of interface width `eps`: both are kept.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] for values that are not finite.
+    pub fn keeping<const D: usize>(u: &Field<D>, eps: f64) -> Result<Self, Error> {
+        let sizes = Sizes::of(u, eps)?;
+        Ok(Self {
+            perimeter: Some(sizes.perimeter()),
+            volume: Some(sizes.volume()),
+        })
+    }
+
+    /// Whether nothing is held.
+    pub fn is_empty(&self) -> bool {
+        self.targets() == [None; 2]
+    }
+
+    fn targets(&self) -> [Option<f64>; 2] {
+        [self.perimeter, self.volume]
+    }
+
+    /// Refuses targets that no set in the periodic box has.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a target that is not positive and finite, [`Error::VolumeTooLarge`] for the volume of the whole box or more,
+    /// [`Error::PerimeterTooSmall`] for a perimeter below the least that encloses the volume.
+    pub fn check<const D: usize>(&self, grid: &Grid<D>) -> Result<(), Error> {
+        for (name, target) in NAMES.into_iter().zip(self.targets()) {
+            if let Some(value) = target.filter(|value| !(value.is_finite() && *value > 0.0)) {
+                return Err(Error::Parameter {
+                    name,
+                    value,
+                    expected: "positive and finite",
+                });
+            }
+        }
+        let Some(volume) = self.volume else {
+            return Ok(());
+        };
+        let box_volume = grid.side().powi(D as i32);
+        if volume >= box_volume {
+            return Err(Error::VolumeTooLarge { volume, box_volume });
+        }
+        match self.perimeter {
+            Some(perimeter) if perimeter < (1.0 - SLACK) * least_perimeter(grid, volume) => {
+                Err(Error::PerimeterTooSmall {
+                    perimeter,
+                    volume,
+                    least: least_perimeter(grid, volume),
+                    reduced_volume: reduced_volume(D, perimeter, volume),
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The targets in proportion to what is measured on another grid: `u` is a phase field of this one, `other` of that.
+    pub(crate) fn carried<const D: usize>(
+        &self,
+        u: &Field<D>,
+        other: &Field<D>,
+        eps: f64,
+    ) -> Result<Self, Error> {
+        let (here, there) = (Self::keeping(u, eps)?, Self::keeping(other, eps)?);
+        let carried = |target: Option<f64>, here: Option<f64>, there: Option<f64>| {
+            Some(target? * there? / here?)
+        };
+        Ok(Self {
+            perimeter: carried(self.perimeter, here.perimeter, there.perimeter),
+            volume: carried(self.volume, here.volume, there.volume),
+        })
+    }
+}
+
+/// Perimeter and volume during one minimization.
+pub(crate) struct Held<'a, const D: usize> {
+    grid: Grid<D>,
+    eps: f64,
+    targets: [Option<f64>; 2],
+    region: Option<&'a Region<D>>,
+    device: &'a ComputeDevice,
+    multipliers: [f64; 2],
+    /// Whether they are from a linear solve, which knows them better than an estimate does.
+    solved: bool,
+}
+
+/// A phase field that fulfils the constraints, with what they are like there.
+pub(crate) struct Place<const D: usize> {
+    pub(crate) u: Tensor<D>,
+    pub(crate) tangent: Option<Tangent<D>>,
+}
+
+/// The constraints at one phase field.
+pub(crate) struct Tangent<const D: usize> {
+    u: Field<D>,
+    sizes: Sizes<D>,
+    parts: Vec<Part>,
+}
+
+/// A measure that is held, at one phase field.
+#[derive(Clone, Copy)]
+struct Part {
+    /// Its place in [`NAMES`].
+    measure: usize,
+    value: f64,
+    target: f64,
+}
+
+impl<'a, const D: usize> Held<'a, D> {
+    /// Holds the constraints, if there are any, for phase fields of interface width `eps`.
+    pub(crate) fn new(
+        constraints: &Constraints,
+        grid: Grid<D>,
+        eps: f64,
+        region: Option<&'a Region<D>>,
+        device: &'a ComputeDevice,
+    ) -> Option<Self> {
+        (!constraints.is_empty()).then(|| Self {
+            grid,
+            eps,
+            targets: constraints.targets(),
+            region,
+            device,
+            multipliers: [0.0; 2],
+            solved: false,
+        })
+    }
+
+    /// Multipliers of perimeter and volume in the energy that was minimized; zero where nothing is held.
+    pub(crate) fn multipliers(&self) -> [f64; 2] {
+        self.multipliers
+    }
+
+    fn tolerance(&self) -> f64 {
+        TOLERANCE.max(ROUNDINGS * self.device.epsilon())
+    }
+
+    /// The smallest motion, as a root mean square, that means anything.
+    pub(crate) fn noise(&self) -> f64 {
+        NOISE * self.tolerance()
+    }
+
+    /// What is missing to the targets, by the multipliers: with it, the energy does not depend to first order on how exactly they are met.
+    pub(crate) fn excess(&self, tangent: &Tangent<D>) -> f64 {
+        let multipliers = self.multipliers();
+        let parts = tangent.parts.iter();
+        parts
+            .map(|part| multipliers[part.measure] * (part.value - part.target))
+            .sum()
+    }
+
+    /// The phase field near `u` that fulfils the constraints, if there is one. Moves it by displacements of the interface;
+    /// `hold` puts back what may not move.
+    pub(crate) fn restored(
+        &self,
+        mut u: Tensor<D>,
+        hold: impl Fn(Tensor<D>) -> Tensor<D>,
+    ) -> Result<Option<Place<D>>, Error> {
+        let tolerance = self.tolerance();
+        for _ in 0..CORRECTIONS {
+            let values = self.device.values(u.clone())?;
+            let Ok(field) = Field::from_values(self.grid, values) else {
+                return Ok(None);
+            };
+            let tangent = self.tangent(field)?;
+            if tangent.violation() <= tolerance {
+                let tangent = Some(tangent);
+                return Ok(Some(Place { u, tangent }));
+            }
+            let Some(motion) = self.correction(&tangent) else {
+                return Ok(None);
+            };
+            let motion = self.device.tensor(&motion, self.grid.shape());
+            u = hold(retract(&u, &motion, 1.0));
+        }
+        Ok(None)
+    }
+
+    /// The error where nothing near `u` fulfils the constraints.
+    pub(crate) fn lost(&self, u: &Tensor<D>) -> Result<Error, Error> {
+        let field = Field::from_values(self.grid, self.device.values(u.clone())?)?;
+        let parts = self.tangent(field)?.parts;
+        let worst = parts
+            .iter()
+            .max_by(|a, b| a.violation().total_cmp(&b.violation()));
+        let (measure, value, target) = match worst {
+            Some(part) => (NAMES[part.measure], part.value, part.target),
+            None => (NAMES[0], f64::NAN, f64::NAN),
+        };
+        Ok(Error::NotHeld {
+            step: 0,
+            measure,
+            value,
+            target,
+        })
+    }
+
+    fn tangent(&self, u: Field<D>) -> Result<Tangent<D>, Error> {
+        let sizes = Sizes::of(&u, self.eps)?;
+        let values = [sizes.perimeter(), sizes.volume()];
+        let held = self.targets.iter().zip(values).enumerate();
+        let parts = held.filter_map(|(measure, (target, value))| {
+            target.map(|target| Part {
+                measure,
+                value,
+                target,
+            })
+        });
+        Ok(Tangent {
+            parts: parts.collect(),
+            sizes,
+            u,
+        })
+    }
+
+    /// The derivatives of a measure by the values that may move.
+    fn gradient(&self, tangent: &Tangent<D>, part: Part) -> Vec<f64> {
+        let gradient = match part.measure {
+            0 => tangent.sizes.perimeter_gradient(),
+            _ => tangent.sizes.volume_gradient(),
+        };
+        self.inside(gradient)
+    }
+
+    /// The motion that restores a measure: a displacement of the interface, times `1 - u^2`.
+    fn motion(&self, tangent: &Tangent<D>, part: Part) -> Vec<f64> {
+        let well = |u: &f64| (1.0 - u * u).max(0.0);
+        let wells = tangent.u.values().iter().map(well);
+        if part.measure == 1 {
+            return self.inside(wells.collect());
+        }
+        // Sharper bends than the interface is wide are corners.
+        let most = self.eps.recip();
+        let curvature = tangent.sizes.mean_curvature();
+        let bends = curvature.iter().map(|k| k.clamp(-most, most));
+        self.inside(wells.zip(bends).map(|(well, k)| well * k).collect())
+    }
+
+    /// Zero where nothing may move.
+    fn inside(&self, mut values: Vec<f64>) -> Vec<f64> {
+        if let Some(region) = self.region {
+            for (value, inside) in values.iter_mut().zip(region.nodes()) {
+                if !inside {
+                    *value = 0.0;
+                }
+            }
+        }
+        values
+    }
+
+    /// The motion to first order that restores the constraints; none if they depend on each other, or on nothing that may move.
+    fn correction(&self, tangent: &Tangent<D>) -> Option<Vec<f64>> {
+        let parts = &tangent.parts;
+        let gradients: Vec<_> = parts
+            .iter()
+            .map(|part| self.gradient(tangent, *part))
+            .collect();
+        let motions: Vec<_> = parts
+            .iter()
+            .map(|part| self.motion(tangent, *part))
+            .collect();
+        let factors = solve(
+            parts.len(),
+            |row| parts[row].target - parts[row].value,
+            |row, column| product(&gradients[row], &motions[column]),
+        )?;
+        let mut motion = vec![0.0; tangent.u.values().len()];
+        for (direction, factor) in motions.iter().zip(factors) {
+            for (sum, value) in motion.iter_mut().zip(direction) {
+                *sum += factor * value;
+            }
+        }
+        // On the interface, where 1 - u^2 > 1/2, the displacement is the motion over 1 - u^2.
+        let wells = tangent.u.values().iter().map(|u| 1.0 - u * u);
+        let shifts = motion.iter().zip(wells).filter(|(_, well)| *well > 0.5);
+        let longest = shifts.fold(0.0, |longest: f64, (motion, well)| {
+            longest.max((motion / well).abs())
+        });
+        if longest > LONGEST {
+            for value in &mut motion {
+                *value *= LONGEST / longest;
+            }
+        }
+        Some(motion)
+    }
+
+    /// The multipliers for which the Lagrangian does not change along the motions that restore the constraints.
+    fn estimate(&self, tangent: &Tangent<D>, gradients: &[Vec<f64>], force: &[f64]) -> [f64; 2] {
+        let parts = &tangent.parts;
+        let motions: Vec<_> = parts
+            .iter()
+            .map(|part| self.motion(tangent, *part))
+            .collect();
+        let found = solve(
+            parts.len(),
+            |row| -product(force, &motions[row]),
+            |row, column| product(&gradients[column], &motions[row]),
+        );
+        let mut multipliers = [0.0; 2];
+        for (part, value) in parts.iter().zip(found.unwrap_or_default()) {
+            multipliers[part.measure] = value;
+        }
+        multipliers
+    }
+
+    /// Solves for the motion that minimizes the quadratic model of `objective`, with this gradient at its point, among those tangential to
+    /// the constraints. With `keep`, what is found out about the multipliers is remembered.
+    pub(crate) fn solve(
+        &mut self,
+        objective: &mut impl Objective<D>,
+        (gradient, tangent): (&Tensor<D>, &Tangent<D>),
+        precondition: &dyn Fn(&Tensor<D>) -> Tensor<D>,
+        limits: CgLimits,
+        keep: bool,
+    ) -> Result<CgSolution<D>, Error> {
+        let parts = &tangent.parts;
+        let gradients: Vec<_> = parts
+            .iter()
+            .map(|part| self.gradient(tangent, *part))
+            .collect();
+        if !self.solved {
+            let force = self.device.values(gradient.clone())?;
+            self.multipliers = self.estimate(tangent, &gradients, &force);
+        }
+        let multipliers = self.multipliers;
+        let working = objective.product_dtype().unwrap_or(gradient.dtype());
+        let (mut lagrangian, mut normals) = (gradient.clone(), Vec::new());
+        for (part, values) in parts.iter().zip(&gradients) {
+            let normal = self.device.tensor::<D>(values, self.grid.shape());
+            lagrangian = lagrangian + normal.clone() * multipliers[part.measure];
+            normals.push((part.measure, normal.cast(working)));
+        }
+        let projection = Projection::new(normals, precondition, self.device)?;
+        let mut objective = Lagrangian {
+            objective,
+            curvature: Arc::new(Curvature(tangent.sizes.second_derivative(multipliers))),
+            region: self.region,
+        };
+        let projected = |r: &Tensor<D>| projection.apply(precondition(r));
+        let solution =
+            conjugate_gradients(&mut objective, &lagrangian, &projected, limits, self.device)?;
+        if keep {
+            self.solved = solution.exit != CgExit::NegativeCurvature;
+        }
+        if keep && self.solved {
+            let change = projection.multipliers(&solution.residual, self.device)?;
+            for (multiplier, change) in self.multipliers.iter_mut().zip(change) {
+                *multiplier += change;
+            }
+        }
+        Ok(solution)
+    }
+}
+
+impl Part {
+    fn violation(&self) -> f64 {
+        (self.value / self.target - 1.0).abs()
+    }
+}
+
+impl<const D: usize> Tangent<D> {
+    fn violation(&self) -> f64 {
+        let violations = self.parts.iter().map(Part::violation);
+        // A NaN must not pass for zero.
+        violations.fold(0.0, |worst, v| if v <= worst { worst } else { v })
+    }
+}
+
+/// Solves a system of one or two equations.
+fn solve(
+    equations: usize,
+    right: impl Fn(usize) -> f64,
+    matrix: impl Fn(usize, usize) -> f64,
+) -> Option<[f64; 2]> {
+    if equations == 1 {
+        let pivot = matrix(0, 0);
+        return (pivot != 0.0).then(|| [right(0) / pivot, 0.0]);
+    }
+    let [[a, b], [c, d]] = [0, 1].map(|row| [matrix(row, 0), matrix(row, 1)]);
+    let determinant = a * d - b * c;
+    let (r, s) = (right(0), right(1));
+    let independent = determinant.abs() > DEPENDENT * (a * d).abs();
+    independent.then(|| [(d * r - b * s) / determinant, (a * s - c * r) / determinant])
+}
+
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// The projection `P - P A (A^T P A)^-1 A^T P` of a preconditioner.
+struct Projection<const D: usize> {
+    /// Combinations of the gradients that are orthonormal with respect to `P`.
+    normals: Vec<Normal<D>>,
+}
+
+struct Normal<const D: usize> {
+    vector: Tensor<D>,
+    preconditioned: Tensor<D>,
+    /// The vector as a combination of the gradients of perimeter and volume.
+    combination: [f64; 2],
+}
+
+impl<const D: usize> Projection<D> {
+    /// Onto the motions that are orthogonal to `gradients`, each with its place in [`NAMES`].
+    fn new(
+        gradients: Vec<(usize, Tensor<D>)>,
+        precondition: &dyn Fn(&Tensor<D>) -> Tensor<D>,
+        device: &ComputeDevice,
+    ) -> Result<Self, Error> {
+        let mut normals: Vec<Normal<D>> = Vec::new();
+        for (measure, mut vector) in gradients {
+            let mut preconditioned = precondition(&vector);
+            let whole = dot(&vector, &preconditioned, device)?;
+            let mut combination = [0.0; 2];
+            combination[measure] = 1.0;
+            for other in &normals {
+                let along = dot(&other.preconditioned, &vector, device)?;
+                vector = vector - other.vector.clone() * along;
+                preconditioned = preconditioned - other.preconditioned.clone() * along;
+                for (c, o) in combination.iter_mut().zip(other.combination) {
+                    *c -= along * o;
+                }
+            }
+            let square = dot(&vector, &preconditioned, device)?;
+            if square > whole * DEPENDENT {
+                let factor = square.sqrt().recip();
+                normals.push(Normal {
+                    vector: vector * factor,
+                    preconditioned: preconditioned * factor,
+                    combination: combination.map(|c| c * factor),
+                });
+            }
+        }
+        Ok(Self { normals })
+    }
+
+    /// Takes the part out of a preconditioned vector that changes the measures.
+    fn apply(&self, mut z: Tensor<D>) -> Tensor<D> {
+        for normal in &self.normals {
+            let along = inner_product(&normal.vector, &z).cast(z.dtype());
+            z = z - normal.preconditioned.clone() * along.reshape([1; D]);
+        }
+        z
+    }
+
+    /// The multipliers with which the gradients make up the residual, as far as they can.
+    fn multipliers(&self, residual: &Tensor<D>, device: &ComputeDevice) -> Result<[f64; 2], Error> {
+        let mut multipliers = [0.0; 2];
+        for normal in &self.normals {
+            let along = dot(&normal.preconditioned, residual, device)?;
+            for (multiplier, part) in multipliers.iter_mut().zip(normal.combination) {
+                *multiplier += along * part;
+            }
+        }
+        Ok(multipliers)
+    }
+}
+
+/// An objective with the second derivative of the constraints, times multipliers, added to its own.
+struct Lagrangian<'a, const D: usize, O> {
+    objective: &'a mut O,
+    curvature: Arc<Curvature<D>>,
+    region: Option<&'a Region<D>>,
+}
+
+/// Adds a product with the second derivative of the constraints.
+struct Curvature<const D: usize>(SizeHessian<D>);
+
+impl<const D: usize> HostUpdate for Curvature<D> {
+    fn update(&self, vectors: HostVectors<'_>) {
+        match vectors {
+            HostVectors::Double(p, product) => {
+                self.0
+                    .multiply(|node| p[node], |node, value| product[node] += value);
+            }
+            HostVectors::Single(p, product) => self.0.multiply(
+                |node| f64::from(p[node]),
+                |node, value| product[node] += value as f32,
+            ),
+        }
+    }
+}
+
+impl<const D: usize, O: Objective<D>> Objective<D> for Lagrangian<'_, D, O> {
+    fn value(&mut self, u: &Tensor<D>) -> Result<f64, Error> {
+        self.objective.value(u)
+    }
+
+    fn evaluate(&mut self, u: &Tensor<D>) -> Result<(f64, Tensor<D>), Error> {
+        self.objective.evaluate(u)
+    }
+
+    fn hessian_vector_product(&mut self, p: &Tensor<D>) -> Result<Tensor<D>, Error> {
+        let product = self.objective.hessian_vector_product(p)?;
+        let product = update_on_host(p, product, &self.curvature);
+        Ok(match self.region {
+            Some(region) => region.project(product),
+            None => product,
+        })
+    }
+
+    fn product_dtype(&self) -> Option<DType> {
+        self.objective.product_dtype()
+    }
+
+    fn unit(&self) -> f64 {
+        self.objective.unit()
+    }
+
+    fn hold(&self, u: Tensor<D>) -> Tensor<D> {
+        self.objective.hold(u)
+    }
+}

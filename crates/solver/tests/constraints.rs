@@ -1,0 +1,351 @@
+//! Flows with perimeter and volume held.
+
+use crate::common::{ball, device, network, params};
+use geometry::shapes::{Ball, Ellipse};
+use geometry::zero_set::reduced_volume;
+use geometry::{Field, Grid, SignedDistance, ZeroSet, phase_field};
+use model::{Ratios, Shipped};
+use solver::{Constraints, Error, Exit, StepRecord, WillmoreFlow};
+
+/// The ellipsoid of revolution about the third axis.
+struct Spheroid(Ellipse);
+
+impl SignedDistance<3> for Spheroid {
+    fn signed_distance(&self, [x, y, z]: [f64; 3]) -> f64 {
+        self.0.signed_distance([x.hypot(y), z])
+    }
+}
+
+const BOTH: [bool; 2] = [true, true];
+const PERIMETER: [bool; 2] = [true, false];
+const VOLUME: [bool; 2] = [false, true];
+
+fn plane() -> Grid<2> {
+    Grid::per_unit(128, 1.0).unwrap()
+}
+
+fn ellipse(a: f64, b: f64) -> Field<2> {
+    let grid = plane();
+    phase_field(grid, &Ellipse::new([a, b]).unwrap(), params(&grid).eps).unwrap()
+}
+
+fn measured<const D: usize>(u: &Field<D>) -> ZeroSet {
+    ZeroSet::of(u, params(u.grid()).eps).unwrap()
+}
+
+/// A calibrated flow, free.
+fn free<const D: usize>(u: &Field<D>) -> WillmoreFlow<D> {
+    let ratios = Ratios {
+        dimension: D,
+        width: 17,
+        eps_over_h: 2.0,
+        step_over_h2: 1.0,
+    };
+    let network = Shipped::Accurate.find(ratios).unwrap();
+    let mut params = params(u.grid());
+    params.calibration = network.calibration().unwrap().factors;
+    WillmoreFlow::with_network(&network, u, params, &device()).unwrap()
+}
+
+/// A flow that keeps perimeter or volume or both.
+fn keeping<const D: usize>(u: &Field<D>, [perimeter, volume]: [bool; 2]) -> WillmoreFlow<D> {
+    let all = Constraints::keeping(u, params(u.grid()).eps).unwrap();
+    let mut flow = free(u);
+    flow.constrain(Constraints {
+        perimeter: all.perimeter.filter(|_| perimeter),
+        volume: all.volume.filter(|_| volume),
+    })
+    .unwrap();
+    flow
+}
+
+/// Steps with the largest relative drift of what is held.
+fn run<const D: usize>(
+    flow: &mut WillmoreFlow<D>,
+    held: [bool; 2],
+    tau: f64,
+    steps: usize,
+) -> (Vec<StepRecord>, f64) {
+    let start = measured(&flow.field().unwrap());
+    let mut drift: f64 = 0.0;
+    let records = (0..steps).map(|_| {
+        let record = flow.advance(tau).unwrap();
+        let now = measured(&flow.field().unwrap());
+        let pairs = [(now.perimeter, start.perimeter), (now.volume, start.volume)];
+        for ((now, start), _) in pairs.into_iter().zip(held).filter(|(_, held)| *held) {
+            drift = drift.max((now / start - 1.0).abs());
+        }
+        record
+    });
+    (records.collect(), drift)
+}
+
+fn products(records: &[StepRecord]) -> f64 {
+    records.iter().map(StepRecord::hvp).sum()
+}
+
+#[test]
+fn fifty_steps_do_not_drift_and_cost_what_free_ones_do() {
+    let u = ellipse(0.35, 0.2);
+    let tau = plane().spacing().powi(2);
+    let cost = products(&run(&mut free(&u), [false; 2], tau, 20).0);
+    for held in [VOLUME, PERIMETER, BOTH] {
+        let mut flow = keeping(&u, held);
+        let (records, drift) = run(&mut flow, held, tau, 50);
+        assert!(drift < 1e-11, "{held:?}: {drift:e}");
+        let moving = |pair: &&[StepRecord]| pair[1].energy < pair[1].energy_before * (1.0 - 1e-6);
+        let falls = |pair: &[StepRecord]| pair[1].willmore_energy < pair[0].willmore_energy;
+        let mut steps = records.windows(2).take_while(moving);
+        assert!(steps.clone().count() > 3 && steps.all(falls), "{records:?}");
+        let [tension, pressure] = [records[0].tension, records[0].pressure];
+        assert_eq!([tension.is_some(), pressure.is_some()], held);
+        if held != BOTH {
+            // Both together are at rest after ten steps.
+            let ratio = products(&records[..20]) / cost;
+            assert!(ratio < 1.25, "{held:?}: {ratio}");
+        }
+    }
+}
+
+#[test]
+fn an_ellipse_of_kept_area_becomes_a_disc() {
+    let u = ellipse(0.3, 0.22);
+    let mut flow = keeping(&u, VOLUME);
+    run(&mut flow, VOLUME, 32.0 * plane().spacing().powi(2), 4);
+    let end = measured(&flow.field().unwrap());
+    let round = reduced_volume(2, end.perimeter, end.volume);
+    assert!(round > 1.0 - 1e-5, "{round}");
+    let radius = (0.3_f64 * 0.22).sqrt();
+    let exact = std::f64::consts::PI / radius;
+    assert!((end.willmore_energy / exact - 1.0).abs() < 1e-3, "{end:?}");
+}
+
+/// `w` of a disc is `pi / R`: pressure `1/(2 R^3)`, tension `1/(2 R^2)`, up to the scheme's own energy at `eps / R = .08` and .05.
+#[test]
+fn multipliers_of_discs_are_the_exact_ones() {
+    let tau = plane().spacing().powi(2);
+    for (radius, bound) in [(0.2, 0.02), (0.3, 0.011)] {
+        let u = ball(plane(), radius);
+        let last = |held| run(&mut keeping(&u, held), held, tau, 2).0[1];
+        let pressure = last(VOLUME).pressure.unwrap() * 2.0 * radius.powi(3);
+        let tension = last(PERIMETER).tension.unwrap() * 2.0 * radius.powi(2);
+        assert!((pressure - 1.0).abs() < bound, "{pressure}");
+        assert!((tension - 1.0).abs() < bound, "{tension}");
+    }
+}
+
+/// At rest the energy changes with the targets by minus the multipliers.
+#[test]
+fn multipliers_are_derivatives_of_the_energy_at_rest() {
+    let u = ellipse(0.3, 0.2);
+    let all = Constraints::keeping(&u, params(u.grid()).eps).unwrap();
+    let at_rest = |perimeter: f64, volume: f64| {
+        let mut flow = free(&u);
+        flow.constrain(Constraints {
+            perimeter: all.perimeter.map(|p| p * perimeter),
+            volume: all.volume.map(|v| v * volume),
+        })
+        .unwrap();
+        let tau = 32.0 * plane().spacing().powi(2);
+        // The targets are not those of the start.
+        flow.advance(tau / 32.0).unwrap();
+        (0..4)
+            .fold(None, |_, _| Some(flow.advance(tau).unwrap()))
+            .unwrap()
+    };
+    let rest = at_rest(1.0, 1.0);
+    let by_perimeter = at_rest(1.002, 1.0).willmore_energy - at_rest(0.998, 1.0).willmore_energy;
+    let by_volume = at_rest(1.0, 1.002).willmore_energy - at_rest(1.0, 0.998).willmore_energy;
+    for (change, target, multiplier) in [
+        (by_perimeter, all.perimeter, rest.tension),
+        (by_volume, all.volume, rest.pressure),
+    ] {
+        let slope = change / (0.004 * target.unwrap());
+        let sum = slope / multiplier.unwrap() + 1.0;
+        assert!(sum.abs() < 0.01, "{slope} {multiplier:?}");
+    }
+}
+
+#[test]
+fn a_spheroid_keeps_its_volume_in_space() {
+    let grid = Grid::<3>::per_unit(32, 1.0).unwrap();
+    let shape = Spheroid(Ellipse::new([0.3, 0.24]).unwrap());
+    let u = phase_field(grid, &shape, params(&grid).eps).unwrap();
+    let tau = 0.25 * grid.spacing().powi(2);
+    let cost = products(&run(&mut free(&u), [false; 2], tau, 4).0);
+    let (records, drift) = run(&mut keeping(&u, VOLUME), VOLUME, tau, 4);
+    assert!(drift < 1e-11, "{drift:e}");
+    assert!(products(&records) < 1.5 * cost);
+    for record in records {
+        assert_eq!(record.newton.exit, Exit::Converged, "{record:?}");
+        assert!(record.energy < record.energy_before);
+    }
+}
+
+#[test]
+fn a_target_that_moves_is_met_in_every_step() {
+    let u = ball(plane(), 0.25);
+    let mut flow = free(&u);
+    let area = measured(&u).volume;
+    for step in 1..=4 {
+        let target = area * (1.0 - 0.01 * f64::from(step));
+        flow.constrain(Constraints {
+            volume: Some(target),
+            ..Constraints::default()
+        })
+        .unwrap();
+        flow.advance(plane().spacing().powi(2)).unwrap();
+        let found = measured(&flow.field().unwrap()).volume;
+        assert!((found / target - 1.0).abs() < 1e-11);
+    }
+    flow.constrain(Constraints::default()).unwrap();
+    let record = flow.advance(plane().spacing().powi(2)).unwrap();
+    assert_eq!((record.tension, record.pressure), (None, None));
+}
+
+#[test]
+fn constraints_hold_in_regions_and_in_second_order_steps() {
+    let u = ellipse(0.3, 0.2);
+    let tau = 0.25 * plane().spacing().powi(2);
+    let mut flow = keeping(&u, BOTH);
+    let right: Vec<bool> = (0..u.grid().len())
+        .map(|i| u.grid().node(i)[0] > -0.1)
+        .collect();
+    flow.restrict_to(&right).unwrap();
+    let (_, drift) = run(&mut flow, BOTH, tau, 3);
+    assert!(drift < 1e-11, "{drift:e}");
+    let end = flow.field().unwrap();
+    let pairs = end.values().iter().zip(u.values()).zip(&right);
+    for ((now, before), _) in pairs.filter(|(_, inside)| !**inside) {
+        assert_eq!(now.to_bits(), before.to_bits());
+    }
+
+    let mut flow = keeping(&u, BOTH);
+    let start = measured(&u);
+    for _ in 0..3 {
+        let (record, _) = flow.advance_second_order(tau, |_| true).unwrap();
+        assert!(record.tension.is_some() && record.pressure.is_some());
+        let now = measured(&flow.field().unwrap());
+        assert!((now.volume / start.volume - 1.0).abs() < 1e-11);
+        assert!((now.perimeter / start.perimeter - 1.0).abs() < 1e-11);
+    }
+}
+
+#[test]
+fn a_restored_flow_continues_with_the_same_bytes() {
+    let u = ellipse(0.3, 0.2);
+    let tau = plane().spacing().powi(2);
+    let held = Constraints::keeping(&u, params(u.grid()).eps).unwrap();
+    let mut flow = free(&u);
+    flow.constrain(held).unwrap();
+    run(&mut flow, BOTH, tau, 2);
+    let mut other = free(&u);
+    other.constrain(held).unwrap();
+    other.restore(&flow.state().unwrap()).unwrap();
+    let records = [&mut flow, &mut other].map(|flow| flow.advance(tau).unwrap());
+    assert_eq!(records[0].pressure, records[1].pressure);
+    assert_eq!(records[0].tension, records[1].tension);
+    assert_eq!(flow.field().unwrap(), other.field().unwrap());
+}
+
+#[test]
+fn half_grids_are_held_too() {
+    let grid = Grid::<2>::per_unit(256, 0.75).unwrap();
+    let eps = 4.0 * grid.spacing();
+    let ratios = Ratios {
+        dimension: 2,
+        width: 33,
+        eps_over_h: 4.0,
+        step_over_h2: 4.0,
+    };
+    let network = Shipped::Accurate.find(ratios).unwrap();
+    let params = solver::FlowParams {
+        eps,
+        mcf_step: 4.0 * grid.spacing().powi(2),
+        newton: solver::NewtonParams::default(),
+        calibration: network.calibration().unwrap().factors,
+    };
+    let u = phase_field(grid, &Ellipse::new([0.25, 0.15]).unwrap(), eps).unwrap();
+    let mut flow = WillmoreFlow::with_network(&network, &u, params, &device()).unwrap();
+    assert!(flow.begin_on_half_grids(&network).unwrap() > 0);
+    let held = Constraints::keeping(&u, eps).unwrap();
+    flow.constrain(Constraints {
+        perimeter: None,
+        ..held
+    })
+    .unwrap();
+    for _ in 0..2 {
+        let record = flow.advance(params.mcf_step).unwrap();
+        assert_eq!(record.start.kind, solver::StartKind::HalfGrid);
+        let now = ZeroSet::of(&flow.field().unwrap(), eps).unwrap();
+        assert!((now.volume / held.volume.unwrap() - 1.0).abs() < 1e-11);
+    }
+}
+
+#[test]
+fn targets_that_cannot_be_are_refused() {
+    let u = ball(plane(), 0.2);
+    let mut flow = free(&u);
+    let refused = |flow: &mut WillmoreFlow<2>, perimeter, volume| {
+        flow.constrain(Constraints { perimeter, volume })
+            .unwrap_err()
+    };
+    for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let error = refused(&mut flow, Some(value), None);
+        assert!(matches!(error, Error::Parameter { .. }), "{error}");
+    }
+    let error = refused(&mut flow, None, Some(1.0));
+    assert!(matches!(error, Error::VolumeTooLarge { .. }), "{error}");
+    let error = refused(&mut flow, Some(1.0), Some(0.1));
+    assert!(matches!(error, Error::PerimeterTooSmall { .. }), "{error}");
+    assert!(error.to_string().contains("reduced volume"), "{error}");
+    // A disc is as round as can be, and a strip across the box has a shorter boundary than a large disc.
+    flow.constrain(Constraints::keeping(&u, params(&plane()).eps).unwrap())
+        .unwrap();
+    flow.constrain(Constraints {
+        perimeter: Some(2.1),
+        volume: Some(0.5),
+    })
+    .unwrap();
+
+    // What cannot be reached in a step leaves the flow where it was.
+    flow.constrain(Constraints {
+        perimeter: Some(40.0),
+        volume: None,
+    })
+    .unwrap();
+    let before = flow.field().unwrap();
+    let error = flow.advance(plane().spacing().powi(2)).unwrap_err();
+    assert!(
+        matches!(
+            error,
+            Error::NotHeld {
+                step: 1,
+                measure: "perimeter",
+                ..
+            }
+        ),
+        "{error}"
+    );
+    assert_eq!(flow.field().unwrap(), before);
+}
+
+#[test]
+fn any_network_and_shape_keeps_its_area() {
+    // The paper's energy, uncalibrated, and two discs.
+    let grid = plane();
+    let discs = geometry::SignedDistanceExt::union(
+        Ball::new([-0.25, 0.0], 0.15).unwrap(),
+        Ball::new([0.25, 0.0], 0.12).unwrap(),
+    );
+    let u = phase_field(grid, &discs, params(&grid).eps).unwrap();
+    let mut flow = WillmoreFlow::with_network(&network(), &u, params(&grid), &device()).unwrap();
+    let all = Constraints::keeping(&u, params(&grid).eps).unwrap();
+    flow.constrain(Constraints {
+        perimeter: None,
+        ..all
+    })
+    .unwrap();
+    let (_, drift) = run(&mut flow, VOLUME, grid.spacing().powi(2), 3);
+    assert!(drift < 1e-11, "{drift:e}");
+}
