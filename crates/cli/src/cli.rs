@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
@@ -272,6 +273,62 @@ pub struct SayOptions {
     pub json: bool,
 }
 
+/// What a size is to become.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SizeTarget {
+    /// What it is at the beginning.
+    Keep,
+    /// A value in the units of the input.
+    Value(f64),
+    /// A part of what it is at the beginning, in percent.
+    Percent(f64),
+}
+
+impl SizeTarget {
+    /// The value, for a size that is `now` at the beginning.
+    pub fn of(self, now: f64) -> f64 {
+        match self {
+            Self::Keep => now,
+            Self::Value(value) => value,
+            Self::Percent(percent) => percent / 100.0 * now,
+        }
+    }
+}
+
+impl FromStr for SizeTarget {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |text: &str| match text.parse::<f64>() {
+            Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+            _ => Err(format!(
+                "{text:?} is no positive number; give keep, a value, or a part of the beginning in percent, such as 90%"
+            )),
+        };
+        match (text, text.strip_suffix('%')) {
+            ("keep", _) => Ok(Self::Keep),
+            (_, Some(percent)) => number(percent).map(Self::Percent),
+            (value, None) => number(value).map(Self::Value),
+        }
+    }
+}
+
+impl fmt::Display for SizeTarget {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Keep => f.write_str("keep"),
+            Self::Value(value) => write!(f, "{value}"),
+            Self::Percent(percent) => write!(f, "{percent}%"),
+        }
+    }
+}
+
+impl Serialize for SizeTarget {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
 /// Options of `flow`.
 #[derive(Args, Serialize, Clone, Debug)]
 pub struct FlowOptions {
@@ -291,6 +348,18 @@ pub struct FlowOptions {
     /// The time error of controlled steps that is allowed, as a part of how far the surface moves [default: 0.02]
     #[arg(long, value_name = "PART", allow_hyphen_values = true)]
     pub tolerance: Option<f64>,
+
+    /// Hold the volume (the area of a plane shape): keep, a VALUE in the units of the input, or PERCENT of that at the beginning, as 90%
+    #[arg(long, value_name = "TARGET")]
+    pub volume: Option<SizeTarget>,
+
+    /// Hold the area of the surface (the length of a plane curve): keep, VALUE, or PERCENT, as 105%
+    #[arg(long, value_name = "TARGET")]
+    pub area: Option<SizeTarget>,
+
+    /// Steps over which --volume and --area go to their targets [default: 20]
+    #[arg(long, value_name = "STEPS")]
+    pub ramp: Option<usize>,
 
     /// Stop after this many steps [default: 20, or 1000 where something else ends the run]
     #[arg(long, value_name = "COUNT")]

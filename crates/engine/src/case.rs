@@ -7,7 +7,7 @@ use runs::fingerprint;
 use serde_json::{Value, json};
 use solver::FlowParams;
 
-use crate::{Error, Flow, Measure, Operator, Scales, Stop, TimeSteps};
+use crate::{Error, Flow, Held, Measure, Operator, Scales, Stop, TimeSteps};
 
 /// A flow with everything that its result depends on, but for the device.
 #[derive(Clone, Debug)]
@@ -18,6 +18,8 @@ pub struct Case<const D: usize> {
     pub initial: Field<D>,
     /// The nodes whose values may move, if not all.
     pub region: Option<Vec<bool>>,
+    /// The sizes that are held; mean curvature flow holds none.
+    pub held: Held,
     /// Mean curvature flow or Willmore flow.
     pub flow: Flow,
     /// The step of mean curvature flow, and the weights of the energy.
@@ -89,7 +91,7 @@ impl<const D: usize> Case<D> {
         };
         let marks = |nodes: &Vec<bool>| -> Vec<u8> { nodes.iter().map(|&n| u8::from(n)).collect() };
         let names: Vec<&str> = self.measures.iter().map(Measure::name).collect();
-        json!({
+        let mut identity = json!({
             "version": env!("CARGO_PKG_VERSION"),
             "device": format!("{} {:?}", device.kind(), device.dtype()).to_lowercase(),
             "grid": { "dimension": D, "cells": grid.cells(), "side": grid.side(), "origin": grid.origin().to_vec() },
@@ -101,6 +103,10 @@ impl<const D: usize> Case<D> {
             "steps": self.steps,
             "stops": self.stops,
             "measures": names,
-        })
+        });
+        if !self.held.is_empty() {
+            identity["held"] = json!(self.held);
+        }
+        identity
     }
 }

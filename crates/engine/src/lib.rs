@@ -1,7 +1,7 @@
 //! Cases of Willmore flow and mean curvature flow, run and resumed by one loop over time steps.
 //!
 //! ```
-//! use engine::{Case, Flow, Measure, Operator, Run, Scales, Scheme, StepRule, Stop};
+//! use engine::{Case, Flow, Held, Measure, Operator, Run, Scales, Scheme, StepRule, Stop};
 //! use geometry::{Grid, phase_field, shapes::Cuboid};
 //! use model::Networks;
 //! use operators::ComputeDevice;
@@ -16,6 +16,7 @@
 //!     shape: "square of side 1/2".to_owned(),
 //!     initial: phase_field(grid, &Cuboid::new([0.25; 2])?, scales.eps)?,
 //!     region: None,
+//!     held: Held::default(),
 //!     flow: Flow::Willmore,
 //!     operator: Operator::learned(Scheme::Accurate, network)?,
 //!     scales,
@@ -34,7 +35,7 @@
 //! # }
 //! ```
 //!
-//! A [`Case`] is everything that a result depends on: initial phase field, region, operator, scales, time steps, stop rules, measures.
+//! A [`Case`] is everything that a result depends on: initial phase field, region, sizes that are held, operator, scales, time steps, stop rules, measures.
 //! A [`Run`] computes a case, and [`Run::advance`] is the only loop over time steps. The solver knows nothing of files, progress or
 //! shapes; [observers](Observer) are called after each accepted step. A [`Store`] keeps a run on disk: one checkpoint
 //! holds the phase fields and all records, and a run that is resumed from it ends with the same bytes.
@@ -50,6 +51,7 @@
 mod case;
 mod control;
 mod error;
+mod held;
 mod measure;
 mod motion;
 mod observer;
@@ -65,6 +67,7 @@ mod trajectory;
 pub use case::Case;
 pub use control::ErrorControl;
 pub use error::Error;
+pub use held::{Held, Target};
 pub use measure::{DISPLACEMENT, Measure};
 pub use observer::{Event, Observer, Samples};
 pub use operator::{Flow, Method, Operator, Scales, Scheme, quarter_square};

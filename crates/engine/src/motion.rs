@@ -5,7 +5,7 @@ use geometry::Field;
 use operators::ComputeDevice;
 use solver::{FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow};
 
-use crate::{Case, Error, Flow, Method, Order};
+use crate::{Case, Error, Flow, Held, Method, Order};
 
 /// The solver's flow of a case, between two steps.
 pub(crate) struct Motion<const D: usize> {
@@ -13,6 +13,7 @@ pub(crate) struct Motion<const D: usize> {
     /// The finite-element step inside, for its statistics.
     elements: Option<FiniteElementStep<D>>,
     order: Order,
+    held: Held,
 }
 
 enum Either<const D: usize> {
@@ -50,6 +51,7 @@ impl<const D: usize> Motion<D> {
                 if let Some(region) = &case.region {
                     flow.restrict_to(region)?;
                 }
+                flow.constrain(case.held.targets())?;
                 flow.restore(state)?;
                 Either::Willmore(Box::new(flow))
             }
@@ -69,16 +71,21 @@ impl<const D: usize> Motion<D> {
             flow,
             elements,
             order: case.steps.order,
+            held: case.held,
         })
     }
 
-    /// One time step of this size, or one step of mean curvature flow, whose size is that of its operator. A step of second order is made
+    /// The time step with this number and of this size, or one step of mean curvature flow, whose size is that of its operator. A step of second order is made
     /// only if `accept` takes it; the second value says so.
     pub(crate) fn advance(
         &mut self,
+        step: usize,
         size: f64,
         accept: impl FnOnce(&StepRecord) -> bool,
     ) -> Result<(Option<StepRecord>, bool), solver::Error> {
+        if let Either::Willmore(flow) = &mut self.flow {
+            flow.constrain(self.held.at(step))?;
+        }
         match &mut self.flow {
             Either::Willmore(flow) if self.order == Order::First => {
                 Ok((Some(flow.advance(size)?), true))

@@ -82,8 +82,21 @@ pub fn to_csv(records: &[Record]) -> String {
     let names: BTreeSet<&str> = names.map(String::as_str).collect();
     let head = ["step", "time", "tau"];
     let energies = ["energy_before", "energy", "willmore_energy"];
+    let multipliers: [(&str, fn(&StepRecord) -> Option<f64>); 2] = [
+        ("tension", |made| made.tension),
+        ("pressure", |made| made.pressure),
+    ];
+    let held =
+        |of: fn(&StepRecord) -> Option<f64>| minimizations(records).any(|made| of(made).is_some());
+    let multipliers: Vec<_> = multipliers
+        .into_iter()
+        .filter(|(_, of)| held(*of))
+        .collect();
     let tail = ["newton", "hvp", "halvings"];
-    let columns = head.iter().chain(&energies).chain(&names).chain(&tail);
+    let columns = head.iter().chain(&energies).chain(&names);
+    let columns = columns
+        .chain(multipliers.iter().map(|(name, _)| name))
+        .chain(&tail);
     let mut text = columns.copied().collect::<Vec<_>>().join(",") + "\n";
     let number = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
     for record in records {
@@ -97,6 +110,11 @@ pub fn to_csv(records: &[Record]) -> String {
             number(made.map(|m| m.willmore_energy)),
         ];
         row.extend(names.iter().map(|name| number(record.measure(name))));
+        row.extend(
+            multipliers
+                .iter()
+                .map(|(_, of)| number(made.and_then(|m| of(&m)))),
+        );
         row.push(made.map_or(String::new(), |m| m.newton.newton.to_string()));
         row.push(number(record.hvp()));
         row.push(record.halvings.to_string());

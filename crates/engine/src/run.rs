@@ -200,7 +200,7 @@ impl<const D: usize> Run<D> {
                 shorter = self.control.shorter(made).filter(|_| halvings < most);
                 shorter.is_none()
             };
-            match self.motion.advance(size, accept) {
+            match self.motion.advance(self.control.step(), size, accept) {
                 Ok((minimization, true)) => {
                     let made = Attempt {
                         halvings,

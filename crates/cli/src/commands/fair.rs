@@ -6,7 +6,7 @@ use engine::{Scales, StepRule};
 use surfaces::Fairing;
 
 use super::flow::{FlowCommand, Shared};
-use crate::cli::{FairOptions, MeshFormat, SayOptions};
+use crate::cli::{FairOptions, MeshFormat, SayOptions, SizeTarget};
 use crate::error::Error;
 use crate::input::{self, Loaded};
 use crate::own::{Noise, OwnMesh};
@@ -105,6 +105,10 @@ impl FlowCommand for FairOptions {
 
     fn ends(&self) -> bool {
         self.noise.is_some() || self.energy_ratio.is_some() || !self.ends
+    }
+
+    fn targets(&self) -> ([Option<SizeTarget>; 2], usize) {
+        self.flow.targets()
     }
 
     fn tolerance(&self) -> Option<f64> {

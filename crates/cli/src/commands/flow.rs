@@ -3,9 +3,11 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use engine::{Case, ErrorControl, Flow, Measure, Method, Scales, StepRule, Stop, TimeSteps};
-use geometry::Field;
+use engine::{
+    Case, ErrorControl, Flow, Held, Measure, Method, Scales, StepRule, Stop, Target, TimeSteps,
+};
 use geometry::measure::{perimeter, zero_set_volume};
+use geometry::{Field, ZeroSet};
 use operators::ComputeDevice;
 use runs::StoredRun;
 use serde::Serialize;
@@ -14,6 +16,7 @@ use solver::NewtonParams;
 use super::{open_device, operator};
 use crate::cli::{
     CommonOptions, FlowOptions, InputOptions, KeepOptions, MeshFormat, SayOptions, SchemeOptions,
+    SizeTarget,
 };
 use crate::config;
 use crate::error::Error;
@@ -26,6 +29,8 @@ use crate::run::Plan;
 const STEPS: usize = 20;
 /// In a step the interface moves by at most so many widths of it.
 const LONGEST_MOVE: f64 = 2.0;
+/// Steps over which sizes go to their targets.
+const RAMP: usize = 20;
 /// What can be saved.
 const SAVED: [&str; 5] = ["ply", "obj", "stl", "png", "svg"];
 
@@ -81,6 +86,11 @@ pub trait FlowCommand: Serialize {
         None
     }
 
+    /// What volume and area of the zero set are to become, and over how many steps.
+    fn targets(&self) -> ([Option<SizeTarget>; 2], usize) {
+        ([None; 2], RAMP)
+    }
+
     /// Format of meshes.
     fn format(&self) -> Option<MeshFormat> {
         None
@@ -119,6 +129,10 @@ impl FlowCommand for FlowOptions {
 
     fn tolerance(&self) -> Option<f64> {
         self.tolerance
+    }
+
+    fn targets(&self) -> ([Option<SizeTarget>; 2], usize) {
+        ([self.volume, self.area], self.ramp.unwrap_or(RAMP))
     }
 
     fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
@@ -201,6 +215,41 @@ impl Shared<'_> {
         stops.extend([Stop::NoSurface, Stop::Vanished, Stop::AtTheSide]);
         stops
     }
+}
+
+/// Perimeter and volume of the zero set to four digits; where it bends too sharply for that, of the phase field.
+fn sizes<const D: usize>(u: &Field<D>, eps: f64) -> Result<[f64; 2], geometry::Error> {
+    let zero_set = ZeroSet::of(u, eps)?;
+    if zero_set.sizes_hold() {
+        return Ok([zero_set.perimeter, zero_set.volume]);
+    }
+    Ok([perimeter(u, eps)?, zero_set_volume(u)])
+}
+
+/// The sizes that are held, from what they are at the beginning.
+fn held<const D: usize>(
+    ([volume, area], ramp): ([Option<SizeTarget>; 2], usize),
+    initial: &Field<D>,
+    eps: f64,
+) -> Result<Held, Error> {
+    if volume.is_none() && area.is_none() {
+        return Ok(Held::default());
+    }
+    let now = ZeroSet::of(initial, eps)?;
+    let target = |wanted: Option<SizeTarget>, from: f64| {
+        wanted.map(|wanted| match wanted {
+            SizeTarget::Keep => Target::keep(from),
+            other => Target {
+                from,
+                to: other.of(from),
+                over: ramp,
+            },
+        })
+    };
+    Ok(Held {
+        perimeter: target(area, now.perimeter),
+        volume: target(volume, now.volume),
+    })
 }
 
 /// Makes a run, or continues one that is stored.
@@ -318,14 +367,16 @@ impl<C: FlowCommand> Job<C> {
             _ => (scales.eps, ["area", "volume"]),
         };
         let mut measures = vec![
-            Measure::new(boundary, move |u, _| perimeter(u, eps).map(Some)),
-            Measure::new(inside, |u, _| Ok(Some(zero_set_volume(u)))),
+            Measure::new(boundary, move |u, _| sizes(u, eps).map(|s| Some(s[0]))),
+            Measure::new(inside, move |u, _| sizes(u, eps).map(|s| Some(s[1]))),
         ];
         measures.extend(outlet.measures(&initial, scales.eps)?);
+        let held = held(self.command.targets(), &initial, eps)?;
         Ok(Case {
             shape: name.to_owned(),
             initial,
             region,
+            held,
             flow: C::FLOW,
             operator,
             scales,

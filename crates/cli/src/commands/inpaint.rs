@@ -4,7 +4,7 @@ use engine::{Scales, StepRule};
 use surfaces::shapes::Region;
 
 use super::flow::{FlowCommand, Shared};
-use crate::cli::InpaintOptions;
+use crate::cli::{InpaintOptions, SizeTarget};
 use crate::error::Error;
 use crate::input::{self, Loaded, Start};
 
@@ -48,6 +48,10 @@ impl FlowCommand for InpaintOptions {
                 Loaded::Space(self.restrict(start, region)?)
             }
         })
+    }
+
+    fn targets(&self) -> ([Option<SizeTarget>; 2], usize) {
+        self.flow.targets()
     }
 
     fn tolerance(&self) -> Option<f64> {

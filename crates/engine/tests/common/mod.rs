@@ -1,7 +1,7 @@
 //! Small cases.
 
 use engine::{
-    Case, Flow, Measure, Method, Operator, Run, Scales, Scheme, StepRule, Stop, TimeSteps,
+    Case, Flow, Held, Measure, Method, Operator, Run, Scales, Scheme, StepRule, Stop, TimeSteps,
 };
 use geometry::shapes::{Ball, Cuboid};
 use geometry::{Field, Grid, phase_field};
@@ -58,6 +58,7 @@ pub fn case(flow: Flow, method: Method, initial: Field<2>) -> Case<2> {
         shape: "shape".to_owned(),
         initial,
         region: None,
+        held: Held::default(),
         flow,
         operator: operator.unwrap(),
         scales: scales(),
