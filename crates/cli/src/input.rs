@@ -144,7 +144,9 @@ pub fn closed(path: &Path, repairs: bool, say: SayOptions) -> Result<ClosedMesh,
         return Ok(repaired.mesh);
     }
     let (mesh, warnings) = ClosedMesh::new(mesh).map_err(Error::mesh)?;
-    warnings.iter().for_each(|warning| warn(warning));
+    for warning in &warnings {
+        warn(warning);
+    }
     Ok(mesh)
 }
 
