@@ -382,10 +382,6 @@ pub struct FlowOptions {
 }
 
 /// Options of `fair`.
-#[expect(
-    clippy::struct_excessive_bools,
-    reason = "each is an option of its own"
-)]
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct FairOptions {

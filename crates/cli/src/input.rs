@@ -72,7 +72,7 @@ const MOST_LOST: f64 = 0.25;
 /// Rays by which the thickness of a mesh is measured.
 const MOST_RAYS: usize = 4096;
 /// Cells along a mesh that is repaired.
-const REPAIR_CELLS: usize = 160;
+const REPAIR_CELLS: usize = 112;
 /// Images with more than this part of their pixels between two tones are no drawings.
 const PHOTOGRAPH: f64 = 0.05;
 /// Memory of a flow, measured at 128 and 192 cells.
@@ -144,7 +144,9 @@ pub fn closed(path: &Path, repairs: bool, say: SayOptions) -> Result<ClosedMesh,
         return Ok(repaired.mesh);
     }
     let (mesh, warnings) = ClosedMesh::new(mesh).map_err(Error::mesh)?;
-    warnings.iter().for_each(|warning| warn(warning));
+    for warning in &warnings {
+        warn(warning);
+    }
     Ok(mesh)
 }
 

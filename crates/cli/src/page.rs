@@ -5,7 +5,7 @@
 
 use std::fmt::Write;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use engine::METRICS;
 use geometry::UpAxis;
@@ -21,6 +21,7 @@ use surfaces::TriangleMesh;
 use crate::cli::MeshFormat;
 use crate::config;
 use crate::error::Error;
+use crate::input::extension;
 use crate::outlet;
 use crate::own;
 
@@ -139,7 +140,7 @@ impl Files<'_> {
     fn frames(&self) -> Result<Option<Frames>, Error> {
         let files = self.run.files();
         let names: Vec<&str> = files
-            .filter(|f| f.starts_with(outlet::FRAMES) && f.ends_with(".png"))
+            .filter(|f| f.starts_with(outlet::FRAMES) && extension(Path::new(f)) == "png")
             .collect();
         if names.is_empty() {
             return Ok(None);

@@ -164,10 +164,11 @@ impl Outlet<2> for Plane {
     }
 
     fn save(&self, u: &Field<2>, eps: f64, path: &Path) -> Result<(), Error> {
-        Ok(match &*extension(path) {
+        match &*extension(path) {
             "svg" => self.svg(u)?.write(path)?,
             _ => self.picture(u, u, eps)?.write_png(path)?,
-        })
+        }
+        Ok(())
     }
 
     fn inputs(&self) -> Result<Vec<(&str, Vec<u8>)>, Error> {

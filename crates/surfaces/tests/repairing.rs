@@ -97,7 +97,7 @@ fn what_crosses_itself_becomes_one() {
 #[test]
 fn a_closed_mesh_stays_as_it_is() {
     let lever = samples::lever(64).unwrap();
-    let repaired = repair(lever.mesh(), 96).unwrap();
+    let repaired = repair(lever.mesh(), 64).unwrap();
     assert_eq!(
         repaired.mesh.euler_characteristic(),
         lever.euler_characteristic()

@@ -53,20 +53,22 @@ pub fn run(mut options: SampleOptions, say: SayOptions) -> Result<ExitCode, Erro
     } = &options.input;
     let on_grid =
         options.resample || cells.is_some() || box_side.is_some() || side_length.is_some();
-    if is_mesh && options.without.is_empty() && !on_grid {
-        if let Some(from) = input::mesh_file(&mut options.input)? {
-            let mut mesh = if options.input.repair {
-                input::closed(&from, true, say)?.into_mesh()
-            } else {
-                surfaces::read(&from)?
-            };
-            if noise > 0.0 {
-                mesh.normals = Some(mesh.vertex_normals());
-                mesh.roughen(noise, options.seed);
-            }
-            surfaces::write(&path, &mesh)?;
-            return done();
+    if is_mesh
+        && options.without.is_empty()
+        && !on_grid
+        && let Some(from) = input::mesh_file(&mut options.input)?
+    {
+        let mut mesh = if options.input.repair {
+            input::closed(&from, true, say)?.into_mesh()
+        } else {
+            surfaces::read(&from)?
+        };
+        if noise > 0.0 {
+            mesh.normals = Some(mesh.vertex_normals());
+            mesh.roughen(noise, options.seed);
         }
+        surfaces::write(&path, &mesh)?;
+        return done();
     }
     match input::load(&mut options.input, EPS_OVER_H, say)? {
         Loaded::Plane(start, _) => write(start, options, &path)?,
