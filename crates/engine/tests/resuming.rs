@@ -146,7 +146,10 @@ fn a_controlled_run_continues_with_the_same_bytes() {
     let root = tempfile::tempdir().unwrap();
     let mut controlled = case(Flow::Willmore, Method::Hybrid, square(128));
     controlled.steps = TimeSteps {
-        order: Order::Controlled(ErrorControl::default()),
+        order: Order::Controlled(ErrorControl {
+            relative: 0.002,
+            ..ErrorControl::default()
+        }),
         ..StepRule::Ramp {
             tau: 2.0 * TAU,
             halvings: 1,

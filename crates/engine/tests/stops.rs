@@ -29,7 +29,7 @@ fn energies_and_vanishing_end_a_run() {
 
 #[test]
 fn a_shape_that_comes_to_the_side_ends_a_run_unless_it_was_there_before() {
-    let mut growing = case(Flow::Willmore, Method::Hybrid, disc(128, 0.34));
+    let mut growing = case(Flow::Willmore, Method::Hybrid, disc(128, 0.32));
     growing.steps = StepRule::ByEnergy(Some(16.0 * TAU)).into();
     growing.stops = vec![Stop::Steps(40), Stop::AtTheSide];
     let run = finished(growing.clone());

@@ -27,21 +27,21 @@ struct Sample {
 const SAMPLES: [Sample; 3] = [
     Sample {
         key: "cross",
-        title: "Cross [-.8,.8] x [-.27,.27]",
+        title: "Cross",
         side: 2.0,
         initial: |grid, eps| phase_field(grid, &Cross::new(0.8, 0.27)?, eps),
         exact: || reference::Shape::cross(0.8, 0.27),
     },
     Sample {
         key: "rectangle",
-        title: "Rectangle with sides .4 and .2",
+        title: "Rectangle",
         side: 1.25,
         initial: |grid, eps| phase_field(grid, &Cuboid::new([0.2, 0.1])?, eps),
         exact: || reference::Shape::rectangle(0.2, 0.1),
     },
     Sample {
         key: "ellipse",
-        title: "Ellipse with half axes .3 and .2",
+        title: "Ellipse",
         side: 1.25,
         initial: |grid, eps| phase_field(grid, &Ellipse::new([0.3, 0.2])?, eps),
         exact: || reference::Shape::ellipse(0.3, 0.2),
@@ -305,12 +305,12 @@ impl Sample {
     }
 }
 
-/// The controlled runs at both `eps`, extrapolated, by shape and mark.
+/// The strictly controlled runs at both `eps`, extrapolated, by shape and mark.
 fn extrapolations(rows: &[Compared]) -> BTreeMap<(&'static str, usize), Sizes> {
     let mut all = BTreeMap::new();
     let controlled = |n| {
         rows.iter()
-            .filter(move |row| row.n == n && row.stepping == "controlled")
+            .filter(move |row| row.n == n && row.stepping == "controlled_strict")
     };
     for single in controlled(CELLS[1]) {
         let same = |row: &&Compared| (row.sample, row.mark) == (single.sample, single.mark);
