@@ -247,7 +247,8 @@ impl<O> Plan<O> {
             Some(stop) => format!(": {stop}"),
         };
         let mut text = vec![format!(
-            "{steps} steps to t = {time:.4e} in {seconds:.1} s{reason}"
+            "{} to t = {time:.4e} in {seconds:.1} s{reason}",
+            counted(steps)
         )];
         if let (Some(first), Some(energy)) = (number("first_energy"), number("energy")) {
             let spheres = number("energy_over_8_pi");
@@ -256,10 +257,8 @@ impl<O> Plan<O> {
                 "Willmore energy {energy:.5}{spheres}, before {first:.5}"
             ));
         }
-        if let (Some(error), Some(path)) = (
-            outcome["time_steps"]["estimated_error"].as_f64(),
-            outcome["time_steps"]["path"].as_f64(),
-        ) {
+        let of_steps = |name: &str| outcome["time_steps"][name].as_f64();
+        if let (Some(error), Some(path)) = (of_steps("estimated_error"), of_steps("path")) {
             text.push(format!(
                 "time error about {error:.1e} (estimated), after a way of {path:.3}"
             ));
@@ -395,7 +394,13 @@ fn free_folder(name: &str) -> PathBuf {
         .expect("some number is free")
 }
 
-/// What controlled steps say of themselves: the sum of their estimated errors, the way of the place that moves farthest in each, and the
+/// A number of steps in words.
+fn counted(steps: u64) -> String {
+    let plural = if steps == 1 { "" } else { "s" };
+    format!("{steps} step{plural}")
+}
+
+/// What controlled steps say of themselves: the sum of their estimated errors (the first steps have none), the way of the place that moves farthest in each, and the
 /// longest displacement of a stage in interface widths.
 fn time_accuracy(records: &[Record], eps: f64) -> Option<Value> {
     let made = |record: &Record| record.minimization?.estimates;
@@ -404,8 +409,9 @@ fn time_accuracy(records: &[Record], eps: f64) -> Option<Value> {
         return None;
     }
     let longest = estimates.iter().map(|e| e.displacement).fold(0.0, f64::max);
+    let errors: Vec<f64> = estimates.iter().filter_map(|e| e.error).collect();
     Some(json!({
-        "estimated_error": estimates.iter().filter_map(|e| e.error).sum::<f64>(),
+        "estimated_error": (!errors.is_empty()).then(|| errors.iter().sum::<f64>()),
         "path": estimates.iter().map(|e| e.motion).sum::<f64>(),
         "longest_displacement_in_widths": longest / eps,
     }))

@@ -9,7 +9,7 @@ const RUN: [&str; 8] = [
     "flow",
     "builtin:cube",
     "--cells",
-    "24",
+    "40",
     "--steps",
     "3",
     "--frames",
@@ -28,7 +28,7 @@ fn page(folder: &Path, run: &str) -> String {
 fn a_run_in_space_has_a_page_with_a_surface_to_turn() {
     let folder = tempfile::tempdir().unwrap();
     // Also where the mesh is kept without normals.
-    let fair = ["fair", "builtin:cube", "--cells", "24", "--steps", "3"];
+    let fair = ["fair", "builtin:cube", "--cells", "40", "--steps", "3"];
     let stl = ["--format", "stl", "--output", "stl"];
     outcome(folder.path(), &with(&["--output", "ply"]));
     outcome(folder.path(), &[&fair[..], &stl].concat());

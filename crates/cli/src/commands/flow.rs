@@ -352,6 +352,9 @@ impl<C: FlowCommand> Job<C> {
                 };
                 let mut control = ErrorControl::default();
                 control.relative = self.command.tolerance().unwrap_or(control.relative);
+                // On coarse grids the usual first step is long against the shape.
+                let shorter = scales.mcf_step * unit.powi(2) / 16.0;
+                control.first = Some(shorter.min(16.0 * scales.eps.powi(4)));
                 TimeSteps::controlled(control)
             }
             rule => TimeSteps {
