@@ -14,6 +14,7 @@ use report::Summary;
 const CALIBRATION: &str = env!("CARGO_BIN_EXE_calibration");
 const CIRCLES: &str = env!("CARGO_BIN_EXE_circle_convergence");
 const DENOISING: &str = env!("CARGO_BIN_EXE_denoising");
+const ELASTICA: &str = env!("CARGO_BIN_EXE_elastica");
 const INPAINTING: &str = env!("CARGO_BIN_EXE_inpainting_2d");
 const LEARNED: &str = env!("CARGO_BIN_EXE_learned_networks");
 const CROSS: &str = env!("CARGO_BIN_EXE_cross");
@@ -24,6 +25,7 @@ const TIMING: &str = env!("CARGO_BIN_EXE_timing_tables");
 const SPHERES: &str = env!("CARGO_BIN_EXE_spheres");
 const DISK_AND_CUBE: &str = env!("CARGO_BIN_EXE_disk_and_cube");
 const TRAIN: &str = env!("CARGO_BIN_EXE_train_networks");
+const VESICLES: &str = env!("CARGO_BIN_EXE_vesicles");
 
 #[test]
 fn devices_that_are_unknown_or_not_compiled_in() {
@@ -489,6 +491,32 @@ fn the_quick_timing_table_has_a_row_for_every_method() {
         assert!(number("seconds") >= number("measured_seconds"), "{row}");
     }
     assert!(metric("armadillo.hybrid.hvp") >= 1.0 && metric("armadillo.fe_implicit.hvp") >= 1.0);
+}
+
+#[test]
+fn an_elastic_curve_keeps_its_length_and_area_and_has_the_exact_energy() {
+    let root = tempfile::tempdir().unwrap();
+    let summary = quick_summary(ELASTICA, root.path());
+    let metric = |name: &str| summary.get(&format!("elastica.q0.95.{name}")).unwrap();
+    let close = |name: &str, exact: &str, tolerance: f64| {
+        let (value, exact) = (metric(name), metric(exact));
+        assert!(
+            (value / exact - 1.0).abs() < tolerance,
+            "{name}: {value}, exact {exact}"
+        );
+    };
+    close("w_over_circle", "exact", 1e-3);
+    close("tension", "exact_tension", 0.02);
+    close("pressure", "exact_pressure", 0.02);
+    assert!(metric("length_drift") < 1e-9 && metric("area_drift") < 1e-9);
+}
+
+#[test]
+#[ignore = "a whole quick run: see scripts/test_long"]
+fn the_quick_vesicle_keeps_its_area_and_volume() {
+    let root = tempfile::tempdir().unwrap();
+    let summary = quick_summary(VESICLES, root.path());
+    assert!(summary.get("vesicles.prolate.v0.95.w_over_8pi").unwrap() < 1.3);
 }
 
 /// The metrics of a quick run into the folder `out`.
