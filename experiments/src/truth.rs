@@ -311,6 +311,15 @@ impl Reached {
     }
 }
 
+/// The largest distance of points to a closed polygon.
+pub fn largest_distance(points: &[[f64; 2]], polygon: &[[f64; 2]]) -> f64 {
+    let distance = |p: &[f64; 2]| {
+        let q = nearest(polygon, *p);
+        (p[0] - q[0]).hypot(p[1] - q[1])
+    };
+    points.iter().map(distance).fold(0.0, f64::max)
+}
+
 /// The nearest point of a closed polygon.
 fn nearest(polygon: &[[f64; 2]], p: [f64; 2]) -> [f64; 2] {
     let foot = |k: usize| {

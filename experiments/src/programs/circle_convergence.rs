@@ -84,7 +84,14 @@ fn program(options: &Options) -> Result<(), Error> {
         let ensemble = session.phase(title, |stage| {
             stage.bar.set_length(count as u64);
             let folder = finished.as_path();
-            Ensemble::run(planned, (count, steps), stage.device, folder, &stage.bar)
+            Ensemble::run(
+                planned,
+                (count, steps),
+                None,
+                stage.device,
+                folder,
+                &stage.bar,
+            )
         })?;
         ensembles.push(ensemble);
     }
