@@ -16,11 +16,8 @@ static FONT: LazyLock<FontRef<'static>> = LazyLock::new(|| {
     FontRef::try_from_slice(dejavu::sans::regular()).expect("the embedded font is well formed")
 });
 
-/// Families named in SVG files: the embedded one, the one with the same metrics, then any.
-const SVG_FAMILY: &str = "DejaVu Sans, Verdana, sans-serif";
-
 /// Distance from the middle of the capitals to the baseline, in em.
-const HALF_CAPITAL: f64 = 0.365;
+pub(crate) const HALF_CAPITAL: f64 = 0.365;
 
 /// Distance from the top anchor of the drawing backends to the baseline, in em.
 const TOP_TO_BASELINE: f64 = 0.76;
@@ -134,9 +131,8 @@ impl BackendTextStyle for TextStyle {
         RGBColor(r, g, b).to_backend_color()
     }
 
-    /// The SVG backend divides by 1.24 to get `font-size`.
     fn size(&self) -> f64 {
-        self.em * 1.24
+        self.em
     }
 
     fn transform(&self) -> FontTransform {
@@ -152,7 +148,7 @@ impl BackendTextStyle for TextStyle {
     }
 
     fn family(&self) -> FontFamily<'_> {
-        FontFamily::Name(SVG_FAMILY)
+        FontFamily::SansSerif
     }
 
     fn layout_box(&self, text: &str) -> Result<((i32, i32), (i32, i32)), Self::FontError> {
