@@ -1,12 +1,13 @@
 //! Figures as PNG files, drawn by the bitmap backend of plotters at three times their size and averaged, which smooths every edge alike.
 
 use plotters::prelude::{BitMapBackend, Color, DrawingBackend, RGBColor};
+use plotters_backend::text_anchor::HPos;
 use plotters_backend::{BackendCoord, DrawingErrorKind};
 use srgb::Rgb;
 
 use crate::colour::WHITE;
 use crate::error::{Error, Result};
-use crate::font::TextStyle;
+use crate::font::{self, TextStyle};
 use crate::geom::{self, Point, Rect, dash, point};
 use crate::style::Marker;
 use crate::surface::{PNG_SCALE, Surface};
@@ -105,14 +106,32 @@ impl Surface for PngSurface<'_> {
     }
 
     fn text(&mut self, line: &str, at: Point, style: TextStyle) -> Result<()> {
-        let anchor = if style.vertical {
-            point(at.x - style.rise(), at.y)
-        } else {
-            point(at.x, at.y - style.rise())
+        let (em, rise) = (style.em * Self::SCALE, style.rise());
+        let width = font::width(line, em).round() as i32;
+        let start = match style.align {
+            HPos::Left => 0,
+            HPos::Center => -width / 2,
+            HPos::Right => -width,
         };
-        let em = style.em * Self::SCALE;
-        let style = TextStyle { em, ..style };
-        drawn(self.backend.draw_text(line, &style, sampled(anchor)))
+        let top = if style.vertical {
+            sampled(point(at.x - rise, at.y))
+        } else {
+            sampled(point(at.x, at.y - rise))
+        };
+        let (Rgb(r, g, b), mut result) = (style.colour, Ok(()));
+        font::rasterize(line, em, |along, down, covered| {
+            let along = start + along;
+            let (x, y) = if style.vertical {
+                (top.0 + down, top.1 - along)
+            } else {
+                (top.0 + along, top.1 + down)
+            };
+            let ink = RGBColor(r, g, b).mix(f64::from(covered).min(1.0));
+            if result.is_ok() {
+                result = self.backend.draw_pixel((x, y), ink.to_backend_color());
+            }
+        });
+        drawn(result)
     }
 
     fn image(&mut self, area: Rect, columns: usize, cells: &[Rgb], _: bool) -> Result<()> {
