@@ -94,7 +94,6 @@ fn program(options: &Options) -> Result<(), Error> {
     session.figure(discs_figure(&discs), "discs")?;
     let output = &session.output;
     output.write_json("diagnostics.json", &diagnosed)?;
-    output.write_json("discs.json", &discs)?;
     output.write_csv("discs.csv", &discs)?;
     output.write_csv("surfaces.csv", &surfaces)?;
     let learned = all

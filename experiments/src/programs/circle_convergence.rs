@@ -266,8 +266,6 @@ impl Report {
             }
         }
         let steps = steps::table(&[&Variant::COLUMNS[1..], &["radius"]].concat(), &runs)?;
-        output.write("curves.json", curves.to_json()?)?;
-        output.write("steps.json", steps.to_json()?)?;
         for (name, table) in [("curves", curves), ("circles", circles), ("steps", steps)] {
             output.write(&format!("{name}.csv"), table.to_csv()?)?;
         }

@@ -3,14 +3,15 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
+use chacha20::ChaCha8Rng;
+
 use crate::meshes::{folder, sampled};
 use crate::prelude::*;
 use crate::surfaces::{centred_box, willmore_flow};
 use engine::{DISPLACEMENT, Stop};
 use geometry::{Placement, SignedDistance, UpAxis, optimal_profile};
 use model::Networks;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use render::{Scene, View};
 use report::Raster;
 use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, samples, usual_up_axis};

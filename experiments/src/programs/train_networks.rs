@@ -201,7 +201,6 @@ impl Trainings<'_> {
         session.figure(figure(&all), "learning_curves")?;
         let rows: Vec<CurveRow> = all.iter().flat_map(Finished::curve).collect();
         session.output.write_csv("learning_curves.csv", &rows)?;
-        session.output.write_json("learning_curves.json", &rows)?;
         for one in &all {
             session
                 .summary
