@@ -90,7 +90,7 @@ impl<const D: usize> Case<D> {
                 .collect()
         };
         let marks = |nodes: &Vec<bool>| -> Vec<u8> { nodes.iter().map(|&n| u8::from(n)).collect() };
-        let names: Vec<&str> = self.measures.iter().map(Measure::name).collect();
+        let names: Vec<&str> = self.measures.iter().flat_map(Measure::names).collect();
         let mut identity = json!({
             "version": env!("CARGO_PKG_VERSION"),
             "device": format!("{} {:?}", device.kind(), device.dtype()).to_lowercase(),

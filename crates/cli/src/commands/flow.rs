@@ -6,7 +6,6 @@ use std::process::ExitCode;
 use engine::{
     Case, ErrorControl, Flow, Held, Measure, Method, Scales, StepRule, Stop, Target, TimeSteps,
 };
-use geometry::measure::{perimeter, zero_set_volume};
 use geometry::{Field, ZeroSet};
 use operators::ComputeDevice;
 use runs::StoredRun;
@@ -217,15 +216,6 @@ impl Shared<'_> {
     }
 }
 
-/// Perimeter and volume of the zero set to four digits; where it bends too sharply for that, of the phase field.
-fn sizes<const D: usize>(u: &Field<D>, eps: f64) -> Result<[f64; 2], geometry::Error> {
-    let zero_set = ZeroSet::of(u, eps)?;
-    if zero_set.sizes_hold() {
-        return Ok([zero_set.perimeter, zero_set.volume]);
-    }
-    Ok([perimeter(u, eps)?, zero_set_volume(u)])
-}
-
 /// The sizes that are held, from what they are at the beginning.
 fn held<const D: usize>(
     ([volume, area], ramp): ([Option<SizeTarget>; 2], usize),
@@ -365,15 +355,9 @@ impl<C: FlowCommand> Job<C> {
         let mut stops = self.command.shared().stops(rule);
         stops.extend(self.command.energy_ratio().map(Stop::EnergyRatio));
         stops.extend(outlet.stops(&initial));
-        let (eps, [boundary, inside]) = match D {
-            2 => (scales.eps, ["length", "area"]),
-            _ => (scales.eps, ["area", "volume"]),
-        };
-        let mut measures = vec![
-            Measure::new(boundary, move |u, _| sizes(u, eps).map(|s| Some(s[0]))),
-            Measure::new(inside, move |u, _| sizes(u, eps).map(|s| Some(s[1]))),
-        ];
-        measures.extend(outlet.measures(&initial, scales.eps)?);
+        let eps = scales.eps;
+        let mut measures = vec![Measure::zero_set(eps)];
+        measures.extend(outlet.measures(&initial, eps)?);
         let held = held(self.command.targets(), &initial, eps)?;
         Ok(Case {
             shape: name.to_owned(),
