@@ -47,6 +47,9 @@ impl<const D: usize> Motion<D> {
                 if let Some(network) = network.filter(|_| operator.half_grids) {
                     flow.begin_on_half_grids(network)?;
                 }
+                if !case.energy.is_willmore() {
+                    flow.set_energy(case.energy, operator.response)?;
+                }
                 if let Some(region) = &case.region {
                     flow.restrict_to(region)?;
                 }

@@ -67,6 +67,7 @@ impl<const D: usize> Run<D> {
             eps: case.scales.eps,
             mcf_step,
             largest: case.largest_step(),
+            least_energy: case.least_energy(),
         };
         let mut control = StepControl::new(case.steps, lengths, case.end())?;
         let (mut step_size, mut ramped) = (control.step_size(), 0.0);

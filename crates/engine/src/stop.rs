@@ -33,7 +33,7 @@ pub enum Stop {
     /// the box become stationary; longer steps count as that long.
     EnergyRate(f64),
     /// In space, the Willmore energy is less than half of that of a sphere, which no closed surface has: the phase field does not describe
-    /// a surface any more.
+    /// a surface any more. Says nothing with spontaneous curvature, tension or pressure.
     NoSurface,
     /// One of the two phases has vanished.
     Vanished,
@@ -89,7 +89,8 @@ impl Stop {
             }
             Self::NoSurface => {
                 let energy = last.and_then(Record::willmore_energy);
-                D == 3 && energy.is_some_and(|energy| energy < 4.0 * PI)
+                let bending = run.case.energy.is_willmore();
+                D == 3 && bending && energy.is_some_and(|energy| energy < 4.0 * PI)
             }
             Self::Vanished => !has_interface(run.field()),
             Self::AtTheSide => is_near_side(run.field()) && !is_near_side(&run.case.initial),
@@ -103,8 +104,10 @@ fn is_at_rest<const D: usize>(run: &Run<D>, test: impl Fn(f64, f64) -> bool) -> 
     last.is_some_and(|records| {
         records.iter().all(|record| {
             record.minimization.is_some_and(|made| {
-                let before = made.energy_at_rest();
-                test(record.tau, (1.0 - made.willmore_energy / before).abs())
+                test(
+                    record.tau,
+                    made.relative_drop(run.case.least_energy()).abs(),
+                )
             })
         })
     })
