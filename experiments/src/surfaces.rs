@@ -1,7 +1,7 @@
 //! Surfaces under Willmore flow: their scales, the shown steps of a run, and the pictures, tables and metrics of those.
 
 use clap::Args;
-use engine::{Held, Samples, Stop, Trajectory, energy_increases, mean_hvp};
+use engine::{Held, Helfrich, Samples, Stop, Trajectory, energy_increases, mean_hvp};
 use geometry::measure::BoundingBox;
 use model::NeededNetwork;
 use operators::memory;
@@ -93,6 +93,7 @@ pub fn willmore_flow<const D: usize>(
         shape: shape.to_owned(),
         initial,
         region: None,
+        energy: Helfrich::default(),
         held: Held::default(),
         flow: Flow::Willmore,
         operator,

@@ -85,6 +85,7 @@ const FLOW_EXAMPLES: &str = "Examples:
   willmore flow bunny.ply --steps 12 --output runs/bunny
   willmore flow logo.png --frames 1 --save smooth.svg
   willmore flow builtin:cube --tau doubling:1e-6 --steps 10
+  willmore flow builtin:coin --reduced-volume 0.64 --steps 40
 Lengths, areas, volumes and times (length^4) are in the units of the mesh, in pixels of the image, or in those of the box.
 The Willmore energy is 1/2 int h^2 dA in space, h the sum of the principal curvatures (a sphere has 8 pi, no closed surface less),
 and 1/2 int kappa^2 ds in the plane (a circle of radius R has pi / R).
@@ -357,9 +358,27 @@ pub struct FlowOptions {
     #[arg(long, value_name = "TARGET")]
     pub area: Option<SizeTarget>,
 
-    /// Steps over which --volume and --area go to their targets [default: 20]
+    /// Keep the area of the surface (the length) and change the volume to that with this reduced volume, above 0 and at most 1:
+    /// 6 sqrt(pi) V / A^(3/2), and 4 pi A / L^2 in the plane; a ball has 1, a red blood cell 0.64
+    #[arg(long, value_name = "PART", conflicts_with_all = ["volume", "area"])]
+    pub reduced_volume: Option<f64>,
+
+    /// Steps over which --volume, --area and --reduced-volume go to their targets [default: 20]
     #[arg(long, value_name = "STEPS")]
     pub ramp: Option<usize>,
+
+    /// The curvature c0 that bends for nothing, one over a length: the energy is 1/2 int (h - c0)^2 dA, h the sum of the principal
+    /// curvatures, positive for a ball [default: 0]
+    #[arg(long, value_name = "C0")]
+    pub spontaneous_curvature: Option<f64>,
+
+    /// Add this times the area of the surface (the length) to the energy; one over a length squared [default: 0]
+    #[arg(long, value_name = "SIGMA")]
+    pub tension: Option<f64>,
+
+    /// Add this times the volume (the area of a plane shape) to the energy; one over a length cubed [default: 0]
+    #[arg(long, value_name = "P")]
+    pub pressure: Option<f64>,
 
     /// Stop after this many steps [default: 20, or 1000 where something else ends the run]
     #[arg(long, value_name = "COUNT")]

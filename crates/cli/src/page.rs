@@ -168,7 +168,7 @@ impl Files<'_> {
             2 => [("length", "Length"), ("area", "Area")],
             _ => [("area", "Area"), ("volume", "Volume")],
         };
-        let energy = ("willmore_energy", "Willmore energy");
+        let energy = ("willmore_energy", "Energy");
         let mut figure = report::Figure::new("", 3);
         for (column, title) in std::iter::once(energy).chain(columns) {
             let mut points = points(table, column);
@@ -244,7 +244,11 @@ fn lead(outcome: Option<&Value>, table: &Table) -> String {
     let mut lead = format!("{step} steps to the time {time}.");
     let number = |name: &str| outcome[name].as_f64().map(five_digits);
     if let (Some(first), Some(last)) = (number("first_energy"), number("energy")) {
-        let _ = write!(lead, " Willmore energy {last}, before {first}.");
+        let name = match outcome["energy_terms"] {
+            Value::Null => "Willmore energy",
+            _ => "Energy",
+        };
+        let _ = write!(lead, " {name} {last}, before {first}.");
     }
     if outcome["components"] == 0 {
         lead += " The shape has vanished.";
@@ -299,8 +303,8 @@ fn facts(values: &Value) -> Facts {
 /// A key of the outcome or an option in words.
 fn named(key: &str) -> String {
     let known = match key {
-        "energy" => "Willmore energy",
-        "first_energy" => "Willmore energy at the beginning",
+        "first_energy" => "energy at the beginning",
+        "energy_terms" => "spontaneous curvature, tension and pressure",
         "energy_over_8_pi" => "Willmore energy over that of a sphere",
         "components" => "closed parts",
         "mesh" => "movement of the vertices",

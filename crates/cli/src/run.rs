@@ -219,7 +219,9 @@ impl<O> Plan<O> {
         if let (Some(first), Some(energy)) = (first.and_then(|r| r.minimization), energy) {
             outcome["first_energy"] = first.energy_at_rest().into();
             outcome["energy"] = energy.into();
-            if D == 3 {
+            if !case.energy.is_willmore() {
+                outcome["energy_terms"] = json!(case.energy);
+            } else if D == 3 {
                 outcome["energy_over_8_pi"] = (energy / (8.0 * PI)).into();
             }
         }
@@ -253,9 +255,11 @@ impl<O> Plan<O> {
         if let (Some(first), Some(energy)) = (number("first_energy"), number("energy")) {
             let spheres = number("energy_over_8_pi");
             let spheres = spheres.map_or(String::new(), |w| format!(" = {w:.4} x 8 pi"));
-            text.push(format!(
-                "Willmore energy {energy:.5}{spheres}, before {first:.5}"
-            ));
+            let name = match outcome["energy_terms"] {
+                Value::Null => "Willmore energy",
+                _ => "energy",
+            };
+            text.push(format!("{name} {energy:.5}{spheres}, before {first:.5}"));
         }
         let of_steps = |name: &str| outcome["time_steps"][name].as_f64();
         if let (Some(error), Some(path)) = (of_steps("estimated_error"), of_steps("path")) {
@@ -293,7 +297,7 @@ impl<O> Plan<O> {
             ),
             (
                 outcome["shortened_steps"].as_u64().unwrap_or(0) > 0,
-                "some steps were made shorter than they were to be, since the interface would have moved by more than 2 widths of it",
+                "some steps were made shorter than they were to be, since the interface would have moved by more than 2 widths of it, or could not keep its sizes",
             ),
             (
                 outcome["same_topology"] == false,

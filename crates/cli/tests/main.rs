@@ -4,6 +4,7 @@ mod commands;
 mod common;
 #[cfg(target_os = "linux")]
 mod disks;
+mod energies;
 mod examples;
 #[cfg(unix)]
 mod killed;

@@ -99,6 +99,37 @@ fn every_mistake_is_one_clear_line() {
         ),
         (&["flow", "builtin:disc", "--box-side=-1"], "side"),
         (
+            &["flow", "builtin:disc", "--reduced-volume", "1.2"],
+            "a reduced volume of 1.2 is not possible: a ball has 1",
+        ),
+        (
+            &[
+                "flow",
+                "builtin:disc",
+                "--reduced-volume",
+                "0.8",
+                "--area",
+                "keep",
+            ],
+            "cannot be used with",
+        ),
+        (
+            &["flow", "builtin:disc", "--volume", "100"],
+            "a volume of 100 does not fit a box of volume 4",
+        ),
+        (
+            &["flow", "builtin:disc", "--volume", "keep", "--area", "80%"],
+            "above 1; the perimeter has to be at least",
+        ),
+        (
+            &["flow", "builtin:disc", "--volume=-3%"],
+            "is no positive number; give keep, a value, or a part",
+        ),
+        (
+            &["flow", "builtin:disc", "--tension", "nan"],
+            "--tension NaN must be a finite number",
+        ),
+        (
             &["flow", "builtin:disc", "--steps", "0"],
             "--steps must be at least 1",
         ),

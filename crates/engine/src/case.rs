@@ -7,7 +7,7 @@ use runs::fingerprint;
 use serde_json::{Value, json};
 use solver::FlowParams;
 
-use crate::{Error, Flow, Held, Measure, Operator, Scales, Stop, TimeSteps};
+use crate::{Error, Flow, Held, Helfrich, Measure, Operator, Scales, Stop, TimeSteps};
 
 /// A flow with everything that its result depends on, but for the device.
 #[derive(Clone, Debug)]
@@ -18,6 +18,8 @@ pub struct Case<const D: usize> {
     pub initial: Field<D>,
     /// The nodes whose values may move, if not all.
     pub region: Option<Vec<bool>>,
+    /// Spontaneous curvature, tension and pressure in the energy; mean curvature flow has none.
+    pub energy: Helfrich,
     /// The sizes that are held; mean curvature flow holds none.
     pub held: Held,
     /// Mean curvature flow or Willmore flow.
@@ -72,6 +74,11 @@ impl<const D: usize> Case<D> {
         self.grid().side().powi(4) / 1024.0
     }
 
+    /// An energy below that of any closed curve in the box, or surface: changes of smaller ones are measured by it.
+    pub(crate) fn least_energy(&self) -> f64 {
+        self.grid().side().powi(D as i32 - 3)
+    }
+
     /// The time at which the flow ends, if there is one.
     pub(crate) fn end(&self) -> Option<f64> {
         self.stops.iter().find_map(|stop| match stop {
@@ -90,7 +97,7 @@ impl<const D: usize> Case<D> {
                 .collect()
         };
         let marks = |nodes: &Vec<bool>| -> Vec<u8> { nodes.iter().map(|&n| u8::from(n)).collect() };
-        let names: Vec<&str> = self.measures.iter().map(Measure::name).collect();
+        let names: Vec<&str> = self.measures.iter().flat_map(Measure::names).collect();
         let mut identity = json!({
             "version": env!("CARGO_PKG_VERSION"),
             "device": format!("{} {:?}", device.kind(), device.dtype()).to_lowercase(),
@@ -104,6 +111,9 @@ impl<const D: usize> Case<D> {
             "stops": self.stops,
             "measures": names,
         });
+        if !self.energy.is_willmore() {
+            identity["energy"] = json!(self.energy);
+        }
         if !self.held.is_empty() {
             identity["held"] = json!(self.held);
         }

@@ -17,6 +17,16 @@ pub enum Error {
         /// The range.
         expected: &'static str,
     },
+    /// A reduced volume that no shape has.
+    #[error(
+        "a reduced volume of {target} is not possible: a ball has 1, any other shape less, this one {present:.4} at the beginning"
+    )]
+    ReducedVolume {
+        /// What was asked for.
+        target: f64,
+        /// That of the initial shape.
+        present: f64,
+    },
     /// A time step that failed, with the case that it belongs to.
     #[error("{case}: {source}")]
     Step {

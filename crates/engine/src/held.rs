@@ -1,9 +1,14 @@
 //! Perimeter and volume held, or driven to targets.
 
+use geometry::zero_set::reduced_volume;
+use geometry::{Field, ZeroSet};
 use serde::{Deserialize, Serialize};
 use solver::Constraints;
 
-/// A size that goes from one value to another over so many steps, evenly, and is held there.
+use crate::Error;
+
+/// A size that goes from one value to another over so many steps, evenly, and is held there. A step that is made shorter, or a substep, takes
+/// it that part of the way.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Target {
     /// The value at the beginning,
@@ -24,12 +29,17 @@ impl Target {
         }
     }
 
-    /// The value at the end of a step, counted from 1.
-    pub fn at(&self, step: usize) -> f64 {
-        if step >= self.over {
+    /// The value after so many steps, parts of them included.
+    pub fn at(&self, steps: f64) -> f64 {
+        if self.is_reached(steps) {
             return self.to;
         }
-        self.from + (self.to - self.from) * step as f64 / self.over as f64
+        self.from + (self.to - self.from) * steps / self.over as f64
+    }
+
+    fn is_reached(&self, steps: f64) -> bool {
+        // Parts of steps add up to whole ones but for rounding.
+        steps >= self.over as f64 - 1e-9
     }
 }
 
@@ -43,14 +53,42 @@ pub struct Held {
 }
 
 impl Held {
+    /// Keeps the perimeter of a phase field, and drives the volume over so many steps to that which has, with this perimeter, the
+    /// [reduced volume](geometry::zero_set::reduced_volume) `target`.
+    ///
+    /// # Errors
+    /// [`Error::ReducedVolume`] unless `target` is above 0 and at most 1, [`Error::Geometry`].
+    pub fn at_reduced_volume<const D: usize>(
+        u: &Field<D>,
+        eps: f64,
+        target: f64,
+        over: usize,
+    ) -> Result<Self, Error> {
+        let ZeroSet {
+            perimeter, volume, ..
+        } = ZeroSet::of(u, eps)?;
+        let present = reduced_volume(D, perimeter, volume);
+        if !(target > 0.0 && target <= 1.0) {
+            return Err(Error::ReducedVolume { target, present });
+        }
+        Ok(Self {
+            perimeter: Some(Target::keep(perimeter)),
+            volume: Some(Target {
+                from: volume,
+                to: volume * target / present,
+                over,
+            }),
+        })
+    }
+
     /// Whether nothing is held.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 
-    /// The constraints of a step, counted from 1.
-    pub fn at(&self, step: usize) -> Constraints {
-        let at = |target: Option<Target>| target.map(|target| target.at(step));
+    /// The constraints after so many steps, parts of them included.
+    pub fn at(&self, steps: f64) -> Constraints {
+        let at = |target: Option<Target>| target.map(|target| target.at(steps));
         Constraints {
             perimeter: at(self.perimeter),
             volume: at(self.volume),
@@ -59,13 +97,20 @@ impl Held {
 
     /// The constraints in the end.
     pub fn targets(&self) -> Constraints {
-        self.at(usize::MAX)
+        self.at(f64::INFINITY)
+    }
+
+    /// Whether so many steps reach all targets.
+    pub(crate) fn is_reached(&self, steps: f64) -> bool {
+        let mut targets = self.perimeter.iter().chain(&self.volume);
+        targets.all(|target| target.is_reached(steps))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use geometry::{Grid, phase_field, shapes::Ellipse};
 
     #[test]
     fn a_target_is_reached_evenly_and_held() {
@@ -74,12 +119,31 @@ mod tests {
             to: 2.0,
             over: 4,
         };
-        let values = [1, 2, 4, 9].map(|step| target.at(step));
+        let values = [1.0, 2.0, 2.5, 4.0, 9.0].map(|steps| target.at(steps));
         assert_eq!(
             values.map(f64::to_bits),
-            [1.25, 1.5, 2.0, 2.0].map(f64::to_bits)
+            [1.25, 1.5, 1.625, 2.0, 2.0].map(f64::to_bits)
         );
-        assert_eq!(Target::keep(0.3).at(1).to_bits(), 0.3_f64.to_bits());
+        assert_eq!(Target::keep(0.3).at(0.5).to_bits(), 0.3_f64.to_bits());
         assert!(Held::default().is_empty() && Held::default().targets().is_empty());
+        let held = Held {
+            perimeter: Some(Target::keep(1.0)),
+            volume: Some(target),
+        };
+        assert!(!held.is_reached(3.5) && held.is_reached(4.0));
+    }
+
+    #[test]
+    fn reduced_volumes_are_reached_with_the_perimeter_kept() {
+        let grid = Grid::<2>::centred(64, 1.0).unwrap();
+        let eps = 2.0 * grid.spacing();
+        let u = phase_field(grid, &Ellipse::new([0.3, 0.2]).unwrap(), eps).unwrap();
+        let end = Held::at_reduced_volume(&u, eps, 0.7, 5).unwrap().targets();
+        let (perimeter, volume) = (end.perimeter.unwrap(), end.volume.unwrap());
+        assert!((reduced_volume(2, perimeter, volume) - 0.7).abs() < 1e-12);
+        for target in [0.0, -0.5, 1.01, f64::NAN] {
+            let error = Held::at_reduced_volume(&u, eps, target, 5).unwrap_err();
+            assert!(matches!(error, Error::ReducedVolume { .. }), "{error}");
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! Cases of Willmore flow and mean curvature flow, run and resumed by one loop over time steps.
 //!
 //! ```
-//! use engine::{Case, Flow, Held, Measure, Operator, Run, Scales, Scheme, StepRule, Stop};
+//! use engine::{Case, Flow, Held, Helfrich, Measure, Operator, Run, Scales, Scheme, StepRule, Stop};
 //! use geometry::{Grid, phase_field, shapes::Cuboid};
 //! use model::Networks;
 //! use operators::ComputeDevice;
@@ -16,6 +16,7 @@
 //!     shape: "square of side 1/2".to_owned(),
 //!     initial: phase_field(grid, &Cuboid::new([0.25; 2])?, scales.eps)?,
 //!     region: None,
+//!     energy: Helfrich::default(),
 //!     held: Held::default(),
 //!     flow: Flow::Willmore,
 //!     operator: Operator::learned(Scheme::Accurate, network)?,
@@ -73,6 +74,7 @@ pub use observer::{Event, Observer, Samples};
 pub use operator::{Flow, Method, Operator, Scales, Scheme, quarter_square};
 pub use record::{Record, Values, energy_increases, mean_hvp, minimizations, to_csv};
 pub use run::{Ending, Run};
+pub use solver::Helfrich;
 pub use steps::{Order, StepRule, TimeSteps};
 pub use stop::Stop;
 pub use store::{Checkpoints, METRICS, Store, dimension, initial, notes};

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use geometry::contour::ray_crossing;
 use geometry::measure::{l2_distance, perimeter, zero_set_volume};
-use geometry::{Field, Grid};
+use geometry::zero_set::reduced_volume;
+use geometry::{Field, Grid, ZeroSet};
 
 use crate::Error;
 
@@ -13,12 +14,12 @@ use crate::Error;
 pub const DISPLACEMENT: &str = "displacement";
 
 type Function<const D: usize> =
-    dyn Fn(&Field<D>, f64) -> Result<Option<f64>, geometry::Error> + Send + Sync;
+    dyn Fn(&Field<D>, f64) -> Result<Vec<Option<f64>>, geometry::Error> + Send + Sync;
 
-/// A number that is measured on the phase field after every step, under a name.
+/// Numbers that are measured together on the phase field after every step, each under a name.
 #[derive(Clone)]
 pub struct Measure<const D: usize> {
-    name: String,
+    names: Vec<String>,
     of: Arc<Function<D>>,
 }
 
@@ -29,8 +30,38 @@ impl<const D: usize> Measure<D> {
         of: impl Fn(&Field<D>, f64) -> Result<Option<f64>, geometry::Error> + Send + Sync + 'static,
     ) -> Self {
         Self {
-            name: name.into(),
-            of: Arc::new(of),
+            names: vec![name.into()],
+            of: Arc::new(move |u, time| Ok(vec![of(u, time)?])),
+        }
+    }
+
+    /// Sizes of the zero set ([`ZeroSet`]): `length` and `area` in 2D, `area` and `volume` in 3D, `reduced_volume`, and
+    /// `integrated_mean_curvature`. Where it bends too sharply for them the sizes are those of the phase field, and the last is absent.
+    pub fn zero_set(eps: f64) -> Self {
+        let [boundary, inside] = match D {
+            2 => ["length", "area"],
+            _ => ["area", "volume"],
+        };
+        let names = [
+            boundary,
+            inside,
+            "reduced_volume",
+            "integrated_mean_curvature",
+        ];
+        Self {
+            names: names.map(str::to_owned).to_vec(),
+            of: Arc::new(move |u, _| {
+                let zero_set = ZeroSet::of(u, eps)?;
+                let (boundary, inside) = if zero_set.sizes_hold() {
+                    (zero_set.perimeter, zero_set.volume)
+                } else {
+                    (perimeter(u, eps)?, zero_set_volume(u))
+                };
+                let reduced = (boundary > 0.0).then(|| reduced_volume(D, boundary, inside));
+                let curvature = zero_set.mean_curvature;
+                let curvature = zero_set.curvatures_hold().then_some(curvature);
+                Ok(vec![Some(boundary), Some(inside), reduced, curvature])
+            }),
         }
     }
 
@@ -60,19 +91,24 @@ impl<const D: usize> Measure<D> {
         })
     }
 
-    /// Its name.
-    pub fn name(&self) -> &str {
-        &self.name
+    /// Their names.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.names.iter().map(String::as_str)
     }
 
-    /// Its value.
-    pub fn of(&self, field: &Field<D>, time: f64) -> Result<Option<f64>, Error> {
-        Ok((self.of)(field, time)?)
+    /// Their values, with the names of those that the shape has.
+    pub fn of(
+        &self,
+        field: &Field<D>,
+        time: f64,
+    ) -> Result<impl Iterator<Item = (&str, f64)>, Error> {
+        let values = self.names().zip((self.of)(field, time)?);
+        Ok(values.filter_map(|(name, value)| Some((name, value?))))
     }
 }
 
 impl<const D: usize> fmt::Debug for Measure<D> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.name)
+        f.write_str(&self.names.join(", "))
     }
 }

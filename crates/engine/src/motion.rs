@@ -3,9 +3,9 @@
 use fem::{FiniteElementStep, Statistics};
 use geometry::Field;
 use operators::ComputeDevice;
-use solver::{FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow};
+use solver::{Constraints, FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow};
 
-use crate::{Case, Error, Flow, Held, Method, Order};
+use crate::{Case, Error, Flow, Method, Order};
 
 /// The solver's flow of a case, between two steps.
 pub(crate) struct Motion<const D: usize> {
@@ -13,7 +13,6 @@ pub(crate) struct Motion<const D: usize> {
     /// The finite-element step inside, for its statistics.
     elements: Option<FiniteElementStep<D>>,
     order: Order,
-    held: Held,
 }
 
 enum Either<const D: usize> {
@@ -48,6 +47,9 @@ impl<const D: usize> Motion<D> {
                 if let Some(network) = network.filter(|_| operator.half_grids) {
                     flow.begin_on_half_grids(network)?;
                 }
+                if !case.energy.is_willmore() {
+                    flow.set_energy(case.energy, operator.response)?;
+                }
                 if let Some(region) = &case.region {
                     flow.restrict_to(region)?;
                 }
@@ -71,20 +73,19 @@ impl<const D: usize> Motion<D> {
             flow,
             elements,
             order: case.steps.order,
-            held: case.held,
         })
     }
 
-    /// The time step with this number and of this size, or one step of mean curvature flow, whose size is that of its operator. A step of second order is made
-    /// only if `accept` takes it; the second value says so.
+    /// A time step of this size that ends with these sizes held, or one step of mean curvature flow, whose size is that of its operator. A step
+    /// of second order is made only if `accept` takes it; the second value says so.
     pub(crate) fn advance(
         &mut self,
-        step: usize,
         size: f64,
+        constraints: Constraints,
         accept: impl FnOnce(&StepRecord) -> bool,
     ) -> Result<(Option<StepRecord>, bool), solver::Error> {
         if let Either::Willmore(flow) = &mut self.flow {
-            flow.constrain(self.held.at(step))?;
+            flow.constrain(constraints)?;
         }
         match &mut self.flow {
             Either::Willmore(flow) if self.order == Order::First => {

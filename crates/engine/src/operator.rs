@@ -209,6 +209,8 @@ pub struct Operator {
     pub scheme: Scheme,
     /// The calibration factors by which the terms of the energy are divided.
     pub factors: Factors,
+    /// The response of the step to curvature ([`model::Calibration::response`]); 1 in the paper's scheme.
+    pub response: f64,
     /// How the linear systems of implicit finite elements are solved.
     pub linear: LinearSolver,
     /// Whether steps of a learned operator begin on coarser grids where networks for those are shipped. The result differs by less
@@ -224,19 +226,23 @@ impl Operator {
     /// [`Error::Model`] if the step cannot be calibrated.
     pub fn learned(scheme: Scheme, network: NamedNetwork) -> Result<Self, Error> {
         let NamedNetwork { name, network } = network;
-        let (network, factors) = match scheme {
-            Scheme::Paper => (network, Factors::PAPER),
-            // The odd part has the same factors to first order in its difference to the whole.
-            Scheme::Calibrated => (network.odd_part(), network.calibration()?.factors),
-            Scheme::Accurate => {
-                let factors = network.calibration()?.factors;
-                (network, factors)
+        let (factors, response) = match scheme {
+            Scheme::Paper => (Factors::PAPER, 1.0),
+            Scheme::Calibrated | Scheme::Accurate => {
+                let calibration = network.calibration()?;
+                (calibration.factors, calibration.response())
             }
+        };
+        let network = match scheme {
+            // The odd part has the same factors to first order in its difference to the whole.
+            Scheme::Calibrated => network.odd_part(),
+            Scheme::Paper | Scheme::Accurate => network,
         };
         Ok(Self {
             method: Method::Hybrid,
             scheme,
             factors,
+            response,
             linear: LinearSolver::default(),
             half_grids: true,
             network: Some(Arc::new(NamedNetwork { name, network })),
@@ -261,12 +267,14 @@ impl Operator {
             method,
             scheme,
             factors: Factors::PAPER,
+            response: 1.0,
             linear: LinearSolver::default(),
             half_grids: false,
             network: None,
         };
         if scheme != Scheme::Paper {
-            operator.factors = operator.elements(grid, scales)?.calibrate()?.factors;
+            let calibration = operator.elements(grid, scales)?.calibrate()?;
+            (operator.factors, operator.response) = (calibration.factors, calibration.response());
         }
         Ok(operator)
     }

@@ -28,6 +28,8 @@ pub struct Run<const D: usize> {
     pub(crate) device: ComputeDevice,
     motion: Motion<D>,
     control: StepControl,
+    /// How many steps the targets of what is held have gone, parts of steps included.
+    ramped: f64,
     field: Field<D>,
     pub(crate) start: Values,
     pub(crate) records: Vec<Record>,
@@ -65,11 +67,13 @@ impl<const D: usize> Run<D> {
             eps: case.scales.eps,
             mcf_step,
             largest: case.largest_step(),
+            least_energy: case.least_energy(),
         };
         let mut control = StepControl::new(case.steps, lengths, case.end())?;
-        let mut step_size = control.step_size();
+        let (mut step_size, mut ramped) = (control.step_size(), 0.0);
         for record in &records {
             step_size = control.step_size();
+            ramped += record.tau / step_size;
             control.accept(record)?;
         }
         let mut run = Self {
@@ -78,6 +82,7 @@ impl<const D: usize> Run<D> {
             field: state.current.clone(),
             case,
             control,
+            ramped,
             start,
             records,
             ended: None,
@@ -119,6 +124,7 @@ impl<const D: usize> Run<D> {
             measures: values(&self.case, &field, time)?,
             seconds,
         };
+        self.ramped += record.tau / step_size;
         record.completes_step = self.control.accept(&record)?;
         self.field = field;
         self.records.push(record);
@@ -181,7 +187,10 @@ impl<const D: usize> Run<D> {
     /// A step that succeeds and is short enough.
     fn attempt(&mut self) -> Result<Attempt, Error> {
         use solver::Error::{NonFinite, NotConverged, NotHeld};
-        let (mut size, most) = (self.control.next_size(), self.control.halvings());
+        let (mut size, mut most) = (self.control.next_size(), self.control.halvings());
+        if !self.case.held.is_empty() {
+            most = most.max(SHORTER);
+        }
         let (mut halvings, mut refused_hvp) = (0, 0.0);
         let longest = self.case.steps.longest_move;
         let before = longest.map(|_| self.state()).transpose()?;
@@ -200,7 +209,10 @@ impl<const D: usize> Run<D> {
                 shorter = self.control.shorter(made).filter(|_| halvings < most);
                 shorter.is_none()
             };
-            match self.motion.advance(self.control.step(), size, accept) {
+            // A shorter step changes what is held by less, too.
+            let ramped = self.ramped + size / self.control.step_size();
+            let constraints = self.case.held.at(ramped);
+            match self.motion.advance(size, constraints, accept) {
                 Ok((minimization, true)) => {
                     let made = Attempt {
                         halvings,
@@ -261,7 +273,8 @@ impl<const D: usize> Run<D> {
 
     /// The first stop rule that holds, where the last record belongs to a time step of this size.
     fn stop(&self, step_size: f64) -> Option<Stop> {
-        let mut stops = self.case.stops.iter();
+        let driven = !self.case.held.is_reached(self.ramped);
+        let mut stops = (self.case.stops.iter()).filter(|stop| !(driven && stop.is_rest()));
         stops.find(|stop| stop.holds(self, step_size)).copied()
     }
 
@@ -319,7 +332,7 @@ struct Attempt {
     minimization: Option<StepRecord>,
 }
 
-/// How often a step that moves the interface too far is halved.
+/// How often a step is halved that moves the interface too far, or cannot hold what it is to hold.
 const SHORTER: u32 = 12;
 /// The part of the interface that may move further: that of parts that vanish.
 const VANISHING: f64 = 0.02;
@@ -350,9 +363,8 @@ fn has_gone_further<const D: usize>(u: &Field<D>, now: &Field<D>, widths: f64) -
 fn values<const D: usize>(case: &Case<D>, field: &Field<D>, time: f64) -> Result<Values, Error> {
     let mut values = Values::new();
     for measure in &case.measures {
-        if let Some(value) = measure.of(field, time)? {
-            values.insert(measure.name().to_owned(), value);
-        }
+        let measured = measure.of(field, time)?;
+        values.extend(measured.map(|(name, value)| (name.to_owned(), value)));
     }
     Ok(values)
 }

@@ -142,7 +142,7 @@ impl From<StepRule> for TimeSteps {
     }
 }
 
-/// The lengths and times of a flow that step sizes depend on.
+/// The lengths, times and energies of a flow that step sizes depend on.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lengths {
     /// Interface width.
@@ -151,6 +151,8 @@ pub(crate) struct Lengths {
     pub(crate) mcf_step: f64,
     /// The longest step that shows anything.
     pub(crate) largest: f64,
+    /// Changes of energies below this are measured by it.
+    pub(crate) least_energy: f64,
 }
 
 /// Where in its time steps a flow is, and what size comes next. It depends on nothing but the records so far, so that
@@ -162,6 +164,7 @@ pub(crate) struct StepControl {
     end: f64,
     /// The largest size of steps by the energy.
     largest: f64,
+    least_energy: f64,
     /// Steps completed, and the time reached.
     completed: usize,
     time: f64,
@@ -183,6 +186,7 @@ impl StepControl {
             eps,
             mcf_step,
             largest,
+            least_energy,
         }: Lengths,
         end: Option<f64>,
     ) -> Result<Self, Error> {
@@ -198,6 +202,7 @@ impl StepControl {
             steps: TimeSteps { rule, ..steps },
             end: end.unwrap_or(f64::INFINITY),
             largest,
+            least_energy,
             completed: 0,
             time: 0.0,
             wanted: rule.size(1),
@@ -294,7 +299,7 @@ impl StepControl {
         self.wanted = match self.steps.rule {
             // A step that was cut short by the end says nothing about the next one.
             StepRule::ByEnergy(_) if self.size < before && record.halvings == 0 => before,
-            StepRule::ByEnergy(_) => after(record).min(self.largest),
+            StepRule::ByEnergy(_) => after(record, self.least_energy).min(self.largest),
             StepRule::Graded { first, part } => first.max(part * self.time),
             rule => rule.size(self.step()),
         };
@@ -305,12 +310,11 @@ impl StepControl {
 }
 
 /// The size by the energy after a step.
-fn after(record: &Record) -> f64 {
+fn after(record: &Record, least_energy: f64) -> f64 {
     let Some(made) = &record.minimization else {
         return record.tau;
     };
-    let before = made.energy_at_rest();
-    let drop = (before - made.willmore_energy) / before.max(f64::MIN_POSITIVE);
+    let drop = made.relative_drop(least_energy);
     let newton = made.newton.newton;
     let factor = if drop > MUCH || newton > HARD {
         0.5

@@ -29,8 +29,11 @@ pub enum Stop {
     /// Three steps in a row, nearly as long as steps by the energy can be, lowered the energy by almost nothing. Longer ones would
     /// jump to other minimizers, such as an empty box.
     EnergyAtRest,
+    /// In three steps in a row, the energy changed by less than this fraction of itself per time `side^4 / 1024`, in which shapes as large as
+    /// the box become stationary; longer steps count as that long.
+    EnergyRate(f64),
     /// In space, the Willmore energy is less than half of that of a sphere, which no closed surface has: the phase field does not describe
-    /// a surface any more.
+    /// a surface any more. Says nothing with spontaneous curvature, tension or pressure.
     NoSurface,
     /// One of the two phases has vanished.
     Vanished,
@@ -45,6 +48,14 @@ const LITTLE: f64 = 1e-4;
 const IN_A_ROW: usize = 3;
 
 impl Stop {
+    /// Whether it says that nothing happens any more, which it cannot say while sizes are driven to their targets.
+    pub(crate) fn is_rest(&self) -> bool {
+        matches!(
+            self,
+            Self::Motion(_) | Self::EnergyAtRest | Self::EnergyRate(_)
+        )
+    }
+
     /// Whether it holds for a run whose last record belongs to a time step of this size.
     pub(crate) fn holds<const D: usize>(&self, run: &Run<D>, step_size: f64) -> bool {
         let last = run.records.last();
@@ -69,25 +80,37 @@ impl Stop {
                 last.is_some_and(|r| r.moved * step_size / r.tau <= limit * r.travelled)
             }
             Self::EnergyAtRest => {
-                let largest = run.case.largest_step();
-                let at_rest = |record: &Record| {
-                    record.minimization.is_some_and(|made| {
-                        let before = made.energy_at_rest();
-                        let change = (before - made.willmore_energy).abs();
-                        record.tau >= 0.25 * largest && change < LITTLE * before
-                    })
-                };
-                let last = run.records.last_chunk::<IN_A_ROW>();
-                last.is_some_and(|records| records.iter().all(at_rest))
+                let shortest = 0.25 * run.case.largest_step();
+                is_at_rest(run, |tau, change| tau >= shortest && change < LITTLE)
+            }
+            Self::EnergyRate(limit) => {
+                let unit = run.case.largest_step();
+                is_at_rest(run, |tau, change| change * (unit / tau).max(1.0) <= limit)
             }
             Self::NoSurface => {
                 let energy = last.and_then(Record::willmore_energy);
-                D == 3 && energy.is_some_and(|energy| energy < 4.0 * PI)
+                let bending = run.case.energy.is_willmore();
+                D == 3 && bending && energy.is_some_and(|energy| energy < 4.0 * PI)
             }
             Self::Vanished => !has_interface(run.field()),
             Self::AtTheSide => is_near_side(run.field()) && !is_near_side(&run.case.initial),
         }
     }
+}
+
+/// Whether this holds for the size of each of the last steps and the change of the energy in it, relative to the energy.
+fn is_at_rest<const D: usize>(run: &Run<D>, test: impl Fn(f64, f64) -> bool) -> bool {
+    let last = run.records.last_chunk::<IN_A_ROW>();
+    last.is_some_and(|records| {
+        records.iter().all(|record| {
+            record.minimization.is_some_and(|made| {
+                test(
+                    record.tau,
+                    made.relative_drop(run.case.least_energy()).abs(),
+                )
+            })
+        })
+    })
 }
 
 /// Whether the shape is within two interface widths of the side of the box.
@@ -113,7 +136,7 @@ impl fmt::Display for Stop {
             }
             Self::Displacement(_) => f.write_str("the surface has gone as far as it was to go"),
             Self::Motion(_) => f.write_str("the shape is stationary"),
-            Self::EnergyAtRest => f.write_str("the energy is stationary"),
+            Self::EnergyAtRest | Self::EnergyRate(_) => f.write_str("the energy is stationary"),
             Self::NoSurface => f.write_str(
                 "the Willmore energy is less than any closed surface has, 8 pi: the time steps were too long for the shape",
             ),

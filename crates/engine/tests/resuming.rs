@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::common::{TAU, case, device, disc, divided, finished, square};
+use crate::held::driven;
 use engine::{
     Case, Checkpoints, Ending, Error, ErrorControl, Event, Flow, Method, Observer, Order, Samples,
     StepRule, Stop, Store, TimeSteps, Trajectory,
@@ -138,6 +139,21 @@ fn a_run_is_interrupted_inside_a_step() {
         }
         assert_eq!(resumed.field(2).unwrap(), reference.field(2).unwrap());
     }
+}
+
+/// The targets of what is held go on where they were.
+#[test]
+fn a_driven_run_continues_with_the_same_bytes() {
+    let root = tempfile::tempdir().unwrap();
+    let mut case = driven(4, divided(TAU, 0.5 * TAU));
+    case.stops = vec![Stop::Steps(3)];
+    let samples = Samples::every(1);
+    let reference = trajectory(&case, &root.path().join("whole"), &samples);
+    let folder = root.path().join("interrupted");
+    interrupted(&case, &folder, &samples, 1);
+    let resumed = trajectory(&case, &folder, &samples);
+    assert_eq!(without_seconds(&resumed), without_seconds(&reference));
+    assert_eq!(resumed.field(3).unwrap(), reference.field(3).unwrap());
 }
 
 /// Controlled steps, one of which is refused at first, between marks: the same after an interruption between two of them.

@@ -8,8 +8,8 @@ use model::MeanCurvatureOperator;
 use operators::{ComputeDevice, SpectralFilter};
 use serde::{Deserialize, Serialize};
 
-use crate::Error;
 use crate::error::StepFailure;
+use crate::{Error, HelfrichTerms};
 
 /// Precision of the linear solves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -126,7 +126,7 @@ pub trait Objective<const D: usize> {
 /// `E(u) = 1/2 |u - a|^2 + c/2 |V[u] - u|^2`, with sums over the grid in the step's inner product and
 /// `c = tau / tautilde^2`,
 ///
-/// so that its Hessian is the identity (or mass matrix) plus what the curvature adds. The anchor `a` is `u_k` in an implicit Euler step.
+/// so that its Hessian is the identity (or mass matrix) plus what the curvature adds; [`HelfrichTerms`] change the second term. The anchor `a` is `u_k` in an implicit Euler step.
 /// Stages of second-order steps have other anchors, and weigh the motion by positive numbers that are fixed during the minimization:
 /// `1/2 |s (u - a)|^2`. Anchor, `c` and `s` are inputs of the traced graph: one trace serves a whole run.
 pub struct MinimizingMovement<const D: usize> {
@@ -164,24 +164,39 @@ impl<const D: usize> MinimizingMovement<D> {
         products: Precision,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
-        Self::trace(step, cells, products, false, device)
+        Self::with_terms(step, cells, products, None, device)
     }
 
-    /// As [`Self::with_precision`], with factors of the motion, which are 1 until they are [set](Self::set_factors).
+    /// As [`Self::with_precision`], with spontaneous curvature, tension and pressure.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_terms(
+        step: Arc<dyn MeanCurvatureStep<D>>,
+        cells: usize,
+        products: Precision,
+        terms: Option<&HelfrichTerms<D>>,
+        device: &ComputeDevice,
+    ) -> Result<Self, Error> {
+        Self::trace(step, cells, products, (false, terms), device)
+    }
+
+    /// As [`Self::with_terms`], with factors of the motion, which are 1 until they are [set](Self::set_factors).
     pub(crate) fn weighted(
         step: Arc<dyn MeanCurvatureStep<D>>,
         cells: usize,
         products: Precision,
+        terms: Option<&HelfrichTerms<D>>,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
-        Self::trace(step, cells, products, true, device)
+        Self::trace(step, cells, products, (true, terms), device)
     }
 
     fn trace(
         step: Arc<dyn MeanCurvatureStep<D>>,
         cells: usize,
         products: Precision,
-        weighted: bool,
+        (weighted, terms): (bool, Option<&HelfrichTerms<D>>),
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
         let options = (device.device(), device.dtype());
@@ -196,9 +211,16 @@ impl<const D: usize> MinimizingMovement<D> {
             if weighted {
                 motion = motion * inputs.parameter::<D>(2);
             }
-            let residual = step.apply(u.clone()) - u;
+            let mut residual = step.apply(u.clone()) - u.clone();
+            if let Some(terms) = terms {
+                residual = terms.shifted(residual, &u);
+            }
             let square = |x: Tensor<D>| (x.clone() * step.mass(x)).sum();
-            (square(motion) + square(residual) * inputs.parameter::<1>(1)) * 0.5
+            let mut curvature = square(residual);
+            if let Some(sizes) = terms.and_then(|terms| terms.sizes(&u)) {
+                curvature = curvature + sizes * 2.0;
+            }
+            (square(motion) + curvature * inputs.parameter::<1>(1)) * 0.5
         })?;
         let extensions = step.extensions();
         let single = products == Precision::Single && step.allows_single_precision();

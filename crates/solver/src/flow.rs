@@ -14,7 +14,10 @@ use crate::newton::{NewtonInfo, NewtonParams, minimize_timed};
 use crate::preconditioner::Preconditioner;
 use crate::region::Restricted;
 use crate::times::PhaseTimes;
-use crate::{Accuracy, Error, Exit, MeanCurvatureStep, MinimizingMovement, Objective, Region};
+use crate::{
+    Accuracy, Error, Exit, Helfrich, HelfrichTerms, MeanCurvatureStep, MinimizingMovement,
+    Objective, Region,
+};
 
 mod second_order;
 mod start;
@@ -64,14 +67,16 @@ pub struct StepRecord {
     pub energy_before: f64,
     /// `E[u_k, u_{k+1}]`.
     pub energy: f64,
-    /// `eps / (2 c tautilde^2) |V[u] - u|^2`, the approximate Willmore energy of the result; `c = 1` without calibration.
+    /// `eps / (2 c tautilde^2) |V[u] - u|^2`, the approximate Willmore energy of the result; `c = 1` without calibration. With spontaneous
+    /// curvature, tension or pressure the [energy](Helfrich) that these make of it.
     pub willmore_energy: f64,
     /// Where the minimization began.
     pub start: Start,
     /// What the minimization did.
     pub newton: NewtonInfo,
     /// The surface tension `sigma` that holds the perimeter: `w + sigma A + p V` is stationary but for the motion, `w` being the Willmore
-    /// energy, `A` the perimeter, and `V` the volume. Energy per length (2D) or area (3D); positive where the interface wants to grow.
+    /// energy, `A` the perimeter, and `V` the volume. Energy per length (2D) or area (3D); positive where the interface wants to grow. It comes
+    /// on top of the tension in [`Helfrich`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tension: Option<f64>,
     /// The pressure `p` that holds the volume, likewise: energy per area (2D) or volume (3D), positive where the inside wants to grow.
@@ -92,6 +97,12 @@ impl StepRecord {
     /// The Willmore energy before the step, as the scheme measures it: standing still costs `2 tau w`.
     pub fn energy_at_rest(&self) -> f64 {
         self.energy_before / (2.0 * self.tau)
+    }
+
+    /// By which part of itself the energy fell, or of `least` where it is smaller, as it can be with spontaneous curvature or pressure.
+    pub fn relative_drop(&self, least: f64) -> f64 {
+        let before = self.energy_at_rest();
+        (before - self.willmore_energy) / before.abs().max(least)
     }
 
     /// Hessian-vector products of the step; those on coarser grids count by their share of this grid's unknowns.
@@ -162,6 +173,8 @@ pub struct WillmoreFlow<const D: usize> {
     device: ComputeDevice,
     mcf: Arc<dyn MeanCurvatureStep<D>>,
     energy: MinimizingMovement<D>,
+    /// What it has besides bending.
+    terms: Option<HelfrichTerms<D>>,
     /// The same with weights of the motion, from the first second-order step on.
     weighted: Option<MinimizingMovement<D>>,
     filter: Option<(f64, SpectralFilter)>,
@@ -234,6 +247,7 @@ impl<const D: usize> WillmoreFlow<D> {
             device: device.clone(),
             mcf,
             energy,
+            terms: None,
             weighted: None,
             filter: None,
             region: None,
@@ -271,6 +285,38 @@ impl<const D: usize> WillmoreFlow<D> {
         constraints.check(&self.grid)?;
         self.constraints = constraints;
         Ok(())
+    }
+
+    /// Makes this the energy of all following steps, by a step of mean curvature flow whose motion is `response` times that of the calibration
+    /// (1 for an exact one; [`model::Calibration::response`]). The Willmore energies of the records are then this energy.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for values that are not finite, or what tracing the energy raises.
+    pub fn set_energy(&mut self, energy: Helfrich, response: f64) -> Result<(), Error> {
+        self.terms = if energy.is_willmore() {
+            None
+        } else {
+            let (grid, device) = (&self.grid, &self.device);
+            Some(HelfrichTerms::new(
+                energy,
+                response,
+                &self.params,
+                grid,
+                device,
+            )?)
+        };
+        self.energy = MinimizingMovement::with_terms(
+            self.mcf.clone(),
+            self.grid.cells(),
+            self.params.newton.precision,
+            self.terms.as_ref(),
+            &self.device,
+        )?;
+        self.weighted = None;
+        match &mut self.half {
+            Some(half) => half.set_energy(energy, response),
+            None => Ok(()),
+        }
     }
 
     /// The phase field now, on the device.
@@ -437,6 +483,7 @@ impl<const D: usize> WillmoreFlow<D> {
                         self.mcf.clone(),
                         self.grid.cells(),
                         params.precision,
+                        self.terms.as_ref(),
                         device,
                     )?),
                 };

@@ -68,6 +68,10 @@
 //! among the phase fields that have them. The multipliers are the tension and the pressure in the records. Two constraints leave a ball no
 //! freedom at all, and a shape near one little; a target far from the present value is reached best by small changes in small steps.
 //!
+//! # Spontaneous curvature, tension and pressure
+//!
+//! [`WillmoreFlow::set_energy`] makes the energy `1/2 int (h - c0)^2 + sigma A + p V` ([`Helfrich`]), by terms of the same traced function.
+//!
 //! # Conventions
 //!
 //! Grids, norms and signs are those of [`geometry`]. Energies in [`StepRecord`] are in the paper's units with true L2 norms.
@@ -80,6 +84,7 @@ mod displacement;
 mod energy;
 mod error;
 mod flow;
+mod helfrich;
 mod interface;
 mod newton;
 mod preconditioner;
@@ -94,6 +99,7 @@ pub use flow::{
     FlowParams, FlowState, MeanCurvatureFlow, Start, StartKind, StepEstimates, StepRecord,
     WillmoreFlow,
 };
+pub use helfrich::{Helfrich, HelfrichTerms};
 pub use model::Factors;
 pub use newton::{Exit, Method, NewtonInfo, NewtonParams, minimize};
 pub use operators::{extrapolate, retract};

@@ -408,7 +408,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
                     }
                 },
             };
-            let worthwhile = point.energy - next.energy > WORTHWHILE * point.energy;
+            let worthwhile = point.energy - next.energy > WORTHWHILE * point.energy.abs();
             point = next;
             if !worthwhile {
                 break;
@@ -493,7 +493,9 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
                 let u = retract(&point.u, &solution.direction, sign * t);
                 let u = self.objective.hold(u);
                 let candidate = self.trial(u)?;
-                if let Some(candidate) = candidate.filter(|c| c.energy < HOPELESS * point.energy) {
+                if let Some(candidate) =
+                    candidate.filter(|c| c.energy < HOPELESS * point.energy.abs())
+                {
                     let candidate = self.clean(candidate)?;
                     if candidate.energy <= point.energy - 1e-3 * t * decrease {
                         next = Some(candidate);

@@ -4,6 +4,7 @@ mod calibration;
 mod common;
 mod constraints;
 mod flow;
+mod helfrich;
 mod minimization;
 mod profile;
 mod region;

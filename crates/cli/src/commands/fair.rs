@@ -6,7 +6,7 @@ use engine::{Scales, StepRule};
 use surfaces::Fairing;
 
 use super::flow::{FlowCommand, Shared};
-use crate::cli::{FairOptions, MeshFormat, SayOptions, SizeTarget};
+use crate::cli::{FairOptions, FlowOptions, MeshFormat, SayOptions};
 use crate::error::Error;
 use crate::input::{self, Loaded};
 use crate::own::{Noise, OwnMesh};
@@ -107,12 +107,8 @@ impl FlowCommand for FairOptions {
         self.noise.is_some() || self.energy_ratio.is_some() || !self.ends
     }
 
-    fn targets(&self) -> ([Option<SizeTarget>; 2], usize) {
-        self.flow.targets()
-    }
-
-    fn tolerance(&self) -> Option<f64> {
-        self.flow.tolerance
+    fn willmore(&self) -> Option<&FlowOptions> {
+        Some(&self.flow)
     }
 
     fn energy_ratio(&self) -> Option<f64> {

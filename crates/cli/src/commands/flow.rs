@@ -4,9 +4,9 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use engine::{
-    Case, ErrorControl, Flow, Held, Measure, Method, Scales, StepRule, Stop, Target, TimeSteps,
+    Case, ErrorControl, Flow, Held, Helfrich, Measure, Method, Scales, StepRule, Stop, Target,
+    TimeSteps,
 };
-use geometry::measure::{perimeter, zero_set_volume};
 use geometry::{Field, ZeroSet};
 use operators::ComputeDevice;
 use runs::StoredRun;
@@ -81,14 +81,9 @@ pub trait FlowCommand: Serialize {
     /// the inner step do so in a box of that size.
     fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule;
 
-    /// The time error of controlled steps, as a part of the motion.
-    fn tolerance(&self) -> Option<f64> {
+    /// The options of Willmore flow; mean curvature flow has no energy and no controlled steps.
+    fn willmore(&self) -> Option<&FlowOptions> {
         None
-    }
-
-    /// What volume and area of the zero set are to become, and over how many steps.
-    fn targets(&self) -> ([Option<SizeTarget>; 2], usize) {
-        ([None; 2], RAMP)
     }
 
     /// Format of meshes.
@@ -127,12 +122,8 @@ impl FlowCommand for FlowOptions {
         self.check_tolerance(StepRule::Controlled)
     }
 
-    fn tolerance(&self) -> Option<f64> {
-        self.tolerance
-    }
-
-    fn targets(&self) -> ([Option<SizeTarget>; 2], usize) {
-        ([self.volume, self.area], self.ramp.unwrap_or(RAMP))
+    fn willmore(&self) -> Option<&FlowOptions> {
+        Some(self)
     }
 
     fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
@@ -161,6 +152,49 @@ impl FlowOptions {
             )));
         }
         Ok(())
+    }
+}
+
+impl FlowOptions {
+    /// Spontaneous curvature, tension and pressure, in the units of the input.
+    fn energy(&self) -> Result<Helfrich, Error> {
+        let finite = |name: &str, value: Option<f64>| match value.unwrap_or(0.0) {
+            value if value.is_finite() => Ok(value),
+            value => Err(Error::options(format!(
+                "{name} {value} must be a finite number"
+            ))),
+        };
+        Ok(Helfrich {
+            spontaneous_curvature: finite("--spontaneous-curvature", self.spontaneous_curvature)?,
+            tension: finite("--tension", self.tension)?,
+            pressure: finite("--pressure", self.pressure)?,
+        })
+    }
+
+    /// The sizes that are held, from what they are at the beginning.
+    fn held<const D: usize>(&self, initial: &Field<D>, eps: f64) -> Result<Held, Error> {
+        let ramp = self.ramp.unwrap_or(RAMP);
+        if let Some(target) = self.reduced_volume {
+            return Ok(Held::at_reduced_volume(initial, eps, target, ramp)?);
+        }
+        if self.volume.is_none() && self.area.is_none() {
+            return Ok(Held::default());
+        }
+        let now = ZeroSet::of(initial, eps)?;
+        let target = |wanted: Option<SizeTarget>, from: f64| {
+            wanted.map(|wanted| match wanted {
+                SizeTarget::Keep => Target::keep(from),
+                other => Target {
+                    from,
+                    to: other.of(from),
+                    over: ramp,
+                },
+            })
+        };
+        Ok(Held {
+            perimeter: target(self.area, now.perimeter),
+            volume: target(self.volume, now.volume),
+        })
     }
 }
 
@@ -215,41 +249,6 @@ impl Shared<'_> {
         stops.extend([Stop::NoSurface, Stop::Vanished, Stop::AtTheSide]);
         stops
     }
-}
-
-/// Perimeter and volume of the zero set to four digits; where it bends too sharply for that, of the phase field.
-fn sizes<const D: usize>(u: &Field<D>, eps: f64) -> Result<[f64; 2], geometry::Error> {
-    let zero_set = ZeroSet::of(u, eps)?;
-    if zero_set.sizes_hold() {
-        return Ok([zero_set.perimeter, zero_set.volume]);
-    }
-    Ok([perimeter(u, eps)?, zero_set_volume(u)])
-}
-
-/// The sizes that are held, from what they are at the beginning.
-fn held<const D: usize>(
-    ([volume, area], ramp): ([Option<SizeTarget>; 2], usize),
-    initial: &Field<D>,
-    eps: f64,
-) -> Result<Held, Error> {
-    if volume.is_none() && area.is_none() {
-        return Ok(Held::default());
-    }
-    let now = ZeroSet::of(initial, eps)?;
-    let target = |wanted: Option<SizeTarget>, from: f64| {
-        wanted.map(|wanted| match wanted {
-            SizeTarget::Keep => Target::keep(from),
-            other => Target {
-                from,
-                to: other.of(from),
-                over: ramp,
-            },
-        })
-    };
-    Ok(Held {
-        perimeter: target(area, now.perimeter),
-        volume: target(volume, now.volume),
-    })
 }
 
 /// Makes a run, or continues one that is stored.
@@ -339,6 +338,7 @@ impl<C: FlowCommand> Job<C> {
         outlet: &impl Outlet<D>,
     ) -> Result<Case<D>, Error> {
         let method = self.command.method();
+        let options = self.command.willmore().cloned();
         let (mut scales, operator) =
             operator(self.command.shared().scheme, method, initial.grid())?;
         let box_side = self.command.shared().input.box_side;
@@ -351,7 +351,8 @@ impl<C: FlowCommand> Job<C> {
                     ..NewtonParams::second_order()
                 };
                 let mut control = ErrorControl::default();
-                control.relative = self.command.tolerance().unwrap_or(control.relative);
+                let tolerance = options.as_ref().and_then(|options| options.tolerance);
+                control.relative = tolerance.unwrap_or(control.relative);
                 // On coarse grids the usual first step is long against the shape.
                 let shorter = scales.mcf_step * unit.powi(2) / 16.0;
                 control.first = Some(shorter.min(16.0 * scales.eps.powi(4)));
@@ -365,20 +366,18 @@ impl<C: FlowCommand> Job<C> {
         let mut stops = self.command.shared().stops(rule);
         stops.extend(self.command.energy_ratio().map(Stop::EnergyRatio));
         stops.extend(outlet.stops(&initial));
-        let (eps, [boundary, inside]) = match D {
-            2 => (scales.eps, ["length", "area"]),
-            _ => (scales.eps, ["area", "volume"]),
+        let eps = scales.eps;
+        let mut measures = vec![Measure::zero_set(eps)];
+        measures.extend(outlet.measures(&initial, eps)?);
+        let (energy, held) = match &options {
+            Some(options) => (options.energy()?, options.held(&initial, eps)?),
+            None => (Helfrich::default(), Held::default()),
         };
-        let mut measures = vec![
-            Measure::new(boundary, move |u, _| sizes(u, eps).map(|s| Some(s[0]))),
-            Measure::new(inside, move |u, _| sizes(u, eps).map(|s| Some(s[1]))),
-        ];
-        measures.extend(outlet.measures(&initial, scales.eps)?);
-        let held = held(self.command.targets(), &initial, eps)?;
         Ok(Case {
             shape: name.to_owned(),
             initial,
             region,
+            energy,
             held,
             flow: C::FLOW,
             operator,

@@ -4,7 +4,7 @@ use engine::{Scales, StepRule};
 use surfaces::shapes::Region;
 
 use super::flow::{FlowCommand, Shared};
-use crate::cli::{InpaintOptions, SizeTarget};
+use crate::cli::{FlowOptions, InpaintOptions};
 use crate::error::Error;
 use crate::input::{self, Loaded, Start};
 
@@ -50,12 +50,8 @@ impl FlowCommand for InpaintOptions {
         })
     }
 
-    fn targets(&self) -> ([Option<SizeTarget>; 2], usize) {
-        self.flow.targets()
-    }
-
-    fn tolerance(&self) -> Option<f64> {
-        self.flow.tolerance
+    fn willmore(&self) -> Option<&FlowOptions> {
+        Some(&self.flow)
     }
 
     fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {

@@ -1,7 +1,8 @@
 //! Small cases.
 
 use engine::{
-    Case, Flow, Held, Measure, Method, Operator, Run, Scales, Scheme, StepRule, Stop, TimeSteps,
+    Case, Flow, Held, Helfrich, Measure, Method, Operator, Run, Scales, Scheme, StepRule, Stop,
+    TimeSteps,
 };
 use geometry::shapes::{Ball, Cuboid};
 use geometry::{Field, Grid, phase_field};
@@ -58,6 +59,7 @@ pub fn case(flow: Flow, method: Method, initial: Field<2>) -> Case<2> {
         shape: "shape".to_owned(),
         initial,
         region: None,
+        energy: Helfrich::default(),
         held: Held::default(),
         flow,
         operator: operator.unwrap(),

@@ -90,6 +90,15 @@ pub struct Calibration {
     pub normal_spread: f64,
 }
 
+impl Calibration {
+    /// What a bent interface leaves of the residual `v[u] - u`, over what the displacement `tautilde kappa` of the profile would,
+    /// `-<A, psi> / (tautilde <w', psi>)`: a residual `v[u] - u + response tautilde c0 w'` vanishes at the curvature `c0`.
+    pub fn response(&self) -> f64 {
+        let Factors { energy, metric } = self.factors;
+        (energy / (self.alignment * metric)).sqrt()
+    }
+}
+
 /// Normals and their weights: `c` is averaged over them. In 2D the four integrate `cos 4 theta` exactly, in 3D they are Lebedev's
 /// rule of degree 7.
 pub fn normals(dimension: usize) -> &'static [(&'static [isize], f64)] {

@@ -1,0 +1,152 @@
+//! Spontaneous curvature, tension and pressure: what the energy has besides bending.
+
+use burn::tensor::Tensor;
+use geometry::Grid;
+use operators::{ComputeDevice, circular_convolution};
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, FlowParams};
+
+/// The second derivative by central differences of eighth order: weights of the node and of its neighbours.
+const SECOND_DIFFERENCE: [f64; 5] = [
+    -205.0 / 72.0,
+    8.0 / 5.0,
+    -1.0 / 5.0,
+    8.0 / 315.0,
+    -1.0 / 560.0,
+];
+/// Width of the kernel of the Laplacian.
+const WIDTH: usize = 2 * SECOND_DIFFERENCE.len() - 1;
+
+/// The terms of the energy of Canham and Helfrich, `w = 1/2 int (h - c0)^2 + sigma A + p V`, with `h` the sum of the principal
+/// curvatures, positive where the phase `u = 1` is convex (a ball of radius `R` has `(D - 1) / R`), `A` the perimeter, and `V` the volume of that phase.
+///
+/// All zero is the Willmore energy.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Helfrich {
+    /// `c0`, one over a length.
+    pub spontaneous_curvature: f64,
+    /// `sigma`, energy per length (2D) or area (3D); positive draws the interface together.
+    pub tension: f64,
+    /// `p`, energy per area (2D) or volume (3D); positive makes the inside smaller.
+    pub pressure: f64,
+}
+
+impl Helfrich {
+    /// Whether the energy is that of bending alone, without spontaneous curvature.
+    pub fn is_willmore(&self) -> bool {
+        *self == Self::default()
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        for (name, value) in [
+            ("spontaneous curvature", self.spontaneous_curvature),
+            ("tension", self.tension),
+            ("pressure", self.pressure),
+        ] {
+            if !value.is_finite() {
+                return Err(Error::Parameter {
+                    name,
+                    value,
+                    expected: "finite",
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The terms of [`Helfrich`] in phase fields, as the energy of a step has them.
+///
+/// With the factor `c` and the response `g` of the step to curvature ([`model::Calibration`]), and `q' = 3/(4 eps) (1 - u^2)` for the slope of
+/// the optimal profile, the residual becomes `V[u] - u + g tautilde c0 q'`, and
+///
+/// `A = int eps/2 |grad u|^2 + Psi(u)/(2 eps)`, `Psi(u) = 9/16 (1 - u^2)^2`,    `V = int (2 + 3 u - u^3)/4`.
+///
+/// On the optimal profile the derivatives of both by `u` are displacements, `h eps q'` and `eps q'`, so that they do not bend it; see
+/// `docs/algorithm.md`.
+#[derive(Clone, Debug)]
+pub struct HelfrichTerms<const D: usize> {
+    eps: f64,
+    /// Factor of `1 - u^2` in the residual.
+    shift: f64,
+    /// Factors of the densities of `A` and `V`, relative to `1/2 (V[u] - u)^2`.
+    tension: f64,
+    pressure: f64,
+    /// Kernel of the negative Laplacian.
+    laplacian: Tensor<D>,
+}
+
+impl<const D: usize> HelfrichTerms<D> {
+    /// The terms in a flow with these parameters, by a step with this response to curvature.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for values that are not finite.
+    pub fn new(
+        helfrich: Helfrich,
+        response: f64,
+        params: &FlowParams,
+        grid: &Grid<D>,
+        device: &ComputeDevice,
+    ) -> Result<Self, Error> {
+        helfrich.check()?;
+        let (eps, tautilde) = (params.eps, params.mcf_step);
+        // A step weighs 1/2 |V[u] - u|^2 by tau m / (c tautilde^2), and the energy by tau m / eps.
+        let unit = params.calibration.energy * tautilde * tautilde / eps;
+        Ok(Self {
+            eps,
+            shift: 0.75 / eps * response * tautilde * helfrich.spontaneous_curvature,
+            tension: unit * helfrich.tension,
+            pressure: unit * helfrich.pressure,
+            laplacian: device.tensor(&negative_laplacian::<D>(grid.spacing()), [WIDTH; D]),
+        })
+    }
+
+    /// The residual that vanishes at the spontaneous curvature.
+    pub(crate) fn shifted(&self, residual: Tensor<D>, u: &Tensor<D>) -> Tensor<D> {
+        if self.shift == 0.0 {
+            return residual;
+        }
+        residual + well(u) * self.shift
+    }
+
+    /// `sigma A + p V`, if there is any of it.
+    pub(crate) fn sizes(&self, u: &Tensor<D>) -> Option<Tensor<1>> {
+        let tension = (self.tension != 0.0).then(|| {
+            let kernel = self.laplacian.clone().to_device(&u.device());
+            let gradient = u.clone() * circular_convolution(u.clone(), kernel, false);
+            let well = well(u);
+            let double_well = well.clone() * well * (9.0 / 16.0);
+            (gradient * self.eps + double_well / self.eps).sum() * (0.5 * self.tension)
+        });
+        let pressure = (self.pressure != 0.0).then(|| {
+            let cube = u.clone() * u.clone() * u.clone();
+            ((u.clone() * 3.0 - cube) + 2.0).sum() * (0.25 * self.pressure)
+        });
+        match (tension, pressure) {
+            (Some(tension), Some(pressure)) => Some(tension + pressure),
+            (tension, pressure) => tension.or(pressure),
+        }
+    }
+}
+
+/// `1 - u^2`
+fn well<const D: usize>(u: &Tensor<D>) -> Tensor<D> {
+    (u.clone() * u.clone()).neg() + 1.0
+}
+
+/// Row-major kernel of minus the sum of second differences along the axes.
+fn negative_laplacian<const D: usize>(spacing: f64) -> Vec<f64> {
+    let centre = WIDTH / 2;
+    let mut kernel = vec![0.0; WIDTH.pow(D as u32)];
+    let middle = centre * (0..D).map(|axis| WIDTH.pow(axis as u32)).sum::<usize>();
+    for axis in 0..D {
+        let stride = WIDTH.pow(axis as u32);
+        for offset in 0..WIDTH {
+            let weight = SECOND_DIFFERENCE[offset.abs_diff(centre)];
+            kernel[middle + offset * stride - centre * stride] -= weight / (spacing * spacing);
+        }
+    }
+    kernel
+}

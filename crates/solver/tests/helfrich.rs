@@ -1,0 +1,312 @@
+//! Spontaneous curvature, tension and pressure.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use crate::common::{ball, device, network, network_3d, noise, params};
+use burn::tensor::Tensor;
+use geometry::zero_set::ball_perimeter;
+use geometry::{Field, Grid, ZeroSet};
+use linearize::taylor::{halvings, remainder};
+use model::{MeanCurvatureOperator, Network, Ratios, Shipped};
+use solver::{
+    Error, Helfrich, HelfrichTerms, MinimizingMovement, Objective, Precision, WillmoreFlow,
+};
+
+const ALL: Helfrich = Helfrich {
+    spontaneous_curvature: 3.0,
+    tension: 7.0,
+    pressure: -11.0,
+};
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn energy_with<const D: usize>(
+    helfrich: Helfrich,
+    network: &Network,
+    grid: &Grid<D>,
+) -> MinimizingMovement<D> {
+    let device = device();
+    let operator = MeanCurvatureOperator::new(network, &device).unwrap();
+    let terms = HelfrichTerms::new(helfrich, 1.0, &params(grid), grid, &device).unwrap();
+    let (cells, precision) = (grid.cells(), Precision::Device);
+    MinimizingMovement::with_terms(Arc::new(operator), cells, precision, Some(&terms), &device)
+        .unwrap()
+}
+
+fn derivatives<const D: usize>(network: &Network, cells: usize) {
+    let grid = Grid::<D>::centred(cells, 1.0).unwrap();
+    let device = device();
+    let tensor = |x: &[f64]| -> Tensor<D> { device.tensor(x, grid.shape()) };
+    let rough = |radius: f64, seed: u64| -> Vec<f64> {
+        let field = ball(grid, radius);
+        let noise = noise(grid.len(), seed);
+        (field.values().iter().zip(noise))
+            .map(|(u, x)| u + 0.05 * x)
+            .collect()
+    };
+    let (u, previous) = (rough(0.3, 1), rough(0.28, 2));
+    let (p, q) = (noise(grid.len(), 3), noise(grid.len(), 4));
+    let mut energy = energy_with(ALL, network, &grid);
+    energy.set(&tensor(&previous), 300.0).unwrap();
+
+    let (_, gradient) = energy.evaluate(&tensor(&u)).unwrap();
+    let gradient = device.values(gradient).unwrap();
+    let mut apply = |p: &[f64]| {
+        let product = energy.hessian_vector_product(&tensor(p)).unwrap();
+        device.values(product).unwrap()
+    };
+    let (hp, hq) = (apply(&p), apply(&q));
+    let scale = (dot(&hp, &hp) * dot(&q, &q)).sqrt();
+    assert!((dot(&hp, &q) - dot(&p, &hq)).abs() < 1e-12 * scale);
+
+    let mut at = |t: f64| {
+        let moved: Vec<f64> = u.iter().zip(&p).map(|(u, p)| u + t * p).collect();
+        energy.value(&tensor(&moved)).unwrap()
+    };
+    let (first, second) = (dot(&gradient, &p), dot(&hp, &p));
+    for (derivatives, expected) in [(vec![first], 2.0), (vec![first, second], 3.0)] {
+        let rate = remainder(&mut at, &derivatives, &halvings(0.5, 12), 1e-14).rate();
+        let rate = rate.unwrap();
+        assert!((rate - expected).abs() < 0.1, "{expected}: {rate}");
+    }
+}
+
+#[test]
+fn derivatives_pass_taylor_tests() {
+    derivatives::<2>(&network(), 32);
+    derivatives::<3>(&network_3d(), 20);
+}
+
+/// `A` and `V` of a ball, and their derivatives by its radius.
+fn sizes<const D: usize>(network: &Network, cells: usize) {
+    let grid = Grid::<D>::centred(cells, 1.0).unwrap();
+    let eps = params(&grid).eps;
+    let of = |helfrich: Helfrich, radius: f64| {
+        let mut energy = energy_with(helfrich, network, &grid);
+        let u = device().tensor(ball(grid, radius).values(), grid.shape());
+        energy.set(&u, 1.0).unwrap();
+        let scale = eps * grid.cell_volume() / params(&grid).mcf_step.powi(2);
+        let bending = {
+            let mut energy = energy_with(Helfrich::default(), network, &grid);
+            energy.set(&u, 1.0).unwrap();
+            energy.value(&u).unwrap()
+        };
+        scale * (energy.value(&u).unwrap() - bending)
+    };
+    let (tension, pressure) = (stretched(1.0), pressed(1.0));
+    let d = D as f64;
+    let (radius, step) = (0.3, 1e-3);
+    let slope =
+        |helfrich| (of(helfrich, radius + step) - of(helfrich, radius - step)) / (2.0 * step);
+    // The second moment of eps q'^2, in which shells beside the interface are larger and smaller.
+    let moment = 4.0 / 27.0 * (PI * PI - 6.0) * (eps / radius).powi(2);
+    let beside = 0.5 * (d - 1.0) * (d - 2.0) * moment;
+    let volume = ball_volume(D) * radius.powi(D as i32);
+    for (name, found, exact) in [
+        (
+            "A",
+            of(tension, radius),
+            d * volume / radius * (1.0 + beside),
+        ),
+        (
+            "V",
+            of(pressure, radius),
+            volume * (1.0 + 0.5 * d * (d - 1.0) * moment),
+        ),
+        (
+            "dA/dR",
+            slope(tension),
+            d * (d - 1.0) * volume / radius.powi(2),
+        ),
+        (
+            "dV/dR",
+            slope(pressure),
+            d * volume / radius * (1.0 + beside),
+        ),
+    ] {
+        assert!(
+            (found / exact - 1.0).abs() < 1e-3,
+            "{D} {name}: {found} {exact}"
+        );
+    }
+}
+
+/// The volume of the unit ball.
+fn ball_volume(dimension: usize) -> f64 {
+    let d = dimension as i32;
+    (ball_perimeter(dimension, 1.0) / f64::from(d)).powi(d)
+}
+
+#[test]
+fn sizes_of_balls_are_those_of_the_profile() {
+    sizes::<2>(&network(), 64);
+    sizes::<3>(&network_3d(), 32);
+}
+
+fn flow<const D: usize>(u: &Field<D>, helfrich: Helfrich) -> WillmoreFlow<D> {
+    let ratios = Ratios {
+        dimension: D,
+        width: 17,
+        eps_over_h: 2.0,
+        step_over_h2: 1.0,
+    };
+    let network = Shipped::Accurate.find(ratios).unwrap();
+    let calibration = network.calibration().unwrap();
+    let mut params = params(u.grid());
+    params.calibration = calibration.factors;
+    let mut flow = WillmoreFlow::with_network(&network, u, params, &device()).unwrap();
+    flow.set_energy(helfrich, calibration.response()).unwrap();
+    flow
+}
+
+fn radius<const D: usize>(flow: &WillmoreFlow<D>) -> f64 {
+    let u = flow.field().unwrap();
+    let volume = ZeroSet::of(&u, params(u.grid()).eps).unwrap().volume;
+    (volume / ball_volume(D)).powf(1.0 / D as f64)
+}
+
+/// The speed of a ball of radius `R`: minus the derivative of its energy by `R`, over its perimeter.
+fn speed(dimension: usize, helfrich: Helfrich, radius: f64) -> f64 {
+    let Helfrich {
+        spontaneous_curvature: c0,
+        tension,
+        pressure,
+    } = helfrich;
+    let k = (dimension - 1) as f64;
+    // w = |S| (1/2 (k/R - c0)^2 R^k + sigma R^k + p R^(k+1) / (k+1))
+    let excess = k / radius - c0;
+    excess * k / radius.powi(2)
+        - 0.5 * k * excess.powi(2) / radius
+        - k * tension / radius
+        - pressure
+}
+
+/// The radius after a time, by small Runge-Kutta steps.
+fn exact(dimension: usize, helfrich: Helfrich, start: f64, time: f64) -> f64 {
+    const STEPS: usize = 1000;
+    let dt = time / STEPS as f64;
+    (0..STEPS).fold(start, |r, _| {
+        let middle = r + 0.5 * dt * speed(dimension, helfrich, r);
+        r + dt * speed(dimension, helfrich, middle)
+    })
+}
+
+const fn bent(c0: f64) -> Helfrich {
+    Helfrich {
+        spontaneous_curvature: c0,
+        tension: 0.0,
+        pressure: 0.0,
+    }
+}
+
+const fn stretched(tension: f64) -> Helfrich {
+    Helfrich {
+        spontaneous_curvature: 0.0,
+        tension,
+        pressure: 0.0,
+    }
+}
+
+const fn pressed(pressure: f64) -> Helfrich {
+    Helfrich {
+        spontaneous_curvature: 0.0,
+        tension: 0.0,
+        pressure,
+    }
+}
+
+/// Four steps of either order move the radius as the ordinary differential equation does, up to this part of the motion.
+fn follows_the_equation<const D: usize>(
+    u: &Field<D>,
+    start: f64,
+    helfrich: Helfrich,
+    tau: f64,
+    bounds: [f64; 2],
+) {
+    for (second, bound) in [false, true].into_iter().zip(bounds) {
+        let mut flow = flow(u, helfrich);
+        for _ in 0..4 {
+            if second {
+                flow.advance_second_order(tau, |_| true).unwrap();
+            } else {
+                flow.advance(tau).unwrap();
+            }
+        }
+        let found = radius(&flow) - start;
+        let expected = exact(D, helfrich, start, flow.time()) - start;
+        let error = found / expected - 1.0;
+        assert!(
+            error.abs() < bound,
+            "{helfrich:?}, second order {second}: {found} {expected} {error}"
+        );
+    }
+}
+
+#[test]
+fn discs_follow_the_ordinary_differential_equation() {
+    let grid = Grid::<2>::per_unit(128, 1.0).unwrap();
+    let (u, tau) = (ball(grid, 0.25), grid.spacing().powi(2));
+    for helfrich in [bent(6.0), stretched(16.0), pressed(64.0)] {
+        follows_the_equation(&u, 0.25, helfrich, tau, [0.02, 0.004]);
+    }
+}
+
+/// What is left is of the second order in `eps / R = .18`.
+#[test]
+fn balls_follow_the_ordinary_differential_equation() {
+    let grid = Grid::<3>::per_unit(40, 1.0).unwrap();
+    let (u, tau) = (ball(grid, 0.28), 0.25 * grid.spacing().powi(2));
+    for (helfrich, bound) in [(stretched(6.0), 0.01), (pressed(40.0), 0.03)] {
+        follows_the_equation(&u, 0.28, helfrich, tau, [bound; 2]);
+    }
+}
+
+/// The radius at rest, over the exact one.
+fn at_rest<const D: usize>(grid: Grid<D>, start: f64, helfrich: Helfrich, expected: f64) -> f64 {
+    assert!(speed(D, helfrich, expected).abs() < 1e-9);
+    let mut flow = flow(&ball(grid, start), helfrich);
+    for tau in [1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, 2e-3, 2e-3, 2e-3, 2e-3] {
+        flow.advance(tau).unwrap();
+    }
+    radius(&flow) / expected
+}
+
+/// Up to the second order in `eps / R = .08`.
+#[test]
+fn discs_come_to_rest_at_their_exact_radius() {
+    let grid = Grid::<2>::per_unit(128, 1.0).unwrap();
+    for helfrich in [bent(5.0), bent(-5.0), stretched(12.5), pressed(62.5)] {
+        let ratio = at_rest(grid, 0.202, helfrich, 0.2);
+        println!("{helfrich:?}: {ratio:.5}");
+        assert!((ratio - 1.0).abs() < 0.01, "{helfrich:?}: {ratio}");
+    }
+}
+
+/// A sphere of the spontaneous curvature has no energy; its radius is right to the second order in the width of the interface.
+#[test]
+fn balls_come_to_rest_at_their_spontaneous_curvature() {
+    let error = |cells| {
+        let grid = Grid::<3>::per_unit(cells, 1.0).unwrap();
+        1.0 - at_rest(grid, 0.24, bent(8.0), 0.25)
+    };
+    let [coarse, fine] = [error(32), error(44)];
+    println!("{coarse:.5} {fine:.5}");
+    let order = (coarse / fine).ln() / (44.0_f64 / 32.0).ln();
+    assert!(
+        fine.abs() < 0.03 && (order - 2.0).abs() < 0.5,
+        "{coarse} {fine} {order}"
+    );
+}
+
+#[test]
+fn what_is_not_finite_is_refused() {
+    let u = ball(Grid::<2>::per_unit(64, 1.0).unwrap(), 0.2);
+    let mut flow = flow(&u, Helfrich::default());
+    for value in [f64::NAN, f64::INFINITY] {
+        let error = flow.set_energy(bent(value), 1.0).unwrap_err();
+        assert!(matches!(error, Error::Parameter { .. }), "{error}");
+    }
+}
