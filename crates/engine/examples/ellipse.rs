@@ -1,7 +1,8 @@
 //! Willmore flow of an ellipse, which becomes a circle and grows.
 
 use engine::{
-    Case, ErrorControl, Flow, Held, Measure, Operator, Run, Scales, Scheme, Stop, TimeSteps,
+    Case, ErrorControl, Flow, Held, Helfrich, Measure, Operator, Run, Scales, Scheme, Stop,
+    TimeSteps,
 };
 use geometry::{Grid, ZeroSet, phase_field, shapes::Ellipse};
 use model::Networks;
@@ -18,6 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         region: None,
         held: Held::default(),
         flow: Flow::Willmore,
+        energy: Helfrich::default(),
         operator: Operator::learned(Scheme::Accurate, network)?,
         scales,
         steps: TimeSteps::controlled(ErrorControl::default()),

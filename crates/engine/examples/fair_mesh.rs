@@ -1,6 +1,6 @@
 //! Takes the noise off a closed mesh by Willmore flow: fair_mesh IN OUT, or the built-in lever with noise.
 
-use engine::{Case, Flow, Held, Method, Operator, Run, Scales, Scheme, StepRule, Stop};
+use engine::{Case, Flow, Held, Helfrich, Method, Operator, Run, Scales, Scheme, StepRule, Stop};
 use geometry::{Grid, Placement, SignedDistance, optimal_profile};
 use model::Networks;
 use operators::ComputeDevice;
@@ -37,6 +37,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         region: None,
         held: Held::default(),
         flow: Flow::Willmore,
+        energy: Helfrich::default(),
         operator: Operator::new(accurate, &networks, &needed, &grid, &scales)?,
         scales,
         steps: StepRule::Doubling(Fairing::first_step(grid.spacing())).into(),
