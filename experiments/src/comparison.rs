@@ -415,24 +415,32 @@ impl Comparison<'_> {
             let points = run.from_exact.iter().map(|(&k, &d)| [time(k), d]);
             self.study.series(run.variant, points.collect())
         });
-        let new = self
-            .second_order
-            .iter()
-            .zip([Marker::Circle, Marker::Diamond]);
-        let new = new.map(|(run, marker)| {
+        // Where the study's colours end.
+        let looks = [
+            (Colour::Grey, LineStyle::Solid),
+            (Colour::Grey, LineStyle::Dotted),
+        ];
+        let second_order = || self.second_order.iter().zip(looks);
+        let new = second_order().map(|(run, (colour, style))| {
             let points: Vec<[f64; 2]> = (run.at.iter())
                 .map(|(&k, at)| [time(k), at.distance])
                 .collect();
-            let series = Series::new(&run.label, points).with_colour(Colour::Black);
-            series.with_marker(marker)
+            let series = Series::new(&run.label, points).with_style(style);
+            series.with_colour(colour).with_marker(Marker::Circle)
         });
+        let entries = second_order()
+            .map(|(run, (colour, style))| LegendEntry::line(&run.label, colour, style));
         let chart = |title, y| LineChart::new(title, Axis::linear("time t"), Axis::log(y));
         let papers = chart("to the reference", "L² distance");
         let exact = chart("to the exact flow", "largest distance of the curves");
         let reference = self.about_the_reference();
         Figure::new(format!("{}: distances over time", self.setting.title), 2)
             .with_panel(self.study.chart(papers, curves))
-            .with_panel(self.study.chart(exact, truths.chain(new)))
+            .with_panel(
+                self.study
+                    .chart(exact, truths.chain(new))
+                    .with_entries(entries),
+            )
             .with_shared_legend()
             .with_note(format!("ε = 2⁻⁶, time step 2⁻¹⁴. {reference}"))
     }
