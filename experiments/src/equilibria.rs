@@ -48,8 +48,10 @@ impl Equilibrium {
     /// Ramanujan to the length and of Thomsen to the area, whose errors the first steps take away.
     fn half_axes<const D: usize>(&self) -> [f64; 2] {
         const THOMSEN: f64 = 1.6075;
+        // More slender spheroids are much longer than the dumbbells that they become.
+        let ratio = self.ratio.max(if self.prolate { 0.7 } else { 0.0 });
         let axes = |slenderness: f64| {
-            let across = (self.ratio / slenderness).powf(1.0 / D as f64);
+            let across = (ratio / slenderness).powf(1.0 / D as f64);
             [across, slenderness * across]
         };
         let perimeter = |[a, c]: [f64; 2]| match D {
