@@ -4,14 +4,14 @@
 use std::f64::consts::PI;
 use std::path::Path;
 
-use engine::{Samples, Trajectory, minimizations};
+use engine::{Order, Samples, Stop, TimeSteps, Trajectory, minimizations};
 use geometry::Error as GeometryError;
 use geometry::exact::{mean_curvature_radius, willmore_radius};
 use geometry::measure::l2_distance;
 use geometry::shapes::Ball;
 use indicatif::ProgressBar;
 use runs::Interrupt;
-use solver::StepRecord;
+use solver::{NewtonParams, StepRecord};
 
 use crate::harness::{in_parallel, workers};
 use crate::networks::{EPS, STEP};
@@ -76,7 +76,7 @@ fn exact(flow: Flow, radius: f64, grid: Grid<2>, time: f64) -> Result<Field<2>, 
 fn case(
     (flow, operator, n): (Flow, &Operator, usize),
     radius: f64,
-    steps: usize,
+    (steps, time_steps): (usize, TimeSteps),
 ) -> Result<Case<2>, Error> {
     let cells = box_cells(flow, radius, steps, n);
     let grid = Grid::<2>::centred(cells, cells as f64 / n as f64)?;
@@ -86,10 +86,16 @@ fn case(
     }));
     let shape = format!("circle r = {radius:.4}");
     let initial = exact(flow, radius, grid, 0.0)?;
-    Ok(Case {
+    let mut case = Case {
         measures,
         ..study::case((flow, operator), &shape, initial, (STEP, steps))
-    })
+    };
+    if time_steps.order != Order::First {
+        case.steps = time_steps;
+        case.stops = vec![Stop::Time(steps as f64 * STEP)];
+        case.scales.newton = NewtonParams::second_order();
+    }
+    Ok(case)
 }
 
 /// What came out for one circle.
@@ -119,10 +125,12 @@ pub struct Ensemble {
 }
 
 impl Ensemble {
-    /// Runs `count` circles side by side, largest first; those of an interrupted run are in `folder`.
+    /// Runs `count` circles side by side up to the time of so many steps of `2^-14`, which are made unless others of second order are given;
+    /// those of an interrupted run are in `folder`.
     pub fn run(
         (variant, operator): &(Variant, Operator),
         (count, steps): (usize, usize),
+        time_steps: Option<TimeSteps>,
         device: &ComputeDevice,
         folder: &Path,
         bar: &ProgressBar,
@@ -130,13 +138,16 @@ impl Ensemble {
         let Variant { flow, n, .. } = *variant;
         let radii = radii(count);
         let circles = in_parallel(count, workers(device), |i| {
-            let case = case((flow, operator, n), radii[i], steps)?;
-            let folder = folder.join(format!("{}-n{n}-{}-{i:02}", flow.key(), operator.key()));
+            let rule = time_steps.unwrap_or(StepRule::Constant(STEP).into());
+            let case = case((flow, operator, n), radii[i], (steps, rule))?;
+            let (flow, operator) = (flow.key(), operator.key());
+            let order = time_steps.map_or("", |_| "-second_order");
+            let folder = folder.join(format!("{flow}-n{n}-{operator}{order}-{i:02}"));
             let (ends, never) = (Samples::every(usize::MAX), Interrupt::never());
             let trajectory = Trajectory::of(case, device, &folder, &ends, &mut [], &never)?;
             let trajectory = trajectory.expect("nobody interrupts it");
             let (initial, end) = (&trajectory.case.initial, steps as f64 * STEP);
-            let last = exact(flow, radii[i], *initial.grid(), end)?;
+            let last = exact(variant.flow, radii[i], *initial.grid(), end)?;
             bar.inc(1);
             Ok(Circle {
                 radius: radii[i],
@@ -158,6 +169,11 @@ impl Ensemble {
     /// Mean error after `k` steps.
     pub fn mean_error(&self, k: usize) -> f64 {
         self.mean(|circle| circle.error(k))
+    }
+
+    /// Mean error at the end.
+    pub fn last_error(&self) -> f64 {
+        self.mean(|circle| circle.error(circle.trajectory.records.len()))
     }
 
     /// Largest and smallest error after `k` steps.

@@ -1,12 +1,10 @@
-//! Shapes without a known solution: all methods and resolutions against a finer run.
+//! A shape by all methods and resolutions, against a finer run as in the paper, and against the exact flow.
 
 use std::collections::BTreeMap;
 
 use clap::{CommandFactory, FromArgMatches};
 use engine::{Samples, Trajectory, energy_increases, minimizations};
-use geometry::Error as GeometryError;
 use geometry::measure::{perimeter, zero_set_volume};
-use geometry::shapes::Cross;
 use report::{Curve, OutputDir, Shapes, Table};
 use solver::StepRecord;
 
@@ -15,6 +13,7 @@ use crate::networks::{EPS, STEP};
 use crate::prelude::*;
 use crate::steps::{self, Rows};
 use crate::study::{self, Study, StudyOptions, Variant};
+use crate::truth::{self, CELLS, Reached, STRICT, Sample, Truth, USUAL};
 
 /// A shape and the flow it undergoes.
 pub struct Setting {
@@ -26,10 +25,8 @@ pub struct Setting {
     pub about: &'static str,
     /// Name of the shape with its measures.
     pub shape: &'static str,
-    pub initial: fn(Grid<2>) -> Result<Field<2>, GeometryError>,
+    pub sample: Sample<2>,
     pub flow: Flow,
-    /// Side of the periodic box.
-    pub side: f64,
     /// Time steps of `2^-14`.
     pub steps: usize,
     /// Steps whose shapes are drawn.
@@ -38,11 +35,6 @@ pub struct Setting {
     pub reference_ratio: usize,
     /// Half the width of the window of the shapes.
     pub window: f64,
-}
-
-/// The non-convex cross: arms of half length 0.8 and half width 0.27.
-pub fn cross(grid: Grid<2>) -> Result<Field<2>, GeometryError> {
-    phase_field(grid, &Cross::new(0.8, 0.27)?, EPS)
 }
 
 /// The options of a comparison. Runs are kept in the folder `fields` of the output; an interrupted one continues.
@@ -82,6 +74,16 @@ struct Compared {
     ratio: usize,
     /// Steps of `2^-14` and `L2` distances; none for the reference itself.
     errors: BTreeMap<usize, f64>,
+    /// Such steps and the largest distances to the exact curve.
+    from_exact: BTreeMap<usize, f64>,
+}
+
+/// Runs of second order at the times at which they are compared with the exact flow.
+struct SecondOrder {
+    /// As in metrics and as in the figure.
+    key: String,
+    label: String,
+    at: BTreeMap<usize, Reached>,
 }
 
 /// Everything a comparison computed.
@@ -92,6 +94,9 @@ struct Comparison<'a> {
     runs: Vec<Compared>,
     /// The reference, and perhaps the same at half its resolution, to estimate its error.
     references: Vec<Compared>,
+    exact: BTreeMap<usize, Truth>,
+    /// For Willmore flow.
+    second_order: Vec<SecondOrder>,
 }
 
 fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
@@ -121,7 +126,7 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
         "cells": cells,
         "reference_n": reference_n,
         "reference_steps_per_step": setting.reference_ratio,
-        "side": setting.side,
+        "side": setting.sample.side,
         "eps": EPS,
         "time_step": STEP,
         "steps": steps,
@@ -156,12 +161,27 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
     for run in runs.iter_mut().chain(half) {
         run.compare(&reference[0], steps)?;
     }
+    let times: Vec<usize> = sampled(steps).filter(|k| *k > 0).collect();
+    let exact = session.phase("the exact flow", |_| {
+        let at: Vec<f64> = times.iter().map(|k| time(*k)).collect();
+        setting.sample.exact(flow, &at)
+    })?;
+    let exact: BTreeMap<_, _> = times.into_iter().zip(exact).collect();
+    for run in runs.iter_mut().chain(&mut references) {
+        run.compare_with_exact(setting, &exact)?;
+    }
+    let second_order = match flow {
+        Flow::Willmore => setting.second_order(&mut session, steps, &exact)?,
+        Flow::MeanCurvature => Vec::new(),
+    };
     let comparison = Comparison {
         setting,
         steps,
         study,
         runs,
         references,
+        exact,
+        second_order,
     };
     comparison.write(session)
 }
@@ -174,7 +194,8 @@ impl Setting {
         (variant, operator): (Variant, &Operator),
         (steps, ratio): (usize, usize),
     ) -> Result<Compared, Error> {
-        let initial = (self.initial)(Grid::<2>::per_unit(variant.n, self.side)?)?;
+        let grid = Grid::<2>::per_unit(variant.n, self.sample.side)?;
+        let initial = (self.sample.initial)(grid, EPS)?;
         let time = (STEP / ratio as f64, steps * ratio);
         let mut case = study::case((self.flow, operator), self.shape, initial, time);
         case.measures = Measure::crossings(0.0);
@@ -190,7 +211,51 @@ impl Setting {
             trajectory,
             ratio,
             errors: BTreeMap::new(),
+            from_exact: BTreeMap::new(),
         })
+    }
+
+    /// Controlled steps of second order with the accurate operator at two to `eps`, at the end and at halves of that time, and their
+    /// extrapolation to `eps = 0` from stricter steps.
+    fn second_order(
+        &self,
+        session: &mut Session<'_>,
+        steps: usize,
+        exact: &BTreeMap<usize, Truth>,
+    ) -> Result<Vec<SecondOrder>, Error> {
+        let halves = (steps / 8).checked_ilog2().unwrap_or(0);
+        let halves = halves.min(steps.trailing_zeros());
+        let marks: Vec<usize> = (0..=halves).rev().map(|k| steps >> k).collect();
+        let mut reached = |n, control, name| {
+            let time_steps = truth::controlled(control, time(steps), halves);
+            let run = self
+                .sample
+                .run(session, n, (name, time_steps, time(steps)))?;
+            let at = marks
+                .iter()
+                .map(|k| Ok((*k, Reached::of(&self.sample, &run, &exact[k])?)));
+            at.collect::<Result<BTreeMap<_, _>, Error>>()
+        };
+        let [double, single] = CELLS;
+        let controlled = reached(single, USUAL, "controlled")?;
+        let coarse = reached(double, STRICT, "controlled_strict")?;
+        let fine = reached(single, STRICT, "controlled_strict")?;
+        let extrapolated = fine.iter().map(|(k, fine)| {
+            let both = Reached::extrapolated(&coarse[k], fine, &exact[k]);
+            (*k, both)
+        });
+        Ok(vec![
+            SecondOrder {
+                key: format!("n{single}.controlled"),
+                label: format!("second order, controlled steps, n = {single}"),
+                at: controlled,
+            },
+            SecondOrder {
+                key: "extrapolated".to_owned(),
+                label: "second order, extrapolated to ε = 0".to_owned(),
+                at: extrapolated.collect(),
+            },
+        ])
     }
 }
 
@@ -219,6 +284,20 @@ impl Compared {
             let (own, its) = (k * self.ratio, k * reference.ratio);
             let l2 = (self.trajectory).distance(own, &reference.trajectory, its)?;
             self.errors.insert(k, l2);
+        }
+        Ok(())
+    }
+
+    fn compare_with_exact(
+        &mut self,
+        setting: &Setting,
+        exact: &BTreeMap<usize, Truth>,
+    ) -> Result<(), Error> {
+        for (&k, curve) in exact {
+            let field = self.trajectory.field(k * self.ratio)?;
+            let points = (setting.sample.level)(&field, EPS)?;
+            let distance = curve.outline().largest_distance_of(&points);
+            self.from_exact.insert(k, distance);
         }
         Ok(())
     }
@@ -283,19 +362,36 @@ impl Comparison<'_> {
             ("reference.l2_to_half_n", self.reference_difference().into()),
         ];
         session.metrics(self.setting.program, metrics)?;
+        self.metrics_of_exact(&mut session)?;
         session.finish(self.setting.title)
+    }
+
+    fn metrics_of_exact(&self, session: &mut Session<'_>) -> Result<(), Error> {
+        let program = self.setting.program;
+        for (k, curve) in &self.exact {
+            truth::record(session, &format!("{program}.exact"), *k, &curve.sizes())?;
+            let name = format!("{program}.reference.distance_to_exact.step{k}");
+            session.metric(&name, self.reference().from_exact.get(k).copied())?;
+        }
+        for run in &self.second_order {
+            let key = format!("{program}.{}", run.key);
+            (run.at.iter()).try_for_each(|(k, reached)| reached.record(session, &key, *k))?;
+        }
+        Ok(())
     }
 
     fn data(&self, output: &OutputDir) -> Result<(), Error> {
         let leading = &Variant::COLUMNS[1..];
-        let mut errors = Table::data(leading.iter().chain(&["step", "time", "l2"]));
+        let names = ["step", "time", "l2", "distance_to_exact"];
+        let mut errors = Table::data(leading.iter().chain(&names));
         for run in &self.runs {
             for (&step, &l2) in &run.errors {
-                errors.push(run.variant.row([step.into()], [time(step), l2]).skip(1))?;
+                let exact = run.from_exact.get(&step).copied().unwrap_or(0.0);
+                let row = run.variant.row([step.into()], [time(step), l2, exact]);
+                errors.push(row.skip(1))?;
             }
         }
         output.write("errors.csv", errors.to_csv()?)?;
-        output.write("errors.json", errors.to_json()?)?;
         let compared = self.runs.iter().map(|run| (run, "false"));
         let rows = compared.chain(self.references.iter().map(|run| (run, "true")));
         let rows = rows.map(|(run, reference)| Rows {
@@ -315,10 +411,28 @@ impl Comparison<'_> {
             let points = run.errors.iter().map(|(&k, &l2)| [time(k), l2]);
             self.study.series(run.variant, points.collect())
         });
-        let chart = LineChart::new("", Axis::linear("time t"), Axis::log("L² error"));
+        let truths = (self.runs.iter()).map(|run| {
+            let points = run.from_exact.iter().map(|(&k, &d)| [time(k), d]);
+            self.study.series(run.variant, points.collect())
+        });
+        let new = self
+            .second_order
+            .iter()
+            .zip([Marker::Circle, Marker::Diamond]);
+        let new = new.map(|(run, marker)| {
+            let points: Vec<[f64; 2]> = (run.at.iter())
+                .map(|(&k, at)| [time(k), at.distance])
+                .collect();
+            let series = Series::new(&run.label, points).with_colour(Colour::Black);
+            series.with_marker(marker)
+        });
+        let chart = |title, y| LineChart::new(title, Axis::linear("time t"), Axis::log(y));
+        let papers = chart("to the reference", "L² distance");
+        let exact = chart("to the exact flow", "largest distance of the curves");
         let reference = self.about_the_reference();
-        Figure::new(format!("{}: error over time", self.setting.title), 1)
-            .with_panel(self.study.chart(chart, curves))
+        Figure::new(format!("{}: distances over time", self.setting.title), 2)
+            .with_panel(self.study.chart(papers, curves))
+            .with_panel(self.study.chart(exact, truths.chain(new)))
             .with_shared_legend()
             .with_note(format!("ε = 2⁻⁶, time step 2⁻¹⁴. {reference}"))
     }
@@ -335,7 +449,8 @@ impl Comparison<'_> {
         rows.push((self.reference(), "reference".to_owned()));
         let label = |(run, label): &(&Compared, String)| format!("{label}\nn = {}", run.variant.n);
         let (shown, half) = (self.shown(), self.setting.window);
-        let note = format!("Orange: the reference. {}", self.about_the_reference());
+        let about = self.about_the_reference();
+        let note = format!("Orange: the reference. Blue: the exact flow. {about}");
         let mut figure = Figure::new(format!("{}: shapes", self.setting.title), shown.len())
             .with_column_labels(shown.iter().map(|&k| format!("t = {}", time_label(k))))
             .with_row_labels(rows.iter().map(label))
@@ -348,6 +463,10 @@ impl Comparison<'_> {
                 if !run.errors.is_empty() {
                     let reference = self.reference().loops(step)?;
                     panel = panel.with_curve(reference.with_colour(1).with_width(1.0));
+                }
+                if let Some(exact) = self.exact.get(&step) {
+                    let exact = Curve::new([exact.outline().points()]).with_colour(0);
+                    panel = panel.with_curve(exact.with_width(1.0));
                 }
                 figure = figure.with_panel(panel);
             }
@@ -365,11 +484,14 @@ impl Comparison<'_> {
             let error = |run: &Compared| run.errors.get(&k).copied();
             sheet = sheet.column(format!("error, step {k}"), Fixed(5), error);
         }
-        for k in 0..=self.steps {
+        for k in sampled(self.steps) {
             let energy = |run: &Compared| Some(run.trajectory.record(k)?.minimization?.energy);
             sheet = sheet
                 .metric(&format!("l2.step{k}"), |run| run.errors.get(&k).copied())
-                .metric(&format!("energy.step{k}"), energy);
+                .metric(&format!("energy.step{k}"), energy)
+                .metric(&format!("distance_to_exact.step{k}"), |run| {
+                    run.from_exact.get(&k).copied()
+                });
             for name in MEASURES {
                 sheet = sheet.metric(&format!("{name}.step{k}"), |run| {
                     run.trajectory.measures(k).ok()?.get(name).copied()
@@ -416,14 +538,5 @@ mod tests {
     fn times_are_written_as_in_the_paper() {
         let labels: Vec<String> = [0, 1, 32, 64, 96, 128].map(time_label).into();
         assert_eq!(labels, ["0", "2⁻¹⁴", "2⁻⁹", "2⁻⁸", "3·2⁻⁹", "2⁻⁷"]);
-    }
-
-    #[test]
-    fn the_cross_is_the_documented_one() {
-        let grid = Grid::<2>::per_unit(64, 2.0).unwrap();
-        let field = cross(grid).unwrap();
-        let area = geometry::measure::zero_set_volume(&field);
-        let exact = 2.0 * 1.6 * 0.54 - 0.54 * 0.54;
-        assert!((area - exact).abs() < 2e-3, "{area} {exact}");
     }
 }

@@ -1,8 +1,8 @@
 //! The harness of the experiments: options, errors, stored partial results, and the runs themselves.
 //!
-//! The programs in `src/bin` are thin: they read options, call what is here, and write figures, tables and summaries
-//! with the `report` crate. Numerics live in the library crates; the only computation here is the comparison with exact
-//! solutions.
+//! The [`programs`] read options, call what is here, and write figures, tables and summaries with the `report` crate; the
+//! executables only call them. Numerics live in the library crates; the only computation here is the comparison with
+//! exact solutions.
 //!
 //! ```
 //! use engine::Flow;
@@ -27,6 +27,7 @@
 
 pub mod circles;
 pub mod comparison;
+pub mod equilibria;
 mod error;
 pub mod harness;
 pub mod inpainting;
@@ -38,6 +39,7 @@ pub mod options;
 pub mod orders;
 pub mod prelude;
 pub mod products;
+pub mod programs;
 pub mod quality;
 pub mod session;
 pub mod sheet;
@@ -46,5 +48,6 @@ pub mod study;
 pub mod surfaces;
 pub mod timing;
 pub mod training;
+pub mod truth;
 
 pub use error::{Error, require};

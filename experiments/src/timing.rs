@@ -7,10 +7,9 @@ use geometry::shapes::Ball;
 use indicatif::ProgressBar;
 use solver::StepRecord;
 
-use crate::comparison::cross;
 use crate::networks::{Chosen, EPS, NetworkOptions, STEP, convergence_network};
 use crate::prelude::*;
-use crate::{study, surfaces};
+use crate::{study, surfaces, truth};
 
 /// What was measured, under the same names in tables, metrics and JSON; what a system does not tell is absent.
 pub type Numbers = BTreeMap<&'static str, f64>;
@@ -49,7 +48,10 @@ pub fn plane(operator: &Operator, n: usize, steps: usize, quick: bool) -> Result
         let disc = Ball::new([0.0, 0.0], 0.2)?;
         ("disc", phase_field(Grid::per_unit(n, 0.75)?, &disc, EPS)?)
     } else {
-        ("cross", cross(Grid::per_unit(n, 2.0)?)?)
+        (
+            "cross",
+            (truth::CROSS.initial)(Grid::per_unit(n, truth::CROSS.side)?, EPS)?,
+        )
     };
     let flow = (Flow::Willmore, operator);
     Ok(study::case(flow, shape, initial, (STEP, steps)))

@@ -1,5 +1,6 @@
 //! The compiled programs: what they refuse, and the quick convergence test.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -14,6 +15,7 @@ use report::Summary;
 const CALIBRATION: &str = env!("CARGO_BIN_EXE_calibration");
 const CIRCLES: &str = env!("CARGO_BIN_EXE_circle_convergence");
 const DENOISING: &str = env!("CARGO_BIN_EXE_denoising");
+const ELASTICA: &str = env!("CARGO_BIN_EXE_elastica");
 const INPAINTING: &str = env!("CARGO_BIN_EXE_inpainting_2d");
 const LEARNED: &str = env!("CARGO_BIN_EXE_learned_networks");
 const CROSS: &str = env!("CARGO_BIN_EXE_cross");
@@ -24,6 +26,7 @@ const TIMING: &str = env!("CARGO_BIN_EXE_timing_tables");
 const SPHERES: &str = env!("CARGO_BIN_EXE_spheres");
 const DISK_AND_CUBE: &str = env!("CARGO_BIN_EXE_disk_and_cube");
 const TRAIN: &str = env!("CARGO_BIN_EXE_train_networks");
+const VESICLES: &str = env!("CARGO_BIN_EXE_vesicles");
 
 #[test]
 fn devices_that_are_unknown_or_not_compiled_in() {
@@ -174,7 +177,7 @@ fn the_quick_convergence_test_is_accurate_and_reproducible() {
         assert!(read(&results[0], &format!("{name}.svg")).contains("quick run"));
         assert!(results[0].join(format!("{name}.png")).exists());
     }
-    for name in ["curves.json", "steps.json", "errors.md"] {
+    for name in ["curves.csv", "steps.csv", "errors.md"] {
         assert!(results[0].join(name).exists(), "{name}");
     }
     assert!(!results[0].join("partial").exists());
@@ -313,15 +316,19 @@ fn the_quick_calibration_predicts_the_energies_and_installs_the_network() {
     let summary = Summary::from_json(&summary).unwrap();
     let c = summary.get("d2_k17_eps2_step1.energy").unwrap();
     assert!((c - 0.932).abs() < 0.002, "{c}");
-    let discs = fs::read_to_string(folder.join("discs.json")).unwrap();
-    let discs: Vec<serde_json::Value> = serde_json::from_str(&discs).unwrap();
+    let discs = fs::read_to_string(folder.join("discs.csv")).unwrap();
+    let mut discs = discs.lines().map(|line| line.split(','));
+    let names: Vec<&str> = discs.next().unwrap().collect();
+    let discs: Vec<BTreeMap<_, _>> = discs
+        .map(|row| names.iter().copied().zip(row).collect())
+        .collect();
     assert_eq!(discs.len(), 8);
     for disc in &discs {
-        let number = |name: &str| disc[name].as_f64().unwrap();
+        let number = |name: &str| disc[name].parse::<f64>().unwrap();
         let ratio = number("measured") / number("predicted");
-        assert!((ratio - 1.0).abs() < 0.008, "{disc}");
-        if disc["odd_part"] == true {
-            assert!((number("calibrated") - 1.0).abs() < 0.01, "{disc}");
+        assert!((ratio - 1.0).abs() < 0.008, "{disc:?}");
+        if disc["odd_part"] == "true" {
+            assert!((number("calibrated") - 1.0).abs() < 0.01, "{disc:?}");
         }
     }
     let name = "networks/d2_k17_eps2_step1.safetensors";
@@ -489,6 +496,32 @@ fn the_quick_timing_table_has_a_row_for_every_method() {
         assert!(number("seconds") >= number("measured_seconds"), "{row}");
     }
     assert!(metric("armadillo.hybrid.hvp") >= 1.0 && metric("armadillo.fe_implicit.hvp") >= 1.0);
+}
+
+#[test]
+fn an_elastic_curve_keeps_its_length_and_area_and_has_the_exact_energy() {
+    let root = tempfile::tempdir().unwrap();
+    let summary = quick_summary(ELASTICA, root.path());
+    let metric = |name: &str| summary.get(&format!("elastica.q0.95.{name}")).unwrap();
+    let close = |name: &str, exact: &str, tolerance: f64| {
+        let (value, exact) = (metric(name), metric(exact));
+        assert!(
+            (value / exact - 1.0).abs() < tolerance,
+            "{name}: {value}, exact {exact}"
+        );
+    };
+    close("w_over_circle", "exact", 1e-3);
+    close("tension", "exact_tension", 0.02);
+    close("pressure", "exact_pressure", 0.02);
+    assert!(metric("length_drift") < 1e-9 && metric("area_drift") < 1e-9);
+}
+
+#[test]
+#[ignore = "a whole quick run: see scripts/test_long"]
+fn the_quick_vesicle_keeps_its_area_and_volume() {
+    let root = tempfile::tempdir().unwrap();
+    let summary = quick_summary(VESICLES, root.path());
+    assert!(summary.get("vesicles.prolate.v0.95.w_over_8pi").unwrap() < 1.3);
 }
 
 /// The metrics of a quick run into the folder `out`.

@@ -5,11 +5,11 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::{self, outcome};
+use chacha20::ChaCha8Rng;
 use geometry::shapes::{Ball, Cuboid};
 use geometry::{Field, Grid, npy, phase_field, vti};
 use images::{Drawing, Frame};
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use render::Rgb;
 use surfaces::ClosedMesh;
 

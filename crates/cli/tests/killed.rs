@@ -4,8 +4,8 @@ use std::process::Child;
 use std::time::{Duration, Instant};
 
 use crate::common::{assert_same, committed, run, start, text, wait_for, with_output};
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use chacha20::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 
 /// Runs with a commit after every step, as far as they go.
 const RUNS: [(u64, &[&str]); 2] = [

@@ -4,8 +4,8 @@ use std::time::Duration;
 use crate::common::{
     self, assert_same, committed, interrupt, run, start, text, wait_for, with_output,
 };
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use chacha20::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 
 /// Runs of a second or two with many commits, frames, regions and both flows.
 const RUNS: [&[&str]; 6] = [

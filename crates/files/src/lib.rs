@@ -17,11 +17,13 @@
 //!   operation fail.
 
 mod atomic;
+mod checksum;
 mod error;
 mod storage;
 mod text;
 
 pub use atomic::{TEMPORARY_PREFIX, make_folders_on, probe, write_atomically, write_atomically_on};
+pub use checksum::{Sha256, hexadecimal};
 pub use error::Error;
 pub use storage::{Disk, Storage};
 pub use text::shortened;

@@ -1,7 +1,7 @@
 //! A trained operator: kernel, activation, and the ratios it was trained for.
 
+use files::{Sha256, hexadecimal};
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use crate::{Calibration, Error, Mlp, Ratios};
 
@@ -124,7 +124,7 @@ impl Network {
         }
         let numbers = self.kernel.iter().chain(self.activation.parameters());
         bytes.extend(numbers.flat_map(|value| value.to_le_bytes()));
-        format!("{:x}", Sha256::digest(bytes))
+        hexadecimal(Sha256::of(bytes))
     }
 
     /// The calibration stored with the weights, if there is one.

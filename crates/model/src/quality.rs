@@ -1,8 +1,8 @@
 //! What a network is worth: losses on whole grids, its transfer function, its activation.
 
+use chacha20::ChaCha8Rng;
 use operators::{ComputeDevice, Transform, circular_convolution, kernel_symbol};
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::training::SphereData;

@@ -3,11 +3,11 @@
 use std::collections::HashMap;
 use std::path::Path;
 
+use files::{Sha256, hexadecimal};
 use geometry::file::write_atomically;
 use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, TensorView};
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use crate::mlp::{layout, parameter_count};
 use crate::network::Provenance;
@@ -32,7 +32,7 @@ fn check_header(data: &[u8]) -> Result<(), String> {
 
 /// SHA-256 over everything that a network consists of, so that a flipped bit anywhere is noticed.
 fn checksum(network: &Network) -> serde_json::Result<String> {
-    let mut hash = Sha256::new();
+    let mut hash = Sha256::default();
     let about = (
         network.ratios(),
         network.provenance(),
@@ -45,7 +45,7 @@ fn checksum(network: &Network) -> serde_json::Result<String> {
     }
     hash.update(bytes(network.kernel()));
     hash.update(bytes(network.activation().parameters()));
-    Ok(format!("{:x}", hash.finalize()))
+    Ok(hexadecimal(hash.finish()))
 }
 
 /// Name of the metadata entry. There is only one: safetensors writes several in random order, and the same network should

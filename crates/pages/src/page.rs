@@ -5,9 +5,9 @@ use std::path::Path;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use files::Sha256;
 use geometry::file::write_atomically;
 use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
-use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
 use crate::image::Image;
@@ -168,7 +168,7 @@ fn script(frames: bool, viewer: bool) -> String {
 /// What the browser may load: nothing but the style and the script, by their hashes, and pictures
 /// inside.
 fn policy(script: &str) -> String {
-    let hash = |text: &str| STANDARD.encode(Sha256::digest(text));
+    let hash = |text: &str| STANDARD.encode(Sha256::of(text));
     format!(
         "default-src 'none'; img-src data:; style-src 'sha256-{}'; script-src 'sha256-{}'; \
          base-uri 'none'; form-action 'none'",

@@ -134,6 +134,11 @@ impl Error {
         }
     }
 
+    pub(crate) fn draw(error: impl std::error::Error) -> Self {
+        let cause = error.to_string();
+        Self::Draw { cause }
+    }
+
     pub(crate) fn json(what: impl Into<String>) -> impl FnOnce(serde_json::Error) -> Self {
         let what = what.into();
         move |source| Self::Json { what, source }

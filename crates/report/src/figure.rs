@@ -6,6 +6,7 @@ use std::ops::RangeInclusive;
 use plotters_backend::text_anchor::HPos;
 
 use crate::axes::Margins;
+use crate::bitmap;
 use crate::colour::{GREY, INK};
 use crate::error::{Error, Result};
 use crate::font::{self, AIR, LEADING, TextStyle};
@@ -14,7 +15,8 @@ use crate::legend::{Block, LegendEntry};
 use crate::output::OutputDir;
 use crate::panel::{Drawable, Panel};
 use crate::style::Fonts;
-use crate::surface::{self, Surface};
+use crate::surface::Surface;
+use crate::svg;
 
 /// A figure: panels row by row on a grid.
 ///
@@ -126,7 +128,7 @@ impl Figure {
     /// If there is nothing to draw, a range or array does not fit, or the width leaves no room.
     pub fn to_svg(&self) -> Result<String> {
         let layout = self.layout()?;
-        surface::svg(layout.size, |s| self.draw(&layout, s))
+        svg::svg(layout.size, |s| self.draw(&layout, s))
     }
 
     /// The figure as a PNG file, two pixels per layout unit.
@@ -136,7 +138,7 @@ impl Figure {
     /// As [`Figure::to_svg`].
     pub fn to_png(&self) -> Result<Vec<u8>> {
         let layout = self.layout()?;
-        surface::png(layout.size, |s| self.draw(&layout, s))
+        bitmap::png(layout.size, |s| self.draw(&layout, s))
     }
 
     /// Writes `<stem>.svg` and `<stem>.png`.
@@ -429,7 +431,9 @@ pub(crate) mod tests {
 
     impl Picture {
         pub fn new(bytes: &[u8]) -> Self {
-            let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
+            let mut decoder = png::Decoder::new(Cursor::new(bytes));
+            decoder.set_transformations(png::Transformations::EXPAND);
+            let mut reader = decoder.read_info().unwrap();
             let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
             let info = reader.next_frame(&mut pixels).unwrap();
             assert_eq!(info.color_type, png::ColorType::Rgb);
@@ -623,7 +627,7 @@ pub(crate) mod tests {
             "second line",
             "Another.",
         ] {
-            assert!(svg.contains(&format!(">\n{text}\n</text>")), "no {text:?}");
+            assert!(svg.contains(&format!(">{text}</text>")), "no {text:?}");
         }
         assert!(!svg.contains("NaN") && !svg.contains("inf"));
         assert!(svg.contains("sans-serif") && svg.trim_end().ends_with("</svg>"));
@@ -657,7 +661,7 @@ pub(crate) mod tests {
         let svg = figure.to_svg().unwrap();
         for label in ["straight", "falling", "method A"] {
             assert_eq!(
-                svg.matches(&format!(">\n{label}\n</text>")).count(),
+                svg.matches(&format!(">{label}</text>")).count(),
                 1,
                 "{label}"
             );
@@ -801,7 +805,7 @@ pub(crate) mod tests {
             }
             let svg = figure.to_svg().unwrap();
             assert_eq!(svg.matches("<image").count(), 1);
-            assert!(!svg.contains("pixelated") && svg.contains(">\nstep 100\n</text>"));
+            assert!(!svg.contains("pixelated") && svg.contains(">step 100</text>"));
         }
     }
 

@@ -1,28 +1,22 @@
 //! The embedded typeface, so that pictures come out the same on every machine: no system font is ever consulted.
 //!
-//! The fonts of plotters will not do: its bitmaps set them 6.5 per cent larger than its SVG documents and on another baseline, so a figure
+//! The fonts of plotters will not do: it sets them 6.5 per cent larger than viewers of SVG documents do, and on another baseline, so a figure
 //! would differ from its twin.
 
-use std::convert::Infallible;
 use std::sync::LazyLock;
 
 use ab_glyph::{Font, FontRef, GlyphId, ScaleFont};
-use plotters::style::{Color, RGBColor};
-use plotters_backend::text_anchor::{HPos, Pos, VPos};
-use plotters_backend::{BackendColor, BackendTextStyle, FontFamily, FontTransform};
+use plotters_backend::text_anchor::HPos;
 use srgb::Rgb;
 
 static FONT: LazyLock<FontRef<'static>> = LazyLock::new(|| {
     FontRef::try_from_slice(dejavu::sans::regular()).expect("the embedded font is well formed")
 });
 
-/// Families named in SVG files: the embedded one, the one with the same metrics, then any.
-const SVG_FAMILY: &str = "DejaVu Sans, Verdana, sans-serif";
-
 /// Distance from the middle of the capitals to the baseline, in em.
-const HALF_CAPITAL: f64 = 0.365;
+pub(crate) const HALF_CAPITAL: f64 = 0.365;
 
-/// Distance from the top anchor of the drawing backends to the baseline, in em.
+/// Distance from the top of a line to the baseline, in em.
 const TOP_TO_BASELINE: f64 = 0.76;
 
 /// Distance from one line of text to the next, in em.
@@ -89,7 +83,7 @@ pub(crate) fn height(text: &str, em: f64, limit: f64) -> f64 {
 /// How a line of text is set in the embedded font. Its place is the middle of the capitals.
 #[derive(Clone, Copy)]
 pub(crate) struct TextStyle {
-    /// Device pixels per em when it reaches a backend, layout units before.
+    /// Layout units per em.
     pub em: f64,
     pub colour: Rgb,
     pub align: HPos,
@@ -120,73 +114,25 @@ impl TextStyle {
         }
     }
 
-    /// From the top anchor of the backends down to the middle of the capitals.
+    /// From the top of the line down to the middle of the capitals.
     pub fn rise(&self) -> f64 {
         self.em * (TOP_TO_BASELINE - HALF_CAPITAL)
     }
 }
 
-impl BackendTextStyle for TextStyle {
-    type FontError = Infallible;
-
-    fn color(&self) -> BackendColor {
-        let Rgb(r, g, b) = self.colour;
-        RGBColor(r, g, b).to_backend_color()
-    }
-
-    /// The SVG backend divides by 1.24 to get `font-size`.
-    fn size(&self) -> f64 {
-        self.em * 1.24
-    }
-
-    fn transform(&self) -> FontTransform {
-        if self.vertical {
-            FontTransform::Rotate270
-        } else {
-            FontTransform::None
-        }
-    }
-
-    fn anchor(&self) -> Pos {
-        Pos::new(self.align, VPos::Top)
-    }
-
-    fn family(&self) -> FontFamily<'_> {
-        FontFamily::Name(SVG_FAMILY)
-    }
-
-    fn layout_box(&self, text: &str) -> Result<((i32, i32), (i32, i32)), Self::FontError> {
-        let width = width(text, self.em).round() as i32;
-        Ok(((0, 0), (width, self.em.round() as i32)))
-    }
-
-    fn draw<E, DrawFunc: FnMut(i32, i32, BackendColor) -> Result<(), E>>(
-        &self,
-        text: &str,
-        (x0, y0): (i32, i32),
-        mut draw: DrawFunc,
-    ) -> Result<Result<(), E>, Self::FontError> {
-        let (scale, baseline) = (scale_of(self.em), (TOP_TO_BASELINE * self.em) as f32);
-        for (glyph, pen) in lay_out(text, self.em).0 {
-            let placed = glyph.with_scale_and_position(scale, ab_glyph::point(pen, baseline));
-            let Some(outline) = FONT.outline_glyph(placed) else {
-                continue;
-            };
+/// Visits the pixels of one line of text at `em` pixels per em, with the covered part of each: to the right of where the line begins, and
+/// down from its top.
+pub(crate) fn rasterize(text: &str, em: f64, mut visit: impl FnMut(i32, i32, f32)) {
+    let (scale, baseline) = (scale_of(em), (TOP_TO_BASELINE * em) as f32);
+    for (glyph, pen) in lay_out(text, em).0 {
+        let placed = glyph.with_scale_and_position(scale, ab_glyph::point(pen, baseline));
+        if let Some(outline) = FONT.outline_glyph(placed) {
             let corner = outline.px_bounds().min;
-            let mut result = Ok(());
-            let (x0, y0) = (x0 + corner.x as i32, y0 + corner.y as i32);
-            outline.draw(|x, y, coverage| {
-                let mut colour = self.color();
-                colour.alpha = f64::from(coverage).min(1.0);
-                if result.is_ok() {
-                    result = draw(x0 + x.cast_signed(), y0 + y.cast_signed(), colour);
-                }
+            let (x0, y0) = (corner.x as i32, corner.y as i32);
+            outline.draw(|x, y, covered| {
+                visit(x0 + x.cast_signed(), y0 + y.cast_signed(), covered);
             });
-            if result.is_err() {
-                return Ok(result);
-            }
         }
-        Ok(Ok(()))
     }
 }
 

@@ -2,6 +2,8 @@
 //!
 //! Everything is in layout units with the origin at the upper left and `y` pointing down.
 
+use std::f64::consts::TAU;
+
 /// A point in layout units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Point {
@@ -18,11 +20,30 @@ impl Point {
         (self.x - other.x).hypot(self.y - other.y)
     }
 
+    /// Distance to the segment from `a` to `b`.
+    fn distance_to(self, a: Self, b: Self) -> f64 {
+        let (dx, dy) = (b.x - a.x, b.y - a.y);
+        let along = (self.x - a.x) * dx + (self.y - a.y) * dy;
+        let share = (along / (dx * dx + dy * dy)).clamp(0.0, 1.0);
+        // Of a segment without length, every point is the same.
+        self.distance(a.towards(b, if share.is_nan() { 0.0 } else { share }))
+    }
+
     /// The point a fraction `t` of the way to `other`.
     pub fn towards(self, other: Self, t: f64) -> Self {
         let between = |from: f64, to: f64| from + t * (to - from);
         point(between(self.x, other.x), between(self.y, other.y))
     }
+}
+
+/// A regular polygon that passes for a disc at the sizes used for markers and joins.
+pub(crate) fn disc(centre: Point, radius: f64) -> Vec<Point> {
+    let sides = if radius < 2.0 { 12 } else { 24 };
+    let corner = |k| {
+        let (sin, cos) = (TAU * f64::from(k) / f64::from(sides)).sin_cos();
+        point(centre.x + radius * cos, centre.y + radius * sin)
+    };
+    (0..sides).map(corner).collect()
 }
 
 /// An axis-parallel box.
@@ -174,6 +195,28 @@ pub(crate) fn thin(points: &[Point], spacing: f64) -> Vec<Point> {
     kept
 }
 
+/// Leaves out points as long as no other is farther than `tolerance` from the line between those kept (Ramer, 1972; Douglas and Peucker,
+/// 1973). The ends stay.
+pub(crate) fn simplified(points: &[Point], tolerance: f64) -> Vec<Point> {
+    let last = points.len().saturating_sub(1);
+    let (mut kept, mut spans) = (vec![0, last], vec![(0, last)]);
+    while let Some((from, to)) = spans.pop() {
+        let inner = (from + 1..to).map(|k| (k, points[k].distance_to(points[from], points[to])));
+        let farthest = inner.max_by(|(_, a), (_, b)| a.total_cmp(b));
+        if let Some((middle, distance)) = farthest
+            && distance > tolerance
+        {
+            kept.push(middle);
+            spans.extend([(from, middle), (middle, to)]);
+        }
+    }
+    kept.sort_unstable();
+    kept.dedup();
+    kept.iter()
+        .filter_map(|&k| points.get(k).copied())
+        .collect()
+}
+
 /// Cuts a polyline into the dashes of `pattern` (lengths of pen down, pen up, ...); empty: solid.
 pub(crate) fn dash(points: &[Point], pattern: &[f64]) -> Vec<Vec<Point>> {
     if pattern.is_empty() || points.len() < 2 {
@@ -239,6 +282,29 @@ mod tests {
         let corners = Rect::new(5.0, 5.0, 5.0, 5.0).corners();
         assert!(clipped.len() == 4 && corners.iter().all(|corner| clipped.contains(corner)));
         assert!(clip_loop(&Rect::new(20.0, 20.0, 1.0, 1.0).corners(), &UNIT).is_empty());
+    }
+
+    #[test]
+    fn simplified_curves_keep_their_corners_and_their_place() {
+        let step = |k: u32| 10.0 * f64::from(k) / 100.0;
+        let up = (0..=100).map(|k| point(0.0, step(k)));
+        let corner: Vec<Point> = up.chain((1..=100).map(|k| point(step(k), 10.0))).collect();
+        let corners = [point(0.0, 0.0), point(0.0, 10.0), point(10.0, 10.0)];
+        assert_eq!(simplified(&corner, 0.05), corners);
+        for few in 0..3 {
+            assert_eq!(simplified(&corner[..few], 0.05), corner[..few]);
+        }
+        let circle = |k: u32| {
+            let (sin, cos) = (TAU * f64::from(k) / 3000.0).sin_cos();
+            point(100.0 * cos, 100.0 * sin)
+        };
+        let ring: Vec<Point> = (0..=3000).map(circle).collect();
+        let kept = simplified(&ring, 0.05);
+        assert!((60..140).contains(&kept.len()), "{}", kept.len());
+        for &p in &ring {
+            let distances = kept.windows(2).map(|pair| p.distance_to(pair[0], pair[1]));
+            assert!(distances.fold(f64::INFINITY, f64::min) <= 0.05);
+        }
     }
 
     proptest! {

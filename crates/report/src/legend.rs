@@ -6,7 +6,7 @@ use crate::colour::{Colour, INK};
 use crate::error::Result;
 use crate::font::{self, TextStyle};
 use crate::geom::{Point, point};
-use crate::style::{LineStyle, Marker, draw_marker};
+use crate::style::{LineStyle, Marker};
 use crate::surface::Surface;
 
 /// A piece of line and what it stands for.
@@ -42,7 +42,7 @@ impl LegendEntry {
         }
         if let Some(marker) = self.marker {
             let middle = point(at.x + 0.5 * SAMPLE_WIDTH, at.y);
-            draw_marker(surface, marker, middle, colour)?;
+            surface.markers(marker, &[middle], colour)?;
         }
         let text = point(at.x + SAMPLE_WIDTH + SAMPLE_GAP, at.y);
         surface.text(

@@ -45,8 +45,10 @@
 
 mod axes;
 mod axis;
+mod bitmap;
 mod colour;
 mod data;
+mod encode;
 mod error;
 mod figure;
 mod font;
@@ -63,6 +65,7 @@ mod shapes;
 mod style;
 mod summary;
 mod surface;
+mod svg;
 mod table;
 
 pub use axis::Axis;

@@ -69,8 +69,8 @@ impl OutputDir {
 
     /// Writes records as CSV with a header from their field names (RFC 4180 quoting, line feeds).
     ///
-    /// Records are flat structs of numbers, text and options (`None` is an empty field). Floats have the fewest digits that read back
-    /// exactly; NaN and infinities are `NaN` and `inf`.
+    /// Records are flat structs of numbers, text and options (`None` is an empty field). Floats have nine significant digits; NaN
+    /// and infinities are `NaN` and `inf`.
     ///
     /// # Errors
     ///

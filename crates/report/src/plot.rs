@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::geom::{Point, Rect, clip_polyline, thin};
 use crate::legend::LegendEntry;
 use crate::panel::Drawable;
-use crate::style::{Fonts, LineStyle, Marker, draw_marker};
+use crate::style::{Fonts, LineStyle, Marker};
 use crate::surface::Surface;
 
 /// A named curve.
@@ -207,9 +207,7 @@ impl Drawable for Plot<'_> {
                 symbols.extend(placed.into_iter().filter(|&p| bounds.contains(p)));
             }
             if let Some(marker) = series.marker {
-                for at in thin(&symbols, 11.0) {
-                    draw_marker(surface, marker, at, colour)?;
-                }
+                surface.markers(marker, &thin(&symbols, 11.0), colour)?;
             }
         }
         self.axes.draw_frame(surface, plot)

@@ -28,28 +28,11 @@ impl Progress {
     /// A bar below the others: message, position of `length`, time elapsed, time to go.
     pub fn bar(&self, message: impl Into<Cow<'static, str>>, length: u64) -> ProgressBar {
         let template = "{msg:28} {bar:28} {pos:>6}/{len:<6} {elapsed_precise}  eta {eta_precise}";
-        self.add(ProgressBar::new(length), template, message)
-    }
-
-    /// A bar for work of unknown length: message, position, time elapsed.
-    pub fn counter(&self, message: impl Into<Cow<'static, str>>) -> ProgressBar {
-        self.add(
-            ProgressBar::no_length(),
-            "{msg:28} {spinner} {pos:>6} {elapsed_precise}",
-            message,
-        )
-    }
-
-    fn add(
-        &self,
-        bar: ProgressBar,
-        template: &str,
-        message: impl Into<Cow<'static, str>>,
-    ) -> ProgressBar {
         let style = ProgressStyle::with_template(template)
-            .expect("the templates are fixed and valid")
+            .expect("the template is fixed and valid")
             .progress_chars("━╸ ");
-        self.bars.add(bar).with_style(style).with_message(message)
+        let bar = self.bars.add(ProgressBar::new(length));
+        bar.with_style(style).with_message(message)
     }
 
     /// Takes all bars off the screen.
@@ -66,17 +49,13 @@ mod tests {
     #[test]
     fn hidden_bars_count_all_the_same() {
         let progress = Progress::new(true);
-        let (bar, counter) = (progress.bar("steps", 10), progress.counter("iterations"));
-        assert!(bar.is_hidden() && counter.is_hidden());
+        let bar = progress.bar("steps", 10);
+        assert!(bar.is_hidden());
         bar.inc(3);
-        counter.inc(5);
-        assert_eq!(
-            (bar.position(), bar.length(), counter.position()),
-            (3, Some(10), 5)
-        );
+        assert_eq!((bar.position(), bar.length()), (3, Some(10)));
         assert_eq!(bar.message(), "steps");
         bar.finish();
-        assert!(bar.is_finished() && !counter.is_finished());
+        assert!(bar.is_finished());
         progress.clear();
     }
 }

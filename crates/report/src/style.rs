@@ -1,11 +1,6 @@
 //! What lines, markers and letters look like.
 
-use srgb::Rgb;
-
-use crate::colour::WHITE;
-use crate::error::Result;
-use crate::geom::{Point, point};
-use crate::surface::{Surface, disc};
+use crate::geom::{Point, disc, point};
 
 /// How a curve is stroked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -54,30 +49,23 @@ pub enum Marker {
     Triangle,
 }
 
-/// Draws one marker with a thin white rim, so that it stands out from its curve.
-pub(crate) fn draw_marker(
-    surface: &mut dyn Surface,
-    marker: Marker,
-    at: Point,
-    colour: Rgb,
-) -> Result<()> {
-    const RADIUS: f64 = 3.8;
-    for (r, colour) in [(RADIUS + 1.0, WHITE), (RADIUS, colour)] {
-        let corners = |list: &[(f64, f64)]| -> Vec<Point> {
-            let corner = |&(x, y)| point(at.x + x * r, at.y + y * r);
-            list.iter().map(corner).collect()
+impl Marker {
+    /// Half the size, in layout units.
+    pub(crate) const RADIUS: f64 = 3.8;
+    /// Width of the white rim.
+    pub(crate) const RIM: f64 = 1.0;
+
+    /// The corners of a marker of any radius.
+    pub(crate) fn outline(self, centre: Point, radius: f64) -> Vec<Point> {
+        let corners: &[(f64, f64)] = match self {
+            Self::Circle => return disc(centre, radius),
+            Self::Square => &[(-0.88, -0.88), (0.88, -0.88), (0.88, 0.88), (-0.88, 0.88)],
+            Self::Diamond => &[(0.0, -1.2), (1.2, 0.0), (0.0, 1.2), (-1.2, 0.0)],
+            Self::Triangle => &[(0.0, -1.15), (1.1, 0.8), (-1.1, 0.8)],
         };
-        let symbol = match marker {
-            Marker::Circle => disc(at, r),
-            Marker::Square => {
-                corners(&[(-0.88, -0.88), (0.88, -0.88), (0.88, 0.88), (-0.88, 0.88)])
-            }
-            Marker::Diamond => corners(&[(0.0, -1.2), (1.2, 0.0), (0.0, 1.2), (-1.2, 0.0)]),
-            Marker::Triangle => corners(&[(0.0, -1.15), (1.1, 0.8), (-1.1, 0.8)]),
-        };
-        surface.fill(&[symbol], colour)?;
+        let place = |&(x, y)| point(centre.x + radius * x, centre.y + radius * y);
+        corners.iter().map(place).collect()
     }
-    Ok(())
 }
 
 /// Letter sizes (em, in layout units) of one figure.

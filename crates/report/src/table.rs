@@ -6,10 +6,11 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::axis::power_of_ten;
+use crate::data::{rounded, shortest};
 use crate::error::{Error, Result};
 use crate::output::OutputDir;
 
-/// How Markdown shows the numbers of a column. CSV always carries all digits.
+/// How Markdown shows the numbers of a column. CSV carries nine significant digits of all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// The fewest digits that read back exactly.
@@ -59,12 +60,12 @@ impl<C: Into<Cell>> From<Option<C>> for Cell {
 }
 
 impl Cell {
-    /// With all digits, as CSV has it.
-    fn whole(&self) -> String {
+    /// As CSV has it.
+    fn raw(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
             Self::Integer(number) => number.to_string(),
-            Self::Number(number) => crate::data::shortest(*number),
+            Self::Number(number) => shortest(rounded(*number)),
             Self::Missing => String::new(),
         }
     }
@@ -77,7 +78,8 @@ impl Cell {
             (Self::Number(number), Some(Format::Scientific(decimals))) => {
                 scientific(*number, decimals)
             }
-            _ => escaped(&self.whole()),
+            (Self::Number(number), _) => shortest(*number),
+            _ => escaped(&self.raw()),
         }
     }
 }
@@ -97,7 +99,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table without rows for programs, who want all digits.
+    /// A table without rows, for programs.
     pub fn data<'a>(names: impl IntoIterator<Item = &'a &'a str>) -> Self {
         let column = |name: &&str| Column {
             name: (*name).to_owned(),
@@ -167,7 +169,7 @@ impl Table {
         self.columns.iter().map(|column| column.name.as_str())
     }
 
-    /// The table as CSV (RFC 4180 quoting, line feeds), numbers with all their digits.
+    /// The table as CSV (RFC 4180 quoting, line feeds), numbers with nine significant digits.
     ///
     /// # Errors
     ///
@@ -176,7 +178,7 @@ impl Table {
         let mut writer = csv::Writer::from_writer(Vec::new());
         writer.write_record(self.columns())?;
         for row in &self.rows {
-            writer.write_record(row.iter().map(Cell::whole))?;
+            writer.write_record(row.iter().map(Cell::raw))?;
         }
         crate::data::finished(writer)
     }
@@ -334,16 +336,13 @@ mod tests {
     }
 
     #[test]
-    fn csv_quotes_and_keeps_every_digit() {
+    fn csv_quotes_and_keeps_nine_digits() {
         let text = example().to_csv().unwrap();
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         assert_eq!(reader.headers().unwrap().iter().next_back(), Some("share"));
         let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
         assert_eq!(&rows[0][0], "a|b, \"c\"");
-        assert_eq!(
-            rows[0][3].parse::<f64>().unwrap().to_bits(),
-            (1.0_f64 / 3.0).to_bits()
-        );
+        assert_eq!(&rows[0][3], "0.333333333");
         assert_eq!(&rows[1][2], "");
         assert!(
             text.contains("\"a|b, \"\"c\"\"\",128,0.0000012345,"),

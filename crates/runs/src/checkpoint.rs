@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
+use files::Sha256;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use sha2::{Digest, Sha256};
 
 use crate::digest::{self, Seal};
 use crate::{Error, names};
@@ -162,7 +162,7 @@ pub(crate) fn start(state: &State, files: &Files, finished: bool) -> Result<Vec<
 
 /// Writes a checkpoint, given its [`start`].
 pub(crate) fn write(out: &mut dyn Write, start: &[u8], state: &State) -> io::Result<()> {
-    let mut hash = Sha256::new();
+    let mut hash = Sha256::default();
     let mut put = |bytes: &[u8]| {
         hash.update(bytes);
         out.write_all(bytes)
@@ -173,7 +173,7 @@ pub(crate) fn write(out: &mut dyn Write, start: &[u8], state: &State) -> io::Res
         let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
         put(&bytes)?;
     }
-    out.write_all(&hash.finalize())
+    out.write_all(&hash.finish())
 }
 
 /// Whether all have names, and none two have the same.
@@ -197,7 +197,7 @@ pub(crate) fn content(folder: &Path, step: u64) -> Result<(Vec<u8>, PathBuf), Er
     let read = digest::open(&path)?.read_to_end(&mut bytes);
     read.map_err(files::Error::of("read", &path))?;
     match bytes.split_last_chunk::<END>() {
-        Some((all, sum)) if Sha256::digest(all)[..] == sum[..] => {}
+        Some((all, sum)) if Sha256::of(all) == *sum => {}
         _ => return Err(digest::wrong_checksum(&path)),
     }
     bytes.truncate(bytes.len() - END);

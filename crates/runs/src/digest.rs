@@ -4,15 +4,15 @@ use std::fs::{self, File};
 use std::io;
 use std::path::Path;
 
+use files::{Sha256, hexadecimal};
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use crate::Error;
 
 /// The SHA-256 of some bytes in lower-case hexadecimal digits, for example as the fingerprint of the
 /// options of a run.
 pub fn fingerprint(bytes: impl AsRef<[u8]>) -> String {
-    format!("{:x}", Sha256::digest(bytes))
+    hexadecimal(Sha256::of(bytes))
 }
 
 /// Length and checksum of a file.
@@ -26,11 +26,11 @@ pub(crate) struct Seal {
 impl Seal {
     /// The seal of a file as it is.
     pub fn of(path: &Path) -> Result<Self, Error> {
-        let mut hash = Sha256::new();
+        let mut hash = Sha256::default();
         let read = io::copy(&mut open(path)?, &mut hash);
         Ok(Self {
             length: read.map_err(files::Error::of("read", path))?,
-            sha256: format!("{:x}", hash.finalize()),
+            sha256: hexadecimal(hash.finish()),
         })
     }
 

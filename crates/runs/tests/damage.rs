@@ -10,14 +10,14 @@ use files::{Disk, Storage};
 use crate::toy::{
     self, FILES, STEPS, contents, quick_folder, run_to, uninterrupted, write_contents,
 };
+use files::Sha256;
 use runs::{Error, RunDirectory, State};
 use serde_json::json;
-use sha2::{Digest, Sha256};
 
 /// A checkpoint with other content and the checksum that goes with it.
 pub fn rehashed(bytes: &[u8]) -> Vec<u8> {
     let end = bytes.len().saturating_sub(32);
-    [&bytes[..end], Sha256::digest(&bytes[..end]).as_slice()].concat()
+    [&bytes[..end], &Sha256::of(&bytes[..end])].concat()
 }
 
 /// The name of the damaged file and the step of the fallback.

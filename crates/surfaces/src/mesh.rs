@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
+use chacha20::ChaCha8Rng;
 use geometry::measure::BoundingBox;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 
 use crate::Error;
 use crate::vector::{corners, scaled_normal};

@@ -2,9 +2,9 @@
 
 #![allow(clippy::float_cmp, reason = "where equality is asserted, it is exact")]
 
+use chacha20::ChaCha8Rng;
 use geometry::{Grid, Placement, optimal_profile};
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, decode, rewrite};
 
 use crate::common::{cube, sphere, torus};

@@ -1,23 +1,7 @@
 //! The cross under Willmore flow.
 
-use experiments::comparison::{self, Setting};
-use experiments::prelude::*;
-
-const CROSS: Setting = Setting {
-    program: "cross",
-    title: "Willmore flow of a cross",
-    about: "Willmore flow of a non-convex cross, eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7, by all methods and resolutions \
-            (finite elements from n = 256 on, where they are stable): L2 distance to a finer implicit finite-element run, and shapes",
-    shape: "cross [-.8,.8] x [-.27,.27]",
-    initial: comparison::cross,
-    flow: Flow::Willmore,
-    side: 2.0,
-    steps: 128,
-    shown: &[0, 32, 64, 96, 128],
-    reference_ratio: 1,
-    window: 0.95,
-};
+use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    comparison::main(&CROSS)
+    experiments::programs::cross::main()
 }

@@ -1,27 +1,7 @@
 //! The rectangle under Willmore flow.
 
-use experiments::comparison::{self, Setting};
-use experiments::networks::EPS;
-use experiments::prelude::*;
-use geometry::shapes::Cuboid;
-
-const RECTANGLE: Setting = Setting {
-    program: "rectangle",
-    title: "Willmore flow of a rectangle",
-    about: "Willmore flow of a rectangle with sides 0.4 and 0.2, eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7, by all methods \
-            and resolutions (finite elements from n = 256 on, where they are stable): L2 distance to a finer implicit \
-            finite-element run, and shapes",
-    shape: "rectangle 0.4 x 0.2",
-    initial: |grid| phase_field(grid, &Cuboid::new([0.2, 0.1])?, EPS),
-    flow: Flow::Willmore,
-    // The shape ends within 0.36 of the origin; the profile's tails are below 1e-12 at the boundary.
-    side: 1.5,
-    steps: 128,
-    shown: &[0, 32, 64, 96, 128],
-    reference_ratio: 1,
-    window: 0.5,
-};
+use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    comparison::main(&RECTANGLE)
+    experiments::programs::rectangle::main()
 }

@@ -4,13 +4,13 @@ use std::fmt::Write;
 use std::process::ExitCode;
 use std::sync::Arc;
 
+use chacha20::ChaCha8Rng;
 use engine::Method;
 use geometry::Field;
 use linearize::taylor::{halvings, remainder};
 use model::{Factors, MeanCurvatureOperator, Network};
 use operators::{ComputeDevice, DeviceKind, add_scaled, inner_product};
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
 use solver::{FlowParams, MinimizingMovement, Objective};
 

@@ -2,10 +2,10 @@
 
 use burn::optim::{Adam, AdamConfig, AdamState as BurnState, AdaptiveMomentumState, Optimizer};
 use burn::tensor::Tensor;
+use chacha20::ChaCha8Rng;
 use operators::{ComputeDevice, circular_convolution};
 use rand::seq::SliceRandom;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use serde::{Deserialize, Serialize};
 
 use super::{Observer, Progress, Recipe, SphereData};

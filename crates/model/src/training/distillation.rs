@@ -1,9 +1,9 @@
 //! Perceptrons of the paper's form that imitate a given odd function with its first two derivatives.
 
+use chacha20::ChaCha8Rng;
 use faer::Mat;
 use operators::ComputeDevice;
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::levenberg_marquardt::{Problem, random_activation};

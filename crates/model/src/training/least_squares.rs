@@ -10,12 +10,12 @@
 //!   far its sphere moves, and flat interfaces in many directions must stay where they are;
 //! - a [distillation](Distillation) fits a perceptron of the paper's form to the polynomial, with its first and second derivatives.
 
+use chacha20::ChaCha8Rng;
 use faer::linalg::solvers::SolveLstsq;
 use faer::{Col, Mat};
 use geometry::optimal_profile;
 use operators::ComputeDevice;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 

@@ -6,11 +6,11 @@
 //! of the Jacobian are products of those with the layers' inputs.
 
 use burn::tensor::{DType, Tensor};
+use chacha20::ChaCha8Rng;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, MatRef, Side};
 use operators::ComputeDevice;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use serde::{Deserialize, Serialize};
 
 use super::{BandSamples, Observer, Orbits, Progress, Recipe, SphereData};

@@ -1,9 +1,9 @@
 //! Training data: spheres shrinking by mean curvature (eq:analyticSolutionMCFCircle, eq:analyticSolutionMCFCirclePf).
 
+use chacha20::ChaCha8Rng;
 use geometry::exact::mean_curvature_radius;
 use geometry::optimal_profile;
-use rand::Rng;
-use rand_chacha::ChaCha8Rng;
+use rand::RngExt;
 use rayon::prelude::*;
 use serde::Serialize;
 

@@ -1,0 +1,37 @@
+//! Willmore flow of an ellipse, which becomes a circle and grows.
+
+use engine::{
+    Case, ErrorControl, Flow, Held, Measure, Operator, Run, Scales, Scheme, Stop, TimeSteps,
+};
+use geometry::{Grid, ZeroSet, phase_field, shapes::Ellipse};
+use model::Networks;
+use operators::ComputeDevice;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let grid = Grid::<2>::per_unit(64, 1.25)?;
+    let scales = Scales::of_grid(grid.spacing(), 2.0);
+    let needed = scales.needs(2, grid.spacing());
+    let network = Networks::default().find(Scheme::Accurate.shipped(), &needed)?;
+    let case = Case {
+        shape: "ellipse".to_owned(),
+        initial: phase_field(grid, &Ellipse::new([0.3, 0.2])?, scales.eps)?,
+        region: None,
+        held: Held::default(),
+        flow: Flow::Willmore,
+        operator: Operator::learned(Scheme::Accurate, network)?,
+        scales,
+        steps: TimeSteps::controlled(ErrorControl::default()),
+        stops: vec![Stop::Time(0.002)],
+        measures: Measure::crossings(0.0),
+    };
+    let mut run = Run::new(case, &ComputeDevice::default_compiled()?)?;
+    println!("       t        tau    length      area    energy");
+    while let Some(record) = run.step()?.cloned() {
+        let curve = ZeroSet::of(run.field(), scales.eps)?;
+        println!(
+            "{:8.2e}   {:8.2e}   {:.5}   {:.5}   {:.5}",
+            record.time, record.tau, curve.perimeter, curve.volume, curve.willmore_energy
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,448 @@
+//! The factors by which the hybrid scheme differs from Willmore flow, predicted and measured on discs.
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+use std::path::PathBuf;
+
+use crate::networks::{EPS, STEP, scales};
+use crate::prelude::*;
+use crate::session::Stage;
+use crate::surfaces::{self, willmore_flow};
+use fem::FiniteElementStep;
+use geometry::measure::zero_set_volume;
+use geometry::shapes::{Ball, Torus};
+use model::training::SphereData;
+use model::{Calibration, NamedNetwork, Network, Shipped, displacement_errors};
+use report::OutputDir;
+use solver::Factors;
+
+const PROGRAM: &str = "calibration";
+
+const RADII: [f64; 7] = [0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6];
+const QUICK_RADII: [f64; 2] = [0.15, 0.3];
+/// Distance of a disc to the box's boundary.
+const MARGIN: f64 = 0.3;
+
+const SURFACE_CELLS: usize = 64;
+/// Room for tori whose hole is some interface widths wide.
+const SURFACE_SIDE: f64 = 1.5;
+const BALLS: [f64; 3] = [0.2, 0.3, 0.34];
+/// Outer radii of the Clifford tori.
+const TORI: [f64; 3] = [0.40, 0.50, 0.60];
+
+/// The measurement's time step over the inner one: the interface hardly moves, and its profile relaxes all the same.
+const STEP_RATIO: f64 = 1.0 / 8.0;
+
+/// `eps/h` and `tautilde/h^2` of the finite-element steps of the experiments.
+const ELEMENTS: [[f64; 2]; 2] = [[2.0, 1.0], [4.0, 4.0]];
+
+/// Calibrates the shipped networks, or others, and the finite-element steps; compares the predicted Willmore energy of discs of
+/// either phase with the one that the scheme finds, and the energy of balls and Clifford tori with the exact one; draws what
+/// tells good networks from bad ones.
+#[derive(Parser, Debug)]
+#[command(name = PROGRAM, version)]
+struct Options {
+    #[command(flatten)]
+    run: RunOptions,
+
+    /// Calibrate this safetensors file in place of the shipped networks; can be repeated
+    #[arg(long, value_name = "FILE")]
+    network: Vec<PathBuf>,
+
+    /// Write the networks with their calibration to this folder
+    #[arg(long, value_name = "DIR")]
+    install: Option<PathBuf>,
+}
+
+pub fn main() -> ExitCode {
+    harness::main(program)
+}
+
+fn program(options: &Options) -> Result<(), Error> {
+    let run = &options.run;
+    let networks = options.networks()?;
+    let device = run.open_device()?;
+    let checksums = networks
+        .iter()
+        .map(|one| (&one.name, one.network.fingerprint()));
+    let parameters = json!({
+        "networks": checksums.collect::<BTreeMap<_, _>>(),
+        "eps": EPS,
+        "inner_step": STEP,
+        "time_step": STEP_RATIO * STEP,
+    });
+    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let install = options.install.as_ref().map(OutputDir::create);
+    let install = install.transpose()?;
+    let mut all = Vec::new();
+    for NamedNetwork { name, network } in networks {
+        let calibration = session.phase(&name, |_| Ok(network.calibrate()?))?;
+        let network = network.with_calibration(Some(calibration));
+        if let Some(install) = &install {
+            network.save(&install.path(&name)?)?;
+        }
+        all.push(Calibrated {
+            named: NamedNetwork { name, network },
+            calibration,
+        });
+    }
+    let discs = session.phase("discs", |stage| discs(&all, stage))?;
+    let surfaces = session.phase("balls and tori", |stage| balls_and_tori(&all, stage))?;
+    let diagnosed = session.phase("diagnostics", |stage| diagnostics(&all, stage))?;
+
+    session.figure(diagnostics_figure(&diagnosed), "diagnostics")?;
+    session.figure(discs_figure(&discs), "discs")?;
+    let output = &session.output;
+    output.write_json("diagnostics.json", &diagnosed)?;
+    output.write_csv("discs.csv", &discs)?;
+    output.write_csv("surfaces.csv", &surfaces)?;
+    let learned = all
+        .iter()
+        .map(|one| (one.named.name.clone(), one.calibration));
+    let rows: Vec<(String, Calibration)> = learned.chain(elements()?).collect();
+    session.sheet(calibrations_table(&rows), "calibration")?;
+    session.sheet(discs_table(&discs), "discs_table")?;
+    session.sheet(surfaces_table(&surfaces), "surfaces_table")?;
+    for one in &all {
+        let (key, calibration) = (one.key(), &one.calibration);
+        session.summary.insert_record(key, calibration)?;
+        session.summary.insert_record(key, &calibration.factors)?;
+    }
+    session.finish("Calibration of the learned operators and of finite elements")
+}
+
+impl Options {
+    /// Networks under their file names.
+    fn networks(&self) -> Result<Vec<NamedNetwork>, Error> {
+        let shipped = [Shipped::Paper.all()?, Shipped::Accurate.all()?].concat();
+        let shipped = shipped.into_iter().map(|(name, network)| NamedNetwork {
+            name: name.to_owned(),
+            network,
+        });
+        let chosen = self.network.iter().map(|path| {
+            let network = Network::load(path)?;
+            let name = network.ratios().file_name();
+            Ok(NamedNetwork { name, network })
+        });
+        let mut networks = chosen.collect::<Result<Vec<_>, Error>>()?;
+        if networks.is_empty() {
+            networks.extend(shipped);
+        }
+        networks.truncate(if self.run.quick { 1 } else { usize::MAX });
+        Ok(networks)
+    }
+}
+
+/// A network under its name.
+#[derive(Clone)]
+struct Calibrated {
+    named: NamedNetwork,
+    calibration: Calibration,
+}
+
+impl Calibrated {
+    fn key(&self) -> &str {
+        self.named.name.trim_end_matches(".safetensors")
+    }
+
+    /// Cells per unit length at which the network has the scales of the convergence tests.
+    fn convergence_cells(&self) -> Option<usize> {
+        let ratios = self.named.network.ratios();
+        let n = (ratios.eps_over_h / EPS).round();
+        let fits = ratios.dimension == 2 && (ratios.step_over_h2 - n * n * STEP).abs() < 1e-9;
+        fits.then_some(n as usize)
+    }
+
+    /// The odd part of the operator, calibrated anew.
+    fn odd_part(&self) -> Result<Self, Error> {
+        let mut odd = self.clone();
+        odd.named.network = self.named.network.odd_part();
+        odd.calibration = odd.named.network.calibrate()?;
+        Ok(odd)
+    }
+
+    /// Willmore energy and phase field after one small step with these factors.
+    fn relaxed<const D: usize>(
+        &self,
+        initial: &Field<D>,
+        scales: Scales,
+        factors: Factors,
+        device: &ComputeDevice,
+    ) -> Result<(f64, Field<D>), Error> {
+        let mut operator = Operator::learned(Scheme::Paper, self.named.clone())?;
+        operator.factors = factors;
+        let time = (StepRule::Constant(STEP_RATIO * scales.mcf_step), 1);
+        let case = willmore_flow("surface at rest", initial.clone(), operator, scales, time);
+        let mut run = Run::new(case, device)?;
+        let energy = run.step()?.and_then(Record::willmore_energy);
+        Ok((energy.unwrap_or(f64::NAN), run.field().clone()))
+    }
+}
+
+/// The Willmore energy that the scheme sees in a disc.
+#[derive(Serialize)]
+struct DiscRow {
+    network: String,
+    odd_part: bool,
+    /// 1: the phase `u = 1` is the disc; -1: the phases are exchanged.
+    phase: i8,
+    radius: f64,
+    /// `w` without calibration over `pi / R`.
+    measured: f64,
+    /// `c (1 - kappa_0 R)^2`.
+    predicted: f64,
+    /// `w` with calibration over `pi / R`.
+    calibrated: f64,
+}
+
+/// Discs of either phase by every network with the scales of the convergence tests up to `n = 256`, and by its odd part.
+fn discs(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<DiscRow>, Error> {
+    let quick = stage.options.quick;
+    let radii = if quick { &QUICK_RADII[..] } else { &RADII };
+    let mut variants = Vec::new();
+    for one in all {
+        if let Some(n) = one.convergence_cells().filter(|&n| n <= 256) {
+            variants.push((n, false, one.clone()));
+            if !one.key().starts_with("accurate") {
+                variants.push((n, true, one.odd_part()?));
+            }
+        }
+    }
+    let mut tasks = Vec::new();
+    for variant in &variants {
+        for &radius in radii {
+            tasks.extend([1, -1].map(|phase| (variant, radius, phase)));
+        }
+    }
+    stage.bar.set_length(tasks.len() as u64);
+    harness::in_parallel(tasks.len(), harness::workers(stage.device), |i| {
+        let (&(n, odd_part, ref one), radius, phase) = tasks[i];
+        let (sign, factors) = (f64::from(phase), one.calibration.factors);
+        let offset = one.calibration.spontaneous_curvature / EPS * sign;
+        let half = ((radius + MARGIN) * n as f64).ceil();
+        let grid = Grid::<2>::centred(2 * half as usize, 2.0 * half / n as f64)?;
+        let disc = phase_field(grid, &Ball::new([0.0, 0.0], radius)?, EPS)?;
+        let disc = disc.map(|u| sign * u);
+        // Over that of the zero level set of the relaxed disc, `pi / R`.
+        let energy = |factors| -> Result<f64, Error> {
+            let (energy, field) = one.relaxed(&disc, scales(), factors, stage.device)?;
+            let inside = zero_set_volume(&field);
+            let outside = grid.side().powi(2) - inside;
+            let area = if phase > 0 { inside } else { outside };
+            Ok(energy * (area / PI).sqrt() / PI)
+        };
+        let row = DiscRow {
+            network: one.named.name.clone(),
+            odd_part,
+            phase,
+            radius,
+            measured: energy(Factors::PAPER)?,
+            predicted: factors.energy * (1.0 - offset * radius).powi(2),
+            calibrated: energy(factors)?,
+        };
+        stage.bar.inc(1);
+        Ok(row)
+    })
+}
+
+fn discs_table(discs: &[DiscRow]) -> Sheet<'_, DiscRow> {
+    Sheet::of(discs)
+        .text("network", |r| &r.network)
+        .text("F", |r| if r.odd_part { "odd part" } else { "whole" })
+        .column("phase", Shortest, |r| f64::from(r.phase))
+        .column("R", Shortest, |r| r.radius)
+        .column("w R/π", Fixed(4), |r| r.measured)
+        .column("predicted", Fixed(4), |r| r.predicted)
+        .column("calibrated w R/π", Fixed(4), |r| r.calibrated)
+}
+
+/// Measured and predicted energies over the radius; colour: phase.
+fn discs_figure(discs: &[DiscRow]) -> Figure {
+    let panel = |rows: &[DiscRow]| {
+        let part = ["F", "odd part of F"][usize::from(rows[0].odd_part)];
+        let title = format!("{}, {part}", rows[0].network);
+        let mut chart = LineChart::new(title, Axis::linear("radius R"), Axis::linear("w R/π"));
+        for (colour, phase, name) in [(0, 1, "disc"), (1, -1, "complement of a disc")] {
+            let curve = |label, value: fn(&DiscRow) -> f64| {
+                let rows = rows.iter().filter(|row| row.phase == phase);
+                let point = |row: &DiscRow| [row.radius, value(row)];
+                Series::of(format!("{name}: {label}"), rows, point).with_colour(colour)
+            };
+            let measured = curve("without calibration", |row| row.measured);
+            let calibrated = curve("calibrated", |row| row.calibrated);
+            chart = chart.with_curves([
+                measured.with_symbols(Marker::Circle),
+                curve("predicted", |row| row.predicted),
+                calibrated.with_symbols(Marker::Square),
+            ]);
+        }
+        let exact = Series::new("exact", [[0.0, 1.0], [0.65, 1.0]]).with_colour(Colour::Black);
+        chart.with_series(exact.with_style(LineStyle::Dashed))
+    };
+    let same = |a: &DiscRow, b: &DiscRow| a.network == b.network && a.odd_part == b.odd_part;
+    Figure::new("Willmore energy of discs, w R/π", 2)
+        .with_panels(discs.chunk_by(same).map(panel))
+        .with_shared_legend()
+}
+
+/// The Willmore energy that the scheme sees in a surface whose energy is known.
+#[derive(Serialize)]
+struct SurfaceRow {
+    network: String,
+    surface: String,
+    /// Over the exact energy, without calibration.
+    measured: f64,
+    /// The same with calibration.
+    calibrated: f64,
+}
+
+/// Balls and Clifford tori.
+fn balls_and_tori(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<SurfaceRow>, Error> {
+    let grid = Grid::<3>::per_unit(SURFACE_CELLS, SURFACE_SIDE)?;
+    let scales = surfaces::scales(SURFACE_CELLS);
+    let mut shapes: Vec<(String, Field<3>, f64)> = Vec::new();
+    for radius in BALLS {
+        let ball = phase_field(grid, &Ball::new([0.0; 3], radius)?, scales.eps)?;
+        shapes.push((format!("ball, R = {radius}"), ball, 8.0 * PI));
+    }
+    for outer in TORI {
+        let torus = phase_field(grid, &Torus::clifford(outer)?, scales.eps)?;
+        shapes.push((format!("Clifford torus, {outer:.2}"), torus, 4.0 * PI * PI));
+    }
+    if stage.options.quick {
+        shapes.truncate(1);
+    }
+    let mut rows = Vec::new();
+    for one in all
+        .iter()
+        .filter(|one| one.named.network.ratios().dimension == 3)
+    {
+        let mut odd = one.clone();
+        odd.named.network = one.named.network.odd_part();
+        for (surface, initial, exact) in &shapes {
+            let energy = |factors| -> Result<f64, Error> {
+                Ok(odd.relaxed(initial, scales, factors, stage.device)?.0 / exact)
+            };
+            rows.push(SurfaceRow {
+                network: one.named.name.clone(),
+                surface: surface.clone(),
+                measured: energy(Factors::PAPER)?,
+                calibrated: energy(one.calibration.factors)?,
+            });
+        }
+    }
+    Ok(rows)
+}
+
+fn surfaces_table(rows: &[SurfaceRow]) -> Sheet<'_, SurfaceRow> {
+    Sheet::of(rows)
+        .text("network", |r| &r.network)
+        .text("surface", |r| &r.surface)
+        .column("w / exact", Fixed(4), |r| r.measured)
+        .column("calibrated w / exact", Fixed(4), |r| r.calibrated)
+}
+
+/// What tells good networks from bad ones.
+#[derive(Serialize)]
+struct Diagnostics {
+    network: String,
+    /// `eps kappa`, positive where the phase `u = 1` is convex, and the relative error of the displacement.
+    displacement: Vec<[f64; 2]>,
+    /// Eigenvalues of `J` at the flat interface, real and imaginary parts.
+    spectrum: Vec<[f64; 2]>,
+    /// `w` and `F''(w)`.
+    bend: Vec<[f64; 2]>,
+}
+
+fn diagnostics(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<Diagnostics>, Error> {
+    let count: usize = if stage.options.quick { 3 } else { 12 };
+    // Kernels of width 65 have a thousand planes; surfaces have millions of nodes.
+    let networks = all.iter().map(|one| (one.key(), &one.named.network));
+    let small = networks
+        .filter(|(_, network)| network.ratios().width < 65 && network.ratios().dimension == 2);
+    let diagnose = |(name, network): (&str, &Network)| {
+        let data = SphereData::new(network.ratios(), network.provenance().reference_cells)?;
+        let mut displacement = Vec::new();
+        for i in 0..count {
+            let radius = 0.05 * (0.42_f64 / 0.05).powf(i as f64 / (count - 1) as f64);
+            let curvature = data.eps() / radius;
+            let [convex, concave] = displacement_errors(network, &data, radius, stage.device)?;
+            displacement.extend([[curvature, convex], [-curvature, concave]]);
+        }
+        displacement.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let bend = (0..=400).map(|i| f64::from(i) / 200.0 - 1.0);
+        Ok(Diagnostics {
+            network: name.to_owned(),
+            displacement,
+            spectrum: network.flat_spectrum()?,
+            bend: bend.map(|w| [w, network.activation().jet(w)[2]]).collect(),
+        })
+    };
+    small.map(diagnose).collect()
+}
+
+fn diagnostics_figure(all: &[Diagnostics]) -> Figure {
+    let chart = |title, x, y, points: fn(&Diagnostics) -> Vec<[f64; 2]>| {
+        let curves = all.iter().enumerate().map(|(k, one)| {
+            let accurate = one.network.starts_with("accurate");
+            let style = [LineStyle::Solid, LineStyle::Dashed][usize::from(accurate)];
+            let curve = Series::new(one.network.clone(), points(one));
+            curve.with_colour(k % 8).with_style(style)
+        });
+        LineChart::new(title, Axis::linear(x), Axis::linear(y)).with_curves(curves)
+    };
+    let displacement = chart(
+        "Error of one step of mean curvature flow",
+        "curvature ε κ (positive: disc)",
+        "relative error of the displacement",
+        |one| one.displacement.clone(),
+    );
+    let spectrum = chart(
+        "Spectrum of the flat interface",
+        "number of the eigenvalue",
+        "real part",
+        |one| {
+            let first = one.spectrum.iter().take(40).enumerate();
+            first.map(|(i, value)| [(i + 1) as f64, value[0]]).collect()
+        },
+    );
+    let bend = |one: &Diagnostics| one.bend.clone();
+    let bend = chart("Second derivative of F", "w", "F''(w)", bend);
+    Figure::new("Diagnostics of the learned operators", 2)
+        .with_panels([displacement, spectrum, bend])
+        .with_shared_legend()
+}
+
+/// The finite-element steps of the experiments.
+fn elements() -> Result<Vec<(String, Calibration)>, Error> {
+    let (plane, space) = (Grid::<2>::centred(16, 16.0)?, Grid::<3>::centred(8, 8.0)?);
+    let mut all = Vec::new();
+    let mut add = |kind, dimension, [eps, step]: [f64; 2], calibration| {
+        let name = format!("FE {kind}, {dimension}D, eps = {eps} h, step = {step} h²");
+        all.push((name, calibration));
+    };
+    for ratios @ [eps, step] in ELEMENTS {
+        let implicit = FiniteElementStep::implicit(&plane, eps, step)?;
+        add("implicit", 2, ratios, implicit.calibrate()?);
+        let semi_implicit = FiniteElementStep::semi_implicit(&plane, eps, step)?;
+        add("semi-implicit", 2, ratios, semi_implicit.calibrate()?);
+    }
+    let implicit = FiniteElementStep::implicit(&space, ELEMENTS[0][0], ELEMENTS[0][1])?;
+    add("implicit", 3, ELEMENTS[0], implicit.calibrate()?);
+    Ok(all)
+}
+
+fn calibrations_table(rows: &[(String, Calibration)]) -> Sheet<'_, (String, Calibration)> {
+    let small = Scientific(1);
+    Sheet::of(rows)
+        .text("network", |(name, _)| name)
+        .column("c", Fixed(4), |(_, c)| c.factors.energy)
+        .column("m", Fixed(4), |(_, c)| c.factors.metric)
+        .column("c/m", Fixed(4), |(_, c)| c.factors.speed())
+        .column("displacement", Fixed(4), |(_, c)| c.displacement)
+        .column("cos² of ψ and w'", Fixed(4), |(_, c)| c.alignment)
+        .column("ε κ₀", small, |(_, c)| c.spontaneous_curvature)
+        .column("eigenvalue - 1", small, |(_, c)| c.eigenvalue - 1.0)
+        .column("spread over positions", small, |(_, c)| c.position_spread)
+        .column("spread over normals", small, |(_, c)| c.normal_spread)
+}

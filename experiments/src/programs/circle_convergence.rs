@@ -1,0 +1,306 @@
+//! Convergence test on circles: mean curvature flow and Willmore flow against the exact solutions.
+
+use crate::circles::{self, Circle, Ensemble};
+use crate::look;
+use crate::networks::{EPS, STEP};
+use crate::prelude::*;
+use crate::session::remove_folder;
+use crate::steps::{self, Rows};
+use crate::study::{Study, StudyOptions, Variant};
+use engine::Flow;
+use report::{OutputDir, Table};
+use solver::StepRecord;
+
+const PROGRAM: &str = "circle_convergence";
+/// Steps at which tables and summaries give the error.
+const SHOWN_STEPS: [usize; 5] = [1, 8, 16, 32, 64];
+
+/// Mean curvature flow by all methods and Willmore flow by the learned operator (with --full by all) of 30 circles, eps = 2^-6, 64
+/// steps of 2^-14: L2 distance to the exact solution over time, mean over the radii 0.05 pi + 0.15 pi i/30.
+#[derive(Parser, Debug)]
+#[command(name = PROGRAM, version)]
+struct Options {
+    #[command(flatten)]
+    study: StudyOptions,
+
+    /// Leave nested finite elements of Willmore flow out above this resolution; a circle takes minutes at n = 256
+    #[arg(long, value_name = "N")]
+    elements_up_to: Option<usize>,
+
+    /// Take some of the 30 circles only, evenly chosen
+    #[arg(long, value_name = "COUNT")]
+    circles: Option<usize>,
+}
+
+impl Options {
+    /// All curves of the figures. Nested finite elements take hours; everything else together some minutes.
+    fn variants(&self) -> Vec<Variant> {
+        let limit = self.elements_up_to.unwrap_or(usize::MAX);
+        let usual = |method: Method, _| method.is_learned() || self.study.full;
+        let mut willmore = self.study.variants(Flow::Willmore, usual);
+        willmore.retain(|variant| variant.method.is_learned() || variant.n <= limit);
+        let mut variants = self.study.variants(Flow::MeanCurvature, |_, _| true);
+        variants.extend(willmore);
+        variants
+    }
+}
+
+pub fn main() -> ExitCode {
+    harness::main(program)
+}
+
+fn program(options: &Options) -> Result<(), Error> {
+    let run = &options.study.run;
+    let (all, steps) = if run.quick {
+        (4, 8)
+    } else {
+        (circles::COUNT, circles::STEPS)
+    };
+    let count = options.circles.unwrap_or(all);
+    require(
+        (1..=circles::COUNT).contains(&count),
+        format!(
+            "--circles must be from 1 to {}, not {count}",
+            circles::COUNT
+        ),
+    )?;
+    let (variants, device) = (options.variants(), run.open_device()?);
+    let study = Study::new(&options.study.networks, &variants)?;
+    let parameters = json!({
+        "cells": study.cells,
+        "runs": study.variants().collect::<Vec<_>>(),
+        "circles": count,
+        "steps": steps,
+        "eps": EPS,
+        "time_step": STEP,
+        "networks": study.checksums(),
+    });
+    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let finished = session.output.subfolder("partial")?;
+    let mut ensembles = Vec::new();
+    for planned in &study.plan {
+        let Variant { flow, n, .. } = planned.0;
+        let title = format!("{}, {}, n = {n}", flow.title(), planned.0.label());
+        let ensemble = session.phase(title, |stage| {
+            stage.bar.set_length(count as u64);
+            let folder = finished.as_path();
+            Ensemble::run(
+                planned,
+                (count, steps),
+                None,
+                stage.device,
+                folder,
+                &stage.bar,
+            )
+        })?;
+        ensembles.push(ensemble);
+    }
+    let report = Report {
+        study,
+        ensembles,
+        steps,
+    };
+    report.figures(&session)?;
+    report.data(&session.output)?;
+    session.sheet(report.sheet(), "errors")?;
+    report.metrics(&mut session)?;
+    remove_folder(&finished)?;
+    session.finish("Mean L2 distance to the exact solution")
+}
+
+/// Turns the ensembles into files.
+struct Report {
+    study: Study,
+    ensembles: Vec<Ensemble>,
+    steps: usize,
+}
+
+fn time(step: usize) -> f64 {
+    step as f64 * STEP
+}
+
+impl Report {
+    fn of_flow(&self, flow: Flow) -> impl Iterator<Item = &Ensemble> {
+        (self.ensembles.iter()).filter(move |e| e.variant.flow == flow)
+    }
+
+    fn shown_steps(&self) -> impl Iterator<Item = usize> {
+        SHOWN_STEPS.into_iter().filter(|&k| k <= self.steps)
+    }
+
+    /// The way of the exact solution, at the finest resolution.
+    fn scale(&self, flow: Flow) -> Option<f64> {
+        (self.of_flow(flow).last()).map(|e| e.mean(|circle| circle.travelled))
+    }
+
+    /// A chart for each flow with a curve for each variant.
+    fn flows(&self, x: &str, y: &str, curve: impl Fn(&Ensemble) -> Series) -> [LineChart; 2] {
+        Flow::ALL.map(|flow| {
+            let chart = LineChart::new(flow.title(), Axis::linear(x), Axis::log(y));
+            self.study.chart(chart, self.of_flow(flow).map(&curve))
+        })
+    }
+
+    fn figures(&self, session: &Session<'_>) -> Result<(), Error> {
+        let end = time(self.steps);
+        let over_radius = format!("Error on circles at t = {end:.4} over the radius");
+        let work = "Work per step of Willmore flow, mean over the circles".to_owned();
+        let over_time = Figure::new("Error on circles over time", 2).with_panels(self.over_time());
+        let over_time = over_time.with_shared_legend().with_note(self.circles());
+        session.figure(over_time, "convergence")?;
+        for (title, charts, stem) in [
+            (over_radius, self.over_radius(), "error_over_radius"),
+            (work, self.work(), "work_per_step"),
+        ] {
+            let figure = Figure::new(title, 2).with_panels(charts);
+            session.figure(figure.with_shared_legend(), stem)?;
+        }
+        session.figure(self.cost(), "error_over_cost")
+    }
+
+    fn circles(&self) -> String {
+        let radii: Vec<f64> = self.ensembles[0].circles.iter().map(|c| c.radius).collect();
+        let (count, first, last) = (radii.len(), radii[0], radii[radii.len() - 1]);
+        format!(
+            "ε = 2⁻⁶, τ = 2⁻¹⁴, h = 1/n; mean over {count} circles with radii between {first:.3} and {last:.3}."
+        )
+    }
+
+    fn over_time(&self) -> [LineChart; 2] {
+        let mut charts = self.flows("time t", "mean L² error", |e| {
+            let points = (0..=self.steps).map(|k| [time(k), e.mean_error(k)]);
+            self.study.series(e.variant, points.collect())
+        });
+        for (chart, flow) in charts.iter_mut().zip(Flow::ALL) {
+            let end = time(self.steps);
+            chart.note = self.scale(flow).map(|scale| {
+                format!("For scale: mean ‖u(t) − u(0)‖ = {scale:.3} at t = {end:.4}.")
+            });
+        }
+        charts
+    }
+
+    fn over_radius(&self) -> [LineChart; 2] {
+        self.flows("initial radius r", "L² error", |e| {
+            let points = e.circles.iter().map(|c| [c.radius, c.error(self.steps)]);
+            let curve = self.study.series(e.variant, points.collect());
+            let marker = look::marker(e.variant.n, &self.study.cells);
+            curve.with_marker(marker).with_width(1.6)
+        })
+    }
+
+    /// Work of each step.
+    fn work(&self) -> [LineChart; 2] {
+        let counts: [(&str, fn(&StepRecord) -> f64); 2] = [
+            ("Hessian-vector products", StepRecord::hvp),
+            ("Newton steps", |r| r.newton.newton as f64),
+        ];
+        counts.map(|(label, count)| {
+            let mut highest = 1.0_f64;
+            let mut curves = Vec::new();
+            for e in self.of_flow(Flow::Willmore) {
+                let of = |circle: &Circle, k: usize| {
+                    let made = &circle.trajectory.records[k].minimization;
+                    made.as_ref().map_or(0.0, count)
+                };
+                let point = |k| [time(k + 1), e.mean(|circle| of(circle, k))];
+                let points: Vec<[f64; 2]> = (0..self.steps).map(point).collect();
+                highest = points.iter().map(|point| point[1]).fold(highest, f64::max);
+                curves.push(self.study.series(e.variant, points).with_width(1.8));
+            }
+            let y = Axis::linear(label).with_range(0.0, 1.1 * highest);
+            let chart = LineChart::new("", Axis::linear("time t"), y);
+            self.study.chart(chart, curves)
+        })
+    }
+
+    /// Error at the end over the mean wall time of a circle, a curve for each method and scheme.
+    fn cost(&self) -> Figure {
+        let steps = self.steps;
+        let own = |look| (self.of_flow(Flow::Willmore)).filter(move |e| e.variant.look() == look);
+        let shown = look::variants(|look| own(look).next().is_some());
+        let curves = shown.map(|(method, scheme)| {
+            let cells: Vec<String> = own((method, scheme))
+                .map(|e| e.variant.n.to_string())
+                .collect();
+            let name = format!("{}, n = {}", method.label_in(scheme), cells.join(", "));
+            let point = |e: &Ensemble| [e.seconds_per_step() * steps as f64, e.mean_error(steps)];
+            Series::of(name, own((method, scheme)), point)
+                .with_colour(look::colour(method, scheme))
+                .with_marker(Marker::Circle)
+        });
+        let error = Axis::log(format!("mean L² error at t = {:.4}", time(steps)));
+        let chart = LineChart::new("", Axis::log("wall time per circle [s]"), error);
+        Figure::new("Willmore flow of circles: accuracy against cost", 1)
+            .with_panel(chart.with_curves(curves))
+            .with_shared_legend()
+            .with_note(format!(
+                "{steps} time steps; mean over {} circles, each on one core.",
+                self.ensembles[0].circles.len()
+            ))
+    }
+
+    fn data(&self, output: &OutputDir) -> Result<(), Error> {
+        let table = |columns: &[&'static str]| Table::data(Variant::COLUMNS.iter().chain(columns));
+        let mut curves = table(&["step", "time", "l2_mean", "l2_min", "l2_max"]);
+        let mut circles = table(&["radius", "step", "time", "l2"]);
+        let mut runs = Vec::new();
+        for e in &self.ensembles {
+            for k in 0..=self.steps {
+                let [least, most] = e.error_range(k);
+                let errors = [time(k), e.mean_error(k), least, most];
+                curves.push(e.variant.row([k.into()], errors))?;
+            }
+            for circle in &e.circles {
+                for k in self.shown_steps() {
+                    let which = [circle.radius.into(), k.into()];
+                    circles.push(e.variant.row(which, [time(k), circle.error(k)]))?;
+                }
+            }
+            if e.variant.flow == Flow::Willmore {
+                runs.extend(e.circles.iter().map(|circle| Rows {
+                    leading: [&e.variant.cells()[1..], &[circle.radius.into()]].concat(),
+                    start: None,
+                    records: &circle.trajectory.records,
+                }));
+            }
+        }
+        let steps = steps::table(&[&Variant::COLUMNS[1..], &["radius"]].concat(), &runs)?;
+        for (name, table) in [("curves", curves), ("circles", circles), ("steps", steps)] {
+            output.write(&format!("{name}.csv"), table.to_csv()?)?;
+        }
+        Ok(())
+    }
+
+    /// The mean errors, and of Willmore flow the work.
+    fn sheet(&self) -> Sheet<'_, Ensemble> {
+        let mut sheet = Sheet::of(&self.ensembles)
+            .keyed(|e, name| format!("{}.{name}", e.key()))
+            .text("flow", |e| e.variant.flow.title())
+            .column("n", Shortest, |e| e.variant.n)
+            .text("method", |e| e.variant.label());
+        for k in self.shown_steps() {
+            let (metric, head) = (format!("l2.step{k}"), format!("step {k}"));
+            sheet = sheet.measure(&metric, (&head, Fixed(5)), |e| e.mean_error(k));
+        }
+        let hvp = |e: &Ensemble| e.mean_of_steps(StepRecord::hvp);
+        sheet.measure("hvp_per_step", ("HVP/step", Fixed(1)), hvp)
+    }
+
+    /// Further metrics of Willmore flow, and the scale of both flows.
+    fn metrics(&self, session: &mut Session<'_>) -> Result<(), Error> {
+        for e in self.of_flow(Flow::Willmore) {
+            let newton = e.mean_of_steps(|r| r.newton.newton as f64);
+            let metrics = [
+                ("newton_per_step", newton.into()),
+                ("seconds_per_step", e.seconds_per_step().into()),
+                ("energy_increases", e.energy_increases().into()),
+                ("negative_curvature", e.negative_curvature().into()),
+            ];
+            session.metrics(&e.key(), metrics)?;
+        }
+        let scales = Flow::ALL.map(|flow| (flow.key(), self.scale(flow)));
+        (scales.into_iter())
+            .try_for_each(|(flow, scale)| session.metric(&format!("{flow}.scale"), scale))
+    }
+}

@@ -1,0 +1,23 @@
+//! The cross under Willmore flow.
+
+use crate::comparison::{self, Setting};
+use crate::prelude::*;
+use crate::truth;
+
+const CROSS: Setting = Setting {
+    program: "cross",
+    title: "Willmore flow of a cross",
+    about: "Willmore flow of a non-convex cross, eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7, by all methods and resolutions \
+            (finite elements from n = 256 on, where they are stable): L2 distance to a finer implicit finite-element run, and shapes",
+    shape: "cross [-.8,.8] x [-.27,.27]",
+    sample: truth::CROSS,
+    flow: Flow::Willmore,
+    steps: 128,
+    shown: &[0, 32, 64, 96, 128],
+    reference_ratio: 1,
+    window: 0.95,
+};
+
+pub fn main() -> ExitCode {
+    comparison::main(&CROSS)
+}

@@ -1,0 +1,311 @@
+//! Noise taken off meshes by Willmore flow, by Taubin's smoothing and by Laplacian smoothing.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use chacha20::ChaCha8Rng;
+
+use crate::meshes::{folder, sampled};
+use crate::prelude::*;
+use crate::surfaces::{centred_box, willmore_flow};
+use engine::{DISPLACEMENT, Stop};
+use geometry::{Placement, SignedDistance, UpAxis, optimal_profile};
+use model::Networks;
+use rand::{RngExt, SeedableRng};
+use render::{Scene, View};
+use report::Raster;
+use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, samples, usual_up_axis};
+
+const TITLE: &str = "Noise of meshes taken off";
+/// Standard deviations along the normals, in percent of the longest side.
+const NOISES: [f64; 2] = [0.3, 0.5];
+/// The grid as `willmore fair` chooses it: cells per unit length, and the longest side in the box.
+const CELLS: usize = 128;
+const SIDE: f64 = 0.9;
+/// Factors of Taubin's smoothing, and of Laplacian smoothing; the most iterations of both.
+const TAUBIN: [f64; 2] = [0.5, -0.53];
+const LAPLACIAN: [f64; 2] = [0.5, 0.0];
+const ITERATIONS: usize = 30;
+/// Side of a picture in pixels.
+const DRAWN: u32 = 420;
+
+/// Independent normally distributed noise along the normals of clean meshes, taken off by `willmore fair` at its defaults, by Taubin's
+/// and by Laplacian smoothing with the number of iterations that comes nearest to the clean mesh: distances, normals and volumes.
+#[derive(Parser, Debug)]
+#[command(name = "denoising", version)]
+struct Options {
+    #[command(flatten)]
+    run: RunOptions,
+
+    /// Denoise this clean mesh too (OBJ, PLY or STL); can be repeated [default: the meshes of scripts/fetch_meshes, where they are here]
+    #[arg(long, value_name = "FILE")]
+    mesh: Vec<PathBuf>,
+}
+
+pub fn main() -> ExitCode {
+    harness::main(program)
+}
+
+/// A clean mesh.
+struct Clean {
+    name: String,
+    mesh: ClosedMesh,
+    distance: MeshDistance,
+    up: UpAxis,
+}
+
+/// What became of a noisy mesh by one method.
+struct Row<'a> {
+    clean: &'a Clean,
+    noise: f64,
+    method: &'static str,
+    iterations: Option<usize>,
+    quality: Quality,
+    seconds: f64,
+    result: TriangleMesh,
+}
+
+impl Row<'_> {
+    /// Prefix of its metrics.
+    fn key(&self) -> String {
+        let method = self.method.to_lowercase();
+        format!("{}.{method}", self.clean.key(self.noise))
+    }
+}
+
+/// How near a mesh is to the clean one.
+#[derive(Clone, Copy)]
+struct Quality {
+    /// Root of the mean square distance of the vertices to the clean surface, in percent of the longest side.
+    rms: f64,
+    /// Mean angle between corresponding faces, in degrees.
+    normals: f64,
+    /// Change of the volume in percent.
+    volume: f64,
+}
+
+fn program(options: &Options) -> Result<(), Error> {
+    let device = options.run.open_device()?;
+    let quick = options.run.quick;
+    let noises = if quick { &NOISES[..1] } else { &NOISES };
+    let cells = if quick { 64 } else { CELLS };
+    let meshes = clean_meshes(options)?;
+    let names: Vec<&str> = meshes.iter().map(|clean| clean.name.as_str()).collect();
+    let parameters = json!({ "meshes": names, "noise_percent": noises, "cells": cells, "side": SIDE,
+        "taubin": TAUBIN, "laplacian": LAPLACIAN, "iterations": ITERATIONS });
+    let mut session = Session::open("denoising", &options.run, device, parameters)?;
+    let (mut rows, mut charts, mut pictures) = (Vec::new(), Vec::new(), Vec::new());
+    for clean in &meshes {
+        for &noise in noises {
+            let (methods, chart) = denoise(&mut session, clean, noise, cells)?;
+            charts.push(chart);
+            if noise.to_bits() == noises[0].to_bits() {
+                let results = [0, 2, 3, 1].map(|k| (methods[k].method, &methods[k].result));
+                let shown = [("clean", clean.mesh.mesh())].into_iter().chain(results);
+                let drawn = shown.map(|(name, mesh)| clean.picture(name, mesh));
+                pictures.extend(session.phase::<Vec<_>>("pictures", |_| drawn.collect())?);
+            }
+            rows.extend(methods);
+        }
+    }
+    let table = Sheet::of(&rows)
+        .keyed(|row, name| format!("{}.{name}", row.key()))
+        .text("mesh", |row| &row.clean.name)
+        .column("noise, %", Shortest, |row| row.noise)
+        .text("method", |row| row.method)
+        .column("iterations", Shortest, |row| row.iterations)
+        .measure("rms", ("distance, %", Fixed(4)), |row| row.quality.rms)
+        .measure("normals", ("normals, degrees", Fixed(2)), |row| {
+            row.quality.normals
+        })
+        .measure("volume", ("volume, %", Fixed(3)), |row| row.quality.volume)
+        .column("seconds", Fixed(2), |row| row.seconds);
+    session.sheet(table, "denoising")?;
+    let title = format!("{TITLE}: distance to the clean surface");
+    let figure = Figure::new(title, noises.len()).with_panels(charts);
+    session.figure(figure.with_shared_legend(), "distances")?;
+    let surfaces = Figure::new(format!("{TITLE}: noise of {} %", noises[0]), 5)
+        .with_row_labels(names)
+        .with_panels(pictures);
+    session.figure(surfaces, "surfaces")?;
+    session.finish(TITLE)
+}
+
+/// A mesh with noise, and what `fair`, Taubin's and Laplacian smoothing make of it, and the distances over the number of iterations.
+fn denoise<'a>(
+    session: &mut Session<'_>,
+    clean: &'a Clean,
+    noise: f64,
+    cells: usize,
+) -> Result<(Vec<Row<'a>>, LineChart), Error> {
+    let noisy = clean.with_noise(noise, session.options.seed);
+    let row = |method, iterations, result: TriangleMesh, seconds| Row {
+        clean,
+        noise,
+        method,
+        iterations,
+        quality: clean.quality(&result),
+        seconds,
+        result,
+    };
+    let title = format!("{}, noise {noise} %", clean.name);
+    let clock = Instant::now();
+    let faired = fair(session, &noisy, cells, &title)?;
+    let fair = row("fair", None, faired, clock.elapsed().as_secs_f64());
+    let mut rows = vec![row("noisy", None, noisy.clone(), 0.0)];
+    let mut curves = Vec::new();
+    for (colour, method, factors) in [(1, "Taubin", TAUBIN), (2, "Laplacian", LAPLACIAN)] {
+        let clock = Instant::now();
+        let smoothed = |count| noisy.smoothed(count, factors[0], factors[1]);
+        let all = (1..=ITERATIONS).map(|count| clean.quality(&smoothed(count)));
+        let all: Vec<Quality> = all.collect();
+        let seconds = clock.elapsed().as_secs_f64() / ITERATIONS as f64;
+        let best = (2..ITERATIONS).min_by(|&a, &b| all[a].rms.total_cmp(&all[b].rms));
+        let best = best.unwrap_or(2) + 1;
+        let least = all[2..].iter().map(|q| q.normals).fold(f64::MAX, f64::min);
+        let row = row(method, Some(best), smoothed(best), seconds);
+        session.metric(&format!("{}.least_normals", row.key()), least)?;
+        rows.push(row);
+        let points = (1..).zip(&all);
+        let curve = Series::of(method, points, |(k, quality)| [f64::from(k), quality.rms]);
+        curves.push(curve.with_colour(colour));
+    }
+    let ratio = fair.quality.rms / rows[1].quality.rms;
+    session.metric(&format!("{}.fair_over_taubin", clean.key(noise)), ratio)?;
+    let level = |name, quality: &Quality| {
+        let ends = [1.0, ITERATIONS as f64].map(|x| [x, quality.rms]);
+        Series::new(name, ends)
+    };
+    curves.push(level("fair", &fair.quality).with_colour(0));
+    let noisy = level("noisy", &rows[0].quality).with_colour(4);
+    curves.push(noisy.with_style(LineStyle::Dotted));
+    rows.insert(1, fair);
+    let distance = Axis::log("distance, % of the longest side");
+    let chart = LineChart::new(title, Axis::linear("iterations"), distance);
+    Ok((rows, chart.with_curves(curves)))
+}
+
+/// The built-in shapes, and the meshes that are chosen or here.
+fn clean_meshes(options: &Options) -> Result<Vec<Clean>, Error> {
+    let mut meshes = vec![
+        Clean::new("figure", samples::figure(96)?, UpAxis::Y),
+        Clean::new("lever", samples::lever(96)?, UpAxis::Z),
+    ];
+    let mut files = options.mesh.clone();
+    if files.is_empty() && !options.run.quick {
+        let here = ["rocker-arm.obj", "armadillo.obj"].map(|name| folder().join(name));
+        files.extend(here.into_iter().filter(|path| path.exists()));
+    }
+    for path in files {
+        let (mesh, _) = ClosedMesh::new(surfaces::read(&path)?)?;
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        let name = name.replace('.', "_");
+        meshes.push(Clean::new(&name, mesh, usual_up_axis(&path)?));
+    }
+    Ok(meshes)
+}
+
+impl Clean {
+    fn new(name: &str, mesh: ClosedMesh, up: UpAxis) -> Self {
+        Self {
+            name: name.to_owned(),
+            distance: MeshDistance::new(&mesh),
+            mesh,
+            up,
+        }
+    }
+
+    /// The mesh with noise in percent of the longest side.
+    fn with_noise(&self, percent: f64, seed: u64) -> TriangleMesh {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut noisy = self.mesh.mesh().clone();
+        let deviation = 0.01 * percent * self.mesh.bounding_box().longest_side();
+        let normals = noisy.vertex_normals();
+        for (x, normal) in noisy.vertices.iter_mut().zip(normals) {
+            // The sum of twelve uniform numbers is normally distributed to a percent, with variance 1.
+            let sum: f64 = (0..12).map(|_| rng.random::<f64>()).sum();
+            *x = std::array::from_fn(|i| x[i] + deviation * (sum - 6.0) * normal[i]);
+        }
+        noisy.normals = None;
+        noisy
+    }
+
+    fn quality(&self, mesh: &TriangleMesh) -> Quality {
+        let vertices = mesh.vertices.iter();
+        let squares = vertices.map(|&x| self.distance.signed_distance(x).powi(2));
+        let rms = (squares.sum::<f64>() / mesh.vertices.len() as f64).sqrt();
+        let clean = self.mesh.mesh();
+        let angles = mesh.faces.iter().map(|&face| {
+            let [a, b] = [mesh, clean].map(|mesh| mesh.face_normal(face));
+            let cosine: f64 = (0..3).map(|i| a[i] * b[i]).sum();
+            cosine.clamp(-1.0, 1.0).acos().to_degrees()
+        });
+        Quality {
+            rms: 100.0 * rms / self.mesh.bounding_box().longest_side(),
+            normals: angles.sum::<f64>() / mesh.faces.len() as f64,
+            volume: 100.0 * (mesh.volume() / self.mesh.volume() - 1.0),
+        }
+    }
+
+    fn key(&self, noise: f64) -> String {
+        let name = self.name.replace('-', "_").to_lowercase();
+        format!("{name}.noise{noise}")
+    }
+
+    /// A picture of a mesh, in the frame of the clean one.
+    fn picture(&self, caption: &str, mesh: &TriangleMesh) -> Result<Raster, Error> {
+        let scene = Scene::of_mesh(mesh.clone()).view(View {
+            up: self.up,
+            azimuth: -60.0,
+            elevation: 25.0,
+        });
+        let picture = scene.within(self.mesh.bounding_box()).render([DRAWN; 2])?;
+        let size = [picture.width() as usize, picture.height() as usize];
+        Ok(Raster::new(size, picture.pixels()).with_caption(caption))
+    }
+}
+
+/// The noise taken off as `willmore fair` does at its defaults.
+fn fair(
+    session: &mut Session<'_>,
+    noisy: &TriangleMesh,
+    cells: usize,
+    title: &str,
+) -> Result<TriangleMesh, Error> {
+    let (closed, _) = ClosedMesh::new(noisy.clone())?;
+    let fairing = Fairing::new(closed, noisy.noise(), |_| false);
+    let grid = centred_box(cells, 1.0)?;
+    let scales = Scales::of_grid(grid.spacing(), 2.0);
+    let placement = Placement::fit(&fairing.start().bounding_box(), &grid, SIDE, 0.0)?;
+    let distance = MeshDistance::new(&fairing.start().placed(&placement));
+    let mut distance = session.phase(format!("{title}: signed distance"), |stage| {
+        sampled(&distance, grid, &stage.bar)
+    })?;
+    surfaces::mend_signs(&mut distance);
+    let initial: Field<3> = distance.map(|s| optimal_profile(s, scales.eps));
+    let followed = fairing.follow(placement, &initial, scales.eps)?;
+    let needed = scales.needs(3, grid.spacing());
+    let variant = (Method::Hybrid, Scheme::Accurate);
+    let operator = Operator::new(variant, &Networks::default(), &needed, &grid, &scales)?;
+    let measured = (fairing.clone(), followed.clone());
+    let displacement = Measure::new(DISPLACEMENT, move |u, _| {
+        let gone = measured.0.displacement(&measured.1, u).ok();
+        Ok(gone.map(|gone| gone * placement.scale()))
+    });
+    let rule = StepRule::Doubling(Fairing::first_step(grid.spacing()));
+    let case = Case {
+        stops: vec![
+            Stop::Time(fairing.time(grid.spacing(), placement.scale())),
+            Stop::Displacement(fairing.farthest() * placement.scale()),
+        ],
+        measures: vec![displacement],
+        ..willmore_flow(title, initial, operator, scales, (rule, 0))
+    };
+    session.phase(title, |stage| {
+        let mut run = Run::new(case, stage.device)?;
+        while run.step()?.is_some() {
+            stage.bar.inc(1);
+        }
+        Ok(fairing.faired(&followed, run.field())?)
+    })
+}

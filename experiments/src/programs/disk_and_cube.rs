@@ -1,0 +1,207 @@
+//! A cube and a thick disk under Willmore flow.
+
+use engine::{Order, TimeSteps};
+
+use crate::prelude::*;
+use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, View};
+use crate::truth::{self, DISK, ELLIPSOID, Reached, Sample, Sizes, THICK_DISK, Truth, USUAL};
+use geometry::shapes::{Cuboid, Cylinder};
+use geometry::{SignedDistanceExt, UpAxis};
+
+const PROGRAM: &str = "disk_and_cube";
+/// Cells per unit length of a quick run and of the paper.
+const CELLS: [usize; 2] = [24, 64];
+/// Size of a time step.
+const TAU: f64 = 1.0 / 262_144.0;
+const STEPS: usize = 100;
+/// Half the side of the cube; the paper does not say, but this fits its initial energy.
+const CUBE_HALF_SIDE: f64 = 0.25;
+/// How often the time until the 64th step is halved to the first times at which controlled steps are compared with the exact flow.
+const HALVINGS: u32 = 6;
+/// The Willmore energies that the paper reports for the hybrid scheme.
+const CUBE_ENERGIES: [(usize, f64); 3] = [(0, 132.65), (1, 52.26), (STEPS, 25.78)];
+const DISK_ENERGIES: [(usize, f64); 3] = [(0, 87.15), (1, 50.49), (STEPS, 25.59)];
+const VIEW: View = View {
+    up: UpAxis::Z,
+    azimuth: 30.0,
+    elevation: 25.0,
+};
+
+/// Willmore flow of a cube and of a thick disk, n = 64, eps = 2^-5, tautilde = 2^-12, tau = 2^-18, by the hybrid scheme and by
+/// nested implicit finite elements: pictures, Willmore energies w and L2 distances after 0, 1 and 100 steps.
+#[derive(Parser, Debug)]
+#[command(name = PROGRAM, version)]
+struct Options {
+    #[command(flatten)]
+    figure: FigureOptions,
+
+    /// Number of time steps [default: 100]
+    #[arg(long, value_name = "COUNT")]
+    steps: Option<usize>,
+
+    /// Methods, separated by commas
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum, default_values_t = [Method::Hybrid, Method::FeImplicit])]
+    methods: Vec<Method>,
+
+    #[command(flatten)]
+    schemes: SchemeOptions,
+}
+
+impl Options {
+    /// Finite elements are the paper's reference, unless another scheme is wanted of all.
+    fn variants(&self) -> Vec<(Method, Scheme)> {
+        let schemes = |method: Method| match (method.is_learned(), self.schemes.scheme) {
+            (true, _) => self.schemes.schemes(),
+            (false, None | Some(Scheme::Paper)) => vec![Scheme::Paper],
+            (false, Some(_)) => vec![Scheme::Calibrated],
+        };
+        let variants = |&method: &Method| schemes(method).into_iter().map(move |s| (method, s));
+        self.methods.iter().flat_map(variants).collect()
+    }
+}
+
+pub fn main() -> ExitCode {
+    harness::main(program)
+}
+
+fn program(options: &Options) -> Result<(), Error> {
+    let [radius, half_height] = THICK_DISK;
+    let run = &options.figure.run;
+    let steps = (options.steps).unwrap_or(if run.quick { 2 } else { STEPS });
+    let variants = options.variants();
+    require(
+        steps > 0 && !variants.is_empty(),
+        "--steps must be at least 1, and --methods must name a method",
+    )?;
+    let device = run.open_device()?;
+    let setting = Setting::new(&options.figure, CELLS, 1.0)?;
+    let (n, grid, eps) = (setting.n, setting.grid, setting.scales.eps);
+    let cube = Cuboid::new([CUBE_HALF_SIDE; 3])?.translated([0.5; 3]);
+    let disk = Cylinder::new(radius, half_height)?.translated([0.5; 3]);
+    let (cube, disk) = (
+        phase_field(grid, &cube, eps)?,
+        phase_field(grid, &disk, eps)?,
+    );
+    let parameters = setting.parameters(json!({
+        "tau": TAU, "steps": steps, "variants": variants, "cube_half_side": CUBE_HALF_SIDE, "disk_radius": radius,
+        "disk_half_height": half_height,
+    }))?;
+    let session = Session::open(PROGRAM, run, device, parameters)?;
+    let flows = SurfaceFlows {
+        program: PROGRAM,
+        title: "Willmore flow of a cube and of a thick disk".to_owned(),
+        surfaces: vec![
+            (surface("cube", "cube", CUBE_ENERGIES), cube),
+            (surface("disk", "thick disk", DISK_ENERGIES), disk),
+        ],
+        variants,
+        time: (StepRule::Constant(TAU), steps),
+        tau_in_words: "τ = 2⁻¹⁸",
+    };
+    flows.run(session, &setting, |session, all| {
+        compare_with_finite_elements(session, all)?;
+        let end = (TAU, steps);
+        let rows = [&DISK, &ELLIPSOID].map(|sample| compare_with_exact(session, sample, n, end));
+        let rows: Vec<Compared> = rows.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
+        session.sheet(sheet(&rows), "exact")?;
+        Ok(String::new())
+    })
+}
+
+/// A surface of revolution in controlled steps, and the exact flow.
+#[derive(Clone)]
+struct Compared {
+    title: &'static str,
+    step: usize,
+    /// Of the flow and of the exact one: area, volume, energy.
+    sizes: [Sizes; 2],
+    distance_over_h: f64,
+    hvp: f64,
+}
+
+/// Lets a surface flow in controlled steps of second order, and compares it with the exact flow after 1, 2, 4, ... 64 and all steps of the
+/// paper.
+fn compare_with_exact(
+    session: &mut Session<'_>,
+    sample: &Sample<3>,
+    n: usize,
+    (tau, steps): (f64, usize),
+) -> Result<Vec<Compared>, Error> {
+    let powers = (0..=HALVINGS).map(|k| 1_usize << k).filter(|k| *k < steps);
+    let marks: Vec<usize> = powers.chain([steps]).collect();
+    let times: Vec<f64> = marks.iter().map(|&k| k as f64 * tau).collect();
+    let title = format!("{}: the exact flow", sample.title);
+    let exact = session.phase(title, |_| sample.exact(Flow::Willmore, &times))?;
+    let first = StepRule::Ramp {
+        tau: tau * f64::from(1 << HALVINGS),
+        halvings: HALVINGS,
+    };
+    let time_steps = TimeSteps {
+        order: Order::Controlled(USUAL),
+        ..first.into()
+    };
+    let run = sample.run(session, n, ("controlled", time_steps, tau * steps as f64))?;
+    let compare = |(&step, exact): (&usize, &Truth)| {
+        let reached = Reached::of(sample, &run, exact)?;
+        let key = sample.key;
+        truth::record(session, &format!("{key}.exact"), step, &exact.sizes())?;
+        reached.record(session, &format!("{key}.n{n}.controlled"), step)?;
+        Ok(Compared {
+            title: sample.title,
+            step,
+            distance_over_h: reached.distance * n as f64,
+            hvp: reached.hvp,
+            sizes: [reached.sizes, exact.sizes()],
+        })
+    };
+    marks.iter().zip(&exact).map(compare).collect()
+}
+
+fn sheet(rows: &[Compared]) -> Sheet<'_, Compared> {
+    let mut sheet =
+        Sheet::of(rows)
+            .text("surface", |row| row.title)
+            .column("step", Shortest, |row| row.step);
+    for (k, name) in ["area", "volume", "w"].into_iter().enumerate() {
+        let digits = if k == 2 { 3 } else { 5 };
+        sheet = sheet
+            .column(name, Fixed(digits), move |row| row.sizes[0][k].1)
+            .column("exact", Fixed(digits), move |row| row.sizes[1][k].1);
+    }
+    let distance = |row: &Compared| row.distance_over_h;
+    sheet
+        .column("largest distance / h", Fixed(3), distance)
+        .column("HVP", Fixed(0), |row| row.hvp)
+}
+
+fn surface(key: &'static str, title: &str, energies: [(usize, f64); 3]) -> Surface {
+    Surface {
+        key,
+        title: title.to_owned(),
+        shown: energies.map(|(step, w)| (step, Some(w))).to_vec(),
+        view: VIEW,
+    }
+}
+
+/// Adds the L2 distances of the learned operators to the finite elements, where both ran, to captions and metrics.
+fn compare_with_finite_elements(
+    session: &mut Session<'_>,
+    all: &mut [Flowed],
+) -> Result<(), Error> {
+    let method = |one: &Flowed| one.trajectory.case.operator.method;
+    let (elements, mut others): (Vec<_>, Vec<_>) =
+        (all.iter_mut()).partition(|one| method(one) == Method::FeImplicit);
+    for one in others.iter_mut().filter(|one| method(one).is_learned()) {
+        let Some(elements) = elements.iter().find(|e| e.surface.key == one.surface.key) else {
+            continue;
+        };
+        let key = one.key();
+        for shown in one.snapshots.iter_mut().filter(|shown| shown.step > 0) {
+            let step = shown.step;
+            let l2 = one.trajectory.distance(step, &elements.trajectory, step)?;
+            shown.caption = format!("{}\nL² distance to FE {l2:.4}", shown.caption);
+            session.metric(&format!("{key}.l2_to_fe.step{step}"), l2)?;
+        }
+    }
+    Ok(())
+}

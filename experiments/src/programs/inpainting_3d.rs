@@ -1,0 +1,179 @@
+//! Inpainting of surfaces: Willmore flow of the values in a region, the rest of the surface held.
+
+use crate::inpainting::{self, Inpainted, InpaintingOptions, Shape};
+use crate::prelude::*;
+use crate::surfaces::{Flowed, Setting, Snapshot, Surface, View, write_snapshots};
+use geometry::shapes::{Ball, Cuboid, Cylinder};
+use geometry::{SignedDistance, SignedDistanceExt, UpAxis};
+use render::{Rgb, Tube};
+
+const PROGRAM: &str = "inpainting_3d";
+const TITLE: &str = "Inpainting of surfaces";
+/// Cells per unit length of a quick run and of the paper.
+const CELLS: [usize; 2] = [32, 128];
+/// Size of the paper's time steps.
+const TAU: f64 = 1.0 / 2_097_152.0;
+/// Middle of the box.
+const CENTRE: f64 = 0.5;
+/// Radius of the ball.
+const RADIUS: f64 = 0.34;
+/// The cut-out corner: everything beyond this along all three axes, from the middle.
+const CORNER: f64 = 0.05;
+/// The region of the ball along all three axes.
+const BALL_REGION: [f64; 2] = [CENTRE, CENTRE + 0.39];
+/// Radius of the tubes, and where they end.
+const TUBE: [f64; 2] = [0.11, 0.42];
+/// The region of the tubes along all three axes.
+const TUBES_REGION: [f64; 2] = [CENTRE - 0.24, CENTRE + 0.24];
+/// Radius of the edges of the region in the pictures.
+const EDGE: f64 = 0.003;
+/// Side of a picture in pixels.
+const SIDE: u32 = 480;
+/// Pictures side by side.
+const COLUMNS: usize = 3;
+/// After so many doublings a step has size 8: nothing moves for long.
+const MOST_EXTRA: usize = 24;
+const GREEN: Rgb = Rgb(0, 140, 60);
+
+/// Inpainting of surfaces: a ball grows its missing corner again, and six tubes are blended in the middle. Only the values in the
+/// region D move (green in the pictures); all others stay bit for bit.
+///
+/// Frames are those of the paper's 5 and 8 steps of tau = 2^-21. Further steps follow, each twice as long as the one before, until
+/// nothing moves any more. The paper has n = 128; eps = 2/n and tautilde = 1/n^2.
+#[derive(Parser, Debug)]
+#[command(name = PROGRAM, version)]
+struct Options {
+    #[command(flatten)]
+    common: InpaintingOptions,
+
+    /// Steps beyond the paper's, each twice as long as the one before
+    #[arg(long, value_name = "COUNT", default_value_t = 20)]
+    extra_steps: usize,
+}
+
+/// The shapes with the azimuths from which they are looked at. The last step shown is one on the way to the end.
+fn shapes(extra_steps: usize) -> Result<[(Shape<3>, f64); 2], Error> {
+    let ball = Ball::new([0.0; 3], RADIUS)?;
+    let half = 0.5 * (0.5 - CORNER);
+    let corner = Cuboid::new([half; 3])?.translated([CORNER + half; 3]);
+    let [radius, end] = TUBE;
+    let pair = Cylinder::new(radius, end)?;
+    // The ansatz in the middle is that they meet.
+    let tubes = move |[x, y, z]: [f64; 3]| {
+        let pairs = [[x, y, z], [y, z, x], [z, x, y]].map(|x| pair.signed_distance(x));
+        pairs.into_iter().fold(f64::INFINITY, f64::min)
+    };
+    let ball_shape = Shape {
+        key: "ball",
+        title: "ball with a cut-out corner",
+        initial: Box::new(ball.difference(corner).translated([CENTRE; 3])),
+        whole: Some(Box::new(ball.translated([CENTRE; 3]))),
+        region: BALL_REGION,
+        rule: growing(5),
+        steps: 5 + extra_steps,
+        shown: vec![0, 1, 3, 5, 11],
+        halvings: &[],
+    };
+    let tubes_shape = Shape {
+        key: "tubes",
+        title: "six tubes",
+        initial: Box::new(tubes.translated([CENTRE; 3])),
+        whole: None,
+        region: TUBES_REGION,
+        rule: growing(8),
+        steps: 8 + extra_steps,
+        shown: vec![0, 1, 4, 8, 14],
+        halvings: &[],
+    };
+    Ok([(ball_shape, 30.0), (tubes_shape, 25.0)])
+}
+
+/// The paper's steps, and further ones each twice as long as the one before.
+fn growing(papers: usize) -> StepRule {
+    StepRule::Growing {
+        tau: TAU,
+        alike: papers,
+    }
+}
+
+pub fn main() -> ExitCode {
+    harness::main(program)
+}
+
+fn program(options: &Options) -> Result<(), Error> {
+    let run = &options.common.figure.run;
+    let extra_steps = options.extra_steps;
+    require(
+        extra_steps <= MOST_EXTRA,
+        format!(
+            "--extra-steps {extra_steps} is too many: each step is twice as long as the one before; give at most {MOST_EXTRA}"
+        ),
+    )?;
+    let device = run.open_device()?;
+    let setting = Setting::new(&options.common.figure, CELLS, 1.0)?;
+    let Setting {
+        n, grid, scales, ..
+    } = setting;
+    let operator = setting.operator((Method::Hybrid, options.common.scheme))?;
+    let (shapes, azimuths): (Vec<_>, Vec<_>) = shapes(extra_steps)?.into_iter().unzip();
+    let parameters = inpainting::parameters((n, &scales), &operator, &shapes);
+    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut flowed = Vec::new();
+    for (shape, azimuth) in shapes.iter().zip(azimuths) {
+        let surface = Surface {
+            key: shape.key,
+            title: shape.title.to_owned(),
+            shown: shape.shown.iter().map(|&step| (step, None)).collect(),
+            view: View {
+                up: UpAxis::Z,
+                azimuth,
+                elevation: 25.0,
+            },
+        };
+        let case = shape.case(grid, scales, &operator)?;
+        flowed.push(surface.flow(case, &mut session)?);
+    }
+    let key = |one: &Flowed| one.surface.key.to_owned();
+    write_snapshots(&mut session, &flowed, "shapes", key)?;
+    let mut inpainted = Vec::new();
+    for (shape, one) in shapes.iter().zip(&mut flowed) {
+        let measured = Inpainted::measure(shape, &one.trajectory)?;
+        decorate(&mut one.snapshots, &measured);
+        let title = format!("{}: pictures", shape.title);
+        let pictures = session.phase(title, |stage| one.pictures(stage, SIDE))?;
+        let figure = Figure::new("", COLUMNS).with_panels(pictures);
+        measured.write_frames(&session, figure.with_note(note(&measured, n)))?;
+        inpainted.push(measured);
+    }
+    inpainting::finish(session, TITLE, &inpainted)
+}
+
+/// Draws the region, and tells the time and the distance to the whole shape.
+fn decorate(snapshots: &mut [Snapshot], measured: &Inpainted<'_, 3>) {
+    let [low, high] = measured.shape.region;
+    for snapshot in snapshots {
+        let (step, after) = (snapshot.step, (snapshot.time / TAU).round());
+        let time = (after > step as f64).then(|| format!(" (t = {after} τ)"));
+        let distance = measured.distances.iter().find(|(k, _)| *k == step);
+        let distance = distance.filter(|_| measured.shape.whole.is_some());
+        let distance = distance.map(|(_, l2)| format!("\nL² distance to the ball {l2:.4}"));
+        let [time, distance] = [time, distance].map(Option::unwrap_or_default);
+        snapshot.caption = format!("step {step}{time}: w = {:.2}{distance}", snapshot.w());
+        let edges = Tube::edges_of_box([low; 3], [high; 3], EDGE).into_iter();
+        snapshot.tubes = edges.map(|edge| edge.with_colour(GREEN)).collect();
+    }
+}
+
+fn note(one: &Inpainted<'_, 3>, n: usize) -> String {
+    let StepRule::Growing { alike, .. } = one.shape.rule else {
+        unreachable!("steps grow");
+    };
+    let end = one.still_from().map_or(String::new(), |still| {
+        format!(" The shape stands still from t = {} τ on.", still.round())
+    });
+    format!(
+        "n = {n}, ε = 2/n, inner step 1/n², τ = 2⁻²¹, doubled every step from step {} on; only the values in the green box move.{end} \
+         w: Willmore energy with the implicit finite-element step.",
+        alike + 1
+    )
+}

@@ -1,0 +1,303 @@
+//! What a time step costs, and where the time goes.
+
+use std::time::Duration;
+
+use crate::networks::{NetworkOptions, convergence_network};
+use crate::prelude::*;
+use crate::timing::{self, Numbers, Timed};
+use crate::{products, surfaces};
+use geometry::SignedDistanceExt;
+use geometry::measure::l2_distance;
+use geometry::shapes::{Ball, Capsule, Cuboid};
+use operators::memory;
+use solver::StepRecord;
+
+const PROGRAM: &str = "performance";
+/// Steps of a comparison with a smaller tolerance, and how much smaller.
+const COMPARED_STEPS: usize = 20;
+const TIGHTER: f64 = 100.0;
+
+/// Cost of Willmore steps by the hybrid scheme on this machine: the cross of the paper (128 steps, eps = 2^-6, tau = tautilde =
+/// 2^-14) at n = 128, 256 and 512, and in 3D a cube at n = 64 and a blob at n = 128 (eps = 2h, tautilde = h^2, tau = 2^-18).
+/// Hessian-vector products through Burn, by hand, and their Fourier transforms alone take turns in the same run.
+#[derive(Parser, Debug)]
+#[command(name = PROGRAM, version)]
+struct Options {
+    #[command(flatten)]
+    run: RunOptions,
+
+    #[command(flatten)]
+    networks: NetworkOptions,
+
+    /// Seconds for the comparison of products on each grid
+    #[arg(long, value_name = "SECONDS", default_value_t = 5.0)]
+    turns: f64,
+}
+
+/// What was measured for one shape on one grid.
+#[derive(Serialize)]
+struct Measurement {
+    case: &'static str,
+    n: usize,
+    cells: Vec<usize>,
+    /// Seconds, work and memory of the steps. Products on coarser grids count by their shares of the unknowns; pages are those that the
+    /// system had to provide from the second step on; `distance_to_tighter` is the `L2` distance to a minimization with [much
+    /// smaller](TIGHTER) tolerance after [some steps](COMPARED_STEPS), over the way from the start.
+    steps: Numbers,
+    products: Numbers,
+    /// Parts of the time of a step in seconds.
+    parts: [(&'static str, f64); 7],
+}
+
+const STEPS: [(&str, Format, &str); 11] = [
+    ("steps", Shortest, "steps"),
+    ("all steps [s]", Fixed(1), "seconds"),
+    ("median step [s]", Fixed(3), "seconds_per_step"),
+    ("Newton/step", Fixed(1), "newton_per_step"),
+    ("HVP/step", Fixed(1), "hvp_on_this_grid"),
+    ("and on coarser grids", Fixed(1), "hvp_on_coarser_grids"),
+    ("ms/HVP", Fixed(2), "ms_per_product"),
+    ("times two FFT pairs (f32)", Fixed(2), "product_over_floor"),
+    ("peak memory [MiB]", Fixed(0), "peak_mib"),
+    ("new pages/HVP", Fixed(1), "pages_per_product"),
+    (
+        "to 100 times the precision",
+        Scientific(1),
+        "distance_to_tighter",
+    ),
+];
+
+const PRODUCTS: [(&str, Format, &str); 7] = [
+    ("Burn, f64 [ms]", Fixed(2), "ms"),
+    ("by hand, f64 [ms]", Fixed(2), "by_hand_ms"),
+    ("Burn / by hand", Fixed(2), "ratio"),
+    ("two FFT pairs, f64 [ms]", Fixed(2), "floor_ms"),
+    ("Burn, f32 [ms]", Fixed(2), "single_ms"),
+    ("two FFT pairs, f32 [ms]", Fixed(2), "floor_single_ms"),
+    ("energy and gradient [ms]", Fixed(2), "evaluate_ms"),
+];
+
+pub fn main() -> ExitCode {
+    harness::main(program)
+}
+
+fn program(options: &Options) -> Result<(), Error> {
+    let (run, quick) = (&options.run, options.run.quick);
+    require(
+        options.turns.is_finite() && options.turns > 0.0,
+        "--turns must be positive",
+    )?;
+    let device = run.open_device()?;
+    let kind = device.kind();
+    require(
+        kind.is_cpu(),
+        format!(
+            "{PROGRAM} compares with products written for the CPU: choose --device flex or ndarray, not {kind}"
+        ),
+    )?;
+    let planes: &[usize] = if quick { &[128] } else { &[128, 256, 512] };
+    let solids = if quick {
+        [("cube", 24, 2), ("blob", 32, 2)]
+    } else {
+        [("cube", 64, 20), ("blob", 128, 8)]
+    };
+    let networks = timing::networks(&options.networks, planes)?;
+    let learned = |needed| -> Result<Operator, Error> {
+        let network = networks.find(Scheme::Paper, &needed)?;
+        Ok(Operator::learned(Scheme::Paper, network)?)
+    };
+    let turns = if quick { 0.05 } else { options.turns };
+    let parameters = json!({ "turns": turns, "threads": rayon::current_num_threads() });
+    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut all = Vec::new();
+    for &n in planes {
+        let operator = learned(convergence_network(n)?)?;
+        let case = timing::plane(&operator, n, if quick { 2 } else { 128 }, quick)?;
+        let compared = n <= 256;
+        let measured = Measurement::of("cross", &case, &mut session, turns, compared)?;
+        all.push(measured);
+    }
+    for (name, n, steps) in solids {
+        let operator = learned(surfaces::needed_network())?;
+        let time = (StepRule::Constant(0.5_f64.powi(18)), steps);
+        let initial = solid_shape(name, n)?;
+        let case = surfaces::willmore_flow(name, initial, operator, surfaces::scales(n), time);
+        all.push(Measurement::of(name, &case, &mut session, turns, false)?);
+    }
+    let steps = Sheet::of(&all)
+        .keyed(|m, name| format!("{}.n{}.{name}", m.case, m.n))
+        .text("shape", |m| format!("{}, n = {}", m.case, m.n))
+        .text("grid", Measurement::grid)
+        .numbers(&STEPS, |m| &m.steps);
+    session.sheet(steps, "steps")?;
+    let products = Sheet::of(&all)
+        .keyed(|m, name| format!("hvp.{}.{name}", m.grid()))
+        .text("grid", Measurement::grid)
+        .numbers(&PRODUCTS, |m| &m.products);
+    session.sheet(products, "products")?;
+    session.output.write_json("performance.json", &all)?;
+    session.figure(figure(&all), "performance")?;
+    session.finish("Willmore steps by the hybrid scheme on this machine")
+}
+
+/// A cube of side 1/2, or a body with arms: a ball with three capsules through it.
+fn solid_shape(name: &str, n: usize) -> Result<Field<3>, Error> {
+    let (grid, eps) = (Grid::<3>::per_unit(n, 1.0)?, surfaces::scales(n).eps);
+    if name == "cube" {
+        return Ok(phase_field(grid, &Cuboid::new([0.25, 0.25, 0.25])?, eps)?);
+    }
+    let arm = |to: [f64; 3], radius| Capsule::new([0.0; 3], to, radius);
+    let blob = Ball::new([0.0; 3], 0.2)?
+        .union(arm([0.25, 0.1, 0.05], 0.1)?)
+        .union(arm([-0.2, 0.2, -0.1], 0.09)?)
+        .union(arm([0.0, -0.25, 0.15], 0.11)?);
+    Ok(phase_field(grid, &blob, eps)?)
+}
+
+/// Distance of the end of some steps to that with a smaller tolerance.
+fn distance_to_tighter<const D: usize>(
+    case: &Case<D>,
+    device: &ComputeDevice,
+) -> Result<f64, Error> {
+    let end = |case: Case<D>| -> Result<Field<D>, Error> {
+        let mut run = Run::new(case, device)?;
+        while run.steps() < COMPARED_STEPS && run.step()?.is_some() {}
+        Ok(run.field().clone())
+    };
+    let mut tighter = case.clone();
+    let newton = &mut tighter.scales.newton;
+    newton.tolerance /= TIGHTER;
+    // Linear solves that leave a tenth would take a Newton step for every digit.
+    newton.cg_tolerance /= TIGHTER.sqrt();
+    let (loose, tight) = (end(case.clone())?, end(tighter)?);
+    Ok(l2_distance(&loose, &tight)? / l2_distance(&case.initial, &tight)?)
+}
+
+impl Measurement {
+    fn of<const D: usize>(
+        case_name: &'static str,
+        case: &Case<D>,
+        session: &mut Session<'_>,
+        turns: f64,
+        compared: bool,
+    ) -> Result<Self, Error> {
+        let grid = *case.grid();
+        let n = grid.spacing().recip().round();
+        let name = format!("{case_name}, n = {n}");
+        memory::forget_peak();
+        let mut timed = Timed::new(case.clone(), &session.device)?;
+        let mut warm = None;
+        session.phase(format!("{name}: steps"), |stage| {
+            while timed.step(&stage.bar)? {
+                warm = warm.or_else(memory::pages);
+            }
+            Ok(())
+        })?;
+        let later = timed.minimizations().skip(1).map(|r| r.newton.hvp as f64);
+        let later = later.sum::<f64>().max(1.0);
+        let pages = memory::pages().zip(warm);
+        let pages = pages.map(|(now, warm)| (now - warm) as f64 / later);
+        let peak_mib = memory::peak_mib();
+        let (products, distance) = session.phase(format!("{name}: products"), |stage| {
+            let distance = compared.then(|| distance_to_tighter(case, stage.device));
+            let network = &case.operator.network().expect("a learned operator").network;
+            let candidates = products::candidates(network, timed.run.field(), stage.device)?;
+            let products = products::measure(candidates, Duration::from_secs_f64(turns))?;
+            Ok((products, distance.transpose()?))
+        })?;
+        let mut steps = timed.numbers();
+        let floor = products["floor_single_ms"];
+        let over_floor = steps["ms_per_product"] / floor;
+        let others = [
+            ("product_over_floor", Some(over_floor)),
+            ("pages_per_product", pages),
+            ("peak_mib", peak_mib),
+            ("distance_to_tighter", distance),
+        ];
+        let others = others.into_iter();
+        steps.extend(others.filter_map(|(name, value)| Some((name, value?))));
+        Ok(Self {
+            case: case_name,
+            n: n as usize,
+            cells: vec![grid.cells(); D],
+            parts: parts(&timed, floor),
+            steps,
+            products,
+        })
+    }
+
+    fn grid(&self) -> String {
+        let cells: Vec<String> = self.cells.iter().map(ToString::to_string).collect();
+        cells.join("x")
+    }
+
+    fn unknowns(&self) -> f64 {
+        self.cells.iter().product::<usize>() as f64
+    }
+}
+
+/// Parts of the time of a step, where two pairs of transforms, timed alone, take so many milliseconds.
+fn parts<const D: usize>(timed: &Timed<D>, floor_ms: f64) -> [(&'static str, f64); 7] {
+    let mean = |of: fn(&StepRecord) -> f64| timed.mean(of);
+    let products = mean(|r| r.times.products);
+    let convolutions = (1e-3 * floor_ms * mean(|r| r.newton.hvp as f64)).min(products);
+    let mut parts = [
+        ("convolutions of products", convolutions),
+        ("other work of products", products - convolutions),
+        ("preconditioner", mean(|r| r.times.preconditioner)),
+        ("coarse assembly", mean(|r| r.times.assembly)),
+        ("energies and gradients", mean(|r| r.times.energies)),
+        ("start on the half grid", mean(|r| r.times.start)),
+        ("rest", 0.0),
+    ];
+    let all = parts.iter().map(|(_, seconds)| seconds).sum::<f64>();
+    parts[6].1 = (mean(|r| r.seconds) - all).max(0.0);
+    parts
+}
+
+/// Exponent of a power law through the first and the last point.
+fn slope(points: &[[f64; 2]]) -> Option<f64> {
+    let (first, last) = (points.first()?, points.last()?);
+    (last[0] > first[0]).then(|| (last[1] / first[1]).ln() / (last[0] / first[0]).ln())
+}
+
+/// The cost of a step, and where the time goes: a colour for each part, a line style for each dimension.
+fn figure(all: &[Measurement]) -> Figure {
+    let [mut cost, mut shares] = [
+        ("cost of a step", "median step [s]"),
+        ("where the time goes", "mean per step [s]"),
+    ]
+    .map(|(title, y)| LineChart::new(title, Axis::log("unknowns"), Axis::log(y)));
+    let (mut slopes, mut entries) = (Vec::new(), Vec::new());
+    for (dimension, style) in [(2, LineStyle::Solid), (3, LineStyle::Dashed)] {
+        let rows = || all.iter().filter(|m| m.cells.len() == dimension);
+        let name = format!("{dimension}D");
+        let curve = |name: &str, points: Vec<[f64; 2]>| {
+            let curve = Series::new(name, points).with_style(style);
+            curve.with_marker(Marker::Circle)
+        };
+        let seconds = rows().map(|m| [m.unknowns(), m.steps["seconds_per_step"]]);
+        let seconds = curve(&name, seconds.collect()).with_colour(Colour::Black);
+        slopes.extend(slope(&seconds.points).map(|slope| format!("{slope:.2} in {name}")));
+        cost = cost.with_series(seconds);
+        for (k, (part, _)) in all[0].parts.iter().enumerate() {
+            let seconds = rows().map(|m| [m.unknowns(), m.parts[k].1]);
+            let seconds = seconds.filter(|[_, seconds]| *seconds > 0.0).collect();
+            let curve = curve(&format!("{part}, {name}"), seconds);
+            shares = shares.with_series(curve.with_colour(k));
+        }
+        entries.push(LegendEntry::line(name, Colour::Black, style));
+    }
+    let parts = all[0].parts.iter().enumerate();
+    let parts = parts.map(|(k, (part, _))| LegendEntry::line(*part, k, LineStyle::Solid));
+    Figure::new("Willmore steps by the hybrid scheme", 2)
+        .with_panel(cost.with_entries([]))
+        .with_panel(shares.with_entries(parts).with_entries(entries))
+        .with_shared_legend()
+        .with_note(format!(
+            "2D: a cross, eps = 2⁻⁶, tau = 2⁻¹⁴. 3D: a cube at n = 64, a blob at n = 128, eps = 2h, tau = 2⁻¹⁸. {} threads. Cost \
+             of a step ~ unknowns to the power {}.",
+            rayon::current_num_threads(),
+            slopes.join(" and ")
+        ))
+}

@@ -1,0 +1,86 @@
+//! A machine part of genus one under Willmore flow, and the Clifford torus next to it.
+
+use std::collections::BTreeMap;
+
+use crate::mesh_flow::{MeshFlow, MeshFlowOptions};
+use crate::meshes::KnownMesh;
+use crate::prelude::*;
+use crate::surfaces::{Flowed, View};
+use geometry::{CliffordTorus, UpAxis};
+use render::Tube;
+
+const ROCKER_ARM_FLOW: MeshFlow = MeshFlow {
+    program: "rocker_arm",
+    mesh: KnownMesh {
+        file: "rocker-arm.obj",
+        title: "rocker arm",
+        side_length: 1.0,
+        box_side: 1.25,
+        procedural: surfaces::samples::lever,
+        procedural_title: "built-in lever",
+    },
+    cells: 64,
+    steps: 20,
+    tau: StepRule::Constant(1.0 / 4096.0),
+    tau_in_words: "τ = 2⁻¹²",
+    shown: &[(0, Some(276.12)), (1, Some(42.08)), (20, Some(41.46))],
+    view: View {
+        up: UpAxis::Z,
+        azimuth: 20.0,
+        elevation: 20.0,
+    },
+};
+/// What the paper reports for the torus: its distance and its energy.
+const PAPERS_L2: f64 = 3.978e-2;
+const PAPERS_CLIFFORD: f64 = 41.11;
+/// Circles drawn on the torus, and points of each.
+const CIRCLES: (usize, usize) = (12, 96);
+
+/// Willmore flow of the rocker arm, n = 64, eps = 2^-5, tau = tautilde = 2^-12: pictures and Willmore energies at steps 0, 1 and 20,
+/// and the Clifford torus whose phase field is nearest to the last one in L2.
+#[derive(Parser, Debug)]
+#[command(name = ROCKER_ARM_FLOW.program, version)]
+struct Options {
+    #[command(flatten)]
+    flow: MeshFlowOptions,
+}
+
+pub fn main() -> ExitCode {
+    harness::main(|options: &Options| ROCKER_ARM_FLOW.run(&options.flow, clifford_tori))
+}
+
+/// Finds the Clifford torus nearest to the last shape of each run, and draws it there.
+fn clifford_tori(session: &mut Session<'_>, all: &mut [Flowed]) -> Result<String, Error> {
+    let mut tori = BTreeMap::new();
+    for one in all {
+        let case = &one.trajectory.case;
+        let last = one.trajectory.field(one.trajectory.steps())?;
+        let title = format!("Clifford torus, {}", one.label());
+        let torus = session.phase(title, |_| {
+            Ok(CliffordTorus::nearest(&last, case.scales.eps)?)
+        })?;
+        let as_field = torus.phase_field(last.grid(), case.scales.eps)?;
+        let w = case.implicit_elements()?.willmore_energy(&as_field)?;
+        let CliffordTorus {
+            l2, outer_radius, ..
+        } = torus;
+        session.remark(format!(
+            "Nearest Clifford torus, {}: L2 distance {l2:.4} (paper {PAPERS_L2:.4}), outer radius {outer_radius:.3}, w = {w:.2} (paper \
+             {PAPERS_CLIFFORD})",
+            one.label()
+        ));
+        let circles = torus.minor_circles(CIRCLES.0, CIRCLES.1)?.into_iter();
+        let tube = |circle: Vec<[f64; 3]>| Tube::new(circle, 0.1 * case.scales.eps).closed();
+        if let Some(shown) = one.snapshots.last_mut() {
+            let torus = format!("L² distance to the torus {l2:.4}\n(which has w = {w:.2})");
+            shown.caption = format!("{}\n{torus}", shown.caption);
+            shown.tubes = circles.map(tube).collect();
+        }
+        for (name, value) in [("l2", l2), ("w", w), ("outer_radius", outer_radius)] {
+            session.metric(&format!("{}.clifford_{name}", one.key()), value)?;
+        }
+        tori.insert(one.key(), torus);
+    }
+    session.output.write_json("clifford.json", &tori)?;
+    Ok(" Circles: of the nearest Clifford torus; one has 4π² = 39.48 in the limit.".to_owned())
+}

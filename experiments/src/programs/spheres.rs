@@ -1,0 +1,267 @@
+//! Spheres by the network for surfaces: mean curvature flow, Willmore energies, and standing still.
+
+use crate::prelude::*;
+use crate::surfaces::{self, Setting};
+use crate::training::{NetworkSpec, held_out_radii};
+use crate::{look, quality};
+use engine::{energy_increases, mean_hvp};
+use geometry::exact::{WILLMORE_ENERGY_SPHERE, mean_curvature_radius};
+use geometry::shapes::Ball;
+use model::Quality;
+
+const PROGRAM: &str = "spheres";
+const TITLE: &str = "Spheres by the network for surfaces";
+/// Cells per unit length of a quick run and of the paper.
+const CELLS: [usize; 2] = [32, 64];
+const RADII: [f64; 6] = [0.15, 0.2, 0.25, 0.3, 0.35, 0.4];
+/// Steps of mean curvature flow after which errors are reported; the smallest sphere vanishes after 23 at n = 64.
+const MCF_STEPS: [usize; 3] = [1, 4, 8];
+const LAST: usize = MCF_STEPS.len() - 1;
+/// Steps of Willmore flow, which should leave spheres alone.
+const WILLMORE_STEPS: usize = 20;
+const TAU: f64 = 1.0 / 262_144.0;
+/// The hybrid scheme as in the paper.
+const PAPERS: (Method, Scheme) = (Method::Hybrid, Scheme::Paper);
+
+/// The network for surfaces on spheres, n = 64, eps = 2^-5, tautilde = 2^-12: L2 errors of mean curvature flow against
+/// R^2 = r^2 - 4t beside finite elements, Willmore energies w against 8 pi, and the change of the radius in 20 steps of Willmore
+/// flow, tau = 2^-18, which leaves spheres alone.
+#[derive(Parser, Debug)]
+#[command(name = PROGRAM, version)]
+struct Options {
+    #[command(flatten)]
+    figure: FigureOptions,
+}
+
+/// What was measured for one radius.
+#[derive(Serialize)]
+struct Measurement {
+    radius: f64,
+    /// Errors of mean curvature flow, in the order of [`variants`], for each of the reported steps.
+    mcf: Vec<[f64; MCF_STEPS.len()]>,
+    /// `w` with the implicit finite-element step and the mass-matrix norm, as the paper measures.
+    w_elements: f64,
+    /// Willmore flow by the learned operator, in every scheme.
+    willmore: Vec<Still>,
+}
+
+/// A sphere under Willmore flow.
+#[derive(Serialize)]
+struct Still {
+    scheme: Scheme,
+    /// `w` of the start as the scheme measures it, by its factors of calibration.
+    w_learned: f64,
+    /// `w` of the end: the profile is now the one of the scheme, which the calibration is about.
+    w_relaxed: f64,
+    /// Radius of the ball with the final volume, less that at the beginning, in cells.
+    radius_change_over_h: f64,
+    /// Steps in which the energy rose.
+    energy_increases: usize,
+    hvp_per_step: f64,
+}
+
+/// Measures of standing still: metric, heading, digits, value.
+const MEASURES: [(&str, &str, usize, fn(&Still) -> f64); 4] = [
+    ("w_learned", "w", 2, |s| s.w_learned),
+    ("w_relaxed", "w in the end", 2, |s| s.w_relaxed),
+    ("radius_change_over_h", "change of radius / h", 4, |s| {
+        s.radius_change_over_h
+    }),
+    ("hvp_per_step", "HVP/step", 1, |s| s.hvp_per_step),
+];
+
+/// Methods and schemes of mean curvature flow.
+fn variants() -> impl Iterator<Item = (Method, Scheme)> {
+    look::variants(|(method, scheme)| method.schemes(Flow::MeanCurvature).contains(&scheme))
+}
+
+pub fn main() -> ExitCode {
+    harness::main(program)
+}
+
+fn program(options: &Options) -> Result<(), Error> {
+    let run = &options.figure.run;
+    let radii = if run.quick { &RADII[2..4] } else { &RADII };
+    let willmore_steps = if run.quick { 2 } else { WILLMORE_STEPS };
+    let device = run.open_device()?;
+    let setting = Setting::new(&options.figure, CELLS, 1.0)?;
+    let others = json!({ "tau": TAU, "willmore_steps": willmore_steps });
+    let parameters = setting.parameters(others)?;
+    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut all = Vec::new();
+    for &radius in radii {
+        let measured = session.phase(format!("radius {radius}"), |stage| {
+            let sphere = Sphere {
+                setting: &setting,
+                device: stage.device,
+                radius,
+            };
+            sphere.measure(willmore_steps)
+        })?;
+        all.push(measured);
+    }
+    session.sheet(sheet(&all), "spheres")?;
+    if !run.quick {
+        let (spec, papers) = (NetworkSpec::surfaces(), setting.operator(PAPERS)?);
+        let network = &papers.network().expect("it is learned").network;
+        let measured = session.phase("quality of the network", |stage| {
+            let (data, count) = (spec.data(false)?, held_out_radii(false));
+            Ok(Quality::measure(network, &data, count, stage.device)?)
+        })?;
+        let names = Sheet::of(std::slice::from_ref(&measured)).text("network", |_| spec.name);
+        session.sheet(quality::columns(names, |measured| measured), "quality")?;
+        session.summary.insert_record(spec.name, &measured)?;
+    }
+    session.output.write_json("spheres.json", &all)?;
+    let note = format!(
+        "n = {}, ε = 2/n, inner step 1/n². Energies by the schemes are those after the steps of Willmore flow, of the relaxed profile.",
+        setting.n
+    );
+    let figure = Figure::new("Spheres", 2).with_panels([errors(&all), energies(&all)]);
+    session.figure(figure.with_note(note), "spheres")?;
+    session.finish(TITLE)
+}
+
+/// A ball with its setting.
+struct Sphere<'a> {
+    setting: &'a Setting,
+    device: &'a ComputeDevice,
+    radius: f64,
+}
+
+impl Sphere<'_> {
+    fn measure(&self, willmore_steps: usize) -> Result<Measurement, Error> {
+        let time = (self.setting.scales.mcf_step, MCF_STEPS[LAST]);
+        let still = self.case(Flow::Willmore, PAPERS, (TAU, 0))?;
+        let mcf = variants().map(|variant| {
+            let run = self.run(self.case(Flow::MeanCurvature, variant, time)?)?;
+            Ok(MCF_STEPS.map(|step| run.records()[step - 1].measures["l2"]))
+        });
+        let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
+        let willmore = schemes.map(|&scheme| self.stand_still(scheme, willmore_steps));
+        Ok(Measurement {
+            radius: self.radius,
+            mcf: mcf.collect::<Result<_, Error>>()?,
+            w_elements: still.implicit_elements()?.willmore_energy(&still.initial)?,
+            willmore: willmore.collect::<Result<_, _>>()?,
+        })
+    }
+
+    fn case(
+        &self,
+        flow: Flow,
+        variant: (Method, Scheme),
+        (tau, steps): (f64, usize),
+    ) -> Result<Case<3>, Error> {
+        let (grid, scales, radius) = (self.setting.grid, self.setting.scales, self.radius);
+        let ball = move |grid, r| phase_field(grid, &Ball::new([0.5; 3], r)?, scales.eps);
+        let exact = move |grid, t| ball(grid, mean_curvature_radius(radius, t, 3));
+        let (initial, operator) = (ball(grid, radius)?, self.setting.operator(variant)?);
+        let (shape, rule) = (
+            format!("sphere of radius {radius}"),
+            StepRule::Constant(tau),
+        );
+        let mut case = surfaces::willmore_flow(&shape, initial, operator, scales, (rule, steps));
+        if flow == Flow::MeanCurvature {
+            case.measures = vec![Measure::distance_to(exact)];
+        }
+        Ok(Case { flow, ..case })
+    }
+
+    fn run(&self, case: Case<3>) -> Result<Run<3>, Error> {
+        let mut run = Run::new(case, self.device)?;
+        while run.step()?.is_some() {}
+        Ok(run)
+    }
+
+    fn stand_still(&self, scheme: Scheme, steps: usize) -> Result<Still, Error> {
+        let run = self.run(self.case(Flow::Willmore, (Method::Hybrid, scheme), (TAU, steps))?)?;
+        let records = run.records();
+        let first = records.first().and_then(|record| record.minimization);
+        let last = records.last();
+        // Of the ball with that volume.
+        let radius = |volume: f64| (0.75 * volume / std::f64::consts::PI).cbrt();
+        let end = last.map_or(f64::NAN, |record| record.measures["volume"]);
+        let change = radius(end) - radius(run.start()["volume"]);
+        Ok(Still {
+            scheme,
+            w_learned: first.map_or(f64::NAN, |made| made.energy_at_rest()),
+            w_relaxed: last.and_then(Record::willmore_energy).unwrap_or(f64::NAN),
+            radius_change_over_h: change * self.setting.n as f64,
+            energy_increases: energy_increases(records),
+            hvp_per_step: mean_hvp(records),
+        })
+    }
+}
+
+/// The errors of mean curvature flow and the energies, a row for each radius.
+fn sheet(all: &[Measurement]) -> Sheet<'_, Measurement> {
+    let mut sheet = Sheet::of(all)
+        .keyed(|m, name| format!("spheres.r{:03.0}.{name}", 100.0 * m.radius))
+        .column("radius", Fixed(2), |m| m.radius);
+    for (k, (method, scheme)) in variants().enumerate() {
+        for (j, step) in MCF_STEPS.into_iter().enumerate() {
+            let head = format!("MCF error, {}, step {step}", method.label_in(scheme));
+            let metric = format!("mcf.{}.l2.step{step}", method.key_in(scheme));
+            sheet = sheet.measure(&metric, (&head, Fixed(5)), |m| m.mcf[k][j]);
+        }
+    }
+    let relative = |m: &Measurement| m.w_elements / WILLMORE_ENERGY_SPHERE;
+    sheet = (sheet.measure("w", ("w, FE measure", Fixed(2)), |m| m.w_elements)).column(
+        "w / 8π (FE)",
+        Fixed(4),
+        relative,
+    );
+    for (k, &scheme) in Method::Hybrid.schemes(Flow::Willmore).iter().enumerate() {
+        let prefix = match scheme {
+            Scheme::Paper => String::new(),
+            other => format!("{}.", Method::Hybrid.key_in(other)),
+        };
+        let label = Method::Hybrid.label_in(scheme);
+        for (name, head, digits, value) in MEASURES {
+            let (name, head) = (format!("{prefix}{name}"), format!("{head}, {label}"));
+            sheet = sheet.measure(&name, (&head, Fixed(digits)), |m| value(&m.willmore[k]));
+        }
+        let increases = format!("{prefix}energy_increases");
+        sheet = sheet.metric(&increases, |m| m.willmore[k].energy_increases);
+    }
+    sheet
+}
+
+/// The curve of a method; markers tell schemes apart where lines are short.
+fn curve(
+    (method, scheme): (Method, Scheme),
+    all: &[Measurement],
+    value: impl Fn(&Measurement) -> f64,
+) -> Series {
+    let marker = match scheme {
+        Scheme::Paper => Marker::Circle,
+        Scheme::Calibrated => Marker::Triangle,
+        Scheme::Accurate => Marker::Diamond,
+    };
+    Series::of(method.label_in(scheme), all, |m| [m.radius, value(m)])
+        .with_colour(look::colour(method, scheme))
+        .with_marker(marker)
+}
+
+fn errors(all: &[Measurement]) -> LineChart {
+    let title = format!("Mean curvature flow, {} steps", MCF_STEPS[LAST]);
+    let curves = variants()
+        .enumerate()
+        .map(|(k, variant)| curve(variant, all, |m| m.mcf[k][LAST]));
+    LineChart::new(title, Axis::linear("radius"), Axis::log("L² error")).with_curves(curves)
+}
+
+fn energies(all: &[Measurement]) -> LineChart {
+    let elements = Series::of("implicit FE measure", all, |m| [m.radius, m.w_elements]);
+    let schemes = Method::Hybrid.schemes(Flow::Willmore).iter().enumerate();
+    let relaxed = schemes
+        .map(|(k, &scheme)| curve((Method::Hybrid, scheme), all, |m| m.willmore[k].w_relaxed));
+    let exact = Series::of("exact, 8π", all, |m| [m.radius, WILLMORE_ENERGY_SPHERE])
+        .with_colour(Colour::Black)
+        .with_style(LineStyle::Dashed);
+    LineChart::new("Willmore energy", Axis::linear("radius"), Axis::linear("w"))
+        .with_series(elements.with_colour(1).with_marker(Marker::Square))
+        .with_curves(relaxed)
+        .with_series(exact)
+}

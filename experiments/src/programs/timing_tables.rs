@@ -1,0 +1,345 @@
+//! Time of the methods for the same flow on the same machine.
+
+use crate::meshes::{ARMADILLO, MeshOptions};
+use crate::networks::{Chosen, NetworkOptions, convergence_network};
+use crate::prelude::*;
+use crate::surfaces;
+use crate::timing::{self, Numbers, Timed, take_turns};
+use engine::Method::{FeImplicit, FeSemi, Hybrid};
+use fem::LinearSolver::{self, ConjugateGradients, Direct};
+use indicatif::ProgressBar;
+use solver::Method::{self as Newton, Paper, Preconditioned};
+
+const PROGRAM: &str = "timing_tables";
+/// Time steps of the table, until `t = 2^-7`.
+const STEPS: usize = 128;
+/// Headings of the columns with the times over those of the hybrid scheme, and with the paper's.
+const MEASURED: &str = "times hybrid, measured steps";
+const PAPERS: &str = "paper, other machines [s]";
+
+/// Wall time of 128 Willmore steps of the cross (eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7) by the hybrid scheme and by
+/// nested finite elements, taking turns step by step on this machine, with the numbers of Newton steps, Hessian-vector products and
+/// inner iterations. Rows that exceed the budget are extrapolated from the steps done, and say so.
+#[derive(Parser, Debug)]
+#[command(name = PROGRAM, version)]
+struct Options {
+    #[command(flatten)]
+    run: RunOptions,
+
+    #[command(flatten)]
+    networks: NetworkOptions,
+
+    /// Cells per unit length, separated by commas
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [256, 512])]
+    cells: Vec<usize>,
+
+    #[command(flatten)]
+    mesh: MeshOptions,
+
+    /// Stop a row after this many seconds and extrapolate; at least three steps are done
+    #[arg(long, value_name = "SECONDS", default_value_t = 120.0)]
+    budget: f64,
+}
+
+/// A row of the table.
+struct Variant {
+    key: &'static str,
+    label: &'static str,
+    method: Method,
+    newton: Newton,
+    linear: LinearSolver,
+    /// What the paper reports for 128 steps at n = 256 and 512, in seconds: hybrid on one A100, finite elements (sparse direct
+    /// solver) on 64 cores.
+    papers_seconds: Option<[f64; 2]>,
+}
+
+const VARIANTS: [Variant; 5] = [
+    Variant {
+        key: "hybrid",
+        label: "hybrid",
+        method: Hybrid,
+        newton: Preconditioned,
+        linear: ConjugateGradients,
+        papers_seconds: None,
+    },
+    Variant {
+        key: "hybrid_plain_newton",
+        label: "hybrid, plain Newton-CG",
+        method: Hybrid,
+        newton: Paper,
+        linear: ConjugateGradients,
+        papers_seconds: Some([122.0, 1020.0]),
+    },
+    Variant {
+        key: "fe_implicit",
+        label: "FE implicit, FFT-CG inside",
+        method: FeImplicit,
+        newton: Preconditioned,
+        linear: ConjugateGradients,
+        papers_seconds: None,
+    },
+    Variant {
+        key: "fe_implicit_direct",
+        label: "FE implicit, Cholesky inside",
+        method: FeImplicit,
+        newton: Preconditioned,
+        linear: Direct,
+        papers_seconds: Some([4970.0, 28622.0]),
+    },
+    Variant {
+        key: "fe_semi",
+        label: "FE semi-implicit",
+        method: FeSemi,
+        newton: Preconditioned,
+        linear: ConjugateGradients,
+        papers_seconds: Some([4307.0, 22045.0]),
+    },
+];
+
+/// A row at work, and what was measured.
+struct Timing {
+    row: &'static Variant,
+    n: usize,
+    timed: Timed<2>,
+    /// Why the row ended early, if it failed.
+    failure: Option<String>,
+}
+
+const COLUMNS: [(&str, Format, &str); 4] = [
+    ("Newton/step", Fixed(1), "newton_per_step"),
+    ("HVP/step", Fixed(0), "hvp_per_step"),
+    ("inner CG/step", Fixed(0), "inner_cg_per_step"),
+    ("Cholesky/step", Fixed(1), "factorizations_per_step"),
+];
+
+pub fn main() -> ExitCode {
+    harness::main(program)
+}
+
+fn program(options: &Options) -> Result<(), Error> {
+    let (run, quick) = (&options.run, options.run.quick);
+    require(
+        options.budget.is_finite() && options.budget > 0.0,
+        "--budget must be positive",
+    )?;
+    let cells = if quick { &[128][..] } else { &options.cells };
+    let budget = if quick { 0.1 } else { options.budget };
+    let networks = timing::networks(&options.networks, cells)?;
+    let device = run.open_device()?;
+    let checksum = |&n| {
+        let found = networks.find(Scheme::Paper, &convergence_network(n)?)?;
+        Ok((format!("n{n}"), found.network.fingerprint().into()))
+    };
+    let checksums = cells.iter().map(checksum);
+    let parameters = json!({
+        "networks": checksums.collect::<Result<serde_json::Map<_, _>, Error>>()?,
+        "cells": cells,
+        "budget": budget,
+        "steps": STEPS,
+    });
+    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut timings = Vec::new();
+    for &n in cells {
+        timings.extend(measure(&mut session, &networks, n, budget)?);
+    }
+    let n = if quick { 32 } else { 64 };
+    let (surface, steps) = surface_steps(options, &networks, &mut session, n)?;
+
+    let rows: Vec<_> = timings.iter().map(|t| (t, t.numbers())).collect();
+    let times = |t: &Timing, k: usize| t.over_hybrid(&timings).map(|times| times[k]);
+    let table = Sheet::of(&rows)
+        .text("method", |(t, _)| t.row.label)
+        .column("n", Shortest, |(t, _)| t.n)
+        .column("128 steps [s]", Fixed(1), |(t, _)| t.seconds())
+        .text("measured", |(t, _)| t.measured())
+        .column("times hybrid", Fixed(1), |(t, _)| times(t, 0))
+        .column(MEASURED, Fixed(1), |(t, _)| times(t, 1))
+        .columns(&COLUMNS, |(_, numbers)| numbers)
+        .column(PAPERS, Shortest, |(t, _)| t.papers_seconds());
+    session.sheet(table, "timing")?;
+    session.remark(run.title("One Willmore step of a surface"));
+    let steps = Sheet::of(&steps)
+        .keyed(|(method, ..), name| format!("timing.armadillo.{}.{name}", method.key()))
+        .text("surface", |_| &surface)
+        .text("method", |(method, ..)| method.label())
+        .column("n", Shortest, |_| n)
+        .measure("seconds", ("one step [s]", Fixed(2)), |s| s.1["seconds"])
+        .column("Newton", Fixed(0), |s| s.1["newton_per_step"])
+        .measure("hvp", ("HVP", Fixed(0)), |s| s.1["hvp_on_this_grid"])
+        .column(PAPERS, Shortest, |s| s.2);
+    session.sheet(steps, "armadillo")?;
+    let json = rows.iter().map(|(t, numbers)| {
+        let (row, seconds) = (t.row.key, t.timed.seconds());
+        json!({ "variant": row, "n": t.n, "numbers": numbers, "step_seconds": seconds, "failure": t.failure })
+    });
+    let json: Vec<_> = json.collect();
+    session.output.write_json("timing.json", &json)?;
+    session.figure(figure(&timings), "timing")?;
+    for (timing, mut numbers) in rows.into_iter().filter(|(t, _)| t.usable()) {
+        numbers.extend(times(timing, 1).map(|times| ("times_hybrid_measured_steps", times)));
+        for (name, value) in numbers {
+            let metric = format!("timing.n{}.{}.{name}", timing.n, timing.row.key);
+            session.metric(&metric, value)?;
+        }
+    }
+    session.finish("128 Willmore steps of the cross: wall time on this machine")
+}
+
+/// All rows at a resolution.
+fn measure(
+    session: &mut Session<'_>,
+    networks: &Chosen,
+    n: usize,
+    budget: f64,
+) -> Result<Vec<Timing>, Error> {
+    let mut contenders = Vec::new();
+    for row in &VARIANTS {
+        let mut operator = networks.operator((row.method, Scheme::Paper), n)?;
+        // All begin their steps on the whole grid, as in the paper.
+        operator.half_grids = false;
+        operator.linear = row.linear;
+        let mut case = timing::plane(&operator, n, STEPS, session.options.quick)?;
+        case.scales.newton.method = row.newton;
+        contenders.push(Timing {
+            row,
+            n,
+            timed: Timed::new(case, &session.device)?,
+            failure: None,
+        });
+    }
+    session.phase(format!("n = {n}"), |stage| {
+        stage.bar.set_length((VARIANTS.len() * STEPS) as u64);
+        let goes_on = |timing: &Timing| timing.goes_on(budget);
+        take_turns(&mut contenders, goes_on, |timing| timing.step(&stage.bar))
+    })?;
+    Ok(contenders)
+}
+
+impl Timing {
+    fn goes_on(&self, budget: f64) -> bool {
+        // The first step costs more than the others: extrapolation needs some of those.
+        let seconds = self.timed.seconds();
+        let more = seconds.len() < 3 || seconds.iter().sum::<f64>() < budget;
+        self.failure.is_none() && seconds.len() < STEPS && more
+    }
+
+    fn step(&mut self, bar: &ProgressBar) -> Result<(), Error> {
+        match self.timed.step(bar) {
+            Err(Error::Engine(engine::Error::Step { source, .. }))
+                if matches!(*source, solver::Error::NotConverged { .. }) =>
+            {
+                self.failure = Some(source.to_string());
+                Ok(())
+            }
+            other => other.map(drop),
+        }
+    }
+
+    /// Time and work, with the time of all steps in seconds: measured, or with the mean of the later half of the measured steps for each
+    /// of the rest. Steps become cheaper as corners smooth out: the later ones say most about what is to come.
+    fn numbers(&self) -> Numbers {
+        let (mut numbers, seconds) = (self.timed.numbers(), self.timed.seconds());
+        let (count, measured) = (seconds.len(), seconds.iter().sum::<f64>());
+        let later = &seconds[count / 2..];
+        let late = later.iter().sum::<f64>() / later.len().max(1) as f64;
+        let inner = self.timed.run.statistics().unwrap_or_default();
+        let per_step = |total: usize| total as f64 / count.max(1) as f64;
+        numbers.extend([
+            ("measured_steps", count as f64),
+            ("measured_seconds", measured),
+            ("seconds", measured + late * (STEPS - count) as f64),
+            ("inner_cg_per_step", per_step(inner.cg)),
+            ("factorizations_per_step", per_step(inner.factorizations)),
+        ]);
+        numbers
+    }
+
+    /// Whether there is a time worth showing.
+    fn usable(&self) -> bool {
+        self.failure.is_none() && self.timed.run.steps() > 1
+    }
+
+    fn seconds(&self) -> Option<f64> {
+        self.usable().then(|| self.numbers()["seconds"])
+    }
+
+    fn papers_seconds(&self) -> Option<f64> {
+        let column = [256, 512].iter().position(|&n| n == self.n)?;
+        self.row.papers_seconds.map(|seconds| seconds[column])
+    }
+
+    /// How it was measured.
+    fn measured(&self) -> String {
+        let steps = self.timed.run.steps();
+        match &self.failure {
+            Some(reason) => format!("stopped after {steps} steps: {reason}"),
+            None if steps < STEPS => format!("extrapolated from {steps} steps"),
+            None => "all steps".to_owned(),
+        }
+    }
+
+    /// Time of all steps, and of those measured by both, over that of the hybrid scheme.
+    fn over_hybrid(&self, all: &[Self]) -> Option<[f64; 2]> {
+        let hybrid = (all.iter()).find(|t| t.n == self.n && t.row.key == "hybrid")?;
+        let (own, its) = (self.timed.seconds(), hybrid.timed.seconds());
+        let common = own.len().min(its.len());
+        let measured = own[..common].iter().sum::<f64>() / its[..common].iter().sum::<f64>();
+        Some([self.seconds()? / hybrid.seconds()?, measured])
+    }
+}
+
+/// One step of tau = 2^-18 of the armadillo by the hybrid scheme and nested finite elements, eps = 2h, tautilde = h^2: its name, and for
+/// each method what was measured and the seconds that the paper reports.
+fn surface_steps(
+    options: &Options,
+    networks: &Chosen,
+    session: &mut Session<'_>,
+    n: usize,
+) -> Result<(String, Vec<(Method, Numbers, f64)>), Error> {
+    const METHODS: [(Method, f64); 2] = [(Hybrid, 807.0), (FeImplicit, 14589.0)];
+    let time = (StepRule::Constant(0.5_f64.powi(18)), 1);
+    let (scales, needed) = (surfaces::scales(n), surfaces::needed_network());
+    let grid = surfaces::centred_box(n, options.mesh.box_side(&ARMADILLO))?;
+    session.phase("armadillo", |stage| {
+        let mesh = options.mesh.load_or_built_in(&ARMADILLO, &grid)?;
+        let initial = mesh.phase_field(grid, scales.eps, &stage.bar)?;
+        let mut steps = Vec::new();
+        for (method, papers_seconds) in METHODS {
+            let (variant, source) = ((method, Scheme::Paper), networks.of(Scheme::Paper));
+            let operator = Operator::new(variant, &source, &needed, &grid, &scales)?;
+            let initial = initial.clone();
+            let case = surfaces::willmore_flow(&mesh.title, initial, operator, scales, time);
+            let mut timed = Timed::new(case, stage.device)?;
+            timed.step(&stage.bar)?;
+            steps.push((method, timed.numbers(), papers_seconds));
+        }
+        Ok((mesh.title, steps))
+    })
+}
+
+/// Seconds over the resolution: solid lines for this machine, dashed ones for the paper.
+fn figure(timings: &[Timing]) -> Figure {
+    let mut curves = Vec::new();
+    for (k, row) in VARIANTS.iter().enumerate() {
+        let marker = [Marker::Circle, Marker::Square, Marker::Triangle][k % 3];
+        let mut curve = |name: String, style, seconds: fn(&Timing) -> Option<f64>| {
+            let own = timings.iter().filter(|t| t.row.key == row.key);
+            let points = own.filter_map(|t| Some([t.n as f64, seconds(t)?]));
+            let curve = Series::new(name, points.collect::<Vec<_>>()).with_style(style);
+            curves.push(curve.with_colour(k).with_marker(marker));
+        };
+        curve(row.label.to_owned(), LineStyle::Solid, Timing::seconds);
+        let papers = format!("{} (paper, other machines)", row.label);
+        curve(papers, LineStyle::Dashed, Timing::papers_seconds);
+    }
+    curves.retain(|curve| !curve.points.is_empty());
+    let n = Axis::log("cells per unit length n");
+    let chart = LineChart::new("", n, Axis::log("seconds for 128 steps")).with_curves(curves);
+    Figure::new("Willmore flow of a cross: wall time", 1)
+        .with_panel(chart)
+        .with_shared_legend()
+        .with_note(
+            "Solid: this machine, one run, long rows extrapolated (see the table). Dashed: the paper's times on an A100 (hybrid) and \
+             on 64 cores (finite elements).",
+        )
+}

@@ -1,0 +1,289 @@
+//! Trains the networks that ship with the library.
+
+use std::collections::BTreeSet;
+
+use crate::prelude::*;
+use crate::quality;
+use crate::session::{Stage, remove_folder};
+use crate::training::{NetworkSpec, train, training_device};
+use clap::ValueEnum;
+use model::Network;
+use model::training::adam::AdamParams;
+use model::training::least_squares::LeastSquaresParams;
+use model::training::levenberg_marquardt::LmParams;
+use model::training::{self, CurvePoint, Trained};
+use report::OutputDir;
+
+const PROGRAM: &str = "train_networks";
+
+/// How networks are trained.
+#[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+enum Recipe {
+    /// Levenberg-Marquardt from the splitting scheme
+    Lm,
+    /// The paper's: Adam from a random start at n = 128, refined to n = 256 and 512
+    Adam,
+    /// The heat kernel and an odd activation by least squares, for the calibrated Willmore scheme
+    Accurate,
+    /// Levenberg-Marquardt and Adam, with the learning curves side by side; Adam only for the networks of the convergence tests
+    Both,
+}
+
+/// Trains the networks: n = 128, 256, 512 of the convergence tests, the one for inpainting, and the one for surfaces in 3D.
+#[derive(Parser, Debug)]
+#[command(name = PROGRAM, version)]
+struct Options {
+    #[command(flatten)]
+    run: RunOptions,
+
+    /// How to train
+    #[arg(long, value_enum, default_value_t = Recipe::Lm)]
+    recipe: Recipe,
+
+    /// Train this network alone: n128, n256, n512, inpainting or surfaces, with --recipe accurate also n64; can be repeated
+    #[arg(long, value_name = "NAME")]
+    only: Vec<String>,
+
+    /// Epochs of Adam at n = 128; every refinement gets a quarter of the epochs before it
+    #[arg(long, value_name = "COUNT", default_value_t = 200)]
+    adam_epochs: usize,
+}
+
+impl Recipe {
+    /// Name in data, metrics and checkpoints, name in the legend, and how its curves look.
+    fn look(self) -> (&'static str, &'static str, LineStyle) {
+        match self {
+            Self::Lm | Self::Both => ("lm", "Levenberg-Marquardt", LineStyle::Solid),
+            Self::Adam => ("adam", "Adam", LineStyle::Dashed),
+            Self::Accurate => {
+                let label = "distillation of the least-squares fit";
+                ("accurate", label, LineStyle::DashDotDot)
+            }
+        }
+    }
+}
+
+pub fn main() -> ExitCode {
+    harness::main(program)
+}
+
+fn program(options: &Options) -> Result<(), Error> {
+    let run = &options.run;
+    let chosen = options.chosen()?;
+    require(options.adam_epochs > 0, "--adam-epochs must be at least 1")?;
+    let device = training_device(&run.open_device()?)?;
+    let (lm, accurate) = (LmParams::new(run.quick), LeastSquaresParams::new(run.quick));
+    let adam = AdamParams {
+        epochs: if run.quick { 2 } else { options.adam_epochs },
+        ..AdamParams::default()
+    };
+    let parameters = json!({
+        "recipe": options.recipe,
+        "networks": chosen,
+        "levenberg_marquardt": lm,
+        "adam": adam,
+        "accurate": accurate,
+    });
+    let session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut trainings = Trainings {
+        checkpoints: session.output.subfolder("checkpoints")?,
+        folder: session.output.subfolder("networks")?,
+        session,
+        chosen: chosen.clone(),
+        finished: Vec::new(),
+    };
+    for spec in &chosen {
+        match options.recipe {
+            Recipe::Lm | Recipe::Both => trainings.train(Recipe::Lm, spec, &lm)?,
+            Recipe::Accurate => trainings.train(Recipe::Accurate, spec, &accurate)?,
+            Recipe::Adam => break,
+        };
+    }
+    match options.recipe {
+        Recipe::Adam => trainings.progressively(&adam, true)?,
+        Recipe::Both => trainings.progressively(&adam, !options.only.is_empty())?,
+        Recipe::Lm | Recipe::Accurate => {}
+    }
+    trainings.write()
+}
+
+impl Options {
+    fn chosen(&self) -> Result<Vec<NetworkSpec>, Error> {
+        let mut specs = match self.recipe {
+            Recipe::Accurate => NetworkSpec::accurate(),
+            Recipe::Lm | Recipe::Adam | Recipe::Both => NetworkSpec::paper(),
+        };
+        let names: Vec<&str> = specs.iter().map(|spec| spec.name).collect();
+        for name in &self.only {
+            require(
+                names.contains(&name.as_str()),
+                format!(
+                    "no network is called '{name}'; there are {}",
+                    names.join(", ")
+                ),
+            )?;
+        }
+        if !self.only.is_empty() {
+            specs.retain(|spec| self.only.iter().any(|name| name == spec.name));
+        }
+        Ok(specs)
+    }
+}
+
+/// Trainings one after the other. Those of the chosen networks are kept and saved at once.
+struct Trainings<'a> {
+    session: Session<'a>,
+    /// Where interrupted trainings are kept until all are finished.
+    checkpoints: OutputDir,
+    folder: OutputDir,
+    chosen: Vec<NetworkSpec>,
+    finished: Vec<Finished>,
+}
+
+struct Finished {
+    recipe: Recipe,
+    spec: NetworkSpec,
+    trained: Trained,
+}
+
+impl Trainings<'_> {
+    fn train<R: training::Recipe>(
+        &mut self,
+        recipe: Recipe,
+        spec: &NetworkSpec,
+        params: &R,
+    ) -> Result<Network, Error> {
+        let (key, label, _) = recipe.look();
+        let name = format!("{}-{key}", spec.name);
+        let file = self.checkpoints.path(&format!("{name}.json"))?;
+        let work = |stage: &Stage<'_>| train((spec, params), &file, stage);
+        let trained = (self.session).phase(format!("{} by {label}", spec.name), work)?;
+        let network = trained.network.clone();
+        if self.chosen.contains(spec) {
+            let prefix = match recipe {
+                Recipe::Lm | Recipe::Both => "",
+                Recipe::Adam => "adam_",
+                Recipe::Accurate => "accurate_",
+            };
+            let file = format!("{prefix}{}", spec.ratios.file_name());
+            network.save(&self.folder.path(&file)?)?;
+            self.finished.push(Finished {
+                recipe,
+                spec: spec.clone(),
+                trained,
+            });
+        }
+        Ok(network)
+    }
+
+    /// The paper's progressive training up to the finest of the chosen networks: each starts from the refined kernel
+    /// and the activation of the one before. The others have no coarser one and are trained `alone`, from a random start.
+    fn progressively(&mut self, first: &AdamParams, alone: bool) -> Result<(), Error> {
+        let mut stages = NetworkSpec::convergence();
+        let others = self.chosen.iter().filter(|spec| !stages.contains(spec));
+        let others: Vec<_> = others.filter(|_| alone).cloned().collect();
+        while stages.pop_if(|spec| !self.chosen.contains(spec)).is_some() {}
+        let mut params = first.clone();
+        for spec in &stages {
+            let network = self.train(Recipe::Adam, spec, &params)?;
+            params = params.refined(&network);
+        }
+        for spec in &others {
+            self.train(Recipe::Adam, spec, first)?;
+        }
+        Ok(())
+    }
+
+    /// Curves, figure, metrics and table.
+    fn write(self) -> Result<(), Error> {
+        let (mut session, all) = (self.session, self.finished);
+        session.figure(figure(&all), "learning_curves")?;
+        let rows: Vec<CurveRow> = all.iter().flat_map(Finished::curve).collect();
+        session.output.write_csv("learning_curves.csv", &rows)?;
+        for one in &all {
+            session
+                .summary
+                .insert_record(&one.key(), &one.trained.quality)?;
+        }
+        let sheet = Sheet::of(&all)
+            .keyed(|one, name| format!("{}.{name}", one.key()))
+            .text("network", |one| one.spec.name)
+            .text("recipe", |one| one.recipe.look().0)
+            .metric("seconds", |one| one.trained.seconds())
+            .metric("iterations", |one| one.trained.curve.len());
+        let sheet = quality::columns(sheet, |one| &one.trained.quality);
+        session.sheet(sheet, "quality")?;
+        remove_folder(&self.checkpoints)?;
+        let folder = self.folder.as_path().display();
+        session.remark(format!("Networks are in {folder}"));
+        session.finish("Quality of the trained networks")
+    }
+}
+
+impl Finished {
+    /// Prefix of its metrics.
+    fn key(&self) -> String {
+        match self.recipe {
+            Recipe::Lm => format!("train.{}", self.spec.name),
+            other => format!("train.{}.{}", self.spec.name, other.look().0),
+        }
+    }
+
+    fn curve(&self) -> impl Iterator<Item = CurveRow> {
+        self.trained.curve.iter().map(|point| CurveRow {
+            network: self.spec.name,
+            recipe: self.recipe.look().0,
+            iteration: point.iteration,
+            seconds: point.seconds,
+            training_loss: point.training_loss,
+            held_out_loss: point.held_out_loss,
+        })
+    }
+}
+
+#[derive(Serialize)]
+struct CurveRow {
+    network: &'static str,
+    recipe: &'static str,
+    iteration: usize,
+    seconds: f64,
+    training_loss: f64,
+    held_out_loss: f64,
+}
+
+/// Held-out loss over wall time and over iterations; colour: network, line style: recipe.
+fn figure(all: &[Finished]) -> Figure {
+    let mut names: Vec<&str> = all.iter().map(|one| one.spec.name).collect();
+    let mut seen = BTreeSet::new();
+    names.retain(|name| seen.insert(*name));
+    let recipes = [Recipe::Lm, Recipe::Adam, Recipe::Accurate].into_iter();
+    let used = |recipe: &Recipe| all.iter().any(|one| one.recipe == *recipe);
+    let entry = |recipe: Recipe| LegendEntry::line(recipe.look().1, Colour::Black, recipe.look().2);
+    let recipes: Vec<_> = recipes.filter(used).map(entry).collect();
+    let networks = names.iter().enumerate();
+    let networks = networks.map(|(k, name)| LegendEntry::line(*name, k, LineStyle::Solid));
+    let networks: Vec<_> = networks.collect();
+    let chart = |label: &str, abscissa: fn(&CurvePoint) -> f64| {
+        let curves = all.iter().map(|one| {
+            let (key, _, style) = one.recipe.look();
+            let colour = names.iter().position(|name| *name == one.spec.name);
+            let name = format!("{} {key}", one.spec.name);
+            let point = |at: &CurvePoint| [abscissa(at), at.held_out_loss];
+            let curve = Series::of(name, &one.trained.curve, point).with_style(style);
+            curve.with_colour(colour.unwrap_or(0))
+        });
+        LineChart::new("", Axis::log(label), Axis::log("held-out loss"))
+            .with_curves(curves)
+            .with_entries(recipes.clone())
+            .with_entries(networks.clone())
+    };
+    Figure::new("Learning curves", 2)
+        .with_panel(chart("wall time [s]", |point| point.seconds))
+        .with_panel(chart("iteration or epoch", |point| point.iteration as f64))
+        .with_shared_legend()
+        .with_note(
+            "Loss: mean squared nodal error on spheres not trained on. Levenberg-Marquardt uses all sampled points in each \
+             iteration; an epoch of Adam is one pass over all radii in batches of 10 grids.",
+        )
+}

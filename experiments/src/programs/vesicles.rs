@@ -1,0 +1,250 @@
+//! Lipid vesicles: area and volume held.
+
+use std::f64::consts::PI;
+
+use crate::equilibria::{self, AtRest, Equilibrium, Exact};
+use crate::look;
+use crate::prelude::*;
+use crate::surfaces::{Setting, View, centred_box, willmore_flow};
+use geometry::UpAxis;
+use reference::equilibria::{Branch, Vesicle, vesicles};
+use render::{Quality, Scene};
+use report::{Curve, Raster, Shapes};
+
+const TITLE: &str = "Vesicles: least bending energy with given area and volume";
+const CELLS: [usize; 2] = [32, 64];
+/// The area is that of a sphere of this radius.
+const RADIUS: f64 = 0.3;
+const VIEW: View = View {
+    up: UpAxis::Z,
+    azimuth: 30.0,
+    elevation: 25.0,
+};
+
+/// Shapes that are run: branch, name, reduced volumes, side of the box.
+const RUNS: [(Branch, &str, &[f64], f64); 2] = [
+    (
+        Branch::Prolate,
+        "prolate",
+        &[0.95, 0.9, 0.8, 0.7, 0.65, 0.6],
+        1.5,
+    ),
+    (
+        Branch::Oblate,
+        "oblate",
+        &[0.9, 0.8, 0.7, 0.65, 0.64, 0.6],
+        1.25,
+    ),
+];
+
+/// Willmore flow of spheroids with area and volume held until rest, by the accurate operator, n = 64, eps = 2h: energies, profiles and pictures
+/// along the reduced volume, against exact axisymmetric equilibria; the phase diagram and where prolate and oblate vesicles have the same energy.
+#[derive(Parser, Debug)]
+#[command(name = "vesicles", version)]
+struct Options {
+    #[command(flatten)]
+    figure: FigureOptions,
+}
+
+pub fn main() -> ExitCode {
+    harness::main(program)
+}
+
+/// A vesicle of the flow and the exact one.
+struct Pair {
+    branch: &'static str,
+    at_rest: AtRest<3>,
+    exact: Vesicle,
+}
+
+fn program(options: &Options) -> Result<(), Error> {
+    let run = &options.figure.run;
+    let (count, steps) = if run.quick {
+        (1, Some(2))
+    } else {
+        (usize::MAX, None)
+    };
+    let device = run.open_device()?;
+    let setting = Setting::new(&options.figure, CELLS, 1.0)?;
+    let parameters = setting.parameters(json!({ "radius": RADIUS }))?;
+    let mut session = Session::open("vesicles", run, device, parameters)?;
+    let (mut all, mut pairs) = (Vec::new(), Vec::new());
+    for (branch, name, volumes, side) in RUNS.into_iter().take(count) {
+        let volumes = &volumes[..volumes.len().min(count)];
+        let title = format!("exact vesicles: {name}");
+        let exact = session.phase(title, |_| Ok(vesicles(branch, 0.0, volumes)?))?;
+        let grid = centred_box(setting.n, side)?;
+        for (&ratio, exact) in volumes.iter().zip(exact) {
+            let equilibrium = Equilibrium {
+                key: format!("vesicles.{name}.v{ratio:.2}"),
+                title: format!("{name}, v = {ratio:.2}"),
+                radius: RADIUS,
+                ratio,
+                prolate: branch == Branch::Prolate,
+                exact: Exact {
+                    energy: exact.energy(),
+                    tension: exact.tension / RADIUS.powi(2),
+                    pressure: -exact.pressure / RADIUS.powi(3),
+                },
+            };
+            let operator = setting.operator((Method::Hybrid, Scheme::Accurate))?;
+            let initial = equilibrium.start(grid, setting.scales.eps, 0.5)?;
+            let rule = (StepRule::ByEnergy(None), 1);
+            let case = willmore_flow("spheroid", initial, operator, setting.scales, rule);
+            all.push(equilibrium.relax(&mut session, case, steps)?);
+            pairs.push((name, exact));
+        }
+    }
+    session.sheet(equilibria::sheet(&all), "energies")?;
+    let pairs: Vec<Pair> = (all.into_iter().zip(pairs))
+        .map(|(at_rest, (branch, exact))| Pair {
+            branch,
+            at_rest,
+            exact,
+        })
+        .collect();
+    for (key, energy) in [
+        ("crossing.prolate_oblate", Pair::energy as fn(&Pair) -> f64),
+        ("crossing.exact", |pair| pair.exact.energy() / (8.0 * PI)),
+    ] {
+        session.metric(&format!("vesicles.{key}"), crossing(&pairs, energy))?;
+    }
+    let diagram = diagram(&mut session, &pairs)?;
+    session.figure(diagram, "diagram")?;
+    session.figure(shapes(&pairs, run.quick)?, "shapes")?;
+    session.finish(TITLE)
+}
+
+impl Pair {
+    /// In units of the sphere's.
+    fn energy(&self) -> f64 {
+        self.at_rest.zero_set.willmore_energy / (8.0 * PI)
+    }
+
+    fn ratio(&self) -> f64 {
+        self.at_rest.equilibrium.ratio
+    }
+}
+
+/// The reduced volume at which both branches have the same energy, interpolated between the two where their order changes.
+fn crossing(pairs: &[Pair], energy: fn(&Pair) -> f64) -> Option<f64> {
+    let of = |branch| pairs.iter().filter(move |pair| pair.branch == branch);
+    let excess = of("prolate").filter_map(|one| {
+        let same = |other: &&Pair| other.ratio().to_bits() == one.ratio().to_bits();
+        let other = of("oblate").find(same)?;
+        Some((one.ratio(), energy(one) - energy(other)))
+    });
+    let excess: Vec<(f64, f64)> = excess.collect();
+    let changes = |pair: &&[(f64, f64)]| (pair[0].1 < 0.0) != (pair[1].1 < 0.0);
+    let between = excess.windows(2).find(changes)?;
+    let [(v, d), (next, e)] = [between[0], between[1]];
+    Some(v + (next - v) * d / (d - e))
+}
+
+/// Exact branches as lines, the flow's shapes as marks.
+fn diagram(session: &mut Session<'_>, pairs: &[Pair]) -> Result<Figure, Error> {
+    let branches = [
+        (Branch::Prolate, "prolate", (0.99, 0.5), Marker::Circle),
+        (Branch::Oblate, "oblate", (0.99, 0.51), Marker::Square),
+        (
+            Branch::Stomatocyte,
+            "stomatocyte",
+            (0.65, 0.4),
+            Marker::Diamond,
+        ),
+    ];
+    let mut curves = Vec::new();
+    for (colour, (branch, name, (from, to), marker)) in branches.into_iter().enumerate() {
+        let volumes: Vec<f64> = (0..=60)
+            .map(|k| from + (to - from) * f64::from(k) / 60.0)
+            .collect();
+        let exact = session.phase(format!("branch: {name}"), |_| {
+            Ok(vesicles(branch, 0.0, &volumes)?)
+        })?;
+        let points = volumes
+            .iter()
+            .zip(&exact)
+            .map(|(v, one)| [*v, one.energy() / (8.0 * PI)]);
+        let exact = Series::new(format!("{name}, exact"), points.collect::<Vec<_>>());
+        curves.push(exact.with_colour(colour));
+        let own = pairs.iter().filter(|pair| pair.branch == name);
+        let points: Vec<[f64; 2]> = own.map(|pair| [pair.ratio(), pair.energy()]).collect();
+        if !points.is_empty() {
+            let own = Series::new(format!("{name}, phase field"), points);
+            curves.push(own.with_colour(colour).with_symbols(marker));
+        }
+    }
+    let axes = (
+        Axis::linear("reduced volume v"),
+        Axis::linear("energy w / 8π"),
+    );
+    let chart = LineChart::new("", axes.0, axes.1).with_curves(curves);
+    Ok(Figure::new(TITLE, 1).with_panel(chart).with_note(
+        "w = ½ ∫ h² dA; v: volume over that of the sphere with the same area. The least energy is that of the lowest branch.",
+    ))
+}
+
+/// A picture of every shape, and its section through the axis over the exact profile.
+fn shapes(pairs: &[Pair], quick: bool) -> Result<Figure, Error> {
+    let half = 2.2 * RADIUS;
+    let quality = if quick {
+        Quality::Draft
+    } else {
+        Quality::Standard
+    };
+    let columns = RUNS
+        .iter()
+        .map(|(_, _, volumes, _)| volumes.len())
+        .max()
+        .unwrap_or(1);
+    let mut figure = Figure::new(TITLE, columns.min(pairs.len()));
+    let mut rows = Vec::new();
+    for (_, branch, ..) in RUNS {
+        let own = || pairs.iter().filter(move |pair| pair.branch == branch);
+        if own().next().is_none() {
+            continue;
+        }
+        rows.extend([branch, "section"]);
+        for pair in own() {
+            let eps = pair.at_rest.trajectory.case.scales.eps;
+            let scene = Scene::new(&pair.at_rest.field, eps)?
+                .view(VIEW)
+                .quality(quality);
+            let picture = scene.render([320; 2])?;
+            let size = [picture.width() as usize, picture.height() as usize];
+            let (energy, exact) = (pair.energy(), pair.exact.energy() / (8.0 * PI));
+            let caption = format!(
+                "v = {:.2}\nw / 8π = {energy:.4}\nexact {exact:.4}",
+                pair.ratio()
+            );
+            figure = figure.with_panel(Raster::new(size, picture.pixels()).with_caption(caption));
+        }
+        for pair in own() {
+            let exact = pair.exact.surface.profile().points().into_iter();
+            let exact: Vec<[f64; 2]> = exact.map(|p| p.map(|x| RADIUS * x)).collect();
+            let section = look::outline(&section(&pair.at_rest.field)?);
+            let panel = Shapes::new("")
+                .with_window([-half, half], [-half, half])
+                .with_curve(section.filled(Colour::LightGrey))
+                .with_curve(Curve::new([exact]).with_colour(0).with_width(1.0));
+            figure = figure.with_panel(panel);
+        }
+    }
+    Ok(figure.with_row_labels(rows).with_note(
+        "Grey: at rest, ε = 2h. Blue: the exact equilibrium. v: volume over that of the sphere with the same area.",
+    ))
+}
+
+/// The plane through the axis, moved to the origin.
+fn section(field: &Field<3>) -> Result<Field<2>, Error> {
+    let grid = field.grid();
+    let (cells, plane) = (grid.cells(), Grid::<2>::new(grid.cells(), grid.side())?);
+    let value = |node: usize| {
+        let [i, k] = plane.multi_index(node);
+        field.values()[grid.index([i, cells / 2, k])]
+    };
+    Ok(Field::from_values(
+        plane,
+        (0..plane.len()).map(value).collect(),
+    )?)
+}

@@ -1,0 +1,365 @@
+//! Runs against the exact flow of their curves, and of their surfaces of revolution.
+
+use engine::{ErrorControl, Order, Samples, Stop, TimeSteps, Trajectory};
+use geometry::contour::{Interpolation, zero_level};
+use geometry::shapes::{Cross, Cuboid, Cylinder, Ellipse};
+use geometry::{SignedDistance, ZeroSet};
+use model::Networks;
+use reference::revolution::{self, Surface};
+use reference::{Curve, Shape, planar};
+use solver::NewtonParams;
+use surfaces::phase_field_surface;
+
+use crate::prelude::*;
+use crate::surfaces::willmore_flow;
+
+/// A shape whose exact flow is known, around the origin; in space a body of revolution about the third axis.
+pub struct Sample<const D: usize> {
+    pub key: &'static str,
+    pub title: &'static str,
+    /// Side of the periodic box. The profile's tails are below 1e-12 at the boundary.
+    pub side: f64,
+    /// The phase field for an interface width.
+    pub initial: fn(Grid<D>, f64) -> Result<Field<D>, geometry::Error>,
+    /// The curve, or the profile of the surface.
+    pub curve: fn() -> Result<Shape, reference::Error>,
+    /// Points of the zero level of a phase field with an interface width: of the curve, or of the profile.
+    pub level: fn(&Field<D>, f64) -> Result<Vec<[f64; 2]>, surfaces::Error>,
+}
+
+/// The non-convex cross: arms of half length 0.8 and half width 0.27.
+pub const CROSS: Sample<2> = Sample {
+    key: "cross",
+    title: "Cross",
+    side: 2.0,
+    initial: |grid, eps| phase_field(grid, &Cross::new(0.8, 0.27)?, eps),
+    curve: || Shape::cross(0.8, 0.27),
+    level,
+};
+
+/// The rectangle with sides 0.4 and 0.2; it ends within 0.36 of the origin.
+pub const RECTANGLE: Sample<2> = Sample {
+    key: "rectangle",
+    title: "Rectangle",
+    side: 1.5,
+    initial: |grid, eps| phase_field(grid, &Cuboid::new([0.2, 0.1])?, eps),
+    curve: || Shape::rectangle(0.2, 0.1),
+    level,
+};
+
+/// A smooth start.
+pub const ELLIPSE: Sample<2> = Sample {
+    key: "ellipse",
+    title: "Ellipse",
+    side: 1.5,
+    initial: |grid, eps| phase_field(grid, &Ellipse::new([0.3, 0.2])?, eps),
+    curve: || Shape::ellipse(0.3, 0.2),
+    level,
+};
+
+/// Radius and half the height of the thick disk; the paper does not say, but these fit its initial energy.
+pub const THICK_DISK: [f64; 2] = [0.29, 0.1];
+
+/// The thick disk of the paper.
+pub const DISK: Sample<3> = Sample {
+    key: "disk",
+    title: "Thick disk",
+    side: 1.0,
+    initial: |grid, eps| {
+        let [radius, half_height] = THICK_DISK;
+        phase_field(grid, &Cylinder::new(radius, half_height)?, eps)
+    },
+    curve: || Shape::rectangle(THICK_DISK[0], THICK_DISK[1]),
+    level: profile,
+};
+
+/// A smooth surface: the flat spheroid 3:2.
+pub const ELLIPSOID: Sample<3> = Sample {
+    key: "ellipsoid",
+    title: "Ellipsoid",
+    side: 1.0,
+    initial: |grid, eps| {
+        let profile = Ellipse::new([0.3, 0.2])?;
+        let distance = |[x, y, z]: [f64; 3]| profile.signed_distance([x.hypot(y), z]);
+        phase_field(grid, &distance, eps)
+    },
+    curve: || Shape::ellipse(0.3, 0.2),
+    level: profile,
+};
+
+/// Cells per unit length of runs by the accurate operator, two to `eps`; the errors of the two are extrapolated to `eps = 0`.
+pub const CELLS: [usize; 2] = [64, 128];
+
+/// Controlled steps with the tolerance of the program `willmore`.
+pub const USUAL: ErrorControl = ErrorControl {
+    relative: 0.02,
+    longest: 1.0,
+    first: None,
+};
+
+/// Controlled steps with a time error well below that in `eps`.
+pub const STRICT: ErrorControl = ErrorControl {
+    relative: 0.005,
+    longest: 0.5,
+    first: None,
+};
+
+/// Controlled steps that end at the times `end / 2^k` for `k` up to `halvings`, among others.
+pub fn controlled(control: ErrorControl, end: f64, halvings: u32) -> TimeSteps {
+    TimeSteps {
+        order: Order::Controlled(control),
+        ..StepRule::Ramp { tau: end, halvings }.into()
+    }
+}
+
+impl<const D: usize> Sample<D> {
+    /// The exact flow at increasing times.
+    pub fn exact(&self, flow: Flow, times: &[f64]) -> Result<Vec<Truth>, Error> {
+        let flow = match flow {
+            Flow::Willmore => reference::Flow::Willmore,
+            Flow::MeanCurvature => reference::Flow::MeanCurvature,
+        };
+        let shape = (self.curve)()?;
+        Ok(if D == 2 {
+            let curves = planar::evolve(&shape, flow, times, &planar::ACCURACY)?;
+            curves.into_iter().map(Truth::Curve).collect()
+        } else {
+            let surfaces = revolution::evolve(&shape, flow, times, &revolution::ACCURACY)?;
+            surfaces.into_iter().map(Truth::Surface).collect()
+        })
+    }
+
+    /// Willmore flow by the accurate operator with `eps = 2/n` up to a time, in such steps.
+    pub fn run(
+        &self,
+        session: &mut Session<'_>,
+        n: usize,
+        (name, steps, end): (&str, TimeSteps, f64),
+    ) -> Result<Trajectory<D>, Error> {
+        let grid = Grid::<D>::per_unit(n, self.side)?;
+        let newton = match steps.order {
+            Order::First => NewtonParams::default(),
+            Order::Second | Order::Controlled(_) => NewtonParams::second_order(),
+        };
+        let scales = Scales {
+            newton,
+            ..Scales::of_grid(grid.spacing(), 2.0)
+        };
+        let needed = scales.needs(D, grid.spacing());
+        let network = Networks::default().find(Scheme::Accurate.shipped(), &needed)?;
+        let operator = Operator::learned(Scheme::Accurate, network)?;
+        let initial = (self.initial)(grid, scales.eps)?;
+        let mut case = willmore_flow(self.key, initial, operator, scales, (steps.rule, 1));
+        case.steps = steps;
+        case.stops = vec![Stop::Time(end)];
+        case.measures = Measure::crossings(0.0);
+        let name = format!("{}-n{n}-{name}", self.key);
+        session.trajectory(&name, case, &name, &Samples::every(1))
+    }
+}
+
+/// An exact shape at a time.
+pub enum Truth {
+    Curve(Curve),
+    Surface(Surface),
+}
+
+/// Sizes by their names in metrics.
+pub type Sizes = Vec<(&'static str, f64)>;
+
+impl Truth {
+    pub fn time(&self) -> f64 {
+        match self {
+            Self::Curve(curve) => curve.time(),
+            Self::Surface(surface) => surface.time(),
+        }
+    }
+
+    /// The curve, or the profile of the surface.
+    pub fn outline(&self) -> &Curve {
+        match self {
+            Self::Curve(curve) => curve,
+            Self::Surface(surface) => surface.profile(),
+        }
+    }
+
+    /// Of a curve the extent from the origin along the x axis and along the diagonal, the enclosed area, the length, and
+    /// `w = 1/2 int kappa^2`; of a surface area, volume, and `w = 1/2 int h^2`.
+    pub fn sizes(&self) -> Sizes {
+        let along = |curve: &Curve, direction| curve.distance_along(direction).unwrap_or(f64::NAN);
+        match self {
+            Self::Curve(curve) => vec![
+                ("tip", along(curve, [1.0, 0.0])),
+                ("diagonal", along(curve, [1.0, 1.0])),
+                ("area", curve.area()),
+                ("perimeter", curve.length()),
+                ("w", curve.energy()),
+            ],
+            Self::Surface(surface) => vec![
+                ("area", surface.area()),
+                ("volume", surface.volume()),
+                ("w", surface.energy()),
+            ],
+        }
+    }
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "isosurfaces may fail")]
+fn level(field: &Field<2>, _: f64) -> Result<Vec<[f64; 2]>, surfaces::Error> {
+    let curves = zero_level(field, Interpolation::Profile).into_iter();
+    Ok(curves.flat_map(|curve| curve.points).collect())
+}
+
+/// Distance from the axis and height of the vertices of the isosurface.
+fn profile(field: &Field<3>, eps: f64) -> Result<Vec<[f64; 2]>, surfaces::Error> {
+    let vertices = phase_field_surface(field, eps)?.vertices.into_iter();
+    Ok(vertices.map(|[x, y, z]| [x.hypot(y), z]).collect())
+}
+
+/// Adds metrics `KEY.NAME.stepMARK`.
+pub fn record(
+    session: &mut Session<'_>,
+    key: &str,
+    mark: usize,
+    sizes: &[(&str, f64)],
+) -> Result<(), Error> {
+    let mut sizes = sizes.iter();
+    sizes.try_for_each(|(name, value)| session.metric(&format!("{key}.{name}.step{mark}"), *value))
+}
+
+/// What a run has reached at a time at which one of its steps ends.
+pub struct Reached {
+    pub sizes: Sizes,
+    /// The zero level.
+    pub points: Vec<[f64; 2]>,
+    /// The largest distance of the zero level to the exact curve or surface.
+    pub distance: f64,
+    /// All Hessian-vector products so far,
+    pub hvp: f64,
+    /// seconds,
+    pub seconds: f64,
+    /// and steps.
+    pub steps: usize,
+    /// The sum of the estimated errors of the steps, where they have an estimate.
+    pub estimated: f64,
+}
+
+impl Reached {
+    /// Compares a run of a sample with the exact flow at a time.
+    pub fn of<const D: usize>(
+        sample: &Sample<D>,
+        run: &Trajectory<D>,
+        exact: &Truth,
+    ) -> Result<Self, Error> {
+        let earlier = |record: &Record| record.time < exact.time() * (1.0 - 1e-9);
+        let so_far = &run.records[..=run.records.partition_point(earlier)];
+        let last = &so_far[so_far.len() - 1];
+        let (field, eps) = (run.field(last.step)?, run.case.scales.eps);
+        let zero_set = ZeroSet::of(&field, eps)?;
+        let points = (sample.level)(&field, eps)?;
+        let measured = |name| last.measure(name).unwrap_or(f64::NAN);
+        let estimate = |record: &Record| record.minimization?.estimates?.error;
+        let size = |name| match (D, name) {
+            (2, "area") | (_, "volume") => zero_set.volume,
+            (_, "area" | "perimeter") => zero_set.perimeter,
+            (_, "w") => zero_set.willmore_energy,
+            (_, name) => measured(name),
+        };
+        let sizes = exact.sizes().into_iter();
+        Ok(Self {
+            sizes: sizes.map(|(name, _)| (name, size(name))).collect(),
+            distance: exact.outline().largest_distance_of(&points),
+            points,
+            hvp: so_far.iter().filter_map(Record::hvp).sum(),
+            seconds: so_far.iter().map(|record| record.seconds).sum(),
+            steps: so_far.len(),
+            estimated: so_far.iter().filter_map(estimate).sum(),
+        })
+    }
+
+    /// Adds it as metrics `KEY.NAME.stepMARK`.
+    pub fn record(&self, session: &mut Session<'_>, key: &str, mark: usize) -> Result<(), Error> {
+        let others = [
+            ("distance_to_exact", self.distance),
+            ("hvp_total", self.hvp),
+            ("steps", self.steps as f64),
+            ("estimated_error", self.estimated),
+        ];
+        record(session, key, mark, &[&self.sizes[..], &others].concat())
+    }
+
+    /// The same at `eps = 0` from runs at `2 eps` and at `eps`, the error being of second order in `eps`: sizes are `(4 b - a) / 3`, and the
+    /// points of the finer level move on by a third of the way from the coarser one. The work is that of both.
+    pub fn extrapolated(double: &Self, single: &Self, exact: &Truth) -> Self {
+        let sizes = single.sizes.iter().zip(&double.sizes);
+        let sizes = sizes.map(|(&(name, b), (_, a))| (name, (4.0 * b - a) / 3.0));
+        let points: Vec<[f64; 2]> = (single.points.iter())
+            .map(|p| {
+                let [x, y] = nearest(&double.points, *p);
+                [p[0] + (p[0] - x) / 3.0, p[1] + (p[1] - y) / 3.0]
+            })
+            .collect();
+        Self {
+            sizes: sizes.collect(),
+            distance: exact.outline().largest_distance_of(&points),
+            points,
+            hvp: double.hvp + single.hvp,
+            seconds: double.seconds + single.seconds,
+            steps: double.steps + single.steps,
+            estimated: double.estimated.max(single.estimated),
+        }
+    }
+}
+
+/// The largest distance of points to a closed polygon.
+pub fn largest_distance(points: &[[f64; 2]], polygon: &[[f64; 2]]) -> f64 {
+    let distance = |p: &[f64; 2]| {
+        let q = nearest(polygon, *p);
+        (p[0] - q[0]).hypot(p[1] - q[1])
+    };
+    points.iter().map(distance).fold(0.0, f64::max)
+}
+
+/// The nearest point of a closed polygon.
+fn nearest(polygon: &[[f64; 2]], p: [f64; 2]) -> [f64; 2] {
+    let foot = |k: usize| {
+        let (a, b) = (polygon[k], polygon[(k + 1) % polygon.len()]);
+        let (along, from) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
+        let squared = along[0].powi(2) + along[1].powi(2);
+        let part = (from[0] * along[0] + from[1] * along[1]) / squared.max(f64::MIN_POSITIVE);
+        let part = part.clamp(0.0, 1.0);
+        [a[0] + part * along[0], a[1] + part * along[1]]
+    };
+    let distance = |q: &[f64; 2]| (q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2);
+    (0..polygon.len())
+        .map(foot)
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .unwrap_or(p)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_point_is_a_foot_or_a_corner() {
+        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        for (p, expected) in [
+            ([0.3, -2.0], [0.3, 0.0]),
+            ([-1.0, 0.4], [0.0, 0.4]),
+            ([2.0, 3.0], [1.0, 1.0]),
+        ] {
+            let [x, y] = nearest(&square, p);
+            assert!((x - expected[0]).hypot(y - expected[1]) < 1e-15, "{p:?}");
+        }
+    }
+
+    #[test]
+    fn the_cross_is_the_documented_one() {
+        let grid = Grid::<2>::per_unit(64, CROSS.side).unwrap();
+        let field = (CROSS.initial)(grid, 1.0 / 64.0).unwrap();
+        let area = geometry::measure::zero_set_volume(&field);
+        let exact = 2.0 * 1.6 * 0.54 - 0.54 * 0.54;
+        assert!((area - exact).abs() < 2e-3, "{area} {exact}");
+    }
+}
