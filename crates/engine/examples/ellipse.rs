@@ -1,7 +1,8 @@
 //! Willmore flow of an ellipse, which becomes a circle and grows.
 
 use engine::{
-    Case, ErrorControl, Flow, Held, Measure, Operator, Run, Scales, Scheme, Stop, TimeSteps,
+    Case, ErrorControl, Flow, Held, Helfrich, Measure, Operator, Run, Scales, Scheme, Stop,
+    TimeSteps,
 };
 use geometry::{Grid, ZeroSet, phase_field, shapes::Ellipse};
 use model::Networks;
@@ -16,6 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         shape: "ellipse".to_owned(),
         initial: phase_field(grid, &Ellipse::new([0.3, 0.2])?, scales.eps)?,
         region: None,
+        energy: Helfrich::default(),
         held: Held::default(),
         flow: Flow::Willmore,
         operator: Operator::learned(Scheme::Accurate, network)?,

@@ -1,6 +1,6 @@
 //! Takes the noise off a closed mesh by Willmore flow: fair_mesh IN OUT, or the built-in lever with noise.
 
-use engine::{Case, Flow, Held, Method, Operator, Run, Scales, Scheme, StepRule, Stop};
+use engine::{Case, Flow, Held, Helfrich, Method, Operator, Run, Scales, Scheme, StepRule, Stop};
 use geometry::{Grid, Placement, SignedDistance, optimal_profile};
 use model::Networks;
 use operators::ComputeDevice;
@@ -35,6 +35,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         shape: "mesh".to_owned(),
         initial,
         region: None,
+        energy: Helfrich::default(),
         held: Held::default(),
         flow: Flow::Willmore,
         operator: Operator::new(accurate, &networks, &needed, &grid, &scales)?,
