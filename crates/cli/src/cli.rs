@@ -85,7 +85,7 @@ const FLOW_EXAMPLES: &str = "Examples:
   willmore flow bunny.ply --steps 12 --output runs/bunny
   willmore flow logo.png --frames 1 --save smooth.svg
   willmore flow builtin:cube --tau doubling:1e-6 --steps 10
-  willmore flow builtin:coin --reduced-volume 0.64 --steps 40
+  willmore flow builtin:ring --tension 4 --steps 12
 Lengths, areas, volumes and times (length^4) are in the units of the mesh, in pixels of the image, or in those of the box.
 The Willmore energy is 1/2 int h^2 dA in space, h the sum of the principal curvatures (a sphere has 8 pi, no closed surface less),
 and 1/2 int kappa^2 ds in the plane (a circle of radius R has pi / R).

@@ -17,6 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         shape: "ellipse".to_owned(),
         initial: phase_field(grid, &Ellipse::new([0.3, 0.2])?, scales.eps)?,
         region: None,
+        energy: Helfrich::default(),
         held: Held::default(),
         flow: Flow::Willmore,
         energy: Helfrich::default(),

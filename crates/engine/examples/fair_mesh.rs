@@ -35,6 +35,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         shape: "mesh".to_owned(),
         initial,
         region: None,
+        energy: Helfrich::default(),
         held: Held::default(),
         flow: Flow::Willmore,
         energy: Helfrich::default(),

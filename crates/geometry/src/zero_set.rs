@@ -120,7 +120,7 @@ fn sample<const D: usize>(
         2 => curvature.abs(),
         _ => 0.5 * (curvature.abs() + gap),
     };
-    let gradient = vector::norm(layer.gradients[place]);
+    let gradient = vector::norm(layer.gradients()[place]);
     Sample {
         distance,
         element: layer.kernel.value(distance) * gradient,

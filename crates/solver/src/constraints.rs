@@ -1,7 +1,7 @@
 //! Perimeter and volume held at targets, by Lagrange multipliers inside the minimization of each step.
 //!
 //! With `C` the perimeter and the volume of the zero set ([`geometry::zero_set`]) and `C*` their targets, a step minimizes its energy `E`
-//! under `C(u) = C*`. All iterates fulfil that, so that the energy alone says which is better:
+//! under `C(u) = C*`. All iterates fulfil that, up to what the multipliers correct, so that the energy alone says which is better:
 //!
 //! - Conjugate gradients solve `H p = -(g + A lambda)` for motions with `A^T p = 0`, `A` being the gradients of `C`, `g` that of `E`, and
 //!   `H` the second derivative of `E + lambda C`. For that the preconditioner `P` is projected, `P - P A (A^T P A)^-1 A^T P`, whose spectrum
@@ -20,9 +20,11 @@ use serde::{Deserialize, Serialize};
 use crate::cg::{CgExit, CgLimits, CgSolution, conjugate_gradients, dot};
 use crate::{Error, Objective, Region};
 
-/// What is held, relative to the target, in double precision.
+/// How exactly targets are met in the end, relative to them, in double precision.
 const TOLERANCE: f64 = 1e-12;
-/// The same in units of the precision of the device.
+/// The same during the minimization: energies are corrected for what is missing.
+const ITERATES: f64 = 1e-7;
+/// The least of both in units of the precision of the device.
 const ROUNDINGS: f64 = 16.0;
 /// Root mean square of motions that are nothing but the noise of restoring, in units of the tolerance.
 const NOISE: f64 = 100.0;
@@ -30,6 +32,8 @@ const NOISE: f64 = 100.0;
 const CORRECTIONS: usize = 16;
 /// Longest displacement of one correction, in units of `4 eps / 3`.
 const LONGEST: f64 = 0.5;
+/// After shorter ones the derivatives of the measures are not computed again, in the same units.
+const NEAR: f64 = 0.02;
 /// Gradients that differ by less than this part are the same constraint.
 const DEPENDENT: f64 = 1e-12;
 /// Balls that are measured are round to this part of their perimeter.
@@ -200,14 +204,17 @@ impl<'a, const D: usize> Held<'a, D> {
             .sum()
     }
 
-    /// The phase field near `u` that fulfils the constraints, if there is one. Moves it by displacements of the interface;
-    /// `hold` puts back what may not move.
+    /// The phase field near `u` that fulfils the constraints well enough for an iterate, or `exactly`, if there is one. Moves it by displacements
+    /// of the interface; `hold` puts back what may not move.
     pub(crate) fn restored(
         &self,
         mut u: Tensor<D>,
+        exactly: bool,
         hold: impl Fn(Tensor<D>) -> Tensor<D>,
     ) -> Result<Option<Place<D>>, Error> {
-        let tolerance = self.tolerance();
+        let exact = self.tolerance();
+        let tolerance = if exactly { exact } else { exact.max(ITERATES) };
+        let mut found: Option<Correction> = None;
         for _ in 0..CORRECTIONS {
             let values = self.device.values(u.clone())?;
             let Ok(field) = Field::from_values(self.grid, values) else {
@@ -218,9 +225,12 @@ impl<'a, const D: usize> Held<'a, D> {
                 let tangent = Some(tangent);
                 return Ok(Some(Place { u, tangent }));
             }
-            let Some(motion) = self.correction(&tangent) else {
+            let correction = found.unwrap_or_else(|| self.correction(&tangent));
+            let Some((motion, is_short)) = correction.motion(&tangent) else {
                 return Ok(None);
             };
+            // Near the targets the derivatives change little.
+            found = is_short.then_some(correction);
             let motion = self.device.tensor(&motion, self.grid.shape());
             u = hold(retract(&u, &motion, 1.0));
         }
@@ -248,12 +258,14 @@ impl<'a, const D: usize> Held<'a, D> {
 
     fn tangent(&self, u: Field<D>) -> Result<Tangent<D>, Error> {
         let sizes = Sizes::of(&u, self.eps)?;
-        let values = [sizes.perimeter(), sizes.volume()];
-        let held = self.targets.iter().zip(values).enumerate();
-        let parts = held.filter_map(|(measure, (target, value))| {
+        let held = self.targets.iter().enumerate();
+        let parts = held.filter_map(|(measure, target)| {
             target.map(|target| Part {
                 measure,
-                value,
+                value: match measure {
+                    0 => sizes.perimeter(),
+                    _ => sizes.volume(),
+                },
                 target,
             })
         });
@@ -299,40 +311,21 @@ impl<'a, const D: usize> Held<'a, D> {
         values
     }
 
-    /// The motion to first order that restores the constraints; none if they depend on each other, or on nothing that may move.
-    fn correction(&self, tangent: &Tangent<D>) -> Option<Vec<f64>> {
+    /// The motions that restore the constraints at a phase field, with what they change.
+    fn correction(&self, tangent: &Tangent<D>) -> Correction {
         let parts = &tangent.parts;
-        let gradients: Vec<_> = parts
-            .iter()
-            .map(|part| self.gradient(tangent, *part))
-            .collect();
         let motions: Vec<_> = parts
             .iter()
             .map(|part| self.motion(tangent, *part))
             .collect();
-        let factors = solve(
-            parts.len(),
-            |row| parts[row].target - parts[row].value,
-            |row, column| product(&gradients[row], &motions[column]),
-        )?;
-        let mut motion = vec![0.0; tangent.u.values().len()];
-        for (direction, factor) in motions.iter().zip(factors) {
-            for (sum, value) in motion.iter_mut().zip(direction) {
-                *sum += factor * value;
+        let mut changes = [[0.0; 2]; 2];
+        for (row, part) in changes.iter_mut().zip(parts) {
+            let gradient = self.gradient(tangent, *part);
+            for (change, motion) in row.iter_mut().zip(&motions) {
+                *change = product(&gradient, motion);
             }
         }
-        // On the interface, where 1 - u^2 > 1/2, the displacement is the motion over 1 - u^2.
-        let wells = tangent.u.values().iter().map(|u| 1.0 - u * u);
-        let shifts = motion.iter().zip(wells).filter(|(_, well)| *well > 0.5);
-        let longest = shifts.fold(0.0, |longest: f64, (motion, well)| {
-            longest.max((motion / well).abs())
-        });
-        if longest > LONGEST {
-            for value in &mut motion {
-                *value *= LONGEST / longest;
-            }
-        }
-        Some(motion)
+        Correction { motions, changes }
     }
 
     /// The multipliers for which the Lagrangian does not change along the motions that restore the constraints.
@@ -355,7 +348,7 @@ impl<'a, const D: usize> Held<'a, D> {
     }
 
     /// Solves for the motion that minimizes the quadratic model of `objective`, with this gradient at its point, among those tangential to
-    /// the constraints. With `keep`, what is found out about the multipliers is remembered.
+    /// the constraints. With `keep`, what is found out about the multipliers is remembered; without, the motion only cleans the profile.
     pub(crate) fn solve(
         &mut self,
         objective: &mut impl Objective<D>,
@@ -384,7 +377,9 @@ impl<'a, const D: usize> Held<'a, D> {
         let projection = Projection::new(normals, precondition, self.device)?;
         let mut objective = Lagrangian {
             objective,
-            curvature: Arc::new(Curvature(tangent.sizes.second_derivative(multipliers))),
+            // To clean the profile, which is much stiffer, it is not needed.
+            curvature: keep
+                .then(|| Arc::new(Curvature(tangent.sizes.second_derivative(multipliers)))),
             region: self.region,
         };
         let projected = |r: &Tensor<D>| projection.apply(precondition(r));
@@ -400,6 +395,44 @@ impl<'a, const D: usize> Held<'a, D> {
             }
         }
         Ok(solution)
+    }
+}
+
+/// Motions of the interface, and the derivatives along them of what is held; the first index is that of the measure.
+struct Correction {
+    motions: Vec<Vec<f64>>,
+    changes: [[f64; 2]; 2],
+}
+
+impl Correction {
+    /// The motion to first order that restores the constraints, and whether it is short; none if they depend on each
+    /// other, or on nothing that may move.
+    fn motion<const D: usize>(&self, tangent: &Tangent<D>) -> Option<(Vec<f64>, bool)> {
+        let parts = &tangent.parts;
+        let factors = solve(
+            parts.len(),
+            |row| parts[row].target - parts[row].value,
+            |row, column| self.changes[row][column],
+        )?;
+        let mut motion = vec![0.0; tangent.u.values().len()];
+        for (direction, factor) in self.motions.iter().zip(factors) {
+            for (sum, value) in motion.iter_mut().zip(direction) {
+                *sum += factor * value;
+            }
+        }
+        // On the interface, where 1 - u^2 > 1/2, the displacement is the motion over 1 - u^2.
+        let wells = tangent.u.values().iter().map(|u| 1.0 - u * u);
+        let shifts = motion.iter().zip(wells).filter(|(_, well)| *well > 0.5);
+        let longest = shifts.fold(0.0, |longest: f64, (motion, well)| {
+            longest.max((motion / well).abs())
+        });
+        let is_short = longest <= NEAR;
+        if longest > LONGEST {
+            for value in &mut motion {
+                *value *= LONGEST / longest;
+            }
+        }
+        Some((motion, is_short))
     }
 }
 
@@ -510,7 +543,7 @@ impl<const D: usize> Projection<D> {
 /// An objective with the second derivative of the constraints, times multipliers, added to its own.
 struct Lagrangian<'a, const D: usize, O> {
     objective: &'a mut O,
-    curvature: Arc<Curvature<D>>,
+    curvature: Option<Arc<Curvature<D>>>,
     region: Option<&'a Region<D>>,
 }
 
@@ -542,8 +575,10 @@ impl<const D: usize, O: Objective<D>> Objective<D> for Lagrangian<'_, D, O> {
     }
 
     fn hessian_vector_product(&mut self, p: &Tensor<D>) -> Result<Tensor<D>, Error> {
-        let product = self.objective.hessian_vector_product(p)?;
-        let product = update_on_host(p, product, &self.curvature);
+        let mut product = self.objective.hessian_vector_product(p)?;
+        if let Some(curvature) = &self.curvature {
+            product = update_on_host(p, product, curvature);
+        }
         Ok(match self.region {
             Some(region) => region.project(product),
             None => product,

@@ -250,6 +250,7 @@ pub(crate) fn minimize_timed<const D: usize>(
         Method::Preconditioned => minimizer.preconditioned(start)?,
         Method::Paper => minimizer.paper()?,
     };
+    let u = minimizer.exact(u)?;
     let times = PhaseTimes {
         products: minimizer.objective.products.seconds(),
         preconditioner: minimizer.preconditioning.seconds(),
@@ -264,8 +265,19 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
     /// The phase field near `u` at which the energy counts; none if nothing near it fulfils the constraints.
     fn place(&self, u: Tensor<D>) -> Result<Option<Place<D>>, Error> {
         match &self.held {
-            Some(held) => held.restored(u, |u| self.objective.hold(u)),
+            Some(held) => held.restored(u, false, |u| self.objective.hold(u)),
             None => Ok(Some(Place { u, tangent: None })),
+        }
+    }
+
+    /// The phase field near `u` that fulfils the constraints exactly.
+    fn exact(&self, u: Tensor<D>) -> Result<Tensor<D>, Error> {
+        let Some(held) = &self.held else {
+            return Ok(u);
+        };
+        match held.restored(u.clone(), true, |u| self.objective.hold(u))? {
+            Some(place) => Ok(place.u),
+            None => Err(held.lost(&u)?),
         }
     }
 

@@ -147,16 +147,22 @@ fn sizes_of_balls_are_those_of_the_profile() {
 }
 
 fn flow<const D: usize>(u: &Field<D>, helfrich: Helfrich) -> WillmoreFlow<D> {
+    flow_by(Shipped::Accurate, u, helfrich)
+}
+
+/// A calibrated flow by a network of either recipe.
+fn flow_by<const D: usize>(recipe: Shipped, u: &Field<D>, helfrich: Helfrich) -> WillmoreFlow<D> {
     let ratios = Ratios {
         dimension: D,
         width: 17,
         eps_over_h: 2.0,
         step_over_h2: 1.0,
     };
-    let network = Shipped::Accurate.find(ratios).unwrap();
+    let network = recipe.find(ratios).unwrap();
     let calibration = network.calibration().unwrap();
     let mut params = params(u.grid());
     params.calibration = calibration.factors;
+    let network = network.odd_part();
     let mut flow = WillmoreFlow::with_network(&network, u, params, &device()).unwrap();
     flow.set_energy(helfrich, calibration.response()).unwrap();
     flow
@@ -265,9 +271,14 @@ fn balls_follow_the_ordinary_differential_equation() {
 }
 
 /// The radius at rest, over the exact one.
-fn at_rest<const D: usize>(grid: Grid<D>, start: f64, helfrich: Helfrich, expected: f64) -> f64 {
+fn at_rest<const D: usize>(
+    recipe: Shipped,
+    (grid, start): (Grid<D>, f64),
+    helfrich: Helfrich,
+    expected: f64,
+) -> f64 {
     assert!(speed(D, helfrich, expected).abs() < 1e-9);
-    let mut flow = flow(&ball(grid, start), helfrich);
+    let mut flow = flow_by(recipe, &ball(grid, start), helfrich);
     for tau in [1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, 2e-3, 2e-3, 2e-3, 2e-3] {
         flow.advance(tau).unwrap();
     }
@@ -278,9 +289,17 @@ fn at_rest<const D: usize>(grid: Grid<D>, start: f64, helfrich: Helfrich, expect
 #[test]
 fn discs_come_to_rest_at_their_exact_radius() {
     let grid = Grid::<2>::per_unit(128, 1.0).unwrap();
-    for helfrich in [bent(5.0), bent(-5.0), stretched(12.5), pressed(62.5)] {
-        let ratio = at_rest(grid, 0.202, helfrich, 0.2);
-        println!("{helfrich:?}: {ratio:.5}");
+    let (accurate, papers) = (Shipped::Accurate, Shipped::Paper);
+    for (recipe, helfrich) in [
+        (accurate, bent(5.0)),
+        (accurate, bent(-5.0)),
+        (accurate, stretched(12.5)),
+        (accurate, pressed(62.5)),
+        // Its response to curvature is 3 % too small.
+        (papers, bent(5.0)),
+    ] {
+        let ratio = at_rest(recipe, (grid, 0.202), helfrich, 0.2);
+        println!("{recipe:?} {helfrich:?}: {ratio:.5}");
         assert!((ratio - 1.0).abs() < 0.01, "{helfrich:?}: {ratio}");
     }
 }
@@ -290,7 +309,7 @@ fn discs_come_to_rest_at_their_exact_radius() {
 fn balls_come_to_rest_at_their_spontaneous_curvature() {
     let error = |cells| {
         let grid = Grid::<3>::per_unit(cells, 1.0).unwrap();
-        1.0 - at_rest(grid, 0.24, bent(8.0), 0.25)
+        1.0 - at_rest(Shipped::Accurate, (grid, 0.24), bent(8.0), 0.25)
     };
     let [coarse, fine] = [error(32), error(44)];
     println!("{coarse:.5} {fine:.5}");

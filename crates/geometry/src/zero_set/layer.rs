@@ -1,6 +1,7 @@
 //! The distance variable near the zero set, and what its sums and differences are made of.
 
 use std::f64::consts::FRAC_2_SQRT_PI;
+use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
@@ -19,7 +20,7 @@ const WEIGHTS: [f64; 3] = [45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0];
 /// Neighbours along an axis in a difference.
 pub(super) const NEIGHBOURS: usize = 6;
 /// Work on fewer values than this is not worth another thread.
-const SHARE: usize = 1 << 13;
+pub(super) const SHARE: usize = 1 << 13;
 /// Place of a node that is not in the layer.
 const NOWHERE: u32 = u32::MAX;
 
@@ -65,7 +66,12 @@ impl Kernel {
 
     /// Its integral from `d` on: one deep inside, zero outside.
     pub(super) fn inside(self, d: f64) -> f64 {
-        self.sum(|width| 0.5 * libm::erfc(d / width))
+        // Beyond six widths the rest of the integral is below rounding.
+        self.sum(|width| match d / width {
+            t if t > 6.0 => 0.0,
+            t if t < -6.0 => 1.0,
+            t => 0.5 * libm::erfc(t),
+        })
     }
 
     /// The narrower Gaussian, which is positive.
@@ -76,6 +82,10 @@ impl Kernel {
 
 fn gaussian(d: f64, width: f64) -> f64 {
     let t = d / width;
+    if t.abs() > 6.5 {
+        // Below rounding.
+        return 0.0;
+    }
     0.5 * FRAC_2_SQRT_PI / width * (-t * t).exp()
 }
 
@@ -92,8 +102,7 @@ pub(super) struct Layer<const D: usize> {
     places: Vec<u32>,
     /// Along an axis, the nodes one to three spacings below and above.
     neighbours: Vec<[[usize; 2]; 3]>,
-    /// Gradients of the distance variable at the nodes of the layer.
-    pub(super) gradients: Vec<[f64; D]>,
+    gradients: OnceLock<Vec<[f64; D]>>,
 }
 
 impl<const D: usize> Layer<D> {
@@ -120,14 +129,17 @@ impl<const D: usize> Layer<D> {
             nodes: Vec::new(),
             places: vec![NOWHERE; grid.len()],
             neighbours: (0..n).map(around).collect(),
-            gradients: Vec::new(),
+            gradients: OnceLock::new(),
         };
         layer.find_nodes();
-        let gradient = |&node: &u32| layer.gradient(node as usize, |i| layer.distance[i]);
-        layer.gradients = (layer.nodes.par_iter().with_min_len(SHARE))
-            .map(gradient)
-            .collect();
         Ok(layer)
+    }
+
+    /// Gradients of the distance variable at the nodes of the layer, which the volume does not need.
+    pub(super) fn gradients(&self) -> &[[f64; D]] {
+        self.gradients.get_or_init(|| {
+            self.map(|place| self.gradient(self.nodes[place] as usize, |i| self.distance[i]))
+        })
     }
 
     /// Fills `nodes` and `places`.
@@ -251,8 +263,9 @@ impl<const D: usize> Layer<D> {
 
     /// Length or area of the zero set.
     pub(super) fn perimeter(&self) -> f64 {
+        let gradients = self.gradients();
         let element = |place: usize| match self.near(place) {
-            Some(d) => self.kernel.value(d) * vector::norm(self.gradients[place]),
+            Some(d) => self.kernel.value(d) * vector::norm(gradients[place]),
             None => 0.0,
         };
         self.grid.cell_volume() * reduce::sum(self.nodes.len(), element)
@@ -260,8 +273,9 @@ impl<const D: usize> Layer<D> {
 
     /// Unit vectors along the gradients; zero where there is none.
     pub(super) fn normals(&self) -> Vec<[f64; D]> {
+        let gradients = self.gradients();
         let unit = |place: usize| {
-            let gradient = self.gradients[place];
+            let gradient = gradients[place];
             vector::scale(
                 gradient,
                 vector::norm(gradient).max(f64::MIN_POSITIVE).recip(),

@@ -1,8 +1,10 @@
 //! Perimeter and volume as functions of the nodal values, with their derivatives.
 
+use std::sync::OnceLock;
+
 use rayon::prelude::*;
 
-use super::layer::{Layer, NEIGHBOURS};
+use super::layer::{Layer, NEIGHBOURS, SHARE};
 use crate::{Error, Field, vector};
 
 /// Perimeter and volume of the zero set as functions of the nodal values, at one phase field: values, gradients, and products with
@@ -11,9 +13,11 @@ use crate::{Error, Field, vector};
 /// Derivatives are those of the sums, by adjoint differences: `<gradient, p>` is the derivative along `p` to rounding.
 pub struct Sizes<const D: usize> {
     layer: Layer<D>,
-    normals: Vec<[f64; D]>,
     /// First and second derivative of the distance variable by the value at the node, at the places of the layer.
     slopes: Vec<[f64; 2]>,
+    normals: OnceLock<Vec<[f64; D]>>,
+    /// Derivatives of perimeter and volume by the distance variable, at the places of the layer.
+    by_distance: [OnceLock<Vec<f64>>; 2],
 }
 
 impl<const D: usize> Sizes<D> {
@@ -35,9 +39,10 @@ impl<const D: usize> Sizes<D> {
             [slope, slope * 2.0 * u / well]
         });
         Ok(Self {
-            normals: layer.normals(),
             layer,
             slopes,
+            normals: OnceLock::new(),
+            by_distance: Default::default(),
         })
     }
 
@@ -53,18 +58,19 @@ impl<const D: usize> Sizes<D> {
 
     /// Derivatives of the perimeter by the nodal values.
     pub fn perimeter_gradient(&self) -> Vec<f64> {
-        self.gradient([1.0, 0.0])
+        self.gradient(self.perimeter_by_distance())
     }
 
     /// Derivatives of the volume by the nodal values.
     pub fn volume_gradient(&self) -> Vec<f64> {
-        self.gradient([0.0, 1.0])
+        self.gradient(self.volume_by_distance())
     }
 
     /// The mean curvature `k` at the nodes with a weight, zero elsewhere.
     pub fn mean_curvature(&self) -> Vec<f64> {
+        let normals = self.normals();
         self.spread(self.layer.map(|place| match self.layer.near(place) {
-            Some(_) => self.layer.divergence_at(place, &self.normals),
+            Some(_) => self.layer.divergence_at(place, normals),
             None => 0.0,
         }))
     }
@@ -75,38 +81,57 @@ impl<const D: usize> Sizes<D> {
         SizeHessian::new(self, weights)
     }
 
-    fn gradient(&self, weights: [f64; 2]) -> Vec<f64> {
-        let by_distance = self.by_distance(weights);
-        let by_value = self
-            .slopes
-            .iter()
-            .zip(by_distance)
-            .map(|([slope, _], d)| slope * d);
-        self.spread(by_value.collect())
+    fn gradient(&self, by_distance: &[f64]) -> Vec<f64> {
+        let pairs = self.slopes.iter().zip(by_distance);
+        self.spread(pairs.map(|([slope, _], d)| slope * d).collect())
+    }
+
+    fn normals(&self) -> &[[f64; D]] {
+        self.normals.get_or_init(|| self.layer.normals())
+    }
+
+    fn perimeter_by_distance(&self) -> &[f64] {
+        self.by_distance[0].get_or_init(|| {
+            let (layer, kernel) = (&self.layer, self.layer.kernel);
+            let (normals, gradients) = (self.normals(), layer.gradients());
+            let fluxes = layer.map(|place| match layer.near(place) {
+                Some(d) => vector::scale(normals[place], kernel.value(d)),
+                None => [0.0; D],
+            });
+            layer.map(|place| {
+                let own = (layer.near(place))
+                    .map_or(0.0, |d| kernel.slope(d) * vector::norm(gradients[place]));
+                layer.grid.cell_volume() * (own - layer.divergence_at(place, &fluxes))
+            })
+        })
+    }
+
+    fn volume_by_distance(&self) -> &[f64] {
+        self.by_distance[1].get_or_init(|| {
+            let layer = &self.layer;
+            layer.map(|place| {
+                let weight = |d| -layer.grid.cell_volume() * layer.kernel.value(d);
+                layer.near(place).map_or(0.0, weight)
+            })
+        })
     }
 
     /// Derivatives of `weights[0] perimeter + weights[1] volume` by the distance variable, at the places of the layer.
-    fn by_distance(&self, [perimeter, volume]: [f64; 2]) -> Vec<f64> {
-        let (layer, kernel, cell) = (
-            &self.layer,
-            self.layer.kernel,
-            self.layer.grid.cell_volume(),
-        );
-        // Without the perimeter there is nothing to differentiate.
-        let fluxes = (perimeter != 0.0).then(|| {
-            layer.map(|place| match layer.near(place) {
-                Some(d) => vector::scale(self.normals[place], perimeter * kernel.value(d)),
-                None => [0.0; D],
-            })
-        });
-        layer.map(|place| {
-            let own = layer.near(place).map_or(0.0, |d| {
-                let gradient = vector::norm(layer.gradients[place]);
-                perimeter * kernel.slope(d) * gradient - volume * kernel.value(d)
-            });
-            let around = fluxes.as_ref();
-            cell * (own - around.map_or(0.0, |fluxes| layer.divergence_at(place, fluxes)))
-        })
+    fn by_distance(&self, weights: [f64; 2]) -> Vec<f64> {
+        let mut sums = vec![0.0; self.layer.nodes.len()];
+        for (k, weight) in weights.into_iter().enumerate() {
+            // What is not asked for is not computed.
+            if weight != 0.0 {
+                let values = match k {
+                    0 => self.perimeter_by_distance(),
+                    _ => self.volume_by_distance(),
+                };
+                for (sum, value) in sums.iter_mut().zip(values) {
+                    *sum += weight * value;
+                }
+            }
+        }
+        sums
     }
 
     /// Second derivatives at one node with a weight: by the distance variable, by that and the gradient along the normal, and by the
@@ -118,7 +143,7 @@ impl<const D: usize> Sizes<D> {
             self.layer.grid.cell_volume(),
         );
         let d = layer.near(place).unwrap_or(f64::INFINITY);
-        let gradient = vector::norm(layer.gradients[place]).max(f64::MIN_POSITIVE);
+        let gradient = vector::norm(layer.gradients()[place]).max(f64::MIN_POSITIVE);
         let own = perimeter * kernel.curvature(d) * gradient - volume * kernel.slope(d);
         [
             own,
@@ -144,8 +169,8 @@ impl<const D: usize> Sizes<D> {
 /// `y` and `F` are what the derivatives by `d` and by `grad d` change with `x` and `grad x`.
 pub struct SizeHessian<const D: usize> {
     sites: Vec<Site<D>>,
-    /// Weights of the neighbours in a difference.
-    weights: [f64; NEIGHBOURS],
+    /// Weights of the neighbours in a difference; none for the volume alone, whose second derivative is diagonal.
+    weights: Option<[f64; NEIGHBOURS]>,
 }
 
 /// One node, and what it contributes.
@@ -180,7 +205,7 @@ impl<const D: usize> SizeHessian<D> {
                 places.push(place);
             }
         }
-        let first = sizes.by_distance(weights);
+        let (first, normals) = (sizes.by_distance(weights), sizes.normals());
         let site_of = |place: u32| sites_of.get(place as usize).copied().unwrap_or(u32::MAX);
         let site = |&place: &usize| {
             let [slope, curvature] = sizes.slopes[place];
@@ -189,7 +214,7 @@ impl<const D: usize> SizeHessian<D> {
                 around: around[place].map(|axis| axis.map(site_of)),
                 slope,
                 bent: first[place] * curvature,
-                normal: sizes.normals[place],
+                normal: normals[place],
                 second: if active[place] {
                     sizes.second_at(place, weights)
                 } else {
@@ -198,8 +223,8 @@ impl<const D: usize> SizeHessian<D> {
             }
         };
         Self {
-            sites: places.iter().map(site).collect(),
-            weights: layer.weights(),
+            sites: places.par_iter().with_min_len(SHARE).map(site).collect(),
+            weights: (weights[0] != 0.0).then(|| layer.weights()),
         }
     }
 
@@ -207,22 +232,21 @@ impl<const D: usize> SizeHessian<D> {
     pub fn multiply(&self, p: impl Fn(usize) -> f64 + Sync, mut add: impl FnMut(usize, f64)) {
         let sites = &self.sites;
         let of = |site: &Site<D>| p(site.node as usize);
-        let shifts: Vec<f64> = sites.iter().map(|site| site.slope * of(site)).collect();
-        let changes = map(sites, |index, site| {
-            site.change(shifts[index], &shifts, &self.weights)
-        });
-        let products = map(sites, |index, site| {
-            let (own, _) = changes[index];
-            let mut divergence = 0.0;
-            for (axis, around) in site.around.iter().enumerate() {
-                for (weight, other) in self.weights.iter().zip(around) {
-                    if let Some((_, flux)) = changes.get(*other as usize) {
-                        divergence += weight * flux[axis];
-                    }
-                }
+        let products = match &self.weights {
+            None => map(sites, |_, site| {
+                (site.slope * site.second[0] * site.slope + site.bent) * of(site)
+            }),
+            Some(weights) => {
+                let shifts: Vec<f64> = sites.iter().map(|site| site.slope * of(site)).collect();
+                let changes = map(sites, |index, site| {
+                    site.change(shifts[index], &shifts, weights)
+                });
+                map(sites, |index, site| {
+                    let own = changes[index].0 - site.divergence(&changes, weights);
+                    site.slope * own + site.bent * of(site)
+                })
             }
-            site.slope * (own - divergence) + site.bent * of(site)
-        });
+        };
         for (site, product) in sites.iter().zip(products) {
             add(site.node as usize, product);
         }
@@ -250,6 +274,19 @@ impl<const D: usize> Site<D> {
         );
         (own * shift + mixed * along, flux)
     }
+
+    /// The divergence of what the derivatives by the gradient change.
+    fn divergence(&self, changes: &[(f64, [f64; D])], weights: &[f64; NEIGHBOURS]) -> f64 {
+        let mut sum = 0.0;
+        for (axis, around) in self.around.iter().enumerate() {
+            for (weight, other) in weights.iter().zip(around) {
+                if let Some((_, flux)) = changes.get(*other as usize) {
+                    sum += weight * flux[axis];
+                }
+            }
+        }
+        sum
+    }
 }
 
 /// A function of the sites, in parallel if there are many.
@@ -257,7 +294,6 @@ fn map<const D: usize, T: Send>(
     sites: &[Site<D>],
     f: impl Fn(usize, &Site<D>) -> T + Send + Sync,
 ) -> Vec<T> {
-    const SHARE: usize = 1 << 13;
     let sites = sites.par_iter().with_min_len(SHARE).enumerate();
     sites.map(|(index, site)| f(index, site)).collect()
 }
