@@ -341,7 +341,7 @@ pub struct FlowOptions {
 
     /// Time steps: controlled (of second order, by their error), auto (by the energy), auto:FIRST, VALUE, doubling:FIRST,
     /// graded:FIRST,PART (of the time reached), growing:VALUE,COUNT, which doubles after so many, or ramp:VALUE,HALVINGS, whose first
-    /// step is divided [default: controlled; inpaint: a ramp; fair: doubling]
+    /// step is divided [default: controlled; inpaint: a ramp; fair: graded]
     #[arg(long, value_name = "TAU")]
     pub tau: Option<StepRule>,
 

@@ -38,7 +38,10 @@ impl FlowCommand for FairOptions {
         let usual = if self.ends {
             StepRule::Controlled
         } else {
-            StepRule::Doubling(f64::NAN)
+            StepRule::Graded {
+                first: f64::NAN,
+                part: Fairing::GROWTH,
+            }
         };
         self.flow.check_tolerance(usual)?;
         if let Some(ratio) = self.energy_ratio.filter(|ratio| *ratio >= 1.0) {
@@ -131,8 +134,10 @@ impl FlowCommand for FairOptions {
     fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
         if self.noise.is_some() {
             let spacing = scales.eps / self.flow.scheme.eps_over_h();
-            let first = Fairing::first_step(spacing);
-            self.flow.tau.get_or_insert(StepRule::Doubling(first));
+            self.flow.tau.get_or_insert(StepRule::Graded {
+                first: Fairing::first_step(spacing),
+                part: Fairing::GROWTH,
+            });
         }
         self.flow.rule(scales, unit)
     }
