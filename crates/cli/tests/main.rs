@@ -7,6 +7,7 @@ mod disks;
 mod examples;
 #[cfg(unix)]
 mod killed;
+mod own;
 mod page;
 mod refusals;
 #[cfg(unix)]

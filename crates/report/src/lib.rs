@@ -66,7 +66,7 @@ mod surface;
 mod table;
 
 pub use axis::Axis;
-pub use colour::{Colour, OKABE_ITO};
+pub use colour::{Colour, OKABE_ITO, viridis};
 pub use error::{Error, Result};
 pub use figure::Figure;
 pub use heatmap::Heatmap;

@@ -9,6 +9,7 @@ use super::flow::{FlowCommand, Shared};
 use crate::cli::{FairOptions, MeshFormat, SayOptions, SizeTarget};
 use crate::error::Error;
 use crate::input::{self, Loaded};
+use crate::keep::Keep;
 use crate::own::{Noise, OwnMesh};
 
 /// Energies below this have only balls, which have `8 pi`.
@@ -82,6 +83,9 @@ impl FlowCommand for FairOptions {
             return Err(Error::options(
                 "--repair makes a new mesh: write it by `willmore sample --repair --save`, which can then be faired, or give --remesh",
             ));
+        }
+        if let Some(mask) = self.keep.as_deref().and_then(Keep::mask) {
+            self.keep = Some(input::absolute(mask)?.to_string_lossy().into_owned());
         }
         let bytes = std::fs::read(&path).map_err(Error::io("read", &path))?;
         let noise = match self.noise {
