@@ -131,7 +131,8 @@ const COMPLETIONS_EXAMPLES: &str =
 #[serde(rename_all = "kebab-case")]
 pub struct InputOptions {
     /// A mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), a field (.npy, .vti), builtin:NAME with
-    /// NAME one of disc, ring, cross, rectangle, sphere, cube, torus, coin, figure, lever, or a region as box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z
+    /// NAME one of disc, ring, cross, rectangle, sphere, cube, torus, coin, figure, lever, a region as box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z,
+    /// or - for standard input
     pub input: Option<String>,
 
     /// Cells per unit length of the box [default: 128 in 2D, 64 in 3D; of a mesh or image the first that hold its thin parts]
@@ -227,7 +228,7 @@ pub struct KeepOptions {
     #[serde(skip)]
     pub output: Option<PathBuf>,
 
-    /// Write the result to this file too: a mesh (.ply, .obj, .stl) in space, a picture (.png, .svg) in the plane
+    /// Write the result to this file too: a mesh (.ply, .obj, .stl) in space, a picture (.png, .svg) in the plane, - for standard output
     #[arg(long, value_name = "FILE")]
     pub save: Option<PathBuf>,
 
@@ -342,7 +343,7 @@ pub struct FlowOptions {
 
     /// Time steps: controlled (of second order, by their error), auto (by the energy), auto:FIRST, VALUE, doubling:FIRST,
     /// graded:FIRST,PART (of the time reached), growing:VALUE,COUNT, which doubles after so many, or ramp:VALUE,HALVINGS, whose first
-    /// step is divided [default: controlled; inpaint: a ramp; fair: doubling]
+    /// step is divided [default: controlled; inpaint: a ramp; fair: graded]
     #[arg(long, value_name = "TAU")]
     pub tau: Option<StepRule>,
 
@@ -417,7 +418,8 @@ pub struct FairOptions {
     #[arg(long, value_name = "PART", allow_hyphen_values = true)]
     pub energy_ratio: Option<f64>,
 
-    /// Leave everything in this region where it is: box:x0,y0,z0,x1,y1,z1 or ball:x,y,z,r in the coordinates of the mesh
+    /// Leave this where it is: everything in box:x0,y0,z0,x1,y1,z1, in ball:x,y,z,r or inside a closed mesh (.obj, .stl, .ply), in the
+    /// coordinates of the input, or its vertices of a colour, as colour:ff0000
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub keep: Option<String>,
 

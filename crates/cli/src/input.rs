@@ -6,7 +6,8 @@ use geometry::measure::BoundingBox;
 use geometry::npy::{self, NpyError};
 use geometry::vti::{self, VtiError};
 use geometry::{
-    Field, Grid, Placement, SignedDistance, UpAxis, optimal_profile, phase_field, thin_part,
+    Field, Grid, Placement, SignedDistance, UpAxis, distance_from_phase_field, optimal_profile,
+    phase_field, thin_part,
 };
 use images::{Frame, Image, Outline, OutlineDistance, Side, Threshold, Tones};
 use surfaces::shapes::{self, BuiltIn, Region};
@@ -132,6 +133,18 @@ pub fn mesh_file(options: &mut InputOptions) -> Result<Option<PathBuf>, Error> {
         }
         _ => None,
     })
+}
+
+/// The usual format of what becomes of an input: that of a mesh, otherwise PLY in space and PNG in the plane.
+pub fn usual_format(input: &str) -> Result<String, Error> {
+    let in_plane = match Source::of(input)? {
+        Source::Mesh(path) => return Ok(extension(&path)),
+        Source::Image(_) => true,
+        Source::Field(path) => is_planar(&path)?,
+        Source::BuiltIn(name) => shapes::dimension(name)? == 2,
+        Source::Region(region) => region.dimension() == 2,
+    };
+    Ok(if in_plane { "png" } else { "ply" }.to_owned())
 }
 
 /// The closed mesh in a file, possibly after a repair.
@@ -282,7 +295,6 @@ impl Source<'_> {
             ("--holds", options.holds.is_some(), is_field),
             ("--repair", options.repair, matches!(self, Self::Mesh(_))),
             ("--side-length", options.side_length.is_some(), has_side),
-            ("--cells", options.cells.is_some(), !is_field),
             ("--box-side", options.box_side.is_some(), !is_vti),
         ] {
             if given && !allowed {
@@ -549,17 +561,40 @@ impl Reader<'_> {
             let side = *self.options.box_side.get_or_insert(side);
             npy::read(path, |cells| Grid::centred(cells, side))?
         };
-        if holds == Holds::Distance {
-            let eps = self.eps_over_h * field.grid().spacing();
-            return Ok(field.map(|s| optimal_profile(s, eps)));
-        }
-        match field.values().iter().find(|u| u.abs() > LARGEST_PHASE) {
-            None => Ok(field),
-            Some(value) => Err(Error::options(format!(
+        let outside = |u: &&f64| u.abs() > LARGEST_PHASE;
+        if let Some(value) = field
+            .values()
+            .iter()
+            .find(outside)
+            .filter(|_| holds == Holds::PhaseField)
+        {
+            return Err(Error::options(format!(
                 "{} holds the value {value}, which no phase field has; give --holds distance if these are signed distances",
                 path.display()
-            ))),
+            )));
         }
+        let eps = self.eps_over_h * field.grid().spacing();
+        let distance = match (holds, self.options.cells) {
+            (Holds::PhaseField, None) => return Ok(field),
+            (Holds::PhaseField, Some(_)) => field.map(|u| distance_from_phase_field(u, eps)),
+            (Holds::Distance, _) => field,
+        };
+        let distance = self.resampled(distance)?;
+        let eps = self.eps_over_h * distance.grid().spacing();
+        Ok(distance.map(|s| optimal_profile(s, eps)))
+    }
+
+    /// Distances in the same box with the number of cells that was chosen, interpolated linearly.
+    fn resampled<const D: usize>(&mut self, distance: Field<D>) -> Result<Field<D>, Error> {
+        if self.options.cells.is_none() {
+            return Ok(distance);
+        }
+        let (side, origin) = (distance.grid().side(), distance.grid().origin());
+        // A VTI file says itself how large the box is.
+        let box_side = self.options.box_side.replace(side);
+        let grid = self.grid::<D>()?.with_origin(origin)?;
+        self.options.box_side = box_side;
+        Ok(Field::from_fn(grid, |x| distance.interpolate(x)))
     }
 }
 

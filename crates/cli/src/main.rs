@@ -4,14 +4,17 @@ mod ansatz;
 mod cli;
 mod commands;
 mod config;
+mod displacement;
 mod error;
 mod input;
+mod keep;
 mod outlet;
 mod own;
 mod page;
 mod plane;
 mod run;
 mod say;
+mod standard;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -22,6 +25,7 @@ use crate::cli::{Cli, Command};
 use crate::commands::{check, flow, info, networks, resume, sample, shell, train};
 use crate::config::ParseError;
 use crate::error::Error;
+use crate::standard::Standard;
 
 /// Bad input, or failure.
 const FAILURE: u8 = 2;
@@ -53,9 +57,10 @@ fn main() -> ExitCode {
     })
 }
 
-fn execute(cli: Cli) -> Result<ExitCode, Error> {
+fn execute(mut cli: Cli) -> Result<ExitCode, Error> {
+    let standard = Standard::open(&mut cli.command, &mut cli.say)?;
     let say = cli.say;
-    match cli.command {
+    let code = match cli.command {
         Command::Flow(options) => flow::run(options, say, None),
         Command::Fair(options) => flow::run(options, say, None),
         Command::Inpaint(options) => flow::run(options, say, None),
@@ -68,5 +73,7 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Command::Train(options) => train::run(options, say),
         Command::Completions { shell } => Ok(shell::completions(shell)),
         Command::Man => shell::man(),
-    }
+    }?;
+    standard.write()?;
+    Ok(code)
 }

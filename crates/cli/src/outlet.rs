@@ -36,6 +36,8 @@ pub const START: &str = "start";
 pub const FINAL: &str = "final";
 /// The picture of the shape at the end.
 pub const PICTURE: &str = "final.png";
+/// How far the vertices of a mesh have gone.
+pub const DISPLACEMENT: &str = "final.displacement.svg";
 /// The folder of pictures of the shape in between.
 pub const FRAMES: &str = "frames";
 /// The frames one after the other.
@@ -206,7 +208,8 @@ impl Outlet<3> for Space {
 
     fn faired(&self, start: &Field<3>, u: &Field<3>, eps: f64) -> Result<Option<Faired>, Error> {
         let own = self.own.as_ref();
-        own.map(|own| own.faired(start, u, eps)).transpose()
+        own.map(|own| own.faired(start, u, eps, self.up))
+            .transpose()
     }
 
     fn measures(&self, start: &Field<3>, eps: f64) -> Result<Vec<Measure<3>>, Error> {
@@ -220,7 +223,7 @@ impl Outlet<3> for Space {
     }
 
     fn inputs(&self) -> Result<Vec<(&str, Vec<u8>)>, Error> {
-        Ok(self.own.iter().map(OwnMesh::input).collect())
+        Ok(self.own.as_ref().map_or(Vec::new(), OwnMesh::inputs))
     }
 
     fn restore(&mut self, stored: &StoredRun) -> Result<(), Error> {
@@ -253,6 +256,8 @@ pub fn write_final<const D: usize, O: Outlet<D>>(
         let name = format!("{FINAL}.{extension}");
         faired.write(&run.path().join(&name))?;
         run.adopt_file(&name)?;
+        let text = faired.displacement.to_svg()?;
+        run.write_file(DISPLACEMENT, |out| out.write_all(text.as_bytes()))?;
     } else {
         outlet.write_shape(u, eps, FINAL, format.unwrap_or_default(), run)?;
     }

@@ -6,14 +6,16 @@ use std::sync::Arc;
 
 use engine::{DISPLACEMENT, Measure, Stop};
 use geometry::file::write_atomically;
-use geometry::{Field, Placement, SignedDistance};
+use geometry::{Field, Placement, SignedDistance, UpAxis};
+use report::Figure;
 use runs::StoredRun;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use surfaces::shapes::Region;
 use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, root_mean_square};
 
+use crate::displacement;
 use crate::error::Error;
+use crate::keep::{Keep, key, moving_nodes};
 use crate::outlet::Topology;
 
 /// The name of the copy of the input, without its extension.
@@ -28,6 +30,9 @@ pub struct OwnMesh {
     noise: f64,
     /// What stays where it is, in the coordinates of the mesh.
     keep: Option<String>,
+    /// The name of the copy of the mask, if that is a mesh, and its bytes.
+    #[serde(skip)]
+    mask: Option<(String, Vec<u8>)>,
     #[serde(skip)]
     loaded: Option<Arc<Loaded>>,
 }
@@ -73,11 +78,20 @@ impl OwnMesh {
                 Noise::Of(length) => length,
                 Noise::Estimated => closed.mesh().noise(),
             },
+            mask: None,
             keep,
             loaded: None,
         };
+        if let Some(mask) = own.keep.as_deref().and_then(Keep::mask) {
+            let bytes = std::fs::read(mask).map_err(Error::io("read", mask))?;
+            own.mask = Some((Self::mask_file(mask), bytes));
+        }
         own.load(bytes, mesh, closed)?;
         Ok((own, warnings.iter().map(ToString::to_string).collect()))
+    }
+
+    fn mask_file(mask: &Path) -> String {
+        format!("keep.{}", crate::input::extension(mask))
     }
 
     fn load(
@@ -86,17 +100,19 @@ impl OwnMesh {
         mesh: TriangleMesh,
         closed: ClosedMesh,
     ) -> Result<(), Error> {
-        let region = self.region()?;
-        let fairing = Fairing::new(closed, self.noise, |x| {
-            (region.as_ref()).is_some_and(|region| region.signed_distance(x) <= 0.0)
-        });
+        let mask = self.mask.as_ref().map(|(_, bytes)| &bytes[..]);
+        let keep = self.keep.as_deref().map(|text| Keep::parse(text, mask));
+        let fairing = match keep.transpose()? {
+            Some(keep) => Fairing::new(closed, self.noise, keep.holds(&bytes, &self.file, &mesh)?),
+            None => Fairing::new(closed, self.noise, |_| false),
+        };
         let kept = fairing.keeps().iter().filter(|&&kept| kept).count();
         if kept == fairing.keeps().len() {
             return Err(Error::options(
                 "--keep contains all of the mesh: nothing could move",
             ));
         }
-        if region.is_some() && kept == 0 {
+        if self.keep.is_some() && kept == 0 {
             let bounds = fairing.rough().bounding_box();
             return Err(Error::options(format!(
                 "--keep contains no vertex of the mesh, which goes from {:?} to {:?}",
@@ -111,29 +127,29 @@ impl OwnMesh {
         Ok(())
     }
 
-    /// What is kept.
-    fn region(&self) -> Result<Option<Box<dyn SignedDistance<3>>>, Error> {
-        let Some(keep) = &self.keep else {
-            return Ok(None);
-        };
-        let region: Region = keep
-            .parse()
-            .map_err(|reason| Error::options(format!("--keep: {reason}")))?;
-        Ok(Some(region.shape::<3>()?))
-    }
-
     /// Takes the copy in the folder of a run.
     pub fn load_from(&mut self, stored: &StoredRun) -> Result<(), Error> {
         let path = stored.path().join(&self.file);
         let bytes = std::fs::read(&path).map_err(Error::io("read", &path))?;
         let mesh = surfaces::decode(&bytes, &path)?;
         let (closed, _) = ClosedMesh::new(mesh.clone())?;
+        if let Some(mask) = self.keep.as_deref().and_then(Keep::mask) {
+            let file = Self::mask_file(mask);
+            let path = stored.path().join(&file);
+            let bytes = std::fs::read(&path).map_err(Error::io("read", &path))?;
+            self.mask = Some((file, bytes));
+        }
         self.load(bytes, mesh, closed)
     }
 
-    /// The copy of the input for the folder of a run, and its name.
-    pub fn input(&self) -> (&str, Vec<u8>) {
-        (&self.file, self.loaded().bytes.clone())
+    /// The copies of the input and of the mask for the folder of a run, with their names.
+    pub fn inputs(&self) -> Vec<(&str, Vec<u8>)> {
+        let input = (&*self.file, self.loaded().bytes.clone());
+        let mask = self
+            .mask
+            .iter()
+            .map(|(name, bytes)| (&**name, bytes.clone()));
+        std::iter::once(input).chain(mask).collect()
     }
 
     fn loaded(&self) -> &Loaded {
@@ -150,13 +166,20 @@ impl OwnMesh {
         self.fairing().rough().bounding_box().longest_side()
     }
 
-    /// The nodes that may move: those outside of what is kept.
+    /// The nodes that may move, if not all.
     pub fn nodes(&self, field: &Field<3>) -> Result<Option<Vec<bool>>, Error> {
-        let grid = field.grid();
-        Ok(self.region()?.map(|region| {
-            (0..grid.len())
-                .map(|node| region.signed_distance(grid.node(node)) > 0.0)
-                .collect()
+        let (grid, fairing) = (field.grid(), self.fairing());
+        let Some(keep) = &self.keep else {
+            return Ok(None);
+        };
+        let mask = self.mask.as_ref().map(|(_, bytes)| &bytes[..]);
+        Ok(Some(match Keep::parse(keep, mask)? {
+            Keep::Inside(shape) => (0..grid.len())
+                .map(|node| shape.signed_distance(grid.node(node)) > 0.0)
+                .collect(),
+            Keep::Coloured(_) => {
+                moving_nodes(grid, &fairing.rough().mesh().vertices, fairing.keeps())
+            }
         }))
     }
 
@@ -165,7 +188,7 @@ impl OwnMesh {
         Topology::of(self.fairing().rough())
     }
 
-    /// How far the vertices have gone, root of the mean square.
+    /// How far the vertices have gone along the normals, root of the mean square.
     pub fn measure(&self, start: &Field<3>, eps: f64) -> Result<Measure<3>, Error> {
         let fairing = self.fairing().clone();
         let followed = fairing.follow(in_place()?, start, eps)?;
@@ -187,7 +210,13 @@ impl OwnMesh {
     }
 
     /// The mesh with the vertices where the phase field `u` has taken them.
-    pub fn faired(&self, start: &Field<3>, u: &Field<3>, eps: f64) -> Result<Faired, Error> {
+    pub fn faired(
+        &self,
+        start: &Field<3>,
+        u: &Field<3>,
+        eps: f64,
+        up: UpAxis,
+    ) -> Result<Faired, Error> {
         let Loaded {
             bytes,
             mesh,
@@ -195,21 +224,25 @@ impl OwnMesh {
         } = self.loaded();
         let followed = fairing.follow(in_place()?, start, eps)?;
         let moved = fairing.faired(&followed, u)?;
-        let key = |x: &[f64; 3]| x.map(|v| (v + 0.0).to_bits());
         let pairs = fairing.rough().mesh().vertices.iter().zip(&moved.vertices);
-        let goes: HashMap<_, _> = pairs.map(|(from, to)| (key(from), *to)).collect();
+        let goes: HashMap<_, _> = pairs.map(|(from, to)| (key(*from), *to)).collect();
         let all = TriangleMesh {
             // Vertices of no face stay.
             vertices: (mesh.vertices.iter())
-                .map(|x| goes.get(&key(x)).copied().unwrap_or(*x))
+                .map(|x| goes.get(&key(*x)).copied().unwrap_or(*x))
                 .collect(),
             faces: mesh.faces.clone(),
             normals: None,
         };
+        let pairs = fairing.rough().mesh().vertices.iter().zip(&moved.vertices);
+        let lengths: Vec<f64> = pairs
+            .map(|(a, b)| root_mean_square(&[*a], &[*b]).1)
+            .collect();
         Ok(Faired {
             extension: crate::input::extension(Path::new(&self.file)),
             file: surfaces::rewrite(bytes, &self.file, &all)?,
             mesh: all,
+            displacement: displacement::figure(&moved, &lengths, &followed.unresolved(), up)?,
             topology: self.topology(),
             report: self.report(&moved, followed.left_behind(u)?),
         })
@@ -252,6 +285,8 @@ pub struct Faired {
     pub extension: String,
     file: Vec<u8>,
     mesh: TriangleMesh,
+    /// How far its vertices have gone.
+    pub displacement: Figure,
     /// Parts and holes, which stay.
     pub topology: Topology,
     /// What has changed.

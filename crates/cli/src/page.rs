@@ -116,7 +116,13 @@ impl Files<'_> {
             view,
             meshes.iter().map(|(label, mesh)| (*label, mesh)),
         )?;
-        Ok(Some(section.with(viewer)))
+        section.push(viewer);
+        if let Some(bytes) = self.read(outlet::DISPLACEMENT)? {
+            let image = Image::from_bytes(outlet::DISPLACEMENT, &bytes)?;
+            let caption = "How far the vertices have gone, as colours and as a histogram.";
+            section.push(Figure::new(image, caption));
+        }
+        Ok(Some(section))
     }
 
     /// What shows the shape at the beginning: the mesh itself where its vertices follow the flow.

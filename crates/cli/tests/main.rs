@@ -8,6 +8,7 @@ mod energies;
 mod examples;
 #[cfg(unix)]
 mod killed;
+mod own;
 mod page;
 mod refusals;
 #[cfg(unix)]

@@ -195,8 +195,8 @@ fn every_mistake_is_one_clear_line() {
             "--holds has no meaning for an image",
         ),
         (
-            &["flow", "broken.npy", "--cells", "64"],
-            "--cells has no meaning for a field",
+            &["flow", "broken.npy", "--side-length", "1"],
+            "--side-length has no meaning for a field",
         ),
         (&["flow", "builtin:disc", "--output", "full"], "holds mine"),
         (

@@ -38,7 +38,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         energy: Helfrich::default(),
         held: Held::default(),
         flow: Flow::Willmore,
-        energy: Helfrich::default(),
         operator: Operator::new(accurate, &networks, &needed, &grid, &scales)?,
         scales,
         steps: StepRule::Doubling(Fairing::first_step(grid.spacing())).into(),

@@ -60,6 +60,8 @@ pub struct Scene {
     tubes: Vec<Tube>,
     /// A colour, and where it is: where the value at a vertex, interpolated, exceeds one half.
     highlight: Option<(Vec<f64>, Rgb)>,
+    /// Of the vertices of the surface, if it has not one for all.
+    painted: Option<Vec<Rgb>>,
     quality: Quality,
 }
 
@@ -96,6 +98,7 @@ impl Scene {
             transparent: false,
             tubes: Vec::new(),
             highlight: None,
+            painted: None,
             quality: Quality::default(),
         }
     }
@@ -149,6 +152,20 @@ impl Scene {
         Ok(self)
     }
 
+    /// Gives every vertex of the surface its own colour, interpolated between them.
+    ///
+    /// # Errors
+    /// There must be as many colours as vertices.
+    pub fn painted(mut self, colours: Vec<Rgb>) -> Result<Self, Error> {
+        let vertices = self.mesh.vertices.len() as f64;
+        let count = colours.len() as f64;
+        require("number of colours", count, "that of the vertices", |n| {
+            n.to_bits() == vertices.to_bits()
+        })?;
+        self.painted = Some(colours);
+        Ok(self)
+    }
+
     /// Sets how much is spent.
     #[must_use]
     pub fn quality(mut self, quality: Quality) -> Self {
@@ -183,6 +200,9 @@ impl Scene {
                 .map(Triangle::new)
                 .collect(),
             highlight: (self.highlight.as_ref()).map(|(mask, colour)| (&**mask, colour.linear())),
+            painted: (self.painted.iter().flatten())
+                .map(|colour| colour.linear())
+                .collect(),
             background: if self.transparent { [0.0; 4] } else { [1.0; 4] },
             per_side,
             model,
@@ -244,6 +264,8 @@ struct Drawing<'a> {
     arriving: Vec<[f64; 2]>,
     colours: Vec<[f32; 3]>,
     highlight: Option<(&'a [f64], [f32; 3])>,
+    /// Of the first vertices, if those have their own.
+    painted: Vec<[f32; 3]>,
     background: [f32; 4],
     camera: Camera,
     lights: Lights,
@@ -315,6 +337,10 @@ impl Drawing<'_> {
         let body = match (self.highlight, vertices[0].colour) {
             (Some((mask, colour)), 0) if mean(&|k| DVec3::splat(mask[corners[k]])).x > 0.5 => {
                 colour
+            }
+            (_, 0) if !self.painted.is_empty() => {
+                let colour = |k: usize| DVec3::from(self.painted[corners[k]].map(f64::from));
+                mean(&colour).to_array().map(|light| light as f32)
             }
             (_, colour) => self.colours[colour],
         };

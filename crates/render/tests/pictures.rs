@@ -246,6 +246,24 @@ fn a_mask_has_its_colour() {
     assert!(is_blue(56) && !is_blue(44));
 }
 
+#[test]
+fn vertices_have_the_colours_that_they_are_painted_with() {
+    let mesh = surfaces::phase_field_surface(&field(&ball([0.0; 3], 0.3)), EPS).unwrap();
+    let colour = |x: &[f64; 3]| {
+        if x[1] > 0.0 {
+            Rgb(30, 60, 200)
+        } else {
+            Rgb::CLAY
+        }
+    };
+    let colours: Vec<Rgb> = mesh.vertices.iter().map(colour).collect();
+    let scene = || Scene::of_mesh(mesh.clone()).view(view(0.0, 0.0));
+    let picture = scene().painted(colours).unwrap().render([100; 2]).unwrap();
+    let is_blue = |x| picture.pixel(x, 50)[2] > picture.pixel(x, 50)[0].saturating_add(40);
+    assert!(is_blue(56) != is_blue(44));
+    assert!(scene().painted(vec![Rgb::CLAY]).is_err());
+}
+
 /// Mean difference of all values, in levels.
 fn mean_difference(a: &Picture, b: &Picture) -> f64 {
     let [a, b] = [a, b].map(|picture| picture.pixels().as_flattened());

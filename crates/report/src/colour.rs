@@ -65,7 +65,7 @@ impl From<Rgb> for Colour {
 }
 
 /// The colour map viridis, perceptually uniform and dark to light, at `t` in `[0, 1]`; values outside are clamped, NaN is light grey.
-pub(crate) fn viridis(t: f64) -> Rgb {
+pub fn viridis(t: f64) -> Rgb {
     if t.is_nan() {
         return Rgb(200, 200, 200);
     }

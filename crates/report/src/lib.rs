@@ -69,7 +69,7 @@ mod svg;
 mod table;
 
 pub use axis::Axis;
-pub use colour::{Colour, OKABE_ITO};
+pub use colour::{Colour, OKABE_ITO, viridis};
 pub use error::{Error, Result};
 pub use figure::Figure;
 pub use heatmap::Heatmap;

@@ -57,6 +57,7 @@
 //! - Same input, same bytes, for any number of threads.
 
 mod closed;
+mod colours;
 mod distance;
 mod error;
 mod fairing;
@@ -80,6 +81,7 @@ mod vector;
 mod write;
 
 pub use closed::{ClosedMesh, Warning};
+pub use colours::vertex_colours;
 pub use distance::MeshDistance;
 pub use error::Error;
 use error::positive;

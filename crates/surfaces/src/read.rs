@@ -16,7 +16,7 @@ use error::FormatError;
 /// - OBJ: `v` and `f`, with relative indices; groups, normals, colours and everything else are
 ///   passed over.
 /// - PLY: ASCII and binary of both byte orders; `x y z` of `vertex`, with `nx ny nz` if they are
-///   there, and `vertex_indices` (or `vertex_index`) of `face`; everything else is passed over.
+///   there, and `vertex_indices` (or `vertex_index`) of `face` and of `tristrips`, where -1 ends a strip; everything else is passed over.
 /// - STL: binary and ASCII; corners with exactly equal coordinates become one vertex.
 ///
 /// Polygons are cut into triangles from their first corner, which is right for convex ones.

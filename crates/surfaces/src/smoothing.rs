@@ -191,7 +191,7 @@ impl TriangleMesh {
             .collect();
         let twice = umbrellas.laplacian(&umbrellas.laplacian(&x));
         // Normals of the smoothed mesh: noise turns those of the mesh itself, towards the plane of their neighbours.
-        let normals = self.smoothed(3, 0.5, -0.53).vertex_normals();
+        let normals = self.smoothed(12, 0.5, -0.53).vertex_normals();
         let mut weights = Vec::new();
         let mut sizes: Vec<f64> = (0..x.len())
             .filter(|&v| umbrellas.of_vertex(v).len() > 2)

@@ -285,6 +285,54 @@ fn ply_variants_are_understood() {
 }
 
 #[test]
+fn colours_of_vertices_are_read() {
+    let text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty TYPE red\n\
+                property TYPE green\nproperty TYPE blue\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+                0 0 0 1 0 0\n1 0 0 0 1 0\n0 1 0 0 0 1\n3 0 1 2\n";
+    let colours = |text: &str, name: &str| surfaces::vertex_colours(text.as_bytes(), name).unwrap();
+    let of = |level: u8| Some(vec![[level, 0, 0], [0, level, 0], [0, 0, level]]);
+    assert_eq!(colours(&text.replace("TYPE", "uchar"), "a.ply"), of(1));
+    assert_eq!(colours(&text.replace("TYPE", "float"), "a.ply"), of(255));
+    assert_eq!(
+        colours(
+            &text
+                .replace("TYPE blue", "int alpha")
+                .replace("TYPE", "uchar"),
+            "a.ply"
+        ),
+        None
+    );
+    let obj = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nf 1 2 3\n";
+    assert_eq!(colours(obj, "a.obj"), of(255));
+    assert_eq!(
+        colours(&obj.replace("v 1 0 0 0 1 0", "v 1 0 0"), "a.obj"),
+        None
+    );
+    assert_eq!(colours("solid a", "a.stl"), None);
+}
+
+/// A strip goes round its sides in turn, -1 begins the next one, and a vertex given twice turns it.
+#[test]
+fn ply_strips_are_triangles() {
+    let text = |strips: &str| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+             element tristrips 1\nproperty list int int vertex_indices\nend_header\n\
+             0 0 0\n1 0 0\n0 1 0\n0 0 1\n{strips}\n"
+        )
+    };
+    let apart = decode("ply", text("8 0 2 1 3 -1 0 1 3").as_bytes()).unwrap();
+    assert_eq!(apart.faces, [[0, 2, 1], [1, 2, 3], [0, 1, 3]]);
+    let closed = decode("ply", text("6 0 2 1 3 0 2").as_bytes()).unwrap();
+    assert_eq!(closed.faces, [[0, 2, 1], [1, 2, 3], [1, 3, 0], [0, 3, 2]]);
+    ClosedMesh::new(closed).unwrap();
+    let turned = decode("ply", text("5 0 2 1 1 3").as_bytes()).unwrap();
+    assert_eq!(turned.faces, [[0, 2, 1]]);
+    let message = problem("ply", text("4 0 2 1 4")).to_string();
+    assert!(message.contains("refers to vertex 4"), "{message}");
+}
+
+#[test]
 fn broken_ply_files_are_explained() {
     let text = String::from_utf8(ply("ascii")).unwrap();
     let message = |from: &str, to: &str| {
@@ -315,7 +363,7 @@ fn broken_ply_files_are_explained() {
         (
             "vertex_index",
             "indices",
-            "the header does not declare a list vertex_indices of face",
+            "the header does not declare a list vertex_indices of its faces",
         ),
         (
             "element vertex",
@@ -325,7 +373,7 @@ fn broken_ply_files_are_explained() {
         (
             "element face",
             "element patch",
-            "the header does not declare an element face",
+            "the header does not declare an element face or tristrips",
         ),
         (
             "1 1 0 0\n",

@@ -153,7 +153,7 @@ fn denoise<'a>(
     let faired = fair(session, &noisy, cells, &title)?;
     let fair = row("fair", None, faired, clock.elapsed().as_secs_f64());
     let mut rows = vec![row("noisy", None, noisy.clone(), 0.0)];
-    let mut curves = Vec::new();
+    let (mut curves, mut least_normals) = (Vec::new(), Vec::new());
     for (colour, method, factors) in [(1, "Taubin", TAUBIN), (2, "Laplacian", LAPLACIAN)] {
         let clock = Instant::now();
         let smoothed = |count| noisy.smoothed(count, factors[0], factors[1]);
@@ -165,6 +165,7 @@ fn denoise<'a>(
         let least = all[2..].iter().map(|q| q.normals).fold(f64::MAX, f64::min);
         let row = row(method, Some(best), smoothed(best), seconds);
         session.metric(&format!("{}.least_normals", row.key()), least)?;
+        least_normals.push(least);
         rows.push(row);
         let points = (1..).zip(&all);
         let curve = Series::of(method, points, |(k, quality)| [f64::from(k), quality.rms]);
@@ -172,6 +173,8 @@ fn denoise<'a>(
     }
     let ratio = fair.quality.rms / rows[1].quality.rms;
     session.metric(&format!("{}.fair_over_taubin", clean.key(noise)), ratio)?;
+    let ratio = fair.quality.normals / least_normals[0];
+    session.metric(&format!("{}.normals_over_taubin", clean.key(noise)), ratio)?;
     let level = |name, quality: &Quality| {
         let ends = [1.0, ITERATIONS as f64].map(|x| [x, quality.rms]);
         Series::new(name, ends)
@@ -292,7 +295,10 @@ fn fair(
         let gone = measured.0.displacement(&measured.1, u).ok();
         Ok(gone.map(|gone| gone * placement.scale()))
     });
-    let rule = StepRule::Doubling(Fairing::first_step(grid.spacing()));
+    let rule = StepRule::Graded {
+        first: Fairing::first_step(grid.spacing()),
+        part: Fairing::GROWTH,
+    };
     let case = Case {
         stops: vec![
             Stop::Time(fairing.time(grid.spacing(), placement.scale())),

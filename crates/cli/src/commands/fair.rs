@@ -9,6 +9,7 @@ use super::flow::{FlowCommand, Shared};
 use crate::cli::{FairOptions, FlowOptions, MeshFormat, SayOptions};
 use crate::error::Error;
 use crate::input::{self, Loaded};
+use crate::keep::Keep;
 use crate::own::{Noise, OwnMesh};
 
 /// Energies below this have only balls, which have `8 pi`.
@@ -38,7 +39,10 @@ impl FlowCommand for FairOptions {
         let usual = if self.ends {
             StepRule::Controlled
         } else {
-            StepRule::Doubling(f64::NAN)
+            StepRule::Graded {
+                first: f64::NAN,
+                part: Fairing::GROWTH,
+            }
         };
         self.flow.check_tolerance(usual)?;
         if let Some(ratio) = self.energy_ratio.filter(|ratio| *ratio >= 1.0) {
@@ -79,6 +83,9 @@ impl FlowCommand for FairOptions {
             return Err(Error::options(
                 "--repair makes a new mesh: write it by `willmore sample --repair --save`, which can then be faired, or give --remesh",
             ));
+        }
+        if let Some(mask) = self.keep.as_deref().and_then(Keep::mask) {
+            self.keep = Some(input::absolute(mask)?.to_string_lossy().into_owned());
         }
         let bytes = std::fs::read(&path).map_err(Error::io("read", &path))?;
         let noise = match self.noise {
@@ -127,8 +134,10 @@ impl FlowCommand for FairOptions {
     fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
         if self.noise.is_some() {
             let spacing = scales.eps / self.flow.scheme.eps_over_h();
-            let first = Fairing::first_step(spacing);
-            self.flow.tau.get_or_insert(StepRule::Doubling(first));
+            self.flow.tau.get_or_insert(StepRule::Graded {
+                first: Fairing::first_step(spacing),
+                part: Fairing::GROWTH,
+            });
         }
         self.flow.rule(scales, unit)
     }

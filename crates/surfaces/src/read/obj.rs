@@ -5,6 +5,7 @@
 
 use super::{FormatError, Polygons, position, shortened};
 use crate::TriangleMesh;
+use crate::colours::level;
 use crate::vector::Vector;
 
 /// Vertices and faces; all other statements are passed over.
@@ -38,6 +39,25 @@ pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
         vertices,
         normals: None,
     })
+}
+
+/// The colours behind the coordinates of the vertices, if all have some.
+pub(crate) fn colours(bytes: &[u8]) -> Option<Vec<[u8; 3]>> {
+    let text = String::from_utf8_lossy(bytes);
+    let vertices = text
+        .lines()
+        .filter_map(|line| line.trim_start().strip_prefix("v "));
+    let colour = |vertex: &str| {
+        let numbers: Option<Vec<f64>> = vertex
+            .split_whitespace()
+            .map(|word| word.parse().ok())
+            .collect();
+        match numbers?[..] {
+            [_, _, _, r, g, b] => Some([r, g, b].map(level)),
+            _ => None,
+        }
+    };
+    vertices.map(colour).collect()
 }
 
 /// The vertex of a corner `v`, `v/vt`, `v//vn` or `v/vt/vn`; negative ones count backwards from the

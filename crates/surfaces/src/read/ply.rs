@@ -8,22 +8,29 @@ use header::{Element, Header};
 
 use super::{FormatError, Polygons};
 use crate::TriangleMesh;
+use crate::colours::level;
+
+/// Elements that hold faces: polygons, and strips of triangles.
+const FACES: [&str; 2] = ["face", STRIPS];
+const STRIPS: &str = "tristrips";
 
 pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     let (header, begin) = Header::parse(bytes)?;
     let vertices = header.element("vertex").ok_or(FormatError::Undeclared {
         missing: "an element vertex",
     })?;
-    header.element("face").ok_or(FormatError::Undeclared {
-        missing: "an element face",
-    })?;
+    if FACES.iter().all(|name| header.element(name).is_none()) {
+        return Err(FormatError::Undeclared {
+            missing: "an element face or tristrips",
+        });
+    }
     let mut polygons = Polygons::new(vertices.count, 0)?;
     let mut mesh = TriangleMesh::default();
     let mut body = Body::new(&header, bytes, begin);
     for element in &header.elements {
         match element.name.as_str() {
             "vertex" => read_vertices(&mut body, element, &mut mesh)?,
-            "face" => read_faces(&mut body, element, &mut polygons)?,
+            name if FACES.contains(&name) => read_faces(&mut body, element, &mut polygons)?,
             _ => body.rows(element, |_, _| Ok(()))?,
         }
     }
@@ -71,14 +78,58 @@ fn read_faces(
         .into_iter()
         .find_map(|name| element.indices(name))
         .ok_or(FormatError::Undeclared {
-            missing: "a list vertex_indices of face",
+            missing: "a list vertex_indices of its faces",
         })?;
     let mut corners = Vec::new();
     body.rows(element, |face, row| {
         corners.clear();
         corners.extend(row[list].iter().map(|&index| index as i64));
+        if element.name == STRIPS {
+            return push_strips(polygons, face, &corners);
+        }
         polygons.push(face, &corners)
     })
+}
+
+/// Adds strips that end at an index of -1: every three vertices in a row are a triangle, every second one turned round. A vertex that is
+/// given twice, where a strip turns, makes none.
+fn push_strips(polygons: &mut Polygons, number: usize, indices: &[i64]) -> Result<(), FormatError> {
+    for strip in indices.split(|&index| index == -1) {
+        for (k, corners) in strip.windows(3).enumerate() {
+            let [a, b, c] = [corners[0], corners[1], corners[2]];
+            if a != b && b != c && c != a {
+                polygons.push(number, &if k % 2 == 0 { [a, b, c] } else { [b, a, c] })?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The colours of the vertices, if they have some.
+pub(crate) fn colours(bytes: &[u8]) -> Result<Option<Vec<[u8; 3]>>, FormatError> {
+    let (header, begin) = Header::parse(bytes)?;
+    let mut body = Body::new(&header, bytes, begin);
+    for element in &header.elements {
+        let columns = ["red", "green", "blue"].map(|name| element.scalar(name));
+        let ("vertex", [Some(r), Some(g), Some(b)]) = (element.name.as_str(), columns) else {
+            body.rows(element, |_, _| Ok(()))?;
+            continue;
+        };
+        let mut colours = Vec::with_capacity(element.count);
+        body.rows(element, |_, row| {
+            colours.push([r, g, b].map(|column| {
+                let value = row[column][0];
+                if element.properties[column].scalar.is_integer() {
+                    value as u8
+                } else {
+                    level(value)
+                }
+            }));
+            Ok(())
+        })?;
+        return Ok(Some(colours));
+    }
+    Ok(None)
 }
 
 /// The file with other coordinates of vertices, and other normals if it has some.

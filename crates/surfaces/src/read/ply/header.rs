@@ -79,7 +79,7 @@ impl Header {
                 "element" => {
                     let element = Element::parse(words);
                     let new = element.filter(|new| {
-                        let read = ["vertex", "face"].contains(&new.name.as_str());
+                        let read = ["vertex", "face", "tristrips"].contains(&new.name.as_str());
                         !(read && elements.iter().any(|known| known.name == new.name))
                     });
                     let new = new.ok_or_else(|| expected("a new element and its number"))?;

@@ -1,0 +1,118 @@
+//! `-` for standard input and output: files that stand for them while a command runs.
+
+use std::io::{Read, Write};
+use std::path::PathBuf;
+
+use crate::cli::{Command, InputOptions, SayOptions};
+use crate::error::Error;
+use crate::input::usual_format;
+
+/// The files, which are removed in the end.
+#[derive(Default)]
+pub struct Standard {
+    input: Option<PathBuf>,
+    output: Option<PathBuf>,
+}
+
+impl Standard {
+    /// Reads standard input if it is the input, and puts files in place of every `-` in the options.
+    pub fn open(command: &mut Command, say: &mut SayOptions) -> Result<Self, Error> {
+        let mut standard = Self::default();
+        let Some((input, save)) = paths(command) else {
+            return Ok(standard);
+        };
+        if input.input.as_deref() == Some("-") {
+            let mut bytes = Vec::new();
+            let name = "standard input";
+            let read = std::io::stdin().read_to_end(&mut bytes);
+            read.map_err(Error::io("read", name))?;
+            if bytes.is_empty() {
+                return Err(Error::options(
+                    "standard input is empty: pipe a mesh, an image or a field into it",
+                ));
+            }
+            let path = stand_in("input", kind(&bytes));
+            std::fs::write(&path, bytes).map_err(Error::io("write", &path))?;
+            input.input = Some(path.to_string_lossy().into_owned());
+            standard.input = Some(path);
+        }
+        let Some(save) = save.as_mut().filter(|path| path.as_os_str() == "-") else {
+            return Ok(standard);
+        };
+        if say.json {
+            return Err(Error::options(
+                "--json and --save - would both write to standard output: leave one out",
+            ));
+        }
+        say.quiet = true;
+        let format = usual_format(input.input.as_deref().unwrap_or_default())?;
+        *save = stand_in("output", &format);
+        standard.output = Some(save.clone());
+        Ok(standard)
+    }
+
+    /// Writes what was saved to standard output.
+    pub fn write(&self) -> Result<(), Error> {
+        let Some(path) = self.output.as_ref().filter(|path| path.exists()) else {
+            return Ok(());
+        };
+        let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
+        let written = std::io::stdout().write_all(&bytes);
+        written.map_err(Error::io("write", "standard output"))
+    }
+}
+
+impl Drop for Standard {
+    fn drop(&mut self) {
+        for path in self.input.iter().chain(&self.output) {
+            // There is none where the command failed before.
+            let _ = std::fs::remove_file(path);
+        }
+    }
+}
+
+/// The input of a command and the file that it writes, if it has these.
+fn paths(command: &mut Command) -> Option<(&mut InputOptions, &mut Option<PathBuf>)> {
+    match command {
+        Command::Flow(flow) => Some((&mut flow.input, &mut flow.keep.save)),
+        Command::Fair(fair) => Some((&mut fair.flow.input, &mut fair.flow.keep.save)),
+        Command::Inpaint(inpaint) => Some((&mut inpaint.flow.input, &mut inpaint.flow.keep.save)),
+        Command::Mcf(mcf) => Some((&mut mcf.input, &mut mcf.keep.save)),
+        Command::Sample(sample) => Some((&mut sample.input, &mut sample.save)),
+        _ => None,
+    }
+}
+
+/// A name that no other process has.
+fn stand_in(what: &str, format: &str) -> PathBuf {
+    let name = format!("willmore-{}-{what}.{format}", std::process::id());
+    std::env::temp_dir().join(name)
+}
+
+/// The usual extension of a file with these contents: OBJ, which is any text, if they are nothing else.
+fn kind(bytes: &[u8]) -> &'static str {
+    const BEGINNINGS: [(&[u8], &str); 12] = [
+        (b"ply", "ply"),
+        (b"solid", "stl"),
+        (b"\x89PNG", "png"),
+        (b"\xff\xd8", "jpg"),
+        (b"GIF8", "gif"),
+        (b"II*\0", "tif"),
+        (b"MM\0*", "tif"),
+        (b"RIFF", "webp"),
+        (b"BM", "bmp"),
+        (b"\x93NUMPY", "npy"),
+        (b"<?xml", "vti"),
+        (b"<VTKFile", "vti"),
+    ];
+    // A header of 80 bytes, the number of triangles, and 50 bytes for each of them.
+    let facets = bytes.get(80..84).and_then(|count| count.try_into().ok());
+    let length = facets.map(|count| 84 + 50 * u64::from(u32::from_le_bytes(count)));
+    if length == Some(bytes.len() as u64) {
+        return "stl";
+    }
+    let known = BEGINNINGS
+        .iter()
+        .find(|(beginning, _)| bytes.starts_with(beginning));
+    known.map_or("obj", |(_, kind)| kind)
+}

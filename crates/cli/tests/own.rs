@@ -1,0 +1,183 @@
+//! A person's own files: parts of a mesh that stay, standard input and output, fields on other grids.
+
+use std::fs::{self, File};
+use std::path::Path;
+
+use geometry::shapes::Ball;
+use geometry::{Grid, npy, phase_field};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use surfaces::TriangleMesh;
+
+use crate::common::{outcome, program, run, text};
+
+/// A ball of radius 3 about (1, 0, 0) with noise.
+fn noisy_ball() -> TriangleMesh {
+    let grid = Grid::<3>::centred(24, 1.0).unwrap();
+    let u = phase_field(grid, &Ball::new([0.0; 3], 0.4).unwrap(), 0.1).unwrap();
+    let mut mesh = surfaces::phase_field_surface(&u, 0.1).unwrap();
+    mesh.normals = None;
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    for x in &mut mesh.vertices {
+        let factor = 7.5 * (1.0 + 0.01 * rng.random_range(-1.7..1.7));
+        *x = [1.0 + factor * x[0], factor * x[1], factor * x[2]];
+    }
+    mesh
+}
+
+/// How many vertices moved, of which none may have been `kept`.
+fn moved(from: &TriangleMesh, to: &Path, kept: impl Fn([f64; 3]) -> bool) -> usize {
+    let to = surfaces::read(to).unwrap();
+    let pairs = from.vertices.iter().zip(&to.vertices);
+    let differ = |(a, b): &(&[f64; 3], &[f64; 3])| a.map(f64::to_bits) != b.map(f64::to_bits);
+    let moved: Vec<_> = pairs.filter(differ).map(|(a, _)| *a).collect();
+    assert!(!moved.iter().any(|x| kept(*x)), "a kept vertex moved");
+    moved.len()
+}
+
+#[test]
+fn a_mask_and_a_colour_keep_parts_of_a_mesh_and_the_page_shows_how_far_the_others_went() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let mesh = noisy_ball();
+    let right = |x: [f64; 3]| x[0] > 1.0;
+    let mut lines: Vec<String> = Vec::new();
+    for x in &mesh.vertices {
+        let [r, g] = if right(*x) { [1, 0] } else { [0, 1] };
+        lines.push(format!("v {} {} {} {r} {g} 0", x[0], x[1], x[2]));
+    }
+    for face in &mesh.faces {
+        let [a, b, c] = face.map(|v| v + 1);
+        lines.push(format!("f {a} {b} {c}"));
+    }
+    fs::write(at("ball.obj"), lines.join("\n")).unwrap();
+    let mut half = TriangleMesh::default();
+    let cube = |k: usize, axis: usize| f64::from(u8::from(k >> axis & 1 == 1));
+    half.vertices = (0..8)
+        .map(|k| {
+            [
+                1.0 + 5.0 * cube(k, 0),
+                10.0 * cube(k, 1) - 5.0,
+                10.0 * cube(k, 2) - 5.0,
+            ]
+        })
+        .collect();
+    half.faces = [
+        [0, 2, 1],
+        [1, 2, 3],
+        [4, 5, 6],
+        [5, 7, 6],
+        [0, 1, 4],
+        [1, 5, 4],
+    ]
+    .into_iter()
+    .chain([
+        [2, 6, 3],
+        [3, 6, 7],
+        [0, 4, 2],
+        [2, 4, 6],
+        [1, 3, 5],
+        [3, 7, 5],
+    ])
+    .collect();
+    surfaces::write(at("half.stl"), &half).unwrap();
+    for (keep, name) in [("half.stl", "mask"), ("colour:ff0000", "colour")] {
+        let fair = [
+            "fair", "ball.obj", "--cells", "40", "--steps", "2", "--noise", "0.03",
+        ];
+        let kept = ["--keep", keep, "--output", name];
+        outcome(folder.path(), &[&fair[..], &kept].concat());
+        let count = moved(&mesh, &at(name).join("final.obj"), right);
+        assert!(count > mesh.vertices.len() / 3, "{name}: {count}");
+        let html = fs::read_to_string(at(name).join("index.html")).unwrap();
+        assert!(html.contains("How far the vertices have gone"), "{name}");
+        let svg = fs::read_to_string(at(name).join("final.displacement.svg")).unwrap();
+        assert!(svg.contains("in the units of the mesh"), "{name}");
+    }
+    // The mask is in the folder: it takes nothing else to go on.
+    fs::remove_file(at("half.stl")).unwrap();
+    outcome(folder.path(), &["resume", "mask", "--steps", "3"]);
+    moved(&mesh, &at("mask/final.obj"), right);
+    for (keep, reason) in [
+        ("colour:red", "six hexadecimal digits"),
+        ("colour:0000ff", "contains no vertex"),
+        ("missing.ply", "cannot read"),
+        ("ball.obj", "contains all of the mesh"),
+    ] {
+        let refused = run(folder.path(), &["fair", "ball.obj", "--keep", keep]);
+        let said = text(&refused.stderr);
+        assert!(
+            !refused.status.success() && said.contains(reason),
+            "{keep}: {said}"
+        );
+    }
+}
+
+#[test]
+fn meshes_and_pictures_go_through_pipes() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for (shape, file) in [
+        ("sphere", "in.ply"),
+        ("sphere", "in.stl"),
+        ("disc", "in.png"),
+    ] {
+        let shape = format!("builtin:{shape}");
+        let sample = ["sample", &shape, "--cells", "32", "--save", file];
+        outcome(folder.path(), &sample);
+        let flow = ["flow", "-", "--cells", "32", "--steps", "1", "--save", "-"];
+        let piped = program(folder.path())
+            .args(flow)
+            .args(["--output", &format!("run-{file}")])
+            .stdin(File::open(at(file)).unwrap())
+            .output()
+            .unwrap();
+        assert!(piped.status.success(), "{file}: {}", text(&piped.stderr));
+        if file == "in.png" {
+            assert!(piped.stdout.starts_with(b"\x89PNG"));
+        } else {
+            let mesh = surfaces::decode(&piped.stdout, file).unwrap();
+            assert!(mesh.faces.len() > 100, "{file}");
+        }
+    }
+    let left = fs::read_dir(std::env::temp_dir()).unwrap();
+    let of_this = |name: &str| name.starts_with("willmore-") && name.contains("put.");
+    // Other tests may be at it in this moment, but not with these.
+    let left = left.filter(|entry| {
+        let name = entry.as_ref().unwrap().file_name();
+        of_this(&name.to_string_lossy()) && name.to_string_lossy().ends_with("input.stl")
+    });
+    assert_eq!(left.count(), 0);
+    let json = run(folder.path(), &["flow", "in.ply", "--save", "-"]);
+    assert!(text(&json.stderr).contains("--json and --save -"));
+    let empty = run(folder.path(), &["flow", "-"]);
+    assert!(text(&empty.stderr).contains("standard input is empty"));
+}
+
+#[test]
+fn fields_are_taken_to_other_grids() {
+    let folder = tempfile::tempdir().unwrap();
+    let grid = Grid::<2>::centred(48, 1.0).unwrap();
+    let disc = Ball::new([0.1, 0.0], 0.3).unwrap();
+    let u = phase_field(grid, &disc, 2.0 * grid.spacing()).unwrap();
+    npy::write(folder.path().join("disc.npy"), &u).unwrap();
+    for cells in ["32", "96"] {
+        let sample = ["sample", "disc.npy", "--box-side", "1", "--cells", cells];
+        outcome(
+            folder.path(),
+            &[&sample[..], &["--save", "fine.npy", "--force"]].concat(),
+        );
+        let fine = npy::read(folder.path().join("fine.npy"), |n| {
+            Grid::<2>::centred(n, 1.0)
+        });
+        let fine = fine.unwrap();
+        let count: usize = cells.parse().unwrap();
+        assert_eq!(fine.grid().cells(), count);
+        let exact = phase_field(*fine.grid(), &disc, 2.0 * fine.grid().spacing()).unwrap();
+        let pairs = fine.values().iter().zip(exact.values());
+        let off = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 0.05, "{cells}: {off}");
+    }
+    let few = run(folder.path(), &["flow", "disc.npy", "--cells", "2"]);
+    assert!(text(&few.stderr).contains("--cells 2 resolves nothing"));
+}
