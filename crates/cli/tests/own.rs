@@ -3,10 +3,10 @@
 use std::fs::{self, File};
 use std::path::Path;
 
+use chacha20::ChaCha8Rng;
 use geometry::shapes::Ball;
 use geometry::{Grid, npy, phase_field};
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use surfaces::TriangleMesh;
 
 use crate::common::{outcome, program, run, text};
