@@ -20,7 +20,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         energy: Helfrich::default(),
         held: Held::default(),
         flow: Flow::Willmore,
-        energy: Helfrich::default(),
         operator: Operator::learned(Scheme::Accurate, network)?,
         scales,
         steps: TimeSteps::controlled(ErrorControl::default()),
