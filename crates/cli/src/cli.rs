@@ -333,6 +333,7 @@ impl Serialize for SizeTarget {
 
 /// Options of `flow`.
 #[derive(Args, Serialize, Clone, Debug)]
+#[serde(rename_all = "kebab-case")]
 pub struct FlowOptions {
     #[command(flatten)]
     #[serde(flatten)]
@@ -370,15 +371,15 @@ pub struct FlowOptions {
 
     /// The curvature c0 that bends for nothing, one over a length: the energy is 1/2 int (h - c0)^2 dA, h the sum of the principal
     /// curvatures, positive for a ball [default: 0]
-    #[arg(long, value_name = "C0")]
+    #[arg(long, value_name = "C0", allow_hyphen_values = true)]
     pub spontaneous_curvature: Option<f64>,
 
     /// Add this times the area of the surface (the length) to the energy; one over a length squared [default: 0]
-    #[arg(long, value_name = "SIGMA")]
+    #[arg(long, value_name = "SIGMA", allow_hyphen_values = true)]
     pub tension: Option<f64>,
 
     /// Add this times the volume (the area of a plane shape) to the energy; one over a length cubed [default: 0]
-    #[arg(long, value_name = "P")]
+    #[arg(long, value_name = "P", allow_hyphen_values = true)]
     pub pressure: Option<f64>,
 
     /// Stop after this many steps [default: 20, or 1000 where something else ends the run]

@@ -64,7 +64,7 @@ fn a_folder_becomes_a_section() {
     for part in [
         "<h2 id=\"cross\">Willmore flow of a cross</h2>",
         "<td><a href=\"#cross\">cross</a>, x</td>",
-        "<figcaption>L² distance to the reference against time.</figcaption>",
+        "<figcaption>L² distance to the reference, and distance to the exact flow, against time.</figcaption>",
         "<div class=\"frame\" data-label=\"001\"><img src=\"data:image/png",
         "<caption>Error table</caption>",
         "<summary>Steps (2 rows)</summary>",
