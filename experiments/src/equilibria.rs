@@ -111,8 +111,10 @@ impl Equilibrium {
             perimeter: over(start.perimeter, perimeter),
             volume: over(start.volume, volume),
         };
+        // In long steps flat vesicles break through in the middle.
+        let flat = D == 3 && !self.prolate;
         case.steps = TimeSteps {
-            longest_move: Some(1.0),
+            longest_move: Some(if flat { 0.3 } else { 1.0 }),
             ..StepRule::ByEnergy(None).into()
         };
         case.stops = vec![

@@ -26,15 +26,10 @@ const RUNS: [(Branch, &str, &[f64], f64); 2] = [
     (
         Branch::Prolate,
         "prolate",
-        &[0.95, 0.9, 0.8, 0.7, 0.65, 0.6],
+        &[0.95, 0.9, 0.8, 0.7, 0.65],
         1.5,
     ),
-    (
-        Branch::Oblate,
-        "oblate",
-        &[0.9, 0.8, 0.7, 0.65, 0.64, 0.6],
-        1.25,
-    ),
+    (Branch::Oblate, "oblate", &[0.8, 0.7, 0.65, 0.6], 1.25),
 ];
 
 /// Willmore flow of spheroids with area and volume held until rest, by the accurate operator, n = 64, eps = 2h: energies, profiles and pictures
