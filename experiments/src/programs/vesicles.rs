@@ -13,23 +13,23 @@ use report::{Curve, Raster, Shapes};
 
 const TITLE: &str = "Vesicles: least bending energy with given area and volume";
 const CELLS: [usize; 2] = [32, 64];
-/// The area is that of a sphere of this radius.
-const RADIUS: f64 = 0.3;
 const VIEW: View = View {
     up: UpAxis::Z,
     azimuth: 30.0,
     elevation: 25.0,
 };
 
-/// Shapes that are run: branch, name, reduced volumes, side of the box.
-const RUNS: [(Branch, &str, &[f64], f64); 2] = [
+/// Shapes that are run: branch, name, reduced volumes, the radius of the sphere with the same area, side of the box. Oblate shapes are thin in
+/// the middle, where their two sides must be several interface widths apart.
+const RUNS: [(Branch, &str, &[f64], f64, f64); 2] = [
     (
         Branch::Prolate,
         "prolate",
         &[0.95, 0.9, 0.8, 0.7, 0.65],
+        0.3,
         1.5,
     ),
-    (Branch::Oblate, "oblate", &[0.8, 0.7, 0.65, 0.6], 1.25),
+    (Branch::Oblate, "oblate", &[0.7, 0.65, 0.6], 0.45, 1.5),
 ];
 
 /// Willmore flow of spheroids with area and volume held until rest, by the accurate operator, n = 64, eps = 2h: energies, profiles and pictures
@@ -61,10 +61,10 @@ fn program(options: &Options) -> Result<(), Error> {
     };
     let device = run.open_device()?;
     let setting = Setting::new(&options.figure, CELLS, 1.0)?;
-    let parameters = setting.parameters(json!({ "radius": RADIUS }))?;
+    let parameters = setting.parameters(json!({ "runs": RUNS.map(|(_, name, volumes, radius, side)| (name, volumes, radius, side)) }))?;
     let mut session = Session::open("vesicles", run, device, parameters)?;
     let (mut all, mut pairs) = (Vec::new(), Vec::new());
-    for (branch, name, volumes, side) in RUNS.into_iter().take(count) {
+    for (branch, name, volumes, radius, side) in RUNS.into_iter().take(count) {
         let volumes = &volumes[..volumes.len().min(count)];
         let title = format!("exact vesicles: {name}");
         let exact = session.phase(title, |_| Ok(vesicles(branch, 0.0, volumes)?))?;
@@ -73,13 +73,13 @@ fn program(options: &Options) -> Result<(), Error> {
             let equilibrium = Equilibrium {
                 key: format!("vesicles.{name}.v{ratio:.2}"),
                 title: format!("{name}, v = {ratio:.2}"),
-                radius: RADIUS,
+                radius,
                 ratio,
                 prolate: branch == Branch::Prolate,
                 exact: Exact {
                     energy: exact.energy(),
-                    tension: exact.tension / RADIUS.powi(2),
-                    pressure: -exact.pressure / RADIUS.powi(3),
+                    tension: exact.tension / radius.powi(2),
+                    pressure: -exact.pressure / radius.powi(3),
                 },
             };
             let operator = setting.operator((Method::Hybrid, Scheme::Accurate))?;
@@ -181,7 +181,6 @@ fn diagram(session: &mut Session<'_>, pairs: &[Pair]) -> Result<Figure, Error> {
 
 /// A picture of every shape, and its section through the axis over the exact profile.
 fn shapes(pairs: &[Pair], quick: bool) -> Result<Figure, Error> {
-    let half = 2.2 * RADIUS;
     let quality = if quick {
         Quality::Draft
     } else {
@@ -189,7 +188,7 @@ fn shapes(pairs: &[Pair], quick: bool) -> Result<Figure, Error> {
     };
     let columns = RUNS
         .iter()
-        .map(|(_, _, volumes, _)| volumes.len())
+        .map(|(_, _, volumes, ..)| volumes.len())
         .max()
         .unwrap_or(1);
     let mut figure = Figure::new(TITLE, columns.min(pairs.len()));
@@ -216,7 +215,9 @@ fn shapes(pairs: &[Pair], quick: bool) -> Result<Figure, Error> {
         }
         for pair in own() {
             let exact = pair.exact.surface.profile().points().into_iter();
-            let exact: Vec<[f64; 2]> = exact.map(|p| p.map(|x| RADIUS * x)).collect();
+            let radius = pair.at_rest.equilibrium.radius;
+            let half = 2.2 * radius;
+            let exact: Vec<[f64; 2]> = exact.map(|p| p.map(|x| radius * x)).collect();
             let section = look::outline(&section(&pair.at_rest.field)?);
             let panel = Shapes::new("")
                 .with_window([-half, half], [-half, half])
