@@ -158,62 +158,56 @@ fn diagram(session: &mut Session<'_>, pairs: &[Pair]) -> Result<Figure, Error> {
     ))
 }
 
-/// A picture of every shape, and its section through the axis over the exact profile.
+/// A picture of every shape, and below it its section through the axis over the exact profile.
 fn shapes(pairs: &[Pair], quick: bool) -> Result<Figure, Error> {
     let quality = if quick {
         Quality::Draft
     } else {
         Quality::Standard
     };
-    let columns = RUNS
+    let picture = |pair: &Pair| {
+        let eps = pair.at_rest.trajectory.case.scales.eps;
+        let scene = Scene::new(&pair.at_rest.field, eps)?
+            .view(VIEW)
+            .quality(quality);
+        let picture = scene.render([320; 2])?;
+        let size = [picture.width() as usize, picture.height() as usize];
+        let (branch, v, energy) = (pair.branch, pair.ratio(), pair.energy());
+        let exact = pair.exact.energy() / (8.0 * PI);
+        let caption = format!("{branch}, v = {v:.2}\nw / 8π = {energy:.4}\nexact {exact:.4}");
+        Ok(Raster::new(size, picture.pixels()).with_caption(caption))
+    };
+    let section = |pair: &Pair| {
+        let radius = pair.at_rest.equilibrium.radius;
+        let half = 2.2 * radius;
+        let exact = pair.exact.surface.profile().points().into_iter();
+        let exact: Vec<[f64; 2]> = exact.map(|p| p.map(|x| radius * x)).collect();
+        let own = look::outline(&section(&pair.at_rest.field)?);
+        Ok(Shapes::new("")
+            .with_window([-half, half], [-half, half])
+            .with_curve(own.filled(Colour::LightGrey))
+            .with_curve(Curve::new([exact]).with_colour(0).with_width(1.0)))
+    };
+    let pictures = pairs
         .iter()
-        .map(|(_, _, volumes, ..)| volumes.len())
-        .max()
-        .unwrap_or(1);
-    let mut figure = Figure::new(TITLE, columns.min(pairs.len()));
-    let mut rows = Vec::new();
-    for (_, branch, ..) in RUNS {
-        let own = || pairs.iter().filter(move |pair| pair.branch == branch);
-        if own().next().is_none() {
-            continue;
-        }
-        rows.extend([branch, "section"]);
-        for pair in own() {
-            let eps = pair.at_rest.trajectory.case.scales.eps;
-            let scene = Scene::new(&pair.at_rest.field, eps)?
-                .view(VIEW)
-                .quality(quality);
-            let picture = scene.render([320; 2])?;
-            let size = [picture.width() as usize, picture.height() as usize];
-            let (energy, exact) = (pair.energy(), pair.exact.energy() / (8.0 * PI));
-            let caption = format!(
-                "v = {:.2}\nw / 8π = {energy:.4}\nexact {exact:.4}",
-                pair.ratio()
-            );
-            figure = figure.with_panel(Raster::new(size, picture.pixels()).with_caption(caption));
-        }
-        for pair in own() {
-            let exact = pair.exact.surface.profile().points().into_iter();
-            let radius = pair.at_rest.equilibrium.radius;
-            let half = 2.2 * radius;
-            let exact: Vec<[f64; 2]> = exact.map(|p| p.map(|x| radius * x)).collect();
-            let section = look::outline(&section(&pair.at_rest.field)?);
-            let panel = Shapes::new("")
-                .with_window([-half, half], [-half, half])
-                .with_curve(section.filled(Colour::LightGrey))
-                .with_curve(Curve::new([exact]).with_colour(0).with_width(1.0));
-            figure = figure.with_panel(panel);
-        }
-    }
-    Ok(figure.with_row_labels(rows).with_note(
-        "Grey: at rest, ε = 2h. Blue: the exact equilibrium. v: volume over that of the sphere with the same area.",
-    ))
+        .map(picture)
+        .collect::<Result<Vec<_>, Error>>()?;
+    let sections = pairs
+        .iter()
+        .map(section)
+        .collect::<Result<Vec<_>, Error>>()?;
+    Ok(Figure::new(TITLE, pairs.len())
+        .with_panels(pictures)
+        .with_panels(sections)
+        .with_note(
+            "Grey: at rest, ε = 2h. Blue: the exact equilibrium. v: volume over that of the sphere with the same area.",
+        ))
 }
 
 /// The plane through the axis, moved to the origin.
 fn section(field: &Field<3>) -> Result<Field<2>, Error> {
     let grid = field.grid();
-    let (cells, plane) = (grid.cells(), Grid::<2>::new(grid.cells(), grid.side())?);
+    let (cells, plane) = (grid.cells(), Grid::<2>::centred(grid.cells(), grid.side())?);
     let value = |node: usize| {
         let [i, k] = plane.multi_index(node);
         field.values()[grid.index([i, cells / 2, k])]
