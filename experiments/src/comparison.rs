@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use clap::{CommandFactory, FromArgMatches};
-use engine::{Samples, Trajectory, energy_increases, minimizations};
+use engine::{ErrorControl, Samples, Trajectory, energy_increases, minimizations};
 use geometry::measure::{perimeter, zero_set_volume};
 use report::{Curve, OutputDir, Shapes, Table};
 use solver::StepRecord;
@@ -13,7 +13,7 @@ use crate::networks::{EPS, STEP};
 use crate::prelude::*;
 use crate::steps::{self, Rows};
 use crate::study::{self, Study, StudyOptions, Variant};
-use crate::truth::{self, CELLS, Reached, STRICT, Sample, Truth, USUAL};
+use crate::truth::{self, CELLS, Reached, STRICT, Sample, Truth};
 
 /// A shape and the flow it undergoes.
 pub struct Setting {
@@ -237,7 +237,7 @@ impl Setting {
             at.collect::<Result<BTreeMap<_, _>, Error>>()
         };
         let [double, single] = CELLS;
-        let controlled = reached(single, USUAL, "controlled")?;
+        let controlled = reached(single, ErrorControl::default(), "controlled")?;
         let coarse = reached(double, STRICT, "controlled_strict")?;
         let fine = reached(single, STRICT, "controlled_strict")?;
         let extrapolated = fine.iter().map(|(k, fine)| {

@@ -48,10 +48,8 @@ impl Equilibrium {
     /// Ramanujan to the length and of Thomsen to the area, whose errors the first steps take away.
     fn half_axes<const D: usize>(&self) -> [f64; 2] {
         const THOMSEN: f64 = 1.6075;
-        // More slender spheroids are much longer than the dumbbells that they become.
-        let ratio = self.ratio.max(if self.prolate { 0.7 } else { 0.0 });
         let axes = |slenderness: f64| {
-            let across = (ratio / slenderness).powf(1.0 / D as f64);
+            let across = (self.ratio / slenderness).powf(1.0 / D as f64);
             [across, slenderness * across]
         };
         let perimeter = |[a, c]: [f64; 2]| match D {
@@ -123,14 +121,7 @@ impl Equilibrium {
             Stop::NoSurface,
             Stop::AtTheSide,
         ];
-        case.measures = vec![
-            Measure::new("perimeter", move |u, _| {
-                ZeroSet::of(u, eps).map(|set| Some(set.perimeter))
-            }),
-            Measure::new("volume", move |u, _| {
-                ZeroSet::of(u, eps).map(|set| Some(set.volume))
-            }),
-        ];
+        case.measures = vec![Measure::zero_set(eps)];
         let samples = Samples::every(usize::MAX);
         let trajectory = session.trajectory(&self.title, case, &self.key, &samples)?;
         let field = trajectory.field(trajectory.steps())?;
@@ -153,9 +144,13 @@ pub struct AtRest<const D: usize> {
 }
 
 impl<const D: usize> AtRest<D> {
-    /// The largest relative distance of a size from its target after the sizes have been reached.
+    /// The largest relative distance of a size from its target after the ramp; a step that is halved takes sizes that part of the way.
     fn drift(&self, name: &str, target: f64) -> Option<f64> {
-        let held = self.trajectory.records.iter().filter(|r| r.step >= RAMP);
+        let mut steps = 0.0;
+        let held = self.trajectory.records.iter().filter(|record| {
+            steps += 0.5_f64.powi(record.halvings as i32);
+            steps >= RAMP as f64 - 1e-9
+        });
         let drift = held.filter_map(|r| Some((r.measure(name)? / target - 1.0).abs()));
         drift.max_by(f64::total_cmp)
     }
@@ -169,9 +164,17 @@ impl<const D: usize> AtRest<D> {
 
 /// Energies in units of that of the ball of the same perimeter or, in space, of any ball, `8 pi`; drifts, multipliers and work.
 pub fn sheet<const D: usize>(all: &[AtRest<D>]) -> Sheet<'_, AtRest<D>> {
-    let (energy, perimeter, volume) = match D {
-        2 => ("w_over_circle", "length_drift", "area_drift"),
-        _ => ("w_over_8pi", "area_drift", "volume_drift"),
+    let (energy, [perimeter, volume], drifts) = match D {
+        2 => (
+            "w_over_circle",
+            ["length", "area"],
+            ["length_drift", "area_drift"],
+        ),
+        _ => (
+            "w_over_8pi",
+            ["area", "volume"],
+            ["area_drift", "volume_drift"],
+        ),
     };
     let ball = |one: &AtRest<D>| match D {
         2 => PI / one.equilibrium.radius,
@@ -191,13 +194,15 @@ pub fn sheet<const D: usize>(all: &[AtRest<D>]) -> Sheet<'_, AtRest<D>> {
             100.0 * (one.zero_set.willmore_energy / one.equilibrium.exact.energy - 1.0)
         })
         .measure(
-            perimeter,
-            ("drift of the perimeter", Scientific(1)),
-            move |one| one.drift("perimeter", sizes(one)[0]),
+            drifts[0],
+            (&format!("drift of the {perimeter}"), Scientific(1)),
+            move |one| one.drift(perimeter, sizes(one)[0]),
         )
-        .measure(volume, ("drift of the volume", Scientific(1)), move |one| {
-            one.drift("volume", sizes(one)[1])
-        })
+        .measure(
+            drifts[1],
+            (&format!("drift of the {volume}"), Scientific(1)),
+            move |one| one.drift(volume, sizes(one)[1]),
+        )
         .measure("tension", ("tension", Fixed(3)), |one| {
             one.last(|made| made.tension)
         })

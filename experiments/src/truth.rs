@@ -1,6 +1,6 @@
 //! Runs against the exact flow of their curves, and of their surfaces of revolution.
 
-use engine::{ErrorControl, Order, Samples, Stop, TimeSteps, Trajectory};
+use engine::{ErrorControl, Order, Samples, Stop, TimeSteps, Trajectory, estimated_time_error};
 use geometry::contour::{Interpolation, zero_level};
 use geometry::shapes::{Cross, Cuboid, Cylinder, Ellipse};
 use geometry::{SignedDistance, ZeroSet};
@@ -90,13 +90,6 @@ pub const ELLIPSOID: Sample<3> = Sample {
 /// Cells per unit length of runs by the accurate operator, two to `eps`; the errors of the two are extrapolated to `eps = 0`.
 pub const CELLS: [usize; 2] = [64, 128];
 
-/// Controlled steps with the tolerance of the program `willmore`.
-pub const USUAL: ErrorControl = ErrorControl {
-    relative: 0.02,
-    longest: 1.0,
-    first: None,
-};
-
 /// Controlled steps with a time error well below that in `eps`.
 pub const STRICT: ErrorControl = ErrorControl {
     relative: 0.005,
@@ -146,8 +139,8 @@ impl<const D: usize> Sample<D> {
             ..Scales::of_grid(grid.spacing(), 2.0)
         };
         let needed = scales.needs(D, grid.spacing());
-        let network = Networks::default().find(Scheme::Accurate.shipped(), &needed)?;
-        let operator = Operator::learned(Scheme::Accurate, network)?;
+        let accurate = (Method::Hybrid, Scheme::Accurate);
+        let operator = Operator::new(accurate, &Networks::default(), &needed, &grid, &scales)?;
         let initial = (self.initial)(grid, scales.eps)?;
         let mut case = willmore_flow(self.key, initial, operator, scales, (steps.rule, 1));
         case.steps = steps;
@@ -240,7 +233,7 @@ pub struct Reached {
     pub seconds: f64,
     /// and steps.
     pub steps: usize,
-    /// The sum of the estimated errors of the steps, where they have an estimate.
+    /// The estimated time error of controlled steps.
     pub estimated: f64,
 }
 
@@ -258,7 +251,6 @@ impl Reached {
         let zero_set = ZeroSet::of(&field, eps)?;
         let points = (sample.level)(&field, eps)?;
         let measured = |name| last.measure(name).unwrap_or(f64::NAN);
-        let estimate = |record: &Record| record.minimization?.estimates?.error;
         let size = |name| match (D, name) {
             (2, "area") | (_, "volume") => zero_set.volume,
             (_, "area" | "perimeter") => zero_set.perimeter,
@@ -273,7 +265,7 @@ impl Reached {
             hvp: so_far.iter().filter_map(Record::hvp).sum(),
             seconds: so_far.iter().map(|record| record.seconds).sum(),
             steps: so_far.len(),
-            estimated: so_far.iter().filter_map(estimate).sum(),
+            estimated: estimated_time_error(so_far).unwrap_or(0.0),
         })
     }
 

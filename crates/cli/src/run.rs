@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use engine::{Case, Checkpoints, Ending, Event, Observer, Record, Run, Stop, Store};
+use engine::{
+    Case, Checkpoints, Ending, Event, Observer, Record, Run, Stop, Store, estimated_time_error,
+};
 use geometry::measure::{has_interface, touches_side};
 use geometry::vti;
 use operators::ComputeDevice;
@@ -404,8 +406,8 @@ fn counted(steps: u64) -> String {
     format!("{steps} step{plural}")
 }
 
-/// What controlled steps say of themselves: the sum of their estimated errors (the first steps have none), the way of the place that moves farthest in each, and the
-/// longest displacement of a stage in interface widths.
+/// What controlled steps say of themselves: their [estimated error](estimated_time_error), the way of the place that moves farthest in each,
+/// and the longest displacement of a stage in interface widths.
 fn time_accuracy(records: &[Record], eps: f64) -> Option<Value> {
     let made = |record: &Record| record.minimization?.estimates;
     let estimates: Vec<StepEstimates> = records.iter().filter_map(made).collect();
@@ -413,9 +415,8 @@ fn time_accuracy(records: &[Record], eps: f64) -> Option<Value> {
         return None;
     }
     let longest = estimates.iter().map(|e| e.displacement).fold(0.0, f64::max);
-    let errors: Vec<f64> = estimates.iter().filter_map(|e| e.error).collect();
     Some(json!({
-        "estimated_error": (!errors.is_empty()).then(|| errors.iter().sum::<f64>()),
+        "estimated_error": estimated_time_error(records),
         "path": estimates.iter().map(|e| e.motion).sum::<f64>(),
         "longest_displacement_in_widths": longest / eps,
     }))

@@ -72,7 +72,9 @@ pub use held::{Held, Target};
 pub use measure::{DISPLACEMENT, Measure};
 pub use observer::{Event, Observer, Samples};
 pub use operator::{Flow, Method, Operator, Scales, Scheme, quarter_square};
-pub use record::{Record, Values, energy_increases, mean_hvp, minimizations, to_csv};
+pub use record::{
+    Record, Values, energy_increases, estimated_time_error, mean_hvp, minimizations, to_csv,
+};
 pub use run::{Ending, Run};
 pub use solver::Helfrich;
 pub use steps::{Order, StepRule, TimeSteps};

@@ -70,6 +70,24 @@ pub fn energy_increases(records: &[Record]) -> usize {
     minimizations(records).filter(risen).count()
 }
 
+/// The estimated time error of second-order steps at the end of the last of them, largest over the interface; none before the first
+/// [estimate](solver::StepEstimates).
+///
+/// The flow does not depend on time: what a step is late lasts. So the local error `e_k` of a step in which the interface moves at the rate
+/// `F_k` is taken for a delay, and all of them count at the present rate, `F_n sum_k e_k / F_k`. Their plain sum would not see that shapes forget
+/// errors as they slow down.
+pub fn estimated_time_error(records: &[Record]) -> Option<f64> {
+    let estimates = minimizations(records).filter_map(|made| Some((made.tau, made.estimates?)));
+    let (mut delay, mut rate) = (None, 0.0);
+    for (tau, estimates) in estimates {
+        rate = estimates.motion / tau;
+        if let Some(error) = estimates.error.filter(|_| rate > 0.0) {
+            delay = Some(delay.unwrap_or(0.0) + error / rate);
+        }
+    }
+    Some(delay? * rate)
+}
+
 /// Hessian-vector products per minimization.
 pub fn mean_hvp(records: &[Record]) -> f64 {
     let hvp: f64 = records.iter().filter_map(Record::hvp).sum();

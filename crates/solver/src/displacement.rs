@@ -11,9 +11,14 @@ fn clipped(u: f64) -> f64 {
     u.clamp(PURE - 1.0, 1.0 - PURE)
 }
 
+/// `atanh u`, the distance inside the interface in units of `4 eps / 3`.
+pub(crate) fn depth(u: f64) -> f64 {
+    clipped(u).atanh()
+}
+
 /// `atanh u - atanh v`, in units of `4 eps / 3`; zero in the pure phases.
 pub(crate) fn displacement(u: f64, v: f64) -> f64 {
-    clipped(u).atanh() - clipped(v).atanh()
+    depth(u) - depth(v)
 }
 
 /// `u` displaced by `y`, `tanh(atanh u + y)`. What `u` is beyond the pure phases stays.
@@ -25,6 +30,23 @@ pub(crate) fn displaced(u: f64, y: f64) -> f64 {
 /// The weight of a place in averages over the interface, `(1 - u^2)^2`.
 pub(crate) fn on_interface(u: f64) -> f64 {
     (1.0 - u * u).max(0.0).powi(2)
+}
+
+/// One on the interface and zero in the pure phases, beyond `(1 - u^2)^2` of some `10^-3`.
+pub(crate) fn window(u: f64) -> f64 {
+    const EDGE: f64 = 1e-3;
+    let weight = on_interface(u);
+    weight / (weight + EDGE)
+}
+
+/// The factor by which the `L2` metric is too weak for a displacement `d` to a surface of mean curvature `h`, of which `bend` is the product.
+///
+/// The metric measures in a straight line: the squared distance is `d^2` on the surface half-way, where areas are `1 - h d / 2` times those of
+/// the displaced one, and its derivative there is `(1 - h d / 4) d` for each area.
+pub(crate) fn curvature_weight(bend: f64) -> f64 {
+    /// Where the curvature changes within the displacement, at corners, it says nothing.
+    const MOST: f64 = 0.5;
+    1.0 / (1.0 - 0.25 * bend.clamp(-MOST, MOST))
 }
 
 /// The factor by which the `L2` metric is too weak for a motion that displaces the interface by `y`, `1 / rho(y)`.

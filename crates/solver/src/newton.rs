@@ -61,12 +61,12 @@ impl Default for NewtonParams {
 }
 
 impl NewtonParams {
-    /// For steps of second order, whose minimizations are short and begin near their ends: a tighter tolerance, since what the
-    /// minimizations leave enters the [estimated error](crate::StepEstimates), and looser linear solves.
+    /// For steps of second order, whose minimizations are short and begin near their ends: few and accurate linear solves. What the
+    /// minimizations leave enters the [estimated error](crate::StepEstimates), and adds up where steps are long.
     pub fn second_order() -> Self {
         Self {
-            tolerance: 0.015,
-            cg_tolerance: 0.3,
+            tolerance: 0.05,
+            cg_tolerance: 0.15,
             ..Self::default()
         }
     }

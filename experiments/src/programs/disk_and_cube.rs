@@ -1,10 +1,10 @@
 //! A cube and a thick disk under Willmore flow.
 
-use engine::{Order, TimeSteps};
+use engine::{ErrorControl, Order, TimeSteps};
 
 use crate::prelude::*;
 use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, View};
-use crate::truth::{self, DISK, ELLIPSOID, Reached, Sample, Sizes, THICK_DISK, Truth, USUAL};
+use crate::truth::{self, DISK, ELLIPSOID, Reached, Sample, Sizes, THICK_DISK, Truth};
 use geometry::shapes::{Cuboid, Cylinder};
 use geometry::{SignedDistanceExt, UpAxis};
 
@@ -137,7 +137,7 @@ fn compare_with_exact(
         halvings: HALVINGS,
     };
     let time_steps = TimeSteps {
-        order: Order::Controlled(USUAL),
+        order: Order::Controlled(ErrorControl::default()),
         ..first.into()
     };
     let run = sample.run(session, n, ("controlled", time_steps, tau * steps as f64))?;

@@ -39,9 +39,9 @@ fn program(options: &RunOptions) -> Result<(), Error> {
     let exact = session.phase("exact curves", |_| Ok(elastica(&QUOTIENTS[..count])?))?;
     let grid = Grid::<2>::per_unit(CELLS, SIDE)?;
     let scales = Scales::of_grid(grid.spacing(), 2.0);
-    let network =
-        Networks::default().find(Scheme::Accurate.shipped(), &scales.needs(2, grid.spacing()))?;
-    let operator = Operator::learned(Scheme::Accurate, network)?;
+    let needed = scales.needs(2, grid.spacing());
+    let accurate = (Method::Hybrid, Scheme::Accurate);
+    let operator = Operator::new(accurate, &Networks::default(), &needed, &grid, &scales)?;
     let mut all = Vec::new();
     for (&ratio, exact) in QUOTIENTS.iter().zip(&exact) {
         let equilibrium = Equilibrium {

@@ -19,17 +19,17 @@ const VIEW: View = View {
     elevation: 25.0,
 };
 
-/// Shapes that are run: branch, name, reduced volumes, the radius of the sphere with the same area, side of the box. Oblate shapes are thin in
-/// the middle, where their two sides must be several interface widths apart: those with smaller reduced volumes break through at these resolutions.
+/// Branches that are run, each from the relaxed shape before: branch, name, reduced volumes, the radius of the sphere with the same area, side
+/// of the box. Oblate shapes are thin in the middle, where their two sides must be several interface widths apart.
 const RUNS: [(Branch, &str, &[f64], f64, f64); 2] = [
     (
         Branch::Prolate,
         "prolate",
-        &[0.95, 0.9, 0.8, 0.7, 0.65],
-        0.3,
-        1.5,
+        &[0.95, 0.9, 0.8, 0.7, 0.65, 0.6],
+        0.4,
+        2.0,
     ),
-    (Branch::Oblate, "oblate", &[0.7], 0.45, 1.5),
+    (Branch::Oblate, "oblate", &[0.7, 0.65, 0.6], 0.6, 2.0),
 ];
 
 /// Willmore flow of spheroids with area and volume held until rest, by the accurate operator, n = 64, eps = 2h: energies, profiles and pictures
@@ -69,6 +69,7 @@ fn program(options: &Options) -> Result<(), Error> {
         let title = format!("exact vesicles: {name}");
         let exact = session.phase(title, |_| Ok(vesicles(branch, 0.0, volumes)?))?;
         let grid = centred_box(setting.n, side)?;
+        let mut relaxed = None;
         for (&ratio, exact) in volumes.iter().zip(exact) {
             let equilibrium = Equilibrium {
                 key: format!("vesicles.{name}.v{ratio:.2}"),
@@ -83,10 +84,15 @@ fn program(options: &Options) -> Result<(), Error> {
                 },
             };
             let operator = setting.operator((Method::Hybrid, Scheme::Accurate))?;
-            let initial = equilibrium.start(grid, setting.scales.eps, 0.5)?;
+            let initial = match relaxed {
+                Some(shape) => shape,
+                None => equilibrium.start(grid, setting.scales.eps, 0.5)?,
+            };
             let rule = (StepRule::ByEnergy(None), 1);
-            let case = willmore_flow("spheroid", initial, operator, setting.scales, rule);
-            all.push(equilibrium.relax(&mut session, case, steps)?);
+            let case = willmore_flow(name, initial, operator, setting.scales, rule);
+            let at_rest = equilibrium.relax(&mut session, case, steps)?;
+            relaxed = Some(at_rest.field.clone());
+            all.push(at_rest);
             pairs.push((name, exact));
         }
     }
@@ -98,6 +104,12 @@ fn program(options: &Options) -> Result<(), Error> {
             exact,
         })
         .collect();
+    let own = crossing(&pairs, Pair::energy);
+    let exact = crossing(&pairs, |pair| pair.exact.energy() / (8.0 * PI));
+    session.metrics(
+        "vesicles.crossing",
+        [("prolate_oblate", own.into()), ("exact", exact.into())],
+    )?;
     let diagram = diagram(&mut session, &pairs)?;
     session.figure(diagram, "diagram")?;
     session.figure(shapes(&pairs, run.quick)?, "shapes")?;
@@ -113,6 +125,23 @@ impl Pair {
     fn ratio(&self) -> f64 {
         self.at_rest.equilibrium.ratio
     }
+}
+
+/// The reduced volume at which the energies of prolate and oblate shapes are the same, by straight lines between the reduced volumes that both
+/// have, which are off by less than .001.
+fn crossing(pairs: &[Pair], energy: impl Fn(&Pair) -> f64) -> Option<f64> {
+    let of = |branch| pairs.iter().filter(move |pair| pair.branch == branch);
+    let both: Vec<[f64; 2]> = of("prolate")
+        .filter_map(|prolate| {
+            let oblate = of("oblate").find(|oblate| oblate.ratio() == prolate.ratio())?;
+            Some([prolate.ratio(), energy(prolate) - energy(oblate)])
+        })
+        .collect();
+    let crossing = both
+        .windows(2)
+        .find(|pair| pair[0][1] * pair[1][1] <= 0.0)?;
+    let [[v, a], [w, b]] = [crossing[0], crossing[1]];
+    Some(v + (w - v) * a / (a - b))
 }
 
 /// Exact branches as lines, the flow's shapes as marks.

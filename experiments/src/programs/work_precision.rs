@@ -4,7 +4,7 @@ use crate::circles::{self, Ensemble};
 use crate::networks::{Chosen, STEP};
 use crate::prelude::*;
 use crate::study::Variant;
-use crate::truth::{self, CELLS, CROSS, ELLIPSE, RECTANGLE, Reached, STRICT, Sample, USUAL};
+use crate::truth::{self, CELLS, CROSS, ELLIPSE, RECTANGLE, Reached, STRICT, Sample};
 use engine::{ErrorControl, Order, TimeSteps};
 
 const TITLE: &str = "Time steps of Willmore flow against the exact flow";
@@ -45,7 +45,11 @@ fn steppings(quick: bool) -> Vec<Stepping> {
         longest: 2.0,
         first: None,
     };
-    let controls = [("_loose", loose), ("", USUAL), ("_strict", STRICT)];
+    let controls = [
+        ("_loose", loose),
+        ("", ErrorControl::default()),
+        ("_strict", STRICT),
+    ];
     let controlled = controls.map(|(suffix, control)| {
         let steps = truth::controlled(control, END, 4);
         stepping(format!("controlled{suffix}"), CONTROLLED, steps)
@@ -92,7 +96,6 @@ fn program(options: &RunOptions) -> Result<(), Error> {
     for sample in &SAMPLES {
         let title = format!("{}: the exact flow", sample.key);
         let curves = session.phase(title, |_| sample.exact(Flow::Willmore, &times))?;
-        let mut strict = Vec::new();
         for &n in &cells {
             for stepping in steppings(options.quick) {
                 let run = sample.run(&mut session, n, (&stepping.key, stepping.steps, end))?;
@@ -106,18 +109,20 @@ fn program(options: &RunOptions) -> Result<(), Error> {
                         reached: Reached::of(sample, &run, curve)?,
                     });
                 }
-                if stepping.key == "controlled_strict" {
-                    strict.push(run);
-                }
             }
         }
         for (&mark, curve) in marks.iter().zip(&curves) {
             let exact = format!("{}.exact", sample.key);
             truth::record(&mut session, &exact, mark, &curve.sizes())?;
-            if let [double, single] = &strict[..] {
-                let [double, single] = [double, single].map(|run| Reached::of(sample, run, curve));
-                let (double, single) = (double?, single?);
-                let both = Reached::extrapolated(&double, &single, curve);
+            let strict = |n| {
+                let same = |row: &&Compared| {
+                    let key = (row.sample, row.n, &row.stepping[..], row.mark);
+                    key == (sample.key, n, "controlled_strict", mark)
+                };
+                rows.iter().find(same).map(|row| &row.reached)
+            };
+            if let (Some(double), Some(single)) = (strict(CELLS[0]), strict(CELLS[1])) {
+                let both = Reached::extrapolated(double, single, curve);
                 let key = format!("{}.extrapolated", sample.key);
                 both.record(&mut session, &key, mark)?;
             }
@@ -177,7 +182,7 @@ fn circles(session: &mut Session<'_>, quick: bool) -> Result<(), Error> {
     };
     let operator = Chosen::default().operator(variant.look(), variant.n)?;
     let planned = (variant, operator);
-    let controlled = TimeSteps::controlled(USUAL);
+    let controlled = TimeSteps::controlled(ErrorControl::default());
     for (name, time_steps) in [("euler1", None), ("controlled", Some(controlled))] {
         let ensemble = session.phase(format!("circles: {name}"), |stage| {
             let folder = stage.output.subfolder("fields")?;

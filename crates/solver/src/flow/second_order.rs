@@ -3,8 +3,8 @@
 //! The diagonally implicit Runge-Kutta method SDIRK2 (Alexander 1977; `gamma = 1 - 1/sqrt 2`, L-stable) is, written in the states
 //! themselves, two implicit Euler steps of size `gamma tau`: from `u_k` to `U`, and from the anchor `u_k + (1 + sqrt 2)(U - u_k)` to
 //! `u_{k+1}`. Both are minimizing movements. The anchor is formed by displacement, in `atanh u`, so that it is a phase field with the
-//! optimal profile again; and motions are weighted by the [factor](crate::displacement::metric_weight) by which the `L2` metric is too weak for
-//! long ones. See `docs/time-steps.md`.
+//! optimal profile again; and motions are weighted by the factors by which the `L2` metric is too weak for [long](crate::displacement::metric_weight)
+//! displacements and those of [curved](crate::displacement::curvature_weight) surfaces. See `docs/time-steps.md`.
 
 use std::time::Instant;
 
@@ -13,7 +13,9 @@ use geometry::Field;
 use serde::{Deserialize, Serialize};
 
 use super::{Minimum, Movement, StepRecord, WillmoreFlow, download};
-use crate::displacement::{displaced, displacement, metric_weight, on_interface};
+use crate::displacement::{
+    curvature_weight, depth, displaced, displacement, metric_weight, on_interface, window,
+};
 use crate::times::PhaseTimes;
 use crate::{Error, NewtonInfo, Start, StartKind};
 
@@ -66,7 +68,7 @@ impl<const D: usize> WillmoreFlow<D> {
 
         let moved = middle.zip_map(&before, displacement)?;
         let further = moved.map(|y| FURTHER * y);
-        let anchor = anchor(&before, &middle, &further)?;
+        let anchor = before.zip_map(&further, displaced)?;
         let start = middle.zip_map(&further, displaced)?;
         let second = self.stage(&anchor, &moved, &start, stage)?;
         let after = download(&self.grid, &second.u, &self.device)?;
@@ -102,7 +104,7 @@ impl<const D: usize> WillmoreFlow<D> {
         let tensor = |field: &Field<D>| -> Tensor<D> {
             self.device.tensor(field.values(), self.grid.shape())
         };
-        let factors = tensor(&expected.map(|y| metric_weight(y).sqrt()));
+        let factors = tensor(&self.factors(expected, start)?);
         let (anchor, start) = (tensor(anchor), tensor(start));
         self.minimize(&Movement {
             anchor: &anchor,
@@ -112,18 +114,23 @@ impl<const D: usize> WillmoreFlow<D> {
         })
     }
 
+    /// Square roots of the weights with which the `L2` metric measures displacements, where `end` is about where these `expected` ones lead.
+    fn factors(&self, expected: &Field<D>, end: &Field<D>) -> Result<Field<D>, Error> {
+        // The mean curvature is minus the Laplacian of the depth.
+        let unit = 4.0 * self.params.eps / 3.0;
+        let curvature = end.map(|u| unit * depth(u)).laplacian();
+        let curvature = curvature.zip_map(end, |laplacian, u| -window(u) * laplacian)?;
+        Ok(expected.zip_map(&curvature, |y, h| {
+            (metric_weight(y) * curvature_weight(h * unit * y)).sqrt()
+        })?)
+    }
+
     /// The displacement in the time `tau` at the rate of the last step, on the interface.
     fn anticipated(&self, tau: f64) -> Result<Field<D>, Error> {
-        /// Where `(1 - u^2)^2` is less than this, rates are not continued.
-        const WINDOW: f64 = 1e-3;
-        let Some(rate) = &self.rate else {
-            return Ok(Field::constant(self.grid, 0.0));
-        };
-        let window = self.field()?.map(|u| {
-            let weight = on_interface(u);
-            weight / (weight + WINDOW)
-        });
-        Ok(rate.zip_map(&window, |rate, window| rate * window * tau)?)
+        match &self.rate {
+            Some(rate) => Ok(rate.zip_map(&self.field()?, |rate, u| rate * window(u) * tau)?),
+            None => Ok(Field::constant(self.grid, 0.0)),
+        }
     }
 
     /// The lengths that a step is judged by, `[u_k, U, u_{k+1}]` being its states.
@@ -208,27 +215,6 @@ impl<const D: usize> WillmoreFlow<D> {
             },
         }
     }
-}
-
-/// `u_k + (1 + sqrt 2)(U - u_k)`: for long steps as a displacement, for short ones as a linear combination.
-///
-/// A linear combination is no profile. Beyond one `eps` it overshoots the pure phases without being further away, and the step lags. A
-/// displaced phase field is one, but the `L2` metric measures it in a straight line: on a surface of curvature `h` steps of length `d` go
-/// too far by a part of order `h d`, which is of first order in time. Either is used where its error is the smaller one, and the order stays two.
-fn anchor<const D: usize>(
-    before: &Field<D>,
-    middle: &Field<D>,
-    further: &Field<D>,
-) -> Result<Field<D>, Error> {
-    /// The displacement of the anchor, in units of `4 eps / 3`, at which both count alike.
-    const ALIKE: f64 = 0.1;
-    let longest = largest(further, middle);
-    let weight = longest * longest / (longest * longest + ALIKE * ALIKE);
-    let along = before.zip_map(further, displaced)?;
-    let straight = before.zip_map(middle, |u, v| u + FURTHER * (v - u))?;
-    Ok(along.zip_map(&straight, |along, straight| {
-        straight + weight * (along - straight)
-    })?)
 }
 
 /// The largest size of a displacement on the interface of `u`.
