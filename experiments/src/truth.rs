@@ -90,10 +90,11 @@ pub const ELLIPSOID: Sample<3> = Sample {
 /// Cells per unit length of runs by the accurate operator, two to `eps`; the errors of the two are extrapolated to `eps = 0`.
 pub const CELLS: [usize; 2] = [64, 128];
 
-/// Controlled steps with a time error well below that in `eps`.
+/// Controlled steps with a time error well below that in `eps`; their minimizations are accurate, too.
 pub const STRICT: ErrorControl = ErrorControl {
-    relative: 0.005,
-    longest: 0.5,
+    relative: 0.002,
+    length: None,
+    longest: 0.35,
     first: None,
 };
 
@@ -132,6 +133,11 @@ impl<const D: usize> Sample<D> {
         let grid = Grid::<D>::per_unit(n, self.side)?;
         let newton = match steps.order {
             Order::First => NewtonParams::default(),
+            Order::Controlled(STRICT) => NewtonParams {
+                tolerance: 0.01,
+                cg_tolerance: 0.05,
+                ..NewtonParams::default()
+            },
             Order::Second | Order::Controlled(_) => NewtonParams::second_order(),
         };
         let scales = Scales {

@@ -301,17 +301,19 @@ impl FromStr for SizeTarget {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let number = |text: &str| match text.parse::<f64>() {
-            Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-            _ => Err(format!(
-                "{text:?} is no positive number; give keep, a value, or a part of the beginning in percent, such as 90%"
-            )),
-        };
+        let expected = "keep, a value, or a part of the beginning in percent, such as 90%";
         match (text, text.strip_suffix('%')) {
             ("keep", _) => Ok(Self::Keep),
-            (_, Some(percent)) => number(percent).map(Self::Percent),
-            (value, None) => number(value).map(Self::Value),
+            (_, Some(percent)) => positive(percent, expected).map(Self::Percent),
+            (value, None) => positive(value, expected).map(Self::Value),
         }
+    }
+}
+
+fn positive(text: &str, expected: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err(format!("{text:?} is no positive number; give {expected}")),
     }
 }
 
@@ -326,6 +328,42 @@ impl fmt::Display for SizeTarget {
 }
 
 impl Serialize for SizeTarget {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// The estimated time error that controlled steps may make.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tolerance {
+    /// Of the whole run, in the units of the input.
+    Length(f64),
+    /// Of each step, in percent of how far the surface moves in it.
+    Percent(f64),
+}
+
+impl FromStr for Tolerance {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = "a length, or a part of the motion in percent, such as 2%";
+        match text.strip_suffix('%') {
+            Some(percent) => positive(percent, expected).map(Self::Percent),
+            None => positive(text, expected).map(Self::Length),
+        }
+    }
+}
+
+impl fmt::Display for Tolerance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Length(length) => write!(f, "{length}"),
+            Self::Percent(percent) => write!(f, "{percent}%"),
+        }
+    }
+}
+
+impl Serialize for Tolerance {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
     }
@@ -348,9 +386,10 @@ pub struct FlowOptions {
     #[arg(long, value_name = "TAU")]
     pub tau: Option<StepRule>,
 
-    /// The time error of controlled steps that is allowed, as a part of how far the surface moves [default: 0.02]
-    #[arg(long, value_name = "PART", allow_hyphen_values = true)]
-    pub tolerance: Option<f64>,
+    /// The estimated time error that controlled steps may make: a LENGTH in the units of the input for the whole run, or for each step a
+    /// part of how far the surface moves in it in percent [default: 2%]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub tolerance: Option<Tolerance>,
 
     /// Hold the volume (the area of a plane shape): keep, a VALUE in the units of the input, or PERCENT of that at the beginning, as 90%
     #[arg(long, value_name = "TARGET")]

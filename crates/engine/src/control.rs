@@ -10,6 +10,10 @@ use crate::{Error, Record};
 pub struct ErrorControl {
     /// The estimated time error of a step over how far the interface moves in it.
     pub relative: f64,
+    /// Instead, the [time error of the run](crate::estimated_time_error), a length: a step that ends at the time `t` may be off by `tau / t` of it.
+    /// Errors counted as delays then add up to no more than it while the interface slows down.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub length: Option<f64>,
     /// The longest displacement of a stage over the interface width `eps`.
     pub longest: f64,
     /// Size of the first step; `16 eps^4`, in which a corner gets a radius of about `2 eps`, if it is not given.
@@ -21,6 +25,7 @@ impl Default for ErrorControl {
     fn default() -> Self {
         Self {
             relative: 0.02,
+            length: None,
             longest: 1.0,
             first: None,
         }
@@ -52,6 +57,7 @@ impl Controller {
         let size = control.first.unwrap_or(16.0 * eps.powi(4));
         for (name, value) in [
             ("relative error of a step", control.relative),
+            ("time error", control.length.unwrap_or(1.0)),
             ("longest displacement of a stage", control.longest),
             ("first step", size),
         ] {
@@ -81,10 +87,13 @@ impl Controller {
         }
     }
 
-    /// By which factors a step could have been longer: for its error, which is of third order and counts against a motion of first order, and
-    /// for its displacement.
-    fn room(&self, estimates: &StepEstimates) -> (f64, f64) {
-        let allowed = self.control.relative * estimates.motion;
+    /// By which factors a step of size `tau` could have been longer: for its error, which is of third order and counts against what is allowed, of first
+    /// order, and for its displacement.
+    fn room(&self, estimates: &StepEstimates, (tau, end): (f64, f64)) -> (f64, f64) {
+        let allowed = match self.control.length {
+            Some(length) => length * tau / end,
+            None => self.control.relative * estimates.motion,
+        };
         let by_error = match estimates.error {
             Some(error) if error > 0.0 => (allowed / error).sqrt(),
             Some(_) => f64::INFINITY,
@@ -97,7 +106,7 @@ impl Controller {
     /// The size with which a step is made again, if it was too long.
     pub(crate) fn shorter(&self, made: &StepRecord) -> Option<f64> {
         let estimates = made.estimates?;
-        let (by_error, by_displacement) = self.room(&estimates);
+        let (by_error, by_displacement) = self.room(&estimates, (made.tau, made.time));
         let least = LEAST * self.time;
         let too_far = WORSE * by_displacement < AIM;
         let too_wrong = WORSE * by_error * by_error < 1.0 && made.tau > 1.2 * least;
@@ -115,7 +124,7 @@ impl Controller {
         let Some(estimates) = record.minimization.and_then(|made| made.estimates) else {
             return;
         };
-        let (by_error, by_displacement) = self.room(&estimates);
+        let (by_error, by_displacement) = self.room(&estimates, (made, record.time));
         let by_error = (AIM * by_error).max(LEAST * self.time / made);
         let growth = by_error.min(AIM * by_displacement).clamp(0.3, GROWTH);
         // A step that was cut short to end at a given time says little about the next one.
@@ -151,8 +160,9 @@ mod tests {
             motion: 0.1,
             displacement,
         };
-        made.minimization.as_mut().unwrap().estimates = Some(estimates);
         made.time = 4.0 * tau;
+        let step = made.minimization.as_mut().unwrap();
+        (step.estimates, step.time) = (Some(estimates), made.time);
         made
     }
 
@@ -170,6 +180,21 @@ mod tests {
         );
         control.accept(&made(2e-3, Some(1e-12), EPS));
         assert!((control.size(1.0) - AIM * 2e-3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_time_error_is_shared_out_by_the_time() {
+        let control = ErrorControl {
+            length: Some(1e-4),
+            ..ErrorControl::default()
+        };
+        let mut control = Controller::new(control, EPS, 1.0).unwrap();
+        // The step is the last quarter of the time.
+        control.accept(&made(1e-3, Some(0.25 * 1e-4), 0.01 * EPS));
+        assert!((control.size(1.0) / (AIM * 1e-3) - 1.0).abs() < 1e-12);
+        let wrong = made(1e-2, Some(4.0 * 0.25 * 1e-4), 0.01 * EPS);
+        let shorter = control.shorter(&wrong.minimization.unwrap()).unwrap();
+        assert!((shorter / (0.5 * 0.85 * 1e-2) - 1.0).abs() < 1e-12);
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! Sizes of steps, and what is done where a minimization fails.
 
 use crate::common::{EPS, TAU, case, device, disc, divided, finished, square};
-use engine::{Error, ErrorControl, Flow, Method, Record, Run, StepRule, Stop, TimeSteps};
+use engine::{
+    Error, ErrorControl, Flow, Method, Record, Run, StepRule, Stop, TimeSteps, estimated_time_error,
+};
 
 /// With three Newton steps a whole step of a square's flow is too much, substeps are not.
 #[test]
@@ -83,7 +85,7 @@ fn controlled_steps_are_as_accurate_as_they_say() {
         controlled.steps = TimeSteps::controlled(ErrorControl {
             relative,
             longest,
-            first: None,
+            ..ErrorControl::default()
         });
         controlled.stops = vec![Stop::Time(4.0 * TAU)];
         finished(controlled)
@@ -103,8 +105,7 @@ fn controlled_steps_are_as_accurate_as_they_say() {
         assert!(step.energy < step.energy_before, "{step:?}");
         assert!(step.estimates.unwrap().displacement < 1.7 * EPS, "{step:?}");
     }
-    let errors = made.iter().filter_map(|step| step.estimates.unwrap().error);
-    let estimated: f64 = errors.sum();
+    let estimated = estimated_time_error(usual.records()).unwrap();
     let crossing = |run: &Run<2>| {
         let last = run.records().last().unwrap();
         [last.measures["tip"], last.measures["diagonal"]]
@@ -115,6 +116,24 @@ fn controlled_steps_are_as_accurate_as_they_say() {
         error < 3.0 * estimated && estimated < 10.0 * error,
         "{estimated:e} estimated, {error:e}"
     );
+}
+
+#[test]
+fn a_time_error_that_is_given_is_kept() {
+    let steps = [3e-4, 3e-5].map(|length| {
+        let mut controlled = case(Flow::Willmore, Method::Hybrid, square(128));
+        controlled.scales.newton.tolerance = 1e-3;
+        controlled.steps = TimeSteps::controlled(ErrorControl {
+            length: Some(length),
+            ..ErrorControl::default()
+        });
+        controlled.stops = vec![Stop::Time(4.0 * TAU)];
+        let run = finished(controlled);
+        let estimated = estimated_time_error(run.records()).unwrap();
+        assert!(estimated < 1.5 * length, "{estimated:e} of {length:e}");
+        run.records().len()
+    });
+    assert!(steps[1] > steps[0], "{steps:?}");
 }
 
 #[test]

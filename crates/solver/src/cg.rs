@@ -32,6 +32,8 @@ pub(crate) struct CgSolution<const D: usize> {
 pub(crate) struct CgLimits {
     /// Reduction of the residual in the norm of the preconditioner.
     pub tolerance: f64,
+    /// The square of that norm below which the residual need not go in any case.
+    pub least: f64,
     pub iterations: usize,
 }
 
@@ -62,7 +64,7 @@ pub(crate) fn conjugate_gradients<const D: usize>(
     let mut residual = gradient.clone().neg().cast(working);
     let z = precondition(&residual);
     let mut rz = dot(&residual, &z, device)?;
-    let target = limits.tolerance * limits.tolerance * rz;
+    let target = (limits.tolerance * limits.tolerance * rz).max(limits.least);
     let mut direction = z;
     let mut solution: Option<Tensor<D>> = None;
     let mut iterations = 0;

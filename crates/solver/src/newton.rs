@@ -36,6 +36,9 @@ pub struct NewtonParams {
     pub tolerance: f64,
     /// Reduction of the residual in each linear solve, in the norm of the preconditioner.
     pub cg_tolerance: f64,
+    /// Linear solves end sooner where the residual says that they are nearer to their solution than this fraction of the motion.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub linear_accuracy: f64,
     /// Limit of linear iterations per Newton step.
     pub cg_iterations: usize,
     /// Limit of Newton steps.
@@ -46,12 +49,21 @@ pub struct NewtonParams {
     pub precision: Precision,
 }
 
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "the form that serde asks for"
+)]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
 impl Default for NewtonParams {
     fn default() -> Self {
         Self {
             method: Method::Preconditioned,
             tolerance: 0.02,
             cg_tolerance: 0.1,
+            linear_accuracy: 0.0,
             cg_iterations: 600,
             newton_iterations: 60,
             cleanup_iterations: 4,
@@ -61,12 +73,13 @@ impl Default for NewtonParams {
 }
 
 impl NewtonParams {
-    /// For steps of second order, whose minimizations are short and begin near their ends: few and accurate linear solves. What the
-    /// minimizations leave enters the [estimated error](crate::StepEstimates), and adds up where steps are long.
+    /// For steps of second order, whose minimizations are short and begin near their ends: few linear solves that leave all the same, since
+    /// what the minimizations leave enters the [estimated error](crate::StepEstimates), and adds up where steps are long.
     pub fn second_order() -> Self {
         Self {
-            tolerance: 0.05,
-            cg_tolerance: 0.15,
+            tolerance: 0.03,
+            cg_tolerance: 0.1,
+            linear_accuracy: 0.003,
             ..Self::default()
         }
     }
@@ -367,24 +380,28 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         8.0 * self.device.epsilon() * energy.abs()
     }
 
+    /// The sum of the squares of the motion so far.
+    fn motion(&self, point: &Point<D>) -> Result<f64, Error> {
+        let motion = point.u.clone() - self.previous.clone();
+        dot(&motion, &motion, self.device)
+    }
+
     /// The stop test: `sqrt(-g . p / N)` against the root mean square of the motion. Invariant under scaling of the
     /// energy, and never satisfied by standing still unless the gradient vanishes.
-    fn converged(&mut self, point: &Point<D>, slope: f64) -> Result<Option<Exit>, Error> {
-        let motion = point.u.clone() - self.previous.clone();
-        let motion = dot(&motion, &motion, self.device)?;
+    fn converged(&mut self, motion: f64, slope: f64) -> Option<Exit> {
         let decrement = slope.abs() / self.objective.unit();
         self.info.estimate = (decrement / motion.max(f64::MIN_POSITIVE)).sqrt();
         let smallest = match &self.held {
             Some(held) => held.noise(),
             None => self.device.epsilon(),
         };
-        Ok(if decrement <= smallest * smallest * self.unknowns {
+        if decrement <= smallest * smallest * self.unknowns {
             Some(Exit::Stationary)
         } else if self.info.estimate <= self.params.tolerance {
             Some(Exit::Converged)
         } else {
             None
-        })
+        }
     }
 
     fn finish(&mut self, exit: Exit, (u, energy): (Tensor<D>, f64)) -> Tensor<D> {
@@ -400,6 +417,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         const WORTHWHILE: f64 = 0.05;
         let limits = CgLimits {
             tolerance: 0.2,
+            least: 0.0,
             iterations: self.params.cleanup_iterations,
         };
         if limits.iterations == 0 {
@@ -474,11 +492,13 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
                 point = rest;
             }
         }
-        let limits = CgLimits {
-            tolerance: self.params.cg_tolerance,
-            iterations: self.params.cg_iterations,
-        };
         while self.info.newton < self.params.newton_iterations {
+            let motion = self.motion(&point)?;
+            let limits = CgLimits {
+                tolerance: self.params.cg_tolerance,
+                least: self.params.linear_accuracy.powi(2) * motion * self.objective.unit(),
+                iterations: self.params.cg_iterations,
+            };
             if let Some(preconditioner) = &mut self.preconditioner {
                 self.assembly
                     .time(|| preconditioner.follow(&point.u, self.device))?;
@@ -486,7 +506,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             let solution = self.solve(&point, limits, Level::Both)?;
             let sign = -solution.slope.signum();
             let decrease = solution.slope.abs();
-            let done = self.converged(&point, solution.slope)?;
+            let done = self.converged(motion, solution.slope);
             self.info.newton += 1;
             if let Some(exit) = done {
                 let u = retract(&point.u, &solution.direction, sign);
@@ -549,10 +569,11 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             let forcing = (norm / first.max(f64::MIN_POSITIVE)).sqrt().min(0.5);
             let limits = CgLimits {
                 tolerance: forcing.min(self.params.cg_tolerance),
+                least: 0.0,
                 iterations: self.params.cg_iterations,
             };
             let solution = self.solve(&point, limits, Level::Both)?;
-            let done = self.converged(&point, solution.slope)?;
+            let done = self.converged(self.motion(&point)?, solution.slope);
             self.info.newton += 1;
             let next = self.straight(&point, &solution, 1.0, 1e-6, 1e-4)?;
             match (done, next) {

@@ -43,7 +43,7 @@ fn steppings(quick: bool) -> Vec<Stepping> {
     let loose = ErrorControl {
         relative: 0.08,
         longest: 2.0,
-        first: None,
+        ..ErrorControl::default()
     };
     let controls = [
         ("_loose", loose),

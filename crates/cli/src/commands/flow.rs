@@ -16,7 +16,7 @@ use solver::NewtonParams;
 use super::{open_device, operator};
 use crate::cli::{
     CommonOptions, FlowOptions, InputOptions, KeepOptions, MeshFormat, SayOptions, SchemeOptions,
-    SizeTarget,
+    SizeTarget, Tolerance,
 };
 use crate::config;
 use crate::error::Error;
@@ -135,16 +135,11 @@ impl FlowCommand for FlowOptions {
 }
 
 impl FlowOptions {
-    /// Refuses a tolerance that is none, or that the time steps do not look at.
+    /// Refuses a tolerance that the time steps do not look at.
     pub fn check_tolerance(&self, usual: StepRule) -> Result<(), Error> {
         let Some(tolerance) = self.tolerance else {
             return Ok(());
         };
-        if !(tolerance > 0.0 && tolerance < 1.0) {
-            return Err(Error::options(format!(
-                "--tolerance {tolerance} must be between 0 and 1, a part of how far the surface moves"
-            )));
-        }
         let rule = self.tau.unwrap_or(usual);
         if rule != StepRule::Controlled {
             return Err(Error::options(format!(
@@ -351,8 +346,11 @@ impl<C: FlowCommand> Job<C> {
                     ..NewtonParams::second_order()
                 };
                 let mut control = ErrorControl::default();
-                let tolerance = options.as_ref().and_then(|options| options.tolerance);
-                control.relative = tolerance.unwrap_or(control.relative);
+                match options.as_ref().and_then(|options| options.tolerance) {
+                    Some(Tolerance::Length(length)) => control.length = Some(length),
+                    Some(Tolerance::Percent(percent)) => control.relative = percent / 100.0,
+                    None => (),
+                }
                 // On coarse grids the usual first step is long against the shape.
                 let shorter = scales.mcf_step * unit.powi(2) / 16.0;
                 control.first = Some(shorter.min(16.0 * scales.eps.powi(4)));
