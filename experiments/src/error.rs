@@ -30,6 +30,8 @@ pub enum Error {
     Render(#[from] render::Error),
     #[error(transparent)]
     Report(#[from] report::Error),
+    #[error(transparent)]
+    Volumes(#[from] volumes::Error),
 }
 
 impl Error {

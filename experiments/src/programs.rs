@@ -19,5 +19,6 @@ pub mod rocker_arm;
 pub mod spheres;
 pub mod timing_tables;
 pub mod train_networks;
+pub mod unshrinking;
 pub mod vesicles;
 pub mod work_precision;

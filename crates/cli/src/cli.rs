@@ -15,6 +15,7 @@ use surfaces::shapes::Region;
 use crate::ansatz::Ansatz;
 use crate::commands::check_eps_over_h;
 use crate::error::Error;
+use crate::volume::Label;
 
 const EXIT_CODES: &str = "Exit codes: 0 success; 2 bad input or failure, one line on standard error; 130 interrupted (Ctrl-C): \
 the last step was finished and stored, `willmore resume` goes on.";
@@ -43,7 +44,7 @@ pub enum Command {
     /// Continue an interrupted run, to the same final bytes as if it had not been interrupted
     #[command(after_help = RESUME_EXAMPLES)]
     Resume(ResumeOptions),
-    /// Take the noise off a mesh: its vertices move, everything else of the file stays
+    /// Take the noise off a mesh, whose vertices move while all else of the file stays, or the voxels off a segmentation
     #[command(after_help = FAIR_EXAMPLES)]
     Fair(FairOptions),
     /// Fill a region of a shape smoothly; everything outside stays bit for bit
@@ -96,7 +97,8 @@ const RESUME_EXAMPLES: &str = "Examples:
 const FAIR_EXAMPLES: &str = "Examples:
   willmore fair scan.stl --save smooth.stl
   willmore fair scan.obj --noise 0.2 --keep box:-5,-5,0,5,5,2
-  willmore fair scan.ply --energy-ratio 0.5 --remesh";
+  willmore fair scan.ply --energy-ratio 0.5 --remesh
+  willmore fair organs.nii.gz --label all --save organ.stl";
 const INPAINT_EXAMPLES: &str = "Examples:
   willmore inpaint drawing.png --mask damage.png --steps 40
   willmore inpaint builtin:disc --mask box:0.2,0.2,0.9,0.9 --ansatz empty
@@ -130,12 +132,13 @@ const COMPLETIONS_EXAMPLES: &str =
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct InputOptions {
-    /// A mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), a field (.npy, .vti), builtin:NAME with
+    /// A mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), a volume of voxels (.nii, .nii.gz, .mrc, .map, and .tif
+    /// of several pages), a field (.npy, .vti), builtin:NAME with
     /// NAME one of disc, ring, cross, rectangle, sphere, cube, torus, coin, figure, lever, a region as box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z,
     /// or - for standard input
     pub input: Option<String>,
 
-    /// Cells per unit length of the box [default: 128 in 2D, 64 in 3D; of a mesh or image the first that hold its thin parts]
+    /// Cells per unit length of the box [default: 128 in 2D, 64 in 3D; of a mesh, image or volume the first that hold its thin parts]
     #[arg(long, value_name = "N")]
     pub cells: Option<usize>,
 
@@ -143,7 +146,7 @@ pub struct InputOptions {
     #[arg(long, value_name = "LENGTH")]
     pub box_side: Option<f64>,
 
-    /// Longest side of the shape in the box, which is made around a mesh or image in its own units [default: 0.6 of the box]
+    /// Longest side of the shape in the box, which is made around a mesh, image or volume in its own units [default: 0.6 of the box]
     #[arg(long, value_name = "LENGTH")]
     pub side_length: Option<f64>,
 
@@ -151,9 +154,18 @@ pub struct InputOptions {
     #[arg(long, value_name = "SIDE", value_enum)]
     pub inside: Option<Inside>,
 
-    /// Grey value from 0 to 1, or opacity, between inside and outside [default: 0.5]
+    /// Value between inside and outside: of an image its grey value from 0 to 1, or opacity [default: 0.5]; of a volume in its units
     #[arg(long, value_name = "VALUE")]
     pub threshold: Option<f64>,
+
+    /// The label of a volume that is inside, or all: each but 0 becomes a surface of its own [default: the larger of two values]
+    #[arg(
+        long,
+        value_name = "LABEL",
+        conflicts_with = "threshold",
+        allow_hyphen_values = true
+    )]
+    pub label: Option<Label>,
 
     /// Mend a mesh that is open, crosses itself or is not oriented alike: a new mesh is made, and it is said what was changed
     #[arg(long)]
@@ -391,7 +403,8 @@ pub struct FlowOptions {
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub tolerance: Option<Tolerance>,
 
-    /// Hold the volume (the area of a plane shape): keep, a VALUE in the units of the input, or PERCENT of that at the beginning, as 90%
+    /// Hold the volume (the area of a plane shape): keep, a VALUE in the units of the input, or PERCENT of that at the beginning, as 90%;
+    /// of a segmentation it is that of the voxels [default: keep for `fair` of a segmentation]
     #[arg(long, value_name = "TARGET")]
     pub volume: Option<SizeTarget>,
 
@@ -450,7 +463,7 @@ pub struct FairOptions {
     pub flow: FlowOptions,
 
     /// Take off noise of this standard deviation along the normals, in the units of the mesh [default: estimated from the mesh,
-    /// unless --time, --energy, --energy-ratio or --steps says when to stop]
+    /// unless --time, --energy, --energy-ratio or --steps says when to stop; a segmentation flows for (2 voxels)^4, or until it has gone by half a voxel]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub noise: Option<f64>,
 
@@ -571,7 +584,7 @@ pub struct SampleOptions {
     #[command(flatten)]
     pub input: InputOptions,
 
-    /// The file to write: a picture (.png), a mesh (.ply, .obj, .stl) or a field (.npy, .vti)
+    /// The file to write: a picture (.png), a mesh (.ply, .obj, .stl), a field (.npy, .vti) or a segmentation (.nii, .nii.gz)
     #[arg(long, value_name = "FILE")]
     pub save: Option<PathBuf>,
 

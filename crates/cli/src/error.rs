@@ -48,6 +48,8 @@ pub enum Error {
     Solver(#[from] solver::Error),
     #[error(transparent)]
     Surfaces(#[from] surfaces::Error),
+    #[error(transparent)]
+    Volumes(#[from] volumes::Error),
 }
 
 impl From<engine::Error> for Error {

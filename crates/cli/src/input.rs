@@ -18,6 +18,7 @@ use crate::error::Error;
 use crate::outlet::{Outlet, Space, Topology};
 use crate::own::OwnMesh;
 use crate::plane::Plane;
+use crate::volume::{self, Voxels};
 
 /// What a run starts from.
 pub struct Start<const D: usize, O> {
@@ -46,6 +47,7 @@ enum Source<'a> {
     Mesh(PathBuf),
     Image(PathBuf),
     Field(PathBuf),
+    Volume(PathBuf),
     BuiltIn(&'a str),
     Region(Region),
 }
@@ -104,7 +106,9 @@ pub fn load(options: &mut InputOptions, eps_over_h: f64, say: SayOptions) -> Res
     })?;
     let source = Source::of(&input)?;
     source.refuse_foreign(options)?;
-    if let Source::Mesh(path) | Source::Image(path) | Source::Field(path) = &source {
+    if let Source::Mesh(path) | Source::Image(path) | Source::Field(path) | Source::Volume(path) =
+        &source
+    {
         options.input = Some(path.to_string_lossy().into_owned());
     }
     let mut reader = Reader {
@@ -135,12 +139,19 @@ pub fn mesh_file(options: &mut InputOptions) -> Result<Option<PathBuf>, Error> {
     })
 }
 
+/// Whether the input is a volume of voxels.
+pub fn is_volume(options: &InputOptions) -> Result<bool, Error> {
+    let source = options.input.as_deref().map(Source::of).transpose()?;
+    Ok(matches!(source, Some(Source::Volume(_))))
+}
+
 /// The usual format of what becomes of an input: that of a mesh, otherwise PLY in space and PNG in the plane.
 pub fn usual_format(input: &str) -> Result<String, Error> {
     let in_plane = match Source::of(input)? {
         Source::Mesh(path) => return Ok(extension(&path)),
         Source::Image(_) => true,
         Source::Field(path) => is_planar(&path)?,
+        Source::Volume(_) => false,
         Source::BuiltIn(name) => shapes::dimension(name)? == 2,
         Source::Region(region) => region.dimension() == 2,
     };
@@ -253,13 +264,15 @@ impl Source<'_> {
         let path = absolute(input)?;
         match &*extension(&path) {
             "obj" | "stl" | "ply" => Ok(Source::Mesh(path)),
+            "tif" | "tiff" if volumes::is_stack(&path) => Ok(Source::Volume(path)),
             "png" | "jpg" | "jpeg" | "webp" | "gif" | "tif" | "tiff" | "bmp" => {
                 Ok(Source::Image(path))
             }
             "npy" | "vti" => Ok(Source::Field(path)),
+            "nii" | "gz" | "mrc" | "map" => Ok(Source::Volume(path)),
             _ => Err(Error::options(format!(
                 "{input} is no input: give a mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), \
-                 a field (.npy, .vti), builtin:NAME, or a region as box:... or ball:..."
+                 a volume (.nii, .nii.gz, .mrc, .map, .tif of several pages), a field (.npy, .vti), builtin:NAME, or a region as box:... or ball:..."
             ))),
         }
     }
@@ -269,9 +282,11 @@ impl Source<'_> {
         let path = match self {
             Self::BuiltIn(name) => return (*name).to_owned(),
             Self::Region(region) => return region.name().to_owned(),
-            Self::Mesh(path) | Self::Image(path) | Self::Field(path) => path,
+            Self::Mesh(path) | Self::Image(path) | Self::Field(path) | Self::Volume(path) => path,
         };
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        // Of .nii.gz.
+        let stem = stem.strip_suffix(".nii").unwrap_or(&stem);
         let other = |c: char| !(c.is_ascii_alphanumeric() || "-_".contains(c));
         stem.replace(other, "_")
     }
@@ -282,16 +297,23 @@ impl Source<'_> {
             Self::Mesh(_) => "a mesh",
             Self::Image(_) => "an image",
             Self::Field(_) => "a field",
+            Self::Volume(_) => "a volume",
             Self::BuiltIn(_) => "a built-in shape",
             Self::Region(_) => "a region",
         };
         let is_image = matches!(self, Self::Image(_));
+        let is_volume = matches!(self, Self::Volume(_));
         let is_field = matches!(self, Self::Field(_));
         let is_vti = matches!(self, Self::Field(path) if extension(path) == "vti");
         let has_side = !is_field && !matches!(self, Self::Region(_));
         for (name, given, allowed) in [
             ("--inside", options.inside.is_some(), is_image),
-            ("--threshold", options.threshold.is_some(), is_image),
+            (
+                "--threshold",
+                options.threshold.is_some(),
+                is_image || is_volume,
+            ),
+            ("--label", options.label.is_some(), is_volume),
             ("--holds", options.holds.is_some(), is_field),
             ("--repair", options.repair, matches!(self, Self::Mesh(_))),
             ("--side-length", options.side_length.is_some(), has_side),
@@ -333,6 +355,7 @@ impl Reader<'_> {
                 Ok(self.space(field, surfaces::usual_up_axis(&path)?))
             }
             Source::Image(path) => self.image(&path),
+            Source::Volume(path) => self.volume(&path),
             Source::Field(path) if is_planar(&path)? => {
                 let field = self.values(&path)?;
                 self.plane(field)
@@ -532,6 +555,42 @@ impl Reader<'_> {
             Frame::new(width, height, [0.0, f64::from(height)], 1.0)?,
             ImageFrame(Some((path.to_owned(), [width, height]))),
         ))
+    }
+
+    fn volume(&mut self, path: &Path) -> Result<Loaded, Error> {
+        let body = volume::body(path, self.options)?;
+        if let Some(label) = self.options.label {
+            self.name = format!("{}-label{label}", self.name);
+        }
+        let bounds = body.surface.bounding_box();
+        let distance = MeshDistance::new(&body.surface);
+        let sides = body.surface.mesh().sides(MOST_RAYS);
+        // As fine as the voxels, where that is possible.
+        let fine = bounds.longest_side() / (PART * body.voxel);
+        let last = MESH_CELLS.len() - 1;
+        let first = MESH_CELLS.iter().position(|&cells| cells as f64 >= fine);
+        let grids = &MESH_CELLS[first.unwrap_or(last)..];
+        let grid = self.grid_holding(&bounds, grids, &distance, &sides)?;
+        let wide = grid.spacing() / body.voxel;
+        if wide > 1.5 {
+            self.say.note(&format!(
+                "a cell is {wide:.1} voxels wide: with more --cells than {} smaller details last",
+                self.options.cells.unwrap_or_default()
+            ));
+        }
+        let field = self.mesh_field(&body.surface, grid)?;
+        let mut outlet = Space::new(UpAxis::default());
+        outlet.voxels = Some(Voxels {
+            volume: body.volume,
+            side: body.voxel,
+            farthest: None,
+        });
+        Ok(Loaded::Space(Start {
+            name: self.name.clone(),
+            field,
+            outlet,
+            region: None,
+        }))
     }
 
     fn mesh_field(&self, mesh: &ClosedMesh, grid: Grid<3>) -> Result<Field<3>, Error> {

@@ -15,6 +15,7 @@ mod plane;
 mod run;
 mod say;
 mod standard;
+mod volume;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

@@ -5,17 +5,18 @@ use std::path::Path;
 
 use engine::{Measure, Stop};
 use geometry::measure::{BoundingBox, bounding_box, has_interface};
-use geometry::{Field, UpAxis, npy, vti};
+use geometry::{Field, UpAxis, ZeroSet, npy, vti};
 use render::{Picture, Scene, View};
 use runs::{RunDirectory, StoredRun};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use surfaces::ClosedMesh;
+use surfaces::{ClosedMesh, TriangleMesh};
 
 use crate::cli::MeshFormat;
 use crate::error::Error;
 use crate::input::extension;
 use crate::own::{Faired, OwnMesh};
+use crate::volume::Voxels;
 
 /// Pixels a side of pictures of surfaces.
 const PIXELS: u32 = 480;
@@ -120,6 +121,11 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
         Ok(None)
     }
 
+    /// The volume of the input, where that is known better than from the phase field.
+    fn volume(&self) -> Option<f64> {
+        None
+    }
+
     /// What is measured besides,
     fn measures(&self, _: &Field<D>, _: f64) -> Result<Vec<Measure<D>>, Error> {
         Ok(Vec::new())
@@ -149,12 +155,19 @@ pub struct Space {
     /// The mesh whose vertices follow the flow, if it is one.
     #[serde(default)]
     pub own: Option<OwnMesh>,
+    /// The voxels that it was, if it was some.
+    #[serde(default)]
+    pub voxels: Option<Voxels>,
 }
 
 impl Space {
     /// With this axis upwards.
     pub fn new(up: UpAxis) -> Self {
-        Self { up, own: None }
+        Self {
+            up,
+            own: None,
+            voxels: None,
+        }
     }
 }
 
@@ -195,15 +208,14 @@ impl Outlet<3> for Space {
         run: &mut RunDirectory,
     ) -> Result<(), Error> {
         let name = format!("{stem}.{format}");
-        let mesh = surfaces::remeshed_surface(u, eps)?;
-        surfaces::write(run.path().join(&name), &mesh)?;
+        surfaces::write(run.path().join(&name), &surface(u, eps)?)?;
         Ok(run.adopt_file(&name)?)
     }
 
     const SAVED: &'static [&'static str] = &["ply", "obj", "stl"];
 
     fn save(&self, u: &Field<3>, eps: f64, path: &Path) -> Result<(), Error> {
-        Ok(surfaces::write(path, &surfaces::remeshed_surface(u, eps)?)?)
+        Ok(surfaces::write(path, &surface(u, eps)?)?)
     }
 
     fn faired(&self, start: &Field<3>, u: &Field<3>, eps: f64) -> Result<Option<Faired>, Error> {
@@ -212,14 +224,26 @@ impl Outlet<3> for Space {
             .transpose()
     }
 
+    fn volume(&self) -> Option<f64> {
+        let own = self.own.as_ref().filter(|own| own.keeps_volume);
+        let own = own.map(|own| own.fairing().rough().volume());
+        own.or_else(|| self.voxels.map(|voxels| voxels.volume))
+    }
+
     fn measures(&self, start: &Field<3>, eps: f64) -> Result<Vec<Measure<3>>, Error> {
-        let own = self.own.iter();
-        own.map(|own| own.measure(start, eps)).collect()
+        let own = self.own.iter().map(|own| own.measure(start, eps));
+        let voxels = self.voxels.iter();
+        own.chain(voxels.map(|_| Ok(Measure::displacement(start, eps))))
+            .collect()
     }
 
     fn stops(&self, start: &Field<3>) -> Vec<Stop> {
+        let farthest = self.voxels.and_then(|voxels| voxels.farthest);
         let own = self.own.as_ref();
-        own.map_or(Vec::new(), |own| own.stops(start.grid().spacing()))
+        let own = own.map_or(Vec::new(), |own| own.stops(start.grid().spacing()));
+        own.into_iter()
+            .chain(farthest.map(Stop::Displacement))
+            .collect()
     }
 
     fn inputs(&self) -> Result<Vec<(&str, Vec<u8>)>, Error> {
@@ -231,6 +255,17 @@ impl Outlet<3> for Space {
             .as_mut()
             .map_or(Ok(()), |own| own.load_from(stored))
     }
+}
+
+/// The zero set as triangles, which would cut off what is round, with its volume where that can be measured.
+fn surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
+    let mesh = surfaces::remeshed_surface(u, eps)?;
+    let zero_set = ZeroSet::of(u, eps)?;
+    Ok(if zero_set.sizes_hold() {
+        mesh.with_volume(zero_set.volume, |_| true)
+    } else {
+        mesh
+    })
 }
 
 /// Writes `final.npy`, `final.vti`, and, unless the shape has vanished, picture and shape, of which it returns the parts.

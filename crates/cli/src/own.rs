@@ -30,6 +30,9 @@ pub struct OwnMesh {
     noise: f64,
     /// What stays where it is, in the coordinates of the mesh.
     keep: Option<String>,
+    /// Whether it keeps its volume, also where vertices simply follow.
+    #[serde(default)]
+    pub keeps_volume: bool,
     /// The name of the copy of the mask, if that is a mesh, and its bytes.
     #[serde(skip)]
     mask: Option<(String, Vec<u8>)>,
@@ -78,6 +81,7 @@ impl OwnMesh {
                 Noise::Of(length) => length,
                 Noise::Estimated => closed.mesh().noise(),
             },
+            keeps_volume: false,
             mask: None,
             keep,
             loaded: None,
@@ -223,7 +227,10 @@ impl OwnMesh {
             fairing,
         } = self.loaded();
         let followed = fairing.follow(in_place()?, start, eps)?;
-        let moved = fairing.faired(&followed, u)?;
+        let mut moved = fairing.faired(&followed, u)?;
+        if self.keeps_volume {
+            moved = moved.with_volume(fairing.rough().volume(), |v| !fairing.keeps()[v]);
+        }
         let pairs = fairing.rough().mesh().vertices.iter().zip(&moved.vertices);
         let goes: HashMap<_, _> = pairs.map(|(from, to)| (key(*from), *to)).collect();
         let all = TriangleMesh {

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use crate::cli::{Command, InputOptions, SayOptions};
 use crate::error::Error;
 use crate::input::usual_format;
+use crate::volume::Label;
 
 /// The files, which are removed in the end.
 #[derive(Default)]
@@ -36,12 +37,18 @@ impl Standard {
             input.input = Some(path.to_string_lossy().into_owned());
             standard.input = Some(path);
         }
+        let several = input.label == Some(Label::All);
         let Some(save) = save.as_mut().filter(|path| path.as_os_str() == "-") else {
             return Ok(standard);
         };
         if say.json {
             return Err(Error::options(
                 "--json and --save - would both write to standard output: leave one out",
+            ));
+        }
+        if several {
+            return Err(Error::options(
+                "--save - writes one mesh, and --label all makes several: give a file",
             ));
         }
         say.quiet = true;
@@ -91,7 +98,7 @@ fn stand_in(what: &str, format: &str) -> PathBuf {
 
 /// The usual extension of a file with these contents: OBJ, which is any text, if they are nothing else.
 fn kind(bytes: &[u8]) -> &'static str {
-    const BEGINNINGS: [(&[u8], &str); 12] = [
+    const BEGINNINGS: [(&[u8], &str); 15] = [
         (b"ply", "ply"),
         (b"solid", "stl"),
         (b"\x89PNG", "png"),
@@ -102,6 +109,9 @@ fn kind(bytes: &[u8]) -> &'static str {
         (b"RIFF", "webp"),
         (b"BM", "bmp"),
         (b"\x93NUMPY", "npy"),
+        (b"\x1f\x8b", "nii.gz"),
+        (b"\x5c\x01\0\0", "nii"),
+        (b"\x1c\x02\0\0", "nii"),
         (b"<?xml", "vti"),
         (b"<VTKFile", "vti"),
     ];
@@ -110,6 +120,9 @@ fn kind(bytes: &[u8]) -> &'static str {
     let length = facets.map(|count| 84 + 50 * u64::from(u32::from_le_bytes(count)));
     if length == Some(bytes.len() as u64) {
         return "stl";
+    }
+    if bytes.get(208..212) == Some(b"MAP ") {
+        return "mrc";
     }
     let known = BEGINNINGS
         .iter()

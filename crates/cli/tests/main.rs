@@ -15,3 +15,4 @@ mod refusals;
 mod resume;
 mod trust;
 mod tutorial;
+mod volumes;

@@ -1,7 +1,7 @@
 //! Every reason to end.
 
 use crate::common::{EPS, TAU, case, disc, divided, finished, grid};
-use engine::{Flow, Method, Record, StepRule, Stop};
+use engine::{Flow, Measure, Method, Record, StepRule, Stop};
 use geometry::Field;
 
 #[test]
@@ -62,4 +62,24 @@ fn a_flat_interface_is_at_rest() {
     flat.stops = vec![Stop::Steps(12), Stop::EnergyAtRest];
     let run = finished(flat);
     assert_eq!(run.ended(), Some(Stop::EnergyAtRest));
+}
+
+/// A disc whose radius grows has gone by that.
+#[test]
+fn how_far_the_zero_set_has_gone_is_measured() {
+    let measure = Measure::displacement(&disc(128, 0.2), EPS);
+    for (radius, gone) in [(0.2, 0.0), (0.203, 0.003), (0.19, 0.01)] {
+        let u = disc(128, radius);
+        let measured: Vec<_> = measure.of(&u, 0.0).unwrap().collect();
+        let [(name, value)] = measured[..] else {
+            panic!("{measured:?}");
+        };
+        assert_eq!(name, engine::DISPLACEMENT);
+        assert!((value - gone).abs() < 1e-6, "{value} {gone}");
+    }
+    let mut growing = case(Flow::Willmore, Method::Hybrid, disc(128, 0.15));
+    growing.measures = vec![Measure::displacement(&growing.initial, EPS)];
+    growing.stops = vec![Stop::Steps(50), Stop::Displacement(0.01)];
+    let run = finished(growing);
+    assert_eq!(run.ended(), Some(Stop::Displacement(0.01)));
 }

@@ -180,6 +180,32 @@ impl ClosedMesh {
         bounds.expect("a closed mesh has vertices")
     }
 
+    /// The surface without the components, cavities too, that enclose less than `least`: specks and bubbles. All of it if nothing would be
+    /// left.
+    ///
+    /// # Errors
+    /// As [`ClosedMesh::new`].
+    pub fn without_small_parts(&self, least: f64) -> Result<Self, Error> {
+        let Seams {
+            component,
+            components,
+            ..
+        } = Seams::find(&self.mesh)?;
+        let mut parts = vec![Vec::new(); components];
+        for (face, &part) in self.mesh.faces.iter().zip(&component) {
+            parts[part as usize].push(*face);
+        }
+        parts.retain(|faces| volume(&self.mesh, faces).abs() >= least);
+        if parts.is_empty() {
+            return Ok(self.clone());
+        }
+        let mesh = TriangleMesh {
+            faces: parts.concat(),
+            ..self.mesh.clone()
+        };
+        Ok(Self::new(mesh)?.0)
+    }
+
     /// The surface scaled and moved.
     #[must_use]
     pub fn placed(&self, placement: &Placement<3>) -> Self {

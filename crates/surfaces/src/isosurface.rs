@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use geometry::{Field, Grid, distance_from_phase_field};
+use geometry::{Field, distance_from_phase_field};
 use rayon::prelude::*;
 
 use crate::vector::Vector;
@@ -44,10 +44,36 @@ pub fn phase_field_surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error
 /// [`geometry::Error::NonFinite`]; [`Error::TooLarge`].
 pub fn isosurface(s: &Field<3>) -> Result<TriangleMesh, Error> {
     s.check_finite()?;
-    let lattice = Lattice::new(s);
+    let grid = s.grid();
+    marched(&Lattice::new(
+        grid.shape(),
+        s.values(),
+        grid.origin(),
+        [grid.side(), grid.cells() as f64],
+    ))
+}
+
+/// The same of values on a lattice of any size, the last axis fastest, whose nodes have their indices as coordinates: not of a grid in a
+/// cube, but of the voxels of a volume.
+///
+/// # Errors
+/// [`geometry::Error::ValueCount`], [`geometry::Error::NonFinite`]; [`Error::TooLarge`].
+pub fn lattice_surface(size: [usize; 3], values: &[f64]) -> Result<TriangleMesh, Error> {
+    let (expected, actual) = (size.iter().product(), values.len());
+    if expected != actual {
+        return Err(geometry::Error::ValueCount { expected, actual }.into());
+    }
+    if let Some(index) = values.iter().position(|v| !v.is_finite()) {
+        let value = values[index];
+        return Err(geometry::Error::NonFinite { index, value }.into());
+    }
+    marched(&Lattice::new(size, values, [0.0; 3], [1.0; 2]))
+}
+
+fn marched(lattice: &Lattice<'_>) -> Result<TriangleMesh, Error> {
     let tetrahedra = tetrahedra();
     let mut surface = Surface {
-        lattice: &lattice,
+        lattice,
         vertex_of: HashMap::new(),
         vertices: Vec::new(),
         normals: Vec::new(),
@@ -75,7 +101,7 @@ pub fn isosurface(s: &Field<3>) -> Result<TriangleMesh, Error> {
     surface.finish()
 }
 
-/// Indices of a node, counted from one: 0 and `N + 1` are the layers outside.
+/// Indices of a node, counted from one: 0 and one more than the last are the layers outside.
 type Node = [usize; 3];
 
 /// Vertices keep this part of the length of their edge from its ends.
@@ -83,36 +109,41 @@ const CLEARANCE: f64 = 1.0 / 1024.0;
 
 /// The nodes with a layer of outside around them.
 struct Lattice<'a> {
-    grid: &'a Grid<3>,
+    size: [usize; 3],
     values: &'a [f64],
     inside: Vec<bool>,
+    origin: [f64; 3],
+    /// So many nodes along each axis are so long: length and number.
+    spacing: [f64; 2],
 }
 
 impl<'a> Lattice<'a> {
-    fn new(s: &'a Field<3>) -> Self {
-        let (grid, values) = (s.grid(), s.values());
-        let (cells, layers) = (grid.cells(), grid.cells() + 2);
-        let mut inside = vec![false; layers.pow(3)];
-        for (row, values) in values.chunks(cells).enumerate() {
-            let (i, j) = (row / cells + 1, row % cells + 1);
-            let start = (i * layers + j) * layers + 1;
+    fn new(size: [usize; 3], values: &'a [f64], origin: [f64; 3], spacing: [f64; 2]) -> Self {
+        let layers = size.map(|n| n + 2);
+        let mut inside = vec![false; layers.iter().product()];
+        for (row, values) in values.chunks(size[2]).enumerate() {
+            let (i, j) = (row / size[1] + 1, row % size[1] + 1);
+            let start = (i * layers[1] + j) * layers[2] + 1;
             for (inside, &value) in inside[start..].iter_mut().zip(values) {
                 *inside = value < 0.0;
             }
         }
         Self {
-            grid,
+            size,
             values,
             inside,
+            origin,
+            spacing,
         }
     }
 
-    fn layers(&self) -> usize {
-        self.grid.cells() + 2
+    fn layers(&self) -> [usize; 3] {
+        self.size.map(|n| n + 2)
     }
 
     fn index(&self, [i, j, k]: Node) -> usize {
-        (i * self.layers() + j) * self.layers() + k
+        let [_, rows, columns] = self.layers();
+        (i * rows + j) * columns + k
     }
 
     fn is_inside(&self, node: Node) -> bool {
@@ -124,15 +155,15 @@ impl<'a> Lattice<'a> {
         let layers = self.layers();
         let of_layer = |i: usize| {
             let mut mixed = Vec::new();
-            for j in 0..layers - 1 {
+            for j in 0..layers[1] - 1 {
                 let row = |di: usize, dj: usize| {
                     let start = self.index([i + di, j + dj, 0]);
-                    &self.inside[start..start + layers]
+                    &self.inside[start..start + layers[2]]
                 };
                 let rows = [row(0, 0), row(0, 1), row(1, 0), row(1, 1)];
                 let column = |k: usize| rows.iter().map(|row| u8::from(row[k])).sum::<u8>();
                 let mut left = column(0);
-                for k in 0..layers - 1 {
+                for k in 0..layers[2] - 1 {
                     let right = column(k + 1);
                     if !matches!(left + right, 0 | 8) {
                         mixed.push([i, j, k]);
@@ -142,17 +173,16 @@ impl<'a> Lattice<'a> {
             }
             mixed
         };
-        let by_layer: Vec<Vec<Node>> = (0..layers - 1).into_par_iter().map(of_layer).collect();
+        let by_layer: Vec<Vec<Node>> = (0..layers[0] - 1).into_par_iter().map(of_layer).collect();
         by_layer.concat()
     }
 
     /// The value at a node, `None` outside the grid.
     fn value(&self, node: [isize; 3]) -> Option<f64> {
-        let cells = self.grid.cells();
         let mut index = 0;
-        for i in node {
-            let i = usize::try_from(i - 1).ok().filter(|&i| i < cells)?;
-            index = index * cells + i;
+        for (i, size) in node.into_iter().zip(self.size) {
+            let i = usize::try_from(i - 1).ok().filter(|&i| i < size)?;
+            index = index * size + i;
         }
         Some(self.values[index])
     }
@@ -160,8 +190,8 @@ impl<'a> Lattice<'a> {
     fn position(&self, node: Node) -> Vector {
         let along = |axis: usize| {
             // As `Grid::coordinate`, from one layer before the first.
-            let (cells, side) = (self.grid.cells() as f64, self.grid.side());
-            self.grid.origin()[axis] + side * ((node[axis] as f64 - 1.0) / cells)
+            let [side, cells] = self.spacing;
+            self.origin[axis] + side * ((node[axis] as f64 - 1.0) / cells)
         };
         Vector::new(along(0), along(1), along(2))
     }

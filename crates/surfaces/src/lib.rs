@@ -87,7 +87,7 @@ pub use error::Error;
 use error::positive;
 pub use fairing::{Fairing, Followed, root_mean_square};
 pub use format::usual_up_axis;
-pub use isosurface::{isosurface, phase_field_surface};
+pub use isosurface::{isosurface, lattice_surface, phase_field_surface};
 pub use mesh::TriangleMesh;
 pub use read::error::FormatError;
 pub use read::{decode, read};

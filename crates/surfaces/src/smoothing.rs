@@ -132,19 +132,54 @@ impl TriangleMesh {
         const STEPS: usize = 4;
         let mut moved = self.clone();
         for _ in 0..STEPS {
-            let normals = moved.vertex_normals().into_iter().enumerate();
-            let normals: Vec<Vector> = normals
-                .map(|(v, n)| if moves(v) { n.into() } else { Vector::ZERO })
-                .collect();
-            let derivative = moved.volume_derivative(&normals);
-            if derivative == 0.0 {
-                break;
-            }
-            let length = (volume - moved.volume()) / derivative;
-            let offset: Vec<_> = normals.into_iter().map(|n| length * n).collect();
-            moved = moved.moved_by(&offset);
+            moved = moved.towards_volume(volume, &moves);
         }
-        moved
+        Self {
+            normals: self.normals.clone(),
+            ..moved
+        }
+    }
+
+    /// One step of Newton's method.
+    fn towards_volume(&self, volume: f64, moves: impl Fn(usize) -> bool) -> Self {
+        let normals = self.vertex_normals().into_iter().enumerate();
+        let normals: Vec<Vector> = normals
+            .map(|(v, n)| if moves(v) { n.into() } else { Vector::ZERO })
+            .collect();
+        let derivative = self.volume_derivative(&normals);
+        if derivative == 0.0 {
+            return self.clone();
+        }
+        let length = (volume - self.volume()) / derivative;
+        let offset: Vec<_> = normals.into_iter().map(|n| length * n).collect();
+        self.moved_by(&offset)
+    }
+
+    /// The closed surface as small as it becomes in some rounds in which every vertex moves halfway to the middle of its neighbours, then
+    /// all of them along their normals so that it encloses `volume`, and none further from where it was than `shortened` allows, which
+    /// says of a vertex and its way how much of it may be gone. In the end it encloses `volume`.
+    #[must_use]
+    pub fn relaxed(
+        &self,
+        rounds: usize,
+        volume: f64,
+        shortened: impl Fn(usize, [f64; 3]) -> f64,
+    ) -> Self {
+        let umbrellas = Umbrellas::of(self);
+        let mut moved = self.clone();
+        for _ in 0..rounds {
+            let mut x: Vec<Vector> = moved.vertices.iter().map(|&x| x.into()).collect();
+            umbrellas.smooth(&mut x, 1, [0.5, 0.0]);
+            moved.vertices = x.iter().map(Vector::to_array).collect();
+            moved = moved.towards_volume(volume, |_| true);
+            let pairs = moved.vertices.iter_mut().zip(&self.vertices);
+            for (vertex, (x, &from)) in pairs.enumerate() {
+                let way = Vector::from_array(*x) - Vector::from_array(from);
+                let part = shortened(vertex, way.to_array());
+                *x = (Vector::from_array(from) + part * way).to_array();
+            }
+        }
+        moved.with_volume(volume, |_| true)
     }
 
     /// The derivative of the enclosed volume for velocities of the vertices.

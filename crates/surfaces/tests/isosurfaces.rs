@@ -9,7 +9,9 @@ use geometry::shapes::{Ball, Cuboid, Torus};
 use geometry::{Field, Grid, Rotation, SignedDistance, SignedDistanceExt, phase_field};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use surfaces::{ClosedMesh, Error, MeshDistance, isosurface, phase_field_surface, samples};
+use surfaces::{
+    ClosedMesh, Error, MeshDistance, isosurface, lattice_surface, phase_field_surface, samples,
+};
 
 /// Every edge once in each direction, without mending anything.
 #[track_caller]
@@ -317,4 +319,62 @@ proptest! {
             }
         }
     }
+}
+
+/// The voxels of an ellipsoid in a box that is no cube, in units of the lattice.
+#[test]
+fn a_lattice_need_not_be_a_cube() {
+    let size = [14, 22, 30];
+    let centre = [6.6, 10.4, 14.7];
+    let node = |v: usize| [v / (22 * 30), v / 30 % 22, v % 30].map(|i| i as f64);
+    let value = |x: [f64; 3]| {
+        let scaled = (0..3).map(|i| (x[i] - centre[i]) / (0.8 * (centre[i] - 0.5)));
+        scaled.map(|v| v * v).sum::<f64>().sqrt() - 1.0
+    };
+    let values: Vec<f64> = (0..14 * 22 * 30).map(|v| value(node(v))).collect();
+    let mesh = closed(lattice_surface(size, &values).unwrap());
+    assert_eq!(mesh.genus(), 0);
+    for &x in &mesh.mesh().vertices {
+        assert!(value(x).abs() < 5e-3, "{x:?}");
+    }
+    // As of a field, but for the place and the size.
+    let field = samples::figure(48).unwrap();
+    let grid = Grid::centred(24, 1.0).unwrap();
+    let s = MeshDistance::new(&field).sample(grid, || ()).unwrap();
+    let (one, other) = (
+        isosurface(&s).unwrap(),
+        lattice_surface([24; 3], s.values()),
+    );
+    assert_eq!(one.faces, other.unwrap().faces);
+    let error = lattice_surface([2, 3, 4], &[0.0; 20]).unwrap_err();
+    assert!(matches!(
+        error,
+        Error::Geometry(geometry::Error::ValueCount { .. })
+    ));
+    let error = lattice_surface([2; 3], &[f64::NAN; 8]).unwrap_err();
+    assert!(matches!(
+        error,
+        Error::Geometry(geometry::Error::NonFinite { .. })
+    ));
+}
+
+#[test]
+fn relaxed_surfaces_keep_their_volume_and_their_place() {
+    let grid = Grid::centred(32, 1.0).unwrap();
+    let steps = Field::from_fn(grid, |x| {
+        let inside = x.iter().map(|v| v * v).sum::<f64>() < 0.09;
+        if inside { -1.0 } else { 1.0 }
+    });
+    let rough = isosurface(&steps).unwrap();
+    let (reach, volume) = (0.5 / 32.0, 0.11);
+    let smooth = rough.relaxed(20, volume, |_, way| {
+        let length = way.iter().map(|v| v * v).sum::<f64>().sqrt();
+        (reach / length).min(1.0)
+    });
+    let [before, after] = [rough.clone(), smooth.clone()].map(closed);
+    assert!((after.volume() / volume - 1.0).abs() < 1e-12);
+    assert!(after.area() < 0.9 * before.area());
+    let (_, gone) = surfaces::root_mean_square(&rough.vertices, &smooth.vertices);
+    // The last move to the volume comes on top.
+    assert!(gone < 1.2 * reach, "{gone} {reach}");
 }

@@ -6,14 +6,51 @@ use engine::{Scales, StepRule};
 use surfaces::Fairing;
 
 use super::flow::{FlowCommand, Shared};
-use crate::cli::{FairOptions, FlowOptions, MeshFormat, SayOptions};
+use crate::cli::{FairOptions, FlowOptions, MeshFormat, SayOptions, SizeTarget};
 use crate::error::Error;
-use crate::input::{self, Loaded};
+use crate::input::{self, Loaded, Start};
 use crate::keep::Keep;
 use crate::own::{Noise, OwnMesh};
 
 /// Energies below this have only balls, which have `8 pi`.
 const BALL: f64 = 1.2 * 8.0 * PI;
+
+/// Of a segmentation, details of so many voxels are taken for its steps,
+const STEPS: f64 = 2.0;
+/// as long as the surface goes no further than so many, root of the mean square.
+const FARTHEST: f64 = 0.5;
+
+impl FairOptions {
+    /// A segmentation, whose volume is kept.
+    fn load_volume(&mut self, say: SayOptions) -> Result<Loaded, Error> {
+        for (name, given) in [
+            ("--noise", self.noise.is_some()),
+            ("--keep", self.keep.is_some()),
+        ] {
+            if given {
+                return Err(Error::options(format!(
+                    "{name} has no meaning for a volume, of which a new mesh is made: leave it out"
+                )));
+            }
+        }
+        let flow = &mut self.flow;
+        if flow.reduced_volume.is_none() {
+            flow.volume.get_or_insert(SizeTarget::Keep);
+        }
+        let mut loaded = input::load(&mut flow.input, flow.scheme.eps_over_h(), say)?;
+        if let Loaded::Space(Start { field, outlet, .. }) = &mut loaded
+            && let Some(voxels) = outlet.voxels.as_mut().filter(|_| !self.ends)
+        {
+            voxels.farthest = Some(FARTHEST * voxels.side);
+            flow.time = Some((STEPS * voxels.side).powi(4));
+            flow.tau.get_or_insert(StepRule::Graded {
+                first: Fairing::first_step(field.grid().spacing()),
+                part: Fairing::GROWTH,
+            });
+        }
+        Ok(loaded)
+    }
+}
 
 impl FlowCommand for FairOptions {
     const NAME: &'static str = "fair";
@@ -60,6 +97,9 @@ impl FlowCommand for FairOptions {
     }
 
     fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
+        if input::is_volume(&self.flow.input)? {
+            return self.load_volume(say);
+        }
         let ends = self.ends;
         let eps_over_h = self.flow.scheme.eps_over_h();
         let input = &mut self.flow.input;
@@ -94,7 +134,8 @@ impl FlowCommand for FairOptions {
             None => Noise::Estimated,
         };
         let estimated = matches!(noise, Noise::Estimated);
-        let (own, warnings) = OwnMesh::new(&path, bytes, noise, self.keep.clone())?;
+        let (mut own, warnings) = OwnMesh::new(&path, bytes, noise, self.keep.clone())?;
+        own.keeps_volume = self.flow.volume == Some(SizeTarget::Keep);
         for warning in warnings {
             say.warn(&format!("{}: {warning}", path.display()));
         }

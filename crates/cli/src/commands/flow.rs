@@ -24,6 +24,7 @@ use crate::input::{self, Loaded, Start};
 use crate::outlet::{Outlet, Space};
 use crate::plane::Plane;
 use crate::run::Plan;
+use crate::volume::{self, Label};
 
 /// Steps of a run that has no other end.
 const STEPS: usize = 20;
@@ -35,7 +36,7 @@ const RAMP: usize = 20;
 const SAVED: [&str; 5] = ["ply", "obj", "stl", "png", "svg"];
 
 /// A command that makes a run.
-pub trait FlowCommand: Serialize {
+pub trait FlowCommand: Serialize + Clone {
     /// Its name.
     const NAME: &'static str;
     /// The flow.
@@ -167,7 +168,12 @@ impl FlowOptions {
     }
 
     /// The sizes that are held, from what they are at the beginning.
-    fn held<const D: usize>(&self, initial: &Field<D>, eps: f64) -> Result<Held, Error> {
+    fn held<const D: usize>(
+        &self,
+        initial: &Field<D>,
+        eps: f64,
+        outlet: &impl Outlet<D>,
+    ) -> Result<Held, Error> {
         let ramp = self.ramp.unwrap_or(RAMP);
         if let Some(target) = self.reduced_volume {
             return Ok(Held::at_reduced_volume(initial, eps, target, ramp)?);
@@ -176,19 +182,20 @@ impl FlowOptions {
             return Ok(Held::default());
         }
         let now = ZeroSet::of(initial, eps)?;
-        let target = |wanted: Option<SizeTarget>, from: f64| {
+        let target = |wanted: Option<SizeTarget>, from: f64, of_input: f64| {
             wanted.map(|wanted| match wanted {
-                SizeTarget::Keep => Target::keep(from),
+                SizeTarget::Keep => Target::keep(of_input),
                 other => Target {
                     from,
-                    to: other.of(from),
+                    to: other.of(of_input),
                     over: ramp,
                 },
             })
         };
+        let of_input = outlet.volume().unwrap_or(now.volume);
         Ok(Held {
-            perimeter: target(self.area, now.perimeter),
-            volume: target(self.volume, now.volume),
+            perimeter: target(self.area, now.perimeter, now.perimeter),
+            volume: target(self.volume, now.volume, of_input),
         })
     }
 }
@@ -252,6 +259,9 @@ pub fn run<C: FlowCommand>(
     say: SayOptions,
     stored: Option<(StoredRun, Option<usize>)>,
 ) -> Result<ExitCode, Error> {
+    if let Some(path) = volume::of_all_labels(command.shared().input)? {
+        return each_label(&command, &path, say);
+    }
     command.check()?;
     let ends = command.ends();
     let mut shared = command.shared();
@@ -282,6 +292,27 @@ pub fn run<C: FlowCommand>(
         Loaded::Plane(start, _) => job.start(start),
         Loaded::Space(start) => job.start(start),
     }
+}
+
+/// One run for each label of a volume, until one is interrupted.
+fn each_label<C: FlowCommand>(
+    command: &C,
+    path: &Path,
+    say: SayOptions,
+) -> Result<ExitCode, Error> {
+    for label in volume::labels(path)? {
+        let mut one = command.clone();
+        let Shared { input, keep, .. } = one.shared();
+        input.label = Some(Label::One(label));
+        for name in keep.output.iter_mut().chain(&mut keep.save) {
+            *name = volume::named(name, label);
+        }
+        let code = run(one, say, None)?;
+        if code != ExitCode::SUCCESS {
+            return Ok(code);
+        }
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 /// A command with its device.
@@ -368,7 +399,7 @@ impl<C: FlowCommand> Job<C> {
         let mut measures = vec![Measure::zero_set(eps)];
         measures.extend(outlet.measures(&initial, eps)?);
         let (energy, held) = match &options {
-            Some(options) => (options.energy()?, options.held(&initial, eps)?),
+            Some(options) => (options.energy()?, options.held(&initial, eps, outlet)?),
             None => (Helfrich::default(), Held::default()),
         };
         Ok(Case {

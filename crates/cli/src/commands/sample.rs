@@ -6,11 +6,13 @@ use std::process::ExitCode;
 use geometry::{Field, npy, phase_field, vti};
 use serde_json::json;
 use surfaces::shapes::Region;
+use volumes::Volume;
 
 use crate::cli::{InputOptions, SampleOptions, SayOptions};
 use crate::error::Error;
 use crate::input::{self, Loaded, Start};
 use crate::outlet::Outlet;
+use crate::volume::{self, Label};
 
 /// Interface width in cells of what is written.
 const EPS_OVER_H: f64 = 2.0;
@@ -18,14 +20,25 @@ const EPS_OVER_H: f64 = 2.0;
 /// Writes an input as the flows begin with it, possibly damaged.
 pub fn run(mut options: SampleOptions, say: SayOptions) -> Result<ExitCode, Error> {
     let path = options.save.take().ok_or_else(|| {
-        Error::options("sample needs --save FILE, with .png, .ply, .obj, .stl, .npy or .vti")
+        Error::options(
+            "sample needs --save FILE, with .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz",
+        )
     })?;
+    if let Some(of) = volume::of_all_labels(&options.input)? {
+        for label in volume::labels(&of)? {
+            let mut one = options.clone();
+            one.input.label = Some(Label::One(label));
+            one.save = Some(volume::named(&path, label));
+            run(one, say)?;
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
     let extension = input::extension(&path);
     let is_mesh = ["ply", "obj", "stl"].contains(&&*extension);
     let shown = path.display();
-    if !is_mesh && !["png", "npy", "vti"].contains(&&*extension) {
+    if !is_mesh && !["png", "npy", "vti", "nii", "gz"].contains(&&*extension) {
         return Err(Error::options(format!(
-            "--save {shown} must end in .png, .ply, .obj, .stl, .npy or .vti"
+            "--save {shown} must end in .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz"
         )));
     }
     options.force.check("--save", &path)?;
@@ -96,6 +109,7 @@ fn write<const D: usize, O: Outlet<D>>(
     let u = without(start.field, &options.without)?;
     match &*input::extension(path) {
         "npy" => npy::write(path, &u)?,
+        "nii" | "gz" => volumes::write(path, &segmentation(&u, path)?)?,
         "vti" => vti::write(path, &[("phase_field", &u)])?,
         "png" => start.outlet.picture(&u, &u, eps(&u))?.write_png(path)?,
         _ => {
@@ -104,6 +118,26 @@ fn write<const D: usize, O: Outlet<D>>(
         }
     }
     Ok(())
+}
+
+/// The nodes inside as voxels labelled 1.
+fn segmentation<const D: usize>(u: &Field<D>, path: &Path) -> Result<Volume, Error> {
+    let grid = u.grid();
+    let Ok(origin) = <[f64; 3]>::try_from(&grid.origin()[..]) else {
+        return Err(Error::options(format!(
+            "--save {}: a shape in {D}D has no voxels",
+            path.display()
+        )));
+    };
+    let cells = grid.cells();
+    // The first axis runs fastest.
+    let label = |voxel: usize| {
+        let digits = std::array::from_fn(|axis| voxel / cells.pow(axis as u32) % cells);
+        u8::from(u.values()[grid.index(digits)] > 0.0)
+    };
+    let labels = (0..grid.len()).map(label).collect();
+    let sides = [grid.spacing(); 3];
+    Ok(Volume::of_labels([cells; 3], origin, sides, labels)?)
 }
 
 /// The shape without regions.

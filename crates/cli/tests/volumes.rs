@@ -1,0 +1,211 @@
+//! Segmentations as inputs: surfaces without steps, of the volume of the voxels.
+
+use std::f64::consts::PI;
+use std::path::Path;
+
+use serde_json::Value;
+use surfaces::ClosedMesh;
+use volumes::Volume;
+
+use crate::common::{outcome, program, run, text};
+
+/// Side of a voxel, and the centre of the first one.
+const SIDE: f64 = 0.7;
+const ORIGIN: [f64; 3] = [100.0, -50.0, 3.0];
+
+/// Labels of voxels by their indices, in 38 voxels a side.
+fn write(path: &Path, label: impl Fn([f64; 3]) -> u8) -> Volume {
+    let voxels = (0..38 * 38 * 38_usize).map(|v| [v % 38, v / 38 % 38, v / (38 * 38)]);
+    let labels = voxels.map(|index| label(index.map(|i| i as f64)));
+    let volume = Volume::of_labels([38; 3], ORIGIN, [SIDE; 3], labels.collect()).unwrap();
+    volumes::write(path, &volume).unwrap();
+    volume
+}
+
+/// A ball about this centre, in voxels.
+fn ball(x: [f64; 3], centre: [f64; 3], radius: f64) -> bool {
+    (0..3).map(|i| (x[i] - centre[i]).powi(2)).sum::<f64>() < radius * radius
+}
+
+fn number(outcome: &Value, name: &str) -> f64 {
+    let found = outcome[name].as_f64();
+    found.unwrap_or_else(|| panic!("no {name} in {outcome}"))
+}
+
+fn closed(path: &Path) -> ClosedMesh {
+    ClosedMesh::new(surfaces::read(path).unwrap()).unwrap().0
+}
+
+#[test]
+fn a_ball_of_voxels_becomes_a_ball_of_their_volume() {
+    let folder = tempfile::tempdir().unwrap();
+    let centre = [18.3, 18.1, 18.45];
+    let volume = write(&folder.path().join("ball.nii.gz"), |x| {
+        u8::from(ball(x, centre, 16.0))
+    });
+    let voxels = volume.labels().unwrap()[1].1 as f64 * SIDE.powi(3);
+    let options = ["--volume", "keep", "--save", "ball.ply", "--output", "run"];
+    let ended = outcome(
+        folder.path(),
+        &[&["fair", "ball.nii.gz"][..], &options].concat(),
+    );
+    assert!(
+        (number(&ended, "volume") / voxels - 1.0).abs() < 1e-6,
+        "{ended}"
+    );
+    assert!(
+        (number(&ended, "energy_over_8_pi") - 1.0).abs() < 0.005,
+        "{ended}"
+    );
+    let mesh = closed(&folder.path().join("ball.ply"));
+    assert!(
+        (mesh.volume() / voxels - 1.0).abs() < 1e-6,
+        "{}",
+        mesh.volume()
+    );
+    // In the coordinates of the volume.
+    let radius = (0.75 / PI * voxels).cbrt();
+    for x in &mesh.mesh().vertices {
+        let offset = (0..3).map(|i| (x[i] - ORIGIN[i] - SIDE * centre[i]).powi(2));
+        let off = offset.sum::<f64>().sqrt() - radius;
+        assert!(off.abs() < 0.2 * SIDE, "{x:?} is off by {off}");
+    }
+}
+
+/// Beyond its noise, which leaves a sphere with long waves.
+#[test]
+fn a_noisy_sphere_becomes_a_sphere_of_its_volume() {
+    let folder = tempfile::tempdir().unwrap();
+    let noisy = ["sample", "builtin:sphere", "--noise", "0.004"];
+    let save = ["--save", "noisy.ply"];
+    outcome(folder.path(), &[&noisy[..], &save].concat());
+    let options = ["--volume", "keep", "--save", "ball.ply", "--cells", "64"];
+    let time = [
+        "--side-length",
+        "0.6",
+        "--tau",
+        "graded:1e-8,0.5",
+        "--time",
+        "1e-5",
+    ];
+    let fair = [&["fair", "noisy.ply"][..], &options, &time].concat();
+    let ended = outcome(folder.path(), &fair);
+    let [before, after] = ["noisy.ply", "ball.ply"].map(|name| closed(&folder.path().join(name)));
+    for volume in [after.volume(), number(&ended, "volume")] {
+        assert!(
+            (volume / before.volume() - 1.0).abs() < 1e-6,
+            "{volume} {ended}"
+        );
+    }
+    assert!(
+        (number(&ended, "energy_over_8_pi") - 1.0).abs() < 0.02,
+        "{ended}"
+    );
+}
+
+#[test]
+fn every_label_becomes_a_surface() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("two.nii");
+    let volume = write(&file, |x| {
+        let here = |centre, radius| u8::from(ball(x, centre, radius));
+        3 * here([10.0, 18.0, 18.0], 8.0) + 7 * here([28.0, 18.0, 18.0], 6.0)
+    });
+    for (arguments, parts) in [
+        (
+            &["flow", "two.nii"][..],
+            &["the values 0, 3, 7", "--label"][..],
+        ),
+        (
+            &["flow", "two.nii", "--label", "4"],
+            &["no voxel is labelled 4"],
+        ),
+        (
+            &["flow", "two.nii", "--label", "x"],
+            &["neither a whole number nor all"],
+        ),
+        (
+            &["flow", "two.nii", "--label", "3", "--threshold", "2"],
+            &["--threshold"],
+        ),
+        (
+            &["check", "two.nii", "--label", "all"],
+            &["give its number"],
+        ),
+        (
+            &["fair", "two.nii", "--label", "3", "--noise", "1"],
+            &["--noise has no meaning"],
+        ),
+        (
+            &["flow", "builtin:cube", "--label", "3"],
+            &["--label has no meaning"],
+        ),
+        (
+            &["sample", "two.nii", "--label", "all", "--save", "-"],
+            &["several"],
+        ),
+    ] {
+        let output = program(folder.path()).args(arguments).output().unwrap();
+        let error = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
+        for part in parts {
+            assert!(error.contains(part), "{part}: {error}");
+        }
+    }
+    let sample = ["sample", "two.nii", "--label", "all", "--save", "body.stl"];
+    run(folder.path(), &sample);
+    let counts = volume.labels().unwrap();
+    for ((label, count), first) in counts[1..].iter().zip([2.0, 22.0]) {
+        let mesh = closed(&folder.path().join(format!("body-label{label}.stl")));
+        let voxels = *count as f64 * SIDE.powi(3);
+        assert!((mesh.volume() / voxels - 1.0).abs() < 2e-3, "{label}");
+        let low = mesh.bounding_box().lower[0];
+        assert!((low - ORIGIN[0] - SIDE * first).abs() < 0.5 * SIDE, "{low}");
+    }
+    let options = [
+        "--label", "all", "--cells", "32", "--steps", "2", "--output", "run",
+    ];
+    let output = run(
+        folder.path(),
+        &[&["fair", "two.nii"][..], &options].concat(),
+    );
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    // Continued, a run still keeps the volume of the voxels.
+    let seven = [
+        "fair", "two.nii", "--label", "7", "--cells", "32", "--steps", "3",
+    ];
+    outcome(
+        folder.path(),
+        &[&seven[..], &["--output", "three"]].concat(),
+    );
+    let ended = outcome(folder.path(), &["resume", "run-label7", "--steps", "3"]);
+    let voxels = counts[2].1 as f64 * SIDE.powi(3);
+    assert!(
+        (number(&ended, "volume") / voxels - 1.0).abs() < 1e-6,
+        "{ended}"
+    );
+    for name in ["final.npy", "final.ply"] {
+        let [a, b] = ["run-label7", "three"].map(|run| folder.path().join(run).join(name));
+        assert!(
+            std::fs::read(a).unwrap() == std::fs::read(b).unwrap(),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn shapes_are_written_as_voxels_and_read_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let sample = |arguments: &[&str]| outcome(folder.path(), &[&["sample"], arguments].concat());
+    sample(&["builtin:torus", "--cells", "48", "--save", "torus.nii.gz"]);
+    sample(&["torus.nii.gz", "--save", "torus.ply"]);
+    let mesh = closed(&folder.path().join("torus.ply"));
+    assert_eq!(mesh.genus(), 1);
+    // 2 pi^2 R r^2 with R = 0.72 x 0.3 and r = 0.28 x 0.3.
+    let exact = 2.0 * PI * PI * 0.216 * 0.084 * 0.084;
+    assert!(
+        (mesh.volume() / exact - 1.0).abs() < 0.02,
+        "{} {exact}",
+        mesh.volume()
+    );
+}

@@ -1,0 +1,58 @@
+//! Volumes of voxels, such as segmentations, as closed surfaces.
+//!
+//! ```
+//! use volumes::{Inside, Volume, read, write};
+//!
+//! fn main() -> Result<(), volumes::Error> {
+//!     // A ball of radius 8 in voxels of 1 x 1 x 2, labelled 3.
+//!     let (size, sides) = ([24, 24, 12], [1.0, 1.0, 2.0]);
+//!     let centre = [0, 1, 2].map(|axis| 0.5 * (size[axis] - 1) as f64 * sides[axis]);
+//!     let label = |voxel: usize| {
+//!         let index = [voxel % 24, voxel / 24 % 24, voxel / (24 * 24)];
+//!         let offset = [0, 1, 2].map(|axis| index[axis] as f64 * sides[axis] - centre[axis]);
+//!         let distance = offset.iter().map(|x| x * x).sum::<f64>().sqrt();
+//!         if distance < 8.0 { 3 } else { 0 }
+//!     };
+//!     let labels = (0..size.iter().product()).map(label).collect();
+//!     let volume = Volume::of_labels(size, [0.0; 3], sides, labels)?;
+//!
+//!     // To a file and back, and its surface, with the volume of the voxels.
+//! #   let folder = tempfile::tempdir().expect("a folder for temporary files");
+//! #   let path = folder.path().join("ball.nii.gz");
+//!     write(&path, &volume)?;
+//!     let volume = read(&path)?;
+//!     for (label, count) in volume.labels().unwrap_or_default() {
+//!         println!("label {label}: {count} voxels");
+//!     }
+//!     let body = volume.body(Inside::Label(3.0))?;
+//!     let area = body.surface.area(); // 4 pi 8^2 = 804.2
+//!     println!("volume {:.1}, area {area:.0}", body.volume); // 4/3 pi 8^3 = 2144.7
+//! #   assert_eq!(format!("{:.1}, {area:.0}", body.volume), "2208.0, 825");
+//!     Ok(())
+//! }
+//! ```
+//! prints
+//! ```text
+//! label 0: 5808 voxels
+//! label 3: 1104 voxels
+//! volume 2208.0, area 825
+//! ```
+//!
+//! # Conventions
+//!
+//! - Voxels are counted from zero; the first axis runs fastest, as in the files. A volume says where the centres of voxels are, and all
+//!   surfaces are there, in the units of the file.
+//! - Faces are counter-clockwise seen from outside, also where the axes of the voxels are left-handed.
+//! - Same input, same bytes, for any number of threads.
+
+mod body;
+mod error;
+mod read;
+mod volume;
+mod write;
+
+pub use body::{Body, Inside};
+pub use error::{Error, FormatError};
+pub use read::{decode, is_stack, read};
+pub use volume::Volume;
+pub use write::write;

@@ -1,0 +1,155 @@
+//! Files in.
+
+mod fields;
+mod mrc;
+mod nifti;
+mod stack;
+
+use std::io::Read;
+use std::path::Path;
+
+use flate2::read::MultiGzDecoder;
+use glam::DAffine3;
+
+use crate::volume::{Element, Voxels};
+use crate::{Error, FormatError, Volume};
+
+pub use stack::is_stack;
+
+/// Most bytes of voxels of a file that has fewer itself.
+const MOST_BYTES: u64 = 1 << 31;
+/// As many bytes at the beginning as have all headers.
+const HEAD: usize = 1024;
+const GZIP: [u8; 2] = [0x1f, 0x8b];
+
+/// Reads a volume of a format that is told by its contents, not by its extension.
+///
+/// - NIfTI-1 and NIfTI-2 in one file, also compressed by gzip: voxels are placed by the `sform`, or else by the `qform`, or else by
+///   their sizes alone, in the units of the file. Values are scaled by `scl_slope` and `scl_inter`.
+/// - MRC and CCP4 maps of modes 0, 1, 2 and 6, with cells of right angles, also compressed: the axes are as `MAPC`, `MAPR` and `MAPS` say,
+///   and the first voxel is at `ORIGIN`, or else at `NXSTART`, `NYSTART`, `NZSTART`.
+/// - Stacks of TIFF images with one number per pixel. The axes are columns, rows and pages; pixels have the sizes of the resolution,
+///   in millimetres where that is per inch or centimetre, and pages the distance that ImageJ notes, or else that of rows.
+///
+/// Memory: four times the bytes of the voxels, of which there may be as many as the file has, or 2^31 if it has fewer, and 1 GiB.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] for everything that is wrong with the contents: truncated or overlong files, headers that are
+/// none, absurd sizes, values that are not finite.
+pub fn read(path: impl AsRef<Path>) -> Result<Volume, Error> {
+    let path = path.as_ref();
+    let bytes = std::fs::read(path).map_err(|source| Error::Io {
+        action: "read",
+        path: path.into(),
+        source,
+    })?;
+    decode(&bytes).map_err(|problem| Error::Format {
+        path: path.into(),
+        problem,
+    })
+}
+
+/// The volume in the bytes of a file; see [`read`].
+///
+/// # Errors
+/// Whatever is wrong with them, in one line.
+pub fn decode(bytes: &[u8]) -> Result<Volume, FormatError> {
+    let limit = MOST_BYTES.max(bytes.len() as u64);
+    if stack::is_tiff(bytes) {
+        return stack::decode(bytes, limit);
+    }
+    if bytes.starts_with(&GZIP) {
+        return unpacked(MultiGzDecoder::new(bytes), limit);
+    }
+    let header = header(&bytes[..bytes.len().min(HEAD)])?;
+    let expected = header.end(limit)?;
+    let found = bytes.len() as u64;
+    if found != expected {
+        let longer = false;
+        return Err(FormatError::Length {
+            expected,
+            found,
+            longer,
+        });
+    }
+    header.volume(bytes[header.start as usize..].to_vec())
+}
+
+/// A header with the voxels behind it, while they are unpacked.
+fn unpacked(mut packed: impl Read, limit: u64) -> Result<Volume, FormatError> {
+    let damaged = |error: std::io::Error| FormatError::damaged("gzip", &error);
+    let mut bytes = Vec::new();
+    let mut head = packed.by_ref().take(HEAD as u64);
+    head.read_to_end(&mut bytes).map_err(damaged)?;
+    let header = header(&bytes)?;
+    let expected = header.end(limit)?;
+    // One more than announced tells that there are more.
+    let rest = (expected + 1).saturating_sub(bytes.len() as u64);
+    packed.take(rest).read_to_end(&mut bytes).map_err(damaged)?;
+    let found = bytes.len() as u64;
+    if found != expected {
+        return Err(FormatError::Length {
+            expected,
+            found,
+            longer: found > expected,
+        });
+    }
+    bytes.drain(..header.start as usize);
+    header.volume(bytes)
+}
+
+/// What comes before the voxels.
+struct Header {
+    size: [u64; 3],
+    element: Element,
+    big_endian: bool,
+    scale: [f64; 2],
+    frame: DAffine3,
+    /// Where the voxels begin.
+    start: u64,
+}
+
+fn header(head: &[u8]) -> Result<Header, FormatError> {
+    let known = nifti::header(head).or_else(|| mrc::header(head));
+    known.unwrap_or_else(|| {
+        let start = head.iter().take(8).copied().collect();
+        Err(FormatError::Unknown { start })
+    })
+}
+
+impl Header {
+    /// Where the voxels end.
+    fn end(&self, limit: u64) -> Result<u64, FormatError> {
+        let length = length(self.size, self.element, limit)?;
+        if self.start > limit {
+            return Err(FormatError::Length {
+                expected: self.start,
+                found: HEAD as u64,
+                longer: true,
+            });
+        }
+        Ok(self.start + length)
+    }
+
+    fn volume(&self, bytes: Vec<u8>) -> Result<Volume, FormatError> {
+        let voxels = Voxels {
+            bytes,
+            element: self.element,
+            big_endian: self.big_endian,
+            scale: self.scale,
+        };
+        Volume::new(self.size.map(|n| n as usize), self.frame, voxels)
+    }
+}
+
+/// Bytes of so many voxels.
+fn length(size: [u64; 3], element: Element, limit: u64) -> Result<u64, FormatError> {
+    let bytes = element.size() as u64;
+    let length = size.iter().try_fold(bytes, |all, &n| all.checked_mul(n));
+    let some = size.iter().all(|&n| n >= 2);
+    (length.filter(|&length| some && length <= limit)).ok_or(FormatError::Size {
+        size,
+        bytes,
+        limit,
+    })
+}

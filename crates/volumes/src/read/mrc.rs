@@ -1,0 +1,91 @@
+//! Headers of MRC files and CCP4 maps.
+//!
+//! MRC2014: A. Cheng et al.: MRC2014: Extensions to the MRC format header for electron cryo-microscopy and tomography. J. Struct. Biol.
+//! 192 (2015), <https://www.ccpem.ac.uk/mrc-format/mrc2014/>.
+
+use glam::{DAffine3, DMat3, DVec3};
+
+use super::fields::Fields;
+use super::{HEAD, Header};
+use crate::FormatError;
+use crate::volume::Element;
+
+/// Angles of cells may differ from right ones by so many degrees.
+const SKEW: f64 = 1e-3;
+
+/// Unless it is none.
+pub(super) fn header(head: &[u8]) -> Option<Result<Header, FormatError>> {
+    if head.get(208..212)? != b"MAP " {
+        return None;
+    }
+    if head.len() < HEAD {
+        return Some(Err(FormatError::Length {
+            expected: HEAD as u64,
+            found: head.len() as u64,
+            longer: false,
+        }));
+    }
+    Some(entries(&Fields {
+        format: "MRC",
+        bytes: head,
+        // The stamp of the machine; some programs write none, and all machines of theirs are little-endian.
+        big_endian: head[212] == 0x11,
+    }))
+}
+
+fn entries(fields: &Fields<'_>) -> Result<Header, FormatError> {
+    let i32s = |at: usize| [0, 1, 2].map(|i| fields.i32(at + 4 * i));
+    let f32s = |at: usize| [0, 1, 2].map(|i| fields.f32(at + 4 * i));
+    let element = match fields.i32(12) {
+        0 => Element::I8,
+        1 => Element::I16,
+        2 => Element::F32,
+        6 => Element::U16,
+        mode => return fields.bad("mode", &mode, "0, 1, 2 or 6: real numbers"),
+    };
+    let extended = fields.i32(92);
+    if extended < 0 {
+        return fields.bad("NSYMBT", &extended, "the length of what follows the header");
+    }
+    let angles = f32s(52);
+    let is_right = |angle: &f64| *angle == 0.0 || (angle - 90.0).abs() < SKEW;
+    if !angles.iter().all(is_right) {
+        return fields.bad("CELLB", &format!("{angles:?}"), "right angles");
+    }
+    // For columns, rows and sections, the axis in space; without any they are x, y, z.
+    let axes = match i32s(64) {
+        [0, 0, 0] => [0, 1, 2],
+        axes => {
+            let mut sorted = axes;
+            sorted.sort_unstable();
+            if sorted != [1, 2, 3] {
+                return fields.bad("MAPC", &format!("{axes:?}"), "an order of 1, 2, 3");
+            }
+            axes.map(|axis| axis as usize - 1)
+        }
+    };
+    let (intervals, cell) = (i32s(28), f32s(40));
+    let sides = [0, 1, 2].map(|axis| match (cell[axis], intervals[axis]) {
+        // What is not written is one.
+        (side, count) if side == 0.0 || count <= 0 => 1.0,
+        (side, count) => side / f64::from(count),
+    });
+    let (starts, origin) = (i32s(16), f32s(196));
+    let mut matrix = DMat3::ZERO;
+    let mut first = DVec3::ZERO;
+    for (own, &axis) in axes.iter().enumerate() {
+        matrix.col_mut(own)[axis] = sides[axis];
+        first[axis] = f64::from(starts[own]) * sides[axis];
+    }
+    if origin.iter().any(|x| *x != 0.0) {
+        first = origin.into();
+    }
+    Ok(Header {
+        size: fields.size(i32s(0).map(i64::from))?,
+        element,
+        big_endian: fields.big_endian,
+        scale: [1.0, 0.0],
+        frame: DAffine3::from_mat3_translation(matrix, first),
+        start: HEAD as u64 + extended as u64,
+    })
+}

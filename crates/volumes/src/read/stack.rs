@@ -1,0 +1,189 @@
+//! Stacks of TIFF images, by the crate `tiff`.
+
+use std::fs::File;
+use std::io::{BufReader, Cursor, Read, Seek};
+use std::path::Path;
+
+use glam::{DAffine3, DVec3};
+use tiff::decoder::ifd::Value;
+use tiff::decoder::{BufferLayoutPreference, Decoder, DecodingSampleType, Limits};
+use tiff::tags::{ResolutionUnit, Tag};
+use tiff::{ColorType, TiffResult};
+
+use super::length;
+use crate::volume::{Element, Voxels};
+use crate::{FormatError, Volume};
+
+/// Most bytes of a page, and of what it is unpacked from.
+const LARGEST_PAGE: usize = 1 << 29;
+/// Millimetres.
+const INCH: f64 = 25.4;
+const CENTIMETRE: f64 = 10.0;
+
+/// Whether the first bytes are those of a TIFF file, also of a large one.
+pub(super) fn is_tiff(bytes: &[u8]) -> bool {
+    let starts: [&[u8]; 4] = [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"];
+    starts.iter().any(|start| bytes.starts_with(start))
+}
+
+/// Whether a file is TIFF with several images of the same size: it is a volume, and not an image.
+pub fn is_stack(path: impl AsRef<Path>) -> bool {
+    let same = || -> TiffResult<bool> {
+        let mut reader = Decoder::new(BufReader::new(File::open(path)?))?;
+        let first = reader.dimensions()?;
+        if !reader.more_images() {
+            return Ok(false);
+        }
+        reader.next_image()?;
+        Ok(reader.dimensions()? == first)
+    };
+    same().unwrap_or(false)
+}
+
+#[allow(clippy::needless_pass_by_value, reason = "for map_err")]
+fn damaged(error: tiff::TiffError) -> FormatError {
+    FormatError::damaged("TIFF", &error)
+}
+
+fn bad<T>(
+    entry: &'static str,
+    value: &impl ToString,
+    requirement: &'static str,
+) -> Result<T, FormatError> {
+    Err(FormatError::Header {
+        format: "TIFF",
+        entry,
+        value: value.to_string(),
+        requirement,
+    })
+}
+
+pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Volume, FormatError> {
+    let mut limits = Limits::default();
+    limits.decoding_buffer_size = LARGEST_PAGE;
+    limits.intermediate_buffer_size = LARGEST_PAGE;
+    let reader = Decoder::new(Cursor::new(bytes)).map_err(damaged)?;
+    let mut reader = reader.with_limits(limits);
+    let about = About::of(&mut reader)?;
+    let sides = about.sides(&mut reader)?;
+    let (first, element) = page(&mut reader)?;
+    let (mut data, mut pages) = (Vec::new(), 0);
+    loop {
+        let (size, kind) = page(&mut reader)?;
+        if (size, kind) != (first, element) {
+            let shown = format!("{} x {} as {kind:?}", size[0], size[1]);
+            return bad("page", &shown, "like the first one");
+        }
+        pages += 1;
+        // A page more than there is, so that one alone is no reason yet.
+        length([size[0], size[1], pages + 1], element, limit)?;
+        let layout = reader.image_buffer_layout().map_err(damaged)?;
+        let start = data.len();
+        data.resize(start + area(size, element), 0);
+        if layout.len != data.len() - start {
+            return bad("page", &format!("{} bytes long", layout.len), "one plane");
+        }
+        let read = reader.read_image_bytes(&mut data[start..]);
+        read.map_err(damaged)?;
+        if !reader.more_images() {
+            break;
+        }
+        reader.next_image().map_err(damaged)?;
+    }
+    if about.images.is_some_and(|images| images != pages) {
+        return bad("number of pages", &pages, "what ImageJ notes");
+    }
+    let size = [first[0], first[1], pages].map(|n| n as usize);
+    let voxels = Voxels {
+        bytes: data,
+        element,
+        big_endian: cfg!(target_endian = "big"),
+        scale: [1.0, 0.0],
+    };
+    Volume::new(size, DAffine3::from_scale(sides), voxels)
+}
+
+fn area([width, height]: [u64; 2], element: Element) -> usize {
+    width as usize * height as usize * element.size()
+}
+
+/// Columns and rows of the page, and its numbers.
+fn page(reader: &mut Decoder<impl Read + Seek>) -> Result<([u64; 2], Element), FormatError> {
+    let colours = reader.colortype().map_err(damaged)?;
+    let ColorType::Gray(8 | 16 | 32 | 64) = colours else {
+        let shown = format!("{colours:?}");
+        return bad("kind of pixels", &shown, "one number of 8 to 64 bits each");
+    };
+    let layout = reader.image_buffer_layout().map_err(damaged)?;
+    let BufferLayoutPreference { sample_type, .. } = layout;
+    let element = match sample_type {
+        Some(DecodingSampleType::U8) => Element::U8,
+        Some(DecodingSampleType::U16) => Element::U16,
+        Some(DecodingSampleType::U32) => Element::U32,
+        Some(DecodingSampleType::U64) => Element::U64,
+        Some(DecodingSampleType::I8) => Element::I8,
+        Some(DecodingSampleType::I16) => Element::I16,
+        Some(DecodingSampleType::I32) => Element::I32,
+        Some(DecodingSampleType::I64) => Element::I64,
+        Some(DecodingSampleType::F32) => Element::F32,
+        Some(DecodingSampleType::F64) => Element::F64,
+        _ => return bad("kind of numbers", &"unusual", "whole, or of 32 or 64 bits"),
+    };
+    let (width, height) = reader.dimensions().map_err(damaged)?;
+    let size = [width, height].map(u64::from);
+    length([size[0], size[1], 2], element, 2 * LARGEST_PAGE as u64)?;
+    Ok((size, element))
+}
+
+/// What ImageJ notes in the description of the first page.
+struct About {
+    is_by_imagej: bool,
+    images: Option<u64>,
+    spacing: Option<f64>,
+}
+
+impl About {
+    fn of(reader: &mut Decoder<impl Read + Seek>) -> Result<Self, FormatError> {
+        let text = reader.get_tag_ascii_string(Tag::ImageDescription);
+        let text = text.unwrap_or_default();
+        let note = |name: &str| {
+            let mut lines = text.lines().filter_map(|line| line.split_once('='));
+            lines.find(|(key, _)| *key == name).map(|(_, value)| value)
+        };
+        let is_by_imagej = text.starts_with("ImageJ=");
+        let count = |name| note(name).and_then(|n| n.parse::<u64>().ok());
+        for axis in ["channels", "frames"] {
+            if let Some(n) = count(axis).filter(|&n| is_by_imagej && n > 1) {
+                return bad("number of channels or times", &n, "1: save one of them");
+            }
+        }
+        let spacing = note("spacing").and_then(|n| n.parse::<f64>().ok());
+        Ok(Self {
+            is_by_imagej,
+            images: count("images").filter(|_| is_by_imagej),
+            spacing: spacing.filter(|_| is_by_imagej).map(f64::abs),
+        })
+    }
+
+    /// Of voxels.
+    fn sides(&self, reader: &mut Decoder<impl Read + Seek>) -> Result<DVec3, FormatError> {
+        let unit = reader.find_tag_unsigned::<u16>(Tag::ResolutionUnit);
+        let unit = unit.map_err(damaged)?.and_then(ResolutionUnit::from_u16);
+        let unit = match unit {
+            Some(ResolutionUnit::Centimeter) if !self.is_by_imagej => CENTIMETRE,
+            Some(ResolutionUnit::Inch) if !self.is_by_imagej => INCH,
+            _ => 1.0,
+        };
+        let mut side = |tag| {
+            let pixels = match reader.get_tag(tag) {
+                Ok(Value::Rational(n, d)) => f64::from(n) / f64::from(d),
+                _ => 0.0,
+            };
+            let side = unit / pixels;
+            if side.is_normal() { side } else { 1.0 }
+        };
+        let (x, y) = (side(Tag::XResolution), side(Tag::YResolution));
+        let z = self.spacing.filter(|&z| z > 0.0).unwrap_or(y);
+        Ok(DVec3::new(x, y, z))
+    }
+}

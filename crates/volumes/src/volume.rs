@@ -1,0 +1,198 @@
+//! Values on a lattice in space.
+
+use glam::{DAffine3, DMat3, DVec3};
+use rayon::prelude::*;
+
+use crate::{Error, FormatError};
+
+/// One number per voxel of a lattice of `size[0] x size[1] x size[2]` voxels, whose centres are at `origin + i a + j b + k c`.
+///
+/// The steps `a`, `b`, `c` need not be orthogonal, and may be left-handed.
+#[derive(Clone, Debug)]
+pub struct Volume {
+    size: [usize; 3],
+    frame: DAffine3,
+    voxels: Voxels,
+}
+
+/// Numbers as they are in files, the first axis fastest.
+#[derive(Clone, Debug)]
+pub(crate) struct Voxels {
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) element: Element,
+    pub(crate) big_endian: bool,
+    /// The value of a number `x` is `scale[0] x + scale[1]`.
+    pub(crate) scale: [f64; 2],
+}
+
+/// Kinds of numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Element {
+    U8,
+    I8,
+    U16,
+    I16,
+    U32,
+    I32,
+    U64,
+    I64,
+    F32,
+    F64,
+}
+
+impl Element {
+    /// In bytes.
+    pub(crate) fn size(self) -> usize {
+        match self {
+            Self::U8 | Self::I8 => 1,
+            Self::U16 | Self::I16 => 2,
+            Self::U32 | Self::I32 | Self::F32 => 4,
+            Self::U64 | Self::I64 | Self::F64 => 8,
+        }
+    }
+
+    /// Of as many bytes as it has.
+    fn decode(self, bytes: &[u8], big_endian: bool) -> f64 {
+        let push = |bits: u64, byte: &u8| bits << 8 | u64::from(*byte);
+        let bits = if big_endian {
+            bytes.iter().fold(0, push)
+        } else {
+            bytes.iter().rev().fold(0, push)
+        };
+        match self {
+            Self::U8 | Self::U16 | Self::U32 | Self::U64 => bits as f64,
+            Self::I8 => f64::from(bits as i8),
+            Self::I16 => f64::from(bits as i16),
+            Self::I32 => f64::from(bits as i32),
+            Self::I64 => bits as i64 as f64,
+            Self::F32 => f64::from(f32::from_bits(bits as u32)),
+            Self::F64 => f64::from_bits(bits),
+        }
+    }
+}
+
+impl Voxels {
+    fn value(&self, voxel: usize) -> f64 {
+        let size = self.element.size();
+        let bytes = &self.bytes[size * voxel..][..size];
+        let [slope, shift] = self.scale;
+        slope * self.element.decode(bytes, self.big_endian) + shift
+    }
+}
+
+impl Volume {
+    /// Labels in a row, the first axis fastest, of voxels with these sides from the centre of the first one.
+    ///
+    /// # Errors
+    /// [`Error::Volume`] unless there are two voxels along each axis at least, as many labels as voxels, and sides that are finite and
+    /// positive.
+    pub fn of_labels(
+        size: [usize; 3],
+        origin: [f64; 3],
+        sides: [f64; 3],
+        labels: Vec<u8>,
+    ) -> Result<Self, Error> {
+        let voxels = Voxels {
+            bytes: labels,
+            element: Element::U8,
+            big_endian: false,
+            scale: [1.0, 0.0],
+        };
+        let matrix = DMat3::from_diagonal(sides.into());
+        let frame = DAffine3::from_mat3_translation(matrix, origin.into());
+        Self::new(size, frame, voxels).map_err(Error::Volume)
+    }
+
+    pub(crate) fn new(
+        size: [usize; 3],
+        frame: DAffine3,
+        voxels: Voxels,
+    ) -> Result<Self, FormatError> {
+        let bytes = voxels.element.size();
+        let needed = size
+            .iter()
+            .try_fold(bytes, |product, &n| product.checked_mul(n));
+        if size.iter().any(|&n| n < 2) || needed != Some(voxels.bytes.len()) {
+            return Err(FormatError::Size {
+                size: size.map(|n| n as u64),
+                bytes: bytes as u64,
+                limit: voxels.bytes.len() as u64,
+            });
+        }
+        let determinant = frame.matrix3.determinant();
+        if !(frame.is_finite() && determinant.is_finite() && determinant != 0.0) {
+            return Err(FormatError::Header {
+                format: "volume",
+                entry: "the place in space",
+                value: format!("{:?}", frame.to_cols_array()),
+                requirement: "a finite affine map that can be inverted",
+            });
+        }
+        let volume = Self {
+            size,
+            frame,
+            voxels,
+        };
+        let bad = (0..volume.len())
+            .into_par_iter()
+            .find_first(|&voxel| !volume.voxels.value(voxel).is_finite());
+        match bad {
+            None => Ok(volume),
+            Some(voxel) => Err(FormatError::NonFinite {
+                index: volume.index(voxel),
+                value: volume.voxels.value(voxel),
+            }),
+        }
+    }
+
+    /// Voxels along the axes.
+    pub fn size(&self) -> [usize; 3] {
+        self.size
+    }
+
+    /// Number of voxels.
+    #[allow(clippy::len_without_is_empty, reason = "there are eight at least")]
+    pub fn len(&self) -> usize {
+        self.size.iter().product()
+    }
+
+    /// The value of a voxel.
+    pub fn value(&self, [i, j, k]: [usize; 3]) -> f64 {
+        self.voxels.value(i + self.size[0] * (j + self.size[1] * k))
+    }
+
+    /// All values, the first axis fastest.
+    pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
+        (0..self.len()).map(|voxel| self.voxels.value(voxel))
+    }
+
+    /// Where a point is whose coordinates are counted in voxels from the centre of the first one.
+    pub fn position(&self, index: [f64; 3]) -> [f64; 3] {
+        (self.frame.transform_point3(index.into())).to_array()
+    }
+
+    /// Volume of a voxel.
+    pub fn voxel_volume(&self) -> f64 {
+        self.frame.matrix3.determinant().abs()
+    }
+
+    /// Whether the axes are left-handed.
+    pub(crate) fn is_mirrored(&self) -> bool {
+        self.frame.matrix3.determinant() < 0.0
+    }
+
+    /// The map from positions to coordinates in voxels.
+    pub(crate) fn to_voxels(&self) -> impl Fn([f64; 3]) -> DVec3 + Sync + use<> {
+        let inverse = self.frame.matrix3.inverse();
+        move |offset| inverse * DVec3::from_array(offset)
+    }
+
+    pub(crate) fn frame(&self) -> &DAffine3 {
+        &self.frame
+    }
+
+    fn index(&self, voxel: usize) -> [usize; 3] {
+        let [x, y, _] = self.size;
+        [voxel % x, voxel / x % y, voxel / (x * y)]
+    }
+}

@@ -1,0 +1,290 @@
+//! Segmentations made smooth by Willmore flow with and without their volume kept, by Taubin's smoothing and by Laplacian smoothing.
+
+use std::f64::consts::PI;
+
+use chacha20::ChaCha8Rng;
+
+use crate::prelude::*;
+use crate::surfaces::willmore_flow;
+use engine::{Stop, Target};
+use geometry::shapes::Ball;
+use geometry::{Placement, SignedDistance, UpAxis, ZeroSet, optimal_profile};
+use model::Networks;
+use rand::{RngExt, SeedableRng};
+use render::{Scene, View};
+use report::Raster;
+use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, samples};
+use volumes::{Body, Inside, Volume};
+
+const TITLE: &str = "Segmentations without their steps, and their volumes";
+/// Bodies with their voxels along the longest side, in quick runs and usually.
+const BODIES: [(&str, [usize; 2]); 2] = [("ball", [16, 32]), ("figure", [24, 48])];
+/// Within a voxel of the surface, this part of the labels of the ball is wrong.
+const WRONG: f64 = 0.15;
+/// Layers of voxels around a body.
+const MARGIN: f64 = 3.0;
+/// Part of the box that the body fills, and cells along a voxel.
+const PART: f64 = 0.8;
+const FINE: f64 = 1.25;
+/// Time of the flow, and how far the surface may go, as `willmore fair` has them.
+const TIME: f64 = 16.0;
+const FARTHEST: f64 = 0.5;
+/// Factors of Taubin's and of Laplacian smoothing, and the most iterations.
+const TAUBIN: [f64; 2] = [0.5, -0.53];
+const LAPLACIAN: [f64; 2] = [0.5, 0.0];
+const ITERATIONS: usize = 60;
+/// Side of a picture in pixels.
+const DRAWN: u32 = 420;
+
+/// A ball with wrong labels and a figure, as voxels: their surface by marching tetrahedra, what `willmore fair` makes of the voxels and of
+/// that surface, with the volume kept and without, and Taubin's and Laplacian smoothing of it with the number of iterations that comes
+/// nearest to the shape: volumes, energies, displacements.
+#[derive(Parser, Debug)]
+#[command(name = "unshrinking", version)]
+struct Options {
+    #[command(flatten)]
+    run: RunOptions,
+}
+
+pub fn main() -> ExitCode {
+    harness::main(program)
+}
+
+/// A shape as voxels, whose sides are the unit of length.
+struct Segmented {
+    name: &'static str,
+    shape: Box<dyn SignedDistance<3>>,
+    up: UpAxis,
+    body: Body,
+    /// By marching tetrahedra, with all steps but without specks.
+    marched: ClosedMesh,
+    grid: Grid<3>,
+}
+
+/// What became of it: key and words for how, and the Willmore energy in units of a sphere's by implicit finite elements, and by the zero set
+/// where that holds.
+struct Row<'a> {
+    of: &'a Segmented,
+    treatment: (&'static str, &'static str),
+    iterations: Option<usize>,
+    volume: f64,
+    energies: (f64, Option<f64>),
+    surface: TriangleMesh,
+}
+
+fn program(options: &Options) -> Result<(), Error> {
+    let full = usize::from(!options.run.quick);
+    let device = options.run.open_device()?;
+    let parameters = json!({ "bodies": BODIES, "wrong": WRONG, "time": TIME, "taubin": TAUBIN, "laplacian": LAPLACIAN, "iterations": ITERATIONS });
+    let mut session = Session::open("unshrinking", &options.run, device, parameters)?;
+    let seed = session.options.seed;
+    let bodies = BODIES.map(|(name, voxels)| Segmented::new(name, voxels[full] as f64, seed));
+    let bodies = bodies.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let (mut rows, mut pictures) = (Vec::new(), Vec::new());
+    for body in &bodies {
+        let treated = body.treated(&mut session)?;
+        let drawn = session.phase("pictures", |_| {
+            [0, 1, 2, 5, 6]
+                .map(|k: usize| treated[k].picture())
+                .into_iter()
+                .collect::<Result<Vec<_>, _>>()
+        })?;
+        pictures.extend(drawn);
+        rows.extend(treated);
+    }
+    let table = Sheet::of(&rows)
+        .keyed(|row, name| format!("unshrinking.{}.{}.{name}", row.of.name, row.treatment.0))
+        .text("body", |row| row.of.name)
+        .text("surface", |row| row.treatment.1)
+        .column("iterations", Shortest, |row| row.iterations)
+        .measure("volume", ("volume, %", Fixed(4)), Row::change)
+        .measure("w_over_8pi", ("w / 8 pi by elements", Fixed(3)), |row| {
+            row.energies.0
+        })
+        .measure("zero_set", ("by the zero set", Fixed(4)), |row| {
+            row.energies.1
+        })
+        .measure(
+            "displacement",
+            ("largest displacement", Fixed(3)),
+            Row::displacement,
+        )
+        .measure("rms", ("distance to the shape", Fixed(4)), |row| {
+            row.of.distance(&row.surface)
+        });
+    session.sheet(table, "unshrinking")?;
+    let figure = Figure::new(TITLE, 5)
+        .with_row_labels(bodies.iter().map(|body| body.name).collect::<Vec<_>>());
+    session.figure(figure.with_panels(pictures), "surfaces")?;
+    session.finish(TITLE)
+}
+
+impl Segmented {
+    fn new(name: &'static str, voxels: f64, seed: u64) -> Result<Self, Error> {
+        let centre = [0.5 * voxels + MARGIN + 0.2; 3];
+        let (shape, wrong, up): (Box<dyn SignedDistance<3>>, _, _) = if name == "ball" {
+            (Box::new(Ball::new(centre, 0.5 * voxels)?), WRONG, UpAxis::Z)
+        } else {
+            let figure = samples::figure(96)?;
+            let bounds = figure.bounding_box();
+            let scale = voxels / bounds.longest_side();
+            let corner = std::array::from_fn(|i| bounds.centre()[i] - centre[i] / scale);
+            let placed = figure.placed(&Placement::about(corner, scale)?);
+            (Box::new(MeshDistance::new(&placed)), 0.0, UpAxis::Y)
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let size = (voxels + 2.0 * MARGIN).ceil() as usize + 1;
+        let labels = (0..size.pow(3)).map(|voxel| {
+            let index = [voxel % size, voxel / size % size, voxel / (size * size)];
+            let distance = shape.signed_distance(index.map(|i| i as f64));
+            let is_wrong = distance.abs() < 1.0 && rng.random::<f64>() < wrong;
+            u8::from((distance < 0.0) != is_wrong)
+        });
+        let volume = Volume::of_labels([size; 3], [0.0; 3], [1.0; 3], labels.collect())?;
+        let side = voxels / PART;
+        // For the half grid.
+        let cells = 2 * (0.5 * FINE * side).ceil() as usize;
+        Ok(Self {
+            name,
+            up,
+            body: volume.body(Inside::Label(1.0))?,
+            marched: (volume.body(Inside::Above(0.5))?.surface).without_small_parts(8.0)?,
+            grid: Grid::new(cells, side)?.with_origin(centre.map(|x| x - 0.5 * side))?,
+            shape,
+        })
+    }
+
+    /// What becomes of it by all means.
+    fn treated(&self, session: &mut Session<'_>) -> Result<Vec<Row<'_>>, Error> {
+        let (body, marched) = (&self.body.surface, &self.marched);
+        let [taubin, laplacian] = [TAUBIN, LAPLACIAN].map(|factors| self.smoothed(factors));
+        let (taubin, laplacian) = (taubin?, laplacian?);
+        // Key, words, what it starts from, and for flows whether the volume is kept.
+        let all = [
+            ("marched", "marching tetrahedra", marched, None, None),
+            ("fair", "fair, volume kept", body, None, Some(true)),
+            ("free", "fair, free", body, None, Some(false)),
+            (
+                "marched_fair",
+                "marched, volume kept",
+                marched,
+                None,
+                Some(true),
+            ),
+            ("marched_free", "marched, free", marched, None, Some(false)),
+            ("taubin", "Taubin", &taubin.1, Some(taubin.0), None),
+            (
+                "laplacian",
+                "Laplacian",
+                &laplacian.1,
+                Some(laplacian.0),
+                None,
+            ),
+        ];
+        let row = |(key, words, start, iterations, flow): (_, _, &ClosedMesh, _, Option<bool>)| {
+            session.phase(format!("{}: {words}", self.name), |stage| {
+                let mut case = self.case(start)?;
+                let mut surface = start.mesh().clone();
+                let mut volume = start.volume();
+                if let Some(keeps) = flow {
+                    case.held.volume = keeps.then_some(Target::keep(self.body.volume));
+                    let mut run = Run::new(case.clone(), stage.device)?;
+                    while run.step()?.is_some() {
+                        stage.bar.inc(1);
+                    }
+                    case.initial = run.field().clone();
+                    volume = ZeroSet::of(run.field(), case.scales.eps)?.volume;
+                    surface = surfaces::remeshed_surface(run.field(), case.scales.eps)?
+                        .with_volume(volume, |_| true);
+                }
+                let zero_set = ZeroSet::of(&case.initial, case.scales.eps)?;
+                let holds = flow.is_some() && zero_set.curvatures_hold();
+                let elements = case.implicit_elements()?.willmore_energy(&case.initial)?;
+                Ok(Row {
+                    of: self,
+                    treatment: (key, words),
+                    iterations,
+                    volume,
+                    energies: (
+                        elements / (8.0 * PI),
+                        holds.then_some(zero_set.willmore_energy / (8.0 * PI)),
+                    ),
+                    surface,
+                })
+            })
+        };
+        all.into_iter().map(row).collect()
+    }
+
+    /// The surface after the number of iterations that brings it nearest to the shape.
+    fn smoothed(&self, [lambda, mu]: [f64; 2]) -> Result<(usize, ClosedMesh), Error> {
+        let smoothed = |count| self.marched.mesh().smoothed(count, lambda, mu);
+        let all = (1..=ITERATIONS).map(|count| (count, self.distance(&smoothed(count))));
+        let best = all
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map_or(1, |(count, _)| count);
+        Ok((best, ClosedMesh::new(smoothed(best))?.0))
+    }
+
+    /// Willmore flow from a surface, as long as `willmore fair` lets it.
+    fn case(&self, start: &ClosedMesh) -> Result<Case<3>, Error> {
+        let (grid, spacing) = (self.grid, self.grid.spacing());
+        let scales = Scales::of_grid(spacing, 2.0);
+        let mut distance = MeshDistance::new(start).sample(grid, || ())?;
+        surfaces::mend_signs(&mut distance);
+        let initial = distance.map(|s| optimal_profile(s, scales.eps));
+        let (needed, variant) = (scales.needs(3, spacing), (Method::Hybrid, Scheme::Accurate));
+        let operator = Operator::new(variant, &Networks::default(), &needed, &grid, &scales)?;
+        let first = Fairing::first_step(spacing);
+        let rule = StepRule::Graded {
+            first,
+            part: Fairing::GROWTH,
+        };
+        Ok(Case {
+            measures: vec![Measure::displacement(&initial, scales.eps)],
+            stops: vec![Stop::Time(TIME), Stop::Displacement(FARTHEST)],
+            ..willmore_flow(self.name, initial, operator, scales, (rule, 0))
+        })
+    }
+
+    /// Root of the mean square distance of the vertices to the shape.
+    fn distance(&self, mesh: &TriangleMesh) -> f64 {
+        let squares = mesh
+            .vertices
+            .iter()
+            .map(|&x| self.shape.signed_distance(x).powi(2));
+        (squares.sum::<f64>() / mesh.vertices.len() as f64).sqrt()
+    }
+}
+
+impl Row<'_> {
+    /// Of the volume of the voxels, in percent.
+    fn change(&self) -> f64 {
+        100.0 * (self.volume / self.of.body.volume - 1.0)
+    }
+
+    /// The largest distance from the surface by marching tetrahedra.
+    fn displacement(&self) -> f64 {
+        let distance = MeshDistance::new(&self.of.marched);
+        let all = self
+            .surface
+            .vertices
+            .iter()
+            .map(|&x| distance.signed_distance(x).abs());
+        all.fold(0.0, f64::max)
+    }
+
+    fn picture(&self) -> Result<Raster, Error> {
+        let scene = Scene::of_mesh(self.surface.clone()).view(View {
+            up: self.of.up,
+            azimuth: -60.0,
+            elevation: 25.0,
+        });
+        let picture = scene
+            .within(self.of.marched.bounding_box())
+            .render([DRAWN; 2])?;
+        let size = [picture.width() as usize, picture.height() as usize];
+        let caption = format!("{}\nvolume {:+.2} %", self.treatment.1, self.change());
+        Ok(Raster::new(size, picture.pixels()).with_caption(&caption))
+    }
+}
