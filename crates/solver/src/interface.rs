@@ -17,6 +17,7 @@ use geometry::Grid;
 use operators::{HostUpdate, HostVectors, Real};
 use rayon::prelude::*;
 
+use crate::nodes::Nodes;
 use crate::samples::{MOST_CORNERS, Samples};
 
 /// Spacing of the lattice in units of `eps`.
@@ -43,17 +44,19 @@ pub(crate) struct InterfaceModes<const D: usize> {
 type Local = [[f64; MOST_CORNERS]; MOST_CORNERS];
 
 impl<const D: usize> InterfaceModes<D> {
-    /// The correction for the interface of `u`, or none if there is no interface, or too much of it.
+    /// The correction for the interface of `u`, whose values are stored at some `nodes` of the grid, or none if there is no interface, or
+    /// too much of it.
     ///
     /// With a `region` only its nodes count.
     pub(crate) fn new(
         grid: &Grid<D>,
+        nodes: &impl Nodes<D>,
         u: &[f64],
         eps: f64,
         tau: f64,
         region: Option<&[bool]>,
     ) -> Option<Self> {
-        let samples = Samples::new(grid, u, eps, SPACING * eps, region);
+        let samples = Samples::new(grid, nodes, u, eps, SPACING * eps, region);
         let nodes = &samples.nodes;
         let sharp = nodes.iter().filter(|s| s.curvature.abs() * eps > 1.0);
         let corners_dominate = sharp.count() as f64 > SHARP * nodes.len() as f64;
@@ -198,7 +201,7 @@ mod tests {
         let grid = Grid::<2>::centred(96, 1.0).unwrap();
         let u = disc(&grid);
         let tau = 2e-5;
-        let modes = InterfaceModes::new(&grid, &u, EPS, tau, None).unwrap();
+        let modes = InterfaceModes::new(&grid, &grid, &u, EPS, tau, None).unwrap();
         for k in [0.0_f64, 2.0, 5.0] {
             let p = wave(&grid, &u, k);
             let mut z = vec![0.0; p.len()];
@@ -219,7 +222,7 @@ mod tests {
     fn the_correction_is_symmetric_and_not_negative() {
         let grid = Grid::<2>::centred(64, 1.0).unwrap();
         let u = disc(&grid);
-        let modes = InterfaceModes::new(&grid, &u, EPS, 1e-4, None).unwrap();
+        let modes = InterfaceModes::new(&grid, &grid, &u, EPS, 1e-4, None).unwrap();
         let vector = |a: f64| -> Vec<f64> {
             (0..u.len())
                 .map(|i| (a * i as f64).sin() + 0.2 * (a * a * i as f64).cos())
@@ -241,9 +244,9 @@ mod tests {
     fn nothing_is_corrected_without_an_interface_or_at_corners() {
         let grid = Grid::<2>::centred(64, 1.0).unwrap();
         let flat = vec![1.0; grid.len()];
-        assert!(InterfaceModes::new(&grid, &flat, EPS, 1e-4, None).is_none());
+        assert!(InterfaceModes::new(&grid, &grid, &flat, EPS, 1e-4, None).is_none());
         let square = Cuboid::new([0.3, 0.3]).unwrap();
         let square = phase_field(grid, &square, EPS).unwrap();
-        assert!(InterfaceModes::new(&grid, square.values(), EPS, 1e-4, None).is_none());
+        assert!(InterfaceModes::new(&grid, &grid, square.values(), EPS, 1e-4, None).is_none());
     }
 }

@@ -3,6 +3,8 @@
 use geometry::Grid;
 use rayon::prelude::*;
 
+use crate::nodes::Nodes;
+
 /// Corners of a cell of the lattice in 3D; in 2D the first four count.
 pub(crate) const MOST_CORNERS: usize = 8;
 /// Nodes with `1 - u^2` above this belong to the interface: `|s| < 3.1 eps`.
@@ -67,7 +69,7 @@ fn along(corner: usize, axis: usize, fraction: f64) -> (f64, f64) {
 
 /// All nodes of an interface, and the lattice cells that hold their foot points.
 pub(crate) struct Samples<const D: usize> {
-    /// The nodes in the order of the grid.
+    /// The nodes in the order of storage.
     pub nodes: Vec<Sample<D>>,
     /// Positions in `nodes`, cell by cell, and where each cell begins.
     order: Vec<u32>,
@@ -81,10 +83,11 @@ pub(crate) struct Samples<const D: usize> {
 }
 
 impl<const D: usize> Samples<D> {
-    /// The interface of `u`, whose width is `eps`, on a lattice of about the given spacing.
-    /// With a `region`, only its nodes count.
+    /// The interface of `u`, whose values are stored at some `nodes` of the grid and whose width is `eps`, on a lattice of about the given
+    /// spacing. With a `region`, only its nodes count.
     pub(crate) fn new(
         grid: &Grid<D>,
+        nodes: &impl Nodes<D>,
         u: &[f64],
         eps: f64,
         spacing: f64,
@@ -101,7 +104,7 @@ impl<const D: usize> Samples<D> {
             .into_par_iter()
             .with_min_len(CHUNK)
             .filter(|&node| region.is_none_or(|region| region[node]))
-            .filter_map(|node| lattice.sample(node, u))
+            .filter_map(|node| lattice.sample(node, nodes, u))
             .collect();
         let mut cell_of = vec![u32::MAX; cells.pow(D as u32)];
         let mut column_of = cell_of.clone();
@@ -175,26 +178,26 @@ impl<const D: usize> Lattice<'_, D> {
         -4.0 / 3.0 * self.eps * u.clamp(-0.999_999, 0.999_999).atanh()
     }
 
-    /// The sample of a node, if the node belongs to the interface. Its cell is still that of the whole lattice.
-    fn sample(&self, node: usize, u: &[f64]) -> Option<Sample<D>> {
+    /// The sample of a node, if the node belongs to the interface, with all nodes beside it. Its cell is still that of the whole lattice.
+    fn sample(&self, node: usize, nodes: &impl Nodes<D>, u: &[f64]) -> Option<Sample<D>> {
         let weight = 1.0 - u[node] * u[node];
         if weight < WINDOW {
             return None;
         }
-        let (cells, spacing) = (self.grid.cells(), self.grid.spacing());
-        let index = self.grid.multi_index(node);
+        let spacing = self.grid.spacing();
+        let index = nodes.place(node);
         let here = self.distance(u[node]);
         let mut laplacian = 0.0;
-        let mut normal: [f64; D] = std::array::from_fn(|axis| {
-            let stride = self.grid.stride(axis);
-            let at = |shift: usize| {
-                let moved = (index[axis] + shift) % cells;
-                self.distance(u[node + moved * stride - index[axis] * stride])
+        let mut normal = [0.0; D];
+        for (axis, normal) in normal.iter_mut().enumerate() {
+            let at = |forward: bool| {
+                let beside = nodes.beside(node, index, axis, forward).ok()?;
+                Some(self.distance(u[beside]))
             };
-            let (after, before) = (at(1), at(cells - 1));
+            let (after, before) = (at(true)?, at(false)?);
             laplacian += after - 2.0 * here + before;
-            after - before
-        });
+            *normal = after - before;
+        }
         let length = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
         if length / (2.0 * spacing) < FLAT {
             return None;
