@@ -1,5 +1,10 @@
 //! Separable convolution on active bricks, on the host: one pass along each axis.
 
+#![expect(
+    clippy::inline_always,
+    reason = "what is not inlined is compiled without the instructions that were detected"
+)]
+
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
@@ -174,7 +179,7 @@ impl<T: Real> Pass<'_, T> {
     ) {
         const ROWS: usize = 8;
         let (side, reach) = (self.side, self.reach);
-        let taps = &self.weights[ALONG - 1..][..2 * reach + 1];
+        let taps = &self.weights[ALONG - 1..][..=2 * reach];
         let width = side + 2 * reach;
         for block in (0..self.volume).step_by(ROWS * side) {
             lines.clear();

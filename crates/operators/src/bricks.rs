@@ -143,7 +143,10 @@ impl<const D: usize> Bricks<D> {
         index
     }
 
-    /// The cell beside a stored one, or else whether the brick there is in the positive phase.
+    /// The cell beside a stored one.
+    ///
+    /// # Errors
+    /// If no brick is active there: whether it is in the positive phase.
     pub fn beside(&self, cell: usize, axis: usize, forward: bool) -> Result<usize, bool> {
         let stride = self.side.pow((D - 1 - axis) as u32);
         let within = cell / stride % self.side;

@@ -121,7 +121,7 @@ fn record<const N: usize>(
     scalars: Vec<ScalarIr>,
 ) -> FloatTensor<CaptureBackend> {
     let client = inputs[0].client.clone();
-    let inputs = inputs.map(|input| input.into_ir());
+    let inputs = inputs.map(burn_router::RouterTensor::into_ir);
     let output = TensorIr::uninit(client.create_empty_handle(), shape, inputs[0].dtype);
     let operation = CustomOpIr::with_scalars(id, &inputs, &[output], scalars);
     client.register(OperationIr::Custom(operation)).output()

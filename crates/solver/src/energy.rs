@@ -99,7 +99,9 @@ impl<const D: usize> MeanCurvatureStep<D> for BrickOperator<D> {
     }
 
     fn phase_preconditioner(&self, _cells: usize, stiffness: f64) -> PhaseInverse {
-        PhaseInverse::Scalar(self.operator().phase_preconditioner(stiffness))
+        PhaseInverse::Bricks(Box::new(BrickOperator::phase_preconditioner(
+            self, stiffness,
+        )))
     }
 }
 

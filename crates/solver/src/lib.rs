@@ -82,6 +82,7 @@ mod active;
 mod cg;
 mod constraints;
 mod displacement;
+mod dissection;
 mod energy;
 mod error;
 mod flow;
@@ -92,6 +93,7 @@ mod nodes;
 mod preconditioner;
 mod region;
 mod samples;
+mod sparse;
 mod times;
 
 pub use constraints::Constraints;

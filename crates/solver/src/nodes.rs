@@ -5,6 +5,9 @@ use operators::Bricks;
 
 /// The places of stored values.
 pub(crate) trait Nodes<const D: usize>: Sync {
+    /// Whether they are all that the grid has.
+    const WHOLE_GRID: bool;
+
     /// How many there are.
     fn count(&self) -> usize;
 
@@ -22,6 +25,8 @@ pub(crate) trait Nodes<const D: usize>: Sync {
 }
 
 impl<const D: usize> Nodes<D> for Grid<D> {
+    const WHOLE_GRID: bool = true;
+
     fn count(&self) -> usize {
         self.len()
     }
@@ -44,6 +49,8 @@ impl<const D: usize> Nodes<D> for Grid<D> {
 }
 
 impl<const D: usize> Nodes<D> for Bricks<D> {
+    const WHOLE_GRID: bool = false;
+
     fn count(&self) -> usize {
         self.len()
     }

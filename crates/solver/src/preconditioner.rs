@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use burn::tensor::Tensor;
 use geometry::Grid;
+use model::Smoother;
 use operators::{Bricks, ComputeDevice, SpectralFilter, spectral_filter, update_on_host};
 
 use crate::interface::InterfaceModes;
@@ -14,8 +15,8 @@ use crate::{Error, Region};
 pub enum PhaseInverse {
     /// Diagonal in Fourier space.
     Spectral(SpectralFilter),
-    /// A multiple of the identity.
-    Scalar(f64),
+    /// A polynomial of the convolution on active bricks.
+    Bricks(Box<Smoother>),
 }
 
 impl From<SpectralFilter> for PhaseInverse {
@@ -28,7 +29,7 @@ impl PhaseInverse {
     fn apply<const D: usize>(&self, r: &Tensor<D>) -> Tensor<D> {
         match self {
             Self::Spectral(filter) => spectral_filter(r.clone(), filter),
-            Self::Scalar(factor) => r.clone() * *factor,
+            Self::Bricks(smoother) => smoother.apply(r),
         }
     }
 }

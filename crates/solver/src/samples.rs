@@ -31,10 +31,13 @@ impl<const D: usize> Sample<D> {
     /// Values of the hat functions of the cell's corners at the foot point.
     pub(crate) fn hats(&self) -> [f64; MOST_CORNERS] {
         let mut hats = [0.0; MOST_CORNERS];
-        for (corner, hat) in hats.iter_mut().enumerate().take(1 << D) {
-            *hat = (0..D)
-                .map(|axis| along(corner, axis, self.fraction[axis]).0)
-                .product();
+        hats[0] = 1.0;
+        for (axis, fraction) in self.fraction.iter().enumerate() {
+            let (lower, upper) = hats.split_at_mut(1 << axis);
+            for (lower, upper) in lower.iter_mut().zip(upper) {
+                *upper = *lower * fraction;
+                *lower *= 1.0 - fraction;
+            }
         }
         hats
     }
@@ -76,8 +79,10 @@ pub(crate) struct Samples<const D: usize> {
     starts: Vec<u32>,
     /// Numbers of the hat functions at the corners of each cell.
     pub corners: Vec<[u32; MOST_CORNERS]>,
-    /// How many hat functions there are.
-    pub columns: usize,
+    /// Places on the lattice of all hat functions.
+    pub columns: Vec<[u32; D]>,
+    /// Lattice cells per side of the box.
+    pub cells: usize,
     /// Side of a lattice cell.
     pub spacing: f64,
 }
@@ -109,17 +114,18 @@ impl<const D: usize> Samples<D> {
         let mut cell_of = vec![u32::MAX; cells.pow(D as u32)];
         let mut column_of = cell_of.clone();
         let mut corners: Vec<[u32; MOST_CORNERS]> = Vec::new();
-        let mut columns = 0;
+        let mut columns = Vec::new();
         for sample in &mut samples {
             let cell = &mut cell_of[sample.cell as usize];
             if *cell == u32::MAX {
                 *cell = corners.len() as u32;
                 let mut ends = [0; MOST_CORNERS];
                 for (corner, end) in ends.iter_mut().enumerate().take(1 << D) {
-                    let column = &mut column_of[lattice.corner(sample.cell as usize, corner)];
+                    let position = lattice.corner(sample.cell as usize, corner);
+                    let column = &mut column_of[position];
                     if *column == u32::MAX {
-                        *column = columns;
-                        columns += 1;
+                        *column = columns.len() as u32;
+                        columns.push(lattice.place(position));
                     }
                     *end = *column;
                 }
@@ -133,7 +139,8 @@ impl<const D: usize> Samples<D> {
             order,
             starts,
             corners,
-            columns: columns as usize,
+            columns,
+            cells,
             spacing: lattice.width * grid.spacing(),
         }
     }
@@ -223,6 +230,16 @@ impl<const D: usize> Lattice<'_, D> {
             // For a distance function the Laplacian is the mean curvature.
             curvature: laplacian / (spacing * spacing),
         })
+    }
+
+    /// The place along each axis of a position in row-major order.
+    fn place(&self, mut position: usize) -> [u32; D] {
+        let mut place = [0; D];
+        for at in place.iter_mut().rev() {
+            *at = (position % self.cells) as u32;
+            position /= self.cells;
+        }
+        place
     }
 
     /// Row-major index of a corner of a cell.

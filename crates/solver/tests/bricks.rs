@@ -172,7 +172,7 @@ fn fronts_that_meet_flow_as_on_the_whole_grid() {
 fn a_step_beyond_the_first_bricks_makes_them_more() {
     let start = cross();
     let params = exact(start.grid());
-    let steps = [8.0 * params.mcf_step; 2];
+    let steps = [8.0 * params.mcf_step];
     let mut few = bricks(&start, params);
     let before = few.current().dims();
     few.advance(steps[0]).unwrap();

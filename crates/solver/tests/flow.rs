@@ -5,6 +5,7 @@ use burn::tensor::Tensor;
 use geometry::measure::{l2_distance, linf, perimeter, zero_set_volume};
 use geometry::{Field, Grid, exact};
 use model::MeanCurvatureOperator;
+use operators::SpectralFilter;
 use solver::{
     Error, Exit, FlowParams, MeanCurvatureFlow, MeanCurvatureStep, Method, MinimizingMovement,
     NewtonParams, Objective, PhaseInverse, PhaseTimes, Precision, StepRecord, WillmoreFlow,
@@ -374,8 +375,8 @@ impl MeanCurvatureStep<2> for Pointwise {
         linearize::Extensions::new()
     }
 
-    fn phase_preconditioner(&self, _cells: usize, _stiffness: f64) -> PhaseInverse {
-        PhaseInverse::Scalar(1.0)
+    fn phase_preconditioner(&self, cells: usize, _stiffness: f64) -> PhaseInverse {
+        SpectralFilter::from_kernel(&[cells; 2], &[1.0], 1, |_| 1.0).into()
     }
 }
 
