@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use engine::{Scheme, StepRule};
+use engine::{Scheme, StepRule, Storage};
 use geometry::UpAxis;
 use model::Network;
 use serde::Serialize;
@@ -213,6 +213,10 @@ pub struct SchemeOptions {
     /// Use this network, as `willmore train` makes them
     #[arg(long, value_name = "FILE")]
     pub network: Option<PathBuf>,
+
+    /// What of the phase field is stored: dense, the whole grid; bricks, what is near the surface; or auto [default: dense]
+    #[arg(long, value_name = "WHAT", value_enum, hide_possible_values = true)]
+    pub storage: Option<Storage>,
 }
 
 /// What is kept.

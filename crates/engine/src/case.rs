@@ -79,6 +79,11 @@ impl<const D: usize> Case<D> {
         self.grid().side().powi(D as i32 - 3)
     }
 
+    /// Whether something in it cannot be had on active bricks.
+    pub(crate) fn needs_grid(&self) -> bool {
+        self.region.is_some() || !self.energy.is_willmore() || !self.held.is_empty()
+    }
+
     /// The time at which the flow ends, if there is one.
     pub(crate) fn end(&self) -> Option<f64> {
         self.stops.iter().find_map(|stop| match stop {

@@ -2,10 +2,11 @@
 
 use fem::{FiniteElementStep, Statistics};
 use geometry::Field;
+use model::Network;
 use operators::ComputeDevice;
 use solver::{Constraints, FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow};
 
-use crate::{Case, Error, Flow, Method, Order};
+use crate::{Case, Error, Flow, Method, Order, Storage};
 
 /// The solver's flow of a case, between two steps.
 pub(crate) struct Motion<const D: usize> {
@@ -28,6 +29,14 @@ impl<const D: usize> Motion<D> {
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
         let (params, operator) = (case.params(), &case.operator);
+        let whole = match (case.flow, operator.method) {
+            (Flow::Willmore, Method::Hybrid) => None,
+            (Flow::MeanCurvature, _) => Some("mean curvature flows"),
+            (Flow::Willmore, _) => Some("finite elements"),
+        };
+        if let Some(what) = whole.filter(|_| operator.storage == Storage::Bricks) {
+            return Err(solver::Error::NeedsGrid { what }.into());
+        }
         let elements = match operator.method {
             Method::Hybrid => None,
             _ => Some(operator.elements(case.grid(), &case.scales)?),
@@ -39,9 +48,7 @@ impl<const D: usize> Motion<D> {
                     (Some(step), _) => {
                         WillmoreFlow::new(step.clone(), &case.initial, params, device)?
                     }
-                    (None, Some(network)) => {
-                        WillmoreFlow::with_network(network, &case.initial, params, device)?
-                    }
+                    (None, Some(network)) => learned(case, network, device)?,
                     (None, None) => unreachable!("a learned operator has a network"),
                 };
                 if let Some(network) = network.filter(|_| operator.half_grids) {
@@ -118,5 +125,27 @@ impl<const D: usize> Motion<D> {
     /// Work of the linear solves inside finite elements so far.
     pub(crate) fn statistics(&self) -> Option<Statistics> {
         self.elements.as_ref().map(FiniteElementStep::statistics)
+    }
+}
+
+/// Willmore flow with a network, of what is to be stored.
+fn learned<const D: usize>(
+    case: &Case<D>,
+    network: &Network,
+    device: &ComputeDevice,
+) -> Result<WillmoreFlow<D>, solver::Error> {
+    /// Bricks that are more than this part of the grid do not pay.
+    const PAYS: f64 = 0.5;
+    let (initial, params) = (&case.initial, case.params());
+    let dense = || WillmoreFlow::with_network(network, initial, params, device);
+    let bricks = || WillmoreFlow::on_bricks(network, initial, params, device);
+    match case.operator.storage {
+        Storage::Dense => dense(),
+        Storage::Bricks => bricks(),
+        Storage::Auto if case.needs_grid() => dense(),
+        Storage::Auto => match bricks() {
+            Ok(flow) if flow.stored_share() < PAYS => Ok(flow),
+            _ => dense(),
+        },
     }
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use solver::{Factors, NewtonParams};
 
-use crate::Error;
+use crate::{Error, Storage};
 
 /// The geometric flow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -216,6 +216,8 @@ pub struct Operator {
     /// Whether steps of a learned operator begin on coarser grids where networks for those are shipped. The result differs by less
     /// than the tolerance of the minimization.
     pub half_grids: bool,
+    /// What of the phase field is stored in Willmore flow with a learned operator.
+    pub storage: Storage,
     network: Option<Arc<NamedNetwork>>,
 }
 
@@ -245,6 +247,7 @@ impl Operator {
             response,
             linear: LinearSolver::default(),
             half_grids: true,
+            storage: Storage::default(),
             network: Some(Arc::new(NamedNetwork { name, network })),
         })
     }
@@ -270,6 +273,7 @@ impl Operator {
             response: 1.0,
             linear: LinearSolver::default(),
             half_grids: false,
+            storage: Storage::default(),
             network: None,
         };
         if scheme != Scheme::Paper {
@@ -312,13 +316,17 @@ impl Operator {
     /// What a result depends on, for the identity of a case.
     pub(crate) fn identity(&self) -> Value {
         let network = |named: &NamedNetwork| json!([named.name, named.network.fingerprint()]);
-        json!({
+        let mut identity = json!({
             "method": self.method,
             "scheme": self.scheme,
             "factors": self.factors,
             "half_grids": self.half_grids,
             "network": self.network().map(network),
-        })
+        });
+        if !self.storage.is_dense() {
+            identity["storage"] = json!(self.storage);
+        }
+        identity
     }
 
     /// The finite-element step on a grid.

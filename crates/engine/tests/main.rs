@@ -5,3 +5,4 @@ mod held;
 mod resuming;
 mod steps;
 mod stops;
+mod storage;

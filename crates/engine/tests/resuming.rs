@@ -23,7 +23,7 @@ impl Observer<2> for After<'_> {
     }
 }
 
-fn trajectory(case: &Case<2>, folder: &Path, samples: &Samples) -> Trajectory<2> {
+pub fn trajectory(case: &Case<2>, folder: &Path, samples: &Samples) -> Trajectory<2> {
     Trajectory::of(
         case.clone(),
         &device(),
@@ -36,7 +36,7 @@ fn trajectory(case: &Case<2>, folder: &Path, samples: &Samples) -> Trajectory<2>
     .unwrap()
 }
 
-fn interrupted(case: &Case<2>, folder: &Path, samples: &Samples, after: usize) {
+pub fn interrupted(case: &Case<2>, folder: &Path, samples: &Samples, after: usize) {
     let interrupt = Interrupt::never();
     let observers: &mut [&mut dyn Observer<2>] = &mut [&mut After(after, &interrupt)];
     let ended = Trajectory::of(
@@ -50,7 +50,7 @@ fn interrupted(case: &Case<2>, folder: &Path, samples: &Samples, after: usize) {
     assert!(ended.unwrap().is_none());
 }
 
-fn without_seconds(trajectory: &Trajectory<2>) -> Vec<engine::Record> {
+pub fn without_seconds(trajectory: &Trajectory<2>) -> Vec<engine::Record> {
     let mut records = trajectory.records.clone();
     for record in &mut records {
         record.seconds = 0.0;

@@ -6,7 +6,7 @@ use geometry::{Field, Grid};
 use linearize::Extensions;
 use model::Calibration;
 use operators::SpectralFilter;
-use solver::{Accuracy, MeanCurvatureStep};
+use solver::{Accuracy, MeanCurvatureStep, PhaseInverse};
 
 use crate::ops::{FemOps, Registered};
 use crate::scheme::Kind;
@@ -249,15 +249,16 @@ impl<const D: usize> MeanCurvatureStep<D> for FiniteElementStep<D> {
         crate::extensions()
     }
 
-    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> SpectralFilter {
-        SpectralFilter::from_symbol(&[cells; D], |theta| {
+    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse {
+        let inverse = SpectralFilter::from_symbol(&[cells; D], |theta| {
             let (mass, implicit, semi_implicit) = self.scheme().phase_symbols(theta);
             let derivative = match self.kind {
                 Kind::Implicit => implicit,
                 Kind::SemiImplicit | Kind::SemiImplicitExact => semi_implicit,
             };
             1.0 / (mass * (1.0 + stiffness * (1.0 - derivative).powi(2)))
-        })
+        });
+        inverse.into()
     }
 
     /// A product with the Hessian contains `c (J - 1)^T M (J - 1) p`; where `J` is near 1, errors of `J p` come out `c` times

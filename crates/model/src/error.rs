@@ -42,6 +42,23 @@ pub enum Error {
         /// Cells per side.
         cells: usize,
     },
+    /// A kernel that is no product of functions of one variable.
+    #[error(
+        "the kernel of this network differs by {error:.0e} of its largest value from a product of functions of one variable, which active \
+         bricks need; take a network of the accurate recipe, or store the whole grid"
+    )]
+    NotSeparable {
+        /// The largest difference, relative to the largest value.
+        error: f64,
+    },
+    /// An operator that keeps no value near a pure phase.
+    #[error(
+        "the operator keeps no constant value near {phase}, which active bricks need; train the network longer, or store the whole grid"
+    )]
+    NoRest {
+        /// The phase, -1 or 1.
+        phase: f64,
+    },
     /// Ratios that cannot describe an operator.
     #[error("impossible ratios ({ratios}): {reason}")]
     Ratios {

@@ -53,6 +53,7 @@ mod operator;
 mod pretrained;
 mod quality;
 mod ratios;
+mod separable;
 mod store;
 pub mod training;
 
@@ -65,3 +66,4 @@ pub use operator::MeanCurvatureOperator;
 pub use pretrained::Shipped;
 pub use quality::{Quality, REFERENCE_RADII, displacement_errors};
 pub use ratios::Ratios;
+pub use separable::{BrickOperator, SeparableOperator, Smoother};

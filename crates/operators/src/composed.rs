@@ -141,6 +141,56 @@ pub(crate) fn kernel_correlation<const R: usize, const K: usize>(
     correlation.reshape([width; K])
 }
 
+/// See [`crate::brick_convolution`]: in every pass a product of the bricks, between their neighbours, with a banded matrix.
+pub(crate) fn brick_convolution<const R: usize>(
+    x: Tensor<R>,
+    taps: Tensor<1>,
+    neighbours: Tensor<2>,
+    adjoint: bool,
+) -> Tensor<R> {
+    let dims = x.dims();
+    let (side, device) = (dims[R - 1], x.device());
+    let (bricks, volume) = (neighbours.dims()[0], side.pow(R as u32));
+    let matrix = banded(taps, side, adjoint);
+    // What is not active is a brick of zeros behind the last.
+    let absent = neighbours.clone().lower_elem(0.0);
+    let neighbours = neighbours.mask_fill(absent, bricks as f64).int();
+    let ghost = Tensor::<2>::zeros([1, volume], (&device, x.dtype()));
+    let mut y: Tensor<2> = x.reshape([bricks, volume]);
+    for pass in 0..R {
+        let axis = if adjoint { pass } else { R - 1 - pass };
+        let (outer, inner) = (side.pow(axis as u32), side.pow((R - 1 - axis) as u32));
+        let in_lines = |y: Tensor<2>| -> Tensor<4> { y.reshape([bricks, outer, side, inner]) };
+        let stored = Tensor::cat(vec![y.clone(), ghost.clone()], 0);
+        let beside = |column: usize| {
+            let numbers = (neighbours.clone()).slice([0..bricks, column..column + 1]);
+            in_lines(stored.clone().select(0, numbers.reshape([bricks])))
+        };
+        let window = vec![beside(2 * axis), in_lines(y), beside(2 * axis + 1)];
+        let passed = matrix.clone().matmul(Tensor::cat(window, 2));
+        y = passed.reshape([bricks, volume]);
+    }
+    y.reshape(dims)
+}
+
+/// `[1, 1, side, 3 side]`: row `i` has tap `k` in column `side + i + k - reach`.
+fn banded(taps: Tensor<1>, side: usize, mirrored: bool) -> Tensor<4> {
+    let (width, device) = (taps.dims()[0], taps.device());
+    let taps = if mirrored { taps.flip([0]) } else { taps };
+    let places: Vec<i32> = (0..side * 3 * side)
+        .map(|place| {
+            let (i, j) = (place / (3 * side), place % (3 * side));
+            let tap = (j + width / 2).checked_sub(side + i);
+            // Behind the last tap there is a zero.
+            tap.unwrap_or(width).min(width) as i32
+        })
+        .collect();
+    let zero = Tensor::<1>::zeros([1], (&device, taps.dtype()));
+    let count = places.len();
+    let places = Tensor::<1, Int>::from_data(TensorData::new(places, [count]), &device);
+    (Tensor::cat(vec![taps, zero], 0).select(0, places)).reshape([1, 1, side, 3 * side])
+}
+
 /// See [`crate::tabulated`].
 pub(crate) fn tabulated<const R: usize>(
     w: Tensor<R>,
@@ -267,6 +317,28 @@ mod tests {
             spectral_filter(volume.clone(), symbol),
             crate::spectral_filter(volume, &filter),
         );
+    }
+
+    #[test]
+    fn composed_passes_over_bricks_equal_the_host_kernel() {
+        fn check<const D: usize>(side: usize, reach: usize) {
+            let device = ComputeDevice::open(DeviceKind::Flex).unwrap();
+            let odd = |place: [usize; D]| place.iter().sum::<usize>() % 3 != 1;
+            let bricks = crate::Bricks::<D>::new(3 * side, side, odd, |_| true).unwrap();
+            let x = device.tensor::<D>(&wave(bricks.len(), 0.37), bricks.shape());
+            let taps = device.tensor::<1>(&wave(2 * reach + 1, 1.1), [2 * reach + 1]);
+            let count = bricks.places().len();
+            let neighbours = device.tensor::<2>(&bricks.neighbours(), [count, 2 * D]);
+            for adjoint in [false, true] {
+                let host =
+                    crate::brick_convolution(x.clone(), taps.clone(), neighbours.clone(), adjoint);
+                let composed =
+                    brick_convolution(x.clone(), taps.clone(), neighbours.clone(), adjoint);
+                assert_close(composed, host);
+            }
+        }
+        check::<2>(16, 5);
+        check::<3>(8, 8);
     }
 
     #[test]

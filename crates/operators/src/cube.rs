@@ -80,6 +80,17 @@ impl GridOps for Cube {
         })
     }
 
+    fn brick_convolution(
+        x: CubeTensor,
+        taps: CubeTensor,
+        neighbours: CubeTensor,
+        adjoint: bool,
+    ) -> CubeTensor {
+        ranked!(x.shape().num_dims(), 2 3, R => {
+            down(composed::brick_convolution::<R>(up(x), up(taps), up(neighbours), adjoint))
+        })
+    }
+
     fn tabulated(w: CubeTensor, table: CubeTensor, range: TableRange, order: usize) -> CubeTensor {
         ranked!(w.shape().num_dims(), 1 2 3 4, R => {
             down(composed::tabulated::<R>(up(w), up(table), range, order))

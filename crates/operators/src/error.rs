@@ -49,6 +49,16 @@ pub enum Error {
         /// The message of the backend.
         reason: String,
     },
+    /// A grid that cannot be divided into bricks.
+    #[error(
+        "a grid of {cells} cells per side cannot be divided into bricks of {side}; take a multiple of {side} cells, or store the whole grid"
+    )]
+    Bricks {
+        /// Cells per axis of the grid.
+        cells: usize,
+        /// Cells per axis of a brick.
+        side: usize,
+    },
     /// An empty or non-finite table interval.
     #[error("a table needs a finite interval and cells, got [{low}, {high}] with {cells} cells")]
     TableRange {

@@ -2,6 +2,7 @@
 
 use burn_backend::Shape;
 
+use crate::brick_convolution::{self, Ghosts};
 use crate::convolution::{convolve, correlate};
 use crate::fft::{Real, Transform};
 use crate::filter::SpectralFilter;
@@ -32,6 +33,18 @@ pub(crate) fn kernel_correlation<T: Real>(
     axes: usize,
 ) -> Vec<T> {
     correlate(x, g, &shape[shape.num_dims() - axes..], width)
+}
+
+pub(crate) fn brick_convolution<T: Real>(
+    x: &[T],
+    shape: &Shape,
+    taps: &[T],
+    neighbours: &[T],
+    adjoint: bool,
+) -> Vec<T> {
+    let axes = shape.num_dims();
+    let bricks = (shape[axes - 1], axes);
+    brick_convolution::convolve(x, bricks, neighbours, taps, adjoint, Ghosts::Zero)
 }
 
 pub(crate) fn tabulated<T: Real>(w: &[T], table: &[T], range: TableRange, order: usize) -> Vec<T> {
@@ -109,6 +122,21 @@ pub(crate) mod flex {
             in_precision!(x.dtype(), T => {
                 let y = super::kernel_correlation::<T>(values(&x), &shape, values(&g), width, axes);
                 FlexTensor::from_data(TensorData::new(y, vec![width; axes]))
+            })
+        }
+
+        fn brick_convolution(
+            x: FlexTensor,
+            taps: FlexTensor,
+            neighbours: FlexTensor,
+            adjoint: bool,
+        ) -> FlexTensor {
+            let [x, taps, neighbours] = [x, taps, neighbours].map(contiguous);
+            let shape = x.shape();
+            in_precision!(x.dtype(), T => {
+                let (taps, neighbours) = (values(&taps), values(&neighbours));
+                let y = super::brick_convolution::<T>(values(&x), &shape, taps, neighbours, adjoint);
+                FlexTensor::from_data(TensorData::new(y, shape))
             })
         }
 
@@ -259,6 +287,19 @@ pub(crate) mod ndarray {
             in_precision!(x.dtype(), T => {
                 let (x, g) = (values::<T>(x), values::<T>(g));
                 tensor(super::kernel_correlation(&x, &shape, &g, width, axes), vec![width; axes])
+            })
+        }
+
+        fn brick_convolution(
+            x: NdTensor,
+            taps: NdTensor,
+            neighbours: NdTensor,
+            adjoint: bool,
+        ) -> NdTensor {
+            let shape = x.shape();
+            in_precision!(x.dtype(), T => {
+                let [x, taps, neighbours] = [x, taps, neighbours].map(values::<T>);
+                tensor(super::brick_convolution(&x, &shape, &taps, &neighbours, adjoint), shape)
             })
         }
 

@@ -20,6 +20,7 @@
 //! | operation | formula | derivative |
 //! |---|---|---|
 //! | [`circular_convolution`] | `y_a = sum_b K_b x_{a+b}` | itself with `adjoint` flipped; in the kernel [`kernel_correlation`] |
+//! | [`brick_convolution`] | `y_a = sum t_b .. t_c x_{a+(b,..,c)}` on active [`Bricks`] | itself with `adjoint` flipped |
 //! | [`kernel_correlation`] | `c_b = sum_a g_a x_{a+b}` | [`circular_convolution`] |
 //! | [`tabulated`] | `y_a = F^(k)(w_a)`, `F` a quintic Hermite table | itself with `k + 1` |
 //! | [`spectral_filter`] | `y = F^-1[symbol F[x]]` | none (preconditioners) |
@@ -43,6 +44,8 @@
 pub mod memory;
 pub mod slices;
 
+mod brick_convolution;
+mod bricks;
 mod composed;
 mod convolution;
 #[cfg(any(feature = "wgpu", feature = "cuda"))]
@@ -64,6 +67,7 @@ mod table;
 mod tensor;
 mod vector;
 
+pub use bricks::Bricks;
 pub use convolution::kernel_symbol;
 pub use device::{ComputeDevice, DeviceKind};
 pub use error::Error;
@@ -72,7 +76,9 @@ pub use filter::{FilterOps, SpectralFilter};
 pub use ops::GridOps;
 pub use rules::extensions;
 pub use table::{COEFFICIENTS, HermiteTable, TableRange};
-pub use tensor::{circular_convolution, kernel_correlation, spectral_filter, tabulated};
+pub use tensor::{
+    brick_convolution, circular_convolution, kernel_correlation, spectral_filter, tabulated,
+};
 pub use vector::{
     HostUpdate, HostVectors, SharedUpdate, VectorOps, add_scaled, extrapolate, inner_product,
     retract, update_on_host,

@@ -18,6 +18,8 @@ use crate::table::TableRange;
 pub(crate) const CONVOLUTION: &str = "operators::circular_convolution";
 /// Identifier of [`GridOps::kernel_correlation`] in captured graphs.
 pub(crate) const CORRELATION: &str = "operators::kernel_correlation";
+/// Identifier of [`GridOps::brick_convolution`] in captured graphs.
+pub(crate) const BRICKS: &str = "operators::brick_convolution";
 /// Identifier of [`GridOps::tabulated`] in captured graphs.
 pub(crate) const TABULATED: &str = "operators::tabulated";
 
@@ -43,6 +45,13 @@ pub trait GridOps: Backend {
         width: usize,
         axes: usize,
     ) -> FloatTensor<Self>;
+    /// `sum_b t_b .. t_c x_{a+(b,..,c)}` over the cells of active bricks, pass by pass; the transpose if `adjoint`.
+    fn brick_convolution(
+        x: FloatTensor<Self>,
+        taps: FloatTensor<Self>,
+        neighbours: FloatTensor<Self>,
+        adjoint: bool,
+    ) -> FloatTensor<Self>;
     /// The `order`-th derivative of a tabulated function at every entry of `w`.
     fn tabulated(
         w: FloatTensor<Self>,
@@ -59,7 +68,12 @@ impl GridOps for CaptureBackend {
         adjoint: bool,
     ) -> FloatTensor<Self> {
         let shape = x.shape();
-        record(CONVOLUTION, x, kernel, shape, vec![ScalarIr::Bool(adjoint)])
+        record(
+            CONVOLUTION,
+            [x, kernel],
+            shape,
+            vec![ScalarIr::Bool(adjoint)],
+        )
     }
 
     fn kernel_correlation(
@@ -69,7 +83,18 @@ impl GridOps for CaptureBackend {
         axes: usize,
     ) -> FloatTensor<Self> {
         let scalars = vec![ScalarIr::UInt(width as u64), ScalarIr::UInt(axes as u64)];
-        record(CORRELATION, x, g, Shape::from(vec![width; axes]), scalars)
+        record(CORRELATION, [x, g], Shape::from(vec![width; axes]), scalars)
+    }
+
+    fn brick_convolution(
+        x: FloatTensor<Self>,
+        taps: FloatTensor<Self>,
+        neighbours: FloatTensor<Self>,
+        adjoint: bool,
+    ) -> FloatTensor<Self> {
+        let shape = x.shape();
+        let scalars = vec![ScalarIr::Bool(adjoint)];
+        record(BRICKS, [x, taps, neighbours], shape, scalars)
     }
 
     fn tabulated(
@@ -85,21 +110,20 @@ impl GridOps for CaptureBackend {
             ScalarIr::Float(range.high),
             ScalarIr::UInt(range.cells as u64),
         ];
-        record(TABULATED, w, table, shape, scalars)
+        record(TABULATED, [w, table], shape, scalars)
     }
 }
 
-fn record(
+fn record<const N: usize>(
     id: &'static str,
-    a: FloatTensor<CaptureBackend>,
-    b: FloatTensor<CaptureBackend>,
+    inputs: [FloatTensor<CaptureBackend>; N],
     shape: Shape,
     scalars: Vec<ScalarIr>,
 ) -> FloatTensor<CaptureBackend> {
-    let client = a.client.clone();
-    let (a, b) = (a.into_ir(), b.into_ir());
-    let output = TensorIr::uninit(client.create_empty_handle(), shape, a.dtype);
-    let operation = CustomOpIr::with_scalars(id, &[a, b], &[output], scalars);
+    let client = inputs[0].client.clone();
+    let inputs = inputs.map(burn_router::RouterTensor::into_ir);
+    let output = TensorIr::uninit(client.create_empty_handle(), shape, inputs[0].dtype);
+    let operation = CustomOpIr::with_scalars(id, &inputs, &[output], scalars);
     client.register(OperationIr::Custom(operation)).output()
 }
 
@@ -179,6 +203,43 @@ impl<B: Backend + GridOps, C: CheckpointStrategy> GridOps for Autodiff<B, C> {
         let y = B::kernel_correlation(x.clone(), g.clone(), width, axes);
         match Correlation.prepare::<C>(nodes).compute_bound().stateful() {
             OpsKind::Tracked(prepared) => prepared.finish((x, g), y),
+            OpsKind::UnTracked(prepared) => prepared.finish(y),
+        }
+    }
+
+    fn brick_convolution(
+        x: FloatTensor<Self>,
+        taps: FloatTensor<Self>,
+        neighbours: FloatTensor<Self>,
+        adjoint: bool,
+    ) -> FloatTensor<Self> {
+        #[derive(Debug)]
+        struct Bricks;
+        impl<B: Backend + GridOps> Backward<B, 1> for Bricks {
+            type State = (FloatTensor<B>, FloatTensor<B>, bool);
+            fn backward(
+                self,
+                ops: Ops<Self::State, 1>,
+                grads: &mut Gradients,
+                _checkpointer: &mut Checkpointer,
+            ) {
+                let (taps, neighbours, adjoint) = ops.state;
+                unary::<B, _>(ops.parents, ops.node, grads, |g| {
+                    B::brick_convolution(g, taps, neighbours, !adjoint)
+                });
+            }
+        }
+        let node = x.node();
+        // Taps and neighbours are data, not variables.
+        let (taps, neighbours) = (taps.into_primitive(), neighbours.into_primitive());
+        let y = B::brick_convolution(
+            x.into_primitive(),
+            taps.clone(),
+            neighbours.clone(),
+            adjoint,
+        );
+        match Bricks.prepare::<C>([node]).compute_bound().stateful() {
+            OpsKind::Tracked(prepared) => prepared.finish((taps, neighbours, adjoint), y),
             OpsKind::UnTracked(prepared) => prepared.finish(y),
         }
     }

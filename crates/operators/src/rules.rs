@@ -3,7 +3,7 @@
 use burn_ir::{BackendIr, CustomOpIr, ScalarIr, TensorIr};
 use linearize::{Builder, CustomOpRegistry, Error, Extensions, Multilinear, Rule};
 
-use crate::ops::{CONVOLUTION, CORRELATION, GridOps, TABULATED};
+use crate::ops::{BRICKS, CONVOLUTION, CORRELATION, GridOps, TABULATED};
 use crate::table::TableRange;
 
 /// `d F^(k)(w) = F^(k+1)(w) dw`; the table is constant.
@@ -44,6 +44,12 @@ fn register<B: BackendIr + GridOps>(registry: &mut CustomOpRegistry<B>) {
         let y = B::kernel_correlation(x, g, width, axes);
         handles.register_float_tensor::<B>(&ir.outputs[0].id, y);
     });
+    registry.register(BRICKS, |handles, ir, _| {
+        let [x, taps, neighbours] = [0, 1, 2].map(|i| handles.get_float_tensor::<B>(&ir.inputs[i]));
+        let adjoint = ir.scalars[0] == ScalarIr::Bool(true);
+        let y = B::brick_convolution(x, taps, neighbours, adjoint);
+        handles.register_float_tensor::<B>(&ir.outputs[0].id, y);
+    });
     registry.register(TABULATED, |handles, ir, _| {
         let w = handles.get_float_tensor::<B>(&ir.inputs[0]);
         let table = handles.get_float_tensor::<B>(&ir.inputs[1]);
@@ -64,6 +70,7 @@ pub fn extensions() -> Extensions {
     extensions
         .rule(CONVOLUTION, Multilinear)
         .rule(CORRELATION, Multilinear)
+        .rule(BRICKS, Multilinear)
         .rule(TABULATED, Tabulated);
     #[cfg(feature = "flex")]
     extensions.on_flex(|registry| {

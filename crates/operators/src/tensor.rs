@@ -37,6 +37,25 @@ pub fn kernel_correlation<const R: usize, const K: usize>(
     ))
 }
 
+/// `y_a = sum_{b,..,c} t_b .. t_c x_{a+(b,..,c)}` on active [`crate::Bricks`], as one pass along each axis, the last one first; every pass
+/// takes what is not active as zero. The transpose of that if `adjoint`: the passes in the opposite order with mirrored taps.
+///
+/// `x` has the shape of [`crate::Bricks::shape`]; `taps` are odd in number with the centre in the middle, and reach no further than the
+/// next brick; `neighbours` is [`crate::Bricks::neighbours`]. Linear and differentiable in `x`; the others are constant.
+pub fn brick_convolution<const D: usize>(
+    x: Tensor<D>,
+    taps: Tensor<1>,
+    neighbours: Tensor<2>,
+    adjoint: bool,
+) -> Tensor<D> {
+    Tensor::from_dispatch(<Dispatch as GridOps>::brick_convolution(
+        x.into_dispatch(),
+        taps.into_dispatch(),
+        neighbours.into_dispatch(),
+        adjoint,
+    ))
+}
+
 /// `F^(order)(w)` entry by entry, `F` given by the coefficients `[cells, 6]` of a [`crate::HermiteTable`].
 ///
 /// Differentiable in `w`; the table is constant.

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use burn::tensor::{DType, Tensor};
 use linearize::{Graph, Linearization, Value};
-use model::MeanCurvatureOperator;
-use operators::{ComputeDevice, SpectralFilter};
+use model::{BrickOperator, MeanCurvatureOperator};
+use operators::ComputeDevice;
 use serde::{Deserialize, Serialize};
 
 use crate::error::StepFailure;
-use crate::{Error, HelfrichTerms};
+use crate::{Error, HelfrichTerms, PhaseInverse};
 
 /// Precision of the linear solves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -45,7 +45,7 @@ pub trait MeanCurvatureStep<const D: usize>: Send + Sync {
     }
 
     /// An approximate inverse of `1 + c (J - 1)^T (J - 1)` in the pure phases, `J` the derivative of `v`.
-    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> SpectralFilter;
+    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse;
 
     /// Says how accurate derivatives of the step have to be; a step that solves systems adapts its tolerances.
     fn set_accuracy(&self, _accuracy: &Accuracy) {}
@@ -80,8 +80,28 @@ impl<const D: usize> MeanCurvatureStep<D> for MeanCurvatureOperator<D> {
         true
     }
 
-    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> SpectralFilter {
-        MeanCurvatureOperator::phase_preconditioner(self, cells, stiffness)
+    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse {
+        MeanCurvatureOperator::phase_preconditioner(self, cells, stiffness).into()
+    }
+}
+
+impl<const D: usize> MeanCurvatureStep<D> for BrickOperator<D> {
+    fn apply(&self, u: Tensor<D>) -> Tensor<D> {
+        BrickOperator::apply(self, u)
+    }
+
+    fn extensions(&self) -> linearize::Extensions {
+        operators::extensions()
+    }
+
+    fn allows_single_precision(&self) -> bool {
+        true
+    }
+
+    fn phase_preconditioner(&self, _cells: usize, stiffness: f64) -> PhaseInverse {
+        PhaseInverse::Bricks(Box::new(BrickOperator::phase_preconditioner(
+            self, stiffness,
+        )))
     }
 }
 
@@ -178,31 +198,35 @@ impl<const D: usize> MinimizingMovement<D> {
         terms: Option<&HelfrichTerms<D>>,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
-        Self::trace(step, cells, products, (false, terms), device)
+        Self::trace(step, [cells; D], products, (false, terms), device)
     }
 
-    /// As [`Self::with_terms`], with factors of the motion, which are 1 until they are [set](Self::set_factors).
-    pub(crate) fn weighted(
+    /// As [`Self::with_precision`], for tensors of any shape that the step takes, such as that of active bricks.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of_shape(
         step: Arc<dyn MeanCurvatureStep<D>>,
-        cells: usize,
+        shape: [usize; D],
         products: Precision,
-        terms: Option<&HelfrichTerms<D>>,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
-        Self::trace(step, cells, products, (true, terms), device)
+        Self::trace(step, shape, products, (false, None), device)
     }
 
-    fn trace(
+    /// As [`Self::with_terms`], for tensors of any shape that the step takes; if `weighted`, with factors of the motion, which are 1 until
+    /// they are [set](Self::set_factors).
+    pub(crate) fn trace(
         step: Arc<dyn MeanCurvatureStep<D>>,
-        cells: usize,
+        shape: [usize; D],
         products: Precision,
         (weighted, terms): (bool, Option<&HelfrichTerms<D>>),
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
         let options = (device.device(), device.dtype());
-        let anchor = Value::from(Tensor::<D>::zeros([cells; D], options));
+        let anchor = Value::from(Tensor::<D>::zeros(shape, options));
         let stiffness_tensor = Value::from(device.tensor::<1>(&[1.0], [1]));
-        let factors = weighted.then(|| Value::from(Tensor::<D>::ones([cells; D], options)));
+        let factors = weighted.then(|| Value::from(Tensor::<D>::ones(shape, options)));
         let mut parameters = vec![anchor.clone(), stiffness_tensor.clone()];
         parameters.extend(factors.clone());
         let graph = Graph::gradient(std::slice::from_ref(&anchor), &parameters, |inputs| {

@@ -90,6 +90,17 @@ pub enum Error {
         /// Marks that are set.
         marked: usize,
     },
+    /// A phase field without an interface on active bricks, which follow one.
+    #[error(
+        "there is no interface for active bricks to follow; give a phase field of both signs, or store the whole grid"
+    )]
+    NoInterface,
+    /// Something that flows on active bricks cannot do.
+    #[error("{what} need the whole grid; store that instead of active bricks")]
+    NeedsGrid {
+        /// What was asked for.
+        what: &'static str,
+    },
     /// The step of mean curvature flow failed.
     #[error("the step of mean curvature flow failed: {0}")]
     Step(StepFailure),

@@ -5,13 +5,14 @@ use std::time::Instant;
 
 use burn::tensor::Tensor;
 use geometry::{Field, Grid};
-use model::{Factors, MeanCurvatureOperator, Network, Ratios};
-use operators::{ComputeDevice, SpectralFilter, inner_product};
+use model::{Factors, MeanCurvatureOperator, Network, Ratios, SeparableOperator};
+use operators::{ComputeDevice, inner_product};
 use serde::{Deserialize, Serialize};
 
+use crate::active::Active;
 use crate::constraints::{Constraints, Held};
 use crate::newton::{NewtonInfo, NewtonParams, minimize_timed};
-use crate::preconditioner::Preconditioner;
+use crate::preconditioner::{PhaseInverse, Preconditioner};
 use crate::region::Restricted;
 use crate::times::PhaseTimes;
 use crate::{
@@ -19,6 +20,7 @@ use crate::{
     Objective, Region,
 };
 
+mod bricks;
 mod second_order;
 mod start;
 
@@ -45,6 +47,25 @@ impl FlowParams {
     /// The network ratios that a grid needs with these scales.
     pub fn ratios<const D: usize>(&self, grid: &Grid<D>, width: usize) -> Ratios {
         Ratios::of_run(D, width, grid.spacing(), self.eps, self.mcf_step)
+    }
+
+    fn validate(&self) -> Result<(), Error> {
+        self.newton.validate()?;
+        for (name, value) in [
+            ("eps", self.eps),
+            ("tautilde", self.mcf_step),
+            ("calibration.energy", self.calibration.energy),
+            ("calibration.metric", self.calibration.metric),
+        ] {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::Parameter {
+                    name,
+                    value,
+                    expected: "positive and finite",
+                });
+            }
+        }
+        Ok(())
     }
 
     /// `tau m / (c tautilde^2)`, the weight of the curvature against the motion in a time step of size `tau`.
@@ -171,13 +192,15 @@ pub struct WillmoreFlow<const D: usize> {
     grid: Grid<D>,
     params: FlowParams,
     device: ComputeDevice,
+    /// The bricks that are stored, if not the whole grid.
+    active: Option<Active<D>>,
     mcf: Arc<dyn MeanCurvatureStep<D>>,
     energy: MinimizingMovement<D>,
     /// What it has besides bending.
     terms: Option<HelfrichTerms<D>>,
     /// The same with weights of the motion, from the first second-order step on.
     weighted: Option<MinimizingMovement<D>>,
-    filter: Option<(f64, SpectralFilter)>,
+    phase: Option<(f64, PhaseInverse)>,
     region: Option<Region<D>>,
     constraints: Constraints,
     /// Where steps begin, if on the half grid, and what that moved last.
@@ -217,39 +240,64 @@ impl<const D: usize> WillmoreFlow<D> {
         params: FlowParams,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
-        params.newton.validate()?;
-        for (name, value) in [
-            ("eps", params.eps),
-            ("tautilde", params.mcf_step),
-            ("calibration.energy", params.calibration.energy),
-            ("calibration.metric", params.calibration.metric),
-        ] {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(Error::Parameter {
-                    name,
-                    value,
-                    expected: "positive and finite",
-                });
-            }
-        }
-        let grid = *initial.grid();
+        params.validate()?;
         let current = upload(initial, device)?;
-        let mcf: Arc<dyn MeanCurvatureStep<D>> = Arc::new(step);
-        let energy = MinimizingMovement::with_precision(
-            mcf.clone(),
-            grid.cells(),
-            params.newton.precision,
+        Self::stored(
+            Arc::new(step),
+            None,
+            (initial.grid(), current),
+            params,
             device,
-        )?;
+        )
+    }
+
+    /// A flow with a learned operator on active bricks, which follow the interface: bricks that are further from it than 8 `eps` are not stored,
+    /// and the phase field is constant there. That changes a flow by about a millionth of its motion; work and memory are in proportion to
+    /// the length or area of the interface.
+    ///
+    /// # Errors
+    /// As [`Self::with_network`]; [`Error::Model`] for a network whose kernel is not separable, [`Error::Operators`] if the grid cannot be divided
+    /// into bricks, and [`Error::NoInterface`].
+    pub fn on_bricks(
+        network: &Network,
+        initial: &Field<D>,
+        params: FlowParams,
+        device: &ComputeDevice,
+    ) -> Result<Self, Error> {
+        params.validate()?;
+        initial.check_finite().map_err(|_| Error::NonFinite {
+            step: 0,
+            field: "phase field",
+        })?;
+        let grid = initial.grid();
+        network.check_fits(params.ratios(grid, network.ratios().width))?;
+        let operator = SeparableOperator::new(network, device)?;
+        let active = Active::new(operator, initial, params.eps)?;
+        let current = device.tensor(&active.gather(initial), active.bricks().shape());
+        let step = Arc::new(active.step(device));
+        Self::stored(step, Some(active), (grid, current), params, device)
+    }
+
+    fn stored(
+        mcf: Arc<dyn MeanCurvatureStep<D>>,
+        active: Option<Active<D>>,
+        (grid, current): (&Grid<D>, Tensor<D>),
+        params: FlowParams,
+        device: &ComputeDevice,
+    ) -> Result<Self, Error> {
+        let (shape, precision) = (current.dims(), params.newton.precision);
+        let energy =
+            MinimizingMovement::trace(mcf.clone(), shape, precision, (false, None), device)?;
         Ok(Self {
-            grid,
+            grid: *grid,
             params,
             device: device.clone(),
+            active,
             mcf,
             energy,
             terms: None,
             weighted: None,
-            filter: None,
+            phase: None,
             region: None,
             constraints: Constraints::default(),
             half: None,
@@ -268,6 +316,7 @@ impl<const D: usize> WillmoreFlow<D> {
     /// # Errors
     /// [`Error::Region`] if there are not as many marks as nodes, or if none is set.
     pub fn restrict_to(&mut self, nodes: &[bool]) -> Result<(), Error> {
+        self.needs_grid("regions")?;
         let region = Region::new(&self.grid, nodes, &self.device)?;
         if let Some(half) = &mut self.half {
             half.restrict_to(&every_other_node(self.grid, nodes))?;
@@ -283,6 +332,9 @@ impl<const D: usize> WillmoreFlow<D> {
     /// As [`Constraints::check`].
     pub fn constrain(&mut self, constraints: Constraints) -> Result<(), Error> {
         constraints.check(&self.grid)?;
+        if !constraints.is_empty() {
+            self.needs_grid("perimeters and volumes that are held")?;
+        }
         self.constraints = constraints;
         Ok(())
     }
@@ -296,6 +348,7 @@ impl<const D: usize> WillmoreFlow<D> {
         self.terms = if energy.is_willmore() {
             None
         } else {
+            self.needs_grid("spontaneous curvature, tension and pressure")?;
             let (grid, device) = (&self.grid, &self.device);
             Some(HelfrichTerms::new(
                 energy,
@@ -305,13 +358,7 @@ impl<const D: usize> WillmoreFlow<D> {
                 device,
             )?)
         };
-        self.energy = MinimizingMovement::with_terms(
-            self.mcf.clone(),
-            self.grid.cells(),
-            self.params.newton.precision,
-            self.terms.as_ref(),
-            &self.device,
-        )?;
+        self.energy = self.traced(false)?;
         self.weighted = None;
         match &mut self.half {
             Some(half) => half.set_energy(energy, response),
@@ -319,7 +366,22 @@ impl<const D: usize> WillmoreFlow<D> {
         }
     }
 
-    /// The phase field now, on the device.
+    fn traced(&self, weighted: bool) -> Result<MinimizingMovement<D>, Error> {
+        MinimizingMovement::trace(
+            self.mcf.clone(),
+            self.current.dims(),
+            self.params.newton.precision,
+            (weighted, self.terms.as_ref()),
+            &self.device,
+        )
+    }
+
+    /// Which part of the grid is stored: all of it, or that of the active bricks.
+    pub fn stored_share(&self) -> f64 {
+        self.current.shape().num_elements() as f64 / self.grid.len() as f64
+    }
+
+    /// The phase field now, on the device: on the whole grid, or on its active [`operators::Bricks`].
     pub fn current(&self) -> &Tensor<D> {
         &self.current
     }
@@ -329,7 +391,7 @@ impl<const D: usize> WillmoreFlow<D> {
     /// # Errors
     /// [`Error::Operators`] if the device fails.
     pub fn field(&self) -> Result<Field<D>, Error> {
-        download(&self.grid, &self.current, &self.device)
+        self.on_grid(&self.current)
     }
 
     /// Everything the following steps depend on: a flow [restored](Self::restore) from it continues with the same bytes.
@@ -338,7 +400,7 @@ impl<const D: usize> WillmoreFlow<D> {
     /// [`Error::Operators`] if the device fails.
     pub fn state(&self) -> Result<FlowState<D>, Error> {
         let previous = match &self.previous {
-            Some((u, tau)) => Some((download(&self.grid, u, &self.device)?, *tau)),
+            Some((u, tau)) => Some((self.on_grid(u)?, *tau)),
             None => None,
         };
         Ok(FlowState {
@@ -356,15 +418,22 @@ impl<const D: usize> WillmoreFlow<D> {
     /// # Errors
     /// [`Error::Geometry`] for fields on another grid, [`Error::NonFinite`] for values that are not finite.
     pub fn restore(&mut self, state: &FlowState<D>) -> Result<(), Error> {
-        let fitting = |field: &Field<D>| -> Result<Tensor<D>, Error> {
+        let fitting = |field: &Field<D>| -> Result<Field<D>, Error> {
             let field = Field::from_values(self.grid, field.values().to_vec())?;
-            upload(&field, &self.device)
+            field.check_finite().map_err(|_| Error::NonFinite {
+                step: 0,
+                field: "phase field",
+            })?;
+            Ok(field)
         };
         let current = fitting(&state.current)?;
         let previous = match &state.previous {
             Some((u, tau)) => Some((fitting(u)?, *tau)),
             None => None,
         };
+        self.follow_field(&current)?;
+        let current = self.in_storage(&current);
+        let previous = previous.map(|(u, tau)| (self.in_storage(&u), tau));
         let rate = match &state.rate {
             Some(rate) => Some(Field::from_values(self.grid, rate.values().to_vec())?),
             None => None,
@@ -419,6 +488,7 @@ impl<const D: usize> WillmoreFlow<D> {
 
     fn make_step(&mut self, tau: f64) -> Result<StepRecord, Error> {
         let clock = Instant::now();
+        self.follow()?;
         let (start, origin) = self.start(tau)?;
         let beginning = clock.elapsed().as_secs_f64();
         let anchor = self.current.clone();
@@ -458,8 +528,9 @@ impl<const D: usize> WillmoreFlow<D> {
         2.0 * self.params.eps * self.grid.cell_volume() / self.params.calibration.metric
     }
 
-    /// Minimizes the energy of a movement from the present phase field, with respect to which the tolerance is meant.
-    fn minimize(&mut self, movement: &Movement<'_, D>) -> Result<Minimum<D>, Error> {
+    /// Minimizes the energy of a movement from the present phase field, with respect to which the tolerance is meant, on the values that are
+    /// stored now.
+    fn minimize_here(&mut self, movement: &Movement<'_, D>) -> Result<Minimum<D>, Error> {
         let Movement {
             anchor,
             factors,
@@ -469,27 +540,21 @@ impl<const D: usize> WillmoreFlow<D> {
         let step = self.step + 1;
         let stiffness = self.params.stiffness(tau);
         self.prepare(stiffness);
-        let preconditioner = self.filter.as_ref().map(|(_, filter)| {
-            Preconditioner::two_level(filter.clone(), &self.grid, self.params.eps, tau)
+        if factors.is_some() && self.weighted.is_none() {
+            self.weighted = Some(self.traced(true)?);
+        }
+        let preconditioner = self.phase.as_ref().map(|(_, phase)| {
+            Preconditioner::two_level(phase.clone(), &self.grid, self.params.eps, tau)
+                .on(self.active.as_ref().map(Active::bricks))
                 .within(self.region.clone())
         });
         let (params, device, current) = (self.params.newton, &self.device, &self.current);
-        let energy = match factors {
-            None => &mut self.energy,
-            Some(factors) => {
-                let energy = match &mut self.weighted {
-                    Some(energy) => energy,
-                    none => none.insert(MinimizingMovement::weighted(
-                        self.mcf.clone(),
-                        self.grid.cells(),
-                        params.precision,
-                        self.terms.as_ref(),
-                        device,
-                    )?),
-                };
+        let energy = match (factors, &mut self.weighted) {
+            (Some(factors), Some(energy)) => {
                 energy.set_factors(factors);
                 energy
             }
+            _ => &mut self.energy,
         };
         energy.set(anchor, stiffness)?;
         let (eps, region) = (self.params.eps, self.region.as_ref());
@@ -544,10 +609,12 @@ impl<const D: usize> WillmoreFlow<D> {
                 tolerance: self.params.newton.tolerance,
             });
         }
-        download(&self.grid, &u, &self.device).map_err(|_| Error::NonFinite {
-            step,
-            field: "phase field",
-        })?;
+        if !self.device.values(u.clone())?.iter().all(|u| u.is_finite()) {
+            return Err(Error::NonFinite {
+                step,
+                field: "phase field",
+            });
+        }
         let mut motion = u.clone() - anchor.clone();
         if let Some(factors) = factors {
             motion = motion * factors.clone();
@@ -572,12 +639,12 @@ impl<const D: usize> WillmoreFlow<D> {
 
     /// Fits preconditioner and accuracy to a weight of the curvature.
     fn prepare(&mut self, stiffness: f64) {
-        let prepared = self.filter.as_ref().map(|(c, _)| c.to_bits());
+        let prepared = self.phase.as_ref().map(|(c, _)| c.to_bits());
         if prepared == Some(stiffness.to_bits()) {
             return;
         }
-        let filter = self.mcf.phase_preconditioner(self.grid.cells(), stiffness);
-        self.filter = Some((stiffness, filter));
+        let phase = self.mcf.phase_preconditioner(self.grid.cells(), stiffness);
+        self.phase = Some((stiffness, phase));
         self.mcf.set_accuracy(&Accuracy {
             stiffness,
             tolerance: self.params.newton.tolerance,

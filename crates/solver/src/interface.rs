@@ -9,20 +9,25 @@
 //! So the coarse correction of the preconditioner is `Z (M + tau (S M^-1 S + B))^-1 Z^T` on hat functions `phi_j` of a lattice of
 //! spacing `4 eps`, evaluated at the foot point on the interface: `Z = q phi_j`, `M = int q^2 phi_j phi_k`,
 //! `S = int q^2 grad phi_j . grad phi_k` with tangential gradients, and `B = 4 int q^2 (kappa^2 grad phi_j . grad phi_k +
-//! kappa^4 phi_j phi_k)` for the terms of lower order. Nothing of it needs a Hessian-vector product.
+//! kappa^4 phi_j phi_k)` for the terms of lower order. Nothing of it needs a Hessian-vector product. Where there are too many functions for
+//! dense matrices, and on active bricks, the [sparse] form takes their place.
+//!
+//! [sparse]: crate::sparse
 
 use faer::linalg::solvers::{Llt, Solve};
-use faer::{Mat, Side};
+use faer::{ColMut, Mat, Side};
 use geometry::Grid;
 use operators::{HostUpdate, HostVectors, Real};
 use rayon::prelude::*;
 
+use crate::nodes::Nodes;
 use crate::samples::{MOST_CORNERS, Samples};
+use crate::sparse::{Entry, SparseInverse};
 
 /// Spacing of the lattice in units of `eps`.
 const SPACING: f64 = 4.0;
-/// More functions than this cost more than they save.
-const MOST_COLUMNS: usize = 2000;
+/// With more functions than this the matrices are sparse.
+const MOST_DENSE: usize = 2000;
 /// With more than this fraction of the interface curved more sharply than `1/eps` (corners, in the first steps), displacements
 /// along normals are not the slow modes, and the correction is left out.
 const SHARP: f64 = 1e-3;
@@ -36,32 +41,54 @@ const CHUNK: usize = 1 << 14;
 /// A coarse correction at one phase field for one time step.
 pub(crate) struct InterfaceModes<const D: usize> {
     samples: Samples<D>,
-    factor: Llt<f64>,
+    inverse: Inverse,
+}
+
+/// The inverse of the coarse problem.
+enum Inverse {
+    Dense(Llt<f64>),
+    Sparse(Box<SparseInverse>),
+}
+
+impl Inverse {
+    fn apply(&self, x: &mut [f64]) {
+        match self {
+            Self::Dense(factor) => {
+                factor.solve_in_place(ColMut::from_slice_mut(x).as_mat_mut());
+            }
+            Self::Sparse(inverse) => inverse.apply(x),
+        }
+    }
 }
 
 /// One matrix per cell, rows and columns being the corners.
 type Local = [[f64; MOST_CORNERS]; MOST_CORNERS];
 
 impl<const D: usize> InterfaceModes<D> {
-    /// The correction for the interface of `u`, or none if there is no interface, or too much of it.
+    /// The correction for the interface of `u`, whose values are stored at some `nodes` of the grid, or none if there is no interface, or
+    /// one with corners.
     ///
     /// With a `region` only its nodes count.
-    pub(crate) fn new(
+    pub(crate) fn new<N: Nodes<D>>(
         grid: &Grid<D>,
+        nodes: &N,
         u: &[f64],
         eps: f64,
         tau: f64,
         region: Option<&[bool]>,
     ) -> Option<Self> {
-        let samples = Samples::new(grid, u, eps, SPACING * eps, region);
-        let nodes = &samples.nodes;
-        let sharp = nodes.iter().filter(|s| s.curvature.abs() * eps > 1.0);
-        let corners_dominate = sharp.count() as f64 > SHARP * nodes.len() as f64;
-        if nodes.is_empty() || samples.columns > MOST_COLUMNS || corners_dominate {
+        let samples = Samples::new(grid, nodes, u, eps, SPACING * eps, region);
+        let sharp = (samples.nodes.iter()).filter(|s| s.curvature.abs() * eps > 1.0);
+        let corners_dominate = sharp.count() as f64 > SHARP * samples.nodes.len() as f64;
+        if samples.nodes.is_empty() || corners_dominate {
             return None;
         }
-        let factor = coarse_matrix(&samples, tau)?.llt(Side::Lower).ok()?;
-        Some(Self { samples, factor })
+        let inverse = if N::WHOLE_GRID && samples.columns.len() <= MOST_DENSE {
+            Inverse::Dense(coarse_matrix(&samples, tau)?.llt(Side::Lower).ok()?)
+        } else {
+            Inverse::Sparse(Box::new(sparse_inverse(&samples, tau)?))
+        };
+        Some(Self { samples, inverse })
     }
 
     /// Adds `Z A^-1 Z^T r` to `z`.
@@ -81,13 +108,13 @@ impl<const D: usize> InterfaceModes<D> {
                 sums
             })
             .collect();
-        let mut coarse = Mat::<f64>::zeros(samples.columns, 1);
+        let mut coarse = vec![0.0; samples.columns.len()];
         for (corners, sums) in samples.corners.iter().zip(&parts) {
             for (&column, sum) in corners.iter().zip(sums).take(1 << D) {
-                coarse[(column as usize, 0)] += sum;
+                coarse[column as usize] += sum;
             }
         }
-        self.factor.solve_in_place(&mut coarse);
+        self.inverse.apply(&mut coarse);
         z.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, z)| {
             let first = chunk * CHUNK;
             let from = samples.nodes.partition_point(|s| (s.node as usize) < first);
@@ -98,7 +125,7 @@ impl<const D: usize> InterfaceModes<D> {
                 let sum: f64 = (sample.hats().iter())
                     .zip(&samples.corners[sample.cell as usize])
                     .take(1 << D)
-                    .map(|(hat, &column)| hat * coarse[(column as usize, 0)])
+                    .map(|(hat, &column)| hat * coarse[column as usize])
                     .sum();
                 *z = T::of(z.double() + sample.weight * sum);
             }
@@ -108,11 +135,10 @@ impl<const D: usize> InterfaceModes<D> {
 
 /// `M + tau (S M^-1 S + B)`
 fn coarse_matrix<const D: usize>(samples: &Samples<D>, tau: f64) -> Option<Mat<f64>> {
-    let locals: Vec<[Local; 3]> = (0..samples.corners.len())
-        .into_par_iter()
-        .map(|cell| local_matrices(samples, cell))
-        .collect();
-    let columns = samples.columns;
+    let locals = local_matrices(samples, |dot, product, square| {
+        [product, dot, BENT * square * (dot + square * product)]
+    });
+    let columns = samples.columns.len();
     let mut mass = Mat::<f64>::zeros(columns, columns);
     let mut stiffness = Mat::<f64>::zeros(columns, columns);
     let mut bent = Mat::<f64>::zeros(columns, columns);
@@ -136,25 +162,57 @@ fn coarse_matrix<const D: usize>(samples: &Samples<D>, tau: f64) -> Option<Mat<f
     }))
 }
 
-/// What one cell of the lattice adds to `M`, `S` and `B`.
-fn local_matrices<const D: usize>(samples: &Samples<D>, cell: usize) -> [Local; 3] {
-    let [mut mass, mut stiffness, mut bent] = [[[0.0; MOST_CORNERS]; MOST_CORNERS]; 3];
-    let unit = samples.spacing.powi(-2);
-    for sample in samples.of_cell(cell) {
-        let (hats, slopes) = (sample.hats(), sample.slopes());
-        let weight = sample.weight * sample.weight;
-        let square = sample.curvature * sample.curvature;
-        for j in 0..1 << D {
-            for k in 0..1 << D {
-                let slope: f64 = slopes[j].iter().zip(&slopes[k]).map(|(a, b)| a * b).sum();
-                let (dot, product) = (weight * unit * slope, weight * hats[j] * hats[k]);
-                mass[j][k] += product;
-                stiffness[j][k] += dot;
-                bent[j][k] += BENT * square * (dot + square * product);
+/// `conj(C)^-1 M C^-1`, see [`crate::sparse`].
+fn sparse_inverse<const D: usize>(samples: &Samples<D>, tau: f64) -> Option<SparseInverse> {
+    let root = tau.sqrt();
+    // To the terms of lower order half of their weight, since `C` comes twice.
+    let locals = local_matrices(samples, |dot, product, square| {
+        [product, root * (dot + 0.5 * BENT * square * product)]
+    });
+    let mut entries: Vec<Entry> = Vec::new();
+    for (corners, [m, k]) in samples.corners.iter().zip(&locals) {
+        for (i, &row) in corners.iter().enumerate().take(1 << D) {
+            for (j, &column) in corners.iter().enumerate().take(1 << D) {
+                entries.push((row, column, m[i][j], k[i][j]));
             }
         }
     }
-    [mass, stiffness, bent]
+    let columns = samples.columns.len();
+    let diagonal = entries.iter().filter(|(row, column, ..)| row == column);
+    let mean = diagonal.map(|(.., m, _)| m).sum::<f64>() / columns as f64;
+    entries.extend((0..columns as u32).map(|j| (j, j, RIDGE * mean, 0.0)));
+    SparseInverse::new(&samples.columns, samples.cells as u32, &entries)
+}
+
+/// What each cell of the lattice adds to some matrices: for every sample and every pair of functions the `entries` made of
+/// `q^2 grad phi_j . grad phi_k`, `q^2 phi_j phi_k` and `kappa^2`.
+fn local_matrices<const D: usize, const N: usize>(
+    samples: &Samples<D>,
+    entries: impl Fn(f64, f64, f64) -> [f64; N] + Sync,
+) -> Vec<[Local; N]> {
+    let unit = samples.spacing.powi(-2);
+    let of_cell = |cell: usize| {
+        let mut matrices = [[[0.0; MOST_CORNERS]; MOST_CORNERS]; N];
+        for sample in samples.of_cell(cell) {
+            let (hats, slopes) = (sample.hats(), sample.slopes());
+            let weight = sample.weight * sample.weight;
+            let square = sample.curvature * sample.curvature;
+            for j in 0..1 << D {
+                for k in 0..1 << D {
+                    let slope: f64 = slopes[j].iter().zip(&slopes[k]).map(|(a, b)| a * b).sum();
+                    let (dot, product) = (weight * unit * slope, weight * hats[j] * hats[k]);
+                    for (matrix, entry) in matrices.iter_mut().zip(entries(dot, product, square)) {
+                        matrix[j][k] += entry;
+                    }
+                }
+            }
+        }
+        matrices
+    };
+    (0..samples.corners.len())
+        .into_par_iter()
+        .map(of_cell)
+        .collect()
 }
 
 impl<const D: usize> HostUpdate for InterfaceModes<D> {
@@ -198,7 +256,7 @@ mod tests {
         let grid = Grid::<2>::centred(96, 1.0).unwrap();
         let u = disc(&grid);
         let tau = 2e-5;
-        let modes = InterfaceModes::new(&grid, &u, EPS, tau, None).unwrap();
+        let modes = InterfaceModes::new(&grid, &grid, &u, EPS, tau, None).unwrap();
         for k in [0.0_f64, 2.0, 5.0] {
             let p = wave(&grid, &u, k);
             let mut z = vec![0.0; p.len()];
@@ -219,7 +277,7 @@ mod tests {
     fn the_correction_is_symmetric_and_not_negative() {
         let grid = Grid::<2>::centred(64, 1.0).unwrap();
         let u = disc(&grid);
-        let modes = InterfaceModes::new(&grid, &u, EPS, 1e-4, None).unwrap();
+        let modes = InterfaceModes::new(&grid, &grid, &u, EPS, 1e-4, None).unwrap();
         let vector = |a: f64| -> Vec<f64> {
             (0..u.len())
                 .map(|i| (a * i as f64).sin() + 0.2 * (a * a * i as f64).cos())
@@ -241,9 +299,9 @@ mod tests {
     fn nothing_is_corrected_without_an_interface_or_at_corners() {
         let grid = Grid::<2>::centred(64, 1.0).unwrap();
         let flat = vec![1.0; grid.len()];
-        assert!(InterfaceModes::new(&grid, &flat, EPS, 1e-4, None).is_none());
+        assert!(InterfaceModes::new(&grid, &grid, &flat, EPS, 1e-4, None).is_none());
         let square = Cuboid::new([0.3, 0.3]).unwrap();
         let square = phase_field(grid, &square, EPS).unwrap();
-        assert!(InterfaceModes::new(&grid, square.values(), EPS, 1e-4, None).is_none());
+        assert!(InterfaceModes::new(&grid, &grid, square.values(), EPS, 1e-4, None).is_none());
     }
 }

@@ -78,18 +78,22 @@
 //! Energies and gradients have the precision of the device, `f64` on CPUs. On a GPU in `f32` the energy of a step is known to about
 //! seven digits, so that a minimization can end with [`Exit::Precision`] before a tight tolerance.
 
+mod active;
 mod cg;
 mod constraints;
 mod displacement;
+mod dissection;
 mod energy;
 mod error;
 mod flow;
 mod helfrich;
 mod interface;
 mod newton;
+mod nodes;
 mod preconditioner;
 mod region;
 mod samples;
+mod sparse;
 mod times;
 
 pub use constraints::Constraints;
@@ -103,6 +107,6 @@ pub use helfrich::{Helfrich, HelfrichTerms};
 pub use model::Factors;
 pub use newton::{Exit, Method, NewtonInfo, NewtonParams, minimize};
 pub use operators::{extrapolate, retract};
-pub use preconditioner::Preconditioner;
+pub use preconditioner::{PhaseInverse, Preconditioner};
 pub use region::Region;
 pub use times::PhaseTimes;

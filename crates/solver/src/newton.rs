@@ -165,6 +165,20 @@ pub struct NewtonInfo {
     pub estimate: f64,
 }
 
+impl NewtonInfo {
+    /// With the work of a minimization before it.
+    pub(crate) fn after(self, first: &Self) -> Self {
+        Self {
+            newton: first.newton + self.newton,
+            hvp: first.hvp + self.hvp,
+            values: first.values + self.values,
+            gradients: first.gradients + self.gradients,
+            negative_curvature: first.negative_curvature + self.negative_curvature,
+            ..self
+        }
+    }
+}
+
 /// Which parts of the preconditioner.
 #[derive(Clone, Copy)]
 enum Level {

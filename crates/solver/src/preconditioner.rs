@@ -4,15 +4,40 @@ use std::sync::Arc;
 
 use burn::tensor::Tensor;
 use geometry::Grid;
-use operators::{ComputeDevice, SpectralFilter, spectral_filter, update_on_host};
+use model::Smoother;
+use operators::{Bricks, ComputeDevice, SpectralFilter, spectral_filter, update_on_host};
 
 use crate::interface::InterfaceModes;
 use crate::{Error, Region};
 
+/// An approximate inverse of the Hessian in the pure phases.
+#[derive(Clone, Debug)]
+pub enum PhaseInverse {
+    /// Diagonal in Fourier space.
+    Spectral(SpectralFilter),
+    /// A polynomial of the convolution on active bricks.
+    Bricks(Box<Smoother>),
+}
+
+impl From<SpectralFilter> for PhaseInverse {
+    fn from(filter: SpectralFilter) -> Self {
+        Self::Spectral(filter)
+    }
+}
+
+impl PhaseInverse {
+    fn apply<const D: usize>(&self, r: &Tensor<D>) -> Tensor<D> {
+        match self {
+            Self::Spectral(filter) => spectral_filter(r.clone(), filter),
+            Self::Bricks(smoother) => smoother.apply(r),
+        }
+    }
+}
+
 /// A symmetric positive definite approximation of the inverse Hessian: the exact one in the pure phases, which handles
 /// everything but displacements of the interface, plus a coarse correction for those that follows the interface.
 pub struct Preconditioner<const D: usize> {
-    phase: SpectralFilter,
+    phase: PhaseInverse,
     scales: Option<Scales<D>>,
     interface: Option<Arc<InterfaceModes<D>>>,
     region: Option<Region<D>>,
@@ -23,13 +48,15 @@ struct Scales<const D: usize> {
     grid: Grid<D>,
     eps: f64,
     tau: f64,
+    /// The active bricks, where values are stored on such.
+    bricks: Option<Arc<Bricks<D>>>,
 }
 
 impl<const D: usize> From<SpectralFilter> for Preconditioner<D> {
     /// The approximation in the pure phases alone.
-    fn from(phase: SpectralFilter) -> Self {
+    fn from(filter: SpectralFilter) -> Self {
         Self {
-            phase,
+            phase: filter.into(),
             scales: None,
             interface: None,
             region: None,
@@ -39,14 +66,28 @@ impl<const D: usize> From<SpectralFilter> for Preconditioner<D> {
 
 impl<const D: usize> Preconditioner<D> {
     /// With the coarse correction, for phase fields with interface width `eps` and a step of size `tau`.
-    pub fn two_level(phase: SpectralFilter, grid: &Grid<D>, eps: f64, tau: f64) -> Self {
-        let grid = *grid;
+    pub fn two_level(phase: impl Into<PhaseInverse>, grid: &Grid<D>, eps: f64, tau: f64) -> Self {
+        let scales = Scales {
+            grid: *grid,
+            eps,
+            tau,
+            bricks: None,
+        };
         Self {
-            phase,
-            scales: Some(Scales { grid, eps, tau }),
+            phase: phase.into(),
+            scales: Some(scales),
             interface: None,
             region: None,
         }
+    }
+
+    /// The same for values on active bricks, if there are such.
+    #[must_use]
+    pub(crate) fn on(mut self, bricks: Option<&Arc<Bricks<D>>>) -> Self {
+        if let Some(scales) = &mut self.scales {
+            scales.bricks = bricks.cloned();
+        }
+        self
     }
 
     /// The same for the values in a region, if there is one: projected from both sides, which keeps it symmetric and positive.
@@ -60,17 +101,22 @@ impl<const D: usize> Preconditioner<D> {
     /// # Errors
     /// [`Error::Operators`] if the device fails.
     pub(crate) fn follow(&mut self, u: &Tensor<D>, device: &ComputeDevice) -> Result<(), Error> {
-        if let Some(Scales { grid, eps, tau }) = &self.scales {
+        if let Some(scales) = &self.scales {
+            let Scales { grid, eps, tau, .. } = scales;
             let u = device.values(u.clone())?;
             let region = self.region.as_ref().map(Region::nodes);
-            self.interface = InterfaceModes::new(grid, &u, *eps, *tau, region).map(Arc::new);
+            self.interface = match &scales.bricks {
+                None => InterfaceModes::new(grid, grid, &u, *eps, *tau, region),
+                Some(bricks) => InterfaceModes::new(grid, &**bricks, &u, *eps, *tau, region),
+            }
+            .map(Arc::new);
         }
         Ok(())
     }
 
     /// Applies it, in the precision of `r`.
     pub(crate) fn apply(&self, r: &Tensor<D>) -> Tensor<D> {
-        let z = spectral_filter(r.clone(), &self.phase);
+        let z = self.phase.apply(r);
         self.projected(match &self.interface {
             Some(interface) => update_on_host(r, z, interface),
             None => z,
@@ -79,7 +125,7 @@ impl<const D: usize> Preconditioner<D> {
 
     /// Applies the approximation in the pure phases alone.
     pub(crate) fn apply_phase(&self, r: &Tensor<D>) -> Tensor<D> {
-        self.projected(spectral_filter(r.clone(), &self.phase))
+        self.projected(self.phase.apply(r))
     }
 
     fn projected(&self, z: Tensor<D>) -> Tensor<D> {

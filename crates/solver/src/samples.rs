@@ -3,6 +3,8 @@
 use geometry::Grid;
 use rayon::prelude::*;
 
+use crate::nodes::Nodes;
+
 /// Corners of a cell of the lattice in 3D; in 2D the first four count.
 pub(crate) const MOST_CORNERS: usize = 8;
 /// Nodes with `1 - u^2` above this belong to the interface: `|s| < 3.1 eps`.
@@ -29,10 +31,13 @@ impl<const D: usize> Sample<D> {
     /// Values of the hat functions of the cell's corners at the foot point.
     pub(crate) fn hats(&self) -> [f64; MOST_CORNERS] {
         let mut hats = [0.0; MOST_CORNERS];
-        for (corner, hat) in hats.iter_mut().enumerate().take(1 << D) {
-            *hat = (0..D)
-                .map(|axis| along(corner, axis, self.fraction[axis]).0)
-                .product();
+        hats[0] = 1.0;
+        for (axis, fraction) in self.fraction.iter().enumerate() {
+            let (lower, upper) = hats.split_at_mut(1 << axis);
+            for (lower, upper) in lower.iter_mut().zip(upper) {
+                *upper = *lower * fraction;
+                *lower *= 1.0 - fraction;
+            }
         }
         hats
     }
@@ -67,24 +72,27 @@ fn along(corner: usize, axis: usize, fraction: f64) -> (f64, f64) {
 
 /// All nodes of an interface, and the lattice cells that hold their foot points.
 pub(crate) struct Samples<const D: usize> {
-    /// The nodes in the order of the grid.
+    /// The nodes in the order of storage.
     pub nodes: Vec<Sample<D>>,
     /// Positions in `nodes`, cell by cell, and where each cell begins.
     order: Vec<u32>,
     starts: Vec<u32>,
     /// Numbers of the hat functions at the corners of each cell.
     pub corners: Vec<[u32; MOST_CORNERS]>,
-    /// How many hat functions there are.
-    pub columns: usize,
+    /// Places on the lattice of all hat functions.
+    pub columns: Vec<[u32; D]>,
+    /// Lattice cells per side of the box.
+    pub cells: usize,
     /// Side of a lattice cell.
     pub spacing: f64,
 }
 
 impl<const D: usize> Samples<D> {
-    /// The interface of `u`, whose width is `eps`, on a lattice of about the given spacing.
-    /// With a `region`, only its nodes count.
+    /// The interface of `u`, whose values are stored at some `nodes` of the grid and whose width is `eps`, on a lattice of about the given
+    /// spacing. With a `region`, only its nodes count.
     pub(crate) fn new(
         grid: &Grid<D>,
+        nodes: &impl Nodes<D>,
         u: &[f64],
         eps: f64,
         spacing: f64,
@@ -101,22 +109,23 @@ impl<const D: usize> Samples<D> {
             .into_par_iter()
             .with_min_len(CHUNK)
             .filter(|&node| region.is_none_or(|region| region[node]))
-            .filter_map(|node| lattice.sample(node, u))
+            .filter_map(|node| lattice.sample(node, nodes, u))
             .collect();
         let mut cell_of = vec![u32::MAX; cells.pow(D as u32)];
         let mut column_of = cell_of.clone();
         let mut corners: Vec<[u32; MOST_CORNERS]> = Vec::new();
-        let mut columns = 0;
+        let mut columns = Vec::new();
         for sample in &mut samples {
             let cell = &mut cell_of[sample.cell as usize];
             if *cell == u32::MAX {
                 *cell = corners.len() as u32;
                 let mut ends = [0; MOST_CORNERS];
                 for (corner, end) in ends.iter_mut().enumerate().take(1 << D) {
-                    let column = &mut column_of[lattice.corner(sample.cell as usize, corner)];
+                    let position = lattice.corner(sample.cell as usize, corner);
+                    let column = &mut column_of[position];
                     if *column == u32::MAX {
-                        *column = columns;
-                        columns += 1;
+                        *column = columns.len() as u32;
+                        columns.push(lattice.place(position));
                     }
                     *end = *column;
                 }
@@ -130,7 +139,8 @@ impl<const D: usize> Samples<D> {
             order,
             starts,
             corners,
-            columns: columns as usize,
+            columns,
+            cells,
             spacing: lattice.width * grid.spacing(),
         }
     }
@@ -175,26 +185,26 @@ impl<const D: usize> Lattice<'_, D> {
         -4.0 / 3.0 * self.eps * u.clamp(-0.999_999, 0.999_999).atanh()
     }
 
-    /// The sample of a node, if the node belongs to the interface. Its cell is still that of the whole lattice.
-    fn sample(&self, node: usize, u: &[f64]) -> Option<Sample<D>> {
+    /// The sample of a node, if the node belongs to the interface, with all nodes beside it. Its cell is still that of the whole lattice.
+    fn sample(&self, node: usize, nodes: &impl Nodes<D>, u: &[f64]) -> Option<Sample<D>> {
         let weight = 1.0 - u[node] * u[node];
         if weight < WINDOW {
             return None;
         }
-        let (cells, spacing) = (self.grid.cells(), self.grid.spacing());
-        let index = self.grid.multi_index(node);
+        let spacing = self.grid.spacing();
+        let index = nodes.place(node);
         let here = self.distance(u[node]);
         let mut laplacian = 0.0;
-        let mut normal: [f64; D] = std::array::from_fn(|axis| {
-            let stride = self.grid.stride(axis);
-            let at = |shift: usize| {
-                let moved = (index[axis] + shift) % cells;
-                self.distance(u[node + moved * stride - index[axis] * stride])
+        let mut normal = [0.0; D];
+        for (axis, normal) in normal.iter_mut().enumerate() {
+            let at = |forward: bool| {
+                let beside = nodes.beside(node, index, axis, forward).ok()?;
+                Some(self.distance(u[beside]))
             };
-            let (after, before) = (at(1), at(cells - 1));
+            let (after, before) = (at(true)?, at(false)?);
             laplacian += after - 2.0 * here + before;
-            after - before
-        });
+            *normal = after - before;
+        }
         let length = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
         if length / (2.0 * spacing) < FLAT {
             return None;
@@ -220,6 +230,16 @@ impl<const D: usize> Lattice<'_, D> {
             // For a distance function the Laplacian is the mean curvature.
             curvature: laplacian / (spacing * spacing),
         })
+    }
+
+    /// The place along each axis of a position in row-major order.
+    fn place(&self, mut position: usize) -> [u32; D] {
+        let mut place = [0; D];
+        for at in place.iter_mut().rev() {
+            *at = (position % self.cells) as u32;
+            position /= self.cells;
+        }
+        place
     }
 
     /// Row-major index of a corner of a cell.

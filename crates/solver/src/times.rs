@@ -26,6 +26,19 @@ pub struct PhaseTimes {
     pub start: f64,
 }
 
+impl PhaseTimes {
+    /// With those of a minimization before it.
+    pub(crate) fn after(self, first: &Self) -> Self {
+        Self {
+            products: first.products + self.products,
+            preconditioner: first.preconditioner + self.preconditioner,
+            assembly: first.assembly + self.assembly,
+            energies: first.energies + self.energies,
+            start: first.start + self.start,
+        }
+    }
+}
+
 /// Adds up wall times.
 #[derive(Default)]
 pub(crate) struct Stopwatch(Cell<f64>);

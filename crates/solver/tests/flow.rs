@@ -8,7 +8,8 @@ use model::MeanCurvatureOperator;
 use operators::SpectralFilter;
 use solver::{
     Error, Exit, FlowParams, MeanCurvatureFlow, MeanCurvatureStep, Method, MinimizingMovement,
-    NewtonParams, Objective, PhaseTimes, Precision, StepRecord, WillmoreFlow, minimize,
+    NewtonParams, Objective, PhaseInverse, PhaseTimes, Precision, StepRecord, WillmoreFlow,
+    minimize,
 };
 
 /// A radius of the reference experiment, `2^-4 pi`.
@@ -374,8 +375,8 @@ impl MeanCurvatureStep<2> for Pointwise {
         linearize::Extensions::new()
     }
 
-    fn phase_preconditioner(&self, cells: usize, _stiffness: f64) -> SpectralFilter {
-        SpectralFilter::from_kernel(&[cells; 2], &[1.0], 1, |_| 1.0)
+    fn phase_preconditioner(&self, cells: usize, _stiffness: f64) -> PhaseInverse {
+        SpectralFilter::from_kernel(&[cells; 2], &[1.0], 1, |_| 1.0).into()
     }
 }
 

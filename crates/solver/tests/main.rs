@@ -1,5 +1,6 @@
 //! Minimizations, flows and their parts.
 
+mod bricks;
 mod calibration;
 mod common;
 mod constraints;

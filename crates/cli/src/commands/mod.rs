@@ -54,6 +54,7 @@ pub fn operator<const D: usize>(
     } else {
         Scheme::Paper
     };
-    let operator = Operator::new((method, scheme), &networks, &needed, grid, &scales)?;
+    let mut operator = Operator::new((method, scheme), &networks, &needed, grid, &scales)?;
+    operator.storage = options.storage.unwrap_or_default();
     Ok((scales, operator))
 }

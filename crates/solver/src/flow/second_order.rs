@@ -8,16 +8,14 @@
 
 use std::time::Instant;
 
-use burn::tensor::Tensor;
 use geometry::Field;
 use serde::{Deserialize, Serialize};
 
-use super::{Minimum, Movement, StepRecord, WillmoreFlow, download};
+use super::{Minimum, Movement, StepRecord, WillmoreFlow};
 use crate::displacement::{
     curvature_weight, depth, displaced, displacement, metric_weight, on_interface, window,
 };
-use crate::times::PhaseTimes;
-use crate::{Error, NewtonInfo, Start, StartKind};
+use crate::{Error, Start, StartKind};
 
 /// `gamma = 1 - 1/sqrt 2`: the size of a stage over that of the step.
 const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
@@ -58,20 +56,21 @@ impl<const D: usize> WillmoreFlow<D> {
         accept: impl FnOnce(&StepRecord) -> bool,
     ) -> Result<(StepRecord, bool), Error> {
         let clock = Instant::now();
+        self.follow()?;
         let before = self.field()?;
         let stage = GAMMA * tau;
 
         let anticipated = self.anticipated(stage)?;
         let start = before.zip_map(&limited(&anticipated), displaced)?;
         let first = self.stage(&before, &anticipated, &start, stage)?;
-        let middle = download(&self.grid, &first.u, &self.device)?;
+        let middle = self.on_grid(&first.u)?;
 
         let moved = middle.zip_map(&before, displacement)?;
         let further = moved.map(|y| FURTHER * y);
         let anchor = before.zip_map(&further, displaced)?;
         let start = middle.zip_map(&further, displaced)?;
         let second = self.stage(&anchor, &moved, &start, stage)?;
-        let after = download(&self.grid, &second.u, &self.device)?;
+        let after = self.on_grid(&second.u)?;
 
         let rate = |to: &Field<D>, from: &Field<D>| -> Result<Field<D>, Error> {
             Ok(to.zip_map(from, |u, v| displacement(u, v) / stage)?)
@@ -101,11 +100,8 @@ impl<const D: usize> WillmoreFlow<D> {
         start: &Field<D>,
         tau: f64,
     ) -> Result<Minimum<D>, Error> {
-        let tensor = |field: &Field<D>| -> Tensor<D> {
-            self.device.tensor(field.values(), self.grid.shape())
-        };
-        let factors = tensor(&self.factors(expected, start)?);
-        let (anchor, start) = (tensor(anchor), tensor(start));
+        let factors = self.in_storage(&self.factors(expected, start)?);
+        let (anchor, start) = (self.in_storage(anchor), self.in_storage(start));
         self.minimize(&Movement {
             anchor: &anchor,
             factors: Some(&factors),
@@ -196,23 +192,10 @@ impl<const D: usize> WillmoreFlow<D> {
             tension: second.tension,
             pressure: second.pressure,
             start: Start { kind, hvp: 0.0 },
-            newton: NewtonInfo {
-                newton: one.newton + two.newton,
-                hvp: one.hvp + two.hvp,
-                values: one.values + two.values,
-                gradients: one.gradients + two.gradients,
-                negative_curvature: one.negative_curvature + two.negative_curvature,
-                ..two
-            },
+            newton: two.after(&one),
             estimates: Some(estimates),
             seconds: clock.elapsed().as_secs_f64(),
-            times: PhaseTimes {
-                products: first.times.products + second.times.products,
-                preconditioner: first.times.preconditioner + second.times.preconditioner,
-                assembly: first.times.assembly + second.times.assembly,
-                energies: first.times.energies + second.times.energies,
-                start: 0.0,
-            },
+            times: second.times.after(&first.times),
         }
     }
 }

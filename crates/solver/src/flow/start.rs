@@ -41,6 +41,8 @@ impl<const D: usize> WillmoreFlow<D> {
     /// # Errors
     /// [`Error::Geometry`] if its grid is not the half of this one; [`Error::Parameter`] for another `eps` or `tautilde`.
     pub fn begin_on(&mut self, mut half: Self) -> Result<(), Error> {
+        self.needs_grid("starts on half grids")?;
+        half.needs_grid("starts on half grids")?;
         // The other grid's size and place are in the error.
         Field::constant(self.grid.half()?, 0.0)
             .zip_map(&Field::constant(half.grid, 0.0), |a, _| a)?;
@@ -69,15 +71,16 @@ impl<const D: usize> WillmoreFlow<D> {
 
     /// [Begins](Self::begin_on) on the half grid, that on its half, and so on, as far as networks are shipped: those of the paper's
     /// recipe if the network is one of them (or its odd part) or the energy is the paper's, else those of the accurate recipe: the relaxed
-    /// profiles of one recipe are alike on all grids. Says how many grids there are below this one; none for an odd number of cells, or
-    /// without networks.
+    /// profiles of one recipe are alike on all grids. Says how many grids there are below this one; none for an odd number of cells,
+    /// without networks, or on active bricks.
     ///
     /// # Errors
     /// What building the flows raises.
     pub fn begin_on_half_grids(&mut self, network: &Network) -> Result<usize, Error> {
         /// Below this many cells per `eps` the motion is too far off to be of use.
         const COARSEST: f64 = 2.0;
-        let Some(ratios) = halved(network.ratios()).filter(|r| r.eps_over_h >= COARSEST) else {
+        let ratios = halved(network.ratios()).filter(|r| r.eps_over_h >= COARSEST);
+        let Some(ratios) = ratios.filter(|_| self.active.is_none()) else {
             return Ok(0);
         };
         let Ok(grid) = self.grid.half() else {

@@ -1,0 +1,73 @@
+//! What is stored of a phase field.
+
+use crate::common::{EPS, case, device, disc, finished, grid, scales};
+use crate::resuming::{interrupted, trajectory, without_seconds};
+use engine::{Case, Error, Flow, Method, Operator, Run, Samples, Scheme, Storage};
+use geometry::measure::l2_distance;
+use geometry::phase_field;
+use geometry::shapes::Ball;
+use model::Networks;
+
+/// A small disc, whose bricks are about half of the grid.
+fn stored(storage: Storage, radius: f64) -> Case<2> {
+    let initial = phase_field(grid(128), &Ball::new([0.0; 2], radius).unwrap(), EPS).unwrap();
+    let needed = scales().needs(2, 1.0 / 128.0);
+    let accurate = (Method::Hybrid, Scheme::Accurate);
+    let networks = Networks::default();
+    let operator = Operator::new(accurate, &networks, &needed, initial.grid(), &scales());
+    let mut operator = operator.unwrap();
+    operator.storage = storage;
+    Case {
+        operator,
+        ..case(Flow::Willmore, Method::Hybrid, initial)
+    }
+}
+
+#[test]
+fn bricks_make_the_same_flow_and_another_case() {
+    let [dense, bricks] = [Storage::Dense, Storage::Bricks].map(|storage| stored(storage, 0.1));
+    assert!(dense.identity(&device())["operator"]["storage"].is_null());
+    assert_eq!(bricks.identity(&device())["operator"]["storage"], "bricks");
+    let start = dense.initial.clone();
+    let [dense, bricks] = [dense, bricks].map(finished);
+    let apart = l2_distance(dense.field(), bricks.field()).unwrap();
+    let way = l2_distance(dense.field(), &start).unwrap();
+    // The minimizations are no more accurate than this.
+    assert!(apart > 0.0 && apart < 3e-3 * way, "{apart:e} of {way:e}");
+}
+
+#[test]
+fn an_interrupted_run_on_bricks_continues_with_the_same_bytes() {
+    let root = tempfile::tempdir().unwrap();
+    let samples = Samples::every(2);
+    let case = stored(Storage::Bricks, 0.1);
+    let reference = trajectory(&case, &root.path().join("whole"), &samples);
+    let folder = root.path().join("interrupted");
+    interrupted(&case, &folder, &samples, 2);
+    let resumed = trajectory(&case, &folder, &samples);
+    assert_eq!(without_seconds(&resumed), without_seconds(&reference));
+    assert_eq!(resumed.field(4).unwrap(), reference.field(4).unwrap());
+}
+
+#[test]
+fn bricks_are_refused_or_left_where_they_cannot_be() {
+    let paper = |storage: Storage| {
+        let mut case = case(Flow::Willmore, Method::Hybrid, disc(128, 0.2));
+        case.operator.storage = storage;
+        case
+    };
+    let curvature = Case {
+        flow: Flow::MeanCurvature,
+        ..stored(Storage::Bricks, 0.1)
+    };
+    for (case, reason) in [
+        (paper(Storage::Bricks), "accurate recipe"),
+        (curvature, "mean curvature flows need the whole grid"),
+    ] {
+        let refused = Run::new(case, &device()).err().unwrap();
+        assert!(matches!(refused, Error::Solver(_)), "{refused}");
+        assert!(refused.to_string().contains(reason), "{refused}");
+    }
+    let [dense, auto] = [Storage::Dense, Storage::Auto].map(|storage| finished(paper(storage)));
+    assert_eq!(dense.field(), auto.field());
+}

@@ -1,0 +1,200 @@
+//! The operator on active bricks, for kernels that are products of functions of one variable.
+
+use burn::tensor::Tensor;
+use operators::{
+    Bricks, COEFFICIENTS, ComputeDevice, HermiteTable, TableRange, add_scaled, brick_convolution,
+    tabulated,
+};
+
+use crate::{Error, Network};
+
+/// A kernel may differ from a product by this part of its largest value: networks of the accurate recipe, whose kernels are Gaussian, do
+/// by rounding.
+const SEPARABLE: f64 = 1e-12;
+/// Smallest side of a brick, in two and in three dimensions.
+const SIDES: [usize; 2] = [16, 8];
+
+/// An operator `V[u] = F(K * u)` with `K = t x .. x t`, to be put on [`Bricks`] of any grid that it fits.
+///
+/// Where `u` is constant, at the values near -1 and 1 that `V` keeps, nothing needs to be stored.
+#[derive(Clone, Debug)]
+pub struct SeparableOperator<const D: usize> {
+    taps: Vec<f64>,
+    table: Tensor<2>,
+    range: TableRange,
+    rests: [f64; 2],
+    slope: f64,
+}
+
+impl<const D: usize> SeparableOperator<D> {
+    /// Takes the kernel of a network apart and uploads the rest.
+    ///
+    /// # Errors
+    /// [`Error::NotSeparable`], [`Error::NoRest`], and as [`crate::MeanCurvatureOperator::new`].
+    pub fn new(network: &Network, device: &ComputeDevice) -> Result<Self, Error> {
+        let ratios = network.ratios();
+        if ratios.dimension != D {
+            return Err(Error::Shape {
+                what: "dimension of the network",
+                expected: D.to_string(),
+                found: ratios.dimension.to_string(),
+            });
+        }
+        let taps = factor::<D>(network.kernel(), ratios.width)?;
+        let table = network.activation().table()?;
+        let mass = taps.iter().sum::<f64>().powi(D as i32);
+        let [negative, positive] = [-1.0, 1.0].map(|phase| rest(&table, mass, phase));
+        let rests = [negative?, positive?];
+        let slope = rests.map(|rest| mass * table.derivative(mass * rest, 1));
+        let range = table.range();
+        Ok(Self {
+            taps,
+            table: device.tensor(table.coefficients(), [range.cells, COEFFICIENTS]),
+            range,
+            rests,
+            slope: 0.5 * (slope[0] + slope[1]),
+        })
+    }
+
+    /// The values in the negative and in the positive phase that the operator keeps: `V[z] = z`.
+    pub fn rests(&self) -> [f64; 2] {
+        self.rests
+    }
+
+    /// Cells along each axis of a brick: a power of two that is no less than what the kernel reaches.
+    pub fn brick_side(&self) -> usize {
+        let least = SIDES[usize::from(D > 2)];
+        least.max((self.taps.len() / 2).next_power_of_two())
+    }
+
+    /// What stands for the inverse of the energy's Hessian in the pure phases, `1 / (1 + c |1 - F'(1) k|^2)` with `k` between 0 and 1 and
+    /// `c = tau / tautilde^2`: `[x, y]` of the polynomial `x + y k` with the least squares of relative errors. In the plane, where a
+    /// convolution would cost more than it saves, the geometric mean of the largest and the smallest value for large `c`.
+    fn phase_polynomial(&self, stiffness: f64) -> [f64; 2] {
+        const SAMPLES: usize = 256;
+        if D == 2 {
+            return [1.0 / (1.0 + stiffness * (1.0 - self.slope).abs()), 0.0];
+        }
+        let inverse = |k: f64| 1.0 + stiffness * (1.0 - self.slope * k).powi(2);
+        let ks = (0..SAMPLES).map(|i| (i as f64 + 0.5) / SAMPLES as f64);
+        let [mut a, mut b, mut c, mut p, mut q] = [0.0; 5];
+        for k in ks {
+            let w = inverse(k);
+            a += w * w;
+            b += w * w * k;
+            c += w * w * k * k;
+            p += w;
+            q += w * k;
+        }
+        let determinant = a * c - b * b;
+        [(p * c - q * b) / determinant, (q * a - p * b) / determinant]
+    }
+
+    /// The operator on some bricks.
+    pub fn on(&self, bricks: &Bricks<D>, device: &ComputeDevice) -> BrickOperator<D> {
+        let outside = bricks.convolution_of_outside(&self.taps, self.rests);
+        let count = bricks.places().len();
+        BrickOperator {
+            operator: self.clone(),
+            taps: device.tensor(&self.taps, [self.taps.len()]),
+            neighbours: device.tensor(&bricks.neighbours(), [count, 2 * D]),
+            outside: device.tensor(&outside, bricks.shape()),
+        }
+    }
+}
+
+/// `V[u] = F(K * u)` on active bricks, where `u` is constant outside.
+#[derive(Clone, Debug)]
+pub struct BrickOperator<const D: usize> {
+    operator: SeparableOperator<D>,
+    taps: Tensor<1>,
+    neighbours: Tensor<2>,
+    /// What the values outside add to the convolution.
+    outside: Tensor<D>,
+}
+
+impl<const D: usize> BrickOperator<D> {
+    /// `V[u]`, on the device of `u` (which may be Burn's capture device), differentiable in `u`.
+    pub fn apply(&self, u: Tensor<D>) -> Tensor<D> {
+        let device = u.device();
+        let taps = self.taps.clone().to_device(&device);
+        let neighbours = self.neighbours.clone().to_device(&device);
+        let outside = self.outside.clone().to_device(&device);
+        let table = self.operator.table.clone().to_device(&device);
+        let smoothed = brick_convolution(u, taps, neighbours, false) + outside;
+        tabulated(smoothed, table, self.operator.range, 0)
+    }
+
+    /// An approximate inverse of the energy's Hessian in the pure phases, for `c = tau / tautilde^2`.
+    pub fn phase_preconditioner(&self, stiffness: f64) -> Smoother {
+        let [identity, smoothed] = self.operator.phase_polynomial(stiffness);
+        let mass = self.operator.taps.iter().sum::<f64>().powi(D as i32);
+        Smoother {
+            identity,
+            smoothed: smoothed / mass,
+            taps: self.taps.clone(),
+            neighbours: self.neighbours.clone(),
+        }
+    }
+}
+
+/// `x + y K` on active bricks. Up to what passes over the bricks lose at their edge it is symmetric.
+#[derive(Clone, Debug)]
+pub struct Smoother {
+    identity: f64,
+    smoothed: f64,
+    taps: Tensor<1>,
+    neighbours: Tensor<2>,
+}
+
+impl Smoother {
+    /// Applies it, in the precision of `r`.
+    pub fn apply<const D: usize>(&self, r: &Tensor<D>) -> Tensor<D> {
+        let identity = r.clone() * self.identity;
+        if self.smoothed == 0.0 {
+            return identity;
+        }
+        let taps = self.taps.clone().cast(r.dtype());
+        let neighbours = self.neighbours.clone().cast(r.dtype());
+        let smoothed = brick_convolution(r.clone(), taps, neighbours, false);
+        add_scaled(identity, &smoothed, self.smoothed)
+    }
+}
+
+/// The function of one variable whose product with itself along all axes is the kernel.
+fn factor<const D: usize>(kernel: &[f64], width: usize) -> Result<Vec<f64>, Error> {
+    let total: f64 = kernel.iter().sum();
+    let rows = kernel.chunks_exact(kernel.len() / width);
+    let scale = total.abs().powf(1.0 - 1.0 / D as f64);
+    let taps: Vec<f64> = rows.map(|row| row.iter().sum::<f64>() / scale).collect();
+    let product = |place: usize| -> f64 {
+        (0..D)
+            .map(|axis| taps[place / width.pow(axis as u32) % width])
+            .product()
+    };
+    let largest = kernel.iter().fold(0.0, |most: f64, k| most.max(k.abs()));
+    let error = (kernel.iter().enumerate())
+        .map(|(place, value)| (value - product(place)).abs() / largest)
+        .fold(0.0, f64::max);
+    if error <= SEPARABLE {
+        Ok(taps)
+    } else {
+        Err(Error::NotSeparable { error })
+    }
+}
+
+/// The solution of `F(m z) = z` near a phase, by Newton's method.
+fn rest(table: &HermiteTable, mass: f64, phase: f64) -> Result<f64, Error> {
+    const ITERATIONS: usize = 30;
+    const NEAR: f64 = 0.1;
+    let mut z = phase;
+    for _ in 0..ITERATIONS {
+        let slope = mass * table.derivative(mass * z, 1) - 1.0;
+        z -= (table.derivative(mass * z, 0) - z) / slope;
+    }
+    if (z - phase).abs() < NEAR {
+        Ok(z)
+    } else {
+        Err(Error::NoRest { phase })
+    }
+}

@@ -1,0 +1,427 @@
+//! Separable convolution on active bricks, on the host: one pass along each axis.
+
+#![expect(
+    clippy::inline_always,
+    reason = "what is not inlined is compiled without the instructions that were detected"
+)]
+
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+
+use crate::fft::{Real, is_f64};
+
+/// Bricks per task.
+const GROUP: usize = 8;
+/// Cells that are computed side by side across the axis of a pass: a vector register of 256 bits.
+const DOUBLES: usize = 4;
+const SINGLES: usize = 8;
+/// and along it.
+const ALONG: usize = 8;
+
+/// What passes see where no brick is active.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Ghosts {
+    /// Nothing.
+    Zero,
+    /// Constants in the negative and in the positive phase.
+    At([f64; 2]),
+}
+
+/// `sum_b t_b .. t_c x_{a+(b,..,c)}` by passes along the last axis, the one before it, and so on; each pass sees the ghosts outside the
+/// bricks. The adjoint takes the passes in the opposite order with mirrored taps, which is the transpose although passes that are cut at the
+/// edge of the bricks do not commute.
+///
+/// `bricks` are cubes of `side^axes` cells, `neighbours` is the table of [`crate::Bricks::neighbours`], and the taps are no more
+/// than `2 side + 1`.
+pub(crate) fn convolve<T: Real>(
+    x: &[T],
+    (side, axes): (usize, usize),
+    neighbours: &[T],
+    taps: &[T],
+    adjoint: bool,
+    ghosts: Ghosts,
+) -> Vec<T> {
+    let reach = taps.len() / 2;
+    debug_assert!(taps.len() % 2 == 1 && reach <= side && side.is_multiple_of(ALONG));
+    let mut weights = vec![T::zero(); ALONG - 1];
+    weights.extend_from_slice(taps);
+    if adjoint {
+        weights[ALONG - 1..].reverse();
+    }
+    weights.resize(weights.len() + ALONG - 1, T::zero());
+    let volume = side.pow(axes as u32);
+    let mut rests = match ghosts {
+        Ghosts::Zero => [T::zero(); 2],
+        Ghosts::At(rests) => rests.map(T::of),
+    };
+    let sum = taps.iter().fold(T::zero(), |sum, tap| sum + *tap);
+    let mut y: Option<Vec<T>> = None;
+    let mut spare = Vec::new();
+    for pass in 0..axes {
+        let axis = if adjoint { pass } else { axes - 1 - pass };
+        let constants = rests.map(|rest| vec![rest; volume]);
+        let pass = Pass {
+            x: y.as_deref().unwrap_or(x),
+            neighbours,
+            constants: &constants,
+            weights: &weights,
+            reach,
+            side,
+            columns: (2 * axes, 2 * axis),
+            stride: side.pow((axes - 1 - axis) as u32),
+            volume,
+        };
+        let mut result = std::mem::take(&mut spare);
+        result.resize(x.len(), T::zero());
+        pass.run(&mut result);
+        spare = y.replace(result).unwrap_or_default();
+        // A constant outside is smoothed like the values inside.
+        rests = rests.map(|rest| rest * sum);
+    }
+    y.unwrap_or_else(|| x.to_vec())
+}
+
+/// A pass along one axis.
+struct Pass<'a, T> {
+    x: &'a [T],
+    neighbours: &'a [T],
+    /// Bricks of ghosts, of the negative and of the positive phase.
+    constants: &'a [Vec<T>; 2],
+    /// The taps between zeros, so that a few cells along the axis can be computed from the same window.
+    weights: &'a [T],
+    reach: usize,
+    side: usize,
+    /// How many there are in the table of neighbours, and that of the brick before along this axis.
+    columns: (usize, usize),
+    /// Distance in memory of cells along the axis.
+    stride: usize,
+    volume: usize,
+}
+
+impl<T: Real> Pass<'_, T> {
+    fn run(&self, result: &mut [T]) {
+        let arch = Arch::new();
+        let groups = result.par_chunks_mut(GROUP * self.volume).enumerate();
+        groups.for_each(|(group, result)| {
+            arch.dispatch(Group {
+                pass: self,
+                first: group * GROUP,
+                result,
+            });
+        });
+    }
+
+    /// The brick itself, the one before and the one after.
+    #[inline(always)]
+    fn bricks(&self, brick: usize) -> [&[T]; 3] {
+        let (count, column) = self.columns;
+        let neighbour = |offset: usize| {
+            let number = self.neighbours[brick * count + column + offset];
+            if number >= T::zero() {
+                &self.x[number.truncated() * self.volume..][..self.volume]
+            } else {
+                &self.constants[usize::from(number > T::of(-1.5))][..]
+            }
+        };
+        let own = &self.x[brick * self.volume..][..self.volume];
+        [neighbour(0), own, neighbour(1)]
+    }
+
+    /// Along an axis that is not the last: `LANES` lines at once, which lie side by side in memory.
+    #[inline(always)]
+    fn across<const LANES: usize, const FUSED: bool>(
+        &self,
+        [before, own, after]: [&[T]; 3],
+        result: &mut [T],
+    ) {
+        let (side, stride, reach) = (self.side, self.stride, self.reach);
+        for outer in (0..self.volume).step_by(side * stride) {
+            for lane in (outer..outer + stride).step_by(LANES) {
+                for first in (0..side).step_by(ALONG) {
+                    let mut sums = [[T::zero(); LANES]; ALONG];
+                    let mut weights = self.weights;
+                    // The cells from `first - reach` to `first + ALONG - 1 + reach`, brick by brick.
+                    let end = first + ALONG + reach;
+                    let parts = [
+                        (before, (side + first).saturating_sub(reach).min(side)..side),
+                        (own, first.saturating_sub(reach)..end.min(side)),
+                        (after, 0..end.saturating_sub(side)),
+                    ];
+                    for (brick, range) in parts {
+                        for at in range {
+                            let (window, _) = weights.split_first_chunk::<ALONG>().expect(WINDOW);
+                            let row: &[T; LANES] =
+                                brick[lane + at * stride..].first_chunk().expect(ROW);
+                            for (q, sums) in sums.iter_mut().enumerate() {
+                                let weight = window[ALONG - 1 - q];
+                                for (sum, value) in sums.iter_mut().zip(row) {
+                                    *sum = multiply_add::<T, FUSED>(weight, *value, *sum);
+                                }
+                            }
+                            weights = &weights[1..];
+                        }
+                    }
+                    for (q, sums) in sums.iter().enumerate() {
+                        result[lane + (first + q) * stride..][..LANES].copy_from_slice(sums);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Along the last axis: from copies of the lines with what lies before and after them.
+    #[inline(always)]
+    fn along<const LANES: usize, const FUSED: bool>(
+        &self,
+        [before, own, after]: [&[T]; 3],
+        lines: &mut Vec<T>,
+        result: &mut [T],
+    ) {
+        const ROWS: usize = 8;
+        let (side, reach) = (self.side, self.reach);
+        let taps = &self.weights[ALONG - 1..][..=2 * reach];
+        let width = side + 2 * reach;
+        for block in (0..self.volume).step_by(ROWS * side) {
+            lines.clear();
+            for row in (block..block + ROWS * side).step_by(side) {
+                lines.extend_from_slice(&before[row + side - reach..row + side]);
+                lines.extend_from_slice(&own[row..row + side]);
+                lines.extend_from_slice(&after[row..row + reach]);
+            }
+            for first in (0..side).step_by(LANES) {
+                let mut sums = [[T::zero(); LANES]; ROWS];
+                for (k, tap) in taps.iter().enumerate() {
+                    for (row, sums) in sums.iter_mut().enumerate() {
+                        let values: &[T; LANES] =
+                            lines[row * width + first + k..].first_chunk().expect(ROW);
+                        for (sum, value) in sums.iter_mut().zip(values) {
+                            *sum = multiply_add::<T, FUSED>(*tap, *value, *sum);
+                        }
+                    }
+                }
+                for (row, sums) in sums.iter().enumerate() {
+                    result[block + row * side + first..][..LANES].copy_from_slice(sums);
+                }
+            }
+        }
+    }
+}
+
+const WINDOW: &str = "the weights are as many as the cells of a window";
+const ROW: &str = "the side of a brick is a multiple of the lanes";
+
+/// A few bricks of a pass: what one thread computes with the best instructions that the processor has.
+struct Group<'a, T> {
+    pass: &'a Pass<'a, T>,
+    first: usize,
+    result: &'a mut [T],
+}
+
+impl<T: Real> WithSimd for Group<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        match (is_f64::<T>(), S::IS_SCALAR) {
+            (true, true) => self.run::<DOUBLES, false>(),
+            (true, false) => self.run::<DOUBLES, true>(),
+            (false, true) => self.run::<SINGLES, false>(),
+            (false, false) => self.run::<SINGLES, true>(),
+        }
+    }
+}
+
+impl<T: Real> Group<'_, T> {
+    #[inline(always)]
+    fn run<const LANES: usize, const FUSED: bool>(self) {
+        let pass = self.pass;
+        let mut lines = Vec::new();
+        for (i, result) in self.result.chunks_exact_mut(pass.volume).enumerate() {
+            let bricks = pass.bricks(self.first + i);
+            if pass.stride == 1 {
+                pass.along::<LANES, FUSED>(bricks, &mut lines, result);
+            } else {
+                pass.across::<LANES, FUSED>(bricks, result);
+            }
+        }
+    }
+}
+
+/// `a b + c`, rounded once where the processor does that in one instruction.
+#[inline(always)]
+fn multiply_add<T: Real, const FUSED: bool>(a: T, b: T, c: T) -> T {
+    if FUSED { a.mul_add(b, c) } else { a * b + c }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Bricks;
+    use crate::convolution::convolve as circular;
+
+    fn noise(n: usize, seed: u64) -> Vec<f64> {
+        let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+        (0..n)
+            .map(|_| {
+                state ^= state << 13;
+                state ^= state >> 7;
+                state ^= state << 17;
+                (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+            })
+            .collect()
+    }
+
+    fn dot(a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).map(|(a, b)| a * b).sum()
+    }
+
+    fn assert_near(a: &[f64], b: &[f64], tolerance: f64) {
+        assert_eq!(a.len(), b.len());
+        let pairs = a.iter().zip(b);
+        let error = pairs.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+        assert!(error < tolerance, "{error:e}");
+    }
+
+    /// Bricks with holes, at the periodic boundary too.
+    fn some<const D: usize>(cells: usize, side: usize) -> Bricks<D> {
+        let active = |place: [usize; D]| (place.iter().sum::<usize>() * 7) % 5 < 3;
+        Bricks::new(cells, side, active, |place| place[0] % 2 == 0).unwrap()
+    }
+
+    fn on<const D: usize>(bricks: &Bricks<D>, x: &[f64], taps: &[f64], adjoint: bool) -> Vec<f64> {
+        let shape = (bricks.side(), D);
+        convolve(x, shape, &bricks.neighbours(), taps, adjoint, Ghosts::Zero)
+    }
+
+    /// The definition on the whole grid: after every pass what is not active is `rests`, times what a pass makes of constants.
+    fn by_passes<const D: usize>(
+        bricks: &Bricks<D>,
+        x: &[f64],
+        taps: &[f64],
+        mut rests: [f64; 2],
+    ) -> Vec<f64> {
+        let (cells, reach) = (bricks.cells(), taps.len() / 2);
+        let mut dense = bricks.scatter(x, rests);
+        for axis in (0..D).rev() {
+            let stride = cells.pow((D - 1 - axis) as u32);
+            let passed: Vec<f64> = (0..dense.len())
+                .map(|i| {
+                    let at = i / stride % cells;
+                    let taps = taps.iter().enumerate();
+                    taps.map(|(k, tap)| {
+                        let from = (at + cells + k - reach) % cells;
+                        tap * dense[i + from * stride - at * stride]
+                    })
+                    .sum()
+                })
+                .collect();
+            rests = rests.map(|rest| rest * taps.iter().sum::<f64>());
+            dense = bricks.scatter(&bricks.gather(&passed), rests);
+        }
+        bricks.gather(&dense)
+    }
+
+    fn equals_the_definition<const D: usize>(cells: usize, side: usize, reach: usize) {
+        let bricks = some::<D>(cells, side);
+        let x = noise(bricks.len(), 1);
+        let taps = noise(2 * reach + 1, 2);
+        let rests = [-0.9, 1.1];
+        let outside = bricks.convolution_of_outside(&taps, rests);
+        let linear = on(&bricks, &x, &taps, false);
+        let both: Vec<f64> = linear.iter().zip(&outside).map(|(a, b)| a + b).collect();
+        assert_near(&linear, &by_passes(&bricks, &x, &taps, [0.0; 2]), 1e-13);
+        assert_near(&both, &by_passes(&bricks, &x, &taps, rests), 1e-13);
+    }
+
+    #[test]
+    fn equals_passes_over_the_whole_grid() {
+        equals_the_definition::<2>(64, 16, 5);
+        equals_the_definition::<2>(48, 16, 16);
+        equals_the_definition::<2>(64, 32, 29);
+        equals_the_definition::<3>(32, 8, 8);
+        equals_the_definition::<3>(24, 8, 3);
+    }
+
+    #[test]
+    fn the_adjoint_is_the_transpose_to_rounding() {
+        fn check<const D: usize>(cells: usize, side: usize, reach: usize) {
+            let bricks = some::<D>(cells, side);
+            let (x, y) = (noise(bricks.len(), 3), noise(bricks.len(), 4));
+            let taps = noise(2 * reach + 1, 5);
+            let left = dot(&on(&bricks, &x, &taps, false), &y);
+            let right = dot(&x, &on(&bricks, &y, &taps, true));
+            let image = on(&bricks, &x, &taps, false);
+            let scale = (dot(&image, &image) * dot(&y, &y)).sqrt();
+            assert!((left - right).abs() < 1e-14 * scale, "{left} {right}");
+        }
+        check::<2>(64, 16, 8);
+        check::<3>(32, 8, 8);
+    }
+
+    #[test]
+    fn inside_a_wide_enough_set_it_is_the_circular_convolution() {
+        let (cells, reach) = (48, 7);
+        let taps = noise(2 * reach + 1, 6);
+        let width = taps.len();
+        let kernel: Vec<f64> = (0..width * width)
+            .map(|k| taps[k / width] * taps[k % width])
+            .collect();
+        let all = Bricks::<2>::new(cells, 16, |_| true, |_| true).unwrap();
+        let dense = noise(cells * cells, 7);
+        for adjoint in [false, true] {
+            let expected = circular(&dense, &[cells; 2], &kernel, width, adjoint);
+            let found = on(&all, &all.gather(&dense), &taps, adjoint);
+            assert_near(&all.scatter(&found, [0.0; 2]), &expected, 1e-13);
+        }
+    }
+
+    #[test]
+    fn single_precision_and_one_thread_agree() {
+        let bricks = some::<3>(32, 8);
+        let (x, taps) = (noise(bricks.len(), 8), noise(17, 9));
+        let double = on(&bricks, &x, &taps, true);
+        let single = |x: &[f64]| -> Vec<f32> { x.iter().map(|&x| x as f32).collect() };
+        let table = bricks.neighbours();
+        let run = || {
+            let (x, table, taps) = (single(&x), single(&table), single(&taps));
+            convolve(&x, (8, 3), &table, &taps, true, Ghosts::Zero)
+        };
+        let found: Vec<f64> = run().into_iter().map(f64::from).collect();
+        assert_near(&found, &double, 1e-5);
+        let one = rayon::ThreadPoolBuilder::new()
+            .num_threads(1)
+            .build()
+            .unwrap();
+        assert_eq!(run(), one.install(run));
+        assert_eq!(double, one.install(|| on(&bricks, &x, &taps, true)));
+    }
+
+    #[test]
+    fn values_keep_their_places() {
+        let (few, all) = (
+            some::<2>(48, 16),
+            Bricks::<2>::new(48, 16, |_| true, |_| true).unwrap(),
+        );
+        let x = noise(few.len(), 10);
+        let carried = all.carried(&few, &x, [-1.0, 1.0]);
+        let dense = few.scatter(&x, [-1.0, 1.0]);
+        assert_eq!(all.scatter(&carried, [0.0; 2]), dense);
+        assert_eq!(few.carried(&all, &carried, [0.0; 2]), x);
+        for (cell, value) in x.iter().enumerate() {
+            let [i, j] = few.multi_index(cell);
+            assert_eq!(dense[48 * i + j].to_bits(), value.to_bits());
+            let next = dense[48 * i + (j + 1) % 48];
+            match few.beside(cell, 1, true) {
+                Ok(beside) => assert_eq!(x[beside].to_bits(), next.to_bits()),
+                Err(positive) => assert_eq!(positive, next > 0.0),
+            }
+        }
+        assert!(matches!(
+            Bricks::<2>::new(50, 16, |_| true, |_| true),
+            Err(crate::Error::Bricks {
+                cells: 50,
+                side: 16
+            })
+        ));
+    }
+}

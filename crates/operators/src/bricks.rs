@@ -1,0 +1,276 @@
+//! Active bricks: the part of a periodic grid that is stored and worked on.
+
+use crate::Error;
+use crate::brick_convolution::{Ghosts, convolve};
+
+/// A brick that is not stored, in the tables of neighbours: the field is constant there, in the phase of positive values
+const POSITIVE: i32 = -1;
+/// or in that of negative ones.
+const NEGATIVE: i32 = -2;
+
+/// Some of the bricks, cubes of `B^D` cells, into which a periodic grid of `N^D` cells is divided.
+///
+/// A field on them is one vector, brick after brick in Morton order, each row-major; as a tensor it has the shape `[bricks B, B, ..]`, so that
+/// pointwise operations need not know. Everywhere else the field is constant, at one of two values, the rest values of the two phases.
+///
+/// ```
+/// use operators::Bricks;
+///
+/// # fn main() -> Result<(), operators::Error> {
+/// // The left half of a grid of 32 x 32 cells, in bricks of 8 x 8; the right half is in the negative phase.
+/// let bricks = Bricks::<2>::new(32, 8, |[_, column]| column < 2, |_| false)?;
+/// assert_eq!(bricks.shape(), [64, 8]);
+/// let dense: Vec<f64> = (0..1024).map(|i| if i % 32 < 16 { 0.5 } else { -1.0 }).collect();
+/// let stored = bricks.gather(&dense);
+/// assert_eq!(bricks.scatter(&stored, [-1.0, 1.0]), dense);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Bricks<const D: usize> {
+    side: usize,
+    per_axis: usize,
+    places: Vec<[usize; D]>,
+    /// For every brick of the grid, row-major, its number or the phase that it is in.
+    directory: Vec<i32>,
+}
+
+impl<const D: usize> Bricks<D> {
+    /// The bricks of `side^D` cells that are `active`, by their places along each axis; `positive` says which phase the others are in.
+    ///
+    /// # Errors
+    /// [`Error::Bricks`] unless the side is a multiple of 8 that divides the `cells` per axis of the grid.
+    pub fn new(
+        cells: usize,
+        side: usize,
+        active: impl Fn([usize; D]) -> bool,
+        positive: impl Fn([usize; D]) -> bool,
+    ) -> Result<Self, Error> {
+        if side == 0 || !side.is_multiple_of(8) || !cells.is_multiple_of(side) {
+            return Err(Error::Bricks { cells, side });
+        }
+        let per_axis = cells / side;
+        let mut bricks = Self {
+            side,
+            per_axis,
+            places: Vec::new(),
+            directory: Vec::new(),
+        };
+        for flat in 0..per_axis.pow(D as u32) {
+            let place = bricks.place(flat);
+            let phase = if positive(place) { POSITIVE } else { NEGATIVE };
+            bricks.directory.push(phase);
+            if active(place) {
+                bricks.places.push(place);
+            }
+        }
+        bricks.places.sort_by_key(morton);
+        for (number, place) in bricks.places.iter().enumerate() {
+            bricks.directory[flat(*place, per_axis)] = number as i32;
+        }
+        Ok(bricks)
+    }
+
+    fn place(&self, mut flat: usize) -> [usize; D] {
+        let mut place = [0; D];
+        for at in place.iter_mut().rev() {
+            *at = flat % self.per_axis;
+            flat /= self.per_axis;
+        }
+        place
+    }
+
+    /// Cells along each axis of a brick, `B`.
+    pub fn side(&self) -> usize {
+        self.side
+    }
+
+    /// Cells along each axis of the grid, `N`.
+    pub fn cells(&self) -> usize {
+        self.side * self.per_axis
+    }
+
+    /// Bricks along each axis of the grid, `N / B`.
+    pub fn per_axis(&self) -> usize {
+        self.per_axis
+    }
+
+    /// The places of the active bricks along each axis, in order.
+    pub fn places(&self) -> &[[usize; D]] {
+        &self.places
+    }
+
+    /// Cells of a brick, `B^D`.
+    pub fn volume(&self) -> usize {
+        self.side.pow(D as u32)
+    }
+
+    /// Stored cells.
+    pub fn len(&self) -> usize {
+        self.places.len() * self.volume()
+    }
+
+    /// Whether no brick is active.
+    pub fn is_empty(&self) -> bool {
+        self.places.is_empty()
+    }
+
+    /// The shape of fields as tensors, `[bricks B, B, ..]`.
+    pub fn shape(&self) -> [usize; D] {
+        let mut shape = [self.side; D];
+        shape[0] *= self.places.len();
+        shape
+    }
+
+    /// The number of the active brick at a place.
+    pub fn number(&self, place: [usize; D]) -> Option<usize> {
+        usize::try_from(self.directory[flat(place, self.per_axis)]).ok()
+    }
+
+    /// Whether a place is in the positive phase, if no brick is active there.
+    pub fn is_positive(&self, place: [usize; D]) -> bool {
+        self.directory[flat(place, self.per_axis)] == POSITIVE
+    }
+
+    /// Place on the grid of a stored cell.
+    pub fn multi_index(&self, cell: usize) -> [usize; D] {
+        let mut index = self.places[cell / self.volume()];
+        let mut rest = cell % self.volume();
+        for at in index.iter_mut().rev() {
+            *at = *at * self.side + rest % self.side;
+            rest /= self.side;
+        }
+        index
+    }
+
+    /// The cell beside a stored one.
+    ///
+    /// # Errors
+    /// If no brick is active there: whether it is in the positive phase.
+    pub fn beside(&self, cell: usize, axis: usize, forward: bool) -> Result<usize, bool> {
+        let stride = self.side.pow((D - 1 - axis) as u32);
+        let within = cell / stride % self.side;
+        let last = self.side - 1;
+        match forward {
+            true if within < last => Ok(cell + stride),
+            false if within > 0 => Ok(cell - stride),
+            _ => {
+                let place = self.shifted(self.places[cell / self.volume()], axis, forward);
+                let inside = cell % self.volume();
+                match self.number(place) {
+                    Some(number) if forward => Ok(number * self.volume() + inside - last * stride),
+                    Some(number) => Ok(number * self.volume() + inside + last * stride),
+                    None => Err(self.is_positive(place)),
+                }
+            }
+        }
+    }
+
+    fn shifted(&self, mut place: [usize; D], axis: usize, forward: bool) -> [usize; D] {
+        let step = if forward { 1 } else { self.per_axis - 1 };
+        place[axis] = (place[axis] + step) % self.per_axis;
+        place
+    }
+
+    /// The table of neighbours, `[bricks, 2 D]`: the numbers of the bricks before and after along each axis, negative for those that are not
+    /// active. Numbers as floats, so that the table can be an input of [`crate::brick_convolution`].
+    pub fn neighbours(&self) -> Vec<f64> {
+        let mut table = Vec::with_capacity(self.places.len() * 2 * D);
+        for place in &self.places {
+            for axis in 0..D {
+                for forward in [false, true] {
+                    let beside = self.shifted(*place, axis, forward);
+                    table.push(f64::from(self.directory[flat(beside, self.per_axis)]));
+                }
+            }
+        }
+        table
+    }
+
+    /// What constant values outside, `rests` in the negative and in the positive phase, add to the convolution of a field with `taps`
+    /// along each axis: [`crate::brick_convolution`] itself takes them as zero.
+    pub fn convolution_of_outside(&self, taps: &[f64], rests: [f64; 2]) -> Vec<f64> {
+        let zeros = vec![0.0; self.len()];
+        let table = self.neighbours();
+        convolve(
+            &zeros,
+            (self.side, D),
+            &table,
+            taps,
+            false,
+            Ghosts::At(rests),
+        )
+    }
+
+    /// The values of the active bricks, of those of the whole grid.
+    pub fn gather(&self, dense: &[f64]) -> Vec<f64> {
+        let mut values = Vec::with_capacity(self.len());
+        self.each_row(|start, _| values.extend_from_slice(&dense[start..start + self.side]));
+        values
+    }
+
+    /// The values on the whole grid: `rests` outside, in the negative and in the positive phase.
+    pub fn scatter(&self, values: &[f64], rests: [f64; 2]) -> Vec<f64> {
+        let cells = self.cells();
+        let mut dense = Vec::with_capacity(cells.pow(D as u32));
+        // A row of the grid lies in one row of bricks along the last axis.
+        for row in 0..cells.pow(D as u32 - 1) {
+            let (mut rest, mut stride, mut brick) = (row, self.per_axis, 0);
+            for _ in 1..D {
+                brick += rest % cells / self.side * stride;
+                stride *= self.per_axis;
+                rest /= cells;
+            }
+            for phase in &self.directory[brick..brick + self.per_axis] {
+                let rest = rests[usize::from(*phase == POSITIVE)];
+                dense.resize(dense.len() + self.side, rest);
+            }
+        }
+        self.each_row(|start, cell| {
+            dense[start..start + self.side].copy_from_slice(&values[cell..cell + self.side]);
+        });
+        dense
+    }
+
+    /// Calls with the first cell of every row of the active bricks, on the grid and in the order of storage.
+    fn each_row(&self, mut call: impl FnMut(usize, usize)) {
+        for cell in (0..self.len()).step_by(self.side) {
+            call(flat(self.multi_index(cell), self.cells()), cell);
+        }
+    }
+
+    /// The values on these bricks of a field on others of the same grid; where those have none, `rests` of their phases.
+    ///
+    /// # Panics
+    /// If the bricks have other sides.
+    pub fn carried(&self, from: &Self, values: &[f64], rests: [f64; 2]) -> Vec<f64> {
+        assert_eq!((self.side, self.per_axis), (from.side, from.per_axis));
+        let volume = self.volume();
+        let mut carried = Vec::with_capacity(self.len());
+        for place in &self.places {
+            match from.number(*place) {
+                Some(number) => carried.extend_from_slice(&values[number * volume..][..volume]),
+                None => {
+                    let rest = rests[usize::from(from.is_positive(*place))];
+                    carried.resize(carried.len() + volume, rest);
+                }
+            }
+        }
+        carried
+    }
+}
+
+fn flat<const D: usize>(place: [usize; D], per_axis: usize) -> usize {
+    place.iter().fold(0, |flat, at| flat * per_axis + at)
+}
+
+/// The bits of the places along all axes, interleaved: bricks that are near in this order are near in space.
+fn morton<const D: usize>(place: &[usize; D]) -> u64 {
+    let mut key = 0;
+    for bit in (0..64 / D).rev() {
+        for at in place {
+            key = key << 1 | (*at as u64 >> bit & 1);
+        }
+    }
+    key
+}

@@ -1,0 +1,114 @@
+//! Flows on active bricks, which follow the interface.
+
+use std::sync::Arc;
+
+use burn::tensor::Tensor;
+use geometry::Field;
+
+use super::{Minimum, Movement, WillmoreFlow, download};
+use crate::Error;
+use crate::active::Active;
+
+impl<const D: usize> WillmoreFlow<D> {
+    /// Minimizes the energy of a movement from the present phase field. If the interface comes near the edge of the active bricks, these are
+    /// made more, and the minimization goes on from there.
+    pub(super) fn minimize(&mut self, movement: &Movement<'_, D>) -> Result<Minimum<D>, Error> {
+        let mut minimum = self.minimize_here(movement)?;
+        let (mut anchor, mut factors) = (movement.anchor.clone(), movement.factors.cloned());
+        while let Some((from, to)) = self.enlarge(&minimum.u)? {
+            let carried = |x: &Tensor<D>| to.carried(&from, x, &self.device);
+            let start = carried(&minimum.u)?;
+            anchor = carried(&anchor)?;
+            // Where nothing moves, factors of the motion are near 1 or, which is the same, near -1.
+            factors = factors.as_ref().map(carried).transpose()?;
+            let again = self.minimize_here(&Movement {
+                anchor: &anchor,
+                factors: factors.as_ref(),
+                start: &start,
+                tau: movement.tau,
+            })?;
+            minimum = Minimum {
+                newton: again.newton.after(&minimum.newton),
+                times: again.times.after(&minimum.times),
+                ..again
+            };
+        }
+        Ok(minimum)
+    }
+
+    /// Goes to the bricks near the interface now.
+    pub(super) fn follow(&mut self) -> Result<(), Error> {
+        let Some(active) = &self.active else {
+            return Ok(());
+        };
+        let next = active.following(&self.device.values(self.current.clone())?)?;
+        next.map_or(Ok(()), |next| self.go_to(next).map(|_| ()))
+    }
+
+    /// Goes to the bricks near the interface of a field of the whole grid, with nothing but that field to be kept.
+    pub(super) fn follow_field(&mut self, field: &Field<D>) -> Result<(), Error> {
+        let Some(active) = &self.active else {
+            return Ok(());
+        };
+        let next = active.following_field(field)?;
+        self.go_to(next).map(|_| ())
+    }
+
+    /// Makes the bricks more if the interface of `u` has come near their edge; those before and after.
+    fn enlarge(&mut self, u: &Tensor<D>) -> Result<Option<(Active<D>, Active<D>)>, Error> {
+        let Some(active) = &self.active else {
+            return Ok(None);
+        };
+        match active.enlarged(&self.device.values(u.clone())?)? {
+            Some(next) => Ok(Some((self.go_to(next.clone())?, next))),
+            None => Ok(None),
+        }
+    }
+
+    /// Carries everything over to other bricks; those before.
+    fn go_to(&mut self, next: Active<D>) -> Result<Active<D>, Error> {
+        let before = self.active.clone().unwrap_or_else(|| next.clone());
+        let carried = |u: &Tensor<D>| next.carried(&before, u, &self.device);
+        let current = carried(&self.current)?;
+        let previous = match &self.previous {
+            Some((u, tau)) => Some((carried(u)?, *tau)),
+            None => None,
+        };
+        self.current = current;
+        self.previous = previous;
+        self.mcf = Arc::new(next.step(&self.device));
+        self.active = Some(next);
+        // What it was prepared for belongs to the step of mean curvature flow.
+        self.phase = None;
+        self.weighted = None;
+        self.energy = self.traced(false)?;
+        Ok(before)
+    }
+
+    /// A field of the whole grid as a tensor of what is stored.
+    pub(super) fn in_storage(&self, field: &Field<D>) -> Tensor<D> {
+        match &self.active {
+            Some(active) => {
+                let shape = active.bricks().shape();
+                self.device.tensor(&active.gather(field), shape)
+            }
+            None => self.device.tensor(field.values(), self.grid.shape()),
+        }
+    }
+
+    /// The field of the whole grid of which `u` is stored.
+    pub(super) fn on_grid(&self, u: &Tensor<D>) -> Result<Field<D>, Error> {
+        match &self.active {
+            Some(active) => active.scatter(&self.device.values(u.clone())?),
+            None => download(&self.grid, u, &self.device),
+        }
+    }
+
+    /// Refuses what active bricks cannot do.
+    pub(super) fn needs_grid(&self, what: &'static str) -> Result<(), Error> {
+        match &self.active {
+            Some(_) => Err(Error::NeedsGrid { what }),
+            None => Ok(()),
+        }
+    }
+}

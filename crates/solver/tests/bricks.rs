@@ -1,0 +1,269 @@
+//! Flows on active bricks against those on the whole grid.
+
+use std::sync::Arc;
+
+use crate::common::{device, distance, network, noise, params, ratios};
+use geometry::distance::SignedDistanceExt;
+use geometry::measure::l2_distance;
+use geometry::shapes::{Ball, Cross};
+use geometry::{Field, Grid, SignedDistance, phase_field};
+use linearize::taylor::{halvings, remainder};
+use model::{Network, SeparableOperator, Shipped};
+use operators::Bricks;
+use solver::{
+    Constraints, Error, FlowParams, Helfrich, MinimizingMovement, NewtonParams, Objective,
+    Precision, StartKind, WillmoreFlow,
+};
+
+fn accurate<const D: usize>() -> Network {
+    Shipped::Accurate.find(ratios(D)).unwrap()
+}
+
+/// Scales with a solver so accurate that only the storage makes a difference.
+fn exact<const D: usize>(grid: &Grid<D>) -> FlowParams {
+    FlowParams {
+        calibration: accurate::<D>().calibration().unwrap().factors,
+        newton: NewtonParams {
+            tolerance: 1e-7,
+            cg_tolerance: 1e-2,
+            precision: Precision::Device,
+            ..NewtonParams::default()
+        },
+        ..params(grid)
+    }
+}
+
+fn usual<const D: usize>(grid: &Grid<D>) -> FlowParams {
+    FlowParams {
+        newton: NewtonParams::default(),
+        ..exact(grid)
+    }
+}
+
+fn dense<const D: usize>(start: &Field<D>, params: FlowParams) -> WillmoreFlow<D> {
+    WillmoreFlow::with_network(&accurate::<D>(), start, params, &device()).unwrap()
+}
+
+fn bricks<const D: usize>(start: &Field<D>, params: FlowParams) -> WillmoreFlow<D> {
+    WillmoreFlow::on_bricks(&accurate::<D>(), start, params, &device()).unwrap()
+}
+
+/// The L2 difference of both flows after these steps, over how far they went, and the largest relative difference of their energies.
+fn difference<const D: usize>(start: &Field<D>, params: FlowParams, steps: &[f64]) -> (f64, f64) {
+    let (mut whole, mut few) = (dense(start, params), bricks(start, params));
+    let mut energies: f64 = 0.0;
+    for &tau in steps {
+        let [a, b] = [&mut whole, &mut few].map(|flow| flow.advance(tau).unwrap());
+        energies = energies.max((b.willmore_energy / a.willmore_energy - 1.0).abs());
+    }
+    let (whole, few) = (whole.field().unwrap(), few.field().unwrap());
+    let apart = l2_distance(&whole, &few).unwrap() / l2_distance(&whole, start).unwrap();
+    println!("difference over motion {apart:.1e}, of the energies {energies:.1e}");
+    (apart, energies)
+}
+
+fn field<const D: usize>(grid: Grid<D>, shape: &impl SignedDistance<D>) -> Field<D> {
+    phase_field(grid, shape, 2.0 * grid.spacing()).unwrap()
+}
+
+fn cross() -> Field<2> {
+    let grid = Grid::per_unit(128, 2.0).unwrap();
+    field(grid, &Cross::new(0.8, 0.27).unwrap())
+}
+
+/// Gradient and Hessian-vector products of the energy on bricks with holes, about a field that is rough there.
+fn derivatives<const D: usize>(cells: usize) {
+    let device = device();
+    let operator = SeparableOperator::<D>::new(&accurate::<D>(), &device).unwrap();
+    let hole = |place: [usize; D]| place.iter().sum::<usize>() % 4 == 2;
+    let side = operator.brick_side();
+    let bricks = Bricks::new(cells, side, |place| !hole(place), |place| place[0] == 0).unwrap();
+    let shape = bricks.shape();
+    let step = Arc::new(operator.on(&bricks, &device));
+    let mut energy = MinimizingMovement::of_shape(step, shape, Precision::Device, &device).unwrap();
+    let [u, anchor, p] = [1, 2, 3].map(|seed| noise(bricks.len(), seed));
+    energy.set(&device.tensor(&anchor, shape), 40.0).unwrap();
+    let at = |t: f64| -> Vec<f64> { u.iter().zip(&p).map(|(u, p)| u + t * p).collect() };
+    let direction = device.tensor::<D>(&p, shape);
+    let (_, gradient) = energy.evaluate(&device.tensor(&u, shape)).unwrap();
+    let product = energy.hessian_vector_product(&direction).unwrap();
+    let dot = |a: burn::tensor::Tensor<D>| -> f64 {
+        let a = device.values(a).unwrap();
+        a.iter().zip(&p).map(|(a, b)| a * b).sum()
+    };
+    let (first, second) = (dot(gradient), dot(product));
+    let mut value = |t: f64| energy.value(&device.tensor(&at(t), shape)).unwrap();
+    for (derivatives, expected) in [(vec![first], 2.0), (vec![first, second], 3.0)] {
+        let rate = remainder(&mut value, &derivatives, &halvings(0.1, 8), 1e-14).rate();
+        let rate = rate.unwrap();
+        assert!((rate - expected).abs() < 0.1, "{D}D, {expected}: {rate}");
+    }
+}
+
+#[test]
+fn derivatives_pass_taylor_tests() {
+    derivatives::<2>(64);
+    derivatives::<3>(32);
+}
+
+#[test]
+fn pure_phases_cost_nothing() {
+    let (device, grid) = (device(), Grid::<3>::centred(32, 0.5).unwrap());
+    let operator = SeparableOperator::<3>::new(&accurate::<3>(), &device).unwrap();
+    for (phase, rest) in [false, true].into_iter().zip(operator.rests()) {
+        let some = |place: [usize; 3]| place[0] != place[1];
+        let bricks = Bricks::new(grid.cells(), 8, some, |_| phase).unwrap();
+        let u = vec![rest; bricks.len()];
+        let u = device.tensor::<3>(&u, bricks.shape());
+        let image = device
+            .values(operator.on(&bricks, &device).apply(u))
+            .unwrap();
+        let worst = image
+            .iter()
+            .fold(0.0, |most: f64, v| most.max((v - rest).abs()));
+        assert!(
+            (rest.abs() - 1.0).abs() < 1e-3 && worst < 1e-13,
+            "{rest} {worst:e}"
+        );
+    }
+}
+
+#[test]
+fn a_cross_flows_as_on_the_whole_grid() {
+    let start = cross();
+    let tau = exact(start.grid()).mcf_step;
+    let (apart, energies) = difference(&start, exact(start.grid()), &[tau; 8]);
+    assert!(apart < 2e-6 && energies < 1e-6, "{apart:e} {energies:e}");
+}
+
+#[test]
+fn a_surface_flows_as_on_the_whole_grid() {
+    let grid = Grid::<3>::centred(64, 0.5).unwrap();
+    let dented = |x: [f64; 3]| {
+        let r = x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let [a, b, c] = x.map(|x| x / r.max(1e-9));
+        r - 0.17 * (1.0 + 0.2 * (4.0 * a * b * c + 0.5 * c.powi(3) - 0.4 * a * a))
+    };
+    let start = field(grid, &dented);
+    let tau = exact(&grid).mcf_step;
+    let (apart, energies) = difference(&start, exact(&grid), &[tau / 4.0; 8]);
+    assert!(apart < 2e-6 && energies < 1e-6, "{apart:e} {energies:e}");
+}
+
+#[test]
+fn fronts_that_meet_flow_as_on_the_whole_grid() {
+    let grid = Grid::<2>::per_unit(128, 1.0).unwrap();
+    let (eps, tau) = (params(&grid).eps, params(&grid).mcf_step);
+    let disc = |x: f64| Ball::new([x, 0.0], 0.12).unwrap();
+    let pair = disc(-0.12 - 0.2 * eps).union(disc(0.12 + 0.2 * eps));
+    // Discs that merge, and holes that do.
+    for phase in [1.0, -1.0] {
+        let start = field(grid, &pair).map(|u| phase * u);
+        let mut whole = dense(&start, exact(&grid));
+        (0..4).for_each(|_| assert!(whole.advance(tau).is_ok()));
+        let between = |u: &Field<2>| u.interpolate([0.0, 0.0]) * phase;
+        assert!(between(&start) < 0.0 && between(&whole.field().unwrap()) > 0.0);
+        let (apart, energies) = difference(&start, exact(&grid), &[tau; 4]);
+        assert!(apart < 2e-6 && energies < 1e-6, "{apart:e} {energies:e}");
+    }
+}
+
+#[test]
+fn a_step_beyond_the_first_bricks_makes_them_more() {
+    let start = cross();
+    let params = exact(start.grid());
+    let steps = [8.0 * params.mcf_step];
+    let mut few = bricks(&start, params);
+    let before = few.current().dims();
+    few.advance(steps[0]).unwrap();
+    assert!(few.current().dims() > before, "{before:?}");
+    // The first phase field had no more than the first bricks.
+    let (apart, energies) = difference(&start, params, &steps);
+    assert!(apart < 2e-6 && energies < 1e-5, "{apart:e} {energies:e}");
+}
+
+#[test]
+fn the_same_flow_again_and_from_the_middle_has_the_same_bytes() {
+    let start = cross();
+    let tau = usual(start.grid()).mcf_step;
+    let run = |flow: &mut WillmoreFlow<2>, steps: usize| -> Vec<usize> {
+        (0..steps)
+            .map(|_| flow.advance(tau).unwrap().newton.hvp)
+            .collect()
+    };
+    let mut flow = bricks(&start, usual(start.grid()));
+    let first = run(&mut flow, 3);
+    let state = flow.state().unwrap();
+    let rest = run(&mut flow, 2);
+    let end = flow.field().unwrap();
+    println!("{first:?} {rest:?}");
+
+    let mut again = bricks(&start, usual(start.grid()));
+    assert_eq!(run(&mut again, 5), [first, rest.clone()].concat());
+    assert_eq!(again.field().unwrap(), end);
+
+    let mut resumed = bricks(&start, usual(start.grid()));
+    resumed.restore(&state).unwrap();
+    assert_eq!(run(&mut resumed, 2), rest);
+    assert_eq!(resumed.field().unwrap(), end);
+}
+
+#[test]
+fn second_order_steps_go_on_bricks_too() {
+    let start = cross();
+    let grid = *start.grid();
+    let tau = params(&grid).mcf_step;
+    let (mut whole, mut few) = (dense(&start, exact(&grid)), bricks(&start, exact(&grid)));
+    for _ in 0..3 {
+        for flow in [&mut whole, &mut few] {
+            assert!(flow.advance_second_order(tau, |_| true).unwrap().1);
+        }
+    }
+    let (whole, few) = (whole.field().unwrap(), few.field().unwrap());
+    let found = l2_distance(&whole, &few).unwrap() / l2_distance(&whole, &start).unwrap();
+    println!("difference over motion {found:.1e}");
+    assert!(found < 4e-6, "{found:e}");
+}
+
+#[test]
+fn what_bricks_cannot_do_is_refused_in_one_line() {
+    let grid = Grid::<2>::per_unit(128, 0.75).unwrap();
+    let start = field(grid, &Ball::new([0.0, 0.0], 0.2).unwrap());
+    let on = |network: &Network, start: &Field<2>| {
+        WillmoreFlow::on_bricks(network, start, usual(start.grid()), &device())
+    };
+    let error = on(&network(), &start).err().unwrap();
+    assert!(error.to_string().contains("accurate recipe"), "{error}");
+    let flat = on(&accurate::<2>(), &Field::constant(grid, 1.0));
+    assert!(matches!(flat, Err(Error::NoInterface)));
+    let odd = Grid::<2>::centred(72, 72.0 / 128.0).unwrap();
+    let odd = on(
+        &accurate::<2>(),
+        &field(odd, &Ball::new([0.0, 0.0], 0.2).unwrap()),
+    );
+    assert!(odd.err().unwrap().to_string().contains("bricks of 16"));
+
+    let mut flow = bricks(&start, usual(&grid));
+    let held = Constraints {
+        volume: Some(0.1),
+        ..Constraints::default()
+    };
+    let helfrich = Helfrich {
+        tension: 1.0,
+        ..Helfrich::default()
+    };
+    for refused in [
+        flow.restrict_to(&vec![true; grid.len()]),
+        flow.constrain(held),
+        flow.set_energy(helfrich, 1.0),
+    ] {
+        assert!(
+            matches!(refused, Err(Error::NeedsGrid { .. })),
+            "{refused:?}"
+        );
+    }
+    assert_eq!(flow.begin_on_half_grids(&accurate::<2>()).unwrap(), 0);
+    assert_ne!(flow.advance(1e-5).unwrap().start.kind, StartKind::HalfGrid);
+    let whole = distance(flow.field().unwrap().values(), start.values());
+    assert!(whole > 0.0);
+}
