@@ -90,11 +90,12 @@ pub const ELLIPSOID: Sample<3> = Sample {
 /// Cells per unit length of runs by the accurate operator, two to `eps`; the errors of the two are extrapolated to `eps = 0`.
 pub const CELLS: [usize; 2] = [64, 128];
 
-/// Controlled steps with a time error well below that in `eps`; their minimizations are accurate, too.
+/// Controlled steps with a time error well below that in `eps`; their minimizations are accurate, too. The first step is as long as that of other
+/// controlled steps, since at corners it belongs to the error in `eps`.
 pub const STRICT: ErrorControl = ErrorControl {
     relative: 0.002,
     length: None,
-    longest: 0.35,
+    longest: 0.5,
     first: None,
 };
 
