@@ -26,6 +26,7 @@ const TIMING: &str = env!("CARGO_BIN_EXE_timing_tables");
 const SPHERES: &str = env!("CARGO_BIN_EXE_spheres");
 const DISK_AND_CUBE: &str = env!("CARGO_BIN_EXE_disk_and_cube");
 const TRAIN: &str = env!("CARGO_BIN_EXE_train_networks");
+const UNSHRINKING: &str = env!("CARGO_BIN_EXE_unshrinking");
 const VESICLES: &str = env!("CARGO_BIN_EXE_vesicles");
 
 #[test]
@@ -550,6 +551,21 @@ fn the_quick_denoising_takes_off_noise_and_keeps_the_volume() {
         );
         assert!(
             (metric("fair.volume") - metric("noisy.volume")).abs() < 1e-6,
+            "{summary:?}"
+        );
+    }
+}
+
+#[test]
+#[ignore = "a whole quick run: see scripts/test_long"]
+fn the_quick_segmentations_keep_their_volume() {
+    let root = tempfile::tempdir().unwrap();
+    let summary = quick_summary(UNSHRINKING, root.path());
+    for body in ["ball", "figure"] {
+        let metric = |name: &str| summary.get(&format!("unshrinking.{body}.{name}")).unwrap();
+        assert!(metric("fair.volume").abs() < 1e-6, "{summary:?}");
+        assert!(
+            metric("fair.w_over_8pi") < metric("marched.w_over_8pi"),
             "{summary:?}"
         );
     }

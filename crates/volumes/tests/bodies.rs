@@ -67,7 +67,7 @@ fn bodies_end_at_the_side_of_the_volume() {
     }
     // A voxel alone, and what is joined by an edge only.
     for inside in [
-        |x: [f64; 3]| if x == [2.0, 2.0, 1.0] { -1.0 } else { 1.0 },
+        |x: [f64; 3]| distance(x, [2.0, 2.0, 1.0]) - 0.5,
         |x: [f64; 3]| if (x[0] - x[1]).abs() < 0.5 { -1.0 } else { 1.0 },
     ] {
         let volume = labelled([5, 5, 3], [1.0; 3], inside);
