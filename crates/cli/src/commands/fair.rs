@@ -16,9 +16,9 @@ use crate::own::{Noise, OwnMesh};
 const BALL: f64 = 1.2 * 8.0 * PI;
 
 /// Of a segmentation, details of so many voxels are taken for its steps,
-const STEPS: f64 = 2.0;
+const STEPS: f64 = 1.5;
 /// as long as the surface goes no further than so many, root of the mean square.
-const FARTHEST: f64 = 0.5;
+const FARTHEST: f64 = 0.35;
 
 impl FairOptions {
     /// A segmentation, whose volume is kept.
