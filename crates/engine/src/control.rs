@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use solver::{StepEstimates, StepRecord};
 
+use crate::record::ESTIMATES_MISS;
 use crate::{Error, Record};
 
 /// What limits the size of controlled steps.
@@ -91,7 +92,7 @@ impl Controller {
     /// order, and for its displacement.
     fn room(&self, estimates: &StepEstimates, (tau, end): (f64, f64)) -> (f64, f64) {
         let allowed = match self.control.length {
-            Some(length) => length * tau / end,
+            Some(length) => length / ESTIMATES_MISS * tau / end,
             None => self.control.relative * estimates.motion,
         };
         let by_error = match estimates.error {
@@ -190,9 +191,10 @@ mod tests {
         };
         let mut control = Controller::new(control, EPS, 1.0).unwrap();
         // The step is the last quarter of the time.
-        control.accept(&made(1e-3, Some(0.25 * 1e-4), 0.01 * EPS));
+        let allowed = 0.25 * 1e-4 / ESTIMATES_MISS;
+        control.accept(&made(1e-3, Some(allowed), 0.01 * EPS));
         assert!((control.size(1.0) / (AIM * 1e-3) - 1.0).abs() < 1e-12);
-        let wrong = made(1e-2, Some(4.0 * 0.25 * 1e-4), 0.01 * EPS);
+        let wrong = made(1e-2, Some(4.0 * allowed), 0.01 * EPS);
         let shorter = control.shorter(&wrong.minimization.unwrap()).unwrap();
         assert!((shorter / (0.5 * 0.85 * 1e-2) - 1.0).abs() < 1e-12);
     }
