@@ -90,7 +90,8 @@ fn controlled_steps_are_as_accurate_as_they_say() {
         controlled.stops = vec![Stop::Time(4.0 * TAU)];
         finished(controlled)
     };
-    let (usual, strict) = (run(0.02, 1.0), run(0.002, 0.3));
+    // The first step, whose error has no estimate, is the same in both.
+    let (usual, strict) = (run(0.02, 1.0), run(0.002, 0.5));
     let steps = |run: &Run<2>| -> Vec<_> {
         let made = run.records().iter().map(|r| r.minimization.unwrap());
         made.collect()
