@@ -61,14 +61,13 @@ struct Segmented {
     grid: Grid<3>,
 }
 
-/// What became of it: key and words for how, and the Willmore energy in units of a sphere's by implicit finite elements, and by the zero set
-/// where that holds.
+/// What became of it: key and words for how, and the Willmore energy in units of a sphere's by implicit finite elements.
 struct Row<'a> {
     of: &'a Segmented,
     treatment: (&'static str, &'static str),
     iterations: Option<usize>,
     volume: f64,
-    energies: (f64, Option<f64>),
+    energy: f64,
     surface: TriangleMesh,
 }
 
@@ -99,10 +98,7 @@ fn program(options: &Options) -> Result<(), Error> {
         .column("iterations", Shortest, |row| row.iterations)
         .measure("volume", ("volume, %", Fixed(4)), Row::change)
         .measure("w_over_8pi", ("w / 8 pi by elements", Fixed(3)), |row| {
-            row.energies.0
-        })
-        .measure("zero_set", ("by the zero set", Fixed(4)), |row| {
-            row.energies.1
+            row.energy
         })
         .measure(
             "displacement",
@@ -197,18 +193,13 @@ impl Segmented {
                     surface = surfaces::remeshed_surface(run.field(), case.scales.eps)?
                         .with_volume(volume, |_| true);
                 }
-                let zero_set = ZeroSet::of(&case.initial, case.scales.eps)?;
-                let holds = flow.is_some() && zero_set.curvatures_hold();
                 let elements = case.implicit_elements()?.willmore_energy(&case.initial)?;
                 Ok(Row {
                     of: self,
                     treatment: (key, words),
                     iterations,
                     volume,
-                    energies: (
-                        elements / (8.0 * PI),
-                        holds.then_some(zero_set.willmore_energy / (8.0 * PI)),
-                    ),
+                    energy: elements / (8.0 * PI),
                     surface,
                 })
             })
