@@ -337,7 +337,7 @@ fn every_mistake_is_one_clear_line() {
         (&["sample", "builtin:disc"], "sample needs --save"),
         (
             &["sample", "builtin:disc", "--save", "a.jpg"],
-            "must end in .png, .ply, .obj, .stl, .npy or .vti",
+            "must end in .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz",
         ),
         (
             &["sample", "builtin:disc", "--save", "a.ply"],
