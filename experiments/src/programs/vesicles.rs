@@ -134,7 +134,8 @@ fn crossing(pairs: &[Pair], energy: impl Fn(&Pair) -> f64) -> Option<f64> {
     let of = |branch| pairs.iter().filter(move |pair| pair.branch == branch);
     let both: Vec<[f64; 2]> = of("prolate")
         .filter_map(|prolate| {
-            let oblate = of("oblate").find(|oblate| oblate.ratio() == prolate.ratio())?;
+            let oblate = of("oblate")
+                .find(|oblate| oblate.ratio().to_bits() == prolate.ratio().to_bits())?;
             Some([prolate.ratio(), energy(prolate) - energy(oblate)])
         })
         .collect();
