@@ -96,8 +96,8 @@ pub fn candidates<const D: usize>(
     let previous: Vec<f64> = u.values().iter().map(|u| 0.99 * u).collect();
     let operator = Arc::new(MeanCurvatureOperator::<D>::new(network, device)?);
     let energy = |precision| -> Result<_, Error> {
-        let (operator, cells) = (operator.clone(), grid.cells());
-        let mut energy = MinimizingMovement::with_precision(operator, cells, precision, device)?;
+        let (operator, shape) = (operator.clone(), grid.shape());
+        let mut energy = MinimizingMovement::with_terms(operator, shape, precision, None, device)?;
         energy.set(&tensor(&previous), STIFFNESS)?;
         energy.evaluate(&tensor(u.values()))?;
         Ok(energy)

@@ -467,7 +467,7 @@ pub struct FairOptions {
     pub flow: FlowOptions,
 
     /// Take off noise of this standard deviation along the normals, in the units of the mesh [default: estimated from the mesh,
-    /// unless --time, --energy, --energy-ratio or --steps says when to stop; a segmentation flows for (1.5 voxels)^4, or until it has gone by .35 of a voxel]
+    /// unless --time, --energy, --energy-ratio or --steps says when to stop; a segmentation flows for (1.6 voxels)^4, or until it has gone by .35 of a voxel]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub noise: Option<f64>,
 

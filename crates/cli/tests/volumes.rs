@@ -54,7 +54,7 @@ fn a_ball_of_voxels_becomes_a_ball_of_their_volume() {
         "{ended}"
     );
     assert!(
-        (number(&ended, "energy_over_8_pi") - 1.0).abs() < 0.01,
+        (number(&ended, "energy_over_8_pi") - 1.0).abs() < 0.005,
         "{ended}"
     );
     let mesh = closed(&folder.path().join("ball.ply"));

@@ -145,7 +145,8 @@ fn learned<const D: usize>(
         Storage::Auto if case.needs_grid() => dense(),
         Storage::Auto => match bricks() {
             Ok(flow) if flow.stored_share() < PAYS => Ok(flow),
-            _ => dense(),
+            Ok(_) | Err(solver::Error::Model(_) | solver::Error::NoInterface) => dense(),
+            Err(error) => Err(error),
         },
     }
 }

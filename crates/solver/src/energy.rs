@@ -171,51 +171,25 @@ impl<const D: usize> MinimizingMovement<D> {
         cells: usize,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
-        Self::with_precision(step, cells, Precision::Device, device)
+        Self::with_terms(step, [cells; D], Precision::Device, None, device)
     }
 
-    /// As [`Self::new`], with Hessian-vector products in single precision if asked for and if the step allows it.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub fn with_precision(
-        step: Arc<dyn MeanCurvatureStep<D>>,
-        cells: usize,
-        products: Precision,
-        device: &ComputeDevice,
-    ) -> Result<Self, Error> {
-        Self::with_terms(step, cells, products, None, device)
-    }
-
-    /// As [`Self::with_precision`], with spontaneous curvature, tension and pressure.
+    /// As [`Self::new`], for tensors of any shape that the step takes, such as that of active bricks; with Hessian-vector products in single
+    /// precision if asked for and if the step allows it, and with spontaneous curvature, tension and pressure, if there are such.
     ///
     /// # Errors
     /// As [`Self::new`].
     pub fn with_terms(
         step: Arc<dyn MeanCurvatureStep<D>>,
-        cells: usize,
+        shape: [usize; D],
         products: Precision,
         terms: Option<&HelfrichTerms<D>>,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
-        Self::trace(step, [cells; D], products, (false, terms), device)
+        Self::trace(step, shape, products, (false, terms), device)
     }
 
-    /// As [`Self::with_precision`], for tensors of any shape that the step takes, such as that of active bricks.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub fn of_shape(
-        step: Arc<dyn MeanCurvatureStep<D>>,
-        shape: [usize; D],
-        products: Precision,
-        device: &ComputeDevice,
-    ) -> Result<Self, Error> {
-        Self::trace(step, shape, products, (false, None), device)
-    }
-
-    /// As [`Self::with_terms`], for tensors of any shape that the step takes; if `weighted`, with factors of the motion, which are 1 until
-    /// they are [set](Self::set_factors).
+    /// As [`Self::with_terms`]; if `weighted`, with factors of the motion, which are 1 until they are [set](Self::set_factors).
     pub(crate) fn trace(
         step: Arc<dyn MeanCurvatureStep<D>>,
         shape: [usize; D],

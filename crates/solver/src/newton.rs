@@ -37,8 +37,8 @@ pub struct NewtonParams {
     /// Reduction of the residual in each linear solve, in the norm of the preconditioner.
     pub cg_tolerance: f64,
     /// Linear solves end sooner where the residual says that they are nearer to their solution than this fraction of the motion.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub linear_accuracy: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub linear_accuracy: Option<f64>,
     /// Limit of linear iterations per Newton step.
     pub cg_iterations: usize,
     /// Limit of Newton steps.
@@ -49,21 +49,13 @@ pub struct NewtonParams {
     pub precision: Precision,
 }
 
-#[expect(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "the form that serde asks for"
-)]
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
-}
-
 impl Default for NewtonParams {
     fn default() -> Self {
         Self {
             method: Method::Preconditioned,
             tolerance: 0.02,
             cg_tolerance: 0.1,
-            linear_accuracy: 0.0,
+            linear_accuracy: None,
             cg_iterations: 600,
             newton_iterations: 60,
             cleanup_iterations: 4,
@@ -79,7 +71,7 @@ impl NewtonParams {
         Self {
             tolerance: 0.03,
             cg_tolerance: 0.1,
-            linear_accuracy: 0.003,
+            linear_accuracy: Some(0.003),
             ..Self::default()
         }
     }
@@ -92,6 +84,7 @@ impl NewtonParams {
         for (name, value) in [
             ("tolerance", self.tolerance),
             ("cg_tolerance", self.cg_tolerance),
+            ("linear_accuracy", self.linear_accuracy.unwrap_or(0.5)),
         ] {
             if !(value > 0.0 && value < 1.0) {
                 return Err(Error::Parameter {
@@ -508,9 +501,10 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         }
         while self.info.newton < self.params.newton_iterations {
             let motion = self.motion(&point)?;
+            let accuracy = self.params.linear_accuracy.unwrap_or(0.0);
             let limits = CgLimits {
                 tolerance: self.params.cg_tolerance,
-                least: self.params.linear_accuracy.powi(2) * motion * self.objective.unit(),
+                least: accuracy.powi(2) * motion * self.objective.unit(),
                 iterations: self.params.cg_iterations,
             };
             if let Some(preconditioner) = &mut self.preconditioner {

@@ -80,7 +80,8 @@ fn derivatives<const D: usize>(cells: usize) {
     let bricks = Bricks::new(cells, side, |place| !hole(place), |place| place[0] == 0).unwrap();
     let shape = bricks.shape();
     let step = Arc::new(operator.on(&bricks, &device));
-    let mut energy = MinimizingMovement::of_shape(step, shape, Precision::Device, &device).unwrap();
+    let mut energy =
+        MinimizingMovement::with_terms(step, shape, Precision::Device, None, &device).unwrap();
     let [u, anchor, p] = [1, 2, 3].map(|seed| noise(bricks.len(), seed));
     energy.set(&device.tensor(&anchor, shape), 40.0).unwrap();
     let at = |t: f64| -> Vec<f64> { u.iter().zip(&p).map(|(u, p)| u + t * p).collect() };

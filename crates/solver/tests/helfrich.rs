@@ -31,8 +31,8 @@ fn energy_with<const D: usize>(
     let device = device();
     let operator = MeanCurvatureOperator::new(network, &device).unwrap();
     let terms = HelfrichTerms::new(helfrich, 1.0, &params(grid), grid, &device).unwrap();
-    let (cells, precision) = (grid.cells(), Precision::Device);
-    MinimizingMovement::with_terms(Arc::new(operator), cells, precision, Some(&terms), &device)
+    let (shape, precision) = (grid.shape(), Precision::Device);
+    MinimizingMovement::with_terms(Arc::new(operator), shape, precision, Some(&terms), &device)
         .unwrap()
 }
 

@@ -27,7 +27,7 @@ const MARGIN: f64 = 3.0;
 const PART: f64 = 0.8;
 const FINE: f64 = 1.25;
 /// Time of the flow, and how far the surface may go, as `willmore fair` has them.
-const TIME: f64 = 5.0625;
+const TIME: f64 = 6.5536;
 const FARTHEST: f64 = 0.35;
 /// Factors of Taubin's and of Laplacian smoothing, and the most iterations.
 const TAUBIN: [f64; 2] = [0.5, -0.53];

@@ -16,7 +16,7 @@ use crate::own::{Noise, OwnMesh};
 const BALL: f64 = 1.2 * 8.0 * PI;
 
 /// Of a segmentation, details of so many voxels are taken for its steps,
-const STEPS: f64 = 1.5;
+const STEPS: f64 = 1.6;
 /// as long as the surface goes no further than so many, root of the mean square.
 const FARTHEST: f64 = 0.35;
 

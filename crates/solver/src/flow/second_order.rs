@@ -223,7 +223,7 @@ fn anchor<const D: usize>(
 /// The part of a displacement in anchors that are displaced by `further` on the interface of `u`.
 fn displaced_part<const D: usize>(further: &Field<D>, u: &Field<D>) -> f64 {
     /// The displacement of the anchor, in units of `4 eps / 3`, at which both count alike.
-    const ALIKE: f64 = 0.05;
+    const ALIKE: f64 = 0.02;
     let longest = largest(further, u);
     longest * longest / (longest * longest + ALIKE * ALIKE)
 }
