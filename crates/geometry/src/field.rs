@@ -101,29 +101,6 @@ impl<const D: usize> Field<D> {
         })
     }
 
-    /// The Laplacian by centred differences of second order, periodic.
-    #[must_use]
-    pub fn laplacian(&self) -> Self {
-        let (grid, values) = (&self.grid, &self.values);
-        let (cells, unit) = (grid.cells(), grid.spacing().powi(-2));
-        let at = |node: usize| {
-            let index = grid.multi_index(node);
-            let along = |axis: usize| {
-                let neighbour = |place: usize| {
-                    values[node + place * grid.stride(axis) - index[axis] * grid.stride(axis)]
-                };
-                let (after, before) =
-                    ((index[axis] + 1) % cells, (index[axis] + cells - 1) % cells);
-                neighbour(after) - 2.0 * values[node] + neighbour(before)
-            };
-            unit * (0..D).map(along).sum::<f64>()
-        };
-        Self {
-            grid: *grid,
-            values: (0..values.len()).into_par_iter().map(at).collect(),
-        }
-    }
-
     /// The periodic multilinear interpolant at `x`; NaN where `x` is not finite.
     pub fn interpolate(&self, x: [f64; D]) -> f64 {
         self.interpolate_with(x, |v| v)

@@ -55,15 +55,9 @@ impl<const D: usize> Active<D> {
         self.operator.on(&self.bricks, device)
     }
 
-    /// The values of a field of the whole grid on them.
-    pub(crate) fn gather(&self, field: &Field<D>) -> Vec<f64> {
-        self.bricks.gather(field.values())
-    }
-
-    /// The field of the whole grid.
-    pub(crate) fn scatter(&self, values: &[f64]) -> Result<Field<D>, Error> {
-        let values = self.bricks.scatter(values, self.operator.rests());
-        Ok(Field::from_values(self.grid, values)?)
+    /// The values of a phase field in the negative and in the positive phase, where nothing is stored.
+    pub(crate) fn rests(&self) -> [f64; 2] {
+        self.operator.rests()
     }
 
     /// Those near the interface of a field of the whole grid.

@@ -14,6 +14,7 @@ use crate::constraints::{Constraints, Held};
 use crate::newton::{NewtonInfo, NewtonParams, minimize_timed};
 use crate::preconditioner::{PhaseInverse, Preconditioner};
 use crate::region::Restricted;
+use crate::stored::Stored;
 use crate::times::PhaseTimes;
 use crate::{
     Accuracy, Error, Exit, Helfrich, HelfrichTerms, MeanCurvatureStep, MinimizingMovement,
@@ -210,7 +211,7 @@ pub struct WillmoreFlow<const D: usize> {
     /// The phase field one step ago and the size of that step.
     previous: Option<(Tensor<D>, f64)>,
     /// The rate of displacement at the end of the last step, if that was of second order.
-    rate: Option<Field<D>>,
+    rate: Option<Stored<D>>,
     step: usize,
     time: f64,
 }
@@ -242,7 +243,7 @@ impl<const D: usize> WillmoreFlow<D> {
     ) -> Result<Self, Error> {
         params.validate()?;
         let current = upload(initial, device)?;
-        Self::stored(
+        Self::begun(
             Arc::new(step),
             None,
             (initial.grid(), current),
@@ -273,12 +274,12 @@ impl<const D: usize> WillmoreFlow<D> {
         network.check_fits(params.ratios(grid, network.ratios().width))?;
         let operator = SeparableOperator::new(network, device)?;
         let active = Active::new(operator, initial, params.eps)?;
-        let current = device.tensor(&active.gather(initial), active.bricks().shape());
+        let current = Stored::part_of(initial, Some(active.clone()), active.rests()).tensor(device);
         let step = Arc::new(active.step(device));
-        Self::stored(step, Some(active), (grid, current), params, device)
+        Self::begun(step, Some(active), (grid, current), params, device)
     }
 
-    fn stored(
+    fn begun(
         mcf: Arc<dyn MeanCurvatureStep<D>>,
         active: Option<Active<D>>,
         (grid, current): (&Grid<D>, Tensor<D>),
@@ -376,9 +377,9 @@ impl<const D: usize> WillmoreFlow<D> {
         )
     }
 
-    /// Which part of the grid is stored: all of it, or that of the active bricks.
-    pub fn stored_share(&self) -> f64 {
-        self.current.shape().num_elements() as f64 / self.grid.len() as f64
+    /// How many cells of the phase field are stored: those of the grid, or of the active bricks.
+    pub fn stored_cells(&self) -> usize {
+        self.current.shape().num_elements()
     }
 
     /// The phase field now, on the device: on the whole grid, or on its active [`operators::Bricks`].
@@ -406,7 +407,7 @@ impl<const D: usize> WillmoreFlow<D> {
         Ok(FlowState {
             current: self.field()?,
             previous,
-            rate: self.rate.clone(),
+            rate: self.rate.as_ref().map(Stored::field).transpose()?,
             half_motions: self.half_motions(),
             step: self.step,
             time: self.time,
@@ -418,8 +419,9 @@ impl<const D: usize> WillmoreFlow<D> {
     /// # Errors
     /// [`Error::Geometry`] for fields on another grid or with values that are not finite.
     pub fn restore(&mut self, state: &FlowState<D>) -> Result<(), Error> {
+        let grid = self.grid;
         let fitting = |field: &Field<D>| -> Result<Field<D>, Error> {
-            Ok(Field::from_values(self.grid, field.values().to_vec())?)
+            Ok(Field::from_values(grid, field.values().to_vec())?)
         };
         let current = fitting(&state.current)?;
         let previous = match &state.previous {
@@ -430,7 +432,10 @@ impl<const D: usize> WillmoreFlow<D> {
         let current = self.in_storage(&current);
         let previous = previous.map(|(u, tau)| (self.in_storage(&u), tau));
         let rate = match &state.rate {
-            Some(rate) => Some(Field::from_values(self.grid, rate.values().to_vec())?),
+            Some(rate) => {
+                let rate = fitting(rate)?;
+                Some(Stored::part_of(&rate, self.active.clone(), [0.0; 2]))
+            }
             None => None,
         };
         self.set_half_motions(&state.half_motions)?;

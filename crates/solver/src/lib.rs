@@ -94,6 +94,7 @@ mod preconditioner;
 mod region;
 mod samples;
 mod sparse;
+mod stored;
 mod times;
 
 pub use constraints::Constraints;

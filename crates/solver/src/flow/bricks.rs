@@ -5,9 +5,10 @@ use std::sync::Arc;
 use burn::tensor::Tensor;
 use geometry::Field;
 
-use super::{Minimum, Movement, WillmoreFlow, download};
+use super::{Minimum, Movement, WillmoreFlow};
 use crate::Error;
 use crate::active::Active;
+use crate::stored::Stored;
 
 impl<const D: usize> WillmoreFlow<D> {
     /// Minimizes the energy of a movement from the present phase field. If the interface comes near the edge of the active bricks, these are
@@ -74,6 +75,7 @@ impl<const D: usize> WillmoreFlow<D> {
             Some((u, tau)) => Some((carried(u)?, *tau)),
             None => None,
         };
+        self.rate = self.rate.as_ref().map(|rate| rate.on(&next));
         self.current = current;
         self.previous = previous;
         self.mcf = Arc::new(next.step(&self.device));
@@ -85,23 +87,20 @@ impl<const D: usize> WillmoreFlow<D> {
         Ok(before)
     }
 
-    /// A field of the whole grid as a tensor of what is stored.
+    /// A phase field that is stored as the present one is, for arithmetic.
+    pub(super) fn stored(&self, u: &Tensor<D>) -> Result<Stored<D>, Error> {
+        Stored::of(u, self.grid, self.active.clone(), &self.device)
+    }
+
+    /// What is stored of a phase field of the whole grid.
     pub(super) fn in_storage(&self, field: &Field<D>) -> Tensor<D> {
-        match &self.active {
-            Some(active) => {
-                let shape = active.bricks().shape();
-                self.device.tensor(&active.gather(field), shape)
-            }
-            None => self.device.tensor(field.values(), self.grid.shape()),
-        }
+        let rests = self.active.as_ref().map_or([-1.0, 1.0], Active::rests);
+        Stored::part_of(field, self.active.clone(), rests).tensor(&self.device)
     }
 
     /// The field of the whole grid of which `u` is stored.
     pub(super) fn on_grid(&self, u: &Tensor<D>) -> Result<Field<D>, Error> {
-        match &self.active {
-            Some(active) => active.scatter(&self.device.values(u.clone())?),
-            None => download(&self.grid, u, &self.device),
-        }
+        self.stored(u)?.field()
     }
 
     /// Refuses what active bricks cannot do.

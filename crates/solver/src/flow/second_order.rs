@@ -8,13 +8,13 @@
 
 use std::time::Instant;
 
-use geometry::Field;
 use serde::{Deserialize, Serialize};
 
 use super::{Minimum, Movement, StepRecord, WillmoreFlow};
 use crate::displacement::{
     curvature_weight, depth, displaced, displacement, metric_weight, on_interface, window,
 };
+use crate::stored::Stored;
 use crate::{Error, Start, StartKind};
 
 /// `gamma = 1 - 1/sqrt 2`: the size of a stage over that of the step.
@@ -38,8 +38,8 @@ pub struct StepEstimates {
 
 /// The rates of displacement of a step, in `atanh u` per time, at its stages.
 struct Rates<const D: usize> {
-    first: Field<D>,
-    second: Field<D>,
+    first: Stored<D>,
+    second: Stored<D>,
 }
 
 impl<const D: usize> WillmoreFlow<D> {
@@ -57,29 +57,27 @@ impl<const D: usize> WillmoreFlow<D> {
     ) -> Result<(StepRecord, bool), Error> {
         let clock = Instant::now();
         self.follow()?;
-        let before = self.field()?;
+        let before = self.stored(&self.current)?;
         let stage = GAMMA * tau;
 
-        let anticipated = self.anticipated(stage)?;
-        let start = before.zip_map(&limited(&anticipated), displaced)?;
+        let anticipated = self.anticipated(&before, stage);
+        let start = before.zip_map(&limited(&anticipated), displaced);
         let first = self.stage(&before, &anticipated, &start, stage)?;
-        let middle = self.on_grid(&first.u)?;
+        let middle = self.stored(&first.u)?;
 
-        let moved = middle.zip_map(&before, displacement)?;
+        let moved = middle.zip_map(&before, displacement);
         let further = moved.map(|y| FURTHER * y);
-        let anchor = anchor(&before, &middle, &further)?;
-        let start = middle.zip_map(&further, displaced)?;
+        let anchor = anchor(&before, &middle, &further);
+        let start = middle.zip_map(&further, displaced);
         let second = self.stage(&anchor, &moved, &start, stage)?;
-        let after = self.on_grid(&second.u)?;
+        let after = self.stored(&second.u)?;
 
-        let rate = |to: &Field<D>, from: &Field<D>| -> Result<Field<D>, Error> {
-            Ok(to.zip_map(from, |u, v| displacement(u, v) / stage)?)
-        };
+        let rate = |to: &Stored<D>, from| to.zip_map(from, |u, v| displacement(u, v) / stage);
         let rates = Rates {
-            first: rate(&middle, &before)?,
-            second: rate(&after, &anchor)?,
+            first: rate(&middle, &before),
+            second: rate(&after, &anchor),
         };
-        let estimates = self.estimates([&before, &middle, &after], &rates, tau)?;
+        let estimates = self.estimates([&before, &middle, &after], &rates, tau);
         let record = self.second_order_record(tau, &first, &second, estimates, clock);
         let accepted = accept(&record);
         if accepted {
@@ -95,39 +93,38 @@ impl<const D: usize> WillmoreFlow<D> {
     /// One stage: the minimization from an anchor, weighted for the displacement that is expected of it.
     fn stage(
         &mut self,
-        anchor: &Field<D>,
-        expected: &Field<D>,
-        start: &Field<D>,
+        anchor: &Stored<D>,
+        expected: &Stored<D>,
+        start: &Stored<D>,
         tau: f64,
     ) -> Result<Minimum<D>, Error> {
         let long = displaced_part(&expected.map(|y| FURTHER * y), start);
-        let factors = self.in_storage(&self.factors(expected, start, long)?);
-        let (anchor, start) = (self.in_storage(anchor), self.in_storage(start));
+        let factors = self.factors(expected, start, long).tensor(&self.device);
         self.minimize(&Movement {
-            anchor: &anchor,
+            anchor: &anchor.tensor(&self.device),
             factors: Some(&factors),
-            start: &start,
+            start: &start.tensor(&self.device),
             tau,
         })
     }
 
     /// Square roots of the weights with which the `L2` metric measures displacements, where `end` is about where these `expected` ones lead, and
     /// anchors are displaced by the part `long`.
-    fn factors(&self, expected: &Field<D>, end: &Field<D>, long: f64) -> Result<Field<D>, Error> {
+    fn factors(&self, expected: &Stored<D>, end: &Stored<D>, long: f64) -> Stored<D> {
         // The mean curvature is minus the Laplacian of the depth.
         let unit = 4.0 * self.params.eps / 3.0;
         let curvature = end.map(|u| unit * depth(u)).laplacian();
-        let curvature = curvature.zip_map(end, |laplacian, u| -window(u) * laplacian)?;
-        Ok(expected.zip_map(&curvature, |y, h| {
+        let curvature = curvature.zip_map(end, |laplacian, u| -window(u) * laplacian);
+        expected.zip_map(&curvature, |y, h| {
             (metric_weight(y) * curvature_weight(long * h * unit * y)).sqrt()
-        })?)
+        })
     }
 
-    /// The displacement in the time `tau` at the rate of the last step, on the interface.
-    fn anticipated(&self, tau: f64) -> Result<Field<D>, Error> {
+    /// The displacement in the time `tau` at the rate of the last step, on the interface of the present phase field.
+    fn anticipated(&self, now: &Stored<D>, tau: f64) -> Stored<D> {
         match &self.rate {
-            Some(rate) => Ok(rate.zip_map(&self.field()?, |rate, u| rate * window(u) * tau)?),
-            None => Ok(Field::constant(self.grid, 0.0)),
+            Some(rate) => rate.zip_map(now, |rate, u| rate * window(u) * tau),
+            None => now.map(|_| 0.0),
         }
     }
 
@@ -138,35 +135,34 @@ impl<const D: usize> WillmoreFlow<D> {
     /// `tau |b_0 F_0 + (b_1 - 1 + gamma) F_1 + (b_2 - gamma) F_2|`.
     fn estimates(
         &self,
-        [before, middle, after]: [&Field<D>; 3],
+        [before, middle, after]: [&Stored<D>; 3],
         rates: &Rates<D>,
         tau: f64,
-    ) -> Result<StepEstimates, Error> {
+    ) -> StepEstimates {
         const FIRST: f64 = 1.0 / (6.0 * GAMMA * (1.0 - GAMMA));
         const SECOND: f64 = (2.0 - 3.0 * GAMMA) / (6.0 * (1.0 - GAMMA));
         /// Steps that have no estimate.
         const WITHOUT: usize = 3;
         let unit = 4.0 * self.params.eps / 3.0;
-        let between = |to: &Field<D>, from: &Field<D>| -> Result<f64, Error> {
-            Ok(unit * largest(&to.zip_map(from, displacement)?, middle))
-        };
+        let between =
+            |to: &Stored<D>, from| unit * largest(&to.zip_map(from, displacement), middle);
         let error = match &self.rate {
             Some(start) if self.step >= WITHOUT => {
                 let stages = rates.first.zip_map(&rates.second, |first, second| {
                     (FIRST - 1.0 + GAMMA) * first + (SECOND - GAMMA) * second
-                })?;
+                });
                 let error = stages.zip_map(start, |stages, start| {
                     tau * (stages + (1.0 - FIRST - SECOND) * start)
-                })?;
+                });
                 Some(unit * largest(&error, middle))
             }
             _ => None,
         };
-        Ok(StepEstimates {
+        StepEstimates {
             error,
-            motion: between(after, before)?,
-            displacement: between(middle, before)?.max(between(after, middle)?),
-        })
+            motion: between(after, before),
+            displacement: between(middle, before).max(between(after, middle)),
+        }
     }
 
     fn second_order_record(
@@ -208,20 +204,20 @@ impl<const D: usize> WillmoreFlow<D> {
 /// displaced phase field the scheme is of second order as far as the metric's weights are exact, with a linear one it is where profiles do not
 /// matter. Either is used where its error is the smaller one, and the order stays two.
 fn anchor<const D: usize>(
-    before: &Field<D>,
-    middle: &Field<D>,
-    further: &Field<D>,
-) -> Result<Field<D>, Error> {
+    before: &Stored<D>,
+    middle: &Stored<D>,
+    further: &Stored<D>,
+) -> Stored<D> {
     let part = displaced_part(further, middle);
-    let along = before.zip_map(further, displaced)?;
-    let straight = before.zip_map(middle, |u, v| u + FURTHER * (v - u))?;
-    Ok(along.zip_map(&straight, |along, straight| {
+    let along = before.zip_map(further, displaced);
+    let straight = before.zip_map(middle, |u, v| u + FURTHER * (v - u));
+    along.zip_map(&straight, |along, straight| {
         straight + part * (along - straight)
-    })?)
+    })
 }
 
 /// The part of a displacement in anchors that are displaced by `further` on the interface of `u`.
-fn displaced_part<const D: usize>(further: &Field<D>, u: &Field<D>) -> f64 {
+fn displaced_part<const D: usize>(further: &Stored<D>, u: &Stored<D>) -> f64 {
     /// The displacement of the anchor, in units of `4 eps / 3`, at which both count alike.
     const ALIKE: f64 = 0.02;
     let longest = largest(further, u);
@@ -229,16 +225,13 @@ fn displaced_part<const D: usize>(further: &Field<D>, u: &Field<D>) -> f64 {
 }
 
 /// The largest size of a displacement on the interface of `u`.
-fn largest<const D: usize>(displacement: &Field<D>, u: &Field<D>) -> f64 {
-    let values = displacement.values().iter().zip(u.values());
-    let on = values.filter(|(_, u)| on_interface(**u) > 0.5);
-    on.fold(0.0, |most: f64, (y, _)| most.max(y.abs()))
+fn largest<const D: usize>(displacement: &Stored<D>, u: &Stored<D>) -> f64 {
+    let on = displacement.zip_map(u, |y, u| if on_interface(u) > 0.5 { y } else { 0.0 });
+    on.largest()
 }
 
 /// The displacements, scaled down so that none is longer than a start may anticipate.
-fn limited<const D: usize>(displacement: &Field<D>) -> Field<D> {
-    let values = displacement.values().iter();
-    let longest = values.fold(0.0, |most: f64, y| most.max(y.abs()));
-    let factor = (FARTHEST / longest.max(FARTHEST)).min(1.0);
+fn limited<const D: usize>(displacement: &Stored<D>) -> Stored<D> {
+    let factor = FARTHEST / displacement.largest().max(FARTHEST);
     displacement.map(|y| factor * y)
 }

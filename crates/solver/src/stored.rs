@@ -1,0 +1,208 @@
+//! Arithmetic of fields node by node, on what is stored of them.
+
+use burn::tensor::Tensor;
+use geometry::{Field, Grid};
+use operators::ComputeDevice;
+use rayon::prelude::*;
+
+use crate::Error;
+use crate::active::Active;
+use crate::nodes::Nodes;
+
+/// The values of a field on the whole grid, or on active bricks, with the constants that it has outside.
+#[derive(Clone)]
+pub(crate) struct Stored<const D: usize> {
+    grid: Grid<D>,
+    active: Option<Active<D>>,
+    values: Vec<f64>,
+    /// The values in the negative and in the positive phase where nothing is stored.
+    rests: [f64; 2],
+}
+
+impl<const D: usize> Stored<D> {
+    /// A phase field that is stored in this way.
+    pub(crate) fn of(
+        u: &Tensor<D>,
+        grid: Grid<D>,
+        active: Option<Active<D>>,
+        device: &ComputeDevice,
+    ) -> Result<Self, Error> {
+        Ok(Self {
+            grid,
+            rests: active.as_ref().map_or([-1.0, 1.0], Active::rests),
+            active,
+            values: device.values(u.clone())?,
+        })
+    }
+
+    /// A field of the whole grid, as far as it is stored; `rests` elsewhere.
+    pub(crate) fn part_of(field: &Field<D>, active: Option<Active<D>>, rests: [f64; 2]) -> Self {
+        let values = match &active {
+            Some(active) => active.bricks().gather(field.values()),
+            None => field.values().to_vec(),
+        };
+        Self {
+            grid: *field.grid(),
+            active,
+            values,
+            rests,
+        }
+    }
+
+    /// The field on the whole grid.
+    pub(crate) fn field(&self) -> Result<Field<D>, Error> {
+        let values = match &self.active {
+            Some(active) => active.bricks().scatter(&self.values, self.rests),
+            None => self.values.clone(),
+        };
+        Ok(Field::from_values(self.grid, values)?)
+    }
+
+    pub(crate) fn tensor(&self, device: &ComputeDevice) -> Tensor<D> {
+        let whole = || self.grid.shape();
+        let shape = (self.active.as_ref()).map_or_else(whole, |active| active.bricks().shape());
+        device.tensor(&self.values, shape)
+    }
+
+    /// The same field on other bricks.
+    pub(crate) fn on(&self, active: &Active<D>) -> Self {
+        let Some(own) = &self.active else {
+            return self.clone();
+        };
+        let (bricks, rests) = (active.bricks(), self.rests);
+        Self {
+            values: bricks.carried(own.bricks(), &self.values, rests),
+            active: Some(active.clone()),
+            ..*self
+        }
+    }
+
+    pub(crate) fn map(&self, f: impl Fn(f64) -> f64 + Sync) -> Self {
+        Self {
+            grid: self.grid,
+            active: self.active.clone(),
+            values: self.values.par_iter().map(|&x| f(x)).collect(),
+            rests: self.rests.map(f),
+        }
+    }
+
+    /// A function of two fields, on the larger one of their sets of bricks, which holds the other.
+    pub(crate) fn zip_map(&self, other: &Self, f: impl Fn(f64, f64) -> f64 + Sync) -> Self {
+        let carried = |from: &Self, to: &Self| Some(from.on(to.active.as_ref()?));
+        let (left, right) = match self.values.len().cmp(&other.values.len()) {
+            std::cmp::Ordering::Less => (carried(self, other), None),
+            std::cmp::Ordering::Equal => (None, None),
+            std::cmp::Ordering::Greater => (None, carried(other, self)),
+        };
+        let (left, right) = (
+            left.as_ref().unwrap_or(self),
+            right.as_ref().unwrap_or(other),
+        );
+        let pairs = left.values.par_iter().zip(&right.values);
+        Self {
+            grid: self.grid,
+            active: left.active.clone(),
+            values: pairs.map(|(&a, &b)| f(a, b)).collect(),
+            rests: [0, 1].map(|phase| f(left.rests[phase], right.rests[phase])),
+        }
+    }
+
+    /// The Laplacian by centred differences of second order, periodic.
+    pub(crate) fn laplacian(&self) -> Self {
+        let values = match &self.active {
+            Some(active) => self.laplacian_at(&**active.bricks()),
+            None => self.laplacian_at(&self.grid),
+        };
+        Self {
+            grid: self.grid,
+            active: self.active.clone(),
+            values,
+            rests: [0.0; 2],
+        }
+    }
+
+    fn laplacian_at(&self, nodes: &impl Nodes<D>) -> Vec<f64> {
+        let unit = self.grid.spacing().powi(-2);
+        let at = |node: usize| {
+            let place = nodes.place(node);
+            let along = |axis: usize| {
+                let [before, after] = [false, true].map(|forward| {
+                    let beside = nodes.beside(node, place, axis, forward);
+                    beside.map_or_else(|phase| self.rests[usize::from(phase)], |k| self.values[k])
+                });
+                after - 2.0 * self.values[node] + before
+            };
+            unit * (0..D).map(along).sum::<f64>()
+        };
+        (0..nodes.count()).into_par_iter().map(at).collect()
+    }
+
+    /// The largest size of a value.
+    pub(crate) fn largest(&self) -> f64 {
+        let sizes = self.values.iter().map(|value| value.abs());
+        sizes.fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use geometry::phase_field;
+    use geometry::shapes::Ball;
+    use model::{Ratios, SeparableOperator, Shipped};
+
+    const EPS: f64 = 1.0 / 32.0;
+
+    fn disc(radius: f64) -> (Field<2>, Active<2>) {
+        let device = ComputeDevice::default_compiled().unwrap();
+        let grid = Grid::centred(128, 2.0).unwrap();
+        let ratios = Ratios::of_run(2, 17, grid.spacing(), EPS, grid.spacing().powi(2));
+        let network = Shipped::Accurate.find(ratios).unwrap();
+        let operator = SeparableOperator::new(&network, &device).unwrap();
+        let disc = phase_field(grid, &Ball::new([0.0; 2], radius).unwrap(), EPS).unwrap();
+        let active = Active::new(operator, &disc, EPS).unwrap();
+        (disc, active)
+    }
+
+    /// Of the same fields on the whole grid the results have the same bits on the bricks.
+    #[test]
+    fn results_on_bricks_are_those_on_the_grid() {
+        let (disc, active) = disc(0.5);
+        let (bricks, rests) = (active.bricks().clone(), active.rests());
+        let part = Stored::part_of(&disc, Some(active), rests);
+        let whole = Stored::part_of(&part.field().unwrap(), None, rests);
+        assert!(part.values.len() < whole.values.len());
+        let same = |part: &Stored<2>, whole: &Stored<2>| {
+            assert_eq!(part.values, bricks.gather(&whole.values));
+        };
+        same(&part.map(f64::sinh), &whole.map(f64::sinh));
+        same(&part.laplacian(), &whole.laplacian());
+        let mixed = |x: &Stored<2>| x.zip_map(&x.map(|u| 1.0 - u * u), |u, v| u + 3.0 * v);
+        same(&mixed(&part), &mixed(&whole));
+        assert_eq!(
+            mixed(&part).field().unwrap(),
+            mixed(&whole).field().unwrap()
+        );
+        assert!((part.laplacian().largest() - whole.laplacian().largest()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn fields_on_fewer_bricks_are_continued_by_their_constants() {
+        let ((small, few), (_, many)) = (disc(0.3), disc(0.6));
+        let rests = few.rests();
+        let u = Stored::part_of(&small, Some(few), rests);
+        let v = u.on(&many);
+        assert!(v.values.len() > u.values.len());
+        // Where those bricks are none of its own, the field is nearly constant.
+        let outer = Stored::part_of(&small, Some(many), rests);
+        let difference = outer.zip_map(&v, |a, b| a - b);
+        assert!(difference.largest() < 2e-4, "{}", difference.largest());
+        // Nothing remains of a difference to itself, whichever of both has more bricks.
+        for nothing in [u.zip_map(&v, |a, b| a - b), v.zip_map(&u, |a, b| a - b)] {
+            assert_eq!(
+                (nothing.values.len(), nothing.largest()),
+                (v.values.len(), 0.0)
+            );
+        }
+    }
+}
