@@ -44,6 +44,7 @@ pub mod quality;
 pub mod session;
 pub mod sheet;
 pub mod steps;
+pub mod storages;
 pub mod study;
 pub mod surfaces;
 pub mod timing;

@@ -608,4 +608,14 @@ fn the_quick_performance_run_measures_planes_and_solids() {
     }
     let table = fs::read_to_string(root.path().join("out/steps.md")).unwrap();
     assert!(table.contains("cube, n = 24"));
+    // Both storages make the same flow.
+    for n in [32, 40] {
+        let [dense, bricks] = ["dense", "bricks"].map(|storage| {
+            let name = |name: &str| metric(&format!("armadillo.n{n}.{storage}.{name}"));
+            assert!(name("active_cells") <= f64::from(n).powi(3) && name("seconds") > 0.0);
+            (name("w"), name("hvp_per_step"))
+        });
+        assert!((dense.0 / bricks.0 - 1.0).abs() < 1e-5 && dense.1 > 0.0 && bricks.1 > 0.0);
+    }
+    assert!(metric("hvp.armadillo.n40.bricks_over_dense") > 0.0);
 }

@@ -214,7 +214,8 @@ pub struct SchemeOptions {
     #[arg(long, value_name = "FILE")]
     pub network: Option<PathBuf>,
 
-    /// What of the phase field is stored: dense, the whole grid; bricks, what is near the surface; or auto [default: dense]
+    /// What of the phase field is stored: dense, the whole grid; bricks, what is near the surface; auto, bricks where they are less than half of
+    /// the grid [default: auto]
     #[arg(long, value_name = "WHAT", value_enum, hide_possible_values = true)]
     pub storage: Option<Storage>,
 }

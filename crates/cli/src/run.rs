@@ -118,6 +118,13 @@ impl<O> Plan<O> {
         O: Outlet<D>,
     {
         let interrupt = Interrupt::catch()?;
+        let (nodes, stored) = (run.case().grid().len(), run.stored_cells());
+        if stored < nodes {
+            let percent = 100.0 * stored as f64 / nodes as f64;
+            self.say.note(&format!(
+                "storage: bricks near the surface, {percent:.0} % of the grid (--storage)"
+            ));
+        }
         let folder = store.directory().path().to_owned();
         let steps = run.case().stops.iter().find_map(|stop| match stop {
             Stop::Steps(steps) => Some(*steps as u64),
@@ -204,6 +211,7 @@ impl<O> Plan<O> {
                 "spacing": case.grid().spacing(),
                 "origin": case.grid().origin().to_vec(),
                 "interface_width": eps,
+                "stored_nodes": run.stored_cells(),
             },
             "shortened_steps": run.records().iter().filter(|record| record.halvings > 0).count(),
         });

@@ -51,6 +51,21 @@ pub enum Error {
         /// Why the last attempt failed.
         source: Box<solver::Error>,
     },
+    /// A flow for which the memory is too small.
+    #[error(
+        "the flow needs about {needed:.1} GB of memory with {cells} cells a side, and {available:.1} GB are free: take at most {fitting}, \
+         or store bricks instead of the whole grid"
+    )]
+    Memory {
+        /// Cells along a side of the grid.
+        cells: usize,
+        /// The memory that the flow needs, in GB.
+        needed: f64,
+        /// The memory that is free, in GB.
+        available: f64,
+        /// With so many cells along a side it fits.
+        fitting: usize,
+    },
     /// Two runs whose nodes cannot be compared.
     #[error(
         "a run with {cells} cells per side cannot be compared with a reference with {reference}: the latter must be a multiple, in the \

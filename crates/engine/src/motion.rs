@@ -114,6 +114,14 @@ impl<const D: usize> Motion<D> {
         }
     }
 
+    /// How many cells of the phase field are stored now, where that need not be all.
+    pub(crate) fn stored_cells(&self) -> Option<usize> {
+        match &self.flow {
+            Either::Willmore(flow) => Some(flow.stored_cells()),
+            Either::MeanCurvature(_) => None,
+        }
+    }
+
     /// All that the following steps depend on, after so many minimizations or steps and at this time.
     pub(crate) fn state(&self, count: usize, time: f64) -> Result<FlowState<D>, solver::Error> {
         match &self.flow {
@@ -133,19 +141,31 @@ fn learned<const D: usize>(
     case: &Case<D>,
     network: &Network,
     device: &ComputeDevice,
-) -> Result<WillmoreFlow<D>, solver::Error> {
+) -> Result<WillmoreFlow<D>, Error> {
     /// Bricks that are more than this part of the grid do not pay.
     const PAYS: f64 = 0.5;
     let (initial, params) = (&case.initial, case.params());
-    let dense = || WillmoreFlow::with_network(network, initial, params, device);
-    let bricks = || WillmoreFlow::on_bricks(network, initial, params, device);
+    let (cells, nodes) = (case.grid().cells(), case.grid().len());
+    let dense = || {
+        Storage::check(cells, D as u32, nodes)?;
+        Ok(WillmoreFlow::with_network(
+            network, initial, params, device,
+        )?)
+    };
+    let bricks = || {
+        let flow = WillmoreFlow::on_bricks(network, initial, params, device)?;
+        Storage::check(cells, D as u32, flow.stored_cells())?;
+        Ok(flow)
+    };
     match case.operator.storage {
         Storage::Dense => dense(),
         Storage::Bricks => bricks(),
         Storage::Auto if case.needs_grid() => dense(),
         Storage::Auto => match bricks() {
-            Ok(flow) if flow.stored_share() < PAYS => Ok(flow),
-            Ok(_) | Err(solver::Error::Model(_) | solver::Error::NoInterface) => dense(),
+            Ok(flow) if (flow.stored_cells() as f64) < PAYS * nodes as f64 => Ok(flow),
+            Ok(_) | Err(Error::Solver(solver::Error::Model(_) | solver::Error::NoInterface)) => {
+                dense()
+            }
             Err(error) => Err(error),
         },
     }

@@ -313,6 +313,12 @@ impl<const D: usize> Run<D> {
         self.records.last().map_or(0.0, |last| last.time)
     }
 
+    /// How many cells of the phase field are stored now: all of the grid, or those of the bricks near the surface.
+    pub fn stored_cells(&self) -> usize {
+        let stored = self.motion.stored_cells();
+        stored.unwrap_or_else(|| self.case.grid().len())
+    }
+
     /// Work of the linear solves inside finite elements so far; none for a learned operator.
     pub fn statistics(&self) -> Option<fem::Statistics> {
         self.motion.statistics()

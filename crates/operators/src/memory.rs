@@ -44,6 +44,16 @@ pub fn peak_mib() -> Option<f64> {
     Some(kib / 1024.0)
 }
 
+/// Bytes of memory that programs could still take without swapping, where the system tells.
+pub fn available() -> Option<f64> {
+    let info = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = info
+        .lines()
+        .find(|line| line.starts_with("MemAvailable:"))?;
+    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib * 1024.0)
+}
+
 /// Pages of memory that the system has handed to this process so far, where it tells. While vectors are recycled, there are none.
 pub fn pages() -> Option<u64> {
     let stat = std::fs::read_to_string("/proc/self/stat").ok()?;

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use crate::networks::{NetworkOptions, convergence_network};
 use crate::prelude::*;
+use crate::storages::{self, StorageOptions, Stored};
 use crate::timing::{self, Numbers, Timed};
 use crate::{products, surfaces};
 use geometry::SignedDistanceExt;
@@ -19,7 +20,8 @@ const TIGHTER: f64 = 100.0;
 
 /// Cost of Willmore steps by the hybrid scheme on this machine: the cross of the paper (128 steps, eps = 2^-6, tau = tautilde =
 /// 2^-14) at n = 128, 256 and 512, and in 3D a cube at n = 64 and a blob at n = 128 (eps = 2h, tautilde = h^2, tau = 2^-18).
-/// Hessian-vector products through Burn, by hand, and their Fourier transforms alone take turns in the same run.
+/// Hessian-vector products through Burn, by hand, and their Fourier transforms alone take turns in the same run. Then the armadillo
+/// (eps = 2h, 16 steps of the accurate scheme, tau = 64 h^4 doubled after every step) on the whole grid and on bricks near the surface.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
 struct Options {
@@ -28,6 +30,9 @@ struct Options {
 
     #[command(flatten)]
     networks: NetworkOptions,
+
+    #[command(flatten)]
+    storage: StorageOptions,
 
     /// Seconds for the comparison of products on each grid
     #[arg(long, value_name = "SECONDS", default_value_t = 5.0)]
@@ -137,7 +142,28 @@ fn program(options: &Options) -> Result<(), Error> {
     session.sheet(products, "products")?;
     session.output.write_json("performance.json", &all)?;
     session.figure(figure(&all), "performance")?;
+    let stored = options.storage.measure(&options.networks, &mut session)?;
+    write_storages(&stored, &mut session)?;
     session.finish("Willmore steps by the hybrid scheme on this machine")
+}
+
+/// The table, metrics and figure of the two storages.
+fn write_storages(stored: &[Stored], session: &mut Session<'_>) -> Result<(), Error> {
+    let sheet = Sheet::of(stored)
+        .keyed(|row, name| format!("{row}.{name}"))
+        .text("n", |row| row.n.to_string())
+        .text("storage", |row| row.storage.to_string())
+        .numbers(&storages::COLUMNS, |row| &row.numbers);
+    session.sheet(sheet, "storages")?;
+    for (n, ratio) in storages::product_ratios(stored) {
+        session.metric(&format!("hvp.armadillo.n{n}.bricks_over_dense"), ratio)?;
+    }
+    for name in ["seconds", "peak_mib", "active_cells"] {
+        if let Some(exponent) = storages::exponent(stored, name) {
+            session.metric(&format!("exponent.bricks.{name}"), exponent)?;
+        }
+    }
+    session.figure(storages::figure(stored), "storages")
 }
 
 /// A cube of side 1/2, or a body with arms: a ball with three capsules through it.

@@ -12,7 +12,7 @@ pub mod sample;
 pub mod shell;
 pub mod train;
 
-use engine::{Method, Operator, Scales, Scheme};
+use engine::{Method, Operator, Scales, Scheme, Storage};
 use geometry::Grid;
 use model::Networks;
 use operators::{ComputeDevice, DeviceKind};
@@ -55,6 +55,6 @@ pub fn operator<const D: usize>(
         Scheme::Paper
     };
     let mut operator = Operator::new((method, scheme), &networks, &needed, grid, &scales)?;
-    operator.storage = options.storage.unwrap_or_default();
+    operator.storage = options.storage.unwrap_or(Storage::Auto);
     Ok((scales, operator))
 }

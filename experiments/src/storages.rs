@@ -1,0 +1,204 @@
+//! What a surface costs by what is stored of its phase field: the whole grid, or bricks near the surface.
+
+use std::fmt;
+use std::time::Instant;
+
+use clap::Args;
+use engine::Storage;
+use operators::memory;
+
+use crate::meshes::{ARMADILLO, Loaded, MeshOptions};
+use crate::networks::NetworkOptions;
+use crate::prelude::*;
+use crate::surfaces::{centred_box, needed_network, scales, willmore_flow};
+use crate::timing::{Numbers, Timed};
+
+/// Steps of the paper's armadillo,
+const STEPS: usize = 16;
+/// and its first one, `2^-22` at `n = 128`, in units of `h^4`.
+const FIRST_STEP: f64 = 64.0;
+/// From here on exponents are fitted.
+const COARSEST_FITTED: usize = 128;
+
+#[derive(Args, Clone, Debug)]
+pub struct StorageOptions {
+    #[command(flatten)]
+    mesh: MeshOptions,
+
+    /// Cells per unit length of the armadillo, separated by commas
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [64, 128, 256, 512])]
+    surface_cells: Vec<usize>,
+
+    /// Finest grid of the armadillo that is stored as a whole
+    #[arg(long, value_name = "N", default_value_t = 256)]
+    dense_up_to: usize,
+}
+
+/// What was measured at one resolution with one storage.
+#[derive(Serialize)]
+pub struct Stored {
+    pub n: usize,
+    pub storage: Storage,
+    /// Wall time of all steps, with all that the engine does between minimizations; work, memory and cells.
+    pub numbers: Numbers,
+}
+
+/// Columns of the table.
+pub const COLUMNS: [(&str, Format, &str); 8] = [
+    ("steps and parts of steps", Shortest, "steps"),
+    ("all steps [s]", Fixed(1), "seconds"),
+    ("HVP/step", Fixed(1), "hvp_per_step"),
+    ("ms/HVP", Fixed(2), "ms_per_product"),
+    ("stored cells", Shortest, "active_cells"),
+    ("of the grid", Fixed(3), "active_share"),
+    ("peak memory [MiB]", Fixed(0), "peak_mib"),
+    ("Willmore energy", Fixed(3), "w"),
+];
+
+impl StorageOptions {
+    /// Lets the armadillo flow on both storages at every resolution; the built-in figure in a quick run, or if it is not here.
+    pub fn measure(
+        &self,
+        networks: &NetworkOptions,
+        session: &mut Session<'_>,
+    ) -> Result<Vec<Stored>, Error> {
+        let networks = networks.load(&[needed_network()])?;
+        let network = networks.find(Scheme::Accurate, &needed_network())?;
+        let mut operator = Operator::learned(Scheme::Accurate, network)?;
+        let mut measured = Vec::new();
+        for n in self.resolutions(session.options.quick) {
+            for storage in [Storage::Dense, Storage::Bricks] {
+                if storage == Storage::Dense && n > self.dense_up_to {
+                    continue;
+                }
+                operator.storage = storage;
+                measured.push(self.flow(n, operator.clone(), session)?);
+            }
+        }
+        Ok(measured)
+    }
+
+    fn resolutions(&self, quick: bool) -> Vec<usize> {
+        if quick {
+            vec![32, 40]
+        } else {
+            self.surface_cells.clone()
+        }
+    }
+
+    fn mesh(&self, grid: &Grid<3>, quick: bool) -> Result<Loaded, Error> {
+        let procedural = self.mesh.procedural || quick;
+        let options = MeshOptions {
+            procedural,
+            ..self.mesh.clone()
+        };
+        options.load_or_built_in(&ARMADILLO, grid)
+    }
+
+    fn flow(
+        &self,
+        n: usize,
+        operator: Operator,
+        session: &mut Session<'_>,
+    ) -> Result<Stored, Error> {
+        let (storage, quick) = (operator.storage, session.options.quick);
+        let name = format!("armadillo, n = {n}, {storage}");
+        memory::release_freed();
+        memory::forget_peak();
+        let grid = centred_box(n, self.mesh.box_side(&ARMADILLO))?;
+        let mesh = self.mesh(&grid, quick)?;
+        let initial = session.phase(format!("{name}: signed distance"), |stage| {
+            mesh.phase_field(grid, scales(n).eps, &stage.bar)
+        })?;
+        drop(mesh);
+        let first = FIRST_STEP * grid.spacing().powi(4);
+        let time = (StepRule::Doubling(first), if quick { 2 } else { STEPS });
+        let mut case = willmore_flow("armadillo", initial, operator, scales(n), time);
+        case.measures.clear();
+        // Where limbs come off, long steps fail, and are made in parts.
+        case.steps.first_substep = Some(first);
+        let mut timed = Timed::new(case, &session.device)?;
+        let cells = timed.run.stored_cells() as f64;
+        let seconds = session.phase(format!("{name}: steps"), |stage| {
+            let clock = Instant::now();
+            while timed.step(&stage.bar)? {}
+            Ok(clock.elapsed().as_secs_f64())
+        })?;
+        let mut numbers = timed.numbers();
+        numbers.extend([
+            ("seconds", seconds),
+            ("active_cells", cells),
+            ("active_share", cells / grid.len() as f64),
+        ]);
+        let last = timed.minimizations().last();
+        numbers.extend(last.map(|made| ("w", made.willmore_energy)));
+        numbers.extend(memory::peak_mib().map(|peak| ("peak_mib", peak)));
+        Ok(Stored {
+            n,
+            storage,
+            numbers,
+        })
+    }
+}
+
+impl fmt::Display for Stored {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "armadillo.n{}.{}", self.n, self.storage)
+    }
+}
+
+/// Hessian-vector products on bricks over those on the whole grid, by resolution.
+pub fn product_ratios(measured: &[Stored]) -> impl Iterator<Item = (usize, f64)> {
+    let of = |n, storage| {
+        let mut rows = measured.iter().filter(move |row| row.n == n);
+        rows.find(|row| row.storage == storage)
+    };
+    measured.iter().filter_map(move |dense| {
+        let bricks = of(dense.n, Storage::Bricks)?;
+        let [ours, theirs] = [bricks, dense].map(|row| row.numbers["ms_per_product"]);
+        (dense.storage == Storage::Dense).then_some((dense.n, ours / theirs))
+    })
+}
+
+/// The exponent of a number on bricks in `n`, by least squares of logarithms over the resolutions from 128 on, of which there must be two.
+pub fn exponent(measured: &[Stored], name: &str) -> Option<f64> {
+    let rows = measured.iter().filter(|row| row.storage == Storage::Bricks);
+    let rows = rows.filter(|row| row.n >= COARSEST_FITTED);
+    let points: Vec<[f64; 2]> = rows
+        .filter_map(|row| Some([(row.n as f64).ln(), row.numbers.get(name)?.ln()]))
+        .collect();
+    let count = points.len() as f64;
+    let [x, y] = [0, 1].map(|axis| points.iter().map(|p| p[axis]).sum::<f64>() / count);
+    let squares = points.iter().map(|p| (p[0] - x).powi(2)).sum::<f64>();
+    let products = points.iter().map(|p| (p[0] - x) * (p[1] - y)).sum::<f64>();
+    (points.len() > 1).then(|| products / squares)
+}
+
+/// Seconds and memory against `n`, a colour for each storage.
+pub fn figure(measured: &[Stored]) -> Figure {
+    let panel = |title: &str, y: &str, name: &str| {
+        let chart = LineChart::new(title, Axis::log("cells per unit length n"), Axis::log(y));
+        [Storage::Dense, Storage::Bricks]
+            .into_iter()
+            .fold(chart, |chart, storage| {
+                let rows = measured.iter().filter(|row| row.storage == storage);
+                let point = |row: &Stored| Some([row.n as f64, *row.numbers.get(name)?]);
+                let points: Vec<_> = rows.filter_map(point).collect();
+                let series = Series::new(storage.to_string(), points);
+                chart.with_series(series.with_marker(Marker::Circle))
+            })
+    };
+    let fitted = exponent(measured, "seconds").map(|exponent| {
+        format!(" On bricks seconds grow like n to the power {exponent:.2} from n = {COARSEST_FITTED} on.")
+    });
+    Figure::new("The armadillo on the whole grid and on bricks", 3)
+        .with_panel(panel("time", "all steps [s]", "seconds"))
+        .with_panel(panel("memory", "largest memory [MiB]", "peak_mib"))
+        .with_panel(panel("size", "stored cells", "active_cells"))
+        .with_shared_legend()
+        .with_note(format!(
+            "{STEPS} steps of Willmore flow, tau = 64 h⁴ doubled after every step, eps = 2h; {} threads.{}",
+            rayon::current_num_threads(),
+            fitted.unwrap_or_default()
+        ))
+}
