@@ -41,7 +41,7 @@ const ELEMENTS: [[f64; 2]; 2] = [[2.0, 1.0], [4.0, 4.0]];
 /// tells good networks from bad ones.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
 
@@ -54,11 +54,7 @@ struct Options {
     install: Option<PathBuf>,
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.run;
     let networks = options.networks()?;
     let device = run.open_device()?;

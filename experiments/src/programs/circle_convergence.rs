@@ -19,7 +19,7 @@ const SHOWN_STEPS: [usize; 5] = [1, 8, 16, 32, 64];
 /// steps of 2^-14: L2 distance to the exact solution over time, mean over the radii 0.05 pi + 0.15 pi i/30.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     study: StudyOptions,
 
@@ -45,11 +45,7 @@ impl Options {
     }
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.study.run;
     let (all, steps) = if run.quick {
         (4, 8)

@@ -33,17 +33,13 @@ const DRAWN: u32 = 420;
 /// and by Laplacian smoothing with the number of iterations that comes nearest to the clean mesh: distances, normals and volumes.
 #[derive(Parser, Debug)]
 #[command(name = "denoising", version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
 
     /// Denoise this clean mesh too (OBJ, PLY or STL); can be repeated [default: the meshes of scripts/fetch_meshes, where they are here]
     #[arg(long, value_name = "FILE")]
     mesh: Vec<PathBuf>,
-}
-
-pub fn main() -> ExitCode {
-    harness::main(program)
 }
 
 /// A clean mesh.
@@ -84,7 +80,7 @@ struct Quality {
     volume: f64,
 }
 
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let device = options.run.open_device()?;
     let quick = options.run.quick;
     let noises = if quick { &NOISES[..1] } else { &NOISES };

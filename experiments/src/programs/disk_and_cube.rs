@@ -31,7 +31,7 @@ const VIEW: View = View {
 /// nested implicit finite elements: pictures, Willmore energies w and L2 distances after 0, 1 and 100 steps.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     figure: FigureOptions,
 
@@ -60,11 +60,7 @@ impl Options {
     }
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let [radius, half_height] = THICK_DISK;
     let run = &options.figure.run;
     let steps = (options.steps).unwrap_or(if run.quick { 2 } else { STEPS });

@@ -22,16 +22,12 @@ const CELLS: usize = 128;
 /// exact elastic curves, for several isoperimetric quotients.
 #[derive(Parser, Debug)]
 #[command(name = "elastica", version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
 }
 
-pub fn main() -> ExitCode {
-    harness::main(|options: &Options| program(&options.run))
-}
-
-fn program(options: &RunOptions) -> Result<(), Error> {
+pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
     let count = if options.quick { 1 } else { QUOTIENTS.len() };
     let parameters = json!({ "n": CELLS, "eps_over_h": 2, "quotients": QUOTIENTS[..count], "radius": RADIUS, "side": SIDE });
     let device = options.open_device()?;

@@ -39,7 +39,7 @@ const GREEN: Rgb = Rgb(0, 140, 60);
 /// The paper has n = 1024; eps = 4/n and tautilde = 4/n^2.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     common: InpaintingOptions,
 
@@ -79,11 +79,7 @@ fn shapes(quick: bool) -> Result<[Shape<2>; 2], Error> {
     Ok([disk, cross])
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.common.figure.run;
     let n = options.common.figure.cells(CELLS);
     let grid = Grid::<2>::per_unit(n, 1.0)?.with_origin([-0.5; 2])?;

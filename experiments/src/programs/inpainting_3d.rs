@@ -42,7 +42,7 @@ const GREEN: Rgb = Rgb(0, 140, 60);
 /// nothing moves any more. The paper has n = 128; eps = 2/n and tautilde = 1/n^2.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     common: InpaintingOptions,
 
@@ -96,11 +96,7 @@ fn growing(papers: usize) -> StepRule {
     }
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.common.figure.run;
     let extra_steps = options.extra_steps;
     require(

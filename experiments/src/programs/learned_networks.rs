@@ -16,7 +16,7 @@ const PROGRAM: &str = "learned_networks";
 /// Kernels, activations, transfer functions and quality of the learned operators for n = 128, 256, 512.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
 
@@ -24,11 +24,7 @@ struct Options {
     networks: NetworkOptions,
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.run;
     let mut specs = NetworkSpec::convergence();
     specs.truncate(if run.quick { 1 } else { specs.len() });

@@ -13,7 +13,7 @@ use surfaces::{ClosedMesh, MeshDistance};
 /// that the longest side of its bounding box has the given length, and its bounding box is centred at (0.5, 0.5, 0.5).
 #[derive(Parser, Debug)]
 #[command(name = "mesh_distance", version)]
-struct Options {
+pub struct Options {
     /// The mesh: OBJ, STL or PLY
     #[arg(long, value_name = "FILE")]
     mesh: PathBuf,
@@ -35,11 +35,7 @@ struct Options {
     quiet: bool,
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let (path, output) = (options.mesh.display(), options.output.display());
     let extension = options.output.extension().map(OsStr::to_ascii_lowercase);
     let volume = extension.as_ref().is_some_and(|name| name == "vti");

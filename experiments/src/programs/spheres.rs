@@ -28,7 +28,7 @@ const PAPERS: (Method, Scheme) = (Method::Hybrid, Scheme::Paper);
 /// flow, tau = 2^-18, which leaves spheres alone.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     figure: FigureOptions,
 }
@@ -75,11 +75,7 @@ fn variants() -> impl Iterator<Item = (Method, Scheme)> {
     look::variants(|(method, scheme)| method.schemes(Flow::MeanCurvature).contains(&scheme))
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.figure.run;
     let radii = if run.quick { &RADII[2..4] } else { &RADII };
     let willmore_steps = if run.quick { 2 } else { WILLMORE_STEPS };

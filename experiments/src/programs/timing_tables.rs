@@ -22,7 +22,7 @@ const PAPERS: &str = "paper, other machines [s]";
 /// inner iterations. Rows that exceed the budget are extrapolated from the steps done, and say so.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
 
@@ -112,11 +112,7 @@ const COLUMNS: [(&str, Format, &str); 4] = [
     ("Cholesky/step", Fixed(1), "factorizations_per_step"),
 ];
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let (run, quick) = (&options.run, options.run.quick);
     require(
         options.budget.is_finite() && options.budget > 0.0,

@@ -33,7 +33,7 @@ enum Recipe {
 /// Trains the networks: n = 128, 256, 512 of the convergence tests, the one for inpainting, and the one for surfaces in 3D.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
 
@@ -64,11 +64,7 @@ impl Recipe {
     }
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.run;
     let chosen = options.chosen()?;
     require(options.adam_epochs > 0, "--adam-epochs must be at least 1")?;

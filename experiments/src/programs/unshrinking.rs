@@ -41,13 +41,9 @@ const DRAWN: u32 = 420;
 /// nearest to the shape: volumes, energies, displacements.
 #[derive(Parser, Debug)]
 #[command(name = "unshrinking", version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
-}
-
-pub fn main() -> ExitCode {
-    harness::main(program)
 }
 
 /// A shape as voxels, whose sides are the unit of length.
@@ -71,7 +67,7 @@ struct Row<'a> {
     surface: TriangleMesh,
 }
 
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let full = usize::from(!options.run.quick);
     let device = options.run.open_device()?;
     let parameters = json!({ "bodies": BODIES, "wrong": WRONG, "time": TIME, "taubin": TAUBIN, "laplacian": LAPLACIAN, "iterations": ITERATIONS });

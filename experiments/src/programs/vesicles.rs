@@ -37,13 +37,9 @@ const RUNS: [(Branch, &str, &[f64], f64, f64); 2] = [
 /// along the reduced volume, against exact axisymmetric equilibria; the phase diagram.
 #[derive(Parser, Debug)]
 #[command(name = "vesicles", version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     figure: FigureOptions,
-}
-
-pub fn main() -> ExitCode {
-    harness::main(program)
 }
 
 /// A vesicle of the flow and the exact one.
@@ -53,7 +49,7 @@ struct Pair {
     exact: Vesicle,
 }
 
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.figure.run;
     let (count, steps) = if run.quick {
         (1, Some(2))

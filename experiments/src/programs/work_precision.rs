@@ -64,13 +64,9 @@ fn steppings(quick: bool) -> Vec<Stepping> {
 /// the exact flow of the curves: largest distances, tips, areas, lengths and energies, and the Hessian-vector products they cost.
 #[derive(Parser, Debug)]
 #[command(name = "work_precision", version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
-}
-
-pub fn main() -> ExitCode {
-    harness::main(|options: &Options| program(&options.run))
 }
 
 /// A run at a mark.
@@ -83,7 +79,7 @@ struct Compared {
     reached: Reached,
 }
 
-fn program(options: &RunOptions) -> Result<(), Error> {
+pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
     let used = if options.quick { 1 } else { usize::MAX };
     let marks: Vec<usize> = MARKS.into_iter().take(used).collect();
     let cells: Vec<usize> = CELLS.into_iter().take(used).collect();
