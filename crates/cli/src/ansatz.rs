@@ -11,18 +11,15 @@ use crate::error::Error;
 /// What the inpainted region holds at the beginning.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ansatz {
-    /// What the input has there.
     Keep,
     /// Nothing.
     Empty,
     /// All inside.
     Full,
-    /// A shape.
     Shape(Region),
 }
 
 impl Ansatz {
-    /// The phase field with the ansatz in the region.
     pub fn put_into<const D: usize>(
         &self,
         mut field: Field<D>,

@@ -15,6 +15,7 @@ use surfaces::shapes::Region;
 use crate::ansatz::Ansatz;
 use crate::commands::check_eps_over_h;
 use crate::error::Error;
+use crate::outlet::MESHES;
 use crate::volume::Label;
 
 const EXIT_CODES: &str = "Exit codes: 0 success; 2 bad input or failure, one line on standard error; 130 interrupted (Ctrl-C): \
@@ -489,33 +490,13 @@ pub struct FairOptions {
     pub allow_loss: bool,
 
     /// Format of the mesh in the run's folder [default: that of the input]
-    #[arg(long, value_name = "NAME", value_enum)]
-    pub format: Option<MeshFormat>,
+    #[arg(long, value_name = "NAME", value_parser = MESHES)]
+    pub format: Option<String>,
 
     /// Whether an option other than --noise says when to stop.
     #[arg(skip)]
     #[serde(skip)]
     pub ends: bool,
-}
-
-/// Formats of meshes.
-#[derive(ValueEnum, Serialize, Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[serde(rename_all = "kebab-case")]
-pub enum MeshFormat {
-    #[default]
-    Ply,
-    Obj,
-    Stl,
-}
-
-impl fmt::Display for MeshFormat {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Ply => "ply",
-            Self::Obj => "obj",
-            Self::Stl => "stl",
-        })
-    }
 }
 
 /// Options of `inpaint`.

@@ -8,7 +8,6 @@ use surfaces::TriangleMesh;
 use crate::error::Error;
 use crate::outlet;
 
-/// Pixels a side of the surface.
 const PIXELS: u32 = 640;
 /// Bars of the histogram, and their width in the figure.
 const BARS: usize = 40;

@@ -8,10 +8,11 @@ pub enum Error {
     /// Options that contradict each other or the input.
     #[error("{0}")]
     Options(String),
-    /// An option of a configuration file.
+    /// What clap says, which may be the help that was asked for.
+    #[error(transparent)]
+    Typed(#[from] clap::Error),
     #[error("{}: {message}", path.display())]
     Config { path: PathBuf, message: String },
-    /// The system refused.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
         action: &'static str,
@@ -62,12 +63,10 @@ impl From<engine::Error> for Error {
 }
 
 impl Error {
-    /// Bad options.
     pub fn options(message: impl Into<String>) -> Self {
         Self::Options(message.into())
     }
 
-    /// What the system refused.
     pub fn io(
         action: &'static str,
         path: impl Into<PathBuf>,
@@ -80,7 +79,6 @@ impl Error {
         }
     }
 
-    /// What is wrong with a mesh.
     pub fn mesh(error: surfaces::Error) -> Self {
         use surfaces::Error::{MixedOrientation, Nesting, NonManifold, Open};
         match error {

@@ -22,11 +22,8 @@ use crate::volume::{self, Voxels};
 
 /// What a run starts from.
 pub struct Start<const D: usize, O> {
-    /// Name for the folder of the run.
     pub name: String,
-    /// The phase field.
     pub field: Field<D>,
-    /// How it is shown.
     pub outlet: O,
     /// The nodes that move, if not all.
     pub region: Option<Vec<bool>>,
@@ -34,9 +31,7 @@ pub struct Start<const D: usize, O> {
 
 /// What a run starts from, in the dimension of the input.
 pub enum Loaded {
-    /// In the plane.
     Plane(Start<2, Plane>, ImageFrame),
-    /// In space.
     Space(Start<3, Space>),
 }
 
@@ -52,7 +47,6 @@ enum Source<'a> {
     Region(Region),
 }
 
-/// Least resolution.
 const FEWEST_CELLS: usize = 8;
 /// Most nodes of a grid: beyond, a flow needs more than 100 GiB.
 const MOST_NODES: f64 = 1e9;
@@ -91,7 +85,6 @@ pub fn absolute(path: impl AsRef<Path>) -> Result<PathBuf, Error> {
     std::path::absolute(path).map_err(Error::io("find", path))
 }
 
-/// The extension of a file in lower case.
 pub fn extension(path: &Path) -> String {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
     extension.to_ascii_lowercase()
@@ -139,7 +132,6 @@ pub fn mesh_file(options: &mut InputOptions) -> Result<Option<PathBuf>, Error> {
     })
 }
 
-/// Whether the input is a volume of voxels.
 pub fn is_volume(options: &InputOptions) -> Result<bool, Error> {
     let source = options.input.as_deref().map(Source::of).transpose()?;
     Ok(matches!(source, Some(Source::Volume(_))))
@@ -277,7 +269,6 @@ impl Source<'_> {
         }
     }
 
-    /// A name for folders.
     fn name(&self) -> String {
         let path = match self {
             Self::BuiltIn(name) => return (*name).to_owned(),
@@ -291,7 +282,6 @@ impl Source<'_> {
         stem.replace(other, "_")
     }
 
-    /// Options that say nothing about this input.
     fn refuse_foreign(&self, options: &InputOptions) -> Result<(), Error> {
         let what = match self {
             Self::Mesh(_) => "a mesh",
@@ -329,7 +319,6 @@ impl Source<'_> {
     }
 }
 
-/// What inputs are read with.
 struct Reader<'a> {
     name: String,
     options: &'a mut InputOptions,

@@ -53,34 +53,20 @@ fn in_place() -> Result<Placement<3>, Error> {
     Ok(Placement::about([0.0; 3], 1.0)?)
 }
 
-/// What there is to take off.
-#[derive(Clone, Copy)]
-pub enum Noise {
-    /// Nothing: the flow ends for another reason, and vertices simply follow.
-    None,
-    /// Noise of this standard deviation.
-    Of(f64),
-    /// As much as the mesh seems to have.
-    Estimated,
-}
-
 impl OwnMesh {
-    /// Takes a mesh, and what noise is to be taken off. The texts are what there is to warn of.
+    /// Takes a mesh, and what noise is to be taken off, estimated unless it is given; without any vertices simply follow. The texts are what
+    /// there is to warn of.
     pub fn new(
         path: &Path,
         bytes: Vec<u8>,
-        noise: Noise,
+        noise: Option<f64>,
         keep: Option<String>,
     ) -> Result<(Self, Vec<String>), Error> {
         let mesh = surfaces::decode(&bytes, path)?;
         let (closed, warnings) = ClosedMesh::new(mesh.clone()).map_err(Error::mesh)?;
         let mut own = Self {
             file: format!("{INPUT}.{}", crate::input::extension(path)),
-            noise: match noise {
-                Noise::None => 0.0,
-                Noise::Of(length) => length,
-                Noise::Estimated => closed.mesh().noise(),
-            },
+            noise: noise.unwrap_or_else(|| closed.mesh().noise()),
             keeps_volume: false,
             mask: None,
             keep,

@@ -9,7 +9,6 @@ use render::{Picture, Rgb};
 use runs::{RunDirectory, StoredRun};
 use serde::{Deserialize, Serialize};
 
-use crate::cli::MeshFormat;
 use crate::error::Error;
 use crate::input::extension;
 use crate::outlet::{Outlet, Topology};
@@ -35,7 +34,6 @@ struct Original {
 }
 
 impl Plane {
-    /// In black on white.
     pub fn new(frame: Frame) -> Self {
         Self {
             frame,
@@ -155,7 +153,7 @@ impl Outlet<2> for Plane {
         u: &Field<2>,
         _: f64,
         stem: &str,
-        _: MeshFormat,
+        _: &str,
         run: &mut RunDirectory,
     ) -> Result<(), Error> {
         let name = format!("{stem}.svg");

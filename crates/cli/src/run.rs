@@ -17,35 +17,28 @@ use runs::{Interrupt, RunDirectory, StoredRun};
 use serde_json::{Value, json};
 use solver::StepEstimates;
 
-use crate::cli::{KeepOptions, MeshFormat, SayOptions};
+use crate::cli::{KeepOptions, SayOptions};
 use crate::config;
 use crate::error::Error;
 use crate::input::extension;
-use crate::outlet::{self, Outlet, Topology};
+use crate::outlet::{self, MESHES, Outlet, Topology};
 use crate::own::Faired;
 use crate::page;
 
 /// Everything about a run but its case.
 pub struct Plan<O> {
-    /// Name of the subcommand.
     pub command: &'static str,
-    /// Name of the input.
     pub name: String,
-    /// How the shape is shown.
     pub outlet: O,
-    /// What is kept.
     pub keep: KeepOptions,
-    /// Format of meshes.
-    pub format: Option<MeshFormat>,
-    /// What is printed.
+    /// The extension of meshes, if it is not the usual one.
+    pub format: Option<String>,
     pub say: SayOptions,
 }
 
-/// Time that a picture is shown.
 const DELAY: Duration = Duration::from_millis(200);
 
 impl<O> Plan<O> {
-    /// Starts a run, and goes on to its end.
     pub fn start<const D: usize>(
         &self,
         case: Case<D>,
@@ -170,7 +163,7 @@ impl<O> Plan<O> {
             u,
             eps,
             faired.as_ref(),
-            self.format,
+            self.format.as_deref(),
             directory,
         )?;
         if let Some(path) = self.keep.save.as_ref().filter(|_| has_interface(u)) {
@@ -347,15 +340,11 @@ impl<const D: usize, O: Outlet<D>> Observer<D> for Pictures<'_, O> {
         if !has_interface(u) {
             return Ok(());
         }
-        let Plan {
-            outlet,
-            keep,
-            format,
-            ..
-        } = self.plan;
+        let Plan { outlet, keep, .. } = self.plan;
         let mut write = || -> Result<(), Error> {
             if step == 0 {
-                outlet.write_shape(u, eps, outlet::START, format.unwrap_or_default(), run)?;
+                let format = self.plan.format.as_deref();
+                outlet.write_shape(u, eps, outlet::START, format.unwrap_or(MESHES[0]), run)?;
             }
             if keep.frames.is_some_and(|every| step.is_multiple_of(every)) {
                 let name = format!("{}/step-{step:06}", outlet::FRAMES);
@@ -400,7 +389,6 @@ fn free_folder(name: &str) -> PathBuf {
         .expect("some number is free")
 }
 
-/// A number of steps in words.
 fn counted(steps: u64) -> String {
     let plural = if steps == 1 { "" } else { "s" };
     format!("{steps} step{plural}")
@@ -438,7 +426,6 @@ fn series(run: &Path, records: &[Record]) -> String {
     text + "  </Collection>\n</VTKFile>\n"
 }
 
-/// The pictures in a folder, in the order of their names.
 fn frames(folder: &Path) -> Result<Vec<Picture>, Error> {
     let entries = std::fs::read_dir(folder).map_err(Error::io("read", folder))?;
     let mut paths: Vec<PathBuf> = entries

@@ -18,21 +18,18 @@ impl SayOptions {
         }
     }
 
-    /// Says what was mended.
     pub fn warn(self, what: &str) {
         if !self.quiet {
             eprintln!("warning: {what}");
         }
     }
 
-    /// Says what was chosen.
     pub fn note(self, what: &str) {
         if !self.quiet && !self.json {
             eprintln!("{what}");
         }
     }
 
-    /// Progress bars, if anybody wants to see them.
     pub fn progress(self) -> Progress {
         Progress::new(self.quiet || self.json)
     }

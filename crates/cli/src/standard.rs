@@ -58,7 +58,6 @@ impl Standard {
         Ok(standard)
     }
 
-    /// Writes what was saved to standard output.
     pub fn write(&self) -> Result<(), Error> {
         let Some(path) = self.output.as_ref().filter(|path| path.exists()) else {
             return Ok(());

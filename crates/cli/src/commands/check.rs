@@ -19,7 +19,6 @@ use crate::cli::{CheckOptions, SayOptions};
 use crate::error::Error;
 use crate::input::{self, Loaded};
 
-/// Steps of the Taylor tests.
 const STEPS: usize = 14;
 /// By how much an observed rate may be short of the expected one.
 const SHORT: f64 = 0.3;
@@ -135,11 +134,9 @@ fn findings<const D: usize>(
     Ok(findings)
 }
 
-/// The first and largest step of the Taylor tests.
 const FIRST_STEP: f64 = 0.25;
 
 struct Derivatives {
-    /// Steps and energies.
     values: Vec<(f64, f64)>,
     /// First and second derivative in one direction.
     along: [f64; 2],

@@ -6,11 +6,11 @@ use engine::{Scales, StepRule};
 use surfaces::Fairing;
 
 use super::flow::{FlowCommand, Shared};
-use crate::cli::{FairOptions, FlowOptions, MeshFormat, SayOptions, SizeTarget};
+use crate::cli::{FairOptions, FlowOptions, SayOptions, SizeTarget};
 use crate::error::Error;
 use crate::input::{self, Loaded, Start};
 use crate::keep::Keep;
-use crate::own::{Noise, OwnMesh};
+use crate::own::OwnMesh;
 
 /// Energies below this have only balls, which have `8 pi`.
 const BALL: f64 = 1.2 * 8.0 * PI;
@@ -128,18 +128,13 @@ impl FlowCommand for FairOptions {
             self.keep = Some(input::absolute(mask)?.to_string_lossy().into_owned());
         }
         let bytes = std::fs::read(&path).map_err(Error::io("read", &path))?;
-        let noise = match self.noise {
-            Some(noise) => Noise::Of(noise),
-            None if ends => Noise::None,
-            None => Noise::Estimated,
-        };
-        let estimated = matches!(noise, Noise::Estimated);
+        let noise = self.noise.or(ends.then_some(0.0));
         let (mut own, warnings) = OwnMesh::new(&path, bytes, noise, self.keep.clone())?;
         own.keeps_volume = self.flow.volume == Some(SizeTarget::Keep);
         for warning in warnings {
             say.warn(&format!("{}: {warning}", path.display()));
         }
-        if estimated {
+        if noise.is_none() {
             say.note(&format!(
                 "noise: {:.3e}, {:.3} % of the longest side, estimated (--noise)",
                 own.fairing().noise(),
@@ -183,7 +178,7 @@ impl FlowCommand for FairOptions {
         self.flow.rule(scales, unit)
     }
 
-    fn format(&self) -> Option<MeshFormat> {
-        self.format
+    fn format(&self) -> Option<String> {
+        self.format.clone()
     }
 }

@@ -15,7 +15,7 @@ use solver::NewtonParams;
 
 use super::{open_device, operator};
 use crate::cli::{
-    CommonOptions, FlowOptions, InputOptions, KeepOptions, MeshFormat, SayOptions, SchemeOptions,
+    CommonOptions, FlowOptions, InputOptions, KeepOptions, SayOptions, SchemeOptions,
     SizeTarget, Tolerance,
 };
 use crate::config;
@@ -32,19 +32,15 @@ const STEPS: usize = 20;
 const LONGEST_MOVE: f64 = 2.0;
 /// Steps over which sizes go to their targets.
 const RAMP: usize = 20;
-/// What can be saved.
 const SAVED: [&str; 5] = ["ply", "obj", "stl", "png", "svg"];
 
 /// A command that makes a run.
 pub trait FlowCommand: Serialize + Clone {
-    /// Its name.
     const NAME: &'static str;
-    /// The flow.
     const FLOW: Flow = Flow::Willmore;
     /// Steps of a run that ends at a time or an energy.
     const MANY_STEPS: usize = 1000;
 
-    /// Reads the input.
     fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
         let shared = self.shared();
         input::load(shared.input, shared.scheme.eps_over_h(), say)
@@ -60,10 +56,8 @@ pub trait FlowCommand: Serialize + Clone {
         None
     }
 
-    /// The options that all of them have.
     fn shared(&mut self) -> Shared<'_>;
 
-    /// How the inner step is made.
     fn method(&self) -> Method {
         Method::Hybrid
     }
@@ -87,13 +81,11 @@ pub trait FlowCommand: Serialize + Clone {
         None
     }
 
-    /// Format of meshes.
-    fn format(&self) -> Option<MeshFormat> {
+    fn format(&self) -> Option<String> {
         None
     }
 }
 
-/// Options of all commands that make runs.
 pub struct Shared<'a> {
     pub input: &'a mut InputOptions,
     pub scheme: &'a mut SchemeOptions,
@@ -239,7 +231,6 @@ impl Shared<'_> {
         Ok(())
     }
 
-    /// When the run ends.
     fn stops(&self, rule: StepRule) -> Vec<Stop> {
         let mut stops: Vec<Stop> = (self.steps.map(Stop::Steps).into_iter())
             .chain(self.time.map(Stop::Time))
@@ -315,7 +306,6 @@ fn each_label<C: FlowCommand>(
     Ok(ExitCode::SUCCESS)
 }
 
-/// A command with its device.
 struct Job<C> {
     command: C,
     device: ComputeDevice,

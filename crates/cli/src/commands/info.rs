@@ -10,7 +10,6 @@ use serde_json::json;
 use crate::cli::SayOptions;
 use crate::error::Error;
 
-/// Says what this program is made of and which devices work.
 pub fn run(say: SayOptions) -> Result<ExitCode, Error> {
     let version = env!("CARGO_PKG_VERSION");
     let mut devices = Vec::new();

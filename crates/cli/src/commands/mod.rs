@@ -30,7 +30,6 @@ pub fn open_device(options: &mut CommonOptions) -> Result<ComputeDevice, Error> 
     Ok(device)
 }
 
-/// Refuses widths of the interface that make no sense.
 pub fn check_eps_over_h(eps_over_h: f64) -> Result<(), Error> {
     if (0.5..=64.0).contains(&eps_over_h) {
         return Ok(());
@@ -40,7 +39,6 @@ pub fn check_eps_over_h(eps_over_h: f64) -> Result<(), Error> {
     )))
 }
 
-/// The scales of a grid, and the operator for them.
 pub fn operator<const D: usize>(
     options: &SchemeOptions,
     method: Method,

@@ -9,7 +9,6 @@ use serde_json::{Value, json};
 use crate::cli::{NetworksCommand, SayOptions};
 use crate::error::Error;
 
-/// Lists the networks, or shows one.
 pub fn run(show: Option<&NetworksCommand>, say: SayOptions) -> Result<ExitCode, Error> {
     let shipped = || -> Result<Vec<(String, Network)>, Error> {
         let all = Shipped::Accurate
@@ -59,7 +58,6 @@ fn about(name: &str, network: &Network) -> Value {
     })
 }
 
-/// The name of a network's file without its extension.
 fn stem(name: &str) -> String {
     name.trim_end_matches(".safetensors").to_owned()
 }

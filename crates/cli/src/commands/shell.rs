@@ -9,7 +9,6 @@ use clap_complete::Shell;
 use crate::cli::Cli;
 use crate::error::Error;
 
-/// Prints completions.
 pub fn completions(shell: Shell) -> ExitCode {
     let mut text = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "willmore", &mut text);

@@ -18,7 +18,6 @@ const CELLS: f64 = 128.0;
 /// Radii on which the quality is measured.
 const HELD_OUT: usize = 20;
 
-/// Trains a network by the accurate recipe and writes it to a file.
 pub fn run(mut options: TrainOptions, say: SayOptions) -> Result<ExitCode, Error> {
     let missing = |name: &str| {
         Error::options(format!(
