@@ -15,7 +15,6 @@ pub const EPS: f64 = 1.0 / 64.0;
 /// Time step `tau = tautilde = 2^-14` of both flows.
 pub const STEP: f64 = 1.0 / 16384.0;
 
-/// The scales of the convergence tests.
 pub fn scales() -> Scales {
     Scales {
         eps: EPS,
@@ -52,7 +51,6 @@ impl Chosen {
         }
     }
 
-    /// The network of a scheme with these ratios.
     pub fn find(&self, scheme: Scheme, needed: &NeededNetwork) -> Result<NamedNetwork, Error> {
         Ok(self.of(scheme).find(scheme.shipped(), needed)?)
     }

@@ -37,7 +37,6 @@ pub fn finish<const D: usize>(
 /// A run in a sequence in which a size, `h` or `tau`, is halved from one to the next.
 #[derive(Clone, Copy, Debug)]
 struct Refinement {
-    /// The size.
     size: f64,
     /// `L2` distance of its end to that of the finest run, which is small only as long as the finest run is much finer,
     to_finest: f64,

@@ -21,7 +21,6 @@ const COLUMNS: [(&str, Format, fn(&Quality) -> f64); 10] = [
     ("radial asymmetry", LOSS, |q| q.radial_asymmetry),
 ];
 
-/// Adds the columns of the quality to a table.
 pub fn columns<'a, R>(sheet: Sheet<'a, R>, of: impl Fn(&'a R) -> &'a Quality) -> Sheet<'a, R> {
     let add = |sheet: Sheet<'a, R>, (head, format, value): (_, _, fn(&Quality) -> f64)| {
         sheet.column::<f64>(head, format, |row| value(of(row)))

@@ -129,7 +129,6 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Adds metrics `KEY.NAME`.
     pub fn metrics<const N: usize>(
         &mut self,
         key: &str,
@@ -139,7 +138,6 @@ impl<'a> Session<'a> {
         metrics.try_for_each(|(name, value)| self.metric(&format!("{key}.{name}"), value))
     }
 
-    /// Adds a text to what is printed in the end.
     pub fn remark(&mut self, text: impl Into<String>) {
         self.report.push(text.into());
     }

@@ -8,13 +8,11 @@ use solver::StepRecord;
 
 use crate::Error;
 
-/// A run in a table of steps.
 pub struct Rows<'a> {
     /// Which run it is: a cell for each leading column.
     pub leading: Vec<Cell>,
     /// The measures of the initial phase field, if there is to be a row for them.
     pub start: Option<&'a Values>,
-    /// Its steps.
     pub records: &'a [Record],
 }
 

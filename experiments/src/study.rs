@@ -39,7 +39,6 @@ pub struct StudyOptions {
 }
 
 impl StudyOptions {
-    /// Resolutions in increasing order.
     pub fn cells(&self) -> Vec<usize> {
         let mut cells = match (&self.cells[..], self.run.quick, self.full) {
             ([], true, _) => vec![128],
@@ -74,13 +73,11 @@ impl StudyOptions {
     }
 }
 
-/// A curve in the figures of a study.
 #[derive(Serialize, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Variant {
     pub flow: Flow,
     pub method: Method,
     pub scheme: Scheme,
-    /// Cells per unit length.
     pub n: usize,
 }
 
@@ -88,7 +85,6 @@ impl Variant {
     /// Columns of tables that say which variant it is.
     pub const COLUMNS: [&str; 4] = ["flow", "n", "method", "scheme"];
 
-    /// Their cells.
     pub fn cells(&self) -> [Cell; 4] {
         let texts = [self.flow.key(), self.method.key(), self.scheme.key()];
         let [flow, method, scheme] = texts.map(Cell::from);
@@ -109,7 +105,6 @@ impl Variant {
         format!("n{}.{}", self.n, self.method.key_in(self.scheme))
     }
 
-    /// Name in legends.
     pub fn label(&self) -> String {
         self.method.label_in(self.scheme)
     }
@@ -123,7 +118,6 @@ impl Variant {
 /// What is compared with what, with all operators.
 pub struct Study {
     pub cells: Vec<usize>,
-    /// Variants with their operators.
     pub plan: Vec<(Variant, Operator)>,
     pub networks: Chosen,
 }
@@ -162,7 +156,6 @@ impl Study {
         self.plan.iter().filter_map(of).collect()
     }
 
-    /// The curve of a variant.
     pub fn series(&self, variant: Variant, points: Vec<[f64; 2]>) -> Series {
         look::curve(points, variant.look(), (variant.n, &self.cells))
     }

@@ -16,11 +16,8 @@ use crate::prelude::*;
 use crate::session::Stage;
 use crate::steps::steps_csv;
 
-/// Interface width of surfaces, in cells.
 const EPS_OVER_H: f64 = 2.0;
-/// Kernel width of the network for surfaces.
 const WIDTH: usize = 17;
-/// The usual side of a picture in pixels.
 const SIDE: u32 = 640;
 /// Colour of a surface where it may move, if it may not everywhere.
 const MOVING: Rgb = Rgb(150, 196, 160);
@@ -40,9 +37,7 @@ pub fn centred_box(n: usize, side: f64) -> Result<Grid<3>, Error> {
     Ok(Grid::per_unit(n, side)?.with_origin([0.5 - 0.5 * side; 3])?)
 }
 
-/// What surfaces at one resolution share.
 pub struct Setting {
-    /// Cells per unit length.
     pub n: usize,
     pub grid: Grid<3>,
     pub scales: Scales,
@@ -121,7 +116,6 @@ impl SchemeOptions {
 /// What is shown of a surface that flows.
 #[derive(Clone)]
 pub struct Surface {
-    /// Prefix of its metrics and files.
     pub key: &'static str,
     pub title: String,
     /// Steps to be shown, and the Willmore energies that the paper reports for them. Of a run that ends early the last one is shown.
@@ -139,31 +133,25 @@ const MEASURES: [(&str, &str, usize); 5] = [
     ("euler_characteristic", "Euler characteristic", 0),
 ];
 
-/// A shown step.
 pub struct Snapshot {
     pub step: usize,
     pub time: f64,
     measures: [f64; MEASURES.len()],
     /// The Willmore energy that the paper reports.
     paper: Option<f64>,
-    /// What stands below the picture.
     pub caption: String,
-    /// Curves drawn into the picture.
     pub tubes: Vec<Tube>,
 }
 
 impl Snapshot {
-    /// The Willmore energy.
     pub fn w(&self) -> f64 {
         self.measures[0]
     }
 }
 
-/// A surface that has flowed.
 pub struct Flowed {
     pub surface: Surface,
     pub trajectory: Trajectory<3>,
-    /// The shown steps.
     pub snapshots: Vec<Snapshot>,
     /// Largest resident memory of the process until the last step was done, in MiB, where the system tells.
     peak_mib: Option<f64>,
@@ -230,13 +218,11 @@ impl Flowed {
         })
     }
 
-    /// Name of the files of a step.
     fn file(&self, step: usize) -> String {
         let operator = self.trajectory.case.operator.key();
         format!("{}_{operator}_step{step:03}", self.surface.key)
     }
 
-    /// Name of method and scheme.
     pub fn label(&self) -> String {
         self.trajectory.case.operator.label()
     }
@@ -299,7 +285,6 @@ impl Flowed {
 pub struct SurfaceFlows {
     pub program: &'static str,
     pub title: String,
-    /// The surfaces with their initial phase fields.
     pub surfaces: Vec<(Surface, Field<3>)>,
     pub variants: Vec<(Method, Scheme)>,
     /// Sizes of the time steps, their number,

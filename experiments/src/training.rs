@@ -13,13 +13,10 @@ use serde_json::Value;
 use crate::Error;
 use crate::session::Stage;
 
-/// Least time between two checkpoints.
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(3);
 
-/// A network to be trained.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NetworkSpec {
-    /// Name in files and metrics.
     pub name: &'static str,
     pub ratios: Ratios,
     /// Cells per unit length of the training grid.
@@ -66,7 +63,6 @@ impl NetworkSpec {
         Self::named(|_| true)
     }
 
-    /// The networks of the paper's recipe.
     pub fn paper() -> Vec<Self> {
         Self::named(|name| name != "n64")
     }
@@ -97,7 +93,6 @@ pub fn training_device(device: &ComputeDevice) -> Result<ComputeDevice, Error> {
     Ok(ComputeDevice::open(kind)?)
 }
 
-/// Number of held-out radii for measuring quality.
 pub fn held_out_radii(quick: bool) -> usize {
     if quick { 4 } else { 20 }
 }

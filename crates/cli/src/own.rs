@@ -43,7 +43,6 @@ pub struct OwnMesh {
 #[derive(Debug)]
 struct Loaded {
     bytes: Vec<u8>,
-    /// As in the file.
     mesh: TriangleMesh,
     fairing: Fairing,
 }
@@ -151,7 +150,6 @@ impl OwnMesh {
         &self.loaded().fairing
     }
 
-    /// The longest side of its bounding box.
     pub fn longest_side(&self) -> f64 {
         self.fairing().rough().bounding_box().longest_side()
     }
@@ -173,7 +171,6 @@ impl OwnMesh {
         }))
     }
 
-    /// Parts and holes.
     pub fn topology(&self) -> Topology {
         Topology::of(self.fairing().rough())
     }
@@ -272,17 +269,14 @@ impl OwnMesh {
     }
 }
 
-/// What becomes of a mesh.
 pub struct Faired {
     /// The extension of files that keep everything.
     pub extension: String,
     file: Vec<u8>,
     mesh: TriangleMesh,
-    /// How far its vertices have gone.
     pub displacement: Figure,
     /// Parts and holes, which stay.
     pub topology: Topology,
-    /// What has changed.
     pub report: Value,
 }
 

@@ -27,7 +27,6 @@ const SURFACE_CELLS: usize = 64;
 /// Room for tori whose hole is some interface widths wide.
 const SURFACE_SIDE: f64 = 1.5;
 const BALLS: [f64; 3] = [0.2, 0.3, 0.34];
-/// Outer radii of the Clifford tori.
 const TORI: [f64; 3] = [0.40, 0.50, 0.60];
 
 /// The measurement's time step over the inner one: the interface hardly moves, and its profile relaxes all the same.
@@ -108,7 +107,6 @@ pub fn program(options: &Options) -> Result<(), Error> {
 }
 
 impl Options {
-    /// Networks under their file names.
     fn networks(&self) -> Result<Vec<NamedNetwork>, Error> {
         let shipped = [Shipped::Paper.all()?, Shipped::Accurate.all()?].concat();
         let shipped = shipped.into_iter().map(|(name, network)| NamedNetwork {
@@ -129,7 +127,6 @@ impl Options {
     }
 }
 
-/// A network under its name.
 #[derive(Clone)]
 struct Calibrated {
     named: NamedNetwork,
@@ -149,7 +146,6 @@ impl Calibrated {
         fits.then_some(n as usize)
     }
 
-    /// The odd part of the operator, calibrated anew.
     fn odd_part(&self) -> Result<Self, Error> {
         let mut odd = self.clone();
         odd.named.network = self.named.network.odd_part();
@@ -288,11 +284,9 @@ struct SurfaceRow {
     surface: String,
     /// Over the exact energy, without calibration.
     measured: f64,
-    /// The same with calibration.
     calibrated: f64,
 }
 
-/// Balls and Clifford tori.
 fn balls_and_tori(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<SurfaceRow>, Error> {
     let grid = Grid::<3>::per_unit(SURFACE_CELLS, SURFACE_SIDE)?;
     let scales = surfaces::scales(SURFACE_CELLS);
@@ -338,7 +332,6 @@ fn surfaces_table(rows: &[SurfaceRow]) -> Sheet<'_, SurfaceRow> {
         .column("calibrated w / exact", Fixed(4), |r| r.calibrated)
 }
 
-/// What tells good networks from bad ones.
 #[derive(Serialize)]
 struct Diagnostics {
     network: String,
@@ -346,7 +339,6 @@ struct Diagnostics {
     displacement: Vec<[f64; 2]>,
     /// Eigenvalues of `J` at the flat interface, real and imaginary parts.
     spectrum: Vec<[f64; 2]>,
-    /// `w` and `F''(w)`.
     bend: Vec<[f64; 2]>,
 }
 
@@ -409,7 +401,6 @@ fn diagnostics_figure(all: &[Diagnostics]) -> Figure {
         .with_shared_legend()
 }
 
-/// The finite-element steps of the experiments.
 fn elements() -> Result<Vec<(String, Calibration)>, Error> {
     let (plane, space) = (Grid::<2>::centred(16, 16.0)?, Grid::<3>::centred(8, 8.0)?);
     let mut all = Vec::new();

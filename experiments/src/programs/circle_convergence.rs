@@ -104,7 +104,6 @@ pub fn program(options: &Options) -> Result<(), Error> {
     session.finish("Mean L2 distance to the exact solution")
 }
 
-/// Turns the ensembles into files.
 struct Report {
     study: Study,
     ensembles: Vec<Ensemble>,
@@ -185,7 +184,6 @@ impl Report {
         })
     }
 
-    /// Work of each step.
     fn work(&self) -> [LineChart; 2] {
         let counts: [(&str, fn(&StepRecord) -> f64); 2] = [
             ("Hessian-vector products", StepRecord::hvp),

@@ -26,7 +26,6 @@ const SIDE: f64 = 0.9;
 const TAUBIN: [f64; 2] = [0.5, -0.53];
 const LAPLACIAN: [f64; 2] = [0.5, 0.0];
 const ITERATIONS: usize = 30;
-/// Side of a picture in pixels.
 const DRAWN: u32 = 420;
 
 /// Independent normally distributed noise along the normals of clean meshes, taken off by `willmore fair` at its defaults, by Taubin's
@@ -42,7 +41,6 @@ pub struct Options {
     mesh: Vec<PathBuf>,
 }
 
-/// A clean mesh.
 struct Clean {
     name: String,
     mesh: ClosedMesh,
@@ -62,7 +60,6 @@ struct Row<'a> {
 }
 
 impl Row<'_> {
-    /// Prefix of its metrics.
     fn key(&self) -> String {
         let method = self.method.to_lowercase();
         format!("{}.{method}", self.clean.key(self.noise))
@@ -74,9 +71,7 @@ impl Row<'_> {
 struct Quality {
     /// Root of the mean square distance of the vertices to the clean surface, in percent of the longest side.
     rms: f64,
-    /// Mean angle between corresponding faces, in degrees.
     normals: f64,
-    /// Change of the volume in percent.
     volume: f64,
 }
 
@@ -214,7 +209,6 @@ impl Clean {
         }
     }
 
-    /// The mesh with noise in percent of the longest side.
     fn with_noise(&self, percent: f64, seed: u64) -> TriangleMesh {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut noisy = self.mesh.mesh().clone();

@@ -11,7 +11,6 @@ use geometry::{SignedDistanceExt, UpAxis};
 const PROGRAM: &str = "disk_and_cube";
 /// Cells per unit length of a quick run and of the paper.
 const CELLS: [usize; 2] = [24, 64];
-/// Size of a time step.
 const TAU: f64 = 1.0 / 262_144.0;
 const STEPS: usize = 100;
 /// Half the side of the cube; the paper does not say, but this fits its initial energy.

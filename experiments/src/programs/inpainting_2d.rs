@@ -12,7 +12,6 @@ use solver::Precision;
 const PROGRAM: &str = "inpainting_2d";
 /// Cells per unit length of a quick run and of the paper.
 const CELLS: [usize; 2] = [256, 1024];
-/// Kernel width of the paper.
 const WIDTH: usize = 17;
 /// Interface width in cells: 2^-8 at n = 1024; `tautilde = eps^2 / 4`, as in the paper's other experiments.
 const EPS_OVER_H: f64 = 4.0;
@@ -20,7 +19,6 @@ const EPS_OVER_H: f64 = 4.0;
 const PRINTED_STEP: f64 = 1.0 / 16384.0;
 /// Inside the first step the shapes after `2^-k` of it are shown, for these `k`.
 const INSIDE: &[u32] = &[12, 9, 6, 3];
-/// Radius of the disk.
 const RADIUS: f64 = 0.35;
 /// The cut-out corner: everything right of and above this.
 const CORNER: f64 = 0.12;

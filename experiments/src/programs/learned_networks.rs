@@ -76,7 +76,6 @@ pub fn program(options: &Options) -> Result<(), Error> {
     session.finish("Quality of the learned operators")
 }
 
-/// A network with the curves that show it.
 struct Shown<'a> {
     spec: &'a NetworkSpec,
     network: &'a Network,
@@ -189,7 +188,6 @@ fn transfer_rows<'a>(
     (0..=n / 2).map(row).collect()
 }
 
-/// A thin black curve to compare with.
 fn thin(curve: Series, style: LineStyle) -> Series {
     let curve = curve.with_colour(Colour::Black);
     curve.with_style(style).with_width(1.5)

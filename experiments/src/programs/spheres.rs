@@ -20,7 +20,6 @@ const LAST: usize = MCF_STEPS.len() - 1;
 /// Steps of Willmore flow, which should leave spheres alone.
 const WILLMORE_STEPS: usize = 20;
 const TAU: f64 = 1.0 / 262_144.0;
-/// The hybrid scheme as in the paper.
 const PAPERS: (Method, Scheme) = (Method::Hybrid, Scheme::Paper);
 
 /// The network for surfaces on spheres, n = 64, eps = 2^-5, tautilde = 2^-12: L2 errors of mean curvature flow against
@@ -33,7 +32,6 @@ pub struct Options {
     figure: FigureOptions,
 }
 
-/// What was measured for one radius.
 #[derive(Serialize)]
 struct Measurement {
     radius: f64,
@@ -45,7 +43,6 @@ struct Measurement {
     willmore: Vec<Still>,
 }
 
-/// A sphere under Willmore flow.
 #[derive(Serialize)]
 struct Still {
     scheme: Scheme,
@@ -55,7 +52,6 @@ struct Still {
     w_relaxed: f64,
     /// Radius of the ball with the final volume, less that at the beginning, in cells.
     radius_change_over_h: f64,
-    /// Steps in which the energy rose.
     energy_increases: usize,
     hvp_per_step: f64,
 }
@@ -118,7 +114,6 @@ pub fn program(options: &Options) -> Result<(), Error> {
     session.finish(TITLE)
 }
 
-/// A ball with its setting.
 struct Sphere<'a> {
     setting: &'a Setting,
     device: &'a ComputeDevice,

@@ -41,7 +41,6 @@ pub struct Options {
     budget: f64,
 }
 
-/// A row of the table.
 struct Variant {
     key: &'static str,
     label: &'static str,
@@ -181,7 +180,6 @@ pub fn program(options: &Options) -> Result<(), Error> {
     session.finish("128 Willmore steps of the cross: wall time on this machine")
 }
 
-/// All rows at a resolution.
 fn measure(
     session: &mut Session<'_>,
     networks: &Chosen,
@@ -250,7 +248,6 @@ impl Timing {
         numbers
     }
 
-    /// Whether there is a time worth showing.
     fn usable(&self) -> bool {
         self.failure.is_none() && self.timed.run.steps() > 1
     }
@@ -264,7 +261,6 @@ impl Timing {
         self.row.papers_seconds.map(|seconds| seconds[column])
     }
 
-    /// How it was measured.
     fn measured(&self) -> String {
         let steps = self.timed.run.steps();
         match &self.failure {

@@ -16,7 +16,6 @@ use report::OutputDir;
 
 const PROGRAM: &str = "train_networks";
 
-/// How networks are trained.
 #[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 enum Recipe {
@@ -191,7 +190,6 @@ impl Trainings<'_> {
         Ok(())
     }
 
-    /// Curves, figure, metrics and table.
     fn write(self) -> Result<(), Error> {
         let (mut session, all) = (self.session, self.finished);
         session.figure(figure(&all), "learning_curves")?;
@@ -218,7 +216,6 @@ impl Trainings<'_> {
 }
 
 impl Finished {
-    /// Prefix of its metrics.
     fn key(&self) -> String {
         match self.recipe {
             Recipe::Lm => format!("train.{}", self.spec.name),

@@ -33,7 +33,6 @@ const FARTHEST: f64 = 0.35;
 const TAUBIN: [f64; 2] = [0.5, -0.53];
 const LAPLACIAN: [f64; 2] = [0.5, 0.0];
 const ITERATIONS: usize = 60;
-/// Side of a picture in pixels.
 const DRAWN: u32 = 420;
 
 /// A ball with wrong labels and a figure, as voxels: their surface by marching tetrahedra, what `willmore fair` makes of the voxels and of
@@ -146,7 +145,6 @@ impl Segmented {
         })
     }
 
-    /// What becomes of it by all means.
     fn treated(&self, session: &mut Session<'_>) -> Result<Vec<Row<'_>>, Error> {
         let (body, marched) = (&self.body.surface, &self.marched);
         let [taubin, laplacian] = [TAUBIN, LAPLACIAN].map(|factors| self.smoothed(factors));

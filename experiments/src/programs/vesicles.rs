@@ -42,7 +42,6 @@ pub struct Options {
     figure: FigureOptions,
 }
 
-/// A vesicle of the flow and the exact one.
 struct Pair {
     branch: &'static str,
     at_rest: AtRest<3>,

@@ -15,7 +15,6 @@ const SAMPLES: [Sample<2>; 3] = [CROSS, RECTANGLE, ELLIPSE];
 const MARKS: [usize; 4] = [8, 32, 64, 128];
 const END: f64 = 128.0 * STEP;
 
-/// The curves of the figure.
 const EULER: &str = "implicit Euler, equal steps";
 const EQUAL: &str = "second order, equal steps";
 const CONTROLLED: &str = "second order, controlled steps";
@@ -69,7 +68,6 @@ pub struct Options {
     run: RunOptions,
 }
 
-/// A run at a mark.
 struct Compared {
     sample: &'static str,
     n: usize,

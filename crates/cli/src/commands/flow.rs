@@ -15,8 +15,8 @@ use solver::NewtonParams;
 
 use super::{open_device, operator};
 use crate::cli::{
-    CommonOptions, FlowOptions, InputOptions, KeepOptions, SayOptions, SchemeOptions,
-    SizeTarget, Tolerance,
+    CommonOptions, FlowOptions, InputOptions, KeepOptions, SayOptions, SchemeOptions, SizeTarget,
+    Tolerance,
 };
 use crate::config;
 use crate::error::Error;
