@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::time::Instant;
 
-use engine::{Case, Samples, Stop, Trajectory};
+use engine::{Case, Run, Samples, Stop, Trajectory};
 use indicatif::ProgressBar;
 use operators::ComputeDevice;
 use report::{Cell, Figure, Manifest, OutputDir, Progress, Summary};
@@ -34,6 +34,17 @@ pub struct Stage<'a> {
     pub device: &'a ComputeDevice,
     pub output: &'a OutputDir,
     pub bar: ProgressBar,
+}
+
+impl Stage<'_> {
+    /// Runs a case to its end; the bar counts the steps.
+    pub fn run<const D: usize>(&self, case: Case<D>) -> Result<Run<D>, Error> {
+        let mut run = Run::new(case, self.device)?;
+        while run.step()?.is_some() {
+            self.bar.inc(1);
+        }
+        Ok(run)
+    }
 }
 
 impl<'a> Session<'a> {

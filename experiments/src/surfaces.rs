@@ -3,13 +3,14 @@
 use clap::Args;
 use engine::{Held, Helfrich, Samples, Stop, Trajectory, energy_increases, mean_hvp};
 use geometry::measure::BoundingBox;
-use model::NeededNetwork;
+use geometry::{UpAxis, optimal_profile};
+use model::{NeededNetwork, Networks};
 use operators::memory;
 pub use render::View;
 use render::{Quality, Rgb, Scene, Tube};
 use report::Raster;
 use serde_json::Value;
-use surfaces::ClosedMesh;
+use surfaces::{ClosedMesh, Fairing, TriangleMesh};
 
 use crate::networks::Chosen;
 use crate::prelude::*;
@@ -97,6 +98,30 @@ pub fn willmore_flow<const D: usize>(
         stops: vec![Stop::Steps(steps)],
         measures: Measure::size(scales.eps),
     }
+}
+
+/// The accurate operator for the scales of a grid.
+pub fn accurate_operator<const D: usize>(
+    grid: &Grid<D>,
+    scales: &Scales,
+) -> Result<Operator, Error> {
+    let (needed, networks) = (scales.needs(D, grid.spacing()), Networks::default());
+    let accurate = (Method::Hybrid, Scheme::Accurate);
+    Ok(Operator::new(accurate, &networks, &needed, grid, scales)?)
+}
+
+/// Willmore flow from signed distances as `willmore fair` makes it, without its ends and measures.
+pub fn fairing_flow(title: &str, mut distance: Field<3>) -> Result<Case<3>, Error> {
+    surfaces::mend_signs(&mut distance);
+    let (grid, spacing) = (*distance.grid(), distance.grid().spacing());
+    let scales = Scales::of_grid(spacing, EPS_OVER_H);
+    let initial = distance.map(|s| optimal_profile(s, scales.eps));
+    let rule = StepRule::Graded {
+        first: Fairing::first_step(spacing),
+        part: Fairing::GROWTH,
+    };
+    let operator = accurate_operator(&grid, &scales)?;
+    Ok(willmore_flow(title, initial, operator, scales, (rule, 0)))
 }
 
 #[derive(Args, Clone, Copy, Debug)]
@@ -279,6 +304,28 @@ impl Flowed {
         }
         Ok(scene.view(self.surface.view).tubes(snapshot.tubes.clone()))
     }
+}
+
+/// A square picture of a scene.
+pub fn raster(scene: &Scene, side: u32, caption: impl Into<String>) -> Result<Raster, Error> {
+    let picture = scene.render([side; 2])?;
+    let size = [picture.width(), picture.height()].map(|side| side as usize);
+    Ok(Raster::new(size, picture.pixels()).with_caption(caption))
+}
+
+/// A picture of a mesh in a frame.
+pub fn mesh_raster(
+    mesh: &TriangleMesh,
+    (up, frame): (UpAxis, BoundingBox<3>),
+    caption: impl Into<String>,
+) -> Result<Raster, Error> {
+    const SIDE: u32 = 420;
+    let scene = Scene::of_mesh(mesh.clone()).within(frame).view(View {
+        up,
+        azimuth: -60.0,
+        elevation: 25.0,
+    });
+    raster(&scene, SIDE, caption)
 }
 
 /// Surfaces under Willmore flow by several methods, as a program shows them.

@@ -4,14 +4,13 @@ use engine::{ErrorControl, Order, Samples, Stop, TimeSteps, Trajectory, estimate
 use geometry::contour::{Interpolation, zero_level};
 use geometry::shapes::{Cross, Cuboid, Cylinder, Ellipse};
 use geometry::{SignedDistance, ZeroSet};
-use model::Networks;
 use reference::revolution::{self, Surface};
 use reference::{Curve, Shape, planar};
 use solver::NewtonParams;
 use surfaces::phase_field_surface;
 
 use crate::prelude::*;
-use crate::surfaces::willmore_flow;
+use crate::surfaces::{accurate_operator, willmore_flow};
 
 /// A shape whose exact flow is known, around the origin; in space a body of revolution about the third axis.
 pub struct Sample<const D: usize> {
@@ -141,9 +140,7 @@ impl<const D: usize> Sample<D> {
             newton,
             ..Scales::of_grid(grid.spacing(), 2.0)
         };
-        let needed = scales.needs(D, grid.spacing());
-        let accurate = (Method::Hybrid, Scheme::Accurate);
-        let operator = Operator::new(accurate, &Networks::default(), &needed, &grid, &scales)?;
+        let operator = accurate_operator(&grid, &scales)?;
         let initial = (self.initial)(grid, scales.eps)?;
         let mut case = willmore_flow(self.key, initial, operator, scales, (steps.rule, 1));
         case.steps = steps;

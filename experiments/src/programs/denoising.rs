@@ -7,13 +7,10 @@ use chacha20::ChaCha8Rng;
 
 use crate::meshes::{folder, sampled};
 use crate::prelude::*;
-use crate::surfaces::{centred_box, willmore_flow};
+use crate::surfaces::{centred_box, fairing_flow, mesh_raster};
 use engine::{DISPLACEMENT, Stop};
-use geometry::{Placement, SignedDistance, UpAxis, optimal_profile};
-use model::Networks;
+use geometry::{Placement, SignedDistance, UpAxis};
 use rand::{RngExt, SeedableRng};
-use render::{Scene, View};
-use report::Raster;
 use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, samples, usual_up_axis};
 
 const TITLE: &str = "Noise of meshes taken off";
@@ -26,7 +23,6 @@ const SIDE: f64 = 0.9;
 const TAUBIN: [f64; 2] = [0.5, -0.53];
 const LAPLACIAN: [f64; 2] = [0.5, 0.0];
 const ITERATIONS: usize = 30;
-const DRAWN: u32 = 420;
 
 /// Independent normally distributed noise along the normals of clean meshes, taken off by `willmore fair` at its defaults, by Taubin's
 /// and by Laplacian smoothing with the number of iterations that comes nearest to the clean mesh: distances, normals and volumes.
@@ -93,7 +89,8 @@ pub fn program(options: &Options) -> Result<(), Error> {
             if noise.to_bits() == noises[0].to_bits() {
                 let results = [0, 2, 3, 1].map(|k| (methods[k].method, &methods[k].result));
                 let shown = [("clean", clean.mesh.mesh())].into_iter().chain(results);
-                let drawn = shown.map(|(name, mesh)| clean.picture(name, mesh));
+                let frame = (clean.up, clean.mesh.bounding_box());
+                let drawn = shown.map(|(name, mesh)| mesh_raster(mesh, frame, name));
                 pictures.extend(session.phase::<Vec<_>>("pictures", |_| drawn.collect())?);
             }
             rows.extend(methods);
@@ -244,18 +241,6 @@ impl Clean {
         let name = self.name.replace('-', "_").to_lowercase();
         format!("{name}.noise{noise}")
     }
-
-    /// A picture of a mesh, in the frame of the clean one.
-    fn picture(&self, caption: &str, mesh: &TriangleMesh) -> Result<Raster, Error> {
-        let scene = Scene::of_mesh(mesh.clone()).view(View {
-            up: self.up,
-            azimuth: -60.0,
-            elevation: 25.0,
-        });
-        let picture = scene.within(self.mesh.bounding_box()).render([DRAWN; 2])?;
-        let size = [picture.width() as usize, picture.height() as usize];
-        Ok(Raster::new(size, picture.pixels()).with_caption(caption))
-    }
 }
 
 /// The noise taken off as `willmore fair` does at its defaults.
@@ -268,40 +253,23 @@ fn fair(
     let (closed, _) = ClosedMesh::new(noisy.clone())?;
     let fairing = Fairing::new(closed, noisy.noise(), |_| false);
     let grid = centred_box(cells, 1.0)?;
-    let scales = Scales::of_grid(grid.spacing(), 2.0);
     let placement = Placement::fit(&fairing.start().bounding_box(), &grid, SIDE, 0.0)?;
     let distance = MeshDistance::new(&fairing.start().placed(&placement));
-    let mut distance = session.phase(format!("{title}: signed distance"), |stage| {
+    let distance = session.phase(format!("{title}: signed distance"), |stage| {
         sampled(&distance, grid, &stage.bar)
     })?;
-    surfaces::mend_signs(&mut distance);
-    let initial: Field<3> = distance.map(|s| optimal_profile(s, scales.eps));
-    let followed = fairing.follow(placement, &initial, scales.eps)?;
-    let needed = scales.needs(3, grid.spacing());
-    let variant = (Method::Hybrid, Scheme::Accurate);
-    let operator = Operator::new(variant, &Networks::default(), &needed, &grid, &scales)?;
+    let mut case = fairing_flow(title, distance)?;
+    let followed = fairing.follow(placement, &case.initial, case.scales.eps)?;
     let measured = (fairing.clone(), followed.clone());
-    let displacement = Measure::new(DISPLACEMENT, move |u, _| {
+    case.measures = vec![Measure::new(DISPLACEMENT, move |u, _| {
         let gone = measured.0.displacement(&measured.1, u).ok();
         Ok(gone.map(|gone| gone * placement.scale()))
-    });
-    let rule = StepRule::Graded {
-        first: Fairing::first_step(grid.spacing()),
-        part: Fairing::GROWTH,
-    };
-    let case = Case {
-        stops: vec![
-            Stop::Time(fairing.time(grid.spacing(), placement.scale())),
-            Stop::Displacement(fairing.farthest() * placement.scale()),
-        ],
-        measures: vec![displacement],
-        ..willmore_flow(title, initial, operator, scales, (rule, 0))
-    };
+    })];
+    case.stops = vec![
+        Stop::Time(fairing.time(grid.spacing(), placement.scale())),
+        Stop::Displacement(fairing.farthest() * placement.scale()),
+    ];
     session.phase(title, |stage| {
-        let mut run = Run::new(case, stage.device)?;
-        while run.step()?.is_some() {
-            stage.bar.inc(1);
-        }
-        Ok(fairing.faired(&followed, run.field())?)
+        Ok(fairing.faired(&followed, stage.run(case)?.field())?)
     })
 }

@@ -1,6 +1,7 @@
 //! Spheres by the network for surfaces: mean curvature flow, Willmore energies, and standing still.
 
 use crate::prelude::*;
+use crate::session::Stage;
 use crate::surfaces::{self, Setting};
 use crate::training::{NetworkSpec, held_out_radii};
 use crate::{look, quality};
@@ -85,7 +86,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
         let measured = session.phase(format!("radius {radius}"), |stage| {
             let sphere = Sphere {
                 setting: &setting,
-                device: stage.device,
+                stage,
                 radius,
             };
             sphere.measure(willmore_steps)
@@ -116,7 +117,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
 
 struct Sphere<'a> {
     setting: &'a Setting,
-    device: &'a ComputeDevice,
+    stage: &'a Stage<'a>,
     radius: f64,
 }
 
@@ -125,7 +126,9 @@ impl Sphere<'_> {
         let time = (self.setting.scales.mcf_step, MCF_STEPS[LAST]);
         let still = self.case(Flow::Willmore, PAPERS, (TAU, 0))?;
         let mcf = variants().map(|variant| {
-            let run = self.run(self.case(Flow::MeanCurvature, variant, time)?)?;
+            let run = self
+                .stage
+                .run(self.case(Flow::MeanCurvature, variant, time)?)?;
             Ok(MCF_STEPS.map(|step| run.records()[step - 1].measures["l2"]))
         });
         let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
@@ -159,14 +162,9 @@ impl Sphere<'_> {
         Ok(Case { flow, ..case })
     }
 
-    fn run(&self, case: Case<3>) -> Result<Run<3>, Error> {
-        let mut run = Run::new(case, self.device)?;
-        while run.step()?.is_some() {}
-        Ok(run)
-    }
-
     fn stand_still(&self, scheme: Scheme, steps: usize) -> Result<Still, Error> {
-        let run = self.run(self.case(Flow::Willmore, (Method::Hybrid, scheme), (TAU, steps))?)?;
+        let case = self.case(Flow::Willmore, (Method::Hybrid, scheme), (TAU, steps))?;
+        let run = self.stage.run(case)?;
         let records = run.records();
         let first = records.first().and_then(|record| record.minimization);
         let last = records.last();
