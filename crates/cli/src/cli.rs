@@ -673,6 +673,20 @@ pub struct TrainOptions {
     pub common: CommonOptions,
 }
 
+impl Command {
+    /// The input of a command that makes runs, and what it keeps.
+    pub fn of_run(&mut self) -> Option<(&mut InputOptions, &mut KeepOptions)> {
+        let flow = match self {
+            Self::Mcf(mcf) => return Some((&mut mcf.input, &mut mcf.keep)),
+            Self::Flow(flow) => flow,
+            Self::Fair(fair) => &mut fair.flow,
+            Self::Inpaint(inpaint) => &mut inpaint.flow,
+            _ => return None,
+        };
+        Some((&mut flow.input, &mut flow.keep))
+    }
+}
+
 impl SchemeOptions {
     /// Interface width in cells.
     pub fn eps_over_h(&self) -> f64 {

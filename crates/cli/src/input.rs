@@ -237,12 +237,8 @@ pub fn load_own(
     ));
     let region = own.nodes(&field)?;
     space.own = Some(own);
-    Ok(Loaded::Space(Start {
-        name: reader.name,
-        field,
-        outlet: space,
-        region,
-    }))
+    let start = reader.start(field, space);
+    Ok(Loaded::Space(Start { region, ..start }))
 }
 
 impl Source<'_> {
@@ -475,28 +471,25 @@ impl Reader<'_> {
         Ok(phase_field(grid, shape, eps)?)
     }
 
-    fn space(&self, field: Field<3>, up: UpAxis) -> Loaded {
-        Loaded::Space(Start {
+    fn start<const D: usize, O>(&self, field: Field<D>, outlet: O) -> Start<D, O> {
+        Start {
             name: self.name.clone(),
             field,
-            outlet: Space::new(up),
+            outlet,
             region: None,
-        })
+        }
+    }
+
+    fn space(&self, field: Field<3>, up: UpAxis) -> Loaded {
+        Loaded::Space(self.start(field, Space::new(up)))
     }
 
     fn plane(&self, field: Field<2>) -> Result<Loaded, Error> {
         let frame = Frame::of_box(field.grid(), PIXELS)?;
-        Ok(self.framed(field, frame, ImageFrame(None)))
-    }
-
-    fn framed(&self, field: Field<2>, frame: Frame, of_image: ImageFrame) -> Loaded {
-        let start = Start {
-            name: self.name.clone(),
-            field,
-            outlet: Plane::new(frame),
-            region: None,
-        };
-        Loaded::Plane(start, of_image)
+        Ok(Loaded::Plane(
+            self.start(field, Plane::new(frame)),
+            ImageFrame(None),
+        ))
     }
 
     fn built_in(&mut self, name: &str) -> Result<Loaded, Error> {
@@ -539,11 +532,10 @@ impl Reader<'_> {
         let sides = outline.sides();
         let grid = self.grid_holding(&image.bounding_box(), &IMAGE_CELLS, &distance, &sides)?;
         let [width, height] = [image.width(), image.height()];
-        Ok(self.framed(
-            self.sampled(grid, &distance)?,
-            Frame::new(width, height, [0.0, f64::from(height)], 1.0)?,
-            ImageFrame(Some((path.to_owned(), [width, height]))),
-        ))
+        let frame = Frame::new(width, height, [0.0, f64::from(height)], 1.0)?;
+        let start = self.start(self.sampled(grid, &distance)?, Plane::new(frame));
+        let image = ImageFrame(Some((path.to_owned(), [width, height])));
+        Ok(Loaded::Plane(start, image))
     }
 
     fn volume(&mut self, path: &Path) -> Result<Loaded, Error> {
@@ -574,12 +566,7 @@ impl Reader<'_> {
             side: body.voxel,
             farthest: None,
         });
-        Ok(Loaded::Space(Start {
-            name: self.name.clone(),
-            field,
-            outlet,
-            region: None,
-        }))
+        Ok(Loaded::Space(self.start(field, outlet)))
     }
 
     fn mesh_field(&self, mesh: &ClosedMesh, grid: Grid<3>) -> Result<Field<3>, Error> {

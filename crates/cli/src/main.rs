@@ -51,7 +51,7 @@ fn main() -> ExitCode {
         Err(error) => Err(error),
     };
     ended.unwrap_or_else(|error| {
-        eprintln!("error: {}", error.line());
+        eprintln!("error: {}", files::with_causes(&error));
         ExitCode::from(FAILURE)
     })
 }

@@ -79,14 +79,11 @@ impl Drop for Standard {
 
 /// The input of a command and the file that it writes, if it has these.
 fn paths(command: &mut Command) -> Option<(&mut InputOptions, &mut Option<PathBuf>)> {
-    match command {
-        Command::Flow(flow) => Some((&mut flow.input, &mut flow.keep.save)),
-        Command::Fair(fair) => Some((&mut fair.flow.input, &mut fair.flow.keep.save)),
-        Command::Inpaint(inpaint) => Some((&mut inpaint.flow.input, &mut inpaint.flow.keep.save)),
-        Command::Mcf(mcf) => Some((&mut mcf.input, &mut mcf.keep.save)),
-        Command::Sample(sample) => Some((&mut sample.input, &mut sample.save)),
-        _ => None,
+    if let Command::Sample(sample) = command {
+        return Some((&mut sample.input, &mut sample.save));
     }
+    let (input, keep) = command.of_run()?;
+    Some((input, &mut keep.save))
 }
 
 /// A name that no other process has.

@@ -52,46 +52,44 @@ struct Variant {
     papers_seconds: Option<[f64; 2]>,
 }
 
+const HYBRID: Variant = Variant {
+    key: "hybrid",
+    label: "hybrid",
+    method: Hybrid,
+    newton: Preconditioned,
+    linear: ConjugateGradients,
+    papers_seconds: None,
+};
+
 const VARIANTS: [Variant; 5] = [
-    Variant {
-        key: "hybrid",
-        label: "hybrid",
-        method: Hybrid,
-        newton: Preconditioned,
-        linear: ConjugateGradients,
-        papers_seconds: None,
-    },
+    HYBRID,
     Variant {
         key: "hybrid_plain_newton",
         label: "hybrid, plain Newton-CG",
-        method: Hybrid,
         newton: Paper,
-        linear: ConjugateGradients,
         papers_seconds: Some([122.0, 1020.0]),
+        ..HYBRID
     },
     Variant {
         key: "fe_implicit",
         label: "FE implicit, FFT-CG inside",
         method: FeImplicit,
-        newton: Preconditioned,
-        linear: ConjugateGradients,
-        papers_seconds: None,
+        ..HYBRID
     },
     Variant {
         key: "fe_implicit_direct",
         label: "FE implicit, Cholesky inside",
         method: FeImplicit,
-        newton: Preconditioned,
         linear: Direct,
         papers_seconds: Some([4970.0, 28622.0]),
+        ..HYBRID
     },
     Variant {
         key: "fe_semi",
         label: "FE semi-implicit",
         method: FeSemi,
-        newton: Preconditioned,
-        linear: ConjugateGradients,
         papers_seconds: Some([4307.0, 22045.0]),
+        ..HYBRID
     },
 ];
 

@@ -20,6 +20,14 @@ const STEPS: f64 = 1.6;
 /// as long as the surface goes no further than so many, root of the mean square.
 const FARTHEST: f64 = 0.35;
 
+/// The usual steps on a grid of this spacing.
+fn graded(spacing: f64) -> StepRule {
+    StepRule::Graded {
+        first: Fairing::first_step(spacing),
+        part: Fairing::GROWTH,
+    }
+}
+
 impl FairOptions {
     /// A segmentation, whose volume is kept.
     fn load_volume(&mut self, say: SayOptions) -> Result<Loaded, Error> {
@@ -43,10 +51,7 @@ impl FairOptions {
         {
             voxels.farthest = Some(FARTHEST * voxels.side);
             flow.time = Some((STEPS * voxels.side).powi(4));
-            flow.tau.get_or_insert(StepRule::Graded {
-                first: Fairing::first_step(field.grid().spacing()),
-                part: Fairing::GROWTH,
-            });
+            flow.tau.get_or_insert(graded(field.grid().spacing()));
         }
         Ok(loaded)
     }
@@ -76,10 +81,7 @@ impl FlowCommand for FairOptions {
         let usual = if self.ends {
             StepRule::Controlled
         } else {
-            StepRule::Graded {
-                first: f64::NAN,
-                part: Fairing::GROWTH,
-            }
+            graded(f64::NAN)
         };
         self.flow.check_tolerance(usual)?;
         if let Some(ratio) = self.energy_ratio.filter(|ratio| *ratio >= 1.0) {
@@ -170,10 +172,7 @@ impl FlowCommand for FairOptions {
     fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
         if self.noise.is_some() {
             let spacing = scales.eps / self.flow.scheme.eps_over_h();
-            self.flow.tau.get_or_insert(StepRule::Graded {
-                first: Fairing::first_step(spacing),
-                part: Fairing::GROWTH,
-            });
+            self.flow.tau.get_or_insert(graded(spacing));
         }
         self.flow.rule(scales, unit)
     }

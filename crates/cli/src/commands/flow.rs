@@ -130,20 +130,16 @@ impl FlowCommand for FlowOptions {
 impl FlowOptions {
     /// Refuses a tolerance that the time steps do not look at.
     pub fn check_tolerance(&self, usual: StepRule) -> Result<(), Error> {
-        let Some(tolerance) = self.tolerance else {
-            return Ok(());
-        };
-        let rule = self.tau.unwrap_or(usual);
-        if rule != StepRule::Controlled {
-            return Err(Error::options(format!(
-                "--tolerance {tolerance} is for controlled time steps: give --tau controlled, or leave it out"
-            )));
+        match self.tolerance {
+            Some(tolerance) if self.tau.unwrap_or(usual) != StepRule::Controlled => {
+                Err(Error::options(format!(
+                    "--tolerance {tolerance} is for controlled time steps: give --tau controlled, or leave it out"
+                )))
+            }
+            _ => Ok(()),
         }
-        Ok(())
     }
-}
 
-impl FlowOptions {
     /// Spontaneous curvature, tension and pressure, in the units of the input.
     fn energy(&self) -> Result<Helfrich, Error> {
         let finite = |name: &str, value: Option<f64>| match value.unwrap_or(0.0) {

@@ -20,17 +20,11 @@ pub fn run(options: &ResumeOptions, say: SayOptions) -> Result<ExitCode, Error> 
     };
     let path = options.run.join(config::FILE);
     let mut command = config::parse_resolved(&stored.read_text(config::FILE)?, &path)?.command;
-    let keep = match &mut command {
-        Command::Flow(flow) => &mut flow.keep,
-        Command::Fair(fair) => &mut fair.flow.keep,
-        Command::Inpaint(inpaint) => &mut inpaint.flow.keep,
-        Command::Mcf(mcf) => &mut mcf.keep,
-        _ => {
-            let path = path.display();
-            return Err(Error::options(format!(
-                "{path} names no command that makes runs"
-            )));
-        }
+    let Some((_, keep)) = command.of_run() else {
+        let path = path.display();
+        return Err(Error::options(format!(
+            "{path} names no command that makes runs"
+        )));
     };
     keep.force = options.force;
     if stored.is_finished() && options.steps.is_none() {
