@@ -1,20 +1,11 @@
 //! Circles under mean curvature flow and Willmore flow, compared with the exact solutions
 //! (eq:analyticSolutionMCFCircle and `R(t) = (r^4 + 2t)^(1/4)`).
 
-use std::f64::consts::PI;
-use std::path::Path;
-
-use engine::{Order, Samples, Stop, TimeSteps, Trajectory, minimizations};
 use geometry::Error as GeometryError;
 use geometry::exact::{mean_curvature_radius, willmore_radius};
-use geometry::measure::l2_distance;
-use geometry::shapes::Ball;
-use indicatif::ProgressBar;
 use runs::Interrupt;
-use solver::{NewtonParams, StepRecord};
 
 use crate::harness::{in_parallel, workers};
-use crate::networks::{EPS, STEP};
 use crate::prelude::*;
 use crate::study::{self, Variant};
 

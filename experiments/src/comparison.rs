@@ -1,15 +1,8 @@
 //! A shape by all methods and resolutions, against a finer run as in the paper, and against the exact flow.
 
-use std::collections::BTreeMap;
-
 use clap::{CommandFactory, FromArgMatches};
-use engine::{ErrorControl, Samples, Trajectory, energy_increases, minimizations};
-use geometry::measure::{perimeter, zero_set_volume};
-use report::{Curve, OutputDir, Shapes, Table};
-use solver::StepRecord;
+use geometry::measure::perimeter;
 
-use crate::look;
-use crate::networks::{EPS, STEP};
 use crate::prelude::*;
 use crate::steps::{self, Rows};
 use crate::study::{self, Study, StudyOptions, Variant};

@@ -1,10 +1,6 @@
 //! Curves and surfaces that come to rest with given perimeter and volume, against exact equilibria.
 
-use std::f64::consts::{PI, TAU};
-
-use engine::{Held, Samples, Stop, Target, TimeSteps, Trajectory};
-use geometry::shapes::Ellipse;
-use geometry::{SignedDistance, ZeroSet};
+use std::f64::consts::TAU;
 
 use crate::prelude::*;
 

@@ -1,11 +1,5 @@
 //! Inpainting, in any dimension: Willmore flow of the values in a region, the rest held.
 
-use clap::Args;
-use engine::{Samples, Stop, Trajectory, energy_increases, mean_hvp};
-use geometry::SignedDistance;
-use geometry::measure::l2_distance;
-use serde_json::Value;
-
 use crate::prelude::*;
 use crate::steps::steps_csv;
 use crate::surfaces::willmore_flow;

@@ -1,9 +1,7 @@
 //! How curves look in the figures: colours stand for methods in their schemes, dashes for resolutions.
 
-use engine::{Method, Scheme};
-use geometry::Field;
+use crate::prelude::*;
 use geometry::contour::{Interpolation, zero_level};
-use report::{Colour, Curve, LegendEntry, LineChart, LineStyle, Marker, Series};
 
 /// The methods in their schemes that are shown, in the order of legends.
 pub fn variants(

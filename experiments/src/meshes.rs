@@ -1,12 +1,7 @@
 //! Triangle meshes and volumes as initial data.
 
-use std::path::{Path, PathBuf};
-
-use clap::{Args, ValueEnum};
-use geometry::{Placement, UpAxis, npy, optimal_profile, vti};
-use indicatif::ProgressBar;
+use geometry::{npy, vti};
 use runs::fingerprint;
-use serde_json::Value;
 use surfaces::{ClosedMesh, MeshDistance, usual_up_axis};
 
 use crate::prelude::*;

@@ -1,14 +1,7 @@
 //! The scales of the convergence tests, and where networks come from.
 
-use std::path::PathBuf;
-
-use clap::Args;
-use engine::{Method, Operator, Scales, Scheme};
-use geometry::Grid;
+use crate::prelude::*;
 use model::{NamedNetwork, NeededNetwork, Networks, Ratios};
-use solver::NewtonParams;
-
-use crate::{Error, require};
 
 /// Interface width `eps = 2^-6`.
 pub const EPS: f64 = 1.0 / 64.0;

@@ -1,7 +1,5 @@
 //! Orders of convergence of runs against the finest of them.
 
-use engine::Trajectory;
-
 use crate::prelude::*;
 
 /// Writes what the sequences of runs say, each with the name of the size that is halved from one run to the next: a figure, a table, and

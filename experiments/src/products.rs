@@ -7,19 +7,18 @@
 //!
 //! that is two convolutions and two loops on `Vec<f64>`.
 
+use crate::prelude::*;
 use std::hint::black_box;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use burn::tensor::{DType, Tensor};
-use geometry::Field;
 use model::{MeanCurvatureOperator, Network};
-use operators::{ComputeDevice, SpectralFilter, Transform, kernel_symbol, spectral_filter};
+use operators::{SpectralFilter, Transform, kernel_symbol, spectral_filter};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 use solver::{MinimizingMovement, Objective, Precision};
 
-use crate::Error;
 use crate::error::require;
 use crate::timing::{Numbers, median, take_turns};
 

@@ -1,18 +1,10 @@
 //! What every program does between its options and its results.
 
+use crate::prelude::*;
 use std::io::Write;
-use std::time::Instant;
 
-use engine::{Case, Run, Samples, Stop, Trajectory};
-use indicatif::ProgressBar;
-use operators::ComputeDevice;
-use report::{Cell, Figure, Manifest, OutputDir, Progress, Summary};
+use report::{Manifest, Summary};
 use runs::Interrupt;
-use serde_json::Value;
-
-use crate::Error;
-use crate::options::RunOptions;
-use crate::sheet::Sheet;
 
 /// A program whose options are checked, and what it has to say so far.
 pub struct Session<'a> {

@@ -1,12 +1,9 @@
 //! The steps of runs as a table.
 
+use crate::prelude::*;
 use std::collections::BTreeSet;
 
-use engine::{Record, Trajectory, Values};
-use report::{Cell, Table};
-use solver::StepRecord;
-
-use crate::Error;
+use engine::Values;
 
 pub struct Rows<'a> {
     /// Which run it is: a cell for each leading column.

@@ -1,13 +1,8 @@
 //! Studies in the plane at the scales of the convergence tests: methods in their schemes at several resolutions.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
-use clap::Args;
-use report::Cell;
-use solver::StepRecord;
-
-use crate::look;
-use crate::networks::{Chosen, NetworkOptions, STEP, convergence_network, scales};
+use crate::networks::{Chosen, convergence_network, scales};
 use crate::prelude::*;
 use crate::surfaces::willmore_flow;
 

@@ -1,20 +1,15 @@
 //! Surfaces under Willmore flow: their scales, the shown steps of a run, and the pictures, tables and metrics of those.
 
-use clap::Args;
-use engine::{Held, Helfrich, Samples, Stop, Trajectory, energy_increases, mean_hvp};
+use engine::Helfrich;
 use geometry::measure::BoundingBox;
-use geometry::{UpAxis, optimal_profile};
 use model::{NeededNetwork, Networks};
 use operators::memory;
 pub use render::View;
 use render::{Quality, Rgb, Scene, Tube};
-use report::Raster;
-use serde_json::Value;
 use surfaces::{ClosedMesh, Fairing, TriangleMesh};
 
 use crate::networks::Chosen;
 use crate::prelude::*;
-use crate::session::Stage;
 use crate::steps::steps_csv;
 
 const EPS_OVER_H: f64 = 2.0;

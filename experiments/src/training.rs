@@ -1,17 +1,11 @@
 //! The networks of the experiments, and training them with a progress bar and checkpoints.
 
-use std::path::Path;
-use std::time::{Duration, Instant};
+use crate::prelude::*;
+use std::time::Duration;
 
 use model::training::{Checkpoint, Progress as Iteration, Recipe, SphereData, Trained, Training};
 use model::{Error as ModelError, Ratios};
-use operators::{ComputeDevice, DeviceKind};
-use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde_json::Value;
-
-use crate::Error;
-use crate::session::Stage;
 
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(3);
 

@@ -1,12 +1,9 @@
 //! Runs against the exact flow of their curves, and of their surfaces of revolution.
 
-use engine::{ErrorControl, Order, Samples, Stop, TimeSteps, Trajectory, estimated_time_error};
+use engine::estimated_time_error;
 use geometry::contour::{Interpolation, zero_level};
-use geometry::shapes::{Cross, Cuboid, Cylinder, Ellipse};
-use geometry::{SignedDistance, ZeroSet};
 use reference::revolution::{self, Surface};
 use reference::{Curve, Shape, planar};
-use solver::NewtonParams;
 use surfaces::phase_field_surface;
 
 use crate::prelude::*;

@@ -4,7 +4,6 @@ use crate::mesh_flow::{MeshFlow, MeshFlowOptions};
 use crate::meshes::ARMADILLO;
 use crate::prelude::*;
 use crate::surfaces::View;
-use geometry::UpAxis;
 
 const ARMADILLO_FLOW: MeshFlow = MeshFlow {
     program: "armadillo",

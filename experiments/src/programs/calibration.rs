@@ -1,19 +1,12 @@
 //! The factors by which the hybrid scheme differs from Willmore flow, predicted and measured on discs.
 
-use std::collections::BTreeMap;
-use std::f64::consts::PI;
-use std::path::PathBuf;
-
-use crate::networks::{EPS, STEP, scales};
+use crate::networks::scales;
 use crate::prelude::*;
-use crate::session::Stage;
 use crate::surfaces::{self, willmore_flow};
 use fem::FiniteElementStep;
-use geometry::measure::zero_set_volume;
-use geometry::shapes::{Ball, Torus};
+use geometry::shapes::Torus;
 use model::training::SphereData;
 use model::{Calibration, NamedNetwork, Network, Shipped, displacement_errors};
-use report::OutputDir;
 use solver::Factors;
 
 const PROGRAM: &str = "calibration";

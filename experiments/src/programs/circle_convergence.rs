@@ -1,15 +1,10 @@
 //! Convergence test on circles: mean curvature flow and Willmore flow against the exact solutions.
 
 use crate::circles::{self, Circle, Ensemble};
-use crate::look;
-use crate::networks::{EPS, STEP};
 use crate::prelude::*;
 use crate::session::remove_folder;
 use crate::steps::{self, Rows};
 use crate::study::{Study, StudyOptions, Variant};
-use engine::Flow;
-use report::{OutputDir, Table};
-use solver::StepRecord;
 
 const PROGRAM: &str = "circle_convergence";
 /// Steps at which tables and summaries give the error.

@@ -1,15 +1,11 @@
 //! Noise taken off meshes by Willmore flow, by Taubin's smoothing and by Laplacian smoothing.
 
-use std::path::PathBuf;
-use std::time::Instant;
-
 use chacha20::ChaCha8Rng;
 
 use crate::meshes::{folder, sampled};
 use crate::prelude::*;
 use crate::surfaces::{centred_box, fairing_flow, mesh_raster};
-use engine::{DISPLACEMENT, Stop};
-use geometry::{Placement, SignedDistance, UpAxis};
+use engine::DISPLACEMENT;
 use rand::{RngExt, SeedableRng};
 use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, samples, usual_up_axis};
 

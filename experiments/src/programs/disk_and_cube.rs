@@ -1,12 +1,8 @@
 //! A cube and a thick disk under Willmore flow.
 
-use engine::{ErrorControl, Order, TimeSteps};
-
 use crate::prelude::*;
 use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, View};
 use crate::truth::{self, DISK, ELLIPSOID, Reached, Sample, Sizes, THICK_DISK, Truth};
-use geometry::shapes::{Cuboid, Cylinder};
-use geometry::{SignedDistanceExt, UpAxis};
 
 const PROGRAM: &str = "disk_and_cube";
 /// Cells per unit length of a quick run and of the paper.

@@ -1,13 +1,9 @@
 //! Closed elastic curves: length and area held.
 
-use std::f64::consts::PI;
-
 use crate::equilibria::{self, AtRest, Equilibrium, Exact};
-use crate::look;
 use crate::prelude::*;
 use crate::surfaces::{accurate_operator, willmore_flow};
 use reference::equilibria::{Elastica, elastica};
-use report::{Curve, Shapes};
 
 const TITLE: &str = "Closed elastic curves with given length and area";
 /// Isoperimetric quotients `4 pi area / length^2`.

@@ -1,10 +1,8 @@
 //! The order of convergence of Willmore flow of an ellipse in h and in tau, against its own finest run.
 
-use crate::networks::{Chosen, EPS, STEP};
+use crate::networks::Chosen;
 use crate::prelude::*;
 use crate::{orders, study};
-use engine::Samples;
-use geometry::shapes::Ellipse;
 
 const TITLE: &str = "Willmore flow of an ellipse, each h with its network";
 const HALF_AXES: [f64; 2] = [0.3, 0.2];

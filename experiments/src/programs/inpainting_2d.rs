@@ -1,12 +1,9 @@
 //! Inpainting in 2D: Willmore flow of the values in a region, the rest of the image held.
 
 use crate::inpainting::{self, Inpainted, InpaintingOptions, Shape};
-use crate::look;
 use crate::prelude::*;
-use geometry::SignedDistanceExt;
-use geometry::shapes::{Ball, Cross, Cuboid};
 use model::{NeededNetwork, Ratios};
-use report::{Curve, Rgb, Shapes};
+use report::Rgb;
 use solver::Precision;
 
 const PROGRAM: &str = "inpainting_2d";

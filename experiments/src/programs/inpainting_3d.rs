@@ -3,8 +3,6 @@
 use crate::inpainting::{self, Inpainted, InpaintingOptions, Shape};
 use crate::prelude::*;
 use crate::surfaces::{Flowed, Setting, Snapshot, Surface, View, write_snapshots};
-use geometry::shapes::{Ball, Cuboid, Cylinder};
-use geometry::{SignedDistance, SignedDistanceExt, UpAxis};
 use render::{Rgb, Tube};
 
 const PROGRAM: &str = "inpainting_3d";

@@ -1,9 +1,7 @@
 //! Pictures and quality of the learned 2D operators.
 
-use std::collections::BTreeMap;
-use std::f64::consts::{PI, SQRT_2, TAU};
+use std::f64::consts::{SQRT_2, TAU};
 
-use crate::networks::NetworkOptions;
 use crate::prelude::*;
 use crate::quality;
 use crate::training::{NetworkSpec, held_out_radii};

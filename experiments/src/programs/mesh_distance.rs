@@ -1,12 +1,10 @@
 //! The signed distance of any mesh on any grid.
 
 use std::ffi::OsStr;
-use std::path::PathBuf;
 
 use crate::meshes;
 use crate::prelude::*;
-use geometry::{Placement, npy, vti};
-use report::Progress;
+use geometry::{npy, vti};
 use surfaces::{ClosedMesh, MeshDistance};
 
 /// Writes the signed distance to a closed triangle mesh, negative inside, at the nodes i/n of the unit cube. The mesh is scaled so

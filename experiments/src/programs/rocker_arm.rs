@@ -1,12 +1,10 @@
 //! A machine part of genus one under Willmore flow, and the Clifford torus next to it.
 
-use std::collections::BTreeMap;
-
 use crate::mesh_flow::{MeshFlow, MeshFlowOptions};
 use crate::meshes::KnownMesh;
 use crate::prelude::*;
 use crate::surfaces::{Flowed, View};
-use geometry::{CliffordTorus, UpAxis};
+use geometry::CliffordTorus;
 use render::Tube;
 
 const ROCKER_ARM_FLOW: MeshFlow = MeshFlow {

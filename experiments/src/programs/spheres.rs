@@ -1,13 +1,10 @@
 //! Spheres by the network for surfaces: mean curvature flow, Willmore energies, and standing still.
 
 use crate::prelude::*;
-use crate::session::Stage;
+use crate::quality;
 use crate::surfaces::{self, Setting};
 use crate::training::{NetworkSpec, held_out_radii};
-use crate::{look, quality};
-use engine::{energy_increases, mean_hvp};
 use geometry::exact::{WILLMORE_ENERGY_SPHERE, mean_curvature_radius};
-use geometry::shapes::Ball;
 use model::Quality;
 
 const PROGRAM: &str = "spheres";

@@ -1,13 +1,12 @@
 //! Time of the methods for the same flow on the same machine.
 
 use crate::meshes::{ARMADILLO, MeshOptions};
-use crate::networks::{Chosen, NetworkOptions, convergence_network};
+use crate::networks::{Chosen, convergence_network};
 use crate::prelude::*;
 use crate::surfaces;
 use crate::timing::{self, Numbers, Timed, take_turns};
 use engine::Method::{FeImplicit, FeSemi, Hybrid};
 use fem::LinearSolver::{self, ConjugateGradients, Direct};
-use indicatif::ProgressBar;
 use solver::Method::{self as Newton, Paper, Preconditioned};
 
 const PROGRAM: &str = "timing_tables";

@@ -4,15 +4,13 @@ use std::collections::BTreeSet;
 
 use crate::prelude::*;
 use crate::quality;
-use crate::session::{Stage, remove_folder};
+use crate::session::remove_folder;
 use crate::training::{NetworkSpec, train, training_device};
-use clap::ValueEnum;
 use model::Network;
 use model::training::adam::AdamParams;
 use model::training::least_squares::LeastSquaresParams;
 use model::training::levenberg_marquardt::LmParams;
 use model::training::{self, CurvePoint, Trained};
-use report::OutputDir;
 
 const PROGRAM: &str = "train_networks";
 

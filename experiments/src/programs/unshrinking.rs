@@ -1,16 +1,10 @@
 //! Segmentations made smooth by Willmore flow with and without their volume kept, by Taubin's smoothing and by Laplacian smoothing.
 
-use std::f64::consts::PI;
-
 use chacha20::ChaCha8Rng;
 
 use crate::prelude::*;
 use crate::surfaces::{fairing_flow, mesh_raster};
-use engine::{Stop, Target};
-use geometry::shapes::Ball;
-use geometry::{Placement, SignedDistance, UpAxis, ZeroSet};
 use rand::{RngExt, SeedableRng};
-use report::Raster;
 use surfaces::{ClosedMesh, MeshDistance, TriangleMesh, samples};
 use volumes::{Body, Inside, Volume};
 

@@ -1,15 +1,10 @@
 //! Lipid vesicles: area and volume held.
 
-use std::f64::consts::PI;
-
 use crate::equilibria::{self, AtRest, Equilibrium, Exact};
-use crate::look;
 use crate::prelude::*;
 use crate::surfaces::{Setting, View, centred_box, raster, willmore_flow};
-use geometry::UpAxis;
 use reference::equilibria::{Branch, Vesicle, vesicles};
 use render::{Quality, Scene};
-use report::{Curve, Shapes};
 
 const TITLE: &str = "Vesicles: least bending energy with given area and volume";
 const CELLS: [usize; 2] = [32, 64];

@@ -1,11 +1,10 @@
 //! Errors of the time steps against the exact flow, and what they cost.
 
 use crate::circles::{self, Ensemble};
-use crate::networks::{Chosen, STEP};
+use crate::networks::Chosen;
 use crate::prelude::*;
 use crate::study::Variant;
 use crate::truth::{self, CELLS, CROSS, ELLIPSE, RECTANGLE, Reached, STRICT, Sample};
-use engine::{ErrorControl, Order, TimeSteps};
 
 const TITLE: &str = "Time steps of Willmore flow against the exact flow";
 
