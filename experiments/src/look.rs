@@ -1,7 +1,8 @@
 //! How curves look in the figures: colours stand for methods in their schemes, dashes for resolutions.
 
-use crate::prelude::*;
 use geometry::contour::{Interpolation, zero_level};
+
+use crate::prelude::*;
 
 /// The methods in their schemes that are shown, in the order of legends.
 pub fn variants(

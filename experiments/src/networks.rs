@@ -1,7 +1,8 @@
 //! The scales of the convergence tests, and where networks come from.
 
-use crate::prelude::*;
 use model::{NamedNetwork, NeededNetwork, Networks, Ratios};
+
+use crate::prelude::*;
 
 /// Interface width `eps = 2^-6`.
 pub const EPS: f64 = 1.0 / 64.0;

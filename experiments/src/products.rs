@@ -7,7 +7,6 @@
 //!
 //! that is two convolutions and two loops on `Vec<f64>`.
 
-use crate::prelude::*;
 use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Duration;
@@ -20,6 +19,7 @@ use rustfft::num_complex::Complex;
 use solver::{MinimizingMovement, Objective, Precision};
 
 use crate::error::require;
+use crate::prelude::*;
 use crate::timing::{Numbers, median, take_turns};
 
 /// `c = tau / tautilde^2` of a typical step: `tau = tautilde = 2^-14`.

@@ -1,7 +1,8 @@
 //! The quality of networks as columns of a table; its metrics are all fields of [`Quality`].
 
-use crate::prelude::*;
 use model::Quality;
+
+use crate::prelude::*;
 
 const LOSS: Format = Format::Scientific(2);
 const TRANSFER: Format = Format::Fixed(5);

@@ -1,10 +1,11 @@
 //! What every program does between its options and its results.
 
-use crate::prelude::*;
 use std::io::Write;
 
 use report::{Manifest, Summary};
 use runs::Interrupt;
+
+use crate::prelude::*;
 
 /// A program whose options are checked, and what it has to say so far.
 pub struct Session<'a> {

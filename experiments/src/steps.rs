@@ -1,9 +1,10 @@
 //! The steps of runs as a table.
 
-use crate::prelude::*;
 use std::collections::BTreeSet;
 
 use engine::Values;
+
+use crate::prelude::*;
 
 pub struct Rows<'a> {
     /// Which run it is: a cell for each leading column.

@@ -1,11 +1,12 @@
 //! The networks of the experiments, and training them with a progress bar and checkpoints.
 
-use crate::prelude::*;
 use std::time::Duration;
 
 use model::training::{Checkpoint, Progress as Iteration, Recipe, SphereData, Trained, Training};
 use model::{Error as ModelError, Ratios};
 use serde::de::DeserializeOwned;
+
+use crate::prelude::*;
 
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(3);
 

@@ -1,12 +1,6 @@
 //! What an inpainted region holds at the beginning.
 
-use std::str::FromStr;
-
-use geometry::{Field, phase_field};
-use serde::{Serialize, Serializer};
-use surfaces::shapes::Region;
-
-use crate::error::Error;
+use crate::prelude::*;
 
 /// What the inpainted region holds at the beginning.
 #[derive(Clone, Debug, PartialEq)]

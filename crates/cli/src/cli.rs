@@ -1,22 +1,15 @@
 //! What can be typed.
 
 use std::fmt;
-use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use engine::{Scheme, StepRule, Storage};
-use geometry::UpAxis;
+use engine::Storage;
 use model::Network;
-use serde::Serialize;
-use surfaces::shapes::Region;
 
 use crate::ansatz::Ansatz;
 use crate::commands::check_eps_over_h;
-use crate::error::Error;
-use crate::outlet::MESHES;
-use crate::volume::Label;
+use crate::prelude::*;
 
 const EXIT_CODES: &str = "Exit codes: 0 success; 2 bad input or failure, one line on standard error; 130 interrupted (Ctrl-C): \
 the last step was finished and stored, `willmore resume` goes on.";

@@ -12,15 +12,13 @@ mod fuzzing;
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
 
 use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
-use serde::Serialize;
 use toml::{Table, Value};
 
 use crate::cli::Cli;
-use crate::error::Error;
+use crate::prelude::*;
 
 /// The file of all options, resolved, in the folder of a run.
 pub const FILE: &str = "config.toml";

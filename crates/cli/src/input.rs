@@ -1,23 +1,13 @@
 //! Inputs as phase fields.
 
-use std::path::{Path, PathBuf};
-
-use geometry::measure::BoundingBox;
 use geometry::npy::{self, NpyError};
 use geometry::vti::{self, VtiError};
-use geometry::{
-    Field, Grid, Placement, SignedDistance, UpAxis, distance_from_phase_field, optimal_profile,
-    phase_field, thin_part,
-};
+use geometry::{distance_from_phase_field, thin_part};
 use images::{Frame, Image, Outline, OutlineDistance, Side, Threshold, Tones};
-use surfaces::shapes::{self, BuiltIn, Region};
-use surfaces::{ClosedMesh, MeshDistance};
+use surfaces::shapes::{self, BuiltIn};
 
-use crate::cli::{Holds, InputOptions, Inside, SayOptions};
-use crate::error::Error;
-use crate::outlet::{Outlet, Space, Topology};
-use crate::own::OwnMesh;
-use crate::plane::Plane;
+use crate::cli::{Holds, Inside};
+use crate::prelude::*;
 use crate::volume::{self, Voxels};
 
 /// What a run starts from.

@@ -1,15 +1,8 @@
 //! What `--keep` leaves where it is.
 
 use std::collections::HashSet;
-use std::path::Path;
 
-use geometry::{Grid, SignedDistance};
-use surfaces::shapes::Region;
-use surfaces::{ClosedMesh, MeshDistance, TriangleMesh};
-
-use crate::error::Error;
-use crate::input::extension;
-use crate::outlet::MESHES;
+use crate::prelude::*;
 
 /// Nodes this many cells from a vertex along an axis may belong to it.
 const REACH: f64 = 6.0;

@@ -12,19 +12,19 @@ mod outlet;
 mod own;
 mod page;
 mod plane;
+mod prelude;
 mod run;
 mod say;
 mod standard;
 mod volume;
 
 use std::ffi::OsString;
-use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 
 use crate::cli::{Cli, Command};
 use crate::commands::{check, flow, info, networks, resume, sample, shell, train};
-use crate::error::Error;
+use crate::prelude::*;
 use crate::standard::Standard;
 
 const FAILURE: u8 = 2;

@@ -1,20 +1,13 @@
 //! What people look at: pictures, meshes, drawings.
 
 use std::fmt;
-use std::path::Path;
 
-use engine::{Measure, Stop};
-use geometry::measure::{BoundingBox, bounding_box, has_interface};
-use geometry::{Field, UpAxis, ZeroSet, npy, vti};
-use render::{Picture, Scene, View};
-use runs::{RunDirectory, StoredRun};
+use geometry::measure::bounding_box;
+use render::View;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
-use surfaces::{ClosedMesh, TriangleMesh};
 
-use crate::error::Error;
-use crate::input::extension;
-use crate::own::{Faired, OwnMesh};
+use crate::own::Faired;
+use crate::prelude::*;
 use crate::volume::Voxels;
 
 const PIXELS: u32 = 480;

@@ -1,22 +1,16 @@
 //! The mesh that a person gave: its vertices follow the flow.
 
 use std::collections::HashMap;
-use std::path::Path;
 use std::sync::Arc;
 
-use engine::{DISPLACEMENT, Measure, Stop};
+use engine::DISPLACEMENT;
 use geometry::file::write_atomically;
-use geometry::{Field, Placement, SignedDistance, UpAxis};
 use report::Figure;
-use runs::StoredRun;
-use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
-use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, root_mean_square};
+use surfaces::root_mean_square;
 
 use crate::displacement;
-use crate::error::Error;
 use crate::keep::{Keep, key, moving_nodes};
-use crate::outlet::Topology;
+use crate::prelude::*;
 
 /// The name of the copy of the input, without its extension.
 pub const INPUT: &str = "input";

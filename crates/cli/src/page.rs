@@ -5,24 +5,15 @@
 
 use std::fmt::Write;
 use std::fs;
-use std::path::{Path, PathBuf};
 
 use engine::METRICS;
-use geometry::UpAxis;
 use pages::{
     Details, Facts, Figure, Frames, Image, Page, Section, Table, Text, Viewer, five_digits,
 };
 use report::{Axis, LineChart, Marker, Series};
-use runs::StoredRun;
-use serde::Deserialize;
-use serde_json::Value;
-use surfaces::TriangleMesh;
 
-use crate::config;
-use crate::error::Error;
-use crate::input::extension;
-use crate::outlet;
 use crate::own;
+use crate::prelude::*;
 
 pub const NAME: &str = "index.html";
 

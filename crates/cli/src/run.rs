@@ -2,28 +2,14 @@
 
 use std::f64::consts::PI;
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use engine::{
-    Case, Checkpoints, Ending, Event, Observer, Record, Run, Stop, Store, estimated_time_error,
-};
-use geometry::measure::{has_interface, touches_side};
-use geometry::vti;
-use operators::ComputeDevice;
-use render::Picture;
-use runs::{Interrupt, RunDirectory, StoredRun};
-use serde_json::{Value, json};
+use engine::{Checkpoints, Ending, Event, Observer, Store, estimated_time_error};
+use geometry::measure::touches_side;
 use solver::StepEstimates;
 
-use crate::cli::{KeepOptions, SayOptions};
-use crate::config;
-use crate::error::Error;
-use crate::input::extension;
-use crate::outlet::{self, MESHES, Outlet, Topology};
 use crate::own::Faired;
-use crate::page;
+use crate::prelude::*;
 
 /// Everything about a run but its case.
 pub struct Plan<O> {

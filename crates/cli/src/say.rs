@@ -3,9 +3,8 @@
 use std::io::Write;
 
 use report::Progress;
-use serde_json::Value;
 
-use crate::cli::SayOptions;
+use crate::prelude::*;
 
 impl SayOptions {
     /// Prints the outcome of a command: an object, or a text for people.

@@ -1,12 +1,10 @@
 //! `-` for standard input and output: files that stand for them while a command runs.
 
 use std::io::{Read, Write};
-use std::path::PathBuf;
 
-use crate::cli::{Command, InputOptions, SayOptions};
-use crate::error::Error;
+use crate::cli::Command;
 use crate::input::usual_format;
-use crate::volume::Label;
+use crate::prelude::*;
 
 /// The files, which are removed in the end.
 #[derive(Default)]

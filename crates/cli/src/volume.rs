@@ -1,15 +1,11 @@
 //! Volumes of voxels as inputs.
 
 use std::fmt;
-use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
-use serde::{Deserialize, Serialize};
 use volumes::{Body, Inside, Volume};
 
-use crate::cli::InputOptions;
-use crate::error::Error;
 use crate::input::absolute;
+use crate::prelude::*;
 
 const LISTED: usize = 20;
 

@@ -1,23 +1,18 @@
 //! `willmore check`.
 
 use std::fmt::Write;
-use std::process::ExitCode;
 use std::sync::Arc;
 
 use chacha20::ChaCha8Rng;
-use engine::Method;
-use geometry::Field;
 use linearize::taylor::{halvings, remainder};
 use model::{Factors, MeanCurvatureOperator, Network};
-use operators::{ComputeDevice, DeviceKind, add_scaled, inner_product};
+use operators::{add_scaled, inner_product};
 use rand::{RngExt, SeedableRng};
-use serde_json::{Value, json};
 use solver::{FlowParams, MinimizingMovement, Objective};
 
 use super::{open_device, operator};
-use crate::cli::{CheckOptions, SayOptions};
-use crate::error::Error;
-use crate::input::{self, Loaded};
+use crate::cli::CheckOptions;
+use crate::prelude::*;
 
 const STEPS: usize = 14;
 /// By how much an observed rate may be short of the expected one.

@@ -2,15 +2,10 @@
 
 use std::f64::consts::PI;
 
-use engine::{Scales, StepRule};
-use surfaces::Fairing;
-
 use super::flow::{FlowCommand, Shared};
-use crate::cli::{FairOptions, FlowOptions, SayOptions, SizeTarget};
-use crate::error::Error;
-use crate::input::{self, Loaded, Start};
+use crate::cli::FairOptions;
 use crate::keep::Keep;
-use crate::own::OwnMesh;
+use crate::prelude::*;
 
 /// Energies below this have only balls, which have `8 pi`.
 const BALL: f64 = 1.2 * 8.0 * PI;

@@ -1,30 +1,13 @@
 //! `willmore flow`, and what it has in common with the other commands that make runs.
 
-use std::path::Path;
-use std::process::ExitCode;
-
-use engine::{
-    Case, ErrorControl, Flow, Held, Helfrich, Measure, Method, Scales, StepRule, Stop, Target,
-    TimeSteps,
-};
-use geometry::{Field, ZeroSet};
-use operators::ComputeDevice;
-use runs::StoredRun;
-use serde::Serialize;
+use engine::{ErrorControl, Flow, Held, Helfrich, Target, TimeSteps};
 use solver::NewtonParams;
 
 use super::{open_device, operator};
-use crate::cli::{
-    CommonOptions, FlowOptions, InputOptions, KeepOptions, SayOptions, SchemeOptions, SizeTarget,
-    Tolerance,
-};
-use crate::config;
-use crate::error::Error;
-use crate::input::{self, Loaded, Start};
-use crate::outlet::{Outlet, Space};
-use crate::plane::Plane;
+use crate::cli::{CommonOptions, SchemeOptions};
+use crate::prelude::*;
 use crate::run::Plan;
-use crate::volume::{self, Label};
+use crate::volume;
 
 /// Steps of a run that has no other end.
 const STEPS: usize = 20;

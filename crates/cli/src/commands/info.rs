@@ -1,14 +1,10 @@
 //! `willmore info`.
 
 use std::fmt::Write;
-use std::process::ExitCode;
 
 use model::Shipped;
-use operators::{ComputeDevice, DeviceKind};
-use serde_json::json;
 
-use crate::cli::SayOptions;
-use crate::error::Error;
+use crate::prelude::*;
 
 pub fn run(say: SayOptions) -> Result<ExitCode, Error> {
     let version = env!("CARGO_PKG_VERSION");

@@ -12,13 +12,11 @@ pub mod sample;
 pub mod shell;
 pub mod train;
 
-use engine::{Method, Operator, Scales, Scheme};
-use geometry::Grid;
+use engine::Operator;
 use model::Networks;
-use operators::{ComputeDevice, DeviceKind};
 
 use crate::cli::{CommonOptions, SchemeOptions};
-use crate::error::Error;
+use crate::prelude::*;
 
 /// Opens the device and writes its name into the options.
 pub fn open_device(options: &mut CommonOptions) -> Result<ComputeDevice, Error> {

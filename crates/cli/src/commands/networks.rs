@@ -1,13 +1,9 @@
 //! `willmore networks`.
 
-use std::path::Path;
-use std::process::ExitCode;
-
 use model::{Network, Shipped};
-use serde_json::{Value, json};
 
-use crate::cli::{NetworksCommand, SayOptions};
-use crate::error::Error;
+use crate::cli::NetworksCommand;
+use crate::prelude::*;
 
 pub fn run(show: Option<&NetworksCommand>, say: SayOptions) -> Result<ExitCode, Error> {
     let all = [Shipped::Accurate.all()?, Shipped::Paper.all()?].concat();

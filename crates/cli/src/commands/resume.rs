@@ -1,15 +1,8 @@
 //! `willmore resume`.
 
-use std::process::ExitCode;
-
-use runs::RunDirectory;
-use serde_json::json;
-
 use super::flow;
-use crate::cli::{Command, ResumeOptions, SayOptions};
-use crate::config;
-use crate::error::Error;
-use crate::page;
+use crate::cli::{Command, ResumeOptions};
+use crate::prelude::*;
 
 /// Continues a run by the options and the state that it stored; its input is not needed again.
 pub fn run(options: &ResumeOptions, say: SayOptions) -> Result<ExitCode, Error> {

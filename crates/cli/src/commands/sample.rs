@@ -1,18 +1,10 @@
 //! `willmore sample`.
 
-use std::path::Path;
-use std::process::ExitCode;
-
-use geometry::{Field, npy, phase_field, vti};
-use serde_json::json;
-use surfaces::shapes::Region;
 use volumes::Volume;
 
-use crate::cli::{InputOptions, SampleOptions, SayOptions};
-use crate::error::Error;
-use crate::input::{self, Loaded, Start};
-use crate::outlet::{MESHES, Outlet};
-use crate::volume::{self, Label};
+use crate::cli::SampleOptions;
+use crate::prelude::*;
+use crate::volume;
 
 /// Interface width in cells of what is written.
 const EPS_OVER_H: f64 = 2.0;

@@ -1,17 +1,13 @@
 //! `willmore train`.
 
-use std::process::ExitCode;
-
 use engine::quarter_square;
 use model::Ratios;
 use model::training::least_squares::LeastSquaresParams;
 use model::training::{Checkpoint, Progress, SphereData, Trained, Training};
-use runs::Interrupt;
-use serde_json::json;
 
 use super::{check_eps_over_h, open_device};
-use crate::cli::{SayOptions, TrainOptions};
-use crate::error::Error;
+use crate::cli::TrainOptions;
+use crate::prelude::*;
 
 /// Cells per unit length of the training grid for `eps = 2h`; it grows with the interface, so that the same spheres fit.
 const CELLS: f64 = 128.0;
