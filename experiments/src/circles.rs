@@ -1,31 +1,19 @@
 //! Circles under mean curvature flow and Willmore flow, compared with the exact solutions
 //! (eq:analyticSolutionMCFCircle and `R(t) = (r^4 + 2t)^(1/4)`).
 
-use std::f64::consts::PI;
-use std::path::Path;
-
-use engine::{Order, Samples, Stop, TimeSteps, Trajectory, minimizations};
 use geometry::Error as GeometryError;
 use geometry::exact::{mean_curvature_radius, willmore_radius};
-use geometry::measure::l2_distance;
-use geometry::shapes::Ball;
-use indicatif::ProgressBar;
 use runs::Interrupt;
-use solver::{NewtonParams, StepRecord};
 
 use crate::harness::{in_parallel, workers};
-use crate::networks::{EPS, STEP};
 use crate::prelude::*;
 use crate::study::{self, Variant};
 
-/// Number of circles.
 pub const COUNT: usize = 30;
-/// Number of time steps.
 pub const STEPS: usize = 64;
 /// Distance of the interface to the box's boundary, `19.2 eps`: the profile's tails are below `1e-12` there.
 const MARGIN: f64 = 0.3;
 
-/// Radius of a circle at time `t`.
 fn radius_at(flow: Flow, r: f64, t: f64) -> f64 {
     match flow {
         Flow::MeanCurvature => mean_curvature_radius(r, t, 2),
@@ -72,7 +60,6 @@ fn exact(flow: Flow, radius: f64, grid: Grid<2>, time: f64) -> Result<Field<2>, 
     phase_field(grid, &Ball::new([0.0, 0.0], radius)?, EPS)
 }
 
-/// One circle.
 fn case(
     (flow, operator, n): (Flow, &Operator, usize),
     radius: f64,
@@ -98,9 +85,7 @@ fn case(
     Ok(case)
 }
 
-/// What came out for one circle.
 pub struct Circle {
-    /// Initial radius.
     pub radius: f64,
     /// Exact `L2` distance between the last and the first time, for scale.
     pub travelled: f64,
@@ -161,22 +146,18 @@ impl Ensemble {
         })
     }
 
-    /// Mean of a quantity over the circles.
     pub fn mean(&self, f: impl Fn(&Circle) -> f64) -> f64 {
         self.circles.iter().map(f).sum::<f64>() / self.circles.len().max(1) as f64
     }
 
-    /// Mean error after `k` steps.
     pub fn mean_error(&self, k: usize) -> f64 {
         self.mean(|circle| circle.error(k))
     }
 
-    /// Mean error at the end.
     pub fn last_error(&self) -> f64 {
         self.mean(|circle| circle.error(circle.trajectory.records.len()))
     }
 
-    /// Largest and smallest error after `k` steps.
     pub fn error_range(&self, k: usize) -> [f64; 2] {
         let errors = || self.circles.iter().map(|circle| circle.error(k));
         [
@@ -185,13 +166,11 @@ impl Ensemble {
         ]
     }
 
-    /// Mean wall time of a step.
     pub fn seconds_per_step(&self) -> f64 {
         let steps = self.circles[0].trajectory.records.len();
         self.mean(|circle| circle.trajectory.seconds()) / steps as f64
     }
 
-    /// All minimizations of Willmore flow.
     pub fn minimizations(&self) -> impl Iterator<Item = &StepRecord> {
         let records = self.circles.iter().map(|circle| &circle.trajectory.records);
         records.flat_map(|records| minimizations(records))

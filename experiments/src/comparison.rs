@@ -1,27 +1,17 @@
 //! A shape by all methods and resolutions, against a finer run as in the paper, and against the exact flow.
 
-use std::collections::BTreeMap;
-
 use clap::{CommandFactory, FromArgMatches};
-use engine::{ErrorControl, Samples, Trajectory, energy_increases, minimizations};
-use geometry::measure::{perimeter, zero_set_volume};
-use report::{Curve, OutputDir, Shapes, Table};
-use solver::StepRecord;
+use geometry::measure::perimeter;
 
-use crate::look;
-use crate::networks::{EPS, STEP};
 use crate::prelude::*;
 use crate::steps::{self, Rows};
 use crate::study::{self, Study, StudyOptions, Variant};
 use crate::truth::{self, CELLS, Reached, STRICT, Sample, Truth};
 
-/// A shape and the flow it undergoes.
 pub struct Setting {
     /// Name of the program and its folder, and prefix of the metrics.
     pub program: &'static str,
-    /// Of the figures.
     pub title: &'static str,
-    /// What the program does, for its help.
     pub about: &'static str,
     /// Name of the shape with its measures.
     pub shape: &'static str,
@@ -29,11 +19,9 @@ pub struct Setting {
     pub flow: Flow,
     /// Time steps of `2^-14`.
     pub steps: usize,
-    /// Steps whose shapes are drawn.
     pub shown: &'static [usize],
     /// Steps of the reference per step of the compared runs.
     pub reference_ratio: usize,
-    /// Half the width of the window of the shapes.
     pub window: f64,
 }
 
@@ -53,7 +41,6 @@ struct Options {
     steps: Option<usize>,
 }
 
-/// The program of a comparison.
 pub fn main(setting: &Setting) -> ExitCode {
     let command = Options::command()
         .name(setting.program)
@@ -63,10 +50,8 @@ pub fn main(setting: &Setting) -> ExitCode {
     harness::run(|| run(setting, &options))
 }
 
-/// What is measured of the shapes.
 const MEASURES: [&str; 4] = ["tip", "diagonal", "perimeter", "area"];
 
-/// A run and its distances to the reference.
 struct Compared {
     variant: Variant,
     trajectory: Trajectory<2>,
@@ -80,13 +65,11 @@ struct Compared {
 
 /// Runs of second order at the times at which they are compared with the exact flow.
 struct SecondOrder {
-    /// As in metrics and as in the figure.
     key: String,
     label: String,
     at: BTreeMap<usize, Reached>,
 }
 
-/// Everything a comparison computed.
 struct Comparison<'a> {
     setting: &'a Setting,
     steps: usize,
@@ -95,7 +78,6 @@ struct Comparison<'a> {
     /// The reference, and perhaps the same at half its resolution, to estimate its error.
     references: Vec<Compared>,
     exact: BTreeMap<usize, Truth>,
-    /// For Willmore flow.
     second_order: Vec<SecondOrder>,
 }
 
@@ -311,7 +293,6 @@ impl Compared {
         study::mean(self.minimizations(), of)
     }
 
-    /// The zero level at a time.
     fn loops(&self, step: usize) -> Result<Curve, Error> {
         let field = self.trajectory.field(step * self.ratio)?;
         Ok(look::outline(&field))

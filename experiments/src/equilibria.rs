@@ -1,10 +1,6 @@
 //! Curves and surfaces that come to rest with given perimeter and volume, against exact equilibria.
 
-use std::f64::consts::{PI, TAU};
-
-use engine::{Held, Samples, Stop, Target, TimeSteps, Trajectory};
-use geometry::shapes::Ellipse;
-use geometry::{SignedDistance, ZeroSet};
+use std::f64::consts::TAU;
 
 use crate::prelude::*;
 
@@ -23,7 +19,6 @@ pub struct Exact {
 /// An equilibrium: its perimeter is that of the ball of this radius, its volume a part of that ball's, which is the reduced volume in
 /// space and the isoperimetric quotient in the plane.
 pub struct Equilibrium {
-    /// Prefix of the metrics.
     pub key: String,
     pub title: String,
     pub radius: f64,
@@ -35,7 +30,6 @@ pub struct Equilibrium {
 }
 
 impl Equilibrium {
-    /// Perimeter and volume.
     fn sizes<const D: usize>(&self) -> [f64; 2] {
         let (r, v) = (self.radius, self.ratio);
         match D {
@@ -135,7 +129,6 @@ impl Equilibrium {
     }
 }
 
-/// A shape at rest.
 pub struct AtRest<const D: usize> {
     pub equilibrium: Equilibrium,
     pub trajectory: Trajectory<D>,
@@ -155,7 +148,6 @@ impl<const D: usize> AtRest<D> {
         drift.max_by(f64::total_cmp)
     }
 
-    /// The last value of what a minimization says.
     fn last(&self, of: fn(&solver::StepRecord) -> Option<f64>) -> Option<f64> {
         let records = self.trajectory.records.iter().rev();
         records.filter_map(|r| r.minimization.as_ref()).find_map(of)

@@ -37,17 +37,7 @@ pub enum Error {
 impl Error {
     /// The message with its causes, on one line.
     pub fn line(&self) -> String {
-        let mut line = self.to_string();
-        let mut cause = std::error::Error::source(self);
-        while let Some(error) = cause {
-            let text = error.to_string();
-            // Most messages already contain their cause's.
-            if !line.contains(&text) {
-                line = format!("{line}: {text}");
-            }
-            cause = error.source();
-        }
-        line.split_whitespace().collect::<Vec<_>>().join(" ")
+        files::with_causes(self)
     }
 }
 

@@ -1,11 +1,5 @@
 //! Inpainting, in any dimension: Willmore flow of the values in a region, the rest held.
 
-use clap::Args;
-use engine::{Samples, Stop, Trajectory, energy_increases, mean_hvp};
-use geometry::SignedDistance;
-use geometry::measure::l2_distance;
-use serde_json::Value;
-
 use crate::prelude::*;
 use crate::steps::steps_csv;
 use crate::surfaces::willmore_flow;
@@ -25,11 +19,9 @@ pub struct InpaintingOptions {
     pub scheme: Scheme,
 }
 
-/// A shape that is inpainted.
 pub struct Shape<const D: usize> {
     /// Prefix of its metrics and files.
     pub key: &'static str,
-    /// Name in titles and tables.
     pub title: &'static str,
     /// The shape with its fault.
     pub initial: Box<dyn SignedDistance<D>>,
@@ -47,7 +39,6 @@ pub struct Shape<const D: usize> {
 }
 
 impl<const D: usize> Shape<D> {
-    /// The shape in its region on a grid.
     pub fn case(
         &self,
         grid: Grid<D>,
@@ -66,7 +57,6 @@ impl<const D: usize> Shape<D> {
         Ok(case)
     }
 
-    /// Which phase fields are kept.
     pub fn samples(&self) -> Samples {
         Samples {
             every: self.steps,
@@ -80,7 +70,6 @@ fn first_substep(eps: f64) -> f64 {
     FIRST_SUBSTEP * eps.powi(4)
 }
 
-/// The parameters of a program, for its manifest.
 pub fn parameters<const D: usize>(
     (n, scales): (usize, &Scales),
     operator: &Operator,
@@ -96,7 +85,6 @@ pub fn parameters<const D: usize>(
     })
 }
 
-/// What became of a shape.
 pub struct Inpainted<'a, const D: usize> {
     pub shape: &'a Shape<D>,
     pub trajectory: &'a Trajectory<D>,
@@ -149,7 +137,6 @@ impl<'a, const D: usize> Inpainted<'a, D> {
         stands_still.then_some((last.time - last.tau) / self.tau())
     }
 
-    /// Writes the figure of the shown steps.
     pub fn write_frames(&self, session: &Session<'_>, figure: Figure) -> Result<(), Error> {
         let title = format!("Inpainting: {}", self.shape.title);
         let name = format!("{}_frames", self.shape.key);

@@ -1,9 +1,8 @@
 //! How curves look in the figures: colours stand for methods in their schemes, dashes for resolutions.
 
-use engine::{Method, Scheme};
-use geometry::Field;
 use geometry::contour::{Interpolation, zero_level};
-use report::{Colour, Curve, LegendEntry, LineChart, LineStyle, Marker, Series};
+
+use crate::prelude::*;
 
 /// The methods in their schemes that are shown, in the order of legends.
 pub fn variants(
@@ -38,7 +37,6 @@ fn dashes(n: usize, cells: &[usize]) -> LineStyle {
     [Solid, Dashed, ShortDashed, Dotted][rank(n, cells).min(3)]
 }
 
-/// A marker for a resolution.
 pub fn marker(n: usize, cells: &[usize]) -> Marker {
     use Marker::{Circle, Diamond, Square, Triangle};
     [Circle, Square, Triangle, Diamond][rank(n, cells).min(3)]
@@ -72,7 +70,6 @@ pub fn legend(
     chart.with_entries(methods).with_entries(resolutions)
 }
 
-/// The zero level of a phase field.
 pub fn outline(field: &Field<2>) -> Curve {
     let curves = zero_level(field, Interpolation::Profile).into_iter();
     Curve::new(curves.map(|curve| curve.points).collect::<Vec<_>>())

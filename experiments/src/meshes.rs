@@ -1,19 +1,13 @@
 //! Triangle meshes and volumes as initial data.
 
-use std::path::{Path, PathBuf};
-
-use clap::{Args, ValueEnum};
-use geometry::{Placement, UpAxis, npy, optimal_profile, vti};
-use indicatif::ProgressBar;
+use geometry::{npy, vti};
 use runs::fingerprint;
-use serde_json::Value;
 use surfaces::{ClosedMesh, MeshDistance, usual_up_axis};
 
 use crate::prelude::*;
 
 /// Names a folder that holds the meshes of the paper.
 pub const FOLDER_VARIABLE: &str = "WORKBENCH_MESHES";
-/// Where `scripts/fetch_meshes` puts them.
 const FOLDER: &str = "meshes";
 
 /// Options of programs that start from a mesh.
@@ -66,11 +60,8 @@ pub enum VolumeKind {
 pub struct KnownMesh {
     pub file: &'static str,
     pub title: &'static str,
-    /// Longest side, unless chosen otherwise.
     pub side_length: f64,
-    /// Side of the box, unless chosen otherwise.
     pub box_side: f64,
-    /// Makes the built-in shape at a resolution.
     pub procedural: fn(usize) -> Result<ClosedMesh, surfaces::Error>,
     pub procedural_title: &'static str,
 }
@@ -87,10 +78,8 @@ pub const ARMADILLO: KnownMesh = KnownMesh {
     procedural_title: "built-in figure",
 };
 
-/// Initial data with their provenance.
 pub struct Loaded {
     shape: Shape,
-    /// What they are, in titles.
     pub title: String,
     /// File with its checksum, measures, what was mended: for manifests.
     pub about: Value,
@@ -105,7 +94,6 @@ enum Shape {
 const PROCEDURAL_CELLS: usize = 96;
 
 impl MeshOptions {
-    /// Side of the box.
     pub fn box_side(&self, known: &KnownMesh) -> f64 {
         self.box_side.unwrap_or(known.box_side)
     }
@@ -187,7 +175,6 @@ pub fn folder() -> PathBuf {
     named.unwrap_or_else(|| PathBuf::from(FOLDER))
 }
 
-/// Name and checksum of a file.
 fn about_file(path: &Path) -> Result<(String, Value), Error> {
     let bytes = std::fs::read(path).map_err(files::Error::of("read", path))?;
     let name = path.file_name().unwrap_or(path.as_os_str());
@@ -244,7 +231,6 @@ fn volume(path: &Path, grid: Grid<3>, holds: VolumeKind) -> Result<Field<3>, Err
     Ok(Field::from_values(grid, field.into_values())?)
 }
 
-/// Signed distances at the nodes of a grid.
 pub fn sampled(
     distance: &MeshDistance,
     grid: Grid<3>,

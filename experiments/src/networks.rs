@@ -1,21 +1,14 @@
 //! The scales of the convergence tests, and where networks come from.
 
-use std::path::PathBuf;
-
-use clap::Args;
-use engine::{Method, Operator, Scales, Scheme};
-use geometry::Grid;
 use model::{NamedNetwork, NeededNetwork, Networks, Ratios};
-use solver::NewtonParams;
 
-use crate::{Error, require};
+use crate::prelude::*;
 
 /// Interface width `eps = 2^-6`.
 pub const EPS: f64 = 1.0 / 64.0;
 /// Time step `tau = tautilde = 2^-14` of both flows.
 pub const STEP: f64 = 1.0 / 16384.0;
 
-/// The scales of the convergence tests.
 pub fn scales() -> Scales {
     Scales {
         eps: EPS,
@@ -52,7 +45,6 @@ impl Chosen {
         }
     }
 
-    /// The network of a scheme with these ratios.
     pub fn find(&self, scheme: Scheme, needed: &NeededNetwork) -> Result<NamedNetwork, Error> {
         Ok(self.of(scheme).find(scheme.shipped(), needed)?)
     }

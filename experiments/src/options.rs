@@ -1,13 +1,6 @@
 //! Options common to all programs.
 
-use std::path::PathBuf;
-
-use clap::Args;
-use operators::{ComputeDevice, DeviceKind};
-use report::{OutputDir, Progress};
-
-use crate::Error;
-use crate::networks::NetworkOptions;
+use crate::prelude::*;
 
 /// Options of every program.
 #[derive(Args, Clone, Debug)]

@@ -1,7 +1,5 @@
 //! Orders of convergence of runs against the finest of them.
 
-use engine::Trajectory;
-
 use crate::prelude::*;
 
 /// Writes what the sequences of runs say, each with the name of the size that is halved from one run to the next: a figure, a table, and
@@ -37,7 +35,6 @@ pub fn finish<const D: usize>(
 /// A run in a sequence in which a size, `h` or `tau`, is halved from one to the next.
 #[derive(Clone, Copy, Debug)]
 struct Refinement {
-    /// The size.
     size: f64,
     /// `L2` distance of its end to that of the finest run, which is small only as long as the finest run is much finer,
     to_finest: f64,

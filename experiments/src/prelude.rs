@@ -1,17 +1,36 @@
 //! What nearly every program needs.
 
+pub use std::collections::BTreeMap;
+pub use std::f64::consts::PI;
+pub use std::path::{Path, PathBuf};
 pub use std::process::ExitCode;
+pub use std::time::Instant;
 
-pub use clap::Parser;
-pub use engine::{Case, Flow, Measure, Method, Operator, Record, Run, Scales, Scheme, StepRule};
-pub use geometry::{Field, Grid, phase_field};
-pub use operators::ComputeDevice;
+pub use clap::{Args, Parser, ValueEnum};
+pub use engine::{
+    Case, ErrorControl, Flow, Held, Measure, Method, Operator, Order, Record, Run, Samples, Scales,
+    Scheme, StepRule, Stop, Target, TimeSteps, Trajectory, energy_increases, mean_hvp,
+    minimizations,
+};
+pub use geometry::measure::{l2_distance, zero_set_volume};
+pub use geometry::shapes::{Ball, Cross, Cuboid, Cylinder, Ellipse};
+pub use geometry::{
+    Field, Grid, Placement, SignedDistance, SignedDistanceExt, UpAxis, ZeroSet, optimal_profile,
+    phase_field,
+};
+pub use indicatif::ProgressBar;
+pub use operators::{ComputeDevice, DeviceKind};
 pub use report::Format::{self, Fixed, Scientific, Shortest};
-pub use report::{Axis, Colour, Figure, LegendEntry, LineChart, LineStyle, Marker, Series};
+pub use report::{
+    Axis, Cell, Colour, Curve, Figure, LegendEntry, LineChart, LineStyle, Marker, OutputDir,
+    Progress, Raster, Series, Shapes, Table,
+};
 pub use serde::Serialize;
-pub use serde_json::json;
+pub use serde_json::{Value, json};
+pub use solver::{NewtonParams, StepRecord};
 
+pub use crate::networks::{EPS, NetworkOptions, STEP};
 pub use crate::options::{FigureOptions, RunOptions};
-pub use crate::session::Session;
+pub use crate::session::{Session, Stage};
 pub use crate::sheet::Sheet;
-pub use crate::{Error, harness, require};
+pub use crate::{Error, harness, look, require};

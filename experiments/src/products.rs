@@ -9,18 +9,17 @@
 
 use std::hint::black_box;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use burn::tensor::{DType, Tensor};
-use geometry::Field;
 use model::{MeanCurvatureOperator, Network};
-use operators::{ComputeDevice, SpectralFilter, Transform, kernel_symbol, spectral_filter};
+use operators::{SpectralFilter, Transform, kernel_symbol, spectral_filter};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 use solver::{MinimizingMovement, Objective, Precision};
 
-use crate::Error;
 use crate::error::require;
+use crate::prelude::*;
 use crate::timing::{Numbers, median, take_turns};
 
 /// `c = tau / tautilde^2` of a typical step: `tau = tautilde = 2^-14`.
@@ -32,9 +31,7 @@ const CHUNK: usize = 1 << 13;
 struct ByHand {
     plan: Arc<Transform<f64>>,
     symbol: Arc<Vec<Complex<f64>>>,
-    /// `F'(w)`.
     slope: Vec<f64>,
-    /// `F''(w) r`.
     bend: Vec<f64>,
 }
 

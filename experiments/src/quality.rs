@@ -1,9 +1,8 @@
 //! The quality of networks as columns of a table; its metrics are all fields of [`Quality`].
 
 use model::Quality;
-use report::Format;
 
-use crate::sheet::Sheet;
+use crate::prelude::*;
 
 const LOSS: Format = Format::Scientific(2);
 const TRANSFER: Format = Format::Fixed(5);
@@ -21,7 +20,6 @@ const COLUMNS: [(&str, Format, fn(&Quality) -> f64); 10] = [
     ("radial asymmetry", LOSS, |q| q.radial_asymmetry),
 ];
 
-/// Adds the columns of the quality to a table.
 pub fn columns<'a, R>(sheet: Sheet<'a, R>, of: impl Fn(&'a R) -> &'a Quality) -> Sheet<'a, R> {
     let add = |sheet: Sheet<'a, R>, (head, format, value): (_, _, fn(&Quality) -> f64)| {
         sheet.column::<f64>(head, format, |row| value(of(row)))

@@ -1,18 +1,11 @@
 //! What every program does between its options and its results.
 
 use std::io::Write;
-use std::time::Instant;
 
-use engine::{Case, Samples, Stop, Trajectory};
-use indicatif::ProgressBar;
-use operators::ComputeDevice;
-use report::{Cell, Figure, Manifest, OutputDir, Progress, Summary};
+use report::{Manifest, Summary};
 use runs::Interrupt;
-use serde_json::Value;
 
-use crate::Error;
-use crate::options::RunOptions;
-use crate::sheet::Sheet;
+use crate::prelude::*;
 
 /// A program whose options are checked, and what it has to say so far.
 pub struct Session<'a> {
@@ -34,6 +27,17 @@ pub struct Stage<'a> {
     pub device: &'a ComputeDevice,
     pub output: &'a OutputDir,
     pub bar: ProgressBar,
+}
+
+impl Stage<'_> {
+    /// Runs a case to its end; the bar counts the steps.
+    pub fn run<const D: usize>(&self, case: Case<D>) -> Result<Run<D>, Error> {
+        let mut run = Run::new(case, self.device)?;
+        while run.step()?.is_some() {
+            self.bar.inc(1);
+        }
+        Ok(run)
+    }
 }
 
 impl<'a> Session<'a> {
@@ -129,7 +133,6 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Adds metrics `KEY.NAME`.
     pub fn metrics<const N: usize>(
         &mut self,
         key: &str,
@@ -139,7 +142,6 @@ impl<'a> Session<'a> {
         metrics.try_for_each(|(name, value)| self.metric(&format!("{key}.{name}"), value))
     }
 
-    /// Adds a text to what is printed in the end.
     pub fn remark(&mut self, text: impl Into<String>) {
         self.report.push(text.into());
     }

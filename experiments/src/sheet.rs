@@ -14,7 +14,6 @@ pub struct Sheet<'a, R> {
 }
 
 impl<'a, R> Sheet<'a, R> {
-    /// Rows of which nothing is measured yet.
     pub fn of(rows: &'a [R]) -> Self {
         Self {
             rows,
@@ -30,13 +29,11 @@ impl<'a, R> Sheet<'a, R> {
         self
     }
 
-    /// A column of text.
     pub fn text<S: Into<String>>(mut self, head: &str, value: impl Fn(&'a R) -> S) -> Self {
         self.table = self.table.text(head, value);
         self
     }
 
-    /// A column of numbers.
     pub fn column<C: Into<Cell>>(
         mut self,
         head: impl Into<String>,

@@ -2,19 +2,15 @@
 
 use std::collections::BTreeSet;
 
-use engine::{Record, Trajectory, Values};
-use report::{Cell, Table};
-use solver::StepRecord;
+use engine::Values;
 
-use crate::Error;
+use crate::prelude::*;
 
-/// A run in a table of steps.
 pub struct Rows<'a> {
     /// Which run it is: a cell for each leading column.
     pub leading: Vec<Cell>,
     /// The measures of the initial phase field, if there is to be a row for them.
     pub start: Option<&'a Values>,
-    /// Its steps.
     pub records: &'a [Record],
 }
 

@@ -1,13 +1,8 @@
 //! Studies in the plane at the scales of the convergence tests: methods in their schemes at several resolutions.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
-use clap::Args;
-use report::Cell;
-use solver::StepRecord;
-
-use crate::look;
-use crate::networks::{Chosen, NetworkOptions, STEP, convergence_network, scales};
+use crate::networks::{Chosen, convergence_network, scales};
 use crate::prelude::*;
 use crate::surfaces::willmore_flow;
 
@@ -39,7 +34,6 @@ pub struct StudyOptions {
 }
 
 impl StudyOptions {
-    /// Resolutions in increasing order.
     pub fn cells(&self) -> Vec<usize> {
         let mut cells = match (&self.cells[..], self.run.quick, self.full) {
             ([], true, _) => vec![128],
@@ -74,13 +68,11 @@ impl StudyOptions {
     }
 }
 
-/// A curve in the figures of a study.
 #[derive(Serialize, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Variant {
     pub flow: Flow,
     pub method: Method,
     pub scheme: Scheme,
-    /// Cells per unit length.
     pub n: usize,
 }
 
@@ -88,7 +80,6 @@ impl Variant {
     /// Columns of tables that say which variant it is.
     pub const COLUMNS: [&str; 4] = ["flow", "n", "method", "scheme"];
 
-    /// Their cells.
     pub fn cells(&self) -> [Cell; 4] {
         let texts = [self.flow.key(), self.method.key(), self.scheme.key()];
         let [flow, method, scheme] = texts.map(Cell::from);
@@ -109,7 +100,6 @@ impl Variant {
         format!("n{}.{}", self.n, self.method.key_in(self.scheme))
     }
 
-    /// Name in legends.
     pub fn label(&self) -> String {
         self.method.label_in(self.scheme)
     }
@@ -123,7 +113,6 @@ impl Variant {
 /// What is compared with what, with all operators.
 pub struct Study {
     pub cells: Vec<usize>,
-    /// Variants with their operators.
     pub plan: Vec<(Variant, Operator)>,
     pub networks: Chosen,
 }
@@ -162,7 +151,6 @@ impl Study {
         self.plan.iter().filter_map(of).collect()
     }
 
-    /// The curve of a variant.
     pub fn series(&self, variant: Variant, points: Vec<[f64; 2]>) -> Series {
         look::curve(points, variant.look(), (variant.n, &self.cells))
     }

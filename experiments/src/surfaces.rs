@@ -1,26 +1,19 @@
 //! Surfaces under Willmore flow: their scales, the shown steps of a run, and the pictures, tables and metrics of those.
 
-use clap::Args;
-use engine::{Held, Helfrich, Samples, Stop, Trajectory, energy_increases, mean_hvp};
+use engine::Helfrich;
 use geometry::measure::BoundingBox;
-use model::NeededNetwork;
+use model::{NeededNetwork, Networks};
 use operators::memory;
 pub use render::View;
 use render::{Quality, Rgb, Scene, Tube};
-use report::Raster;
-use serde_json::Value;
-use surfaces::ClosedMesh;
+use surfaces::{ClosedMesh, Fairing, TriangleMesh};
 
 use crate::networks::Chosen;
 use crate::prelude::*;
-use crate::session::Stage;
 use crate::steps::steps_csv;
 
-/// Interface width of surfaces, in cells.
 const EPS_OVER_H: f64 = 2.0;
-/// Kernel width of the network for surfaces.
 const WIDTH: usize = 17;
-/// The usual side of a picture in pixels.
 const SIDE: u32 = 640;
 /// Colour of a surface where it may move, if it may not everywhere.
 const MOVING: Rgb = Rgb(150, 196, 160);
@@ -40,9 +33,7 @@ pub fn centred_box(n: usize, side: f64) -> Result<Grid<3>, Error> {
     Ok(Grid::per_unit(n, side)?.with_origin([0.5 - 0.5 * side; 3])?)
 }
 
-/// What surfaces at one resolution share.
 pub struct Setting {
-    /// Cells per unit length.
     pub n: usize,
     pub grid: Grid<3>,
     pub scales: Scales,
@@ -104,6 +95,30 @@ pub fn willmore_flow<const D: usize>(
     }
 }
 
+/// The accurate operator for the scales of a grid.
+pub fn accurate_operator<const D: usize>(
+    grid: &Grid<D>,
+    scales: &Scales,
+) -> Result<Operator, Error> {
+    let (needed, networks) = (scales.needs(D, grid.spacing()), Networks::default());
+    let accurate = (Method::Hybrid, Scheme::Accurate);
+    Ok(Operator::new(accurate, &networks, &needed, grid, scales)?)
+}
+
+/// Willmore flow from signed distances as `willmore fair` makes it, without its ends and measures.
+pub fn fairing_flow(title: &str, mut distance: Field<3>) -> Result<Case<3>, Error> {
+    surfaces::mend_signs(&mut distance);
+    let (grid, spacing) = (*distance.grid(), distance.grid().spacing());
+    let scales = Scales::of_grid(spacing, EPS_OVER_H);
+    let initial = distance.map(|s| optimal_profile(s, scales.eps));
+    let rule = StepRule::Graded {
+        first: Fairing::first_step(spacing),
+        part: Fairing::GROWTH,
+    };
+    let operator = accurate_operator(&grid, &scales)?;
+    Ok(willmore_flow(title, initial, operator, scales, (rule, 0)))
+}
+
 #[derive(Args, Clone, Copy, Debug)]
 pub struct SchemeOptions {
     /// One scheme alone: paper, calibrated or accurate [default: paper and accurate]
@@ -121,7 +136,6 @@ impl SchemeOptions {
 /// What is shown of a surface that flows.
 #[derive(Clone)]
 pub struct Surface {
-    /// Prefix of its metrics and files.
     pub key: &'static str,
     pub title: String,
     /// Steps to be shown, and the Willmore energies that the paper reports for them. Of a run that ends early the last one is shown.
@@ -139,31 +153,25 @@ const MEASURES: [(&str, &str, usize); 5] = [
     ("euler_characteristic", "Euler characteristic", 0),
 ];
 
-/// A shown step.
 pub struct Snapshot {
     pub step: usize,
     pub time: f64,
     measures: [f64; MEASURES.len()],
     /// The Willmore energy that the paper reports.
     paper: Option<f64>,
-    /// What stands below the picture.
     pub caption: String,
-    /// Curves drawn into the picture.
     pub tubes: Vec<Tube>,
 }
 
 impl Snapshot {
-    /// The Willmore energy.
     pub fn w(&self) -> f64 {
         self.measures[0]
     }
 }
 
-/// A surface that has flowed.
 pub struct Flowed {
     pub surface: Surface,
     pub trajectory: Trajectory<3>,
-    /// The shown steps.
     pub snapshots: Vec<Snapshot>,
     /// Largest resident memory of the process until the last step was done, in MiB, where the system tells.
     peak_mib: Option<f64>,
@@ -230,13 +238,11 @@ impl Flowed {
         })
     }
 
-    /// Name of the files of a step.
     fn file(&self, step: usize) -> String {
         let operator = self.trajectory.case.operator.key();
         format!("{}_{operator}_step{step:03}", self.surface.key)
     }
 
-    /// Name of method and scheme.
     pub fn label(&self) -> String {
         self.trajectory.case.operator.label()
     }
@@ -295,11 +301,32 @@ impl Flowed {
     }
 }
 
+/// A square picture of a scene.
+pub fn raster(scene: &Scene, side: u32, caption: impl Into<String>) -> Result<Raster, Error> {
+    let picture = scene.render([side; 2])?;
+    let size = [picture.width(), picture.height()].map(|side| side as usize);
+    Ok(Raster::new(size, picture.pixels()).with_caption(caption))
+}
+
+/// A picture of a mesh in a frame.
+pub fn mesh_raster(
+    mesh: &TriangleMesh,
+    (up, frame): (UpAxis, BoundingBox<3>),
+    caption: impl Into<String>,
+) -> Result<Raster, Error> {
+    const SIDE: u32 = 420;
+    let scene = Scene::of_mesh(mesh.clone()).within(frame).view(View {
+        up,
+        azimuth: -60.0,
+        elevation: 25.0,
+    });
+    raster(&scene, SIDE, caption)
+}
+
 /// Surfaces under Willmore flow by several methods, as a program shows them.
 pub struct SurfaceFlows {
     pub program: &'static str,
     pub title: String,
-    /// The surfaces with their initial phase fields.
     pub surfaces: Vec<(Surface, Field<3>)>,
     pub variants: Vec<(Method, Scheme)>,
     /// Sizes of the time steps, their number,

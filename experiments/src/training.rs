@@ -1,25 +1,17 @@
 //! The networks of the experiments, and training them with a progress bar and checkpoints.
 
-use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use model::training::{Checkpoint, Progress as Iteration, Recipe, SphereData, Trained, Training};
 use model::{Error as ModelError, Ratios};
-use operators::{ComputeDevice, DeviceKind};
-use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde_json::Value;
 
-use crate::Error;
-use crate::session::Stage;
+use crate::prelude::*;
 
-/// Least time between two checkpoints.
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(3);
 
-/// A network to be trained.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NetworkSpec {
-    /// Name in files and metrics.
     pub name: &'static str,
     pub ratios: Ratios,
     /// Cells per unit length of the training grid.
@@ -66,7 +58,6 @@ impl NetworkSpec {
         Self::named(|_| true)
     }
 
-    /// The networks of the paper's recipe.
     pub fn paper() -> Vec<Self> {
         Self::named(|name| name != "n64")
     }
@@ -97,7 +88,6 @@ pub fn training_device(device: &ComputeDevice) -> Result<ComputeDevice, Error> {
     Ok(ComputeDevice::open(kind)?)
 }
 
-/// Number of held-out radii for measuring quality.
 pub fn held_out_radii(quick: bool) -> usize {
     if quick { 4 } else { 20 }
 }

@@ -1,17 +1,13 @@
 //! Runs against the exact flow of their curves, and of their surfaces of revolution.
 
-use engine::{ErrorControl, Order, Samples, Stop, TimeSteps, Trajectory, estimated_time_error};
+use engine::estimated_time_error;
 use geometry::contour::{Interpolation, zero_level};
-use geometry::shapes::{Cross, Cuboid, Cylinder, Ellipse};
-use geometry::{SignedDistance, ZeroSet};
-use model::Networks;
 use reference::revolution::{self, Surface};
 use reference::{Curve, Shape, planar};
-use solver::NewtonParams;
 use surfaces::phase_field_surface;
 
 use crate::prelude::*;
-use crate::surfaces::willmore_flow;
+use crate::surfaces::{accurate_operator, willmore_flow};
 
 /// A shape whose exact flow is known, around the origin; in space a body of revolution about the third axis.
 pub struct Sample<const D: usize> {
@@ -19,7 +15,6 @@ pub struct Sample<const D: usize> {
     pub title: &'static str,
     /// Side of the periodic box. The profile's tails are below 1e-12 at the boundary.
     pub side: f64,
-    /// The phase field for an interface width.
     pub initial: fn(Grid<D>, f64) -> Result<Field<D>, geometry::Error>,
     /// The curve, or the profile of the surface.
     pub curve: fn() -> Result<Shape, reference::Error>,
@@ -47,7 +42,6 @@ pub const RECTANGLE: Sample<2> = Sample {
     level,
 };
 
-/// A smooth start.
 pub const ELLIPSE: Sample<2> = Sample {
     key: "ellipse",
     title: "Ellipse",
@@ -60,7 +54,6 @@ pub const ELLIPSE: Sample<2> = Sample {
 /// Radius and half the height of the thick disk; the paper does not say, but these fit its initial energy.
 pub const THICK_DISK: [f64; 2] = [0.29, 0.1];
 
-/// The thick disk of the paper.
 pub const DISK: Sample<3> = Sample {
     key: "disk",
     title: "Thick disk",
@@ -108,7 +101,6 @@ pub fn controlled(control: ErrorControl, end: f64, halvings: u32) -> TimeSteps {
 }
 
 impl<const D: usize> Sample<D> {
-    /// The exact flow at increasing times.
     pub fn exact(&self, flow: Flow, times: &[f64]) -> Result<Vec<Truth>, Error> {
         let flow = match flow {
             Flow::Willmore => reference::Flow::Willmore,
@@ -145,9 +137,7 @@ impl<const D: usize> Sample<D> {
             newton,
             ..Scales::of_grid(grid.spacing(), 2.0)
         };
-        let needed = scales.needs(D, grid.spacing());
-        let accurate = (Method::Hybrid, Scheme::Accurate);
-        let operator = Operator::new(accurate, &Networks::default(), &needed, &grid, &scales)?;
+        let operator = accurate_operator(&grid, &scales)?;
         let initial = (self.initial)(grid, scales.eps)?;
         let mut case = willmore_flow(self.key, initial, operator, scales, (steps.rule, 1));
         case.steps = steps;
@@ -158,13 +148,11 @@ impl<const D: usize> Sample<D> {
     }
 }
 
-/// An exact shape at a time.
 pub enum Truth {
     Curve(Curve),
     Surface(Surface),
 }
 
-/// Sizes by their names in metrics.
 pub type Sizes = Vec<(&'static str, f64)>;
 
 impl Truth {
@@ -230,7 +218,6 @@ pub fn record(
 /// What a run has reached at a time at which one of its steps ends.
 pub struct Reached {
     pub sizes: Sizes,
-    /// The zero level.
     pub points: Vec<[f64; 2]>,
     /// The largest distance of the zero level to the exact curve or surface.
     pub distance: f64,
@@ -310,7 +297,6 @@ impl Reached {
     }
 }
 
-/// The largest distance of points to a closed polygon.
 pub fn largest_distance(points: &[[f64; 2]], polygon: &[[f64; 2]]) -> f64 {
     let distance = |p: &[f64; 2]| {
         let q = nearest(polygon, *p);
@@ -319,7 +305,6 @@ pub fn largest_distance(points: &[[f64; 2]], polygon: &[[f64; 2]]) -> f64 {
     points.iter().map(distance).fold(0.0, f64::max)
 }
 
-/// The nearest point of a closed polygon.
 fn nearest(polygon: &[[f64; 2]], p: [f64; 2]) -> [f64; 2] {
     let foot = |k: usize| {
         let (a, b) = (polygon[k], polygon[(k + 1) % polygon.len()]);

@@ -1,28 +1,19 @@
 //! What an inpainted region holds at the beginning.
 
-use std::str::FromStr;
-
-use geometry::{Field, phase_field};
-use serde::{Serialize, Serializer};
-use surfaces::shapes::Region;
-
-use crate::error::Error;
+use crate::prelude::*;
 
 /// What the inpainted region holds at the beginning.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ansatz {
-    /// What the input has there.
     Keep,
     /// Nothing.
     Empty,
     /// All inside.
     Full,
-    /// A shape.
     Shape(Region),
 }
 
 impl Ansatz {
-    /// The phase field with the ansatz in the region.
     pub fn put_into<const D: usize>(
         &self,
         mut field: Field<D>,

@@ -1,21 +1,15 @@
 //! What can be typed.
 
 use std::fmt;
-use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use engine::{Scheme, StepRule, Storage};
-use geometry::UpAxis;
+use engine::Storage;
 use model::Network;
-use serde::Serialize;
-use surfaces::shapes::Region;
 
 use crate::ansatz::Ansatz;
 use crate::commands::check_eps_over_h;
-use crate::error::Error;
-use crate::volume::Label;
+use crate::prelude::*;
 
 const EXIT_CODES: &str = "Exit codes: 0 success; 2 bad input or failure, one line on standard error; 130 interrupted (Ctrl-C): \
 the last step was finished and stored, `willmore resume` goes on.";
@@ -490,33 +484,13 @@ pub struct FairOptions {
     pub allow_loss: bool,
 
     /// Format of the mesh in the run's folder [default: that of the input]
-    #[arg(long, value_name = "NAME", value_enum)]
-    pub format: Option<MeshFormat>,
+    #[arg(long, value_name = "NAME", value_parser = MESHES)]
+    pub format: Option<String>,
 
     /// Whether an option other than --noise says when to stop.
     #[arg(skip)]
     #[serde(skip)]
     pub ends: bool,
-}
-
-/// Formats of meshes.
-#[derive(ValueEnum, Serialize, Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[serde(rename_all = "kebab-case")]
-pub enum MeshFormat {
-    #[default]
-    Ply,
-    Obj,
-    Stl,
-}
-
-impl fmt::Display for MeshFormat {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Ply => "ply",
-            Self::Obj => "obj",
-            Self::Stl => "stl",
-        })
-    }
 }
 
 /// Options of `inpaint`.
@@ -691,6 +665,20 @@ pub struct TrainOptions {
 
     #[command(flatten)]
     pub common: CommonOptions,
+}
+
+impl Command {
+    /// The input of a command that makes runs, and what it keeps.
+    pub fn of_run(&mut self) -> Option<(&mut InputOptions, &mut KeepOptions)> {
+        let flow = match self {
+            Self::Mcf(mcf) => return Some((&mut mcf.input, &mut mcf.keep)),
+            Self::Flow(flow) => flow,
+            Self::Fair(fair) => &mut fair.flow,
+            Self::Inpaint(inpaint) => &mut inpaint.flow,
+            _ => return None,
+        };
+        Some((&mut flow.input, &mut flow.keep))
+    }
 }
 
 impl SchemeOptions {

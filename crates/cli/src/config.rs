@@ -12,15 +12,13 @@ mod fuzzing;
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
 
 use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
-use serde::Serialize;
 use toml::{Table, Value};
 
 use crate::cli::Cli;
-use crate::error::Error;
+use crate::prelude::*;
 
 /// The file of all options, resolved, in the folder of a run.
 pub const FILE: &str = "config.toml";
@@ -36,7 +34,7 @@ fn program() -> clap::Command {
 }
 
 /// What was typed, together with the configuration file it names.
-pub fn parse(arguments: &[OsString]) -> Result<Cli, ParseError> {
+pub fn parse(arguments: &[OsString]) -> Result<Cli, Error> {
     let matches = program().try_get_matches_from(arguments)?;
     let Some((command, typed)) = matches.subcommand() else {
         return Ok(Cli::from_arg_matches(&matches)?);
@@ -50,7 +48,7 @@ pub fn parse(arguments: &[OsString]) -> Result<Cli, ParseError> {
     let opened = File::open(file).map(|opened| opened.take(LONGEST as u64 + 1));
     let read = opened.and_then(|mut opened| opened.read_to_string(&mut text));
     read.map_err(Error::io("read", file))?;
-    Ok(parse_both(arguments, command, typed, &text, file)?)
+    parse_both(arguments, command, typed, &text, file)
 }
 
 /// The options of a file, and what was typed behind them.
@@ -88,26 +86,6 @@ pub fn resolved(command: &str, options: &impl Serialize) -> Result<String, Error
     let unwritable = |error| Error::options(format!("the options cannot be stored: {error}"));
     let options = toml::to_string(options).map_err(unwritable)?;
     Ok(format!("{COMMAND} = {command:?}\n{options}"))
-}
-
-/// Why nothing could be parsed.
-pub enum ParseError {
-    /// What clap says, which may be the help that was asked for.
-    Clap(clap::Error),
-    /// Something about a file.
-    Other(Error),
-}
-
-impl From<clap::Error> for ParseError {
-    fn from(error: clap::Error) -> Self {
-        Self::Clap(error)
-    }
-}
-
-impl From<Error> for ParseError {
-    fn from(error: Error) -> Self {
-        Self::Other(error)
-    }
 }
 
 /// What clap says, on one line.

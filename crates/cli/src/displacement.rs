@@ -1,14 +1,9 @@
 //! How far the vertices of a mesh have gone, as a picture.
 
-use geometry::UpAxis;
-use render::Scene;
 use report::{Axis, Figure, LineChart, OKABE_ITO, Raster, Rgb, Series, viridis};
-use surfaces::TriangleMesh;
 
-use crate::error::Error;
-use crate::outlet;
+use crate::prelude::*;
 
-/// Pixels a side of the surface.
 const PIXELS: u32 = 640;
 /// Bars of the histogram, and their width in the figure.
 const BARS: usize = 40;

@@ -8,10 +8,11 @@ pub enum Error {
     /// Options that contradict each other or the input.
     #[error("{0}")]
     Options(String),
-    /// An option of a configuration file.
+    /// What clap says, which may be the help that was asked for.
+    #[error(transparent)]
+    Typed(#[from] clap::Error),
     #[error("{}: {message}", path.display())]
     Config { path: PathBuf, message: String },
-    /// The system refused.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
         action: &'static str,
@@ -62,12 +63,10 @@ impl From<engine::Error> for Error {
 }
 
 impl Error {
-    /// Bad options.
     pub fn options(message: impl Into<String>) -> Self {
         Self::Options(message.into())
     }
 
-    /// What the system refused.
     pub fn io(
         action: &'static str,
         path: impl Into<PathBuf>,
@@ -80,7 +79,6 @@ impl Error {
         }
     }
 
-    /// What is wrong with a mesh.
     pub fn mesh(error: surfaces::Error) -> Self {
         use surfaces::Error::{MixedOrientation, Nesting, NonManifold, Open};
         match error {
@@ -89,20 +87,5 @@ impl Error {
             }
             error => error.into(),
         }
-    }
-
-    /// The message with its causes, on one line.
-    pub fn line(&self) -> String {
-        let mut line = self.to_string();
-        let mut cause = std::error::Error::source(self);
-        while let Some(error) = cause {
-            let text = error.to_string();
-            // Most messages already contain their cause's.
-            if !line.contains(&text) {
-                line = format!("{line}: {text}");
-            }
-            cause = error.source();
-        }
-        line.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 }

@@ -1,32 +1,19 @@
 //! Inputs as phase fields.
 
-use std::path::{Path, PathBuf};
-
-use geometry::measure::BoundingBox;
 use geometry::npy::{self, NpyError};
 use geometry::vti::{self, VtiError};
-use geometry::{
-    Field, Grid, Placement, SignedDistance, UpAxis, distance_from_phase_field, optimal_profile,
-    phase_field, thin_part,
-};
+use geometry::{distance_from_phase_field, thin_part};
 use images::{Frame, Image, Outline, OutlineDistance, Side, Threshold, Tones};
-use surfaces::shapes::{self, BuiltIn, Region};
-use surfaces::{ClosedMesh, MeshDistance};
+use surfaces::shapes::{self, BuiltIn};
 
-use crate::cli::{Holds, InputOptions, Inside, SayOptions};
-use crate::error::Error;
-use crate::outlet::{Outlet, Space, Topology};
-use crate::own::OwnMesh;
-use crate::plane::Plane;
+use crate::cli::{Holds, Inside};
+use crate::prelude::*;
 use crate::volume::{self, Voxels};
 
 /// What a run starts from.
 pub struct Start<const D: usize, O> {
-    /// Name for the folder of the run.
     pub name: String,
-    /// The phase field.
     pub field: Field<D>,
-    /// How it is shown.
     pub outlet: O,
     /// The nodes that move, if not all.
     pub region: Option<Vec<bool>>,
@@ -34,9 +21,7 @@ pub struct Start<const D: usize, O> {
 
 /// What a run starts from, in the dimension of the input.
 pub enum Loaded {
-    /// In the plane.
     Plane(Start<2, Plane>, ImageFrame),
-    /// In space.
     Space(Start<3, Space>),
 }
 
@@ -52,7 +37,6 @@ enum Source<'a> {
     Region(Region),
 }
 
-/// Least resolution.
 const FEWEST_CELLS: usize = 8;
 /// Most nodes of a grid: beyond, a flow needs more than 100 GiB.
 const MOST_NODES: f64 = 1e9;
@@ -91,7 +75,6 @@ pub fn absolute(path: impl AsRef<Path>) -> Result<PathBuf, Error> {
     std::path::absolute(path).map_err(Error::io("find", path))
 }
 
-/// The extension of a file in lower case.
 pub fn extension(path: &Path) -> String {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
     extension.to_ascii_lowercase()
@@ -139,7 +122,6 @@ pub fn mesh_file(options: &mut InputOptions) -> Result<Option<PathBuf>, Error> {
     })
 }
 
-/// Whether the input is a volume of voxels.
 pub fn is_volume(options: &InputOptions) -> Result<bool, Error> {
     let source = options.input.as_deref().map(Source::of).transpose()?;
     Ok(matches!(source, Some(Source::Volume(_))))
@@ -245,12 +227,8 @@ pub fn load_own(
     ));
     let region = own.nodes(&field)?;
     space.own = Some(own);
-    Ok(Loaded::Space(Start {
-        name: reader.name,
-        field,
-        outlet: space,
-        region,
-    }))
+    let start = reader.start(field, space);
+    Ok(Loaded::Space(Start { region, ..start }))
 }
 
 impl Source<'_> {
@@ -277,7 +255,6 @@ impl Source<'_> {
         }
     }
 
-    /// A name for folders.
     fn name(&self) -> String {
         let path = match self {
             Self::BuiltIn(name) => return (*name).to_owned(),
@@ -291,7 +268,6 @@ impl Source<'_> {
         stem.replace(other, "_")
     }
 
-    /// Options that say nothing about this input.
     fn refuse_foreign(&self, options: &InputOptions) -> Result<(), Error> {
         let what = match self {
             Self::Mesh(_) => "a mesh",
@@ -329,7 +305,6 @@ impl Source<'_> {
     }
 }
 
-/// What inputs are read with.
 struct Reader<'a> {
     name: String,
     options: &'a mut InputOptions,
@@ -486,28 +461,25 @@ impl Reader<'_> {
         Ok(phase_field(grid, shape, eps)?)
     }
 
-    fn space(&self, field: Field<3>, up: UpAxis) -> Loaded {
-        Loaded::Space(Start {
+    fn start<const D: usize, O>(&self, field: Field<D>, outlet: O) -> Start<D, O> {
+        Start {
             name: self.name.clone(),
             field,
-            outlet: Space::new(up),
+            outlet,
             region: None,
-        })
+        }
+    }
+
+    fn space(&self, field: Field<3>, up: UpAxis) -> Loaded {
+        Loaded::Space(self.start(field, Space::new(up)))
     }
 
     fn plane(&self, field: Field<2>) -> Result<Loaded, Error> {
         let frame = Frame::of_box(field.grid(), PIXELS)?;
-        Ok(self.framed(field, frame, ImageFrame(None)))
-    }
-
-    fn framed(&self, field: Field<2>, frame: Frame, of_image: ImageFrame) -> Loaded {
-        let start = Start {
-            name: self.name.clone(),
-            field,
-            outlet: Plane::new(frame),
-            region: None,
-        };
-        Loaded::Plane(start, of_image)
+        Ok(Loaded::Plane(
+            self.start(field, Plane::new(frame)),
+            ImageFrame(None),
+        ))
     }
 
     fn built_in(&mut self, name: &str) -> Result<Loaded, Error> {
@@ -550,11 +522,10 @@ impl Reader<'_> {
         let sides = outline.sides();
         let grid = self.grid_holding(&image.bounding_box(), &IMAGE_CELLS, &distance, &sides)?;
         let [width, height] = [image.width(), image.height()];
-        Ok(self.framed(
-            self.sampled(grid, &distance)?,
-            Frame::new(width, height, [0.0, f64::from(height)], 1.0)?,
-            ImageFrame(Some((path.to_owned(), [width, height]))),
-        ))
+        let frame = Frame::new(width, height, [0.0, f64::from(height)], 1.0)?;
+        let start = self.start(self.sampled(grid, &distance)?, Plane::new(frame));
+        let image = ImageFrame(Some((path.to_owned(), [width, height])));
+        Ok(Loaded::Plane(start, image))
     }
 
     fn volume(&mut self, path: &Path) -> Result<Loaded, Error> {
@@ -585,12 +556,7 @@ impl Reader<'_> {
             side: body.voxel,
             farthest: None,
         });
-        Ok(Loaded::Space(Start {
-            name: self.name.clone(),
-            field,
-            outlet,
-            region: None,
-        }))
+        Ok(Loaded::Space(self.start(field, outlet)))
     }
 
     fn mesh_field(&self, mesh: &ClosedMesh, grid: Grid<3>) -> Result<Field<3>, Error> {

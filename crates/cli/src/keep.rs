@@ -1,23 +1,15 @@
 //! What `--keep` leaves where it is.
 
 use std::collections::HashSet;
-use std::path::Path;
 
-use geometry::{Grid, SignedDistance};
-use surfaces::shapes::Region;
-use surfaces::{ClosedMesh, MeshDistance, TriangleMesh};
-
-use crate::error::Error;
-use crate::input::extension;
+use crate::prelude::*;
 
 /// Nodes this many cells from a vertex along an axis may belong to it.
 const REACH: f64 = 6.0;
 
-/// A part of a mesh.
 pub enum Keep {
     /// What is inside a region or a mask.
     Inside(Box<dyn SignedDistance<3>>),
-    /// The vertices of this colour.
     Coloured([u8; 3]),
 }
 
@@ -30,7 +22,7 @@ impl Keep {
     /// The file of the mask, if it is one.
     pub fn mask(text: &str) -> Option<&Path> {
         let path = Path::new(text);
-        (["obj", "ply", "stl"].contains(&&*extension(path))).then_some(path)
+        MESHES.contains(&&*extension(path)).then_some(path)
     }
 
     /// From what was typed, with the bytes of the mask.

@@ -12,23 +12,21 @@ mod outlet;
 mod own;
 mod page;
 mod plane;
+mod prelude;
 mod run;
 mod say;
 mod standard;
 mod volume;
 
 use std::ffi::OsString;
-use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 
 use crate::cli::{Cli, Command};
 use crate::commands::{check, flow, info, networks, resume, sample, shell, train};
-use crate::config::ParseError;
-use crate::error::Error;
+use crate::prelude::*;
 use crate::standard::Standard;
 
-/// Bad input, or failure.
 const FAILURE: u8 = 2;
 
 fn main() -> ExitCode {
@@ -36,8 +34,7 @@ fn main() -> ExitCode {
     let arguments: Vec<OsString> = std::env::args_os().collect();
     let ended = match config::parse(&arguments) {
         Ok(cli) => execute(cli),
-        Err(ParseError::Other(error)) => Err(error),
-        Err(ParseError::Clap(error)) => match error.kind() {
+        Err(Error::Typed(error)) => match error.kind() {
             ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
                 // A closed pipe (`| head`) is no failure.
                 let _ = error.print();
@@ -51,9 +48,10 @@ fn main() -> ExitCode {
                 config::one_line(&error)
             ))),
         },
+        Err(error) => Err(error),
     };
     ended.unwrap_or_else(|error| {
-        eprintln!("error: {}", error.line());
+        eprintln!("error: {}", files::with_causes(&error));
         ExitCode::from(FAILURE)
     })
 }

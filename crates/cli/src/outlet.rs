@@ -1,28 +1,18 @@
 //! What people look at: pictures, meshes, drawings.
 
 use std::fmt;
-use std::path::Path;
 
-use engine::{Measure, Stop};
-use geometry::measure::{BoundingBox, bounding_box, has_interface};
-use geometry::{Field, UpAxis, ZeroSet, npy, vti};
-use render::{Picture, Scene, View};
-use runs::{RunDirectory, StoredRun};
+use geometry::measure::bounding_box;
+use render::View;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
-use surfaces::{ClosedMesh, TriangleMesh};
 
-use crate::cli::MeshFormat;
-use crate::error::Error;
-use crate::input::extension;
-use crate::own::{Faired, OwnMesh};
+use crate::own::Faired;
+use crate::prelude::*;
 use crate::volume::Voxels;
 
-/// Pixels a side of pictures of surfaces.
 const PIXELS: u32 = 480;
 /// Room around a surface for its flow, as a part of its longest side.
 const ROOM: f64 = 0.06;
-/// From where surfaces are seen, with this axis pointing up.
 pub fn view(up: UpAxis) -> View {
     View {
         up,
@@ -31,24 +21,19 @@ pub fn view(up: UpAxis) -> View {
     }
 }
 
+/// The extensions of meshes, the usual one first.
+pub const MESHES: [&str; 3] = ["ply", "obj", "stl"];
 /// Names of files that hold the shape at the beginning, without their extension.
 pub const START: &str = "start";
-/// Names of files that hold the shape at the end, without their extension.
 pub const FINAL: &str = "final";
-/// The picture of the shape at the end.
 pub const PICTURE: &str = "final.png";
-/// How far the vertices of a mesh have gone.
 pub const DISPLACEMENT: &str = "final.displacement.svg";
-/// The folder of pictures of the shape in between.
 pub const FRAMES: &str = "frames";
-/// The frames one after the other.
 pub const ANIMATION: &str = "animation.png";
 /// The fields of the frames with their times.
 pub const SERIES: &str = "frames.pvd";
-/// The outcome of a run.
 pub const SUMMARY: &str = "summary.json";
 
-/// The parts of a shape.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Topology {
     /// Closed curves or surfaces.
@@ -58,7 +43,6 @@ pub struct Topology {
 }
 
 impl Topology {
-    /// Of a surface.
     pub fn of(surface: &ClosedMesh) -> Self {
         Self {
             components: surface.components(),
@@ -85,7 +69,6 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
     /// A picture, in the same frame for all steps of a flow from `start`.
     fn picture(&self, start: &Field<D>, u: &Field<D>, eps: f64) -> Result<Picture, Error>;
 
-    /// The parts of the shape.
     fn topology(&self, u: &Field<D>, eps: f64) -> Result<Topology, Error>;
 
     /// Writes the shape to a file `stem.*`.
@@ -94,7 +77,7 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
         u: &Field<D>,
         eps: f64,
         stem: &str,
-        format: MeshFormat,
+        format: &str,
         run: &mut RunDirectory,
     ) -> Result<(), Error>;
 
@@ -147,10 +130,8 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
     }
 }
 
-/// As surfaces in space.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Space {
-    /// The axis that points up.
     up: UpAxis,
     /// The mesh whose vertices follow the flow, if it is one.
     #[serde(default)]
@@ -161,7 +142,6 @@ pub struct Space {
 }
 
 impl Space {
-    /// With this axis upwards.
     pub fn new(up: UpAxis) -> Self {
         Self {
             up,
@@ -204,7 +184,7 @@ impl Outlet<3> for Space {
         u: &Field<3>,
         eps: f64,
         stem: &str,
-        format: MeshFormat,
+        format: &str,
         run: &mut RunDirectory,
     ) -> Result<(), Error> {
         let name = format!("{stem}.{format}");
@@ -212,7 +192,7 @@ impl Outlet<3> for Space {
         Ok(run.adopt_file(&name)?)
     }
 
-    const SAVED: &'static [&'static str] = &["ply", "obj", "stl"];
+    const SAVED: &'static [&'static str] = &MESHES;
 
     fn save(&self, u: &Field<3>, eps: f64, path: &Path) -> Result<(), Error> {
         Ok(surfaces::write(path, &surface(u, eps)?)?)
@@ -275,7 +255,7 @@ pub fn write_final<const D: usize, O: Outlet<D>>(
     u: &Field<D>,
     eps: f64,
     faired: Option<&Faired>,
-    format: Option<MeshFormat>,
+    format: Option<&str>,
     run: &mut RunDirectory,
 ) -> Result<Topology, Error> {
     npy::write(run.path().join("final.npy"), u)?;
@@ -287,14 +267,13 @@ pub fn write_final<const D: usize, O: Outlet<D>>(
     }
     write_picture(&outlet.picture(start, u, eps)?, PICTURE, run)?;
     if let Some(faired) = faired {
-        let extension = format.map_or(faired.extension.clone(), |format| format.to_string());
-        let name = format!("{FINAL}.{extension}");
+        let name = format!("{FINAL}.{}", format.unwrap_or(&faired.extension));
         faired.write(&run.path().join(&name))?;
         run.adopt_file(&name)?;
         let text = faired.displacement.to_svg()?;
         run.write_file(DISPLACEMENT, |out| out.write_all(text.as_bytes()))?;
     } else {
-        outlet.write_shape(u, eps, FINAL, format.unwrap_or_default(), run)?;
+        outlet.write_shape(u, eps, FINAL, format.unwrap_or(MESHES[0]), run)?;
     }
     outlet.topology(u, eps)
 }
@@ -305,7 +284,6 @@ pub fn is_of_end(name: &str) -> bool {
     stem == Some(FINAL) || [SUMMARY, ANIMATION, SERIES].contains(&name)
 }
 
-/// Adds a picture to a run.
 pub fn write_picture(picture: &Picture, name: &str, run: &mut RunDirectory) -> Result<(), Error> {
     let bytes = picture.to_png()?;
     run.write_file(name, |out| out.write_all(&bytes))?;

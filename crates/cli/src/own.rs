@@ -1,22 +1,16 @@
 //! The mesh that a person gave: its vertices follow the flow.
 
 use std::collections::HashMap;
-use std::path::Path;
 use std::sync::Arc;
 
-use engine::{DISPLACEMENT, Measure, Stop};
+use engine::DISPLACEMENT;
 use geometry::file::write_atomically;
-use geometry::{Field, Placement, SignedDistance, UpAxis};
 use report::Figure;
-use runs::StoredRun;
-use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
-use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, root_mean_square};
+use surfaces::root_mean_square;
 
 use crate::displacement;
-use crate::error::Error;
 use crate::keep::{Keep, key, moving_nodes};
-use crate::outlet::Topology;
+use crate::prelude::*;
 
 /// The name of the copy of the input, without its extension.
 pub const INPUT: &str = "input";
@@ -43,7 +37,6 @@ pub struct OwnMesh {
 #[derive(Debug)]
 struct Loaded {
     bytes: Vec<u8>,
-    /// As in the file.
     mesh: TriangleMesh,
     fairing: Fairing,
 }
@@ -53,34 +46,20 @@ fn in_place() -> Result<Placement<3>, Error> {
     Ok(Placement::about([0.0; 3], 1.0)?)
 }
 
-/// What there is to take off.
-#[derive(Clone, Copy)]
-pub enum Noise {
-    /// Nothing: the flow ends for another reason, and vertices simply follow.
-    None,
-    /// Noise of this standard deviation.
-    Of(f64),
-    /// As much as the mesh seems to have.
-    Estimated,
-}
-
 impl OwnMesh {
-    /// Takes a mesh, and what noise is to be taken off. The texts are what there is to warn of.
+    /// Takes a mesh, and what noise is to be taken off, estimated unless it is given; without any vertices simply follow. The texts are what
+    /// there is to warn of.
     pub fn new(
         path: &Path,
         bytes: Vec<u8>,
-        noise: Noise,
+        noise: Option<f64>,
         keep: Option<String>,
     ) -> Result<(Self, Vec<String>), Error> {
         let mesh = surfaces::decode(&bytes, path)?;
         let (closed, warnings) = ClosedMesh::new(mesh.clone()).map_err(Error::mesh)?;
         let mut own = Self {
             file: format!("{INPUT}.{}", crate::input::extension(path)),
-            noise: match noise {
-                Noise::None => 0.0,
-                Noise::Of(length) => length,
-                Noise::Estimated => closed.mesh().noise(),
-            },
+            noise: noise.unwrap_or_else(|| closed.mesh().noise()),
             keeps_volume: false,
             mask: None,
             keep,
@@ -165,7 +144,6 @@ impl OwnMesh {
         &self.loaded().fairing
     }
 
-    /// The longest side of its bounding box.
     pub fn longest_side(&self) -> f64 {
         self.fairing().rough().bounding_box().longest_side()
     }
@@ -187,7 +165,6 @@ impl OwnMesh {
         }))
     }
 
-    /// Parts and holes.
     pub fn topology(&self) -> Topology {
         Topology::of(self.fairing().rough())
     }
@@ -286,17 +263,14 @@ impl OwnMesh {
     }
 }
 
-/// What becomes of a mesh.
 pub struct Faired {
     /// The extension of files that keep everything.
     pub extension: String,
     file: Vec<u8>,
     mesh: TriangleMesh,
-    /// How far its vertices have gone.
     pub displacement: Figure,
     /// Parts and holes, which stay.
     pub topology: Topology,
-    /// What has changed.
     pub report: Value,
 }
 

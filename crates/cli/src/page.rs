@@ -5,27 +5,16 @@
 
 use std::fmt::Write;
 use std::fs;
-use std::path::{Path, PathBuf};
 
 use engine::METRICS;
-use geometry::UpAxis;
 use pages::{
     Details, Facts, Figure, Frames, Image, Page, Section, Table, Text, Viewer, five_digits,
 };
 use report::{Axis, LineChart, Marker, Series};
-use runs::StoredRun;
-use serde::Deserialize;
-use serde_json::Value;
-use surfaces::TriangleMesh;
 
-use crate::cli::MeshFormat;
-use crate::config;
-use crate::error::Error;
-use crate::input::extension;
-use crate::outlet;
 use crate::own;
+use crate::prelude::*;
 
-/// Name of the page in the folder of a run.
 pub const NAME: &str = "index.html";
 
 /// Of longer sequences every second, third, ... picture is shown: a page should stay small enough to be mailed.
@@ -73,7 +62,6 @@ impl Files<'_> {
         Ok(page.with(numbers.with(options).with(program)))
     }
 
-    /// The outcome of a finished run.
     fn outcome(&self) -> Result<Option<Value>, Error> {
         let bytes = self.read(outlet::SUMMARY)?;
         let outcome = bytes
@@ -137,8 +125,7 @@ impl Files<'_> {
 
     /// The surface of that name, in any of the formats.
     fn mesh(&self, stem: &str) -> Result<Option<TriangleMesh>, Error> {
-        let formats = [MeshFormat::Ply, MeshFormat::Obj, MeshFormat::Stl];
-        let mut names = formats.iter().map(|format| format!("{stem}.{format}"));
+        let mut names = (outlet::MESHES.iter()).map(|format| format!("{stem}.{format}"));
         let path = (names.find(|name| self.has(name))).map(|name| self.run.path().join(name));
         Ok(path.map(surfaces::read).transpose()?)
     }
@@ -163,7 +150,6 @@ impl Files<'_> {
         Ok(Some(Frames::new("The shape over the steps", frames)?))
     }
 
-    /// The records of all steps.
     fn table(&self) -> Result<Table, Error> {
         Ok(Table::from_csv("Steps", &self.run.read_text(METRICS)?)?)
     }

@@ -1,18 +1,11 @@
 //! Shapes in the plane, as the pixels of an image.
 
-use std::path::Path;
 use std::sync::Arc;
 
-use geometry::{Field, SignedDistance, UpAxis};
 use images::{Drawing, Frame, Interface, Outline, Svg};
-use render::{Picture, Rgb};
-use runs::{RunDirectory, StoredRun};
-use serde::{Deserialize, Serialize};
+use render::Rgb;
 
-use crate::cli::MeshFormat;
-use crate::error::Error;
-use crate::input::extension;
-use crate::outlet::{Outlet, Topology};
+use crate::prelude::*;
 
 /// Files of a run with the image that is repaired, and with the pixels that are drawn anew in black.
 const ORIGINAL: &str = "original.png";
@@ -35,7 +28,6 @@ struct Original {
 }
 
 impl Plane {
-    /// In black on white.
     pub fn new(frame: Frame) -> Self {
         Self {
             frame,
@@ -155,7 +147,7 @@ impl Outlet<2> for Plane {
         u: &Field<2>,
         _: f64,
         stem: &str,
-        _: MeshFormat,
+        _: &str,
         run: &mut RunDirectory,
     ) -> Result<(), Error> {
         let name = format!("{stem}.svg");

@@ -2,50 +2,29 @@
 
 use std::f64::consts::PI;
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use engine::{
-    Case, Checkpoints, Ending, Event, Observer, Record, Run, Stop, Store, estimated_time_error,
-};
-use geometry::measure::{has_interface, touches_side};
-use geometry::vti;
-use operators::ComputeDevice;
-use render::Picture;
-use runs::{Interrupt, RunDirectory, StoredRun};
-use serde_json::{Value, json};
+use engine::{Checkpoints, Ending, Event, Observer, Store, estimated_time_error};
+use geometry::measure::touches_side;
 use solver::StepEstimates;
 
-use crate::cli::{KeepOptions, MeshFormat, SayOptions};
-use crate::config;
-use crate::error::Error;
-use crate::input::extension;
-use crate::outlet::{self, Outlet, Topology};
 use crate::own::Faired;
-use crate::page;
+use crate::prelude::*;
 
 /// Everything about a run but its case.
 pub struct Plan<O> {
-    /// Name of the subcommand.
     pub command: &'static str,
-    /// Name of the input.
     pub name: String,
-    /// How the shape is shown.
     pub outlet: O,
-    /// What is kept.
     pub keep: KeepOptions,
-    /// Format of meshes.
-    pub format: Option<MeshFormat>,
-    /// What is printed.
+    /// The extension of meshes, if it is not the usual one.
+    pub format: Option<String>,
     pub say: SayOptions,
 }
 
-/// Time that a picture is shown.
 const DELAY: Duration = Duration::from_millis(200);
 
 impl<O> Plan<O> {
-    /// Starts a run, and goes on to its end.
     pub fn start<const D: usize>(
         &self,
         case: Case<D>,
@@ -177,7 +156,7 @@ impl<O> Plan<O> {
             u,
             eps,
             faired.as_ref(),
-            self.format,
+            self.format.as_deref(),
             directory,
         )?;
         if let Some(path) = self.keep.save.as_ref().filter(|_| has_interface(u)) {
@@ -355,15 +334,11 @@ impl<const D: usize, O: Outlet<D>> Observer<D> for Pictures<'_, O> {
         if !has_interface(u) {
             return Ok(());
         }
-        let Plan {
-            outlet,
-            keep,
-            format,
-            ..
-        } = self.plan;
+        let Plan { outlet, keep, .. } = self.plan;
         let mut write = || -> Result<(), Error> {
             if step == 0 {
-                outlet.write_shape(u, eps, outlet::START, format.unwrap_or_default(), run)?;
+                let format = self.plan.format.as_deref();
+                outlet.write_shape(u, eps, outlet::START, format.unwrap_or(MESHES[0]), run)?;
             }
             if keep.frames.is_some_and(|every| step.is_multiple_of(every)) {
                 let name = format!("{}/step-{step:06}", outlet::FRAMES);
@@ -408,7 +383,6 @@ fn free_folder(name: &str) -> PathBuf {
         .expect("some number is free")
 }
 
-/// A number of steps in words.
 fn counted(steps: u64) -> String {
     let plural = if steps == 1 { "" } else { "s" };
     format!("{steps} step{plural}")
@@ -446,7 +420,6 @@ fn series(run: &Path, records: &[Record]) -> String {
     text + "  </Collection>\n</VTKFile>\n"
 }
 
-/// The pictures in a folder, in the order of their names.
 fn frames(folder: &Path) -> Result<Vec<Picture>, Error> {
     let entries = std::fs::read_dir(folder).map_err(Error::io("read", folder))?;
     let mut paths: Vec<PathBuf> = entries

@@ -3,9 +3,8 @@
 use std::io::Write;
 
 use report::Progress;
-use serde_json::Value;
 
-use crate::cli::SayOptions;
+use crate::prelude::*;
 
 impl SayOptions {
     /// Prints the outcome of a command: an object, or a text for people.
@@ -18,21 +17,18 @@ impl SayOptions {
         }
     }
 
-    /// Says what was mended.
     pub fn warn(self, what: &str) {
         if !self.quiet {
             eprintln!("warning: {what}");
         }
     }
 
-    /// Says what was chosen.
     pub fn note(self, what: &str) {
         if !self.quiet && !self.json {
             eprintln!("{what}");
         }
     }
 
-    /// Progress bars, if anybody wants to see them.
     pub fn progress(self) -> Progress {
         Progress::new(self.quiet || self.json)
     }

@@ -1,12 +1,10 @@
 //! `-` for standard input and output: files that stand for them while a command runs.
 
 use std::io::{Read, Write};
-use std::path::PathBuf;
 
-use crate::cli::{Command, InputOptions, SayOptions};
-use crate::error::Error;
+use crate::cli::Command;
 use crate::input::usual_format;
-use crate::volume::Label;
+use crate::prelude::*;
 
 /// The files, which are removed in the end.
 #[derive(Default)]
@@ -58,7 +56,6 @@ impl Standard {
         Ok(standard)
     }
 
-    /// Writes what was saved to standard output.
     pub fn write(&self) -> Result<(), Error> {
         let Some(path) = self.output.as_ref().filter(|path| path.exists()) else {
             return Ok(());
@@ -80,14 +77,11 @@ impl Drop for Standard {
 
 /// The input of a command and the file that it writes, if it has these.
 fn paths(command: &mut Command) -> Option<(&mut InputOptions, &mut Option<PathBuf>)> {
-    match command {
-        Command::Flow(flow) => Some((&mut flow.input, &mut flow.keep.save)),
-        Command::Fair(fair) => Some((&mut fair.flow.input, &mut fair.flow.keep.save)),
-        Command::Inpaint(inpaint) => Some((&mut inpaint.flow.input, &mut inpaint.flow.keep.save)),
-        Command::Mcf(mcf) => Some((&mut mcf.input, &mut mcf.keep.save)),
-        Command::Sample(sample) => Some((&mut sample.input, &mut sample.save)),
-        _ => None,
+    if let Command::Sample(sample) = command {
+        return Some((&mut sample.input, &mut sample.save));
     }
+    let (input, keep) = command.of_run()?;
+    Some((input, &mut keep.save))
 }
 
 /// A name that no other process has.

@@ -1,25 +1,18 @@
 //! Volumes of voxels as inputs.
 
 use std::fmt;
-use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
-use serde::{Deserialize, Serialize};
 use volumes::{Body, Inside, Volume};
 
-use crate::cli::InputOptions;
-use crate::error::Error;
 use crate::input::absolute;
+use crate::prelude::*;
 
-/// Most values that a message lists.
 const LISTED: usize = 20;
 
-/// Which label of a volume is inside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Label {
     /// Each but 0 becomes a surface of its own.
     All,
-    /// This one.
     One(i64),
 }
 
@@ -50,10 +43,8 @@ impl Serialize for Label {
     }
 }
 
-/// What is known of a body in a volume beside its surface.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Voxels {
-    /// Its volume.
     pub volume: f64,
     /// The side of a cube as large as a voxel.
     pub side: f64,
@@ -61,7 +52,6 @@ pub struct Voxels {
     pub farthest: Option<f64>,
 }
 
-/// The body that options choose in a volume.
 pub fn body(path: &Path, options: &InputOptions) -> Result<Body, Error> {
     let volume = volumes::read(path)?;
     let inside = match (options.label, options.threshold) {

@@ -329,7 +329,6 @@ impl Operator {
         identity
     }
 
-    /// The finite-element step on a grid.
     pub(crate) fn elements<const D: usize>(
         &self,
         grid: &Grid<D>,

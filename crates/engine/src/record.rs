@@ -101,44 +101,40 @@ pub fn mean_hvp(records: &[Record]) -> f64 {
 pub fn to_csv(records: &[Record]) -> String {
     let names = records.iter().flat_map(|record| record.measures.keys());
     let names: BTreeSet<&str> = names.map(String::as_str).collect();
-    let head = ["step", "time", "tau"];
-    let energies = ["energy_before", "energy", "willmore_energy"];
-    let multipliers: [(&str, fn(&StepRecord) -> Option<f64>); 2] = [
-        ("tension", |made| made.tension),
-        ("pressure", |made| made.pressure),
+    let mut columns: Vec<(&str, Box<dyn Fn(&Record) -> Option<f64> + '_>)> = vec![
+        ("step", Box::new(|r| Some(r.step as f64))),
+        ("time", Box::new(|r| Some(r.time))),
+        ("tau", Box::new(|r| Some(r.tau))),
+        (
+            "energy_before",
+            Box::new(|r| Some(r.minimization?.energy_before)),
+        ),
+        ("energy", Box::new(|r| Some(r.minimization?.energy))),
+        ("willmore_energy", Box::new(Record::willmore_energy)),
     ];
-    let held =
-        |of: fn(&StepRecord) -> Option<f64>| minimizations(records).any(|made| of(made).is_some());
-    let multipliers: Vec<_> = multipliers
-        .into_iter()
-        .filter(|(_, of)| held(*of))
-        .collect();
-    let tail = ["newton", "hvp", "halvings"];
-    let columns = head.iter().chain(&energies).chain(&names);
-    let columns = columns
-        .chain(multipliers.iter().map(|(name, _)| name))
-        .chain(&tail);
-    let mut text = columns.copied().collect::<Vec<_>>().join(",") + "\n";
-    let number = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
+    for name in names {
+        columns.push((name, Box::new(move |r| r.measure(name))));
+    }
+    let multipliers: [(&str, fn(&Record) -> Option<f64>); 2] = [
+        ("tension", |r| r.minimization?.tension),
+        ("pressure", |r| r.minimization?.pressure),
+    ];
+    for (name, of) in multipliers {
+        if records.iter().any(|record| of(record).is_some()) {
+            columns.push((name, Box::new(of)));
+        }
+    }
+    columns.push((
+        "newton",
+        Box::new(|r| Some(r.minimization?.newton.newton as f64)),
+    ));
+    columns.push(("hvp", Box::new(Record::hvp)));
+    columns.push(("halvings", Box::new(|r| Some(f64::from(r.halvings)))));
+    let head: Vec<&str> = columns.iter().map(|(name, _)| *name).collect();
+    let mut text = head.join(",") + "\n";
     for record in records {
-        let made = record.minimization;
-        let mut row = vec![
-            record.step.to_string(),
-            record.time.to_string(),
-            record.tau.to_string(),
-            number(made.map(|m| m.energy_before)),
-            number(made.map(|m| m.energy)),
-            number(made.map(|m| m.willmore_energy)),
-        ];
-        row.extend(names.iter().map(|name| number(record.measure(name))));
-        row.extend(
-            multipliers
-                .iter()
-                .map(|(_, of)| number(made.and_then(|m| of(&m)))),
-        );
-        row.push(made.map_or(String::new(), |m| m.newton.newton.to_string()));
-        row.push(number(record.hvp()));
-        row.push(record.halvings.to_string());
+        let cell = |of: Option<f64>| of.map_or(String::new(), |value| value.to_string());
+        let row: Vec<String> = columns.iter().map(|(_, of)| cell(of(record))).collect();
         text += &(row.join(",") + "\n");
     }
     text

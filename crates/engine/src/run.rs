@@ -329,7 +329,6 @@ impl<const D: usize> Run<D> {
     }
 }
 
-/// A step that was made.
 struct Attempt {
     /// How often it was tried with a longer size,
     halvings: u32,

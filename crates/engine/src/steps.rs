@@ -145,9 +145,7 @@ impl From<StepRule> for TimeSteps {
 /// The lengths, times and energies of a flow that step sizes depend on.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lengths {
-    /// Interface width.
     pub(crate) eps: f64,
-    /// Inner time step.
     pub(crate) mcf_step: f64,
     /// The longest step that shows anything.
     pub(crate) largest: f64,
@@ -179,7 +177,6 @@ pub(crate) struct StepControl {
 }
 
 impl StepControl {
-    /// The place before the first step.
     pub(crate) fn new(
         steps: TimeSteps,
         Lengths {
@@ -242,7 +239,6 @@ impl StepControl {
         }
     }
 
-    /// The size of the next minimization.
     pub(crate) fn next_size(&self) -> f64 {
         match (self.controller, self.substeps) {
             (Some(controller), _) => controller.size(self.due - self.time),
@@ -266,7 +262,6 @@ impl StepControl {
         }
     }
 
-    /// Number of the present step, from 1.
     pub(crate) fn step(&self) -> usize {
         self.completed + 1
     }

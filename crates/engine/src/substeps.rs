@@ -69,7 +69,6 @@ impl Substeps {
         })
     }
 
-    /// Whether the substeps fill the step.
     pub(crate) fn is_complete(&self) -> bool {
         self.done >= 1 << self.deepest
     }

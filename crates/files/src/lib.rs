@@ -26,4 +26,4 @@ pub use atomic::{TEMPORARY_PREFIX, make_folders_on, probe, write_atomically, wri
 pub use checksum::{Sha256, hexadecimal};
 pub use error::Error;
 pub use storage::{Disk, Storage};
-pub use text::shortened;
+pub use text::{shortened, with_causes};

@@ -1,5 +1,7 @@
 //! Texts of files in messages.
 
+use std::error::Error;
+
 /// The start of a text, in one line without control characters, for the message that complains of
 /// it: `longest` characters, and ` ...` if there is more.
 ///
@@ -22,4 +24,19 @@ pub fn shortened(text: &str, longest: usize) -> String {
         }
     }
     line
+}
+
+/// The message of an error with its causes, on one line.
+pub fn with_causes(error: &dyn Error) -> String {
+    let mut line = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        let text = error.to_string();
+        // Most messages already contain their cause's.
+        if !line.contains(&text) {
+            line = format!("{line}: {text}");
+        }
+        cause = error.source();
+    }
+    line.split_whitespace().collect::<Vec<_>>().join(" ")
 }

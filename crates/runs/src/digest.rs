@@ -15,7 +15,6 @@ pub fn fingerprint(bytes: impl AsRef<[u8]>) -> String {
     hexadecimal(Sha256::of(bytes))
 }
 
-/// Length and checksum of a file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Seal {
@@ -24,7 +23,6 @@ pub(crate) struct Seal {
 }
 
 impl Seal {
-    /// The seal of a file as it is.
     pub fn of(path: &Path) -> Result<Self, Error> {
         let mut hash = Sha256::default();
         let read = io::copy(&mut open(path)?, &mut hash);
@@ -34,7 +32,6 @@ impl Seal {
         })
     }
 
-    /// Accepts a file with this seal.
     pub fn check(&self, path: &Path) -> Result<(), Error> {
         let found = Self::of(path)?;
         (found == *self)

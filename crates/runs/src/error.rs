@@ -1,5 +1,7 @@
 //! The one error type of the crate.
 
+#![allow(missing_docs, reason = "messages and names say it")]
+
 use std::io;
 use std::path::PathBuf;
 
@@ -10,54 +12,38 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A new run where there is something already.
     #[error(
         "cannot start a run in {}: it holds {found}; resume the run that is there, or give an empty \
          folder, or one that does not exist", path.display()
     )]
-    Occupied {
-        /// The folder.
-        path: PathBuf,
-        /// What is there.
-        found: String,
-    },
-    /// A folder without a checkpoint.
+    Occupied { path: PathBuf, found: String },
     #[error("{} holds no run (no checkpoint): start one there, or give another folder", .0.display())]
     NoRun(PathBuf),
-    /// Another process works on the run in the folder.
     #[error("another process works on the run in {}: wait for it or stop it", .0.display())]
     Locked(PathBuf),
     /// A file is not what was committed.
     #[error("{} is damaged: {what}; {}", path.display(), advice(*.fallback))]
     Damaged {
-        /// The file.
         path: PathBuf,
-        /// What is wrong with it.
         what: String,
         /// The step from which [`RunDirectory::recover`](crate::RunDirectory::recover) can go on.
         fallback: Option<u64>,
     },
-    /// A file of another version of the format.
     #[error(
         "{} has format version {found}, this program reads version {supported}: finish the run with \
          the version of the program that made it, or start a new run in another folder", path.display()
     )]
     Version {
-        /// The file.
         path: PathBuf,
-        /// Its version.
         found: u32,
-        /// The version that can be read.
         supported: u32,
     },
     /// A state that cannot be committed, a file that cannot be stored, and the like: a mistake of the
     /// calling program, which changes nothing.
     #[error("{0}")]
     Invalid(String),
-    /// The operating system refused.
     #[error(transparent)]
     Io(#[from] files::Error),
-    /// Signals cannot be caught.
     #[error("could not catch the signals that interrupt the program: {0}")]
     Signals(#[source] io::Error),
 }
@@ -85,7 +71,6 @@ impl Error {
         Self::damaged(path, format!("its content is not as expected: {quoted}"))
     }
 
-    /// A file that cannot be stored.
     pub(crate) fn file(name: &str, reason: &str) -> Self {
         let shown = files::shortened(name, 600);
         Self::Invalid(format!("{shown:?} cannot be stored: {reason}"))

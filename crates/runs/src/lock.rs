@@ -21,7 +21,6 @@ impl Drop for Lock {
     }
 }
 
-/// Locks a run directory.
 pub(crate) fn lock(storage: &dyn Storage, folder: &Path) -> Result<Lock, Error> {
     let path = folder.join(names::LOCK);
     let locked = || Error::Locked(folder.into());

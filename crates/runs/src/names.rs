@@ -10,7 +10,6 @@ pub(crate) fn checkpoint(step: u64) -> String {
     format!("{CHECKPOINTS}/step-{step:08}.ckpt")
 }
 
-/// The step of the checkpoint of a name.
 pub(crate) fn step(name: &str) -> Option<u64> {
     let number = name.rsplit('-').next()?.strip_suffix(".ckpt")?;
     let step = number.parse().ok()?;

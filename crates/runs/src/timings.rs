@@ -8,7 +8,6 @@ use serde_json::Value;
 use crate::digest::{self, fingerprint};
 use crate::{Error, names};
 
-/// Longest file in bytes.
 const LONGEST: u64 = 4 << 20;
 
 /// The text of the file, if it can be read again.
@@ -20,7 +19,6 @@ pub(crate) fn encode(timings: &Value) -> Result<String, Error> {
     Ok(text)
 }
 
-/// Reads the file of a run.
 pub(crate) fn read(folder: &Path) -> Result<Value, Error> {
     let path = folder.join(names::TIMINGS);
     let mut bytes = Vec::new();

@@ -1,7 +1,5 @@
 //! A scanned figure under Willmore flow with time steps that double.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    experiments::programs::armadillo::main()
+fn main() -> std::process::ExitCode {
+    experiments::harness::main(experiments::programs::armadillo::program)
 }

@@ -1,7 +1,5 @@
 //! Convergence test on circles: mean curvature flow and Willmore flow against the exact solutions.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    experiments::programs::circle_convergence::main()
+fn main() -> std::process::ExitCode {
+    experiments::harness::main(experiments::programs::circle_convergence::program)
 }

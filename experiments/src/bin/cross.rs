@@ -1,7 +1,5 @@
 //! The cross under Willmore flow.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    experiments::programs::cross::main()
+fn main() -> std::process::ExitCode {
+    experiments::comparison::main(&experiments::programs::cross::SETTING)
 }

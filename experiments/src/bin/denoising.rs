@@ -1,7 +1,5 @@
 //! Noise taken off meshes by Willmore flow, by Taubin's smoothing and by Laplacian smoothing.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    experiments::programs::denoising::main()
+fn main() -> std::process::ExitCode {
+    experiments::harness::main(experiments::programs::denoising::program)
 }

@@ -1,7 +1,5 @@
 //! A cube and a thick disk under Willmore flow.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    experiments::programs::disk_and_cube::main()
+fn main() -> std::process::ExitCode {
+    experiments::harness::main(experiments::programs::disk_and_cube::program)
 }

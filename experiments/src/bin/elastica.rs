@@ -1,7 +1,5 @@
 //! Closed elastic curves: length and area held.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    experiments::programs::elastica::main()
+fn main() -> std::process::ExitCode {
+    experiments::harness::main(experiments::programs::elastica::program)
 }

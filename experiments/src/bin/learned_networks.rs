@@ -1,7 +1,5 @@
 //! Pictures and quality of the learned 2D operators.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    experiments::programs::learned_networks::main()
+fn main() -> std::process::ExitCode {
+    experiments::harness::main(experiments::programs::learned_networks::program)
 }

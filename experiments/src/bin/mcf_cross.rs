@@ -1,7 +1,5 @@
 //! The cross under mean curvature flow.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    experiments::programs::mcf_cross::main()
+fn main() -> std::process::ExitCode {
+    experiments::comparison::main(&experiments::programs::mcf_cross::SETTING)
 }

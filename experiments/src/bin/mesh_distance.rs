@@ -1,7 +1,5 @@
 //! The signed distance of any mesh on any grid.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    experiments::programs::mesh_distance::main()
+fn main() -> std::process::ExitCode {
+    experiments::harness::main(experiments::programs::mesh_distance::program)
 }

@@ -1,7 +1,5 @@
 //! The rectangle under Willmore flow.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    experiments::programs::rectangle::main()
+fn main() -> std::process::ExitCode {
+    experiments::comparison::main(&experiments::programs::rectangle::SETTING)
 }

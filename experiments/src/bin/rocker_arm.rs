@@ -1,7 +1,5 @@
 //! A machine part of genus one under Willmore flow, and the Clifford torus next to it.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    experiments::programs::rocker_arm::main()
+fn main() -> std::process::ExitCode {
+    experiments::harness::main(experiments::programs::rocker_arm::program)
 }

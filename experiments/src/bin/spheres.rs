@@ -1,7 +1,5 @@
 //! Spheres by the network for surfaces: mean curvature flow, Willmore energies, and standing still.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    experiments::programs::spheres::main()
+fn main() -> std::process::ExitCode {
+    experiments::harness::main(experiments::programs::spheres::program)
 }

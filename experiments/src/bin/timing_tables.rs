@@ -1,7 +1,5 @@
 //! Time of the methods for the same flow on the same machine.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    experiments::programs::timing_tables::main()
+fn main() -> std::process::ExitCode {
+    experiments::harness::main(experiments::programs::timing_tables::program)
 }

@@ -1,7 +1,5 @@
 //! Trains the networks that ship with the library.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    experiments::programs::train_networks::main()
+fn main() -> std::process::ExitCode {
+    experiments::harness::main(experiments::programs::train_networks::program)
 }

@@ -1,7 +1,5 @@
 //! Segmentations without their steps, and their volumes.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    experiments::programs::unshrinking::main()
+fn main() -> std::process::ExitCode {
+    experiments::harness::main(experiments::programs::unshrinking::program)
 }

@@ -1,7 +1,5 @@
 //! Lipid vesicles: area and volume held.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    experiments::programs::vesicles::main()
+fn main() -> std::process::ExitCode {
+    experiments::harness::main(experiments::programs::vesicles::program)
 }

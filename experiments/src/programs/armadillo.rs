@@ -4,7 +4,6 @@ use crate::mesh_flow::{MeshFlow, MeshFlowOptions};
 use crate::meshes::ARMADILLO;
 use crate::prelude::*;
 use crate::surfaces::View;
-use geometry::UpAxis;
 
 const ARMADILLO_FLOW: MeshFlow = MeshFlow {
     program: "armadillo",
@@ -25,11 +24,11 @@ const ARMADILLO_FLOW: MeshFlow = MeshFlow {
 /// Willmore energies at steps 0, 1, 8, 11 and 16.
 #[derive(Parser, Debug)]
 #[command(name = ARMADILLO_FLOW.program, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     flow: MeshFlowOptions,
 }
 
-pub fn main() -> ExitCode {
-    harness::main(|options: &Options| ARMADILLO_FLOW.run(&options.flow, |_, _| Ok(String::new())))
+pub fn program(options: &Options) -> Result<(), Error> {
+    ARMADILLO_FLOW.run(&options.flow, |_, _| Ok(String::new()))
 }

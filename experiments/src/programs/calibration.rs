@@ -1,19 +1,12 @@
 //! The factors by which the hybrid scheme differs from Willmore flow, predicted and measured on discs.
 
-use std::collections::BTreeMap;
-use std::f64::consts::PI;
-use std::path::PathBuf;
-
-use crate::networks::{EPS, STEP, scales};
+use crate::networks::scales;
 use crate::prelude::*;
-use crate::session::Stage;
 use crate::surfaces::{self, willmore_flow};
 use fem::FiniteElementStep;
-use geometry::measure::zero_set_volume;
-use geometry::shapes::{Ball, Torus};
+use geometry::shapes::Torus;
 use model::training::SphereData;
 use model::{Calibration, NamedNetwork, Network, Shipped, displacement_errors};
-use report::OutputDir;
 use solver::Factors;
 
 const PROGRAM: &str = "calibration";
@@ -27,7 +20,6 @@ const SURFACE_CELLS: usize = 64;
 /// Room for tori whose hole is some interface widths wide.
 const SURFACE_SIDE: f64 = 1.5;
 const BALLS: [f64; 3] = [0.2, 0.3, 0.34];
-/// Outer radii of the Clifford tori.
 const TORI: [f64; 3] = [0.40, 0.50, 0.60];
 
 /// The measurement's time step over the inner one: the interface hardly moves, and its profile relaxes all the same.
@@ -41,7 +33,7 @@ const ELEMENTS: [[f64; 2]; 2] = [[2.0, 1.0], [4.0, 4.0]];
 /// tells good networks from bad ones.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
 
@@ -54,11 +46,7 @@ struct Options {
     install: Option<PathBuf>,
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.run;
     let networks = options.networks()?;
     let device = run.open_device()?;
@@ -112,7 +100,6 @@ fn program(options: &Options) -> Result<(), Error> {
 }
 
 impl Options {
-    /// Networks under their file names.
     fn networks(&self) -> Result<Vec<NamedNetwork>, Error> {
         let shipped = [Shipped::Paper.all()?, Shipped::Accurate.all()?].concat();
         let shipped = shipped.into_iter().map(|(name, network)| NamedNetwork {
@@ -133,7 +120,6 @@ impl Options {
     }
 }
 
-/// A network under its name.
 #[derive(Clone)]
 struct Calibrated {
     named: NamedNetwork,
@@ -153,7 +139,6 @@ impl Calibrated {
         fits.then_some(n as usize)
     }
 
-    /// The odd part of the operator, calibrated anew.
     fn odd_part(&self) -> Result<Self, Error> {
         let mut odd = self.clone();
         odd.named.network = self.named.network.odd_part();
@@ -292,11 +277,9 @@ struct SurfaceRow {
     surface: String,
     /// Over the exact energy, without calibration.
     measured: f64,
-    /// The same with calibration.
     calibrated: f64,
 }
 
-/// Balls and Clifford tori.
 fn balls_and_tori(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<SurfaceRow>, Error> {
     let grid = Grid::<3>::per_unit(SURFACE_CELLS, SURFACE_SIDE)?;
     let scales = surfaces::scales(SURFACE_CELLS);
@@ -342,7 +325,6 @@ fn surfaces_table(rows: &[SurfaceRow]) -> Sheet<'_, SurfaceRow> {
         .column("calibrated w / exact", Fixed(4), |r| r.calibrated)
 }
 
-/// What tells good networks from bad ones.
 #[derive(Serialize)]
 struct Diagnostics {
     network: String,
@@ -350,7 +332,6 @@ struct Diagnostics {
     displacement: Vec<[f64; 2]>,
     /// Eigenvalues of `J` at the flat interface, real and imaginary parts.
     spectrum: Vec<[f64; 2]>,
-    /// `w` and `F''(w)`.
     bend: Vec<[f64; 2]>,
 }
 
@@ -413,7 +394,6 @@ fn diagnostics_figure(all: &[Diagnostics]) -> Figure {
         .with_shared_legend()
 }
 
-/// The finite-element steps of the experiments.
 fn elements() -> Result<Vec<(String, Calibration)>, Error> {
     let (plane, space) = (Grid::<2>::centred(16, 16.0)?, Grid::<3>::centred(8, 8.0)?);
     let mut all = Vec::new();

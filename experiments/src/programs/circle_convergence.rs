@@ -1,15 +1,10 @@
 //! Convergence test on circles: mean curvature flow and Willmore flow against the exact solutions.
 
 use crate::circles::{self, Circle, Ensemble};
-use crate::look;
-use crate::networks::{EPS, STEP};
 use crate::prelude::*;
 use crate::session::remove_folder;
 use crate::steps::{self, Rows};
 use crate::study::{Study, StudyOptions, Variant};
-use engine::Flow;
-use report::{OutputDir, Table};
-use solver::StepRecord;
 
 const PROGRAM: &str = "circle_convergence";
 /// Steps at which tables and summaries give the error.
@@ -19,7 +14,7 @@ const SHOWN_STEPS: [usize; 5] = [1, 8, 16, 32, 64];
 /// steps of 2^-14: L2 distance to the exact solution over time, mean over the radii 0.05 pi + 0.15 pi i/30.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     study: StudyOptions,
 
@@ -45,11 +40,7 @@ impl Options {
     }
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.study.run;
     let (all, steps) = if run.quick {
         (4, 8)
@@ -108,7 +99,6 @@ fn program(options: &Options) -> Result<(), Error> {
     session.finish("Mean L2 distance to the exact solution")
 }
 
-/// Turns the ensembles into files.
 struct Report {
     study: Study,
     ensembles: Vec<Ensemble>,
@@ -189,7 +179,6 @@ impl Report {
         })
     }
 
-    /// Work of each step.
     fn work(&self) -> [LineChart; 2] {
         let counts: [(&str, fn(&StepRecord) -> f64); 2] = [
             ("Hessian-vector products", StepRecord::hvp),

@@ -1,10 +1,10 @@
 //! The cross under Willmore flow.
 
-use crate::comparison::{self, Setting};
+use crate::comparison::Setting;
 use crate::prelude::*;
 use crate::truth;
 
-const CROSS: Setting = Setting {
+pub const SETTING: Setting = Setting {
     program: "cross",
     title: "Willmore flow of a cross",
     about: "Willmore flow of a non-convex cross, eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7, by all methods and resolutions \
@@ -17,7 +17,3 @@ const CROSS: Setting = Setting {
     reference_ratio: 1,
     window: 0.95,
 };
-
-pub fn main() -> ExitCode {
-    comparison::main(&CROSS)
-}

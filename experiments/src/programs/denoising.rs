@@ -1,19 +1,12 @@
 //! Noise taken off meshes by Willmore flow, by Taubin's smoothing and by Laplacian smoothing.
 
-use std::path::PathBuf;
-use std::time::Instant;
-
 use chacha20::ChaCha8Rng;
 
 use crate::meshes::{folder, sampled};
 use crate::prelude::*;
-use crate::surfaces::{centred_box, willmore_flow};
-use engine::{DISPLACEMENT, Stop};
-use geometry::{Placement, SignedDistance, UpAxis, optimal_profile};
-use model::Networks;
+use crate::surfaces::{centred_box, fairing_flow, mesh_raster};
+use engine::DISPLACEMENT;
 use rand::{RngExt, SeedableRng};
-use render::{Scene, View};
-use report::Raster;
 use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, samples, usual_up_axis};
 
 const TITLE: &str = "Noise of meshes taken off";
@@ -26,14 +19,12 @@ const SIDE: f64 = 0.9;
 const TAUBIN: [f64; 2] = [0.5, -0.53];
 const LAPLACIAN: [f64; 2] = [0.5, 0.0];
 const ITERATIONS: usize = 30;
-/// Side of a picture in pixels.
-const DRAWN: u32 = 420;
 
 /// Independent normally distributed noise along the normals of clean meshes, taken off by `willmore fair` at its defaults, by Taubin's
 /// and by Laplacian smoothing with the number of iterations that comes nearest to the clean mesh: distances, normals and volumes.
 #[derive(Parser, Debug)]
 #[command(name = "denoising", version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
 
@@ -42,11 +33,6 @@ struct Options {
     mesh: Vec<PathBuf>,
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-/// A clean mesh.
 struct Clean {
     name: String,
     mesh: ClosedMesh,
@@ -66,7 +52,6 @@ struct Row<'a> {
 }
 
 impl Row<'_> {
-    /// Prefix of its metrics.
     fn key(&self) -> String {
         let method = self.method.to_lowercase();
         format!("{}.{method}", self.clean.key(self.noise))
@@ -78,13 +63,11 @@ impl Row<'_> {
 struct Quality {
     /// Root of the mean square distance of the vertices to the clean surface, in percent of the longest side.
     rms: f64,
-    /// Mean angle between corresponding faces, in degrees.
     normals: f64,
-    /// Change of the volume in percent.
     volume: f64,
 }
 
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let device = options.run.open_device()?;
     let quick = options.run.quick;
     let noises = if quick { &NOISES[..1] } else { &NOISES };
@@ -102,7 +85,8 @@ fn program(options: &Options) -> Result<(), Error> {
             if noise.to_bits() == noises[0].to_bits() {
                 let results = [0, 2, 3, 1].map(|k| (methods[k].method, &methods[k].result));
                 let shown = [("clean", clean.mesh.mesh())].into_iter().chain(results);
-                let drawn = shown.map(|(name, mesh)| clean.picture(name, mesh));
+                let frame = (clean.up, clean.mesh.bounding_box());
+                let drawn = shown.map(|(name, mesh)| mesh_raster(mesh, frame, name));
                 pictures.extend(session.phase::<Vec<_>>("pictures", |_| drawn.collect())?);
             }
             rows.extend(methods);
@@ -218,7 +202,6 @@ impl Clean {
         }
     }
 
-    /// The mesh with noise in percent of the longest side.
     fn with_noise(&self, percent: f64, seed: u64) -> TriangleMesh {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut noisy = self.mesh.mesh().clone();
@@ -254,18 +237,6 @@ impl Clean {
         let name = self.name.replace('-', "_").to_lowercase();
         format!("{name}.noise{noise}")
     }
-
-    /// A picture of a mesh, in the frame of the clean one.
-    fn picture(&self, caption: &str, mesh: &TriangleMesh) -> Result<Raster, Error> {
-        let scene = Scene::of_mesh(mesh.clone()).view(View {
-            up: self.up,
-            azimuth: -60.0,
-            elevation: 25.0,
-        });
-        let picture = scene.within(self.mesh.bounding_box()).render([DRAWN; 2])?;
-        let size = [picture.width() as usize, picture.height() as usize];
-        Ok(Raster::new(size, picture.pixels()).with_caption(caption))
-    }
 }
 
 /// The noise taken off as `willmore fair` does at its defaults.
@@ -278,40 +249,23 @@ fn fair(
     let (closed, _) = ClosedMesh::new(noisy.clone())?;
     let fairing = Fairing::new(closed, noisy.noise(), |_| false);
     let grid = centred_box(cells, 1.0)?;
-    let scales = Scales::of_grid(grid.spacing(), 2.0);
     let placement = Placement::fit(&fairing.start().bounding_box(), &grid, SIDE, 0.0)?;
     let distance = MeshDistance::new(&fairing.start().placed(&placement));
-    let mut distance = session.phase(format!("{title}: signed distance"), |stage| {
+    let distance = session.phase(format!("{title}: signed distance"), |stage| {
         sampled(&distance, grid, &stage.bar)
     })?;
-    surfaces::mend_signs(&mut distance);
-    let initial: Field<3> = distance.map(|s| optimal_profile(s, scales.eps));
-    let followed = fairing.follow(placement, &initial, scales.eps)?;
-    let needed = scales.needs(3, grid.spacing());
-    let variant = (Method::Hybrid, Scheme::Accurate);
-    let operator = Operator::new(variant, &Networks::default(), &needed, &grid, &scales)?;
+    let mut case = fairing_flow(title, distance)?;
+    let followed = fairing.follow(placement, &case.initial, case.scales.eps)?;
     let measured = (fairing.clone(), followed.clone());
-    let displacement = Measure::new(DISPLACEMENT, move |u, _| {
+    case.measures = vec![Measure::new(DISPLACEMENT, move |u, _| {
         let gone = measured.0.displacement(&measured.1, u).ok();
         Ok(gone.map(|gone| gone * placement.scale()))
-    });
-    let rule = StepRule::Graded {
-        first: Fairing::first_step(grid.spacing()),
-        part: Fairing::GROWTH,
-    };
-    let case = Case {
-        stops: vec![
-            Stop::Time(fairing.time(grid.spacing(), placement.scale())),
-            Stop::Displacement(fairing.farthest() * placement.scale()),
-        ],
-        measures: vec![displacement],
-        ..willmore_flow(title, initial, operator, scales, (rule, 0))
-    };
+    })];
+    case.stops = vec![
+        Stop::Time(fairing.time(grid.spacing(), placement.scale())),
+        Stop::Displacement(fairing.farthest() * placement.scale()),
+    ];
     session.phase(title, |stage| {
-        let mut run = Run::new(case, stage.device)?;
-        while run.step()?.is_some() {
-            stage.bar.inc(1);
-        }
-        Ok(fairing.faired(&followed, run.field())?)
+        Ok(fairing.faired(&followed, stage.run(case)?.field())?)
     })
 }

@@ -1,17 +1,12 @@
 //! A cube and a thick disk under Willmore flow.
 
-use engine::{ErrorControl, Order, TimeSteps};
-
 use crate::prelude::*;
 use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, View};
 use crate::truth::{self, DISK, ELLIPSOID, Reached, Sample, Sizes, THICK_DISK, Truth};
-use geometry::shapes::{Cuboid, Cylinder};
-use geometry::{SignedDistanceExt, UpAxis};
 
 const PROGRAM: &str = "disk_and_cube";
 /// Cells per unit length of a quick run and of the paper.
 const CELLS: [usize; 2] = [24, 64];
-/// Size of a time step.
 const TAU: f64 = 1.0 / 262_144.0;
 const STEPS: usize = 100;
 /// Half the side of the cube; the paper does not say, but this fits its initial energy.
@@ -31,7 +26,7 @@ const VIEW: View = View {
 /// nested implicit finite elements: pictures, Willmore energies w and L2 distances after 0, 1 and 100 steps.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     figure: FigureOptions,
 
@@ -60,11 +55,7 @@ impl Options {
     }
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let [radius, half_height] = THICK_DISK;
     let run = &options.figure.run;
     let steps = (options.steps).unwrap_or(if run.quick { 2 } else { STEPS });

@@ -1,14 +1,9 @@
 //! Closed elastic curves: length and area held.
 
-use std::f64::consts::PI;
-
 use crate::equilibria::{self, AtRest, Equilibrium, Exact};
-use crate::look;
 use crate::prelude::*;
-use crate::surfaces::willmore_flow;
-use model::Networks;
+use crate::surfaces::{accurate_operator, willmore_flow};
 use reference::equilibria::{Elastica, elastica};
-use report::{Curve, Shapes};
 
 const TITLE: &str = "Closed elastic curves with given length and area";
 /// Isoperimetric quotients `4 pi area / length^2`.
@@ -22,16 +17,12 @@ const CELLS: usize = 128;
 /// exact elastic curves, for several isoperimetric quotients.
 #[derive(Parser, Debug)]
 #[command(name = "elastica", version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
 }
 
-pub fn main() -> ExitCode {
-    harness::main(|options: &Options| program(&options.run))
-}
-
-fn program(options: &RunOptions) -> Result<(), Error> {
+pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
     let count = if options.quick { 1 } else { QUOTIENTS.len() };
     let parameters = json!({ "n": CELLS, "eps_over_h": 2, "quotients": QUOTIENTS[..count], "radius": RADIUS, "side": SIDE });
     let device = options.open_device()?;
@@ -39,9 +30,7 @@ fn program(options: &RunOptions) -> Result<(), Error> {
     let exact = session.phase("exact curves", |_| Ok(elastica(&QUOTIENTS[..count])?))?;
     let grid = Grid::<2>::per_unit(CELLS, SIDE)?;
     let scales = Scales::of_grid(grid.spacing(), 2.0);
-    let needed = scales.needs(2, grid.spacing());
-    let accurate = (Method::Hybrid, Scheme::Accurate);
-    let operator = Operator::new(accurate, &Networks::default(), &needed, &grid, &scales)?;
+    let operator = accurate_operator(&grid, &scales)?;
     let mut all = Vec::new();
     for (&ratio, exact) in QUOTIENTS.iter().zip(&exact) {
         let equilibrium = Equilibrium {
@@ -71,19 +60,12 @@ fn figure(all: &[AtRest<2>], exact: &[Elastica]) -> Figure {
     let panels = all.iter().zip(exact).map(|(one, exact)| {
         let w = one.zero_set.willmore_energy * RADIUS / PI;
         let caption = format!("w / (π/R) = {w:.4}\nexact {:.4}", exact.curve.energy() / PI);
-        let points = exact
-            .curve
-            .points()
-            .into_iter()
-            .map(|[x, y]| [RADIUS * x, RADIUS * y]);
+        let points = exact.curve.points().into_iter();
+        let points: Vec<_> = points.map(|p| p.map(|x| RADIUS * x)).collect();
         Shapes::new(caption)
             .with_window([-half, half], [-half, half])
             .with_curve(look::outline(&one.field).filled(Colour::LightGrey))
-            .with_curve(
-                Curve::new([points.collect::<Vec<_>>()])
-                    .with_colour(0)
-                    .with_width(1.0),
-            )
+            .with_curve(Curve::new([points]).with_colour(0).with_width(1.0))
     });
     Figure::new(TITLE, all.len())
         .with_column_labels(all.iter().map(|one| one.equilibrium.title.clone()))

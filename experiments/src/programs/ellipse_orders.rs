@@ -1,10 +1,8 @@
 //! The order of convergence of Willmore flow of an ellipse in h and in tau, against its own finest run.
 
-use crate::networks::{Chosen, EPS, STEP};
+use crate::networks::Chosen;
 use crate::prelude::*;
 use crate::{orders, study};
-use engine::Samples;
-use geometry::shapes::Ellipse;
 
 const TITLE: &str = "Willmore flow of an ellipse, each h with its network";
 const HALF_AXES: [f64; 2] = [0.3, 0.2];
@@ -20,16 +18,12 @@ const PARTS: [usize; 5] = [1, 2, 4, 8, 16];
 /// 2^-14, until t = 2^-10: L2 distances between runs with h and tau halved, and the orders of convergence.
 #[derive(Parser, Debug)]
 #[command(name = "ellipse_orders", version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
 }
 
-pub fn main() -> ExitCode {
-    harness::main(|options: &Options| program(&options.run))
-}
-
-fn program(options: &RunOptions) -> Result<(), Error> {
+pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
     let (used, steps) = if options.quick { (3, 2) } else { (4, STEPS) };
     let parameters =
         json!({ "half_axes": HALF_AXES, "side": SIDE, "steps": steps, "tolerance": TOLERANCE });

@@ -1,18 +1,14 @@
 //! Inpainting in 2D: Willmore flow of the values in a region, the rest of the image held.
 
 use crate::inpainting::{self, Inpainted, InpaintingOptions, Shape};
-use crate::look;
 use crate::prelude::*;
-use geometry::SignedDistanceExt;
-use geometry::shapes::{Ball, Cross, Cuboid};
 use model::{NeededNetwork, Ratios};
-use report::{Curve, Rgb, Shapes};
+use report::Rgb;
 use solver::Precision;
 
 const PROGRAM: &str = "inpainting_2d";
 /// Cells per unit length of a quick run and of the paper.
 const CELLS: [usize; 2] = [256, 1024];
-/// Kernel width of the paper.
 const WIDTH: usize = 17;
 /// Interface width in cells: 2^-8 at n = 1024; `tautilde = eps^2 / 4`, as in the paper's other experiments.
 const EPS_OVER_H: f64 = 4.0;
@@ -20,7 +16,6 @@ const EPS_OVER_H: f64 = 4.0;
 const PRINTED_STEP: f64 = 1.0 / 16384.0;
 /// Inside the first step the shapes after `2^-k` of it are shown, for these `k`.
 const INSIDE: &[u32] = &[12, 9, 6, 3];
-/// Radius of the disk.
 const RADIUS: f64 = 0.35;
 /// The cut-out corner: everything right of and above this.
 const CORNER: f64 = 0.12;
@@ -39,7 +34,7 @@ const GREEN: Rgb = Rgb(0, 140, 60);
 /// The paper has n = 1024; eps = 4/n and tautilde = 4/n^2.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     common: InpaintingOptions,
 
@@ -79,11 +74,7 @@ fn shapes(quick: bool) -> Result<[Shape<2>; 2], Error> {
     Ok([disk, cross])
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.common.figure.run;
     let n = options.common.figure.cells(CELLS);
     let grid = Grid::<2>::per_unit(n, 1.0)?.with_origin([-0.5; 2])?;

@@ -3,19 +3,14 @@
 use crate::inpainting::{self, Inpainted, InpaintingOptions, Shape};
 use crate::prelude::*;
 use crate::surfaces::{Flowed, Setting, Snapshot, Surface, View, write_snapshots};
-use geometry::shapes::{Ball, Cuboid, Cylinder};
-use geometry::{SignedDistance, SignedDistanceExt, UpAxis};
 use render::{Rgb, Tube};
 
 const PROGRAM: &str = "inpainting_3d";
 const TITLE: &str = "Inpainting of surfaces";
 /// Cells per unit length of a quick run and of the paper.
 const CELLS: [usize; 2] = [32, 128];
-/// Size of the paper's time steps.
 const TAU: f64 = 1.0 / 2_097_152.0;
-/// Middle of the box.
 const CENTRE: f64 = 0.5;
-/// Radius of the ball.
 const RADIUS: f64 = 0.34;
 /// The cut-out corner: everything beyond this along all three axes, from the middle.
 const CORNER: f64 = 0.05;
@@ -27,9 +22,7 @@ const TUBE: [f64; 2] = [0.11, 0.42];
 const TUBES_REGION: [f64; 2] = [CENTRE - 0.24, CENTRE + 0.24];
 /// Radius of the edges of the region in the pictures.
 const EDGE: f64 = 0.003;
-/// Side of a picture in pixels.
 const SIDE: u32 = 480;
-/// Pictures side by side.
 const COLUMNS: usize = 3;
 /// After so many doublings a step has size 8: nothing moves for long.
 const MOST_EXTRA: usize = 24;
@@ -42,7 +35,7 @@ const GREEN: Rgb = Rgb(0, 140, 60);
 /// nothing moves any more. The paper has n = 128; eps = 2/n and tautilde = 1/n^2.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     common: InpaintingOptions,
 
@@ -96,11 +89,7 @@ fn growing(papers: usize) -> StepRule {
     }
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.common.figure.run;
     let extra_steps = options.extra_steps;
     require(

@@ -1,9 +1,7 @@
 //! Pictures and quality of the learned 2D operators.
 
-use std::collections::BTreeMap;
-use std::f64::consts::{PI, SQRT_2, TAU};
+use std::f64::consts::{SQRT_2, TAU};
 
-use crate::networks::NetworkOptions;
 use crate::prelude::*;
 use crate::quality;
 use crate::training::{NetworkSpec, held_out_radii};
@@ -16,7 +14,7 @@ const PROGRAM: &str = "learned_networks";
 /// Kernels, activations, transfer functions and quality of the learned operators for n = 128, 256, 512.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
 
@@ -24,11 +22,7 @@ struct Options {
     networks: NetworkOptions,
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.run;
     let mut specs = NetworkSpec::convergence();
     specs.truncate(if run.quick { 1 } else { specs.len() });
@@ -80,7 +74,6 @@ fn program(options: &Options) -> Result<(), Error> {
     session.finish("Quality of the learned operators")
 }
 
-/// A network with the curves that show it.
 struct Shown<'a> {
     spec: &'a NetworkSpec,
     network: &'a Network,
@@ -193,7 +186,6 @@ fn transfer_rows<'a>(
     (0..=n / 2).map(row).collect()
 }
 
-/// A thin black curve to compare with.
 fn thin(curve: Series, style: LineStyle) -> Series {
     let curve = curve.with_colour(Colour::Black);
     curve.with_style(style).with_width(1.5)

@@ -1,10 +1,10 @@
 //! The cross under mean curvature flow.
 
-use crate::comparison::{self, Setting};
+use crate::comparison::Setting;
 use crate::prelude::*;
 use crate::truth;
 
-const MCF_CROSS: Setting = Setting {
+pub const SETTING: Setting = Setting {
     program: "mcf_cross",
     title: "Mean curvature flow of a cross",
     about: "Mean curvature flow of a non-convex cross, eps = 2^-6, tautilde = 2^-14, until t = 2^-7, by all methods and resolutions: \
@@ -17,7 +17,3 @@ const MCF_CROSS: Setting = Setting {
     reference_ratio: 4,
     window: 0.95,
 };
-
-pub fn main() -> ExitCode {
-    comparison::main(&MCF_CROSS)
-}

@@ -1,19 +1,17 @@
 //! The signed distance of any mesh on any grid.
 
 use std::ffi::OsStr;
-use std::path::PathBuf;
 
 use crate::meshes;
 use crate::prelude::*;
-use geometry::{Placement, npy, vti};
-use report::Progress;
+use geometry::{npy, vti};
 use surfaces::{ClosedMesh, MeshDistance};
 
 /// Writes the signed distance to a closed triangle mesh, negative inside, at the nodes i/n of the unit cube. The mesh is scaled so
 /// that the longest side of its bounding box has the given length, and its bounding box is centred at (0.5, 0.5, 0.5).
 #[derive(Parser, Debug)]
 #[command(name = "mesh_distance", version)]
-struct Options {
+pub struct Options {
     /// The mesh: OBJ, STL or PLY
     #[arg(long, value_name = "FILE")]
     mesh: PathBuf,
@@ -35,11 +33,7 @@ struct Options {
     quiet: bool,
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let (path, output) = (options.mesh.display(), options.output.display());
     let extension = options.output.extension().map(OsStr::to_ascii_lowercase);
     let volume = extension.as_ref().is_some_and(|name| name == "vti");

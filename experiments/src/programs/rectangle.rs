@@ -1,10 +1,10 @@
 //! The rectangle under Willmore flow.
 
-use crate::comparison::{self, Setting};
+use crate::comparison::Setting;
 use crate::prelude::*;
 use crate::truth;
 
-const RECTANGLE: Setting = Setting {
+pub const SETTING: Setting = Setting {
     program: "rectangle",
     title: "Willmore flow of a rectangle",
     about: "Willmore flow of a rectangle with sides 0.4 and 0.2, eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7, by all methods \
@@ -18,7 +18,3 @@ const RECTANGLE: Setting = Setting {
     reference_ratio: 1,
     window: 0.5,
 };
-
-pub fn main() -> ExitCode {
-    comparison::main(&RECTANGLE)
-}

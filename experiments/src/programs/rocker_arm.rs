@@ -1,12 +1,10 @@
 //! A machine part of genus one under Willmore flow, and the Clifford torus next to it.
 
-use std::collections::BTreeMap;
-
 use crate::mesh_flow::{MeshFlow, MeshFlowOptions};
 use crate::meshes::KnownMesh;
 use crate::prelude::*;
 use crate::surfaces::{Flowed, View};
-use geometry::{CliffordTorus, UpAxis};
+use geometry::CliffordTorus;
 use render::Tube;
 
 const ROCKER_ARM_FLOW: MeshFlow = MeshFlow {
@@ -40,13 +38,13 @@ const CIRCLES: (usize, usize) = (12, 96);
 /// and the Clifford torus whose phase field is nearest to the last one in L2.
 #[derive(Parser, Debug)]
 #[command(name = ROCKER_ARM_FLOW.program, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     flow: MeshFlowOptions,
 }
 
-pub fn main() -> ExitCode {
-    harness::main(|options: &Options| ROCKER_ARM_FLOW.run(&options.flow, clifford_tori))
+pub fn program(options: &Options) -> Result<(), Error> {
+    ROCKER_ARM_FLOW.run(&options.flow, clifford_tori)
 }
 
 /// Finds the Clifford torus nearest to the last shape of each run, and draws it there.

@@ -1,12 +1,10 @@
 //! Spheres by the network for surfaces: mean curvature flow, Willmore energies, and standing still.
 
 use crate::prelude::*;
+use crate::quality;
 use crate::surfaces::{self, Setting};
 use crate::training::{NetworkSpec, held_out_radii};
-use crate::{look, quality};
-use engine::{energy_increases, mean_hvp};
 use geometry::exact::{WILLMORE_ENERGY_SPHERE, mean_curvature_radius};
-use geometry::shapes::Ball;
 use model::Quality;
 
 const PROGRAM: &str = "spheres";
@@ -20,7 +18,6 @@ const LAST: usize = MCF_STEPS.len() - 1;
 /// Steps of Willmore flow, which should leave spheres alone.
 const WILLMORE_STEPS: usize = 20;
 const TAU: f64 = 1.0 / 262_144.0;
-/// The hybrid scheme as in the paper.
 const PAPERS: (Method, Scheme) = (Method::Hybrid, Scheme::Paper);
 
 /// The network for surfaces on spheres, n = 64, eps = 2^-5, tautilde = 2^-12: L2 errors of mean curvature flow against
@@ -28,12 +25,11 @@ const PAPERS: (Method, Scheme) = (Method::Hybrid, Scheme::Paper);
 /// flow, tau = 2^-18, which leaves spheres alone.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     figure: FigureOptions,
 }
 
-/// What was measured for one radius.
 #[derive(Serialize)]
 struct Measurement {
     radius: f64,
@@ -45,7 +41,6 @@ struct Measurement {
     willmore: Vec<Still>,
 }
 
-/// A sphere under Willmore flow.
 #[derive(Serialize)]
 struct Still {
     scheme: Scheme,
@@ -55,7 +50,6 @@ struct Still {
     w_relaxed: f64,
     /// Radius of the ball with the final volume, less that at the beginning, in cells.
     radius_change_over_h: f64,
-    /// Steps in which the energy rose.
     energy_increases: usize,
     hvp_per_step: f64,
 }
@@ -75,11 +69,7 @@ fn variants() -> impl Iterator<Item = (Method, Scheme)> {
     look::variants(|(method, scheme)| method.schemes(Flow::MeanCurvature).contains(&scheme))
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.figure.run;
     let radii = if run.quick { &RADII[2..4] } else { &RADII };
     let willmore_steps = if run.quick { 2 } else { WILLMORE_STEPS };
@@ -93,7 +83,7 @@ fn program(options: &Options) -> Result<(), Error> {
         let measured = session.phase(format!("radius {radius}"), |stage| {
             let sphere = Sphere {
                 setting: &setting,
-                device: stage.device,
+                stage,
                 radius,
             };
             sphere.measure(willmore_steps)
@@ -122,10 +112,9 @@ fn program(options: &Options) -> Result<(), Error> {
     session.finish(TITLE)
 }
 
-/// A ball with its setting.
 struct Sphere<'a> {
     setting: &'a Setting,
-    device: &'a ComputeDevice,
+    stage: &'a Stage<'a>,
     radius: f64,
 }
 
@@ -134,7 +123,9 @@ impl Sphere<'_> {
         let time = (self.setting.scales.mcf_step, MCF_STEPS[LAST]);
         let still = self.case(Flow::Willmore, PAPERS, (TAU, 0))?;
         let mcf = variants().map(|variant| {
-            let run = self.run(self.case(Flow::MeanCurvature, variant, time)?)?;
+            let run = self
+                .stage
+                .run(self.case(Flow::MeanCurvature, variant, time)?)?;
             Ok(MCF_STEPS.map(|step| run.records()[step - 1].measures["l2"]))
         });
         let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
@@ -168,14 +159,9 @@ impl Sphere<'_> {
         Ok(Case { flow, ..case })
     }
 
-    fn run(&self, case: Case<3>) -> Result<Run<3>, Error> {
-        let mut run = Run::new(case, self.device)?;
-        while run.step()?.is_some() {}
-        Ok(run)
-    }
-
     fn stand_still(&self, scheme: Scheme, steps: usize) -> Result<Still, Error> {
-        let run = self.run(self.case(Flow::Willmore, (Method::Hybrid, scheme), (TAU, steps))?)?;
+        let case = self.case(Flow::Willmore, (Method::Hybrid, scheme), (TAU, steps))?;
+        let run = self.stage.run(case)?;
         let records = run.records();
         let first = records.first().and_then(|record| record.minimization);
         let last = records.last();

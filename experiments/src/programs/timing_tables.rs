@@ -1,13 +1,12 @@
 //! Time of the methods for the same flow on the same machine.
 
 use crate::meshes::{ARMADILLO, MeshOptions};
-use crate::networks::{Chosen, NetworkOptions, convergence_network};
+use crate::networks::{Chosen, convergence_network};
 use crate::prelude::*;
 use crate::surfaces;
 use crate::timing::{self, Numbers, Timed, take_turns};
 use engine::Method::{FeImplicit, FeSemi, Hybrid};
 use fem::LinearSolver::{self, ConjugateGradients, Direct};
-use indicatif::ProgressBar;
 use solver::Method::{self as Newton, Paper, Preconditioned};
 
 const PROGRAM: &str = "timing_tables";
@@ -22,7 +21,7 @@ const PAPERS: &str = "paper, other machines [s]";
 /// inner iterations. Rows that exceed the budget are extrapolated from the steps done, and say so.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
 
@@ -41,7 +40,6 @@ struct Options {
     budget: f64,
 }
 
-/// A row of the table.
 struct Variant {
     key: &'static str,
     label: &'static str,
@@ -53,46 +51,44 @@ struct Variant {
     papers_seconds: Option<[f64; 2]>,
 }
 
+const HYBRID: Variant = Variant {
+    key: "hybrid",
+    label: "hybrid",
+    method: Hybrid,
+    newton: Preconditioned,
+    linear: ConjugateGradients,
+    papers_seconds: None,
+};
+
 const VARIANTS: [Variant; 5] = [
-    Variant {
-        key: "hybrid",
-        label: "hybrid",
-        method: Hybrid,
-        newton: Preconditioned,
-        linear: ConjugateGradients,
-        papers_seconds: None,
-    },
+    HYBRID,
     Variant {
         key: "hybrid_plain_newton",
         label: "hybrid, plain Newton-CG",
-        method: Hybrid,
         newton: Paper,
-        linear: ConjugateGradients,
         papers_seconds: Some([122.0, 1020.0]),
+        ..HYBRID
     },
     Variant {
         key: "fe_implicit",
         label: "FE implicit, FFT-CG inside",
         method: FeImplicit,
-        newton: Preconditioned,
-        linear: ConjugateGradients,
-        papers_seconds: None,
+        ..HYBRID
     },
     Variant {
         key: "fe_implicit_direct",
         label: "FE implicit, Cholesky inside",
         method: FeImplicit,
-        newton: Preconditioned,
         linear: Direct,
         papers_seconds: Some([4970.0, 28622.0]),
+        ..HYBRID
     },
     Variant {
         key: "fe_semi",
         label: "FE semi-implicit",
         method: FeSemi,
-        newton: Preconditioned,
-        linear: ConjugateGradients,
         papers_seconds: Some([4307.0, 22045.0]),
+        ..HYBRID
     },
 ];
 
@@ -112,11 +108,7 @@ const COLUMNS: [(&str, Format, &str); 4] = [
     ("Cholesky/step", Fixed(1), "factorizations_per_step"),
 ];
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let (run, quick) = (&options.run, options.run.quick);
     require(
         options.budget.is_finite() && options.budget > 0.0,
@@ -185,7 +177,6 @@ fn program(options: &Options) -> Result<(), Error> {
     session.finish("128 Willmore steps of the cross: wall time on this machine")
 }
 
-/// All rows at a resolution.
 fn measure(
     session: &mut Session<'_>,
     networks: &Chosen,
@@ -254,7 +245,6 @@ impl Timing {
         numbers
     }
 
-    /// Whether there is a time worth showing.
     fn usable(&self) -> bool {
         self.failure.is_none() && self.timed.run.steps() > 1
     }
@@ -268,7 +258,6 @@ impl Timing {
         self.row.papers_seconds.map(|seconds| seconds[column])
     }
 
-    /// How it was measured.
     fn measured(&self) -> String {
         let steps = self.timed.run.steps();
         match &self.failure {

@@ -4,19 +4,16 @@ use std::collections::BTreeSet;
 
 use crate::prelude::*;
 use crate::quality;
-use crate::session::{Stage, remove_folder};
+use crate::session::remove_folder;
 use crate::training::{NetworkSpec, train, training_device};
-use clap::ValueEnum;
 use model::Network;
 use model::training::adam::AdamParams;
 use model::training::least_squares::LeastSquaresParams;
 use model::training::levenberg_marquardt::LmParams;
 use model::training::{self, CurvePoint, Trained};
-use report::OutputDir;
 
 const PROGRAM: &str = "train_networks";
 
-/// How networks are trained.
 #[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 enum Recipe {
@@ -33,7 +30,7 @@ enum Recipe {
 /// Trains the networks: n = 128, 256, 512 of the convergence tests, the one for inpainting, and the one for surfaces in 3D.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
 
@@ -64,11 +61,7 @@ impl Recipe {
     }
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.run;
     let chosen = options.chosen()?;
     require(options.adam_epochs > 0, "--adam-epochs must be at least 1")?;
@@ -195,7 +188,6 @@ impl Trainings<'_> {
         Ok(())
     }
 
-    /// Curves, figure, metrics and table.
     fn write(self) -> Result<(), Error> {
         let (mut session, all) = (self.session, self.finished);
         session.figure(figure(&all), "learning_curves")?;
@@ -222,7 +214,6 @@ impl Trainings<'_> {
 }
 
 impl Finished {
-    /// Prefix of its metrics.
     fn key(&self) -> String {
         match self.recipe {
             Recipe::Lm => format!("train.{}", self.spec.name),

@@ -1,19 +1,11 @@
 //! Segmentations made smooth by Willmore flow with and without their volume kept, by Taubin's smoothing and by Laplacian smoothing.
 
-use std::f64::consts::PI;
-
 use chacha20::ChaCha8Rng;
 
 use crate::prelude::*;
-use crate::surfaces::willmore_flow;
-use engine::{Stop, Target};
-use geometry::shapes::Ball;
-use geometry::{Placement, SignedDistance, UpAxis, ZeroSet, optimal_profile};
-use model::Networks;
+use crate::surfaces::{fairing_flow, mesh_raster};
 use rand::{RngExt, SeedableRng};
-use render::{Scene, View};
-use report::Raster;
-use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, samples};
+use surfaces::{ClosedMesh, MeshDistance, TriangleMesh, samples};
 use volumes::{Body, Inside, Volume};
 
 const TITLE: &str = "Segmentations without their steps, and their volumes";
@@ -33,21 +25,15 @@ const FARTHEST: f64 = 0.35;
 const TAUBIN: [f64; 2] = [0.5, -0.53];
 const LAPLACIAN: [f64; 2] = [0.5, 0.0];
 const ITERATIONS: usize = 60;
-/// Side of a picture in pixels.
-const DRAWN: u32 = 420;
 
 /// A ball with wrong labels and a figure, as voxels: their surface by marching tetrahedra, what `willmore fair` makes of the voxels and of
 /// that surface, with the volume kept and without, and Taubin's and Laplacian smoothing of it with the number of iterations that comes
 /// nearest to the shape: volumes, energies, displacements.
 #[derive(Parser, Debug)]
 #[command(name = "unshrinking", version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
-}
-
-pub fn main() -> ExitCode {
-    harness::main(program)
 }
 
 /// A shape as voxels, whose sides are the unit of length.
@@ -71,7 +57,7 @@ struct Row<'a> {
     surface: TriangleMesh,
 }
 
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let full = usize::from(!options.run.quick);
     let device = options.run.open_device()?;
     let parameters = json!({ "bodies": BODIES, "wrong": WRONG, "time": TIME, "taubin": TAUBIN, "laplacian": LAPLACIAN, "iterations": ITERATIONS });
@@ -150,7 +136,6 @@ impl Segmented {
         })
     }
 
-    /// What becomes of it by all means.
     fn treated(&self, session: &mut Session<'_>) -> Result<Vec<Row<'_>>, Error> {
         let (body, marched) = (&self.body.surface, &self.marched);
         let [taubin, laplacian] = [TAUBIN, LAPLACIAN].map(|factors| self.smoothed(factors));
@@ -184,10 +169,7 @@ impl Segmented {
                 let mut volume = start.volume();
                 if let Some(keeps) = flow {
                     case.held.volume = keeps.then_some(Target::keep(self.body.volume));
-                    let mut run = Run::new(case.clone(), stage.device)?;
-                    while run.step()?.is_some() {
-                        stage.bar.inc(1);
-                    }
+                    let run = stage.run(case.clone())?;
                     case.initial = run.field().clone();
                     volume = ZeroSet::of(run.field(), case.scales.eps)?.volume;
                     surface = surfaces::remeshed_surface(run.field(), case.scales.eps)?
@@ -219,31 +201,19 @@ impl Segmented {
 
     /// Willmore flow from a surface, as long as `willmore fair` lets it.
     fn case(&self, start: &ClosedMesh) -> Result<Case<3>, Error> {
-        let (grid, spacing) = (self.grid, self.grid.spacing());
-        let scales = Scales::of_grid(spacing, 2.0);
-        let mut distance = MeshDistance::new(start).sample(grid, || ())?;
-        surfaces::mend_signs(&mut distance);
-        let initial = distance.map(|s| optimal_profile(s, scales.eps));
-        let (needed, variant) = (scales.needs(3, spacing), (Method::Hybrid, Scheme::Accurate));
-        let operator = Operator::new(variant, &Networks::default(), &needed, &grid, &scales)?;
-        let first = Fairing::first_step(spacing);
-        let rule = StepRule::Graded {
-            first,
-            part: Fairing::GROWTH,
-        };
+        let distance = MeshDistance::new(start).sample(self.grid, || ())?;
+        let case = fairing_flow(self.name, distance)?;
         Ok(Case {
-            measures: vec![Measure::displacement(&initial, scales.eps)],
+            measures: vec![Measure::displacement(&case.initial, case.scales.eps)],
             stops: vec![Stop::Time(TIME), Stop::Displacement(FARTHEST)],
-            ..willmore_flow(self.name, initial, operator, scales, (rule, 0))
+            ..case
         })
     }
 
     /// Root of the mean square distance of the vertices to the shape.
     fn distance(&self, mesh: &TriangleMesh) -> f64 {
-        let squares = mesh
-            .vertices
-            .iter()
-            .map(|&x| self.shape.signed_distance(x).powi(2));
+        let vertices = mesh.vertices.iter();
+        let squares = vertices.map(|&x| self.shape.signed_distance(x).powi(2));
         (squares.sum::<f64>() / mesh.vertices.len() as f64).sqrt()
     }
 }
@@ -257,25 +227,14 @@ impl Row<'_> {
     /// The largest distance from the surface by marching tetrahedra.
     fn displacement(&self) -> f64 {
         let distance = MeshDistance::new(&self.of.marched);
-        let all = self
-            .surface
-            .vertices
-            .iter()
-            .map(|&x| distance.signed_distance(x).abs());
+        let vertices = self.surface.vertices.iter();
+        let all = vertices.map(|&x| distance.signed_distance(x).abs());
         all.fold(0.0, f64::max)
     }
 
     fn picture(&self) -> Result<Raster, Error> {
-        let scene = Scene::of_mesh(self.surface.clone()).view(View {
-            up: self.of.up,
-            azimuth: -60.0,
-            elevation: 25.0,
-        });
-        let picture = scene
-            .within(self.of.marched.bounding_box())
-            .render([DRAWN; 2])?;
-        let size = [picture.width() as usize, picture.height() as usize];
+        let frame = (self.of.up, self.of.marched.bounding_box());
         let caption = format!("{}\nvolume {:+.2} %", self.treatment.1, self.change());
-        Ok(Raster::new(size, picture.pixels()).with_caption(&caption))
+        mesh_raster(&self.surface, frame, caption)
     }
 }

@@ -1,15 +1,10 @@
 //! Lipid vesicles: area and volume held.
 
-use std::f64::consts::PI;
-
 use crate::equilibria::{self, AtRest, Equilibrium, Exact};
-use crate::look;
 use crate::prelude::*;
-use crate::surfaces::{Setting, View, centred_box, willmore_flow};
-use geometry::UpAxis;
+use crate::surfaces::{Setting, View, centred_box, raster, willmore_flow};
 use reference::equilibria::{Branch, Vesicle, vesicles};
 use render::{Quality, Scene};
-use report::{Curve, Raster, Shapes};
 
 const TITLE: &str = "Vesicles: least bending energy with given area and volume";
 const CELLS: [usize; 2] = [32, 64];
@@ -37,23 +32,18 @@ const RUNS: [(Branch, &str, &[f64], f64, f64); 2] = [
 /// along the reduced volume, against exact axisymmetric equilibria; the phase diagram.
 #[derive(Parser, Debug)]
 #[command(name = "vesicles", version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     figure: FigureOptions,
 }
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-/// A vesicle of the flow and the exact one.
 struct Pair {
     branch: &'static str,
     at_rest: AtRest<3>,
     exact: Vesicle,
 }
 
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.figure.run;
     let (count, steps) = if run.quick {
         (1, Some(2))
@@ -201,12 +191,10 @@ fn shapes(pairs: &[Pair], quick: bool) -> Result<Figure, Error> {
         let scene = Scene::new(&pair.at_rest.field, eps)?
             .view(VIEW)
             .quality(quality);
-        let picture = scene.render([320; 2])?;
-        let size = [picture.width() as usize, picture.height() as usize];
         let (branch, v, energy) = (pair.branch, pair.ratio(), pair.energy());
         let exact = pair.exact.energy() / (8.0 * PI);
         let caption = format!("{branch}, v = {v:.2}\nw / 8π = {energy:.4}\nexact {exact:.4}");
-        Ok(Raster::new(size, picture.pixels()).with_caption(caption))
+        raster(&scene, 320, caption)
     };
     let section = |pair: &Pair| {
         let radius = pair.at_rest.equilibrium.radius;

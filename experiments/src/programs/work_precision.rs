@@ -1,11 +1,10 @@
 //! Errors of the time steps against the exact flow, and what they cost.
 
 use crate::circles::{self, Ensemble};
-use crate::networks::{Chosen, STEP};
+use crate::networks::Chosen;
 use crate::prelude::*;
 use crate::study::Variant;
 use crate::truth::{self, CELLS, CROSS, ELLIPSE, RECTANGLE, Reached, STRICT, Sample};
-use engine::{ErrorControl, Order, TimeSteps};
 
 const TITLE: &str = "Time steps of Willmore flow against the exact flow";
 
@@ -15,7 +14,6 @@ const SAMPLES: [Sample<2>; 3] = [CROSS, RECTANGLE, ELLIPSE];
 const MARKS: [usize; 4] = [8, 32, 64, 128];
 const END: f64 = 128.0 * STEP;
 
-/// The curves of the figure.
 const EULER: &str = "implicit Euler, equal steps";
 const EQUAL: &str = "second order, equal steps";
 const CONTROLLED: &str = "second order, controlled steps";
@@ -64,16 +62,11 @@ fn steppings(quick: bool) -> Vec<Stepping> {
 /// the exact flow of the curves: largest distances, tips, areas, lengths and energies, and the Hessian-vector products they cost.
 #[derive(Parser, Debug)]
 #[command(name = "work_precision", version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
 }
 
-pub fn main() -> ExitCode {
-    harness::main(|options: &Options| program(&options.run))
-}
-
-/// A run at a mark.
 struct Compared {
     sample: &'static str,
     n: usize,
@@ -83,7 +76,7 @@ struct Compared {
     reached: Reached,
 }
 
-fn program(options: &RunOptions) -> Result<(), Error> {
+pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
     let used = if options.quick { 1 } else { usize::MAX };
     let marks: Vec<usize> = MARKS.into_iter().take(used).collect();
     let cells: Vec<usize> = CELLS.into_iter().take(used).collect();

@@ -1,25 +1,19 @@
 //! `willmore check`.
 
 use std::fmt::Write;
-use std::process::ExitCode;
 use std::sync::Arc;
 
 use chacha20::ChaCha8Rng;
-use engine::Method;
-use geometry::Field;
 use linearize::taylor::{halvings, remainder};
 use model::{Factors, MeanCurvatureOperator, Network};
-use operators::{ComputeDevice, DeviceKind, add_scaled, inner_product};
+use operators::{add_scaled, inner_product};
 use rand::{RngExt, SeedableRng};
-use serde_json::{Value, json};
 use solver::{FlowParams, MinimizingMovement, Objective};
 
 use super::{open_device, operator};
-use crate::cli::{CheckOptions, SayOptions};
-use crate::error::Error;
-use crate::input::{self, Loaded};
+use crate::cli::CheckOptions;
+use crate::prelude::*;
 
-/// Steps of the Taylor tests.
 const STEPS: usize = 14;
 /// By how much an observed rate may be short of the expected one.
 const SHORT: f64 = 0.3;
@@ -135,11 +129,9 @@ fn findings<const D: usize>(
     Ok(findings)
 }
 
-/// The first and largest step of the Taylor tests.
 const FIRST_STEP: f64 = 0.25;
 
 struct Derivatives {
-    /// Steps and energies.
     values: Vec<(f64, f64)>,
     /// First and second derivative in one direction.
     along: [f64; 2],

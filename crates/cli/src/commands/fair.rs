@@ -2,15 +2,10 @@
 
 use std::f64::consts::PI;
 
-use engine::{Scales, StepRule};
-use surfaces::Fairing;
-
 use super::flow::{FlowCommand, Shared};
-use crate::cli::{FairOptions, FlowOptions, MeshFormat, SayOptions, SizeTarget};
-use crate::error::Error;
-use crate::input::{self, Loaded, Start};
+use crate::cli::FairOptions;
 use crate::keep::Keep;
-use crate::own::{Noise, OwnMesh};
+use crate::prelude::*;
 
 /// Energies below this have only balls, which have `8 pi`.
 const BALL: f64 = 1.2 * 8.0 * PI;
@@ -19,6 +14,14 @@ const BALL: f64 = 1.2 * 8.0 * PI;
 const STEPS: f64 = 1.6;
 /// as long as the surface goes no further than so many, root of the mean square.
 const FARTHEST: f64 = 0.35;
+
+/// The usual steps on a grid of this spacing.
+fn graded(spacing: f64) -> StepRule {
+    StepRule::Graded {
+        first: Fairing::first_step(spacing),
+        part: Fairing::GROWTH,
+    }
+}
 
 impl FairOptions {
     /// A segmentation, whose volume is kept.
@@ -43,10 +46,7 @@ impl FairOptions {
         {
             voxels.farthest = Some(FARTHEST * voxels.side);
             flow.time = Some((STEPS * voxels.side).powi(4));
-            flow.tau.get_or_insert(StepRule::Graded {
-                first: Fairing::first_step(field.grid().spacing()),
-                part: Fairing::GROWTH,
-            });
+            flow.tau.get_or_insert(graded(field.grid().spacing()));
         }
         Ok(loaded)
     }
@@ -76,10 +76,7 @@ impl FlowCommand for FairOptions {
         let usual = if self.ends {
             StepRule::Controlled
         } else {
-            StepRule::Graded {
-                first: f64::NAN,
-                part: Fairing::GROWTH,
-            }
+            graded(f64::NAN)
         };
         self.flow.check_tolerance(usual)?;
         if let Some(ratio) = self.energy_ratio.filter(|ratio| *ratio >= 1.0) {
@@ -128,18 +125,13 @@ impl FlowCommand for FairOptions {
             self.keep = Some(input::absolute(mask)?.to_string_lossy().into_owned());
         }
         let bytes = std::fs::read(&path).map_err(Error::io("read", &path))?;
-        let noise = match self.noise {
-            Some(noise) => Noise::Of(noise),
-            None if ends => Noise::None,
-            None => Noise::Estimated,
-        };
-        let estimated = matches!(noise, Noise::Estimated);
+        let noise = self.noise.or(ends.then_some(0.0));
         let (mut own, warnings) = OwnMesh::new(&path, bytes, noise, self.keep.clone())?;
         own.keeps_volume = self.flow.volume == Some(SizeTarget::Keep);
         for warning in warnings {
             say.warn(&format!("{}: {warning}", path.display()));
         }
-        if estimated {
+        if noise.is_none() {
             say.note(&format!(
                 "noise: {:.3e}, {:.3} % of the longest side, estimated (--noise)",
                 own.fairing().noise(),
@@ -175,15 +167,12 @@ impl FlowCommand for FairOptions {
     fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
         if self.noise.is_some() {
             let spacing = scales.eps / self.flow.scheme.eps_over_h();
-            self.flow.tau.get_or_insert(StepRule::Graded {
-                first: Fairing::first_step(spacing),
-                part: Fairing::GROWTH,
-            });
+            self.flow.tau.get_or_insert(graded(spacing));
         }
         self.flow.rule(scales, unit)
     }
 
-    fn format(&self) -> Option<MeshFormat> {
-        self.format
+    fn format(&self) -> Option<String> {
+        self.format.clone()
     }
 }

@@ -1,30 +1,13 @@
 //! `willmore flow`, and what it has in common with the other commands that make runs.
 
-use std::path::Path;
-use std::process::ExitCode;
-
-use engine::{
-    Case, ErrorControl, Flow, Held, Helfrich, Measure, Method, Scales, StepRule, Stop, Target,
-    TimeSteps,
-};
-use geometry::{Field, ZeroSet};
-use operators::ComputeDevice;
-use runs::StoredRun;
-use serde::Serialize;
+use engine::{ErrorControl, Flow, Held, Helfrich, Target, TimeSteps};
 use solver::NewtonParams;
 
 use super::{open_device, operator};
-use crate::cli::{
-    CommonOptions, FlowOptions, InputOptions, KeepOptions, MeshFormat, SayOptions, SchemeOptions,
-    SizeTarget, Tolerance,
-};
-use crate::config;
-use crate::error::Error;
-use crate::input::{self, Loaded, Start};
-use crate::outlet::{Outlet, Space};
-use crate::plane::Plane;
+use crate::cli::{CommonOptions, SchemeOptions};
+use crate::prelude::*;
 use crate::run::Plan;
-use crate::volume::{self, Label};
+use crate::volume;
 
 /// Steps of a run that has no other end.
 const STEPS: usize = 20;
@@ -32,19 +15,15 @@ const STEPS: usize = 20;
 const LONGEST_MOVE: f64 = 2.0;
 /// Steps over which sizes go to their targets.
 const RAMP: usize = 20;
-/// What can be saved.
 const SAVED: [&str; 5] = ["ply", "obj", "stl", "png", "svg"];
 
 /// A command that makes a run.
 pub trait FlowCommand: Serialize + Clone {
-    /// Its name.
     const NAME: &'static str;
-    /// The flow.
     const FLOW: Flow = Flow::Willmore;
     /// Steps of a run that ends at a time or an energy.
     const MANY_STEPS: usize = 1000;
 
-    /// Reads the input.
     fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
         let shared = self.shared();
         input::load(shared.input, shared.scheme.eps_over_h(), say)
@@ -60,10 +39,8 @@ pub trait FlowCommand: Serialize + Clone {
         None
     }
 
-    /// The options that all of them have.
     fn shared(&mut self) -> Shared<'_>;
 
-    /// How the inner step is made.
     fn method(&self) -> Method {
         Method::Hybrid
     }
@@ -87,13 +64,11 @@ pub trait FlowCommand: Serialize + Clone {
         None
     }
 
-    /// Format of meshes.
-    fn format(&self) -> Option<MeshFormat> {
+    fn format(&self) -> Option<String> {
         None
     }
 }
 
-/// Options of all commands that make runs.
 pub struct Shared<'a> {
     pub input: &'a mut InputOptions,
     pub scheme: &'a mut SchemeOptions,
@@ -138,20 +113,16 @@ impl FlowCommand for FlowOptions {
 impl FlowOptions {
     /// Refuses a tolerance that the time steps do not look at.
     pub fn check_tolerance(&self, usual: StepRule) -> Result<(), Error> {
-        let Some(tolerance) = self.tolerance else {
-            return Ok(());
-        };
-        let rule = self.tau.unwrap_or(usual);
-        if rule != StepRule::Controlled {
-            return Err(Error::options(format!(
-                "--tolerance {tolerance} is for controlled time steps: give --tau controlled, or leave it out"
-            )));
+        match self.tolerance {
+            Some(tolerance) if self.tau.unwrap_or(usual) != StepRule::Controlled => {
+                Err(Error::options(format!(
+                    "--tolerance {tolerance} is for controlled time steps: give --tau controlled, or leave it out"
+                )))
+            }
+            _ => Ok(()),
         }
-        Ok(())
     }
-}
 
-impl FlowOptions {
     /// Spontaneous curvature, tension and pressure, in the units of the input.
     fn energy(&self) -> Result<Helfrich, Error> {
         let finite = |name: &str, value: Option<f64>| match value.unwrap_or(0.0) {
@@ -239,7 +210,6 @@ impl Shared<'_> {
         Ok(())
     }
 
-    /// When the run ends.
     fn stops(&self, rule: StepRule) -> Vec<Stop> {
         let mut stops: Vec<Stop> = (self.steps.map(Stop::Steps).into_iter())
             .chain(self.time.map(Stop::Time))
@@ -315,7 +285,6 @@ fn each_label<C: FlowCommand>(
     Ok(ExitCode::SUCCESS)
 }
 
-/// A command with its device.
 struct Job<C> {
     command: C,
     device: ComputeDevice,

@@ -1,16 +1,11 @@
 //! `willmore info`.
 
 use std::fmt::Write;
-use std::process::ExitCode;
 
 use model::Shipped;
-use operators::{ComputeDevice, DeviceKind};
-use serde_json::json;
 
-use crate::cli::SayOptions;
-use crate::error::Error;
+use crate::prelude::*;
 
-/// Says what this program is made of and which devices work.
 pub fn run(say: SayOptions) -> Result<ExitCode, Error> {
     let version = env!("CARGO_PKG_VERSION");
     let mut devices = Vec::new();

@@ -1,12 +1,8 @@
 //! `willmore inpaint`.
 
-use engine::{Scales, StepRule};
-use surfaces::shapes::Region;
-
 use super::flow::{FlowCommand, Shared};
-use crate::cli::{FlowOptions, InpaintOptions};
-use crate::error::Error;
-use crate::input::{self, Loaded, Start};
+use crate::cli::InpaintOptions;
+use crate::prelude::*;
 
 /// The usual step in units of the inner one.
 const STEP: f64 = 16.0;

@@ -1,10 +1,10 @@
 //! `willmore mcf`.
 
-use engine::{Flow, Method, Scales, Scheme, StepRule};
+use engine::Flow;
 
 use super::flow::{FlowCommand, Shared};
 use crate::cli::{McfMethod, McfOptions, SchemeOptions};
-use crate::error::Error;
+use crate::prelude::*;
 
 impl FlowCommand for McfOptions {
     const NAME: &'static str = "mcf";

@@ -12,13 +12,11 @@ pub mod sample;
 pub mod shell;
 pub mod train;
 
-use engine::{Method, Operator, Scales, Scheme, Storage};
-use geometry::Grid;
+use engine::{Operator, Storage};
 use model::Networks;
-use operators::{ComputeDevice, DeviceKind};
 
 use crate::cli::{CommonOptions, SchemeOptions};
-use crate::error::Error;
+use crate::prelude::*;
 
 /// Opens the device and writes its name into the options.
 pub fn open_device(options: &mut CommonOptions) -> Result<ComputeDevice, Error> {
@@ -30,7 +28,6 @@ pub fn open_device(options: &mut CommonOptions) -> Result<ComputeDevice, Error> 
     Ok(device)
 }
 
-/// Refuses widths of the interface that make no sense.
 pub fn check_eps_over_h(eps_over_h: f64) -> Result<(), Error> {
     if (0.5..=64.0).contains(&eps_over_h) {
         return Ok(());
@@ -40,7 +37,6 @@ pub fn check_eps_over_h(eps_over_h: f64) -> Result<(), Error> {
     )))
 }
 
-/// The scales of a grid, and the operator for them.
 pub fn operator<const D: usize>(
     options: &SchemeOptions,
     method: Method,

@@ -1,51 +1,34 @@
 //! `willmore networks`.
 
-use std::path::Path;
-use std::process::ExitCode;
-
 use model::{Network, Shipped};
-use serde_json::{Value, json};
 
-use crate::cli::{NetworksCommand, SayOptions};
-use crate::error::Error;
+use crate::cli::NetworksCommand;
+use crate::prelude::*;
 
-/// Lists the networks, or shows one.
 pub fn run(show: Option<&NetworksCommand>, say: SayOptions) -> Result<ExitCode, Error> {
-    let shipped = || -> Result<Vec<(String, Network)>, Error> {
-        let all = Shipped::Accurate
-            .all()?
-            .into_iter()
-            .chain(Shipped::Paper.all()?);
-        Ok(all.map(|(name, network)| (stem(name), network)).collect())
+    let all = [Shipped::Accurate.all()?, Shipped::Paper.all()?].concat();
+    let mut all = all.iter().map(|(name, network)| (stem(name), network));
+    let Some(NetworksCommand::Show { network: wanted }) = show else {
+        let (lines, list): (Vec<String>, Vec<Value>) = all
+            .map(|(name, network)| {
+                let line = format!("{name:32} {}", network.ratios());
+                (line, about(&name, network))
+            })
+            .unzip();
+        say.report(&Value::Array(list), &lines.join("\n"));
+        return Ok(ExitCode::SUCCESS);
     };
-    match show {
+    let network = match all.find(|(name, _)| *name == stem(wanted)) {
+        Some((_, network)) => network,
+        None if Path::new(wanted).exists() => &Network::load(Path::new(wanted))?,
         None => {
-            let all = shipped()?;
-            let lines: Vec<String> = (all.iter())
-                .map(|(name, network)| format!("{name:32} {}", network.ratios()))
-                .collect();
-            let list: Vec<Value> = all
-                .iter()
-                .map(|(name, network)| about(name, network))
-                .collect();
-            say.report(&Value::Array(list), &lines.join("\n"));
+            return Err(Error::options(format!(
+                "there is no network {wanted:?}, neither in the list of `willmore networks` nor as a file"
+            )));
         }
-        Some(NetworksCommand::Show { network: wanted }) => {
-            let all = shipped()?;
-            let known = all.into_iter().find(|(name, _)| *name == stem(wanted));
-            let network = match known {
-                Some((_, network)) => network,
-                None if Path::new(wanted).exists() => Network::load(Path::new(wanted))?,
-                None => {
-                    return Err(Error::options(format!(
-                        "there is no network {wanted:?}, neither in the list of `willmore networks` nor as a file"
-                    )));
-                }
-            };
-            let about = about(&stem(wanted), &network);
-            say.report(&about, &format!("{about:#}"));
-        }
-    }
+    };
+    let about = about(&stem(wanted), network);
+    say.report(&about, &format!("{about:#}"));
     Ok(ExitCode::SUCCESS)
 }
 
@@ -59,7 +42,6 @@ fn about(name: &str, network: &Network) -> Value {
     })
 }
 
-/// The name of a network's file without its extension.
 fn stem(name: &str) -> String {
     name.trim_end_matches(".safetensors").to_owned()
 }

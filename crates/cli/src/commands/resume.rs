@@ -1,15 +1,8 @@
 //! `willmore resume`.
 
-use std::process::ExitCode;
-
-use runs::RunDirectory;
-use serde_json::json;
-
 use super::flow;
-use crate::cli::{Command, ResumeOptions, SayOptions};
-use crate::config;
-use crate::error::Error;
-use crate::page;
+use crate::cli::{Command, ResumeOptions};
+use crate::prelude::*;
 
 /// Continues a run by the options and the state that it stored; its input is not needed again.
 pub fn run(options: &ResumeOptions, say: SayOptions) -> Result<ExitCode, Error> {
@@ -20,17 +13,11 @@ pub fn run(options: &ResumeOptions, say: SayOptions) -> Result<ExitCode, Error> 
     };
     let path = options.run.join(config::FILE);
     let mut command = config::parse_resolved(&stored.read_text(config::FILE)?, &path)?.command;
-    let keep = match &mut command {
-        Command::Flow(flow) => &mut flow.keep,
-        Command::Fair(fair) => &mut fair.flow.keep,
-        Command::Inpaint(inpaint) => &mut inpaint.flow.keep,
-        Command::Mcf(mcf) => &mut mcf.keep,
-        _ => {
-            let path = path.display();
-            return Err(Error::options(format!(
-                "{path} names no command that makes runs"
-            )));
-        }
+    let Some((_, keep)) = command.of_run() else {
+        let path = path.display();
+        return Err(Error::options(format!(
+            "{path} names no command that makes runs"
+        )));
     };
     keep.force = options.force;
     if stored.is_finished() && options.steps.is_none() {

@@ -1,18 +1,10 @@
 //! `willmore sample`.
 
-use std::path::Path;
-use std::process::ExitCode;
-
-use geometry::{Field, npy, phase_field, vti};
-use serde_json::json;
-use surfaces::shapes::Region;
 use volumes::Volume;
 
-use crate::cli::{InputOptions, SampleOptions, SayOptions};
-use crate::error::Error;
-use crate::input::{self, Loaded, Start};
-use crate::outlet::Outlet;
-use crate::volume::{self, Label};
+use crate::cli::SampleOptions;
+use crate::prelude::*;
+use crate::volume;
 
 /// Interface width in cells of what is written.
 const EPS_OVER_H: f64 = 2.0;
@@ -34,7 +26,7 @@ pub fn run(mut options: SampleOptions, say: SayOptions) -> Result<ExitCode, Erro
         return Ok(ExitCode::SUCCESS);
     }
     let extension = input::extension(&path);
-    let is_mesh = ["ply", "obj", "stl"].contains(&&*extension);
+    let is_mesh = MESHES.contains(&&*extension);
     let shown = path.display();
     if !is_mesh && !["png", "npy", "vti", "nii", "gz"].contains(&&*extension) {
         return Err(Error::options(format!(
@@ -140,7 +132,6 @@ fn segmentation<const D: usize>(u: &Field<D>, path: &Path) -> Result<Volume, Err
     Ok(Volume::of_labels([cells; 3], origin, sides, labels)?)
 }
 
-/// The shape without regions.
 fn without<const D: usize>(mut u: Field<D>, regions: &[Region]) -> Result<Field<D>, Error> {
     for region in regions {
         let hole = phase_field(*u.grid(), region.shape::<D>()?.as_ref(), eps(&u))?;

@@ -1,24 +1,19 @@
 //! `willmore train`.
 
-use std::process::ExitCode;
-
 use engine::quarter_square;
 use model::Ratios;
 use model::training::least_squares::LeastSquaresParams;
 use model::training::{Checkpoint, Progress, SphereData, Trained, Training};
-use runs::Interrupt;
-use serde_json::json;
 
 use super::{check_eps_over_h, open_device};
-use crate::cli::{SayOptions, TrainOptions};
-use crate::error::Error;
+use crate::cli::TrainOptions;
+use crate::prelude::*;
 
 /// Cells per unit length of the training grid for `eps = 2h`; it grows with the interface, so that the same spheres fit.
 const CELLS: f64 = 128.0;
 /// Radii on which the quality is measured.
 const HELD_OUT: usize = 20;
 
-/// Trains a network by the accurate recipe and writes it to a file.
 pub fn run(mut options: TrainOptions, say: SayOptions) -> Result<ExitCode, Error> {
     let missing = |name: &str| {
         Error::options(format!(
