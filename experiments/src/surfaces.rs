@@ -1,6 +1,6 @@
 //! Surfaces under Willmore flow: their scales, the shown steps of a run, and the pictures, tables and metrics of those.
 
-use engine::Helfrich;
+use engine::{Helfrich, Storage};
 use geometry::measure::BoundingBox;
 use model::{NeededNetwork, Networks};
 use operators::memory;
@@ -55,7 +55,9 @@ impl Setting {
     pub fn operator(&self, variant: (Method, Scheme)) -> Result<Operator, Error> {
         let (networks, needed) = (self.networks.of(variant.1), needed_network());
         let (grid, scales) = (&self.grid, &self.scales);
-        Ok(Operator::new(variant, &networks, &needed, grid, scales)?)
+        let mut operator = Operator::new(variant, &networks, &needed, grid, scales)?;
+        operator.storage = Storage::Auto;
+        Ok(operator)
     }
 
     /// The parameters of a program for its manifest: the common ones, and others.

@@ -21,10 +21,10 @@ pub enum Storage {
     Bricks,
 }
 
-/// Bytes that a flow takes for each stored cell, measured with the armadillo at 128 and 192 cells on the whole grid, and at 128 and 256 on bricks;
-const PER_STORED: f64 = 300.0;
-/// and on bricks for each node of the grid, for the phase fields before, between and after steps.
-const PER_NODE: f64 = 48.0;
+/// Bytes that a flow takes for each node of a grid that is stored as a whole, measured at 128 and 192 cells;
+const PER_NODE: f64 = 300.0;
+/// on bricks for each stored cell and, for the phase fields before and after a step, for each node, by the armadillo at 128 and 256 cells.
+const ON_BRICKS: [f64; 2] = [220.0, 24.0];
 
 impl Storage {
     /// Whether it is the usual one.
@@ -34,8 +34,12 @@ impl Storage {
 
     /// About how many bytes a flow takes on a grid of so many nodes of which so many are stored.
     pub fn bytes(nodes: usize, stored: usize) -> f64 {
-        let outside = if stored < nodes { PER_NODE } else { 0.0 };
-        PER_STORED * stored as f64 + outside * nodes as f64
+        let [per_cell, per_node] = if stored < nodes {
+            ON_BRICKS
+        } else {
+            [0.0, PER_NODE]
+        };
+        per_cell * stored as f64 + per_node * nodes as f64
     }
 
     /// Refuses a flow on a grid of `cells^dimension` nodes, of which so many are stored, for which the memory is too small.

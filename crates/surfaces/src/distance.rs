@@ -33,6 +33,9 @@ pub struct MeshDistance {
     scale: f64,
 }
 
+/// Nodes along a side of the blocks for which it is asked first whether they are far away.
+const BLOCK: usize = 8;
+
 /// Two vertices in ascending order.
 type Edge = [u32; 2];
 
@@ -80,7 +83,22 @@ impl MeshDistance {
     /// # Errors
     /// [`geometry::Error::NonFinite`] for nodes so far away that squares of distances overflow.
     pub fn sample(&self, grid: Grid<3>, layer_done: impl Fn() + Sync) -> Result<Field<3>, Error> {
+        self.sample_within(f64::INFINITY, grid, layer_done)
+    }
+
+    /// The same, but distances are cut off beyond `reach`, on either side: where nothing is nearer than that, nothing is searched for.
+    ///
+    /// # Errors
+    /// As [`Self::sample`].
+    pub fn sample_within(
+        &self,
+        reach: f64,
+        grid: Grid<3>,
+        layer_done: impl Fn() + Sync,
+    ) -> Result<Field<3>, Error> {
         let cells = grid.cells();
+        let blocks = cells.div_ceil(BLOCK);
+        let far = self.far_blocks(reach, &grid);
         let mut values = vec![0.0; grid.len()];
         values
             .par_chunks_mut(cells * cells)
@@ -90,10 +108,16 @@ impl MeshDistance {
                 let mut row_start = None;
                 for (j, row) in layer.chunks_mut(cells).enumerate() {
                     let y = grid.coordinate(1, j);
+                    let far = &far[(i / BLOCK * blocks + j / BLOCK) * blocks..][..blocks];
                     let mut near = row_start;
                     for (k, value) in row.iter_mut().enumerate() {
+                        if let Some(distance) = far[k / BLOCK] {
+                            *value = distance;
+                            continue;
+                        }
                         let node = Vector::new(x, y, grid.coordinate(2, k));
                         (*value, near) = self.distance_near(node, near);
+                        *value = value.clamp(-reach, reach);
                         if k == 0 {
                             row_start = near;
                         }
@@ -102,6 +126,28 @@ impl MeshDistance {
                 layer_done();
             });
         Ok(Field::from_values(grid, values)?)
+    }
+
+    /// For every block of `BLOCK^3` nodes, `reach` with its sign if all of the block is further away.
+    fn far_blocks(&self, reach: f64, grid: &Grid<3>) -> Vec<Option<f64>> {
+        let blocks = grid.cells().div_ceil(BLOCK);
+        if reach.is_infinite() {
+            return vec![None; blocks.pow(3)];
+        }
+        let to_centre = 0.5 * (BLOCK - 1) as f64 * grid.spacing();
+        let far = |block: usize| {
+            let place = [
+                block / (blocks * blocks),
+                block / blocks % blocks,
+                block % blocks,
+            ];
+            let at = |axis: usize| grid.coordinate(axis, place[axis] * BLOCK) + to_centre;
+            let centre = Vector::new(at(0), at(1), at(2));
+            let (distance, _) = self.distance_near(centre, None);
+            (distance.abs() > reach + 3.0_f64.sqrt() * to_centre)
+                .then_some(reach.copysign(distance))
+        };
+        (0..blocks.pow(3)).into_par_iter().map(far).collect()
     }
 
     /// The signed distance of `x`, and the nearest face; NaN if there is none. A face that is not

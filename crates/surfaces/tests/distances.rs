@@ -214,6 +214,12 @@ fn sampling_is_the_distance_at_every_node() {
         for (index, (a, b)) in sampled.values().iter().zip(direct.values()).enumerate() {
             assert!((a - b).abs() < 1e-15, "{a} for {b} at node {index}");
         }
+        // Whole blocks are further away than this, and others in part.
+        let reach = 0.1;
+        let within = distance.sample_within(reach, grid, || ()).unwrap();
+        for (a, b) in within.values().iter().zip(direct.values()) {
+            assert!((a - b.clamp(-reach, reach)).abs() < 1e-15, "{a} for {b}");
+        }
     }
     let far = grid.with_origin([1e200; 3]).unwrap();
     let distance = MeshDistance::new(&closed(cube(0.5)));
