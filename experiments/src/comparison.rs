@@ -128,11 +128,10 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
     ];
     let mut references: Vec<Compared> = Vec::new();
     for (what, n) in named.into_iter().filter_map(|(what, n)| Some((what, n?))) {
-        let (method, scheme) = (Method::FeImplicit, Scheme::Paper);
         let variant = Variant {
             flow,
-            method,
-            scheme,
+            method: Method::FeImplicit,
+            scheme: Scheme::Paper,
             n,
         };
         let operator = study.networks.operator(variant.look(), n)?;
@@ -284,13 +283,9 @@ impl Compared {
         Ok(())
     }
 
-    fn minimizations(&self) -> impl Iterator<Item = &StepRecord> {
-        minimizations(&self.trajectory.records)
-    }
-
     /// The mean over all minimizations; nothing for mean curvature flow.
     fn mean(&self, of: fn(&StepRecord) -> f64) -> Option<f64> {
-        study::mean(self.minimizations(), of)
+        study::mean(minimizations(&self.trajectory.records), of)
     }
 
     fn loops(&self, step: usize) -> Result<Curve, Error> {

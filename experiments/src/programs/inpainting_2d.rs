@@ -19,12 +19,6 @@ const INSIDE: &[u32] = &[12, 9, 6, 3];
 const RADIUS: f64 = 0.35;
 /// The cut-out corner: everything right of and above this.
 const CORNER: f64 = 0.12;
-/// The region of the disk along both axes: to the corner of the box.
-const DISK_REGION: [f64; 2] = [0.08, 0.42];
-/// Half length and half width of the arms of the cross.
-const CROSS: [f64; 2] = [0.4, 0.1];
-/// The region of the cross along both axes.
-const CROSS_REGION: [f64; 2] = [-0.22, 0.22];
 const GREEN: Rgb = Rgb(0, 140, 60);
 
 /// Inpainting: a disk whose corner was cut out grows round again (tau = 2^-7), the middle of a cross is smoothed (tau = 2^-14). Only
@@ -47,14 +41,14 @@ pub struct Options {
 fn shapes(quick: bool) -> Result<[Shape<2>; 2], Error> {
     let disk = Ball::new([0.0; 2], RADIUS)?;
     let corner = Cuboid::new([0.5 * (0.5 - CORNER); 2])?.translated([0.5 * (CORNER + 0.5); 2]);
-    let [length, width] = CROSS;
     let steps = |papers: usize| if quick { 5 } else { papers };
     let disk = Shape {
         key: "disk",
         title: "disk with a cut-out corner",
         initial: Box::new(disk.difference(corner)),
         whole: Some(Box::new(disk)),
-        region: DISK_REGION,
+        // To the corner of the box.
+        region: [0.08, 0.42],
         rule: StepRule::Constant(1.0 / 128.0),
         steps: steps(2000),
         shown: vec![0, 1, 100, 500, 1000, 1500, 2000],
@@ -63,9 +57,9 @@ fn shapes(quick: bool) -> Result<[Shape<2>; 2], Error> {
     let cross = Shape {
         key: "cross",
         title: "cross",
-        initial: Box::new(Cross::new(length, width)?),
+        initial: Box::new(Cross::new(0.4, 0.1)?),
         whole: None,
-        region: CROSS_REGION,
+        region: [-0.22, 0.22],
         rule: StepRule::Constant(1.0 / 16384.0),
         steps: steps(50),
         shown: vec![0, 1, 5, 10, 20, 35, 50],

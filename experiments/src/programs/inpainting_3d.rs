@@ -14,12 +14,6 @@ const CENTRE: f64 = 0.5;
 const RADIUS: f64 = 0.34;
 /// The cut-out corner: everything beyond this along all three axes, from the middle.
 const CORNER: f64 = 0.05;
-/// The region of the ball along all three axes.
-const BALL_REGION: [f64; 2] = [CENTRE, CENTRE + 0.39];
-/// Radius of the tubes, and where they end.
-const TUBE: [f64; 2] = [0.11, 0.42];
-/// The region of the tubes along all three axes.
-const TUBES_REGION: [f64; 2] = [CENTRE - 0.24, CENTRE + 0.24];
 /// Radius of the edges of the region in the pictures.
 const EDGE: f64 = 0.003;
 const SIDE: u32 = 480;
@@ -49,8 +43,7 @@ fn shapes(extra_steps: usize) -> Result<[(Shape<3>, f64); 2], Error> {
     let ball = Ball::new([0.0; 3], RADIUS)?;
     let half = 0.5 * (0.5 - CORNER);
     let corner = Cuboid::new([half; 3])?.translated([CORNER + half; 3]);
-    let [radius, end] = TUBE;
-    let pair = Cylinder::new(radius, end)?;
+    let pair = Cylinder::new(0.11, 0.42)?;
     // The ansatz in the middle is that they meet.
     let tubes = move |[x, y, z]: [f64; 3]| {
         let pairs = [[x, y, z], [y, z, x], [z, x, y]].map(|x| pair.signed_distance(x));
@@ -61,7 +54,7 @@ fn shapes(extra_steps: usize) -> Result<[(Shape<3>, f64); 2], Error> {
         title: "ball with a cut-out corner",
         initial: Box::new(ball.difference(corner).translated([CENTRE; 3])),
         whole: Some(Box::new(ball.translated([CENTRE; 3]))),
-        region: BALL_REGION,
+        region: [CENTRE, CENTRE + 0.39],
         rule: growing(5),
         steps: 5 + extra_steps,
         shown: vec![0, 1, 3, 5, 11],
@@ -72,7 +65,7 @@ fn shapes(extra_steps: usize) -> Result<[(Shape<3>, f64); 2], Error> {
         title: "six tubes",
         initial: Box::new(tubes.translated([CENTRE; 3])),
         whole: None,
-        region: TUBES_REGION,
+        region: [CENTRE - 0.24, CENTRE + 0.24],
         rule: growing(8),
         steps: 8 + extra_steps,
         shown: vec![0, 1, 4, 8, 14],
