@@ -1,7 +1,5 @@
 //! What a time step costs, and where the time goes.
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    experiments::programs::performance::main()
+fn main() -> std::process::ExitCode {
+    experiments::harness::main(experiments::programs::performance::program)
 }

@@ -24,7 +24,7 @@ const TIGHTER: f64 = 100.0;
 /// (eps = 2h, 16 steps of the accurate scheme, tau = h^4/32 doubled after every step) on the whole grid and on bricks near the surface.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
-struct Options {
+pub struct Options {
     #[command(flatten)]
     run: RunOptions,
 
@@ -82,11 +82,7 @@ const PRODUCTS: [(&str, Format, &str); 7] = [
     ("energy and gradient [ms]", Fixed(2), "evaluate_ms"),
 ];
 
-pub fn main() -> ExitCode {
-    harness::main(program)
-}
-
-fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<(), Error> {
     let (run, quick) = (&options.run, options.run.quick);
     require(
         options.turns.is_finite() && options.turns > 0.0,
