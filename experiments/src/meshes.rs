@@ -60,8 +60,11 @@ pub enum VolumeKind {
 pub struct KnownMesh {
     pub file: &'static str,
     pub title: &'static str,
+    /// Longest side, unless chosen otherwise.
     pub side_length: f64,
+    /// Side of the box, unless chosen otherwise.
     pub box_side: f64,
+    /// Makes the built-in shape at a resolution.
     pub procedural: fn(usize) -> Result<ClosedMesh, surfaces::Error>,
     pub procedural_title: &'static str,
 }

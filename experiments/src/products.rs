@@ -31,7 +31,9 @@ const CHUNK: usize = 1 << 13;
 struct ByHand {
     plan: Arc<Transform<f64>>,
     symbol: Arc<Vec<Complex<f64>>>,
+    /// `F'(w)`.
     slope: Vec<f64>,
+    /// `F''(w) r`.
     bend: Vec<f64>,
 }
 

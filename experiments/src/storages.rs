@@ -57,6 +57,15 @@ pub const COLUMNS: [(&str, Format, &str); 7] = [
 ];
 
 impl StorageOptions {
+    /// Refuses resolutions that cannot be measured.
+    pub fn check(&self) -> Result<(), Error> {
+        let possible = |n: &usize| *n >= 16 && n.is_multiple_of(8);
+        require(
+            self.surface_cells.iter().all(possible),
+            "--surface-cells must be multiples of 8, from 16 on, as bricks are",
+        )
+    }
+
     /// Lets the armadillo flow on both storages at every resolution; the built-in figure in a quick run, or if it is not here.
     pub fn measure(
         &self,
@@ -81,7 +90,7 @@ impl StorageOptions {
 
     fn resolutions(&self, quick: bool) -> Vec<usize> {
         if quick {
-            vec![32, 40]
+            vec![32, 64]
         } else {
             self.surface_cells.clone()
         }

@@ -56,7 +56,9 @@ impl Setting {
         let (networks, needed) = (self.networks.of(variant.1), needed_network());
         let (grid, scales) = (&self.grid, &self.scales);
         let mut operator = Operator::new(variant, &networks, &needed, grid, scales)?;
-        operator.storage = Storage::Auto;
+        if variant == (Method::Hybrid, Scheme::Accurate) {
+            operator.storage = Storage::Auto;
+        }
         Ok(operator)
     }
 
@@ -117,7 +119,8 @@ pub fn fairing_flow(title: &str, mut distance: Field<3>) -> Result<Case<3>, Erro
         first: Fairing::first_step(spacing),
         part: Fairing::GROWTH,
     };
-    let operator = accurate_operator(&grid, &scales)?;
+    let mut operator = accurate_operator(&grid, &scales)?;
+    operator.storage = Storage::Auto;
     Ok(willmore_flow(title, initial, operator, scales, (rule, 0)))
 }
 

@@ -38,7 +38,7 @@ enum Source<'a> {
 }
 
 const FEWEST_CELLS: usize = 8;
-/// Most nodes of a grid: beyond, a flow needs more than 100 GiB.
+/// Most nodes of a grid: beyond, each field takes more than 8 GB.
 const MOST_NODES: f64 = 1e9;
 /// Part of the box that a shape takes: flows make shapes round, and curves grow.
 const PART: f64 = 0.6;
@@ -62,8 +62,6 @@ const MOST_RAYS: usize = 4096;
 const REPAIR_CELLS: usize = 112;
 /// Images with more than this part of their pixels between two tones are no drawings.
 const PHOTOGRAPH: f64 = 0.05;
-/// Memory of a flow, measured at 128 and 192 cells.
-const BYTES_PER_NODE: f64 = 300.0;
 /// Largest magnitude in a phase field: flows overshoot the phases a little.
 const LARGEST_PHASE: f64 = 1.1;
 /// Pixels a side of pictures of boxes.
@@ -221,9 +219,8 @@ pub fn load_own(
         )?;
     }
     say.note(&format!(
-        "grid: {cells} cells per unit length, {:.3e} wide (--cells); about {:.1} GB of memory",
+        "grid: {cells} cells per unit length, {:.3e} wide (--cells)",
         field.grid().spacing(),
-        BYTES_PER_NODE * field.grid().len() as f64 * 1e-9,
     ));
     let region = own.nodes(&field)?;
     space.own = Some(own);

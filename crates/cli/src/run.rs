@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::fmt::Write;
 use std::time::{Duration, Instant};
 
-use engine::{Checkpoints, Ending, Event, Observer, Store, estimated_time_error};
+use engine::{Checkpoints, Ending, Event, Observer, Storage, Store, estimated_time_error};
 use geometry::measure::touches_side;
 use solver::StepEstimates;
 
@@ -98,12 +98,16 @@ impl<O> Plan<O> {
     {
         let interrupt = Interrupt::catch()?;
         let (nodes, stored) = (run.case().grid().len(), run.stored_cells());
-        if stored < nodes {
+        let what = if stored < nodes {
             let percent = 100.0 * stored as f64 / nodes as f64;
-            self.say.note(&format!(
-                "storage: bricks near the surface, {percent:.0} % of the grid (--storage)"
-            ));
-        }
+            format!("bricks near the surface, {percent:.0} % of the grid")
+        } else {
+            "the whole grid".to_owned()
+        };
+        let gigabytes = 1e-9 * Storage::bytes(nodes, stored);
+        self.say.note(&format!(
+            "storage: {what}, about {gigabytes:.1} GB of memory (--storage)"
+        ));
         let folder = store.directory().path().to_owned();
         let steps = run.case().stops.iter().find_map(|stop| match stop {
             Stop::Steps(steps) => Some(*steps as u64),
@@ -190,7 +194,7 @@ impl<O> Plan<O> {
                 "spacing": case.grid().spacing(),
                 "origin": case.grid().origin().to_vec(),
                 "interface_width": eps,
-                "stored_nodes": run.stored_cells(),
+                "stored_cells": run.stored_cells(),
             },
             "shortened_steps": run.records().iter().filter(|record| record.halvings > 0).count(),
         });

@@ -84,6 +84,11 @@ impl<const D: usize> Case<D> {
         self.region.is_some() || !self.energy.is_willmore() || !self.held.is_empty()
     }
 
+    /// Whether it can be had on active bricks, if the network's kernel is separable.
+    pub(crate) fn takes_bricks(&self) -> bool {
+        self.flow == Flow::Willmore && self.operator.network().is_some() && !self.needs_grid()
+    }
+
     /// The time at which the flow ends, if there is one.
     pub(crate) fn end(&self) -> Option<f64> {
         self.stops.iter().find_map(|stop| match stop {

@@ -37,6 +37,7 @@ impl Default for ErrorControl {
 const WORSE: f64 = 1.5;
 /// Steps aim at this part of what they may be.
 const AIM: f64 = 0.9;
+/// The next step is at most this times as long.
 const GROWTH: f64 = 2.0;
 /// For the sake of its error alone no step is shorter than this part of the time reached: from a corner the rates of the first steps
 /// mean nothing.

@@ -38,14 +38,15 @@ pub enum Error {
     },
     /// Cells are those along a side, memory is in GB.
     #[error(
-        "the flow needs about {needed:.1} GB of memory with {cells} cells a side, and {available:.1} GB are free: take at most {fitting}, \
-         or store bricks instead of the whole grid"
+        "the flow needs about {needed:.1} GB of memory on a box of {cells} cells a side, and {available:.1} GB are free: take at most \
+         {fitting} cells a side of the box{alternative}"
     )]
     Memory {
         cells: usize,
         needed: f64,
         available: f64,
         fitting: usize,
+        alternative: &'static str,
     },
     #[error(
         "a run with {cells} cells per side cannot be compared with a reference with {reference}: the latter must be a multiple, in the \

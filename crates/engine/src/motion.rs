@@ -141,29 +141,20 @@ fn learned<const D: usize>(
     case: &Case<D>,
     network: &Network,
     device: &ComputeDevice,
-) -> Result<WillmoreFlow<D>, Error> {
+) -> Result<WillmoreFlow<D>, solver::Error> {
+    use solver::Error::{Model, NoInterface, Operators};
     /// Bricks that are more than this part of the grid do not pay.
     const PAYS: f64 = 0.5;
     let (initial, params) = (&case.initial, case.params());
-    let (cells, nodes) = (case.grid().cells(), case.grid().len());
-    let dense = || {
-        Storage::check(cells, D as u32, nodes)?;
-        Ok(WillmoreFlow::with_network(
-            network, initial, params, device,
-        )?)
-    };
-    let bricks = || {
-        let flow = WillmoreFlow::on_bricks(network, initial, params, device)?;
-        Storage::check(cells, D as u32, flow.stored_cells())?;
-        Ok(flow)
-    };
+    let dense = || WillmoreFlow::with_network(network, initial, params, device);
+    let bricks = || WillmoreFlow::on_bricks(network, initial, params, device);
     match case.operator.storage {
         Storage::Dense => dense(),
         Storage::Bricks => bricks(),
         Storage::Auto if case.needs_grid() => dense(),
         Storage::Auto => match bricks() {
-            Ok(flow) if (flow.stored_cells() as f64) < PAYS * nodes as f64 => Ok(flow),
-            Ok(_) | Err(Error::Solver(solver::Error::Model(_) | solver::Error::NoInterface)) => {
+            Ok(flow) if (flow.stored_cells() as f64) < PAYS * case.grid().len() as f64 => Ok(flow),
+            Ok(_) | Err(Model(_) | NoInterface | Operators(operators::Error::Bricks { .. })) => {
                 dense()
             }
             Err(error) => Err(error),

@@ -11,7 +11,7 @@ use solver::{FlowState, StepRecord};
 use crate::motion::Motion;
 use crate::record::Values;
 use crate::steps::{Lengths, StepControl};
-use crate::{Case, Error, Event, Flow, Observer, Record, Stop, Store};
+use crate::{Case, Error, Event, Flow, Observer, Record, Stop, Storage, Store};
 
 /// Why [`Run::advance`] returned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,8 +76,22 @@ impl<const D: usize> Run<D> {
             ramped += record.tau / step_size;
             control.accept(record)?;
         }
+        let (nodes, takes_bricks) = (case.grid().len(), case.takes_bricks());
+        let check = |stored| match device.kind().is_cpu() {
+            true => Storage::check(case.grid(), stored, takes_bricks),
+            false => Ok(()),
+        };
+        let dense = !takes_bricks || case.operator.storage == Storage::Dense;
+        if dense {
+            check(nodes)?;
+        }
+        let motion = Motion::new(&case, state, device)?;
+        if !dense {
+            // How many there are is known now, and little is allocated yet.
+            check(motion.stored_cells().unwrap_or(nodes))?;
+        }
         let mut run = Self {
-            motion: Motion::new(&case, state, device)?,
+            motion,
             device: device.clone(),
             field: state.current.clone(),
             case,

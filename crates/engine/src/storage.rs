@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use geometry::Grid;
 use operators::memory;
 use serde::{Deserialize, Serialize};
 
@@ -21,13 +22,14 @@ pub enum Storage {
     Bricks,
 }
 
-/// Bytes that a flow takes for each node of a grid that is stored as a whole, measured at 128 and 192 cells;
+/// Bytes for each node of a flow on the whole grid, measured at 128 and 192 cells.
 const PER_NODE: f64 = 300.0;
-/// on bricks for each stored cell and, for the phase fields before and after a step, for each node, by the armadillo at 128 and 256 cells.
+/// Bytes for each stored cell of a flow on bricks, and for each node of its grid, whose phase fields before and after a step are kept; measured
+/// with the armadillo at 128 and 256 cells.
 const ON_BRICKS: [f64; 2] = [220.0, 24.0];
 
 impl Storage {
-    /// Whether it is the usual one.
+    /// Whether the whole grid is stored, which identities of cases leave out.
     pub(crate) fn is_dense(self) -> bool {
         self == Self::Dense
     }
@@ -42,21 +44,34 @@ impl Storage {
         per_cell * stored as f64 + per_node * nodes as f64
     }
 
-    /// Refuses a flow on a grid of `cells^dimension` nodes, of which so many are stored, for which the memory is too small.
+    /// Refuses a flow of which so many cells of a grid are stored if the memory is too small for it. Limits of containers are not looked at.
     ///
     /// # Errors
     /// [`Error::Memory`].
-    pub(crate) fn check(cells: usize, dimension: u32, stored: usize) -> Result<(), Error> {
-        let needed = Self::bytes(cells.pow(dimension), stored);
+    pub(crate) fn check<const D: usize>(
+        grid: &Grid<D>,
+        stored: usize,
+        takes_bricks: bool,
+    ) -> Result<(), Error> {
+        let needed = Self::bytes(grid.len(), stored);
+        memory::release_freed();
         match memory::available() {
             Some(available) if needed > available => {
-                let fitting =
-                    cells as f64 * (available / needed).powf(f64::from(dimension).recip());
+                // Most of the memory on bricks is in proportion to the surface.
+                let on_bricks = stored < grid.len();
+                let power = if on_bricks { D - 1 } else { D };
+                let cells = grid.cells();
+                let fitting = cells as f64 * (available / needed).powf((power as f64).recip());
                 Err(Error::Memory {
                     cells,
                     needed: needed * 1e-9,
                     available: available * 1e-9,
-                    fitting: fitting as usize / 8 * 8,
+                    fitting: fitting as usize,
+                    alternative: if takes_bricks && !on_bricks {
+                        ", or bricks near the surface instead of the whole grid"
+                    } else {
+                        ""
+                    },
                 })
             }
             _ => Ok(()),
@@ -80,22 +95,33 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_into_memory_is_refused_with_what_does() {
-        assert!(Storage::check(64, 3, 64 * 64 * 64).is_ok());
+        let small = Grid::<3>::centred(64, 1.0).unwrap();
+        assert!(Storage::check(&small, small.len(), true).is_ok());
         // Ten thousand cells a side take 300 TB, which no machine has.
-        let error = Storage::check(10_000, 3, 1_000_000_000_000);
-        let Err(Error::Memory {
+        let large = Grid::<3>::centred(10_000, 1.0).unwrap();
+        let Err(error) = Storage::check(&large, large.len(), true) else {
+            assert!(memory::available().is_none());
+            return;
+        };
+        assert!(
+            error
+                .to_string()
+                .ends_with("or bricks near the surface instead of the whole grid")
+        );
+        let Error::Memory {
             needed,
             available,
             fitting,
             ..
-        }) = error
+        } = error
         else {
-            assert!(memory::available().is_none());
-            return;
+            panic!("{error}");
         };
         assert!((needed - 300e3).abs() < 1.0);
-        assert!(fitting > 64 && Storage::bytes(fitting.pow(3), fitting.pow(3)) <= available * 1e9);
-        // On bricks a thousandth of that is stored.
-        assert!(Storage::bytes(1 << 27, 1 << 23) < Storage::bytes(1 << 27, 1 << 27) / 4.0);
+        let nodes = fitting.pow(3);
+        assert!(fitting > 64 && Storage::bytes(nodes, nodes) <= available * 1e9);
+        // Where a sixteenth is stored, a tenth is needed.
+        let part = Storage::bytes(1 << 27, 1 << 23) / Storage::bytes(1 << 27, 1 << 27);
+        assert!(part > 0.0625 && part < 0.15, "{part}");
     }
 }

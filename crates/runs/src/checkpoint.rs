@@ -119,8 +119,10 @@ pub(crate) struct Header {
     step: u64,
     pub finished: bool,
     pub files: Files,
+    /// Bytes of the text.
     #[serde(default)]
     text: u64,
+    /// Names and numbers of values.
     arrays: Vec<(String, u64)>,
 }
 

@@ -86,24 +86,28 @@ impl<const D: usize> Stored<D> {
         }
     }
 
-    /// A function of two fields, on the larger one of their sets of bricks, which holds the other.
+    /// A function of two fields, on the larger one of their sets of bricks, to which the other is carried.
     pub(crate) fn zip_map(&self, other: &Self, f: impl Fn(f64, f64) -> f64 + Sync) -> Self {
-        let carried = |from: &Self, to: &Self| Some(from.on(to.active.as_ref()?));
-        let (left, right) = match self.values.len().cmp(&other.values.len()) {
-            std::cmp::Ordering::Less => (carried(self, other), None),
-            std::cmp::Ordering::Equal => (None, None),
-            std::cmp::Ordering::Greater => (None, carried(other, self)),
+        let active = match (&self.active, &other.active) {
+            (Some(own), Some(others)) if own.bricks() != others.bricks() => {
+                if other.values.len() > self.values.len() {
+                    return self.on(others).zip_map(other, f);
+                }
+                return self.zip_map(&other.on(own), f);
+            }
+            (own, others) => own.as_ref().or(others.as_ref()),
         };
-        let (left, right) = (
-            left.as_ref().unwrap_or(self),
-            right.as_ref().unwrap_or(other),
+        assert_eq!(
+            self.values.len(),
+            other.values.len(),
+            "both are on bricks, or neither"
         );
-        let pairs = left.values.par_iter().zip(&right.values);
+        let pairs = self.values.par_iter().zip(&other.values);
         Self {
             grid: self.grid,
-            active: left.active.clone(),
+            active: active.cloned(),
             values: pairs.map(|(&a, &b)| f(a, b)).collect(),
-            rests: [0, 1].map(|phase| f(left.rests[phase], right.rests[phase])),
+            rests: [0, 1].map(|phase| f(self.rests[phase], other.rests[phase])),
         }
     }
 

@@ -20,6 +20,7 @@ const SURFACE_CELLS: usize = 64;
 /// Room for tori whose hole is some interface widths wide.
 const SURFACE_SIDE: f64 = 1.5;
 const BALLS: [f64; 3] = [0.2, 0.3, 0.34];
+/// Outer radii of the Clifford tori.
 const TORI: [f64; 3] = [0.40, 0.50, 0.60];
 
 /// The measurement's time step over the inner one: the interface hardly moves, and its profile relaxes all the same.
@@ -332,6 +333,7 @@ struct Diagnostics {
     displacement: Vec<[f64; 2]>,
     /// Eigenvalues of `J` at the flat interface, real and imaginary parts.
     spectrum: Vec<[f64; 2]>,
+    /// `w` and `F''(w)`.
     bend: Vec<[f64; 2]>,
 }
 

@@ -54,10 +54,11 @@ fn shapes(quick: bool) -> Result<[Shape<2>; 2], Error> {
         shown: vec![0, 1, 100, 500, 1000, 1500, 2000],
         halvings: INSIDE,
     };
+    let [half_length, half_width] = [0.4, 0.1];
     let cross = Shape {
         key: "cross",
         title: "cross",
-        initial: Box::new(Cross::new(0.4, 0.1)?),
+        initial: Box::new(Cross::new(half_length, half_width)?),
         whole: None,
         region: [-0.22, 0.22],
         rule: StepRule::Constant(1.0 / 16384.0),

@@ -43,7 +43,8 @@ fn shapes(extra_steps: usize) -> Result<[(Shape<3>, f64); 2], Error> {
     let ball = Ball::new([0.0; 3], RADIUS)?;
     let half = 0.5 * (0.5 - CORNER);
     let corner = Cuboid::new([half; 3])?.translated([CORNER + half; 3]);
-    let pair = Cylinder::new(0.11, 0.42)?;
+    let [radius, end] = [0.11, 0.42];
+    let pair = Cylinder::new(radius, end)?;
     // The ansatz in the middle is that they meet.
     let tubes = move |[x, y, z]: [f64; 3]| {
         let pairs = [[x, y, z], [y, z, x], [z, x, y]].map(|x| pair.signed_distance(x));

@@ -88,6 +88,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
         options.turns.is_finite() && options.turns > 0.0,
         "--turns must be positive",
     )?;
+    options.storage.check()?;
     let device = run.open_device()?;
     let kind = device.kind();
     require(
