@@ -18,7 +18,8 @@ const STEPS: usize = 16;
 /// the first one in units of `h^4`: on finer grids smaller details vanish in shorter times. In the last one the limbs of the armadillo are
 /// about to vanish at `n = 128`.
 const FIRST_STEP: f64 = 1.0 / 32.0;
-const STORAGES: [Storage; 2] = [Storage::Dense, Storage::Bricks];
+/// The one that takes less memory first, since what it takes is seen only from there on.
+const STORAGES: [Storage; 2] = [Storage::Bricks, Storage::Dense];
 /// From here on exponents are fitted.
 const COARSEST_FITTED: usize = 128;
 
