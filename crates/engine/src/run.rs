@@ -77,9 +77,12 @@ impl<const D: usize> Run<D> {
             control.accept(record)?;
         }
         let (nodes, takes_bricks) = (case.grid().len(), case.takes_bricks());
-        let check = |stored| match device.kind().is_cpu() {
-            true => Storage::check(case.grid(), stored, takes_bricks),
-            false => Ok(()),
+        let check = |stored| {
+            if device.kind().is_cpu() {
+                Storage::check(case.grid(), stored, takes_bricks)
+            } else {
+                Ok(())
+            }
         };
         let dense = !takes_bricks || case.operator.storage == Storage::Dense;
         if dense {
