@@ -11,7 +11,7 @@ use crate::meshes::{ARMADILLO, Loaded, MeshOptions};
 use crate::networks::NetworkOptions;
 use crate::prelude::*;
 use crate::surfaces::{centred_box, needed_network, scales, willmore_flow};
-use crate::timing::{Numbers, Timed};
+use crate::timing::{self, Numbers, Timed};
 
 /// Steps on every grid, each twice as long as the one before,
 const STEPS: usize = 16;
@@ -20,7 +20,7 @@ const STEPS: usize = 16;
 const FIRST_STEP: f64 = 1.0 / 32.0;
 /// The one that takes less memory first, since what it takes is seen only from there on.
 const STORAGES: [Storage; 2] = [Storage::Bricks, Storage::Dense];
-/// From here on exponents are fitted.
+/// Exponents are those from here to the finest.
 const COARSEST_FITTED: usize = 128;
 
 #[derive(Args, Clone, Debug)]
@@ -172,18 +172,12 @@ pub fn product_ratios(measured: &[Stored]) -> impl Iterator<Item = (usize, f64)>
     })
 }
 
-/// The exponent of a number on bricks in `n`, by least squares of logarithms over the resolutions from 128 on, of which there must be two.
+/// The exponent of a number on bricks in `n`, from 128 on.
 pub fn exponent(measured: &[Stored], name: &str) -> Option<f64> {
     let rows = measured.iter().filter(|row| row.storage == Storage::Bricks);
     let rows = rows.filter(|row| row.n >= COARSEST_FITTED);
-    let points: Vec<[f64; 2]> = rows
-        .filter_map(|row| Some([(row.n as f64).ln(), row.numbers.get(name)?.ln()]))
-        .collect();
-    let count = points.len() as f64;
-    let [x, y] = [0, 1].map(|axis| points.iter().map(|p| p[axis]).sum::<f64>() / count);
-    let squares = points.iter().map(|p| (p[0] - x).powi(2)).sum::<f64>();
-    let products = points.iter().map(|p| (p[0] - x) * (p[1] - y)).sum::<f64>();
-    (points.len() > 1).then(|| products / squares)
+    let point = |row: &Stored| Some([row.n as f64, *row.numbers.get(name)?]);
+    timing::exponent(&rows.filter_map(point).collect::<Vec<_>>())
 }
 
 /// Seconds and memory against `n`, a colour for each storage.

@@ -35,6 +35,12 @@ pub fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
+/// The exponent of the power law through the first and the last point; none unless they are two.
+pub fn exponent(points: &[[f64; 2]]) -> Option<f64> {
+    let (first, last) = (points.first()?, points.last()?);
+    (last[0] > first[0]).then(|| (last[1] / first[1]).ln() / (last[0] / first[0]).ln())
+}
+
 /// The networks of the convergence tests at some resolutions, and that of surfaces.
 pub fn networks(options: &NetworkOptions, cells: &[usize]) -> Result<Chosen, Error> {
     let needs = cells.iter().map(|&n| convergence_network(n));

@@ -556,9 +556,8 @@ fn ball<const D: usize>(grid: Grid<D>, radius: f64) -> Field<D> {
     phase_field(grid, &ball, 2.0 * grid.spacing()).unwrap()
 }
 
-/// Two steps, so that the second starts from the extrapolation.
-fn flow<const D: usize>(backend: &Backend, grid: Grid<D>) -> (Field<D>, [StepRecord; 2]) {
-    let params = FlowParams {
+fn params<const D: usize>(grid: &Grid<D>) -> FlowParams {
+    FlowParams {
         eps: 2.0 * grid.spacing(),
         mcf_step: grid.spacing().powi(2),
         newton: NewtonParams {
@@ -567,7 +566,12 @@ fn flow<const D: usize>(backend: &Backend, grid: Grid<D>) -> (Field<D>, [StepRec
             ..NewtonParams::default()
         },
         calibration: solver::Factors::PAPER,
-    };
+    }
+}
+
+/// Two steps, so that the second starts from the extrapolation.
+fn flow<const D: usize>(backend: &Backend, grid: Grid<D>) -> (Field<D>, [StepRecord; 2]) {
+    let params = params(&grid);
     let network = splitting_network(D, WIDTH).unwrap();
     let start = ball(grid, 0.3);
     let mut flow = WillmoreFlow::with_network(&network, &start, params, &backend.device).unwrap();
@@ -621,16 +625,7 @@ fn steps_of_the_flow_agree_in_three_dimensions() {
 #[test]
 fn steps_on_bricks_are_those_on_the_whole_grid() {
     let grid = Grid::<2>::centred(128, 1.0).unwrap();
-    let params = FlowParams {
-        eps: 2.0 * grid.spacing(),
-        mcf_step: grid.spacing().powi(2),
-        newton: NewtonParams {
-            tolerance: 1e-3,
-            cg_tolerance: 1e-2,
-            ..NewtonParams::default()
-        },
-        calibration: solver::Factors::PAPER,
-    };
+    let params = params(&grid);
     let network = Shipped::Accurate.find(params.ratios(&grid, 17)).unwrap();
     let start = ball(grid, 0.3);
     for backend in &backends() {

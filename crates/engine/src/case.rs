@@ -79,14 +79,10 @@ impl<const D: usize> Case<D> {
         self.grid().side().powi(D as i32 - 3)
     }
 
-    /// Whether something in it cannot be had on active bricks.
-    pub(crate) fn needs_grid(&self) -> bool {
-        self.region.is_some() || !self.energy.is_willmore() || !self.held.is_empty()
-    }
-
     /// Whether it can be had on active bricks, if the network's kernel is separable.
     pub(crate) fn takes_bricks(&self) -> bool {
-        self.flow == Flow::Willmore && self.operator.network().is_some() && !self.needs_grid()
+        let bends_only = self.energy.is_willmore() && self.held.is_empty() && self.region.is_none();
+        self.flow == Flow::Willmore && self.operator.network().is_some() && bends_only
     }
 
     /// The time at which the flow ends, if there is one.

@@ -151,7 +151,7 @@ fn learned<const D: usize>(
     match case.operator.storage {
         Storage::Dense => dense(),
         Storage::Bricks => bricks(),
-        Storage::Auto if case.needs_grid() => dense(),
+        Storage::Auto if !case.takes_bricks() => dense(),
         Storage::Auto => match bricks() {
             Ok(flow) if (flow.stored_cells() as f64) < PAYS * case.grid().len() as f64 => Ok(flow),
             Ok(_) | Err(Model(_) | NoInterface | Operators(operators::Error::Bricks { .. })) => {

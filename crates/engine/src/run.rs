@@ -76,25 +76,8 @@ impl<const D: usize> Run<D> {
             ramped += record.tau / step_size;
             control.accept(record)?;
         }
-        let (nodes, takes_bricks) = (case.grid().len(), case.takes_bricks());
-        let check = |stored| {
-            if device.kind().is_cpu() {
-                Storage::check(case.grid(), stored, takes_bricks)
-            } else {
-                Ok(())
-            }
-        };
-        let dense = !takes_bricks || case.operator.storage == Storage::Dense;
-        if dense {
-            check(nodes)?;
-        }
-        let motion = Motion::new(&case, state, device)?;
-        if !dense {
-            // How many there are is known now, and little is allocated yet.
-            check(motion.stored_cells().unwrap_or(nodes))?;
-        }
         let mut run = Self {
-            motion,
+            motion: motion_in_memory(&case, state, device)?,
             device: device.clone(),
             field: state.current.clone(),
             case,
@@ -344,6 +327,30 @@ impl<const D: usize> Run<D> {
     pub(crate) fn state(&self) -> Result<FlowState<D>, Error> {
         Ok(self.motion.state(self.records.len(), self.time())?)
     }
+}
+
+/// The flow of a case at a state, if it fits into the memory.
+fn motion_in_memory<const D: usize>(
+    case: &Case<D>,
+    state: &FlowState<D>,
+    device: &ComputeDevice,
+) -> Result<Motion<D>, Error> {
+    let (nodes, takes_bricks) = (case.grid().len(), case.takes_bricks());
+    let check = |stored| {
+        if device.kind().is_cpu() {
+            Storage::check(case.grid(), stored, takes_bricks)
+        } else {
+            Ok(())
+        }
+    };
+    if !takes_bricks || case.operator.storage == Storage::Dense {
+        check(nodes)?;
+        return Motion::new(case, state, device);
+    }
+    let motion = Motion::new(case, state, device)?;
+    // How many cells are stored is known only now; little is allocated yet.
+    check(motion.stored_cells().unwrap_or(nodes))?;
+    Ok(motion)
 }
 
 struct Attempt {

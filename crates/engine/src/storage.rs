@@ -54,9 +54,12 @@ impl Storage {
         takes_bricks: bool,
     ) -> Result<(), Error> {
         let needed = Self::bytes(grid.len(), stored);
-        memory::release_freed();
-        match memory::available() {
-            Some(available) if needed > available => {
+        let short = |available: &f64| needed > *available;
+        if memory::available().is_some_and(|available| short(&available)) {
+            memory::release_freed();
+        }
+        match memory::available().filter(short) {
+            Some(available) => {
                 // Most of the memory on bricks is in proportion to the surface.
                 let on_bricks = stored < grid.len();
                 let power = if on_bricks { D - 1 } else { D };
@@ -74,7 +77,7 @@ impl Storage {
                     },
                 })
             }
-            _ => Ok(()),
+            None => Ok(()),
         }
     }
 }

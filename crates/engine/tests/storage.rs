@@ -4,8 +4,8 @@ use crate::common::{EPS, case, device, disc, finished, grid, scales};
 use crate::resuming::{interrupted, trajectory, without_seconds};
 use engine::{Case, Error, Flow, Method, Operator, Run, Samples, Scheme, Storage};
 use geometry::measure::l2_distance;
-use geometry::phase_field;
 use geometry::shapes::Ball;
+use geometry::{Grid, phase_field};
 use model::Networks;
 
 /// A small disc, whose bricks are about half of the grid.
@@ -68,6 +68,18 @@ fn bricks_are_refused_or_left_where_they_cannot_be() {
         assert!(matches!(refused, Error::Solver(_)), "{refused}");
         assert!(refused.to_string().contains(reason), "{refused}");
     }
-    let [dense, auto] = [Storage::Dense, Storage::Auto].map(|storage| finished(paper(storage)));
-    assert_eq!(dense.field(), auto.field());
+    let small = Ball::new([0.0; 2], 0.1).unwrap();
+    let undivided = Grid::per_unit(128, 104.0 / 128.0).unwrap();
+    let undivided = phase_field(undivided, &small, EPS).unwrap();
+    let undivided = |storage: Storage| Case {
+        initial: undivided.clone(),
+        ..stored(storage, 0.1)
+    };
+    for of in [&paper as &dyn Fn(Storage) -> Case<2>, &undivided] {
+        let [dense, auto] = [Storage::Dense, Storage::Auto].map(|storage| finished(of(storage)));
+        assert_eq!(dense.field(), auto.field());
+    }
+    let refused = Run::new(undivided(Storage::Bricks), &device());
+    let refused = refused.err().unwrap().to_string();
+    assert!(refused.contains("104"), "{refused}");
 }

@@ -9,6 +9,11 @@ use crate::Error;
 use crate::active::Active;
 use crate::nodes::Nodes;
 
+/// The values of phase fields where nothing is stored, in the negative and in the positive phase.
+pub(crate) fn phases<const D: usize>(active: Option<&Active<D>>) -> [f64; 2] {
+    active.map_or([-1.0, 1.0], Active::rests)
+}
+
 /// The values of a field on the whole grid, or on active bricks, with the constants that it has outside.
 #[derive(Clone)]
 pub(crate) struct Stored<const D: usize> {
@@ -29,7 +34,7 @@ impl<const D: usize> Stored<D> {
     ) -> Result<Self, Error> {
         Ok(Self {
             grid,
-            rests: active.as_ref().map_or([-1.0, 1.0], Active::rests),
+            rests: phases(active.as_ref()),
             active,
             values: device.values(u.clone())?,
         })

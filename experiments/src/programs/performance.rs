@@ -278,12 +278,6 @@ fn parts<const D: usize>(timed: &Timed<D>, floor_ms: f64) -> [(&'static str, f64
     parts
 }
 
-/// Exponent of a power law through the first and the last point.
-fn slope(points: &[[f64; 2]]) -> Option<f64> {
-    let (first, last) = (points.first()?, points.last()?);
-    (last[0] > first[0]).then(|| (last[1] / first[1]).ln() / (last[0] / first[0]).ln())
-}
-
 /// The cost of a step, and where the time goes: a colour for each part, a line style for each dimension.
 fn figure(all: &[Measurement]) -> Figure {
     let [mut cost, mut shares] = [
@@ -301,7 +295,7 @@ fn figure(all: &[Measurement]) -> Figure {
         };
         let seconds = rows().map(|m| [m.unknowns(), m.steps["seconds_per_step"]]);
         let seconds = curve(&name, seconds.collect()).with_colour(Colour::Black);
-        slopes.extend(slope(&seconds.points).map(|slope| format!("{slope:.2} in {name}")));
+        slopes.extend(timing::exponent(&seconds.points).map(|p| format!("{p:.2} in {name}")));
         cost = cost.with_series(seconds);
         for (k, (part, _)) in all[0].parts.iter().enumerate() {
             let seconds = rows().map(|m| [m.unknowns(), m.parts[k].1]);

@@ -8,7 +8,7 @@ use geometry::Field;
 use super::{Minimum, Movement, WillmoreFlow};
 use crate::Error;
 use crate::active::Active;
-use crate::stored::Stored;
+use crate::stored::{Stored, phases};
 
 impl<const D: usize> WillmoreFlow<D> {
     /// Minimizes the energy of a movement from the present phase field. If the interface comes near the edge of the active bricks, these are
@@ -94,8 +94,9 @@ impl<const D: usize> WillmoreFlow<D> {
 
     /// What is stored of a phase field of the whole grid.
     pub(super) fn in_storage(&self, field: &Field<D>) -> Tensor<D> {
-        let rests = self.active.as_ref().map_or([-1.0, 1.0], Active::rests);
-        Stored::part_of(field, self.active.clone(), rests).tensor(&self.device)
+        let active = self.active.clone();
+        let rests = phases(active.as_ref());
+        Stored::part_of(field, active, rests).tensor(&self.device)
     }
 
     /// The field of the whole grid of which `u` is stored.
