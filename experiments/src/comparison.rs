@@ -209,9 +209,9 @@ impl Setting {
         let marks: Vec<usize> = (0..=halves).rev().map(|k| steps >> k).collect();
         let mut reached = |n, control, name| {
             let time_steps = truth::controlled(control, time(steps), halves);
-            let run = self
-                .sample
-                .run(session, n, (name, time_steps, time(steps)))?;
+            let run =
+                self.sample
+                    .run(session, n, truth::ACCURATE, (name, time_steps, time(steps)))?;
             let at = marks
                 .iter()
                 .map(|k| Ok((*k, Reached::of(&self.sample, &run, &exact[k])?)));

@@ -2,12 +2,13 @@
 
 use engine::estimated_time_error;
 use geometry::contour::{Interpolation, zero_level};
+use model::Networks;
 use reference::revolution::{self, Surface};
 use reference::{Curve, Shape, planar};
 use surfaces::phase_field_surface;
 
 use crate::prelude::*;
-use crate::surfaces::{accurate_operator, willmore_flow};
+use crate::surfaces::willmore_flow;
 
 /// A shape whose exact flow is known, around the origin; in space a body of revolution about the third axis.
 pub struct Sample<const D: usize> {
@@ -80,6 +81,9 @@ pub const ELLIPSOID: Sample<3> = Sample {
     level: profile,
 };
 
+/// The operator of runs against the exact flow.
+pub const ACCURATE: (Method, Scheme) = (Method::Hybrid, Scheme::Accurate);
+
 /// Cells per unit length of runs by the accurate operator, two to `eps`; the errors of the two are extrapolated to `eps = 0`.
 pub const CELLS: [usize; 2] = [64, 128];
 
@@ -116,11 +120,12 @@ impl<const D: usize> Sample<D> {
         })
     }
 
-    /// Willmore flow by the accurate operator with `eps = 2/n` up to a time, in such steps.
+    /// Willmore flow with `eps = 2/n` up to a time, in such steps.
     pub fn run(
         &self,
         session: &mut Session<'_>,
         n: usize,
+        variant: (Method, Scheme),
         (name, steps, end): (&str, TimeSteps, f64),
     ) -> Result<Trajectory<D>, Error> {
         let grid = Grid::<D>::per_unit(n, self.side)?;
@@ -137,7 +142,8 @@ impl<const D: usize> Sample<D> {
             newton,
             ..Scales::of_grid(grid.spacing(), 2.0)
         };
-        let operator = accurate_operator(&grid, &scales)?;
+        let needed = scales.needs(D, grid.spacing());
+        let operator = Operator::new(variant, &Networks::default(), &needed, &grid, &scales)?;
         let initial = (self.initial)(grid, scales.eps)?;
         let mut case = willmore_flow(self.key, initial, operator, scales, (steps.rule, 1));
         case.steps = steps;
@@ -215,6 +221,12 @@ pub fn record(
     sizes.try_for_each(|(name, value)| session.metric(&format!("{key}.{name}.step{mark}"), *value))
 }
 
+/// The records of a run up to the first one at a time or later.
+pub fn until<const D: usize>(run: &Trajectory<D>, time: f64) -> &[Record] {
+    let earlier = |record: &Record| record.time < time * (1.0 - 1e-9);
+    &run.records[..=run.records.partition_point(earlier)]
+}
+
 /// What a run has reached at a time at which one of its steps ends.
 pub struct Reached {
     pub sizes: Sizes,
@@ -232,14 +244,18 @@ pub struct Reached {
 }
 
 impl Reached {
+    pub fn size(&self, name: &str) -> Option<f64> {
+        let mut sizes = self.sizes.iter();
+        sizes.find_map(|(of, size)| (*of == name).then_some(*size))
+    }
+
     /// Compares a run of a sample with the exact flow at a time.
     pub fn of<const D: usize>(
         sample: &Sample<D>,
         run: &Trajectory<D>,
         exact: &Truth,
     ) -> Result<Self, Error> {
-        let earlier = |record: &Record| record.time < exact.time() * (1.0 - 1e-9);
-        let so_far = &run.records[..=run.records.partition_point(earlier)];
+        let so_far = until(run, exact.time());
         let last = &so_far[so_far.len() - 1];
         let (field, eps) = (run.field(last.step)?, run.case.scales.eps);
         let zero_set = ZeroSet::of(&field, eps)?;

@@ -12,7 +12,7 @@ const WIDTH: f64 = 8.0;
 const LOST: Rgb = OKABE_ITO[1];
 
 /// The surface in the colours of the lengths by which its vertices have moved, and their histogram, whose bars say which colour is which
-/// length. Vertices that are `lost`, which the grid does not resolve, have a colour of their own.
+/// length. Vertices that are `lost`, at parts or gaps that the grid does not hold, have a colour of their own.
 pub fn figure(
     mesh: &TriangleMesh,
     lengths: &[f64],
@@ -35,7 +35,7 @@ pub fn figure(
     let caption = match count {
         0 => String::new(),
         _ => format!(
-            "orange: {:.1} % of the vertices, which the grid does not hold",
+            "orange: {:.1} % of the vertices, at parts or gaps that the grid does not hold",
             percent * count as f64
         ),
     };

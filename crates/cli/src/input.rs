@@ -4,6 +4,7 @@ use geometry::npy::{self, NpyError};
 use geometry::vti::{self, VtiError};
 use geometry::{distance_from_phase_field, thin_part};
 use images::{Frame, Image, Outline, OutlineDistance, Side, Threshold, Tones};
+use surfaces::hausdorff_distance;
 use surfaces::shapes::{self, BuiltIn};
 
 use crate::cli::{Holds, Inside};
@@ -164,64 +165,26 @@ pub fn load_own(
 ) -> Result<Loaded, Error> {
     let source = Source::Mesh(path.to_owned());
     source.refuse_foreign(options)?;
-    let grids = options
+    let mut space = Space::new(surfaces::usual_up_axis(path)?);
+    let mut grids = options
         .cells
-        .map_or(OWN_CELLS.to_vec(), |cells| vec![cells]);
-    let up = surfaces::usual_up_axis(path)?;
+        .map_or(OWN_CELLS.to_vec(), |cells| vec![cells])
+        .into_iter()
+        .peekable();
     let mut reader = Reader {
         name: source.name(),
         options,
         eps_over_h,
         say,
     };
-    let (mut start, mut found) = (None, Topology::default());
-    for cells in grids {
-        reader.options.cells = Some(cells);
+    let field = loop {
+        reader.options.cells = grids.next();
         let grid = reader.grid_around(&own.fairing().start().bounding_box(), OWN_PART)?;
-        let eps = eps_over_h * grid.spacing();
         let field = reader.mesh_field(own.fairing().start(), grid)?;
-        let space = Space::new(up);
-        // Touching sheets have no topology.
-        found = space.topology(&field, eps).unwrap_or_default();
-        start = Some((field, space, cells));
-        if found == own.topology() {
-            break;
+        if reader.holds(&own, &field, grids.peek().is_none(), allow_loss)? {
+            break field;
         }
-    }
-    let Some((field, mut space, cells)) = start else {
-        return Err(Error::options("there is no grid to choose from"));
     };
-    if found != own.topology() {
-        let thin = 2.0 * field.grid().spacing();
-        let message = format!(
-            "with --cells {cells} parts and gaps thinner than {thin:.3e} ({:.2} % of the longest side) are lost: the mesh has {}, \
-             the grid {found}",
-            100.0 * thin / own.longest_side(),
-            own.topology(),
-        );
-        if !allow_loss {
-            return Err(Error::options(format!(
-                "{message}; use more --cells, or --allow-loss to go on without them"
-            )));
-        }
-        say.warn(&message);
-    }
-    let width = THIN * eps_over_h * field.grid().spacing();
-    let mesh = own.fairing().rough();
-    let sides = mesh.mesh().sides(MOST_RAYS);
-    let thin = thin_part(&MeshDistance::new(mesh), sides, width);
-    if thin >= THIN_PART {
-        reader.tell_thin(
-            thin,
-            (width, cells),
-            "where vertices follow less well",
-            false,
-        )?;
-    }
-    say.note(&format!(
-        "grid: {cells} cells per unit length, {:.3e} wide (--cells)",
-        field.grid().spacing(),
-    ));
     let region = own.nodes(&field)?;
     space.own = Some(own);
     let start = reader.start(field, space);
@@ -414,6 +377,70 @@ impl Reader<'_> {
             }
             return Ok(grid);
         }
+    }
+
+    /// Whether the zero level set on a grid has the parts and holes of a mesh. On the `last` grid it says what does not hold, and refuses it
+    /// unless that is allowed.
+    fn holds(
+        &self,
+        own: &OwnMesh,
+        field: &Field<3>,
+        last: bool,
+        allow_loss: bool,
+    ) -> Result<bool, Error> {
+        let (grid, mesh, side) = (field.grid(), own.fairing().start(), own.longest_side());
+        let cells = self.options.cells.unwrap_or_default();
+        let eps = self.eps_over_h * grid.spacing();
+        let found = ClosedMesh::new(surfaces::phase_field_surface(field, eps)?).ok();
+        let topology = found.as_ref().map(|(found, _)| Topology::of(found));
+        let holds = topology == Some(own.topology());
+        if !holds && !last {
+            return Ok(false);
+        }
+        let percent = |length: f64| 100.0 * length / side;
+        let far = match found {
+            Some((found, _)) => {
+                let far = hausdorff_distance(&found, mesh);
+                format!(
+                    "at most {far:.3e} ({:.3} % of the longest side) from that of the mesh",
+                    percent(far)
+                )
+            }
+            None => "one that touches itself".to_owned(),
+        };
+        if !holds {
+            let thin = OwnMesh::thinnest(grid);
+            let message = format!(
+                "with --cells {cells} parts and gaps thinner than {thin:.3e} ({:.2} % of the longest side) are lost: the mesh has {}, the grid \
+                 {}; its surface is {far}",
+                percent(thin),
+                own.topology(),
+                topology.unwrap_or_default(),
+            );
+            if !allow_loss {
+                return Err(Error::options(format!(
+                    "{message}; use more --cells, or --allow-loss to go on without them"
+                )));
+            }
+            self.say.warn(&message);
+        }
+        let width = THIN * eps;
+        let rough = own.fairing().rough();
+        let sides = rough.mesh().sides(MOST_RAYS);
+        let thin = thin_part(&MeshDistance::new(rough), sides, width);
+        if thin >= THIN_PART {
+            self.tell_thin(
+                thin,
+                (width, cells),
+                "where vertices follow less well",
+                false,
+            )?;
+        }
+        self.say.note(&format!(
+            "grid: {cells} cells per unit length, {:.3e} wide (--cells); its surface is {far}",
+            grid.spacing(),
+        ));
+        Ok(true)
     }
 
     /// Says that thin parts are lost, or refuses to lose many unless the grid was chosen.

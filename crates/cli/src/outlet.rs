@@ -53,7 +53,8 @@ impl Topology {
 
 impl fmt::Display for Topology {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} closed parts", self.components)?;
+        let plural = if self.components == 1 { "" } else { "s" };
+        write!(f, "{} closed part{plural}", self.components)?;
         match self.euler_characteristic {
             Some(number) => write!(f, " of Euler characteristic {number}"),
             None => Ok(()),

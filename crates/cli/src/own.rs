@@ -6,7 +6,7 @@ use std::sync::Arc;
 use engine::DISPLACEMENT;
 use geometry::file::write_atomically;
 use report::Figure;
-use surfaces::root_mean_square;
+use surfaces::{hausdorff_distance, root_mean_square};
 
 use crate::displacement;
 use crate::keep::{Keep, key, moving_nodes};
@@ -222,14 +222,20 @@ impl OwnMesh {
         let lengths: Vec<f64> = pairs
             .map(|(a, b)| root_mean_square(&[*a], &[*b]).1)
             .collect();
+        let lost = fairing.unresolved(&followed, Self::thinnest(start.grid()));
         Ok(Faired {
             extension: crate::input::extension(Path::new(&self.file)),
             file: surfaces::rewrite(bytes, &self.file, &all)?,
             mesh: all,
-            displacement: displacement::figure(&moved, &lengths, &followed.unresolved(), up)?,
+            displacement: displacement::figure(&moved, &lengths, &lost, up)?,
             topology: self.topology(),
             report: self.report(&moved, followed.left_behind(u)?),
         })
+    }
+
+    /// Parts and gaps that are thinner than two cells come and go with the place of the grid.
+    pub fn thinnest(grid: &Grid<3>) -> f64 {
+        2.0 * grid.spacing()
     }
 
     fn report(&self, moved: &TriangleMesh, left_behind: f64) -> Value {
@@ -248,12 +254,7 @@ impl OwnMesh {
         // A mesh that folds over itself is written all the same, and has no distance.
         if let Ok((after, _)) = ClosedMesh::new(moved.clone()) {
             let relative = |after: f64, before: f64| 100.0 * (after / before - 1.0);
-            let far = |points: &TriangleMesh, from: &ClosedMesh| {
-                let distance = MeshDistance::new(from);
-                let of = |&x: &[f64; 3]| distance.signed_distance(x).abs();
-                points.vertices.iter().map(of).fold(0.0, f64::max)
-            };
-            let distance = far(before, &after).max(far(moved, closed));
+            let distance = hausdorff_distance(closed, &after);
             report["volume_change_percent"] = relative(after.volume(), closed.volume()).into();
             report["area_change_percent"] = relative(after.area(), closed.area()).into();
             report["hausdorff_distance"] = distance.into();

@@ -182,11 +182,16 @@ fn a_mesh_that_no_grid_holds_is_refused_with_numbers_unless_losses_are_allowed()
     let message = common::text(&refused.stderr);
     assert_eq!(refused.status.code(), Some(2), "{message}");
     assert!(
-        message.contains("2 closed parts") && message.contains("--allow-loss"),
+        message.contains("2 closed parts")
+            && message.contains("from that of the mesh")
+            && message.contains("--allow-loss"),
         "{message}"
     );
     let outcome = outcome(folder.path(), &[&arguments[..], &["--allow-loss"]].concat());
     assert_eq!(outcome["same_topology"], false, "{outcome}");
+    let drawn = folder.path().join("run/final.displacement.svg");
+    let drawn = fs::read_to_string(drawn).unwrap();
+    assert!(drawn.contains("% of the vertices, at parts or gaps"));
 }
 
 #[test]

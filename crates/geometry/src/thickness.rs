@@ -29,8 +29,20 @@ pub fn thickness<const D: usize>(
     largest
 }
 
-/// The part of the weight of points on the boundary of a shape, each with its outward normal, where the shape or the gap before it is
-/// thinner than `width`.
+/// Whether a shape, or the gap before it, is thinner than `width` at a point of its boundary with this outward normal.
+pub fn is_thin<const D: usize>(
+    shape: &(impl SignedDistance<D> + ?Sized),
+    x: [f64; D],
+    normal: [f64; D],
+    width: f64,
+) -> bool {
+    let inside = thickness(|x| shape.signed_distance(x), x, normal, width);
+    let outward = normal.map(|n| -n);
+    let gap = || thickness(|x| -shape.signed_distance(x), x, outward, width);
+    inside < width || gap() < width
+}
+
+/// The part of the weight of points on the boundary of a shape, each with its outward normal, where it [is thin](is_thin).
 pub fn thin_part<const D: usize>(
     shape: &(impl SignedDistance<D> + ?Sized),
     points: impl Iterator<Item = ([f64; D], [f64; D], f64)>,
@@ -38,10 +50,7 @@ pub fn thin_part<const D: usize>(
 ) -> f64 {
     let (mut thin, mut all) = (0.0, 0.0);
     for (x, normal, weight) in points {
-        let inside = thickness(|x| shape.signed_distance(x), x, normal, width);
-        let outward = normal.map(|n| -n);
-        let gap = || thickness(|x| -shape.signed_distance(x), x, outward, width);
-        if inside < width || gap() < width {
+        if is_thin(shape, x, normal, width) {
             thin += weight;
         }
         all += weight;

@@ -188,3 +188,14 @@ impl SignedDistance<3> for MeshDistance {
         self.distance_near(Vector::from_array(x), None).0
     }
 }
+
+/// The Hausdorff distance of two meshes at their vertices: how far the farthest vertex of one is from the faces of the other.
+pub fn hausdorff_distance(a: &ClosedMesh, b: &ClosedMesh) -> f64 {
+    let farthest = |points: &ClosedMesh, from: &ClosedMesh| {
+        let distance = MeshDistance::new(from);
+        let points = points.mesh().vertices.par_iter();
+        let of = |&x: &[f64; 3]| distance.signed_distance(x).abs();
+        points.map(of).reduce(|| 0.0, f64::max)
+    };
+    farthest(a, b).max(farthest(b, a))
+}

@@ -1,10 +1,10 @@
 //! A noisy mesh, and what becomes of its vertices while a phase field flows.
 
-use geometry::{Field, Placement};
+use geometry::{Field, Placement, is_thin};
 use rayon::prelude::*;
 
 use crate::level_set::LevelSet;
-use crate::{ClosedMesh, Error, TriangleMesh};
+use crate::{ClosedMesh, Error, MeshDistance, TriangleMesh};
 
 /// Most rounds of Taubin's smoothing before the flow, and their factors.
 const ROUNDS: usize = 30;
@@ -134,6 +134,17 @@ impl Fairing {
         })
     }
 
+    /// Whether each vertex is at something that the grid does not hold: too far from the zero level set at the beginning, or where the start,
+    /// or the gap before it, is thinner than `width`.
+    pub fn unresolved(&self, followed: &Followed, width: f64) -> Vec<bool> {
+        let mesh = self.start.mesh();
+        let distance = MeshDistance::new(&self.start);
+        let points = mesh.vertices.par_iter().zip(mesh.vertex_normals());
+        let thin = points.map(|(&x, normal)| is_thin(&distance, x, normal, width));
+        let pairs = thin.zip(&followed.levels);
+        pairs.map(|(thin, level)| thin || *level != 0.0).collect()
+    }
+
     /// How far the vertices have gone along the normals of the start when the phase field is `u`, root of the mean square.
     ///
     /// # Errors
@@ -181,11 +192,6 @@ impl Followed {
         let pairs = self.vertices.par_iter().zip(&self.levels);
         let moved = pairs.map(|(&x, &level)| now.project(x, level, REACH * self.eps));
         Ok(moved.map(|x| self.placement.apply_inverse(x)).collect())
-    }
-
-    /// Whether each vertex belongs to a part that the grid does not resolve.
-    pub fn unresolved(&self) -> Vec<bool> {
-        self.levels.iter().map(|level| *level != 0.0).collect()
     }
 
     /// The part of the vertices that the zero level set of `u` has left behind.

@@ -82,7 +82,7 @@ mod write;
 
 pub use closed::{ClosedMesh, Warning};
 pub use colours::vertex_colours;
-pub use distance::MeshDistance;
+pub use distance::{MeshDistance, hausdorff_distance};
 pub use error::Error;
 use error::positive;
 pub use fairing::{Fairing, Followed, root_mean_square};

@@ -131,7 +131,8 @@ fn compare_with_exact(
         order: Order::Controlled(ErrorControl::default()),
         ..first.into()
     };
-    let run = sample.run(session, n, ("controlled", time_steps, tau * steps as f64))?;
+    let control = ("controlled", time_steps, tau * steps as f64);
+    let run = sample.run(session, n, truth::ACCURATE, control)?;
     let compare = |(&step, exact): (&usize, &Truth)| {
         let reached = Reached::of(sample, &run, exact)?;
         let key = sample.key;

@@ -2,31 +2,59 @@
 
 use crate::equilibria::{self, AtRest, Equilibrium, Exact};
 use crate::prelude::*;
-use crate::surfaces::{Setting, View, centred_box, raster, willmore_flow};
+use crate::surfaces::{Setting, View, raster, willmore_flow};
+use geometry::contour::Polyline;
+use images::{Outline, OutlineDistance};
 use reference::equilibria::{Branch, Vesicle, vesicles};
 use render::{Quality, Scene};
 
 const TITLE: &str = "Vesicles: least bending energy with given area and volume";
-const CELLS: [usize; 2] = [32, 64];
 const VIEW: View = View {
     up: UpAxis::Z,
     azimuth: 30.0,
     elevation: 25.0,
 };
 
-/// Branches that are run, each from the relaxed shape before: branch, name, reduced volumes, the radius of the sphere with the same area, side
-/// of the box. The two sides of oblate shapes must be several interface widths apart in the middle: below 0.62 they break through at this
-/// resolution. Longer prolate shapes come to the side of the box.
-const RUNS: [(Branch, &str, &[f64], f64, f64); 2] = [
-    (
-        Branch::Prolate,
-        "prolate",
-        &[0.95, 0.9, 0.8, 0.7, 0.65],
-        0.4,
-        2.0,
-    ),
-    (Branch::Oblate, "oblate", &[0.7, 0.65], 0.6, 2.0),
+/// Shapes of a branch, each flowing from the relaxed one before it.
+struct Family {
+    branch: Branch,
+    name: &'static str,
+    reduced_volumes: &'static [f64],
+    /// Of the sphere with the same area.
+    radius: f64,
+    /// Cells per unit length of a quick run and of the whole one.
+    cells: [usize; 2],
+}
+
+/// The two sides of oblate shapes must be several interface widths apart in the middle: with half as many cells they break through below .62. Longer
+/// prolate shapes come to the side of the box.
+const FAMILIES: [Family; 3] = [
+    Family {
+        branch: Branch::Prolate,
+        name: "prolate",
+        reduced_volumes: &[0.95, 0.9, 0.8, 0.7, 0.65],
+        radius: 0.4,
+        cells: [32, 64],
+    },
+    Family {
+        branch: Branch::Oblate,
+        name: "oblate",
+        reduced_volumes: &[0.7, 0.65, 0.6],
+        radius: 0.6,
+        cells: [32, 128],
+    },
+    Family {
+        branch: Branch::Stomatocyte,
+        name: "stomatocyte",
+        reduced_volumes: &[0.6, 0.65],
+        radius: 0.6,
+        cells: [32, 128],
+    },
 ];
+/// Side of the box.
+const SIDE: f64 = 2.0;
+/// No spheroid flows to a cup: the first of them starts from the exact cup of this reduced volume.
+const FIRST_CUP: f64 = 0.57;
 
 /// Willmore flow of spheroids with area and volume held until rest, by the accurate operator, n = 64, eps = 2h: energies, profiles and pictures
 /// along the reduced volume, against exact axisymmetric equilibria; the phase diagram.
@@ -51,33 +79,28 @@ pub fn program(options: &Options) -> Result<(), Error> {
         (usize::MAX, None)
     };
     let device = run.open_device()?;
-    let setting = Setting::new(&options.figure, CELLS, 1.0)?;
-    let parameters = setting.parameters(json!({ "runs": RUNS.map(|(_, name, volumes, radius, side)| (name, volumes, radius, side)) }))?;
+    let settings = (FAMILIES.iter().take(count))
+        .map(|family| Setting::new(&options.figure, family.cells, SIDE))
+        .collect::<Result<Vec<_>, Error>>()?;
+    let families = FAMILIES.iter().zip(&settings).map(|(family, setting)| {
+        json!({ "branch": family.name, "reduced_volumes": family.reduced_volumes, "radius": family.radius, "n": setting.n })
+    });
+    let families: Vec<Value> = families.collect();
+    let parameters = settings[0].parameters(json!({ "families": families }))?;
     let mut session = Session::open("vesicles", run, device, parameters)?;
     let (mut all, mut pairs) = (Vec::new(), Vec::new());
-    for (branch, name, volumes, radius, side) in RUNS.into_iter().take(count) {
-        let volumes = &volumes[..volumes.len().min(count)];
+    for (family, setting) in FAMILIES.iter().zip(&settings) {
+        let name = family.name;
+        let volumes = &family.reduced_volumes[..family.reduced_volumes.len().min(count)];
         let title = format!("exact vesicles: {name}");
-        let exact = session.phase(title, |_| Ok(vesicles(branch, 0.0, volumes)?))?;
-        let grid = centred_box(setting.n, side)?;
+        let exact = session.phase(title, |_| Ok(vesicles(family.branch, 0.0, volumes)?))?;
         let mut relaxed = None;
         for (&ratio, exact) in volumes.iter().zip(exact) {
-            let equilibrium = Equilibrium {
-                key: format!("vesicles.{name}.v{ratio:.2}"),
-                title: format!("{name}, v = {ratio:.2}"),
-                radius,
-                ratio,
-                prolate: branch == Branch::Prolate,
-                exact: Exact {
-                    energy: exact.energy(),
-                    tension: exact.tension / radius.powi(2),
-                    pressure: -exact.pressure / radius.powi(3),
-                },
-            };
+            let equilibrium = family.equilibrium(ratio, &exact);
             let operator = setting.operator((Method::Hybrid, Scheme::Accurate))?;
             let initial = match relaxed {
                 Some(shape) => shape,
-                None => equilibrium.start(grid, setting.scales.eps, 0.5)?,
+                None => family.start(&equilibrium, setting)?,
             };
             let rule = (StepRule::ByEnergy(None), 1);
             let case = willmore_flow(name, initial, operator, setting.scales, rule);
@@ -105,6 +128,42 @@ pub fn program(options: &Options) -> Result<(), Error> {
     session.figure(diagram, "diagram")?;
     session.figure(shapes(&pairs, run.quick)?, "shapes")?;
     session.finish(TITLE)
+}
+
+impl Family {
+    fn equilibrium(&self, ratio: f64, exact: &Vesicle) -> Equilibrium {
+        let (name, radius) = (self.name, self.radius);
+        Equilibrium {
+            key: format!("vesicles.{name}.v{ratio:.2}"),
+            title: format!("{name}, v = {ratio:.2}"),
+            radius,
+            ratio,
+            prolate: self.branch == Branch::Prolate,
+            exact: Exact {
+                energy: exact.energy(),
+                tension: exact.tension / radius.powi(2),
+                pressure: -exact.pressure / radius.powi(3),
+            },
+        }
+    }
+
+    fn start(&self, equilibrium: &Equilibrium, setting: &Setting) -> Result<Field<3>, Error> {
+        let (grid, eps) = (setting.grid, setting.scales.eps);
+        if self.branch != Branch::Stomatocyte {
+            return equilibrium.start(grid, eps, 0.5);
+        }
+        let cup = vesicles(self.branch, 0.0, &[FIRST_CUP])?.swap_remove(0);
+        let points = cup.surface.profile().points().into_iter();
+        let points = points.map(|p| p.map(|x| self.radius * x)).collect();
+        let outline = Outline::new(vec![Polyline {
+            points,
+            closed: true,
+        }])?;
+        let section = OutlineDistance::new(&outline);
+        let distance =
+            |[x, y, z]: [f64; 3]| section.signed_distance([f64::hypot(x - 0.5, y - 0.5), z - 0.5]);
+        Ok(phase_field(grid, &distance, eps)?)
+    }
 }
 
 impl Pair {

@@ -4,39 +4,72 @@ use crate::circles::{self, Ensemble};
 use crate::networks::Chosen;
 use crate::prelude::*;
 use crate::study::Variant;
-use crate::truth::{self, CELLS, CROSS, ELLIPSE, RECTANGLE, Reached, STRICT, Sample};
+use crate::truth::{
+    self, ACCURATE, CELLS, CROSS, ELLIPSE, ELLIPSOID, RECTANGLE, Reached, STRICT, Sample,
+};
 
 const TITLE: &str = "Time steps of Willmore flow against the exact flow";
 
-const SAMPLES: [Sample<2>; 3] = [CROSS, RECTANGLE, ELLIPSE];
+const CURVES: [Sample<2>; 3] = [CROSS, RECTANGLE, ELLIPSE];
+/// A surface of revolution, on half as many cells.
+const SURFACE: Sample<3> = ELLIPSOID;
 
 /// Times at which flows are compared, in units of `2^-14`.
 const MARKS: [usize; 4] = [8, 32, 64, 128];
 const END: f64 = 128.0 * STEP;
 
 const EULER: &str = "implicit Euler, equal steps";
+const GRADED: &str = "implicit Euler, graded steps";
 const EQUAL: &str = "second order, equal steps";
 const CONTROLLED: &str = "second order, controlled steps";
+const ELEMENTS: &str = "finite elements, implicit Euler";
+/// With their colours and marks in the figures.
+const KINDS: [(&str, usize, Marker); 5] = [
+    (EULER, 1, Marker::Square),
+    (GRADED, 3, Marker::Diamond),
+    (EQUAL, 0, Marker::Triangle),
+    (CONTROLLED, 2, Marker::Circle),
+    (ELEMENTS, 4, Marker::Triangle),
+];
 
 /// A way to make time steps, and its curve in the figure.
 struct Stepping {
     key: String,
-    curve: &'static str,
+    kind: &'static str,
+    variant: (Method, Scheme),
     steps: TimeSteps,
 }
 
-fn steppings(quick: bool) -> Vec<Stepping> {
-    let stepping = |key: String, curve, steps| Stepping { key, curve, steps };
-    let euler = [1, 2, 4].map(|parts| {
-        let steps = StepRule::Constant(STEP / f64::from(parts)).into();
-        stepping(format!("euler{parts}"), EULER, steps)
+/// Three of each kind, from coarse to fine, the coarsest with equal steps of `longest`; the middle ones alone for a quick run.
+fn steppings(longest: f64, quick: bool) -> Vec<Stepping> {
+    let stepping = |key: String, kind, steps| Stepping {
+        key,
+        kind,
+        variant: ACCURATE,
+        steps,
+    };
+    let equal = |parts: f64| StepRule::Constant(longest / parts);
+    let euler = [1.0, 2.0, 4.0].map(|parts| {
+        let key = format!("euler{}", STEP / longest * parts);
+        stepping(key, EULER, equal(parts).into())
     });
-    let equal = [0.5, 1.0, 2.0].map(|parts: f64| {
+    let graded = [0.4, 0.2, 0.1].map(|part| {
+        let rule = StepRule::Graded {
+            first: part * longest / 4.0,
+            part,
+        };
+        stepping(format!("graded{part}"), GRADED, rule.into())
+    });
+    let second = [0.5, 1.0, 2.0].map(|parts| {
         let steps = TimeSteps {
             order: Order::Second,
-            ..StepRule::Constant(STEP / parts).into()
+            ..equal(parts).into()
         };
-        stepping(format!("second_order{parts}"), EQUAL, steps)
+        stepping(
+            format!("second_order{}", STEP / longest * parts),
+            EQUAL,
+            steps,
+        )
     });
     let loose = ErrorControl {
         relative: 0.08,
@@ -52,9 +85,17 @@ fn steppings(quick: bool) -> Vec<Stepping> {
         let steps = truth::controlled(control, END, 4);
         stepping(format!("controlled{suffix}"), CONTROLLED, steps)
     });
+    let elements = [0.125, 0.25, 0.5].map(|parts| Stepping {
+        variant: (Method::FeImplicit, Scheme::Paper),
+        ..stepping(
+            format!("elements{}", STEP / longest * parts),
+            ELEMENTS,
+            equal(parts).into(),
+        )
+    });
     let used = if quick { 1..2 } else { 0..3 };
-    let all =
-        [euler, equal, controlled].map(|three| three.into_iter().take(used.end).skip(used.start));
+    let all = [euler, graded, second, controlled, elements];
+    let all = all.map(|three| three.into_iter().take(used.end).skip(used.start));
     all.into_iter().flatten().collect()
 }
 
@@ -71,7 +112,7 @@ struct Compared {
     sample: &'static str,
     n: usize,
     stepping: String,
-    curve: &'static str,
+    kind: &'static str,
     mark: usize,
     reached: Reached,
 }
@@ -83,49 +124,91 @@ pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
     let parameters = json!({ "marks": marks, "cells": cells, "time_unit": STEP, "eps_over_h": 2 });
     let device = options.open_device()?;
     let mut session = Session::open("work_precision", options, device, parameters)?;
-    let times: Vec<f64> = marks.iter().map(|&k| k as f64 * STEP).collect();
-    let end = times[times.len() - 1];
     let mut rows = Vec::new();
-    for sample in &SAMPLES {
-        let title = format!("{}: the exact flow", sample.key);
-        let curves = session.phase(title, |_| sample.exact(Flow::Willmore, &times))?;
-        for &n in &cells {
-            for stepping in steppings(options.quick) {
-                let run = sample.run(&mut session, n, (&stepping.key, stepping.steps, end))?;
-                for (&mark, curve) in marks.iter().zip(&curves) {
-                    rows.push(Compared {
-                        sample: sample.key,
-                        n,
-                        stepping: stepping.key.clone(),
-                        curve: stepping.curve,
-                        mark,
-                        reached: Reached::of(sample, &run, curve)?,
-                    });
-                }
-            }
-        }
-        for (&mark, curve) in marks.iter().zip(&curves) {
-            let exact = format!("{}.exact", sample.key);
-            truth::record(&mut session, &exact, mark, &curve.sizes())?;
-            let strict = |n| {
-                let same = |row: &&Compared| {
-                    let key = (row.sample, row.n, &row.stepping[..], row.mark);
-                    key == (sample.key, n, "controlled_strict", mark)
-                };
-                rows.iter().find(same).map(|row| &row.reached)
+    let in_plane = steppings(STEP, options.quick);
+    for sample in &CURVES {
+        compare(&mut session, sample, (&cells, &marks), &in_plane, &mut rows)?;
+    }
+    let halves: Vec<usize> = cells.iter().map(|n| n / 2).collect();
+    let in_space: Vec<Stepping> = (steppings(4.0 * STEP, options.quick).into_iter())
+        .filter(|stepping| stepping.kind != ELEMENTS)
+        .collect();
+    compare(
+        &mut session,
+        &SURFACE,
+        (&halves, &marks),
+        &in_space,
+        &mut rows,
+    )?;
+    truth_of_estimates(&mut session, &rows)?;
+    circles(&mut session, options.quick)?;
+    let work = Axis::log("HVPs");
+    session.figure(
+        figure(&rows, &marks, &work, |reached| reached.hvp),
+        "work_precision",
+    )?;
+    let seconds = Axis::log("seconds");
+    session.figure(
+        figure(&rows, &marks, &seconds, |reached| reached.seconds),
+        "seconds",
+    )?;
+    session.sheet(sheet(&rows), "errors")?;
+    session.finish(TITLE)
+}
+
+/// Runs a sample in all kinds of time steps and compares it at the marks, graded steps at the ends of those in which the marks are.
+fn compare<const D: usize>(
+    session: &mut Session<'_>,
+    sample: &Sample<D>,
+    (cells, marks): (&[usize], &[usize]),
+    steppings: &[Stepping],
+    rows: &mut Vec<Compared>,
+) -> Result<(), Error> {
+    let times: Vec<f64> = marks.iter().map(|&k| k as f64 * STEP).collect();
+    let title = format!("{}: the exact flow", sample.key);
+    let exact = session.phase(title, |_| sample.exact(Flow::Willmore, &times))?;
+    for &n in cells {
+        for stepping in steppings {
+            let steps = (&stepping.key[..], stepping.steps, times[times.len() - 1]);
+            let run = sample.run(session, n, stepping.variant, steps)?;
+            let own = if stepping.kind == GRADED {
+                let ends = times
+                    .iter()
+                    .filter_map(|time| truth::until(&run, *time).last());
+                let ends: Vec<f64> = ends.map(|record| record.time).collect();
+                Some(sample.exact(Flow::Willmore, &ends)?)
+            } else {
+                None
             };
-            if let (Some(double), Some(single)) = (strict(CELLS[0]), strict(CELLS[1])) {
-                let both = Reached::extrapolated(double, single, curve);
-                let key = format!("{}.extrapolated", sample.key);
-                both.record(&mut session, &key, mark)?;
+            for (&mark, truth) in marks.iter().zip(own.as_ref().unwrap_or(&exact)) {
+                rows.push(Compared {
+                    sample: sample.key,
+                    n,
+                    stepping: stepping.key.clone(),
+                    kind: stepping.kind,
+                    mark,
+                    reached: Reached::of(sample, &run, truth)?,
+                });
             }
         }
     }
-    truth_of_estimates(&mut session, &rows)?;
-    circles(&mut session, options.quick)?;
-    session.figure(figure(&rows, &marks), "work_precision")?;
-    session.sheet(sheet(&rows), "errors")?;
-    session.finish(TITLE)
+    for (&mark, truth) in marks.iter().zip(&exact) {
+        let key = format!("{}.exact", sample.key);
+        truth::record(session, &key, mark, &truth.sizes())?;
+        let strict = |n: &usize| {
+            let same = |row: &&Compared| {
+                let key = (row.sample, row.n, &row.stepping[..], row.mark);
+                key == (sample.key, *n, "controlled_strict", mark)
+            };
+            rows.iter().find(same).map(|row| &row.reached)
+        };
+        let of_both: Vec<&Reached> = cells.iter().filter_map(strict).collect();
+        if let [double, single] = of_both[..] {
+            let both = Reached::extrapolated(double, single, truth);
+            both.record(session, &format!("{}.extrapolated", sample.key), mark)?;
+        }
+    }
+    Ok(())
 }
 
 /// Compares the estimated time errors of controlled steps with the true ones, distances to strictly controlled runs with the same `eps`: the
@@ -213,9 +296,8 @@ fn sheet(rows: &[Compared]) -> Sheet<'_, Compared> {
         .column("n", Shortest, |row| row.n)
         .text("time steps", |row| row.stepping.clone())
         .column("time / 2⁻¹⁴", Shortest, |row| row.mark);
-    let names = rows.first().map(|row| &row.reached.sizes);
-    for (i, (name, _)) in names.into_iter().flatten().enumerate() {
-        sheet = sheet.metric(name, move |row| row.reached.sizes[i].1);
+    for name in ["tip", "diagonal", "area", "perimeter", "volume", "w"] {
+        sheet = sheet.metric(name, move |row| row.reached.size(name));
     }
     sheet
         .measure(
@@ -233,43 +315,39 @@ fn sheet(rows: &[Compared]) -> Sheet<'_, Compared> {
         .measure("seconds", ("s", Fixed(1)), |row| row.reached.seconds)
 }
 
-/// Largest distances from the exact curve against Hessian-vector products, for the second and the last mark.
-fn figure(rows: &[Compared], marks: &[usize]) -> Figure {
+/// Largest distances from the exact flow against work, for the second and the last mark.
+fn figure(rows: &[Compared], marks: &[usize], axis: &Axis, work: fn(&Reached) -> f64) -> Figure {
     let mut shown: Vec<usize> = vec![marks[1.min(marks.len() - 1)], marks[marks.len() - 1]];
     shown.dedup();
-    let mut figure = Figure::new(format!("{TITLE}: work and precision"), SAMPLES.len());
+    let curves = CURVES.iter().map(|sample| (sample.key, sample.title));
+    let samples: Vec<_> = curves.chain([(SURFACE.key, SURFACE.title)]).collect();
+    let mut figure = Figure::new(format!("{TITLE}: work and precision"), samples.len());
     for &mark in &shown {
-        for sample in &SAMPLES {
-            let title = format!("{}, t = {mark}·2⁻¹⁴", sample.title);
-            let axes = (
-                Axis::log("Hessian-vector products"),
-                Axis::log("largest distance"),
-            );
+        for (key, title) in &samples {
+            let here = |row: &&Compared| (row.sample, row.mark) == (*key, mark);
+            let cells = CELLS.map(|n| if *key == SURFACE.key { n / 2 } else { n });
             let mut curves: Vec<Series> = Vec::new();
-            for (n, style) in CELLS.into_iter().zip([LineStyle::Dashed, LineStyle::Solid]) {
-                for (kind, colour, marker) in [
-                    (EULER, 1, Marker::Square),
-                    (EQUAL, 0, Marker::Triangle),
-                    (CONTROLLED, 2, Marker::Circle),
-                ] {
-                    let here = |row: &&Compared| {
-                        (row.sample, row.n, row.curve, row.mark) == (sample.key, n, kind, mark)
-                    };
+            let styles = [(LineStyle::Dashed, "coarse"), (LineStyle::Solid, "fine")];
+            for (n, (style, grid)) in cells.into_iter().zip(styles) {
+                for (kind, colour, marker) in KINDS {
+                    let rows = rows.iter().filter(here);
                     let mut points: Vec<[f64; 2]> = rows
-                        .iter()
-                        .filter(here)
-                        .map(|row| [row.reached.hvp, row.reached.distance])
+                        .filter(|row| (row.n, row.kind) == (n, kind))
+                        .map(|row| [work(&row.reached), row.reached.distance])
                         .collect();
                     points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-                    let label = format!("{kind}, eps = 1/{}", n / 2);
-                    let curve = Series::new(label, points)
+                    let curve = Series::new(format!("{kind}, {grid}"), points)
                         .with_colour(colour)
                         .with_style(style);
                     curves.push(curve.with_marker(marker));
                 }
             }
-            figure = figure.with_panel(LineChart::new(title, axes.0, axes.1).with_curves(curves));
+            let title = format!("{title}, t = {mark}·2⁻¹⁴");
+            let chart = LineChart::new(title, axis.clone(), Axis::log("largest distance"));
+            figure = figure.with_panel(chart.with_curves(curves));
         }
     }
-    figure.with_shared_legend()
+    figure.with_shared_legend().with_note(
+        "HVP: Hessian-vector product. Fine: eps = 2h = 1/64, of the ellipsoid 1/32; coarse: twice that.",
+    )
 }
