@@ -24,6 +24,8 @@ struct Family {
     radius: f64,
     /// Cells per unit length of a quick run and of the whole one.
     cells: [usize; 2],
+    /// See [`Equilibrium::end`]: energies change by less than 1e-5 of themselves afterwards.
+    end: Option<f64>,
 }
 
 /// The two sides of oblate shapes must be several interface widths apart in the middle: with half as many cells they break through below .62. Longer
@@ -35,6 +37,7 @@ const FAMILIES: [Family; 3] = [
         reduced_volumes: &[0.95, 0.9, 0.8, 0.7, 0.65],
         radius: 0.4,
         cells: [32, 64],
+        end: None,
     },
     Family {
         branch: Branch::Oblate,
@@ -42,6 +45,7 @@ const FAMILIES: [Family; 3] = [
         reduced_volumes: &[0.7, 0.65, 0.6],
         radius: 0.6,
         cells: [32, 128],
+        end: Some(0.002),
     },
     Family {
         branch: Branch::Stomatocyte,
@@ -49,6 +53,7 @@ const FAMILIES: [Family; 3] = [
         reduced_volumes: &[0.6, 0.65],
         radius: 0.6,
         cells: [32, 128],
+        end: Some(0.002),
     },
 ];
 /// Side of the box.
@@ -139,6 +144,7 @@ impl Family {
             radius,
             ratio,
             prolate: self.branch == Branch::Prolate,
+            end: self.end,
             exact: Exact {
                 energy: exact.energy(),
                 tension: exact.tension / radius.powi(2),
