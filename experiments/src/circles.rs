@@ -111,15 +111,16 @@ pub struct Ensemble {
 
 impl Ensemble {
     /// Runs `count` circles side by side up to the time of so many steps of `2^-14`, which are made unless others of second order are given;
-    /// those of an interrupted run are in `folder`.
+    /// those of an interrupted run are in a `folder` of the output.
     pub fn run(
         (variant, operator): &(Variant, Operator),
         (count, steps): (usize, usize),
         time_steps: Option<TimeSteps>,
-        device: &ComputeDevice,
-        folder: &Path,
-        bar: &ProgressBar,
+        folder: &str,
+        stage: &Stage<'_>,
     ) -> Result<Self, Error> {
+        let (device, folder) = (stage.device, stage.output.subfolder(folder)?);
+        stage.bar.set_length(count as u64);
         let Variant { flow, n, .. } = *variant;
         let radii = radii(count);
         let circles = in_parallel(count, workers(device), |i| {
@@ -127,13 +128,15 @@ impl Ensemble {
             let case = case((flow, operator, n), radii[i], (steps, rule))?;
             let (flow, operator) = (flow.key(), operator.key());
             let order = time_steps.map_or("", |_| "-second_order");
-            let folder = folder.join(format!("{flow}-n{n}-{operator}{order}-{i:02}"));
+            let folder = folder
+                .as_path()
+                .join(format!("{flow}-n{n}-{operator}{order}-{i:02}"));
             let (ends, never) = (Samples::every(usize::MAX), Interrupt::never());
             let trajectory = Trajectory::of(case, device, &folder, &ends, &mut [], &never)?;
             let trajectory = trajectory.expect("nobody interrupts it");
             let (initial, end) = (&trajectory.case.initial, steps as f64 * STEP);
             let last = exact(variant.flow, radii[i], *initial.grid(), end)?;
-            bar.inc(1);
+            stage.bar.inc(1);
             Ok(Circle {
                 radius: radii[i],
                 travelled: l2_distance(&last, initial)?,

@@ -1,8 +1,5 @@
 //! Programs that let a mesh flow by several schemes.
 
-use clap::Args;
-use geometry::UpAxis;
-
 use crate::meshes::{KnownMesh, MeshOptions};
 use crate::prelude::*;
 use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, View};

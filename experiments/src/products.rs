@@ -18,7 +18,6 @@ use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 use solver::{MinimizingMovement, Objective, Precision};
 
-use crate::error::require;
 use crate::prelude::*;
 use crate::timing::{Numbers, median, take_turns};
 

@@ -1,14 +1,11 @@
 //! What a surface costs by what is stored of its phase field: the whole grid, or bricks near the surface.
 
 use std::fmt;
-use std::time::Instant;
 
-use clap::Args;
 use engine::Storage;
 use operators::memory;
 
 use crate::meshes::{ARMADILLO, Loaded, MeshOptions};
-use crate::networks::NetworkOptions;
 use crate::prelude::*;
 use crate::surfaces::{centred_box, needed_network, scales, willmore_flow};
 use crate::timing::{self, Numbers, Timed};

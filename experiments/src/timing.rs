@@ -1,13 +1,6 @@
 //! Timing: contenders take turns, so that whatever else the machine does burdens them alike.
 
-use std::collections::BTreeMap;
-
-use engine::minimizations;
-use geometry::shapes::Ball;
-use indicatif::ProgressBar;
-use solver::StepRecord;
-
-use crate::networks::{Chosen, EPS, NetworkOptions, STEP, convergence_network};
+use crate::networks::{Chosen, convergence_network};
 use crate::prelude::*;
 use crate::{study, surfaces, truth};
 

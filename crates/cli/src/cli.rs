@@ -286,15 +286,48 @@ pub struct SayOptions {
     pub json: bool,
 }
 
+/// A value in the units of the input, or a part of another one in percent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Amount {
+    Value(f64),
+    Percent(f64),
+}
+
+impl Amount {
+    fn parse(text: &str, expected: &str) -> Result<Self, String> {
+        let (number, amount): (_, fn(f64) -> Self) = match text.strip_suffix('%') {
+            Some(percent) => (percent, Self::Percent),
+            None => (text, Self::Value),
+        };
+        match number.parse::<f64>() {
+            Ok(value) if value.is_finite() && value > 0.0 => Ok(amount(value)),
+            _ => Err(format!("{number:?} is no positive number; give {expected}")),
+        }
+    }
+}
+
+impl fmt::Display for Amount {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Value(value) => write!(f, "{value}"),
+            Self::Percent(percent) => write!(f, "{percent}%"),
+        }
+    }
+}
+
+impl Serialize for Amount {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
 /// What a size is to become.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SizeTarget {
     /// What it is at the beginning.
     Keep,
-    /// A value in the units of the input.
-    Value(f64),
-    /// A part of what it is at the beginning, in percent.
-    Percent(f64),
+    /// This, or this part of what it is at the beginning.
+    To(Amount),
 }
 
 impl SizeTarget {
@@ -302,8 +335,8 @@ impl SizeTarget {
     pub fn of(self, now: f64) -> f64 {
         match self {
             Self::Keep => now,
-            Self::Value(value) => value,
-            Self::Percent(percent) => percent / 100.0 * now,
+            Self::To(Amount::Value(value)) => value,
+            Self::To(Amount::Percent(percent)) => percent / 100.0 * now,
         }
     }
 }
@@ -313,71 +346,27 @@ impl FromStr for SizeTarget {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let expected = "keep, a value, or a part of the beginning in percent, such as 90%";
-        match (text, text.strip_suffix('%')) {
-            ("keep", _) => Ok(Self::Keep),
-            (_, Some(percent)) => positive(percent, expected).map(Self::Percent),
-            (value, None) => positive(value, expected).map(Self::Value),
-        }
-    }
-}
-
-fn positive(text: &str, expected: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err(format!("{text:?} is no positive number; give {expected}")),
-    }
-}
-
-impl fmt::Display for SizeTarget {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Keep => f.write_str("keep"),
-            Self::Value(value) => write!(f, "{value}"),
-            Self::Percent(percent) => write!(f, "{percent}%"),
+        match text {
+            "keep" => Ok(Self::Keep),
+            text => Amount::parse(text, expected).map(Self::To),
         }
     }
 }
 
 impl Serialize for SizeTarget {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
-
-/// The estimated time error that controlled steps may make.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Tolerance {
-    /// Of the whole run, in the units of the input.
-    Length(f64),
-    /// Of each step, in percent of how far the surface moves in it.
-    Percent(f64),
-}
-
-impl FromStr for Tolerance {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let expected = "a length, or a part of the motion in percent, such as 2%";
-        match text.strip_suffix('%') {
-            Some(percent) => positive(percent, expected).map(Self::Percent),
-            None => positive(text, expected).map(Self::Length),
-        }
-    }
-}
-
-impl fmt::Display for Tolerance {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Length(length) => write!(f, "{length}"),
-            Self::Percent(percent) => write!(f, "{percent}%"),
+            Self::Keep => serializer.serialize_str("keep"),
+            Self::To(amount) => amount.serialize(serializer),
         }
     }
 }
 
-impl Serialize for Tolerance {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
+fn tolerance(text: &str) -> Result<Amount, String> {
+    Amount::parse(
+        text,
+        "a length, or a part of the motion in percent, such as 2%",
+    )
 }
 
 /// Options of `flow`.
@@ -399,8 +388,8 @@ pub struct FlowOptions {
 
     /// The estimated time error that controlled steps may make: a LENGTH in the units of the input for the whole run, or for each step a
     /// part of how far the surface moves in it in percent [default: 2%]
-    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
-    pub tolerance: Option<Tolerance>,
+    #[arg(long, value_name = "LENGTH", value_parser = tolerance, allow_hyphen_values = true)]
+    pub tolerance: Option<Amount>,
 
     /// Hold the volume (the area of a plane shape): keep, a VALUE in the units of the input, or PERCENT of that at the beginning, as 90%;
     /// of a segmentation it is that of the voxels [default: keep for `fair` of a segmentation]
@@ -527,7 +516,7 @@ pub struct McfOptions {
 
     /// By which step
     #[arg(long, value_name = "NAME", value_enum, default_value = "network")]
-    pub method: McfMethod,
+    pub method: Method,
 
     /// Stop after this many steps, of (eps/h)^2/4 cells squared each [default: 20, or 100000 with --time]
     #[arg(long, value_name = "COUNT")]
@@ -543,18 +532,6 @@ pub struct McfOptions {
     #[command(flatten)]
     #[serde(flatten)]
     pub common: CommonOptions,
-}
-
-/// A step of mean curvature flow.
-#[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
-#[serde(rename_all = "kebab-case")]
-pub enum McfMethod {
-    /// The learned operator
-    Network,
-    /// Implicit finite elements
-    FeImplicit,
-    /// Semi-implicit finite elements
-    FeSemi,
 }
 
 /// Options of `sample`.

@@ -17,7 +17,7 @@ pub use serde_json::{Value, json};
 pub use surfaces::shapes::Region;
 pub use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh};
 
-pub use crate::cli::{FlowOptions, InputOptions, KeepOptions, SayOptions, SizeTarget, Tolerance};
+pub use crate::cli::{Amount, FlowOptions, InputOptions, KeepOptions, SayOptions, SizeTarget};
 pub use crate::error::Error;
 pub use crate::input::{Loaded, Start, extension};
 pub use crate::outlet::{MESHES, Outlet, Space, Topology};

@@ -46,17 +46,16 @@ impl Flow {
 /// How a step of mean curvature flow is approximated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
-#[cfg_attr(feature = "clap", value(rename_all = "snake_case"))]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// The learned operator
-    #[cfg_attr(feature = "clap", value(alias = "network"))]
+    #[cfg_attr(feature = "clap", value(name = "network", alias = "hybrid"))]
     Hybrid,
     /// Implicit finite elements (Franken, Rumpf and Wirth)
-    #[cfg_attr(feature = "clap", value(alias = "fe-implicit"))]
+    #[cfg_attr(feature = "clap", value(alias = "fe_implicit"))]
     FeImplicit,
     /// Semi-implicit finite elements
-    #[cfg_attr(feature = "clap", value(alias = "fe-semi"))]
+    #[cfg_attr(feature = "clap", value(alias = "fe_semi"))]
     FeSemi,
 }
 

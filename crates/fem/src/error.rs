@@ -1,3 +1,5 @@
+#![allow(missing_docs, reason = "messages and names say it")]
+
 use thiserror::Error as ThisError;
 
 /// What can go wrong in a finite-element step.
@@ -6,11 +8,8 @@ pub enum Error {
     /// A parameter out of range.
     #[error("{name} = {value:e} is out of range: {expected}")]
     Parameter {
-        /// Which parameter.
         name: &'static str,
-        /// Its value.
         value: f64,
-        /// The range.
         expected: &'static str,
     },
     /// The time step is so large that the implicit step has no unique solution.
@@ -20,7 +19,6 @@ pub enum Error {
     StepTooLarge {
         /// `tautilde`.
         step: f64,
-        /// `eps`.
         eps: f64,
         /// `8/9 eps^2`.
         bound: f64,
@@ -30,29 +28,18 @@ pub enum Error {
         "{solver} stopped after {iterations} iterations at a relative residual of {residual:.1e}, above {tolerance:.1e}"
     )]
     NotConverged {
-        /// Which iteration.
         solver: &'static str,
-        /// Iterations done.
         iterations: usize,
-        /// Where it stopped.
         residual: f64,
-        /// What was asked for.
         tolerance: f64,
     },
     /// A value became NaN or infinite.
     #[error("{field} is not finite in {solver}")]
     NonFinite {
-        /// Which quantity.
         field: &'static str,
-        /// Where.
         solver: &'static str,
     },
     /// The sparse factorization failed.
     #[error("the sparse Cholesky factorization of {unknowns} unknowns failed: {reason}")]
-    Factorization {
-        /// Size of the matrix.
-        unknowns: usize,
-        /// What the library says.
-        reason: String,
-    },
+    Factorization { unknowns: usize, reason: String },
 }

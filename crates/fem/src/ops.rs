@@ -7,16 +7,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
 
 use burn::backend::{Backend, backend_extension, tensor::FloatTensor};
-use burn_autodiff::{
-    Autodiff,
-    checkpoint::{base::Checkpointer, strategy::CheckpointStrategy},
-    grads::Gradients,
-    ops::{Backward, Ops, OpsKind, binary, unary},
-};
+use burn_autodiff::{Autodiff, checkpoint::strategy::CheckpointStrategy};
 use burn_backend::TensorMetadata;
 use burn_capture::CaptureBackend;
-use burn_ir::{CustomOpIr, OperationIr, OperationOutput, ScalarIr, TensorIr};
-use burn_router::{RouterClient, RouterTensor};
+use burn_ir::ScalarIr;
+use operators::recording::{Pullback, captured, on_tape};
 
 use crate::Scheme;
 
@@ -144,26 +139,22 @@ pub trait FemOps: Backend {
     ) -> FloatTensor<Self>;
 }
 
-fn record(
+fn record<const N: usize>(
     id: &'static str,
-    inputs: Vec<FloatTensor<CaptureBackend>>,
+    inputs: [FloatTensor<CaptureBackend>; N],
     scheme: u64,
 ) -> FloatTensor<CaptureBackend> {
-    let first = &inputs[0];
-    let (client, shape, dtype) = (first.client.clone(), first.shape(), first.dtype());
-    let inputs: Vec<TensorIr> = inputs.into_iter().map(RouterTensor::into_ir).collect();
-    let output = TensorIr::uninit(client.create_empty_handle(), shape, dtype);
-    let operation = CustomOpIr::with_scalars(id, &inputs, &[output], vec![ScalarIr::UInt(scheme)]);
-    client.register(OperationIr::Custom(operation)).output()
+    let shape = inputs[0].shape();
+    captured(id, inputs, shape, vec![ScalarIr::UInt(scheme)])
 }
 
 impl FemOps for CaptureBackend {
     fn fem_mass(x: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self> {
-        record(MASS, vec![x], scheme)
+        record(MASS, [x], scheme)
     }
 
     fn fem_heat_solve(x: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self> {
-        record(HEAT, vec![x], scheme)
+        record(HEAT, [x], scheme)
     }
 
     fn fem_product(
@@ -172,11 +163,11 @@ impl FemOps for CaptureBackend {
         c: FloatTensor<Self>,
         scheme: u64,
     ) -> FloatTensor<Self> {
-        record(PRODUCT, vec![a, b, c], scheme)
+        record(PRODUCT, [a, b, c], scheme)
     }
 
     fn fem_implicit_step(u: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self> {
-        record(IMPLICIT, vec![u], scheme)
+        record(IMPLICIT, [u], scheme)
     }
 
     fn fem_linearized_solve(
@@ -184,47 +175,28 @@ impl FemOps for CaptureBackend {
         g: FloatTensor<Self>,
         scheme: u64,
     ) -> FloatTensor<Self> {
-        record(LINEARIZED, vec![v, g], scheme)
+        record(LINEARIZED, [v, g], scheme)
     }
 }
 
-/// `factor * x`
-fn scaled<B: Backend>(x: FloatTensor<B>, factor: f64) -> FloatTensor<B> {
-    B::float_mul_scalar(x, factor.into())
-}
-
-/// Self-adjoint linear operations: their gradient is themselves.
-macro_rules! self_adjoint {
-    ($name:ident, $node:ident) => {
-        fn $name(x: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self> {
-            #[derive(Debug)]
-            struct $node;
-            impl<B: Backend + FemOps> Backward<B, 1> for $node {
-                type State = u64;
-                fn backward(
-                    self,
-                    ops: Ops<u64, 1>,
-                    grads: &mut Gradients,
-                    _checkpointer: &mut Checkpointer,
-                ) {
-                    let scheme = ops.state;
-                    unary::<B, _>(ops.parents, ops.node, grads, |g| B::$name(g, scheme));
-                }
-            }
-            let node = x.node();
-            let y = B::$name(x.into_primitive(), scheme);
-            match $node.prepare::<C>([node]).compute_bound().stateful() {
-                OpsKind::Tracked(prepared) => prepared.finish(scheme, y),
-                OpsKind::UnTracked(prepared) => prepared.finish(y),
-            }
-        }
-    };
-}
-
 impl<B: Backend + FemOps, C: CheckpointStrategy> FemOps for Autodiff<B, C> {
-    self_adjoint!(fem_mass, Mass);
-    self_adjoint!(fem_heat_solve, HeatSolve);
+    fn fem_mass(x: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self> {
+        let node = x.node();
+        let y = B::fem_mass(x.into_primitive(), scheme);
+        // Self-adjoint.
+        let to_x = Pullback::new(move |g| B::fem_mass(g, scheme));
+        on_tape::<B, C, 1>([node], y, [to_x])
+    }
 
+    fn fem_heat_solve(x: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self> {
+        let node = x.node();
+        let y = B::fem_heat_solve(x.into_primitive(), scheme);
+        // Self-adjoint.
+        let to_x = Pullback::new(move |g| B::fem_heat_solve(g, scheme));
+        on_tape::<B, C, 1>([node], y, [to_x])
+    }
+
+    /// Symmetric in all four places: the gradient with respect to one factor has the cotangent in its place.
     #[allow(clippy::redundant_closure_for_method_calls)] // the tensor's type cannot be named
     fn fem_product(
         a: FloatTensor<Self>,
@@ -232,104 +204,44 @@ impl<B: Backend + FemOps, C: CheckpointStrategy> FemOps for Autodiff<B, C> {
         c: FloatTensor<Self>,
         scheme: u64,
     ) -> FloatTensor<Self> {
-        /// Symmetric in all four places: the gradient with respect to one factor has the cotangent in its place.
-        #[derive(Debug)]
-        struct Product;
-        impl<B: Backend + FemOps> Backward<B, 3> for Product {
-            type State = ([FloatTensor<B>; 3], u64);
-            fn backward(
-                self,
-                ops: Ops<Self::State, 3>,
-                grads: &mut Gradients,
-                _checkpointer: &mut Checkpointer,
-            ) {
-                let g = grads.consume::<B>(&ops.node);
-                let (factors, scheme) = ops.state;
-                for (i, parent) in ops.parents.into_iter().enumerate() {
-                    let Some(parent) = parent else { continue };
-                    let [x, y] = [(i + 1) % 3, (i + 2) % 3].map(|k| factors[k].clone());
-                    let gradient = B::fem_product(x, y, g.clone(), scheme);
-                    grads.register::<B>(parent.id, gradient);
-                }
-            }
-        }
         let nodes = [a.node(), b.node(), c.node()];
-        let factors = [a, b, c].map(|x| x.into_primitive());
-        let [x, y, z] = factors.clone();
-        let result = B::fem_product(x, y, z, scheme);
-        match Product.prepare::<C>(nodes).compute_bound().stateful() {
-            OpsKind::Tracked(prepared) => prepared.finish((factors, scheme), result),
-            OpsKind::UnTracked(prepared) => prepared.finish(result),
-        }
+        let [a, b, c] = [a, b, c].map(|x| x.into_primitive());
+        let result = B::fem_product(a.clone(), b.clone(), c.clone(), scheme);
+        let pullbacks = [(&b, &c), (&c, &a), (&a, &b)].map(|(x, y)| {
+            let (x, y) = (x.clone(), y.clone());
+            Pullback::new(move |g| B::fem_product(x.clone(), y.clone(), g, scheme))
+        });
+        on_tape::<B, C, 3>(nodes, result, pullbacks)
     }
 
+    /// The gradient is by the adjoint of `A(v)^-1 M`.
     fn fem_implicit_step(u: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self> {
-        /// The adjoint of `A(v)^-1 M`.
-        #[derive(Debug)]
-        struct ImplicitStep;
-        impl<B: Backend + FemOps> Backward<B, 1> for ImplicitStep {
-            type State = (FloatTensor<B>, u64);
-            fn backward(
-                self,
-                ops: Ops<Self::State, 1>,
-                grads: &mut Gradients,
-                _checkpointer: &mut Checkpointer,
-            ) {
-                let (v, scheme) = ops.state;
-                unary::<B, _>(ops.parents, ops.node, grads, |g| {
-                    B::fem_mass(B::fem_linearized_solve(v, g, scheme), scheme)
-                });
-            }
-        }
         let node = u.node();
         let v = B::fem_implicit_step(u.into_primitive(), scheme);
-        match ImplicitStep.prepare::<C>([node]).compute_bound().stateful() {
-            OpsKind::Tracked(prepared) => prepared.finish((v.clone(), scheme), v),
-            OpsKind::UnTracked(prepared) => prepared.finish(v),
-        }
+        let at = v.clone();
+        let to_u = Pullback::new(move |g| {
+            B::fem_mass(B::fem_linearized_solve(at.clone(), g, scheme), scheme)
+        });
+        on_tape::<B, C, 1>([node], v, [to_u])
     }
 
+    /// With `y = A(v)^-1 g`: `g` gets `z = A(v)^-1 w`, and `v` gets `-6 reaction int v y z phi`.
     fn fem_linearized_solve(
         v: FloatTensor<Self>,
         g: FloatTensor<Self>,
         scheme: u64,
     ) -> FloatTensor<Self> {
-        /// With `y = A(v)^-1 g`: `g` gets `z = A(v)^-1 w`, and `v` gets `-6 reaction int v y z phi`.
-        #[derive(Debug)]
-        struct LinearizedSolve;
-        impl<B: Backend + FemOps> Backward<B, 2> for LinearizedSolve {
-            type State = (FloatTensor<B>, FloatTensor<B>, u64);
-            fn backward(
-                self,
-                ops: Ops<Self::State, 2>,
-                grads: &mut Gradients,
-                _checkpointer: &mut Checkpointer,
-            ) {
-                let (v, y, scheme) = ops.state;
-                let factor = -6.0 * host(scheme).reaction();
-                let at = v.clone();
-                binary::<B, _, _>(
-                    ops.parents,
-                    ops.node,
-                    grads,
-                    |w| {
-                        let z = B::fem_linearized_solve(at.clone(), w, scheme);
-                        scaled::<B>(B::fem_product(at, y, z, scheme), factor)
-                    },
-                    |w| B::fem_linearized_solve(v, w, scheme),
-                );
-            }
-        }
         let nodes = [v.node(), g.node()];
         let (v, g) = (v.into_primitive(), g.into_primitive());
         let y = B::fem_linearized_solve(v.clone(), g, scheme);
-        match LinearizedSolve
-            .prepare::<C>(nodes)
-            .compute_bound()
-            .stateful()
-        {
-            OpsKind::Tracked(prepared) => prepared.finish((v, y.clone(), scheme), y),
-            OpsKind::UnTracked(prepared) => prepared.finish(y),
-        }
+        let (at, solution) = (v.clone(), y.clone());
+        let to_v = Pullback::new(move |w| {
+            let factor = -6.0 * host(scheme).reaction();
+            let z = B::fem_linearized_solve(at.clone(), w, scheme);
+            let product = B::fem_product(at.clone(), solution.clone(), z, scheme);
+            B::float_mul_scalar(product, factor.into())
+        });
+        let to_g = Pullback::new(move |w| B::fem_linearized_solve(v.clone(), w, scheme));
+        on_tape::<B, C, 2>(nodes, y, [to_v, to_g])
     }
 }

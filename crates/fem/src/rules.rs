@@ -94,20 +94,20 @@ impl Rule for LinearizedSolve {
 }
 
 fn register<B: BackendIr + FemOps>(registry: &mut CustomOpRegistry<B>) {
-    macro_rules! handler {
-        ($id:expr, $op:ident, $($input:literal)+) => {
-            registry.register($id, |handles, ir, _| {
-                let scheme = ir.scalars[0].elem::<u64>();
-                let y = B::$op($(handles.get_float_tensor::<B>(&ir.inputs[$input])),+, scheme);
-                handles.register_float_tensor::<B>(&ir.outputs[0].id, y);
-            });
-        };
-    }
-    handler!(MASS, fem_mass, 0);
-    handler!(HEAT, fem_heat_solve, 0);
-    handler!(PRODUCT, fem_product, 0 1 2);
-    handler!(IMPLICIT, fem_implicit_step, 0);
-    handler!(LINEARIZED, fem_linearized_solve, 0 1);
+    let scheme = |scalars: &[ScalarIr]| scalars[0].elem::<u64>();
+    registry.register_function(MASS, move |[x], scalars| B::fem_mass(x, scheme(scalars)));
+    registry.register_function(HEAT, move |[x], scalars| {
+        B::fem_heat_solve(x, scheme(scalars))
+    });
+    registry.register_function(PRODUCT, move |[a, b, c], scalars| {
+        B::fem_product(a, b, c, scheme(scalars))
+    });
+    registry.register_function(IMPLICIT, move |[u], scalars| {
+        B::fem_implicit_step(u, scheme(scalars))
+    });
+    registry.register_function(LINEARIZED, move |[v, g], scalars| {
+        B::fem_linearized_solve(v, g, scheme(scalars))
+    });
 }
 
 /// Everything [`linearize`] needs to differentiate and replay the operations of this crate.

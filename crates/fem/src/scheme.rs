@@ -130,11 +130,6 @@ impl<const D: usize> Scheme<D> {
         })
     }
 
-    /// Cells per side.
-    pub fn cells(&self) -> usize {
-        self.cells
-    }
-
     /// Symbols of `M`, and of the derivative `J` of the implicit and of the semi-implicit step in the pure phases.
     pub(crate) fn phase_symbols(&self, theta: &[f64]) -> (f64, f64, f64) {
         let (mass, stiffness) = element::symbols(theta);

@@ -5,9 +5,7 @@
 //! | [`Union`] (minimum) | exact | bound: never deeper than the truth |
 //! | [`Intersection`] (maximum) | bound: never farther than the truth | exact |
 //! | [`Difference`] (`a` and not `b`) | bound: never farther | exact |
-//! | [`Complement`], [`Translated`], [`Rotated`], [`Scaled`] | as the operand | as the operand |
-//! | [`Offset`] by `r > 0` | exact | exact for convex shapes, else never deeper |
-//! | [`Offset`] by `r < 0` | never farther | exact |
+//! | [`Translated`], [`Rotated`], [`Scaled`] | as the operand | as the operand |
 //!
 //! The table is for exact operands. A bound has the right sign and zero set, is 1-Lipschitz, and
 //! `|bound| <= |distance|`. A union is exact inside as well where its parts do not touch; an
@@ -54,19 +52,6 @@ pub trait SignedDistanceExt<const D: usize>: SignedDistance<D> + Sized {
         Difference(self, other)
     }
 
-    /// Points not in `self`.
-    fn complement(self) -> Complement<Self> {
-        Complement(self)
-    }
-
-    /// Grows the shape by `radius`, rounding outer corners; shrinks it where `radius` is negative.
-    fn offset(self, radius: f64) -> Offset<Self> {
-        Offset {
-            shape: self,
-            radius,
-        }
-    }
-
     /// Moves the shape by `shift`.
     fn translated(self, shift: [f64; D]) -> Translated<Self, D> {
         Translated { shape: self, shift }
@@ -105,17 +90,6 @@ pub struct Intersection<A, B>(A, B);
 /// See [`SignedDistanceExt::difference`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference<A, B>(A, B);
-
-/// See [`SignedDistanceExt::complement`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Complement<S>(S);
-
-/// See [`SignedDistanceExt::offset`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Offset<S> {
-    shape: S,
-    radius: f64,
-}
 
 /// See [`SignedDistanceExt::translated`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -161,18 +135,6 @@ where
 {
     fn signed_distance(&self, x: [f64; D]) -> f64 {
         max(self.0.signed_distance(x), -self.1.signed_distance(x))
-    }
-}
-
-impl<const D: usize, S: SignedDistance<D>> SignedDistance<D> for Complement<S> {
-    fn signed_distance(&self, x: [f64; D]) -> f64 {
-        -self.0.signed_distance(x)
-    }
-}
-
-impl<const D: usize, S: SignedDistance<D>> SignedDistance<D> for Offset<S> {
-    fn signed_distance(&self, x: [f64; D]) -> f64 {
-        self.shape.signed_distance(x) - self.radius
     }
 }
 
@@ -243,42 +205,6 @@ impl Rotation<3> {
 }
 
 impl<const D: usize> Rotation<D> {
-    /// No rotation.
-    pub fn identity() -> Self {
-        Self {
-            rows: std::array::from_fn(|i| std::array::from_fn(|j| f64::from(i == j))),
-        }
-    }
-
-    /// From the rows of its matrix.
-    ///
-    /// # Errors
-    /// The rows must be orthonormal, and the determinant 1, to 1e-9.
-    pub fn from_matrix(rows: [[f64; D]; D]) -> Result<Self, Error> {
-        for (i, &a) in rows.iter().enumerate() {
-            for (j, &b) in rows.iter().enumerate() {
-                let error = (vector::dot(a, b) - f64::from(i == j)).abs();
-                // Not `error >= 1e-9`: that would let NaN pass.
-                if !matches!(error.partial_cmp(&1e-9), Some(std::cmp::Ordering::Less)) {
-                    return Err(Error::InvalidParameter {
-                        name: "deviation of R R^T from the identity",
-                        value: error,
-                        requirement: "below 1e-9",
-                    });
-                }
-            }
-        }
-        let determinant = determinant(rows);
-        if determinant < 0.0 {
-            return Err(Error::InvalidParameter {
-                name: "determinant of the rotation",
-                value: determinant,
-                requirement: "1 (this is a reflection)",
-            });
-        }
-        Ok(Self { rows })
-    }
-
     /// The rows of the matrix `R`.
     pub fn matrix(&self) -> [[f64; D]; D] {
         self.rows
@@ -293,29 +219,4 @@ impl<const D: usize> Rotation<D> {
     pub fn apply_inverse(&self, x: [f64; D]) -> [f64; D] {
         std::array::from_fn(|j| (0..D).map(|i| self.rows[i][j] * x[i]).sum())
     }
-}
-
-/// Determinant by Gaussian elimination with partial pivoting.
-fn determinant<const D: usize>(mut rows: [[f64; D]; D]) -> f64 {
-    let mut determinant = 1.0;
-    for k in 0..D {
-        let pivot = (k..D).fold(k, |best, i| {
-            if rows[i][k].abs() > rows[best][k].abs() {
-                i
-            } else {
-                best
-            }
-        });
-        if pivot != k {
-            rows.swap(pivot, k);
-            determinant = -determinant;
-        }
-        determinant *= rows[k][k];
-        let top = rows[k];
-        for row in rows.iter_mut().skip(k + 1) {
-            let factor = row[k] / top[k];
-            *row = std::array::from_fn(|j| row[j] - factor * top[j]);
-        }
-    }
-    determinant
 }

@@ -1,5 +1,7 @@
 //! Everything that can go wrong in this crate.
 
+#![allow(missing_docs, reason = "messages and names say it")]
+
 use std::path::PathBuf;
 
 use crate::npy::error::NpyError;
@@ -11,29 +13,18 @@ use crate::vti::error::VtiError;
 pub enum Error {
     /// A periodic grid needs at least two cells per side.
     #[error("a periodic grid needs at least 2 cells per side, got {cells}")]
-    GridTooSmall {
-        /// Requested cells per side.
-        cells: usize,
-    },
+    GridTooSmall { cells: usize },
     /// The number of nodes does not fit in memory addresses.
     #[error("{cells}^{dimension} nodes cannot be addressed on this machine; use fewer cells")]
-    GridTooLarge {
-        /// Requested cells per side.
-        cells: usize,
-        /// Number of axes.
-        dimension: usize,
-    },
+    GridTooLarge { cells: usize, dimension: usize },
     /// `n * side` cells per side is not a whole number.
     #[error(
         "{cells_per_unit} cells per unit length on a side of {side} give {cells} cells; \
          choose values whose product is a whole number"
     )]
     FractionalCells {
-        /// Requested cells per unit length.
         cells_per_unit: usize,
-        /// Side of the box.
         side: f64,
-        /// Their product.
         cells: f64,
     },
     /// The search for the torus nearest to a phase field.
@@ -42,27 +33,18 @@ pub enum Error {
     /// A number is outside the range in which the formula makes sense.
     #[error("{name} = {value:?} is not allowed: it must be {requirement}")]
     InvalidParameter {
-        /// What the number is.
         name: &'static str,
-        /// The number.
         value: f64,
-        /// The condition it violates.
         requirement: &'static str,
     },
     /// The number of values is not the number of nodes.
     #[error("the grid has {expected} nodes, but {actual} values were given")]
-    ValueCount {
-        /// Nodes of the grid.
-        expected: usize,
-        /// Values given.
-        actual: usize,
-    },
+    ValueCount { expected: usize, actual: usize },
     /// A nodal value is NaN or infinite.
     #[error("the value at node {index} is {value}; all nodal values must be finite")]
     NonFinite {
         /// Row-major index of the first such node.
         index: usize,
-        /// Its value.
         value: f64,
     },
     /// Two fields live on different grids.
@@ -71,34 +53,23 @@ pub enum Error {
          on {right_side} (or their origins differ)"
     )]
     GridMismatch {
-        /// Cells per side of the first grid.
         left_cells: usize,
-        /// Side of the first grid.
         left_side: f64,
-        /// Cells per side of the second grid.
         right_cells: usize,
-        /// Side of the second grid.
         right_side: f64,
     },
     /// A point lies outside the box spanned by the nodes.
     #[error("the point {point:?} is outside the box spanned by the nodes")]
-    PointOutside {
-        /// The point.
-        point: Vec<f64>,
-    },
+    PointOutside { point: Vec<f64> },
     /// What is placed is larger than the box less its margin.
     #[error(
         "a side length of {side_length} with a margin of {margin} on both sides does not fit the \
          box of side {box_side}; use at most {largest}"
     )]
     DoesNotFit {
-        /// Requested longest side.
         side_length: f64,
-        /// Side of the box.
         box_side: f64,
-        /// Requested margin.
         margin: f64,
-        /// Largest side length that fits: `box_side - 2 margin`, not below zero.
         largest: f64,
     },
     /// What is not to be moved reaches beyond the box.
@@ -107,63 +78,34 @@ pub enum Error {
          {highest:?}; fit it to the box instead, by a side length of at most {largest}"
     )]
     Outside {
-        /// Lower corner of the bounding box.
         lower: Vec<f64>,
-        /// Upper corner.
         upper: Vec<f64>,
-        /// Lower corner of what is allowed.
         lowest: Vec<f64>,
-        /// Upper corner.
         highest: Vec<f64>,
-        /// The largest side length that fits after moving to the centre.
         largest: f64,
     },
     /// No name of a coordinate axis.
     #[error("{name:?} is no axis: choose x, y or z")]
-    UnknownAxis {
-        /// What was given.
-        name: String,
-    },
+    UnknownAxis { name: String },
     /// A list of named arrays is unusable.
     #[error("array name {name:?} cannot be written: {reason}")]
-    ArrayName {
-        /// The offending name.
-        name: String,
-        /// What is wrong with it.
-        reason: &'static str,
-    },
+    ArrayName { name: String, reason: &'static str },
     /// Nothing to write.
     #[error("no arrays were given to write to {path}", path = path.display())]
-    NoArrays {
-        /// Destination.
-        path: PathBuf,
-    },
+    NoArrays { path: PathBuf },
     /// The operating system refused.
     #[error("could not {action} {path}", path = path.display())]
     Io {
-        /// What was attempted.
         action: &'static str,
-        /// On which file.
         path: PathBuf,
-        /// Why it failed.
         source: std::io::Error,
     },
     /// A file is not a usable NPY file.
     #[error("{path} cannot be read as a field", path = path.display())]
-    Npy {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        source: NpyError,
-    },
+    Npy { path: PathBuf, source: NpyError },
     /// A file is not usable VTK image data.
     #[error("{path} cannot be read as fields", path = path.display())]
-    Vti {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        source: VtiError,
-    },
+    Vti { path: PathBuf, source: VtiError },
 }
 
 /// Accepts finite positive numbers.

@@ -38,12 +38,6 @@ pub fn linf_distance<const D: usize>(a: &Field<D>, b: &Field<D>) -> Result<f64, 
     Ok(linf(&a.zip_map(b, |v, w| v - w)?))
 }
 
-/// Mean of the nodal values.
-pub fn mean<const D: usize>(u: &Field<D>) -> f64 {
-    let v = u.values();
-    reduce::sum(v.len(), |i| v[i]) / v.len() as f64
-}
-
 /// Whether there is an interface at all.
 pub fn has_interface<const D: usize>(u: &Field<D>) -> bool {
     let inside = u.values().iter().filter(|u| **u > 0.0).count();

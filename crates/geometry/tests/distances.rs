@@ -260,11 +260,10 @@ proptest! {
         let b = || Ball::new([0.3, 0.2], 0.35).unwrap();
         let inside = |s: &dyn SignedDistance<2>| s.signed_distance(x) < 0.0;
         let (in_a, in_b) = (inside(&a()), inside(&b()));
-        let combinations: [(Shape<2>, bool); 4] = [
+        let combinations: [(Shape<2>, bool); 3] = [
             (Box::new(a().union(b())), in_a || in_b),
             (Box::new(a().intersection(b())), in_a && in_b),
             (Box::new(a().difference(b())), in_a && !in_b),
-            (Box::new(a().complement()), !in_a),
         ];
         for (shape, expected) in combinations {
             prop_assert_eq!(inside(&*shape), expected);
@@ -303,17 +302,6 @@ fn rotations_turn_the_right_way() {
         .unwrap()
         .apply([1.0, 2.0, 3.0]);
     assert!((x - 3.0).abs() < 1e-14 && (y - 1.0).abs() < 1e-14 && (z - 2.0).abs() < 1e-14);
-    let (rotation, _) = motion();
-    assert_eq!(Rotation::from_matrix(rotation.matrix()).unwrap(), rotation);
-}
-
-#[test]
-fn offsets_of_convex_shapes_are_exact() {
-    let grown = Cuboid::new([0.3, 0.2]).unwrap().offset(0.1);
-    let expected = RoundedBox::new([0.4, 0.3], 0.1).unwrap();
-    for x in scattered::<2>(200) {
-        assert!((grown.signed_distance(x) - expected.signed_distance(x)).abs() < 1e-15);
-    }
 }
 
 #[test]
@@ -349,9 +337,6 @@ fn impossible_shapes_are_refused() {
     refused(HalfSpace::new([0.0; 3], [0.0; 3]).map(drop));
     refused(Ball::new([0.0], 1.0).unwrap().scaled(-1.0).map(drop));
     refused(Rotation::about_axis([0.0; 3], 1.0).map(drop));
-    refused(Rotation::from_matrix([[1.0, 0.1], [0.0, 1.0]]).map(drop));
-    refused(Rotation::from_matrix([[0.0, 1.0], [1.0, 0.0]]).map(drop));
-    refused(Rotation::from_matrix([[f64::NAN; 2]; 2]).map(drop));
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Everything that can go wrong in this crate.
 
+#![allow(missing_docs, reason = "messages and names say it")]
+
 use std::path::PathBuf;
 
 use crate::read::error::FormatError;
@@ -10,12 +12,7 @@ use crate::read::error::FormatError;
 pub enum Error {
     /// A file is no usable image.
     #[error("{path} cannot be read as an image: {problem}", path = path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        problem: FormatError,
-    },
+    Format { path: PathBuf, problem: FormatError },
     /// Grids, fields and the operating system.
     #[error(transparent)]
     Geometry(#[from] geometry::Error),
@@ -25,11 +22,8 @@ pub enum Error {
     /// A number is outside the range in which the formula makes sense.
     #[error("{name} = {value} is not allowed: it must be {requirement}")]
     InvalidParameter {
-        /// What the number is.
         name: &'static str,
-        /// The number.
         value: f64,
-        /// The condition it violates.
         requirement: &'static str,
     },
     /// An image without pixels, or with more than are accepted.
@@ -38,23 +32,17 @@ pub enum Error {
          may have up to {limit}"
     )]
     ImageSize {
-        /// Pixels in a row.
         width: u32,
-        /// Rows.
         height: u32,
-        /// Largest number of pixels.
         limit: usize,
     },
     /// The number of values is not that of the pixels.
     #[error("{width} x {height} pixels were announced, but {actual} {values} given")]
     PixelCount {
-        /// Pixels in a row.
         width: u32,
-        /// Rows.
         height: u32,
         /// What is given: grey values or opacities.
         values: &'static str,
-        /// How many.
         actual: usize,
     },
     /// All pixels are on the chosen side of the threshold, or none is.
@@ -65,13 +53,9 @@ pub enum Error {
     OneSided {
         /// "everything" or "nothing".
         inside: &'static str,
-        /// The side, with its threshold.
         side: String,
-        /// What is compared with the threshold.
         quantity: &'static str,
-        /// Its least value.
         low: f64,
-        /// Its largest value.
         high: f64,
     },
     /// An outline with too many segments: noise, or a photograph.
@@ -79,23 +63,13 @@ pub enum Error {
         "the outline would have about {segments} segments, more than {limit}: this is noise and \
          no shape; blur the image or make it smaller"
     )]
-    Noise {
-        /// Pairs of neighbouring pixels on different sides of the threshold.
-        segments: usize,
-        /// Largest number.
-        limit: usize,
-    },
+    Noise { segments: usize, limit: usize },
     /// A field without an interface.
     #[error(
         "the phase field has no interface: its values range from {low:.4} to {high:.4}, and do \
          not change sign"
     )]
-    NoInterface {
-        /// Least value.
-        low: f64,
-        /// Largest value.
-        high: f64,
-    },
+    NoInterface { low: f64, high: f64 },
     /// Curves that bound nothing.
     #[error("no curve was given; an outline needs at least one closed curve")]
     NoCurves,
@@ -107,7 +81,6 @@ pub enum Error {
     OpenCurve {
         /// Which curve, from 0.
         curve: usize,
-        /// Its points.
         points: usize,
         /// Open or closed.
         state: &'static str,
@@ -122,9 +95,7 @@ pub enum Error {
         curve: usize,
         /// Which of its points, from 0.
         point: usize,
-        /// The point.
         position: [f64; 2],
-        /// Largest magnitude.
         limit: f64,
     },
     /// A region that contains no node.
@@ -132,10 +103,7 @@ pub enum Error {
         "no node of the grid of {nodes} nodes is in the region, so nothing could move; check where \
          it is placed, or use a finer grid"
     )]
-    EmptyMask {
-        /// Nodes of the grid.
-        nodes: usize,
-    },
+    EmptyMask { nodes: usize },
 }
 
 /// Accepts numbers for which `condition` holds.

@@ -75,12 +75,6 @@ impl<const D: usize> Dual<D> {
         }
     }
 
-    /// Matrix product.
-    #[must_use]
-    pub fn matmul(self, other: Self) -> Self {
-        self.bilinear(other, Tensor::matmul)
-    }
-
     /// Integer power.
     #[must_use]
     pub fn powi(self, exponent: i32) -> Self {
@@ -104,40 +98,12 @@ impl<const D: usize> Dual<D> {
         self.pointwise(value.clone(), value)
     }
 
-    /// Natural logarithm.
-    #[must_use]
-    pub fn log(self) -> Self {
-        let (value, slope) = (self.primal.clone().log(), self.primal.clone().recip());
-        self.pointwise(value, slope)
-    }
-
     /// Hyperbolic tangent.
     #[must_use]
     pub fn tanh(self) -> Self {
         let value = self.primal.clone().tanh();
         let slope = -(value.clone() * value.clone()) + 1.0;
         self.pointwise(value, slope)
-    }
-
-    /// Sine.
-    #[must_use]
-    pub fn sin(self) -> Self {
-        let (value, slope) = (self.primal.clone().sin(), self.primal.clone().cos());
-        self.pointwise(value, slope)
-    }
-
-    /// Cosine.
-    #[must_use]
-    pub fn cos(self) -> Self {
-        let (value, slope) = (self.primal.clone().cos(), -self.primal.clone().sin());
-        self.pointwise(value, slope)
-    }
-
-    /// Square root.
-    #[must_use]
-    pub fn sqrt(self) -> Self {
-        let value = self.primal.clone().sqrt();
-        self.pointwise(value.clone(), value.recip() * 0.5)
     }
 
     /// Sum of all elements.

@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use burn::backend::ir::{BackendIr, CustomOpIr, HandleContainer, TensorIr};
+use burn::backend::ir::{BackendIr, CustomOpIr, HandleContainer, ScalarIr, TensorIr};
+use burn::backend::tensor::FloatTensor;
 use burn::backend::{BackendTypes, DispatchDevice};
 use burn::tensor::Device;
 
@@ -120,6 +121,19 @@ impl<B: BackendIr> CustomOpRegistry<B> {
     {
         self.handlers.register(id, handler);
         self.known.insert(id.to_owned());
+    }
+
+    /// Run operations called `id`, which have one output, by a function of their inputs and scalars.
+    pub fn register_function<const N: usize>(
+        &mut self,
+        id: &str,
+        function: impl Fn([FloatTensor<B>; N], &[ScalarIr]) -> FloatTensor<B> + Send + Sync + 'static,
+    ) {
+        self.register(id, move |handles, operation, _| {
+            let input = |i: usize| handles.get_float_tensor::<B>(&operation.inputs[i]);
+            let output = function(std::array::from_fn(input), &operation.scalars);
+            handles.register_float_tensor::<B>(&operation.outputs[0].id, output);
+        });
     }
 }
 

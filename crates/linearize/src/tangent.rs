@@ -432,26 +432,6 @@ impl Builder {
         self.primal.emit_one(OperationIr::Custom(operation))
     }
 
-    /// Add any operation to the primal program and return its outputs.
-    pub fn primal_operation(&mut self, operation: OperationIr) -> Vec<TensorIr> {
-        self.primal.emit(operation)
-    }
-
-    /// Product of two tensors of the primal program.
-    pub fn primal_mul(&mut self, a: &TensorIr, b: &TensorIr) -> TensorIr {
-        self.primal.mul(a, b)
-    }
-
-    /// Sum of two tensors of the primal program.
-    pub fn primal_add(&mut self, a: &TensorIr, b: &TensorIr) -> TensorIr {
-        self.primal.add(a, b)
-    }
-
-    /// Multiple of a tensor of the primal program.
-    pub fn primal_scale(&mut self, a: &TensorIr, factor: f64) -> TensorIr {
-        self.primal.scale(a, factor)
-    }
-
     /// Add an operation to the tangent program and return its first output. The operation must be
     /// jointly linear in the tangents among its inputs.
     ///

@@ -163,11 +163,6 @@ impl Graph {
             Ok((value, outputs))
         })
     }
-
-    /// Number of recorded operations.
-    pub fn operations(&self) -> usize {
-        self.operations.len()
-    }
 }
 
 impl fmt::Display for Graph {

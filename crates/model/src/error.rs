@@ -1,3 +1,5 @@
+#![allow(missing_docs, reason = "messages and names say it")]
+
 use std::path::PathBuf;
 
 use thiserror::Error as ThisError;
@@ -9,12 +11,7 @@ use crate::Ratios;
 pub enum Error {
     /// A network of other ratios than the run's.
     #[error("the network does not fit this run: trained for {network}, the run has {run}")]
-    Mismatch {
-        /// The network's ratios.
-        network: Ratios,
-        /// The run's ratios.
-        run: Ratios,
-    },
+    Mismatch { network: Ratios, run: Ratios },
     /// No shipped network fits.
     #[error(
         "no network of the {recipe} recipe for {wanted}; there are {available}. Choose one of these interface widths, or train a network: \
@@ -22,11 +19,8 @@ pub enum Error {
         wanted.dimension, wanted.width, wanted.eps_over_h, wanted.step_over_h2
     )]
     MissingNetwork {
-        /// How the networks are trained.
         recipe: &'static str,
-        /// What is needed.
         wanted: Ratios,
-        /// What there is.
         available: String,
     },
     /// A file with a network was given, and no case has a learned operator.
@@ -36,12 +30,7 @@ pub enum Error {
     #[error(
         "the kernel is {width} cells wide, but the grid has only {cells}; use a larger box or a finer grid"
     )]
-    KernelTooWide {
-        /// Kernel width.
-        width: usize,
-        /// Cells per side.
-        cells: usize,
-    },
+    KernelTooWide { width: usize, cells: usize },
     /// A kernel that is no product of functions of one variable.
     #[error(
         "the kernel of this network differs by {error:.0e} of its largest value from a product of functions of one variable, which active \
@@ -55,54 +44,33 @@ pub enum Error {
     #[error(
         "the operator keeps no constant value near {phase}, which active bricks need; train the network longer, or store the whole grid"
     )]
-    NoRest {
-        /// The phase, -1 or 1.
-        phase: f64,
-    },
+    NoRest { phase: f64 },
     /// Ratios that cannot describe an operator.
     #[error("impossible ratios ({ratios}): {reason}")]
     Ratios {
-        /// The ratios.
         ratios: Ratios,
-        /// What is wrong with them.
         reason: &'static str,
     },
     /// An array of the wrong size.
     #[error("{what}: expected {expected}, found {found}")]
     Shape {
-        /// Which array.
         what: &'static str,
-        /// Its proper size.
         expected: String,
-        /// Its size.
         found: String,
     },
     /// A number that is not finite.
     #[error("{what}: entry {index} is not finite")]
-    NonFinite {
-        /// Which array.
-        what: &'static str,
-        /// First bad entry.
-        index: usize,
-    },
+    NonFinite { what: &'static str, index: usize },
     /// A weights file that cannot be read or written.
     #[error("{action} {path}: {source}")]
     Io {
-        /// What was attempted.
         action: &'static str,
-        /// The file.
         path: PathBuf,
-        /// The system's reason.
         source: std::io::Error,
     },
     /// A weights file with the wrong content.
     #[error("{path} is not a usable network: {reason}")]
-    Weights {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        reason: String,
-    },
+    Weights { path: PathBuf, reason: String },
     /// Training parameters out of range.
     #[error("training: {0}")]
     Training(String),
@@ -111,9 +79,7 @@ pub enum Error {
         "training diverged in iteration {iteration}: {what} is not finite; lower the learning rate or change the seed"
     )]
     Diverged {
-        /// Iteration or epoch.
         iteration: usize,
-        /// What became non-finite.
         what: &'static str,
     },
     /// A step of mean curvature flow that cannot be calibrated.
@@ -121,17 +87,13 @@ pub enum Error {
         "calibration: {reason} (eigenvalue near 1: {eigenvalue:.6}); train the network longer, or run without calibration"
     )]
     Calibration {
-        /// What is missing.
         reason: &'static str,
         /// The eigenvalue of the step's derivative at the flat interface that should be 1; NaN if there is no such interface.
         eigenvalue: f64,
     },
     /// Training was interrupted; its checkpoint can be resumed.
     #[error("training interrupted after iteration {iteration}; run again to resume")]
-    Interrupted {
-        /// The last finished iteration.
-        iteration: usize,
-    },
+    Interrupted { iteration: usize },
     /// A file that cannot be written.
     #[error(transparent)]
     Write(#[from] geometry::Error),

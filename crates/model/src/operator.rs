@@ -55,16 +55,6 @@ impl<const D: usize> MeanCurvatureOperator<D> {
         tabulated(smoothed, table, self.range, 0)
     }
 
-    /// Kernel width `n_K`.
-    pub fn width(&self) -> usize {
-        self.width
-    }
-
-    /// `F'` in the pure phases, mean of `F'(1)` and `F'(-1)`.
-    pub fn slope(&self) -> f64 {
-        self.slope
-    }
-
     /// The inverse of the energy's Hessian in the pure phases, `1 / (1 + c |1 - F'(1) k|^2)` with `k` the kernel's
     /// transfer function and `c = tau / tautilde^2`: the preconditioner of a minimizing-movement step.
     pub fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> SpectralFilter {

@@ -85,11 +85,6 @@ impl SpectralFilter {
         Transform::of_shape(&self.0.shape).filter_real(x, &self.0.double)
     }
 
-    /// Shape of the grids it applies to.
-    pub fn shape(&self) -> &[usize] {
-        &self.0.shape
-    }
-
     pub(crate) fn symbol<T: Real>(&self) -> &[T] {
         if is_f64::<T>() {
             bytemuck::cast_slice(&self.0.double)

@@ -1,59 +1,34 @@
 //! The extension operations on the CPU backends, through the host kernels, in `f64` or `f32`.
 
-use burn_backend::Shape;
+use burn_backend::{Backend, DType, Element, Shape, TensorMetadata, tensor::FloatTensor};
 
 use crate::brick_convolution::{self, Ghosts};
 use crate::convolution::{convolve, correlate};
 use crate::fft::{Real, Transform};
-use crate::filter::SpectralFilter;
+use crate::filter::{FilterOps, SpectralFilter};
+use crate::ops::GridOps;
+use crate::slices;
 use crate::table::{TableRange, evaluate};
+use crate::vector::{self, SharedUpdate, VectorOps};
 
-/// Grid axes and width of a kernel from its shape; batch axes lead.
-fn grid_axes<'a>(x: &'a Shape, kernel: &Shape) -> (&'a [usize], usize) {
-    let axes = kernel.num_dims();
-    (&x[x.num_dims() - axes..], kernel[0])
-}
+/// A backend whose tensors are in the memory of the host.
+pub(crate) trait Host: Backend {
+    /// What lends the values of a tensor.
+    type Lender;
 
-pub(crate) fn circular_convolution<T: Real>(
-    x: &[T],
-    shape: &Shape,
-    kernel: &[T],
-    kernel_shape: &Shape,
-    adjoint: bool,
-) -> Vec<T> {
-    let (grid, width) = grid_axes(shape, kernel_shape);
-    convolve(x, grid, kernel, width, adjoint)
-}
+    /// Takes a tensor whose values are to be lent.
+    fn lender(x: FloatTensor<Self>) -> Self::Lender;
 
-pub(crate) fn kernel_correlation<T: Real>(
-    x: &[T],
-    shape: &Shape,
-    g: &[T],
-    width: usize,
-    axes: usize,
-) -> Vec<T> {
-    correlate(x, g, &shape[shape.num_dims() - axes..], width)
-}
+    /// The values, in the precision of the tensor.
+    fn values<T: Real + Element>(lender: &Self::Lender) -> &[T];
 
-pub(crate) fn brick_convolution<T: Real>(
-    x: &[T],
-    shape: &Shape,
-    taps: &[T],
-    neighbours: &[T],
-    adjoint: bool,
-) -> Vec<T> {
-    let axes = shape.num_dims();
-    let bricks = (shape[axes - 1], axes);
-    brick_convolution::convolve(x, bricks, neighbours, taps, adjoint, Ghosts::Zero)
-}
+    fn tensor<T: Real + Element>(values: Vec<T>, shape: Shape) -> FloatTensor<Self>;
 
-pub(crate) fn tabulated<T: Real>(w: &[T], table: &[T], range: TableRange, order: usize) -> Vec<T> {
-    evaluate(w, range, table, order)
-}
-
-pub(crate) fn spectral_filter<T: Real>(x: &[T], shape: &Shape, filter: &SpectralFilter) -> Vec<T> {
-    let symbol: &[T] = filter.symbol();
-    Transform::of_shape(&shape[..]).filter_real(x, symbol)
+    /// Changes the values in place, or a copy of them if somebody else holds them.
+    fn changed<T: Real + Element>(
+        x: FloatTensor<Self>,
+        f: impl FnOnce(&mut [T]),
+    ) -> FloatTensor<Self>;
 }
 
 /// Runs a generic host kernel in the tensor's own precision.
@@ -73,19 +48,129 @@ macro_rules! in_precision {
     };
 }
 
+impl<B: Host> GridOps for B {
+    fn circular_convolution(
+        x: FloatTensor<B>,
+        kernel: FloatTensor<B>,
+        adjoint: bool,
+    ) -> FloatTensor<B> {
+        let (dtype, shape, kernel_shape) = (x.dtype(), x.shape(), kernel.shape());
+        // Batch axes lead.
+        let grid = &shape[shape.num_dims() - kernel_shape.num_dims()..];
+        let (x, kernel) = (B::lender(x), B::lender(kernel));
+        in_precision!(dtype, T => {
+            let (x, kernel) = (B::values::<T>(&x), B::values(&kernel));
+            let y = convolve(x, grid, kernel, kernel_shape[0], adjoint);
+            B::tensor(y, shape)
+        })
+    }
+
+    fn kernel_correlation(
+        x: FloatTensor<B>,
+        g: FloatTensor<B>,
+        width: usize,
+        axes: usize,
+    ) -> FloatTensor<B> {
+        let (dtype, shape) = (x.dtype(), x.shape());
+        let grid = &shape[shape.num_dims() - axes..];
+        let (x, g) = (B::lender(x), B::lender(g));
+        in_precision!(dtype, T => {
+            let c = correlate(B::values::<T>(&x), B::values(&g), grid, width);
+            B::tensor(c, vec![width; axes].into())
+        })
+    }
+
+    fn brick_convolution(
+        x: FloatTensor<B>,
+        taps: FloatTensor<B>,
+        neighbours: FloatTensor<B>,
+        adjoint: bool,
+    ) -> FloatTensor<B> {
+        let (dtype, shape) = (x.dtype(), x.shape());
+        let axes = shape.num_dims();
+        let bricks = (shape[axes - 1], axes);
+        let [x, taps, neighbours] = [x, taps, neighbours].map(B::lender);
+        in_precision!(dtype, T => {
+            let (x, taps, neighbours) = (B::values::<T>(&x), B::values(&taps), B::values(&neighbours));
+            let y = brick_convolution::convolve(x, bricks, neighbours, taps, adjoint, Ghosts::Zero);
+            B::tensor(y, shape)
+        })
+    }
+
+    fn tabulated(
+        w: FloatTensor<B>,
+        table: FloatTensor<B>,
+        range: TableRange,
+        order: usize,
+    ) -> FloatTensor<B> {
+        let (dtype, shape) = (w.dtype(), w.shape());
+        let (w, table) = (B::lender(w), B::lender(table));
+        in_precision!(dtype, T => {
+            B::tensor(evaluate(B::values::<T>(&w), range, B::values(&table), order), shape)
+        })
+    }
+}
+
+impl<B: Host> FilterOps for B {
+    fn spectral_filter(x: FloatTensor<B>, filter: SpectralFilter) -> FloatTensor<B> {
+        let (dtype, shape) = (x.dtype(), x.shape());
+        let x = B::lender(x);
+        in_precision!(dtype, T => {
+            let y = Transform::of_shape(&shape[..]).filter_real(B::values::<T>(&x), filter.symbol());
+            B::tensor(y, shape)
+        })
+    }
+}
+
+/// Changes `x` by a function of its values and those of `y`.
+macro_rules! changed {
+    ($x:ident, $y:ident, $f:expr) => {{
+        let y = B::lender($y);
+        in_precision!($x.dtype(), T => B::changed::<T>($x, |x| $f(x, B::values(&y))))
+    }};
+}
+
+impl<B: Host> VectorOps for B {
+    fn inner_product(a: FloatTensor<B>, b: FloatTensor<B>) -> FloatTensor<B> {
+        let dtype = a.dtype();
+        let (a, b) = (B::lender(a), B::lender(b));
+        let sum = in_precision!(dtype, T => slices::dot::<T>(B::values(&a), B::values(&b)));
+        B::tensor(vec![sum], vec![1].into())
+    }
+
+    fn add_scaled(x: FloatTensor<B>, y: FloatTensor<B>, alpha: f64) -> FloatTensor<B> {
+        changed!(x, y, |x, y| vector::axpy(x, y, alpha))
+    }
+
+    fn retract(u: FloatTensor<B>, p: FloatTensor<B>, t: f64) -> FloatTensor<B> {
+        changed!(u, p, |u, p| vector::retract_values(u, p, t))
+    }
+
+    fn extrapolate(u: FloatTensor<B>, previous: FloatTensor<B>, factor: f64) -> FloatTensor<B> {
+        changed!(u, previous, |u, before| vector::extrapolate_values(
+            u, before, factor
+        ))
+    }
+
+    fn update_on_host(
+        x: FloatTensor<B>,
+        z: FloatTensor<B>,
+        update: SharedUpdate,
+    ) -> FloatTensor<B> {
+        changed!(z, x, |z, x| vector::call(&update, x, z))
+    }
+}
+
 #[cfg(feature = "flex")]
 pub(crate) mod flex {
-    use burn_backend::{DType, Element, TensorData, TensorMetadata};
+    use burn_backend::{DType, Element, Shape, TensorData};
     use burn_flex::{Flex, FlexTensor};
     use burn_ir::TensorStatus;
     use linearize::{CustomOpRegistry, ELEMENTWISE};
 
-    use super::{SpectralFilter, TableRange};
+    use super::Host;
     use crate::elementwise::{self, Operand};
-    use crate::filter::FilterOps;
-    use crate::ops::GridOps;
-    use crate::slices;
-    use crate::vector::{self, SharedUpdate, VectorOps};
+    use crate::fft::Real;
 
     fn contiguous(x: FlexTensor) -> FlexTensor {
         if x.is_contiguous() {
@@ -95,101 +180,28 @@ pub(crate) mod flex {
         }
     }
 
-    /// The values of a contiguous tensor. Its storage can hold more: that of the tensor it is a slice of.
-    fn values<T: Element + bytemuck::Pod>(x: &FlexTensor) -> &[T] {
-        x.as_slice()
-            .expect("the tensor is contiguous and of this type")
-    }
+    impl Host for Flex {
+        type Lender = FlexTensor;
 
-    impl GridOps for Flex {
-        fn circular_convolution(x: FlexTensor, kernel: FlexTensor, adjoint: bool) -> FlexTensor {
-            let (x, kernel) = (contiguous(x), contiguous(kernel));
-            let (shape, kernel_shape) = (x.shape(), kernel.shape());
-            in_precision!(x.dtype(), T => {
-                let y = super::circular_convolution::<T>(values(&x), &shape, values(&kernel), &kernel_shape, adjoint);
-                FlexTensor::from_data(TensorData::new(y, shape))
-            })
+        fn lender(x: FlexTensor) -> FlexTensor {
+            contiguous(x)
         }
 
-        fn kernel_correlation(
-            x: FlexTensor,
-            g: FlexTensor,
-            width: usize,
-            axes: usize,
-        ) -> FlexTensor {
-            let (x, g) = (contiguous(x), contiguous(g));
-            let shape = x.shape();
-            in_precision!(x.dtype(), T => {
-                let y = super::kernel_correlation::<T>(values(&x), &shape, values(&g), width, axes);
-                FlexTensor::from_data(TensorData::new(y, vec![width; axes]))
-            })
+        /// Its storage can hold more: that of the tensor it is a slice of.
+        fn values<T: Real + Element>(x: &FlexTensor) -> &[T] {
+            x.as_slice()
+                .expect("the tensor is contiguous and of this type")
         }
 
-        fn brick_convolution(
-            x: FlexTensor,
-            taps: FlexTensor,
-            neighbours: FlexTensor,
-            adjoint: bool,
-        ) -> FlexTensor {
-            let [x, taps, neighbours] = [x, taps, neighbours].map(contiguous);
-            let shape = x.shape();
-            in_precision!(x.dtype(), T => {
-                let (taps, neighbours) = (values(&taps), values(&neighbours));
-                let y = super::brick_convolution::<T>(values(&x), &shape, taps, neighbours, adjoint);
-                FlexTensor::from_data(TensorData::new(y, shape))
-            })
+        fn tensor<T: Real + Element>(values: Vec<T>, shape: Shape) -> FlexTensor {
+            FlexTensor::from_data(TensorData::new(values, shape))
         }
 
-        fn tabulated(
-            w: FlexTensor,
-            table: FlexTensor,
-            range: TableRange,
-            order: usize,
-        ) -> FlexTensor {
-            let (w, table) = (contiguous(w), contiguous(table));
-            let shape = w.shape();
-            in_precision!(w.dtype(), T => {
-                let y = super::tabulated::<T>(values(&w), values(&table), range, order);
-                FlexTensor::from_data(TensorData::new(y, shape))
-            })
-        }
-    }
-
-    /// Changes `x` in place, or a copy of it if somebody else holds it; `y` stays.
-    macro_rules! in_place {
-        ($x:ident, $y:ident, $f:expr) => {{
-            let (mut x, y) = (contiguous($x), contiguous($y));
-            in_precision!(x.dtype(), T => {
-                let (start, end) = x.layout().contiguous_offsets().expect("x is contiguous");
-                $f(&mut x.storage_mut::<T>()[start..end], values::<T>(&y));
-            });
+        fn changed<T: Real + Element>(x: FlexTensor, f: impl FnOnce(&mut [T])) -> FlexTensor {
+            let mut x = contiguous(x);
+            let (start, end) = x.layout().contiguous_offsets().expect("x is contiguous");
+            f(&mut x.storage_mut::<T>()[start..end]);
             x
-        }};
-    }
-
-    impl VectorOps for Flex {
-        fn inner_product(a: FlexTensor, b: FlexTensor) -> FlexTensor {
-            let (a, b) = (contiguous(a), contiguous(b));
-            let sum = in_precision!(a.dtype(), T => slices::dot::<T>(values(&a), values(&b)));
-            FlexTensor::from_data(TensorData::new(vec![sum], vec![1]))
-        }
-
-        fn add_scaled(x: FlexTensor, y: FlexTensor, alpha: f64) -> FlexTensor {
-            in_place!(x, y, |x, y| vector::axpy(x, y, alpha))
-        }
-
-        fn retract(u: FlexTensor, p: FlexTensor, t: f64) -> FlexTensor {
-            in_place!(u, p, |u, p| vector::retract_values(u, p, t))
-        }
-
-        fn extrapolate(u: FlexTensor, previous: FlexTensor, factor: f64) -> FlexTensor {
-            in_place!(u, previous, |u, before| vector::extrapolate_values(
-                u, before, factor
-            ))
-        }
-
-        fn update_on_host(x: FlexTensor, z: FlexTensor, update: SharedUpdate) -> FlexTensor {
-            in_place!(z, x, |z, x| vector::call(&update, x, z))
         }
     }
 
@@ -214,7 +226,7 @@ pub(crate) mod flex {
                 let operands = (given.into_iter().zip(&lent))
                     .map(|pair| match pair {
                         (Some(values), _) => Operand::Given(values),
-                        (None, Some(x)) => Operand::Lent(values::<T>(x)),
+                        (None, Some(x)) => Operand::Lent(Flex::values::<T>(x)),
                         (None, None) => unreachable!("the tensor has the type of its description"),
                     })
                     .collect();
@@ -226,125 +238,50 @@ pub(crate) mod flex {
             }
         });
     }
-
-    impl FilterOps for Flex {
-        fn spectral_filter(x: FlexTensor, filter: SpectralFilter) -> FlexTensor {
-            let x = contiguous(x);
-            let shape = x.shape();
-            in_precision!(x.dtype(), T => {
-                let y = super::spectral_filter::<T>(values(&x), &shape, &filter);
-                FlexTensor::from_data(TensorData::new(y, shape))
-            })
-        }
-    }
 }
 
 #[cfg(feature = "ndarray")]
 pub(crate) mod ndarray {
     use burn_backend::{
-        DType, Element, TensorData, TensorMetadata, ops::FloatTensorOps, tensor::FloatTensor,
+        DType, Element, Shape, TensorData, TensorMetadata, ops::FloatTensorOps, tensor::FloatTensor,
     };
     use burn_ndarray::NdArray;
     use linearize::{CustomOpRegistry, ELEMENTWISE};
 
-    use super::{SpectralFilter, TableRange};
+    use super::Host;
     use crate::elementwise::{self, Operand};
     use crate::fft::Real;
-    use crate::filter::FilterOps;
-    use crate::ops::GridOps;
-    use crate::slices;
-    use crate::vector::{self, SharedUpdate, VectorOps};
 
     type NdTensor = FloatTensor<NdArray>;
 
-    fn values<T: Real + Element>(x: NdTensor) -> Vec<T> {
-        burn_std::reader::try_read_sync(NdArray::float_into_data(x))
-            .expect("the ndarray backend reads synchronously")
-            .expect("an ndarray tensor can be read")
-            .try_into_vec()
+    fn into_values<T: Real + Element>(data: TensorData) -> Vec<T> {
+        data.try_into_vec()
             .expect("the tensor has the element type of its dtype")
     }
 
-    fn tensor<T: Real + Element>(
-        values: Vec<T>,
-        shape: impl Into<burn_backend::Shape>,
-    ) -> NdTensor {
-        NdArray::float_from_data(TensorData::new(values, shape), &Default::default())
-    }
+    impl Host for NdArray {
+        type Lender = TensorData;
 
-    impl GridOps for NdArray {
-        fn circular_convolution(x: NdTensor, kernel: NdTensor, adjoint: bool) -> NdTensor {
-            let (shape, kernel_shape) = (x.shape(), kernel.shape());
-            in_precision!(x.dtype(), T => {
-                let (x, kernel) = (values::<T>(x), values::<T>(kernel));
-                let y = super::circular_convolution(&x, &shape, &kernel, &kernel_shape, adjoint);
-                tensor(y, shape)
-            })
+        fn lender(x: NdTensor) -> TensorData {
+            burn_std::reader::try_read_sync(NdArray::float_into_data(x))
+                .expect("the ndarray backend reads synchronously")
+                .expect("an ndarray tensor can be read")
         }
 
-        fn kernel_correlation(x: NdTensor, g: NdTensor, width: usize, axes: usize) -> NdTensor {
+        fn values<T: Real + Element>(data: &TensorData) -> &[T] {
+            data.as_slice()
+                .expect("the tensor has the element type of its dtype")
+        }
+
+        fn tensor<T: Real + Element>(values: Vec<T>, shape: Shape) -> NdTensor {
+            NdArray::float_from_data(TensorData::new(values, shape), &Default::default())
+        }
+
+        fn changed<T: Real + Element>(x: NdTensor, f: impl FnOnce(&mut [T])) -> NdTensor {
             let shape = x.shape();
-            in_precision!(x.dtype(), T => {
-                let (x, g) = (values::<T>(x), values::<T>(g));
-                tensor(super::kernel_correlation(&x, &shape, &g, width, axes), vec![width; axes])
-            })
-        }
-
-        fn brick_convolution(
-            x: NdTensor,
-            taps: NdTensor,
-            neighbours: NdTensor,
-            adjoint: bool,
-        ) -> NdTensor {
-            let shape = x.shape();
-            in_precision!(x.dtype(), T => {
-                let [x, taps, neighbours] = [x, taps, neighbours].map(values::<T>);
-                tensor(super::brick_convolution(&x, &shape, &taps, &neighbours, adjoint), shape)
-            })
-        }
-
-        fn tabulated(w: NdTensor, table: NdTensor, range: TableRange, order: usize) -> NdTensor {
-            let shape = w.shape();
-            in_precision!(w.dtype(), T => {
-                let (w, table) = (values::<T>(w), values::<T>(table));
-                tensor(super::tabulated(&w, &table, range, order), shape)
-            })
-        }
-    }
-
-    macro_rules! in_place {
-        ($x:ident, $y:ident, $f:expr) => {{
-            let shape = $x.shape();
-            in_precision!($x.dtype(), T => {
-                let (mut x, y) = (values::<T>($x), values::<T>($y));
-                $f(&mut x[..], &y[..]);
-                tensor(x, shape)
-            })
-        }};
-    }
-
-    impl VectorOps for NdArray {
-        fn inner_product(a: NdTensor, b: NdTensor) -> NdTensor {
-            let sum = in_precision!(a.dtype(), T => slices::dot(&values::<T>(a), &values::<T>(b)));
-            tensor(vec![sum], vec![1])
-        }
-
-        fn add_scaled(x: NdTensor, y: NdTensor, alpha: f64) -> NdTensor {
-            in_place!(x, y, |x, y| vector::axpy(x, y, alpha))
-        }
-
-        fn retract(u: NdTensor, p: NdTensor, t: f64) -> NdTensor {
-            in_place!(u, p, |u, p| vector::retract_values(u, p, t))
-        }
-
-        fn extrapolate(u: NdTensor, previous: NdTensor, factor: f64) -> NdTensor {
-            in_place!(u, previous, |u, before| vector::extrapolate_values(
-                u, before, factor
-            ))
-        }
-
-        fn update_on_host(x: NdTensor, z: NdTensor, update: SharedUpdate) -> NdTensor {
-            in_place!(z, x, |z, x| vector::call(&update, x, z))
+            let mut values = into_values::<T>(Self::lender(x));
+            f(&mut values);
+            Self::tensor(values, shape)
         }
     }
 
@@ -353,7 +290,7 @@ pub(crate) mod ndarray {
         registry.register(ELEMENTWISE, |handles, ir, _| {
             let inputs = (ir.inputs.iter()).map(|t| handles.get_float_tensor::<NdArray>(t));
             let results = in_precision!(ir.inputs[0].dtype, T => {
-                let operands = inputs.map(|x| Operand::Given(values::<T>(x))).collect();
+                let operands = inputs.map(|x| Operand::Given(into_values::<T>(NdArray::lender(x)))).collect();
                 elementwise::run_operation::<T>(ir, operands)
             });
             for (result, out) in results.into_iter().zip(&ir.outputs) {
@@ -362,14 +299,5 @@ pub(crate) mod ndarray {
                 handles.register_float_tensor::<NdArray>(&out.id, tensor);
             }
         });
-    }
-
-    impl FilterOps for NdArray {
-        fn spectral_filter(x: NdTensor, filter: SpectralFilter) -> NdTensor {
-            let shape = x.shape();
-            in_precision!(x.dtype(), T => {
-                tensor(super::spectral_filter(&values::<T>(x), &shape, &filter), shape)
-            })
-        }
     }
 }

@@ -42,6 +42,7 @@
 )]
 
 pub mod memory;
+pub mod recording;
 pub mod slices;
 
 mod brick_convolution;

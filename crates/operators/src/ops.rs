@@ -1,17 +1,12 @@
 //! The extension operations as a Burn backend trait, with their autodiff and capture implementations.
 
 use burn::backend::{Backend, backend_extension, tensor::FloatTensor};
-use burn_autodiff::{
-    Autodiff,
-    checkpoint::{base::Checkpointer, strategy::CheckpointStrategy},
-    grads::Gradients,
-    ops::{Backward, Ops, OpsKind, binary, unary},
-};
+use burn_autodiff::{Autodiff, checkpoint::strategy::CheckpointStrategy};
 use burn_backend::{Shape, TensorMetadata};
 use burn_capture::CaptureBackend;
-use burn_ir::{CustomOpIr, OperationIr, OperationOutput, ScalarIr, TensorIr};
-use burn_router::RouterClient;
+use burn_ir::ScalarIr;
 
+use crate::recording::{Pullback, captured, on_tape};
 use crate::table::TableRange;
 
 /// Identifier of [`GridOps::circular_convolution`] in captured graphs.
@@ -68,7 +63,7 @@ impl GridOps for CaptureBackend {
         adjoint: bool,
     ) -> FloatTensor<Self> {
         let shape = x.shape();
-        record(
+        captured(
             CONVOLUTION,
             [x, kernel],
             shape,
@@ -83,7 +78,7 @@ impl GridOps for CaptureBackend {
         axes: usize,
     ) -> FloatTensor<Self> {
         let scalars = vec![ScalarIr::UInt(width as u64), ScalarIr::UInt(axes as u64)];
-        record(CORRELATION, [x, g], Shape::from(vec![width; axes]), scalars)
+        captured(CORRELATION, [x, g], Shape::from(vec![width; axes]), scalars)
     }
 
     fn brick_convolution(
@@ -94,7 +89,7 @@ impl GridOps for CaptureBackend {
     ) -> FloatTensor<Self> {
         let shape = x.shape();
         let scalars = vec![ScalarIr::Bool(adjoint)];
-        record(BRICKS, [x, taps, neighbours], shape, scalars)
+        captured(BRICKS, [x, taps, neighbours], shape, scalars)
     }
 
     fn tabulated(
@@ -110,27 +105,8 @@ impl GridOps for CaptureBackend {
             ScalarIr::Float(range.high),
             ScalarIr::UInt(range.cells as u64),
         ];
-        record(TABULATED, [w, table], shape, scalars)
+        captured(TABULATED, [w, table], shape, scalars)
     }
-}
-
-fn record<const N: usize>(
-    id: &'static str,
-    inputs: [FloatTensor<CaptureBackend>; N],
-    shape: Shape,
-    scalars: Vec<ScalarIr>,
-) -> FloatTensor<CaptureBackend> {
-    let client = inputs[0].client.clone();
-    let inputs = inputs.map(burn_router::RouterTensor::into_ir);
-    let output = TensorIr::uninit(client.create_empty_handle(), shape, inputs[0].dtype);
-    let operation = CustomOpIr::with_scalars(id, &inputs, &[output], scalars);
-    client.register(OperationIr::Custom(operation)).output()
-}
-
-/// Width of a kernel: its extent along the first axis.
-fn width_of<B: Backend>(kernel: &FloatTensor<B>) -> (usize, usize) {
-    let shape = kernel.shape();
-    (shape[0], shape.num_dims())
 }
 
 impl<B: Backend + GridOps, C: CheckpointStrategy> GridOps for Autodiff<B, C> {
@@ -139,37 +115,20 @@ impl<B: Backend + GridOps, C: CheckpointStrategy> GridOps for Autodiff<B, C> {
         kernel: FloatTensor<Self>,
         adjoint: bool,
     ) -> FloatTensor<Self> {
-        #[derive(Debug)]
-        struct Convolution;
-        impl<B: Backend + GridOps> Backward<B, 2> for Convolution {
-            type State = (FloatTensor<B>, FloatTensor<B>, bool);
-            fn backward(
-                self,
-                ops: Ops<Self::State, 2>,
-                grads: &mut Gradients,
-                _checkpointer: &mut Checkpointer,
-            ) {
-                let (x, kernel, adjoint) = ops.state;
-                let (width, axes) = width_of::<B>(&kernel);
-                binary::<B, _, _>(
-                    ops.parents,
-                    ops.node,
-                    grads,
-                    |g| B::circular_convolution(g, kernel, !adjoint),
-                    |g| {
-                        let (x, g) = if adjoint { (g, x) } else { (x, g) };
-                        B::kernel_correlation(x, g, width, axes)
-                    },
-                );
-            }
-        }
         let nodes = [x.node(), kernel.node()];
         let (x, kernel) = (x.into_primitive(), kernel.into_primitive());
         let y = B::circular_convolution(x.clone(), kernel.clone(), adjoint);
-        match Convolution.prepare::<C>(nodes).compute_bound().stateful() {
-            OpsKind::Tracked(prepared) => prepared.finish((x, kernel, adjoint), y),
-            OpsKind::UnTracked(prepared) => prepared.finish(y),
-        }
+        let (width, axes) = (kernel.shape()[0], kernel.shape().num_dims());
+        let to_x = move |g| B::circular_convolution(g, kernel.clone(), !adjoint);
+        let to_kernel = move |g| {
+            let (x, g) = if adjoint {
+                (g, x.clone())
+            } else {
+                (x.clone(), g)
+            };
+            B::kernel_correlation(x, g, width, axes)
+        };
+        on_tape::<B, C, 2>(nodes, y, [Pullback::new(to_x), Pullback::new(to_kernel)])
     }
 
     fn kernel_correlation(
@@ -178,33 +137,12 @@ impl<B: Backend + GridOps, C: CheckpointStrategy> GridOps for Autodiff<B, C> {
         width: usize,
         axes: usize,
     ) -> FloatTensor<Self> {
-        #[derive(Debug)]
-        struct Correlation;
-        impl<B: Backend + GridOps> Backward<B, 2> for Correlation {
-            type State = (FloatTensor<B>, FloatTensor<B>);
-            fn backward(
-                self,
-                ops: Ops<Self::State, 2>,
-                grads: &mut Gradients,
-                _checkpointer: &mut Checkpointer,
-            ) {
-                let (x, g) = ops.state;
-                binary::<B, _, _>(
-                    ops.parents,
-                    ops.node,
-                    grads,
-                    |c| B::circular_convolution(g, c, true),
-                    |c| B::circular_convolution(x, c, false),
-                );
-            }
-        }
         let nodes = [x.node(), g.node()];
         let (x, g) = (x.into_primitive(), g.into_primitive());
         let y = B::kernel_correlation(x.clone(), g.clone(), width, axes);
-        match Correlation.prepare::<C>(nodes).compute_bound().stateful() {
-            OpsKind::Tracked(prepared) => prepared.finish((x, g), y),
-            OpsKind::UnTracked(prepared) => prepared.finish(y),
-        }
+        let to_x = move |c| B::circular_convolution(g.clone(), c, true);
+        let to_g = move |c| B::circular_convolution(x.clone(), c, false);
+        on_tape::<B, C, 2>(nodes, y, [Pullback::new(to_x), Pullback::new(to_g)])
     }
 
     fn brick_convolution(
@@ -213,35 +151,12 @@ impl<B: Backend + GridOps, C: CheckpointStrategy> GridOps for Autodiff<B, C> {
         neighbours: FloatTensor<Self>,
         adjoint: bool,
     ) -> FloatTensor<Self> {
-        #[derive(Debug)]
-        struct Bricks;
-        impl<B: Backend + GridOps> Backward<B, 1> for Bricks {
-            type State = (FloatTensor<B>, FloatTensor<B>, bool);
-            fn backward(
-                self,
-                ops: Ops<Self::State, 1>,
-                grads: &mut Gradients,
-                _checkpointer: &mut Checkpointer,
-            ) {
-                let (taps, neighbours, adjoint) = ops.state;
-                unary::<B, _>(ops.parents, ops.node, grads, |g| {
-                    B::brick_convolution(g, taps, neighbours, !adjoint)
-                });
-            }
-        }
-        let node = x.node();
+        let (node, x) = (x.node(), x.into_primitive());
         // Taps and neighbours are data, not variables.
         let (taps, neighbours) = (taps.into_primitive(), neighbours.into_primitive());
-        let y = B::brick_convolution(
-            x.into_primitive(),
-            taps.clone(),
-            neighbours.clone(),
-            adjoint,
-        );
-        match Bricks.prepare::<C>([node]).compute_bound().stateful() {
-            OpsKind::Tracked(prepared) => prepared.finish((taps, neighbours, adjoint), y),
-            OpsKind::UnTracked(prepared) => prepared.finish(y),
-        }
+        let y = B::brick_convolution(x, taps.clone(), neighbours.clone(), adjoint);
+        let to_x = move |g| B::brick_convolution(g, taps.clone(), neighbours.clone(), !adjoint);
+        on_tape::<B, C, 1>([node], y, [Pullback::new(to_x)])
     }
 
     fn tabulated(
@@ -250,29 +165,14 @@ impl<B: Backend + GridOps, C: CheckpointStrategy> GridOps for Autodiff<B, C> {
         range: TableRange,
         order: usize,
     ) -> FloatTensor<Self> {
-        #[derive(Debug)]
-        struct Tabulated;
-        impl<B: Backend + GridOps> Backward<B, 1> for Tabulated {
-            type State = (FloatTensor<B>, FloatTensor<B>, TableRange, usize);
-            fn backward(
-                self,
-                ops: Ops<Self::State, 1>,
-                grads: &mut Gradients,
-                _checkpointer: &mut Checkpointer,
-            ) {
-                let (w, table, range, order) = ops.state;
-                unary::<B, _>(ops.parents, ops.node, grads, |g| {
-                    B::float_mul(g, B::tabulated(w, table, range, order + 1))
-                });
-            }
-        }
         let node = w.node();
         // The table is data, not a variable: no gradient flows into it.
         let (w, table) = (w.into_primitive(), table.into_primitive());
         let y = B::tabulated(w.clone(), table.clone(), range, order);
-        match Tabulated.prepare::<C>([node]).compute_bound().stateful() {
-            OpsKind::Tracked(prepared) => prepared.finish((w, table, range, order), y),
-            OpsKind::UnTracked(prepared) => prepared.finish(y),
-        }
+        let to_w = move |g| {
+            let slope = B::tabulated(w.clone(), table.clone(), range, order + 1);
+            B::float_mul(g, slope)
+        };
+        on_tape::<B, C, 1>([node], y, [Pullback::new(to_w)])
     }
 }

@@ -30,37 +30,24 @@ impl Rule for Tabulated {
 }
 
 fn register<B: BackendIr + GridOps>(registry: &mut CustomOpRegistry<B>) {
-    registry.register(CONVOLUTION, |handles, ir, _| {
-        let x = handles.get_float_tensor::<B>(&ir.inputs[0]);
-        let kernel = handles.get_float_tensor::<B>(&ir.inputs[1]);
-        let adjoint = ir.scalars[0] == ScalarIr::Bool(true);
-        let y = B::circular_convolution(x, kernel, adjoint);
-        handles.register_float_tensor::<B>(&ir.outputs[0].id, y);
+    registry.register_function(CONVOLUTION, |[x, kernel], scalars| {
+        B::circular_convolution(x, kernel, scalars[0] == ScalarIr::Bool(true))
     });
-    registry.register(CORRELATION, |handles, ir, _| {
-        let x = handles.get_float_tensor::<B>(&ir.inputs[0]);
-        let g = handles.get_float_tensor::<B>(&ir.inputs[1]);
-        let [width, axes] = [0, 1].map(|i| ir.scalars[i].elem::<u64>() as usize);
-        let y = B::kernel_correlation(x, g, width, axes);
-        handles.register_float_tensor::<B>(&ir.outputs[0].id, y);
+    registry.register_function(CORRELATION, |[x, g], scalars| {
+        let [width, axes] = [0, 1].map(|i| scalars[i].elem::<u64>() as usize);
+        B::kernel_correlation(x, g, width, axes)
     });
-    registry.register(BRICKS, |handles, ir, _| {
-        let [x, taps, neighbours] = [0, 1, 2].map(|i| handles.get_float_tensor::<B>(&ir.inputs[i]));
-        let adjoint = ir.scalars[0] == ScalarIr::Bool(true);
-        let y = B::brick_convolution(x, taps, neighbours, adjoint);
-        handles.register_float_tensor::<B>(&ir.outputs[0].id, y);
+    registry.register_function(BRICKS, |[x, taps, neighbours], scalars| {
+        B::brick_convolution(x, taps, neighbours, scalars[0] == ScalarIr::Bool(true))
     });
-    registry.register(TABULATED, |handles, ir, _| {
-        let w = handles.get_float_tensor::<B>(&ir.inputs[0]);
-        let table = handles.get_float_tensor::<B>(&ir.inputs[1]);
-        let order = ir.scalars[0].elem::<u64>() as usize;
+    registry.register_function(TABULATED, |[w, table], scalars| {
+        let order = scalars[0].elem::<u64>() as usize;
         let range = TableRange {
-            low: ir.scalars[1].elem(),
-            high: ir.scalars[2].elem(),
-            cells: ir.scalars[3].elem::<u64>() as usize,
+            low: scalars[1].elem(),
+            high: scalars[2].elem(),
+            cells: scalars[3].elem::<u64>() as usize,
         };
-        let y = B::tabulated(w, table, range, order);
-        handles.register_float_tensor::<B>(&ir.outputs[0].id, y);
+        B::tabulated(w, table, range, order)
     });
 }
 

@@ -67,12 +67,6 @@ impl Curve {
         self.placed(self.series().at(alpha))
     }
 
-    /// Curvatures at [`Curve::points`], positive where the curve is convex.
-    pub fn curvatures(&self) -> Vec<f64> {
-        let period: Vec<f64> = self.curvatures_of_period().collect();
-        period.repeat(self.grid.folds)
-    }
-
     fn curvatures_of_period(&self) -> impl Iterator<Item = f64> {
         let derivative = self.grid.values(&self.grid.derivative(&self.angle));
         derivative.into_iter().map(|a| (1.0 + a) / self.scale)

@@ -1,5 +1,7 @@
 //! Everything that can go wrong in this crate.
 
+#![allow(missing_docs, reason = "messages and names say it")]
+
 /// Errors of shapes, flows and equilibria.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -7,11 +9,8 @@ pub enum Error {
     /// A parameter out of its range.
     #[error("{name} must be {requirement}, got {value}")]
     InvalidParameter {
-        /// What it is.
         name: &'static str,
-        /// What it must be.
         requirement: &'static str,
-        /// What it was.
         value: f64,
     },
     /// A curve that is no simple closed curve.
@@ -27,7 +26,6 @@ pub enum Error {
         "no self-similar solution found at a corner of exterior angle {angle:.4}; the last Newton step was {residual:.1e}"
     )]
     Corner {
-        /// Exterior angle.
         angle: f64,
         /// Largest entry of the last Newton step.
         residual: f64,
@@ -36,38 +34,20 @@ pub enum Error {
     #[error(
         "time {time:.3e} is before {first:.3e}, when the polygon starts with rounded corners; take a smaller rounding"
     )]
-    TooEarly {
-        /// Requested time.
-        time: f64,
-        /// First time that can be had.
-        first: f64,
-    },
+    TooEarly { time: f64, first: f64 },
     /// Requested times do not increase.
     #[error(
         "times must be finite, not negative and in increasing order, got {time} after {before}"
     )]
-    TimesNotIncreasing {
-        /// The offending time.
-        time: f64,
-        /// The one before.
-        before: f64,
-    },
+    TimesNotIncreasing { time: f64, before: f64 },
     /// The curve cannot be resolved any more, as before a singularity.
     #[error(
         "{points} points do not resolve the curve at time {time:.6e}; the flow may be singular there, or the start needs more points"
     )]
-    Unresolved {
-        /// Points of the curve.
-        points: usize,
-        /// Time reached.
-        time: f64,
-    },
+    Unresolved { points: usize, time: f64 },
     /// The time steps became too short.
     #[error("no time step meets the tolerance at time {time:.6e}; the flow may be singular there")]
-    StepTooShort {
-        /// Time reached.
-        time: f64,
-    },
+    StepTooShort { time: f64 },
     /// A surface of revolution needs a profile on one side of the axis or symmetric about it.
     #[error(
         "a surface of revolution needs a curve with positive x, or one symmetric about the y axis that starts on it"
@@ -80,9 +60,7 @@ pub enum Error {
     NoEquilibrium {
         /// Reduced volume or isoperimetric quotient.
         ratio: f64,
-        /// Largest residual.
         residual: f64,
-        /// Newton steps made.
         iterations: usize,
     },
 }

@@ -1,5 +1,7 @@
 //! Everything that can go wrong in this crate.
 
+#![allow(missing_docs, reason = "messages and names say it")]
+
 /// Errors of scenes and pictures, each with the numbers needed to act on it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -19,11 +21,8 @@ pub enum Error {
     /// A number is outside its allowed range.
     #[error("{name} is {value}, but must be {requirement}")]
     Parameter {
-        /// What the number is.
         name: &'static str,
-        /// The number.
         value: f64,
-        /// The condition it violates.
         requirement: &'static str,
     },
     /// The camera is to be fitted to a surface that is not there.
@@ -37,27 +36,16 @@ pub enum Error {
     TubePoints {
         /// Which tube, from 0.
         index: usize,
-        /// Its points.
         points: usize,
     },
     /// A picture without pixels, or with more than can be meant.
     #[error("a picture of {width} x {height} pixels cannot be drawn; use 1 to {limit} a side")]
-    PictureSize {
-        /// Pixels in a row.
-        width: u32,
-        /// Rows.
-        height: u32,
-        /// Largest allowed side.
-        limit: u32,
-    },
+    PictureSize { width: u32, height: u32, limit: u32 },
     /// The number of pixels is not that of the picture.
     #[error("{width} x {height} pixels were announced, but {actual} given")]
     PixelCount {
-        /// Pixels in a row.
         width: u32,
-        /// Rows.
         height: u32,
-        /// Pixels given.
         actual: usize,
     },
     /// An animation without pictures.
@@ -71,9 +59,7 @@ pub enum Error {
     FrameSize {
         /// Which picture, from 0.
         index: usize,
-        /// Its width and height.
         size: [u32; 2],
-        /// Those of the first.
         first: [u32; 2],
     },
 }

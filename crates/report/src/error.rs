@@ -1,5 +1,7 @@
 //! The one error type of the crate.
 
+#![allow(missing_docs, reason = "messages and names say it")]
+
 /// What can go wrong while describing, drawing or writing results.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -8,10 +10,7 @@ pub enum Error {
     #[error(
         "nothing to draw in {chart:?}: it has no finite point (positive on a logarithmic axis) and no pixel"
     )]
-    Empty {
-        /// Title or caption of the panel.
-        chart: String,
-    },
+    Empty { chart: String },
     /// A figure without panels.
     #[error("the figure has no panels: add one with `Figure::with_panel`")]
     NoPanels,
@@ -20,24 +19,13 @@ pub enum Error {
         "the range [{low}, {high}] of axis {axis:?} must be finite, increasing by more than \
          rounding, and positive on a logarithmic scale"
     )]
-    Range {
-        /// Label of the axis.
-        axis: String,
-        /// Lower end as given.
-        low: f64,
-        /// Upper end as given.
-        high: f64,
-    },
+    Range { axis: String, low: f64, high: f64 },
     /// An array whose length does not match its shape.
     #[error("the array of {chart:?} has {found} values where its shape {shape:?} needs {expected}")]
     ArrayShape {
-        /// Title or caption of the panel.
         chart: String,
-        /// Shape as given.
         shape: [usize; 2],
-        /// Product of the shape.
         expected: usize,
-        /// Length of the array.
         found: usize,
     },
     /// A figure size that leaves no room to draw, or more pixels than can be meant.
@@ -53,37 +41,22 @@ pub enum Error {
     },
     /// A metric or table cell that is NaN or infinite.
     #[error("{what} is {value}, which is not a finite number")]
-    NotFinite {
-        /// Name of the metric or column, with the row where there is one.
-        what: String,
-        /// The offending value.
-        value: f64,
-    },
+    NotFinite { what: String, value: f64 },
     /// A metric name outside the allowed grammar.
     #[error(
         "metric name {name:?} is not allowed: use lower-case words of letters, digits and '_', \
          joined by '.' and beginning with a letter, such as \"circle.error_l2\""
     )]
-    MetricName {
-        /// The name as given.
-        name: String,
-    },
+    MetricName { name: String },
     /// A metric inserted twice.
     #[error("metric {name:?} is already set to {value}")]
-    DuplicateMetric {
-        /// The name as given.
-        name: String,
-        /// The value it already has.
-        value: String,
-    },
+    DuplicateMetric { name: String, value: String },
     /// A table row with the wrong number of cells.
     #[error("row {row} of the table has {found} cells where there are {expected} columns")]
     RowLength {
         /// Index of the row, from 0.
         row: usize,
-        /// Number of columns.
         expected: usize,
-        /// Number of cells given.
         found: usize,
     },
     /// A file or folder that could not be written; what was there before is untouched.
@@ -91,31 +64,22 @@ pub enum Error {
     File(#[from] files::Error),
     /// A file name that is not a single plain component.
     #[error("file name {name:?} is not allowed: give one plain name without separators")]
-    FileName {
-        /// The name as given.
-        name: String,
-    },
+    FileName { name: String },
     /// A value that cannot be turned into JSON, or JSON that is not what it should be.
     #[error("{what} is not valid as JSON: {source}")]
     Json {
-        /// What was being written or read.
         what: String,
-        /// The cause.
         source: serde_json::Error,
     },
     /// A record that cannot be turned into a CSV row.
     #[error("cannot write the records as CSV: {source}")]
     Csv {
-        /// The cause.
         #[from]
         source: csv::Error,
     },
     /// The drawing backend refused an operation.
     #[error("cannot draw the figure: {cause}")]
-    Draw {
-        /// What the backend said.
-        cause: String,
-    },
+    Draw { cause: String },
 }
 
 impl Error {

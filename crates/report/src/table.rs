@@ -2,9 +2,6 @@
 
 use std::path::PathBuf;
 
-use serde::Serialize;
-use serde_json::{Map, Value, json};
-
 use crate::axis::power_of_ten;
 use crate::data::{rounded, shortest};
 use crate::error::{Error, Result};
@@ -22,8 +19,7 @@ pub enum Format {
 }
 
 /// One cell.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(untagged)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Cell {
     /// Text, whatever the format of the column.
     Text(String),
@@ -181,19 +177,6 @@ impl Table {
             writer.write_record(row.iter().map(Cell::raw))?;
         }
         crate::data::finished(writer)
-    }
-
-    /// The table as a JSON array with an object for each row, numbers with all their digits, `null` for what is missing.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Json`] never, for finite numbers.
-    pub fn to_json(&self) -> Result<String> {
-        let object = |row: &Vec<Cell>| -> Map<String, Value> {
-            let names = self.columns().map(str::to_owned);
-            names.zip(row.iter().map(|cell| json!(cell))).collect()
-        };
-        crate::data::to_json(&self.rows.iter().map(object).collect::<Vec<_>>())
     }
 
     /// The table as Markdown with padded columns, numbers as their columns say.

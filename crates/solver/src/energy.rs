@@ -267,16 +267,6 @@ impl<const D: usize> MinimizingMovement<D> {
         self.linearization.forget();
     }
 
-    /// `c = tau / tautilde^2`.
-    pub fn stiffness(&self) -> f64 {
-        self.stiffness
-    }
-
-    /// The traced program, for statistics.
-    pub fn program(&self) -> &linearize::Program {
-        self.linearization.program()
-    }
-
     fn check(&self) -> Result<(), Error> {
         match self.step.failure() {
             Some(failure) => Err(Error::Step(failure)),

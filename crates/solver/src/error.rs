@@ -1,3 +1,5 @@
+#![allow(missing_docs, reason = "messages and names say it")]
+
 use thiserror::Error as ThisError;
 
 /// Why a step of mean curvature flow failed.
@@ -13,7 +15,6 @@ pub enum Error {
     NonFinite {
         /// Time step, counted from 1 (0: the initial data).
         step: usize,
-        /// Which quantity.
         field: &'static str,
     },
     /// The minimization gave up before its stop test held.
@@ -24,11 +25,9 @@ pub enum Error {
     NotConverged {
         /// Time step, counted from 1.
         step: usize,
-        /// Why it stopped.
         reason: crate::Exit,
         /// Estimated distance to the minimizer relative to the motion.
         estimate: f64,
-        /// What was asked for.
         tolerance: f64,
     },
     /// Perimeter or volume could not be brought to its target in a step.
@@ -38,11 +37,8 @@ pub enum Error {
     NotHeld {
         /// Time step, counted from 1.
         step: usize,
-        /// Which measure.
         measure: &'static str,
-        /// Its value before the step.
         value: f64,
-        /// What was asked for.
         target: f64,
     },
     /// No set of a volume has so small a perimeter.
@@ -51,31 +47,19 @@ pub enum Error {
          has to be at least {least}"
     )]
     PerimeterTooSmall {
-        /// The target of the perimeter.
         perimeter: f64,
-        /// The target of the volume.
         volume: f64,
-        /// The least perimeter.
         least: f64,
-        /// The volume over that of the ball of the same perimeter.
         reduced_volume: f64,
     },
     /// A volume that the box does not hold.
     #[error("a volume of {volume} does not fit a box of volume {box_volume}")]
-    VolumeTooLarge {
-        /// The target of the volume.
-        volume: f64,
-        /// The volume of the box.
-        box_volume: f64,
-    },
+    VolumeTooLarge { volume: f64, box_volume: f64 },
     /// A parameter out of range.
     #[error("{name} = {value:e} is out of range: {expected}")]
     Parameter {
-        /// Which parameter.
         name: &'static str,
-        /// Its value.
         value: f64,
-        /// The range.
         expected: &'static str,
     },
     /// A region that does not fit the grid.
@@ -83,11 +67,8 @@ pub enum Error {
         "a region of {marked} of {marks} nodes does not fit a grid of {nodes} nodes; mark at least one node, and give a mark for each"
     )]
     Region {
-        /// Marks given.
         marks: usize,
-        /// Nodes of the grid.
         nodes: usize,
-        /// Marks that are set.
         marked: usize,
     },
     /// A phase field without an interface on active bricks, which follow one.
@@ -97,10 +78,7 @@ pub enum Error {
     NoInterface,
     /// Something that flows on active bricks cannot do.
     #[error("{what} need the whole grid; store that instead of active bricks")]
-    NeedsGrid {
-        /// What was asked for.
-        what: &'static str,
-    },
+    NeedsGrid { what: &'static str },
     /// The step of mean curvature flow failed.
     #[error("the step of mean curvature flow failed: {0}")]
     Step(StepFailure),

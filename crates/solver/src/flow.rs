@@ -457,11 +457,6 @@ impl<const D: usize> WillmoreFlow<D> {
         self.step
     }
 
-    /// The energy of the steps.
-    pub fn energy(&self) -> &MinimizingMovement<D> {
-        &self.energy
-    }
-
     /// Whether the interface moved by less than half its width, `4 eps/3` in root mean square, since `previous`. After longer
     /// moves an extrapolation can end in the valley of another minimizer, even close a hole.
     fn moved_little(&self, previous: &Tensor<D>) -> Result<bool, Error> {

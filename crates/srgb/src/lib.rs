@@ -20,8 +20,6 @@ impl Rgb {
     pub const GREEN: Self = Self(0, 158, 115);
     /// Black.
     pub const BLACK: Self = Self(0, 0, 0);
-    /// White.
-    pub const WHITE: Self = Self(255, 255, 255);
 
     /// Linear intensities in `[0, 1]`.
     pub fn linear(self) -> [f32; 3] {

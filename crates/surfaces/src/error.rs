@@ -1,5 +1,7 @@
 //! Everything that can go wrong in this crate.
 
+#![allow(missing_docs, reason = "messages and names say it")]
+
 use std::path::PathBuf;
 
 use crate::read::error::FormatError;
@@ -16,18 +18,10 @@ pub enum Error {
         "{path} has no known extension; meshes are read and written as .obj, .ply or .stl",
         path = path.display()
     )]
-    UnknownFormat {
-        /// The file.
-        path: PathBuf,
-    },
+    UnknownFormat { path: PathBuf },
     /// A file is no usable mesh.
     #[error("{path} cannot be read as a mesh: {problem}", path = path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        problem: FormatError,
-    },
+    Format { path: PathBuf, problem: FormatError },
     /// Grids, fields and the operating system.
     #[error(transparent)]
     Geometry(#[from] geometry::Error),
@@ -42,7 +36,6 @@ pub enum Error {
     NonFiniteVertex {
         /// The first such vertex.
         vertex: usize,
-        /// Its coordinates.
         position: [f64; 3],
         /// Largest magnitude that the format holds.
         limit: f64,
@@ -53,11 +46,8 @@ pub enum Error {
          every vertex needs one, or the mesh none"
     )]
     Normals {
-        /// Number of normals.
         normals: usize,
-        /// How many are finite.
         finite: usize,
-        /// Number of vertices.
         vertices: usize,
     },
     /// A face refers to a vertex that does not exist.
@@ -65,17 +55,13 @@ pub enum Error {
     IndexOutOfRange {
         /// The first such face.
         face: usize,
-        /// Its index.
         vertex: u32,
-        /// Number of vertices.
         vertices: usize,
     },
     /// More vertices or faces than 32-bit indices can count.
     #[error("{count} {elements} are more than 32-bit indices can count; use a coarser mesh")]
     TooLarge {
-        /// Vertices or faces.
         elements: &'static str,
-        /// How many.
         count: usize,
     },
     /// Edges with one face only.
@@ -84,13 +70,9 @@ pub enum Error {
          face {face}; close the holes"
     )]
     Open {
-        /// Number of such edges.
         edges: usize,
-        /// Face of the first one.
         face: usize,
-        /// Its start.
         from: [f64; 3],
-        /// Its end.
         to: [f64; 3],
     },
     /// Edges with more than two faces.
@@ -99,15 +81,10 @@ pub enum Error {
          {from:?} - {to:?} of face {face} and {others} others; remove the inner or doubled sheets"
     )]
     NonManifold {
-        /// Number of such edges.
         edges: usize,
-        /// One face of the first one.
         face: usize,
-        /// Number of its other faces.
         others: usize,
-        /// Its start.
         from: [f64; 3],
-        /// Its end.
         to: [f64; 3],
     },
     /// Edges that both their faces run through in the same direction.
@@ -116,15 +93,10 @@ pub enum Error {
          such as {from:?} - {to:?} by the faces {first} and {second}; orient all faces alike"
     )]
     MixedOrientation {
-        /// Number of such edges.
         edges: usize,
-        /// One face of the first one.
         first: usize,
-        /// Its other face.
         second: usize,
-        /// Its start.
         from: [f64; 3],
-        /// Its end.
         to: [f64; 3],
     },
     /// Faces without area, whose normal is undefined.
@@ -133,11 +105,8 @@ pub enum Error {
          merge their vertices or flip their longest edges"
     )]
     NoArea {
-        /// Number of such faces.
         faces: usize,
-        /// The first one.
         face: usize,
-        /// Its corners.
         corners: [[f64; 3]; 3],
     },
     /// A closed surface that encloses nothing.
@@ -145,12 +114,7 @@ pub enum Error {
         "the enclosed volume {volume:e} is zero up to rounding (area {area:e}), so that inside \
          and outside cannot be told apart"
     )]
-    NoVolume {
-        /// Signed volume.
-        volume: f64,
-        /// Area.
-        area: f64,
-    },
+    NoVolume { volume: f64, area: f64 },
     /// A component whose orientation does not agree with where it lies.
     #[error(
         "the component with face {face} is oriented {orientation}, but {enclosing} other \
@@ -158,7 +122,6 @@ pub enum Error {
          inwards"
     )]
     Nesting {
-        /// First face of the component.
         face: usize,
         /// `outwards` or `inwards`.
         orientation: &'static str,
@@ -170,11 +133,8 @@ pub enum Error {
     /// A number is outside the range in which it makes sense.
     #[error("{name} = {value:?} is not allowed: it must be {requirement}")]
     InvalidParameter {
-        /// What the number is.
         name: &'static str,
-        /// The number.
         value: f64,
-        /// The condition it violates.
         requirement: &'static str,
     },
 }

@@ -1,5 +1,7 @@
 //! Everything that can go wrong in this crate.
 
+#![allow(missing_docs, reason = "messages and names say it")]
+
 use std::path::PathBuf;
 
 /// Errors of volumes, their files and what is taken of them.
@@ -9,40 +11,22 @@ pub enum Error {
     /// The operating system refused.
     #[error("could not {action} {path}", path = path.display())]
     Io {
-        /// What was attempted.
         action: &'static str,
-        /// On which file.
         path: PathBuf,
-        /// Why it failed.
         source: std::io::Error,
     },
     /// A file is no usable volume.
     #[error("{path} cannot be read as a volume: {problem}", path = path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        problem: FormatError,
-    },
+    Format { path: PathBuf, problem: FormatError },
     /// The number of values is not that of the voxels, or one of them is no number, or they have no place in space.
     #[error("no volume: {0}")]
     Volume(FormatError),
     /// No voxel is of the body.
     #[error("no voxel is {what}: the values range from {low} to {high}")]
-    NothingInside {
-        /// What was asked for.
-        what: String,
-        /// The least value.
-        low: f64,
-        /// The largest value.
-        high: f64,
-    },
+    NothingInside { what: String, low: f64, high: f64 },
     /// What is to be written has an extension of another format.
     #[error("{path} must end in .nii or .nii.gz: volumes are written as NIfTI", path = path.display())]
-    UnknownFormat {
-        /// The file.
-        path: PathBuf,
-    },
+    UnknownFormat { path: PathBuf },
     /// Of the surface.
     #[error(transparent)]
     Surfaces(#[from] surfaces::Error),
@@ -56,56 +40,36 @@ pub enum FormatError {
     #[error(
         "it begins with the bytes {start:02x?}, and is none of NIfTI (.nii, .nii.gz), MRC (.mrc, .map) and stacks of TIFF images"
     )]
-    Unknown {
-        /// Up to eight bytes.
-        start: Vec<u8>,
-    },
+    Unknown { start: Vec<u8> },
     /// An entry of the header is not understood.
     #[error("{entry} of the {format} header is {value}; it must be {requirement}")]
     Header {
-        /// Name of the format.
         format: &'static str,
-        /// Name of the entry.
         entry: &'static str,
-        /// What it is.
         value: String,
-        /// What it may be.
         requirement: &'static str,
     },
     /// More or fewer bytes than the header announces.
     #[error("it should have {expected} bytes by its header, and has {found}{}", if *longer { " or more" } else { "" })]
     Length {
-        /// Bytes by the header.
         expected: u64,
-        /// Bytes that there are.
         found: u64,
-        /// Whether the rest was not counted.
         longer: bool,
     },
     /// No voxels, or more than are accepted.
     #[error("it has {}, and may have up to {limit} bytes of voxels, with two along each axis at least", shown(*size, *bytes))]
     Size {
-        /// Voxels along the axes.
         size: [u64; 3],
-        /// Bytes of one of them.
         bytes: u64,
-        /// Most bytes of all.
         limit: u64,
     },
     /// A value is NaN or infinite.
     #[error("voxel {index:?} has the value {value}; all values must be finite")]
-    NonFinite {
-        /// Its place, from zero.
-        index: [usize; 3],
-        /// Its value.
-        value: f64,
-    },
+    NonFinite { index: [usize; 3], value: f64 },
     /// What the library of a format says.
     #[error("damaged, truncated or unusual {format}: {message}")]
     Damaged {
-        /// Name of the format.
         format: &'static str,
-        /// In one line, shortened.
         message: String,
     },
 }

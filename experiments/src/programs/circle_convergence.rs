@@ -9,6 +9,8 @@ use crate::study::{Study, StudyOptions, Variant};
 const PROGRAM: &str = "circle_convergence";
 /// Steps at which tables and summaries give the error.
 const SHOWN_STEPS: [usize; 5] = [1, 8, 16, 32, 64];
+/// Folder of finished circles, until all are finished.
+const FINISHED: &str = "partial";
 
 /// Mean curvature flow by all methods and Willmore flow by the learned operator (with --full by all) of 30 circles, eps = 2^-6, 64
 /// steps of 2^-14: L2 distance to the exact solution over time, mean over the radii 0.05 pi + 0.15 pi i/30.
@@ -67,22 +69,12 @@ pub fn program(options: &Options) -> Result<(), Error> {
         "networks": study.checksums(),
     });
     let mut session = Session::open(PROGRAM, run, device, parameters)?;
-    let finished = session.output.subfolder("partial")?;
     let mut ensembles = Vec::new();
     for planned in &study.plan {
         let Variant { flow, n, .. } = planned.0;
         let title = format!("{}, {}, n = {n}", flow.title(), planned.0.label());
         let ensemble = session.phase(title, |stage| {
-            stage.bar.set_length(count as u64);
-            let folder = finished.as_path();
-            Ensemble::run(
-                planned,
-                (count, steps),
-                None,
-                stage.device,
-                folder,
-                &stage.bar,
-            )
+            Ensemble::run(planned, (count, steps), None, FINISHED, stage)
         })?;
         ensembles.push(ensemble);
     }
@@ -95,7 +87,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
     report.data(&session.output)?;
     session.sheet(report.sheet(), "errors")?;
     report.metrics(&mut session)?;
-    remove_folder(&finished)?;
+    remove_folder(&session.output.subfolder(FINISHED)?)?;
     session.finish("Mean L2 distance to the exact solution")
 }
 

@@ -2,16 +2,13 @@
 
 use std::time::Duration;
 
-use crate::networks::{NetworkOptions, convergence_network};
+use crate::networks::convergence_network;
 use crate::prelude::*;
 use crate::storages::{self, StorageOptions, Stored};
 use crate::timing::{self, Numbers, Timed};
 use crate::{products, surfaces};
-use geometry::SignedDistanceExt;
-use geometry::measure::l2_distance;
-use geometry::shapes::{Ball, Capsule, Cuboid};
+use geometry::shapes::Capsule;
 use operators::memory;
-use solver::StepRecord;
 
 const PROGRAM: &str = "performance";
 /// Steps of a comparison with a smaller tolerance, and how much smaller.

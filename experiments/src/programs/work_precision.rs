@@ -261,17 +261,7 @@ fn circles(session: &mut Session<'_>, quick: bool) -> Result<(), Error> {
     let controlled = TimeSteps::controlled(ErrorControl::default());
     for (name, time_steps) in [("euler1", None), ("controlled", Some(controlled))] {
         let ensemble = session.phase(format!("circles: {name}"), |stage| {
-            let folder = stage.output.subfolder("fields")?;
-            stage.bar.set_length(count as u64);
-            let folder = folder.as_path();
-            Ensemble::run(
-                &planned,
-                (count, steps),
-                time_steps,
-                stage.device,
-                folder,
-                &stage.bar,
-            )
+            Ensemble::run(&planned, (count, steps), time_steps, "fields", stage)
         })?;
         let records = (ensemble.circles.iter()).flat_map(|circle| &circle.trajectory.records);
         let hvp: f64 = records.filter_map(Record::hvp).sum();

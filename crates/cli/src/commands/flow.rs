@@ -156,7 +156,7 @@ impl FlowOptions {
         let target = |wanted: Option<SizeTarget>, from: f64, of_input: f64| {
             wanted.map(|wanted| match wanted {
                 SizeTarget::Keep => Target::keep(of_input),
-                other => Target {
+                other @ SizeTarget::To(_) => Target {
                     from,
                     to: other.of(of_input),
                     over: ramp,
@@ -347,8 +347,8 @@ impl<C: FlowCommand> Job<C> {
                 };
                 let mut control = ErrorControl::default();
                 match options.as_ref().and_then(|options| options.tolerance) {
-                    Some(Tolerance::Length(length)) => control.length = Some(length),
-                    Some(Tolerance::Percent(percent)) => control.relative = percent / 100.0,
+                    Some(Amount::Value(length)) => control.length = Some(length),
+                    Some(Amount::Percent(percent)) => control.relative = percent / 100.0,
                     None => (),
                 }
                 // On coarse grids the usual first step is long against the shape.

@@ -3,7 +3,7 @@
 use engine::Flow;
 
 use super::flow::{FlowCommand, Shared};
-use crate::cli::{McfMethod, McfOptions, SchemeOptions};
+use crate::cli::{McfOptions, SchemeOptions};
 use crate::prelude::*;
 
 impl FlowCommand for McfOptions {
@@ -24,11 +24,7 @@ impl FlowCommand for McfOptions {
     }
 
     fn method(&self) -> Method {
-        match self.method {
-            McfMethod::Network => Method::Hybrid,
-            McfMethod::FeImplicit => Method::FeImplicit,
-            McfMethod::FeSemi => Method::FeSemi,
-        }
+        self.method
     }
 
     fn check(&mut self) -> Result<(), Error> {
@@ -36,7 +32,7 @@ impl FlowCommand for McfOptions {
             scheme, network, ..
         } = &self.scheme;
         let chosen = network.is_some() || *scheme != Scheme::Accurate;
-        if chosen && self.method != McfMethod::Network {
+        if chosen && !self.method.is_learned() {
             return Err(Error::options(
                 "--network and --scheme have no meaning for finite elements: leave them out, or choose --method network",
             ));

@@ -1,5 +1,7 @@
 //! What can be wrong with a file.
 
+#![allow(missing_docs, reason = "messages and names say it")]
+
 /// What is wrong with an NPY file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -9,26 +11,14 @@ pub enum NpyError {
     NotNpy,
     /// A version of the format that does not exist yet.
     #[error("NPY format {major}.{minor} is not supported; use 1.0, 2.0 or 3.0")]
-    Version {
-        /// Major version.
-        major: u8,
-        /// Minor version.
-        minor: u8,
-    },
+    Version { major: u8, minor: u8 },
     /// The header is longer than that of any array.
     #[error("the header has {length} bytes, and may have {limit}")]
-    HeaderLength {
-        /// Its bytes.
-        length: usize,
-        /// How many it may have.
-        limit: usize,
-    },
+    HeaderLength { length: usize, limit: usize },
     /// The header is not the dictionary that the format prescribes.
     #[error("the header is malformed at byte {position} of its text: expected {expected}")]
     Header {
-        /// Where parsing stopped.
         position: usize,
-        /// What should have come.
         expected: &'static str,
     },
     /// The element type is not a floating-point number of 4 or 8 bytes.
@@ -39,32 +29,18 @@ pub enum NpyError {
     },
     /// The array has the wrong number of axes.
     #[error("the array has shape {shape:?}, but {expected} axes are needed")]
-    Rank {
-        /// Axes needed.
-        expected: usize,
-        /// Shape found.
-        shape: Vec<u64>,
-    },
+    Rank { expected: usize, shape: Vec<u64> },
     /// The sides of the array differ.
     #[error("the array has shape {shape:?}, but all its sides must be equal")]
-    NotCubical {
-        /// Shape found.
-        shape: Vec<u64>,
-    },
+    NotCubical { shape: Vec<u64> },
     /// The file ends early, or goes on after the data.
     #[error("the file has {found} bytes where {expected} are needed: truncated, or not one array")]
     Length {
         /// Bytes according to the header; saturates at `u64::MAX`.
         expected: u64,
-        /// Bytes found.
         found: u64,
     },
     /// A value is NaN or infinite.
     #[error("element {index} (row-major) is {value}; all values must be finite")]
-    NonFinite {
-        /// Row-major index of the first one.
-        index: usize,
-        /// Its value.
-        value: f64,
-    },
+    NonFinite { index: usize, value: f64 },
 }

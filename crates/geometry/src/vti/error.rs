@@ -1,15 +1,14 @@
 //! What can be wrong with a file.
 
+#![allow(missing_docs, reason = "messages and names say it")]
+
 /// What is wrong with a VTI file. Texts from the file are shortened.
 #[derive(Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VtiError {
     /// The XML cannot be parsed.
     #[error("it is not well-formed XML: {reason}")]
-    Xml {
-        /// What the parser said.
-        reason: String,
-    },
+    Xml { reason: String },
     /// More elements, or more attributes, than such files have.
     #[error(
         "it has {count} elements or attributes, and may have {limit}: not a file of VTK image data"
@@ -17,7 +16,6 @@ pub enum VtiError {
     TooManyElements {
         /// How many, counted by the characters `<` and `=`.
         count: usize,
-        /// How many it may have.
         limit: usize,
     },
     /// More values than are accepted.
@@ -26,37 +24,25 @@ pub enum VtiError {
          fewer arrays at a time, without compression"
     )]
     TooManyValues {
-        /// Number of arrays.
         arrays: usize,
-        /// Values of an array.
         nodes: u64,
-        /// Values of all of them that are accepted.
         limit: u64,
     },
     /// An element is missing.
     #[error("there is no element {element}: not a file of VTK image data")]
-    NoElement {
-        /// The element.
-        element: &'static str,
-    },
+    NoElement { element: &'static str },
     /// An attribute is missing or has a value that is not understood.
     #[error("attribute {attribute} of {element} is {value:?}, but must be {requirement}")]
     Attribute {
-        /// The element.
         element: &'static str,
-        /// The attribute.
         attribute: &'static str,
         /// Its value; empty if it is missing.
         value: String,
-        /// What is understood.
         requirement: &'static str,
     },
     /// The image is in several pieces, or in none.
     #[error("the image has {count} pieces; save it as one file with one piece")]
-    Pieces {
-        /// Pieces found.
-        count: usize,
-    },
+    Pieces { count: usize },
     /// The piece is not the whole image.
     #[error("the piece spans nodes {piece}, but the image {whole}; save the whole image")]
     PartialPiece {
@@ -73,7 +59,6 @@ pub enum VtiError {
     NotCubical {
         /// Nodes along x, y and z.
         nodes: [u64; 3],
-        /// Dimension wanted.
         dimension: usize,
     },
     /// The nodes are not equally far apart in all directions.
@@ -88,40 +73,21 @@ pub enum VtiError {
     } else {
         ""
     })]
-    NoPointData {
-        /// Whether there are cell data.
-        cell_data: bool,
-    },
+    NoPointData { cell_data: bool },
     /// An array is not scalar.
     #[error("array {name:?} has {components} components; save scalar arrays alone")]
-    Components {
-        /// Its name.
-        name: String,
-        /// Its components, as written.
-        components: String,
-    },
+    Components { name: String, components: String },
     /// Two arrays have one name, or one has none.
     #[error("array name {name:?} is empty or used twice")]
-    Name {
-        /// The name.
-        name: String,
-    },
+    Name { name: String },
     /// The data of an array are shorter or longer than its nodes need.
     #[error("array {name:?} has {found} bytes (as text: numbers) where {expected} are needed")]
     Length {
-        /// Its name.
         name: String,
-        /// Needed.
         expected: u64,
-        /// Found, as far as can be told.
         found: u64,
     },
     /// The data of an array cannot be decoded.
     #[error("the data of array {name:?} cannot be decoded: {reason}")]
-    Data {
-        /// Its name.
-        name: String,
-        /// Where it fails.
-        reason: &'static str,
-    },
+    Data { name: String, reason: &'static str },
 }

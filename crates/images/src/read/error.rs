@@ -1,5 +1,7 @@
 //! What can be wrong with a file.
 
+#![allow(missing_docs, reason = "messages and names say it")]
+
 /// What is wrong with the contents of an image file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -9,35 +11,24 @@ pub enum FormatError {
     Empty,
     /// More bytes than an image can need.
     #[error("it has more than {limit} bytes; make the image smaller")]
-    TooLong {
-        /// Largest number of bytes.
-        limit: u64,
-    },
+    TooLong { limit: u64 },
     /// The first bytes are not those of a known format.
     #[error(
         "it begins with the bytes {start:02x?}, which is none of PNG, JPEG, WebP, GIF, TIFF and \
          BMP; save it as one of these"
     )]
-    UnknownFormat {
-        /// Up to eight bytes.
-        start: Vec<u8>,
-    },
+    UnknownFormat { start: Vec<u8> },
     /// No pixels, or more than are accepted.
     #[error("it has {width} x {height} pixels, and may have 1 to {limit}; make it smaller")]
     Size {
-        /// Pixels in a row.
         width: u32,
-        /// Rows.
         height: u32,
-        /// Largest number of pixels.
         limit: usize,
     },
     /// What the library of the format says.
     #[error("damaged, truncated or unusual {format}: {message}; try saving it as PNG")]
     Damaged {
-        /// Name of the format.
         format: &'static str,
-        /// In one line, shortened.
         message: String,
     },
 }

@@ -111,7 +111,7 @@ impl<'a> Problem<'a> {
         ridge: (Vec<f64>, Vec<f64>),
         device: &'a ComputeDevice,
     ) -> Self {
-        let (rows, orbits) = (samples.len(), sizes.len());
+        let (rows, orbits) = (samples.target.len(), sizes.len());
         // Relative to the identity map, so that ridges mean the same for every network.
         let scale = 1.0 / samples.identity_loss;
         let root: Vec<f64> = samples.weight.iter().map(|w| (w * scale).sqrt()).collect();

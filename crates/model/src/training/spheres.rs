@@ -222,16 +222,6 @@ impl BandSamples {
             identity_loss,
         }
     }
-
-    /// Number of rows.
-    pub fn len(&self) -> usize {
-        self.target.len()
-    }
-
-    /// Whether there are no rows.
-    pub fn is_empty(&self) -> bool {
-        self.target.is_empty()
-    }
 }
 
 fn sphere_area(dimension: usize, radius: f64) -> f64 {
@@ -312,7 +302,7 @@ mod tests {
             let mut rng = ChaCha8Rng::seed_from_u64(2);
             let orbits = Orbits::new(dimension, 17);
             let samples = BandSamples::draw(&data, &orbits, 200, 1, 0.5, &mut rng);
-            let rows = samples.len() / 2;
+            let rows = samples.target.len() / 2;
             let total: f64 = samples.weight[..rows].iter().sum();
             assert!((total - 1.0).abs() < 0.05, "{dimension}D: {total}");
             assert!((samples.target[rows] + samples.target[0]).abs() < f64::EPSILON);

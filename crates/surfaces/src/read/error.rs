@@ -1,5 +1,7 @@
 //! What can be wrong with a file.
 
+#![allow(missing_docs, reason = "messages and names say it")]
+
 /// What is wrong with the contents of a mesh file. Lines are counted from one, all else from zero.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -10,93 +12,56 @@ pub enum FormatError {
     /// A line of text is not what the format says.
     #[error("line {line} has {found:?} where {expected} is expected")]
     Line {
-        /// Number of the line.
         line: usize,
-        /// What stands there, shortened.
         found: String,
-        /// What should.
         expected: &'static str,
     },
     /// The text ends too early.
     #[error("the file ends in line {line} where {expected} is expected: it is truncated")]
-    EndOfText {
-        /// Number of the last line.
-        line: usize,
-        /// What should follow.
-        expected: &'static str,
-    },
+    EndOfText { line: usize, expected: &'static str },
     /// The number of bytes does not agree with the header.
     #[error(
         "the header announces {count} {elements}, which take at least {expected} bytes, but the \
          file has {found}: truncated, or another format"
     )]
     Length {
-        /// What is announced.
         elements: String,
-        /// How many.
         count: u64,
         /// Bytes of the whole file according to the header; saturates at `u64::MAX`.
         expected: u64,
-        /// Bytes found.
         found: u64,
     },
     /// A coordinate is NaN or infinite.
     #[error("vertex {vertex} has the coordinate {value}; all coordinates must be finite")]
-    NonFinite {
-        /// Number of the vertex.
-        vertex: usize,
-        /// The coordinate.
-        value: f64,
-    },
+    NonFinite { vertex: usize, value: f64 },
     /// A corner of a face does not exist.
     #[error(
         "face {face} refers to vertex {index}, but the file has {vertices} vertices, the first of \
          which is {first}"
     )]
     Index {
-        /// Number of the face in the file.
         face: usize,
-        /// The index as it stands in the file.
         index: i64,
-        /// Number of vertices.
         vertices: usize,
-        /// Index of the first vertex in this format.
         first: u8,
     },
     /// A face with fewer than three corners, or an STL facet with another number than three.
     #[error("face {face} has {corners} corners; {expected}")]
     Corners {
-        /// Number of the face in the file.
         face: usize,
-        /// Its corners.
         corners: usize,
-        /// How many it needs.
         expected: &'static str,
     },
     /// No faces.
     #[error("the file has {vertices} vertices and no faces: no mesh, or another format")]
-    NoFaces {
-        /// Vertices found.
-        vertices: usize,
-    },
+    NoFaces { vertices: usize },
     /// More vertices than 32-bit indices can count.
     #[error("{vertices} vertices are more than 32-bit indices can count; use a coarser mesh")]
-    TooManyVertices {
-        /// Vertices found.
-        vertices: usize,
-    },
+    TooManyVertices { vertices: usize },
     /// The header of a PLY file lacks something.
     #[error("the header does not declare {missing}")]
-    Undeclared {
-        /// What is missing.
-        missing: &'static str,
-    },
+    Undeclared { missing: &'static str },
     /// An element of a PLY file has no properties and hence no data.
     #[error("the header announces {count} elements {element:?} without properties")]
-    NoProperties {
-        /// Name of the element.
-        element: String,
-        /// How many.
-        count: usize,
-    },
+    NoProperties { element: String, count: usize },
 }
