@@ -311,9 +311,9 @@ fn figure(rows: &[Compared], marks: &[usize], axis: &Axis, work: fn(&Reached) ->
     shown.dedup();
     let curves = CURVES.iter().map(|sample| (sample.key, sample.title));
     let samples: Vec<_> = curves.chain([(SURFACE.key, SURFACE.title)]).collect();
-    let mut figure = Figure::new(format!("{TITLE}: work and precision"), samples.len());
-    for &mark in &shown {
-        for (key, title) in &samples {
+    let mut figure = Figure::new(format!("{TITLE}: work and precision"), shown.len());
+    for (key, title) in &samples {
+        for &mark in &shown {
             let here = |row: &&Compared| (row.sample, row.mark) == (*key, mark);
             let cells = CELLS.map(|n| if *key == SURFACE.key { n / 2 } else { n });
             let mut curves: Vec<Series> = Vec::new();
