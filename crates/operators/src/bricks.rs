@@ -143,6 +143,13 @@ impl<const D: usize> Bricks<D> {
         index
     }
 
+    /// The stored cell at a place on the grid, if a brick is active there.
+    pub fn cell(&self, index: [usize; D]) -> Option<usize> {
+        let number = self.number(index.map(|at| at / self.side))?;
+        let inside = flat(index.map(|at| at % self.side), self.side);
+        Some(number * self.volume() + inside)
+    }
+
     /// The cell beside a stored one.
     ///
     /// # Errors
@@ -203,7 +210,7 @@ impl<const D: usize> Bricks<D> {
     }
 
     /// The values of the active bricks, of those of the whole grid.
-    pub fn gather(&self, dense: &[f64]) -> Vec<f64> {
+    pub fn gather<T: Copy>(&self, dense: &[T]) -> Vec<T> {
         let mut values = Vec::with_capacity(self.len());
         self.each_row(|start, _| values.extend_from_slice(&dense[start..start + self.side]));
         values

@@ -17,7 +17,9 @@ use geometry::{Field, Grid};
 use operators::{ComputeDevice, HostUpdate, HostVectors, inner_product, retract, update_on_host};
 use serde::{Deserialize, Serialize};
 
+use crate::active::Active;
 use crate::cg::{CgExit, CgLimits, CgSolution, conjugate_gradients, dot};
+use crate::stored::Stored;
 use crate::{Error, Objective, Region};
 
 /// How exactly targets are met in the end, relative to them, in double precision.
@@ -130,6 +132,7 @@ impl Constraints {
 /// Perimeter and volume during one minimization.
 pub(crate) struct Held<'a, const D: usize> {
     grid: Grid<D>,
+    active: Option<&'a Active<D>>,
     eps: f64,
     targets: [Option<f64>; 2],
     region: Option<&'a Region<D>>,
@@ -147,7 +150,7 @@ pub(crate) struct Place<const D: usize> {
 
 /// The constraints at one phase field.
 pub(crate) struct Tangent<const D: usize> {
-    u: Field<D>,
+    u: Vec<f64>,
     sizes: Sizes<D>,
     parts: Vec<Part>,
 }
@@ -162,16 +165,17 @@ struct Part {
 }
 
 impl<'a, const D: usize> Held<'a, D> {
-    /// Holds the constraints, if there are any, for phase fields of interface width `eps`.
+    /// Holds the constraints, if there are any, for phase fields of interface width `eps` on a grid or its active bricks.
     pub(crate) fn new(
         constraints: &Constraints,
-        grid: Grid<D>,
+        (grid, active): (Grid<D>, Option<&'a Active<D>>),
         eps: f64,
         region: Option<&'a Region<D>>,
         device: &'a ComputeDevice,
     ) -> Option<Self> {
         (!constraints.is_empty()).then(|| Self {
             grid,
+            active,
             eps,
             targets: constraints.targets(),
             region,
@@ -216,11 +220,9 @@ impl<'a, const D: usize> Held<'a, D> {
         let tolerance = if exactly { exact } else { exact.max(ITERATES) };
         let mut found: Option<Correction> = None;
         for _ in 0..CORRECTIONS {
-            let values = self.device.values(u.clone())?;
-            let Ok(field) = Field::from_values(self.grid, values) else {
+            let Some(tangent) = self.tangent(&u)? else {
                 return Ok(None);
             };
-            let tangent = self.tangent(field)?;
             if tangent.violation() <= tolerance {
                 let tangent = Some(tangent);
                 return Ok(Some(Place { u, tangent }));
@@ -231,7 +233,7 @@ impl<'a, const D: usize> Held<'a, D> {
             };
             // Near the targets the derivatives change little.
             found = is_short.then_some(correction);
-            let motion = self.device.tensor(&motion, self.grid.shape());
+            let motion = self.device.tensor(&motion, u.dims());
             u = hold(retract(&u, &motion, 1.0));
         }
         Ok(None)
@@ -239,8 +241,9 @@ impl<'a, const D: usize> Held<'a, D> {
 
     /// The error where nothing near `u` fulfils the constraints.
     pub(crate) fn lost(&self, u: &Tensor<D>) -> Result<Error, Error> {
-        let field = Field::from_values(self.grid, self.device.values(u.clone())?)?;
-        let parts = self.tangent(field)?.parts;
+        let parts = self
+            .tangent(u)?
+            .map_or_else(Vec::new, |tangent| tangent.parts);
         let worst = parts
             .iter()
             .max_by(|a, b| a.violation().total_cmp(&b.violation()));
@@ -256,8 +259,13 @@ impl<'a, const D: usize> Held<'a, D> {
         })
     }
 
-    fn tangent(&self, u: Field<D>) -> Result<Tangent<D>, Error> {
-        let sizes = Sizes::of(&u, self.eps)?;
+    /// None for values that are not finite.
+    fn tangent(&self, u: &Tensor<D>) -> Result<Option<Tangent<D>>, Error> {
+        let stored = Stored::of(u, self.grid, self.active.cloned(), self.device)?;
+        let Ok(field) = stored.field() else {
+            return Ok(None);
+        };
+        let sizes = Sizes::of(&field, self.eps)?;
         let held = self.targets.iter().enumerate();
         let parts = held.filter_map(|(measure, target)| {
             target.map(|target| Part {
@@ -269,11 +277,11 @@ impl<'a, const D: usize> Held<'a, D> {
                 target,
             })
         });
-        Ok(Tangent {
+        Ok(Some(Tangent {
             parts: parts.collect(),
             sizes,
-            u,
-        })
+            u: stored.into_values(),
+        }))
     }
 
     /// The derivatives of a measure by the values that may move.
@@ -282,19 +290,27 @@ impl<'a, const D: usize> Held<'a, D> {
             0 => tangent.sizes.perimeter_gradient(),
             _ => tangent.sizes.volume_gradient(),
         };
-        self.inside(gradient)
+        self.inside(self.stored(gradient))
+    }
+
+    /// Of values on the whole grid those that are stored.
+    fn stored(&self, values: Vec<f64>) -> Vec<f64> {
+        match self.active {
+            Some(active) => active.bricks().gather(&values),
+            None => values,
+        }
     }
 
     /// The motion that restores a measure: a displacement of the interface, times `1 - u^2`.
     fn motion(&self, tangent: &Tangent<D>, part: Part) -> Vec<f64> {
         let well = |u: &f64| (1.0 - u * u).max(0.0);
-        let wells = tangent.u.values().iter().map(well);
+        let wells = tangent.u.iter().map(well);
         if part.measure == 1 {
             return self.inside(wells.collect());
         }
         // Sharper bends than the interface is wide are corners.
         let most = self.eps.recip();
-        let curvature = tangent.sizes.mean_curvature();
+        let curvature = self.stored(tangent.sizes.mean_curvature());
         let bends = curvature.iter().map(|k| k.clamp(-most, most));
         self.inside(wells.zip(bends).map(|(well, k)| well * k).collect())
     }
@@ -347,6 +363,15 @@ impl<'a, const D: usize> Held<'a, D> {
         multipliers
     }
 
+    /// The second derivative of the measures by what is stored.
+    fn curvature(&self, tangent: &Tangent<D>) -> Curvature<D> {
+        let all = tangent.sizes.second_derivative(self.multipliers);
+        Curvature(match self.active {
+            Some(active) => all.at(|node| active.bricks().cell(self.grid.multi_index(node))),
+            None => all,
+        })
+    }
+
     /// Solves for the motion that minimizes the quadratic model of `objective`, with this gradient at its point, among those tangential to
     /// the constraints. With `keep`, what is found out about the multipliers is remembered; without, the motion only cleans the profile.
     pub(crate) fn solve(
@@ -370,7 +395,7 @@ impl<'a, const D: usize> Held<'a, D> {
         let working = objective.product_dtype().unwrap_or(gradient.dtype());
         let (mut lagrangian, mut normals) = (gradient.clone(), Vec::new());
         for (part, values) in parts.iter().zip(&gradients) {
-            let normal = self.device.tensor::<D>(values, self.grid.shape());
+            let normal = self.device.tensor::<D>(values, gradient.dims());
             lagrangian = lagrangian + normal.clone() * multipliers[part.measure];
             normals.push((part.measure, normal.cast(working)));
         }
@@ -378,8 +403,7 @@ impl<'a, const D: usize> Held<'a, D> {
         let mut objective = Lagrangian {
             objective,
             // To clean the profile, which is much stiffer, it is not needed.
-            curvature: keep
-                .then(|| Arc::new(Curvature(tangent.sizes.second_derivative(multipliers)))),
+            curvature: keep.then(|| Arc::new(self.curvature(tangent))),
             region: self.region,
         };
         let projected = |r: &Tensor<D>| projection.apply(precondition(r));
@@ -414,14 +438,14 @@ impl Correction {
             |row| parts[row].target - parts[row].value,
             |row, column| self.changes[row][column],
         )?;
-        let mut motion = vec![0.0; tangent.u.values().len()];
+        let mut motion = vec![0.0; tangent.u.len()];
         for (direction, factor) in self.motions.iter().zip(factors) {
             for (sum, value) in motion.iter_mut().zip(direction) {
                 *sum += factor * value;
             }
         }
         // On the interface, where 1 - u^2 > 1/2, the displacement is the motion over 1 - u^2.
-        let wells = tangent.u.values().iter().map(|u| 1.0 - u * u);
+        let wells = tangent.u.iter().map(|u| 1.0 - u * u);
         let shifts = motion.iter().zip(wells).filter(|(_, well)| *well > 0.5);
         let longest = shifts.fold(0.0, |longest: f64, (motion, well)| {
             longest.max((motion / well).abs())

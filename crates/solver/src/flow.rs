@@ -333,9 +333,6 @@ impl<const D: usize> WillmoreFlow<D> {
     /// As [`Constraints::check`].
     pub fn constrain(&mut self, constraints: Constraints) -> Result<(), Error> {
         constraints.check(&self.grid)?;
-        if !constraints.is_empty() {
-            self.needs_grid("perimeters and volumes that are held")?;
-        }
         self.constraints = constraints;
         Ok(())
     }
@@ -552,8 +549,8 @@ impl<const D: usize> WillmoreFlow<D> {
             _ => &mut self.energy,
         };
         energy.set(anchor, stiffness)?;
-        let (eps, region) = (self.params.eps, self.region.as_ref());
-        let mut held = Held::new(&self.constraints, self.grid, eps, region, device);
+        let (stored, eps) = ((self.grid, self.active.as_ref()), self.params.eps);
+        let mut held = Held::new(&self.constraints, stored, eps, self.region.as_ref(), device);
         let holding = held.as_mut();
         let (u, newton, times) = match &self.region {
             None => minimize_timed(

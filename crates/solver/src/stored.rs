@@ -63,6 +63,10 @@ impl<const D: usize> Stored<D> {
         Ok(Field::from_values(self.grid, values)?)
     }
 
+    pub(crate) fn into_values(self) -> Vec<f64> {
+        self.values
+    }
+
     pub(crate) fn tensor(&self, device: &ComputeDevice) -> Tensor<D> {
         let whole = || self.grid.shape();
         let shape = (self.active.as_ref()).map_or_else(whole, |active| active.bricks().shape());

@@ -33,6 +33,16 @@ fn exact<const D: usize>(grid: &Grid<D>) -> FlowParams {
     }
 }
 
+/// As accurate as steps are in which sizes are held.
+fn holding<const D: usize>(grid: &Grid<D>) -> FlowParams {
+    let exact = exact(grid);
+    let newton = NewtonParams {
+        tolerance: 1e-5,
+        ..exact.newton
+    };
+    FlowParams { newton, ..exact }
+}
+
 fn usual<const D: usize>(grid: &Grid<D>) -> FlowParams {
     FlowParams {
         newton: NewtonParams::default(),
@@ -50,14 +60,21 @@ fn bricks<const D: usize>(start: &Field<D>, params: FlowParams) -> WillmoreFlow<
 
 /// The L2 difference of both flows after these steps, over how far they went, and the largest relative difference of their energies.
 fn difference<const D: usize>(start: &Field<D>, params: FlowParams, steps: &[f64]) -> (f64, f64) {
-    let (mut whole, mut few) = (dense(start, params), bricks(start, params));
+    difference_of((dense(start, params), bricks(start, params)), steps)
+}
+
+fn difference_of<const D: usize>(
+    (mut whole, mut few): (WillmoreFlow<D>, WillmoreFlow<D>),
+    steps: &[f64],
+) -> (f64, f64) {
+    let start = whole.field().unwrap();
     let mut energies: f64 = 0.0;
     for &tau in steps {
         let [a, b] = [&mut whole, &mut few].map(|flow| flow.advance(tau).unwrap());
         energies = energies.max((b.willmore_energy / a.willmore_energy - 1.0).abs());
     }
     let (whole, few) = (whole.field().unwrap(), few.field().unwrap());
-    let apart = l2_distance(&whole, &few).unwrap() / l2_distance(&whole, start).unwrap();
+    let apart = l2_distance(&whole, &few).unwrap() / l2_distance(&whole, &start).unwrap();
     println!("difference over motion {apart:.1e}, of the energies {energies:.1e}");
     (apart, energies)
 }
@@ -170,6 +187,29 @@ fn fronts_that_meet_flow_as_on_the_whole_grid() {
 }
 
 #[test]
+fn held_sizes_flow_as_on_the_whole_grid() {
+    fn check<const D: usize>(start: &Field<D>, tau: f64, perimeter_too: bool) {
+        let params = holding(start.grid());
+        let mut held = Constraints::keeping(start, params.eps).unwrap();
+        held.perimeter = held.perimeter.filter(|_| perimeter_too);
+        let mut flows = (dense(start, params), bricks(start, params));
+        for flow in [&mut flows.0, &mut flows.1] {
+            flow.constrain(held).unwrap();
+        }
+        let (apart, energies) = difference_of(flows, &[tau; 4]);
+        assert!(apart < 2e-6 && energies < 1e-6, "{apart:e} {energies:e}");
+    }
+    let start = cross();
+    check(&start, params(start.grid()).mcf_step, true);
+    let grid = Grid::<3>::centred(64, 0.5).unwrap();
+    let egg = |x: [f64; 3]| {
+        let r = x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        r - 0.15 * (1.0 + 0.3 * (x[0] / r.max(1e-9)).powi(2))
+    };
+    check(&field(grid, &egg), params(&grid).mcf_step / 4.0, false);
+}
+
+#[test]
 fn a_step_beyond_the_first_bricks_makes_them_more() {
     let start = cross();
     let params = exact(start.grid());
@@ -245,17 +285,12 @@ fn what_bricks_cannot_do_is_refused_in_one_line() {
     assert!(odd.err().unwrap().to_string().contains("bricks of 16"));
 
     let mut flow = bricks(&start, usual(&grid));
-    let held = Constraints {
-        volume: Some(0.1),
-        ..Constraints::default()
-    };
     let helfrich = Helfrich {
         tension: 1.0,
         ..Helfrich::default()
     };
     for refused in [
         flow.restrict_to(&vec![true; grid.len()]),
-        flow.constrain(held),
         flow.set_energy(helfrich, 1.0),
     ] {
         assert!(

@@ -175,6 +175,7 @@ pub struct SizeHessian<const D: usize> {
 
 /// One node, and what it contributes.
 struct Site<const D: usize> {
+    /// Its place among the values; the last number there is if it has none.
     node: u32,
     /// Its neighbours among the sites; beyond the last where there is none.
     around: [[u32; NEIGHBOURS]; D],
@@ -228,10 +229,23 @@ impl<const D: usize> SizeHessian<D> {
         }
     }
 
-    /// Calls `add` with each node that the product with `p` changes, and by how much.
+    /// The same for values that are stored in another order, by the place of each node in it; those that have none do not move.
+    #[must_use]
+    pub fn at(mut self, place: impl Fn(usize) -> Option<usize>) -> Self {
+        for site in &mut self.sites {
+            let place = place(site.node as usize);
+            site.node = place.map_or(u32::MAX, |place| place as u32);
+        }
+        self
+    }
+
+    /// Calls `add` with the place of each value that the product with `p` changes, and by how much.
     pub fn multiply(&self, p: impl Fn(usize) -> f64 + Sync, mut add: impl FnMut(usize, f64)) {
         let sites = &self.sites;
-        let of = |site: &Site<D>| p(site.node as usize);
+        let of = |site: &Site<D>| match site.node {
+            u32::MAX => 0.0,
+            node => p(node as usize),
+        };
         let products = match &self.weights {
             None => map(sites, |_, site| {
                 (site.slope * site.second[0] * site.slope + site.bent) * of(site)
@@ -247,7 +261,8 @@ impl<const D: usize> SizeHessian<D> {
                 })
             }
         };
-        for (site, product) in sites.iter().zip(products) {
+        let stored = |site: &Site<D>| site.node != u32::MAX;
+        for (site, product) in sites.iter().zip(products).filter(|(site, _)| stored(site)) {
             add(site.node as usize, product);
         }
     }
