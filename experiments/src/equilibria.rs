@@ -25,8 +25,6 @@ pub struct Equilibrium {
     pub ratio: f64,
     /// Whether the start is longer than wide, in space.
     pub prolate: bool,
-    /// A time at which it is at rest for certain, if later steps are not worth their work.
-    pub end: Option<f64>,
     /// The exact energy `1/2 int h^2`, tension and pressure at this radius.
     pub exact: Exact,
 }
@@ -117,7 +115,6 @@ impl Equilibrium {
             Stop::NoSurface,
             Stop::AtTheSide,
         ];
-        case.stops.extend(self.end.map(Stop::Time));
         case.measures = vec![Measure::zero_set(eps)];
         let samples = Samples::every(usize::MAX);
         let trajectory = session.trajectory(&self.title, case, &self.key, &samples)?;

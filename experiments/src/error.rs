@@ -25,8 +25,6 @@ pub enum Error {
     #[error(transparent)]
     Surfaces(#[from] surfaces::Error),
     #[error(transparent)]
-    Images(#[from] images::Error),
-    #[error(transparent)]
     Reference(#[from] reference::Error),
     #[error(transparent)]
     Render(#[from] render::Error),

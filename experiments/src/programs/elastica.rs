@@ -39,7 +39,6 @@ pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
             radius: RADIUS,
             ratio,
             prolate: false,
-            end: None,
             exact: Exact {
                 energy: exact.curve.energy() / RADIUS,
                 tension: exact.tension / RADIUS.powi(2),

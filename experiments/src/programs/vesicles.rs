@@ -3,8 +3,6 @@
 use crate::equilibria::{self, AtRest, Equilibrium, Exact};
 use crate::prelude::*;
 use crate::surfaces::{Setting, View, raster, willmore_flow};
-use geometry::contour::Polyline;
-use images::{Outline, OutlineDistance};
 use reference::equilibria::{Branch, Vesicle, vesicles};
 use render::{Quality, Scene};
 
@@ -24,20 +22,17 @@ struct Family {
     radius: f64,
     /// Cells per unit length of a quick run and of the whole one.
     cells: [usize; 2],
-    /// See [`Equilibrium::end`]: energies change by less than 1e-5 of themselves afterwards.
-    end: Option<f64>,
 }
 
 /// The two sides of oblate shapes must be several interface widths apart in the middle: with half as many cells they break through below .62. Longer
 /// prolate shapes come to the side of the box.
-const FAMILIES: [Family; 3] = [
+const FAMILIES: [Family; 2] = [
     Family {
         branch: Branch::Prolate,
         name: "prolate",
         reduced_volumes: &[0.95, 0.9, 0.8, 0.7, 0.65],
         radius: 0.4,
         cells: [32, 64],
-        end: None,
     },
     Family {
         branch: Branch::Oblate,
@@ -45,23 +40,12 @@ const FAMILIES: [Family; 3] = [
         reduced_volumes: &[0.7, 0.65, 0.6],
         radius: 0.6,
         cells: [32, 128],
-        end: Some(0.002),
-    },
-    Family {
-        branch: Branch::Stomatocyte,
-        name: "stomatocyte",
-        reduced_volumes: &[0.6, 0.65],
-        radius: 0.6,
-        cells: [32, 128],
-        end: Some(0.002),
     },
 ];
 /// Side of the box.
 const SIDE: f64 = 2.0;
-/// No spheroid flows to a cup: the first of them starts from the exact cup of this reduced volume.
-const FIRST_CUP: f64 = 0.57;
 
-/// Willmore flow of spheroids with area and volume held until rest, by the accurate operator, n = 64, eps = 2h: energies, profiles and pictures
+/// Willmore flow of spheroids with area and volume held until rest, by the accurate operator, eps = 2h: energies, profiles and pictures
 /// along the reduced volume, against exact axisymmetric equilibria; the phase diagram.
 #[derive(Parser, Debug)]
 #[command(name = "vesicles", version)]
@@ -105,7 +89,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
             let operator = setting.operator((Method::Hybrid, Scheme::Accurate))?;
             let initial = match relaxed {
                 Some(shape) => shape,
-                None => family.start(&equilibrium, setting)?,
+                None => equilibrium.start(setting.grid, setting.scales.eps, 0.5)?,
             };
             let rule = (StepRule::ByEnergy(None), 1);
             let case = willmore_flow(name, initial, operator, setting.scales, rule);
@@ -144,31 +128,12 @@ impl Family {
             radius,
             ratio,
             prolate: self.branch == Branch::Prolate,
-            end: self.end,
             exact: Exact {
                 energy: exact.energy(),
                 tension: exact.tension / radius.powi(2),
                 pressure: -exact.pressure / radius.powi(3),
             },
         }
-    }
-
-    fn start(&self, equilibrium: &Equilibrium, setting: &Setting) -> Result<Field<3>, Error> {
-        let (grid, eps) = (setting.grid, setting.scales.eps);
-        if self.branch != Branch::Stomatocyte {
-            return equilibrium.start(grid, eps, 0.5);
-        }
-        let cup = vesicles(self.branch, 0.0, &[FIRST_CUP])?.swap_remove(0);
-        let points = cup.surface.profile().points().into_iter();
-        let points = points.map(|p| p.map(|x| self.radius * x)).collect();
-        let outline = Outline::new(vec![Polyline {
-            points,
-            closed: true,
-        }])?;
-        let section = OutlineDistance::new(&outline);
-        let distance =
-            |[x, y, z]: [f64; 3]| section.signed_distance([f64::hypot(x - 0.5, y - 0.5), z - 0.5]);
-        Ok(phase_field(grid, &distance, eps)?)
     }
 }
 
