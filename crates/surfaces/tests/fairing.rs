@@ -51,10 +51,9 @@ fn noise_need_not_be_normally_distributed_nor_along_the_normals() {
     let (mut uniform, mut isotropic) = (clean.clone(), clean.clone());
     for (vertex, normal) in clean.vertex_normals().into_iter().enumerate() {
         let length = 12.0_f64.sqrt() * deviation * sum(1);
-        for axis in 0..3 {
-            uniform.vertices[vertex][axis] += length * normal[axis];
-            isotropic.vertices[vertex][axis] += deviation * sum(12);
-        }
+        let x = clean.vertices[vertex];
+        uniform.vertices[vertex] = std::array::from_fn(|i| x[i] + length * normal[i]);
+        isotropic.vertices[vertex] = x.map(|x| x + deviation * sum(12));
     }
     for noisy in [uniform, isotropic] {
         let estimate = noisy.noise();

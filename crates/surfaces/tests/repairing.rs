@@ -133,9 +133,13 @@ fn a_closed_mesh_stays_as_it_is() {
         "{repaired}"
     );
     assert!(repair(&TriangleMesh::default(), 32).is_err());
-    let mut sheet = TriangleMesh::default();
-    sheet.vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
-    sheet.faces = vec![[0, 1, 2], [0, 2, 3]];
+    let sheet = TriangleMesh {
+        vertices: [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+            .map(|[x, y]| [x, y, 0.0])
+            .into(),
+        faces: vec![[0, 1, 2], [0, 2, 3]],
+        normals: None,
+    };
     let refused = repair(&sheet, 32).unwrap_err().to_string();
     assert!(refused.contains("encloses nothing"), "{refused}");
 }
