@@ -26,10 +26,10 @@ pub fn write(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<(), Error> {
     Ok(write_atomically(path, |out| out.write_all(&bytes))?)
 }
 
-/// The bytes that [`write`] puts into a file of that name.
+/// The bytes that [`write()`] puts into a file of that name.
 ///
 /// # Errors
-/// Those of [`write`] but the last.
+/// Those of [`write()`] but the last.
 pub fn encode(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<Vec<u8>, Error> {
     let path = path.as_ref();
     let format = Format::of(path)?;
