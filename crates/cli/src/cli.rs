@@ -455,7 +455,7 @@ pub struct FairOptions {
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub noise: Option<f64>,
 
-    /// Stop when the Willmore energy is no more than this part of that at the beginning
+    /// Stop as soon as the Willmore energy is no more than this part of that at the beginning; the volume is kept by --volume keep
     #[arg(long, value_name = "PART", allow_hyphen_values = true)]
     pub energy_ratio: Option<f64>,
 
@@ -464,7 +464,8 @@ pub struct FairOptions {
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub keep: Option<String>,
 
-    /// Write a new mesh, the zero level set on the grid, in place of the input with its vertices moved
+    /// Write a new mesh, the zero level set on the grid, in place of the input with its vertices moved; with --repair of a mesh that is not
+    /// closed
     #[arg(long)]
     pub remesh: bool,
 

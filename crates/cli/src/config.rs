@@ -96,7 +96,11 @@ pub fn one_line(error: &clap::Error) -> String {
     });
     let words: Vec<&str> = paragraphs.flat_map(str::split_whitespace).collect();
     let line = words.join(" ");
-    line.strip_prefix("error: ").unwrap_or(&line).to_owned()
+    let line = line.strip_prefix("error: ").unwrap_or(&line);
+    line.replace(
+        "invalid digit found in string",
+        "it must be a whole number, not negative",
+    )
 }
 
 fn bad(path: &Path, message: impl Into<String>) -> Error {

@@ -1,4 +1,4 @@
-//! How far the vertices of a mesh have gone, as a picture.
+//! How far a surface has gone, as a picture.
 
 use report::{Axis, Figure, LineChart, OKABE_ITO, Raster, Rgb, Series, viridis};
 
@@ -52,7 +52,7 @@ pub fn figure(
         bar.with_colour(viridis(middle)).with_width(WIDTH)
     });
     let chart = LineChart::new(
-        "How far the vertices have gone",
+        "How far it has gone at its vertices",
         Axis::linear("length, in the units of the mesh").with_range(0.0, largest),
         Axis::linear("vertices, %"),
     );

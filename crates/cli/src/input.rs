@@ -45,12 +45,16 @@ const MOST_NODES: f64 = 1e9;
 const PART: f64 = 0.6;
 /// Cells per unit length from which a mesh whose vertices follow the flow gets the first that hold it,
 const OWN_CELLS: [usize; 3] = [128, 160, 192];
-/// and the part of the box that it takes: it moves by little.
-const OWN_PART: f64 = 0.9;
+/// and the part of the box that it takes where noise is taken off it, by which it moves by little, and otherwise.
+const OWN_PART: [f64; 2] = [0.9, 0.8];
 /// Cells per unit length among which the coarsest that holds all thin parts is taken,
 const IMAGE_CELLS: [usize; 5] = [128, 192, 256, 384, 512];
-/// and those for meshes.
+/// those for meshes,
 const MESH_CELLS: [usize; 3] = [64, 96, 128];
+/// and those for meshes whose components or holes these do not have.
+const FINER_CELLS: [usize; 2] = [160, 192];
+/// Interface widths between a shape and the sides of the box, beyond which its periodic images are.
+const ROOM: f64 = 1.0;
 /// Parts and gaps of less than so many interface widths are thin.
 const THIN: f64 = 1.5;
 /// Where more than this part of the boundary is at thin parts a finer grid is taken, or it is told,
@@ -63,6 +67,8 @@ const MOST_RAYS: usize = 4096;
 const REPAIR_CELLS: usize = 112;
 /// Images with more than this part of their pixels between two tones are no drawings.
 const PHOTOGRAPH: f64 = 0.05;
+/// What becomes of thin parts of a surface.
+const WILL_NOT_LAST: &str = "which will not last";
 /// Largest magnitude in a phase field: flows overshoot the phases a little.
 const LARGEST_PHASE: f64 = 1.1;
 /// Pixels a side of pictures of boxes.
@@ -165,7 +171,7 @@ pub fn load_own(
 ) -> Result<Loaded, Error> {
     let source = Source::Mesh(path.to_owned());
     source.refuse_foreign(options)?;
-    let mut space = Space::new(surfaces::usual_up_axis(path)?);
+    let (rough, start) = (own.fairing().rough(), own.fairing().start());
     let mut grids = options
         .cells
         .map_or(OWN_CELLS.to_vec(), |cells| vec![cells])
@@ -179,12 +185,38 @@ pub fn load_own(
     };
     let field = loop {
         reader.options.cells = grids.next();
-        let grid = reader.grid_around(&own.fairing().start().bounding_box(), OWN_PART)?;
-        let field = reader.mesh_field(own.fairing().start(), grid)?;
-        if reader.holds(&own, &field, grids.peek().is_none(), allow_loss)? {
-            break field;
+        let part = OWN_PART[usize::from(own.fairing().noise() == 0.0)];
+        let grid = reader.grid_around(&start.bounding_box(), part)?;
+        let field = reader.mesh_field(start, grid)?;
+        let made = reader.made_of(start, &field)?;
+        if !made.is_like_mesh() {
+            if grids.peek().is_some() {
+                continue;
+            }
+            let advice = "use more --cells, or --allow-loss to go on without them";
+            reader.tell_lost(&made, (!allow_loss).then_some(advice))?;
         }
+        let width = THIN * eps_over_h * grid.spacing();
+        let sides = rough.mesh().sides(MOST_RAYS);
+        let part = thin_part(&MeshDistance::new(rough), sides, width);
+        if part >= THIN_PART {
+            let what = if own.is_new {
+                WILL_NOT_LAST
+            } else {
+                "where vertices follow less well"
+            };
+            reader.tell_thin(part, (width, made.cells), what, false)?;
+        }
+        say.note(&format!(
+            "grid: {} cells per unit length, {:.3e} wide (--cells); its surface is {}",
+            made.cells,
+            grid.spacing(),
+            made.far()
+        ));
+        break field;
     };
+    let mut space = Space::new(surfaces::usual_up_axis(path)?);
+    space.input = Some(Topology::of(rough));
     let region = own.nodes(&field)?;
     space.own = Some(own);
     let start = reader.start(field, space);
@@ -265,6 +297,37 @@ impl Source<'_> {
     }
 }
 
+/// What a grid makes of a mesh.
+struct Made<'a> {
+    mesh: &'a ClosedMesh,
+    /// The zero level set, unless it touches itself.
+    surface: Option<ClosedMesh>,
+    cells: usize,
+    grid: Grid<3>,
+}
+
+impl Made<'_> {
+    /// Whether it has the components and the holes of the mesh.
+    fn is_like_mesh(&self) -> bool {
+        self.surface.as_ref().map(Topology::of) == Some(Topology::of(self.mesh))
+    }
+
+    fn percent(&self, length: f64) -> f64 {
+        100.0 * length / self.mesh.bounding_box().longest_side()
+    }
+
+    fn far(&self) -> String {
+        let Some(surface) = &self.surface else {
+            return "one that touches itself".to_owned();
+        };
+        let far = hausdorff_distance(surface, self.mesh);
+        format!(
+            "at most {far:.3e} ({:.3} % of the longest side) from that of the mesh",
+            self.percent(far)
+        )
+    }
+}
+
 struct Reader<'a> {
     name: String,
     options: &'a mut InputOptions,
@@ -282,12 +345,7 @@ impl Reader<'_> {
         match source {
             Source::Mesh(path) => {
                 let mesh = closed(&path, self.options.repair, self.say)?;
-                let distance = MeshDistance::new(&mesh);
-                let sides = mesh.mesh().sides(MOST_RAYS);
-                let grid =
-                    self.grid_holding(&mesh.bounding_box(), &MESH_CELLS, &distance, &sides)?;
-                let field = self.mesh_field(&mesh, grid)?;
-                Ok(self.space(field, surfaces::usual_up_axis(&path)?))
+                self.mesh(&mesh, surfaces::usual_up_axis(&path)?)
             }
             Source::Image(path) => self.image(&path),
             Source::Volume(path) => self.volume(&path),
@@ -339,7 +397,9 @@ impl Reader<'_> {
         part: f64,
     ) -> Result<Grid<D>, Error> {
         let grid = self.grid::<D>()?;
-        let side = self.side(part, grid.side())?;
+        // An image is all of its box: what is drawn may go on at its border.
+        let room = if D == 2 { 0.0 } else { ROOM };
+        let side = self.side(part, &grid, room)?;
         let own = bounds.longest_side() / side * grid.side();
         let corner = bounds.centre().map(|x| x - 0.5 * own);
         Ok(Grid::new(grid.cells(), own)?.with_origin(corner)?)
@@ -368,79 +428,68 @@ impl Reader<'_> {
                 continue;
             }
             if thin >= THIN_PART {
-                self.tell_thin(
-                    thin,
-                    (width, cells),
-                    "which will not last",
-                    chosen.is_none(),
-                )?;
+                self.tell_thin(thin, (width, cells), WILL_NOT_LAST, chosen.is_none())?;
             }
             return Ok(grid);
         }
     }
 
-    /// Whether the zero level set on a grid has the parts and holes of a mesh. On the `last` grid it says what does not hold, and refuses it
-    /// unless that is allowed.
-    fn holds(
-        &self,
-        own: &OwnMesh,
-        field: &Field<3>,
-        last: bool,
-        allow_loss: bool,
-    ) -> Result<bool, Error> {
-        let (grid, mesh, side) = (field.grid(), own.fairing().start(), own.longest_side());
+    /// The start of the flow of a mesh, on the coarsest grid that holds its thin parts, its components and its holes.
+    fn mesh(&mut self, mesh: &ClosedMesh, up: UpAxis) -> Result<Loaded, Error> {
+        let bounds = mesh.bounding_box();
+        let sides = mesh.mesh().sides(MOST_RAYS);
+        let chosen = self.options.cells.is_some();
+        let mut grid = self.grid_holding(&bounds, &MESH_CELLS, &MeshDistance::new(mesh), &sides)?;
         let cells = self.options.cells.unwrap_or_default();
-        let eps = self.eps_over_h * grid.spacing();
-        let found = ClosedMesh::new(surfaces::phase_field_surface(field, eps)?).ok();
-        let topology = found.as_ref().map(|(found, _)| Topology::of(found));
-        let holds = topology == Some(own.topology());
-        if !holds && !last {
-            return Ok(false);
-        }
-        let percent = |length: f64| 100.0 * length / side;
-        let far = match found {
-            Some((found, _)) => {
-                let far = hausdorff_distance(&found, mesh);
-                format!(
-                    "at most {far:.3e} ({:.3} % of the longest side) from that of the mesh",
-                    percent(far)
-                )
+        let finer = MESH_CELLS.into_iter().chain(FINER_CELLS);
+        let mut finer = finer.filter(|&finer| !chosen && finer > cells);
+        let field = loop {
+            let field = self.mesh_field(mesh, grid)?;
+            let made = self.made_of(mesh, &field)?;
+            if made.is_like_mesh() {
+                break field;
             }
-            None => "one that touches itself".to_owned(),
+            let Some(cells) = finer.next() else {
+                let advice = "give a larger --side-length or more --cells, or these --cells to go on without them";
+                self.tell_lost(&made, (!chosen).then_some(advice))?;
+                break field;
+            };
+            self.options.cells = Some(cells);
+            grid = self.grid_around(&bounds, PART)?;
         };
-        if !holds {
-            let thin = OwnMesh::thinnest(grid);
-            let message = format!(
-                "with --cells {cells} parts and gaps thinner than {thin:.3e} ({:.2} % of the longest side) are lost: the mesh has {}, the grid \
-                 {}; its surface is {far}",
-                percent(thin),
-                own.topology(),
-                topology.unwrap_or_default(),
-            );
-            if !allow_loss {
-                return Err(Error::options(format!(
-                    "{message}; use more --cells, or --allow-loss to go on without them"
-                )));
-            }
-            self.say.warn(&message);
+        let mut space = Space::new(up);
+        space.input = Some(Topology::of(mesh));
+        Ok(Loaded::Space(self.start(field, space)))
+    }
+
+    fn made_of<'m>(&self, mesh: &'m ClosedMesh, field: &Field<3>) -> Result<Made<'m>, Error> {
+        let eps = self.eps_over_h * field.grid().spacing();
+        let surface = ClosedMesh::new(surfaces::phase_field_surface(field, eps)?);
+        Ok(Made {
+            mesh,
+            surface: surface.ok().map(|(surface, _)| surface),
+            cells: self.options.cells.unwrap_or_default(),
+            grid: *field.grid(),
+        })
+    }
+
+    /// Says that parts or holes of a mesh are lost, or refuses it with some advice.
+    fn tell_lost(&self, made: &Made<'_>, refused: Option<&str>) -> Result<(), Error> {
+        let thin = OwnMesh::thinnest(&made.grid);
+        let message = format!(
+            "with --cells {} parts and gaps thinner than {thin:.3e} ({:.2} % of the longest side) are lost: the mesh has {}, the grid {}; \
+             its surface is {}",
+            made.cells,
+            made.percent(thin),
+            Topology::of(made.mesh),
+            made.surface.as_ref().map(Topology::of).unwrap_or_default(),
+            made.far(),
+        );
+        if let Some(advice) = refused {
+            return Err(Error::options(format!("{message}; {advice}")));
         }
-        let width = THIN * eps;
-        let rough = own.fairing().rough();
-        let sides = rough.mesh().sides(MOST_RAYS);
-        let thin = thin_part(&MeshDistance::new(rough), sides, width);
-        if thin >= THIN_PART {
-            self.tell_thin(
-                thin,
-                (width, cells),
-                "where vertices follow less well",
-                false,
-            )?;
-        }
-        self.say.note(&format!(
-            "grid: {cells} cells per unit length, {:.3e} wide (--cells); its surface is {far}",
-            grid.spacing(),
-        ));
-        Ok(true)
+        self.say.warn(&message);
+        Ok(())
     }
 
     /// Says that thin parts are lost, or refuses to lose many unless the grid was chosen.
@@ -465,12 +514,16 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// The longest side of what is in the box, a part of that unless it is chosen.
-    fn side(&mut self, part: f64, box_side: f64) -> Result<f64, Error> {
-        let side = *self.options.side_length.get_or_insert(part * box_side);
-        if !(side > 0.0 && side <= box_side) {
+    /// The longest side of what is in the box, a part of that unless it is chosen, so many interface widths from its sides.
+    fn side<const D: usize>(&mut self, part: f64, grid: &Grid<D>, room: f64) -> Result<f64, Error> {
+        let box_side = grid.side();
+        let most = box_side - 2.0 * room * self.eps_over_h * grid.spacing();
+        let usual = (part * box_side).min(most);
+        let side = *self.options.side_length.get_or_insert(usual);
+        if !(side > 0.0 && side <= most) {
             return Err(Error::options(format!(
-                "--side-length {side} does not fit the box of side {box_side}: give a positive length of at most that"
+                "--side-length {side} does not fit the box of side {box_side}, whose sides are to be an interface width away: give a \
+                 positive length of at most {most:.4}"
             )));
         }
         Ok(side)
@@ -509,18 +562,20 @@ impl Reader<'_> {
     fn built_in(&mut self, name: &str) -> Result<Loaded, Error> {
         if shapes::dimension(name)? == 2 {
             let grid = self.grid::<2>()?;
-            let shape = shapes::built_in(name, self.side(PART, grid.side())?)?;
+            let shape = shapes::built_in(name, self.side(PART, &grid, ROOM)?)?;
             let BuiltIn::Plane(shape) = shape else {
                 return Err(Error::options(format!("{name} is not in the plane")));
             };
             return self.plane(self.sampled(grid, shape.as_ref())?);
         }
+        let chosen = self.options.cells;
         let grid = self.grid::<3>()?;
-        let side = self.side(PART, grid.side())?;
+        let side = self.side(PART, &grid, ROOM)?;
         let field = match shapes::built_in(name, side)? {
             BuiltIn::Mesh(mesh) => {
                 let placement = Placement::fit(&mesh.bounding_box(), &grid, side, 0.0)?;
-                self.mesh_field(&mesh.placed(&placement), grid)?
+                self.options.cells = chosen;
+                return self.mesh(&mesh.placed(&placement), UpAxis::default());
             }
             BuiltIn::Space(shape) => self.sampled(grid, shape.as_ref())?,
             BuiltIn::Plane(_) => return Err(Error::options(format!("{name} is in the plane"))),

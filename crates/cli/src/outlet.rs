@@ -34,7 +34,7 @@ pub const ANIMATION: &str = "animation.png";
 pub const SERIES: &str = "frames.pvd";
 pub const SUMMARY: &str = "summary.json";
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Topology {
     /// Closed curves or surfaces.
     pub components: usize,
@@ -100,9 +100,14 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
     /// Writes the shape to any such file.
     fn save(&self, u: &Field<D>, eps: f64, path: &Path) -> Result<(), Error>;
 
-    /// What becomes of the mesh whose vertices follow the flow, if there is one.
+    /// What becomes of a surface, and how far it has gone.
     fn faired(&self, _: &Field<D>, _: &Field<D>, _: f64) -> Result<Option<Faired>, Error> {
         Ok(None)
+    }
+
+    /// The parts and holes of the input, where these are known better than from the phase field.
+    fn input(&self) -> Option<Topology> {
+        None
     }
 
     /// The volume of the input, where that is known better than from the phase field.
@@ -134,6 +139,9 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Space {
     up: UpAxis,
+    /// The parts and holes of the mesh that it was, if it was one.
+    #[serde(default)]
+    pub input: Option<Topology>,
     /// The mesh whose vertices follow the flow, if it is one.
     #[serde(default)]
     pub own: Option<OwnMesh>,
@@ -146,6 +154,7 @@ impl Space {
     pub fn new(up: UpAxis) -> Self {
         Self {
             up,
+            input: None,
             own: None,
             voxels: None,
         }
@@ -200,9 +209,18 @@ impl Outlet<3> for Space {
     }
 
     fn faired(&self, start: &Field<3>, u: &Field<3>, eps: f64) -> Result<Option<Faired>, Error> {
-        let own = self.own.as_ref();
-        own.map(|own| own.faired(start, u, eps, self.up))
-            .transpose()
+        if let Some(own) = &self.own {
+            return own.faired(start, u, eps, self.up).map(Some);
+        }
+        // Sheets that touch each other are no surface from which another one could be far.
+        let before = ClosedMesh::new(surfaces::phase_field_surface(start, eps)?).ok();
+        let before = before.filter(|(before, _)| before.volume() > 0.0);
+        let anew = |(before, _)| Faired::anew(&before, surface(u, eps)?, MESHES[0], self.up);
+        before.map(anew).transpose()
+    }
+
+    fn input(&self) -> Option<Topology> {
+        self.input
     }
 
     fn volume(&self) -> Option<f64> {
@@ -239,7 +257,7 @@ impl Outlet<3> for Space {
 }
 
 /// The zero set as triangles, which would cut off what is round, with its volume where that can be measured.
-fn surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
+pub fn surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
     let mesh = surfaces::remeshed_surface(u, eps)?;
     let zero_set = ZeroSet::of(u, eps)?;
     Ok(if zero_set.sizes_hold() {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use engine::DISPLACEMENT;
 use geometry::file::write_atomically;
 use report::Figure;
-use surfaces::{hausdorff_distance, root_mean_square};
+use surfaces::hausdorff_distance;
 
 use crate::displacement;
 use crate::keep::{Keep, key, moving_nodes};
@@ -27,6 +27,9 @@ pub struct OwnMesh {
     /// Whether it keeps its volume, also where vertices simply follow.
     #[serde(default)]
     pub keeps_volume: bool,
+    /// Whether the zero level set takes its place in the end.
+    #[serde(default)]
+    pub is_new: bool,
     /// The name of the copy of the mask, if that is a mesh, and its bytes.
     #[serde(skip)]
     mask: Option<(String, Vec<u8>)>,
@@ -61,6 +64,7 @@ impl OwnMesh {
             file: format!("{INPUT}.{}", crate::input::extension(path)),
             noise: noise.unwrap_or_else(|| closed.mesh().noise()),
             keeps_volume: false,
+            is_new: false,
             mask: None,
             keep,
             loaded: None,
@@ -165,10 +169,6 @@ impl OwnMesh {
         }))
     }
 
-    pub fn topology(&self) -> Topology {
-        Topology::of(self.fairing().rough())
-    }
-
     /// How far the vertices have gone along the normals, root of the mean square.
     pub fn measure(&self, start: &Field<3>, eps: f64) -> Result<Measure<3>, Error> {
         let fairing = self.fairing().clone();
@@ -190,7 +190,7 @@ impl OwnMesh {
         ]
     }
 
-    /// The mesh with the vertices where the phase field `u` has taken them.
+    /// The mesh with the vertices where the phase field `u` has taken them, or the new one in its place.
     pub fn faired(
         &self,
         start: &Field<3>,
@@ -198,6 +198,9 @@ impl OwnMesh {
         eps: f64,
         up: UpAxis,
     ) -> Result<Faired, Error> {
+        if self.is_new {
+            return self.made_anew(u, eps, up);
+        }
         let Loaded {
             bytes,
             mesh,
@@ -219,67 +222,105 @@ impl OwnMesh {
             normals: None,
         };
         let pairs = fairing.rough().mesh().vertices.iter().zip(&moved.vertices);
-        let lengths: Vec<f64> = pairs
-            .map(|(a, b)| root_mean_square(&[*a], &[*b]).1)
-            .collect();
+        let squares = pairs.map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>());
+        let lengths: Vec<f64> = squares.map(f64::sqrt).collect();
         let lost = fairing.unresolved(&followed, Self::thinnest(start.grid()));
+        let mut report = report(fairing.rough(), &moved, &lengths);
+        report["noise"] = self.noise.into();
+        report["left_behind_percent"] = (100.0 * followed.left_behind(u)?).into();
         Ok(Faired {
-            extension: crate::input::extension(Path::new(&self.file)),
-            file: surfaces::rewrite(bytes, &self.file, &all)?,
+            extension: self.extension(),
+            file: Some(surfaces::rewrite(bytes, &self.file, &all)?),
             mesh: all,
             displacement: displacement::figure(&moved, &lengths, &lost, up)?,
-            topology: self.topology(),
-            report: self.report(&moved, followed.left_behind(u)?),
+            report,
         })
+    }
+
+    /// The zero level set, with the volume that noise does not change.
+    fn made_anew(&self, u: &Field<3>, eps: f64, up: UpAxis) -> Result<Faired, Error> {
+        let rough = self.fairing().rough();
+        let mut mesh = outlet::surface(u, eps)?;
+        if self.noise > 0.0 || self.keeps_volume {
+            mesh = mesh.with_volume(rough.volume(), |_| true);
+        }
+        let mut made = Faired::anew(rough, mesh, &self.extension(), up)?;
+        made.report["noise"] = self.noise.into();
+        Ok(made)
+    }
+
+    fn extension(&self) -> String {
+        crate::input::extension(Path::new(&self.file))
     }
 
     /// Parts and gaps that are thinner than two cells come and go with the place of the grid.
     pub fn thinnest(grid: &Grid<3>) -> f64 {
         2.0 * grid.spacing()
     }
-
-    fn report(&self, moved: &TriangleMesh, left_behind: f64) -> Value {
-        let closed = self.fairing().rough();
-        let (before, side) = (closed.mesh(), self.longest_side());
-        let (rms, largest) = root_mean_square(&before.vertices, &moved.vertices);
-        let percent = |length: f64| 100.0 * length / side;
-        let mut report = json!({
-            "noise": self.noise,
-            "displacement_rms": rms,
-            "displacement_rms_percent": percent(rms),
-            "displacement_largest": largest,
-            "displacement_largest_percent": percent(largest),
-            "left_behind_percent": 100.0 * left_behind,
-        });
-        // A mesh that folds over itself is written all the same, and has no distance.
-        if let Ok((after, _)) = ClosedMesh::new(moved.clone()) {
-            let relative = |after: f64, before: f64| 100.0 * (after / before - 1.0);
-            let distance = hausdorff_distance(closed, &after);
-            report["volume_change_percent"] = relative(after.volume(), closed.volume()).into();
-            report["area_change_percent"] = relative(after.area(), closed.area()).into();
-            report["hausdorff_distance"] = distance.into();
-            report["hausdorff_distance_percent"] = percent(distance).into();
-        }
-        report
-    }
 }
 
+/// What became of a surface.
 pub struct Faired {
     /// The extension of files that keep everything.
     pub extension: String,
-    file: Vec<u8>,
+    /// With everything that the input had, unless the mesh is new.
+    file: Option<Vec<u8>>,
     mesh: TriangleMesh,
     pub displacement: Figure,
-    /// Parts and holes, which stay.
-    pub topology: Topology,
     pub report: Value,
 }
 
+/// How a mesh whose vertices are that far from where they were, or from the surface `before`, differs from that.
+fn report(before: &ClosedMesh, after: &TriangleMesh, lengths: &[f64]) -> Value {
+    let side = before.bounding_box().longest_side();
+    let squares: f64 = lengths.iter().map(|length| length * length).sum();
+    let rms = (squares / lengths.len().max(1) as f64).sqrt();
+    let largest = lengths.iter().copied().fold(0.0, f64::max);
+    let percent = |length: f64| 100.0 * length / side;
+    let mut report = json!({
+        "displacement_rms": rms,
+        "displacement_rms_percent": percent(rms),
+        "displacement_largest": largest,
+        "displacement_largest_percent": percent(largest),
+    });
+    // A mesh that folds over itself is written all the same, and has no distance.
+    if let Ok((after, _)) = ClosedMesh::new(after.clone()) {
+        let relative = |after: f64, before: f64| 100.0 * (after / before - 1.0);
+        let distance = hausdorff_distance(before, &after);
+        report["volume_change_percent"] = relative(after.volume(), before.volume()).into();
+        report["area_change_percent"] = relative(after.area(), before.area()).into();
+        report["hausdorff_distance"] = distance.into();
+        report["hausdorff_distance_percent"] = percent(distance).into();
+    }
+    report
+}
+
 impl Faired {
+    /// A new mesh in place of a surface.
+    pub fn anew(
+        before: &ClosedMesh,
+        mesh: TriangleMesh,
+        extension: &str,
+        up: UpAxis,
+    ) -> Result<Self, Error> {
+        let distance = MeshDistance::new(before);
+        let lengths = distance.signed_distances(&mesh.vertices).into_iter();
+        let lengths: Vec<f64> = lengths.map(f64::abs).collect();
+        let none_lost = vec![false; lengths.len()];
+        Ok(Self {
+            extension: extension.to_owned(),
+            file: None,
+            displacement: displacement::figure(&mesh, &lengths, &none_lost, up)?,
+            report: report(before, &mesh, &lengths),
+            mesh,
+        })
+    }
+
     /// Writes a file: in the format of the input with everything that this had, in another one the triangles alone.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
-        if crate::input::extension(path) == self.extension {
-            return Ok(write_atomically(path, |out| out.write_all(&self.file))?);
+        let same = crate::input::extension(path) == self.extension;
+        if let Some(file) = self.file.as_ref().filter(|_| same) {
+            return Ok(write_atomically(path, |out| out.write_all(file))?);
         }
         Ok(surfaces::write(path, &self.mesh)?)
     }

@@ -107,7 +107,12 @@ impl Files<'_> {
         section.push(viewer);
         if let Some(bytes) = self.read(outlet::DISPLACEMENT)? {
             let image = Image::from_bytes(outlet::DISPLACEMENT, &bytes)?;
-            let caption = "How far the vertices have gone, as colours and as a histogram.";
+            let what = if self.before() == own::INPUT {
+                "vertices have"
+            } else {
+                "surface has"
+            };
+            let caption = format!("How far the {what} gone, as colours and as a histogram.");
             section.push(Figure::new(image, caption));
         }
         Ok(Some(section))
@@ -146,6 +151,14 @@ impl Files<'_> {
             if let Some(bytes) = self.read(name)? {
                 frames.push((label, Image::from_bytes(name, &bytes)?));
             }
+        }
+        // The last step may have no frame of its own.
+        let last = names.last().map(|name| self.read(name)).transpose()?;
+        let last = last.flatten();
+        let end = self.read(outlet::PICTURE)?;
+        if let Some(end) = end.filter(|end| last.as_ref() != Some(end)) {
+            let end = Image::from_bytes(outlet::PICTURE, &end)?;
+            frames.push(("after".to_owned(), end));
         }
         Ok(Some(Frames::new("The shape over the steps", frames)?))
     }
@@ -191,7 +204,11 @@ impl Files<'_> {
         };
         let details = Details::new("Steps as a table")
             .with(Text::markdown(&note))
-            .with(Table::new("Steps", table.head(), rows)?);
+            .with(Table::new(
+                "Steps",
+                table.head().iter().map(|key| column(key)),
+                rows,
+            )?);
         let caption = "Energy and measures of the shape at the beginning and after every step.";
         let figure = Figure::new(image, caption);
         Ok(Section::new("Steps").with(figure).with(details))
@@ -292,6 +309,20 @@ fn facts(values: &Value) -> Facts {
     })
 }
 
+/// A column of the steps in words.
+fn column(key: &str) -> String {
+    let known = match key {
+        "tau" => "time step",
+        "energy_before" => "objective before",
+        "energy" => "objective after",
+        "newton" => "Newton steps",
+        "hvp" => "Hessian products",
+        "halvings" => "times shortened",
+        other => return named(other),
+    };
+    known.to_owned()
+}
+
 /// A key of the outcome or an option in words.
 fn named(key: &str) -> String {
     let known = match key {
@@ -299,7 +330,7 @@ fn named(key: &str) -> String {
         "energy_terms" => "spontaneous curvature, tension and pressure",
         "energy_over_8_pi" => "Willmore energy over that of a sphere",
         "components" => "closed parts",
-        "mesh" => "movement of the vertices",
+        "mesh" => "movement of the surface",
         "same_topology" => "as many parts and holes as before",
         "touches_box" => "touches the side of the box",
         "shortened_steps" => "steps that were shortened",

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use engine::{Checkpoints, Ending, Event, Observer, Storage, Store, estimated_time_error};
 use geometry::measure::touches_side;
+use pages::five_digits;
 use solver::StepEstimates;
 
 use crate::own::Faired;
@@ -22,6 +23,8 @@ pub struct Plan<O> {
     pub say: SayOptions,
 }
 
+/// Measures whose change is told.
+const SIZES: [&str; 3] = ["length", "area", "volume"];
 const DELAY: Duration = Duration::from_millis(200);
 
 impl<O> Plan<O> {
@@ -177,10 +180,8 @@ impl<O> Plan<O> {
             directory.write_file(outlet::SERIES, |out| out.write_all(series.as_bytes()))?;
         }
         // Touching sheets have no topology; that is no reason not to flow.
-        let before = match &faired {
-            Some(faired) => faired.topology,
-            None => self.outlet.topology(&case.initial, eps).unwrap_or_default(),
-        };
+        let of_start = || self.outlet.topology(&case.initial, eps).unwrap_or_default();
+        let before = self.outlet.input().unwrap_or_else(of_start);
         let mut outcome = json!({
             "command": self.command,
             "finished": true,
@@ -207,6 +208,11 @@ impl<O> Plan<O> {
         let (first, last) = (run.records().first(), run.records().last());
         for (name, value) in last.map_or(run.start(), |record| &record.measures) {
             outcome[name] = (*value).into();
+            let before = run.start().get(name).filter(|_| SIZES.contains(&&**name));
+            if let Some(before) = before.filter(|before| **before > 0.0) {
+                let change = 100.0 * (value / before - 1.0);
+                outcome[&format!("{name}_change_percent")] = change.into();
+            }
         }
         let energy = last.and_then(Record::willmore_energy);
         if let (Some(first), Some(energy)) = (first.and_then(|r| r.minimization), energy) {
@@ -252,7 +258,8 @@ impl<O> Plan<O> {
                 Value::Null => "Willmore energy",
                 _ => "energy",
             };
-            text.push(format!("{name} {energy:.5}{spheres}, before {first:.5}"));
+            let [energy, first] = [energy, first].map(five_digits);
+            text.push(format!("{name} {energy}{spheres}, before {first}"));
         }
         let of_steps = |name: &str| outcome["time_steps"][name].as_f64();
         if let (Some(error), Some(path)) = (of_steps("estimated_error"), of_steps("path")) {
@@ -260,16 +267,24 @@ impl<O> Plan<O> {
                 "time error about {error:.1e} (estimated), after a way of {path:.3}"
             ));
         }
-        let sizes = ["length", "area", "volume"].iter().filter_map(|name| {
-            let size = number(name)?;
-            Some(format!("{name} {size:.5}"))
+        let sizes = SIZES.iter().filter_map(|name| {
+            let change = match number(&format!("{name}_change_percent")) {
+                Some(percent) if outcome["mesh"].is_null() => format!(" ({percent:+.2} %)"),
+                _ => String::new(),
+            };
+            Some(format!("{name} {}{change}", five_digits(number(name)?)))
         });
         text.push(sizes.collect::<Vec<_>>().join(", "));
         let mesh = &outcome["mesh"];
         if let Some(moved) = mesh["displacement_rms"].as_f64() {
             let of = |name: &str| mesh[name].as_f64().unwrap_or(f64::NAN);
+            let what = if mesh["left_behind_percent"].is_null() {
+                "the surface"
+            } else {
+                "vertices"
+            };
             text.push(format!(
-                "vertices moved by {moved:.3e} (root mean square) and {:.3e} at most, {:.3} % and {:.3} % of the longest side; \
+                "{what} moved by {moved:.3e} (root mean square) and {:.3e} at most, {:.3} % and {:.3} % of the longest side; \
                  volume {:+.4} %, area {:+.3} %",
                 of("displacement_largest"),
                 of("displacement_rms_percent"),
@@ -294,7 +309,12 @@ impl<O> Plan<O> {
             ),
             (
                 outcome["same_topology"] == false,
-                "parts or holes have come or gone: if they should not, use more --cells or a larger --side-length",
+                if mesh["left_behind_percent"].is_null() {
+                    "parts or holes have come or gone: if they should not, use more --cells or a larger --side-length"
+                } else {
+                    "on the grid parts or holes have come or gone: if vertices nearby followed the wrong surface, use more --cells or a \
+                     larger --side-length"
+                },
             ),
             (
                 outcome["touches_box"] == true,

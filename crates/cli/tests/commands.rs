@@ -140,6 +140,11 @@ fn a_new_mesh_is_made_on_demand_and_the_energy_falls_by_the_ratio() {
         "{outcome}"
     );
     assert!(number("energy") > 0.98 * EIGHT_PI, "{outcome}");
+    // It is reached by small steps, and nothing of the shape is jumped over.
+    assert!(number("energy") > 0.5 * number("first_energy"), "{outcome}");
+    let moved = &outcome["mesh"];
+    assert!(moved["displacement_rms_percent"].as_f64().unwrap() < 2.0);
+    assert!(moved["hausdorff_distance"].as_f64().unwrap() < 0.5);
     let (mean, _) = radii(&folder.path().join("run/final.obj"));
     assert!((mean / 7.0 - 1.0).abs() < 0.05, "{mean}");
 }

@@ -43,6 +43,24 @@ fn a_run_in_space_has_a_page_with_a_surface_to_turn() {
         // All is inside: the text of a page names no address but that of SVG itself.
         assert!(!html.contains("src=\"http") && !html.contains("href=\"http"));
         assert!(html.contains("Willmore energy") && html.contains("builtin:cube"));
+        assert!(html.contains("How far the surface has gone"), "{name}");
+        assert!(
+            html.contains(">time step<") && !html.contains(">hvp<"),
+            "{name}"
+        );
+    }
+}
+
+/// Frames of every second one of three steps, and the shape in the end.
+#[test]
+fn the_frames_go_from_the_beginning_to_the_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let every = ["--frames", "2", "--output", "run"];
+    outcome(folder.path(), &with(&every));
+    let html = page(folder.path(), "run");
+    for label in ["step 0", "step 2", "after"] {
+        let frame = format!("class=\"frame\" data-label=\"{label}\"");
+        assert!(html.contains(&frame), "{label}");
     }
 }
 

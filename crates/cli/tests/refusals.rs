@@ -97,6 +97,14 @@ fn every_mistake_is_one_clear_line() {
             &["flow", "builtin:disc", "--side-length", "3"],
             "--side-length 3 does not fit the box of side 2",
         ),
+        (
+            &["flow", "builtin:cube", "--side-length", "1"],
+            "give a positive length of at most 0.9375",
+        ),
+        (
+            &["flow", "builtin:disc", "--cells", "-5"],
+            "it must be a whole number, not negative",
+        ),
         (&["flow", "builtin:disc", "--box-side=-1"], "side"),
         (
             &["flow", "builtin:disc", "--reduced-volume", "1.2"],
@@ -223,6 +231,7 @@ fn every_mistake_is_one_clear_line() {
             &["flow", "builtin:disc", "--config", "other.toml"],
             "other.toml: it is for the command \"mcf\"",
         ),
+        (&["fair"], "there is no input"),
         (
             &["fair", "builtin:sphere"],
             "say how smooth the surface is to become",

@@ -381,6 +381,46 @@ fn long_steps_are_shortened_and_the_shape_stays() {
     assert!(found["shortened_steps"].as_u64().unwrap() > 0, "{found}");
 }
 
+/// A lever whose hole and arms are about as wide as the interface.
+#[test]
+fn parts_and_holes_that_a_flow_loses_at_the_beginning_are_said_and_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let lever = surfaces::samples::lever(48).unwrap();
+    surfaces::write(folder.path().join("lever.ply"), lever.mesh()).unwrap();
+    let flow = ["flow", "lever.ply", "--steps", "1", "--side-length", "0.1"];
+    let line = refused(folder.path(), &[&flow[..], &["--output", "run"]].concat());
+    assert!(line.contains("larger --side-length"), "{line}");
+    let coarse = ["--cells", "48", "--no-page", "--output", "coarse"];
+    let output = run(folder.path(), &[&flow[..], &coarse].concat());
+    let said = text(&output.stderr);
+    assert!(
+        said.contains("the mesh has 1 closed part of Euler characteristic 0, the grid"),
+        "{said}"
+    );
+    let outcome: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(outcome["same_topology"], false, "{outcome}");
+}
+
+/// An open scan with noise becomes a new mesh with the volume that it had when it was closed.
+#[test]
+fn an_open_mesh_is_repaired_and_its_noise_taken_off_in_one_go() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut mesh = surfaces::samples::lever(64).unwrap().into_mesh();
+    mesh.normals = Some(mesh.vertex_normals());
+    mesh.roughen(0.003, 7);
+    mesh.normals = None;
+    mesh.faces.drain(..3);
+    surfaces::write(folder.path().join("open.obj"), &mesh).unwrap();
+    let fair = ["fair", "open.obj", "--repair", "--remesh", "--cells", "64"];
+    let outcome = outcome(folder.path(), &[&fair[..], &["--output", "run"]].concat());
+    let of = |name: &str| outcome["mesh"][name].as_f64().unwrap();
+    assert!(of("noise") > 0.0 && of("volume_change_percent").abs() < 1e-6);
+    assert!(of("displacement_rms_percent") < 1.0, "{outcome}");
+    assert_eq!(outcome["same_topology"], true, "{outcome}");
+    let made = surfaces::read(folder.path().join("run/final.obj")).unwrap();
+    assert!(surfaces::ClosedMesh::new(made).is_ok());
+}
+
 #[test]
 fn meshes_are_converted_as_they_are() {
     let folder = tempfile::tempdir().unwrap();

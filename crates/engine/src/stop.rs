@@ -125,8 +125,13 @@ fn is_near_side<const D: usize>(u: &Field<D>) -> bool {
 impl fmt::Display for Stop {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Steps(1) => f.write_str("one step is made"),
             Self::Steps(steps) => write!(f, "{steps} steps are made"),
-            Self::Time(time) => write!(f, "the time {time:e} is reached"),
+            Self::Time(time) => {
+                // Of the digits of a computed time five say enough.
+                let rounded: f64 = format!("{time:.4e}").parse().unwrap_or(*time);
+                write!(f, "the time {rounded:e} is reached")
+            }
             Self::Energy(energy) => write!(f, "the Willmore energy is at most {energy}"),
             Self::EnergyRatio(ratio) => {
                 write!(

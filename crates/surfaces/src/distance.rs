@@ -128,6 +128,12 @@ impl MeshDistance {
         Ok(Field::from_values(grid, values)?)
     }
 
+    /// The distances of many points, in parallel.
+    pub fn signed_distances(&self, points: &[[f64; 3]]) -> Vec<f64> {
+        let points = points.par_iter();
+        points.map(|&x| self.signed_distance(x)).collect()
+    }
+
     /// For every block of `BLOCK^3` nodes, `reach` with its sign if all of the block is further away.
     fn far_blocks(&self, reach: f64, grid: &Grid<3>) -> Vec<Option<f64>> {
         let blocks = grid.cells().div_ceil(BLOCK);
@@ -192,10 +198,8 @@ impl SignedDistance<3> for MeshDistance {
 /// The Hausdorff distance of two meshes at their vertices: how far the farthest vertex of one is from the faces of the other.
 pub fn hausdorff_distance(a: &ClosedMesh, b: &ClosedMesh) -> f64 {
     let farthest = |points: &ClosedMesh, from: &ClosedMesh| {
-        let distance = MeshDistance::new(from);
-        let points = points.mesh().vertices.par_iter();
-        let of = |&x: &[f64; 3]| distance.signed_distance(x).abs();
-        points.map(of).reduce(|| 0.0, f64::max)
+        let distances = MeshDistance::new(from).signed_distances(&points.mesh().vertices);
+        distances.into_iter().map(f64::abs).fold(0.0, f64::max)
     };
     farthest(a, b).max(farthest(b, a))
 }

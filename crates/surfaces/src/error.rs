@@ -31,6 +31,14 @@ pub enum Error {
     /// A mesh without faces.
     #[error("the mesh has no faces; a surface needs at least four")]
     NoFaces,
+    /// Triangles that enclose nothing, however they are closed.
+    #[error(
+        "the mesh encloses nothing that could be repaired: nowhere on a grid of cells of {spacing:.3e} do its faces wind round by more than half"
+    )]
+    EnclosesNothing {
+        /// Side of the cells of the grid on which it was looked for.
+        spacing: f64,
+    },
     /// A coordinate is NaN or infinite, or does not fit the numbers of the file.
     #[error("vertex {vertex} is {position:?}; all coordinates must be finite{}", within(*limit))]
     NonFiniteVertex {

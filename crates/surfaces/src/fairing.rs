@@ -4,6 +4,7 @@ use geometry::{Field, Placement, is_thin};
 use rayon::prelude::*;
 
 use crate::level_set::LevelSet;
+use crate::vector::{Vector, corners};
 use crate::{ClosedMesh, Error, MeshDistance, TriangleMesh};
 
 /// Most rounds of Taubin's smoothing before the flow, and their factors.
@@ -16,10 +17,12 @@ const TIME: f64 = 8.0;
 /// and by all of it, what would go further is the shape: the part of the noise that waves of the shape have stays on. On all meshes
 /// that were tried the distance to the clean surface is least near these values, whatever they were smoothed by.
 const FARTHEST: [f64; 2] = [0.92, 0.945];
+/// Along the surface no vertex is moved by more than so many standard deviations: there is no noise beyond.
+const SLIDING: f64 = 3.0;
 /// Waves of so many interface widths are long.
 const LONG: f64 = 4.0;
-/// A vertex that is further from the zero level set at the beginning than so many standard deviations of the noise, or than so many
-/// interface widths, belongs to something that the grid does not resolve.
+/// A vertex that is further from the zero level set at the beginning than so many standard deviations of the noise, or without noise than
+/// so many interface widths, belongs to something that the grid does not resolve.
 const RESOLVED: (f64, f64) = (3.0, 0.25);
 /// How far from where they began, in interface widths, vertices are looked for: a level set that is further off was not followed.
 const REACH: f64 = 4.0;
@@ -119,7 +122,11 @@ impl Fairing {
     ) -> Result<Followed, Error> {
         let vertices = self.start.mesh().vertices.iter();
         let vertices: Vec<_> = vertices.map(|&x| placement.apply(x)).collect();
-        let own = (RESOLVED.0 * self.noise * placement.scale()).max(RESOLVED.1 * eps);
+        let own = if self.noise > 0.0 {
+            RESOLVED.0 * self.noise * placement.scale()
+        } else {
+            RESOLVED.1 * eps
+        };
         // Zero up to `own`, all of it from twice that.
         let kept = |s: f64| {
             let t = (s.abs() / own - 1.0).clamp(0.0, 1.0);
@@ -134,15 +141,21 @@ impl Fairing {
         })
     }
 
-    /// Whether each vertex is at something that the grid does not hold: too far from the zero level set at the beginning, or where the start,
-    /// or the gap before it, is thinner than `width`.
+    /// Whether each vertex is at something that the grid does not hold: too far from the zero level set at the beginning, or at a face where the
+    /// start, or the gap before it, is thinner than `width`.
     pub fn unresolved(&self, followed: &Followed, width: f64) -> Vec<bool> {
         let mesh = self.start.mesh();
         let distance = MeshDistance::new(&self.start);
-        let points = mesh.vertices.par_iter().zip(mesh.vertex_normals());
-        let thin = points.map(|(&x, normal)| is_thin(&distance, x, normal, width));
-        let pairs = thin.zip(&followed.levels);
-        pairs.map(|(thin, level)| thin || *level != 0.0).collect()
+        let far = RESOLVED.1 * followed.eps;
+        let mut lost: Vec<bool> = (followed.levels.iter().map(|level| level.abs() > far)).collect();
+        let thin = mesh.faces.par_iter().filter(|&&face| {
+            let centre = corners(mesh, face).into_iter().sum::<Vector>() / 3.0;
+            is_thin(&distance, centre.to_array(), mesh.face_normal(face), width)
+        });
+        for vertex in thin.collect::<Vec<_>>().into_iter().flatten() {
+            lost[*vertex as usize] = true;
+        }
+        lost
     }
 
     /// How far the vertices have gone along the normals of the start when the phase field is `u`, root of the mean square.
@@ -209,11 +222,13 @@ impl Followed {
     }
 }
 
-/// As many rounds of Taubin's smoothing as move the vertices along the normals by no more than most of the noise.
+/// As many rounds of Taubin's smoothing as move the vertices along the normals by no more than most of the noise, and along the surface,
+/// where it would make edges alike, by no more than noise does.
 fn without_short_waves(rough: &ClosedMesh, noise: f64) -> ClosedMesh {
     let mut smooth = rough.clone();
     for _ in 0..ROUNDS {
-        let next = smooth.mesh().smoothed(1, TAUBIN[0], TAUBIN[1]);
+        let mut next = smooth.mesh().smoothed(1, TAUBIN[0], TAUBIN[1]);
+        hold_along_surface(&mut next, rough.mesh(), SLIDING * noise);
         let moved = along_normals(&next, rough.mesh(), &next);
         match ClosedMesh::new(next) {
             Ok((next, _)) if moved <= FARTHEST[0] * noise => smooth = next,
@@ -224,6 +239,17 @@ fn without_short_waves(rough: &ClosedMesh, noise: f64) -> ClosedMesh {
     smooth
 }
 
+/// Shortens the ways of the vertices from those of a rough mesh along the surface to a length.
+fn hold_along_surface(mesh: &mut TriangleMesh, rough: &TriangleMesh, longest: f64) {
+    let normals = mesh.vertex_normals();
+    for ((x, from), normal) in mesh.vertices.iter_mut().zip(&rough.vertices).zip(normals) {
+        let here = Vector::from_array(*x);
+        let way = here - Vector::from_array(*from);
+        let along = way.reject_from_normalized(normal.into());
+        *x = (here - along + along.clamp_length_max(longest)).to_array();
+    }
+}
+
 /// The root of the mean square of the way between the vertices of two meshes along the normals of a smooth one.
 fn along_normals(smooth: &TriangleMesh, from: &TriangleMesh, to: &TriangleMesh) -> f64 {
     let normals = smooth.vertex_normals();
@@ -231,12 +257,4 @@ fn along_normals(smooth: &TriangleMesh, from: &TriangleMesh, to: &TriangleMesh) 
     let squares =
         pairs.map(|((a, b), n)| (0..3).map(|i| (b[i] - a[i]) * n[i]).sum::<f64>().powi(2));
     (squares.sum::<f64>() / normals.len().max(1) as f64).sqrt()
-}
-
-/// Of the distances between the points of two lists, with the largest.
-pub fn root_mean_square(from: &[[f64; 3]], to: &[[f64; 3]]) -> (f64, f64) {
-    let squares = from.iter().zip(to);
-    let squares = squares.map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>());
-    let (sum, largest) = squares.fold((0.0, 0.0_f64), |(s, l), d| (s + d, l.max(d)));
-    ((sum / from.len().max(1) as f64).sqrt(), largest.sqrt())
 }

@@ -22,8 +22,10 @@ const MENDED: f64 = 0.25;
 const GOOD: f64 = 30.0;
 /// Angles of fewer degrees may only become larger.
 const FAIR: f64 = 20.0;
-/// The same for cosines of the angles between a face and the normals of the level set at its corners.
+/// The same for cosines of the angles between a face and the normals of the level set at its corners,
 const AGREEING: f64 = 0.5;
+/// and in creases, where normals turn within a triangle and only slivers agree with all of them, for angles that are not fair.
+const IN_CREASES: f64 = 0.0;
 /// How far points are projected, in cells,
 const REACH: f64 = 0.5;
 /// and how close to the level set they are then.
@@ -63,7 +65,8 @@ pub fn remeshed_surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
         remeshing.flip_edges();
         remeshing.relax();
     }
-    remeshing.mend();
+    remeshing.mend(GOOD, AGREEING);
+    remeshing.mend(FAIR, IN_CREASES);
     Ok(match ClosedMesh::new(remeshing.finish()) {
         Ok((closed, warnings)) if warnings.is_empty() => closed.into_mesh(),
         _ => marched,
@@ -110,8 +113,8 @@ impl Verdict {
         self.agreement >= before.agreement.min(AGREEING) && self.angle >= before.angle.min(FAIR)
     }
 
-    fn is_better_than(self, before: Self) -> bool {
-        self.agreement >= before.agreement.min(AGREEING) && self.angle > before.angle + 1e-3
+    fn is_better_than(self, before: Self, agreeing: f64) -> bool {
+        self.agreement >= before.agreement.min(agreeing) && self.angle > before.angle + 1e-3
     }
 }
 
@@ -286,13 +289,14 @@ impl<'a> Remeshing<'a> {
         }
     }
 
-    /// Whether all edges stay short if an edge collapses to a point.
+    /// Whether all edges stay short, or hardly become longer, if an edge collapses to a point.
     fn stay_short(&self, h: u32, point: Point) -> bool {
         let ends = [self.surface.from(h), self.surface.to(h)];
         let mut around = ends.iter().flat_map(|&v| self.surface.around(v));
         around.all(|g| {
             let x = self.point(self.surface.to(g)).x;
-            x.distance(point.x) <= LONG * LENGTH * self.spacing
+            let longest = (LONG * LENGTH * self.spacing).max(1.1 * self.length(g));
+            x.distance(point.x) <= longest
         })
     }
 
@@ -329,7 +333,7 @@ impl<'a> Remeshing<'a> {
             if self.surface.leads(h)
                 && self.faces_obtuse_angle(h)
                 && let Some([before, after]) = self.verdicts(Change::Flip(h))
-                && after.is_better_than(before)
+                && after.is_better_than(before, AGREEING)
             {
                 self.make(Change::Flip(h));
             }
@@ -366,15 +370,15 @@ impl<'a> Remeshing<'a> {
     }
 
     /// Makes the best of all changes at every triangle that is still bad, until none is better than what is there.
-    fn mend(&mut self) {
+    fn mend(&mut self, good: f64, agreeing: f64) {
         let mut left = (MENDED * f64::from(self.surface.len() / 3)) as usize;
         for _ in 0..MENDING {
             let mut mended = false;
             for h in (0..self.surface.len()).step_by(3) {
-                let bad = self.surface.exists(h) && smallest_angle(self.corners(h)) < GOOD;
+                let bad = self.surface.exists(h) && smallest_angle(self.corners(h)) < good;
                 if bad && self.has_free_ends(h) && left > 0 {
                     left -= 1;
-                    mended |= self.mend_triangle(h);
+                    mended |= self.mend_triangle(h, agreeing);
                 }
             }
             if !mended {
@@ -383,11 +387,11 @@ impl<'a> Remeshing<'a> {
         }
     }
 
-    fn mend_triangle(&mut self, h: u32) -> bool {
+    fn mend_triangle(&mut self, h: u32, agreeing: f64) -> bool {
         let mut best: Option<(f64, Change)> = None;
         for change in self.changes(h) {
             if let Some([before, after]) = self.verdicts(change)
-                && after.is_better_than(before)
+                && after.is_better_than(before, agreeing)
                 && best.is_none_or(|(angle, _)| after.angle > angle)
             {
                 best = Some((after.angle, change));

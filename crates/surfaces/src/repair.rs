@@ -59,8 +59,7 @@ impl fmt::Display for Repaired {
 /// many cells a side, of which the mesh fills four fifths.
 ///
 /// # Errors
-/// [`Error::NoFaces`], [`Error::NonFiniteVertex`], [`Error::IndexOutOfRange`]; what [`ClosedMesh::new`] says of a surface of which nothing is
-/// inside.
+/// [`Error::NoFaces`], [`Error::NonFiniteVertex`], [`Error::IndexOutOfRange`]; [`Error::EnclosesNothing`].
 pub fn repair(mesh: &TriangleMesh, cells: usize) -> Result<Repaired, Error> {
     mesh.check(1e70)?;
     let bounds = mesh.bounding_box().filter(|_| !mesh.faces.is_empty());
@@ -84,7 +83,12 @@ pub fn repair(mesh: &TriangleMesh, cells: usize) -> Result<Repaired, Error> {
     })?;
     let eps = EPS_OVER_H * grid.spacing();
     let u = signed(&unsigned, &winding)?.map(|s| optimal_profile(s, eps));
-    let (new, _) = ClosedMesh::new(remeshed_surface(&u, eps)?)?;
+    let new = remeshed_surface(&u, eps)?;
+    if new.faces.is_empty() {
+        let spacing = grid.spacing();
+        return Err(Error::EnclosesNothing { spacing });
+    }
+    let (new, _) = ClosedMesh::new(new)?;
     let far_part = |points: &TriangleMesh, distance: &(dyn Fn(Vector) -> f64 + Sync)| {
         let (mut far, mut all) = (0.0, 0.0);
         for (x, _, area) in points.sides(usize::MAX) {

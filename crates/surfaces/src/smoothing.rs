@@ -3,8 +3,10 @@
 use crate::TriangleMesh;
 use crate::vector::{Vector, corners};
 
-/// The median of the absolute value of a normally distributed number over its standard deviation.
-const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_082;
+/// Rounds in which the squares of noise are averaged over neighbours, some forty of them,
+const AVERAGING: usize = 12;
+/// and the root of the median of these means over that of the mean, of independent normally distributed numbers at regular vertices.
+const MEDIAN_OF_MEANS: f64 = 0.99;
 
 /// The neighbours of every vertex along edges, in ascending order.
 struct Umbrellas {
@@ -216,8 +218,9 @@ impl TriangleMesh {
 
     /// The standard deviation of the noise of the vertices along their normals, as far as it is independent from vertex to vertex.
     ///
-    /// It is the median of `|n . L L x|` over the vertices, each divided by the norm of its coefficients: twice the Laplacian `L`
-    /// takes away what varies slowly, and the median what bends in few places, such as edges. A surface without noise has a
+    /// It is the root of the median over the vertices of means over their neighbours of `(n . L L x)^2`, each divided by the sum of the
+    /// squares of its coefficients: twice the Laplacian `L` takes away what varies slowly, the mean is the variance whatever the
+    /// distribution, and the median takes away what bends in few places, such as edges. A surface without noise has a
     /// small one, by its curvature. Zero for a mesh without faces.
     pub fn noise(&self) -> f64 {
         let umbrellas = Umbrellas::of(self);
@@ -228,18 +231,23 @@ impl TriangleMesh {
         // Normals of the smoothed mesh: noise turns those of the mesh itself, towards the plane of their neighbours.
         let normals = self.smoothed(12, 0.5, -0.53).vertex_normals();
         let mut weights = Vec::new();
-        let mut sizes: Vec<f64> = (0..x.len())
-            .filter(|&v| umbrellas.of_vertex(v).len() > 2)
-            .map(|v| {
-                let squares = umbrellas.squared_weights(v, &mut weights);
-                twice[v].dot(Vector::from_array(normals[v])).abs() / squares.sqrt()
-            })
+        let inner: Vec<bool> = (0..x.len())
+            .map(|v| umbrellas.of_vertex(v).len() > 2)
             .collect();
-        if sizes.is_empty() {
+        // A number at each vertex, as a vector.
+        let mut squares = vec![Vector::ZERO; x.len()];
+        for v in (0..x.len()).filter(|&v| inner[v]) {
+            let along = twice[v].dot(Vector::from_array(normals[v]));
+            squares[v].x = along * along / umbrellas.squared_weights(v, &mut weights);
+        }
+        umbrellas.smooth(&mut squares, AVERAGING, [0.5, 0.0]);
+        let means = squares.iter().zip(inner).filter(|(_, inner)| *inner);
+        let mut means: Vec<f64> = means.map(|(mean, _)| mean.x).collect();
+        if means.is_empty() {
             return 0.0;
         }
-        let middle = sizes.len() / 2;
-        let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-        *median / MEDIAN_OF_NORMAL
+        let middle = means.len() / 2;
+        let (_, median, _) = means.select_nth_unstable_by(middle, f64::total_cmp);
+        median.sqrt() / MEDIAN_OF_MEANS
     }
 }

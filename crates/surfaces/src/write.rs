@@ -22,6 +22,16 @@ use crate::{Error, TriangleMesh};
 /// [`Error::Geometry`] if the file cannot be written.
 pub fn write(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<(), Error> {
     let path = path.as_ref();
+    let bytes = encode(path, mesh)?;
+    Ok(write_atomically(path, |out| out.write_all(&bytes))?)
+}
+
+/// The bytes that [`write()`] puts into a file of that name.
+///
+/// # Errors
+/// Those of [`write()`] but the last.
+pub fn encode(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<Vec<u8>, Error> {
+    let path = path.as_ref();
     let format = Format::of(path)?;
     mesh.check(match format {
         Format::Stl => f64::from(f32::MAX),
@@ -34,12 +44,18 @@ pub fn write(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<(), Error> {
     if faces == 0 {
         return Err(Error::NoFaces);
     }
-    write_atomically(path, |out| match format {
-        Format::Obj => obj(out, mesh),
-        Format::Ply => ply(out, mesh),
-        Format::Stl => stl(out, mesh, faces),
+    let mut bytes = Vec::new();
+    match format {
+        Format::Obj => obj(&mut bytes, mesh),
+        Format::Ply => ply(&mut bytes, mesh),
+        Format::Stl => stl(&mut bytes, mesh, faces),
+    }
+    .map_err(|source| geometry::Error::Io {
+        action: "encode",
+        path: path.into(),
+        source,
     })?;
-    Ok(())
+    Ok(bytes)
 }
 
 fn obj(out: &mut dyn Write, mesh: &TriangleMesh) -> io::Result<()> {

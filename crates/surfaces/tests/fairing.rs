@@ -41,6 +41,26 @@ fn noise_is_estimated_to_five_percent_and_is_next_to_nothing_on_a_smooth_surface
     }
 }
 
+/// The variance is that of any distribution.
+#[test]
+fn noise_need_not_be_normally_distributed_nor_along_the_normals() {
+    let clean = sphere([0.0; 3], 1.0, 5);
+    let deviation = 0.01;
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let mut sum = |count: usize| (0..count).map(|_| rng.random::<f64>() - 0.5).sum::<f64>();
+    let (mut uniform, mut isotropic) = (clean.clone(), clean.clone());
+    for (vertex, normal) in clean.vertex_normals().into_iter().enumerate() {
+        let length = 12.0_f64.sqrt() * deviation * sum(1);
+        let x = clean.vertices[vertex];
+        uniform.vertices[vertex] = std::array::from_fn(|i| x[i] + length * normal[i]);
+        isotropic.vertices[vertex] = x.map(|x| x + deviation * sum(12));
+    }
+    for noisy in [uniform, isotropic] {
+        let estimate = noisy.noise();
+        assert!((estimate / deviation - 1.0).abs() < 0.05, "{estimate}");
+    }
+}
+
 #[test]
 fn smoothing_keeps_size_with_taubins_factors_and_shrinks_with_laplacian_ones() {
     let noisy = with_noise(&sphere([0.0; 3], 1.0, 4), 0.01);

@@ -43,7 +43,7 @@ fn triangles(mesh: &TriangleMesh) -> impl Iterator<Item = [Vector; 3]> {
 }
 
 /// Smallest angles of the triangles in degrees, in ascending order.
-fn smallest_angles(mesh: &TriangleMesh) -> Vec<f64> {
+pub fn smallest_angles(mesh: &TriangleMesh) -> Vec<f64> {
     let smallest = |x: [Vector; 3]| {
         let angle = |i: usize| {
             let (a, b) = (minus(x[(i + 1) % 3], x[i]), minus(x[(i + 2) % 3], x[i]));

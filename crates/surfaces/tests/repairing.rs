@@ -2,6 +2,8 @@
 
 use surfaces::{ClosedMesh, TriangleMesh, repair, samples};
 
+use crate::remeshing::smallest_angles;
+
 /// The mesh without the faces whose centres are near a point.
 fn with_hole(mesh: &TriangleMesh, at: [f64; 3], radius: f64) -> TriangleMesh {
     let mut open = mesh.clone();
@@ -94,6 +96,29 @@ fn what_crosses_itself_becomes_one() {
     assert!(repaired.dropped > 0.2, "{repaired}");
 }
 
+/// Two levers that cross each other, some of their sides at small angles.
+#[test]
+fn there_are_no_slivers_in_creases() {
+    let mut two = samples::lever(96).unwrap().into_mesh();
+    two.normals = None;
+    let (count, faces) = (two.vertices.len() as u32, two.faces.clone());
+    let moved = two
+        .vertices
+        .iter()
+        .map(|[x, y, z]| [x + 0.05, y + 0.02, z + 0.03]);
+    two.vertices.extend(moved.collect::<Vec<_>>());
+    two.faces
+        .extend(faces.iter().map(|face| face.map(|v| v + count)));
+    let repaired = repair(&two, 112).unwrap();
+    let angles = smallest_angles(repaired.mesh.mesh());
+    let good = angles.iter().filter(|&&angle| angle > 25.0).count();
+    assert!(
+        angles[0] > 15.0 && 100 * good > 99 * angles.len(),
+        "{}",
+        angles[0]
+    );
+}
+
 #[test]
 fn a_closed_mesh_stays_as_it_is() {
     let lever = samples::lever(64).unwrap();
@@ -108,4 +133,13 @@ fn a_closed_mesh_stays_as_it_is() {
         "{repaired}"
     );
     assert!(repair(&TriangleMesh::default(), 32).is_err());
+    let sheet = TriangleMesh {
+        vertices: [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+            .map(|[x, y]| [x, y, 0.0])
+            .into(),
+        faces: vec![[0, 1, 2], [0, 2, 3]],
+        normals: None,
+    };
+    let refused = repair(&sheet, 32).unwrap_err().to_string();
+    assert!(refused.contains("encloses nothing"), "{refused}");
 }

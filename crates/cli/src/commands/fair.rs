@@ -24,6 +24,12 @@ fn graded(spacing: f64) -> StepRule {
 }
 
 impl FairOptions {
+    /// Whether it ends as soon as something is reached, which must not be jumped over.
+    fn takes_small_steps(&self) -> bool {
+        let ratio = self.energy_ratio.or(self.flow.energy);
+        self.noise.is_some() || ratio.is_some() || !self.ends
+    }
+
     /// A segmentation, whose volume is kept.
     fn load_volume(&mut self, say: SayOptions) -> Result<Loaded, Error> {
         for (name, given) in [
@@ -73,10 +79,10 @@ impl FlowCommand for FairOptions {
                 return Err(Error::options(format!("{name} {value} must be positive")));
             }
         }
-        let usual = if self.ends {
-            StepRule::Controlled
-        } else {
+        let usual = if self.takes_small_steps() {
             graded(f64::NAN)
+        } else {
+            StepRule::Controlled
         };
         self.flow.check_tolerance(usual)?;
         if let Some(ratio) = self.energy_ratio.filter(|ratio| *ratio >= 1.0) {
@@ -100,23 +106,16 @@ impl FlowCommand for FairOptions {
         let ends = self.ends;
         let eps_over_h = self.flow.scheme.eps_over_h();
         let input = &mut self.flow.input;
-        let path = match (input::mesh_file(input)?, self.remesh) {
-            (Some(path), false) => path,
-            (path, _) => {
-                let reason = match path {
-                    Some(_) => "--remesh leaves no vertices by which noise could be measured",
-                    None => "only a mesh in a file has noise to take off",
-                };
-                if self.noise.is_some() || self.keep.is_some() || !ends {
-                    return Err(Error::options(format!(
-                        "{reason}: say how smooth the surface is to become, by --energy-ratio, --time, --energy or --steps, without \
-                         --noise and --keep"
-                    )));
-                }
-                return input::load(input, eps_over_h, say);
+        let Some(path) = input::mesh_file(input)? else {
+            if input.input.is_some() && (self.noise.is_some() || self.keep.is_some() || !ends) {
+                return Err(Error::options(
+                    "only a mesh in a file has noise to take off: say how smooth the surface is to become, by --energy-ratio, --time, \
+                     --energy or --steps, without --noise and --keep",
+                ));
             }
+            return input::load(input, eps_over_h, say);
         };
-        if input.repair {
+        if input.repair && !self.remesh {
             return Err(Error::options(
                 "--repair makes a new mesh: write it by `willmore sample --repair --save`, which can then be faired, or give --remesh",
             ));
@@ -124,9 +123,14 @@ impl FlowCommand for FairOptions {
         if let Some(mask) = self.keep.as_deref().and_then(Keep::mask) {
             self.keep = Some(input::absolute(mask)?.to_string_lossy().into_owned());
         }
-        let bytes = std::fs::read(&path).map_err(Error::io("read", &path))?;
+        let bytes = if input.repair {
+            surfaces::encode(&path, input::closed(&path, true, say)?.mesh())?
+        } else {
+            std::fs::read(&path).map_err(Error::io("read", &path))?
+        };
         let noise = self.noise.or(ends.then_some(0.0));
         let (mut own, warnings) = OwnMesh::new(&path, bytes, noise, self.keep.clone())?;
+        own.is_new = self.remesh;
         own.keeps_volume = self.flow.volume == Some(SizeTarget::Keep);
         for warning in warnings {
             say.warn(&format!("{}: {warning}", path.display()));
@@ -165,7 +169,7 @@ impl FlowCommand for FairOptions {
     }
 
     fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
-        if self.noise.is_some() {
+        if self.takes_small_steps() {
             let spacing = scales.eps / self.flow.scheme.eps_over_h();
             self.flow.tau.get_or_insert(graded(spacing));
         }

@@ -211,14 +211,14 @@ impl Shared<'_> {
     }
 
     fn stops(&self, rule: StepRule) -> Vec<Stop> {
-        let mut stops: Vec<Stop> = (self.steps.map(Stop::Steps).into_iter())
-            .chain(self.time.map(Stop::Time))
-            .chain(self.energy.map(Stop::Energy))
-            .collect();
+        // What has gone wrong is said before what was asked for.
+        let mut stops = vec![Stop::Vanished, Stop::NoSurface, Stop::AtTheSide];
+        stops.extend(self.steps.map(Stop::Steps));
+        stops.extend(self.time.map(Stop::Time));
+        stops.extend(self.energy.map(Stop::Energy));
         if matches!(rule, StepRule::ByEnergy(_) | StepRule::Controlled) {
             stops.push(Stop::EnergyAtRest);
         }
-        stops.extend([Stop::NoSurface, Stop::Vanished, Stop::AtTheSide]);
         stops
     }
 }
