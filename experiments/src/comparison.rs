@@ -6,7 +6,7 @@ use geometry::measure::perimeter;
 use crate::prelude::*;
 use crate::steps::{self, Rows};
 use crate::study::{self, Study, StudyOptions, Variant};
-use crate::truth::{self, CELLS, Reached, STRICT, Sample, Truth};
+use crate::truth::{self, CELLS, Reached, Sample, Truth};
 
 pub struct Setting {
     /// Name of the program and its folder, and prefix of the metrics.
@@ -152,7 +152,7 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
         run.compare_with_exact(setting, &exact)?;
     }
     let second_order = match flow {
-        Flow::Willmore => setting.second_order(&mut session, steps, &exact)?,
+        Flow::Willmore => setting.second_order(&mut session, steps, &exact, quick)?,
         Flow::MeanCurvature => Vec::new(),
     };
     let comparison = Comparison {
@@ -196,45 +196,38 @@ impl Setting {
         })
     }
 
-    /// Controlled steps of second order with the accurate operator at two to `eps`, at the end and at halves of that time, and their
-    /// extrapolation to `eps = 0` from stricter steps.
+    /// Controlled steps of second order with the accurate operator at two to `eps`, at the end and at halves of that time, and the same
+    /// extrapolated to `eps = 0` from stricter steps.
     fn second_order(
         &self,
         session: &mut Session<'_>,
         steps: usize,
         exact: &BTreeMap<usize, Truth>,
+        quick: bool,
     ) -> Result<Vec<SecondOrder>, Error> {
         let halves = (steps / 8).checked_ilog2().unwrap_or(0);
         let halves = halves.min(steps.trailing_zeros());
         let marks: Vec<usize> = (0..=halves).rev().map(|k| steps >> k).collect();
-        let mut reached = |n, control, name| {
-            let time_steps = truth::controlled(control, time(steps), halves);
-            let run =
-                self.sample
-                    .run(session, n, truth::ACCURATE, (name, time_steps, time(steps)))?;
-            let at = marks
-                .iter()
-                .map(|k| Ok((*k, Reached::of(&self.sample, &run, &exact[k])?)));
-            at.collect::<Result<BTreeMap<_, _>, Error>>()
-        };
-        let [double, single] = CELLS;
-        let controlled = reached(single, ErrorControl::default(), "controlled")?;
-        let coarse = reached(double, STRICT, "controlled_strict")?;
-        let fine = reached(single, STRICT, "controlled_strict")?;
-        let extrapolated = fine.iter().map(|(k, fine)| {
-            let both = Reached::extrapolated(&coarse[k], fine, &exact[k]);
-            (*k, both)
-        });
+        let truths = || marks.iter().map(|k| &exact[k]);
+        let (n, end) = (CELLS[1], time(steps));
+        let controlled = truth::controlled(ErrorControl::default(), end, halves);
+        let run = ("controlled", controlled, end);
+        let run = self.sample.run(session, (n, 2.0), truth::ACCURATE, run)?;
+        let controlled = truths().map(|exact| Reached::of(&self.sample, &run, exact));
+        let controlled = controlled.collect::<Result<Vec<_>, Error>>()?;
+        let coarser = if quick { 4 } else { 1 };
+        let extrapolated = (self.sample).extrapolated(session, (end, halves), truths(), coarser)?;
+        let at = |reached: Vec<Reached>| marks.iter().copied().zip(reached).collect();
         Ok(vec![
             SecondOrder {
-                key: format!("n{single}.controlled"),
-                label: format!("second order, controlled steps, n = {single}"),
-                at: controlled,
+                key: format!("n{n}.controlled"),
+                label: format!("second order, controlled steps, n = {n}"),
+                at: at(controlled),
             },
             SecondOrder {
                 key: "extrapolated".to_owned(),
                 label: "second order, extrapolated to ε = 0".to_owned(),
-                at: extrapolated.collect(),
+                at: at(extrapolated),
             },
         ])
     }

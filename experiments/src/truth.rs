@@ -19,9 +19,29 @@ pub struct Sample<const D: usize> {
     pub initial: fn(Grid<D>, f64) -> Result<Field<D>, geometry::Error>,
     /// The curve, or the profile of the surface.
     pub curve: fn() -> Result<Shape, reference::Error>,
+    /// Of runs that are extrapolated to `eps = 0`.
+    pub grids: Grids,
     /// Points of the zero level of a phase field with an interface width: of the curve, or of the profile.
     pub level: fn(&Field<D>, f64) -> Result<Vec<[f64; 2]>, surfaces::Error>,
 }
+
+/// Two grids, the finer one with half the `eps` of the other.
+pub struct Grids {
+    /// Cells per unit length.
+    pub cells: [usize; 2],
+    pub eps_over_h: f64,
+}
+
+/// With two cells to `eps` the lattice holds slow flows back by as much as the extrapolation leaves.
+const FINE: Grids = Grids {
+    cells: [256, 512],
+    eps_over_h: 4.0,
+};
+/// No network in space has more cells to `eps`.
+const FINE_IN_SPACE: Grids = Grids {
+    cells: [32, 64],
+    eps_over_h: 2.0,
+};
 
 /// The non-convex cross: arms of half length 0.8 and half width 0.27.
 pub const CROSS: Sample<2> = Sample {
@@ -30,6 +50,7 @@ pub const CROSS: Sample<2> = Sample {
     side: 2.0,
     initial: |grid, eps| phase_field(grid, &Cross::new(0.8, 0.27)?, eps),
     curve: || Shape::cross(0.8, 0.27),
+    grids: FINE,
     level,
 };
 
@@ -40,6 +61,7 @@ pub const RECTANGLE: Sample<2> = Sample {
     side: 1.5,
     initial: |grid, eps| phase_field(grid, &Cuboid::new([0.2, 0.1])?, eps),
     curve: || Shape::rectangle(0.2, 0.1),
+    grids: FINE,
     level,
 };
 
@@ -49,6 +71,7 @@ pub const ELLIPSE: Sample<2> = Sample {
     side: 1.5,
     initial: |grid, eps| phase_field(grid, &Ellipse::new([0.3, 0.2])?, eps),
     curve: || Shape::ellipse(0.3, 0.2),
+    grids: FINE,
     level,
 };
 
@@ -64,6 +87,7 @@ pub const DISK: Sample<3> = Sample {
         phase_field(grid, &Cylinder::new(radius, half_height)?, eps)
     },
     curve: || Shape::rectangle(THICK_DISK[0], THICK_DISK[1]),
+    grids: FINE_IN_SPACE,
     level: profile,
 };
 
@@ -78,13 +102,14 @@ pub const ELLIPSOID: Sample<3> = Sample {
         phase_field(grid, &distance, eps)
     },
     curve: || Shape::ellipse(0.3, 0.2),
+    grids: FINE_IN_SPACE,
     level: profile,
 };
 
 /// The operator of runs against the exact flow.
 pub const ACCURATE: (Method, Scheme) = (Method::Hybrid, Scheme::Accurate);
 
-/// Cells per unit length of runs by the accurate operator, two to `eps`; the errors of the two are extrapolated to `eps = 0`.
+/// Cells per unit length of runs by the accurate operator, two to `eps`.
 pub const CELLS: [usize; 2] = [64, 128];
 
 /// Controlled steps with a time error well below that in `eps`; their minimizations are accurate, too. The first step is as long as that of other
@@ -120,11 +145,11 @@ impl<const D: usize> Sample<D> {
         })
     }
 
-    /// Willmore flow with `eps = 2/n` up to a time, in such steps.
+    /// Willmore flow on `n` cells per unit length, so many to `eps`, up to a time in such steps.
     pub fn run(
         &self,
         session: &mut Session<'_>,
-        n: usize,
+        (n, eps_over_h): (usize, f64),
         variant: (Method, Scheme),
         (name, steps, end): (&str, TimeSteps, f64),
     ) -> Result<Trajectory<D>, Error> {
@@ -140,7 +165,7 @@ impl<const D: usize> Sample<D> {
         };
         let scales = Scales {
             newton,
-            ..Scales::of_grid(grid.spacing(), 2.0)
+            ..Scales::of_grid(grid.spacing(), eps_over_h)
         };
         let needed = scales.needs(D, grid.spacing());
         let operator = Operator::new(variant, &Networks::default(), &needed, &grid, &scales)?;
@@ -151,6 +176,29 @@ impl<const D: usize> Sample<D> {
         case.measures = Measure::crossings(0.0);
         let name = format!("{}-n{n}-{name}", self.key);
         session.trajectory(&name, case, &name, &Samples::every(1))
+    }
+
+    /// The flow at these times, `end / 2^k` for some `k` up to `halvings`, extrapolated to `eps = 0` from strictly controlled runs. Grids so many times
+    /// coarser give a quick look.
+    pub fn extrapolated<'e>(
+        &self,
+        session: &mut Session<'_>,
+        (end, halvings): (f64, u32),
+        exact: impl Iterator<Item = &'e Truth>,
+        coarser: usize,
+    ) -> Result<Vec<Reached>, Error> {
+        let Grids { cells, eps_over_h } = self.grids;
+        let mut run = |n| {
+            let steps = ("controlled_strict", controlled(STRICT, end, halvings), end);
+            self.run(session, (n / coarser, eps_over_h), ACCURATE, steps)
+        };
+        let (double, single) = (run(cells[0])?, run(cells[1])?);
+        exact
+            .map(|truth| {
+                let at = |run| Reached::of(self, run, truth);
+                Ok(Reached::extrapolated(&at(&double)?, &at(&single)?, truth))
+            })
+            .collect()
     }
 }
 
@@ -292,7 +340,7 @@ impl Reached {
 
     /// The same at `eps = 0` from runs at `2 eps` and at `eps`, the error being of second order in `eps`: sizes are `(4 b - a) / 3`, and the
     /// points of the finer level move on by a third of the way from the coarser one. The work is that of both.
-    pub fn extrapolated(double: &Self, single: &Self, exact: &Truth) -> Self {
+    fn extrapolated(double: &Self, single: &Self, exact: &Truth) -> Self {
         let sizes = single.sizes.iter().zip(&double.sizes);
         let sizes = sizes.map(|(&(name, b), (_, a))| (name, (4.0 * b - a) / 3.0));
         let points: Vec<[f64; 2]> = (single.points.iter())

@@ -387,7 +387,7 @@ pub struct FlowOptions {
     pub tau: Option<StepRule>,
 
     /// The estimated time error that controlled steps may make: a LENGTH in the units of the input for the whole run, or for each step a
-    /// part of how far the surface moves in it in percent [default: 2%]
+    /// part of how far the surface moves in it in percent [default: 1.5%]
     #[arg(long, value_name = "LENGTH", value_parser = tolerance, allow_hyphen_values = true)]
     pub tolerance: Option<Amount>,
 

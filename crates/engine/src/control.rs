@@ -25,7 +25,7 @@ pub struct ErrorControl {
 impl Default for ErrorControl {
     fn default() -> Self {
         Self {
-            relative: 0.02,
+            relative: 0.015,
             length: None,
             longest: 1.0,
             first: None,
@@ -171,7 +171,7 @@ mod tests {
         let mut control = controller();
         assert!((control.size(1.0) - 16.0 * EPS.powi(4)).abs() < 1e-18);
         // An error four times smaller than it may be allows twice the size, but for caution.
-        control.accept(&made(1e-3, Some(0.25 * 0.02 * 0.1), 0.01 * EPS));
+        control.accept(&made(1e-3, Some(0.25 * 0.015 * 0.1), 0.01 * EPS));
         assert!((control.size(1.0) / (2.0 * AIM * 1e-3) - 1.0).abs() < 1e-12);
         control.accept(&made(1e-3, Some(1e-12), 0.01 * EPS));
         assert!(
@@ -206,10 +206,10 @@ mod tests {
         control.accept(&made(1e-3, None, 0.1 * EPS));
         let shorter = control.shorter(&long(&far)).unwrap();
         assert!((shorter / (0.85 / 3.0 * 1e-3) - 1.0).abs() < 1e-12);
-        let wrong = made(1e-2, Some(4.0 * 0.02 * 0.1), 0.1 * EPS);
+        let wrong = made(1e-2, Some(4.0 * 0.015 * 0.1), 0.1 * EPS);
         let shorter = control.shorter(&long(&wrong)).unwrap();
         assert!((shorter / (0.5 * 0.85 * 1e-2) - 1.0).abs() < 1e-12);
-        let good = made(1e-3, Some(0.02 * 0.1), EPS);
+        let good = made(1e-3, Some(0.015 * 0.1), EPS);
         assert_eq!(control.shorter(&long(&good)), None);
     }
 
@@ -219,7 +219,7 @@ mod tests {
         control.size = 1e-3;
         assert!((control.size(1.5e-3) - 0.75e-3).abs() < 1e-18);
         assert!((control.size(0.4e-3) - 0.4e-3).abs() < 1e-18);
-        control.accept(&made(0.1e-3, Some(0.02 * 0.1), 0.1 * EPS));
+        control.accept(&made(0.1e-3, Some(0.015 * 0.1), 0.1 * EPS));
         assert!(control.size(1.0) > 0.8e-3);
     }
 

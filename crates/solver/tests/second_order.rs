@@ -94,12 +94,26 @@ fn the_order_is_two_in_the_plane() {
     );
 }
 
+fn errors_in_space(shape: &impl SignedDistance<3>, halvings: u32) -> Vec<f64> {
+    let mut flow = flow_of(32, shape);
+    time_errors(&mut flow, 4.0 * UNIT, halvings, |flow, tau| {
+        step(flow, tau);
+    })
+}
+
 #[test]
 fn the_order_is_two_in_space() {
-    let mut flow = flow_of(32, &Torus::new(0.26, 0.15).unwrap());
-    let errors = time_errors(&mut flow, 4.0 * UNIT, 2, |flow, tau| {
-        step(flow, tau);
-    });
+    let profile = Ellipse::new([0.3, 0.2]).unwrap();
+    let spheroid = |[x, y, z]: [f64; 3]| profile.signed_distance([x.hypot(y), z]);
+    let errors = errors_in_space(&spheroid, 3);
+    let order = mean_order(&errors);
+    assert!((order - 2.0).abs() < 0.15, "{order}: {errors:?}");
+}
+
+/// The radius of the tube is 2.4 interface widths: too little for displacements to be exact.
+#[test]
+fn the_order_is_nearly_two_for_thin_tubes() {
+    let errors = errors_in_space(&Torus::new(0.26, 0.15).unwrap(), 2);
     let order = mean_order(&errors);
     assert!((order - 2.0).abs() < 0.3, "{order}: {errors:?}");
 }

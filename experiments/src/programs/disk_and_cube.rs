@@ -132,7 +132,7 @@ fn compare_with_exact(
         ..first.into()
     };
     let control = ("controlled", time_steps, tau * steps as f64);
-    let run = sample.run(session, n, truth::ACCURATE, control)?;
+    let run = sample.run(session, (n, 2.0), truth::ACCURATE, control)?;
     let compare = |(&step, exact): (&usize, &Truth)| {
         let reached = Reached::of(sample, &run, exact)?;
         let key = sample.key;

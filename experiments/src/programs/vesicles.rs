@@ -223,7 +223,7 @@ fn shapes(pairs: &[Pair], quick: bool) -> Result<Figure, Error> {
             .quality(quality);
         let (branch, v, energy) = (pair.branch, pair.ratio(), pair.energy());
         let exact = pair.exact.energy() / (8.0 * PI);
-        let caption = format!("{branch}, v = {v:.2}\nw / 8π = {energy:.4}\nexact {exact:.4}");
+        let caption = format!("{branch}\nv = {v:.2}\n{energy:.4}\nexact {exact:.4}");
         raster(&scene, 320, caption)
     };
     let section = |pair: &Pair| {
@@ -249,7 +249,7 @@ fn shapes(pairs: &[Pair], quick: bool) -> Result<Figure, Error> {
         .with_panels(pictures)
         .with_panels(sections)
         .with_note(
-            "Grey: at rest, ε = 2h. Blue: the exact equilibrium. v: volume over that of the sphere with the same area.",
+            "Numbers: w / 8π. Grey: at rest, ε = 2h. Blue: the exact equilibrium. v: volume over that of the sphere with the same area.",
         ))
 }
 

@@ -17,6 +17,8 @@ const SURFACE: Sample<3> = ELLIPSOID;
 /// Times at which flows are compared, in units of `2^-14`.
 const MARKS: [usize; 4] = [8, 32, 64, 128];
 const END: f64 = 128.0 * STEP;
+/// The first mark is the end divided by two so many times.
+const HALVINGS: u32 = 4;
 
 const EULER: &str = "implicit Euler, equal steps";
 const GRADED: &str = "implicit Euler, graded steps";
@@ -82,7 +84,7 @@ fn steppings(longest: f64, quick: bool) -> Vec<Stepping> {
         ("_strict", STRICT),
     ];
     let controlled = controls.map(|(suffix, control)| {
-        let steps = truth::controlled(control, END, 4);
+        let steps = truth::controlled(control, END, HALVINGS);
         stepping(format!("controlled{suffix}"), CONTROLLED, steps)
     });
     let elements = [0.125, 0.25, 0.5].map(|parts| Stepping {
@@ -170,7 +172,7 @@ fn compare<const D: usize>(
     for &n in cells {
         for stepping in steppings {
             let steps = (&stepping.key[..], stepping.steps, times[times.len() - 1]);
-            let run = sample.run(session, n, stepping.variant, steps)?;
+            let run = sample.run(session, (n, 2.0), stepping.variant, steps)?;
             let own = if stepping.kind == GRADED {
                 let ends = times
                     .iter()
@@ -195,17 +197,11 @@ fn compare<const D: usize>(
     for (&mark, truth) in marks.iter().zip(&exact) {
         let key = format!("{}.exact", sample.key);
         truth::record(session, &key, mark, &truth.sizes())?;
-        let strict = |n: &usize| {
-            let same = |row: &&Compared| {
-                let key = (row.sample, row.n, &row.stepping[..], row.mark);
-                key == (sample.key, *n, "controlled_strict", mark)
-            };
-            rows.iter().find(same).map(|row| &row.reached)
-        };
-        let of_both: Vec<&Reached> = cells.iter().filter_map(strict).collect();
-        if let [double, single] = of_both[..] {
-            let both = Reached::extrapolated(double, single, truth);
-            both.record(session, &format!("{}.extrapolated", sample.key), mark)?;
+    }
+    if cells.len() > 1 {
+        let both = sample.extrapolated(session, (END, HALVINGS), exact.iter(), 1)?;
+        for (&mark, reached) in marks.iter().zip(&both) {
+            reached.record(session, &format!("{}.extrapolated", sample.key), mark)?;
         }
     }
     Ok(())
