@@ -1,4 +1,4 @@
-//! What a surface costs by what is stored of its phase field: the whole grid, or bricks near the surface.
+//! What a surface and a curve cost by what is stored of their phase fields: the whole grid, or bricks near them.
 
 use std::fmt;
 
@@ -7,8 +7,9 @@ use operators::memory;
 
 use crate::meshes::{ARMADILLO, Loaded, MeshOptions};
 use crate::prelude::*;
-use crate::surfaces::{centred_box, needed_network, scales, willmore_flow};
+use crate::surfaces::{accurate_operator, centred_box, needed_network, scales, willmore_flow};
 use crate::timing::{self, Numbers, Timed};
+use crate::truth::CROSS;
 
 /// Steps on every grid, each twice as long as the one before,
 const STEPS: usize = 16;
@@ -17,6 +18,8 @@ const STEPS: usize = 16;
 const FIRST_STEP: f64 = 1.0 / 32.0;
 /// The one that takes less memory first, since what it takes is seen only from there on.
 const STORAGES: [Storage; 2] = [Storage::Bricks, Storage::Dense];
+/// Controlled steps of the cross, on bricks.
+const CROSS_STEPS: usize = 32;
 /// Exponents are those from here to the finest.
 const COARSEST_FITTED: usize = 128;
 
@@ -32,11 +35,16 @@ pub struct StorageOptions {
     /// Finest grid of the armadillo that is stored as a whole
     #[arg(long, value_name = "N", default_value_t = 256)]
     dense_up_to: usize,
+
+    /// Cells per unit length of the cross on bricks, separated by commas
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [1024, 2048])]
+    curve_cells: Vec<usize>,
 }
 
 /// What was measured at one resolution with one storage.
 #[derive(Serialize)]
 pub struct Stored {
+    pub shape: &'static str,
     pub n: usize,
     pub storage: Storage,
     /// Wall time of all steps, with all that the engine does between minimizations; work, memory and cells.
@@ -59,12 +67,16 @@ impl StorageOptions {
     pub fn check(&self) -> Result<(), Error> {
         let possible = |n: &usize| *n >= 16 && n.is_multiple_of(8);
         require(
-            self.surface_cells.iter().all(possible),
-            "--surface-cells must be multiples of 8, from 16 on, as bricks are",
+            self.surface_cells
+                .iter()
+                .chain(&self.curve_cells)
+                .all(possible),
+            "--surface-cells and --curve-cells must be multiples of 8, from 16 on, as bricks are",
         )
     }
 
-    /// Lets the armadillo flow on both storages at every resolution; the built-in figure in a quick run, or if it is not here.
+    /// Lets the armadillo flow on both storages at every resolution; the built-in figure in a quick run, or if it is not here. Then the cross
+    /// on bricks.
     pub fn measure(
         &self,
         networks: &NetworkOptions,
@@ -80,8 +92,17 @@ impl StorageOptions {
                     continue;
                 }
                 operator.storage = storage;
-                measured.push(self.flow(n, operator.clone(), session)?);
+                measured.push(self.surface(n, operator.clone(), session)?);
             }
+        }
+        let quick = session.options.quick;
+        let curves = if quick {
+            vec![64]
+        } else {
+            self.curve_cells.clone()
+        };
+        for n in curves {
+            measured.push(curve(n, session)?);
         }
         Ok(measured)
     }
@@ -103,19 +124,19 @@ impl StorageOptions {
         options.load_or_built_in(&ARMADILLO, grid)
     }
 
-    fn flow(
+    fn surface(
         &self,
         n: usize,
         operator: Operator,
         session: &mut Session<'_>,
     ) -> Result<Stored, Error> {
-        let (storage, quick) = (operator.storage, session.options.quick);
-        let name = format!("armadillo, n = {n}, {storage}");
+        let quick = session.options.quick;
         memory::release_freed();
         memory::forget_peak();
         let grid = centred_box(n, self.mesh.box_side(&ARMADILLO))?;
         let mesh = self.mesh(&grid, quick)?;
-        let initial = session.phase(format!("{name}: signed distance"), |stage| {
+        let title = format!("armadillo, n = {n}, {}: signed distance", operator.storage);
+        let initial = session.phase(title, |stage| {
             mesh.phase_field(grid, scales(n).eps, &stage.bar)
         })?;
         drop(mesh);
@@ -124,11 +145,46 @@ impl StorageOptions {
             StepRule::Doubling(FIRST_STEP * grid.spacing().powi(4)),
             steps,
         );
-        let mut case = willmore_flow("armadillo", initial, operator, scales(n), time);
+        let case = willmore_flow("armadillo", initial, operator, scales(n), time);
+        Stored::measure("armadillo", n, case, session)
+    }
+}
+
+/// The cross in controlled steps of second order.
+fn curve(n: usize, session: &mut Session<'_>) -> Result<Stored, Error> {
+    memory::release_freed();
+    memory::forget_peak();
+    let grid = Grid::per_unit(n, CROSS.side)?;
+    let scales = Scales {
+        newton: NewtonParams::second_order(),
+        ..scales(n)
+    };
+    let initial = (CROSS.initial)(grid, scales.eps)?;
+    let mut operator = accurate_operator(&grid, &scales)?;
+    operator.storage = Storage::Bricks;
+    let steps = TimeSteps::controlled(ErrorControl::default());
+    let count = if session.options.quick {
+        2
+    } else {
+        CROSS_STEPS
+    };
+    let mut case = willmore_flow(CROSS.key, initial, operator, scales, (steps.rule, count));
+    case.steps = steps;
+    Stored::measure(CROSS.key, n, case, session)
+}
+
+impl Stored {
+    fn measure<const D: usize>(
+        shape: &'static str,
+        n: usize,
+        mut case: Case<D>,
+        session: &mut Session<'_>,
+    ) -> Result<Self, Error> {
         case.measures.clear();
+        let (storage, nodes) = (case.operator.storage, case.grid().len() as f64);
         let mut timed = Timed::new(case, &session.device)?;
         let cells = timed.run.stored_cells() as f64;
-        let seconds = session.phase(format!("{name}: steps"), |stage| {
+        let seconds = session.phase(format!("{shape}, n = {n}, {storage}: steps"), |stage| {
             let clock = Instant::now();
             while timed.step(&stage.bar)? {}
             Ok(clock.elapsed().as_secs_f64())
@@ -137,12 +193,13 @@ impl StorageOptions {
         numbers.extend([
             ("seconds", seconds),
             ("active_cells", cells),
-            ("active_share", cells / grid.len() as f64),
+            ("active_share", cells / nodes),
         ]);
         let last = timed.minimizations().last();
         numbers.extend(last.map(|made| ("w", made.willmore_energy)));
         numbers.extend(memory::peak_mib().map(|peak| ("peak_mib", peak)));
-        Ok(Stored {
+        Ok(Self {
+            shape,
             n,
             storage,
             numbers,
@@ -152,8 +209,12 @@ impl StorageOptions {
 
 impl fmt::Display for Stored {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "armadillo.n{}.{}", self.n, self.storage)
+        write!(f, "{}.n{}.{}", self.shape, self.n, self.storage)
     }
+}
+
+fn surfaces(measured: &[Stored]) -> impl Iterator<Item = &Stored> {
+    measured.iter().filter(|row| row.shape != CROSS.key)
 }
 
 /// Hessian-vector products on bricks over those on the whole grid, by resolution.
@@ -171,7 +232,7 @@ pub fn product_ratios(measured: &[Stored]) -> impl Iterator<Item = (usize, f64)>
 
 /// The exponent of a number on bricks in `n`, from 128 on.
 pub fn exponent(measured: &[Stored], name: &str) -> Option<f64> {
-    let rows = measured.iter().filter(|row| row.storage == Storage::Bricks);
+    let rows = surfaces(measured).filter(|row| row.storage == Storage::Bricks);
     let rows = rows.filter(|row| row.n >= COARSEST_FITTED);
     let point = |row: &Stored| Some([row.n as f64, *row.numbers.get(name)?]);
     timing::exponent(&rows.filter_map(point).collect::<Vec<_>>())
@@ -182,7 +243,7 @@ pub fn figure(measured: &[Stored]) -> Figure {
     let panel = |title: &str, y: &str, name: &str| {
         let chart = LineChart::new(title, Axis::log("cells per unit length n"), Axis::log(y));
         (STORAGES.into_iter().enumerate()).fold(chart, |chart, (colour, storage)| {
-            let rows = measured.iter().filter(|row| row.storage == storage);
+            let rows = surfaces(measured).filter(|row| row.storage == storage);
             let point = |row: &Stored| Some([row.n as f64, *row.numbers.get(name)?]);
             let points: Vec<_> = rows.filter_map(point).collect();
             let series = Series::new(storage.to_string(), points).with_colour(colour);

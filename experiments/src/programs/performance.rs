@@ -18,7 +18,8 @@ const TIGHTER: f64 = 100.0;
 /// Cost of Willmore steps by the hybrid scheme on this machine: the cross of the paper (128 steps, eps = 2^-6, tau = tautilde =
 /// 2^-14) at n = 128, 256 and 512, and in 3D a cube at n = 64 and a blob at n = 128 (eps = 2h, tautilde = h^2, tau = 2^-18).
 /// Hessian-vector products through Burn, by hand, and their Fourier transforms alone take turns in the same run. Then the armadillo
-/// (eps = 2h, 16 steps of the accurate scheme, tau = h^4/32 doubled after every step) on the whole grid and on bricks near the surface.
+/// (eps = 2h, 16 steps of the accurate scheme, tau = h^4/32 doubled after every step) on the whole grid and on bricks near the surface, and the
+/// cross (eps = 2h, 32 controlled steps of second order) on bricks.
 #[derive(Parser, Debug)]
 #[command(name = PROGRAM, version)]
 pub struct Options {
@@ -145,6 +146,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
 fn write_storages(stored: &[Stored], session: &mut Session<'_>) -> Result<(), Error> {
     let sheet = Sheet::of(stored)
         .keyed(|row, name| format!("{row}.{name}"))
+        .text("shape", |row| row.shape)
         .text("n", |row| row.n.to_string())
         .text("storage", |row| row.storage.to_string())
         .numbers(&storages::COLUMNS, |row| &row.numbers);
