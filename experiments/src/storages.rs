@@ -1,7 +1,6 @@
 //! What a surface costs by what is stored of its phase field: the whole grid, or bricks near the surface.
 
-use std::fmt;
-
+use derive_more::Display;
 use engine::Storage;
 use operators::memory;
 
@@ -35,7 +34,8 @@ pub struct StorageOptions {
 }
 
 /// What was measured at one resolution with one storage.
-#[derive(Serialize)]
+#[derive(Display, Serialize)]
+#[display("armadillo.n{n}.{storage}")]
 pub struct Stored {
     pub n: usize,
     pub storage: Storage,
@@ -147,12 +147,6 @@ impl StorageOptions {
             storage,
             numbers,
         })
-    }
-}
-
-impl fmt::Display for Stored {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "armadillo.n{}.{}", self.n, self.storage)
     }
 }
 

@@ -1,9 +1,8 @@
 //! What can be typed.
 
-use std::fmt;
-
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use derive_more::Display;
 use engine::Storage;
 use model::Network;
 
@@ -287,9 +286,10 @@ pub struct SayOptions {
 }
 
 /// A value in the units of the input, or a part of another one in percent.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Display)]
 pub enum Amount {
     Value(f64),
+    #[display("{_0}%")]
     Percent(f64),
 }
 
@@ -302,15 +302,6 @@ impl Amount {
         match number.parse::<f64>() {
             Ok(value) if value.is_finite() && value > 0.0 => Ok(amount(value)),
             _ => Err(format!("{number:?} is no positive number; give {expected}")),
-        }
-    }
-}
-
-impl fmt::Display for Amount {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Value(value) => write!(f, "{value}"),
-            Self::Percent(percent) => write!(f, "{percent}%"),
         }
     }
 }

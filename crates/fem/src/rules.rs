@@ -9,11 +9,7 @@ use crate::ops::{FemOps, HEAT, IMPLICIT, LINEARIZED, MASS, PRODUCT, host};
 type Tangents = Result<Vec<Option<TensorIr>>, Error>;
 
 /// `d int a b c phi`: linear in each factor, and symmetric, so that equal factors are differentiated once.
-fn product(
-    operation: &CustomOpIr,
-    tangents: &[Option<TensorIr>],
-    build: &mut Builder,
-) -> Tangents {
+fn product(operation: &CustomOpIr, tangents: &[Option<TensorIr>], build: &mut Builder) -> Tangents {
     let mut sum: Option<TensorIr> = None;
     for (i, tangent) in tangents.iter().enumerate() {
         let Some(tangent) = tangent else { continue };

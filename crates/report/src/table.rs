@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use derive_more::From;
+
 use crate::axis::power_of_ten;
 use crate::data::{rounded, shortest};
 use crate::error::{Error, Result};
@@ -19,28 +21,18 @@ pub enum Format {
 }
 
 /// One cell.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, From)]
 pub enum Cell {
     /// Text, whatever the format of the column.
+    #[from(&str)]
     Text(String),
     /// A whole number, shown as it is whatever the format of the column.
     Integer(i64),
     /// A finite number.
+    #[from]
     Number(f64),
     /// Nothing to report: empty in CSV, a dash in Markdown.
     Missing,
-}
-
-impl From<&str> for Cell {
-    fn from(text: &str) -> Self {
-        Self::Text(text.to_owned())
-    }
-}
-
-impl From<f64> for Cell {
-    fn from(number: f64) -> Self {
-        Self::Number(number)
-    }
 }
 
 impl From<usize> for Cell {
