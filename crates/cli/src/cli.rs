@@ -313,11 +313,13 @@ impl Serialize for Amount {
 }
 
 /// What a size is to become.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum SizeTarget {
     /// What it is at the beginning.
     Keep,
     /// This, or this part of what it is at the beginning.
+    #[serde(untagged)]
     To(Amount),
 }
 
@@ -340,15 +342,6 @@ impl FromStr for SizeTarget {
         match text {
             "keep" => Ok(Self::Keep),
             text => Amount::parse(text, expected).map(Self::To),
-        }
-    }
-}
-
-impl Serialize for SizeTarget {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Keep => serializer.serialize_str("keep"),
-            Self::To(amount) => amount.serialize(serializer),
         }
     }
 }

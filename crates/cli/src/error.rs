@@ -12,7 +12,10 @@ pub enum Error {
     /// What clap says, which may be the help that was asked for.
     Typed(#[from] clap::Error),
     #[error("{}: {message}", path.display())]
-    Config { path: PathBuf, message: String },
+    Config {
+        path: PathBuf,
+        message: String,
+    },
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
         action: &'static str,

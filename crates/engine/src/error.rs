@@ -8,7 +8,6 @@ use crate::Stop;
 
 /// What can stop a case.
 #[derive(Debug, ThisError)]
-#[error(transparent)]
 pub enum Error {
     #[error("{name} = {value:e} is out of range: {expected}")]
     Parameter {
@@ -65,13 +64,20 @@ pub enum Error {
     #[error("{} cannot be resumed: {reason}; start a new run", path.display())]
     Unreadable { path: PathBuf, reason: String },
     /// From an observer of another crate.
+    #[error(transparent)]
     Observer(Box<dyn std::error::Error + Send + Sync>),
+    #[error(transparent)]
     Runs(#[from] runs::Error),
+    #[error(transparent)]
     Fem(#[from] fem::Error),
+    #[error(transparent)]
     Model(#[from] model::Error),
     /// From the solver, before the first step.
+    #[error(transparent)]
     Solver(#[from] solver::Error),
+    #[error(transparent)]
     Operators(#[from] operators::Error),
+    #[error(transparent)]
     Geometry(#[from] geometry::Error),
 }
 

@@ -1,12 +1,9 @@
 //! Forward-mode rules and replay handlers of the finite-element operations.
 
 use burn_ir::{BackendIr, CustomOpIr, ScalarIr, TensorIr};
-use linearize::{Builder, CustomOpRegistry, Error, Extensions, Multilinear};
+use linearize::{Builder, CustomOpRegistry, Extensions, Tangents, multilinear};
 
 use crate::ops::{FemOps, HEAT, IMPLICIT, LINEARIZED, MASS, PRODUCT, host};
-
-/// Tangents of the outputs of an operation.
-type Tangents = Result<Vec<Option<TensorIr>>, Error>;
 
 /// `d int a b c phi`: linear in each factor, and symmetric, so that equal factors are differentiated once.
 fn product(operation: &CustomOpIr, tangents: &[Option<TensorIr>], build: &mut Builder) -> Tangents {
@@ -98,8 +95,8 @@ fn register<B: BackendIr + FemOps>(registry: &mut CustomOpRegistry<B>) {
 pub fn extensions() -> Extensions {
     let mut extensions = Extensions::new();
     extensions
-        .rule(MASS, Multilinear)
-        .rule(HEAT, Multilinear)
+        .rule(MASS, multilinear)
+        .rule(HEAT, multilinear)
         .rule(PRODUCT, product)
         .rule(IMPLICIT, implicit_step)
         .rule(LINEARIZED, linearized_solve);

@@ -1,7 +1,7 @@
 //! Forward-mode rules and replay handlers of the extension operations.
 
 use burn_ir::{BackendIr, CustomOpIr, ScalarIr, TensorIr};
-use linearize::{Builder, CustomOpRegistry, Error, Extensions, Multilinear};
+use linearize::{Builder, CustomOpRegistry, Error, Extensions, Tangents, multilinear};
 
 use crate::ops::{BRICKS, CONVOLUTION, CORRELATION, GridOps, TABULATED};
 use crate::table::TableRange;
@@ -11,7 +11,7 @@ fn of_table(
     operation: &CustomOpIr,
     tangents: &[Option<TensorIr>],
     build: &mut Builder,
-) -> Result<Vec<Option<TensorIr>>, Error> {
+) -> Tangents {
     let (Some(dw), None) = (&tangents[0], &tangents[1]) else {
         return Err(Error::NoRule {
             operation: format!("{TABULATED} with respect to its table"),
@@ -50,9 +50,9 @@ fn register<B: BackendIr + GridOps>(registry: &mut CustomOpRegistry<B>) {
 pub fn extensions() -> Extensions {
     let mut extensions = Extensions::new();
     extensions
-        .rule(CONVOLUTION, Multilinear)
-        .rule(CORRELATION, Multilinear)
-        .rule(BRICKS, Multilinear)
+        .rule(CONVOLUTION, multilinear)
+        .rule(CORRELATION, multilinear)
+        .rule(BRICKS, multilinear)
         .rule(TABULATED, of_table);
     #[cfg(feature = "flex")]
     extensions.on_flex(|registry| {

@@ -120,7 +120,7 @@ fn custom(
         .iter()
         .map(|t| cx.d(t).map(|e| cx.build.handle(e)))
         .collect();
-    let outputs = rule.jvp(operation, &tangents, &mut cx.build)?;
+    let outputs = rule(operation, &tangents, &mut cx.build)?;
     if outputs.len() != operation.outputs.len() {
         return Err(Error::Rule {
             operation: id.clone(),
