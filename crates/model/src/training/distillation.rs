@@ -50,7 +50,7 @@ pub(super) fn distill_odd(
     settings: &Distillation,
     seed: u64,
     device: &ComputeDevice,
-    observer: &mut dyn Observer<()>,
+    observer: &mut Observer<'_, ()>,
 ) -> Result<Mlp, Error> {
     let nodes: Vec<f64> = (0..IMITATED).map(|i| i as f64 * NODE_DISTANCE).collect();
     let design: Vec<f64> = nodes
@@ -81,7 +81,7 @@ pub(super) fn distill_odd(
                 training_loss: loss,
                 held_out_loss: loss,
             };
-            match observer.observe(&progress, &())? {
+            match observer(&progress, &())? {
                 true => Ok(()),
                 false => Err(Error::Interrupted { iteration }),
             }

@@ -472,7 +472,7 @@ impl Recipe for LmParams {
         seed: u64,
         state: Option<LmState>,
         device: &ComputeDevice,
-        observer: &mut dyn Observer<LmState>,
+        observer: &mut Observer<'_, LmState>,
     ) -> Result<(Vec<f64>, Mlp), Error> {
         data.validate()?;
         let orbits = Orbits::new(data.ratios.dimension, data.ratios.width);
@@ -551,7 +551,7 @@ impl Recipe for LmParams {
                 training_loss: loss * scale,
                 held_out_loss: held,
             };
-            if !observer.observe(&progress, &state)? {
+            if !observer(&progress, &state)? {
                 return Err(Error::Interrupted {
                     iteration: state.iteration,
                 });
@@ -645,7 +645,7 @@ mod tests {
         let device = ComputeDevice::default_compiled().unwrap();
         for dimension in [2, 3] {
             let data = data(dimension);
-            let run = |state, observer: &mut dyn Observer<LmState>| {
+            let run = |state, observer: &mut Observer<'_, LmState>| {
                 params().train(&data, 2, state, &device, observer)
             };
             let (mut losses, mut last) = (Vec::new(), None);
