@@ -1,5 +1,7 @@
 //! Forward-mode rules and replay handlers of the finite-element operations.
 
+#![expect(clippy::unnecessary_wraps, reason = "all rules have one type")]
+
 use burn_ir::{BackendIr, CustomOpIr, ScalarIr, TensorIr};
 use linearize::{Builder, CustomOpRegistry, Extensions, Tangents, multilinear};
 

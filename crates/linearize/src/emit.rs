@@ -159,8 +159,11 @@ impl Emitter {
                 Base::Zeros(_) => Some(constant(0.0)),
                 Base::Ones(_) => Some(constant(1.0)),
                 Base::Expand(s) => self.uniform_or_single(&s.input),
-                Base::Reshape(_) | Base::Permute(_) | Base::SwapDims(_) => of_input(),
-                Base::Flip(_) | Base::Slice(_) => of_input(),
+                Base::Reshape(_)
+                | Base::Permute(_)
+                | Base::SwapDims(_)
+                | Base::Flip(_)
+                | Base::Slice(_) => of_input(),
                 _ => None,
             },
             OperationIr::NumericFloat(_, Num::Full(f)) => Some(constant(f.value.elem())),

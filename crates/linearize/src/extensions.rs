@@ -43,11 +43,7 @@ pub type Tangents = Result<Vec<Option<TensorIr>>, Error>;
 ///
 /// The tangent is the sum over the active inputs of the operation with that input replaced by its
 /// tangent.
-#[expect(
-    clippy::missing_errors_doc,
-    clippy::unnecessary_wraps,
-    reason = "it is a rule"
-)]
+#[expect(clippy::missing_errors_doc, reason = "it is a rule")]
 pub fn multilinear(
     operation: &CustomOpIr,
     tangents: &[Option<TensorIr>],

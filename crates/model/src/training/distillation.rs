@@ -81,9 +81,10 @@ pub(super) fn distill_odd(
                 training_loss: loss,
                 held_out_loss: loss,
             };
-            match observer(&progress, &())? {
-                true => Ok(()),
-                false => Err(Error::Interrupted { iteration }),
+            if observer(&progress, &())? {
+                Ok(())
+            } else {
+                Err(Error::Interrupted { iteration })
             }
         })
     };
