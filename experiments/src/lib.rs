@@ -42,7 +42,6 @@ pub mod products;
 pub mod programs;
 pub mod quality;
 pub mod session;
-pub mod sheet;
 pub mod steps;
 pub mod storages;
 pub mod study;

@@ -23,7 +23,7 @@ pub use operators::{ComputeDevice, DeviceKind};
 pub use report::Format::{self, Fixed, Scientific, Shortest};
 pub use report::{
     Axis, Cell, Colour, Curve, Figure, LegendEntry, LineChart, LineStyle, Marker, OutputDir,
-    Progress, Raster, Series, Shapes, Table,
+    Progress, Raster, Series, Shapes, Sheet, Table,
 };
 pub use serde::Serialize;
 pub use serde_json::{Value, json};
@@ -32,5 +32,4 @@ pub use solver::{NewtonParams, StepRecord};
 pub use crate::networks::{EPS, NetworkOptions, STEP};
 pub use crate::options::{FigureOptions, RunOptions};
 pub use crate::session::{Session, Stage};
-pub use crate::sheet::Sheet;
 pub use crate::{Error, harness, look, require};

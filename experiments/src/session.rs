@@ -117,10 +117,10 @@ impl<'a> Session<'a> {
 
     /// Writes a table, which is printed in the end, too, and adds its metrics.
     pub fn sheet<R>(&mut self, sheet: Sheet<'_, R>, stem: &str) -> Result<(), Error> {
-        let (table, mut metrics) = (sheet.table.finish()?, sheet.metrics.into_iter());
+        let (table, metrics) = sheet.finish()?;
         table.write(&self.output, stem)?;
         self.remark(table.to_markdown());
-        metrics.try_for_each(|(name, value)| self.metric(&name, value))
+        (metrics.into_iter()).try_for_each(|(name, value)| self.metric(&name, value))
     }
 
     /// Adds a metric, unless its value is missing.

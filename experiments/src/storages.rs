@@ -1,7 +1,6 @@
 //! What a surface and a curve cost by what is stored of their phase fields: the whole grid, or bricks near them.
 
-use std::fmt;
-
+use derive_more::Display;
 use engine::Storage;
 use operators::memory;
 
@@ -42,7 +41,8 @@ pub struct StorageOptions {
 }
 
 /// What was measured at one resolution with one storage.
-#[derive(Serialize)]
+#[derive(Display, Serialize)]
+#[display("{shape}.n{n}.{storage}")]
 pub struct Stored {
     pub shape: &'static str,
     pub n: usize,
@@ -207,16 +207,9 @@ impl Stored {
     }
 }
 
-impl fmt::Display for Stored {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}.n{}.{}", self.shape, self.n, self.storage)
-    }
-}
-
 fn surfaces(measured: &[Stored]) -> impl Iterator<Item = &Stored> {
     measured.iter().filter(|row| row.shape != CROSS.key)
 }
-
 /// Hessian-vector products on bricks over those on the whole grid, by resolution.
 pub fn product_ratios(measured: &[Stored]) -> impl Iterator<Item = (usize, f64)> {
     let of = |n, storage| {

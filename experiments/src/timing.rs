@@ -4,8 +4,7 @@ use crate::networks::{Chosen, convergence_network};
 use crate::prelude::*;
 use crate::{study, surfaces, truth};
 
-/// What was measured, under the same names in tables, metrics and JSON; what a system does not tell is absent.
-pub type Numbers = BTreeMap<&'static str, f64>;
+pub use report::Numbers;
 
 /// Round after round, everyone who goes on has a turn.
 pub fn take_turns<C>(

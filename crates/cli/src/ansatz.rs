@@ -1,15 +1,19 @@
 //! What an inpainted region holds at the beginning.
 
+use derive_more::Display;
+
 use crate::prelude::*;
 
 /// What the inpainted region holds at the beginning.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Display)]
+#[display(rename_all = "lowercase")]
 pub enum Ansatz {
     Keep,
     /// Nothing.
     Empty,
     /// All inside.
     Full,
+    #[display("{_0}")]
     Shape(Region),
 }
 
@@ -55,11 +59,6 @@ impl FromStr for Ansatz {
 
 impl Serialize for Ansatz {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Keep => serializer.serialize_str("keep"),
-            Self::Empty => serializer.serialize_str("empty"),
-            Self::Full => serializer.serialize_str("full"),
-            Self::Shape(region) => serializer.collect_str(region),
-        }
+        serializer.collect_str(self)
     }
 }

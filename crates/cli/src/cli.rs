@@ -1,9 +1,8 @@
 //! What can be typed.
 
-use std::fmt;
-
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use derive_more::Display;
 use engine::Storage;
 use model::Network;
 
@@ -287,9 +286,10 @@ pub struct SayOptions {
 }
 
 /// A value in the units of the input, or a part of another one in percent.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Display)]
 pub enum Amount {
     Value(f64),
+    #[display("{_0}%")]
     Percent(f64),
 }
 
@@ -306,15 +306,6 @@ impl Amount {
     }
 }
 
-impl fmt::Display for Amount {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Value(value) => write!(f, "{value}"),
-            Self::Percent(percent) => write!(f, "{percent}%"),
-        }
-    }
-}
-
 impl Serialize for Amount {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
@@ -322,11 +313,13 @@ impl Serialize for Amount {
 }
 
 /// What a size is to become.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum SizeTarget {
     /// What it is at the beginning.
     Keep,
     /// This, or this part of what it is at the beginning.
+    #[serde(untagged)]
     To(Amount),
 }
 
@@ -349,15 +342,6 @@ impl FromStr for SizeTarget {
         match text {
             "keep" => Ok(Self::Keep),
             text => Amount::parse(text, expected).map(Self::To),
-        }
-    }
-}
-
-impl Serialize for SizeTarget {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Keep => serializer.serialize_str("keep"),
-            Self::To(amount) => amount.serialize(serializer),
         }
     }
 }

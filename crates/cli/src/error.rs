@@ -4,15 +4,18 @@ use std::path::PathBuf;
 
 /// What can stop the program. Every message is one line and says what to do.
 #[derive(Debug, thiserror::Error)]
+#[error(transparent)]
 pub enum Error {
     /// Options that contradict each other or the input.
     #[error("{0}")]
     Options(String),
     /// What clap says, which may be the help that was asked for.
-    #[error(transparent)]
     Typed(#[from] clap::Error),
     #[error("{}: {message}", path.display())]
-    Config { path: PathBuf, message: String },
+    Config {
+        path: PathBuf,
+        message: String,
+    },
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
         action: &'static str,
@@ -25,31 +28,18 @@ pub enum Error {
     /// Time steps became too small.
     #[error("{0}; the shape is not resolved, use more --cells")]
     TooStiff(#[source] engine::Error),
-    #[error(transparent)]
     Engine(engine::Error),
-    #[error(transparent)]
     Geometry(#[from] geometry::Error),
-    #[error(transparent)]
     Images(#[from] images::Error),
-    #[error(transparent)]
     Linearize(#[from] linearize::Error),
-    #[error(transparent)]
     Model(#[from] model::Error),
-    #[error(transparent)]
     Operators(#[from] operators::Error),
-    #[error(transparent)]
     Pages(#[from] pages::Error),
-    #[error(transparent)]
     Report(#[from] report::Error),
-    #[error(transparent)]
     Render(#[from] render::Error),
-    #[error(transparent)]
     Runs(#[from] runs::Error),
-    #[error(transparent)]
     Solver(#[from] solver::Error),
-    #[error(transparent)]
     Surfaces(#[from] surfaces::Error),
-    #[error(transparent)]
     Volumes(#[from] volumes::Error),
 }
 

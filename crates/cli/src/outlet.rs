@@ -72,18 +72,10 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
 
     fn topology(&self, u: &Field<D>, eps: f64) -> Result<Topology, Error>;
 
-    /// Writes the shape to a file `stem.*`.
-    fn write_shape(
-        &self,
-        u: &Field<D>,
-        eps: f64,
-        stem: &str,
-        format: &str,
-        run: &mut RunDirectory,
-    ) -> Result<(), Error>;
-
-    /// The extensions of files that hold it.
+    /// The extensions of files that hold it,
     const SAVED: &'static [&'static str];
+    /// and that of those in the folder of a run.
+    const USUAL: &'static str;
 
     /// Refuses other files.
     fn check_saved(path: &Path) -> Result<(), Error> {
@@ -99,6 +91,20 @@ pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
 
     /// Writes the shape to any such file.
     fn save(&self, u: &Field<D>, eps: f64, path: &Path) -> Result<(), Error>;
+
+    /// Writes the shape to a file `stem.*` of a run.
+    fn write_shape(
+        &self,
+        u: &Field<D>,
+        eps: f64,
+        stem: &str,
+        format: Option<&str>,
+        run: &mut RunDirectory,
+    ) -> Result<(), Error> {
+        let name = format!("{stem}.{}", format.unwrap_or(Self::USUAL));
+        self.save(u, eps, &run.path().join(&name))?;
+        Ok(run.adopt_file(&name)?)
+    }
 
     /// What becomes of a surface, and how far it has gone.
     fn faired(&self, _: &Field<D>, _: &Field<D>, _: f64) -> Result<Option<Faired>, Error> {
@@ -189,20 +195,8 @@ impl Outlet<3> for Space {
         Ok(Topology::of(&closed))
     }
 
-    fn write_shape(
-        &self,
-        u: &Field<3>,
-        eps: f64,
-        stem: &str,
-        format: &str,
-        run: &mut RunDirectory,
-    ) -> Result<(), Error> {
-        let name = format!("{stem}.{format}");
-        surfaces::write(run.path().join(&name), &surface(u, eps)?)?;
-        Ok(run.adopt_file(&name)?)
-    }
-
     const SAVED: &'static [&'static str] = &MESHES;
+    const USUAL: &'static str = MESHES[0];
 
     fn save(&self, u: &Field<3>, eps: f64, path: &Path) -> Result<(), Error> {
         Ok(surfaces::write(path, &surface(u, eps)?)?)
@@ -292,7 +286,7 @@ pub fn write_final<const D: usize, O: Outlet<D>>(
         let text = faired.displacement.to_svg()?;
         run.write_file(DISPLACEMENT, |out| out.write_all(text.as_bytes()))?;
     } else {
-        outlet.write_shape(u, eps, FINAL, format.unwrap_or(MESHES[0]), run)?;
+        outlet.write_shape(u, eps, FINAL, format, run)?;
     }
     outlet.topology(u, eps)
 }

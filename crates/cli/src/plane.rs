@@ -112,6 +112,7 @@ impl Original {
 
 impl Outlet<2> for Plane {
     const SAVED: &'static [&'static str] = &["png", "svg"];
+    const USUAL: &'static str = "svg";
 
     fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error> {
         match up {
@@ -140,19 +141,6 @@ impl Outlet<2> for Plane {
             components: Outline::of_phase_field(u)?.curves().len(),
             euler_characteristic: None,
         })
-    }
-
-    fn write_shape(
-        &self,
-        u: &Field<2>,
-        _: f64,
-        stem: &str,
-        _: &str,
-        run: &mut RunDirectory,
-    ) -> Result<(), Error> {
-        let name = format!("{stem}.svg");
-        self.svg(u)?.write(run.path().join(&name))?;
-        Ok(run.adopt_file(&name)?)
     }
 
     fn save(&self, u: &Field<2>, eps: f64, path: &Path) -> Result<(), Error> {

@@ -362,7 +362,7 @@ impl<const D: usize, O: Outlet<D>> Observer<D> for Pictures<'_, O> {
         let mut write = || -> Result<(), Error> {
             if step == 0 {
                 let format = self.plan.format.as_deref();
-                outlet.write_shape(u, eps, outlet::START, format.unwrap_or(MESHES[0]), run)?;
+                outlet.write_shape(u, eps, outlet::START, format, run)?;
             }
             if keep.frames.is_some_and(|every| step.is_multiple_of(every)) {
                 let name = format!("{}/step-{step:06}", outlet::FRAMES);

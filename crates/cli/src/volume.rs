@@ -1,7 +1,6 @@
 //! Volumes of voxels as inputs.
 
-use std::fmt;
-
+use derive_more::Display;
 use volumes::{Body, Inside, Volume};
 
 use crate::input::absolute;
@@ -9,9 +8,10 @@ use crate::prelude::*;
 
 const LISTED: usize = 20;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Display)]
 pub enum Label {
     /// Each but 0 becomes a surface of its own.
+    #[display("all")]
     All,
     One(i64),
 }
@@ -24,15 +24,6 @@ impl FromStr for Label {
             Ok(label) => Ok(Self::One(label)),
             Err(_) if text == "all" => Ok(Self::All),
             Err(_) => Err(format!("{text:?} is neither a whole number nor all")),
-        }
-    }
-}
-
-impl fmt::Display for Label {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::All => f.write_str("all"),
-            Self::One(label) => write!(f, "{label}"),
         }
     }
 }

@@ -1,6 +1,5 @@
 //! What is measured after every step.
 
-use std::fmt;
 use std::sync::Arc;
 
 use geometry::contour::ray_crossing;
@@ -20,7 +19,8 @@ type Function<const D: usize> =
     dyn Fn(&Field<D>, f64) -> Result<Vec<Option<f64>>, geometry::Error> + Send + Sync;
 
 /// Numbers that are measured together on the phase field after every step, each under a name.
-#[derive(Clone)]
+#[derive(Clone, derive_more::Debug)]
+#[debug("{}", names.join(", "))]
 pub struct Measure<const D: usize> {
     names: Vec<String>,
     of: Arc<Function<D>>,
@@ -128,11 +128,5 @@ impl<const D: usize> Measure<D> {
     ) -> Result<impl Iterator<Item = (&str, f64)>, Error> {
         let values = self.names().zip((self.of)(field, time)?);
         Ok(values.filter_map(|(name, value)| Some((name, value?))))
-    }
-}
-
-impl<const D: usize> fmt::Debug for Measure<D> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.names.join(", "))
     }
 }

@@ -221,6 +221,19 @@ pub struct Operator {
 }
 
 impl Operator {
+    fn plain(method: Method, scheme: Scheme) -> Self {
+        Self {
+            method,
+            scheme,
+            factors: Factors::PAPER,
+            response: 1.0,
+            linear: LinearSolver::default(),
+            half_grids: false,
+            storage: Storage::default(),
+            network: None,
+        }
+    }
+
     /// A learned operator with the network that [`Networks::find`] has for the scheme: the calibrated scheme takes its odd part.
     ///
     /// # Errors
@@ -240,14 +253,11 @@ impl Operator {
             Scheme::Paper | Scheme::Accurate => network,
         };
         Ok(Self {
-            method: Method::Hybrid,
-            scheme,
             factors,
             response,
-            linear: LinearSolver::default(),
             half_grids: true,
-            storage: Storage::default(),
             network: Some(Arc::new(NamedNetwork { name, network })),
+            ..Self::plain(Method::Hybrid, scheme)
         })
     }
 
@@ -265,16 +275,7 @@ impl Operator {
         scales: &Scales,
     ) -> Result<Self, Error> {
         assert!(!method.is_learned(), "a learned operator needs a network");
-        let mut operator = Self {
-            method,
-            scheme,
-            factors: Factors::PAPER,
-            response: 1.0,
-            linear: LinearSolver::default(),
-            half_grids: false,
-            storage: Storage::default(),
-            network: None,
-        };
+        let mut operator = Self::plain(method, scheme);
         if scheme != Scheme::Paper {
             let calibration = operator.elements(grid, scales)?.calibrate()?;
             (operator.factors, operator.response) = (calibration.factors, calibration.response());

@@ -1,8 +1,8 @@
 //! When a flow ends.
 
 use std::f64::consts::PI;
-use std::fmt;
 
+use derive_more::Display;
 use geometry::Field;
 use geometry::measure::has_interface;
 use serde::{Deserialize, Serialize};
@@ -10,35 +10,48 @@ use serde::{Deserialize, Serialize};
 use crate::{DISPLACEMENT, Record, Run};
 
 /// A reason to end; a flow ends with the first that holds.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Display, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stop {
     /// This many time steps are made.
+    #[display("{}", made(*_0))]
     Steps(usize),
     /// This time is reached; the last step is cut short to end there.
+    #[display("the time {:e} is reached", rounded(*_0))]
     Time(f64),
     /// The Willmore energy, as the scheme measures it, is no more than this.
+    #[display("the Willmore energy is at most {_0}")]
     Energy(f64),
     /// The Willmore energy, as the scheme measures it, is no more than this fraction of its initial value.
+    #[display("the Willmore energy is at most {_0} times that of the start")]
     EnergyRatio(f64),
     /// The measure [`DISPLACEMENT`](crate::DISPLACEMENT) has this value or more.
+    #[display("the surface has gone as far as it was to go")]
     Displacement(f64),
     /// The phase field moves by less than this fraction of the way that it has come (`L2`) per time step; a substep counts as much as
     /// it would if the whole step were like it.
+    #[display("the shape is stationary")]
     Motion(f64),
     /// Three steps in a row, nearly as long as steps by the energy can be, lowered the energy by almost nothing. Longer ones would
     /// jump to other minimizers, such as an empty box.
+    #[display("the energy is stationary")]
     EnergyAtRest,
     /// In three steps in a row, the energy changed by less than this fraction of itself per time `side^4 / 1024`, in which shapes as large as
     /// the box become stationary; longer steps count as that long.
+    #[display("the energy is stationary")]
     EnergyRate(f64),
     /// In space, the Willmore energy is less than half of that of a sphere, which no closed surface has: the phase field does not describe
     /// a surface any more. Says nothing with spontaneous curvature, tension or pressure.
+    #[display(
+        "the Willmore energy is less than any closed surface has, 8 pi: the time steps were too long for the shape"
+    )]
     NoSurface,
     /// One of the two phases has vanished.
+    #[display("the shape has vanished")]
     Vanished,
     /// The shape has come within two interface widths of the side of the box, and so near to its own periodic image, and was not there
     /// in the beginning.
+    #[display("the shape has come to the side of the box, near to its own periodic image")]
     AtTheSide,
 }
 
@@ -122,33 +135,14 @@ fn is_near_side<const D: usize>(u: &Field<D>) -> bool {
     })
 }
 
-impl fmt::Display for Stop {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Steps(1) => f.write_str("one step is made"),
-            Self::Steps(steps) => write!(f, "{steps} steps are made"),
-            Self::Time(time) => {
-                // Of the digits of a computed time five say enough.
-                let rounded: f64 = format!("{time:.4e}").parse().unwrap_or(*time);
-                write!(f, "the time {rounded:e} is reached")
-            }
-            Self::Energy(energy) => write!(f, "the Willmore energy is at most {energy}"),
-            Self::EnergyRatio(ratio) => {
-                write!(
-                    f,
-                    "the Willmore energy is at most {ratio} times that of the start"
-                )
-            }
-            Self::Displacement(_) => f.write_str("the surface has gone as far as it was to go"),
-            Self::Motion(_) => f.write_str("the shape is stationary"),
-            Self::EnergyAtRest | Self::EnergyRate(_) => f.write_str("the energy is stationary"),
-            Self::NoSurface => f.write_str(
-                "the Willmore energy is less than any closed surface has, 8 pi: the time steps were too long for the shape",
-            ),
-            Self::Vanished => f.write_str("the shape has vanished"),
-            Self::AtTheSide => f.write_str(
-                "the shape has come to the side of the box, near to its own periodic image",
-            ),
-        }
+fn made(steps: usize) -> String {
+    match steps {
+        1 => "one step is made".to_owned(),
+        steps => format!("{steps} steps are made"),
     }
+}
+
+/// Of the digits of a computed time five say enough.
+fn rounded(time: f64) -> f64 {
+    format!("{time:.4e}").parse().unwrap_or(time)
 }

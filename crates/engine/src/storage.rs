@@ -1,7 +1,6 @@
 //! What of a phase field is stored, and how much memory that takes.
 
-use std::fmt;
-
+use derive_more::Display;
 use geometry::Grid;
 use operators::memory;
 use serde::{Deserialize, Serialize};
@@ -9,8 +8,9 @@ use serde::{Deserialize, Serialize};
 use crate::Error;
 
 /// What of a phase field is stored and worked on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Display, Serialize, Deserialize)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
+#[display(rename_all = "snake_case")]
 #[serde(rename_all = "snake_case")]
 pub enum Storage {
     /// Bricks near the surface where the flow can have them and they are less than half of the grid
@@ -79,16 +79,6 @@ impl Storage {
             }
             None => Ok(()),
         }
-    }
-}
-
-impl fmt::Display for Storage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Auto => "auto",
-            Self::Dense => "dense",
-            Self::Bricks => "bricks",
-        })
     }
 }
 

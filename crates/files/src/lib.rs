@@ -15,15 +15,18 @@
 //!   writing fails; only a process that is killed, or a power failure, leaves them behind.
 //! - Everything that changes the disk goes through [`Storage`], so that tests can let every single
 //!   operation fail.
+//! - [`Number`] reads the numbers of binary formats.
 
 mod atomic;
 mod checksum;
 mod error;
+mod number;
 mod storage;
 mod text;
 
 pub use atomic::{TEMPORARY_PREFIX, make_folders_on, probe, write_atomically, write_atomically_on};
 pub use checksum::{Sha256, hexadecimal};
 pub use error::Error;
+pub use number::{Number, unsigned};
 pub use storage::{Disk, Storage};
 pub use text::{shortened, with_causes};

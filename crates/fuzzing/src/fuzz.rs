@@ -42,7 +42,11 @@ impl Limit {
 }
 
 /// What was measured.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, derive_more::Display)]
+#[display(
+    "{name}: {cases} cases in {:.1} s, {accepted} accepted; slowest {:.1} ms; at most {:.1} KiB, {:.0} % of the limit",
+    time.as_secs_f64(), 1e3 * slowest.as_secs_f64(), *largest as f64 / 1024.0, 100.0 * largest_part
+)]
 pub struct Report {
     /// Name of the test.
     pub name: &'static str,
@@ -58,22 +62,6 @@ pub struct Report {
     pub largest: usize,
     /// Most bytes that a case held at a time, as part of what it might.
     pub largest_part: f64,
-}
-
-impl fmt::Display for Report {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{}: {} cases in {:.1} s, {} accepted; slowest {:.1} ms; at most {:.1} KiB, {:.0} % of the limit",
-            self.name,
-            self.cases,
-            self.time.as_secs_f64(),
-            self.accepted,
-            1e3 * self.slowest.as_secs_f64(),
-            self.largest as f64 / 1024.0,
-            100.0 * self.largest_part,
-        )
-    }
 }
 
 /// A file, what happens to it, and whether it is repaired then.

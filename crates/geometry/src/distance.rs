@@ -2,10 +2,10 @@
 //!
 //! | combination | outside | inside |
 //! |---|---|---|
-//! | [`Union`] (minimum) | exact | bound: never deeper than the truth |
-//! | [`Intersection`] (maximum) | bound: never farther than the truth | exact |
-//! | [`Difference`] (`a` and not `b`) | bound: never farther | exact |
-//! | [`Translated`], [`Rotated`], [`Scaled`] | as the operand | as the operand |
+//! | union (minimum) | exact | bound: never deeper than the truth |
+//! | intersection (maximum) | bound: never farther than the truth | exact |
+//! | difference (`a` and not `b`) | bound: never farther | exact |
+//! | translated, rotated, scaled | as the operand | as the operand |
 //!
 //! The table is for exact operands. A bound has the right sign and zero set, is 1-Lipschitz, and
 //! `|bound| <= |distance|`. A union is exact inside as well where its parts do not touch; an
@@ -38,123 +38,41 @@ impl<const D: usize> SignedDistance<D> for Box<dyn SignedDistance<D> + '_> {
 /// The combinations, as methods of every shape. Exactness: see the [module](crate::distance).
 pub trait SignedDistanceExt<const D: usize>: SignedDistance<D> + Sized {
     /// Points in `self` or `other`.
-    fn union<S: SignedDistance<D>>(self, other: S) -> Union<Self, S> {
-        Union(self, other)
+    fn union(self, other: impl SignedDistance<D>) -> impl SignedDistance<D> {
+        move |x| -max(-self.signed_distance(x), -other.signed_distance(x))
     }
 
     /// Points in both.
-    fn intersection<S: SignedDistance<D>>(self, other: S) -> Intersection<Self, S> {
-        Intersection(self, other)
+    fn intersection(self, other: impl SignedDistance<D>) -> impl SignedDistance<D> {
+        move |x| max(self.signed_distance(x), other.signed_distance(x))
     }
 
     /// Points in `self` and not in `other`.
-    fn difference<S: SignedDistance<D>>(self, other: S) -> Difference<Self, S> {
-        Difference(self, other)
+    fn difference(self, other: impl SignedDistance<D>) -> impl SignedDistance<D> {
+        move |x| max(self.signed_distance(x), -other.signed_distance(x))
     }
 
     /// Moves the shape by `shift`.
-    fn translated(self, shift: [f64; D]) -> Translated<Self, D> {
-        Translated { shape: self, shift }
+    fn translated(self, shift: [f64; D]) -> impl SignedDistance<D> {
+        move |x| self.signed_distance(vector::sub(x, shift))
     }
 
     /// Turns the shape about the origin.
-    fn rotated(self, rotation: Rotation<D>) -> Rotated<Self, D> {
-        Rotated {
-            shape: self,
-            rotation,
-        }
+    fn rotated(self, rotation: Rotation<D>) -> impl SignedDistance<D> {
+        move |x| self.signed_distance(rotation.apply_inverse(x))
     }
 
     /// Scales the shape about the origin.
     ///
     /// # Errors
     /// The factor must be finite and positive.
-    fn scaled(self, factor: f64) -> Result<Scaled<Self>, Error> {
-        Ok(Scaled {
-            shape: self,
-            factor: positive("factor", factor)?,
-        })
+    fn scaled(self, factor: f64) -> Result<impl SignedDistance<D>, Error> {
+        let factor = positive("factor", factor)?;
+        Ok(move |x: [f64; D]| factor * self.signed_distance(x.map(|v| v / factor)))
     }
 }
 
 impl<const D: usize, S: SignedDistance<D>> SignedDistanceExt<D> for S {}
-
-/// See [`SignedDistanceExt::union`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Union<A, B>(A, B);
-
-/// See [`SignedDistanceExt::intersection`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Intersection<A, B>(A, B);
-
-/// See [`SignedDistanceExt::difference`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Difference<A, B>(A, B);
-
-/// See [`SignedDistanceExt::translated`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Translated<S, const D: usize> {
-    shape: S,
-    shift: [f64; D],
-}
-
-/// See [`SignedDistanceExt::rotated`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rotated<S, const D: usize> {
-    shape: S,
-    rotation: Rotation<D>,
-}
-
-/// See [`SignedDistanceExt::scaled`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scaled<S> {
-    shape: S,
-    factor: f64,
-}
-
-impl<const D: usize, A: SignedDistance<D>, B: SignedDistance<D>> SignedDistance<D> for Union<A, B> {
-    fn signed_distance(&self, x: [f64; D]) -> f64 {
-        -max(-self.0.signed_distance(x), -self.1.signed_distance(x))
-    }
-}
-
-impl<const D: usize, A, B> SignedDistance<D> for Intersection<A, B>
-where
-    A: SignedDistance<D>,
-    B: SignedDistance<D>,
-{
-    fn signed_distance(&self, x: [f64; D]) -> f64 {
-        max(self.0.signed_distance(x), self.1.signed_distance(x))
-    }
-}
-
-impl<const D: usize, A, B> SignedDistance<D> for Difference<A, B>
-where
-    A: SignedDistance<D>,
-    B: SignedDistance<D>,
-{
-    fn signed_distance(&self, x: [f64; D]) -> f64 {
-        max(self.0.signed_distance(x), -self.1.signed_distance(x))
-    }
-}
-
-impl<const D: usize, S: SignedDistance<D>> SignedDistance<D> for Translated<S, D> {
-    fn signed_distance(&self, x: [f64; D]) -> f64 {
-        self.shape.signed_distance(vector::sub(x, self.shift))
-    }
-}
-
-impl<const D: usize, S: SignedDistance<D>> SignedDistance<D> for Rotated<S, D> {
-    fn signed_distance(&self, x: [f64; D]) -> f64 {
-        self.shape.signed_distance(self.rotation.apply_inverse(x))
-    }
-}
-
-impl<const D: usize, S: SignedDistance<D>> SignedDistance<D> for Scaled<S> {
-    fn signed_distance(&self, x: [f64; D]) -> f64 {
-        self.factor * self.shape.signed_distance(x.map(|v| v / self.factor))
-    }
-}
 
 /// A rotation about the origin, an element of `SO(D)`.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -22,6 +22,8 @@ pub(crate) mod error;
 
 use std::path::Path;
 
+use files::Number;
+
 use crate::file::write_atomically;
 use crate::{Error, Field, Grid};
 pub use error::NpyError;
@@ -107,7 +109,7 @@ fn header(shape: &[usize]) -> Vec<u8> {
 pub fn decode<const D: usize>(bytes: &[u8]) -> Result<(usize, Vec<f64>), NpyError> {
     let (header, data) = split(bytes)?;
     let header = Header::parse(header)?;
-    let element = Element::parse(&header.data_type)?;
+    let (number, big_endian) = number(&header.data_type)?;
     let shape = header.shape;
     if shape.len() != D {
         return Err(NpyError::Rank { expected: D, shape });
@@ -119,7 +121,7 @@ pub fn decode<const D: usize>(bytes: &[u8]) -> Result<(usize, Vec<f64>), NpyErro
     let count = shape
         .iter()
         .try_fold(1_u64, |product, &s| product.checked_mul(s));
-    let expected = count.and_then(|count| count.checked_mul(element.size as u64));
+    let expected = count.and_then(|count| count.checked_mul(number.size() as u64));
     if expected != Some(data.len() as u64) {
         let before = (bytes.len() - data.len()) as u64;
         return Err(NpyError::Length {
@@ -128,8 +130,8 @@ pub fn decode<const D: usize>(bytes: &[u8]) -> Result<(usize, Vec<f64>), NpyErro
         });
     }
     let stored: Vec<f64> = data
-        .chunks_exact(element.size)
-        .map(|b| element.decode(b))
+        .chunks_exact(number.size())
+        .map(|b| number.decode(b, big_endian))
         .collect();
     let cells = side as usize;
     let values = if header.fortran_order {
@@ -146,7 +148,7 @@ pub fn decode<const D: usize>(bytes: &[u8]) -> Result<(usize, Vec<f64>), NpyErro
 }
 
 /// Position in Fortran order of the element at `index` in C order.
-fn reversed<const D: usize>(index: usize, cells: usize) -> usize {
+pub(crate) fn reversed<const D: usize>(index: usize, cells: usize) -> usize {
     let digits = (0..D).scan(index, |rest, _| {
         let digit = *rest % cells;
         *rest /= cells;
@@ -186,47 +188,21 @@ fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), NpyError> {
     Ok(parts)
 }
 
-/// Size and byte order of an element.
-#[derive(Clone, Copy)]
-struct Element {
-    size: usize,
-    big_endian: bool,
-}
-
-impl Element {
-    fn parse(data_type: &str) -> Result<Self, NpyError> {
-        let native_big = cfg!(target_endian = "big");
-        let (big_endian, kind) = match data_type.split_at_checked(1) {
-            Some(("<", kind)) => (false, kind),
-            Some((">", kind)) => (true, kind),
-            Some(("=", kind)) => (native_big, kind),
-            _ => (native_big, data_type),
-        };
-        let size = match kind {
-            "f8" => 8,
-            "f4" => 4,
-            _ => {
-                return Err(NpyError::DataType {
-                    found: files::shortened(data_type, 20),
-                });
-            }
-        };
-        Ok(Self { size, big_endian })
-    }
-
-    fn decode(self, bytes: &[u8]) -> f64 {
-        // As bits in the low bytes of one integer, whatever the order and size.
-        let push = |bits: u64, byte: &u8| bits << 8 | u64::from(*byte);
-        let bits = if self.big_endian {
-            bytes.iter().fold(0, push)
-        } else {
-            bytes.iter().rev().fold(0, push)
-        };
-        if self.size == 8 {
-            f64::from_bits(bits)
-        } else {
-            f64::from(f32::from_bits(bits as u32))
-        }
+/// Kind and byte order of the numbers.
+fn number(data_type: &str) -> Result<(Number, bool), NpyError> {
+    let native_big = cfg!(target_endian = "big");
+    let (big_endian, kind) = match data_type.split_at_checked(1) {
+        Some(("<", kind)) => (false, kind),
+        Some((">", kind)) => (true, kind),
+        Some(("=", kind)) => (native_big, kind),
+        _ => (native_big, data_type),
+    };
+    match kind {
+        "f8" => Ok((Number::F64, big_endian)),
+        "f4" => Ok((Number::F32, big_endian)),
+        _ => Err(NpyError::DataType {
+            found: files::shortened(data_type, 20),
+        }),
     }
 }
 

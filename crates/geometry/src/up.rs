@@ -1,8 +1,8 @@
 //! Which way is up.
 
-use std::fmt;
 use std::str::FromStr;
 
+use derive_more::Display;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
@@ -11,7 +11,8 @@ use crate::Error;
 ///
 /// Together with the two that follow it cyclically it is right-handed: `z`, `x`, `y` if `z` points
 /// up, and azimuths are counted from the second to the third.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default, Display, Serialize, Deserialize)]
+#[display(rename_all = "lowercase")]
 #[serde(rename_all = "lowercase")]
 pub enum UpAxis {
     /// Axis 0.
@@ -30,12 +31,6 @@ impl UpAxis {
     /// Its number, from 0.
     pub fn index(self) -> usize {
         self as usize
-    }
-}
-
-impl fmt::Display for UpAxis {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(["x", "y", "z"][self.index()])
     }
 }
 

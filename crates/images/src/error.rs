@@ -8,16 +8,15 @@ use crate::read::error::FormatError;
 
 /// Errors of images, outlines, placement and drawings, each with the numbers needed to act on it.
 #[derive(Debug, thiserror::Error)]
+#[error(transparent)]
 #[non_exhaustive]
 pub enum Error {
     /// A file is no usable image.
     #[error("{path} cannot be read as an image: {problem}", path = path.display())]
     Format { path: PathBuf, problem: FormatError },
     /// Grids, fields and the operating system.
-    #[error(transparent)]
     Geometry(#[from] geometry::Error),
     /// Pictures and their encoding.
-    #[error(transparent)]
     Picture(#[from] render::Error),
     /// A number is outside the range in which the formula makes sense.
     #[error("{name} = {value} is not allowed: it must be {requirement}")]

@@ -1,6 +1,6 @@
 //! Which pixels of an image are the shape.
 
-use std::fmt;
+use derive_more::Display;
 
 use crate::error::require;
 use crate::{Error, Image};
@@ -42,13 +42,16 @@ impl Default for Threshold {
 /// Grey values are compared as they are stored, which is evenly spaced for the eye, and not in
 /// light: drawing programs blend edges in stored values, so that a pixel half covered by black on
 /// white has the value 0.5. Values equal to the threshold are outside.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Display)]
 pub enum Side {
     /// `1 - opacity (1 - grey)`, the grey value on white, is below the threshold.
+    #[display("darker than {_0:.4}")]
     Dark(f64),
     /// `opacity grey`, the grey value on black, is above the threshold.
+    #[display("lighter than {_0:.4}")]
     Light(f64),
     /// The opacity is above the threshold.
+    #[display("more opaque than {_0:.4}")]
     Opaque(f64),
 }
 
@@ -131,17 +134,6 @@ impl Side {
             Self::Dark(_) | Self::Light(_) => "the grey value",
             Self::Opaque(_) => "the opacity",
         }
-    }
-}
-
-impl fmt::Display for Side {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (words, threshold) = match self {
-            Self::Dark(threshold) => ("darker than", threshold),
-            Self::Light(threshold) => ("lighter than", threshold),
-            Self::Opaque(threshold) => ("more opaque than", threshold),
-        };
-        write!(f, "{words} {threshold:.4}")
     }
 }
 

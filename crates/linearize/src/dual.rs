@@ -19,12 +19,12 @@
 //! product.into_data().assert_eq(&TensorData::from([6.0, 120.0]), true);
 //! ```
 
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Sub};
 
 use burn::tensor::Tensor;
 
 /// A tensor and its derivative in one direction.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, derive_more::Add, derive_more::Neg, derive_more::Sub)]
 pub struct Dual<const D: usize> {
     /// The value.
     pub primal: Tensor<D>,
@@ -119,22 +119,6 @@ impl<const D: usize> Dual<D> {
     }
 }
 
-impl<const D: usize> Add for Dual<D> {
-    type Output = Self;
-
-    fn add(self, other: Self) -> Self {
-        Self::new(self.primal + other.primal, self.tangent + other.tangent)
-    }
-}
-
-impl<const D: usize> Sub for Dual<D> {
-    type Output = Self;
-
-    fn sub(self, other: Self) -> Self {
-        Self::new(self.primal - other.primal, self.tangent - other.tangent)
-    }
-}
-
 impl<const D: usize> Mul for Dual<D> {
     type Output = Self;
 
@@ -150,14 +134,6 @@ impl<const D: usize> Div for Dual<D> {
         let quotient = self.primal / other.primal.clone();
         let tangent = (self.tangent - quotient.clone() * other.tangent) / other.primal;
         Self::new(quotient, tangent)
-    }
-}
-
-impl<const D: usize> Neg for Dual<D> {
-    type Output = Self;
-
-    fn neg(self) -> Self {
-        self.linear(Tensor::neg)
     }
 }
 

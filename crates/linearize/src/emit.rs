@@ -13,7 +13,7 @@ use burn::backend::ir::{
 };
 use burn::tensor::{DType, Shape, Slice};
 
-use crate::ir::{detach_outputs, each_tensor, like, output, read_only, tensor};
+use crate::ir::{detach_outputs, like, output, read_only, rename, tensor};
 
 /// A tensor all of whose elements are `factor` times the one element of `scalar` (one if absent).
 #[derive(Clone)]
@@ -62,20 +62,12 @@ impl Emitter {
             return outputs.to_vec();
         }
         let key = operation.clone();
-        let mut fresh = HashMap::new();
-        let outputs: Vec<TensorIr> = key
-            .outputs()
-            .map(|out| {
-                let new = self.fresh(out.shape.clone(), out.dtype);
-                fresh.insert(out.id, new.id);
-                new
-            })
+        let outputs: Vec<TensorIr> = (key.outputs())
+            .map(|out| self.fresh(out.shape.clone(), out.dtype))
             .collect();
-        each_tensor(&mut operation, |t| {
-            if let Some(id) = fresh.get(&t.id) {
-                t.id = *id;
-            }
-        });
+        let detached = key.outputs().map(|out| out.id);
+        let fresh = detached.zip(outputs.iter().cloned()).collect();
+        rename(&mut operation, &fresh);
         for out in &outputs {
             self.producer.insert(out.id, self.operations.len());
         }
@@ -96,14 +88,8 @@ impl Emitter {
 
     /// `factor * t`, if it has been emitted.
     fn find_multiple(&self, t: &TensorIr, factor: f64) -> Option<TensorIr> {
-        let mut operation = OperationIr::NumericFloat(
-            t.dtype,
-            Num::MulScalar(ScalarOpIr {
-                lhs: read_only(t),
-                rhs: ScalarIr::Float(factor),
-                out: like(t),
-            }),
-        );
+        let multiple = Num::MulScalar(by_number(t, ScalarIr::Float(factor)));
+        let mut operation = OperationIr::NumericFloat(t.dtype, multiple);
         detach_outputs(&mut operation);
         let outputs = self.find(hash(&operation), &operation)?;
         outputs.first().cloned()
@@ -164,28 +150,27 @@ impl Emitter {
             factor,
             scalar: None,
         };
+        let of_input = || {
+            let input = operation.inputs().next()?;
+            self.uniform.get(&input.id).cloned()
+        };
         let noted = match operation {
             OperationIr::BaseFloat(op) => match op {
-                Base::Zeros(c) => Some((c.out.id, constant(0.0))),
-                Base::Ones(c) => Some((c.out.id, constant(1.0))),
-                Base::Expand(s) => self.uniform_or_single(&s.input).map(|u| (s.out.id, u)),
-                Base::Reshape(s) => self.uniform.get(&s.input.id).map(|u| (s.out.id, u.clone())),
-                Base::Permute(s) => self.uniform.get(&s.input.id).map(|u| (s.out.id, u.clone())),
-                Base::SwapDims(s) => self.uniform.get(&s.input.id).map(|u| (s.out.id, u.clone())),
-                Base::Flip(s) => self.uniform.get(&s.input.id).map(|u| (s.out.id, u.clone())),
-                Base::Slice(s) => self
-                    .uniform
-                    .get(&s.tensor.id)
-                    .map(|u| (s.out.id, u.clone())),
+                Base::Zeros(_) => Some(constant(0.0)),
+                Base::Ones(_) => Some(constant(1.0)),
+                Base::Expand(s) => self.uniform_or_single(&s.input),
+                Base::Reshape(_)
+                | Base::Permute(_)
+                | Base::SwapDims(_)
+                | Base::Flip(_)
+                | Base::Slice(_) => of_input(),
                 _ => None,
             },
-            OperationIr::NumericFloat(_, Num::Full(f)) => {
-                Some((f.out.id, constant(f.value.elem())))
-            }
+            OperationIr::NumericFloat(_, Num::Full(f)) => Some(constant(f.value.elem())),
             _ => None,
         };
-        if let Some((id, uniform)) = noted {
-            self.uniform.insert(id, uniform);
+        if let (Some(uniform), Some(out)) = (noted, operation.outputs().next()) {
+            self.uniform.insert(out.id, uniform);
         }
     }
 
@@ -233,7 +218,7 @@ impl Emitter {
         let out = output(shape, dtype);
         self.emit_one(if value == 0.0 {
             OperationIr::BaseFloat(Base::Zeros(CreationOpIr { out }))
-        } else if value.to_bits() == 1.0_f64.to_bits() {
+        } else if is(value, 1.0) {
             OperationIr::BaseFloat(Base::Ones(CreationOpIr { out }))
         } else {
             OperationIr::NumericFloat(
@@ -280,6 +265,14 @@ impl Emitter {
         self.producer.get(&t.id).map(|i| &self.operations[*i])
     }
 
+    /// The tensor of which `t` is the negative, if it is one.
+    fn negated(&self, t: &TensorIr) -> Option<TensorIr> {
+        match self.definition(t)? {
+            OperationIr::NumericFloat(_, Num::Neg(neg)) => Some(neg.input.clone()),
+            _ => None,
+        }
+    }
+
     /// If both operands are uniform, `combine` on single elements, spread over `shape`.
     fn on_single_elements(
         &mut self,
@@ -291,12 +284,9 @@ impl Emitter {
         if shape.num_elements() <= 1 {
             return None;
         }
-        let (ua, ub) = (self.uniform_or_single(a)?, self.uniform_or_single(b)?);
+        let uniforms = [self.uniform_or_single(a)?, self.uniform_or_single(b)?];
         let rank = shape.num_dims();
-        let (a, b) = (
-            self.single(&ua, rank, a.dtype),
-            self.single(&ub, rank, b.dtype),
-        );
+        let [a, b] = uniforms.map(|uniform| self.single(&uniform, rank, a.dtype));
         let single = combine(self, &a, &b);
         Some(self.expand(&single, shape.clone()))
     }
@@ -332,13 +322,10 @@ impl Emitter {
         if a.id == b.id {
             return self.scale(a, 2.0);
         }
-        if let Some(OperationIr::NumericFloat(_, Num::Neg(neg))) = self.definition(b) {
-            let negated = neg.input.clone();
-            return self.sub(a, &negated);
-        }
-        if let Some(OperationIr::NumericFloat(_, Num::Neg(neg))) = self.definition(a) {
-            let negated = neg.input.clone();
-            return self.sub(b, &negated);
+        for (a, b) in [(a, b), (b, a)] {
+            if let Some(negated) = self.negated(b) {
+                return self.sub(a, &negated);
+            }
         }
         if let Some(joined) = self.join(a, b) {
             return joined;
@@ -388,8 +375,7 @@ impl Emitter {
         if a.id == b.id {
             return self.full(shape, a.dtype, 0.0);
         }
-        if let Some(OperationIr::NumericFloat(_, Num::Neg(neg))) = self.definition(b) {
-            let negated = neg.input.clone();
+        if let Some(negated) = self.negated(b) {
             return self.add(a, &negated);
         }
         let (a, b) = self.compact_operands(a, b, &shape);
@@ -407,7 +393,7 @@ impl Emitter {
         if let Some(value) = self.constant(b)
             && a.shape == shape
         {
-            return if value.to_bits() == 1.0_f64.to_bits() {
+            return if is(value, 1.0) {
                 a.clone()
             } else {
                 self.scalar(a, value, Num::DivScalar)
@@ -423,7 +409,7 @@ impl Emitter {
 
     /// `factor * t`
     pub(crate) fn scale(&mut self, t: &TensorIr, factor: f64) -> TensorIr {
-        if factor.to_bits() == 1.0_f64.to_bits() {
+        if is(factor, 1.0) {
             return t.clone();
         }
         if let Some(value) = self.constant(t) {
@@ -441,16 +427,14 @@ impl Emitter {
                 let input = inner.input.clone();
                 self.scale(&input, -factor)
             }
-            Some(OperationIr::NumericFloat(_, Num::MulScalar(inner)))
-                if factor.to_bits() != (-1.0_f64).to_bits() =>
-            {
+            Some(OperationIr::NumericFloat(_, Num::MulScalar(inner))) if !is(factor, -1.0) => {
                 let (input, inner) = (inner.lhs.clone(), inner.rhs.elem::<f64>());
                 self.scale(&input, factor * inner)
             }
             // The factor of a spread scalar goes into the scalar.
             Some(OperationIr::NumericFloat(_, Num::Mul(product)))
                 if t.shape.num_elements() > 1
-                    && factor.to_bits() != (-1.0_f64).to_bits()
+                    && !is(factor, -1.0)
                     && has_one_element(product).is_some() =>
             {
                 let (single, other) = has_one_element(product).expect("checked by the guard");
@@ -458,15 +442,7 @@ impl Emitter {
                 let single = self.scale(&single, factor);
                 self.mul(&other, &single)
             }
-            _ if factor.to_bits() == (-1.0_f64).to_bits() => {
-                self.emit_one(OperationIr::NumericFloat(
-                    t.dtype,
-                    Num::Neg(UnaryOpIr {
-                        input: read_only(t),
-                        out: like(t),
-                    }),
-                ))
-            }
+            _ if is(factor, -1.0) => self.numeric(t, Num::Neg),
             // Negatives of what is there vanish in differences.
             _ => match self.find_multiple(t, -factor) {
                 Some(opposite) => self.neg(&opposite),
@@ -507,11 +483,7 @@ impl Emitter {
             -1 => self.unary(t, Float::Recip),
             _ => self.emit_one(OperationIr::NumericFloat(
                 t.dtype,
-                Num::PowiScalar(ScalarOpIr {
-                    lhs: read_only(t),
-                    rhs: ScalarIr::Int(exponent),
-                    out: like(t),
-                }),
+                Num::PowiScalar(by_number(t, ScalarIr::Int(exponent))),
             )),
         }
     }
@@ -522,43 +494,21 @@ impl Emitter {
         }
         self.emit_one(OperationIr::Float(
             t.dtype,
-            Float::PowfScalar(ScalarOpIr {
-                lhs: read_only(t),
-                rhs: ScalarIr::Float(exponent),
-                out: like(t),
-            }),
+            Float::PowfScalar(by_number(t, ScalarIr::Float(exponent))),
         ))
     }
 
     pub(crate) fn unary(&mut self, t: &TensorIr, variant: fn(UnaryOpIr) -> Float) -> TensorIr {
-        self.emit_one(OperationIr::Float(
-            t.dtype,
-            variant(UnaryOpIr {
-                input: read_only(t),
-                out: like(t),
-            }),
-        ))
+        self.emit_one(OperationIr::Float(t.dtype, variant(of_one(t))))
     }
 
     pub(crate) fn numeric(&mut self, t: &TensorIr, variant: fn(UnaryOpIr) -> Num) -> TensorIr {
-        self.emit_one(OperationIr::NumericFloat(
-            t.dtype,
-            variant(UnaryOpIr {
-                input: read_only(t),
-                out: like(t),
-            }),
-        ))
+        self.emit_one(OperationIr::NumericFloat(t.dtype, variant(of_one(t))))
     }
 
     fn scalar(&mut self, t: &TensorIr, value: f64, variant: fn(ScalarOpIr) -> Num) -> TensorIr {
-        self.emit_one(OperationIr::NumericFloat(
-            t.dtype,
-            variant(ScalarOpIr {
-                lhs: read_only(t),
-                rhs: ScalarIr::Float(value),
-                out: like(t),
-            }),
-        ))
+        let operation = variant(by_number(t, ScalarIr::Float(value)));
+        self.emit_one(OperationIr::NumericFloat(t.dtype, operation))
     }
 
     fn binary(
@@ -592,6 +542,25 @@ impl Emitter {
         } else {
             (a.clone(), b.clone())
         }
+    }
+}
+
+fn is(value: f64, number: f64) -> bool {
+    value.to_bits() == number.to_bits()
+}
+
+fn of_one(t: &TensorIr) -> UnaryOpIr {
+    UnaryOpIr {
+        input: read_only(t),
+        out: like(t),
+    }
+}
+
+fn by_number(t: &TensorIr, number: ScalarIr) -> ScalarOpIr {
+    ScalarOpIr {
+        lhs: read_only(t),
+        rhs: number,
+        out: like(t),
     }
 }
 

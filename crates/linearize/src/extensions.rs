@@ -14,8 +14,8 @@ use crate::{Builder, ELEMENTWISE, Error};
 ///
 /// A rule maps the tangents of the inputs (`None` is zero) to the tangents of the outputs. It may
 /// add operations to the primal program, which runs once per point, and builds tangents, which must
-/// depend linearly on the given ones. Closures of the same signature are rules;
-/// [`Multilinear`] is the rule of an operation that is linear in each of its inputs.
+/// depend linearly on the given ones; [`multilinear`] is the rule of an operation that is linear in each of
+/// its inputs. It gives [`Error::NoRule`] if this combination of active inputs cannot be differentiated.
 ///
 /// A pointwise function `f⁽ᵏ⁾(x)` whose order `k` is a scalar argument differentiates to
 /// `f⁽ᵏ⁺¹⁾(x) ⊙ ẋ`:
@@ -34,51 +34,22 @@ use crate::{Builder, ELEMENTWISE, Error};
 ///     Ok(vec![Some(build.mul(&derivative, tangent))])
 /// });
 /// ```
-pub trait Rule: Send + Sync {
-    /// Tangents of the outputs of `operation`, given the tangents of its inputs, in their order.
-    ///
-    /// # Errors
-    /// [`Error::NoRule`] if this combination of active inputs cannot be differentiated.
-    fn jvp(
-        &self,
-        operation: &CustomOpIr,
-        tangents: &[Option<TensorIr>],
-        build: &mut Builder,
-    ) -> Result<Vec<Option<TensorIr>>, Error>;
-}
+pub type Rule = dyn Fn(&CustomOpIr, &[Option<TensorIr>], &mut Builder) -> Tangents + Send + Sync;
 
-impl<F> Rule for F
-where
-    F: Fn(&CustomOpIr, &[Option<TensorIr>], &mut Builder) -> Result<Vec<Option<TensorIr>>, Error>
-        + Send
-        + Sync,
-{
-    fn jvp(
-        &self,
-        operation: &CustomOpIr,
-        tangents: &[Option<TensorIr>],
-        build: &mut Builder,
-    ) -> Result<Vec<Option<TensorIr>>, Error> {
-        self(operation, tangents, build)
-    }
-}
+/// Tangents of the outputs of an operation, in their order; none is zero.
+pub type Tangents = Result<Vec<Option<TensorIr>>, Error>;
 
 /// Rule of operations that are linear in each input separately: convolutions, transforms, products.
 ///
 /// The tangent is the sum over the active inputs of the operation with that input replaced by its
 /// tangent.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Multilinear;
-
-impl Rule for Multilinear {
-    fn jvp(
-        &self,
-        operation: &CustomOpIr,
-        tangents: &[Option<TensorIr>],
-        build: &mut Builder,
-    ) -> Result<Vec<Option<TensorIr>>, Error> {
-        Ok(build.multilinear(operation, tangents))
-    }
+#[expect(clippy::missing_errors_doc, reason = "it is a rule")]
+pub fn multilinear(
+    operation: &CustomOpIr,
+    tangents: &[Option<TensorIr>],
+    build: &mut Builder,
+) -> Tangents {
+    Ok(build.multilinear(operation, tangents))
 }
 
 /// Handlers of custom operations on backend `B`, by identifier.
@@ -140,7 +111,7 @@ impl<B: BackendIr> CustomOpRegistry<B> {
 /// Differentiation rules and per-backend handlers of custom (backend-extension) operations.
 #[derive(Clone, Default)]
 pub struct Extensions {
-    rules: BTreeMap<String, Arc<dyn Rule>>,
+    rules: BTreeMap<String, Arc<Rule>>,
     #[cfg(feature = "flex")]
     pub(crate) flex: CustomOpRegistry<burn::backend::Flex>,
     #[cfg(feature = "ndarray")]
@@ -160,7 +131,10 @@ impl Extensions {
     }
 
     /// Differentiate custom operations called `id` with `rule`.
-    pub fn rule(&mut self, id: &str, rule: impl Rule + 'static) -> &mut Self {
+    pub fn rule<F>(&mut self, id: &str, rule: F) -> &mut Self
+    where
+        F: Fn(&CustomOpIr, &[Option<TensorIr>], &mut Builder) -> Tangents + Send + Sync + 'static,
+    {
         self.rules.insert(id.to_owned(), Arc::new(rule));
         self
     }
@@ -179,7 +153,7 @@ impl Extensions {
         }
     }
 
-    pub(crate) fn rule_of(&self, id: &str) -> Option<Arc<dyn Rule>> {
+    pub(crate) fn rule_of(&self, id: &str) -> Option<Arc<Rule>> {
         self.rules.get(id).cloned()
     }
 

@@ -9,7 +9,7 @@ use std::collections::{HashMap, HashSet};
 
 use burn::backend::ir::{
     BaseOperationIr as Base, BinaryOpIr, CustomOpIr, NumericOperationIr as Num, OperationIr,
-    ScalarIr, TensorId, TensorIr,
+    ScalarIr, ScalarOpIr, TensorId, TensorIr,
 };
 use burn::tensor::DType;
 
@@ -110,91 +110,72 @@ impl Elementwise {
     }
 }
 
-/// What an operation does to the entries of its inputs.
-enum Entrywise<'a> {
-    Binary(fn(usize, usize) -> Instruction, &'a BinaryOpIr),
-    Number(
-        fn(usize, f64) -> Instruction,
-        f64,
-        &'a TensorIr,
-        &'a TensorIr,
-    ),
-    Sum(&'a TensorIr, &'a TensorIr),
-    Convert(&'a TensorIr, &'a TensorIr),
+/// An operation on the entries of its operands.
+struct Entrywise<'a> {
+    action: Action,
+    operands: Vec<&'a TensorIr>,
+    result: &'a TensorIr,
+}
+
+#[derive(Clone, Copy)]
+enum Action {
+    Binary(fn(usize, usize) -> Instruction),
+    Number(fn(usize, f64) -> Instruction, f64),
+    /// The result is no operand of the same loop.
+    End(fn(usize) -> Output),
 }
 
 impl<'a> Entrywise<'a> {
     fn of(operation: &'a OperationIr) -> Option<Self> {
-        let found = match operation {
+        use Instruction::{Add, AddNumber, Div, DivNumber, Mul, MulNumber, Sub};
+        let binary =
+            |make, op: &'a BinaryOpIr| (Action::Binary(make), vec![&op.lhs, &op.rhs], &op.out);
+        let number = |make, number: f64, op: &'a ScalarOpIr| {
+            (Action::Number(make, number), vec![&op.lhs], &op.out)
+        };
+        let (action, operands, result) = match operation {
             OperationIr::NumericFloat(_, operation) => match operation {
-                Num::Add(op) => Self::Binary(Instruction::Add, op),
-                Num::Sub(op) => Self::Binary(Instruction::Sub, op),
-                Num::Mul(op) => Self::Binary(Instruction::Mul, op),
-                Num::Div(op) => Self::Binary(Instruction::Div, op),
-                Num::AddScalar(op) => {
-                    Self::Number(Instruction::AddNumber, op.rhs.elem(), &op.lhs, &op.out)
-                }
-                Num::SubScalar(op) => {
-                    let number: f64 = op.rhs.elem();
-                    Self::Number(Instruction::AddNumber, -number, &op.lhs, &op.out)
-                }
-                Num::MulScalar(op) => {
-                    Self::Number(Instruction::MulNumber, op.rhs.elem(), &op.lhs, &op.out)
-                }
-                Num::DivScalar(op) => {
-                    Self::Number(Instruction::DivNumber, op.rhs.elem(), &op.lhs, &op.out)
-                }
-                Num::Neg(op) => Self::Number(Instruction::MulNumber, -1.0, &op.input, &op.out),
-                Num::Sum(op) => Self::Sum(&op.input, &op.out),
+                Num::Add(op) => binary(Add, op),
+                Num::Sub(op) => binary(Sub, op),
+                Num::Mul(op) => binary(Mul, op),
+                Num::Div(op) => binary(Div, op),
+                Num::AddScalar(op) => number(AddNumber, op.rhs.elem(), op),
+                Num::SubScalar(op) => number(AddNumber, -op.rhs.elem::<f64>(), op),
+                Num::MulScalar(op) => number(MulNumber, op.rhs.elem(), op),
+                Num::DivScalar(op) => number(DivNumber, op.rhs.elem(), op),
+                Num::Neg(op) => (Action::Number(MulNumber, -1.0), vec![&op.input], &op.out),
+                Num::Sum(op) => (Action::End(Output::Sum), vec![&op.input], &op.out),
                 _ => return None,
             },
-            OperationIr::BaseFloat(Base::Cast(op)) => Self::Convert(&op.input, &op.out),
+            OperationIr::BaseFloat(Base::Cast(op)) => {
+                (Action::End(Output::Values), vec![&op.input], &op.out)
+            }
             _ => return None,
+        };
+        let found = Self {
+            action,
+            operands,
+            result,
         };
         found.fits().then_some(found)
     }
 
     /// The operand that has all entries: its shape and type are those of the loop.
     fn main(&self) -> &TensorIr {
-        match self {
-            Self::Binary(_, op) if elements(&op.lhs) < elements(&op.rhs) => &op.rhs,
-            Self::Binary(_, op) => &op.lhs,
-            Self::Number(_, _, input, _) | Self::Sum(input, _) | Self::Convert(input, _) => input,
-        }
+        let larger = |a, b| if elements(a) < elements(b) { b } else { a };
+        let operands = self.operands.iter().copied();
+        operands.reduce(larger).expect("it has an operand")
     }
 
     /// Whether this is a loop over more than one entry in which every operand has all entries or one.
     fn fits(&self) -> bool {
         let main = self.main();
         let float = |t: &TensorIr| matches!(t.dtype, DType::F64 | DType::F32);
-        elements(main) > 1
-            && float(main)
-            && match self {
-                Self::Binary(_, op) => {
-                    op.out.shape == main.shape
-                        && [&op.lhs, &op.rhs].iter().all(|t| {
-                            t.dtype == main.dtype && (t.shape == main.shape || elements(t) == 1)
-                        })
-                }
-                Self::Convert(_, out) => float(out),
-                Self::Number(..) | Self::Sum(..) => true,
-            }
-    }
-
-    fn operands(&self) -> Vec<&TensorIr> {
-        match self {
-            Self::Binary(_, op) => vec![&op.lhs, &op.rhs],
-            Self::Number(_, _, input, _) | Self::Sum(input, _) | Self::Convert(input, _) => {
-                vec![input]
-            }
-        }
-    }
-
-    fn result(&self) -> &TensorIr {
-        match self {
-            Self::Binary(_, op) => &op.out,
-            Self::Number(_, _, _, out) | Self::Sum(_, out) | Self::Convert(_, out) => out,
-        }
+        let of_loop =
+            |t: &&TensorIr| t.dtype == main.dtype && (t.shape == main.shape || elements(t) == 1);
+        let result = self.is_terminal() || self.result.shape == main.shape;
+        let floats = float(main) && float(self.result);
+        elements(main) > 1 && floats && result && self.operands.iter().all(of_loop)
     }
 
     /// Whether both can run in one loop.
@@ -203,9 +184,8 @@ impl<'a> Entrywise<'a> {
         a.shape == b.shape && a.dtype == b.dtype
     }
 
-    /// Whether the result cannot be an operand of the same loop.
     fn is_terminal(&self) -> bool {
-        matches!(self, Self::Sum(..) | Self::Convert(..))
+        matches!(self.action, Action::End(_))
     }
 }
 
@@ -280,11 +260,11 @@ pub(crate) fn fuse(operations: &[OperationIr], needed: &HashSet<TensorId>) -> Ve
 
 /// One operation that does what the members do, one after the other.
 fn as_one(members: &[&Entrywise], used: impl Fn(TensorId) -> bool) -> CustomOpIr {
-    let inside: HashSet<TensorId> = members.iter().map(|m| m.result().id).collect();
+    let inside: HashSet<TensorId> = members.iter().map(|m| m.result.id).collect();
     let mut inputs: Vec<TensorIr> = Vec::new();
-    for t in members.iter().flat_map(|m| m.operands()) {
+    for t in members.iter().flat_map(|m| &m.operands) {
         if !inside.contains(&t.id) && !inputs.iter().any(|known| known.id == t.id) {
-            inputs.push(t.clone());
+            inputs.push((*t).clone());
         }
     }
     let mut place: HashMap<TensorId, usize> =
@@ -292,18 +272,12 @@ fn as_one(members: &[&Entrywise], used: impl Fn(TensorId) -> bool) -> CustomOpIr
     let mut outputs = Vec::new();
     let mut program = Elementwise::default();
     for member in members {
-        let result = member.result();
-        let at = |t: &TensorIr| place[&t.id];
-        let instruction = match member {
-            Entrywise::Binary(make, op) => make(at(&op.lhs), at(&op.rhs)),
-            Entrywise::Number(make, number, input, _) => make(at(input), *number),
-            Entrywise::Sum(input, _) => {
-                program.outputs.push(Output::Sum(at(input)));
-                outputs.push(result.clone());
-                continue;
-            }
-            Entrywise::Convert(input, _) => {
-                program.outputs.push(Output::Values(at(input)));
+        let (result, operand) = (member.result, |k: usize| place[&member.operands[k].id]);
+        let instruction = match member.action {
+            Action::Binary(make) => make(operand(0), operand(1)),
+            Action::Number(make, number) => make(operand(0), number),
+            Action::End(make) => {
+                program.outputs.push(make(operand(0)));
                 outputs.push(result.clone());
                 continue;
             }

@@ -118,7 +118,7 @@ mod value;
 pub use burn::backend::ir::{CustomOpIr, HandleContainer, OperationIr, ScalarIr, TensorIr};
 
 pub use error::Error;
-pub use extensions::{CustomOpRegistry, Extensions, Multilinear, Rule};
+pub use extensions::{CustomOpRegistry, Extensions, Rule, Tangents, multilinear};
 pub use fusion::{ELEMENTWISE, Elementwise, Instruction, Output};
 pub use program::{Program, Statistics};
 pub use replay::{Evaluation, Linearization};

@@ -7,7 +7,7 @@ use burn::backend::ir::{
     BaseOperationIr as Base, NumericOperationIr as Num, OperationIr, TensorId, TensorIr,
     TensorStatus,
 };
-use burn::tensor::{DType, TensorData};
+use burn::tensor::DType;
 
 use crate::conversion::Conversion;
 use crate::emit::Emitter;
@@ -15,6 +15,7 @@ use crate::fusion::fuse;
 use crate::ir::{Line, detach_outputs, each_tensor, name, read_only, rename, with_status};
 use crate::rules::{self, Context};
 use crate::tangent::{Builder, Expression};
+use crate::trace::Sources;
 use crate::{Error, Extensions, Graph, precision};
 
 /// Programs ready to run: constants (once), value, primal (once per point), tangent (once per
@@ -23,9 +24,7 @@ use crate::{Error, Extensions, Graph, precision};
 /// `Display` lists the operations; the [statistics](Self::statistics) count them.
 #[derive(Clone, Debug)]
 pub struct Program {
-    pub(crate) variables: Vec<TensorIr>,
-    pub(crate) parameters: Vec<TensorIr>,
-    pub(crate) constants: Vec<(TensorIr, TensorData)>,
+    pub(crate) sources: Sources,
     /// Operations that depend on no input.
     pub(crate) constant: Vec<OperationIr>,
     pub(crate) value: Block,
@@ -76,10 +75,9 @@ impl Program {
 
     /// The same programs with elementwise operations gathered into [`ELEMENTWISE`](crate::ELEMENTWISE) ones.
     pub(crate) fn fused(&self) -> Self {
-        let saved = self.saved.iter().map(|t| t.id).collect();
         Self {
             value: self.value.fused(&HashSet::new()),
-            primal: self.primal.fused(&saved),
+            primal: self.primal.fused(&ids(&self.saved)),
             tangent: self.tangent.fused(&HashSet::new()),
             ..self.clone()
         }
@@ -131,31 +129,29 @@ impl fmt::Display for Program {
     }
 }
 
-/// A graph after common-subexpression elimination and algebra, in new numbering.
-struct Simplified {
-    operations: Vec<OperationIr>,
-    variables: Vec<TensorIr>,
-    parameters: Vec<TensorIr>,
-    constants: Vec<(TensorIr, TensorData)>,
-    value: TensorIr,
-    outputs: Vec<TensorIr>,
+impl Sources {
+    /// The same under fresh names, which the map then knows.
+    fn renamed(&self, emitter: &mut Emitter, map: &mut HashMap<TensorId, TensorIr>) -> Self {
+        let mut fresh = |old: &TensorIr| {
+            let new = emitter.fresh(old.shape.clone(), old.dtype);
+            map.insert(old.id, new.clone());
+            new
+        };
+        Self {
+            variables: self.variables.iter().map(&mut fresh).collect(),
+            parameters: self.parameters.iter().map(&mut fresh).collect(),
+            constants: (self.constants.iter())
+                .map(|(old, data)| (fresh(old), data.clone()))
+                .collect(),
+        }
+    }
 }
 
-fn simplify(graph: &Graph) -> Simplified {
+/// A graph after common-subexpression elimination and algebra, in new numbering.
+fn simplify(graph: &Graph) -> Graph {
     let mut emitter = Emitter::new(0);
     let mut map: HashMap<TensorId, TensorIr> = HashMap::new();
-    let mut input = |old: &TensorIr| {
-        let new = emitter.fresh(old.shape.clone(), old.dtype);
-        map.insert(old.id, new.clone());
-        new
-    };
-    let variables = graph.variables.iter().map(&mut input).collect();
-    let parameters = graph.parameters.iter().map(&mut input).collect();
-    let constants = graph
-        .constants
-        .iter()
-        .map(|(old, data)| (input(old), data.clone()))
-        .collect();
+    let sources = graph.sources.renamed(&mut emitter, &mut map);
     for operation in live(
         &graph.operations,
         graph.outputs.iter().chain([&graph.value]),
@@ -170,11 +166,9 @@ fn simplify(graph: &Graph) -> Simplified {
     let operations = live(&operations, outputs.iter().chain([&value]))
         .cloned()
         .collect();
-    Simplified {
+    Graph {
         operations,
-        variables,
-        parameters,
-        constants,
+        sources,
         value,
         outputs,
     }
@@ -200,7 +194,7 @@ fn live<'a, 'b>(
     operations: &'a [OperationIr],
     outputs: impl Iterator<Item = &'b TensorIr>,
 ) -> impl Iterator<Item = &'a OperationIr> {
-    let mut needed: HashSet<TensorId> = outputs.map(|t| t.id).collect();
+    let mut needed = ids(outputs);
     let mut keep = vec![false; operations.len()];
     for (operation, keep) in operations.iter().zip(&mut keep).rev() {
         if operation.outputs().any(|out| needed.contains(&out.id)) {
@@ -248,22 +242,8 @@ fn linearize(
         tangents: HashMap::new(),
     };
     let mut map: HashMap<TensorId, TensorIr> = HashMap::new();
-    let mut input = |build: &mut Builder, old: &TensorIr| {
-        let new = build.primal.fresh(old.shape.clone(), old.dtype);
-        map.insert(old.id, new.clone());
-        new
-    };
-    let variables: Vec<TensorIr> = (simplified.variables.iter())
-        .map(|old| input(&mut cx.build, old))
-        .collect();
-    let parameters: Vec<TensorIr> = (simplified.parameters.iter())
-        .map(|old| input(&mut cx.build, old))
-        .collect();
-    let constants: Vec<(TensorIr, TensorData)> = (simplified.constants.iter())
-        .map(|(old, data)| (input(&mut cx.build, old), data.clone()))
-        .collect();
-    let directions: Vec<TensorIr> = variables
-        .iter()
+    let sources = (simplified.sources).renamed(&mut cx.build.primal, &mut map);
+    let directions: Vec<TensorIr> = (sources.variables.iter())
         .map(|variable| {
             let seed = cx
                 .build
@@ -322,9 +302,7 @@ fn linearize(
         })
         .collect();
     let ends = Ends {
-        variables,
-        parameters,
-        constants,
+        sources,
         directions,
         value,
         outputs,
@@ -335,28 +313,26 @@ fn linearize(
 
 /// Give a detached operation its outputs back.
 fn name_outputs(operation: &mut OperationIr, outputs: &[TensorIr]) {
-    let detached: Vec<TensorId> = operation.outputs().map(|out| out.id).collect();
-    each_tensor(operation, |t| {
-        if let Some(i) = detached.iter().position(|id| *id == t.id) {
-            t.id = outputs[i].id;
-        }
-    });
+    let detached = operation.outputs().map(|out| out.id);
+    let names = detached.zip(outputs.iter().cloned()).collect();
+    rename(operation, &names);
 }
 
 /// Inputs and outputs of all programs.
 struct Ends {
-    variables: Vec<TensorIr>,
-    parameters: Vec<TensorIr>,
-    constants: Vec<(TensorIr, TensorData)>,
+    sources: Sources,
     directions: Vec<TensorIr>,
     value: TensorIr,
     outputs: Vec<TensorIr>,
     tangents: Vec<TensorIr>,
 }
 
-fn outputs_of<'a>(operations: impl IntoIterator<Item = &'a OperationIr>) -> HashSet<TensorId> {
-    let outputs = |operation: &'a OperationIr| operation.outputs().map(|t| t.id);
-    operations.into_iter().flat_map(outputs).collect()
+fn outputs_of(operations: &[OperationIr]) -> impl Iterator<Item = TensorId> {
+    operations.iter().flat_map(|op| op.outputs().map(|t| t.id))
+}
+
+fn ids<'a>(tensors: impl IntoIterator<Item = &'a TensorIr>) -> HashSet<TensorId> {
+    tensors.into_iter().map(|t| t.id).collect()
 }
 
 fn assemble(build: Builder, mut ends: Ends, products: Option<DType>) -> Program {
@@ -367,11 +343,11 @@ fn assemble(build: Builder, mut ends: Ends, products: Option<DType>) -> Program 
     let all = build.primal.into_operations();
 
     // What depends on inputs, and what does not.
-    let inputs: Vec<TensorIr> = (ends.variables.iter())
-        .chain(&ends.parameters)
+    let inputs: Vec<TensorIr> = (ends.sources.variables.iter())
+        .chain(&ends.sources.parameters)
         .cloned()
         .collect();
-    let mut varying: HashSet<TensorId> = inputs.iter().map(|t| t.id).collect();
+    let mut varying = ids(&inputs);
     for operation in &all {
         if operation.inputs().any(|t| varying.contains(&t.id)) {
             varying.extend(operation.outputs().map(|t| t.id));
@@ -385,11 +361,11 @@ fn assemble(build: Builder, mut ends: Ends, products: Option<DType>) -> Program 
         .filter(|operation| varies(operation) || is_fill(operation))
         .cloned()
         .collect();
-    let mut produced_locally = outputs_of(&local);
-    produced_locally.extend(inputs.iter().map(|t| t.id));
+    let mut produced_locally = ids(&inputs);
+    produced_locally.extend(outputs_of(&local));
 
-    let mut in_tangent = outputs_of(&tangent);
-    in_tangent.extend(ends.directions.iter().map(|t| t.id));
+    let mut in_tangent = ids(&ends.directions);
+    in_tangent.extend(outputs_of(&tangent));
     let mut saved: Vec<TensorIr> = Vec::new();
     let mut constants_of_tangent: Vec<TensorIr> = Vec::new();
     for t in tangent.iter().flat_map(OperationIr::inputs) {
@@ -435,8 +411,7 @@ fn assemble(build: Builder, mut ends: Ends, products: Option<DType>) -> Program 
     from_constants.extend(constants_of_tangent);
 
     let primal_outputs: Vec<TensorIr> = value.iter().chain(&ends.outputs).cloned().collect();
-    let keep: HashSet<TensorId> = saved.iter().map(|t| t.id).collect();
-    let kept_constants = from_constants.iter().map(|t| t.id).collect();
+    let (keep, kept_constants) = (ids(&saved), ids(&from_constants));
     Program {
         value: separate(Block::new(
             &inputs,
@@ -451,9 +426,7 @@ fn assemble(build: Builder, mut ends: Ends, products: Option<DType>) -> Program 
             .iter()
             .map(|t| with_status(t, TensorStatus::ReadWrite))
             .collect(),
-        variables: ends.variables,
-        parameters: ends.parameters,
-        constants: ends.constants,
+        sources: ends.sources,
         directions: ends.directions,
     }
 }
@@ -486,11 +459,8 @@ impl Block {
         outputs: &[TensorIr],
         keep: &HashSet<TensorId>,
     ) -> Self {
-        let read: HashSet<TensorId> = (operations.iter())
-            .flat_map(OperationIr::inputs)
-            .chain(outputs)
-            .map(|t| t.id)
-            .collect();
+        let read = (operations.iter()).flat_map(OperationIr::inputs);
+        let read = ids(read.chain(outputs));
         let inputs: Vec<Option<TensorId>> = inputs
             .iter()
             .map(|t| (read.contains(&t.id) || keep.contains(&t.id)).then_some(t.id))
@@ -507,16 +477,12 @@ impl Block {
         keep: &HashSet<TensorId>,
     ) -> Self {
         let mut owned: HashSet<TensorId> = inputs.iter().flatten().copied().collect();
-        owned.extend(
-            operations
-                .iter()
-                .flat_map(|op| op.outputs().map(|t| t.id).collect::<Vec<_>>()),
-        );
+        owned.extend(outputs_of(&operations));
         for id in keep {
             owned.remove(id);
         }
 
-        let mut used: HashSet<TensorId> = outputs.iter().map(|t| t.id).collect();
+        let mut used = ids(outputs);
         let mut reversed: Vec<OperationIr> = Vec::with_capacity(operations.len());
         for mut operation in operations.into_iter().rev() {
             let results: Vec<TensorIr> = operation.outputs().cloned().collect();
@@ -580,9 +546,7 @@ impl Block {
 fn separate(mut block: Block) -> Block {
     const OFFSET: u64 = 1 << 24;
     let mut own: HashSet<TensorId> = block.inputs.iter().flatten().copied().collect();
-    own.extend(
-        (block.operations.iter()).flat_map(|op| op.outputs().map(|t| t.id).collect::<Vec<_>>()),
-    );
+    own.extend(outputs_of(&block.operations));
     let shift = |id: TensorId| {
         if own.contains(&id) {
             TensorId::new(id.value() + OFFSET)

@@ -172,9 +172,9 @@ impl Linearization {
     }
 
     fn check_inputs(&self, variables: &[Value], parameters: &[Value]) -> Result<(), Error> {
-        let program = &self.program;
-        check(("variables", "variable"), &program.variables, variables)?;
-        check(("parameters", "parameter"), &program.parameters, parameters)
+        let sources = &self.program.sources;
+        check(("variables", "variable"), &sources.variables, variables)?;
+        check(("parameters", "parameter"), &sources.parameters, parameters)
     }
 }
 
@@ -237,7 +237,7 @@ fn load<B: BackendIr>(
         });
     }
     let mut it = TensorInterpreter::with_custom_ops(device.clone(), registry.handlers.clone());
-    for (t, data) in &program.constants {
+    for (t, data) in &program.sources.constants {
         it.register_tensor_data_id(t.id, data.clone());
     }
     for operation in &program.constant {

@@ -15,7 +15,7 @@ use burn::backend::ir::{
 use burn::tensor::{DType, Shape};
 
 use crate::emit::Emitter;
-use crate::ir::{EXPRESSION_IDS, TANGENT_IDS, each_tensor, like, output, read_only, tensor};
+use crate::ir::{EXPRESSION_IDS, TANGENT_IDS, like, output, read_only, rename, tensor};
 
 /// `factor · coefficient ⊙ atom`
 #[derive(Clone, Debug)]
@@ -228,12 +228,7 @@ impl Builder {
         for term in &mut e.terms {
             term.factor /= unit;
         }
-        (unit, self.sum(e))
-    }
-
-    /// Evaluate.
-    pub(crate) fn exactly(&mut self, e: Expression) -> TensorIr {
-        self.sum(e)
+        (unit, self.exactly(e))
     }
 
     /// Evaluate now, so that several uses share the sum.
@@ -242,7 +237,8 @@ impl Builder {
         Expression::atom(atom).scale(factor)
     }
 
-    fn sum(&mut self, e: Expression) -> TensorIr {
+    /// Evaluate.
+    pub(crate) fn exactly(&mut self, e: Expression) -> TensorIr {
         let terms = self.grouped(e.terms);
         let mut terms = self.joined(terms);
         // Signs go into additions and subtractions; begin with a positive term.
@@ -444,14 +440,10 @@ impl Builder {
         let inputs: Vec<TensorIr> = operation.inputs().cloned().collect();
         for input in inputs {
             if let Some(e) = self.expressions.get(&input.id).cloned() {
-                values.insert(input.id, self.exactly(e).id);
+                values.insert(input.id, self.exactly(e));
             }
         }
-        each_tensor(&mut operation, |t| {
-            if let Some(id) = values.get(&t.id) {
-                t.id = *id;
-            }
-        });
+        rename(&mut operation, &values);
         self.tangent.emit_one(operation)
     }
 

@@ -21,7 +21,7 @@ use burn::backend::{
 use burn::tensor::{DType, Device, FloatDType, Shape, Tensor, TensorData};
 use burn_router::{RouterClient, RouterTensor};
 
-use crate::ir::{Line, each_tensor, tensor};
+use crate::ir::{Line, rename, tensor};
 use crate::{Error, Value, precision};
 
 type Tracked = Autodiff<Capture>;
@@ -81,12 +81,18 @@ fn symbol<const D: usize>(role: &str, symbols: &[DispatchTensor], i: usize) -> T
 #[derive(Clone, Debug)]
 pub struct Graph {
     pub(crate) operations: Vec<OperationIr>,
-    pub(crate) variables: Vec<TensorIr>,
-    pub(crate) parameters: Vec<TensorIr>,
-    pub(crate) constants: Vec<(TensorIr, TensorData)>,
+    pub(crate) sources: Sources,
     pub(crate) value: TensorIr,
     /// What is differentiated: the gradients, or all outputs of a traced function.
     pub(crate) outputs: Vec<TensorIr>,
+}
+
+/// What a graph or program reads.
+#[derive(Clone, Debug)]
+pub(crate) struct Sources {
+    pub(crate) variables: Vec<TensorIr>,
+    pub(crate) parameters: Vec<TensorIr>,
+    pub(crate) constants: Vec<(TensorIr, TensorData)>,
 }
 
 impl Graph {
@@ -104,13 +110,10 @@ impl Graph {
         f: impl FnOnce(&Inputs) -> Vec<Value>,
     ) -> Result<Self, Error> {
         record(variables, parameters, |session| {
-            let outputs = f(&session.inputs(|symbol| {
-                DispatchTensor::from_backend(BackendTensor::<Capture>::Float(symbol))
-            }))
-            .into_iter()
-            .enumerate()
-            .map(|(index, output)| plain(index, output.0).map(Some))
-            .collect::<Result<Vec<_>, Error>>()?;
+            let outputs = f(&session.inputs()).into_iter().enumerate();
+            let outputs = outputs
+                .map(|(index, output)| output_on::<Capture>(index, output.0).map(Some))
+                .collect::<Result<Vec<_>, Error>>()?;
             let value = outputs.first().cloned().flatten().ok_or(Error::NoOutputs)?;
             Ok((value, outputs))
         })
@@ -135,9 +138,7 @@ impl Graph {
                 .iter()
                 .map(|symbol| TrackedSymbol::new(symbol.clone()).require_grad())
                 .collect();
-            let mut inputs = session.inputs(|symbol| {
-                DispatchTensor::from_backend(BackendTensor::<Capture>::Float(symbol))
-            });
+            let mut inputs = session.inputs();
             inputs.variables = tracked
                 .iter()
                 .map(|t| DispatchTensor::from_backend(BackendTensor::<Tracked>::Float(t.clone())))
@@ -151,7 +152,8 @@ impl Graph {
             }
             if energy.autodiff == DispatchAutodiffContext::Disabled {
                 // A constant energy: no variable reaches it.
-                return Ok((plain(0, energy)?, vec![None; tracked.len()]));
+                let energy = output_on::<Capture>(0, energy)?;
+                return Ok((energy, vec![None; tracked.len()]));
             }
             let energy = output_on::<Tracked>(0, energy)?;
             let value = energy.primitive().clone();
@@ -175,10 +177,6 @@ impl fmt::Display for Graph {
 }
 
 /// The symbol behind an output; detached tensors of the gradient's device count too.
-fn plain(index: usize, output: DispatchTensor) -> Result<Symbol, Error> {
-    output_on::<Capture>(index, output)
-}
-
 fn output_on<B>(index: usize, output: DispatchTensor) -> Result<FloatTensor<B>, Error>
 where
     B: burn::backend::Backend,
@@ -199,8 +197,11 @@ struct Session {
 }
 
 impl Session {
-    fn inputs(&self, wrap: impl Fn(Symbol) -> DispatchTensor) -> Inputs {
-        let all = |symbols: &[Symbol]| symbols.iter().cloned().map(&wrap).collect();
+    fn inputs(&self) -> Inputs {
+        let wrap = |symbol: &Symbol| {
+            DispatchTensor::from_backend(BackendTensor::<Capture>::Float(symbol.clone()))
+        };
+        let all = |symbols: &[Symbol]| symbols.iter().map(wrap).collect();
         Inputs {
             variables: all(&self.variables),
             parameters: all(&self.parameters),
@@ -225,13 +226,7 @@ fn record(
         let session = open(&device, dtype, variables, parameters);
         // Outputs must outlive the scope's completion: the capture device takes the last use of a
         // tensor for its end.
-        let outputs = match f(&session) {
-            Ok(outputs) => Some(outputs),
-            Err(error) => {
-                failure = Some(error);
-                None
-            }
-        };
+        let outputs = f(&session).map_err(|error| failure = Some(error)).ok();
         let ids = outputs.as_ref().map(|outputs| Ids::new(&session, outputs));
         let completed = match &ids {
             Some(ids) => scope.complete(ids.inputs.clone(), ids.unique.clone()),
@@ -395,28 +390,19 @@ fn build(
         })
         .collect();
     precision::restore_reciprocals(&mut operations);
+    for operation in &mut operations {
+        rename(operation, &numbers);
+    }
     Graph {
         value: numbers[&ids.value].clone(),
-        operations: renumbered(operations, &numbers),
-        variables,
-        parameters,
-        constants,
+        operations,
+        sources: Sources {
+            variables,
+            parameters,
+            constants,
+        },
         outputs,
     }
-}
-
-fn renumbered(
-    mut operations: Vec<OperationIr>,
-    numbers: &HashMap<TensorId, TensorIr>,
-) -> Vec<OperationIr> {
-    for operation in &mut operations {
-        each_tensor(operation, |t| {
-            if let Some(new) = numbers.get(&t.id) {
-                t.id = new.id;
-            }
-        });
-    }
-    operations
 }
 
 /// A capture device for the duration of one recording. Devices allow one recording at a time and

@@ -14,8 +14,8 @@ use burn::tensor::{Device, Tensor, TensorData};
 use burn_router::RouterClient;
 use linearize::dual::{self, Dual};
 use linearize::{
-    Builder, CustomOpIr, Error, Extensions, Graph, Multilinear, OperationIr, ScalarIr, TensorIr,
-    Value,
+    Builder, CustomOpIr, Error, Extensions, Graph, OperationIr, ScalarIr, TensorIr, Value,
+    multilinear,
 };
 
 #[backend_extension(Flex, Capture, Autodiff)]
@@ -130,7 +130,7 @@ fn wave<const D: usize>(x: Tensor<D>, order: u64) -> Tensor<D> {
 
 fn rules() -> Extensions {
     let mut extensions = Extensions::new();
-    extensions.rule("blur", Multilinear).rule(
+    extensions.rule("blur", multilinear).rule(
         "wave",
         |operation: &CustomOpIr, tangents: &[Option<TensorIr>], build: &mut Builder| {
             let Some(tangent) = &tangents[0] else {

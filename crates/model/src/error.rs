@@ -8,6 +8,7 @@ use crate::Ratios;
 
 /// What can go wrong with networks and their training.
 #[derive(Debug, ThisError)]
+#[error(transparent)]
 pub enum Error {
     /// A network of other ratios than the run's.
     #[error("the network does not fit this run: trained for {network}, the run has {run}")]
@@ -95,9 +96,7 @@ pub enum Error {
     #[error("training interrupted after iteration {iteration}; run again to resume")]
     Interrupted { iteration: usize },
     /// A file that cannot be written.
-    #[error(transparent)]
     Write(#[from] geometry::Error),
     /// From the operations on the device.
-    #[error(transparent)]
     Operators(#[from] operators::Error),
 }

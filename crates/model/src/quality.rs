@@ -110,11 +110,7 @@ pub fn displacement_errors(
     data.validate()?;
     let u = data.sphere(radius);
     let target = data.sphere(data.shrunk(radius));
-    let values = if network.ratios().dimension == 2 {
-        applied::<2>(network, data, &u, device)?
-    } else {
-        applied::<3>(network, data, &u, device)?
-    };
+    let values = applied(network, data, &u, device)?;
     let [mut products, mut square] = [[0.0; 2], [0.0; 2]];
     for (i, (u, target)) in u.iter().zip(&target).enumerate() {
         let exact = target - u;
@@ -137,11 +133,7 @@ fn losses(
     for &radius in radii {
         let u = data.sphere(radius);
         let target = data.sphere(data.shrunk(radius));
-        let [value, flipped] = if network.ratios().dimension == 2 {
-            applied::<2>(network, data, &u, device)?
-        } else {
-            applied::<3>(network, data, &u, device)?
-        };
+        let [value, flipped] = applied(network, data, &u, device)?;
         for (i, target) in target.iter().enumerate() {
             sums[0] += (value[i] - target).powi(2) / u_len(data);
             sums[1] += (flipped[i] + target).powi(2) / u_len(data);
@@ -155,16 +147,29 @@ fn u_len(data: &SphereData) -> f64 {
     (data.cells as f64).powi(data.ratios.dimension as i32)
 }
 
+/// `K * u`.
+fn smoothed<const D: usize>(
+    network: &Network,
+    data: &SphereData,
+    u: &[f64],
+    device: &ComputeDevice,
+) -> Result<Vec<f64>, Error> {
+    let kernel = device.tensor::<D>(network.kernel(), [network.ratios().width; D]);
+    let u = device.tensor::<D>(u, [data.cells; D]);
+    Ok(device.values(circular_convolution(u, kernel, false))?)
+}
+
 /// `V[u]` and `V[-u]`: by the table where it reaches, exactly beyond, where kernels without regularization go.
-fn applied<const D: usize>(
+fn applied(
     network: &Network,
     data: &SphereData,
     u: &[f64],
     device: &ComputeDevice,
 ) -> Result<[Vec<f64>; 2], Error> {
-    let kernel = device.tensor::<D>(network.kernel(), [network.ratios().width; D]);
-    let u = device.tensor::<D>(u, [data.cells; D]);
-    let smoothed = device.values(circular_convolution(u, kernel, false))?;
+    let smoothed = match network.ratios().dimension {
+        2 => smoothed::<2>(network, data, u, device)?,
+        _ => smoothed::<3>(network, data, u, device)?,
+    };
     let activation = network.activation();
     let table = activation.table()?;
     let range = table.range();

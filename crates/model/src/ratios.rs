@@ -1,11 +1,11 @@
 //! What a network depends on.
 
-use std::fmt;
-
+use derive_more::Display;
 use serde::{Deserialize, Serialize};
 
 /// What a network depends on; one network serves every grid with these ratios.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Display, Serialize, Deserialize)]
+#[display("{dimension}D, n_K = {width}, eps/h = {eps_over_h}, tautilde/h^2 = {step_over_h2}")]
 pub struct Ratios {
     /// Dimension `D` of space.
     pub dimension: usize,
@@ -45,15 +45,5 @@ impl Ratios {
     /// Number of kernel entries, `n_K^D`.
     pub fn kernel_len(&self) -> usize {
         self.width.pow(self.dimension as u32)
-    }
-}
-
-impl fmt::Display for Ratios {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{}D, n_K = {}, eps/h = {}, tautilde/h^2 = {}",
-            self.dimension, self.width, self.eps_over_h, self.step_over_h2
-        )
     }
 }

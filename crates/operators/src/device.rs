@@ -8,7 +8,8 @@ use burn::tensor::{DType, Device, Tensor, TensorData};
 use crate::Error;
 
 /// The backends a device can belong to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, derive_more::Display)]
+#[display("{}", self.name())]
 pub enum DeviceKind {
     /// burn-flex on the CPU, `f64`.
     Flex,
@@ -52,12 +53,6 @@ impl DeviceKind {
     /// The kinds in this build, the default one first.
     pub fn compiled() -> impl Iterator<Item = Self> {
         Self::ALL.into_iter().filter(|kind| kind.is_compiled())
-    }
-}
-
-impl fmt::Display for DeviceKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
     }
 }
 

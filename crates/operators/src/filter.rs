@@ -1,6 +1,5 @@
 //! Symmetric circulant matrices given by their real spectrum: preconditioners.
 
-use std::fmt;
 use std::sync::{Arc, Mutex};
 
 use burn::backend::{Backend, backend_extension, tensor::FloatTensor};
@@ -11,7 +10,8 @@ use crate::convolution::kernel_symbol;
 use crate::fft::{Real, Transform, is_f64, lock};
 
 /// A real, even symbol on the frequencies of a periodic grid; cheap to clone.
-#[derive(Clone)]
+#[derive(Clone, derive_more::Debug)]
+#[debug("SpectralFilter({:?})", _0.shape)]
 pub struct SpectralFilter(Arc<Symbol>);
 
 struct Symbol {
@@ -122,12 +122,6 @@ impl SpectralFilter {
             }
         }
         natural
-    }
-}
-
-impl fmt::Debug for SpectralFilter {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "SpectralFilter({:?})", self.0.shape)
     }
 }
 

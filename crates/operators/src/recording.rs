@@ -1,6 +1,5 @@
 //! How extension operations are recorded: on the tape of autodiff, and in captured graphs.
 
-use std::fmt;
 use std::sync::Arc;
 
 use burn::backend::{Backend, tensor::FloatTensor};
@@ -16,19 +15,14 @@ use burn_ir::{CustomOpIr, OperationIr, OperationOutput, ScalarIr, TensorIr};
 use burn_router::{RouterClient, RouterTensor};
 
 /// The gradient with respect to an input, from that with respect to the result.
-#[derive(Clone)]
+#[derive(Clone, derive_more::Debug)]
+#[debug("Pullback")]
 pub struct Pullback<B: Backend>(Arc<dyn Fn(FloatTensor<B>) -> FloatTensor<B> + Send + Sync>);
 
 impl<B: Backend> Pullback<B> {
     /// A linear function of the gradient.
     pub fn new(of: impl Fn(FloatTensor<B>) -> FloatTensor<B> + Send + Sync + 'static) -> Self {
         Self(Arc::new(of))
-    }
-}
-
-impl<B: Backend> fmt::Debug for Pullback<B> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("Pullback")
     }
 }
 

@@ -1,32 +1,27 @@
 //! Forward-mode rules and replay handlers of the extension operations.
 
 use burn_ir::{BackendIr, CustomOpIr, ScalarIr, TensorIr};
-use linearize::{Builder, CustomOpRegistry, Error, Extensions, Multilinear, Rule};
+use linearize::{Builder, CustomOpRegistry, Error, Extensions, Tangents, multilinear};
 
 use crate::ops::{BRICKS, CONVOLUTION, CORRELATION, GridOps, TABULATED};
 use crate::table::TableRange;
 
 /// `d F^(k)(w) = F^(k+1)(w) dw`; the table is constant.
-struct Tabulated;
-
-impl Rule for Tabulated {
-    fn jvp(
-        &self,
-        operation: &CustomOpIr,
-        tangents: &[Option<TensorIr>],
-        build: &mut Builder,
-    ) -> Result<Vec<Option<TensorIr>>, Error> {
-        let (Some(dw), None) = (&tangents[0], &tangents[1]) else {
-            return Err(Error::NoRule {
-                operation: format!("{TABULATED} with respect to its table"),
-            });
-        };
-        let order = operation.scalars[0].elem::<u64>();
-        let mut derivative = operation.clone();
-        derivative.scalars[0] = ScalarIr::UInt(order + 1);
-        let derivative = build.primal(derivative);
-        Ok(vec![Some(build.mul(&derivative, dw))])
-    }
+fn of_table(
+    operation: &CustomOpIr,
+    tangents: &[Option<TensorIr>],
+    build: &mut Builder,
+) -> Tangents {
+    let (Some(dw), None) = (&tangents[0], &tangents[1]) else {
+        return Err(Error::NoRule {
+            operation: format!("{TABULATED} with respect to its table"),
+        });
+    };
+    let order = operation.scalars[0].elem::<u64>();
+    let mut derivative = operation.clone();
+    derivative.scalars[0] = ScalarIr::UInt(order + 1);
+    let derivative = build.primal(derivative);
+    Ok(vec![Some(build.mul(&derivative, dw))])
 }
 
 fn register<B: BackendIr + GridOps>(registry: &mut CustomOpRegistry<B>) {
@@ -55,10 +50,10 @@ fn register<B: BackendIr + GridOps>(registry: &mut CustomOpRegistry<B>) {
 pub fn extensions() -> Extensions {
     let mut extensions = Extensions::new();
     extensions
-        .rule(CONVOLUTION, Multilinear)
-        .rule(CORRELATION, Multilinear)
-        .rule(BRICKS, Multilinear)
-        .rule(TABULATED, Tabulated);
+        .rule(CONVOLUTION, multilinear)
+        .rule(CORRELATION, multilinear)
+        .rule(BRICKS, multilinear)
+        .rule(TABULATED, of_table);
     #[cfg(feature = "flex")]
     extensions.on_flex(|registry| {
         register(registry);

@@ -2,7 +2,6 @@
 //!
 //! They are not differentiated, so neither captured nor on the tape.
 
-use std::fmt;
 use std::sync::Arc;
 
 use burn::backend::{Backend, Dispatch, backend_extension, tensor::FloatTensor};
@@ -27,14 +26,9 @@ pub trait HostUpdate: Send + Sync {
 }
 
 /// A shared [`HostUpdate`].
-#[derive(Clone)]
+#[derive(Clone, derive_more::Debug)]
+#[debug("SharedUpdate")]
 pub struct SharedUpdate(pub(crate) Arc<dyn HostUpdate>);
-
-impl fmt::Debug for SharedUpdate {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("SharedUpdate")
-    }
-}
 
 /// Vector operations of iterative solvers.
 #[backend_extension(

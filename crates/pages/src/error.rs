@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 /// Errors of pages and what they are made of, each saying which file or number is at fault.
 #[derive(Debug, thiserror::Error)]
+#[error(transparent)]
 #[non_exhaustive]
 pub enum Error {
     /// A file or folder that cannot be read.
@@ -18,13 +19,11 @@ pub enum Error {
     #[error("{0} is missing")]
     Missing(String),
     /// A page that cannot be written.
-    #[error(transparent)]
     Write(#[from] geometry::Error),
     /// Bytes that are no picture a browser shows, or a damaged one.
     #[error("{name} is no intact PNG or SVG picture: {problem}")]
     Picture { name: String, problem: String },
     /// A picture that cannot be encoded, or a view that cannot be taken.
-    #[error(transparent)]
     Render(#[from] render::Error),
     /// A table that cannot be read or has rows of different lengths.
     #[error("{name} is no table: {problem}")]

@@ -131,31 +131,23 @@ fn series(metric: &str) -> Option<&str> {
 
 /// The order in which `step2` comes before `step10`.
 pub(crate) fn natural(a: &str, b: &str) -> Ordering {
-    let digits = |text: &str| text.bytes().take_while(u8::is_ascii_digit).count();
-    let (mut left, mut right) = (a, b);
-    loop {
-        let lengths = (digits(left), digits(right));
-        let (x, y) = if lengths.0 > 0 && lengths.1 > 0 {
-            let ((x, rest), (y, other)) = (left.split_at(lengths.0), right.split_at(lengths.1));
-            let (x, y) = (x.trim_start_matches('0'), y.trim_start_matches('0'));
-            // Of two numbers without leading zeros, the longer one is larger.
-            let order = x.len().cmp(&y.len()).then_with(|| x.cmp(y));
-            if order != Ordering::Equal {
-                return order;
-            }
-            (rest, other)
-        } else {
-            match (left.chars().next(), right.chars().next()) {
-                // Nothing left: `1` and `01` are told apart by their characters.
-                (None, None) => return a.cmp(b),
-                (None, Some(_)) => return Ordering::Less,
-                (Some(_), None) => return Ordering::Greater,
-                (Some(x), Some(y)) if x == y => (&left[x.len_utf8()..], &right[y.len_utf8()..]),
-                (Some(x), Some(y)) => return x.cmp(&y),
-            }
-        };
-        (left, right) = (x, y);
-    }
+    // `1` and `01` are told apart by their characters.
+    parts(a).cmp(parts(b)).then_with(|| a.cmp(b))
+}
+
+/// Characters, and numbers as one part each: of two without leading zeros, the longer one is larger.
+fn parts(mut text: &str) -> impl Iterator<Item = (char, usize, &str)> {
+    std::iter::from_fn(move || {
+        let first = text.chars().next()?;
+        let digits = text.bytes().take_while(u8::is_ascii_digit).count();
+        let (part, rest) = text.split_at(digits.max(first.len_utf8()));
+        text = rest;
+        let number = part.trim_start_matches('0');
+        Some(match digits {
+            0 => (first, 0, ""),
+            _ => ('0', number.len(), number),
+        })
+    })
 }
 
 /// A number with five digits; whole numbers as they are.

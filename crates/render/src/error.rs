@@ -4,13 +4,12 @@
 
 /// Errors of scenes and pictures, each with the numbers needed to act on it.
 #[derive(Debug, thiserror::Error)]
+#[error(transparent)]
 #[non_exhaustive]
 pub enum Error {
     /// A field, grid or file was refused by [`geometry`].
-    #[error(transparent)]
     Geometry(#[from] geometry::Error),
     /// A surface cannot be found.
-    #[error(transparent)]
     Surface(#[from] surfaces::Error),
     /// The PNG encoder failed.
     #[error("the picture could not be encoded as PNG")]

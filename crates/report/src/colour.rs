@@ -1,5 +1,6 @@
 //! Colours that survive colour-blindness and printing: a qualitative palette and a colour map.
 
+use derive_more::From;
 use plotters::style::colors::colormaps::ViridisRGB;
 use srgb::Rgb;
 
@@ -24,10 +25,11 @@ pub const OKABE_ITO: [Rgb; 8] = [
 ];
 
 /// The colour of a curve.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, From)]
 #[non_exhaustive]
 pub enum Colour {
     /// Entry of [`OKABE_ITO`], modulo its length.
+    #[from]
     Palette(usize),
     /// Near-black, for exact solutions.
     Black,
@@ -36,6 +38,7 @@ pub enum Colour {
     /// Light grey, for filled shapes in the background.
     LightGrey,
     /// Any other colour.
+    #[from]
     Custom(Rgb),
 }
 
@@ -49,18 +52,6 @@ impl Colour {
             Self::LightGrey => Rgb(214, 214, 214),
             Self::Custom(rgb) => rgb,
         }
-    }
-}
-
-impl From<usize> for Colour {
-    fn from(index: usize) -> Self {
-        Self::Palette(index)
-    }
-}
-
-impl From<Rgb> for Colour {
-    fn from(rgb: Rgb) -> Self {
-        Self::Custom(rgb)
     }
 }
 

@@ -1,5 +1,6 @@
 //! The cells of a figure.
 
+use derive_more::From;
 use plotters_backend::text_anchor::HPos;
 
 use crate::axes::Margins;
@@ -16,7 +17,7 @@ use crate::style::Fonts;
 use crate::surface::Surface;
 
 /// One cell of a figure.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, From)]
 #[non_exhaustive]
 pub enum Panel {
     /// A line chart.
@@ -27,30 +28,6 @@ pub enum Panel {
     Shapes(Shapes),
     /// A picture.
     Raster(Raster),
-}
-
-impl From<LineChart> for Panel {
-    fn from(chart: LineChart) -> Self {
-        Self::Line(chart)
-    }
-}
-
-impl From<Heatmap> for Panel {
-    fn from(map: Heatmap) -> Self {
-        Self::Heatmap(map)
-    }
-}
-
-impl From<Shapes> for Panel {
-    fn from(shapes: Shapes) -> Self {
-        Self::Shapes(shapes)
-    }
-}
-
-impl From<Raster> for Panel {
-    fn from(raster: Raster) -> Self {
-        Self::Raster(raster)
-    }
 }
 
 impl Panel {

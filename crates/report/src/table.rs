@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use derive_more::From;
+
 use crate::axis::power_of_ten;
 use crate::data::{rounded, shortest};
 use crate::error::{Error, Result};
@@ -19,28 +21,18 @@ pub enum Format {
 }
 
 /// One cell.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, From)]
 pub enum Cell {
     /// Text, whatever the format of the column.
+    #[from(&str)]
     Text(String),
     /// A whole number, shown as it is whatever the format of the column.
     Integer(i64),
     /// A finite number.
+    #[from]
     Number(f64),
     /// Nothing to report: empty in CSV, a dash in Markdown.
     Missing,
-}
-
-impl From<&str> for Cell {
-    fn from(text: &str) -> Self {
-        Self::Text(text.to_owned())
-    }
-}
-
-impl From<f64> for Cell {
-    fn from(number: f64) -> Self {
-        Self::Number(number)
-    }
 }
 
 impl From<usize> for Cell {
@@ -82,16 +74,16 @@ impl Cell {
 
 /// Name of a column with its unit or scaling, and how its numbers are shown; without a format it is text.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Column {
-    name: String,
-    format: Option<Format>,
+pub(crate) struct Column {
+    pub(crate) name: String,
+    pub(crate) format: Option<Format>,
 }
 
 /// A table with typed columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    columns: Vec<Column>,
-    rows: Vec<Vec<Cell>>,
+    pub(crate) columns: Vec<Column>,
+    pub(crate) rows: Vec<Vec<Cell>>,
 }
 
 impl Table {
@@ -105,24 +97,6 @@ impl Table {
             columns: names.into_iter().map(column).collect(),
             rows: Vec::new(),
         }
-    }
-
-    /// Starts a table with a row for every record.
-    ///
-    /// ```
-    /// use report::{Format, Table};
-    /// let circles = [(0.1, 2_usize), (0.2, 3)];
-    /// let table = Table::of(&circles)
-    ///     .text("circle", |(radius, _)| format!("R = {radius}"))
-    ///     .number("iterations", Format::Shortest, |&(_, count)| count)
-    ///     .finish()?;
-    /// assert_eq!(table.to_csv()?, "circle,iterations\nR = 0.1,2\nR = 0.2,3\n");
-    /// # Ok::<(), report::Error>(())
-    /// ```
-    pub fn of<R>(records: &[R]) -> Tabulated<'_, R> {
-        let mut table = Self::data(&[]);
-        table.rows = records.iter().map(|_| Vec::new()).collect();
-        Tabulated { records, table }
     }
 
     /// Adds a row.
@@ -139,7 +113,7 @@ impl Table {
         checked
     }
 
-    fn check(&self, row: usize) -> Result<()> {
+    pub(crate) fn check(&self, row: usize) -> Result<()> {
         let (found, expected) = (self.rows[row].len(), self.columns.len());
         if found != expected {
             return Err(Error::RowLength {
@@ -228,58 +202,6 @@ impl Table {
     }
 }
 
-/// A [table of records](Table::of) that grows column by column.
-#[derive(Debug, Clone)]
-#[must_use]
-pub struct Tabulated<'a, R> {
-    records: &'a [R],
-    table: Table,
-}
-
-impl<'a, R> Tabulated<'a, R> {
-    /// Adds a column of text.
-    pub fn text<S: Into<String>>(
-        self,
-        name: impl Into<String>,
-        value: impl Fn(&'a R) -> S,
-    ) -> Self {
-        self.column(name.into(), None, |record| Cell::Text(value(record).into()))
-    }
-
-    /// Adds a column of numbers.
-    pub fn number<C: Into<Cell>>(
-        self,
-        name: impl Into<String>,
-        format: Format,
-        value: impl Fn(&'a R) -> C,
-    ) -> Self {
-        self.column(name.into(), Some(format), |record| value(record).into())
-    }
-
-    fn column(
-        mut self,
-        name: String,
-        format: Option<Format>,
-        cell: impl Fn(&'a R) -> Cell,
-    ) -> Self {
-        self.table.columns.push(Column { name, format });
-        for (row, record) in self.table.rows.iter_mut().zip(self.records) {
-            row.push(cell(record));
-        }
-        self
-    }
-
-    /// The finished table.
-    ///
-    /// # Errors
-    ///
-    /// As [`Table::push`].
-    pub fn finish(self) -> Result<Table> {
-        (0..self.records.len()).try_for_each(|row| self.table.check(row))?;
-        Ok(self.table)
-    }
-}
-
 /// Keeps text from ending its cell or its row.
 fn escaped(text: &str) -> String {
     text.replace('\\', "\\\\")
@@ -303,19 +225,19 @@ fn scientific(number: f64, decimals: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Sheet;
 
     fn example() -> Table {
         let rows = [
             ("a|b, \"c\"", 128_usize, Some(1.2345e-6), 1.0 / 3.0),
             ("plain", 64, None, 1.0),
         ];
-        Table::of(&rows)
+        let sheet = Sheet::of(&rows)
             .text("method", |row| row.0)
-            .number("N", Format::Shortest, |row| row.1)
-            .number("error", Format::Scientific(2), |row| row.2)
-            .number("share", Format::Fixed(3), |row| row.3)
-            .finish()
-            .unwrap()
+            .column("N", Format::Shortest, |row| row.1)
+            .column("error", Format::Scientific(2), |row| row.2)
+            .column("share", Format::Fixed(3), |row| row.3);
+        sheet.finish().unwrap().0
     }
 
     #[test]

@@ -1,7 +1,6 @@
 //! Closed oriented surfaces, their topology and measures.
 
-use std::fmt;
-
+use derive_more::Display;
 use geometry::Placement;
 use geometry::measure::BoundingBox;
 use rayon::prelude::*;
@@ -23,44 +22,30 @@ pub struct ClosedMesh {
 }
 
 /// What [`ClosedMesh::new`] changed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Display)]
 #[non_exhaustive]
 pub enum Warning {
     /// The total volume was negative: all faces were reversed.
+    #[display("the surface was oriented inwards: all faces reversed")]
     Reversed,
     /// The surface is closed only if vertices with exactly equal coordinates are one.
+    #[display("{vertices} vertices were merged with others at exactly the same place")]
     Merged {
         /// Vertices less than before.
         vertices: usize,
     },
     /// Faces with a repeated vertex were left out.
+    #[display("{faces} faces with a repeated vertex were left out")]
     Collapsed {
         /// Number of such faces.
         faces: usize,
     },
     /// Vertices of no face were left out.
+    #[display("{vertices} vertices of no face were left out")]
     Unreferenced {
         /// Number of such vertices.
         vertices: usize,
     },
-}
-
-impl fmt::Display for Warning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Reversed => write!(f, "the surface was oriented inwards: all faces reversed"),
-            Self::Merged { vertices } => write!(
-                f,
-                "{vertices} vertices were merged with others at exactly the same place"
-            ),
-            Self::Collapsed { faces } => {
-                write!(f, "{faces} faces with a repeated vertex were left out")
-            }
-            Self::Unreferenced { vertices } => {
-                write!(f, "{vertices} vertices of no face were left out")
-            }
-        }
-    }
 }
 
 impl ClosedMesh {

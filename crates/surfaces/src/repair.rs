@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
-use std::fmt;
 
+use derive_more::Display;
 use geometry::{Field, Grid, optimal_profile};
 use rayon::prelude::*;
 
@@ -22,7 +22,12 @@ const LEAF: usize = 8;
 const FAR: f64 = 2.0;
 
 /// A closed mesh, and how it differs from what it was made of.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Display)]
+#[display(
+    "repaired with cells of {spacing:.3e}: {turned} faces were turned round, {:.2} % of the new surface closes holes, {:.2} % of the old \
+     one was inside or too thin and is left out",
+    100.0 * added, 100.0 * dropped
+)]
 pub struct Repaired {
     /// The mesh.
     pub mesh: ClosedMesh,
@@ -34,20 +39,6 @@ pub struct Repaired {
     pub added: f64,
     /// The part of the old area that is further than a cell from the new surface: what is inside, or thinner than a cell.
     pub dropped: f64,
-}
-
-impl fmt::Display for Repaired {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "repaired with cells of {:.3e}: {} faces were turned round, {:.2} % of the new surface closes holes, {:.2} % of the old one \
-             was inside or too thin and is left out",
-            self.spacing,
-            self.turned,
-            100.0 * self.added,
-            100.0 * self.dropped,
-        )
-    }
 }
 
 /// A closed mesh of any triangles: open, not manifold, crossing themselves, of mixed orientation.

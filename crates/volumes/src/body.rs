@@ -1,8 +1,8 @@
 //! Bodies in volumes, and their surfaces.
 
 use std::collections::BTreeMap;
-use std::fmt;
 
+use derive_more::Display;
 use surfaces::{ClosedMesh, TriangleMesh, lattice_surface};
 
 use crate::{Error, Volume};
@@ -19,11 +19,13 @@ const REACHES: [f64; 3] = [0.9, 0.45, 0.0];
 const SPECK: f64 = 8.0;
 
 /// Which voxels are inside.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Display)]
 pub enum Inside {
     /// Those of this value.
+    #[display("labelled {_0}")]
     Label(f64),
     /// Those of larger values; the surface is where the values, interpolated, are this one.
+    #[display("above {_0}")]
     Above(f64),
 }
 
@@ -33,15 +35,6 @@ impl Inside {
             // Labels are whole.
             Self::Label(label) => (value - label).abs() < 0.5,
             Self::Above(threshold) => value > threshold,
-        }
-    }
-}
-
-impl fmt::Display for Inside {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Label(label) => write!(f, "labelled {label}"),
-            Self::Above(threshold) => write!(f, "above {threshold}"),
         }
     }
 }

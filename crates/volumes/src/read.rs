@@ -8,10 +8,11 @@ mod stack;
 use std::io::Read;
 use std::path::Path;
 
+use files::Number;
 use flate2::read::MultiGzDecoder;
 use glam::DAffine3;
 
-use crate::volume::{Element, Voxels};
+use crate::volume::Voxels;
 use crate::{Error, FormatError, Volume};
 
 pub use stack::is_stack;
@@ -101,7 +102,7 @@ fn unpacked(mut packed: impl Read, limit: u64) -> Result<Volume, FormatError> {
 /// What comes before the voxels.
 struct Header {
     size: [u64; 3],
-    element: Element,
+    element: Number,
     big_endian: bool,
     scale: [f64; 2],
     frame: DAffine3,
@@ -143,7 +144,7 @@ impl Header {
 }
 
 /// Bytes of so many voxels.
-fn length(size: [u64; 3], element: Element, limit: u64) -> Result<u64, FormatError> {
+fn length(size: [u64; 3], element: Number, limit: u64) -> Result<u64, FormatError> {
     let bytes = element.size() as u64;
     let length = size.iter().try_fold(bytes, |all, &n| all.checked_mul(n));
     let some = size.iter().all(|&n| n >= 2);

@@ -1,5 +1,6 @@
 //! Values on a lattice in space.
 
+use files::Number;
 use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -19,56 +20,10 @@ pub struct Volume {
 #[derive(Clone, Debug)]
 pub(crate) struct Voxels {
     pub(crate) bytes: Vec<u8>,
-    pub(crate) element: Element,
+    pub(crate) element: Number,
     pub(crate) big_endian: bool,
     /// The value of a number `x` is `scale[0] x + scale[1]`.
     pub(crate) scale: [f64; 2],
-}
-
-/// Kinds of numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Element {
-    U8,
-    I8,
-    U16,
-    I16,
-    U32,
-    I32,
-    U64,
-    I64,
-    F32,
-    F64,
-}
-
-impl Element {
-    /// In bytes.
-    pub(crate) fn size(self) -> usize {
-        match self {
-            Self::U8 | Self::I8 => 1,
-            Self::U16 | Self::I16 => 2,
-            Self::U32 | Self::I32 | Self::F32 => 4,
-            Self::U64 | Self::I64 | Self::F64 => 8,
-        }
-    }
-
-    /// Of as many bytes as it has.
-    fn decode(self, bytes: &[u8], big_endian: bool) -> f64 {
-        let push = |bits: u64, byte: &u8| bits << 8 | u64::from(*byte);
-        let bits = if big_endian {
-            bytes.iter().fold(0, push)
-        } else {
-            bytes.iter().rev().fold(0, push)
-        };
-        match self {
-            Self::U8 | Self::U16 | Self::U32 | Self::U64 => bits as f64,
-            Self::I8 => f64::from(bits as i8),
-            Self::I16 => f64::from(bits as i16),
-            Self::I32 => f64::from(bits as i32),
-            Self::I64 => bits as i64 as f64,
-            Self::F32 => f64::from(f32::from_bits(bits as u32)),
-            Self::F64 => f64::from_bits(bits),
-        }
-    }
 }
 
 impl Voxels {
@@ -94,7 +49,7 @@ impl Volume {
     ) -> Result<Self, Error> {
         let voxels = Voxels {
             bytes: labels,
-            element: Element::U8,
+            element: Number::U8,
             big_endian: false,
             scale: [1.0, 0.0],
         };

@@ -2,7 +2,7 @@
 
 use chacha20::ChaCha8Rng;
 
-use crate::meshes::{folder, sampled};
+use crate::meshes::{LAPLACIAN, TAUBIN, folder, rms_distance, sampled};
 use crate::prelude::*;
 use crate::surfaces::{centred_box, fairing_flow, mesh_raster};
 use engine::DISPLACEMENT;
@@ -15,9 +15,7 @@ const NOISES: [f64; 2] = [0.3, 0.5];
 /// The grid as `willmore fair` chooses it: cells per unit length, and the longest side in the box.
 const CELLS: usize = 128;
 const SIDE: f64 = 0.9;
-/// Factors of Taubin's smoothing, and of Laplacian smoothing; the most iterations of both.
-const TAUBIN: [f64; 2] = [0.5, -0.53];
-const LAPLACIAN: [f64; 2] = [0.5, 0.0];
+/// The most iterations of Taubin's and of Laplacian smoothing.
 const ITERATIONS: usize = 30;
 
 /// Independent normally distributed noise along the normals of clean meshes, taken off by `willmore fair` at its defaults, by Taubin's
@@ -217,9 +215,7 @@ impl Clean {
     }
 
     fn quality(&self, mesh: &TriangleMesh) -> Quality {
-        let vertices = mesh.vertices.iter();
-        let squares = vertices.map(|&x| self.distance.signed_distance(x).powi(2));
-        let rms = (squares.sum::<f64>() / mesh.vertices.len() as f64).sqrt();
+        let rms = rms_distance(mesh, &self.distance);
         let clean = self.mesh.mesh();
         let angles = mesh.faces.iter().map(|&face| {
             let [a, b] = [mesh, clean].map(|mesh| mesh.face_normal(face));

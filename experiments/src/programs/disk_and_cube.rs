@@ -123,14 +123,8 @@ fn compare_with_exact(
     let times: Vec<f64> = marks.iter().map(|&k| k as f64 * tau).collect();
     let title = format!("{}: the exact flow", sample.title);
     let exact = session.phase(title, |_| sample.exact(Flow::Willmore, &times))?;
-    let first = StepRule::Ramp {
-        tau: tau * f64::from(1 << HALVINGS),
-        halvings: HALVINGS,
-    };
-    let time_steps = TimeSteps {
-        order: Order::Controlled(ErrorControl::default()),
-        ..first.into()
-    };
+    let end = tau * f64::from(1 << HALVINGS);
+    let time_steps = truth::controlled(ErrorControl::default(), end, HALVINGS);
     let control = ("controlled", time_steps, tau * steps as f64);
     let run = sample.run(session, (n, 2.0), truth::ACCURATE, control)?;
     let compare = |(&step, exact): (&usize, &Truth)| {

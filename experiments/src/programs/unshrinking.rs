@@ -2,6 +2,7 @@
 
 use chacha20::ChaCha8Rng;
 
+use crate::meshes::{LAPLACIAN, TAUBIN, rms_distance};
 use crate::prelude::*;
 use crate::surfaces::{fairing_flow, mesh_raster};
 use rand::{RngExt, SeedableRng};
@@ -21,9 +22,7 @@ const FINE: f64 = 1.25;
 /// Time of the flow, and how far the surface may go, as `willmore fair` has them.
 const TIME: f64 = 6.5536;
 const FARTHEST: f64 = 0.35;
-/// Factors of Taubin's and of Laplacian smoothing, and the most iterations.
-const TAUBIN: [f64; 2] = [0.5, -0.53];
-const LAPLACIAN: [f64; 2] = [0.5, 0.0];
+/// The most iterations of Taubin's and of Laplacian smoothing.
 const ITERATIONS: usize = 60;
 
 /// A ball with wrong labels and a figure, as voxels: their surface by marching tetrahedra, what `willmore fair` makes of the voxels and of
@@ -92,7 +91,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
             Row::displacement,
         )
         .measure("rms", ("distance to the shape", Fixed(4)), |row| {
-            row.of.distance(&row.surface)
+            rms_distance(&row.surface, &*row.of.shape)
         });
     session.sheet(table, "unshrinking")?;
     let figure = Figure::new(TITLE, 5)
@@ -192,7 +191,8 @@ impl Segmented {
     /// The surface after the number of iterations that brings it nearest to the shape.
     fn smoothed(&self, [lambda, mu]: [f64; 2]) -> Result<(usize, ClosedMesh), Error> {
         let smoothed = |count| self.marched.mesh().smoothed(count, lambda, mu);
-        let all = (1..=ITERATIONS).map(|count| (count, self.distance(&smoothed(count))));
+        let all =
+            (1..=ITERATIONS).map(|count| (count, rms_distance(&smoothed(count), &*self.shape)));
         let best = all
             .min_by(|a, b| a.1.total_cmp(&b.1))
             .map_or(1, |(count, _)| count);
@@ -208,13 +208,6 @@ impl Segmented {
             stops: vec![Stop::Time(TIME), Stop::Displacement(FARTHEST)],
             ..case
         })
-    }
-
-    /// Root of the mean square distance of the vertices to the shape.
-    fn distance(&self, mesh: &TriangleMesh) -> f64 {
-        let vertices = mesh.vertices.iter();
-        let squares = vertices.map(|&x| self.shape.signed_distance(x).powi(2));
-        (squares.sum::<f64>() / mesh.vertices.len() as f64).sqrt()
     }
 }
 

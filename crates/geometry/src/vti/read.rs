@@ -4,10 +4,11 @@ use std::path::Path;
 
 use roxmltree::{Document, Node};
 
-use files::shortened;
+use files::{Number, shortened};
 
 use super::error::VtiError;
-use super::stream::{Element, Fault, Format, Stream};
+use super::stream::{Fault, Format, Stream, number};
+use crate::npy::reversed;
 use crate::{Error, Field, Grid};
 
 /// Most elements, and most attributes, of a file. Those of VTK have some tens.
@@ -323,7 +324,7 @@ impl Reader<'_> {
             });
         }
         let kind = array.attribute("type").unwrap_or_default();
-        let element = Element::parse(kind).ok_or_else(|| VtiError::Attribute {
+        let number = number(kind).ok_or_else(|| VtiError::Attribute {
             element: "DataArray",
             attribute: "type",
             value: excerpt(kind),
@@ -337,7 +338,7 @@ impl Reader<'_> {
             .collect();
         let stored = match one_of(array, "DataArray", "format", &formats, None)? {
             "ascii" => self.parse(&text, name)?,
-            "binary" => self.decode(Stream::base64(text.as_bytes()), element, name)?,
+            "binary" => self.decode(Stream::base64(text.as_bytes()), number, name)?,
             _ => {
                 let [offset] = numbers::<usize, 1>(array, "DataArray", "offset", Some("0"))?;
                 let data = self.appended.get(offset..).unwrap_or_default();
@@ -346,20 +347,13 @@ impl Reader<'_> {
                 } else {
                     Stream::raw(data)
                 };
-                self.decode(stream, element, name)?
+                self.decode(stream, number, name)?
             }
         };
         // VTK's fastest axis is our slowest.
-        let position = |index: usize| {
-            let digits = (0..D).scan(index, |rest, _| {
-                let digit = *rest % self.cells;
-                *rest /= self.cells;
-                Some(digit)
-            });
-            digits.fold(0, |position, digit| position * self.cells + digit)
-        };
-        Ok((0..stored.len())
-            .map(|index| stored[position(index)])
+        let nodes = 0..stored.len();
+        Ok(nodes
+            .map(|index| stored[reversed::<D>(index, self.cells)])
             .collect())
     }
 
@@ -383,10 +377,10 @@ impl Reader<'_> {
     fn decode(
         &self,
         mut stream: Stream<'_>,
-        element: Element,
+        number: Number,
         name: &str,
     ) -> Result<Vec<f64>, VtiError> {
-        let expected = self.nodes.saturating_mul(element.size() as u64);
+        let expected = self.nodes.saturating_mul(number.size() as u64);
         let bytes = stream
             .block(self.format, expected)
             .map_err(|fault| match fault {
@@ -400,9 +394,9 @@ impl Reader<'_> {
                     reason,
                 },
             })?;
-        let chunks = bytes.chunks_exact(element.size());
+        let chunks = bytes.chunks_exact(number.size());
         Ok(chunks
-            .map(|b| element.decode(b, self.format.big_endian))
+            .map(|b| number.decode(b, self.format.big_endian))
             .collect())
     }
 }

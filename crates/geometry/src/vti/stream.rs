@@ -4,6 +4,7 @@ use std::io::Read;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use files::{Number, unsigned};
 use flate2::read::ZlibDecoder;
 
 /// How the numbers of a file are stored.
@@ -16,59 +17,21 @@ pub(super) struct Format {
     pub compressed: bool,
 }
 
-/// Unsigned number of at most eight bytes.
-fn unsigned(bytes: &[u8], big_endian: bool) -> u64 {
-    let push = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
-    if big_endian {
-        bytes.iter().fold(0, push)
-    } else {
-        bytes.iter().rev().fold(0, push)
-    }
-}
-
-/// Number type of an array.
-#[derive(Clone, Copy)]
-pub(super) enum Element {
-    Float(usize),
-    Signed(usize),
-    Unsigned(usize),
-}
-
-impl Element {
-    pub fn parse(name: &str) -> Option<Self> {
-        let split = name.find(|c: char| c.is_ascii_digit())?;
-        let size = match &name[split..] {
-            "8" => 1,
-            "16" => 2,
-            "32" => 4,
-            "64" => 8,
-            _ => return None,
-        };
-        match (&name[..split], size) {
-            ("Float", 4 | 8) => Some(Self::Float(size)),
-            ("Int", _) => Some(Self::Signed(size)),
-            ("UInt", _) => Some(Self::Unsigned(size)),
-            _ => None,
-        }
-    }
-
-    pub fn size(self) -> usize {
-        let (Self::Float(size) | Self::Signed(size) | Self::Unsigned(size)) = self;
-        size
-    }
-
-    pub fn decode(self, bytes: &[u8], big_endian: bool) -> f64 {
-        let bits = unsigned(bytes, big_endian);
-        match self {
-            Self::Float(4) => f64::from(f32::from_bits(bits as u32)),
-            Self::Float(_) => f64::from_bits(bits),
-            Self::Unsigned(_) => bits as f64,
-            Self::Signed(size) => {
-                let unused = 64 - 8 * size as u32;
-                ((bits << unused).cast_signed() >> unused) as f64
-            }
-        }
-    }
+/// The type of the numbers of an array.
+pub(super) fn number(name: &str) -> Option<Number> {
+    Some(match name {
+        "UInt8" => Number::U8,
+        "Int8" => Number::I8,
+        "UInt16" => Number::U16,
+        "Int16" => Number::I16,
+        "UInt32" => Number::U32,
+        "Int32" => Number::I32,
+        "UInt64" => Number::U64,
+        "Int64" => Number::I64,
+        "Float32" => Number::F32,
+        "Float64" => Number::F64,
+        _ => return None,
+    })
 }
 
 /// Why there are no bytes.

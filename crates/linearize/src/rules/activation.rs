@@ -69,9 +69,7 @@ pub(super) fn jvp(cx: &mut Context, op: &Act) -> Option<Vec<Tangent>> {
 }
 
 fn positive(cx: &mut Context, t: &TensorIr) -> TensorIr {
-    cx.indicator(t, ScalarIr::Float(0.0), |op| {
-        OperationIr::NumericFloat(op.lhs.dtype, Num::GreaterElem(op))
-    })
+    cx.indicator(t, ScalarIr::Float(0.0), Num::GreaterElem)
 }
 
 fn sum_along(cx: &mut Context, t: Tangent, s: &DimOpIr) -> Tangent {

@@ -8,35 +8,20 @@ use burn::backend::ir::{
 use burn::tensor::DType;
 
 use super::Context;
+use crate::emit::Emitter;
 use crate::tangent::{Builder, Tangent};
 
 pub(super) fn jvp(cx: &mut Context, dtype: DType, op: &Float) -> Option<Vec<Tangent>> {
     let wrap = move |op| OperationIr::Float(dtype, op);
     let one = match op {
-        Float::Matmul(m) => {
-            let l = cx.d(&m.lhs).map(|e| {
-                cx.build.linear(e, |lhs| {
-                    wrap(Float::Matmul(MatmulOpIr { lhs, ..m.clone() }))
-                })
-            });
-            let r = cx.d(&m.rhs).map(|e| {
-                cx.build.linear(e, |rhs| {
-                    wrap(Float::Matmul(MatmulOpIr { rhs, ..m.clone() }))
-                })
-            });
-            cx.build.plus(l, r)
-        }
-        Float::Cross(m) => {
-            let l = cx.d(&m.lhs).map(|e| {
-                cx.build
-                    .linear(e, |lhs| wrap(Float::Cross(CrossOpIr { lhs, ..m.clone() })))
-            });
-            let r = cx.d(&m.rhs).map(|e| {
-                cx.build
-                    .linear(e, |rhs| wrap(Float::Cross(CrossOpIr { rhs, ..m.clone() })))
-            });
-            cx.build.plus(l, r)
-        }
+        Float::Matmul(m) => cx.bilinear([&m.lhs, &m.rhs], |lhs, rhs| {
+            let out = m.out.clone();
+            wrap(Float::Matmul(MatmulOpIr { lhs, rhs, out }))
+        }),
+        Float::Cross(m) => cx.bilinear([&m.lhs, &m.rhs], |lhs, rhs| {
+            let m = m.clone();
+            wrap(Float::Cross(CrossOpIr { lhs, rhs, ..m }))
+        }),
         Float::PowfScalar(s) => {
             let exponent: f64 = s.rhs.elem();
             let power = cx.build.primal.powf(&s.lhs, exponent - 1.0);
@@ -134,54 +119,37 @@ fn slope<'a>(cx: &mut Context, op: &'a Float) -> Option<(&'a UnaryOpIr, TensorIr
             let sin = primal.unary(&u.input, Float::Sin);
             (u, primal.neg(&sin))
         }
-        // 1 + y²
-        Float::Tan(u) => {
-            let square = primal.mul(&u.out, &u.out);
-            (u, primal.shift(&square, 1.0))
-        }
+        Float::Tan(u) => (u, one_plus_square(primal, &u.out, 1.0)),
         Float::Sinh(u) => (u, primal.unary(&u.input, Float::Cosh)),
         Float::Cosh(u) => (u, primal.unary(&u.input, Float::Sinh)),
-        // 1 − y²
-        Float::Tanh(u) => {
-            let square = primal.mul(&u.out, &u.out);
-            let negated = primal.neg(&square);
-            (u, primal.shift(&negated, 1.0))
+        Float::Tanh(u) => (u, one_plus_square(primal, &u.out, -1.0)),
+        // (1 − x²)^(−1/2)
+        Float::ArcSin(u) => {
+            let rest = one_plus_square(primal, &u.input, -1.0);
+            (u, primal.powf(&rest, -0.5))
         }
-        // ±(1 − x²)^(−1/2)
-        Float::ArcSin(u) | Float::ArcCos(u) => {
-            let square = primal.mul(&u.input, &u.input);
-            let negated = primal.neg(&square);
-            let rest = primal.shift(&negated, 1.0);
+        Float::ArcCos(u) => {
+            let rest = one_plus_square(primal, &u.input, -1.0);
             let root = primal.powf(&rest, -0.5);
-            let sign = if matches!(op, Float::ArcSin(_)) {
-                1.0
-            } else {
-                -1.0
-            };
-            (u, primal.scale(&root, sign))
+            (u, primal.neg(&root))
         }
-        // (x² ± 1)^(−1/2)
-        Float::ArcSinh(u) | Float::ArcCosh(u) => {
-            let square = primal.mul(&u.input, &u.input);
-            let sign = if matches!(op, Float::ArcSinh(_)) {
-                1.0
-            } else {
-                -1.0
-            };
-            let shifted = primal.shift(&square, sign);
-            (u, primal.powf(&shifted, -0.5))
+        Float::ArcSinh(u) => {
+            let rest = one_plus_square(primal, &u.input, 1.0);
+            (u, primal.powf(&rest, -0.5))
         }
-        // 1/(1 ± x²)
-        Float::ArcTan(u) | Float::ArcTanh(u) => {
+        // (x² − 1)^(−1/2)
+        Float::ArcCosh(u) => {
             let square = primal.mul(&u.input, &u.input);
-            let sign = if matches!(op, Float::ArcTan(_)) {
-                1.0
-            } else {
-                -1.0
-            };
-            let signed = primal.scale(&square, sign);
-            let shifted = primal.shift(&signed, 1.0);
-            (u, primal.powi(&shifted, -1))
+            let rest = primal.shift(&square, -1.0);
+            (u, primal.powf(&rest, -0.5))
+        }
+        Float::ArcTan(u) => {
+            let rest = one_plus_square(primal, &u.input, 1.0);
+            (u, primal.powi(&rest, -1))
+        }
+        Float::ArcTanh(u) => {
+            let rest = one_plus_square(primal, &u.input, -1.0);
+            (u, primal.powi(&rest, -1))
         }
         // −y²
         Float::Recip(u) => {
@@ -190,4 +158,11 @@ fn slope<'a>(cx: &mut Context, op: &'a Float) -> Option<(&'a UnaryOpIr, TensorIr
         }
         _ => return None,
     })
+}
+
+/// `1 + sign t²`
+fn one_plus_square(primal: &mut Emitter, t: &TensorIr, sign: f64) -> TensorIr {
+    let square = primal.mul(t, t);
+    let signed = primal.scale(&square, sign);
+    primal.shift(&signed, 1.0)
 }

@@ -12,11 +12,12 @@ mod numeric;
 use std::collections::HashMap;
 
 use burn::backend::ir::{
-    BoolOperationIr, CastOpIr, OperationIr, ScalarIr, ScalarOpIr, TensorId, TensorIr,
+    BoolOperationIr, CastOpIr, NumericOperationIr, OperationIr, ScalarIr, ScalarOpIr, TensorId,
+    TensorIr,
 };
 use burn::tensor::{BoolStore, DType};
 
-use crate::ir::{like, name, output, read_only};
+use crate::ir::{like, name, output, read_only, rename};
 use crate::tangent::{Builder, Expression, Tangent};
 use crate::{Error, Extensions};
 
@@ -37,18 +38,47 @@ impl Context<'_> {
         t.and_then(|e| self.build.times(p, e, &out.shape))
     }
 
+    /// The operation on the tangent of the argument in which it is linear. Others are no floats, or give it their shapes only.
+    fn linear(&mut self, operation: &OperationIr, argument: &TensorIr) -> Tangent {
+        self.jointly_linear(operation, &[argument])
+    }
+
+    /// The operation on the tangents of the arguments in which it is jointly linear.
+    fn jointly_linear(&mut self, operation: &OperationIr, arguments: &[&TensorIr]) -> Tangent {
+        let tangents = arguments.iter().map(|t| (self.d(t), *t)).collect();
+        let mut operation = operation.clone();
+        self.build.jointly_linear(tangents, |tangents| {
+            let ids = arguments.iter().map(|t| t.id);
+            rename(&mut operation, &ids.zip(tangents).collect());
+            operation
+        })
+    }
+
+    /// The sum of the operation on the tangent of either argument and the other argument itself.
+    fn bilinear(
+        &mut self,
+        [l, r]: [&TensorIr; 2],
+        make: impl Fn(TensorIr, TensorIr) -> OperationIr,
+    ) -> Tangent {
+        let left = (self.d(l)).map(|e| self.build.linear(e, |tangent| make(tangent, r.clone())));
+        let right = (self.d(r)).map(|e| self.build.linear(e, |tangent| make(l.clone(), tangent)));
+        self.build.plus(left, right)
+    }
+
     /// `1` where `t` compares true, `0` elsewhere.
     fn indicator(
         &mut self,
         t: &TensorIr,
         bound: ScalarIr,
-        compare: fn(ScalarOpIr) -> OperationIr,
+        compare: fn(ScalarOpIr) -> NumericOperationIr,
     ) -> TensorIr {
-        let mask = self.build.primal.emit_one(compare(ScalarOpIr {
+        let comparison = compare(ScalarOpIr {
             lhs: read_only(t),
             rhs: bound,
             out: output(t.shape.clone(), DType::Bool(BoolStore::U8)),
-        }));
+        });
+        let comparison = OperationIr::NumericFloat(t.dtype, comparison);
+        let mask = self.build.primal.emit_one(comparison);
         self.build
             .primal
             .emit_one(OperationIr::Bool(BoolOperationIr::IntoFloat(CastOpIr {
@@ -64,10 +94,10 @@ pub(crate) fn jvp(cx: &mut Context, operation: &OperationIr) -> Result<Vec<Tange
         return Ok(vec![None; operation.outputs().count()]);
     }
     let found = match operation {
-        OperationIr::NumericFloat(dtype, op) => numeric::jvp(cx, *dtype, op),
+        OperationIr::NumericFloat(dtype, op) => numeric::jvp(cx, operation, *dtype, op),
         OperationIr::Float(dtype, op) => float::jvp(cx, *dtype, op),
-        OperationIr::BaseFloat(op) => base::jvp(cx, op),
-        OperationIr::Module(op) => module::jvp(cx, op),
+        OperationIr::BaseFloat(op) => base::jvp(cx, operation, op),
+        OperationIr::Module(op) => module::jvp(cx, operation, op),
         OperationIr::Activation(op) => activation::jvp(cx, op),
         OperationIr::Custom(op) => return custom(cx, op),
         _ => None,
@@ -90,7 +120,7 @@ fn custom(
         .iter()
         .map(|t| cx.d(t).map(|e| cx.build.handle(e)))
         .collect();
-    let outputs = rule.jvp(operation, &tangents, &mut cx.build)?;
+    let outputs = rule(operation, &tangents, &mut cx.build)?;
     if outputs.len() != operation.outputs.len() {
         return Err(Error::Rule {
             operation: id.clone(),

@@ -50,14 +50,14 @@ macro_rules! multilinear {
     }};
 }
 
-pub(super) fn jvp(cx: &mut Context, op: &Mod) -> Option<Vec<Tangent>> {
+pub(super) fn jvp(cx: &mut Context, whole: &OperationIr, op: &Mod) -> Option<Vec<Tangent>> {
     let one = match op {
         Mod::Linear(o) => layer!(cx, o, Mod::Linear, last_axis),
         Mod::LinearXBackward(o) => multilinear!(cx, o, Mod::LinearXBackward, weight, output_grad),
         Mod::LinearWeightBackward(o) => {
             multilinear!(cx, o, Mod::LinearWeightBackward, x, output_grad)
         }
-        Mod::LinearBiasBackward(o) => multilinear!(cx, o, Mod::LinearBiasBackward, output_grad),
+        Mod::LinearBiasBackward(o) => cx.linear(whole, &o.output_grad),
 
         Mod::Conv1d(o) => layer!(cx, o, Mod::Conv1d, second_axis),
         Mod::Conv2d(o) => layer!(cx, o, Mod::Conv2d, second_axis),
@@ -74,9 +74,9 @@ pub(super) fn jvp(cx: &mut Context, op: &Mod) -> Option<Vec<Tangent>> {
         Mod::Conv3dWeightBackward(o) => {
             multilinear!(cx, o, Mod::Conv3dWeightBackward, x, output_grad)
         }
-        Mod::Conv1dBiasBackward(o) => multilinear!(cx, o, Mod::Conv1dBiasBackward, output_grad),
-        Mod::Conv2dBiasBackward(o) => multilinear!(cx, o, Mod::Conv2dBiasBackward, output_grad),
-        Mod::Conv3dBiasBackward(o) => multilinear!(cx, o, Mod::Conv3dBiasBackward, output_grad),
+        Mod::Conv1dBiasBackward(o) => cx.linear(whole, &o.output_grad),
+        Mod::Conv2dBiasBackward(o) => cx.linear(whole, &o.output_grad),
+        Mod::Conv3dBiasBackward(o) => cx.linear(whole, &o.output_grad),
         Mod::ConvTranspose1d(o) => layer!(cx, o, Mod::ConvTranspose1d, second_axis),
         Mod::ConvTranspose2d(o) => layer!(cx, o, Mod::ConvTranspose2d, second_axis),
         Mod::ConvTranspose3d(o) => layer!(cx, o, Mod::ConvTranspose3d, second_axis),
@@ -89,37 +89,25 @@ pub(super) fn jvp(cx: &mut Context, op: &Mod) -> Option<Vec<Tangent>> {
         Mod::ConvTranspose3dWeightBackward(o) => {
             multilinear!(cx, o, Mod::ConvTranspose3dWeightBackward, x, output_grad)
         }
-        Mod::ConvTranspose1dBiasBackward(o) => {
-            multilinear!(cx, o, Mod::ConvTranspose1dBiasBackward, output_grad)
-        }
-        Mod::ConvTranspose2dBiasBackward(o) => {
-            multilinear!(cx, o, Mod::ConvTranspose2dBiasBackward, output_grad)
-        }
-        Mod::ConvTranspose3dBiasBackward(o) => {
-            multilinear!(cx, o, Mod::ConvTranspose3dBiasBackward, output_grad)
-        }
+        Mod::ConvTranspose1dBiasBackward(o) => cx.linear(whole, &o.output_grad),
+        Mod::ConvTranspose2dBiasBackward(o) => cx.linear(whole, &o.output_grad),
+        Mod::ConvTranspose3dBiasBackward(o) => cx.linear(whole, &o.output_grad),
 
-        Mod::Embedding(o) => multilinear!(cx, o, Mod::Embedding, weights),
-        Mod::EmbeddingBackward(o) => multilinear!(cx, o, Mod::EmbeddingBackward, out_grad),
-        Mod::AvgPool1d(o) => multilinear!(cx, o, Mod::AvgPool1d, x),
-        Mod::AvgPool2d(o) => multilinear!(cx, o, Mod::AvgPool2d, x),
-        Mod::AvgPool1dBackward(o) => multilinear!(cx, o, Mod::AvgPool1dBackward, grad),
-        Mod::AvgPool2dBackward(o) => multilinear!(cx, o, Mod::AvgPool2dBackward, grad),
-        Mod::AdaptiveAvgPool1d(o) => multilinear!(cx, o, Mod::AdaptiveAvgPool1d, x),
-        Mod::AdaptiveAvgPool2d(o) => multilinear!(cx, o, Mod::AdaptiveAvgPool2d, x),
-        Mod::AdaptiveAvgPool3d(o) => multilinear!(cx, o, Mod::AdaptiveAvgPool3d, x),
-        Mod::AdaptiveAvgPool1dBackward(o) => {
-            multilinear!(cx, o, Mod::AdaptiveAvgPool1dBackward, grad)
-        }
-        Mod::AdaptiveAvgPool2dBackward(o) => {
-            multilinear!(cx, o, Mod::AdaptiveAvgPool2dBackward, grad)
-        }
-        Mod::AdaptiveAvgPool3dBackward(o) => {
-            multilinear!(cx, o, Mod::AdaptiveAvgPool3dBackward, grad)
-        }
-        Mod::Interpolate(o) => multilinear!(cx, o, Mod::Interpolate, x),
-        Mod::InterpolateBackward(o) => multilinear!(cx, o, Mod::InterpolateBackward, grad),
-        Mod::Unfold4d(o) => multilinear!(cx, o, Mod::Unfold4d, x),
+        Mod::Embedding(o) => cx.linear(whole, &o.weights),
+        Mod::EmbeddingBackward(o) => cx.linear(whole, &o.out_grad),
+        Mod::AvgPool1d(o) => cx.linear(whole, &o.x),
+        Mod::AvgPool2d(o) => cx.linear(whole, &o.x),
+        Mod::AvgPool1dBackward(o) => cx.linear(whole, &o.grad),
+        Mod::AvgPool2dBackward(o) => cx.linear(whole, &o.grad),
+        Mod::AdaptiveAvgPool1d(o) => cx.linear(whole, &o.x),
+        Mod::AdaptiveAvgPool2d(o) => cx.linear(whole, &o.x),
+        Mod::AdaptiveAvgPool3d(o) => cx.linear(whole, &o.x),
+        Mod::AdaptiveAvgPool1dBackward(o) => cx.linear(whole, &o.grad),
+        Mod::AdaptiveAvgPool2dBackward(o) => cx.linear(whole, &o.grad),
+        Mod::AdaptiveAvgPool3dBackward(o) => cx.linear(whole, &o.grad),
+        Mod::Interpolate(o) => cx.linear(whole, &o.x),
+        Mod::InterpolateBackward(o) => cx.linear(whole, &o.grad),
+        Mod::Unfold4d(o) => cx.linear(whole, &o.x),
         _ => return None,
     };
     Some(vec![one])

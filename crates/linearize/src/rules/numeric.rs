@@ -2,9 +2,8 @@
 
 use burn::backend::ir::{BaseOperationIr as Base, FloatOperationIr as Float};
 use burn::backend::ir::{
-    BinaryOpIr, CastOpIr, ClampOpIr, DimOpIr, GatherOpIr, IntOperationIr,
-    NumericOperationIr as Num, OperationIr, PadModeIr, PadOpIr, ReduceDimOpIr,
-    ReduceDimWithIndicesOpIr, ReduceDimsOpIr, ReduceOpIr, ScalarIr, ScalarOpIr, TensorIr,
+    BinaryOpIr, CastOpIr, ClampOpIr, GatherOpIr, IntOperationIr, NumericOperationIr as Num,
+    OperationIr, PadModeIr, ReduceDimWithIndicesOpIr, ScalarIr, ScalarOpIr, TensorIr,
 };
 use burn::tensor::DType;
 
@@ -12,8 +11,12 @@ use super::Context;
 use crate::ir::{like, output, read_only};
 use crate::tangent::{Builder, Tangent};
 
-#[allow(clippy::too_many_lines, reason = "one table")]
-pub(super) fn jvp(cx: &mut Context, dtype: DType, op: &Num) -> Option<Vec<Tangent>> {
+pub(super) fn jvp(
+    cx: &mut Context,
+    whole: &OperationIr,
+    dtype: DType,
+    op: &Num,
+) -> Option<Vec<Tangent>> {
     let wrap = move |op| OperationIr::NumericFloat(dtype, op);
     let one = match op {
         Num::Add(b) => {
@@ -74,64 +77,24 @@ pub(super) fn jvp(cx: &mut Context, dtype: DType, op: &Num) -> Option<Vec<Tangen
             cx.times(&inside, cx.d(&c.tensor), &c.out)
         }
         Num::ClampMin(s) => {
-            let inside = cx.indicator(&s.lhs, s.rhs, |op| {
-                OperationIr::NumericFloat(op.lhs.dtype, Num::GreaterEqualElem(op))
-            });
+            let inside = cx.indicator(&s.lhs, s.rhs, Num::GreaterEqualElem);
             cx.times(&inside, cx.d(&s.lhs), &s.out)
         }
         Num::ClampMax(s) => {
-            let inside = cx.indicator(&s.lhs, s.rhs, |op| {
-                OperationIr::NumericFloat(op.lhs.dtype, Num::LowerEqualElem(op))
-            });
+            let inside = cx.indicator(&s.lhs, s.rhs, Num::LowerEqualElem);
             cx.times(&inside, cx.d(&s.lhs), &s.out)
         }
-        Num::Sum(r) | Num::Mean(r) => {
-            let variant = if matches!(op, Num::Sum(_)) {
-                Num::Sum
-            } else {
-                Num::Mean
-            };
-            let out = like(&r.out);
-            cx.d(&r.input).map(|e| {
-                cx.build
-                    .linear(e, |input| wrap(variant(ReduceOpIr { input, out })))
-            })
-        }
-        Num::SumDim(r) | Num::MeanDim(r) => {
-            let variant = if matches!(op, Num::SumDim(_)) {
-                Num::SumDim
-            } else {
-                Num::MeanDim
-            };
-            let r = r.clone();
-            cx.d(&r.input).map(|e| {
-                cx.build
-                    .linear(e, |input| wrap(variant(ReduceDimOpIr { input, ..r })))
-            })
-        }
-        Num::SumDims(r) => {
-            let r = r.clone();
-            cx.d(&r.input).map(|e| {
-                cx.build
-                    .linear(e, |input| wrap(Num::SumDims(ReduceDimsOpIr { input, ..r })))
-            })
-        }
-        Num::CumSum(r) => {
-            let r = r.clone();
-            cx.d(&r.input).map(|e| {
-                cx.build
-                    .linear(e, |input| wrap(Num::CumSum(DimOpIr { input, ..r })))
-            })
-        }
+        Num::Sum(r) | Num::Mean(r) => cx.linear(whole, &r.input),
+        Num::SumDim(r) | Num::MeanDim(r) => cx.linear(whole, &r.input),
+        Num::SumDims(r) => cx.linear(whole, &r.input),
+        Num::CumSum(r) => cx.linear(whole, &r.input),
         Num::Pad(p) => {
-            let mut p: PadOpIr = p.clone();
+            let mut p = p.clone();
             if let PadModeIr::Constant(value) = &mut p.mode {
                 *value = ScalarIr::Float(0.0);
             }
-            cx.d(&p.input).map(|e| {
-                cx.build
-                    .linear(e, |input| wrap(Num::Pad(PadOpIr { input, ..p })))
-            })
+            let input = p.input.clone();
+            cx.linear(&wrap(Num::Pad(p)), &input)
         }
         Num::MaxDimWithIndices(m) | Num::MinDimWithIndices(m) => {
             let value = gather(cx, &m.tensor, m.dim, &m.out_indices, &m.out);
@@ -214,12 +177,8 @@ fn powi_slope(cx: &mut Context, dtype: DType, b: &BinaryOpIr) -> TensorIr {
 
 /// Indicator of `min ≤ x ≤ max`.
 fn inside(cx: &mut Context, c: &ClampOpIr) -> TensorIr {
-    let above = cx.indicator(&c.tensor, c.min, |op| {
-        OperationIr::NumericFloat(op.lhs.dtype, Num::GreaterEqualElem(op))
-    });
-    let below = cx.indicator(&c.tensor, c.max, |op| {
-        OperationIr::NumericFloat(op.lhs.dtype, Num::LowerEqualElem(op))
-    });
+    let above = cx.indicator(&c.tensor, c.min, Num::GreaterEqualElem);
+    let below = cx.indicator(&c.tensor, c.max, Num::LowerEqualElem);
     cx.build.primal.mul(&above, &below)
 }
 

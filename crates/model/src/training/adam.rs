@@ -119,7 +119,7 @@ impl AdamParams {
         seed: u64,
         state: Option<AdamState>,
         device: &ComputeDevice,
-        observer: &mut dyn Observer<AdamState>,
+        observer: &mut Observer<'_, AdamState>,
     ) -> Result<(Vec<f64>, Mlp), Error> {
         data.validate()?;
         if self.batch == 0 || self.epochs == 0 {
@@ -230,7 +230,7 @@ impl AdamParams {
                 training_loss: sum / batches,
                 held_out_loss: device.scalar(held)?,
             };
-            if !observer.observe(&progress, &state)? {
+            if !observer(&progress, &state)? {
                 return Err(Error::Interrupted {
                     iteration: state.epoch,
                 });
@@ -251,7 +251,7 @@ impl Recipe for AdamParams {
         seed: u64,
         state: Option<AdamState>,
         device: &ComputeDevice,
-        observer: &mut dyn Observer<AdamState>,
+        observer: &mut Observer<'_, AdamState>,
     ) -> Result<(Vec<f64>, Mlp), Error> {
         if data.ratios.dimension == 2 {
             self.train_in::<2, 3>(data, seed, state, device, observer)
@@ -352,7 +352,7 @@ mod tests {
         for dimension in [2, 3] {
             let mut data = data(dimension);
             data.cells = if dimension == 2 { 32 } else { 16 };
-            let run = |state, observer: &mut dyn Observer<AdamState>| {
+            let run = |state, observer: &mut Observer<'_, AdamState>| {
                 params().train(&data, 3, state, &device, observer)
             };
             let mut losses = Vec::new();

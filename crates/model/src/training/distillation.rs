@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 
 use super::levenberg_marquardt::{Problem, random_activation};
 use super::{BandSamples, Observer, Progress};
-use crate::mlp::parameter_count;
 use crate::{Error, Mlp, PAPER_LAYERS};
 
 /// Settings of the fit of a perceptron to a function.
@@ -51,7 +50,7 @@ pub(super) fn distill_odd(
     settings: &Distillation,
     seed: u64,
     device: &ComputeDevice,
-    observer: &mut dyn Observer<()>,
+    observer: &mut Observer<'_, ()>,
 ) -> Result<Mlp, Error> {
     let nodes: Vec<f64> = (0..IMITATED).map(|i| i as f64 * NODE_DISTANCE).collect();
     let design: Vec<f64> = nodes
@@ -68,38 +67,26 @@ pub(super) fn distill_odd(
         identity_loss: 1.0,
         design,
     };
-    let n = parameter_count(&PAPER_LAYERS);
     let of = 4 * settings.starts.max(1) * settings.start_iterations + 3 * settings.iterations;
     let mut iteration = 0;
     let mut fit = |x: Vec<f64>, ridge: f64, iterations: usize| -> Result<(f64, Vec<f64>), Error> {
-        // One "orbit" whose value is frozen at 1 by an overwhelming ridge.
-        let mut weights = vec![ridge; n + 1];
-        weights[0] = 1e12;
-        let mut centre = vec![0.0; n + 1];
-        centre[0] = 1.0;
-        let mut problem = Problem::new(&samples, &[1], &PAPER_LAYERS, (weights, centre), device);
+        let mut problem = Problem::of_activation(&samples, ridge, device);
         problem.mix = Some(odd_sobolev_rows());
-        let mut all = [vec![1.0], x].concat();
-        let mut damping = 1e-3;
-        for _ in 0..iterations {
-            let Some(next) = problem.step(&all, &mut damping)? else {
-                break;
-            };
-            all = next;
+        problem.fit_activation(x, iterations, |all| {
             iteration += 1;
-            let (loss, _) = problem.value(&all)?;
+            let (loss, _) = problem.value(all)?;
             let progress = Progress {
                 iteration,
                 of,
                 training_loss: loss,
                 held_out_loss: loss,
             };
-            if !observer.observe(&progress, &())? {
-                return Err(Error::Interrupted { iteration });
+            if observer(&progress, &())? {
+                Ok(())
+            } else {
+                Err(Error::Interrupted { iteration })
             }
-        }
-        let (loss, _) = problem.value(&all)?;
-        Ok((loss, all.split_off(1)))
+        })
     };
     let mut best: Option<(f64, Vec<f64>)> = None;
     for start in 0..settings.starts.max(1) {

@@ -360,7 +360,7 @@ impl Recipe for LeastSquaresParams {
         seed: u64,
         _: Option<()>,
         device: &ComputeDevice,
-        observer: &mut dyn Observer<()>,
+        observer: &mut Observer<'_, ()>,
     ) -> Result<(Vec<f64>, Mlp), Error> {
         let kernel = kernel_of_full_variance(data);
         let polynomial = fit(data, self, &kernel, seed)?;

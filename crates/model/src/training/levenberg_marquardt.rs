@@ -130,6 +130,40 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// The activation of the paper's layers alone, with this ridge toward 0.
+    pub(super) fn of_activation(
+        samples: &BandSamples,
+        ridge: f64,
+        device: &'a ComputeDevice,
+    ) -> Self {
+        let n = parameter_count(&PAPER_LAYERS);
+        // One "orbit" whose value is frozen at 1 by an overwhelming ridge.
+        let (mut weights, mut centre) = (vec![ridge; n + 1], vec![0.0; n + 1]);
+        (weights[0], centre[0]) = (1e12, 1.0);
+        Self::new(samples, &[1], &PAPER_LAYERS, (weights, centre), device)
+    }
+
+    /// Loss and parameters after so many steps from `x`, fewer if none lowers the value; `observe` is told the parameters, the first one being
+    /// the orbit, after each.
+    pub(super) fn fit_activation(
+        &self,
+        x: Vec<f64>,
+        iterations: usize,
+        mut observe: impl FnMut(&[f64]) -> Result<(), Error>,
+    ) -> Result<(f64, Vec<f64>), Error> {
+        let mut all = [vec![1.0], x].concat();
+        let mut damping = 1e-3;
+        for _ in 0..iterations {
+            let Some(next) = self.step(&all, &mut damping)? else {
+                break;
+            };
+            all = next;
+            observe(&all)?;
+        }
+        let (loss, _) = self.value(&all)?;
+        Ok((loss, all.split_off(1)))
+    }
+
     fn ridge_value(&self, x: &[f64]) -> f64 {
         let terms = x.iter().zip(&self.centre).zip(&self.ridge);
         let ridge: f64 = terms.map(|((x, c), r)| r * (x - c) * (x - c)).sum();
@@ -355,28 +389,14 @@ pub fn splitting_start(
         identity_loss: 1.0,
         design: w,
     };
-    let n = parameter_count(&PAPER_LAYERS);
     let mut best: Option<(f64, Vec<f64>)> = None;
     for start in 0..params.starts.max(1) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(start as u64));
         let mut x = random_activation(&mut rng);
         for ridge in [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10] {
-            // One "orbit" whose value is frozen at 1 by an overwhelming ridge.
-            let mut weights = vec![ridge; n + 1];
-            weights[0] = 1e12;
-            let mut centre = vec![0.0; n + 1];
-            centre[0] = 1.0;
-            let problem = Problem::new(&samples, &[1], &PAPER_LAYERS, (weights, centre), device);
-            let mut all = [vec![1.0], x].concat();
-            let mut damping = 1e-3;
-            for _ in 0..15 {
-                match problem.step(&all, &mut damping)? {
-                    Some(next) => all = next,
-                    None => break,
-                }
-            }
-            let (loss, _) = problem.value(&all)?;
-            x = all.split_off(1);
+            let problem = Problem::of_activation(&samples, ridge, device);
+            let loss;
+            (loss, x) = problem.fit_activation(x, 15, |_| Ok(()))?;
             if best.as_ref().is_none_or(|(b, _)| loss < *b) {
                 best = Some((loss, x.clone()));
             }
@@ -452,7 +472,7 @@ impl Recipe for LmParams {
         seed: u64,
         state: Option<LmState>,
         device: &ComputeDevice,
-        observer: &mut dyn Observer<LmState>,
+        observer: &mut Observer<'_, LmState>,
     ) -> Result<(Vec<f64>, Mlp), Error> {
         data.validate()?;
         let orbits = Orbits::new(data.ratios.dimension, data.ratios.width);
@@ -531,7 +551,7 @@ impl Recipe for LmParams {
                 training_loss: loss * scale,
                 held_out_loss: held,
             };
-            if !observer.observe(&progress, &state)? {
+            if !observer(&progress, &state)? {
                 return Err(Error::Interrupted {
                     iteration: state.iteration,
                 });
@@ -625,7 +645,7 @@ mod tests {
         let device = ComputeDevice::default_compiled().unwrap();
         for dimension in [2, 3] {
             let data = data(dimension);
-            let run = |state, observer: &mut dyn Observer<LmState>| {
+            let run = |state, observer: &mut Observer<'_, LmState>| {
                 params().train(&data, 2, state, &device, observer)
             };
             let (mut losses, mut last) = (Vec::new(), None);

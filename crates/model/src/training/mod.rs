@@ -34,17 +34,6 @@ pub struct Progress {
     pub held_out_loss: f64,
 }
 
-/// An observer of a training.
-pub trait Observer<State> {
-    /// Called after every iteration; `Ok(false)` stops the training with [`Error::Interrupted`].
-    ///
-    /// # Errors
-    /// Whatever storing a checkpoint can raise; it ends the training.
-    fn observe(&mut self, progress: &Progress, state: &State) -> Result<bool, Error>;
-}
-
-impl<State, F: FnMut(&Progress, &State) -> Result<bool, Error>> Observer<State> for F {
-    fn observe(&mut self, progress: &Progress, state: &State) -> Result<bool, Error> {
-        self(progress, state)
-    }
-}
+/// Called after every iteration of a training: `Ok(false)` stops it with [`Error::Interrupted`], and an error, such as that of storing
+/// a checkpoint, ends it.
+pub type Observer<'a, State> = dyn FnMut(&Progress, &State) -> Result<bool, Error> + 'a;

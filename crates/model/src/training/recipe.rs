@@ -25,7 +25,7 @@ pub trait Recipe: Serialize {
         seed: u64,
         state: Option<Self::State>,
         device: &ComputeDevice,
-        observer: &mut dyn Observer<Self::State>,
+        observer: &mut Observer<'_, Self::State>,
     ) -> Result<(Vec<f64>, Mlp), Error>;
 
     /// Method and settings in words, after so many iterations.
@@ -103,7 +103,7 @@ impl<R: Recipe> Training<'_, R> {
         &self,
         checkpoint: &mut Checkpoint<R::State>,
         device: &ComputeDevice,
-        observer: &mut dyn Observer<Checkpoint<R::State>>,
+        observer: &mut Observer<'_, Checkpoint<R::State>>,
     ) -> Result<Trained, Error> {
         let state = checkpoint.state.clone();
         if state.is_none() {
@@ -119,7 +119,7 @@ impl<R: Recipe> Training<'_, R> {
                 training_loss: progress.training_loss,
                 held_out_loss: progress.held_out_loss,
             });
-            observer.observe(progress, checkpoint)
+            observer(progress, checkpoint)
         };
         let (kernel, activation) =
             (self.recipe).train(&self.data, self.seed, state, device, &mut record)?;

@@ -3,12 +3,12 @@
 //! MRC2014: A. Cheng et al.: MRC2014: Extensions to the MRC format header for electron cryo-microscopy and tomography. J. Struct. Biol.
 //! 192 (2015), <https://www.ccpem.ac.uk/mrc-format/mrc2014/>.
 
+use files::Number;
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::fields::Fields;
 use super::{HEAD, Header};
 use crate::FormatError;
-use crate::volume::Element;
 
 /// Angles of cells may differ from right ones by so many degrees.
 const SKEW: f64 = 1e-3;
@@ -37,10 +37,10 @@ fn entries(fields: &Fields<'_>) -> Result<Header, FormatError> {
     let i32s = |at: usize| [0, 1, 2].map(|i| fields.i32(at + 4 * i));
     let f32s = |at: usize| [0, 1, 2].map(|i| fields.f32(at + 4 * i));
     let element = match fields.i32(12) {
-        0 => Element::I8,
-        1 => Element::I16,
-        2 => Element::F32,
-        6 => Element::U16,
+        0 => Number::I8,
+        1 => Number::I16,
+        2 => Number::F32,
+        6 => Number::U16,
         mode => return fields.bad("mode", &mode, "0, 1, 2 or 6: real numbers"),
     };
     let extended = fields.i32(92);

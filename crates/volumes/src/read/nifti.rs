@@ -2,12 +2,12 @@
 //!
 //! NIfTI-1: <https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h>, NIfTI-2: `nifti2.h` beside it.
 
+use files::Number;
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::Header;
 use super::fields::Fields;
 use crate::FormatError;
-use crate::volume::Element;
 
 /// Lengths of the headers, which are their first numbers.
 const LENGTHS: [i32; 2] = [348, 540];
@@ -103,16 +103,16 @@ impl<'a> Entries<'a> {
             return fields.bad("dim", &shown, "that of one volume with three axes");
         }
         let element = match self.data_type {
-            2 => Element::U8,
-            4 => Element::I16,
-            8 => Element::I32,
-            16 => Element::F32,
-            64 => Element::F64,
-            256 => Element::I8,
-            512 => Element::U16,
-            768 => Element::U32,
-            1024 => Element::I64,
-            1280 => Element::U64,
+            2 => Number::U8,
+            4 => Number::I16,
+            8 => Number::I32,
+            16 => Number::F32,
+            64 => Number::F64,
+            256 => Number::I8,
+            512 => Number::U16,
+            768 => Number::U32,
+            1024 => Number::I64,
+            1280 => Number::U64,
             other => {
                 return fields.bad("datatype", &other, "a real number of up to 64 bits");
             }

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
+use files::Number;
 use glam::{DAffine3, DVec3};
 use tiff::decoder::ifd::Value;
 use tiff::decoder::{BufferLayoutPreference, Decoder, DecodingSampleType, Limits};
@@ -11,7 +12,7 @@ use tiff::tags::{ResolutionUnit, Tag};
 use tiff::{ColorType, TiffResult};
 
 use super::length;
-use crate::volume::{Element, Voxels};
+use crate::volume::Voxels;
 use crate::{FormatError, Volume};
 
 /// Most bytes of a page, and of what it is unpacked from.
@@ -103,12 +104,12 @@ pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Volume, FormatError> {
     Volume::new(size, DAffine3::from_scale(sides), voxels)
 }
 
-fn area([width, height]: [u64; 2], element: Element) -> usize {
+fn area([width, height]: [u64; 2], element: Number) -> usize {
     width as usize * height as usize * element.size()
 }
 
 /// Columns and rows of the page, and its numbers.
-fn page(reader: &mut Decoder<impl Read + Seek>) -> Result<([u64; 2], Element), FormatError> {
+fn page(reader: &mut Decoder<impl Read + Seek>) -> Result<([u64; 2], Number), FormatError> {
     let colours = reader.colortype().map_err(damaged)?;
     let ColorType::Gray(8 | 16 | 32 | 64) = colours else {
         let shown = format!("{colours:?}");
@@ -117,16 +118,16 @@ fn page(reader: &mut Decoder<impl Read + Seek>) -> Result<([u64; 2], Element), F
     let layout = reader.image_buffer_layout().map_err(damaged)?;
     let BufferLayoutPreference { sample_type, .. } = layout;
     let element = match sample_type {
-        Some(DecodingSampleType::U8) => Element::U8,
-        Some(DecodingSampleType::U16) => Element::U16,
-        Some(DecodingSampleType::U32) => Element::U32,
-        Some(DecodingSampleType::U64) => Element::U64,
-        Some(DecodingSampleType::I8) => Element::I8,
-        Some(DecodingSampleType::I16) => Element::I16,
-        Some(DecodingSampleType::I32) => Element::I32,
-        Some(DecodingSampleType::I64) => Element::I64,
-        Some(DecodingSampleType::F32) => Element::F32,
-        Some(DecodingSampleType::F64) => Element::F64,
+        Some(DecodingSampleType::U8) => Number::U8,
+        Some(DecodingSampleType::U16) => Number::U16,
+        Some(DecodingSampleType::U32) => Number::U32,
+        Some(DecodingSampleType::U64) => Number::U64,
+        Some(DecodingSampleType::I8) => Number::I8,
+        Some(DecodingSampleType::I16) => Number::I16,
+        Some(DecodingSampleType::I32) => Number::I32,
+        Some(DecodingSampleType::I64) => Number::I64,
+        Some(DecodingSampleType::F32) => Number::F32,
+        Some(DecodingSampleType::F64) => Number::F64,
         _ => return bad("kind of numbers", &"unusual", "whole, or of 32 or 64 bits"),
     };
     let (width, height) = reader.dimensions().map_err(damaged)?;

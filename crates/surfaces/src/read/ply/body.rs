@@ -1,9 +1,10 @@
 //! The numbers of a PLY file. All types of the format fit into `f64`.
 
 use std::borrow::Cow;
-use std::str::FromStr;
 
-use super::header::{Element, Encoding, Header, Scalar};
+use files::Number;
+
+use super::header::{Element, Encoding, Header};
 use crate::read::{FormatError, shortened};
 
 /// The values of the properties of one element; one value, or those of a list.
@@ -80,11 +81,11 @@ impl<'a> Body<'a> {
             for (column, (property, values)) in element.properties.iter().zip(&row).enumerate() {
                 if let Some(value) = value(number, column) {
                     let big = self.encoding == Encoding::BigEndian;
-                    let bytes = property.scalar.encode(value, big);
+                    let bytes = encode(property.scalar, value, big);
                     out[at..at + bytes.len()].copy_from_slice(&bytes);
                 }
                 at +=
-                    property.length.map_or(0, Scalar::size) + values.len() * property.scalar.size();
+                    property.length.map_or(0, Number::size) + values.len() * property.scalar.size();
             }
         }
         out.extend_from_slice(&self.bytes[self.position.min(self.bytes.len())..]);
@@ -108,7 +109,7 @@ impl<'a> Body<'a> {
     fn numbers(
         &mut self,
         element: &Element,
-        scalar: Scalar,
+        scalar: Number,
         count: usize,
     ) -> Result<impl Iterator<Item = f64> + use<'a>, FormatError> {
         let size = scalar.size();
@@ -126,9 +127,9 @@ impl<'a> Body<'a> {
     fn text_row(&mut self, element: &Element, row: &mut Row) -> Result<(), FormatError> {
         let line = self.line()?;
         let mut words = line.split_ascii_whitespace();
-        let mut number = |scalar: Scalar| {
+        let mut number = |scalar: Number| {
             let word = words.next().unwrap_or_default();
-            scalar.parse_number(word).ok_or_else(|| FormatError::Line {
+            parsed(scalar, word).ok_or_else(|| FormatError::Line {
                 line: self.lines,
                 found: shortened(word),
                 expected: "a number of the type in the header",
@@ -163,56 +164,27 @@ impl<'a> Body<'a> {
     }
 }
 
-impl Scalar {
-    fn decode(self, bytes: &[u8], big: bool) -> f64 {
-        /// The value of a type from its bytes in either order.
-        macro_rules! value {
-            ($type:ty) => {{
-                let bytes = bytes.try_into().expect("as many bytes as the type has");
-                f64::from(if big {
-                    <$type>::from_be_bytes(bytes)
-                } else {
-                    <$type>::from_le_bytes(bytes)
-                })
-            }};
-        }
-        match self {
-            Self::I8 => value!(i8),
-            Self::U8 => value!(u8),
-            Self::I16 => value!(i16),
-            Self::U16 => value!(u16),
-            Self::I32 => value!(i32),
-            Self::U32 => value!(u32),
-            Self::F32 => value!(f32),
-            Self::F64 => value!(f64),
-        }
+/// The bytes of a floating-point number of this type.
+fn encode(number: Number, value: f64, big: bool) -> Vec<u8> {
+    let mut bytes = match number {
+        Number::F32 => (value as f32).to_le_bytes().to_vec(),
+        _ => value.to_le_bytes().to_vec(),
+    };
+    if big {
+        bytes.reverse();
     }
+    bytes
+}
 
-    /// The bytes of a floating-point number of this type.
-    fn encode(self, value: f64, big: bool) -> Vec<u8> {
-        let mut bytes = match self {
-            Self::F32 => (value as f32).to_le_bytes().to_vec(),
-            _ => value.to_le_bytes().to_vec(),
-        };
-        if big {
-            bytes.reverse();
-        }
-        bytes
-    }
-
-    fn parse_number(self, word: &str) -> Option<f64> {
-        fn value<T: FromStr + Into<f64>>(word: &str) -> Option<f64> {
-            word.parse::<T>().ok().map(Into::into)
-        }
-        match self {
-            Self::I8 => value::<i8>(word),
-            Self::U8 => value::<u8>(word),
-            Self::I16 => value::<i16>(word),
-            Self::U16 => value::<u16>(word),
-            Self::I32 => value::<i32>(word),
-            Self::U32 => value::<u32>(word),
-            Self::F32 => value::<f32>(word),
-            Self::F64 => value::<f64>(word),
+/// The value of a word, if numbers of this type can have it.
+fn parsed(number: Number, word: &str) -> Option<f64> {
+    match number {
+        Number::F32 => word.parse::<f32>().ok().map(f64::from),
+        Number::F64 => word.parse().ok(),
+        _ => {
+            let value = word.parse::<i64>().ok()?;
+            let read = number.decode(&value.to_le_bytes()[..number.size()], false);
+            (read as i64 == value).then_some(read)
         }
     }
 }

@@ -1,5 +1,7 @@
 //! What a PLY file announces.
 
+use files::Number;
+
 use crate::read::{FormatError, shortened};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,24 +11,12 @@ pub(super) enum Encoding {
     BigEndian,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scalar {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    F32,
-    F64,
-}
-
 #[derive(Debug)]
 pub(super) struct Property {
     name: String,
     /// Of the number of values, for a list.
-    pub(super) length: Option<Scalar>,
-    pub(super) scalar: Scalar,
+    pub(super) length: Option<Number>,
+    pub(super) scalar: Number,
 }
 
 #[derive(Debug)]
@@ -190,7 +180,7 @@ impl Property {
     fn parse<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<Self> {
         let first = words.next()?;
         let (length, scalar) = if first == "list" {
-            let length = Scalar::parse(words.next()?)?;
+            let length = number(words.next()?)?;
             if !length.is_integer() {
                 return None;
             }
@@ -199,39 +189,24 @@ impl Property {
             (None, first)
         };
         Some(Self {
-            scalar: Scalar::parse(scalar)?,
+            scalar: number(scalar)?,
             name: words.next()?.to_owned(),
             length,
         })
     }
 }
 
-impl Scalar {
-    fn parse(word: &str) -> Option<Self> {
-        Some(match word {
-            "char" | "int8" => Self::I8,
-            "uchar" | "uint8" => Self::U8,
-            "short" | "int16" => Self::I16,
-            "ushort" | "uint16" => Self::U16,
-            "int" | "int32" => Self::I32,
-            "uint" | "uint32" => Self::U32,
-            "float" | "float32" => Self::F32,
-            "double" | "float64" => Self::F64,
-            _ => return None,
-        })
-    }
-
-    pub(super) fn is_integer(self) -> bool {
-        !matches!(self, Self::F32 | Self::F64)
-    }
-
-    /// In bytes.
-    pub(super) fn size(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::F64 => 8,
-        }
-    }
+/// The type of numbers of that name.
+fn number(word: &str) -> Option<Number> {
+    Some(match word {
+        "char" | "int8" => Number::I8,
+        "uchar" | "uint8" => Number::U8,
+        "short" | "int16" => Number::I16,
+        "ushort" | "uint16" => Number::U16,
+        "int" | "int32" => Number::I32,
+        "uint" | "uint32" => Number::U32,
+        "float" | "float32" => Number::F32,
+        "double" | "float64" => Number::F64,
+        _ => return None,
+    })
 }
