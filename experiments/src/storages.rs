@@ -210,6 +210,7 @@ impl Stored {
 fn surfaces(measured: &[Stored]) -> impl Iterator<Item = &Stored> {
     measured.iter().filter(|row| row.shape != CROSS.key)
 }
+
 /// Hessian-vector products on bricks over those on the whole grid, by resolution.
 pub fn product_ratios(measured: &[Stored]) -> impl Iterator<Item = (usize, f64)> {
     let of = |n, storage| {
