@@ -8,12 +8,15 @@
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use crate::fft::Real;
+use crate::fft::{Real, is_f64};
 
 /// Bricks per task.
 const GROUP: usize = 8;
-/// Cells that are computed side by side, in vector registers. It divides the sides of bricks.
-const LANES: usize = 8;
+/// Cells that are computed side by side across the axis of a pass: a vector register of 256 bits.
+const DOUBLES: usize = 4;
+const SINGLES: usize = 8;
+/// and along it.
+const ALONG: usize = 8;
 
 /// What passes see where no brick is active.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,8 +42,13 @@ pub(crate) fn convolve<T: Real>(
     ghosts: Ghosts,
 ) -> Vec<T> {
     let reach = taps.len() / 2;
-    debug_assert!(taps.len() % 2 == 1 && reach <= side && side.is_multiple_of(LANES));
-    let windows = windows(taps, adjoint);
+    debug_assert!(taps.len() % 2 == 1 && reach <= side && side.is_multiple_of(ALONG));
+    let mut weights = vec![T::zero(); ALONG - 1];
+    weights.extend_from_slice(taps);
+    if adjoint {
+        weights[ALONG - 1..].reverse();
+    }
+    weights.resize(weights.len() + ALONG - 1, T::zero());
     let volume = side.pow(axes as u32);
     let mut rests = match ghosts {
         Ghosts::Zero => [T::zero(); 2],
@@ -56,7 +64,7 @@ pub(crate) fn convolve<T: Real>(
             x: y.as_deref().unwrap_or(x),
             neighbours,
             constants: &constants,
-            windows: &windows,
+            weights: &weights,
             reach,
             side,
             columns: (2 * axes, 2 * axis),
@@ -73,31 +81,14 @@ pub(crate) fn convolve<T: Real>(
     y.unwrap_or_else(|| x.to_vec())
 }
 
-/// The weights of `2 reach + LANES` cells in a row, each for the `LANES` cells whose first one is `reach` cells from the first of the row.
-fn windows<T: Real>(taps: &[T], mirrored: bool) -> Vec<[T; LANES]> {
-    let last = taps.len() - 1;
-    let weight = |distance: usize| {
-        let at = if mirrored {
-            last.checked_sub(distance)?
-        } else {
-            distance
-        };
-        taps.get(at).copied()
-    };
-    let of_cell = |cell: usize| {
-        let distance = |lane: usize| cell.checked_sub(lane).and_then(weight);
-        std::array::from_fn(|lane| distance(lane).unwrap_or(T::zero()))
-    };
-    (0..last + LANES).map(of_cell).collect()
-}
-
 /// A pass along one axis.
 struct Pass<'a, T> {
     x: &'a [T],
     neighbours: &'a [T],
     /// Bricks of ghosts, of the negative and of the positive phase.
     constants: &'a [Vec<T>; 2],
-    windows: &'a [[T; LANES]],
+    /// The taps between zeros, so that a few cells along the axis can be computed from the same window.
+    weights: &'a [T],
     reach: usize,
     side: usize,
     /// How many there are in the table of neighbours, and that of the brick before along this axis.
@@ -109,9 +100,10 @@ struct Pass<'a, T> {
 
 impl<T: Real> Pass<'_, T> {
     fn run(&self, result: &mut [T]) {
+        let arch = Arch::new();
         let groups = result.par_chunks_mut(GROUP * self.volume).enumerate();
         groups.for_each(|(group, result)| {
-            best_instructions(Group {
+            arch.dispatch(Group {
                 pass: self,
                 first: group * GROUP,
                 result,
@@ -119,7 +111,7 @@ impl<T: Real> Pass<'_, T> {
         });
     }
 
-    /// The brick itself between the one before and the one after.
+    /// The brick itself, the one before and the one after.
     #[inline(always)]
     fn bricks(&self, brick: usize) -> [&[T]; 3] {
         let (count, column) = self.columns;
@@ -135,70 +127,75 @@ impl<T: Real> Pass<'_, T> {
         [neighbour(0), own, neighbour(1)]
     }
 
-    /// Along an axis that is not the last: `LANES` lines at once, which lie side by side in memory, and `ROWS` cells of each. What they are
-    /// computed from is first copied to one place in order: read where it is, with steps of many cells, it would be waited for.
+    /// Along an axis that is not the last: `LANES` lines at once, which lie side by side in memory.
     #[inline(always)]
-    fn across<const ROWS: usize, const FUSED: bool>(
+    fn across<const LANES: usize, const FUSED: bool>(
         &self,
         [before, own, after]: [&[T]; 3],
-        column: &mut Vec<T>,
         result: &mut [T],
     ) {
-        let stride = self.stride;
-        let (slab, reach) = (self.side * stride, self.reach * stride);
-        for (slabs, result) in result.chunks_exact_mut(slab).enumerate() {
-            let (start, end) = (slabs * slab, (slabs + 1) * slab);
-            column.clear();
-            column.extend_from_slice(&before[end - reach..end]);
-            column.extend_from_slice(&own[start..end]);
-            column.extend_from_slice(&after[start..start + reach]);
-            for (first, result) in result.chunks_exact_mut(ROWS * stride).enumerate() {
-                let rows = column[first * ROWS * stride..].chunks_exact(stride);
-                for lane in (0..stride).step_by(LANES) {
-                    let mut sums = [[T::zero(); LANES]; ROWS];
-                    let rows = rows.clone().take(2 * self.reach + ROWS);
-                    for (row, window) in rows.zip(self.windows) {
-                        let row: &[T; LANES] = row[lane..].first_chunk().expect(ROW);
-                        for (sums, weight) in sums.iter_mut().zip(window) {
-                            for (sum, value) in sums.iter_mut().zip(row) {
-                                *sum = multiply_add::<T, FUSED>(*weight, *value, *sum);
+        let (side, stride, reach) = (self.side, self.stride, self.reach);
+        for outer in (0..self.volume).step_by(side * stride) {
+            for lane in (outer..outer + stride).step_by(LANES) {
+                for first in (0..side).step_by(ALONG) {
+                    let mut sums = [[T::zero(); LANES]; ALONG];
+                    let mut weights = self.weights;
+                    // The cells from `first - reach` to `first + ALONG - 1 + reach`, brick by brick.
+                    let end = first + ALONG + reach;
+                    let parts = [
+                        (before, (side + first).saturating_sub(reach).min(side)..side),
+                        (own, first.saturating_sub(reach)..end.min(side)),
+                        (after, 0..end.saturating_sub(side)),
+                    ];
+                    for (brick, range) in parts {
+                        for at in range {
+                            let (window, _) = weights.split_first_chunk::<ALONG>().expect(WINDOW);
+                            let row: &[T; LANES] =
+                                brick[lane + at * stride..].first_chunk().expect(ROW);
+                            for (q, sums) in sums.iter_mut().enumerate() {
+                                let weight = window[ALONG - 1 - q];
+                                for (sum, value) in sums.iter_mut().zip(row) {
+                                    *sum = multiply_add::<T, FUSED>(weight, *value, *sum);
+                                }
                             }
+                            weights = &weights[1..];
                         }
                     }
-                    for (row, sums) in result.chunks_exact_mut(stride).zip(&sums) {
-                        row[lane..][..LANES].copy_from_slice(sums);
+                    for (q, sums) in sums.iter().enumerate() {
+                        result[lane + (first + q) * stride..][..LANES].copy_from_slice(sums);
                     }
                 }
             }
         }
     }
 
-    /// Along the last axis: `LANES` cells of `ROWS` lines at once.
+    /// Along the last axis: from copies of the lines with what lies before and after them.
     #[inline(always)]
-    fn along<const ROWS: usize, const FUSED: bool>(
+    fn along<const LANES: usize, const FUSED: bool>(
         &self,
         [before, own, after]: [&[T]; 3],
+        lines: &mut Vec<T>,
         result: &mut [T],
     ) {
+        const ROWS: usize = 8;
         let (side, reach) = (self.side, self.reach);
+        let taps = &self.weights[ALONG - 1..][..=2 * reach];
+        let width = side + 2 * reach;
         for block in (0..self.volume).step_by(ROWS * side) {
+            lines.clear();
+            for row in (block..block + ROWS * side).step_by(side) {
+                lines.extend_from_slice(&before[row + side - reach..row + side]);
+                lines.extend_from_slice(&own[row..row + side]);
+                lines.extend_from_slice(&after[row..row + reach]);
+            }
             for first in (0..side).step_by(LANES) {
-                // The cells from `first - reach` to `first + LANES - 1 + reach`, brick by brick.
-                let end = first + LANES + reach;
-                let parts = [
-                    (before, (side + first).saturating_sub(reach).min(side)..side),
-                    (own, first.saturating_sub(reach)..end.min(side)),
-                    (after, 0..end.saturating_sub(side)),
-                ];
                 let mut sums = [[T::zero(); LANES]; ROWS];
-                let mut windows = self.windows.iter();
-                for (brick, cells) in parts {
-                    for (cell, window) in cells.zip(&mut windows) {
-                        for (row, sums) in sums.iter_mut().enumerate() {
-                            let value = brick[block + row * side + cell];
-                            for (sum, weight) in sums.iter_mut().zip(window) {
-                                *sum = multiply_add::<T, FUSED>(*weight, value, *sum);
-                            }
+                for (k, tap) in taps.iter().enumerate() {
+                    for (row, sums) in sums.iter_mut().enumerate() {
+                        let values: &[T; LANES] =
+                            lines[row * width + first + k..].first_chunk().expect(ROW);
+                        for (sum, value) in sums.iter_mut().zip(values) {
+                            *sum = multiply_add::<T, FUSED>(*tap, *value, *sum);
                         }
                     }
                 }
@@ -210,29 +207,14 @@ impl<T: Real> Pass<'_, T> {
     }
 }
 
+const WINDOW: &str = "the weights are as many as the cells of a window";
 const ROW: &str = "the side of a brick is a multiple of the lanes";
 
-/// A few bricks of a pass, which one thread computes.
+/// A few bricks of a pass: what one thread computes with the best instructions that the processor has.
 struct Group<'a, T> {
     pass: &'a Pass<'a, T>,
     first: usize,
     result: &'a mut [T],
-}
-
-/// Computes with the widest registers that the processor has; the numbers depend only on whether it can fuse multiplication and addition.
-fn best_instructions<T: Real>(group: Group<'_, T>) {
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx512f") {
-        #[expect(unsafe_code, reason = "the processor has these instructions")]
-        return unsafe { by_avx512(group) };
-    }
-    Arch::new().dispatch(group);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f")]
-fn by_avx512<T: Real>(group: Group<'_, T>) {
-    group.run::<8, true>();
 }
 
 impl<T: Real> WithSimd for Group<'_, T> {
@@ -240,26 +222,26 @@ impl<T: Real> WithSimd for Group<'_, T> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        if S::IS_SCALAR {
-            self.run::<2, false>();
-        } else {
-            self.run::<4, true>();
+        match (is_f64::<T>(), S::IS_SCALAR) {
+            (true, true) => self.run::<DOUBLES, false>(),
+            (true, false) => self.run::<DOUBLES, true>(),
+            (false, true) => self.run::<SINGLES, false>(),
+            (false, false) => self.run::<SINGLES, true>(),
         }
     }
 }
 
 impl<T: Real> Group<'_, T> {
-    /// As many rows at once as have room in the registers.
     #[inline(always)]
-    fn run<const ROWS: usize, const FUSED: bool>(self) {
+    fn run<const LANES: usize, const FUSED: bool>(self) {
         let pass = self.pass;
-        let mut column = Vec::new();
+        let mut lines = Vec::new();
         for (i, result) in self.result.chunks_exact_mut(pass.volume).enumerate() {
             let bricks = pass.bricks(self.first + i);
             if pass.stride == 1 {
-                pass.along::<ROWS, FUSED>(bricks, result);
+                pass.along::<LANES, FUSED>(bricks, &mut lines, result);
             } else {
-                pass.across::<ROWS, FUSED>(bricks, &mut column, result);
+                pass.across::<LANES, FUSED>(bricks, result);
             }
         }
     }
