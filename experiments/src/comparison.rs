@@ -152,7 +152,7 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
         run.compare_with_exact(setting, &exact)?;
     }
     let second_order = match flow {
-        Flow::Willmore => setting.second_order(&mut session, steps, &exact, quick)?,
+        Flow::Willmore => setting.second_order(&mut session, steps, &exact)?,
         Flow::MeanCurvature => Vec::new(),
     };
     let comparison = Comparison {
@@ -203,7 +203,6 @@ impl Setting {
         session: &mut Session<'_>,
         steps: usize,
         exact: &BTreeMap<usize, Truth>,
-        quick: bool,
     ) -> Result<Vec<SecondOrder>, Error> {
         let halves = (steps / 8).checked_ilog2().unwrap_or(0);
         let halves = halves.min(steps.trailing_zeros());
@@ -215,8 +214,7 @@ impl Setting {
         let run = self.sample.run(session, (n, 2.0), truth::ACCURATE, run)?;
         let controlled = truths().map(|exact| Reached::of(&self.sample, &run, exact));
         let controlled = controlled.collect::<Result<Vec<_>, Error>>()?;
-        let coarser = if quick { 4 } else { 1 };
-        let extrapolated = (self.sample).extrapolated(session, (end, halves), truths(), coarser)?;
+        let extrapolated = (self.sample).extrapolated(session, (end, halves), truths())?;
         let at = |reached: Vec<Reached>| marks.iter().copied().zip(reached).collect();
         Ok(vec![
             SecondOrder {

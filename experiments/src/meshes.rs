@@ -1,6 +1,6 @@
 //! Triangle meshes and volumes as initial data.
 
-use geometry::{npy, vti};
+use geometry::{PURE_BEYOND, npy, vti};
 use runs::fingerprint;
 use surfaces::{ClosedMesh, MeshDistance, TriangleMesh, usual_up_axis};
 
@@ -194,13 +194,11 @@ impl Loaded {
         eps: f64,
         bar: &ProgressBar,
     ) -> Result<Field<3>, Error> {
-        /// Beyond so many interface widths the profile is a pure phase, to the last bit.
-        const REACH: f64 = 26.0;
         let profile = |distance: &Field<3>| distance.map(|s| optimal_profile(s, eps));
         Ok(match &self.shape {
             Shape::Distance(distance) => {
                 bar.set_length(grid.cells() as u64);
-                profile(&distance.sample_within(REACH * eps, grid, || bar.inc(1))?)
+                profile(&distance.sample_within(PURE_BEYOND * eps, grid, || bar.inc(1))?)
             }
             Shape::Volume(values, VolumeKind::SignedDistance) => profile(values),
             Shape::Volume(values, VolumeKind::PhaseField) => values.clone(),

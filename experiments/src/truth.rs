@@ -19,29 +19,9 @@ pub struct Sample<const D: usize> {
     pub initial: fn(Grid<D>, f64) -> Result<Field<D>, geometry::Error>,
     /// The curve, or the profile of the surface.
     pub curve: fn() -> Result<Shape, reference::Error>,
-    /// Of runs that are extrapolated to `eps = 0`.
-    pub grids: Grids,
     /// Points of the zero level of a phase field with an interface width: of the curve, or of the profile.
     pub level: fn(&Field<D>, f64) -> Result<Vec<[f64; 2]>, surfaces::Error>,
 }
-
-/// Two grids, the finer one with half the `eps` of the other.
-pub struct Grids {
-    /// Cells per unit length.
-    pub cells: [usize; 2],
-    pub eps_over_h: f64,
-}
-
-/// With two cells to `eps` the lattice holds slow flows back by as much as the extrapolation leaves.
-const FINE: Grids = Grids {
-    cells: [256, 512],
-    eps_over_h: 4.0,
-};
-/// No network in space has more cells to `eps`.
-const FINE_IN_SPACE: Grids = Grids {
-    cells: [32, 64],
-    eps_over_h: 2.0,
-};
 
 /// The non-convex cross: arms of half length 0.8 and half width 0.27.
 pub const CROSS: Sample<2> = Sample {
@@ -50,7 +30,6 @@ pub const CROSS: Sample<2> = Sample {
     side: 2.0,
     initial: |grid, eps| phase_field(grid, &Cross::new(0.8, 0.27)?, eps),
     curve: || Shape::cross(0.8, 0.27),
-    grids: FINE,
     level,
 };
 
@@ -61,7 +40,6 @@ pub const RECTANGLE: Sample<2> = Sample {
     side: 1.5,
     initial: |grid, eps| phase_field(grid, &Cuboid::new([0.2, 0.1])?, eps),
     curve: || Shape::rectangle(0.2, 0.1),
-    grids: FINE,
     level,
 };
 
@@ -71,7 +49,6 @@ pub const ELLIPSE: Sample<2> = Sample {
     side: 1.5,
     initial: |grid, eps| phase_field(grid, &Ellipse::new([0.3, 0.2])?, eps),
     curve: || Shape::ellipse(0.3, 0.2),
-    grids: FINE,
     level,
 };
 
@@ -87,7 +64,6 @@ pub const DISK: Sample<3> = Sample {
         phase_field(grid, &Cylinder::new(radius, half_height)?, eps)
     },
     curve: || Shape::rectangle(THICK_DISK[0], THICK_DISK[1]),
-    grids: FINE_IN_SPACE,
     level: profile,
 };
 
@@ -102,7 +78,6 @@ pub const ELLIPSOID: Sample<3> = Sample {
         phase_field(grid, &distance, eps)
     },
     curve: || Shape::ellipse(0.3, 0.2),
-    grids: FINE_IN_SPACE,
     level: profile,
 };
 
@@ -178,19 +153,23 @@ impl<const D: usize> Sample<D> {
         session.trajectory(&name, case, &name, &Samples::every(1))
     }
 
-    /// The flow at these times, `end / 2^k` for some `k` up to `halvings`, extrapolated to `eps = 0` from strictly controlled runs. Grids so many times
-    /// coarser give a quick look.
+    /// The flow at these times, `end / 2^k` for some `k` up to `halvings`, extrapolated to `eps = 0` from strictly controlled runs on two grids, the
+    /// finer one with half the `eps`. A quick look takes coarser ones.
     pub fn extrapolated<'e>(
         &self,
         session: &mut Session<'_>,
         (end, halvings): (f64, u32),
         exact: impl Iterator<Item = &'e Truth>,
-        coarser: usize,
     ) -> Result<Vec<Reached>, Error> {
-        let Grids { cells, eps_over_h } = self.grids;
+        // With two cells to eps the lattice holds slow flows back by as much as the extrapolation leaves. In space no network has more.
+        let (cells, eps_over_h) = match (D, session.options.quick) {
+            (2, false) => ([256, 512], 4.0),
+            (2, true) => ([64, 128], 4.0),
+            _ => ([32, 64], 2.0),
+        };
         let mut run = |n| {
             let steps = ("controlled_strict", controlled(STRICT, end, halvings), end);
-            self.run(session, (n / coarser, eps_over_h), ACCURATE, steps)
+            self.run(session, (n, eps_over_h), ACCURATE, steps)
         };
         let (double, single) = (run(cells[0])?, run(cells[1])?);
         exact

@@ -2,7 +2,7 @@
 
 use geometry::npy::{self, NpyError};
 use geometry::vti::{self, VtiError};
-use geometry::{distance_from_phase_field, thin_part};
+use geometry::{PURE_BEYOND, distance_from_phase_field, thin_part};
 use images::{Frame, Image, Outline, OutlineDistance, Side, Threshold, Tones};
 use surfaces::hausdorff_distance;
 use surfaces::shapes::{self, BuiltIn};
@@ -642,7 +642,8 @@ impl Reader<'_> {
         let progress = self.say.progress();
         let bar = progress.bar("signed distance", grid.cells() as u64);
         let distance = MeshDistance::new(mesh);
-        let mut distance = distance.sample(grid, || bar.inc(1))?;
+        let eps = self.eps_over_h * grid.spacing();
+        let mut distance = distance.sample_within(PURE_BEYOND * eps, grid, || bar.inc(1))?;
         bar.finish();
         progress.clear();
         let mended = surfaces::mend_signs(&mut distance);
@@ -651,7 +652,6 @@ impl Reader<'_> {
                 "the mesh crosses itself: {mended} nodes of the grid, which its faces put on the wrong side, were put right"
             ));
         }
-        let eps = self.eps_over_h * grid.spacing();
         Ok(distance.map(|s| optimal_profile(s, eps)))
     }
 

@@ -75,7 +75,7 @@ pub use error::Error;
 pub use field::Field;
 pub use grid::Grid;
 pub use placement::Placement;
-pub use profile::{distance_from_phase_field, optimal_profile, phase_field};
+pub use profile::{PURE_BEYOND, distance_from_phase_field, optimal_profile, phase_field};
 pub use thickness::{is_thin, thickness, thin_part};
 pub use up::UpAxis;
 pub use zero_set::ZeroSet;

@@ -3,11 +3,13 @@
 use crate::error::positive;
 use crate::{Error, Field, Grid, SignedDistance};
 
+/// Beyond so many interface widths the optimal profile is `-1` or `1` exactly, by rounding.
+pub const PURE_BEYOND: f64 = 26.0;
+
 /// The optimal profile `u = tanh(-3 s / (4 eps))` at signed distance `s`.
 ///
 /// It minimises the perimeter functional across a flat interface: `eps^2 u'^2 = Psi(u)` with
-/// `Psi(u) = 9/16 (1 - u^2)^2`. `u` is positive inside, where `s < 0`. For `|s| > 26 eps` it is
-/// `-1` or `1` exactly, by rounding.
+/// `Psi(u) = 9/16 (1 - u^2)^2`. `u` is positive inside, where `s < 0`.
 pub fn optimal_profile(distance: f64, eps: f64) -> f64 {
     (-0.75 * distance / eps).tanh()
 }

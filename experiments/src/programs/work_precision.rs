@@ -199,7 +199,7 @@ fn compare<const D: usize>(
         truth::record(session, &key, mark, &truth.sizes())?;
     }
     if cells.len() > 1 {
-        let both = sample.extrapolated(session, (END, HALVINGS), exact.iter(), 1)?;
+        let both = sample.extrapolated(session, (END, HALVINGS), exact.iter())?;
         for (&mark, reached) in marks.iter().zip(&both) {
             reached.record(session, &format!("{}.extrapolated", sample.key), mark)?;
         }
