@@ -29,6 +29,10 @@ pub const FINAL: &str = "final";
 pub const PICTURE: &str = "final.png";
 pub const DISPLACEMENT: &str = "final.displacement.svg";
 pub const FRAMES: &str = "frames";
+/// The files of a frame without their extensions.
+pub fn frame(step: usize) -> String {
+    format!("{FRAMES}/step-{step:06}")
+}
 pub const ANIMATION: &str = "animation.png";
 /// The fields of the frames with their times.
 pub const SERIES: &str = "frames.pvd";

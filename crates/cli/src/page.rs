@@ -12,13 +12,15 @@ use pages::{
 };
 use report::{Axis, LineChart, Marker, Series};
 
-use crate::own;
 use crate::prelude::*;
+use crate::{own, plane};
 
 pub const NAME: &str = "index.html";
 
 /// Of longer sequences every second, third, ... picture is shown: a page should stay small enough to be mailed.
 const MOST_FRAMES: usize = 60;
+/// The same for surfaces, some 25 bytes for a vertex.
+const MOST_VERTICES: usize = 300_000;
 /// The same for rows of the table of steps.
 const MOST_ROWS: usize = 60;
 /// Curves through fewer steps have a mark at each.
@@ -42,11 +44,8 @@ impl Files<'_> {
         let (outcome, table) = (self.outcome()?, self.table()?);
         let mut page = Page::new(format!("willmore {} {}", text("command"), text("name")))
             .with_lead(lead(outcome.as_ref(), &table));
-        if let Some(shape) = self.shape()? {
+        if let Some(shape) = self.shape(&table)? {
             page.push(shape);
-        }
-        if let Some(frames) = self.frames()? {
-            page.push(Section::new("Frames").with(frames));
         }
         if !table.rows().is_empty() {
             page.push(self.steps(&table)?);
@@ -70,52 +69,64 @@ impl Files<'_> {
         outcome.map_err(|error| Error::options(format!("the stored outcome: {error}")))
     }
 
-    /// The shape before and after: drawings in the plane, surfaces to turn in space.
-    fn shape(&self) -> Result<Option<Section>, Error> {
-        let mut section = Section::new("Shape");
-        let mut drawings = false;
-        for (stem, caption) in [(outlet::START, "Before."), (outlet::FINAL, "After.")] {
-            let name = format!("{stem}.svg");
-            if let Some(bytes) = self.read(&name)? {
-                section.push(Figure::new(Image::from_bytes(&name, &bytes)?, caption));
-                drawings = true;
+    /// The shape before, in the frames and after, in one view: drawings in the plane, surfaces to turn in space.
+    fn shape(&self, table: &Table) -> Result<Option<Section>, Error> {
+        let section = Section::new("Shape");
+        let section = match engine::dimension(self.run)? {
+            2 => self.drawings(table)?.map(|frames| section.with(frames)),
+            _ => self.surfaces(table)?.map(|viewer| section.with(viewer)),
+        };
+        let (Some(section), Some(bytes)) = (&section, self.read(outlet::DISPLACEMENT)?) else {
+            return Ok(section);
+        };
+        let image = Image::from_bytes(outlet::DISPLACEMENT, &bytes)?;
+        let what = if self.before() == own::INPUT {
+            "vertices have"
+        } else {
+            "surface has"
+        };
+        let caption = format!("How far the {what} gone, as colours and as a histogram.");
+        Ok(Some(section.clone().with(Figure::new(image, caption))))
+    }
+
+    fn drawings(&self, table: &Table) -> Result<Option<Frames>, Error> {
+        // Images are repaired in their own tones.
+        let (before, format) = if self.has(plane::ORIGINAL) {
+            (plane::ORIGINAL.trim_end_matches(".png"), "png")
+        } else {
+            (outlet::START, "svg")
+        };
+        let stages = self.stages(before, &[format], table);
+        let mut drawings = Vec::new();
+        for (label, name) in thinned(&stages, MOST_FRAMES) {
+            if let Some(bytes) = self.read(name)? {
+                drawings.push((label.clone(), Image::from_bytes(name, &bytes)?));
             }
         }
-        if drawings {
-            return Ok(Some(section));
-        }
-        let meshes: Vec<(&str, TriangleMesh)> =
-            [(self.before(), "before"), (outlet::FINAL, "after")]
-                .into_iter()
-                .filter_map(|(stem, label)| Some(self.mesh(stem).transpose()?.map(|m| (label, m))))
-                .collect::<Result<_, _>>()?;
+        let frames =
+            (!drawings.is_empty()).then(|| Frames::new("The shape over the steps", drawings));
+        Ok(frames.transpose()?)
+    }
+
+    fn surfaces(&self, table: &Table) -> Result<Option<Viewer>, Error> {
+        let stages = self.stages(self.before(), &outlet::MESHES, table);
         // Until it is started, and on paper, the viewer is a picture.
-        let Some(poster) = self.read(outlet::PICTURE)? else {
+        let (Some(poster), Some((_, first))) = (self.read(outlet::PICTURE)?, stages.first()) else {
             return Ok(None);
         };
-        if meshes.is_empty() {
-            return Ok(None);
-        }
+        let read = |name: &str| surfaces::read(self.run.path().join(name));
+        let vertices = read(first)?.vertices.len();
+        let most = (MOST_VERTICES / vertices.max(1)).clamp(2, MOST_FRAMES);
+        let meshes: Vec<(&str, TriangleMesh)> = thinned(&stages, most)
+            .map(|(label, name)| Ok((label.as_str(), read(name)?)))
+            .collect::<Result<_, Error>>()?;
         let up = UpAxis::deserialize(&engine::notes(self.run)["outlet"]["up"]);
-        let view = outlet::view(up.unwrap_or_default());
-        let viewer = Viewer::new(
-            "The surface before and after",
+        Ok(Some(Viewer::new(
+            "The surface over the steps",
             Image::from_bytes(outlet::PICTURE, &poster)?,
-            view,
+            outlet::view(up.unwrap_or_default()),
             meshes.iter().map(|(label, mesh)| (*label, mesh)),
-        )?;
-        section.push(viewer);
-        if let Some(bytes) = self.read(outlet::DISPLACEMENT)? {
-            let image = Image::from_bytes(outlet::DISPLACEMENT, &bytes)?;
-            let what = if self.before() == own::INPUT {
-                "vertices have"
-            } else {
-                "surface has"
-            };
-            let caption = format!("How far the {what} gone, as colours and as a histogram.");
-            section.push(Figure::new(image, caption));
-        }
-        Ok(Some(section))
+        )?))
     }
 
     /// What shows the shape at the beginning: the mesh itself where its vertices follow the flow.
@@ -128,39 +139,25 @@ impl Files<'_> {
         }
     }
 
-    /// The surface of that name, in any of the formats.
-    fn mesh(&self, stem: &str) -> Result<Option<TriangleMesh>, Error> {
-        let mut names = (outlet::MESHES.iter()).map(|format| format!("{stem}.{format}"));
-        let path = (names.find(|name| self.has(name))).map(|name| self.run.path().join(name));
-        Ok(path.map(surfaces::read).transpose()?)
-    }
-
-    fn frames(&self) -> Result<Option<Frames>, Error> {
-        let files = self.run.files();
-        let names: Vec<&str> = files
-            .filter(|f| f.starts_with(outlet::FRAMES) && extension(Path::new(f)) == "png")
-            .collect();
-        if names.is_empty() {
-            return Ok(None);
+    /// Labels and files of the shape before, in the frames between, and after, each in the first of these formats that it has.
+    fn stages(&self, before: &str, formats: &[&str], table: &Table) -> Vec<(String, String)> {
+        let named = |label: &str, stem: &str| {
+            let mut names = formats.iter().map(|format| format!("{stem}.{format}"));
+            let name = names.find(|name| self.has(name));
+            name.map(|name| (label.to_owned(), name))
+        };
+        let after = named("after", outlet::FINAL);
+        let steps = table.rows().iter().filter_map(|row| row[0].parse().ok());
+        let mut steps: Vec<usize> = steps.collect();
+        steps.dedup();
+        // The frame of the last step shows the same.
+        if after.is_some() {
+            steps.pop();
         }
-        let mut frames = Vec::new();
-        for name in thinned(&names, MOST_FRAMES) {
-            let number = name.trim_matches(|c: char| !c.is_ascii_digit());
-            let step = number.trim_start_matches('0');
-            let label = format!("step {}", if step.is_empty() { "0" } else { step });
-            if let Some(bytes) = self.read(name)? {
-                frames.push((label, Image::from_bytes(name, &bytes)?));
-            }
-        }
-        // The last step may have no frame of its own.
-        let last = names.last().map(|name| self.read(name)).transpose()?;
-        let last = last.flatten();
-        let end = self.read(outlet::PICTURE)?;
-        if let Some(end) = end.filter(|end| last.as_ref() != Some(end)) {
-            let end = Image::from_bytes(outlet::PICTURE, &end)?;
-            frames.push(("after".to_owned(), end));
-        }
-        Ok(Some(Frames::new("The shape over the steps", frames)?))
+        let frame = |step| named(&format!("step {step}"), &outlet::frame(step));
+        let frames = steps.into_iter().filter_map(frame);
+        let before = named("before", before);
+        before.into_iter().chain(frames).chain(after).collect()
     }
 
     fn table(&self) -> Result<Table, Error> {
@@ -206,7 +203,7 @@ impl Files<'_> {
             .with(Text::markdown(&note))
             .with(Table::new(
                 "Steps",
-                table.head().iter().map(|key| column(key)),
+                table.head().iter().map(|key| in_words(&COLUMNS, key)),
                 rows,
             )?);
         let caption = "Energy and measures of the shape at the beginning and after every step.";
@@ -296,7 +293,7 @@ fn facts(values: &Value) -> Facts {
         return Facts::new();
     };
     map.iter().fold(Facts::new(), |facts, (key, value)| {
-        let name = &named(key);
+        let name = &in_words(&KEYS, key);
         match value {
             Value::Number(number) => {
                 let value = number
@@ -309,34 +306,35 @@ fn facts(values: &Value) -> Facts {
     })
 }
 
-/// A column of the steps in words.
-fn column(key: &str) -> String {
-    let known = match key {
-        "tau" => "time step",
-        "energy_before" => "objective before",
-        "energy" => "objective after",
-        "newton" => "Newton steps",
-        "hvp" => "Hessian products",
-        "halvings" => "times shortened",
-        other => return named(other),
-    };
-    known.to_owned()
-}
+/// Columns of the steps in words,
+const COLUMNS: [(&str, &str); 6] = [
+    ("tau", "time step"),
+    ("energy_before", "objective before"),
+    ("energy", "objective after"),
+    ("newton", "Newton steps"),
+    ("hvp", "Hessian products"),
+    ("halvings", "times shortened"),
+];
+/// and keys of the outcome.
+const KEYS: [(&str, &str); 8] = [
+    ("first_energy", "energy at the beginning"),
+    (
+        "energy_terms",
+        "spontaneous curvature, tension and pressure",
+    ),
+    ("energy_over_8_pi", "Willmore energy over that of a sphere"),
+    ("components", "closed parts"),
+    ("mesh", "movement of the surface"),
+    ("same_topology", "as many parts and holes as before"),
+    ("touches_box", "touches the side of the box"),
+    ("shortened_steps", "steps that were shortened"),
+];
 
-/// A key of the outcome or an option in words.
-fn named(key: &str) -> String {
-    let known = match key {
-        "first_energy" => "energy at the beginning",
-        "energy_terms" => "spontaneous curvature, tension and pressure",
-        "energy_over_8_pi" => "Willmore energy over that of a sphere",
-        "components" => "closed parts",
-        "mesh" => "movement of the surface",
-        "same_topology" => "as many parts and holes as before",
-        "touches_box" => "touches the side of the box",
-        "shortened_steps" => "steps that were shortened",
-        other => return other.replace('_', " "),
-    };
-    known.to_owned()
+fn in_words(known: &[(&str, &str)], key: &str) -> String {
+    match known.iter().find(|(name, _)| *name == key) {
+        Some((_, words)) => (*words).to_owned(),
+        None => key.replace('_', " "),
+    }
 }
 
 #[cfg(test)]

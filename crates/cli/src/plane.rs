@@ -8,7 +8,7 @@ use render::Rgb;
 use crate::prelude::*;
 
 /// Files of a run with the image that is repaired, and with the pixels that are drawn anew in black.
-const ORIGINAL: &str = "original.png";
+pub const ORIGINAL: &str = "original.png";
 const MASK: &str = "mask.png";
 
 /// A raster, and the image of which only what is in a mask is drawn anew, if there is one.

@@ -365,12 +365,13 @@ impl<const D: usize, O: Outlet<D>> Observer<D> for Pictures<'_, O> {
                 outlet.write_shape(u, eps, outlet::START, format, run)?;
             }
             if keep.frames.is_some_and(|every| step.is_multiple_of(every)) {
-                let name = format!("{}/step-{step:06}", outlet::FRAMES);
+                let name = outlet::frame(step);
                 let picture = outlet.picture(&case.initial, u, eps)?;
                 outlet::write_picture(&picture, &format!("{name}.png"), run)?;
                 let values = format!("{name}.vti");
                 vti::write(run.path().join(&values), &[("phase_field", u)])?;
                 run.adopt_file(&values)?;
+                outlet.write_shape(u, eps, &name, self.plan.format.as_deref(), run)?;
             }
             Ok(())
         };
@@ -436,7 +437,7 @@ fn series(run: &Path, records: &[Record]) -> String {
     let complete = records.iter().filter(|record| record.completes_step);
     let times = complete.map(|record| (record.step, record.time));
     for (step, time) in std::iter::once((0, 0.0)).chain(times) {
-        let name = format!("{}/step-{step:06}.vti", outlet::FRAMES);
+        let name = outlet::frame(step) + ".vti";
         if run.join(&name).exists() {
             let _ = writeln!(text, "    <DataSet timestep=\"{time}\" file=\"{name}\"/>");
         }

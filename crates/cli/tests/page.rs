@@ -13,7 +13,7 @@ const RUN: [&str; 8] = [
     "--steps",
     "3",
     "--frames",
-    "3",
+    "2",
 ];
 
 fn with<'a>(options: &[&'a str]) -> Vec<&'a str> {
@@ -32,14 +32,22 @@ fn a_run_in_space_has_a_page_with_a_surface_to_turn() {
     let stl = ["--format", "stl", "--output", "stl"];
     outcome(folder.path(), &with(&["--output", "ply"]));
     outcome(folder.path(), &[&fair[..], &stl].concat());
-    for (name, frames) in [("ply", 2), ("stl", 0)] {
+    // With frames they are shown between the beginning and the end.
+    for (name, labels) in [
+        ("ply", &["before", "step 2", "after"][..]),
+        ("stl", &["before", "after"]),
+    ] {
         let html = page(folder.path(), name);
         assert_eq!(html.matches("class=\"viewer\"").count(), 1, "{name}");
-        for label in ["before", "after"] {
+        assert_eq!(
+            html.matches("data-vertices=").count(),
+            labels.len(),
+            "{name}"
+        );
+        for label in labels {
             let surface = format!("<script type=\"text/plain\" data-label=\"{label}\"");
             assert!(html.contains(&surface), "{name}: {label}");
         }
-        assert_eq!(html.matches("class=\"frame\"").count(), frames, "{name}");
         // All is inside: the text of a page names no address but that of SVG itself.
         assert!(!html.contains("src=\"http") && !html.contains("href=\"http"));
         assert!(html.contains("Willmore energy") && html.contains("builtin:cube"));
@@ -48,19 +56,6 @@ fn a_run_in_space_has_a_page_with_a_surface_to_turn() {
             html.contains(">time step<") && !html.contains(">hvp<"),
             "{name}"
         );
-    }
-}
-
-/// Frames of every second one of three steps, and the shape in the end.
-#[test]
-fn the_frames_go_from_the_beginning_to_the_end() {
-    let folder = tempfile::tempdir().unwrap();
-    let every = ["--frames", "2", "--output", "run"];
-    outcome(folder.path(), &with(&every));
-    let html = page(folder.path(), "run");
-    for label in ["step 0", "step 2", "after"] {
-        let frame = format!("class=\"frame\" data-label=\"{label}\"");
-        assert!(html.contains(&frame), "{label}");
     }
 }
 
@@ -91,13 +86,15 @@ fn the_axis_that_points_up_is_that_of_the_format_or_chosen() {
 fn a_run_in_the_plane_has_a_page_with_drawings() {
     let folder = tempfile::tempdir().unwrap();
     let mcf = ["mcf", "builtin:ring", "--cells", "32", "--steps", "2"];
-    outcome(
-        folder.path(),
-        &[&mcf[..], &["--output", "ring"][..]].concat(),
-    );
+    let frames = ["--frames", "1", "--output", "ring"];
+    outcome(folder.path(), &[&mcf[..], &frames[..]].concat());
     let html = page(folder.path(), "ring");
-    // Before, after, and the plot of the steps.
-    assert_eq!(html.matches("data:image/svg+xml").count(), 3);
+    // These and the plot of the steps.
+    assert_eq!(html.matches("data:image/svg+xml").count(), 4);
+    for label in ["before", "step 1", "after"] {
+        let frame = format!("class=\"frame\" data-label=\"{label}\"");
+        assert!(html.contains(&frame), "{label}");
+    }
     let rows = html.split("<tbody>").nth(1).unwrap();
     assert_eq!(
         rows.split("</tbody>")

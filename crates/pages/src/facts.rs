@@ -30,14 +30,15 @@ impl Facts {
         self
     }
 
-    /// Adds a value at the end: maps become names with dots, lists of plain values one line,
+    /// Adds a value at the end: entries of maps are named `name: key of the entry`, lists of plain values are one line,
     /// numbers have five digits unless they are whole, and null is left out.
     #[must_use]
     pub fn with_value(mut self, name: &str, value: &Value) -> Self {
         match value {
             Value::Object(map) => {
                 for (key, value) in map {
-                    self = self.with_value(&format!("{name}.{key}"), value);
+                    let name = format!("{name}: {}", key.replace('_', " "));
+                    self = self.with_value(&name, value);
                 }
                 self
             }
