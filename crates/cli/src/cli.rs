@@ -217,7 +217,7 @@ pub struct SchemeOptions {
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct KeepOptions {
-    /// Keep a picture every so many steps, and an animation of them
+    /// Keep a picture, the field and the shape every so many steps, and an animation
     #[arg(long, value_name = "EVERY")]
     pub frames: Option<usize>,
 

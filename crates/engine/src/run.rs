@@ -1,11 +1,13 @@
 //! The loop over time steps.
 
+use std::sync::OnceLock;
 use std::time::Instant;
 
 use geometry::Field;
 use geometry::measure::{has_interface, l2_distance};
 use operators::ComputeDevice;
 use runs::Interrupt;
+use serde_json::Value;
 use solver::{FlowState, StepRecord};
 
 use crate::motion::Motion;
@@ -26,6 +28,7 @@ pub enum Ending {
 pub struct Run<const D: usize> {
     pub(crate) case: Case<D>,
     pub(crate) device: ComputeDevice,
+    identity: OnceLock<Value>,
     motion: Motion<D>,
     control: StepControl,
     /// How many steps the targets of what is held have gone, parts of steps included.
@@ -79,6 +82,7 @@ impl<const D: usize> Run<D> {
         let mut run = Self {
             motion: motion_in_memory(&case, state, device)?,
             device: device.clone(),
+            identity: OnceLock::new(),
             field: state.current.clone(),
             case,
             control,
@@ -278,6 +282,11 @@ impl<const D: usize> Run<D> {
         stops.find(|stop| stop.holds(self, step_size)).copied()
     }
 
+    /// The identity of the case, which takes all of its initial values.
+    pub(crate) fn identity(&self) -> &Value {
+        (self.identity).get_or_init(|| self.case.identity(&self.device))
+    }
+
     /// The case that is run.
     pub fn case(&self) -> &Case<D> {
         &self.case
@@ -371,19 +380,24 @@ const VANISHING: f64 = 0.02;
 fn has_gone_further<const D: usize>(u: &Field<D>, now: &Field<D>, widths: f64) -> bool {
     let (grid, limit) = (u.grid(), (0.75 * widths).tanh());
     let (mut all, mut far) = (0_usize, 0_usize);
-    for node in 0..grid.len() {
-        let index = grid.multi_index(node);
-        for axis in 0..D {
-            let mut next = index;
-            next[axis] += 1;
-            let next = grid.index(next);
-            let [a, b] = [node, next].map(|k| u.values()[k]);
-            if (a > 0.0) == (b > 0.0) {
-                continue;
+    for axis in 0..D {
+        let stride = grid.stride(axis);
+        let lines = grid.cells() * stride;
+        let (u, now) = (
+            u.values().chunks_exact(lines),
+            now.values().chunks_exact(lines),
+        );
+        for (u, now) in u.zip(now) {
+            let beside = (stride..lines).chain(0..stride);
+            for (node, next) in (0..lines).zip(beside) {
+                let [a, b] = [node, next].map(|k| u[k]);
+                if (a > 0.0) == (b > 0.0) {
+                    continue;
+                }
+                let [c, d] = [node, next].map(|k| now[k]);
+                all += 1;
+                far += usize::from((c + (d - c) * a / (a - b)).abs() > limit);
             }
-            let [c, d] = [node, next].map(|k| now.values()[k]);
-            all += 1;
-            far += usize::from((c + (d - c) * a / (a - b)).abs() > limit);
         }
     }
     far as f64 > VANISHING * all as f64

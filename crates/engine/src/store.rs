@@ -178,7 +178,7 @@ fn pack<const D: usize>(run: &Run<D>, notes: &Value) -> Result<State, Error> {
     let state = run.state()?;
     let (previous, previous_tau) = state.previous.unzip();
     let notes = json!({
-        "case": run.case.identity(&run.device),
+        "case": run.identity(),
         "application": notes,
         "start": run.start,
         "ended": run.ended(),

@@ -8,15 +8,16 @@
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use crate::fft::{Real, is_f64};
+use crate::fft::Real;
 
 /// Bricks per task.
 const GROUP: usize = 8;
-/// Cells that are computed side by side across the axis of a pass: a vector register of 256 bits.
-const DOUBLES: usize = 4;
-const SINGLES: usize = 8;
-/// and along it.
-const ALONG: usize = 8;
+/// Cells along the axis of a pass that are computed from the same window of values.
+const ROWS: usize = 4;
+/// Lines of a brick that are computed together along its last axis.
+const LINES: usize = 8;
+/// The side of a brick is a multiple of the numbers in a register.
+const MOST_LANES: usize = 8;
 
 /// What passes see where no brick is active.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,13 +43,13 @@ pub(crate) fn convolve<T: Real>(
     ghosts: Ghosts,
 ) -> Vec<T> {
     let reach = taps.len() / 2;
-    debug_assert!(taps.len() % 2 == 1 && reach <= side && side.is_multiple_of(ALONG));
-    let mut weights = vec![T::zero(); ALONG - 1];
+    debug_assert!(taps.len() % 2 == 1 && reach <= side && side.is_multiple_of(MOST_LANES));
+    let mut weights = vec![T::zero(); ROWS - 1];
     weights.extend_from_slice(taps);
     if adjoint {
-        weights[ALONG - 1..].reverse();
+        weights[ROWS - 1..].reverse();
     }
-    weights.resize(weights.len() + ALONG - 1, T::zero());
+    weights.resize(weights.len() + ROWS - 1, T::zero());
     let volume = side.pow(axes as u32);
     let mut rests = match ghosts {
         Ghosts::Zero => [T::zero(); 2],
@@ -127,42 +128,42 @@ impl<T: Real> Pass<'_, T> {
         [neighbour(0), own, neighbour(1)]
     }
 
-    /// Along an axis that is not the last: `LANES` lines at once, which lie side by side in memory.
+    /// Along an axis that is not the last: `COLUMNS` registers of lines at once, which lie side by side in memory.
     #[inline(always)]
-    fn across<const LANES: usize, const FUSED: bool>(
-        &self,
-        [before, own, after]: [&[T]; 3],
-        result: &mut [T],
-    ) {
-        let (side, stride, reach) = (self.side, self.stride, self.reach);
-        for outer in (0..self.volume).step_by(side * stride) {
-            for lane in (outer..outer + stride).step_by(LANES) {
-                for first in (0..side).step_by(ALONG) {
-                    let mut sums = [[T::zero(); LANES]; ALONG];
-                    let mut weights = self.weights;
-                    // The cells from `first - reach` to `first + ALONG - 1 + reach`, brick by brick.
-                    let end = first + ALONG + reach;
-                    let parts = [
-                        (before, (side + first).saturating_sub(reach).min(side)..side),
-                        (own, first.saturating_sub(reach)..end.min(side)),
-                        (after, 0..end.saturating_sub(side)),
-                    ];
-                    for (brick, range) in parts {
-                        for at in range {
-                            let (window, _) = weights.split_first_chunk::<ALONG>().expect(WINDOW);
-                            let row: &[T; LANES] =
-                                brick[lane + at * stride..].first_chunk().expect(ROW);
-                            for (q, sums) in sums.iter_mut().enumerate() {
-                                let weight = window[ALONG - 1 - q];
-                                for (sum, value) in sums.iter_mut().zip(row) {
-                                    *sum = multiply_add::<T, FUSED>(weight, *value, *sum);
-                                }
+    fn across<S: Simd, const COLUMNS: usize>(&self, simd: S, bricks: [&[T]; 3], result: &mut [T]) {
+        let (side, reach) = (self.side, self.reach);
+        let [before, own, after] = bricks.map(T::registers::<S>);
+        let result = T::registers_mut::<S>(result);
+        let stride = self.stride * result.len() / self.volume;
+        for column in (0..result.len() / side).step_by(COLUMNS) {
+            let starts: [usize; COLUMNS] = std::array::from_fn(|c| {
+                let column = column + c;
+                column / stride * stride * side + column % stride
+            });
+            for first in (0..side).step_by(ROWS) {
+                // The cells from `first - reach` to `first + ROWS - 1 + reach`, brick by brick.
+                let end = first + ROWS + reach;
+                let parts = [
+                    (before, (side + first).saturating_sub(reach).min(side)..side),
+                    (own, first.saturating_sub(reach)..end.min(side)),
+                    (after, 0..end.saturating_sub(side)),
+                ];
+                let mut sums = [[T::splat(simd, T::zero()); COLUMNS]; ROWS];
+                let mut windows = self.weights.windows(ROWS);
+                for (brick, cells) in parts {
+                    for (at, window) in cells.zip(&mut windows) {
+                        let values = starts.map(|start| brick[start + at * stride]);
+                        for (sums, weight) in sums.iter_mut().zip(window.iter().rev()) {
+                            let weight = T::splat(simd, *weight);
+                            for (sum, value) in sums.iter_mut().zip(values) {
+                                *sum = T::multiply_add(simd, weight, value, *sum);
                             }
-                            weights = &weights[1..];
                         }
                     }
-                    for (q, sums) in sums.iter().enumerate() {
-                        result[lane + (first + q) * stride..][..LANES].copy_from_slice(sums);
+                }
+                for (q, sums) in sums.iter().enumerate() {
+                    for (start, sum) in starts.iter().zip(sums) {
+                        result[start + (first + q) * stride] = *sum;
                     }
                 }
             }
@@ -171,44 +172,45 @@ impl<T: Real> Pass<'_, T> {
 
     /// Along the last axis: from copies of the lines with what lies before and after them.
     #[inline(always)]
-    fn along<const LANES: usize, const FUSED: bool>(
+    fn along<S: Simd>(
         &self,
+        simd: S,
         [before, own, after]: [&[T]; 3],
-        lines: &mut Vec<T>,
+        copies: &mut Vec<T>,
         result: &mut [T],
     ) {
-        const ROWS: usize = 8;
         let (side, reach) = (self.side, self.reach);
-        let taps = &self.weights[ALONG - 1..][..=2 * reach];
-        let width = side + 2 * reach;
-        for block in (0..self.volume).step_by(ROWS * side) {
-            lines.clear();
-            for row in (block..block + ROWS * side).step_by(side) {
-                lines.extend_from_slice(&before[row + side - reach..row + side]);
-                lines.extend_from_slice(&own[row..row + side]);
-                lines.extend_from_slice(&after[row..row + reach]);
-            }
-            for first in (0..side).step_by(LANES) {
-                let mut sums = [[T::zero(); LANES]; ROWS];
-                for (k, tap) in taps.iter().enumerate() {
-                    for (row, sums) in sums.iter_mut().enumerate() {
-                        let values: &[T; LANES] =
-                            lines[row * width + first + k..].first_chunk().expect(ROW);
-                        for (sum, value) in sums.iter_mut().zip(values) {
-                            *sum = multiply_add::<T, FUSED>(*tap, *value, *sum);
-                        }
+        let taps = &self.weights[ROWS - 1..][..=2 * reach];
+        let lanes = self.volume / T::registers::<S>(own).len();
+        let width = 3 * side;
+        copies.resize(LINES * width, T::zero());
+        for block in (0..self.volume).step_by(LINES * side) {
+            for (part, brick) in [before, own, after].into_iter().enumerate() {
+                let lines = brick[block..][..LINES * side].chunks_exact(side);
+                for (line, copy) in lines.zip(copies.chunks_exact_mut(width)) {
+                    let copy = T::registers_mut::<S>(&mut copy[part * side..][..side]);
+                    for (to, from) in copy.iter_mut().zip(T::registers::<S>(line)) {
+                        *to = *from;
                     }
                 }
-                for (row, sums) in sums.iter().enumerate() {
-                    result[block + row * side + first..][..LANES].copy_from_slice(sums);
+            }
+            for first in (0..side).step_by(lanes) {
+                let mut sums = [T::splat(simd, T::zero()); LINES];
+                for (k, tap) in taps.iter().enumerate() {
+                    let tap = T::splat(simd, *tap);
+                    for (line, sum) in sums.iter_mut().enumerate() {
+                        let values = &copies[line * width + side - reach + first + k..][..lanes];
+                        *sum = T::multiply_add(simd, tap, T::registers::<S>(values)[0], *sum);
+                    }
+                }
+                for (line, sum) in sums.iter().enumerate() {
+                    let result = &mut result[block + line * side + first..][..lanes];
+                    T::registers_mut::<S>(result)[0] = *sum;
                 }
             }
         }
     }
 }
-
-const WINDOW: &str = "the weights are as many as the cells of a window";
-const ROW: &str = "the side of a brick is a multiple of the lanes";
 
 /// A few bricks of a pass: what one thread computes with the best instructions that the processor has.
 struct Group<'a, T> {
@@ -221,37 +223,91 @@ impl<T: Real> WithSimd for Group<'_, T> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        match (is_f64::<T>(), S::IS_SCALAR) {
-            (true, true) => self.run::<DOUBLES, false>(),
-            (true, false) => self.run::<DOUBLES, true>(),
-            (false, true) => self.run::<SINGLES, false>(),
-            (false, false) => self.run::<SINGLES, true>(),
-        }
-    }
-}
-
-impl<T: Real> Group<'_, T> {
-    #[inline(always)]
-    fn run<const LANES: usize, const FUSED: bool>(self) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let pass = self.pass;
-        let mut lines = Vec::new();
+        let mut copies = Vec::new();
         for (i, result) in self.result.chunks_exact_mut(pass.volume).enumerate() {
             let bricks = pass.bricks(self.first + i);
+            let columns = T::registers::<S>(bricks[0]).len() / pass.side;
             if pass.stride == 1 {
-                pass.along::<LANES, FUSED>(bricks, &mut lines, result);
+                pass.along(simd, bricks, &mut copies, result);
+            } else if columns.is_multiple_of(2) {
+                pass.across::<S, 2>(simd, bricks, result);
             } else {
-                pass.across::<LANES, FUSED>(bricks, result);
+                pass.across::<S, 1>(simd, bricks, result);
             }
         }
     }
 }
 
-/// `a b + c`, rounded once where the processor does that in one instruction.
-#[inline(always)]
-fn multiply_add<T: Real, const FUSED: bool>(a: T, b: T, c: T) -> T {
-    if FUSED { a.mul_add(b, c) } else { a * b + c }
+/// Numbers that vector registers hold side by side.
+pub trait Lanes: Copy {
+    /// As many of them as there is room for.
+    type Register<S: Simd>: Copy;
+
+    /// The registers that a slice fills; what is left at the end is left out.
+    fn registers<S: Simd>(values: &[Self]) -> &[Self::Register<S>];
+
+    /// [`Self::registers`], to be written to.
+    fn registers_mut<S: Simd>(values: &mut [Self]) -> &mut [Self::Register<S>];
+
+    /// A register with one value throughout.
+    fn splat<S: Simd>(simd: S, value: Self) -> Self::Register<S>;
+
+    /// `a b + c`, rounded once where the processor does that in one instruction.
+    fn multiply_add<S: Simd>(
+        simd: S,
+        a: Self::Register<S>,
+        b: Self::Register<S>,
+        c: Self::Register<S>,
+    ) -> Self::Register<S>;
 }
+
+macro_rules! lanes {
+    ($type:ty, $register:ident, $shared:ident, $exclusive:ident, $splat:ident, $multiply_add:ident) => {
+        impl Lanes for $type {
+            type Register<S: Simd> = S::$register;
+            #[inline(always)]
+            fn registers<S: Simd>(values: &[Self]) -> &[S::$register] {
+                S::$shared(values).0
+            }
+            #[inline(always)]
+            fn registers_mut<S: Simd>(values: &mut [Self]) -> &mut [S::$register] {
+                S::$exclusive(values).0
+            }
+            #[inline(always)]
+            fn splat<S: Simd>(simd: S, value: Self) -> S::$register {
+                simd.$splat(value)
+            }
+            #[inline(always)]
+            fn multiply_add<S: Simd>(
+                simd: S,
+                a: S::$register,
+                b: S::$register,
+                c: S::$register,
+            ) -> S::$register {
+                simd.$multiply_add(a, b, c)
+            }
+        }
+    };
+}
+
+lanes!(
+    f64,
+    f64s,
+    as_simd_f64s,
+    as_mut_simd_f64s,
+    splat_f64s,
+    mul_add_e_f64s
+);
+lanes!(
+    f32,
+    f32s,
+    as_simd_f32s,
+    as_mut_simd_f32s,
+    splat_f32s,
+    mul_add_e_f32s
+);
 
 #[cfg(test)]
 mod tests {

@@ -13,13 +13,15 @@ use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 use rustfft::num_traits::Float;
 
+use crate::brick_convolution::Lanes;
+
 /// Columns of the first axis that are transformed together: two cache lines of complex doubles.
 const BLOCK: usize = 8;
 /// Below this number of grid points one thread is faster than two.
 const PARALLEL_FROM: usize = 1 << 15;
 
 /// Floating-point type of a grid: `f64` or `f32`.
-pub trait Real: Planned + Float + bytemuck::Pod + Default {
+pub trait Real: Planned + Float + Lanes + bytemuck::Pod + Default {
     /// Conversion from a double, rounding if needed.
     fn of(value: f64) -> Self;
     /// The value as a double, exactly.

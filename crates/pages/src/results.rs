@@ -405,8 +405,8 @@ mod tests {
             ("experiment", "x"),
             ("dtype", "f64"),
             ("wall_seconds", "1.5000"),
-            ("a.b", "true"),
-            ("l[0].d", "e"),
+            ("a: b", "true"),
+            ("l[0]: d", "e"),
             ("n", "64, 128"),
             ("p", "2 s"),
         ];
