@@ -2,6 +2,7 @@
 
 use fem::{FiniteElementStep, Statistics};
 use geometry::Field;
+use geometry::measure::l2_distance;
 use model::Network;
 use operators::ComputeDevice;
 use solver::{Constraints, FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow};
@@ -111,6 +112,19 @@ impl<const D: usize> Motion<D> {
         match &self.flow {
             Either::Willmore(flow) => flow.field(),
             Either::MeanCurvature(flow) => flow.field(),
+        }
+    }
+
+    /// Puts the phase field in the place of the one before; the `L2` distance to that.
+    pub(crate) fn replace(&self, field: &mut Field<D>) -> Result<f64, solver::Error> {
+        match &self.flow {
+            Either::Willmore(flow) => flow.replace(field),
+            Either::MeanCurvature(flow) => {
+                let now = flow.field()?;
+                let moved = l2_distance(&now, field)?;
+                *field = now;
+                Ok(moved)
+            }
         }
     }
 

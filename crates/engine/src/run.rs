@@ -47,7 +47,7 @@ impl<const D: usize> Run<D> {
     pub fn new(case: Case<D>, device: &ComputeDevice) -> Result<Self, Error> {
         let start = values(&case, &case.initial, 0.0)?;
         let state = FlowState::new(case.initial.clone(), 0, 0.0);
-        Self::at(case, device, start, Vec::new(), &state)
+        Self::at(case, device, start, Vec::new(), state)
     }
 
     /// Restores a case to the state that it had after these records.
@@ -56,7 +56,7 @@ impl<const D: usize> Run<D> {
         device: &ComputeDevice,
         start: Values,
         records: Vec<Record>,
-        state: &FlowState<D>,
+        state: FlowState<D>,
     ) -> Result<Self, Error> {
         let (mcf_step, first) = (case.scales.mcf_step, case.steps.rule.size(1));
         if case.flow == Flow::MeanCurvature && first.to_bits() != mcf_step.to_bits() {
@@ -80,10 +80,10 @@ impl<const D: usize> Run<D> {
             control.accept(record)?;
         }
         let mut run = Self {
-            motion: motion_in_memory(&case, state, device)?,
+            motion: motion_in_memory(&case, &state, device)?,
             device: device.clone(),
             identity: OnceLock::new(),
-            field: state.current.clone(),
+            field: state.current,
             case,
             control,
             ramped,
@@ -109,7 +109,8 @@ impl<const D: usize> Run<D> {
             refused_hvp,
             minimization,
         } = self.attempt()?;
-        let field = self.motion.field().map_err(|source| self.failed(source))?;
+        let moved = self.motion.replace(&mut self.field);
+        let moved = moved.map_err(|source| self.failed(source))?;
         let seconds = clock.elapsed().as_secs_f64();
         let step_size = self.control.step_size();
         let mcf_step = self.case.scales.mcf_step;
@@ -122,15 +123,14 @@ impl<const D: usize> Run<D> {
             tau: minimization.map_or(mcf_step, |made| made.tau),
             halvings,
             refused_hvp,
-            moved: l2_distance(&field, &self.field)?,
-            travelled: l2_distance(&field, &self.case.initial)?,
+            moved,
+            travelled: l2_distance(&self.field, &self.case.initial)?,
             minimization,
-            measures: values(&self.case, &field, time)?,
+            measures: values(&self.case, &self.field, time)?,
             seconds,
         };
         self.ramped += record.tau / step_size;
         record.completes_step = self.control.accept(&record)?;
-        self.field = field;
         self.records.push(record);
         self.ended = self.stop(step_size);
         Ok(self.records.last())

@@ -247,7 +247,7 @@ fn restore<const D: usize>(
         time: read(stored, &state.notes["time"])?,
     };
     let start = read(stored, &state.notes["start"])?;
-    Run::at(case, device, start, records(stored)?, &at)
+    Run::at(case, device, start, records(stored)?, at)
 }
 
 /// Refuses a stored run of another case, and says in what it differs.

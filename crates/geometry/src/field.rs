@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::{Error, Grid};
+use crate::{Error, Grid, reduce};
 
 /// One `f64` per node of a [`Grid`], row-major, last axis fastest.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,6 +72,17 @@ impl<const D: usize> Field<D> {
     /// The nodal values, to be changed in place; see [`Field::check_finite`].
     pub fn values_mut(&mut self) -> &mut [f64] {
         &mut self.values
+    }
+
+    /// Replaces the values in place; the `L2` distance to what they were. `fill` gives those of some nodes in a row from one on, whose
+    /// number is a multiple of 4096.
+    ///
+    /// # Errors
+    /// [`Error::NonFinite`], with the values replaced.
+    pub fn replace(&mut self, fill: impl Fn(usize, &mut [f64]) + Sync) -> Result<f64, Error> {
+        let squares = reduce::replace(&mut self.values, fill);
+        self.check_finite()?;
+        Ok((self.grid.cell_volume() * squares).sqrt())
     }
 
     /// Gives up the grid and returns the nodal values.

@@ -1,5 +1,7 @@
 //! Active bricks: the part of a periodic grid that is stored and worked on.
 
+use rayon::prelude::*;
+
 use crate::Error;
 use crate::brick_convolution::{Ghosts, convolve};
 
@@ -219,24 +221,30 @@ impl<const D: usize> Bricks<D> {
     /// The values on the whole grid: `rests` outside, in the negative and in the positive phase.
     pub fn scatter(&self, values: &[f64], rests: [f64; 2]) -> Vec<f64> {
         let cells = self.cells();
-        let mut dense = Vec::with_capacity(cells.pow(D as u32));
-        // A row of the grid lies in one row of bricks along the last axis.
-        for row in 0..cells.pow(D as u32 - 1) {
-            let (mut rest, mut stride, mut brick) = (row, self.per_axis, 0);
-            for _ in 1..D {
-                brick += rest % cells / self.side * stride;
-                stride *= self.per_axis;
-                rest /= cells;
+        let mut dense = vec![0.0; cells.pow(D as u32)];
+        let lines = dense.par_chunks_mut(cells).enumerate();
+        lines.for_each(|(line, part)| self.read(values, rests, line * cells, part));
+        dense
+    }
+
+    /// Fills a part of the whole grid from a cell on, both multiples of the side.
+    pub fn read(&self, values: &[f64], rests: [f64; 2], start: usize, part: &mut [f64]) {
+        // A row of a brick lies in one row of the grid.
+        for (k, row) in part.chunks_exact_mut(self.side).enumerate() {
+            let mut flat = start + k * self.side;
+            let mut index = [0; D];
+            for at in index.iter_mut().rev() {
+                *at = flat % self.cells();
+                flat /= self.cells();
             }
-            for phase in &self.directory[brick..brick + self.per_axis] {
-                let rest = rests[usize::from(*phase == POSITIVE)];
-                dense.resize(dense.len() + self.side, rest);
+            match self.cell(index) {
+                Some(cell) => row.copy_from_slice(&values[cell..][..self.side]),
+                None => {
+                    let phase = self.is_positive(index.map(|at| at / self.side));
+                    row.fill(rests[usize::from(phase)]);
+                }
             }
         }
-        self.each_row(|start, cell| {
-            dense[start..start + self.side].copy_from_slice(&values[cell..cell + self.side]);
-        });
-        dense
     }
 
     /// Calls with the first cell of every row of the active bricks, on the grid and in the order of storage.

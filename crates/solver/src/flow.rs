@@ -392,6 +392,14 @@ impl<const D: usize> WillmoreFlow<D> {
         self.on_grid(&self.current)
     }
 
+    /// Puts the phase field now in the place of another one; the `L2` distance to that.
+    ///
+    /// # Errors
+    /// [`Error::Operators`] if the device fails.
+    pub fn replace(&self, field: &mut Field<D>) -> Result<f64, Error> {
+        self.stored(&self.current)?.replace(field)
+    }
+
     /// Everything the following steps depend on: a flow [restored](Self::restore) from it continues with the same bytes.
     ///
     /// # Errors

@@ -63,6 +63,14 @@ impl<const D: usize> Stored<D> {
         Ok(Field::from_values(self.grid, values)?)
     }
 
+    /// Puts it in the place of a field of the whole grid; the `L2` distance to that.
+    pub(crate) fn replace(&self, field: &mut Field<D>) -> Result<f64, Error> {
+        Ok(field.replace(|start, part| match &self.active {
+            Some(active) => (active.bricks()).read(&self.values, self.rests, start, part),
+            None => part.copy_from_slice(&self.values[start..][..part.len()]),
+        })?)
+    }
+
     pub(crate) fn into_values(self) -> Vec<f64> {
         self.values
     }

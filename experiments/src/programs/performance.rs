@@ -109,6 +109,8 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let turns = if quick { 0.05 } else { options.turns };
     let parameters = json!({ "turns": turns, "threads": rayon::current_num_threads() });
     let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    // First, as what other measurements leave behind would count as their memory.
+    let stored = options.storage.measure(&options.networks, &mut session)?;
     let mut all = Vec::new();
     for &n in planes {
         let operator = learned(convergence_network(n)?)?;
@@ -137,7 +139,6 @@ pub fn program(options: &Options) -> Result<(), Error> {
     session.sheet(products, "products")?;
     session.output.write_json("performance.json", &all)?;
     session.figure(figure(&all), "performance")?;
-    let stored = options.storage.measure(&options.networks, &mut session)?;
     write_storages(&stored, &mut session)?;
     session.finish("Willmore steps by the hybrid scheme on this machine")
 }
