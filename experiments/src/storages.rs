@@ -75,8 +75,8 @@ impl StorageOptions {
         )
     }
 
-    /// Lets the armadillo flow on both storages at every resolution; the built-in figure in a quick run, or if it is not here. Then the cross
-    /// on bricks.
+    /// Lets the cross flow on bricks, and then the armadillo on both storages at every resolution; the built-in figure in a quick run, or if it
+    /// is not here.
     pub fn measure(
         &self,
         networks: &NetworkOptions,
@@ -86,15 +86,6 @@ impl StorageOptions {
         let network = networks.find(Scheme::Accurate, &needed_network())?;
         let mut operator = Operator::learned(Scheme::Accurate, network)?;
         let mut measured = Vec::new();
-        for n in self.resolutions(session.options.quick) {
-            for storage in STORAGES {
-                if storage == Storage::Dense && n > self.dense_up_to {
-                    continue;
-                }
-                operator.storage = storage;
-                measured.push(self.surface(n, operator.clone(), session)?);
-            }
-        }
         let quick = session.options.quick;
         let curves = if quick {
             vec![64]
@@ -103,6 +94,15 @@ impl StorageOptions {
         };
         for n in curves {
             measured.push(curve(n, session)?);
+        }
+        for n in self.resolutions(quick) {
+            for storage in STORAGES {
+                if storage == Storage::Dense && n > self.dense_up_to {
+                    continue;
+                }
+                operator.storage = storage;
+                measured.push(self.surface(n, operator.clone(), session)?);
+            }
         }
         Ok(measured)
     }

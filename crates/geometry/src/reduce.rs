@@ -19,14 +19,13 @@ pub(crate) fn sum(len: usize, term: impl Fn(usize) -> f64 + Sync) -> f64 {
 /// Replaces values, and sums the squares of their changes as [`sum`] does. `fill` gives those from a place on.
 pub(crate) fn replace(values: &mut [f64], fill: impl Fn(usize, &mut [f64]) + Sync) -> f64 {
     let part = |(chunk, values): (usize, &mut [f64])| {
-        let mut now = [0.0; CHUNK];
-        let now = &mut now[..values.len()];
-        fill(chunk * CHUNK, now);
+        let mut now = vec![0.0; values.len()];
+        fill(chunk * CHUNK, &mut now);
         let pairs = values.iter_mut().zip(now);
         pairs
             .map(|(value, now)| {
-                let change = *now - *value;
-                *value = *now;
+                let change = now - *value;
+                *value = now;
                 change * change
             })
             .sum()

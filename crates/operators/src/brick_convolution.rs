@@ -8,7 +8,7 @@
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use crate::fft::Real;
+use crate::fft::{Real, lock};
 
 /// Bricks per task.
 const GROUP: usize = 8;
@@ -56,13 +56,20 @@ pub(crate) fn convolve<T: Real>(
         Ghosts::At(rests) => rests.map(T::of),
     };
     let sum = taps.iter().fold(T::zero(), |sum, tap| sum + *tap);
-    let mut y: Option<Vec<T>> = None;
-    let mut spare = Vec::new();
+    // Passes write by turns to a vector that is kept and to the one that is returned, to which the last one does.
+    let mut kept = std::mem::take(&mut *lock(&T::shared().scratch));
+    kept.resize(x.len(), T::zero());
+    let mut result = vec![T::zero(); x.len()];
     for pass in 0..axes {
         let axis = if adjoint { pass } else { axes - 1 - pass };
         let constants = rests.map(|rest| vec![rest; volume]);
+        let (from, to) = if (axes - pass).is_multiple_of(2) {
+            (&mut result, &mut kept)
+        } else {
+            (&mut kept, &mut result)
+        };
         let pass = Pass {
-            x: y.as_deref().unwrap_or(x),
+            x: if pass == 0 { x } else { from },
             neighbours,
             constants: &constants,
             weights: &weights,
@@ -72,14 +79,12 @@ pub(crate) fn convolve<T: Real>(
             stride: side.pow((axes - 1 - axis) as u32),
             volume,
         };
-        let mut result = std::mem::take(&mut spare);
-        result.resize(x.len(), T::zero());
-        pass.run(&mut result);
-        spare = y.replace(result).unwrap_or_default();
+        pass.run(to);
         // A constant outside is smoothed like the values inside.
         rests = rests.map(|rest| rest * sum);
     }
-    y.unwrap_or_else(|| x.to_vec())
+    *lock(&T::shared().scratch) = kept;
+    result
 }
 
 /// A pass along one axis.

@@ -32,10 +32,12 @@ pub trait Real: Planned + Float + Lanes + bytemuck::Pod + Default {
     fn shared() -> &'static Shared<Self>;
 }
 
-/// Plans by grid shape, and the symbols of the kernels used last.
+/// Plans by grid shape, the symbols of the kernels used last, and memory that is used again.
 pub struct Shared<T: Real> {
     plans: Mutex<HashMap<Vec<usize>, Arc<Transform<T>>>>,
     pub(crate) symbols: Mutex<Vec<CachedSymbol<T>>>,
+    /// A vector for intermediate results, while nobody uses it.
+    pub(crate) scratch: Mutex<Vec<T>>,
 }
 
 /// The spectrum of a kernel on a grid, normalised, with the data it was made from.
@@ -64,6 +66,7 @@ macro_rules! real {
                 SHARED.get_or_init(|| Shared {
                     plans: Mutex::new(HashMap::new()),
                     symbols: Mutex::new(Vec::new()),
+                    scratch: Mutex::new(Vec::new()),
                 })
             }
         }

@@ -109,8 +109,6 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let turns = if quick { 0.05 } else { options.turns };
     let parameters = json!({ "turns": turns, "threads": rayon::current_num_threads() });
     let mut session = Session::open(PROGRAM, run, device, parameters)?;
-    // First, as what other measurements leave behind would count as their memory.
-    let stored = options.storage.measure(&options.networks, &mut session)?;
     let mut all = Vec::new();
     for &n in planes {
         let operator = learned(convergence_network(n)?)?;
@@ -119,6 +117,8 @@ pub fn program(options: &Options) -> Result<(), Error> {
         let measured = Measurement::of("cross", &case, &mut session, turns, compared)?;
         all.push(measured);
     }
+    // Before larger ones, as what these leave behind would count as their memory.
+    let stored = options.storage.measure(&options.networks, &mut session)?;
     for (name, n, steps) in solids {
         let operator = learned(surfaces::needed_network())?;
         let time = (StepRule::Constant(0.5_f64.powi(18)), steps);
