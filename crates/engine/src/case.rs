@@ -81,8 +81,8 @@ impl<const D: usize> Case<D> {
 
     /// Whether it can be had on active bricks, if the network's kernel is separable.
     pub(crate) fn takes_bricks(&self) -> bool {
-        let bends_only = self.energy.is_willmore() && self.region.is_none();
-        self.flow == Flow::Willmore && self.operator.network().is_some() && bends_only
+        let learned = self.flow == Flow::Willmore && self.operator.network().is_some();
+        learned && self.energy.is_willmore()
     }
 
     /// The time at which the flow ends, if there is one.

@@ -83,7 +83,7 @@ impl<const D: usize> Run<D> {
             motion: motion_in_memory(&case, &state, device)?,
             device: device.clone(),
             identity: OnceLock::new(),
-            field: state.current,
+            field: kept_outside(&case, state.current),
             case,
             control,
             ramped,
@@ -336,6 +336,19 @@ impl<const D: usize> Run<D> {
     pub(crate) fn state(&self) -> Result<FlowState<D>, Error> {
         Ok(self.motion.state(self.records.len(), self.time())?)
     }
+}
+
+/// A phase field with the initial values outside of the region, which bricks do not keep where they are constant.
+fn kept_outside<const D: usize>(case: &Case<D>, mut field: Field<D>) -> Field<D> {
+    if let Some(region) = &case.region {
+        let initial = case.initial.values().iter().zip(region);
+        for (value, (initial, moves)) in field.values_mut().iter_mut().zip(initial) {
+            if !moves {
+                *value = *initial;
+            }
+        }
+    }
+    field
 }
 
 /// The flow of a case at a state, if it fits into the memory.

@@ -74,7 +74,7 @@ impl<const D: usize> Field<D> {
         &mut self.values
     }
 
-    /// Replaces the values in place; the `L2` distance to what they were. `fill` gives those of some nodes in a row from one on, whose
+    /// Replaces the values in place; the `L2` distance to what they were. `fill` changes those of some nodes in a row from one on, whose
     /// number is a multiple of 4096.
     ///
     /// # Errors

@@ -16,10 +16,10 @@ pub(crate) fn sum(len: usize, term: impl Fn(usize) -> f64 + Sync) -> f64 {
     total(&parts)
 }
 
-/// Replaces values, and sums the squares of their changes as [`sum`] does. `fill` gives those from a place on.
+/// Replaces values, and sums the squares of their changes as [`sum`] does. `fill` changes copies of those from a place on.
 pub(crate) fn replace(values: &mut [f64], fill: impl Fn(usize, &mut [f64]) + Sync) -> f64 {
     let part = |(chunk, values): (usize, &mut [f64])| {
-        let mut now = vec![0.0; values.len()];
+        let mut now = values.to_vec();
         fill(chunk * CHUNK, &mut now);
         let pairs = values.iter_mut().zip(now);
         pairs

@@ -317,8 +317,10 @@ impl<const D: usize> WillmoreFlow<D> {
     /// # Errors
     /// [`Error::Region`] if there are not as many marks as nodes, or if none is set.
     pub fn restrict_to(&mut self, nodes: &[bool]) -> Result<(), Error> {
-        self.needs_grid("regions")?;
-        let region = Region::new(&self.grid, nodes, &self.device)?;
+        let mut region = Region::new(&self.grid, nodes, &self.device)?;
+        if let Some(active) = &self.active {
+            region = region.on(active.bricks(), &self.device);
+        }
         if let Some(half) = &mut self.half {
             half.restrict_to(&every_other_node(self.grid, nodes))?;
         }
@@ -392,12 +394,14 @@ impl<const D: usize> WillmoreFlow<D> {
         self.on_grid(&self.current)
     }
 
-    /// Puts the phase field now in the place of another one; the `L2` distance to that.
+    /// Puts the phase field now in the place of the one before, which stays outside of the region if there is one; the `L2` distance to
+    /// that.
     ///
     /// # Errors
     /// [`Error::Operators`] if the device fails.
     pub fn replace(&self, field: &mut Field<D>) -> Result<f64, Error> {
-        self.stored(&self.current)?.replace(field)
+        let marks = self.region.as_ref().map(Region::marks);
+        self.stored(&self.current)?.replace(field, marks)
     }
 
     /// Everything the following steps depend on: a flow [restored](Self::restore) from it continues with the same bytes.

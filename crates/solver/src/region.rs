@@ -4,13 +4,16 @@ use std::sync::Arc;
 
 use burn::tensor::{Bool, DType, Tensor};
 use geometry::Grid;
-use operators::ComputeDevice;
+use operators::{Bricks, ComputeDevice};
 
 use crate::{Error, Objective};
 
 /// The grid nodes whose values may change; the others keep theirs, bit for bit.
 #[derive(Clone)]
 pub struct Region<const D: usize> {
+    /// All nodes of the grid,
+    marks: Arc<[bool]>,
+    /// and those that are stored.
     nodes: Arc<[bool]>,
     /// The indicator function of the region: 1 inside, 0 outside.
     inside: Tensor<D>,
@@ -31,17 +34,39 @@ impl<const D: usize> Region<D> {
                 marked,
             });
         }
+        let marks: Arc<[bool]> = nodes.into();
+        Ok(Self::stored(marks.clone(), marks, grid.shape(), device))
+    }
+
+    /// The same region for fields on these bricks.
+    pub(crate) fn on(&self, bricks: &Bricks<D>, device: &ComputeDevice) -> Self {
+        let nodes = bricks.gather(&self.marks).into();
+        Self::stored(self.marks.clone(), nodes, bricks.shape(), device)
+    }
+
+    fn stored(
+        marks: Arc<[bool]>,
+        nodes: Arc<[bool]>,
+        shape: [usize; D],
+        device: &ComputeDevice,
+    ) -> Self {
         let values: Vec<f64> = nodes.iter().map(|&inside| f64::from(inside)).collect();
-        let inside = device.tensor::<D>(&values, [grid.cells(); D]);
-        Ok(Self {
-            nodes: nodes.into(),
+        let inside = device.tensor::<D>(&values, shape);
+        Self {
+            marks,
+            nodes,
             outside: inside.clone().equal_elem(0.0),
             inside,
-        })
+        }
     }
 
     /// Which nodes are inside, in the order of the grid.
-    pub fn nodes(&self) -> &[bool] {
+    pub fn marks(&self) -> &[bool] {
+        &self.marks
+    }
+
+    /// Which of the stored nodes are inside.
+    pub(crate) fn nodes(&self) -> &[bool] {
         &self.nodes
     }
 

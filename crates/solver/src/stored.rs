@@ -63,11 +63,28 @@ impl<const D: usize> Stored<D> {
         Ok(Field::from_values(self.grid, values)?)
     }
 
-    /// Puts it in the place of a field of the whole grid; the `L2` distance to that.
-    pub(crate) fn replace(&self, field: &mut Field<D>) -> Result<f64, Error> {
-        Ok(field.replace(|start, part| match &self.active {
+    /// Puts it in the place of a field of the whole grid, where only the nodes with these marks change; the `L2` distance to that.
+    pub(crate) fn replace(
+        &self,
+        field: &mut Field<D>,
+        marks: Option<&[bool]>,
+    ) -> Result<f64, Error> {
+        let fill = |start: usize, part: &mut [f64]| match &self.active {
             Some(active) => (active.bricks()).read(&self.values, self.rests, start, part),
             None => part.copy_from_slice(&self.values[start..][..part.len()]),
+        };
+        let Some(marks) = marks else {
+            return Ok(field.replace(fill)?);
+        };
+        Ok(field.replace(|start, part| {
+            let before = part.to_vec();
+            fill(start, part);
+            let kept = before.iter().zip(&marks[start..]);
+            for (value, (before, moves)) in part.iter_mut().zip(kept) {
+                if !moves {
+                    *value = *before;
+                }
+            }
         })?)
     }
 

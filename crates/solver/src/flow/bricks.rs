@@ -76,6 +76,8 @@ impl<const D: usize> WillmoreFlow<D> {
             None => None,
         };
         self.rate = self.rate.as_ref().map(|rate| rate.on(&next));
+        let region = self.region.take();
+        self.region = region.map(|region| region.on(next.bricks(), &self.device));
         self.current = current;
         self.previous = previous;
         self.mcf = Arc::new(next.step(&self.device));

@@ -63,7 +63,7 @@ impl<const D: usize> WillmoreFlow<D> {
             }
         }
         if let Some(region) = &self.region {
-            half.restrict_to(&every_other_node(self.grid, region.nodes()))?;
+            half.restrict_to(&every_other_node(self.grid, region.marks()))?;
         }
         self.half = Some(Box::new(half));
         Ok(())
