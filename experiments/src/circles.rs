@@ -14,7 +14,7 @@ pub const STEPS: usize = 64;
 /// Distance of the interface to the box's boundary, `19.2 eps`: the profile's tails are below `1e-12` there.
 const MARGIN: f64 = 0.3;
 
-fn radius_at(flow: Flow, r: f64, t: f64) -> f64 {
+pub fn radius_at(flow: Flow, r: f64, t: f64) -> f64 {
     match flow {
         Flow::MeanCurvature => mean_curvature_radius(r, t, 2),
         Flow::Willmore => willmore_radius(r, t, 2),
@@ -42,6 +42,12 @@ pub fn box_cells(flow: Flow, radius: f64, steps: usize, cells_per_unit: usize) -
     cells
 }
 
+/// That box about the centre of the circle.
+pub fn grid(flow: Flow, radius: f64, steps: usize, n: usize) -> Result<Grid<2>, Error> {
+    let cells = box_cells(flow, radius, steps, n);
+    Ok(Grid::centred(cells, cells as f64 / n as f64)?)
+}
+
 fn is_smooth(mut number: usize) -> bool {
     for prime in [2, 3, 5] {
         while number.is_multiple_of(prime) {
@@ -63,26 +69,19 @@ fn exact(flow: Flow, radius: f64, grid: Grid<2>, time: f64) -> Result<Field<2>, 
 fn case(
     (flow, operator, n): (Flow, &Operator, usize),
     radius: f64,
-    (steps, time_steps): (usize, TimeSteps),
+    steps: usize,
 ) -> Result<Case<2>, Error> {
-    let cells = box_cells(flow, radius, steps, n);
-    let grid = Grid::<2>::centred(cells, cells as f64 / n as f64)?;
+    let grid = grid(flow, radius, steps, n)?;
     let mut measures = Measure::size(EPS);
     measures.push(Measure::distance_to(move |grid, time| {
         exact(flow, radius, grid, time)
     }));
     let shape = format!("circle r = {radius:.4}");
     let initial = exact(flow, radius, grid, 0.0)?;
-    let mut case = Case {
+    Ok(Case {
         measures,
         ..study::case((flow, operator), &shape, initial, (STEP, steps))
-    };
-    if time_steps.order != Order::First {
-        case.steps = time_steps;
-        case.stops = vec![Stop::Time(steps as f64 * STEP)];
-        case.scales.newton = NewtonParams::second_order();
-    }
-    Ok(case)
+    })
 }
 
 pub struct Circle {
@@ -110,12 +109,10 @@ pub struct Ensemble {
 }
 
 impl Ensemble {
-    /// Runs `count` circles side by side up to the time of so many steps of `2^-14`, which are made unless others of second order are given;
-    /// those of an interrupted run are in a `folder` of the output.
+    /// Runs `count` circles side by side for so many steps of `2^-14`; those of an interrupted run are in a `folder` of the output.
     pub fn run(
         (variant, operator): &(Variant, Operator),
         (count, steps): (usize, usize),
-        time_steps: Option<TimeSteps>,
         folder: &str,
         stage: &Stage<'_>,
     ) -> Result<Self, Error> {
@@ -124,13 +121,11 @@ impl Ensemble {
         let Variant { flow, n, .. } = *variant;
         let radii = radii(count);
         let circles = in_parallel(count, workers(device), |i| {
-            let rule = time_steps.unwrap_or(StepRule::Constant(STEP).into());
-            let case = case((flow, operator, n), radii[i], (steps, rule))?;
+            let case = case((flow, operator, n), radii[i], steps)?;
             let (flow, operator) = (flow.key(), operator.key());
-            let order = time_steps.map_or("", |_| "-second_order");
             let folder = folder
                 .as_path()
-                .join(format!("{flow}-n{n}-{operator}{order}-{i:02}"));
+                .join(format!("{flow}-n{n}-{operator}-{i:02}"));
             let (ends, never) = (Samples::every(usize::MAX), Interrupt::never());
             let trajectory = Trajectory::of(case, device, &folder, &ends, &mut [], &never)?;
             let trajectory = trajectory.expect("nobody interrupts it");
@@ -155,10 +150,6 @@ impl Ensemble {
 
     pub fn mean_error(&self, k: usize) -> f64 {
         self.mean(|circle| circle.error(k))
-    }
-
-    pub fn last_error(&self) -> f64 {
-        self.mean(|circle| circle.error(circle.trajectory.records.len()))
     }
 
     pub fn error_range(&self, k: usize) -> [f64; 2] {

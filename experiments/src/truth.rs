@@ -129,28 +129,10 @@ impl<const D: usize> Sample<D> {
         (name, steps, end): (&str, TimeSteps, f64),
     ) -> Result<Trajectory<D>, Error> {
         let grid = Grid::<D>::per_unit(n, self.side)?;
-        let newton = match steps.order {
-            Order::First => NewtonParams::default(),
-            Order::Controlled(STRICT) => NewtonParams {
-                tolerance: 0.01,
-                cg_tolerance: 0.05,
-                ..NewtonParams::default()
-            },
-            Order::Second | Order::Controlled(_) => NewtonParams::second_order(),
-        };
-        let scales = Scales {
-            newton,
-            ..Scales::of_grid(grid.spacing(), eps_over_h)
-        };
-        let needed = scales.needs(D, grid.spacing());
-        let operator = Operator::new(variant, &Networks::default(), &needed, &grid, &scales)?;
-        let initial = (self.initial)(grid, scales.eps)?;
-        let mut case = willmore_flow(self.key, initial, operator, scales, (steps.rule, 1));
-        case.steps = steps;
-        case.stops = vec![Stop::Time(end)];
-        case.measures = Measure::crossings(0.0);
+        let initial = (self.initial)(grid, eps_over_h * grid.spacing())?;
         let name = format!("{}-n{n}-{name}", self.key);
-        session.trajectory(&name, case, &name, &Samples::every(1))
+        let start = (self.key, initial, eps_over_h);
+        flow(session, start, variant, (&name, steps, end))
     }
 
     /// The flow at these times, `end / 2^k` for some `k` up to `halvings`, extrapolated to `eps = 0` from strictly controlled runs on two grids, the
@@ -179,6 +161,36 @@ impl<const D: usize> Sample<D> {
             })
             .collect()
     }
+}
+
+/// Willmore flow of a phase field with so many cells to `eps`, a shape of this name, up to a time in such steps.
+pub fn flow<const D: usize>(
+    session: &mut Session<'_>,
+    (shape, initial, eps_over_h): (&str, Field<D>, f64),
+    variant: (Method, Scheme),
+    (name, steps, end): (&str, TimeSteps, f64),
+) -> Result<Trajectory<D>, Error> {
+    let newton = match steps.order {
+        Order::First => NewtonParams::default(),
+        Order::Controlled(STRICT) => NewtonParams {
+            tolerance: 0.01,
+            cg_tolerance: 0.05,
+            ..NewtonParams::default()
+        },
+        Order::Second | Order::Controlled(_) => NewtonParams::second_order(),
+    };
+    let grid = *initial.grid();
+    let scales = Scales {
+        newton,
+        ..Scales::of_grid(grid.spacing(), eps_over_h)
+    };
+    let needed = scales.needs(D, grid.spacing());
+    let operator = Operator::new(variant, &Networks::default(), &needed, &grid, &scales)?;
+    let mut case = willmore_flow(shape, initial, operator, scales, (steps.rule, 1));
+    case.steps = steps;
+    case.stops = vec![Stop::Time(end)];
+    case.measures = Measure::crossings(0.0);
+    session.trajectory(name, case, name, &Samples::every(1))
 }
 
 pub enum Truth {

@@ -72,6 +72,7 @@ impl NewtonParams {
             tolerance: 0.03,
             cg_tolerance: 0.1,
             linear_accuracy: Some(0.003),
+            newton_iterations: 20,
             ..Self::default()
         }
     }

@@ -74,7 +74,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
         let Variant { flow, n, .. } = planned.0;
         let title = format!("{}, {}, n = {n}", flow.title(), planned.0.label());
         let ensemble = session.phase(title, |stage| {
-            Ensemble::run(planned, (count, steps), None, FINISHED, stage)
+            Ensemble::run(planned, (count, steps), FINISHED, stage)
         })?;
         ensembles.push(ensemble);
     }

@@ -244,8 +244,19 @@ fn truth_of_estimates(session: &mut Session<'_>, rows: &[Compared]) -> Result<()
     Ok(())
 }
 
-/// The circles of `circle_convergence` at n = 128 with the accurate operator, in equal steps of first order and in controlled ones of second
-/// order: their mean L2 error at the end of the 64 steps, and all Hessian-vector products.
+/// Steps for an extrapolation, alike on both grids, so that their errors do not add up.
+fn careful(n: usize) -> ErrorControl {
+    ErrorControl {
+        relative: 0.003,
+        length: None,
+        longest: 0.5 * n as f64 / CELLS[1] as f64,
+        first: Some(16.0 * EPS.powi(4)),
+    }
+}
+
+/// The circles of `circle_convergence` at n = 128 with the accurate operator, in equal steps of first order, in controlled ones of second order, and
+/// those extrapolated in `eps` from n = 64 and 128: their mean L2 error at the end of the 64 steps, and all Hessian-vector products, which on
+/// the coarser grid count by their share of the unknowns.
 fn circles(session: &mut Session<'_>, quick: bool) -> Result<(), Error> {
     let (count, steps) = if quick {
         (2, 4)
@@ -259,18 +270,49 @@ fn circles(session: &mut Session<'_>, quick: bool) -> Result<(), Error> {
         n: CELLS[1],
     };
     let operator = Chosen::default().operator(variant.look(), variant.n)?;
-    let planned = (variant, operator);
-    let controlled = TimeSteps::controlled(ErrorControl::default());
-    for (name, time_steps) in [("euler1", None), ("controlled", Some(controlled))] {
-        let ensemble = session.phase(format!("circles: {name}"), |stage| {
-            Ensemble::run(&planned, (count, steps), time_steps, "fields", stage)
-        })?;
-        let records = (ensemble.circles.iter()).flat_map(|circle| &circle.trajectory.records);
-        let hvp: f64 = records.filter_map(Record::hvp).sum();
-        let metrics = [
-            ("l2", ensemble.last_error().into()),
-            ("hvp_total", hvp.into()),
-        ];
+    let euler = session.phase("circles: euler1", |stage| {
+        Ensemble::run(&(variant, operator), (count, steps), "fields", stage)
+    })?;
+    let hvp = |run: &Trajectory<2>| run.records.iter().filter_map(Record::hvp).sum::<f64>();
+    let of_euler = [
+        euler.mean_error(steps),
+        euler.circles.iter().map(|c| hvp(&c.trajectory)).sum(),
+    ];
+    let (mut controlled, mut extrapolated) = ([0.0; 2], [0.0; 2]);
+    for (k, radius) in circles::radii(count).into_iter().enumerate() {
+        let mut run = |n: usize, name: &str, control| {
+            let grid = circles::grid(variant.flow, radius, steps, n)?;
+            let initial = phase_field(grid, &Ball::new([0.0; 2], radius)?, 2.0 * grid.spacing())?;
+            let (name, end) = (format!("circle{k:02}-n{n}-{name}"), steps as f64 * STEP);
+            let time = (&name[..], TimeSteps::controlled(control), end);
+            let run = truth::flow(session, ("circle", initial, 2.0), ACCURATE, time)?;
+            Ok::<_, Error>((run.field(run.steps())?, hvp(&run)))
+        };
+        let [coarse, fine] = CELLS;
+        let (u, work) = run(fine, "controlled", ErrorControl::default())?;
+        let (a, coarse_work) = run(coarse, "careful", careful(coarse))?;
+        let (b, fine_work) = run(fine, "careful", careful(fine))?;
+        let radius_of = |u: &Field<2>, eps| Ok((ZeroSet::of(u, eps)?.volume / PI).sqrt());
+        let circle = |radius| phase_field(*u.grid(), &Ball::new([0.0; 2], radius)?, EPS);
+        let [a, b]: [Result<f64, Error>; 2] = [radius_of(&a, 2.0 * EPS), radius_of(&b, EPS)];
+        let limit = circle((4.0 * b? - a?) / 3.0)?;
+        let end = steps as f64 * STEP;
+        let exact = circle(circles::radius_at(variant.flow, radius, end))?;
+        let share = (coarse as f64 / fine as f64).powi(2);
+        for (sums, field, work) in [
+            (&mut controlled, &u, work),
+            (&mut extrapolated, &limit, fine_work + share * coarse_work),
+        ] {
+            sums[0] += l2_distance(field, &exact)? / count as f64;
+            sums[1] += work;
+        }
+    }
+    let all = [of_euler, controlled, extrapolated];
+    for (name, [l2, hvp]) in ["euler1", "controlled", "extrapolated"]
+        .into_iter()
+        .zip(all)
+    {
+        let metrics = [("l2", l2.into()), ("hvp_total", hvp.into())];
         session.metrics(&format!("circles.n{}.{name}", variant.n), metrics)?;
     }
     Ok(())
