@@ -135,22 +135,24 @@ impl<const D: usize> Sample<D> {
         flow(session, start, variant, (&name, steps, end))
     }
 
-    /// The flow at these times, `end / 2^k` for some `k` up to `halvings`, extrapolated to `eps = 0` from strictly controlled runs on two grids, the
-    /// finer one with half the `eps`. A quick look takes coarser ones.
+    /// The flow at these times, `end / 2^k` for some `k` up to `halvings` or the last one, extrapolated to `eps = 0` from strictly controlled runs on
+    /// two grids, the finer one with half the `eps`. A quick look takes coarser ones.
     pub fn extrapolated<'e>(
         &self,
         session: &mut Session<'_>,
         (end, halvings): (f64, u32),
-        exact: impl Iterator<Item = &'e Truth>,
+        exact: impl Iterator<Item = &'e Truth> + Clone,
     ) -> Result<Vec<Reached>, Error> {
         // With two cells to eps the lattice holds slow flows back by as much as the extrapolation leaves. In space no network has more.
         let (cells, eps_over_h) = match (D, session.options.quick) {
             (2, false) => ([256, 512], 4.0),
             (2, true) => ([64, 128], 4.0),
-            _ => ([32, 64], 2.0),
+            (_, false) => ([64, 128], 2.0),
+            (_, true) => ([32, 64], 2.0),
         };
+        let last = exact.clone().map(Truth::time).fold(0.0, f64::max);
         let mut run = |n| {
-            let steps = ("controlled_strict", controlled(STRICT, end, halvings), end);
+            let steps = ("controlled_strict", controlled(STRICT, end, halvings), last);
             self.run(session, (n, eps_over_h), ACCURATE, steps)
         };
         let (double, single) = (run(cells[0])?, run(cells[1])?);
@@ -243,10 +245,15 @@ fn level(field: &Field<2>, _: f64) -> Result<Vec<[f64; 2]>, surfaces::Error> {
     Ok(curves.flat_map(|curve| curve.points).collect())
 }
 
-/// Distance from the axis and height of the vertices of the isosurface.
+/// Distance from the axis and height of the vertices of the isosurface, from the upper pole to the lower one as seen from the origin. The
+/// grid and the surface are symmetric, so that an eighth of the vertices is enough.
 fn profile(field: &Field<3>, eps: f64) -> Result<Vec<[f64; 2]>, surfaces::Error> {
     let vertices = phase_field_surface(field, eps)?.vertices.into_iter();
-    Ok(vertices.map(|[x, y, z]| [x.hypot(y), z]).collect())
+    let eighth = vertices.filter(|[x, y, _]| (0.0..=*x).contains(y));
+    let mut points: Vec<[f64; 2]> = eighth.map(|[x, y, z]| [x.hypot(y), z]).collect();
+    let angle = |[r, z]: &[f64; 2]| r.atan2(*z);
+    points.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
+    Ok(points)
 }
 
 /// Adds metrics `KEY.NAME.stepMARK`.

@@ -2,7 +2,7 @@
 
 use crate::prelude::*;
 use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, View};
-use crate::truth::{self, DISK, ELLIPSOID, Reached, Sample, Sizes, THICK_DISK, Truth};
+use crate::truth::{self, DISK, ELLIPSOID, Reached, Sample, Sizes, THICK_DISK};
 
 const PROGRAM: &str = "disk_and_cube";
 /// Cells per unit length of a quick run and of the paper.
@@ -93,16 +93,17 @@ pub fn program(options: &Options) -> Result<(), Error> {
         compare_with_finite_elements(session, all)?;
         let end = (TAU, steps);
         let rows = [&DISK, &ELLIPSOID].map(|sample| compare_with_exact(session, sample, n, end));
-        let rows: Vec<Compared> = rows.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
+        let rows: Vec<Vec<Compared>> = rows.into_iter().collect::<Result<_, _>>()?;
+        let rows: Vec<Compared> = rows.into_iter().flatten().collect();
         session.sheet(sheet(&rows), "exact")?;
         Ok(String::new())
     })
 }
 
 /// A surface of revolution in controlled steps, and the exact flow.
-#[derive(Clone)]
 struct Compared {
     title: &'static str,
+    run: String,
     step: usize,
     /// Of the flow and of the exact one: area, volume, energy.
     sizes: [Sizes; 2],
@@ -110,8 +111,8 @@ struct Compared {
     hvp: f64,
 }
 
-/// Lets a surface flow in controlled steps of second order, and compares it with the exact flow after 1, 2, 4, ... 64 and all steps of the
-/// paper.
+/// Lets a surface flow in controlled steps of second order, and compares it and its extrapolation in `eps` with the exact flow after
+/// 1, 2, 4, ... 64 and all steps of the paper.
 fn compare_with_exact(
     session: &mut Session<'_>,
     sample: &Sample<3>,
@@ -127,27 +128,43 @@ fn compare_with_exact(
     let time_steps = truth::controlled(ErrorControl::default(), end, HALVINGS);
     let control = ("controlled", time_steps, tau * steps as f64);
     let run = sample.run(session, (n, 2.0), truth::ACCURATE, control)?;
-    let compare = |(&step, exact): (&usize, &Truth)| {
-        let reached = Reached::of(sample, &run, exact)?;
-        let key = sample.key;
-        truth::record(session, &format!("{key}.exact"), step, &exact.sizes())?;
-        reached.record(session, &format!("{key}.n{n}.controlled"), step)?;
-        Ok(Compared {
-            title: sample.title,
+    let reached = exact.iter().map(|exact| Reached::of(sample, &run, exact));
+    let reached = reached.collect::<Result<Vec<_>, Error>>()?;
+    let limit = sample.extrapolated(session, (end, HALVINGS), exact.iter())?;
+    for (&step, exact) in marks.iter().zip(&exact) {
+        truth::record(
+            session,
+            &format!("{}.exact", sample.key),
             step,
-            distance_over_h: reached.distance * n as f64,
-            hvp: reached.hvp,
-            sizes: [reached.sizes, exact.sizes()],
-        })
-    };
-    marks.iter().zip(&exact).map(compare).collect()
+            &exact.sizes(),
+        )?;
+    }
+    let mut rows = Vec::new();
+    let runs = [
+        (format!("n{n}.controlled"), format!("n = {n}"), reached),
+        ("extrapolated".to_owned(), "extrapolated".to_owned(), limit),
+    ];
+    for (key, run, reached) in runs {
+        for ((&step, exact), reached) in marks.iter().zip(&exact).zip(reached) {
+            reached.record(session, &format!("{}.{key}", sample.key), step)?;
+            rows.push(Compared {
+                title: sample.title,
+                run: run.clone(),
+                step,
+                distance_over_h: reached.distance * n as f64,
+                hvp: reached.hvp,
+                sizes: [reached.sizes, exact.sizes()],
+            });
+        }
+    }
+    Ok(rows)
 }
 
 fn sheet(rows: &[Compared]) -> Sheet<'_, Compared> {
-    let mut sheet =
-        Sheet::of(rows)
-            .text("surface", |row| row.title)
-            .column("step", Shortest, |row| row.step);
+    let mut sheet = Sheet::of(rows)
+        .text("surface", |row| row.title)
+        .text("run", |row| &row.run)
+        .column("step", Shortest, |row| row.step);
     for (k, name) in ["area", "volume", "w"].into_iter().enumerate() {
         let digits = if k == 2 { 3 } else { 5 };
         sheet = sheet
