@@ -2,6 +2,7 @@
 
 use engine::estimated_time_error;
 use geometry::contour::{Interpolation, zero_level};
+use geometry::distance_from_phase_field;
 use model::Networks;
 use reference::revolution::{self, Surface};
 use reference::{Curve, Shape, planar};
@@ -359,12 +360,14 @@ impl Reached {
     }
 }
 
-pub fn largest_distance(points: &[[f64; 2]], polygon: &[[f64; 2]]) -> f64 {
-    let distance = |p: &[f64; 2]| {
-        let q = nearest(polygon, *p);
-        (p[0] - q[0]).hypot(p[1] - q[1])
-    };
-    points.iter().map(distance).fold(0.0, f64::max)
+/// How far the zero levels of two nearly equal phase fields are apart: the largest difference of the distances that their profiles have at
+/// nodes within a cell of the first level.
+pub fn distance_of_levels<const D: usize>(first: &Field<D>, second: &Field<D>, eps: f64) -> f64 {
+    let distance = |u: &f64| distance_from_phase_field(*u, eps);
+    let distances = |field: &Field<D>| field.values().iter().map(distance).collect::<Vec<_>>();
+    let both = distances(first).into_iter().zip(distances(second));
+    let near = both.filter(|(d, _)| d.abs() <= first.grid().spacing());
+    near.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
 fn nearest(polygon: &[[f64; 2]], p: [f64; 2]) -> [f64; 2] {

@@ -126,23 +126,21 @@ pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
     let parameters = json!({ "marks": marks, "cells": cells, "time_unit": STEP, "eps_over_h": 2 });
     let device = options.open_device()?;
     let mut session = Session::open("work_precision", options, device, parameters)?;
-    let mut rows = Vec::new();
+    let (mut rows, mut ratios) = (Vec::new(), Vec::new());
     let in_plane = steppings(STEP, options.quick);
     for sample in &CURVES {
-        compare(&mut session, sample, (&cells, &marks), &in_plane, &mut rows)?;
+        let cells = (&cells[..], &marks[..]);
+        let of_curve = compare(&mut session, sample, cells, &in_plane, &mut ratios)?;
+        rows.extend(of_curve);
     }
     let halves: Vec<usize> = cells.iter().map(|n| n / 2).collect();
     let in_space: Vec<Stepping> = (steppings(4.0 * STEP, options.quick).into_iter())
         .filter(|stepping| stepping.kind != ELEMENTS)
         .collect();
-    compare(
-        &mut session,
-        &SURFACE,
-        (&halves, &marks),
-        &in_space,
-        &mut rows,
-    )?;
-    truth_of_estimates(&mut session, &rows)?;
+    let cells = (&halves[..], &marks[..]);
+    let of_surface = compare(&mut session, &SURFACE, cells, &in_space, &mut ratios)?;
+    rows.extend(of_surface);
+    truth_of_estimates(&mut session, &ratios)?;
     circles(&mut session, options.quick)?;
     let work = Axis::log("HVPs");
     session.figure(
@@ -158,18 +156,21 @@ pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
     session.finish(TITLE)
 }
 
-/// Runs a sample in all kinds of time steps and compares it at the marks, graded steps at the ends of those in which the marks are.
+/// Runs a sample in all kinds of time steps and compares it at the marks, graded steps at the ends of those in which the marks are; adds the
+/// ratios of estimated to true time errors.
 fn compare<const D: usize>(
     session: &mut Session<'_>,
     sample: &Sample<D>,
     (cells, marks): (&[usize], &[usize]),
     steppings: &[Stepping],
-    rows: &mut Vec<Compared>,
-) -> Result<(), Error> {
+    ratios: &mut Vec<f64>,
+) -> Result<Vec<Compared>, Error> {
+    let mut rows = Vec::new();
     let times: Vec<f64> = marks.iter().map(|&k| k as f64 * STEP).collect();
     let title = format!("{}: the exact flow", sample.key);
     let exact = session.phase(title, |_| sample.exact(Flow::Willmore, &times))?;
     for &n in cells {
+        let mut controlled = Vec::new();
         for stepping in steppings {
             let steps = (&stepping.key[..], stepping.steps, times[times.len() - 1]);
             let run = sample.run(session, (n, 2.0), stepping.variant, steps)?;
@@ -192,7 +193,11 @@ fn compare<const D: usize>(
                     reached: Reached::of(sample, &run, truth)?,
                 });
             }
+            if stepping.kind == CONTROLLED {
+                controlled.push((format!("{}.n{n}.{}", sample.key, stepping.key), run));
+            }
         }
+        ratios.extend(time_errors(session, marks, &controlled)?);
     }
     for (&mark, truth) in marks.iter().zip(&exact) {
         let key = format!("{}.exact", sample.key);
@@ -204,31 +209,45 @@ fn compare<const D: usize>(
             reached.record(session, &format!("{}.extrapolated", sample.key), mark)?;
         }
     }
-    Ok(())
+    Ok(rows)
 }
 
 /// Distances of runs below which they are the same, a thousandth of a cell.
 const SAME: f64 = 1e-5;
 
-/// Compares the estimated time errors of controlled steps with the true ones, distances to strictly controlled runs with the same `eps`: the
-/// least ratio of the two, and in which part of the cases it is between 1/3 and 3. Cases without an estimate, after less than three steps, do
-/// not count, nor those that are nearer to the strict run than that is known to be near the truth.
-fn truth_of_estimates(session: &mut Session<'_>, rows: &[Compared]) -> Result<(), Error> {
+/// The true time errors of controlled steps, distances to the last and strictest of the runs with the same `eps`, and the ratios of estimated errors to
+/// them. Cases without an estimate, after less than three steps, do not count, nor those that are nearer to the strict run than that is known to be
+/// near the truth.
+fn time_errors<const D: usize>(
+    session: &mut Session<'_>,
+    marks: &[usize],
+    runs: &[(String, Trajectory<D>)],
+) -> Result<Vec<f64>, Error> {
     let mut ratios = Vec::new();
-    let named = |name| rows.iter().filter(move |row| row.stepping == name);
-    for row in named("controlled").chain(named("controlled_loose")) {
-        let key = |row: &Compared| (row.sample, row.n, row.mark);
-        let Some(strict) = named("controlled_strict").find(|strict| key(strict) == key(row)) else {
-            continue;
+    let Some(((_, strict), others)) = runs.split_last() else {
+        return Ok(ratios);
+    };
+    for ((name, run), &mark) in others
+        .iter()
+        .flat_map(|other| marks.iter().map(move |mark| (other, mark)))
+    {
+        let time = mark as f64 * STEP;
+        let field = |run: &Trajectory<D>| {
+            let so_far = truth::until(run, time);
+            run.field(so_far[so_far.len() - 1].step)
         };
-        let error = truth::largest_distance(&row.reached.points, &strict.reached.points);
-        let (sample, n, mark) = key(row);
-        let name = format!("{sample}.n{n}.{}.time_error.step{mark}", row.stepping);
-        session.metric(&name, error)?;
-        if row.reached.estimated > 0.0 && error > SAME {
-            ratios.push(row.reached.estimated / error);
+        let error = truth::distance_of_levels(&field(run)?, &field(strict)?, run.case.scales.eps);
+        session.metric(&format!("{name}.time_error.step{mark}"), error)?;
+        let estimated = engine::estimated_time_error(truth::until(run, time)).unwrap_or(0.0);
+        if estimated > 0.0 && error > SAME {
+            ratios.push(estimated / error);
         }
     }
+    Ok(ratios)
+}
+
+/// The least ratio of an estimated time error to the true one, and in which part of the cases it is between 1/3 and 3.
+fn truth_of_estimates(session: &mut Session<'_>, ratios: &[f64]) -> Result<(), Error> {
     if !ratios.is_empty() {
         let good = ratios
             .iter()
