@@ -115,7 +115,7 @@ impl Equilibrium {
             Stop::NoSurface,
             Stop::AtTheSide,
         ];
-        case.measures = vec![Measure::zero_set(eps)];
+        case.measures = vec![Measure::zero_set(eps, &case.held)];
         let samples = Samples::every(usize::MAX);
         let trajectory = session.trajectory(&self.title, case, &self.key, &samples)?;
         let field = trajectory.field(trajectory.steps())?;

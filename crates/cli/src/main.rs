@@ -15,6 +15,7 @@ mod plane;
 mod prelude;
 mod run;
 mod say;
+mod sizes;
 mod standard;
 mod volume;
 

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use crate::common::outcome;
-use geometry::shapes::{Ball, Ellipse};
+use crate::common::{outcome, program, text};
+use geometry::shapes::{Ball, Cuboid, Ellipse};
 use geometry::{Grid, SignedDistance, npy, phase_field};
 use serde_json::Value;
 
@@ -82,6 +82,45 @@ fn sizes_are_kept_and_driven() {
     outcome(folder.path(), &["resume", "stopped", "--steps", "4"]);
     let last = |run: &str| fs::read(at(run).join("final.npy")).unwrap();
     assert!(last("stopped") == last("reduced"));
+}
+
+/// Edges sharper than the interface cannot keep their area: they become round before, and the area comes back.
+#[test]
+fn edges_become_round_where_both_sizes_are_held() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    write(&at("rectangle.npy"), &Cuboid::new([0.25, 0.15]).unwrap());
+    let run = |name: &str, options: &[&str]| {
+        let both = ["--volume", "keep", "--area", "keep", "--ramp", "4"];
+        let options = [&both[..], options].concat();
+        of_field(folder.path(), ["flow", "rectangle.npy", name], &options)
+    };
+    run("kept", &["--steps", "9"]);
+    let (lengths, areas) = (column(&at("kept"), "length"), column(&at("kept"), "area"));
+    assert!((lengths[8] / 1.6 - 1.0).abs() < 5e-3, "{lengths:?}");
+    assert!((areas[8] / 0.15 - 1.0).abs() < 5e-3, "{areas:?}");
+    assert!(lengths[0] < 0.995 * lengths[8], "{lengths:?}");
+    for held in [&lengths[7..], &areas] {
+        let change = held[held.len() - 1] / held[0] - 1.0;
+        assert!(change.abs() < 1e-9, "{held:?}");
+    }
+    let halvings = column(&at("kept"), "halvings");
+    assert!(halvings.iter().sum::<f64>() <= 4.0, "{halvings:?}");
+
+    run("stopped", &["--steps", "2"]);
+    outcome(folder.path(), &["resume", "stopped", "--steps", "9"]);
+    let last = |run: &str| fs::read(at(run).join("final.npy")).unwrap();
+    assert!(last("stopped") == last("kept"));
+
+    write(&at("thin.npy"), &Cuboid::new([0.25, 0.012]).unwrap());
+    let arguments = ["flow", "thin.npy", "--volume", "keep", "--area", "keep"];
+    let refused = program(folder.path()).args(arguments).output().unwrap();
+    assert!(!refused.status.success());
+    let message = text(&refused.stderr);
+    assert!(
+        message.contains("area and volume cannot both be held"),
+        "{message}"
+    );
 }
 
 /// The speed of a disc is `1/(2 R^3) - c0^2/(2 R) - sigma/R - p`.

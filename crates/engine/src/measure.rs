@@ -7,7 +7,7 @@ use geometry::measure::{l2_distance, perimeter, zero_set_volume};
 use geometry::zero_set::reduced_volume;
 use geometry::{Field, Grid, ZeroSet, distance_from_phase_field};
 
-use crate::Error;
+use crate::{Error, Held};
 
 /// The name of a measure of how far the surface has gone since the beginning, a length in the box.
 pub const DISPLACEMENT: &str = "displacement";
@@ -39,8 +39,10 @@ impl<const D: usize> Measure<D> {
     }
 
     /// Sizes of the zero set ([`ZeroSet`]): `length` and `area` in 2D, `area` and `volume` in 3D, `reduced_volume`, and
-    /// `integrated_mean_curvature`. Where it bends too sharply for them the sizes are those of the phase field, and the last is absent.
-    pub fn zero_set(eps: f64) -> Self {
+    /// `integrated_mean_curvature`. Where it bends too sharply for them the sizes are those of the phase field, unless some are held, and the
+    /// last is absent.
+    pub fn zero_set(eps: f64, held: &Held) -> Self {
+        let hold = !held.is_empty();
         let [boundary, inside] = match D {
             2 => ["length", "area"],
             _ => ["area", "volume"],
@@ -55,7 +57,7 @@ impl<const D: usize> Measure<D> {
             names: names.map(str::to_owned).to_vec(),
             of: Arc::new(move |u, _| {
                 let zero_set = ZeroSet::of(u, eps)?;
-                let (boundary, inside) = if zero_set.sizes_hold() {
+                let (boundary, inside) = if hold || zero_set.sizes_hold() {
                     (zero_set.perimeter, zero_set.volume)
                 } else {
                     (perimeter(u, eps)?, zero_set_volume(u))

@@ -13,7 +13,7 @@ fn ellipse() -> Field<2> {
 pub fn driven(over: usize, steps: impl Into<TimeSteps>) -> Case<2> {
     let mut case = case(Flow::Willmore, Method::Hybrid, ellipse());
     case.held = Held::at_reduced_volume(&case.initial, EPS, 0.85, over).unwrap();
-    case.measures = vec![Measure::zero_set(EPS)];
+    case.measures = vec![Measure::zero_set(EPS, &case.held)];
     case.steps = steps.into();
     case
 }

@@ -151,8 +151,8 @@ impl FlowCommand for FairOptions {
         self.noise.is_some() || self.energy_ratio.is_some() || !self.ends
     }
 
-    fn willmore(&self) -> Option<&FlowOptions> {
-        Some(&self.flow)
+    fn willmore(&mut self) -> Option<&mut FlowOptions> {
+        Some(&mut self.flow)
     }
 
     fn energy_ratio(&self) -> Option<f64> {

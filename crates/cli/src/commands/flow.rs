@@ -1,20 +1,18 @@
 //! `willmore flow`, and what it has in common with the other commands that make runs.
 
-use engine::{ErrorControl, Flow, Held, Helfrich, Target, TimeSteps};
+use engine::{ErrorControl, Flow, Held, Helfrich, TimeSteps};
 use solver::NewtonParams;
 
 use super::{open_device, operator};
 use crate::cli::{CommonOptions, SchemeOptions};
 use crate::prelude::*;
 use crate::run::Plan;
-use crate::volume;
+use crate::{sizes, volume};
 
 /// Steps of a run that has no other end.
 const STEPS: usize = 20;
 /// In a step the interface moves by at most so many widths of it.
 const LONGEST_MOVE: f64 = 2.0;
-/// Steps over which sizes go to their targets.
-const RAMP: usize = 20;
 const SAVED: [&str; 5] = ["ply", "obj", "stl", "png", "svg"];
 
 /// A command that makes a run.
@@ -60,7 +58,7 @@ pub trait FlowCommand: Serialize + Clone {
     fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule;
 
     /// The options of Willmore flow; mean curvature flow has no energy and no controlled steps.
-    fn willmore(&self) -> Option<&FlowOptions> {
+    fn willmore(&mut self) -> Option<&mut FlowOptions> {
         None
     }
 
@@ -98,7 +96,7 @@ impl FlowCommand for FlowOptions {
         self.check_tolerance(StepRule::Controlled)
     }
 
-    fn willmore(&self) -> Option<&FlowOptions> {
+    fn willmore(&mut self) -> Option<&mut FlowOptions> {
         Some(self)
     }
 
@@ -135,38 +133,6 @@ impl FlowOptions {
             spontaneous_curvature: finite("--spontaneous-curvature", self.spontaneous_curvature)?,
             tension: finite("--tension", self.tension)?,
             pressure: finite("--pressure", self.pressure)?,
-        })
-    }
-
-    /// The sizes that are held, from what they are at the beginning.
-    fn held<const D: usize>(
-        &self,
-        initial: &Field<D>,
-        eps: f64,
-        outlet: &impl Outlet<D>,
-    ) -> Result<Held, Error> {
-        let ramp = self.ramp.unwrap_or(RAMP);
-        if let Some(target) = self.reduced_volume {
-            return Ok(Held::at_reduced_volume(initial, eps, target, ramp)?);
-        }
-        if self.volume.is_none() && self.area.is_none() {
-            return Ok(Held::default());
-        }
-        let now = ZeroSet::of(initial, eps)?;
-        let target = |wanted: Option<SizeTarget>, from: f64, of_input: f64| {
-            wanted.map(|wanted| match wanted {
-                SizeTarget::Keep => Target::keep(of_input),
-                other @ SizeTarget::To(_) => Target {
-                    from,
-                    to: other.of(of_input),
-                    over: ramp,
-                },
-            })
-        };
-        let of_input = outlet.volume().unwrap_or(now.volume);
-        Ok(Held {
-            perimeter: target(self.area, now.perimeter, now.perimeter),
-            volume: target(self.volume, now.volume, of_input),
         })
     }
 }
@@ -299,10 +265,29 @@ impl<C: FlowCommand> Job<C> {
         let keep = self.command.shared().keep;
         start.outlet.turn(&mut keep.up)?;
         keep.save.as_deref().map_or(Ok(()), O::check_saved)?;
+        if C::NAME == FlowOptions::NAME {
+            self.round_edges(&mut start.field)?;
+        }
         let case = self.case(&start.name, start.field, start.region, &start.outlet)?;
         let config = config::resolved(C::NAME, &self.command)?;
         let plan = self.plan(start.name, start.outlet);
         plan.start(case, &config, &self.device)
+    }
+
+    /// Where area and volume are to be held, [rounds the edges](sizes::with_round_edges) of the start.
+    fn round_edges<const D: usize>(&mut self, field: &mut Field<D>) -> Result<(), Error> {
+        let scheme = self.command.shared().scheme.clone();
+        let Some(options) = self.command.willmore() else {
+            return Ok(());
+        };
+        let (scales, operator) = operator(&scheme, Method::Hybrid, field.grid())?;
+        if let Some((round, note)) =
+            sizes::with_round_edges(options, field, (scales, operator), &self.device)?
+        {
+            self.say.note(&note);
+            *field = round;
+        }
+        Ok(())
     }
 
     fn resume<const D: usize, O: Outlet<D>>(
@@ -333,7 +318,7 @@ impl<C: FlowCommand> Job<C> {
         outlet: &impl Outlet<D>,
     ) -> Result<Case<D>, Error> {
         let method = self.command.method();
-        let options = self.command.willmore().cloned();
+        let options = self.command.willmore().map(|options| options.clone());
         let (mut scales, operator) =
             operator(self.command.shared().scheme, method, initial.grid())?;
         let box_side = self.command.shared().input.box_side;
@@ -365,12 +350,15 @@ impl<C: FlowCommand> Job<C> {
         stops.extend(self.command.energy_ratio().map(Stop::EnergyRatio));
         stops.extend(outlet.stops(&initial));
         let eps = scales.eps;
-        let mut measures = vec![Measure::zero_set(eps)];
-        measures.extend(outlet.measures(&initial, eps)?);
         let (energy, held) = match &options {
-            Some(options) => (options.energy()?, options.held(&initial, eps, outlet)?),
+            Some(options) => {
+                let volume = outlet.volume();
+                (options.energy()?, options.held(&initial, eps, volume)?)
+            }
             None => (Helfrich::default(), Held::default()),
         };
+        let mut measures = vec![Measure::zero_set(eps, &held)];
+        measures.extend(outlet.measures(&initial, eps)?);
         Ok(Case {
             shape: name.to_owned(),
             initial,

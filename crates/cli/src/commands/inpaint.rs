@@ -46,8 +46,8 @@ impl FlowCommand for InpaintOptions {
         })
     }
 
-    fn willmore(&self) -> Option<&FlowOptions> {
-        Some(&self.flow)
+    fn willmore(&mut self) -> Option<&mut FlowOptions> {
+        Some(&mut self.flow)
     }
 
     fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {

@@ -1,0 +1,115 @@
+//! Area and volume that are held: from the options to targets, and a start that has them.
+
+use engine::{Flow, Held, Helfrich, Operator, Target};
+
+use crate::prelude::*;
+
+/// Steps over which sizes go to their targets.
+const RAMP: usize = 20;
+/// Most steps in which edges become round, of `eps^4` each.
+const ROUNDING: usize = 8;
+/// Edges are round where the [spread](ZeroSet::spread) is below this.
+const ROUND: f64 = 0.04;
+/// Round edges take at most this part of the area away.
+const LOST: f64 = 0.15;
+
+impl FlowOptions {
+    /// The sizes that are held, from what they are at the beginning; `of_input` is the volume of the input, if the grid does not say it.
+    pub fn held<const D: usize>(
+        &self,
+        initial: &Field<D>,
+        eps: f64,
+        of_input: Option<f64>,
+    ) -> Result<Held, Error> {
+        let ramp = self.ramp.unwrap_or(RAMP);
+        if let Some(target) = self.reduced_volume {
+            return Ok(Held::at_reduced_volume(initial, eps, target, ramp)?);
+        }
+        if self.volume.is_none() && self.area.is_none() {
+            return Ok(Held::default());
+        }
+        let now = ZeroSet::of(initial, eps)?;
+        let target = |wanted: Option<SizeTarget>, from: f64, of_input: f64| {
+            wanted.map(|wanted| match wanted {
+                SizeTarget::Keep => Target::keep(of_input),
+                other @ SizeTarget::To(_) => Target {
+                    from,
+                    to: other.of(of_input),
+                    over: ramp,
+                },
+            })
+        };
+        Ok(Held {
+            perimeter: target(self.area, now.perimeter, now.perimeter),
+            volume: target(self.volume, now.volume, of_input.unwrap_or(now.volume)),
+        })
+    }
+
+    fn holds_both(&self) -> bool {
+        self.reduced_volume.is_some() || (self.area.is_some() && self.volume.is_some())
+    }
+}
+
+/// The start with round edges, and a note on it, if area and volume are to be held and its edges are sharper than the interface is wide.
+///
+/// Such edges become round in the first step, which takes area away. To hold it there, the flow would have to make other edges. So they become
+/// round while the volume alone is held, and the area goes back to what it was, or to its target, over the steps of the ramp: the options
+/// say so then.
+///
+/// # Errors
+/// Where that does not help, or takes too much away, since the shape is too thin.
+pub fn with_round_edges<const D: usize>(
+    options: &mut FlowOptions,
+    start: &Field<D>,
+    (scales, operator): (Scales, Operator),
+    device: &ComputeDevice,
+) -> Result<Option<(Field<D>, String)>, Error> {
+    let eps = scales.eps;
+    let sharp = ZeroSet::of(start, eps)?;
+    if !options.holds_both() || sharp.sizes_hold() {
+        return Ok(None);
+    }
+    let targets = options.held(start, eps, None)?.targets();
+    let case = Case {
+        shape: "edges".to_owned(),
+        initial: start.clone(),
+        region: None,
+        energy: Helfrich::default(),
+        held: Held {
+            perimeter: None,
+            volume: Some(Target::keep(sharp.volume)),
+        },
+        flow: Flow::Willmore,
+        operator,
+        scales,
+        steps: StepRule::Constant(eps.powi(4)).into(),
+        stops: vec![Stop::Steps(ROUNDING)],
+        measures: Vec::new(),
+    };
+    let mut run = Run::new(case, device)?;
+    while run.step()?.is_some() {
+        let round = ZeroSet::of(run.field(), eps)?;
+        if round.perimeter < (1.0 - LOST) * sharp.perimeter {
+            break;
+        }
+        if round.spread > ROUND {
+            continue;
+        }
+        let of_surface = if D == 2 { "length" } else { "area" };
+        let area = targets.perimeter.unwrap_or(sharp.perimeter);
+        let note = format!(
+            "edges sharper than the interface became round: {of_surface} {:.4} instead of {:.4}; it goes to {area:.4} over the steps of --ramp",
+            round.perimeter, sharp.perimeter
+        );
+        options.area = Some(SizeTarget::To(Amount::Value(area)));
+        if options.reduced_volume.take().is_some() {
+            let volume = targets.volume.unwrap_or(sharp.volume);
+            options.volume = Some(SizeTarget::To(Amount::Value(volume)));
+        }
+        return Ok(Some((run.field().clone(), note)));
+    }
+    Err(Error::options(
+        "area and volume cannot both be held: the grid does not resolve parts of the shape, and so their area; give more --cells, or hold \
+         one of them",
+    ))
+}
