@@ -45,12 +45,13 @@ impl FlowOptions {
         })
     }
 
-    fn holds_both(&self) -> bool {
+    /// Whether neither area nor volume is free.
+    pub fn holds_both(&self) -> bool {
         self.reduced_volume.is_some() || (self.area.is_some() && self.volume.is_some())
     }
 }
 
-/// The start with round edges, and a note on it, if area and volume are to be held and its edges are sharper than the interface is wide.
+/// For a flow that holds area and volume: the start with round edges, and a note on it, if its edges are sharper than the interface is wide.
 ///
 /// Such edges become round in the first step, which takes area away. To hold it there, the flow would have to make other edges. So they become
 /// round while the volume alone is held, and the area goes back to what it was, or to its target, over the steps of the ramp: the options
@@ -66,7 +67,7 @@ pub fn with_round_edges<const D: usize>(
 ) -> Result<Option<(Field<D>, String)>, Error> {
     let eps = scales.eps;
     let sharp = ZeroSet::of(start, eps)?;
-    if !options.holds_both() || sharp.sizes_hold() {
+    if sharp.sizes_hold() {
         return Ok(None);
     }
     let targets = options.held(start, eps, None)?.targets();

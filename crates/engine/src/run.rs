@@ -156,7 +156,7 @@ impl<const D: usize> Run<D> {
             }
             if let Err(error) = self.step() {
                 if let Some(store) = &mut store {
-                    store.commit(self)?;
+                    store.commit_failed(self)?;
                 }
                 return Err(error);
             }

@@ -32,6 +32,8 @@ pub struct Store {
     /// What the application keeps in each checkpoint.
     notes: Value,
     last: Instant,
+    /// Records in the last checkpoint.
+    records: usize,
 }
 
 impl Store {
@@ -45,15 +47,21 @@ impl Store {
         checkpoints: Checkpoints,
     ) -> Result<Self, Error> {
         let directory = RunDirectory::create(folder, files, &pack(run, &notes)?)?;
-        Ok(Self::at(directory, notes, checkpoints))
+        Ok(Self::at(directory, notes, checkpoints, run))
     }
 
-    fn at(directory: RunDirectory, notes: Value, checkpoints: Checkpoints) -> Self {
+    fn at<const D: usize>(
+        directory: RunDirectory,
+        notes: Value,
+        checkpoints: Checkpoints,
+        run: &Run<D>,
+    ) -> Self {
         Self {
             directory,
             checkpoints,
             notes,
             last: Instant::now(),
+            records: run.records.len(),
         }
     }
 
@@ -68,7 +76,7 @@ impl Store {
         let run = restore(&stored, case, device, &[])?;
         let notes = notes(&stored).clone();
         let (directory, _) = stored.resume()?;
-        Ok((Self::at(directory, notes, checkpoints), run))
+        Ok((Self::at(directory, notes, checkpoints, &run), run))
     }
 
     /// Goes on with a finished run under other stop rules, and with other notes; `case` is the stored one but for those. The files of its
@@ -89,7 +97,7 @@ impl Store {
             return Err(Error::Over { path, stop });
         }
         let directory = stored.reopen(&pack(&run, &notes)?, ends)?;
-        Ok((Self::at(directory, notes, checkpoints), run))
+        Ok((Self::at(directory, notes, checkpoints, &run), run))
     }
 
     /// The directory, to which files can be added.
@@ -101,8 +109,16 @@ impl Store {
     pub fn commit<const D: usize>(&mut self, run: &Run<D>) -> Result<(), Error> {
         self.write_tables(run)?;
         self.directory.commit(&pack(run, &self.notes)?)?;
-        self.last = Instant::now();
+        (self.last, self.records) = (Instant::now(), run.records.len());
         Ok(())
+    }
+
+    /// Writes a checkpoint of a run whose next step has failed, unless the last one is of the same step: that one has not begun on other bricks.
+    pub(crate) fn commit_failed<const D: usize>(&mut self, run: &Run<D>) -> Result<(), Error> {
+        if run.records.len() == self.records {
+            return Ok(());
+        }
+        self.commit(run)
     }
 
     /// Writes a checkpoint if one is due, or if it `must` be.

@@ -1,12 +1,17 @@
 //! What is stored of a phase field.
 
-use crate::common::{EPS, case, device, disc, finished, grid, scales};
+use crate::common::{EPS, TAU, case, device, disc, finished, grid, scales};
 use crate::resuming::{interrupted, trajectory, without_seconds};
-use engine::{Case, Error, Flow, Method, Operator, Run, Samples, Scheme, Storage};
+use engine::{
+    Case, Checkpoints, Error, Flow, Method, Operator, Run, Samples, Scheme, StepRule, Stop,
+    Storage, Store,
+};
 use geometry::measure::l2_distance;
 use geometry::shapes::Ball;
 use geometry::{Grid, phase_field};
 use model::Networks;
+use runs::Interrupt;
+use serde_json::Value;
 
 /// A small disc, whose bricks are about half of the grid.
 fn stored(storage: Storage, radius: f64) -> Case<2> {
@@ -94,4 +99,22 @@ fn bricks_are_refused_or_left_where_they_cannot_be() {
     let refused = Run::new(undivided(Storage::Bricks), &device());
     let refused = refused.err().unwrap().to_string();
     assert!(refused.contains("104"), "{refused}");
+}
+
+/// A step that fails after a checkpoint says why, although it has begun on other bricks.
+#[test]
+fn a_step_on_bricks_that_fails_is_not_taken_for_a_bad_checkpoint() {
+    let mut case = stored(Storage::Bricks, 0.284);
+    case.scales.newton.newton_iterations = 3;
+    case.steps = StepRule::Doubling(TAU / 16.0).into();
+    case.stops = vec![Stop::Steps(12)];
+    let folder = tempfile::tempdir().unwrap();
+    let mut run = Run::new(case, &device()).unwrap();
+    let every = Checkpoints::EverySteps(1);
+    let path = folder.path().join("run");
+    let mut store = Store::create(&path, &[], &run, Value::Null, every).unwrap();
+    let failed = run.advance(Some(&mut store), &mut [], &Interrupt::never());
+    let error = failed.unwrap_err();
+    assert!(matches!(error, Error::Step { .. }), "{error}");
+    assert!(!run.records().is_empty());
 }

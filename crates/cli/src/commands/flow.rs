@@ -277,13 +277,13 @@ impl<C: FlowCommand> Job<C> {
     /// Where area and volume are to be held, [rounds the edges](sizes::with_round_edges) of the start.
     fn round_edges<const D: usize>(&mut self, field: &mut Field<D>) -> Result<(), Error> {
         let scheme = self.command.shared().scheme.clone();
-        let Some(options) = self.command.willmore() else {
+        let options = self.command.willmore();
+        let Some(options) = options.filter(|options| options.holds_both()) else {
             return Ok(());
         };
-        let (scales, operator) = operator(&scheme, Method::Hybrid, field.grid())?;
-        if let Some((round, note)) =
-            sizes::with_round_edges(options, field, (scales, operator), &self.device)?
-        {
+        let operator = operator(&scheme, Method::Hybrid, field.grid())?;
+        let round = sizes::with_round_edges(options, field, operator, &self.device)?;
+        if let Some((round, note)) = round {
             self.say.note(&note);
             *field = round;
         }
