@@ -5,7 +5,7 @@ use geometry::measure::perimeter;
 
 use crate::prelude::*;
 use crate::steps::{self, Rows};
-use crate::study::{self, Study, StudyOptions, Variant};
+use crate::study::{self, Study, StudyOptions, Variant, one_over_two_to};
 use crate::truth::{self, CELLS, Reached, Sample, Truth};
 
 pub struct Setting {
@@ -494,14 +494,10 @@ fn time_label(step: usize) -> String {
         return "0".to_owned();
     }
     let power = step.trailing_zeros();
-    let superscript: String = (14 - i64::from(power))
-        .to_string()
-        .chars()
-        .filter_map(|c| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(c.to_digit(10)? as usize))
-        .collect();
+    let unit = one_over_two_to(14 - power);
     match step >> power {
-        1 => format!("2⁻{superscript}"),
-        factor => format!("{factor}·2⁻{superscript}"),
+        1 => unit,
+        factor => format!("{factor}·{unit}"),
     }
 }
 

@@ -33,8 +33,6 @@ pub struct MeshFlow {
     pub cells: usize,
     pub steps: usize,
     pub tau: StepRule,
-    /// The same in words, for the figure.
-    pub tau_in_words: &'static str,
     /// Steps to be shown, with the energies that the paper reports.
     pub shown: &'static [(usize, Option<f64>)],
     pub view: View,
@@ -48,23 +46,27 @@ impl MeshFlow {
         remarks: impl FnOnce(&mut Session<'_>, &mut [Flowed]) -> Result<String, Error>,
     ) -> Result<(), Error> {
         let run = &options.figure.run;
-        let steps = (options.steps).unwrap_or(if run.quick { 2 } else { self.steps });
-        require(steps > 0, "--steps must be at least 1")?;
         let device = run.open_device()?;
         let side = options.mesh.box_side(&self.mesh);
         let setting = Setting::new(&options.figure, [32, self.cells], side)?;
+        let (tau, more) = self.doubling(setting.n);
+        let steps = (options.steps).unwrap_or(if run.quick { 2 } else { self.steps + more });
+        require(steps > 0, "--steps must be at least 1")?;
         let mesh = options.mesh.load(&self.mesh, &setting.grid)?;
         let up = (options.up).map_or_else(|| options.mesh.up(self.view.up), Ok)?;
         let schemes = options.schemes.schemes();
         let parameters = setting.parameters(json!({
-            "mesh": mesh.about, "tau": self.tau, "steps": steps, "schemes": schemes,
+            "mesh": mesh.about, "tau": tau, "steps": steps, "schemes": schemes,
         }))?;
         let mut session = Session::open(self.program, run, device, parameters)?;
         let initial = session.phase("signed distance", |stage| {
             mesh.phase_field(setting.grid, setting.scales.eps, &stage.bar)
         })?;
         let papers = options.mesh.is_the_papers();
-        let energy = |&(step, w): &(usize, Option<f64>)| (step, w.filter(|_| papers));
+        let energy = |&(step, w): &(usize, Option<f64>)| {
+            let step = if step > 1 { step + more } else { step };
+            (step, w.filter(|_| papers))
+        };
         let surface = Surface {
             key: self.program,
             title: mesh.title.clone(),
@@ -77,9 +79,22 @@ impl MeshFlow {
             title: format!("Willmore flow: {}", surface.title),
             surfaces: vec![(surface, initial)],
             variants: variants.collect(),
-            time: (self.tau, steps),
-            tau_in_words: self.tau_in_words,
+            time: (tau, steps),
         };
         flows.run(session, &setting, remarks)
+    }
+
+    /// The step rule on `n` cells per unit length: on grids finer than the paper's the first of doubling steps is shorter by the fourth power of their
+    /// ratio, and so many more steps lead to the same time.
+    fn doubling(&self, n: usize) -> (StepRule, usize) {
+        match self.tau {
+            StepRule::Doubling(first) if n > self.cells => {
+                let halvings = 4.0 * (n as f64 / self.cells as f64).log2();
+                let halvings = halvings.round() as i32;
+                let tau = StepRule::Doubling(first / 2.0_f64.powi(halvings));
+                (tau, halvings as usize)
+            }
+            tau => (tau, 0),
+        }
     }
 }

@@ -187,6 +187,14 @@ pub fn case(
 }
 
 /// Mean over minimizations; nothing without any.
+/// A negative power of two, as `2⁻⁹`.
+pub fn one_over_two_to(exponent: u32) -> String {
+    let digits = exponent.to_string();
+    let digits = digits.chars().filter_map(|c| c.to_digit(10));
+    let superscript = digits.filter_map(|digit| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize));
+    format!("2⁻{}", superscript.collect::<String>())
+}
+
 pub fn mean<'a>(
     minimizations: impl Iterator<Item = &'a StepRecord>,
     of: impl Fn(&StepRecord) -> f64,

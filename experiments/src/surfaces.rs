@@ -11,6 +11,7 @@ use surfaces::{ClosedMesh, Fairing, TriangleMesh};
 use crate::networks::Chosen;
 use crate::prelude::*;
 use crate::steps::steps_csv;
+use crate::study::one_over_two_to;
 
 const EPS_OVER_H: f64 = 2.0;
 const WIDTH: usize = 17;
@@ -334,10 +335,20 @@ pub struct SurfaceFlows {
     pub title: String,
     pub surfaces: Vec<(Surface, Field<3>)>,
     pub variants: Vec<(Method, Scheme)>,
-    /// Sizes of the time steps, their number,
+    /// Sizes of the time steps, and their number.
     pub time: (StepRule, usize),
-    /// and their sizes in words, for the figure.
-    pub tau_in_words: &'static str,
+}
+
+/// Sizes of time steps that are powers of two, for figures.
+fn in_words(steps: StepRule) -> String {
+    let power = |tau: f64| one_over_two_to(tau.recip().log2().round() as u32);
+    match steps {
+        StepRule::Constant(tau) => format!("τ = {}", power(tau)),
+        StepRule::Doubling(first) => {
+            format!("first step τ = {}, doubled after every step", power(first))
+        }
+        other => format!("τ = {other}"),
+    }
 }
 
 impl SurfaceFlows {
@@ -376,7 +387,7 @@ impl SurfaceFlows {
             .with_panels(pictures.into_iter().flatten())
             .with_note(format!(
                 "n = {}, ε = 2/n, inner step 1/n², {}. w: Willmore energy with the implicit finite-element step; a sphere has 8π = 25.13.{remarks}",
-                setting.n, self.tau_in_words
+                setting.n, in_words(self.time.0)
             ));
         session.figure(figure, "surfaces")?;
         let runs = all.iter().map(|one| (one.surface.key, &one.trajectory));

@@ -11,7 +11,6 @@ const ARMADILLO_FLOW: MeshFlow = MeshFlow {
     cells: 128,
     steps: 16,
     tau: StepRule::Doubling(1.0 / 4_194_304.0),
-    tau_in_words: "first step τ = 2⁻²², doubled after every step",
     shown: &[(0, None), (1, None), (8, None), (11, None), (16, None)],
     view: View {
         up: UpAxis::Y,

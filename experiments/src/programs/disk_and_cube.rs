@@ -87,7 +87,6 @@ pub fn program(options: &Options) -> Result<(), Error> {
         ],
         variants,
         time: (StepRule::Constant(TAU), steps),
-        tau_in_words: "τ = 2⁻¹⁸",
     };
     flows.run(session, &setting, |session, all| {
         compare_with_finite_elements(session, all)?;

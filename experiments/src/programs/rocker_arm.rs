@@ -20,7 +20,6 @@ const ROCKER_ARM_FLOW: MeshFlow = MeshFlow {
     cells: 64,
     steps: 20,
     tau: StepRule::Constant(1.0 / 4096.0),
-    tau_in_words: "τ = 2⁻¹²",
     shown: &[(0, Some(276.12)), (1, Some(42.08)), (20, Some(41.46))],
     view: View {
         up: UpAxis::Z,
