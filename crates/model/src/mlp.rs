@@ -204,7 +204,7 @@ fn gaussian_series(s: [f64; 4]) -> [f64; 4] {
 
 /// The perceptron as a Burn graph of its flat parameters `[parameter_count]`, for inputs `[rows, 1]`.
 pub fn forward(widths: &[usize], parameters: &Tensor<1>, input: Tensor<2>) -> Tensor<2> {
-    forward_with(widths, parameters, input, |_, preactivation| preactivation)
+    forward_with(widths, parameters, input, |preactivation| preactivation)
 }
 
 /// As [`forward`], with a hook on every layer's pre-activation `[rows, outputs]`.
@@ -212,7 +212,7 @@ pub(crate) fn forward_with(
     widths: &[usize],
     parameters: &Tensor<1>,
     input: Tensor<2>,
-    mut hook: impl FnMut(usize, Tensor<2>) -> Tensor<2>,
+    mut hook: impl FnMut(Tensor<2>) -> Tensor<2>,
 ) -> Tensor<2> {
     let layout = layout(widths);
     let last = layout.len() - 1;
@@ -226,7 +226,7 @@ pub(crate) fn forward_with(
             .clone()
             .slice([layer.biases..layer.biases + layer.outputs])
             .reshape([1, layer.outputs]);
-        x = hook(l, x.matmul(weights) + biases);
+        x = hook(x.matmul(weights) + biases);
         if l < last {
             x = (x.clone() * x).neg().exp();
         }

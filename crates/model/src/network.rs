@@ -101,6 +101,18 @@ impl Network {
         self.ratios
     }
 
+    /// The ratios of a network that must be of this dimension.
+    pub(crate) fn ratios_in(&self, dimension: usize) -> Result<Ratios, Error> {
+        if self.ratios.dimension == dimension {
+            return Ok(self.ratios);
+        }
+        Err(Error::Shape {
+            what: "dimension of the network",
+            expected: dimension.to_string(),
+            found: self.ratios.dimension.to_string(),
+        })
+    }
+
     /// Kernel `K`, row-major.
     pub fn kernel(&self) -> &[f64] {
         &self.kernel

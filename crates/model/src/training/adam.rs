@@ -230,11 +230,7 @@ impl AdamParams {
                 training_loss: sum / batches,
                 held_out_loss: device.scalar(held)?,
             };
-            if !observer(&progress, &state)? {
-                return Err(Error::Interrupted {
-                    iteration: state.epoch,
-                });
-            }
+            progress.tell(observer, &state)?;
         }
         let (kernel, activation) = state.parameters.split_at(kernel.len());
         let activation = Mlp::new(layers, activation.to_vec())?;
