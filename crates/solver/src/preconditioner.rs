@@ -129,9 +129,6 @@ impl<const D: usize> Preconditioner<D> {
     }
 
     fn projected(&self, z: Tensor<D>) -> Tensor<D> {
-        match &self.region {
-            Some(region) => region.project(z),
-            None => z,
-        }
+        Region::project(self.region.as_ref(), z)
     }
 }
