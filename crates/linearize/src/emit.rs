@@ -227,33 +227,28 @@ impl Emitter {
     }
 
     pub(crate) fn reshape(&mut self, t: &TensorIr, shape: Shape) -> TensorIr {
-        if t.shape == shape {
-            return t.clone();
+        match self.definition(t) {
+            Some(OperationIr::BaseFloat(Base::Reshape(inner))) if t.shape != shape => {
+                let input = inner.input.clone();
+                self.reshape(&input, shape)
+            }
+            _ => self.shaped(t, shape, Base::Reshape),
         }
-        if let Some(value) = self.constant(t) {
-            return self.full(shape, t.dtype, value);
-        }
-        if let Some(OperationIr::BaseFloat(Base::Reshape(inner))) = self.definition(t) {
-            let input = inner.input.clone();
-            return self.reshape(&input, shape);
-        }
-        self.emit_one(OperationIr::BaseFloat(Base::Reshape(ShapeOpIr {
-            input: read_only(t),
-            out: output(shape, t.dtype),
-        })))
     }
 
     pub(crate) fn expand(&mut self, t: &TensorIr, shape: Shape) -> TensorIr {
+        self.shaped(t, shape, Base::Expand)
+    }
+
+    fn shaped(&mut self, t: &TensorIr, shape: Shape, variant: fn(ShapeOpIr) -> Base) -> TensorIr {
         if t.shape == shape {
             return t.clone();
         }
         if let Some(value) = self.constant(t) {
             return self.full(shape, t.dtype, value);
         }
-        self.emit_one(OperationIr::BaseFloat(Base::Expand(ShapeOpIr {
-            input: read_only(t),
-            out: output(shape, t.dtype),
-        })))
+        let (input, out) = (read_only(t), output(shape, t.dtype));
+        self.emit_one(OperationIr::BaseFloat(variant(ShapeOpIr { input, out })))
     }
 
     fn definition(&self, t: &TensorIr) -> Option<&OperationIr> {

@@ -5,17 +5,6 @@ use operators::{ComputeDevice, add_scaled, inner_product};
 
 use crate::Error;
 
-/// How a conjugate-gradient solve ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum CgExit {
-    /// The residual fell below the tolerance.
-    Converged,
-    /// The iteration limit was reached; the direction is still a descent direction.
-    Limit,
-    /// A direction of negative curvature was met; the direction so far (or the first one) is used.
-    NegativeCurvature,
-}
-
 /// The function `1/2 p . H p + g . p` of a motion `p`.
 pub(crate) struct Quadratic<'a, const D: usize> {
     pub gradient: &'a Tensor<D>,
@@ -32,7 +21,8 @@ pub(crate) struct CgSolution<const D: usize> {
     /// `g . p`, negative for a descent direction.
     pub slope: f64,
     pub iterations: usize,
-    pub exit: CgExit,
+    /// Whether a direction of negative curvature was met; the direction so far (or the first one) is used.
+    pub negative_curvature: bool,
     /// `-g - H p`, in the precision of the products.
     pub residual: Tensor<D>,
 }
@@ -61,7 +51,7 @@ pub(crate) fn dot<const D: usize>(
 }
 
 /// Solves `H p = -g` until the residual's norm `sqrt(r . M r)` is reduced, a direction of
-/// negative curvature appears (Steihaug), or the limit is reached. Vectors have the precision of the Hessian-vector products.
+/// negative curvature appears (Steihaug), or the limit is reached: the direction is one of descent in any case. Vectors have the precision of the Hessian-vector products.
 pub(crate) fn conjugate_gradients<const D: usize>(
     quadratic: Quadratic<'_, D>,
     precondition: &dyn Fn(&Tensor<D>) -> Tensor<D>,
@@ -81,7 +71,7 @@ pub(crate) fn conjugate_gradients<const D: usize>(
     let mut direction = z;
     let mut solution: Option<Tensor<D>> = None;
     let mut iterations = 0;
-    let mut exit = CgExit::Limit;
+    let mut negative_curvature = false;
     while iterations < limits.iterations {
         let image = product(&direction)?;
         iterations += 1;
@@ -89,7 +79,7 @@ pub(crate) fn conjugate_gradients<const D: usize>(
         // `rz / curvature` is the step: beyond this length it is rounding noise that made the curvature positive. NaN
         // leaves through the same door; the caller checks the slope.
         if curvature.is_nan() || curvature * LONGEST_STEP <= rz * unit {
-            exit = CgExit::NegativeCurvature;
+            negative_curvature = true;
             break;
         }
         let alpha = rz / curvature;
@@ -101,7 +91,6 @@ pub(crate) fn conjugate_gradients<const D: usize>(
         let z = precondition(&residual);
         let next = dot(&residual, &z, device)?;
         if next.abs() <= target {
-            exit = CgExit::Converged;
             break;
         }
         let beta = next / rz;
@@ -117,7 +106,7 @@ pub(crate) fn conjugate_gradients<const D: usize>(
         direction,
         slope,
         iterations,
-        exit,
+        negative_curvature,
         residual,
     })
 }

@@ -18,7 +18,7 @@ use operators::{ComputeDevice, HostUpdate, HostVectors, inner_product, retract, 
 use serde::{Deserialize, Serialize};
 
 use crate::active::Active;
-use crate::cg::{CgExit, CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
+use crate::cg::{CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
 use crate::stored::Stored;
 use crate::{Error, Region};
 
@@ -421,7 +421,7 @@ impl<'a, const D: usize> Held<'a, D> {
         let projected = |r: &Tensor<D>| projection.apply(precondition(r));
         let solution = conjugate_gradients(quadratic, &projected, limits, self.device)?;
         if keep {
-            self.solved = solution.exit != CgExit::NegativeCurvature;
+            self.solved = !solution.negative_curvature;
         }
         if keep && self.solved {
             let change = projection.multipliers(&solution.residual, self.device)?;

@@ -9,7 +9,7 @@ use burn::tensor::Tensor;
 use operators::{ComputeDevice, retract};
 use serde::{Deserialize, Serialize};
 
-use crate::cg::{CgExit, CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
+use crate::cg::{CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
 use crate::constraints::{Held, Place, Tangent};
 use crate::preconditioner::Preconditioner;
 use crate::times::{PhaseTimes, Stopwatch};
@@ -394,9 +394,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             _ => conjugate_gradients(quadratic, &precondition, limits, device)?,
         };
         self.info.hvp += solution.iterations;
-        if solution.exit == CgExit::NegativeCurvature {
-            self.info.negative_curvature += 1;
-        }
+        self.info.negative_curvature += usize::from(solution.negative_curvature);
         if !solution.slope.is_finite() {
             return Err(Error::NonFinite {
                 step: 0,
