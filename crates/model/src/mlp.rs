@@ -79,20 +79,9 @@ impl Mlp {
                 found: format!("{layers:?}"),
             });
         }
-        let expected = parameter_count(&layers);
-        if parameters.len() != expected {
-            return Err(Error::Shape {
-                what: "activation parameters",
-                expected: expected.to_string(),
-                found: parameters.len().to_string(),
-            });
-        }
-        if let Some(index) = parameters.iter().position(|p| !p.is_finite()) {
-            return Err(Error::NonFinite {
-                what: "activation parameters",
-                index,
-            });
-        }
+        let what = "activation parameters";
+        Error::check_count(what, parameter_count(&layers), parameters.len())?;
+        Error::check_finite(what, &parameters)?;
         Ok(Self { layers, parameters })
     }
 

@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::active::Active;
 use crate::cg::{CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
+use crate::error::check_positive;
 use crate::stored::Stored;
 use crate::{Error, Region};
 
@@ -83,12 +84,8 @@ impl Constraints {
     /// [`Error::PerimeterTooSmall`] for a perimeter below the least that encloses the volume.
     pub fn check<const D: usize>(&self, grid: &Grid<D>) -> Result<(), Error> {
         for (name, target) in NAMES.into_iter().zip(self.targets()) {
-            if let Some(value) = target.filter(|value| !(value.is_finite() && *value > 0.0)) {
-                return Err(Error::Parameter {
-                    name,
-                    value,
-                    expected: "positive and finite",
-                });
+            if let Some(value) = target {
+                check_positive(name, value)?;
             }
         }
         let Some(volume) = self.volume else {

@@ -8,7 +8,7 @@ use model::{BrickOperator, MeanCurvatureOperator};
 use operators::ComputeDevice;
 use serde::{Deserialize, Serialize};
 
-use crate::error::StepFailure;
+use crate::error::{StepFailure, check_positive};
 use crate::{Error, HelfrichTerms, PhaseInverse};
 
 /// Precision of the linear solves.
@@ -230,13 +230,7 @@ impl<const D: usize> MinimizingMovement<D> {
     /// # Errors
     /// [`Error::Parameter`] unless `c` is positive and finite.
     pub fn set(&mut self, anchor: &Tensor<D>, stiffness: f64) -> Result<(), Error> {
-        if !(stiffness.is_finite() && stiffness > 0.0) {
-            return Err(Error::Parameter {
-                name: "tau / tautilde^2",
-                value: stiffness,
-                expected: "positive and finite",
-            });
-        }
+        check_positive("tau / tautilde^2", stiffness)?;
         self.anchor = anchor.clone().into();
         if self.stiffness.to_bits() != stiffness.to_bits() {
             self.stiffness = stiffness;

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::active::Active;
 use crate::constraints::{Constraints, Held};
+use crate::error::check_positive;
 use crate::newton::{NewtonInfo, NewtonParams, minimize_timed};
 use crate::preconditioner::{PhaseInverse, Preconditioner};
 use crate::stored::Stored;
@@ -56,13 +57,7 @@ impl FlowParams {
             ("calibration.energy", self.calibration.energy),
             ("calibration.metric", self.calibration.metric),
         ] {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(Error::Parameter {
-                    name,
-                    value,
-                    expected: "positive and finite",
-                });
-            }
+            check_positive(name, value)?;
         }
         Ok(())
     }
@@ -570,21 +565,7 @@ impl<const D: usize> WillmoreFlow<D> {
             params,
             device,
         )
-        .map_err(|error| match error {
-            Error::NonFinite { field, .. } => Error::NonFinite { step, field },
-            Error::NotHeld {
-                measure,
-                value,
-                target,
-                ..
-            } => Error::NotHeld {
-                step,
-                measure,
-                value,
-                target,
-            },
-            other => other,
-        })?;
+        .map_err(|error| error.at(step))?;
         if newton.exit == Exit::IterationLimit {
             return Err(Error::NotConverged {
                 step,

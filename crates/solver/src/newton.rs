@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::cg::{CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
 use crate::constraints::{Held, Place, Tangent};
+use crate::error::check;
 use crate::preconditioner::Preconditioner;
 use crate::times::{PhaseTimes, Stopwatch};
 use crate::{Error, Objective, Precision, Region};
@@ -87,25 +88,13 @@ impl NewtonParams {
             ("cg_tolerance", self.cg_tolerance),
             ("linear_accuracy", self.linear_accuracy.unwrap_or(0.5)),
         ] {
-            if !(value > 0.0 && value < 1.0) {
-                return Err(Error::Parameter {
-                    name,
-                    value,
-                    expected: "between 0 and 1",
-                });
-            }
+            check(name, value, value > 0.0 && value < 1.0, "between 0 and 1")?;
         }
         for (name, value) in [
             ("cg_iterations", self.cg_iterations),
             ("newton_iterations", self.newton_iterations),
         ] {
-            if value == 0 {
-                return Err(Error::Parameter {
-                    name,
-                    value: 0.0,
-                    expected: "at least 1",
-                });
-            }
+            check(name, value as f64, value > 0, "at least 1")?;
         }
         Ok(())
     }

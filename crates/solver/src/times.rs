@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// and measurements.
 ///
 /// On a GPU, which works while the host goes on, only sums mean something.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, derive_more::Add, Serialize, Deserialize)]
 pub struct PhaseTimes {
     /// Hessian-vector products.
     pub products: f64,
@@ -21,19 +21,6 @@ pub struct PhaseTimes {
     pub energies: f64,
     /// Minimizations on coarser grids that find the start.
     pub start: f64,
-}
-
-impl PhaseTimes {
-    /// With those of a minimization before it.
-    pub(crate) fn after(self, first: &Self) -> Self {
-        Self {
-            products: first.products + self.products,
-            preconditioner: first.preconditioner + self.preconditioner,
-            assembly: first.assembly + self.assembly,
-            energies: first.energies + self.energies,
-            start: first.start + self.start,
-        }
-    }
 }
 
 /// Adds up wall times.

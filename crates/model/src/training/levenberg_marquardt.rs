@@ -497,16 +497,11 @@ impl Recipe for LmParams {
         drop(training);
 
         let mut state = match state {
-            Some(state) if state.parameters.len() == n + activation_len => state,
-            Some(state) => {
-                return Err(Error::Shape {
-                    what: "training checkpoint",
-                    expected: (n + activation_len).to_string(),
-                    found: state.parameters.len().to_string(),
-                });
-            }
+            Some(state) => state,
             None => self.start(data, &heat, seed, device)?,
         };
+        let (count, found) = (n + activation_len, state.parameters.len());
+        Error::check_count("training checkpoint", count, found)?;
         while state.iteration < self.iterations
             && state.iteration <= state.improved_at + self.patience
         {
