@@ -95,7 +95,8 @@ pub fn candidates<const D: usize>(
     let operator = Arc::new(MeanCurvatureOperator::<D>::new(network, device)?);
     let energy = |precision| -> Result<_, Error> {
         let (operator, shape) = (operator.clone(), grid.shape());
-        let mut energy = MinimizingMovement::with_terms(operator, shape, precision, None, device)?;
+        let mut energy =
+            MinimizingMovement::with_terms(operator, shape, precision, (false, None), device)?;
         energy.set(&tensor(&previous), STIFFNESS)?;
         energy.evaluate(&tensor(u.values()))?;
         Ok(energy)

@@ -658,7 +658,6 @@ fn finite_elements<const D: usize>(cells: usize) {
     let steps = [
         FiniteElementStep::implicit(&grid, eps, size).unwrap(),
         FiniteElementStep::semi_implicit(&grid, eps, size).unwrap(),
-        FiniteElementStep::semi_implicit_exact(&grid, eps, size).unwrap(),
     ];
     for (step, backend) in steps
         .iter()

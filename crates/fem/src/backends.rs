@@ -3,7 +3,7 @@
 use burn::backend::Backend;
 use burn_backend::{DType, TensorData, TensorMetadata, tensor::FloatTensor};
 
-use crate::ops::{FemOps, host};
+use crate::ops::{FemOps, Operation, host};
 
 /// The values of a tensor as doubles.
 fn values<B: Backend>(x: FloatTensor<B>) -> Vec<f64> {
@@ -30,36 +30,26 @@ fn through_host<B: Backend, const N: usize>(
     B::float_from_data(data, &device)
 }
 
+fn on_host<B: Backend>(operation: Operation<B>, scheme: u64) -> FloatTensor<B> {
+    let host = host(scheme);
+    match operation {
+        Operation::Mass(x) => through_host::<B, 1>([x], |[x]| host.mass(&x)),
+        Operation::HeatSolve(x) => through_host::<B, 1>([x], |[x]| host.heat_solve(&x)),
+        Operation::Product(a, b, c) => {
+            through_host::<B, 3>([a, b, c], |[a, b, c]| host.product(&a, &b, &c))
+        }
+        Operation::ImplicitStep(u) => through_host::<B, 1>([u], |[u]| host.implicit_step(&u)),
+        Operation::LinearizedSolve(v, g) => {
+            through_host::<B, 2>([v, g], |[v, g]| host.linearized_solve(&v, &g))
+        }
+    }
+}
+
 macro_rules! on_host {
     ($backend:ty) => {
         impl FemOps for $backend {
-            fn fem_mass(x: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self> {
-                through_host::<Self, 1>([x], |[x]| host(scheme).mass(&x))
-            }
-
-            fn fem_heat_solve(x: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self> {
-                through_host::<Self, 1>([x], |[x]| host(scheme).heat_solve(&x))
-            }
-
-            fn fem_product(
-                a: FloatTensor<Self>,
-                b: FloatTensor<Self>,
-                c: FloatTensor<Self>,
-                scheme: u64,
-            ) -> FloatTensor<Self> {
-                through_host::<Self, 3>([a, b, c], |[a, b, c]| host(scheme).product(&a, &b, &c))
-            }
-
-            fn fem_implicit_step(u: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self> {
-                through_host::<Self, 1>([u], |[u]| host(scheme).implicit_step(&u))
-            }
-
-            fn fem_linearized_solve(
-                v: FloatTensor<Self>,
-                g: FloatTensor<Self>,
-                scheme: u64,
-            ) -> FloatTensor<Self> {
-                through_host::<Self, 2>([v, g], |[v, g]| host(scheme).linearized_solve(&v, &g))
+            fn fem(operation: Operation<Self>, scheme: u64) -> FloatTensor<Self> {
+                on_host(operation, scheme)
             }
         }
     };

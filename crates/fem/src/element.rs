@@ -130,18 +130,17 @@ impl Work {
         }
     }
 
-    /// Entries of the local mass matrix weighted with the product of the first two interpolated lines: left-left (`low`),
+    /// Entries of the local mass matrix weighted with the square of the first interpolated line: left-left (`low`),
     /// left-right (`mixed`), right-right (`high`).
     fn mass_along_row(&mut self, cells: usize) {
-        let [a, b, _] = &self.lines;
-        let (a, b) = (&a[..=cells], &b[..=cells]);
+        let a = &self.lines[0][..=cells];
         let (low, high) = (&mut self.low[..cells], &mut self.high[..cells]);
         let mixed = &mut self.mixed[..cells];
         for i in 0..cells {
             let (mut ll, mut lr, mut rr) = (0.0, 0.0, 0.0);
             for (s, w) in GAUSS_NODES.into_iter().zip(GAUSS_WEIGHTS) {
-                let at = |x: &[f64]| x[i] + s * (x[i + 1] - x[i]);
-                let value = w * at(a) * at(b);
+                let at = a[i] + s * (a[i + 1] - a[i]);
+                let value = w * at * at;
                 ll += (1.0 - s) * (1.0 - s) * value;
                 lr += s * (1.0 - s) * value;
                 rr += s * s * value;
@@ -330,8 +329,6 @@ impl<const D: usize> Stencil<D> {
                         .collect();
                     for (gauss, at) in &rows.points {
                         interpolate(&nodes, at, &mut work.lines[0]);
-                        let [a, b, _] = &mut work.lines;
-                        b.copy_from_slice(a);
                         work.mass_along_row(cells);
                         for &(one, two, along) in &pairs {
                             let (side, line) = lines[one];

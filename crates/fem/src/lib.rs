@@ -33,7 +33,7 @@
 //!
 //! Multilinear (Q1) elements on the periodic grid, one code for two and three dimensions ([`element`]); consistent mass and
 //! stiffness; the double well `Psi(v) = 9/16 (1 - v^2)^2` is integrated exactly (three Gauss points per axis), but for the explicit
-//! term of the semi-implicit step, which is interpolated at the nodes unless asked otherwise. Linear systems
+//! term of the semi-implicit step, which is interpolated at the nodes. Linear systems
 //! are solved by conjugate gradients, preconditioned with the exact inverse in the pure phases by Fourier transforms: the
 //! spectrum of the preconditioned matrix lies in `[(1 - 9/8 s)/(1 + 9/4 s), 1]` with `s = tautilde/eps^2`, independent of the
 //! grid. [`LinearSolver::Direct`] is the sparse Cholesky factorization the paper's comparison used.
@@ -60,7 +60,7 @@ mod scheme;
 mod step;
 
 pub use error::Error;
-pub use ops::FemOps;
+pub use ops::{FemOps, Operation};
 pub use rules::extensions;
 pub use scheme::{Scheme, Statistics};
 pub use step::FiniteElementStep;

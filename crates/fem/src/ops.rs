@@ -6,13 +6,14 @@ use std::collections::HashMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
 
-use burn::backend::{Backend, backend_extension, tensor::FloatTensor};
+use burn::backend::{Backend, ExtensionType, backend_extension, tensor::FloatTensor};
 use burn_autodiff::{Autodiff, checkpoint::strategy::CheckpointStrategy};
 use burn_backend::TensorMetadata;
 use burn_capture::CaptureBackend;
 use burn_ir::ScalarIr;
 use operators::recording::{Pullback, captured, on_tape};
 
+use self::Operation::{HeatSolve, ImplicitStep, LinearizedSolve, Mass, Product};
 use crate::Scheme;
 
 pub(crate) const MASS: &str = "fem::mass";
@@ -109,7 +110,22 @@ pub(crate) fn host(number: u64) -> Arc<dyn Host> {
         .expect("a step keeps its scheme alive as long as graphs of it run")
 }
 
-/// Operations of finite-element schemes, closed under differentiation in both modes.
+/// An operation of a finite-element scheme on its arguments.
+#[derive(ExtensionType)]
+pub enum Operation<B: Backend> {
+    /// `M x`.
+    Mass(FloatTensor<B>),
+    /// `(M + tautilde S)^-1 x`.
+    HeatSolve(FloatTensor<B>),
+    /// `int a b c phi_i`.
+    Product(FloatTensor<B>, FloatTensor<B>, FloatTensor<B>),
+    /// The implicit step of mean curvature flow, `v[u]`.
+    ImplicitStep(FloatTensor<B>),
+    /// `A(v)^-1 g`, of `v` and `g`.
+    LinearizedSolve(FloatTensor<B>, FloatTensor<B>),
+}
+
+/// Finite-element schemes on a backend; their operations are closed under differentiation in both modes.
 #[backend_extension(
     Flex: cfg(feature = "flex"),
     NdArray: cfg(feature = "ndarray"),
@@ -118,130 +134,73 @@ pub(crate) fn host(number: u64) -> Arc<dyn Host> {
     Autodiff
 )]
 pub trait FemOps: Backend {
-    /// `M x`.
-    fn fem_mass(x: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self>;
-    /// `(M + tautilde S)^-1 x`.
-    fn fem_heat_solve(x: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self>;
-    /// `int a b c phi_i`.
-    fn fem_product(
-        a: FloatTensor<Self>,
-        b: FloatTensor<Self>,
-        c: FloatTensor<Self>,
-        scheme: u64,
-    ) -> FloatTensor<Self>;
-    /// The implicit step of mean curvature flow.
-    fn fem_implicit_step(u: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self>;
-    /// `A(v)^-1 g`.
-    fn fem_linearized_solve(
-        v: FloatTensor<Self>,
-        g: FloatTensor<Self>,
-        scheme: u64,
-    ) -> FloatTensor<Self>;
-}
-
-fn record<const N: usize>(
-    id: &'static str,
-    inputs: [FloatTensor<CaptureBackend>; N],
-    scheme: u64,
-) -> FloatTensor<CaptureBackend> {
-    let shape = inputs[0].shape();
-    captured(id, inputs, shape, vec![ScalarIr::UInt(scheme)])
+    /// An operation of the scheme of this number; the result has the shape of the arguments.
+    fn fem(#[extension_type] operation: Operation<Self>, scheme: u64) -> FloatTensor<Self>;
 }
 
 impl FemOps for CaptureBackend {
-    fn fem_mass(x: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self> {
-        record(MASS, [x], scheme)
-    }
-
-    fn fem_heat_solve(x: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self> {
-        record(HEAT, [x], scheme)
-    }
-
-    fn fem_product(
-        a: FloatTensor<Self>,
-        b: FloatTensor<Self>,
-        c: FloatTensor<Self>,
-        scheme: u64,
-    ) -> FloatTensor<Self> {
-        record(PRODUCT, [a, b, c], scheme)
-    }
-
-    fn fem_implicit_step(u: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self> {
-        record(IMPLICIT, [u], scheme)
-    }
-
-    fn fem_linearized_solve(
-        v: FloatTensor<Self>,
-        g: FloatTensor<Self>,
-        scheme: u64,
-    ) -> FloatTensor<Self> {
-        record(LINEARIZED, [v, g], scheme)
+    fn fem(operation: Operation<Self>, scheme: u64) -> FloatTensor<Self> {
+        let (id, inputs) = match operation {
+            Mass(x) => (MASS, vec![x]),
+            HeatSolve(x) => (HEAT, vec![x]),
+            Product(a, b, c) => (PRODUCT, vec![a, b, c]),
+            ImplicitStep(u) => (IMPLICIT, vec![u]),
+            LinearizedSolve(v, g) => (LINEARIZED, vec![v, g]),
+        };
+        let shape = inputs[0].shape();
+        captured(id, inputs, shape, vec![ScalarIr::UInt(scheme)])
     }
 }
 
 impl<B: Backend + FemOps, C: CheckpointStrategy> FemOps for Autodiff<B, C> {
-    fn fem_mass(x: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self> {
-        let node = x.node();
-        let y = B::fem_mass(x.into_primitive(), scheme);
-        // Self-adjoint.
-        let to_x = Pullback::new(move |g| B::fem_mass(g, scheme));
-        on_tape::<B, C, 1>([node], y, [to_x])
-    }
-
-    fn fem_heat_solve(x: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self> {
-        let node = x.node();
-        let y = B::fem_heat_solve(x.into_primitive(), scheme);
-        // Self-adjoint.
-        let to_x = Pullback::new(move |g| B::fem_heat_solve(g, scheme));
-        on_tape::<B, C, 1>([node], y, [to_x])
-    }
-
-    /// Symmetric in all four places: the gradient with respect to one factor has the cotangent in its place.
     #[allow(clippy::redundant_closure_for_method_calls)] // the tensor's type cannot be named
-    fn fem_product(
-        a: FloatTensor<Self>,
-        b: FloatTensor<Self>,
-        c: FloatTensor<Self>,
-        scheme: u64,
-    ) -> FloatTensor<Self> {
-        let nodes = [a.node(), b.node(), c.node()];
-        let [a, b, c] = [a, b, c].map(|x| x.into_primitive());
-        let result = B::fem_product(a.clone(), b.clone(), c.clone(), scheme);
-        let pullbacks = [(&b, &c), (&c, &a), (&a, &b)].map(|(x, y)| {
-            let (x, y) = (x.clone(), y.clone());
-            Pullback::new(move |g| B::fem_product(x.clone(), y.clone(), g, scheme))
-        });
-        on_tape::<B, C, 3>(nodes, result, pullbacks)
-    }
-
-    /// The gradient is by the adjoint of `A(v)^-1 M`.
-    fn fem_implicit_step(u: FloatTensor<Self>, scheme: u64) -> FloatTensor<Self> {
-        let node = u.node();
-        let v = B::fem_implicit_step(u.into_primitive(), scheme);
-        let at = v.clone();
-        let to_u = Pullback::new(move |g| {
-            B::fem_mass(B::fem_linearized_solve(at.clone(), g, scheme), scheme)
-        });
-        on_tape::<B, C, 1>([node], v, [to_u])
-    }
-
-    /// With `y = A(v)^-1 g`: `g` gets `z = A(v)^-1 w`, and `v` gets `-6 reaction int v y z phi`.
-    fn fem_linearized_solve(
-        v: FloatTensor<Self>,
-        g: FloatTensor<Self>,
-        scheme: u64,
-    ) -> FloatTensor<Self> {
-        let nodes = [v.node(), g.node()];
-        let (v, g) = (v.into_primitive(), g.into_primitive());
-        let y = B::fem_linearized_solve(v.clone(), g, scheme);
-        let (at, solution) = (v.clone(), y.clone());
-        let to_v = Pullback::new(move |w| {
-            let factor = -6.0 * host(scheme).reaction();
-            let z = B::fem_linearized_solve(at.clone(), w, scheme);
-            let product = B::fem_product(at.clone(), solution.clone(), z, scheme);
-            B::float_mul_scalar(product, factor.into())
-        });
-        let to_g = Pullback::new(move |w| B::fem_linearized_solve(v.clone(), w, scheme));
-        on_tape::<B, C, 2>(nodes, y, [to_v, to_g])
+    fn fem(operation: Operation<Self>, scheme: u64) -> FloatTensor<Self> {
+        let run = move |operation| B::fem(operation, scheme);
+        match operation {
+            // Self-adjoint.
+            Mass(x) => {
+                let (node, x) = (x.node(), x.into_primitive());
+                let to_x = Pullback::new(move |g| run(Mass(g)));
+                on_tape::<B, C, 1>([node], run(Mass(x)), [to_x])
+            }
+            HeatSolve(x) => {
+                let (node, x) = (x.node(), x.into_primitive());
+                let to_x = Pullback::new(move |g| run(HeatSolve(g)));
+                on_tape::<B, C, 1>([node], run(HeatSolve(x)), [to_x])
+            }
+            // Symmetric in all four places: the gradient with respect to one factor has the cotangent in its place.
+            Product(a, b, c) => {
+                let nodes = [a.node(), b.node(), c.node()];
+                let [a, b, c] = [a, b, c].map(|x| x.into_primitive());
+                let pullbacks = [(&b, &c), (&c, &a), (&a, &b)].map(|(x, y)| {
+                    let (x, y) = (x.clone(), y.clone());
+                    Pullback::new(move |g| run(Product(x.clone(), y.clone(), g)))
+                });
+                on_tape::<B, C, 3>(nodes, run(Product(a, b, c)), pullbacks)
+            }
+            // The gradient is by the adjoint of `A(v)^-1 M`.
+            ImplicitStep(u) => {
+                let (node, u) = (u.node(), u.into_primitive());
+                let v = run(ImplicitStep(u));
+                let at = v.clone();
+                let to_u = Pullback::new(move |g| run(Mass(run(LinearizedSolve(at.clone(), g)))));
+                on_tape::<B, C, 1>([node], v, [to_u])
+            }
+            // With `y = A(v)^-1 g`: `g` gets `z = A(v)^-1 w`, and `v` gets `-6 reaction int v y z phi`.
+            LinearizedSolve(v, g) => {
+                let nodes = [v.node(), g.node()];
+                let (v, g) = (v.into_primitive(), g.into_primitive());
+                let y = run(LinearizedSolve(v.clone(), g));
+                let (at, solution) = (v.clone(), y.clone());
+                let to_v = Pullback::new(move |w| {
+                    let factor = -6.0 * host(scheme).reaction();
+                    let z = run(LinearizedSolve(at.clone(), w));
+                    let product = run(Product(at.clone(), solution.clone(), z));
+                    B::float_mul_scalar(product, factor.into())
+                });
+                let to_g = Pullback::new(move |w| run(LinearizedSolve(v.clone(), w)));
+                on_tape::<B, C, 2>(nodes, y, [to_v, to_g])
+            }
+        }
     }
 }

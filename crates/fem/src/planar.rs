@@ -192,20 +192,12 @@ impl ElementsOnPlanes {
         parts
     }
 
-    /// The derivative of the right side in `u`, and nodal factors before it.
-    fn right<'a>(&self, u: &'a Col<f64>) -> (Vec<Part<'a>>, Col<f64>) {
+    /// The nodal factors before the mass matrix in the derivative of the right side in `u`.
+    fn right(&self, u: &Col<f64>) -> Col<f64> {
         let r = self.reaction;
-        let ones = Col::full(u.nrows(), 1.0);
         match self.kind {
-            Kind::Implicit => (vec![Part::Mass(1.0)], ones),
-            Kind::SemiImplicit => {
-                let slope = Col::from_fn(u.nrows(), |i| 1.0 + r - 3.0 * r * u[i] * u[i]);
-                (vec![Part::Mass(1.0)], slope)
-            }
-            Kind::SemiImplicitExact => {
-                let parts = vec![Part::Mass(1.0 + r), Part::Weighted(-3.0 * r, u)];
-                (parts, ones)
-            }
+            Kind::Implicit => Col::full(u.nrows(), 1.0),
+            Kind::SemiImplicit => Col::from_fn(u.nrows(), |i| 1.0 + r - 3.0 * r * u[i] * u[i]),
         }
     }
 
@@ -216,19 +208,14 @@ impl ElementsOnPlanes {
         let solve = |parts: &[Part], right: &Col<f64>| {
             PartialPivLu::new(self.matrix(planes, parts).as_ref()).solve(right)
         };
-        let right = match self.kind {
-            Kind::Implicit => self.apply(&[Part::Mass(1.0)], false, u),
-            Kind::SemiImplicit => {
-                let g = Col::from_fn(planes, |i| u[i] * (1.0 + r - r * u[i] * u[i]));
-                self.apply(&[Part::Mass(1.0)], false, &g)
-            }
-            Kind::SemiImplicitExact => {
-                self.apply(&[Part::Mass(1.0 + r), Part::Weighted(-r, u)], false, u)
-            }
-        };
-        if self.kind != Kind::Implicit {
-            return Ok(solve(&self.left(u), &right));
+        if self.kind == Kind::SemiImplicit {
+            let g = Col::from_fn(planes, |i| u[i] * (1.0 + r - r * u[i] * u[i]));
+            return Ok(solve(
+                &self.left(u),
+                &self.apply(&[Part::Mass(1.0)], false, &g),
+            ));
         }
+        let right = self.apply(&[Part::Mass(1.0)], false, u);
         let mut v = u.clone();
         for _ in 0..NEWTON {
             let linear = [Part::Mass(1.0 - r), Part::Stiffness(self.diffusion)];
@@ -273,8 +260,8 @@ impl PlanarStep for ElementsOnPlanes {
     fn linearize(&self, w: &Col<f64>) -> Result<(Col<f64>, Mat<f64>), model::Error> {
         let planes = w.nrows();
         let v = self.step(w)?;
-        let (parts, factors) = self.right(w);
-        let mut right = self.matrix(planes, &parts);
+        let factors = self.right(w);
+        let mut right = self.matrix(planes, &[Part::Mass(1.0)]);
         for j in 0..planes {
             for i in 0..planes {
                 right[(i, j)] *= factors[j];
@@ -288,9 +275,10 @@ impl PlanarStep for ElementsOnPlanes {
     /// `L p + L_t w' = R_t w'` for the change `p` of `v`, with the bent matrices of both sides.
     fn bending(&self, w: &Col<f64>, slope: &Col<f64>) -> Col<f64> {
         let planes = w.nrows();
-        let (parts, factors) = self.right(w);
+        let factors = self.right(w);
         let scaled = Col::from_fn(planes, |i| factors[i] * slope[i]);
-        let right = self.apply(&parts, true, &scaled) - self.apply(&self.left(w), true, slope);
+        let mass = self.apply(&[Part::Mass(1.0)], true, &scaled);
+        let right = mass - self.apply(&self.left(w), true, slope);
         PartialPivLu::new(self.matrix(planes, &self.left(w)).as_ref()).solve(&right)
     }
 
@@ -323,14 +311,13 @@ mod tests {
     use geometry::shapes::Ball;
     use geometry::{Field, Grid};
 
-    const KINDS: [Kind; 3] = [Kind::Implicit, Kind::SemiImplicit, Kind::SemiImplicitExact];
+    const KINDS: [Kind; 2] = [Kind::Implicit, Kind::SemiImplicit];
 
     fn grid_step<const D: usize>(kind: Kind, grid: &Grid<D>, eps: f64) -> FiniteElementStep<D> {
         let step = grid.spacing().powi(2);
         match kind {
             Kind::Implicit => FiniteElementStep::implicit(grid, eps, step),
             Kind::SemiImplicit => FiniteElementStep::semi_implicit(grid, eps, step),
-            Kind::SemiImplicitExact => FiniteElementStep::semi_implicit_exact(grid, eps, step),
         }
         .unwrap()
     }

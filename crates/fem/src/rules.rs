@@ -5,7 +5,7 @@
 use burn_ir::{BackendIr, CustomOpIr, ScalarIr, TensorIr};
 use linearize::{Builder, CustomOpRegistry, Extensions, Tangents, multilinear};
 
-use crate::ops::{FemOps, HEAT, IMPLICIT, LINEARIZED, MASS, PRODUCT, host};
+use crate::ops::{FemOps, HEAT, IMPLICIT, LINEARIZED, MASS, Operation, PRODUCT, host};
 
 /// `d int a b c phi`: linear in each factor, and symmetric, so that equal factors are differentiated once.
 fn product(operation: &CustomOpIr, tangents: &[Option<TensorIr>], build: &mut Builder) -> Tangents {
@@ -78,18 +78,18 @@ fn linearized_solve(
 
 fn register<B: BackendIr + FemOps>(registry: &mut CustomOpRegistry<B>) {
     let scheme = |scalars: &[ScalarIr]| scalars[0].elem::<u64>();
-    registry.register_function(MASS, move |[x], scalars| B::fem_mass(x, scheme(scalars)));
-    registry.register_function(HEAT, move |[x], scalars| {
-        B::fem_heat_solve(x, scheme(scalars))
+    registry.register_function(MASS, move |[x], s| B::fem(Operation::Mass(x), scheme(s)));
+    registry.register_function(HEAT, move |[x], s| {
+        B::fem(Operation::HeatSolve(x), scheme(s))
     });
-    registry.register_function(PRODUCT, move |[a, b, c], scalars| {
-        B::fem_product(a, b, c, scheme(scalars))
+    registry.register_function(PRODUCT, move |[a, b, c], s| {
+        B::fem(Operation::Product(a, b, c), scheme(s))
     });
-    registry.register_function(IMPLICIT, move |[u], scalars| {
-        B::fem_implicit_step(u, scheme(scalars))
+    registry.register_function(IMPLICIT, move |[u], s| {
+        B::fem(Operation::ImplicitStep(u), scheme(s))
     });
-    registry.register_function(LINEARIZED, move |[v, g], scalars| {
-        B::fem_linearized_solve(v, g, scheme(scalars))
+    registry.register_function(LINEARIZED, move |[v, g], s| {
+        B::fem(Operation::LinearizedSolve(v, g), scheme(s))
     });
 }
 

@@ -19,10 +19,7 @@ const NEWTON_LIMIT: usize = 40;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Implicit,
-    /// The well interpolated at the nodes.
     SemiImplicit,
-    /// The well integrated exactly.
-    SemiImplicitExact,
 }
 
 /// How much work the inner solvers did.
@@ -41,10 +38,11 @@ pub struct Statistics {
 /// Multilinear finite elements for the step (eq:implicitMCF) and its semi-implicit relative, on `cells^D` nodes.
 ///
 /// With the mass matrix `M` and the stiffness matrix `S` of the periodic grid, `kappa = tautilde/(2 eps^2)` and
-/// `Psi'(v) = 9/4 (v^3 - v)` integrated exactly against the basis functions (`b(v)`):
+/// `Psi'(v) = 9/4 (v^3 - v)`:
 ///
-/// - implicit: `M (v - u) + tautilde S v + kappa b(v) = 0`, the minimizer of `eps |u - v|^2 + 2 tautilde P_eps[v]`,
-/// - semi-implicit: `M (v - u) + tautilde S v + kappa b(u) = 0`, or with `M Psi'(u)` in place of `b(u)`.
+/// - implicit: `M (v - u) + tautilde S v + kappa b(v) = 0`, the minimizer of `eps |u - v|^2 + 2 tautilde P_eps[v]`, where `b(v)` is
+///   `Psi'(v)` integrated exactly against the basis functions,
+/// - semi-implicit: `M (v - u) + tautilde S v + kappa M Psi'(u) = 0`, with `Psi'` interpolated at the nodes.
 ///
 /// All matrices are divided by `h^D`.
 pub struct Scheme<const D: usize> {
@@ -198,17 +196,11 @@ impl<const D: usize> Scheme<D> {
         self.reaction
     }
 
-    /// The semi-implicit step: one circulant system. The well is integrated exactly, or interpolated at the nodes.
-    pub fn semi_implicit_step(&self, u: &[f64], exact: bool) -> Vec<f64> {
+    /// The semi-implicit step: one circulant system.
+    pub fn semi_implicit_step(&self, u: &[f64]) -> Vec<f64> {
         let r = self.reaction;
-        if !exact {
-            let explicit: Vec<f64> = u.iter().map(|u| u * (1.0 + r - r * u * u)).collect();
-            return self.heat_solve(&self.mass(&explicit));
-        }
-        let mut right = self.mass(u);
-        let cubic = self.product(u, u, u);
-        zip_apply(&mut right, &cubic, |m, c| (1.0 + r) * m - r * c);
-        self.heat_solve(&right)
+        let explicit: Vec<f64> = u.iter().map(|u| u * (1.0 + r - r * u * u)).collect();
+        self.heat_solve(&self.mass(&explicit))
     }
 
     /// The implicit step: Newton's method from `u`, whose result depends on nothing else.

@@ -8,7 +8,7 @@ use model::Calibration;
 use operators::SpectralFilter;
 use solver::{Accuracy, MeanCurvatureStep, PhaseInverse};
 
-use crate::ops::{FemOps, Registered};
+use crate::ops::{FemOps, Operation, Registered};
 use crate::scheme::Kind;
 use crate::{Error, LinearSolver, Scheme, Statistics, Tolerances};
 
@@ -70,22 +70,12 @@ impl<const D: usize> FiniteElementStep<D> {
     }
 
     /// The semi-implicit step `(v - u)/tautilde = lap v - Psi'(u)/(2 eps^2)`: one circulant system, solved exactly. The explicit
-    /// term is interpolated at the nodes, `M Psi'(u)`, as codes for this scheme do; see [`Self::semi_implicit_exact`].
+    /// term is interpolated at the nodes, `M Psi'(u)`, as codes for this scheme do.
     ///
     /// # Errors
     /// As [`Scheme::new`].
     pub fn semi_implicit(grid: &Grid<D>, eps: f64, step: f64) -> Result<Self, Error> {
         Self::new(Kind::SemiImplicit, grid, eps, step, LinearSolver::default())
-    }
-
-    /// The semi-implicit step with `int Psi'(u) phi_i` integrated exactly: of the same order, with a smaller error in the first
-    /// steps on coarse grids (a quarter less after one step of the circles at `h = eps/2`).
-    ///
-    /// # Errors
-    /// As [`Scheme::new`].
-    pub fn semi_implicit_exact(grid: &Grid<D>, eps: f64, step: f64) -> Result<Self, Error> {
-        let solver = LinearSolver::default();
-        Self::new(Kind::SemiImplicitExact, grid, eps, step, solver)
     }
 
     fn new(
@@ -131,8 +121,7 @@ impl<const D: usize> FiniteElementStep<D> {
         let scheme = self.scheme();
         let values = match self.kind {
             Kind::Implicit => scheme.implicit_step(u.values())?,
-            Kind::SemiImplicit => scheme.semi_implicit_step(u.values(), false),
-            Kind::SemiImplicitExact => scheme.semi_implicit_step(u.values(), true),
+            Kind::SemiImplicit => scheme.semi_implicit_step(u.values()),
         };
         Ok(Field::from_values(*u.grid(), values).expect("a step keeps the number of nodes"))
     }
@@ -171,73 +160,40 @@ impl<const D: usize> FiniteElementStep<D> {
     /// step.
     pub fn derivative(&self, u: Tensor<D>, v: Tensor<D>, p: Tensor<D>) -> Tensor<D> {
         match self.kind {
-            Kind::Implicit => self.linearized_tensor(v, self.mass_tensor(p)),
+            Kind::Implicit => {
+                let (v, right) = (v.into_dispatch(), self.mass_tensor(p).into_dispatch());
+                self.run(Operation::LinearizedSolve(v, right))
+            }
             Kind::SemiImplicit => {
                 let r = self.scheme().reaction();
                 let slope = (u.clone() * u) * (-3.0 * r) + (1.0 + r);
                 self.heat_tensor(self.mass_tensor(slope * p))
             }
-            Kind::SemiImplicitExact => {
-                let r = self.scheme().reaction();
-                let cubic = self.product_tensor([u.clone(), u, p.clone()]);
-                self.heat_tensor(self.mass_tensor(p) * (1.0 + r) - cubic * (3.0 * r))
-            }
         }
     }
 
+    fn run(&self, operation: Operation<Dispatch>) -> Tensor<D> {
+        Tensor::from_dispatch(<Dispatch as FemOps>::fem(operation, self.scheme.number()))
+    }
+
     fn mass_tensor(&self, x: Tensor<D>) -> Tensor<D> {
-        let number = self.scheme.number();
-        Tensor::from_dispatch(<Dispatch as FemOps>::fem_mass(x.into_dispatch(), number))
-    }
-
-    fn implicit_tensor(&self, u: Tensor<D>) -> Tensor<D> {
-        let number = self.scheme.number();
-        Tensor::from_dispatch(<Dispatch as FemOps>::fem_implicit_step(
-            u.into_dispatch(),
-            number,
-        ))
-    }
-
-    fn linearized_tensor(&self, v: Tensor<D>, g: Tensor<D>) -> Tensor<D> {
-        let number = self.scheme.number();
-        Tensor::from_dispatch(<Dispatch as FemOps>::fem_linearized_solve(
-            v.into_dispatch(),
-            g.into_dispatch(),
-            number,
-        ))
-    }
-
-    fn product_tensor(&self, factors: [Tensor<D>; 3]) -> Tensor<D> {
-        let number = self.scheme.number();
-        let [a, b, c] = factors.map(Tensor::into_dispatch);
-        Tensor::from_dispatch(<Dispatch as FemOps>::fem_product(a, b, c, number))
+        self.run(Operation::Mass(x.into_dispatch()))
     }
 
     fn heat_tensor(&self, x: Tensor<D>) -> Tensor<D> {
-        let number = self.scheme.number();
-        Tensor::from_dispatch(<Dispatch as FemOps>::fem_heat_solve(
-            x.into_dispatch(),
-            number,
-        ))
-    }
-
-    fn semi_implicit_tensor(&self, u: Tensor<D>) -> Tensor<D> {
-        let r = self.scheme().reaction();
-        let cubic = self.product_tensor([u.clone(), u.clone(), u.clone()]);
-        self.heat_tensor(self.mass_tensor(u) * (1.0 + r) - cubic * r)
+        self.run(Operation::HeatSolve(x.into_dispatch()))
     }
 }
 
 impl<const D: usize> MeanCurvatureStep<D> for FiniteElementStep<D> {
     fn apply(&self, u: Tensor<D>) -> Tensor<D> {
         match self.kind {
-            Kind::Implicit => self.implicit_tensor(u),
+            Kind::Implicit => self.run(Operation::ImplicitStep(u.into_dispatch())),
             Kind::SemiImplicit => {
                 let r = self.scheme().reaction();
                 let cubic = u.clone() * u.clone() * u.clone();
                 self.heat_tensor(self.mass_tensor(u * (1.0 + r) - cubic * r))
             }
-            Kind::SemiImplicitExact => self.semi_implicit_tensor(u),
         }
     }
 
@@ -254,7 +210,7 @@ impl<const D: usize> MeanCurvatureStep<D> for FiniteElementStep<D> {
             let (mass, implicit, semi_implicit) = self.scheme().phase_symbols(theta);
             let derivative = match self.kind {
                 Kind::Implicit => implicit,
-                Kind::SemiImplicit | Kind::SemiImplicitExact => semi_implicit,
+                Kind::SemiImplicit => semi_implicit,
             };
             1.0 / (mass * (1.0 + stiffness * (1.0 - derivative).powi(2)))
         });

@@ -38,13 +38,12 @@ fn ball<const D: usize>(grid: Grid<D>, radius: f64, eps: f64) -> Field<D> {
 }
 
 /// All steps, solved to rounding.
-fn steps<const D: usize>(grid: &Grid<D>) -> [FiniteElementStep<D>; 4] {
+fn steps<const D: usize>(grid: &Grid<D>) -> [FiniteElementStep<D>; 3] {
     let (eps, size) = (2.0 * grid.spacing(), grid.spacing().powi(2));
     let direct = LinearSolver::Direct;
     let steps = [
         FiniteElementStep::implicit(grid, eps, size).unwrap(),
         FiniteElementStep::semi_implicit(grid, eps, size).unwrap(),
-        FiniteElementStep::semi_implicit_exact(grid, eps, size).unwrap(),
         FiniteElementStep::implicit_with(grid, eps, size, direct).unwrap(),
     ];
     for step in &steps {

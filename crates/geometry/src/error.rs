@@ -108,17 +108,25 @@ pub enum Error {
     Vti { path: PathBuf, source: VtiError },
 }
 
+/// Accepts a number for which the requirement holds.
+pub(crate) fn checked(
+    name: &'static str,
+    value: f64,
+    holds: bool,
+    requirement: &'static str,
+) -> Result<f64, Error> {
+    let error = Error::InvalidParameter {
+        name,
+        value,
+        requirement,
+    };
+    holds.then_some(value).ok_or(error)
+}
+
 /// Accepts finite positive numbers.
 pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64, Error> {
-    if value.is_finite() && value > 0.0 {
-        Ok(value)
-    } else {
-        Err(Error::InvalidParameter {
-            name,
-            value,
-            requirement: "finite and positive",
-        })
-    }
+    let holds = value.is_finite() && value > 0.0;
+    checked(name, value, holds, "finite and positive")
 }
 
 /// Accepts vectors of finite numbers.
@@ -126,12 +134,8 @@ pub(crate) fn finite<const D: usize>(
     name: &'static str,
     vector: [f64; D],
 ) -> Result<[f64; D], Error> {
-    match vector.into_iter().find(|v| !v.is_finite()) {
-        None => Ok(vector),
-        Some(value) => Err(Error::InvalidParameter {
-            name,
-            value,
-            requirement: "finite",
-        }),
+    for value in vector {
+        checked(name, value, value.is_finite(), "finite")?;
     }
+    Ok(vector)
 }

@@ -1,6 +1,6 @@
 //! Where a shape goes in the box of a grid.
 
-use crate::error::positive;
+use crate::error::{checked, positive};
 use crate::measure::BoundingBox;
 use crate::{Error, Grid};
 
@@ -104,12 +104,7 @@ impl<const D: usize> Placement<D> {
 
 /// The largest side length that leaves the margin on both sides.
 fn largest<const D: usize>(grid: &Grid<D>, margin: f64) -> Result<f64, Error> {
-    if !(margin.is_finite() && margin >= 0.0) {
-        return Err(Error::InvalidParameter {
-            name: "margin",
-            value: margin,
-            requirement: "finite and not negative",
-        });
-    }
+    let holds = margin.is_finite() && margin >= 0.0;
+    checked("margin", margin, holds, "finite and not negative")?;
     Ok((grid.side() - 2.0 * margin).max(0.0))
 }

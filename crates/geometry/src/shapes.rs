@@ -3,7 +3,7 @@
 //! All but [`Ball`], [`Capsule`] and [`HalfSpace`] are centred at the origin; move them with the
 //! combinations of [`SignedDistanceExt`](crate::SignedDistanceExt).
 
-use crate::error::{finite, positive};
+use crate::error::{checked, finite, positive};
 use crate::{Error, SignedDistance, vector};
 
 /// A ball (a disc in 2D). Exact everywhere.
@@ -82,13 +82,9 @@ impl<const D: usize> RoundedBox<D> {
     pub fn new(half_extents: [f64; D], radius: f64) -> Result<Self, Error> {
         Cuboid::new(half_extents)?;
         let smallest = half_extents.into_iter().fold(f64::INFINITY, f64::min);
-        if !(0.0..=smallest).contains(&radius) {
-            return Err(Error::InvalidParameter {
-                name: "rounding radius",
-                value: radius,
-                requirement: "between zero and the smallest half extent",
-            });
-        }
+        let holds = (0.0..=smallest).contains(&radius);
+        let requirement = "between zero and the smallest half extent";
+        checked("rounding radius", radius, holds, requirement)?;
         Ok(Self {
             core: half_extents.map(|a| a - radius),
             radius,
@@ -120,13 +116,9 @@ impl<const D: usize> Cross<D> {
     /// `0 < b < a`, both finite.
     pub fn new(half_length: f64, half_width: f64) -> Result<Self, Error> {
         positive("half length", half_length)?;
-        if !(half_width > 0.0 && half_width < half_length) {
-            return Err(Error::InvalidParameter {
-                name: "half width",
-                value: half_width,
-                requirement: "positive and smaller than the half length",
-            });
-        }
+        let holds = half_width > 0.0 && half_width < half_length;
+        let requirement = "positive and smaller than the half length";
+        checked("half width", half_width, holds, requirement)?;
         Ok(Self {
             half_length,
             half_width,
@@ -286,13 +278,9 @@ impl Torus {
     /// `0 < minor < major`, both finite.
     pub fn new(major: f64, minor: f64) -> Result<Self, Error> {
         positive("major radius", major)?;
-        if !(minor > 0.0 && minor < major) {
-            return Err(Error::InvalidParameter {
-                name: "minor radius",
-                value: minor,
-                requirement: "positive and smaller than the major radius",
-            });
-        }
+        let holds = minor > 0.0 && minor < major;
+        let requirement = "positive and smaller than the major radius";
+        checked("minor radius", minor, holds, requirement)?;
         Ok(Self { major, minor })
     }
 

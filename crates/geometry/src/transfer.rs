@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::error::checked;
 use crate::{Error, Field, Grid};
 
 impl<const D: usize> Grid<D> {
@@ -10,13 +11,8 @@ impl<const D: usize> Grid<D> {
     /// # Errors
     /// [`Error::InvalidParameter`] for an odd number of cells; as [`Grid::new`].
     pub fn half(&self) -> Result<Self, Error> {
-        if !self.cells().is_multiple_of(2) {
-            return Err(Error::InvalidParameter {
-                name: "cells",
-                value: self.cells() as f64,
-                requirement: "even to be halved",
-            });
-        }
+        let even = self.cells().is_multiple_of(2);
+        checked("cells", self.cells() as f64, even, "even to be halved")?;
         Self::new(self.cells() / 2, self.side())?.with_origin(self.origin())
     }
 }

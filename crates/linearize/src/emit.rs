@@ -221,44 +221,34 @@ impl Emitter {
         } else if is(value, 1.0) {
             OperationIr::BaseFloat(Base::Ones(CreationOpIr { out }))
         } else {
-            OperationIr::NumericFloat(
-                dtype,
-                Num::Full(FullOpIr {
-                    out,
-                    value: ScalarIr::Float(value),
-                }),
-            )
+            let value = ScalarIr::Float(value);
+            OperationIr::NumericFloat(dtype, Num::Full(FullOpIr { out, value }))
         })
     }
 
     pub(crate) fn reshape(&mut self, t: &TensorIr, shape: Shape) -> TensorIr {
-        if t.shape == shape {
-            return t.clone();
+        match self.definition(t) {
+            Some(OperationIr::BaseFloat(Base::Reshape(inner))) if t.shape != shape => {
+                let input = inner.input.clone();
+                self.reshape(&input, shape)
+            }
+            _ => self.shaped(t, shape, Base::Reshape),
         }
-        if let Some(value) = self.constant(t) {
-            return self.full(shape, t.dtype, value);
-        }
-        if let Some(OperationIr::BaseFloat(Base::Reshape(inner))) = self.definition(t) {
-            let input = inner.input.clone();
-            return self.reshape(&input, shape);
-        }
-        self.emit_one(OperationIr::BaseFloat(Base::Reshape(ShapeOpIr {
-            input: read_only(t),
-            out: output(shape, t.dtype),
-        })))
     }
 
     pub(crate) fn expand(&mut self, t: &TensorIr, shape: Shape) -> TensorIr {
+        self.shaped(t, shape, Base::Expand)
+    }
+
+    fn shaped(&mut self, t: &TensorIr, shape: Shape, variant: fn(ShapeOpIr) -> Base) -> TensorIr {
         if t.shape == shape {
             return t.clone();
         }
         if let Some(value) = self.constant(t) {
             return self.full(shape, t.dtype, value);
         }
-        self.emit_one(OperationIr::BaseFloat(Base::Expand(ShapeOpIr {
-            input: read_only(t),
-            out: output(shape, t.dtype),
-        })))
+        let (input, out) = (read_only(t), output(shape, t.dtype));
+        self.emit_one(OperationIr::BaseFloat(variant(ShapeOpIr { input, out })))
     }
 
     fn definition(&self, t: &TensorIr) -> Option<&OperationIr> {
@@ -303,8 +293,7 @@ impl Emitter {
                 return self.scale(b, value);
             }
         }
-        let (a, b) = self.compact_operands(a, b, &shape);
-        self.binary(&a, &b, shape, Num::Mul)
+        self.binary(a, b, shape, Num::Mul)
     }
 
     pub(crate) fn add(&mut self, a: &TensorIr, b: &TensorIr) -> TensorIr {
@@ -330,8 +319,7 @@ impl Emitter {
         if let Some(joined) = self.join(a, b) {
             return joined;
         }
-        let (a, b) = self.compact_operands(a, b, &shape);
-        self.binary(&a, &b, shape, Num::Add)
+        self.binary(a, b, shape, Num::Add)
     }
 
     /// `a + b` without an addition, if both are blocks put into zeros and the blocks do not overlap:
@@ -378,8 +366,7 @@ impl Emitter {
         if let Some(negated) = self.negated(b) {
             return self.add(a, &negated);
         }
-        let (a, b) = self.compact_operands(a, b, &shape);
-        self.binary(&a, &b, shape, Num::Sub)
+        self.binary(a, b, shape, Num::Sub)
     }
 
     pub(crate) fn div(&mut self, a: &TensorIr, b: &TensorIr) -> TensorIr {
@@ -399,8 +386,7 @@ impl Emitter {
                 self.scalar(a, value, Num::DivScalar)
             };
         }
-        let (a, b) = self.compact_operands(a, b, &shape);
-        self.binary(&a, &b, shape, Num::Div)
+        self.binary(a, b, shape, Num::Div)
     }
 
     pub(crate) fn neg(&mut self, t: &TensorIr) -> TensorIr {
@@ -472,13 +458,10 @@ impl Emitter {
             0 => self.full(t.shape.clone(), t.dtype, 1.0),
             1 => t.clone(),
             2 => self.mul(t, t),
-            3 => {
+            3 | 4 => {
                 let square = self.mul(t, t);
-                self.mul(&square, t)
-            }
-            4 => {
-                let square = self.mul(t, t);
-                self.mul(&square, &square)
+                let rest = if exponent == 3 { t } else { &square };
+                self.mul(&square, rest)
             }
             -1 => self.unary(t, Float::Recip),
             _ => self.emit_one(OperationIr::NumericFloat(
@@ -511,6 +494,7 @@ impl Emitter {
         self.emit_one(OperationIr::NumericFloat(t.dtype, operation))
     }
 
+    /// Uniform operands shrink to one element where the other operand already has the full shape.
     fn binary(
         &mut self,
         a: &TensorIr,
@@ -518,30 +502,15 @@ impl Emitter {
         shape: Shape,
         variant: fn(BinaryOpIr) -> Num,
     ) -> TensorIr {
-        self.emit_one(OperationIr::NumericFloat(
-            a.dtype,
-            variant(BinaryOpIr {
-                lhs: read_only(a),
-                rhs: read_only(b),
-                out: output(shape, a.dtype),
-            }),
-        ))
-    }
-
-    /// Uniform operands shrink to one element where the other operand already has the full shape.
-    fn compact_operands(
-        &mut self,
-        a: &TensorIr,
-        b: &TensorIr,
-        shape: &Shape,
-    ) -> (TensorIr, TensorIr) {
-        if b.shape == *shape && self.uniform.contains_key(&a.id) {
-            (self.compact(a), b.clone())
-        } else if a.shape == *shape && self.uniform.contains_key(&b.id) {
-            (a.clone(), self.compact(b))
-        } else {
-            (a.clone(), b.clone())
+        let (mut lhs, mut rhs) = (read_only(a), read_only(b));
+        if b.shape == shape && self.uniform.contains_key(&a.id) {
+            lhs = read_only(&self.compact(a));
+        } else if a.shape == shape && self.uniform.contains_key(&b.id) {
+            rhs = read_only(&self.compact(b));
         }
+        let out = output(shape, a.dtype);
+        let operation = variant(BinaryOpIr { lhs, rhs, out });
+        self.emit_one(OperationIr::NumericFloat(a.dtype, operation))
     }
 }
 

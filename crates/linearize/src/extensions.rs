@@ -3,19 +3,18 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use burn::backend::BackendTypes;
 use burn::backend::ir::{BackendIr, CustomOpIr, HandleContainer, ScalarIr, TensorIr};
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{BackendTypes, DispatchDevice};
-use burn::tensor::Device;
 
-use crate::{Builder, ELEMENTWISE, Error};
+use crate::tangent::{Builder, Tangents};
 
 /// Forward-mode rule of a custom operation.
 ///
 /// A rule maps the tangents of the inputs (`None` is zero) to the tangents of the outputs. It may
 /// add operations to the primal program, which runs once per point, and builds tangents, which must
-/// depend linearly on the given ones; [`multilinear`] is the rule of an operation that is linear in each of
-/// its inputs. It gives [`Error::NoRule`] if this combination of active inputs cannot be differentiated.
+/// depend linearly on the given ones; [`multilinear`](crate::multilinear) is the rule of an operation that is linear in each of
+/// its inputs. It gives [`Error::NoRule`](crate::Error::NoRule) if this combination of active inputs cannot be differentiated.
 ///
 /// A pointwise function `f⁽ᵏ⁾(x)` whose order `k` is a scalar argument differentiates to
 /// `f⁽ᵏ⁺¹⁾(x) ⊙ ẋ`:
@@ -36,48 +35,15 @@ use crate::{Builder, ELEMENTWISE, Error};
 /// ```
 pub type Rule = dyn Fn(&CustomOpIr, &[Option<TensorIr>], &mut Builder) -> Tangents + Send + Sync;
 
-/// Tangents of the outputs of an operation, in their order; none is zero.
-pub type Tangents = Result<Vec<Option<TensorIr>>, Error>;
-
-/// Rule of operations that are linear in each input separately: convolutions, transforms, products.
-///
-/// The tangent is the sum over the active inputs of the operation with that input replaced by its
-/// tangent.
-#[expect(clippy::missing_errors_doc, reason = "it is a rule")]
-pub fn multilinear(
-    operation: &CustomOpIr,
-    tangents: &[Option<TensorIr>],
-    build: &mut Builder,
-) -> Tangents {
-    Ok(build.multilinear(operation, tangents))
-}
-
 /// Handlers of custom operations on backend `B`, by identifier.
 ///
 /// Burn's registry of the same name, which additionally knows what it contains, so that a missing
-/// handler is an [error](Error::NoHandler) when a program is loaded rather than a panic when it
+/// handler is an [error](crate::Error::NoHandler) when a program is loaded rather than a panic when it
 /// runs.
+#[derive(Clone, Default)]
 pub struct CustomOpRegistry<B: BackendIr> {
     pub(crate) handlers: burn_router::CustomOpRegistry<B>,
     pub(crate) known: BTreeSet<String>,
-}
-
-impl<B: BackendIr> Clone for CustomOpRegistry<B> {
-    fn clone(&self) -> Self {
-        Self {
-            handlers: self.handlers.clone(),
-            known: self.known.clone(),
-        }
-    }
-}
-
-impl<B: BackendIr> Default for CustomOpRegistry<B> {
-    fn default() -> Self {
-        Self {
-            handlers: burn_router::CustomOpRegistry::new(),
-            known: BTreeSet::new(),
-        }
-    }
 }
 
 impl<B: BackendIr> CustomOpRegistry<B> {
@@ -111,7 +77,7 @@ impl<B: BackendIr> CustomOpRegistry<B> {
 /// Differentiation rules and per-backend handlers of custom (backend-extension) operations.
 #[derive(Clone, Default)]
 pub struct Extensions {
-    rules: BTreeMap<String, Arc<Rule>>,
+    pub(crate) rules: BTreeMap<String, Arc<Rule>>,
     #[cfg(feature = "flex")]
     pub(crate) flex: CustomOpRegistry<burn::backend::Flex>,
     #[cfg(feature = "ndarray")]
@@ -137,24 +103,6 @@ impl Extensions {
     {
         self.rules.insert(id.to_owned(), Arc::new(rule));
         self
-    }
-
-    /// Whether the device's backend has a handler for gathered elementwise operations.
-    pub(crate) fn fuses_on(&self, device: &Device) -> bool {
-        #[allow(unreachable_patterns, reason = "depends on the compiled backends")]
-        match device.as_dispatch() {
-            #[cfg(feature = "flex")]
-            DispatchDevice::Flex(_) => self.flex.known.contains(ELEMENTWISE),
-            #[cfg(feature = "ndarray")]
-            DispatchDevice::NdArray(_) => self.ndarray.known.contains(ELEMENTWISE),
-            #[cfg(any(feature = "wgpu", feature = "cuda"))]
-            DispatchDevice::Cube(_) => self.cube.known.contains(ELEMENTWISE),
-            _ => false,
-        }
-    }
-
-    pub(crate) fn rule_of(&self, id: &str) -> Option<Arc<Rule>> {
-        self.rules.get(id).cloned()
     }
 
     /// Register handlers on the Flex backend.

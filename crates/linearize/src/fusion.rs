@@ -16,24 +16,27 @@ use burn::tensor::DType;
 /// Identifier of fused elementwise operations.
 pub const ELEMENTWISE: &str = "linearize::elementwise";
 
-/// One operation on entries. Operands are numbered: the inputs, then the results of earlier instructions.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Instruction {
-    /// `a + b`
-    Add(usize, usize),
-    /// `a - b`
-    Sub(usize, usize),
-    /// `a b`
-    Mul(usize, usize),
-    /// `a / b`
-    Div(usize, usize),
-    /// `a + number`
-    AddNumber(usize, f64),
-    /// `number a`
-    MulNumber(usize, f64),
-    /// `a / number`
-    DivNumber(usize, f64),
+/// An operation on entries, `left + right` and so on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "names say it")]
+pub enum Arithmetic {
+    Add,
+    Sub,
+    Mul,
+    Div,
 }
+
+/// The right one of two operands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Right {
+    /// The operand of this number.
+    Operand(usize),
+    /// The same value for all entries.
+    Number(f64),
+}
+
+/// One operation with its operands. These are numbered: the inputs, then the results of earlier instructions.
+pub type Instruction = (Arithmetic, usize, Right);
 
 /// What becomes of an operand in the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,28 +58,21 @@ pub struct Elementwise {
 
 impl Elementwise {
     fn encode(&self) -> Vec<ScalarIr> {
-        let mut scalars = vec![ScalarIr::UInt(self.instructions.len() as u64)];
-        let mut push = |code: u64, operand: usize, rest: ScalarIr| {
-            scalars.extend([ScalarIr::UInt(code), ScalarIr::UInt(operand as u64), rest]);
-        };
-        for instruction in &self.instructions {
-            let place = |b: usize| ScalarIr::UInt(b as u64);
-            match *instruction {
-                Instruction::Add(a, b) => push(0, a, place(b)),
-                Instruction::Sub(a, b) => push(1, a, place(b)),
-                Instruction::Mul(a, b) => push(2, a, place(b)),
-                Instruction::Div(a, b) => push(3, a, place(b)),
-                Instruction::AddNumber(a, x) => push(4, a, ScalarIr::Float(x)),
-                Instruction::MulNumber(a, x) => push(5, a, ScalarIr::Float(x)),
-                Instruction::DivNumber(a, x) => push(6, a, ScalarIr::Float(x)),
-            }
+        let place = |operand: usize| ScalarIr::UInt(operand as u64);
+        let mut scalars = vec![place(self.instructions.len())];
+        for &(operation, left, right) in &self.instructions {
+            let right = match right {
+                Right::Operand(operand) => place(operand),
+                Right::Number(number) => ScalarIr::Float(number),
+            };
+            scalars.extend([place(operation as usize), place(left), right]);
         }
         for output in &self.outputs {
             let (sum, operand) = match *output {
                 Output::Values(operand) => (false, operand),
                 Output::Sum(operand) => (true, operand),
             };
-            scalars.extend([ScalarIr::Bool(sum), ScalarIr::UInt(operand as u64)]);
+            scalars.extend([ScalarIr::Bool(sum), place(operand)]);
         }
         scalars
     }
@@ -87,17 +83,16 @@ impl Elementwise {
         let (count, rest) = (place(&operation.scalars[0]), &operation.scalars[1..]);
         let (instructions, outputs) = rest.split_at(3 * count);
         let instruction = |code: &[ScalarIr]| {
-            let (a, b) = (place(&code[1]), &code[2]);
-            match code[0].elem::<u64>() {
-                0 => Instruction::Add(a, place(b)),
-                1 => Instruction::Sub(a, place(b)),
-                2 => Instruction::Mul(a, place(b)),
-                3 => Instruction::Div(a, place(b)),
-                4 => Instruction::AddNumber(a, b.elem()),
-                5 => Instruction::MulNumber(a, b.elem()),
-                6 => Instruction::DivNumber(a, b.elem()),
-                other => unreachable!("no instruction has the code {other}"),
-            }
+            use Arithmetic::{Add, Div, Mul, Sub};
+            let right = match code[2] {
+                ScalarIr::Float(number) => Right::Number(number),
+                ref operand => Right::Operand(place(operand)),
+            };
+            (
+                [Add, Sub, Mul, Div][place(&code[0])],
+                place(&code[1]),
+                right,
+            )
         };
         let output = |code: &[ScalarIr]| match code[0] {
             ScalarIr::Bool(true) => Output::Sum(place(&code[1])),
@@ -119,19 +114,22 @@ struct Entrywise<'a> {
 
 #[derive(Clone, Copy)]
 enum Action {
-    Binary(fn(usize, usize) -> Instruction),
-    Number(fn(usize, f64) -> Instruction, f64),
+    /// With a number in place of the right operand, if there is one.
+    Compute(Arithmetic, Option<f64>),
     /// The result is no operand of the same loop.
     End(fn(usize) -> Output),
 }
 
 impl<'a> Entrywise<'a> {
     fn of(operation: &'a OperationIr) -> Option<Self> {
-        use Instruction::{Add, AddNumber, Div, DivNumber, Mul, MulNumber, Sub};
-        let binary =
-            |make, op: &'a BinaryOpIr| (Action::Binary(make), vec![&op.lhs, &op.rhs], &op.out);
-        let number = |make, number: f64, op: &'a ScalarOpIr| {
-            (Action::Number(make, number), vec![&op.lhs], &op.out)
+        use Arithmetic::{Add, Div, Mul, Sub};
+        let binary = |arithmetic, op: &'a BinaryOpIr| {
+            let action = Action::Compute(arithmetic, None);
+            (action, vec![&op.lhs, &op.rhs], &op.out)
+        };
+        let number = |arithmetic, number: f64, op: &'a ScalarOpIr| {
+            let action = Action::Compute(arithmetic, Some(number));
+            (action, vec![&op.lhs], &op.out)
         };
         let (action, operands, result) = match operation {
             OperationIr::NumericFloat(_, operation) => match operation {
@@ -139,11 +137,14 @@ impl<'a> Entrywise<'a> {
                 Num::Sub(op) => binary(Sub, op),
                 Num::Mul(op) => binary(Mul, op),
                 Num::Div(op) => binary(Div, op),
-                Num::AddScalar(op) => number(AddNumber, op.rhs.elem(), op),
-                Num::SubScalar(op) => number(AddNumber, -op.rhs.elem::<f64>(), op),
-                Num::MulScalar(op) => number(MulNumber, op.rhs.elem(), op),
-                Num::DivScalar(op) => number(DivNumber, op.rhs.elem(), op),
-                Num::Neg(op) => (Action::Number(MulNumber, -1.0), vec![&op.input], &op.out),
+                Num::AddScalar(op) => number(Add, op.rhs.elem(), op),
+                Num::SubScalar(op) => number(Sub, op.rhs.elem(), op),
+                Num::MulScalar(op) => number(Mul, op.rhs.elem(), op),
+                Num::DivScalar(op) => number(Div, op.rhs.elem(), op),
+                Num::Neg(op) => {
+                    let negate = Action::Compute(Mul, Some(-1.0));
+                    (negate, vec![&op.input], &op.out)
+                }
                 Num::Sum(op) => (Action::End(Output::Sum), vec![&op.input], &op.out),
                 _ => return None,
             },
@@ -274,8 +275,10 @@ fn as_one(members: &[&Entrywise], used: impl Fn(TensorId) -> bool) -> CustomOpIr
     for member in members {
         let (result, operand) = (member.result, |k: usize| place[&member.operands[k].id]);
         let instruction = match member.action {
-            Action::Binary(make) => make(operand(0), operand(1)),
-            Action::Number(make, number) => make(operand(0), number),
+            Action::Compute(arithmetic, number) => {
+                let right = number.map_or_else(|| Right::Operand(operand(1)), Right::Number);
+                (arithmetic, operand(0), right)
+            }
             Action::End(make) => {
                 program.outputs.push(make(operand(0)));
                 outputs.push(result.clone());
@@ -374,7 +377,10 @@ mod tests {
         assert_eq!((inputs, outputs), (vec![0, 1], vec![2, 4]));
         assert_eq!(
             program.instructions,
-            [Instruction::Sub(0, 1), Instruction::Mul(2, 2)]
+            [
+                (Arithmetic::Sub, 0, Right::Operand(1)),
+                (Arithmetic::Mul, 2, Right::Operand(2))
+            ]
         );
         assert_eq!(program.outputs, [Output::Values(2), Output::Sum(3)]);
     }
@@ -422,13 +428,13 @@ mod tests {
     fn programs_survive_their_encoding() {
         let program = Elementwise {
             instructions: vec![
-                Instruction::Add(0, 1),
-                Instruction::Sub(1, 0),
-                Instruction::Mul(2, 3),
-                Instruction::Div(3, 2),
-                Instruction::AddNumber(4, 0.1),
-                Instruction::MulNumber(5, -3.0),
-                Instruction::DivNumber(6, 1e-300),
+                (Arithmetic::Add, 0, Right::Operand(1)),
+                (Arithmetic::Sub, 1, Right::Operand(0)),
+                (Arithmetic::Mul, 2, Right::Operand(3)),
+                (Arithmetic::Div, 3, Right::Operand(2)),
+                (Arithmetic::Add, 4, Right::Number(0.1)),
+                (Arithmetic::Mul, 5, Right::Number(-3.0)),
+                (Arithmetic::Div, 6, Right::Number(1e-300)),
             ],
             outputs: vec![Output::Sum(7), Output::Values(8)],
         };

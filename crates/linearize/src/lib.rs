@@ -118,10 +118,10 @@ mod value;
 pub use burn::backend::ir::{CustomOpIr, HandleContainer, OperationIr, ScalarIr, TensorIr};
 
 pub use error::Error;
-pub use extensions::{CustomOpRegistry, Extensions, Rule, Tangents, multilinear};
-pub use fusion::{ELEMENTWISE, Elementwise, Instruction, Output};
+pub use extensions::{CustomOpRegistry, Extensions, Rule};
+pub use fusion::{Arithmetic, ELEMENTWISE, Elementwise, Instruction, Output, Right};
 pub use program::{Program, Statistics};
 pub use replay::{Evaluation, Linearization};
-pub use tangent::Builder;
+pub use tangent::{Builder, Tangents, multilinear};
 pub use trace::{Graph, Inputs};
 pub use value::Value;

@@ -174,19 +174,22 @@ fn simplify(graph: &Graph) -> Graph {
     }
 }
 
-/// Emit `operation` with its inputs renamed, and note what its outputs are called now.
+/// Emit `operation` with its inputs renamed, and note what its outputs are called now: the operation in the new names.
 fn replay(
     map: &mut HashMap<TensorId, TensorIr>,
     operation: &OperationIr,
     emit: impl FnOnce(OperationIr) -> Vec<TensorIr>,
-) -> Vec<TensorIr> {
+) -> OperationIr {
     let old: Vec<TensorId> = operation.outputs().map(|out| out.id).collect();
     let mut operation = operation.clone();
     detach_outputs(&mut operation);
     rename(&mut operation, map);
-    let new = emit(operation);
-    map.extend(old.into_iter().zip(new.iter().cloned()));
-    new
+    let new = emit(operation.clone());
+    let detached = operation.outputs().map(|out| out.id);
+    let names = detached.zip(new.iter().cloned()).collect();
+    rename(&mut operation, &names);
+    map.extend(old.into_iter().zip(new));
+    operation
 }
 
 /// Dead-code elimination: the operations that `outputs` depend on, in order.
@@ -268,22 +271,17 @@ fn linearize(
         *uses.entry(t.id).or_insert(0) += 1;
     }
     for operation in &simplified.operations {
-        let old: Vec<TensorId> = operation.outputs().map(|out| out.id).collect();
-        let mut emitted = None;
-        let new = replay(&mut map, operation, |operation| {
-            let outputs = cx.build.primal.emit(operation.clone());
-            emitted = Some(operation);
-            outputs
-        });
-        if !old.iter().any(|id| differentiated.contains(id)) {
+        let emitted = replay(&mut map, operation, |new| cx.build.primal.emit(new));
+        if !operation
+            .outputs()
+            .any(|out| differentiated.contains(&out.id))
+        {
             continue;
         }
-        let mut emitted = emitted.expect("replaying emits");
-        name_outputs(&mut emitted, &new);
         let tangents = rules::jvp(&mut cx, &emitted)?;
-        for ((old, new), tangent) in old.iter().zip(&new).zip(tangents) {
+        for ((old, new), tangent) in operation.outputs().zip(emitted.outputs()).zip(tangents) {
             let Some(mut tangent) = tangent else { continue };
-            if uses.get(old).copied().unwrap_or(0) > 1 && tangent.is_long() {
+            if uses.get(&old.id).copied().unwrap_or(0) > 1 && tangent.is_long() {
                 tangent = cx.build.shared(tangent);
             }
             cx.tangents.insert(new.id, tangent);
@@ -309,13 +307,6 @@ fn linearize(
         tangents,
     };
     Ok(assemble(cx.build, ends, products))
-}
-
-/// Give a detached operation its outputs back.
-fn name_outputs(operation: &mut OperationIr, outputs: &[TensorIr]) {
-    let detached = operation.outputs().map(|out| out.id);
-    let names = detached.zip(outputs.iter().cloned()).collect();
-    rename(operation, &names);
 }
 
 /// Inputs and outputs of all programs.

@@ -10,7 +10,7 @@ use burn_router::TensorInterpreter;
 
 use crate::extensions::CustomOpRegistry;
 use crate::program::Block;
-use crate::{Error, Extensions, Program, Value};
+use crate::{ELEMENTWISE, Error, Extensions, Program, Value};
 
 /// What the primal program computes at a point.
 #[derive(Clone, Debug)]
@@ -26,35 +26,8 @@ pub struct Evaluation {
 /// It can move between threads, and several can run at once.
 pub struct Linearization {
     program: Program,
-    interpreter: Interpreter,
+    interpreter: Box<dyn Interpreter>,
     evaluated: bool,
-}
-
-enum Interpreter {
-    #[cfg(feature = "flex")]
-    Flex(Box<TensorInterpreter<burn::backend::Flex>>),
-    #[cfg(feature = "ndarray")]
-    #[allow(
-        deprecated,
-        reason = "burn deprecates the backend, which we still offer"
-    )]
-    NdArray(Box<TensorInterpreter<burn::backend::NdArray>>),
-    #[cfg(any(feature = "wgpu", feature = "cuda"))]
-    Cube(Box<TensorInterpreter<burn::backend::Cube>>),
-}
-
-/// Run `$body` with the interpreter of whichever backend.
-macro_rules! on_backend {
-    ($self:ident, $interpreter:ident => $body:expr) => {
-        match &mut $self.interpreter {
-            #[cfg(feature = "flex")]
-            Interpreter::Flex($interpreter) => $body,
-            #[cfg(feature = "ndarray")]
-            Interpreter::NdArray($interpreter) => $body,
-            #[cfg(any(feature = "wgpu", feature = "cuda"))]
-            Interpreter::Cube($interpreter) => $body,
-        }
-    };
 }
 
 impl Program {
@@ -64,44 +37,22 @@ impl Program {
     /// [`Error::NoHandler`] if a custom operation has no handler on the device's backend,
     /// [`Error::Device`] if that backend is not compiled in.
     pub fn on(&self, device: &Device, extensions: &Extensions) -> Result<Linearization, Error> {
-        Linearization::new(self, device, extensions)
+        #[allow(unreachable_patterns, reason = "depends on the compiled backends")]
+        match device.as_dispatch() {
+            #[cfg(feature = "flex")]
+            DispatchDevice::Flex(device) => load(self, "flex", device, &extensions.flex),
+            #[cfg(feature = "ndarray")]
+            DispatchDevice::NdArray(device) => load(self, "ndarray", device, &extensions.ndarray),
+            #[cfg(any(feature = "wgpu", feature = "cuda"))]
+            DispatchDevice::Cube(device) => load(self, "cube", device, &extensions.cube),
+            other => Err(Error::Device {
+                device: format!("{other:?}"),
+            }),
+        }
     }
 }
 
 impl Linearization {
-    fn new(program: &Program, device: &Device, extensions: &Extensions) -> Result<Self, Error> {
-        let program = &if extensions.fuses_on(device) {
-            program.fused()
-        } else {
-            program.clone()
-        };
-        #[allow(unreachable_patterns, reason = "depends on the compiled backends")]
-        let interpreter = match device.as_dispatch() {
-            #[cfg(feature = "flex")]
-            DispatchDevice::Flex(device) => {
-                Interpreter::Flex(load(program, "flex", device, &extensions.flex)?)
-            }
-            #[cfg(feature = "ndarray")]
-            DispatchDevice::NdArray(device) => {
-                Interpreter::NdArray(load(program, "ndarray", device, &extensions.ndarray)?)
-            }
-            #[cfg(any(feature = "wgpu", feature = "cuda"))]
-            DispatchDevice::Cube(device) => {
-                Interpreter::Cube(load(program, "cube", device, &extensions.cube)?)
-            }
-            other => {
-                return Err(Error::Device {
-                    device: format!("{other:?}"),
-                });
-            }
-        };
-        Ok(Self {
-            program: program.clone(),
-            interpreter,
-            evaluated: false,
-        })
-    }
-
     /// The program that is loaded, with elementwise operations gathered if the backend has a handler for that.
     pub fn program(&self) -> &Program {
         &self.program
@@ -115,9 +66,8 @@ impl Linearization {
     /// live on another backend.
     pub fn value(&mut self, variables: &[Value], parameters: &[Value]) -> Result<Value, Error> {
         self.check_inputs(variables, parameters)?;
-        let block = &self.program.value;
-        let inputs = named("variable", variables).chain(named("parameter", parameters));
-        let mut outputs = on_backend!(self, it => run(it, block, inputs))?;
+        let mut inputs = named("variable", variables).chain(named("parameter", parameters));
+        let mut outputs = self.interpreter.run(&self.program.value, &mut inputs)?;
         outputs.pop().ok_or(Error::NoOutputs)
     }
 
@@ -130,9 +80,9 @@ impl Linearization {
     pub fn at(&mut self, variables: &[Value], parameters: &[Value]) -> Result<Evaluation, Error> {
         self.check_inputs(variables, parameters)?;
         self.forget();
-        let block = &self.program.primal;
-        let inputs = named("variable", variables).chain(named("parameter", parameters));
-        let mut outputs = on_backend!(self, it => run(it, block, inputs))?.into_iter();
+        let mut inputs = named("variable", variables).chain(named("parameter", parameters));
+        let outputs = self.interpreter.run(&self.program.primal, &mut inputs)?;
+        let mut outputs = outputs.into_iter();
         self.evaluated = true;
         Ok(Evaluation {
             value: outputs.next().ok_or(Error::NoOutputs)?,
@@ -154,9 +104,8 @@ impl Linearization {
             &self.program.directions,
             directions,
         )?;
-        let block = &self.program.tangent;
-        let inputs = named("direction", directions);
-        on_backend!(self, it => run(it, block, inputs))
+        let mut inputs = named("direction", directions);
+        self.interpreter.run(&self.program.tangent, &mut inputs)
     }
 
     /// Free what [`at`](Self::at) keeps for [`apply`](Self::apply).
@@ -165,10 +114,7 @@ impl Linearization {
             return;
         }
         self.evaluated = false;
-        let saved = &self.program.saved;
-        on_backend!(self, it => for t in saved {
-            it.register_op(OperationIr::Drop(t.clone()));
-        });
+        self.interpreter.free(&self.program.saved);
     }
 
     fn check_inputs(&self, variables: &[Value], parameters: &[Value]) -> Result<(), Error> {
@@ -220,13 +166,16 @@ fn check(
     Ok(())
 }
 
-/// An interpreter with the constants of the program in place.
-fn load<B: BackendIr>(
+/// A program on a backend, with its constants in place.
+fn load<B: BackendIr + 'static>(
     program: &Program,
     backend: &'static str,
     device: &<B as BackendTypes>::Device,
     registry: &CustomOpRegistry<B>,
-) -> Result<Box<TensorInterpreter<B>>, Error> {
+) -> Result<Linearization, Error>
+where
+    DispatchTensor: DispatchKindConversion<B>,
+{
     if let Some(missing) = program
         .custom_operations()
         .find(|id| !registry.known.contains(*id))
@@ -236,6 +185,11 @@ fn load<B: BackendIr>(
             backend,
         });
     }
+    let program = if registry.known.contains(ELEMENTWISE) {
+        program.fused()
+    } else {
+        program.clone()
+    };
     let mut it = TensorInterpreter::with_custom_ops(device.clone(), registry.handlers.clone());
     for (t, data) in &program.sources.constants {
         it.register_tensor_data_id(t.id, data.clone());
@@ -243,41 +197,64 @@ fn load<B: BackendIr>(
     for operation in &program.constant {
         it.register_op(operation.clone());
     }
-    Ok(Box::new(it))
+    Ok(Linearization {
+        program,
+        interpreter: Box::new(it),
+        evaluated: false,
+    })
 }
 
-fn run<'a, B: BackendIr>(
-    it: &mut TensorInterpreter<B>,
-    block: &Block,
-    inputs: impl Iterator<Item = Named<'a>>,
-) -> Result<Vec<Value>, Error>
+/// Burn's interpreter on whichever backend.
+trait Interpreter: Send {
+    /// Runs a block on its inputs, and takes its outputs.
+    fn run(
+        &mut self,
+        block: &Block,
+        inputs: &mut dyn Iterator<Item = Named<'_>>,
+    ) -> Result<Vec<Value>, Error>;
+
+    /// Frees tensors.
+    fn free(&mut self, tensors: &[TensorIr]);
+}
+
+impl<B: BackendIr> Interpreter for TensorInterpreter<B>
 where
     DispatchTensor: DispatchKindConversion<B>,
 {
-    for (id, (role, index, value)) in block.inputs.iter().zip(inputs) {
-        let Some(id) = id else { continue };
-        let primitive =
-            <DispatchTensor as DispatchKindConversion<B>>::try_into_backend(value.0.clone())
-                .map_err(|reason| Error::Backend {
-                    role,
-                    index,
-                    reason,
-                })?;
-        it.register_tensor_to_device(*id, HandleKind::Float(primitive.float()));
-    }
-    for operation in &block.operations {
-        it.register_op(operation.clone());
-    }
-    Ok(block
-        .outputs
-        .iter()
-        .map(|out| {
-            let HandleKind::Float(tensor) = it.get_tensor(out) else {
+    fn run(
+        &mut self,
+        block: &Block,
+        inputs: &mut dyn Iterator<Item = Named<'_>>,
+    ) -> Result<Vec<Value>, Error> {
+        for (id, (role, index, value)) in block.inputs.iter().zip(inputs) {
+            let Some(id) = id else { continue };
+            let primitive =
+                <DispatchTensor as DispatchKindConversion<B>>::try_into_backend(value.0.clone())
+                    .map_err(|reason| Error::Backend {
+                        role,
+                        index,
+                        reason,
+                    })?;
+            self.register_tensor_to_device(*id, HandleKind::Float(primitive.float()));
+        }
+        for operation in &block.operations {
+            self.register_op(operation.clone());
+        }
+        let output = |out| {
+            let HandleKind::Float(tensor) = self.get_tensor(out) else {
                 unreachable!("outputs of traced functions are float tensors")
             };
+            let tensor = BackendTensor::Float(tensor);
             Value(<DispatchTensor as DispatchKindConversion<B>>::from_backend(
-                BackendTensor::Float(tensor),
+                tensor,
             ))
-        })
-        .collect())
+        };
+        Ok(block.outputs.iter().map(output).collect())
+    }
+
+    fn free(&mut self, tensors: &[TensorIr]) {
+        for t in tensors {
+            self.register_op(OperationIr::Drop(t.clone()));
+        }
+    }
 }

@@ -14,6 +14,7 @@ use burn::backend::ir::{
 };
 use burn::tensor::{DType, Shape};
 
+use crate::Error;
 use crate::emit::Emitter;
 use crate::ir::{EXPRESSION_IDS, TANGENT_IDS, like, output, read_only, rename, tensor};
 
@@ -447,29 +448,6 @@ impl Builder {
         self.tangent.emit_one(operation)
     }
 
-    /// Tangents of the outputs of an operation that is linear in each input separately.
-    pub fn multilinear(
-        &mut self,
-        operation: &CustomOpIr,
-        tangents: &[Option<TensorIr>],
-    ) -> Vec<Option<TensorIr>> {
-        let mut sums: Vec<Tangent> = vec![None; operation.outputs.len()];
-        for (i, tangent) in tangents.iter().enumerate() {
-            let Some(tangent) = tangent else { continue };
-            let e = self.expression(tangent);
-            let (factor, atom) = self.evaluate(e);
-            let mut replaced = operation.clone();
-            replaced.inputs[i] = read_only(&atom);
-            let outputs = self.tangent.emit(OperationIr::Custom(replaced));
-            for (sum, out) in sums.iter_mut().zip(outputs) {
-                *sum = self.plus(sum.take(), Some(Expression::atom(out).scale(factor)));
-            }
-        }
-        sums.into_iter()
-            .map(|sum| sum.map(|e| self.handle(e)))
-            .collect()
-    }
-
     /// Elementwise product of a primal tensor with a tangent of the same rank.
     pub fn mul(&mut self, primal: &TensorIr, tangent: &TensorIr) -> TensorIr {
         let e = self.expression(tangent);
@@ -486,21 +464,10 @@ impl Builder {
         self.tangent_or_zeros(sum, &a.shape, a.dtype)
     }
 
-    /// Difference of two tangents of the same shape.
-    pub fn sub(&mut self, a: &TensorIr, b: &TensorIr) -> TensorIr {
-        let b = self.neg(b);
-        self.add(a, &b)
-    }
-
     /// Multiple of a tangent.
     pub fn scale(&mut self, tangent: &TensorIr, factor: f64) -> TensorIr {
         let e = Self::scaled(Some(self.expression(tangent)), factor);
         self.tangent_or_zeros(e, &tangent.shape, tangent.dtype)
-    }
-
-    /// Negative of a tangent.
-    pub fn neg(&mut self, tangent: &TensorIr) -> TensorIr {
-        self.scale(tangent, -1.0)
     }
 
     fn tangent_or_zeros(&mut self, tangent: Tangent, shape: &Shape, dtype: DType) -> TensorIr {
@@ -509,4 +476,33 @@ impl Builder {
             None => self.or_zeros(None, shape, dtype),
         }
     }
+}
+
+/// Tangents of the outputs of an operation, in their order; none is zero.
+pub type Tangents = Result<Vec<Option<TensorIr>>, Error>;
+
+/// Rule of operations that are linear in each input separately: convolutions, transforms, products.
+///
+/// The tangent is the sum over the active inputs of the operation with that input replaced by its
+/// tangent.
+#[expect(clippy::missing_errors_doc, reason = "it is a rule")]
+pub fn multilinear(
+    operation: &CustomOpIr,
+    tangents: &[Option<TensorIr>],
+    build: &mut Builder,
+) -> Tangents {
+    let mut sums: Vec<Tangent> = vec![None; operation.outputs.len()];
+    for (i, tangent) in tangents.iter().enumerate() {
+        let Some(tangent) = tangent else { continue };
+        let e = build.expression(tangent);
+        let (factor, atom) = build.evaluate(e);
+        let mut replaced = operation.clone();
+        replaced.inputs[i] = read_only(&atom);
+        let outputs = build.tangent.emit(OperationIr::Custom(replaced));
+        for (sum, out) in sums.iter_mut().zip(outputs) {
+            *sum = build.plus(sum.take(), Some(Expression::atom(out).scale(factor)));
+        }
+    }
+    let handles = sums.into_iter().map(|sum| sum.map(|e| build.handle(e)));
+    Ok(handles.collect())
 }

@@ -229,7 +229,7 @@ fn record(
         let outputs = f(&session).map_err(|error| failure = Some(error)).ok();
         let ids = outputs.as_ref().map(|outputs| Ids::new(&session, outputs));
         let completed = match &ids {
-            Some(ids) => scope.complete(ids.inputs.clone(), ids.unique.clone()),
+            Some(ids) => scope.complete(ids.inputs(), ids.unique.clone()),
             None => scope.complete([], []),
         };
         found = ids;
@@ -243,18 +243,13 @@ fn record(
         reason: error.to_string(),
     })?;
     let ids = found.ok_or(Error::NoOutputs)?;
-    let inputs = (specs(variables), specs(parameters));
-    Ok(build(
-        captured.graph.operations,
-        captured.values,
-        &ids,
-        inputs,
-    ))
+    Ok(build(captured.graph.operations, captured.values, &ids))
 }
 
-/// Identifiers on the capture device.
+/// What the inputs and outputs are called on the capture device.
 struct Ids {
-    inputs: Vec<TensorId>,
+    variables: Vec<TensorIr>,
+    parameters: Vec<TensorIr>,
     value: TensorId,
     outputs: Vec<Option<TensorId>>,
     /// Outputs without repetitions, as the capture device wants them.
@@ -263,7 +258,10 @@ struct Ids {
 
 impl Ids {
     fn new(session: &Session, (value, outputs): &Outputs) -> Self {
-        let inputs = session.variables.iter().chain(&session.parameters);
+        let describe = |symbol: &Symbol| {
+            let (shape, dtype) = (symbol.shape(), symbol.dtype());
+            tensor(symbol.id().value(), shape, dtype)
+        };
         let value = value.id();
         let outputs: Vec<_> = outputs.iter().map(|o| o.as_ref().map(Symbol::id)).collect();
         let mut unique = vec![value];
@@ -273,22 +271,18 @@ impl Ids {
             }
         }
         Self {
-            inputs: inputs.map(Symbol::id).collect(),
+            variables: session.variables.iter().map(describe).collect(),
+            parameters: session.parameters.iter().map(describe).collect(),
             value,
             outputs,
             unique,
         }
     }
-}
 
-/// Shape and element type of an input.
-type Spec = (Shape, DType);
-
-fn specs(values: &[Value]) -> Vec<Spec> {
-    values
-        .iter()
-        .map(|value| (value.0.shape(), value.dtype()))
-        .collect()
+    fn inputs(&self) -> Vec<TensorId> {
+        let inputs = self.variables.iter().chain(&self.parameters);
+        inputs.map(|t| t.id).collect()
+    }
 }
 
 /// Symbols for the inputs, without values: a function that reads data fails to trace instead of
@@ -303,18 +297,14 @@ fn open(device: &Device, dtype: DType, variables: &[Value], parameters: &[Value]
         .try_into_primitive::<Capture>()
         .expect("tensors created on a capture device live there");
     let client = seed.client.clone();
-    let symbols = |values: &[Value]| -> Vec<Symbol> {
-        specs(values)
-            .into_iter()
-            .map(|(shape, dtype)| {
-                RouterTensor::new(client.create_empty_handle(), shape, dtype, client.clone())
-            })
-            .collect()
+    let symbol = |value: &Value| {
+        let (id, shape) = (client.create_empty_handle(), value.0.shape());
+        RouterTensor::new(id, shape, value.dtype(), client.clone())
     };
     let session = Session {
         device: device.clone(),
-        variables: symbols(variables),
-        parameters: symbols(parameters),
+        variables: variables.iter().map(symbol).collect(),
+        parameters: parameters.iter().map(symbol).collect(),
     };
     let inputs = session.variables.iter().chain(&session.parameters);
     client.register_op(OperationIr::Custom(CustomOpIr {
@@ -331,7 +321,6 @@ fn build(
     mut operations: Vec<OperationIr>,
     values: impl IntoIterator<Item = (TensorId, TensorData)>,
     ids: &Ids,
-    (variables, parameters): (Vec<Spec>, Vec<Spec>),
 ) -> Graph {
     operations.retain(|operation| match operation {
         OperationIr::Init(_) | OperationIr::Drop(_) => false,
@@ -339,36 +328,22 @@ fn build(
         _ => true,
     });
     let mut numbers: HashMap<TensorId, TensorIr> = HashMap::new();
-    let mut number = |old: Option<TensorId>, shape: Shape, dtype: DType, next: &mut u64| {
-        let new = tensor(*next, shape, dtype);
-        *next += 1;
-        if let Some(old) = old {
-            numbers.insert(old, new.clone());
-        }
+    let mut next = 0;
+    let mut number = |old: TensorId, shape: &Shape, dtype: DType| {
+        let new = tensor(next, shape.clone(), dtype);
+        next += 1;
+        numbers.insert(old, new.clone());
         new
     };
-    let mut next = 0;
-    let mut known = ids.inputs.iter();
-    let mut inputs = |specs: Vec<Spec>, next: &mut u64| -> Vec<TensorIr> {
-        specs
-            .into_iter()
-            .map(|(shape, dtype)| number(known.next().copied(), shape, dtype, next))
-            .collect()
-    };
-    let variables = inputs(variables, &mut next);
-    let parameters = inputs(parameters, &mut next);
-    let constants: Vec<(TensorIr, TensorData)> = values
+    let mut renamed = |t: &TensorIr| number(t.id, &t.shape, t.dtype);
+    let variables: Vec<TensorIr> = ids.variables.iter().map(&mut renamed).collect();
+    let parameters = ids.parameters.iter().map(&mut renamed).collect();
+    let constants = values
         .into_iter()
-        .map(|(id, data)| {
-            let tensor = number(Some(id), data.shape().clone(), data.dtype(), &mut next);
-            (tensor, data)
-        })
+        .map(|(id, data)| (number(id, data.shape(), data.dtype()), data))
         .collect();
-    for operation in &mut operations {
-        let outputs: Vec<TensorIr> = operation.outputs().cloned().collect();
-        for out in outputs {
-            number(Some(out.id), out.shape, out.dtype, &mut next);
-        }
+    for out in operations.iter().flat_map(OperationIr::outputs) {
+        number(out.id, &out.shape, out.dtype);
     }
     let outputs = ids
         .outputs

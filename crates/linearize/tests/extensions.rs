@@ -291,11 +291,12 @@ fn rules_combine_tangents() {
                 ..operation.clone()
             });
             let tripled = build.scale(&blurred, 3.0);
-            let difference = build.sub(&tripled, &tangent);
+            let negative = build.scale(&tangent, -1.0);
+            let difference = build.add(&tripled, &negative);
             let weighted = build.mul(&operation.inputs[0], &tangent);
             let sum = build.add(&difference, &weighted);
             let zero = build.scale(&tangent, 0.0);
-            let nothing = build.neg(&zero);
+            let nothing = build.scale(&zero, -1.0);
             Ok(vec![Some(build.add(&sum, &nothing))])
         },
     );

@@ -100,3 +100,29 @@ pub enum Error {
     /// From the operations on the device.
     Operators(#[from] operators::Error),
 }
+
+impl Error {
+    /// Refuses another number, of entries or of dimensions, than the expected one.
+    pub(crate) fn check_count(
+        what: &'static str,
+        expected: usize,
+        found: usize,
+    ) -> Result<(), Self> {
+        if found == expected {
+            return Ok(());
+        }
+        Err(Self::Shape {
+            what,
+            expected: expected.to_string(),
+            found: found.to_string(),
+        })
+    }
+
+    /// Refuses numbers that are not finite.
+    pub(crate) fn check_finite(what: &'static str, values: &[f64]) -> Result<(), Self> {
+        match values.iter().position(|value| !value.is_finite()) {
+            Some(index) => Err(Self::NonFinite { what, index }),
+            None => Ok(()),
+        }
+    }
+}

@@ -79,20 +79,9 @@ impl Mlp {
                 found: format!("{layers:?}"),
             });
         }
-        let expected = parameter_count(&layers);
-        if parameters.len() != expected {
-            return Err(Error::Shape {
-                what: "activation parameters",
-                expected: expected.to_string(),
-                found: parameters.len().to_string(),
-            });
-        }
-        if let Some(index) = parameters.iter().position(|p| !p.is_finite()) {
-            return Err(Error::NonFinite {
-                what: "activation parameters",
-                index,
-            });
-        }
+        let what = "activation parameters";
+        Error::check_count(what, parameter_count(&layers), parameters.len())?;
+        Error::check_finite(what, &parameters)?;
         Ok(Self { layers, parameters })
     }
 
@@ -204,7 +193,7 @@ fn gaussian_series(s: [f64; 4]) -> [f64; 4] {
 
 /// The perceptron as a Burn graph of its flat parameters `[parameter_count]`, for inputs `[rows, 1]`.
 pub fn forward(widths: &[usize], parameters: &Tensor<1>, input: Tensor<2>) -> Tensor<2> {
-    forward_with(widths, parameters, input, |_, preactivation| preactivation)
+    forward_with(widths, parameters, input, |preactivation| preactivation)
 }
 
 /// As [`forward`], with a hook on every layer's pre-activation `[rows, outputs]`.
@@ -212,7 +201,7 @@ pub(crate) fn forward_with(
     widths: &[usize],
     parameters: &Tensor<1>,
     input: Tensor<2>,
-    mut hook: impl FnMut(usize, Tensor<2>) -> Tensor<2>,
+    mut hook: impl FnMut(Tensor<2>) -> Tensor<2>,
 ) -> Tensor<2> {
     let layout = layout(widths);
     let last = layout.len() - 1;
@@ -226,7 +215,7 @@ pub(crate) fn forward_with(
             .clone()
             .slice([layer.biases..layer.biases + layer.outputs])
             .reshape([1, layer.outputs]);
-        x = hook(l, x.matmul(weights) + biases);
+        x = hook(x.matmul(weights) + biases);
         if l < last {
             x = (x.clone() * x).neg().exp();
         }

@@ -74,19 +74,8 @@ impl Network {
         provenance: Provenance,
     ) -> Result<Self, Error> {
         ratios.validate()?;
-        if kernel.len() != ratios.kernel_len() {
-            return Err(Error::Shape {
-                what: "kernel",
-                expected: ratios.kernel_len().to_string(),
-                found: kernel.len().to_string(),
-            });
-        }
-        if let Some(index) = kernel.iter().position(|k| !k.is_finite()) {
-            return Err(Error::NonFinite {
-                what: "kernel",
-                index,
-            });
-        }
+        Error::check_count("kernel", ratios.kernel_len(), kernel.len())?;
+        Error::check_finite("kernel", &kernel)?;
         Ok(Self {
             ratios,
             kernel,
@@ -99,6 +88,13 @@ impl Network {
     /// The ratios it was trained for.
     pub fn ratios(&self) -> Ratios {
         self.ratios
+    }
+
+    /// The ratios of a network that must be of this dimension.
+    pub(crate) fn ratios_in(&self, dimension: usize) -> Result<Ratios, Error> {
+        let own = self.ratios.dimension;
+        Error::check_count("dimension of the network", dimension, own)?;
+        Ok(self.ratios)
     }
 
     /// Kernel `K`, row-major.

@@ -26,14 +26,7 @@ impl<const D: usize> MeanCurvatureOperator<D> {
     /// # Errors
     /// [`Error::Shape`] if the network is of another dimension; as [`crate::Mlp::table`].
     pub fn new(network: &Network, device: &ComputeDevice) -> Result<Self, Error> {
-        let ratios = network.ratios();
-        if ratios.dimension != D {
-            return Err(Error::Shape {
-                what: "dimension of the network",
-                expected: D.to_string(),
-                found: ratios.dimension.to_string(),
-            });
-        }
+        let ratios = network.ratios_in(D)?;
         let table = network.activation().table()?;
         let range = table.range();
         Ok(Self {

@@ -32,14 +32,7 @@ impl<const D: usize> SeparableOperator<D> {
     /// # Errors
     /// [`Error::NotSeparable`], [`Error::NoRest`], and as [`crate::MeanCurvatureOperator::new`].
     pub fn new(network: &Network, device: &ComputeDevice) -> Result<Self, Error> {
-        let ratios = network.ratios();
-        if ratios.dimension != D {
-            return Err(Error::Shape {
-                what: "dimension of the network",
-                expected: D.to_string(),
-                found: ratios.dimension.to_string(),
-            });
-        }
+        let ratios = network.ratios_in(D)?;
         let taps = factor::<D>(network.kernel(), ratios.width)?;
         let table = network.activation().table()?;
         let mass = taps.iter().sum::<f64>().powi(D as i32);

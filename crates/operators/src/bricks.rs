@@ -73,13 +73,14 @@ impl<const D: usize> Bricks<D> {
         Ok(bricks)
     }
 
-    fn place(&self, mut flat: usize) -> [usize; D] {
-        let mut place = [0; D];
-        for at in place.iter_mut().rev() {
-            *at = flat % self.per_axis;
-            flat /= self.per_axis;
-        }
-        place
+    /// The place of a brick along each axis, from its row-major index among all of the grid.
+    pub fn place(&self, flat: usize) -> [usize; D] {
+        digits(flat, self.per_axis)
+    }
+
+    /// The row-major index of a brick among all of the grid.
+    pub fn flat(&self, place: [usize; D]) -> usize {
+        flat(place, self.per_axis)
     }
 
     /// Cells along each axis of a brick, `B`.
@@ -126,23 +127,19 @@ impl<const D: usize> Bricks<D> {
 
     /// The number of the active brick at a place.
     pub fn number(&self, place: [usize; D]) -> Option<usize> {
-        usize::try_from(self.directory[flat(place, self.per_axis)]).ok()
+        usize::try_from(self.directory[self.flat(place)]).ok()
     }
 
     /// Whether a place is in the positive phase, if no brick is active there.
     pub fn is_positive(&self, place: [usize; D]) -> bool {
-        self.directory[flat(place, self.per_axis)] == POSITIVE
+        self.directory[self.flat(place)] == POSITIVE
     }
 
     /// Place on the grid of a stored cell.
     pub fn multi_index(&self, cell: usize) -> [usize; D] {
-        let mut index = self.places[cell / self.volume()];
-        let mut rest = cell % self.volume();
-        for at in index.iter_mut().rev() {
-            *at = *at * self.side + rest % self.side;
-            rest /= self.side;
-        }
-        index
+        let place = self.places[cell / self.volume()];
+        let inside: [usize; D] = digits(cell % self.volume(), self.side);
+        std::array::from_fn(|axis| place[axis] * self.side + inside[axis])
     }
 
     /// The stored cell at a place on the grid, if a brick is active there.
@@ -189,7 +186,7 @@ impl<const D: usize> Bricks<D> {
             for axis in 0..D {
                 for forward in [false, true] {
                     let beside = self.shifted(*place, axis, forward);
-                    table.push(f64::from(self.directory[flat(beside, self.per_axis)]));
+                    table.push(f64::from(self.directory[self.flat(beside)]));
                 }
             }
         }
@@ -214,7 +211,11 @@ impl<const D: usize> Bricks<D> {
     /// The values of the active bricks, of those of the whole grid.
     pub fn gather<T: Copy>(&self, dense: &[T]) -> Vec<T> {
         let mut values = Vec::with_capacity(self.len());
-        self.each_row(|start, _| values.extend_from_slice(&dense[start..start + self.side]));
+        // Row by row of the active bricks.
+        for cell in (0..self.len()).step_by(self.side) {
+            let start = flat(self.multi_index(cell), self.cells());
+            values.extend_from_slice(&dense[start..][..self.side]);
+        }
         values
     }
 
@@ -231,12 +232,7 @@ impl<const D: usize> Bricks<D> {
     pub fn read(&self, values: &[f64], rests: [f64; 2], start: usize, part: &mut [f64]) {
         // A row of a brick lies in one row of the grid.
         for (k, row) in part.chunks_exact_mut(self.side).enumerate() {
-            let mut flat = start + k * self.side;
-            let mut index = [0; D];
-            for at in index.iter_mut().rev() {
-                *at = flat % self.cells();
-                flat /= self.cells();
-            }
+            let index = digits(start + k * self.side, self.cells());
             match self.cell(index) {
                 Some(cell) => row.copy_from_slice(&values[cell..][..self.side]),
                 None => {
@@ -244,13 +240,6 @@ impl<const D: usize> Bricks<D> {
                     row.fill(rests[usize::from(phase)]);
                 }
             }
-        }
-    }
-
-    /// Calls with the first cell of every row of the active bricks, on the grid and in the order of storage.
-    fn each_row(&self, mut call: impl FnMut(usize, usize)) {
-        for cell in (0..self.len()).step_by(self.side) {
-            call(flat(self.multi_index(cell), self.cells()), cell);
         }
     }
 
@@ -277,6 +266,16 @@ impl<const D: usize> Bricks<D> {
 
 fn flat<const D: usize>(place: [usize; D], per_axis: usize) -> usize {
     place.iter().fold(0, |flat, at| flat * per_axis + at)
+}
+
+/// The inverse of [`flat`].
+fn digits<const D: usize>(mut flat: usize, per_axis: usize) -> [usize; D] {
+    let mut place = [0; D];
+    for at in place.iter_mut().rev() {
+        *at = flat % per_axis;
+        flat /= per_axis;
+    }
+    place
 }
 
 /// The bits of the places along all axes, interleaved: bricks that are near in this order are near in space.

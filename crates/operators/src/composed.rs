@@ -74,6 +74,14 @@ fn inverse<const R: usize>(z: Complex<R>, axes: usize) -> Tensor<R> {
     transform(z, axes, true).0 / points as f64
 }
 
+/// Places of a kernel's entries along an axis of `n` cells, its centre at the origin.
+fn wrapped(width: usize, n: usize, device: &Device) -> Tensor<1, Int> {
+    let places: Vec<i32> = (0..width)
+        .map(|i| (i as i32 - (width / 2) as i32).rem_euclid(n as i32))
+        .collect();
+    Tensor::from_data(TensorData::new(places, [width]), device)
+}
+
 /// The kernel on the grid `grid`, centre at the origin, as a tensor with `R` axes (leading ones of length 1).
 fn on_grid<const R: usize, const K: usize>(kernel: Tensor<K>, grid: &[usize]) -> Tensor<R> {
     let device = kernel.device();
@@ -85,10 +93,7 @@ fn on_grid<const R: usize, const K: usize>(kernel: Tensor<K>, grid: &[usize]) ->
         // Adds each slice at its wrapped place: a product with a 0-1 matrix would do the same with more work.
         let mut dims = full.dims();
         dims[axis] = n;
-        let indices: Vec<i32> = (0..width)
-            .map(|i| (i as i32 - (width / 2) as i32).rem_euclid(n as i32))
-            .collect();
-        let indices = Tensor::<1, Int>::from_data(TensorData::new(indices, [width]), &device);
+        let indices = wrapped(width, n, &device);
         let zeros = Tensor::<K>::zeros(dims, (&device, full.dtype()));
         full = zeros.select_assign(axis, indices, full, IndexingUpdateOp::Add);
     }
@@ -132,11 +137,7 @@ pub(crate) fn kernel_correlation<const R: usize, const K: usize>(
     }
     let mut correlation = inverse(product, K);
     for (axis, &n) in grid.iter().enumerate() {
-        let indices: Vec<i32> = (0..width)
-            .map(|i| (i as i32 - (width / 2) as i32).rem_euclid(n as i32))
-            .collect();
-        let indices = Tensor::<1, Int>::from_data(TensorData::new(indices, [width]), &device);
-        correlation = correlation.select(R - K + axis, indices);
+        correlation = correlation.select(R - K + axis, wrapped(width, n, &device));
     }
     correlation.reshape([width; K])
 }

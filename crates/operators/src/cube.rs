@@ -5,7 +5,7 @@ use burn::tensor::{DType, Tensor, TensorData};
 use burn_backend::TensorMetadata;
 
 use crate::composed;
-use crate::filter::{FilterOps, SpectralFilter};
+use crate::filter::SpectralFilter;
 use crate::ops::GridOps;
 use crate::profile;
 use crate::table::TableRange;
@@ -32,50 +32,29 @@ macro_rules! ranked {
     };
 }
 
+/// The same for the ranks of a batch of grids and of a kernel.
 macro_rules! gridded {
-    ($rank:expr, $axes:expr, $R:ident, $K:ident => $body:expr) => {
+    ($rank:expr, $axes:expr, $(($r:literal $k:literal))+, $R:ident, $K:ident => $body:expr) => {
         match ($rank, $axes) {
-            (2, 2) => {
-                const $R: usize = 2;
-                const $K: usize = 2;
+            $(($r, $k) => {
+                const $R: usize = $r;
+                const $K: usize = $k;
                 $body
-            }
-            (3, 2) => {
-                const $R: usize = 3;
-                const $K: usize = 2;
-                $body
-            }
-            (3, 3) => {
-                const $R: usize = 3;
-                const $K: usize = 3;
-                $body
-            }
-            (4, 2) => {
-                const $R: usize = 4;
-                const $K: usize = 2;
-                $body
-            }
-            (4, 3) => {
-                const $R: usize = 4;
-                const $K: usize = 3;
-                $body
-            }
-            shape => {
-                unreachable!("grids have 2 or 3 axes, 4 with the batch, got {shape:?}")
-            }
+            })+
+            shape => unreachable!("grids have 2 or 3 axes, 4 with the batch, got {shape:?}"),
         }
     };
 }
 
 impl GridOps for Cube {
     fn circular_convolution(x: CubeTensor, kernel: CubeTensor, adjoint: bool) -> CubeTensor {
-        gridded!(x.shape().num_dims(), kernel.shape().num_dims(), R, K => {
+        gridded!(x.shape().num_dims(), kernel.shape().num_dims(), (2 2) (3 2) (3 3) (4 2) (4 3), R, K => {
             down(composed::circular_convolution::<R, K>(up(x), up(kernel), adjoint))
         })
     }
 
     fn kernel_correlation(x: CubeTensor, g: CubeTensor, width: usize, axes: usize) -> CubeTensor {
-        gridded!(x.shape().num_dims(), axes, R, K => {
+        gridded!(x.shape().num_dims(), axes, (2 2) (3 2) (3 3) (4 2) (4 3), R, K => {
             down(composed::kernel_correlation::<R, K>(up(x), up(g), width))
         })
     }
@@ -98,19 +77,17 @@ impl GridOps for Cube {
     }
 }
 
-impl FilterOps for Cube {
+impl VectorOps for Cube {
+    fn inner_product(a: CubeTensor, b: CubeTensor) -> CubeTensor {
+        ranked!(a.shape().num_dims(), 1 2 3 4, R => down((up::<R>(a) * up::<R>(b)).sum()))
+    }
+
     fn spectral_filter(x: CubeTensor, filter: SpectralFilter) -> CubeTensor {
         ranked!(x.shape().num_dims(), 2 3, R => {
             let x = up::<R>(x);
             let symbol = filter.on_device(&x.device(), x.dtype());
             down(composed::spectral_filter::<R>(x, symbol))
         })
-    }
-}
-
-impl VectorOps for Cube {
-    fn inner_product(a: CubeTensor, b: CubeTensor) -> CubeTensor {
-        ranked!(a.shape().num_dims(), 1 2 3 4, R => down((up::<R>(a) * up::<R>(b)).sum()))
     }
 
     fn add_scaled(x: CubeTensor, y: CubeTensor, alpha: f64) -> CubeTensor {

@@ -2,8 +2,10 @@
 //!
 //! Entries are worked on in blocks that stay in the fastest cache, instruction by instruction.
 
+use std::borrow::Cow;
+
 use burn_backend::{DType, Shape, TensorData};
-use linearize::{CustomOpIr, Elementwise, Instruction, Output};
+use linearize::{Arithmetic, CustomOpIr, Elementwise, Instruction, Output, Right};
 use rayon::prelude::*;
 
 use crate::fft::{Real, is_f64};
@@ -15,23 +17,6 @@ const BLOCK: usize = 1 << 10;
 const CHUNK: usize = 1 << 14;
 /// Shorter vectors stay on one thread.
 const PARALLEL_FROM: usize = 1 << 15;
-
-/// An input of an elementwise program.
-pub(crate) enum Operand<'a, T> {
-    /// Entries whose memory can be reused for results.
-    Given(Vec<T>),
-    /// Entries that are only read.
-    Lent(&'a [T]),
-}
-
-impl<T: Real> Operand<'_, T> {
-    fn len(&self) -> usize {
-        match self {
-            Self::Given(values) => values.len(),
-            Self::Lent(values) => values.len(),
-        }
-    }
-}
 
 /// Values in either precision.
 #[derive(Debug, PartialEq)]
@@ -78,68 +63,53 @@ impl Values {
 }
 
 impl Target<'_> {
-    /// The entries themselves, where they have the precision of the loop.
     fn read<T: Real>(&self, start: usize, block: &mut [T]) {
-        let end = start + block.len();
         match self {
-            Self::Double(x) if is_f64::<T>() => {
-                block.copy_from_slice(bytemuck::cast_slice(&x[start..end]));
-            }
-            Self::Single(x) if !is_f64::<T>() => {
-                block.copy_from_slice(bytemuck::cast_slice(&x[start..end]));
-            }
-            _ => unreachable!("memory is reused in its own precision"),
+            Self::Double(x) => convert(&x[start..], block),
+            Self::Single(x) => convert(&x[start..], block),
         }
     }
 
     fn write<T: Real>(&mut self, start: usize, block: &[T]) {
-        let end = start + block.len();
         match self {
-            Self::Double(x) if is_f64::<T>() => {
-                x[start..end].copy_from_slice(bytemuck::cast_slice(block));
-            }
-            Self::Single(x) if !is_f64::<T>() => {
-                x[start..end].copy_from_slice(bytemuck::cast_slice(block));
-            }
-            Self::Double(x) => {
-                for (x, value) in x[start..end].iter_mut().zip(block) {
-                    *x = value.double();
-                }
-            }
-            Self::Single(x) => {
-                for (x, value) in x[start..end].iter_mut().zip(block) {
-                    *x = value.double() as f32;
-                }
-            }
+            Self::Double(x) => convert(block, &mut x[start..]),
+            Self::Single(x) => convert(block, &mut x[start..]),
         }
     }
 }
 
-/// Where the entries of an operand are while a task runs.
-enum Source<'a, T> {
-    Lent(&'a [T]),
+/// Copies entries, rounded if needed.
+fn convert<A: Real, B: Real>(from: &[A], to: &mut [B]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = B::of(from.double());
+    }
+}
+
+/// Where the entries of an input are while a task runs.
+enum Source<'a, T: Clone> {
+    Entries(Cow<'a, [T]>),
     /// One value for all entries.
     Single(T),
     /// In the memory of an output.
     Reused(usize),
 }
 
-/// Runs the program of an operation on its operands.
+/// Runs the program of an operation on its inputs. The memory of those that it owns is used for results.
 pub(crate) fn run_operation<T: Real>(
     operation: &CustomOpIr,
-    operands: Vec<Operand<'_, T>>,
+    inputs: Vec<Cow<'_, [T]>>,
 ) -> Vec<Values> {
     let dtypes: Vec<DType> = operation.outputs.iter().map(|out| out.dtype).collect();
-    run(&Elementwise::of(operation), operands, &dtypes)
+    run(&Elementwise::of(operation), inputs, &dtypes)
 }
 
 /// Runs a program; `dtypes` are the float types of its outputs.
-fn run<T: Real>(
+fn run<'a, T: Real>(
     program: &Elementwise,
-    operands: Vec<Operand<'_, T>>,
+    inputs: Vec<Cow<'a, [T]>>,
     dtypes: &[DType],
 ) -> Vec<Values> {
-    let len = operands.iter().map(Operand::len).max().unwrap_or(0);
+    let len = inputs.iter().map(|input| input.len()).max().unwrap_or(0);
     let own = if is_f64::<T>() {
         DType::F64
     } else {
@@ -152,34 +122,16 @@ fn run<T: Real>(
         .map(|(i, _)| i)
         .rev()
         .collect();
-    let mut kept = Vec::new();
-    let mut places = Vec::new();
-    for operand in operands {
-        places.push(match operand {
-            Operand::Lent([single]) if len > 1 => Place::Single(*single),
-            Operand::Given(values) if values.len() == 1 && len > 1 => Place::Single(values[0]),
-            Operand::Lent(values) => Place::Lent(values),
-            Operand::Given(values) => match free.pop() {
-                Some(output) => {
-                    results[output] = Some(Values::of(values));
-                    Place::Reused(output)
-                }
-                None => {
-                    kept.push(values);
-                    Place::Kept(kept.len() - 1)
-                }
-            },
-        });
-    }
-    let sources: Vec<Source<T>> = places
-        .into_iter()
-        .map(|place| match place {
-            Place::Single(value) => Source::Single(value),
-            Place::Lent(values) => Source::Lent(values),
-            Place::Kept(number) => Source::Lent(&kept[number]),
-            Place::Reused(output) => Source::Reused(output),
-        })
-        .collect();
+    let source = |input: Cow<'a, [T]>| match input {
+        single if single.len() == 1 && len > 1 => Source::Single(single[0]),
+        Cow::Owned(values) if !free.is_empty() => {
+            let output = free.pop().expect("it is not empty");
+            results[output] = Some(Values::of(values));
+            Source::Reused(output)
+        }
+        entries => Source::Entries(entries),
+    };
+    let sources: Vec<Source<T>> = inputs.into_iter().map(source).collect();
     let mut results: Vec<Values> = (results.into_iter().zip(&program.outputs).zip(dtypes))
         .map(|((reused, output), dtype)| match (reused, output) {
             (Some(values), _) => values,
@@ -219,15 +171,7 @@ fn run<T: Real>(
     results
 }
 
-/// As [`Source`], before the kept inputs have stopped moving.
-enum Place<'a, T> {
-    Single(T),
-    Lent(&'a [T]),
-    Kept(usize),
-    Reused(usize),
-}
-
-struct Machine<'a, T> {
+struct Machine<'a, T: Clone> {
     program: &'a Elementwise,
     sources: Vec<Source<'a, T>>,
 }
@@ -257,7 +201,7 @@ impl<T: Real> Machine<'_, T> {
             for (number, instruction) in self.program.instructions.iter().enumerate() {
                 let (before, rest) = registers.split_at_mut((inputs + number) * block);
                 let operand = |i: usize| self.operand(i, before, block, start, size);
-                compute(*instruction, &mut rest[..size], operand);
+                compute(instruction, &mut rest[..size], operand);
             }
             for (output, (target, total)) in
                 (self.program.outputs.iter()).zip(targets.iter_mut().zip(&mut sums))
@@ -285,49 +229,41 @@ impl<T: Real> Machine<'_, T> {
         size: usize,
     ) -> &'b [T] {
         match self.sources.get(i) {
-            Some(Source::Lent(values)) => &values[start..start + size],
+            Some(Source::Entries(values)) => &values[start..start + size],
             _ => &registers[i * block..][..size],
         }
     }
 }
 
 fn compute<'a, T: Real>(
-    instruction: Instruction,
+    &(arithmetic, left, right): &Instruction,
     result: &mut [T],
     operand: impl Fn(usize) -> &'a [T],
 ) {
-    let unary = |result: &mut [T], a: usize, f: &dyn Fn(&mut [T], &[T])| f(result, operand(a));
-    let binary = |result: &mut [T], a: usize, b: usize, f: &dyn Fn(&mut [T], &[T], &[T])| {
-        f(result, operand(a), operand(b));
-    };
-    // One loop for each operation, so that each is compiled to vector instructions.
-    macro_rules! two {
-        ($a:ident, $b:ident, $x:ident $op:tt $y:ident) => {
-            binary(result, $a, $b, &|r, a, b| {
-                for (r, (&$x, &$y)) in r.iter_mut().zip(a.iter().zip(b)) {
-                    *r = $x $op $y;
+    // Two loops for each operation, so that each is compiled to vector instructions.
+    macro_rules! each {
+        ($x:ident $op:tt $y:ident) => {
+            match right {
+                Right::Operand(right) => {
+                    let pairs = operand(left).iter().zip(operand(right));
+                    for (r, (&$x, &$y)) in result.iter_mut().zip(pairs) {
+                        *r = $x $op $y;
+                    }
                 }
-            })
+                Right::Number(number) => {
+                    let $y = T::of(number);
+                    for (r, &$x) in result.iter_mut().zip(operand(left)) {
+                        *r = $x $op $y;
+                    }
+                }
+            }
         };
     }
-    macro_rules! one {
-        ($a:ident, $x:ident $op:tt $number:ident) => {{
-            let number = T::of($number);
-            unary(result, $a, &|r, a| {
-                for (r, &$x) in r.iter_mut().zip(a) {
-                    *r = $x $op number;
-                }
-            })
-        }};
-    }
-    match instruction {
-        Instruction::Add(a, b) => two!(a, b, x + y),
-        Instruction::Sub(a, b) => two!(a, b, x - y),
-        Instruction::Mul(a, b) => two!(a, b, x * y),
-        Instruction::Div(a, b) => two!(a, b, x / y),
-        Instruction::AddNumber(a, number) => one!(a, x + number),
-        Instruction::MulNumber(a, number) => one!(a, x * number),
-        Instruction::DivNumber(a, number) => one!(a, x / number),
+    match arithmetic {
+        Arithmetic::Add => each!(x + y),
+        Arithmetic::Sub => each!(x - y),
+        Arithmetic::Mul => each!(x * y),
+        Arithmetic::Div => each!(x / y),
     }
 }
 
@@ -339,10 +275,10 @@ mod tests {
     fn program() -> Elementwise {
         Elementwise {
             instructions: vec![
-                Instruction::Mul(1, 2),
-                Instruction::Add(0, 3),
-                Instruction::Div(4, 0),
-                Instruction::MulNumber(5, 2.0),
+                (Arithmetic::Mul, 1, Right::Operand(2)),
+                (Arithmetic::Add, 0, Right::Operand(3)),
+                (Arithmetic::Div, 4, Right::Operand(0)),
+                (Arithmetic::Mul, 5, Right::Number(2.0)),
             ],
             outputs: vec![Output::Values(5), Output::Sum(6), Output::Values(1)],
         }
@@ -366,9 +302,9 @@ mod tests {
             for given in [false, true] {
                 let operand = |x: &'static [f64]| {
                     if given {
-                        Operand::Given(x.to_vec())
+                        Cow::Owned(x.to_vec())
                     } else {
-                        Operand::Lent(x)
+                        Cow::Borrowed(x)
                     }
                 };
                 let leak = |x: &[f64]| -> &'static [f64] { Vec::leak(x.to_vec()) };
@@ -400,9 +336,9 @@ mod tests {
                 .build()
                 .unwrap();
             let operands = vec![
-                Operand::Lent(&a[..]),
-                Operand::Lent(&b[..]),
-                Operand::Lent(&[0.5]),
+                Cow::Borrowed(&a[..]),
+                Cow::Borrowed(&b[..]),
+                Cow::Borrowed(&[0.5]),
             ];
             pool.install(|| run(&program(), operands, &[DType::F32, DType::F32, DType::F64]))
         };

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 use rustfft::num_traits::Float;
 
-use crate::brick_convolution::Lanes;
+use crate::lanes::Lanes;
 
 /// Columns of the first axis that are transformed together: two cache lines of complex doubles.
 const BLOCK: usize = 8;

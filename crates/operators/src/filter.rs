@@ -2,7 +2,6 @@
 
 use std::sync::{Arc, Mutex};
 
-use burn::backend::{Backend, backend_extension, tensor::FloatTensor};
 use burn::tensor::{DType, Device, Tensor, TensorData};
 
 use crate::composed::full_symbol;
@@ -123,15 +122,4 @@ impl SpectralFilter {
         }
         natural
     }
-}
-
-/// Multiplication in Fourier space; not differentiated, so neither captured nor on the tape.
-#[backend_extension(
-    Flex: cfg(feature = "flex"),
-    NdArray: cfg(feature = "ndarray"),
-    Cube: cfg(any(feature = "wgpu", feature = "cuda"))
-)]
-pub trait FilterOps: Backend {
-    /// Applies the circulant matrix to one grid.
-    fn spectral_filter(x: FloatTensor<Self>, filter: SpectralFilter) -> FloatTensor<Self>;
 }

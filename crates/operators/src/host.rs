@@ -1,15 +1,17 @@
 //! The extension operations on the CPU backends, through the host kernels, in `f64` or `f32`.
 
-use burn_backend::{Backend, DType, Element, Shape, TensorMetadata, tensor::FloatTensor};
+use burn_backend::{
+    Backend, DType, Element, Shape, TensorData, TensorMetadata, tensor::FloatTensor,
+};
 
 use crate::brick_convolution::{self, Ghosts};
 use crate::convolution::{convolve, correlate};
 use crate::fft::{Real, Transform};
-use crate::filter::{FilterOps, SpectralFilter};
+use crate::filter::SpectralFilter;
 use crate::ops::GridOps;
-use crate::slices;
 use crate::table::{TableRange, evaluate};
 use crate::vector::{self, SharedUpdate, VectorOps};
+use crate::{profile, slices};
 
 /// A backend whose tensors are in the memory of the host.
 pub(crate) trait Host: Backend {
@@ -29,6 +31,11 @@ pub(crate) trait Host: Backend {
         x: FloatTensor<Self>,
         f: impl FnOnce(&mut [T]),
     ) -> FloatTensor<Self>;
+}
+
+fn into_values<T: Element>(data: TensorData) -> Vec<T> {
+    data.try_into_vec()
+        .expect("the tensor has the element type of its dtype")
 }
 
 /// Runs a generic host kernel in the tensor's own precision.
@@ -111,23 +118,23 @@ impl<B: Host> GridOps for B {
     }
 }
 
-impl<B: Host> FilterOps for B {
-    fn spectral_filter(x: FloatTensor<B>, filter: SpectralFilter) -> FloatTensor<B> {
-        let (dtype, shape) = (x.dtype(), x.shape());
-        let x = B::lender(x);
-        in_precision!(dtype, T => {
-            let y = Transform::of_shape(&shape[..]).filter_real(B::values::<T>(&x), filter.symbol());
-            B::tensor(y, shape)
-        })
-    }
-}
-
 /// Changes `x` by a function of its values and those of `y`.
 macro_rules! changed {
     ($x:ident, $y:ident, $f:expr) => {{
         let y = B::lender($y);
         in_precision!($x.dtype(), T => B::changed::<T>($x, |x| $f(x, B::values(&y))))
     }};
+}
+
+/// Changes `x` by a function of each of its values and that of `y` there, in double precision.
+fn mapped<B: Host>(
+    x: FloatTensor<B>,
+    y: FloatTensor<B>,
+    f: impl Fn(f64, f64) -> f64 + Sync,
+) -> FloatTensor<B> {
+    changed!(x, y, |x: &mut [T], y| slices::zip_apply(x, y, |x, y| {
+        T::of(f(x.double(), y.double()))
+    }))
 }
 
 impl<B: Host> VectorOps for B {
@@ -138,18 +145,30 @@ impl<B: Host> VectorOps for B {
         B::tensor(vec![sum], vec![1].into())
     }
 
+    fn spectral_filter(x: FloatTensor<B>, filter: SpectralFilter) -> FloatTensor<B> {
+        let (dtype, shape) = (x.dtype(), x.shape());
+        let x = B::lender(x);
+        in_precision!(dtype, T => {
+            let y = Transform::of_shape(&shape[..]).filter_real(B::values::<T>(&x), filter.symbol());
+            B::tensor(y, shape)
+        })
+    }
+
     fn add_scaled(x: FloatTensor<B>, y: FloatTensor<B>, alpha: f64) -> FloatTensor<B> {
-        changed!(x, y, |x, y| vector::axpy(x, y, alpha))
+        changed!(x, y, |x: &mut [T], y| {
+            let alpha = T::of(alpha);
+            slices::zip_apply(x, y, |x, y| x + alpha * y);
+        })
     }
 
     fn retract(u: FloatTensor<B>, p: FloatTensor<B>, t: f64) -> FloatTensor<B> {
-        changed!(u, p, |u, p| vector::retract_values(u, p, t))
+        mapped::<B>(u, p, |u, p| profile::retracted(u, t * p))
     }
 
     fn extrapolate(u: FloatTensor<B>, previous: FloatTensor<B>, factor: f64) -> FloatTensor<B> {
-        changed!(u, previous, |u, before| vector::extrapolate_values(
-            u, before, factor
-        ))
+        mapped::<B>(u, previous, |u, before| {
+            profile::extrapolated(u, before, factor)
+        })
     }
 
     fn update_on_host(
@@ -163,13 +182,15 @@ impl<B: Host> VectorOps for B {
 
 #[cfg(feature = "flex")]
 pub(crate) mod flex {
+    use std::borrow::Cow;
+
     use burn_backend::{DType, Element, Shape, TensorData};
     use burn_flex::{Flex, FlexTensor};
     use burn_ir::TensorStatus;
     use linearize::{CustomOpRegistry, ELEMENTWISE};
 
     use super::Host;
-    use crate::elementwise::{self, Operand};
+    use crate::elementwise;
     use crate::fft::Real;
 
     fn contiguous(x: FlexTensor) -> FlexTensor {
@@ -212,25 +233,21 @@ pub(crate) mod flex {
                 .map(|t| contiguous(handles.get_float_tensor::<Flex>(t)))
                 .collect();
             let results = in_precision!(ir.inputs[0].dtype, T => {
-                // A tensor that was given away and that nobody else holds lends its memory to a result.
                 let (mut given, mut lent) = (Vec::new(), Vec::new());
                 for (x, ir) in inputs.into_iter().zip(&ir.inputs) {
-                    if ir.status == TensorStatus::ReadWrite && x.is_unique() {
-                        given.push(x.into_data().try_into_vec::<T>().ok());
-                        lent.push(None);
-                    } else {
-                        given.push(None);
-                        lent.push(Some(x));
-                    }
+                    // A tensor that was given away and that nobody else holds lends its memory to a result.
+                    let owned = ir.status == TensorStatus::ReadWrite && x.is_unique();
+                    let (give, lend) = if owned { (Some(x), None) } else { (None, Some(x)) };
+                    given.push(give.map(|x| super::into_values::<T>(x.into_data())));
+                    lent.push(lend);
                 }
-                let operands = (given.into_iter().zip(&lent))
-                    .map(|pair| match pair {
-                        (Some(values), _) => Operand::Given(values),
-                        (None, Some(x)) => Operand::Lent(Flex::values::<T>(x)),
-                        (None, None) => unreachable!("the tensor has the type of its description"),
+                let inputs = (given.into_iter().zip(&lent))
+                    .map(|(given, lent)| {
+                        let borrowed = lent.as_ref().map(|x| Cow::Borrowed(Flex::values::<T>(x)));
+                        given.map(Cow::Owned).or(borrowed).expect("it is either")
                     })
                     .collect();
-                elementwise::run_operation::<T>(ir, operands)
+                elementwise::run_operation::<T>(ir, inputs)
             });
             for (result, out) in results.into_iter().zip(&ir.outputs) {
                 let data = result.into_data(out.shape.clone());
@@ -248,16 +265,11 @@ pub(crate) mod ndarray {
     use burn_ndarray::NdArray;
     use linearize::{CustomOpRegistry, ELEMENTWISE};
 
-    use super::Host;
-    use crate::elementwise::{self, Operand};
+    use super::{Host, into_values};
+    use crate::elementwise;
     use crate::fft::Real;
 
     type NdTensor = FloatTensor<NdArray>;
-
-    fn into_values<T: Real + Element>(data: TensorData) -> Vec<T> {
-        data.try_into_vec()
-            .expect("the tensor has the element type of its dtype")
-    }
 
     impl Host for NdArray {
         type Lender = TensorData;
@@ -290,8 +302,8 @@ pub(crate) mod ndarray {
         registry.register(ELEMENTWISE, |handles, ir, _| {
             let inputs = (ir.inputs.iter()).map(|t| handles.get_float_tensor::<NdArray>(t));
             let results = in_precision!(ir.inputs[0].dtype, T => {
-                let operands = inputs.map(|x| Operand::Given(into_values::<T>(NdArray::lender(x)))).collect();
-                elementwise::run_operation::<T>(ir, operands)
+                let inputs = inputs.map(|x| into_values::<T>(NdArray::lender(x)).into()).collect();
+                elementwise::run_operation::<T>(ir, inputs)
             });
             for (result, out) in results.into_iter().zip(&ir.outputs) {
                 let data = result.into_data(out.shape.clone());

@@ -60,6 +60,7 @@ mod fft;
 mod filter;
 #[macro_use]
 mod host;
+mod lanes;
 mod open;
 mod ops;
 mod profile;
@@ -73,14 +74,12 @@ pub use convolution::kernel_symbol;
 pub use device::{ComputeDevice, DeviceKind};
 pub use error::Error;
 pub use fft::{Real, Transform};
-pub use filter::{FilterOps, SpectralFilter};
+pub use filter::SpectralFilter;
 pub use ops::GridOps;
 pub use rules::extensions;
 pub use table::{COEFFICIENTS, HermiteTable, TableRange};
-pub use tensor::{
-    brick_convolution, circular_convolution, kernel_correlation, spectral_filter, tabulated,
-};
+pub use tensor::{brick_convolution, circular_convolution, kernel_correlation, tabulated};
 pub use vector::{
     HostUpdate, HostVectors, SharedUpdate, VectorOps, add_scaled, extrapolate, inner_product,
-    retract, update_on_host,
+    retract, spectral_filter, update_on_host,
 };

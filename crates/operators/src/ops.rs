@@ -63,12 +63,8 @@ impl GridOps for CaptureBackend {
         adjoint: bool,
     ) -> FloatTensor<Self> {
         let shape = x.shape();
-        captured(
-            CONVOLUTION,
-            [x, kernel],
-            shape,
-            vec![ScalarIr::Bool(adjoint)],
-        )
+        let scalars = vec![ScalarIr::Bool(adjoint)];
+        captured(CONVOLUTION, vec![x, kernel], shape, scalars)
     }
 
     fn kernel_correlation(
@@ -78,7 +74,8 @@ impl GridOps for CaptureBackend {
         axes: usize,
     ) -> FloatTensor<Self> {
         let scalars = vec![ScalarIr::UInt(width as u64), ScalarIr::UInt(axes as u64)];
-        captured(CORRELATION, [x, g], Shape::from(vec![width; axes]), scalars)
+        let shape = Shape::from(vec![width; axes]);
+        captured(CORRELATION, vec![x, g], shape, scalars)
     }
 
     fn brick_convolution(
@@ -89,7 +86,7 @@ impl GridOps for CaptureBackend {
     ) -> FloatTensor<Self> {
         let shape = x.shape();
         let scalars = vec![ScalarIr::Bool(adjoint)];
-        captured(BRICKS, [x, taps, neighbours], shape, scalars)
+        captured(BRICKS, vec![x, taps, neighbours], shape, scalars)
     }
 
     fn tabulated(
@@ -105,7 +102,7 @@ impl GridOps for CaptureBackend {
             ScalarIr::Float(range.high),
             ScalarIr::UInt(range.cells as u64),
         ];
-        captured(TABULATED, [w, table], shape, scalars)
+        captured(TABULATED, vec![w, table], shape, scalars)
     }
 }
 

@@ -55,14 +55,14 @@ impl<B: Backend, const N: usize> Backward<B, N> for Recorded {
 }
 
 /// Records an operation with a result of this shape in a captured graph.
-pub fn captured<const N: usize>(
+pub fn captured(
     id: &'static str,
-    inputs: [FloatTensor<CaptureBackend>; N],
+    inputs: Vec<FloatTensor<CaptureBackend>>,
     shape: Shape,
     scalars: Vec<ScalarIr>,
 ) -> FloatTensor<CaptureBackend> {
     let client = inputs[0].client.clone();
-    let inputs = inputs.map(RouterTensor::into_ir);
+    let inputs: Vec<TensorIr> = inputs.into_iter().map(RouterTensor::into_ir).collect();
     let output = TensorIr::uninit(client.create_empty_handle(), shape, inputs[0].dtype);
     let operation = CustomOpIr::with_scalars(id, &inputs, &[output], scalars);
     client.register(OperationIr::Custom(operation)).output()

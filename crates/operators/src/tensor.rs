@@ -3,7 +3,6 @@
 use burn::backend::Dispatch;
 use burn::tensor::Tensor;
 
-use crate::filter::{FilterOps, SpectralFilter};
 use crate::ops::GridOps;
 use crate::table::TableRange;
 
@@ -70,13 +69,5 @@ pub fn tabulated<const R: usize>(
         table.into_dispatch(),
         range,
         order,
-    ))
-}
-
-/// Applies a symmetric circulant matrix given by its spectrum. Not differentiable.
-pub fn spectral_filter<const R: usize>(x: Tensor<R>, filter: &SpectralFilter) -> Tensor<R> {
-    Tensor::from_dispatch(<Dispatch as FilterOps>::spectral_filter(
-        x.into_dispatch(),
-        filter.clone(),
     ))
 }

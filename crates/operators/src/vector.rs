@@ -8,8 +8,7 @@ use burn::backend::{Backend, Dispatch, backend_extension, tensor::FloatTensor};
 use burn::tensor::Tensor;
 
 use crate::fft::{Real, is_f64};
-use crate::profile;
-use crate::slices::zip_apply;
+use crate::filter::SpectralFilter;
 
 /// Two vectors in the memory of the host, in the precision of their tensors.
 pub enum HostVectors<'a> {
@@ -39,6 +38,8 @@ pub struct SharedUpdate(pub(crate) Arc<dyn HostUpdate>);
 pub trait VectorOps: Backend {
     /// `sum a b`, shape `[1]`; accumulated and returned in double precision on a CPU.
     fn inner_product(a: FloatTensor<Self>, b: FloatTensor<Self>) -> FloatTensor<Self>;
+    /// [`spectral_filter`] on primitives.
+    fn spectral_filter(x: FloatTensor<Self>, filter: SpectralFilter) -> FloatTensor<Self>;
     /// `x + alpha y`.
     fn add_scaled(x: FloatTensor<Self>, y: FloatTensor<Self>, alpha: f64) -> FloatTensor<Self>;
     /// [`retract`] on primitives.
@@ -61,6 +62,12 @@ pub trait VectorOps: Backend {
 pub fn inner_product<const R: usize>(a: &Tensor<R>, b: &Tensor<R>) -> Tensor<1> {
     let (a, b) = (a.clone().into_dispatch(), b.clone().into_dispatch());
     Tensor::from_dispatch(<Dispatch as VectorOps>::inner_product(a, b))
+}
+
+/// Applies a symmetric circulant matrix given by its spectrum.
+pub fn spectral_filter<const R: usize>(x: Tensor<R>, filter: &SpectralFilter) -> Tensor<R> {
+    let (x, filter) = (x.into_dispatch(), filter.clone());
+    Tensor::from_dispatch(<Dispatch as VectorOps>::spectral_filter(x, filter))
 }
 
 /// `x + alpha y`, in place on a CPU if nobody else holds `x`.
@@ -116,21 +123,4 @@ pub(crate) fn call<T: Real>(update: &SharedUpdate, x: &[T], z: &mut [T]) {
         HostVectors::Single(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(z))
     };
     update.0.update(vectors);
-}
-
-pub(crate) fn axpy<T: Real>(x: &mut [T], y: &[T], alpha: f64) {
-    let alpha = T::of(alpha);
-    zip_apply(x, y, |x, y| x + alpha * y);
-}
-
-pub(crate) fn retract_values<T: Real>(u: &mut [T], p: &[T], t: f64) {
-    zip_apply(u, p, |u, p| {
-        T::of(profile::retracted(u.double(), t * p.double()))
-    });
-}
-
-pub(crate) fn extrapolate_values<T: Real>(u: &mut [T], previous: &[T], factor: f64) {
-    zip_apply(u, previous, |u, before| {
-        T::of(profile::extrapolated(u.double(), before.double(), factor))
-    });
 }

@@ -129,16 +129,6 @@ impl Curve {
         points.iter().map(distance).fold(0.0, f64::max)
     }
 
-    /// The largest distance of any point of the curve to the nearest of the segments, as those of a level set.
-    pub fn largest_distance_to(&self, segments: &[[[f64; 2]; 2]]) -> f64 {
-        const POINTS: usize = 4096;
-        let points = self.points();
-        let distances = |p: [f64; 2]| segments.iter().map(move |s| to_segment(p, *s));
-        let nearest = |p: &[f64; 2]| distances(*p).fold(f64::INFINITY, f64::min);
-        let some = points.iter().step_by(points.len().div_ceil(POINTS));
-        some.map(nearest).fold(0.0, f64::max)
-    }
-
     /// `theta(alpha)`, the angle of the tangent against the x axis.
     pub fn angle_at(&self, alpha: f64) -> f64 {
         alpha + self.real_part(&self.angle, alpha)
@@ -248,16 +238,4 @@ impl Curve {
 
 fn largest(coefficients: &[Complex<f64>]) -> f64 {
     coefficients.iter().map(|c| c.norm()).fold(0.0, f64::max)
-}
-
-fn to_segment(p: [f64; 2], [a, b]: [[f64; 2]; 2]) -> f64 {
-    let (edge, to_p) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
-    let squared = edge[0] * edge[0] + edge[1] * edge[1];
-    let along = if squared > 0.0 {
-        (edge[0] * to_p[0] + edge[1] * to_p[1]) / squared
-    } else {
-        0.0
-    };
-    let along = along.clamp(0.0, 1.0);
-    (to_p[0] - along * edge[0]).hypot(to_p[1] - along * edge[1])
 }

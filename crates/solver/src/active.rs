@@ -68,7 +68,7 @@ impl<const D: usize> Active<D> {
         let bricks = Bricks::new(
             self.grid.cells(),
             side,
-            |place| near[self.flat(place)],
+            |place| near[self.bricks.flat(place)],
             |place| field.values()[first(place)] > 0.0,
         )?;
         if bricks.is_empty() {
@@ -86,7 +86,7 @@ impl<const D: usize> Active<D> {
         if !near.contains(&true) {
             return Ok(None);
         }
-        self.replaced(u, |place| near[self.flat(place)])
+        self.replaced(u, |place| near[self.bricks.flat(place)])
     }
 
     /// The set with the bricks near the interface of `u`, if that has come near its edge.
@@ -94,14 +94,14 @@ impl<const D: usize> Active<D> {
         let needed = self.near(&*self.bricks, u, MARGIN);
         let places = (0..needed.len()).filter(|&brick| needed[brick]);
         let missing = places
-            .map(|brick| self.place(brick))
+            .map(|brick| self.bricks.place(brick))
             .any(|place| self.bricks.number(place).is_none());
         if !missing {
             return Ok(None);
         }
         let near = self.near(&*self.bricks, u, REACH);
         self.replaced(u, |place| {
-            near[self.flat(place)] || self.bricks.number(place).is_some()
+            near[self.bricks.flat(place)] || self.bricks.number(place).is_some()
         })
     }
 
@@ -133,26 +133,13 @@ impl<const D: usize> Active<D> {
         Ok(device.tensor(&carried, self.bricks.shape()))
     }
 
-    fn flat(&self, place: [usize; D]) -> usize {
-        let per_axis = self.bricks.per_axis();
-        place.iter().fold(0, |flat, at| flat * per_axis + at)
-    }
-
-    fn place(&self, mut flat: usize) -> [usize; D] {
-        let mut place = [0; D];
-        for at in place.iter_mut().rev() {
-            *at = flat % self.bricks.per_axis();
-            flat /= self.bricks.per_axis();
-        }
-        place
-    }
-
     /// For every brick of the grid, whether a cell of it is within `reach eps` of one beside a change of sign.
     fn near(&self, nodes: &impl Nodes<D>, u: &[f64], reach: f64) -> Vec<bool> {
         let (side, per_axis) = (self.bricks.side(), self.bricks.per_axis());
         let mut cells_of = vec![Vec::new(); per_axis.pow(D as u32)];
         for place in interface(nodes, u) {
-            cells_of[self.flat(place.map(|at| at / side))].push(place.map(|at| (at % side) as i64));
+            let brick = self.bricks.flat(place.map(|at| at / side));
+            cells_of[brick].push(place.map(|at| (at % side) as i64));
         }
         let reach = reach * self.eps / self.grid.spacing();
         let furthest = (reach / side as f64).floor() as i64 + 1;
@@ -161,7 +148,7 @@ impl<const D: usize> Active<D> {
         let holders: Vec<usize> = holders.collect();
         let reached: Vec<Vec<usize>> = (holders.par_iter())
             .map(|&brick| {
-                let place = self.place(brick);
+                let place = self.bricks.place(brick);
                 let offset = |mut number: i64| -> [i64; D] {
                     std::array::from_fn(|_| {
                         let offset = number % offsets - furthest;
@@ -176,7 +163,7 @@ impl<const D: usize> Active<D> {
                         cells.any(|cell| distance(*cell, *offset, side as i64) <= reach * reach)
                     })
                     .map(|offset| {
-                        self.flat(std::array::from_fn(|axis| {
+                        self.bricks.flat(std::array::from_fn(|axis| {
                             (place[axis] as i64 + offset[axis]).rem_euclid(per_axis as i64) as usize
                         }))
                     })

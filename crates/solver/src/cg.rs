@@ -1,19 +1,18 @@
 //! Truncated, preconditioned conjugate gradients.
 
-use burn::tensor::Tensor;
+use burn::tensor::{DType, Tensor};
 use operators::{ComputeDevice, add_scaled, inner_product};
 
-use crate::{Error, Objective};
+use crate::Error;
 
-/// How a conjugate-gradient solve ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum CgExit {
-    /// The residual fell below the tolerance.
-    Converged,
-    /// The iteration limit was reached; the direction is still a descent direction.
-    Limit,
-    /// A direction of negative curvature was met; the direction so far (or the first one) is used.
-    NegativeCurvature,
+/// The function `1/2 p . H p + g . p` of a motion `p`.
+pub(crate) struct Quadratic<'a, const D: usize> {
+    pub gradient: &'a Tensor<D>,
+    /// `H p`, in its own precision.
+    pub product: &'a mut dyn FnMut(&Tensor<D>) -> Result<Tensor<D>, Error>,
+    pub dtype: DType,
+    /// As [`crate::Objective::unit`].
+    pub unit: f64,
 }
 
 /// An approximate solution of `H p = -g`.
@@ -22,7 +21,8 @@ pub(crate) struct CgSolution<const D: usize> {
     /// `g . p`, negative for a descent direction.
     pub slope: f64,
     pub iterations: usize,
-    pub exit: CgExit,
+    /// Whether a direction of negative curvature was met; the direction so far (or the first one) is used.
+    pub negative_curvature: bool,
     /// `-g - H p`, in the precision of the products.
     pub residual: Tensor<D>,
 }
@@ -50,33 +50,36 @@ pub(crate) fn dot<const D: usize>(
     Ok(device.scalar(inner_product(a, b))?)
 }
 
-/// Solves `H p = -g` at the objective's point until the residual's norm `sqrt(r . M r)` is reduced, a direction of
-/// negative curvature appears (Steihaug), or the limit is reached. Vectors have the precision of the Hessian-vector products.
+/// Solves `H p = -g` until the residual's norm `sqrt(r . M r)` is reduced, a direction of
+/// negative curvature appears (Steihaug), or the limit is reached: the direction is one of descent in any case. Vectors have the precision of the Hessian-vector products.
 pub(crate) fn conjugate_gradients<const D: usize>(
-    objective: &mut impl Objective<D>,
-    gradient: &Tensor<D>,
+    quadratic: Quadratic<'_, D>,
     precondition: &dyn Fn(&Tensor<D>) -> Tensor<D>,
     limits: CgLimits,
     device: &ComputeDevice,
 ) -> Result<CgSolution<D>, Error> {
-    let full = gradient.dtype();
-    let working = objective.product_dtype().unwrap_or(full);
-    let mut residual = gradient.clone().neg().cast(working);
+    let Quadratic {
+        gradient,
+        product,
+        dtype,
+        unit,
+    } = quadratic;
+    let mut residual = gradient.clone().neg().cast(dtype);
     let z = precondition(&residual);
     let mut rz = dot(&residual, &z, device)?;
     let target = (limits.tolerance * limits.tolerance * rz).max(limits.least);
     let mut direction = z;
     let mut solution: Option<Tensor<D>> = None;
     let mut iterations = 0;
-    let mut exit = CgExit::Limit;
+    let mut negative_curvature = false;
     while iterations < limits.iterations {
-        let product = objective.hessian_vector_product(&direction)?;
+        let image = product(&direction)?;
         iterations += 1;
-        let curvature = dot(&direction, &product, device)?;
+        let curvature = dot(&direction, &image, device)?;
         // `rz / curvature` is the step: beyond this length it is rounding noise that made the curvature positive. NaN
         // leaves through the same door; the caller checks the slope.
-        if curvature.is_nan() || curvature * LONGEST_STEP <= rz * objective.unit() {
-            exit = CgExit::NegativeCurvature;
+        if curvature.is_nan() || curvature * LONGEST_STEP <= rz * unit {
+            negative_curvature = true;
             break;
         }
         let alpha = rz / curvature;
@@ -84,11 +87,10 @@ pub(crate) fn conjugate_gradients<const D: usize>(
             Some(p) => add_scaled(p, &direction, alpha),
             None => direction.clone() * alpha,
         });
-        residual = add_scaled(residual, &product, -alpha);
+        residual = add_scaled(residual, &image, -alpha);
         let z = precondition(&residual);
         let next = dot(&residual, &z, device)?;
         if next.abs() <= target {
-            exit = CgExit::Converged;
             break;
         }
         let beta = next / rz;
@@ -97,14 +99,14 @@ pub(crate) fn conjugate_gradients<const D: usize>(
     }
     // Negative curvature at once: the preconditioned steepest descent is still a descent direction. It carries the unit of
     // the energy, which conjugate gradients divide out otherwise.
-    let direction = solution.unwrap_or_else(|| direction * objective.unit().recip());
-    let direction = direction.cast(full);
+    let direction = solution.unwrap_or_else(|| direction * unit.recip());
+    let direction = direction.cast(gradient.dtype());
     let slope = dot(gradient, &direction, device)?;
     Ok(CgSolution {
         direction,
         slope,
         iterations,
-        exit,
+        negative_curvature,
         residual,
     })
 }

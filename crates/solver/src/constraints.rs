@@ -11,16 +11,17 @@
 
 use std::sync::Arc;
 
-use burn::tensor::{DType, Tensor};
+use burn::tensor::Tensor;
 use geometry::zero_set::{SizeHessian, Sizes, least_perimeter, reduced_volume};
 use geometry::{Field, Grid};
 use operators::{ComputeDevice, HostUpdate, HostVectors, inner_product, retract, update_on_host};
 use serde::{Deserialize, Serialize};
 
 use crate::active::Active;
-use crate::cg::{CgExit, CgLimits, CgSolution, conjugate_gradients, dot};
+use crate::cg::{CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
+use crate::error::check_positive;
 use crate::stored::Stored;
-use crate::{Error, Objective, Region};
+use crate::{Error, Region};
 
 /// How exactly targets are met in the end, relative to them, in double precision.
 const TOLERANCE: f64 = 1e-12;
@@ -83,12 +84,8 @@ impl Constraints {
     /// [`Error::PerimeterTooSmall`] for a perimeter below the least that encloses the volume.
     pub fn check<const D: usize>(&self, grid: &Grid<D>) -> Result<(), Error> {
         for (name, target) in NAMES.into_iter().zip(self.targets()) {
-            if let Some(value) = target.filter(|value| !(value.is_finite() && *value > 0.0)) {
-                return Err(Error::Parameter {
-                    name,
-                    value,
-                    expected: "positive and finite",
-                });
+            if let Some(value) = target {
+                check_positive(name, value)?;
             }
         }
         let Some(volume) = self.volume else {
@@ -315,6 +312,11 @@ impl<'a, const D: usize> Held<'a, D> {
         self.inside(wells.zip(bends).map(|(well, k)| well * k).collect())
     }
 
+    fn motions(&self, tangent: &Tangent<D>) -> Vec<Vec<f64>> {
+        let parts = tangent.parts.iter();
+        parts.map(|part| self.motion(tangent, *part)).collect()
+    }
+
     /// Zero where nothing may move.
     fn inside(&self, mut values: Vec<f64>) -> Vec<f64> {
         if let Some(region) = self.region {
@@ -329,11 +331,7 @@ impl<'a, const D: usize> Held<'a, D> {
 
     /// The motions that restore the constraints at a phase field, with what they change.
     fn correction(&self, tangent: &Tangent<D>) -> Correction {
-        let parts = &tangent.parts;
-        let motions: Vec<_> = parts
-            .iter()
-            .map(|part| self.motion(tangent, *part))
-            .collect();
+        let (parts, motions) = (&tangent.parts, self.motions(tangent));
         let mut changes = [[0.0; 2]; 2];
         for (row, part) in changes.iter_mut().zip(parts) {
             let gradient = self.gradient(tangent, *part);
@@ -346,11 +344,7 @@ impl<'a, const D: usize> Held<'a, D> {
 
     /// The multipliers for which the Lagrangian does not change along the motions that restore the constraints.
     fn estimate(&self, tangent: &Tangent<D>, gradients: &[Vec<f64>], force: &[f64]) -> [f64; 2] {
-        let parts = &tangent.parts;
-        let motions: Vec<_> = parts
-            .iter()
-            .map(|part| self.motion(tangent, *part))
-            .collect();
+        let (parts, motions) = (&tangent.parts, self.motions(tangent));
         let found = solve(
             parts.len(),
             |row| -product(force, &motions[row]),
@@ -372,16 +366,21 @@ impl<'a, const D: usize> Held<'a, D> {
         })
     }
 
-    /// Solves for the motion that minimizes the quadratic model of `objective`, with this gradient at its point, among those tangential to
-    /// the constraints. With `keep`, what is found out about the multipliers is remembered; without, the motion only cleans the profile.
+    /// Solves for the motion that minimizes a quadratic model of the energy among those tangential to the constraints. With `keep`, what is found out about the multipliers is remembered; without, the motion only cleans the profile.
     pub(crate) fn solve(
         &mut self,
-        objective: &mut impl Objective<D>,
-        (gradient, tangent): (&Tensor<D>, &Tangent<D>),
+        quadratic: Quadratic<'_, D>,
+        tangent: &Tangent<D>,
         precondition: &dyn Fn(&Tensor<D>) -> Tensor<D>,
         limits: CgLimits,
         keep: bool,
     ) -> Result<CgSolution<D>, Error> {
+        let Quadratic {
+            gradient,
+            product: of_energy,
+            dtype,
+            unit,
+        } = quadratic;
         let parts = &tangent.parts;
         let gradients: Vec<_> = parts
             .iter()
@@ -392,25 +391,34 @@ impl<'a, const D: usize> Held<'a, D> {
             self.multipliers = self.estimate(tangent, &gradients, &force);
         }
         let multipliers = self.multipliers;
-        let working = objective.product_dtype().unwrap_or(gradient.dtype());
         let (mut lagrangian, mut normals) = (gradient.clone(), Vec::new());
         for (part, values) in parts.iter().zip(&gradients) {
             let normal = self.device.tensor::<D>(values, gradient.dims());
             lagrangian = lagrangian + normal.clone() * multipliers[part.measure];
-            normals.push((part.measure, normal.cast(working)));
+            normals.push((part.measure, normal.cast(dtype)));
         }
         let projection = Projection::new(normals, precondition, self.device)?;
-        let mut objective = Lagrangian {
-            objective,
-            // To clean the profile, which is much stiffer, it is not needed.
-            curvature: keep.then(|| Arc::new(self.curvature(tangent))),
-            region: self.region,
+        // To clean the profile, which is much stiffer, it is not needed.
+        let curvature = keep.then(|| Arc::new(self.curvature(tangent)));
+        let mut product = |p: &Tensor<D>| {
+            let product = of_energy(p)?;
+            Ok(match &curvature {
+                Some(curvature) => {
+                    Region::project(self.region, update_on_host(p, product, curvature))
+                }
+                None => product,
+            })
+        };
+        let quadratic = Quadratic {
+            gradient: &lagrangian,
+            product: &mut product,
+            dtype,
+            unit,
         };
         let projected = |r: &Tensor<D>| projection.apply(precondition(r));
-        let solution =
-            conjugate_gradients(&mut objective, &lagrangian, &projected, limits, self.device)?;
+        let solution = conjugate_gradients(quadratic, &projected, limits, self.device)?;
         if keep {
-            self.solved = solution.exit != CgExit::NegativeCurvature;
+            self.solved = !solution.negative_curvature;
         }
         if keep && self.solved {
             let change = projection.multipliers(&solution.residual, self.device)?;
@@ -564,13 +572,6 @@ impl<const D: usize> Projection<D> {
     }
 }
 
-/// An objective with the second derivative of the constraints, times multipliers, added to its own.
-struct Lagrangian<'a, const D: usize, O> {
-    objective: &'a mut O,
-    curvature: Option<Arc<Curvature<D>>>,
-    region: Option<&'a Region<D>>,
-}
-
 /// Adds a product with the second derivative of the constraints.
 struct Curvature<const D: usize>(SizeHessian<D>);
 
@@ -586,38 +587,5 @@ impl<const D: usize> HostUpdate for Curvature<D> {
                 |node, value| product[node] += value as f32,
             ),
         }
-    }
-}
-
-impl<const D: usize, O: Objective<D>> Objective<D> for Lagrangian<'_, D, O> {
-    fn value(&mut self, u: &Tensor<D>) -> Result<f64, Error> {
-        self.objective.value(u)
-    }
-
-    fn evaluate(&mut self, u: &Tensor<D>) -> Result<(f64, Tensor<D>), Error> {
-        self.objective.evaluate(u)
-    }
-
-    fn hessian_vector_product(&mut self, p: &Tensor<D>) -> Result<Tensor<D>, Error> {
-        let mut product = self.objective.hessian_vector_product(p)?;
-        if let Some(curvature) = &self.curvature {
-            product = update_on_host(p, product, curvature);
-        }
-        Ok(match self.region {
-            Some(region) => region.project(product),
-            None => product,
-        })
-    }
-
-    fn product_dtype(&self) -> Option<DType> {
-        self.objective.product_dtype()
-    }
-
-    fn unit(&self) -> f64 {
-        self.objective.unit()
-    }
-
-    fn hold(&self, u: Tensor<D>) -> Tensor<D> {
-        self.objective.hold(u)
     }
 }

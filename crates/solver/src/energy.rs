@@ -8,7 +8,7 @@ use model::{BrickOperator, MeanCurvatureOperator};
 use operators::ComputeDevice;
 use serde::{Deserialize, Serialize};
 
-use crate::error::StepFailure;
+use crate::error::{StepFailure, check_positive};
 use crate::{Error, HelfrichTerms, PhaseInverse};
 
 /// Precision of the linear solves.
@@ -134,11 +134,6 @@ pub trait Objective<const D: usize> {
 
     /// The size of the curvature where the function is flattest and convex: the weight of `1/2 |u|^2` in it.
     fn unit(&self) -> f64;
-
-    /// `u` with the values that may not change put back, where there are such.
-    fn hold(&self, u: Tensor<D>) -> Tensor<D> {
-        u
-    }
 }
 
 /// The energy of one minimizing movement (eq:fully_discrete_willmore_flow_energy), scaled by `N / (2 eps)`:
@@ -171,26 +166,17 @@ impl<const D: usize> MinimizingMovement<D> {
         cells: usize,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
-        Self::with_terms(step, [cells; D], Precision::Device, None, device)
+        let shape = [cells; D];
+        Self::with_terms(step, shape, Precision::Device, (false, None), device)
     }
 
     /// As [`Self::new`], for tensors of any shape that the step takes, such as that of active bricks; with Hessian-vector products in single
-    /// precision if asked for and if the step allows it, and with spontaneous curvature, tension and pressure, if there are such.
+    /// precision if asked for and if the step allows it; with factors of the motion if `weighted`; and with spontaneous curvature, tension and
+    /// pressure, if there are such.
     ///
     /// # Errors
     /// As [`Self::new`].
     pub fn with_terms(
-        step: Arc<dyn MeanCurvatureStep<D>>,
-        shape: [usize; D],
-        products: Precision,
-        terms: Option<&HelfrichTerms<D>>,
-        device: &ComputeDevice,
-    ) -> Result<Self, Error> {
-        Self::trace(step, shape, products, (false, terms), device)
-    }
-
-    /// As [`Self::with_terms`]; if `weighted`, with factors of the motion, which are 1 until they are [set](Self::set_factors).
-    pub(crate) fn trace(
         step: Arc<dyn MeanCurvatureStep<D>>,
         shape: [usize; D],
         products: Precision,
@@ -244,13 +230,7 @@ impl<const D: usize> MinimizingMovement<D> {
     /// # Errors
     /// [`Error::Parameter`] unless `c` is positive and finite.
     pub fn set(&mut self, anchor: &Tensor<D>, stiffness: f64) -> Result<(), Error> {
-        if !(stiffness.is_finite() && stiffness > 0.0) {
-            return Err(Error::Parameter {
-                name: "tau / tautilde^2",
-                value: stiffness,
-                expected: "positive and finite",
-            });
-        }
+        check_positive("tau / tautilde^2", stiffness)?;
         self.anchor = anchor.clone().into();
         if self.stiffness.to_bits() != stiffness.to_bits() {
             self.stiffness = stiffness;
@@ -260,7 +240,7 @@ impl<const D: usize> MinimizingMovement<D> {
         Ok(())
     }
 
-    /// Sets the factors `s` of the motion.
+    /// Sets the factors `s` of the motion, which are 1 until then.
     pub(crate) fn set_factors(&mut self, factors: &Tensor<D>) {
         debug_assert!(self.factors.is_some(), "the energy is not weighted");
         self.factors = Some(factors.clone().into());

@@ -95,3 +95,33 @@ pub enum Error {
     #[error(transparent)]
     Geometry(#[from] geometry::Error),
 }
+
+impl Error {
+    /// The same of this time step.
+    pub(crate) fn at(mut self, number: usize) -> Self {
+        if let Self::NonFinite { step, .. } | Self::NotHeld { step, .. } = &mut self {
+            *step = number;
+        }
+        self
+    }
+}
+
+/// Refuses a parameter that is not as expected.
+pub(crate) fn check(
+    name: &'static str,
+    value: f64,
+    holds: bool,
+    expected: &'static str,
+) -> Result<(), Error> {
+    let error = Error::Parameter {
+        name,
+        value,
+        expected,
+    };
+    holds.then_some(()).ok_or(error)
+}
+
+pub(crate) fn check_positive(name: &'static str, value: f64) -> Result<(), Error> {
+    let holds = value.is_finite() && value > 0.0;
+    check(name, value, holds, "positive and finite")
+}

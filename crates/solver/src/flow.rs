@@ -11,14 +11,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::active::Active;
 use crate::constraints::{Constraints, Held};
+use crate::error::check_positive;
 use crate::newton::{NewtonInfo, NewtonParams, minimize_timed};
 use crate::preconditioner::{PhaseInverse, Preconditioner};
-use crate::region::Restricted;
 use crate::stored::Stored;
 use crate::times::PhaseTimes;
 use crate::{
-    Accuracy, Error, Exit, Helfrich, HelfrichTerms, MeanCurvatureStep, MinimizingMovement,
-    Objective, Region,
+    Accuracy, Error, Exit, Helfrich, HelfrichTerms, MeanCurvatureStep, MinimizingMovement, Region,
 };
 
 mod bricks;
@@ -58,13 +57,7 @@ impl FlowParams {
             ("calibration.energy", self.calibration.energy),
             ("calibration.metric", self.calibration.metric),
         ] {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(Error::Parameter {
-                    name,
-                    value,
-                    expected: "positive and finite",
-                });
-            }
+            check_positive(name, value)?;
         }
         Ok(())
     }
@@ -288,7 +281,7 @@ impl<const D: usize> WillmoreFlow<D> {
     ) -> Result<Self, Error> {
         let (shape, precision) = (current.dims(), params.newton.precision);
         let energy =
-            MinimizingMovement::trace(mcf.clone(), shape, precision, (false, None), device)?;
+            MinimizingMovement::with_terms(mcf.clone(), shape, precision, (false, None), device)?;
         Ok(Self {
             grid: *grid,
             params,
@@ -367,7 +360,7 @@ impl<const D: usize> WillmoreFlow<D> {
     }
 
     fn traced(&self, weighted: bool) -> Result<MinimizingMovement<D>, Error> {
-        MinimizingMovement::trace(
+        MinimizingMovement::with_terms(
             self.mcf.clone(),
             self.current.dims(),
             self.params.newton.precision,
@@ -563,48 +556,16 @@ impl<const D: usize> WillmoreFlow<D> {
         energy.set(anchor, stiffness)?;
         let (stored, eps) = ((self.grid, self.active.as_ref()), self.params.eps);
         let mut held = Held::new(&self.constraints, stored, eps, self.region.as_ref(), device);
-        let holding = held.as_mut();
-        let (u, newton, times) = match &self.region {
-            None => minimize_timed(
-                energy,
-                holding,
-                current,
-                start,
-                preconditioner,
-                params,
-                device,
-            ),
-            Some(region) => {
-                let mut energy = Restricted::new(energy, region, current);
-                let start = energy.hold(start.clone());
-                // Adding nothing makes 0.0 of -0.0.
-                minimize_timed(
-                    &mut energy,
-                    holding,
-                    current,
-                    &start,
-                    preconditioner,
-                    params,
-                    device,
-                )
-                .map(|(u, newton, times)| (energy.hold(u), newton, times))
-            }
-        }
-        .map_err(|error| match error {
-            Error::NonFinite { field, .. } => Error::NonFinite { step, field },
-            Error::NotHeld {
-                measure,
-                value,
-                target,
-                ..
-            } => Error::NotHeld {
-                step,
-                measure,
-                value,
-                target,
-            },
-            other => other,
-        })?;
+        let (u, newton, times) = minimize_timed(
+            energy,
+            (self.region.as_ref(), held.as_mut()),
+            current,
+            start,
+            preconditioner,
+            params,
+            device,
+        )
+        .map_err(|error| error.at(step))?;
         if newton.exit == Exit::IterationLimit {
             return Err(Error::NotConverged {
                 step,

@@ -5,6 +5,7 @@ use geometry::Grid;
 use operators::{ComputeDevice, circular_convolution};
 use serde::{Deserialize, Serialize};
 
+use crate::error::check;
 use crate::{Error, FlowParams};
 
 /// The second derivative by central differences of eighth order: weights of the node and of its neighbours.
@@ -45,13 +46,7 @@ impl Helfrich {
             ("tension", self.tension),
             ("pressure", self.pressure),
         ] {
-            if !value.is_finite() {
-                return Err(Error::Parameter {
-                    name,
-                    value,
-                    expected: "finite",
-                });
-            }
+            check(name, value, value.is_finite(), "finite")?;
         }
         Ok(())
     }

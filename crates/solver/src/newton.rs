@@ -9,11 +9,12 @@ use burn::tensor::Tensor;
 use operators::{ComputeDevice, retract};
 use serde::{Deserialize, Serialize};
 
-use crate::cg::{CgExit, CgLimits, CgSolution, conjugate_gradients, dot};
+use crate::cg::{CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
 use crate::constraints::{Held, Place, Tangent};
+use crate::error::check;
 use crate::preconditioner::Preconditioner;
-use crate::times::{PhaseTimes, Stopwatch, Timed};
-use crate::{Error, Objective, Precision};
+use crate::times::{PhaseTimes, Stopwatch};
+use crate::{Error, Objective, Precision, Region};
 
 /// Which minimization.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -87,25 +88,13 @@ impl NewtonParams {
             ("cg_tolerance", self.cg_tolerance),
             ("linear_accuracy", self.linear_accuracy.unwrap_or(0.5)),
         ] {
-            if !(value > 0.0 && value < 1.0) {
-                return Err(Error::Parameter {
-                    name,
-                    value,
-                    expected: "between 0 and 1",
-                });
-            }
+            check(name, value, value > 0.0 && value < 1.0, "between 0 and 1")?;
         }
         for (name, value) in [
             ("cg_iterations", self.cg_iterations),
             ("newton_iterations", self.newton_iterations),
         ] {
-            if value == 0 {
-                return Err(Error::Parameter {
-                    name,
-                    value: 0.0,
-                    expected: "at least 1",
-                });
-            }
+            check(name, value as f64, value > 0, "at least 1")?;
         }
         Ok(())
     }
@@ -189,7 +178,9 @@ struct Point<const D: usize> {
 }
 
 struct Minimizer<'a, 'h, const D: usize, O> {
-    objective: Timed<'a, O>,
+    objective: &'a mut O,
+    /// Outside of it, values stay as they were.
+    region: Option<&'a Region<D>>,
     held: Option<&'a mut Held<'h, D>>,
     params: NewtonParams,
     device: &'a ComputeDevice,
@@ -197,6 +188,8 @@ struct Minimizer<'a, 'h, const D: usize, O> {
     previous: &'a Tensor<D>,
     unknowns: f64,
     info: NewtonInfo,
+    products: Stopwatch,
+    energies: Stopwatch,
     preconditioning: Stopwatch,
     assembly: Stopwatch,
 }
@@ -216,7 +209,7 @@ pub fn minimize<const D: usize>(
 ) -> Result<(Tensor<D>, NewtonInfo), Error> {
     let (u, info, _) = minimize_timed(
         objective,
-        None,
+        (None, None),
         previous,
         start,
         preconditioner,
@@ -226,10 +219,10 @@ pub fn minimize<const D: usize>(
     Ok((u, info))
 }
 
-/// [`minimize`] with the time of its parts, and with measures held at targets.
+/// [`minimize`] with the time of its parts, in a region if there is one, and with measures held at targets.
 pub(crate) fn minimize_timed<const D: usize>(
     objective: &mut impl Objective<D>,
-    held: Option<&mut Held<'_, D>>,
+    (region, held): (Option<&Region<D>>, Option<&mut Held<'_, D>>),
     previous: &Tensor<D>,
     start: &Tensor<D>,
     preconditioner: Option<Preconditioner<D>>,
@@ -237,8 +230,8 @@ pub(crate) fn minimize_timed<const D: usize>(
     device: &ComputeDevice,
 ) -> Result<(Tensor<D>, NewtonInfo, PhaseTimes), Error> {
     params.validate()?;
-    let mut objective = Timed::new(objective);
-    let energy_before = objective.value(previous)?;
+    let energies = Stopwatch::default();
+    let energy_before = energies.time(|| objective.value(previous))?;
     if !energy_before.is_finite() {
         return Err(Error::NonFinite {
             step: 0,
@@ -247,6 +240,7 @@ pub(crate) fn minimize_timed<const D: usize>(
     }
     let mut minimizer = Minimizer {
         objective,
+        region,
         held,
         params,
         device,
@@ -264,6 +258,8 @@ pub(crate) fn minimize_timed<const D: usize>(
             energy: energy_before,
             estimate: f64::INFINITY,
         },
+        products: Stopwatch::default(),
+        energies,
         preconditioning: Stopwatch::default(),
         assembly: Stopwatch::default(),
     };
@@ -271,22 +267,28 @@ pub(crate) fn minimize_timed<const D: usize>(
         Method::Preconditioned => minimizer.preconditioned(start)?,
         Method::Paper => minimizer.paper()?,
     };
-    let u = minimizer.exact(u)?;
+    // Adding nothing makes 0.0 of -0.0.
+    let u = minimizer.hold(minimizer.exact(u)?);
     let times = PhaseTimes {
-        products: minimizer.objective.products.seconds(),
+        products: minimizer.products.seconds(),
         preconditioner: minimizer.preconditioning.seconds(),
         assembly: minimizer.assembly.seconds(),
-        energies: minimizer.objective.energies.seconds(),
+        energies: minimizer.energies.seconds(),
         start: 0.0,
     };
     Ok((u, minimizer.info, times))
 }
 
 impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
+    /// `u` with the values that may not change put back, where there are such.
+    fn hold(&self, u: Tensor<D>) -> Tensor<D> {
+        Region::hold(self.region, u, self.previous)
+    }
+
     /// The phase field near `u` at which the energy counts; none if nothing near it fulfils the constraints.
     fn place(&self, u: Tensor<D>) -> Result<Option<Place<D>>, Error> {
         match &self.held {
-            Some(held) => held.restored(u, false, |u| self.objective.hold(u)),
+            Some(held) => held.restored(u, false, |u| self.hold(u)),
             None => Ok(Some(Place { u, tangent: None })),
         }
     }
@@ -296,7 +298,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         let Some(held) = &self.held else {
             return Ok(u);
         };
-        match held.restored(u.clone(), true, |u| self.objective.hold(u))? {
+        match held.restored(u.clone(), true, |u| self.hold(u))? {
             Some(place) => Ok(place.u),
             None => Err(held.lost(&u)?),
         }
@@ -312,12 +314,12 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
     }
 
     fn point(&mut self, Place { u, tangent }: Place<D>) -> Result<Point<D>, Error> {
-        let (energy, gradient) = self.objective.evaluate(&u)?;
+        let (energy, gradient) = self.energies.time(|| self.objective.evaluate(&u))?;
         self.info.gradients += 1;
         Ok(Point {
             u,
             energy: energy + self.excess(tangent.as_ref()),
-            gradient,
+            gradient: Region::project(self.region, gradient),
             tangent,
         })
     }
@@ -336,7 +338,8 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
 
     fn energy(&mut self, place: &Place<D>) -> Result<f64, Error> {
         self.info.values += 1;
-        Ok(self.objective.value(&place.u)? + self.excess(place.tangent.as_ref()))
+        let energy = self.energies.time(|| self.objective.value(&place.u))?;
+        Ok(energy + self.excess(place.tangent.as_ref()))
     }
 
     /// What the energy counts for constraints that are not met to rounding.
@@ -362,18 +365,25 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
                 (None, _) => r.clone(),
             })
         };
-        let (objective, gradient) = (&mut self.objective, &point.gradient);
+        let gradient = &point.gradient;
+        let quadratic = Quadratic {
+            gradient,
+            dtype: (self.objective.product_dtype()).unwrap_or(gradient.dtype()),
+            unit: self.objective.unit(),
+            product: &mut |p| {
+                let product = (self.products).time(|| self.objective.hessian_vector_product(p))?;
+                Ok(Region::project(self.region, product))
+            },
+        };
         let solution = match (&mut self.held, &point.tangent) {
             (Some(held), Some(tangent)) => {
                 let keep = matches!(level, Level::Both);
-                held.solve(objective, (gradient, tangent), &precondition, limits, keep)?
+                held.solve(quadratic, tangent, &precondition, limits, keep)?
             }
-            _ => conjugate_gradients(objective, gradient, &precondition, limits, device)?,
+            _ => conjugate_gradients(quadratic, &precondition, limits, device)?,
         };
         self.info.hvp += solution.iterations;
-        if solution.exit == CgExit::NegativeCurvature {
-            self.info.negative_curvature += 1;
-        }
+        self.info.negative_curvature += usize::from(solution.negative_curvature);
         if !solution.slope.is_finite() {
             return Err(Error::NonFinite {
                 step: 0,
@@ -481,7 +491,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
     fn preconditioned(&mut self, start: &Tensor<D>) -> Result<Tensor<D>, Error> {
         const HOPELESS: f64 = 50.0;
         const SHORTEST: f64 = 0.02;
-        let place = match self.place(start.clone())? {
+        let place = match self.place(self.hold(start.clone()))? {
             Some(place) => place,
             None => self.rest()?,
         };
@@ -520,7 +530,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             if let Some(exit) = done {
                 let u = retract(&point.u, &solution.direction, sign);
                 let mut end = (point.u, point.energy);
-                if let Some(place) = self.place(self.objective.hold(u))? {
+                if let Some(place) = self.place(self.hold(u))? {
                     let energy = self.energy(&place)?;
                     if energy <= end.1 {
                         end = (place.u, energy);
@@ -532,8 +542,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             let mut next = None;
             while t >= SHORTEST {
                 let u = retract(&point.u, &solution.direction, sign * t);
-                let u = self.objective.hold(u);
-                let candidate = self.trial(u)?;
+                let candidate = self.trial(self.hold(u))?;
                 if let Some(candidate) =
                     candidate.filter(|c| c.energy < HOPELESS * point.energy.abs())
                 {

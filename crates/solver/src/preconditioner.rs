@@ -66,7 +66,7 @@ impl<const D: usize> From<SpectralFilter> for Preconditioner<D> {
 
 impl<const D: usize> Preconditioner<D> {
     /// With the coarse correction, for phase fields with interface width `eps` and a step of size `tau`.
-    pub fn two_level(phase: impl Into<PhaseInverse>, grid: &Grid<D>, eps: f64, tau: f64) -> Self {
+    pub fn two_level(phase: PhaseInverse, grid: &Grid<D>, eps: f64, tau: f64) -> Self {
         let scales = Scales {
             grid: *grid,
             eps,
@@ -74,7 +74,7 @@ impl<const D: usize> Preconditioner<D> {
             bricks: None,
         };
         Self {
-            phase: phase.into(),
+            phase,
             scales: Some(scales),
             interface: None,
             region: None,
@@ -129,9 +129,6 @@ impl<const D: usize> Preconditioner<D> {
     }
 
     fn projected(&self, z: Tensor<D>) -> Tensor<D> {
-        match &self.region {
-            Some(region) => region.project(z),
-            None => z,
-        }
+        Region::project(self.region.as_ref(), z)
     }
 }

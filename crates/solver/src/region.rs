@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use burn::tensor::{Bool, DType, Tensor};
+use burn::tensor::{Bool, Tensor};
 use geometry::Grid;
 use operators::{Bricks, ComputeDevice};
 
-use crate::{Error, Objective};
+use crate::Error;
 
 /// The grid nodes whose values may change; the others keep theirs, bit for bit.
 #[derive(Clone)]
@@ -70,60 +70,22 @@ impl<const D: usize> Region<D> {
         &self.nodes
     }
 
-    /// `x` inside, zero outside.
-    pub(crate) fn project(&self, x: Tensor<D>) -> Tensor<D> {
-        let inside = self.inside.clone().cast(x.dtype());
-        x * inside
-    }
-
-    /// `u` inside, `fixed` outside.
-    pub(crate) fn hold(&self, u: Tensor<D>, fixed: &Tensor<D>) -> Tensor<D> {
-        u.mask_where(self.outside.clone(), fixed.clone())
-    }
-}
-
-/// An objective as a function of the values in a region.
-pub(crate) struct Restricted<'a, const D: usize, O> {
-    objective: &'a mut O,
-    region: &'a Region<D>,
-    fixed: &'a Tensor<D>,
-}
-
-impl<'a, const D: usize, O> Restricted<'a, D, O> {
-    /// Outside the region the values are those of `fixed`.
-    pub(crate) fn new(objective: &'a mut O, region: &'a Region<D>, fixed: &'a Tensor<D>) -> Self {
-        Self {
-            objective,
-            region,
-            fixed,
+    /// `x` inside, zero outside, if there is a region.
+    pub(crate) fn project(region: Option<&Self>, x: Tensor<D>) -> Tensor<D> {
+        match region {
+            Some(region) => {
+                let inside = region.inside.clone().cast(x.dtype());
+                x * inside
+            }
+            None => x,
         }
     }
-}
 
-impl<const D: usize, O: Objective<D>> Objective<D> for Restricted<'_, D, O> {
-    fn value(&mut self, u: &Tensor<D>) -> Result<f64, Error> {
-        self.objective.value(u)
-    }
-
-    fn evaluate(&mut self, u: &Tensor<D>) -> Result<(f64, Tensor<D>), Error> {
-        let (value, gradient) = self.objective.evaluate(u)?;
-        Ok((value, self.region.project(gradient)))
-    }
-
-    fn hessian_vector_product(&mut self, p: &Tensor<D>) -> Result<Tensor<D>, Error> {
-        let product = self.objective.hessian_vector_product(p)?;
-        Ok(self.region.project(product))
-    }
-
-    fn product_dtype(&self) -> Option<DType> {
-        self.objective.product_dtype()
-    }
-
-    fn unit(&self) -> f64 {
-        self.objective.unit()
-    }
-
-    fn hold(&self, u: Tensor<D>) -> Tensor<D> {
-        self.region.hold(u, self.fixed)
+    /// `u` inside, `fixed` outside, if there is a region.
+    pub(crate) fn hold(region: Option<&Self>, u: Tensor<D>, fixed: &Tensor<D>) -> Tensor<D> {
+        match region {
+            Some(region) => u.mask_where(region.outside.clone(), fixed.clone()),
+            None => u,
+        }
     }
 }

@@ -98,7 +98,8 @@ fn derivatives<const D: usize>(cells: usize) {
     let shape = bricks.shape();
     let step = Arc::new(operator.on(&bricks, &device));
     let mut energy =
-        MinimizingMovement::with_terms(step, shape, Precision::Device, None, &device).unwrap();
+        MinimizingMovement::with_terms(step, shape, Precision::Device, (false, None), &device)
+            .unwrap();
     let [u, anchor, p] = [1, 2, 3].map(|seed| noise(bricks.len(), seed));
     energy.set(&device.tensor(&anchor, shape), 40.0).unwrap();
     let at = |t: f64| -> Vec<f64> { u.iter().zip(&p).map(|(u, p)| u + t * p).collect() };

@@ -32,8 +32,14 @@ fn energy_with<const D: usize>(
     let operator = MeanCurvatureOperator::new(network, &device).unwrap();
     let terms = HelfrichTerms::new(helfrich, 1.0, &params(grid), grid, &device).unwrap();
     let (shape, precision) = (grid.shape(), Precision::Device);
-    MinimizingMovement::with_terms(Arc::new(operator), shape, precision, Some(&terms), &device)
-        .unwrap()
+    MinimizingMovement::with_terms(
+        Arc::new(operator),
+        shape,
+        precision,
+        (false, Some(&terms)),
+        &device,
+    )
+    .unwrap()
 }
 
 fn derivatives<const D: usize>(network: &Network, cells: usize) {

@@ -62,26 +62,19 @@ pub(super) fn jvp(cx: &mut Context, dtype: DType, op: &Float) -> Option<Vec<Tang
 
 /// `r lʳ⁻¹ l̇ + lʳ ln(l) ṙ`
 fn powf(cx: &mut Context, b: &BinaryOpIr) -> Tangent {
-    let wrap = |op| OperationIr::Float(b.out.dtype, op);
-    let l = if cx.d(&b.lhs).is_some() {
+    let l = cx.d(&b.lhs).and_then(|dl| {
         let primal = &mut cx.build.primal;
-        let lower = primal.shift(&b.rhs, -1.0);
-        let power = primal.emit_one(wrap(Float::Powf(BinaryOpIr {
-            rhs: lower,
-            ..b.clone()
-        })));
+        let rhs = primal.shift(&b.rhs, -1.0);
+        let lower = Float::Powf(BinaryOpIr { rhs, ..b.clone() });
+        let power = primal.emit_one(OperationIr::Float(b.out.dtype, lower));
         let slope = primal.mul(&power, &b.rhs);
-        cx.times(&slope, cx.d(&b.lhs), &b.out)
-    } else {
-        None
-    };
-    let r = if cx.d(&b.rhs).is_some() {
+        cx.times(&slope, Some(dl), &b.out)
+    });
+    let r = cx.d(&b.rhs).and_then(|dr| {
         let log = cx.build.primal.unary(&b.lhs, Float::Log);
         let slope = cx.build.primal.mul(&b.out, &log);
-        cx.times(&slope, cx.d(&b.rhs), &b.out)
-    } else {
-        None
-    };
+        cx.times(&slope, Some(dr), &b.out)
+    });
     cx.build.plus(l, r)
 }
 

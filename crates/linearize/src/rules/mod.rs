@@ -112,7 +112,7 @@ fn custom(
     operation: &burn::backend::ir::CustomOpIr,
 ) -> Result<Vec<Tangent>, Error> {
     let id = &operation.id;
-    let rule = cx.extensions.rule_of(id).ok_or_else(|| Error::NoRule {
+    let rule = cx.extensions.rules.get(id).ok_or_else(|| Error::NoRule {
         operation: id.clone(),
     })?;
     let tangents: Vec<Option<TensorIr>> = operation
@@ -121,28 +121,22 @@ fn custom(
         .map(|t| cx.d(t).map(|e| cx.build.handle(e)))
         .collect();
     let outputs = rule(operation, &tangents, &mut cx.build)?;
-    if outputs.len() != operation.outputs.len() {
-        return Err(Error::Rule {
-            operation: id.clone(),
-            reason: format!(
-                "{} tangents for {} outputs",
-                outputs.len(),
-                operation.outputs.len()
-            ),
-        });
+    let wrong = |reason| {
+        let operation = id.clone();
+        Err(Error::Rule { operation, reason })
+    };
+    let (found, expected) = (outputs.len(), operation.outputs.len());
+    if found != expected {
+        return wrong(format!("{found} tangents for {expected} outputs"));
     }
     for (tangent, out) in outputs.iter().zip(&operation.outputs) {
         if let Some(tangent) = tangent
             && tangent.shape != out.shape
         {
-            return Err(Error::Rule {
-                operation: id.clone(),
-                reason: format!(
-                    "tangent of shape {:?} for an output of shape {:?}",
-                    tangent.shape.to_vec(),
-                    out.shape.to_vec()
-                ),
-            });
+            let (found, expected) = (tangent.shape.to_vec(), out.shape.to_vec());
+            return wrong(format!(
+                "tangent of shape {found:?} for an output of shape {expected:?}"
+            ));
         }
     }
     Ok(outputs

@@ -2,8 +2,8 @@
 
 use burn::backend::ir::{BaseOperationIr as Base, FloatOperationIr as Float};
 use burn::backend::ir::{
-    BinaryOpIr, CastOpIr, ClampOpIr, GatherOpIr, IntOperationIr, NumericOperationIr as Num,
-    OperationIr, PadModeIr, ReduceDimWithIndicesOpIr, ScalarIr, ScalarOpIr, TensorIr,
+    BinaryOpIr, CastOpIr, GatherOpIr, IntOperationIr, NumericOperationIr as Num, OperationIr,
+    PadModeIr, ReduceDimWithIndicesOpIr, ScalarIr, ScalarOpIr, TensorIr,
 };
 use burn::tensor::DType;
 
@@ -35,25 +35,21 @@ pub(super) fn jvp(
         Num::Div(b) => {
             let reciprocal = cx.build.primal.powi(&b.rhs, -1);
             let l = cx.times(&reciprocal, cx.d(&b.lhs), &b.out);
-            let r = if cx.d(&b.rhs).is_some() {
+            let r = cx.d(&b.rhs).and_then(|dr| {
                 let slope = cx.build.primal.mul(&b.out, &reciprocal);
-                Builder::scaled(cx.times(&slope, cx.d(&b.rhs), &b.out), -1.0)
-            } else {
-                None
-            };
-            cx.build.plus(l, r)
+                cx.times(&slope, Some(dr), &b.out)
+            });
+            cx.build.plus(l, Builder::scaled(r, -1.0))
         }
         // l mod r = l − r ⌊l/r⌋
         Num::Rem(b) => {
             let l = cx.d(&b.lhs).map(|e| cx.build.spread(e, &b.out.shape));
-            let r = if cx.d(&b.rhs).is_some() {
+            let r = cx.d(&b.rhs).and_then(|dr| {
                 let quotient = cx.build.primal.div(&b.lhs, &b.rhs);
                 let floor = cx.build.primal.unary(&quotient, Float::Floor);
-                Builder::scaled(cx.times(&floor, cx.d(&b.rhs), &b.out), -1.0)
-            } else {
-                None
-            };
-            cx.build.plus(l, r)
+                cx.times(&floor, Some(dr), &b.out)
+            });
+            cx.build.plus(l, Builder::scaled(r, -1.0))
         }
         Num::AddScalar(s) | Num::SubScalar(s) | Num::RemScalar(s) => cx.d(&s.lhs),
         Num::MulScalar(s) => Builder::scaled(cx.d(&s.lhs), s.rhs.elem()),
@@ -72,8 +68,11 @@ pub(super) fn jvp(
             let slope = powi_slope(cx, dtype, b);
             cx.times(&slope, cx.d(&b.lhs), &b.out)
         }
+        // Indicator of `min ≤ x ≤ max`.
         Num::Clamp(c) => {
-            let inside = inside(cx, c);
+            let above = cx.indicator(&c.tensor, c.min, Num::GreaterEqualElem);
+            let below = cx.indicator(&c.tensor, c.max, Num::LowerEqualElem);
+            let inside = cx.build.primal.mul(&above, &below);
             cx.times(&inside, cx.d(&c.tensor), &c.out)
         }
         Num::ClampMin(s) => {
@@ -97,8 +96,7 @@ pub(super) fn jvp(
             cx.linear(&wrap(Num::Pad(p)), &input)
         }
         Num::MaxDimWithIndices(m) | Num::MinDimWithIndices(m) => {
-            let value = gather(cx, &m.tensor, m.dim, &m.out_indices, &m.out);
-            return Some(vec![value, None]);
+            return Some(selected(cx, &m.tensor, m.dim, &m.out_indices, &m.out));
         }
         Num::MaxDim(r) | Num::MinDim(r) => {
             let variant = if matches!(op, Num::MaxDim(_)) {
@@ -115,12 +113,10 @@ pub(super) fn jvp(
             gather(cx, &r.input, r.axis, &indices[1], &r.out)
         }
         Num::TopKWithIndices(m) => {
-            let value = gather(cx, &m.tensor, m.dim, &m.out_indices, &m.out);
-            return Some(vec![value, None]);
+            return Some(selected(cx, &m.tensor, m.dim, &m.out_indices, &m.out));
         }
         Num::SortWithIndices(m) => {
-            let value = gather(cx, &m.input, m.dim, &m.out_indices, &m.out);
-            return Some(vec![value, None]);
+            return Some(selected(cx, &m.input, m.dim, &m.out_indices, &m.out));
         }
         // Piecewise constant, or not real.
         Num::Sign(_)
@@ -175,11 +171,15 @@ fn powi_slope(cx: &mut Context, dtype: DType, b: &BinaryOpIr) -> TensorIr {
     primal.mul(&power, &exponent)
 }
 
-/// Indicator of `min ≤ x ≤ max`.
-fn inside(cx: &mut Context, c: &ClampOpIr) -> TensorIr {
-    let above = cx.indicator(&c.tensor, c.min, Num::GreaterEqualElem);
-    let below = cx.indicator(&c.tensor, c.max, Num::LowerEqualElem);
-    cx.build.primal.mul(&above, &below)
+/// Tangents of selected elements and of their indices.
+fn selected(
+    cx: &mut Context,
+    input: &TensorIr,
+    dim: usize,
+    indices: &TensorIr,
+    out: &TensorIr,
+) -> Vec<Tangent> {
+    vec![gather(cx, input, dim, indices, out), None]
 }
 
 /// The tangent of selected elements is the selection of the tangent.

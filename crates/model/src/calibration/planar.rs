@@ -36,32 +36,6 @@ pub trait PlanarStep: Sync {
     }
 }
 
-impl<S: PlanarStep + ?Sized> PlanarStep for &S {
-    fn eps(&self) -> f64 {
-        (**self).eps()
-    }
-
-    fn time_step(&self) -> f64 {
-        (**self).time_step()
-    }
-
-    fn spacing(&self) -> f64 {
-        (**self).spacing()
-    }
-
-    fn linearize(&self, w: &Col<f64>) -> Result<(Col<f64>, Mat<f64>), Error> {
-        (**self).linearize(w)
-    }
-
-    fn bending(&self, w: &Col<f64>, slope: &Col<f64>) -> Col<f64> {
-        (**self).bending(w, slope)
-    }
-
-    fn mass(&self, planes: usize) -> Option<Mat<f64>> {
-        (**self).mass(planes)
-    }
-}
-
 /// The flat interface of a step at one position, and the factors of the scheme's energy that follow from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanarInterface {

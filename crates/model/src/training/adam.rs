@@ -131,13 +131,8 @@ impl AdamParams {
             Some(start) => start.clone(),
             None => paper_start(data, seed),
         };
-        if kernel.len() != data.ratios.kernel_len() {
-            return Err(Error::Shape {
-                what: "kernel to start from",
-                expected: data.ratios.kernel_len().to_string(),
-                found: kernel.len().to_string(),
-            });
-        }
+        let kernel_len = data.ratios.kernel_len();
+        Error::check_count("kernel to start from", kernel_len, kernel.len())?;
         let layers = activation.layers().to_vec();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let radii = data.draw_radii(data.count, &mut rng);
@@ -158,12 +153,8 @@ impl AdamParams {
             }
         };
         let n = kernel.len() + activation.parameters().len();
-        if state.parameters.len() != n || state.moments.iter().any(|m| m.len() != n) {
-            return Err(Error::Shape {
-                what: "training checkpoint",
-                expected: n.to_string(),
-                found: state.parameters.len().to_string(),
-            });
+        for part in state.moments.iter().chain([&state.parameters]) {
+            Error::check_count("training checkpoint", n, part.len())?;
         }
         let adam: Adam = AdamConfig::new().with_epsilon(1e-10).build();
         let upload = |values: &[f64]| device.tensor::<1>(values, [n]);
@@ -230,11 +221,7 @@ impl AdamParams {
                 training_loss: sum / batches,
                 held_out_loss: device.scalar(held)?,
             };
-            if !observer(&progress, &state)? {
-                return Err(Error::Interrupted {
-                    iteration: state.epoch,
-                });
-            }
+            progress.tell(observer, &state)?;
         }
         let (kernel, activation) = state.parameters.split_at(kernel.len());
         let activation = Mlp::new(layers, activation.to_vec())?;

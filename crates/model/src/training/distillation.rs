@@ -81,11 +81,7 @@ pub(super) fn distill_odd(
                 training_loss: loss,
                 held_out_loss: loss,
             };
-            if observer(&progress, &())? {
-                Ok(())
-            } else {
-                Err(Error::Interrupted { iteration })
-            }
+            progress.tell(observer, &())
         })
     };
     let mut best: Option<(f64, Vec<f64>)> = None;

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use super::distillation::{Distillation, distill_odd};
 use super::levenberg_marquardt::heat_kernel;
-use super::spheres::direction;
+use super::spheres::{BAND, direction, norm};
 use super::{Observer, Recipe, SphereData};
 use crate::{Error, Mlp, Ratios};
 
@@ -111,8 +111,6 @@ impl OddPolynomial {
     }
 }
 
-/// Half-width of the sampled band in units of `eps`.
-const BAND: f64 = 7.0;
 /// Number of samples across a flat interface.
 const ACROSS: usize = 64;
 /// Weight of `F(1) = 1`.
@@ -137,10 +135,6 @@ fn smoothed(kernel: &[(Vec<f64>, f64)], x: &[f64], u: impl Fn(&[f64]) -> f64) ->
             weight * u(&moved)
         })
         .sum()
-}
-
-fn norm(x: &[f64]) -> f64 {
-    x.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 /// Equations for a shrinking sphere; their weights make the identity map score 1.

@@ -14,7 +14,7 @@ use rand::{RngExt, SeedableRng};
 use serde::{Deserialize, Serialize};
 
 use super::{BandSamples, Observer, Orbits, Progress, Recipe, SphereData};
-use crate::mlp::{forward_with, layout, parameter_count};
+use crate::mlp::{forward, forward_with, layout, parameter_count};
 use crate::{Error, Mlp, PAPER_LAYERS};
 
 /// Rows of the Jacobian assembled at once.
@@ -82,7 +82,6 @@ pub(super) struct Problem<'a> {
     root_weight: Tensor<1>,
     rows: usize,
     orbits: usize,
-    widths: &'a [usize],
     /// Ridge per parameter and the values it pulls to.
     ridge: Vec<f64>,
     centre: Vec<f64>,
@@ -107,8 +106,7 @@ impl<'a> Problem<'a> {
     pub(super) fn new(
         samples: &BandSamples,
         sizes: &[usize],
-        widths: &'a [usize],
-        ridge: (Vec<f64>, Vec<f64>),
+        (ridge, centre): (Vec<f64>, Vec<f64>),
         device: &'a ComputeDevice,
     ) -> Self {
         let (rows, orbits) = (samples.target.len(), sizes.len());
@@ -121,9 +119,8 @@ impl<'a> Problem<'a> {
             root_weight: device.tensor(&root, [rows]),
             rows,
             orbits,
-            widths,
-            ridge: ridge.0,
-            centre: ridge.1,
+            ridge,
+            centre,
             sum: sizes.iter().map(|&s| s as f64).collect(),
             mix: None,
             device,
@@ -140,7 +137,7 @@ impl<'a> Problem<'a> {
         // One "orbit" whose value is frozen at 1 by an overwhelming ridge.
         let (mut weights, mut centre) = (vec![ridge; n + 1], vec![0.0; n + 1]);
         (weights[0], centre[0]) = (1e12, 1.0);
-        Self::new(samples, &[1], &PAPER_LAYERS, (weights, centre), device)
+        Self::new(samples, &[1], (weights, centre), device)
     }
 
     /// Loss and parameters after so many steps from `x`, fewer if none lowers the value; `observe` is told the parameters, the first one being
@@ -178,7 +175,7 @@ impl<'a> Problem<'a> {
     pub(super) fn value(&self, x: &[f64]) -> Result<(f64, f64), Error> {
         let (kernel, activation) = self.split(x);
         let z = self.design.clone().matmul(kernel);
-        let f = forward_with(self.widths, &activation, z, |_, a| a);
+        let f = forward(&PAPER_LAYERS, &activation, z);
         let residual = (f.reshape([self.rows]) - self.target.clone()) * self.root_weight.clone();
         let loss = match &self.mix {
             None => self.device.scalar((residual.clone() * residual).sum())?,
@@ -215,7 +212,7 @@ impl<'a> Problem<'a> {
         let mut leaves = Vec::new();
         let mut inputs = Vec::new();
         let device = z.device();
-        let f = forward_with(self.widths, &activation, z.clone(), |_, preactivation| {
+        let f = forward_with(&PAPER_LAYERS, &activation, z.clone(), |preactivation| {
             let leaf =
                 Tensor::<2>::zeros(preactivation.dims(), (&device, DType::F64)).require_grad();
             leaves.push(leaf.clone());
@@ -493,33 +490,18 @@ impl Recipe for LmParams {
         let n = orbits.count();
         let scale = training.identity_loss;
         let held_scale = held_out.identity_loss;
-        let held_out = Problem::new(
-            &held_out,
-            orbits.sizes(),
-            &PAPER_LAYERS,
-            (vec![0.0; ridge.len()], centre.clone()),
-            device,
-        );
-        let problem = Problem::new(
-            &training,
-            orbits.sizes(),
-            &PAPER_LAYERS,
-            (ridge, centre),
-            device,
-        );
+        let sizes = orbits.sizes();
+        let no_ridge = (vec![0.0; ridge.len()], centre.clone());
+        let held_out = Problem::new(&held_out, sizes, no_ridge, device);
+        let problem = Problem::new(&training, sizes, (ridge, centre), device);
         drop(training);
 
         let mut state = match state {
-            Some(state) if state.parameters.len() == n + activation_len => state,
-            Some(state) => {
-                return Err(Error::Shape {
-                    what: "training checkpoint",
-                    expected: (n + activation_len).to_string(),
-                    found: state.parameters.len().to_string(),
-                });
-            }
+            Some(state) => state,
             None => self.start(data, &heat, seed, device)?,
         };
+        let (count, found) = (n + activation_len, state.parameters.len());
+        Error::check_count("training checkpoint", count, found)?;
         while state.iteration < self.iterations
             && state.iteration <= state.improved_at + self.patience
         {
@@ -551,11 +533,7 @@ impl Recipe for LmParams {
                 training_loss: loss * scale,
                 held_out_loss: held,
             };
-            if !observer(&progress, &state)? {
-                return Err(Error::Interrupted {
-                    iteration: state.iteration,
-                });
-            }
+            progress.tell(observer, &state)?;
         }
         let (kernel, activation) = state.best.split_at(n);
         let activation = Mlp::new(PAPER_LAYERS.to_vec(), activation.to_vec())?;
@@ -609,13 +587,7 @@ mod tests {
         let x = [heat, random_activation(&mut rng)].concat();
         let centre = x.iter().map(|x| 0.9 * x).collect();
         let ridge = vec![1e-2; x.len()];
-        let problem = Problem::new(
-            &samples,
-            orbits.sizes(),
-            &PAPER_LAYERS,
-            (ridge, centre),
-            device,
-        );
+        let problem = Problem::new(&samples, orbits.sizes(), (ridge, centre), device);
         (problem, x)
     }
 

@@ -34,6 +34,18 @@ pub struct Progress {
     pub held_out_loss: f64,
 }
 
+impl Progress {
+    /// Tells an observer, who may end the training.
+    fn tell<State>(&self, observer: &mut Observer<'_, State>, state: &State) -> Result<(), Error> {
+        if observer(self, state)? {
+            return Ok(());
+        }
+        Err(Error::Interrupted {
+            iteration: self.iteration,
+        })
+    }
+}
+
 /// Called after every iteration of a training: `Ok(false)` stops it with [`Error::Interrupted`], and an error, such as that of storing
 /// a checkpoint, ends it.
 pub type Observer<'a, State> = dyn FnMut(&Progress, &State) -> Result<bool, Error> + 'a;

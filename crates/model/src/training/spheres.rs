@@ -135,7 +135,7 @@ pub struct BandSamples {
 }
 
 /// Half-width of the band in units of `eps`; beyond it the profile is within `1e-4` of a pure phase.
-const BAND: f64 = 7.0;
+pub(super) const BAND: f64 = 7.0;
 
 impl BandSamples {
     /// `shells` strata across the band, `directions` random points on each, for every radius.
@@ -185,7 +185,6 @@ impl BandSamples {
                     row[orbit] += optimal_profile(squared.sqrt() - radius, eps);
                 }
             });
-        let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
         let mut target: Vec<f64> = points
             .iter()
             .map(|(radius, x, _)| optimal_profile(norm(x) - data.shrunk(*radius), eps))
@@ -237,16 +236,20 @@ fn ball_volume(dimension: usize, radius: f64) -> f64 {
     sphere_area(dimension, radius) * radius / dimension as f64
 }
 
+pub(super) fn norm(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
 /// A random point at distance `rho` from the origin.
 pub(super) fn direction(dimension: usize, rho: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
     loop {
         let x: Vec<f64> = (0..dimension)
             .map(|_| rng.random_range(-1.0..1.0))
             .collect();
-        let norm = x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let length = norm(&x);
         // Rejection makes the direction uniform on the sphere.
-        if norm <= 1.0 && norm > 1e-3 {
-            return x.into_iter().map(|x| x * rho / norm).collect();
+        if length <= 1.0 && length > 1e-3 {
+            return x.into_iter().map(|x| x * rho / length).collect();
         }
     }
 }

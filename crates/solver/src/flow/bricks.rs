@@ -30,7 +30,7 @@ impl<const D: usize> WillmoreFlow<D> {
             })?;
             minimum = Minimum {
                 newton: again.newton.after(&minimum.newton),
-                times: again.times.after(&minimum.times),
+                times: minimum.times + again.times,
                 ..again
             };
         }

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{WillmoreFlow, download};
 use crate::Error;
+use crate::error::check;
 
 /// The origin of a start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -54,13 +55,8 @@ impl<const D: usize> WillmoreFlow<D> {
                 half.params.mcf_step,
             ),
         ] {
-            if own.to_bits() != other.to_bits() {
-                return Err(Error::Parameter {
-                    name,
-                    value: other,
-                    expected: "that of the flow, which begins there",
-                });
-            }
+            let same = own.to_bits() == other.to_bits();
+            check(name, other, same, "that of the flow, which begins there")?;
         }
         if let Some(region) = &self.region {
             half.restrict_to(&every_other_node(self.grid, region.marks()))?;
@@ -175,8 +171,7 @@ impl<const D: usize> WillmoreFlow<D> {
         };
         let moved = download(&half.grid, &(half.current.clone() - from), &half.device)?;
         let share = half.grid.len() as f64 / self.grid.len() as f64;
-        let hvp = share * (record.newton.hvp as f64 + record.start.hvp);
-        Ok(Some((moved, hvp)))
+        Ok(Some((moved, share * record.hvp())))
     }
 
     /// The last motions on the coarser grids, the finest first.
@@ -191,14 +186,10 @@ impl<const D: usize> WillmoreFlow<D> {
         let Some(half) = &mut self.half else {
             return Ok(());
         };
-        let (own, below) = match motions.split_first() {
-            Some((own, below)) => (Some(own), below),
-            None => (None, motions),
+        let Some((own, below)) = motions.split_first() else {
+            return half.set_half_motions(&[]);
         };
-        self.half_motion = match own {
-            Some(own) => Some(Field::from_values(half.grid, own.values().to_vec())?),
-            None => None,
-        };
+        self.half_motion = Some(Field::from_values(half.grid, own.values().to_vec())?);
         half.set_half_motions(below)
     }
 }
