@@ -80,7 +80,7 @@ fn case(
     let initial = exact(flow, radius, grid, 0.0)?;
     Ok(Case {
         measures,
-        ..study::case((flow, operator), &shape, initial, (STEP, steps))
+        ..planar_flow((flow, operator), &shape, initial, (STEP, steps))
     })
 }
 

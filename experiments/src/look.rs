@@ -74,3 +74,11 @@ pub fn outline(field: &Field<2>) -> Curve {
     let curves = zero_level(field, Interpolation::Profile).into_iter();
     Curve::new(curves.map(|curve| curve.points).collect::<Vec<_>>())
 }
+
+/// A negative power of two, as `2⁻⁹`.
+pub fn one_over_two_to(exponent: u32) -> String {
+    let digits = exponent.to_string();
+    let digits = digits.chars().filter_map(|c| c.to_digit(10));
+    let superscript = digits.filter_map(|digit| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize));
+    format!("2⁻{}", superscript.collect::<String>())
+}

@@ -29,6 +29,7 @@ pub use serde::Serialize;
 pub use serde_json::{Value, json};
 pub use solver::{NewtonParams, StepRecord};
 
+pub use crate::flows::{ACCURATE, PAPERS, operator, planar_flow, willmore_flow};
 pub use crate::networks::{EPS, NetworkOptions, STEP};
 pub use crate::options::{FigureOptions, RunOptions};
 pub use crate::session::{Session, Stage};

@@ -33,10 +33,15 @@ impl Stage<'_> {
     /// Runs a case to its end; the bar counts the steps.
     pub fn run<const D: usize>(&self, case: Case<D>) -> Result<Run<D>, Error> {
         let mut run = Run::new(case, self.device)?;
+        self.finish(&mut run)?;
+        Ok(run)
+    }
+
+    pub fn finish<const D: usize>(&self, run: &mut Run<D>) -> Result<(), Error> {
         while run.step()?.is_some() {
             self.bar.inc(1);
         }
-        Ok(run)
+        Ok(())
     }
 }
 
@@ -121,6 +126,13 @@ impl<'a> Session<'a> {
         table.write(&self.output, stem)?;
         self.remark(table.to_markdown());
         (metrics.into_iter()).try_for_each(|(name, value)| self.metric(&name, value))
+    }
+
+    /// Writes a table for programs alone.
+    pub fn csv<R>(&self, sheet: Sheet<'_, R>, stem: &str) -> Result<(), Error> {
+        let (table, _) = sheet.finish()?;
+        self.output.write(&format!("{stem}.csv"), table.to_csv()?)?;
+        Ok(())
     }
 
     /// Adds a metric, unless its value is missing.

@@ -2,9 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use crate::networks::{Chosen, convergence_network, scales};
+use crate::networks::{Chosen, convergence_network};
 use crate::prelude::*;
-use crate::surfaces::willmore_flow;
 
 /// Options of the studies.
 #[derive(Args, Clone, Debug)]
@@ -77,22 +76,12 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// Columns of tables that say which variant it is.
-    pub const COLUMNS: [&str; 4] = ["flow", "n", "method", "scheme"];
-
-    pub fn cells(&self) -> [Cell; 4] {
-        let texts = [self.flow.key(), self.method.key(), self.scheme.key()];
-        let [flow, method, scheme] = texts.map(Cell::from);
-        [flow, self.n.into(), method, scheme]
-    }
-
-    /// A row of a data table: those cells, and others.
-    pub fn row<const N: usize, const M: usize>(
-        &self,
-        which: [Cell; N],
-        numbers: [f64; M],
-    ) -> impl Iterator<Item = Cell> {
-        (self.cells().into_iter().chain(which)).chain(numbers.map(Cell::from))
+    /// Adds columns that say of which variant a row is.
+    pub fn columns<R>(sheet: Sheet<'_, R>, of: impl Fn(&R) -> Self) -> Sheet<'_, R> {
+        sheet
+            .data("n", |row| of(row).n)
+            .data("method", |row| of(row).method.key())
+            .data("scheme", |row| of(row).scheme.key())
     }
 
     /// Name in metrics after the flow or shape, such as `n128.hybrid_calibrated`.
@@ -163,38 +152,7 @@ impl Study {
     }
 }
 
-/// A flow at the scales of the convergence tests in equal steps, with nothing measured; the inner step of mean curvature flow is its step.
-pub fn case(
-    (flow, operator): (Flow, &Operator),
-    shape: &str,
-    initial: Field<2>,
-    (tau, steps): (f64, usize),
-) -> Case<2> {
-    let mcf_step = match flow {
-        Flow::MeanCurvature => tau,
-        Flow::Willmore => STEP,
-    };
-    let scales = Scales {
-        mcf_step,
-        ..scales()
-    };
-    let time = (StepRule::Constant(tau), steps);
-    Case {
-        flow,
-        measures: Vec::new(),
-        ..willmore_flow(shape, initial, operator.clone(), scales, time)
-    }
-}
-
 /// Mean over minimizations; nothing without any.
-/// A negative power of two, as `2⁻⁹`.
-pub fn one_over_two_to(exponent: u32) -> String {
-    let digits = exponent.to_string();
-    let digits = digits.chars().filter_map(|c| c.to_digit(10));
-    let superscript = digits.filter_map(|digit| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize));
-    format!("2⁻{}", superscript.collect::<String>())
-}
-
 pub fn mean<'a>(
     minimizations: impl Iterator<Item = &'a StepRecord>,
     of: impl Fn(&StepRecord) -> f64,

@@ -1,17 +1,17 @@
 //! Surfaces under Willmore flow: their scales, the shown steps of a run, and the pictures, tables and metrics of those.
 
-use engine::{Helfrich, Storage};
+use engine::Storage;
 use geometry::measure::BoundingBox;
-use model::{NeededNetwork, Networks};
+use model::NeededNetwork;
 use operators::memory;
 pub use render::View;
-use render::{Quality, Rgb, Scene, Tube};
-use surfaces::{ClosedMesh, Fairing, TriangleMesh};
+use render::{Picture, Quality, Rgb, Scene, Tube};
+use surfaces::ClosedMesh;
 
+use crate::look::one_over_two_to;
 use crate::networks::Chosen;
 use crate::prelude::*;
-use crate::steps::steps_csv;
-use crate::study::one_over_two_to;
+use crate::steps;
 
 const EPS_OVER_H: f64 = 2.0;
 const WIDTH: usize = 17;
@@ -57,7 +57,7 @@ impl Setting {
         let (networks, needed) = (self.networks.of(variant.1), needed_network());
         let (grid, scales) = (&self.grid, &self.scales);
         let mut operator = Operator::new(variant, &networks, &needed, grid, scales)?;
-        if variant == (Method::Hybrid, Scheme::Accurate) {
+        if variant == ACCURATE {
             operator.storage = Storage::Auto;
         }
         Ok(operator)
@@ -65,7 +65,7 @@ impl Setting {
 
     /// The parameters of a program for its manifest: the common ones, and others.
     pub fn parameters(&self, others: Value) -> Result<Value, Error> {
-        let papers = self.operator((Method::Hybrid, Scheme::Paper))?;
+        let papers = self.operator(PAPERS)?;
         let mut parameters = json!({
             "n": self.n, "box_side": self.grid.side(), "eps": self.scales.eps, "mcf_step": self.scales.mcf_step,
             "network": papers.network().map(|named| named.network.fingerprint()),
@@ -75,54 +75,6 @@ impl Setting {
         }
         Ok(parameters)
     }
-}
-
-/// Willmore flow as in the paper: everywhere, in whole steps.
-pub fn willmore_flow<const D: usize>(
-    shape: &str,
-    initial: Field<D>,
-    operator: Operator,
-    scales: Scales,
-    (rule, steps): (StepRule, usize),
-) -> Case<D> {
-    Case {
-        shape: shape.to_owned(),
-        initial,
-        region: None,
-        energy: Helfrich::default(),
-        held: Held::default(),
-        flow: Flow::Willmore,
-        operator,
-        scales,
-        steps: rule.into(),
-        stops: vec![Stop::Steps(steps)],
-        measures: Measure::size(scales.eps),
-    }
-}
-
-/// The accurate operator for the scales of a grid.
-pub fn accurate_operator<const D: usize>(
-    grid: &Grid<D>,
-    scales: &Scales,
-) -> Result<Operator, Error> {
-    let (needed, networks) = (scales.needs(D, grid.spacing()), Networks::default());
-    let accurate = (Method::Hybrid, Scheme::Accurate);
-    Ok(Operator::new(accurate, &networks, &needed, grid, scales)?)
-}
-
-/// Willmore flow from signed distances as `willmore fair` makes it, without its ends and measures.
-pub fn fairing_flow(title: &str, mut distance: Field<3>) -> Result<Case<3>, Error> {
-    surfaces::mend_signs(&mut distance);
-    let (grid, spacing) = (*distance.grid(), distance.grid().spacing());
-    let scales = Scales::of_grid(spacing, EPS_OVER_H);
-    let initial = distance.map(|s| optimal_profile(s, scales.eps));
-    let rule = StepRule::Graded {
-        first: Fairing::first_step(spacing),
-        part: Fairing::GROWTH,
-    };
-    let mut operator = accurate_operator(&grid, &scales)?;
-    operator.storage = Storage::Auto;
-    Ok(willmore_flow(title, initial, operator, scales, (rule, 0)))
 }
 
 #[derive(Args, Clone, Copy, Debug)]
@@ -290,8 +242,7 @@ impl Flowed {
             }
             let picture = scene.render([side; 2])?;
             picture.write_png(folder.path(&format!("{}.png", self.file(snapshot.step)))?)?;
-            let size = [picture.width() as usize, picture.height() as usize];
-            Ok(Raster::new(size, picture.pixels()).with_caption(&snapshot.caption))
+            Ok(raster(&picture, &snapshot.caption))
         };
         self.snapshots.iter().map(picture).collect()
     }
@@ -307,26 +258,10 @@ impl Flowed {
     }
 }
 
-/// A square picture of a scene.
-pub fn raster(scene: &Scene, side: u32, caption: impl Into<String>) -> Result<Raster, Error> {
-    let picture = scene.render([side; 2])?;
+/// A picture as a panel of a figure.
+pub fn raster(picture: &Picture, caption: impl Into<String>) -> Raster {
     let size = [picture.width(), picture.height()].map(|side| side as usize);
-    Ok(Raster::new(size, picture.pixels()).with_caption(caption))
-}
-
-/// A picture of a mesh in a frame.
-pub fn mesh_raster(
-    mesh: &TriangleMesh,
-    (up, frame): (UpAxis, BoundingBox<3>),
-    caption: impl Into<String>,
-) -> Result<Raster, Error> {
-    const SIDE: u32 = 420;
-    let scene = Scene::of_mesh(mesh.clone()).within(frame).view(View {
-        up,
-        azimuth: -60.0,
-        elevation: 25.0,
-    });
-    raster(&scene, SIDE, caption)
+    Raster::new(size, picture.pixels()).with_caption(caption)
 }
 
 /// Surfaces under Willmore flow by several methods, as a program shows them.
@@ -365,7 +300,7 @@ impl SurfaceFlows {
         for (surface, initial) in &self.surfaces {
             for &variant in &self.variants {
                 let mut surface = surface.clone();
-                if variant != (Method::Hybrid, Scheme::Paper) {
+                if variant != PAPERS {
                     // The paper reports energies of its own scheme.
                     surface.shown.iter_mut().for_each(|(_, w)| *w = None);
                 }
@@ -391,8 +326,7 @@ impl SurfaceFlows {
             ));
         session.figure(figure, "surfaces")?;
         let runs = all.iter().map(|one| (one.surface.key, &one.trajectory));
-        let output = &session.output;
-        output.write("steps.csv", steps_csv("surface", runs)?)?;
+        steps::write(&session, "surface", runs)?;
         for one in &all {
             let records = &one.trajectory.records;
             let metrics = [

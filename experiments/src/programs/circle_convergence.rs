@@ -3,7 +3,7 @@
 use crate::circles::{self, Circle, Ensemble};
 use crate::prelude::*;
 use crate::session::remove_folder;
-use crate::steps::{self, Rows};
+use crate::steps;
 use crate::study::{Study, StudyOptions, Variant};
 
 const PROGRAM: &str = "circle_convergence";
@@ -84,7 +84,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
         steps,
     };
     report.figures(&session)?;
-    report.data(&session.output)?;
+    report.data(&session)?;
     session.sheet(report.sheet(), "errors")?;
     report.metrics(&mut session)?;
     remove_folder(&session.output.subfolder(FINISHED)?)?;
@@ -221,36 +221,36 @@ impl Report {
             ))
     }
 
-    fn data(&self, output: &OutputDir) -> Result<(), Error> {
-        let table = |columns: &[&'static str]| Table::data(Variant::COLUMNS.iter().chain(columns));
-        let mut curves = table(&["step", "time", "l2_mean", "l2_min", "l2_max"]);
-        let mut circles = table(&["radius", "step", "time", "l2"]);
-        let mut runs = Vec::new();
+    fn data(&self, session: &Session<'_>) -> Result<(), Error> {
+        let times = (self.ensembles.iter()).flat_map(|e| (0..=self.steps).map(move |k| (e, k)));
+        let times: Vec<(&Ensemble, usize)> = times.collect();
+        let curves = Sheet::of(&times).data("flow", |(e, _)| e.variant.flow.key());
+        let curves = Variant::columns(curves, |(e, _)| e.variant)
+            .data("step", |(_, k)| *k)
+            .data("time", |(_, k)| time(*k))
+            .data("l2_mean", |(e, k)| e.mean_error(*k))
+            .data("l2_min", |(e, k)| e.error_range(*k)[0])
+            .data("l2_max", |(e, k)| e.error_range(*k)[1]);
+        session.csv(curves, "curves")?;
+        let (mut circles, mut steps) = (Vec::new(), Vec::new());
         for e in &self.ensembles {
-            for k in 0..=self.steps {
-                let [least, most] = e.error_range(k);
-                let errors = [time(k), e.mean_error(k), least, most];
-                curves.push(e.variant.row([k.into()], errors))?;
-            }
             for circle in &e.circles {
-                for k in self.shown_steps() {
-                    let which = [circle.radius.into(), k.into()];
-                    circles.push(e.variant.row(which, [time(k), circle.error(k)]))?;
+                circles.extend(self.shown_steps().map(|k| (e, circle, k)));
+                if e.variant.flow == Flow::Willmore {
+                    steps.extend(steps::of((e.variant, circle.radius), &circle.trajectory));
                 }
             }
-            if e.variant.flow == Flow::Willmore {
-                runs.extend(e.circles.iter().map(|circle| Rows {
-                    leading: [&e.variant.cells()[1..], &[circle.radius.into()]].concat(),
-                    start: None,
-                    records: &circle.trajectory.records,
-                }));
-            }
         }
-        let steps = steps::table(&[&Variant::COLUMNS[1..], &["radius"]].concat(), &runs)?;
-        for (name, table) in [("curves", curves), ("circles", circles), ("steps", steps)] {
-            output.write(&format!("{name}.csv"), table.to_csv()?)?;
-        }
-        Ok(())
+        let sheet = Sheet::of(&circles).data("flow", |(e, ..)| e.variant.flow.key());
+        let sheet = Variant::columns(sheet, |(e, ..)| e.variant)
+            .data("radius", |(_, circle, _)| circle.radius)
+            .data("step", |(.., k)| *k)
+            .data("time", |(.., k)| time(*k))
+            .data("l2", |(_, circle, k)| circle.error(*k));
+        session.csv(sheet, "circles")?;
+        let sheet = Variant::columns(Sheet::of(&steps), |step| step.run.0);
+        let sheet = sheet.data("radius", |step| step.run.1);
+        session.csv(steps::columns(sheet, &steps), "steps")
     }
 
     /// The mean errors, and of Willmore flow the work.

@@ -2,9 +2,10 @@
 
 use chacha20::ChaCha8Rng;
 
-use crate::meshes::{LAPLACIAN, TAUBIN, folder, rms_distance, sampled};
+use crate::meshes::{folder, sampled};
 use crate::prelude::*;
-use crate::surfaces::{centred_box, fairing_flow, mesh_raster};
+use crate::smoothing::{LAPLACIAN, TAUBIN, fairing_flow, mesh_raster, rms_distance};
+use crate::surfaces::centred_box;
 use engine::DISPLACEMENT;
 use rand::{RngExt, SeedableRng};
 use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, samples, usual_up_axis};

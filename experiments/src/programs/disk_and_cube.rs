@@ -2,7 +2,8 @@
 
 use crate::prelude::*;
 use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, View};
-use crate::truth::{self, DISK, ELLIPSOID, Reached, Sample, Sizes, THICK_DISK};
+use crate::truth::{DISK, ELLIPSOID, Reached, Sample, THICK_DISK, Truth};
+use report::Numbers;
 
 const PROGRAM: &str = "disk_and_cube";
 /// Cells per unit length of a quick run and of the paper.
@@ -94,20 +95,17 @@ pub fn program(options: &Options) -> Result<(), Error> {
         let rows = [&DISK, &ELLIPSOID].map(|sample| compare_with_exact(session, sample, n, end));
         let rows: Vec<Vec<Compared>> = rows.into_iter().collect::<Result<_, _>>()?;
         let rows: Vec<Compared> = rows.into_iter().flatten().collect();
-        session.sheet(sheet(&rows), "exact")?;
+        session.sheet(sheet(&rows, n), "exact")?;
         Ok(String::new())
     })
 }
 
-/// A surface of revolution in controlled steps, and the exact flow.
+/// A surface of revolution in controlled steps, or extrapolated, and the sizes of the exact flow.
 struct Compared {
     title: &'static str,
     run: String,
-    step: usize,
-    /// Of the flow and of the exact one: area, volume, energy.
-    sizes: [Sizes; 2],
-    distance_over_h: f64,
-    hvp: f64,
+    reached: Reached,
+    exact: Numbers,
 }
 
 /// Lets a surface flow in controlled steps of second order, and compares it and its extrapolation in `eps` with the exact flow after
@@ -119,61 +117,43 @@ fn compare_with_exact(
     (tau, steps): (f64, usize),
 ) -> Result<Vec<Compared>, Error> {
     let powers = (0..=HALVINGS).map(|k| 1_usize << k).filter(|k| *k < steps);
-    let marks: Vec<usize> = powers.chain([steps]).collect();
-    let times: Vec<f64> = marks.iter().map(|&k| k as f64 * tau).collect();
+    let marks = powers.chain([steps]).map(|k| (k, k as f64 * tau));
+    let marks: Vec<(usize, f64)> = marks.collect();
     let title = format!("{}: the exact flow", sample.title);
-    let exact = session.phase(title, |_| sample.exact(Flow::Willmore, &times))?;
-    let end = tau * f64::from(1 << HALVINGS);
-    let time_steps = truth::controlled(ErrorControl::default(), end, HALVINGS);
-    let control = ("controlled", time_steps, tau * steps as f64);
-    let run = sample.run(session, (n, 2.0), truth::ACCURATE, control)?;
-    let reached = exact.iter().map(|exact| Reached::of(sample, &run, exact));
-    let reached = reached.collect::<Result<Vec<_>, Error>>()?;
-    let limit = sample.extrapolated(session, (end, HALVINGS), exact.iter())?;
-    for (&step, exact) in marks.iter().zip(&exact) {
-        truth::record(
-            session,
-            &format!("{}.exact", sample.key),
-            step,
-            &exact.sizes(),
-        )?;
-    }
+    let exact = session.phase(title, |_| sample.exact(Flow::Willmore, &marks))?;
+    (exact.iter()).try_for_each(|exact| exact.record(session, sample.key))?;
+    let ramp = (tau * f64::from(1 << HALVINGS), HALVINGS);
+    let all: Vec<&Truth> = exact.iter().collect();
+    let runs = sample.second_order(session, n, ramp, &all)?;
     let mut rows = Vec::new();
-    let runs = [
-        (format!("n{n}.controlled"), format!("n = {n}"), reached),
-        ("extrapolated".to_owned(), "extrapolated".to_owned(), limit),
-    ];
-    for (key, run, reached) in runs {
-        for ((&step, exact), reached) in marks.iter().zip(&exact).zip(reached) {
-            reached.record(session, &format!("{}.{key}", sample.key), step)?;
-            rows.push(Compared {
-                title: sample.title,
-                run: run.clone(),
-                step,
-                distance_over_h: reached.distance * n as f64,
-                hvp: reached.hvp,
-                sizes: [reached.sizes, exact.sizes()],
-            });
-        }
+    for (run, reached) in [format!("n = {n}"), "extrapolated".to_owned()]
+        .into_iter()
+        .zip(runs)
+    {
+        rows.extend(exact.iter().zip(reached).map(|(exact, reached)| Compared {
+            title: sample.title,
+            run: run.clone(),
+            reached,
+            exact: exact.sizes.clone(),
+        }));
     }
     Ok(rows)
 }
 
-fn sheet(rows: &[Compared]) -> Sheet<'_, Compared> {
+fn sheet(rows: &[Compared], n: usize) -> Sheet<'_, Compared> {
     let mut sheet = Sheet::of(rows)
         .text("surface", |row| row.title)
         .text("run", |row| &row.run)
-        .column("step", Shortest, |row| row.step);
-    for (k, name) in ["area", "volume", "w"].into_iter().enumerate() {
-        let digits = if k == 2 { 3 } else { 5 };
+        .column("step", Shortest, |row| row.reached.mark);
+    for (name, digits) in [("area", 5), ("volume", 5), ("w", 3)] {
         sheet = sheet
-            .column(name, Fixed(digits), move |row| row.sizes[0][k].1)
-            .column("exact", Fixed(digits), move |row| row.sizes[1][k].1);
+            .column(name, Fixed(digits), |row| row.reached.sizes[name])
+            .column("exact", Fixed(digits), |row| row.exact[name]);
     }
-    let distance = |row: &Compared| row.distance_over_h;
+    let distance = |row: &Compared| row.reached.distance * n as f64;
     sheet
         .column("largest distance / h", Fixed(3), distance)
-        .column("HVP", Fixed(0), |row| row.hvp)
+        .column("HVP", Fixed(0), |row| row.reached.hvp)
 }
 
 fn surface(key: &'static str, title: &str, energies: [(usize, f64); 3]) -> Surface {

@@ -84,7 +84,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let device = run.open_device()?;
     let (scheme, needed) = (options.common.scheme, NeededNetwork::exactly(ratios));
     let networks = options.common.figure.networks.load(&[needed])?;
-    let operator = Operator::learned(scheme, networks.find(scheme, &needed)?)?;
+    let operator = networks.learned(scheme, &needed)?;
     let shapes = shapes(run.quick)?;
     let parameters = inpainting::parameters((n, &scales), &operator, &shapes);
     let mut session = Session::open(PROGRAM, run, device, parameters)?;

@@ -2,10 +2,9 @@
 
 use crate::prelude::*;
 use crate::quality;
-use crate::surfaces::{self, Setting};
-use crate::training::{NetworkSpec, held_out_radii};
+use crate::surfaces::Setting;
+use crate::training::NetworkSpec;
 use geometry::exact::{WILLMORE_ENERGY_SPHERE, mean_curvature_radius};
-use model::Quality;
 
 const PROGRAM: &str = "spheres";
 const TITLE: &str = "Spheres by the network for surfaces";
@@ -18,7 +17,6 @@ const LAST: usize = MCF_STEPS.len() - 1;
 /// Steps of Willmore flow, which should leave spheres alone.
 const WILLMORE_STEPS: usize = 20;
 const TAU: f64 = 1.0 / 262_144.0;
-const PAPERS: (Method, Scheme) = (Method::Hybrid, Scheme::Paper);
 
 /// The network for surfaces on spheres, n = 64, eps = 2^-5, tautilde = 2^-12: L2 errors of mean curvature flow against
 /// R^2 = r^2 - 4t beside finite elements, Willmore energies w against 8 pi, and the change of the radius in 20 steps of Willmore
@@ -94,13 +92,10 @@ pub fn program(options: &Options) -> Result<(), Error> {
     if !run.quick {
         let (spec, papers) = (NetworkSpec::surfaces(), setting.operator(PAPERS)?);
         let network = &papers.network().expect("it is learned").network;
-        let measured = session.phase("quality of the network", |stage| {
-            let (data, count) = (spec.data(false)?, held_out_radii(false));
-            Ok(Quality::measure(network, &data, count, stage.device)?)
-        })?;
-        let names = Sheet::of(std::slice::from_ref(&measured)).text("network", |_| spec.name);
+        let title = "quality of the network".to_owned();
+        let measured = [quality::measure(&mut session, title, &spec, network)?];
+        let names = Sheet::of(&measured).text("network", |_| spec.name);
         session.sheet(quality::columns(names, |measured| measured), "quality")?;
-        session.summary.insert_record(spec.name, &measured)?;
     }
     session.output.write_json("spheres.json", &all)?;
     let note = format!(
@@ -152,7 +147,7 @@ impl Sphere<'_> {
             format!("sphere of radius {radius}"),
             StepRule::Constant(tau),
         );
-        let mut case = surfaces::willmore_flow(&shape, initial, operator, scales, (rule, steps));
+        let mut case = willmore_flow(&shape, initial, operator, scales, (rule, steps));
         if flow == Flow::MeanCurvature {
             case.measures = vec![Measure::distance_to(exact)];
         }

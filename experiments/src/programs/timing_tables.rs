@@ -4,7 +4,7 @@ use crate::meshes::{ARMADILLO, MeshOptions};
 use crate::networks::{Chosen, convergence_network};
 use crate::prelude::*;
 use crate::surfaces;
-use crate::timing::{self, Numbers, Timed, take_turns};
+use crate::timing::{self, Numbers, take_turns};
 use engine::Method::{FeImplicit, FeSemi, Hybrid};
 use fem::LinearSolver::{self, ConjugateGradients, Direct};
 use solver::Method::{self as Newton, Paper, Preconditioned};
@@ -96,7 +96,7 @@ const VARIANTS: [Variant; 5] = [
 struct Timing {
     row: &'static Variant,
     n: usize,
-    timed: Timed<2>,
+    run: Run<2>,
     /// Why the row ended early, if it failed.
     failure: Option<String>,
 }
@@ -161,7 +161,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
         .column(PAPERS, Shortest, |s| s.2);
     session.sheet(steps, "armadillo")?;
     let json = rows.iter().map(|(t, numbers)| {
-        let (row, seconds) = (t.row.key, t.timed.seconds());
+        let (row, seconds) = (t.row.key, timing::seconds(&t.run));
         json!({ "variant": row, "n": t.n, "numbers": numbers, "step_seconds": seconds, "failure": t.failure })
     });
     let json: Vec<_> = json.collect();
@@ -194,7 +194,7 @@ fn measure(
         contenders.push(Timing {
             row,
             n,
-            timed: Timed::new(case, &session.device)?,
+            run: Run::new(case, &session.device)?,
             failure: None,
         });
     }
@@ -209,31 +209,32 @@ fn measure(
 impl Timing {
     fn goes_on(&self, budget: f64) -> bool {
         // The first step costs more than the others: extrapolation needs some of those.
-        let seconds = self.timed.seconds();
+        let seconds = timing::seconds(&self.run);
         let more = seconds.len() < 3 || seconds.iter().sum::<f64>() < budget;
         self.failure.is_none() && seconds.len() < STEPS && more
     }
 
     fn step(&mut self, bar: &ProgressBar) -> Result<(), Error> {
-        match self.timed.step(bar) {
-            Err(Error::Engine(engine::Error::Step { source, .. }))
+        bar.inc(1);
+        match self.run.step() {
+            Err(engine::Error::Step { source, .. })
                 if matches!(*source, solver::Error::NotConverged { .. }) =>
             {
                 self.failure = Some(source.to_string());
                 Ok(())
             }
-            other => other.map(drop),
+            other => Ok(other.map(drop)?),
         }
     }
 
     /// Time and work, with the time of all steps in seconds: measured, or with the mean of the later half of the measured steps for each
     /// of the rest. Steps become cheaper as corners smooth out: the later ones say most about what is to come.
     fn numbers(&self) -> Numbers {
-        let (mut numbers, seconds) = (self.timed.numbers(), self.timed.seconds());
+        let (mut numbers, seconds) = (timing::numbers(&self.run), timing::seconds(&self.run));
         let (count, measured) = (seconds.len(), seconds.iter().sum::<f64>());
         let later = &seconds[count / 2..];
         let late = later.iter().sum::<f64>() / later.len().max(1) as f64;
-        let inner = self.timed.run.statistics().unwrap_or_default();
+        let inner = self.run.statistics().unwrap_or_default();
         let per_step = |total: usize| total as f64 / count.max(1) as f64;
         numbers.extend([
             ("measured_steps", count as f64),
@@ -246,7 +247,7 @@ impl Timing {
     }
 
     fn usable(&self) -> bool {
-        self.failure.is_none() && self.timed.run.steps() > 1
+        self.failure.is_none() && self.run.steps() > 1
     }
 
     fn seconds(&self) -> Option<f64> {
@@ -259,7 +260,7 @@ impl Timing {
     }
 
     fn measured(&self) -> String {
-        let steps = self.timed.run.steps();
+        let steps = self.run.steps();
         match &self.failure {
             Some(reason) => format!("stopped after {steps} steps: {reason}"),
             None if steps < STEPS => format!("extrapolated from {steps} steps"),
@@ -270,7 +271,7 @@ impl Timing {
     /// Time of all steps, and of those measured by both, over that of the hybrid scheme.
     fn over_hybrid(&self, all: &[Self]) -> Option<[f64; 2]> {
         let hybrid = (all.iter()).find(|t| t.n == self.n && t.row.key == "hybrid")?;
-        let (own, its) = (self.timed.seconds(), hybrid.timed.seconds());
+        let (own, its) = (timing::seconds(&self.run), timing::seconds(&hybrid.run));
         let common = own.len().min(its.len());
         let measured = own[..common].iter().sum::<f64>() / its[..common].iter().sum::<f64>();
         Some([self.seconds()? / hybrid.seconds()?, measured])
@@ -297,10 +298,8 @@ fn surface_steps(
             let (variant, source) = ((method, Scheme::Paper), networks.of(Scheme::Paper));
             let operator = Operator::new(variant, &source, &needed, &grid, &scales)?;
             let initial = initial.clone();
-            let case = surfaces::willmore_flow(&mesh.title, initial, operator, scales, time);
-            let mut timed = Timed::new(case, stage.device)?;
-            timed.step(&stage.bar)?;
-            steps.push((method, timed.numbers(), papers_seconds));
+            let run = stage.run(willmore_flow(&mesh.title, initial, operator, scales, time))?;
+            steps.push((method, timing::numbers(&run), papers_seconds));
         }
         Ok((mesh.title, steps))
     })

@@ -2,9 +2,8 @@
 
 use chacha20::ChaCha8Rng;
 
-use crate::meshes::{LAPLACIAN, TAUBIN, rms_distance};
 use crate::prelude::*;
-use crate::surfaces::{fairing_flow, mesh_raster};
+use crate::smoothing::{LAPLACIAN, TAUBIN, fairing_flow, mesh_raster, rms_distance};
 use rand::{RngExt, SeedableRng};
 use surfaces::{ClosedMesh, MeshDistance, TriangleMesh, samples};
 use volumes::{Body, Inside, Volume};
@@ -68,34 +67,25 @@ pub fn program(options: &Options) -> Result<(), Error> {
     for body in &bodies {
         let treated = body.treated(&mut session)?;
         let drawn = session.phase("pictures", |_| {
-            [0, 1, 2, 5, 6]
-                .map(|k: usize| treated[k].picture())
-                .into_iter()
-                .collect::<Result<Vec<_>, _>>()
-        })?;
-        pictures.extend(drawn);
+            let shown = [0, 1, 2, 5, 6].map(|k: usize| treated[k].picture());
+            shown.into_iter().collect::<Result<Vec<_>, _>>()
+        });
+        pictures.extend(drawn?);
         rows.extend(treated);
     }
+    let elements = ("w / 8 pi by elements", Fixed(3));
+    let displacement = ("largest displacement", Fixed(3));
     let table = Sheet::of(&rows)
         .keyed(|row, name| format!("unshrinking.{}.{}.{name}", row.of.name, row.treatment.0))
         .text("body", |row| row.of.name)
         .text("surface", |row| row.treatment.1)
         .column("iterations", Shortest, |row| row.iterations)
         .measure("volume", ("volume, %", Fixed(4)), Row::change)
-        .measure("w_over_8pi", ("w / 8 pi by elements", Fixed(3)), |row| {
-            row.energy
-        })
-        .measure(
-            "displacement",
-            ("largest displacement", Fixed(3)),
-            Row::displacement,
-        )
-        .measure("rms", ("distance to the shape", Fixed(4)), |row| {
-            rms_distance(&row.surface, &*row.of.shape)
-        });
+        .measure("w_over_8pi", elements, |row| row.energy)
+        .measure("displacement", displacement, Row::displacement)
+        .measure("rms", ("distance to the shape", Fixed(4)), Row::distance);
     session.sheet(table, "unshrinking")?;
-    let figure = Figure::new(TITLE, 5)
-        .with_row_labels(bodies.iter().map(|body| body.name).collect::<Vec<_>>());
+    let figure = Figure::new(TITLE, 5).with_row_labels(BODIES.map(|(name, _)| name));
     session.figure(figure.with_panels(pictures), "surfaces")?;
     session.finish(TITLE)
 }
@@ -137,31 +127,23 @@ impl Segmented {
 
     fn treated(&self, session: &mut Session<'_>) -> Result<Vec<Row<'_>>, Error> {
         let (body, marched) = (&self.body.surface, &self.marched);
-        let [taubin, laplacian] = [TAUBIN, LAPLACIAN].map(|factors| self.smoothed(factors));
-        let (taubin, laplacian) = (taubin?, laplacian?);
+        let (taubin, laplacian) = (self.smoothed(TAUBIN)?, self.smoothed(LAPLACIAN)?);
         // Key, words, what it starts from, and for flows whether the volume is kept.
         let all = [
-            ("marched", "marching tetrahedra", marched, None, None),
-            ("fair", "fair, volume kept", body, None, Some(true)),
-            ("free", "fair, free", body, None, Some(false)),
-            (
-                "marched_fair",
-                "marched, volume kept",
-                marched,
-                None,
-                Some(true),
-            ),
-            ("marched_free", "marched, free", marched, None, Some(false)),
-            ("taubin", "Taubin", &taubin.1, Some(taubin.0), None),
-            (
-                "laplacian",
-                "Laplacian",
-                &laplacian.1,
-                Some(laplacian.0),
-                None,
-            ),
+            ("marched", "marching tetrahedra", marched, None),
+            ("fair", "fair, volume kept", body, Some(true)),
+            ("free", "fair, free", body, Some(false)),
+            ("marched_fair", "marched, volume kept", marched, Some(true)),
+            ("marched_free", "marched, free", marched, Some(false)),
+            ("taubin", "Taubin", &taubin.1, None),
+            ("laplacian", "Laplacian", &laplacian.1, None),
         ];
-        let row = |(key, words, start, iterations, flow): (_, _, &ClosedMesh, _, Option<bool>)| {
+        let row = |(key, words, start, flow): (_, _, &ClosedMesh, Option<bool>)| {
+            let iterations = match key {
+                "taubin" => Some(taubin.0),
+                "laplacian" => Some(laplacian.0),
+                _ => None,
+            };
             session.phase(format!("{}: {words}", self.name), |stage| {
                 let mut case = self.case(start)?;
                 let mut surface = start.mesh().clone();
@@ -191,11 +173,11 @@ impl Segmented {
     /// The surface after the number of iterations that brings it nearest to the shape.
     fn smoothed(&self, [lambda, mu]: [f64; 2]) -> Result<(usize, ClosedMesh), Error> {
         let smoothed = |count| self.marched.mesh().smoothed(count, lambda, mu);
-        let all =
-            (1..=ITERATIONS).map(|count| (count, rms_distance(&smoothed(count), &*self.shape)));
+        let distance = |count| (count, rms_distance(&smoothed(count), &*self.shape));
+        let all = (1..=ITERATIONS).map(distance);
         let best = all
             .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map_or(1, |(count, _)| count);
+            .map_or(1, |best| best.0);
         Ok((best, ClosedMesh::new(smoothed(best))?.0))
     }
 
@@ -215,6 +197,10 @@ impl Row<'_> {
     /// Of the volume of the voxels, in percent.
     fn change(&self) -> f64 {
         100.0 * (self.volume / self.of.body.volume - 1.0)
+    }
+
+    fn distance(&self) -> f64 {
+        rms_distance(&self.surface, &*self.of.shape)
     }
 
     /// The largest distance from the surface by marching tetrahedra.
