@@ -123,9 +123,8 @@ impl Ensemble {
         let circles = in_parallel(count, workers(device), |i| {
             let case = case((flow, operator, n), radii[i], steps)?;
             let (flow, operator) = (flow.key(), operator.key());
-            let folder = folder
-                .as_path()
-                .join(format!("{flow}-n{n}-{operator}-{i:02}"));
+            let name = format!("{flow}-n{n}-{operator}-{i:02}");
+            let folder = folder.as_path().join(name);
             let (ends, never) = (Samples::every(usize::MAX), Interrupt::never());
             let trajectory = Trajectory::of(case, device, &folder, &ends, &mut [], &never)?;
             let trajectory = trajectory.expect("nobody interrupts it");
@@ -154,10 +153,8 @@ impl Ensemble {
 
     pub fn error_range(&self, k: usize) -> [f64; 2] {
         let errors = || self.circles.iter().map(|circle| circle.error(k));
-        [
-            errors().fold(f64::INFINITY, f64::min),
-            errors().fold(0.0, f64::max),
-        ]
+        let least = errors().fold(f64::INFINITY, f64::min);
+        [least, errors().fold(0.0, f64::max)]
     }
 
     pub fn seconds_per_step(&self) -> f64 {
@@ -180,11 +177,6 @@ impl Ensemble {
         let raised =
             |r: &&StepRecord| r.energy >= r.energy_before || r.willmore_energy > r.energy_at_rest();
         self.minimizations().filter(raised).count()
-    }
-
-    /// Linear solves that met negative curvature.
-    pub fn negative_curvature(&self) -> usize {
-        (self.minimizations().map(|r| r.newton.negative_curvature)).sum()
     }
 
     /// Name in metrics, such as `willmore.n128.hybrid_calibrated`.

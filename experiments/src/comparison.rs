@@ -128,7 +128,6 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
     }
     let steps = (options.steps).unwrap_or(if quick { 2 } else { STEPS });
     require(steps > 0, "--steps must be at least 1")?;
-    let device = options.study.run.open_device()?;
     // Franken, Rumpf and Wirth: for eps = 2h the nested scheme is unstable.
     let nested = |method: Method| flow == Flow::Willmore && !method.is_learned();
     let stable = |method, n| !nested(method) || n as f64 * EPS >= 4.0;
@@ -146,7 +145,7 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
         "steps": steps,
         "networks": study.checksums(),
     });
-    let mut session = Session::open(setting.program, &options.study.run, device, parameters)?;
+    let mut session = Session::open(setting.program, &options.study.run, parameters)?;
     let mut runs = Vec::new();
     for (variant, operator) in &study.plan {
         runs.push(setting.run(&mut session, "", (*variant, operator), (steps, 1))?);
@@ -154,16 +153,14 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
     // The paper's references are implicit finite elements.
     let half = reference_n / 2;
     let halved = (reference_n.is_multiple_of(2) && finest <= half).then_some(half);
-    let named = [
-        ("reference: ", Some(reference_n)),
-        ("for the reference's error: ", halved),
-    ];
     let mut references: Vec<Compared> = Vec::new();
-    for (what, n) in named.into_iter().filter_map(|(what, n)| Some((what, n?))) {
+    for n in [Some(reference_n), halved].into_iter().flatten() {
+        let what = ["reference: ", "for the reference's error: "][references.len()];
+        let (method, scheme) = (Method::FeImplicit, Scheme::Paper);
         let variant = Variant {
             flow,
-            method: Method::FeImplicit,
-            scheme: Scheme::Paper,
+            method,
+            scheme,
             n,
         };
         let operator = study.networks.operator(variant.look(), n)?;
@@ -383,29 +380,23 @@ impl Comparison<'_> {
             self.study.series(run.variant, points.collect())
         });
         // Where the study's colours end.
-        let looks = [
-            (Colour::Grey, LineStyle::Solid),
-            (Colour::Grey, LineStyle::Dotted),
-        ];
-        let second_order = || self.second_order.iter().zip(looks);
-        let new = second_order().map(|((label, reached), (colour, style))| {
+        let styles = [LineStyle::Solid, LineStyle::Dotted];
+        let second_order = || self.second_order.iter().zip(styles);
+        let new = second_order().map(|((label, reached), style)| {
             let series = Series::of(label, reached, |at| [time(at.mark), at.distance]);
-            let series = series.with_style(style).with_colour(colour);
+            let series = series.with_colour(Colour::Grey).with_style(style);
             series.with_marker(Marker::Circle)
         });
-        let entries = second_order()
-            .map(|((label, _), (colour, style))| LegendEntry::line(label, colour, style));
+        let entries =
+            second_order().map(|((label, _), style)| LegendEntry::line(label, Colour::Grey, style));
         let chart = |title, y| LineChart::new(title, Axis::linear("time t"), Axis::log(y));
         let papers = chart("to the reference", "L² distance");
         let exact = chart("to the exact flow", "largest distance of the curves");
         let reference = self.about_the_reference();
+        let exact = self.study.chart(exact, truths.chain(new));
         Figure::new(format!("{}: distances over time", self.setting.title), 2)
             .with_panel(self.study.chart(papers, curves))
-            .with_panel(
-                self.study
-                    .chart(exact, truths.chain(new))
-                    .with_entries(entries),
-            )
+            .with_panel(exact.with_entries(entries))
             .with_shared_legend()
             .with_note(format!("ε = 2⁻⁶, time step 2⁻¹⁴. {reference}"))
     }

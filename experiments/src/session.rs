@@ -46,11 +46,16 @@ impl Stage<'_> {
 }
 
 impl<'a> Session<'a> {
-    /// Opens the output folder of a program and begins its manifest; to be called when everything else has been checked.
-    pub fn open(
+    /// Opens the device and the output folder of a program and begins its manifest; to be called when everything else has been checked.
+    pub fn open(program: &str, options: &'a RunOptions, parameters: Value) -> Result<Self, Error> {
+        Self::on(options.open_device()?, program, options, parameters)
+    }
+
+    /// The same on this device.
+    pub fn on(
+        device: ComputeDevice,
         program: &str,
         options: &'a RunOptions,
-        device: ComputeDevice,
         mut parameters: Value,
     ) -> Result<Self, Error> {
         parameters["quick"] = options.quick.into();

@@ -84,11 +84,8 @@ impl StorageOptions {
     ) -> Result<Vec<Stored>, Error> {
         let networks = networks.load(&[needed_network()])?;
         let mut operator = networks.learned(Scheme::Accurate, &needed_network())?;
-        let [curves, surfaces] = if session.options.quick {
-            [&[64][..], &[32, 64]]
-        } else {
-            [&self.curve_cells[..], &self.surface_cells]
-        };
+        let usual = [&self.curve_cells[..], &self.surface_cells];
+        let [curves, surfaces] = session.options.either([&[64][..], &[32, 64]], usual);
         let mut measured = Vec::new();
         for &n in curves {
             measured.push(curve(n, session)?);

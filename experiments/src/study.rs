@@ -140,15 +140,43 @@ impl Study {
         self.plan.iter().filter_map(of).collect()
     }
 
-    pub fn series(&self, variant: Variant, points: Vec<[f64; 2]>) -> Series {
-        look::curve(points, variant.look(), (variant.n, &self.cells))
+    /// How much finer the finest resolution is, counted in resolutions.
+    fn rank(&self, n: usize) -> usize {
+        self.cells.iter().filter(|&&m| m > n).count()
     }
 
-    /// A chart of such curves with the legend for all variants.
+    fn dashes(&self, n: usize) -> LineStyle {
+        use LineStyle::{Dashed, Dotted, ShortDashed, Solid};
+        [Solid, Dashed, ShortDashed, Dotted][self.rank(n).min(3)]
+    }
+
+    pub fn marker(&self, n: usize) -> Marker {
+        use Marker::{Circle, Diamond, Square, Triangle};
+        [Circle, Square, Triangle, Diamond][self.rank(n).min(3)]
+    }
+
+    /// The curve of a variant: colours stand for methods in their schemes, dashes for resolutions. Such curves often coincide, so coarser
+    /// ones are wider and show on both sides of finer ones.
+    pub fn series(&self, variant: Variant, points: Vec<[f64; 2]>) -> Series {
+        Series::new(format!("{}, n = {}", variant.label(), variant.n), points)
+            .with_colour(look::colour(variant.method, variant.scheme))
+            .with_style(self.dashes(variant.n))
+            .with_width(1.8 + 1.4 * self.rank(variant.n) as f64)
+    }
+
+    /// A chart of such curves with a legend for all variants: methods, then resolutions.
     pub fn chart(&self, chart: LineChart, curves: impl IntoIterator<Item = Series>) -> LineChart {
-        let shown =
-            look::variants(|wanted| self.variants().any(|variant| variant.look() == wanted));
-        look::legend(chart.with_curves(curves), shown, &self.cells)
+        let planned = |look| self.variants().any(|variant| variant.look() == look);
+        let methods = look::variants(planned).map(|(method, scheme)| {
+            let (label, colour) = (method.label_in(scheme), look::colour(method, scheme));
+            LegendEntry::line(label, colour, LineStyle::Solid)
+        });
+        let resolutions = self
+            .cells
+            .iter()
+            .map(|&n| LegendEntry::line(format!("n = {n}"), Colour::Black, self.dashes(n)));
+        let chart = chart.with_curves(curves);
+        chart.with_entries(methods).with_entries(resolutions)
     }
 }
 

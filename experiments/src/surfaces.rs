@@ -6,6 +6,7 @@ use model::NeededNetwork;
 use operators::memory;
 pub use render::View;
 use render::{Picture, Quality, Rgb, Scene, Tube};
+use report::Numbers;
 use surfaces::ClosedMesh;
 
 use crate::look::one_over_two_to;
@@ -15,6 +16,12 @@ use crate::steps;
 
 const EPS_OVER_H: f64 = 2.0;
 const WIDTH: usize = 17;
+/// From above and from the side.
+pub const VIEW: View = View {
+    up: UpAxis::Z,
+    azimuth: 30.0,
+    elevation: 25.0,
+};
 const SIDE: u32 = 640;
 /// Colour of a surface where it may move, if it may not everywhere.
 const MOVING: Rgb = Rgb(150, 196, 160);
@@ -101,30 +108,24 @@ pub struct Surface {
     pub view: View,
 }
 
-/// The measures of a shown step: name in metrics, column and digits in tables. `w` is the Willmore energy with the implicit finite-element
-/// step and the mass-matrix norm, `w_scheme` what the flow minimizes; the Euler characteristic is that of the isosurface `u = 0`.
-const MEASURES: [(&str, &str, usize); 5] = [
-    ("w", "w", 2),
-    ("w_scheme", "w of the scheme", 2),
-    ("perimeter", "area", 4),
-    ("volume", "volume", 5),
-    ("euler_characteristic", "Euler characteristic", 0),
+/// The measures of a shown step in tables. `w` is the Willmore energy with the implicit finite-element step and the mass-matrix norm,
+/// `w_scheme` what the flow minimizes; the Euler characteristic is that of the isosurface `u = 0`.
+const MEASURES: [(&str, Format, &str); 5] = [
+    ("w", Fixed(2), "w"),
+    ("w of the scheme", Fixed(2), "w_scheme"),
+    ("area", Fixed(4), "perimeter"),
+    ("volume", Fixed(5), "volume"),
+    ("Euler characteristic", Fixed(0), "euler_characteristic"),
 ];
 
 pub struct Snapshot {
     pub step: usize,
     pub time: f64,
-    measures: [f64; MEASURES.len()],
+    pub measures: Numbers,
     /// The Willmore energy that the paper reports.
     paper: Option<f64>,
     pub caption: String,
     pub tubes: Vec<Tube>,
-}
-
-impl Snapshot {
-    pub fn w(&self) -> f64 {
-        self.measures[0]
-    }
 }
 
 pub struct Flowed {
@@ -177,20 +178,20 @@ impl Flowed {
         let measured = self.trajectory.measures(step)?;
         let w = case.implicit_elements()?.willmore_energy(&u)?;
         memory::release_freed();
-        let reported = self.surface.shown.iter().find(|(shown, _)| *shown == step);
+        let mut measures = Numbers::from([
+            ("w", w),
+            ("perimeter", measured["perimeter"]),
+            ("volume", measured["volume"]),
+            ("euler_characteristic", mesh.euler_characteristic() as f64),
+        ]);
+        measures.extend(w_scheme.map(|w| ("w_scheme", w)));
+        let mut reported = self.surface.shown.iter().filter(|_| !stage.options.quick);
+        let reported = reported.find(|(shown, _)| *shown == step);
         Ok(Snapshot {
             step,
             time: record.map_or(0.0, |r| r.time),
-            measures: [
-                w,
-                w_scheme.unwrap_or(f64::NAN),
-                measured["perimeter"],
-                measured["volume"],
-                mesh.euler_characteristic() as f64,
-            ],
-            paper: reported
-                .filter(|_| !stage.options.quick)
-                .and_then(|(_, w)| *w),
+            measures,
+            paper: reported.and_then(|(_, w)| *w),
             caption: format!("step {step}: w = {w:.2}"),
             tubes: Vec::new(),
         })
@@ -223,9 +224,8 @@ impl Flowed {
     /// Pictures of the shown steps with this side in pixels (less in a quick run), all in one framing, each also as a file of its own.
     pub fn pictures(&self, stage: &Stage<'_>, side: u32) -> Result<Vec<Raster>, Error> {
         memory::release_freed();
-        let quick = stage.options.quick;
         let usual = (side, Quality::Standard);
-        let (side, quality) = if quick { (120, Quality::Draft) } else { usual };
+        let (side, quality) = stage.options.either((120, Quality::Draft), usual);
         // Scenes are made twice rather than kept: one takes several times the memory of its phase field.
         let mut points = Vec::new();
         for snapshot in &self.snapshots {
@@ -352,18 +352,14 @@ pub fn write_snapshots(
     let rows: Vec<(&Flowed, &Snapshot)> = (all.iter())
         .flat_map(|one| one.snapshots.iter().map(move |shown| (one, shown)))
         .collect();
-    let mut sheet = Sheet::of(&rows)
+    let sheet = Sheet::of(&rows)
         .keyed(|(one, shown), name| format!("{}.{name}.step{}", key(one), shown.step))
         .text("surface", |(one, _)| one.surface.title.as_str())
         .text("method", |(one, _)| one.label())
-        .column("step", Shortest, |(_, shown)| shown.step);
-    for (k, (name, head, digits)) in MEASURES.into_iter().enumerate() {
-        let value = |(_, shown): &(&Flowed, &Snapshot)| shown.measures[k];
-        sheet = sheet.measure(name, (head, Fixed(digits)), value);
-        if k == 0 {
-            sheet = sheet.column("w, paper", Fixed(2), |(_, shown)| shown.paper);
-        }
-    }
+        .column("step", Shortest, |(_, shown)| shown.step)
+        .numbers(&MEASURES[..1], |(_, shown)| &shown.measures)
+        .column("w, paper", Fixed(2), |(_, shown)| shown.paper)
+        .columns(&MEASURES[1..], |(_, shown)| &shown.measures);
     session.sheet(sheet, stem)?;
     (all.iter()).try_for_each(|one| session.metric(&format!("{}.peak_mib", key(one)), one.peak_mib))
 }

@@ -50,7 +50,6 @@ pub struct Options {
 pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.run;
     let networks = options.networks()?;
-    let device = run.open_device()?;
     let checksums = (networks.iter()).map(|one| (&one.name, one.network.fingerprint()));
     let parameters = json!({
         "networks": checksums.collect::<BTreeMap<_, _>>(),
@@ -58,7 +57,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
         "inner_step": STEP,
         "time_step": STEP_RATIO * STEP,
     });
-    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut session = Session::open(PROGRAM, run, parameters)?;
     let install = options.install.as_ref().map(OutputDir::create);
     let install = install.transpose()?;
     let mut all = Vec::new();

@@ -44,11 +44,7 @@ impl Options {
 
 pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.study.run;
-    let (all, steps) = if run.quick {
-        (4, 8)
-    } else {
-        (circles::COUNT, circles::STEPS)
-    };
+    let (all, steps) = run.either((4, 8), (circles::COUNT, circles::STEPS));
     let count = options.circles.unwrap_or(all);
     require(
         (1..=circles::COUNT).contains(&count),
@@ -57,7 +53,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
             circles::COUNT
         ),
     )?;
-    let (variants, device) = (options.variants(), run.open_device()?);
+    let variants = options.variants();
     let study = Study::new(&options.study.networks, &variants)?;
     let parameters = json!({
         "cells": study.cells,
@@ -68,7 +64,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
         "time_step": STEP,
         "networks": study.checksums(),
     });
-    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut session = Session::open(PROGRAM, run, parameters)?;
     let mut ensembles = Vec::new();
     for planned in &study.plan {
         let Variant { flow, n, .. } = planned.0;
@@ -166,8 +162,9 @@ impl Report {
         self.flows("initial radius r", "L² error", |e| {
             let points = e.circles.iter().map(|c| [c.radius, c.error(self.steps)]);
             let curve = self.study.series(e.variant, points.collect());
-            let marker = look::marker(e.variant.n, &self.study.cells);
-            curve.with_marker(marker).with_width(1.6)
+            curve
+                .with_marker(self.study.marker(e.variant.n))
+                .with_width(1.6)
         })
     }
 
@@ -272,11 +269,13 @@ impl Report {
     fn metrics(&self, session: &mut Session<'_>) -> Result<(), Error> {
         for e in self.of_flow(Flow::Willmore) {
             let newton = e.mean_of_steps(|r| r.newton.newton as f64);
+            // Linear solves that met it.
+            let negative = e.minimizations().map(|r| r.newton.negative_curvature);
             let metrics = [
                 ("newton_per_step", newton.into()),
                 ("seconds_per_step", e.seconds_per_step().into()),
                 ("energy_increases", e.energy_increases().into()),
-                ("negative_curvature", e.negative_curvature().into()),
+                ("negative_curvature", negative.sum::<usize>().into()),
             ];
             session.metrics(&e.key(), metrics)?;
         }

@@ -1,7 +1,7 @@
 //! A cube and a thick disk under Willmore flow.
 
 use crate::prelude::*;
-use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, View};
+use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, VIEW};
 use crate::truth::{DISK, ELLIPSOID, Reached, Sample, THICK_DISK, Truth};
 use report::Numbers;
 
@@ -17,11 +17,6 @@ const HALVINGS: u32 = 6;
 /// The Willmore energies that the paper reports for the hybrid scheme.
 const CUBE_ENERGIES: [(usize, f64); 3] = [(0, 132.65), (1, 52.26), (STEPS, 25.78)];
 const DISK_ENERGIES: [(usize, f64); 3] = [(0, 87.15), (1, 50.49), (STEPS, 25.59)];
-const VIEW: View = View {
-    up: UpAxis::Z,
-    azimuth: 30.0,
-    elevation: 25.0,
-};
 
 /// Willmore flow of a cube and of a thick disk, n = 64, eps = 2^-5, tautilde = 2^-12, tau = 2^-18, by the hybrid scheme and by
 /// nested implicit finite elements: pictures, Willmore energies w and L2 distances after 0, 1 and 100 steps.
@@ -65,7 +60,6 @@ pub fn program(options: &Options) -> Result<(), Error> {
         steps > 0 && !variants.is_empty(),
         "--steps must be at least 1, and --methods must name a method",
     )?;
-    let device = run.open_device()?;
     let setting = Setting::new(&options.figure, CELLS, 1.0)?;
     let (n, grid, eps) = (setting.n, setting.grid, setting.scales.eps);
     let cube = Cuboid::new([CUBE_HALF_SIDE; 3])?.translated([0.5; 3]);
@@ -78,7 +72,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
         "tau": TAU, "steps": steps, "variants": variants, "cube_half_side": CUBE_HALF_SIDE, "disk_radius": radius,
         "disk_half_height": half_height,
     }))?;
-    let session = Session::open(PROGRAM, run, device, parameters)?;
+    let session = Session::open(PROGRAM, run, parameters)?;
     let flows = SurfaceFlows {
         program: PROGRAM,
         title: "Willmore flow of a cube and of a thick disk".to_owned(),

@@ -24,8 +24,7 @@ pub struct Options {
 pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
     let count = if options.quick { 1 } else { QUOTIENTS.len() };
     let parameters = json!({ "n": CELLS, "eps_over_h": 2, "quotients": QUOTIENTS[..count], "radius": RADIUS, "side": SIDE });
-    let device = options.open_device()?;
-    let mut session = Session::open("elastica", options, device, parameters)?;
+    let mut session = Session::open("elastica", options, parameters)?;
     let exact = session.phase("exact curves", |_| Ok(elastica(&QUOTIENTS[..count])?))?;
     let grid = Grid::<2>::per_unit(CELLS, SIDE)?;
     let scales = Scales::of_grid(grid.spacing(), 2.0);

@@ -26,8 +26,7 @@ pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
     let (used, steps) = if options.quick { (3, 2) } else { (4, STEPS) };
     let parameters =
         json!({ "half_axes": HALF_AXES, "side": SIDE, "steps": steps, "tolerance": TOLERANCE });
-    let device = options.open_device()?;
-    let mut session = Session::open("ellipse_orders", options, device, parameters)?;
+    let mut session = Session::open("ellipse_orders", options, parameters)?;
     let mut run = |size: f64, n: usize, parts: usize| {
         let operator = Chosen::default().operator(ACCURATE, n)?;
         let initial = phase_field(Grid::per_unit(n, SIDE)?, &Ellipse::new(HALF_AXES)?, EPS)?;

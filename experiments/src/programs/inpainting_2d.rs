@@ -81,13 +81,12 @@ pub fn program(options: &Options) -> Result<(), Error> {
     }
     let ratios = Ratios::of_run(2, WIDTH, 1.0 / n as f64, scales.eps, scales.mcf_step);
     ratios.validate()?;
-    let device = run.open_device()?;
     let (scheme, needed) = (options.common.scheme, NeededNetwork::exactly(ratios));
     let networks = options.common.figure.networks.load(&[needed])?;
     let operator = networks.learned(scheme, &needed)?;
     let shapes = shapes(run.quick)?;
     let parameters = inpainting::parameters((n, &scales), &operator, &shapes);
-    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut session = Session::open(PROGRAM, run, parameters)?;
     let mut trajectories = Vec::new();
     for shape in &shapes {
         let case = shape.case(grid, scales, &operator)?;

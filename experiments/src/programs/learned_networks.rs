@@ -26,7 +26,6 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.run;
     let mut specs = NetworkSpec::convergence();
     specs.truncate(if run.quick { 1 } else { specs.len() });
-    let device = run.open_device()?;
     let needs: Vec<_> = (specs.iter().map(|spec| NeededNetwork::exactly(spec.ratios))).collect();
     let chosen = options.networks.load(&needs)?;
     let find = |need| Ok(chosen.find(Scheme::Paper, need)?.network);
@@ -35,7 +34,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let names = specs.iter().map(|spec| spec.name);
     let checksums: BTreeMap<_, _> = names.zip(fingerprints).collect();
     let parameters = json!({"networks": checksums, "held_out_radii": held_out_radii(run.quick)});
-    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut session = Session::open(PROGRAM, run, parameters)?;
     let mut shown = Vec::new();
     for (&spec, network) in specs.iter().zip(networks) {
         let title = format!("quality of {}", spec.name);

@@ -94,16 +94,15 @@ pub fn program(options: &Options) -> Result<(), Error> {
         ),
     )?;
     let planes: &[usize] = if quick { &[128] } else { &[128, 256, 512] };
-    let solids = if quick {
-        [("cube", 24, 2), ("blob", 32, 2)]
-    } else {
-        [("cube", 64, 20), ("blob", 128, 8)]
-    };
+    let solids = run.either(
+        [("cube", 24, 2), ("blob", 32, 2)],
+        [("cube", 64, 20), ("blob", 128, 8)],
+    );
     let networks = timing::networks(&options.networks, planes)?;
     let learned = |needed| networks.learned(Scheme::Paper, &needed);
     let turns = if quick { 0.05 } else { options.turns };
     let parameters = json!({ "turns": turns, "threads": rayon::current_num_threads() });
-    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut session = Session::on(device, PROGRAM, run, parameters)?;
     let mut all = Vec::new();
     for &n in planes {
         let operator = learned(convergence_network(n)?)?;

@@ -71,22 +71,21 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.figure.run;
     let radii = if run.quick { &RADII[2..4] } else { &RADII };
     let willmore_steps = if run.quick { 2 } else { WILLMORE_STEPS };
-    let device = run.open_device()?;
     let setting = Setting::new(&options.figure, CELLS, 1.0)?;
     let others = json!({ "tau": TAU, "willmore_steps": willmore_steps });
     let parameters = setting.parameters(others)?;
-    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut session = Session::open(PROGRAM, run, parameters)?;
     let mut all = Vec::new();
     for &radius in radii {
-        let measured = session.phase(format!("radius {radius}"), |stage| {
-            let sphere = Sphere {
-                setting: &setting,
+        let setting = &setting;
+        all.push(session.phase(format!("radius {radius}"), |stage| {
+            Sphere {
+                setting,
                 stage,
                 radius,
-            };
-            sphere.measure(willmore_steps)
-        })?;
-        all.push(measured);
+            }
+            .measure(willmore_steps)
+        })?);
     }
     session.sheet(sheet(&all), "spheres")?;
     if !run.quick {
@@ -118,9 +117,8 @@ impl Sphere<'_> {
         let time = (self.setting.scales.mcf_step, MCF_STEPS[LAST]);
         let still = self.case(Flow::Willmore, PAPERS, (TAU, 0))?;
         let mcf = variants().map(|variant| {
-            let run = self
-                .stage
-                .run(self.case(Flow::MeanCurvature, variant, time)?)?;
+            let case = self.case(Flow::MeanCurvature, variant, time)?;
+            let run = self.stage.run(case)?;
             Ok(MCF_STEPS.map(|step| run.records()[step - 1].measures["l2"]))
         });
         let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
@@ -161,7 +159,7 @@ impl Sphere<'_> {
         let first = records.first().and_then(|record| record.minimization);
         let last = records.last();
         // Of the ball with that volume.
-        let radius = |volume: f64| (0.75 * volume / std::f64::consts::PI).cbrt();
+        let radius = |volume: f64| (0.75 * volume / PI).cbrt();
         let end = last.map_or(f64::NAN, |record| record.measures["volume"]);
         let change = radius(end) - radius(run.start()["volume"]);
         Ok(Still {
@@ -188,11 +186,8 @@ fn sheet(all: &[Measurement]) -> Sheet<'_, Measurement> {
         }
     }
     let relative = |m: &Measurement| m.w_elements / WILLMORE_ENERGY_SPHERE;
-    sheet = (sheet.measure("w", ("w, FE measure", Fixed(2)), |m| m.w_elements)).column(
-        "w / 8π (FE)",
-        Fixed(4),
-        relative,
-    );
+    sheet = sheet.measure("w", ("w, FE measure", Fixed(2)), |m| m.w_elements);
+    sheet = sheet.column("w / 8π (FE)", Fixed(4), relative);
     for (k, &scheme) in Method::Hybrid.schemes(Flow::Willmore).iter().enumerate() {
         let prefix = match scheme {
             Scheme::Paper => String::new(),

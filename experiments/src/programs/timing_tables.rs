@@ -99,6 +99,7 @@ struct Timing {
     run: Run<2>,
     /// Why the row ended early, if it failed.
     failure: Option<String>,
+    numbers: Numbers,
 }
 
 const COLUMNS: [(&str, Format, &str); 4] = [
@@ -117,7 +118,6 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let cells = if quick { &[128][..] } else { &options.cells };
     let budget = if quick { 0.1 } else { options.budget };
     let networks = timing::networks(&options.networks, cells)?;
-    let device = run.open_device()?;
     let checksum = |&n| {
         let found = networks.find(Scheme::Paper, &convergence_network(n)?)?;
         Ok((format!("n{n}"), found.network.fingerprint().into()))
@@ -129,7 +129,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
         "budget": budget,
         "steps": STEPS,
     });
-    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut session = Session::open(PROGRAM, run, parameters)?;
     let mut timings = Vec::new();
     for &n in cells {
         timings.extend(measure(&mut session, &networks, n, budget)?);
@@ -137,17 +137,16 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let n = if quick { 32 } else { 64 };
     let (surface, steps) = surface_steps(options, &networks, &mut session, n)?;
 
-    let rows: Vec<_> = timings.iter().map(|t| (t, t.numbers())).collect();
     let times = |t: &Timing, k: usize| t.over_hybrid(&timings).map(|times| times[k]);
-    let table = Sheet::of(&rows)
-        .text("method", |(t, _)| t.row.label)
-        .column("n", Shortest, |(t, _)| t.n)
-        .column("128 steps [s]", Fixed(1), |(t, _)| t.seconds())
-        .text("measured", |(t, _)| t.measured())
-        .column("times hybrid", Fixed(1), |(t, _)| times(t, 0))
-        .column(MEASURED, Fixed(1), |(t, _)| times(t, 1))
-        .columns(&COLUMNS, |(_, numbers)| numbers)
-        .column(PAPERS, Shortest, |(t, _)| t.papers_seconds());
+    let table = Sheet::of(&timings)
+        .text("method", |t| t.row.label)
+        .column("n", Shortest, |t| t.n)
+        .column("128 steps [s]", Fixed(1), Timing::seconds)
+        .text("measured", Timing::measured)
+        .column("times hybrid", Fixed(1), |t| times(t, 0))
+        .column(MEASURED, Fixed(1), |t| times(t, 1))
+        .columns(&COLUMNS, |t| &t.numbers)
+        .column(PAPERS, Shortest, Timing::papers_seconds);
     session.sheet(table, "timing")?;
     session.remark(run.title("One Willmore step of a surface"));
     let steps = Sheet::of(&steps)
@@ -160,18 +159,18 @@ pub fn program(options: &Options) -> Result<(), Error> {
         .measure("hvp", ("HVP", Fixed(0)), |s| s.1["hvp_on_this_grid"])
         .column(PAPERS, Shortest, |s| s.2);
     session.sheet(steps, "armadillo")?;
-    let json = rows.iter().map(|(t, numbers)| {
+    let json = timings.iter().map(|t| {
         let (row, seconds) = (t.row.key, timing::seconds(&t.run));
-        json!({ "variant": row, "n": t.n, "numbers": numbers, "step_seconds": seconds, "failure": t.failure })
+        json!({ "variant": row, "n": t.n, "numbers": t.numbers, "step_seconds": seconds, "failure": t.failure })
     });
     let json: Vec<_> = json.collect();
     session.output.write_json("timing.json", &json)?;
     session.figure(figure(&timings), "timing")?;
-    for (timing, mut numbers) in rows.into_iter().filter(|(t, _)| t.usable()) {
-        numbers.extend(times(timing, 1).map(|times| ("times_hybrid_measured_steps", times)));
-        for (name, value) in numbers {
-            let metric = format!("timing.n{}.{}.{name}", timing.n, timing.row.key);
-            session.metric(&metric, value)?;
+    for timing in timings.iter().filter(|timing| timing.usable()) {
+        let key = format!("timing.n{}.{}", timing.n, timing.row.key);
+        let times = times(timing, 1).map(|times| ("times_hybrid_measured_steps", times));
+        for (name, value) in timing.numbers.clone().into_iter().chain(times) {
+            session.metric(&format!("{key}.{name}"), value)?;
         }
     }
     session.finish("128 Willmore steps of the cross: wall time on this machine")
@@ -196,6 +195,7 @@ fn measure(
             n,
             run: Run::new(case, &session.device)?,
             failure: None,
+            numbers: Numbers::new(),
         });
     }
     session.phase(format!("n = {n}"), |stage| {
@@ -203,6 +203,9 @@ fn measure(
         let goes_on = |timing: &Timing| timing.goes_on(budget);
         take_turns(&mut contenders, goes_on, |timing| timing.step(&stage.bar))
     })?;
+    for timing in &mut contenders {
+        timing.numbers = timing.numbers();
+    }
     Ok(contenders)
 }
 
@@ -251,7 +254,7 @@ impl Timing {
     }
 
     fn seconds(&self) -> Option<f64> {
-        self.usable().then(|| self.numbers()["seconds"])
+        self.usable().then(|| self.numbers["seconds"])
     }
 
     fn papers_seconds(&self) -> Option<f64> {

@@ -76,7 +76,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
         "adam": adam,
         "accurate": accurate,
     });
-    let session = Session::open(PROGRAM, run, device, parameters)?;
+    let session = Session::on(device, PROGRAM, run, parameters)?;
     let mut trainings = Trainings {
         checkpoints: session.output.subfolder("checkpoints")?,
         folder: session.output.subfolder("networks")?,

@@ -57,9 +57,8 @@ struct Row<'a> {
 
 pub fn program(options: &Options) -> Result<(), Error> {
     let full = usize::from(!options.run.quick);
-    let device = options.run.open_device()?;
     let parameters = json!({ "bodies": BODIES, "wrong": WRONG, "time": TIME, "taubin": TAUBIN, "laplacian": LAPLACIAN, "iterations": ITERATIONS });
-    let mut session = Session::open("unshrinking", &options.run, device, parameters)?;
+    let mut session = Session::open("unshrinking", &options.run, parameters)?;
     let seed = session.options.seed;
     let bodies = BODIES.map(|(name, voxels)| Segmented::new(name, voxels[full] as f64, seed));
     let bodies = bodies.into_iter().collect::<Result<Vec<_>, _>>()?;

@@ -2,17 +2,11 @@
 
 use crate::equilibria::{self, AtRest, Equilibrium};
 use crate::prelude::*;
-use crate::surfaces::{Setting, View, raster};
-use reference::equilibria::{Branch, vesicles};
+use crate::surfaces::{Setting, VIEW, raster};
+use reference::equilibria::{Branch, Vesicle, vesicles};
 use render::{Quality, Scene};
 
 const TITLE: &str = "Vesicles: least bending energy with given area and volume";
-const VIEW: View = View {
-    up: UpAxis::Z,
-    azimuth: 30.0,
-    elevation: 25.0,
-};
-
 /// Shapes of a branch, each flowing from the relaxed one before it.
 struct Family {
     branch: Branch,
@@ -56,12 +50,7 @@ pub struct Options {
 
 pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.figure.run;
-    let (count, steps) = if run.quick {
-        (1, Some(2))
-    } else {
-        (usize::MAX, None)
-    };
-    let device = run.open_device()?;
+    let (count, steps) = run.either((1, Some(2)), (usize::MAX, None));
     let settings = (FAMILIES.iter().take(count))
         .map(|family| Setting::new(&options.figure, family.cells, SIDE))
         .collect::<Result<Vec<_>, Error>>()?;
@@ -70,15 +59,10 @@ pub fn program(options: &Options) -> Result<(), Error> {
     });
     let families: Vec<Value> = families.collect();
     let parameters = settings[0].parameters(json!({ "families": families }))?;
-    let mut session = Session::open("vesicles", run, device, parameters)?;
+    let mut session = Session::open("vesicles", run, parameters)?;
     let mut all: Vec<AtRest<3>> = Vec::new();
     for (family, setting) in FAMILIES.iter().zip(&settings) {
-        let &Family {
-            branch,
-            name,
-            radius,
-            ..
-        } = family;
+        let (branch, name, radius) = (family.branch, family.name, family.radius);
         let volumes = family.reduced_volumes.iter().copied().take(count);
         let volumes: Vec<f64> = volumes.collect();
         let title = format!("exact vesicles: {name}");
@@ -112,7 +96,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
     session.metrics("vesicles.crossing", crossings)?;
     let diagram = diagram(&mut session, &all)?;
     session.figure(diagram, "diagram")?;
-    session.figure(shapes(&all, run.quick)?, "shapes")?;
+    session.figure(shapes(&all, run)?, "shapes")?;
     session.finish(TITLE)
 }
 
@@ -139,16 +123,11 @@ fn crossing(all: &[AtRest<3>], energy: impl Fn(&AtRest<3>) -> f64) -> Option<f64
 
 /// Exact branches as lines, the flow's shapes as marks.
 fn diagram(session: &mut Session<'_>, all: &[AtRest<3>]) -> Result<Figure, Error> {
+    use Branch::{Oblate, Prolate, Stomatocyte};
     let branches = [
-        (Branch::Prolate, "prolate", 0.99, 0.5, Marker::Circle),
-        (Branch::Oblate, "oblate", 0.99, 0.51, Marker::Square),
-        (
-            Branch::Stomatocyte,
-            "stomatocyte",
-            0.65,
-            0.4,
-            Marker::Diamond,
-        ),
+        (Prolate, "prolate", 0.99, 0.5, Marker::Circle),
+        (Oblate, "oblate", 0.99, 0.51, Marker::Square),
+        (Stomatocyte, "stomatocyte", 0.65, 0.4, Marker::Diamond),
     ];
     let mut curves = Vec::new();
     for (colour, (branch, name, from, to, marker)) in branches.into_iter().enumerate() {
@@ -156,11 +135,9 @@ fn diagram(session: &mut Session<'_>, all: &[AtRest<3>]) -> Result<Figure, Error
         let volumes: Vec<f64> = volumes.collect();
         let title = format!("branch: {name}");
         let exact = session.phase(title, |_| Ok(vesicles(branch, 0.0, &volumes)?))?;
-        let exact = Series::of(
-            format!("{name}, exact"),
-            volumes.iter().zip(&exact),
-            |(v, one)| [*v, one.energy() / (8.0 * PI)],
-        );
+        let points = volumes.iter().zip(&exact);
+        let point = |(v, one): (&f64, &Vesicle)| [*v, one.energy() / (8.0 * PI)];
+        let exact = Series::of(format!("{name}, exact"), points, point);
         curves.push(exact.with_colour(colour));
         let own = Series::of(format!("{name}, phase field"), of(branch, all), |one| {
             [one.equilibrium.ratio, one.energy()]
@@ -177,21 +154,14 @@ fn diagram(session: &mut Session<'_>, all: &[AtRest<3>]) -> Result<Figure, Error
 }
 
 /// A picture of every shape, and below it its section through the axis over the exact profile.
-fn shapes(all: &[AtRest<3>], quick: bool) -> Result<Figure, Error> {
+fn shapes(all: &[AtRest<3>], options: &RunOptions) -> Result<Figure, Error> {
     let (mut pictures, mut sections) = (Vec::new(), Vec::new());
     for one in all {
         let scene = Scene::new(&one.field, one.trajectory.case.scales.eps)?.view(VIEW);
-        let scene = scene.quality(if quick {
-            Quality::Draft
-        } else {
-            Quality::Standard
-        });
+        let scene = scene.quality(options.either(Quality::Draft, Quality::Standard));
         let name = one.equilibrium.title.replace(", ", "\n");
-        let caption = format!(
-            "{name}\n{:.4}\nexact {:.4}",
-            one.energy(),
-            one.exact_energy()
-        );
+        let (energy, exact) = (one.energy(), one.exact_energy());
+        let caption = format!("{name}\n{energy:.4}\nexact {exact:.4}");
         pictures.push(raster(&scene.render([320; 2])?, caption));
         sections.push(one.panel(String::new(), &section(&one.field)?, 2.2));
     }

@@ -104,8 +104,7 @@ pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
     let marks: Vec<usize> = MARKS.into_iter().take(used).collect();
     let cells: Vec<usize> = CELLS.into_iter().take(used).collect();
     let parameters = json!({ "marks": marks, "cells": cells, "time_unit": STEP, "eps_over_h": 2 });
-    let device = options.open_device()?;
-    let mut session = Session::open("work_precision", options, device, parameters)?;
+    let mut session = Session::open("work_precision", options, parameters)?;
     let (mut rows, mut ratios) = (Vec::new(), Vec::new());
     let times: Vec<(usize, f64)> = marks.iter().map(|&k| (k, k as f64 * STEP)).collect();
     let in_plane = steppings(STEP, options.quick);
@@ -132,7 +131,7 @@ pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
         ];
         session.metrics("estimates", metrics)?;
     }
-    circles(&mut session, options.quick)?;
+    circles(&mut session)?;
     let work: [(_, _, fn(&Reached) -> f64); 2] = [
         ("work_precision", "HVPs", |reached| reached.hvp),
         ("seconds", "seconds", |reached| reached.seconds),
@@ -247,12 +246,9 @@ fn careful(n: usize) -> ErrorControl {
 /// The circles of `circle_convergence` at n = 128 with the accurate operator, in equal steps of first order, in controlled ones of second order, and
 /// those extrapolated in `eps` from n = 64 and 128: their mean L2 error at the end of the 64 steps, and all Hessian-vector products, which on
 /// the coarser grid count by their share of the unknowns.
-fn circles(session: &mut Session<'_>, quick: bool) -> Result<(), Error> {
-    let (count, steps) = if quick {
-        (2, 4)
-    } else {
-        (circles::COUNT, circles::STEPS)
-    };
+fn circles(session: &mut Session<'_>) -> Result<(), Error> {
+    let usual = (circles::COUNT, circles::STEPS);
+    let (count, steps) = session.options.either((2, 4), usual);
     let variant = Variant {
         flow: Flow::Willmore,
         method: Method::Hybrid,
