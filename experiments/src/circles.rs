@@ -66,24 +66,6 @@ fn exact(flow: Flow, radius: f64, grid: Grid<2>, time: f64) -> Result<Field<2>, 
     phase_field(grid, &Ball::new([0.0, 0.0], radius)?, EPS)
 }
 
-fn case(
-    (flow, operator, n): (Flow, &Operator, usize),
-    radius: f64,
-    steps: usize,
-) -> Result<Case<2>, Error> {
-    let grid = grid(flow, radius, steps, n)?;
-    let mut measures = Measure::size(EPS);
-    measures.push(Measure::distance_to(move |grid, time| {
-        exact(flow, radius, grid, time)
-    }));
-    let shape = format!("circle r = {radius:.4}");
-    let initial = exact(flow, radius, grid, 0.0)?;
-    Ok(Case {
-        measures,
-        ..planar_flow((flow, operator), &shape, initial, (STEP, steps))
-    })
-}
-
 pub struct Circle {
     pub radius: f64,
     /// Exact `L2` distance between the last and the first time, for scale.
@@ -121,19 +103,24 @@ impl Ensemble {
         let Variant { flow, n, .. } = *variant;
         let radii = radii(count);
         let circles = in_parallel(count, workers(device), |i| {
-            let case = case((flow, operator, n), radii[i], steps)?;
+            let (radius, grid) = (radii[i], grid(flow, radii[i], steps, n)?);
+            let exact = move |grid, time| exact(flow, radius, grid, time);
+            let shape = format!("circle r = {radius:.4}");
+            let (initial, time) = (exact(grid, 0.0)?, (STEP, steps));
+            let mut case = planar_flow((flow, operator), &shape, initial, time);
+            case.measures = Measure::size(EPS);
+            case.measures.push(Measure::distance_to(exact));
             let (flow, operator) = (flow.key(), operator.key());
             let name = format!("{flow}-n{n}-{operator}-{i:02}");
             let folder = folder.as_path().join(name);
             let (ends, never) = (Samples::every(usize::MAX), Interrupt::never());
             let trajectory = Trajectory::of(case, device, &folder, &ends, &mut [], &never)?;
             let trajectory = trajectory.expect("nobody interrupts it");
-            let (initial, end) = (&trajectory.case.initial, steps as f64 * STEP);
-            let last = exact(variant.flow, radii[i], *initial.grid(), end)?;
+            let last = exact(grid, steps as f64 * STEP)?;
             stage.bar.inc(1);
             Ok(Circle {
-                radius: radii[i],
-                travelled: l2_distance(&last, initial)?,
+                radius,
+                travelled: l2_distance(&last, &trajectory.case.initial)?,
                 trajectory,
             })
         })?;
