@@ -159,11 +159,17 @@ impl Ensemble {
         study::mean(self.minimizations(), f)
     }
 
-    /// Steps that did not lower the energy `E[u_k, .]`, or that raised the Willmore energy.
-    pub fn energy_increases(&self) -> usize {
+    /// Steps that did not lower the energy `E[u_k, .]`, or that raised the Willmore energy; nothing for mean curvature flow.
+    pub fn energy_increases(&self) -> Option<usize> {
         let raised =
-            |r: &&StepRecord| r.energy >= r.energy_before || r.willmore_energy > r.energy_at_rest();
-        self.minimizations().filter(raised).count()
+            |r: &StepRecord| r.energy >= r.energy_before || r.willmore_energy > r.energy_at_rest();
+        (self.minimizations().map(|r| usize::from(raised(r)))).reduce(|a, b| a + b)
+    }
+
+    /// Linear solves that met negative curvature; nothing for mean curvature flow.
+    pub fn negative_curvature(&self) -> Option<usize> {
+        let solves = self.minimizations().map(|r| r.newton.negative_curvature);
+        solves.reduce(|a, b| a + b)
     }
 
     /// Name in metrics, such as `willmore.n128.hybrid_calibrated`.

@@ -82,7 +82,9 @@ pub fn program(options: &Options) -> Result<(), Error> {
     report.figures(&session)?;
     report.data(&session)?;
     session.sheet(report.sheet(), "errors")?;
-    report.metrics(&mut session)?;
+    for flow in Flow::ALL {
+        session.metric(&format!("{}.scale", flow.key()), report.scale(flow))?;
+    }
     remove_folder(&session.output.subfolder(FINISHED)?)?;
     session.finish("Mean L2 distance to the exact solution")
 }
@@ -261,26 +263,15 @@ impl Report {
             let (metric, head) = (format!("l2.step{k}"), format!("step {k}"));
             sheet = sheet.measure(&metric, (&head, Fixed(5)), |e| e.mean_error(k));
         }
+        // Of Willmore flow.
+        let seconds = |e: &Ensemble| e.minimizations().next().map(|_| e.seconds_per_step());
         let hvp = |e: &Ensemble| e.mean_of_steps(StepRecord::hvp);
-        sheet.measure("hvp_per_step", ("HVP/step", Fixed(1)), hvp)
-    }
-
-    /// Further metrics of Willmore flow, and the scale of both flows.
-    fn metrics(&self, session: &mut Session<'_>) -> Result<(), Error> {
-        for e in self.of_flow(Flow::Willmore) {
-            let newton = e.mean_of_steps(|r| r.newton.newton as f64);
-            // Linear solves that met it.
-            let negative = e.minimizations().map(|r| r.newton.negative_curvature);
-            let metrics = [
-                ("newton_per_step", newton.into()),
-                ("seconds_per_step", e.seconds_per_step().into()),
-                ("energy_increases", e.energy_increases().into()),
-                ("negative_curvature", negative.sum::<usize>().into()),
-            ];
-            session.metrics(&e.key(), metrics)?;
-        }
-        let scales = Flow::ALL.map(|flow| (flow.key(), self.scale(flow)));
-        (scales.into_iter())
-            .try_for_each(|(flow, scale)| session.metric(&format!("{flow}.scale"), scale))
+        let newton = |e: &Ensemble| e.mean_of_steps(|r| r.newton.newton as f64);
+        sheet
+            .measure("hvp_per_step", ("HVP/step", Fixed(1)), hvp)
+            .metric("newton_per_step", newton)
+            .metric("seconds_per_step", seconds)
+            .metric("energy_increases", Ensemble::energy_increases)
+            .metric("negative_curvature", Ensemble::negative_curvature)
     }
 }

@@ -77,14 +77,8 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let mut session = Session::open(PROGRAM, run, parameters)?;
     let mut all = Vec::new();
     for &radius in radii {
-        let setting = &setting;
         all.push(session.phase(format!("radius {radius}"), |stage| {
-            Sphere {
-                setting,
-                stage,
-                radius,
-            }
-            .measure(willmore_steps)
+            measure(&setting, stage, radius, willmore_steps)
         })?);
     }
     session.sheet(sheet(&all), "spheres")?;
@@ -106,71 +100,55 @@ pub fn program(options: &Options) -> Result<(), Error> {
     session.finish(TITLE)
 }
 
-struct Sphere<'a> {
-    setting: &'a Setting,
-    stage: &'a Stage<'a>,
+fn measure(
+    setting: &Setting,
+    stage: &Stage<'_>,
     radius: f64,
-}
-
-impl Sphere<'_> {
-    fn measure(&self, willmore_steps: usize) -> Result<Measurement, Error> {
-        let time = (self.setting.scales.mcf_step, MCF_STEPS[LAST]);
-        let still = self.case(Flow::Willmore, PAPERS, (TAU, 0))?;
-        let mcf = variants().map(|variant| {
-            let case = self.case(Flow::MeanCurvature, variant, time)?;
-            let run = self.stage.run(case)?;
-            Ok(MCF_STEPS.map(|step| run.records()[step - 1].measures["l2"]))
-        });
-        let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
-        let willmore = schemes.map(|&scheme| self.stand_still(scheme, willmore_steps));
-        Ok(Measurement {
-            radius: self.radius,
-            mcf: mcf.collect::<Result<_, Error>>()?,
-            w_elements: still.implicit_elements()?.willmore_energy(&still.initial)?,
-            willmore: willmore.collect::<Result<_, _>>()?,
-        })
-    }
-
-    fn case(
-        &self,
-        flow: Flow,
-        variant: (Method, Scheme),
-        (tau, steps): (f64, usize),
-    ) -> Result<Case<3>, Error> {
-        let (grid, scales, radius) = (self.setting.grid, self.setting.scales, self.radius);
-        let ball = move |grid, r| phase_field(grid, &Ball::new([0.5; 3], r)?, scales.eps);
+    willmore_steps: usize,
+) -> Result<Measurement, Error> {
+    let (grid, scales) = (setting.grid, setting.scales);
+    let ball = move |grid, radius| phase_field(grid, &Ball::new([0.5; 3], radius)?, scales.eps);
+    let shape = format!("sphere of radius {radius}");
+    let case = |variant, tau, steps| -> Result<Case<3>, Error> {
+        let (initial, operator) = (ball(grid, radius)?, setting.operator(variant)?);
+        let time = (StepRule::Constant(tau), steps);
+        Ok(willmore_flow(&shape, initial, operator, scales, time))
+    };
+    let mut mcf = Vec::new();
+    for variant in variants() {
         let exact = move |grid, t| ball(grid, mean_curvature_radius(radius, t, 3));
-        let (initial, operator) = (ball(grid, radius)?, self.setting.operator(variant)?);
-        let (shape, rule) = (
-            format!("sphere of radius {radius}"),
-            StepRule::Constant(tau),
-        );
-        let mut case = willmore_flow(&shape, initial, operator, scales, (rule, steps));
-        if flow == Flow::MeanCurvature {
-            case.measures = vec![Measure::distance_to(exact)];
-        }
-        Ok(Case { flow, ..case })
+        let run = stage.run(Case {
+            flow: Flow::MeanCurvature,
+            measures: vec![Measure::distance_to(exact)],
+            ..case(variant, scales.mcf_step, MCF_STEPS[LAST])?
+        })?;
+        mcf.push(MCF_STEPS.map(|step| run.records()[step - 1].measures["l2"]));
     }
-
-    fn stand_still(&self, scheme: Scheme, steps: usize) -> Result<Still, Error> {
-        let case = self.case(Flow::Willmore, (Method::Hybrid, scheme), (TAU, steps))?;
-        let run = self.stage.run(case)?;
-        let records = run.records();
+    let mut willmore = Vec::new();
+    for &scheme in Method::Hybrid.schemes(Flow::Willmore) {
+        let run = stage.run(case((Method::Hybrid, scheme), TAU, willmore_steps)?)?;
+        let (records, last) = (run.records(), run.records().last());
         let first = records.first().and_then(|record| record.minimization);
-        let last = records.last();
         // Of the ball with that volume.
         let radius = |volume: f64| (0.75 * volume / PI).cbrt();
         let end = last.map_or(f64::NAN, |record| record.measures["volume"]);
         let change = radius(end) - radius(run.start()["volume"]);
-        Ok(Still {
+        willmore.push(Still {
             scheme,
             w_learned: first.map_or(f64::NAN, |made| made.energy_at_rest()),
             w_relaxed: last.and_then(Record::willmore_energy).unwrap_or(f64::NAN),
-            radius_change_over_h: change * self.setting.n as f64,
+            radius_change_over_h: change * setting.n as f64,
             energy_increases: energy_increases(records),
             hvp_per_step: mean_hvp(records),
-        })
+        });
     }
+    let still = case(PAPERS, TAU, 0)?;
+    Ok(Measurement {
+        radius,
+        mcf,
+        w_elements: still.implicit_elements()?.willmore_energy(&still.initial)?,
+        willmore,
+    })
 }
 
 /// The errors of mean curvature flow and the energies, a row for each radius.
@@ -222,9 +200,8 @@ fn curve(
 
 fn errors(all: &[Measurement]) -> LineChart {
     let title = format!("Mean curvature flow, {} steps", MCF_STEPS[LAST]);
-    let curves = variants()
-        .enumerate()
-        .map(|(k, variant)| curve(variant, all, |m| m.mcf[k][LAST]));
+    let curves = variants().enumerate();
+    let curves = curves.map(|(k, variant)| curve(variant, all, |m| m.mcf[k][LAST]));
     LineChart::new(title, Axis::linear("radius"), Axis::log("L² error")).with_curves(curves)
 }
 
