@@ -177,10 +177,19 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
     for run in runs.iter_mut().chain(&mut references) {
         run.compare_with_exact(setting, &exact)?;
     }
-    let second_order = match flow {
-        Flow::Willmore => setting.second_order(&mut session, steps, &exact)?,
-        Flow::MeanCurvature => Vec::new(),
-    };
+    let mut second_order = Vec::new();
+    if flow == Flow::Willmore {
+        // At the end and at halves of that time.
+        let halves = (steps / 8).checked_ilog2().unwrap_or(0);
+        let halves = halves.min(steps.trailing_zeros());
+        let is_half = |mark: usize| (0..=halves).any(|k| mark == steps >> k);
+        let exact: Vec<&Truth> = exact.iter().filter(|exact| is_half(exact.mark)).collect();
+        let (n, ramp) = (CELLS[1], (time(steps), halves));
+        let reached = (setting.sample).second_order(&mut session, n, ramp, &exact)?;
+        let controlled = format!("second order, controlled steps, n = {n}");
+        let labels = [controlled, "second order, extrapolated to ε = 0".to_owned()];
+        second_order.extend(labels.into_iter().zip(reached));
+    }
     let comparison = Comparison {
         setting,
         steps,
@@ -220,27 +229,6 @@ impl Setting {
             errors: BTreeMap::new(),
             from_exact: BTreeMap::new(),
         })
-    }
-
-    /// Controlled steps of second order with the accurate operator at two to `eps`, at the end and at halves of that time, and the same
-    /// extrapolated to `eps = 0` from stricter steps.
-    fn second_order(
-        &self,
-        session: &mut Session<'_>,
-        steps: usize,
-        exact: &[Truth],
-    ) -> Result<Vec<(String, Vec<Reached>)>, Error> {
-        let halves = (steps / 8).checked_ilog2().unwrap_or(0);
-        let halves = halves.min(steps.trailing_zeros());
-        let is_half = |mark: usize| (0..=halves).any(|k| mark == steps >> k);
-        let exact: Vec<&Truth> = exact.iter().filter(|exact| is_half(exact.mark)).collect();
-        let (n, ramp) = (CELLS[1], (time(steps), halves));
-        let reached = self.sample.second_order(session, n, ramp, &exact)?;
-        let labels = [
-            format!("second order, controlled steps, n = {n}"),
-            "second order, extrapolated to ε = 0".to_owned(),
-        ];
-        Ok(labels.into_iter().zip(reached).collect())
     }
 }
 

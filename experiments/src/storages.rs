@@ -66,11 +66,9 @@ impl StorageOptions {
     /// Refuses resolutions that cannot be measured.
     pub fn check(&self) -> Result<(), Error> {
         let possible = |n: &usize| *n >= 16 && n.is_multiple_of(8);
+        let mut cells = self.surface_cells.iter().chain(&self.curve_cells);
         require(
-            self.surface_cells
-                .iter()
-                .chain(&self.curve_cells)
-                .all(possible),
+            cells.all(possible),
             "--surface-cells and --curve-cells must be multiples of 8, from 16 on, as bricks are",
         )
     }
@@ -83,65 +81,50 @@ impl StorageOptions {
         session: &mut Session<'_>,
     ) -> Result<Vec<Stored>, Error> {
         let networks = networks.load(&[needed_network()])?;
-        let mut operator = networks.learned(Scheme::Accurate, &needed_network())?;
+        let mut dense_or_bricks = networks.learned(Scheme::Accurate, &needed_network())?;
+        let quick = session.options.quick;
         let usual = [&self.curve_cells[..], &self.surface_cells];
         let [curves, surfaces] = session.options.either([&[64][..], &[32, 64]], usual);
         let mut measured = Vec::new();
         for &n in curves {
-            measured.push(curve(n, session)?);
+            forget_memory();
+            let grid = Grid::per_unit(n, CROSS.side)?;
+            let mut scales = scales(n);
+            scales.newton = NewtonParams::second_order();
+            let initial = (CROSS.initial)(grid, scales.eps)?;
+            let mut operator = operator(ACCURATE, &grid, &scales)?;
+            operator.storage = Storage::Bricks;
+            let steps = TimeSteps::controlled(ErrorControl::default());
+            let time = (steps.rule, if quick { 2 } else { CROSS_STEPS });
+            let mut case = willmore_flow(CROSS.key, initial, operator, scales, time);
+            case.steps = steps;
+            measured.push(Stored::measure(CROSS.key, n, case, session)?);
         }
+        let mut mesh_options = self.mesh.clone();
+        mesh_options.procedural |= quick;
         for &n in surfaces {
             for storage in STORAGES {
-                if storage == Storage::Bricks || n <= self.dense_up_to {
-                    operator.storage = storage;
-                    measured.push(self.surface(n, operator.clone(), session)?);
+                if storage == Storage::Dense && n > self.dense_up_to {
+                    continue;
                 }
+                forget_memory();
+                let grid = centred_box(n, self.mesh.box_side(&ARMADILLO))?;
+                let mesh = mesh_options.load_or_built_in(&ARMADILLO, &grid)?;
+                let (title, eps) = (format!("armadillo, n = {n}, {storage}"), scales(n).eps);
+                let initial = session.phase(format!("{title}: signed distance"), |stage| {
+                    mesh.phase_field(grid, eps, &stage.bar)
+                })?;
+                drop(mesh);
+                let rule = StepRule::Doubling(FIRST_STEP * grid.spacing().powi(4));
+                let time = (rule, if quick { 2 } else { STEPS });
+                dense_or_bricks.storage = storage;
+                let operator = dense_or_bricks.clone();
+                let case = willmore_flow("armadillo", initial, operator, scales(n), time);
+                measured.push(Stored::measure("armadillo", n, case, session)?);
             }
         }
         Ok(measured)
     }
-
-    fn surface(
-        &self,
-        n: usize,
-        operator: Operator,
-        session: &mut Session<'_>,
-    ) -> Result<Stored, Error> {
-        let quick = session.options.quick;
-        forget_memory();
-        let grid = centred_box(n, self.mesh.box_side(&ARMADILLO))?;
-        let mut options = self.mesh.clone();
-        options.procedural |= quick;
-        let mesh = options.load_or_built_in(&ARMADILLO, &grid)?;
-        let title = format!("armadillo, n = {n}, {}: signed distance", operator.storage);
-        let initial = session.phase(title, |stage| {
-            mesh.phase_field(grid, scales(n).eps, &stage.bar)
-        })?;
-        drop(mesh);
-        let rule = StepRule::Doubling(FIRST_STEP * grid.spacing().powi(4));
-        let time = (rule, if quick { 2 } else { STEPS });
-        let case = willmore_flow("armadillo", initial, operator, scales(n), time);
-        Stored::measure("armadillo", n, case, session)
-    }
-}
-
-/// The cross in controlled steps of second order.
-fn curve(n: usize, session: &mut Session<'_>) -> Result<Stored, Error> {
-    forget_memory();
-    let grid = Grid::per_unit(n, CROSS.side)?;
-    let scales = Scales {
-        newton: NewtonParams::second_order(),
-        ..scales(n)
-    };
-    let initial = (CROSS.initial)(grid, scales.eps)?;
-    let mut operator = operator(ACCURATE, &grid, &scales)?;
-    operator.storage = Storage::Bricks;
-    let steps = TimeSteps::controlled(ErrorControl::default());
-    let quick = session.options.quick;
-    let time = (steps.rule, if quick { 2 } else { CROSS_STEPS });
-    let mut case = willmore_flow(CROSS.key, initial, operator, scales, time);
-    case.steps = steps;
-    Stored::measure(CROSS.key, n, case, session)
 }
 
 fn forget_memory() {

@@ -198,10 +198,26 @@ fn measure(
             numbers: Numbers::new(),
         });
     }
+    // The first step costs more than the others: extrapolation needs some of those.
+    let goes_on = |timing: &Timing| {
+        let seconds = timing::seconds(&timing.run);
+        let more = seconds.len() < 3 || seconds.iter().sum::<f64>() < budget;
+        timing.failure.is_none() && seconds.len() < STEPS && more
+    };
     session.phase(format!("n = {n}"), |stage| {
         stage.bar.set_length((VARIANTS.len() * STEPS) as u64);
-        let goes_on = |timing: &Timing| timing.goes_on(budget);
-        take_turns(&mut contenders, goes_on, |timing| timing.step(&stage.bar))
+        take_turns(&mut contenders, goes_on, |timing| {
+            stage.bar.inc(1);
+            match timing.run.step() {
+                Err(engine::Error::Step { source, .. })
+                    if matches!(*source, solver::Error::NotConverged { .. }) =>
+                {
+                    timing.failure = Some(source.to_string());
+                    Ok(())
+                }
+                other => Ok(other.map(drop)?),
+            }
+        })
     })?;
     for timing in &mut contenders {
         timing.numbers = timing.numbers();
@@ -210,26 +226,6 @@ fn measure(
 }
 
 impl Timing {
-    fn goes_on(&self, budget: f64) -> bool {
-        // The first step costs more than the others: extrapolation needs some of those.
-        let seconds = timing::seconds(&self.run);
-        let more = seconds.len() < 3 || seconds.iter().sum::<f64>() < budget;
-        self.failure.is_none() && seconds.len() < STEPS && more
-    }
-
-    fn step(&mut self, bar: &ProgressBar) -> Result<(), Error> {
-        bar.inc(1);
-        match self.run.step() {
-            Err(engine::Error::Step { source, .. })
-                if matches!(*source, solver::Error::NotConverged { .. }) =>
-            {
-                self.failure = Some(source.to_string());
-                Ok(())
-            }
-            other => Ok(other.map(drop)?),
-        }
-    }
-
     /// Time and work, with the time of all steps in seconds: measured, or with the mean of the later half of the measured steps for each
     /// of the rest. Steps become cheaper as corners smooth out: the later ones say most about what is to come.
     fn numbers(&self) -> Numbers {

@@ -127,24 +127,29 @@ impl Segmented {
     fn treated(&self, session: &mut Session<'_>) -> Result<Vec<Row<'_>>, Error> {
         let (body, marched) = (&self.body.surface, &self.marched);
         let (taubin, laplacian) = (self.smoothed(TAUBIN)?, self.smoothed(LAPLACIAN)?);
-        // Key, words, what it starts from, and for flows whether the volume is kept.
+        let (none, kept, free) = (None, Some(true), Some(false));
+        // Key, words, what it starts from, iterations, and for flows whether the volume is kept.
         let all = [
-            ("marched", "marching tetrahedra", marched, None),
-            ("fair", "fair, volume kept", body, Some(true)),
-            ("free", "fair, free", body, Some(false)),
-            ("marched_fair", "marched, volume kept", marched, Some(true)),
-            ("marched_free", "marched, free", marched, Some(false)),
-            ("taubin", "Taubin", &taubin.1, None),
-            ("laplacian", "Laplacian", &laplacian.1, None),
+            ("marched", "marching tetrahedra", marched, None, none),
+            ("fair", "fair, volume kept", body, None, kept),
+            ("free", "fair, free", body, None, free),
+            ("marched_fair", "marched, volume kept", marched, None, kept),
+            ("marched_free", "marched, free", marched, None, free),
+            ("taubin", "Taubin", &taubin.1, Some(taubin.0), none),
+            (
+                "laplacian",
+                "Laplacian",
+                &laplacian.1,
+                Some(laplacian.0),
+                none,
+            ),
         ];
-        let row = |(key, words, start, flow): (_, _, &ClosedMesh, Option<bool>)| {
-            let iterations = match key {
-                "taubin" => Some(taubin.0),
-                "laplacian" => Some(laplacian.0),
-                _ => None,
-            };
+        let row = |(key, words, start, iterations, flow): (_, _, &ClosedMesh, _, Option<bool>)| {
             session.phase(format!("{}: {words}", self.name), |stage| {
-                let mut case = self.case(start)?;
+                let distance = MeshDistance::new(start).sample(self.grid, || ())?;
+                let mut case = fairing_flow(self.name, distance)?;
+                case.measures = vec![Measure::displacement(&case.initial, case.scales.eps)];
+                case.stops = vec![Stop::Time(TIME), Stop::Displacement(FARTHEST)];
                 let mut surface = start.mesh().clone();
                 let mut volume = start.volume();
                 if let Some(keeps) = flow {
@@ -178,17 +183,6 @@ impl Segmented {
             .min_by(|a, b| a.1.total_cmp(&b.1))
             .map_or(1, |best| best.0);
         Ok((best, ClosedMesh::new(smoothed(best))?.0))
-    }
-
-    /// Willmore flow from a surface, as long as `willmore fair` lets it.
-    fn case(&self, start: &ClosedMesh) -> Result<Case<3>, Error> {
-        let distance = MeshDistance::new(start).sample(self.grid, || ())?;
-        let case = fairing_flow(self.name, distance)?;
-        Ok(Case {
-            measures: vec![Measure::displacement(&case.initial, case.scales.eps)],
-            stops: vec![Stop::Time(TIME), Stop::Displacement(FARTHEST)],
-            ..case
-        })
     }
 }
 
