@@ -91,22 +91,18 @@ pub fn held_out_radii(quick: bool) -> usize {
 pub fn train<R: Recipe>(
     (spec, recipe): (&NetworkSpec, &R),
     file: &Path,
-    Stage {
-        options,
-        device,
-        bar,
-        ..
-    }: &Stage<'_>,
+    stage: &Stage<'_>,
 ) -> Result<Trained, Error> {
     let training = Training {
         recipe,
-        data: spec.data(options.quick)?,
-        seed: options.seed,
-        held_out: held_out_radii(options.quick),
+        data: spec.data(stage.options.quick)?,
+        seed: stage.options.seed,
+        held_out: held_out_radii(stage.options.quick),
     };
     let key = serde_json::to_value((&training, env!("CARGO_PKG_VERSION")));
     let key = key.expect("settings are numbers and names");
     let mut checkpoint: Checkpoint<R::State> = load(file, &key).unwrap_or_default();
+    let bar = &stage.bar;
     bar.set_position(checkpoint.curve.len() as u64);
     bar.reset_eta();
     let mut stored = Instant::now();
@@ -120,7 +116,7 @@ pub fn train<R: Recipe>(
         }
         Ok(true)
     };
-    let trained = training.run(&mut checkpoint, device, &mut observer)?;
+    let trained = training.run(&mut checkpoint, stage.device, &mut observer)?;
     store(file, &key, &checkpoint)?;
     Ok(trained)
 }

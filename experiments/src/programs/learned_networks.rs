@@ -28,15 +28,16 @@ pub fn program(options: &Options) -> Result<(), Error> {
     specs.truncate(if run.quick { 1 } else { specs.len() });
     let needs: Vec<_> = (specs.iter().map(|spec| NeededNetwork::exactly(spec.ratios))).collect();
     let chosen = options.networks.load(&needs)?;
-    let find = |need| Ok(chosen.find(Scheme::Paper, need)?.network);
-    let networks: Vec<Network> = needs.iter().map(find).collect::<Result<_, Error>>()?;
-    let fingerprints = networks.iter().map(Network::fingerprint);
-    let names = specs.iter().map(|spec| spec.name);
-    let checksums: BTreeMap<_, _> = names.zip(fingerprints).collect();
+    let mut networks: Vec<(NetworkSpec, Network)> = Vec::new();
+    for (&spec, need) in specs.iter().zip(&needs) {
+        networks.push((spec, chosen.find(Scheme::Paper, need)?.network));
+    }
+    let checksums = (networks.iter()).map(|(spec, network)| (spec.name, network.fingerprint()));
+    let checksums: BTreeMap<_, _> = checksums.collect();
     let parameters = json!({"networks": checksums, "held_out_radii": held_out_radii(run.quick)});
     let mut session = Session::open(PROGRAM, run, parameters)?;
     let mut shown = Vec::new();
-    for (&spec, network) in specs.iter().zip(networks) {
+    for (spec, network) in networks {
         let title = format!("quality of {}", spec.name);
         let quality = quality::measure(&mut session, title, &spec, &network)?;
         shown.push(Shown {

@@ -96,7 +96,36 @@ pub fn program(options: &Options) -> Result<(), Error> {
         Recipe::Both => trainings.progressively(&adam, !options.only.is_empty())?,
         Recipe::Lm | Recipe::Accurate => {}
     }
-    trainings.write()
+    let (mut session, all) = (trainings.session, trainings.finished);
+    session.figure(figure(&all), "learning_curves")?;
+    let points = all
+        .iter()
+        .flat_map(|one| one.trained.curve.iter().map(move |at| (one, at)));
+    let points: Vec<(&Finished, &CurvePoint)> = points.collect();
+    let curves = Sheet::of(&points)
+        .data("network", |(one, _)| one.spec.name)
+        .data("recipe", |(one, _)| one.recipe.look().0)
+        .data("iteration", |(_, at)| at.iteration)
+        .data("seconds", |(_, at)| at.seconds)
+        .data("training_loss", |(_, at)| at.training_loss)
+        .data("held_out_loss", |(_, at)| at.held_out_loss);
+    session.csv(curves, "learning_curves")?;
+    for one in &all {
+        let quality = &one.trained.quality;
+        session.summary.insert_record(&one.key(), quality)?;
+    }
+    let sheet = Sheet::of(&all)
+        .keyed(|one, name| format!("{}.{name}", one.key()))
+        .text("network", |one| one.spec.name)
+        .text("recipe", |one| one.recipe.look().0)
+        .metric("seconds", |one| one.trained.seconds())
+        .metric("iterations", |one| one.trained.curve.len());
+    let sheet = quality::columns(sheet, |one| &one.trained.quality);
+    session.sheet(sheet, "quality")?;
+    remove_folder(&trainings.checkpoints)?;
+    let folder = trainings.folder.as_path().display();
+    session.remark(format!("Networks are in {folder}"));
+    session.finish("Quality of the trained networks")
 }
 
 impl Options {
@@ -177,39 +206,6 @@ impl Trainings<'_> {
             self.train(Recipe::Adam, spec, first)?;
         }
         Ok(())
-    }
-
-    fn write(self) -> Result<(), Error> {
-        let (mut session, all) = (self.session, self.finished);
-        session.figure(figure(&all), "learning_curves")?;
-        let points = all
-            .iter()
-            .flat_map(|one| one.trained.curve.iter().map(move |at| (one, at)));
-        let points: Vec<(&Finished, &CurvePoint)> = points.collect();
-        let curves = Sheet::of(&points)
-            .data("network", |(one, _)| one.spec.name)
-            .data("recipe", |(one, _)| one.recipe.look().0)
-            .data("iteration", |(_, at)| at.iteration)
-            .data("seconds", |(_, at)| at.seconds)
-            .data("training_loss", |(_, at)| at.training_loss)
-            .data("held_out_loss", |(_, at)| at.held_out_loss);
-        session.csv(curves, "learning_curves")?;
-        for one in &all {
-            let quality = &one.trained.quality;
-            session.summary.insert_record(&one.key(), quality)?;
-        }
-        let sheet = Sheet::of(&all)
-            .keyed(|one, name| format!("{}.{name}", one.key()))
-            .text("network", |one| one.spec.name)
-            .text("recipe", |one| one.recipe.look().0)
-            .metric("seconds", |one| one.trained.seconds())
-            .metric("iterations", |one| one.trained.curve.len());
-        let sheet = quality::columns(sheet, |one| &one.trained.quality);
-        session.sheet(sheet, "quality")?;
-        remove_folder(&self.checkpoints)?;
-        let folder = self.folder.as_path().display();
-        session.remark(format!("Networks are in {folder}"));
-        session.finish("Quality of the trained networks")
     }
 }
 

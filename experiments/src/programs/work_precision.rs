@@ -233,16 +233,6 @@ fn time_errors<const D: usize>(
     Ok(ratios)
 }
 
-/// Steps for an extrapolation, alike on both grids, so that their errors do not add up.
-fn careful(n: usize) -> ErrorControl {
-    ErrorControl {
-        relative: 0.003,
-        length: None,
-        longest: 0.5 * n as f64 / CELLS[1] as f64,
-        first: Some(16.0 * EPS.powi(4)),
-    }
-}
-
 /// The circles of `circle_convergence` at n = 128 with the accurate operator, in equal steps of first order, in controlled ones of second order, and
 /// those extrapolated in `eps` from n = 64 and 128: their mean L2 error at the end of the 64 steps, and all Hessian-vector products, which on
 /// the coarser grid count by their share of the unknowns.
@@ -273,6 +263,13 @@ fn circles(session: &mut Session<'_>) -> Result<(), Error> {
             Ok::<_, Error>((run.field(run.steps())?, hvp(&run)))
         };
         let [coarse, fine] = CELLS;
+        // Alike on both grids, so that their errors do not add up.
+        let careful = |n: usize| ErrorControl {
+            relative: 0.003,
+            length: None,
+            longest: 0.5 * n as f64 / CELLS[1] as f64,
+            first: Some(16.0 * EPS.powi(4)),
+        };
         let (u, work) = run(fine, "controlled", ErrorControl::default())?;
         let (a, coarse_work) = run(coarse, "careful", careful(coarse))?;
         let (b, fine_work) = run(fine, "careful", careful(fine))?;
