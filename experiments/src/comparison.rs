@@ -358,33 +358,30 @@ impl Comparison<'_> {
     }
 
     fn error_figure(&self) -> Figure {
-        let compared = self.runs.iter().filter(|run| !run.errors.is_empty());
-        let curves = compared.map(|run| {
-            let points = run.errors.iter().map(|(&k, &l2)| [time(k), l2]);
-            self.study.series(run.variant, points.collect())
-        });
-        let truths = (self.runs.iter()).map(|run| {
-            let points = run.from_exact.iter().map(|(&k, &d)| [time(k), d]);
-            self.study.series(run.variant, points.collect())
-        });
-        // Where the study's colours end.
-        let styles = [LineStyle::Solid, LineStyle::Dotted];
-        let second_order = || self.second_order.iter().zip(styles);
-        let new = second_order().map(|((label, reached), style)| {
+        let chart = |title, y, distances: fn(&Compared) -> &BTreeMap<usize, f64>| {
+            let compared = self.runs.iter().filter(|run| !distances(run).is_empty());
+            let curves = compared.map(|run| {
+                let points = distances(run)
+                    .iter()
+                    .map(|(&k, &distance)| [time(k), distance]);
+                self.study.series(run.variant, points.collect())
+            });
+            let chart = LineChart::new(title, Axis::linear("time t"), Axis::log(y));
+            self.study.chart(chart, curves)
+        };
+        let papers = chart("to the reference", "L² distance", |run| &run.errors);
+        let largest = "largest distance of the curves";
+        let mut exact = chart("to the exact flow", largest, |run| &run.from_exact);
+        let (mut entries, styles) = (Vec::new(), [LineStyle::Solid, LineStyle::Dotted]);
+        for ((label, reached), style) in self.second_order.iter().zip(styles) {
             let series = Series::of(label, reached, |at| [time(at.mark), at.distance]);
             let series = series.with_colour(Colour::Grey).with_style(style);
-            series.with_marker(Marker::Circle)
-        });
-        let entries =
-            second_order().map(|((label, _), style)| LegendEntry::line(label, Colour::Grey, style));
-        let chart = |title, y| LineChart::new(title, Axis::linear("time t"), Axis::log(y));
-        let papers = chart("to the reference", "L² distance");
-        let exact = chart("to the exact flow", "largest distance of the curves");
+            exact = exact.with_series(series.with_marker(Marker::Circle));
+            entries.push(LegendEntry::line(label, Colour::Grey, style));
+        }
         let reference = self.about_the_reference();
-        let exact = self.study.chart(exact, truths.chain(new));
         Figure::new(format!("{}: distances over time", self.setting.title), 2)
-            .with_panel(self.study.chart(papers, curves))
-            .with_panel(exact.with_entries(entries))
+            .with_panels([papers, exact.with_entries(entries)])
             .with_shared_legend()
             .with_note(format!("ε = 2⁻⁶, time step 2⁻¹⁴. {reference}"))
     }

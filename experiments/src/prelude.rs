@@ -22,8 +22,8 @@ pub use indicatif::ProgressBar;
 pub use operators::{ComputeDevice, DeviceKind};
 pub use report::Format::{self, Fixed, Scientific, Shortest};
 pub use report::{
-    Axis, Cell, Colour, Curve, Figure, LegendEntry, LineChart, LineStyle, Marker, OutputDir,
-    Progress, Raster, Series, Shapes, Sheet, Table,
+    Axis, Cell, Colour, Curve, Figure, LegendEntry, LineChart, LineStyle, Marker, Numbers,
+    OutputDir, Progress, Raster, Series, Shapes, Sheet,
 };
 pub use serde::Serialize;
 pub use serde_json::{Value, json};

@@ -18,7 +18,7 @@ use rustfft::num_complex::Complex;
 use solver::{MinimizingMovement, Objective, Precision};
 
 use crate::prelude::*;
-use crate::timing::{Numbers, median, take_turns};
+use crate::timing::{median, take_turns};
 
 /// `c = tau / tautilde^2` of a typical step: `tau = tautilde = 2^-14`.
 const STIFFNESS: f64 = 16384.0;

@@ -7,7 +7,7 @@ use operators::memory;
 use crate::meshes::{ARMADILLO, MeshOptions};
 use crate::prelude::*;
 use crate::surfaces::{centred_box, needed_network, scales};
-use crate::timing::{self, Numbers};
+use crate::timing;
 use crate::truth::CROSS;
 
 /// Steps on every grid, each twice as long as the one before,

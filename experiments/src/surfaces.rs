@@ -6,7 +6,6 @@ use model::NeededNetwork;
 use operators::memory;
 pub use render::View;
 use render::{Picture, Quality, Rgb, Scene, Tube};
-use report::Numbers;
 use surfaces::ClosedMesh;
 
 use crate::look::one_over_two_to;

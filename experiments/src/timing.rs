@@ -4,8 +4,6 @@ use crate::networks::{Chosen, convergence_network};
 use crate::prelude::*;
 use crate::{study, surfaces, truth};
 
-pub use report::Numbers;
-
 /// Round after round, everyone who goes on has a turn.
 pub fn take_turns<C>(
     contenders: &mut [C],

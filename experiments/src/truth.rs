@@ -3,8 +3,8 @@
 use engine::estimated_time_error;
 use geometry::contour::{Interpolation, zero_level};
 use geometry::distance_from_phase_field;
-use reference::{Curve, Shape, planar, revolution};
-use report::Numbers;
+use reference::revolution::{self, Surface};
+use reference::{Curve, Shape, planar};
 use surfaces::phase_field_surface;
 
 use crate::prelude::*;
@@ -109,28 +109,14 @@ impl<const D: usize> Sample<D> {
         };
         let (shape, times) = ((self.curve)()?, marks.iter().map(|(_, time)| *time));
         let times: Vec<f64> = times.collect();
-        let truths: Vec<(Curve, Numbers)> = if D == 2 {
+        let marks = marks.iter().map(|(mark, _)| *mark);
+        Ok(if D == 2 {
             let curves = planar::evolve(&shape, flow, &times, &planar::ACCURACY)?;
-            curves.into_iter().map(with_sizes).collect()
+            marks.zip(curves).map(Truth::of_curve).collect()
         } else {
             let surfaces = revolution::evolve(&shape, flow, &times, &revolution::ACCURACY)?;
-            let sizes = |s: &revolution::Surface| {
-                [
-                    ("area", s.area()),
-                    ("volume", s.volume()),
-                    ("w", s.energy()),
-                ]
-                .into()
-            };
-            (surfaces.iter().map(|s| (s.profile().clone(), sizes(s)))).collect()
-        };
-        let truths = marks.iter().zip(truths);
-        let truth = |(&(mark, _), (outline, sizes))| Truth {
-            mark,
-            outline,
-            sizes,
-        };
-        Ok(truths.map(truth).collect())
+            marks.zip(surfaces).map(Truth::of_surface).collect()
+        })
     }
 
     /// Willmore flow on `n` cells per unit length, so many to `eps`, up to a time in such steps.
@@ -243,7 +229,32 @@ pub struct Truth {
 }
 
 impl Truth {
-    pub fn time(&self) -> f64 {
+    fn of_curve((mark, outline): (usize, Curve)) -> Self {
+        let along = |direction| outline.distance_along(direction).unwrap_or(f64::NAN);
+        let sizes = Numbers::from([
+            ("tip", along([1.0, 0.0])),
+            ("diagonal", along([1.0, 1.0])),
+            ("area", outline.area()),
+            ("perimeter", outline.length()),
+            ("w", outline.energy()),
+        ]);
+        Self {
+            mark,
+            outline,
+            sizes,
+        }
+    }
+
+    fn of_surface((mark, surface): (usize, Surface)) -> Self {
+        let [area, volume, w] = [surface.area(), surface.volume(), surface.energy()];
+        Self {
+            mark,
+            outline: surface.profile().clone(),
+            sizes: [("area", area), ("volume", volume), ("w", w)].into(),
+        }
+    }
+
+    fn time(&self) -> f64 {
         self.outline.time()
     }
 
@@ -251,18 +262,6 @@ impl Truth {
     pub fn record(&self, session: &mut Session<'_>, key: &str) -> Result<(), Error> {
         record(session, &format!("{key}.exact"), self.mark, &self.sizes)
     }
-}
-
-fn with_sizes(curve: Curve) -> (Curve, Numbers) {
-    let along = |direction| curve.distance_along(direction).unwrap_or(f64::NAN);
-    let sizes = [
-        ("tip", along([1.0, 0.0])),
-        ("diagonal", along([1.0, 1.0])),
-        ("area", curve.area()),
-        ("perimeter", curve.length()),
-        ("w", curve.energy()),
-    ];
-    (curve, sizes.into())
 }
 
 #[expect(clippy::unnecessary_wraps, reason = "isosurfaces may fail")]

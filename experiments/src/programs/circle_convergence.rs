@@ -122,52 +122,39 @@ impl Report {
     }
 
     fn figures(&self, session: &Session<'_>) -> Result<(), Error> {
-        let end = time(self.steps);
-        let over_radius = format!("Error on circles at t = {end:.4} over the radius");
-        let work = "Work per step of Willmore flow, mean over the circles".to_owned();
-        let over_time = Figure::new("Error on circles over time", 2).with_panels(self.over_time());
-        let over_time = over_time.with_shared_legend().with_note(self.circles());
-        session.figure(over_time, "convergence")?;
-        for (title, charts, stem) in [
-            (over_radius, self.over_radius(), "error_over_radius"),
-            (work, self.work(), "work_per_step"),
-        ] {
-            let figure = Figure::new(title, 2).with_panels(charts);
-            session.figure(figure.with_shared_legend(), stem)?;
-        }
-        session.figure(self.cost(), "error_over_cost")
-    }
-
-    fn circles(&self) -> String {
-        let radii: Vec<f64> = self.ensembles[0].circles.iter().map(|c| c.radius).collect();
-        let (count, first, last) = (radii.len(), radii[0], radii[radii.len() - 1]);
-        format!(
-            "ε = 2⁻⁶, τ = 2⁻¹⁴, h = 1/n; mean over {count} circles with radii between {first:.3} and {last:.3}."
-        )
-    }
-
-    fn over_time(&self) -> [LineChart; 2] {
-        let mut charts = self.flows("time t", "mean L² error", |e| {
-            let points = (0..=self.steps).map(|k| [time(k), e.mean_error(k)]);
+        let (steps, end) = (self.steps, time(self.steps));
+        let mut over_time = self.flows("time t", "mean L² error", |e| {
+            let points = (0..=steps).map(|k| [time(k), e.mean_error(k)]);
             self.study.series(e.variant, points.collect())
         });
-        for (chart, flow) in charts.iter_mut().zip(Flow::ALL) {
-            let end = time(self.steps);
+        for (chart, flow) in over_time.iter_mut().zip(Flow::ALL) {
             chart.note = self.scale(flow).map(|scale| {
                 format!("For scale: mean ‖u(t) − u(0)‖ = {scale:.3} at t = {end:.4}.")
             });
         }
-        charts
-    }
-
-    fn over_radius(&self) -> [LineChart; 2] {
-        self.flows("initial radius r", "L² error", |e| {
-            let points = e.circles.iter().map(|c| [c.radius, c.error(self.steps)]);
+        let over_radius = self.flows("initial radius r", "L² error", |e| {
+            let points = e.circles.iter().map(|c| [c.radius, c.error(steps)]);
             let curve = self.study.series(e.variant, points.collect());
-            curve
-                .with_marker(self.study.marker(e.variant.n))
-                .with_width(1.6)
-        })
+            let marker = self.study.marker(e.variant.n);
+            curve.with_marker(marker).with_width(1.6)
+        });
+        let circles = &self.ensembles[0].circles;
+        let (count, last) = (circles.len(), circles[circles.len() - 1].radius);
+        let figure = Figure::new("Error on circles over time", 2)
+            .with_panels(over_time)
+            .with_shared_legend()
+            .with_note(format!(
+                "ε = 2⁻⁶, τ = 2⁻¹⁴, h = 1/n; mean over {count} circles with radii between {:.3} and {last:.3}.",
+                circles[0].radius
+            ));
+        session.figure(figure, "convergence")?;
+        let title = format!("Error on circles at t = {end:.4} over the radius");
+        let figure = Figure::new(title, 2).with_panels(over_radius);
+        session.figure(figure.with_shared_legend(), "error_over_radius")?;
+        let title = "Work per step of Willmore flow, mean over the circles";
+        let figure = Figure::new(title, 2).with_panels(self.work());
+        session.figure(figure.with_shared_legend(), "work_per_step")?;
+        session.figure(self.cost(), "error_over_cost")
     }
 
     fn work(&self) -> [LineChart; 2] {

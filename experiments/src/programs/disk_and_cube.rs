@@ -3,7 +3,6 @@
 use crate::prelude::*;
 use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, VIEW};
 use crate::truth::{DISK, ELLIPSOID, Reached, Sample, THICK_DISK, Truth};
-use report::Numbers;
 
 const PROGRAM: &str = "disk_and_cube";
 /// Cells per unit length of a quick run and of the paper.
@@ -64,10 +63,19 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let (n, grid, eps) = (setting.n, setting.grid, setting.scales.eps);
     let cube = Cuboid::new([CUBE_HALF_SIDE; 3])?.translated([0.5; 3]);
     let disk = Cylinder::new(radius, half_height)?.translated([0.5; 3]);
-    let (cube, disk) = (
-        phase_field(grid, &cube, eps)?,
-        phase_field(grid, &disk, eps)?,
-    );
+    let start = |key, title: &str, shape: &dyn SignedDistance<3>, energies: [(usize, f64); 3]| {
+        let surface = Surface {
+            key,
+            title: title.to_owned(),
+            shown: energies.map(|(step, w)| (step, Some(w))).to_vec(),
+            view: VIEW,
+        };
+        phase_field(grid, shape, eps).map(|initial| (surface, initial))
+    };
+    let surfaces = vec![
+        start("cube", "cube", &cube, CUBE_ENERGIES)?,
+        start("disk", "thick disk", &disk, DISK_ENERGIES)?,
+    ];
     let parameters = setting.parameters(json!({
         "tau": TAU, "steps": steps, "variants": variants, "cube_half_side": CUBE_HALF_SIDE, "disk_radius": radius,
         "disk_half_height": half_height,
@@ -76,19 +84,16 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let flows = SurfaceFlows {
         program: PROGRAM,
         title: "Willmore flow of a cube and of a thick disk".to_owned(),
-        surfaces: vec![
-            (surface("cube", "cube", CUBE_ENERGIES), cube),
-            (surface("disk", "thick disk", DISK_ENERGIES), disk),
-        ],
+        surfaces,
         variants,
         time: (StepRule::Constant(TAU), steps),
     };
     flows.run(session, &setting, |session, all| {
         compare_with_finite_elements(session, all)?;
-        let end = (TAU, steps);
-        let rows = [&DISK, &ELLIPSOID].map(|sample| compare_with_exact(session, sample, n, end));
-        let rows: Vec<Vec<Compared>> = rows.into_iter().collect::<Result<_, _>>()?;
-        let rows: Vec<Compared> = rows.into_iter().flatten().collect();
+        let mut rows = Vec::new();
+        for sample in [&DISK, &ELLIPSOID] {
+            rows.extend(compare_with_exact(session, sample, n, (TAU, steps))?);
+        }
         session.sheet(sheet(&rows, n), "exact")?;
         Ok(String::new())
     })
@@ -148,15 +153,6 @@ fn sheet(rows: &[Compared], n: usize) -> Sheet<'_, Compared> {
     sheet
         .column("largest distance / h", Fixed(3), distance)
         .column("HVP", Fixed(0), |row| row.reached.hvp)
-}
-
-fn surface(key: &'static str, title: &str, energies: [(usize, f64); 3]) -> Surface {
-    Surface {
-        key,
-        title: title.to_owned(),
-        shown: energies.map(|(step, w)| (step, Some(w))).to_vec(),
-        view: VIEW,
-    }
 }
 
 /// Adds the L2 distances of the learned operators to the finite elements, where both ran, to captions and metrics.

@@ -3,7 +3,7 @@
 use crate::networks::convergence_network;
 use crate::prelude::*;
 use crate::storages::{self, StorageOptions};
-use crate::timing::{self, Numbers};
+use crate::timing;
 use crate::{products, surfaces};
 use geometry::shapes::Capsule;
 use operators::memory;

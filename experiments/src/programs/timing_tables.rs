@@ -4,7 +4,7 @@ use crate::meshes::{ARMADILLO, MeshOptions};
 use crate::networks::{Chosen, convergence_network};
 use crate::prelude::*;
 use crate::surfaces;
-use crate::timing::{self, Numbers, take_turns};
+use crate::timing::{self, take_turns};
 use engine::Method::{FeImplicit, FeSemi, Hybrid};
 use fem::LinearSolver::{self, ConjugateGradients, Direct};
 use solver::Method::{self as Newton, Paper, Preconditioned};
