@@ -35,17 +35,6 @@ impl RunOptions {
         })
     }
 
-    /// Creates and checks the output folder; to be called when everything else has been checked.
-    pub fn open_output(&self, program: &str) -> Result<OutputDir, Error> {
-        let folder = self.output.clone();
-        let folder = folder.unwrap_or_else(|| PathBuf::from("results").join(program));
-        Ok(OutputDir::create(folder)?)
-    }
-
-    pub fn progress(&self) -> Progress {
-        Progress::new(self.quiet)
-    }
-
     /// One of these, the first if this is a quick run.
     pub fn either<T>(&self, quick: T, usual: T) -> T {
         if self.quick { quick } else { usual }

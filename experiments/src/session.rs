@@ -59,7 +59,9 @@ impl<'a> Session<'a> {
         mut parameters: Value,
     ) -> Result<Self, Error> {
         parameters["quick"] = options.quick.into();
-        let output = options.open_output(program)?;
+        let folder = options.output.clone();
+        let folder = folder.unwrap_or_else(|| PathBuf::from("results").join(program));
+        let output = OutputDir::create(folder)?;
         let place = if device.kind().is_cpu() { "cpu" } else { "gpu" };
         let dtype = format!("{:?}", device.dtype()).to_lowercase();
         Ok(Self {
@@ -67,7 +69,7 @@ impl<'a> Session<'a> {
                 .with_parameters(&parameters)?
                 .with_backend(device.kind().name(), place, dtype)
                 .with_seed(options.seed),
-            progress: options.progress(),
+            progress: Progress::new(options.quiet),
             summary: Summary::new(),
             report: Vec::new(),
             clock: Instant::now(),

@@ -92,6 +92,9 @@ const VARIANTS: [Variant; 5] = [
     },
 ];
 
+/// Methods for one step of a surface, and the seconds that the paper reports.
+const SURFACE_STEPS: [(Method, f64); 2] = [(Hybrid, 807.0), (FeImplicit, 14589.0)];
+
 /// A row at work, and what was measured.
 struct Timing {
     row: &'static Variant,
@@ -134,8 +137,24 @@ pub fn program(options: &Options) -> Result<(), Error> {
     for &n in cells {
         timings.extend(measure(&mut session, &networks, n, budget)?);
     }
+    // One step of tau = 2^-18 of the armadillo by the hybrid scheme and nested finite elements, eps = 2h, tautilde = h^2.
     let n = if quick { 32 } else { 64 };
-    let (surface, steps) = surface_steps(options, &networks, &mut session, n)?;
+    let time = (StepRule::Constant(0.5_f64.powi(18)), 1);
+    let (scales, needed) = (surfaces::scales(n), surfaces::needed_network());
+    let grid = surfaces::centred_box(n, options.mesh.box_side(&ARMADILLO))?;
+    let (surface, steps) = session.phase("armadillo", |stage| {
+        let mesh = options.mesh.load_or_built_in(&ARMADILLO, &grid)?;
+        let initial = mesh.phase_field(grid, scales.eps, &stage.bar)?;
+        let mut steps = Vec::new();
+        for (method, papers_seconds) in SURFACE_STEPS {
+            let (variant, source) = ((method, Scheme::Paper), networks.of(Scheme::Paper));
+            let operator = Operator::new(variant, &source, &needed, &grid, &scales)?;
+            let initial = initial.clone();
+            let run = stage.run(willmore_flow(&mesh.title, initial, operator, scales, time))?;
+            steps.push((method, timing::numbers(&run), papers_seconds));
+        }
+        Ok((mesh.title, steps))
+    })?;
 
     let times = |t: &Timing, k: usize| t.over_hybrid(&timings).map(|times| times[k]);
     let table = Sheet::of(&timings)
@@ -275,33 +294,6 @@ impl Timing {
         let measured = own[..common].iter().sum::<f64>() / its[..common].iter().sum::<f64>();
         Some([self.seconds()? / hybrid.seconds()?, measured])
     }
-}
-
-/// One step of tau = 2^-18 of the armadillo by the hybrid scheme and nested finite elements, eps = 2h, tautilde = h^2: its name, and for
-/// each method what was measured and the seconds that the paper reports.
-fn surface_steps(
-    options: &Options,
-    networks: &Chosen,
-    session: &mut Session<'_>,
-    n: usize,
-) -> Result<(String, Vec<(Method, Numbers, f64)>), Error> {
-    const METHODS: [(Method, f64); 2] = [(Hybrid, 807.0), (FeImplicit, 14589.0)];
-    let time = (StepRule::Constant(0.5_f64.powi(18)), 1);
-    let (scales, needed) = (surfaces::scales(n), surfaces::needed_network());
-    let grid = surfaces::centred_box(n, options.mesh.box_side(&ARMADILLO))?;
-    session.phase("armadillo", |stage| {
-        let mesh = options.mesh.load_or_built_in(&ARMADILLO, &grid)?;
-        let initial = mesh.phase_field(grid, scales.eps, &stage.bar)?;
-        let mut steps = Vec::new();
-        for (method, papers_seconds) in METHODS {
-            let (variant, source) = ((method, Scheme::Paper), networks.of(Scheme::Paper));
-            let operator = Operator::new(variant, &source, &needed, &grid, &scales)?;
-            let initial = initial.clone();
-            let run = stage.run(willmore_flow(&mesh.title, initial, operator, scales, time))?;
-            steps.push((method, timing::numbers(&run), papers_seconds));
-        }
-        Ok((mesh.title, steps))
-    })
 }
 
 /// Seconds over the resolution: solid lines for this machine, dashed ones for the paper.
