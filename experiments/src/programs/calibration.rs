@@ -49,7 +49,19 @@ pub struct Options {
 
 pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.run;
-    let networks = options.networks()?;
+    let mut networks = Vec::new();
+    for path in &options.network {
+        let network = Network::load(path)?;
+        let name = network.ratios().file_name();
+        networks.push(NamedNetwork { name, network });
+    }
+    if networks.is_empty() {
+        for (name, network) in [Shipped::Paper.all()?, Shipped::Accurate.all()?].concat() {
+            let name = name.to_owned();
+            networks.push(NamedNetwork { name, network });
+        }
+    }
+    networks.truncate(run.either(1, usize::MAX));
     let checksums = (networks.iter()).map(|one| (&one.name, one.network.fingerprint()));
     let parameters = json!({
         "networks": checksums.collect::<BTreeMap<_, _>>(),
@@ -120,26 +132,6 @@ pub fn program(options: &Options) -> Result<(), Error> {
     session.finish("Calibration of the learned operators and of finite elements")
 }
 
-impl Options {
-    fn networks(&self) -> Result<Vec<NamedNetwork>, Error> {
-        let shipped = [Shipped::Paper.all()?, Shipped::Accurate.all()?].concat();
-        let mut networks = Vec::new();
-        for path in &self.network {
-            let network = Network::load(path)?;
-            let name = network.ratios().file_name();
-            networks.push(NamedNetwork { name, network });
-        }
-        if networks.is_empty() {
-            networks.extend(shipped.into_iter().map(|(name, network)| NamedNetwork {
-                name: name.to_owned(),
-                network,
-            }));
-        }
-        networks.truncate(if self.run.quick { 1 } else { usize::MAX });
-        Ok(networks)
-    }
-}
-
 #[derive(Clone)]
 struct Calibrated {
     named: NamedNetwork,
@@ -149,21 +141,6 @@ struct Calibrated {
 impl Calibrated {
     fn key(&self) -> &str {
         self.named.name.trim_end_matches(".safetensors")
-    }
-
-    /// Cells per unit length at which the network has the scales of the convergence tests.
-    fn convergence_cells(&self) -> Option<usize> {
-        let ratios = self.named.network.ratios();
-        let n = (ratios.eps_over_h / EPS).round();
-        let fits = ratios.dimension == 2 && (ratios.step_over_h2 - n * n * STEP).abs() < 1e-9;
-        fits.then_some(n as usize)
-    }
-
-    fn odd_part(&self) -> Result<Self, Error> {
-        let mut odd = self.clone();
-        odd.named.network = self.named.network.odd_part();
-        odd.calibration = odd.named.network.calibrate()?;
-        Ok(odd)
     }
 
     /// Willmore energy and phase field after one small step with these factors.
@@ -202,15 +179,22 @@ struct DiscRow {
 
 /// Discs of either phase by every network with the scales of the convergence tests up to `n = 256`, and by its odd part.
 fn discs(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<DiscRow>, Error> {
-    let quick = stage.options.quick;
-    let radii = if quick { &QUICK_RADII[..] } else { &RADII };
+    let radii = stage.options.either(&QUICK_RADII[..], &RADII);
     let mut variants = Vec::new();
     for one in all {
-        if let Some(n) = one.convergence_cells().filter(|&n| n <= 256) {
-            variants.push((n, false, one.clone()));
-            if !one.key().starts_with("accurate") {
-                variants.push((n, true, one.odd_part()?));
-            }
+        let ratios = one.named.network.ratios();
+        // At which the network has the scales of the convergence tests, if it does at all.
+        let n = (ratios.eps_over_h / EPS).round();
+        let fits = ratios.dimension == 2 && (ratios.step_over_h2 - n * n * STEP).abs() < 1e-9;
+        if !fits || n > 256.0 {
+            continue;
+        }
+        variants.push((n, false, one.clone()));
+        if !one.key().starts_with("accurate") {
+            let mut odd = one.clone();
+            odd.named.network = one.named.network.odd_part();
+            odd.calibration = odd.named.network.calibrate()?;
+            variants.push((n, true, odd));
         }
     }
     let mut tasks = Vec::new();
@@ -224,8 +208,8 @@ fn discs(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<DiscRow>, Error> {
         let (&(n, odd_part, ref one), radius, phase) = tasks[i];
         let (sign, factors) = (f64::from(phase), one.calibration.factors);
         let offset = one.calibration.spontaneous_curvature / EPS * sign;
-        let half = ((radius + MARGIN) * n as f64).ceil();
-        let grid = Grid::<2>::centred(2 * half as usize, 2.0 * half / n as f64)?;
+        let half = ((radius + MARGIN) * n).ceil();
+        let grid = Grid::<2>::centred(2 * half as usize, 2.0 * half / n)?;
         let disc = phase_field(grid, &Ball::new([0.0, 0.0], radius)?, EPS)?;
         let disc = disc.map(|u| sign * u);
         // Over that of the zero level set of the relaxed disc, `pi / R`.
