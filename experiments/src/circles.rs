@@ -66,24 +66,6 @@ fn exact(flow: Flow, radius: f64, grid: Grid<2>, time: f64) -> Result<Field<2>, 
     phase_field(grid, &Ball::new([0.0, 0.0], radius)?, EPS)
 }
 
-fn case(
-    (flow, operator, n): (Flow, &Operator, usize),
-    radius: f64,
-    steps: usize,
-) -> Result<Case<2>, Error> {
-    let grid = grid(flow, radius, steps, n)?;
-    let mut measures = Measure::size(EPS);
-    measures.push(Measure::distance_to(move |grid, time| {
-        exact(flow, radius, grid, time)
-    }));
-    let shape = format!("circle r = {radius:.4}");
-    let initial = exact(flow, radius, grid, 0.0)?;
-    Ok(Case {
-        measures,
-        ..study::case((flow, operator), &shape, initial, (STEP, steps))
-    })
-}
-
 pub struct Circle {
     pub radius: f64,
     /// Exact `L2` distance between the last and the first time, for scale.
@@ -121,20 +103,24 @@ impl Ensemble {
         let Variant { flow, n, .. } = *variant;
         let radii = radii(count);
         let circles = in_parallel(count, workers(device), |i| {
-            let case = case((flow, operator, n), radii[i], steps)?;
+            let (radius, grid) = (radii[i], grid(flow, radii[i], steps, n)?);
+            let exact = move |grid, time| exact(flow, radius, grid, time);
+            let shape = format!("circle r = {radius:.4}");
+            let (initial, time) = (exact(grid, 0.0)?, (STEP, steps));
+            let mut case = planar_flow((flow, operator), &shape, initial, time);
+            case.measures = Measure::size(EPS);
+            case.measures.push(Measure::distance_to(exact));
             let (flow, operator) = (flow.key(), operator.key());
-            let folder = folder
-                .as_path()
-                .join(format!("{flow}-n{n}-{operator}-{i:02}"));
+            let name = format!("{flow}-n{n}-{operator}-{i:02}");
+            let folder = folder.as_path().join(name);
             let (ends, never) = (Samples::every(usize::MAX), Interrupt::never());
             let trajectory = Trajectory::of(case, device, &folder, &ends, &mut [], &never)?;
             let trajectory = trajectory.expect("nobody interrupts it");
-            let (initial, end) = (&trajectory.case.initial, steps as f64 * STEP);
-            let last = exact(variant.flow, radii[i], *initial.grid(), end)?;
+            let last = exact(grid, steps as f64 * STEP)?;
             stage.bar.inc(1);
             Ok(Circle {
-                radius: radii[i],
-                travelled: l2_distance(&last, initial)?,
+                radius,
+                travelled: l2_distance(&last, &trajectory.case.initial)?,
                 trajectory,
             })
         })?;
@@ -154,10 +140,8 @@ impl Ensemble {
 
     pub fn error_range(&self, k: usize) -> [f64; 2] {
         let errors = || self.circles.iter().map(|circle| circle.error(k));
-        [
-            errors().fold(f64::INFINITY, f64::min),
-            errors().fold(0.0, f64::max),
-        ]
+        let least = errors().fold(f64::INFINITY, f64::min);
+        [least, errors().fold(0.0, f64::max)]
     }
 
     pub fn seconds_per_step(&self) -> f64 {
@@ -175,16 +159,17 @@ impl Ensemble {
         study::mean(self.minimizations(), f)
     }
 
-    /// Steps that did not lower the energy `E[u_k, .]`, or that raised the Willmore energy.
-    pub fn energy_increases(&self) -> usize {
+    /// Steps that did not lower the energy `E[u_k, .]`, or that raised the Willmore energy; nothing for mean curvature flow.
+    pub fn energy_increases(&self) -> Option<usize> {
         let raised =
-            |r: &&StepRecord| r.energy >= r.energy_before || r.willmore_energy > r.energy_at_rest();
-        self.minimizations().filter(raised).count()
+            |r: &StepRecord| r.energy >= r.energy_before || r.willmore_energy > r.energy_at_rest();
+        (self.minimizations().map(|r| usize::from(raised(r)))).reduce(|a, b| a + b)
     }
 
-    /// Linear solves that met negative curvature.
-    pub fn negative_curvature(&self) -> usize {
-        (self.minimizations().map(|r| r.newton.negative_curvature)).sum()
+    /// Linear solves that met negative curvature; nothing for mean curvature flow.
+    pub fn negative_curvature(&self) -> Option<usize> {
+        let solves = self.minimizations().map(|r| r.newton.negative_curvature);
+        solves.reduce(|a, b| a + b)
     }
 
     /// Name in metrics, such as `willmore.n128.hybrid_calibrated`.

@@ -3,9 +3,10 @@
 use clap::{CommandFactory, FromArgMatches};
 use geometry::measure::perimeter;
 
+use crate::look::one_over_two_to;
 use crate::prelude::*;
-use crate::steps::{self, Rows};
-use crate::study::{self, Study, StudyOptions, Variant, one_over_two_to};
+use crate::steps;
+use crate::study::{self, Study, StudyOptions, Variant};
 use crate::truth::{self, CELLS, Reached, Sample, Truth};
 
 pub struct Setting {
@@ -17,13 +18,50 @@ pub struct Setting {
     pub shape: &'static str,
     pub sample: Sample<2>,
     pub flow: Flow,
-    /// Time steps of `2^-14`.
-    pub steps: usize,
     pub shown: &'static [usize],
     /// Steps of the reference per step of the compared runs.
     pub reference_ratio: usize,
     pub window: f64,
 }
+
+/// Time steps of `2^-14`.
+const STEPS: usize = 128;
+
+pub const CROSS: Setting = Setting {
+    program: "cross",
+    title: "Willmore flow of a cross",
+    about: "Willmore flow of a non-convex cross, eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7, by all methods and resolutions \
+            (finite elements from n = 256 on, where they are stable): L2 distance to a finer implicit finite-element run, and shapes",
+    shape: "cross [-.8,.8] x [-.27,.27]",
+    sample: truth::CROSS,
+    flow: Flow::Willmore,
+    shown: &[0, 32, 64, 96, 128],
+    reference_ratio: 1,
+    window: 0.95,
+};
+
+pub const MCF_CROSS: Setting = Setting {
+    program: "mcf_cross",
+    title: "Mean curvature flow of a cross",
+    about: "Mean curvature flow of a non-convex cross, eps = 2^-6, tautilde = 2^-14, until t = 2^-7, by all methods and resolutions: \
+            L2 distance to a finer implicit finite-element run with time step 2^-16, and shapes",
+    flow: Flow::MeanCurvature,
+    shown: &[0, 64, 128],
+    reference_ratio: 4,
+    ..CROSS
+};
+
+pub const RECTANGLE: Setting = Setting {
+    program: "rectangle",
+    title: "Willmore flow of a rectangle",
+    about: "Willmore flow of a rectangle with sides 0.4 and 0.2, eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7, by all methods \
+            and resolutions (finite elements from n = 256 on, where they are stable): L2 distance to a finer implicit \
+            finite-element run, and shapes",
+    shape: "rectangle 0.4 x 0.2",
+    sample: truth::RECTANGLE,
+    window: 0.5,
+    ..CROSS
+};
 
 /// The options of a comparison. Runs are kept in the folder `fields` of the output; an interrupted one continues.
 #[derive(Parser, Debug)]
@@ -63,13 +101,6 @@ struct Compared {
     from_exact: BTreeMap<usize, f64>,
 }
 
-/// Runs of second order at the times at which they are compared with the exact flow.
-struct SecondOrder {
-    key: String,
-    label: String,
-    at: BTreeMap<usize, Reached>,
-}
-
 struct Comparison<'a> {
     setting: &'a Setting,
     steps: usize,
@@ -77,8 +108,9 @@ struct Comparison<'a> {
     runs: Vec<Compared>,
     /// The reference, and perhaps the same at half its resolution, to estimate its error.
     references: Vec<Compared>,
-    exact: BTreeMap<usize, Truth>,
-    second_order: Vec<SecondOrder>,
+    exact: Vec<Truth>,
+    /// Runs of second order with their names, at the times at which they are compared with the exact flow.
+    second_order: Vec<(String, Vec<Reached>)>,
 }
 
 fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
@@ -94,9 +126,8 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
             ),
         )?;
     }
-    let steps = (options.steps).unwrap_or(if quick { 2 } else { setting.steps });
+    let steps = (options.steps).unwrap_or(if quick { 2 } else { STEPS });
     require(steps > 0, "--steps must be at least 1")?;
-    let device = options.study.run.open_device()?;
     // Franken, Rumpf and Wirth: for eps = 2h the nested scheme is unstable.
     let nested = |method: Method| flow == Flow::Willmore && !method.is_learned();
     let stable = |method, n| !nested(method) || n as f64 * EPS >= 4.0;
@@ -114,7 +145,7 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
         "steps": steps,
         "networks": study.checksums(),
     });
-    let mut session = Session::open(setting.program, &options.study.run, device, parameters)?;
+    let mut session = Session::open(setting.program, &options.study.run, parameters)?;
     let mut runs = Vec::new();
     for (variant, operator) in &study.plan {
         runs.push(setting.run(&mut session, "", (*variant, operator), (steps, 1))?);
@@ -122,16 +153,14 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
     // The paper's references are implicit finite elements.
     let half = reference_n / 2;
     let halved = (reference_n.is_multiple_of(2) && finest <= half).then_some(half);
-    let named = [
-        ("reference: ", Some(reference_n)),
-        ("for the reference's error: ", halved),
-    ];
     let mut references: Vec<Compared> = Vec::new();
-    for (what, n) in named.into_iter().filter_map(|(what, n)| Some((what, n?))) {
+    for n in [Some(reference_n), halved].into_iter().flatten() {
+        let what = ["reference: ", "for the reference's error: "][references.len()];
+        let (method, scheme) = (Method::FeImplicit, Scheme::Paper);
         let variant = Variant {
             flow,
-            method: Method::FeImplicit,
-            scheme: Scheme::Paper,
+            method,
+            scheme,
             n,
         };
         let operator = study.networks.operator(variant.look(), n)?;
@@ -142,19 +171,25 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
     for run in runs.iter_mut().chain(half) {
         run.compare(&reference[0], steps)?;
     }
-    let times: Vec<usize> = sampled(steps).filter(|k| *k > 0).collect();
-    let exact = session.phase("the exact flow", |_| {
-        let at: Vec<f64> = times.iter().map(|k| time(*k)).collect();
-        setting.sample.exact(flow, &at)
-    })?;
-    let exact: BTreeMap<_, _> = times.into_iter().zip(exact).collect();
+    let marks = sampled(steps).filter(|k| *k > 0).map(|k| (k, time(k)));
+    let marks: Vec<(usize, f64)> = marks.collect();
+    let exact = session.phase("the exact flow", |_| setting.sample.exact(flow, &marks))?;
     for run in runs.iter_mut().chain(&mut references) {
         run.compare_with_exact(setting, &exact)?;
     }
-    let second_order = match flow {
-        Flow::Willmore => setting.second_order(&mut session, steps, &exact)?,
-        Flow::MeanCurvature => Vec::new(),
-    };
+    let mut second_order = Vec::new();
+    if flow == Flow::Willmore {
+        // At the end and at halves of that time.
+        let halves = (steps / 8).checked_ilog2().unwrap_or(0);
+        let halves = halves.min(steps.trailing_zeros());
+        let is_half = |mark: usize| (0..=halves).any(|k| mark == steps >> k);
+        let exact: Vec<&Truth> = exact.iter().filter(|exact| is_half(exact.mark)).collect();
+        let (n, ramp) = (CELLS[1], (time(steps), halves));
+        let reached = (setting.sample).second_order(&mut session, n, ramp, &exact)?;
+        let controlled = format!("second order, controlled steps, n = {n}");
+        let labels = [controlled, "second order, extrapolated to ε = 0".to_owned()];
+        second_order.extend(labels.into_iter().zip(reached));
+    }
     let comparison = Comparison {
         setting,
         steps,
@@ -178,7 +213,7 @@ impl Setting {
         let grid = Grid::<2>::per_unit(variant.n, self.sample.side)?;
         let initial = (self.sample.initial)(grid, EPS)?;
         let time = (STEP / ratio as f64, steps * ratio);
-        let mut case = study::case((self.flow, operator), self.shape, initial, time);
+        let mut case = planar_flow((self.flow, operator), self.shape, initial, time);
         case.measures = Measure::crossings(0.0);
         case.measures.extend([
             Measure::new("perimeter", |u, _| perimeter(u, EPS).map(Some)),
@@ -194,40 +229,6 @@ impl Setting {
             errors: BTreeMap::new(),
             from_exact: BTreeMap::new(),
         })
-    }
-
-    /// Controlled steps of second order with the accurate operator at two to `eps`, at the end and at halves of that time, and the same
-    /// extrapolated to `eps = 0` from stricter steps.
-    fn second_order(
-        &self,
-        session: &mut Session<'_>,
-        steps: usize,
-        exact: &BTreeMap<usize, Truth>,
-    ) -> Result<Vec<SecondOrder>, Error> {
-        let halves = (steps / 8).checked_ilog2().unwrap_or(0);
-        let halves = halves.min(steps.trailing_zeros());
-        let marks: Vec<usize> = (0..=halves).rev().map(|k| steps >> k).collect();
-        let truths = || marks.iter().map(|k| &exact[k]);
-        let (n, end) = (CELLS[1], time(steps));
-        let controlled = truth::controlled(ErrorControl::default(), end, halves);
-        let run = ("controlled", controlled, end);
-        let run = self.sample.run(session, (n, 2.0), truth::ACCURATE, run)?;
-        let controlled = truths().map(|exact| Reached::of(&self.sample, &run, exact));
-        let controlled = controlled.collect::<Result<Vec<_>, Error>>()?;
-        let extrapolated = (self.sample).extrapolated(session, (end, halves), truths())?;
-        let at = |reached: Vec<Reached>| marks.iter().copied().zip(reached).collect();
-        Ok(vec![
-            SecondOrder {
-                key: format!("n{n}.controlled"),
-                label: format!("second order, controlled steps, n = {n}"),
-                at: at(controlled),
-            },
-            SecondOrder {
-                key: "extrapolated".to_owned(),
-                label: "second order, extrapolated to ε = 0".to_owned(),
-                at: at(extrapolated),
-            },
-        ])
     }
 }
 
@@ -260,16 +261,12 @@ impl Compared {
         Ok(())
     }
 
-    fn compare_with_exact(
-        &mut self,
-        setting: &Setting,
-        exact: &BTreeMap<usize, Truth>,
-    ) -> Result<(), Error> {
-        for (&k, curve) in exact {
-            let field = self.trajectory.field(k * self.ratio)?;
+    fn compare_with_exact(&mut self, setting: &Setting, exact: &[Truth]) -> Result<(), Error> {
+        for Truth { mark, outline, .. } in exact {
+            let field = self.trajectory.field(mark * self.ratio)?;
             let points = (setting.sample.level)(&field, EPS)?;
-            let distance = curve.outline().largest_distance_of(&points);
-            self.from_exact.insert(k, distance);
+            let distance = outline.largest_distance_of(&points);
+            self.from_exact.insert(*mark, distance);
         }
         Ok(())
     }
@@ -321,93 +318,70 @@ impl Comparison<'_> {
         session.figure(self.shape_figure()?, "shapes")?;
         session.sheet(self.sheet(), "error_table")?;
         session.remark(self.about_the_reference());
-        self.data(&session.output)?;
-        let reference = self.reference();
+        self.data(&session)?;
+        let (program, reference) = (self.setting.program, self.reference());
         let metrics = [
             ("reference.n", reference.variant.n.into()),
             ("reference.seconds", reference.trajectory.seconds().into()),
             ("reference.l2_to_half_n", self.reference_difference().into()),
         ];
-        session.metrics(self.setting.program, metrics)?;
-        self.metrics_of_exact(&mut session)?;
+        session.metrics(program, metrics)?;
+        for (k, distance) in &reference.from_exact {
+            let name = format!("{program}.reference.distance_to_exact.step{k}");
+            session.metric(&name, *distance)?;
+        }
+        (self.exact.iter()).try_for_each(|exact| exact.record(&mut session, program))?;
         session.finish(self.setting.title)
     }
 
-    fn metrics_of_exact(&self, session: &mut Session<'_>) -> Result<(), Error> {
-        let program = self.setting.program;
-        for (k, curve) in &self.exact {
-            truth::record(session, &format!("{program}.exact"), *k, &curve.sizes())?;
-            let name = format!("{program}.reference.distance_to_exact.step{k}");
-            session.metric(&name, self.reference().from_exact.get(k).copied())?;
-        }
-        for run in &self.second_order {
-            let key = format!("{program}.{}", run.key);
-            (run.at.iter()).try_for_each(|(k, reached)| reached.record(session, &key, *k))?;
-        }
-        Ok(())
-    }
-
-    fn data(&self, output: &OutputDir) -> Result<(), Error> {
-        let leading = &Variant::COLUMNS[1..];
-        let names = ["step", "time", "l2", "distance_to_exact"];
-        let mut errors = Table::data(leading.iter().chain(&names));
-        for run in &self.runs {
-            for (&step, &l2) in &run.errors {
-                let exact = run.from_exact.get(&step).copied().unwrap_or(0.0);
-                let row = run.variant.row([step.into()], [time(step), l2, exact]);
-                errors.push(row.skip(1))?;
-            }
-        }
-        output.write("errors.csv", errors.to_csv()?)?;
-        let compared = self.runs.iter().map(|run| (run, "false"));
-        let rows = compared.chain(self.references.iter().map(|run| (run, "true")));
-        let rows = rows.map(|(run, reference)| Rows {
-            leading: [&run.variant.cells()[1..], &[reference.into()]].concat(),
-            start: Some(&run.trajectory.start),
-            records: &run.trajectory.records,
+    fn data(&self, session: &Session<'_>) -> Result<(), Error> {
+        let errors = self.runs.iter().flat_map(|run| {
+            let errors = run.errors.iter();
+            errors.map(move |(step, l2)| (run, *step, *l2))
         });
-        let leading = [leading, &["reference"]].concat();
-        let steps = steps::table(&leading, &rows.collect::<Vec<_>>())?;
-        output.write("steps.csv", steps.to_csv()?)?;
-        Ok(())
+        let errors: Vec<_> = errors.collect();
+        let errors = Variant::columns(Sheet::of(&errors), |(run, ..)| run.variant)
+            .data("step", |(_, step, _)| *step)
+            .data("time", |(_, step, _)| time(*step))
+            .data("l2", |(.., l2)| *l2)
+            .data("distance_to_exact", |(run, step, _)| {
+                run.from_exact.get(step).copied().unwrap_or(0.0)
+            });
+        session.csv(errors, "errors")?;
+        let compared = self.runs.iter().map(|run| (run, "false"));
+        let all = compared.chain(self.references.iter().map(|run| (run, "true")));
+        let steps = all.flat_map(|run| steps::with_start(run, &run.0.trajectory));
+        let steps: Vec<_> = steps.collect();
+        let sheet = Variant::columns(Sheet::of(&steps), |step| step.run.0.variant)
+            .data("reference", |step| step.run.1);
+        session.csv(steps::columns(sheet, &steps), "steps")
     }
 
     fn error_figure(&self) -> Figure {
-        let compared = self.runs.iter().filter(|run| !run.errors.is_empty());
-        let curves = compared.map(|run| {
-            let points = run.errors.iter().map(|(&k, &l2)| [time(k), l2]);
-            self.study.series(run.variant, points.collect())
-        });
-        let truths = (self.runs.iter()).map(|run| {
-            let points = run.from_exact.iter().map(|(&k, &d)| [time(k), d]);
-            self.study.series(run.variant, points.collect())
-        });
-        // Where the study's colours end.
-        let looks = [
-            (Colour::Grey, LineStyle::Solid),
-            (Colour::Grey, LineStyle::Dotted),
-        ];
-        let second_order = || self.second_order.iter().zip(looks);
-        let new = second_order().map(|(run, (colour, style))| {
-            let points: Vec<[f64; 2]> = (run.at.iter())
-                .map(|(&k, at)| [time(k), at.distance])
-                .collect();
-            let series = Series::new(&run.label, points).with_style(style);
-            series.with_colour(colour).with_marker(Marker::Circle)
-        });
-        let entries = second_order()
-            .map(|(run, (colour, style))| LegendEntry::line(&run.label, colour, style));
-        let chart = |title, y| LineChart::new(title, Axis::linear("time t"), Axis::log(y));
-        let papers = chart("to the reference", "L² distance");
-        let exact = chart("to the exact flow", "largest distance of the curves");
+        let chart = |title, y, distances: fn(&Compared) -> &BTreeMap<usize, f64>| {
+            let compared = self.runs.iter().filter(|run| !distances(run).is_empty());
+            let curves = compared.map(|run| {
+                let points = distances(run)
+                    .iter()
+                    .map(|(&k, &distance)| [time(k), distance]);
+                self.study.series(run.variant, points.collect())
+            });
+            let chart = LineChart::new(title, Axis::linear("time t"), Axis::log(y));
+            self.study.chart(chart, curves)
+        };
+        let papers = chart("to the reference", "L² distance", |run| &run.errors);
+        let largest = "largest distance of the curves";
+        let mut exact = chart("to the exact flow", largest, |run| &run.from_exact);
+        let (mut entries, styles) = (Vec::new(), [LineStyle::Solid, LineStyle::Dotted]);
+        for ((label, reached), style) in self.second_order.iter().zip(styles) {
+            let series = Series::of(label, reached, |at| [time(at.mark), at.distance]);
+            let series = series.with_colour(Colour::Grey).with_style(style);
+            exact = exact.with_series(series.with_marker(Marker::Circle));
+            entries.push(LegendEntry::line(label, Colour::Grey, style));
+        }
         let reference = self.about_the_reference();
         Figure::new(format!("{}: distances over time", self.setting.title), 2)
-            .with_panel(self.study.chart(papers, curves))
-            .with_panel(
-                self.study
-                    .chart(exact, truths.chain(new))
-                    .with_entries(entries),
-            )
+            .with_panels([papers, exact.with_entries(entries)])
             .with_shared_legend()
             .with_note(format!("ε = 2⁻⁶, time step 2⁻¹⁴. {reference}"))
     }
@@ -439,8 +413,8 @@ impl Comparison<'_> {
                     let reference = self.reference().loops(step)?;
                     panel = panel.with_curve(reference.with_colour(1).with_width(1.0));
                 }
-                if let Some(exact) = self.exact.get(&step) {
-                    let exact = Curve::new([exact.outline().points()]).with_colour(0);
+                if let Some(exact) = self.exact.iter().find(|exact| exact.mark == step) {
+                    let exact = Curve::new([exact.outline.points()]).with_colour(0);
                     panel = panel.with_curve(exact.with_width(1.0));
                 }
                 figure = figure.with_panel(panel);

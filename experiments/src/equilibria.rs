@@ -2,19 +2,13 @@
 
 use std::f64::consts::TAU;
 
+use reference::equilibria::Branch;
+
 use crate::prelude::*;
 
 /// Steps in which the sizes of the start go to the given ones, and the most steps until rest.
 const RAMP: usize = 8;
 const MOST: usize = 200;
-
-/// The exact energy `w = 1/2 int h^2`, and the derivatives `-dw/dA` by the perimeter and `-dw/dV` by the volume.
-#[derive(Clone, Copy)]
-pub struct Exact {
-    pub energy: f64,
-    pub tension: f64,
-    pub pressure: f64,
-}
 
 /// An equilibrium: its perimeter is that of the ball of this radius, its volume a part of that ball's, which is the reduced volume in
 /// space and the isoperimetric quotient in the plane.
@@ -23,10 +17,14 @@ pub struct Equilibrium {
     pub title: String,
     pub radius: f64,
     pub ratio: f64,
-    /// Whether the start is longer than wide, in space.
-    pub prolate: bool,
-    /// The exact energy `1/2 int h^2`, tension and pressure at this radius.
-    pub exact: Exact,
+    /// Of vesicles.
+    pub branch: Option<Branch>,
+    /// The exact energy `w = 1/2 int h^2` at this radius, and its derivatives `-dw/dA` by the perimeter and `-dw/dV` by the volume.
+    pub energy: f64,
+    pub tension: f64,
+    pub pressure: f64,
+    /// The exact curve or profile with the perimeter of the unit ball.
+    pub curve: reference::Curve,
 }
 
 impl Equilibrium {
@@ -53,7 +51,8 @@ impl Equilibrium {
                 mean.powf(1.0 / THOMSEN)
             }
         };
-        let (mut round, mut slender) = (1.0, if self.prolate { 100.0 } else { 0.01 });
+        let prolate = self.branch == Some(Branch::Prolate);
+        let (mut round, mut slender) = (1.0, if prolate { 100.0 } else { 0.01 });
         for _ in 0..60 {
             let middle = f64::sqrt(round * slender);
             let end = if perimeter(axes(middle)) < 1.0 {
@@ -92,19 +91,14 @@ impl Equilibrium {
         let eps = case.scales.eps;
         let start = ZeroSet::of(&case.initial, eps)?;
         let [perimeter, volume] = self.sizes::<D>();
-        let over = |from, to| {
-            Some(Target {
-                from,
-                to,
-                over: RAMP,
-            })
-        };
+        let over = RAMP;
+        let ramp = |from, to| Some(Target { from, to, over });
         case.held = Held {
-            perimeter: over(start.perimeter, perimeter),
-            volume: over(start.volume, volume),
+            perimeter: ramp(start.perimeter, perimeter),
+            volume: ramp(start.volume, volume),
         };
         // In long steps flat vesicles break through in the middle.
-        let flat = D == 3 && !self.prolate;
+        let flat = self.branch == Some(Branch::Oblate);
         case.steps = TimeSteps {
             longest_move: Some(if flat { 0.3 } else { 1.0 }),
             ..StepRule::ByEnergy(None).into()
@@ -137,6 +131,34 @@ pub struct AtRest<const D: usize> {
 }
 
 impl<const D: usize> AtRest<D> {
+    /// The energy of the ball of the same perimeter, in space that of any ball.
+    fn unit(&self) -> f64 {
+        match D {
+            2 => PI / self.equilibrium.radius,
+            _ => 8.0 * PI,
+        }
+    }
+
+    pub fn energy(&self) -> f64 {
+        self.zero_set.willmore_energy / self.unit()
+    }
+
+    pub fn exact_energy(&self) -> f64 {
+        self.equilibrium.energy / self.unit()
+    }
+
+    /// The shape, or the plane through its axis, and the exact curve, in a window of so many radii.
+    pub fn panel(&self, caption: String, plane: &Field<2>, radii: f64) -> Shapes {
+        let radius = self.equilibrium.radius;
+        let ends = [-radii * radius, radii * radius];
+        let exact = self.equilibrium.curve.points().into_iter();
+        let exact: Vec<[f64; 2]> = exact.map(|p| p.map(|x| radius * x)).collect();
+        Shapes::new(caption)
+            .with_window(ends, ends)
+            .with_curve(look::outline(plane).filled(Colour::LightGrey))
+            .with_curve(Curve::new([exact]).with_colour(0).with_width(1.0))
+    }
+
     /// The largest relative distance of a size from its target after the ramp; a step that is halved takes sizes that part of the way.
     fn drift(&self, name: &str, target: f64) -> Option<f64> {
         let mut steps = 0.0;
@@ -148,69 +170,48 @@ impl<const D: usize> AtRest<D> {
         drift.max_by(f64::total_cmp)
     }
 
-    fn last(&self, of: fn(&solver::StepRecord) -> Option<f64>) -> Option<f64> {
+    fn last(&self, of: fn(&StepRecord) -> Option<f64>) -> Option<f64> {
         let records = self.trajectory.records.iter().rev();
         records.filter_map(|r| r.minimization.as_ref()).find_map(of)
+    }
+
+    fn hvp(&self) -> f64 {
+        let records = self.trajectory.records.iter();
+        records.filter_map(Record::hvp).sum()
     }
 }
 
 /// Energies in units of that of the ball of the same perimeter or, in space, of any ball, `8 pi`; drifts, multipliers and work.
 pub fn sheet<const D: usize>(all: &[AtRest<D>]) -> Sheet<'_, AtRest<D>> {
-    let (energy, [perimeter, volume], drifts) = match D {
-        2 => (
-            "w_over_circle",
-            ["length", "area"],
-            ["length_drift", "area_drift"],
-        ),
-        _ => (
-            "w_over_8pi",
-            ["area", "volume"],
-            ["area_drift", "volume_drift"],
-        ),
+    let (energy, sizes) = match D {
+        2 => ("w_over_circle", ["length", "area"]),
+        _ => ("w_over_8pi", ["area", "volume"]),
     };
-    let ball = |one: &AtRest<D>| match D {
-        2 => PI / one.equilibrium.radius,
-        _ => 8.0 * PI,
-    };
-    let sizes = |one: &AtRest<D>| one.equilibrium.sizes::<D>();
-    Sheet::of(all)
+    let error = |one: &AtRest<D>| one.zero_set.willmore_energy / one.equilibrium.energy - 1.0;
+    let (energies, forces) = (Fixed(4), Fixed(3));
+    let mut sheet = Sheet::of(all)
         .keyed(|one, name| format!("{}.{name}", one.equilibrium.key))
         .text("equilibrium", |one| one.equilibrium.title.as_str())
-        .measure(energy, ("energy / ball's", Fixed(4)), move |one| {
-            one.zero_set.willmore_energy / ball(one)
+        .measure(energy, ("energy / ball's", energies), AtRest::energy)
+        .measure("exact", ("exact", energies), AtRest::exact_energy)
+        .column("error in %", Fixed(2), |one| 100.0 * error(one));
+    for (k, name) in sizes.into_iter().enumerate() {
+        let (metric, head) = (format!("{name}_drift"), format!("drift of the {name}"));
+        sheet = sheet.measure(&metric, (&head, Scientific(1)), |one| {
+            one.drift(name, one.equilibrium.sizes::<D>()[k])
+        });
+    }
+    let [tension, pressure] = [("tension", forces), ("pressure", forces)];
+    sheet
+        .measure("tension", tension, |one| one.last(|made| made.tension))
+        .measure("exact_tension", ("exact", forces), |one| {
+            one.equilibrium.tension
         })
-        .measure("exact", ("exact", Fixed(4)), move |one| {
-            one.equilibrium.exact.energy / ball(one)
-        })
-        .column("error in %", Fixed(2), |one| {
-            100.0 * (one.zero_set.willmore_energy / one.equilibrium.exact.energy - 1.0)
-        })
-        .measure(
-            drifts[0],
-            (&format!("drift of the {perimeter}"), Scientific(1)),
-            move |one| one.drift(perimeter, sizes(one)[0]),
-        )
-        .measure(
-            drifts[1],
-            (&format!("drift of the {volume}"), Scientific(1)),
-            move |one| one.drift(volume, sizes(one)[1]),
-        )
-        .measure("tension", ("tension", Fixed(3)), |one| {
-            one.last(|made| made.tension)
-        })
-        .measure("exact_tension", ("exact", Fixed(3)), |one| {
-            one.equilibrium.exact.tension
-        })
-        .measure("pressure", ("pressure", Fixed(3)), |one| {
-            one.last(|made| made.pressure)
-        })
-        .measure("exact_pressure", ("exact", Fixed(3)), |one| {
-            one.equilibrium.exact.pressure
+        .measure("pressure", pressure, |one| one.last(|made| made.pressure))
+        .measure("exact_pressure", ("exact", forces), |one| {
+            one.equilibrium.pressure
         })
         .measure("steps", ("steps", Shortest), |one| one.trajectory.steps())
-        .measure("hvp_total", ("HVP", Fixed(0)), |one| {
-            let hvp = one.trajectory.records.iter().filter_map(Record::hvp);
-            hvp.sum::<f64>()
-        })
+        .measure("hvp_total", ("HVP", Fixed(0)), AtRest::hvp)
         .measure("seconds", ("s", Fixed(0)), |one| one.trajectory.seconds())
 }

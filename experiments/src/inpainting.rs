@@ -1,8 +1,7 @@
 //! Inpainting, in any dimension: Willmore flow of the values in a region, the rest held.
 
 use crate::prelude::*;
-use crate::steps::steps_csv;
-use crate::surfaces::willmore_flow;
+use crate::steps;
 
 /// A shape stands still once it moves by less than this part of the way it has come per step.
 const STILL: f64 = 1e-5;
@@ -96,25 +95,20 @@ pub struct Inpainted<'a, const D: usize> {
 
 impl<'a, const D: usize> Inpainted<'a, D> {
     pub fn measure(shape: &'a Shape<D>, trajectory: &'a Trajectory<D>) -> Result<Self, Error> {
-        let Case {
-            initial,
-            region,
-            scales,
-            ..
-        } = &trajectory.case;
-        let whole = shape.whole.as_ref();
-        let whole = whole
-            .map(|whole| phase_field(*initial.grid(), whole, scales.eps))
-            .transpose()?;
-        let goal = whole.as_ref().unwrap_or(initial);
-        let steps = trajectory.steps();
-        let distances = (shape.shown.iter().copied().filter(|&k| k < steps))
-            .chain([steps])
-            .map(|k| Ok((k, l2_distance(&trajectory.field(k)?, goal)?)))
-            .collect::<Result<Vec<_>, Error>>()?;
-        let last = trajectory.field(steps)?;
-        let marks = region.iter().flatten();
-        let changed_outside = (last.values().iter().zip(initial.values()).zip(marks))
+        let (case, steps) = (&trajectory.case, trajectory.steps());
+        let goal = match &shape.whole {
+            Some(whole) => phase_field(*case.grid(), whole, case.scales.eps)?,
+            None => case.initial.clone(),
+        };
+        let mut distances = Vec::new();
+        let shown = shape.shown.iter().copied().filter(|&k| k < steps);
+        for k in shown.chain([steps]) {
+            distances.push((k, l2_distance(&trajectory.field(k)?, &goal)?));
+        }
+        let (last, moves) = (trajectory.field(steps)?, case.region.iter().flatten());
+        let values = last.values().iter().zip(case.initial.values());
+        let changed_outside = values
+            .zip(moves)
             .filter(|((u, start), inside)| !**inside && u.to_bits() != start.to_bits())
             .count();
         Ok(Self {
@@ -150,7 +144,6 @@ pub fn finish<const D: usize>(
     title: &str,
     all: &[Inpainted<'_, D>],
 ) -> Result<(), Error> {
-    let output = &session.output;
     let energies = all.iter().map(|one| {
         let point = |r: &Record| Some([r.time, r.willmore_energy()?]);
         let points: Vec<_> = one.trajectory.records.iter().filter_map(point).collect();
@@ -160,7 +153,7 @@ pub fn finish<const D: usize>(
     let energies = Figure::new("Willmore energy while inpainting", 2).with_panels(energies);
     session.figure(energies, "energies")?;
     let runs = all.iter().map(|one| (one.shape.key, one.trajectory));
-    output.write("steps.csv", steps_csv("shape", runs)?)?;
+    steps::write(&session, "shape", runs)?;
     let mut rows = Vec::new();
     for one in all {
         for &(step, distance) in &one.distances {

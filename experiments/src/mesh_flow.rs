@@ -46,7 +46,6 @@ impl MeshFlow {
         remarks: impl FnOnce(&mut Session<'_>, &mut [Flowed]) -> Result<String, Error>,
     ) -> Result<(), Error> {
         let run = &options.figure.run;
-        let device = run.open_device()?;
         let side = options.mesh.box_side(&self.mesh);
         let setting = Setting::new(&options.figure, [32, self.cells], side)?;
         let (tau, more) = self.doubling(setting.n);
@@ -58,7 +57,7 @@ impl MeshFlow {
         let parameters = setting.parameters(json!({
             "mesh": mesh.about, "tau": tau, "steps": steps, "schemes": schemes,
         }))?;
-        let mut session = Session::open(self.program, run, device, parameters)?;
+        let mut session = Session::open(self.program, run, parameters)?;
         let initial = session.phase("signed distance", |stage| {
             mesh.phase_field(setting.grid, setting.scales.eps, &stage.bar)
         })?;

@@ -2,7 +2,7 @@
 
 use geometry::{PURE_BEYOND, npy, vti};
 use runs::fingerprint;
-use surfaces::{ClosedMesh, MeshDistance, TriangleMesh, usual_up_axis};
+use surfaces::{ClosedMesh, MeshDistance, usual_up_axis};
 
 use crate::prelude::*;
 
@@ -235,18 +235,6 @@ fn volume(path: &Path, grid: Grid<3>, holds: VolumeKind) -> Result<Field<3>, Err
         ),
     )?;
     Ok(Field::from_values(grid, field.into_values())?)
-}
-
-/// Factors of Taubin's smoothing,
-pub const TAUBIN: [f64; 2] = [0.5, -0.53];
-/// and of Laplacian smoothing.
-pub const LAPLACIAN: [f64; 2] = [0.5, 0.0];
-
-/// Root of the mean square distance of the vertices of a mesh to a shape.
-pub fn rms_distance(mesh: &TriangleMesh, shape: &dyn SignedDistance<3>) -> f64 {
-    let vertices = mesh.vertices.iter();
-    let squares = vertices.map(|&x| shape.signed_distance(x).powi(2));
-    (squares.sum::<f64>() / mesh.vertices.len() as f64).sqrt()
 }
 
 pub fn sampled(

@@ -49,18 +49,22 @@ impl Chosen {
         Ok(self.of(scheme).find(scheme.shipped(), needed)?)
     }
 
+    pub fn learned(&self, scheme: Scheme, needed: &NeededNetwork) -> Result<Operator, Error> {
+        Ok(Operator::learned(scheme, self.find(scheme, needed)?)?)
+    }
+
     /// The operator of a method in a scheme at resolution `n` of the convergence tests.
     pub fn operator(
         &self,
         (method, scheme): (Method, Scheme),
         n: usize,
     ) -> Result<Operator, Error> {
-        Ok(if method.is_learned() {
-            Operator::learned(scheme, self.find(scheme, &convergence_network(n)?)?)?
-        } else {
-            let grid = Grid::<2>::per_unit(n, 1.0)?;
-            Operator::finite_elements(method, scheme, &grid, &scales())?
-        })
+        if method.is_learned() {
+            return self.learned(scheme, &convergence_network(n)?);
+        }
+        let grid = Grid::<2>::per_unit(n, 1.0)?;
+        let elements = Operator::finite_elements(method, scheme, &grid, &scales());
+        Ok(elements?)
     }
 }
 

@@ -35,24 +35,14 @@ impl RunOptions {
         })
     }
 
-    /// Creates and checks the output folder; to be called when everything else has been checked.
-    pub fn open_output(&self, program: &str) -> Result<OutputDir, Error> {
-        let folder = self.output.clone();
-        let folder = folder.unwrap_or_else(|| PathBuf::from("results").join(program));
-        Ok(OutputDir::create(folder)?)
-    }
-
-    pub fn progress(&self) -> Progress {
-        Progress::new(self.quiet)
+    /// One of these, the first if this is a quick run.
+    pub fn either<T>(&self, quick: T, usual: T) -> T {
+        if self.quick { quick } else { usual }
     }
 
     /// A title, marked if this is a quick run.
     pub fn title(&self, title: &str) -> String {
-        if self.quick {
-            format!("{title} (quick run)")
-        } else {
-            title.to_owned()
-        }
+        format!("{title}{}", self.either(" (quick run)", ""))
     }
 }
 
@@ -73,7 +63,6 @@ pub struct FigureOptions {
 impl FigureOptions {
     /// Cells per unit length: those chosen, or the usual ones of a quick run or of the paper.
     pub fn cells(&self, [quick, paper]: [usize; 2]) -> usize {
-        let usual = if self.run.quick { quick } else { paper };
-        self.cells.unwrap_or(usual)
+        self.cells.unwrap_or(self.run.either(quick, paper))
     }
 }

@@ -22,13 +22,14 @@ pub use indicatif::ProgressBar;
 pub use operators::{ComputeDevice, DeviceKind};
 pub use report::Format::{self, Fixed, Scientific, Shortest};
 pub use report::{
-    Axis, Cell, Colour, Curve, Figure, LegendEntry, LineChart, LineStyle, Marker, OutputDir,
-    Progress, Raster, Series, Shapes, Sheet, Table,
+    Axis, Cell, Colour, Curve, Figure, LegendEntry, LineChart, LineStyle, Marker, Numbers,
+    OutputDir, Progress, Raster, Series, Shapes, Sheet,
 };
 pub use serde::Serialize;
 pub use serde_json::{Value, json};
 pub use solver::{NewtonParams, StepRecord};
 
+pub use crate::flows::{ACCURATE, PAPERS, operator, planar_flow, willmore_flow};
 pub use crate::networks::{EPS, NetworkOptions, STEP};
 pub use crate::options::{FigureOptions, RunOptions};
 pub use crate::session::{Session, Stage};

@@ -9,7 +9,6 @@
 
 use std::hint::black_box;
 use std::sync::Arc;
-use std::time::Duration;
 
 use burn::tensor::{DType, Tensor};
 use model::{MeanCurvatureOperator, Network};
@@ -19,7 +18,7 @@ use rustfft::num_complex::Complex;
 use solver::{MinimizingMovement, Objective, Precision};
 
 use crate::prelude::*;
-use crate::timing::{Numbers, median, take_turns};
+use crate::timing::{median, take_turns};
 
 /// `c = tau / tautilde^2` of a typical step: `tau = tautilde = 2^-14`.
 const STIFFNESS: f64 = 16384.0;
@@ -73,20 +72,20 @@ impl ByHand {
     }
 }
 
-/// Work that can be repeated, under the name of its time in milliseconds.
-pub type Candidate = (&'static str, Box<dyn FnMut()>);
-
-/// Everything at the phase field `u` with one direction, for a CPU device: `ms` and `single_ms` for the product through Burn in double
-/// and in single precision, `by_hand_ms`, `floor_ms` and `floor_single_ms` for two pairs of transforms, the least that a product needs,
-/// and `evaluate_ms` for energy and gradient.
+/// Measures everything at the phase field `u` with one direction on a CPU, in turns for at least so many seconds and eleven turns: medians in
+/// milliseconds of the product through Burn in double and in single precision, `ms` and `single_ms`, of that `by_hand_ms`, of two pairs of
+/// transforms, the least that a product needs, `floor_ms` and `floor_single_ms`, and of energy and gradient, `evaluate_ms`; the median `ratio`
+/// of the product through Burn to that by hand in the same turn, and what the former costs `over_floor`, its transforms alone.
 ///
 /// # Errors
-/// [`Error::Options`] if the candidates disagree; what the solver raises.
-pub fn candidates<const D: usize>(
+/// [`Error::Options`] if the products disagree; what the solver raises.
+pub fn measure<const D: usize>(
     network: &Network,
     u: &Field<D>,
     device: &ComputeDevice,
-) -> Result<[Candidate; 6], Error> {
+    seconds: f64,
+) -> Result<Numbers, Error> {
+    const LEAST: usize = 11;
     let grid = *u.grid();
     let direction = |(i, u): (usize, &f64)| (1.0 - u.powi(2)) + 0.1 * (0.37 * i as f64).sin();
     let on_host: Vec<f64> = u.values().iter().enumerate().map(direction).collect();
@@ -123,31 +122,22 @@ pub fn candidates<const D: usize>(
         move || spectral_filter(spectral_filter(black_box(p.clone()), &floor), &floor)
     });
     let once = "it worked once";
-    Ok([
-        work("ms", move || {
+    let mut contenders = [
+        work("ms", || {
             double.hessian_vector_product(black_box(&p)).expect(once)
         }),
-        work("single_ms", move || {
+        work("single_ms", || {
             single.hessian_vector_product(&p_single).expect(once)
         }),
-        work("by_hand_ms", move || by_hand.product(black_box(&on_host))),
+        work("by_hand_ms", || by_hand.product(black_box(&on_host))),
         work("floor_ms", floor),
         work("floor_single_ms", floor_single),
-        work("evaluate_ms", move || evaluated.evaluate(&u).expect(once)),
-    ])
-}
-
-fn work<R>(name: &'static str, mut of: impl FnMut() -> R + 'static) -> Candidate {
-    (name, Box::new(move || drop(black_box(of()))))
-}
-
-/// Measures all candidates in turns, for at least this time and eleven turns: medians in milliseconds, the median `ratio` of the
-/// product through Burn to that by hand in the same turn, and what the former costs `over_floor`, its transforms alone.
-pub fn measure(candidates: [Candidate; 6], budget: Duration) -> Result<Numbers, Error> {
-    const LEAST: usize = 11;
+        work("evaluate_ms", || evaluated.evaluate(&u).expect(once)),
+    ];
     let clock = Instant::now();
-    let mut contenders = candidates.map(|(name, work)| (name, work, Vec::new()));
-    let goes_on = |(.., times): &(_, _, Vec<f64>)| times.len() < LEAST || clock.elapsed() < budget;
+    let goes_on = |(.., times): &(_, _, Vec<f64>)| {
+        times.len() < LEAST || clock.elapsed().as_secs_f64() < seconds
+    };
     take_turns(&mut contenders, goes_on, |(_, work, times)| {
         let clock = Instant::now();
         work();
@@ -156,11 +146,16 @@ pub fn measure(candidates: [Candidate; 6], budget: Duration) -> Result<Numbers, 
     })?;
     let (burn, by_hand) = (&contenders[0].2, &contenders[2].2);
     let ratio = median(burn.iter().zip(by_hand).map(|(a, b)| a / b).collect());
-    let times = contenders
-        .into_iter()
-        .map(|(name, _, times)| (name, median(times)));
-    let mut numbers: Numbers = times.collect();
+    let times = contenders.map(|(name, _, times)| (name, median(times)));
+    let mut numbers = Numbers::from(times);
     numbers.insert("ratio", ratio);
     numbers.insert("over_floor", numbers["ms"] / numbers["floor_ms"]);
     Ok(numbers)
+}
+
+/// Work with the name of its time, and its times.
+type Contender<'a> = (&'static str, Box<dyn FnMut() + 'a>, Vec<f64>);
+
+fn work<'a, R>(name: &'static str, mut of: impl FnMut() -> R + 'a) -> Contender<'a> {
+    (name, Box::new(move || drop(black_box(of()))), Vec::new())
 }

@@ -3,7 +3,6 @@
 pub mod armadillo;
 pub mod calibration;
 pub mod circle_convergence;
-pub mod cross;
 pub mod denoising;
 pub mod disk_and_cube;
 pub mod elastica;
@@ -11,10 +10,8 @@ pub mod ellipse_orders;
 pub mod inpainting_2d;
 pub mod inpainting_3d;
 pub mod learned_networks;
-pub mod mcf_cross;
 pub mod mesh_distance;
 pub mod performance;
-pub mod rectangle;
 pub mod rocker_arm;
 pub mod spheres;
 pub mod timing_tables;

@@ -1,8 +1,9 @@
 //! The quality of networks as columns of a table; its metrics are all fields of [`Quality`].
 
-use model::Quality;
+use model::{Network, Quality};
 
 use crate::prelude::*;
+use crate::training::{NetworkSpec, held_out_radii};
 
 const LOSS: Format = Format::Scientific(2);
 const TRANSFER: Format = Format::Fixed(5);
@@ -19,6 +20,21 @@ const COLUMNS: [(&str, Format, fn(&Quality) -> f64); 10] = [
     ("roughness of F''", LOSS, |q| q.activation_roughness),
     ("radial asymmetry", LOSS, |q| q.radial_asymmetry),
 ];
+
+/// Measures a network on spheres that it was not trained on; adds the metrics.
+pub fn measure(
+    session: &mut Session<'_>,
+    title: String,
+    spec: &NetworkSpec,
+    network: &Network,
+) -> Result<Quality, Error> {
+    let (data, radii) = (spec.data(false)?, held_out_radii(session.options.quick));
+    let quality = session.phase(title, |stage| {
+        Ok(Quality::measure(network, &data, radii, stage.device)?)
+    })?;
+    session.summary.insert_record(spec.name, &quality)?;
+    Ok(quality)
+}
 
 pub fn columns<'a, R>(sheet: Sheet<'a, R>, of: impl Fn(&'a R) -> &'a Quality) -> Sheet<'a, R> {
     let add = |sheet: Sheet<'a, R>, (head, format, value): (_, _, fn(&Quality) -> f64)| {

@@ -33,23 +33,35 @@ impl Stage<'_> {
     /// Runs a case to its end; the bar counts the steps.
     pub fn run<const D: usize>(&self, case: Case<D>) -> Result<Run<D>, Error> {
         let mut run = Run::new(case, self.device)?;
+        self.finish(&mut run)?;
+        Ok(run)
+    }
+
+    pub fn finish<const D: usize>(&self, run: &mut Run<D>) -> Result<(), Error> {
         while run.step()?.is_some() {
             self.bar.inc(1);
         }
-        Ok(run)
+        Ok(())
     }
 }
 
 impl<'a> Session<'a> {
-    /// Opens the output folder of a program and begins its manifest; to be called when everything else has been checked.
-    pub fn open(
+    /// Opens the device and the output folder of a program and begins its manifest; to be called when everything else has been checked.
+    pub fn open(program: &str, options: &'a RunOptions, parameters: Value) -> Result<Self, Error> {
+        Self::on(options.open_device()?, program, options, parameters)
+    }
+
+    /// The same on this device.
+    pub fn on(
+        device: ComputeDevice,
         program: &str,
         options: &'a RunOptions,
-        device: ComputeDevice,
         mut parameters: Value,
     ) -> Result<Self, Error> {
         parameters["quick"] = options.quick.into();
-        let output = options.open_output(program)?;
+        let folder = options.output.clone();
+        let folder = folder.unwrap_or_else(|| PathBuf::from("results").join(program));
+        let output = OutputDir::create(folder)?;
         let place = if device.kind().is_cpu() { "cpu" } else { "gpu" };
         let dtype = format!("{:?}", device.dtype()).to_lowercase();
         Ok(Self {
@@ -57,7 +69,7 @@ impl<'a> Session<'a> {
                 .with_parameters(&parameters)?
                 .with_backend(device.kind().name(), place, dtype)
                 .with_seed(options.seed),
-            progress: options.progress(),
+            progress: Progress::new(options.quiet),
             summary: Summary::new(),
             report: Vec::new(),
             clock: Instant::now(),
@@ -121,6 +133,13 @@ impl<'a> Session<'a> {
         table.write(&self.output, stem)?;
         self.remark(table.to_markdown());
         (metrics.into_iter()).try_for_each(|(name, value)| self.metric(&name, value))
+    }
+
+    /// Writes a table for programs alone.
+    pub fn csv<R>(&self, sheet: Sheet<'_, R>, stem: &str) -> Result<(), Error> {
+        let (table, _) = sheet.finish()?;
+        self.output.write(&format!("{stem}.csv"), table.to_csv()?)?;
+        Ok(())
     }
 
     /// Adds a metric, unless its value is missing.

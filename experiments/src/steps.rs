@@ -6,64 +6,73 @@ use engine::Values;
 
 use crate::prelude::*;
 
-pub struct Rows<'a> {
-    /// Which run it is: a cell for each leading column.
-    pub leading: Vec<Cell>,
-    /// The measures of the initial phase field, if there is to be a row for them.
-    pub start: Option<&'a Values>,
-    pub records: &'a [Record],
+/// A step of one of several runs, or its beginning.
+pub struct Step<'a, R> {
+    pub run: R,
+    record: Option<&'a Record>,
+    measures: &'a Values,
 }
 
-/// The steps of runs by any names, with method and scheme, as CSV.
-pub fn steps_csv<'a, const D: usize>(
+/// The steps of a run.
+pub fn of<R: Copy, const D: usize>(
+    run: R,
+    trajectory: &Trajectory<D>,
+) -> impl Iterator<Item = Step<'_, R>> {
+    trajectory.records.iter().map(move |record| Step {
+        run,
+        record: Some(record),
+        measures: &record.measures,
+    })
+}
+
+/// The beginning of a run and its steps.
+pub fn with_start<R: Copy, const D: usize>(
+    run: R,
+    trajectory: &Trajectory<D>,
+) -> impl Iterator<Item = Step<'_, R>> {
+    let start = Step {
+        run,
+        record: None,
+        measures: &trajectory.start,
+    };
+    [start].into_iter().chain(of(run, trajectory))
+}
+
+/// Writes the steps of runs by any names, with method and scheme, as `steps.csv`.
+pub fn write<'a, const D: usize>(
+    session: &Session<'_>,
     named: &str,
     runs: impl Iterator<Item = (&'a str, &'a Trajectory<D>)>,
-) -> Result<String, Error> {
-    let rows = runs.map(|(name, run)| {
-        let operator = &run.case.operator;
-        Rows {
-            leading: [name, operator.method.key(), operator.scheme.key()]
-                .map(Cell::from)
-                .to_vec(),
-            start: None,
-            records: &run.records,
-        }
-    });
-    let rows: Vec<Rows<'_>> = rows.collect();
-    Ok(table(&[named, "method", "scheme"], &rows)?.to_csv()?)
+) -> Result<(), Error> {
+    let steps = runs.flat_map(|(name, run)| of((name, &run.case.operator), run));
+    let steps: Vec<_> = steps.collect();
+    let sheet = Sheet::of(&steps)
+        .text(named, |step| step.run.0)
+        .text("method", |step| step.run.1.method.key())
+        .text("scheme", |step| step.run.1.scheme.key());
+    session.csv(columns(sheet, &steps), "steps")
 }
 
-/// A row for every step: the leading columns, step, time and size, a column for every measure, and what the minimization did.
-pub fn table(leading: &[&str], runs: &[Rows<'_>]) -> Result<Table, Error> {
-    let records = || runs.iter().flat_map(|run| run.records);
-    let values = records().map(|record| &record.measures);
-    let values = values.chain(runs.iter().filter_map(|run| run.start));
-    let measures: BTreeSet<&str> = values.flat_map(|v| v.keys().map(String::as_str)).collect();
-    let minimization = MINIMIZATION.map(|(name, _)| name);
-    let names = (leading.iter().chain(&["step", "time", "tau"]))
-        .chain(&measures)
-        .chain(&minimization)
-        .chain(&["halvings", "seconds"]);
-    let mut table = Table::data(names);
-    for run in runs {
-        let start = run.start.map(|values| (None, values));
-        let steps = run.records.iter().map(|r| (Some(r), &r.measures));
-        for (record, values) in start.into_iter().chain(steps) {
-            let mut row = run.leading.clone();
-            row.extend(match record {
-                Some(r) => [r.step.into(), r.time.into(), r.tau.into()],
-                None => [0_usize.into(), 0.0.into(), Cell::Missing],
-            });
-            let value = |name: &&str| values.get(*name).copied().into();
-            row.extend(measures.iter().map(value));
-            let made = record.and_then(|r| r.minimization.as_ref());
-            row.extend(MINIMIZATION.map(|(_, of)| made.map_or(Cell::Missing, of)));
-            row.push(record.map(|r| r.halvings as usize).into());
-            row.push(record.map(|r| r.seconds).into());
-            table.push(row)?;
-        }
+/// Adds step, time and size, a column for every measure, and what the minimization did.
+pub fn columns<'a, R>(
+    sheet: Sheet<'a, Step<'a, R>>,
+    steps: &'a [Step<'a, R>],
+) -> Sheet<'a, Step<'a, R>> {
+    let measures = steps.iter().flat_map(|step| step.measures.keys());
+    let measures: BTreeSet<&String> = measures.collect();
+    let mut sheet = sheet
+        .data("step", |s| s.record.map_or(0, |r| r.step))
+        .data("time", |s| s.record.map_or(0.0, |r| r.time))
+        .data("tau", |s| s.record.map(|r| r.tau));
+    for name in measures {
+        sheet = sheet.data(name, |s| s.measures.get(name).copied());
     }
-    Ok(table)
+    for (name, of) in MINIMIZATION {
+        sheet = sheet.data(name, |s| s.record?.minimization.as_ref().map(of));
+    }
+    sheet
+        .data("halvings", |s| s.record.map(|r| r.halvings as usize))
+        .data("seconds", |s| s.record.map(|r| r.seconds))
 }
 
 /// Columns that are empty for mean curvature flow.

@@ -4,10 +4,10 @@ use derive_more::Display;
 use engine::Storage;
 use operators::memory;
 
-use crate::meshes::{ARMADILLO, Loaded, MeshOptions};
+use crate::meshes::{ARMADILLO, MeshOptions};
 use crate::prelude::*;
-use crate::surfaces::{accurate_operator, centred_box, needed_network, scales, willmore_flow};
-use crate::timing::{self, Numbers, Timed};
+use crate::surfaces::{centred_box, needed_network, scales};
+use crate::timing;
 use crate::truth::CROSS;
 
 /// Steps on every grid, each twice as long as the one before,
@@ -20,7 +20,7 @@ const STORAGES: [Storage; 2] = [Storage::Bricks, Storage::Dense];
 /// Controlled steps of the cross, on bricks.
 const CROSS_STEPS: usize = 32;
 /// Exponents are those from here to the finest.
-const COARSEST_FITTED: usize = 128;
+const COARSEST_FITTED: f64 = 128.0;
 
 #[derive(Args, Clone, Debug)]
 pub struct StorageOptions {
@@ -41,18 +41,18 @@ pub struct StorageOptions {
 }
 
 /// What was measured at one resolution with one storage.
-#[derive(Display, Serialize)]
+#[derive(Display)]
 #[display("{shape}.n{n}.{storage}")]
 pub struct Stored {
-    pub shape: &'static str,
-    pub n: usize,
-    pub storage: Storage,
+    shape: &'static str,
+    n: usize,
+    storage: Storage,
     /// Wall time of all steps, with all that the engine does between minimizations; work, memory and cells.
-    pub numbers: Numbers,
+    numbers: Numbers,
 }
 
 /// Columns of the table.
-pub const COLUMNS: [(&str, Format, &str); 7] = [
+const COLUMNS: [(&str, Format, &str); 7] = [
     ("all steps [s]", Fixed(1), "seconds"),
     ("HVP/step", Fixed(1), "hvp_per_step"),
     ("ms/HVP", Fixed(2), "ms_per_product"),
@@ -66,11 +66,9 @@ impl StorageOptions {
     /// Refuses resolutions that cannot be measured.
     pub fn check(&self) -> Result<(), Error> {
         let possible = |n: &usize| *n >= 16 && n.is_multiple_of(8);
+        let mut cells = self.surface_cells.iter().chain(&self.curve_cells);
         require(
-            self.surface_cells
-                .iter()
-                .chain(&self.curve_cells)
-                .all(possible),
+            cells.all(possible),
             "--surface-cells and --curve-cells must be multiples of 8, from 16 on, as bricks are",
         )
     }
@@ -83,94 +81,55 @@ impl StorageOptions {
         session: &mut Session<'_>,
     ) -> Result<Vec<Stored>, Error> {
         let networks = networks.load(&[needed_network()])?;
-        let network = networks.find(Scheme::Accurate, &needed_network())?;
-        let mut operator = Operator::learned(Scheme::Accurate, network)?;
-        let mut measured = Vec::new();
+        let mut dense_or_bricks = networks.learned(Scheme::Accurate, &needed_network())?;
         let quick = session.options.quick;
-        let curves = if quick {
-            vec![64]
-        } else {
-            self.curve_cells.clone()
-        };
-        for n in curves {
-            measured.push(curve(n, session)?);
+        let usual = [&self.curve_cells[..], &self.surface_cells];
+        let [curves, surfaces] = session.options.either([&[64][..], &[32, 64]], usual);
+        let mut measured = Vec::new();
+        for &n in curves {
+            forget_memory();
+            let grid = Grid::per_unit(n, CROSS.side)?;
+            let mut scales = scales(n);
+            scales.newton = NewtonParams::second_order();
+            let initial = (CROSS.initial)(grid, scales.eps)?;
+            let mut operator = operator(ACCURATE, &grid, &scales)?;
+            operator.storage = Storage::Bricks;
+            let steps = TimeSteps::controlled(ErrorControl::default());
+            let time = (steps.rule, if quick { 2 } else { CROSS_STEPS });
+            let mut case = willmore_flow(CROSS.key, initial, operator, scales, time);
+            case.steps = steps;
+            measured.push(Stored::measure(CROSS.key, n, case, session)?);
         }
-        for n in self.resolutions(quick) {
+        let mut mesh_options = self.mesh.clone();
+        mesh_options.procedural |= quick;
+        for &n in surfaces {
             for storage in STORAGES {
                 if storage == Storage::Dense && n > self.dense_up_to {
                     continue;
                 }
-                operator.storage = storage;
-                measured.push(self.surface(n, operator.clone(), session)?);
+                forget_memory();
+                let grid = centred_box(n, self.mesh.box_side(&ARMADILLO))?;
+                let mesh = mesh_options.load_or_built_in(&ARMADILLO, &grid)?;
+                let (title, eps) = (format!("armadillo, n = {n}, {storage}"), scales(n).eps);
+                let initial = session.phase(format!("{title}: signed distance"), |stage| {
+                    mesh.phase_field(grid, eps, &stage.bar)
+                })?;
+                drop(mesh);
+                let rule = StepRule::Doubling(FIRST_STEP * grid.spacing().powi(4));
+                let time = (rule, if quick { 2 } else { STEPS });
+                dense_or_bricks.storage = storage;
+                let operator = dense_or_bricks.clone();
+                let case = willmore_flow("armadillo", initial, operator, scales(n), time);
+                measured.push(Stored::measure("armadillo", n, case, session)?);
             }
         }
         Ok(measured)
     }
-
-    fn resolutions(&self, quick: bool) -> Vec<usize> {
-        if quick {
-            vec![32, 64]
-        } else {
-            self.surface_cells.clone()
-        }
-    }
-
-    fn mesh(&self, grid: &Grid<3>, quick: bool) -> Result<Loaded, Error> {
-        let procedural = self.mesh.procedural || quick;
-        let options = MeshOptions {
-            procedural,
-            ..self.mesh.clone()
-        };
-        options.load_or_built_in(&ARMADILLO, grid)
-    }
-
-    fn surface(
-        &self,
-        n: usize,
-        operator: Operator,
-        session: &mut Session<'_>,
-    ) -> Result<Stored, Error> {
-        let quick = session.options.quick;
-        memory::release_freed();
-        memory::forget_peak();
-        let grid = centred_box(n, self.mesh.box_side(&ARMADILLO))?;
-        let mesh = self.mesh(&grid, quick)?;
-        let title = format!("armadillo, n = {n}, {}: signed distance", operator.storage);
-        let initial = session.phase(title, |stage| {
-            mesh.phase_field(grid, scales(n).eps, &stage.bar)
-        })?;
-        drop(mesh);
-        let steps = if quick { 2 } else { STEPS };
-        let time = (
-            StepRule::Doubling(FIRST_STEP * grid.spacing().powi(4)),
-            steps,
-        );
-        let case = willmore_flow("armadillo", initial, operator, scales(n), time);
-        Stored::measure("armadillo", n, case, session)
-    }
 }
 
-/// The cross in controlled steps of second order.
-fn curve(n: usize, session: &mut Session<'_>) -> Result<Stored, Error> {
+fn forget_memory() {
     memory::release_freed();
     memory::forget_peak();
-    let grid = Grid::per_unit(n, CROSS.side)?;
-    let scales = Scales {
-        newton: NewtonParams::second_order(),
-        ..scales(n)
-    };
-    let initial = (CROSS.initial)(grid, scales.eps)?;
-    let mut operator = accurate_operator(&grid, &scales)?;
-    operator.storage = Storage::Bricks;
-    let steps = TimeSteps::controlled(ErrorControl::default());
-    let count = if session.options.quick {
-        2
-    } else {
-        CROSS_STEPS
-    };
-    let mut case = willmore_flow(CROSS.key, initial, operator, scales, (steps.rule, count));
-    case.steps = steps;
-    Stored::measure(CROSS.key, n, case, session)
 }
 
 impl Stored {
@@ -182,20 +141,21 @@ impl Stored {
     ) -> Result<Self, Error> {
         case.measures.clear();
         let (storage, nodes) = (case.operator.storage, case.grid().len() as f64);
-        let mut timed = Timed::new(case, &session.device)?;
-        let cells = timed.run.stored_cells() as f64;
-        let seconds = session.phase(format!("{shape}, n = {n}, {storage}: steps"), |stage| {
+        let mut run = Run::new(case, &session.device)?;
+        let cells = run.stored_cells() as f64;
+        let title = format!("{shape}, n = {n}, {storage}: steps");
+        let seconds = session.phase(title, |stage| {
             let clock = Instant::now();
-            while timed.step(&stage.bar)? {}
+            stage.finish(&mut run)?;
             Ok(clock.elapsed().as_secs_f64())
         })?;
-        let mut numbers = timed.numbers();
+        let mut numbers = timing::numbers(&run);
         numbers.extend([
             ("seconds", seconds),
             ("active_cells", cells),
             ("active_share", cells / nodes),
         ]);
-        let last = timed.minimizations().last();
+        let last = minimizations(run.records()).last();
         numbers.extend(last.map(|made| ("w", made.willmore_energy)));
         numbers.extend(memory::peak_mib().map(|peak| ("peak_mib", peak)));
         Ok(Self {
@@ -207,42 +167,57 @@ impl Stored {
     }
 }
 
-fn surfaces(measured: &[Stored]) -> impl Iterator<Item = &Stored> {
-    measured.iter().filter(|row| row.shape != CROSS.key)
+/// Writes the table, the metrics and the figure of the two storages.
+pub fn write(stored: &[Stored], session: &mut Session<'_>) -> Result<(), Error> {
+    let sheet = Sheet::of(stored)
+        .keyed(|row, name| format!("{row}.{name}"))
+        .text("shape", |row| row.shape)
+        .text("n", |row| row.n.to_string())
+        .text("storage", |row| row.storage.to_string())
+        .numbers(&COLUMNS, |row| &row.numbers);
+    session.sheet(sheet, "storages")?;
+    for (n, ratio) in product_ratios(stored) {
+        session.metric(&format!("hvp.armadillo.n{n}.bricks_over_dense"), ratio)?;
+    }
+    for name in ["seconds", "peak_mib", "active_cells"] {
+        session.metric(&format!("exponent.bricks.{name}"), exponent(stored, name))?;
+    }
+    session.figure(figure(stored), "storages")
+}
+
+fn surfaces(measured: &[Stored], storage: Storage, name: &str) -> impl Iterator<Item = [f64; 2]> {
+    let rows = measured
+        .iter()
+        .filter(move |row| row.shape != CROSS.key && row.storage == storage);
+    rows.filter_map(move |row| Some([row.n as f64, *row.numbers.get(name)?]))
 }
 
 /// Hessian-vector products on bricks over those on the whole grid, by resolution.
-pub fn product_ratios(measured: &[Stored]) -> impl Iterator<Item = (usize, f64)> {
-    let of = |n, storage| {
-        let mut rows = measured.iter().filter(move |row| row.n == n);
-        rows.find(|row| row.storage == storage)
-    };
-    measured.iter().filter_map(move |dense| {
-        let bricks = of(dense.n, Storage::Bricks)?;
-        let [ours, theirs] = [bricks, dense].map(|row| row.numbers["ms_per_product"]);
-        (dense.storage == Storage::Dense).then_some((dense.n, ours / theirs))
+fn product_ratios(measured: &[Stored]) -> impl Iterator<Item = (usize, f64)> {
+    let times = |storage| surfaces(measured, storage, "ms_per_product");
+    times(Storage::Dense).filter_map(move |[n, dense]| {
+        let bricks = times(Storage::Bricks).find(|[m, _]| m.to_bits() == n.to_bits())?;
+        Some((n as usize, bricks[1] / dense))
     })
 }
 
 /// The exponent of a number on bricks in `n`, from 128 on.
-pub fn exponent(measured: &[Stored], name: &str) -> Option<f64> {
-    let rows = surfaces(measured).filter(|row| row.storage == Storage::Bricks);
-    let rows = rows.filter(|row| row.n >= COARSEST_FITTED);
-    let point = |row: &Stored| Some([row.n as f64, *row.numbers.get(name)?]);
-    timing::exponent(&rows.filter_map(point).collect::<Vec<_>>())
+fn exponent(measured: &[Stored], name: &str) -> Option<f64> {
+    let points = surfaces(measured, Storage::Bricks, name);
+    let points: Vec<_> = points.filter(|[n, _]| *n >= COARSEST_FITTED).collect();
+    timing::exponent(&points)
 }
 
 /// Seconds and memory against `n`, a colour for each storage.
-pub fn figure(measured: &[Stored]) -> Figure {
+fn figure(measured: &[Stored]) -> Figure {
     let panel = |title: &str, y: &str, name: &str| {
-        let chart = LineChart::new(title, Axis::log("cells per unit length n"), Axis::log(y));
-        (STORAGES.into_iter().enumerate()).fold(chart, |chart, (colour, storage)| {
-            let rows = surfaces(measured).filter(|row| row.storage == storage);
-            let point = |row: &Stored| Some([row.n as f64, *row.numbers.get(name)?]);
-            let points: Vec<_> = rows.filter_map(point).collect();
+        let curves = STORAGES.into_iter().enumerate().map(|(colour, storage)| {
+            let points: Vec<_> = surfaces(measured, storage, name).collect();
             let series = Series::new(storage.to_string(), points).with_colour(colour);
-            chart.with_series(series.with_marker(Marker::Circle))
-        })
+            series.with_marker(Marker::Circle)
+        });
+        LineChart::new(title, Axis::log("cells per unit length n"), Axis::log(y))
+            .with_curves(curves)
     };
     let fitted = exponent(measured, "seconds").map(|exponent| {
         format!(" On bricks seconds grow like n to the power {exponent:.2} from n = {COARSEST_FITTED} on.")

@@ -2,9 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use crate::networks::{Chosen, convergence_network, scales};
+use crate::networks::{Chosen, convergence_network};
 use crate::prelude::*;
-use crate::surfaces::willmore_flow;
 
 /// Options of the studies.
 #[derive(Args, Clone, Debug)]
@@ -77,22 +76,12 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// Columns of tables that say which variant it is.
-    pub const COLUMNS: [&str; 4] = ["flow", "n", "method", "scheme"];
-
-    pub fn cells(&self) -> [Cell; 4] {
-        let texts = [self.flow.key(), self.method.key(), self.scheme.key()];
-        let [flow, method, scheme] = texts.map(Cell::from);
-        [flow, self.n.into(), method, scheme]
-    }
-
-    /// A row of a data table: those cells, and others.
-    pub fn row<const N: usize, const M: usize>(
-        &self,
-        which: [Cell; N],
-        numbers: [f64; M],
-    ) -> impl Iterator<Item = Cell> {
-        (self.cells().into_iter().chain(which)).chain(numbers.map(Cell::from))
+    /// Adds columns that say of which variant a row is.
+    pub fn columns<R>(sheet: Sheet<'_, R>, of: impl Fn(&R) -> Self) -> Sheet<'_, R> {
+        sheet
+            .data("n", |row| of(row).n)
+            .data("method", |row| of(row).method.key())
+            .data("scheme", |row| of(row).scheme.key())
     }
 
     /// Name in metrics after the flow or shape, such as `n128.hybrid_calibrated`.
@@ -151,50 +140,47 @@ impl Study {
         self.plan.iter().filter_map(of).collect()
     }
 
+    /// How much finer the finest resolution is, counted in resolutions.
+    fn rank(&self, n: usize) -> usize {
+        self.cells.iter().filter(|&&m| m > n).count()
+    }
+
+    fn dashes(&self, n: usize) -> LineStyle {
+        use LineStyle::{Dashed, Dotted, ShortDashed, Solid};
+        [Solid, Dashed, ShortDashed, Dotted][self.rank(n).min(3)]
+    }
+
+    pub fn marker(&self, n: usize) -> Marker {
+        use Marker::{Circle, Diamond, Square, Triangle};
+        [Circle, Square, Triangle, Diamond][self.rank(n).min(3)]
+    }
+
+    /// The curve of a variant: colours stand for methods in their schemes, dashes for resolutions. Such curves often coincide, so coarser
+    /// ones are wider and show on both sides of finer ones.
     pub fn series(&self, variant: Variant, points: Vec<[f64; 2]>) -> Series {
-        look::curve(points, variant.look(), (variant.n, &self.cells))
+        Series::new(format!("{}, n = {}", variant.label(), variant.n), points)
+            .with_colour(look::colour(variant.method, variant.scheme))
+            .with_style(self.dashes(variant.n))
+            .with_width(1.8 + 1.4 * self.rank(variant.n) as f64)
     }
 
-    /// A chart of such curves with the legend for all variants.
+    /// A chart of such curves with a legend for all variants: methods, then resolutions.
     pub fn chart(&self, chart: LineChart, curves: impl IntoIterator<Item = Series>) -> LineChart {
-        let shown =
-            look::variants(|wanted| self.variants().any(|variant| variant.look() == wanted));
-        look::legend(chart.with_curves(curves), shown, &self.cells)
-    }
-}
-
-/// A flow at the scales of the convergence tests in equal steps, with nothing measured; the inner step of mean curvature flow is its step.
-pub fn case(
-    (flow, operator): (Flow, &Operator),
-    shape: &str,
-    initial: Field<2>,
-    (tau, steps): (f64, usize),
-) -> Case<2> {
-    let mcf_step = match flow {
-        Flow::MeanCurvature => tau,
-        Flow::Willmore => STEP,
-    };
-    let scales = Scales {
-        mcf_step,
-        ..scales()
-    };
-    let time = (StepRule::Constant(tau), steps);
-    Case {
-        flow,
-        measures: Vec::new(),
-        ..willmore_flow(shape, initial, operator.clone(), scales, time)
+        let planned = |look| self.variants().any(|variant| variant.look() == look);
+        let methods = look::variants(planned).map(|(method, scheme)| {
+            let (label, colour) = (method.label_in(scheme), look::colour(method, scheme));
+            LegendEntry::line(label, colour, LineStyle::Solid)
+        });
+        let resolutions = self
+            .cells
+            .iter()
+            .map(|&n| LegendEntry::line(format!("n = {n}"), Colour::Black, self.dashes(n)));
+        let chart = chart.with_curves(curves);
+        chart.with_entries(methods).with_entries(resolutions)
     }
 }
 
 /// Mean over minimizations; nothing without any.
-/// A negative power of two, as `2⁻⁹`.
-pub fn one_over_two_to(exponent: u32) -> String {
-    let digits = exponent.to_string();
-    let digits = digits.chars().filter_map(|c| c.to_digit(10));
-    let superscript = digits.filter_map(|digit| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize));
-    format!("2⁻{}", superscript.collect::<String>())
-}
-
 pub fn mean<'a>(
     minimizations: impl Iterator<Item = &'a StepRecord>,
     of: impl Fn(&StepRecord) -> f64,

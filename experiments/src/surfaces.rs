@@ -1,20 +1,26 @@
 //! Surfaces under Willmore flow: their scales, the shown steps of a run, and the pictures, tables and metrics of those.
 
-use engine::{Helfrich, Storage};
+use engine::Storage;
 use geometry::measure::BoundingBox;
-use model::{NeededNetwork, Networks};
+use model::NeededNetwork;
 use operators::memory;
 pub use render::View;
-use render::{Quality, Rgb, Scene, Tube};
-use surfaces::{ClosedMesh, Fairing, TriangleMesh};
+use render::{Picture, Quality, Rgb, Scene, Tube};
+use surfaces::ClosedMesh;
 
+use crate::look::one_over_two_to;
 use crate::networks::Chosen;
 use crate::prelude::*;
-use crate::steps::steps_csv;
-use crate::study::one_over_two_to;
+use crate::steps;
 
 const EPS_OVER_H: f64 = 2.0;
 const WIDTH: usize = 17;
+/// From above and from the side.
+pub const VIEW: View = View {
+    up: UpAxis::Z,
+    azimuth: 30.0,
+    elevation: 25.0,
+};
 const SIDE: u32 = 640;
 /// Colour of a surface where it may move, if it may not everywhere.
 const MOVING: Rgb = Rgb(150, 196, 160);
@@ -57,7 +63,7 @@ impl Setting {
         let (networks, needed) = (self.networks.of(variant.1), needed_network());
         let (grid, scales) = (&self.grid, &self.scales);
         let mut operator = Operator::new(variant, &networks, &needed, grid, scales)?;
-        if variant == (Method::Hybrid, Scheme::Accurate) {
+        if variant == ACCURATE {
             operator.storage = Storage::Auto;
         }
         Ok(operator)
@@ -65,7 +71,7 @@ impl Setting {
 
     /// The parameters of a program for its manifest: the common ones, and others.
     pub fn parameters(&self, others: Value) -> Result<Value, Error> {
-        let papers = self.operator((Method::Hybrid, Scheme::Paper))?;
+        let papers = self.operator(PAPERS)?;
         let mut parameters = json!({
             "n": self.n, "box_side": self.grid.side(), "eps": self.scales.eps, "mcf_step": self.scales.mcf_step,
             "network": papers.network().map(|named| named.network.fingerprint()),
@@ -75,54 +81,6 @@ impl Setting {
         }
         Ok(parameters)
     }
-}
-
-/// Willmore flow as in the paper: everywhere, in whole steps.
-pub fn willmore_flow<const D: usize>(
-    shape: &str,
-    initial: Field<D>,
-    operator: Operator,
-    scales: Scales,
-    (rule, steps): (StepRule, usize),
-) -> Case<D> {
-    Case {
-        shape: shape.to_owned(),
-        initial,
-        region: None,
-        energy: Helfrich::default(),
-        held: Held::default(),
-        flow: Flow::Willmore,
-        operator,
-        scales,
-        steps: rule.into(),
-        stops: vec![Stop::Steps(steps)],
-        measures: Measure::size(scales.eps),
-    }
-}
-
-/// The accurate operator for the scales of a grid.
-pub fn accurate_operator<const D: usize>(
-    grid: &Grid<D>,
-    scales: &Scales,
-) -> Result<Operator, Error> {
-    let (needed, networks) = (scales.needs(D, grid.spacing()), Networks::default());
-    let accurate = (Method::Hybrid, Scheme::Accurate);
-    Ok(Operator::new(accurate, &networks, &needed, grid, scales)?)
-}
-
-/// Willmore flow from signed distances as `willmore fair` makes it, without its ends and measures.
-pub fn fairing_flow(title: &str, mut distance: Field<3>) -> Result<Case<3>, Error> {
-    surfaces::mend_signs(&mut distance);
-    let (grid, spacing) = (*distance.grid(), distance.grid().spacing());
-    let scales = Scales::of_grid(spacing, EPS_OVER_H);
-    let initial = distance.map(|s| optimal_profile(s, scales.eps));
-    let rule = StepRule::Graded {
-        first: Fairing::first_step(spacing),
-        part: Fairing::GROWTH,
-    };
-    let mut operator = accurate_operator(&grid, &scales)?;
-    operator.storage = Storage::Auto;
-    Ok(willmore_flow(title, initial, operator, scales, (rule, 0)))
 }
 
 #[derive(Args, Clone, Copy, Debug)]
@@ -149,30 +107,24 @@ pub struct Surface {
     pub view: View,
 }
 
-/// The measures of a shown step: name in metrics, column and digits in tables. `w` is the Willmore energy with the implicit finite-element
-/// step and the mass-matrix norm, `w_scheme` what the flow minimizes; the Euler characteristic is that of the isosurface `u = 0`.
-const MEASURES: [(&str, &str, usize); 5] = [
-    ("w", "w", 2),
-    ("w_scheme", "w of the scheme", 2),
-    ("perimeter", "area", 4),
-    ("volume", "volume", 5),
-    ("euler_characteristic", "Euler characteristic", 0),
+/// The measures of a shown step in tables. `w` is the Willmore energy with the implicit finite-element step and the mass-matrix norm,
+/// `w_scheme` what the flow minimizes; the Euler characteristic is that of the isosurface `u = 0`.
+const MEASURES: [(&str, Format, &str); 5] = [
+    ("w", Fixed(2), "w"),
+    ("w of the scheme", Fixed(2), "w_scheme"),
+    ("area", Fixed(4), "perimeter"),
+    ("volume", Fixed(5), "volume"),
+    ("Euler characteristic", Fixed(0), "euler_characteristic"),
 ];
 
 pub struct Snapshot {
     pub step: usize,
     pub time: f64,
-    measures: [f64; MEASURES.len()],
+    pub measures: Numbers,
     /// The Willmore energy that the paper reports.
     paper: Option<f64>,
     pub caption: String,
     pub tubes: Vec<Tube>,
-}
-
-impl Snapshot {
-    pub fn w(&self) -> f64 {
-        self.measures[0]
-    }
 }
 
 pub struct Flowed {
@@ -225,20 +177,20 @@ impl Flowed {
         let measured = self.trajectory.measures(step)?;
         let w = case.implicit_elements()?.willmore_energy(&u)?;
         memory::release_freed();
-        let reported = self.surface.shown.iter().find(|(shown, _)| *shown == step);
+        let mut measures = Numbers::from([
+            ("w", w),
+            ("perimeter", measured["perimeter"]),
+            ("volume", measured["volume"]),
+            ("euler_characteristic", mesh.euler_characteristic() as f64),
+        ]);
+        measures.extend(w_scheme.map(|w| ("w_scheme", w)));
+        let mut reported = self.surface.shown.iter().filter(|_| !stage.options.quick);
+        let reported = reported.find(|(shown, _)| *shown == step);
         Ok(Snapshot {
             step,
             time: record.map_or(0.0, |r| r.time),
-            measures: [
-                w,
-                w_scheme.unwrap_or(f64::NAN),
-                measured["perimeter"],
-                measured["volume"],
-                mesh.euler_characteristic() as f64,
-            ],
-            paper: reported
-                .filter(|_| !stage.options.quick)
-                .and_then(|(_, w)| *w),
+            measures,
+            paper: reported.and_then(|(_, w)| *w),
             caption: format!("step {step}: w = {w:.2}"),
             tubes: Vec::new(),
         })
@@ -271,9 +223,8 @@ impl Flowed {
     /// Pictures of the shown steps with this side in pixels (less in a quick run), all in one framing, each also as a file of its own.
     pub fn pictures(&self, stage: &Stage<'_>, side: u32) -> Result<Vec<Raster>, Error> {
         memory::release_freed();
-        let quick = stage.options.quick;
         let usual = (side, Quality::Standard);
-        let (side, quality) = if quick { (120, Quality::Draft) } else { usual };
+        let (side, quality) = stage.options.either((120, Quality::Draft), usual);
         // Scenes are made twice rather than kept: one takes several times the memory of its phase field.
         let mut points = Vec::new();
         for snapshot in &self.snapshots {
@@ -290,8 +241,7 @@ impl Flowed {
             }
             let picture = scene.render([side; 2])?;
             picture.write_png(folder.path(&format!("{}.png", self.file(snapshot.step)))?)?;
-            let size = [picture.width() as usize, picture.height() as usize];
-            Ok(Raster::new(size, picture.pixels()).with_caption(&snapshot.caption))
+            Ok(raster(&picture, &snapshot.caption))
         };
         self.snapshots.iter().map(picture).collect()
     }
@@ -307,26 +257,10 @@ impl Flowed {
     }
 }
 
-/// A square picture of a scene.
-pub fn raster(scene: &Scene, side: u32, caption: impl Into<String>) -> Result<Raster, Error> {
-    let picture = scene.render([side; 2])?;
+/// A picture as a panel of a figure.
+pub fn raster(picture: &Picture, caption: impl Into<String>) -> Raster {
     let size = [picture.width(), picture.height()].map(|side| side as usize);
-    Ok(Raster::new(size, picture.pixels()).with_caption(caption))
-}
-
-/// A picture of a mesh in a frame.
-pub fn mesh_raster(
-    mesh: &TriangleMesh,
-    (up, frame): (UpAxis, BoundingBox<3>),
-    caption: impl Into<String>,
-) -> Result<Raster, Error> {
-    const SIDE: u32 = 420;
-    let scene = Scene::of_mesh(mesh.clone()).within(frame).view(View {
-        up,
-        azimuth: -60.0,
-        elevation: 25.0,
-    });
-    raster(&scene, SIDE, caption)
+    Raster::new(size, picture.pixels()).with_caption(caption)
 }
 
 /// Surfaces under Willmore flow by several methods, as a program shows them.
@@ -365,7 +299,7 @@ impl SurfaceFlows {
         for (surface, initial) in &self.surfaces {
             for &variant in &self.variants {
                 let mut surface = surface.clone();
-                if variant != (Method::Hybrid, Scheme::Paper) {
+                if variant != PAPERS {
                     // The paper reports energies of its own scheme.
                     surface.shown.iter_mut().for_each(|(_, w)| *w = None);
                 }
@@ -391,8 +325,7 @@ impl SurfaceFlows {
             ));
         session.figure(figure, "surfaces")?;
         let runs = all.iter().map(|one| (one.surface.key, &one.trajectory));
-        let output = &session.output;
-        output.write("steps.csv", steps_csv("surface", runs)?)?;
+        steps::write(&session, "surface", runs)?;
         for one in &all {
             let records = &one.trajectory.records;
             let metrics = [
@@ -418,18 +351,14 @@ pub fn write_snapshots(
     let rows: Vec<(&Flowed, &Snapshot)> = (all.iter())
         .flat_map(|one| one.snapshots.iter().map(move |shown| (one, shown)))
         .collect();
-    let mut sheet = Sheet::of(&rows)
+    let sheet = Sheet::of(&rows)
         .keyed(|(one, shown), name| format!("{}.{name}.step{}", key(one), shown.step))
         .text("surface", |(one, _)| one.surface.title.as_str())
         .text("method", |(one, _)| one.label())
-        .column("step", Shortest, |(_, shown)| shown.step);
-    for (k, (name, head, digits)) in MEASURES.into_iter().enumerate() {
-        let value = |(_, shown): &(&Flowed, &Snapshot)| shown.measures[k];
-        sheet = sheet.measure(name, (head, Fixed(digits)), value);
-        if k == 0 {
-            sheet = sheet.column("w, paper", Fixed(2), |(_, shown)| shown.paper);
-        }
-    }
+        .column("step", Shortest, |(_, shown)| shown.step)
+        .numbers(&MEASURES[..1], |(_, shown)| &shown.measures)
+        .column("w, paper", Fixed(2), |(_, shown)| shown.paper)
+        .columns(&MEASURES[1..], |(_, shown)| &shown.measures);
     session.sheet(sheet, stem)?;
     (all.iter()).try_for_each(|one| session.metric(&format!("{}.peak_mib", key(one)), one.peak_mib))
 }

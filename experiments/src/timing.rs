@@ -1,10 +1,8 @@
-//! Timing: contenders take turns, so that whatever else the machine does burdens them alike.
+//! Wall times, work and memory. Contenders take turns, so that whatever else the machine does burdens them alike.
 
 use crate::networks::{Chosen, convergence_network};
 use crate::prelude::*;
 use crate::{study, surfaces, truth};
-
-pub use report::Numbers;
 
 /// Round after round, everyone who goes on has a turn.
 pub fn take_turns<C>(
@@ -46,61 +44,36 @@ pub fn plane(operator: &Operator, n: usize, steps: usize, quick: bool) -> Result
         let disc = Ball::new([0.0, 0.0], 0.2)?;
         ("disc", phase_field(Grid::per_unit(n, 0.75)?, &disc, EPS)?)
     } else {
-        (
-            "cross",
-            (truth::CROSS.initial)(Grid::per_unit(n, truth::CROSS.side)?, EPS)?,
-        )
+        let grid = Grid::per_unit(n, truth::CROSS.side)?;
+        ("cross", (truth::CROSS.initial)(grid, EPS)?)
     };
     let flow = (Flow::Willmore, operator);
-    Ok(study::case(flow, shape, initial, (STEP, steps)))
+    Ok(planar_flow(flow, shape, initial, (STEP, steps)))
 }
 
-/// Willmore flow that is timed step by step.
-pub struct Timed<const D: usize> {
-    pub run: Run<D>,
+/// Wall times of the minimizations in seconds.
+pub fn seconds<const D: usize>(run: &Run<D>) -> Vec<f64> {
+    let made = minimizations(run.records());
+    made.map(|made| made.seconds).collect()
 }
 
-impl<const D: usize> Timed<D> {
-    /// A case at its start.
-    pub fn new(case: Case<D>, device: &ComputeDevice) -> Result<Self, Error> {
-        let run = Run::new(case, device)?;
-        Ok(Self { run })
-    }
+/// Mean over the minimizations; 0 without any.
+pub fn mean<const D: usize>(run: &Run<D>, of: impl Fn(&StepRecord) -> f64) -> f64 {
+    study::mean(minimizations(run.records()), of).unwrap_or(0.0)
+}
 
-    /// One step, if there is one left, which the bar counts.
-    pub fn step(&mut self, bar: &ProgressBar) -> Result<bool, Error> {
-        bar.inc(1);
-        Ok(self.run.step()?.is_some())
-    }
-
-    /// What the steps did.
-    pub fn minimizations(&self) -> impl Iterator<Item = &StepRecord> {
-        minimizations(self.run.records())
-    }
-
-    /// Wall times of the steps in seconds.
-    pub fn seconds(&self) -> Vec<f64> {
-        self.minimizations().map(|made| made.seconds).collect()
-    }
-
-    /// Mean over the steps; 0 without any.
-    pub fn mean(&self, of: impl Fn(&StepRecord) -> f64) -> f64 {
-        study::mean(self.minimizations(), of).unwrap_or(0.0)
-    }
-
-    /// Time and work of the steps; products on coarser grids count by their shares of the unknowns.
-    pub fn numbers(&self) -> Numbers {
-        let (seconds, products) = (self.seconds(), self.mean(|r| r.newton.hvp as f64));
-        let ms = 1e3 * self.mean(|r| r.times.products);
-        Numbers::from([
-            ("steps", seconds.len() as f64),
-            ("seconds", seconds.iter().sum()),
-            ("seconds_per_step", median(seconds)),
-            ("newton_per_step", self.mean(|r| r.newton.newton as f64)),
-            ("hvp_per_step", self.mean(StepRecord::hvp)),
-            ("hvp_on_this_grid", products),
-            ("hvp_on_coarser_grids", self.mean(|r| r.start.hvp)),
-            ("ms_per_product", ms / products.max(1.0)),
-        ])
-    }
+/// Time and work of the steps; products on coarser grids count by their shares of the unknowns.
+pub fn numbers<const D: usize>(run: &Run<D>) -> Numbers {
+    let (seconds, products) = (seconds(run), mean(run, |r| r.newton.hvp as f64));
+    let ms = 1e3 * mean(run, |r| r.times.products);
+    Numbers::from([
+        ("steps", seconds.len() as f64),
+        ("seconds", seconds.iter().sum()),
+        ("seconds_per_step", median(seconds)),
+        ("newton_per_step", mean(run, |r| r.newton.newton as f64)),
+        ("hvp_per_step", mean(run, StepRecord::hvp)),
+        ("hvp_on_this_grid", products),
+        ("hvp_on_coarser_grids", mean(run, |r| r.start.hvp)),
+        ("ms_per_product", ms / products.max(1.0)),
+    ])
 }

@@ -10,7 +10,7 @@ use crate::prelude::*;
 
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(3);
 
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct NetworkSpec {
     pub name: &'static str,
     pub ratios: Ratios,
@@ -18,57 +18,52 @@ pub struct NetworkSpec {
     pub cells: usize,
 }
 
-const fn ratios(dimension: usize, width: usize, eps_over_h: f64, step_over_h2: f64) -> Ratios {
-    Ratios {
+/// Dimension, width of the kernel, `eps/h`, `tautilde/h^2`; cells per unit length of the training grid.
+const fn spec(name: &'static str, ratios: (usize, usize, f64, f64), cells: usize) -> NetworkSpec {
+    let (dimension, width, eps_over_h, step_over_h2) = ratios;
+    let ratios = Ratios {
         dimension,
         width,
         eps_over_h,
         step_over_h2,
+    };
+    NetworkSpec {
+        name,
+        ratios,
+        cells,
     }
 }
 
-/// Name; dimension, width of the kernel, `eps/h`, `tautilde/h^2`; cells per unit length of the training grid.
-///
 /// `n64` to `n512` have the scales of the convergence tests, `eps = 2^-6` and `tautilde = 2^-14`. The paper inpaints at `n = 1024`
 /// with `eps = 2^-8` and `tautilde = 2^-18`, which are the same ratios as those of the training at `n = 256`. The network of the
 /// surfaces serves `n = 64` with `eps = 2^-5` and `tautilde = 2^-12`; it is trained at `n = 128`, where the smallest sphere
 /// measures six cells.
-const NETWORKS: [(&str, Ratios, usize); 6] = [
-    ("n64", ratios(2, 9, 1.0, 0.25), 64),
-    ("n128", ratios(2, 17, 2.0, 1.0), 128),
-    ("n256", ratios(2, 33, 4.0, 4.0), 256),
-    ("n512", ratios(2, 65, 8.0, 16.0), 512),
-    ("inpainting", ratios(2, 17, 4.0, 4.0), 256),
-    ("surfaces", ratios(3, 17, 2.0, 1.0), 128),
+const NETWORKS: [NetworkSpec; 6] = [
+    spec("n64", (2, 9, 1.0, 0.25), 64),
+    spec("n128", (2, 17, 2.0, 1.0), 128),
+    spec("n256", (2, 33, 4.0, 4.0), 256),
+    spec("n512", (2, 65, 8.0, 16.0), 512),
+    spec("inpainting", (2, 17, 4.0, 4.0), 256),
+    spec("surfaces", (3, 17, 2.0, 1.0), 128),
 ];
 
 impl NetworkSpec {
-    fn named(wanted: impl Fn(&str) -> bool) -> Vec<Self> {
-        let spec = |(name, ratios, cells)| Self {
-            name,
-            ratios,
-            cells,
-        };
-        let all = NETWORKS.into_iter().map(spec);
-        all.filter(|spec| wanted(spec.name)).collect()
-    }
-
     /// The networks of the accurate recipe: those of the paper's, and one for `eps = h`.
     pub fn accurate() -> Vec<Self> {
-        Self::named(|_| true)
+        NETWORKS.to_vec()
     }
 
     pub fn paper() -> Vec<Self> {
-        Self::named(|name| name != "n64")
+        NETWORKS[1..].to_vec()
     }
 
     /// The networks of the paper's convergence tests, each with twice the resolution of the one before.
     pub fn convergence() -> Vec<Self> {
-        Self::named(|name| ["n128", "n256", "n512"].contains(&name))
+        NETWORKS[1..4].to_vec()
     }
 
     pub fn surfaces() -> Self {
-        Self::named(|name| name == "surfaces").remove(0)
+        NETWORKS[5]
     }
 
     pub fn data(&self, quick: bool) -> Result<SphereData, Error> {
@@ -96,22 +91,18 @@ pub fn held_out_radii(quick: bool) -> usize {
 pub fn train<R: Recipe>(
     (spec, recipe): (&NetworkSpec, &R),
     file: &Path,
-    Stage {
-        options,
-        device,
-        bar,
-        ..
-    }: &Stage<'_>,
+    stage: &Stage<'_>,
 ) -> Result<Trained, Error> {
     let training = Training {
         recipe,
-        data: spec.data(options.quick)?,
-        seed: options.seed,
-        held_out: held_out_radii(options.quick),
+        data: spec.data(stage.options.quick)?,
+        seed: stage.options.seed,
+        held_out: held_out_radii(stage.options.quick),
     };
     let key = serde_json::to_value((&training, env!("CARGO_PKG_VERSION")));
     let key = key.expect("settings are numbers and names");
     let mut checkpoint: Checkpoint<R::State> = load(file, &key).unwrap_or_default();
+    let bar = &stage.bar;
     bar.set_position(checkpoint.curve.len() as u64);
     bar.reset_eta();
     let mut stored = Instant::now();
@@ -125,7 +116,7 @@ pub fn train<R: Recipe>(
         }
         Ok(true)
     };
-    let trained = training.run(&mut checkpoint, device, &mut observer)?;
+    let trained = training.run(&mut checkpoint, stage.device, &mut observer)?;
     store(file, &key, &checkpoint)?;
     Ok(trained)
 }

@@ -3,13 +3,11 @@
 use engine::estimated_time_error;
 use geometry::contour::{Interpolation, zero_level};
 use geometry::distance_from_phase_field;
-use model::Networks;
 use reference::revolution::{self, Surface};
 use reference::{Curve, Shape, planar};
 use surfaces::phase_field_surface;
 
 use crate::prelude::*;
-use crate::surfaces::willmore_flow;
 
 /// A shape whose exact flow is known, around the origin; in space a body of revolution about the third axis.
 pub struct Sample<const D: usize> {
@@ -82,9 +80,6 @@ pub const ELLIPSOID: Sample<3> = Sample {
     level: profile,
 };
 
-/// The operator of runs against the exact flow.
-pub const ACCURATE: (Method, Scheme) = (Method::Hybrid, Scheme::Accurate);
-
 /// Cells per unit length of runs by the accurate operator, two to `eps`.
 pub const CELLS: [usize; 2] = [64, 128];
 
@@ -98,7 +93,7 @@ pub const STRICT: ErrorControl = ErrorControl {
 };
 
 /// Controlled steps that end at the times `end / 2^k` for `k` up to `halvings`, among others.
-pub fn controlled(control: ErrorControl, end: f64, halvings: u32) -> TimeSteps {
+pub fn controlled(control: ErrorControl, (end, halvings): (f64, u32)) -> TimeSteps {
     TimeSteps {
         order: Order::Controlled(control),
         ..StepRule::Ramp { tau: end, halvings }.into()
@@ -106,18 +101,21 @@ pub fn controlled(control: ErrorControl, end: f64, halvings: u32) -> TimeSteps {
 }
 
 impl<const D: usize> Sample<D> {
-    pub fn exact(&self, flow: Flow, times: &[f64]) -> Result<Vec<Truth>, Error> {
+    /// The exact flow at times, each with a number that names it.
+    pub fn exact(&self, flow: Flow, marks: &[(usize, f64)]) -> Result<Vec<Truth>, Error> {
         let flow = match flow {
             Flow::Willmore => reference::Flow::Willmore,
             Flow::MeanCurvature => reference::Flow::MeanCurvature,
         };
-        let shape = (self.curve)()?;
+        let (shape, times) = ((self.curve)()?, marks.iter().map(|(_, time)| *time));
+        let times: Vec<f64> = times.collect();
+        let marks = marks.iter().map(|(mark, _)| *mark);
         Ok(if D == 2 {
-            let curves = planar::evolve(&shape, flow, times, &planar::ACCURACY)?;
-            curves.into_iter().map(Truth::Curve).collect()
+            let curves = planar::evolve(&shape, flow, &times, &planar::ACCURACY)?;
+            marks.zip(curves).map(Truth::of_curve).collect()
         } else {
-            let surfaces = revolution::evolve(&shape, flow, times, &revolution::ACCURACY)?;
-            surfaces.into_iter().map(Truth::Surface).collect()
+            let surfaces = revolution::evolve(&shape, flow, &times, &revolution::ACCURACY)?;
+            marks.zip(surfaces).map(Truth::of_surface).collect()
         })
     }
 
@@ -136,13 +134,33 @@ impl<const D: usize> Sample<D> {
         flow(session, start, variant, (&name, steps, end))
     }
 
-    /// The flow at these times, `end / 2^k` for some `k` up to `halvings` or the last one, extrapolated to `eps = 0` from strictly controlled runs on
-    /// two grids, the finer one with half the `eps`. A quick look takes coarser ones.
-    pub fn extrapolated<'e>(
+    /// What controlled steps of second order with two cells to `eps` reach at the times of the exact flow, `end / 2^k` for some `k` up to
+    /// `halvings` or the last one, and [the same extrapolated](Self::extrapolated); adds the metrics `KEY.nN.controlled` and
+    /// `KEY.extrapolated`.
+    pub fn second_order(
         &self,
         session: &mut Session<'_>,
-        (end, halvings): (f64, u32),
-        exact: impl Iterator<Item = &'e Truth> + Clone,
+        n: usize,
+        ramp: (f64, u32),
+        exact: &[&Truth],
+    ) -> Result<[Vec<Reached>; 2], Error> {
+        let steps = controlled(ErrorControl::default(), ramp);
+        let run = ("controlled", steps, last(exact));
+        let run = self.run(session, (n, 2.0), ACCURATE, run)?;
+        let reached = exact.iter().map(|exact| Reached::of(self, &run, exact));
+        let reached = reached.collect::<Result<Vec<_>, _>>()?;
+        let key = format!("{}.n{n}.controlled", self.key);
+        (reached.iter()).try_for_each(|reached| reached.record(session, &key))?;
+        Ok([reached, self.extrapolated(session, ramp, exact)?])
+    }
+
+    /// The flow at such times extrapolated to `eps = 0` from strictly controlled runs on two grids, the finer one with half the `eps`; adds
+    /// the metrics `KEY.extrapolated`. A quick look takes coarser ones.
+    pub fn extrapolated(
+        &self,
+        session: &mut Session<'_>,
+        ramp: (f64, u32),
+        exact: &[&Truth],
     ) -> Result<Vec<Reached>, Error> {
         // With two cells to eps the lattice holds slow flows back by as much as the extrapolation leaves. In space no network has more.
         let (cells, eps_over_h) = match (D, session.options.quick) {
@@ -151,19 +169,24 @@ impl<const D: usize> Sample<D> {
             (_, false) => ([64, 128], 2.0),
             (_, true) => ([32, 64], 2.0),
         };
-        let last = exact.clone().map(Truth::time).fold(0.0, f64::max);
         let mut run = |n| {
-            let steps = ("controlled_strict", controlled(STRICT, end, halvings), last);
+            let steps = ("controlled_strict", controlled(STRICT, ramp), last(exact));
             self.run(session, (n, eps_over_h), ACCURATE, steps)
         };
         let (double, single) = (run(cells[0])?, run(cells[1])?);
-        exact
-            .map(|truth| {
-                let at = |run| Reached::of(self, run, truth);
-                Ok(Reached::extrapolated(&at(&double)?, &at(&single)?, truth))
-            })
-            .collect()
+        let (key, mut all) = (format!("{}.extrapolated", self.key), Vec::new());
+        for exact in exact {
+            let at = |run| Reached::of(self, run, exact);
+            let reached = Reached::extrapolated(&at(&double)?, &at(&single)?, exact);
+            reached.record(session, &key)?;
+            all.push(reached);
+        }
+        Ok(all)
     }
+}
+
+fn last(exact: &[&Truth]) -> f64 {
+    exact.iter().map(|truth| truth.time()).fold(0.0, f64::max)
 }
 
 /// Willmore flow of a phase field with so many cells to `eps`, a shape of this name, up to a time in such steps.
@@ -187,8 +210,7 @@ pub fn flow<const D: usize>(
         newton,
         ..Scales::of_grid(grid.spacing(), eps_over_h)
     };
-    let needed = scales.needs(D, grid.spacing());
-    let operator = Operator::new(variant, &Networks::default(), &needed, &grid, &scales)?;
+    let operator = operator(variant, &grid, &scales)?;
     let mut case = willmore_flow(shape, initial, operator, scales, (steps.rule, 1));
     case.steps = steps;
     case.stops = vec![Stop::Time(end)];
@@ -196,47 +218,49 @@ pub fn flow<const D: usize>(
     session.trajectory(name, case, name, &Samples::every(1))
 }
 
-pub enum Truth {
-    Curve(Curve),
-    Surface(Surface),
-}
-
-pub type Sizes = Vec<(&'static str, f64)>;
-
-impl Truth {
-    pub fn time(&self) -> f64 {
-        match self {
-            Self::Curve(curve) => curve.time(),
-            Self::Surface(surface) => surface.time(),
-        }
-    }
-
+/// The exact flow at a time.
+pub struct Truth {
+    pub mark: usize,
     /// The curve, or the profile of the surface.
-    pub fn outline(&self) -> &Curve {
-        match self {
-            Self::Curve(curve) => curve,
-            Self::Surface(surface) => surface.profile(),
-        }
-    }
-
+    pub outline: Curve,
     /// Of a curve the extent from the origin along the x axis and along the diagonal, the enclosed area, the length, and
     /// `w = 1/2 int kappa^2`; of a surface area, volume, and `w = 1/2 int h^2`.
-    pub fn sizes(&self) -> Sizes {
-        let along = |curve: &Curve, direction| curve.distance_along(direction).unwrap_or(f64::NAN);
-        match self {
-            Self::Curve(curve) => vec![
-                ("tip", along(curve, [1.0, 0.0])),
-                ("diagonal", along(curve, [1.0, 1.0])),
-                ("area", curve.area()),
-                ("perimeter", curve.length()),
-                ("w", curve.energy()),
-            ],
-            Self::Surface(surface) => vec![
-                ("area", surface.area()),
-                ("volume", surface.volume()),
-                ("w", surface.energy()),
-            ],
+    pub sizes: Numbers,
+}
+
+impl Truth {
+    fn of_curve((mark, outline): (usize, Curve)) -> Self {
+        let along = |direction| outline.distance_along(direction).unwrap_or(f64::NAN);
+        let sizes = Numbers::from([
+            ("tip", along([1.0, 0.0])),
+            ("diagonal", along([1.0, 1.0])),
+            ("area", outline.area()),
+            ("perimeter", outline.length()),
+            ("w", outline.energy()),
+        ]);
+        Self {
+            mark,
+            outline,
+            sizes,
         }
+    }
+
+    fn of_surface((mark, surface): (usize, Surface)) -> Self {
+        let [area, volume, w] = [surface.area(), surface.volume(), surface.energy()];
+        Self {
+            mark,
+            outline: surface.profile().clone(),
+            sizes: [("area", area), ("volume", volume), ("w", w)].into(),
+        }
+    }
+
+    fn time(&self) -> f64 {
+        self.outline.time()
+    }
+
+    /// Adds its sizes as metrics `KEY.exact.SIZE.stepMARK`.
+    pub fn record(&self, session: &mut Session<'_>, key: &str) -> Result<(), Error> {
+        record(session, &format!("{key}.exact"), self.mark, &self.sizes)
     }
 }
 
@@ -258,14 +282,15 @@ fn profile(field: &Field<3>, eps: f64) -> Result<Vec<[f64; 2]>, surfaces::Error>
 }
 
 /// Adds metrics `KEY.NAME.stepMARK`.
-pub fn record(
+fn record(
     session: &mut Session<'_>,
     key: &str,
     mark: usize,
-    sizes: &[(&str, f64)],
+    numbers: &Numbers,
 ) -> Result<(), Error> {
-    let mut sizes = sizes.iter();
-    sizes.try_for_each(|(name, value)| session.metric(&format!("{key}.{name}.step{mark}"), *value))
+    let mut numbers = numbers.iter();
+    numbers
+        .try_for_each(|(name, value)| session.metric(&format!("{key}.{name}.step{mark}"), *value))
 }
 
 /// The records of a run up to the first one at a time or later.
@@ -276,8 +301,10 @@ pub fn until<const D: usize>(run: &Trajectory<D>, time: f64) -> &[Record] {
 
 /// What a run has reached at a time at which one of its steps ends.
 pub struct Reached {
-    pub sizes: Sizes,
-    pub points: Vec<[f64; 2]>,
+    pub mark: usize,
+    /// Those of the [exact flow](Truth).
+    pub sizes: Numbers,
+    points: Vec<[f64; 2]>,
     /// The largest distance of the zero level to the exact curve or surface.
     pub distance: f64,
     /// All Hessian-vector products so far,
@@ -291,11 +318,6 @@ pub struct Reached {
 }
 
 impl Reached {
-    pub fn size(&self, name: &str) -> Option<f64> {
-        let mut sizes = self.sizes.iter();
-        sizes.find_map(|(of, size)| (*of == name).then_some(*size))
-    }
-
     /// Compares a run of a sample with the exact flow at a time.
     pub fn of<const D: usize>(
         sample: &Sample<D>,
@@ -307,17 +329,16 @@ impl Reached {
         let (field, eps) = (run.field(last.step)?, run.case.scales.eps);
         let zero_set = ZeroSet::of(&field, eps)?;
         let points = (sample.level)(&field, eps)?;
-        let measured = |name| last.measure(name).unwrap_or(f64::NAN);
         let size = |name| match (D, name) {
             (2, "area") | (_, "volume") => zero_set.volume,
             (_, "area" | "perimeter") => zero_set.perimeter,
             (_, "w") => zero_set.willmore_energy,
-            (_, name) => measured(name),
+            (_, name) => last.measure(name).unwrap_or(f64::NAN),
         };
-        let sizes = exact.sizes().into_iter();
         Ok(Self {
-            sizes: sizes.map(|(name, _)| (name, size(name))).collect(),
-            distance: exact.outline().largest_distance_of(&points),
+            mark: exact.mark,
+            sizes: exact.sizes.keys().map(|&name| (name, size(name))).collect(),
+            distance: exact.outline.largest_distance_of(&points),
             points,
             hvp: so_far.iter().filter_map(Record::hvp).sum(),
             seconds: so_far.iter().map(|record| record.seconds).sum(),
@@ -327,21 +348,21 @@ impl Reached {
     }
 
     /// Adds it as metrics `KEY.NAME.stepMARK`.
-    pub fn record(&self, session: &mut Session<'_>, key: &str, mark: usize) -> Result<(), Error> {
-        let others = [
+    fn record(&self, session: &mut Session<'_>, key: &str) -> Result<(), Error> {
+        let mut numbers = self.sizes.clone();
+        numbers.extend([
             ("distance_to_exact", self.distance),
             ("hvp_total", self.hvp),
             ("steps", self.steps as f64),
             ("estimated_error", self.estimated),
-        ];
-        record(session, key, mark, &[&self.sizes[..], &others].concat())
+        ]);
+        record(session, key, self.mark, &numbers)
     }
 
     /// The same at `eps = 0` from runs at `2 eps` and at `eps`, the error being of second order in `eps`: sizes are `(4 b - a) / 3`, and the
     /// points of the finer level move on by a third of the way from the coarser one. The work is that of both.
     fn extrapolated(double: &Self, single: &Self, exact: &Truth) -> Self {
-        let sizes = single.sizes.iter().zip(&double.sizes);
-        let sizes = sizes.map(|(&(name, b), (_, a))| (name, (4.0 * b - a) / 3.0));
+        let size = |(name, b): (&&'static str, &f64)| (*name, (4.0 * b - double.sizes[name]) / 3.0);
         let points: Vec<[f64; 2]> = (single.points.iter())
             .map(|p| {
                 let [x, y] = nearest(&double.points, *p);
@@ -349,8 +370,9 @@ impl Reached {
             })
             .collect();
         Self {
-            sizes: sizes.collect(),
-            distance: exact.outline().largest_distance_of(&points),
+            mark: exact.mark,
+            sizes: single.sizes.iter().map(size).collect(),
+            distance: exact.outline.largest_distance_of(&points),
             points,
             hvp: double.hvp + single.hvp,
             seconds: double.seconds + single.seconds,

@@ -4,9 +4,10 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::{refused, run};
-use engine::{Operator, Record, Run, Scheme, StepRule, energy_increases};
+use engine::{Record, Run, Scheme, StepRule, energy_increases};
+use experiments::flows::willmore_flow;
 use experiments::networks::Chosen;
-use experiments::surfaces::{centred_box, needed_network, scales, willmore_flow};
+use experiments::surfaces::{centred_box, needed_network, scales};
 use geometry::exact::WILLMORE_ENERGY_CLIFFORD_TORUS;
 use geometry::measure::{l2_distance, zero_set_volume};
 use geometry::shapes::{Ball, Capsule};
@@ -259,10 +260,9 @@ fn a_volume_flows_like_the_shape_it_was_made_from() {
 
 fn flow(initial: &Field<3>, n: usize, steps: usize) -> (Field<3>, Vec<Record>) {
     let device = ComputeDevice::default_compiled().unwrap();
-    let network = Chosen::default().find(Scheme::Paper, &needed_network());
-    let operator = Operator::learned(Scheme::Paper, network.unwrap()).unwrap();
+    let operator = Chosen::default().learned(Scheme::Paper, &needed_network());
     let time = (StepRule::Constant(TAU), steps);
-    let case = willmore_flow("shape", initial.clone(), operator, scales(n), time);
+    let case = willmore_flow("shape", initial.clone(), operator.unwrap(), scales(n), time);
     let mut run = Run::new(case, &device).unwrap();
     run.advance(None, &mut [], &Interrupt::never()).unwrap();
     (run.field().clone(), run.records().to_vec())

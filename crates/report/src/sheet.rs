@@ -64,6 +64,11 @@ impl<'a, R> Sheet<'a, R> {
         self.with_column(head.into(), Some(format), |row| value(row).into())
     }
 
+    /// Adds a column for programs: text, or numbers with as many digits as they have.
+    pub fn data<C: Into<Cell>>(self, head: &str, value: impl Fn(&'a R) -> C) -> Self {
+        self.column(head, Format::Shortest, value)
+    }
+
     fn with_column(
         mut self,
         name: String,

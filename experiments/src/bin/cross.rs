@@ -1,5 +1,5 @@
 //! The cross under Willmore flow.
 
 fn main() -> std::process::ExitCode {
-    experiments::comparison::main(&experiments::programs::cross::SETTING)
+    experiments::comparison::main(&experiments::comparison::CROSS)
 }

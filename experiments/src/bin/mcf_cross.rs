@@ -1,5 +1,5 @@
 //! The cross under mean curvature flow.
 
 fn main() -> std::process::ExitCode {
-    experiments::comparison::main(&experiments::programs::mcf_cross::SETTING)
+    experiments::comparison::main(&experiments::comparison::MCF_CROSS)
 }

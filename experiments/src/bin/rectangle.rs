@@ -1,5 +1,5 @@
 //! The rectangle under Willmore flow.
 
 fn main() -> std::process::ExitCode {
-    experiments::comparison::main(&experiments::programs::rectangle::SETTING)
+    experiments::comparison::main(&experiments::comparison::RECTANGLE)
 }

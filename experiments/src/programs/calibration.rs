@@ -2,7 +2,7 @@
 
 use crate::networks::scales;
 use crate::prelude::*;
-use crate::surfaces::{self, willmore_flow};
+use crate::surfaces;
 use fem::FiniteElementStep;
 use geometry::shapes::Torus;
 use model::training::SphereData;
@@ -49,18 +49,27 @@ pub struct Options {
 
 pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.run;
-    let networks = options.networks()?;
-    let device = run.open_device()?;
-    let checksums = networks
-        .iter()
-        .map(|one| (&one.name, one.network.fingerprint()));
+    let mut networks = Vec::new();
+    for path in &options.network {
+        let network = Network::load(path)?;
+        let name = network.ratios().file_name();
+        networks.push(NamedNetwork { name, network });
+    }
+    if networks.is_empty() {
+        for (name, network) in [Shipped::Paper.all()?, Shipped::Accurate.all()?].concat() {
+            let name = name.to_owned();
+            networks.push(NamedNetwork { name, network });
+        }
+    }
+    networks.truncate(run.either(1, usize::MAX));
+    let checksums = (networks.iter()).map(|one| (&one.name, one.network.fingerprint()));
     let parameters = json!({
         "networks": checksums.collect::<BTreeMap<_, _>>(),
         "eps": EPS,
         "inner_step": STEP,
         "time_step": STEP_RATIO * STEP,
     });
-    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut session = Session::open(PROGRAM, run, parameters)?;
     let install = options.install.as_ref().map(OutputDir::create);
     let install = install.transpose()?;
     let mut all = Vec::new();
@@ -85,40 +94,42 @@ pub fn program(options: &Options) -> Result<(), Error> {
     output.write_json("diagnostics.json", &diagnosed)?;
     output.write_csv("discs.csv", &discs)?;
     output.write_csv("surfaces.csv", &surfaces)?;
-    let learned = all
-        .iter()
-        .map(|one| (one.named.name.clone(), one.calibration));
+    let learned = (all.iter()).map(|one| (one.named.name.clone(), one.calibration));
     let rows: Vec<(String, Calibration)> = learned.chain(elements()?).collect();
-    session.sheet(calibrations_table(&rows), "calibration")?;
-    session.sheet(discs_table(&discs), "discs_table")?;
-    session.sheet(surfaces_table(&surfaces), "surfaces_table")?;
+    let small = Scientific(1);
+    let factors = Sheet::of(&rows)
+        .text("network", |(name, _)| name)
+        .column("c", Fixed(4), |(_, c)| c.factors.energy)
+        .column("m", Fixed(4), |(_, c)| c.factors.metric)
+        .column("c/m", Fixed(4), |(_, c)| c.factors.speed())
+        .column("displacement", Fixed(4), |(_, c)| c.displacement)
+        .column("cos² of ψ and w'", Fixed(4), |(_, c)| c.alignment)
+        .column("ε κ₀", small, |(_, c)| c.spontaneous_curvature)
+        .column("eigenvalue - 1", small, |(_, c)| c.eigenvalue - 1.0)
+        .column("spread over positions", small, |(_, c)| c.position_spread)
+        .column("spread over normals", small, |(_, c)| c.normal_spread);
+    session.sheet(factors, "calibration")?;
+    let of_discs = Sheet::of(&discs)
+        .text("network", |r| &r.network)
+        .text("F", |r| if r.odd_part { "odd part" } else { "whole" })
+        .column("phase", Shortest, |r| f64::from(r.phase))
+        .column("R", Shortest, |r| r.radius)
+        .column("w R/π", Fixed(4), |r| r.measured)
+        .column("predicted", Fixed(4), |r| r.predicted)
+        .column("calibrated w R/π", Fixed(4), |r| r.calibrated);
+    session.sheet(of_discs, "discs_table")?;
+    let of_surfaces = Sheet::of(&surfaces)
+        .text("network", |r| &r.network)
+        .text("surface", |r| &r.surface)
+        .column("w / exact", Fixed(4), |r| r.measured)
+        .column("calibrated w / exact", Fixed(4), |r| r.calibrated);
+    session.sheet(of_surfaces, "surfaces_table")?;
     for one in &all {
         let (key, calibration) = (one.key(), &one.calibration);
         session.summary.insert_record(key, calibration)?;
         session.summary.insert_record(key, &calibration.factors)?;
     }
     session.finish("Calibration of the learned operators and of finite elements")
-}
-
-impl Options {
-    fn networks(&self) -> Result<Vec<NamedNetwork>, Error> {
-        let shipped = [Shipped::Paper.all()?, Shipped::Accurate.all()?].concat();
-        let shipped = shipped.into_iter().map(|(name, network)| NamedNetwork {
-            name: name.to_owned(),
-            network,
-        });
-        let chosen = self.network.iter().map(|path| {
-            let network = Network::load(path)?;
-            let name = network.ratios().file_name();
-            Ok(NamedNetwork { name, network })
-        });
-        let mut networks = chosen.collect::<Result<Vec<_>, Error>>()?;
-        if networks.is_empty() {
-            networks.extend(shipped);
-        }
-        networks.truncate(if self.run.quick { 1 } else { usize::MAX });
-        Ok(networks)
-    }
 }
 
 #[derive(Clone)]
@@ -130,21 +141,6 @@ struct Calibrated {
 impl Calibrated {
     fn key(&self) -> &str {
         self.named.name.trim_end_matches(".safetensors")
-    }
-
-    /// Cells per unit length at which the network has the scales of the convergence tests.
-    fn convergence_cells(&self) -> Option<usize> {
-        let ratios = self.named.network.ratios();
-        let n = (ratios.eps_over_h / EPS).round();
-        let fits = ratios.dimension == 2 && (ratios.step_over_h2 - n * n * STEP).abs() < 1e-9;
-        fits.then_some(n as usize)
-    }
-
-    fn odd_part(&self) -> Result<Self, Error> {
-        let mut odd = self.clone();
-        odd.named.network = self.named.network.odd_part();
-        odd.calibration = odd.named.network.calibrate()?;
-        Ok(odd)
     }
 
     /// Willmore energy and phase field after one small step with these factors.
@@ -183,15 +179,22 @@ struct DiscRow {
 
 /// Discs of either phase by every network with the scales of the convergence tests up to `n = 256`, and by its odd part.
 fn discs(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<DiscRow>, Error> {
-    let quick = stage.options.quick;
-    let radii = if quick { &QUICK_RADII[..] } else { &RADII };
+    let radii = stage.options.either(&QUICK_RADII[..], &RADII);
     let mut variants = Vec::new();
     for one in all {
-        if let Some(n) = one.convergence_cells().filter(|&n| n <= 256) {
-            variants.push((n, false, one.clone()));
-            if !one.key().starts_with("accurate") {
-                variants.push((n, true, one.odd_part()?));
-            }
+        let ratios = one.named.network.ratios();
+        // At which the network has the scales of the convergence tests, if it does at all.
+        let n = (ratios.eps_over_h / EPS).round();
+        let fits = ratios.dimension == 2 && (ratios.step_over_h2 - n * n * STEP).abs() < 1e-9;
+        if !fits || n > 256.0 {
+            continue;
+        }
+        variants.push((n, false, one.clone()));
+        if !one.key().starts_with("accurate") {
+            let mut odd = one.clone();
+            odd.named.network = one.named.network.odd_part();
+            odd.calibration = odd.named.network.calibrate()?;
+            variants.push((n, true, odd));
         }
     }
     let mut tasks = Vec::new();
@@ -205,8 +208,8 @@ fn discs(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<DiscRow>, Error> {
         let (&(n, odd_part, ref one), radius, phase) = tasks[i];
         let (sign, factors) = (f64::from(phase), one.calibration.factors);
         let offset = one.calibration.spontaneous_curvature / EPS * sign;
-        let half = ((radius + MARGIN) * n as f64).ceil();
-        let grid = Grid::<2>::centred(2 * half as usize, 2.0 * half / n as f64)?;
+        let half = ((radius + MARGIN) * n).ceil();
+        let grid = Grid::<2>::centred(2 * half as usize, 2.0 * half / n)?;
         let disc = phase_field(grid, &Ball::new([0.0, 0.0], radius)?, EPS)?;
         let disc = disc.map(|u| sign * u);
         // Over that of the zero level set of the relaxed disc, `pi / R`.
@@ -229,17 +232,6 @@ fn discs(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<DiscRow>, Error> {
         stage.bar.inc(1);
         Ok(row)
     })
-}
-
-fn discs_table(discs: &[DiscRow]) -> Sheet<'_, DiscRow> {
-    Sheet::of(discs)
-        .text("network", |r| &r.network)
-        .text("F", |r| if r.odd_part { "odd part" } else { "whole" })
-        .column("phase", Shortest, |r| f64::from(r.phase))
-        .column("R", Shortest, |r| r.radius)
-        .column("w R/π", Fixed(4), |r| r.measured)
-        .column("predicted", Fixed(4), |r| r.predicted)
-        .column("calibrated w R/π", Fixed(4), |r| r.calibrated)
 }
 
 /// Measured and predicted energies over the radius; colour: phase.
@@ -297,10 +289,8 @@ fn balls_and_tori(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<SurfaceRo
         shapes.truncate(1);
     }
     let mut rows = Vec::new();
-    for one in all
-        .iter()
-        .filter(|one| one.named.network.ratios().dimension == 3)
-    {
+    let is_solid = |one: &&Calibrated| one.named.network.ratios().dimension == 3;
+    for one in all.iter().filter(is_solid) {
         let mut odd = one.clone();
         odd.named.network = one.named.network.odd_part();
         for (surface, initial, exact) in &shapes {
@@ -318,14 +308,6 @@ fn balls_and_tori(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<SurfaceRo
     Ok(rows)
 }
 
-fn surfaces_table(rows: &[SurfaceRow]) -> Sheet<'_, SurfaceRow> {
-    Sheet::of(rows)
-        .text("network", |r| &r.network)
-        .text("surface", |r| &r.surface)
-        .column("w / exact", Fixed(4), |r| r.measured)
-        .column("calibrated w / exact", Fixed(4), |r| r.calibrated)
-}
-
 #[derive(Serialize)]
 struct Diagnostics {
     network: String,
@@ -340,10 +322,12 @@ struct Diagnostics {
 fn diagnostics(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<Diagnostics>, Error> {
     let count: usize = if stage.options.quick { 3 } else { 12 };
     // Kernels of width 65 have a thousand planes; surfaces have millions of nodes.
-    let networks = all.iter().map(|one| (one.key(), &one.named.network));
-    let small = networks
-        .filter(|(_, network)| network.ratios().width < 65 && network.ratios().dimension == 2);
-    let diagnose = |(name, network): (&str, &Network)| {
+    let small = all.iter().filter(|one| {
+        let ratios = one.named.network.ratios();
+        ratios.width < 65 && ratios.dimension == 2
+    });
+    let diagnose = |one: &Calibrated| {
+        let network = &one.named.network;
         let data = SphereData::new(network.ratios(), network.provenance().reference_cells)?;
         let mut displacement = Vec::new();
         for i in 0..count {
@@ -355,7 +339,7 @@ fn diagnostics(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<Diagnostics>
         displacement.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let bend = (0..=400).map(|i| f64::from(i) / 200.0 - 1.0);
         Ok(Diagnostics {
-            network: name.to_owned(),
+            network: one.key().to_owned(),
             displacement,
             spectrum: network.flat_spectrum()?,
             bend: bend.map(|w| [w, network.activation().jet(w)[2]]).collect(),
@@ -398,33 +382,18 @@ fn diagnostics_figure(all: &[Diagnostics]) -> Figure {
 
 fn elements() -> Result<Vec<(String, Calibration)>, Error> {
     let (plane, space) = (Grid::<2>::centred(16, 16.0)?, Grid::<3>::centred(8, 8.0)?);
+    let name = |kind, [eps, step]: [f64; 2]| format!("FE {kind}, eps = {eps} h, step = {step} h²");
     let mut all = Vec::new();
-    let mut add = |kind, dimension, [eps, step]: [f64; 2], calibration| {
-        let name = format!("FE {kind}, {dimension}D, eps = {eps} h, step = {step} h²");
-        all.push((name, calibration));
-    };
     for ratios @ [eps, step] in ELEMENTS {
         let implicit = FiniteElementStep::implicit(&plane, eps, step)?;
-        add("implicit", 2, ratios, implicit.calibrate()?);
+        all.push((name("implicit, 2D", ratios), implicit.calibrate()?));
         let semi_implicit = FiniteElementStep::semi_implicit(&plane, eps, step)?;
-        add("semi-implicit", 2, ratios, semi_implicit.calibrate()?);
+        all.push((
+            name("semi-implicit, 2D", ratios),
+            semi_implicit.calibrate()?,
+        ));
     }
     let implicit = FiniteElementStep::implicit(&space, ELEMENTS[0][0], ELEMENTS[0][1])?;
-    add("implicit", 3, ELEMENTS[0], implicit.calibrate()?);
+    all.push((name("implicit, 3D", ELEMENTS[0]), implicit.calibrate()?));
     Ok(all)
-}
-
-fn calibrations_table(rows: &[(String, Calibration)]) -> Sheet<'_, (String, Calibration)> {
-    let small = Scientific(1);
-    Sheet::of(rows)
-        .text("network", |(name, _)| name)
-        .column("c", Fixed(4), |(_, c)| c.factors.energy)
-        .column("m", Fixed(4), |(_, c)| c.factors.metric)
-        .column("c/m", Fixed(4), |(_, c)| c.factors.speed())
-        .column("displacement", Fixed(4), |(_, c)| c.displacement)
-        .column("cos² of ψ and w'", Fixed(4), |(_, c)| c.alignment)
-        .column("ε κ₀", small, |(_, c)| c.spontaneous_curvature)
-        .column("eigenvalue - 1", small, |(_, c)| c.eigenvalue - 1.0)
-        .column("spread over positions", small, |(_, c)| c.position_spread)
-        .column("spread over normals", small, |(_, c)| c.normal_spread)
 }

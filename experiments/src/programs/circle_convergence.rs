@@ -3,7 +3,7 @@
 use crate::circles::{self, Circle, Ensemble};
 use crate::prelude::*;
 use crate::session::remove_folder;
-use crate::steps::{self, Rows};
+use crate::steps;
 use crate::study::{Study, StudyOptions, Variant};
 
 const PROGRAM: &str = "circle_convergence";
@@ -44,11 +44,7 @@ impl Options {
 
 pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.study.run;
-    let (all, steps) = if run.quick {
-        (4, 8)
-    } else {
-        (circles::COUNT, circles::STEPS)
-    };
+    let (all, steps) = run.either((4, 8), (circles::COUNT, circles::STEPS));
     let count = options.circles.unwrap_or(all);
     require(
         (1..=circles::COUNT).contains(&count),
@@ -57,7 +53,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
             circles::COUNT
         ),
     )?;
-    let (variants, device) = (options.variants(), run.open_device()?);
+    let variants = options.variants();
     let study = Study::new(&options.study.networks, &variants)?;
     let parameters = json!({
         "cells": study.cells,
@@ -68,7 +64,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
         "time_step": STEP,
         "networks": study.checksums(),
     });
-    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut session = Session::open(PROGRAM, run, parameters)?;
     let mut ensembles = Vec::new();
     for planned in &study.plan {
         let Variant { flow, n, .. } = planned.0;
@@ -84,9 +80,11 @@ pub fn program(options: &Options) -> Result<(), Error> {
         steps,
     };
     report.figures(&session)?;
-    report.data(&session.output)?;
+    report.data(&session)?;
     session.sheet(report.sheet(), "errors")?;
-    report.metrics(&mut session)?;
+    for flow in Flow::ALL {
+        session.metric(&format!("{}.scale", flow.key()), report.scale(flow))?;
+    }
     remove_folder(&session.output.subfolder(FINISHED)?)?;
     session.finish("Mean L2 distance to the exact solution")
 }
@@ -124,51 +122,39 @@ impl Report {
     }
 
     fn figures(&self, session: &Session<'_>) -> Result<(), Error> {
-        let end = time(self.steps);
-        let over_radius = format!("Error on circles at t = {end:.4} over the radius");
-        let work = "Work per step of Willmore flow, mean over the circles".to_owned();
-        let over_time = Figure::new("Error on circles over time", 2).with_panels(self.over_time());
-        let over_time = over_time.with_shared_legend().with_note(self.circles());
-        session.figure(over_time, "convergence")?;
-        for (title, charts, stem) in [
-            (over_radius, self.over_radius(), "error_over_radius"),
-            (work, self.work(), "work_per_step"),
-        ] {
-            let figure = Figure::new(title, 2).with_panels(charts);
-            session.figure(figure.with_shared_legend(), stem)?;
-        }
-        session.figure(self.cost(), "error_over_cost")
-    }
-
-    fn circles(&self) -> String {
-        let radii: Vec<f64> = self.ensembles[0].circles.iter().map(|c| c.radius).collect();
-        let (count, first, last) = (radii.len(), radii[0], radii[radii.len() - 1]);
-        format!(
-            "ε = 2⁻⁶, τ = 2⁻¹⁴, h = 1/n; mean over {count} circles with radii between {first:.3} and {last:.3}."
-        )
-    }
-
-    fn over_time(&self) -> [LineChart; 2] {
-        let mut charts = self.flows("time t", "mean L² error", |e| {
-            let points = (0..=self.steps).map(|k| [time(k), e.mean_error(k)]);
+        let (steps, end) = (self.steps, time(self.steps));
+        let mut over_time = self.flows("time t", "mean L² error", |e| {
+            let points = (0..=steps).map(|k| [time(k), e.mean_error(k)]);
             self.study.series(e.variant, points.collect())
         });
-        for (chart, flow) in charts.iter_mut().zip(Flow::ALL) {
-            let end = time(self.steps);
+        for (chart, flow) in over_time.iter_mut().zip(Flow::ALL) {
             chart.note = self.scale(flow).map(|scale| {
                 format!("For scale: mean ‖u(t) − u(0)‖ = {scale:.3} at t = {end:.4}.")
             });
         }
-        charts
-    }
-
-    fn over_radius(&self) -> [LineChart; 2] {
-        self.flows("initial radius r", "L² error", |e| {
-            let points = e.circles.iter().map(|c| [c.radius, c.error(self.steps)]);
+        let over_radius = self.flows("initial radius r", "L² error", |e| {
+            let points = e.circles.iter().map(|c| [c.radius, c.error(steps)]);
             let curve = self.study.series(e.variant, points.collect());
-            let marker = look::marker(e.variant.n, &self.study.cells);
+            let marker = self.study.marker(e.variant.n);
             curve.with_marker(marker).with_width(1.6)
-        })
+        });
+        let circles = &self.ensembles[0].circles;
+        let (count, last) = (circles.len(), circles[circles.len() - 1].radius);
+        let figure = Figure::new("Error on circles over time", 2)
+            .with_panels(over_time)
+            .with_shared_legend()
+            .with_note(format!(
+                "ε = 2⁻⁶, τ = 2⁻¹⁴, h = 1/n; mean over {count} circles with radii between {:.3} and {last:.3}.",
+                circles[0].radius
+            ));
+        session.figure(figure, "convergence")?;
+        let title = format!("Error on circles at t = {end:.4} over the radius");
+        let figure = Figure::new(title, 2).with_panels(over_radius);
+        session.figure(figure.with_shared_legend(), "error_over_radius")?;
+        let title = "Work per step of Willmore flow, mean over the circles";
+        let figure = Figure::new(title, 2).with_panels(self.work());
+        session.figure(figure.with_shared_legend(), "work_per_step")?;
+        session.figure(self.cost(), "error_over_cost")
     }
 
     fn work(&self) -> [LineChart; 2] {
@@ -221,36 +207,36 @@ impl Report {
             ))
     }
 
-    fn data(&self, output: &OutputDir) -> Result<(), Error> {
-        let table = |columns: &[&'static str]| Table::data(Variant::COLUMNS.iter().chain(columns));
-        let mut curves = table(&["step", "time", "l2_mean", "l2_min", "l2_max"]);
-        let mut circles = table(&["radius", "step", "time", "l2"]);
-        let mut runs = Vec::new();
+    fn data(&self, session: &Session<'_>) -> Result<(), Error> {
+        let times = (self.ensembles.iter()).flat_map(|e| (0..=self.steps).map(move |k| (e, k)));
+        let times: Vec<(&Ensemble, usize)> = times.collect();
+        let curves = Sheet::of(&times).data("flow", |(e, _)| e.variant.flow.key());
+        let curves = Variant::columns(curves, |(e, _)| e.variant)
+            .data("step", |(_, k)| *k)
+            .data("time", |(_, k)| time(*k))
+            .data("l2_mean", |(e, k)| e.mean_error(*k))
+            .data("l2_min", |(e, k)| e.error_range(*k)[0])
+            .data("l2_max", |(e, k)| e.error_range(*k)[1]);
+        session.csv(curves, "curves")?;
+        let (mut circles, mut steps) = (Vec::new(), Vec::new());
         for e in &self.ensembles {
-            for k in 0..=self.steps {
-                let [least, most] = e.error_range(k);
-                let errors = [time(k), e.mean_error(k), least, most];
-                curves.push(e.variant.row([k.into()], errors))?;
-            }
             for circle in &e.circles {
-                for k in self.shown_steps() {
-                    let which = [circle.radius.into(), k.into()];
-                    circles.push(e.variant.row(which, [time(k), circle.error(k)]))?;
+                circles.extend(self.shown_steps().map(|k| (e, circle, k)));
+                if e.variant.flow == Flow::Willmore {
+                    steps.extend(steps::of((e.variant, circle.radius), &circle.trajectory));
                 }
             }
-            if e.variant.flow == Flow::Willmore {
-                runs.extend(e.circles.iter().map(|circle| Rows {
-                    leading: [&e.variant.cells()[1..], &[circle.radius.into()]].concat(),
-                    start: None,
-                    records: &circle.trajectory.records,
-                }));
-            }
         }
-        let steps = steps::table(&[&Variant::COLUMNS[1..], &["radius"]].concat(), &runs)?;
-        for (name, table) in [("curves", curves), ("circles", circles), ("steps", steps)] {
-            output.write(&format!("{name}.csv"), table.to_csv()?)?;
-        }
-        Ok(())
+        let sheet = Sheet::of(&circles).data("flow", |(e, ..)| e.variant.flow.key());
+        let sheet = Variant::columns(sheet, |(e, ..)| e.variant)
+            .data("radius", |(_, circle, _)| circle.radius)
+            .data("step", |(.., k)| *k)
+            .data("time", |(.., k)| time(*k))
+            .data("l2", |(_, circle, k)| circle.error(*k));
+        session.csv(sheet, "circles")?;
+        let sheet = Variant::columns(Sheet::of(&steps), |step| step.run.0);
+        let sheet = sheet.data("radius", |step| step.run.1);
+        session.csv(steps::columns(sheet, &steps), "steps")
     }
 
     /// The mean errors, and of Willmore flow the work.
@@ -264,24 +250,15 @@ impl Report {
             let (metric, head) = (format!("l2.step{k}"), format!("step {k}"));
             sheet = sheet.measure(&metric, (&head, Fixed(5)), |e| e.mean_error(k));
         }
+        // Of Willmore flow.
+        let seconds = |e: &Ensemble| e.minimizations().next().map(|_| e.seconds_per_step());
         let hvp = |e: &Ensemble| e.mean_of_steps(StepRecord::hvp);
-        sheet.measure("hvp_per_step", ("HVP/step", Fixed(1)), hvp)
-    }
-
-    /// Further metrics of Willmore flow, and the scale of both flows.
-    fn metrics(&self, session: &mut Session<'_>) -> Result<(), Error> {
-        for e in self.of_flow(Flow::Willmore) {
-            let newton = e.mean_of_steps(|r| r.newton.newton as f64);
-            let metrics = [
-                ("newton_per_step", newton.into()),
-                ("seconds_per_step", e.seconds_per_step().into()),
-                ("energy_increases", e.energy_increases().into()),
-                ("negative_curvature", e.negative_curvature().into()),
-            ];
-            session.metrics(&e.key(), metrics)?;
-        }
-        let scales = Flow::ALL.map(|flow| (flow.key(), self.scale(flow)));
-        (scales.into_iter())
-            .try_for_each(|(flow, scale)| session.metric(&format!("{flow}.scale"), scale))
+        let newton = |e: &Ensemble| e.mean_of_steps(|r| r.newton.newton as f64);
+        sheet
+            .measure("hvp_per_step", ("HVP/step", Fixed(1)), hvp)
+            .metric("newton_per_step", newton)
+            .metric("seconds_per_step", seconds)
+            .metric("energy_increases", Ensemble::energy_increases)
+            .metric("negative_curvature", Ensemble::negative_curvature)
     }
 }

@@ -2,9 +2,10 @@
 
 use chacha20::ChaCha8Rng;
 
-use crate::meshes::{LAPLACIAN, TAUBIN, folder, rms_distance, sampled};
+use crate::meshes::{folder, sampled};
 use crate::prelude::*;
-use crate::surfaces::{centred_box, fairing_flow, mesh_raster};
+use crate::smoothing::{LAPLACIAN, TAUBIN, fairing_flow, mesh_raster, rms_distance};
+use crate::surfaces::centred_box;
 use engine::DISPLACEMENT;
 use rand::{RngExt, SeedableRng};
 use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, samples, usual_up_axis};
@@ -66,7 +67,6 @@ struct Quality {
 }
 
 pub fn program(options: &Options) -> Result<(), Error> {
-    let device = options.run.open_device()?;
     let quick = options.run.quick;
     let noises = if quick { &NOISES[..1] } else { &NOISES };
     let cells = if quick { 64 } else { CELLS };
@@ -74,14 +74,14 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let names: Vec<&str> = meshes.iter().map(|clean| clean.name.as_str()).collect();
     let parameters = json!({ "meshes": names, "noise_percent": noises, "cells": cells, "side": SIDE,
         "taubin": TAUBIN, "laplacian": LAPLACIAN, "iterations": ITERATIONS });
-    let mut session = Session::open("denoising", &options.run, device, parameters)?;
+    let mut session = Session::open("denoising", &options.run, parameters)?;
     let (mut rows, mut charts, mut pictures) = (Vec::new(), Vec::new(), Vec::new());
     for clean in &meshes {
         for &noise in noises {
             let (methods, chart) = denoise(&mut session, clean, noise, cells)?;
             charts.push(chart);
             if noise.to_bits() == noises[0].to_bits() {
-                let results = [0, 2, 3, 1].map(|k| (methods[k].method, &methods[k].result));
+                let results = [0, 2, 3, 1].map(|k: usize| (methods[k].method, &methods[k].result));
                 let shown = [("clean", clean.mesh.mesh())].into_iter().chain(results);
                 let frame = (clean.up, clean.mesh.bounding_box());
                 let drawn = shown.map(|(name, mesh)| mesh_raster(mesh, frame, name));
@@ -90,6 +90,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
             rows.extend(methods);
         }
     }
+    let normals = ("normals, degrees", Fixed(2));
     let table = Sheet::of(&rows)
         .keyed(|row, name| format!("{}.{name}", row.key()))
         .text("mesh", |row| &row.clean.name)
@@ -97,9 +98,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
         .text("method", |row| row.method)
         .column("iterations", Shortest, |row| row.iterations)
         .measure("rms", ("distance, %", Fixed(4)), |row| row.quality.rms)
-        .measure("normals", ("normals, degrees", Fixed(2)), |row| {
-            row.quality.normals
-        })
+        .measure("normals", normals, |row| row.quality.normals)
         .measure("volume", ("volume, %", Fixed(3)), |row| row.quality.volume)
         .column("seconds", Fixed(2), |row| row.seconds);
     session.sheet(table, "denoising")?;
@@ -133,8 +132,11 @@ fn denoise<'a>(
     let title = format!("{}, noise {noise} %", clean.name);
     let clock = Instant::now();
     let faired = fair(session, &noisy, cells, &title)?;
-    let fair = row("fair", None, faired, clock.elapsed().as_secs_f64());
-    let mut rows = vec![row("noisy", None, noisy.clone(), 0.0)];
+    let seconds = clock.elapsed().as_secs_f64();
+    let mut rows = vec![
+        row("noisy", None, noisy.clone(), 0.0),
+        row("fair", None, faired, seconds),
+    ];
     let (mut curves, mut least_normals) = (Vec::new(), Vec::new());
     for (colour, method, factors) in [(1, "Taubin", TAUBIN), (2, "Laplacian", LAPLACIAN)] {
         let clock = Instant::now();
@@ -144,8 +146,8 @@ fn denoise<'a>(
         let seconds = clock.elapsed().as_secs_f64() / ITERATIONS as f64;
         let best = (2..ITERATIONS).min_by(|&a, &b| all[a].rms.total_cmp(&all[b].rms));
         let best = best.unwrap_or(2) + 1;
-        let least = all[2..].iter().map(|q| q.normals).fold(f64::MAX, f64::min);
         let row = row(method, Some(best), smoothed(best), seconds);
+        let least = all[2..].iter().map(|q| q.normals).fold(f64::MAX, f64::min);
         session.metric(&format!("{}.least_normals", row.key()), least)?;
         least_normals.push(least);
         rows.push(row);
@@ -153,18 +155,21 @@ fn denoise<'a>(
         let curve = Series::of(method, points, |(k, quality)| [f64::from(k), quality.rms]);
         curves.push(curve.with_colour(colour));
     }
-    let ratio = fair.quality.rms / rows[1].quality.rms;
-    session.metric(&format!("{}.fair_over_taubin", clean.key(noise)), ratio)?;
-    let ratio = fair.quality.normals / least_normals[0];
-    session.metric(&format!("{}.normals_over_taubin", clean.key(noise)), ratio)?;
-    let level = |name, quality: &Quality| {
-        let ends = [1.0, ITERATIONS as f64].map(|x| [x, quality.rms]);
-        Series::new(name, ends)
+    let [noisy, fair, taubin] = [0, 1, 2].map(|k: usize| rows[k].quality);
+    let ratios = [
+        ("fair_over_taubin", (fair.rms / taubin.rms).into()),
+        (
+            "normals_over_taubin",
+            (fair.normals / least_normals[0]).into(),
+        ),
+    ];
+    session.metrics(&clean.key(noise), ratios)?;
+    let level = |name, quality: Quality| {
+        Series::new(name, [1.0, ITERATIONS as f64].map(|x| [x, quality.rms]))
     };
-    curves.push(level("fair", &fair.quality).with_colour(0));
-    let noisy = level("noisy", &rows[0].quality).with_colour(4);
+    curves.push(level("fair", fair).with_colour(0));
+    let noisy = level("noisy", noisy).with_colour(4);
     curves.push(noisy.with_style(LineStyle::Dotted));
-    rows.insert(1, fair);
     let distance = Axis::log("distance, % of the longest side");
     let chart = LineChart::new(title, Axis::linear("iterations"), distance);
     Ok((rows, chart.with_curves(curves)))

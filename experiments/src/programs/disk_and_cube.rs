@@ -1,8 +1,8 @@
 //! A cube and a thick disk under Willmore flow.
 
 use crate::prelude::*;
-use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, View};
-use crate::truth::{self, DISK, ELLIPSOID, Reached, Sample, Sizes, THICK_DISK};
+use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, VIEW};
+use crate::truth::{DISK, ELLIPSOID, Reached, Sample, THICK_DISK, Truth};
 
 const PROGRAM: &str = "disk_and_cube";
 /// Cells per unit length of a quick run and of the paper.
@@ -16,11 +16,6 @@ const HALVINGS: u32 = 6;
 /// The Willmore energies that the paper reports for the hybrid scheme.
 const CUBE_ENERGIES: [(usize, f64); 3] = [(0, 132.65), (1, 52.26), (STEPS, 25.78)];
 const DISK_ENERGIES: [(usize, f64); 3] = [(0, 87.15), (1, 50.49), (STEPS, 25.59)];
-const VIEW: View = View {
-    up: UpAxis::Z,
-    azimuth: 30.0,
-    elevation: 25.0,
-};
 
 /// Willmore flow of a cube and of a thick disk, n = 64, eps = 2^-5, tautilde = 2^-12, tau = 2^-18, by the hybrid scheme and by
 /// nested implicit finite elements: pictures, Willmore energies w and L2 distances after 0, 1 and 100 steps.
@@ -64,50 +59,52 @@ pub fn program(options: &Options) -> Result<(), Error> {
         steps > 0 && !variants.is_empty(),
         "--steps must be at least 1, and --methods must name a method",
     )?;
-    let device = run.open_device()?;
     let setting = Setting::new(&options.figure, CELLS, 1.0)?;
     let (n, grid, eps) = (setting.n, setting.grid, setting.scales.eps);
     let cube = Cuboid::new([CUBE_HALF_SIDE; 3])?.translated([0.5; 3]);
     let disk = Cylinder::new(radius, half_height)?.translated([0.5; 3]);
-    let (cube, disk) = (
-        phase_field(grid, &cube, eps)?,
-        phase_field(grid, &disk, eps)?,
-    );
+    let start = |key, title: &str, shape: &dyn SignedDistance<3>, energies: [(usize, f64); 3]| {
+        let surface = Surface {
+            key,
+            title: title.to_owned(),
+            shown: energies.map(|(step, w)| (step, Some(w))).to_vec(),
+            view: VIEW,
+        };
+        phase_field(grid, shape, eps).map(|initial| (surface, initial))
+    };
+    let surfaces = vec![
+        start("cube", "cube", &cube, CUBE_ENERGIES)?,
+        start("disk", "thick disk", &disk, DISK_ENERGIES)?,
+    ];
     let parameters = setting.parameters(json!({
         "tau": TAU, "steps": steps, "variants": variants, "cube_half_side": CUBE_HALF_SIDE, "disk_radius": radius,
         "disk_half_height": half_height,
     }))?;
-    let session = Session::open(PROGRAM, run, device, parameters)?;
+    let session = Session::open(PROGRAM, run, parameters)?;
     let flows = SurfaceFlows {
         program: PROGRAM,
         title: "Willmore flow of a cube and of a thick disk".to_owned(),
-        surfaces: vec![
-            (surface("cube", "cube", CUBE_ENERGIES), cube),
-            (surface("disk", "thick disk", DISK_ENERGIES), disk),
-        ],
+        surfaces,
         variants,
         time: (StepRule::Constant(TAU), steps),
     };
     flows.run(session, &setting, |session, all| {
         compare_with_finite_elements(session, all)?;
-        let end = (TAU, steps);
-        let rows = [&DISK, &ELLIPSOID].map(|sample| compare_with_exact(session, sample, n, end));
-        let rows: Vec<Vec<Compared>> = rows.into_iter().collect::<Result<_, _>>()?;
-        let rows: Vec<Compared> = rows.into_iter().flatten().collect();
-        session.sheet(sheet(&rows), "exact")?;
+        let mut rows = Vec::new();
+        for sample in [&DISK, &ELLIPSOID] {
+            rows.extend(compare_with_exact(session, sample, n, (TAU, steps))?);
+        }
+        session.sheet(sheet(&rows, n), "exact")?;
         Ok(String::new())
     })
 }
 
-/// A surface of revolution in controlled steps, and the exact flow.
+/// A surface of revolution in controlled steps, or extrapolated, and the sizes of the exact flow.
 struct Compared {
     title: &'static str,
     run: String,
-    step: usize,
-    /// Of the flow and of the exact one: area, volume, energy.
-    sizes: [Sizes; 2],
-    distance_over_h: f64,
-    hvp: f64,
+    reached: Reached,
+    exact: Numbers,
 }
 
 /// Lets a surface flow in controlled steps of second order, and compares it and its extrapolation in `eps` with the exact flow after
@@ -119,70 +116,43 @@ fn compare_with_exact(
     (tau, steps): (f64, usize),
 ) -> Result<Vec<Compared>, Error> {
     let powers = (0..=HALVINGS).map(|k| 1_usize << k).filter(|k| *k < steps);
-    let marks: Vec<usize> = powers.chain([steps]).collect();
-    let times: Vec<f64> = marks.iter().map(|&k| k as f64 * tau).collect();
+    let marks = powers.chain([steps]).map(|k| (k, k as f64 * tau));
+    let marks: Vec<(usize, f64)> = marks.collect();
     let title = format!("{}: the exact flow", sample.title);
-    let exact = session.phase(title, |_| sample.exact(Flow::Willmore, &times))?;
-    let end = tau * f64::from(1 << HALVINGS);
-    let time_steps = truth::controlled(ErrorControl::default(), end, HALVINGS);
-    let control = ("controlled", time_steps, tau * steps as f64);
-    let run = sample.run(session, (n, 2.0), truth::ACCURATE, control)?;
-    let reached = exact.iter().map(|exact| Reached::of(sample, &run, exact));
-    let reached = reached.collect::<Result<Vec<_>, Error>>()?;
-    let limit = sample.extrapolated(session, (end, HALVINGS), exact.iter())?;
-    for (&step, exact) in marks.iter().zip(&exact) {
-        truth::record(
-            session,
-            &format!("{}.exact", sample.key),
-            step,
-            &exact.sizes(),
-        )?;
-    }
+    let exact = session.phase(title, |_| sample.exact(Flow::Willmore, &marks))?;
+    (exact.iter()).try_for_each(|exact| exact.record(session, sample.key))?;
+    let ramp = (tau * f64::from(1 << HALVINGS), HALVINGS);
+    let all: Vec<&Truth> = exact.iter().collect();
+    let runs = sample.second_order(session, n, ramp, &all)?;
     let mut rows = Vec::new();
-    let runs = [
-        (format!("n{n}.controlled"), format!("n = {n}"), reached),
-        ("extrapolated".to_owned(), "extrapolated".to_owned(), limit),
-    ];
-    for (key, run, reached) in runs {
-        for ((&step, exact), reached) in marks.iter().zip(&exact).zip(reached) {
-            reached.record(session, &format!("{}.{key}", sample.key), step)?;
-            rows.push(Compared {
-                title: sample.title,
-                run: run.clone(),
-                step,
-                distance_over_h: reached.distance * n as f64,
-                hvp: reached.hvp,
-                sizes: [reached.sizes, exact.sizes()],
-            });
-        }
+    for (run, reached) in [format!("n = {n}"), "extrapolated".to_owned()]
+        .into_iter()
+        .zip(runs)
+    {
+        rows.extend(exact.iter().zip(reached).map(|(exact, reached)| Compared {
+            title: sample.title,
+            run: run.clone(),
+            reached,
+            exact: exact.sizes.clone(),
+        }));
     }
     Ok(rows)
 }
 
-fn sheet(rows: &[Compared]) -> Sheet<'_, Compared> {
+fn sheet(rows: &[Compared], n: usize) -> Sheet<'_, Compared> {
     let mut sheet = Sheet::of(rows)
         .text("surface", |row| row.title)
         .text("run", |row| &row.run)
-        .column("step", Shortest, |row| row.step);
-    for (k, name) in ["area", "volume", "w"].into_iter().enumerate() {
-        let digits = if k == 2 { 3 } else { 5 };
+        .column("step", Shortest, |row| row.reached.mark);
+    for (name, digits) in [("area", 5), ("volume", 5), ("w", 3)] {
         sheet = sheet
-            .column(name, Fixed(digits), move |row| row.sizes[0][k].1)
-            .column("exact", Fixed(digits), move |row| row.sizes[1][k].1);
+            .column(name, Fixed(digits), |row| row.reached.sizes[name])
+            .column("exact", Fixed(digits), |row| row.exact[name]);
     }
-    let distance = |row: &Compared| row.distance_over_h;
+    let distance = |row: &Compared| row.reached.distance * n as f64;
     sheet
         .column("largest distance / h", Fixed(3), distance)
-        .column("HVP", Fixed(0), |row| row.hvp)
-}
-
-fn surface(key: &'static str, title: &str, energies: [(usize, f64); 3]) -> Surface {
-    Surface {
-        key,
-        title: title.to_owned(),
-        shown: energies.map(|(step, w)| (step, Some(w))).to_vec(),
-        view: VIEW,
-    }
+        .column("HVP", Fixed(0), |row| row.reached.hvp)
 }
 
 /// Adds the L2 distances of the learned operators to the finite elements, where both ran, to captions and metrics.

@@ -2,7 +2,6 @@
 
 use crate::networks::Chosen;
 use crate::prelude::*;
-use crate::{orders, study};
 
 const TITLE: &str = "Willmore flow of an ellipse, each h with its network";
 const HALF_AXES: [f64; 2] = [0.3, 0.2];
@@ -27,22 +26,97 @@ pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
     let (used, steps) = if options.quick { (3, 2) } else { (4, STEPS) };
     let parameters =
         json!({ "half_axes": HALF_AXES, "side": SIDE, "steps": steps, "tolerance": TOLERANCE });
-    let device = options.open_device()?;
-    let mut session = Session::open("ellipse_orders", options, device, parameters)?;
+    let mut session = Session::open("ellipse_orders", options, parameters)?;
     let mut run = |size: f64, n: usize, parts: usize| {
-        let operator = Chosen::default().operator((Method::Hybrid, Scheme::Accurate), n)?;
+        let operator = Chosen::default().operator(ACCURATE, n)?;
         let initial = phase_field(Grid::per_unit(n, SIDE)?, &Ellipse::new(HALF_AXES)?, EPS)?;
         let time = (STEP / parts as f64, steps * parts);
-        let mut case = study::case((Flow::Willmore, &operator), "ellipse", initial, time);
+        let mut case = planar_flow((Flow::Willmore, &operator), "ellipse", initial, time);
         case.scales.newton.tolerance = TOLERANCE;
         let name = format!("n{n}-{parts}");
         let end = session.trajectory(&name, case, &name, &Samples::every(time.1))?;
         Ok::<_, Error>((size, end))
     };
     let in_h = CELLS[..used].iter().map(|&n| run(1.0 / n as f64, n, 1));
-    let in_h = in_h.collect::<Result<_, _>>()?;
+    let h = refinements("h", &in_h.collect::<Result<Vec<_>, _>>()?)?;
     let in_tau = PARTS[..=used].iter().map(|&k| run(STEP / k as f64, 128, k));
-    let in_tau = in_tau.collect::<Result<_, _>>()?;
-    let sequences = [("h", in_h), ("tau", in_tau)];
-    orders::finish(session, "ellipse", TITLE, &sequences)
+    let tau = refinements("tau", &in_tau.collect::<Result<Vec<_>, _>>()?)?;
+    let figure = Figure::new(format!("{TITLE}: convergence"), 2)
+        .with_panels([chart(&h), chart(&tau)])
+        .with_shared_legend();
+    session.figure(figure, "orders")?;
+    let rows = [h, tau].concat();
+    let sheet = Sheet::of(&rows)
+        .keyed(|row, name| format!("ellipse.{name}.{}.pair{}", row.refined, row.pair))
+        .text("refined", |row| row.refined)
+        .column("size", Scientific(2), |row| row.size)
+        .column("to the finest", Scientific(2), |row| row.to_finest)
+        .measure("to_next", ("to the next", Scientific(2)), |row| row.to_next)
+        .measure("order", ("order", Fixed(2)), |row| row.order);
+    session.sheet(sheet, "orders")?;
+    session.finish(&format!("{TITLE}: orders of convergence"))
+}
+
+/// A run in a sequence in which a size, `h` or `tau`, is halved from one to the next.
+#[derive(Clone, Copy)]
+struct Refinement {
+    refined: &'static str,
+    /// Its number in the sequence, from 1, the coarsest.
+    pair: usize,
+    size: f64,
+    /// `L2` distance of its end to that of the finest run, which is small only as long as the finest run is much finer,
+    to_finest: f64,
+    /// and to that of the next one, which is of the order of the error whatever the finest run is.
+    to_next: f64,
+    /// The order `p` as the distances to the next fall like `size^p` up to the next run; none for the last.
+    order: Option<f64>,
+}
+
+/// What the runs say, coarsest first; the finest one has no row.
+fn refinements(
+    refined: &'static str,
+    runs: &[(f64, Trajectory<2>)],
+) -> Result<Vec<Refinement>, Error> {
+    let distance = |coarse: &Trajectory<2>, fine: &Trajectory<2>| {
+        coarse.distance(coarse.steps(), fine, fine.steps())
+    };
+    let finest = &runs[runs.len() - 1].1;
+    let mut rows: Vec<Refinement> = Vec::new();
+    for (k, pair) in runs.windows(2).enumerate() {
+        rows.push(Refinement {
+            refined,
+            pair: k + 1,
+            size: pair[0].0,
+            to_finest: distance(&pair[0].1, finest)?,
+            to_next: distance(&pair[0].1, &pair[1].1)?,
+            order: None,
+        });
+    }
+    for k in 1..rows.len() {
+        rows[k - 1].order = Some((rows[k - 1].to_next / rows[k].to_next).log2());
+    }
+    Ok(rows)
+}
+
+/// The refinements of a size as a chart, with slopes 1 and 2 for comparison.
+fn chart(rows: &[Refinement]) -> LineChart {
+    let (first, last) = (rows[0], rows[rows.len() - 1]);
+    let guide = |slope: i32, style| {
+        let power = |size: f64| first.to_next * (size / first.size).powi(slope);
+        let line = [first, last].map(|row| [row.size, power(row.size)]);
+        let guide = Series::new(format!("slope {slope}"), line).with_colour(Colour::Grey);
+        guide.with_style(style)
+    };
+    let next = Series::of("to the next finer run", rows, |row| [row.size, row.to_next]);
+    let finest = Series::of("to the finest run", rows, |row| [row.size, row.to_finest]);
+    let (size, distance) = (
+        Axis::log(first.refined),
+        Axis::log("L² distance at the end"),
+    );
+    LineChart::new("", size, distance).with_curves([
+        next.with_marker(Marker::Circle),
+        finest.with_colour(1).with_marker(Marker::Square),
+        guide(1, LineStyle::Dashed),
+        guide(2, LineStyle::Dotted),
+    ])
 }

@@ -81,13 +81,12 @@ pub fn program(options: &Options) -> Result<(), Error> {
     }
     let ratios = Ratios::of_run(2, WIDTH, 1.0 / n as f64, scales.eps, scales.mcf_step);
     ratios.validate()?;
-    let device = run.open_device()?;
     let (scheme, needed) = (options.common.scheme, NeededNetwork::exactly(ratios));
     let networks = options.common.figure.networks.load(&[needed])?;
-    let operator = Operator::learned(scheme, networks.find(scheme, &needed)?)?;
+    let operator = networks.learned(scheme, &needed)?;
     let shapes = shapes(run.quick)?;
     let parameters = inpainting::parameters((n, &scales), &operator, &shapes);
-    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut session = Session::open(PROGRAM, run, parameters)?;
     let mut trajectories = Vec::new();
     for shape in &shapes {
         let case = shape.case(grid, scales, &operator)?;
@@ -124,20 +123,18 @@ fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure, Error> {
     let end = one.still_from().map_or(String::new(), |still| {
         format!(" The shape stands still after {still:.3} steps.")
     });
-    let shown = shown.into_iter();
-    let panels = shown.map(|(name, field)| panel(name, &field, one.shape.region));
+    let [low, high] = one.shape.region;
+    let frame = vec![[low, low], [high, low], [high, high], [low, high]];
+    let frame = Curve::new(vec![frame]).with_colour(Colour::Custom(GREEN));
+    let panels = shown.into_iter().map(|(name, field)| {
+        Shapes::new(name)
+            .with_curve(look::outline(&field).filled(Colour::LightGrey))
+            .with_curve(frame.clone().with_width(1.6))
+            .with_window([-0.5, 0.5], [-0.5, 0.5])
+    });
     Ok(Figure::new("", 4).with_panels(panels).with_note(format!(
         "n = {n}, τ = 2^{}; only the values inside the green frame move. The first step is made in {} parts.{end}",
         tau.log2(),
         trajectory.substeps(1).len(),
     )))
-}
-
-fn panel(name: String, field: &Field<2>, [low, high]: [f64; 2]) -> Shapes {
-    let frame = vec![[low, low], [high, low], [high, high], [low, high]];
-    let frame = Curve::new(vec![frame]).with_colour(Colour::Custom(GREEN));
-    Shapes::new(name)
-        .with_curve(look::outline(field).filled(Colour::LightGrey))
-        .with_curve(frame.with_width(1.6))
-        .with_window([-0.5, 0.5], [-0.5, 0.5])
 }

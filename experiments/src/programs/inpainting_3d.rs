@@ -2,7 +2,7 @@
 
 use crate::inpainting::{self, Inpainted, InpaintingOptions, Shape};
 use crate::prelude::*;
-use crate::surfaces::{Flowed, Setting, Snapshot, Surface, View, write_snapshots};
+use crate::surfaces::{Flowed, Setting, Snapshot, Surface, VIEW, View, write_snapshots};
 use render::{Rgb, Tube};
 
 const PROGRAM: &str = "inpainting_3d";
@@ -92,7 +92,6 @@ pub fn program(options: &Options) -> Result<(), Error> {
             "--extra-steps {extra_steps} is too many: each step is twice as long as the one before; give at most {MOST_EXTRA}"
         ),
     )?;
-    let device = run.open_device()?;
     let setting = Setting::new(&options.common.figure, CELLS, 1.0)?;
     let Setting {
         n, grid, scales, ..
@@ -100,18 +99,14 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let operator = setting.operator((Method::Hybrid, options.common.scheme))?;
     let (shapes, azimuths): (Vec<_>, Vec<_>) = shapes(extra_steps)?.into_iter().unzip();
     let parameters = inpainting::parameters((n, &scales), &operator, &shapes);
-    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut session = Session::open(PROGRAM, run, parameters)?;
     let mut flowed = Vec::new();
     for (shape, azimuth) in shapes.iter().zip(azimuths) {
         let surface = Surface {
             key: shape.key,
             title: shape.title.to_owned(),
             shown: shape.shown.iter().map(|&step| (step, None)).collect(),
-            view: View {
-                up: UpAxis::Z,
-                azimuth,
-                elevation: 25.0,
-            },
+            view: View { azimuth, ..VIEW },
         };
         let case = shape.case(grid, scales, &operator)?;
         flowed.push(surface.flow(case, &mut session)?);
@@ -141,7 +136,10 @@ fn decorate(snapshots: &mut [Snapshot], measured: &Inpainted<'_, 3>) {
         let distance = distance.filter(|_| measured.shape.whole.is_some());
         let distance = distance.map(|(_, l2)| format!("\nL² distance to the ball {l2:.4}"));
         let [time, distance] = [time, distance].map(Option::unwrap_or_default);
-        snapshot.caption = format!("step {step}{time}: w = {:.2}{distance}", snapshot.w());
+        snapshot.caption = format!(
+            "step {step}{time}: w = {:.2}{distance}",
+            snapshot.measures["w"]
+        );
         let edges = Tube::edges_of_box([low; 3], [high; 3], EDGE).into_iter();
         snapshot.tubes = edges.map(|edge| edge.with_colour(GREEN)).collect();
     }

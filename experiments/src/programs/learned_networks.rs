@@ -26,30 +26,26 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.run;
     let mut specs = NetworkSpec::convergence();
     specs.truncate(if run.quick { 1 } else { specs.len() });
-    let device = run.open_device()?;
     let needs: Vec<_> = (specs.iter().map(|spec| NeededNetwork::exactly(spec.ratios))).collect();
     let chosen = options.networks.load(&needs)?;
-    let find = |need| Ok(chosen.find(Scheme::Paper, need)?.network);
-    let networks: Vec<Network> = needs.iter().map(find).collect::<Result<_, Error>>()?;
-    let fingerprints = networks.iter().map(Network::fingerprint);
-    let names = specs.iter().map(|spec| spec.name);
-    let checksums: BTreeMap<_, _> = names.zip(fingerprints).collect();
-    let held_out_radii = held_out_radii(run.quick);
-    let parameters = json!({"networks": checksums, "held_out_radii": held_out_radii});
-    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut networks: Vec<(NetworkSpec, Network)> = Vec::new();
+    for (&spec, need) in specs.iter().zip(&needs) {
+        networks.push((spec, chosen.find(Scheme::Paper, need)?.network));
+    }
+    let checksums = (networks.iter()).map(|(spec, network)| (spec.name, network.fingerprint()));
+    let checksums: BTreeMap<_, _> = checksums.collect();
+    let parameters = json!({"networks": checksums, "held_out_radii": held_out_radii(run.quick)});
+    let mut session = Session::open(PROGRAM, run, parameters)?;
     let mut shown = Vec::new();
-    for (spec, network) in specs.iter().zip(&networks) {
-        let data = spec.data(false)?;
-        let quality = session.phase(format!("quality of {}", spec.name), |stage| {
-            Ok(Quality::measure(
-                network,
-                &data,
-                held_out_radii,
-                stage.device,
-            )?)
-        })?;
-        session.summary.insert_record(spec.name, &quality)?;
-        shown.push(Shown::new(spec, network, &heat_kernel(&data), quality));
+    for (spec, network) in networks {
+        let title = format!("quality of {}", spec.name);
+        let quality = quality::measure(&mut session, title, &spec, &network)?;
+        shown.push(Shown {
+            entries: entries(spec, &network)?,
+            spec,
+            network,
+            quality,
+        });
     }
 
     let width = if shown.len() == 1 { 480.0 } else { 960.0 };
@@ -60,32 +56,35 @@ pub fn program(options: &Options) -> Result<(), Error> {
     ] {
         session.figure(figure.with_width(width), name)?;
     }
-    let all = || shown.iter();
-    let output = &session.output;
-    output.write_csv("kernels.csv", all().flat_map(|one| &one.kernel))?;
-    output.write_csv("activations.csv", all().flat_map(|one| &one.activation))?;
-    output.write_csv("transfer.csv", all().flat_map(|one| &one.transfer))?;
-    let origins: BTreeMap<_, _> = all()
+    let kernels = shown.iter().flat_map(|one| &one.entries);
+    session.output.write_csv("kernels.csv", kernels)?;
+    let activations = shown.iter().flat_map(Shown::activation);
+    session.output.write_csv("activations.csv", activations)?;
+    let directions = shown
+        .iter()
+        .flat_map(|one| ["axis", "diagonal"].map(|name| (one, name)));
+    let transfers = directions.flat_map(|(one, direction)| one.transfer(direction));
+    session.output.write_csv("transfer.csv", transfers)?;
+    let origins: BTreeMap<_, _> = (shown.iter())
         .map(|one| (one.spec.name, (&one.quality, one.network.provenance())))
         .collect();
-    output.write_json("networks.json", &origins)?;
+    session.output.write_json("networks.json", &origins)?;
     let table = Sheet::of(&shown).text("network", |one| one.spec.name);
     session.sheet(quality::columns(table, |one| &one.quality), "quality")?;
     session.finish("Quality of the learned operators")
 }
 
-struct Shown<'a> {
-    spec: &'a NetworkSpec,
-    network: &'a Network,
+struct Shown {
+    spec: NetworkSpec,
+    network: Network,
     quality: Quality,
-    kernel: Vec<KernelRow<'a>>,
-    activation: Vec<ActivationRow<'a>>,
-    transfer: Vec<TransferRow<'a>>,
+    entries: Vec<Entry>,
 }
 
+/// An entry of a kernel.
 #[derive(Serialize)]
-struct KernelRow<'a> {
-    network: &'a str,
+struct Entry {
+    network: &'static str,
     offset_x: isize,
     offset_y: isize,
     distance_over_eps: f64,
@@ -96,57 +95,12 @@ struct KernelRow<'a> {
     density: f64,
 }
 
-#[derive(Serialize)]
-struct ActivationRow<'a> {
-    network: &'a str,
-    w: f64,
-    activation: f64,
-    splitting: f64,
-}
-
-#[derive(Serialize)]
-struct TransferRow<'a> {
-    network: &'a str,
-    direction: &'static str,
-    eps_k: f64,
-    transfer: f64,
-    heat: f64,
-}
-
-impl<'a> Shown<'a> {
-    fn new(spec: &'a NetworkSpec, network: &'a Network, heat: &[f64], quality: Quality) -> Self {
-        let kernel = kernel_rows(spec, network, heat);
-        let activation = (0..=400).map(|i| -1.0 + f64::from(i) / 200.0);
-        let activation = activation.map(|w| ActivationRow {
-            network: spec.name,
-            w,
-            activation: network.activation().value(w),
-            splitting: splitting_activation(spec.ratios.step_over_eps2(), w),
-        });
-        let mut transfer = transfer_rows(spec, &kernel, false);
-        transfer.extend(transfer_rows(spec, &kernel, true));
-        Self {
-            activation: activation.collect(),
-            kernel,
-            network,
-            quality,
-            spec,
-            transfer,
-        }
-    }
-
-    fn title(&self) -> String {
-        let width = self.spec.ratios.width;
-        format!("n = {}, {width} × {width} kernel", self.spec.cells)
-    }
-}
-
-fn kernel_rows<'a>(spec: &'a NetworkSpec, network: &Network, heat: &[f64]) -> Vec<KernelRow<'a>> {
+fn entries(spec: NetworkSpec, network: &Network) -> Result<Vec<Entry>, Error> {
     let (width, eps_over_h) = (spec.ratios.width, spec.ratios.eps_over_h);
-    let middle = (width / 2).cast_signed();
-    let row = |(i, (&kernel, &heat_kernel)): (usize, (&f64, &f64))| {
+    let (middle, heat) = ((width / 2).cast_signed(), heat_kernel(&spec.data(false)?));
+    let entry = |(i, (&kernel, &heat_kernel)): (usize, (&f64, &f64))| {
         let [offset_x, offset_y] = [i / width, i % width].map(|k| k.cast_signed() - middle);
-        KernelRow {
+        Entry {
             network: spec.name,
             offset_x,
             offset_y,
@@ -156,34 +110,63 @@ fn kernel_rows<'a>(spec: &'a NetworkSpec, network: &Network, heat: &[f64]) -> Ve
             density: kernel * eps_over_h.powi(2),
         }
     };
-    let entries = network.kernel().iter().zip(heat).enumerate();
-    entries.map(row).collect()
+    let entries = network.kernel().iter().zip(&heat).enumerate();
+    Ok(entries.map(entry).collect())
 }
 
-/// Transfer functions along an axis or a diagonal, that of the heat kernel being `exp(-tautilde k^2)`.
-fn transfer_rows<'a>(
-    spec: &'a NetworkSpec,
-    kernel: &[KernelRow<'_>],
-    diagonal: bool,
-) -> Vec<TransferRow<'a>> {
-    let n = spec.cells;
-    let row = |j: usize| {
-        let wave = TAU * j as f64 / n as f64;
-        // The imaginary part vanishes: learned kernels are symmetric.
-        let transfer = kernel.iter().map(|row| {
-            let steps = row.offset_x + if diagonal { row.offset_y } else { 0 };
-            row.kernel * (wave * steps as f64).cos()
-        });
-        let length = wave * if diagonal { SQRT_2 } else { 1.0 };
-        TransferRow {
-            network: spec.name,
-            direction: if diagonal { "diagonal" } else { "axis" },
-            eps_k: length * spec.ratios.eps_over_h,
-            transfer: transfer.sum(),
-            heat: (-spec.ratios.step_over_h2 * length * length).exp(),
-        }
-    };
-    (0..=n / 2).map(row).collect()
+#[derive(Serialize)]
+struct ActivationRow {
+    network: &'static str,
+    w: f64,
+    activation: f64,
+    splitting: f64,
+}
+
+/// The transfer function of a kernel along an axis or a diagonal, and `exp(-tautilde k^2)` of the heat kernel.
+#[derive(Serialize)]
+struct TransferRow {
+    network: &'static str,
+    direction: &'static str,
+    eps_k: f64,
+    transfer: f64,
+    heat: f64,
+}
+
+impl Shown {
+    fn title(&self) -> String {
+        let width = self.spec.ratios.width;
+        format!("n = {}, {width} × {width} kernel", self.spec.cells)
+    }
+
+    fn activation(&self) -> impl Iterator<Item = ActivationRow> {
+        let values = (0..=400).map(|i| -1.0 + f64::from(i) / 200.0);
+        values.map(|w| ActivationRow {
+            network: self.spec.name,
+            w,
+            activation: self.network.activation().value(w),
+            splitting: splitting_activation(self.spec.ratios.step_over_eps2(), w),
+        })
+    }
+
+    fn transfer(&self, direction: &'static str) -> impl Iterator<Item = TransferRow> {
+        let (n, diagonal) = (self.spec.cells, direction == "diagonal");
+        (0..=n / 2).map(move |j| {
+            let wave = TAU * j as f64 / n as f64;
+            // The imaginary part vanishes: learned kernels are symmetric.
+            let transfer = self.entries.iter().map(|entry| {
+                let steps = entry.offset_x + if diagonal { entry.offset_y } else { 0 };
+                entry.kernel * (wave * steps as f64).cos()
+            });
+            let length = wave * if diagonal { SQRT_2 } else { 1.0 };
+            TransferRow {
+                network: self.spec.name,
+                direction,
+                eps_k: length * self.spec.ratios.eps_over_h,
+                transfer: transfer.sum(),
+                heat: (-self.spec.ratios.step_over_h2 * length * length).exp(),
+            }
+        })
+    }
 }
 
 fn thin(curve: Series, style: LineStyle) -> Series {
@@ -192,11 +175,11 @@ fn thin(curve: Series, style: LineStyle) -> Series {
 }
 
 /// Kernels as colours above the activations, as in the paper.
-fn operators_figure(shown: &[Shown<'_>]) -> Figure {
-    let densities = |one: &Shown<'_>| one.kernel.iter().map(|row| row.density).collect();
+fn operators_figure(shown: &[Shown]) -> Figure {
+    let densities = |one: &Shown| one.entries.iter().map(|entry| entry.density).collect();
     let all: Vec<Vec<f64>> = shown.iter().map(densities).collect();
     let highest = all.iter().flatten().copied().fold(0.0, f64::max);
-    let kernel = |(one, values): (&Shown<'_>, Vec<f64>)| {
+    let kernel = |(one, values): (&Shown, Vec<f64>)| {
         let width = one.spec.ratios.width;
         let reach = 0.5 * width as f64 / one.spec.ratios.eps_over_h;
         let axis = |label| Axis::linear(label).with_range(-reach, reach);
@@ -204,10 +187,11 @@ fn operators_figure(shown: &[Shown<'_>]) -> Figure {
             .with_axes(axis("x / ε"), axis("y / ε"))
             .with_bar(Axis::linear("K ε²/h²").with_range(0.0, highest))
     };
-    let activation = |one: &Shown<'_>| {
-        let rows = &one.activation;
-        let learned = Series::of("learned F", rows, |row| [row.w, row.activation]);
-        let splitting = Series::of("splitting scheme", rows, |row| [row.w, row.splitting]);
+    let activation = |one: &Shown| {
+        let learned = Series::of("learned F", one.activation(), |at| [at.w, at.activation]);
+        let splitting = Series::of("splitting scheme", one.activation(), |at| {
+            [at.w, at.splitting]
+        });
         LineChart::new("", Axis::linear("w"), Axis::linear("F(w)"))
             .with_series(learned.with_width(3.6))
             .with_series(thin(splitting, LineStyle::Dashed))
@@ -223,22 +207,21 @@ fn operators_figure(shown: &[Shown<'_>]) -> Figure {
 }
 
 /// The kernels' transfer functions beside that of the heat kernel.
-fn transfer_figure(shown: &[Shown<'_>]) -> Figure {
-    let curve = |one: &Shown<'_>, name, direction, value: fn(&TransferRow<'_>) -> f64| {
-        let in_sight = |row: &&TransferRow<'_>| row.direction == direction && row.eps_k <= 9.0;
-        let rows = one.transfer.iter().filter(in_sight);
-        Series::of(name, rows, |row| [row.eps_k, value(row)])
+fn transfer_figure(shown: &[Shown]) -> Figure {
+    let curve = |one: &Shown, name, direction, value: fn(&TransferRow) -> f64| {
+        let in_sight = one.transfer(direction).filter(|at| at.eps_k <= 9.0);
+        Series::of(name, in_sight, |at| [at.eps_k, value(&at)])
     };
-    let directions = |one: &Shown<'_>, value| {
+    let directions = |one: &Shown, value| {
         let diagonal = curve(one, "along a diagonal", "diagonal", value);
         let diagonal = diagonal.with_colour(1).with_style(LineStyle::Dashed);
         [curve(one, "along an axis", "axis", value), diagonal]
     };
     let axis = || Axis::linear("ε |k|").with_range(0.0, 9.0);
-    let transfer = |one: &Shown<'_>| {
-        let [along_axis, along_diagonal] = directions(one, |row| row.transfer);
-        let heat = curve(one, "heat kernel exp(−τ̃ k²)", "diagonal", |row| {
-            row.heat
+    let transfer = |one: &Shown| {
+        let [along_axis, along_diagonal] = directions(one, |at| at.transfer);
+        let heat = curve(one, "heat kernel exp(−τ̃ k²)", "diagonal", |at| {
+            at.heat
         });
         let value = Axis::linear("transfer function").with_range(-0.05, 1.05);
         LineChart::new(one.title(), axis(), value)
@@ -246,9 +229,9 @@ fn transfer_figure(shown: &[Shown<'_>]) -> Figure {
             .with_series(along_diagonal)
             .with_series(thin(heat, LineStyle::Dotted))
     };
-    let difference = |one: &Shown<'_>| {
+    let difference = |one: &Shown| {
         LineChart::new("", axis(), Axis::linear("difference to the heat kernel"))
-            .with_curves(directions(one, |row| row.transfer - row.heat))
+            .with_curves(directions(one, |at| at.transfer - at.heat))
     };
     Figure::new("Transfer functions of the learned kernels", shown.len())
         .with_panels(shown.iter().map(transfer))
@@ -257,11 +240,12 @@ fn transfer_figure(shown: &[Shown<'_>]) -> Figure {
 }
 
 /// Kernel values over the distance from the centre: one curve, if the kernel is radially symmetric.
-fn radial_figure(shown: &[Shown<'_>]) -> Figure {
-    let panel = |one: &Shown<'_>| {
-        let near = one.kernel.iter().filter(|row| row.distance_over_eps <= 4.0);
-        let point = |row: &KernelRow<'_>| [row.distance_over_eps, row.density];
-        let entries = Series::of("kernel entries", near, point);
+fn radial_figure(shown: &[Shown]) -> Figure {
+    let panel = |one: &Shown| {
+        let near = one.entries.iter().filter(|at| at.distance_over_eps <= 4.0);
+        let entries = Series::of("kernel entries", near, |at| {
+            [at.distance_over_eps, at.density]
+        });
         let variance = 4.0 * one.spec.ratios.step_over_eps2();
         let heat = Series::of("heat kernel", 0..=200, |i| {
             let x = f64::from(i) / 50.0;

@@ -1,11 +1,9 @@
 //! What a time step costs, and where the time goes.
 
-use std::time::Duration;
-
 use crate::networks::convergence_network;
 use crate::prelude::*;
-use crate::storages::{self, StorageOptions, Stored};
-use crate::timing::{self, Numbers, Timed};
+use crate::storages::{self, StorageOptions};
+use crate::timing;
 use crate::{products, surfaces};
 use geometry::shapes::Capsule;
 use operators::memory;
@@ -96,19 +94,15 @@ pub fn program(options: &Options) -> Result<(), Error> {
         ),
     )?;
     let planes: &[usize] = if quick { &[128] } else { &[128, 256, 512] };
-    let solids = if quick {
-        [("cube", 24, 2), ("blob", 32, 2)]
-    } else {
-        [("cube", 64, 20), ("blob", 128, 8)]
-    };
+    let solids = run.either(
+        [("cube", 24, 2), ("blob", 32, 2)],
+        [("cube", 64, 20), ("blob", 128, 8)],
+    );
     let networks = timing::networks(&options.networks, planes)?;
-    let learned = |needed| -> Result<Operator, Error> {
-        let network = networks.find(Scheme::Paper, &needed)?;
-        Ok(Operator::learned(Scheme::Paper, network)?)
-    };
+    let learned = |needed| networks.learned(Scheme::Paper, &needed);
     let turns = if quick { 0.05 } else { options.turns };
     let parameters = json!({ "turns": turns, "threads": rayon::current_num_threads() });
-    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut session = Session::on(device, PROGRAM, run, parameters)?;
     let mut all = Vec::new();
     for &n in planes {
         let operator = learned(convergence_network(n)?)?;
@@ -123,7 +117,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
         let operator = learned(surfaces::needed_network())?;
         let time = (StepRule::Constant(0.5_f64.powi(18)), steps);
         let initial = solid_shape(name, n)?;
-        let case = surfaces::willmore_flow(name, initial, operator, surfaces::scales(n), time);
+        let case = willmore_flow(name, initial, operator, surfaces::scales(n), time);
         all.push(Measurement::of(name, &case, &mut session, turns, false)?);
     }
     let steps = Sheet::of(&all)
@@ -139,28 +133,8 @@ pub fn program(options: &Options) -> Result<(), Error> {
     session.sheet(products, "products")?;
     session.output.write_json("performance.json", &all)?;
     session.figure(figure(&all), "performance")?;
-    write_storages(&stored, &mut session)?;
+    storages::write(&stored, &mut session)?;
     session.finish("Willmore steps by the hybrid scheme on this machine")
-}
-
-/// The table, metrics and figure of the two storages.
-fn write_storages(stored: &[Stored], session: &mut Session<'_>) -> Result<(), Error> {
-    let sheet = Sheet::of(stored)
-        .keyed(|row, name| format!("{row}.{name}"))
-        .text("shape", |row| row.shape)
-        .text("n", |row| row.n.to_string())
-        .text("storage", |row| row.storage.to_string())
-        .numbers(&storages::COLUMNS, |row| &row.numbers);
-    session.sheet(sheet, "storages")?;
-    for (n, ratio) in storages::product_ratios(stored) {
-        session.metric(&format!("hvp.armadillo.n{n}.bricks_over_dense"), ratio)?;
-    }
-    for name in ["seconds", "peak_mib", "active_cells"] {
-        if let Some(exponent) = storages::exponent(stored, name) {
-            session.metric(&format!("exponent.bricks.{name}"), exponent)?;
-        }
-    }
-    session.figure(storages::figure(stored), "storages")
 }
 
 /// A cube of side 1/2, or a body with arms: a ball with three capsules through it.
@@ -177,7 +151,7 @@ fn solid_shape(name: &str, n: usize) -> Result<Field<3>, Error> {
     Ok(phase_field(grid, &blob, eps)?)
 }
 
-/// Distance of the end of some steps to that with a smaller tolerance.
+/// Distance of the end of some steps to that with a smaller tolerance, over the way from the start.
 fn distance_to_tighter<const D: usize>(
     case: &Case<D>,
     device: &ComputeDevice,
@@ -208,15 +182,17 @@ impl Measurement {
         let n = grid.spacing().recip().round();
         let name = format!("{case_name}, n = {n}");
         memory::forget_peak();
-        let mut timed = Timed::new(case.clone(), &session.device)?;
+        let mut run = Run::new(case.clone(), &session.device)?;
         let mut warm = None;
         session.phase(format!("{name}: steps"), |stage| {
-            while timed.step(&stage.bar)? {
+            while run.step()?.is_some() {
+                stage.bar.inc(1);
                 warm = warm.or_else(memory::pages);
             }
             Ok(())
         })?;
-        let later = timed.minimizations().skip(1).map(|r| r.newton.hvp as f64);
+        let later = minimizations(run.records()).skip(1);
+        let later = later.map(|made| made.newton.hvp as f64);
         let later = later.sum::<f64>().max(1.0);
         let pages = memory::pages().zip(warm);
         let pages = pages.map(|(now, warm)| (now - warm) as f64 / later);
@@ -224,11 +200,10 @@ impl Measurement {
         let (products, distance) = session.phase(format!("{name}: products"), |stage| {
             let distance = compared.then(|| distance_to_tighter(case, stage.device));
             let network = &case.operator.network().expect("a learned operator").network;
-            let candidates = products::candidates(network, timed.run.field(), stage.device)?;
-            let products = products::measure(candidates, Duration::from_secs_f64(turns))?;
+            let products = products::measure(network, run.field(), stage.device, turns)?;
             Ok((products, distance.transpose()?))
         })?;
-        let mut steps = timed.numbers();
+        let mut steps = timing::numbers(&run);
         let floor = products["floor_single_ms"];
         let over_floor = steps["ms_per_product"] / floor;
         let others = [
@@ -243,7 +218,7 @@ impl Measurement {
             case: case_name,
             n: n as usize,
             cells: vec![grid.cells(); D],
-            parts: parts(&timed, floor),
+            parts: parts(&run, floor),
             steps,
             products,
         })
@@ -260,8 +235,8 @@ impl Measurement {
 }
 
 /// Parts of the time of a step, where two pairs of transforms, timed alone, take so many milliseconds.
-fn parts<const D: usize>(timed: &Timed<D>, floor_ms: f64) -> [(&'static str, f64); 7] {
-    let mean = |of: fn(&StepRecord) -> f64| timed.mean(of);
+fn parts<const D: usize>(run: &Run<D>, floor_ms: f64) -> [(&'static str, f64); 7] {
+    let mean = |of: fn(&StepRecord) -> f64| timing::mean(run, of);
     let products = mean(|r| r.times.products);
     let convolutions = (1e-3 * floor_ms * mean(|r| r.newton.hvp as f64)).min(products);
     let mut parts = [

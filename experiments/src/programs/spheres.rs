@@ -2,10 +2,9 @@
 
 use crate::prelude::*;
 use crate::quality;
-use crate::surfaces::{self, Setting};
-use crate::training::{NetworkSpec, held_out_radii};
+use crate::surfaces::Setting;
+use crate::training::NetworkSpec;
 use geometry::exact::{WILLMORE_ENERGY_SPHERE, mean_curvature_radius};
-use model::Quality;
 
 const PROGRAM: &str = "spheres";
 const TITLE: &str = "Spheres by the network for surfaces";
@@ -18,7 +17,6 @@ const LAST: usize = MCF_STEPS.len() - 1;
 /// Steps of Willmore flow, which should leave spheres alone.
 const WILLMORE_STEPS: usize = 20;
 const TAU: f64 = 1.0 / 262_144.0;
-const PAPERS: (Method, Scheme) = (Method::Hybrid, Scheme::Paper);
 
 /// The network for surfaces on spheres, n = 64, eps = 2^-5, tautilde = 2^-12: L2 errors of mean curvature flow against
 /// R^2 = r^2 - 4t beside finite elements, Willmore energies w against 8 pi, and the change of the radius in 20 steps of Willmore
@@ -73,34 +71,24 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.figure.run;
     let radii = if run.quick { &RADII[2..4] } else { &RADII };
     let willmore_steps = if run.quick { 2 } else { WILLMORE_STEPS };
-    let device = run.open_device()?;
     let setting = Setting::new(&options.figure, CELLS, 1.0)?;
     let others = json!({ "tau": TAU, "willmore_steps": willmore_steps });
     let parameters = setting.parameters(others)?;
-    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut session = Session::open(PROGRAM, run, parameters)?;
     let mut all = Vec::new();
     for &radius in radii {
-        let measured = session.phase(format!("radius {radius}"), |stage| {
-            let sphere = Sphere {
-                setting: &setting,
-                stage,
-                radius,
-            };
-            sphere.measure(willmore_steps)
-        })?;
-        all.push(measured);
+        all.push(session.phase(format!("radius {radius}"), |stage| {
+            measure(&setting, stage, radius, willmore_steps)
+        })?);
     }
     session.sheet(sheet(&all), "spheres")?;
     if !run.quick {
         let (spec, papers) = (NetworkSpec::surfaces(), setting.operator(PAPERS)?);
         let network = &papers.network().expect("it is learned").network;
-        let measured = session.phase("quality of the network", |stage| {
-            let (data, count) = (spec.data(false)?, held_out_radii(false));
-            Ok(Quality::measure(network, &data, count, stage.device)?)
-        })?;
-        let names = Sheet::of(std::slice::from_ref(&measured)).text("network", |_| spec.name);
+        let title = "quality of the network".to_owned();
+        let measured = [quality::measure(&mut session, title, &spec, network)?];
+        let names = Sheet::of(&measured).text("network", |_| spec.name);
         session.sheet(quality::columns(names, |measured| measured), "quality")?;
-        session.summary.insert_record(spec.name, &measured)?;
     }
     session.output.write_json("spheres.json", &all)?;
     let note = format!(
@@ -112,72 +100,55 @@ pub fn program(options: &Options) -> Result<(), Error> {
     session.finish(TITLE)
 }
 
-struct Sphere<'a> {
-    setting: &'a Setting,
-    stage: &'a Stage<'a>,
+fn measure(
+    setting: &Setting,
+    stage: &Stage<'_>,
     radius: f64,
-}
-
-impl Sphere<'_> {
-    fn measure(&self, willmore_steps: usize) -> Result<Measurement, Error> {
-        let time = (self.setting.scales.mcf_step, MCF_STEPS[LAST]);
-        let still = self.case(Flow::Willmore, PAPERS, (TAU, 0))?;
-        let mcf = variants().map(|variant| {
-            let run = self
-                .stage
-                .run(self.case(Flow::MeanCurvature, variant, time)?)?;
-            Ok(MCF_STEPS.map(|step| run.records()[step - 1].measures["l2"]))
-        });
-        let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
-        let willmore = schemes.map(|&scheme| self.stand_still(scheme, willmore_steps));
-        Ok(Measurement {
-            radius: self.radius,
-            mcf: mcf.collect::<Result<_, Error>>()?,
-            w_elements: still.implicit_elements()?.willmore_energy(&still.initial)?,
-            willmore: willmore.collect::<Result<_, _>>()?,
-        })
-    }
-
-    fn case(
-        &self,
-        flow: Flow,
-        variant: (Method, Scheme),
-        (tau, steps): (f64, usize),
-    ) -> Result<Case<3>, Error> {
-        let (grid, scales, radius) = (self.setting.grid, self.setting.scales, self.radius);
-        let ball = move |grid, r| phase_field(grid, &Ball::new([0.5; 3], r)?, scales.eps);
+    willmore_steps: usize,
+) -> Result<Measurement, Error> {
+    let (grid, scales) = (setting.grid, setting.scales);
+    let ball = move |grid, radius| phase_field(grid, &Ball::new([0.5; 3], radius)?, scales.eps);
+    let shape = format!("sphere of radius {radius}");
+    let case = |variant, tau, steps| -> Result<Case<3>, Error> {
+        let (initial, operator) = (ball(grid, radius)?, setting.operator(variant)?);
+        let time = (StepRule::Constant(tau), steps);
+        Ok(willmore_flow(&shape, initial, operator, scales, time))
+    };
+    let mut mcf = Vec::new();
+    for variant in variants() {
         let exact = move |grid, t| ball(grid, mean_curvature_radius(radius, t, 3));
-        let (initial, operator) = (ball(grid, radius)?, self.setting.operator(variant)?);
-        let (shape, rule) = (
-            format!("sphere of radius {radius}"),
-            StepRule::Constant(tau),
-        );
-        let mut case = surfaces::willmore_flow(&shape, initial, operator, scales, (rule, steps));
-        if flow == Flow::MeanCurvature {
-            case.measures = vec![Measure::distance_to(exact)];
-        }
-        Ok(Case { flow, ..case })
+        let run = stage.run(Case {
+            flow: Flow::MeanCurvature,
+            measures: vec![Measure::distance_to(exact)],
+            ..case(variant, scales.mcf_step, MCF_STEPS[LAST])?
+        })?;
+        mcf.push(MCF_STEPS.map(|step| run.records()[step - 1].measures["l2"]));
     }
-
-    fn stand_still(&self, scheme: Scheme, steps: usize) -> Result<Still, Error> {
-        let case = self.case(Flow::Willmore, (Method::Hybrid, scheme), (TAU, steps))?;
-        let run = self.stage.run(case)?;
-        let records = run.records();
+    let mut willmore = Vec::new();
+    for &scheme in Method::Hybrid.schemes(Flow::Willmore) {
+        let run = stage.run(case((Method::Hybrid, scheme), TAU, willmore_steps)?)?;
+        let (records, last) = (run.records(), run.records().last());
         let first = records.first().and_then(|record| record.minimization);
-        let last = records.last();
         // Of the ball with that volume.
-        let radius = |volume: f64| (0.75 * volume / std::f64::consts::PI).cbrt();
+        let radius = |volume: f64| (0.75 * volume / PI).cbrt();
         let end = last.map_or(f64::NAN, |record| record.measures["volume"]);
         let change = radius(end) - radius(run.start()["volume"]);
-        Ok(Still {
+        willmore.push(Still {
             scheme,
             w_learned: first.map_or(f64::NAN, |made| made.energy_at_rest()),
             w_relaxed: last.and_then(Record::willmore_energy).unwrap_or(f64::NAN),
-            radius_change_over_h: change * self.setting.n as f64,
+            radius_change_over_h: change * setting.n as f64,
             energy_increases: energy_increases(records),
             hvp_per_step: mean_hvp(records),
-        })
+        });
     }
+    let still = case(PAPERS, TAU, 0)?;
+    Ok(Measurement {
+        radius,
+        mcf,
+        w_elements: still.implicit_elements()?.willmore_energy(&still.initial)?,
+        willmore,
+    })
 }
 
 /// The errors of mean curvature flow and the energies, a row for each radius.
@@ -193,11 +164,8 @@ fn sheet(all: &[Measurement]) -> Sheet<'_, Measurement> {
         }
     }
     let relative = |m: &Measurement| m.w_elements / WILLMORE_ENERGY_SPHERE;
-    sheet = (sheet.measure("w", ("w, FE measure", Fixed(2)), |m| m.w_elements)).column(
-        "w / 8π (FE)",
-        Fixed(4),
-        relative,
-    );
+    sheet = sheet.measure("w", ("w, FE measure", Fixed(2)), |m| m.w_elements);
+    sheet = sheet.column("w / 8π (FE)", Fixed(4), relative);
     for (k, &scheme) in Method::Hybrid.schemes(Flow::Willmore).iter().enumerate() {
         let prefix = match scheme {
             Scheme::Paper => String::new(),
@@ -232,9 +200,8 @@ fn curve(
 
 fn errors(all: &[Measurement]) -> LineChart {
     let title = format!("Mean curvature flow, {} steps", MCF_STEPS[LAST]);
-    let curves = variants()
-        .enumerate()
-        .map(|(k, variant)| curve(variant, all, |m| m.mcf[k][LAST]));
+    let curves = variants().enumerate();
+    let curves = curves.map(|(k, variant)| curve(variant, all, |m| m.mcf[k][LAST]));
     LineChart::new(title, Axis::linear("radius"), Axis::log("L² error")).with_curves(curves)
 }
 

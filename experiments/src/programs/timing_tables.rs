@@ -4,7 +4,7 @@ use crate::meshes::{ARMADILLO, MeshOptions};
 use crate::networks::{Chosen, convergence_network};
 use crate::prelude::*;
 use crate::surfaces;
-use crate::timing::{self, Numbers, Timed, take_turns};
+use crate::timing::{self, take_turns};
 use engine::Method::{FeImplicit, FeSemi, Hybrid};
 use fem::LinearSolver::{self, ConjugateGradients, Direct};
 use solver::Method::{self as Newton, Paper, Preconditioned};
@@ -92,13 +92,17 @@ const VARIANTS: [Variant; 5] = [
     },
 ];
 
+/// Methods for one step of a surface, and the seconds that the paper reports.
+const SURFACE_STEPS: [(Method, f64); 2] = [(Hybrid, 807.0), (FeImplicit, 14589.0)];
+
 /// A row at work, and what was measured.
 struct Timing {
     row: &'static Variant,
     n: usize,
-    timed: Timed<2>,
+    run: Run<2>,
     /// Why the row ended early, if it failed.
     failure: Option<String>,
+    numbers: Numbers,
 }
 
 const COLUMNS: [(&str, Format, &str); 4] = [
@@ -117,7 +121,6 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let cells = if quick { &[128][..] } else { &options.cells };
     let budget = if quick { 0.1 } else { options.budget };
     let networks = timing::networks(&options.networks, cells)?;
-    let device = run.open_device()?;
     let checksum = |&n| {
         let found = networks.find(Scheme::Paper, &convergence_network(n)?)?;
         Ok((format!("n{n}"), found.network.fingerprint().into()))
@@ -129,25 +132,40 @@ pub fn program(options: &Options) -> Result<(), Error> {
         "budget": budget,
         "steps": STEPS,
     });
-    let mut session = Session::open(PROGRAM, run, device, parameters)?;
+    let mut session = Session::open(PROGRAM, run, parameters)?;
     let mut timings = Vec::new();
     for &n in cells {
         timings.extend(measure(&mut session, &networks, n, budget)?);
     }
+    // One step of tau = 2^-18 of the armadillo by the hybrid scheme and nested finite elements, eps = 2h, tautilde = h^2.
     let n = if quick { 32 } else { 64 };
-    let (surface, steps) = surface_steps(options, &networks, &mut session, n)?;
+    let time = (StepRule::Constant(0.5_f64.powi(18)), 1);
+    let (scales, needed) = (surfaces::scales(n), surfaces::needed_network());
+    let grid = surfaces::centred_box(n, options.mesh.box_side(&ARMADILLO))?;
+    let (surface, steps) = session.phase("armadillo", |stage| {
+        let mesh = options.mesh.load_or_built_in(&ARMADILLO, &grid)?;
+        let initial = mesh.phase_field(grid, scales.eps, &stage.bar)?;
+        let mut steps = Vec::new();
+        for (method, papers_seconds) in SURFACE_STEPS {
+            let (variant, source) = ((method, Scheme::Paper), networks.of(Scheme::Paper));
+            let operator = Operator::new(variant, &source, &needed, &grid, &scales)?;
+            let initial = initial.clone();
+            let run = stage.run(willmore_flow(&mesh.title, initial, operator, scales, time))?;
+            steps.push((method, timing::numbers(&run), papers_seconds));
+        }
+        Ok((mesh.title, steps))
+    })?;
 
-    let rows: Vec<_> = timings.iter().map(|t| (t, t.numbers())).collect();
     let times = |t: &Timing, k: usize| t.over_hybrid(&timings).map(|times| times[k]);
-    let table = Sheet::of(&rows)
-        .text("method", |(t, _)| t.row.label)
-        .column("n", Shortest, |(t, _)| t.n)
-        .column("128 steps [s]", Fixed(1), |(t, _)| t.seconds())
-        .text("measured", |(t, _)| t.measured())
-        .column("times hybrid", Fixed(1), |(t, _)| times(t, 0))
-        .column(MEASURED, Fixed(1), |(t, _)| times(t, 1))
-        .columns(&COLUMNS, |(_, numbers)| numbers)
-        .column(PAPERS, Shortest, |(t, _)| t.papers_seconds());
+    let table = Sheet::of(&timings)
+        .text("method", |t| t.row.label)
+        .column("n", Shortest, |t| t.n)
+        .column("128 steps [s]", Fixed(1), Timing::seconds)
+        .text("measured", Timing::measured)
+        .column("times hybrid", Fixed(1), |t| times(t, 0))
+        .column(MEASURED, Fixed(1), |t| times(t, 1))
+        .columns(&COLUMNS, |t| &t.numbers)
+        .column(PAPERS, Shortest, Timing::papers_seconds);
     session.sheet(table, "timing")?;
     session.remark(run.title("One Willmore step of a surface"));
     let steps = Sheet::of(&steps)
@@ -160,18 +178,18 @@ pub fn program(options: &Options) -> Result<(), Error> {
         .measure("hvp", ("HVP", Fixed(0)), |s| s.1["hvp_on_this_grid"])
         .column(PAPERS, Shortest, |s| s.2);
     session.sheet(steps, "armadillo")?;
-    let json = rows.iter().map(|(t, numbers)| {
-        let (row, seconds) = (t.row.key, t.timed.seconds());
-        json!({ "variant": row, "n": t.n, "numbers": numbers, "step_seconds": seconds, "failure": t.failure })
+    let json = timings.iter().map(|t| {
+        let (row, seconds) = (t.row.key, timing::seconds(&t.run));
+        json!({ "variant": row, "n": t.n, "numbers": t.numbers, "step_seconds": seconds, "failure": t.failure })
     });
     let json: Vec<_> = json.collect();
     session.output.write_json("timing.json", &json)?;
     session.figure(figure(&timings), "timing")?;
-    for (timing, mut numbers) in rows.into_iter().filter(|(t, _)| t.usable()) {
-        numbers.extend(times(timing, 1).map(|times| ("times_hybrid_measured_steps", times)));
-        for (name, value) in numbers {
-            let metric = format!("timing.n{}.{}.{name}", timing.n, timing.row.key);
-            session.metric(&metric, value)?;
+    for timing in timings.iter().filter(|timing| timing.usable()) {
+        let key = format!("timing.n{}.{}", timing.n, timing.row.key);
+        let times = times(timing, 1).map(|times| ("times_hybrid_measured_steps", times));
+        for (name, value) in timing.numbers.clone().into_iter().chain(times) {
+            session.metric(&format!("{key}.{name}"), value)?;
         }
     }
     session.finish("128 Willmore steps of the cross: wall time on this machine")
@@ -194,46 +212,47 @@ fn measure(
         contenders.push(Timing {
             row,
             n,
-            timed: Timed::new(case, &session.device)?,
+            run: Run::new(case, &session.device)?,
             failure: None,
+            numbers: Numbers::new(),
         });
     }
+    // The first step costs more than the others: extrapolation needs some of those.
+    let goes_on = |timing: &Timing| {
+        let seconds = timing::seconds(&timing.run);
+        let more = seconds.len() < 3 || seconds.iter().sum::<f64>() < budget;
+        timing.failure.is_none() && seconds.len() < STEPS && more
+    };
     session.phase(format!("n = {n}"), |stage| {
         stage.bar.set_length((VARIANTS.len() * STEPS) as u64);
-        let goes_on = |timing: &Timing| timing.goes_on(budget);
-        take_turns(&mut contenders, goes_on, |timing| timing.step(&stage.bar))
+        take_turns(&mut contenders, goes_on, |timing| {
+            stage.bar.inc(1);
+            match timing.run.step() {
+                Err(engine::Error::Step { source, .. })
+                    if matches!(*source, solver::Error::NotConverged { .. }) =>
+                {
+                    timing.failure = Some(source.to_string());
+                    Ok(())
+                }
+                other => Ok(other.map(drop)?),
+            }
+        })
     })?;
+    for timing in &mut contenders {
+        timing.numbers = timing.numbers();
+    }
     Ok(contenders)
 }
 
 impl Timing {
-    fn goes_on(&self, budget: f64) -> bool {
-        // The first step costs more than the others: extrapolation needs some of those.
-        let seconds = self.timed.seconds();
-        let more = seconds.len() < 3 || seconds.iter().sum::<f64>() < budget;
-        self.failure.is_none() && seconds.len() < STEPS && more
-    }
-
-    fn step(&mut self, bar: &ProgressBar) -> Result<(), Error> {
-        match self.timed.step(bar) {
-            Err(Error::Engine(engine::Error::Step { source, .. }))
-                if matches!(*source, solver::Error::NotConverged { .. }) =>
-            {
-                self.failure = Some(source.to_string());
-                Ok(())
-            }
-            other => other.map(drop),
-        }
-    }
-
     /// Time and work, with the time of all steps in seconds: measured, or with the mean of the later half of the measured steps for each
     /// of the rest. Steps become cheaper as corners smooth out: the later ones say most about what is to come.
     fn numbers(&self) -> Numbers {
-        let (mut numbers, seconds) = (self.timed.numbers(), self.timed.seconds());
+        let (mut numbers, seconds) = (timing::numbers(&self.run), timing::seconds(&self.run));
         let (count, measured) = (seconds.len(), seconds.iter().sum::<f64>());
         let later = &seconds[count / 2..];
         let late = later.iter().sum::<f64>() / later.len().max(1) as f64;
-        let inner = self.timed.run.statistics().unwrap_or_default();
+        let inner = self.run.statistics().unwrap_or_default();
         let per_step = |total: usize| total as f64 / count.max(1) as f64;
         numbers.extend([
             ("measured_steps", count as f64),
@@ -246,11 +265,11 @@ impl Timing {
     }
 
     fn usable(&self) -> bool {
-        self.failure.is_none() && self.timed.run.steps() > 1
+        self.failure.is_none() && self.run.steps() > 1
     }
 
     fn seconds(&self) -> Option<f64> {
-        self.usable().then(|| self.numbers()["seconds"])
+        self.usable().then(|| self.numbers["seconds"])
     }
 
     fn papers_seconds(&self) -> Option<f64> {
@@ -259,7 +278,7 @@ impl Timing {
     }
 
     fn measured(&self) -> String {
-        let steps = self.timed.run.steps();
+        let steps = self.run.steps();
         match &self.failure {
             Some(reason) => format!("stopped after {steps} steps: {reason}"),
             None if steps < STEPS => format!("extrapolated from {steps} steps"),
@@ -270,40 +289,11 @@ impl Timing {
     /// Time of all steps, and of those measured by both, over that of the hybrid scheme.
     fn over_hybrid(&self, all: &[Self]) -> Option<[f64; 2]> {
         let hybrid = (all.iter()).find(|t| t.n == self.n && t.row.key == "hybrid")?;
-        let (own, its) = (self.timed.seconds(), hybrid.timed.seconds());
+        let (own, its) = (timing::seconds(&self.run), timing::seconds(&hybrid.run));
         let common = own.len().min(its.len());
         let measured = own[..common].iter().sum::<f64>() / its[..common].iter().sum::<f64>();
         Some([self.seconds()? / hybrid.seconds()?, measured])
     }
-}
-
-/// One step of tau = 2^-18 of the armadillo by the hybrid scheme and nested finite elements, eps = 2h, tautilde = h^2: its name, and for
-/// each method what was measured and the seconds that the paper reports.
-fn surface_steps(
-    options: &Options,
-    networks: &Chosen,
-    session: &mut Session<'_>,
-    n: usize,
-) -> Result<(String, Vec<(Method, Numbers, f64)>), Error> {
-    const METHODS: [(Method, f64); 2] = [(Hybrid, 807.0), (FeImplicit, 14589.0)];
-    let time = (StepRule::Constant(0.5_f64.powi(18)), 1);
-    let (scales, needed) = (surfaces::scales(n), surfaces::needed_network());
-    let grid = surfaces::centred_box(n, options.mesh.box_side(&ARMADILLO))?;
-    session.phase("armadillo", |stage| {
-        let mesh = options.mesh.load_or_built_in(&ARMADILLO, &grid)?;
-        let initial = mesh.phase_field(grid, scales.eps, &stage.bar)?;
-        let mut steps = Vec::new();
-        for (method, papers_seconds) in METHODS {
-            let (variant, source) = ((method, Scheme::Paper), networks.of(Scheme::Paper));
-            let operator = Operator::new(variant, &source, &needed, &grid, &scales)?;
-            let initial = initial.clone();
-            let case = surfaces::willmore_flow(&mesh.title, initial, operator, scales, time);
-            let mut timed = Timed::new(case, stage.device)?;
-            timed.step(&stage.bar)?;
-            steps.push((method, timed.numbers(), papers_seconds));
-        }
-        Ok((mesh.title, steps))
-    })
 }
 
 /// Seconds over the resolution: solid lines for this machine, dashed ones for the paper.

@@ -48,15 +48,13 @@ pub struct Options {
 }
 
 impl Recipe {
-    /// Name in data, metrics and checkpoints, name in the legend, and how its curves look.
-    fn look(self) -> (&'static str, &'static str, LineStyle) {
+    /// Name in data, metrics and checkpoints, name in the legend, how its curves look, and prefix of files.
+    fn look(self) -> (&'static str, &'static str, LineStyle, &'static str) {
+        let distilled = "distillation of the least-squares fit";
         match self {
-            Self::Lm | Self::Both => ("lm", "Levenberg-Marquardt", LineStyle::Solid),
-            Self::Adam => ("adam", "Adam", LineStyle::Dashed),
-            Self::Accurate => {
-                let label = "distillation of the least-squares fit";
-                ("accurate", label, LineStyle::DashDotDot)
-            }
+            Self::Lm | Self::Both => ("lm", "Levenberg-Marquardt", LineStyle::Solid, ""),
+            Self::Adam => ("adam", "Adam", LineStyle::Dashed, "adam_"),
+            Self::Accurate => ("accurate", distilled, LineStyle::DashDotDot, "accurate_"),
         }
     }
 }
@@ -78,7 +76,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
         "adam": adam,
         "accurate": accurate,
     });
-    let session = Session::open(PROGRAM, run, device, parameters)?;
+    let session = Session::on(device, PROGRAM, run, parameters)?;
     let mut trainings = Trainings {
         checkpoints: session.output.subfolder("checkpoints")?,
         folder: session.output.subfolder("networks")?,
@@ -98,7 +96,36 @@ pub fn program(options: &Options) -> Result<(), Error> {
         Recipe::Both => trainings.progressively(&adam, !options.only.is_empty())?,
         Recipe::Lm | Recipe::Accurate => {}
     }
-    trainings.write()
+    let (mut session, all) = (trainings.session, trainings.finished);
+    session.figure(figure(&all), "learning_curves")?;
+    let points = all
+        .iter()
+        .flat_map(|one| one.trained.curve.iter().map(move |at| (one, at)));
+    let points: Vec<(&Finished, &CurvePoint)> = points.collect();
+    let curves = Sheet::of(&points)
+        .data("network", |(one, _)| one.spec.name)
+        .data("recipe", |(one, _)| one.recipe.look().0)
+        .data("iteration", |(_, at)| at.iteration)
+        .data("seconds", |(_, at)| at.seconds)
+        .data("training_loss", |(_, at)| at.training_loss)
+        .data("held_out_loss", |(_, at)| at.held_out_loss);
+    session.csv(curves, "learning_curves")?;
+    for one in &all {
+        let quality = &one.trained.quality;
+        session.summary.insert_record(&one.key(), quality)?;
+    }
+    let sheet = Sheet::of(&all)
+        .keyed(|one, name| format!("{}.{name}", one.key()))
+        .text("network", |one| one.spec.name)
+        .text("recipe", |one| one.recipe.look().0)
+        .metric("seconds", |one| one.trained.seconds())
+        .metric("iterations", |one| one.trained.curve.len());
+    let sheet = quality::columns(sheet, |one| &one.trained.quality);
+    session.sheet(sheet, "quality")?;
+    remove_folder(&trainings.checkpoints)?;
+    let folder = trainings.folder.as_path().display();
+    session.remark(format!("Networks are in {folder}"));
+    session.finish("Quality of the trained networks")
 }
 
 impl Options {
@@ -108,14 +135,12 @@ impl Options {
             Recipe::Lm | Recipe::Adam | Recipe::Both => NetworkSpec::paper(),
         };
         let names: Vec<&str> = specs.iter().map(|spec| spec.name).collect();
-        for name in &self.only {
-            require(
-                names.contains(&name.as_str()),
-                format!(
-                    "no network is called '{name}'; there are {}",
-                    names.join(", ")
-                ),
-            )?;
+        let (all, is_one) = (names.join(", "), |name: &String| {
+            names.contains(&name.as_str())
+        });
+        if let Some(name) = self.only.iter().find(|name| !is_one(name)) {
+            let message = format!("no network is called '{name}'; there are {all}");
+            return Err(Error::Options(message));
         }
         if !self.only.is_empty() {
             specs.retain(|spec| self.only.iter().any(|name| name == spec.name));
@@ -147,23 +172,18 @@ impl Trainings<'_> {
         spec: &NetworkSpec,
         params: &R,
     ) -> Result<Network, Error> {
-        let (key, label, _) = recipe.look();
+        let (key, label, _, prefix) = recipe.look();
         let name = format!("{}-{key}", spec.name);
         let file = self.checkpoints.path(&format!("{name}.json"))?;
         let work = |stage: &Stage<'_>| train((spec, params), &file, stage);
         let trained = (self.session).phase(format!("{} by {label}", spec.name), work)?;
         let network = trained.network.clone();
         if self.chosen.contains(spec) {
-            let prefix = match recipe {
-                Recipe::Lm | Recipe::Both => "",
-                Recipe::Adam => "adam_",
-                Recipe::Accurate => "accurate_",
-            };
             let file = format!("{prefix}{}", spec.ratios.file_name());
             network.save(&self.folder.path(&file)?)?;
             self.finished.push(Finished {
                 recipe,
-                spec: spec.clone(),
+                spec: *spec,
                 trained,
             });
         }
@@ -175,7 +195,7 @@ impl Trainings<'_> {
     fn progressively(&mut self, first: &AdamParams, alone: bool) -> Result<(), Error> {
         let mut stages = NetworkSpec::convergence();
         let others = self.chosen.iter().filter(|spec| !stages.contains(spec));
-        let others: Vec<_> = others.filter(|_| alone).cloned().collect();
+        let others: Vec<_> = others.filter(|_| alone).copied().collect();
         while stages.pop_if(|spec| !self.chosen.contains(spec)).is_some() {}
         let mut params = first.clone();
         for spec in &stages {
@@ -187,30 +207,6 @@ impl Trainings<'_> {
         }
         Ok(())
     }
-
-    fn write(self) -> Result<(), Error> {
-        let (mut session, all) = (self.session, self.finished);
-        session.figure(figure(&all), "learning_curves")?;
-        let rows: Vec<CurveRow> = all.iter().flat_map(Finished::curve).collect();
-        session.output.write_csv("learning_curves.csv", &rows)?;
-        for one in &all {
-            session
-                .summary
-                .insert_record(&one.key(), &one.trained.quality)?;
-        }
-        let sheet = Sheet::of(&all)
-            .keyed(|one, name| format!("{}.{name}", one.key()))
-            .text("network", |one| one.spec.name)
-            .text("recipe", |one| one.recipe.look().0)
-            .metric("seconds", |one| one.trained.seconds())
-            .metric("iterations", |one| one.trained.curve.len());
-        let sheet = quality::columns(sheet, |one| &one.trained.quality);
-        session.sheet(sheet, "quality")?;
-        remove_folder(&self.checkpoints)?;
-        let folder = self.folder.as_path().display();
-        session.remark(format!("Networks are in {folder}"));
-        session.finish("Quality of the trained networks")
-    }
 }
 
 impl Finished {
@@ -220,27 +216,6 @@ impl Finished {
             other => format!("train.{}.{}", self.spec.name, other.look().0),
         }
     }
-
-    fn curve(&self) -> impl Iterator<Item = CurveRow> {
-        self.trained.curve.iter().map(|point| CurveRow {
-            network: self.spec.name,
-            recipe: self.recipe.look().0,
-            iteration: point.iteration,
-            seconds: point.seconds,
-            training_loss: point.training_loss,
-            held_out_loss: point.held_out_loss,
-        })
-    }
-}
-
-#[derive(Serialize)]
-struct CurveRow {
-    network: &'static str,
-    recipe: &'static str,
-    iteration: usize,
-    seconds: f64,
-    training_loss: f64,
-    held_out_loss: f64,
 }
 
 /// Held-out loss over wall time and over iterations; colour: network, line style: recipe.
@@ -257,7 +232,7 @@ fn figure(all: &[Finished]) -> Figure {
     let networks: Vec<_> = networks.collect();
     let chart = |label: &str, abscissa: fn(&CurvePoint) -> f64| {
         let curves = all.iter().map(|one| {
-            let (key, _, style) = one.recipe.look();
+            let (key, _, style, _) = one.recipe.look();
             let colour = names.iter().position(|name| *name == one.spec.name);
             let name = format!("{} {key}", one.spec.name);
             let point = |at: &CurvePoint| [abscissa(at), at.held_out_loss];

@@ -2,9 +2,8 @@
 
 use chacha20::ChaCha8Rng;
 
-use crate::meshes::{LAPLACIAN, TAUBIN, rms_distance};
 use crate::prelude::*;
-use crate::surfaces::{fairing_flow, mesh_raster};
+use crate::smoothing::{LAPLACIAN, TAUBIN, fairing_flow, mesh_raster, rms_distance};
 use rand::{RngExt, SeedableRng};
 use surfaces::{ClosedMesh, MeshDistance, TriangleMesh, samples};
 use volumes::{Body, Inside, Volume};
@@ -58,9 +57,8 @@ struct Row<'a> {
 
 pub fn program(options: &Options) -> Result<(), Error> {
     let full = usize::from(!options.run.quick);
-    let device = options.run.open_device()?;
     let parameters = json!({ "bodies": BODIES, "wrong": WRONG, "time": TIME, "taubin": TAUBIN, "laplacian": LAPLACIAN, "iterations": ITERATIONS });
-    let mut session = Session::open("unshrinking", &options.run, device, parameters)?;
+    let mut session = Session::open("unshrinking", &options.run, parameters)?;
     let seed = session.options.seed;
     let bodies = BODIES.map(|(name, voxels)| Segmented::new(name, voxels[full] as f64, seed));
     let bodies = bodies.into_iter().collect::<Result<Vec<_>, _>>()?;
@@ -68,34 +66,25 @@ pub fn program(options: &Options) -> Result<(), Error> {
     for body in &bodies {
         let treated = body.treated(&mut session)?;
         let drawn = session.phase("pictures", |_| {
-            [0, 1, 2, 5, 6]
-                .map(|k: usize| treated[k].picture())
-                .into_iter()
-                .collect::<Result<Vec<_>, _>>()
-        })?;
-        pictures.extend(drawn);
+            let shown = [0, 1, 2, 5, 6].map(|k: usize| treated[k].picture());
+            shown.into_iter().collect::<Result<Vec<_>, _>>()
+        });
+        pictures.extend(drawn?);
         rows.extend(treated);
     }
+    let elements = ("w / 8 pi by elements", Fixed(3));
+    let displacement = ("largest displacement", Fixed(3));
     let table = Sheet::of(&rows)
         .keyed(|row, name| format!("unshrinking.{}.{}.{name}", row.of.name, row.treatment.0))
         .text("body", |row| row.of.name)
         .text("surface", |row| row.treatment.1)
         .column("iterations", Shortest, |row| row.iterations)
         .measure("volume", ("volume, %", Fixed(4)), Row::change)
-        .measure("w_over_8pi", ("w / 8 pi by elements", Fixed(3)), |row| {
-            row.energy
-        })
-        .measure(
-            "displacement",
-            ("largest displacement", Fixed(3)),
-            Row::displacement,
-        )
-        .measure("rms", ("distance to the shape", Fixed(4)), |row| {
-            rms_distance(&row.surface, &*row.of.shape)
-        });
+        .measure("w_over_8pi", elements, |row| row.energy)
+        .measure("displacement", displacement, Row::displacement)
+        .measure("rms", ("distance to the shape", Fixed(4)), Row::distance);
     session.sheet(table, "unshrinking")?;
-    let figure = Figure::new(TITLE, 5)
-        .with_row_labels(bodies.iter().map(|body| body.name).collect::<Vec<_>>());
+    let figure = Figure::new(TITLE, 5).with_row_labels(BODIES.map(|(name, _)| name));
     session.figure(figure.with_panels(pictures), "surfaces")?;
     session.finish(TITLE)
 }
@@ -137,33 +126,30 @@ impl Segmented {
 
     fn treated(&self, session: &mut Session<'_>) -> Result<Vec<Row<'_>>, Error> {
         let (body, marched) = (&self.body.surface, &self.marched);
-        let [taubin, laplacian] = [TAUBIN, LAPLACIAN].map(|factors| self.smoothed(factors));
-        let (taubin, laplacian) = (taubin?, laplacian?);
-        // Key, words, what it starts from, and for flows whether the volume is kept.
+        let (taubin, laplacian) = (self.smoothed(TAUBIN)?, self.smoothed(LAPLACIAN)?);
+        let (none, kept, free) = (None, Some(true), Some(false));
+        // Key, words, what it starts from, iterations, and for flows whether the volume is kept.
         let all = [
-            ("marched", "marching tetrahedra", marched, None, None),
-            ("fair", "fair, volume kept", body, None, Some(true)),
-            ("free", "fair, free", body, None, Some(false)),
-            (
-                "marched_fair",
-                "marched, volume kept",
-                marched,
-                None,
-                Some(true),
-            ),
-            ("marched_free", "marched, free", marched, None, Some(false)),
-            ("taubin", "Taubin", &taubin.1, Some(taubin.0), None),
+            ("marched", "marching tetrahedra", marched, None, none),
+            ("fair", "fair, volume kept", body, None, kept),
+            ("free", "fair, free", body, None, free),
+            ("marched_fair", "marched, volume kept", marched, None, kept),
+            ("marched_free", "marched, free", marched, None, free),
+            ("taubin", "Taubin", &taubin.1, Some(taubin.0), none),
             (
                 "laplacian",
                 "Laplacian",
                 &laplacian.1,
                 Some(laplacian.0),
-                None,
+                none,
             ),
         ];
         let row = |(key, words, start, iterations, flow): (_, _, &ClosedMesh, _, Option<bool>)| {
             session.phase(format!("{}: {words}", self.name), |stage| {
-                let mut case = self.case(start)?;
+                let distance = MeshDistance::new(start).sample(self.grid, || ())?;
+                let mut case = fairing_flow(self.name, distance)?;
+                case.measures = vec![Measure::displacement(&case.initial, case.scales.eps)];
+                case.stops = vec![Stop::Time(TIME), Stop::Displacement(FARTHEST)];
                 let mut surface = start.mesh().clone();
                 let mut volume = start.volume();
                 if let Some(keeps) = flow {
@@ -191,23 +177,12 @@ impl Segmented {
     /// The surface after the number of iterations that brings it nearest to the shape.
     fn smoothed(&self, [lambda, mu]: [f64; 2]) -> Result<(usize, ClosedMesh), Error> {
         let smoothed = |count| self.marched.mesh().smoothed(count, lambda, mu);
-        let all =
-            (1..=ITERATIONS).map(|count| (count, rms_distance(&smoothed(count), &*self.shape)));
+        let distance = |count| (count, rms_distance(&smoothed(count), &*self.shape));
+        let all = (1..=ITERATIONS).map(distance);
         let best = all
             .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map_or(1, |(count, _)| count);
+            .map_or(1, |best| best.0);
         Ok((best, ClosedMesh::new(smoothed(best))?.0))
-    }
-
-    /// Willmore flow from a surface, as long as `willmore fair` lets it.
-    fn case(&self, start: &ClosedMesh) -> Result<Case<3>, Error> {
-        let distance = MeshDistance::new(start).sample(self.grid, || ())?;
-        let case = fairing_flow(self.name, distance)?;
-        Ok(Case {
-            measures: vec![Measure::displacement(&case.initial, case.scales.eps)],
-            stops: vec![Stop::Time(TIME), Stop::Displacement(FARTHEST)],
-            ..case
-        })
     }
 }
 
@@ -215,6 +190,10 @@ impl Row<'_> {
     /// Of the volume of the voxels, in percent.
     fn change(&self) -> f64 {
         100.0 * (self.volume / self.of.body.volume - 1.0)
+    }
+
+    fn distance(&self) -> f64 {
+        rms_distance(&self.surface, &*self.of.shape)
     }
 
     /// The largest distance from the surface by marching tetrahedra.

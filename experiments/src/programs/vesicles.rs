@@ -1,18 +1,12 @@
 //! Lipid vesicles: area and volume held.
 
-use crate::equilibria::{self, AtRest, Equilibrium, Exact};
+use crate::equilibria::{self, AtRest, Equilibrium};
 use crate::prelude::*;
-use crate::surfaces::{Setting, View, raster, willmore_flow};
+use crate::surfaces::{Setting, VIEW, raster};
 use reference::equilibria::{Branch, Vesicle, vesicles};
 use render::{Quality, Scene};
 
 const TITLE: &str = "Vesicles: least bending energy with given area and volume";
-const VIEW: View = View {
-    up: UpAxis::Z,
-    azimuth: 30.0,
-    elevation: 25.0,
-};
-
 /// Shapes of a branch, each flowing from the relaxed one before it.
 struct Family {
     branch: Branch,
@@ -54,20 +48,9 @@ pub struct Options {
     figure: FigureOptions,
 }
 
-struct Pair {
-    branch: &'static str,
-    at_rest: AtRest<3>,
-    exact: Vesicle,
-}
-
 pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.figure.run;
-    let (count, steps) = if run.quick {
-        (1, Some(2))
-    } else {
-        (usize::MAX, None)
-    };
-    let device = run.open_device()?;
+    let (count, steps) = run.either((1, Some(2)), (usize::MAX, None));
     let settings = (FAMILIES.iter().take(count))
         .map(|family| Setting::new(&options.figure, family.cells, SIDE))
         .collect::<Result<Vec<_>, Error>>()?;
@@ -76,176 +59,113 @@ pub fn program(options: &Options) -> Result<(), Error> {
     });
     let families: Vec<Value> = families.collect();
     let parameters = settings[0].parameters(json!({ "families": families }))?;
-    let mut session = Session::open("vesicles", run, device, parameters)?;
-    let (mut all, mut pairs) = (Vec::new(), Vec::new());
+    let mut session = Session::open("vesicles", run, parameters)?;
+    let mut all: Vec<AtRest<3>> = Vec::new();
     for (family, setting) in FAMILIES.iter().zip(&settings) {
-        let name = family.name;
-        let volumes = &family.reduced_volumes[..family.reduced_volumes.len().min(count)];
+        let (branch, name, radius) = (family.branch, family.name, family.radius);
+        let volumes = family.reduced_volumes.iter().copied().take(count);
+        let volumes: Vec<f64> = volumes.collect();
         let title = format!("exact vesicles: {name}");
-        let exact = session.phase(title, |_| Ok(vesicles(family.branch, 0.0, volumes)?))?;
-        let mut relaxed = None;
-        for (&ratio, exact) in volumes.iter().zip(exact) {
-            let equilibrium = family.equilibrium(ratio, &exact);
-            let operator = setting.operator((Method::Hybrid, Scheme::Accurate))?;
-            let initial = match relaxed {
-                Some(shape) => shape,
-                None => equilibrium.start(setting.grid, setting.scales.eps, 0.5)?,
-            };
-            let rule = (StepRule::ByEnergy(None), 1);
-            let case = willmore_flow(name, initial, operator, setting.scales, rule);
-            let at_rest = equilibrium.relax(&mut session, case, steps)?;
-            relaxed = Some(at_rest.field.clone());
-            all.push(at_rest);
-            pairs.push((name, exact));
-        }
-    }
-    session.sheet(equilibria::sheet(&all), "energies")?;
-    let pairs: Vec<Pair> = (all.into_iter().zip(pairs))
-        .map(|(at_rest, (branch, exact))| Pair {
-            branch,
-            at_rest,
-            exact,
-        })
-        .collect();
-    let own = crossing(&pairs, Pair::energy);
-    let exact = crossing(&pairs, |pair| pair.exact.energy() / (8.0 * PI));
-    session.metrics(
-        "vesicles.crossing",
-        [("prolate_oblate", own.into()), ("exact", exact.into())],
-    )?;
-    let diagram = diagram(&mut session, &pairs)?;
-    session.figure(diagram, "diagram")?;
-    session.figure(shapes(&pairs, run.quick)?, "shapes")?;
-    session.finish(TITLE)
-}
-
-impl Family {
-    fn equilibrium(&self, ratio: f64, exact: &Vesicle) -> Equilibrium {
-        let (name, radius) = (self.name, self.radius);
-        Equilibrium {
-            key: format!("vesicles.{name}.v{ratio:.2}"),
-            title: format!("{name}, v = {ratio:.2}"),
-            radius,
-            ratio,
-            prolate: self.branch == Branch::Prolate,
-            exact: Exact {
+        let exact = session.phase(title, |_| Ok(vesicles(branch, 0.0, &volumes)?))?;
+        for (k, (ratio, exact)) in volumes.into_iter().zip(exact).enumerate() {
+            let equilibrium = Equilibrium {
+                key: format!("vesicles.{name}.v{ratio:.2}"),
+                title: format!("{name}, v = {ratio:.2}"),
+                radius,
+                ratio,
+                branch: Some(branch),
                 energy: exact.energy(),
                 tension: exact.tension / radius.powi(2),
                 pressure: -exact.pressure / radius.powi(3),
-            },
+                curve: exact.surface.profile().clone(),
+            };
+            let initial = match all.last() {
+                Some(relaxed) if k > 0 => relaxed.field.clone(),
+                _ => equilibrium.start(setting.grid, setting.scales.eps, 0.5)?,
+            };
+            let (operator, time) = (setting.operator(ACCURATE)?, (StepRule::ByEnergy(None), 1));
+            let case = willmore_flow(name, initial, operator, setting.scales, time);
+            all.push(equilibrium.relax(&mut session, case, steps)?);
         }
     }
+    session.sheet(equilibria::sheet(&all), "energies")?;
+    let crossings = [
+        ("prolate_oblate", crossing(&all, AtRest::energy).into()),
+        ("exact", crossing(&all, AtRest::exact_energy).into()),
+    ];
+    session.metrics("vesicles.crossing", crossings)?;
+    let diagram = diagram(&mut session, &all)?;
+    session.figure(diagram, "diagram")?;
+    session.figure(shapes(&all, run)?, "shapes")?;
+    session.finish(TITLE)
 }
 
-impl Pair {
-    /// In units of the sphere's.
-    fn energy(&self) -> f64 {
-        self.at_rest.zero_set.willmore_energy / (8.0 * PI)
-    }
-
-    fn ratio(&self) -> f64 {
-        self.at_rest.equilibrium.ratio
-    }
+/// The shapes of a branch.
+fn of(branch: Branch, all: &[AtRest<3>]) -> impl Iterator<Item = &AtRest<3>> {
+    (all.iter()).filter(move |one| one.equilibrium.branch == Some(branch))
 }
 
 /// The reduced volume at which the energies of prolate and oblate shapes are the same, by straight lines between the reduced volumes that both
 /// have, which are off by less than .001.
-fn crossing(pairs: &[Pair], energy: impl Fn(&Pair) -> f64) -> Option<f64> {
-    let of = |branch| pairs.iter().filter(move |pair| pair.branch == branch);
-    let both: Vec<[f64; 2]> = of("prolate")
-        .filter_map(|prolate| {
-            let oblate = of("oblate")
-                .find(|oblate| oblate.ratio().to_bits() == prolate.ratio().to_bits())?;
-            Some([prolate.ratio(), energy(prolate) - energy(oblate)])
-        })
-        .collect();
-    let crossing = both
-        .windows(2)
-        .find(|pair| pair[0][1] * pair[1][1] <= 0.0)?;
+fn crossing(all: &[AtRest<3>], energy: impl Fn(&AtRest<3>) -> f64) -> Option<f64> {
+    let difference = |prolate: &AtRest<3>| {
+        let ratio = prolate.equilibrium.ratio;
+        let same = |one: &&AtRest<3>| one.equilibrium.ratio.to_bits() == ratio.to_bits();
+        let oblate = of(Branch::Oblate, all).find(same)?;
+        Some([ratio, energy(prolate) - energy(oblate)])
+    };
+    let both: Vec<[f64; 2]> = of(Branch::Prolate, all).filter_map(difference).collect();
+    let crosses = |pair: &&[[f64; 2]]| pair[0][1] * pair[1][1] <= 0.0;
+    let crossing = both.windows(2).find(crosses)?;
     let [[v, a], [w, b]] = [crossing[0], crossing[1]];
     Some(v + (w - v) * a / (a - b))
 }
 
 /// Exact branches as lines, the flow's shapes as marks.
-fn diagram(session: &mut Session<'_>, pairs: &[Pair]) -> Result<Figure, Error> {
+fn diagram(session: &mut Session<'_>, all: &[AtRest<3>]) -> Result<Figure, Error> {
+    use Branch::{Oblate, Prolate, Stomatocyte};
     let branches = [
-        (Branch::Prolate, "prolate", (0.99, 0.5), Marker::Circle),
-        (Branch::Oblate, "oblate", (0.99, 0.51), Marker::Square),
-        (
-            Branch::Stomatocyte,
-            "stomatocyte",
-            (0.65, 0.4),
-            Marker::Diamond,
-        ),
+        (Prolate, "prolate", 0.99, 0.5, Marker::Circle),
+        (Oblate, "oblate", 0.99, 0.51, Marker::Square),
+        (Stomatocyte, "stomatocyte", 0.65, 0.4, Marker::Diamond),
     ];
     let mut curves = Vec::new();
-    for (colour, (branch, name, (from, to), marker)) in branches.into_iter().enumerate() {
-        let volumes: Vec<f64> = (0..=60)
-            .map(|k| from + (to - from) * f64::from(k) / 60.0)
-            .collect();
-        let exact = session.phase(format!("branch: {name}"), |_| {
-            Ok(vesicles(branch, 0.0, &volumes)?)
-        })?;
-        let points = volumes
-            .iter()
-            .zip(&exact)
-            .map(|(v, one)| [*v, one.energy() / (8.0 * PI)]);
-        let exact = Series::new(format!("{name}, exact"), points.collect::<Vec<_>>());
+    for (colour, (branch, name, from, to, marker)) in branches.into_iter().enumerate() {
+        let volumes = (0..=60).map(|k| from + (to - from) * f64::from(k) / 60.0);
+        let volumes: Vec<f64> = volumes.collect();
+        let title = format!("branch: {name}");
+        let exact = session.phase(title, |_| Ok(vesicles(branch, 0.0, &volumes)?))?;
+        let points = volumes.iter().zip(&exact);
+        let point = |(v, one): (&f64, &Vesicle)| [*v, one.energy() / (8.0 * PI)];
+        let exact = Series::of(format!("{name}, exact"), points, point);
         curves.push(exact.with_colour(colour));
-        let own = pairs.iter().filter(|pair| pair.branch == name);
-        let points: Vec<[f64; 2]> = own.map(|pair| [pair.ratio(), pair.energy()]).collect();
-        if !points.is_empty() {
-            let own = Series::new(format!("{name}, phase field"), points);
+        let own = Series::of(format!("{name}, phase field"), of(branch, all), |one| {
+            [one.equilibrium.ratio, one.energy()]
+        });
+        if !own.points.is_empty() {
             curves.push(own.with_colour(colour).with_symbols(marker));
         }
     }
-    let axes = (
-        Axis::linear("reduced volume v"),
-        Axis::linear("energy w / 8π"),
-    );
-    let chart = LineChart::new("", axes.0, axes.1).with_curves(curves);
-    Ok(Figure::new(TITLE, 1).with_panel(chart).with_note(
+    let (volume, energy) = ("reduced volume v", "energy w / 8π");
+    let chart = LineChart::new("", Axis::linear(volume), Axis::linear(energy));
+    Ok(Figure::new(TITLE, 1).with_panel(chart.with_curves(curves)).with_note(
         "w = ½ ∫ h² dA; v: volume over that of the sphere with the same area. The least energy is that of the lowest branch.",
     ))
 }
 
 /// A picture of every shape, and below it its section through the axis over the exact profile.
-fn shapes(pairs: &[Pair], quick: bool) -> Result<Figure, Error> {
-    let quality = if quick {
-        Quality::Draft
-    } else {
-        Quality::Standard
-    };
-    let picture = |pair: &Pair| {
-        let eps = pair.at_rest.trajectory.case.scales.eps;
-        let scene = Scene::new(&pair.at_rest.field, eps)?
-            .view(VIEW)
-            .quality(quality);
-        let (branch, v, energy) = (pair.branch, pair.ratio(), pair.energy());
-        let exact = pair.exact.energy() / (8.0 * PI);
-        let caption = format!("{branch}\nv = {v:.2}\n{energy:.4}\nexact {exact:.4}");
-        raster(&scene, 320, caption)
-    };
-    let section = |pair: &Pair| {
-        let radius = pair.at_rest.equilibrium.radius;
-        let half = 2.2 * radius;
-        let exact = pair.exact.surface.profile().points().into_iter();
-        let exact: Vec<[f64; 2]> = exact.map(|p| p.map(|x| radius * x)).collect();
-        let own = look::outline(&section(&pair.at_rest.field)?);
-        Ok(Shapes::new("")
-            .with_window([-half, half], [-half, half])
-            .with_curve(own.filled(Colour::LightGrey))
-            .with_curve(Curve::new([exact]).with_colour(0).with_width(1.0)))
-    };
-    let pictures = pairs
-        .iter()
-        .map(picture)
-        .collect::<Result<Vec<_>, Error>>()?;
-    let sections = pairs
-        .iter()
-        .map(section)
-        .collect::<Result<Vec<_>, Error>>()?;
-    Ok(Figure::new(TITLE, pairs.len())
+fn shapes(all: &[AtRest<3>], options: &RunOptions) -> Result<Figure, Error> {
+    let (mut pictures, mut sections) = (Vec::new(), Vec::new());
+    for one in all {
+        let scene = Scene::new(&one.field, one.trajectory.case.scales.eps)?.view(VIEW);
+        let scene = scene.quality(options.either(Quality::Draft, Quality::Standard));
+        let name = one.equilibrium.title.replace(", ", "\n");
+        let (energy, exact) = (one.energy(), one.exact_energy());
+        let caption = format!("{name}\n{energy:.4}\nexact {exact:.4}");
+        pictures.push(raster(&scene.render([320; 2])?, caption));
+        sections.push(one.panel(String::new(), &section(&one.field)?, 2.2));
+    }
+    Ok(Figure::new(TITLE, all.len())
         .with_panels(pictures)
         .with_panels(sections)
         .with_note(
@@ -257,12 +177,9 @@ fn shapes(pairs: &[Pair], quick: bool) -> Result<Figure, Error> {
 fn section(field: &Field<3>) -> Result<Field<2>, Error> {
     let grid = field.grid();
     let (cells, plane) = (grid.cells(), Grid::<2>::centred(grid.cells(), grid.side())?);
-    let value = |node: usize| {
+    let values = (0..plane.len()).map(|node| {
         let [i, k] = plane.multi_index(node);
         field.values()[grid.index([i, cells / 2, k])]
-    };
-    Ok(Field::from_values(
-        plane,
-        (0..plane.len()).map(value).collect(),
-    )?)
+    });
+    Ok(Field::from_values(plane, values.collect())?)
 }

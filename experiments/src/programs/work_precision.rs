@@ -5,7 +5,7 @@ use crate::networks::Chosen;
 use crate::prelude::*;
 use crate::study::Variant;
 use crate::truth::{
-    self, ACCURATE, CELLS, CROSS, ELLIPSE, ELLIPSOID, RECTANGLE, Reached, STRICT, Sample,
+    self, CELLS, CROSS, ELLIPSE, ELLIPSOID, RECTANGLE, Reached, STRICT, Sample, Truth,
 };
 
 const TITLE: &str = "Time steps of Willmore flow against the exact flow";
@@ -36,43 +36,13 @@ const KINDS: [(&str, usize, Marker); 5] = [
 
 /// A way to make time steps, and its curve in the figure.
 struct Stepping {
-    key: String,
     kind: &'static str,
-    variant: (Method, Scheme),
+    key: String,
     steps: TimeSteps,
 }
 
 /// Three of each kind, from coarse to fine, the coarsest with equal steps of `longest`; the middle ones alone for a quick run.
 fn steppings(longest: f64, quick: bool) -> Vec<Stepping> {
-    let stepping = |key: String, kind, steps| Stepping {
-        key,
-        kind,
-        variant: ACCURATE,
-        steps,
-    };
-    let equal = |parts: f64| StepRule::Constant(longest / parts);
-    let euler = [1.0, 2.0, 4.0].map(|parts| {
-        let key = format!("euler{}", STEP / longest * parts);
-        stepping(key, EULER, equal(parts).into())
-    });
-    let graded = [0.4, 0.2, 0.1].map(|part| {
-        let rule = StepRule::Graded {
-            first: part * longest / 4.0,
-            part,
-        };
-        stepping(format!("graded{part}"), GRADED, rule.into())
-    });
-    let second = [0.5, 1.0, 2.0].map(|parts| {
-        let steps = TimeSteps {
-            order: Order::Second,
-            ..equal(parts).into()
-        };
-        stepping(
-            format!("second_order{}", STEP / longest * parts),
-            EQUAL,
-            steps,
-        )
-    });
     let loose = ErrorControl {
         relative: 0.08,
         longest: 2.0,
@@ -83,22 +53,33 @@ fn steppings(longest: f64, quick: bool) -> Vec<Stepping> {
         ("", ErrorControl::default()),
         ("_strict", STRICT),
     ];
-    let controlled = controls.map(|(suffix, control)| {
-        let steps = truth::controlled(control, END, HALVINGS);
-        stepping(format!("controlled{suffix}"), CONTROLLED, steps)
-    });
-    let elements = [0.125, 0.25, 0.5].map(|parts| Stepping {
-        variant: (Method::FeImplicit, Scheme::Paper),
-        ..stepping(
-            format!("elements{}", STEP / longest * parts),
+    let equal = |parts: f64| TimeSteps::from(StepRule::Constant(longest / parts));
+    let mut all = Vec::new();
+    let mut add = |kind, key: String, steps| all.push(Stepping { kind, key, steps });
+    for k in if quick { 1..2 } else { 0..3 } {
+        let halved = 2.0_f64.powi(k as i32);
+        let key = |name: &str, parts: f64| format!("{name}{}", STEP / longest * parts);
+        add(EULER, key("euler", halved), equal(halved));
+        let part = [0.4, 0.2, 0.1][k];
+        let first = part * longest / 4.0;
+        let rule = StepRule::Graded { first, part };
+        add(GRADED, format!("graded{part}"), rule.into());
+        let steps = TimeSteps {
+            order: Order::Second,
+            ..equal(0.5 * halved)
+        };
+        add(EQUAL, key("second_order", 0.5 * halved), steps);
+        let (suffix, control) = controls[k];
+        let steps = truth::controlled(control, (END, HALVINGS));
+        add(CONTROLLED, format!("controlled{suffix}"), steps);
+        add(
             ELEMENTS,
-            equal(parts).into(),
-        )
-    });
-    let used = if quick { 1..2 } else { 0..3 };
-    let all = [euler, graded, second, controlled, elements];
-    let all = all.map(|three| three.into_iter().take(used.end).skip(used.start));
-    all.into_iter().flatten().collect()
+            key("elements", 0.125 * halved),
+            equal(0.125 * halved),
+        );
+    }
+    all.sort_by_key(|stepping| KINDS.iter().position(|kind| kind.0 == stepping.kind));
+    all
 }
 
 /// Willmore flow of a cross, a rectangle and an ellipse by the accurate operator in several kinds of time steps, eps = 2h = 1/32 and 1/64, against
@@ -110,12 +91,11 @@ pub struct Options {
     run: RunOptions,
 }
 
-struct Compared {
+/// What a run in such steps has reached at a mark.
+struct Compared<'a> {
     sample: &'static str,
     n: usize,
-    stepping: String,
-    kind: &'static str,
-    mark: usize,
+    stepping: &'a Stepping,
     reached: Reached,
 }
 
@@ -124,72 +104,86 @@ pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
     let marks: Vec<usize> = MARKS.into_iter().take(used).collect();
     let cells: Vec<usize> = CELLS.into_iter().take(used).collect();
     let parameters = json!({ "marks": marks, "cells": cells, "time_unit": STEP, "eps_over_h": 2 });
-    let device = options.open_device()?;
-    let mut session = Session::open("work_precision", options, device, parameters)?;
+    let mut session = Session::open("work_precision", options, parameters)?;
     let (mut rows, mut ratios) = (Vec::new(), Vec::new());
+    let times: Vec<(usize, f64)> = marks.iter().map(|&k| (k, k as f64 * STEP)).collect();
     let in_plane = steppings(STEP, options.quick);
     for sample in &CURVES {
-        let cells = (&cells[..], &marks[..]);
-        let of_curve = compare(&mut session, sample, cells, &in_plane, &mut ratios)?;
-        rows.extend(of_curve);
+        let at = (&cells[..], &times[..]);
+        rows.extend(compare(&mut session, sample, at, &in_plane, &mut ratios)?);
     }
     let halves: Vec<usize> = cells.iter().map(|n| n / 2).collect();
-    let in_space: Vec<Stepping> = (steppings(4.0 * STEP, options.quick).into_iter())
-        .filter(|stepping| stepping.kind != ELEMENTS)
-        .collect();
-    let cells = (&halves[..], &marks[..]);
-    let of_surface = compare(&mut session, &SURFACE, cells, &in_space, &mut ratios)?;
-    rows.extend(of_surface);
-    truth_of_estimates(&mut session, &ratios)?;
-    circles(&mut session, options.quick)?;
-    let work = Axis::log("HVPs");
-    session.figure(
-        figure(&rows, &marks, &work, |reached| reached.hvp),
-        "work_precision",
-    )?;
-    let seconds = Axis::log("seconds");
-    session.figure(
-        figure(&rows, &marks, &seconds, |reached| reached.seconds),
-        "seconds",
-    )?;
+    let mut in_space = steppings(4.0 * STEP, options.quick);
+    in_space.retain(|stepping| stepping.kind != ELEMENTS);
+    let at = (&halves[..], &times[..]);
+    rows.extend(compare(&mut session, &SURFACE, at, &in_space, &mut ratios)?);
+    if !ratios.is_empty() {
+        // The least ratio of an estimated time error to the true one, and in which part of the cases it is between 1/3 and 3.
+        let good = ratios
+            .iter()
+            .filter(|r| (1.0 / 3.0..=3.0).contains(*r))
+            .count();
+        let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
+        let within = good as f64 / ratios.len() as f64;
+        let metrics = [
+            ("within_factor_3", within.into()),
+            ("least_over_true", least.into()),
+        ];
+        session.metrics("estimates", metrics)?;
+    }
+    circles(&mut session)?;
+    let work: [(_, _, fn(&Reached) -> f64); 2] = [
+        ("work_precision", "HVPs", |reached| reached.hvp),
+        ("seconds", "seconds", |reached| reached.seconds),
+    ];
+    for (stem, axis, work) in work {
+        session.figure(figure(&rows, &marks, &Axis::log(axis), work), stem)?;
+    }
     session.sheet(sheet(&rows), "errors")?;
     session.finish(TITLE)
 }
 
 /// Runs a sample in all kinds of time steps and compares it at the marks, graded steps at the ends of those in which the marks are; adds the
 /// ratios of estimated to true time errors.
-fn compare<const D: usize>(
+fn compare<'a, const D: usize>(
     session: &mut Session<'_>,
     sample: &Sample<D>,
-    (cells, marks): (&[usize], &[usize]),
-    steppings: &[Stepping],
+    (cells, marks): (&[usize], &[(usize, f64)]),
+    steppings: &'a [Stepping],
     ratios: &mut Vec<f64>,
-) -> Result<Vec<Compared>, Error> {
+) -> Result<Vec<Compared<'a>>, Error> {
     let mut rows = Vec::new();
-    let times: Vec<f64> = marks.iter().map(|&k| k as f64 * STEP).collect();
     let title = format!("{}: the exact flow", sample.key);
-    let exact = session.phase(title, |_| sample.exact(Flow::Willmore, &times))?;
+    let exact = session.phase(title, |_| sample.exact(Flow::Willmore, marks))?;
+    (exact.iter()).try_for_each(|exact| exact.record(session, sample.key))?;
     for &n in cells {
         let mut controlled = Vec::new();
         for stepping in steppings {
-            let steps = (&stepping.key[..], stepping.steps, times[times.len() - 1]);
-            let run = sample.run(session, (n, 2.0), stepping.variant, steps)?;
-            let own = if stepping.kind == GRADED {
-                let ends = times
-                    .iter()
-                    .filter_map(|time| truth::until(&run, *time).last());
-                let ends: Vec<f64> = ends.map(|record| record.time).collect();
-                Some(sample.exact(Flow::Willmore, &ends)?)
-            } else {
-                None
+            let variant = match stepping.kind {
+                ELEMENTS => (Method::FeImplicit, Scheme::Paper),
+                _ => ACCURATE,
             };
-            for (&mark, truth) in marks.iter().zip(own.as_ref().unwrap_or(&exact)) {
+            let steps = (&stepping.key[..], stepping.steps, marks[marks.len() - 1].1);
+            let run = sample.run(session, (n, 2.0), variant, steps)?;
+            let mut at = marks.to_vec();
+            if stepping.kind == GRADED {
+                let end = |time| {
+                    truth::until(&run, time)
+                        .last()
+                        .map_or(time, |last| last.time)
+                };
+                for (_, time) in &mut at {
+                    *time = end(*time);
+                }
+            }
+            let own = (at != marks)
+                .then(|| sample.exact(Flow::Willmore, &at))
+                .transpose()?;
+            for truth in own.as_ref().unwrap_or(&exact) {
                 rows.push(Compared {
                     sample: sample.key,
                     n,
-                    stepping: stepping.key.clone(),
-                    kind: stepping.kind,
-                    mark,
+                    stepping,
                     reached: Reached::of(sample, &run, truth)?,
                 });
             }
@@ -199,15 +193,9 @@ fn compare<const D: usize>(
         }
         ratios.extend(time_errors(session, marks, &controlled)?);
     }
-    for (&mark, truth) in marks.iter().zip(&exact) {
-        let key = format!("{}.exact", sample.key);
-        truth::record(session, &key, mark, &truth.sizes())?;
-    }
     if cells.len() > 1 {
-        let both = sample.extrapolated(session, (END, HALVINGS), exact.iter())?;
-        for (&mark, reached) in marks.iter().zip(&both) {
-            reached.record(session, &format!("{}.extrapolated", sample.key), mark)?;
-        }
+        let exact: Vec<&Truth> = exact.iter().collect();
+        sample.extrapolated(session, (END, HALVINGS), &exact)?;
     }
     Ok(rows)
 }
@@ -220,178 +208,146 @@ const SAME: f64 = 1e-5;
 /// near the truth.
 fn time_errors<const D: usize>(
     session: &mut Session<'_>,
-    marks: &[usize],
+    marks: &[(usize, f64)],
     runs: &[(String, Trajectory<D>)],
 ) -> Result<Vec<f64>, Error> {
     let mut ratios = Vec::new();
     let Some(((_, strict), others)) = runs.split_last() else {
         return Ok(ratios);
     };
-    for ((name, run), &mark) in others
-        .iter()
-        .flat_map(|other| marks.iter().map(move |mark| (other, mark)))
-    {
-        let time = mark as f64 * STEP;
-        let field = |run: &Trajectory<D>| {
-            let so_far = truth::until(run, time);
-            run.field(so_far[so_far.len() - 1].step)
-        };
-        let error = truth::distance_of_levels(&field(run)?, &field(strict)?, run.case.scales.eps);
-        session.metric(&format!("{name}.time_error.step{mark}"), error)?;
-        let estimated = engine::estimated_time_error(truth::until(run, time)).unwrap_or(0.0);
-        if estimated > 0.0 && error > SAME {
-            ratios.push(estimated / error);
+    for (name, run) in others {
+        for &(mark, time) in marks {
+            let field = |run: &Trajectory<D>| {
+                let so_far = truth::until(run, time);
+                run.field(so_far[so_far.len() - 1].step)
+            };
+            let eps = run.case.scales.eps;
+            let error = truth::distance_of_levels(&field(run)?, &field(strict)?, eps);
+            session.metric(&format!("{name}.time_error.step{mark}"), error)?;
+            let estimated = engine::estimated_time_error(truth::until(run, time)).unwrap_or(0.0);
+            if estimated > 0.0 && error > SAME {
+                ratios.push(estimated / error);
+            }
         }
     }
     Ok(ratios)
 }
 
-/// The least ratio of an estimated time error to the true one, and in which part of the cases it is between 1/3 and 3.
-fn truth_of_estimates(session: &mut Session<'_>, ratios: &[f64]) -> Result<(), Error> {
-    if !ratios.is_empty() {
-        let good = ratios
-            .iter()
-            .filter(|r| (1.0 / 3.0..=3.0).contains(*r))
-            .count();
-        let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
-        session.metric(
-            "estimates.within_factor_3",
-            good as f64 / ratios.len() as f64,
-        )?;
-        session.metric("estimates.least_over_true", least)?;
-    }
-    Ok(())
-}
-
-/// Steps for an extrapolation, alike on both grids, so that their errors do not add up.
-fn careful(n: usize) -> ErrorControl {
-    ErrorControl {
-        relative: 0.003,
-        length: None,
-        longest: 0.5 * n as f64 / CELLS[1] as f64,
-        first: Some(16.0 * EPS.powi(4)),
-    }
-}
-
 /// The circles of `circle_convergence` at n = 128 with the accurate operator, in equal steps of first order, in controlled ones of second order, and
 /// those extrapolated in `eps` from n = 64 and 128: their mean L2 error at the end of the 64 steps, and all Hessian-vector products, which on
 /// the coarser grid count by their share of the unknowns.
-fn circles(session: &mut Session<'_>, quick: bool) -> Result<(), Error> {
-    let (count, steps) = if quick {
-        (2, 4)
-    } else {
-        (circles::COUNT, circles::STEPS)
-    };
+fn circles(session: &mut Session<'_>) -> Result<(), Error> {
+    let usual = (circles::COUNT, circles::STEPS);
+    let (count, steps) = session.options.either((2, 4), usual);
     let variant = Variant {
         flow: Flow::Willmore,
         method: Method::Hybrid,
         scheme: Scheme::Accurate,
         n: CELLS[1],
     };
-    let operator = Chosen::default().operator(variant.look(), variant.n)?;
+    let (flow, end) = (variant.flow, steps as f64 * STEP);
+    let operator = Chosen::default().operator(ACCURATE, variant.n)?;
     let euler = session.phase("circles: euler1", |stage| {
         Ensemble::run(&(variant, operator), (count, steps), "fields", stage)
     })?;
     let hvp = |run: &Trajectory<2>| run.records.iter().filter_map(Record::hvp).sum::<f64>();
-    let of_euler = [
-        euler.mean_error(steps),
-        euler.circles.iter().map(|c| hvp(&c.trajectory)).sum(),
-    ];
-    let (mut controlled, mut extrapolated) = ([0.0; 2], [0.0; 2]);
+    let work = euler.circles.iter().map(|circle| hvp(&circle.trajectory));
+    let mut all = [[euler.mean_error(steps), work.sum()], [0.0; 2], [0.0; 2]];
     for (k, radius) in circles::radii(count).into_iter().enumerate() {
         let mut run = |n: usize, name: &str, control| {
-            let grid = circles::grid(variant.flow, radius, steps, n)?;
+            let grid = circles::grid(flow, radius, steps, n)?;
             let initial = phase_field(grid, &Ball::new([0.0; 2], radius)?, 2.0 * grid.spacing())?;
-            let (name, end) = (format!("circle{k:02}-n{n}-{name}"), steps as f64 * STEP);
+            let name = format!("circle{k:02}-n{n}-{name}");
             let time = (&name[..], TimeSteps::controlled(control), end);
             let run = truth::flow(session, ("circle", initial, 2.0), ACCURATE, time)?;
             Ok::<_, Error>((run.field(run.steps())?, hvp(&run)))
         };
         let [coarse, fine] = CELLS;
+        // Alike on both grids, so that their errors do not add up.
+        let careful = |n: usize| ErrorControl {
+            relative: 0.003,
+            length: None,
+            longest: 0.5 * n as f64 / CELLS[1] as f64,
+            first: Some(16.0 * EPS.powi(4)),
+        };
         let (u, work) = run(fine, "controlled", ErrorControl::default())?;
         let (a, coarse_work) = run(coarse, "careful", careful(coarse))?;
         let (b, fine_work) = run(fine, "careful", careful(fine))?;
-        let radius_of = |u: &Field<2>, eps| Ok((ZeroSet::of(u, eps)?.volume / PI).sqrt());
+        let radius_of = |u: &Field<2>, eps| -> Result<f64, Error> {
+            Ok((ZeroSet::of(u, eps)?.volume / PI).sqrt())
+        };
         let circle = |radius| phase_field(*u.grid(), &Ball::new([0.0; 2], radius)?, EPS);
-        let [a, b]: [Result<f64, Error>; 2] = [radius_of(&a, 2.0 * EPS), radius_of(&b, EPS)];
-        let limit = circle((4.0 * b? - a?) / 3.0)?;
-        let end = steps as f64 * STEP;
-        let exact = circle(circles::radius_at(variant.flow, radius, end))?;
+        let limit = (4.0 * radius_of(&b, EPS)? - radius_of(&a, 2.0 * EPS)?) / 3.0;
+        let exact = circle(circles::radius_at(flow, radius, end))?;
         let share = (coarse as f64 / fine as f64).powi(2);
-        for (sums, field, work) in [
-            (&mut controlled, &u, work),
-            (&mut extrapolated, &limit, fine_work + share * coarse_work),
-        ] {
+        let extrapolated = (&circle(limit)?, fine_work + share * coarse_work);
+        for (sums, (field, work)) in all[1..].iter_mut().zip([(&u, work), extrapolated]) {
             sums[0] += l2_distance(field, &exact)? / count as f64;
             sums[1] += work;
         }
     }
-    let all = [of_euler, controlled, extrapolated];
-    for (name, [l2, hvp]) in ["euler1", "controlled", "extrapolated"]
-        .into_iter()
-        .zip(all)
-    {
+    let names = ["euler1", "controlled", "extrapolated"];
+    for (name, [l2, hvp]) in names.into_iter().zip(all) {
         let metrics = [("l2", l2.into()), ("hvp_total", hvp.into())];
         session.metrics(&format!("circles.n{}.{name}", variant.n), metrics)?;
     }
     Ok(())
 }
 
-fn sheet(rows: &[Compared]) -> Sheet<'_, Compared> {
-    let mut sheet = Sheet::of(rows)
-        .keyed(|row, name| {
-            format!(
-                "{}.n{}.{}.{name}.step{}",
-                row.sample, row.n, row.stepping, row.mark
-            )
-        })
+fn sheet<'a>(rows: &'a [Compared<'a>]) -> Sheet<'a, Compared<'a>> {
+    let key = |row: &Compared<'_>, name: &str| {
+        let (stepping, mark) = (&row.stepping.key, row.reached.mark);
+        format!("{}.n{}.{stepping}.{name}.step{mark}", row.sample, row.n)
+    };
+    let [distance, estimate] = ["largest distance", "estimated time error"];
+    Sheet::of(rows)
+        .keyed(key)
         .text("shape", |row| row.sample)
         .column("n", Shortest, |row| row.n)
-        .text("time steps", |row| row.stepping.clone())
-        .column("time / 2⁻¹⁴", Shortest, |row| row.mark);
-    for name in ["tip", "diagonal", "area", "perimeter", "volume", "w"] {
-        sheet = sheet.metric(name, move |row| row.reached.size(name));
-    }
-    sheet
-        .measure(
-            "distance_to_exact",
-            ("largest distance", Scientific(2)),
-            |row| row.reached.distance,
-        )
-        .measure(
-            "estimated_error",
-            ("estimated time error", Scientific(1)),
-            |row| (row.reached.estimated > 0.0).then_some(row.reached.estimated),
-        )
+        .text("time steps", |row| row.stepping.key.as_str())
+        .column("time / 2⁻¹⁴", Shortest, |row| row.reached.mark)
+        .numbers(&[], |row| &row.reached.sizes)
+        .measure("distance_to_exact", (distance, Scientific(2)), |row| {
+            row.reached.distance
+        })
+        .measure("estimated_error", (estimate, Scientific(1)), |row| {
+            Some(row.reached.estimated).filter(|error| *error > 0.0)
+        })
         .measure("steps", ("steps", Shortest), |row| row.reached.steps)
         .measure("hvp_total", ("HVP", Fixed(0)), |row| row.reached.hvp)
         .measure("seconds", ("s", Fixed(1)), |row| row.reached.seconds)
 }
 
 /// Largest distances from the exact flow against work, for the second and the last mark.
-fn figure(rows: &[Compared], marks: &[usize], axis: &Axis, work: fn(&Reached) -> f64) -> Figure {
+fn figure(
+    rows: &[Compared<'_>],
+    marks: &[usize],
+    axis: &Axis,
+    work: fn(&Reached) -> f64,
+) -> Figure {
     let mut shown: Vec<usize> = vec![marks[1.min(marks.len() - 1)], marks[marks.len() - 1]];
     shown.dedup();
-    let curves = CURVES.iter().map(|sample| (sample.key, sample.title));
-    let samples: Vec<_> = curves.chain([(SURFACE.key, SURFACE.title)]).collect();
+    let [coarse, fine] = CELLS;
+    let curves = CURVES
+        .iter()
+        .map(|sample| (sample.key, sample.title, [coarse, fine]));
+    let surface = (SURFACE.key, SURFACE.title, [coarse / 2, fine / 2]);
     let mut figure = Figure::new(format!("{TITLE}: work and precision"), shown.len());
-    for (key, title) in &samples {
+    for (key, title, cells) in curves.chain([surface]) {
         for &mark in &shown {
-            let here = |row: &&Compared| (row.sample, row.mark) == (*key, mark);
-            let cells = CELLS.map(|n| if *key == SURFACE.key { n / 2 } else { n });
             let mut curves: Vec<Series> = Vec::new();
             let styles = [(LineStyle::Dashed, "coarse"), (LineStyle::Solid, "fine")];
             for (n, (style, grid)) in cells.into_iter().zip(styles) {
                 for (kind, colour, marker) in KINDS {
-                    let rows = rows.iter().filter(here);
-                    let mut points: Vec<[f64; 2]> = rows
-                        .filter(|row| (row.n, row.kind) == (n, kind))
-                        .map(|row| [work(&row.reached), row.reached.distance])
-                        .collect();
-                    points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-                    let curve = Series::new(format!("{kind}, {grid}"), points)
-                        .with_colour(colour)
-                        .with_style(style);
+                    let own = rows.iter().filter(|row| {
+                        let stepping = (row.n, row.stepping.kind) == (n, kind);
+                        stepping && (row.sample, row.reached.mark) == (key, mark)
+                    });
+                    let mut curve = Series::of(format!("{kind}, {grid}"), own, |row| {
+                        [work(&row.reached), row.reached.distance]
+                    });
+                    curve.points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+                    let curve = curve.with_colour(colour).with_style(style);
                     curves.push(curve.with_marker(marker));
                 }
             }

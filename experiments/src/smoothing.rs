@@ -1,0 +1,50 @@
+//! What comparisons of smoothings of meshes share.
+
+use engine::Storage;
+use geometry::measure::BoundingBox;
+use render::{Scene, View};
+use surfaces::{Fairing, TriangleMesh};
+
+use crate::prelude::*;
+use crate::surfaces::raster;
+
+/// Factors of Taubin's smoothing,
+pub const TAUBIN: [f64; 2] = [0.5, -0.53];
+/// and of Laplacian smoothing.
+pub const LAPLACIAN: [f64; 2] = [0.5, 0.0];
+
+/// Root of the mean square distance of the vertices of a mesh to a shape.
+pub fn rms_distance(mesh: &TriangleMesh, shape: &dyn SignedDistance<3>) -> f64 {
+    let vertices = mesh.vertices.iter();
+    let squares = vertices.map(|&x| shape.signed_distance(x).powi(2));
+    (squares.sum::<f64>() / mesh.vertices.len() as f64).sqrt()
+}
+
+/// Willmore flow from signed distances as `willmore fair` makes it, without its ends and measures.
+pub fn fairing_flow(title: &str, mut distance: Field<3>) -> Result<Case<3>, Error> {
+    surfaces::mend_signs(&mut distance);
+    let (grid, spacing) = (*distance.grid(), distance.grid().spacing());
+    let scales = Scales::of_grid(spacing, 2.0);
+    let initial = distance.map(|s| optimal_profile(s, scales.eps));
+    let rule = StepRule::Graded {
+        first: Fairing::first_step(spacing),
+        part: Fairing::GROWTH,
+    };
+    let mut operator = operator(ACCURATE, &grid, &scales)?;
+    operator.storage = Storage::Auto;
+    Ok(willmore_flow(title, initial, operator, scales, (rule, 0)))
+}
+
+/// A picture of a mesh in a frame.
+pub fn mesh_raster(
+    mesh: &TriangleMesh,
+    (up, frame): (UpAxis, BoundingBox<3>),
+    caption: impl Into<String>,
+) -> Result<Raster, Error> {
+    let scene = Scene::of_mesh(mesh.clone()).within(frame).view(View {
+        up,
+        azimuth: -60.0,
+        elevation: 25.0,
+    });
+    Ok(raster(&scene.render([420; 2])?, caption))
+}
