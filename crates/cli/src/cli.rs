@@ -2,13 +2,11 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use derive_more::Display;
-use engine::Storage;
-use model::Network;
+use engine::{Flow, Storage};
 
-use crate::ansatz::Ansatz;
-use crate::commands::check_eps_over_h;
+use crate::paths::MESHES;
 use crate::prelude::*;
+use crate::values::{Amount, Ansatz, Label, SizeTarget};
 
 const EXIT_CODES: &str = "Exit codes: 0 success; 2 bad input or failure, one line on standard error; 130 interrupted (Ctrl-C): \
 the last step was finished and stored, `willmore resume` goes on.";
@@ -30,22 +28,13 @@ pub struct Cli {
 
 /// The subcommands.
 #[derive(Subcommand, Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one of them")]
 pub enum Command {
-    /// Willmore flow of a mesh, an image, a field or a built-in shape
-    #[command(after_help = FLOW_EXAMPLES)]
-    Flow(FlowOptions),
+    #[command(flatten)]
+    Run(RunCommand),
     /// Continue an interrupted run, to the same final bytes as if it had not been interrupted
     #[command(after_help = RESUME_EXAMPLES)]
     Resume(ResumeOptions),
-    /// Take the noise off a mesh, whose vertices move while all else of the file stays, or the voxels off a segmentation
-    #[command(after_help = FAIR_EXAMPLES)]
-    Fair(FairOptions),
-    /// Fill a region of a shape smoothly; everything outside stays bit for bit
-    #[command(after_help = INPAINT_EXAMPLES)]
-    Inpaint(InpaintOptions),
-    /// Mean curvature flow, by the network or by finite elements
-    #[command(after_help = MCF_EXAMPLES)]
-    Mcf(McfOptions),
     /// Write a built-in shape or another input to a file, possibly with noise and holes: something to try the program on
     #[command(after_help = SAMPLE_EXAMPLES)]
     Sample(SampleOptions),
@@ -73,6 +62,24 @@ pub enum Command {
     /// Print the manual page
     #[command(after_help = "Example:\n  willmore man > willmore.1")]
     Man,
+}
+
+/// The subcommands that make runs.
+#[derive(Subcommand, Serialize, Clone, Debug)]
+#[serde(untagged)]
+pub enum RunCommand {
+    /// Willmore flow of a mesh, an image, a field or a built-in shape
+    #[command(after_help = FLOW_EXAMPLES)]
+    Flow(FlowOptions),
+    /// Take the noise off a mesh, whose vertices move while all else of the file stays, or the voxels off a segmentation
+    #[command(after_help = FAIR_EXAMPLES)]
+    Fair(FairOptions),
+    /// Fill a region of a shape smoothly; everything outside stays bit for bit
+    #[command(after_help = INPAINT_EXAMPLES)]
+    Inpaint(InpaintOptions),
+    /// Mean curvature flow, by the network or by finite elements
+    #[command(after_help = MCF_EXAMPLES)]
+    Mcf(McfOptions),
 }
 
 const FLOW_EXAMPLES: &str = "Examples:
@@ -285,74 +292,6 @@ pub struct SayOptions {
     pub json: bool,
 }
 
-/// A value in the units of the input, or a part of another one in percent.
-#[derive(Clone, Copy, Debug, PartialEq, Display)]
-pub enum Amount {
-    Value(f64),
-    #[display("{_0}%")]
-    Percent(f64),
-}
-
-impl Amount {
-    fn parse(text: &str, expected: &str) -> Result<Self, String> {
-        let (number, amount): (_, fn(f64) -> Self) = match text.strip_suffix('%') {
-            Some(percent) => (percent, Self::Percent),
-            None => (text, Self::Value),
-        };
-        match number.parse::<f64>() {
-            Ok(value) if value.is_finite() && value > 0.0 => Ok(amount(value)),
-            _ => Err(format!("{number:?} is no positive number; give {expected}")),
-        }
-    }
-}
-
-impl Serialize for Amount {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
-
-/// What a size is to become.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum SizeTarget {
-    /// What it is at the beginning.
-    Keep,
-    /// This, or this part of what it is at the beginning.
-    #[serde(untagged)]
-    To(Amount),
-}
-
-impl SizeTarget {
-    /// The value, for a size that is `now` at the beginning.
-    pub fn of(self, now: f64) -> f64 {
-        match self {
-            Self::Keep => now,
-            Self::To(Amount::Value(value)) => value,
-            Self::To(Amount::Percent(percent)) => percent / 100.0 * now,
-        }
-    }
-}
-
-impl FromStr for SizeTarget {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let expected = "keep, a value, or a part of the beginning in percent, such as 90%";
-        match text {
-            "keep" => Ok(Self::Keep),
-            text => Amount::parse(text, expected).map(Self::To),
-        }
-    }
-}
-
-fn tolerance(text: &str) -> Result<Amount, String> {
-    Amount::parse(
-        text,
-        "a length, or a part of the motion in percent, such as 2%",
-    )
-}
-
 /// Options of `flow`.
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
@@ -372,7 +311,7 @@ pub struct FlowOptions {
 
     /// The estimated time error that controlled steps may make: a LENGTH in the units of the input for the whole run, or for each step a
     /// part of how far the surface moves in it in percent [default: 1.5%]
-    #[arg(long, value_name = "LENGTH", value_parser = tolerance, allow_hyphen_values = true)]
+    #[arg(long, value_name = "LENGTH", value_parser = Amount::tolerance, allow_hyphen_values = true)]
     pub tolerance: Option<Amount>,
 
     /// Hold the volume (the area of a plane shape): keep, a VALUE in the units of the input, or PERCENT of that at the beginning, as 90%;
@@ -630,17 +569,82 @@ pub struct TrainOptions {
     pub common: CommonOptions,
 }
 
-impl Command {
-    /// The input of a command that makes runs, and what it keeps.
-    pub fn of_run(&mut self) -> Option<(&mut InputOptions, &mut KeepOptions)> {
-        let flow = match self {
-            Self::Mcf(mcf) => return Some((&mut mcf.input, &mut mcf.keep)),
-            Self::Flow(flow) => flow,
-            Self::Fair(fair) => &mut fair.flow,
-            Self::Inpaint(inpaint) => &mut inpaint.flow,
-            _ => return None,
-        };
-        Some((&mut flow.input, &mut flow.keep))
+/// What all commands that make runs have.
+pub struct Shared<'a> {
+    pub command: &'static str,
+    pub flow: Flow,
+    pub method: Method,
+    pub input: &'a mut InputOptions,
+    pub scheme: &'a mut SchemeOptions,
+    pub steps: &'a mut Option<usize>,
+    /// Steps where something else ends the run.
+    pub many_steps: usize,
+    pub time: Option<f64>,
+    pub energy: Option<f64>,
+    /// The Willmore energy at which it ends, as a part of that at the beginning.
+    pub energy_ratio: Option<f64>,
+    /// The extension of meshes, if it is not the usual one.
+    pub format: Option<String>,
+    pub keep: &'a mut KeepOptions,
+    pub common: &'a mut CommonOptions,
+}
+
+impl RunCommand {
+    pub fn shared(&mut self) -> Shared<'_> {
+        match self {
+            Self::Flow(flow) => flow.shared("flow"),
+            Self::Fair(fair) => Shared {
+                energy_ratio: fair.energy_ratio,
+                format: fair.format.clone(),
+                ..fair.flow.shared("fair")
+            },
+            Self::Inpaint(inpaint) => inpaint.flow.shared("inpaint"),
+            Self::Mcf(mcf) => Shared {
+                command: "mcf",
+                flow: Flow::MeanCurvature,
+                method: mcf.method,
+                input: &mut mcf.input,
+                scheme: &mut mcf.scheme,
+                steps: &mut mcf.steps,
+                many_steps: 100_000,
+                time: mcf.time,
+                energy: None,
+                energy_ratio: None,
+                format: None,
+                keep: &mut mcf.keep,
+                common: &mut mcf.common,
+            },
+        }
+    }
+
+    /// The options of Willmore flow; mean curvature flow has no energy and no controlled steps.
+    pub fn willmore(&mut self) -> Option<&mut FlowOptions> {
+        match self {
+            Self::Flow(flow) => Some(flow),
+            Self::Fair(fair) => Some(&mut fair.flow),
+            Self::Inpaint(inpaint) => Some(&mut inpaint.flow),
+            Self::Mcf(_) => None,
+        }
+    }
+}
+
+impl FlowOptions {
+    fn shared(&mut self, command: &'static str) -> Shared<'_> {
+        Shared {
+            command,
+            flow: Flow::Willmore,
+            method: Method::Hybrid,
+            input: &mut self.input,
+            scheme: &mut self.scheme,
+            steps: &mut self.steps,
+            many_steps: 1000,
+            time: self.time,
+            energy: self.energy,
+            energy_ratio: None,
+            format: None,
+            keep: &mut self.keep,
+            common: &mut self.common,
+        }
     }
 }
 
@@ -648,15 +652,6 @@ impl SchemeOptions {
     /// Interface width in cells.
     pub fn eps_over_h(&self) -> f64 {
         self.eps_over_h.unwrap_or(2.0)
-    }
-
-    /// Takes the width of the interface from the network, unless it is given.
-    pub fn fill_in(&mut self) -> Result<(), Error> {
-        if let (None, Some(path)) = (self.eps_over_h, &self.network) {
-            self.eps_over_h = Some(Network::load(path)?.ratios().eps_over_h);
-        }
-        self.eps_over_h = Some(self.eps_over_h());
-        check_eps_over_h(self.eps_over_h())
     }
 }
 

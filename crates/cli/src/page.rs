@@ -4,7 +4,6 @@
 //! does not know it, so that it may be removed, and is written again by `willmore resume`.
 
 use std::fmt::Write;
-use std::fs;
 
 use engine::METRICS;
 use pages::{
@@ -12,8 +11,10 @@ use pages::{
 };
 use report::{Axis, LineChart, Marker, Series};
 
+use crate::faired::view;
+use crate::paths::MESHES;
 use crate::prelude::*;
-use crate::{own, plane};
+use crate::{config, outlet, own, plane};
 
 pub const NAME: &str = "index.html";
 
@@ -109,7 +110,7 @@ impl Files<'_> {
     }
 
     fn surfaces(&self, table: &Table) -> Result<Option<Viewer>, Error> {
-        let stages = self.stages(self.before(), &outlet::MESHES, table);
+        let stages = self.stages(self.before(), &MESHES, table);
         // Until it is started, and on paper, the viewer is a picture.
         let (Some(poster), Some((_, first))) = (self.read(outlet::PICTURE)?, stages.first()) else {
             return Ok(None);
@@ -124,7 +125,7 @@ impl Files<'_> {
         Ok(Some(Viewer::new(
             "The surface over the steps",
             Image::from_bytes(outlet::PICTURE, &poster)?,
-            outlet::view(up.unwrap_or_default()),
+            view(up.unwrap_or_default()),
             meshes.iter().map(|(label, mesh)| (*label, mesh)),
         )?))
     }
@@ -230,11 +231,8 @@ impl Files<'_> {
 
     /// A file, if it belongs to the run.
     fn read(&self, name: &str) -> Result<Option<Vec<u8>>, Error> {
-        if !self.has(name) {
-            return Ok(None);
-        }
-        let path = self.run.path().join(name);
-        Ok(Some(fs::read(&path).map_err(Error::io("read", path))?))
+        let bytes = self.has(name).then(|| self.run.read(name));
+        Ok(bytes.transpose()?)
     }
 }
 

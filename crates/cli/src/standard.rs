@@ -2,9 +2,11 @@
 
 use std::io::{Read, Write};
 
-use crate::cli::Command;
+use crate::cli::{Command, InputOptions, SayOptions};
 use crate::input::usual_format;
+use crate::paths::read;
 use crate::prelude::*;
+use crate::values::Label;
 
 /// The files, which are removed in the end.
 #[derive(Default)]
@@ -60,8 +62,7 @@ impl Standard {
         let Some(path) = self.output.as_ref().filter(|path| path.exists()) else {
             return Ok(());
         };
-        let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
-        let written = std::io::stdout().write_all(&bytes);
+        let written = std::io::stdout().write_all(&read(path)?);
         written.map_err(Error::io("write", "standard output"))
     }
 }
@@ -77,11 +78,14 @@ impl Drop for Standard {
 
 /// The input of a command and the file that it writes, if it has these.
 fn paths(command: &mut Command) -> Option<(&mut InputOptions, &mut Option<PathBuf>)> {
-    if let Command::Sample(sample) = command {
-        return Some((&mut sample.input, &mut sample.save));
+    match command {
+        Command::Sample(sample) => Some((&mut sample.input, &mut sample.save)),
+        Command::Run(command) => {
+            let shared = command.shared();
+            Some((shared.input, &mut shared.keep.save))
+        }
+        _ => None,
     }
-    let (input, keep) = command.of_run()?;
-    Some((input, &mut keep.save))
 }
 
 /// A name that no other process has.

@@ -1,13 +1,20 @@
 //! `willmore flow`, and what it has in common with the other commands that make runs.
 
-use engine::{ErrorControl, Flow, Held, Helfrich, TimeSteps};
+use engine::{ErrorControl, Flow, Held, Helfrich, Store, TimeSteps};
 use solver::NewtonParams;
 
-use super::{open_device, operator};
-use crate::cli::{CommonOptions, SchemeOptions};
+use crate::cli::{FlowOptions, RunCommand, SayOptions, Shared};
+use crate::config;
+use crate::input::{Loaded, Reader, Start, usual_box};
+use crate::outlet::{self, Outlet};
+use crate::paths::{absolute, extension};
+use crate::plane::Plane;
 use crate::prelude::*;
-use crate::run::Plan;
-use crate::{sizes, volume};
+use crate::run::{Plan, free_folder, make_way};
+use crate::sizes;
+use crate::space::Space;
+use crate::values::{Amount, Label};
+use crate::volume;
 
 /// Steps of a run that has no other end.
 const STEPS: usize = 20;
@@ -15,100 +22,60 @@ const STEPS: usize = 20;
 const LONGEST_MOVE: f64 = 2.0;
 const SAVED: [&str; 5] = ["ply", "obj", "stl", "png", "svg"];
 
-/// A command that makes a run.
-pub trait FlowCommand: Serialize + Clone {
-    const NAME: &'static str;
-    const FLOW: Flow = Flow::Willmore;
-    /// Steps of a run that ends at a time or an energy.
-    const MANY_STEPS: usize = 1000;
-
-    fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
-        let shared = self.shared();
-        input::load(shared.input, shared.scheme.eps_over_h(), say)
-    }
-
-    /// Whether something besides time and energy ends it.
-    fn ends(&self) -> bool {
-        false
-    }
-
-    /// The Willmore energy at which it ends, as a part of that at the beginning.
-    fn energy_ratio(&self) -> Option<f64> {
-        None
-    }
-
-    fn shared(&mut self) -> Shared<'_>;
-
-    fn method(&self) -> Method {
-        Method::Hybrid
-    }
-
+impl RunCommand {
     /// Refuses options before anything is read.
     fn check(&mut self) -> Result<(), Error> {
+        match self {
+            Self::Flow(flow) => flow.check_tolerance(StepRule::Controlled)?,
+            Self::Fair(fair) => fair.check()?,
+            Self::Inpaint(inpaint) => inpaint.check()?,
+            Self::Mcf(mcf) => mcf.check()?,
+        }
         Ok(())
     }
 
-    /// What becomes of the input before it flows.
-    fn prepare(&self, input: Loaded) -> Result<Loaded, Error> {
-        Ok(input)
+    /// Whether something besides the number of steps ends it.
+    fn has_an_end(&mut self) -> bool {
+        let fairs = match self {
+            Self::Fair(fair) => fair.noise.is_some() || fair.energy_ratio.is_some() || !fair.ends,
+            _ => false,
+        };
+        let shared = self.shared();
+        fairs || shared.time.is_some() || shared.energy.is_some()
+    }
+
+    /// The input, as it is before it flows.
+    fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
+        match self {
+            Self::Fair(fair) => fair.load(say),
+            Self::Inpaint(inpaint) => inpaint.load(say),
+            Self::Flow(_) | Self::Mcf(_) => {
+                let Shared { input, scheme, .. } = self.shared();
+                Reader::of(input, scheme.eps_over_h(), say)?.load()
+            }
+        }
     }
 
     /// The rule for time steps, filled in for these scales and the length that a unit of the usual box has: time steps that follow from
     /// the inner step do so in a box of that size.
-    fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule;
-
-    /// The options of Willmore flow; mean curvature flow has no energy and no controlled steps.
-    fn willmore(&mut self) -> Option<&mut FlowOptions> {
-        None
-    }
-
-    fn format(&self) -> Option<String> {
-        None
-    }
-}
-
-pub struct Shared<'a> {
-    pub input: &'a mut InputOptions,
-    pub scheme: &'a mut SchemeOptions,
-    pub steps: &'a mut Option<usize>,
-    pub time: Option<f64>,
-    pub energy: Option<f64>,
-    pub keep: &'a mut KeepOptions,
-    pub common: &'a mut CommonOptions,
-}
-
-impl FlowCommand for FlowOptions {
-    const NAME: &'static str = "flow";
-
-    fn shared(&mut self) -> Shared<'_> {
-        Shared {
-            input: &mut self.input,
-            scheme: &mut self.scheme,
-            steps: &mut self.steps,
-            time: self.time,
-            energy: self.energy,
-            keep: &mut self.keep,
-            common: &mut self.common,
+    fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
+        match self {
+            Self::Flow(flow) => flow.rule(scales, unit),
+            Self::Fair(fair) => fair.rule(scales, unit),
+            Self::Inpaint(inpaint) => inpaint.rule(scales, unit),
+            Self::Mcf(_) => StepRule::Constant(scales.mcf_step),
         }
     }
+}
 
-    fn check(&mut self) -> Result<(), Error> {
-        self.check_tolerance(StepRule::Controlled)
-    }
-
-    fn willmore(&mut self) -> Option<&mut FlowOptions> {
-        Some(self)
-    }
-
-    fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
+impl FlowOptions {
+    pub fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
         let rule = self.tau.unwrap_or(StepRule::Controlled);
         *self
             .tau
             .insert(rule.resolved(scales.mcf_step * unit.powi(2)))
     }
-}
 
-impl FlowOptions {
     /// Refuses a tolerance that the time steps do not look at.
     pub fn check_tolerance(&self, usual: StepRule) -> Result<(), Error> {
         match self.tolerance {
@@ -157,14 +124,14 @@ impl Shared<'_> {
         }
         let force = self.keep.force;
         if let Some(save) = &mut self.keep.save {
-            if !SAVED.contains(&&*input::extension(save)) {
+            if !SAVED.contains(&&*extension(save)) {
                 return Err(Error::options(format!(
                     "--save {} must end in .{}",
                     save.display(),
                     SAVED.join(", .")
                 )));
             }
-            *save = input::absolute(&*save)?;
+            *save = absolute(&*save)?;
             force.check("--save", save)?;
             if !save.parent().is_some_and(Path::is_dir) {
                 return Err(Error::options(format!(
@@ -185,24 +152,24 @@ impl Shared<'_> {
         if matches!(rule, StepRule::ByEnergy(_) | StepRule::Controlled) {
             stops.push(Stop::EnergyAtRest);
         }
+        stops.extend(self.energy_ratio.map(Stop::EnergyRatio));
         stops
     }
 }
 
-/// Makes a run, or continues one that is stored.
-pub fn run<C: FlowCommand>(
-    mut command: C,
+/// Makes a run, or continues one that is stored, perhaps to more steps.
+pub fn run(
+    mut command: RunCommand,
     say: SayOptions,
     stored: Option<(StoredRun, Option<usize>)>,
 ) -> Result<ExitCode, Error> {
-    if let Some(path) = volume::of_all_labels(command.shared().input)? {
-        return each_label(&command, &path, say);
+    if let Some(labels) = volume::all_labels(command.shared().input)? {
+        return each_label(&command, &labels, say);
     }
     command.check()?;
-    let ends = command.ends();
+    let ends = command.has_an_end();
     let mut shared = command.shared();
-    let until = ends || shared.time.is_some() || shared.energy.is_some();
-    let steps = if until { C::MANY_STEPS } else { STEPS };
+    let steps = if ends { shared.many_steps } else { STEPS };
     shared.steps.get_or_insert(steps);
     if let Some((stored, more)) = &stored {
         // A run that has gone on once notes its steps.
@@ -211,7 +178,7 @@ pub fn run<C: FlowCommand>(
         *shared.steps = steps.or(*shared.steps);
     }
     shared.check()?;
-    let device = open_device(shared.common)?;
+    let device = shared.common.open_device()?;
     let mut job = Job {
         command,
         device,
@@ -223,20 +190,15 @@ pub fn run<C: FlowCommand>(
             _ => job.resume::<3, Space>(stored, more),
         };
     }
-    let loaded = job.command.load(say)?;
-    match job.command.prepare(loaded)? {
-        Loaded::Plane(start, _) => job.start(start),
+    match job.command.load(say)? {
+        Loaded::Plane(start) => job.start(start),
         Loaded::Space(start) => job.start(start),
     }
 }
 
 /// One run for each label of a volume, until one is interrupted.
-fn each_label<C: FlowCommand>(
-    command: &C,
-    path: &Path,
-    say: SayOptions,
-) -> Result<ExitCode, Error> {
-    for label in volume::labels(path)? {
+fn each_label(command: &RunCommand, labels: &[i64], say: SayOptions) -> Result<ExitCode, Error> {
+    for &label in labels {
         let mut one = command.clone();
         let Shared { input, keep, .. } = one.shared();
         input.label = Some(Label::One(label));
@@ -251,13 +213,13 @@ fn each_label<C: FlowCommand>(
     Ok(ExitCode::SUCCESS)
 }
 
-struct Job<C> {
-    command: C,
+struct Job {
+    command: RunCommand,
     device: ComputeDevice,
     say: SayOptions,
 }
 
-impl<C: FlowCommand> Job<C> {
+impl Job {
     fn start<const D: usize, O: Outlet<D>>(
         mut self,
         mut start: Start<D, O>,
@@ -265,37 +227,35 @@ impl<C: FlowCommand> Job<C> {
         let keep = self.command.shared().keep;
         start.outlet.turn(&mut keep.up)?;
         keep.save.as_deref().map_or(Ok(()), O::check_saved)?;
-        if C::NAME == FlowOptions::NAME {
-            self.round_edges(&mut start.field)?;
+        if let RunCommand::Flow(options) = &mut self.command {
+            sizes::round_edges(options, &mut start.field, &self.device, self.say)?;
         }
         let case = self.case(&start.name, start.field, start.region, &start.outlet)?;
-        let config = config::resolved(C::NAME, &self.command)?;
+        let options = config::resolved(self.command.shared().command, &self.command)?;
         let plan = self.plan(start.name, start.outlet);
-        plan.start(case, &config, &self.device)
-    }
-
-    /// Where area and volume are to be held, [rounds the edges](sizes::with_round_edges) of the start.
-    fn round_edges<const D: usize>(&mut self, field: &mut Field<D>) -> Result<(), Error> {
-        let scheme = self.command.shared().scheme.clone();
-        let options = self.command.willmore();
-        let Some(options) = options.filter(|options| options.holds_both()) else {
-            return Ok(());
+        let notes = plan.notes(&case, &self.device);
+        let run = Run::new(case, &self.device)?;
+        let folder = match &plan.keep.output {
+            Some(folder) => folder.clone(),
+            None => free_folder(&format!("{}-{}", plan.name, plan.command)),
         };
-        let operator = operator(&scheme, Method::Hybrid, field.grid())?;
-        let round = sizes::with_round_edges(options, field, operator, &self.device)?;
-        if let Some((round, note)) = round {
-            self.say.note(&note);
-            *field = round;
+        if plan.keep.force.force {
+            make_way(&folder)?;
         }
-        Ok(())
+        let inputs = plan.outlet.inputs()?;
+        let mut files = vec![(config::FILE, options.as_bytes())];
+        files.extend(inputs.iter().map(|(name, bytes)| (&**name, &bytes[..])));
+        let store = Store::create(folder, &files, &run, notes, plan.checkpoints())?;
+        plan.go_on(store, run)
     }
 
+    /// Continues a run from its last checkpoint, a finished one to more steps.
     fn resume<const D: usize, O: Outlet<D>>(
         mut self,
         stored: StoredRun,
         more: Option<usize>,
     ) -> Result<ExitCode, Error> {
-        let notes = engine::notes(&stored);
+        let mut notes = engine::notes(&stored).clone();
         let name = notes["about"]["name"].as_str().unwrap_or("run").to_owned();
         let mut outlet = O::deserialize(&notes["outlet"]).map_err(|reason| {
             let path = stored.path().display();
@@ -306,8 +266,17 @@ impl<C: FlowCommand> Job<C> {
         let (field, region) = engine::initial(&stored)?;
         outlet.restore(&stored)?;
         let case = self.case(&name, field, region, &outlet)?;
-        self.plan(name, outlet)
-            .resume(stored, case, &self.device, more)
+        let plan = self.plan(name, outlet);
+        let checkpoints = plan.checkpoints();
+        let (store, run) = match more {
+            Some(steps) => {
+                notes["steps"] = steps.into();
+                let with = (checkpoints, notes);
+                Store::extend(stored, case, &self.device, with, outlet::is_of_end)?
+            }
+            None => Store::resume(stored, case, &self.device, checkpoints)?,
+        };
+        plan.go_on(store, run)
     }
 
     fn case<const D: usize>(
@@ -317,13 +286,18 @@ impl<C: FlowCommand> Job<C> {
         region: Option<Vec<bool>>,
         outlet: &impl Outlet<D>,
     ) -> Result<Case<D>, Error> {
-        let method = self.command.method();
-        let options = self.command.willmore().map(|options| options.clone());
-        let (mut scales, operator) =
-            operator(self.command.shared().scheme, method, initial.grid())?;
-        let box_side = self.command.shared().input.box_side;
-        let unit = initial.grid().side() / box_side.unwrap_or(input::usual_box::<D>().1);
+        let Shared {
+            flow,
+            method,
+            scheme,
+            input,
+            ..
+        } = self.command.shared();
+        let (mut scales, operator) = scheme.operator(method, initial.grid())?;
+        let unit = initial.grid().side() / input.box_side.unwrap_or(usual_box::<D>().1);
         let rule = self.command.rule(&scales, unit);
+        let stops = self.command.shared().stops(rule);
+        let options = self.command.willmore();
         let steps = match rule {
             StepRule::Controlled => {
                 scales.newton = NewtonParams {
@@ -342,45 +316,44 @@ impl<C: FlowCommand> Job<C> {
                 TimeSteps::controlled(control)
             }
             rule => TimeSteps {
-                longest_move: (C::FLOW == Flow::Willmore).then_some(LONGEST_MOVE),
+                longest_move: (flow == Flow::Willmore).then_some(LONGEST_MOVE),
                 ..rule.into()
             },
         };
-        let mut stops = self.command.shared().stops(rule);
-        stops.extend(self.command.energy_ratio().map(Stop::EnergyRatio));
-        stops.extend(outlet.stops(&initial));
         let eps = scales.eps;
-        let (energy, held) = match &options {
-            Some(options) => {
-                let volume = outlet.volume();
-                (options.energy()?, options.held(&initial, eps, volume)?)
-            }
+        let known = outlet.known(&initial, eps)?;
+        let (energy, held) = match options {
+            Some(options) => (
+                options.energy()?,
+                options.held(&initial, eps, known.volume)?,
+            ),
             None => (Helfrich::default(), Held::default()),
         };
         let mut measures = vec![Measure::zero_set(eps, &held)];
-        measures.extend(outlet.measures(&initial, eps)?);
+        measures.extend(known.measures);
         Ok(Case {
             shape: name.to_owned(),
             initial,
             region,
             energy,
             held,
-            flow: C::FLOW,
+            flow,
             operator,
             scales,
             steps,
-            stops,
+            stops: [stops, known.stops].concat(),
             measures,
         })
     }
 
     fn plan<O>(&mut self, name: String, outlet: O) -> Plan<O> {
+        let shared = self.command.shared();
         Plan {
-            command: C::NAME,
+            command: shared.command,
             name,
             outlet,
-            format: self.command.format(),
-            keep: self.command.shared().keep.clone(),
+            format: shared.format,
+            keep: shared.keep.clone(),
             say: self.say,
         }
     }
