@@ -16,6 +16,16 @@ pub fn check_eps_over_h(eps_over_h: f64) -> Result<(), Error> {
     )))
 }
 
+/// Refuses values that are not positive.
+pub fn check_positive(name: &str, value: Option<f64>) -> Result<(), Error> {
+    match value {
+        Some(value) if !(value.is_finite() && value > 0.0) => {
+            Err(Error::options(format!("{name} {value} must be positive")))
+        }
+        _ => Ok(()),
+    }
+}
+
 impl CommonOptions {
     /// Opens the device and notes its name.
     pub fn open_device(&mut self) -> Result<ComputeDevice, Error> {

@@ -8,6 +8,7 @@ use crate::keep::Keep;
 use crate::own::OwnMesh;
 use crate::paths::{absolute, read};
 use crate::prelude::*;
+use crate::setup::check_positive;
 use crate::values::SizeTarget;
 
 /// Energies below this have only balls, which have `8 pi`.
@@ -39,14 +40,7 @@ impl FairOptions {
             || flow.time.is_some()
             || flow.energy.is_some()
             || flow.steps.is_some();
-        for (name, value) in [
-            ("--noise", self.noise),
-            ("--energy-ratio", self.energy_ratio),
-        ] {
-            if let Some(value) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
-                return Err(Error::options(format!("{name} {value} must be positive")));
-            }
-        }
+        check_positive("--noise", self.noise)?;
         let usual = if self.takes_small_steps() {
             graded(f64::NAN)
         } else {

@@ -11,6 +11,7 @@ use crate::paths::{absolute, extension};
 use crate::plane::Plane;
 use crate::prelude::*;
 use crate::run::{Plan, free_folder, make_way};
+use crate::setup::check_positive;
 use crate::sizes;
 use crate::space::Space;
 use crate::values::{Amount, Label};
@@ -108,11 +109,9 @@ impl Shared<'_> {
     /// Refuses what cannot be done before anything is computed.
     fn check(&mut self) -> Result<(), Error> {
         self.scheme.fill_in()?;
-        for (name, value) in [("--time", self.time), ("--energy", self.energy)] {
-            if let Some(value) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
-                return Err(Error::options(format!("{name} {value} must be positive")));
-            }
-        }
+        check_positive("--time", self.time)?;
+        check_positive("--energy", self.energy)?;
+        check_positive("--energy-ratio", self.energy_ratio)?;
         for (name, value) in [
             ("--steps", *self.steps),
             ("--frames", self.keep.frames),
