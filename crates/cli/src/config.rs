@@ -46,7 +46,7 @@ pub fn parse(arguments: &[OsString]) -> Result<Cli, Error> {
     // One more than accepted, of what may never end.
     let opened = File::open(file).map(|opened| opened.take(LONGEST as u64 + 1));
     let read = opened.and_then(|mut opened| opened.read_to_string(&mut text));
-    read.map_err(Error::io("read", file))?;
+    read.map_err(files::Error::of("read", file))?;
     parse_both(arguments, command, typed, &text, file)
 }
 

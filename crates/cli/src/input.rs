@@ -10,7 +10,7 @@ use surfaces::shapes::{self, BuiltIn};
 use crate::cli::{Holds, InputOptions, Inside, SayOptions};
 use crate::outlet::Topology;
 use crate::own::{OwnMesh, thinnest};
-use crate::paths::{absolute, extension};
+use crate::paths::{absolute, extension, read};
 use crate::plane::Plane;
 use crate::prelude::*;
 use crate::space::{Space, Voxels};
@@ -151,34 +151,33 @@ impl Source {
         stem.replace(other, "_")
     }
 
+    /// Refuses options that say nothing about such an input.
     fn refuse_foreign(&self, options: &InputOptions) -> Result<(), Error> {
-        let what = match self {
-            Self::Mesh(_) => "a mesh",
-            Self::Image(_) => "an image",
-            Self::Field(_) => "a field",
-            Self::Volume(_) => "a volume",
-            Self::BuiltIn(_) => "a built-in shape",
-            Self::Region(_) => "a region",
-        };
-        let is_image = matches!(self, Self::Image(_));
-        let is_volume = matches!(self, Self::Volume(_));
-        let is_field = matches!(self, Self::Field(_));
-        let is_vti = matches!(self, Self::Field(path) if extension(path) == "vti");
-        let has_side = !is_field && !matches!(self, Self::Region(_));
-        for (name, given, allowed) in [
-            ("--inside", options.inside.is_some(), is_image),
-            (
-                "--threshold",
-                options.threshold.is_some(),
-                is_image || is_volume,
+        let (what, allowed): (_, &[&str]) = match self {
+            Self::Mesh(_) => ("a mesh", &["--repair", "--side-length", "--box-side"]),
+            Self::Image(_) => (
+                "an image",
+                &["--inside", "--threshold", "--side-length", "--box-side"],
             ),
-            ("--label", options.label.is_some(), is_volume),
-            ("--holds", options.holds.is_some(), is_field),
-            ("--repair", options.repair, matches!(self, Self::Mesh(_))),
-            ("--side-length", options.side_length.is_some(), has_side),
-            ("--box-side", options.box_side.is_some(), !is_vti),
+            Self::Field(path) if extension(path) == "vti" => ("a field", &["--holds"]),
+            Self::Field(_) => ("a field", &["--holds", "--box-side"]),
+            Self::Volume(_) => (
+                "a volume",
+                &["--threshold", "--label", "--side-length", "--box-side"],
+            ),
+            Self::BuiltIn(_) => ("a built-in shape", &["--side-length", "--box-side"]),
+            Self::Region(_) => ("a region", &["--box-side"]),
+        };
+        for (name, given) in [
+            ("--inside", options.inside.is_some()),
+            ("--threshold", options.threshold.is_some()),
+            ("--label", options.label.is_some()),
+            ("--holds", options.holds.is_some()),
+            ("--repair", options.repair),
+            ("--side-length", options.side_length.is_some()),
+            ("--box-side", options.box_side.is_some()),
         ] {
-            if given && !allowed {
+            if given && !allowed.contains(&name) {
                 return Err(Error::options(format!(
                     "{name} has no meaning for {what}: leave it out"
                 )));
@@ -684,7 +683,7 @@ fn refuse_photographs(tones: &Tones, side: Side, path: &Path) -> Result<(), Erro
 
 /// Whether a file of values is meant to be in the plane; its reader says what is wrong with it.
 fn is_planar(path: &Path) -> Result<bool, Error> {
-    let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
+    let bytes = read(path)?;
     Ok(if extension(path) == "vti" {
         let layers = |nodes: [u64; 3]| nodes[2] > 1;
         !matches!(vti::decode::<2>(&bytes), Err(VtiError::NotCubical { nodes, .. }) if layers(nodes))

@@ -8,7 +8,7 @@ pub const MESHES: [&str; 3] = ["ply", "obj", "stl"];
 /// The path of a file from wherever the program may run later.
 pub fn absolute(path: impl AsRef<Path>) -> Result<PathBuf, Error> {
     let path = path.as_ref();
-    std::path::absolute(path).map_err(Error::io("find", path))
+    Ok(std::path::absolute(path).map_err(files::Error::of("find", path))?)
 }
 
 pub fn extension(path: &Path) -> String {
@@ -18,5 +18,5 @@ pub fn extension(path: &Path) -> String {
 
 pub fn read(path: impl AsRef<Path>) -> Result<Vec<u8>, Error> {
     let path = path.as_ref();
-    std::fs::read(path).map_err(Error::io("read", path))
+    Ok(std::fs::read(path).map_err(files::Error::of("read", path))?)
 }

@@ -381,7 +381,7 @@ impl<const D: usize, O: Outlet<D>> Observer<D> for Pictures<'_, O> {
 /// Removes the run in a folder, if there is one that nobody works on. A folder of something else stays.
 pub fn make_way(folder: &Path) -> Result<(), Error> {
     match RunDirectory::recover(folder) {
-        Ok(_) => std::fs::remove_dir_all(folder).map_err(Error::io("remove", folder)),
+        Ok(_) => Ok(std::fs::remove_dir_all(folder).map_err(files::Error::of("remove", folder))?),
         Err(locked @ runs::Error::Locked(_)) => Err(locked.into()),
         Err(_) => Ok(()),
     }
@@ -435,11 +435,11 @@ fn series(run: &Path, records: &[Record]) -> String {
 }
 
 fn frames(folder: &Path) -> Result<Vec<Picture>, Error> {
-    let entries = std::fs::read_dir(folder).map_err(Error::io("read", folder))?;
+    let entries = std::fs::read_dir(folder).map_err(files::Error::of("read", folder))?;
     let mut paths: Vec<PathBuf> = entries
         .map(|entry| Ok(entry?.path()))
         .collect::<Result<_, _>>()
-        .map_err(Error::io("read", folder))?;
+        .map_err(files::Error::of("read", folder))?;
     paths.retain(|path| extension(path) == "png");
     paths.sort();
     let read = |path: &PathBuf| Ok(Picture::from_png(&read(path)?)?);

@@ -26,14 +26,14 @@ impl Standard {
             let mut bytes = Vec::new();
             let name = "standard input";
             let read = std::io::stdin().read_to_end(&mut bytes);
-            read.map_err(Error::io("read", name))?;
+            read.map_err(files::Error::of("read", name))?;
             if bytes.is_empty() {
                 return Err(Error::options(
                     "standard input is empty: pipe a mesh, an image or a field into it",
                 ));
             }
             let path = stand_in("input", kind(&bytes));
-            std::fs::write(&path, bytes).map_err(Error::io("write", &path))?;
+            std::fs::write(&path, bytes).map_err(files::Error::of("write", &path))?;
             input.input = Some(path.to_string_lossy().into_owned());
             standard.input = Some(path);
         }
@@ -63,7 +63,7 @@ impl Standard {
             return Ok(());
         };
         let written = std::io::stdout().write_all(&read(path)?);
-        written.map_err(Error::io("write", "standard output"))
+        Ok(written.map_err(files::Error::of("write", "standard output"))?)
     }
 }
 

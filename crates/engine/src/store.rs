@@ -218,14 +218,12 @@ fn restore<const D: usize>(
     }
     check_identity(stored, &wanted)?;
     let grid = *case.grid();
-    let previous = if state.array("previous").is_some() {
-        let tau = read(stored, &state.notes["previous_tau"])?;
-        Some((field(stored, "previous", grid)?, tau))
-    } else {
-        None
+    let optional = |name: &str| {
+        let found = state.array(name).is_some();
+        found.then(|| field(stored, name, grid)).transpose()
     };
-    let rate = match state.array("rate") {
-        Some(_) => Some(field(stored, "rate", grid)?),
+    let previous = match optional("previous")? {
+        Some(previous) => Some((previous, read(stored, &state.notes["previous_tau"])?)),
         None => None,
     };
     let (mut half_motions, mut half) = (Vec::new(), grid);
@@ -236,7 +234,7 @@ fn restore<const D: usize>(
     let at = FlowState {
         current: field(stored, "current", grid)?,
         previous,
-        rate,
+        rate: optional("rate")?,
         half_motions,
         step: usize::try_from(state.step).map_err(|error| unreadable(stored, error))?,
         time: read(stored, &state.notes["time"])?,
