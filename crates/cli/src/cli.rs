@@ -2,7 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use engine::{Flow, Storage};
+use engine::Storage;
 
 use crate::paths::MESHES;
 use crate::prelude::*;
@@ -79,6 +79,7 @@ pub enum RunCommand {
     Inpaint(InpaintOptions),
     /// Mean curvature flow, by the network or by finite elements
     #[command(after_help = MCF_EXAMPLES)]
+    #[command(mut_arg("steps", |steps| steps.help(MCF_STEPS)), mut_arg("time", |time| time.help(MCF_TIME)))]
     Mcf(McfOptions),
 }
 
@@ -107,6 +108,9 @@ Regions are in the coordinates of the input: of the mesh or field, in pixels fro
 const MCF_EXAMPLES: &str = "Examples:
   willmore mcf logo.png --steps 64
   willmore mcf builtin:torus --method fe-implicit --frames 4";
+const MCF_STEPS: &str = "Stop after this many steps, of (eps/h)^2/4 cells squared each [default: 20, or 100000 with --time]";
+const MCF_TIME: &str =
+    "Stop with the step that reaches this time, a squared length in the units of the input";
 const SAMPLE_EXAMPLES: &str = "Examples:
   willmore sample builtin:figure --noise 0.005 --save scan.ply
   willmore sample builtin:ring --without ball:0.4,0.2,0.1 --save logo.png
@@ -292,10 +296,10 @@ pub struct SayOptions {
     pub json: bool,
 }
 
-/// Options of `flow`.
+/// Options of every command that makes runs.
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
-pub struct FlowOptions {
+pub struct RunOptions {
     #[command(flatten)]
     #[serde(flatten)]
     pub input: InputOptions,
@@ -303,6 +307,26 @@ pub struct FlowOptions {
     #[serde(flatten)]
     pub scheme: SchemeOptions,
 
+    /// Stop after this many steps [default: 20, or 1000 where something else ends the run]
+    #[arg(long, value_name = "COUNT")]
+    pub steps: Option<usize>,
+
+    /// Stop at this time, a length to the fourth power in the units of the input
+    #[arg(long, value_name = "T")]
+    pub time: Option<f64>,
+
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub keep: KeepOptions,
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub common: CommonOptions,
+}
+
+/// Options of `flow`.
+#[derive(Args, Serialize, Clone, Debug)]
+#[serde(rename_all = "kebab-case")]
+pub struct FlowOptions {
     /// Time steps: controlled (of second order, by their error), auto (by the energy), auto:FIRST, VALUE, doubling:FIRST,
     /// graded:FIRST,PART (of the time reached), growing:VALUE,COUNT, which doubles after so many, or ramp:VALUE,HALVINGS, whose first
     /// step is divided [default: controlled; inpaint: a ramp; fair: graded]
@@ -346,24 +370,13 @@ pub struct FlowOptions {
     #[arg(long, value_name = "P", allow_hyphen_values = true)]
     pub pressure: Option<f64>,
 
-    /// Stop after this many steps [default: 20, or 1000 where something else ends the run]
-    #[arg(long, value_name = "COUNT")]
-    pub steps: Option<usize>,
-
-    /// Stop at this time, a length to the fourth power in the units of the input
-    #[arg(long, value_name = "T")]
-    pub time: Option<f64>,
-
     /// Stop when the Willmore energy is no more than this; a sphere has 8 pi = 25.13, a circle of radius R pi / R
     #[arg(long, value_name = "W")]
     pub energy: Option<f64>,
 
     #[command(flatten)]
     #[serde(flatten)]
-    pub keep: KeepOptions,
-    #[command(flatten)]
-    #[serde(flatten)]
-    pub common: CommonOptions,
+    pub run: RunOptions,
 }
 
 /// Options of `fair`.
@@ -431,32 +444,15 @@ pub struct InpaintOptions {
 
 /// Options of `mcf`.
 #[derive(Args, Serialize, Clone, Debug)]
+#[serde(rename_all = "kebab-case")]
 pub struct McfOptions {
-    #[command(flatten)]
-    #[serde(flatten)]
-    pub input: InputOptions,
-    #[command(flatten)]
-    #[serde(flatten)]
-    pub scheme: SchemeOptions,
-
     /// By which step
     #[arg(long, value_name = "NAME", value_enum, default_value = "network")]
     pub method: Method,
 
-    /// Stop after this many steps, of (eps/h)^2/4 cells squared each [default: 20, or 100000 with --time]
-    #[arg(long, value_name = "COUNT")]
-    pub steps: Option<usize>,
-
-    /// Stop with the step that reaches this time, a squared length in the units of the input
-    #[arg(long, value_name = "T")]
-    pub time: Option<f64>,
-
     #[command(flatten)]
     #[serde(flatten)]
-    pub keep: KeepOptions,
-    #[command(flatten)]
-    #[serde(flatten)]
-    pub common: CommonOptions,
+    pub run: RunOptions,
 }
 
 /// Options of `sample`.
@@ -569,81 +565,33 @@ pub struct TrainOptions {
     pub common: CommonOptions,
 }
 
-/// What all commands that make runs have.
-pub struct Shared<'a> {
-    pub command: &'static str,
-    pub flow: Flow,
-    pub method: Method,
-    pub input: &'a mut InputOptions,
-    pub scheme: &'a mut SchemeOptions,
-    pub steps: &'a mut Option<usize>,
-    /// Steps where something else ends the run.
-    pub many_steps: usize,
-    pub time: Option<f64>,
-    pub energy: Option<f64>,
-    /// The Willmore energy at which it ends, as a part of that at the beginning.
-    pub energy_ratio: Option<f64>,
-    /// The extension of meshes, if it is not the usual one.
-    pub format: Option<String>,
-    pub keep: &'a mut KeepOptions,
-    pub common: &'a mut CommonOptions,
-}
-
 impl RunCommand {
-    pub fn shared(&mut self) -> Shared<'_> {
+    pub fn name(&self) -> &'static str {
         match self {
-            Self::Flow(flow) => flow.shared("flow"),
-            Self::Fair(fair) => Shared {
-                energy_ratio: fair.energy_ratio,
-                format: fair.format.clone(),
-                ..fair.flow.shared("fair")
-            },
-            Self::Inpaint(inpaint) => inpaint.flow.shared("inpaint"),
-            Self::Mcf(mcf) => Shared {
-                command: "mcf",
-                flow: Flow::MeanCurvature,
-                method: mcf.method,
-                input: &mut mcf.input,
-                scheme: &mut mcf.scheme,
-                steps: &mut mcf.steps,
-                many_steps: 100_000,
-                time: mcf.time,
-                energy: None,
-                energy_ratio: None,
-                format: None,
-                keep: &mut mcf.keep,
-                common: &mut mcf.common,
-            },
+            Self::Flow(_) => "flow",
+            Self::Fair(_) => "fair",
+            Self::Inpaint(_) => "inpaint",
+            Self::Mcf(_) => "mcf",
+        }
+    }
+
+    /// What it has in common with all others.
+    pub fn options(&mut self) -> &mut RunOptions {
+        match self {
+            Self::Flow(flow) => &mut flow.run,
+            Self::Fair(fair) => &mut fair.flow.run,
+            Self::Inpaint(inpaint) => &mut inpaint.flow.run,
+            Self::Mcf(mcf) => &mut mcf.run,
         }
     }
 
     /// The options of Willmore flow; mean curvature flow has no energy and no controlled steps.
-    pub fn willmore(&mut self) -> Option<&mut FlowOptions> {
+    pub fn willmore(&self) -> Option<&FlowOptions> {
         match self {
             Self::Flow(flow) => Some(flow),
-            Self::Fair(fair) => Some(&mut fair.flow),
-            Self::Inpaint(inpaint) => Some(&mut inpaint.flow),
+            Self::Fair(fair) => Some(&fair.flow),
+            Self::Inpaint(inpaint) => Some(&inpaint.flow),
             Self::Mcf(_) => None,
-        }
-    }
-}
-
-impl FlowOptions {
-    fn shared(&mut self, command: &'static str) -> Shared<'_> {
-        Shared {
-            command,
-            flow: Flow::Willmore,
-            method: Method::Hybrid,
-            input: &mut self.input,
-            scheme: &mut self.scheme,
-            steps: &mut self.steps,
-            many_steps: 1000,
-            time: self.time,
-            energy: self.energy,
-            energy_ratio: None,
-            format: None,
-            keep: &mut self.keep,
-            common: &mut self.common,
         }
     }
 }

@@ -66,7 +66,7 @@ pub fn round_edges<const D: usize>(
     if !(both || options.reduced_volume.is_some()) {
         return Ok(());
     }
-    let (scales, operator) = options.scheme.operator(Method::Hybrid, start.grid())?;
+    let (scales, operator) = options.run.scheme.operator(Method::Hybrid, start.grid())?;
     let eps = scales.eps;
     let sharp = ZeroSet::of(start, eps)?;
     if sharp.sizes_hold() {

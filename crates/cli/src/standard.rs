@@ -81,8 +81,8 @@ fn paths(command: &mut Command) -> Option<(&mut InputOptions, &mut Option<PathBu
     match command {
         Command::Sample(sample) => Some((&mut sample.input, &mut sample.save)),
         Command::Run(command) => {
-            let shared = command.shared();
-            Some((shared.input, &mut shared.keep.save))
+            let options = command.options();
+            Some((&mut options.input, &mut options.keep.save))
         }
         _ => None,
     }

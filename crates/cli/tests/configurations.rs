@@ -32,7 +32,7 @@ fn text(cli: &Cli) -> Option<String> {
     let Command::Run(command) = &cli.command else {
         return None;
     };
-    resolved(command.clone().shared().command, command).ok()
+    resolved(command.name(), command).ok()
 }
 
 fn utf8(bytes: &[u8]) -> Result<&str, Error> {
@@ -109,7 +109,7 @@ fn named_configurations() {
             let Command::Run(RunCommand::Flow(options)) = &cli.command else {
                 panic!("{cli:?}");
             };
-            assert_eq!(options.input.input.as_deref(), Some("a.ply"));
+            assert_eq!(options.run.input.input.as_deref(), Some("a.ply"));
         });
 }
 

@@ -37,16 +37,17 @@ impl FairOptions {
     pub fn check(&mut self) -> Result<(), Error> {
         let flow = &self.flow;
         self.ends = self.energy_ratio.is_some()
-            || flow.time.is_some()
+            || flow.run.time.is_some()
             || flow.energy.is_some()
-            || flow.steps.is_some();
+            || flow.run.steps.is_some();
         check_positive("--noise", self.noise)?;
+        check_positive("--energy-ratio", self.energy_ratio)?;
         let usual = if self.takes_small_steps() {
             graded(f64::NAN)
         } else {
             StepRule::Controlled
         };
-        self.flow.check_tolerance(usual)?;
+        self.flow.check(usual)?;
         if let Some(ratio) = self.energy_ratio.filter(|ratio| *ratio >= 1.0) {
             return Err(Error::options(format!(
                 "--energy-ratio {ratio} is reached before the first step: give a part below 1"
@@ -62,14 +63,19 @@ impl FairOptions {
     }
 
     pub fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
-        let eps_over_h = self.flow.scheme.eps_over_h();
-        let mut reader = Reader::of(&mut self.flow.input, eps_over_h, say)?;
+        let eps_over_h = self.flow.run.scheme.eps_over_h();
+        let mut reader = Reader::of(&mut self.flow.run.input, eps_over_h, say)?;
         let loaded = match reader.source.clone() {
             Source::Mesh(path) => return self.load_mesh(&path, say),
             Source::Volume(_) if self.noise.is_some() || self.keep.is_some() => {
-                return Err(Error::options(
-                    "--noise and --keep have no meaning for a volume, of which a new mesh is made: leave them out",
-                ));
+                let given = if self.noise.is_some() {
+                    "--noise"
+                } else {
+                    "--keep"
+                };
+                return Err(Error::options(format!(
+                    "{given} has no meaning for a volume, of which a new mesh is made: leave it out"
+                )));
             }
             Source::Volume(_) => {
                 let mut loaded = reader.load()?;
@@ -82,7 +88,7 @@ impl FairOptions {
                     && let Some(voxels) = start.outlet.voxels.as_mut().filter(|_| !self.ends)
                 {
                     voxels.farthest = Some(FARTHEST * voxels.side);
-                    flow.time = Some((STEPS * voxels.side).powi(4));
+                    flow.run.time = Some((STEPS * voxels.side).powi(4));
                     flow.tau.get_or_insert(graded(start.field.grid().spacing()));
                 }
                 loaded
@@ -104,7 +110,7 @@ impl FairOptions {
     }
 
     fn load_mesh(&mut self, path: &Path, say: SayOptions) -> Result<Loaded, Error> {
-        let repairs = self.flow.input.repair;
+        let repairs = self.flow.run.input.repair;
         if repairs && !self.remesh {
             return Err(Error::options(
                 "--repair makes a new mesh: write it by `willmore sample --repair --save`, which can then be faired, or give --remesh",
@@ -133,13 +139,13 @@ impl FairOptions {
             ));
             self.noise = Some(noise);
         }
-        let eps_over_h = self.flow.scheme.eps_over_h();
-        Reader::of(&mut self.flow.input, eps_over_h, say)?.own(own, path, self.allow_loss)
+        let eps_over_h = self.flow.run.scheme.eps_over_h();
+        Reader::of(&mut self.flow.run.input, eps_over_h, say)?.own(own, path, self.allow_loss)
     }
 
     pub fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
         if self.takes_small_steps() {
-            let spacing = scales.eps / self.flow.scheme.eps_over_h();
+            let spacing = scales.eps / self.flow.run.scheme.eps_over_h();
             self.flow.tau.get_or_insert(graded(spacing));
         }
         self.flow.rule(scales, unit)

@@ -3,7 +3,7 @@
 use engine::{ErrorControl, Flow, Held, Helfrich, Store, TimeSteps};
 use solver::NewtonParams;
 
-use crate::cli::{FlowOptions, RunCommand, SayOptions, Shared};
+use crate::cli::{FlowOptions, RunCommand, RunOptions, SayOptions};
 use crate::config;
 use crate::input::{Loaded, Reader, Start, usual_box};
 use crate::outlet::{self, Outlet};
@@ -17,8 +17,6 @@ use crate::space::Space;
 use crate::values::{Amount, Label};
 use crate::volume;
 
-/// Steps of a run that has no other end.
-const STEPS: usize = 20;
 /// In a step the interface moves by at most so many widths of it.
 const LONGEST_MOVE: f64 = 2.0;
 const SAVED: [&str; 5] = ["ply", "obj", "stl", "png", "svg"];
@@ -27,22 +25,26 @@ impl RunCommand {
     /// Refuses options before anything is read.
     fn check(&mut self) -> Result<(), Error> {
         match self {
-            Self::Flow(flow) => flow.check_tolerance(StepRule::Controlled)?,
-            Self::Fair(fair) => fair.check()?,
-            Self::Inpaint(inpaint) => inpaint.check()?,
-            Self::Mcf(mcf) => mcf.check()?,
+            Self::Flow(flow) => flow.check(StepRule::Controlled),
+            Self::Fair(fair) => fair.check(),
+            Self::Inpaint(inpaint) => inpaint.check(),
+            Self::Mcf(mcf) => mcf.check(),
         }
-        Ok(())
     }
 
-    /// Whether something besides the number of steps ends it.
-    fn has_an_end(&mut self) -> bool {
+    /// How many steps are made unless it is said: few, or many where something else ends the run; those of mean curvature flow are short.
+    fn usual_steps(&mut self) -> usize {
         let fairs = match self {
             Self::Fair(fair) => fair.noise.is_some() || fair.energy_ratio.is_some() || !fair.ends,
             _ => false,
         };
-        let shared = self.shared();
-        fairs || shared.time.is_some() || shared.energy.is_some()
+        let energy = self.willmore().and_then(|flow| flow.energy);
+        let has_an_end = fairs || energy.is_some() || self.options().time.is_some();
+        match self {
+            _ if !has_an_end => 20,
+            Self::Mcf(_) => 100_000,
+            _ => 1000,
+        }
     }
 
     /// The input, as it is before it flows.
@@ -51,7 +53,7 @@ impl RunCommand {
             Self::Fair(fair) => fair.load(say),
             Self::Inpaint(inpaint) => inpaint.load(say),
             Self::Flow(_) | Self::Mcf(_) => {
-                let Shared { input, scheme, .. } = self.shared();
+                let RunOptions { input, scheme, .. } = self.options();
                 Reader::of(input, scheme.eps_over_h(), say)?.load()
             }
         }
@@ -67,6 +69,23 @@ impl RunCommand {
             Self::Mcf(_) => StepRule::Constant(scales.mcf_step),
         }
     }
+
+    fn stops(&mut self, rule: StepRule) -> Vec<Stop> {
+        // What has gone wrong is said before what was asked for.
+        let mut stops = vec![Stop::Vanished, Stop::NoSurface, Stop::AtTheSide];
+        let options = self.options();
+        stops.extend(options.steps.map(Stop::Steps));
+        stops.extend(options.time.map(Stop::Time));
+        let energy = self.willmore().and_then(|flow| flow.energy);
+        stops.extend(energy.map(Stop::Energy));
+        if matches!(rule, StepRule::ByEnergy(_) | StepRule::Controlled) {
+            stops.push(Stop::EnergyAtRest);
+        }
+        if let Self::Fair(fair) = self {
+            stops.extend(fair.energy_ratio.map(Stop::EnergyRatio));
+        }
+        stops
+    }
 }
 
 impl FlowOptions {
@@ -77,8 +96,9 @@ impl FlowOptions {
             .insert(rule.resolved(scales.mcf_step * unit.powi(2)))
     }
 
-    /// Refuses a tolerance that the time steps do not look at.
-    pub fn check_tolerance(&self, usual: StepRule) -> Result<(), Error> {
+    /// Refuses a tolerance that the time steps do not look at, and energies that nothing has.
+    pub fn check(&self, usual: StepRule) -> Result<(), Error> {
+        check_positive("--energy", self.energy)?;
         match self.tolerance {
             Some(tolerance) if self.tau.unwrap_or(usual) != StepRule::Controlled => {
                 Err(Error::options(format!(
@@ -105,15 +125,13 @@ impl FlowOptions {
     }
 }
 
-impl Shared<'_> {
+impl RunOptions {
     /// Refuses what cannot be done before anything is computed.
     fn check(&mut self) -> Result<(), Error> {
         self.scheme.fill_in()?;
         check_positive("--time", self.time)?;
-        check_positive("--energy", self.energy)?;
-        check_positive("--energy-ratio", self.energy_ratio)?;
         for (name, value) in [
-            ("--steps", *self.steps),
+            ("--steps", self.steps),
             ("--frames", self.keep.frames),
             ("--checkpoint-every", Some(self.keep.checkpoint_every)),
         ] {
@@ -141,19 +159,6 @@ impl Shared<'_> {
         }
         Ok(())
     }
-
-    fn stops(&self, rule: StepRule) -> Vec<Stop> {
-        // What has gone wrong is said before what was asked for.
-        let mut stops = vec![Stop::Vanished, Stop::NoSurface, Stop::AtTheSide];
-        stops.extend(self.steps.map(Stop::Steps));
-        stops.extend(self.time.map(Stop::Time));
-        stops.extend(self.energy.map(Stop::Energy));
-        if matches!(rule, StepRule::ByEnergy(_) | StepRule::Controlled) {
-            stops.push(Stop::EnergyAtRest);
-        }
-        stops.extend(self.energy_ratio.map(Stop::EnergyRatio));
-        stops
-    }
 }
 
 /// Makes a run, or continues one that is stored, perhaps to more steps.
@@ -162,22 +167,21 @@ pub fn run(
     say: SayOptions,
     stored: Option<(StoredRun, Option<usize>)>,
 ) -> Result<ExitCode, Error> {
-    if let Some(labels) = volume::all_labels(command.shared().input)? {
+    if let Some(labels) = volume::all_labels(&command.options().input)? {
         return each_label(&command, &labels, say);
     }
     command.check()?;
-    let ends = command.has_an_end();
-    let mut shared = command.shared();
-    let steps = if ends { shared.many_steps } else { STEPS };
-    shared.steps.get_or_insert(steps);
+    let steps = command.usual_steps();
+    let options = command.options();
+    options.steps.get_or_insert(steps);
     if let Some((stored, more)) = &stored {
         // A run that has gone on once notes its steps.
         let noted = engine::notes(stored)["steps"].as_u64();
         let steps = more.or(noted.map(|steps| steps as usize));
-        *shared.steps = steps.or(*shared.steps);
+        options.steps = steps.or(options.steps);
     }
-    shared.check()?;
-    let device = shared.common.open_device()?;
+    options.check()?;
+    let device = options.common.open_device()?;
     let mut job = Job {
         command,
         device,
@@ -199,7 +203,7 @@ pub fn run(
 fn each_label(command: &RunCommand, labels: &[i64], say: SayOptions) -> Result<ExitCode, Error> {
     for &label in labels {
         let mut one = command.clone();
-        let Shared { input, keep, .. } = one.shared();
+        let RunOptions { input, keep, .. } = one.options();
         input.label = Some(Label::One(label));
         for name in keep.output.iter_mut().chain(&mut keep.save) {
             *name = volume::named(name, label);
@@ -223,14 +227,14 @@ impl Job {
         mut self,
         mut start: Start<D, O>,
     ) -> Result<ExitCode, Error> {
-        let keep = self.command.shared().keep;
+        let keep = &mut self.command.options().keep;
         start.outlet.turn(&mut keep.up)?;
         keep.save.as_deref().map_or(Ok(()), O::check_saved)?;
         if let RunCommand::Flow(options) = &mut self.command {
             sizes::round_edges(options, &mut start.field, &self.device, self.say)?;
         }
         let case = self.case(&start.name, start.field, start.region, &start.outlet)?;
-        let options = config::resolved(self.command.shared().command, &self.command)?;
+        let options = config::resolved(self.command.name(), &self.command)?;
         let plan = self.plan(start.name, start.outlet);
         let notes = plan.notes(&case, &self.device);
         let run = Run::new(case, &self.device)?;
@@ -285,17 +289,15 @@ impl Job {
         region: Option<Vec<bool>>,
         outlet: &impl Outlet<D>,
     ) -> Result<Case<D>, Error> {
-        let Shared {
-            flow,
-            method,
-            scheme,
-            input,
-            ..
-        } = self.command.shared();
+        let (flow, method) = match &self.command {
+            RunCommand::Mcf(mcf) => (Flow::MeanCurvature, mcf.method),
+            _ => (Flow::Willmore, Method::Hybrid),
+        };
+        let RunOptions { scheme, input, .. } = self.command.options();
         let (mut scales, operator) = scheme.operator(method, initial.grid())?;
         let unit = initial.grid().side() / input.box_side.unwrap_or(usual_box::<D>().1);
         let rule = self.command.rule(&scales, unit);
-        let stops = self.command.shared().stops(rule);
+        let stops = self.command.stops(rule);
         let options = self.command.willmore();
         let steps = match rule {
             StepRule::Controlled => {
@@ -304,7 +306,7 @@ impl Job {
                     ..NewtonParams::second_order()
                 };
                 let mut control = ErrorControl::default();
-                match options.as_ref().and_then(|options| options.tolerance) {
+                match options.and_then(|options| options.tolerance) {
                     Some(Amount::Value(length)) => control.length = Some(length),
                     Some(Amount::Percent(percent)) => control.relative = percent / 100.0,
                     None => (),
@@ -346,13 +348,16 @@ impl Job {
     }
 
     fn plan<O>(&mut self, name: String, outlet: O) -> Plan<O> {
-        let shared = self.command.shared();
+        let format = match &self.command {
+            RunCommand::Fair(fair) => fair.format.clone(),
+            _ => None,
+        };
         Plan {
-            command: shared.command,
+            command: self.command.name(),
             name,
             outlet,
-            format: shared.format,
-            keep: shared.keep.clone(),
+            format,
+            keep: self.command.options().keep.clone(),
             say: self.say,
         }
     }

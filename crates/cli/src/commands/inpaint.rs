@@ -13,7 +13,7 @@ const HALVINGS: u32 = 12;
 
 impl InpaintOptions {
     pub fn check(&mut self) -> Result<(), Error> {
-        self.flow.check_tolerance(usual(f64::NAN))?;
+        self.flow.check(usual(f64::NAN))?;
         let mask = self.mask()?;
         if !Region::is_meant(mask) {
             let absolute = absolute(mask)?;
@@ -23,8 +23,8 @@ impl InpaintOptions {
     }
 
     pub fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
-        let eps_over_h = self.flow.scheme.eps_over_h();
-        let loaded = Reader::of(&mut self.flow.input, eps_over_h, say)?.load()?;
+        let eps_over_h = self.flow.run.scheme.eps_over_h();
+        let loaded = Reader::of(&mut self.flow.run.input, eps_over_h, say)?.load()?;
         let mask = self.mask()?;
         Ok(match loaded {
             Loaded::Plane(mut start) => {
@@ -69,7 +69,7 @@ impl InpaintOptions {
                 grid.side()
             )));
         }
-        let eps = self.flow.scheme.eps_over_h() * grid.spacing();
+        let eps = self.flow.run.scheme.eps_over_h() * grid.spacing();
         let inner = match &self.ansatz {
             Ansatz::Keep => start.field.clone(),
             Ansatz::Empty => Field::constant(grid, -1.0),

@@ -7,7 +7,7 @@ impl McfOptions {
     pub fn check(&self) -> Result<(), Error> {
         let SchemeOptions {
             scheme, network, ..
-        } = &self.scheme;
+        } = &self.run.scheme;
         let chosen = network.is_some() || *scheme != Scheme::Accurate;
         if chosen && !self.method.is_learned() {
             return Err(Error::options(

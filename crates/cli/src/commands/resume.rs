@@ -20,7 +20,7 @@ pub fn run(options: &ResumeOptions, say: SayOptions) -> Result<ExitCode, Error> 
             "{path} names no command that makes runs"
         )));
     };
-    let keep = command.shared().keep;
+    let keep = &mut command.options().keep;
     keep.force = options.force;
     if !stored.is_finished() || options.steps.is_some() {
         return flow::run(command, say, Some((stored, options.steps)));
