@@ -2,13 +2,11 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use derive_more::Display;
 use engine::Storage;
-use model::Network;
 
-use crate::ansatz::Ansatz;
-use crate::commands::check_eps_over_h;
+use crate::paths::MESHES;
 use crate::prelude::*;
+use crate::values::{Amount, Ansatz, Label, SizeTarget};
 
 const EXIT_CODES: &str = "Exit codes: 0 success; 2 bad input or failure, one line on standard error; 130 interrupted (Ctrl-C): \
 the last step was finished and stored, `willmore resume` goes on.";
@@ -30,22 +28,13 @@ pub struct Cli {
 
 /// The subcommands.
 #[derive(Subcommand, Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one of them")]
 pub enum Command {
-    /// Willmore flow of a mesh, an image, a field or a built-in shape
-    #[command(after_help = FLOW_EXAMPLES)]
-    Flow(FlowOptions),
+    #[command(flatten)]
+    Run(RunCommand),
     /// Continue an interrupted run, to the same final bytes as if it had not been interrupted
     #[command(after_help = RESUME_EXAMPLES)]
     Resume(ResumeOptions),
-    /// Take the noise off a mesh, whose vertices move while all else of the file stays, or the voxels off a segmentation
-    #[command(after_help = FAIR_EXAMPLES)]
-    Fair(FairOptions),
-    /// Fill a region of a shape smoothly; everything outside stays bit for bit
-    #[command(after_help = INPAINT_EXAMPLES)]
-    Inpaint(InpaintOptions),
-    /// Mean curvature flow, by the network or by finite elements
-    #[command(after_help = MCF_EXAMPLES)]
-    Mcf(McfOptions),
     /// Write a built-in shape or another input to a file, possibly with noise and holes: something to try the program on
     #[command(after_help = SAMPLE_EXAMPLES)]
     Sample(SampleOptions),
@@ -75,6 +64,25 @@ pub enum Command {
     Man,
 }
 
+/// The subcommands that make runs.
+#[derive(Subcommand, Serialize, Clone, Debug)]
+#[serde(untagged)]
+pub enum RunCommand {
+    /// Willmore flow of a mesh, an image, a field or a built-in shape
+    #[command(after_help = FLOW_EXAMPLES)]
+    Flow(FlowOptions),
+    /// Take the noise off a mesh, whose vertices move while all else of the file stays, or the voxels off a segmentation
+    #[command(after_help = FAIR_EXAMPLES)]
+    Fair(FairOptions),
+    /// Fill a region of a shape smoothly; everything outside stays bit for bit
+    #[command(after_help = INPAINT_EXAMPLES)]
+    Inpaint(InpaintOptions),
+    /// Mean curvature flow, by the network or by finite elements
+    #[command(after_help = MCF_EXAMPLES)]
+    #[command(mut_arg("steps", |steps| steps.help(MCF_STEPS)), mut_arg("time", |time| time.help(MCF_TIME)))]
+    Mcf(McfOptions),
+}
+
 const FLOW_EXAMPLES: &str = "Examples:
   willmore flow bunny.ply --steps 12 --output runs/bunny
   willmore flow logo.png --frames 1 --save smooth.svg
@@ -100,6 +108,9 @@ Regions are in the coordinates of the input: of the mesh or field, in pixels fro
 const MCF_EXAMPLES: &str = "Examples:
   willmore mcf logo.png --steps 64
   willmore mcf builtin:torus --method fe-implicit --frames 4";
+const MCF_STEPS: &str = "Stop after this many steps, of (eps/h)^2/4 cells squared each [default: 20, or 100000 with --time]";
+const MCF_TIME: &str =
+    "Stop with the step that reaches this time, a squared length in the units of the input";
 const SAMPLE_EXAMPLES: &str = "Examples:
   willmore sample builtin:figure --noise 0.005 --save scan.ply
   willmore sample builtin:ring --without ball:0.4,0.2,0.1 --save logo.png
@@ -285,78 +296,10 @@ pub struct SayOptions {
     pub json: bool,
 }
 
-/// A value in the units of the input, or a part of another one in percent.
-#[derive(Clone, Copy, Debug, PartialEq, Display)]
-pub enum Amount {
-    Value(f64),
-    #[display("{_0}%")]
-    Percent(f64),
-}
-
-impl Amount {
-    fn parse(text: &str, expected: &str) -> Result<Self, String> {
-        let (number, amount): (_, fn(f64) -> Self) = match text.strip_suffix('%') {
-            Some(percent) => (percent, Self::Percent),
-            None => (text, Self::Value),
-        };
-        match number.parse::<f64>() {
-            Ok(value) if value.is_finite() && value > 0.0 => Ok(amount(value)),
-            _ => Err(format!("{number:?} is no positive number; give {expected}")),
-        }
-    }
-}
-
-impl Serialize for Amount {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
-
-/// What a size is to become.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum SizeTarget {
-    /// What it is at the beginning.
-    Keep,
-    /// This, or this part of what it is at the beginning.
-    #[serde(untagged)]
-    To(Amount),
-}
-
-impl SizeTarget {
-    /// The value, for a size that is `now` at the beginning.
-    pub fn of(self, now: f64) -> f64 {
-        match self {
-            Self::Keep => now,
-            Self::To(Amount::Value(value)) => value,
-            Self::To(Amount::Percent(percent)) => percent / 100.0 * now,
-        }
-    }
-}
-
-impl FromStr for SizeTarget {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let expected = "keep, a value, or a part of the beginning in percent, such as 90%";
-        match text {
-            "keep" => Ok(Self::Keep),
-            text => Amount::parse(text, expected).map(Self::To),
-        }
-    }
-}
-
-fn tolerance(text: &str) -> Result<Amount, String> {
-    Amount::parse(
-        text,
-        "a length, or a part of the motion in percent, such as 2%",
-    )
-}
-
-/// Options of `flow`.
+/// Options of every command that makes runs.
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
-pub struct FlowOptions {
+pub struct RunOptions {
     #[command(flatten)]
     #[serde(flatten)]
     pub input: InputOptions,
@@ -364,6 +307,26 @@ pub struct FlowOptions {
     #[serde(flatten)]
     pub scheme: SchemeOptions,
 
+    /// Stop after this many steps [default: 20, or 1000 where something else ends the run]
+    #[arg(long, value_name = "COUNT")]
+    pub steps: Option<usize>,
+
+    /// Stop at this time, a length to the fourth power in the units of the input
+    #[arg(long, value_name = "T")]
+    pub time: Option<f64>,
+
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub keep: KeepOptions,
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub common: CommonOptions,
+}
+
+/// Options of `flow`.
+#[derive(Args, Serialize, Clone, Debug)]
+#[serde(rename_all = "kebab-case")]
+pub struct FlowOptions {
     /// Time steps: controlled (of second order, by their error), auto (by the energy), auto:FIRST, VALUE, doubling:FIRST,
     /// graded:FIRST,PART (of the time reached), growing:VALUE,COUNT, which doubles after so many, or ramp:VALUE,HALVINGS, whose first
     /// step is divided [default: controlled; inpaint: a ramp; fair: graded]
@@ -372,7 +335,7 @@ pub struct FlowOptions {
 
     /// The estimated time error that controlled steps may make: a LENGTH in the units of the input for the whole run, or for each step a
     /// part of how far the surface moves in it in percent [default: 1.5%]
-    #[arg(long, value_name = "LENGTH", value_parser = tolerance, allow_hyphen_values = true)]
+    #[arg(long, value_name = "LENGTH", value_parser = Amount::tolerance, allow_hyphen_values = true)]
     pub tolerance: Option<Amount>,
 
     /// Hold the volume (the area of a plane shape): keep, a VALUE in the units of the input, or PERCENT of that at the beginning, as 90%;
@@ -407,24 +370,13 @@ pub struct FlowOptions {
     #[arg(long, value_name = "P", allow_hyphen_values = true)]
     pub pressure: Option<f64>,
 
-    /// Stop after this many steps [default: 20, or 1000 where something else ends the run]
-    #[arg(long, value_name = "COUNT")]
-    pub steps: Option<usize>,
-
-    /// Stop at this time, a length to the fourth power in the units of the input
-    #[arg(long, value_name = "T")]
-    pub time: Option<f64>,
-
     /// Stop when the Willmore energy is no more than this; a sphere has 8 pi = 25.13, a circle of radius R pi / R
     #[arg(long, value_name = "W")]
     pub energy: Option<f64>,
 
     #[command(flatten)]
     #[serde(flatten)]
-    pub keep: KeepOptions,
-    #[command(flatten)]
-    #[serde(flatten)]
-    pub common: CommonOptions,
+    pub run: RunOptions,
 }
 
 /// Options of `fair`.
@@ -492,32 +444,15 @@ pub struct InpaintOptions {
 
 /// Options of `mcf`.
 #[derive(Args, Serialize, Clone, Debug)]
+#[serde(rename_all = "kebab-case")]
 pub struct McfOptions {
-    #[command(flatten)]
-    #[serde(flatten)]
-    pub input: InputOptions,
-    #[command(flatten)]
-    #[serde(flatten)]
-    pub scheme: SchemeOptions,
-
     /// By which step
     #[arg(long, value_name = "NAME", value_enum, default_value = "network")]
     pub method: Method,
 
-    /// Stop after this many steps, of (eps/h)^2/4 cells squared each [default: 20, or 100000 with --time]
-    #[arg(long, value_name = "COUNT")]
-    pub steps: Option<usize>,
-
-    /// Stop with the step that reaches this time, a squared length in the units of the input
-    #[arg(long, value_name = "T")]
-    pub time: Option<f64>,
-
     #[command(flatten)]
     #[serde(flatten)]
-    pub keep: KeepOptions,
-    #[command(flatten)]
-    #[serde(flatten)]
-    pub common: CommonOptions,
+    pub run: RunOptions,
 }
 
 /// Options of `sample`.
@@ -630,17 +565,34 @@ pub struct TrainOptions {
     pub common: CommonOptions,
 }
 
-impl Command {
-    /// The input of a command that makes runs, and what it keeps.
-    pub fn of_run(&mut self) -> Option<(&mut InputOptions, &mut KeepOptions)> {
-        let flow = match self {
-            Self::Mcf(mcf) => return Some((&mut mcf.input, &mut mcf.keep)),
-            Self::Flow(flow) => flow,
-            Self::Fair(fair) => &mut fair.flow,
-            Self::Inpaint(inpaint) => &mut inpaint.flow,
-            _ => return None,
-        };
-        Some((&mut flow.input, &mut flow.keep))
+impl RunCommand {
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Flow(_) => "flow",
+            Self::Fair(_) => "fair",
+            Self::Inpaint(_) => "inpaint",
+            Self::Mcf(_) => "mcf",
+        }
+    }
+
+    /// What it has in common with all others.
+    pub fn options(&mut self) -> &mut RunOptions {
+        match self {
+            Self::Flow(flow) => &mut flow.run,
+            Self::Fair(fair) => &mut fair.flow.run,
+            Self::Inpaint(inpaint) => &mut inpaint.flow.run,
+            Self::Mcf(mcf) => &mut mcf.run,
+        }
+    }
+
+    /// The options of Willmore flow; mean curvature flow has no energy and no controlled steps.
+    pub fn willmore(&self) -> Option<&FlowOptions> {
+        match self {
+            Self::Flow(flow) => Some(flow),
+            Self::Fair(fair) => Some(&fair.flow),
+            Self::Inpaint(inpaint) => Some(&inpaint.flow),
+            Self::Mcf(_) => None,
+        }
     }
 }
 
@@ -648,15 +600,6 @@ impl SchemeOptions {
     /// Interface width in cells.
     pub fn eps_over_h(&self) -> f64 {
         self.eps_over_h.unwrap_or(2.0)
-    }
-
-    /// Takes the width of the interface from the network, unless it is given.
-    pub fn fill_in(&mut self) -> Result<(), Error> {
-        if let (None, Some(path)) = (self.eps_over_h, &self.network) {
-            self.eps_over_h = Some(Network::load(path)?.ratios().eps_over_h);
-        }
-        self.eps_over_h = Some(self.eps_over_h());
-        check_eps_over_h(self.eps_over_h())
     }
 }
 

@@ -13,7 +13,6 @@ use std::ffi::OsString;
 use std::fs::File;
 use std::io::Read;
 
-use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
 use toml::{Table, Value};
 
@@ -36,22 +35,22 @@ fn program() -> clap::Command {
 /// What was typed, together with the configuration file it names.
 pub fn parse(arguments: &[OsString]) -> Result<Cli, Error> {
     let matches = program().try_get_matches_from(arguments)?;
-    let Some((command, typed)) = matches.subcommand() else {
-        return Ok(Cli::from_arg_matches(&matches)?);
-    };
-    let file = (typed.try_get_one::<std::path::PathBuf>("config").ok()).flatten();
-    let Some(file) = file else {
+    let named = matches.subcommand().and_then(|(command, typed)| {
+        let file: Option<&PathBuf> = typed.try_get_one("config").ok().flatten();
+        Some((command, typed, file?))
+    });
+    let Some((command, typed, file)) = named else {
         return Ok(Cli::from_arg_matches(&matches)?);
     };
     let mut text = String::new();
     // One more than accepted, of what may never end.
     let opened = File::open(file).map(|opened| opened.take(LONGEST as u64 + 1));
     let read = opened.and_then(|mut opened| opened.read_to_string(&mut text));
-    read.map_err(Error::io("read", file))?;
+    read.map_err(files::Error::of("read", file))?;
     parse_both(arguments, command, typed, &text, file)
 }
 
-/// The options of a file, and what was typed behind them.
+/// The options of a file, and what was typed, which overrides them.
 fn parse_both(
     arguments: &[OsString],
     command: &str,
@@ -59,12 +58,11 @@ fn parse_both(
     text: &str,
     path: &Path,
 ) -> Result<Cli, Error> {
-    let table = read(text, path)?;
-    let mut all: Vec<OsString> = vec!["willmore".into(), command.into()];
-    all.extend(from_table(&table, command, path, Some(typed))?);
-    let typed = arguments.iter().skip(1);
-    all.extend(typed.skip_while(|a| *a != command).skip(1).cloned());
-    parse_file(&all, path)
+    let mut table = read(text, path)?;
+    if typed.try_contains_id("input").unwrap_or(false) {
+        table.remove("input");
+    }
+    with_table(arguments, command, &table, path)
 }
 
 /// The options that a run was started with.
@@ -76,9 +74,24 @@ pub fn parse_resolved(text: &str, path: &Path) -> Result<Cli, Error> {
     if program().find_subcommand(command).is_none() {
         return Err(bad(path, format!("{command:?} is no command")));
     }
-    let mut all: Vec<OsString> = vec!["willmore".into(), command.into()];
-    all.extend(from_table(&table, command, path, None)?);
-    parse_file(&all, path)
+    with_table(&["willmore".into(), command.into()], command, &table, path)
+}
+
+/// Puts the entries of a file behind the command.
+fn with_table(
+    arguments: &[OsString],
+    command: &str,
+    table: &Table,
+    path: &Path,
+) -> Result<Cli, Error> {
+    let place = arguments.iter().position(|argument| argument == command);
+    let place = place.map_or(arguments.len(), |place| place + 1);
+    let mut all = arguments.to_vec();
+    all.splice(place..place, as_typed(table, command, path)?);
+    let parsed = program()
+        .try_get_matches_from(all)
+        .and_then(|matches| Cli::from_arg_matches(&matches));
+    parsed.map_err(|error| bad(path, one_line(&error)))
 }
 
 /// All options of a run, to be read by [`parse_resolved`] and by `--config`.
@@ -125,20 +138,8 @@ fn read(text: &str, path: &Path) -> Result<Table, Error> {
     })
 }
 
-fn parse_file(arguments: &[OsString], path: &Path) -> Result<Cli, Error> {
-    let parsed = program()
-        .try_get_matches_from(arguments)
-        .and_then(|matches| Cli::from_arg_matches(&matches));
-    parsed.map_err(|error| bad(path, one_line(&error)))
-}
-
-/// The entries of a file as they would be typed, but for those that were.
-fn from_table(
-    table: &Table,
-    command: &str,
-    path: &Path,
-    typed: Option<&ArgMatches>,
-) -> Result<Vec<OsString>, Error> {
+/// The entries of a file as they would be typed.
+fn as_typed(table: &Table, command: &str, path: &Path) -> Result<Vec<OsString>, Error> {
     let refused = |message: String| Err(bad(path, message));
     let mut arguments = Vec::new();
     for (name, value) in table {
@@ -155,33 +156,26 @@ fn from_table(
         if name.is_empty() || !name.chars().all(is_name) || ["help", "version"].contains(&&**name) {
             return refused(format!("{name:?} is no option"));
         }
-        let id = name.replace('-', "_");
-        let is_typed = |typed: &ArgMatches| {
-            typed.try_contains_id(&id).is_ok()
-                && typed.value_source(&id) == Some(ValueSource::CommandLine)
-        };
-        if typed.is_some_and(is_typed) {
-            continue;
-        }
         let text = match value {
             Value::Boolean(false) => continue,
-            Value::Boolean(true) => None,
-            Value::String(text) => Some(text.clone()),
-            Value::Integer(number) => Some(number.to_string()),
-            Value::Float(number) => Some(number.to_string()),
+            Value::Boolean(true) => {
+                arguments.push(format!("--{name}").into());
+                continue;
+            }
+            Value::String(text) => text.clone(),
+            Value::Integer(number) => number.to_string(),
+            Value::Float(number) => number.to_string(),
             _ => return refused(format!("{name} must be a number, a text, true or false")),
         };
-        let argument = match text {
-            Some(text) if name == "input" && text.starts_with('-') => {
-                return refused(format!(
-                    "the input {text:?} looks like an option: put ./ before it"
-                ));
-            }
-            Some(text) if name == "input" => text,
-            Some(text) => format!("--{name}={text}"),
-            None => format!("--{name}"),
-        };
-        arguments.push(argument.into());
+        if name != "input" {
+            arguments.push(format!("--{name}={text}").into());
+        } else if text.starts_with('-') {
+            return refused(format!(
+                "the input {text:?} looks like an option: put ./ before it"
+            ));
+        } else {
+            arguments.push(text.into());
+        }
     }
     Ok(arguments)
 }

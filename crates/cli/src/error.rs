@@ -16,12 +16,6 @@ pub enum Error {
         path: PathBuf,
         message: String,
     },
-    #[error("cannot {action} {}: {source}", path.display())]
-    Io {
-        action: &'static str,
-        path: PathBuf,
-        source: std::io::Error,
-    },
     /// A mesh that bounds nothing, and that can be repaired.
     #[error("{0}, or give --repair")]
     Mendable(#[source] surfaces::Error),
@@ -29,6 +23,7 @@ pub enum Error {
     #[error("{0}; the shape is not resolved, use more --cells")]
     TooStiff(#[source] engine::Error),
     Engine(engine::Error),
+    Files(#[from] files::Error),
     Geometry(#[from] geometry::Error),
     Images(#[from] images::Error),
     Linearize(#[from] linearize::Error),
@@ -55,18 +50,6 @@ impl From<engine::Error> for Error {
 impl Error {
     pub fn options(message: impl Into<String>) -> Self {
         Self::Options(message.into())
-    }
-
-    pub fn io(
-        action: &'static str,
-        path: impl Into<PathBuf>,
-    ) -> impl FnOnce(std::io::Error) -> Self {
-        let path = path.into();
-        move |source| Self::Io {
-            action,
-            path,
-            source,
-        }
     }
 
     pub fn mesh(error: surfaces::Error) -> Self {

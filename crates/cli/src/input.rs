@@ -3,13 +3,18 @@
 use geometry::npy::{self, NpyError};
 use geometry::vti::{self, VtiError};
 use geometry::{PURE_BEYOND, distance_from_phase_field, thin_part};
-use images::{Frame, Image, Outline, OutlineDistance, Side, Threshold, Tones};
+use images::{Outline, OutlineDistance, Side, Threshold, Tones};
 use surfaces::hausdorff_distance;
 use surfaces::shapes::{self, BuiltIn};
 
-use crate::cli::{Holds, Inside};
+use crate::cli::{Holds, InputOptions, Inside, SayOptions};
+use crate::outlet::Topology;
+use crate::own::{OwnMesh, thinnest};
+use crate::paths::{absolute, extension, read};
+use crate::plane::Plane;
 use crate::prelude::*;
-use crate::volume::{self, Voxels};
+use crate::space::{Space, Voxels};
+use crate::volume;
 
 /// What a run starts from.
 pub struct Start<const D: usize, O> {
@@ -22,19 +27,18 @@ pub struct Start<const D: usize, O> {
 
 /// What a run starts from, in the dimension of the input.
 pub enum Loaded {
-    Plane(Start<2, Plane>, ImageFrame),
+    Plane(Start<2, Plane>),
     Space(Start<3, Space>),
 }
 
-/// The image that a mask has to fit, and that is repaired: the input, if it is one.
-pub struct ImageFrame(Option<(PathBuf, [u32; 2])>);
-
-enum Source<'a> {
+/// What an input is; the paths of files are absolute.
+#[derive(Clone)]
+pub enum Source {
     Mesh(PathBuf),
     Image(PathBuf),
     Field(PathBuf),
     Volume(PathBuf),
-    BuiltIn(&'a str),
+    BuiltIn(String),
     Region(Region),
 }
 
@@ -71,67 +75,6 @@ const PHOTOGRAPH: f64 = 0.05;
 const WILL_NOT_LAST: &str = "which will not last";
 /// Largest magnitude in a phase field: flows overshoot the phases a little.
 const LARGEST_PHASE: f64 = 1.1;
-/// Pixels a side of pictures of boxes.
-const PIXELS: u32 = 512;
-
-/// The path of a file from wherever the program may run later.
-pub fn absolute(path: impl AsRef<Path>) -> Result<PathBuf, Error> {
-    let path = path.as_ref();
-    std::path::absolute(path).map_err(Error::io("find", path))
-}
-
-pub fn extension(path: &Path) -> String {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-    extension.to_ascii_lowercase()
-}
-
-/// Reads the input and fills in the options that were left to it.
-pub fn load(options: &mut InputOptions, eps_over_h: f64, say: SayOptions) -> Result<Loaded, Error> {
-    let input = options.input.clone().ok_or_else(|| {
-        Error::options(
-            "there is no input: give a file or builtin:NAME, or `input = ...` in a --config file",
-        )
-    })?;
-    let source = Source::of(&input)?;
-    source.refuse_foreign(options)?;
-    if let Source::Mesh(path) | Source::Image(path) | Source::Field(path) | Source::Volume(path) =
-        &source
-    {
-        options.input = Some(path.to_string_lossy().into_owned());
-    }
-    let mut reader = Reader {
-        name: source.name(),
-        options,
-        eps_over_h,
-        say,
-    };
-    let loaded = reader.load(source)?;
-    match &loaded {
-        Loaded::Plane(start, _) => check_phases(&start.field, &input)?,
-        Loaded::Space(start) => check_phases(&start.field, &input)?,
-    }
-    Ok(loaded)
-}
-
-/// The path of the input if it is the file of a mesh, from wherever the program may run later.
-pub fn mesh_file(options: &mut InputOptions) -> Result<Option<PathBuf>, Error> {
-    let Some(input) = &options.input else {
-        return Ok(None);
-    };
-    Ok(match Source::of(input)? {
-        Source::Mesh(path) => {
-            options.input = Some(path.to_string_lossy().into_owned());
-            Some(path)
-        }
-        _ => None,
-    })
-}
-
-pub fn is_volume(options: &InputOptions) -> Result<bool, Error> {
-    let source = options.input.as_deref().map(Source::of).transpose()?;
-    Ok(matches!(source, Some(Source::Volume(_))))
-}
-
 /// The usual format of what becomes of an input: that of a mesh, otherwise PLY in space and PNG in the plane.
 pub fn usual_format(input: &str) -> Result<String, Error> {
     let in_plane = match Source::of(input)? {
@@ -139,7 +82,7 @@ pub fn usual_format(input: &str) -> Result<String, Error> {
         Source::Image(_) => true,
         Source::Field(path) => is_planar(&path)?,
         Source::Volume(_) => false,
-        Source::BuiltIn(name) => shapes::dimension(name)? == 2,
+        Source::BuiltIn(name) => shapes::dimension(&name)? == 2,
         Source::Region(region) => region.dimension() == 2,
     };
     Ok(if in_plane { "png" } else { "ply" }.to_owned())
@@ -161,85 +104,23 @@ pub fn closed(path: &Path, repairs: bool, say: SayOptions) -> Result<ClosedMesh,
     Ok(mesh)
 }
 
-/// A mesh whose vertices follow the flow, on the coarsest grid that holds its parts and holes.
-pub fn load_own(
-    options: &mut InputOptions,
-    own: OwnMesh,
-    path: &Path,
-    (eps_over_h, allow_loss): (f64, bool),
-    say: SayOptions,
-) -> Result<Loaded, Error> {
-    let source = Source::Mesh(path.to_owned());
-    source.refuse_foreign(options)?;
-    let (rough, start) = (own.fairing().rough(), own.fairing().start());
-    let mut grids = options
-        .cells
-        .map_or(OWN_CELLS.to_vec(), |cells| vec![cells])
-        .into_iter()
-        .peekable();
-    let mut reader = Reader {
-        name: source.name(),
-        options,
-        eps_over_h,
-        say,
-    };
-    let field = loop {
-        reader.options.cells = grids.next();
-        let part = OWN_PART[usize::from(own.fairing().noise() == 0.0)];
-        let grid = reader.grid_around(&start.bounding_box(), part)?;
-        let field = reader.mesh_field(start, grid)?;
-        let made = reader.made_of(start, &field)?;
-        if !made.is_like_mesh() {
-            if grids.peek().is_some() {
-                continue;
-            }
-            let advice = "use more --cells, or --allow-loss to go on without them";
-            reader.tell_lost(&made, (!allow_loss).then_some(advice))?;
-        }
-        let width = THIN * eps_over_h * grid.spacing();
-        let sides = rough.mesh().sides(MOST_RAYS);
-        let part = thin_part(&MeshDistance::new(rough), sides, width);
-        if part >= THIN_PART {
-            let what = if own.is_new {
-                WILL_NOT_LAST
-            } else {
-                "where vertices follow less well"
-            };
-            reader.tell_thin(part, (width, made.cells), what, false)?;
-        }
-        say.note(&format!(
-            "grid: {} cells per unit length, {:.3e} wide (--cells); its surface is {}",
-            made.cells,
-            grid.spacing(),
-            made.far()
-        ));
-        break field;
-    };
-    let mut space = Space::new(surfaces::usual_up_axis(path)?);
-    space.input = Some(Topology::of(rough));
-    let region = own.nodes(&field)?;
-    space.own = Some(own);
-    let start = reader.start(field, space);
-    Ok(Loaded::Space(Start { region, ..start }))
-}
-
-impl Source<'_> {
-    fn of(input: &str) -> Result<Source<'_>, Error> {
+impl Source {
+    fn of(input: &str) -> Result<Self, Error> {
         if let Some(name) = input.strip_prefix("builtin:") {
-            return Ok(Source::BuiltIn(name));
+            return Ok(Self::BuiltIn(name.to_owned()));
         }
         if Region::is_meant(input) {
-            return Ok(Source::Region(input.parse().map_err(Error::Options)?));
+            return Ok(Self::Region(input.parse().map_err(Error::Options)?));
         }
         let path = absolute(input)?;
         match &*extension(&path) {
-            "obj" | "stl" | "ply" => Ok(Source::Mesh(path)),
-            "tif" | "tiff" if volumes::is_stack(&path) => Ok(Source::Volume(path)),
+            "obj" | "stl" | "ply" => Ok(Self::Mesh(path)),
+            "tif" | "tiff" if volumes::is_stack(&path) => Ok(Self::Volume(path)),
             "png" | "jpg" | "jpeg" | "webp" | "gif" | "tif" | "tiff" | "bmp" => {
-                Ok(Source::Image(path))
+                Ok(Self::Image(path))
             }
-            "npy" | "vti" => Ok(Source::Field(path)),
-            "nii" | "gz" | "mrc" | "map" => Ok(Source::Volume(path)),
+            "npy" | "vti" => Ok(Self::Field(path)),
+            "nii" | "gz" | "mrc" | "map" => Ok(Self::Volume(path)),
             _ => Err(Error::options(format!(
                 "{input} is no input: give a mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), \
                  a volume (.nii, .nii.gz, .mrc, .map, .tif of several pages), a field (.npy, .vti), builtin:NAME, or a region as box:... or ball:..."
@@ -247,47 +128,56 @@ impl Source<'_> {
         }
     }
 
+    fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Mesh(path) | Self::Image(path) | Self::Field(path) | Self::Volume(path) => {
+                Some(path)
+            }
+            Self::BuiltIn(_) | Self::Region(_) => None,
+        }
+    }
+
     fn name(&self) -> String {
-        let path = match self {
-            Self::BuiltIn(name) => return (*name).to_owned(),
-            Self::Region(region) => return region.name().to_owned(),
-            Self::Mesh(path) | Self::Image(path) | Self::Field(path) | Self::Volume(path) => path,
+        let stem = match self {
+            Self::BuiltIn(name) => name.into(),
+            Self::Region(region) => region.name().into(),
+            file => (file.path().and_then(Path::file_stem))
+                .unwrap_or_default()
+                .to_string_lossy(),
         };
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         // Of .nii.gz.
         let stem = stem.strip_suffix(".nii").unwrap_or(&stem);
         let other = |c: char| !(c.is_ascii_alphanumeric() || "-_".contains(c));
         stem.replace(other, "_")
     }
 
+    /// Refuses options that say nothing about such an input.
     fn refuse_foreign(&self, options: &InputOptions) -> Result<(), Error> {
-        let what = match self {
-            Self::Mesh(_) => "a mesh",
-            Self::Image(_) => "an image",
-            Self::Field(_) => "a field",
-            Self::Volume(_) => "a volume",
-            Self::BuiltIn(_) => "a built-in shape",
-            Self::Region(_) => "a region",
-        };
-        let is_image = matches!(self, Self::Image(_));
-        let is_volume = matches!(self, Self::Volume(_));
-        let is_field = matches!(self, Self::Field(_));
-        let is_vti = matches!(self, Self::Field(path) if extension(path) == "vti");
-        let has_side = !is_field && !matches!(self, Self::Region(_));
-        for (name, given, allowed) in [
-            ("--inside", options.inside.is_some(), is_image),
-            (
-                "--threshold",
-                options.threshold.is_some(),
-                is_image || is_volume,
+        let (what, allowed): (_, &[&str]) = match self {
+            Self::Mesh(_) => ("a mesh", &["--repair", "--side-length", "--box-side"]),
+            Self::Image(_) => (
+                "an image",
+                &["--inside", "--threshold", "--side-length", "--box-side"],
             ),
-            ("--label", options.label.is_some(), is_volume),
-            ("--holds", options.holds.is_some(), is_field),
-            ("--repair", options.repair, matches!(self, Self::Mesh(_))),
-            ("--side-length", options.side_length.is_some(), has_side),
-            ("--box-side", options.box_side.is_some(), !is_vti),
+            Self::Field(path) if extension(path) == "vti" => ("a field", &["--holds"]),
+            Self::Field(_) => ("a field", &["--holds", "--box-side"]),
+            Self::Volume(_) => (
+                "a volume",
+                &["--threshold", "--label", "--side-length", "--box-side"],
+            ),
+            Self::BuiltIn(_) => ("a built-in shape", &["--side-length", "--box-side"]),
+            Self::Region(_) => ("a region", &["--box-side"]),
+        };
+        for (name, given) in [
+            ("--inside", options.inside.is_some()),
+            ("--threshold", options.threshold.is_some()),
+            ("--label", options.label.is_some()),
+            ("--holds", options.holds.is_some()),
+            ("--repair", options.repair),
+            ("--side-length", options.side_length.is_some()),
+            ("--box-side", options.box_side.is_some()),
         ] {
-            if given && !allowed {
+            if given && !allowed.contains(&name) {
                 return Err(Error::options(format!(
                     "{name} has no meaning for {what}: leave it out"
                 )));
@@ -297,38 +187,9 @@ impl Source<'_> {
     }
 }
 
-/// What a grid makes of a mesh.
-struct Made<'a> {
-    mesh: &'a ClosedMesh,
-    /// The zero level set, unless it touches itself.
-    surface: Option<ClosedMesh>,
-    cells: usize,
-    grid: Grid<3>,
-}
-
-impl Made<'_> {
-    /// Whether it has the components and the holes of the mesh.
-    fn is_like_mesh(&self) -> bool {
-        self.surface.as_ref().map(Topology::of) == Some(Topology::of(self.mesh))
-    }
-
-    fn percent(&self, length: f64) -> f64 {
-        100.0 * length / self.mesh.bounding_box().longest_side()
-    }
-
-    fn far(&self) -> String {
-        let Some(surface) = &self.surface else {
-            return "one that touches itself".to_owned();
-        };
-        let far = hausdorff_distance(surface, self.mesh);
-        format!(
-            "at most {far:.3e} ({:.3} % of the longest side) from that of the mesh",
-            self.percent(far)
-        )
-    }
-}
-
-struct Reader<'a> {
+/// Reads an input and fills in the options that were left to it.
+pub struct Reader<'a> {
+    pub source: Source,
     name: String,
     options: &'a mut InputOptions,
     eps_over_h: f64,
@@ -340,34 +201,61 @@ pub fn usual_box<const D: usize>() -> (usize, f64) {
     if D == 2 { (128, 2.0) } else { (64, 1.0) }
 }
 
-impl Reader<'_> {
-    fn load(&mut self, source: Source<'_>) -> Result<Loaded, Error> {
-        match source {
+impl<'a> Reader<'a> {
+    /// Says what the input is.
+    pub fn of(
+        options: &'a mut InputOptions,
+        eps_over_h: f64,
+        say: SayOptions,
+    ) -> Result<Self, Error> {
+        let input = options.input.as_deref().ok_or_else(|| {
+            Error::options(
+                "there is no input: give a file or builtin:NAME, or `input = ...` in a --config file",
+            )
+        })?;
+        let source = Source::of(input)?;
+        source.refuse_foreign(options)?;
+        if let Some(path) = source.path() {
+            options.input = Some(path.to_string_lossy().into_owned());
+        }
+        Ok(Self {
+            name: source.name(),
+            source,
+            options,
+            eps_over_h,
+            say,
+        })
+    }
+
+    /// Reads it.
+    pub fn load(&mut self) -> Result<Loaded, Error> {
+        let loaded = match self.source.clone() {
             Source::Mesh(path) => {
                 let mesh = closed(&path, self.options.repair, self.say)?;
-                self.mesh(&mesh, surfaces::usual_up_axis(&path)?)
+                self.mesh(&mesh, surfaces::usual_up_axis(&path)?)?
             }
-            Source::Image(path) => self.image(&path),
-            Source::Volume(path) => self.volume(&path),
+            Source::Image(path) => self.image(&path)?,
+            Source::Volume(path) => self.volume(&path)?,
             Source::Field(path) if is_planar(&path)? => {
                 let field = self.values(&path)?;
-                self.plane(field)
+                self.plane(field)?
             }
             Source::Field(path) => {
                 let field = self.values(&path)?;
-                Ok(self.space(field, UpAxis::default()))
+                self.space(field, Space::new(UpAxis::default()))
             }
             Source::Region(region) if region.dimension() == 2 => {
-                let grid = self.grid()?;
-                self.plane(self.sampled(grid, region.shape::<2>()?.as_ref())?)
+                self.in_plane(&*region.shape()?)?
             }
-            Source::Region(region) => {
-                let grid = self.grid()?;
-                let field = self.sampled(grid, region.shape::<3>()?.as_ref())?;
-                Ok(self.space(field, UpAxis::default()))
-            }
-            Source::BuiltIn(name) => self.built_in(name),
+            Source::Region(region) => self.in_space(&*region.shape()?)?,
+            Source::BuiltIn(name) => self.built_in(&name)?,
+        };
+        let input = self.options.input.as_deref().unwrap_or_default();
+        match &loaded {
+            Loaded::Plane(start) => check_phases(&start.field, input)?,
+            Loaded::Space(start) => check_phases(&start.field, input)?,
         }
+        Ok(loaded)
     }
 
     /// The grid about 0.
@@ -405,7 +293,24 @@ impl Reader<'_> {
         Ok(Grid::new(grid.cells(), own)?.with_origin(corner)?)
     }
 
-    /// The coarsest of some grids about a shape that holds its thin parts and gaps.
+    /// What comes of the first of some numbers of cells with which all is well, as the attempt says, or of the last.
+    fn first_good<T>(
+        &mut self,
+        grids: &[usize],
+        attempt: impl Fn(&mut Self) -> Result<(T, bool), Error>,
+    ) -> Result<T, Error> {
+        let (last, others) = grids.split_last().expect("there is a grid to try");
+        for &cells in others {
+            self.options.cells = Some(cells);
+            if let (made, true) = attempt(self)? {
+                return Ok(made);
+            }
+        }
+        self.options.cells = Some(*last);
+        Ok(attempt(self)?.0)
+    }
+
+    /// The coarsest of some grids about a shape that holds its thin parts and gaps, or the one that was chosen.
     fn grid_holding<const D: usize>(
         &mut self,
         bounds: &BoundingBox<D>,
@@ -414,96 +319,80 @@ impl Reader<'_> {
         sides: &(impl Iterator<Item = ([f64; D], [f64; D], f64)> + Clone),
     ) -> Result<Grid<D>, Error> {
         let chosen = self.options.cells;
-        let last = chosen.unwrap_or(grids[grids.len() - 1]);
-        let mut grids = chosen
-            .map_or(grids.to_vec(), |cells| vec![cells])
-            .into_iter();
-        loop {
-            let cells = grids.next().unwrap_or(last);
-            self.options.cells = Some(cells);
-            let grid = self.grid_around(bounds, PART)?;
-            let width = THIN * self.eps_over_h * grid.spacing();
-            let thin = thin_part(shape, sides.clone(), width);
-            if thin >= THIN_PART && cells < last {
-                continue;
+        let (grid, thin) = self.first_good(
+            &chosen.map_or(grids.to_vec(), |cells| vec![cells]),
+            |reader| {
+                let grid = reader.grid_around(bounds, PART)?;
+                let thin = thin_part(shape, sides.clone(), reader.thin_below(&grid));
+                Ok(((grid, thin), thin < THIN_PART))
+            },
+        )?;
+        self.tell_thin(thin, &grid, WILL_NOT_LAST, chosen.is_none())?;
+        Ok(grid)
+    }
+
+    /// The phase field of a mesh on the coarsest of some grids about it that has its components and holes, and the surface there, unless it touches
+    /// itself. Where even the last one does not have them this is told, or refused with some advice.
+    fn like_mesh(
+        &mut self,
+        mesh: &ClosedMesh,
+        part: f64,
+        grids: &[usize],
+        refused: Option<&str>,
+    ) -> Result<(Field<3>, Option<ClosedMesh>), Error> {
+        let wanted = Topology::of(mesh);
+        let (field, surface, found) = self.first_good(grids, |reader| {
+            let grid = reader.grid_around(&mesh.bounding_box(), part)?;
+            let field = reader.mesh_field(mesh, grid)?;
+            let eps = reader.eps_over_h * grid.spacing();
+            let surface = ClosedMesh::new(surfaces::phase_field_surface(&field, eps)?).ok();
+            let surface = surface.map(|(surface, _)| surface);
+            let found = surface.as_ref().map(Topology::of);
+            Ok(((field, surface, found), found == Some(wanted)))
+        })?;
+        if found != Some(wanted) {
+            let thin = thinnest(field.grid());
+            let message = format!(
+                "with --cells {} parts and gaps thinner than {thin:.3e} ({:.2} % of the longest side) are lost: the mesh has {wanted}, the \
+                 grid {}; its surface is {}",
+                self.cells(),
+                100.0 * thin / mesh.bounding_box().longest_side(),
+                found.unwrap_or_default(),
+                far_from(mesh, surface.as_ref()),
+            );
+            if let Some(advice) = refused {
+                return Err(Error::options(format!("{message}; {advice}")));
             }
-            if thin >= THIN_PART {
-                self.tell_thin(thin, (width, cells), WILL_NOT_LAST, chosen.is_none())?;
-            }
-            return Ok(grid);
+            self.say.warn(&message);
         }
+        Ok((field, surface))
     }
 
-    /// The start of the flow of a mesh, on the coarsest grid that holds its thin parts, its components and its holes.
-    fn mesh(&mut self, mesh: &ClosedMesh, up: UpAxis) -> Result<Loaded, Error> {
-        let bounds = mesh.bounding_box();
-        let sides = mesh.mesh().sides(MOST_RAYS);
-        let chosen = self.options.cells.is_some();
-        let mut grid = self.grid_holding(&bounds, &MESH_CELLS, &MeshDistance::new(mesh), &sides)?;
-        let cells = self.options.cells.unwrap_or_default();
-        let finer = MESH_CELLS.into_iter().chain(FINER_CELLS);
-        let mut finer = finer.filter(|&finer| !chosen && finer > cells);
-        let field = loop {
-            let field = self.mesh_field(mesh, grid)?;
-            let made = self.made_of(mesh, &field)?;
-            if made.is_like_mesh() {
-                break field;
-            }
-            let Some(cells) = finer.next() else {
-                let advice = "give a larger --side-length or more --cells, or these --cells to go on without them";
-                self.tell_lost(&made, (!chosen).then_some(advice))?;
-                break field;
-            };
-            self.options.cells = Some(cells);
-            grid = self.grid_around(&bounds, PART)?;
-        };
-        let mut space = Space::new(up);
-        space.input = Some(Topology::of(mesh));
-        Ok(Loaded::Space(self.start(field, space)))
+    fn cells(&self) -> usize {
+        self.options.cells.unwrap_or_default()
     }
 
-    fn made_of<'m>(&self, mesh: &'m ClosedMesh, field: &Field<3>) -> Result<Made<'m>, Error> {
-        let eps = self.eps_over_h * field.grid().spacing();
-        let surface = ClosedMesh::new(surfaces::phase_field_surface(field, eps)?);
-        Ok(Made {
-            mesh,
-            surface: surface.ok().map(|(surface, _)| surface),
-            cells: self.options.cells.unwrap_or_default(),
-            grid: *field.grid(),
-        })
+    /// Parts and gaps of less width are thin.
+    fn thin_below<const D: usize>(&self, grid: &Grid<D>) -> f64 {
+        THIN * self.eps_over_h * grid.spacing()
     }
 
-    /// Says that parts or holes of a mesh are lost, or refuses it with some advice.
-    fn tell_lost(&self, made: &Made<'_>, refused: Option<&str>) -> Result<(), Error> {
-        let thin = OwnMesh::thinnest(&made.grid);
-        let message = format!(
-            "with --cells {} parts and gaps thinner than {thin:.3e} ({:.2} % of the longest side) are lost: the mesh has {}, the grid {}; \
-             its surface is {}",
-            made.cells,
-            made.percent(thin),
-            Topology::of(made.mesh),
-            made.surface.as_ref().map(Topology::of).unwrap_or_default(),
-            made.far(),
-        );
-        if let Some(advice) = refused {
-            return Err(Error::options(format!("{message}; {advice}")));
-        }
-        self.say.warn(&message);
-        Ok(())
-    }
-
-    /// Says that thin parts are lost, or refuses to lose many unless the grid was chosen.
-    fn tell_thin(
+    /// Says that so much of the boundary is thin, if it is much, or refuses to lose even more unless the grid was chosen.
+    fn tell_thin<const D: usize>(
         &self,
         part: f64,
-        (width, cells): (f64, usize),
+        grid: &Grid<D>,
         what: &str,
         refuses: bool,
     ) -> Result<(), Error> {
+        if part < THIN_PART {
+            return Ok(());
+        }
         let message = format!(
-            "{:.1} % of the boundary is at parts or gaps thinner than {width:.3e}, {THIN} interface widths with --cells {cells}, \
-             {what}",
-            100.0 * part
+            "{:.1} % of the boundary is at parts or gaps thinner than {:.3e}, {THIN} interface widths with --cells {}, {what}",
+            100.0 * part,
+            self.thin_below(grid),
+            self.cells(),
         );
         if refuses && part >= MOST_LOST {
             return Err(Error::options(format!(
@@ -512,6 +401,62 @@ impl Reader<'_> {
         }
         self.say.warn(&message);
         Ok(())
+    }
+
+    /// The start of the flow of a mesh, on the coarsest grid that holds its thin parts, its components and its holes.
+    fn mesh(&mut self, mesh: &ClosedMesh, up: UpAxis) -> Result<Loaded, Error> {
+        let chosen = self.options.cells.is_some();
+        let sides = mesh.mesh().sides(MOST_RAYS);
+        let distance = MeshDistance::new(mesh);
+        self.grid_holding(&mesh.bounding_box(), &MESH_CELLS, &distance, &sides)?;
+        let cells = self.cells();
+        let finer = MESH_CELLS.into_iter().chain(FINER_CELLS);
+        let finer = finer.filter(|&finer| !chosen && finer > cells);
+        let grids: Vec<usize> = std::iter::once(cells).chain(finer).collect();
+        let advice =
+            "give a larger --side-length or more --cells, or these --cells to go on without them";
+        let (field, _) = self.like_mesh(mesh, PART, &grids, (!chosen).then_some(advice))?;
+        let input = Some(Topology::of(mesh));
+        Ok(self.space(
+            field,
+            Space {
+                input,
+                ..Space::new(up)
+            },
+        ))
+    }
+
+    /// A mesh whose vertices follow the flow, on the coarsest grid that holds its parts and holes.
+    pub fn own(&mut self, own: OwnMesh, path: &Path, allow_loss: bool) -> Result<Loaded, Error> {
+        let (rough, start) = (own.rough(), own.fairing().start());
+        let grids = (self.options.cells).map_or(OWN_CELLS.to_vec(), |cells| vec![cells]);
+        let part = OWN_PART[usize::from(own.fairing().noise() == 0.0)];
+        let advice = "use more --cells, or --allow-loss to go on without them";
+        let refused = (!allow_loss).then_some(advice);
+        let (field, surface) = self.like_mesh(start, part, &grids, refused)?;
+        let grid = field.grid();
+        let sides = rough.mesh().sides(MOST_RAYS);
+        let thin = thin_part(&MeshDistance::new(rough), sides, self.thin_below(grid));
+        let what = if own.is_new {
+            WILL_NOT_LAST
+        } else {
+            "where vertices follow less well"
+        };
+        self.tell_thin(thin, grid, what, false)?;
+        self.say.note(&format!(
+            "grid: {} cells per unit length, {:.3e} wide (--cells); its surface is {}",
+            self.cells(),
+            grid.spacing(),
+            far_from(start, surface.as_ref())
+        ));
+        let (input, region) = (Some(Topology::of(rough)), own.nodes(grid));
+        let space = Space {
+            input,
+            own: Some(own),
+            ..Space::new(surfaces::usual_up_axis(path)?)
+        };
+        let start = self.start(field, space);
+        Ok(Loaded::Space(Start { region, ..start }))
     }
 
     /// The longest side of what is in the box, a part of that unless it is chosen, so many interface widths from its sides.
@@ -547,40 +492,45 @@ impl Reader<'_> {
         }
     }
 
-    fn space(&self, field: Field<3>, up: UpAxis) -> Loaded {
-        Loaded::Space(self.start(field, Space::new(up)))
+    fn space(&self, field: Field<3>, space: Space) -> Loaded {
+        Loaded::Space(self.start(field, space))
     }
 
     fn plane(&self, field: Field<2>) -> Result<Loaded, Error> {
-        let frame = Frame::of_box(field.grid(), PIXELS)?;
-        Ok(Loaded::Plane(
-            self.start(field, Plane::new(frame)),
-            ImageFrame(None),
-        ))
+        let plane = Plane::of_box(field.grid())?;
+        Ok(Loaded::Plane(self.start(field, plane)))
+    }
+
+    fn in_plane(&mut self, shape: &dyn SignedDistance<2>) -> Result<Loaded, Error> {
+        let grid = self.grid()?;
+        self.plane(self.sampled(grid, shape)?)
+    }
+
+    fn in_space(&mut self, shape: &dyn SignedDistance<3>) -> Result<Loaded, Error> {
+        let grid = self.grid()?;
+        let field = self.sampled(grid, shape)?;
+        Ok(self.space(field, Space::new(UpAxis::default())))
     }
 
     fn built_in(&mut self, name: &str) -> Result<Loaded, Error> {
-        if shapes::dimension(name)? == 2 {
-            let grid = self.grid::<2>()?;
-            let shape = shapes::built_in(name, self.side(PART, &grid, ROOM)?)?;
-            let BuiltIn::Plane(shape) = shape else {
-                return Err(Error::options(format!("{name} is not in the plane")));
-            };
-            return self.plane(self.sampled(grid, shape.as_ref())?);
-        }
         let chosen = self.options.cells;
-        let grid = self.grid::<3>()?;
-        let side = self.side(PART, &grid, ROOM)?;
-        let field = match shapes::built_in(name, side)? {
+        let side = if shapes::dimension(name)? == 2 {
+            let grid = self.grid::<2>()?;
+            self.side(PART, &grid, ROOM)?
+        } else {
+            let grid = self.grid::<3>()?;
+            self.side(PART, &grid, ROOM)?
+        };
+        match shapes::built_in(name, side)? {
+            BuiltIn::Plane(shape) => self.in_plane(&*shape),
+            BuiltIn::Space(shape) => self.in_space(&*shape),
             BuiltIn::Mesh(mesh) => {
+                let grid = self.grid()?;
                 let placement = Placement::fit(&mesh.bounding_box(), &grid, side, 0.0)?;
                 self.options.cells = chosen;
-                return self.mesh(&mesh.placed(&placement), UpAxis::default());
+                self.mesh(&mesh.placed(&placement), UpAxis::default())
             }
-            BuiltIn::Space(shape) => self.sampled(grid, shape.as_ref())?,
-            BuiltIn::Plane(_) => return Err(Error::options(format!("{name} is in the plane"))),
-        };
-        Ok(self.space(field, UpAxis::default()))
+        }
     }
 
     fn image(&mut self, path: &Path) -> Result<Loaded, Error> {
@@ -600,11 +550,10 @@ impl Reader<'_> {
         let distance = OutlineDistance::new(&outline);
         let sides = outline.sides();
         let grid = self.grid_holding(&image.bounding_box(), &IMAGE_CELLS, &distance, &sides)?;
-        let [width, height] = [image.width(), image.height()];
-        let frame = Frame::new(width, height, [0.0, f64::from(height)], 1.0)?;
-        let start = self.start(self.sampled(grid, &distance)?, Plane::new(frame));
-        let image = ImageFrame(Some((path.to_owned(), [width, height])));
-        Ok(Loaded::Plane(start, image))
+        let field = self.sampled(grid, &distance)?;
+        Ok(Loaded::Plane(
+            self.start(field, Plane::of_image(&image, path)?),
+        ))
     }
 
     fn volume(&mut self, path: &Path) -> Result<Loaded, Error> {
@@ -625,17 +574,20 @@ impl Reader<'_> {
         if wide > 1.5 {
             self.say.note(&format!(
                 "a cell is {wide:.1} voxels wide: with more --cells than {} smaller details last",
-                self.options.cells.unwrap_or_default()
+                self.cells()
             ));
         }
         let field = self.mesh_field(&body.surface, grid)?;
-        let mut outlet = Space::new(UpAxis::default());
-        outlet.voxels = Some(Voxels {
+        let voxels = Voxels {
             volume: body.volume,
             side: body.voxel,
             farthest: None,
-        });
-        Ok(Loaded::Space(self.start(field, outlet)))
+        };
+        let space = Space {
+            voxels: Some(voxels),
+            ..Space::new(UpAxis::default())
+        };
+        Ok(self.space(field, space))
     }
 
     fn mesh_field(&self, mesh: &ClosedMesh, grid: Grid<3>) -> Result<Field<3>, Error> {
@@ -702,6 +654,16 @@ impl Reader<'_> {
     }
 }
 
+/// How far the zero level set is from a mesh, in words.
+fn far_from(mesh: &ClosedMesh, surface: Option<&ClosedMesh>) -> String {
+    let Some(surface) = surface else {
+        return "one that touches itself".to_owned();
+    };
+    let far = hausdorff_distance(surface, mesh);
+    let percent = 100.0 * far / mesh.bounding_box().longest_side();
+    format!("at most {far:.3e} ({percent:.3} % of the longest side) from that of the mesh")
+}
+
 /// Refuses images that are no drawings, unless it is said what is to be inside.
 fn refuse_photographs(tones: &Tones, side: Side, path: &Path) -> Result<(), Error> {
     if tones.between < PHOTOGRAPH {
@@ -721,7 +683,7 @@ fn refuse_photographs(tones: &Tones, side: Side, path: &Path) -> Result<(), Erro
 
 /// Whether a file of values is meant to be in the plane; its reader says what is wrong with it.
 fn is_planar(path: &Path) -> Result<bool, Error> {
-    let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
+    let bytes = read(path)?;
     Ok(if extension(path) == "vti" {
         let layers = |nodes: [u64; 3]| nodes[2] > 1;
         !matches!(vti::decode::<2>(&bytes), Err(VtiError::NotCubical { nodes, .. }) if layers(nodes))
@@ -740,79 +702,4 @@ pub fn check_phases<const D: usize>(field: &Field<D>, input: &str) -> Result<(),
         )));
     }
     Ok(())
-}
-
-impl ImageFrame {
-    /// The mask, which is a region, or an image of the size of the input.
-    pub fn mask(&self, mask: &str, grid: &Grid<2>) -> Result<Box<dyn SignedDistance<2>>, Error> {
-        if Region::is_meant(mask) {
-            return region(mask);
-        }
-        let image: Image = images::read(mask)?;
-        let size = [image.width(), image.height()];
-        let needed = match &self.0 {
-            None if size[0] != size[1] => Some("a square, which fills the box".to_owned()),
-            Some((_, [w, h])) if size != [*w, *h] => {
-                Some(format!("{w} x {h} pixels, as the input"))
-            }
-            _ => None,
-        };
-        if let Some(needed) = needed {
-            return Err(Error::options(format!(
-                "--mask {mask} has {} x {} pixels; it must be {needed}",
-                size[0], size[1]
-            )));
-        }
-        let side = Side::of(&image, images::Inside::Auto, Threshold::default())?;
-        let mut outline = Outline::of_image(&image, side)?;
-        if self.0.is_none() {
-            let fills = Placement::fit(&image.bounding_box(), grid, grid.side(), 0.0)?;
-            outline = outline.placed(&fills);
-        }
-        Ok(Box::new(OutlineDistance::new(&outline)))
-    }
-
-    /// The plane with the image that is repaired in a mask, if it is one.
-    pub fn repaired(&self, plane: Plane, mask: &dyn SignedDistance<2>) -> Result<Plane, Error> {
-        let Some((path, _)) = &self.0 else {
-            return Ok(plane);
-        };
-        let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
-        let picture = images::colours(&bytes).map_err(|problem| images::Error::Format {
-            path: path.clone(),
-            problem,
-        })?;
-        Ok(plane.repairing(picture, mask))
-    }
-}
-
-/// A region that is a mask.
-pub fn region<const D: usize>(mask: &str) -> Result<Box<dyn SignedDistance<D>>, Error> {
-    if !Region::is_meant(mask) {
-        return Err(Error::options(format!(
-            "--mask {mask} is no region in {D}D: give box:... or ball:..."
-        )));
-    }
-    let region: Region = mask
-        .parse()
-        .map_err(|reason| Error::options(format!("--mask: {reason}")))?;
-    Ok(region.shape::<D>()?)
-}
-
-/// The nodes inside a mask, of which there must be some.
-pub fn nodes<const D: usize>(
-    mask: &str,
-    shape: &dyn SignedDistance<D>,
-    grid: &Grid<D>,
-) -> Result<Vec<bool>, Error> {
-    let nodes: Vec<bool> = (0..grid.len())
-        .map(|i| shape.signed_distance(grid.node(i)) < 0.0)
-        .collect();
-    if !nodes.contains(&true) {
-        let (low, side) = (grid.origin(), grid.side());
-        return Err(Error::options(format!(
-            "--mask {mask} contains no node of the box from {low:?} of side {side}: nothing could move"
-        )));
-    }
-    Ok(nodes)
 }

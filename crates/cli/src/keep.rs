@@ -2,15 +2,17 @@
 
 use std::collections::HashSet;
 
+use crate::paths::{MESHES, extension};
 use crate::prelude::*;
 
 /// Nodes this many cells from a vertex along an axis may belong to it.
 const REACH: f64 = 6.0;
 
 pub enum Keep {
-    /// What is inside a region or a mask.
+    /// What is inside a region or a mask,
     Inside(Box<dyn SignedDistance<3>>),
-    Coloured([u8; 3]),
+    /// or vertices by the [keys](key) of their positions.
+    At(HashSet<[u64; 3]>),
 }
 
 /// The coordinates as bits, by which equal positions are found; -0 is 0.
@@ -25,8 +27,13 @@ impl Keep {
         MESHES.contains(&&*extension(path)).then_some(path)
     }
 
-    /// From what was typed, with the bytes of the mask.
-    pub fn parse(text: &str, mask: Option<&[u8]>) -> Result<Self, Error> {
+    /// From what was typed, with the bytes of the mask, for a mesh and its file.
+    pub fn parse(
+        text: &str,
+        mask: Option<&[u8]>,
+        mesh: &TriangleMesh,
+        (bytes, file): (&[u8], &str),
+    ) -> Result<Self, Error> {
         let wrong = |reason: String| Error::options(format!("--keep {text}: {reason}"));
         if let Some(colour) = text.strip_prefix("colour:") {
             let digits = colour.strip_prefix('#').unwrap_or(colour);
@@ -34,11 +41,18 @@ impl Keep {
             let value = value.filter(|_| digits.len() == 6);
             let value = value
                 .ok_or_else(|| wrong("give six hexadecimal digits, as colour:ff0000".into()))?;
-            let [_, red, green, blue] = value.to_be_bytes();
-            return Ok(Self::Coloured([red, green, blue]));
+            let [_, colour @ ..] = value.to_be_bytes();
+            let colours = surfaces::vertex_colours(bytes, file)?.ok_or_else(|| {
+                Error::options(
+                    "--keep colour:... needs a mesh whose vertices have colours, in PLY or OBJ",
+                )
+            })?;
+            let vertices = mesh.vertices.iter().zip(colours);
+            let kept = vertices.filter(|(_, of)| *of == colour);
+            return Ok(Self::At(kept.map(|(x, _)| key(*x)).collect()));
         }
-        if let Some(bytes) = mask {
-            let mesh = surfaces::decode(bytes, text)?;
+        if let Some(mask) = mask {
+            let mesh = surfaces::decode(mask, text)?;
             let (mesh, _) = ClosedMesh::new(mesh).map_err(|error| wrong(error.to_string()))?;
             return Ok(Self::Inside(Box::new(MeshDistance::new(&mesh))));
         }
@@ -46,49 +60,47 @@ impl Keep {
         Ok(Self::Inside(region.shape::<3>()?))
     }
 
-    /// Says of the positions of vertices of a mesh in a file whether they stay.
-    pub fn holds(
-        self,
-        bytes: &[u8],
-        file: &str,
-        mesh: &TriangleMesh,
-    ) -> Result<Box<dyn Fn([f64; 3]) -> bool>, Error> {
+    /// Whether a vertex stays.
+    pub fn holds(&self, x: [f64; 3]) -> bool {
         match self {
-            Self::Inside(shape) => Ok(Box::new(move |x| shape.signed_distance(x) <= 0.0)),
-            Self::Coloured(colour) => {
-                let colours = surfaces::vertex_colours(bytes, file)?.ok_or_else(|| {
-                    Error::options(
-                        "--keep colour:... needs a mesh whose vertices have colours, in PLY or OBJ",
-                    )
-                })?;
-                let vertices = mesh.vertices.iter().zip(colours);
-                let kept = vertices.filter(|(_, of)| *of == colour);
-                let kept: HashSet<_> = kept.map(|(x, _)| key(*x)).collect();
-                Ok(Box::new(move |x| kept.contains(&key(x))))
-            }
+            Self::Inside(shape) => shape.signed_distance(x) <= 0.0,
+            Self::At(kept) => kept.contains(&key(x)),
         }
     }
-}
 
-/// Whether each node of a grid moves: those do not whose nearest vertex stays.
-pub fn moving_nodes(grid: &Grid<3>, vertices: &[[f64; 3]], kept: &[bool]) -> Vec<bool> {
-    let mut nearest = vec![(f64::INFINITY, true); grid.len()];
-    let (spacing, last) = (grid.spacing(), grid.cells() as f64 - 1.0);
-    for (x, kept) in vertices.iter().zip(kept) {
-        let at: [f64; 3] = std::array::from_fn(|axis| (x[axis] - grid.origin()[axis]) / spacing);
-        let ends = at.map(|at| [at - REACH, at + REACH].map(|end| end.clamp(0.0, last) as usize));
-        for i in ends[0][0]..=ends[0][1] {
-            for j in ends[1][0]..=ends[1][1] {
-                for k in ends[2][0]..=ends[2][1] {
-                    let off = [i, j, k].map(|n| n as f64);
-                    let distance = (0..3).map(|axis| (off[axis] - at[axis]).powi(2)).sum();
-                    let node = &mut nearest[grid.index([i, j, k])];
-                    if distance < node.0 {
-                        *node = (distance, !kept);
+    /// Whether each node of a grid moves.
+    pub fn moving_nodes(&self, grid: &Grid<3>, vertices: &[[f64; 3]]) -> Vec<bool> {
+        match self {
+            Self::Inside(shape) => (0..grid.len())
+                .map(|node| shape.signed_distance(grid.node(node)) > 0.0)
+                .collect(),
+            Self::At(_) => self.far_from(grid, vertices),
+        }
+    }
+
+    /// Whether the vertex that is nearest to a node moves.
+    fn far_from(&self, grid: &Grid<3>, vertices: &[[f64; 3]]) -> Vec<bool> {
+        let mut nearest = vec![(f64::INFINITY, true); grid.len()];
+        let (spacing, last) = (grid.spacing(), grid.cells() as f64 - 1.0);
+        for &x in vertices {
+            let moves = !self.holds(x);
+            let at: [f64; 3] =
+                std::array::from_fn(|axis| (x[axis] - grid.origin()[axis]) / spacing);
+            let ends =
+                at.map(|at| [at - REACH, at + REACH].map(|end| end.clamp(0.0, last) as usize));
+            for i in ends[0][0]..=ends[0][1] {
+                for j in ends[1][0]..=ends[1][1] {
+                    for k in ends[2][0]..=ends[2][1] {
+                        let off = [i, j, k].map(|n| n as f64);
+                        let distance = (0..3).map(|axis| (off[axis] - at[axis]).powi(2)).sum();
+                        let node = &mut nearest[grid.index([i, j, k])];
+                        if distance < node.0 {
+                            *node = (distance, moves);
+                        }
                     }
                 }
             }
         }
+        nearest.into_iter().map(|(_, moves)| moves).collect()
     }
-    nearest.into_iter().map(|(_, moves)| moves).collect()
 }

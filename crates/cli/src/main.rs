@@ -1,22 +1,25 @@
 //! `willmore`: Willmore flow from the command line.
 
-mod ansatz;
 mod cli;
 mod commands;
 mod config;
-mod displacement;
 mod error;
+mod faired;
 mod input;
 mod keep;
 mod outlet;
 mod own;
 mod page;
+mod paths;
 mod plane;
 mod prelude;
 mod run;
 mod say;
+mod setup;
 mod sizes;
+mod space;
 mod standard;
+mod values;
 mod volume;
 
 use std::ffi::OsString;
@@ -61,10 +64,7 @@ fn execute(mut cli: Cli) -> Result<ExitCode, Error> {
     let standard = Standard::open(&mut cli.command, &mut cli.say)?;
     let say = cli.say;
     let code = match cli.command {
-        Command::Flow(options) => flow::run(options, say, None),
-        Command::Fair(options) => flow::run(options, say, None),
-        Command::Inpaint(options) => flow::run(options, say, None),
-        Command::Mcf(options) => flow::run(options, say, None),
+        Command::Run(command) => flow::run(command, say, None),
         Command::Resume(options) => resume::run(&options, say),
         Command::Networks { show } => networks::run(show.as_ref(), say),
         Command::Info => info::run(say),

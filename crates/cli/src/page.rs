@@ -4,7 +4,6 @@
 //! does not know it, so that it may be removed, and is written again by `willmore resume`.
 
 use std::fmt::Write;
-use std::fs;
 
 use engine::METRICS;
 use pages::{
@@ -12,8 +11,10 @@ use pages::{
 };
 use report::{Axis, LineChart, Marker, Series};
 
+use crate::faired::view;
+use crate::paths::MESHES;
 use crate::prelude::*;
-use crate::{own, plane};
+use crate::{config, outlet, own, plane};
 
 pub const NAME: &str = "index.html";
 
@@ -29,26 +30,28 @@ const FEW_STEPS: usize = 40;
 /// Writes the page of a run and returns its path.
 pub fn write(run: &StoredRun) -> Result<PathBuf, Error> {
     let path = run.path().join(NAME);
-    Files { run }.page()?.write(&path)?;
+    let records = engine::records(run)?;
+    Files { run, records }.page()?.write(&path)?;
     Ok(path)
 }
 
 struct Files<'a> {
     run: &'a StoredRun,
+    records: Vec<Record>,
 }
 
 impl Files<'_> {
     fn page(&self) -> Result<Page, Error> {
         let about = &engine::notes(self.run)["about"];
         let text = |name: &str| about[name].as_str().unwrap_or_default();
-        let (outcome, table) = (self.outcome()?, self.table()?);
+        let outcome = self.outcome()?;
         let mut page = Page::new(format!("willmore {} {}", text("command"), text("name")))
-            .with_lead(lead(outcome.as_ref(), &table));
-        if let Some(shape) = self.shape(&table)? {
+            .with_lead(self.lead(outcome.as_ref()));
+        if let Some(shape) = self.shape()? {
             page.push(shape);
         }
-        if !table.rows().is_empty() {
-            page.push(self.steps(&table)?);
+        if !self.records.is_empty() {
+            page.push(self.steps()?);
         }
         let options: Value = toml::from_str(&self.run.read_text(config::FILE)?)
             .map_err(|error| Error::options(format!("the stored options: {error}")))?;
@@ -70,11 +73,11 @@ impl Files<'_> {
     }
 
     /// The shape before, in the frames and after, in one view: drawings in the plane, surfaces to turn in space.
-    fn shape(&self, table: &Table) -> Result<Option<Section>, Error> {
+    fn shape(&self) -> Result<Option<Section>, Error> {
         let section = Section::new("Shape");
         let section = match engine::dimension(self.run)? {
-            2 => self.drawings(table)?.map(|frames| section.with(frames)),
-            _ => self.surfaces(table)?.map(|viewer| section.with(viewer)),
+            2 => self.drawings()?.map(|frames| section.with(frames)),
+            _ => self.surfaces()?.map(|viewer| section.with(viewer)),
         };
         let (Some(section), Some(bytes)) = (&section, self.read(outlet::DISPLACEMENT)?) else {
             return Ok(section);
@@ -89,14 +92,14 @@ impl Files<'_> {
         Ok(Some(section.clone().with(Figure::new(image, caption))))
     }
 
-    fn drawings(&self, table: &Table) -> Result<Option<Frames>, Error> {
+    fn drawings(&self) -> Result<Option<Frames>, Error> {
         // Images are repaired in their own tones.
         let (before, format) = if self.has(plane::ORIGINAL) {
             (plane::ORIGINAL.trim_end_matches(".png"), "png")
         } else {
             (outlet::START, "svg")
         };
-        let stages = self.stages(before, &[format], table);
+        let stages = self.stages(before, &[format]);
         let mut drawings = Vec::new();
         for (label, name) in thinned(&stages, MOST_FRAMES) {
             if let Some(bytes) = self.read(name)? {
@@ -108,8 +111,8 @@ impl Files<'_> {
         Ok(frames.transpose()?)
     }
 
-    fn surfaces(&self, table: &Table) -> Result<Option<Viewer>, Error> {
-        let stages = self.stages(self.before(), &outlet::MESHES, table);
+    fn surfaces(&self) -> Result<Option<Viewer>, Error> {
+        let stages = self.stages(self.before(), &MESHES);
         // Until it is started, and on paper, the viewer is a picture.
         let (Some(poster), Some((_, first))) = (self.read(outlet::PICTURE)?, stages.first()) else {
             return Ok(None);
@@ -124,7 +127,7 @@ impl Files<'_> {
         Ok(Some(Viewer::new(
             "The surface over the steps",
             Image::from_bytes(outlet::PICTURE, &poster)?,
-            outlet::view(up.unwrap_or_default()),
+            view(up.unwrap_or_default()),
             meshes.iter().map(|(label, mesh)| (*label, mesh)),
         )?))
     }
@@ -140,15 +143,14 @@ impl Files<'_> {
     }
 
     /// Labels and files of the shape before, in the frames between, and after, each in the first of these formats that it has.
-    fn stages(&self, before: &str, formats: &[&str], table: &Table) -> Vec<(String, String)> {
+    fn stages(&self, before: &str, formats: &[&str]) -> Vec<(String, String)> {
         let named = |label: &str, stem: &str| {
             let mut names = formats.iter().map(|format| format!("{stem}.{format}"));
             let name = names.find(|name| self.has(name));
             name.map(|name| (label.to_owned(), name))
         };
         let after = named("after", outlet::FINAL);
-        let steps = table.rows().iter().filter_map(|row| row[0].parse().ok());
-        let mut steps: Vec<usize> = steps.collect();
+        let mut steps: Vec<usize> = self.records.iter().map(|record| record.step).collect();
         steps.dedup();
         // The frame of the last step shows the same.
         if after.is_some() {
@@ -160,27 +162,27 @@ impl Files<'_> {
         before.into_iter().chain(frames).chain(after).collect()
     }
 
-    fn table(&self) -> Result<Table, Error> {
-        Ok(Table::from_csv("Steps", &self.run.read_text(METRICS)?)?)
-    }
-
     /// Energy and measures over the steps, drawn and as a table.
-    fn steps(&self, table: &Table) -> Result<Section, Error> {
+    fn steps(&self) -> Result<Section, Error> {
         let columns = match engine::dimension(self.run)? {
             2 => [("length", "Length"), ("area", "Area")],
             _ => [("area", "Area"), ("volume", "Volume")],
         };
-        let energy = ("willmore_energy", "Energy");
+        let at_rest = |first: &Record| Some(first.minimization?.energy_at_rest());
+        let mut curves = vec![(
+            "Energy",
+            self.records.first().and_then(at_rest),
+            self.points(Record::willmore_energy),
+        )];
+        for (name, title) in columns {
+            let start = self.run.state().notes["start"][name].as_f64();
+            curves.push((title, start, self.points(|record| record.measure(name))));
+        }
         let mut figure = report::Figure::new("", 3);
-        for (column, title) in std::iter::once(energy).chain(columns) {
-            let mut points = points(table, column);
-            // Mean curvature flow has no energy.
-            if points.is_empty() {
-                continue;
-            }
-            if let Some(start) = self.start(column) {
-                points.insert(0, [0.0, start]);
-            }
+        // Mean curvature flow has no energy.
+        for (title, start, points) in curves.into_iter().filter(|curve| !curve.2.is_empty()) {
+            let start = start.map(|start| [0.0, start]);
+            let points: Vec<[f64; 2]> = start.into_iter().chain(points).collect();
             let mut series = Series::new("", points);
             if series.points.len() < FEW_STEPS {
                 series = series.with_marker(Marker::Circle);
@@ -190,6 +192,7 @@ impl Files<'_> {
             );
         }
         let image = Image::from_bytes("the plot of the steps", figure.to_svg()?.as_bytes())?;
+        let table = Table::from_csv("Steps", &self.run.read_text(METRICS)?)?;
         let rows: Vec<Vec<String>> = thinned(table.rows(), MOST_ROWS)
             .map(|row| row.iter().map(|cell| shortened(cell)).collect())
             .collect();
@@ -211,17 +214,33 @@ impl Files<'_> {
         Ok(Section::new("Steps").with(figure).with(details))
     }
 
-    /// What a column has before the first step.
-    fn start(&self, column: &str) -> Option<f64> {
-        let first: Value = serde_json::from_str(&self.run.state().text).ok()?;
-        let first = &first[0]["minimization"];
-        match column {
-            // The energy of a step that stands still.
-            "willmore_energy" => {
-                Some(first["energy_before"].as_f64()? / (2.0 * first["tau"].as_f64()?))
-            }
-            measure => self.run.state().notes["start"][measure].as_f64(),
+    /// The values over the steps.
+    fn points(&self, of: impl Fn(&Record) -> Option<f64>) -> Vec<[f64; 2]> {
+        let point = |record: &Record| Some([record.step as f64, of(record)?]);
+        self.records.iter().filter_map(point).collect()
+    }
+
+    /// What came out, in a sentence.
+    fn lead(&self, outcome: Option<&Value>) -> String {
+        let last = self.records.last();
+        let (step, time) = last.map_or((0, 0.0), |last| (last.step, last.time));
+        let time = five_digits(time);
+        let Some(outcome) = outcome else {
+            return format!("Not finished: {step} steps to the time {time} so far.");
+        };
+        let mut lead = format!("{step} steps to the time {time}.");
+        let number = |name: &str| outcome[name].as_f64().map(five_digits);
+        if let (Some(first), Some(last)) = (number("first_energy"), number("energy")) {
+            let name = match outcome["energy_terms"] {
+                Value::Null => "Willmore energy",
+                _ => "Energy",
+            };
+            let _ = write!(lead, " {name} {last}, before {first}.");
         }
+        if outcome["components"] == 0 {
+            lead += " The shape has vanished.";
+        }
+        lead
     }
 
     fn has(&self, name: &str) -> bool {
@@ -230,36 +249,9 @@ impl Files<'_> {
 
     /// A file, if it belongs to the run.
     fn read(&self, name: &str) -> Result<Option<Vec<u8>>, Error> {
-        if !self.has(name) {
-            return Ok(None);
-        }
-        let path = self.run.path().join(name);
-        Ok(Some(fs::read(&path).map_err(Error::io("read", path))?))
+        let bytes = self.has(name).then(|| self.run.read(name));
+        Ok(bytes.transpose()?)
     }
-}
-
-/// What came out, in a sentence.
-fn lead(outcome: Option<&Value>, table: &Table) -> String {
-    let (step, time) = match table.rows().last().map(Vec::as_slice) {
-        Some([step, time, ..]) => (step.as_str(), shortened(time)),
-        _ => ("0", "0".to_owned()),
-    };
-    let Some(outcome) = outcome else {
-        return format!("Not finished: {step} steps to the time {time} so far.");
-    };
-    let mut lead = format!("{step} steps to the time {time}.");
-    let number = |name: &str| outcome[name].as_f64().map(five_digits);
-    if let (Some(first), Some(last)) = (number("first_energy"), number("energy")) {
-        let name = match outcome["energy_terms"] {
-            Value::Null => "Willmore energy",
-            _ => "Energy",
-        };
-        let _ = write!(lead, " {name} {last}, before {first}.");
-    }
-    if outcome["components"] == 0 {
-        lead += " The shape has vanished.";
-    }
-    lead
 }
 
 /// Every k-th item, with the smallest k that leaves at most `most`; the last one in any case.
@@ -271,16 +263,6 @@ fn thinned<T>(items: &[T], most: usize) -> impl Iterator<Item = &T> {
     (items.iter().enumerate())
         .filter(move |(k, _)| k % every == 0 || *k == last)
         .map(|(_, item)| item)
-}
-
-/// The values of a column over the first one, the step.
-fn points(table: &Table, column: &str) -> Vec<[f64; 2]> {
-    let Some(k) = table.head().iter().position(|head| head == column) else {
-        return Vec::new();
-    };
-    (table.rows().iter())
-        .filter_map(|row| Some([row[0].parse().ok()?, row[k].parse().ok()?]))
-        .collect()
 }
 
 fn shortened(cell: &str) -> String {

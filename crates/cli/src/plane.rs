@@ -1,26 +1,32 @@
 //! Shapes in the plane, as the pixels of an image.
 
-use std::sync::Arc;
-
-use images::{Drawing, Frame, Interface, Outline, Svg};
+use images::{
+    Drawing, Frame, Image, Inside, Interface, Outline, OutlineDistance, Side, Svg, Threshold,
+};
 use render::Rgb;
 
+use crate::outlet::{Outlet, Topology};
+use crate::paths::{extension, read};
 use crate::prelude::*;
 
 /// Files of a run with the image that is repaired, and with the pixels that are drawn anew in black.
 pub const ORIGINAL: &str = "original.png";
 const MASK: &str = "mask.png";
+/// Pixels a side of pictures of boxes.
+const PIXELS: u32 = 512;
 
 /// A raster, and the image of which only what is in a mask is drawn anew, if there is one.
-#[derive(Serialize, Deserialize, Clone, Debug)]
+#[derive(Serialize, Deserialize)]
 pub struct Plane {
     frame: Frame,
     is_repaired: bool,
     #[serde(skip)]
-    original: Option<Arc<Original>>,
+    original: Option<Original>,
+    /// The input, if it is an image, which a mask has to fit.
+    #[serde(skip)]
+    image: Option<PathBuf>,
 }
 
-#[derive(Debug)]
 struct Original {
     picture: Picture,
     /// For each pixel whether it is drawn anew.
@@ -28,28 +34,72 @@ struct Original {
 }
 
 impl Plane {
-    pub fn new(frame: Frame) -> Self {
+    pub fn of_box(grid: &Grid<2>) -> Result<Self, Error> {
+        Ok(Self::new(Frame::of_box(grid, PIXELS)?, None))
+    }
+
+    /// The frame has the pixels of the image.
+    pub fn of_image(image: &Image, path: &Path) -> Result<Self, Error> {
+        let (width, height) = (image.width(), image.height());
+        let frame = Frame::new(width, height, [0.0, f64::from(height)], 1.0)?;
+        Ok(Self::new(frame, Some(path.to_owned())))
+    }
+
+    fn new(frame: Frame, image: Option<PathBuf>) -> Self {
         Self {
             frame,
             is_repaired: false,
             original: None,
+            image,
         }
     }
 
-    /// In the tones of a picture of the same size, all of whose pixels outside of a mask stay.
-    #[must_use]
-    pub fn repairing(self, picture: Picture, mask: &dyn SignedDistance<2>) -> Self {
+    /// What is inside a mask that is an image: of the size of the input, or else a square, which fills the box.
+    pub fn mask(&self, mask: &str, grid: &Grid<2>) -> Result<Box<dyn SignedDistance<2>>, Error> {
+        let image = images::read(mask)?;
+        let size = [image.width(), image.height()];
+        let needed = match [self.frame.width(), self.frame.height()] {
+            [w, h] if self.image.is_some() && size != [w, h] => {
+                Some(format!("{w} x {h} pixels, as the input"))
+            }
+            _ if self.image.is_none() && size[0] != size[1] => {
+                Some("a square, which fills the box".to_owned())
+            }
+            _ => None,
+        };
+        if let Some(needed) = needed {
+            return Err(Error::options(format!(
+                "--mask {mask} has {} x {} pixels; it must be {needed}",
+                size[0], size[1]
+            )));
+        }
+        let side = Side::of(&image, Inside::Auto, Threshold::default())?;
+        let mut outline = Outline::of_image(&image, side)?;
+        if self.image.is_none() {
+            let fills = Placement::fit(&image.bounding_box(), grid, grid.side(), 0.0)?;
+            outline = outline.placed(&fills);
+        }
+        Ok(Box::new(OutlineDistance::new(&outline)))
+    }
+
+    /// From now on in the tones of the input, if it is an image, all of whose pixels outside of a mask stay.
+    pub fn repair(&mut self, mask: &dyn SignedDistance<2>) -> Result<(), Error> {
+        let Some(path) = &self.image else {
+            return Ok(());
+        };
+        let picture = images::colours(&read(path)?).map_err(|problem| images::Error::Format {
+            path: path.clone(),
+            problem,
+        })?;
         let width = self.frame.width() as usize;
         let is_inside = |pixel: usize| {
             let [column, row] = [pixel % width, pixel / width].map(|i| i as f64 + 0.5);
             mask.signed_distance(self.frame.point([column, row])) < 0.0
         };
         let drawn = (0..picture.pixels().len()).map(is_inside).collect();
-        Self {
-            is_repaired: true,
-            original: Some(Arc::new(Original { picture, drawn })),
-            ..self
-        }
+        self.is_repaired = true;
+        self.original = Some(Original { picture, drawn });
+        Ok(())
     }
 
     fn svg(&self, u: &Field<2>) -> Result<Svg, Error> {
@@ -151,7 +201,7 @@ impl Outlet<2> for Plane {
         Ok(())
     }
 
-    fn inputs(&self) -> Result<Vec<(&str, Vec<u8>)>, Error> {
+    fn inputs(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
         let Some(original) = &self.original else {
             return Ok(Vec::new());
         };
@@ -159,21 +209,17 @@ impl Outlet<2> for Plane {
         let (width, height) = (original.picture.width(), original.picture.height());
         let mask = Picture::new(width, height, original.drawn.iter().map(tone).collect())?;
         Ok(vec![
-            (ORIGINAL, original.picture.to_png()?),
-            (MASK, mask.to_png()?),
+            (ORIGINAL.to_owned(), original.picture.to_png()?),
+            (MASK.to_owned(), mask.to_png()?),
         ])
     }
 
     fn restore(&mut self, stored: &StoredRun) -> Result<(), Error> {
         if self.is_repaired {
-            let picture = |name: &str| {
-                let path = stored.path().join(name);
-                let bytes = std::fs::read(&path).map_err(Error::io("read", &path))?;
-                Ok::<_, Error>(Picture::from_png(&bytes)?)
-            };
+            let picture = |name: &str| Ok::<_, Error>(Picture::from_png(&stored.read(name)?)?);
             let drawn = picture(MASK)?.pixels().iter().map(|p| p[0] == 0).collect();
             let picture = picture(ORIGINAL)?;
-            self.original = Some(Arc::new(Original { picture, drawn }));
+            self.original = Some(Original { picture, drawn });
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! What nearly every module needs.
+//! What nearly every module needs of other crates.
 
 pub use std::path::{Path, PathBuf};
 pub use std::process::ExitCode;
@@ -17,11 +17,4 @@ pub use serde_json::{Value, json};
 pub use surfaces::shapes::Region;
 pub use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh};
 
-pub use crate::cli::{Amount, FlowOptions, InputOptions, KeepOptions, SayOptions, SizeTarget};
 pub use crate::error::Error;
-pub use crate::input::{Loaded, Start, extension};
-pub use crate::outlet::{MESHES, Outlet, Space, Topology};
-pub use crate::own::OwnMesh;
-pub use crate::plane::Plane;
-pub use crate::volume::Label;
-pub(crate) use crate::{config, input, outlet, page};

@@ -9,7 +9,11 @@ use geometry::measure::touches_side;
 use pages::five_digits;
 use solver::StepEstimates;
 
-use crate::own::Faired;
+use crate::cli::{KeepOptions, SayOptions};
+use crate::faired::Faired;
+use crate::outlet::{self, Outlet, Topology};
+use crate::page;
+use crate::paths::{extension, read};
 use crate::prelude::*;
 
 /// Everything about a run but its case.
@@ -28,17 +32,13 @@ const SIZES: [&str; 3] = ["length", "area", "volume"];
 const DELAY: Duration = Duration::from_millis(200);
 
 impl<O> Plan<O> {
-    pub fn start<const D: usize>(
-        &self,
-        case: Case<D>,
-        options: &str,
-        device: &ComputeDevice,
-    ) -> Result<ExitCode, Error>
+    /// What is kept with the run.
+    pub fn notes<const D: usize>(&self, case: &Case<D>, device: &ComputeDevice) -> Value
     where
         O: Outlet<D>,
     {
         let network = case.operator.network();
-        let notes = json!({
+        json!({
             "about": {
                 "command": self.command,
                 "name": self.name,
@@ -47,55 +47,19 @@ impl<O> Plan<O> {
                 "device": format!("{} {:?}", device.kind(), device.dtype()).to_lowercase(),
             },
             "outlet": self.outlet,
-        });
-        let run = Run::new(case, device)?;
-        let folder = match &self.keep.output {
-            Some(folder) => folder.clone(),
-            None => free_folder(&format!("{}-{}", self.name, self.command)),
-        };
-        if self.keep.force.force {
-            make_way(&folder)?;
-        }
-        let inputs = self.outlet.inputs()?;
-        let mut files = vec![(config::FILE, options.as_bytes())];
-        files.extend(inputs.iter().map(|(name, bytes)| (*name, &bytes[..])));
-        let store = Store::create(folder, &files, &run, notes, self.checkpoints())?;
-        self.go_on(store, run)
+        })
     }
 
-    /// Continues a run from its last checkpoint, a finished one to more steps.
-    pub fn resume<const D: usize>(
-        &self,
-        stored: StoredRun,
-        case: Case<D>,
-        device: &ComputeDevice,
-        steps: Option<usize>,
-    ) -> Result<ExitCode, Error>
-    where
-        O: Outlet<D>,
-    {
-        let checkpoints = self.checkpoints();
-        let (store, run) = if let Some(steps) = steps {
-            let mut notes = engine::notes(&stored).clone();
-            notes["steps"] = steps.into();
-            Store::extend(
-                stored,
-                case,
-                device,
-                (checkpoints, notes),
-                outlet::is_of_end,
-            )?
-        } else {
-            Store::resume(stored, case, device, checkpoints)?
-        };
-        self.go_on(store, run)
-    }
-
-    fn checkpoints(&self) -> Checkpoints {
+    pub fn checkpoints(&self) -> Checkpoints {
         Checkpoints::EverySteps(self.keep.checkpoint_every)
     }
 
-    fn go_on<const D: usize>(&self, mut store: Store, mut run: Run<D>) -> Result<ExitCode, Error>
+    /// From the last checkpoint to the end.
+    pub fn go_on<const D: usize>(
+        &self,
+        mut store: Store,
+        mut run: Run<D>,
+    ) -> Result<ExitCode, Error>
     where
         O: Outlet<D>,
     {
@@ -157,15 +121,7 @@ impl<O> Plan<O> {
         // What has vanished leaves no vertices behind.
         let faired = has_interface(u).then(|| self.outlet.faired(&case.initial, u, eps));
         let faired = faired.transpose()?.flatten();
-        let topology = outlet::write_final(
-            &self.outlet,
-            &case.initial,
-            u,
-            eps,
-            faired.as_ref(),
-            self.format.as_deref(),
-            directory,
-        )?;
+        let topology = self.write_final(&case.initial, u, eps, faired.as_ref(), directory)?;
         if let Some(path) = self.keep.save.as_ref().filter(|_| has_interface(u)) {
             match &faired {
                 Some(faired) => faired.write(path)?,
@@ -237,6 +193,40 @@ impl<O> Plan<O> {
         directory.write_file(outlet::SUMMARY, |out| out.write_all(text.as_bytes()))?;
         store.finish(run)?;
         Ok(outcome)
+    }
+
+    /// Writes `final.npy`, `final.vti`, and, unless the shape has vanished, picture and shape, of which it returns the parts.
+    fn write_final<const D: usize>(
+        &self,
+        start: &Field<D>,
+        u: &Field<D>,
+        eps: f64,
+        faired: Option<&Faired>,
+        run: &mut RunDirectory,
+    ) -> Result<Topology, Error>
+    where
+        O: Outlet<D>,
+    {
+        let outlet = &self.outlet;
+        npy::write(run.path().join("final.npy"), u)?;
+        run.adopt_file("final.npy")?;
+        vti::write(run.path().join("final.vti"), &[("phase_field", u)])?;
+        run.adopt_file("final.vti")?;
+        if !has_interface(u) {
+            return Ok(Topology::default());
+        }
+        outlet.write_picture(start, u, eps, outlet::PICTURE, run)?;
+        let format = self.format.as_deref();
+        if let Some(faired) = faired {
+            let name = format!("{}.{}", outlet::FINAL, format.unwrap_or(&faired.extension));
+            faired.write(&run.path().join(&name))?;
+            run.adopt_file(&name)?;
+            let text = faired.displacement.to_svg()?;
+            run.write_file(outlet::DISPLACEMENT, |out| out.write_all(text.as_bytes()))?;
+        } else {
+            outlet.write_shape(u, eps, outlet::FINAL, format, run)?;
+        }
+        outlet.topology(u, eps)
     }
 
     fn tell(&self, mut outcome: Value, folder: &Path, ended: Option<Stop>, seconds: f64) {
@@ -366,8 +356,7 @@ impl<const D: usize, O: Outlet<D>> Observer<D> for Pictures<'_, O> {
             }
             if keep.frames.is_some_and(|every| step.is_multiple_of(every)) {
                 let name = outlet::frame(step);
-                let picture = outlet.picture(&case.initial, u, eps)?;
-                outlet::write_picture(&picture, &format!("{name}.png"), run)?;
+                outlet.write_picture(&case.initial, u, eps, &format!("{name}.png"), run)?;
                 let values = format!("{name}.vti");
                 vti::write(run.path().join(&values), &[("phase_field", u)])?;
                 run.adopt_file(&values)?;
@@ -390,16 +379,16 @@ impl<const D: usize, O: Outlet<D>> Observer<D> for Pictures<'_, O> {
 }
 
 /// Removes the run in a folder, if there is one that nobody works on. A folder of something else stays.
-fn make_way(folder: &Path) -> Result<(), Error> {
+pub fn make_way(folder: &Path) -> Result<(), Error> {
     match RunDirectory::recover(folder) {
-        Ok(_) => std::fs::remove_dir_all(folder).map_err(Error::io("remove", folder)),
+        Ok(_) => Ok(std::fs::remove_dir_all(folder).map_err(files::Error::of("remove", folder))?),
         Err(locked @ runs::Error::Locked(_)) => Err(locked.into()),
         Err(_) => Ok(()),
     }
 }
 
 /// `runs/NAME`, with the first number that is free.
-fn free_folder(name: &str) -> PathBuf {
+pub fn free_folder(name: &str) -> PathBuf {
     let folder = Path::new("runs").join(name);
     let numbered = (2..).map(|k| Path::new("runs").join(format!("{name}-{k}")));
     std::iter::once(folder)
@@ -446,16 +435,13 @@ fn series(run: &Path, records: &[Record]) -> String {
 }
 
 fn frames(folder: &Path) -> Result<Vec<Picture>, Error> {
-    let entries = std::fs::read_dir(folder).map_err(Error::io("read", folder))?;
+    let entries = std::fs::read_dir(folder).map_err(files::Error::of("read", folder))?;
     let mut paths: Vec<PathBuf> = entries
         .map(|entry| Ok(entry?.path()))
         .collect::<Result<_, _>>()
-        .map_err(Error::io("read", folder))?;
+        .map_err(files::Error::of("read", folder))?;
     paths.retain(|path| extension(path) == "png");
     paths.sort();
-    let read = |path: &PathBuf| {
-        let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
-        Ok(Picture::from_png(&bytes)?)
-    };
+    let read = |path: &PathBuf| Ok(Picture::from_png(&read(path)?)?);
     paths.iter().map(read).collect()
 }

@@ -4,6 +4,7 @@ use std::io::Write;
 
 use report::Progress;
 
+use crate::cli::SayOptions;
 use crate::prelude::*;
 
 impl SayOptions {

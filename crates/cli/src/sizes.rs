@@ -1,8 +1,10 @@
 //! Area and volume that are held: from the options to targets, and a start that has them.
 
-use engine::{Flow, Held, Helfrich, Operator, Target};
+use engine::{Flow, Held, Helfrich, Target};
 
+use crate::cli::{FlowOptions, SayOptions};
 use crate::prelude::*;
+use crate::values::{Amount, SizeTarget};
 
 /// Steps over which sizes go to their targets.
 const RAMP: usize = 20;
@@ -44,14 +46,9 @@ impl FlowOptions {
             volume: target(self.volume, now.volume, of_input.unwrap_or(now.volume)),
         })
     }
-
-    /// Whether neither area nor volume is free.
-    pub fn holds_both(&self) -> bool {
-        self.reduced_volume.is_some() || (self.area.is_some() && self.volume.is_some())
-    }
 }
 
-/// For a flow that holds area and volume: the start with round edges, and a note on it, if its edges are sharper than the interface is wide.
+/// Gives the start of a flow that holds area and volume round edges, if its edges are sharper than the interface is wide.
 ///
 /// Such edges become round in the first step, which takes area away. To hold it there, the flow would have to make other edges. So they become
 /// round while the volume alone is held, and the area goes back to what it was, or to its target, over the steps of the ramp: the options
@@ -59,16 +56,21 @@ impl FlowOptions {
 ///
 /// # Errors
 /// Where that does not help, or takes too much away, since the shape is too thin.
-pub fn with_round_edges<const D: usize>(
+pub fn round_edges<const D: usize>(
     options: &mut FlowOptions,
-    start: &Field<D>,
-    (scales, operator): (Scales, Operator),
+    start: &mut Field<D>,
     device: &ComputeDevice,
-) -> Result<Option<(Field<D>, String)>, Error> {
+    say: SayOptions,
+) -> Result<(), Error> {
+    let both = options.area.is_some() && options.volume.is_some();
+    if !(both || options.reduced_volume.is_some()) {
+        return Ok(());
+    }
+    let (scales, operator) = options.run.scheme.operator(Method::Hybrid, start.grid())?;
     let eps = scales.eps;
     let sharp = ZeroSet::of(start, eps)?;
     if sharp.sizes_hold() {
-        return Ok(None);
+        return Ok(());
     }
     let targets = options.held(start, eps, None)?.targets();
     let case = Case {
@@ -98,16 +100,17 @@ pub fn with_round_edges<const D: usize>(
         }
         let of_surface = if D == 2 { "length" } else { "area" };
         let area = targets.perimeter.unwrap_or(sharp.perimeter);
-        let note = format!(
+        say.note(&format!(
             "edges sharper than the interface became round: {of_surface} {:.4} instead of {:.4}; it goes to {area:.4} over the steps of --ramp",
             round.perimeter, sharp.perimeter
-        );
+        ));
         options.area = Some(SizeTarget::To(Amount::Value(area)));
         if options.reduced_volume.take().is_some() {
             let volume = targets.volume.unwrap_or(sharp.volume);
             options.volume = Some(SizeTarget::To(Amount::Value(volume)));
         }
-        return Ok(Some((run.field().clone(), note)));
+        start.clone_from(run.field());
+        return Ok(());
     }
     Err(Error::options(
         "area and volume cannot both be held: the grid does not resolve parts of the shape, and so their area; give more --cells, or hold \

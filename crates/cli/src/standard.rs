@@ -2,9 +2,11 @@
 
 use std::io::{Read, Write};
 
-use crate::cli::Command;
+use crate::cli::{Command, InputOptions, SayOptions};
 use crate::input::usual_format;
+use crate::paths::read;
 use crate::prelude::*;
+use crate::values::Label;
 
 /// The files, which are removed in the end.
 #[derive(Default)]
@@ -24,14 +26,14 @@ impl Standard {
             let mut bytes = Vec::new();
             let name = "standard input";
             let read = std::io::stdin().read_to_end(&mut bytes);
-            read.map_err(Error::io("read", name))?;
+            read.map_err(files::Error::of("read", name))?;
             if bytes.is_empty() {
                 return Err(Error::options(
                     "standard input is empty: pipe a mesh, an image or a field into it",
                 ));
             }
             let path = stand_in("input", kind(&bytes));
-            std::fs::write(&path, bytes).map_err(Error::io("write", &path))?;
+            std::fs::write(&path, bytes).map_err(files::Error::of("write", &path))?;
             input.input = Some(path.to_string_lossy().into_owned());
             standard.input = Some(path);
         }
@@ -60,9 +62,8 @@ impl Standard {
         let Some(path) = self.output.as_ref().filter(|path| path.exists()) else {
             return Ok(());
         };
-        let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
-        let written = std::io::stdout().write_all(&bytes);
-        written.map_err(Error::io("write", "standard output"))
+        let written = std::io::stdout().write_all(&read(path)?);
+        Ok(written.map_err(files::Error::of("write", "standard output"))?)
     }
 }
 
@@ -77,11 +78,14 @@ impl Drop for Standard {
 
 /// The input of a command and the file that it writes, if it has these.
 fn paths(command: &mut Command) -> Option<(&mut InputOptions, &mut Option<PathBuf>)> {
-    if let Command::Sample(sample) = command {
-        return Some((&mut sample.input, &mut sample.save));
+    match command {
+        Command::Sample(sample) => Some((&mut sample.input, &mut sample.save)),
+        Command::Run(command) => {
+            let options = command.options();
+            Some((&mut options.input, &mut options.keep.save))
+        }
+        _ => None,
     }
-    let (input, keep) = command.of_run()?;
-    Some((input, &mut keep.save))
 }
 
 /// A name that no other process has.

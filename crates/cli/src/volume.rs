@@ -1,47 +1,13 @@
 //! Volumes of voxels as inputs.
 
-use derive_more::Display;
 use volumes::{Body, Inside, Volume};
 
-use crate::input::absolute;
+use crate::cli::InputOptions;
+use crate::paths::absolute;
 use crate::prelude::*;
+use crate::values::Label;
 
 const LISTED: usize = 20;
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Display)]
-pub enum Label {
-    /// Each but 0 becomes a surface of its own.
-    #[display("all")]
-    All,
-    One(i64),
-}
-
-impl FromStr for Label {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.parse() {
-            Ok(label) => Ok(Self::One(label)),
-            Err(_) if text == "all" => Ok(Self::All),
-            Err(_) => Err(format!("{text:?} is neither a whole number nor all")),
-        }
-    }
-}
-
-impl Serialize for Label {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
-
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct Voxels {
-    pub volume: f64,
-    /// The side of a cube as large as a voxel.
-    pub side: f64,
-    /// How far its surface may go, root of the mean square, if that ends the flow.
-    pub farthest: Option<f64>,
-}
 
 pub fn body(path: &Path, options: &InputOptions) -> Result<Body, Error> {
     let volume = volumes::read(path)?;
@@ -80,9 +46,13 @@ fn usual(volume: &Volume, path: &Path) -> Result<Inside, Error> {
     )))
 }
 
-/// The labels in a volume but 0, of which there must be some.
-pub fn labels(path: &Path) -> Result<Vec<i64>, Error> {
-    let labels = volumes::read(path)?.labels().unwrap_or_default();
+/// The labels of a volume but 0, of which there must be some, if all are to become surfaces.
+pub fn all_labels(options: &InputOptions) -> Result<Option<Vec<i64>>, Error> {
+    let (Some(input), Some(Label::All)) = (&options.input, options.label) else {
+        return Ok(None);
+    };
+    let path = absolute(input)?;
+    let labels = volumes::read(&path)?.labels().unwrap_or_default();
     let labels = labels.iter().map(|(label, _)| *label as i64);
     let labels: Vec<i64> = labels.filter(|&label| label != 0).collect();
     if labels.is_empty() {
@@ -91,7 +61,7 @@ pub fn labels(path: &Path) -> Result<Vec<i64>, Error> {
             path.display()
         )));
     }
-    Ok(labels)
+    Ok(Some(labels))
 }
 
 /// The name of a file or folder for one of several labels.
@@ -102,12 +72,4 @@ pub fn named(path: &Path, label: i64) -> PathBuf {
         None => format!("{stem}-label{label}"),
     };
     path.with_file_name(name)
-}
-
-/// The volume whose labels are all to become surfaces, if they are.
-pub fn of_all_labels(options: &InputOptions) -> Result<Option<PathBuf>, Error> {
-    match (&options.input, options.label) {
-        (Some(input), Some(Label::All)) => absolute(input).map(Some),
-        _ => Ok(None),
-    }
 }

@@ -6,7 +6,7 @@ use clap::CommandFactory;
 use fuzzing::{CountingAllocator, Fuzz, Limit, assert_short_line, peak_of};
 
 use super::{LONGEST, parse_both, parse_resolved, resolved};
-use crate::cli::{Cli, Command};
+use crate::cli::{Cli, Command, RunCommand};
 use crate::error::Error;
 
 #[global_allocator]
@@ -29,13 +29,10 @@ const MCF: &str = "command = \"mcf\"\ninput = \"c.vti\"\nmethod = \"fe-implicit\
 
 /// A resolved configuration, as text: the options have no other way to be compared.
 fn text(cli: &Cli) -> Option<String> {
-    match &cli.command {
-        Command::Flow(options) => resolved("flow", options).ok(),
-        Command::Inpaint(options) => resolved("inpaint", options).ok(),
-        Command::Fair(options) => resolved("fair", options).ok(),
-        Command::Mcf(options) => resolved("mcf", options).ok(),
-        _ => None,
-    }
+    let Command::Run(command) = &cli.command else {
+        return None;
+    };
+    resolved(command.name(), command).ok()
 }
 
 fn utf8(bytes: &[u8]) -> Result<&str, Error> {
@@ -109,10 +106,10 @@ fn named_configurations() {
     configurations("named configurations")
         .valid([FLOW.as_bytes().to_vec()])
         .run(read, |_, cli| {
-            let Command::Flow(options) = &cli.command else {
+            let Command::Run(RunCommand::Flow(options)) = &cli.command else {
                 panic!("{cli:?}");
             };
-            assert_eq!(options.input.input.as_deref(), Some("a.ply"));
+            assert_eq!(options.run.input.input.as_deref(), Some("a.ply"));
         });
 }
 

@@ -101,7 +101,7 @@ fn a_mask_and_a_colour_keep_parts_of_a_mesh_and_the_page_shows_how_far_the_other
     for (keep, reason) in [
         ("colour:red", "six hexadecimal digits"),
         ("colour:0000ff", "contains no vertex"),
-        ("missing.ply", "cannot read"),
+        ("missing.ply", "could not read"),
         ("ball.obj", "contains all of the mesh"),
     ] {
         let refused = run(folder.path(), &["fair", "ball.obj", "--keep", keep]);

@@ -209,7 +209,7 @@ fn every_mistake_is_one_clear_line() {
         (&["flow", "builtin:disc", "--output", "full"], "holds mine"),
         (
             &["flow", "--config", "missing.toml"],
-            "cannot read missing.toml",
+            "could not read missing.toml",
         ),
         (
             &["flow", "builtin:disc", "--config", "syntax.toml"],

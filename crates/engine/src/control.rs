@@ -56,20 +56,10 @@ pub(crate) struct Controller {
 impl Controller {
     pub(crate) fn new(control: ErrorControl, eps: f64, largest: f64) -> Result<Self, Error> {
         let size = control.first.unwrap_or(16.0 * eps.powi(4));
-        for (name, value) in [
-            ("relative error of a step", control.relative),
-            ("time error", control.length.unwrap_or(1.0)),
-            ("longest displacement of a stage", control.longest),
-            ("first step", size),
-        ] {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(Error::Parameter {
-                    name,
-                    value,
-                    expected: "positive and finite",
-                });
-            }
-        }
+        Error::unless_positive("relative error of a step", control.relative)?;
+        Error::unless_positive("time error", control.length.unwrap_or(1.0))?;
+        Error::unless_positive("longest displacement of a stage", control.longest)?;
+        Error::unless_positive("first step", size)?;
         Ok(Self {
             control,
             eps,

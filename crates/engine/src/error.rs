@@ -4,8 +4,6 @@ use std::path::PathBuf;
 
 use thiserror::Error as ThisError;
 
-use crate::Stop;
-
 /// What can stop a case.
 #[derive(Debug, ThisError)]
 pub enum Error {
@@ -55,14 +53,9 @@ pub enum Error {
     Incomparable { cells: usize, reference: usize },
     #[error("there is no step {step} in a run of {steps} steps")]
     NoSuchStep { step: usize, steps: usize },
-    #[error(
-        "{} holds a run of another case ({difference}); start a new run in another folder", path.display()
-    )]
-    OtherCase { path: PathBuf, difference: String },
-    #[error("the run in {} cannot go on: {stop}", path.display())]
-    Over { path: PathBuf, stop: Stop },
-    #[error("{} cannot be resumed: {reason}; start a new run", path.display())]
-    Unreadable { path: PathBuf, reason: String },
+    /// A stored run of another case, one that is over, or one that cannot be read.
+    #[error("the run in {} cannot go on: {reason}", path.display())]
+    Stored { path: PathBuf, reason: String },
     /// From an observer of another crate.
     #[error(transparent)]
     Observer(Box<dyn std::error::Error + Send + Sync>),
@@ -82,6 +75,18 @@ pub enum Error {
 }
 
 impl Error {
+    /// Refuses a value unless it is positive and finite.
+    pub(crate) fn unless_positive(name: &'static str, value: f64) -> Result<(), Self> {
+        if value.is_finite() && value > 0.0 {
+            return Ok(());
+        }
+        Err(Self::Parameter {
+            name,
+            value,
+            expected: "positive and finite",
+        })
+    }
+
     /// Wraps what an observer of another crate raised.
     pub fn observer(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
         Self::Observer(error.into())

@@ -38,23 +38,16 @@ impl<const D: usize> Motion<D> {
         if let Some(what) = whole.filter(|_| operator.storage == Storage::Bricks) {
             return Err(solver::Error::NeedsGrid { what }.into());
         }
-        let elements = match operator.method {
-            Method::Hybrid => None,
-            _ => Some(operator.elements(case.grid(), &case.scales)?),
+        let elements = match operator.network() {
+            Some(_) => None,
+            None => Some(operator.elements(case.grid(), &case.scales)?),
         };
-        let network = operator.network().map(|named| &named.network);
         let flow = match case.flow {
             Flow::Willmore => {
-                let mut flow = match (&elements, network) {
-                    (Some(step), _) => {
-                        WillmoreFlow::new(step.clone(), &case.initial, params, device)?
-                    }
-                    (None, Some(network)) => learned(case, network, device)?,
-                    (None, None) => unreachable!("a learned operator has a network"),
+                let mut flow = match &elements {
+                    Some(step) => WillmoreFlow::new(step.clone(), &case.initial, params, device)?,
+                    None => learned(case, device)?,
                 };
-                if let Some(network) = network.filter(|_| operator.half_grids) {
-                    flow.begin_on_half_grids(network)?;
-                }
                 if !case.energy.is_willmore() {
                     flow.set_energy(case.energy, operator.response)?;
                 }
@@ -67,12 +60,9 @@ impl<const D: usize> Motion<D> {
             }
             Flow::MeanCurvature => {
                 let from = &state.current;
-                let flow = match (&elements, network) {
-                    (Some(step), _) => MeanCurvatureFlow::new(step.clone(), from, device)?,
-                    (None, Some(network)) => {
-                        MeanCurvatureFlow::with_network(network, from, &params, device)?
-                    }
-                    (None, None) => unreachable!("a learned operator has a network"),
+                let flow = match &elements {
+                    Some(step) => MeanCurvatureFlow::new(step.clone(), from, device)?,
+                    None => MeanCurvatureFlow::with_network(network(case), from, &params, device)?,
                 };
                 Either::MeanCurvature(Box::new(flow))
             }
@@ -150,28 +140,36 @@ impl<const D: usize> Motion<D> {
     }
 }
 
+fn network<const D: usize>(case: &Case<D>) -> &Network {
+    let named = case.operator.network();
+    &named.expect("a learned operator has a network").network
+}
+
 /// Willmore flow with a network, of what is to be stored.
 fn learned<const D: usize>(
     case: &Case<D>,
-    network: &Network,
     device: &ComputeDevice,
 ) -> Result<WillmoreFlow<D>, solver::Error> {
     use solver::Error::{Model, NoInterface, Operators};
     /// Bricks that are more than this part of the grid do not pay.
     const PAYS: f64 = 0.5;
-    let (initial, params) = (&case.initial, case.params());
+    let (network, initial, params) = (network(case), &case.initial, case.params());
     let dense = || WillmoreFlow::with_network(network, initial, params, device);
     let bricks = || WillmoreFlow::on_bricks(network, initial, params, device);
-    match case.operator.storage {
-        Storage::Dense => dense(),
-        Storage::Bricks => bricks(),
-        Storage::Auto if !case.takes_bricks() => dense(),
+    let mut flow = match case.operator.storage {
+        Storage::Dense => dense()?,
+        Storage::Bricks => bricks()?,
+        Storage::Auto if !case.takes_bricks() => dense()?,
         Storage::Auto => match bricks() {
-            Ok(flow) if (flow.stored_cells() as f64) < PAYS * case.grid().len() as f64 => Ok(flow),
+            Ok(flow) if (flow.stored_cells() as f64) < PAYS * case.grid().len() as f64 => flow,
             Ok(_) | Err(Model(_) | NoInterface | Operators(operators::Error::Bricks { .. })) => {
-                dense()
+                dense()?
             }
-            Err(error) => Err(error),
+            Err(error) => return Err(error),
         },
+    };
+    if case.operator.half_grids {
+        flow.begin_on_half_grids(network)?;
     }
+    Ok(flow)
 }

@@ -323,7 +323,7 @@ impl Operator {
             "half_grids": self.half_grids,
             "network": self.network().map(network),
         });
-        if !self.storage.is_dense() {
+        if self.storage != Storage::Dense {
             identity["storage"] = json!(self.storage);
         }
         identity

@@ -99,37 +99,32 @@ pub fn mean_hvp(records: &[Record]) -> f64 {
 
 /// All records as CSV, with a column for each measure.
 pub fn to_csv(records: &[Record]) -> String {
+    type Column<'a> = (&'a str, Box<dyn Fn(&Record) -> Option<f64> + 'a>);
+    fn column<'a>(name: &'a str, of: impl Fn(&Record) -> Option<f64> + 'a) -> Column<'a> {
+        (name, Box::new(of))
+    }
+    let mut columns = vec![
+        column("step", |r| Some(r.step as f64)),
+        column("time", |r| Some(r.time)),
+        column("tau", |r| Some(r.tau)),
+        column("energy_before", |r| Some(r.minimization?.energy_before)),
+        column("energy", |r| Some(r.minimization?.energy)),
+        column("willmore_energy", Record::willmore_energy),
+    ];
     let names = records.iter().flat_map(|record| record.measures.keys());
     let names: BTreeSet<&str> = names.map(String::as_str).collect();
-    let mut columns: Vec<(&str, Box<dyn Fn(&Record) -> Option<f64> + '_>)> = vec![
-        ("step", Box::new(|r| Some(r.step as f64))),
-        ("time", Box::new(|r| Some(r.time))),
-        ("tau", Box::new(|r| Some(r.tau))),
-        (
-            "energy_before",
-            Box::new(|r| Some(r.minimization?.energy_before)),
-        ),
-        ("energy", Box::new(|r| Some(r.minimization?.energy))),
-        ("willmore_energy", Box::new(Record::willmore_energy)),
+    columns.extend((names.into_iter()).map(|name| column(name, move |r| r.measure(name))));
+    let multipliers = [
+        column("tension", |r| r.minimization?.tension),
+        column("pressure", |r| r.minimization?.pressure),
     ];
-    for name in names {
-        columns.push((name, Box::new(move |r| r.measure(name))));
-    }
-    let multipliers: [(&str, fn(&Record) -> Option<f64>); 2] = [
-        ("tension", |r| r.minimization?.tension),
-        ("pressure", |r| r.minimization?.pressure),
-    ];
-    for (name, of) in multipliers {
-        if records.iter().any(|record| of(record).is_some()) {
-            columns.push((name, Box::new(of)));
-        }
-    }
-    columns.push((
-        "newton",
-        Box::new(|r| Some(r.minimization?.newton.newton as f64)),
-    ));
-    columns.push(("hvp", Box::new(Record::hvp)));
-    columns.push(("halvings", Box::new(|r| Some(f64::from(r.halvings)))));
+    let is_used = |(_, of): &Column<'_>| records.iter().any(|record| of(record).is_some());
+    columns.extend(multipliers.into_iter().filter(is_used));
+    columns.extend([
+        column("newton", |r| Some(r.minimization?.newton.newton as f64)),
+        column("hvp", Record::hvp),
+        column("halvings", |r| Some(f64::from(r.halvings))),
+    ]);
     let head: Vec<&str> = columns.iter().map(|(name, _)| *name).collect();
     let mut text = head.join(",") + "\n";
     for record in records {

@@ -12,7 +12,7 @@ use solver::{FlowState, StepRecord};
 
 use crate::motion::Motion;
 use crate::record::Values;
-use crate::steps::{Lengths, StepControl};
+use crate::steps::StepControl;
 use crate::{Case, Error, Event, Flow, Observer, Record, Stop, Storage, Store};
 
 /// Why [`Run::advance`] returned.
@@ -66,13 +66,7 @@ impl<const D: usize> Run<D> {
                 expected: "the inner step, for mean curvature flow",
             });
         }
-        let lengths = Lengths {
-            eps: case.scales.eps,
-            mcf_step,
-            largest: case.largest_step(),
-            least_energy: case.least_energy(),
-        };
-        let mut control = StepControl::new(case.steps, lengths, case.end())?;
+        let mut control = StepControl::new(&case)?;
         let (mut step_size, mut ramped) = (control.step_size(), 0.0);
         for record in &records {
             step_size = control.step_size();
@@ -156,14 +150,14 @@ impl<const D: usize> Run<D> {
             }
             if let Err(error) = self.step() {
                 if let Some(store) = &mut store {
-                    store.commit_failed(self)?;
+                    store.commit(self, true)?;
                 }
                 return Err(error);
             }
             self.tell(store.as_deref_mut(), observers)?;
             let interrupted = interrupt.requested();
             if let Some(store) = &mut store {
-                store.commit_if_due(self, interrupted)?;
+                store.commit(self, interrupted)?;
             }
             if interrupted && self.ended.is_none() {
                 return Ok(Ending::Interrupted);
@@ -216,32 +210,26 @@ impl<const D: usize> Run<D> {
             // A shorter step changes what is held by less, too.
             let ramped = self.ramped + size / self.control.step_size();
             let constraints = self.case.held.at(ramped);
-            match self.motion.advance(size, constraints, accept) {
+            let refused = match self.motion.advance(size, constraints, accept) {
                 Ok((minimization, true)) => {
-                    let made = Attempt {
-                        halvings,
-                        refused_hvp,
-                        minimization,
-                    };
-                    let (Some(longest), Some(before)) = (longest, &before) else {
-                        return Ok(made);
-                    };
-                    if halvings >= SHORTER || !self.has_gone_too_far(longest)? {
-                        return Ok(made);
+                    let too_long = longest.zip(before.as_ref()).filter(|_| halvings < SHORTER);
+                    match too_long {
+                        Some((longest, before)) if self.has_gone_too_far(longest)? => {
+                            self.motion = Motion::new(&self.case, before, &self.device)?;
+                        }
+                        _ => {
+                            return Ok(Attempt {
+                                halvings,
+                                refused_hvp,
+                                minimization,
+                            });
+                        }
                     }
-                    self.motion = Motion::new(&self.case, before, &self.device)?;
-                    refused_hvp += minimization.map_or(0.0, |made| made.hvp());
-                    size *= 0.5;
-                    halvings += 1;
+                    minimization
                 }
-                Ok((refused, false)) => {
-                    refused_hvp += refused.map_or(0.0, |made| made.hvp());
-                    size = shorter.unwrap_or(0.5 * size);
-                    halvings += 1;
-                }
+                Ok((minimization, false)) => minimization,
                 Err(NotConverged { .. } | NonFinite { .. } | NotHeld { .. }) if halvings < most => {
-                    size *= 0.5;
-                    halvings += 1;
+                    None
                 }
                 Err(source @ (NotConverged { .. } | NonFinite { .. } | NotHeld { .. }))
                     if most > 0 =>
@@ -255,7 +243,10 @@ impl<const D: usize> Run<D> {
                     });
                 }
                 Err(source) => return Err(self.failed(source)),
-            }
+            };
+            refused_hvp += refused.map_or(0.0, |made| made.hvp());
+            size = shorter.unwrap_or(0.5 * size);
+            halvings += 1;
         }
     }
 

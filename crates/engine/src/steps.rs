@@ -9,7 +9,7 @@ use solver::StepRecord;
 
 use crate::control::Controller;
 use crate::substeps::{EASY, HARD, Substeps};
-use crate::{Error, ErrorControl, Record};
+use crate::{Case, Error, ErrorControl, Record};
 
 /// A rule for the sizes of time steps, written `auto`, `auto:FIRST`, `TAU`, `doubling:FIRST`, `growing:TAU,ALIKE`, `graded:FIRST,PART`,
 /// `ramp:TAU,HALVINGS` or `controlled`.
@@ -142,17 +142,6 @@ impl From<StepRule> for TimeSteps {
     }
 }
 
-/// The lengths, times and energies of a flow that step sizes depend on.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Lengths {
-    pub(crate) eps: f64,
-    pub(crate) mcf_step: f64,
-    /// The longest step that shows anything.
-    pub(crate) largest: f64,
-    /// Changes of energies below this are measured by it.
-    pub(crate) least_energy: f64,
-}
-
 /// Where in its time steps a flow is, and what size comes next. It depends on nothing but the records so far, so that
 /// [accepting](Self::accept) them again restores it.
 #[derive(Clone, Debug)]
@@ -160,7 +149,7 @@ pub(crate) struct StepControl {
     steps: TimeSteps,
     /// The time at which the flow ends, if any.
     end: f64,
-    /// The largest size of steps by the energy.
+    /// The largest size of steps by the energy, in which changes of energies below the least one are measured by that.
     largest: f64,
     least_energy: f64,
     /// Steps completed, and the time reached.
@@ -177,35 +166,25 @@ pub(crate) struct StepControl {
 }
 
 impl StepControl {
-    pub(crate) fn new(
-        steps: TimeSteps,
-        Lengths {
-            eps,
-            mcf_step,
-            largest,
-            least_energy,
-        }: Lengths,
-        end: Option<f64>,
-    ) -> Result<Self, Error> {
-        let rule = steps.rule.resolved(mcf_step);
-        let controller = match steps.order {
-            Order::Controlled(control) => Some(Controller::new(control, eps, largest)?),
-            _ if rule == StepRule::Controlled => {
-                Some(Controller::new(ErrorControl::default(), eps, largest)?)
-            }
-            _ => None,
+    pub(crate) fn new<const D: usize>(case: &Case<D>) -> Result<Self, Error> {
+        let (steps, largest) = (case.steps, case.largest_step());
+        let rule = steps.rule.resolved(case.scales.mcf_step);
+        let control = match steps.order {
+            Order::Controlled(control) => Some(control),
+            _ => (rule == StepRule::Controlled).then(ErrorControl::default),
         };
+        let controller = control.map(|control| Controller::new(control, case.scales.eps, largest));
         let mut control = Self {
             steps: TimeSteps { rule, ..steps },
-            end: end.unwrap_or(f64::INFINITY),
+            end: case.end().unwrap_or(f64::INFINITY),
             largest,
-            least_energy,
+            least_energy: case.least_energy(),
             completed: 0,
             time: 0.0,
             wanted: rule.size(1),
             size: f64::NAN,
             substeps: None,
-            controller,
+            controller: controller.transpose()?,
             due: f64::INFINITY,
         };
         control.begin(f64::INFINITY)?;
@@ -325,48 +304,50 @@ impl FromStr for StepRule {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        const RULES: &str = "auto, auto:FIRST, controlled, VALUE, doubling:FIRST, graded:VALUE,PART, growing:VALUE,ALIKE or \
+             ramp:VALUE,HALVINGS";
         let positive = |text: &str| match text.trim().parse::<f64>() {
             Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-            _ => Err(format!(
-                "{text:?} is no positive number; give auto, auto:FIRST, controlled, VALUE, doubling:FIRST, graded:VALUE,PART, \
-                 growing:VALUE,ALIKE or ramp:VALUE,HALVINGS"
-            )),
+            _ => Err(format!("{text:?} is no positive number; give {RULES}")),
         };
-        let pair = |rest: &str, rule: &str, name: &str| match rest.split_once(',') {
-            Some((tau, count)) => match count.trim().parse::<u32>() {
-                Ok(count @ 0..=60) => Ok((positive(tau)?, count)),
-                _ => Err(format!("{count:?} is no number of {name} from 0 to 60")),
-            },
-            None => Err(format!(
-                "a {rule} needs a step and a number of {name}, VALUE,COUNT"
-            )),
+        let count = |text: &str, what: &str| match text.trim().parse::<u32>() {
+            Ok(count @ 0..=60) => Ok(count),
+            _ => Err(format!("{text:?} is no number of {what} from 0 to 60")),
         };
-        match text.split_once(':') {
-            None if text == "auto" => Ok(Self::ByEnergy(None)),
-            None if text == "controlled" => Ok(Self::Controlled),
-            None => Ok(Self::Constant(positive(text)?)),
-            Some(("auto", first)) => Ok(Self::ByEnergy(Some(positive(first)?))),
-            Some(("doubling", first)) => Ok(Self::Doubling(positive(first)?)),
-            Some(("growing", rest)) => {
-                pair(rest, "growing rule", "equal steps").map(|(tau, alike)| Self::Growing {
-                    tau,
-                    alike: alike as usize,
-                })
-            }
-            Some(("ramp", rest)) => {
-                pair(rest, "ramp", "halvings").map(|(tau, halvings)| Self::Ramp { tau, halvings })
-            }
-            Some(("graded", rest)) => match rest.split_once(',') {
-                Some((first, part)) => Ok(Self::Graded {
-                    first: positive(first)?,
-                    part: positive(part)?,
-                }),
-                None => Err("a graded rule needs a step and a part, VALUE,PART".to_owned()),
+        let (rule, numbers) = text.split_once(':').unwrap_or((text, ""));
+        let numbers: Vec<&str> = numbers.split(',').collect();
+        Ok(match (rule, &numbers[..]) {
+            ("auto", [""]) => Self::ByEnergy(None),
+            ("controlled", [""]) => Self::Controlled,
+            ("auto", [first]) => Self::ByEnergy(Some(positive(first)?)),
+            ("doubling", [first]) => Self::Doubling(positive(first)?),
+            ("growing", [tau, alike]) => Self::Growing {
+                tau: positive(tau)?,
+                alike: count(alike, "equal steps")? as usize,
             },
-            Some((rule, _)) => Err(format!(
-                "{rule:?} is no rule; there are auto, controlled, doubling, graded, growing and ramp"
-            )),
-        }
+            ("ramp", [tau, halvings]) => Self::Ramp {
+                tau: positive(tau)?,
+                halvings: count(halvings, "halvings")?,
+            },
+            ("graded", [first, part]) => Self::Graded {
+                first: positive(first)?,
+                part: positive(part)?,
+            },
+            ("growing", _) => {
+                return Err(
+                    "a growing rule needs a step and a number of equal steps, VALUE,COUNT"
+                        .to_owned(),
+                );
+            }
+            ("ramp", _) => {
+                return Err("a ramp needs a step and a number of halvings, VALUE,COUNT".to_owned());
+            }
+            ("graded", _) => {
+                return Err("a graded rule needs a step and a part, VALUE,PART".to_owned());
+            }
+            (tau, [""]) => Self::Constant(positive(tau)?),
+            _ => return Err(format!("{rule:?} is no rule; there are {RULES}")),
+        })
     }
 }
 

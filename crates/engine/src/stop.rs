@@ -6,6 +6,7 @@ use derive_more::Display;
 use geometry::Field;
 use geometry::measure::has_interface;
 use serde::{Deserialize, Serialize};
+use solver::StepRecord;
 
 use crate::{DISPLACEMENT, Record, Run};
 
@@ -36,10 +37,6 @@ pub enum Stop {
     /// jump to other minimizers, such as an empty box.
     #[display("the energy is stationary")]
     EnergyAtRest,
-    /// In three steps in a row, the energy changed by less than this fraction of itself per time `side^4 / 1024`, in which shapes as large as
-    /// the box become stationary; longer steps count as that long.
-    #[display("the energy is stationary")]
-    EnergyRate(f64),
     /// In space, the Willmore energy is less than half of that of a sphere, which no closed surface has: the phase field does not describe
     /// a surface any more. Says nothing with spontaneous curvature, tension or pressure.
     #[display(
@@ -63,10 +60,7 @@ const IN_A_ROW: usize = 3;
 impl Stop {
     /// Whether it says that nothing happens any more, which it cannot say while sizes are driven to their targets.
     pub(crate) fn is_rest(&self) -> bool {
-        matches!(
-            self,
-            Self::Motion(_) | Self::EnergyAtRest | Self::EnergyRate(_)
-        )
+        matches!(self, Self::Motion(_) | Self::EnergyAtRest)
     }
 
     /// Whether it holds for a run whose last record belongs to a time step of this size.
@@ -93,12 +87,8 @@ impl Stop {
                 last.is_some_and(|r| r.moved * step_size / r.tau <= limit * r.travelled)
             }
             Self::EnergyAtRest => {
-                let shortest = 0.25 * run.case.largest_step();
-                is_at_rest(run, |tau, change| tau >= shortest && change < LITTLE)
-            }
-            Self::EnergyRate(limit) => {
-                let unit = run.case.largest_step();
-                is_at_rest(run, |tau, change| change * (unit / tau).max(1.0) <= limit)
+                let last = run.records.last_chunk::<IN_A_ROW>();
+                last.is_some_and(|records| records.iter().all(|record| is_at_rest(run, record)))
             }
             Self::NoSurface => {
                 let energy = last.and_then(Record::willmore_energy);
@@ -111,19 +101,14 @@ impl Stop {
     }
 }
 
-/// Whether this holds for the size of each of the last steps and the change of the energy in it, relative to the energy.
-fn is_at_rest<const D: usize>(run: &Run<D>, test: impl Fn(f64, f64) -> bool) -> bool {
-    let last = run.records.last_chunk::<IN_A_ROW>();
-    last.is_some_and(|records| {
-        records.iter().all(|record| {
-            record.minimization.is_some_and(|made| {
-                test(
-                    record.tau,
-                    made.relative_drop(run.case.least_energy()).abs(),
-                )
-            })
-        })
-    })
+/// Whether a step that is nearly as long as steps by the energy can be changed the energy by almost nothing.
+fn is_at_rest<const D: usize>(run: &Run<D>, record: &Record) -> bool {
+    let change = |made: StepRecord| made.relative_drop(run.case.least_energy()).abs();
+    let is_long = record.tau >= 0.25 * run.case.largest_step();
+    is_long
+        && record
+            .minimization
+            .is_some_and(|made| change(made) < LITTLE)
 }
 
 /// Whether the shape is within two interface widths of the side of the box.

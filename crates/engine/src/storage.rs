@@ -29,11 +29,6 @@ const PER_NODE: f64 = 300.0;
 const ON_BRICKS: [f64; 2] = [220.0, 24.0];
 
 impl Storage {
-    /// Whether the whole grid is stored, which identities of cases leave out.
-    pub(crate) fn is_dense(self) -> bool {
-        self == Self::Dense
-    }
-
     /// About how many bytes a flow takes on a grid of so many nodes of which so many are stored.
     pub fn bytes(nodes: usize, stored: usize) -> f64 {
         let [per_cell, per_node] = if stored < nodes {

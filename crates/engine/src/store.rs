@@ -1,6 +1,7 @@
 //! Runs that are stored in directories.
 
-use std::path::{Path, PathBuf};
+use std::fmt::Display;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use geometry::{Field, Grid};
@@ -83,7 +84,7 @@ impl Store {
     /// end, which `ends` names, are removed.
     ///
     /// # Errors
-    /// As [`Self::resume`]; [`Error::Over`] if one of the stop rules holds already.
+    /// As [`Self::resume`]; [`Error::Stored`] if one of the stop rules holds already.
     pub fn extend<const D: usize>(
         stored: StoredRun,
         case: Case<D>,
@@ -93,8 +94,7 @@ impl Store {
     ) -> Result<(Self, Run<D>), Error> {
         let run = restore(&stored, case, device, &["stops"])?;
         if let Some(stop) = run.ended() {
-            let path = stored.path().to_owned();
-            return Err(Error::Over { path, stop });
+            return Err(refused(&stored, stop.to_string()));
         }
         let directory = stored.reopen(&pack(&run, &notes)?, ends)?;
         Ok((Self::at(directory, notes, checkpoints, &run), run))
@@ -105,35 +105,18 @@ impl Store {
         &mut self.directory
     }
 
-    /// Writes a checkpoint.
-    pub fn commit<const D: usize>(&mut self, run: &Run<D>) -> Result<(), Error> {
-        self.write_tables(run)?;
-        self.directory.commit(&pack(run, &self.notes)?)?;
-        (self.last, self.records) = (Instant::now(), run.records.len());
-        Ok(())
-    }
-
-    /// Writes a checkpoint of a run whose next step has failed, unless the last one is of the same step: that one has not begun on other bricks.
-    pub(crate) fn commit_failed<const D: usize>(&mut self, run: &Run<D>) -> Result<(), Error> {
-        if run.records.len() == self.records {
-            return Ok(());
-        }
-        self.commit(run)
-    }
-
-    /// Writes a checkpoint if one is due, or if it `must` be.
-    pub(crate) fn commit_if_due<const D: usize>(
-        &mut self,
-        run: &Run<D>,
-        must: bool,
-    ) -> Result<(), Error> {
-        let due = match self.checkpoints {
+    /// Writes a checkpoint if one is due, or if there `must` be one of this step: a step that has failed may have begun on other bricks.
+    pub(crate) fn commit<const D: usize>(&mut self, run: &Run<D>, must: bool) -> Result<(), Error> {
+        let is_due = match self.checkpoints {
             Checkpoints::EverySteps(steps) => run.records.len().is_multiple_of(steps),
             Checkpoints::Every(time) => self.last.elapsed() >= time,
         };
-        if due || must {
-            self.commit(run)?;
+        if !(is_due || must) || run.records.len() == self.records {
+            return Ok(());
         }
+        self.write_tables(run)?;
+        self.directory.commit(&pack(run, &self.notes)?)?;
+        (self.last, self.records) = (Instant::now(), run.records.len());
         Ok(())
     }
 
@@ -164,10 +147,7 @@ pub fn dimension(stored: &StoredRun) -> Result<usize, Error> {
     let dimension: usize = read(stored, &stored.state().notes["case"]["grid"]["dimension"])?;
     match dimension {
         2 | 3 => Ok(dimension),
-        other => Err(unreadable(
-            stored.path(),
-            format!("{other} is no dimension"),
-        )),
+        other => Err(unreadable(stored, format!("{other} is no dimension"))),
     }
 }
 
@@ -180,9 +160,9 @@ pub fn initial<const D: usize>(stored: &StoredRun) -> Result<(Field<D>, Option<V
 }
 
 /// All records of a stored run with their wall times.
-pub(crate) fn records(stored: &StoredRun) -> Result<Vec<Record>, Error> {
-    let mut records: Vec<Record> = serde_json::from_str(&stored.state().text)
-        .map_err(|error| unreadable(stored.path(), error.to_string()))?;
+pub fn records(stored: &StoredRun) -> Result<Vec<Record>, Error> {
+    let mut records: Vec<Record> =
+        serde_json::from_str(&stored.state().text).map_err(|error| unreadable(stored, error))?;
     let seconds = stored.timings()["seconds"].as_array();
     for (record, seconds) in records.iter_mut().zip(seconds.into_iter().flatten()) {
         record.seconds = seconds.as_f64().unwrap_or(0.0);
@@ -238,14 +218,12 @@ fn restore<const D: usize>(
     }
     check_identity(stored, &wanted)?;
     let grid = *case.grid();
-    let previous = if state.array("previous").is_some() {
-        let tau = read(stored, &state.notes["previous_tau"])?;
-        Some((field(stored, "previous", grid)?, tau))
-    } else {
-        None
+    let optional = |name: &str| {
+        let found = state.array(name).is_some();
+        found.then(|| field(stored, name, grid)).transpose()
     };
-    let rate = match state.array("rate") {
-        Some(_) => Some(field(stored, "rate", grid)?),
+    let previous = match optional("previous")? {
+        Some(previous) => Some((previous, read(stored, &state.notes["previous_tau"])?)),
         None => None,
     };
     let (mut half_motions, mut half) = (Vec::new(), grid);
@@ -256,10 +234,9 @@ fn restore<const D: usize>(
     let at = FlowState {
         current: field(stored, "current", grid)?,
         previous,
-        rate,
+        rate: optional("rate")?,
         half_motions,
-        step: usize::try_from(state.step)
-            .map_err(|error| unreadable(stored.path(), error.to_string()))?,
+        step: usize::try_from(state.step).map_err(|error| unreadable(stored, error))?,
         time: read(stored, &state.notes["time"])?,
     };
     let start = read(stored, &state.notes["start"])?;
@@ -278,10 +255,11 @@ pub(crate) fn check_identity(stored: &StoredRun, wanted: &Value) -> Result<(), E
         .filter(|(_, there, here)| there != here)
         .map(|(key, there, here)| format!("{key}: {there} there, {here} here"))
         .collect();
-    Err(Error::OtherCase {
-        path: stored.path().to_owned(),
-        difference: differing.join("; "),
-    })
+    let differing = differing.join("; ");
+    Err(refused(
+        stored,
+        format!("it is of another case ({differing}); start a new run in another folder"),
+    ))
 }
 
 fn grid<const D: usize>(stored: &StoredRun) -> Result<Grid<D>, Error> {
@@ -289,24 +267,28 @@ fn grid<const D: usize>(stored: &StoredRun) -> Result<Grid<D>, Error> {
     let origin: Vec<f64> = read(stored, &grid["origin"])?;
     let origin: [f64; D] = origin
         .try_into()
-        .map_err(|_| unreadable(stored.path(), format!("its grid is not in {D}D")))?;
+        .map_err(|_| unreadable(stored, format!("its grid is not in {D}D")))?;
     let (cells, side) = (read(stored, &grid["cells"])?, read(stored, &grid["side"])?);
     Ok(Grid::new(cells, side)?.with_origin(origin)?)
 }
 
 fn field<const D: usize>(stored: &StoredRun, name: &str, grid: Grid<D>) -> Result<Field<D>, Error> {
     let values = stored.state().array(name);
-    let values = values.ok_or_else(|| unreadable(stored.path(), format!("it has no {name:?}")))?;
+    let values = values.ok_or_else(|| unreadable(stored, format!("it has no {name:?}")))?;
     Ok(Field::from_values(grid, values.to_vec())?)
 }
 
 pub(crate) fn read<T: DeserializeOwned>(stored: &StoredRun, value: &Value) -> Result<T, Error> {
-    T::deserialize(value).map_err(|error| unreadable(stored.path(), error.to_string()))
+    T::deserialize(value).map_err(|error| unreadable(stored, error))
 }
 
-fn unreadable(path: &Path, reason: String) -> Error {
-    Error::Unreadable {
-        path: path.to_owned(),
+fn unreadable(stored: &StoredRun, reason: impl Display) -> Error {
+    refused(stored, format!("{reason}; start a new run"))
+}
+
+fn refused(stored: &StoredRun, reason: String) -> Error {
+    Error::Stored {
+        path: stored.path().to_owned(),
         reason,
     }
 }

@@ -42,15 +42,9 @@ impl Substeps {
     /// [`Error::Parameter`] unless all are positive and finite, and `scale` neither larger than `first` and `tau` nor smaller than
     /// `tau / 2^36`.
     pub(crate) fn new(tau: f64, first: f64, scale: f64) -> Result<Self, Error> {
-        for (name, value) in [("tau", tau), ("first substep", first), ("substep", scale)] {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(Error::Parameter {
-                    name,
-                    value,
-                    expected: "positive and finite",
-                });
-            }
-        }
+        Error::unless_positive("tau", tau)?;
+        Error::unless_positive("first substep", first)?;
+        Error::unless_positive("substep", scale)?;
         let deepest = (tau / (scale * 2.0_f64.powi(-HALVINGS))).log2().floor();
         let depth = (tau / first).log2().ceil().max(0.0);
         if scale > first.min(tau) || deepest > f64::from(DEEPEST) {

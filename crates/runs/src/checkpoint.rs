@@ -1,7 +1,7 @@
 //! A commit: the state of a computation, and what the run consists of, in one file.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use files::Sha256;
@@ -193,9 +193,7 @@ pub(crate) fn other_version(path: PathBuf, found: u32) -> Error {
 /// The bytes of a checkpoint, if its checksum holds, and its path.
 pub(crate) fn content(folder: &Path, step: u64) -> Result<(Vec<u8>, PathBuf), Error> {
     let path = folder.join(names::checkpoint(step));
-    let mut bytes = Vec::new();
-    let read = digest::open(&path)?.read_to_end(&mut bytes);
-    read.map_err(files::Error::of("read", &path))?;
+    let mut bytes = digest::read(&path)?;
     match bytes.split_last_chunk::<END>() {
         Some((all, sum)) if Sha256::of(all) == *sum => {}
         _ => return Err(digest::wrong_checksum(&path)),

@@ -1,7 +1,7 @@
 //! By what files are recognised.
 
 use std::fs::{self, File};
-use std::io;
+use std::io::{self, Read};
 use std::path::Path;
 
 use files::{Sha256, hexadecimal};
@@ -56,4 +56,12 @@ pub(crate) fn open(path: &Path) -> Result<File, Error> {
         return Err(Error::damaged(path, "it is not an ordinary file"));
     }
     File::open(path).map_err(failed)
+}
+
+/// Reads an ordinary file.
+pub(crate) fn read(path: &Path) -> Result<Vec<u8>, Error> {
+    let mut bytes = Vec::new();
+    let read = open(path)?.read_to_end(&mut bytes);
+    read.map_err(files::Error::of("read", path))?;
+    Ok(bytes)
 }

@@ -105,21 +105,12 @@ impl RunDirectory {
     }
 
     /// Takes up a file that other code has written whole at [`path`](RunDirectory::path)`/name`, as
-    /// [`RunDirectory::write_file`] would have; make the folder with
-    /// [`RunDirectory::make_folder`]. [`Error::Damaged`] if there is no such file.
+    /// [`RunDirectory::write_file`] would have. [`Error::Damaged`] if there is no such file.
     pub fn adopt_file(&mut self, name: &str) -> Result<(), Error> {
         self.check_new(name)?;
         let seal = self.flushed(name)?;
         self.files.insert(name.into(), Kind::Written(seal));
         Ok(())
-    }
-
-    /// Makes a folder in the run directory, unless it exists, and returns its path.
-    pub fn make_folder(&mut self, name: &str) -> Result<PathBuf, Error> {
-        names::check(name)?;
-        let path = self.path.join(name);
-        make_folders_on(&*self.storage, &path)?;
-        Ok(path)
     }
 
     /// Writes or replaces a file that is derived from the state, such as `metrics.csv`: a crash

@@ -1,6 +1,5 @@
 //! A run as it is found on the disk.
 
-use std::fs;
 use std::io::ErrorKind::NotFound;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -114,14 +113,18 @@ impl StoredRun {
         self.run.files.keys().map(String::as_str)
     }
 
-    /// The text of one of the [files](StoredRun::files) of the run; [`Error::Invalid`] if it is none.
-    pub fn read_text(&self, name: &str) -> Result<String, Error> {
+    /// One of the [files](StoredRun::files) of the run; [`Error::Invalid`] if it is none.
+    pub fn read(&self, name: &str) -> Result<Vec<u8>, Error> {
         if !self.run.files.contains_key(name) {
             return Err(Error::Invalid(format!("the run has no file {name:?}")));
         }
-        let path = self.run.path.join(name);
-        digest::open(&path)?;
-        Ok(fs::read_to_string(&path).map_err(files::Error::of("read", path))?)
+        digest::read(&self.run.path.join(name))
+    }
+
+    /// Such a file as text.
+    pub fn read_text(&self, name: &str) -> Result<String, Error> {
+        let text = String::from_utf8(self.read(name)?);
+        text.map_err(|error| Error::damaged(self.run.path.join(name), error.to_string()))
     }
 
     /// What was last given to [`RunDirectory::write_timings`], null if nothing was.

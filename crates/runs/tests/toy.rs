@@ -125,7 +125,8 @@ pub fn run(folder: &Path, toy: &Toy) -> Result<(), Error> {
             run.write_file(&name, |out| out.write_all(&bytes))?;
         }
         if state.step == 25 {
-            let frames = run.make_folder("frames/first")?;
+            let frames = run.path().join("frames/first");
+            files::make_folders_on(&*toy.storage, &frames)?;
             files::write_atomically_on(&*toy.storage, frames.join("a.png"), |out| {
                 out.write_all(b"a picture")
             })?;

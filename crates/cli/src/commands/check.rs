@@ -10,10 +10,12 @@ use operators::{add_scaled, inner_product};
 use rand::{RngExt, SeedableRng};
 use solver::{FlowParams, MinimizingMovement, Objective};
 
-use super::{open_device, operator};
-use crate::cli::CheckOptions;
+use crate::cli::{CheckOptions, SayOptions};
+use crate::input::{Loaded, Reader};
 use crate::prelude::*;
 
+/// Steps of the Taylor expansion, the first one and how often it is halved.
+const FIRST_STEP: f64 = 0.25;
 const STEPS: usize = 14;
 /// By how much an observed rate may be short of the expected one.
 const SHORT: f64 = 0.3;
@@ -31,10 +33,10 @@ struct Finding {
 /// Checks the derivatives of the energy at the input.
 pub fn run(mut options: CheckOptions, say: SayOptions) -> Result<ExitCode, Error> {
     options.scheme.fill_in()?;
-    let device = open_device(&mut options.common)?;
-    let loaded = input::load(&mut options.input, options.scheme.eps_over_h(), say)?;
-    let findings = match loaded {
-        Loaded::Plane(start, _) => findings(&start.field, &options, &device)?,
+    let device = options.common.open_device()?;
+    let eps_over_h = options.scheme.eps_over_h();
+    let findings = match Reader::of(&mut options.input, eps_over_h, say)?.load()? {
+        Loaded::Plane(start) => findings(&start.field, &options, &device)?,
         Loaded::Space(start) => findings(&start.field, &options, &device)?,
     };
     let mut text = String::new();
@@ -67,7 +69,7 @@ fn findings<const D: usize>(
     options: &CheckOptions,
     device: &ComputeDevice,
 ) -> Result<Vec<Finding>, Error> {
-    let (scales, operator) = operator(&options.scheme, Method::Hybrid, field.grid())?;
+    let (scales, operator) = options.scheme.operator(Method::Hybrid, field.grid())?;
     let network = operator.network();
     let network = &network.expect("a learned operator has one").network;
     let params = FlowParams {
@@ -81,12 +83,9 @@ fn findings<const D: usize>(
     let here = at(device)?;
     let mut findings = Vec::new();
     for (name, derivatives, expected) in [("gradient", 1, 2.0), ("Hessian", 2, 3.0)] {
-        let value = |t: f64| {
-            here.values
-                .iter()
-                .find(|(s, _)| s.to_bits() == t.to_bits())
-                .map_or(f64::NAN, |(_, v)| *v)
-        };
+        // It asks for them in this order.
+        let mut values = here.values.iter().copied();
+        let value = |_: f64| values.next().unwrap_or(f64::NAN);
         let steps = halvings(FIRST_STEP, STEPS);
         let rest = remainder(value, &here.along[..derivatives], &steps, device.epsilon());
         let rate = rest.rate();
@@ -129,11 +128,10 @@ fn findings<const D: usize>(
     Ok(findings)
 }
 
-const FIRST_STEP: f64 = 0.25;
-
 struct Derivatives {
-    values: Vec<(f64, f64)>,
-    /// First and second derivative in one direction.
+    /// At the beginning, and after every step in one direction.
+    values: Vec<f64>,
+    /// First and second derivative in that direction.
     along: [f64; 2],
     /// Relative to the products.
     asymmetry: f64,
@@ -174,7 +172,7 @@ fn derivatives<const D: usize>(
     let along = [dot(&gradient, &p)?, dot(&p, &hp)?];
     let mut values = Vec::new();
     for t in [0.0].into_iter().chain(halvings(FIRST_STEP, STEPS)) {
-        values.push((t, energy.value(&add_scaled(u.clone(), &p, t))?));
+        values.push(energy.value(&add_scaled(u.clone(), &p, t))?);
     }
     Ok(Derivatives {
         values,

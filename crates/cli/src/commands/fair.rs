@@ -2,10 +2,14 @@
 
 use std::f64::consts::PI;
 
-use super::flow::{FlowCommand, Shared};
-use crate::cli::FairOptions;
+use crate::cli::{FairOptions, SayOptions};
+use crate::input::{Loaded, Reader, Source, closed};
 use crate::keep::Keep;
+use crate::own::OwnMesh;
+use crate::paths::{absolute, read};
 use crate::prelude::*;
+use crate::setup::check_positive;
+use crate::values::SizeTarget;
 
 /// Energies below this have only balls, which have `8 pi`.
 const BALL: f64 = 1.2 * 8.0 * PI;
@@ -30,61 +34,20 @@ impl FairOptions {
         self.noise.is_some() || ratio.is_some() || !self.ends
     }
 
-    /// A segmentation, whose volume is kept.
-    fn load_volume(&mut self, say: SayOptions) -> Result<Loaded, Error> {
-        for (name, given) in [
-            ("--noise", self.noise.is_some()),
-            ("--keep", self.keep.is_some()),
-        ] {
-            if given {
-                return Err(Error::options(format!(
-                    "{name} has no meaning for a volume, of which a new mesh is made: leave it out"
-                )));
-            }
-        }
-        let flow = &mut self.flow;
-        if flow.reduced_volume.is_none() {
-            flow.volume.get_or_insert(SizeTarget::Keep);
-        }
-        let mut loaded = input::load(&mut flow.input, flow.scheme.eps_over_h(), say)?;
-        if let Loaded::Space(Start { field, outlet, .. }) = &mut loaded
-            && let Some(voxels) = outlet.voxels.as_mut().filter(|_| !self.ends)
-        {
-            voxels.farthest = Some(FARTHEST * voxels.side);
-            flow.time = Some((STEPS * voxels.side).powi(4));
-            flow.tau.get_or_insert(graded(field.grid().spacing()));
-        }
-        Ok(loaded)
-    }
-}
-
-impl FlowCommand for FairOptions {
-    const NAME: &'static str = "fair";
-
-    fn shared(&mut self) -> Shared<'_> {
-        self.flow.shared()
-    }
-
-    fn check(&mut self) -> Result<(), Error> {
+    pub fn check(&mut self) -> Result<(), Error> {
         let flow = &self.flow;
         self.ends = self.energy_ratio.is_some()
-            || flow.time.is_some()
+            || flow.run.time.is_some()
             || flow.energy.is_some()
-            || flow.steps.is_some();
-        for (name, value) in [
-            ("--noise", self.noise),
-            ("--energy-ratio", self.energy_ratio),
-        ] {
-            if let Some(value) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
-                return Err(Error::options(format!("{name} {value} must be positive")));
-            }
-        }
+            || flow.run.steps.is_some();
+        check_positive("--noise", self.noise)?;
+        check_positive("--energy-ratio", self.energy_ratio)?;
         let usual = if self.takes_small_steps() {
             graded(f64::NAN)
         } else {
             StepRule::Controlled
         };
-        self.flow.check_tolerance(usual)?;
+        self.flow.check(usual)?;
         if let Some(ratio) = self.energy_ratio.filter(|ratio| *ratio >= 1.0) {
             return Err(Error::options(format!(
                 "--energy-ratio {ratio} is reached before the first step: give a part below 1"
@@ -99,84 +62,92 @@ impl FlowCommand for FairOptions {
         Ok(())
     }
 
-    fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
-        if input::is_volume(&self.flow.input)? {
-            return self.load_volume(say);
-        }
-        let ends = self.ends;
-        let eps_over_h = self.flow.scheme.eps_over_h();
-        let input = &mut self.flow.input;
-        let Some(path) = input::mesh_file(input)? else {
-            if input.input.is_some() && (self.noise.is_some() || self.keep.is_some() || !ends) {
+    pub fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
+        let eps_over_h = self.flow.run.scheme.eps_over_h();
+        let mut reader = Reader::of(&mut self.flow.run.input, eps_over_h, say)?;
+        let loaded = match reader.source.clone() {
+            Source::Mesh(path) => return self.load_mesh(&path, say),
+            Source::Volume(_) if self.noise.is_some() || self.keep.is_some() => {
+                let given = if self.noise.is_some() {
+                    "--noise"
+                } else {
+                    "--keep"
+                };
+                return Err(Error::options(format!(
+                    "{given} has no meaning for a volume, of which a new mesh is made: leave it out"
+                )));
+            }
+            Source::Volume(_) => {
+                let mut loaded = reader.load()?;
+                let flow = &mut self.flow;
+                // That of the voxels is kept.
+                if flow.reduced_volume.is_none() {
+                    flow.volume.get_or_insert(SizeTarget::Keep);
+                }
+                if let Loaded::Space(start) = &mut loaded
+                    && let Some(voxels) = start.outlet.voxels.as_mut().filter(|_| !self.ends)
+                {
+                    voxels.farthest = Some(FARTHEST * voxels.side);
+                    flow.run.time = Some((STEPS * voxels.side).powi(4));
+                    flow.tau.get_or_insert(graded(start.field.grid().spacing()));
+                }
+                loaded
+            }
+            _ if self.noise.is_some() || self.keep.is_some() || !self.ends => {
                 return Err(Error::options(
                     "only a mesh in a file has noise to take off: say how smooth the surface is to become, by --energy-ratio, --time, \
                      --energy or --steps, without --noise and --keep",
                 ));
             }
-            return input::load(input, eps_over_h, say);
+            _ => reader.load()?,
         };
-        if input.repair && !self.remesh {
+        match loaded {
+            Loaded::Space(_) => Ok(loaded),
+            Loaded::Plane(_) => Err(Error::options(
+                "`fair` is for surfaces in space; for images and shapes in the plane there is `willmore flow`",
+            )),
+        }
+    }
+
+    fn load_mesh(&mut self, path: &Path, say: SayOptions) -> Result<Loaded, Error> {
+        let repairs = self.flow.run.input.repair;
+        if repairs && !self.remesh {
             return Err(Error::options(
                 "--repair makes a new mesh: write it by `willmore sample --repair --save`, which can then be faired, or give --remesh",
             ));
         }
         if let Some(mask) = self.keep.as_deref().and_then(Keep::mask) {
-            self.keep = Some(input::absolute(mask)?.to_string_lossy().into_owned());
+            self.keep = Some(absolute(mask)?.to_string_lossy().into_owned());
         }
-        let bytes = if input.repair {
-            surfaces::encode(&path, input::closed(&path, true, say)?.mesh())?
+        let bytes = if repairs {
+            surfaces::encode(path, closed(path, true, say)?.mesh())?
         } else {
-            std::fs::read(&path).map_err(Error::io("read", &path))?
+            read(path)?
         };
-        let noise = self.noise.or(ends.then_some(0.0));
-        let (mut own, warnings) = OwnMesh::new(&path, bytes, noise, self.keep.clone())?;
+        let noise = self.noise.or(self.ends.then_some(0.0));
+        let (mut own, warnings) = OwnMesh::new(path, bytes, noise, self.keep.clone())?;
         own.is_new = self.remesh;
         own.keeps_volume = self.flow.volume == Some(SizeTarget::Keep);
         for warning in warnings {
             say.warn(&format!("{}: {warning}", path.display()));
         }
         if noise.is_none() {
+            let noise = own.fairing().noise();
             say.note(&format!(
-                "noise: {:.3e}, {:.3} % of the longest side, estimated (--noise)",
-                own.fairing().noise(),
-                100.0 * own.fairing().noise() / own.longest_side()
+                "noise: {noise:.3e}, {:.3} % of the longest side, estimated (--noise)",
+                100.0 * noise / own.rough().bounding_box().longest_side()
             ));
-            self.noise = Some(own.fairing().noise());
+            self.noise = Some(noise);
         }
-        let input = &mut self.flow.input;
-        input::load_own(input, own, &path, (eps_over_h, self.allow_loss), say)
+        let eps_over_h = self.flow.run.scheme.eps_over_h();
+        Reader::of(&mut self.flow.run.input, eps_over_h, say)?.own(own, path, self.allow_loss)
     }
 
-    fn ends(&self) -> bool {
-        self.noise.is_some() || self.energy_ratio.is_some() || !self.ends
-    }
-
-    fn willmore(&mut self) -> Option<&mut FlowOptions> {
-        Some(&mut self.flow)
-    }
-
-    fn energy_ratio(&self) -> Option<f64> {
-        self.energy_ratio
-    }
-
-    fn prepare(&self, input: Loaded) -> Result<Loaded, Error> {
-        match input {
-            Loaded::Space(..) => Ok(input),
-            Loaded::Plane(..) => Err(Error::options(
-                "`fair` is for surfaces in space; for images and shapes in the plane there is `willmore flow`",
-            )),
-        }
-    }
-
-    fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
+    pub fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
         if self.takes_small_steps() {
-            let spacing = scales.eps / self.flow.scheme.eps_over_h();
+            let spacing = scales.eps / self.flow.run.scheme.eps_over_h();
             self.flow.tau.get_or_insert(graded(spacing));
         }
         self.flow.rule(scales, unit)
-    }
-
-    fn format(&self) -> Option<String> {
-        self.format.clone()
     }
 }

@@ -1,116 +1,104 @@
 //! `willmore flow`, and what it has in common with the other commands that make runs.
 
-use engine::{ErrorControl, Flow, Held, Helfrich, TimeSteps};
+use engine::{ErrorControl, Flow, Held, Helfrich, Store, TimeSteps};
 use solver::NewtonParams;
 
-use super::{open_device, operator};
-use crate::cli::{CommonOptions, SchemeOptions};
+use crate::cli::{FlowOptions, RunCommand, RunOptions, SayOptions};
+use crate::config;
+use crate::input::{Loaded, Reader, Start, usual_box};
+use crate::outlet::{self, Outlet};
+use crate::paths::{absolute, extension};
+use crate::plane::Plane;
 use crate::prelude::*;
-use crate::run::Plan;
-use crate::{sizes, volume};
+use crate::run::{Plan, free_folder, make_way};
+use crate::setup::check_positive;
+use crate::sizes;
+use crate::space::Space;
+use crate::values::{Amount, Label};
+use crate::volume;
 
-/// Steps of a run that has no other end.
-const STEPS: usize = 20;
 /// In a step the interface moves by at most so many widths of it.
 const LONGEST_MOVE: f64 = 2.0;
 const SAVED: [&str; 5] = ["ply", "obj", "stl", "png", "svg"];
 
-/// A command that makes a run.
-pub trait FlowCommand: Serialize + Clone {
-    const NAME: &'static str;
-    const FLOW: Flow = Flow::Willmore;
-    /// Steps of a run that ends at a time or an energy.
-    const MANY_STEPS: usize = 1000;
-
-    fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
-        let shared = self.shared();
-        input::load(shared.input, shared.scheme.eps_over_h(), say)
-    }
-
-    /// Whether something besides time and energy ends it.
-    fn ends(&self) -> bool {
-        false
-    }
-
-    /// The Willmore energy at which it ends, as a part of that at the beginning.
-    fn energy_ratio(&self) -> Option<f64> {
-        None
-    }
-
-    fn shared(&mut self) -> Shared<'_>;
-
-    fn method(&self) -> Method {
-        Method::Hybrid
-    }
-
+impl RunCommand {
     /// Refuses options before anything is read.
     fn check(&mut self) -> Result<(), Error> {
-        Ok(())
+        match self {
+            Self::Flow(flow) => flow.check(StepRule::Controlled),
+            Self::Fair(fair) => fair.check(),
+            Self::Inpaint(inpaint) => inpaint.check(),
+            Self::Mcf(mcf) => mcf.check(),
+        }
     }
 
-    /// What becomes of the input before it flows.
-    fn prepare(&self, input: Loaded) -> Result<Loaded, Error> {
-        Ok(input)
+    /// How many steps are made unless it is said: few, or many where something else ends the run; those of mean curvature flow are short.
+    fn usual_steps(&mut self) -> usize {
+        let fairs = match self {
+            Self::Fair(fair) => fair.noise.is_some() || fair.energy_ratio.is_some() || !fair.ends,
+            _ => false,
+        };
+        let energy = self.willmore().and_then(|flow| flow.energy);
+        let has_an_end = fairs || energy.is_some() || self.options().time.is_some();
+        match self {
+            _ if !has_an_end => 20,
+            Self::Mcf(_) => 100_000,
+            _ => 1000,
+        }
+    }
+
+    /// The input, as it is before it flows.
+    fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
+        match self {
+            Self::Fair(fair) => fair.load(say),
+            Self::Inpaint(inpaint) => inpaint.load(say),
+            Self::Flow(_) | Self::Mcf(_) => {
+                let RunOptions { input, scheme, .. } = self.options();
+                Reader::of(input, scheme.eps_over_h(), say)?.load()
+            }
+        }
     }
 
     /// The rule for time steps, filled in for these scales and the length that a unit of the usual box has: time steps that follow from
     /// the inner step do so in a box of that size.
-    fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule;
-
-    /// The options of Willmore flow; mean curvature flow has no energy and no controlled steps.
-    fn willmore(&mut self) -> Option<&mut FlowOptions> {
-        None
-    }
-
-    fn format(&self) -> Option<String> {
-        None
-    }
-}
-
-pub struct Shared<'a> {
-    pub input: &'a mut InputOptions,
-    pub scheme: &'a mut SchemeOptions,
-    pub steps: &'a mut Option<usize>,
-    pub time: Option<f64>,
-    pub energy: Option<f64>,
-    pub keep: &'a mut KeepOptions,
-    pub common: &'a mut CommonOptions,
-}
-
-impl FlowCommand for FlowOptions {
-    const NAME: &'static str = "flow";
-
-    fn shared(&mut self) -> Shared<'_> {
-        Shared {
-            input: &mut self.input,
-            scheme: &mut self.scheme,
-            steps: &mut self.steps,
-            time: self.time,
-            energy: self.energy,
-            keep: &mut self.keep,
-            common: &mut self.common,
+    fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
+        match self {
+            Self::Flow(flow) => flow.rule(scales, unit),
+            Self::Fair(fair) => fair.rule(scales, unit),
+            Self::Inpaint(inpaint) => inpaint.rule(scales, unit),
+            Self::Mcf(_) => StepRule::Constant(scales.mcf_step),
         }
     }
 
-    fn check(&mut self) -> Result<(), Error> {
-        self.check_tolerance(StepRule::Controlled)
+    fn stops(&mut self, rule: StepRule) -> Vec<Stop> {
+        // What has gone wrong is said before what was asked for.
+        let mut stops = vec![Stop::Vanished, Stop::NoSurface, Stop::AtTheSide];
+        let options = self.options();
+        stops.extend(options.steps.map(Stop::Steps));
+        stops.extend(options.time.map(Stop::Time));
+        let energy = self.willmore().and_then(|flow| flow.energy);
+        stops.extend(energy.map(Stop::Energy));
+        if matches!(rule, StepRule::ByEnergy(_) | StepRule::Controlled) {
+            stops.push(Stop::EnergyAtRest);
+        }
+        if let Self::Fair(fair) = self {
+            stops.extend(fair.energy_ratio.map(Stop::EnergyRatio));
+        }
+        stops
     }
+}
 
-    fn willmore(&mut self) -> Option<&mut FlowOptions> {
-        Some(self)
-    }
-
-    fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
+impl FlowOptions {
+    pub fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
         let rule = self.tau.unwrap_or(StepRule::Controlled);
         *self
             .tau
             .insert(rule.resolved(scales.mcf_step * unit.powi(2)))
     }
-}
 
-impl FlowOptions {
-    /// Refuses a tolerance that the time steps do not look at.
-    pub fn check_tolerance(&self, usual: StepRule) -> Result<(), Error> {
+    /// Refuses a tolerance that the time steps do not look at, and energies that nothing has.
+    pub fn check(&self, usual: StepRule) -> Result<(), Error> {
+        check_positive("--energy", self.energy)?;
         match self.tolerance {
             Some(tolerance) if self.tau.unwrap_or(usual) != StepRule::Controlled => {
                 Err(Error::options(format!(
@@ -137,17 +125,13 @@ impl FlowOptions {
     }
 }
 
-impl Shared<'_> {
+impl RunOptions {
     /// Refuses what cannot be done before anything is computed.
     fn check(&mut self) -> Result<(), Error> {
         self.scheme.fill_in()?;
-        for (name, value) in [("--time", self.time), ("--energy", self.energy)] {
-            if let Some(value) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
-                return Err(Error::options(format!("{name} {value} must be positive")));
-            }
-        }
+        check_positive("--time", self.time)?;
         for (name, value) in [
-            ("--steps", *self.steps),
+            ("--steps", self.steps),
             ("--frames", self.keep.frames),
             ("--checkpoint-every", Some(self.keep.checkpoint_every)),
         ] {
@@ -157,14 +141,14 @@ impl Shared<'_> {
         }
         let force = self.keep.force;
         if let Some(save) = &mut self.keep.save {
-            if !SAVED.contains(&&*input::extension(save)) {
+            if !SAVED.contains(&&*extension(save)) {
                 return Err(Error::options(format!(
                     "--save {} must end in .{}",
                     save.display(),
                     SAVED.join(", .")
                 )));
             }
-            *save = input::absolute(&*save)?;
+            *save = absolute(&*save)?;
             force.check("--save", save)?;
             if !save.parent().is_some_and(Path::is_dir) {
                 return Err(Error::options(format!(
@@ -175,43 +159,29 @@ impl Shared<'_> {
         }
         Ok(())
     }
-
-    fn stops(&self, rule: StepRule) -> Vec<Stop> {
-        // What has gone wrong is said before what was asked for.
-        let mut stops = vec![Stop::Vanished, Stop::NoSurface, Stop::AtTheSide];
-        stops.extend(self.steps.map(Stop::Steps));
-        stops.extend(self.time.map(Stop::Time));
-        stops.extend(self.energy.map(Stop::Energy));
-        if matches!(rule, StepRule::ByEnergy(_) | StepRule::Controlled) {
-            stops.push(Stop::EnergyAtRest);
-        }
-        stops
-    }
 }
 
-/// Makes a run, or continues one that is stored.
-pub fn run<C: FlowCommand>(
-    mut command: C,
+/// Makes a run, or continues one that is stored, perhaps to more steps.
+pub fn run(
+    mut command: RunCommand,
     say: SayOptions,
     stored: Option<(StoredRun, Option<usize>)>,
 ) -> Result<ExitCode, Error> {
-    if let Some(path) = volume::of_all_labels(command.shared().input)? {
-        return each_label(&command, &path, say);
+    if let Some(labels) = volume::all_labels(&command.options().input)? {
+        return each_label(&command, &labels, say);
     }
     command.check()?;
-    let ends = command.ends();
-    let mut shared = command.shared();
-    let until = ends || shared.time.is_some() || shared.energy.is_some();
-    let steps = if until { C::MANY_STEPS } else { STEPS };
-    shared.steps.get_or_insert(steps);
+    let steps = command.usual_steps();
+    let options = command.options();
+    options.steps.get_or_insert(steps);
     if let Some((stored, more)) = &stored {
         // A run that has gone on once notes its steps.
         let noted = engine::notes(stored)["steps"].as_u64();
         let steps = more.or(noted.map(|steps| steps as usize));
-        *shared.steps = steps.or(*shared.steps);
+        options.steps = steps.or(options.steps);
     }
-    shared.check()?;
-    let device = open_device(shared.common)?;
+    options.check()?;
+    let device = options.common.open_device()?;
     let mut job = Job {
         command,
         device,
@@ -223,22 +193,17 @@ pub fn run<C: FlowCommand>(
             _ => job.resume::<3, Space>(stored, more),
         };
     }
-    let loaded = job.command.load(say)?;
-    match job.command.prepare(loaded)? {
-        Loaded::Plane(start, _) => job.start(start),
+    match job.command.load(say)? {
+        Loaded::Plane(start) => job.start(start),
         Loaded::Space(start) => job.start(start),
     }
 }
 
 /// One run for each label of a volume, until one is interrupted.
-fn each_label<C: FlowCommand>(
-    command: &C,
-    path: &Path,
-    say: SayOptions,
-) -> Result<ExitCode, Error> {
-    for label in volume::labels(path)? {
+fn each_label(command: &RunCommand, labels: &[i64], say: SayOptions) -> Result<ExitCode, Error> {
+    for &label in labels {
         let mut one = command.clone();
-        let Shared { input, keep, .. } = one.shared();
+        let RunOptions { input, keep, .. } = one.options();
         input.label = Some(Label::One(label));
         for name in keep.output.iter_mut().chain(&mut keep.save) {
             *name = volume::named(name, label);
@@ -251,51 +216,49 @@ fn each_label<C: FlowCommand>(
     Ok(ExitCode::SUCCESS)
 }
 
-struct Job<C> {
-    command: C,
+struct Job {
+    command: RunCommand,
     device: ComputeDevice,
     say: SayOptions,
 }
 
-impl<C: FlowCommand> Job<C> {
+impl Job {
     fn start<const D: usize, O: Outlet<D>>(
         mut self,
         mut start: Start<D, O>,
     ) -> Result<ExitCode, Error> {
-        let keep = self.command.shared().keep;
+        let keep = &mut self.command.options().keep;
         start.outlet.turn(&mut keep.up)?;
         keep.save.as_deref().map_or(Ok(()), O::check_saved)?;
-        if C::NAME == FlowOptions::NAME {
-            self.round_edges(&mut start.field)?;
+        if let RunCommand::Flow(options) = &mut self.command {
+            sizes::round_edges(options, &mut start.field, &self.device, self.say)?;
         }
         let case = self.case(&start.name, start.field, start.region, &start.outlet)?;
-        let config = config::resolved(C::NAME, &self.command)?;
+        let options = config::resolved(self.command.name(), &self.command)?;
         let plan = self.plan(start.name, start.outlet);
-        plan.start(case, &config, &self.device)
-    }
-
-    /// Where area and volume are to be held, [rounds the edges](sizes::with_round_edges) of the start.
-    fn round_edges<const D: usize>(&mut self, field: &mut Field<D>) -> Result<(), Error> {
-        let scheme = self.command.shared().scheme.clone();
-        let options = self.command.willmore();
-        let Some(options) = options.filter(|options| options.holds_both()) else {
-            return Ok(());
+        let notes = plan.notes(&case, &self.device);
+        let run = Run::new(case, &self.device)?;
+        let folder = match &plan.keep.output {
+            Some(folder) => folder.clone(),
+            None => free_folder(&format!("{}-{}", plan.name, plan.command)),
         };
-        let operator = operator(&scheme, Method::Hybrid, field.grid())?;
-        let round = sizes::with_round_edges(options, field, operator, &self.device)?;
-        if let Some((round, note)) = round {
-            self.say.note(&note);
-            *field = round;
+        if plan.keep.force.force {
+            make_way(&folder)?;
         }
-        Ok(())
+        let inputs = plan.outlet.inputs()?;
+        let mut files = vec![(config::FILE, options.as_bytes())];
+        files.extend(inputs.iter().map(|(name, bytes)| (&**name, &bytes[..])));
+        let store = Store::create(folder, &files, &run, notes, plan.checkpoints())?;
+        plan.go_on(store, run)
     }
 
+    /// Continues a run from its last checkpoint, a finished one to more steps.
     fn resume<const D: usize, O: Outlet<D>>(
         mut self,
         stored: StoredRun,
         more: Option<usize>,
     ) -> Result<ExitCode, Error> {
-        let notes = engine::notes(&stored);
+        let mut notes = engine::notes(&stored).clone();
         let name = notes["about"]["name"].as_str().unwrap_or("run").to_owned();
         let mut outlet = O::deserialize(&notes["outlet"]).map_err(|reason| {
             let path = stored.path().display();
@@ -306,8 +269,17 @@ impl<C: FlowCommand> Job<C> {
         let (field, region) = engine::initial(&stored)?;
         outlet.restore(&stored)?;
         let case = self.case(&name, field, region, &outlet)?;
-        self.plan(name, outlet)
-            .resume(stored, case, &self.device, more)
+        let plan = self.plan(name, outlet);
+        let checkpoints = plan.checkpoints();
+        let (store, run) = match more {
+            Some(steps) => {
+                notes["steps"] = steps.into();
+                let with = (checkpoints, notes);
+                Store::extend(stored, case, &self.device, with, outlet::is_of_end)?
+            }
+            None => Store::resume(stored, case, &self.device, checkpoints)?,
+        };
+        plan.go_on(store, run)
     }
 
     fn case<const D: usize>(
@@ -317,13 +289,16 @@ impl<C: FlowCommand> Job<C> {
         region: Option<Vec<bool>>,
         outlet: &impl Outlet<D>,
     ) -> Result<Case<D>, Error> {
-        let method = self.command.method();
-        let options = self.command.willmore().map(|options| options.clone());
-        let (mut scales, operator) =
-            operator(self.command.shared().scheme, method, initial.grid())?;
-        let box_side = self.command.shared().input.box_side;
-        let unit = initial.grid().side() / box_side.unwrap_or(input::usual_box::<D>().1);
+        let (flow, method) = match &self.command {
+            RunCommand::Mcf(mcf) => (Flow::MeanCurvature, mcf.method),
+            _ => (Flow::Willmore, Method::Hybrid),
+        };
+        let RunOptions { scheme, input, .. } = self.command.options();
+        let (mut scales, operator) = scheme.operator(method, initial.grid())?;
+        let unit = initial.grid().side() / input.box_side.unwrap_or(usual_box::<D>().1);
         let rule = self.command.rule(&scales, unit);
+        let stops = self.command.stops(rule);
+        let options = self.command.willmore();
         let steps = match rule {
             StepRule::Controlled => {
                 scales.newton = NewtonParams {
@@ -331,7 +306,7 @@ impl<C: FlowCommand> Job<C> {
                     ..NewtonParams::second_order()
                 };
                 let mut control = ErrorControl::default();
-                match options.as_ref().and_then(|options| options.tolerance) {
+                match options.and_then(|options| options.tolerance) {
                     Some(Amount::Value(length)) => control.length = Some(length),
                     Some(Amount::Percent(percent)) => control.relative = percent / 100.0,
                     None => (),
@@ -342,45 +317,47 @@ impl<C: FlowCommand> Job<C> {
                 TimeSteps::controlled(control)
             }
             rule => TimeSteps {
-                longest_move: (C::FLOW == Flow::Willmore).then_some(LONGEST_MOVE),
+                longest_move: (flow == Flow::Willmore).then_some(LONGEST_MOVE),
                 ..rule.into()
             },
         };
-        let mut stops = self.command.shared().stops(rule);
-        stops.extend(self.command.energy_ratio().map(Stop::EnergyRatio));
-        stops.extend(outlet.stops(&initial));
         let eps = scales.eps;
-        let (energy, held) = match &options {
-            Some(options) => {
-                let volume = outlet.volume();
-                (options.energy()?, options.held(&initial, eps, volume)?)
-            }
+        let known = outlet.known(&initial, eps)?;
+        let (energy, held) = match options {
+            Some(options) => (
+                options.energy()?,
+                options.held(&initial, eps, known.volume)?,
+            ),
             None => (Helfrich::default(), Held::default()),
         };
         let mut measures = vec![Measure::zero_set(eps, &held)];
-        measures.extend(outlet.measures(&initial, eps)?);
+        measures.extend(known.measures);
         Ok(Case {
             shape: name.to_owned(),
             initial,
             region,
             energy,
             held,
-            flow: C::FLOW,
+            flow,
             operator,
             scales,
             steps,
-            stops,
+            stops: [stops, known.stops].concat(),
             measures,
         })
     }
 
     fn plan<O>(&mut self, name: String, outlet: O) -> Plan<O> {
+        let format = match &self.command {
+            RunCommand::Fair(fair) => fair.format.clone(),
+            _ => None,
+        };
         Plan {
-            command: C::NAME,
+            command: self.command.name(),
             name,
             outlet,
-            format: self.command.format(),
-            keep: self.command.shared().keep.clone(),
+            format,
+            keep: self.command.options().keep.clone(),
             say: self.say,
         }
     }

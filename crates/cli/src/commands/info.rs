@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use model::Shipped;
 
+use crate::cli::SayOptions;
 use crate::prelude::*;
 
 pub fn run(say: SayOptions) -> Result<ExitCode, Error> {

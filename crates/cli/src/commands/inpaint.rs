@@ -1,81 +1,106 @@
 //! `willmore inpaint`.
 
-use super::flow::{FlowCommand, Shared};
-use crate::cli::InpaintOptions;
+use crate::cli::{InpaintOptions, SayOptions};
+use crate::input::{Loaded, Reader, Start};
+use crate::paths::absolute;
 use crate::prelude::*;
+use crate::values::Ansatz;
 
 /// The usual step in units of the inner one.
 const STEP: f64 = 16.0;
 /// The first step is divided into a ramp that starts this many times halved: at the border of the region there is a jump.
 const HALVINGS: u32 = 12;
 
-impl FlowCommand for InpaintOptions {
-    const NAME: &'static str = "inpaint";
-
-    fn shared(&mut self) -> Shared<'_> {
-        self.flow.shared()
-    }
-
-    fn check(&mut self) -> Result<(), Error> {
-        self.flow.check_tolerance(StepRule::Ramp {
-            tau: f64::NAN,
-            halvings: HALVINGS,
-        })?;
+impl InpaintOptions {
+    pub fn check(&mut self) -> Result<(), Error> {
+        self.flow.check(usual(f64::NAN))?;
         let mask = self.mask()?;
         if !Region::is_meant(mask) {
-            let absolute = input::absolute(mask)?;
+            let absolute = absolute(mask)?;
             self.mask = Some(absolute.to_string_lossy().into_owned());
         }
         Ok(())
     }
 
-    fn prepare(&self, input: Loaded) -> Result<Loaded, Error> {
+    pub fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
+        let eps_over_h = self.flow.run.scheme.eps_over_h();
+        let loaded = Reader::of(&mut self.flow.run.input, eps_over_h, say)?.load()?;
         let mask = self.mask()?;
-        Ok(match input {
-            Loaded::Plane(mut start, image) => {
-                let shape = image.mask(mask, start.field.grid())?;
-                let region = input::nodes(mask, shape.as_ref(), start.field.grid())?;
-                start.outlet = image.repaired(start.outlet, shape.as_ref())?;
-                Loaded::Plane(self.restrict(start, region)?, image)
+        Ok(match loaded {
+            Loaded::Plane(mut start) => {
+                let shape = if Region::is_meant(mask) {
+                    region(mask)?
+                } else {
+                    start.outlet.mask(mask, start.field.grid())?
+                };
+                start.outlet.repair(shape.as_ref())?;
+                Loaded::Plane(self.restricted(start, shape.as_ref())?)
             }
-            Loaded::Space(start) => {
-                let shape = input::region(mask)?;
-                let region = input::nodes(mask, shape.as_ref(), start.field.grid())?;
-                Loaded::Space(self.restrict(start, region)?)
-            }
+            Loaded::Space(start) => Loaded::Space(self.restricted(start, region(mask)?.as_ref())?),
         })
     }
 
-    fn willmore(&mut self) -> Option<&mut FlowOptions> {
-        Some(&mut self.flow)
-    }
-
-    fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
-        self.flow.tau.get_or_insert(StepRule::Ramp {
-            tau: STEP * scales.mcf_step * unit.powi(2),
-            halvings: HALVINGS,
-        });
+    pub fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
+        let inner = scales.mcf_step * unit.powi(2);
+        self.flow.tau.get_or_insert(usual(STEP * inner));
         self.flow.rule(scales, unit)
     }
-}
 
-impl InpaintOptions {
     fn mask(&self) -> Result<&str, Error> {
         self.mask.as_deref().ok_or_else(|| {
             Error::options("say which region to fill: --mask IMAGE, box:x0,y0,x1,y1 or ball:x,y,r")
         })
     }
 
-    fn restrict<const D: usize, O>(
+    /// Lets only the nodes inside a mask move, where the shape is what the ansatz says.
+    fn restricted<const D: usize, O>(
         &self,
-        start: Start<D, O>,
-        region: Vec<bool>,
+        mut start: Start<D, O>,
+        mask: &dyn SignedDistance<D>,
     ) -> Result<Start<D, O>, Error> {
-        let eps = self.flow.scheme.eps_over_h() * start.field.grid().spacing();
-        Ok(Start {
-            field: self.ansatz.put_into(start.field, &region, eps)?,
-            region: Some(region),
-            ..start
-        })
+        let grid = *start.field.grid();
+        let inside = |node: usize| mask.signed_distance(grid.node(node)) < 0.0;
+        let region: Vec<bool> = (0..grid.len()).map(inside).collect();
+        if !region.contains(&true) {
+            return Err(Error::options(format!(
+                "--mask {} contains no node of the box from {:?} of side {}: nothing could move",
+                self.mask()?,
+                grid.origin(),
+                grid.side()
+            )));
+        }
+        let eps = self.flow.run.scheme.eps_over_h() * grid.spacing();
+        let inner = match &self.ansatz {
+            Ansatz::Keep => start.field.clone(),
+            Ansatz::Empty => Field::constant(grid, -1.0),
+            Ansatz::Full => Field::constant(grid, 1.0),
+            Ansatz::Shape(shape) => phase_field(grid, shape.shape::<D>()?.as_ref(), eps)?,
+        };
+        let values = start.field.values_mut().iter_mut().zip(inner.values());
+        for ((value, inner), _) in values.zip(&region).filter(|(_, inside)| **inside) {
+            *value = *inner;
+        }
+        start.region = Some(region);
+        Ok(start)
     }
+}
+
+fn usual(tau: f64) -> StepRule {
+    StepRule::Ramp {
+        tau,
+        halvings: HALVINGS,
+    }
+}
+
+/// A region that is a mask.
+fn region<const D: usize>(mask: &str) -> Result<Box<dyn SignedDistance<D>>, Error> {
+    if !Region::is_meant(mask) {
+        return Err(Error::options(format!(
+            "--mask {mask} is no region in {D}D: give box:... or ball:..."
+        )));
+    }
+    let region: Region = mask
+        .parse()
+        .map_err(|reason| Error::options(format!("--mask: {reason}")))?;
+    Ok(region.shape::<D>()?)
 }

@@ -2,7 +2,7 @@
 
 use model::{Network, Shipped};
 
-use crate::cli::NetworksCommand;
+use crate::cli::{NetworksCommand, SayOptions};
 use crate::prelude::*;
 
 pub fn run(show: Option<&NetworksCommand>, say: SayOptions) -> Result<ExitCode, Error> {

@@ -2,8 +2,12 @@
 
 use volumes::Volume;
 
-use crate::cli::SampleOptions;
+use crate::cli::{InputOptions, SampleOptions, SayOptions};
+use crate::input::{Loaded, Reader, Source, Start, check_phases, closed};
+use crate::outlet::Outlet;
+use crate::paths::{MESHES, extension};
 use crate::prelude::*;
+use crate::values::Label;
 use crate::volume;
 
 /// Interface width in cells of what is written.
@@ -16,8 +20,8 @@ pub fn run(mut options: SampleOptions, say: SayOptions) -> Result<ExitCode, Erro
             "sample needs --save FILE, with .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz",
         )
     })?;
-    if let Some(of) = volume::of_all_labels(&options.input)? {
-        for label in volume::labels(&of)? {
+    if let Some(labels) = volume::all_labels(&options.input)? {
+        for label in labels {
             let mut one = options.clone();
             one.input.label = Some(Label::One(label));
             one.save = Some(volume::named(&path, label));
@@ -25,10 +29,10 @@ pub fn run(mut options: SampleOptions, say: SayOptions) -> Result<ExitCode, Erro
         }
         return Ok(ExitCode::SUCCESS);
     }
-    let extension = input::extension(&path);
-    let is_mesh = MESHES.contains(&&*extension);
+    let format = extension(&path);
+    let is_mesh = MESHES.contains(&&*format);
     let shown = path.display();
-    if !is_mesh && !["png", "npy", "vti", "nii", "gz"].contains(&&*extension) {
+    if !is_mesh && !["png", "npy", "vti", "nii", "gz"].contains(&&*format) {
         return Err(Error::options(format!(
             "--save {shown} must end in .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz"
         )));
@@ -58,15 +62,14 @@ pub fn run(mut options: SampleOptions, say: SayOptions) -> Result<ExitCode, Erro
     } = &options.input;
     let on_grid =
         options.resample || cells.is_some() || box_side.is_some() || side_length.is_some();
-    if is_mesh
-        && options.without.is_empty()
-        && !on_grid
-        && let Some(from) = input::mesh_file(&mut options.input)?
-    {
-        let mut mesh = if options.input.repair {
-            input::closed(&from, true, say)?.into_mesh()
+    let whole = is_mesh && options.without.is_empty() && !on_grid;
+    let repairs = options.input.repair;
+    let mut reader = Reader::of(&mut options.input, EPS_OVER_H, say)?;
+    if let (Source::Mesh(from), true) = (&reader.source, whole) {
+        let mut mesh = if repairs {
+            closed(from, true, say)?.into_mesh()
         } else {
-            surfaces::read(&from)?
+            surfaces::read(from)?
         };
         if noise > 0.0 {
             mesh.normals = Some(mesh.vertex_normals());
@@ -75,8 +78,8 @@ pub fn run(mut options: SampleOptions, say: SayOptions) -> Result<ExitCode, Erro
         surfaces::write(&path, &mesh)?;
         return done();
     }
-    match input::load(&mut options.input, EPS_OVER_H, say)? {
-        Loaded::Plane(start, _) => write(start, options, &path)?,
+    match reader.load()? {
+        Loaded::Plane(start) => write(start, options, &path)?,
         Loaded::Space(start) if noise > 0.0 => {
             let u = without(start.field, &options.without)?;
             let mut mesh = surfaces::remeshed_surface(&u, eps(&u))?;
@@ -99,7 +102,7 @@ fn write<const D: usize, O: Outlet<D>>(
 ) -> Result<(), Error> {
     start.outlet.turn(&mut options.up)?;
     let u = without(start.field, &options.without)?;
-    match &*input::extension(path) {
+    match &*extension(path) {
         "npy" => npy::write(path, &u)?,
         "nii" | "gz" => volumes::write(path, &segmentation(&u, path)?)?,
         "vti" => vti::write(path, &[("phase_field", &u)])?,
@@ -139,6 +142,6 @@ fn without<const D: usize>(mut u: Field<D>, regions: &[Region]) -> Result<Field<
             *value = value.min(-hole);
         }
     }
-    input::check_phases(&u, "what --without leaves")?;
+    check_phases(&u, "what --without leaves")?;
     Ok(u)
 }

@@ -24,7 +24,7 @@ pub fn man() -> Result<ExitCode, Error> {
     for page in pages {
         clap_mangen::Man::new(page.clone())
             .render(&mut text)
-            .map_err(Error::io("make the manual page of", page.get_name()))?;
+            .map_err(files::Error::of("make the manual page of", page.get_name()))?;
     }
     print(&text);
     Ok(ExitCode::SUCCESS)

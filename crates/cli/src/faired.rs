@@ -1,0 +1,165 @@
+//! What became of a surface, and how far it has gone.
+
+use geometry::file::write_atomically;
+use render::View;
+use report::{Axis, Figure, LineChart, OKABE_ITO, Raster, Rgb, Series, viridis};
+use surfaces::hausdorff_distance;
+
+use crate::paths::extension;
+use crate::prelude::*;
+
+const PIXELS: u32 = 640;
+/// Bars of the histogram, and their width in the figure.
+const BARS: usize = 40;
+const WIDTH: f64 = 8.0;
+/// The colour of what the grid does not hold, which is none of viridis.
+const LOST: Rgb = OKABE_ITO[1];
+
+/// What became of a surface.
+pub struct Faired {
+    /// The extension of files that keep everything.
+    pub extension: String,
+    /// With everything that the input had, unless the mesh is new.
+    pub file: Option<Vec<u8>>,
+    pub mesh: TriangleMesh,
+    pub displacement: Figure,
+    pub report: Value,
+}
+
+impl Faired {
+    /// A mesh whose vertices have gone as far as `lengths` says from the surface `before`. Those that are `lost` are at parts or gaps that the grid
+    /// does not hold.
+    pub fn new(
+        before: &ClosedMesh,
+        mesh: TriangleMesh,
+        (lengths, lost): (&[f64], &[bool]),
+        extension: String,
+        up: UpAxis,
+    ) -> Result<Self, Error> {
+        Ok(Self {
+            extension,
+            file: None,
+            displacement: figure(&mesh, lengths, lost, up)?,
+            report: report(before, &mesh, lengths),
+            mesh,
+        })
+    }
+
+    /// A new mesh in place of a surface.
+    pub fn anew(
+        before: &ClosedMesh,
+        mesh: TriangleMesh,
+        extension: String,
+        up: UpAxis,
+    ) -> Result<Self, Error> {
+        let distance = MeshDistance::new(before);
+        let lengths = distance.signed_distances(&mesh.vertices).into_iter();
+        let lengths: Vec<f64> = lengths.map(f64::abs).collect();
+        let none_lost = vec![false; lengths.len()];
+        Self::new(before, mesh, (&lengths, &none_lost), extension, up)
+    }
+
+    /// Writes a file: in the format of the input with everything that this had, in another one the triangles alone.
+    pub fn write(&self, path: &Path) -> Result<(), Error> {
+        let same = extension(path) == self.extension;
+        if let Some(file) = self.file.as_ref().filter(|_| same) {
+            return Ok(write_atomically(path, |out| out.write_all(file))?);
+        }
+        Ok(surfaces::write(path, &self.mesh)?)
+    }
+}
+
+/// How surfaces are looked at.
+pub fn view(up: UpAxis) -> View {
+    View {
+        up,
+        azimuth: -60.0,
+        elevation: 25.0,
+    }
+}
+
+/// The zero set as triangles, which would cut off what is round, with its volume where that can be measured.
+pub fn surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
+    let mesh = surfaces::remeshed_surface(u, eps)?;
+    let zero_set = ZeroSet::of(u, eps)?;
+    Ok(if zero_set.sizes_hold() {
+        mesh.with_volume(zero_set.volume, |_| true)
+    } else {
+        mesh
+    })
+}
+
+/// How a mesh whose vertices are that far from the surface `before` differs from that.
+fn report(before: &ClosedMesh, after: &TriangleMesh, lengths: &[f64]) -> Value {
+    let mut report = json!({});
+    let side = before.bounding_box().longest_side();
+    let mut add = |name: &str, length: f64| {
+        report[name] = length.into();
+        report[&format!("{name}_percent")] = (100.0 * length / side).into();
+    };
+    let squares: f64 = lengths.iter().map(|length| length * length).sum();
+    let largest = lengths.iter().copied().fold(0.0, f64::max);
+    add(
+        "displacement_rms",
+        (squares / lengths.len().max(1) as f64).sqrt(),
+    );
+    add("displacement_largest", largest);
+    // A mesh that folds over itself is written all the same, and has no distance.
+    if let Ok((after, _)) = ClosedMesh::new(after.clone()) {
+        add("hausdorff_distance", hausdorff_distance(before, &after));
+        let relative = |after: f64, before: f64| 100.0 * (after / before - 1.0);
+        report["volume_change_percent"] = relative(after.volume(), before.volume()).into();
+        report["area_change_percent"] = relative(after.area(), before.area()).into();
+    }
+    report
+}
+
+/// The surface in the colours of the lengths by which its vertices have moved, and their histogram, whose bars say which colour is which
+/// length. Vertices that are `lost`, at parts or gaps that the grid does not hold, have a colour of their own.
+fn figure(
+    mesh: &TriangleMesh,
+    lengths: &[f64],
+    lost: &[bool],
+    up: UpAxis,
+) -> Result<Figure, Error> {
+    let largest = lengths.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let colours = lengths.iter().zip(lost);
+    let colours = colours.map(|(length, lost)| {
+        if *lost {
+            LOST
+        } else {
+            viridis(length / largest)
+        }
+    });
+    let scene = Scene::of_mesh(mesh.clone()).view(view(up));
+    let picture = scene.painted(colours.collect())?.render([PIXELS; 2])?;
+    let count = lost.iter().filter(|lost| **lost).count();
+    let percent = 100.0 / lengths.len().max(1) as f64;
+    let caption = match count {
+        0 => String::new(),
+        _ => format!(
+            "orange: {:.1} % of the vertices, at parts or gaps that the grid does not hold",
+            percent * count as f64
+        ),
+    };
+    let size = [picture.width(), picture.height()].map(|side| side as usize);
+    let surface = Raster::new(size, picture.pixels()).with_caption(caption);
+    let mut shares = [0.0; BARS];
+    for length in lengths {
+        let bar = (length / largest * BARS as f64) as usize;
+        shares[bar.min(BARS - 1)] += percent;
+    }
+    let bars = shares.iter().enumerate().map(|(bar, share)| {
+        let middle = (bar as f64 + 0.5) / BARS as f64;
+        let bar = Series::new("", [[middle * largest, 0.0], [middle * largest, *share]]);
+        bar.with_colour(viridis(middle)).with_width(WIDTH)
+    });
+    let chart = LineChart::new(
+        "How far it has gone at its vertices",
+        Axis::linear("length, in the units of the mesh").with_range(0.0, largest),
+        Axis::linear("vertices, %"),
+    );
+    Ok(Figure::new("", 2)
+        .with_panel(surface)
+        .with_panel(chart.with_curves(bars)))
+}

@@ -1,0 +1,22 @@
+//! Files that are named on the command line.
+
+use crate::prelude::*;
+
+/// The extensions of meshes, the usual one first.
+pub const MESHES: [&str; 3] = ["ply", "obj", "stl"];
+
+/// The path of a file from wherever the program may run later.
+pub fn absolute(path: impl AsRef<Path>) -> Result<PathBuf, Error> {
+    let path = path.as_ref();
+    Ok(std::path::absolute(path).map_err(files::Error::of("find", path))?)
+}
+
+pub fn extension(path: &Path) -> String {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+    extension.to_ascii_lowercase()
+}
+
+pub fn read(path: impl AsRef<Path>) -> Result<Vec<u8>, Error> {
+    let path = path.as_ref();
+    Ok(std::fs::read(path).map_err(files::Error::of("read", path))?)
+}

@@ -1,0 +1,69 @@
+//! The device and the operator that options choose.
+
+use engine::{Operator, Storage};
+use model::{Network, Networks};
+
+use crate::cli::{CommonOptions, SchemeOptions};
+use crate::prelude::*;
+
+/// Refuses widths of the interface, in cells, that no grid resolves.
+pub fn check_eps_over_h(eps_over_h: f64) -> Result<(), Error> {
+    if (0.5..=64.0).contains(&eps_over_h) {
+        return Ok(());
+    }
+    Err(Error::options(format!(
+        "--eps-over-h {eps_over_h} is not possible: an interface is from 0.5 to 64 cells wide"
+    )))
+}
+
+/// Refuses values that are not positive.
+pub fn check_positive(name: &str, value: Option<f64>) -> Result<(), Error> {
+    match value {
+        Some(value) if !(value.is_finite() && value > 0.0) => {
+            Err(Error::options(format!("{name} {value} must be positive")))
+        }
+        _ => Ok(()),
+    }
+}
+
+impl CommonOptions {
+    /// Opens the device and notes its name.
+    pub fn open_device(&mut self) -> Result<ComputeDevice, Error> {
+        let device = match &self.device {
+            Some(name) => ComputeDevice::open(name.parse::<DeviceKind>()?)?,
+            None => ComputeDevice::default_compiled()?,
+        };
+        self.device = Some(device.kind().name().to_owned());
+        Ok(device)
+    }
+}
+
+impl SchemeOptions {
+    /// Takes the width of the interface from the network, unless it is given.
+    pub fn fill_in(&mut self) -> Result<(), Error> {
+        if let (None, Some(path)) = (self.eps_over_h, &self.network) {
+            self.eps_over_h = Some(Network::load(path)?.ratios().eps_over_h);
+        }
+        self.eps_over_h = Some(self.eps_over_h());
+        check_eps_over_h(self.eps_over_h())
+    }
+
+    /// The step of mean curvature flow on a grid.
+    pub fn operator<const D: usize>(
+        &self,
+        method: Method,
+        grid: &Grid<D>,
+    ) -> Result<(Scales, Operator), Error> {
+        let scales = Scales::of_grid(grid.spacing(), self.eps_over_h());
+        let needed = scales.needs(D, grid.spacing());
+        let networks = Networks::load(self.network.as_slice(), &[needed])?;
+        let scheme = if method.is_learned() {
+            self.scheme
+        } else {
+            Scheme::Paper
+        };
+        let mut operator = Operator::new((method, scheme), &networks, &needed, grid, &scales)?;
+        operator.storage = self.storage.unwrap_or(Storage::Auto);
+        Ok((scales, operator))
+    }
+}

@@ -1,0 +1,126 @@
+//! Surfaces in space.
+
+use geometry::measure::bounding_box;
+
+use crate::faired::{Faired, surface, view};
+use crate::outlet::{Known, Outlet, Topology};
+use crate::own::OwnMesh;
+use crate::paths::MESHES;
+use crate::prelude::*;
+
+const PIXELS: u32 = 480;
+/// Room around a surface for its flow, as a part of its longest side.
+const ROOM: f64 = 0.06;
+
+#[derive(Serialize, Deserialize)]
+pub struct Space {
+    pub up: UpAxis,
+    /// The parts and holes of the mesh that it was, if it was one.
+    #[serde(default)]
+    pub input: Option<Topology>,
+    /// The mesh whose vertices follow the flow, if it is one.
+    #[serde(default)]
+    pub own: Option<OwnMesh>,
+    /// The voxels that it was, if it was some.
+    #[serde(default)]
+    pub voxels: Option<Voxels>,
+}
+
+#[derive(Clone, Copy, Serialize, Deserialize)]
+pub struct Voxels {
+    pub volume: f64,
+    /// The side of a cube as large as a voxel.
+    pub side: f64,
+    /// How far its surface may go, root of the mean square, if that ends the flow.
+    pub farthest: Option<f64>,
+}
+
+impl Space {
+    pub fn new(up: UpAxis) -> Self {
+        Self {
+            up,
+            input: None,
+            own: None,
+            voxels: None,
+        }
+    }
+}
+
+impl Outlet<3> for Space {
+    const SAVED: &'static [&'static str] = &MESHES;
+    const USUAL: &'static str = MESHES[0];
+
+    fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error> {
+        self.up = *up.get_or_insert(self.up);
+        Ok(())
+    }
+
+    fn picture(&self, start: &Field<3>, u: &Field<3>, eps: f64) -> Result<Picture, Error> {
+        let mut scene = Scene::new(u, eps)?.view(view(self.up));
+        // Room to grow, and more only for what grows beyond it, so that the pictures of a film do not jump.
+        let start = bounding_box(start).map(|bounds| {
+            let room = ROOM * bounds.longest_side();
+            [
+                bounds.lower.map(|x| x - room),
+                bounds.upper.map(|x| x + room),
+            ]
+        });
+        let now = scene.bounds().map(|bounds| [bounds.lower, bounds.upper]);
+        if let Some(frame) = BoundingBox::around(start.into_iter().chain(now).flatten()) {
+            scene = scene.within(frame);
+        }
+        Ok(scene.render([PIXELS; 2])?)
+    }
+
+    fn topology(&self, u: &Field<3>, eps: f64) -> Result<Topology, Error> {
+        let (closed, _) = ClosedMesh::new(surfaces::phase_field_surface(u, eps)?)?;
+        Ok(Topology::of(&closed))
+    }
+
+    fn save(&self, u: &Field<3>, eps: f64, path: &Path) -> Result<(), Error> {
+        Ok(surfaces::write(path, &surface(u, eps)?)?)
+    }
+
+    fn faired(&self, start: &Field<3>, u: &Field<3>, eps: f64) -> Result<Option<Faired>, Error> {
+        if let Some(own) = &self.own {
+            return own.faired(start, u, eps, self.up).map(Some);
+        }
+        // Sheets that touch each other are no surface from which another one could be far.
+        match ClosedMesh::new(surfaces::phase_field_surface(start, eps)?) {
+            Ok((before, _)) if before.volume() > 0.0 => {
+                let extension = Self::USUAL.to_owned();
+                Faired::anew(&before, surface(u, eps)?, extension, self.up).map(Some)
+            }
+            _ => Ok(None),
+        }
+    }
+
+    fn input(&self) -> Option<Topology> {
+        self.input
+    }
+
+    fn known(&self, start: &Field<3>, eps: f64) -> Result<Known<3>, Error> {
+        let mut known = Known::default();
+        if let Some(own) = &self.own {
+            known.volume = own.keeps_volume.then(|| own.rough().volume());
+            known.measures.push(own.measure(start, eps)?);
+            known.stops = own.stops(start.grid().spacing());
+        }
+        if let Some(voxels) = &self.voxels {
+            known.volume = Some(voxels.volume);
+            known.measures.push(Measure::displacement(start, eps));
+            known.stops.extend(voxels.farthest.map(Stop::Displacement));
+        }
+        Ok(known)
+    }
+
+    fn inputs(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
+        Ok(self.own.as_ref().map_or(Vec::new(), OwnMesh::inputs))
+    }
+
+    fn restore(&mut self, stored: &StoredRun) -> Result<(), Error> {
+        self.own
+            .as_mut()
+            .map_or(Ok(()), |own| own.load_from(stored))
+    }
+}

@@ -1,0 +1,137 @@
+//! Values of options, which are read as they are written.
+
+use derive_more::Display;
+
+use crate::prelude::*;
+
+/// A value in the units of the input, or a part of another one in percent.
+#[derive(Clone, Copy, Debug, PartialEq, Display)]
+pub enum Amount {
+    Value(f64),
+    #[display("{_0}%")]
+    Percent(f64),
+}
+
+impl Amount {
+    fn parse(text: &str, expected: &str) -> Result<Self, String> {
+        let (number, amount): (_, fn(f64) -> Self) = match text.strip_suffix('%') {
+            Some(percent) => (percent, Self::Percent),
+            None => (text, Self::Value),
+        };
+        match number.parse::<f64>() {
+            Ok(value) if value.is_finite() && value > 0.0 => Ok(amount(value)),
+            _ => Err(format!("{number:?} is no positive number; give {expected}")),
+        }
+    }
+
+    pub fn tolerance(text: &str) -> Result<Self, String> {
+        Self::parse(
+            text,
+            "a length, or a part of the motion in percent, such as 2%",
+        )
+    }
+}
+
+impl Serialize for Amount {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// What a size is to become.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SizeTarget {
+    /// What it is at the beginning.
+    Keep,
+    /// This, or this part of what it is at the beginning.
+    #[serde(untagged)]
+    To(Amount),
+}
+
+impl SizeTarget {
+    /// The value, for a size that is `now` at the beginning.
+    pub fn of(self, now: f64) -> f64 {
+        match self {
+            Self::Keep => now,
+            Self::To(Amount::Value(value)) => value,
+            Self::To(Amount::Percent(percent)) => percent / 100.0 * now,
+        }
+    }
+}
+
+impl FromStr for SizeTarget {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = "keep, a value, or a part of the beginning in percent, such as 90%";
+        match text {
+            "keep" => Ok(Self::Keep),
+            text => Amount::parse(text, expected).map(Self::To),
+        }
+    }
+}
+
+/// What of a volume is inside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Display)]
+pub enum Label {
+    /// Each but 0 becomes a surface of its own.
+    #[display("all")]
+    All,
+    One(i64),
+}
+
+impl Serialize for Label {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl FromStr for Label {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.parse() {
+            Ok(label) => Ok(Self::One(label)),
+            Err(_) if text == "all" => Ok(Self::All),
+            Err(_) => Err(format!("{text:?} is neither a whole number nor all")),
+        }
+    }
+}
+
+/// What an inpainted region holds at the beginning.
+#[derive(Clone, Debug, PartialEq, Display)]
+#[display(rename_all = "lowercase")]
+pub enum Ansatz {
+    Keep,
+    /// Nothing.
+    Empty,
+    /// All inside.
+    Full,
+    #[display("{_0}")]
+    Shape(Region),
+}
+
+impl Serialize for Ansatz {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl FromStr for Ansatz {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Ok(match text {
+            "keep" => Self::Keep,
+            "empty" => Self::Empty,
+            "full" => Self::Full,
+            text if Region::is_meant(text) => Self::Shape(text.parse()?),
+            text => {
+                return Err(format!(
+                    "{text:?} is no ansatz: give keep, empty, full, box:... or ball:..."
+                ));
+            }
+        })
+    }
+}
