@@ -1,7 +1,6 @@
 //! Inputs as phase fields.
 
 use geometry::npy::{self, NpyError};
-use geometry::vti::{self, VtiError};
 use geometry::{PURE_BEYOND, distance_from_phase_field, thin_part};
 use images::{Frame, Image, Outline, OutlineDistance, Side, Threshold, Tones};
 use surfaces::hausdorff_distance;
@@ -238,11 +237,14 @@ impl Source<'_> {
             "png" | "jpg" | "jpeg" | "webp" | "gif" | "tif" | "tiff" | "bmp" => {
                 Ok(Source::Image(path))
             }
-            "npy" | "vti" => Ok(Source::Field(path)),
+            "npy" => Ok(Source::Field(path)),
+            "vti" => Err(Error::options(format!(
+                "{input} is for ParaView and is not read: give the same values as .npy, such as the final.npy beside a final.vti"
+            ))),
             "nii" | "gz" | "mrc" | "map" => Ok(Source::Volume(path)),
             _ => Err(Error::options(format!(
                 "{input} is no input: give a mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), \
-                 a volume (.nii, .nii.gz, .mrc, .map, .tif of several pages), a field (.npy, .vti), builtin:NAME, or a region as box:... or ball:..."
+                 a volume (.nii, .nii.gz, .mrc, .map, .tif of several pages), a field (.npy), builtin:NAME, or a region as box:... or ball:..."
             ))),
         }
     }
@@ -272,7 +274,6 @@ impl Source<'_> {
         let is_image = matches!(self, Self::Image(_));
         let is_volume = matches!(self, Self::Volume(_));
         let is_field = matches!(self, Self::Field(_));
-        let is_vti = matches!(self, Self::Field(path) if extension(path) == "vti");
         let has_side = !is_field && !matches!(self, Self::Region(_));
         for (name, given, allowed) in [
             ("--inside", options.inside.is_some(), is_image),
@@ -285,7 +286,6 @@ impl Source<'_> {
             ("--holds", options.holds.is_some(), is_field),
             ("--repair", options.repair, matches!(self, Self::Mesh(_))),
             ("--side-length", options.side_length.is_some(), has_side),
-            ("--box-side", options.box_side.is_some(), !is_vti),
         ] {
             if given && !allowed {
                 return Err(Error::options(format!(
@@ -657,14 +657,9 @@ impl Reader<'_> {
 
     fn values<const D: usize>(&mut self, path: &Path) -> Result<Field<D>, Error> {
         let holds = *self.options.holds.get_or_insert(Holds::PhaseField);
-        let field = if extension(path) == "vti" {
-            let mut arrays = vti::read::<D>(path)?;
-            arrays.swap_remove(0).1
-        } else {
-            let (_, side) = usual_box::<D>();
-            let side = *self.options.box_side.get_or_insert(side);
-            npy::read(path, |cells| Grid::centred(cells, side))?
-        };
+        let (_, side) = usual_box::<D>();
+        let side = *self.options.box_side.get_or_insert(side);
+        let field = npy::read(path, |cells| Grid::centred(cells, side))?;
         let outside = |u: &&f64| u.abs() > LARGEST_PHASE;
         if let Some(value) = field
             .values()
@@ -693,12 +688,7 @@ impl Reader<'_> {
         if self.options.cells.is_none() {
             return Ok(distance);
         }
-        let (side, origin) = (distance.grid().side(), distance.grid().origin());
-        // A VTI file says itself how large the box is.
-        let box_side = self.options.box_side.replace(side);
-        let grid = self.grid::<D>()?.with_origin(origin)?;
-        self.options.box_side = box_side;
-        Ok(Field::from_fn(grid, |x| distance.interpolate(x)))
+        Ok(Field::from_fn(self.grid()?, |x| distance.interpolate(x)))
     }
 }
 
@@ -722,12 +712,10 @@ fn refuse_photographs(tones: &Tones, side: Side, path: &Path) -> Result<(), Erro
 /// Whether a file of values is meant to be in the plane; its reader says what is wrong with it.
 fn is_planar(path: &Path) -> Result<bool, Error> {
     let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
-    Ok(if extension(path) == "vti" {
-        let layers = |nodes: [u64; 3]| nodes[2] > 1;
-        !matches!(vti::decode::<2>(&bytes), Err(VtiError::NotCubical { nodes, .. }) if layers(nodes))
-    } else {
-        !matches!(npy::decode::<2>(&bytes), Err(NpyError::Rank { .. }))
-    })
+    Ok(!matches!(
+        npy::decode::<2>(&bytes),
+        Err(NpyError::Rank { .. })
+    ))
 }
 
 /// Refuses shapes of which there is nothing on the grid, or nothing else.

@@ -277,7 +277,7 @@ pub fn write_final<const D: usize, O: Outlet<D>>(
 ) -> Result<Topology, Error> {
     npy::write(run.path().join("final.npy"), u)?;
     run.adopt_file("final.npy")?;
-    vti::write(run.path().join("final.vti"), &[("phase_field", u)])?;
+    vti::write(run.path().join("final.vti"), "phase_field", u)?;
     run.adopt_file("final.vti")?;
     if !has_interface(u) {
         return Ok(Topology::default());

@@ -4,7 +4,6 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use engine::DISPLACEMENT;
-use geometry::file::write_atomically;
 use report::Figure;
 use surfaces::hausdorff_distance;
 
@@ -320,7 +319,8 @@ impl Faired {
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         let same = crate::input::extension(path) == self.extension;
         if let Some(file) = self.file.as_ref().filter(|_| same) {
-            return Ok(write_atomically(path, |out| out.write_all(file))?);
+            let written = files::write_atomically(path, |out| out.write_all(file));
+            return Ok(written.map_err(geometry::Error::from)?);
         }
         Ok(surfaces::write(path, &self.mesh)?)
     }

@@ -45,10 +45,10 @@ impl Files<'_> {
         let mut page = Page::new(format!("willmore {} {}", text("command"), text("name")))
             .with_lead(lead(outcome.as_ref(), &table));
         if let Some(shape) = self.shape(&table)? {
-            page.push(shape);
+            page = page.with(shape);
         }
         if !table.rows().is_empty() {
-            page.push(self.steps(&table)?);
+            page = page.with(self.steps(&table)?);
         }
         let options: Value = toml::from_str(&self.run.read_text(config::FILE)?)
             .map_err(|error| Error::options(format!("the stored options: {error}")))?;

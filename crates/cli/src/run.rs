@@ -369,7 +369,7 @@ impl<const D: usize, O: Outlet<D>> Observer<D> for Pictures<'_, O> {
                 let picture = outlet.picture(&case.initial, u, eps)?;
                 outlet::write_picture(&picture, &format!("{name}.png"), run)?;
                 let values = format!("{name}.vti");
-                vti::write(run.path().join(&values), &[("phase_field", u)])?;
+                vti::write(run.path().join(&values), "phase_field", u)?;
                 run.adopt_file(&values)?;
                 outlet.write_shape(u, eps, &name, self.plan.format.as_deref(), run)?;
             }

@@ -109,19 +109,11 @@ impl<'a> Fuzz<'a> {
         self
     }
 
-    /// Words that have a meaning in the format.
+    /// Words that have a meaning in the format, such as those that open something: they are repeated, and nested by that.
     #[must_use]
     pub fn words<T: AsRef<[u8]>>(mut self, words: impl IntoIterator<Item = T>) -> Self {
         let words = words.into_iter().map(|w| w.as_ref().to_vec());
         self.material.words.extend(words);
-        self
-    }
-
-    /// Words that open and close something, which are nested deeply.
-    #[must_use]
-    pub fn pairs<T: AsRef<[u8]>>(mut self, pairs: impl IntoIterator<Item = [T; 2]>) -> Self {
-        let pairs = pairs.into_iter().map(|p| p.map(|w| w.as_ref().to_vec()));
-        self.material.pairs.extend(pairs);
         self
     }
 

@@ -22,9 +22,8 @@ pub(crate) mod error;
 
 use std::path::Path;
 
-use files::Number;
+use files::{Number, write_atomically};
 
-use crate::file::write_atomically;
 use crate::{Error, Field, Grid};
 pub use error::NpyError;
 
@@ -42,13 +41,11 @@ const ALIGNMENT: usize = 64;
 /// [`Error::Io`].
 pub fn write<const D: usize>(path: impl AsRef<Path>, field: &Field<D>) -> Result<(), Error> {
     let header = header(&field.grid().shape());
-    write_atomically(path, |out| {
+    Ok(write_atomically(path, |out| {
         out.write_all(&header)?;
-        field
-            .values()
-            .iter()
-            .try_for_each(|value| out.write_all(&value.to_le_bytes()))
-    })
+        let mut values = field.values().iter();
+        values.try_for_each(|value| out.write_all(&value.to_le_bytes()))
+    })?)
 }
 
 /// Reads a field; `grid` makes the grid from the number of cells per side.
@@ -67,11 +64,7 @@ pub fn read<const D: usize>(
     grid: impl FnOnce(usize) -> Result<Grid<D>, Error>,
 ) -> Result<Field<D>, Error> {
     let path = path.as_ref();
-    let bytes = std::fs::read(path).map_err(|source| Error::Io {
-        action: "read",
-        path: path.into(),
-        source,
-    })?;
+    let bytes = std::fs::read(path).map_err(files::Error::of("read", path))?;
     let (cells, values) = decode::<D>(&bytes).map_err(|source| Error::Npy {
         path: path.into(),
         source,
@@ -148,7 +141,7 @@ pub fn decode<const D: usize>(bytes: &[u8]) -> Result<(usize, Vec<f64>), NpyErro
 }
 
 /// Position in Fortran order of the element at `index` in C order.
-pub(crate) fn reversed<const D: usize>(index: usize, cells: usize) -> usize {
+fn reversed<const D: usize>(index: usize, cells: usize) -> usize {
     let digits = (0..D).scan(index, |rest, _| {
         let digit = *rest % cells;
         *rest /= cells;

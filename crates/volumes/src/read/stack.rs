@@ -51,12 +51,7 @@ fn bad<T>(
     value: &impl ToString,
     requirement: &'static str,
 ) -> Result<T, FormatError> {
-    Err(FormatError::Header {
-        format: "TIFF",
-        entry,
-        value: value.to_string(),
-        requirement,
-    })
+    FormatError::entry("TIFF", entry, value, requirement)
 }
 
 pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Volume, FormatError> {
