@@ -206,7 +206,7 @@ impl Loaded {
     }
 }
 
-/// The values of a file on a grid, whatever box the file says.
+/// The values of an NPY file on a grid.
 fn volume(path: &Path, grid: Grid<3>, holds: VolumeKind) -> Result<Field<3>, Error> {
     /// Flows overshoot the phases of a phase field a little.
     const LARGEST: f64 = 1.1;

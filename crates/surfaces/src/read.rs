@@ -115,17 +115,21 @@ fn position<'a>(
     let mut position = [0.0; 3];
     for coordinate in &mut position {
         let word = words.next().unwrap_or_default();
-        let value: f64 = word.parse().map_err(|_| FormatError::Line {
+        *coordinate = word.parse().map_err(|_| FormatError::Line {
             line,
             found: shortened(word),
             expected: "a coordinate",
         })?;
-        if !value.is_finite() {
-            return Err(FormatError::NonFinite { vertex, value });
-        }
-        *coordinate = value;
     }
-    Ok(position)
+    finite(position, vertex)
+}
+
+/// The position of a vertex, if all its coordinates are numbers.
+fn finite(position: [f64; 3], vertex: usize) -> Result<[f64; 3], FormatError> {
+    match position.into_iter().find(|v| !v.is_finite()) {
+        None => Ok(position),
+        Some(value) => Err(FormatError::NonFinite { vertex, value }),
+    }
 }
 
 /// Polygons cut into triangles, with their indices checked.

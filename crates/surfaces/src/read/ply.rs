@@ -6,7 +6,7 @@ mod header;
 use body::Body;
 use header::{Element, Header};
 
-use super::{FormatError, Polygons, level};
+use super::{FormatError, Polygons, finite, level};
 use crate::TriangleMesh;
 
 /// Elements that hold faces: polygons, and strips of triangles.
@@ -55,10 +55,7 @@ fn read_vertices(
     mesh.vertices.reserve_exact(element.count);
     body.rows(element, |vertex, row| {
         let position = axes.map(|p| row[p].numbers[0]);
-        if let Some(value) = position.into_iter().find(|v| !v.is_finite()) {
-            return Err(FormatError::NonFinite { vertex, value });
-        }
-        mesh.vertices.push(position);
+        mesh.vertices.push(finite(position, vertex)?);
         normals.extend(normal_axes.map(|axes| axes.map(|p| row[p].numbers[0])));
         Ok(())
     })?;

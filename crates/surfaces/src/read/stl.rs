@@ -4,7 +4,7 @@
 //! refuses `solid` without a name, reads the first of several solids only, and rounds ASCII to
 //! single precision.
 
-use super::{FormatError, Polygons, position, shortened};
+use super::{FormatError, Polygons, finite, position, shortened};
 use crate::TriangleMesh;
 use crate::mesh::merge_coincident;
 use crate::vector::{Vector, scaled_normal};
@@ -63,17 +63,9 @@ fn binary(facets: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
     for facet in facets.as_chunks::<FACET>().0 {
         // The normal comes first; it follows from the corners.
         for corner in facet[12..48].as_chunks::<12>().0 {
-            let mut position = [0.0; 3];
-            for (value, bytes) in position.iter_mut().zip(corner.as_chunks().0) {
-                *value = f64::from(f32::from_le_bytes(*bytes));
-                if !value.is_finite() {
-                    return Err(FormatError::NonFinite {
-                        vertex: corners.len(),
-                        value: *value,
-                    });
-                }
-            }
-            corners.push(position);
+            let numbers = corner.as_chunks().0;
+            let position = [0, 1, 2].map(|i| f64::from(f32::from_le_bytes(numbers[i])));
+            corners.push(finite(position, corners.len())?);
         }
     }
     Ok(corners)
