@@ -515,10 +515,10 @@ fn photographs_are_drawings_too() {
 fn samples_are_inputs() {
     let folder = tempfile::tempdir().unwrap();
     for (input, files) in [
-        ("builtin:ring", &["ring.png", "ring.npy", "ring.vti"][..]),
+        ("builtin:ring", &["ring.png", "ring.npy"][..]),
         (
             "box:-0.3,-0.2,-0.3,0.3,0.2,0.3",
-            &["box.ply", "box.stl", "box.vti"],
+            &["box.ply", "box.stl", "box.npy"],
         ),
     ] {
         for file in files {
@@ -537,6 +537,11 @@ fn samples_are_inputs() {
             outcome(folder.path(), &run);
         }
     }
+    // Files for ParaView are written alone.
+    let written = ["sample", "builtin:ring", "--cells", "32", "--save", "r.vti"];
+    outcome(folder.path(), &written);
+    let file = std::fs::read(folder.path().join("r.vti")).unwrap();
+    assert!(file.starts_with(b"<?xml"));
     // A ball of radius 0.2 whose vertices move by up to 0.01.
     let noisy = |file: &str, seed: &str| {
         let ball = [

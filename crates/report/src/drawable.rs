@@ -4,20 +4,10 @@ use crate::geom::{Margins, Rect};
 use crate::legend::LegendEntry;
 use crate::surface::Surface;
 
-/// The texts of a panel, which may be empty.
-#[derive(Default)]
-pub(crate) struct Texts<'a> {
-    /// Above.
-    pub title: &'a str,
-    /// In the middle below, of the size of labels.
-    pub caption: &'a str,
-    /// In small type below.
-    pub note: &'a str,
-}
-
 /// A panel whose content is checked.
 pub(crate) trait Drawable {
-    fn texts(&self) -> Texts<'_>;
+    /// Title above, caption in the middle below, remark in small type below; each may be empty.
+    fn texts(&self) -> [&str; 3];
 
     /// Groups of entries for the legend.
     fn legend(&self) -> Vec<Vec<LegendEntry>> {

@@ -316,18 +316,18 @@ impl<'a> Cell<'a> {
         }
     }
 
-    /// The caption, or the note, below.
-    fn remark(&self) -> (&str, TextStyle) {
-        let note = TextStyle::new(self.fonts.note, GREY).aligned(Align::Left);
+    /// The title above, and the caption or the remark below.
+    fn texts(&self) -> (&str, &str, TextStyle) {
+        let small = TextStyle::new(self.fonts.note, GREY).aligned(Align::Left);
         match self.content.texts() {
-            texts if texts.caption.is_empty() => (texts.note, note),
-            texts => (texts.caption, TextStyle::new(self.fonts.label, INK)),
+            [title, "", remark] => (title, remark, small),
+            [title, caption, _] => (title, caption, TextStyle::new(self.fonts.label, INK)),
         }
     }
 
     /// Room for axes and texts around the plot box.
     fn margins(&self) -> Margins {
-        let ((remark, style), title) = (self.remark(), self.content.texts().title);
+        let (title, remark, style) = self.texts();
         let mut margins = self.content.margins(self.plot.width, self.plot.height);
         margins.top += font::height(title, self.fonts.title, self.text_width);
         margins.bottom += self.legend.height + font::height(remark, style.em, self.text_width);
@@ -344,29 +344,24 @@ impl<'a> Cell<'a> {
 
     fn draw(&self, surface: &mut dyn Surface) {
         let (plot, outer, middle) = (self.plot, self.outer, self.plot.centre().x);
-        let (top, style) = (
+        let (title, remark, style) = self.texts();
+        let (top, heading) = (
             point(middle, outer.y),
             TextStyle::new(self.fonts.title, INK),
         );
-        draw_lines(
-            surface,
-            self.content.texts().title,
-            style,
-            top,
-            self.text_width,
-        );
+        draw_lines(surface, title, heading, top, self.text_width);
         self.content.draw(surface, plot);
         let mut below = plot.bottom() + self.content.margins(plot.width, plot.height).bottom;
         let half = 0.5 * self.legend.width;
         let centre = middle.min(outer.right() - half).max(outer.x + half);
         self.legend.draw(surface, point(centre, below));
-        below += self.legend.height + AIR;
-        let (remark, style) = self.remark();
+        below += self.legend.height;
         let x = match style.align {
             Align::Left => outer.x + 4.0,
             _ => middle,
         };
-        draw_lines(surface, remark, style, point(x, below), self.text_width);
+        let at = point(x, below + AIR);
+        draw_lines(surface, remark, style, at, self.text_width);
     }
 }
 

@@ -5,7 +5,7 @@ use srgb::Rgb;
 use crate::axes::{Axes, Ruler};
 use crate::axis::{Axis, Window};
 use crate::colour::{FRAME, viridis};
-use crate::drawable::{Drawable, Texts};
+use crate::drawable::Drawable;
 use crate::error::{Error, Result};
 use crate::geom::{Margins, Rect};
 use crate::style::Fonts;
@@ -85,11 +85,8 @@ const BAR_GAP: f64 = 10.0;
 const BAR_WIDTH: f64 = 14.0;
 
 impl Drawable for Coloured<'_> {
-    fn texts(&self) -> Texts<'_> {
-        Texts {
-            title: &self.map.title,
-            ..Texts::default()
-        }
+    fn texts(&self) -> [&str; 3] {
+        [&self.map.title, "", ""]
     }
 
     fn aspect(&self) -> Option<f64> {

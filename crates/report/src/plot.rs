@@ -3,7 +3,7 @@
 use crate::axes::Axes;
 use crate::axis::{Axis, Window};
 use crate::colour::Colour;
-use crate::drawable::{Drawable, Texts};
+use crate::drawable::Drawable;
 use crate::error::{Error, Result};
 use crate::geom::{Margins, Point, Rect, clip_polyline, thin};
 use crate::legend::LegendEntry;
@@ -165,12 +165,9 @@ pub(crate) struct Plot<'a> {
 }
 
 impl Drawable for Plot<'_> {
-    fn texts(&self) -> Texts<'_> {
-        Texts {
-            title: &self.chart.title,
-            note: self.chart.note.as_deref().unwrap_or(""),
-            ..Texts::default()
-        }
+    fn texts(&self) -> [&str; 3] {
+        let note = self.chart.note.as_deref();
+        [&self.chart.title, "", note.unwrap_or("")]
     }
 
     fn legend(&self) -> Vec<Vec<LegendEntry>> {

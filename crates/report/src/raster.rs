@@ -2,7 +2,7 @@
 
 use srgb::Rgb;
 
-use crate::drawable::{Drawable, Texts};
+use crate::drawable::Drawable;
 use crate::error::{Error, Result};
 use crate::geom::Rect;
 use crate::surface::{PNG_SCALE, Surface};
@@ -86,11 +86,8 @@ fn shares(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
 }
 
 impl Drawable for &Raster {
-    fn texts(&self) -> Texts<'_> {
-        Texts {
-            caption: &self.caption,
-            ..Texts::default()
-        }
+    fn texts(&self) -> [&str; 3] {
+        ["", &self.caption, ""]
     }
 
     fn aspect(&self) -> Option<f64> {

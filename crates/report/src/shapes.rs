@@ -4,7 +4,7 @@ use srgb::Rgb;
 
 use crate::axis::Window;
 use crate::colour::Colour;
-use crate::drawable::{Drawable, Texts};
+use crate::drawable::Drawable;
 use crate::error::{Error, Result};
 use crate::geom::{Point, Rect, clip_loop, clip_polyline, thin};
 use crate::style::LineStyle;
@@ -133,11 +133,8 @@ pub(crate) struct Seen<'a> {
 }
 
 impl Drawable for Seen<'_> {
-    fn texts(&self) -> Texts<'_> {
-        Texts {
-            title: &self.shapes.caption,
-            ..Texts::default()
-        }
+    fn texts(&self) -> [&str; 3] {
+        [&self.shapes.caption, "", ""]
     }
 
     fn aspect(&self) -> Option<f64> {

@@ -9,38 +9,27 @@ const AVERAGING: usize = 12;
 const MEDIAN_OF_MEANS: f64 = 0.99;
 
 /// The neighbours of every vertex along edges, in ascending order.
-struct Umbrellas {
-    /// Where the neighbours of a vertex begin.
-    begin: Vec<usize>,
-    neighbours: Vec<u32>,
-}
+struct Umbrellas(Vec<Vec<u32>>);
 
 impl Umbrellas {
     fn of(mesh: &TriangleMesh) -> Self {
-        let mut edges: Vec<[u32; 2]> = (mesh.faces.iter())
-            .flat_map(|&[a, b, c]| [[a, b], [b, a], [b, c], [c, b], [c, a], [a, c]])
-            .collect();
-        edges.sort_unstable();
-        edges.dedup();
-        let mut begin = vec![0; mesh.vertices.len() + 1];
-        for [vertex, _] in &edges {
-            begin[*vertex as usize + 1] += 1;
+        let mut neighbours = vec![Vec::new(); mesh.vertices.len()];
+        for &[a, b, c] in &mesh.faces {
+            neighbours[a as usize].extend([b, c]);
+            neighbours[b as usize].extend([c, a]);
+            neighbours[c as usize].extend([a, b]);
         }
-        for vertex in 0..mesh.vertices.len() {
-            begin[vertex + 1] += begin[vertex];
+        for around in &mut neighbours {
+            around.sort_unstable();
+            around.dedup();
         }
-        let neighbours = edges.into_iter().map(|[_, neighbour]| neighbour).collect();
-        Self { begin, neighbours }
-    }
-
-    fn of_vertex(&self, vertex: usize) -> &[u32] {
-        &self.neighbours[self.begin[vertex]..self.begin[vertex + 1]]
+        Self(neighbours)
     }
 
     /// `L x = x - (mean of the neighbours)`; zero where there are none.
     fn laplacian(&self, x: &[Vector]) -> Vec<Vector> {
         let at = |vertex: usize| {
-            let around = self.of_vertex(vertex);
+            let around = &self.0[vertex];
             if around.is_empty() {
                 return Vector::ZERO;
             }
@@ -66,11 +55,11 @@ impl Umbrellas {
     fn squared_weights(&self, vertex: usize, weights: &mut Vec<(u32, f64)>) -> f64 {
         weights.clear();
         weights.push((vertex as u32, 1.0));
-        let around = self.of_vertex(vertex);
+        let around = &self.0[vertex];
         let share = 1.0 / around.len() as f64;
         for &near in around {
             weights.push((near, -2.0 * share));
-            let next = self.of_vertex(near as usize);
+            let next = &self.0[near as usize];
             let part = share / next.len() as f64;
             weights.extend(next.iter().map(|&far| (far, part)));
         }
@@ -212,9 +201,7 @@ impl TriangleMesh {
         // Normals of the smoothed mesh: noise turns those of the mesh itself, towards the plane of their neighbours.
         let normals = self.smoothed(12, 0.5, -0.53).vertex_normals();
         let mut weights = Vec::new();
-        let inner: Vec<bool> = (0..x.len())
-            .map(|v| umbrellas.of_vertex(v).len() > 2)
-            .collect();
+        let inner: Vec<bool> = umbrellas.0.iter().map(|near| near.len() > 2).collect();
         // A number at each vertex, as a vector.
         let mut squares = vec![Vector::ZERO; x.len()];
         for v in (0..x.len()).filter(|&v| inner[v]) {
