@@ -211,7 +211,7 @@ fn volume(path: &Path, grid: Grid<3>, holds: VolumeKind) -> Result<Field<3>, Err
     /// Flows overshoot the phases of a phase field a little.
     const LARGEST: f64 = 1.1;
     let name = path.display();
-    let field = npy::read(path, |cells| Grid::new(cells, grid.side()))?;
+    let field = npy::read(path, |cells| Grid::<3>::new(cells, grid.side()))?;
     let (found, expected) = (field.grid().cells(), grid.cells());
     require(
         found == expected,
