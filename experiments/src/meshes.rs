@@ -1,6 +1,6 @@
 //! Triangle meshes and volumes as initial data.
 
-use geometry::{PURE_BEYOND, npy, vti};
+use geometry::{PURE_BEYOND, npy};
 use runs::fingerprint;
 use surfaces::{ClosedMesh, MeshDistance, usual_up_axis};
 
@@ -22,7 +22,7 @@ pub struct MeshOptions {
     #[arg(long)]
     pub procedural: bool,
 
-    /// Start from values on the n^3 nodes of the box: NPY, or the first array of a VTI file
+    /// Start from values on the n^3 nodes of the box: NPY
     #[arg(long, value_name = "FILE", conflicts_with_all = ["mesh", "procedural", "side_length"])]
     pub volume: Option<PathBuf>,
 
@@ -206,20 +206,12 @@ impl Loaded {
     }
 }
 
-/// The values of a file on a grid, whatever box the file says.
+/// The values of an NPY file on a grid.
 fn volume(path: &Path, grid: Grid<3>, holds: VolumeKind) -> Result<Field<3>, Error> {
     /// Flows overshoot the phases of a phase field a little.
     const LARGEST: f64 = 1.1;
     let name = path.display();
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-    let field = match extension.to_ascii_lowercase().as_str() {
-        "npy" => npy::read(path, |cells| Grid::new(cells, grid.side()))?,
-        "vti" => vti::read::<3>(path)?.swap_remove(0).1,
-        _ => {
-            let message = format!("--volume {name} must end in .npy or .vti");
-            return Err(Error::Options(message));
-        }
-    };
+    let field = npy::read(path, |cells| Grid::<3>::new(cells, grid.side()))?;
     let (found, expected) = (field.grid().cells(), grid.cells());
     require(
         found == expected,

@@ -11,7 +11,7 @@ use experiments::surfaces::{centred_box, needed_network, scales};
 use geometry::exact::WILLMORE_ENERGY_CLIFFORD_TORUS;
 use geometry::measure::{l2_distance, zero_set_volume};
 use geometry::shapes::{Ball, Capsule};
-use geometry::{Field, SignedDistanceExt, npy, phase_field, vti};
+use geometry::{Field, SignedDistanceExt, npy, phase_field};
 use operators::ComputeDevice;
 use report::Summary;
 use runs::Interrupt;
@@ -226,7 +226,7 @@ fn a_volume_flows_like_the_shape_it_was_made_from() {
     let u = blob(32);
     npy::write(root.path().join("u.npy"), &u).unwrap();
     let s = u.map(|u| geometry::distance_from_phase_field(u, scales(32).eps));
-    vti::write(root.path().join("s.vti"), &[("s", &s)]).unwrap();
+    npy::write(root.path().join("s.npy"), &s).unwrap();
     let common = ["--quick", "--quiet", "--output"];
     let w = |folder: &str, arguments: &[&str]| {
         let arguments = [&common[..], &[folder], arguments].concat();
@@ -239,7 +239,7 @@ fn a_volume_flows_like_the_shape_it_was_made_from() {
             .unwrap()
     };
     let phase_field = w("a", &["--volume", "u.npy", "--volume-holds", "phase-field"]);
-    let distance = w("b", &["--volume", "s.vti"]);
+    let distance = w("b", &["--volume", "s.npy"]);
     assert!(
         (phase_field - distance).abs() < 1e-3 * distance,
         "{phase_field} {distance}"
@@ -249,12 +249,12 @@ fn a_volume_flows_like_the_shape_it_was_made_from() {
     let arguments = [
         "--quick",
         "--volume",
-        "s.vti",
+        "s.npy",
         "--volume-holds",
         "phase-field",
     ];
     let doubled = s.map(|s| 40.0 * s);
-    vti::write(root.path().join("s.vti"), &[("s", &doubled)]).unwrap();
+    npy::write(root.path().join("s.npy"), &doubled).unwrap();
     refused(ARMADILLO, root.path(), &arguments, &["signed distances"]);
 }
 

@@ -137,7 +137,7 @@ const COMPLETIONS_EXAMPLES: &str =
 #[serde(rename_all = "kebab-case")]
 pub struct InputOptions {
     /// A mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), a volume of voxels (.nii, .nii.gz, .mrc, .map, and .tif
-    /// of several pages), a field (.npy, .vti), builtin:NAME with
+    /// of several pages), a field (.npy), builtin:NAME with
     /// NAME one of disc, ring, cross, rectangle, sphere, cube, torus, coin, figure, lever, a region as box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z,
     /// or - for standard input
     pub input: Option<String>,

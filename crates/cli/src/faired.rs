@@ -1,6 +1,5 @@
 //! What became of a surface, and how far it has gone.
 
-use geometry::file::write_atomically;
 use render::View;
 use report::{Axis, Figure, LineChart, OKABE_ITO, Raster, Rgb, Series, viridis};
 use surfaces::hausdorff_distance;
@@ -63,7 +62,8 @@ impl Faired {
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         let same = extension(path) == self.extension;
         if let Some(file) = self.file.as_ref().filter(|_| same) {
-            return Ok(write_atomically(path, |out| out.write_all(file))?);
+            let written = files::write_atomically(path, |out| out.write_all(file));
+            return Ok(written.map_err(geometry::Error::from)?);
         }
         Ok(surfaces::write(path, &self.mesh)?)
     }

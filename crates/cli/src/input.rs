@@ -1,7 +1,6 @@
 //! Inputs as phase fields.
 
 use geometry::npy::{self, NpyError};
-use geometry::vti::{self, VtiError};
 use geometry::{PURE_BEYOND, distance_from_phase_field, thin_part};
 use images::{Outline, OutlineDistance, Side, Threshold, Tones};
 use surfaces::hausdorff_distance;
@@ -119,11 +118,14 @@ impl Source {
             "png" | "jpg" | "jpeg" | "webp" | "gif" | "tif" | "tiff" | "bmp" => {
                 Ok(Self::Image(path))
             }
-            "npy" | "vti" => Ok(Self::Field(path)),
+            "npy" => Ok(Self::Field(path)),
+            "vti" => Err(Error::options(format!(
+                "{input} is for ParaView and is not read: give the same values as .npy, such as the final.npy beside a final.vti"
+            ))),
             "nii" | "gz" | "mrc" | "map" => Ok(Self::Volume(path)),
             _ => Err(Error::options(format!(
                 "{input} is no input: give a mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), \
-                 a volume (.nii, .nii.gz, .mrc, .map, .tif of several pages), a field (.npy, .vti), builtin:NAME, or a region as box:... or ball:..."
+                 a volume (.nii, .nii.gz, .mrc, .map, .tif of several pages), a field (.npy), builtin:NAME, or a region as box:... or ball:..."
             ))),
         }
     }
@@ -159,7 +161,6 @@ impl Source {
                 "an image",
                 &["--inside", "--threshold", "--side-length", "--box-side"],
             ),
-            Self::Field(path) if extension(path) == "vti" => ("a field", &["--holds"]),
             Self::Field(_) => ("a field", &["--holds", "--box-side"]),
             Self::Volume(_) => (
                 "a volume",
@@ -609,14 +610,9 @@ impl<'a> Reader<'a> {
 
     fn values<const D: usize>(&mut self, path: &Path) -> Result<Field<D>, Error> {
         let holds = *self.options.holds.get_or_insert(Holds::PhaseField);
-        let field = if extension(path) == "vti" {
-            let mut arrays = vti::read::<D>(path)?;
-            arrays.swap_remove(0).1
-        } else {
-            let (_, side) = usual_box::<D>();
-            let side = *self.options.box_side.get_or_insert(side);
-            npy::read(path, |cells| Grid::centred(cells, side))?
-        };
+        let (_, side) = usual_box::<D>();
+        let side = *self.options.box_side.get_or_insert(side);
+        let field = npy::read(path, |cells| Grid::centred(cells, side))?;
         let outside = |u: &&f64| u.abs() > LARGEST_PHASE;
         if let Some(value) = field
             .values()
@@ -645,12 +641,7 @@ impl<'a> Reader<'a> {
         if self.options.cells.is_none() {
             return Ok(distance);
         }
-        let (side, origin) = (distance.grid().side(), distance.grid().origin());
-        // A VTI file says itself how large the box is.
-        let box_side = self.options.box_side.replace(side);
-        let grid = self.grid::<D>()?.with_origin(origin)?;
-        self.options.box_side = box_side;
-        Ok(Field::from_fn(grid, |x| distance.interpolate(x)))
+        Ok(Field::from_fn(self.grid()?, |x| distance.interpolate(x)))
     }
 }
 
@@ -684,12 +675,10 @@ fn refuse_photographs(tones: &Tones, side: Side, path: &Path) -> Result<(), Erro
 /// Whether a file of values is meant to be in the plane; its reader says what is wrong with it.
 fn is_planar(path: &Path) -> Result<bool, Error> {
     let bytes = read(path)?;
-    Ok(if extension(path) == "vti" {
-        let layers = |nodes: [u64; 3]| nodes[2] > 1;
-        !matches!(vti::decode::<2>(&bytes), Err(VtiError::NotCubical { nodes, .. }) if layers(nodes))
-    } else {
-        !matches!(npy::decode::<2>(&bytes), Err(NpyError::Rank { .. }))
-    })
+    Ok(!matches!(
+        npy::decode::<2>(&bytes),
+        Err(NpyError::Rank { .. })
+    ))
 }
 
 /// Refuses shapes of which there is nothing on the grid, or nothing else.

@@ -48,10 +48,10 @@ impl Files<'_> {
         let mut page = Page::new(format!("willmore {} {}", text("command"), text("name")))
             .with_lead(self.lead(outcome.as_ref()));
         if let Some(shape) = self.shape()? {
-            page.push(shape);
+            page = page.with(shape);
         }
         if !self.records.is_empty() {
-            page.push(self.steps()?);
+            page = page.with(self.steps()?);
         }
         let options: Value = toml::from_str(&self.run.read_text(config::FILE)?)
             .map_err(|error| Error::options(format!("the stored options: {error}")))?;

@@ -210,7 +210,7 @@ impl<O> Plan<O> {
         let outlet = &self.outlet;
         npy::write(run.path().join("final.npy"), u)?;
         run.adopt_file("final.npy")?;
-        vti::write(run.path().join("final.vti"), &[("phase_field", u)])?;
+        vti::write(run.path().join("final.vti"), "phase_field", u)?;
         run.adopt_file("final.vti")?;
         if !has_interface(u) {
             return Ok(Topology::default());
@@ -358,7 +358,7 @@ impl<const D: usize, O: Outlet<D>> Observer<D> for Pictures<'_, O> {
                 let name = outlet::frame(step);
                 outlet.write_picture(&case.initial, u, eps, &format!("{name}.png"), run)?;
                 let values = format!("{name}.vti");
-                vti::write(run.path().join(&values), &[("phase_field", u)])?;
+                vti::write(run.path().join(&values), "phase_field", u)?;
                 run.adopt_file(&values)?;
                 outlet.write_shape(u, eps, &name, self.plan.format.as_deref(), run)?;
             }

@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::common::{self, outcome};
 use chacha20::ChaCha8Rng;
 use geometry::shapes::{Ball, Cuboid};
-use geometry::{Field, Grid, npy, phase_field, vti};
+use geometry::{Field, Grid, npy, phase_field};
 use images::{Drawing, Frame};
 use rand::{RngExt, SeedableRng};
 use render::Rgb;
@@ -238,10 +238,10 @@ fn inpainting_in_space_keeps_what_is_outside_bit_for_bit() {
     let folder = tempfile::tempdir().unwrap();
     let grid = Grid::<3>::centred(32, 1.0).unwrap();
     let field = phase_field(grid, &Cuboid::new([0.25; 3]).unwrap(), 2.0 * grid.spacing()).unwrap();
-    vti::write(folder.path().join("cube.vti"), &[("u", &field)]).unwrap();
+    npy::write(folder.path().join("cube.npy"), &field).unwrap();
     let arguments = [
         "inpaint",
-        "cube.vti",
+        "cube.npy",
         "--mask",
         "ball:0.25,0.25,0.25,0.12",
         "--steps",
@@ -250,10 +250,7 @@ fn inpainting_in_space_keeps_what_is_outside_bit_for_bit() {
         "run",
     ];
     outcome(folder.path(), &arguments);
-    let after = vti::read::<3>(folder.path().join("run/final.vti"))
-        .unwrap()
-        .swap_remove(0)
-        .1;
+    let after = npy::read(folder.path().join("run/final.npy"), |_| Ok(grid)).unwrap();
     let corner = Ball::new([0.25; 3], 0.12).unwrap();
     let mut moved = 0;
     for (node, (a, b)) in field.values().iter().zip(after.values()).enumerate() {
@@ -518,10 +515,10 @@ fn photographs_are_drawings_too() {
 fn samples_are_inputs() {
     let folder = tempfile::tempdir().unwrap();
     for (input, files) in [
-        ("builtin:ring", &["ring.png", "ring.npy", "ring.vti"][..]),
+        ("builtin:ring", &["ring.png", "ring.npy"][..]),
         (
             "box:-0.3,-0.2,-0.3,0.3,0.2,0.3",
-            &["box.ply", "box.stl", "box.vti"],
+            &["box.ply", "box.stl", "box.npy"],
         ),
     ] {
         for file in files {
@@ -540,6 +537,11 @@ fn samples_are_inputs() {
             outcome(folder.path(), &run);
         }
     }
+    // Files for ParaView are written alone.
+    let written = ["sample", "builtin:ring", "--cells", "32", "--save", "r.vti"];
+    outcome(folder.path(), &written);
+    let file = std::fs::read(folder.path().join("r.vti")).unwrap();
+    assert!(file.starts_with(b"<?xml"));
     // A ball of radius 0.2 whose vertices move by up to 0.01.
     let noisy = |file: &str, seed: &str| {
         let ball = [

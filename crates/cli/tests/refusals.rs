@@ -20,8 +20,7 @@ fn every_mistake_is_one_clear_line() {
     write("broken.ply", b"ply\nformat ascii 1.0\n");
     write("open.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n");
     write("broken.npy", b"no array");
-    write("broken.vti", b"<VTKFile");
-    write("flat.vti", b"<VTK/>");
+    write("final.vti", b"<VTKFile");
     write("plane.npy", &plane());
     write("notes.txt", b"");
     write("net.safetensors", b"no network");
@@ -52,7 +51,10 @@ fn every_mistake_is_one_clear_line() {
         (&["flow", "broken.ply"], "broken.ply"),
         (&["flow", "open.obj"], "close the holes"),
         (&["flow", "broken.npy"], "not an NPY file"),
-        (&["flow", "broken.vti"], "broken.vti"),
+        (
+            &["flow", "final.vti"],
+            "is not read: give the same values as .npy",
+        ),
         (
             &["flow", "white.png", "--inside", "dark"],
             "nothing is inside",
@@ -91,7 +93,6 @@ fn every_mistake_is_one_clear_line() {
             ],
             "makes 1.0e18 nodes",
         ),
-        (&["flow", "flat.vti"], "no element"),
         (&["flow", "plane.npy"], "but all its sides must be equal"),
         (
             &["flow", "builtin:disc", "--side-length", "3"],

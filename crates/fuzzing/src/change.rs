@@ -76,8 +76,6 @@ pub(crate) enum Change {
     Swap(Place, Place),
     /// A number in the text becomes another.
     Number(Index, String),
-    /// A pair of words around so many bytes, so often.
-    Nest(Place, usize, Index, usize),
 }
 
 /// What a change can take from.
@@ -87,8 +85,6 @@ pub(crate) struct Material {
     pub files: Vec<Vec<u8>>,
     /// Words of the format.
     pub words: Vec<Vec<u8>>,
-    /// Words that open something, and those that close it.
-    pub pairs: Vec<[Vec<u8>; 2]>,
 }
 
 impl Change {
@@ -127,15 +123,6 @@ impl Change {
                 let numbers = numbers(bytes);
                 if !numbers.is_empty() {
                     replace(bytes, which.get(&numbers).clone(), text.as_bytes(), 1);
-                }
-            }
-            Self::Nest(at, count, which, times) => {
-                if !material.pairs.is_empty() {
-                    let [open, close] = which.get(&material.pairs);
-                    let at = at.of(bytes);
-                    let end = bytes.len().min(at + count);
-                    replace(bytes, end..end, close, *times);
-                    replace(bytes, at..at, open, *times);
                 }
             }
         }
@@ -203,7 +190,6 @@ fn change() -> impl Strategy<Value = Change> {
             .prop_map(move |(at, f, from)| Change::Replace(at, rest, Block::File(f, from), 1)),
         1 => (place(), place()).prop_map(|(a, b)| Change::Swap(a, b)),
         4 => (which(), number).prop_map(|(n, text)| Change::Number(n, text)),
-        1 => (place(), count(), which(), times()).prop_map(|(at, n, w, t)| Change::Nest(at, n, w, t)),
     ]
 }
 

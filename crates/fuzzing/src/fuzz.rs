@@ -109,19 +109,11 @@ impl<'a> Fuzz<'a> {
         self
     }
 
-    /// Words that have a meaning in the format.
+    /// Words that have a meaning in the format, such as those that open something: they are repeated, and nested by that.
     #[must_use]
     pub fn words<T: AsRef<[u8]>>(mut self, words: impl IntoIterator<Item = T>) -> Self {
         let words = words.into_iter().map(|w| w.as_ref().to_vec());
         self.material.words.extend(words);
-        self
-    }
-
-    /// Words that open and close something, which are nested deeply.
-    #[must_use]
-    pub fn pairs<T: AsRef<[u8]>>(mut self, pairs: impl IntoIterator<Item = [T; 2]>) -> Self {
-        let pairs = pairs.into_iter().map(|p| p.map(|w| w.as_ref().to_vec()));
-        self.material.pairs.extend(pairs);
         self
     }
 
@@ -145,10 +137,13 @@ impl<'a> Fuzz<'a> {
         accepted: impl Fn(&[u8], T),
     ) -> Report {
         let begun = AtomicU64::new(0);
-        let meter = RefCell::new(Meter::new(self.name, self.limit));
+        let report = RefCell::new(Report {
+            name: self.name,
+            ..Report::default()
+        });
         let one = |bytes: &[u8]| {
             begun.fetch_add(1, Ordering::Relaxed);
-            meter.borrow_mut().one(bytes, &read, &accepted)
+            self.one(bytes, &read, &accepted, &mut report.borrow_mut())
         };
         let (end, ended) = channel();
         let name = self.name;
@@ -182,7 +177,7 @@ impl<'a> Fuzz<'a> {
                 Err(TestError::Abort(reason)) => panic!("{name}: {reason}"),
             }
         });
-        let report = meter.into_inner().report;
+        let report = report.into_inner();
         println!("{report}");
         report
     }
@@ -204,51 +199,21 @@ impl<'a> Fuzz<'a> {
         }
     }
 
-    fn bytes(&self, (file, changes, repaired): &Case) -> Vec<u8> {
-        let mut bytes = file.get(&self.material.files).clone();
-        for change in changes {
-            change.apply(&mut bytes, &self.material);
-        }
-        match &self.repair {
-            Some(repair) if *repaired => repair(bytes),
-            _ => bytes,
-        }
-    }
-}
-
-/// Measures readings and judges them.
-struct Meter {
-    limit: Limit,
-    /// Where every file is stored.
-    folder: Option<PathBuf>,
-    report: Report,
-}
-
-impl Meter {
-    fn new(name: &'static str, limit: Limit) -> Self {
-        Self {
-            limit,
-            folder: std::env::var_os("FUZZ_KEEP").map(PathBuf::from),
-            report: Report {
-                name,
-                ..Report::default()
-            },
-        }
-    }
-
+    /// Stores a file, if `FUZZ_KEEP` says where.
     fn keep(&self, bytes: &[u8], suffix: &str) {
-        if let Some(folder) = &self.folder {
-            let path = folder.join(format!("{}{suffix}", self.report.name));
+        if let Some(folder) = std::env::var_os("FUZZ_KEEP") {
+            let path = PathBuf::from(folder).join(format!("{}{suffix}", self.name));
             std::fs::write(path, bytes).expect("the folder of FUZZ_KEEP can be written to");
         }
     }
 
-    /// Whether one file is accepted.
+    /// Whether one file is accepted, measured and judged.
     fn one<T, E: fmt::Display>(
-        &mut self,
+        &self,
         bytes: &[u8],
         read: impl Fn(&[u8]) -> Result<T, E>,
         accepted: impl Fn(&[u8], T),
+        report: &mut Report,
     ) -> Result<bool, String> {
         self.keep(bytes, "");
         let start = Instant::now();
@@ -266,7 +231,6 @@ impl Meter {
         let time = start.elapsed();
         let (refusal, peak) = attempt.map_err(|payload| panic_message(&*payload))?;
         let limit = self.limit.of(bytes);
-        let report = &mut self.report;
         report.cases += 1;
         report.accepted += u64::from(refusal.is_none());
         report.time += time;
@@ -289,6 +253,17 @@ impl Meter {
                 Err(format!("not one short line: {start:?}"))
             }
             refusal => Ok(refusal.is_none()),
+        }
+    }
+
+    fn bytes(&self, (file, changes, repaired): &Case) -> Vec<u8> {
+        let mut bytes = file.get(&self.material.files).clone();
+        for change in changes {
+            change.apply(&mut bytes, &self.material);
+        }
+        match &self.repair {
+            Some(repair) if *repaired => repair(bytes),
+            _ => bytes,
         }
     }
 }

@@ -17,8 +17,7 @@ fn fuzz<T, E: Display>(read: impl Fn(&[u8]) -> Result<T, E>) -> Report {
     Fuzz::new("test", LIMIT)
         .valid([b"rows 12 [ 1 2 3 ]".to_vec()])
         .starts(["rows "])
-        .words(["rows", "columns"])
-        .pairs([["[", "]"]])
+        .words(["rows", "columns", "[", "]"])
         .run(read, |_, _| ())
 }
 

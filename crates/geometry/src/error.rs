@@ -5,7 +5,6 @@
 use std::path::PathBuf;
 
 use crate::npy::error::NpyError;
-use crate::vti::error::VtiError;
 
 /// Errors of grids, fields, shapes and files, each with the numbers needed to act on it.
 #[derive(Debug, thiserror::Error)]
@@ -87,46 +86,41 @@ pub enum Error {
     /// No name of a coordinate axis.
     #[error("{name:?} is no axis: choose x, y or z")]
     UnknownAxis { name: String },
-    /// A list of named arrays is unusable.
-    #[error("array name {name:?} cannot be written: {reason}")]
-    ArrayName { name: String, reason: &'static str },
-    /// Nothing to write.
-    #[error("no arrays were given to write to {path}", path = path.display())]
-    NoArrays { path: PathBuf },
     /// The operating system refused.
-    #[error("could not {action} {path}", path = path.display())]
-    Io {
-        action: &'static str,
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Io(#[from] files::Error),
     /// A file is not a usable NPY file.
     #[error("{path} cannot be read as a field", path = path.display())]
     Npy { path: PathBuf, source: NpyError },
-    /// A file is not usable VTK image data.
-    #[error("{path} cannot be read as fields", path = path.display())]
-    Vti { path: PathBuf, source: VtiError },
 }
 
-/// Accepts a number for which the requirement holds.
-pub(crate) fn checked(
+/// Accepts finite numbers for which `condition` holds.
+///
+/// # Errors
+/// [`Error::InvalidParameter`] for others.
+pub fn require(
     name: &'static str,
     value: f64,
-    holds: bool,
     requirement: &'static str,
+    condition: impl FnOnce(f64) -> bool,
 ) -> Result<f64, Error> {
-    let error = Error::InvalidParameter {
-        name,
-        value,
-        requirement,
-    };
-    holds.then_some(value).ok_or(error)
+    if value.is_finite() && condition(value) {
+        Ok(value)
+    } else {
+        Err(Error::InvalidParameter {
+            name,
+            value,
+            requirement,
+        })
+    }
 }
 
 /// Accepts finite positive numbers.
-pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64, Error> {
-    let holds = value.is_finite() && value > 0.0;
-    checked(name, value, holds, "finite and positive")
+///
+/// # Errors
+/// [`Error::InvalidParameter`] for others.
+pub fn positive(name: &'static str, value: f64) -> Result<f64, Error> {
+    require(name, value, "finite and positive", |v| v > 0.0)
 }
 
 /// Accepts vectors of finite numbers.
@@ -135,7 +129,7 @@ pub(crate) fn finite<const D: usize>(
     vector: [f64; D],
 ) -> Result<[f64; D], Error> {
     for value in vector {
-        checked(name, value, value.is_finite(), "finite")?;
+        require(name, value, "finite", |_| true)?;
     }
     Ok(vector)
 }

@@ -53,6 +53,7 @@ mod grid;
 mod placement;
 mod profile;
 mod reduce;
+mod spline;
 mod thickness;
 mod transfer;
 mod up;
@@ -62,7 +63,6 @@ mod clifford;
 pub mod contour;
 pub mod distance;
 pub mod exact;
-pub mod file;
 pub mod measure;
 pub mod npy;
 pub mod shapes;
@@ -71,11 +71,14 @@ pub mod zero_set;
 
 pub use clifford::CliffordTorus;
 pub use distance::{Rotation, SignedDistance, SignedDistanceExt};
-pub use error::Error;
+pub use error::{Error, positive, require};
 pub use field::Field;
 pub use grid::Grid;
 pub use placement::Placement;
-pub use profile::{PURE_BEYOND, distance_from_phase_field, optimal_profile, phase_field};
+pub use profile::{
+    PURE_BEYOND, distance_from_phase_field, distances_from_phase_field, optimal_profile,
+    phase_field,
+};
 pub use thickness::{is_thin, thickness, thin_part};
 pub use up::UpAxis;
 pub use zero_set::ZeroSet;

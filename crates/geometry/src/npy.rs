@@ -22,9 +22,8 @@ pub(crate) mod error;
 
 use std::path::Path;
 
-use files::Number;
+use files::{Number, write_atomically};
 
-use crate::file::write_atomically;
 use crate::{Error, Field, Grid};
 pub use error::NpyError;
 
@@ -42,13 +41,11 @@ const ALIGNMENT: usize = 64;
 /// [`Error::Io`].
 pub fn write<const D: usize>(path: impl AsRef<Path>, field: &Field<D>) -> Result<(), Error> {
     let header = header(&field.grid().shape());
-    write_atomically(path, |out| {
+    Ok(write_atomically(path, |out| {
         out.write_all(&header)?;
-        field
-            .values()
-            .iter()
-            .try_for_each(|value| out.write_all(&value.to_le_bytes()))
-    })
+        let mut values = field.values().iter();
+        values.try_for_each(|value| out.write_all(&value.to_le_bytes()))
+    })?)
 }
 
 /// Reads a field; `grid` makes the grid from the number of cells per side.
@@ -67,11 +64,7 @@ pub fn read<const D: usize>(
     grid: impl FnOnce(usize) -> Result<Grid<D>, Error>,
 ) -> Result<Field<D>, Error> {
     let path = path.as_ref();
-    let bytes = std::fs::read(path).map_err(|source| Error::Io {
-        action: "read",
-        path: path.into(),
-        source,
-    })?;
+    let bytes = std::fs::read(path).map_err(files::Error::of("read", path))?;
     let (cells, values) = decode::<D>(&bytes).map_err(|source| Error::Npy {
         path: path.into(),
         source,
@@ -148,7 +141,7 @@ pub fn decode<const D: usize>(bytes: &[u8]) -> Result<(usize, Vec<f64>), NpyErro
 }
 
 /// Position in Fortran order of the element at `index` in C order.
-pub(crate) fn reversed<const D: usize>(index: usize, cells: usize) -> usize {
+fn reversed<const D: usize>(index: usize, cells: usize) -> usize {
     let digits = (0..D).scan(index, |rest, _| {
         let digit = *rest % cells;
         *rest /= cells;
@@ -215,23 +208,27 @@ struct Header {
 
 impl Header {
     fn parse(text: &[u8]) -> Result<Self, NpyError> {
-        let mut cursor = Cursor { text, position: 0 };
+        let text = String::from_utf8_lossy(text);
+        let mut cursor = Cursor {
+            length: text.len(),
+            rest: &text,
+        };
         let (mut data_type, mut fortran_order, mut shape) = (None, None, None);
-        cursor.expect(b'{', "{")?;
-        while !cursor.take(b'}') {
+        cursor.expect("{")?;
+        while !cursor.take("}") {
             let key = cursor.string()?;
-            cursor.expect(b':', ":")?;
-            match key.as_str() {
+            cursor.expect(":")?;
+            match key {
                 "descr" => data_type = Some(cursor.data_type()?),
                 "fortran_order" => fortran_order = Some(cursor.boolean()?),
                 "shape" => shape = Some(cursor.tuple()?),
                 _ => return Err(cursor.error("the key descr, fortran_order or shape")),
             }
-            if !cursor.take(b',') && cursor.peek() != Some(b'}') {
+            if !cursor.take(",") && !cursor.rest.starts_with('}') {
                 return Err(cursor.error(", or }"));
             }
         }
-        if cursor.peek().is_some() {
+        if !cursor.rest.trim_start().is_empty() {
             return Err(cursor.error("nothing after }"));
         }
         Ok(Self {
@@ -244,85 +241,73 @@ impl Header {
 
 /// Reads the subset of Python literals that NPY headers use.
 struct Cursor<'a> {
-    text: &'a [u8],
-    position: usize,
+    rest: &'a str,
+    /// Of the whole text.
+    length: usize,
 }
 
-impl Cursor<'_> {
+impl<'a> Cursor<'a> {
     fn error(&self, expected: &'static str) -> NpyError {
         NpyError::Header {
-            position: self.position,
+            position: self.length - self.rest.len(),
             expected,
         }
     }
 
-    /// The next byte that is not white space.
-    fn peek(&mut self) -> Option<u8> {
-        while self
-            .text
-            .get(self.position)
-            .is_some_and(u8::is_ascii_whitespace)
-        {
-            self.position += 1;
-        }
-        self.text.get(self.position).copied()
+    /// Passes over white space, and over this if it comes next.
+    fn take(&mut self, token: &str) -> bool {
+        self.rest = self.rest.trim_start();
+        let behind = self.rest.strip_prefix(token);
+        self.rest = behind.unwrap_or(self.rest);
+        behind.is_some()
     }
 
-    fn take(&mut self, byte: u8) -> bool {
-        let found = self.peek() == Some(byte);
-        self.position += usize::from(found);
-        found
-    }
-
-    fn expect(&mut self, byte: u8, name: &'static str) -> Result<(), NpyError> {
-        if self.take(byte) {
+    fn expect(&mut self, token: &'static str) -> Result<(), NpyError> {
+        if self.take(token) {
             Ok(())
         } else {
-            Err(self.error(name))
+            Err(self.error(token))
         }
     }
 
-    fn string(&mut self) -> Result<String, NpyError> {
-        let quote = self.peek().filter(|q| matches!(q, b'\'' | b'"'));
+    fn string(&mut self) -> Result<&'a str, NpyError> {
+        let quote = ["'", "\""].into_iter().find(|quote| self.take(quote));
         let quote = quote.ok_or(self.error("a quoted string"))?;
-        let rest = &self.text[self.position + 1..];
-        let length = rest.iter().position(|&b| b == quote);
-        let length = length.ok_or(self.error("a quoted string that ends"))?;
-        self.position += length + 2;
-        Ok(String::from_utf8_lossy(&rest[..length]).into_owned())
+        let parts = self.rest.split_once(quote);
+        let (text, rest) = parts.ok_or(self.error("a quoted string that ends"))?;
+        self.rest = rest;
+        Ok(text)
     }
 
     /// A string; anything else is the description of a record, which is not a number.
     fn data_type(&mut self) -> Result<String, NpyError> {
-        if matches!(self.peek(), Some(b'[' | b'(')) {
+        if self.take("[") || self.take("(") {
             return Err(NpyError::DataType {
                 found: "a record".into(),
             });
         }
-        self.string()
+        self.string().map(str::to_owned)
     }
 
     fn boolean(&mut self) -> Result<bool, NpyError> {
-        self.peek();
-        let rest = &self.text[self.position..];
-        for (word, value) in [("True", true), ("False", false)] {
-            if rest.starts_with(word.as_bytes()) {
-                self.position += word.len();
-                return Ok(value);
-            }
+        if self.take("True") {
+            return Ok(true);
+        }
+        if self.take("False") {
+            return Ok(false);
         }
         Err(self.error("True or False"))
     }
 
     fn tuple(&mut self) -> Result<Vec<u64>, NpyError> {
         let mut items = Vec::new();
-        self.expect(b'(', "(")?;
-        while !self.take(b')') {
+        self.expect("(")?;
+        while !self.take(")") {
             if items.len() == MOST_AXES {
                 return Err(self.error("at most 64 axes"));
             }
             items.push(self.integer()?);
-            if !self.take(b',') && self.peek() != Some(b')') {
+            if !self.take(",") && !self.rest.starts_with(')') {
                 return Err(self.error(", or )"));
             }
         }
@@ -330,17 +315,12 @@ impl Cursor<'_> {
     }
 
     fn integer(&mut self) -> Result<u64, NpyError> {
-        self.peek();
-        let digits = self.text[self.position..]
-            .iter()
-            .take_while(|b| b.is_ascii_digit());
-        let digits: Vec<u8> = digits.copied().collect();
-        let value = digits.iter().try_fold(0_u64, |value, digit| {
-            value.checked_mul(10)?.checked_add(u64::from(digit - b'0'))
-        });
-        let value = value.filter(|_| !digits.is_empty());
-        let value = value.ok_or(self.error("a whole number below 2^64"))?;
-        self.position += digits.len();
+        self.rest = self.rest.trim_start();
+        let behind = self.rest.trim_start_matches(|c: char| c.is_ascii_digit());
+        let digits = &self.rest[..self.rest.len() - behind.len()];
+        let value = digits.parse();
+        let value = value.map_err(|_| self.error("a whole number below 2^64"))?;
+        self.rest = behind;
         Ok(value)
     }
 }

@@ -1,6 +1,6 @@
 //! Where a shape goes in the box of a grid.
 
-use crate::error::{checked, positive};
+use crate::error::{positive, require};
 use crate::measure::BoundingBox;
 use crate::{Error, Grid};
 
@@ -105,6 +105,6 @@ impl<const D: usize> Placement<D> {
 /// The largest side length that leaves the margin on both sides.
 fn largest<const D: usize>(grid: &Grid<D>, margin: f64) -> Result<f64, Error> {
     let holds = margin.is_finite() && margin >= 0.0;
-    checked("margin", margin, holds, "finite and not negative")?;
+    require("margin", margin, "finite and not negative", |_| holds)?;
     Ok((grid.side() - 2.0 * margin).max(0.0))
 }

@@ -36,6 +36,19 @@ pub fn distance_from_phase_field(u: f64, eps: f64) -> f64 {
     -4.0 / 3.0 * eps * profile_variable(u)
 }
 
+/// The [distances](distance_from_phase_field) at all nodes.
+///
+/// # Errors
+/// `eps` must be finite and positive, the values finite.
+pub fn distances_from_phase_field<const D: usize>(
+    u: &Field<D>,
+    eps: f64,
+) -> Result<Field<D>, Error> {
+    positive("eps", eps)?;
+    u.check_finite()?;
+    Ok(u.map(|u| distance_from_phase_field(u, eps)))
+}
+
 /// The phase field `u = tanh(-3 s(x) / (4 eps))` of a shape with signed distance `s`.
 ///
 /// The distance is that of the shape in the whole space, not its periodic image: keep the shape a

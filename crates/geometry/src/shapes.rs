@@ -3,7 +3,7 @@
 //! All but [`Ball`], [`Capsule`] and [`HalfSpace`] are centred at the origin; move them with the
 //! combinations of [`SignedDistanceExt`](crate::SignedDistanceExt).
 
-use crate::error::{checked, finite, positive};
+use crate::error::{finite, positive, require};
 use crate::{Error, SignedDistance, vector};
 
 /// A ball (a disc in 2D). Exact everywhere.
@@ -84,7 +84,7 @@ impl<const D: usize> RoundedBox<D> {
         let smallest = half_extents.into_iter().fold(f64::INFINITY, f64::min);
         let holds = (0.0..=smallest).contains(&radius);
         let requirement = "between zero and the smallest half extent";
-        checked("rounding radius", radius, holds, requirement)?;
+        require("rounding radius", radius, requirement, |_| holds)?;
         Ok(Self {
             core: half_extents.map(|a| a - radius),
             radius,
@@ -118,7 +118,7 @@ impl<const D: usize> Cross<D> {
         positive("half length", half_length)?;
         let holds = half_width > 0.0 && half_width < half_length;
         let requirement = "positive and smaller than the half length";
-        checked("half width", half_width, holds, requirement)?;
+        require("half width", half_width, requirement, |_| holds)?;
         Ok(Self {
             half_length,
             half_width,
@@ -280,7 +280,7 @@ impl Torus {
         positive("major radius", major)?;
         let holds = minor > 0.0 && minor < major;
         let requirement = "positive and smaller than the major radius";
-        checked("minor radius", minor, holds, requirement)?;
+        require("minor radius", minor, requirement, |_| holds)?;
         Ok(Self { major, minor })
     }
 

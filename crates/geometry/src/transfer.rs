@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::error::checked;
+use crate::error::require;
 use crate::{Error, Field, Grid};
 
 impl<const D: usize> Grid<D> {
@@ -12,7 +12,7 @@ impl<const D: usize> Grid<D> {
     /// [`Error::InvalidParameter`] for an odd number of cells; as [`Grid::new`].
     pub fn half(&self) -> Result<Self, Error> {
         let even = self.cells().is_multiple_of(2);
-        checked("cells", self.cells() as f64, even, "even to be halved")?;
+        require("cells", self.cells() as f64, "even to be halved", |_| even)?;
         Self::new(self.cells() / 2, self.side())?.with_origin(self.origin())
     }
 }

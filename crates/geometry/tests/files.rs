@@ -3,10 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use crate::common::{BY_VTK, doubles, foreign};
+use crate::common::{doubles, foreign};
 use geometry::npy::{self, NpyError};
-use geometry::vti::{self, VtiError};
-use geometry::{Error, Field, Grid, file};
+use geometry::{Error, Field, Grid, vti};
 
 fn sample<const D: usize>(cells: usize) -> Field<D> {
     let grid = Grid::centred(cells, 2.0).unwrap();
@@ -210,7 +209,7 @@ fn errors_name_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("absent.npy");
     let error = read_back::<2>(&path).unwrap_err();
-    assert!(matches!(error, Error::Io { action: "read", .. }));
+    assert!(matches!(&error, Error::Io(error) if error.action == "read"));
     assert!(error.to_string().contains("absent.npy"));
     fs::write(&path, b"nonsense").unwrap();
     let error = read_back::<2>(&path).unwrap_err();
@@ -233,31 +232,8 @@ fn errors_name_the_file() {
     let nowhere = folder.path().join("no/such/folder/u.npy");
     assert!(matches!(
         npy::write(nowhere, &sample::<2>(4)),
-        Err(Error::Io { .. })
+        Err(Error::Io(_))
     ));
-}
-
-#[test]
-fn a_failed_write_leaves_the_old_file_and_nothing_else() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("state");
-    file::write_atomically(&path, |out| out.write_all(b"old")).unwrap();
-    let failed = file::write_atomically(&path, |out| {
-        out.write_all(b"half of the n")?;
-        Err(std::io::Error::other("the disk is on fire"))
-    });
-    assert!(matches!(
-        failed,
-        Err(Error::Io {
-            action: "write",
-            ..
-        })
-    ));
-    assert_eq!(fs::read(&path).unwrap(), b"old");
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-    file::write_atomically(&path, |out| out.write_all(b"new")).unwrap();
-    assert_eq!(fs::read(&path).unwrap(), b"new");
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
 /// The value of an attribute after `from` in the XML.
@@ -267,7 +243,7 @@ fn attribute<'a>(xml: &'a str, element: &str, name: &str) -> &'a str {
     &rest[..rest.find('"').unwrap()]
 }
 
-/// The header, and the block of appended data of one array.
+/// The header, and the block of appended data of the array.
 fn parse_vti(bytes: &[u8], array: &str) -> (String, Vec<f64>) {
     let marker = b"<AppendedData encoding=\"raw\">\n_";
     let start = bytes
@@ -288,15 +264,14 @@ fn parse_vti(bytes: &[u8], array: &str) -> (String, Vec<f64>) {
 }
 
 #[test]
-fn vti_holds_every_array_with_x_fastest() {
+fn vti_holds_the_values_with_x_fastest() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("u.vti");
     let grid = Grid::<3>::centred(4, 2.0).unwrap();
     let u = Field::from_fn(grid, |[x, y, z]| x + 10.0 * y + 100.0 * z);
-    let v = u.map(|value| -value);
-    vti::write(&path, &[("u", &u), ("a<b & \"c\"", &v)]).unwrap();
+    vti::write(&path, "a<b & \"c\"", &u).unwrap();
     let bytes = fs::read(&path).unwrap();
-    let (xml, values) = parse_vti(&bytes, "u");
+    let (xml, values) = parse_vti(&bytes, "a&lt;b &amp; &quot;c&quot;");
     assert_eq!(attribute(&xml, "<ImageData", "WholeExtent"), "0 3 0 3 0 3");
     assert_eq!(attribute(&xml, "<ImageData", "Origin"), "-1 -1 -1");
     assert_eq!(attribute(&xml, "<ImageData", "Spacing"), "0.5 0.5 0.5");
@@ -307,13 +282,6 @@ fn vti_holds_every_array_with_x_fastest() {
         let [i, j, k] = [position % 4, position / 4 % 4, position / 16];
         assert_eq!(value.to_bits(), u.values()[grid.index([i, j, k])].to_bits());
     }
-    let (_, second) = parse_vti(&bytes, "a&lt;b &amp; &quot;c&quot;");
-    assert!(
-        values
-            .iter()
-            .zip(&second)
-            .all(|(a, b)| a.to_bits() == (-b).to_bits())
-    );
     assert!(bytes.ends_with(b"\n  </AppendedData>\n</VTKFile>\n"));
 }
 
@@ -322,220 +290,53 @@ fn vti_of_a_plane_is_one_layer() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("u.vti");
     let u = sample::<2>(5);
-    vti::write(&path, &[("u", &u)]).unwrap();
+    vti::write(&path, "u", &u).unwrap();
     let (xml, values) = parse_vti(&fs::read(&path).unwrap(), "u");
     assert_eq!(attribute(&xml, "<Piece", "Extent"), "0 4 0 4 0 0");
     assert_eq!(attribute(&xml, "<ImageData", "Origin"), "-1 -1 0");
     assert_eq!(values[1].to_bits(), u.values()[5].to_bits());
 }
 
+/// The same field by VTK 9.7, as `tests/vtk/raw_f64_u64.vti` has it: equal bytes of data, at the same place, behind equal attributes.
 #[test]
-fn vti_refuses_unusable_arrays() {
+fn vti_has_the_bytes_that_vtk_writes() {
+    let by_vtk = include_bytes!("vtk/raw_f64_u64.vti");
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("u.vti");
-    let (u, other) = (sample::<2>(4), sample::<2>(5));
-    let none: [(&str, &Field<2>); 0] = [];
-    assert!(matches!(
-        vti::write(&path, &none),
-        Err(Error::NoArrays { .. })
-    ));
-    let twice = vti::write(&path, &[("u", &u), ("u", &u)]);
-    assert!(matches!(twice, Err(Error::ArrayName { .. })));
-    assert!(matches!(
-        vti::write(&path, &[("", &u)]),
-        Err(Error::ArrayName { .. })
-    ));
-    assert!(matches!(
-        vti::write(&path, &[("a\nb", &u)]),
-        Err(Error::ArrayName { .. })
-    ));
-    let mixed = vti::write(&path, &[("u", &u), ("v", &other)]);
-    assert!(matches!(mixed, Err(Error::GridMismatch { .. })));
-    assert!(!path.exists());
-}
-
-#[test]
-fn vti_files_of_vtk_are_read() {
-    let folder = tempfile::tempdir().unwrap();
-    for (k, bytes) in BY_VTK.into_iter().enumerate() {
-        let path = folder.path().join("image.vti");
-        fs::write(&path, bytes).unwrap();
-        let arrays = vti::read::<3>(&path).unwrap();
-        let names: Vec<&str> = arrays.iter().map(|(name, _)| &name[..]).collect();
-        assert_eq!(names, ["u", "v"], "file {k}");
-        for ((_, field), offset) in arrays.iter().zip([0.5, 10.5]) {
-            let grid = field.grid();
-            // The extent begins at node 1, and the origin belongs to node 0.
-            assert_eq!((grid.cells(), grid.origin()), (2, [-0.5, 0.5, 1.5]));
-            assert!((grid.spacing() - 0.5).abs() < 1e-15);
-            for (index, value) in field.values().iter().enumerate() {
-                let [x, y, z] = grid.multi_index(index);
-                let expected = offset + (x + 2 * y + 4 * z) as f64;
-                assert!((value - expected).abs() < 1e-15, "file {k}, {index}");
-            }
+    // VTK's extent begins at node 1, and its origin belongs to node 0.
+    let grid = Grid::<3>::new(2, 1.0).unwrap();
+    let grid = grid.with_origin([-0.5, 0.5, 1.5]).unwrap();
+    let index = |x: [f64; 3]| [0, 1, 2].map(|axis| (x[axis] - grid.origin()[axis]) / 0.5);
+    let u = Field::from_fn(grid, |x| {
+        let [i, j, k] = index(x);
+        0.5 + i + 2.0 * j + 4.0 * k
+    });
+    vti::write(&path, "u", &u).unwrap();
+    let ours = fs::read(&path).unwrap();
+    let block = |bytes: &[u8]| {
+        let marker = b"encoding=\"raw\">";
+        let end = bytes.windows(marker.len()).position(|w| w == marker);
+        let rest = &bytes[end.unwrap()..];
+        let start = rest.iter().position(|&byte| byte == b'_').unwrap() + 1;
+        rest[start..start + 8 + 8 * 8].to_vec()
+    };
+    assert_eq!(block(&ours), block(by_vtk));
+    let [ours, theirs] = [&ours[..], by_vtk].map(String::from_utf8_lossy);
+    for (element, names) in [
+        (
+            "<VTKFile",
+            &["type", "version", "byte_order", "header_type"][..],
+        ),
+        ("<ImageData", &["Spacing"]),
+        ("<PointData", &["Scalars"]),
+        ("<DataArray", &["type", "Name", "format", "offset"]),
+        ("<AppendedData", &["encoding"]),
+    ] {
+        for name in names {
+            assert_eq!(
+                attribute(&ours, element, name),
+                attribute(&theirs, element, name)
+            );
         }
     }
-}
-
-#[test]
-fn vti_round_trips_bit_for_bit() {
-    fn check<const D: usize>(cells: usize) {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("u.vti");
-        let u = sample::<D>(cells);
-        let v = u.map(|value| -value);
-        vti::write(&path, &[("u", &u), ("a<b & \"c\"", &v)]).unwrap();
-        let arrays = vti::read::<D>(&path).unwrap();
-        assert_eq!(arrays, [("u".into(), u), ("a<b & \"c\"".into(), v)]);
-    }
-    check::<1>(8);
-    check::<2>(16);
-    check::<3>(8);
-}
-
-/// The text file of VTK with one thing changed.
-fn altered(from: &str, to: &str) -> Result<vti::Image<3>, VtiError> {
-    let text = std::str::from_utf8(BY_VTK[0]).unwrap();
-    assert!(text.contains(from), "{from}");
-    vti::decode(text.replace(from, to).as_bytes())
-}
-
-#[test]
-fn vti_understands_all_number_types_and_byte_orders() {
-    for (name, bytes) in [
-        ("Int8", [-3_i8, 100].map(i8::to_be_bytes).concat()),
-        ("UInt8", vec![200, 100]),
-        ("Int16", [-3_i16, 100].map(i16::to_be_bytes).concat()),
-        ("Int64", [-3_i64, 100].map(i64::to_be_bytes).concat()),
-        ("UInt64", [1_u64 << 40, 100].map(u64::to_be_bytes).concat()),
-        ("Float32", [-3.0_f32, 100.0].map(f32::to_be_bytes).concat()),
-        ("Float64", [-3.0_f64, 100.0].map(f64::to_be_bytes).concat()),
-    ] {
-        let mut file = format!(
-            "<VTKFile type=\"ImageData\" byte_order=\"BigEndian\"><ImageData \
-             WholeExtent=\"0 1 0 0 0 0\"><Piece><PointData><DataArray type=\"{name}\" Name=\"a\" \
-             format=\"appended\"/></PointData></Piece></ImageData><AppendedData \
-             encoding=\"raw\">_"
-        )
-        .into_bytes();
-        file.extend((bytes.len() as u32).to_be_bytes());
-        file.extend(bytes);
-        let image = vti::decode::<1>(&file).unwrap();
-        let first = match name {
-            "UInt8" => 200.0,
-            "UInt64" => 2.0_f64.powi(40),
-            _ => -3.0,
-        };
-        assert_eq!(
-            image.arrays,
-            [("a".to_owned(), vec![first, 100.0])],
-            "{name}"
-        );
-        assert_eq!((image.cells, image.origin), (2, [0.0]));
-    }
-}
-
-#[test]
-fn vti_refuses_what_is_not_a_cube_of_point_data() {
-    let extent = "WholeExtent=\"1 2 1 2 1 2\"";
-    for (from, to) in [
-        (extent, "WholeExtent=\"1 2 1 3 1 2\""),
-        (extent, "WholeExtent=\"1 1 1 1 1 1\""),
-        (extent, "WholeExtent=\"2 1 2 1 2 1\""),
-        (
-            extent,
-            "WholeExtent=\"-9223372036854775808 9223372036854775807 0 1 0 1\"",
-        ),
-    ] {
-        assert!(
-            matches!(altered(from, to), Err(VtiError::NotCubical { .. })),
-            "{to}"
-        );
-    }
-    let plane = vti::decode::<2>(BY_VTK[0]);
-    let nodes = [2, 2, 2];
-    assert_eq!(
-        plane,
-        Err(VtiError::NotCubical {
-            nodes,
-            dimension: 2
-        })
-    );
-    for spacing in ["0.5 0.5 0.25", "0 0 0", "-1 -1 -1", "nan nan nan"] {
-        let error = altered("Spacing=\"0.5 0.5 0.5\"", &format!("Spacing=\"{spacing}\""));
-        assert!(matches!(error, Err(VtiError::Spacing { .. })), "{spacing}");
-    }
-    let attribute = |from: &str, to: &str| match altered(from, to) {
-        Err(VtiError::Attribute { attribute, .. }) => attribute,
-        other => panic!("{to}: {other:?}"),
-    };
-    assert_eq!(
-        attribute("=\"1 0 0 0 1 0 0 0 1\"", "=\"0 1 0 1 0 0 0 0 1\""),
-        "Direction"
-    );
-    assert_eq!(attribute("type=\"ImageData\"", "type=\"PolyData\""), "type");
-    assert_eq!(attribute("LittleEndian", "MiddleEndian"), "byte_order");
-    assert_eq!(attribute("UInt32\"", "UInt16\""), "header_type");
-    assert_eq!(
-        attribute("UInt32\"", "UInt32\" compressor=\"vtkLZ4DataCompressor\""),
-        "compressor"
-    );
-    assert_eq!(attribute("Float32", "String"), "type");
-    assert_eq!(attribute("ascii", "morse"), "format");
-    assert_eq!(attribute("Origin=\"-1 0 1\"", "Origin=\"-1 0\""), "Origin");
-
-    let cells = altered("PointData", "X").unwrap_err();
-    assert_eq!(cells, VtiError::NoPointData { cell_data: false });
-    let text = std::str::from_utf8(BY_VTK[0]).unwrap();
-    let swapped = text
-        .replace("CellData", "X")
-        .replace("PointData", "CellData");
-    let cells = vti::decode::<3>(swapped.as_bytes()).unwrap_err();
-    assert_eq!(cells, VtiError::NoPointData { cell_data: true });
-    assert!(cells.to_string().contains("Cell Data to Point Data"));
-
-    let twice = altered("<Piece ", "<Piece Extent=\"1 2 1 2 1 2\"/><Piece ");
-    assert_eq!(twice, Err(VtiError::Pieces { count: 2 }));
-    let part = altered("Piece Extent=\"1 2", "Piece Extent=\"1 1");
-    assert!(matches!(part, Err(VtiError::PartialPiece { .. })));
-    let vectors = altered("Name=\"v\"", "Name=\"v\" NumberOfComponents=\"3\"");
-    assert!(matches!(vectors, Err(VtiError::Components { name, .. }) if name == "v"));
-    assert!(matches!(
-        altered("Name=\"v\"", "Name=\"u\""),
-        Err(VtiError::Name { .. })
-    ));
-    let short = altered("16.5 17.5", "16.5");
-    let name = "v".to_owned();
-    assert_eq!(
-        short,
-        Err(VtiError::Length {
-            name,
-            expected: 8,
-            found: 7
-        })
-    );
-    assert!(matches!(
-        altered("16.5", "16,5"),
-        Err(VtiError::Data { .. })
-    ));
-    assert!(matches!(altered("</Piece>", ""), Err(VtiError::Xml { .. })));
-    assert!(matches!(
-        vti::decode::<3>(b"<a/>"),
-        Err(VtiError::NoElement { .. })
-    ));
-
-    // Not finite values are found where fields are.
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("image.vti");
-    fs::write(&path, text.replace("16.5", "nan")).unwrap();
-    assert!(matches!(
-        vti::read::<3>(&path),
-        Err(Error::NonFinite { index: 3, .. })
-    ));
-    fs::write(&path, "nonsense").unwrap();
-    assert!(matches!(vti::read::<3>(&path), Err(Error::Vti { .. })));
-    assert!(matches!(
-        vti::read::<3>(folder.path().join("absent")),
-        Err(Error::Io { .. })
-    ));
 }

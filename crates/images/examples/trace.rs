@@ -63,9 +63,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .filled(&region, Rgb::GREEN);
     drawing.picture()?.write_png(folder.join("region.png"))?;
     let curves = Outline::of_phase_field(&u)?;
-    let svg = Svg::on_white(frame)
-        .filled(&curves, Rgb::SKY)
-        .outlined(&curves, Rgb::INK, 2.0)?;
+    let svg = Svg::on_white(frame).filled(&curves, Rgb::SKY);
     svg.write(folder.join("curves.svg"))?;
     told("drawn in the box");
     Ok(())

@@ -6,7 +6,9 @@ use rstar::primitives::Line;
 use rstar::{AABB, Envelope, RTree};
 
 use crate::Outline;
-use crate::outline::FAR;
+
+/// Coordinates are below this, so that squares of distances are far from overflowing.
+const FAR: f64 = 1e100;
 
 /// The signed distance to the curves of an outline: negative inside, exact to rounding.
 ///

@@ -14,17 +14,12 @@ pub enum Error {
     /// A file is no usable image.
     #[error("{path} cannot be read as an image: {problem}", path = path.display())]
     Format { path: PathBuf, problem: FormatError },
-    /// Grids, fields and the operating system.
+    /// Grids and fields, and numbers outside their range.
     Geometry(#[from] geometry::Error),
+    /// The operating system refused.
+    Io(#[from] files::Error),
     /// Pictures and their encoding.
     Picture(#[from] render::Error),
-    /// A number is outside the range in which the formula makes sense.
-    #[error("{name} = {value} is not allowed: it must be {requirement}")]
-    InvalidParameter {
-        name: &'static str,
-        value: f64,
-        requirement: &'static str,
-    },
     /// An image without pixels, or with more than are accepted.
     #[error(
         "an image of {width} x {height} pixels cannot be used; it needs at least one pixel and \
@@ -69,61 +64,10 @@ pub enum Error {
          not change sign"
     )]
     NoInterface { low: f64, high: f64 },
-    /// Curves that bound nothing.
-    #[error("no curve was given; an outline needs at least one closed curve")]
-    NoCurves,
-    /// A curve that bounds nothing.
-    #[error(
-        "curve {curve} has {points} points and is {state}; an outline is made of closed curves of \
-         at least 3 points"
-    )]
-    OpenCurve {
-        /// Which curve, from 0.
-        curve: usize,
-        points: usize,
-        /// Open or closed.
-        state: &'static str,
-    },
-    /// A point of a curve is NaN or infinite, or so large that squares overflow.
-    #[error(
-        "point {point} of curve {curve} is {position:?}; coordinates must be finite and below \
-         {limit:e}"
-    )]
-    CurvePoint {
-        /// Which curve, from 0.
-        curve: usize,
-        /// Which of its points, from 0.
-        point: usize,
-        position: [f64; 2],
-        limit: f64,
-    },
     /// A region that contains no node.
     #[error(
         "no node of the grid of {nodes} nodes is in the region, so nothing could move; check where \
          it is placed, or use a finer grid"
     )]
     EmptyMask { nodes: usize },
-}
-
-/// Accepts numbers for which `condition` holds.
-pub(crate) fn require(
-    name: &'static str,
-    value: f64,
-    requirement: &'static str,
-    condition: impl FnOnce(f64) -> bool,
-) -> Result<f64, Error> {
-    if value.is_finite() && condition(value) {
-        Ok(value)
-    } else {
-        Err(Error::InvalidParameter {
-            name,
-            value,
-            requirement,
-        })
-    }
-}
-
-/// Accepts finite positive numbers.
-pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64, Error> {
-    require(name, value, "finite and positive", |v| v > 0.0)
 }

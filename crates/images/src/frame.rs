@@ -1,9 +1,8 @@
 //! Which part of the plane a drawing shows, and how large its pixels are.
 
-use geometry::{Grid, Placement};
+use geometry::{Grid, Placement, positive, require};
 use serde::{Deserialize, Serialize};
 
-use crate::error::{positive, require};
 use crate::{Error, Image};
 
 /// A raster of square pixels in the plane.

@@ -2,17 +2,13 @@
 
 use geometry::contour::{Interpolation, Polyline, zero_level_of};
 use geometry::measure::BoundingBox;
-use geometry::{Field, Placement};
+use geometry::{Field, Placement, positive};
 use rayon::prelude::*;
 
-use crate::error::positive;
 use crate::{Error, Image, Side};
 
 /// Largest number of segments of the outline of an image, `2^22`.
 pub const LARGEST_OUTLINE: usize = 1 << 22;
-
-/// Coordinates are below this, so that squares of distances are far from overflowing.
-pub(crate) const FAR: f64 = 1e100;
 
 /// The outline of a shape: closed polygons, counter-clockwise around insides and clockwise around
 /// holes.
@@ -22,38 +18,6 @@ pub struct Outline {
 }
 
 impl Outline {
-    /// Takes over closed curves, with the inside on their left as those of
-    /// [`contour::zero_level`](geometry::contour::zero_level).
-    ///
-    /// # Errors
-    /// [`Error::NoCurves`], [`Error::OpenCurve`] (also for fewer than three points), or
-    /// [`Error::CurvePoint`] for coordinates that are not finite.
-    pub fn new(curves: Vec<Polyline>) -> Result<Self, Error> {
-        if curves.is_empty() {
-            return Err(Error::NoCurves);
-        }
-        for (curve, Polyline { points, closed }) in curves.iter().enumerate() {
-            if !closed || points.len() < 3 {
-                return Err(Error::OpenCurve {
-                    curve,
-                    points: points.len(),
-                    state: if *closed { "closed" } else { "open" },
-                });
-            }
-            // Not `v.abs() >= FAR`: that would let NaN pass.
-            let usable = |p: &[f64; 2]| p.iter().all(|v| v.abs() < FAR);
-            if let Some(point) = points.iter().position(|p| !usable(p)) {
-                return Err(Error::CurvePoint {
-                    curve,
-                    point,
-                    position: points[point],
-                    limit: FAR,
-                });
-            }
-        }
-        Ok(Self { curves })
-    }
-
     /// The outline of the pixels of an image that are on the given side, resolved below the size
     /// of a pixel.
     ///
@@ -77,16 +41,18 @@ impl Outline {
 
         let inside = (0..pixels).into_par_iter().filter(|&p| depth(p) > 0.0);
         let inside = inside.count();
-        if inside == 0 || inside == pixels {
-            let values = (0..pixels).map(|p| side.value(image.pixel(p)));
-            let (low, high) = range(values);
-            return Err(Error::OneSided {
-                inside: if inside == 0 { "nothing" } else { "everything" },
+        let one_sided = |inside| {
+            let (low, high) = range((0..pixels).map(|p| side.value(image.pixel(p))));
+            Error::OneSided {
+                inside,
                 side: side.to_string(),
                 quantity: side.quantity(),
                 low,
                 high,
-            });
+            }
+        };
+        if inside == pixels {
+            return Err(one_sided("everything"));
         }
         let changes = |row: usize| {
             let sides =
@@ -120,7 +86,7 @@ impl Outline {
         for point in curves.iter_mut().flat_map(|curve| &mut curve.points) {
             *point = [point[1], height as f64 - point[0]];
         }
-        Self::new(curves)
+        Self::of(curves).ok_or_else(|| one_sided("nothing"))
     }
 
     /// The same curves without the raster of an image, whose bending energy would outweigh that of the shape.
@@ -155,17 +121,18 @@ impl Outline {
         if low > 0.0 || high <= 0.0 {
             return Err(Error::NoInterface { low, high });
         }
-        Self::new(closed_curves(
+        let curves = closed_curves(
             grid.shape().map(|n| n + 1),
             |node| values[grid.index(node)],
             |axis, i| grid.coordinate(axis, i),
             Interpolation::Profile,
-        ))
-        .map_err(|error| match error {
-            // Values so small that the curves around them have no extent.
-            Error::NoCurves => Error::NoInterface { low, high },
-            other => other,
-        })
+        );
+        Self::of(curves).ok_or(Error::NoInterface { low, high })
+    }
+
+    /// Unless there are no curves, as around values so small that they have no extent.
+    fn of(curves: Vec<Polyline>) -> Option<Self> {
+        (!curves.is_empty()).then_some(Self { curves })
     }
 
     /// The curves.

@@ -37,15 +37,11 @@ const DEEPEST: u64 = 16;
 /// 32 MiB. The size is checked before anything is decoded.
 ///
 /// # Errors
-/// [`Error::Geometry`] if the file cannot be read; [`Error::Format`] for everything that is wrong
+/// [`Error::Io`] if the file cannot be read; [`Error::Format`] for everything that is wrong
 /// with its contents.
 pub fn read(path: impl AsRef<Path>) -> Result<Image, Error> {
     let path = path.as_ref();
-    let io = |source| geometry::Error::Io {
-        action: "read",
-        path: path.into(),
-        source,
-    };
+    let io = |source| files::Error::of("read", path)(source);
     let format = |problem| Error::Format {
         path: path.into(),
         problem,

@@ -1,8 +1,8 @@
 //! Which pixels of an image are the shape.
 
 use derive_more::Display;
+use geometry::require;
 
-use crate::error::require;
 use crate::{Error, Image};
 
 /// Which pixels are inside.
@@ -59,7 +59,7 @@ impl Side {
     /// Decides for an image.
     ///
     /// # Errors
-    /// [`Error::InvalidParameter`] unless the threshold is from 0 to 1.
+    /// [`geometry::Error::InvalidParameter`] unless the threshold is from 0 to 1.
     pub fn of(image: &Image, inside: Inside, threshold: Threshold) -> Result<Self, Error> {
         let resolved = |side: fn(f64) -> Self| {
             let value = match threshold {
@@ -92,12 +92,6 @@ impl Side {
                 }
             }
         }
-    }
-
-    /// The threshold.
-    pub fn threshold(self) -> f64 {
-        let (Self::Dark(threshold) | Self::Light(threshold) | Self::Opaque(threshold)) = self;
-        threshold
     }
 
     /// The same side of another threshold.

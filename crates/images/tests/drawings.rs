@@ -194,7 +194,7 @@ fn frames_are_the_right_way_up() {
     );
     assert_eq!(
         message(5, 5, 0.0, 0.0),
-        "side of a pixel = 0 is not allowed: it must be finite and positive"
+        "side of a pixel = 0.0 is not allowed: it must be finite and positive"
     );
     assert_eq!(
         message(5, 5, f64::INFINITY, 1.0),
@@ -210,10 +210,7 @@ fn vector_graphics_hold_the_curves() {
     });
     let found = outline(&ring.image());
     let frame = Frame::new(40, 30, [0.0, 30.0], 1.0).unwrap();
-    let svg = Svg::on_white(frame)
-        .filled(&found, Rgb::BLACK)
-        .outlined(&found, Rgb::GREEN, 1.5)
-        .unwrap();
+    let svg = Svg::on_white(frame).filled(&found, Rgb::BLACK);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("ring.svg");
     svg.write(&path).unwrap();
@@ -223,9 +220,6 @@ fn vector_graphics_hold_the_curves() {
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"40\" height=\"30\" viewBox=\"0 0 40 30\">\n\
          <rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n\
          <path fill=\"#000000\" fill-rule=\"evenodd\" d=\"M"
-    ));
-    assert!(text.contains(
-        "<path fill=\"none\" stroke=\"#009e73\" stroke-width=\"1.5\" stroke-linejoin=\"round\" d=\"M"
     ));
     assert!(text.ends_with("Z\"/>\n</svg>\n"));
 
@@ -255,13 +249,6 @@ fn vector_graphics_hold_the_curves() {
             .to_string()
             .contains("rect")
     );
-    for width in [0.0, -1.0, f64::NAN] {
-        let svg = Svg::on_white(frame).outlined(&found, Rgb::BLACK, width);
-        assert_eq!(
-            svg.unwrap_err().to_string(),
-            format!("width of the line = {width} is not allowed: it must be finite and positive")
-        );
-    }
     let error = svg.write("no/such/folder/ring.svg").unwrap_err();
     assert!(
         error.to_string().contains("no/such/folder/ring.svg"),

@@ -265,11 +265,9 @@ fn files_that_are_no_images_are_explained() {
 
     let missing = folder.path().join("none.png");
     let error = read(&missing).unwrap_err();
-    assert!(matches!(error, Error::Geometry(_)));
-    assert_eq!(
-        error.to_string(),
-        format!("could not read {}", missing.display())
-    );
+    assert!(matches!(error, Error::Io(_)));
+    let start = format!("could not read {}: ", missing.display());
+    assert!(error.to_string().starts_with(&start), "{error}");
     assert!(read(folder.path()).is_err());
     // The extension does not matter.
     fs::write(&path, jpeg([64, 48], Jpeg::Luma, false, &[9; 64 * 48])).unwrap();

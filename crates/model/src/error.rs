@@ -96,7 +96,7 @@ pub enum Error {
     #[error("training interrupted after iteration {iteration}; run again to resume")]
     Interrupted { iteration: usize },
     /// A file that cannot be written.
-    Write(#[from] geometry::Error),
+    Write(#[from] files::Error),
     /// From the operations on the device.
     Operators(#[from] operators::Error),
 }

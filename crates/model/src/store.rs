@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::path::Path;
 
+use files::write_atomically;
 use files::{Sha256, hexadecimal};
-use geometry::file::write_atomically;
 use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, TensorView};
 use serde::{Deserialize, Serialize};

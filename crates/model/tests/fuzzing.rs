@@ -95,9 +95,10 @@ fn fuzzing_networks() {
             "\\",
             "}",
             "[1,",
+            "[",
+            "{\"a\":",
             "\"a\":{\"dtype\":\"F64\",\"shape\":[0],\"data_offsets\":[0,0]},",
         ])
-        .pairs([["[", "]"], ["{\"a\":", "}"], ["{", "}"], ["\\\"", "\\\""]])
         .repair(with_right_length)
         .run(read, |_, network| {
             assert_eq!(read(&network.to_bytes().unwrap()).unwrap(), network);

@@ -19,7 +19,7 @@ pub enum Error {
     #[error("{0} is missing")]
     Missing(String),
     /// A page that cannot be written.
-    Write(#[from] geometry::Error),
+    Write(#[from] files::Error),
     /// Bytes that are no picture a browser shows, or a damaged one.
     #[error("{name} is no intact PNG or SVG picture: {problem}")]
     Picture { name: String, problem: String },

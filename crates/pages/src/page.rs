@@ -5,8 +5,7 @@ use std::path::Path;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use files::Sha256;
-use geometry::file::write_atomically;
+use files::{Sha256, write_atomically};
 use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 
 use crate::error::{Error, Result};
@@ -54,13 +53,8 @@ impl Page {
     /// Adds a section.
     #[must_use]
     pub fn with(mut self, section: Section) -> Self {
-        self.push(section);
-        self
-    }
-
-    /// Adds a section.
-    pub fn push(&mut self, section: Section) {
         self.sections.push(section);
+        self
     }
 
     /// The page as HTML.

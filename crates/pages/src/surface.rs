@@ -15,8 +15,8 @@ const LARGEST: f64 = 1e18;
 /// A mesh as the page carries it. Vertices are numbered by their first use, and those that no face
 /// uses are left out.
 ///
-/// The data are the positions, three little-endian 16-bit numbers each in units of `step` from
-/// `low`; the normals, if the mesh has them, likewise from -1 to 1; and the corners of the faces. A corner is stored as its distance from the lowest
+/// The data are the positions, three little-endian 16-bit numbers each in units of `step` from the
+/// lower corner; the normals, if the mesh has them, likewise from -1 to 1; and the corners of the faces. A corner is stored as its distance from the lowest
 /// number not used before, zero for a vertex that appears for the first time; seven bits to a byte,
 /// low ones first, the eighth bit set if more follow. Neighbouring faces share recent vertices,
 /// so most corners take one byte or two.
@@ -25,8 +25,7 @@ pub(crate) struct Surface {
     pub label: String,
     pub vertices: usize,
     pub faces: usize,
-    pub low: [f64; 3],
-    pub high: [f64; 3],
+    pub bounds: BoundingBox<3>,
     pub has_normals: bool,
     pub data: String,
 }
@@ -57,16 +56,13 @@ impl Surface {
             push_varint(&mut corners, next - index);
         }
         let used: Vec<[f64; 3]> = order.iter().map(|&vertex| mesh.vertices[vertex]).collect();
-        let BoundingBox {
-            lower: low,
-            upper: high,
-        } = BoundingBox::around(used.iter().copied()).expect("a face has vertices");
+        let bounds = BoundingBox::around(used.iter().copied()).expect("a face has vertices");
+        let (low, extent) = (bounds.lower, bounds.extent());
         let mut bytes = Vec::with_capacity(10 * used.len() + corners.len());
         for position in &used {
             for i in 0..3 {
-                let extent = high[i] - low[i];
-                let part = if extent > 0.0 {
-                    (position[i] - low[i]) / extent
+                let part = if extent[i] > 0.0 {
+                    (position[i] - low[i]) / extent[i]
                 } else {
                     0.0
                 };
@@ -83,8 +79,7 @@ impl Surface {
             label,
             vertices: used.len(),
             faces: mesh.faces.len(),
-            low,
-            high,
+            bounds,
             has_normals: mesh.normals.is_some(),
             data: STANDARD.encode(bytes),
         })
@@ -92,7 +87,7 @@ impl Surface {
 
     /// Sizes of the units of positions.
     pub fn step(&self) -> [f64; 3] {
-        std::array::from_fn(|i| (self.high[i] - self.low[i]) / STEPS)
+        self.bounds.extent().map(|side| side / STEPS)
     }
 }
 
@@ -125,7 +120,7 @@ mod tests {
             .map(|x| {
                 std::array::from_fn(|i| {
                     let value = u16::from_le_bytes([x[2 * i], x[2 * i + 1]]);
-                    surface.low[i] + step[i] * f64::from(value)
+                    surface.bounds.lower[i] + step[i] * f64::from(value)
                 })
             })
             .collect();
@@ -214,7 +209,10 @@ mod tests {
             normals: None,
         };
         let surface = Surface::new("one", &mesh).unwrap();
-        assert_eq!((surface.vertices, surface.high), (3, [1.0, 2.0, 5.0]));
+        assert_eq!(
+            (surface.vertices, surface.bounds.upper),
+            (3, [1.0, 2.0, 5.0])
+        );
         assert!(largest_error(&mesh, &surface) < 0.5);
     }
 

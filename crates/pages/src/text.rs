@@ -1,7 +1,7 @@
 //! Running text.
 
 use maud::{Markup, PreEscaped, Render};
-use pulldown_cmark::{CowStr, Event, HeadingLevel, Options, Parser, Tag, TagEnd, html};
+use pulldown_cmark::{Event, HeadingLevel, Options, Parser, Tag, TagEnd, html};
 
 /// A paragraph, or several.
 ///
@@ -64,50 +64,30 @@ fn events<'a>(
     section: impl Fn(&str) -> Option<String> + 'a,
 ) -> impl Iterator<Item = Event<'a>> {
     let mut kept = true;
-    Parser::new_ext(text, Options::ENABLE_TABLES).filter_map(move |event| match event {
-        Event::Html(html) | Event::InlineHtml(html) => Some(Event::Text(html)),
-        Event::Start(Tag::HtmlBlock) => Some(Event::Start(Tag::Paragraph)),
-        Event::End(TagEnd::HtmlBlock) => Some(Event::End(TagEnd::Paragraph)),
-        // Of a picture the text is left.
-        Event::Start(Tag::Image { .. }) | Event::End(TagEnd::Image) => None,
-        Event::Start(Tag::Link {
-            link_type,
-            dest_url,
-            title,
-            id,
-        }) => {
-            let outside = ["https://", "http://"]
-                .iter()
-                .any(|s| dest_url.starts_with(s));
-            let target = if outside {
-                Some(dest_url)
-            } else {
-                section(&dest_url).map(|name| CowStr::from(format!("#{name}")))
-            };
-            kept = target.is_some();
-            target.map(|dest_url| {
-                Event::Start(Tag::Link {
-                    link_type,
-                    dest_url,
-                    title,
-                    id,
-                })
-            })
+    Parser::new_ext(text, Options::ENABLE_TABLES).filter_map(move |mut event| {
+        match &mut event {
+            Event::Html(html) | Event::InlineHtml(html) => {
+                return Some(Event::Text(html.clone()));
+            }
+            Event::Start(Tag::HtmlBlock) => return Some(Event::Start(Tag::Paragraph)),
+            Event::End(TagEnd::HtmlBlock) => return Some(Event::End(TagEnd::Paragraph)),
+            // Of a picture the text is left.
+            Event::Start(Tag::Image { .. }) | Event::End(TagEnd::Image) => return None,
+            Event::Start(Tag::Link { dest_url, .. }) => {
+                let mut outside = ["https://", "http://"].iter();
+                kept = outside.any(|start| dest_url.starts_with(start));
+                if !kept {
+                    *dest_url = format!("#{}", section(dest_url)?).into();
+                    kept = true;
+                }
+            }
+            Event::End(TagEnd::Link) => return kept.then_some(event),
+            Event::Start(Tag::Heading { level, .. }) | Event::End(TagEnd::Heading(level)) => {
+                *level = below(*level);
+            }
+            _ => {}
         }
-        Event::End(TagEnd::Link) => kept.then_some(event),
-        Event::Start(Tag::Heading {
-            level,
-            id,
-            classes,
-            attrs,
-        }) => Some(Event::Start(Tag::Heading {
-            level: below(level),
-            id,
-            classes,
-            attrs,
-        })),
-        Event::End(TagEnd::Heading(level)) => Some(Event::End(TagEnd::Heading(below(level)))),
-        other => Some(other),
+        Some(event)
     })
 }
 

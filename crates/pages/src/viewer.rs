@@ -76,7 +76,7 @@ impl Render for Viewer {
                 @for surface in &self.surfaces {
                     script type="text/plain" data-label=(surface.label) data-vertices=(surface.vertices)
                         data-faces=(surface.faces) data-normals[surface.has_normals]
-                        data-low=(listed(surface.low)) data-step=(listed(surface.step())) {
+                        data-low=(listed(surface.bounds.lower)) data-step=(listed(surface.step())) {
                         (PreEscaped(&surface.data))
                     }
                 }

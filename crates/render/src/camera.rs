@@ -1,10 +1,9 @@
 //! Where a picture is taken from.
 
-use geometry::UpAxis;
+use geometry::{UpAxis, require};
 use glam::DVec3;
 
 use crate::Error;
-use crate::error::require;
 
 /// Angle that the shorter side of a picture subtends, in degrees: a mild perspective.
 const FIELD_OF_VIEW: f64 = 22.0;
@@ -39,7 +38,7 @@ impl View {
     /// Accepts finite angles, and elevations from -90 to 90 degrees.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for others.
+    /// [`geometry::Error::InvalidParameter`] for others.
     pub fn check(&self) -> Result<(), Error> {
         require("azimuth", self.azimuth, "finite", |_| true)?;
         let range = "between -90 and 90 degrees";
@@ -91,7 +90,7 @@ impl Camera {
     /// picture of `size` pixels.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if the points have no extent in the picture.
+    /// [`geometry::Error::InvalidParameter`] if the points have no extent in the picture.
     pub fn fit(
         orientation: Orientation,
         points: &[DVec3],

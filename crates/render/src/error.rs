@@ -7,8 +7,10 @@
 #[error(transparent)]
 #[non_exhaustive]
 pub enum Error {
-    /// A field, grid or file was refused by [`geometry`].
+    /// A field, or a number outside its allowed range.
     Geometry(#[from] geometry::Error),
+    /// A file cannot be written.
+    Io(#[from] files::Error),
     /// A surface cannot be found.
     Surface(#[from] surfaces::Error),
     /// The PNG encoder failed.
@@ -17,13 +19,6 @@ pub enum Error {
     /// Bytes that are no picture of this crate.
     #[error("the picture cannot be read: {0}")]
     Decode(#[from] png::DecodingError),
-    /// A number is outside its allowed range.
-    #[error("{name} is {value}, but must be {requirement}")]
-    Parameter {
-        name: &'static str,
-        value: f64,
-        requirement: &'static str,
-    },
     /// The camera is to be fitted to a surface that is not there.
     #[error(
         "there is no surface and no tube, so nothing can be framed; say within which box for a \
@@ -61,22 +56,4 @@ pub enum Error {
         size: [u32; 2],
         first: [u32; 2],
     },
-}
-
-/// Accepts finite numbers for which `condition` holds.
-pub(crate) fn require(
-    name: &'static str,
-    value: f64,
-    requirement: &'static str,
-    condition: impl FnOnce(f64) -> bool,
-) -> Result<f64, Error> {
-    if value.is_finite() && condition(value) {
-        Ok(value)
-    } else {
-        Err(Error::Parameter {
-            name,
-            value,
-            requirement,
-        })
-    }
 }

@@ -2,12 +2,12 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
+use geometry::require;
 use glam::DVec3;
 use srgb::Rgb;
 use surfaces::TriangleMesh;
 
 use crate::Error;
-use crate::error::require;
 
 /// Sides of a tube.
 const AROUND: usize = 12;

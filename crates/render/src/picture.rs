@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::time::Duration;
 
-use geometry::file::write_atomically;
+use files::write_atomically;
+use geometry::require;
 
 use crate::Error;
-use crate::error::require;
 
 /// Largest side of a picture, in pixels.
 pub const LARGEST_SIDE: u32 = 8192;
@@ -36,7 +36,7 @@ impl Picture {
     /// # Errors
     /// The sides must be from 1 to 8192, and the pixels `width * height`.
     pub fn new(width: u32, height: u32, pixels: Vec<[u8; 4]>) -> Result<Self, Error> {
-        let [width, height] = checked([width, height])?;
+        let size = checked([width, height])?;
         if pixels.len() != width as usize * height as usize {
             return Err(Error::PixelCount {
                 width,
@@ -44,11 +44,7 @@ impl Picture {
                 actual: pixels.len(),
             });
         }
-        Ok(Self::from_parts([width, height], pixels))
-    }
-
-    pub(crate) fn from_parts(size: [u32; 2], pixels: Vec<[u8; 4]>) -> Self {
-        Self { size, pixels }
+        Ok(Self { size, pixels })
     }
 
     /// Pixels in a row.

@@ -1,7 +1,7 @@
 //! Scenes: a surface and how it is shown.
 
 use geometry::measure::BoundingBox;
-use geometry::{Field, distance_from_phase_field};
+use geometry::{Field, distances_from_phase_field, require};
 use glam::DVec3;
 use rayon::prelude::*;
 use srgb::Rgb;
@@ -9,7 +9,6 @@ use surfaces::{TriangleMesh, isosurface};
 
 use crate::Error;
 use crate::camera::{Camera, View};
-use crate::error::require;
 use crate::light::Lights;
 use crate::model::{Model, Tube};
 use crate::picture::{Picture, checked};
@@ -72,9 +71,7 @@ impl Scene {
     /// # Errors
     /// `u` must be finite, and `eps` finite and positive.
     pub fn new(u: &Field<3>, eps: f64) -> Result<Self, Error> {
-        require("eps", eps, "positive", |v| v > 0.0)?;
-        u.check_finite()?;
-        Self::from_signed_distance(&u.map(|v| distance_from_phase_field(v, eps)))
+        Self::from_signed_distance(&distances_from_phase_field(u, eps)?)
     }
 
     /// The surface of a signed distance, which is negative inside; only its zeros, and its slope
@@ -211,7 +208,7 @@ impl Scene {
             lights,
             size: size.map(|side| side as usize),
         };
-        Ok(Picture::from_parts(size, drawing.pixels()))
+        Picture::new(size[0], size[1], drawing.pixels())
     }
 
     /// The camera, fitted to what is to fill the picture.

@@ -359,7 +359,10 @@ fn what_cannot_be_drawn_is_refused() {
     for eps in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(
             Scene::new(&u, eps),
-            Err(Error::Parameter { name: "eps", .. })
+            Err(Error::Geometry(geometry::Error::InvalidParameter {
+                name: "eps",
+                ..
+            }))
         ));
     }
     let mut broken = u.clone();
@@ -397,7 +400,7 @@ fn what_cannot_be_drawn_is_refused() {
     ] {
         let error = scene.render([10; 2]).unwrap_err();
         assert!(
-            matches!(error, Error::Parameter { name, .. } if name == what),
+            matches!(error, Error::Geometry(geometry::Error::InvalidParameter { name, .. }) if name == what),
             "{what}: {error}"
         );
     }
@@ -479,7 +482,7 @@ fn files_hold_the_pictures() {
     let mixed = animation(&[picture.clone(), opaque], second);
     assert!(matches!(mixed, Err(Error::FrameSize { index: 1, .. })));
     let never = animation(&[picture], Duration::ZERO);
-    assert!(matches!(never, Err(Error::Parameter { .. })));
+    assert!(matches!(never, Err(Error::Geometry(_))));
     assert!(matches!(
         Picture::new(2, 2, vec![[0; 4]; 3]),
         Err(Error::PixelCount { actual: 3, .. })
@@ -510,7 +513,7 @@ proptest! {
             Err(error) => prop_assert!(
                 matches!(
                     error,
-                    Error::Parameter { .. } | Error::NothingToFrame | Error::TubePoints { .. }
+                    Error::Geometry(_) | Error::NothingToFrame | Error::TubePoints { .. }
                 ),
                 "{}", error
             ),

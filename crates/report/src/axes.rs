@@ -1,43 +1,11 @@
 //! Frame, grid, ticks and labels around a plot: shared by line charts and heat maps.
 
-use plotters_backend::text_anchor::HPos;
-
 use crate::axis::{Axis, Mapping, Scale, Ticks, Window};
 use crate::colour::{FRAME, GRID, INK, MINOR_GRID};
-use crate::error::Result;
-use crate::font::{self, TextStyle};
-use crate::geom::{Rect, point};
+use crate::font::{self, Align, TextStyle};
+use crate::geom::{Margins, Rect, point};
 use crate::style::Fonts;
 use crate::surface::Surface;
-
-/// Room a panel needs around its plot box.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Margins {
-    pub left: f64,
-    pub right: f64,
-    pub top: f64,
-    pub bottom: f64,
-}
-
-impl Margins {
-    pub fn even(width: f64) -> Self {
-        Self {
-            left: width,
-            right: width,
-            top: width,
-            bottom: width,
-        }
-    }
-
-    pub fn max(self, other: Self) -> Self {
-        Self {
-            left: self.left.max(other.left),
-            right: self.right.max(other.right),
-            top: self.top.max(other.top),
-            bottom: self.bottom.max(other.bottom),
-        }
-    }
-}
 
 const TICK: f64 = 5.0;
 const MINOR_TICK: f64 = 3.0;
@@ -100,52 +68,52 @@ impl<'a> Ruler<'a> {
     }
 
     /// Ticks, numbers and label of a horizontal axis at the lower edge of `plot`.
-    fn draw_along(&self, surface: &mut dyn Surface, plot: Rect) -> Result<()> {
+    fn draw_along(&self, surface: &mut dyn Surface, plot: Rect) {
         let ticks = self.ticks_along(plot.width);
         let at = |value: f64| snap(plot.x + self.map.fraction(value) * plot.width);
         for (x, length) in marks(&ticks, at) {
             let ends = [point(x, plot.bottom() - length), point(x, plot.bottom())];
-            surface.stroke(&ends, 1.0, FRAME)?;
+            surface.stroke(&ends, 1.0, FRAME);
         }
         let (em, number) = (self.fonts.tick, TextStyle::new(self.fonts.tick, INK));
         let y = plot.bottom() + TICK_GAP + 0.6 * em;
         for (value, label) in &ticks.major {
-            surface.text(label, point(at(*value), y), number)?;
+            surface.text(label, point(at(*value), y), number);
         }
         let below = y + 0.6 * em + LABEL_GAP + 0.5 * self.fonts.label;
         if let Some(factor) = &ticks.factor {
             let corner = point(plot.right(), below);
-            surface.text(factor, corner, number.aligned(HPos::Right))?;
+            surface.text(factor, corner, number.aligned(Align::Right));
         }
         let label = TextStyle::new(self.fonts.label, INK);
-        surface.text(self.label, point(plot.centre().x, below), label)
+        surface.text(self.label, point(plot.centre().x, below), label);
     }
 
     /// Ticks, numbers and label of a vertical axis at the left edge of `area`, or outside at its right edge.
-    pub fn draw_up(&self, surface: &mut dyn Surface, area: Rect, right: bool) -> Result<()> {
+    pub fn draw_up(&self, surface: &mut dyn Surface, area: Rect, right: bool) {
         let (edge, beside, side, align) = if right {
-            (area.right(), TICK + TICK_GAP, 1.0, HPos::Left)
+            (area.right(), TICK + TICK_GAP, 1.0, Align::Left)
         } else {
-            (area.x, -TICK_GAP, -1.0, HPos::Right)
+            (area.x, -TICK_GAP, -1.0, Align::Right)
         };
         let ticks = self.ticks_up(area.height);
         let at = |value: f64| snap(area.bottom() - self.map.fraction(value) * area.height);
         for (y, length) in marks(&ticks, at) {
-            surface.stroke(&[point(edge, y), point(edge + length, y)], 1.0, FRAME)?;
+            surface.stroke(&[point(edge, y), point(edge + length, y)], 1.0, FRAME);
         }
         let number = TextStyle::new(self.fonts.tick, INK);
         for (value, label) in &ticks.major {
             let place = point(edge + beside, at(*value));
-            surface.text(label, place, number.aligned(align))?;
+            surface.text(label, place, number.aligned(align));
         }
         if let Some(factor) = &ticks.factor {
             let above = point(area.x, area.y - 0.9 * self.fonts.tick);
-            surface.text(factor, above, number.aligned(HPos::Left))?;
+            surface.text(factor, above, number.aligned(Align::Left));
         }
         let away = self.widest(&ticks) + LABEL_GAP + 0.5 * self.fonts.label;
         let middle = point(edge + beside + side * away, area.centre().y);
         let upwards = TextStyle::new(self.fonts.label, INK).upwards();
-        surface.text(self.label, middle, upwards)
+        surface.text(self.label, middle, upwards);
     }
 }
 
@@ -179,7 +147,7 @@ impl<'a> Axes<'a> {
     }
 
     /// Grid lines; goes under the data.
-    pub fn draw_grid(&self, surface: &mut dyn Surface, plot: Rect) -> Result<()> {
+    pub fn draw_grid(&self, surface: &mut dyn Surface, plot: Rect) {
         let (along, up) = (self.x.ticks_along(plot.width), self.y.ticks_up(plot.height));
         let level = |value: f64| {
             let y = snap(plot.bottom() - self.y.map.fraction(value) * plot.height);
@@ -187,24 +155,23 @@ impl<'a> Axes<'a> {
         };
         if self.y.map.scale == Scale::Log {
             for &value in &up.minor {
-                surface.stroke(&level(value), 1.0, MINOR_GRID)?;
+                surface.stroke(&level(value), 1.0, MINOR_GRID);
             }
         }
         for (value, _) in &along.major {
             let x = snap(plot.x + self.x.map.fraction(*value) * plot.width);
-            surface.stroke(&[point(x, plot.y), point(x, plot.bottom())], 1.0, GRID)?;
+            surface.stroke(&[point(x, plot.y), point(x, plot.bottom())], 1.0, GRID);
         }
         for (value, _) in &up.major {
-            surface.stroke(&level(*value), 1.0, GRID)?;
+            surface.stroke(&level(*value), 1.0, GRID);
         }
-        Ok(())
     }
 
     /// Frame, ticks and labels; goes over the data.
-    pub fn draw_frame(&self, surface: &mut dyn Surface, plot: Rect) -> Result<()> {
-        surface.outline(plot, FRAME)?;
-        self.x.draw_along(surface, plot)?;
-        self.y.draw_up(surface, plot, false)
+    pub fn draw_frame(&self, surface: &mut dyn Surface, plot: Rect) {
+        surface.outline(plot, FRAME);
+        self.x.draw_along(surface, plot);
+        self.y.draw_up(surface, plot, false);
     }
 }
 

@@ -77,9 +77,6 @@ pub enum Error {
         #[from]
         source: csv::Error,
     },
-    /// The drawing backend refused an operation.
-    #[error("cannot draw the figure: {cause}")]
-    Draw { cause: String },
 }
 
 impl Error {
@@ -96,11 +93,6 @@ impl Error {
                 found,
             }),
         }
-    }
-
-    pub(crate) fn draw(error: impl std::error::Error) -> Self {
-        let cause = error.to_string();
-        Self::Draw { cause }
     }
 
     pub(crate) fn json(what: impl Into<String>) -> impl FnOnce(serde_json::Error) -> Self {

@@ -1,12 +1,8 @@
 //! The embedded typeface, so that pictures come out the same on every machine: no system font is ever consulted.
-//!
-//! The fonts of plotters will not do: it sets them 6.5 per cent larger than viewers of SVG documents do, and on another baseline, so a figure
-//! would differ from its twin.
 
 use std::sync::LazyLock;
 
 use ab_glyph::{Font, FontRef, GlyphId, ScaleFont};
-use plotters_backend::text_anchor::HPos;
 use srgb::Rgb;
 
 static FONT: LazyLock<FontRef<'static>> = LazyLock::new(|| {
@@ -80,13 +76,23 @@ pub(crate) fn height(text: &str, em: f64, limit: f64) -> f64 {
     }
 }
 
+/// Where a line of text is from its place.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Align {
+    /// It begins there.
+    Left,
+    Centre,
+    /// It ends there.
+    Right,
+}
+
 /// How a line of text is set in the embedded font. Its place is the middle of the capitals.
 #[derive(Clone, Copy)]
 pub(crate) struct TextStyle {
     /// Layout units per em.
     pub em: f64,
     pub colour: Rgb,
-    pub align: HPos,
+    pub align: Align,
     /// Turned to be read from bottom to top; then `align` is along that direction.
     pub vertical: bool,
 }
@@ -94,7 +100,7 @@ pub(crate) struct TextStyle {
 impl TextStyle {
     /// Horizontal and centred.
     pub fn new(em: f64, colour: Rgb) -> Self {
-        let (align, vertical) = (HPos::Center, false);
+        let (align, vertical) = (Align::Centre, false);
         Self {
             em,
             colour,
@@ -103,7 +109,7 @@ impl TextStyle {
         }
     }
 
-    pub fn aligned(self, align: HPos) -> Self {
+    pub fn aligned(self, align: Align) -> Self {
         Self { align, ..self }
     }
 

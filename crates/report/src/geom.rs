@@ -116,6 +116,35 @@ impl Rect {
     }
 }
 
+/// Room a panel needs around its plot box.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Margins {
+    pub left: f64,
+    pub right: f64,
+    pub top: f64,
+    pub bottom: f64,
+}
+
+impl Margins {
+    pub fn even(width: f64) -> Self {
+        Self {
+            left: width,
+            right: width,
+            top: width,
+            bottom: width,
+        }
+    }
+
+    pub fn max(self, other: Self) -> Self {
+        Self {
+            left: self.left.max(other.left),
+            right: self.right.max(other.right),
+            top: self.top.max(other.top),
+            bottom: self.bottom.max(other.bottom),
+        }
+    }
+}
+
 /// The part of the segment from `a` to `b` inside `bounds` (Liang and Barsky, 1984).
 fn clip_segment(a: Point, b: Point, bounds: &Rect) -> Option<(Point, Point)> {
     let (dx, dy) = (b.x - a.x, b.y - a.y);

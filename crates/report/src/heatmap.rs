@@ -2,12 +2,12 @@
 
 use srgb::Rgb;
 
-use crate::axes::{Axes, Margins, Ruler};
+use crate::axes::{Axes, Ruler};
 use crate::axis::{Axis, Window};
 use crate::colour::{FRAME, viridis};
+use crate::drawable::Drawable;
 use crate::error::{Error, Result};
-use crate::geom::Rect;
-use crate::panel::Drawable;
+use crate::geom::{Margins, Rect};
 use crate::style::Fonts;
 use crate::surface::Surface;
 
@@ -85,6 +85,10 @@ const BAR_GAP: f64 = 10.0;
 const BAR_WIDTH: f64 = 14.0;
 
 impl Drawable for Coloured<'_> {
+    fn texts(&self) -> [&str; 3] {
+        [&self.map.title, "", ""]
+    }
+
     fn aspect(&self) -> Option<f64> {
         Some(self.axes.window.aspect())
     }
@@ -99,7 +103,7 @@ impl Drawable for Coloured<'_> {
         }
     }
 
-    fn draw(&self, surface: &mut dyn Surface, plot: Rect) -> Result<()> {
+    fn draw(&self, surface: &mut dyn Surface, plot: Rect) {
         let [columns, rows] = self.map.shape;
         // Row by row from the top, as a picture stores them.
         let column = |j: usize| (0..columns).map(move |i| i * rows + j);
@@ -109,13 +113,13 @@ impl Drawable for Coloured<'_> {
             _ => viridis(f64::NAN),
         };
         let cells: Vec<Rgb> = values.map(colour).collect();
-        surface.image(plot, columns, &cells, false)?;
-        self.axes.draw_frame(surface, plot)?;
+        surface.image(plot, columns, &cells, false);
+        self.axes.draw_frame(surface, plot);
         let bar = Rect::new(plot.right() + BAR_GAP, plot.y, BAR_WIDTH, plot.height);
         let shades = (0..=255).rev().map(|k| viridis(f64::from(k) / 255.0));
         let shades: Vec<Rgb> = shades.collect();
-        surface.image(bar, 1, &shades, false)?;
-        surface.outline(bar, FRAME)?;
-        self.bar.draw_up(surface, bar, true)
+        surface.image(bar, 1, &shades, false);
+        surface.outline(bar, FRAME);
+        self.bar.draw_up(surface, bar, true);
     }
 }

@@ -1,10 +1,7 @@
 //! Legends: what the colours and line styles mean.
 
-use plotters_backend::text_anchor::HPos;
-
 use crate::colour::{Colour, INK};
-use crate::error::Result;
-use crate::font::{self, TextStyle};
+use crate::font::{self, Align, TextStyle};
 use crate::geom::{Point, point};
 use crate::style::{LineStyle, Marker};
 use crate::surface::Surface;
@@ -34,22 +31,22 @@ impl LegendEntry {
     }
 
     /// Draws sample and label to the right of `at`.
-    fn draw(&self, surface: &mut dyn Surface, at: Point, em: f64) -> Result<()> {
+    fn draw(&self, surface: &mut dyn Surface, at: Point, em: f64) {
         let colour = self.colour.rgb();
         if self.style != LineStyle::None {
             let line = [at, point(at.x + SAMPLE_WIDTH, at.y)];
-            surface.dashed(&line, 2.0, colour, self.style.pattern())?;
+            surface.dashed(&line, 2.0, colour, self.style.pattern());
         }
         if let Some(marker) = self.marker {
             let middle = point(at.x + 0.5 * SAMPLE_WIDTH, at.y);
-            surface.markers(marker, &[middle], colour)?;
+            surface.markers(marker, &[middle], colour);
         }
         let text = point(at.x + SAMPLE_WIDTH + SAMPLE_GAP, at.y);
         surface.text(
             &self.label,
             text,
-            TextStyle::new(em, INK).aligned(HPos::Left),
-        )
+            TextStyle::new(em, INK).aligned(Align::Left),
+        );
     }
 }
 
@@ -104,10 +101,11 @@ impl Block {
     }
 
     /// Draws with the middle of the upper edge at `top`.
-    pub fn draw(&self, surface: &mut dyn Surface, top: Point) -> Result<()> {
+    pub fn draw(&self, surface: &mut dyn Surface, top: Point) {
         let place = |p: &Point| point((top.x + p.x).round(), top.y + p.y);
-        let mut entries = self.entries.iter();
-        entries.try_for_each(|(at, entry)| entry.draw(surface, place(at), self.em))
+        for (at, entry) in &self.entries {
+            entry.draw(surface, place(at), self.em);
+        }
     }
 }
 

@@ -48,6 +48,7 @@ mod axis;
 mod bitmap;
 mod colour;
 mod data;
+mod drawable;
 mod encode;
 mod error;
 mod figure;

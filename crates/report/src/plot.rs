@@ -1,12 +1,12 @@
 //! Line charts.
 
-use crate::axes::{Axes, Margins};
+use crate::axes::Axes;
 use crate::axis::{Axis, Window};
 use crate::colour::Colour;
+use crate::drawable::Drawable;
 use crate::error::{Error, Result};
-use crate::geom::{Point, Rect, clip_polyline, thin};
+use crate::geom::{Margins, Point, Rect, clip_polyline, thin};
 use crate::legend::LegendEntry;
-use crate::panel::Drawable;
 use crate::style::{Fonts, LineStyle, Marker};
 use crate::surface::Surface;
 
@@ -136,21 +136,6 @@ impl LineChart {
         self
     }
 
-    /// Groups of entries for the legend.
-    pub(crate) fn legend(&self) -> Vec<Vec<LegendEntry>> {
-        if let Some(groups) = &self.entries {
-            return groups.clone();
-        }
-        let named = self.series.iter().filter(|series| !series.name.is_empty());
-        let entry = |series: &Series| LegendEntry {
-            label: series.name.clone(),
-            colour: series.colour,
-            style: series.style,
-            marker: series.marker,
-        };
-        vec![named.map(entry).collect()]
-    }
-
     fn shows(&self, [x, y]: [f64; 2]) -> bool {
         self.x.shows(x) && self.y.shows(y)
     }
@@ -180,6 +165,25 @@ pub(crate) struct Plot<'a> {
 }
 
 impl Drawable for Plot<'_> {
+    fn texts(&self) -> [&str; 3] {
+        let note = self.chart.note.as_deref();
+        [&self.chart.title, "", note.unwrap_or("")]
+    }
+
+    fn legend(&self) -> Vec<Vec<LegendEntry>> {
+        if let Some(groups) = &self.chart.entries {
+            return groups.clone();
+        }
+        let named = (self.chart.series.iter()).filter(|series| !series.name.is_empty());
+        let entry = |series: &Series| LegendEntry {
+            label: series.name.clone(),
+            colour: series.colour,
+            style: series.style,
+            marker: series.marker,
+        };
+        vec![named.map(entry).collect()]
+    }
+
     fn aspect(&self) -> Option<f64> {
         None
     }
@@ -188,8 +192,8 @@ impl Drawable for Plot<'_> {
         self.axes.margins(width, height)
     }
 
-    fn draw(&self, surface: &mut dyn Surface, plot: Rect) -> Result<()> {
-        self.axes.draw_grid(surface, plot)?;
+    fn draw(&self, surface: &mut dyn Surface, plot: Rect) {
+        self.axes.draw_grid(surface, plot);
         let bounds = plot.grown(0.5);
         for series in &self.chart.series {
             let colour = series.colour.rgb();
@@ -201,15 +205,15 @@ impl Drawable for Plot<'_> {
                     .collect();
                 if series.style != LineStyle::None {
                     for piece in clip_polyline(&thin(&placed, 0.2), &bounds) {
-                        surface.dashed(&piece, series.width, colour, series.style.pattern())?;
+                        surface.dashed(&piece, series.width, colour, series.style.pattern());
                     }
                 }
                 symbols.extend(placed.into_iter().filter(|&p| bounds.contains(p)));
             }
             if let Some(marker) = series.marker {
-                surface.markers(marker, &thin(&symbols, 11.0), colour)?;
+                surface.markers(marker, &thin(&symbols, 11.0), colour);
             }
         }
-        self.axes.draw_frame(surface, plot)
+        self.axes.draw_frame(surface, plot);
     }
 }

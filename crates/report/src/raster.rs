@@ -2,10 +2,9 @@
 
 use srgb::Rgb;
 
-use crate::axes::Margins;
+use crate::drawable::Drawable;
 use crate::error::{Error, Result};
 use crate::geom::Rect;
-use crate::panel::Drawable;
 use crate::surface::{PNG_SCALE, Surface};
 
 /// A panel that shows a picture, with a caption below.
@@ -87,19 +86,19 @@ fn shares(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
 }
 
 impl Drawable for &Raster {
+    fn texts(&self) -> [&str; 3] {
+        ["", &self.caption, ""]
+    }
+
     fn aspect(&self) -> Option<f64> {
         Some(self.size[1] as f64 / self.size[0] as f64)
     }
 
-    fn margins(&self, _: f64, _: f64) -> Margins {
-        Margins::even(1.0)
-    }
-
-    fn draw(&self, surface: &mut dyn Surface, plot: Rect) -> Result<()> {
-        let pixels = |side: f64| side as usize * PNG_SCALE as usize;
+    fn draw(&self, surface: &mut dyn Surface, plot: Rect) {
+        let pixels = |side: f64| side as usize * PNG_SCALE;
         let columns = pixels(plot.width);
         let cells = self.averaged(columns, pixels(plot.height));
-        surface.image(plot, columns, &cells, true)
+        surface.image(plot, columns, &cells, true);
     }
 }
 

@@ -2,12 +2,11 @@
 
 use srgb::Rgb;
 
-use crate::axes::Margins;
 use crate::axis::Window;
 use crate::colour::Colour;
+use crate::drawable::Drawable;
 use crate::error::{Error, Result};
 use crate::geom::{Point, Rect, clip_loop, clip_polyline, thin};
-use crate::panel::Drawable;
 use crate::style::LineStyle;
 use crate::surface::Surface;
 
@@ -134,15 +133,15 @@ pub(crate) struct Seen<'a> {
 }
 
 impl Drawable for Seen<'_> {
+    fn texts(&self) -> [&str; 3] {
+        [&self.shapes.caption, "", ""]
+    }
+
     fn aspect(&self) -> Option<f64> {
         Some(self.window.aspect())
     }
 
-    fn margins(&self, _: f64, _: f64) -> Margins {
-        Margins::even(1.0)
-    }
-
-    fn draw(&self, surface: &mut dyn Surface, plot: Rect) -> Result<()> {
+    fn draw(&self, surface: &mut dyn Surface, plot: Rect) {
         for curve in &self.shapes.curves {
             let place = |ring: Vec<[f64; 2]>| -> Vec<Point> {
                 let placed: Vec<Point> =
@@ -152,7 +151,7 @@ impl Drawable for Seen<'_> {
             let placed: Vec<Vec<Point>> = curve.finite().map(place).collect();
             if let Some(fill) = curve.fill {
                 let inside: Vec<_> = placed.iter().map(|ring| clip_loop(ring, &plot)).collect();
-                surface.fill(&inside, fill.rgb())?;
+                surface.fill(&inside, fill.rgb());
             }
             if curve.style == LineStyle::None {
                 continue;
@@ -161,10 +160,10 @@ impl Drawable for Seen<'_> {
             for mut ring in placed {
                 ring.extend(ring.first().copied());
                 for piece in clip_polyline(&ring, &plot) {
-                    surface.dashed(&piece, curve.width, colour, pattern)?;
+                    surface.dashed(&piece, curve.width, colour, pattern);
                 }
             }
         }
-        surface.outline(plot, Rgb(170, 170, 170))
+        surface.outline(plot, Rgb(170, 170, 170));
     }
 }

@@ -1,47 +1,43 @@
-//! What charts are drawn on: one small trait before SVG documents and PNG files.
-//!
-//! The charts of plotters are not used. Its bitmaps fill polygons one pixel too wide, leave holes where a wide curve crosses itself and
-//! know dashes of one length only; its axes have no small ticks and no factor common to all labels; its plots side by side do not line up.
+//! What charts are drawn on, SVG documents and PNG files alike.
 
 use srgb::Rgb;
 
-use crate::error::Result;
 use crate::font::TextStyle;
 use crate::geom::{Point, Rect, point};
 use crate::style::Marker;
 
 /// PNG pixels per layout unit.
-pub(crate) const PNG_SCALE: u32 = 2;
+pub(crate) const PNG_SCALE: usize = 2;
 
 /// What the charts need to draw. Coordinates are layout units, of which a README shows one per CSS pixel.
 pub(crate) trait Surface {
     /// A polyline with round joins, in dashes of a [pattern](crate::LineStyle::pattern).
-    fn dashed(&mut self, points: &[Point], width: f64, colour: Rgb, pattern: &[f64]) -> Result<()>;
+    fn dashed(&mut self, points: &[Point], width: f64, colour: Rgb, pattern: &[f64]);
     /// The region inside an odd number of the loops.
-    fn fill(&mut self, loops: &[Vec<Point>], colour: Rgb) -> Result<()>;
+    fn fill(&mut self, loops: &[Vec<Point>], colour: Rgb);
     /// Markers, each with a thin white rim, so that it stands out from its curve.
-    fn markers(&mut self, marker: Marker, places: &[Point], colour: Rgb) -> Result<()>;
+    fn markers(&mut self, marker: Marker, places: &[Point], colour: Rgb);
     /// One line of text, anchored at the middle of its capitals.
-    fn text(&mut self, line: &str, at: Point, style: TextStyle) -> Result<()>;
+    fn text(&mut self, line: &str, at: Point, style: TextStyle);
     /// A raster of `columns` cells a row, row by row from the top, stretched over `area`, below everything else. Viewers may
     /// interpolate its cells if it is `smooth`.
-    fn image(&mut self, area: Rect, columns: usize, cells: &[Rgb], smooth: bool) -> Result<()>;
+    fn image(&mut self, area: Rect, columns: usize, cells: &[Rgb], smooth: bool);
 }
 
 impl dyn Surface + '_ {
     /// A solid polyline with round joins.
-    pub fn stroke(&mut self, points: &[Point], width: f64, colour: Rgb) -> Result<()> {
-        self.dashed(points, width, colour, &[])
+    pub fn stroke(&mut self, points: &[Point], width: f64, colour: Rgb) {
+        self.dashed(points, width, colour, &[]);
     }
 
     /// Outlines a box with a line one unit wide.
-    pub fn outline(&mut self, area: Rect, colour: Rgb) -> Result<()> {
+    pub fn outline(&mut self, area: Rect, colour: Rgb) {
         let [a, b, c, d] = area.corners();
         for (from, to) in [(a, b), (d, c)] {
             let ends = [point(from.x - 0.5, from.y), point(to.x + 0.5, to.y)];
-            self.stroke(&ends, 1.0, colour)?;
+            self.stroke(&ends, 1.0, colour);
         }
-        self.stroke(&[a, d], 1.0, colour)?;
-        self.stroke(&[b, c], 1.0, colour)
+        self.stroke(&[a, d], 1.0, colour);
+        self.stroke(&[b, c], 1.0, colour);
     }
 }

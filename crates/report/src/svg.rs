@@ -1,15 +1,11 @@
 //! Figures as SVG documents.
-//!
-//! Not by the backend of plotters: it has neither paths nor dashes nor stretched pictures, and its documents are three times as large.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use plotters_backend::text_anchor::HPos;
 use srgb::Rgb;
 
 use crate::colour::WHITE;
-use crate::error::Result;
-use crate::font::{HALF_CAPITAL, TextStyle};
+use crate::font::{Align, HALF_CAPITAL, TextStyle};
 use crate::geom::{Point, Rect, point, simplified};
 use crate::style::Marker;
 use crate::surface::Surface;
@@ -61,7 +57,7 @@ struct SvgSurface {
 }
 
 impl Surface for SvgSurface {
-    fn dashed(&mut self, points: &[Point], width: f64, colour: Rgb, pattern: &[f64]) -> Result<()> {
+    fn dashed(&mut self, points: &[Point], width: f64, colour: Rgb, pattern: &[f64]) {
         let (data, colour, width) = (path(points), hex(colour), units(width));
         let lengths: Vec<String> = pattern.iter().map(|&l| units(l).to_string()).collect();
         let dashes = match lengths.join(" ") {
@@ -71,18 +67,16 @@ impl Surface for SvgSurface {
         self.shapes.push(format!(
             "<path d=\"{data}\" stroke=\"{colour}\" stroke-width=\"{width}\"{dashes}/>\n"
         ));
-        Ok(())
     }
 
-    fn fill(&mut self, loops: &[Vec<Point>], colour: Rgb) -> Result<()> {
+    fn fill(&mut self, loops: &[Vec<Point>], colour: Rgb) {
         let loops = loops.iter().filter(|points| !points.is_empty());
         let data: String = loops.map(|points| path(points) + "z").collect();
         self.shapes
             .push(format!("<path d=\"{data}\" fill=\"{}\"/>\n", hex(colour)));
-        Ok(())
     }
 
-    fn markers(&mut self, marker: Marker, places: &[Point], colour: Rgb) -> Result<()> {
+    fn markers(&mut self, marker: Marker, places: &[Point], colour: Rgb) {
         // The rim is a line around the marker: its middle is half its width outside.
         let radius = Marker::RADIUS + 0.5 * Marker::RIM;
         let symbol = |&at: &Point| match marker {
@@ -97,10 +91,9 @@ impl Surface for SvgSurface {
         self.shapes.push(format!(
             "<g fill=\"{fill}\" stroke=\"{rim}\" stroke-width=\"{width}\" stroke-linejoin=\"miter\">\n{symbols}</g>\n"
         ));
-        Ok(())
     }
 
-    fn text(&mut self, line: &str, at: Point, style: TextStyle) -> Result<()> {
+    fn text(&mut self, line: &str, at: Point, style: TextStyle) {
         let drop = HALF_CAPITAL * style.em;
         let base = if style.vertical {
             point(at.x + drop, at.y)
@@ -115,9 +108,9 @@ impl Surface for SvgSurface {
         };
         let (size, colour) = (units(style.em), hex(style.colour));
         let anchor = match style.align {
-            HPos::Left => "start",
-            HPos::Center => "middle",
-            HPos::Right => "end",
+            Align::Left => "start",
+            Align::Centre => "middle",
+            Align::Right => "end",
         };
         let line = line
             .replace('&', "&amp;")
@@ -126,11 +119,10 @@ impl Surface for SvgSurface {
         self.shapes.push(format!(
             "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" text-anchor=\"{anchor}\" fill=\"{colour}\"{turned}>{line}</text>\n"
         ));
-        Ok(())
     }
 
-    fn image(&mut self, area: Rect, columns: usize, cells: &[Rgb], smooth: bool) -> Result<()> {
-        let encoded = STANDARD.encode(crate::encode::png(columns, cells)?);
+    fn image(&mut self, area: Rect, columns: usize, cells: &[Rgb], smooth: bool) {
+        let encoded = STANDARD.encode(crate::encode::png(columns, cells));
         let (x, y) = (units(area.x), units(area.y));
         let (width, height) = (units(area.right()) - x, units(area.bottom()) - y);
         let rendering = if smooth { "auto" } else { "pixelated" };
@@ -138,24 +130,20 @@ impl Surface for SvgSurface {
             "<image x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" preserveAspectRatio=\"none\" \
              style=\"image-rendering:{rendering}\" href=\"data:image/png;base64,{encoded}\"/>\n"
         ));
-        Ok(())
     }
 }
 
 /// Draws an SVG document of the given size in layout units.
-pub(crate) fn svg(
-    (width, height): (u32, u32),
-    draw: impl FnOnce(&mut dyn Surface) -> Result<()>,
-) -> Result<String> {
+pub(crate) fn svg((width, height): (u32, u32), draw: impl FnOnce(&mut dyn Surface)) -> String {
     let mut surface = SvgSurface::default();
-    draw(&mut surface)?;
+    draw(&mut surface);
     let elements = [surface.images, surface.shapes].concat().concat();
     let (w, h, page) = (width * SCALE, height * SCALE, hex(WHITE));
-    Ok(format!(
+    format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {w} {h}\" \
          font-family=\"{FAMILY}\" fill=\"none\" fill-rule=\"evenodd\" stroke-linejoin=\"round\">\n\
          <rect width=\"{w}\" height=\"{h}\" fill=\"{page}\"/>\n{elements}</svg>\n"
-    ))
+    )
 }
 
 #[cfg(test)]
@@ -164,16 +152,12 @@ mod tests {
 
     const BLACK: Rgb = Rgb::BLACK;
 
-    fn drawn(draw: impl FnOnce(&mut dyn Surface) -> Result<()>) -> String {
-        svg((100, 50), draw).unwrap()
-    }
-
     #[test]
     fn loops_are_one_path_and_dashes_an_attribute() {
         let ring = |side| Rect::new(5.0, 5.0, side, side).corners().to_vec();
-        let document = drawn(|s| {
-            s.fill(&[ring(20.0), vec![], ring(10.0)], BLACK)?;
-            s.dashed(&[point(0.0, 1.0), point(9.0, 1.0)], 2.0, BLACK, &[8.5, 4.5])
+        let document = svg((100, 50), |s| {
+            s.fill(&[ring(20.0), vec![], ring(10.0)], BLACK);
+            s.dashed(&[point(0.0, 1.0), point(9.0, 1.0)], 2.0, BLACK, &[8.5, 4.5]);
         });
         let path = "M80 80l320 0 0 320-320 0zM80 80l160 0 0 160-160 0z";
         assert!(
@@ -187,9 +171,9 @@ mod tests {
     #[test]
     fn images_take_their_place_and_scale_below_everything_else() {
         let cells = [Rgb(1, 2, 3), Rgb(4, 5, 6)];
-        let document = drawn(|s| {
-            s.markers(Marker::Circle, &[point(1.0, 2.0)], BLACK)?;
-            s.image(Rect::new(10.0, 5.0, 20.0, 30.0), 2, &cells, false)
+        let document = svg((100, 50), |s| {
+            s.markers(Marker::Circle, &[point(1.0, 2.0)], BLACK);
+            s.image(Rect::new(10.0, 5.0, 20.0, 30.0), 2, &cells, false);
         });
         assert!(document.contains("width=\"100\" height=\"50\" viewBox=\"0 0 1600 800\""));
         let image = document.find("<image x=\"160\" y=\"80\" width=\"320\" height=\"480\"");

@@ -134,11 +134,6 @@ impl Table {
         Ok(())
     }
 
-    /// The names of the columns.
-    pub fn columns(&self) -> impl ExactSizeIterator<Item = &str> {
-        self.columns.iter().map(|column| column.name.as_str())
-    }
-
     /// The table as CSV (RFC 4180 quoting, line feeds), numbers with nine significant digits.
     ///
     /// # Errors
@@ -146,7 +141,7 @@ impl Table {
     /// [`Error::Csv`] if the table has no columns.
     pub fn to_csv(&self) -> Result<String> {
         let mut writer = csv::Writer::from_writer(Vec::new());
-        writer.write_record(self.columns())?;
+        writer.write_record(self.columns.iter().map(|column| &column.name))?;
         for row in &self.rows {
             writer.write_record(row.iter().map(Cell::raw))?;
         }

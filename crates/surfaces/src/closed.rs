@@ -1,12 +1,12 @@
 //! Closed oriented surfaces, their topology and measures.
 
 use derive_more::Display;
-use geometry::Placement;
 use geometry::measure::BoundingBox;
+use geometry::{Placement, require};
 use rayon::prelude::*;
 
-use crate::mesh::merge_coincident;
-use crate::vector::{Vector, corners, scaled_normal, solid_angle};
+use crate::mesh::has_three_corners;
+use crate::vector::{Vector, scaled_normal, solid_angle};
 use crate::{Error, TriangleMesh};
 
 /// A triangle mesh that bounds a solid: every edge is run through exactly once in each direction.
@@ -58,7 +58,7 @@ impl ClosedMesh {
     ///
     /// # Errors
     /// [`Error::NoFaces`]; [`Error::NonFiniteVertex`]; [`Error::Normals`];
-    /// [`Error::IndexOutOfRange`]; [`Error::InvalidParameter`] for meshes so small or large that
+    /// [`Error::IndexOutOfRange`]; [`geometry::Error::InvalidParameter`] for meshes so small or large that
     /// products of lengths leave the range of numbers; [`Error::Open`], [`Error::NonManifold`] and
     /// [`Error::MixedOrientation`] for edges that are not used once in each direction;
     /// [`Error::NoArea`] for faces whose corners are on a line; [`Error::NoVolume`];
@@ -66,23 +66,21 @@ impl ClosedMesh {
     pub fn new(mut mesh: TriangleMesh) -> Result<(Self, Vec<Warning>), Error> {
         mesh.check(f64::MAX)?;
         let side = mesh.bounding_box().ok_or(Error::NoFaces)?.longest_side();
-        if !(side == 0.0 || (1e-70..1e70).contains(&side)) {
-            return Err(Error::InvalidParameter {
-                name: "longest side of the bounding box",
-                value: side,
-                requirement: "between 1e-70 and 1e70; choose another unit of length",
-            });
-        }
+        let requirement = "between 1e-70 and 1e70; choose another unit of length";
+        require(
+            "longest side of the bounding box",
+            side,
+            requirement,
+            |side| side == 0.0 || (1e-70..1e70).contains(&side),
+        )?;
         let mut warnings = Vec::new();
         let mut seams = Seams::find(&mesh);
-        if seams.is_err() || has_collapsed_faces(&mesh) || has_no_area(&mesh).is_err() {
-            let merged = merge_coincident(&mesh.vertices);
-            let vertices = mesh.vertices.len() - merged.first.len();
-            let before = mesh.faces.len();
-            let mended = mesh.reindexed(&merged.first, |v| merged.index[v as usize]);
-            mesh = if vertices > 0 { mended } else { mesh };
-            mesh.faces.retain(|&[a, b, c]| a != b && b != c && c != a);
-            let faces = before - mesh.faces.len();
+        let collapsed = !mesh.faces.iter().all(has_three_corners);
+        if seams.is_err() || collapsed || has_no_area(&mesh).is_err() {
+            let before = [mesh.vertices.len(), mesh.faces.len()];
+            mesh = mesh.merged();
+            let vertices = before[0] - mesh.vertices.len();
+            let faces = before[1] - mesh.faces.len();
             if vertices > 0 {
                 warnings.push(Warning::Merged { vertices });
             }
@@ -111,7 +109,7 @@ impl ClosedMesh {
             reverse(&mut mesh);
             warnings.push(Warning::Reversed);
         }
-        check_nesting(&mesh, &seams.component, seams.components)?;
+        check_nesting(&mesh, &seams)?;
         let closed = Self {
             // V - E + F with E = 3/2 F.
             euler_characteristic: seams.vertices as i64 - mesh.faces.len() as i64 / 2,
@@ -171,15 +169,7 @@ impl ClosedMesh {
     /// # Errors
     /// As [`ClosedMesh::new`].
     pub fn without_small_parts(&self, least: f64) -> Result<Self, Error> {
-        let Seams {
-            component,
-            components,
-            ..
-        } = Seams::find(&self.mesh)?;
-        let mut parts = vec![Vec::new(); components];
-        for (face, &part) in self.mesh.faces.iter().zip(&component) {
-            parts[part as usize].push(*face);
-        }
+        let mut parts = Seams::find(&self.mesh)?.parts(&self.mesh);
         parts.retain(|faces| volume(&self.mesh, faces).abs() >= least);
         if parts.is_empty() {
             return Ok(self.clone());
@@ -202,15 +192,10 @@ impl ClosedMesh {
     }
 }
 
-fn has_collapsed_faces(mesh: &TriangleMesh) -> bool {
-    let collapsed = |&[a, b, c]: &[u32; 3]| a == b || b == c || c == a;
-    mesh.faces.iter().any(collapsed)
-}
-
 /// Refuses faces whose corners are on a line up to rounding.
 fn has_no_area(mesh: &TriangleMesh) -> Result<(), Error> {
     let flat = |&face: &[u32; 3]| {
-        let [a, b, c] = corners(mesh, face);
+        let [a, b, c] = mesh.corners(face);
         let edges = [b - a, c - b, a - c].map(Vector::length);
         let longest = edges.into_iter().fold(0.0, f64::max);
         // The height over the longest edge, against the rounding of the cross product.
@@ -235,11 +220,7 @@ fn drop_unreferenced(mesh: &mut TriangleMesh) -> usize {
     let kept: Vec<usize> = (0..used.len()).filter(|&v| used[v]).collect();
     let unreferenced = used.len() - kept.len();
     if unreferenced > 0 {
-        let mut index = vec![0; used.len()];
-        for (new, &old) in kept.iter().enumerate() {
-            index[old] = new as u32;
-        }
-        *mesh = mesh.reindexed(&kept, |v| index[v as usize]);
+        *mesh = mesh.keeping(&kept);
     }
     unreferenced
 }
@@ -257,7 +238,7 @@ fn area(mesh: &TriangleMesh) -> f64 {
     let twice = mesh
         .faces
         .iter()
-        .map(|&f| scaled_normal(corners(mesh, f)).length());
+        .map(|&f| scaled_normal(mesh.corners(f)).length());
     0.5 * twice.sum::<f64>()
 }
 
@@ -270,63 +251,42 @@ pub(crate) fn volume<'a>(
     let origin = mesh.vertices.first().copied().unwrap_or_default();
     let origin = Vector::from_array(origin);
     let sixfold = faces.into_iter().map(|&face| {
-        let [a, b, c] = corners(mesh, face).map(|x| x - origin);
+        let [a, b, c] = mesh.corners(face).map(|x| x - origin);
         a.dot(b.cross(c))
     });
     sixfold.sum::<f64>() / 6.0
 }
 
 /// Components must be enclosed by as many others as their orientation says.
-fn check_nesting(mesh: &TriangleMesh, component: &[u32], components: usize) -> Result<(), Error> {
-    if components < 2 {
+fn check_nesting(mesh: &TriangleMesh, seams: &Seams) -> Result<(), Error> {
+    if seams.components < 2 {
         return Ok(());
     }
-    struct Part {
-        first: usize,
-        faces: Vec<[u32; 3]>,
-        bounds: BoundingBox<3>,
-    }
-    let mut parts: Vec<Part> = Vec::with_capacity(components);
-    for (face, (&corners, &part)) in mesh.faces.iter().zip(component).enumerate() {
-        // Components are numbered in the order of their first faces.
-        if part as usize == parts.len() {
-            let x = mesh.vertices[corners[0] as usize];
-            parts.push(Part {
-                first: face,
-                faces: Vec::new(),
-                bounds: BoundingBox { lower: x, upper: x },
-            });
-        }
-        let part = &mut parts[part as usize];
-        part.faces.push(corners);
-        for v in corners {
-            for (axis, &x) in mesh.vertices[v as usize].iter().enumerate() {
-                part.bounds.lower[axis] = part.bounds.lower[axis].min(x);
-                part.bounds.upper[axis] = part.bounds.upper[axis].max(x);
-            }
-        }
-    }
+    let parts = seams.parts(mesh);
+    let bounds = parts.iter().map(|faces| {
+        let corners = faces.as_flattened().iter();
+        BoundingBox::around(corners.map(|&v| mesh.vertices[v as usize]))
+    });
+    let bounds: Vec<_> = bounds.collect();
     let checked = (0..parts.len()).into_par_iter().map(|this| {
-        let part = &parts[this];
-        let x = mesh.vertices[part.faces[0][0] as usize];
-        let others = parts.iter().enumerate();
-        let others = others.filter(|(k, other)| *k != this && other.bounds.contains(x));
-        let angle = others.map(|(_, other)| {
-            let seen = other
-                .faces
-                .iter()
-                .map(|&face| solid_angle(corners(mesh, face).map(|v| v - Vector::from_array(x))));
+        let x = mesh.vertices[parts[this][0][0] as usize];
+        let encloses = |k: &usize| *k != this && bounds[*k].is_some_and(|b| b.contains(x));
+        let angle = (0..parts.len()).filter(encloses).map(|other| {
+            let from_x = |v| v - Vector::from_array(x);
+            let faces = parts[other].iter();
+            let seen = faces.map(|&face| solid_angle(mesh.corners(face).map(from_x)));
             seen.sum::<f64>()
         });
         let winding = angle.sum::<f64>() / (4.0 * std::f64::consts::PI);
-        let outwards = volume(mesh, &part.faces) > 0.0;
+        let outwards = volume(mesh, &parts[this]) > 0.0;
         let expected = i64::from(!outwards);
         // Where components touch, the winding number is not whole and tells nothing.
         if (winding - winding.round()).abs() > 0.01 || winding.round() as i64 == expected {
             return Ok(());
         }
+        let first = seams.component.iter().position(|&k| k as usize == this);
         Err(Error::Nesting {
-            face: part.first,
+            face: first.unwrap_or_default(),
             orientation: if outwards { "outwards" } else { "inwards" },
             enclosing: winding.round() as i64,
             expected,
@@ -404,6 +364,15 @@ impl Seams {
             vertices,
         })
     }
+
+    /// The faces of every component.
+    fn parts(&self, mesh: &TriangleMesh) -> Vec<Vec<[u32; 3]>> {
+        let mut parts = vec![Vec::new(); self.components];
+        for (face, &part) in mesh.faces.iter().zip(&self.component) {
+            parts[part as usize].push(*face);
+        }
+        parts
+    }
 }
 
 impl Side {
@@ -418,47 +387,37 @@ impl Side {
 
 /// Every edge must have one side in each direction.
 fn check_edges(mesh: &TriangleMesh, sides: &[Side]) -> Result<(), Error> {
-    let (mut open, mut crowded, mut mixed) = ((0, None), (0, None), (0, None));
-    for edge in sides.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high)) {
-        let upwards = edge.iter().filter(|s| s.upwards).count();
-        let kind = match edge.len() {
-            2 if upwards == 1 => continue,
-            1 => &mut open,
-            2 => &mut mixed,
-            _ => &mut crowded,
-        };
-        kind.0 += 1;
-        kind.1.get_or_insert(edge);
-    }
-    let ends = |side: &Side| {
-        let [a, b] = [side.low, side.high].map(|v| mesh.vertices[v as usize]);
-        if side.upwards { (a, b) } else { (b, a) }
+    let edges = || sides.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high));
+    // How many edges are wrong in some way, the first of them, and its ends.
+    let wrong = |is_wrong: &dyn Fn(&[Side]) -> bool| {
+        let mut wrong = edges().filter(|edge| is_wrong(edge));
+        let edge = wrong.next()?;
+        let [a, b] = [edge[0].low, edge[0].high].map(|v| mesh.vertices[v as usize]);
+        let (from, to) = if edge[0].upwards { (a, b) } else { (b, a) };
+        Some((1 + wrong.count(), edge, from, to))
     };
-    if let (edges, Some([side, others @ ..])) = crowded {
-        let (from, to) = ends(side);
+    if let Some((edges, edge, from, to)) = wrong(&|edge| edge.len() > 2) {
         return Err(Error::NonManifold {
             edges,
-            face: side.face as usize,
-            others: others.len(),
+            face: edge[0].face as usize,
+            others: edge.len() - 1,
             from,
             to,
         });
     }
-    if let (edges, Some([side, ..])) = open {
-        let (from, to) = ends(side);
+    if let Some((edges, edge, from, to)) = wrong(&|edge| edge.len() == 1) {
         return Err(Error::Open {
             edges,
-            face: side.face as usize,
+            face: edge[0].face as usize,
             from,
             to,
         });
     }
-    if let (edges, Some([side, other, ..])) = mixed {
-        let (from, to) = ends(side);
+    if let Some((edges, edge, from, to)) = wrong(&|edge| edge[0].upwards == edge[1].upwards) {
         return Err(Error::MixedOrientation {
             edges,
-            first: side.face as usize,
-            second: other.face as usize,
+            first: edge[0].face as usize,
+            second: edge[1].face as usize,
             from,
             to,
         });

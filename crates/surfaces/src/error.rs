@@ -22,9 +22,12 @@ pub enum Error {
     /// A file is no usable mesh.
     #[error("{path} cannot be read as a mesh: {problem}", path = path.display())]
     Format { path: PathBuf, problem: FormatError },
-    /// Grids, fields and the operating system.
+    /// Grids and fields, and numbers outside their range.
     #[error(transparent)]
     Geometry(#[from] geometry::Error),
+    /// The operating system refused.
+    #[error(transparent)]
+    Io(#[from] files::Error),
     /// A shape or a region that cannot be built from its description.
     #[error("{0}")]
     Shape(String),
@@ -138,13 +141,6 @@ pub enum Error {
         /// What it should be: 0 outwards, 1 inwards.
         expected: i64,
     },
-    /// A number is outside the range in which it makes sense.
-    #[error("{name} = {value:?} is not allowed: it must be {requirement}")]
-    InvalidParameter {
-        name: &'static str,
-        value: f64,
-        requirement: &'static str,
-    },
 }
 
 fn within(limit: f64) -> String {
@@ -153,16 +149,4 @@ fn within(limit: f64) -> String {
     } else {
         String::new()
     }
-}
-
-/// Refuses what is not a positive number.
-pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64, Error> {
-    if value.is_finite() && value > 0.0 {
-        return Ok(value);
-    }
-    Err(Error::InvalidParameter {
-        name,
-        value,
-        requirement: "finite and positive",
-    })
 }

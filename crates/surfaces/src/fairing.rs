@@ -4,7 +4,7 @@ use geometry::{Field, Placement, is_thin};
 use rayon::prelude::*;
 
 use crate::level_set::LevelSet;
-use crate::vector::{Vector, corners};
+use crate::vector::Vector;
 use crate::{ClosedMesh, Error, MeshDistance, TriangleMesh};
 
 /// Most rounds of Taubin's smoothing before the flow, and their factors.
@@ -149,7 +149,7 @@ impl Fairing {
         let far = RESOLVED.1 * followed.eps;
         let mut lost: Vec<bool> = (followed.levels.iter().map(|level| level.abs() > far)).collect();
         let thin = mesh.faces.par_iter().filter(|&&face| {
-            let centre = corners(mesh, face).into_iter().sum::<Vector>() / 3.0;
+            let centre = mesh.corners(face).into_iter().sum::<Vector>() / 3.0;
             is_thin(&distance, centre.to_array(), mesh.face_normal(face), width)
         });
         for vertex in thin.collect::<Vec<_>>().into_iter().flatten() {
@@ -181,14 +181,10 @@ impl Fairing {
             let wavelength = LONG * followed.eps / followed.placement.scale();
             mesh = mesh.with_long_waves_of(self.start.mesh(), wavelength);
         }
-        let own = self.rough.mesh().vertices.iter().zip(&self.kept);
-        for (x, (own, _)) in mesh
-            .vertices
-            .iter_mut()
-            .zip(own)
-            .filter(|(_, (_, kept))| **kept)
-        {
-            *x = *own;
+        for (vertex, x) in mesh.vertices.iter_mut().enumerate() {
+            if self.kept[vertex] {
+                *x = self.rough.mesh().vertices[vertex];
+            }
         }
         Ok(if self.noise > 0.0 {
             mesh.with_volume(self.rough.volume(), |vertex| !self.kept[vertex])

@@ -25,14 +25,6 @@ impl Format {
             _ => Err(Error::UnknownFormat { path: path.into() }),
         }
     }
-
-    /// The axis that points up in most files.
-    fn up(self) -> UpAxis {
-        match self {
-            Self::Obj => UpAxis::Y,
-            Self::Ply | Self::Stl => UpAxis::Z,
-        }
-    }
 }
 
 /// The axis that points up in most meshes of that format, by the extension: `y` in OBJ files, which
@@ -41,5 +33,8 @@ impl Format {
 /// # Errors
 /// [`Error::UnknownFormat`].
 pub fn usual_up_axis(path: impl AsRef<Path>) -> Result<UpAxis, Error> {
-    Format::of(path.as_ref()).map(Format::up)
+    Ok(match Format::of(path.as_ref())? {
+        Format::Obj => UpAxis::Y,
+        Format::Ply | Format::Stl => UpAxis::Z,
+    })
 }

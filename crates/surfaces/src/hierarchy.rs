@@ -125,14 +125,7 @@ fn divide(triangles: &[Triangle], order: &mut [usize], boxes: &mut [Bounds], nod
     if 2 * node + 1 >= boxes.len() {
         return;
     }
-    let side = boxes[node].max - boxes[node].min;
-    let axis = if side.x >= side.y.max(side.z) {
-        0
-    } else if side.y >= side.z {
-        1
-    } else {
-        2
-    };
+    let axis = (boxes[node].max - boxes[node].min).max_position();
     let centre = |t: &usize| triangles[*t].iter().map(|corner| corner[axis]).sum::<f64>();
     let middle = order.len() / 2;
     order.select_nth_unstable_by(middle, |a, b| centre(a).total_cmp(&centre(b)));

@@ -2,11 +2,11 @@
 
 use std::collections::HashMap;
 
-use geometry::{Field, distance_from_phase_field};
+use geometry::{Field, distances_from_phase_field};
 use rayon::prelude::*;
 
 use crate::vector::Vector;
-use crate::{Error, TriangleMesh, positive};
+use crate::{Error, TriangleMesh};
 
 /// The surface `{u = 0}` of a phase field, around `{u > 0}`.
 ///
@@ -16,9 +16,7 @@ use crate::{Error, TriangleMesh, positive};
 /// # Errors
 /// `eps` must be finite and positive; otherwise as [`isosurface`].
 pub fn phase_field_surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
-    positive("eps", eps)?;
-    u.check_finite()?;
-    isosurface(&u.map(|u| distance_from_phase_field(u, eps)))
+    isosurface(&distances_from_phase_field(u, eps)?)
 }
 
 /// The surface `{s = 0}` of a field, around `{s < 0}`, by marching tetrahedra; without faces where
@@ -71,7 +69,6 @@ pub fn lattice_surface(size: [usize; 3], values: &[f64]) -> Result<TriangleMesh,
 }
 
 fn marched(lattice: &Lattice<'_>) -> Result<TriangleMesh, Error> {
-    let tetrahedra = tetrahedra();
     let mut surface = Surface {
         lattice,
         vertex_of: HashMap::new(),
@@ -93,9 +90,8 @@ fn marched(lattice: &Lattice<'_>) -> Result<TriangleMesh, Error> {
             })
         };
         let reflected = cell.iter().map(|c| c % 2).sum::<usize>() % 2 == 1;
-        for tetrahedron in &tetrahedra {
-            let corners = tetrahedron.corners.map(corner);
-            surface.cut(corners, tetrahedron.positive != reflected);
+        for (corners, positive) in TETRAHEDRA {
+            surface.cut(corners.map(corner), positive != reflected);
         }
     }
     surface.finish()
@@ -279,28 +275,16 @@ fn root(va: f64, vb: f64, bend: f64) -> f64 {
     }
 }
 
-/// Corners of a tetrahedron on the way from the first corner of a cell to the opposite one.
-struct Tetrahedron {
-    /// One bit for every axis.
-    corners: [usize; 4],
-    /// Whether the corners are positively oriented in that order.
-    positive: bool,
-}
-
-fn tetrahedra() -> [Tetrahedron; 6] {
-    const ORDERS: [([usize; 3], bool); 6] = [
-        ([0, 1, 2], true),
-        ([1, 2, 0], true),
-        ([2, 0, 1], true),
-        ([0, 2, 1], false),
-        ([2, 1, 0], false),
-        ([1, 0, 2], false),
-    ];
-    ORDERS.map(|([first, second, _], positive)| Tetrahedron {
-        corners: [0, 1 << first, 1 << first | 1 << second, 7],
-        positive,
-    })
-}
+/// The tetrahedra of a cell: their corners on a way along its edges to the opposite corner, with a bit for every axis, and whether they
+/// are positively oriented in that order.
+const TETRAHEDRA: [([usize; 4], bool); 6] = [
+    ([0, 1, 3, 7], true),
+    ([0, 2, 6, 7], true),
+    ([0, 4, 5, 7], true),
+    ([0, 1, 5, 7], false),
+    ([0, 4, 6, 7], false),
+    ([0, 2, 3, 7], false),
+];
 
 /// The mesh as it grows.
 struct Surface<'a> {

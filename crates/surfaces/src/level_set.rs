@@ -1,13 +1,12 @@
 //! Points on level sets.
 
-use geometry::{Field, Grid, distance_from_phase_field};
+use geometry::{Field, Grid, distances_from_phase_field};
 use rayon::prelude::*;
 
+use crate::Error;
 use crate::vector::Vector;
-use crate::{Error, positive};
 
-/// The distances `-(4 eps/3) atanh u` of a phase field as a function with a continuous gradient: the tensor product of
-/// Catmull-Rom splines, of third order where `u` is smooth.
+/// The distances `-(4 eps/3) atanh u` of a phase field as a function with a continuous gradient, [`Field::spline`].
 #[derive(Clone, Debug)]
 pub(crate) struct LevelSet {
     distance: Field<3>,
@@ -26,9 +25,7 @@ impl LevelSet {
     /// # Errors
     /// `eps` must be finite and positive, the values finite.
     pub(crate) fn new(u: &Field<3>, eps: f64) -> Result<Self, Error> {
-        positive("eps", eps)?;
-        u.check_finite()?;
-        let distance = u.map(|u| distance_from_phase_field(u, eps));
+        let distance = distances_from_phase_field(u, eps)?;
         Ok(Self { distance })
     }
 
@@ -75,53 +72,7 @@ impl LevelSet {
 
     /// The distance at `x` and its gradient.
     pub(crate) fn value_and_gradient(&self, x: Vector) -> (f64, Vector) {
-        let grid = self.grid();
-        let cells = grid.cells();
-        let mut nodes = [[0; 4]; 3];
-        let (mut weights, mut slopes) = ([[0.0; 4]; 3], [[0.0; 4]; 3]);
-        for axis in 0..3 {
-            let position = (x[axis] - grid.origin()[axis]) / grid.spacing();
-            let floor = position.floor();
-            (weights[axis], slopes[axis]) = catmull_rom(position - floor);
-            let first = (floor.rem_euclid(cells as f64)) as usize + cells - 1;
-            nodes[axis] = [0, 1, 2, 3].map(|i| (first + i) % cells);
-        }
-        let (mut value, mut gradient) = (0.0, Vector::ZERO);
-        for (i, &x) in nodes[0].iter().enumerate() {
-            for (j, &y) in nodes[1].iter().enumerate() {
-                let row = grid.index([x, y, 0]);
-                let (mut line, mut slope) = (0.0, 0.0);
-                for (k, &z) in nodes[2].iter().enumerate() {
-                    let distance = self.distance.values()[row + z];
-                    line += weights[2][k] * distance;
-                    slope += slopes[2][k] * distance;
-                }
-                value += weights[0][i] * weights[1][j] * line;
-                gradient += Vector::new(
-                    slopes[0][i] * weights[1][j] * line,
-                    weights[0][i] * slopes[1][j] * line,
-                    weights[0][i] * weights[1][j] * slope,
-                );
-            }
-        }
-        (value, gradient / grid.spacing())
+        let (value, gradient) = self.distance.spline(x.to_array());
+        (value, gradient.into())
     }
-}
-
-/// Weights of four nodes in a row for a point `t` behind the second of them, and their derivatives.
-fn catmull_rom(t: f64) -> ([f64; 4], [f64; 4]) {
-    let (t2, t3) = (t * t, t * t * t);
-    let weights = [
-        -t + 2.0 * t2 - t3,
-        2.0 - 5.0 * t2 + 3.0 * t3,
-        t + 4.0 * t2 - 3.0 * t3,
-        t3 - t2,
-    ];
-    let slopes = [
-        -1.0 + 4.0 * t - 3.0 * t2,
-        -10.0 * t + 9.0 * t2,
-        1.0 + 8.0 * t - 9.0 * t2,
-        3.0 * t2 - 2.0 * t,
-    ];
-    (weights.map(|w| 0.5 * w), slopes.map(|s| 0.5 * s))
 }

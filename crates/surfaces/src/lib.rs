@@ -57,7 +57,6 @@
 //! - Same input, same bytes, for any number of threads.
 
 mod closed;
-mod colours;
 mod distance;
 mod error;
 mod fairing;
@@ -71,7 +70,6 @@ mod normals;
 mod read;
 mod remeshing;
 mod repair;
-mod rewrite;
 pub mod samples;
 pub mod shapes;
 mod signs;
@@ -81,18 +79,15 @@ mod vector;
 mod write;
 
 pub use closed::{ClosedMesh, Warning};
-pub use colours::vertex_colours;
 pub use distance::{MeshDistance, hausdorff_distance};
 pub use error::Error;
-use error::positive;
 pub use fairing::{Fairing, Followed};
 pub use format::usual_up_axis;
 pub use isosurface::{isosurface, lattice_surface, phase_field_surface};
 pub use mesh::TriangleMesh;
 pub use read::error::FormatError;
-pub use read::{decode, read};
+pub use read::{decode, read, rewrite, vertex_colours};
 pub use remeshing::remeshed_surface;
 pub use repair::{Repaired, repair};
-pub use rewrite::rewrite;
 pub use signs::mend_signs;
 pub use write::{encode, write};

@@ -7,7 +7,7 @@ use geometry::measure::BoundingBox;
 use rand::{RngExt, SeedableRng};
 
 use crate::Error;
-use crate::vector::{corners, scaled_normal};
+use crate::vector::{Vector, scaled_normal};
 
 /// Triangles over shared vertices, not necessarily closed; see [`ClosedMesh`](crate::ClosedMesh).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,11 +26,31 @@ impl TriangleMesh {
         BoundingBox::around(self.vertices.iter().copied())
     }
 
+    /// The vertices as vectors.
+    pub(crate) fn points(&self) -> Vec<Vector> {
+        let vertices = self.vertices.iter();
+        vertices.map(|&x| Vector::from_array(x)).collect()
+    }
+
+    /// Corners of a face.
+    pub(crate) fn corners(&self, face: [u32; 3]) -> [Vector; 3] {
+        face.map(|v| Vector::from_array(self.vertices[v as usize]))
+    }
+
+    /// The same faces on other vertices, without normals.
+    pub(crate) fn on(&self, points: &[Vector]) -> Self {
+        Self {
+            vertices: points.iter().map(Vector::to_array).collect(),
+            faces: self.faces.clone(),
+            normals: None,
+        }
+    }
+
     /// The centres of faces with their normals and areas; of large meshes those of every k-th face, at most `most` of them.
     pub fn sides(&self, most: usize) -> impl Iterator<Item = ([f64; 3], [f64; 3], f64)> + Clone {
         let faces = (self.faces.iter()).step_by(self.faces.len().div_ceil(most).max(1));
         let sides = faces.map(|face| {
-            let corners = corners(self, *face);
+            let corners = self.corners(*face);
             let normal = scaled_normal(corners);
             let length = normal.length();
             let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
@@ -91,8 +111,25 @@ impl TriangleMesh {
         Ok(())
     }
 
+    /// With vertices at exactly the same place as one, and without the faces that repeat a vertex then.
+    pub(crate) fn merged(&self) -> Self {
+        let Merged { first, index } = merge_coincident(&self.vertices);
+        let mut merged = self.reindexed(&first, |v| index[v as usize]);
+        merged.faces.retain(has_three_corners);
+        merged
+    }
+
+    /// Keeps the given vertices, among which are those of all faces.
+    pub(crate) fn keeping(&self, kept: &[usize]) -> Self {
+        let mut index = vec![0; self.vertices.len()];
+        for (new, &old) in kept.iter().enumerate() {
+            index[old] = new as u32;
+        }
+        self.reindexed(kept, |v| index[v as usize])
+    }
+
     /// Keeps the given vertices and renumbers the corners; `corner` maps old indices to new ones.
-    pub(crate) fn reindexed(&self, kept: &[usize], corner: impl Fn(u32) -> u32) -> Self {
+    fn reindexed(&self, kept: &[usize], corner: impl Fn(u32) -> u32) -> Self {
         let keep = |values: &[[f64; 3]]| kept.iter().map(|&v| values[v]).collect();
         Self {
             vertices: keep(&self.vertices),
@@ -100,6 +137,11 @@ impl TriangleMesh {
             normals: self.normals.as_deref().map(keep),
         }
     }
+}
+
+/// Whether no vertex is repeated.
+pub(crate) fn has_three_corners(&[a, b, c]: &[u32; 3]) -> bool {
+    a != b && b != c && c != a
 }
 
 /// Positions that coincide exactly, as one.

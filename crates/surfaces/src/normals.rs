@@ -1,12 +1,12 @@
 //! Normals of vertices.
 
 use crate::TriangleMesh;
-use crate::vector::{Vector, corners, scaled_normal};
+use crate::vector::{Vector, scaled_normal};
 
 impl TriangleMesh {
     /// The unit normal of a face; zero for a face without area.
     pub fn face_normal(&self, face: [u32; 3]) -> [f64; 3] {
-        let normal = scaled_normal(corners(self, face)).normalize_or_zero();
+        let normal = scaled_normal(self.corners(face)).normalize_or_zero();
         normal.to_array()
     }
 
@@ -18,10 +18,7 @@ impl TriangleMesh {
     /// Outward unit normals of the vertices: the sums of the unit normals of the faces there, weighted by their angles; zero for
     /// a vertex of no face.
     pub fn vertex_normals(&self) -> Vec<[f64; 3]> {
-        let vertices: Vec<_> = (self.vertices.iter())
-            .map(|&x| Vector::from_array(x))
-            .collect();
-        let sums = angle_weighted_normals(&vertices, &self.faces);
+        let sums = angle_weighted_normals(&self.points(), &self.faces);
         let unit = |sum: Vector| sum.normalize_or_zero().to_array();
         sums.into_iter().map(unit).collect()
     }

@@ -1,9 +1,9 @@
 //! Mesh files in.
 
 pub(crate) mod error;
-pub(crate) mod obj;
-pub(crate) mod ply;
-pub(crate) mod stl;
+mod obj;
+mod ply;
+mod stl;
 
 use std::path::Path;
 
@@ -26,18 +26,14 @@ use error::FormatError;
 /// size).
 ///
 /// # Errors
-/// [`Error::UnknownFormat`]; [`Error::Geometry`] if the file cannot be read; [`Error::Format`] for
+/// [`Error::UnknownFormat`]; [`Error::Io`] if the file cannot be read; [`Error::Format`] for
 /// everything that is wrong with its contents. Whether the surface is closed is another matter: see
 /// [`ClosedMesh`](crate::ClosedMesh).
 pub fn read(path: impl AsRef<Path>) -> Result<TriangleMesh, Error> {
     let path = path.as_ref();
     // Before a long file is read in vain.
     Format::of(path)?;
-    let bytes = std::fs::read(path).map_err(|source| geometry::Error::Io {
-        action: "read",
-        path: path.into(),
-        source,
-    })?;
+    let bytes = std::fs::read(path).map_err(files::Error::of("read", path))?;
     decode(&bytes, path)
 }
 
@@ -46,21 +42,63 @@ pub fn read(path: impl AsRef<Path>) -> Result<TriangleMesh, Error> {
 /// # Errors
 /// [`Error::UnknownFormat`] and [`Error::Format`].
 pub fn decode(bytes: &[u8], path: impl AsRef<Path>) -> Result<TriangleMesh, Error> {
-    let path = path.as_ref();
-    let format = Format::of(path)?;
-    let mesh = if bytes.is_empty() {
-        Err(FormatError::Empty)
-    } else {
-        match format {
-            Format::Obj => obj::decode(bytes),
-            Format::Ply => ply::decode(bytes),
-            Format::Stl => stl::decode(bytes),
-        }
-    };
-    mesh.map_err(|problem| Error::Format {
+    by_format(path.as_ref(), |format| match format {
+        _ if bytes.is_empty() => Err(FormatError::Empty),
+        Format::Obj => obj::decode(bytes),
+        Format::Ply => ply::decode(bytes),
+        Format::Stl => stl::decode(bytes),
+    })
+}
+
+/// The colours (red, green, blue, from 0 to 255) of the vertices in a mesh file, in the order of [`decode`]: `red`, `green` and `blue`
+/// of PLY, as integers or as parts of 1, and three numbers from 0 to 1 after the coordinates in OBJ. `None` where a vertex has none, as
+/// in all STL files.
+///
+/// # Errors
+/// [`Error::UnknownFormat`], and [`Error::Format`] for bytes that are no such mesh.
+pub fn vertex_colours(bytes: &[u8], path: impl AsRef<Path>) -> Result<Option<Vec<[u8; 3]>>, Error> {
+    by_format(path.as_ref(), |format| match format {
+        Format::Obj => Ok(obj::colours(bytes)),
+        Format::Ply => ply::colours(bytes),
+        Format::Stl => Ok(None),
+    })
+}
+
+/// The bytes of a mesh file with the vertices moved to those of `moved`, which has the vertices and faces that [`decode`] finds in
+/// `bytes`, in the same order.
+///
+/// Everything else stays as it is: polygons, texture coordinates, colours, groups, materials, attributes, comments. Normals in the
+/// file are made anew from the faces that refer to them, weighted by area in OBJ and by angle in PLY. Coordinates are rounded to the
+/// type that the file has.
+///
+/// # Errors
+/// [`Error::UnknownFormat`]; [`Error::Format`] for bytes that are no such mesh, and for a PLY file whose coordinates are integers.
+pub fn rewrite(
+    bytes: &[u8],
+    path: impl AsRef<Path>,
+    moved: &TriangleMesh,
+) -> Result<Vec<u8>, Error> {
+    by_format(path.as_ref(), |format| match format {
+        Format::Obj => obj::rewrite(bytes, moved),
+        Format::Ply => ply::rewrite(bytes, moved),
+        Format::Stl => Ok(stl::rewrite(bytes, moved)),
+    })
+}
+
+/// What a reader of the format makes of a file of that name.
+fn by_format<T>(
+    path: &Path,
+    read: impl FnOnce(Format) -> Result<T, FormatError>,
+) -> Result<T, Error> {
+    read(Format::of(path)?).map_err(|problem| Error::Format {
         path: path.into(),
         problem,
     })
+}
+
+/// A part of 1 in 255 steps.
+fn level(part: f64) -> u8 {
+    (255.0 * part.clamp(0.0, 1.0)).round() as u8
 }
 
 /// The start of a text of a file.
@@ -77,17 +115,21 @@ fn position<'a>(
     let mut position = [0.0; 3];
     for coordinate in &mut position {
         let word = words.next().unwrap_or_default();
-        let value: f64 = word.parse().map_err(|_| FormatError::Line {
+        *coordinate = word.parse().map_err(|_| FormatError::Line {
             line,
             found: shortened(word),
             expected: "a coordinate",
         })?;
-        if !value.is_finite() {
-            return Err(FormatError::NonFinite { vertex, value });
-        }
-        *coordinate = value;
     }
-    Ok(position)
+    finite(position, vertex)
+}
+
+/// The position of a vertex, if all its coordinates are numbers.
+fn finite(position: [f64; 3], vertex: usize) -> Result<[f64; 3], FormatError> {
+    match position.into_iter().find(|v| !v.is_finite()) {
+        None => Ok(position),
+        Some(value) => Err(FormatError::NonFinite { vertex, value }),
+    }
 }
 
 /// Polygons cut into triangles, with their indices checked.
@@ -123,22 +165,15 @@ impl Polygons {
                     first: self.first,
                 })
         };
-        let [first, rest @ ..] = corners else {
-            return Err(FormatError::Corners {
-                face,
-                corners: 0,
-                expected: TOO_FEW,
-            });
-        };
-        if rest.len() < 2 {
+        if corners.len() < 3 {
             return Err(FormatError::Corners {
                 face,
                 corners: corners.len(),
-                expected: TOO_FEW,
+                expected: "a face needs at least three",
             });
         }
-        let first = index(first)?;
-        for pair in rest.windows(2) {
+        let first = index(&corners[0])?;
+        for pair in corners[1..].windows(2) {
             self.faces.push([first, index(&pair[0])?, index(&pair[1])?]);
         }
         Ok(())
@@ -153,5 +188,3 @@ impl Polygons {
         Ok(self.faces)
     }
 }
-
-const TOO_FEW: &str = "a face needs at least three";

@@ -153,14 +153,11 @@ struct Remeshing<'a> {
 impl<'a> Remeshing<'a> {
     fn new(level_set: &'a LevelSet, mesh: &TriangleMesh) -> Option<Self> {
         let normals = mesh.normals.as_ref()?.iter();
-        let points = mesh
-            .vertices
-            .iter()
-            .zip(normals)
-            .map(|(&x, &normal)| Point {
-                x: Vector::from_array(x),
-                normal: Vector::from_array(normal),
-            });
+        let points = mesh.points().into_iter().zip(normals);
+        let points = points.map(|(x, &normal)| Point {
+            x,
+            normal: normal.into(),
+        });
         Some(Self {
             level_set,
             spacing: level_set.grid().spacing(),
@@ -435,10 +432,6 @@ impl<'a> Remeshing<'a> {
             normals: Some(self.points.iter().map(|p| p.normal.to_array()).collect()),
         };
         let kept: Vec<usize> = self.surface.vertices().map(|v| v as usize).collect();
-        let mut index = vec![0; mesh.vertices.len()];
-        for (new, &old) in kept.iter().enumerate() {
-            index[old] = new as u32;
-        }
-        mesh.reindexed(&kept, |v| index[v as usize])
+        mesh.keeping(&kept)
     }
 }

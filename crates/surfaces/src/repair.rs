@@ -4,12 +4,11 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 
 use derive_more::Display;
-use geometry::{Field, Grid, optimal_profile};
+use geometry::{Field, Grid, SignedDistance, optimal_profile};
 use rayon::prelude::*;
 
 use crate::hierarchy::Hierarchy;
-use crate::mesh::merge_coincident;
-use crate::vector::{Vector, corners, scaled_normal, solid_angle};
+use crate::vector::{Vector, scaled_normal, solid_angle};
 use crate::{ClosedMesh, Error, MeshDistance, TriangleMesh, remeshed_surface};
 
 /// Part of the box that the mesh fills, so that what closes its holes has room.
@@ -58,20 +57,19 @@ pub fn repair(mesh: &TriangleMesh, cells: usize) -> Result<Repaired, Error> {
     let side = bounds.longest_side() / PART;
     let corner = bounds.centre().map(|x| x - 0.5 * side);
     let grid = Grid::new(cells, side)?.with_origin(corner)?;
-    let merged = merge_coincident(&mesh.vertices);
-    let mut old = mesh.reindexed(&merged.first, |v| merged.index[v as usize]);
-    old.faces.retain(|&[a, b, c]| a != b && b != c && c != a);
+    let mut old = mesh.merged();
     let turned = orient(&mut old.faces);
-    let triangles: Vec<[Vector; 3]> = old.faces.iter().map(|&f| corners(&old, f)).collect();
+    let triangles: Vec<[Vector; 3]> = old.faces.iter().map(|&f| old.corners(f)).collect();
     let tree = Windings::new(&triangles);
     let mut winding = sampled(grid, |x| tree.at(x))?;
     if winding.values().iter().sum::<f64>() < 0.0 {
         winding = winding.map(|w| -w);
     }
     let (hierarchy, _) = Hierarchy::new(&triangles);
-    let unsigned = sampled(grid, |x| {
-        (hierarchy.nearest(x, None)).map_or(f64::NAN, |nearest| nearest.squared_distance.sqrt())
-    })?;
+    let to_old = |x: Vector| {
+        (hierarchy.nearest(x, None)).map_or(f64::INFINITY, |n| n.squared_distance.sqrt())
+    };
+    let unsigned = sampled(grid, to_old)?;
     let eps = EPS_OVER_H * grid.spacing();
     let u = signed(&unsigned, &winding)?.map(|s| optimal_profile(s, eps));
     let new = remeshed_surface(&u, eps)?;
@@ -89,16 +87,11 @@ pub fn repair(mesh: &TriangleMesh, cells: usize) -> Result<Repaired, Error> {
         far / f64::max(all, f64::MIN_POSITIVE)
     };
     let to_new = MeshDistance::new(&new);
-    let to_old = |x: Vector| {
-        (hierarchy.nearest(x, None)).map_or(f64::INFINITY, |n| n.squared_distance.sqrt())
-    };
     Ok(Repaired {
         spacing: grid.spacing(),
         turned,
         added: far_part(new.mesh(), &to_old),
-        dropped: far_part(&old, &|x: Vector| {
-            geometry::SignedDistance::signed_distance(&to_new, x.to_array()).abs()
-        }),
+        dropped: far_part(&old, &|x| to_new.signed_distance(x.to_array()).abs()),
         mesh: new,
     })
 }

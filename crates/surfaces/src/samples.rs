@@ -2,7 +2,7 @@
 //! machine parts, built as isosurfaces of implicit functions.
 
 use geometry::shapes::Capsule;
-use geometry::{Field, Grid, SignedDistance};
+use geometry::{Field, Grid, SignedDistance, require};
 
 use crate::{ClosedMesh, Error, isosurface};
 
@@ -12,7 +12,7 @@ use crate::{ClosedMesh, Error, isosurface};
 /// of the grid on that cube. Below 48 thin parts are not resolved.
 ///
 /// # Errors
-/// [`Error::InvalidParameter`] for fewer than 48 cells.
+/// [`geometry::Error::InvalidParameter`] for fewer than 48 cells.
 pub fn figure(cells: usize) -> Result<ClosedMesh, Error> {
     // Centre and semi-axes.
     const BODY: [([f64; 3], [f64; 3]); 5] = [
@@ -71,7 +71,7 @@ pub fn figure(cells: usize) -> Result<ClosedMesh, Error> {
 /// first; `cells` is the resolution of the grid on that cube.
 ///
 /// # Errors
-/// [`Error::InvalidParameter`] for fewer than 48 cells.
+/// [`geometry::Error::InvalidParameter`] for fewer than 48 cells.
 pub fn lever(cells: usize) -> Result<ClosedMesh, Error> {
     // Boss of the bore and solid boss: centre in the plane of y and z, radius, half width.
     let boss = |[x, y, z]: [f64; 3], centre: [f64; 2], radius: f64, half_width: f64| {
@@ -100,13 +100,8 @@ pub fn lever(cells: usize) -> Result<ClosedMesh, Error> {
 }
 
 fn build(cells: usize, s: impl Fn([f64; 3]) -> f64 + Sync) -> Result<ClosedMesh, Error> {
-    if cells < 48 {
-        return Err(Error::InvalidParameter {
-            name: "cells",
-            value: cells as f64,
-            requirement: "at least 48, to resolve the thin parts",
-        });
-    }
+    let requirement = "at least 48, to resolve the thin parts";
+    require("cells", cells as f64, requirement, |n| n >= 48.0)?;
     let field = Field::from_fn(Grid::centred(cells, 1.0)?, s);
     let (mesh, _) = ClosedMesh::new(isosurface(&field)?)?;
     Ok(mesh)

@@ -11,23 +11,8 @@ use crate::{ClosedMesh, Error, samples};
 /// A box or a ball in the box of the grid, written `box:x0,y0,x1,y1` or `ball:x,y,r`, in 3D with `z`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
-    kind: Kind,
+    is_ball: bool,
     numbers: Vec<f64>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    Box,
-    Ball,
-}
-
-impl Kind {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Box => "box",
-            Self::Ball => "ball",
-        }
-    }
 }
 
 impl Region {
@@ -38,15 +23,12 @@ impl Region {
 
     /// What the region is called: box or ball.
     pub fn name(&self) -> &'static str {
-        self.kind.name()
+        if self.is_ball { "ball" } else { "box" }
     }
 
     /// The dimension of space that its numbers fit; a wrong number of them is left to [`Self::shape`].
     pub fn dimension(&self) -> usize {
-        let in_space = match self.kind {
-            Kind::Box => 6,
-            Kind::Ball => 4,
-        };
+        let in_space = if self.is_ball { 4 } else { 6 };
         if self.numbers.len() < in_space { 2 } else { 3 }
     }
 
@@ -55,33 +37,28 @@ impl Region {
     /// # Errors
     /// [`Error::Shape`] if there are too many or too few numbers, or if they enclose nothing.
     pub fn shape<const D: usize>(&self) -> Result<Box<dyn SignedDistance<D>>, Error> {
-        let needed = match self.kind {
-            Kind::Box => 2 * D,
-            Kind::Ball => D + 1,
-        };
+        let needed = if self.is_ball { D + 1 } else { 2 * D };
         let numbers = &self.numbers;
         if numbers.len() != needed {
             return Err(Error::Shape(format!(
                 "{self} has {} numbers, and a {} in {D}D has {needed}",
                 numbers.len(),
-                self.kind.name()
+                self.name()
             )));
         }
         let first: [f64; D] = std::array::from_fn(|i| numbers[i]);
-        Ok(match self.kind {
-            Kind::Ball => Box::new(Ball::new(first, numbers[D])?),
-            Kind::Box => {
-                let last: [f64; D] = std::array::from_fn(|i| numbers[D + i]);
-                if (0..D).any(|i| first[i] >= last[i]) {
-                    return Err(Error::Shape(format!(
-                        "{self} is empty: give the lower corner first, then the upper one"
-                    )));
-                }
-                let half = std::array::from_fn(|i| 0.5 * (last[i] - first[i]));
-                let centre = std::array::from_fn(|i| 0.5 * (first[i] + last[i]));
-                Box::new(Cuboid::new(half)?.translated(centre))
-            }
-        })
+        if self.is_ball {
+            return Ok(Box::new(Ball::new(first, numbers[D])?));
+        }
+        let last: [f64; D] = std::array::from_fn(|i| numbers[D + i]);
+        if (0..D).any(|i| first[i] >= last[i]) {
+            return Err(Error::Shape(format!(
+                "{self} is empty: give the lower corner first, then the upper one"
+            )));
+        }
+        let half = std::array::from_fn(|i| 0.5 * (last[i] - first[i]));
+        let centre = std::array::from_fn(|i| 0.5 * (first[i] + last[i]));
+        Ok(Box::new(Cuboid::new(half)?.translated(centre)))
     }
 }
 
@@ -90,9 +67,9 @@ impl FromStr for Region {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let advice = "give box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z";
-        let (kind, rest) = match text.split_once(':') {
-            Some(("box", rest)) => (Kind::Box, rest),
-            Some(("ball", rest)) => (Kind::Ball, rest),
+        let (is_ball, rest) = match text.split_once(':') {
+            Some(("box", rest)) => (false, rest),
+            Some(("ball", rest)) => (true, rest),
             _ => return Err(format!("{text:?} is no region: {advice}")),
         };
         let numbers = rest
@@ -104,14 +81,14 @@ impl FromStr for Region {
                 )),
             })
             .collect::<Result<_, _>>()?;
-        Ok(Self { kind, numbers })
+        Ok(Self { is_ball, numbers })
     }
 }
 
 impl fmt::Display for Region {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let numbers: Vec<String> = self.numbers.iter().map(ToString::to_string).collect();
-        write!(f, "{}:{}", self.kind.name(), numbers.join(","))
+        write!(f, "{}:{}", self.name(), numbers.join(","))
     }
 }
 

@@ -1,7 +1,7 @@
 //! Smoothing of meshes by their edges, and the noise that there is to smooth.
 
 use crate::TriangleMesh;
-use crate::vector::{Vector, corners};
+use crate::vector::Vector;
 
 /// Rounds in which the squares of noise are averaged over neighbours, some forty of them,
 const AVERAGING: usize = 12;
@@ -9,38 +9,27 @@ const AVERAGING: usize = 12;
 const MEDIAN_OF_MEANS: f64 = 0.99;
 
 /// The neighbours of every vertex along edges, in ascending order.
-struct Umbrellas {
-    /// Where the neighbours of a vertex begin.
-    begin: Vec<usize>,
-    neighbours: Vec<u32>,
-}
+struct Umbrellas(Vec<Vec<u32>>);
 
 impl Umbrellas {
     fn of(mesh: &TriangleMesh) -> Self {
-        let mut edges: Vec<[u32; 2]> = (mesh.faces.iter())
-            .flat_map(|&[a, b, c]| [[a, b], [b, a], [b, c], [c, b], [c, a], [a, c]])
-            .collect();
-        edges.sort_unstable();
-        edges.dedup();
-        let mut begin = vec![0; mesh.vertices.len() + 1];
-        for [vertex, _] in &edges {
-            begin[*vertex as usize + 1] += 1;
+        let mut neighbours = vec![Vec::new(); mesh.vertices.len()];
+        for &[a, b, c] in &mesh.faces {
+            neighbours[a as usize].extend([b, c]);
+            neighbours[b as usize].extend([c, a]);
+            neighbours[c as usize].extend([a, b]);
         }
-        for vertex in 0..mesh.vertices.len() {
-            begin[vertex + 1] += begin[vertex];
+        for around in &mut neighbours {
+            around.sort_unstable();
+            around.dedup();
         }
-        let neighbours = edges.into_iter().map(|[_, neighbour]| neighbour).collect();
-        Self { begin, neighbours }
-    }
-
-    fn of_vertex(&self, vertex: usize) -> &[u32] {
-        &self.neighbours[self.begin[vertex]..self.begin[vertex + 1]]
+        Self(neighbours)
     }
 
     /// `L x = x - (mean of the neighbours)`; zero where there are none.
     fn laplacian(&self, x: &[Vector]) -> Vec<Vector> {
         let at = |vertex: usize| {
-            let around = self.of_vertex(vertex);
+            let around = &self.0[vertex];
             if around.is_empty() {
                 return Vector::ZERO;
             }
@@ -66,11 +55,11 @@ impl Umbrellas {
     fn squared_weights(&self, vertex: usize, weights: &mut Vec<(u32, f64)>) -> f64 {
         weights.clear();
         weights.push((vertex as u32, 1.0));
-        let around = self.of_vertex(vertex);
+        let around = &self.0[vertex];
         let share = 1.0 / around.len() as f64;
         for &near in around {
             weights.push((near, -2.0 * share));
-            let next = self.of_vertex(near as usize);
+            let next = &self.0[near as usize];
             let part = share / next.len() as f64;
             weights.extend(next.iter().map(|&far| (far, part)));
         }
@@ -89,15 +78,9 @@ impl TriangleMesh {
     /// With `mu = 0` it is Laplacian smoothing. G. Taubin: A signal processing approach to fair surface design. SIGGRAPH (1995).
     #[must_use]
     pub fn smoothed(&self, iterations: usize, lambda: f64, mu: f64) -> Self {
-        let mut x: Vec<Vector> = (self.vertices.iter())
-            .map(|&x| Vector::from_array(x))
-            .collect();
+        let mut x = self.points();
         Umbrellas::of(self).smooth(&mut x, iterations, [lambda, mu]);
-        Self {
-            vertices: x.iter().map(Vector::to_array).collect(),
-            faces: self.faces.clone(),
-            normals: None,
-        }
+        self.on(&x)
     }
 
     /// The smooth surface with what it is off the rough one on the average over neighbours: `x + A (y - x)` with the vertices `y` of
@@ -118,12 +101,9 @@ impl TriangleMesh {
         let rounds = (0.5_f64.ln() / round.max(0.0).ln())
             .clamp(ROUNDS[0], ROUNDS[1])
             .round() as usize;
-        let umbrellas = Umbrellas::of(self);
-        let pairs = self.vertices.iter().zip(&rough.vertices);
-        let mut offset: Vec<Vector> = pairs
-            .map(|(&x, &y)| Vector::from_array(y) - Vector::from_array(x))
-            .collect();
-        umbrellas.smooth(&mut offset, rounds, FACTORS);
+        let pairs = self.points().into_iter().zip(rough.points());
+        let mut offset: Vec<Vector> = pairs.map(|(x, y)| y - x).collect();
+        Umbrellas::of(self).smooth(&mut offset, rounds, FACTORS);
         self.moved_by(&offset)
     }
 
@@ -167,19 +147,17 @@ impl TriangleMesh {
         volume: f64,
         shortened: impl Fn(usize, [f64; 3]) -> f64,
     ) -> Self {
-        let umbrellas = Umbrellas::of(self);
+        let (umbrellas, original) = (Umbrellas::of(self), self.points());
         let mut moved = self.clone();
         for _ in 0..rounds {
-            let mut x: Vec<Vector> = moved.vertices.iter().map(|&x| x.into()).collect();
+            let mut x = moved.points();
             umbrellas.smooth(&mut x, 1, [0.5, 0.0]);
-            moved.vertices = x.iter().map(Vector::to_array).collect();
-            moved = moved.towards_volume(volume, |_| true);
-            let pairs = moved.vertices.iter_mut().zip(&self.vertices);
-            for (vertex, (x, &from)) in pairs.enumerate() {
-                let way = Vector::from_array(*x) - Vector::from_array(from);
-                let part = shortened(vertex, way.to_array());
-                *x = (Vector::from_array(from) + part * way).to_array();
+            let mut x = self.on(&x).towards_volume(volume, |_| true).points();
+            for (vertex, (x, &from)) in x.iter_mut().zip(&original).enumerate() {
+                let way = *x - from;
+                *x = from + shortened(vertex, way.to_array()) * way;
             }
+            moved = self.on(&x);
         }
         moved.with_volume(volume, |_| true)
     }
@@ -189,7 +167,7 @@ impl TriangleMesh {
         // From a point close by, so that far-away meshes do not lose digits.
         let origin = self.vertices.first().copied().unwrap_or_default();
         let sixths = self.faces.iter().map(|&face| {
-            let [a, b, c] = corners(self, face).map(|x| x - Vector::from_array(origin));
+            let [a, b, c] = self.corners(face).map(|x| x - Vector::from_array(origin));
             let [u, v, w] = face.map(|vertex| velocities[vertex as usize]);
             u.dot(b.cross(c)) + v.dot(c.cross(a)) + w.dot(a.cross(b))
         });
@@ -199,21 +177,15 @@ impl TriangleMesh {
     /// Mean length of the edges, each as often as it has faces.
     pub(crate) fn mean_edge(&self) -> f64 {
         let edges = self.faces.iter().flat_map(|&face| {
-            let [a, b, c] = corners(self, face);
+            let [a, b, c] = self.corners(face);
             [a.distance(b), b.distance(c), c.distance(a)]
         });
         edges.sum::<f64>() / (3 * self.faces.len()).max(1) as f64
     }
 
     fn moved_by(&self, offset: &[Vector]) -> Self {
-        let pairs = self.vertices.iter().zip(offset);
-        Self {
-            vertices: pairs
-                .map(|(&x, &by)| (Vector::from_array(x) + by).to_array())
-                .collect(),
-            faces: self.faces.clone(),
-            normals: None,
-        }
+        let pairs = self.points().into_iter().zip(offset);
+        self.on(&pairs.map(|(x, &by)| x + by).collect::<Vec<_>>())
     }
 
     /// The standard deviation of the noise of the vertices along their normals, as far as it is independent from vertex to vertex.
@@ -224,16 +196,12 @@ impl TriangleMesh {
     /// small one, by its curvature. Zero for a mesh without faces.
     pub fn noise(&self) -> f64 {
         let umbrellas = Umbrellas::of(self);
-        let x: Vec<Vector> = (self.vertices.iter())
-            .map(|&x| Vector::from_array(x))
-            .collect();
+        let x = self.points();
         let twice = umbrellas.laplacian(&umbrellas.laplacian(&x));
         // Normals of the smoothed mesh: noise turns those of the mesh itself, towards the plane of their neighbours.
         let normals = self.smoothed(12, 0.5, -0.53).vertex_normals();
         let mut weights = Vec::new();
-        let inner: Vec<bool> = (0..x.len())
-            .map(|v| umbrellas.of_vertex(v).len() > 2)
-            .collect();
+        let inner: Vec<bool> = umbrellas.0.iter().map(|near| near.len() > 2).collect();
         // A number at each vertex, as a vector.
         let mut squares = vec![Vector::ZERO; x.len()];
         for v in (0..x.len()).filter(|&v| inner[v]) {

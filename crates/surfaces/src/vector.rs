@@ -2,13 +2,6 @@
 
 pub(crate) use glam::DVec3 as Vector;
 
-use crate::TriangleMesh;
-
-/// Corners of a face.
-pub(crate) fn corners(mesh: &TriangleMesh, face: [u32; 3]) -> [Vector; 3] {
-    face.map(|v| Vector::from_array(mesh.vertices[v as usize]))
-}
-
 /// Normal whose length is twice the area.
 pub(crate) fn scaled_normal([a, b, c]: [Vector; 3]) -> Vector {
     (b - a).cross(c - a)

@@ -3,10 +3,10 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use geometry::file::write_atomically;
+use files::write_atomically;
 
 use crate::format::Format;
-use crate::vector::{Vector, corners, scaled_normal};
+use crate::vector::{Vector, scaled_normal};
 use crate::{Error, TriangleMesh};
 
 /// Writes a mesh, atomically (see [`write_atomically`]); the extension (`.obj`, `.ply`, `.stl`)
@@ -19,7 +19,7 @@ use crate::{Error, TriangleMesh};
 /// # Errors
 /// [`Error::UnknownFormat`]; [`Error::NoFaces`]; [`Error::NonFiniteVertex`], for STL also beyond
 /// single precision; [`Error::Normals`]; [`Error::IndexOutOfRange`]; [`Error::TooLarge`];
-/// [`Error::Geometry`] if the file cannot be written.
+/// [`Error::Io`] if the file cannot be written.
 pub fn write(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<(), Error> {
     let path = path.as_ref();
     let bytes = encode(path, mesh)?;
@@ -45,16 +45,12 @@ pub fn encode(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<Vec<u8>, Er
         return Err(Error::NoFaces);
     }
     let mut bytes = Vec::new();
-    match format {
+    let encoded = match format {
         Format::Obj => obj(&mut bytes, mesh),
         Format::Ply => ply(&mut bytes, mesh),
         Format::Stl => stl(&mut bytes, mesh, faces),
-    }
-    .map_err(|source| geometry::Error::Io {
-        action: "encode",
-        path: path.into(),
-        source,
-    })?;
+    };
+    encoded.expect("writing to memory does not fail");
     Ok(bytes)
 }
 
@@ -111,7 +107,7 @@ fn stl(out: &mut dyn Write, mesh: &TriangleMesh, faces: u32) -> io::Result<()> {
     for &face in &mesh.faces {
         // The normal is that of the rounded corners.
         let rounded = |x: Vector| x.to_array().map(|v| v as f32);
-        let corners = corners(mesh, face).map(rounded);
+        let corners = mesh.corners(face).map(rounded);
         let normal = scaled_normal(corners.map(|x| Vector::from_array(x.map(f64::from))));
         let normal = rounded(normal.normalize_or_zero());
         for value in [normal].as_flattened().iter().chain(corners.as_flattened()) {

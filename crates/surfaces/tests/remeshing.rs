@@ -320,7 +320,7 @@ fn wrong_fields_and_widths_are_refused() {
     assert!(remeshed_surface(&u, 0.1).unwrap().faces.is_empty());
     for eps in [0.0, -1.0, f64::NAN] {
         let error = remeshed_surface(&u, eps).unwrap_err();
-        assert!(matches!(error, Error::InvalidParameter { .. }));
+        assert!(matches!(error, Error::Geometry(_)));
     }
     u.values_mut()[17] = f64::NAN;
     let error = remeshed_surface(&u, 0.1).unwrap_err();

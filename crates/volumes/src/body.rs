@@ -164,19 +164,13 @@ struct Part {
 impl Part {
     fn of(volume: &Volume, inside: Inside) -> Result<Self, Error> {
         let (mut low, mut high, mut count) = ([usize::MAX; 3], [0; 3], 0);
-        let size = volume.size();
-        for k in 0..size[2] {
-            for j in 0..size[1] {
-                for i in 0..size[0] {
-                    let index = [i, j, k];
-                    if inside.holds(volume.value(index)) {
-                        count += 1;
-                        for axis in 0..3 {
-                            low[axis] = low[axis].min(index[axis]);
-                            high[axis] = high[axis].max(index[axis]);
-                        }
-                    }
-                }
+        let found = volume.values().enumerate();
+        for (voxel, _) in found.filter(|(_, value)| inside.holds(*value)) {
+            let index = volume.index(voxel);
+            count += 1;
+            for axis in 0..3 {
+                low[axis] = low[axis].min(index[axis]);
+                high[axis] = high[axis].max(index[axis]);
             }
         }
         if count == 0 {
@@ -211,18 +205,14 @@ impl Part {
                 -depth.abs()
             }
         };
-        let [nx, ny, nz] = self.size;
-        let mut values = Vec::with_capacity(nx * ny * nz);
-        for i in 0..nx {
-            for j in 0..ny {
-                for k in 0..nz {
-                    let offset = [i, j, k].map(|i| i as isize);
-                    let voxel = std::array::from_fn(|axis| self.first[axis] + offset[axis]);
-                    // Negative inside.
-                    values.push(-depth(voxel));
-                }
-            }
-        }
+        // Negative inside, the last axis fastest.
+        let [_, ny, nz] = self.size;
+        let value = |node: usize| {
+            let offset = [node / (ny * nz), node / nz % ny, node % nz];
+            -depth([0, 1, 2].map(|axis| self.first[axis] + offset[axis] as isize))
+        };
+        let nodes = 0..self.size.iter().product();
+        let values: Vec<f64> = nodes.map(value).collect();
         let mut mesh = lattice_surface(self.size, &values)?;
         for x in &mut mesh.vertices {
             *x = std::array::from_fn(|axis| x[axis] + self.first[axis] as f64);

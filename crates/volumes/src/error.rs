@@ -9,12 +9,8 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum Error {
     /// The operating system refused.
-    #[error("could not {action} {path}", path = path.display())]
-    Io {
-        action: &'static str,
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Io(#[from] files::Error),
     /// A file is no usable volume.
     #[error("{path} cannot be read as a volume: {problem}", path = path.display())]
     Format { path: PathBuf, problem: FormatError },
@@ -79,6 +75,21 @@ fn shown([x, y, z]: [u64; 3], bytes: u64) -> String {
 }
 
 impl FormatError {
+    /// An entry of a header that cannot be used.
+    pub(crate) fn entry<T>(
+        format: &'static str,
+        entry: &'static str,
+        value: &impl ToString,
+        requirement: &'static str,
+    ) -> Result<T, Self> {
+        Err(Self::Header {
+            format,
+            entry,
+            value: value.to_string(),
+            requirement,
+        })
+    }
+
     pub(crate) fn damaged(format: &'static str, error: &impl ToString) -> Self {
         Self::Damaged {
             format,

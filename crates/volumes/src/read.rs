@@ -1,6 +1,5 @@
 //! Files in.
 
-mod fields;
 mod mrc;
 mod nifti;
 mod stack;
@@ -39,11 +38,7 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 /// none, absurd sizes, values that are not finite.
 pub fn read(path: impl AsRef<Path>) -> Result<Volume, Error> {
     let path = path.as_ref();
-    let bytes = std::fs::read(path).map_err(|source| Error::Io {
-        action: "read",
-        path: path.into(),
-        source,
-    })?;
+    let bytes = std::fs::read(path).map_err(files::Error::of("read", path))?;
     decode(&bytes).map_err(|problem| Error::Format {
         path: path.into(),
         problem,
@@ -60,20 +55,10 @@ pub fn decode(bytes: &[u8]) -> Result<Volume, FormatError> {
         return stack::decode(bytes, limit);
     }
     if bytes.starts_with(&GZIP) {
-        return unpacked(MultiGzDecoder::new(bytes), limit);
+        unpacked(MultiGzDecoder::new(bytes), limit)
+    } else {
+        unpacked(bytes, limit)
     }
-    let header = header(&bytes[..bytes.len().min(HEAD)])?;
-    let expected = header.end(limit)?;
-    let found = bytes.len() as u64;
-    if found != expected {
-        let longer = false;
-        return Err(FormatError::Length {
-            expected,
-            found,
-            longer,
-        });
-    }
-    header.volume(bytes[header.start as usize..].to_vec())
 }
 
 /// A header with the voxels behind it, while they are unpacked.
@@ -99,6 +84,23 @@ fn unpacked(mut packed: impl Read, limit: u64) -> Result<Volume, FormatError> {
     header.volume(bytes)
 }
 
+/// Numbers in a header.
+struct Fields<'a> {
+    bytes: &'a [u8],
+    big_endian: bool,
+}
+
+impl Fields<'_> {
+    fn number(&self, at: usize, number: Number) -> f64 {
+        number.decode(&self.bytes[at..at + number.size()], self.big_endian)
+    }
+
+    /// Numbers in a row.
+    fn numbers<const N: usize>(&self, at: usize, number: Number) -> [f64; N] {
+        std::array::from_fn(|i| self.number(at + number.size() * i, number))
+    }
+}
+
 /// What comes before the voxels.
 struct Header {
     size: [u64; 3],
@@ -116,6 +118,14 @@ fn header(head: &[u8]) -> Result<Header, FormatError> {
         let start = head.iter().take(8).copied().collect();
         Err(FormatError::Unknown { start })
     })
+}
+
+/// Numbers of voxels.
+fn size(format: &'static str, size: [f64; 3]) -> Result<[u64; 3], FormatError> {
+    match size.iter().find(|&&n| n < 2.0) {
+        Some(n) => FormatError::entry(format, "number of voxels", n, "2 at least along each axis"),
+        None => Ok(size.map(|n| n as u64)),
+    }
 }
 
 impl Header {

@@ -146,7 +146,8 @@ impl Volume {
         &self.frame
     }
 
-    fn index(&self, voxel: usize) -> [usize; 3] {
+    /// Where a voxel is of which so many are before it.
+    pub(crate) fn index(&self, voxel: usize) -> [usize; 3] {
         let [x, y, _] = self.size;
         [voxel % x, voxel / x % y, voxel / (x * y)]
     }

@@ -27,7 +27,7 @@ pub fn write(path: impl AsRef<Path>, volume: &Volume) -> Result<(), Error> {
     if !packed && !ends(path, "nii") {
         return Err(Error::UnknownFormat { path: path.into() });
     }
-    let written = files::write_atomically(path, |out| {
+    Ok(files::write_atomically(path, |out| {
         if packed {
             let mut packed = GzEncoder::new(out, Compression::default());
             nifti(&mut packed, volume)?;
@@ -35,12 +35,7 @@ pub fn write(path: impl AsRef<Path>, volume: &Volume) -> Result<(), Error> {
         } else {
             nifti(out, volume)
         }
-    });
-    written.map_err(|error| Error::Io {
-        action: error.action,
-        path: error.path,
-        source: error.source,
-    })
+    })?)
 }
 
 fn nifti(out: &mut dyn Write, volume: &Volume) -> io::Result<()> {

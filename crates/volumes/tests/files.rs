@@ -185,7 +185,7 @@ fn labels_are_written_and_read_back() {
     let error = write(folder.path().join("a.mrc"), &volume).unwrap_err();
     assert!(matches!(error, Error::UnknownFormat { .. }), "{error}");
     let error = read(folder.path().join("none.nii")).unwrap_err();
-    assert!(matches!(error, Error::Io { .. }), "{error}");
+    assert!(matches!(error, Error::Io(_)), "{error}");
 }
 
 #[test]

@@ -53,7 +53,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let distance = meshes::sampled(&distance, grid, &bar)?;
     bar.finish();
     if volume {
-        vti::write(&options.output, &[("signed_distance", &distance)])?;
+        vti::write(&options.output, "signed_distance", &distance)?;
     } else {
         npy::write(&options.output, &distance)?;
     }

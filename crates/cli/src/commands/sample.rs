@@ -105,7 +105,7 @@ fn write<const D: usize, O: Outlet<D>>(
     match &*extension(path) {
         "npy" => npy::write(path, &u)?,
         "nii" | "gz" => volumes::write(path, &segmentation(&u, path)?)?,
-        "vti" => vti::write(path, &[("phase_field", &u)])?,
+        "vti" => vti::write(path, "phase_field", &u)?,
         "png" => start.outlet.picture(&u, &u, eps(&u))?.write_png(path)?,
         _ => {
             O::check_saved(path)?;

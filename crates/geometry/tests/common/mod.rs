@@ -15,14 +15,3 @@ pub fn doubles(shape: &str, values: &[f64]) -> Vec<u8> {
     let data: Vec<&[u8]> = data.iter().map(|v| &v[..]).collect();
     foreign("<f8", false, shape, &data)
 }
-
-/// Written by VTK 9.7: the same two arrays in the encodings it knows, in blocks of 32 bytes where
-/// they are compressed.
-pub const BY_VTK: [&[u8]; 6] = [
-    include_bytes!("../vtk/ascii.vti"),
-    include_bytes!("../vtk/inline_f64.vti"),
-    include_bytes!("../vtk/inline_zlib_u64.vti"),
-    include_bytes!("../vtk/raw_f64_u64.vti"),
-    include_bytes!("../vtk/raw_zlib_f64.vti"),
-    include_bytes!("../vtk/base64_zlib.vti"),
-];

@@ -24,7 +24,7 @@ pub(super) fn decode(
         .jpeg_set_max_scans(MOST_SCANS)
         .set_strict_mode(true);
     let mut decoder = JpegDecoder::new_with_options(Cursor::new(bytes), options);
-    decoder.decode_headers().map_err(refused)?;
+    decoder.decode_headers()?;
     let (width, height) = decoder.dimensions().ok_or_else(|| unusual("no size"))?;
     let [width, height] = [width, height].map(|n| n as u32);
     let count = checked(width, height)?;
@@ -38,7 +38,7 @@ pub(super) fn decode(
     };
     decoder.set_options(options.jpeg_set_out_colorspace(output));
     let mut data = vec![0; channels * count];
-    decoder.decode_into(&mut data).map_err(refused)?;
+    decoder.decode_into(&mut data)?;
     let image = match channels {
         1 => image::GrayImage::from_raw(width, height, data).map(DynamicImage::from),
         _ => image::RgbImage::from_raw(width, height, data).map(DynamicImage::from),
@@ -53,7 +53,8 @@ fn unusual(message: &str) -> FormatError {
     FormatError::damaged("JPEG", message)
 }
 
-#[allow(clippy::needless_pass_by_value, reason = "for map_err")]
-fn refused(error: DecodeErrors) -> FormatError {
-    unusual(&error.to_string())
+impl From<DecodeErrors> for FormatError {
+    fn from(error: DecodeErrors) -> Self {
+        unusual(&error.to_string())
+    }
 }

@@ -3,46 +3,79 @@
 //! Not by a library: of those, `tobj` takes polylines for faces, splits vertices between groups,
 //! and tells no line numbers; `obj` reads single precision.
 
-use super::{FormatError, Polygons, position, shortened};
+use super::{FormatError, Polygons, level, position, shortened};
 use crate::TriangleMesh;
-use crate::colours::level;
 use crate::vector::Vector;
 
-/// Vertices and faces; all other statements are passed over.
-pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
-    // Names and comments may be in any encoding.
-    let text = String::from_utf8_lossy(bytes);
-    let mut vertices = Vec::new();
-    // All corners in a row, counted from one, and where each face ends.
-    let (mut corners, mut ends) = (Vec::new(), Vec::new());
-    for (number, line) in text.lines().enumerate() {
-        let mut words = line.split_whitespace();
-        match words.next() {
-            Some("v") => vertices.push(position(words, number + 1, vertices.len())?),
-            Some("f") => {
-                for word in words {
-                    corners.push(corner(word, number + 1, vertices.len())?);
+/// What counts of a text; all other statements are passed over.
+#[derive(Default)]
+struct Statements {
+    vertices: Vec<[f64; 3]>,
+    /// Number of normals.
+    normals: usize,
+    /// All corners of faces in a row: the vertex, counted from one, and the normal, counted from zero, that it refers to.
+    corners: Vec<(i64, Option<usize>)>,
+    /// Where each face ends.
+    ends: Vec<usize>,
+}
+
+impl Statements {
+    fn of(bytes: &[u8]) -> Result<Self, FormatError> {
+        // Names and comments may be in any encoding.
+        let text = String::from_utf8_lossy(bytes);
+        let mut found = Self::default();
+        for (number, line) in text.lines().enumerate() {
+            let mut words = line.split_whitespace();
+            let vertices = found.vertices.len();
+            match words.next() {
+                Some("v") => (found.vertices).push(position(words, number + 1, vertices)?),
+                Some("vn") => found.normals += 1,
+                Some("f") => {
+                    for word in words {
+                        let vertex = corner(word, number + 1, vertices)?;
+                        found.corners.push((vertex, found.normal(word)));
+                    }
+                    found.ends.push(found.corners.len());
                 }
-                ends.push(corners.len());
+                _ => {}
             }
-            _ => {}
         }
+        Ok(found)
     }
-    let mut polygons = Polygons::new(vertices.len(), 1)?;
-    let mut start = 0;
-    for (face, &end) in ends.iter().enumerate() {
-        polygons.push(face, &corners[start..end])?;
-        start = end;
+
+    /// The corners of each face.
+    fn faces(&self) -> impl Iterator<Item = &[(i64, Option<usize>)]> {
+        let starts = std::iter::once(&0).chain(&self.ends);
+        (starts.zip(&self.ends)).map(|(&start, &end)| &self.corners[start..end])
+    }
+
+    /// The normal of a corner `v//vn` or `v/vt/vn`; negative ones count backwards from the last normal so far.
+    fn normal(&self, word: &str) -> Option<usize> {
+        let normal: i64 = word.split('/').nth(2)?.parse().ok()?;
+        let first = if normal < 0 { self.normals as i64 } else { -1 };
+        usize::try_from(first.checked_add(normal)?).ok()
+    }
+}
+
+/// Vertices and faces.
+pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
+    let found = Statements::of(bytes)?;
+    let mut polygons = Polygons::new(found.vertices.len(), 1)?;
+    let mut corners = Vec::new();
+    for (number, face) in found.faces().enumerate() {
+        corners.clear();
+        corners.extend(face.iter().map(|(vertex, _)| vertex));
+        polygons.push(number, &corners)?;
     }
     Ok(TriangleMesh {
         faces: polygons.finish()?,
-        vertices,
+        vertices: found.vertices,
         normals: None,
     })
 }
 
 /// The colours behind the coordinates of the vertices, if all have some.
-pub(crate) fn colours(bytes: &[u8]) -> Option<Vec<[u8; 3]>> {
+pub(super) fn colours(bytes: &[u8]) -> Option<Vec<[u8; 3]>> {
     let text = String::from_utf8_lossy(bytes);
     let vertices = text
         .lines()
@@ -81,7 +114,7 @@ fn corner(word: &str, line: usize, so_far: usize) -> Result<i64, FormatError> {
 }
 
 /// The text with other coordinates of vertices, and with normals to fit them.
-pub(crate) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<u8>, FormatError> {
+pub(super) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<u8>, FormatError> {
     let mut normals = normals(bytes, moved)?.into_iter();
     let mut vertices = moved.vertices.iter();
     let mut out = Vec::with_capacity(bytes.len());
@@ -110,36 +143,22 @@ pub(crate) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<u8>, For
 
 /// For every normal in the text the unit normal of the corners that refer to it, which tells flat faces from smooth ones.
 fn normals(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<Vector>, FormatError> {
-    let text = String::from_utf8_lossy(bytes);
-    let mut sums = Vec::new();
-    let (mut vertices, mut uses) = (0, Vec::new());
-    for (number, line) in text.lines().enumerate() {
-        let mut words = line.split_whitespace();
-        match words.next() {
-            Some("v") => vertices += 1,
-            Some("vn") => sums.push(Vector::ZERO),
-            Some("f") => {
-                let mut polygon = Vec::new();
-                for word in words {
-                    let vertex = corner(word, number + 1, vertices)? - 1;
-                    let normal = word.split('/').nth(2).and_then(|n| n.parse::<i64>().ok());
-                    let normal = normal.map(|n| if n < 0 { n + sums.len() as i64 } else { n - 1 });
-                    let position = moved.vertices.get(vertex as usize).copied();
-                    polygon.push((Vector::from_array(position.unwrap_or_default()), normal));
-                }
-                // Twice the vector area.
-                let area: Vector = (0..polygon.len())
-                    .map(|i| polygon[i].0.cross(polygon[(i + 1) % polygon.len()].0))
-                    .sum();
-                uses.extend(polygon.into_iter().map(|(_, normal)| (normal, area)));
+    let found = Statements::of(bytes)?;
+    let mut sums = vec![Vector::ZERO; found.normals];
+    for face in found.faces() {
+        let place = |&(vertex, _): &(i64, Option<usize>)| {
+            let position = moved.vertices.get((vertex - 1) as usize);
+            Vector::from_array(position.copied().unwrap_or_default())
+        };
+        // Twice the vector area.
+        let next = face.iter().cycle().skip(1);
+        let area: Vector = (face.iter().zip(next))
+            .map(|(a, b)| place(a).cross(place(b)))
+            .sum();
+        for normal in face.iter().filter_map(|(_, normal)| *normal) {
+            if let Some(sum) = sums.get_mut(normal) {
+                *sum += area;
             }
-            _ => {}
-        }
-    }
-    for (normal, area) in uses {
-        let sum = normal.and_then(|n| sums.get_mut(usize::try_from(n).ok()?));
-        if let Some(sum) = sum {
-            *sum += area;
         }
     }
     Ok(sums.into_iter().map(Vector::normalize_or_zero).collect())

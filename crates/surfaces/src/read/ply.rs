@@ -6,19 +6,20 @@ mod header;
 use body::Body;
 use header::{Element, Header};
 
-use super::{FormatError, Polygons};
+use super::{FormatError, Polygons, finite, level};
 use crate::TriangleMesh;
-use crate::colours::level;
 
 /// Elements that hold faces: polygons, and strips of triangles.
 const FACES: [&str; 2] = ["face", STRIPS];
 const STRIPS: &str = "tristrips";
 
+const NO_VERTICES: FormatError = FormatError::Undeclared {
+    missing: "an element vertex",
+};
+
 pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
-    let (header, begin) = Header::parse(bytes)?;
-    let vertices = header.element("vertex").ok_or(FormatError::Undeclared {
-        missing: "an element vertex",
-    })?;
+    let header = Header::parse(bytes)?;
+    let vertices = header.element("vertex").ok_or(NO_VERTICES)?;
     if FACES.iter().all(|name| header.element(name).is_none()) {
         return Err(FormatError::Undeclared {
             missing: "an element face or tristrips",
@@ -26,7 +27,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     }
     let mut polygons = Polygons::new(vertices.count, 0)?;
     let mut mesh = TriangleMesh::default();
-    let mut body = Body::new(&header, bytes, begin);
+    let mut body = Body::new(&header, bytes);
     for element in &header.elements {
         match element.name.as_str() {
             "vertex" => read_vertices(&mut body, element, &mut mesh)?,
@@ -44,23 +45,18 @@ fn read_vertices(
     element: &Element,
     mesh: &mut TriangleMesh,
 ) -> Result<(), FormatError> {
-    let scalars = |names: [&str; 3]| {
-        let [x, y, z] = names.map(|name| element.scalar(name));
-        Some([x?, y?, z?])
-    };
-    let axes = scalars(["x", "y", "z"]).ok_or(FormatError::Undeclared {
-        missing: "x, y and z of vertex",
-    })?;
-    let normal_axes = scalars(["nx", "ny", "nz"]);
+    let axes = element
+        .scalars(["x", "y", "z"])
+        .ok_or(FormatError::Undeclared {
+            missing: "x, y and z of vertex",
+        })?;
+    let normal_axes = element.scalars(["nx", "ny", "nz"]);
     let mut normals = Vec::new();
     mesh.vertices.reserve_exact(element.count);
     body.rows(element, |vertex, row| {
-        let position = axes.map(|p| row[p][0]);
-        if let Some(value) = position.into_iter().find(|v| !v.is_finite()) {
-            return Err(FormatError::NonFinite { vertex, value });
-        }
-        mesh.vertices.push(position);
-        normals.extend(normal_axes.map(|axes| axes.map(|p| row[p][0])));
+        let position = axes.map(|p| row[p].numbers[0]);
+        mesh.vertices.push(finite(position, vertex)?);
+        normals.extend(normal_axes.map(|axes| axes.map(|p| row[p].numbers[0])));
         Ok(())
     })?;
     // Nothing here needs the normals: bad ones are dropped.
@@ -83,7 +79,7 @@ fn read_faces(
     let mut corners = Vec::new();
     body.rows(element, |face, row| {
         corners.clear();
-        corners.extend(row[list].iter().map(|&index| index as i64));
+        corners.extend(row[list].numbers.iter().map(|&index| index as i64));
         if element.name == STRIPS {
             return push_strips(polygons, face, &corners);
         }
@@ -105,66 +101,79 @@ fn push_strips(polygons: &mut Polygons, number: usize, indices: &[i64]) -> Resul
     Ok(())
 }
 
-/// The colours of the vertices, if they have some.
-pub(crate) fn colours(bytes: &[u8]) -> Result<Option<Vec<[u8; 3]>>, FormatError> {
-    let (header, begin) = Header::parse(bytes)?;
-    let mut body = Body::new(&header, bytes, begin);
+/// The vertices of a file, and its numbers from these on.
+fn vertices<'a, 'b>(
+    header: &'a Header,
+    bytes: &'b [u8],
+) -> Result<(&'a Element, Body<'b>), FormatError> {
+    let mut body = Body::new(header, bytes);
     for element in &header.elements {
-        let columns = ["red", "green", "blue"].map(|name| element.scalar(name));
-        let ("vertex", [Some(r), Some(g), Some(b)]) = (element.name.as_str(), columns) else {
-            body.rows(element, |_, _| Ok(()))?;
-            continue;
-        };
-        let mut colours = Vec::with_capacity(element.count);
-        body.rows(element, |_, row| {
-            colours.push([r, g, b].map(|column| {
-                let value = row[column][0];
-                if element.properties[column].scalar.is_integer() {
-                    value as u8
-                } else {
-                    level(value)
-                }
-            }));
-            Ok(())
-        })?;
-        return Ok(Some(colours));
+        if element.name == "vertex" {
+            return Ok((element, body));
+        }
+        body.rows(element, |_, _| Ok(()))?;
     }
-    Ok(None)
+    Err(NO_VERTICES)
+}
+
+/// The colours of the vertices, if they have some.
+pub(super) fn colours(bytes: &[u8]) -> Result<Option<Vec<[u8; 3]>>, FormatError> {
+    let header = Header::parse(bytes)?;
+    let (element, mut body) = vertices(&header, bytes)?;
+    let Some(columns) = element.scalars(["red", "green", "blue"]) else {
+        return Ok(None);
+    };
+    let mut colours = Vec::with_capacity(element.count);
+    body.rows(element, |_, row| {
+        colours.push(columns.map(|column| {
+            let value = row[column].numbers[0];
+            if element.properties[column].scalar.is_integer() {
+                value as u8
+            } else {
+                level(value)
+            }
+        }));
+        Ok(())
+    })?;
+    Ok(Some(colours))
 }
 
 /// The file with other coordinates of vertices, and other normals if it has some.
-pub(crate) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<u8>, FormatError> {
-    let (header, begin) = Header::parse(bytes)?;
+pub(super) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<u8>, FormatError> {
+    let header = Header::parse(bytes)?;
+    let (element, mut body) = vertices(&header, bytes)?;
     let normals = moved.vertex_normals();
-    let mut body = Body::new(&header, bytes, begin);
-    for element in &header.elements {
-        if element.name != "vertex" {
-            body.rows(element, |_, _| Ok(()))?;
-            continue;
-        }
-        let new = [
-            (["x", "y", "z"], &moved.vertices),
-            (["nx", "ny", "nz"], &normals),
-        ];
-        let columns: Vec<_> = (new.iter())
-            .flat_map(|(names, values)| (0..3).map(move |axis| (names[axis], axis, *values)))
-            .filter_map(|(name, axis, values)| Some((element.scalar(name)?, axis, values)))
-            .collect();
-        if columns
-            .iter()
-            .any(|(column, ..)| element.properties[*column].scalar.is_integer())
-        {
-            return Err(FormatError::Undeclared {
-                missing: "x, y and z of vertex as float or double",
-            });
-        }
-        let value = |number: usize, column: usize| {
-            let new = columns.iter().find(|(c, ..)| *c == column);
-            new.and_then(|(_, axis, values)| Some(values.get(number)?[*axis]))
-        };
-        return body.rewritten(element, value);
+    let new = [
+        (["x", "y", "z"], &moved.vertices),
+        (["nx", "ny", "nz"], &normals),
+    ];
+    let mut columns: Vec<_> = (new.iter())
+        .flat_map(|(names, values)| (0..3).map(move |axis| (names[axis], axis, *values)))
+        .filter_map(|(name, axis, values)| Some((element.scalar(name)?, axis, values)))
+        .collect();
+    // In the order of the file.
+    columns.sort_by_key(|(column, ..)| *column);
+    let kind = |column: usize| element.properties[column].scalar;
+    if columns
+        .iter()
+        .any(|(column, ..)| kind(*column).is_integer())
+    {
+        return Err(FormatError::Undeclared {
+            missing: "x, y and z of vertex as float or double",
+        });
     }
-    Err(FormatError::Undeclared {
-        missing: "an element vertex",
-    })
+    let (mut out, mut copied) = (Vec::with_capacity(bytes.len()), 0);
+    body.rows(element, |number, row| {
+        for &(column, axis, values) in &columns {
+            let old = &row[column].place;
+            if let Some(position) = values.get(number) {
+                out.extend_from_slice(&bytes[copied..old.start]);
+                out.extend(header.encoding.bytes(kind(column), position[axis]));
+                copied = old.end;
+            }
+        }
+        Ok(())
+    })?;
+    out.extend_from_slice(&bytes[copied..]);
+    Ok(out)
 }

@@ -4,10 +4,10 @@
 //! refuses `solid` without a name, reads the first of several solids only, and rounds ASCII to
 //! single precision.
 
-use super::{FormatError, position, shortened};
+use super::{FormatError, Polygons, finite, position, shortened};
 use crate::TriangleMesh;
 use crate::mesh::merge_coincident;
-use crate::vector::{Vector, corners, scaled_normal};
+use crate::vector::{Vector, scaled_normal};
 
 /// Comment and number of facets.
 const HEADER: usize = 84;
@@ -35,18 +35,12 @@ pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
             });
         }
     };
-    if corners.is_empty() {
-        return Err(FormatError::NoFaces { vertices: 0 });
-    }
     let merged = merge_coincident(&corners);
-    if u32::try_from(merged.first.len()).is_err() {
-        return Err(FormatError::TooManyVertices {
-            vertices: merged.first.len(),
-        });
-    }
+    let mut polygons = Polygons::new(merged.first.len(), 0)?;
+    polygons.faces = merged.index.as_chunks().0.to_vec();
     Ok(TriangleMesh {
         vertices: merged.first.iter().map(|&v| corners[v]).collect(),
-        faces: merged.index.as_chunks().0.to_vec(),
+        faces: polygons.finish()?,
         normals: None,
     })
 }
@@ -69,17 +63,9 @@ fn binary(facets: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
     for facet in facets.as_chunks::<FACET>().0 {
         // The normal comes first; it follows from the corners.
         for corner in facet[12..48].as_chunks::<12>().0 {
-            let mut position = [0.0; 3];
-            for (value, bytes) in position.iter_mut().zip(corner.as_chunks().0) {
-                *value = f64::from(f32::from_le_bytes(*bytes));
-                if !value.is_finite() {
-                    return Err(FormatError::NonFinite {
-                        vertex: corners.len(),
-                        value: *value,
-                    });
-                }
-            }
-            corners.push(position);
+            let numbers = corner.as_chunks().0;
+            let position = [0, 1, 2].map(|i| f64::from(f32::from_le_bytes(numbers[i])));
+            corners.push(finite(position, corners.len())?);
         }
     }
     Ok(corners)
@@ -138,8 +124,8 @@ fn ascii(text: &str) -> Result<Vec<[f64; 3]>, FormatError> {
 }
 
 /// The file with other corners of its facets, and normals to fit them.
-pub(crate) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Vec<u8> {
-    let corners = |face: &[u32; 3]| corners(moved, *face);
+pub(super) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Vec<u8> {
+    let corners = |face: &[u32; 3]| moved.corners(*face);
     let normal = |face| scaled_normal(corners(face)).normalize_or_zero();
     if binary_length(bytes).is_some_and(|(_, length)| length == bytes.len() as u64) {
         let mut out = bytes.to_vec();

@@ -6,8 +6,7 @@
 use files::Number;
 use glam::{DAffine3, DMat3, DVec3};
 
-use super::fields::Fields;
-use super::{HEAD, Header};
+use super::{Fields, HEAD, Header, size};
 use crate::FormatError;
 
 /// Angles of cells may differ from right ones by so many degrees.
@@ -26,7 +25,6 @@ pub(super) fn header(head: &[u8]) -> Option<Result<Header, FormatError>> {
         }));
     }
     Some(entries(&Fields {
-        format: "MRC",
         bytes: head,
         // The stamp of the machine; some programs write none, and all machines of theirs are little-endian.
         big_endian: head[212] == 0x11,
@@ -34,32 +32,36 @@ pub(super) fn header(head: &[u8]) -> Option<Result<Header, FormatError>> {
 }
 
 fn entries(fields: &Fields<'_>) -> Result<Header, FormatError> {
-    let i32s = |at: usize| [0, 1, 2].map(|i| fields.i32(at + 4 * i));
-    let f32s = |at: usize| [0, 1, 2].map(|i| fields.f32(at + 4 * i));
-    let element = match fields.i32(12) {
+    let bad = |entry, value: &dyn ToString, requirement| {
+        FormatError::entry("MRC", entry, &value.to_string(), requirement)
+    };
+    let whole = |at: usize| fields.number(at, Number::I32) as i32;
+    let i32s = |at: usize| fields.numbers::<3>(at, Number::I32);
+    let f32s = |at: usize| fields.numbers::<3>(at, Number::F32);
+    let element = match whole(12) {
         0 => Number::I8,
         1 => Number::I16,
         2 => Number::F32,
         6 => Number::U16,
-        mode => return fields.bad("mode", &mode, "0, 1, 2 or 6: real numbers"),
+        mode => return bad("mode", &mode, "0, 1, 2 or 6: real numbers"),
     };
-    let extended = fields.i32(92);
+    let extended = whole(92);
     if extended < 0 {
-        return fields.bad("NSYMBT", &extended, "the length of what follows the header");
+        return bad("NSYMBT", &extended, "the length of what follows the header");
     }
     let angles = f32s(52);
     let is_right = |angle: &f64| *angle == 0.0 || (angle - 90.0).abs() < SKEW;
     if !angles.iter().all(is_right) {
-        return fields.bad("CELLB", &format!("{angles:?}"), "right angles");
+        return bad("CELLB", &format!("{angles:?}"), "right angles");
     }
     // For columns, rows and sections, the axis in space; without any they are x, y, z.
-    let axes = match i32s(64) {
+    let axes = match i32s(64).map(|axis| axis as i32) {
         [0, 0, 0] => [0, 1, 2],
         axes => {
             let mut sorted = axes;
             sorted.sort_unstable();
             if sorted != [1, 2, 3] {
-                return fields.bad("MAPC", &format!("{axes:?}"), "an order of 1, 2, 3");
+                return bad("MAPC", &format!("{axes:?}"), "an order of 1, 2, 3");
             }
             axes.map(|axis| axis as usize - 1)
         }
@@ -67,21 +69,21 @@ fn entries(fields: &Fields<'_>) -> Result<Header, FormatError> {
     let (intervals, cell) = (i32s(28), f32s(40));
     let sides = [0, 1, 2].map(|axis| match (cell[axis], intervals[axis]) {
         // What is not written is one.
-        (side, count) if side == 0.0 || count <= 0 => 1.0,
-        (side, count) => side / f64::from(count),
+        (side, count) if side == 0.0 || count <= 0.0 => 1.0,
+        (side, count) => side / count,
     });
     let (starts, origin) = (i32s(16), f32s(196));
     let mut matrix = DMat3::ZERO;
     let mut first = DVec3::ZERO;
     for (own, &axis) in axes.iter().enumerate() {
         matrix.col_mut(own)[axis] = sides[axis];
-        first[axis] = f64::from(starts[own]) * sides[axis];
+        first[axis] = starts[own] * sides[axis];
     }
     if origin.iter().any(|x| *x != 0.0) {
         first = origin.into();
     }
     Ok(Header {
-        size: fields.size(i32s(0).map(i64::from))?,
+        size: size("MRC", i32s(0))?,
         element,
         big_endian: fields.big_endian,
         scale: [1.0, 0.0],

@@ -41,9 +41,10 @@ pub fn is_stack(path: impl AsRef<Path>) -> bool {
     same().unwrap_or(false)
 }
 
-#[allow(clippy::needless_pass_by_value, reason = "for map_err")]
-fn damaged(error: tiff::TiffError) -> FormatError {
-    FormatError::damaged("TIFF", &error)
+impl From<tiff::TiffError> for FormatError {
+    fn from(error: tiff::TiffError) -> Self {
+        Self::damaged("TIFF", &error)
+    }
 }
 
 fn bad<T>(
@@ -51,20 +52,14 @@ fn bad<T>(
     value: &impl ToString,
     requirement: &'static str,
 ) -> Result<T, FormatError> {
-    Err(FormatError::Header {
-        format: "TIFF",
-        entry,
-        value: value.to_string(),
-        requirement,
-    })
+    FormatError::entry("TIFF", entry, value, requirement)
 }
 
 pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Volume, FormatError> {
     let mut limits = Limits::default();
     limits.decoding_buffer_size = LARGEST_PAGE;
     limits.intermediate_buffer_size = LARGEST_PAGE;
-    let reader = Decoder::new(Cursor::new(bytes)).map_err(damaged)?;
-    let mut reader = reader.with_limits(limits);
+    let mut reader = Decoder::new(Cursor::new(bytes))?.with_limits(limits);
     let about = About::of(&mut reader)?;
     let sides = about.sides(&mut reader)?;
     let (first, element) = page(&mut reader)?;
@@ -78,18 +73,17 @@ pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Volume, FormatError> {
         pages += 1;
         // A page more than there is, so that one alone is no reason yet.
         length([size[0], size[1], pages + 1], element, limit)?;
-        let layout = reader.image_buffer_layout().map_err(damaged)?;
+        let layout = reader.image_buffer_layout()?;
         let start = data.len();
         data.resize(start + area(size, element), 0);
         if layout.len != data.len() - start {
             return bad("page", &format!("{} bytes long", layout.len), "one plane");
         }
-        let read = reader.read_image_bytes(&mut data[start..]);
-        read.map_err(damaged)?;
+        reader.read_image_bytes(&mut data[start..])?;
         if !reader.more_images() {
             break;
         }
-        reader.next_image().map_err(damaged)?;
+        reader.next_image()?;
     }
     if about.images.is_some_and(|images| images != pages) {
         return bad("number of pages", &pages, "what ImageJ notes");
@@ -110,13 +104,12 @@ fn area([width, height]: [u64; 2], element: Number) -> usize {
 
 /// Columns and rows of the page, and its numbers.
 fn page(reader: &mut Decoder<impl Read + Seek>) -> Result<([u64; 2], Number), FormatError> {
-    let colours = reader.colortype().map_err(damaged)?;
+    let colours = reader.colortype()?;
     let ColorType::Gray(8 | 16 | 32 | 64) = colours else {
         let shown = format!("{colours:?}");
         return bad("kind of pixels", &shown, "one number of 8 to 64 bits each");
     };
-    let layout = reader.image_buffer_layout().map_err(damaged)?;
-    let BufferLayoutPreference { sample_type, .. } = layout;
+    let BufferLayoutPreference { sample_type, .. } = reader.image_buffer_layout()?;
     let element = match sample_type {
         Some(DecodingSampleType::U8) => Number::U8,
         Some(DecodingSampleType::U16) => Number::U16,
@@ -130,7 +123,7 @@ fn page(reader: &mut Decoder<impl Read + Seek>) -> Result<([u64; 2], Number), Fo
         Some(DecodingSampleType::F64) => Number::F64,
         _ => return bad("kind of numbers", &"unusual", "whole, or of 32 or 64 bits"),
     };
-    let (width, height) = reader.dimensions().map_err(damaged)?;
+    let (width, height) = reader.dimensions()?;
     let size = [width, height].map(u64::from);
     length([size[0], size[1], 2], element, 2 * LARGEST_PAGE as u64)?;
     Ok((size, element))
@@ -147,30 +140,30 @@ impl About {
     fn of(reader: &mut Decoder<impl Read + Seek>) -> Result<Self, FormatError> {
         let text = reader.get_tag_ascii_string(Tag::ImageDescription);
         let text = text.unwrap_or_default();
+        let is_by_imagej = text.starts_with("ImageJ=");
         let note = |name: &str| {
             let mut lines = text.lines().filter_map(|line| line.split_once('='));
-            lines.find(|(key, _)| *key == name).map(|(_, value)| value)
+            let line = lines.find(|(key, _)| is_by_imagej && *key == name);
+            line.map(|(_, value)| value)
         };
-        let is_by_imagej = text.starts_with("ImageJ=");
         let count = |name| note(name).and_then(|n| n.parse::<u64>().ok());
         for axis in ["channels", "frames"] {
-            if let Some(n) = count(axis).filter(|&n| is_by_imagej && n > 1) {
+            if let Some(n) = count(axis).filter(|&n| n > 1) {
                 return bad("number of channels or times", &n, "1: save one of them");
             }
         }
         let spacing = note("spacing").and_then(|n| n.parse::<f64>().ok());
         Ok(Self {
             is_by_imagej,
-            images: count("images").filter(|_| is_by_imagej),
-            spacing: spacing.filter(|_| is_by_imagej).map(f64::abs),
+            images: count("images"),
+            spacing: spacing.map(f64::abs),
         })
     }
 
     /// Of voxels.
     fn sides(&self, reader: &mut Decoder<impl Read + Seek>) -> Result<DVec3, FormatError> {
-        let unit = reader.find_tag_unsigned::<u16>(Tag::ResolutionUnit);
-        let unit = unit.map_err(damaged)?.and_then(ResolutionUnit::from_u16);
-        let unit = match unit {
+        let unit = reader.find_tag_unsigned::<u16>(Tag::ResolutionUnit)?;
+        let unit = match unit.and_then(ResolutionUnit::from_u16) {
             Some(ResolutionUnit::Centimeter) if !self.is_by_imagej => CENTIMETRE,
             Some(ResolutionUnit::Inch) if !self.is_by_imagej => INCH,
             _ => 1.0,

@@ -30,12 +30,14 @@ pub(super) struct Element {
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
+    /// Its lines, and its bytes.
     pub(super) lines: usize,
+    pub(super) length: usize,
 }
 
 impl Header {
-    /// The header, for whose counts the file is long enough, and its length in bytes.
-    pub(super) fn parse(bytes: &[u8]) -> Result<(Self, usize), FormatError> {
+    /// The header, for whose counts the file is long enough.
+    pub(super) fn parse(bytes: &[u8]) -> Result<Self, FormatError> {
         let mut encoding = None;
         let mut elements: Vec<Element> = Vec::new();
         let (mut lines, mut begin) = (0, 0);
@@ -92,12 +94,12 @@ impl Header {
         for element in &elements {
             element.check_length(encoding, begin, bytes.len())?;
         }
-        let header = Self {
+        Ok(Self {
             encoding,
             elements,
             lines,
-        };
-        Ok((header, begin))
+            length: begin,
+        })
     }
 
     pub(super) fn element(&self, name: &str) -> Option<&Element> {
@@ -106,6 +108,19 @@ impl Header {
 }
 
 impl Encoding {
+    /// The bytes of a floating-point number of this type.
+    pub(super) fn bytes(self, number: Number, value: f64) -> Vec<u8> {
+        let mut bytes = match (self, number) {
+            (Self::Ascii, _) => return value.to_string().into_bytes(),
+            (_, Number::F32) => (value as f32).to_le_bytes().to_vec(),
+            _ => value.to_le_bytes().to_vec(),
+        };
+        if self == Self::BigEndian {
+            bytes.reverse();
+        }
+        bytes
+    }
+
     fn parse<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<Self> {
         let encoding = match words.next()? {
             "ascii" => Self::Ascii,
@@ -130,6 +145,12 @@ impl Element {
     pub(super) fn scalar(&self, name: &str) -> Option<usize> {
         let is_scalar = |p: &Property| p.name == name && p.length.is_none();
         self.properties.iter().position(is_scalar)
+    }
+
+    /// Those of three such names.
+    pub(super) fn scalars(&self, names: [&str; 3]) -> Option<[usize; 3]> {
+        let [x, y, z] = names.map(|name| self.scalar(name));
+        Some([x?, y?, z?])
     }
 
     /// Number of the property of that name, if it is a list of integers.
