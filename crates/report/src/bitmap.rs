@@ -1,5 +1,8 @@
-//! Figures as PNG files, drawn at three times their size and averaged, which smooths every edge alike.
+//! Figures as PNG files, drawn by the bitmap backend of plotters at three times their size and averaged, which smooths every edge alike.
 
+use std::fmt::Debug;
+
+use plotters::prelude::{BitMapBackend, Color, DrawingBackend, RGBColor};
 use srgb::Rgb;
 
 use crate::colour::WHITE;
@@ -13,24 +16,19 @@ const SUPERSAMPLING: usize = 3;
 /// Samples per layout unit.
 const SCALE: f64 = (PNG_SCALE * SUPERSAMPLING) as f64;
 
-/// Samples in rows from the top.
-struct PngSurface {
-    width: usize,
-    samples: Vec<Rgb>,
+/// A backend whose pixels are the samples.
+struct PngSurface<'a>(BitMapBackend<'a>);
+
+/// What cannot fail, since the backend draws into memory.
+fn drawn<E: Debug>(result: Result<(), E>) {
+    result.expect("memory takes every drawing");
 }
 
-impl PngSurface {
-    fn height(&self) -> usize {
-        self.samples.len() / self.width
-    }
+fn ink(Rgb(r, g, b): Rgb) -> RGBColor {
+    RGBColor(r, g, b)
+}
 
-    /// The sample in a column and a row, if there is one.
-    fn sample(&mut self, x: i32, y: i32) -> Option<&mut Rgb> {
-        let (x, y) = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
-        let index = y * self.width + x;
-        self.samples.get_mut(index).filter(|_| x < self.width)
-    }
-
+impl PngSurface<'_> {
     fn stroke(&mut self, points: &[Point], width: f64, colour: Rgb) {
         let half = 0.5 * width;
         for pair in points.windows(2) {
@@ -61,7 +59,7 @@ fn sampled(p: Point) -> (i32, i32) {
     (sample(p.x), sample(p.y))
 }
 
-impl Surface for PngSurface {
+impl Surface for PngSurface<'_> {
     fn dashed(&mut self, points: &[Point], width: f64, colour: Rgb, pattern: &[f64]) {
         for piece in dash(points, pattern) {
             self.stroke(&piece, width, colour);
@@ -70,29 +68,31 @@ impl Surface for PngSurface {
 
     /// One horizontal span of samples at a time. A sample belongs to the region if its centre does.
     fn fill(&mut self, loops: &[Vec<Point>], colour: Rgb) {
-        let (width, height) = (self.width, self.height());
+        let ((width, height), ink) = (self.0.get_size(), ink(colour).stroke_width(1));
         let sample =
-            |c: f64, limit: usize| (c * SCALE - 0.5).ceil().clamp(0.0, limit as f64) as usize;
+            |c: f64, limit: u32| (c * SCALE - 0.5).ceil().clamp(0.0, f64::from(limit)) as i32;
         let all = || loops.iter().flatten().map(|p| sample(p.y, height));
         let (Some(first), Some(last)) = (all().min(), all().max()) else {
             return;
         };
-        let mut crossings: Vec<Vec<f64>> = vec![Vec::new(); last - first];
+        let mut crossings: Vec<Vec<f64>> = vec![Vec::new(); (last - first) as usize];
         for ring in loops {
             for (k, &b) in ring.iter().enumerate() {
                 let a = ring[(k + ring.len() - 1) % ring.len()];
                 let (upper, lower) = if a.y <= b.y { (a, b) } else { (b, a) };
                 for row in sample(upper.y, height)..sample(lower.y, height) {
-                    let t = ((row as f64 + 0.5) / SCALE - upper.y) / (lower.y - upper.y);
-                    crossings[row - first].push(upper.towards(lower, t).x);
+                    let t = ((f64::from(row) + 0.5) / SCALE - upper.y) / (lower.y - upper.y);
+                    crossings[(row - first) as usize].push(upper.towards(lower, t).x);
                 }
             }
         }
-        for (row, mut xs) in (first..).zip(crossings) {
+        for (y, mut xs) in (first..).zip(crossings) {
             xs.sort_by(f64::total_cmp);
             for span in xs.chunks_exact(2) {
-                let [from, to] = [span[0], span[1]].map(|x| row * width + sample(x, width));
-                self.samples[from..to].fill(colour);
+                let (from, to) = (sample(span[0], width), sample(span[1], width));
+                if from < to {
+                    drawn(self.0.draw_line((from, y), (to - 1, y), &ink));
+                }
             }
         }
     }
@@ -124,9 +124,8 @@ impl Surface for PngSurface {
             } else {
                 (top.0 + along, top.1 + down)
             };
-            if let Some(sample) = self.sample(x, y) {
-                *sample = mixed(*sample, style.colour, covered);
-            }
+            let ink = ink(style.colour).mix(f64::from(covered).min(1.0));
+            drawn(self.0.draw_pixel((x, y), ink.to_backend_color()));
         });
     }
 
@@ -134,62 +133,41 @@ impl Surface for PngSurface {
         let rows = cells.len() / columns;
         let (x0, y0) = sampled(point(area.x, area.y));
         let (x1, y1) = sampled(point(area.right(), area.bottom()));
-        let [width, height] = [x1 - x0, y1 - y0].map(|side| side.max(1));
-        for y in 0..height {
-            for x in 0..width {
-                let row = y as usize * rows / height as usize;
-                let column = x as usize * columns / width as usize;
-                if let Some(sample) = self.sample(x0 + x, y0 + y) {
-                    *sample = cells[row * columns + column];
-                }
-            }
-        }
+        let [width, height] = [x1 - x0, y1 - y0].map(|side| side.max(1) as usize);
+        let row = |y: usize| y * rows / height * columns;
+        let cell = |k: usize| cells[row(k / width) + k % width * columns / width];
+        let pixels = (0..width * height).map(cell);
+        let pixels: Vec<u8> = pixels.flat_map(|Rgb(r, g, b)| [r, g, b]).collect();
+        let size = (width as u32, height as u32);
+        drawn(self.0.blit_bitmap((x0, y0), size, &pixels));
     }
-}
-
-/// A sample of which a part is covered, in steps of 1/256.
-fn mixed(old: Rgb, new: Rgb, covered: f32) -> Rgb {
-    let part = match (256.0 * covered) as i32 {
-        255.. => 256,
-        part => part,
-    };
-    let mix = |old: u8, new: u8| {
-        let (old, new) = (i32::from(old), i32::from(new));
-        (old + (new - old) * part / 256) as u8
-    };
-    Rgb(mix(old.0, new.0), mix(old.1, new.1), mix(old.2, new.2))
 }
 
 /// Draws a PNG file of the given size in layout units.
 pub(crate) fn png((width, height): (u32, u32), draw: impl FnOnce(&mut dyn Surface)) -> Vec<u8> {
     let [width, height] = [width, height].map(|side| side as usize * PNG_SCALE);
     let fine = [width, height].map(|side| side * SUPERSAMPLING);
-    let mut surface = PngSurface {
-        width: fine[0],
-        samples: vec![WHITE; fine[0] * fine[1]],
-    };
-    draw(&mut surface);
-    crate::encode::png(width, &averaged(&surface))
+    let Rgb(page, ..) = WHITE;
+    let mut samples = vec![page; 3 * fine[0] * fine[1]];
+    let backend = BitMapBackend::with_buffer(&mut samples, fine.map(|side| side as u32).into());
+    draw(&mut PngSurface(backend));
+    crate::encode::png(width, &averaged(&samples, width))
 }
 
 /// Means over square blocks of samples, rounded.
-fn averaged(surface: &PngSurface) -> Vec<Rgb> {
-    let count = SUPERSAMPLING * SUPERSAMPLING;
-    let mut pixels = Vec::with_capacity(surface.samples.len() / count);
-    for rows in surface.samples.chunks_exact(surface.width * SUPERSAMPLING) {
-        for first in (0..surface.width).step_by(SUPERSAMPLING) {
-            let block = (rows.chunks_exact(surface.width))
-                .flat_map(|row| &row[first..first + SUPERSAMPLING]);
-            let [r, g, b] = block.fold([0; 3], |[r, g, b], sample| {
-                let &Rgb(red, green, blue) = sample;
-                [
-                    r + usize::from(red),
-                    g + usize::from(green),
-                    b + usize::from(blue),
-                ]
-            });
-            let [r, g, b] = [r, g, b].map(|sum| ((sum + count / 2) / count) as u8);
-            pixels.push(Rgb(r, g, b));
+fn averaged(samples: &[u8], width: usize) -> Vec<Rgb> {
+    let (stride, count) = (3 * width * SUPERSAMPLING, SUPERSAMPLING * SUPERSAMPLING);
+    let mut pixels = Vec::with_capacity(samples.len() / (3 * count));
+    for rows in samples.chunks_exact(stride * SUPERSAMPLING) {
+        for column in 0..width {
+            let mean = |channel: usize| {
+                let first = 3 * column * SUPERSAMPLING + channel;
+                let block = (0..count)
+                    .map(|s| first + (s / SUPERSAMPLING) * stride + 3 * (s % SUPERSAMPLING));
+                let sum: usize = block.map(|at| usize::from(rows[at])).sum();
+                ((sum + count / 2) / count) as u8
+            };
+            pixels.push(Rgb(mean(0), mean(1), mean(2)));
         }
     }
     pixels

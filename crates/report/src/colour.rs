@@ -1,6 +1,7 @@
 //! Colours that survive colour-blindness and printing: a qualitative palette and a colour map.
 
 use derive_more::From;
+use plotters::style::colors::colormaps::ViridisRGB;
 use srgb::Rgb;
 
 pub(crate) const WHITE: Rgb = Rgb(255, 255, 255);
@@ -54,31 +55,13 @@ impl Colour {
     }
 }
 
-/// Colours of viridis at equal distances; between them it is interpolated.
-const VIRIDIS: [[u8; 3]; 8] = [
-    [68, 1, 84],
-    [70, 50, 127],
-    [54, 92, 141],
-    [39, 127, 143],
-    [31, 162, 136],
-    [74, 194, 110],
-    [160, 219, 57],
-    [254, 232, 37],
-];
-
-/// The colour map viridis (S. van der Walt, N. Smith, 2015), perceptually uniform and dark to light, at `t` in `[0, 1]`; values outside are clamped, NaN is light grey.
+/// The colour map viridis, perceptually uniform and dark to light, at `t` in `[0, 1]`; values outside are clamped, NaN is light grey.
 pub fn viridis(t: f64) -> Rgb {
     if t.is_nan() {
         return Rgb(200, 200, 200);
     }
-    let place = t.clamp(0.0, 1.0) as f32 * (VIRIDIS.len() - 1) as f32;
-    let [below, above] = [place.floor(), place.ceil()].map(|k| VIRIDIS[k as usize]);
-    let back = place.ceil() - place;
-    let mixed = |c: usize| {
-        let (below, above) = (f32::from(below[c]), f32::from(above[c]));
-        ((1.0 - back) * above + back * below).round() as u8
-    };
-    Rgb(mixed(0), mixed(1), mixed(2))
+    let colour = ViridisRGB::get_color(t.clamp(0.0, 1.0) as f32);
+    Rgb(colour.0, colour.1, colour.2)
 }
 
 #[cfg(test)]

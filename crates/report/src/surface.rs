@@ -1,4 +1,7 @@
-//! What charts are drawn on, SVG documents and PNG files alike.
+//! What charts are drawn on: one small trait before SVG documents and PNG files.
+//!
+//! The charts of plotters are not used. Its bitmaps fill polygons one pixel too wide, leave holes where a wide curve crosses itself and
+//! know dashes of one length only; its axes have no small ticks and no factor common to all labels; its plots side by side do not line up.
 
 use srgb::Rgb;
 
