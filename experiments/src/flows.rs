@@ -11,13 +11,13 @@ pub const PAPERS: (Method, Scheme) = (Method::Hybrid, Scheme::Paper);
 /// and in that of the least errors.
 pub const ACCURATE: (Method, Scheme) = (Method::Hybrid, Scheme::Accurate);
 
-/// Willmore flow as in the paper: everywhere, in whole steps.
+/// Willmore flow everywhere; in the paper the steps are those of a rule, each made as a whole.
 pub fn willmore_flow<const D: usize>(
     shape: &str,
     initial: Field<D>,
     operator: Operator,
     scales: Scales,
-    (rule, steps): (StepRule, usize),
+    (time_steps, count): (impl Into<TimeSteps>, usize),
 ) -> Case<D> {
     Case {
         shape: shape.to_owned(),
@@ -28,8 +28,8 @@ pub fn willmore_flow<const D: usize>(
         flow: Flow::Willmore,
         operator,
         scales,
-        steps: rule.into(),
-        stops: vec![Stop::Steps(steps)],
+        steps: time_steps.into(),
+        stops: vec![Stop::Steps(count)],
         measures: Measure::size(scales.eps),
     }
 }

@@ -48,14 +48,14 @@ impl MeshFlow {
         let run = &options.figure.run;
         let side = options.mesh.box_side(&self.mesh);
         let setting = Setting::new(&options.figure, [32, self.cells], side)?;
-        let (tau, more) = self.doubling(setting.n);
+        let (time_steps, more) = self.time_steps(setting.n);
         let steps = (options.steps).unwrap_or(if run.quick { 2 } else { self.steps + more });
         require(steps > 0, "--steps must be at least 1")?;
         let mesh = options.mesh.load(&self.mesh, &setting.grid)?;
         let up = (options.up).map_or_else(|| options.mesh.up(self.view.up), Ok)?;
         let schemes = options.schemes.schemes();
         let parameters = setting.parameters(json!({
-            "mesh": mesh.about, "tau": tau, "steps": steps, "schemes": schemes,
+            "mesh": mesh.about, "tau": time_steps.rule, "steps": steps, "schemes": schemes,
         }))?;
         let mut session = Session::open(self.program, run, parameters)?;
         let initial = session.phase("signed distance", |stage| {
@@ -78,22 +78,27 @@ impl MeshFlow {
             title: format!("Willmore flow: {}", surface.title),
             surfaces: vec![(surface, initial)],
             variants: variants.collect(),
-            time: (tau, steps),
+            time: (time_steps, steps),
         };
         flows.run(session, &setting, remarks)
     }
 
-    /// The step rule on `n` cells per unit length: on grids finer than the paper's the first of doubling steps is shorter by the fourth power of their
-    /// ratio, and so many more steps lead to the same time.
-    fn doubling(&self, n: usize) -> (StepRule, usize) {
+    /// The steps on `n` cells per unit length, and how many more than the paper's they are: on finer grids the first of doubling steps is shorter by
+    /// the fourth power of their ratio, and so many more lead to the same time. Where limbs vanish, a later one is too long for one
+    /// minimization there, and is made in substeps.
+    fn time_steps(&self, n: usize) -> (TimeSteps, usize) {
         match self.tau {
             StepRule::Doubling(first) if n > self.cells => {
                 let halvings = 4.0 * (n as f64 / self.cells as f64).log2();
                 let halvings = halvings.round() as i32;
-                let tau = StepRule::Doubling(first / 2.0_f64.powi(halvings));
-                (tau, halvings as usize)
+                let first = first / 2.0_f64.powi(halvings);
+                let steps = TimeSteps {
+                    first_substep: Some(first),
+                    ..StepRule::Doubling(first).into()
+                };
+                (steps, halvings as usize)
             }
-            tau => (tau, 0),
+            tau => (tau.into(), 0),
         }
     }
 }

@@ -270,7 +270,7 @@ pub struct SurfaceFlows {
     pub surfaces: Vec<(Surface, Field<3>)>,
     pub variants: Vec<(Method, Scheme)>,
     /// Sizes of the time steps, and their number.
-    pub time: (StepRule, usize),
+    pub time: (TimeSteps, usize),
 }
 
 /// Sizes of time steps that are powers of two, for figures.
@@ -321,7 +321,7 @@ impl SurfaceFlows {
             .with_panels(pictures.into_iter().flatten())
             .with_note(format!(
                 "n = {}, ε = 2/n, inner step 1/n², {}. w: Willmore energy with the implicit finite-element step; a sphere has 8π = 25.13.{remarks}",
-                setting.n, in_words(self.time.0)
+                setting.n, in_words(self.time.0.rule)
             ));
         session.figure(figure, "surfaces")?;
         let runs = all.iter().map(|one| (one.surface.key, &one.trajectory));

@@ -1,6 +1,6 @@
 //! Runs against the exact flow of their curves, and of their surfaces of revolution.
 
-use engine::estimated_time_error;
+use engine::{Storage, estimated_time_error};
 use geometry::contour::{Interpolation, zero_level};
 use geometry::distance_from_phase_field;
 use reference::revolution::{self, Surface};
@@ -92,6 +92,12 @@ pub const STRICT: ErrorControl = ErrorControl {
     first: None,
 };
 
+/// A corner has a radius of about `t^(1/4)` at the time `t`, and is round on a grid if `eps` is at most this part of that.
+const ROUND: f64 = 0.65;
+
+/// Nodes of a grid beyond which only what is near the surface is stored, where that is less.
+const MOST_STORED: usize = 1 << 22;
+
 /// Controlled steps that end at the times `end / 2^k` for `k` up to `halvings`, among others.
 pub fn controlled(control: ErrorControl, (end, halvings): (f64, u32)) -> TimeSteps {
     TimeSteps {
@@ -154,8 +160,8 @@ impl<const D: usize> Sample<D> {
         Ok([reached, self.extrapolated(session, ramp, exact)?])
     }
 
-    /// The flow at such times extrapolated to `eps = 0` from strictly controlled runs on two grids, the finer one with half the `eps`; adds
-    /// the metrics `KEY.extrapolated`. A quick look takes coarser ones.
+    /// The flow at such times extrapolated to `eps = 0` from strictly controlled runs on two grids, the finer one with half the `eps`: the coarsest
+    /// two on which a corner is [round](ROUND) by then. Adds the metrics `KEY.extrapolated`. A quick look takes coarser ones.
     pub fn extrapolated(
         &self,
         session: &mut Session<'_>,
@@ -163,21 +169,36 @@ impl<const D: usize> Sample<D> {
         exact: &[&Truth],
     ) -> Result<Vec<Reached>, Error> {
         // With two cells to eps the lattice holds slow flows back by as much as the extrapolation leaves. In space no network has more.
-        let (cells, eps_over_h) = match (D, session.options.quick) {
-            (2, false) => ([256, 512], 4.0),
-            (2, true) => ([64, 128], 4.0),
-            (_, false) => ([64, 128], 2.0),
-            (_, true) => ([32, 64], 2.0),
+        let (cells, eps_over_h): (&[usize], f64) = match (D, session.options.quick) {
+            (2, false) => (&[256, 512], 4.0),
+            (2, true) => (&[64, 128], 4.0),
+            (_, false) => (&[64, 128, 256], 2.0),
+            (_, true) => (&[32, 64], 2.0),
         };
-        let mut run = |n| {
-            let steps = ("controlled_strict", controlled(STRICT, ramp), last(exact));
-            self.run(session, (n, eps_over_h), ACCURATE, steps)
+        let pairs = cells.len() - 1;
+        let coarser = |truth: &Truth| {
+            let radius = truth.time().powf(0.25);
+            let round = |&n: &usize| eps_over_h / n as f64 <= ROUND * radius;
+            cells[..pairs].iter().position(round).unwrap_or(pairs - 1)
         };
-        let (double, single) = (run(cells[0])?, run(cells[1])?);
+        let mut runs = Vec::new();
+        for (k, &n) in cells.iter().enumerate() {
+            let used = exact
+                .iter()
+                .filter(|t| [k, k + 1].contains(&(coarser(t) + 1)));
+            let used: Vec<&Truth> = used.copied().collect();
+            let steps = ("controlled_strict", controlled(STRICT, ramp), last(&used));
+            let run = || self.run(session, (n, eps_over_h), ACCURATE, steps);
+            runs.push((!used.is_empty()).then(run).transpose()?);
+        }
         let (key, mut all) = (format!("{}.extrapolated", self.key), Vec::new());
         for exact in exact {
-            let at = |run| Reached::of(self, run, exact);
-            let reached = Reached::extrapolated(&at(&double)?, &at(&single)?, exact);
+            let at = |k: usize| {
+                let run = runs[k].as_ref().expect("it is run for this time");
+                Reached::of(self, run, exact)
+            };
+            let k = coarser(exact);
+            let reached = Reached::extrapolated(&at(k)?, &at(k + 1)?, exact);
             reached.record(session, &key)?;
             all.push(reached);
         }
@@ -210,9 +231,11 @@ pub fn flow<const D: usize>(
         newton,
         ..Scales::of_grid(grid.spacing(), eps_over_h)
     };
-    let operator = operator(variant, &grid, &scales)?;
-    let mut case = willmore_flow(shape, initial, operator, scales, (steps.rule, 1));
-    case.steps = steps;
+    let mut operator = operator(variant, &grid, &scales)?;
+    if grid.len() > MOST_STORED {
+        operator.storage = Storage::Auto;
+    }
+    let mut case = willmore_flow(shape, initial, operator, scales, (steps, 1));
     case.stops = vec![Stop::Time(end)];
     case.measures = Measure::crossings(0.0);
     session.trajectory(name, case, name, &Samples::every(1))

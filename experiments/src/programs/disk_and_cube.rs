@@ -86,7 +86,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
         title: "Willmore flow of a cube and of a thick disk".to_owned(),
         surfaces,
         variants,
-        time: (StepRule::Constant(TAU), steps),
+        time: (StepRule::Constant(TAU).into(), steps),
     };
     flows.run(session, &setting, |session, all| {
         compare_with_finite_elements(session, all)?;
