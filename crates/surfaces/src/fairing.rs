@@ -13,10 +13,12 @@ const TAUBIN: [f64; 2] = [0.5, -0.53];
 /// The flow takes at most the time `8 s^2 (e^2 + h^2)` for noise of standard deviation `s` on a mesh with edges of mean length `e` and a
 /// grid of spacing `h`.
 const TIME: f64 = 8.0;
-/// When vertices have moved along the normals by this many standard deviations, root of the mean square, by the smoothing before the flow
-/// and by all of it, what would go further is the shape: the part of the noise that waves of the shape have stays on. The distance to the
-/// clean surface is least between .945, on meshes with details as fine as the noise, and .97, on smooth ones.
-const FARTHEST: [f64; 2] = [0.92, 0.955];
+/// The smoothing before the flow moves vertices along the normals by at most so many standard deviations, root of the mean square.
+const SMOOTHED: f64 = 0.92;
+/// When averages over neighbours of the ways of vertices along the normals are this many standard deviations, root of the mean square, what
+/// would go further is the shape. Independent noise has 0.36: what of it is in waves of the shape stays on. The averages tell more than the ways
+/// themselves, most of which are the shortest waves, as long or short as the noise was estimated.
+const FARTHEST: f64 = 0.222;
 /// Along the surface no vertex is moved by more than so many standard deviations: there is no noise beyond.
 const SLIDING: f64 = 3.0;
 /// Waves of so many interface widths are long.
@@ -32,7 +34,7 @@ const REACH: f64 = 4.0;
 /// Noise that is independent from vertex to vertex has waves as short as the edges, which a grid of such a width shows as facets and
 /// not as noise. So first Taubin's smoothing along the edges takes off the shortest waves, as long as the vertices move by less than most
 /// of the noise. From the phase field of this [start](Self::start) Willmore flow takes off longer ones, until the
-/// vertices are [as far](Self::farthest) from the rough ones as noise is. The zero level set takes the vertices along, but for those
+/// surface is [as far](Self::farthest) from the rough one as noise is. The zero level set takes the vertices along, but for those
 /// parts of the mesh that the grid does not resolve, which keep their distance from it. Last, what the flow took off the long waves is
 /// given back ([`TriangleMesh::with_long_waves_of`]), and the volume is made that of the rough mesh.
 ///
@@ -107,7 +109,7 @@ impl Fairing {
 
     /// The [displacement](Self::displacement) at which the noise is off.
     pub fn farthest(&self) -> f64 {
-        FARTHEST[1] * self.noise
+        FARTHEST * self.noise
     }
 
     /// The vertices in the box where the start was placed, whose phase field there is `start`.
@@ -158,13 +160,16 @@ impl Fairing {
         lost
     }
 
-    /// How far the vertices have gone along the normals of the start when the phase field is `u`, root of the mean square.
+    /// How far the surface has gone when the phase field is `u`: the ways of the vertices along the normals of the start, averaged over
+    /// neighbours, root of the mean square.
     ///
     /// # Errors
     /// The values must be finite.
     pub fn displacement(&self, followed: &Followed, u: &Field<3>) -> Result<f64, Error> {
         let now = self.faired(followed, u)?;
-        Ok(along_normals(self.start.mesh(), self.rough.mesh(), &now))
+        let start = self.start.mesh();
+        let ways = along_normals(start, self.rough.mesh(), &now);
+        Ok(root_mean_square(&start.averaged(&ways)))
     }
 
     /// The mesh, when the phase field is `u`.
@@ -225,9 +230,9 @@ fn without_short_waves(rough: &ClosedMesh, noise: f64) -> ClosedMesh {
     for _ in 0..ROUNDS {
         let mut next = smooth.mesh().smoothed(1, TAUBIN[0], TAUBIN[1]);
         hold_along_surface(&mut next, rough.mesh(), SLIDING * noise);
-        let moved = along_normals(&next, rough.mesh(), &next);
+        let moved = root_mean_square(&along_normals(&next, rough.mesh(), &next));
         match ClosedMesh::new(next) {
-            Ok((next, _)) if moved <= FARTHEST[0] * noise => smooth = next,
+            Ok((next, _)) if moved <= SMOOTHED * noise => smooth = next,
             // Also where slivers lose their area.
             _ => break,
         }
@@ -246,11 +251,16 @@ fn hold_along_surface(mesh: &mut TriangleMesh, rough: &TriangleMesh, longest: f6
     }
 }
 
-/// The root of the mean square of the way between the vertices of two meshes along the normals of a smooth one.
-fn along_normals(smooth: &TriangleMesh, from: &TriangleMesh, to: &TriangleMesh) -> f64 {
+/// The ways between the vertices of two meshes along the normals of a smooth one.
+fn along_normals(smooth: &TriangleMesh, from: &TriangleMesh, to: &TriangleMesh) -> Vec<f64> {
     let normals = smooth.vertex_normals();
     let pairs = from.vertices.iter().zip(&to.vertices).zip(&normals);
-    let squares =
-        pairs.map(|((a, b), n)| (0..3).map(|i| (b[i] - a[i]) * n[i]).sum::<f64>().powi(2));
-    (squares.sum::<f64>() / normals.len().max(1) as f64).sqrt()
+    pairs
+        .map(|((a, b), n)| (0..3).map(|i| (b[i] - a[i]) * n[i]).sum())
+        .collect()
+}
+
+fn root_mean_square(numbers: &[f64]) -> f64 {
+    let squares: f64 = numbers.iter().map(|x| x * x).sum();
+    (squares / numbers.len().max(1) as f64).sqrt()
 }

@@ -8,6 +8,9 @@ const AVERAGING: usize = 12;
 /// and the root of the median of these means over that of the mean, of independent normally distributed numbers at regular vertices.
 const MEDIAN_OF_MEANS: f64 = 0.99;
 
+/// Factors of Taubin's smoothing of fields on a mesh.
+const FACTORS: [f64; 2] = [0.5, -0.47];
+
 /// The neighbours of every vertex along edges, in ascending order.
 struct Umbrellas(Vec<Vec<u32>>);
 
@@ -91,7 +94,6 @@ impl TriangleMesh {
     /// wrong in the end is the product of two small errors, `(1 - A)(y - x)`; J. W. Tukey called this twicing.
     #[must_use]
     pub fn with_long_waves_of(&self, rough: &Self, wavelength: f64) -> Self {
-        const FACTORS: [f64; 2] = [0.5, -0.47];
         const ROUNDS: [f64; 2] = [12.0, 400.0];
         // On a lattice of equilateral triangles a wave has the eigenvalue (wave number times edge)^2 / 4.
         let wave = std::f64::consts::TAU / wavelength * self.mean_edge();
@@ -105,6 +107,15 @@ impl TriangleMesh {
         let mut offset: Vec<Vector> = pairs.map(|(x, y)| y - x).collect();
         Umbrellas::of(self).smooth(&mut offset, rounds, FACTORS);
         self.moved_by(&offset)
+    }
+
+    /// A number at each vertex, averaged over its neighbours: waves of some ten edges and more stay, and of independent noise 0.36 of its
+    /// standard deviation.
+    pub(crate) fn averaged(&self, numbers: &[f64]) -> Vec<f64> {
+        const ROUNDS: usize = 8;
+        let mut x: Vec<Vector> = numbers.iter().map(|&x| Vector::new(x, 0.0, 0.0)).collect();
+        Umbrellas::of(self).smooth(&mut x, ROUNDS, FACTORS);
+        x.into_iter().map(|x| x.x).collect()
     }
 
     /// All vertices that may move moved along their normals by the same length, so that the closed surface encloses `volume`.
@@ -217,5 +228,26 @@ impl TriangleMesh {
         let middle = means.len() / 2;
         let (_, median, _) = means.select_nth_unstable_by(middle, f64::total_cmp);
         median.sqrt() / MEDIAN_OF_MEANS
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+
+    use crate::samples;
+
+    /// Long waves are what a constant is here.
+    #[test]
+    fn averages_keep_long_waves_and_a_known_part_of_noise() {
+        let mesh = samples::figure(48).unwrap();
+        let count = mesh.mesh().vertices.len();
+        let averaged = |numbers: &[f64]| mesh.mesh().averaged(numbers);
+        assert!((averaged(&vec![2.0; count]).iter()).all(|x| (x - 2.0).abs() < 1e-12));
+        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(1);
+        let noise: Vec<f64> = (0..count).map(|_| rng.random::<f64>() - 0.5).collect();
+        let squares = |numbers: &[f64]| numbers.iter().map(|x| x * x).sum::<f64>();
+        let part = (squares(&averaged(&noise)) / squares(&noise)).sqrt();
+        assert!((0.34..0.38).contains(&part), "{part}");
     }
 }
