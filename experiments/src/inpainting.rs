@@ -3,7 +3,7 @@
 use crate::prelude::*;
 use crate::steps;
 
-/// A shape stands still once it moves by less than this part of the way it has come per step.
+/// A shape is stationary once it moves by less than this part of the way it has come per step.
 const STILL: f64 = 1e-5;
 /// The first substep of the first step, in units of `eps^4`: the time in which a corner becomes about as round as the interface is wide.
 const FIRST_SUBSTEP: f64 = 32.0;
@@ -124,7 +124,7 @@ impl<'a, const D: usize> Inpainted<'a, D> {
         self.shape.rule.size(1)
     }
 
-    /// The time in the paper's steps from which on the shape stands still, if it does.
+    /// The time in the paper's steps from which on the shape is stationary, if it is.
     pub fn still_from(&self) -> Option<f64> {
         let last = self.trajectory.records.last()?;
         let stands_still = matches!(self.trajectory.ended, Stop::Motion(_));

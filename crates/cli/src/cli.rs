@@ -23,7 +23,7 @@ pub struct Cli {
     #[command(subcommand)]
     pub command: Command,
     #[command(flatten)]
-    pub say: SayOptions,
+    pub messages: MessageOptions,
 }
 
 /// The subcommands.
@@ -286,7 +286,7 @@ pub struct CommonOptions {
 
 /// What is printed.
 #[derive(Args, Clone, Copy, Debug)]
-pub struct SayOptions {
+pub struct MessageOptions {
     /// Print nothing but errors
     #[arg(long, global = true)]
     pub quiet: bool,

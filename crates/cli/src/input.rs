@@ -6,12 +6,12 @@ use images::{Outline, OutlineDistance, Side, Threshold, Tones};
 use surfaces::hausdorff_distance;
 use surfaces::shapes::{self, BuiltIn};
 
-use crate::cli::{Holds, InputOptions, Inside, SayOptions};
-use crate::outlet::Topology;
+use crate::cli::{Holds, InputOptions, Inside, MessageOptions};
 use crate::own::{OwnMesh, thinnest};
 use crate::paths::{absolute, extension, read};
 use crate::plane::Plane;
 use crate::prelude::*;
+use crate::presentation::Topology;
 use crate::space::{Space, Voxels};
 use crate::volume;
 
@@ -19,7 +19,7 @@ use crate::volume;
 pub struct Start<const D: usize, O> {
     pub name: String,
     pub field: Field<D>,
-    pub outlet: O,
+    pub presentation: O,
     /// The nodes that move, if not all.
     pub region: Option<Vec<bool>>,
 }
@@ -88,9 +88,9 @@ pub fn usual_format(input: &str) -> Result<String, Error> {
 }
 
 /// The closed mesh in a file, possibly after a repair.
-pub fn closed(path: &Path, repairs: bool, say: SayOptions) -> Result<ClosedMesh, Error> {
+pub fn closed(path: &Path, repairs: bool, messages: MessageOptions) -> Result<ClosedMesh, Error> {
     let mesh = surfaces::read(path)?;
-    let warn = |what: &dyn std::fmt::Display| say.warn(&format!("{}: {what}", path.display()));
+    let warn = |what: &dyn std::fmt::Display| messages.warn(&format!("{}: {what}", path.display()));
     if repairs {
         let repaired = surfaces::repair(&mesh, REPAIR_CELLS)?;
         warn(&repaired);
@@ -194,7 +194,7 @@ pub struct Reader<'a> {
     name: String,
     options: &'a mut InputOptions,
     eps_over_h: f64,
-    say: SayOptions,
+    messages: MessageOptions,
 }
 
 /// Cells per unit length and side of the box, unless they are chosen.
@@ -207,7 +207,7 @@ impl<'a> Reader<'a> {
     pub fn of(
         options: &'a mut InputOptions,
         eps_over_h: f64,
-        say: SayOptions,
+        messages: MessageOptions,
     ) -> Result<Self, Error> {
         let input = options.input.as_deref().ok_or_else(|| {
             Error::options(
@@ -224,7 +224,7 @@ impl<'a> Reader<'a> {
             source,
             options,
             eps_over_h,
-            say,
+            messages,
         })
     }
 
@@ -232,7 +232,7 @@ impl<'a> Reader<'a> {
     pub fn load(&mut self) -> Result<Loaded, Error> {
         let loaded = match self.source.clone() {
             Source::Mesh(path) => {
-                let mesh = closed(&path, self.options.repair, self.say)?;
+                let mesh = closed(&path, self.options.repair, self.messages)?;
                 self.mesh(&mesh, surfaces::usual_up_axis(&path)?)?
             }
             Source::Image(path) => self.image(&path)?,
@@ -364,7 +364,7 @@ impl<'a> Reader<'a> {
             if let Some(advice) = refused {
                 return Err(Error::options(format!("{message}; {advice}")));
             }
-            self.say.warn(&message);
+            self.messages.warn(&message);
         }
         Ok((field, surface))
     }
@@ -400,7 +400,7 @@ impl<'a> Reader<'a> {
                 "{message}: give a larger --side-length, or --cells to go on all the same"
             )));
         }
-        self.say.warn(&message);
+        self.messages.warn(&message);
         Ok(())
     }
 
@@ -444,7 +444,7 @@ impl<'a> Reader<'a> {
             "where vertices follow less well"
         };
         self.tell_thin(thin, grid, what, false)?;
-        self.say.note(&format!(
+        self.messages.note(&format!(
             "grid: {} cells per unit length, {:.3e} wide (--cells); its surface is {}",
             self.cells(),
             grid.spacing(),
@@ -484,11 +484,11 @@ impl<'a> Reader<'a> {
         Ok(phase_field(grid, shape, eps)?)
     }
 
-    fn start<const D: usize, O>(&self, field: Field<D>, outlet: O) -> Start<D, O> {
+    fn start<const D: usize, O>(&self, field: Field<D>, presentation: O) -> Start<D, O> {
         Start {
             name: self.name.clone(),
             field,
-            outlet,
+            presentation,
             region: None,
         }
     }
@@ -573,7 +573,7 @@ impl<'a> Reader<'a> {
         let grid = self.grid_holding(&bounds, grids, &distance, &sides)?;
         let wide = grid.spacing() / body.voxel;
         if wide > 1.5 {
-            self.say.note(&format!(
+            self.messages.note(&format!(
                 "a cell is {wide:.1} voxels wide: with more --cells than {} smaller details last",
                 self.cells()
             ));
@@ -592,7 +592,7 @@ impl<'a> Reader<'a> {
     }
 
     fn mesh_field(&self, mesh: &ClosedMesh, grid: Grid<3>) -> Result<Field<3>, Error> {
-        let progress = self.say.progress();
+        let progress = self.messages.progress();
         let bar = progress.bar("signed distance", grid.cells() as u64);
         let distance = MeshDistance::new(mesh);
         let eps = self.eps_over_h * grid.spacing();
@@ -601,7 +601,7 @@ impl<'a> Reader<'a> {
         progress.clear();
         let mended = surfaces::mend_signs(&mut distance);
         if mended > 0 {
-            self.say.warn(&format!(
+            self.messages.warn(&format!(
                 "the mesh crosses itself: {mended} nodes of the grid, which its faces put on the wrong side, were put right"
             ));
         }

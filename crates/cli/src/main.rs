@@ -7,14 +7,14 @@ mod error;
 mod faired;
 mod input;
 mod keep;
-mod outlet;
+mod messages;
 mod own;
 mod page;
 mod paths;
 mod plane;
 mod prelude;
+mod presentation;
 mod run;
-mod say;
 mod setup;
 mod sizes;
 mod space;
@@ -61,16 +61,16 @@ fn main() -> ExitCode {
 }
 
 fn execute(mut cli: Cli) -> Result<ExitCode, Error> {
-    let standard = Standard::open(&mut cli.command, &mut cli.say)?;
-    let say = cli.say;
+    let standard = Standard::open(&mut cli.command, &mut cli.messages)?;
+    let messages = cli.messages;
     let code = match cli.command {
-        Command::Run(command) => flow::run(command, say, None),
-        Command::Resume(options) => resume::run(&options, say),
-        Command::Networks { show } => networks::run(show.as_ref(), say),
-        Command::Info => info::run(say),
-        Command::Sample(options) => sample::run(options, say),
-        Command::Check(options) => check::run(options, say),
-        Command::Train(options) => train::run(options, say),
+        Command::Run(command) => flow::run(command, messages, None),
+        Command::Resume(options) => resume::run(&options, messages),
+        Command::Networks { show } => networks::run(show.as_ref(), messages),
+        Command::Info => info::run(messages),
+        Command::Sample(options) => sample::run(options, messages),
+        Command::Check(options) => check::run(options, messages),
+        Command::Train(options) => train::run(options, messages),
         Command::Completions { shell } => Ok(shell::completions(shell)),
         Command::Man => shell::man(),
     }?;

@@ -14,7 +14,7 @@ use report::{Axis, LineChart, Marker, Series};
 use crate::faired::view;
 use crate::paths::MESHES;
 use crate::prelude::*;
-use crate::{config, outlet, own, plane};
+use crate::{config, own, plane, presentation};
 
 pub const NAME: &str = "index.html";
 
@@ -65,7 +65,7 @@ impl Files<'_> {
     }
 
     fn outcome(&self) -> Result<Option<Value>, Error> {
-        let bytes = self.read(outlet::SUMMARY)?;
+        let bytes = self.read(presentation::SUMMARY)?;
         let outcome = bytes
             .map(|bytes| serde_json::from_slice(&bytes))
             .transpose();
@@ -79,10 +79,11 @@ impl Files<'_> {
             2 => self.drawings()?.map(|frames| section.with(frames)),
             _ => self.surfaces()?.map(|viewer| section.with(viewer)),
         };
-        let (Some(section), Some(bytes)) = (&section, self.read(outlet::DISPLACEMENT)?) else {
+        let (Some(section), Some(bytes)) = (&section, self.read(presentation::DISPLACEMENT)?)
+        else {
             return Ok(section);
         };
-        let image = Image::from_bytes(outlet::DISPLACEMENT, &bytes)?;
+        let image = Image::from_bytes(presentation::DISPLACEMENT, &bytes)?;
         let what = if self.before() == own::INPUT {
             "vertices have"
         } else {
@@ -97,7 +98,7 @@ impl Files<'_> {
         let (before, format) = if self.has(plane::ORIGINAL) {
             (plane::ORIGINAL.trim_end_matches(".png"), "png")
         } else {
-            (outlet::START, "svg")
+            (presentation::START, "svg")
         };
         let stages = self.stages(before, &[format]);
         let mut drawings = Vec::new();
@@ -114,7 +115,8 @@ impl Files<'_> {
     fn surfaces(&self) -> Result<Option<Viewer>, Error> {
         let stages = self.stages(self.before(), &MESHES);
         // Until it is started, and on paper, the viewer is a picture.
-        let (Some(poster), Some((_, first))) = (self.read(outlet::PICTURE)?, stages.first()) else {
+        let (Some(poster), Some((_, first))) = (self.read(presentation::PICTURE)?, stages.first())
+        else {
             return Ok(None);
         };
         let read = |name: &str| surfaces::read(self.run.path().join(name));
@@ -126,7 +128,7 @@ impl Files<'_> {
         let up = UpAxis::deserialize(&engine::notes(self.run)["outlet"]["up"]);
         Ok(Some(Viewer::new(
             "The surface over the steps",
-            Image::from_bytes(outlet::PICTURE, &poster)?,
+            Image::from_bytes(presentation::PICTURE, &poster)?,
             view(up.unwrap_or_default()),
             meshes.iter().map(|(label, mesh)| (*label, mesh)),
         )?))
@@ -138,7 +140,7 @@ impl Files<'_> {
         if self.run.files().any(is_input) {
             own::INPUT
         } else {
-            outlet::START
+            presentation::START
         }
     }
 
@@ -149,14 +151,14 @@ impl Files<'_> {
             let name = names.find(|name| self.has(name));
             name.map(|name| (label.to_owned(), name))
         };
-        let after = named("after", outlet::FINAL);
+        let after = named("after", presentation::FINAL);
         let mut steps: Vec<usize> = self.records.iter().map(|record| record.step).collect();
         steps.dedup();
         // The frame of the last step shows the same.
         if after.is_some() {
             steps.pop();
         }
-        let frame = |step| named(&format!("step {step}"), &outlet::frame(step));
+        let frame = |step| named(&format!("step {step}"), &presentation::frame(step));
         let frames = steps.into_iter().filter_map(frame);
         let before = named("before", before);
         before.into_iter().chain(frames).chain(after).collect()

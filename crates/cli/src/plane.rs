@@ -5,9 +5,9 @@ use images::{
 };
 use render::Rgb;
 
-use crate::outlet::{Outlet, Topology};
 use crate::paths::{extension, read};
 use crate::prelude::*;
+use crate::presentation::{Presentation, Topology};
 
 /// Files of a run with the image that is repaired, and with the pixels that are drawn anew in black.
 pub const ORIGINAL: &str = "original.png";
@@ -160,7 +160,7 @@ impl Original {
     }
 }
 
-impl Outlet<2> for Plane {
+impl Presentation<2> for Plane {
     const SAVED: &'static [&'static str] = &["png", "svg"];
     const USUAL: &'static str = "svg";
 

@@ -9,22 +9,22 @@ use geometry::measure::touches_side;
 use pages::five_digits;
 use solver::StepEstimates;
 
-use crate::cli::{KeepOptions, SayOptions};
+use crate::cli::{KeepOptions, MessageOptions};
 use crate::faired::Faired;
-use crate::outlet::{self, Outlet, Topology};
 use crate::page;
 use crate::paths::{extension, read};
 use crate::prelude::*;
+use crate::presentation::{self, Presentation, Topology};
 
 /// Everything about a run but its case.
 pub struct Plan<O> {
     pub command: &'static str,
     pub name: String,
-    pub outlet: O,
+    pub presentation: O,
     pub keep: KeepOptions,
     /// The extension of meshes, if it is not the usual one.
     pub format: Option<String>,
-    pub say: SayOptions,
+    pub messages: MessageOptions,
 }
 
 /// Measures whose change is told.
@@ -35,7 +35,7 @@ impl<O> Plan<O> {
     /// What is kept with the run.
     pub fn notes<const D: usize>(&self, case: &Case<D>, device: &ComputeDevice) -> Value
     where
-        O: Outlet<D>,
+        O: Presentation<D>,
     {
         let network = case.operator.network();
         json!({
@@ -46,7 +46,7 @@ impl<O> Plan<O> {
                 "network": network.map(|n| json!({ "name": n.name, "checksum": n.network.fingerprint() })),
                 "device": format!("{} {:?}", device.kind(), device.dtype()).to_lowercase(),
             },
-            "outlet": self.outlet,
+            "outlet": self.presentation,
         })
     }
 
@@ -61,7 +61,7 @@ impl<O> Plan<O> {
         mut run: Run<D>,
     ) -> Result<ExitCode, Error>
     where
-        O: Outlet<D>,
+        O: Presentation<D>,
     {
         let interrupt = Interrupt::catch()?;
         let (nodes, stored) = (run.case().grid().len(), run.stored_cells());
@@ -72,7 +72,7 @@ impl<O> Plan<O> {
             "the whole grid".to_owned()
         };
         let gigabytes = 1e-9 * Storage::bytes(nodes, stored);
-        self.say.note(&format!(
+        self.messages.note(&format!(
             "storage: {what}, about {gigabytes:.1} GB of memory (--storage)"
         ));
         let folder = store.directory().path().to_owned();
@@ -80,7 +80,7 @@ impl<O> Plan<O> {
             Stop::Steps(steps) => Some(*steps as u64),
             _ => None,
         });
-        let progress = self.say.progress();
+        let progress = self.messages.progress();
         let title = format!("{} of {}", self.command, self.name);
         let mut bar = progress.bar(title, steps.unwrap_or(0));
         let clock = Instant::now();
@@ -113,31 +113,35 @@ impl<O> Plan<O> {
 
     fn finish<const D: usize>(&self, mut store: Store, run: &Run<D>) -> Result<Value, Error>
     where
-        O: Outlet<D>,
+        O: Presentation<D>,
     {
         let (case, u) = (run.case(), run.field());
         let eps = case.scales.eps;
         let directory = store.directory();
         // What has vanished leaves no vertices behind.
-        let faired = has_interface(u).then(|| self.outlet.faired(&case.initial, u, eps));
+        let faired = has_interface(u).then(|| self.presentation.faired(&case.initial, u, eps));
         let faired = faired.transpose()?.flatten();
         let topology = self.write_final(&case.initial, u, eps, faired.as_ref(), directory)?;
         if let Some(path) = self.keep.save.as_ref().filter(|_| has_interface(u)) {
             match &faired {
                 Some(faired) => faired.write(path)?,
-                None => self.outlet.save(u, eps, path)?,
+                None => self.presentation.save(u, eps, path)?,
             }
         }
         if self.keep.frames.is_some() {
-            let frames = frames(&directory.path().join(outlet::FRAMES))?;
+            let frames = frames(&directory.path().join(presentation::FRAMES))?;
             let animation = render::animation(&frames, DELAY)?;
-            directory.write_file(outlet::ANIMATION, |out| out.write_all(&animation))?;
+            directory.write_file(presentation::ANIMATION, |out| out.write_all(&animation))?;
             let series = series(directory.path(), run.records());
-            directory.write_file(outlet::SERIES, |out| out.write_all(series.as_bytes()))?;
+            directory.write_file(presentation::SERIES, |out| out.write_all(series.as_bytes()))?;
         }
         // Touching sheets have no topology; that is no reason not to flow.
-        let of_start = || self.outlet.topology(&case.initial, eps).unwrap_or_default();
-        let before = self.outlet.input().unwrap_or_else(of_start);
+        let of_start = || {
+            self.presentation
+                .topology(&case.initial, eps)
+                .unwrap_or_default()
+        };
+        let before = self.presentation.input().unwrap_or_else(of_start);
         let mut outcome = json!({
             "command": self.command,
             "finished": true,
@@ -190,7 +194,7 @@ impl<O> Plan<O> {
             outcome["mesh"] = report;
         }
         let text = format!("{outcome:#}\n");
-        directory.write_file(outlet::SUMMARY, |out| out.write_all(text.as_bytes()))?;
+        directory.write_file(presentation::SUMMARY, |out| out.write_all(text.as_bytes()))?;
         store.finish(run)?;
         Ok(outcome)
     }
@@ -205,9 +209,9 @@ impl<O> Plan<O> {
         run: &mut RunDirectory,
     ) -> Result<Topology, Error>
     where
-        O: Outlet<D>,
+        O: Presentation<D>,
     {
-        let outlet = &self.outlet;
+        let presentation = &self.presentation;
         npy::write(run.path().join("final.npy"), u)?;
         run.adopt_file("final.npy")?;
         vti::write(run.path().join("final.vti"), "phase_field", u)?;
@@ -215,18 +219,24 @@ impl<O> Plan<O> {
         if !has_interface(u) {
             return Ok(Topology::default());
         }
-        outlet.write_picture(start, u, eps, outlet::PICTURE, run)?;
+        presentation.write_picture(start, u, eps, presentation::PICTURE, run)?;
         let format = self.format.as_deref();
         if let Some(faired) = faired {
-            let name = format!("{}.{}", outlet::FINAL, format.unwrap_or(&faired.extension));
+            let name = format!(
+                "{}.{}",
+                presentation::FINAL,
+                format.unwrap_or(&faired.extension)
+            );
             faired.write(&run.path().join(&name))?;
             run.adopt_file(&name)?;
             let text = faired.displacement.to_svg()?;
-            run.write_file(outlet::DISPLACEMENT, |out| out.write_all(text.as_bytes()))?;
+            run.write_file(presentation::DISPLACEMENT, |out| {
+                out.write_all(text.as_bytes())
+            })?;
         } else {
-            outlet.write_shape(u, eps, outlet::FINAL, format, run)?;
+            presentation.write_shape(u, eps, presentation::FINAL, format, run)?;
         }
-        outlet.topology(u, eps)
+        presentation.topology(u, eps)
     }
 
     fn tell(&self, mut outcome: Value, folder: &Path, ended: Option<Stop>, seconds: f64) {
@@ -327,7 +337,7 @@ impl<O> Plan<O> {
         }
         outcome["run"] = folder.to_string_lossy().into();
         outcome["seconds"] = seconds.into();
-        self.say.report(&outcome, &text.join("\n"));
+        self.messages.report(&outcome, &text.join("\n"));
     }
 }
 
@@ -337,7 +347,7 @@ struct Pictures<'a, O> {
     topology: Option<Topology>,
 }
 
-impl<const D: usize, O: Outlet<D>> Observer<D> for Pictures<'_, O> {
+impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, O> {
     fn observe(&mut self, event: &mut Event<'_, D>) -> Result<(), engine::Error> {
         let (case, u) = (event.case, event.field);
         let eps = case.scales.eps;
@@ -348,28 +358,30 @@ impl<const D: usize, O: Outlet<D>> Observer<D> for Pictures<'_, O> {
         if !has_interface(u) {
             return Ok(());
         }
-        let Plan { outlet, keep, .. } = self.plan;
+        let Plan {
+            presentation, keep, ..
+        } = self.plan;
         let mut write = || -> Result<(), Error> {
             if step == 0 {
                 let format = self.plan.format.as_deref();
-                outlet.write_shape(u, eps, outlet::START, format, run)?;
+                presentation.write_shape(u, eps, presentation::START, format, run)?;
             }
             if keep.frames.is_some_and(|every| step.is_multiple_of(every)) {
-                let name = outlet::frame(step);
-                outlet.write_picture(&case.initial, u, eps, &format!("{name}.png"), run)?;
+                let name = presentation::frame(step);
+                presentation.write_picture(&case.initial, u, eps, &format!("{name}.png"), run)?;
                 let values = format!("{name}.vti");
                 vti::write(run.path().join(&values), "phase_field", u)?;
                 run.adopt_file(&values)?;
-                outlet.write_shape(u, eps, &name, self.plan.format.as_deref(), run)?;
+                presentation.write_shape(u, eps, &name, self.plan.format.as_deref(), run)?;
             }
             Ok(())
         };
         write().map_err(engine::Error::observer)?;
         // Touching sheets have no topology.
-        let topology = outlet.topology(u, eps).ok();
+        let topology = presentation.topology(u, eps).ok();
         if let Some((before, now)) = self.topology.zip(topology).filter(|(a, b)| a != b) {
             let time = event.records.last().map_or(0.0, |record| record.time);
-            self.plan.say.note(&format!(
+            self.plan.messages.note(&format!(
                 "step {step}, t = {time:.4e}: parts or holes have come or gone, {now} where there were {before}"
             ));
         }
@@ -426,7 +438,7 @@ fn series(run: &Path, records: &[Record]) -> String {
     let complete = records.iter().filter(|record| record.completes_step);
     let times = complete.map(|record| (record.step, record.time));
     for (step, time) in std::iter::once((0, 0.0)).chain(times) {
-        let name = outlet::frame(step) + ".vti";
+        let name = presentation::frame(step) + ".vti";
         if run.join(&name).exists() {
             let _ = writeln!(text, "    <DataSet timestep=\"{time}\" file=\"{name}\"/>");
         }

@@ -2,7 +2,7 @@
 
 use engine::{Flow, Held, Helfrich, Target};
 
-use crate::cli::{FlowOptions, SayOptions};
+use crate::cli::{FlowOptions, MessageOptions};
 use crate::prelude::*;
 use crate::values::{Amount, SizeTarget};
 
@@ -60,7 +60,7 @@ pub fn round_edges<const D: usize>(
     options: &mut FlowOptions,
     start: &mut Field<D>,
     device: &ComputeDevice,
-    say: SayOptions,
+    messages: MessageOptions,
 ) -> Result<(), Error> {
     let both = options.area.is_some() && options.volume.is_some();
     if !(both || options.reduced_volume.is_some()) {
@@ -100,7 +100,7 @@ pub fn round_edges<const D: usize>(
         }
         let of_surface = if D == 2 { "length" } else { "area" };
         let area = targets.perimeter.unwrap_or(sharp.perimeter);
-        say.note(&format!(
+        messages.note(&format!(
             "edges sharper than the interface became round: {of_surface} {:.4} instead of {:.4}; it goes to {area:.4} over the steps of --ramp",
             round.perimeter, sharp.perimeter
         ));

@@ -3,10 +3,10 @@
 use geometry::measure::bounding_box;
 
 use crate::faired::{Faired, surface, view};
-use crate::outlet::{Known, Outlet, Topology};
 use crate::own::OwnMesh;
 use crate::paths::MESHES;
 use crate::prelude::*;
+use crate::presentation::{Known, Presentation, Topology};
 
 const PIXELS: u32 = 480;
 /// Room around a surface for its flow, as a part of its longest side.
@@ -46,7 +46,7 @@ impl Space {
     }
 }
 
-impl Outlet<3> for Space {
+impl Presentation<3> for Space {
     const SAVED: &'static [&'static str] = &MESHES;
     const USUAL: &'static str = MESHES[0];
 

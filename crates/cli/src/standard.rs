@@ -2,7 +2,7 @@
 
 use std::io::{Read, Write};
 
-use crate::cli::{Command, InputOptions, SayOptions};
+use crate::cli::{Command, InputOptions, MessageOptions};
 use crate::input::usual_format;
 use crate::paths::read;
 use crate::prelude::*;
@@ -17,7 +17,7 @@ pub struct Standard {
 
 impl Standard {
     /// Reads standard input if it is the input, and puts files in place of every `-` in the options.
-    pub fn open(command: &mut Command, say: &mut SayOptions) -> Result<Self, Error> {
+    pub fn open(command: &mut Command, messages: &mut MessageOptions) -> Result<Self, Error> {
         let mut standard = Self::default();
         let Some((input, save)) = paths(command) else {
             return Ok(standard);
@@ -41,7 +41,7 @@ impl Standard {
         let Some(save) = save.as_mut().filter(|path| path.as_os_str() == "-") else {
             return Ok(standard);
         };
-        if say.json {
+        if messages.json {
             return Err(Error::options(
                 "--json and --save - would both write to standard output: leave one out",
             ));
@@ -51,7 +51,7 @@ impl Standard {
                 "--save - writes one mesh, and --label all makes several: give a file",
             ));
         }
-        say.quiet = true;
+        messages.quiet = true;
         let format = usual_format(input.input.as_deref().unwrap_or_default())?;
         *save = stand_in("output", &format);
         standard.output = Some(save.clone());

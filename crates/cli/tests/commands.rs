@@ -394,7 +394,7 @@ fn time_and_energy_end_runs() {
             "b",
         ],
     );
-    // It stands still, and larger and larger steps would not change that.
+    // It is stationary, and larger and larger steps would not change that.
     assert!(sphere["steps"].as_u64().unwrap() < 40, "{sphere}");
     assert_eq!(sphere["ended"], "the energy is stationary");
     assert!(

@@ -12,7 +12,7 @@ use crate::spectral::{Coefficients, Grid, Series, collect};
 pub enum Flow {
     /// Of `1/2 int h^2`: the outward normal velocity is `h'' + h (|A|^2 - h^2 / 2)`, in which `h''` is the Laplacian along the curve
     /// or on the surface and `|A|^2` the sum of the squared principal curvatures. In the plane that is `kappa_ss + kappa^3 / 2`, and
-    /// the radius of a circle grows as `R^4 = R_0^4 + 2 t`; spheres stand still.
+    /// the radius of a circle grows as `R^4 = R_0^4 + 2 t`; spheres are stationary.
     Willmore,
     /// Of the length or the area: the outward normal velocity is `-h`. In the plane this is curve shortening.
     MeanCurvature,

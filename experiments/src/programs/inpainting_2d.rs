@@ -121,7 +121,7 @@ fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure, Error> {
         shown.push((name, trajectory.field(k)?));
     }
     let end = one.still_from().map_or(String::new(), |still| {
-        format!(" The shape stands still after {still:.3} steps.")
+        format!(" The shape is stationary after {still:.3} steps.")
     });
     let [low, high] = one.shape.region;
     let frame = vec![[low, low], [high, low], [high, high], [low, high]];

@@ -150,7 +150,7 @@ fn note(one: &Inpainted<'_, 3>, n: usize) -> String {
         unreachable!("steps grow");
     };
     let end = one.still_from().map_or(String::new(), |still| {
-        format!(" The shape stands still from t = {} τ on.", still.round())
+        format!(" The shape is stationary from t = {} τ on.", still.round())
     });
     format!(
         "n = {n}, ε = 2/n, inner step 1/n², τ = 2⁻²¹, doubled every step from step {} on; only the values in the green box move.{end} \

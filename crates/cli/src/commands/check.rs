@@ -10,7 +10,7 @@ use operators::{add_scaled, inner_product};
 use rand::{RngExt, SeedableRng};
 use solver::{FlowParams, MinimizingMovement, Objective};
 
-use crate::cli::{CheckOptions, SayOptions};
+use crate::cli::{CheckOptions, MessageOptions};
 use crate::input::{Loaded, Reader};
 use crate::prelude::*;
 
@@ -31,11 +31,11 @@ struct Finding {
 }
 
 /// Checks the derivatives of the energy at the input.
-pub fn run(mut options: CheckOptions, say: SayOptions) -> Result<ExitCode, Error> {
+pub fn run(mut options: CheckOptions, messages: MessageOptions) -> Result<ExitCode, Error> {
     options.scheme.fill_in()?;
     let device = options.common.open_device()?;
     let eps_over_h = options.scheme.eps_over_h();
-    let findings = match Reader::of(&mut options.input, eps_over_h, say)?.load()? {
+    let findings = match Reader::of(&mut options.input, eps_over_h, messages)?.load()? {
         Loaded::Plane(start) => findings(&start.field, &options, &device)?,
         Loaded::Space(start) => findings(&start.field, &options, &device)?,
     };
@@ -48,7 +48,7 @@ pub fn run(mut options: CheckOptions, say: SayOptions) -> Result<ExitCode, Error
         .map(|f| json!({ "name": f.name, "found": f.found, "passed": f.passed }))
         .collect();
     let outcome = json!({ "command": "check", "device": options.common.device, "checks": list });
-    say.report(&outcome, text.trim_end());
+    messages.report(&outcome, text.trim_end());
     let failed: Vec<&str> = findings
         .iter()
         .filter(|f| !f.passed)

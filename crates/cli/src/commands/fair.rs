@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::cli::{FairOptions, SayOptions};
+use crate::cli::{FairOptions, MessageOptions};
 use crate::input::{Loaded, Reader, Source, closed};
 use crate::keep::Keep;
 use crate::own::OwnMesh;
@@ -62,11 +62,11 @@ impl FairOptions {
         Ok(())
     }
 
-    pub fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
+    pub fn load(&mut self, messages: MessageOptions) -> Result<Loaded, Error> {
         let eps_over_h = self.flow.run.scheme.eps_over_h();
-        let mut reader = Reader::of(&mut self.flow.run.input, eps_over_h, say)?;
+        let mut reader = Reader::of(&mut self.flow.run.input, eps_over_h, messages)?;
         let loaded = match reader.source.clone() {
-            Source::Mesh(path) => return self.load_mesh(&path, say),
+            Source::Mesh(path) => return self.load_mesh(&path, messages),
             Source::Volume(_) if self.noise.is_some() || self.keep.is_some() => {
                 let given = if self.noise.is_some() {
                     "--noise"
@@ -85,7 +85,7 @@ impl FairOptions {
                     flow.volume.get_or_insert(SizeTarget::Keep);
                 }
                 if let Loaded::Space(start) = &mut loaded
-                    && let Some(voxels) = start.outlet.voxels.as_mut().filter(|_| !self.ends)
+                    && let Some(voxels) = start.presentation.voxels.as_mut().filter(|_| !self.ends)
                 {
                     voxels.farthest = Some(FARTHEST * voxels.side);
                     flow.run.time = Some((STEPS * voxels.side).powi(4));
@@ -109,7 +109,7 @@ impl FairOptions {
         }
     }
 
-    fn load_mesh(&mut self, path: &Path, say: SayOptions) -> Result<Loaded, Error> {
+    fn load_mesh(&mut self, path: &Path, messages: MessageOptions) -> Result<Loaded, Error> {
         let repairs = self.flow.run.input.repair;
         if repairs && !self.remesh {
             return Err(Error::options(
@@ -120,7 +120,7 @@ impl FairOptions {
             self.keep = Some(absolute(mask)?.to_string_lossy().into_owned());
         }
         let bytes = if repairs {
-            surfaces::encode(path, closed(path, true, say)?.mesh())?
+            surfaces::encode(path, closed(path, true, messages)?.mesh())?
         } else {
             read(path)?
         };
@@ -129,18 +129,18 @@ impl FairOptions {
         own.is_new = self.remesh;
         own.keeps_volume = self.flow.volume == Some(SizeTarget::Keep);
         for warning in warnings {
-            say.warn(&format!("{}: {warning}", path.display()));
+            messages.warn(&format!("{}: {warning}", path.display()));
         }
         if noise.is_none() {
             let noise = own.fairing().noise();
-            say.note(&format!(
+            messages.note(&format!(
                 "noise: {noise:.3e}, {:.3} % of the longest side, estimated (--noise)",
                 100.0 * noise / own.rough().bounding_box().longest_side()
             ));
             self.noise = Some(noise);
         }
         let eps_over_h = self.flow.run.scheme.eps_over_h();
-        Reader::of(&mut self.flow.run.input, eps_over_h, say)?.own(own, path, self.allow_loss)
+        Reader::of(&mut self.flow.run.input, eps_over_h, messages)?.own(own, path, self.allow_loss)
     }
 
     pub fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {

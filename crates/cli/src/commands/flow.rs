@@ -3,13 +3,13 @@
 use engine::{ErrorControl, Flow, Held, Helfrich, Store, TimeSteps};
 use solver::NewtonParams;
 
-use crate::cli::{FlowOptions, RunCommand, RunOptions, SayOptions};
+use crate::cli::{FlowOptions, MessageOptions, RunCommand, RunOptions};
 use crate::config;
 use crate::input::{Loaded, Reader, Start, usual_box};
-use crate::outlet::{self, Outlet};
 use crate::paths::{absolute, extension};
 use crate::plane::Plane;
 use crate::prelude::*;
+use crate::presentation::{self, Presentation};
 use crate::run::{Plan, free_folder, make_way};
 use crate::setup::check_positive;
 use crate::sizes;
@@ -48,13 +48,13 @@ impl RunCommand {
     }
 
     /// The input, as it is before it flows.
-    fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
+    fn load(&mut self, messages: MessageOptions) -> Result<Loaded, Error> {
         match self {
-            Self::Fair(fair) => fair.load(say),
-            Self::Inpaint(inpaint) => inpaint.load(say),
+            Self::Fair(fair) => fair.load(messages),
+            Self::Inpaint(inpaint) => inpaint.load(messages),
             Self::Flow(_) | Self::Mcf(_) => {
                 let RunOptions { input, scheme, .. } = self.options();
-                Reader::of(input, scheme.eps_over_h(), say)?.load()
+                Reader::of(input, scheme.eps_over_h(), messages)?.load()
             }
         }
     }
@@ -164,11 +164,11 @@ impl RunOptions {
 /// Makes a run, or continues one that is stored, perhaps to more steps.
 pub fn run(
     mut command: RunCommand,
-    say: SayOptions,
+    messages: MessageOptions,
     stored: Option<(StoredRun, Option<usize>)>,
 ) -> Result<ExitCode, Error> {
     if let Some(labels) = volume::all_labels(&command.options().input)? {
-        return each_label(&command, &labels, say);
+        return each_label(&command, &labels, messages);
     }
     command.check()?;
     let steps = command.usual_steps();
@@ -185,7 +185,7 @@ pub fn run(
     let mut job = Job {
         command,
         device,
-        say,
+        messages,
     };
     if let Some((stored, more)) = stored {
         return match engine::dimension(&stored)? {
@@ -193,14 +193,18 @@ pub fn run(
             _ => job.resume::<3, Space>(stored, more),
         };
     }
-    match job.command.load(say)? {
+    match job.command.load(messages)? {
         Loaded::Plane(start) => job.start(start),
         Loaded::Space(start) => job.start(start),
     }
 }
 
 /// One run for each label of a volume, until one is interrupted.
-fn each_label(command: &RunCommand, labels: &[i64], say: SayOptions) -> Result<ExitCode, Error> {
+fn each_label(
+    command: &RunCommand,
+    labels: &[i64],
+    messages: MessageOptions,
+) -> Result<ExitCode, Error> {
     for &label in labels {
         let mut one = command.clone();
         let RunOptions { input, keep, .. } = one.options();
@@ -208,7 +212,7 @@ fn each_label(command: &RunCommand, labels: &[i64], say: SayOptions) -> Result<E
         for name in keep.output.iter_mut().chain(&mut keep.save) {
             *name = volume::named(name, label);
         }
-        let code = run(one, say, None)?;
+        let code = run(one, messages, None)?;
         if code != ExitCode::SUCCESS {
             return Ok(code);
         }
@@ -219,23 +223,23 @@ fn each_label(command: &RunCommand, labels: &[i64], say: SayOptions) -> Result<E
 struct Job {
     command: RunCommand,
     device: ComputeDevice,
-    say: SayOptions,
+    messages: MessageOptions,
 }
 
 impl Job {
-    fn start<const D: usize, O: Outlet<D>>(
+    fn start<const D: usize, O: Presentation<D>>(
         mut self,
         mut start: Start<D, O>,
     ) -> Result<ExitCode, Error> {
         let keep = &mut self.command.options().keep;
-        start.outlet.turn(&mut keep.up)?;
+        start.presentation.turn(&mut keep.up)?;
         keep.save.as_deref().map_or(Ok(()), O::check_saved)?;
         if let RunCommand::Flow(options) = &mut self.command {
-            sizes::round_edges(options, &mut start.field, &self.device, self.say)?;
+            sizes::round_edges(options, &mut start.field, &self.device, self.messages)?;
         }
-        let case = self.case(&start.name, start.field, start.region, &start.outlet)?;
+        let case = self.case(&start.name, start.field, start.region, &start.presentation)?;
         let options = config::resolved(self.command.name(), &self.command)?;
-        let plan = self.plan(start.name, start.outlet);
+        let plan = self.plan(start.name, start.presentation);
         let notes = plan.notes(&case, &self.device);
         let run = Run::new(case, &self.device)?;
         let folder = match &plan.keep.output {
@@ -245,7 +249,7 @@ impl Job {
         if plan.keep.force.force {
             make_way(&folder)?;
         }
-        let inputs = plan.outlet.inputs()?;
+        let inputs = plan.presentation.inputs()?;
         let mut files = vec![(config::FILE, options.as_bytes())];
         files.extend(inputs.iter().map(|(name, bytes)| (&**name, &bytes[..])));
         let store = Store::create(folder, &files, &run, notes, plan.checkpoints())?;
@@ -253,29 +257,29 @@ impl Job {
     }
 
     /// Continues a run from its last checkpoint, a finished one to more steps.
-    fn resume<const D: usize, O: Outlet<D>>(
+    fn resume<const D: usize, O: Presentation<D>>(
         mut self,
         stored: StoredRun,
         more: Option<usize>,
     ) -> Result<ExitCode, Error> {
         let mut notes = engine::notes(&stored).clone();
         let name = notes["about"]["name"].as_str().unwrap_or("run").to_owned();
-        let mut outlet = O::deserialize(&notes["outlet"]).map_err(|reason| {
+        let mut presentation = O::deserialize(&notes["outlet"]).map_err(|reason| {
             let path = stored.path().display();
             Error::options(format!(
                 "{path} cannot be resumed: {reason}; start a new run"
             ))
         })?;
         let (field, region) = engine::initial(&stored)?;
-        outlet.restore(&stored)?;
-        let case = self.case(&name, field, region, &outlet)?;
-        let plan = self.plan(name, outlet);
+        presentation.restore(&stored)?;
+        let case = self.case(&name, field, region, &presentation)?;
+        let plan = self.plan(name, presentation);
         let checkpoints = plan.checkpoints();
         let (store, run) = match more {
             Some(steps) => {
                 notes["steps"] = steps.into();
                 let with = (checkpoints, notes);
-                Store::extend(stored, case, &self.device, with, outlet::is_of_end)?
+                Store::extend(stored, case, &self.device, with, presentation::is_of_end)?
             }
             None => Store::resume(stored, case, &self.device, checkpoints)?,
         };
@@ -287,7 +291,7 @@ impl Job {
         name: &str,
         initial: Field<D>,
         region: Option<Vec<bool>>,
-        outlet: &impl Outlet<D>,
+        presentation: &impl Presentation<D>,
     ) -> Result<Case<D>, Error> {
         let (flow, method) = match &self.command {
             RunCommand::Mcf(mcf) => (Flow::MeanCurvature, mcf.method),
@@ -322,7 +326,7 @@ impl Job {
             },
         };
         let eps = scales.eps;
-        let known = outlet.known(&initial, eps)?;
+        let known = presentation.known(&initial, eps)?;
         let (energy, held) = match options {
             Some(options) => (
                 options.energy()?,
@@ -347,7 +351,7 @@ impl Job {
         })
     }
 
-    fn plan<O>(&mut self, name: String, outlet: O) -> Plan<O> {
+    fn plan<O>(&mut self, name: String, presentation: O) -> Plan<O> {
         let format = match &self.command {
             RunCommand::Fair(fair) => fair.format.clone(),
             _ => None,
@@ -355,10 +359,10 @@ impl Job {
         Plan {
             command: self.command.name(),
             name,
-            outlet,
+            presentation,
             format,
             keep: self.command.options().keep.clone(),
-            say: self.say,
+            messages: self.messages,
         }
     }
 }

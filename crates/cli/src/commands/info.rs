@@ -4,10 +4,10 @@ use std::fmt::Write;
 
 use model::Shipped;
 
-use crate::cli::SayOptions;
+use crate::cli::MessageOptions;
 use crate::prelude::*;
 
-pub fn run(say: SayOptions) -> Result<ExitCode, Error> {
+pub fn run(messages: MessageOptions) -> Result<ExitCode, Error> {
     let version = env!("CARGO_PKG_VERSION");
     let mut devices = Vec::new();
     let mut text = format!(
@@ -39,6 +39,6 @@ networks: {accurate} accurate, {paper} of the paper's recipe"
         "devices": devices,
         "networks": { "accurate": accurate, "paper": paper },
     });
-    say.report(&outcome, &text);
+    messages.report(&outcome, &text);
     Ok(ExitCode::SUCCESS)
 }

@@ -1,6 +1,6 @@
 //! `willmore inpaint`.
 
-use crate::cli::{InpaintOptions, SayOptions};
+use crate::cli::{InpaintOptions, MessageOptions};
 use crate::input::{Loaded, Reader, Start};
 use crate::paths::absolute;
 use crate::prelude::*;
@@ -22,18 +22,18 @@ impl InpaintOptions {
         Ok(())
     }
 
-    pub fn load(&mut self, say: SayOptions) -> Result<Loaded, Error> {
+    pub fn load(&mut self, messages: MessageOptions) -> Result<Loaded, Error> {
         let eps_over_h = self.flow.run.scheme.eps_over_h();
-        let loaded = Reader::of(&mut self.flow.run.input, eps_over_h, say)?.load()?;
+        let loaded = Reader::of(&mut self.flow.run.input, eps_over_h, messages)?.load()?;
         let mask = self.mask()?;
         Ok(match loaded {
             Loaded::Plane(mut start) => {
                 let shape = if Region::is_meant(mask) {
                     region(mask)?
                 } else {
-                    start.outlet.mask(mask, start.field.grid())?
+                    start.presentation.mask(mask, start.field.grid())?
                 };
-                start.outlet.repair(shape.as_ref())?;
+                start.presentation.repair(shape.as_ref())?;
                 Loaded::Plane(self.restricted(start, shape.as_ref())?)
             }
             Loaded::Space(start) => Loaded::Space(self.restricted(start, region(mask)?.as_ref())?),

@@ -2,10 +2,10 @@
 
 use model::{Network, Shipped};
 
-use crate::cli::{NetworksCommand, SayOptions};
+use crate::cli::{MessageOptions, NetworksCommand};
 use crate::prelude::*;
 
-pub fn run(show: Option<&NetworksCommand>, say: SayOptions) -> Result<ExitCode, Error> {
+pub fn run(show: Option<&NetworksCommand>, messages: MessageOptions) -> Result<ExitCode, Error> {
     let all = [Shipped::Accurate.all()?, Shipped::Paper.all()?].concat();
     let mut all = all.iter().map(|(name, network)| (stem(name), network));
     let Some(NetworksCommand::Show { network: wanted }) = show else {
@@ -15,7 +15,7 @@ pub fn run(show: Option<&NetworksCommand>, say: SayOptions) -> Result<ExitCode, 
                 (line, about(&name, network))
             })
             .unzip();
-        say.report(&Value::Array(list), &lines.join("\n"));
+        messages.report(&Value::Array(list), &lines.join("\n"));
         return Ok(ExitCode::SUCCESS);
     };
     let network = match all.find(|(name, _)| *name == stem(wanted)) {
@@ -28,7 +28,7 @@ pub fn run(show: Option<&NetworksCommand>, say: SayOptions) -> Result<ExitCode, 
         }
     };
     let about = about(&stem(wanted), network);
-    say.report(&about, &format!("{about:#}"));
+    messages.report(&about, &format!("{about:#}"));
     Ok(ExitCode::SUCCESS)
 }
 

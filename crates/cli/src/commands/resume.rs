@@ -1,12 +1,12 @@
 //! `willmore resume`.
 
 use super::flow;
-use crate::cli::{Command, ResumeOptions, SayOptions};
+use crate::cli::{Command, MessageOptions, ResumeOptions};
 use crate::prelude::*;
 use crate::{config, page};
 
 /// Continues a run by the options and the state that it stored; its input is not needed again.
-pub fn run(options: &ResumeOptions, say: SayOptions) -> Result<ExitCode, Error> {
+pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<ExitCode, Error> {
     let stored = if options.recover {
         RunDirectory::recover(&options.run)?
     } else {
@@ -23,7 +23,7 @@ pub fn run(options: &ResumeOptions, say: SayOptions) -> Result<ExitCode, Error> 
     let keep = &mut command.options().keep;
     keep.force = options.force;
     if !stored.is_finished() || options.steps.is_some() {
-        return flow::run(command, say, Some((stored, options.steps)));
+        return flow::run(command, messages, Some((stored, options.steps)));
     }
     // Nothing else is touched in a finished run: what is there besides may be its owner's.
     stored.tidy()?;
@@ -36,6 +36,6 @@ pub fn run(options: &ResumeOptions, say: SayOptions) -> Result<ExitCode, Error> 
     let text = format!(
         "The run in {folder} is finished already; willmore resume {folder} --steps N goes on to N steps in all"
     );
-    say.report(&outcome, &text);
+    messages.report(&outcome, &text);
     Ok(ExitCode::SUCCESS)
 }

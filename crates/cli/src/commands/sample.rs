@@ -2,11 +2,11 @@
 
 use volumes::Volume;
 
-use crate::cli::{InputOptions, SampleOptions, SayOptions};
+use crate::cli::{InputOptions, MessageOptions, SampleOptions};
 use crate::input::{Loaded, Reader, Source, Start, check_phases, closed};
-use crate::outlet::Outlet;
 use crate::paths::{MESHES, extension};
 use crate::prelude::*;
+use crate::presentation::Presentation;
 use crate::values::Label;
 use crate::volume;
 
@@ -14,7 +14,7 @@ use crate::volume;
 const EPS_OVER_H: f64 = 2.0;
 
 /// Writes an input as the flows begin with it, possibly damaged.
-pub fn run(mut options: SampleOptions, say: SayOptions) -> Result<ExitCode, Error> {
+pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<ExitCode, Error> {
     let path = options.save.take().ok_or_else(|| {
         Error::options(
             "sample needs --save FILE, with .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz",
@@ -25,7 +25,7 @@ pub fn run(mut options: SampleOptions, say: SayOptions) -> Result<ExitCode, Erro
             let mut one = options.clone();
             one.input.label = Some(Label::One(label));
             one.save = Some(volume::named(&path, label));
-            run(one, say)?;
+            run(one, messages)?;
         }
         return Ok(ExitCode::SUCCESS);
     }
@@ -51,7 +51,7 @@ pub fn run(mut options: SampleOptions, say: SayOptions) -> Result<ExitCode, Erro
     }
     let done = || {
         let outcome = json!({ "command": "sample", "file": path });
-        say.report(&outcome, &format!("wrote {shown}"));
+        messages.report(&outcome, &format!("wrote {shown}"));
         Ok(ExitCode::SUCCESS)
     };
     let InputOptions {
@@ -64,10 +64,10 @@ pub fn run(mut options: SampleOptions, say: SayOptions) -> Result<ExitCode, Erro
         options.resample || cells.is_some() || box_side.is_some() || side_length.is_some();
     let whole = is_mesh && options.without.is_empty() && !on_grid;
     let repairs = options.input.repair;
-    let mut reader = Reader::of(&mut options.input, EPS_OVER_H, say)?;
+    let mut reader = Reader::of(&mut options.input, EPS_OVER_H, messages)?;
     if let (Source::Mesh(from), true) = (&reader.source, whole) {
         let mut mesh = if repairs {
-            closed(from, true, say)?.into_mesh()
+            closed(from, true, messages)?.into_mesh()
         } else {
             surfaces::read(from)?
         };
@@ -95,21 +95,24 @@ fn eps<const D: usize>(u: &Field<D>) -> f64 {
     EPS_OVER_H * u.grid().spacing()
 }
 
-fn write<const D: usize, O: Outlet<D>>(
+fn write<const D: usize, O: Presentation<D>>(
     mut start: Start<D, O>,
     mut options: SampleOptions,
     path: &Path,
 ) -> Result<(), Error> {
-    start.outlet.turn(&mut options.up)?;
+    start.presentation.turn(&mut options.up)?;
     let u = without(start.field, &options.without)?;
     match &*extension(path) {
         "npy" => npy::write(path, &u)?,
         "nii" | "gz" => volumes::write(path, &segmentation(&u, path)?)?,
         "vti" => vti::write(path, "phase_field", &u)?,
-        "png" => start.outlet.picture(&u, &u, eps(&u))?.write_png(path)?,
+        "png" => start
+            .presentation
+            .picture(&u, &u, eps(&u))?
+            .write_png(path)?,
         _ => {
             O::check_saved(path)?;
-            start.outlet.save(&u, eps(&u), path)?;
+            start.presentation.save(&u, eps(&u), path)?;
         }
     }
     Ok(())

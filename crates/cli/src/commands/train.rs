@@ -5,7 +5,7 @@ use model::Ratios;
 use model::training::least_squares::LeastSquaresParams;
 use model::training::{Checkpoint, Progress, SphereData, Trained, Training};
 
-use crate::cli::{SayOptions, TrainOptions};
+use crate::cli::{MessageOptions, TrainOptions};
 use crate::prelude::*;
 use crate::setup::check_eps_over_h;
 
@@ -14,7 +14,7 @@ const CELLS: f64 = 128.0;
 /// Radii on which the quality is measured.
 const HELD_OUT: usize = 20;
 
-pub fn run(mut options: TrainOptions, say: SayOptions) -> Result<ExitCode, Error> {
+pub fn run(mut options: TrainOptions, messages: MessageOptions) -> Result<ExitCode, Error> {
     let missing = |name: &str| {
         Error::options(format!(
             "train needs --{name}; for example: willmore train --dimension 2 --width 25 --eps-over-h 3 --save mine.safetensors"
@@ -45,7 +45,7 @@ pub fn run(mut options: TrainOptions, say: SayOptions) -> Result<ExitCode, Error
         held_out: if options.quick { 2 } else { HELD_OUT },
     };
     let interrupt = Interrupt::catch()?;
-    let progress = say.progress();
+    let progress = messages.progress();
     let bar = progress.bar("training", 1);
     let mut observer = |at: &Progress, _: &Checkpoint<()>| {
         bar.set_length(at.of as u64);
@@ -75,6 +75,6 @@ pub fn run(mut options: TrainOptions, say: SayOptions) -> Result<ExitCode, Error
         quality.held_out_loss,
         save.display()
     );
-    say.report(&outcome, &text);
+    messages.report(&outcome, &text);
     Ok(ExitCode::SUCCESS)
 }

@@ -63,7 +63,7 @@ pub struct Known<const D: usize> {
 }
 
 /// How phase fields in `D` dimensions are shown.
-pub trait Outlet<const D: usize>: Serialize + DeserializeOwned {
+pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
     /// Lets the axis that was chosen point up, or says which one does.
     fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error>;
 

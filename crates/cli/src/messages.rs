@@ -4,10 +4,10 @@ use std::io::Write;
 
 use report::Progress;
 
-use crate::cli::SayOptions;
+use crate::cli::MessageOptions;
 use crate::prelude::*;
 
-impl SayOptions {
+impl MessageOptions {
     /// Prints the outcome of a command: an object, or a text for people.
     pub fn report(self, outcome: &Value, text: &str) {
         // A closed pipe (`| head`) is no reason to fail after the results have been written.
