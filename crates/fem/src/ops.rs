@@ -2,9 +2,9 @@
 //!
 //! A scheme has a number, under which it is found again when an operation runs: operations carry numbers only.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use burn::backend::{Backend, ExtensionType, backend_extension, tensor::FloatTensor};
 use burn_autodiff::{Autodiff, checkpoint::strategy::CheckpointStrategy};
@@ -59,13 +59,10 @@ impl<const D: usize> Host for Scheme<D> {
 }
 
 /// The schemes in use, by number.
-fn registry() -> MutexGuard<'static, HashMap<u64, Weak<dyn Host>>> {
-    static SCHEMES: OnceLock<Mutex<HashMap<u64, Weak<dyn Host>>>> = OnceLock::new();
+fn registry() -> MutexGuard<'static, BTreeMap<u64, Weak<dyn Host>>> {
+    static SCHEMES: Mutex<BTreeMap<u64, Weak<dyn Host>>> = Mutex::new(BTreeMap::new());
     // A map of weak references is valid wherever a panic could have left it.
-    SCHEMES
-        .get_or_init(Mutex::default)
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner)
+    SCHEMES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A scheme with its number; leaves the registry when the last clone is dropped.

@@ -1,6 +1,5 @@
 //! One step of mean curvature flow by finite elements, on the host.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use operators::SpectralFilter;
@@ -59,7 +58,7 @@ pub struct Scheme<const D: usize> {
     phase: SpectralFilter,
     systems: Mutex<Vec<(Vec<f64>, Arc<System<D>>)>>,
     symbolic: Mutex<Option<Symbolic>>,
-    counts: [AtomicUsize; 4],
+    statistics: Mutex<Statistics>,
     failure: Mutex<Option<Error>>,
 }
 
@@ -123,7 +122,7 @@ impl<const D: usize> Scheme<D> {
             phase: inverse(2.0 * reaction),
             systems: Mutex::new(Vec::new()),
             symbolic: Mutex::new(None),
-            counts: Default::default(),
+            statistics: Mutex::default(),
             failure: Mutex::new(None),
         })
     }
@@ -149,18 +148,7 @@ impl<const D: usize> Scheme<D> {
 
     /// Work of the inner solvers so far.
     pub fn statistics(&self) -> Statistics {
-        let [newton, solves, cg, factorizations] =
-            self.counts.each_ref().map(|c| c.load(Ordering::Relaxed));
-        Statistics {
-            newton,
-            solves,
-            cg,
-            factorizations,
-        }
-    }
-
-    fn count(&self, which: usize, by: usize) {
-        self.counts[which].fetch_add(by, Ordering::Relaxed);
+        *lock(&self.statistics)
     }
 
     /// The first failure since the last call, if there was one.
@@ -240,7 +228,7 @@ impl<const D: usize> Scheme<D> {
             if iteration == NEWTON_LIMIT {
                 break;
             }
-            self.count(0, 1);
+            lock(&self.statistics).newton += 1;
             let accuracy = residual.clamp(tolerances.linear.min(1e-2), 1e-2);
             let update = self.solve(&self.system(&v), &right, accuracy)?;
             zip_apply(&mut v, &update, |v, d| v + d);
@@ -303,12 +291,12 @@ impl<const D: usize> Scheme<D> {
             Some(symbolic) => symbolic,
             none => none.insert(Symbolic::new(matrix)?),
         };
-        self.count(3, 1);
+        lock(&self.statistics).factorizations += 1;
         symbolic.factorize(matrix)
     }
 
     fn solve(&self, system: &System<D>, right: &[f64], tolerance: f64) -> Result<Vec<f64>, Error> {
-        self.count(1, 1);
+        lock(&self.statistics).solves += 1;
         match (&system.factorization, self.solver) {
             (Some(factorization), _) => Ok(factorization.solve(right)),
             (None, LinearSolver::Direct) => Ok(self.factorize(&system.matrix)?.solve(right)),
@@ -350,7 +338,7 @@ impl<const D: usize> Scheme<D> {
             zip_apply(&mut residual, &product, |r, p| r - alpha * p);
             let z = self.phase.apply(&residual);
             let next = dot(&residual, &z);
-            self.count(2, 1);
+            lock(&self.statistics).cg += 1;
             if next <= tolerance * tolerance * first {
                 return Ok(solution);
             }

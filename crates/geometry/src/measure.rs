@@ -232,16 +232,9 @@ pub fn bounding_box<const D: usize>(u: &Field<D>) -> Option<BoundingBox<D>> {
                 }
             };
             let stride = grid.stride(axis);
-            let back = if node[axis] > 0 {
-                reach(index - stride)
-            } else {
-                0.0
-            };
-            let ahead = if node[axis] + 1 < grid.cells() {
-                reach(index + stride)
-            } else {
-                0.0
-            };
+            let (first, last) = (node[axis] == 0, node[axis] + 1 == grid.cells());
+            let back = if first { 0.0 } else { reach(index - stride) };
+            let ahead = if last { 0.0 } else { reach(index + stride) };
             lower[axis] = lower[axis].min(here - back);
             upper[axis] = upper[axis].max(here + ahead);
         }

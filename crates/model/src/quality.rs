@@ -129,22 +129,19 @@ fn losses(
     radii: &[f64],
     device: &ComputeDevice,
 ) -> Result<[f64; 3], Error> {
+    let points = (data.cells as f64).powi(data.ratios.dimension as i32);
     let mut sums = [0.0; 3];
     for &radius in radii {
         let u = data.sphere(radius);
         let target = data.sphere(data.shrunk(radius));
         let [value, flipped] = applied(network, data, &u, device)?;
         for (i, target) in target.iter().enumerate() {
-            sums[0] += (value[i] - target).powi(2) / u_len(data);
-            sums[1] += (flipped[i] + target).powi(2) / u_len(data);
-            sums[2] += (u[i] - target).powi(2) / u_len(data);
+            sums[0] += (value[i] - target).powi(2) / points;
+            sums[1] += (flipped[i] + target).powi(2) / points;
+            sums[2] += (u[i] - target).powi(2) / points;
         }
     }
     Ok(sums.map(|sum| sum / radii.len() as f64))
-}
-
-fn u_len(data: &SphereData) -> f64 {
-    (data.cells as f64).powi(data.ratios.dimension as i32)
 }
 
 /// `K * u`.

@@ -5,7 +5,7 @@
 //! block of its columns lies in cache. Every pass runs on all cores when the grid is large enough.
 
 use std::any::TypeId;
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
 use fourier::{Planned, Plans};
@@ -34,7 +34,7 @@ pub trait Real: Planned + Float + Lanes + bytemuck::Pod + Default {
 
 /// Plans by grid shape, the symbols of the kernels used last, and memory that is used again.
 pub struct Shared<T: Real> {
-    plans: Mutex<HashMap<Vec<usize>, Arc<Transform<T>>>>,
+    plans: Mutex<BTreeMap<Vec<usize>, Arc<Transform<T>>>>,
     pub(crate) symbols: Mutex<Vec<CachedSymbol<T>>>,
     /// A vector for intermediate results, while nobody uses it.
     pub(crate) scratch: Mutex<Vec<T>>,
@@ -62,12 +62,12 @@ macro_rules! real {
                 (self as i32).max(0) as usize
             }
             fn shared() -> &'static Shared<Self> {
-                static SHARED: std::sync::OnceLock<Shared<$type>> = std::sync::OnceLock::new();
-                SHARED.get_or_init(|| Shared {
-                    plans: Mutex::new(HashMap::new()),
+                static SHARED: Shared<$type> = Shared {
+                    plans: Mutex::new(BTreeMap::new()),
                     symbols: Mutex::new(Vec::new()),
                     scratch: Mutex::new(Vec::new()),
-                })
+                };
+                &SHARED
             }
         }
     };
