@@ -62,13 +62,8 @@ pub enum Error {
     /// A number that is not finite.
     #[error("{what}: entry {index} is not finite")]
     NonFinite { what: &'static str, index: usize },
-    /// A weights file that cannot be read or written.
-    #[error("{action} {path}: {source}")]
-    Io {
-        action: &'static str,
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    /// A weights file that cannot be read.
+    Read(#[from] files::Error),
     /// A weights file with the wrong content.
     #[error("{path} is not a usable network: {reason}")]
     Weights { path: PathBuf, reason: String },
