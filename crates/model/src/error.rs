@@ -62,8 +62,6 @@ pub enum Error {
     /// A number that is not finite.
     #[error("{what}: entry {index} is not finite")]
     NonFinite { what: &'static str, index: usize },
-    /// A weights file that cannot be read.
-    Read(#[from] files::Error),
     /// A weights file with the wrong content.
     #[error("{path} is not a usable network: {reason}")]
     Weights { path: PathBuf, reason: String },
@@ -90,8 +88,8 @@ pub enum Error {
     /// Training was interrupted; its checkpoint can be resumed.
     #[error("training interrupted after iteration {iteration}; run again to resume")]
     Interrupted { iteration: usize },
-    /// A file that cannot be written.
-    Write(#[from] files::Error),
+    /// A file that cannot be read or written.
+    File(#[from] files::Error),
     /// From the operations on the device.
     Operators(#[from] operators::Error),
 }

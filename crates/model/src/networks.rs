@@ -78,7 +78,7 @@ impl Networks {
     /// The networks in these files.
     ///
     /// # Errors
-    /// [`Error::Read`], [`Error::Weights`]; [`Error::Mismatch`] for a file that meets none of the needs, [`Error::NetworkNotNeeded`] if there
+    /// [`Error::File`], [`Error::Weights`]; [`Error::Mismatch`] for a file that meets none of the needs, [`Error::NetworkNotNeeded`] if there
     /// are none.
     pub fn load(paths: &[impl AsRef<Path>], needs: &[NeededNetwork]) -> Result<Self, Error> {
         let mut files = Vec::new();

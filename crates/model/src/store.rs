@@ -212,7 +212,7 @@ impl Network {
     /// Writes the file under a temporary name and renames it.
     ///
     /// # Errors
-    /// [`Error::Write`]; as [`Self::to_bytes`].
+    /// [`Error::File`]; as [`Self::to_bytes`].
     pub fn save(&self, path: &Path) -> Result<(), Error> {
         let data = self.to_bytes()?;
         Ok(write_atomically(path, |out| out.write_all(&data))?)
@@ -221,7 +221,7 @@ impl Network {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`Error::Read`] if it cannot be read, [`Error::Weights`] if it is not a network.
+    /// [`Error::File`] if it cannot be read, [`Error::Weights`] if it is not a network.
     pub fn load(path: &Path) -> Result<Self, Error> {
         let data = std::fs::read(path).map_err(files::Error::of("read", path))?;
         Self::from_bytes(&data, path)
