@@ -161,7 +161,7 @@ impl<const D: usize> Sample<D> {
     }
 
     /// The flow at such times extrapolated to `eps = 0` from strictly controlled runs on two grids, the finer one with half the `eps`: the coarsest
-    /// two on which a corner is [round](ROUND) by then. Adds the metrics `KEY.extrapolated`. A quick look takes coarser ones.
+    /// two on which a corner is round by then. Adds the metrics `KEY.extrapolated`. A quick look takes coarser ones.
     pub fn extrapolated(
         &self,
         session: &mut Session<'_>,
