@@ -183,10 +183,8 @@ impl<const D: usize> Sample<D> {
         };
         let mut runs = Vec::new();
         for (k, &n) in cells.iter().enumerate() {
-            let used = exact
-                .iter()
-                .filter(|t| [k, k + 1].contains(&(coarser(t) + 1)));
-            let used: Vec<&Truth> = used.copied().collect();
+            let in_its_pair = |truth: &&&Truth| k == coarser(truth) || k == coarser(truth) + 1;
+            let used: Vec<&Truth> = exact.iter().filter(in_its_pair).copied().collect();
             let steps = ("controlled_strict", controlled(STRICT, ramp), last(&used));
             let run = || self.run(session, (n, eps_over_h), ACCURATE, steps);
             runs.push((!used.is_empty()).then(run).transpose()?);

@@ -15,9 +15,9 @@ const TAUBIN: [f64; 2] = [0.5, -0.53];
 const TIME: f64 = 8.0;
 /// The smoothing before the flow moves vertices along the normals by at most so many standard deviations, root of the mean square.
 const SMOOTHED: f64 = 0.92;
-/// When averages over neighbours of the ways of vertices along the normals are this many standard deviations, root of the mean square, what
-/// would go further is the shape. Independent noise has 0.36: what of it is in waves of the shape stays on. The averages tell more than the ways
-/// themselves, most of which are the shortest waves. Chosen on the eight meshes of `denoising`, and checked there with noise of another seed.
+/// When the displacements of the vertices along the normals, averaged over neighbours, are this many standard deviations, root of the mean
+/// square, what would go further is the shape. Independent noise has 0.36: what of it is in waves of the shape stays on. Chosen on the four
+/// meshes of `denoising` with two noises each, and checked there with noise of another seed.
 const FARTHEST: f64 = 0.222;
 /// Along the surface no vertex is moved by more than so many standard deviations: there is no noise beyond.
 const SLIDING: f64 = 3.0;
@@ -160,16 +160,16 @@ impl Fairing {
         lost
     }
 
-    /// How far the surface has gone when the phase field is `u`: the ways of the vertices along the normals of the start, averaged over
-    /// neighbours, root of the mean square.
+    /// How far the surface has gone when the phase field is `u`: the displacements of the vertices along the normals of the start, averaged
+    /// over neighbours, root of the mean square.
     ///
     /// # Errors
     /// The values must be finite.
     pub fn displacement(&self, followed: &Followed, u: &Field<3>) -> Result<f64, Error> {
         let now = self.faired(followed, u)?;
         let start = self.start.mesh();
-        let ways = along_normals(start, self.rough.mesh(), &now);
-        Ok(root_mean_square(&start.averaged(&ways)))
+        let displacements = along_normals(start, self.rough.mesh(), &now);
+        Ok(root_mean_square(&start.averaged(&displacements)))
     }
 
     /// The mesh, when the phase field is `u`.
@@ -251,7 +251,7 @@ fn hold_along_surface(mesh: &mut TriangleMesh, rough: &TriangleMesh, longest: f6
     }
 }
 
-/// The ways between the vertices of two meshes along the normals of a smooth one.
+/// The displacements from the vertices of one mesh to those of another along the normals of a smooth one.
 fn along_normals(smooth: &TriangleMesh, from: &TriangleMesh, to: &TriangleMesh) -> Vec<f64> {
     let normals = smooth.vertex_normals();
     let pairs = from.vertices.iter().zip(&to.vertices).zip(&normals);
