@@ -82,7 +82,7 @@ impl Scene {
     /// The field must be finite.
     pub fn from_signed_distance(distance: &Field<3>) -> Result<Self, Error> {
         distance.check_finite()?;
-        Ok(Self::of_mesh(isosurface(&smoothed(distance)?)?))
+        Ok(Self::of_mesh(isosurface(&distance.smoothed())?))
     }
 
     /// A mesh. Light is computed at its vertices: large triangles look flat.
@@ -143,7 +143,7 @@ impl Scene {
     /// The mask must be finite.
     pub fn highlight_mask(mut self, mask: &Field<3>, colour: Rgb) -> Result<Self, Error> {
         mask.check_finite()?;
-        let mask = smoothed(mask)?;
+        let mask = mask.smoothed();
         let values = self.mesh.vertices.iter().map(|&x| mask.interpolate(x));
         self.highlight = Some((values.collect(), colour));
         Ok(self)
@@ -235,22 +235,6 @@ impl Scene {
         let centre = sum / points.len() as f64;
         Camera::fit(self.view.orientation()?, &points, centre, size)
     }
-}
-
-/// The nodal values with the weights (1, 4, 1)/6 of a cubic B-spline along every axis, twice.
-fn smoothed(field: &Field<3>) -> Result<Field<3>, Error> {
-    let (grid, cells) = (field.grid(), field.grid().cells());
-    let mut values = field.values().to_vec();
-    for axis in [0, 1, 2, 0, 1, 2] {
-        let stride = grid.stride(axis);
-        let along = |at: usize| {
-            let k = at / stride % cells;
-            let neighbour = |l: usize| values[at - k * stride + l % cells * stride];
-            (neighbour(k + cells - 1) + 4.0 * values[at] + neighbour(k + 1)) / 6.0
-        };
-        values = (0..values.len()).into_par_iter().map(along).collect();
-    }
-    Ok(Field::from_values(*grid, values)?)
 }
 
 /// Everything needed to draw.

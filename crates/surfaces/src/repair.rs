@@ -46,7 +46,7 @@ pub struct Repaired {
 /// holes its level set at one half, which is smooth, closes them. A. Jacobson, L. Kavan, O. Sorkine-Hornung: Robust inside-outside
 /// segmentation using generalized winding numbers. ACM Trans. Graph. 32 (2013); far faces are summed as dipoles: G. Barill et al.: Fast
 /// winding numbers for soups and clouds. ACM Trans. Graph. 37 (2018). The surface is that of the signed distance on a grid with so
-/// many cells a side, of which the mesh fills four fifths.
+/// many cells a side, of which the mesh fills four fifths; edges and gaps are rounded at the scale of a cell.
 ///
 /// # Errors
 /// [`Error::NoFaces`], [`Error::NonFiniteVertex`], [`Error::IndexOutOfRange`]; [`Error::EnclosesNothing`].
@@ -72,6 +72,7 @@ pub fn repair(mesh: &TriangleMesh, cells: usize) -> Result<Repaired, Error> {
     let unsigned = sampled(grid, to_old)?;
     let eps = EPS_OVER_H * grid.spacing();
     let u = signed(&unsigned, &winding)?.map(|s| optimal_profile(s, eps));
+    let u = without_sharp_edges(&u)?;
     let new = remeshed_surface(&u, eps)?;
     if new.faces.is_empty() {
         let spacing = grid.spacing();
@@ -122,6 +123,13 @@ fn signed(unsigned: &Field<3>, winding: &Field<3>) -> Result<Field<3>, Error> {
         if depth > 0.0 { -distance } else { distance }
     });
     Ok(Field::from_values(grid, values.collect())?)
+}
+
+/// Smoothed by `S (2 - S)`, which rounds creases and closes gaps narrower than a cell, and moves smooth surfaces by the fourth order only.
+fn without_sharp_edges(u: &Field<3>) -> Result<Field<3>, Error> {
+    let once = u.smoothed();
+    let twice = once.smoothed();
+    Ok(once.zip_map(&twice, |once, twice| 2.0 * once - twice)?)
 }
 
 /// Turns faces round so that neighbours across edges of two faces agree, as few as possible of each patch; returns how many.

@@ -60,7 +60,7 @@ fn part_below(angles: &[f64], degrees: f64) -> f64 {
     angles.partition_point(|&angle| angle < degrees) as f64 / angles.len() as f64
 }
 
-fn shortest_edge(mesh: &TriangleMesh) -> f64 {
+pub fn shortest_edge(mesh: &TriangleMesh) -> f64 {
     let edges = triangles(mesh).flat_map(|[a, b, c]| [minus(a, b), minus(b, c), minus(c, a)]);
     edges.map(length).fold(f64::INFINITY, f64::min)
 }
