@@ -1,6 +1,6 @@
 //! Curves and surfaces that come to rest with given perimeter and volume, against exact equilibria.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_1_PI, TAU};
 
 use reference::equilibria::Branch;
 
@@ -65,20 +65,49 @@ impl Equilibrium {
         axes(round).map(|axis| axis * self.radius)
     }
 
-    /// The ellipse or spheroid from which the flow starts, around a centre.
+    /// The ellipse, spheroid or bowl from which the flow starts, around a centre.
     pub fn start<const D: usize>(
         &self,
         grid: Grid<D>,
         eps: f64,
         centre: f64,
     ) -> Result<Field<D>, Error> {
-        let profile = Ellipse::new(self.half_axes::<D>())?;
+        let profile: Box<dyn SignedDistance<2>> = match self.branch {
+            Some(Branch::Stomatocyte) => Box::new(self.bowl()),
+            _ => Box::new(Ellipse::new(self.half_axes::<D>())?),
+        };
         let distance = |x: [f64; D]| {
             let along = x[D - 1] - centre;
             let across = x[..D - 1].iter().map(|x| (x - centre).powi(2));
             profile.signed_distance([across.sum::<f64>().sqrt(), along])
         };
         Ok(phase_field(grid, &distance, eps)?)
+    }
+
+    /// The bowl with these sizes.
+    fn bowl(&self) -> Bowl {
+        let [area, volume] = self.sizes::<3>();
+        let (mut thin, mut thick) = (0.01, 0.99);
+        for _ in 0..60 {
+            let wall = 0.5 * (thin + thick);
+            let [a, v] = Bowl { radius: 1.0, wall }.sizes();
+            let end = if v / a.powf(1.5) < volume / area.powf(1.5) {
+                &mut thin
+            } else {
+                &mut thick
+            };
+            *end = wall;
+        }
+        let [unit, _] = Bowl {
+            radius: 1.0,
+            wall: thin,
+        }
+        .sizes();
+        let radius = (area / unit).sqrt();
+        Bowl {
+            radius,
+            wall: thin * radius,
+        }
     }
 
     /// Lets a flow come to rest with these sizes: [implicit steps by the energy](StepRule::ByEnergy).
@@ -120,6 +149,41 @@ impl Equilibrium {
             field,
             zero_set,
         })
+    }
+}
+
+/// What is within half the thickness of a wall of a part of a sphere, from its lowest point to the angle [`Bowl::RIM`]; as a profile over the
+/// distance from the axis and the height.
+struct Bowl {
+    radius: f64,
+    /// Half the thickness.
+    wall: f64,
+}
+
+impl Bowl {
+    const RIM: f64 = 2.0;
+
+    /// Area and volume, by Pappus's theorems for the rim.
+    fn sizes(&self) -> [f64; 2] {
+        let (r, w, (sin, cos)) = (self.radius, self.wall, Self::RIM.sin_cos());
+        let cap = TAU * (1.0 - cos);
+        let around = |centroid: f64| TAU * (r * sin + centroid * w * FRAC_1_PI * cos);
+        [
+            2.0 * cap * (r * r + w * w) + PI * w * around(2.0),
+            2.0 * cap * (r * r * w + w.powi(3) / 3.0) + 0.5 * PI * w * w * around(4.0 / 3.0),
+        ]
+    }
+}
+
+impl SignedDistance<2> for Bowl {
+    fn signed_distance(&self, [across, height]: [f64; 2]) -> f64 {
+        let (sin, cos) = Self::RIM.sin_cos();
+        let to_sphere = if across.atan2(-height) < Self::RIM {
+            (across.hypot(height) - self.radius).abs()
+        } else {
+            (across - self.radius * sin).hypot(height + self.radius * cos)
+        };
+        to_sphere - self.wall
     }
 }
 

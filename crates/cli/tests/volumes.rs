@@ -72,35 +72,45 @@ fn a_ball_of_voxels_becomes_a_ball_of_their_volume() {
     }
 }
 
-/// Beyond its noise, which leaves a sphere with long waves.
-#[test]
-fn a_noisy_sphere_becomes_a_sphere_of_its_volume() {
+/// Fairs a noisy sphere with its volume kept; the volume of its zero set over that of the mesh.
+fn fair_noisy_sphere(options: &[&str]) -> f64 {
     let folder = tempfile::tempdir().unwrap();
     let noisy = ["sample", "builtin:sphere", "--noise", "0.004"];
-    let save = ["--save", "noisy.ply"];
-    outcome(folder.path(), &[&noisy[..], &save].concat());
-    let options = ["--volume", "keep", "--save", "ball.ply", "--cells", "64"];
-    let time = [
-        "--side-length",
-        "0.6",
-        "--tau",
-        "graded:1e-8,0.5",
-        "--time",
-        "1e-5",
+    outcome(
+        folder.path(),
+        &[&noisy[..], &["--save", "noisy.ply"]].concat(),
+    );
+    let fair = [
+        "fair",
+        "noisy.ply",
+        "--volume",
+        "keep",
+        "--save",
+        "ball.ply",
     ];
-    let fair = [&["fair", "noisy.ply"][..], &options, &time].concat();
-    let ended = outcome(folder.path(), &fair);
+    let ended = outcome(folder.path(), &[&fair[..], options].concat());
     let [before, after] = ["noisy.ply", "ball.ply"].map(|name| closed(&folder.path().join(name)));
-    for volume in [after.volume(), number(&ended, "volume")] {
-        assert!(
-            (volume / before.volume() - 1.0).abs() < 1e-6,
-            "{volume} {ended}"
-        );
-    }
+    assert!((after.volume() / before.volume() - 1.0).abs() < 1e-6);
     assert!(
         (number(&ended, "energy_over_8_pi") - 1.0).abs() < 0.02,
         "{ended}"
     );
+    number(&ended, "volume") / before.volume()
+}
+
+/// Without the estimate of its noise.
+#[test]
+fn a_noisy_sphere_becomes_a_sphere_of_its_volume() {
+    let grid = ["--cells", "64", "--side-length", "0.6"];
+    let time = ["--tau", "graded:1e-8,0.5", "--time", "1e-5"];
+    let ratio = fair_noisy_sphere(&[&grid[..], &time].concat());
+    assert!((ratio - 1.0).abs() < 1e-6, "{ratio}");
+}
+
+#[test]
+#[ignore = "takes a minute: the one above at the usual settings"]
+fn a_noisy_sphere_becomes_a_sphere_at_the_usual_settings() {
+    fair_noisy_sphere(&[]);
 }
 
 #[test]

@@ -7,6 +7,7 @@ use reference::equilibria::{Branch, Vesicle, vesicles};
 use render::{Quality, Scene};
 
 const TITLE: &str = "Vesicles: least bending energy with given area and volume";
+
 /// Shapes of a branch, each flowing from the relaxed one before it.
 struct Family {
     branch: Branch,
@@ -20,7 +21,7 @@ struct Family {
 
 /// The two sides of oblate shapes must be several interface widths apart in the middle: with half as many cells they break through below .62. Longer
 /// prolate shapes come to the side of the box.
-const FAMILIES: [Family; 2] = [
+const FAMILIES: [Family; 3] = [
     Family {
         branch: Branch::Prolate,
         name: "prolate",
@@ -34,6 +35,13 @@ const FAMILIES: [Family; 2] = [
         reduced_volumes: &[0.7, 0.65, 0.6],
         radius: 0.6,
         cells: [32, 128],
+    },
+    Family {
+        branch: Branch::Stomatocyte,
+        name: "stomatocyte",
+        reduced_volumes: &[0.6],
+        radius: 0.6,
+        cells: [32, 64],
     },
 ];
 /// Side of the box.
@@ -51,17 +59,17 @@ pub struct Options {
 pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.figure.run;
     let (count, steps) = run.either((1, Some(2)), (usize::MAX, None));
-    let settings = (FAMILIES.iter().take(count))
+    let settings = (FAMILIES.iter().skip(2))
         .map(|family| Setting::new(&options.figure, family.cells, SIDE))
         .collect::<Result<Vec<_>, Error>>()?;
-    let families = FAMILIES.iter().zip(&settings).map(|(family, setting)| {
+    let families = FAMILIES.iter().skip(2).zip(&settings).map(|(family, setting)| {
         json!({ "branch": family.name, "reduced_volumes": family.reduced_volumes, "radius": family.radius, "n": setting.n })
     });
     let families: Vec<Value> = families.collect();
     let parameters = settings[0].parameters(json!({ "families": families }))?;
     let mut session = Session::open("vesicles", run, parameters)?;
     let mut all: Vec<AtRest<3>> = Vec::new();
-    for (family, setting) in FAMILIES.iter().zip(&settings) {
+    for (family, setting) in FAMILIES.iter().skip(2).zip(&settings) {
         let (branch, name, radius) = (family.branch, family.name, family.radius);
         let volumes = family.reduced_volumes.iter().copied().take(count);
         let volumes: Vec<f64> = volumes.collect();
