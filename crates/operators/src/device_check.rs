@@ -34,7 +34,7 @@ pub(crate) fn open_gpu(
 fn check(device: &ComputeDevice) -> Result<(), Error> {
     const N: usize = 24;
     let u: Vec<f64> = (0..N * N).map(|i| (0.37 * i as f64).sin()).collect();
-    let kernel: Vec<f64> = (0..25).map(|i| 0.04 + 0.01 * (i as f64).cos()).collect();
+    let kernel: Vec<f64> = (0..25).map(|i| 0.04 + 0.01 * f64::from(i).cos()).collect();
     let x = device.tensor::<2>(&u, [N, N]);
 
     let expected = convolve(&u, &[N, N], &kernel, 5, false);

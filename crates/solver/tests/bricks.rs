@@ -277,7 +277,8 @@ fn a_region_moves_on_bricks_as_on_the_grid() {
     let start = flow.field().unwrap();
     let inside: Vec<bool> = (0..grid.len()).map(|i| grid.node(i)[0] > 0.1).collect();
     let params = exact(&grid);
-    let ends = [dense(&start, params), bricks(&start, params)].map(|mut flow| {
+    let ends = [dense, bricks].map(|flow| {
+        let mut flow = flow(&start, params);
         flow.restrict_to(&inside).unwrap();
         for _ in 0..8 {
             flow.advance(params.mcf_step / 4.0).unwrap();
