@@ -126,8 +126,8 @@ impl Equilibrium {
             perimeter: ramp(start.perimeter, perimeter),
             volume: ramp(start.volume, volume),
         };
-        // In long steps flat vesicles break through in the middle.
-        let flat = self.branch == Some(Branch::Oblate);
+        // In long steps flat vesicles and cups break through in the middle.
+        let flat = self.branch.is_some_and(|branch| branch != Branch::Prolate);
         case.steps = TimeSteps {
             longest_move: Some(if flat { 0.3 } else { 1.0 }),
             ..StepRule::ByEnergy(None).into()

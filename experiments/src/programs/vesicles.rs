@@ -59,17 +59,17 @@ pub struct Options {
 pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.figure.run;
     let (count, steps) = run.either((1, Some(2)), (usize::MAX, None));
-    let settings = (FAMILIES.iter().skip(2))
+    let settings = (FAMILIES.iter().take(count))
         .map(|family| Setting::new(&options.figure, family.cells, SIDE))
         .collect::<Result<Vec<_>, Error>>()?;
-    let families = FAMILIES.iter().skip(2).zip(&settings).map(|(family, setting)| {
+    let families = FAMILIES.iter().zip(&settings).map(|(family, setting)| {
         json!({ "branch": family.name, "reduced_volumes": family.reduced_volumes, "radius": family.radius, "n": setting.n })
     });
     let families: Vec<Value> = families.collect();
     let parameters = settings[0].parameters(json!({ "families": families }))?;
     let mut session = Session::open("vesicles", run, parameters)?;
     let mut all: Vec<AtRest<3>> = Vec::new();
-    for (family, setting) in FAMILIES.iter().skip(2).zip(&settings) {
+    for (family, setting) in FAMILIES.iter().zip(&settings) {
         let (branch, name, radius) = (family.branch, family.name, family.radius);
         let volumes = family.reduced_volumes.iter().copied().take(count);
         let volumes: Vec<f64> = volumes.collect();
