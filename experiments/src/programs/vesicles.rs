@@ -19,7 +19,7 @@ struct Family {
     cells: [usize; 2],
 }
 
-/// The two sides of oblate shapes must be several interface widths apart in the middle: with half as many cells they break through below .62. Longer
+/// The two sides of oblate shapes must be several interface widths apart in the middle: with 64 cells they break through below .62. Longer
 /// prolate shapes come to the side of the box.
 const FAMILIES: [Family; 3] = [
     Family {
@@ -30,18 +30,18 @@ const FAMILIES: [Family; 3] = [
         cells: [32, 64],
     },
     Family {
-        branch: Branch::Oblate,
-        name: "oblate",
-        reduced_volumes: &[0.7, 0.65, 0.6],
-        radius: 0.6,
-        cells: [32, 128],
-    },
-    Family {
         branch: Branch::Stomatocyte,
         name: "stomatocyte",
         reduced_volumes: &[0.6],
         radius: 0.6,
         cells: [32, 64],
+    },
+    Family {
+        branch: Branch::Oblate,
+        name: "oblate",
+        reduced_volumes: &[0.7, 0.65, 0.6],
+        radius: 0.6,
+        cells: [32, 96],
     },
 ];
 /// Side of the box.
