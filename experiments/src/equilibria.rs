@@ -84,6 +84,19 @@ impl Equilibrium {
         Ok(phase_field(grid, &distance, eps)?)
     }
 
+    /// The height of the centroid of what the exact curve encloses.
+    pub fn height(&self) -> f64 {
+        let points = self.curve.points();
+        let (mut moment, mut area) = (0.0, 0.0);
+        for (k, [x, y]) in points.iter().enumerate() {
+            let [next_x, next_y] = points[(k + 1) % points.len()];
+            let cross = x * next_y - next_x * y;
+            moment += cross * (y + next_y) / 3.0;
+            area += cross;
+        }
+        self.radius * moment / area
+    }
+
     /// The bowl with these sizes.
     fn bowl(&self) -> Bowl {
         let [area, volume] = self.sizes::<3>();
@@ -153,7 +166,7 @@ impl Equilibrium {
 }
 
 /// What is within half the thickness of a wall of a part of a sphere, from its lowest point to the angle [`Bowl::RIM`]; as a profile over the
-/// distance from the axis and the height.
+/// distance from the axis and the height. Of wider bowls the wall breaks through on the way.
 struct Bowl {
     radius: f64,
     /// Half the thickness.
@@ -161,7 +174,7 @@ struct Bowl {
 }
 
 impl Bowl {
-    const RIM: f64 = 2.0;
+    const RIM: f64 = 2.5;
 
     /// Area and volume, by Pappus's theorems for the rim.
     fn sizes(&self) -> [f64; 2] {
