@@ -1,6 +1,6 @@
 //! Curves and surfaces that come to rest with given perimeter and volume, against exact equilibria.
 
-use std::f64::consts::{FRAC_1_PI, TAU};
+use std::f64::consts::TAU;
 
 use reference::equilibria::Branch;
 
@@ -65,62 +65,20 @@ impl Equilibrium {
         axes(round).map(|axis| axis * self.radius)
     }
 
-    /// The ellipse, spheroid or bowl from which the flow starts, around a centre.
+    /// The ellipse or spheroid from which the flow starts, around a centre.
     pub fn start<const D: usize>(
         &self,
         grid: Grid<D>,
         eps: f64,
         centre: f64,
     ) -> Result<Field<D>, Error> {
-        let profile: Box<dyn SignedDistance<2>> = match self.branch {
-            Some(Branch::Stomatocyte) => Box::new(self.bowl()),
-            _ => Box::new(Ellipse::new(self.half_axes::<D>())?),
-        };
+        let profile = Ellipse::new(self.half_axes::<D>())?;
         let distance = |x: [f64; D]| {
             let along = x[D - 1] - centre;
             let across = x[..D - 1].iter().map(|x| (x - centre).powi(2));
             profile.signed_distance([across.sum::<f64>().sqrt(), along])
         };
         Ok(phase_field(grid, &distance, eps)?)
-    }
-
-    /// The height of the centroid of what the exact curve encloses.
-    pub fn height(&self) -> f64 {
-        let points = self.curve.points();
-        let (mut moment, mut area) = (0.0, 0.0);
-        for (k, [x, y]) in points.iter().enumerate() {
-            let [next_x, next_y] = points[(k + 1) % points.len()];
-            let cross = x * next_y - next_x * y;
-            moment += cross * (y + next_y) / 3.0;
-            area += cross;
-        }
-        self.radius * moment / area
-    }
-
-    /// The bowl with these sizes.
-    fn bowl(&self) -> Bowl {
-        let [area, volume] = self.sizes::<3>();
-        let (mut thin, mut thick) = (0.01, 0.99);
-        for _ in 0..60 {
-            let wall = 0.5 * (thin + thick);
-            let [a, v] = Bowl { radius: 1.0, wall }.sizes();
-            let end = if v / a.powf(1.5) < volume / area.powf(1.5) {
-                &mut thin
-            } else {
-                &mut thick
-            };
-            *end = wall;
-        }
-        let [unit, _] = Bowl {
-            radius: 1.0,
-            wall: thin,
-        }
-        .sizes();
-        let radius = (area / unit).sqrt();
-        Bowl {
-            radius,
-            wall: thin * radius,
-        }
     }
 
     /// Lets a flow come to rest with these sizes: [implicit steps by the energy](StepRule::ByEnergy).
@@ -139,8 +97,8 @@ impl Equilibrium {
             perimeter: ramp(start.perimeter, perimeter),
             volume: ramp(start.volume, volume),
         };
-        // In long steps flat vesicles and cups break through in the middle.
-        let flat = self.branch.is_some_and(|branch| branch != Branch::Prolate);
+        // In long steps flat vesicles break through in the middle.
+        let flat = self.branch == Some(Branch::Oblate);
         case.steps = TimeSteps {
             longest_move: Some(if flat { 0.3 } else { 1.0 }),
             ..StepRule::ByEnergy(None).into()
@@ -162,41 +120,6 @@ impl Equilibrium {
             field,
             zero_set,
         })
-    }
-}
-
-/// What is within half the thickness of a wall of a part of a sphere, from its lowest point to the angle [`Bowl::RIM`]; as a profile over the
-/// distance from the axis and the height. Of wider bowls the wall breaks through on the way.
-struct Bowl {
-    radius: f64,
-    /// Half the thickness.
-    wall: f64,
-}
-
-impl Bowl {
-    const RIM: f64 = 2.5;
-
-    /// Area and volume, by Pappus's theorems for the rim.
-    fn sizes(&self) -> [f64; 2] {
-        let (r, w, (sin, cos)) = (self.radius, self.wall, Self::RIM.sin_cos());
-        let cap = TAU * (1.0 - cos);
-        let around = |centroid: f64| TAU * (r * sin + centroid * w * FRAC_1_PI * cos);
-        [
-            2.0 * cap * (r * r + w * w) + PI * w * around(2.0),
-            2.0 * cap * (r * r * w + w.powi(3) / 3.0) + 0.5 * PI * w * w * around(4.0 / 3.0),
-        ]
-    }
-}
-
-impl SignedDistance<2> for Bowl {
-    fn signed_distance(&self, [across, height]: [f64; 2]) -> f64 {
-        let (sin, cos) = Self::RIM.sin_cos();
-        let to_sphere = if across.atan2(-height) < Self::RIM {
-            (across.hypot(height) - self.radius).abs()
-        } else {
-            (across - self.radius * sin).hypot(height + self.radius * cos)
-        };
-        to_sphere - self.wall
     }
 }
 
