@@ -13,6 +13,10 @@ const TAUBIN: [f64; 2] = [0.5, -0.53];
 /// The flow takes at most the time `100 s^2 (e^2 + h^2)` for noise of standard deviation `s` on a mesh with edges of mean length `e` and a
 /// grid of spacing `h`. Where there is a shape to be lost, the displacement ends it before; a noisy sphere becomes a sphere in this time.
 const TIME: f64 = 100.0;
+/// Where more noise is to be taken off than the mesh has, the shape has to make up for it, and only a shorter time keeps that:
+const TIME_BEYOND: f64 = 8.0;
+/// from so many times the noise that is found in the mesh on.
+const BEYOND: f64 = 1.5;
 /// The smoothing before the flow moves vertices along the normals by at most so many standard deviations, root of the mean square.
 const SMOOTHED: f64 = 0.92;
 /// When the displacements of the vertices along the normals, averaged over neighbours, are this many standard deviations, root of the mean
@@ -104,7 +108,9 @@ impl Fairing {
     /// The longest time of Willmore flow for the noise, on a grid of this spacing, all lengths multiplied by `scale`.
     pub fn time(&self, spacing: f64, scale: f64) -> f64 {
         let edge = scale * self.rough.mesh().mean_edge();
-        TIME * (scale * self.noise).powi(2) * (edge * edge + spacing * spacing)
+        let is_beyond = self.noise > BEYOND * self.rough.mesh().noise();
+        let most = if is_beyond { TIME_BEYOND } else { TIME };
+        most * (scale * self.noise).powi(2) * (edge * edge + spacing * spacing)
     }
 
     /// The [displacement](Self::displacement) at which the noise is off.
