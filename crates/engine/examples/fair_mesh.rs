@@ -45,7 +45,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         measures: Vec::new(),
     };
     let mut run = Run::new(case, &ComputeDevice::default_compiled()?)?;
-    while run.step()?.is_some() {}
+    // As far as the noise is.
+    while run.step()?.is_some()
+        && fairing.displacement(&followed, run.field())? < fairing.farthest()
+    {}
     let faired = fairing.faired(&followed, run.field())?;
     println!("noise about {noise:.5} before, {:.5} after", faired.noise());
     if let Some(out) = out {
