@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 type Summary = BTreeMap<String, f64>;
 
@@ -16,18 +17,28 @@ fn read(file: &str) -> String {
     fs::read_to_string(root().join(file)).unwrap_or_else(|error| panic!("{file}: {error}"))
 }
 
-/// The summaries of all results, by folder.
+/// The summaries of all results, by folder, as git has them for the next commit: a run of one's own replaces the files. Where there is no git, the
+/// files.
 fn summaries() -> BTreeMap<String, Summary> {
     let mut all = BTreeMap::new();
     for folder in fs::read_dir(root().join("results")).unwrap() {
         let folder = folder.unwrap();
-        if let Ok(text) = fs::read_to_string(folder.path().join("summary.json")) {
-            let name = folder.file_name().into_string().unwrap();
+        let name = folder.file_name().into_string().unwrap();
+        let in_file = || fs::read_to_string(folder.path().join("summary.json")).ok();
+        if let Some(text) = staged(&format!("results/{name}/summary.json")).or_else(in_file) {
             all.insert(name, serde_json::from_str(&text).unwrap());
         }
     }
     assert!(!all.is_empty());
     all
+}
+
+/// A file as git has it for the next commit.
+fn staged(file: &str) -> Option<String> {
+    let mut git = Command::new("git");
+    git.arg("-C").arg(root());
+    let output = git.arg("show").arg(format!(":./{file}")).output().ok()?;
+    (output.status.success()).then(|| String::from_utf8(output.stdout).unwrap())
 }
 
 /// What stands in code spans.
