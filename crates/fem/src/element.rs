@@ -65,7 +65,7 @@ fn over_slabs<T: Send>(
     data: &mut [T],
     per_slab: usize,
     parallel: bool,
-    f: impl Fn(usize, &mut [T]) + Sync,
+    f: &(dyn Fn(usize, &mut [T]) + Sync),
 ) {
     if parallel && rayon::current_num_threads() > 1 {
         let slabs = data.len() / per_slab;
@@ -161,7 +161,7 @@ pub fn product<const D: usize>(cells: usize, a: &[f64], b: &[f64], c: &[f64]) ->
     let corners = 1_usize << (D - 1);
     let mut result = vec![0.0; a.len()];
     let parallel = a.len() >= PARALLEL_FROM;
-    over_slabs(&mut result, slab, parallel, |first, out| {
+    over_slabs(&mut result, slab, parallel, &|first, out| {
         let mut work = Work::new(cells);
         let count = out.len() / slab;
         // A node gets contributions of the slabs of cells on both sides: the one below the first node is done here, too.
@@ -313,7 +313,7 @@ impl<const D: usize> Stencil<D> {
         // Slab by slab: the weights of all offsets of one slab of nodes lie together while they are summed.
         let parallel = v.len() >= PARALLEL_FROM;
         let mut together = vec![0.0; count * v.len()];
-        over_slabs(&mut together, count * slab, parallel, |first, out| {
+        over_slabs(&mut together, count * slab, parallel, &|first, out| {
             let mut work = Work::new(cells);
             let slabs = out.len() / (count * slab);
             for k in 0..=slabs {
@@ -362,7 +362,7 @@ impl<const D: usize> Stencil<D> {
             }
         });
         for (offset, weights) in self.weights.iter_mut().enumerate() {
-            over_slabs(weights, slab, parallel, |first, out| {
+            over_slabs(weights, slab, parallel, &|first, out| {
                 for (k, out) in out.chunks_exact_mut(slab).enumerate() {
                     let from = &together[((first + k) * count + offset) * slab..][..slab];
                     for (o, x) in out.iter_mut().zip(from) {
@@ -379,7 +379,7 @@ impl<const D: usize> Stencil<D> {
         let lines = x.len() / cells;
         let mut result = vec![0.0; x.len()];
         let parallel = x.len() >= PARALLEL_FROM;
-        over_slabs(&mut result, cells, parallel, |first, out| {
+        over_slabs(&mut result, cells, parallel, &|first, out| {
             for (k, out) in out.chunks_exact_mut(cells).enumerate() {
                 let line = first + k;
                 for (offset, weights) in self.offsets.iter().zip(&self.weights) {
@@ -466,7 +466,7 @@ fn add_shifted(out: &mut [f64], shift: isize, f: impl Fn(usize, usize) -> f64) {
 pub fn mass<const D: usize>(cells: usize, x: &[f64]) -> Vec<f64> {
     let parallel = x.len() >= PARALLEL_FROM;
     let mut values = vec![0.0; x.len()];
-    over_slabs(&mut values, cells, parallel, |first, out| {
+    over_slabs(&mut values, cells, parallel, &|first, out| {
         for (k, out) in out.chunks_exact_mut(cells).enumerate() {
             let line = &x[(first + k) * cells..][..cells];
             out[0] = (4.0 * line[0] + line[1] + line[cells - 1]) / 6.0;
@@ -480,7 +480,7 @@ pub fn mass<const D: usize>(cells: usize, x: &[f64]) -> Vec<f64> {
     for _ in 1..D {
         let from = values.clone();
         let period = stride * cells;
-        over_slabs(&mut values, stride, parallel, |first, out| {
+        over_slabs(&mut values, stride, parallel, &|first, out| {
             for (k, out) in out.chunks_exact_mut(stride).enumerate() {
                 let start = (first + k) * stride;
                 let block = start / period * period;

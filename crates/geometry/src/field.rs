@@ -1,8 +1,6 @@
 //! Nodal values on a grid.
 
-use rayon::prelude::*;
-
-use crate::{Error, Grid, reduce};
+use crate::{Error, Grid, parallel};
 
 /// One `f64` per node of a [`Grid`], row-major, last axis fastest.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,10 +14,7 @@ impl<const D: usize> Field<D> {
     ///
     /// The values are not checked; see [`Field::check_finite`].
     pub fn from_fn(grid: Grid<D>, f: impl Fn([f64; D]) -> f64 + Sync) -> Self {
-        let values = (0..grid.len())
-            .into_par_iter()
-            .map(|i| f(grid.node(i)))
-            .collect();
+        let values = parallel::map(grid.len(), 1, &|i| f(grid.node(i)));
         Self { grid, values }
     }
 
@@ -80,7 +75,7 @@ impl<const D: usize> Field<D> {
     /// # Errors
     /// [`Error::NonFinite`], with the values replaced.
     pub fn replace(&mut self, fill: impl Fn(usize, &mut [f64]) + Sync) -> Result<f64, Error> {
-        let squares = reduce::replace(&mut self.values, fill);
+        let squares = parallel::replace(&mut self.values, &fill);
         self.check_finite()?;
         Ok((self.grid.cell_volume() * squares).sqrt())
     }
@@ -95,7 +90,7 @@ impl<const D: usize> Field<D> {
     pub fn map(&self, f: impl Fn(f64) -> f64 + Sync) -> Self {
         Self {
             grid: self.grid,
-            values: self.values.par_iter().map(|&v| f(v)).collect(),
+            values: parallel::values(self.values.len(), |i| f(self.values[i])),
         }
     }
 
@@ -105,10 +100,10 @@ impl<const D: usize> Field<D> {
     /// Both fields must live on the same grid.
     pub fn zip_map(&self, other: &Self, f: impl Fn(f64, f64) -> f64 + Sync) -> Result<Self, Error> {
         self.grid.same_as(&other.grid)?;
-        let pairs = self.values.par_iter().zip(&other.values);
+        let (own, others) = (&self.values, &other.values);
         Ok(Self {
             grid: self.grid,
-            values: pairs.map(|(&a, &b)| f(a, b)).collect(),
+            values: parallel::values(own.len(), |i| f(own[i], others[i])),
         })
     }
 

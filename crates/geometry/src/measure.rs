@@ -4,12 +4,12 @@
 
 use crate::error::positive;
 use crate::profile::profile_variable;
-use crate::{Error, Field, Grid, reduce, vector};
+use crate::{Error, Field, Grid, parallel, vector};
 
 /// `L2` norm `sqrt(h^D sum u^2)`: the trapezoidal rule on the periodic box, not a mean.
 pub fn l2_norm<const D: usize>(u: &Field<D>) -> f64 {
     let v = u.values();
-    (u.grid().cell_volume() * reduce::sum(v.len(), |i| v[i] * v[i])).sqrt()
+    (u.grid().cell_volume() * parallel::sum(v.len(), |i| v[i] * v[i])).sqrt()
 }
 
 /// `L2` norm of the difference.
@@ -19,7 +19,7 @@ pub fn l2_norm<const D: usize>(u: &Field<D>) -> f64 {
 pub fn l2_distance<const D: usize>(a: &Field<D>, b: &Field<D>) -> Result<f64, Error> {
     a.grid().same_as(b.grid())?;
     let (v, w) = (a.values(), b.values());
-    let sum = reduce::sum(v.len(), |i| (v[i] - w[i]) * (v[i] - w[i]));
+    let sum = parallel::sum(v.len(), |i| (v[i] - w[i]) * (v[i] - w[i]));
     Ok((a.grid().cell_volume() * sum).sqrt())
 }
 
@@ -77,7 +77,7 @@ pub fn perimeter<const D: usize>(u: &Field<D>, eps: f64) -> Result<f64, Error> {
             .sum();
         0.5 * (eps / (h * h) * gradient + 0.5625 * well * well / eps)
     };
-    Ok(grid.cell_volume() * reduce::sum(v.len(), density))
+    Ok(grid.cell_volume() * parallel::sum(v.len(), density))
 }
 
 /// Fourth-order difference, times `h`, at the middle of the edge from `node` along `axis`.
@@ -126,7 +126,7 @@ pub fn zero_set_volume<const D: usize>(u: &Field<D>) -> f64 {
         });
         simplices.sum::<f64>() / orders.len() as f64
     };
-    grid.cell_volume() * reduce::sum(v.len(), cell)
+    grid.cell_volume() * parallel::sum(v.len(), cell)
 }
 
 /// All orders of the axes.

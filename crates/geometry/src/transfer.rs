@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::error::require;
-use crate::{Error, Field, Grid};
+use crate::{Error, Field, Grid, parallel};
 
 impl<const D: usize> Grid<D> {
     /// The grid of every other node: half as many cells, the same cube.
@@ -40,17 +40,18 @@ impl<const D: usize> Field<D> {
     #[must_use]
     pub fn smoothed(&self) -> Self {
         let (grid, cells) = (*self.grid(), self.grid().cells());
-        let mut smoothed = self.clone();
+        let mut values = self.values().to_vec();
         for axis in (0..D).chain(0..D) {
-            let (stride, values) = (grid.stride(axis), smoothed.values().to_vec());
+            let stride = grid.stride(axis);
             let along = |at: usize| {
                 let k = at / stride % cells;
                 let neighbour = |l: usize| values[at - k * stride + l % cells * stride];
                 (neighbour(k + cells - 1) + 4.0 * values[at] + neighbour(k + 1)) / 6.0
             };
-            let nodes = smoothed.values_mut().par_iter_mut().enumerate();
-            nodes.for_each(|(at, value)| *value = along(at));
+            values = parallel::values(grid.len(), along);
         }
+        let mut smoothed = self.clone();
+        smoothed.values_mut().copy_from_slice(&values);
         smoothed
     }
 }

@@ -146,7 +146,7 @@ impl<T: Real> Transform<T> {
         let rows = self.slabs_forward(x);
         let n0 = self.shape[0];
         let mut spectrum = vec![Complex::default(); self.spectrum_len()];
-        self.over_blocks(&mut spectrum, |work, first, chunk| {
+        self.over_blocks(&mut spectrum, &|work, first, chunk| {
             gather(&rows, self.columns, first, n0, chunk);
             self.plans.complex[0][0].process_with_scratch(chunk, &mut work.scratch);
         });
@@ -157,7 +157,7 @@ impl<T: Real> Transform<T> {
     /// The real grid with this half spectrum, not normalised.
     pub fn inverse(&self, spectrum: &[Complex<T>]) -> Vec<T> {
         let mut blocks = self.take();
-        self.over_blocks(&mut blocks, |work, first, chunk| {
+        self.over_blocks(&mut blocks, &|work, first, chunk| {
             let n0 = self.shape[0];
             let columns = &mut work.columns[..chunk.len()];
             columns.copy_from_slice(&spectrum[first * n0..][..chunk.len()]);
@@ -198,7 +198,7 @@ impl<T: Real> Transform<T> {
         let n0 = self.shape[0];
         let rows = self.slabs_forward(x);
         let mut blocks = self.take();
-        self.over_blocks(&mut blocks, |work, first, chunk| {
+        self.over_blocks(&mut blocks, &|work, first, chunk| {
             let columns = &mut work.columns[..chunk.len()];
             gather(&rows, self.columns, first, n0, columns);
             self.plans.complex[0][0].process_with_scratch(columns, &mut work.scratch);
@@ -217,7 +217,7 @@ impl<T: Real> Transform<T> {
         assert_eq!(x.len(), self.len(), "grid of shape {:?}", self.shape);
         let points = self.len() / self.shape[0];
         let mut rows = self.take();
-        self.over_chunks(&mut rows, self.columns, |work, index, slab| {
+        self.over_chunks(&mut rows, self.columns, &|work, index, slab| {
             let x = &x[index * points..][..points];
             self.slab_forward(x, slab, work);
         });
@@ -269,7 +269,7 @@ impl<T: Real> Transform<T> {
         let points = self.len() / n0;
         let last = self.shape[self.shape.len() - 1];
         let mut result = vec![T::zero(); self.len()];
-        self.over_chunks(&mut result, points, |work, index, out| {
+        self.over_chunks(&mut result, points, &|work, index, out| {
             let mut slab = std::mem::take(&mut work.slab);
             for (block, part) in slab.chunks_mut(BLOCK).enumerate() {
                 let start = block * BLOCK * n0 + index * part.len();
@@ -302,9 +302,9 @@ impl<T: Real> Transform<T> {
     fn over_blocks(
         &self,
         data: &mut [Complex<T>],
-        f: impl Fn(&mut Work<T>, usize, &mut [Complex<T>]) + Sync,
+        f: &(dyn Fn(&mut Work<T>, usize, &mut [Complex<T>]) + Sync),
     ) {
-        self.over_chunks(data, BLOCK * self.shape[0], |work, block, chunk| {
+        self.over_chunks(data, BLOCK * self.shape[0], &|work, block, chunk| {
             f(work, block * BLOCK, chunk);
         });
     }
@@ -313,7 +313,7 @@ impl<T: Real> Transform<T> {
         &self,
         data: &mut [E],
         chunk: usize,
-        f: impl Fn(&mut Work<T>, usize, &mut [E]) + Sync,
+        f: &(dyn Fn(&mut Work<T>, usize, &mut [E]) + Sync),
     ) {
         if self.len() >= PARALLEL_FROM && rayon::current_num_threads() > 1 {
             let tasks = data.len().div_ceil(chunk);

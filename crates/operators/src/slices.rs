@@ -49,16 +49,20 @@ pub(crate) fn sum<T: Real>(a: &[T]) -> f64 {
 
 /// `a_i <- f(a_i, b_i)`
 pub fn zip_apply<T: Real>(a: &mut [T], b: &[T], f: impl Fn(T, T) -> T + Sync) {
-    let run = |(a, b): (&mut [T], &[T])| {
+    over_chunks(a, b, &|a, b| {
         for (a, b) in a.iter_mut().zip(b) {
             *a = f(*a, *b);
         }
-    };
+    });
+}
+
+/// Compiled once, not for every `f`: `work` is called through a pointer.
+fn over_chunks<T: Real>(a: &mut [T], b: &[T], work: &(dyn Fn(&mut [T], &[T]) + Sync)) {
     if a.len() < PARALLEL_FROM {
-        run((a, b));
+        work(a, b);
     } else {
         a.par_chunks_mut(CHUNK)
             .zip(b.par_chunks(CHUNK))
-            .for_each(run);
+            .for_each(|(a, b)| work(a, b));
     }
 }

@@ -3,10 +3,9 @@
 use std::sync::Arc;
 
 use burn::tensor::Tensor;
-use geometry::{Field, Grid};
+use geometry::{Field, Grid, parallel};
 use model::{BrickOperator, SeparableOperator};
 use operators::{Bricks, ComputeDevice};
-use rayon::prelude::*;
 
 use crate::Error;
 use crate::nodes::Nodes;
@@ -146,30 +145,31 @@ impl<const D: usize> Active<D> {
         let offsets = 2 * furthest + 1;
         let holders = (0..cells_of.len()).filter(|&brick| !cells_of[brick].is_empty());
         let holders: Vec<usize> = holders.collect();
-        let reached: Vec<Vec<usize>> = (holders.par_iter())
-            .map(|&brick| {
-                let place = self.bricks.place(brick);
-                let offset = |mut number: i64| -> [i64; D] {
-                    std::array::from_fn(|_| {
-                        let offset = number % offsets - furthest;
-                        number /= offsets;
-                        offset
-                    })
-                };
-                (0..offsets.pow(D as u32))
-                    .map(offset)
-                    .filter(|offset| {
-                        let mut cells = cells_of[brick].iter();
-                        cells.any(|cell| distance(*cell, *offset, side as i64) <= reach * reach)
-                    })
-                    .map(|offset| {
-                        self.bricks.flat(std::array::from_fn(|axis| {
-                            (place[axis] as i64 + offset[axis]).rem_euclid(per_axis as i64) as usize
-                        }))
-                    })
-                    .collect()
+        let offset = |mut number: i64| -> [i64; D] {
+            std::array::from_fn(|_| {
+                let offset = number % offsets - furthest;
+                number /= offsets;
+                offset
             })
-            .collect();
+        };
+        let reached = parallel::map(holders.len(), 1, &|holder| -> Vec<usize> {
+            let (cells, place) = (
+                &cells_of[holders[holder]],
+                self.bricks.place(holders[holder]),
+            );
+            (0..offsets.pow(D as u32))
+                .map(offset)
+                .filter(|offset| {
+                    let mut cells = cells.iter();
+                    cells.any(|cell| distance(*cell, *offset, side as i64) <= reach * reach)
+                })
+                .map(|offset| {
+                    self.bricks.flat(std::array::from_fn(|axis| {
+                        (place[axis] as i64 + offset[axis]).rem_euclid(per_axis as i64) as usize
+                    }))
+                })
+                .collect()
+        });
         let mut near = vec![false; cells_of.len()];
         for brick in reached.into_iter().flatten() {
             near[brick] = true;
@@ -190,19 +190,15 @@ fn distance<const D: usize>(cell: [i64; D], offset: [i64; D], side: i64) -> f64 
 
 /// The places of the nodes beside which `u` changes its sign.
 fn interface<const D: usize>(nodes: &impl Nodes<D>, u: &[f64]) -> Vec<[usize; D]> {
-    (0..nodes.count())
-        .into_par_iter()
-        .with_min_len(CHUNK)
-        .filter_map(|node| {
-            let place = nodes.place(node);
-            let positive = u[node] > 0.0;
-            let changes = (0..D).any(|axis| {
-                [false, true].into_iter().any(|forward| {
-                    let beside = nodes.beside(node, place, axis, forward);
-                    positive != beside.map_or_else(|positive| positive, |node| u[node] > 0.0)
-                })
-            });
-            changes.then_some(place)
-        })
-        .collect()
+    parallel::filter_map(nodes.count(), CHUNK, &|node| {
+        let place = nodes.place(node);
+        let positive = u[node] > 0.0;
+        let changes = (0..D).any(|axis| {
+            [false, true].into_iter().any(|forward| {
+                let beside = nodes.beside(node, place, axis, forward);
+                positive != beside.map_or_else(|positive| positive, |node| u[node] > 0.0)
+            })
+        });
+        changes.then_some(place)
+    })
 }

@@ -16,9 +16,8 @@
 
 use faer::linalg::solvers::{Llt, Solve};
 use faer::{ColMut, Mat, Side};
-use geometry::Grid;
+use geometry::{Grid, parallel};
 use operators::{HostUpdate, HostVectors, Real};
-use rayon::prelude::*;
 
 use crate::nodes::Nodes;
 use crate::samples::{MOST_CORNERS, Samples};
@@ -94,20 +93,16 @@ impl<const D: usize> InterfaceModes<D> {
     /// Adds `Z A^-1 Z^T r` to `z`.
     pub(crate) fn correct<T: Real>(&self, r: &[T], z: &mut [T]) {
         let samples = &self.samples;
-        let parts: Vec<[f64; MOST_CORNERS]> = (0..samples.corners.len())
-            .into_par_iter()
-            .with_min_len(16)
-            .map(|cell| {
-                let mut sums = [0.0; MOST_CORNERS];
-                for sample in samples.of_cell(cell) {
-                    let value = sample.weight * r[sample.node as usize].double();
-                    for (sum, hat) in sums.iter_mut().zip(sample.hats()) {
-                        *sum += hat * value;
-                    }
+        let parts = parallel::map(samples.corners.len(), 16, &|cell| {
+            let mut sums = [0.0; MOST_CORNERS];
+            for sample in samples.of_cell(cell) {
+                let value = sample.weight * r[sample.node as usize].double();
+                for (sum, hat) in sums.iter_mut().zip(sample.hats()) {
+                    *sum += hat * value;
                 }
-                sums
-            })
-            .collect();
+            }
+            sums
+        });
         let mut coarse = vec![0.0; samples.columns.len()];
         for (corners, sums) in samples.corners.iter().zip(&parts) {
             for (&column, sum) in corners.iter().zip(sums).take(1 << D) {
@@ -115,8 +110,7 @@ impl<const D: usize> InterfaceModes<D> {
             }
         }
         self.inverse.apply(&mut coarse);
-        z.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, z)| {
-            let first = chunk * CHUNK;
+        parallel::over_chunks(z, CHUNK, &|first, z| {
             let from = samples.nodes.partition_point(|s| (s.node as usize) < first);
             for sample in &samples.nodes[from..] {
                 let Some(z) = z.get_mut(sample.node as usize - first) else {
@@ -209,10 +203,7 @@ fn local_matrices<const D: usize, const N: usize>(
         }
         matrices
     };
-    (0..samples.corners.len())
-        .into_par_iter()
-        .map(of_cell)
-        .collect()
+    parallel::map(samples.corners.len(), 1, &of_cell)
 }
 
 impl<const D: usize> HostUpdate for InterfaceModes<D> {

@@ -1,7 +1,6 @@
 //! The grid nodes of an interface, with their foot points on it, in the cells of a coarse lattice.
 
-use geometry::Grid;
-use rayon::prelude::*;
+use geometry::{Grid, parallel};
 
 use crate::nodes::Nodes;
 
@@ -105,12 +104,10 @@ impl<const D: usize> Samples<D> {
             cells,
             width: grid.cells() as f64 / cells as f64,
         };
-        let mut samples: Vec<Sample<D>> = (0..u.len())
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .filter(|&node| region.is_none_or(|region| region[node]))
-            .filter_map(|node| lattice.sample(node, nodes, u))
-            .collect();
+        let mut samples: Vec<Sample<D>> = parallel::filter_map(u.len(), CHUNK, &|node| {
+            let moves = region.is_none_or(|region| region[node]);
+            moves.then(|| lattice.sample(node, nodes, u)).flatten()
+        });
         let mut cell_of = vec![u32::MAX; cells.pow(D as u32)];
         let mut column_of = cell_of.clone();
         let mut corners: Vec<[u32; MOST_CORNERS]> = Vec::new();

@@ -1,9 +1,8 @@
 //! Arithmetic of fields node by node, on what is stored of them.
 
 use burn::tensor::Tensor;
-use geometry::{Field, Grid};
+use geometry::{Field, Grid, parallel};
 use operators::ComputeDevice;
-use rayon::prelude::*;
 
 use crate::Error;
 use crate::active::Active;
@@ -115,7 +114,7 @@ impl<const D: usize> Stored<D> {
         Self {
             grid: self.grid,
             active: self.active.clone(),
-            values: self.values.par_iter().map(|&x| f(x)).collect(),
+            values: parallel::values(self.values.len(), |i| f(self.values[i])),
             rests: self.rests.map(f),
         }
     }
@@ -136,11 +135,11 @@ impl<const D: usize> Stored<D> {
             other.values.len(),
             "both are on bricks, or neither"
         );
-        let pairs = self.values.par_iter().zip(&other.values);
+        let (own, others) = (&self.values, &other.values);
         Self {
             grid: self.grid,
             active: active.cloned(),
-            values: pairs.map(|(&a, &b)| f(a, b)).collect(),
+            values: parallel::values(own.len(), |i| f(own[i], others[i])),
             rests: [0, 1].map(|phase| f(self.rests[phase], other.rests[phase])),
         }
     }
@@ -172,7 +171,7 @@ impl<const D: usize> Stored<D> {
             };
             unit * (0..D).map(along).sum::<f64>()
         };
-        (0..nodes.count()).into_par_iter().map(at).collect()
+        parallel::values(nodes.count(), at)
     }
 
     /// The largest size of a value.

@@ -3,10 +3,8 @@
 use std::f64::consts::FRAC_2_SQRT_PI;
 use std::sync::OnceLock;
 
-use rayon::prelude::*;
-
 use crate::error::positive;
-use crate::{Error, Field, Grid, distance_from_phase_field, reduce, vector};
+use crate::{Error, Field, Grid, distance_from_phase_field, parallel, vector};
 
 /// Width of the kernel in spacings of the grid.
 const WIDTH: f64 = 1.25;
@@ -118,9 +116,9 @@ impl<const D: usize> Layer<D> {
             });
         }
         let around = |i: usize| [1, 2, 3].map(|step| [(i + 3 * n - step) % n, (i + step) % n]);
-        let distance: Vec<f64> = (u.values().par_iter().with_min_len(SHARE))
-            .map(|&u| distance_from_phase_field(u, eps))
-            .collect();
+        let distance = parallel::values(grid.len(), |node| {
+            distance_from_phase_field(u.values()[node], eps)
+        });
         let mut layer = Self {
             grid,
             kernel: Kernel::new(grid.spacing()),
@@ -244,8 +242,7 @@ impl<const D: usize> Layer<D> {
 
     /// A function of the places of the layer, in parallel.
     pub(super) fn map<T: Send>(&self, f: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
-        let places = (0..self.nodes.len()).into_par_iter();
-        places.with_min_len(SHARE).map(f).collect()
+        parallel::map(self.nodes.len(), SHARE, &f)
     }
 
     /// Area or volume of the inside.
@@ -258,7 +255,7 @@ impl<const D: usize> Layer<D> {
                 f64::from(d < 0.0)
             }
         };
-        self.grid.cell_volume() * reduce::sum(self.grid.len(), inside)
+        self.grid.cell_volume() * parallel::sum(self.grid.len(), inside)
     }
 
     /// Length or area of the zero set.
@@ -268,7 +265,7 @@ impl<const D: usize> Layer<D> {
             Some(d) => self.kernel.value(d) * vector::norm(gradients[place]),
             None => 0.0,
         };
-        self.grid.cell_volume() * reduce::sum(self.nodes.len(), element)
+        self.grid.cell_volume() * parallel::sum(self.nodes.len(), element)
     }
 
     /// Unit vectors along the gradients; zero where there is none.

@@ -2,10 +2,8 @@
 
 use std::sync::OnceLock;
 
-use rayon::prelude::*;
-
 use super::layer::{Layer, NEIGHBOURS, SHARE};
-use crate::{Error, Field, vector};
+use crate::{Error, Field, parallel, vector};
 
 /// Perimeter and volume of the zero set as functions of the nodal values, at one phase field: values, gradients, and products with
 /// second derivatives.
@@ -208,7 +206,8 @@ impl<const D: usize> SizeHessian<D> {
         }
         let (first, normals) = (sizes.by_distance(weights), sizes.normals());
         let site_of = |place: u32| sites_of.get(place as usize).copied().unwrap_or(u32::MAX);
-        let site = |&place: &usize| {
+        let site = |index: usize| {
+            let place = places[index];
             let [slope, curvature] = sizes.slopes[place];
             Site {
                 node: layer.nodes[place],
@@ -224,7 +223,7 @@ impl<const D: usize> SizeHessian<D> {
             }
         };
         Self {
-            sites: places.par_iter().with_min_len(SHARE).map(site).collect(),
+            sites: parallel::map(places.len(), SHARE, &site),
             weights: (weights[0] != 0.0).then(|| layer.weights()),
         }
     }
@@ -309,6 +308,5 @@ fn map<const D: usize, T: Send>(
     sites: &[Site<D>],
     f: impl Fn(usize, &Site<D>) -> T + Send + Sync,
 ) -> Vec<T> {
-    let sites = sites.par_iter().with_min_len(SHARE).enumerate();
-    sites.map(|(index, site)| f(index, site)).collect()
+    parallel::map(sites.len(), SHARE, &|index| f(index, &sites[index]))
 }
