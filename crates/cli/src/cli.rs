@@ -348,7 +348,7 @@ pub struct FlowOptions {
     #[arg(long, value_name = "TARGET")]
     pub area: Option<SizeTarget>,
 
-    /// Keep the area of the surface (the length) and change the volume to that with this reduced volume, above 0 and at most 1:
+    /// Keep the area of the surface (the length) and change the volume to that with this reduced volume, above 0 and below 1:
     /// 6 sqrt(pi) V / A^(3/2), and 4 pi A / L^2 in the plane; a ball has 1, a red blood cell 0.64
     #[arg(long, value_name = "PART", conflicts_with_all = ["volume", "area"])]
     pub reduced_volume: Option<f64>,

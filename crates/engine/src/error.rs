@@ -17,6 +17,12 @@ pub enum Error {
         "a reduced volume of {target} is not possible: a ball has 1, any other shape less, this one {present:.4} at the beginning"
     )]
     ReducedVolume { target: f64, present: f64 },
+    /// Perimeter and volume of a ball, both held.
+    #[error(
+        "only a ball has a reduced volume of {reduced_volume:.5}, so that nothing could move: hold one of the two sizes, or a smaller reduced \
+         volume"
+    )]
+    OnlyBall { reduced_volume: f64 },
     /// A time step that failed, with the case that it belongs to.
     #[error("{case}: {source}")]
     Step {

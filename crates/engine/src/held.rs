@@ -7,6 +7,9 @@ use solver::Constraints;
 
 use crate::Error;
 
+/// The reduced volume of balls, as they are measured, is 1 up to this.
+const ROUND: f64 = 1e-4;
+
 /// A size that goes from one value to another over so many steps, evenly, and is held there. A step that is made shorter, or a substep, takes
 /// it that part of the way.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -100,6 +103,21 @@ impl Held {
         self.at(f64::INFINITY)
     }
 
+    /// Refuses perimeter and volume of a ball together.
+    ///
+    /// # Errors
+    /// [`Error::OnlyBall`].
+    pub(crate) fn check(&self, dimension: usize) -> Result<(), Error> {
+        let targets = self.targets();
+        if let (Some(perimeter), Some(volume)) = (targets.perimeter, targets.volume) {
+            let reduced_volume = reduced_volume(dimension, perimeter, volume);
+            if (reduced_volume - 1.0).abs() < ROUND {
+                return Err(Error::OnlyBall { reduced_volume });
+            }
+        }
+        Ok(())
+    }
+
     /// Whether so many steps reach all targets.
     pub(crate) fn is_reached(&self, steps: f64) -> bool {
         let mut targets = self.perimeter.iter().chain(&self.volume);
@@ -110,7 +128,8 @@ impl Held {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use geometry::{Grid, phase_field, shapes::Ellipse};
+    use geometry::shapes::{Ball, Capsule, Ellipse};
+    use geometry::{Grid, SignedDistance, phase_field};
 
     #[test]
     fn a_target_is_reached_evenly_and_held() {
@@ -145,5 +164,42 @@ mod tests {
             let error = Held::at_reduced_volume(&u, eps, target, 5).unwrap_err();
             assert!(matches!(error, Error::ReducedVolume { .. }), "{error}");
         }
+    }
+
+    fn check_kept<const D: usize>(
+        shape: &impl SignedDistance<D>,
+        cells: usize,
+    ) -> Result<(), Error> {
+        let grid = Grid::<D>::centred(cells, 1.0).unwrap();
+        let eps = 2.0 * grid.spacing();
+        let u = phase_field(grid, shape, eps).unwrap();
+        let ZeroSet {
+            perimeter, volume, ..
+        } = ZeroSet::of(&u, eps).unwrap();
+        let held = Held {
+            perimeter: Some(Target::keep(perimeter)),
+            volume: Some(Target::keep(volume)),
+        };
+        held.check(D)
+    }
+
+    #[test]
+    fn both_sizes_of_a_ball_are_not_held() {
+        let (disc, ball) = (
+            Ball::new([0.0; 2], 0.3).unwrap(),
+            Ball::new([0.0; 3], 0.27).unwrap(),
+        );
+        for refused in [
+            check_kept(&disc, 32),
+            check_kept(&disc, 128),
+            check_kept(&ball, 32),
+            check_kept(&ball, 64),
+        ] {
+            let error = refused.unwrap_err();
+            assert!(matches!(error, Error::OnlyBall { .. }), "{error}");
+        }
+        check_kept(&Ellipse::new([0.3, 0.28]).unwrap(), 64).unwrap();
+        let rod = Capsule::new([-0.03, 0.0, 0.0], [0.03, 0.0, 0.0], 0.25).unwrap();
+        check_kept(&rod, 32).unwrap();
     }
 }

@@ -54,6 +54,7 @@ impl<const D: usize> Motion<D> {
                 if let Some(region) = &case.region {
                     flow.restrict_to(region)?;
                 }
+                case.held.check(D)?;
                 flow.constrain(case.held.targets())?;
                 flow.restore(state)?;
                 Either::Willmore(Box::new(flow))
