@@ -103,7 +103,7 @@ impl Held {
         self.at(f64::INFINITY)
     }
 
-    /// Refuses perimeter and volume of a ball together.
+    /// Refuses perimeter and volume of a ball together. What no shape has is refused by [`solver::WillmoreFlow::constrain`].
     ///
     /// # Errors
     /// [`Error::OnlyBall`].
@@ -111,7 +111,7 @@ impl Held {
         let targets = self.targets();
         if let (Some(perimeter), Some(volume)) = (targets.perimeter, targets.volume) {
             let reduced_volume = reduced_volume(dimension, perimeter, volume);
-            if (reduced_volume - 1.0).abs() < ROUND {
+            if reduced_volume > 1.0 - ROUND {
                 return Err(Error::OnlyBall { reduced_volume });
             }
         }

@@ -54,8 +54,8 @@ impl<const D: usize> Motion<D> {
                 if let Some(region) = &case.region {
                     flow.restrict_to(region)?;
                 }
-                case.held.check(D)?;
                 flow.constrain(case.held.targets())?;
+                case.held.check(D)?;
                 flow.restore(state)?;
                 Either::Willmore(Box::new(flow))
             }
