@@ -83,22 +83,25 @@ impl MeshFlow {
         flows.run(session, &setting, remarks)
     }
 
-    /// The steps on `n` cells per unit length, and how many more than the paper's they are: on finer grids the first of doubling steps is shorter by
-    /// the fourth power of their ratio, and so many more lead to the same time. Where limbs vanish, a later one is too long for one
-    /// minimization there, and is made in substeps.
+    /// The steps on `n` cells per unit length, and how many more than the paper's they are. On finer grids a first step that is
+    /// shorter by the fourth power of their ratio moves the interface as many cells as the paper's does: doubling steps begin with it, and so many
+    /// more lead to the same time; constant steps are made in substeps that begin with it. Where limbs vanish, a later step is too
+    /// long for one minimization there, and is made in substeps, too.
     fn time_steps(&self, n: usize) -> (TimeSteps, usize) {
-        match self.tau {
-            StepRule::Doubling(first) if n > self.cells => {
-                let halvings = 4.0 * (n as f64 / self.cells as f64).log2();
-                let halvings = halvings.round() as i32;
-                let first = first / 2.0_f64.powi(halvings);
-                let steps = TimeSteps {
-                    first_substep: Some(first),
-                    ..StepRule::Doubling(first).into()
-                };
-                (steps, halvings as usize)
-            }
-            tau => (tau.into(), 0),
+        let halvings = 4.0 * (n as f64 / self.cells as f64).log2();
+        let halvings = halvings.round().max(0.0) as usize;
+        if halvings == 0 {
+            return (self.tau.into(), 0);
         }
+        let first = self.tau.size(1) / 2.0_f64.powi(halvings as i32);
+        let (rule, more) = match self.tau {
+            StepRule::Doubling(_) => (StepRule::Doubling(first), halvings),
+            rule => (rule, 0),
+        };
+        let steps = TimeSteps {
+            first_substep: Some(first),
+            ..rule.into()
+        };
+        (steps, more)
     }
 }
