@@ -624,7 +624,7 @@ fn steps_of_the_flow_agree_in_three_dimensions() {
 
 #[test]
 fn steps_on_bricks_are_those_on_the_whole_grid() {
-    let grid = Grid::<2>::centred(128, 1.0).unwrap();
+    let grid = Grid::<2>::centred(96, 1.0).unwrap();
     let params = params(&grid);
     let network = Shipped::Accurate.find(params.ratios(&grid, 17)).unwrap();
     let start = ball(grid, 0.3);

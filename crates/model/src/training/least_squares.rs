@@ -485,7 +485,15 @@ mod tests {
     fn perceptrons_follow_the_polynomial_to_the_second_derivative() {
         let device = ComputeDevice::default_compiled().unwrap();
         let data = data();
-        let params = LeastSquaresParams::default();
+        // Fewer iterations than by default, which reach 5e-5.
+        let params = LeastSquaresParams {
+            distillation: Distillation {
+                starts: 4,
+                iterations: 60,
+                ..Distillation::default()
+            },
+            ..LeastSquaresParams::default()
+        };
         let mut observer = |_: &_, (): &()| Ok(true);
         let (kernel, mlp) = (params.train(&data, 1, None, &device, &mut observer)).unwrap();
         let polynomial = fit(&data, &params, &kernel, 1).unwrap();
@@ -498,7 +506,7 @@ mod tests {
             }
         }
         assert!(
-            worst[0] < 5e-5 && worst[1] < 2e-3 && worst[2] < 0.1,
+            worst[0] < 1e-4 && worst[1] < 2e-3 && worst[2] < 0.1,
             "{worst:?}"
         );
     }
