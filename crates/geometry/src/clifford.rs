@@ -9,6 +9,9 @@ use crate::shapes::Torus;
 use crate::vector::{dot, norm, sub};
 use crate::{Error, Field, Grid, SignedDistance, optimal_profile};
 
+/// Cells a side of grids that are searched first.
+const MOST_CELLS: usize = 96;
+
 /// A Clifford torus in space, fitted to a phase field.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CliffordTorus {
@@ -24,11 +27,17 @@ pub struct CliffordTorus {
 
 impl CliffordTorus {
     /// The torus whose phase field is nearest to `u` in `L2`: the best of three simplex searches over centre, axis and radius, from
-    /// the centre of mass, the volume and each of the coordinate axes.
+    /// the centre of mass, the volume and each of the coordinate axes. On fine grids they use every second node, third node, and so on, and one
+    /// more search on the whole grid begins where they end.
     ///
     /// # Errors
     /// [`Error::NoCliffordTorus`] if there is no volume inside or the search fails.
     pub fn nearest(u: &Field<3>, eps: f64) -> Result<Self, Error> {
+        Self::nearest_after(coarsened(u, MOST_CELLS)?.as_ref(), u, eps)
+    }
+
+    /// The same, by searches on a coarser grid first if there is one.
+    fn nearest_after(coarse: Option<&Field<3>>, u: &Field<3>, eps: f64) -> Result<Self, Error> {
         let inside = |u: f64| 0.5 * (1.0 + u.clamp(-1.0, 1.0));
         let sum: f64 = u.values().iter().map(|&u| inside(u)).sum();
         if sum <= 0.0 {
@@ -45,22 +54,28 @@ impl CliffordTorus {
         let radius = minor * (1.0 + SQRT_2);
         let [c0, c1, c2] = centre;
         let start = [c0, c1, c2, 0.0, 0.0, radius];
-        let length = 0.1 * radius;
-        let steps = [length, length, length, 0.2, 0.2, length];
-        let tori = [0, 1, 2].map(|along| {
+        let search = |u: &Field<3>, along: usize, start: [f64; 6], part: f64| {
+            let (length, tilt) = (0.1 * part * radius, 0.2 * part);
+            let steps = [length, length, length, tilt, tilt, length];
             let distance = |parameters: &[f64; 6]| {
                 let torus = Self::near_axis(along, parameters).phase_field(u.grid(), eps)?;
                 l2_distance(u, &torus)
             };
             // Beyond the positive radii there is no torus, which is no reason to stop.
             let cost = |parameters: &[f64; 6]| distance(parameters).unwrap_or(f64::INFINITY);
-            let (l2, parameters) = nelder_mead(cost, start, steps);
-            let torus = Self::near_axis(along, &parameters);
-            Self { l2, ..torus }
-        });
-        let fits = tori.into_iter().filter(|torus| torus.l2.is_finite());
-        (fits.min_by(|a, b| a.l2.total_cmp(&b.l2)))
-            .ok_or(Error::NoCliffordTorus("the search found none"))
+            nelder_mead(cost, start, steps)
+        };
+        let found = [0, 1, 2].map(|along| (along, search(coarse.unwrap_or(u), along, start, 1.0)));
+        let fits = found.into_iter().filter(|(_, (l2, _))| l2.is_finite());
+        let best = fits.min_by(|(_, a), (_, b)| a.0.total_cmp(&b.0));
+        let (along, mut best) = best.ok_or(Error::NoCliffordTorus("the search found none"))?;
+        if coarse.is_some() {
+            best = search(u, along, best.1, 0.1);
+        }
+        Ok(Self {
+            l2: best.0,
+            ..Self::near_axis(along, &best.1)
+        })
     }
 
     /// A torus by its centre, the tilt of its axis from a coordinate axis towards the two others, and its outer radius.
@@ -112,6 +127,23 @@ impl CliffordTorus {
         };
         Ok((0..count).map(circle).collect())
     }
+}
+
+/// The values at every k-th node along each axis, with the smallest k that leaves at most so many; none where all are left, or too few.
+fn coarsened(u: &Field<3>, most_cells: usize) -> Result<Option<Field<3>>, Error> {
+    let (grid, cells) = (u.grid(), u.grid().cells());
+    let every = (1..=cells).find(|k| cells.is_multiple_of(*k) && cells / k <= most_cells);
+    // Too few say nothing.
+    let every = every.filter(|every| *every > 1 && 4 * (cells / every) > most_cells);
+    let thinned = every.map(|every| {
+        let coarse = Grid::new(cells / every, grid.side())?.with_origin(grid.origin())?;
+        let value = |node| {
+            let fine = coarse.multi_index(node).map(|i| every * i);
+            u.values()[grid.index(fine)]
+        };
+        Field::from_values(coarse, (0..coarse.len()).map(value).collect())
+    });
+    thinned.transpose()
 }
 
 /// The best vertex and its cost after a search by the simplex method of Nelder and Mead, from the simplex of a point and its displacements
@@ -208,8 +240,11 @@ mod tests {
                 l2: 0.0,
             };
             let u = torus.phase_field(&grid, eps).unwrap();
+            let coarse = coarsened(&u, 16).unwrap().unwrap();
+            assert_eq!(coarse.grid().cells(), 16);
+            let after = CliffordTorus::nearest_after(Some(&coarse), &u, eps).unwrap();
             let found = CliffordTorus::nearest(&u, eps).unwrap();
-            assert!(found.l2 < 1e-4, "{found:?}");
+            assert!(found.l2 < 1e-4 && after.l2 < 1e-4, "{found:?} {after:?}");
             assert!((found.outer_radius - 0.36).abs() < 1e-4, "{found:?}");
             assert!(dot(found.axis, torus.axis).abs() > 1.0 - 1e-6, "{found:?}");
             for (a, b) in found.centre.iter().zip(torus.centre) {
