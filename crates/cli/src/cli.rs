@@ -219,7 +219,7 @@ pub struct SchemeOptions {
     pub network: Option<PathBuf>,
 
     /// What of the phase field is stored: dense, the whole grid; bricks, what is near the surface; auto, bricks where they are less than half of
-    /// the grid; regions, other energies, finite elements and the paper's networks always take the whole grid [default: auto]
+    /// the grid; finite elements and the paper's networks always take the whole grid [default: auto]
     #[arg(long, value_name = "WHAT", value_enum, hide_possible_values = true)]
     pub storage: Option<Storage>,
 }

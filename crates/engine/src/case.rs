@@ -81,8 +81,7 @@ impl<const D: usize> Case<D> {
 
     /// Whether it can be had on active bricks, if the network's kernel is separable.
     pub(crate) fn takes_bricks(&self) -> bool {
-        let learned = self.flow == Flow::Willmore && self.operator.network().is_some();
-        learned && self.energy.is_willmore()
+        self.flow == Flow::Willmore && self.operator.network().is_some()
     }
 
     /// The time at which the flow ends, if there is one.

@@ -135,6 +135,12 @@ impl<const D: usize> Bricks<D> {
         self.directory[self.flat(place)] == POSITIVE
     }
 
+    /// Cells of the positive phase that are not stored.
+    pub fn positive_outside(&self) -> usize {
+        let bricks = self.directory.iter().filter(|brick| **brick == POSITIVE);
+        bricks.count() * self.volume()
+    }
+
     /// Place on the grid of a stored cell.
     pub fn multi_index(&self, cell: usize) -> [usize; D] {
         let place = self.places[cell / self.volume()];

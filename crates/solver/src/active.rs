@@ -45,6 +45,10 @@ impl<const D: usize> Active<D> {
         nothing.following_field(initial)
     }
 
+    pub(crate) fn grid(&self) -> &Grid<D> {
+        &self.grid
+    }
+
     pub(crate) fn bricks(&self) -> &Arc<Bricks<D>> {
         &self.bricks
     }

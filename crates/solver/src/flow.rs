@@ -341,15 +341,12 @@ impl<const D: usize> WillmoreFlow<D> {
         self.terms = if energy.is_willmore() {
             None
         } else {
-            self.needs_grid("spontaneous curvature, tension and pressure")?;
             let (grid, device) = (&self.grid, &self.device);
-            Some(HelfrichTerms::new(
-                energy,
-                response,
-                &self.params,
-                grid,
-                device,
-            )?)
+            let terms = HelfrichTerms::new(energy, response, &self.params, grid, device)?;
+            Some(match &self.active {
+                Some(active) => terms.on(active, device),
+                None => terms,
+            })
         };
         self.energy = self.traced(false)?;
         self.weighted = None;

@@ -81,6 +81,7 @@ impl<const D: usize> WillmoreFlow<D> {
         self.current = current;
         self.previous = previous;
         self.mcf = Arc::new(next.step(&self.device));
+        self.terms = self.terms.take().map(|terms| terms.on(&next, &self.device));
         self.active = Some(next);
         // What it was prepared for belongs to the step of mean curvature flow.
         self.phase = None;
