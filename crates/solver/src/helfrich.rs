@@ -19,7 +19,7 @@ const SECOND_DIFFERENCE: [f64; 5] = [
 ];
 /// Width of the kernel of the Laplacian.
 const WIDTH: usize = 2 * SECOND_DIFFERENCE.len() - 1;
-/// Part of a second difference in the two [products](Laplacian::Bricks) whose difference is the Laplacian on bricks.
+/// Part of a second difference in the two [products](DirichletForm::Bricks) whose difference is the Laplacian on bricks.
 const SMALL: f64 = 1.0 / 128.0;
 
 /// The terms of the energy of Canham and Helfrich, `w = 1/2 int (h - c0)^2 + sigma A + p V`, with `h` the sum of the principal
@@ -72,60 +72,73 @@ pub struct HelfrichTerms<const D: usize> {
     /// Factors of the densities of `A` and `V`, relative to `1/2 (V[u] - u)^2`.
     tension: f64,
     pressure: f64,
-    laplacian: Laplacian<D>,
+    dirichlet: DirichletForm<D>,
     /// Cells of the inside that are not stored.
     inside: f64,
 }
 
-/// The negative Laplacian by second differences `d` along the axes.
+/// The Dirichlet form `sum u (-Laplace u)` over the whole grid, with second differences `d` along the axes.
 #[derive(Clone, Debug)]
-enum Laplacian<const D: usize> {
-    /// Its kernel.
+enum DirichletForm<const D: usize> {
+    /// The kernel of the negative Laplacian.
     Grid(Tensor<D>),
-    /// On active bricks, where convolutions are products of the same taps along all axes: with those of `1 + s d` and of `1 - s d` it is
-    /// `(P_- - P_+) / (2 s h^2)`, exactly in the plane, and in space up to the part `s^2 d_1 d_2 d_3`, which is a millionth of it.
+    /// On active bricks, where convolutions are products of the same taps along all axes: with those of `1 - s d` and of `1 + s d` the negative
+    /// Laplacian is `(P_- - P_+) / (2 s h^2)`, exactly in the plane, and in space up to `s^2 d_1 d_2 d_3`, which is a millionth of it.
     Bricks {
         taps: [Tensor<1>; 2],
         neighbours: Tensor<2>,
-        /// What the values outside add to the difference of the products.
+        /// Twice what the values outside add to `P_- - P_+`: the form has as much from the nodes outside.
         outside: Tensor<D>,
+        /// What the values outside alone add to the form, over its scale.
+        rest: f64,
         /// `1 / (2 s h^2)`
         scale: f64,
     },
 }
 
-impl<const D: usize> Laplacian<D> {
+impl<const D: usize> DirichletForm<D> {
     fn on_grid(grid: &Grid<D>, device: &ComputeDevice) -> Self {
         Self::Grid(device.tensor(&negative_laplacian::<D>(grid.spacing()), [WIDTH; D]))
     }
 
     fn on_bricks(active: &Active<D>, device: &ComputeDevice) -> Self {
-        let (bricks, rests) = (active.bricks(), active.rests());
+        let bricks = active.bricks();
         let taps = [-SMALL, SMALL].map(|part| {
             let mut taps = second_difference().map(|weight| part * weight);
             taps[WIDTH / 2] += 1.0;
             taps
         });
-        let [minus, plus] = taps.map(|taps| bricks.convolution_of_outside(&taps, rests));
-        let outside: Vec<f64> = minus.iter().zip(&plus).map(|(a, b)| a - b).collect();
+        let of_outside = |values: [f64; 2]| -> Vec<f64> {
+            let [minus, plus] = taps.map(|taps| bricks.convolution_of_outside(&taps, values));
+            minus.iter().zip(&plus).map(|(a, b)| a - b).collect()
+        };
+        let rests = active.rests();
+        let outside: Vec<f64> = of_outside(rests).iter().map(|x| 2.0 * x).collect();
+        // Near the edge of the bricks all nodes are in one phase, and second differences of constants vanish.
+        let rest = -of_outside(rests.map(|rest| rest * rest))
+            .iter()
+            .sum::<f64>();
         Self::Bricks {
             taps: taps.map(|taps| device.tensor(&taps, [WIDTH])),
             neighbours: device.tensor(&bricks.neighbours(), [bricks.places().len(), 2 * D]),
             outside: device.tensor(&outside, bricks.shape()),
+            rest,
             scale: 1.0 / (2.0 * SMALL * active.grid().spacing().powi(2)),
         }
     }
 
-    fn apply(&self, u: &Tensor<D>) -> Tensor<D> {
+    fn of(&self, u: &Tensor<D>) -> Tensor<1> {
         let device = u.device();
         match self {
             Self::Grid(kernel) => {
-                circular_convolution(u.clone(), kernel.clone().to_device(&device), false)
+                let kernel = kernel.clone().to_device(&device);
+                (u.clone() * circular_convolution(u.clone(), kernel, false)).sum()
             }
             Self::Bricks {
                 taps,
                 neighbours,
                 outside,
+                rest,
                 scale,
             } => {
                 let product = |taps: &Tensor<1>| {
@@ -134,7 +147,8 @@ impl<const D: usize> Laplacian<D> {
                     brick_convolution(u.clone(), taps, neighbours, false)
                 };
                 let [minus, plus] = taps.each_ref().map(product);
-                (minus - plus + outside.clone().to_device(&device)) * *scale
+                let sum = minus - plus + outside.clone().to_device(&device);
+                ((u.clone() * sum).sum() + *rest) * *scale
             }
         }
     }
@@ -161,7 +175,7 @@ impl<const D: usize> HelfrichTerms<D> {
             shift: 0.75 / eps * response * tautilde * helfrich.spontaneous_curvature,
             tension: unit * helfrich.tension,
             pressure: unit * helfrich.pressure,
-            laplacian: Laplacian::on_grid(grid, device),
+            dirichlet: DirichletForm::on_grid(grid, device),
             inside: 0.0,
         })
     }
@@ -169,7 +183,7 @@ impl<const D: usize> HelfrichTerms<D> {
     /// The same for phase fields on active bricks.
     pub(crate) fn on(&self, active: &Active<D>, device: &ComputeDevice) -> Self {
         Self {
-            laplacian: Laplacian::on_bricks(active, device),
+            dirichlet: DirichletForm::on_bricks(active, device),
             inside: active.bricks().positive_outside() as f64,
             ..self.clone()
         }
@@ -186,10 +200,9 @@ impl<const D: usize> HelfrichTerms<D> {
     /// `sigma A + p V`, if there is any of it.
     pub(crate) fn sizes(&self, u: &Tensor<D>) -> Option<Tensor<1>> {
         let tension = (self.tension != 0.0).then(|| {
-            let gradient = u.clone() * self.laplacian.apply(u);
             let well = well(u);
-            let double_well = well.clone() * well * (9.0 / 16.0);
-            (gradient * self.eps + double_well / self.eps).sum() * (0.5 * self.tension)
+            let double_well = (well.clone() * well).sum() * (9.0 / 16.0);
+            (self.dirichlet.of(u) * self.eps + double_well / self.eps) * (0.5 * self.tension)
         });
         let pressure = (self.pressure != 0.0).then(|| {
             let cube = u.clone() * u.clone() * u.clone();
