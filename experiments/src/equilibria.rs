@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use reference::equilibria::Branch;
 
 use crate::prelude::*;
+use crate::truth::nearest;
 
 /// Steps in which the sizes of the start go to the given ones, and the most steps until rest.
 const RAMP: usize = 8;
@@ -65,20 +66,29 @@ impl Equilibrium {
         axes(round).map(|axis| axis * self.radius)
     }
 
-    /// The ellipse or spheroid from which the flow starts, around a centre.
+    /// The ellipse or spheroid from which the flow starts, around a centre; for a stomatocyte the exact shape, as spheroids do not become cups.
     pub fn start<const D: usize>(
         &self,
         grid: Grid<D>,
         eps: f64,
         centre: f64,
     ) -> Result<Field<D>, Error> {
-        let profile = Ellipse::new(self.half_axes::<D>())?;
+        let profile: Box<dyn SignedDistance<2>> = match self.branch {
+            Some(Branch::Stomatocyte) => Box::new(Polygon(self.outline())),
+            _ => Box::new(Ellipse::new(self.half_axes::<D>())?),
+        };
         let distance = |x: [f64; D]| {
             let along = x[D - 1] - centre;
             let across = x[..D - 1].iter().map(|x| (x - centre).powi(2));
             profile.signed_distance([across.sum::<f64>().sqrt(), along])
         };
         Ok(phase_field(grid, &distance, eps)?)
+    }
+
+    /// The exact curve at this radius.
+    fn outline(&self) -> Vec<[f64; 2]> {
+        let points = self.curve.points().into_iter();
+        points.map(|p| p.map(|x| self.radius * x)).collect()
     }
 
     /// Lets a flow come to rest with these sizes: [implicit steps by the energy](StepRule::ByEnergy).
@@ -97,8 +107,8 @@ impl Equilibrium {
             perimeter: ramp(start.perimeter, perimeter),
             volume: ramp(start.volume, volume),
         };
-        // In long steps flat vesicles break through in the middle.
-        let flat = self.branch == Some(Branch::Oblate);
+        // In long steps flat vesicles break through in the middle, and the necks of cups close.
+        let flat = self.branch.is_some_and(|branch| branch != Branch::Prolate);
         case.steps = TimeSteps {
             longest_move: Some(if flat { 0.3 } else { 1.0 }),
             ..StepRule::ByEnergy(None).into()
@@ -120,6 +130,26 @@ impl Equilibrium {
             field,
             zero_set,
         })
+    }
+}
+
+/// What a polygon encloses.
+struct Polygon(Vec<[f64; 2]>);
+
+impl SignedDistance<2> for Polygon {
+    fn signed_distance(&self, [x, y]: [f64; 2]) -> f64 {
+        let [a, b] = nearest(&self.0, [x, y]);
+        let distance = (a - x).hypot(b - y);
+        let crosses_to_the_right = |k: &usize| {
+            let (a, b) = (self.0[*k], self.0[(k + 1) % self.0.len()]);
+            (a[1] > y) != (b[1] > y) && a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]) > x
+        };
+        let crossings = (0..self.0.len()).filter(crosses_to_the_right).count();
+        if crossings % 2 == 1 {
+            -distance
+        } else {
+            distance
+        }
     }
 }
 
@@ -151,8 +181,7 @@ impl<const D: usize> AtRest<D> {
     pub fn panel(&self, caption: String, plane: &Field<2>, radii: f64) -> Shapes {
         let radius = self.equilibrium.radius;
         let ends = [-radii * radius, radii * radius];
-        let exact = self.equilibrium.curve.points().into_iter();
-        let exact: Vec<[f64; 2]> = exact.map(|p| p.map(|x| radius * x)).collect();
+        let exact = self.equilibrium.outline();
         Shapes::new(caption)
             .with_window(ends, ends)
             .with_curve(look::outline(plane).filled(Colour::LightGrey))

@@ -413,7 +413,8 @@ pub fn distance_of_levels<const D: usize>(first: &Field<D>, second: &Field<D>, e
     near.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-fn nearest(polygon: &[[f64; 2]], p: [f64; 2]) -> [f64; 2] {
+/// The point of a closed polygon that is nearest to `p`.
+pub fn nearest(polygon: &[[f64; 2]], p: [f64; 2]) -> [f64; 2] {
     let foot = |k: usize| {
         let (a, b) = (polygon[k], polygon[(k + 1) % polygon.len()]);
         let (along, from) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);

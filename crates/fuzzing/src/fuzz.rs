@@ -185,10 +185,7 @@ impl<'a> Fuzz<'a> {
     fn config() -> ProptestConfig {
         let number = |name: &str| {
             let text = std::env::var(name).ok()?;
-            Some(
-                text.parse()
-                    .unwrap_or_else(|_| panic!("{name} is a number")),
-            )
+            Some(text.parse().expect("FUZZ_CASES and FUZZ_SEED are numbers"))
         };
         ProptestConfig {
             cases: number("FUZZ_CASES").unwrap_or(CASES),

@@ -16,11 +16,8 @@ pub(crate) fn png(width: usize, pixels: &[Rgb]) -> Vec<u8> {
         return plain;
     };
     let indexed = written(size, Some(bytes(&palette)), &indices).expect(FITS);
-    if indexed.len() < plain.len() {
-        indexed
-    } else {
-        plain
-    }
+    let both = [plain, indexed].into_iter();
+    both.min_by_key(Vec::len).expect("there are two")
 }
 
 fn written(

@@ -19,8 +19,8 @@ struct Family {
 }
 
 /// The two sides of oblate shapes must be several interface widths apart in the middle: with half as many cells they break through below .62. Longer
-/// prolate shapes come to the side of the box.
-const FAMILIES: [Family; 2] = [
+/// prolate shapes come to the side of the box. The neck of cups must be some interface widths wide, too.
+const FAMILIES: [Family; 3] = [
     Family {
         branch: Branch::Prolate,
         name: "prolate",
@@ -35,11 +35,18 @@ const FAMILIES: [Family; 2] = [
         radius: 0.6,
         cells: [32, 128],
     },
+    Family {
+        branch: Branch::Stomatocyte,
+        name: "stomatocyte",
+        reduced_volumes: &[0.62, 0.6],
+        radius: 0.6,
+        cells: [32, 128],
+    },
 ];
 /// Side of the box.
 const SIDE: f64 = 2.0;
 
-/// Willmore flow of spheroids with area and volume held until rest, by the accurate operator, eps = 2h: energies, profiles and pictures
+/// Willmore flow of spheroids, and of exact cups, with area and volume held until rest, by the accurate operator, eps = 2h: energies, profiles and pictures
 /// along the reduced volume, against exact axisymmetric equilibria; the phase diagram.
 #[derive(Parser, Debug)]
 #[command(name = "vesicles", version)]
