@@ -19,7 +19,7 @@ const SECOND_DIFFERENCE: [f64; 5] = [
 ];
 /// Width of the kernel of the Laplacian.
 const WIDTH: usize = 2 * SECOND_DIFFERENCE.len() - 1;
-/// Part of a second difference in the two [products](DirichletForm::Bricks) whose difference is the Laplacian on bricks.
+/// Part of a second difference in the two [products](DirichletForm) whose difference is the Laplacian on bricks.
 const SMALL: f64 = 1.0 / 128.0;
 
 /// The terms of the energy of Canham and Helfrich, `w = 1/2 int (h - c0)^2 + sigma A + p V`, with `h` the sum of the principal
@@ -72,36 +72,32 @@ pub struct HelfrichTerms<const D: usize> {
     /// Factors of the densities of `A` and `V`, relative to `1/2 (V[u] - u)^2`.
     tension: f64,
     pressure: f64,
-    dirichlet: DirichletForm<D>,
+    /// Kernel of the negative Laplacian, and what takes its place on active bricks.
+    laplacian: Tensor<D>,
+    on_bricks: Option<Box<DirichletForm<D>>>,
     /// Cells of the inside that are not stored.
     inside: f64,
 }
 
-/// The Dirichlet form `sum u (-Laplace u)` over the whole grid, with second differences `d` along the axes.
+/// The Dirichlet form `sum u (-Laplace u)` over the whole grid, from values on active bricks, with second differences `d` along the axes.
+///
+/// On bricks convolutions are products of the same taps along all axes. With those of `1 - s d` and of `1 + s d` the negative
+/// Laplacian is `(P_- - P_+) / (2 s h^2)`, exactly in the plane, and in space up to `s^2 d_1 d_2 d_3`, which is a millionth of it.
 #[derive(Clone, Debug)]
-enum DirichletForm<const D: usize> {
-    /// The kernel of the negative Laplacian.
-    Grid(Tensor<D>),
-    /// On active bricks, where convolutions are products of the same taps along all axes: with those of `1 - s d` and of `1 + s d` the negative
-    /// Laplacian is `(P_- - P_+) / (2 s h^2)`, exactly in the plane, and in space up to `s^2 d_1 d_2 d_3`, which is a millionth of it.
-    Bricks {
-        taps: [Tensor<1>; 2],
-        neighbours: Tensor<2>,
-        /// Twice what the values outside add to `P_- - P_+`: the form has as much from the nodes outside.
-        outside: Tensor<D>,
-        /// What the values outside alone add to the form, over its scale.
-        rest: f64,
-        /// `1 / (2 s h^2)`
-        scale: f64,
-    },
+struct DirichletForm<const D: usize> {
+    /// Those of both products.
+    taps: [Tensor<1>; 2],
+    neighbours: Tensor<2>,
+    /// Twice what the values outside add to `P_- - P_+`: the form has as much from the nodes outside.
+    outside: Tensor<D>,
+    /// What the values outside alone add to the form, over its scale.
+    rest: f64,
+    /// `1 / (2 s h^2)`
+    scale: f64,
 }
 
 impl<const D: usize> DirichletForm<D> {
-    fn on_grid(grid: &Grid<D>, device: &ComputeDevice) -> Self {
-        Self::Grid(device.tensor(&negative_laplacian::<D>(grid.spacing()), [WIDTH; D]))
-    }
-
-    fn on_bricks(active: &Active<D>, device: &ComputeDevice) -> Self {
+    fn new(active: &Active<D>, device: &ComputeDevice) -> Self {
         let bricks = active.bricks();
         let taps = [-SMALL, SMALL].map(|part| {
             let mut taps = second_difference().map(|weight| part * weight);
@@ -118,7 +114,7 @@ impl<const D: usize> DirichletForm<D> {
         let rest = -of_outside(rests.map(|rest| rest * rest))
             .iter()
             .sum::<f64>();
-        Self::Bricks {
+        Self {
             taps: taps.map(|taps| device.tensor(&taps, [WIDTH])),
             neighbours: device.tensor(&bricks.neighbours(), [bricks.places().len(), 2 * D]),
             outside: device.tensor(&outside, bricks.shape()),
@@ -129,28 +125,14 @@ impl<const D: usize> DirichletForm<D> {
 
     fn of(&self, u: &Tensor<D>) -> Tensor<1> {
         let device = u.device();
-        match self {
-            Self::Grid(kernel) => {
-                let kernel = kernel.clone().to_device(&device);
-                (u.clone() * circular_convolution(u.clone(), kernel, false)).sum()
-            }
-            Self::Bricks {
-                taps,
-                neighbours,
-                outside,
-                rest,
-                scale,
-            } => {
-                let product = |taps: &Tensor<1>| {
-                    let taps = taps.clone().to_device(&device);
-                    let neighbours = neighbours.clone().to_device(&device);
-                    brick_convolution(u.clone(), taps, neighbours, false)
-                };
-                let [minus, plus] = taps.each_ref().map(product);
-                let sum = minus - plus + outside.clone().to_device(&device);
-                ((u.clone() * sum).sum() + *rest) * *scale
-            }
-        }
+        let product = |taps: &Tensor<1>| {
+            let taps = taps.clone().to_device(&device);
+            let neighbours = self.neighbours.clone().to_device(&device);
+            brick_convolution(u.clone(), taps, neighbours, false)
+        };
+        let [minus, plus] = self.taps.each_ref().map(product);
+        let sum = minus - plus + self.outside.clone().to_device(&device);
+        ((u.clone() * sum).sum() + self.rest) * self.scale
     }
 }
 
@@ -175,15 +157,17 @@ impl<const D: usize> HelfrichTerms<D> {
             shift: 0.75 / eps * response * tautilde * helfrich.spontaneous_curvature,
             tension: unit * helfrich.tension,
             pressure: unit * helfrich.pressure,
-            dirichlet: DirichletForm::on_grid(grid, device),
+            laplacian: device.tensor(&negative_laplacian::<D>(grid.spacing()), [WIDTH; D]),
+            on_bricks: None,
             inside: 0.0,
         })
     }
 
     /// The same for phase fields on active bricks.
     pub(crate) fn on(&self, active: &Active<D>, device: &ComputeDevice) -> Self {
+        let dirichlet = || Box::new(DirichletForm::new(active, device));
         Self {
-            dirichlet: DirichletForm::on_bricks(active, device),
+            on_bricks: (self.tension != 0.0).then(dirichlet),
             inside: active.bricks().positive_outside() as f64,
             ..self.clone()
         }
@@ -197,12 +181,21 @@ impl<const D: usize> HelfrichTerms<D> {
         residual + well(u) * self.shift
     }
 
+    /// `sum u (-Laplace u)` over the whole grid.
+    fn dirichlet_form(&self, u: &Tensor<D>) -> Tensor<1> {
+        if let Some(form) = &self.on_bricks {
+            return form.of(u);
+        }
+        let kernel = self.laplacian.clone().to_device(&u.device());
+        (u.clone() * circular_convolution(u.clone(), kernel, false)).sum()
+    }
+
     /// `sigma A + p V`, if there is any of it.
     pub(crate) fn sizes(&self, u: &Tensor<D>) -> Option<Tensor<1>> {
         let tension = (self.tension != 0.0).then(|| {
             let well = well(u);
             let double_well = (well.clone() * well).sum() * (9.0 / 16.0);
-            (self.dirichlet.of(u) * self.eps + double_well / self.eps) * (0.5 * self.tension)
+            (self.dirichlet_form(u) * self.eps + double_well / self.eps) * (0.5 * self.tension)
         });
         let pressure = (self.pressure != 0.0).then(|| {
             let cube = u.clone() * u.clone() * u.clone();
