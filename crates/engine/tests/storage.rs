@@ -3,8 +3,8 @@
 use crate::common::{EPS, TAU, case, device, disc, finished, grid, scales};
 use crate::resuming::{interrupted, trajectory, without_seconds};
 use engine::{
-    Case, Checkpoints, Error, Flow, Method, Operator, Run, Samples, Scheme, StepRule, Stop,
-    Storage, Store,
+    Case, Checkpoints, Error, Flow, Helfrich, Method, Operator, Run, Samples, Scheme, StepRule,
+    Stop, Storage, Store,
 };
 use geometry::measure::l2_distance;
 use geometry::shapes::Ball;
@@ -44,11 +44,20 @@ fn bricks_make_the_same_flow_and_another_case() {
 #[test]
 fn an_interrupted_run_on_bricks_continues_with_the_same_bytes() {
     let half = (0..grid(128).len()).map(|node| grid(128).node(node)[0] > 0.02);
-    for region in [None, Some(half.collect::<Vec<_>>())] {
+    let loaded = Helfrich {
+        tension: 10.0,
+        pressure: -50.0,
+        ..Helfrich::default()
+    };
+    for (region, energy) in [
+        (None, loaded),
+        (Some(half.collect::<Vec<_>>()), Helfrich::default()),
+    ] {
         let root = tempfile::tempdir().unwrap();
         let samples = Samples::every(2);
         let case = Case {
             region: region.clone(),
+            energy,
             ..stored(Storage::Bricks, 0.1)
         };
         let reference = trajectory(&case, &root.path().join("whole"), &samples);
