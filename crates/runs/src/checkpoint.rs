@@ -14,13 +14,15 @@ use crate::{Error, names};
 /// Not text, not any other format, and changed by programs that convert line ends.
 const MAGIC: [u8; 8] = *b"\x8fckpt\r\n\x1a";
 /// Bumped when a reader of the old format would misread the new one.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 /// Bytes after the arrays.
 const END: usize = 32;
 /// Longest header in bytes, enough for a third of a million files.
 const MAX_HEADER: usize = 1 << 26;
-/// Values that are written at a time.
-const PIECE: usize = 1 << 13;
+/// Values of an array that are stored as one where they are the same, as those far from the interface of a phase field.
+const BLOCK: usize = 64;
+/// Blocks that are written at a time.
+const PIECE: usize = 1 << 7;
 
 /// What a run goes on from: all that the caller needs, so that the next step has the same bits as
 /// without an interruption.
@@ -106,12 +108,12 @@ pub(crate) fn kept(finished: bool) -> usize {
 /// | bytes | content |
 /// |---|---|
 /// | 8 | magic `8f 63 6b 70 74 0d 0a 1a` |
-/// | 4 | format version, little endian: 2 |
+/// | 4 | format version, little endian: 3 |
 /// | 4 + 4 | lengths of the header and of the notes, little endian |
 /// | … | header: this as JSON |
 /// | … | notes: JSON |
 /// | … | the text, UTF-8 |
-/// | … | the arrays one after the other, `f64`, little endian |
+/// | … | the arrays one after the other, in blocks of 64 values: a byte, and if it is 0 the value that all of a block have, else all values, `f64`, little endian |
 /// | 32 | SHA-256 of all bytes before |
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -169,11 +171,17 @@ pub(crate) fn write(out: &mut dyn Write, start: &[u8], state: &State) -> io::Res
     };
     put(start)?;
     put(state.text.as_bytes())?;
-    for values in (state.arrays.iter()).flat_map(|(_, values)| values.chunks(PIECE)) {
-        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
-        put(&bytes)?;
+    for values in (state.arrays.iter()).flat_map(|(_, values)| values.chunks(PIECE * BLOCK)) {
+        put(&values.chunks(BLOCK).flat_map(packed).collect::<Vec<u8>>())?;
     }
     out.write_all(&hash.finish())
+}
+
+/// The bytes of a block.
+fn packed(block: &[f64]) -> impl Iterator<Item = u8> {
+    let differs = block.iter().any(|v| v.to_bits() != block[0].to_bits());
+    let stored = if differs { block } else { &block[..1] };
+    std::iter::once(u8::from(differs)).chain(stored.iter().flat_map(|v| v.to_le_bytes()))
 }
 
 /// Whether all have names, and none two have the same.
@@ -237,11 +245,26 @@ pub(crate) fn read(folder: &Path, step: u64) -> Result<(Header, State), Error> {
     }
     let text = take(usize::try_from(header.text).unwrap_or(usize::MAX))?.to_vec();
     state.text = String::from_utf8(text).map_err(|e| damaged(e.to_string()))?;
+    let least = |(_, length): &(String, u64)| 9 * length.div_ceil(BLOCK as u64);
+    let least = header.arrays.iter().map(least).fold(0, u64::saturating_add);
+    if least > bytes.len() as u64 {
+        return Err(damaged("it ends early".into()));
+    }
     for (name, length) in &header.arrays {
-        let bytes = length.checked_mul(8).and_then(|n| usize::try_from(n).ok());
-        let values = take(bytes.unwrap_or(usize::MAX))?.chunks_exact(8);
-        let values = values.map(|b| f64::from_le_bytes(std::array::from_fn(|i| b[i])));
-        state.arrays.push((name.clone(), values.collect()));
+        let length = *length as usize;
+        let mut values = Vec::with_capacity(length);
+        while values.len() < length {
+            let count = BLOCK.min(length - values.len());
+            let stored = match take(1)? {
+                [0] => 1,
+                [1] => count,
+                _ => return Err(damaged(format!("its array {name:?} has no such block"))),
+            };
+            let stored = take(8 * stored)?.chunks_exact(8);
+            let stored = stored.map(|b| f64::from_le_bytes(std::array::from_fn(|i| b[i])));
+            values.extend(stored.cycle().take(count));
+        }
+        state.arrays.push((name.clone(), values));
     }
     if !rest.is_empty() {
         return Err(damaged(format!("it has {} bytes too many", rest.len())));

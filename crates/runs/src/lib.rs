@@ -53,8 +53,8 @@
 //! - A bit that has flipped in any of the files is noticed when the run is opened, and the file
 //!   named; in files that are replaced at any time, once the run is finished.
 //!   [`RunDirectory::recover`] goes on from the newest intact commit.
-//! - Readers never trust a number in a file before its length agrees. They take at most twice the
-//!   length of a checkpoint, twenty times its list of files (64 MiB at most), 160 times its notes (at
+//! - Readers never trust a number in a file before its length agrees. They take at most 58 times the
+//!   length of a checkpoint (twice, unless its arrays are constant), twenty times its list of files (64 MiB at most), 160 times its notes (at
 //!   most [`State::MAX_NOTES`]) or `timings.json` (at most 4 MiB), and 64 KiB for anything else.
 //! - A failed write (full disk, read-only folder) leaves the last commit in place.
 

@@ -53,22 +53,31 @@ const SIDE: f64 = 2.0;
 pub struct Options {
     #[command(flatten)]
     figure: FigureOptions,
+
+    /// One branch alone: prolate, oblate or stomatocyte [default: all]
+    #[arg(long, value_name = "NAME", value_parser = FAMILIES.map(|family| family.name))]
+    branch: Option<String>,
 }
 
 pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.figure.run;
     let (count, steps) = run.either((1, Some(2)), (usize::MAX, None));
-    let settings = (FAMILIES.iter().take(count))
+    let wanted = |family: &&Family| {
+        let branch = options.branch.as_ref();
+        branch.is_none_or(|branch| branch == family.name)
+    };
+    let families: Vec<&Family> = FAMILIES.iter().filter(wanted).take(count).collect();
+    let settings = (families.iter())
         .map(|family| Setting::new(&options.figure, family.cells, SIDE))
         .collect::<Result<Vec<_>, Error>>()?;
-    let families = FAMILIES.iter().zip(&settings).map(|(family, setting)| {
+    let about = families.iter().zip(&settings).map(|(family, setting)| {
         json!({ "branch": family.name, "reduced_volumes": family.reduced_volumes, "radius": family.radius, "n": setting.n })
     });
-    let families: Vec<Value> = families.collect();
-    let parameters = settings[0].parameters(json!({ "families": families }))?;
+    let about: Vec<Value> = about.collect();
+    let parameters = settings[0].parameters(json!({ "families": about }))?;
     let mut session = Session::open("vesicles", run, parameters)?;
     let mut all: Vec<AtRest<3>> = Vec::new();
-    for (family, setting) in FAMILIES.iter().zip(&settings) {
+    for (family, setting) in families.iter().zip(&settings) {
         let (branch, name, radius) = (family.branch, family.name, family.radius);
         let volumes = family.reduced_volumes.iter().copied().take(count);
         let volumes: Vec<f64> = volumes.collect();
