@@ -54,18 +54,16 @@ pub struct Options {
     #[command(flatten)]
     figure: FigureOptions,
 
-    /// One branch alone: prolate, oblate or stomatocyte [default: all]
-    #[arg(long, value_name = "NAME", value_parser = FAMILIES.map(|family| family.name))]
-    branch: Option<String>,
+    /// Branches, separated by commas; stomatocytes take as long as all others
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = FAMILIES.map(|family| family.name))]
+    #[arg(default_values = ["prolate", "oblate"])]
+    branches: Vec<String>,
 }
 
 pub fn program(options: &Options) -> Result<(), Error> {
     let run = &options.figure.run;
     let (count, steps) = run.either((1, Some(2)), (usize::MAX, None));
-    let wanted = |family: &&Family| {
-        let branch = options.branch.as_ref();
-        branch.is_none_or(|branch| branch == family.name)
-    };
+    let wanted = |family: &&Family| options.branches.iter().any(|name| name == family.name);
     let families: Vec<&Family> = FAMILIES.iter().filter(wanted).take(count).collect();
     let settings = (families.iter())
         .map(|family| Setting::new(&options.figure, family.cells, SIDE))
