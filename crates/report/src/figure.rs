@@ -122,7 +122,6 @@ impl Figure {
     /// The figure as an SVG document. Text stays text, in a sans-serif family.
     ///
     /// # Errors
-    ///
     /// If there is nothing to draw, a range or array does not fit, or the width leaves no room.
     pub fn to_svg(&self) -> Result<String> {
         let layout = self.layout()?;
@@ -132,7 +131,6 @@ impl Figure {
     /// The figure as a PNG file, two pixels per layout unit.
     ///
     /// # Errors
-    ///
     /// As [`Figure::to_svg`].
     pub fn to_png(&self) -> Result<Vec<u8>> {
         let layout = self.layout()?;
@@ -142,7 +140,6 @@ impl Figure {
     /// Writes `<stem>.svg` and `<stem>.png`.
     ///
     /// # Errors
-    ///
     /// As [`Figure::to_svg`], or if a file cannot be written.
     pub fn write(&self, folder: &OutputDir, stem: &str) -> Result<()> {
         let (svg, png) = (self.to_svg()?, self.to_png()?);

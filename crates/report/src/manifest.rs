@@ -70,7 +70,6 @@ impl Manifest {
     /// Sets the parameters from anything that serialises to a map, such as a struct.
     ///
     /// # Errors
-    ///
     /// [`Error::Json`] if it does not.
     pub fn with_parameters(mut self, parameters: &impl Serialize) -> Result<Self> {
         let map = serde_json::to_value(parameters).and_then(serde_json::from_value);
@@ -113,7 +112,6 @@ impl Manifest {
     /// Writes `manifest.json` with the wall time so far.
     ///
     /// # Errors
-    ///
     /// [`Error::File`].
     pub fn write(&mut self, folder: &OutputDir) -> Result<PathBuf> {
         self.wall_seconds = self.clock.elapsed().as_secs_f64();

@@ -18,7 +18,6 @@ impl OutputDir {
     /// it, so that a long computation does not end in a lost result.
     ///
     /// # Errors
-    ///
     /// [`Error::File`] with the path and the cause.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
         let path = path.into();
@@ -30,7 +29,6 @@ impl OutputDir {
     /// A folder inside this one, created and checked likewise.
     ///
     /// # Errors
-    ///
     /// [`Error::FileName`] unless `name` is one plain component, [`Error::File`] as above.
     pub fn subfolder(&self, name: &str) -> Result<Self> {
         Self::create(self.path(name)?)
@@ -44,7 +42,6 @@ impl OutputDir {
     /// The path of a file in the folder, whether or not it exists.
     ///
     /// # Errors
-    ///
     /// [`Error::FileName`] unless `name` is one plain component: no separator, not `..`.
     pub fn path(&self, name: &str) -> Result<PathBuf> {
         let mut components = Path::new(name).components();
@@ -59,7 +56,6 @@ impl OutputDir {
     /// Writes a whole file at once, replacing an old one only when the new one is complete.
     ///
     /// # Errors
-    ///
     /// [`Error::FileName`] or [`Error::File`]; an old file of that name is then untouched.
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> Result<PathBuf> {
         let path = self.path(name)?;
@@ -73,7 +69,6 @@ impl OutputDir {
     /// and infinities are `NaN` and `inf`.
     ///
     /// # Errors
-    ///
     /// [`Error::Csv`] if a record is not flat, or as [`OutputDir::write`].
     pub fn write_csv<T: Serialize>(
         &self,
@@ -86,7 +81,6 @@ impl OutputDir {
     /// Writes any value as indented JSON with a final newline. JSON knows no NaN and no infinity: they become `null`.
     ///
     /// # Errors
-    ///
     /// [`Error::Json`] if the value has, for example, a map with keys that are not text, or as [`OutputDir::write`].
     pub fn write_json(&self, name: &str, value: &impl Serialize) -> Result<PathBuf> {
         self.write(name, crate::data::to_json(value)?)

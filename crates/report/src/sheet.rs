@@ -126,7 +126,6 @@ impl<'a, R> Sheet<'a, R> {
     /// The table, and the metrics with their names.
     ///
     /// # Errors
-    ///
     /// As [`Table::push`].
     pub fn finish(self) -> Result<(Table, Vec<(String, Cell)>)> {
         (0..self.rows.len()).try_for_each(|row| self.table.check(row))?;

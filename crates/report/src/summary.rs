@@ -39,7 +39,6 @@ impl Summary {
     /// Adds a metric.
     ///
     /// # Errors
-    ///
     /// [`Error::NotFinite`], [`Error::MetricName`], or [`Error::DuplicateMetric`].
     pub fn insert(&mut self, name: &str, value: f64) -> Result<()> {
         let number = Number::from_f64(value).ok_or_else(|| Error::NotFinite {
@@ -52,7 +51,6 @@ impl Summary {
     /// Adds the numbers of a record as `<prefix>.<field>`. Fields that hold text, lists or records are left out.
     ///
     /// # Errors
-    ///
     /// [`Error::NotFinite`] for a field that is NaN, infinite or missing; [`Error::Json`] for what is no record; as
     /// [`Summary::insert`].
     pub fn insert_record(&mut self, prefix: &str, record: &impl Serialize) -> Result<()> {
@@ -74,7 +72,6 @@ impl Summary {
     /// Adds a metric that counts something; it is written without a decimal point.
     ///
     /// # Errors
-    ///
     /// [`Error::MetricName`] or [`Error::DuplicateMetric`].
     pub fn insert_count(&mut self, name: &str, value: usize) -> Result<()> {
         self.add(name, Number::from(value))
@@ -107,7 +104,6 @@ impl Summary {
     /// Reads what [`Summary::to_json`] wrote.
     ///
     /// # Errors
-    ///
     /// [`Error::Json`] if the text is not a JSON map of numbers, [`Error::MetricName`] if a name is
     /// not allowed.
     pub fn from_json(text: &str) -> Result<Self> {
@@ -123,7 +119,6 @@ impl Summary {
     /// Writes `summary.json`.
     ///
     /// # Errors
-    ///
     /// [`Error::File`].
     pub fn write(&self, folder: &OutputDir) -> Result<PathBuf> {
         folder.write("summary.json", self.to_json())
@@ -131,13 +126,10 @@ impl Summary {
 }
 
 fn is_metric_name(name: &str) -> bool {
-    name.starts_with(|c: char| c.is_ascii_lowercase())
-        && name.split('.').all(|word| {
-            word.starts_with(|c: char| c.is_ascii_lowercase() || c.is_ascii_digit())
-                && word
-                    .chars()
-                    .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
-        })
+    let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
+    let is_word =
+        |word: &str| word.starts_with(is_plain) && word.chars().all(|c| is_plain(c) || c == '_');
+    name.starts_with(|c: char| c.is_ascii_lowercase()) && name.split('.').all(is_word)
 }
 
 #[cfg(test)]

@@ -102,7 +102,6 @@ impl Table {
     /// Adds a row.
     ///
     /// # Errors
-    ///
     /// [`Error::RowLength`], or [`Error::NotFinite`] naming column and row.
     pub fn push(&mut self, cells: impl IntoIterator<Item = Cell>) -> Result<()> {
         self.rows.push(cells.into_iter().collect());
@@ -137,7 +136,6 @@ impl Table {
     /// The table as CSV (RFC 4180 quoting, line feeds), numbers with nine significant digits.
     ///
     /// # Errors
-    ///
     /// [`Error::Csv`] if the table has no columns.
     pub fn to_csv(&self) -> Result<String> {
         let mut writer = csv::Writer::from_writer(Vec::new());
@@ -187,7 +185,6 @@ impl Table {
     /// Writes `<stem>.csv` and `<stem>.md`.
     ///
     /// # Errors
-    ///
     /// As [`Table::to_csv`], or [`Error::File`].
     pub fn write(&self, folder: &OutputDir, stem: &str) -> Result<[PathBuf; 2]> {
         Ok([
