@@ -66,7 +66,7 @@ impl Equilibrium {
         axes(round).map(|axis| axis * self.radius)
     }
 
-    /// The ellipse or spheroid from which the flow starts, around a centre; for a stomatocyte the exact shape, as spheroids do not become cups.
+    /// The ellipse or spheroid from which the flow starts, around a centre; for a stomatocyte the exact shape.
     pub fn start<const D: usize>(
         &self,
         grid: Grid<D>,
@@ -107,7 +107,7 @@ impl Equilibrium {
             perimeter: ramp(start.perimeter, perimeter),
             volume: ramp(start.volume, volume),
         };
-        // In long steps flat vesicles break through in the middle, and the necks of cups close.
+        // In long steps flat vesicles and cups break through in the middle.
         let flat = self.branch.is_some_and(|branch| branch != Branch::Prolate);
         case.steps = TimeSteps {
             longest_move: Some(if flat { 0.3 } else { 1.0 }),

@@ -9,7 +9,7 @@ use crate::shapes::Torus;
 use crate::vector::{dot, norm, sub};
 use crate::{Error, Field, Grid, SignedDistance, optimal_profile};
 
-/// Cells a side of grids that are searched first.
+/// Finer grids are searched on at most so many cells a side first.
 const MOST_CELLS: usize = 96;
 
 /// A Clifford torus in space, fitted to a phase field.

@@ -245,6 +245,7 @@ pub(crate) fn read(folder: &Path, step: u64) -> Result<(Header, State), Error> {
     }
     let text = take(usize::try_from(header.text).unwrap_or(usize::MAX))?.to_vec();
     state.text = String::from_utf8(text).map_err(|e| damaged(e.to_string()))?;
+    // A block takes nine bytes at least.
     let least = |(_, length): &(String, u64)| 9 * length.div_ceil(BLOCK as u64);
     let least = header.arrays.iter().map(least).fold(0, u64::saturating_add);
     if least > bytes.len() as u64 {

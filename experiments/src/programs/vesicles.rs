@@ -19,7 +19,7 @@ struct Family {
 }
 
 /// The two sides of oblate shapes must be several interface widths apart in the middle: with half as many cells they break through below .62. Longer
-/// prolate shapes come to the side of the box. The neck of cups must be some interface widths wide, too.
+/// prolate shapes come to the side of the box. The neck of stomatocytes must be some interface widths wide, too.
 const FAMILIES: [Family; 3] = [
     Family {
         branch: Branch::Prolate,
@@ -46,15 +46,15 @@ const FAMILIES: [Family; 3] = [
 /// Side of the box.
 const SIDE: f64 = 2.0;
 
-/// Willmore flow of spheroids, and of exact cups, with area and volume held until rest, by the accurate operator, eps = 2h: energies, profiles and pictures
-/// along the reduced volume, against exact axisymmetric equilibria; the phase diagram.
+/// Willmore flow of spheroids, and of exact stomatocytes, with area and volume held until rest, by the accurate operator, eps = 2h: energies,
+/// profiles and pictures along the reduced volume, against exact axisymmetric equilibria; the phase diagram.
 #[derive(Parser, Debug)]
 #[command(name = "vesicles", version)]
 pub struct Options {
     #[command(flatten)]
     figure: FigureOptions,
 
-    /// Branches, separated by commas; stomatocytes take as long as all others
+    /// Branches, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = FAMILIES.map(|family| family.name))]
     #[arg(default_values = ["prolate", "oblate"])]
     branches: Vec<String>,
