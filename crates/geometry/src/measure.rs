@@ -3,6 +3,7 @@
 //! Sums run in parallel over fixed chunks, so that results do not depend on the number of threads.
 
 use crate::error::positive;
+use crate::parallel::Reader;
 use crate::profile::profile_variable;
 use crate::{Error, Field, Grid, parallel, vector};
 
@@ -21,6 +22,12 @@ pub fn l2_distance<const D: usize>(a: &Field<D>, b: &Field<D>) -> Result<f64, Er
     let (v, w) = (a.values(), b.values());
     let sum = parallel::sum(v.len(), |i| (v[i] - w[i]) * (v[i] - w[i]));
     Ok((a.grid().cell_volume() * sum).sqrt())
+}
+
+/// The same for fields of which not the whole is in memory: `a` and `b` write the values of nodes in a row from one on, whose number is a
+/// multiple of 4096.
+pub fn l2_distance_of_parts<const D: usize>(grid: &Grid<D>, a: &Reader<'_>, b: &Reader<'_>) -> f64 {
+    (grid.cell_volume() * parallel::squared_distance(grid.len(), a, b)).sqrt()
 }
 
 /// Maximum norm over the nodes; NaN if a value is.

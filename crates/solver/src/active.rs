@@ -42,7 +42,15 @@ impl<const D: usize> Active<D> {
             grid,
             bricks: Arc::new(none),
         };
-        nothing.following_field(initial)
+        nothing.following_grid(initial.values())
+    }
+
+    /// These bricks.
+    pub(crate) fn at(&self, bricks: Arc<Bricks<D>>) -> Self {
+        Self {
+            bricks,
+            ..self.clone()
+        }
     }
 
     pub(crate) fn grid(&self) -> &Grid<D> {
@@ -63,24 +71,21 @@ impl<const D: usize> Active<D> {
         self.operator.rests()
     }
 
-    /// Those near the interface of a field of the whole grid.
-    pub(crate) fn following_field(&self, field: &Field<D>) -> Result<Self, Error> {
-        let near = self.near(&self.grid, field.values(), REACH);
+    /// Those near the interface of values on the whole grid.
+    pub(crate) fn following_grid(&self, u: &[f64]) -> Result<Self, Error> {
+        let near = self.near(&self.grid, u, REACH);
         let side = self.bricks.side();
         let first = |place: [usize; D]| self.grid.index(place.map(|at| at * side));
         let bricks = Bricks::new(
             self.grid.cells(),
             side,
             |place| near[self.bricks.flat(place)],
-            |place| field.values()[first(place)] > 0.0,
+            |place| u[first(place)] > 0.0,
         )?;
         if bricks.is_empty() {
             return Err(Error::NoInterface);
         }
-        Ok(Self {
-            bricks: Arc::new(bricks),
-            ..self.clone()
-        })
+        Ok(self.at(Arc::new(bricks)))
     }
 
     /// Those near the interface of `u`, if they are others. Where the interface has vanished, all stay.
@@ -118,10 +123,7 @@ impl<const D: usize> Active<D> {
             None => self.bricks.is_positive(place),
         };
         let bricks = Bricks::new(self.grid.cells(), self.bricks.side(), active, positive)?;
-        Ok((bricks != *self.bricks).then(|| Self {
-            bricks: Arc::new(bricks),
-            ..self.clone()
-        }))
+        Ok((bricks != *self.bricks).then(|| self.at(Arc::new(bricks))))
     }
 
     /// A field on other bricks of the same grid, on these.

@@ -6,7 +6,7 @@ use std::time::Instant;
 use burn::tensor::Tensor;
 use geometry::{Field, Grid};
 use model::{Factors, MeanCurvatureOperator, Network, Ratios, SeparableOperator};
-use operators::{ComputeDevice, inner_product};
+use operators::{Bricks, ComputeDevice, inner_product};
 use serde::{Deserialize, Serialize};
 
 use crate::active::Active;
@@ -129,12 +129,14 @@ impl StepRecord {
 /// Where a flow is, for resuming it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlowState<const D: usize> {
+    /// The bricks on which the values are, if not on the whole grid.
+    pub bricks: Option<Arc<Bricks<D>>>,
     /// The phase field.
-    pub current: Field<D>,
+    pub current: Vec<f64>,
     /// The phase field one step ago and the size of that step: what the next step extrapolates.
-    pub previous: Option<(Field<D>, f64)>,
+    pub previous: Option<(Vec<f64>, f64)>,
     /// The rate of displacement at the end of the last step, in `atanh u` per time: what second-order steps continue.
-    pub rate: Option<Field<D>>,
+    pub rate: Option<Vec<f64>>,
     /// The last motions on the coarser grids on which steps [begin](WillmoreFlow::begin_on), the finest first.
     pub half_motions: Vec<Field<D>>,
     /// Steps done.
@@ -147,7 +149,8 @@ impl<const D: usize> FlowState<D> {
     /// A flow of which nothing is known but where it is.
     pub fn new(current: Field<D>, step: usize, time: f64) -> Self {
         Self {
-            current,
+            bricks: None,
+            current: current.into_values(),
             previous: None,
             rate: None,
             half_motions: Vec::new(),
@@ -267,7 +270,8 @@ impl<const D: usize> WillmoreFlow<D> {
         network.check_fits(params.ratios(grid, network.ratios().width))?;
         let operator = SeparableOperator::new(network, device)?;
         let active = Active::new(operator, initial, params.eps)?;
-        let current = Stored::part_of(initial, Some(active.clone()), active.rests()).tensor(device);
+        let bricks = active.bricks();
+        let current = device.tensor(&bricks.gather(initial.values()), bricks.shape());
         let step = Arc::new(active.step(device));
         Self::begun(step, Some(active), (grid, current), params, device)
     }
@@ -384,14 +388,12 @@ impl<const D: usize> WillmoreFlow<D> {
         self.on_grid(&self.current)
     }
 
-    /// Puts the phase field now in the place of the one before, which stays outside of the region if there is one; the `L2` distance to
-    /// that.
+    /// The phase field now, as it is stored.
     ///
     /// # Errors
     /// [`Error::Operators`] if the device fails.
-    pub fn replace(&self, field: &mut Field<D>) -> Result<f64, Error> {
-        let marks = self.region.as_ref().map(Region::marks);
-        self.stored(&self.current)?.replace(field, marks)
+    pub fn stored_field(&self) -> Result<Stored<D>, Error> {
+        self.stored(&self.current)
     }
 
     /// Everything the following steps depend on: a flow [restored](Self::restore) from it continues with the same bytes.
@@ -399,14 +401,16 @@ impl<const D: usize> WillmoreFlow<D> {
     /// # Errors
     /// [`Error::Operators`] if the device fails.
     pub fn state(&self) -> Result<FlowState<D>, Error> {
+        let values = |u: &Tensor<D>| self.device.values(u.clone());
         let previous = match &self.previous {
-            Some((u, tau)) => Some((self.on_grid(u)?, *tau)),
+            Some((u, tau)) => Some((values(u)?, *tau)),
             None => None,
         };
         Ok(FlowState {
-            current: self.field()?,
+            bricks: self.active.as_ref().map(|active| active.bricks().clone()),
+            current: values(&self.current)?,
             previous,
-            rate: self.rate.as_ref().map(Stored::field).transpose()?,
+            rate: self.rate.clone().map(Stored::into_values),
             half_motions: self.half_motions(),
             step: self.step,
             time: self.time,
@@ -416,33 +420,66 @@ impl<const D: usize> WillmoreFlow<D> {
     /// Goes to a state of a flow with the same grid and parameters.
     ///
     /// # Errors
-    /// [`Error::Geometry`] for fields on another grid or with values that are not finite.
+    /// [`Error::Geometry`] for fields on another grid or on other bricks, [`Error::NonFinite`] for values that are not finite.
     pub fn restore(&mut self, state: &FlowState<D>) -> Result<(), Error> {
-        let grid = self.grid;
-        let fitting = |field: &Field<D>| -> Result<Field<D>, Error> {
-            Ok(Field::from_values(grid, field.values().to_vec())?)
-        };
-        let current = fitting(&state.current)?;
-        let previous = match &state.previous {
-            Some((u, tau)) => Some((fitting(u)?, *tau)),
-            None => None,
-        };
-        self.follow_field(&current)?;
-        let current = self.in_storage(&current);
-        let previous = previous.map(|(u, tau)| (self.in_storage(&u), tau));
-        let rate = match &state.rate {
-            Some(rate) => {
-                let rate = fitting(rate)?;
-                Some(Stored::part_of(&rate, self.active.clone(), [0.0; 2]))
-            }
-            None => None,
-        };
+        let previous = state.previous.as_ref();
+        let fields = [
+            Some(&state.current),
+            previous.map(|(u, _)| u),
+            state.rate.as_ref(),
+        ];
+        for values in fields.into_iter().flatten() {
+            self.check_state(state, values)?;
+        }
         self.set_half_motions(&state.half_motions)?;
-        self.rate = rate;
+        if let Some(active) = &self.active {
+            let next = match &state.bricks {
+                Some(bricks) => active.at(bricks.clone()),
+                None => active.following_grid(&state.current)?,
+            };
+            self.go_to(next)?;
+        }
+        // Values on the whole grid, as of a flow that has not been on bricks yet.
+        let whole = self.active.as_ref().filter(|_| state.bricks.is_none());
+        let stored = |values: &Vec<f64>| match whole {
+            Some(active) => active.bricks().gather(values),
+            None => values.clone(),
+        };
+        let dims = self.current.dims();
+        let tensor = |values: &Vec<f64>| self.device.tensor(&stored(values), dims);
+        let rate = (state.rate.as_ref())
+            .map(|rate| Stored::new(stored(rate), self.grid, self.active.clone(), [0.0; 2]));
+        let current = tensor(&state.current);
+        self.previous = previous.map(|(u, tau)| (tensor(u), *tau));
         self.current = current;
-        self.previous = previous;
+        self.rate = rate;
         self.step = state.step;
         self.time = state.time;
+        Ok(())
+    }
+
+    /// Refuses values of a state that this flow cannot go to.
+    fn check_state(&self, state: &FlowState<D>, values: &[f64]) -> Result<(), Error> {
+        let expected = match (&self.active, &state.bricks) {
+            (Some(active), Some(bricks)) => {
+                let [cells, side] = [bricks.cells(), bricks.side()];
+                if [cells, side] != [self.grid.cells(), active.bricks().side()] {
+                    return Err(operators::Error::Bricks { cells, side }.into());
+                }
+                bricks.len()
+            }
+            _ => self.grid.len(),
+        };
+        if values.len() != expected {
+            let actual = values.len();
+            return Err(geometry::Error::ValueCount { expected, actual }.into());
+        }
+        if !values.iter().all(|value| value.is_finite()) {
+            return Err(Error::NonFinite {
+                step: state.step,
+                field: "phase field",
+            });
+        }
         Ok(())
     }
 

@@ -110,4 +110,5 @@ pub use newton::{Exit, Method, NewtonInfo, NewtonParams, minimize};
 pub use operators::{extrapolate, retract};
 pub use preconditioner::{PhaseInverse, Preconditioner};
 pub use region::Region;
+pub use stored::Stored;
 pub use times::PhaseTimes;

@@ -252,7 +252,7 @@ fn a_restored_flow_continues_with_the_same_bytes() {
     assert_eq!(restored.field().unwrap(), whole.field().unwrap());
     let other = Grid::<2>::per_unit(128, 0.5).unwrap();
     let mut foreign = state;
-    foreign.current = ball(other, RADIUS);
+    foreign.current = ball(other, RADIUS).into_values();
     assert!(restored.restore(&foreign).is_err());
 }
 
