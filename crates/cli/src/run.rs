@@ -149,7 +149,7 @@ impl<O> Plan<O> {
             "time": run.time(),
             "components": topology.components,
             "same_topology": topology == before,
-            "touches_box": touches_side(u),
+            "touches_box": touches_side(u, -0.5),
             "grid": {
                 "cells": case.grid().cells(),
                 "spacing": case.grid().spacing(),

@@ -38,9 +38,6 @@ impl<const D: usize> Event<'_, D> {
 /// after the checkpoint only.
 pub trait Observer<const D: usize> {
     /// Looks at the run.
-    ///
-    /// # Errors
-    /// Whatever stops the observer stops the run, too.
     fn observe(&mut self, event: &mut Event<'_, D>) -> Result<(), Error>;
 }
 

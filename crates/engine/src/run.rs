@@ -3,8 +3,8 @@
 use std::sync::OnceLock;
 use std::time::Instant;
 
-use geometry::Field;
 use geometry::measure::{has_interface, l2_distance_of_parts};
+use geometry::{Field, require};
 use operators::ComputeDevice;
 use runs::Interrupt;
 use serde_json::Value;
@@ -46,7 +46,7 @@ impl<const D: usize> Run<D> {
     /// Starts a case.
     ///
     /// # Errors
-    /// If something in the case is not possible: [`Error::Parameter`], [`Error::Solver`], [`Error::Fem`], [`Error::Geometry`].
+    /// If something in the case is not possible: [`Error::Solver`], [`Error::Fem`], [`Error::Geometry`].
     pub fn new(case: Case<D>, device: &ComputeDevice) -> Result<Self, Error> {
         let start = values(&case, 0.0, || &case.initial)?;
         Self::at(case, device, start, Vec::new(), None)
@@ -61,12 +61,11 @@ impl<const D: usize> Run<D> {
         state: Option<&FlowState<D>>,
     ) -> Result<Self, Error> {
         let (mcf_step, first) = (case.scales.mcf_step, case.steps.rule.size(1));
-        if case.flow == Flow::MeanCurvature && first.to_bits() != mcf_step.to_bits() {
-            return Err(Error::Parameter {
-                name: "tau",
-                value: first,
-                expected: "the inner step, for mean curvature flow",
-            });
+        if case.flow == Flow::MeanCurvature {
+            let expected = "the inner step, for mean curvature flow";
+            require("tau", first, expected, |tau| {
+                tau.to_bits() == mcf_step.to_bits()
+            })?;
         }
         let mut control = StepControl::new(&case)?;
         let (mut step_size, mut ramped) = (control.step_size(), 0.0);

@@ -51,12 +51,11 @@ pub fn has_interface<const D: usize>(u: &Field<D>) -> bool {
     inside > 0 && inside < u.grid().len()
 }
 
-/// Whether a node at the side of the box is not outside.
-pub fn touches_side<const D: usize>(u: &Field<D>) -> bool {
-    const OUTSIDE: f64 = -0.5;
-    let grid = u.grid();
-    let at_side = |node: usize| grid.multi_index(node).contains(&0);
-    (u.values().iter().enumerate()).any(|(node, u)| *u > OUTSIDE && at_side(node))
+/// Whether a node at the side of the box has a value above this one.
+pub fn touches_side<const D: usize>(u: &Field<D>, above: f64) -> bool {
+    let (grid, last) = (u.grid(), u.grid().cells() - 1);
+    let at_side = |node: usize| (grid.multi_index(node).iter()).any(|&i| i == 0 || i == last);
+    (u.values().iter().enumerate()).any(|(node, u)| *u > above && at_side(node))
 }
 
 /// Perimeter `P_eps[u] = 1/2 integral of eps |grad u|^2 + Psi(u)/eps`, `Psi(u) = 9/16 (1-u^2)^2`.

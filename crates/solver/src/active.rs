@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use burn::tensor::Tensor;
 use geometry::{Field, Grid, parallel};
 use model::{BrickOperator, SeparableOperator};
 use operators::{Bricks, ComputeDevice};
@@ -124,18 +123,6 @@ impl<const D: usize> Active<D> {
         };
         let bricks = Bricks::new(self.grid.cells(), self.bricks.side(), active, positive)?;
         Ok((bricks != *self.bricks).then(|| self.at(Arc::new(bricks))))
-    }
-
-    /// A field on other bricks of the same grid, on these.
-    pub(crate) fn carried(
-        &self,
-        from: &Self,
-        u: &Tensor<D>,
-        device: &ComputeDevice,
-    ) -> Result<Tensor<D>, Error> {
-        let values = device.values(u.clone())?;
-        let carried = (self.bricks).carried(&from.bricks, &values, self.operator.rests());
-        Ok(device.tensor(&carried, self.bricks.shape()))
     }
 
     /// For every brick of the grid, whether a cell of it is within `reach eps` of one beside a change of sign.

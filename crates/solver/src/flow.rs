@@ -4,20 +4,20 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use burn::tensor::Tensor;
-use geometry::{Field, Grid};
+use geometry::{Field, Grid, positive};
 use model::{Factors, MeanCurvatureOperator, Network, Ratios, SeparableOperator};
 use operators::{Bricks, ComputeDevice, inner_product};
 use serde::{Deserialize, Serialize};
 
 use crate::active::Active;
 use crate::constraints::{Constraints, Held};
-use crate::error::check_positive;
 use crate::newton::{NewtonInfo, NewtonParams, minimize_timed};
 use crate::preconditioner::{PhaseInverse, Preconditioner};
+use crate::region::Region;
 use crate::stored::Stored;
 use crate::times::PhaseTimes;
 use crate::{
-    Accuracy, Error, Exit, Helfrich, HelfrichTerms, MeanCurvatureStep, MinimizingMovement, Region,
+    Accuracy, Error, Exit, Helfrich, HelfrichTerms, MeanCurvatureStep, MinimizingMovement,
 };
 
 mod bricks;
@@ -57,7 +57,7 @@ impl FlowParams {
             ("calibration.energy", self.calibration.energy),
             ("calibration.metric", self.calibration.metric),
         ] {
-            check_positive(name, value)?;
+            positive(name, value)?;
         }
         Ok(())
     }
@@ -161,30 +161,6 @@ impl<const D: usize> FlowState<D> {
 }
 
 /// Willmore flow of a phase field by minimizing movements (def:minProblem).
-///
-/// ```
-/// use geometry::{Grid, phase_field, shapes::Ball};
-/// use model::Shipped;
-/// use operators::ComputeDevice;
-/// use solver::{Factors, FlowParams, NewtonParams, WillmoreFlow};
-///
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// let device = ComputeDevice::default_compiled()?;
-/// let grid = Grid::<2>::per_unit(128, 1.0)?;
-/// let params = FlowParams {
-///     eps: 2.0 * grid.spacing(),
-///     mcf_step: grid.spacing().powi(2),
-///     newton: NewtonParams::default(),
-///     calibration: Factors::PAPER,
-/// };
-/// let network = Shipped::Paper.find(params.ratios(&grid, 17))?;
-/// let disc = phase_field(grid, &Ball::<2>::new([0.0, 0.0], 0.2)?, params.eps)?;
-/// let mut flow = WillmoreFlow::with_network(&network, &disc, params, &device)?;
-/// let record = flow.advance(params.mcf_step)?;
-/// assert!(record.energy < record.energy_before);
-/// # Ok(())
-/// # }
-/// ```
 pub struct WillmoreFlow<const D: usize> {
     grid: Grid<D>,
     params: FlowParams,
@@ -230,7 +206,7 @@ impl<const D: usize> WillmoreFlow<D> {
     /// A flow whose curvature comes from any step of mean curvature flow of size `params.mcf_step`.
     ///
     /// # Errors
-    /// [`Error::Parameter`], [`Error::NonFinite`], or what tracing the energy raises.
+    /// [`Error::Geometry`] for parameters, [`Error::NonFinite`], or what tracing the energy raises.
     pub fn new(
         step: impl MeanCurvatureStep<D> + 'static,
         initial: &Field<D>,
@@ -327,9 +303,6 @@ impl<const D: usize> WillmoreFlow<D> {
 
     /// Holds perimeter and volume at these values in all following steps, from the next one on exactly: to a relative `1e-12` in double
     /// precision. A target that is not the present value is reached in the next step, so change it slowly. Nothing is held by default.
-    ///
-    /// # Errors
-    /// As [`Constraints::check`].
     pub fn constrain(&mut self, constraints: Constraints) -> Result<(), Error> {
         constraints.check(&self.grid)?;
         self.constraints = constraints;
@@ -340,7 +313,7 @@ impl<const D: usize> WillmoreFlow<D> {
     /// (1 for an exact one; [`model::Calibration::response`]). The Willmore energies of the records are then this energy.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for values that are not finite, or what tracing the energy raises.
+    /// [`Error::Geometry`] for values that are not finite, or what tracing the energy raises.
     pub fn set_energy(&mut self, energy: Helfrich, response: f64) -> Result<(), Error> {
         self.terms = if energy.is_willmore() {
             None
@@ -381,25 +354,16 @@ impl<const D: usize> WillmoreFlow<D> {
     }
 
     /// The phase field now.
-    ///
-    /// # Errors
-    /// [`Error::Operators`] if the device fails.
     pub fn field(&self) -> Result<Field<D>, Error> {
         self.on_grid(&self.current)
     }
 
     /// The phase field now, as it is stored.
-    ///
-    /// # Errors
-    /// [`Error::Operators`] if the device fails.
     pub fn stored_field(&self) -> Result<Stored<D>, Error> {
         self.stored(&self.current)
     }
 
     /// Everything the following steps depend on: a flow [restored](Self::restore) from it continues with the same bytes.
-    ///
-    /// # Errors
-    /// [`Error::Operators`] if the device fails.
     pub fn state(&self) -> Result<FlowState<D>, Error> {
         let values = |u: &Tensor<D>| self.device.values(u.clone());
         let previous = match &self.previous {
@@ -574,10 +538,14 @@ impl<const D: usize> WillmoreFlow<D> {
         if factors.is_some() && self.weighted.is_none() {
             self.weighted = Some(self.traced(true)?);
         }
-        let preconditioner = self.phase.as_ref().map(|(_, phase)| {
-            Preconditioner::two_level(phase.clone(), &self.grid, self.params.eps, tau)
-                .on(self.active.as_ref().map(Active::bricks))
-                .within(self.region.clone())
+        let preconditioner = self.phase.as_ref().map(|(_, phase)| Preconditioner {
+            phase: phase.clone(),
+            grid: self.grid,
+            eps: self.params.eps,
+            tau,
+            bricks: (self.active.as_ref()).map(|active| active.bricks().clone()),
+            region: self.region.clone(),
+            interface: None,
         });
         let (params, device, current) = (self.params.newton, &self.device, &self.current);
         let energy = match (factors, &mut self.weighted) {
@@ -603,7 +571,6 @@ impl<const D: usize> WillmoreFlow<D> {
         if newton.exit == Exit::IterationLimit {
             return Err(Error::NotConverged {
                 step,
-                reason: newton.exit,
                 estimate: newton.estimate,
                 tolerance: self.params.newton.tolerance,
             });
@@ -681,9 +648,6 @@ pub struct MeanCurvatureFlow<const D: usize> {
 
 impl<const D: usize> MeanCurvatureFlow<D> {
     /// A flow with a learned operator, whose ratios must be those of the grid.
-    ///
-    /// # Errors
-    /// As [`WillmoreFlow::with_network`].
     pub fn with_network(
         network: &Network,
         initial: &Field<D>,

@@ -17,7 +17,10 @@ impl<const D: usize> WillmoreFlow<D> {
         let mut minimum = self.minimize_here(movement)?;
         let (mut anchor, mut factors) = (movement.anchor.clone(), movement.factors.cloned());
         while let Some((from, to)) = self.enlarge(&minimum.u)? {
-            let carried = |x: &Tensor<D>| to.carried(&from, x, &self.device);
+            let carried = |x: &Tensor<D>| -> Result<Tensor<D>, Error> {
+                let before = Stored::of(x, self.grid, Some(from.clone()), &self.device)?;
+                Ok(before.on(&to).tensor(&self.device))
+            };
             let start = carried(&minimum.u)?;
             anchor = carried(&anchor)?;
             // Where nothing moves, factors of the motion are near 1 or, which is the same, near -1.
@@ -60,7 +63,9 @@ impl<const D: usize> WillmoreFlow<D> {
     /// Carries everything over to other bricks; those before.
     pub(super) fn go_to(&mut self, next: Active<D>) -> Result<Active<D>, Error> {
         let before = self.active.clone().unwrap_or_else(|| next.clone());
-        let carried = |u: &Tensor<D>| next.carried(&before, u, &self.device);
+        let carried = |u: &Tensor<D>| -> Result<Tensor<D>, Error> {
+            Ok(self.stored(u)?.on(&next).tensor(&self.device))
+        };
         let current = carried(&self.current)?;
         let previous = match &self.previous {
             Some((u, tau)) => Some((carried(u)?, *tau)),
