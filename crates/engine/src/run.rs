@@ -112,6 +112,8 @@ impl<const D: usize> Run<D> {
         let moved = self.distance(Some(&now), self.stored.as_ref());
         let travelled = self.distance(Some(&now), None);
         self.stored = Some(now);
+        // That of before was made if it was asked how far the interface went.
+        self.whole.take();
         let seconds = clock.elapsed().as_secs_f64();
         let step_size = self.control.step_size();
         let mcf_step = self.case.scales.mcf_step;
