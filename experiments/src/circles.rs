@@ -110,7 +110,7 @@ impl Ensemble {
             let mut case = planar_flow((flow, operator), &shape, initial, time);
             case.measures = Measure::size(EPS);
             case.measures.push(Measure::distance_to(exact));
-            let (flow, operator) = (flow.key(), operator.key());
+            let operator = operator.key();
             let name = format!("{flow}-n{n}-{operator}-{i:02}");
             let folder = folder.as_path().join(name);
             let (ends, never) = (Samples::every(usize::MAX), Interrupt::never());
@@ -174,7 +174,7 @@ impl Ensemble {
 
     /// Name in metrics, such as `willmore.n128.hybrid_calibrated`.
     pub fn key(&self) -> String {
-        format!("{}.{}", self.variant.flow.key(), self.variant.key())
+        format!("{}.{}", self.variant.flow, self.variant.key())
     }
 }
 

@@ -48,8 +48,8 @@ pub fn write<'a, const D: usize>(
     let steps: Vec<_> = steps.collect();
     let sheet = Sheet::of(&steps)
         .text(named, |step| step.run.0)
-        .text("method", |step| step.run.1.method.key())
-        .text("scheme", |step| step.run.1.scheme.key());
+        .text("method", |step| step.run.1.method.to_string())
+        .text("scheme", |step| step.run.1.scheme.to_string());
     session.csv(columns(sheet, &steps), "steps")
 }
 

@@ -80,8 +80,8 @@ impl Variant {
     pub fn columns<R>(sheet: Sheet<'_, R>, of: impl Fn(&R) -> Self) -> Sheet<'_, R> {
         sheet
             .data("n", |row| of(row).n)
-            .data("method", |row| of(row).method.key())
-            .data("scheme", |row| of(row).scheme.key())
+            .data("method", |row| of(row).method.to_string())
+            .data("scheme", |row| of(row).scheme.to_string())
     }
 
     /// Name in metrics after the flow or shape, such as `n128.hybrid_calibrated`.

@@ -343,8 +343,8 @@ pub struct FlowOptions {
     #[arg(long, value_name = "TARGET")]
     pub volume: Option<SizeTarget>,
 
-    /// Hold the area of the surface (the length of a plane curve): keep, VALUE, or PERCENT, as 105%. With the volume held too, edges
-    /// sharper than the interface become round first, and the area comes back over the ramp
+    /// Hold the area of the surface (the length of a plane curve): keep, VALUE, or PERCENT, as 105%. Edges sharper
+    /// than the interface become round first, and the area comes back over the ramp
     #[arg(long, value_name = "TARGET")]
     pub area: Option<SizeTarget>,
 

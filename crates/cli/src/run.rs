@@ -149,7 +149,7 @@ impl<O> Plan<O> {
             "time": run.time(),
             "components": topology.components,
             "same_topology": topology == before,
-            "touches_box": touches_side(u),
+            "touches_box": touches_side(u, -0.5),
             "grid": {
                 "cells": case.grid().cells(),
                 "spacing": case.grid().spacing(),
@@ -349,7 +349,7 @@ struct Pictures<'a, O> {
 
 impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, O> {
     fn observe(&mut self, event: &mut Event<'_, D>) -> Result<(), engine::Error> {
-        let (case, u) = (event.case, event.field);
+        let (case, u) = (event.run.case(), event.run.field());
         let eps = case.scales.eps;
         let (Some(step), Some(run)) = (event.step(), event.directory.as_deref_mut()) else {
             return Ok(());
@@ -380,7 +380,7 @@ impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, O> {
         // Touching sheets have no topology.
         let topology = presentation.topology(u, eps).ok();
         if let Some((before, now)) = self.topology.zip(topology).filter(|(a, b)| a != b) {
-            let time = event.records.last().map_or(0.0, |record| record.time);
+            let time = event.run.time();
             self.plan.messages.note(&format!(
                 "step {step}, t = {time:.4e}: parts or holes have come or gone, {now} where there were {before}"
             ));

@@ -48,24 +48,24 @@ impl FlowOptions {
     }
 }
 
-/// Gives the start of a flow that holds area and volume round edges, if its edges are sharper than the interface is wide.
+/// Gives the start of a flow that holds the area round edges, if its edges are sharper than the interface is wide.
 ///
 /// Such edges become round in the first step, which takes area away. To hold it there, the flow would have to make other edges. So they become
-/// round while the volume alone is held, and the area goes back to what it was, or to its target, over the steps of the ramp: the options
-/// say so then.
+/// round while the volume alone is held, if that is, and the area goes back to what it was, or to its target, over the steps of the ramp: the
+/// options say so then.
 ///
 /// # Errors
-/// Where that does not help, or takes too much away, since the shape is too thin.
+/// With the volume held, where that does not help, or takes too much away, since the shape is too thin.
 pub fn round_edges<const D: usize>(
     options: &mut FlowOptions,
     start: &mut Field<D>,
     device: &ComputeDevice,
     messages: MessageOptions,
 ) -> Result<(), Error> {
-    let both = options.area.is_some() && options.volume.is_some();
-    if !(both || options.reduced_volume.is_some()) {
+    if options.area.is_none() && options.reduced_volume.is_none() {
         return Ok(());
     }
+    let holds_volume = options.volume.is_some() || options.reduced_volume.is_some();
     let (scales, operator) = options.run.scheme.operator(Method::Hybrid, start.grid())?;
     let eps = scales.eps;
     let sharp = ZeroSet::of(start, eps)?;
@@ -80,7 +80,7 @@ pub fn round_edges<const D: usize>(
         energy: Helfrich::default(),
         held: Held {
             perimeter: None,
-            volume: Some(Target::keep(sharp.volume)),
+            volume: holds_volume.then(|| Target::keep(sharp.volume)),
         },
         flow: Flow::Willmore,
         operator,
@@ -110,6 +110,9 @@ pub fn round_edges<const D: usize>(
             options.volume = Some(SizeTarget::To(Amount::Value(volume)));
         }
         start.clone_from(run.field());
+        return Ok(());
+    }
+    if !holds_volume {
         return Ok(());
     }
     Err(Error::options(

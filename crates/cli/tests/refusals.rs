@@ -164,11 +164,11 @@ fn every_mistake_is_one_clear_line() {
         ),
         (
             &["flow", "builtin:disc", "--tau", "halving:1"],
-            "\"halving\" is no rule",
+            "\"halving:1\" is no rule",
         ),
         (
             &["flow", "builtin:disc", "--tau", "ramp:1"],
-            "a ramp needs a step and a number of halvings",
+            "\"ramp:1\" is no rule",
         ),
         (
             &["flow", "builtin:disc", "--scheme", "best"],

@@ -1,5 +1,6 @@
 //! Sizes of second-order time steps by their errors.
 
+use geometry::positive;
 use serde::{Deserialize, Serialize};
 use solver::{StepEstimates, StepRecord};
 
@@ -56,10 +57,10 @@ pub(crate) struct Controller {
 impl Controller {
     pub(crate) fn new(control: ErrorControl, eps: f64, largest: f64) -> Result<Self, Error> {
         let size = control.first.unwrap_or(16.0 * eps.powi(4));
-        Error::unless_positive("relative error of a step", control.relative)?;
-        Error::unless_positive("time error", control.length.unwrap_or(1.0))?;
-        Error::unless_positive("longest displacement of a stage", control.longest)?;
-        Error::unless_positive("first step", size)?;
+        positive("relative error of a step", control.relative)?;
+        positive("time error", control.length.unwrap_or(1.0))?;
+        positive("longest displacement of a stage", control.longest)?;
+        positive("first step", size)?;
         Ok(Self {
             control,
             eps,
@@ -221,7 +222,7 @@ mod tests {
                 ..ErrorControl::default()
             };
             let error = Controller::new(control, EPS, 1.0).unwrap_err();
-            assert!(matches!(error, Error::Parameter { .. }), "{error}");
+            assert!(matches!(error, Error::Geometry(_)), "{error}");
         }
     }
 }

@@ -7,17 +7,10 @@ use thiserror::Error as ThisError;
 /// What can stop a case.
 #[derive(Debug, ThisError)]
 pub enum Error {
-    #[error("{name} = {value:e} is out of range: {expected}")]
-    Parameter {
-        name: &'static str,
-        value: f64,
-        expected: &'static str,
-    },
     #[error(
         "a reduced volume of {target} is not possible: a ball has 1, any other shape less, this one {present:.4} at the beginning"
     )]
     ReducedVolume { target: f64, present: f64 },
-    /// Perimeter and volume of a ball, both held.
     #[error(
         "only a ball has a reduced volume of {reduced_volume:.5}, so that nothing could move: hold one of the two sizes, or a smaller reduced \
          volume"
@@ -29,7 +22,6 @@ pub enum Error {
         case: String,
         source: Box<solver::Error>,
     },
-    /// Smaller time steps failed, too.
     #[error(
         "{case}: step {step}: no step was possible, not even of size {tau:.1e}, halved {halvings} times: {source}"
     )]
@@ -81,18 +73,6 @@ pub enum Error {
 }
 
 impl Error {
-    /// Refuses a value unless it is positive and finite.
-    pub(crate) fn unless_positive(name: &'static str, value: f64) -> Result<(), Self> {
-        if value.is_finite() && value > 0.0 {
-            return Ok(());
-        }
-        Err(Self::Parameter {
-            name,
-            value,
-            expected: "positive and finite",
-        })
-    }
-
     /// Wraps what an observer of another crate raised.
     pub fn observer(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
         Self::Observer(error.into())

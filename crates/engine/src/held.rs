@@ -104,9 +104,6 @@ impl Held {
     }
 
     /// Refuses perimeter and volume of a ball together. What no shape has is refused by [`solver::WillmoreFlow::constrain`].
-    ///
-    /// # Errors
-    /// [`Error::OnlyBall`].
     pub(crate) fn check(&self, dimension: usize) -> Result<(), Error> {
         let targets = self.targets();
         if let (Some(perimeter), Some(volume)) = (targets.perimeter, targets.volume) {

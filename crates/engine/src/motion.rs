@@ -2,10 +2,9 @@
 
 use fem::{FiniteElementStep, Statistics};
 use geometry::Field;
-use geometry::measure::l2_distance;
 use model::Network;
 use operators::ComputeDevice;
-use solver::{Constraints, FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow};
+use solver::{Constraints, FlowState, MeanCurvatureFlow, StepRecord, Stored, WillmoreFlow};
 
 use crate::{Case, Error, Flow, Method, Order, Storage};
 
@@ -23,10 +22,10 @@ enum Either<const D: usize> {
 }
 
 impl<const D: usize> Motion<D> {
-    /// The flow of a case, at a state of it.
+    /// The flow of a case, at a state of it or at its start.
     pub(crate) fn new(
         case: &Case<D>,
-        state: &FlowState<D>,
+        state: Option<&FlowState<D>>,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
         let (params, operator) = (case.params(), &case.operator);
@@ -56,11 +55,16 @@ impl<const D: usize> Motion<D> {
                 }
                 flow.constrain(case.held.targets())?;
                 case.held.check(D)?;
-                flow.restore(state)?;
+                if let Some(state) = state {
+                    flow.restore(state)?;
+                }
                 Either::Willmore(Box::new(flow))
             }
             Flow::MeanCurvature => {
-                let from = &state.current;
+                let from = match state {
+                    Some(state) => &Field::from_values(*case.grid(), state.current.clone())?,
+                    None => &case.initial,
+                };
                 let flow = match &elements {
                     Some(step) => MeanCurvatureFlow::new(step.clone(), from, device)?,
                     None => MeanCurvatureFlow::with_network(network(case), from, &params, device)?,
@@ -106,16 +110,11 @@ impl<const D: usize> Motion<D> {
         }
     }
 
-    /// Puts the phase field in the place of the one before; the `L2` distance to that.
-    pub(crate) fn replace(&self, field: &mut Field<D>) -> Result<f64, solver::Error> {
+    /// The phase field, as it is stored.
+    pub(crate) fn stored(&self) -> Result<Stored<D>, solver::Error> {
         match &self.flow {
-            Either::Willmore(flow) => flow.replace(field),
-            Either::MeanCurvature(flow) => {
-                let now = flow.field()?;
-                let moved = l2_distance(&now, field)?;
-                *field = now;
-                Ok(moved)
-            }
+            Either::Willmore(flow) => flow.stored_field(),
+            Either::MeanCurvature(flow) => Ok(flow.field()?.into()),
         }
     }
 

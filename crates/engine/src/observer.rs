@@ -1,21 +1,15 @@
 //! Observers, which are called after every step of a run.
 
-use geometry::{Field, npy};
+use geometry::npy;
 use indicatif::ProgressBar;
 use runs::RunDirectory;
 
-use crate::{Case, Error, Record, Stop};
+use crate::{Error, Run};
 
 /// A run at its start, or after an accepted step.
 pub struct Event<'a, const D: usize> {
-    /// The case that is run.
-    pub case: &'a Case<D>,
-    /// The phase field at this time.
-    pub field: &'a Field<D>,
-    /// All records so far; none at the start.
-    pub records: &'a [Record],
-    /// The stop rule that ended the run, if it is over.
-    pub ended: Option<Stop>,
+    /// The run.
+    pub run: &'a Run<D>,
     /// Where the run is stored, if it is.
     pub directory: Option<&'a mut RunDirectory>,
 }
@@ -24,16 +18,16 @@ impl<const D: usize> Event<'_, D> {
     /// The number of the time step that is complete: 0 at the start, none in the middle of a step. The step in whose middle a run
     /// ends counts.
     pub fn step(&self) -> Option<usize> {
-        match self.records.last() {
+        match self.run.records().last() {
             None => Some(0),
-            Some(last) => (last.completes_step || self.ended.is_some()).then_some(last.step),
+            Some(last) => (last.completes_step || self.run.ended().is_some()).then_some(last.step),
         }
     }
 
     /// Writes the phase field to a file of the run; nothing where the run is not stored.
     pub fn write_field(&mut self, name: &str) -> Result<(), Error> {
         if let Some(directory) = &mut self.directory {
-            npy::write(directory.path().join(name), self.field)?;
+            npy::write(directory.path().join(name), self.run.field())?;
             directory.adopt_file(name)?;
         }
         Ok(())
@@ -44,9 +38,6 @@ impl<const D: usize> Event<'_, D> {
 /// after the checkpoint only.
 pub trait Observer<const D: usize> {
     /// Looks at the run.
-    ///
-    /// # Errors
-    /// Whatever stops the observer stops the run, too.
     fn observe(&mut self, event: &mut Event<'_, D>) -> Result<(), Error>;
 }
 
@@ -100,15 +91,15 @@ impl Samples {
 
 impl<const D: usize> Observer<D> for Samples {
     fn observe(&mut self, event: &mut Event<'_, D>) -> Result<(), Error> {
-        if let Some(last) = event.records.last().filter(|last| last.step == 1) {
-            let tau = event.case.steps.rule.size(1);
+        if let Some(last) = event.run.records().last().filter(|last| last.step == 1) {
+            let tau = event.run.case().steps.rule.size(1);
             let ends = |k: &&u32| (tau * 0.5_f64.powi(**k as i32)).to_bits() == last.time.to_bits();
             if let Some(&halvings) = self.halvings.iter().find(ends) {
                 event.write_field(&Self::part_name(halvings))?;
             }
         }
         match event.step() {
-            Some(step) if self.holds(step) || event.ended.is_some() => {
+            Some(step) if self.holds(step) || event.run.ended().is_some() => {
                 event.write_field(&Self::name(step))
             }
             _ => Ok(()),

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use derive_more::Display;
 use fem::{FiniteElementStep, LinearSolver};
 use geometry::Grid;
 use model::{NamedNetwork, NeededNetwork, Networks, Shipped};
@@ -12,10 +13,12 @@ use solver::{Factors, NewtonParams};
 use crate::{Error, Storage};
 
 /// The geometric flow.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Display, Serialize, Deserialize)]
+#[display(rename_all = "snake_case")]
 #[serde(rename_all = "snake_case")]
 pub enum Flow {
     /// Mean curvature flow.
+    #[display("mcf")]
     #[serde(rename = "mcf")]
     MeanCurvature,
     /// Willmore flow.
@@ -25,14 +28,6 @@ pub enum Flow {
 impl Flow {
     /// Both flows.
     pub const ALL: [Self; 2] = [Self::MeanCurvature, Self::Willmore];
-
-    /// Name in files and metrics.
-    pub fn key(self) -> &'static str {
-        match self {
-            Self::MeanCurvature => "mcf",
-            Self::Willmore => "willmore",
-        }
-    }
 
     /// Name in titles.
     pub fn title(self) -> &'static str {
@@ -44,8 +39,9 @@ impl Flow {
 }
 
 /// How a step of mean curvature flow is approximated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Display, Serialize, Deserialize)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
+#[display(rename_all = "snake_case")]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// The learned operator
@@ -60,9 +56,10 @@ pub enum Method {
 }
 
 /// How the energy of a time step of Willmore flow is weighted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Display, Serialize, Deserialize)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[cfg_attr(feature = "clap", value(rename_all = "snake_case"))]
+#[display(rename_all = "snake_case")]
 #[serde(rename_all = "snake_case")]
 pub enum Scheme {
     /// Calibrated, with the operator of the accurate recipe in place of the paper's
@@ -78,15 +75,6 @@ impl Scheme {
     /// All schemes, in the order of legends.
     pub const ALL: [Self; 3] = [Self::Paper, Self::Calibrated, Self::Accurate];
 
-    /// Name in options and files.
-    pub fn key(self) -> &'static str {
-        match self {
-            Self::Paper => "paper",
-            Self::Calibrated => "calibrated",
-            Self::Accurate => "accurate",
-        }
-    }
-
     /// The recipe of the shipped networks that this scheme uses.
     pub fn shipped(self) -> Shipped {
         match self {
@@ -100,15 +88,6 @@ impl Method {
     /// All methods, in the order of legends.
     pub const ALL: [Self; 3] = [Self::Hybrid, Self::FeImplicit, Self::FeSemi];
 
-    /// Name in files and metrics.
-    pub fn key(self) -> &'static str {
-        match self {
-            Self::Hybrid => "hybrid",
-            Self::FeImplicit => "fe_implicit",
-            Self::FeSemi => "fe_semi",
-        }
-    }
-
     /// Name in legends.
     pub fn label(self) -> &'static str {
         match self {
@@ -121,8 +100,8 @@ impl Method {
     /// Name in files and metrics in a scheme.
     pub fn key_in(self, scheme: Scheme) -> String {
         match scheme {
-            Scheme::Paper => self.key().to_owned(),
-            scheme => format!("{}_{}", self.key(), scheme.key()),
+            Scheme::Paper => self.to_string(),
+            scheme => format!("{self}_{scheme}"),
         }
     }
 

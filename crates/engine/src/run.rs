@@ -3,12 +3,12 @@
 use std::sync::OnceLock;
 use std::time::Instant;
 
-use geometry::Field;
-use geometry::measure::{has_interface, l2_distance};
+use geometry::measure::{has_interface, l2_distance_of_parts};
+use geometry::{Field, require};
 use operators::ComputeDevice;
 use runs::Interrupt;
 use serde_json::Value;
-use solver::{FlowState, StepRecord};
+use solver::{FlowState, StepRecord, Stored};
 
 use crate::motion::Motion;
 use crate::record::Values;
@@ -33,7 +33,10 @@ pub struct Run<const D: usize> {
     control: StepControl,
     /// How many steps the targets of what is held have gone, parts of steps included.
     ramped: f64,
-    field: Field<D>,
+    /// What is stored of the phase field after the last step; nothing before the first one.
+    stored: Option<Stored<D>>,
+    /// The same on the whole grid, once it was asked for.
+    whole: OnceLock<Field<D>>,
     pub(crate) start: Values,
     pub(crate) records: Vec<Record>,
     ended: Option<Stop>,
@@ -43,28 +46,26 @@ impl<const D: usize> Run<D> {
     /// Starts a case.
     ///
     /// # Errors
-    /// If something in the case is not possible: [`Error::Parameter`], [`Error::Solver`], [`Error::Fem`], [`Error::Geometry`].
+    /// If something in the case is not possible: [`Error::Solver`], [`Error::Fem`], [`Error::Geometry`].
     pub fn new(case: Case<D>, device: &ComputeDevice) -> Result<Self, Error> {
-        let start = values(&case, &case.initial, 0.0)?;
-        let state = FlowState::new(case.initial.clone(), 0, 0.0);
-        Self::at(case, device, start, Vec::new(), state)
+        let start = values(&case, 0.0, || &case.initial)?;
+        Self::at(case, device, start, Vec::new(), None)
     }
 
-    /// Restores a case to the state that it had after these records.
+    /// A case at the state that it had after these records, or at its start.
     pub(crate) fn at(
         case: Case<D>,
         device: &ComputeDevice,
         start: Values,
         records: Vec<Record>,
-        state: FlowState<D>,
+        state: Option<&FlowState<D>>,
     ) -> Result<Self, Error> {
         let (mcf_step, first) = (case.scales.mcf_step, case.steps.rule.size(1));
-        if case.flow == Flow::MeanCurvature && first.to_bits() != mcf_step.to_bits() {
-            return Err(Error::Parameter {
-                name: "tau",
-                value: first,
-                expected: "the inner step, for mean curvature flow",
-            });
+        if case.flow == Flow::MeanCurvature {
+            let expected = "the inner step, for mean curvature flow";
+            require("tau", first, expected, |tau| {
+                tau.to_bits() == mcf_step.to_bits()
+            })?;
         }
         let mut control = StepControl::new(&case)?;
         let (mut step_size, mut ramped) = (control.step_size(), 0.0);
@@ -73,11 +74,14 @@ impl<const D: usize> Run<D> {
             ramped += record.tau / step_size;
             control.accept(record)?;
         }
+        let motion = motion_in_memory(&case, state, device)?;
+        let stored = state.map(|_| motion.stored()).transpose()?;
         let mut run = Self {
-            motion: motion_in_memory(&case, &state, device)?,
+            motion,
             device: device.clone(),
             identity: OnceLock::new(),
-            field: kept_outside(&case, state.current),
+            stored,
+            whole: OnceLock::new(),
             case,
             control,
             ramped,
@@ -98,13 +102,18 @@ impl<const D: usize> Run<D> {
             return Ok(None);
         }
         let clock = Instant::now();
+        self.whole.take();
         let Attempt {
             halvings,
             refused_hvp,
             minimization,
         } = self.attempt()?;
-        let moved = self.motion.replace(&mut self.field);
-        let moved = moved.map_err(|source| self.failed(source))?;
+        let now = self.motion.stored().map_err(|source| self.failed(source))?;
+        let moved = self.distance(Some(&now), self.stored.as_ref());
+        let travelled = self.distance(Some(&now), None);
+        self.stored = Some(now);
+        // That of before was made if it was asked how far the interface went.
+        self.whole.take();
         let seconds = clock.elapsed().as_secs_f64();
         let step_size = self.control.step_size();
         let mcf_step = self.case.scales.mcf_step;
@@ -118,9 +127,9 @@ impl<const D: usize> Run<D> {
             halvings,
             refused_hvp,
             moved,
-            travelled: l2_distance(&self.field, &self.case.initial)?,
+            travelled,
             minimization,
-            measures: values(&self.case, &self.field, time)?,
+            measures: values(&self.case, time, || self.field())?,
             seconds,
         };
         self.ramped += record.tau / step_size;
@@ -171,10 +180,7 @@ impl<const D: usize> Run<D> {
         observers: &mut [&mut dyn Observer<D>],
     ) -> Result<(), Error> {
         let mut event = Event {
-            case: &self.case,
-            field: &self.field,
-            records: &self.records,
-            ended: self.ended,
+            run: self,
             directory: store.map(Store::directory),
         };
         observers
@@ -215,7 +221,7 @@ impl<const D: usize> Run<D> {
                     let too_long = longest.zip(before.as_ref()).filter(|_| halvings < SHORTER);
                     match too_long {
                         Some((longest, before)) if self.has_gone_too_far(longest)? => {
-                            self.motion = Motion::new(&self.case, before, &self.device)?;
+                            self.motion = Motion::new(&self.case, Some(before), &self.device)?;
                         }
                         _ => {
                             return Ok(Attempt {
@@ -255,8 +261,8 @@ impl<const D: usize> Run<D> {
     fn has_gone_too_far(&self, widths: f64) -> Result<bool, Error> {
         let now = self.motion.field().map_err(|source| self.failed(source))?;
         Ok(!has_interface(&now)
-            || has_gone_further(&self.field, &now, widths)
-            || has_gone_further(&now, &self.field, widths))
+            || has_gone_further(self.field(), &now, widths)
+            || has_gone_further(&now, self.field(), widths))
     }
 
     fn failed(&self, source: solver::Error) -> Error {
@@ -284,8 +290,26 @@ impl<const D: usize> Run<D> {
     }
 
     /// The phase field at the present time.
+    #[allow(clippy::missing_panics_doc, reason = "stored values are finite")]
     pub fn field(&self) -> &Field<D> {
-        &self.field
+        let Some(stored) = &self.stored else {
+            return &self.case.initial;
+        };
+        let case = &self.case;
+        self.whole.get_or_init(|| {
+            let read = |start: usize, part: &mut [f64]| read(case, Some(stored), start, part);
+            Field::read_from(*case.grid(), &read).expect("stored values are finite")
+        })
+    }
+
+    /// The `L2` distance of two phase fields of this run; the initial one where none is stored.
+    fn distance(&self, a: Option<&Stored<D>>, b: Option<&Stored<D>>) -> f64 {
+        let case = &self.case;
+        l2_distance_of_parts(
+            case.grid(),
+            &|start, part| read(case, a, start, part),
+            &|start, part| read(case, b, start, part),
+        )
     }
 
     /// The measures of the initial phase field.
@@ -329,23 +353,34 @@ impl<const D: usize> Run<D> {
     }
 }
 
-/// A phase field with the initial values outside of the region, which bricks do not keep where they are constant.
-fn kept_outside<const D: usize>(case: &Case<D>, mut field: Field<D>) -> Field<D> {
+/// Writes values of a phase field from a node on, whole rows of bricks: those that are stored, or the initial ones, which it keeps outside of
+/// the region.
+fn read<const D: usize>(
+    case: &Case<D>,
+    stored: Option<&Stored<D>>,
+    start: usize,
+    part: &mut [f64],
+) {
+    let initial = &case.initial.values()[start..][..part.len()];
+    let Some(stored) = stored else {
+        part.copy_from_slice(initial);
+        return;
+    };
+    stored.read(start, part);
     if let Some(region) = &case.region {
-        let initial = case.initial.values().iter().zip(region);
-        for (value, (initial, moves)) in field.values_mut().iter_mut().zip(initial) {
+        let kept = initial.iter().zip(&region[start..]);
+        for (value, (initial, moves)) in part.iter_mut().zip(kept) {
             if !moves {
                 *value = *initial;
             }
         }
     }
-    field
 }
 
-/// The flow of a case at a state, if it fits into the memory.
+/// The flow of a case at a state or at its start, if it fits into the memory.
 fn motion_in_memory<const D: usize>(
     case: &Case<D>,
-    state: &FlowState<D>,
+    state: Option<&FlowState<D>>,
     device: &ComputeDevice,
 ) -> Result<Motion<D>, Error> {
     let (nodes, takes_bricks) = (case.grid().len(), case.takes_bricks());
@@ -407,10 +442,15 @@ fn has_gone_further<const D: usize>(u: &Field<D>, now: &Field<D>, widths: f64) -
     far as f64 > VANISHING * all as f64
 }
 
-fn values<const D: usize>(case: &Case<D>, field: &Field<D>, time: f64) -> Result<Values, Error> {
+/// The measures of the phase field at a time, which is made only if there are any.
+fn values<'a, const D: usize>(
+    case: &Case<D>,
+    time: f64,
+    field: impl Fn() -> &'a Field<D>,
+) -> Result<Values, Error> {
     let mut values = Values::new();
     for measure in &case.measures {
-        let measured = measure.of(field, time)?;
+        let measured = measure.of(field(), time)?;
         values.extend(measured.map(|(name, value)| (name.to_owned(), value)));
     }
     Ok(values)

@@ -246,9 +246,6 @@ impl StepControl {
     }
 
     /// Moves on by a minimization; true if it completes the present step.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] if the next step cannot be divided into substeps.
     pub(crate) fn accept(&mut self, record: &Record) -> Result<bool, Error> {
         self.time = record.time;
         let mut substep = f64::INFINITY;
@@ -333,20 +330,8 @@ impl FromStr for StepRule {
                 first: positive(first)?,
                 part: positive(part)?,
             },
-            ("growing", _) => {
-                return Err(
-                    "a growing rule needs a step and a number of equal steps, VALUE,COUNT"
-                        .to_owned(),
-                );
-            }
-            ("ramp", _) => {
-                return Err("a ramp needs a step and a number of halvings, VALUE,COUNT".to_owned());
-            }
-            ("graded", _) => {
-                return Err("a graded rule needs a step and a part, VALUE,PART".to_owned());
-            }
             (tau, [""]) => Self::Constant(positive(tau)?),
-            _ => return Err(format!("{rule:?} is no rule; there are {RULES}")),
+            _ => return Err(format!("{text:?} is no rule; there are {RULES}")),
         })
     }
 }

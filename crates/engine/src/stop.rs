@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use derive_more::Display;
 use geometry::Field;
-use geometry::measure::has_interface;
+use geometry::measure::{has_interface, touches_side};
 use serde::{Deserialize, Serialize};
 use solver::StepRecord;
 
@@ -113,11 +113,8 @@ fn is_at_rest<const D: usize>(run: &Run<D>, record: &Record) -> bool {
 
 /// Whether the shape is within two interface widths of the side of the box.
 fn is_near_side<const D: usize>(u: &Field<D>) -> bool {
-    let last = u.grid().cells() - 1;
-    u.values().iter().enumerate().any(|(node, &u_here)| {
-        // `tanh(3/2) = 0.905`.
-        u_here > -0.9 && (u.grid().multi_index(node).iter()).any(|&i| i == 0 || i == last)
-    })
+    // `tanh(3/2) = 0.905`.
+    touches_side(u, -0.9)
 }
 
 fn made(steps: usize) -> String {

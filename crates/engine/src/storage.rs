@@ -40,9 +40,6 @@ impl Storage {
     }
 
     /// Refuses a flow of which so many cells of a grid are stored if the memory is too small for it. Limits of containers are not looked at.
-    ///
-    /// # Errors
-    /// [`Error::Memory`].
     pub(crate) fn check<const D: usize>(
         grid: &Grid<D>,
         stored: usize,

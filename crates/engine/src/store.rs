@@ -2,10 +2,11 @@
 
 use std::fmt::Display;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use geometry::{Field, Grid};
-use operators::ComputeDevice;
+use operators::{Bricks, ComputeDevice};
 use runs::{RunDirectory, State, StoredRun};
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
@@ -170,7 +171,7 @@ pub fn records(stored: &StoredRun) -> Result<Vec<Record>, Error> {
     Ok(records)
 }
 
-fn pack<const D: usize>(run: &Run<D>, notes: &Value) -> Result<State, Error> {
+fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<State<'a>, Error> {
     let state = run.state()?;
     let (previous, previous_tau) = state.previous.unzip();
     let notes = json!({
@@ -182,21 +183,24 @@ fn pack<const D: usize>(run: &Run<D>, notes: &Value) -> Result<State, Error> {
         "previous_tau": previous_tau,
     });
     let mut packed = State::new(run.records.len() as u64, notes)
-        .with_array("initial", run.case.initial.values().to_vec())
-        .with_array("current", state.current.into_values());
+        .with_array("initial", run.case.initial.values())
+        .with_array("current", state.current);
     packed.text = serde_json::to_string(&run.records).expect("records are numbers and names");
+    if let Some(bricks) = state.bricks {
+        packed = packed.with_array("bricks", bricks.marks());
+    }
     if let Some(previous) = previous {
-        packed = packed.with_array("previous", previous.into_values());
+        packed = packed.with_array("previous", previous);
     }
     if let Some(rate) = state.rate {
-        packed = packed.with_array("rate", rate.into_values());
+        packed = packed.with_array("rate", rate);
     }
     for (level, motion) in state.half_motions.into_iter().enumerate() {
         packed = packed.with_array(&half_motion(level), motion.into_values());
     }
     if let Some(region) = &run.case.region {
         let marks = region.iter().map(|&moves| f64::from(moves));
-        packed = packed.with_array("region", marks.collect());
+        packed = packed.with_array("region", marks.collect::<Vec<f64>>());
     }
     Ok(packed)
 }
@@ -218,11 +222,15 @@ fn restore<const D: usize>(
     }
     check_identity(stored, &wanted)?;
     let grid = *case.grid();
-    let optional = |name: &str| {
-        let found = state.array(name).is_some();
-        found.then(|| field(stored, name, grid)).transpose()
+    let bricks = match state.array("bricks") {
+        Some(marks) => {
+            let bricks = Bricks::with_marks(grid.cells(), marks);
+            Some(Arc::new(bricks.map_err(|error| unreadable(stored, error))?))
+        }
+        None => None,
     };
-    let previous = match optional("previous")? {
+    let values = |name: &str| state.array(name).map(<[f64]>::to_vec);
+    let previous = match values("previous") {
         Some(previous) => Some((previous, read(stored, &state.notes["previous_tau"])?)),
         None => None,
     };
@@ -232,15 +240,16 @@ fn restore<const D: usize>(
         half_motions.push(field(stored, &half_motion(half_motions.len()), half)?);
     }
     let at = FlowState {
-        current: field(stored, "current", grid)?,
+        bricks,
+        current: values("current").ok_or_else(|| lacking(stored, "current"))?,
         previous,
-        rate: optional("rate")?,
+        rate: values("rate"),
         half_motions,
         step: usize::try_from(state.step).map_err(|error| unreadable(stored, error))?,
         time: read(stored, &state.notes["time"])?,
     };
     let start = read(stored, &state.notes["start"])?;
-    Run::at(case, device, start, records(stored)?, at)
+    Run::at(case, device, start, records(stored)?, Some(&at))
 }
 
 /// Refuses a stored run of another case, and says in what it differs.
@@ -274,8 +283,12 @@ fn grid<const D: usize>(stored: &StoredRun) -> Result<Grid<D>, Error> {
 
 fn field<const D: usize>(stored: &StoredRun, name: &str, grid: Grid<D>) -> Result<Field<D>, Error> {
     let values = stored.state().array(name);
-    let values = values.ok_or_else(|| unreadable(stored, format!("it has no {name:?}")))?;
+    let values = values.ok_or_else(|| lacking(stored, name))?;
     Ok(Field::from_values(grid, values.to_vec())?)
+}
+
+fn lacking(stored: &StoredRun, name: &str) -> Error {
+    unreadable(stored, format!("it has no {name:?}"))
 }
 
 pub(crate) fn read<T: DeserializeOwned>(stored: &StoredRun, value: &Value) -> Result<T, Error> {

@@ -3,6 +3,8 @@
 //! A large step from a shape with corners is too much for one minimization: the corners move by many widths of the interface,
 //! and the minimizer is in another valley. In substeps that begin small and grow it is reached.
 
+use geometry::{positive, require};
+
 use crate::{Error, Record};
 
 /// Steps and substeps of adaptive size grow while the minimization takes at most this many Newton steps,
@@ -37,23 +39,18 @@ pub(crate) struct Substeps {
 
 impl Substeps {
     /// A step of size `tau`, the first substep of which is at most of size `first`; none is smaller than `2^-12` of `scale`.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] unless all are positive and finite, and `scale` neither larger than `first` and `tau` nor smaller than
-    /// `tau / 2^36`.
     pub(crate) fn new(tau: f64, first: f64, scale: f64) -> Result<Self, Error> {
-        Error::unless_positive("tau", tau)?;
-        Error::unless_positive("first substep", first)?;
-        Error::unless_positive("substep", scale)?;
+        positive("tau", tau)?;
+        positive("first substep", first)?;
+        positive("substep", scale)?;
         let deepest = (tau / (scale * 2.0_f64.powi(-HALVINGS))).log2().floor();
         let depth = (tau / first).log2().ceil().max(0.0);
-        if scale > first.min(tau) || deepest > f64::from(DEEPEST) {
-            return Err(Error::Parameter {
-                name: "substep",
-                value: scale,
-                expected: "at most the first substep and the time step, at least 2^-36 of the latter",
-            });
-        }
+        require(
+            "substep",
+            scale,
+            "at most the first substep and the time step, at least 2^-36 of the latter",
+            |scale| scale <= first.min(tau) && deepest <= f64::from(DEEPEST),
+        )?;
         Ok(Self {
             tau,
             depth: depth as u32,
@@ -188,7 +185,7 @@ mod tests {
             (1.0, 0.1, 1e-12),
         ] {
             let error = Substeps::new(tau, first, scale).unwrap_err();
-            assert!(matches!(error, Error::Parameter { .. }), "{error}");
+            assert!(matches!(error, Error::Geometry(_)), "{error}");
         }
     }
 }

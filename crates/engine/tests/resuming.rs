@@ -16,7 +16,7 @@ struct After<'a>(usize, &'a Interrupt);
 
 impl Observer<2> for After<'_> {
     fn observe(&mut self, event: &mut Event<'_, 2>) -> Result<(), Error> {
-        if event.records.len() == self.0 {
+        if event.run.records().len() == self.0 {
             self.1.request();
         }
         Ok(())

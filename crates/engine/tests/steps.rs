@@ -151,7 +151,10 @@ fn mean_curvature_flow_takes_its_own_step_alone() {
     other.steps = StepRule::Constant(2.0 * TAU).into();
     let error = Run::new(other, &device()).err().unwrap();
     assert!(
-        matches!(error, Error::Parameter { name: "tau", .. }),
+        matches!(
+            error,
+            Error::Geometry(geometry::Error::InvalidParameter { name: "tau", .. })
+        ),
         "{error}"
     );
 }

@@ -1,5 +1,6 @@
 //! Nodal values on a grid.
 
+use crate::parallel::Reader;
 use crate::{Error, Grid, parallel};
 
 /// One `f64` per node of a [`Grid`], row-major, last axis fastest.
@@ -69,15 +70,14 @@ impl<const D: usize> Field<D> {
         &mut self.values
     }
 
-    /// Replaces the values in place; the `L2` distance to what they were. `fill` changes those of some nodes in a row from one on, whose
-    /// number is a multiple of 4096.
+    /// The field whose values `read` writes for nodes in a row from one on, whose number is a multiple of 4096.
     ///
     /// # Errors
-    /// [`Error::NonFinite`], with the values replaced.
-    pub fn replace(&mut self, fill: impl Fn(usize, &mut [f64]) + Sync) -> Result<f64, Error> {
-        let squares = parallel::replace(&mut self.values, &fill);
-        self.check_finite()?;
-        Ok((self.grid.cell_volume() * squares).sqrt())
+    /// [`Error::NonFinite`].
+    pub fn read_from(grid: Grid<D>, read: &Reader<'_>) -> Result<Self, Error> {
+        let mut values = vec![0.0; grid.len()];
+        parallel::over_chunks(&mut values, parallel::CHUNK, read);
+        Self::from_values(grid, values)
     }
 
     /// Gives up the grid and returns the nodal values.

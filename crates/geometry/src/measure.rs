@@ -3,6 +3,7 @@
 //! Sums run in parallel over fixed chunks, so that results do not depend on the number of threads.
 
 use crate::error::positive;
+use crate::parallel::Reader;
 use crate::profile::profile_variable;
 use crate::{Error, Field, Grid, parallel, vector};
 
@@ -21,6 +22,12 @@ pub fn l2_distance<const D: usize>(a: &Field<D>, b: &Field<D>) -> Result<f64, Er
     let (v, w) = (a.values(), b.values());
     let sum = parallel::sum(v.len(), |i| (v[i] - w[i]) * (v[i] - w[i]));
     Ok((a.grid().cell_volume() * sum).sqrt())
+}
+
+/// The same for fields of which not the whole is in memory: `a` and `b` write the values of nodes in a row from one on, whose number is a
+/// multiple of 4096.
+pub fn l2_distance_of_parts<const D: usize>(grid: &Grid<D>, a: &Reader<'_>, b: &Reader<'_>) -> f64 {
+    (grid.cell_volume() * parallel::squared_distance(grid.len(), a, b)).sqrt()
 }
 
 /// Maximum norm over the nodes; NaN if a value is.
@@ -44,12 +51,11 @@ pub fn has_interface<const D: usize>(u: &Field<D>) -> bool {
     inside > 0 && inside < u.grid().len()
 }
 
-/// Whether a node at the side of the box is not outside.
-pub fn touches_side<const D: usize>(u: &Field<D>) -> bool {
-    const OUTSIDE: f64 = -0.5;
-    let grid = u.grid();
-    let at_side = |node: usize| grid.multi_index(node).contains(&0);
-    (u.values().iter().enumerate()).any(|(node, u)| *u > OUTSIDE && at_side(node))
+/// Whether a node at the side of the box has a value above this one.
+pub fn touches_side<const D: usize>(u: &Field<D>, above: f64) -> bool {
+    let (grid, last) = (u.grid(), u.grid().cells() - 1);
+    let at_side = |node: usize| (grid.multi_index(node).iter()).any(|&i| i == 0 || i == last);
+    (u.values().iter().enumerate()).any(|(node, u)| *u > above && at_side(node))
 }
 
 /// Perimeter `P_eps[u] = 1/2 integral of eps |grad u|^2 + Psi(u)/eps`, `Psi(u) = 9/16 (1-u^2)^2`.

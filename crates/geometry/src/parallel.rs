@@ -6,13 +6,16 @@
 use rayon::prelude::*;
 
 /// Values per task, and terms per partial sum; fixed, so that the order of additions is.
-const CHUNK: usize = 4096;
+pub(crate) const CHUNK: usize = 4096;
+
+/// Writes the values from an index on.
+pub type Reader<'a> = dyn Fn(usize, &mut [f64]) + Sync + 'a;
 
 /// Calls `work` with the first index and the values of each `chunk` in a row.
 pub fn over_chunks<T: Send>(
     values: &mut [T],
     chunk: usize,
-    work: &(dyn Fn(usize, &mut [T]) + Sync),
+    work: &(dyn Fn(usize, &mut [T]) + Sync + '_),
 ) {
     let chunks = values.par_chunks_mut(chunk).enumerate();
     chunks.for_each(|(number, part)| work(number * chunk, part));
@@ -55,22 +58,18 @@ pub(crate) fn sum(len: usize, term: impl Fn(usize) -> f64 + Sync) -> f64 {
     total(&parts)
 }
 
-/// Replaces values, and sums the squares of their changes as [`sum`] does. `fill` changes copies of those from a place on.
-pub(crate) fn replace(values: &mut [f64], fill: &(dyn Fn(usize, &mut [f64]) + Sync)) -> f64 {
-    let part = |(chunk, values): (usize, &mut [f64])| {
-        let mut now = values.to_vec();
-        fill(chunk * CHUNK, &mut now);
-        let pairs = values.iter_mut().zip(now);
-        pairs
-            .map(|(value, now)| {
-                let change = now - *value;
-                *value = now;
-                change * change
-            })
-            .sum()
-    };
-    let chunks = values.par_chunks_mut(CHUNK).enumerate();
-    let parts: Vec<f64> = chunks.map(part).collect();
+/// The sum of the squares of the differences of so many values that two functions write, in the order of [`sum`].
+pub(crate) fn squared_distance(len: usize, a: &Reader<'_>, b: &Reader<'_>) -> f64 {
+    let parts = map(len.div_ceil(CHUNK), 1, &|chunk| {
+        let first = chunk * CHUNK;
+        let [a, b] = [a, b].map(|read| {
+            let mut values = vec![0.0; CHUNK.min(len - first)];
+            read(first, &mut values);
+            values
+        });
+        let pairs = a.iter().zip(b);
+        pairs.map(|(a, b)| (a - b) * (a - b)).sum()
+    });
     total(&parts)
 }
 

@@ -10,10 +10,11 @@ use crate::Ratios;
 #[derive(Debug, ThisError)]
 #[error(transparent)]
 pub enum Error {
-    /// A network of other ratios than the run's.
     #[error("the network does not fit this run: trained for {network}, the run has {run}")]
-    Mismatch { network: Ratios, run: Ratios },
-    /// No shipped network fits.
+    Mismatch {
+        network: Ratios,
+        run: Ratios,
+    },
     #[error(
         "no network of the {recipe} recipe for {wanted}; there are {available}. Choose one of these interface widths, or train a network: \
          willmore train --dimension {} --width {} --eps-over-h {} --step-over-h2 {} --save FILE.safetensors, and give it by --network",
@@ -24,15 +25,15 @@ pub enum Error {
         wanted: Ratios,
         available: String,
     },
-    /// A file with a network was given, and no case has a learned operator.
     #[error("no run of these methods needs a network")]
     NetworkNotNeeded,
-    /// The kernel does not fit on the grid.
     #[error(
         "the kernel is {width} cells wide, but the grid has only {cells}; use a larger box or a finer grid"
     )]
-    KernelTooWide { width: usize, cells: usize },
-    /// A kernel that is no product of functions of one variable.
+    KernelTooWide {
+        width: usize,
+        cells: usize,
+    },
     #[error(
         "the kernel of this network differs by {error:.0e} of its largest value from a product of functions of one variable, which active \
          bricks need; take a network of the accurate recipe, or store the whole grid"
@@ -41,34 +42,35 @@ pub enum Error {
         /// The largest difference, relative to the largest value.
         error: f64,
     },
-    /// An operator that keeps no value near a pure phase.
     #[error(
         "the operator keeps no constant value near {phase}, which active bricks need; train the network longer, or store the whole grid"
     )]
-    NoRest { phase: f64 },
-    /// Ratios that cannot describe an operator.
+    NoRest {
+        phase: f64,
+    },
     #[error("impossible ratios ({ratios}): {reason}")]
     Ratios {
         ratios: Ratios,
         reason: &'static str,
     },
-    /// An array of the wrong size.
     #[error("{what}: expected {expected}, found {found}")]
     Shape {
         what: &'static str,
         expected: String,
         found: String,
     },
-    /// A number that is not finite.
     #[error("{what}: entry {index} is not finite")]
-    NonFinite { what: &'static str, index: usize },
-    /// A weights file with the wrong content.
+    NonFinite {
+        what: &'static str,
+        index: usize,
+    },
     #[error("{path} is not a usable network: {reason}")]
-    Weights { path: PathBuf, reason: String },
-    /// Training parameters out of range.
+    Weights {
+        path: PathBuf,
+        reason: String,
+    },
     #[error("training: {0}")]
     Training(String),
-    /// The loss or a parameter became NaN or infinite.
     #[error(
         "training diverged in iteration {iteration}: {what} is not finite; lower the learning rate or change the seed"
     )]
@@ -76,7 +78,6 @@ pub enum Error {
         iteration: usize,
         what: &'static str,
     },
-    /// A step of mean curvature flow that cannot be calibrated.
     #[error(
         "calibration: {reason} (eigenvalue near 1: {eigenvalue:.6}); train the network longer, or run without calibration"
     )]
@@ -85,12 +86,11 @@ pub enum Error {
         /// The eigenvalue of the step's derivative at the flat interface that should be 1; NaN if there is no such interface.
         eigenvalue: f64,
     },
-    /// Training was interrupted; its checkpoint can be resumed.
     #[error("training interrupted after iteration {iteration}; run again to resume")]
-    Interrupted { iteration: usize },
-    /// A file that cannot be read or written.
+    Interrupted {
+        iteration: usize,
+    },
     File(#[from] files::Error),
-    /// From the operations on the device.
     Operators(#[from] operators::Error),
 }
 

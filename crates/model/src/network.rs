@@ -129,9 +129,6 @@ impl Network {
     }
 
     /// The stored calibration, or a new one.
-    ///
-    /// # Errors
-    /// As [`Self::calibrate`].
     pub fn calibration(&self) -> Result<Calibration, Error> {
         self.calibration.map_or_else(|| self.calibrate(), Ok)
     }

@@ -5,6 +5,7 @@ use operators::{ComputeDevice, Transform, circular_convolution, kernel_symbol};
 use rand::SeedableRng;
 use serde::{Deserialize, Serialize};
 
+use crate::ratios::offsets;
 use crate::training::SphereData;
 use crate::{Error, Network};
 
@@ -98,9 +99,6 @@ impl Quality {
 
 /// Relative error of the motion of spheres, `<V[u] - u, u_R - u> / |u_R - u|^2 - 1` for `u_R` the exact one after the step, and the same
 /// with both phases exchanged: how much too fast an interface of that curvature moves, towards either phase.
-///
-/// # Errors
-/// As [`Quality::measure`].
 pub fn displacement_errors(
     network: &Network,
     data: &SphereData,
@@ -199,11 +197,11 @@ fn roughness(network: &Network) -> f64 {
 
 /// Compares entries of different orbits that lie at the same distance, like offsets (5, 0) and (4, 3).
 fn radial_asymmetry(network: &Network) -> f64 {
-    let orbits = crate::training::Orbits::new(network.ratios().dimension, network.ratios().width);
+    let ratios = network.ratios();
     let mut by_distance: std::collections::BTreeMap<isize, (f64, f64)> =
         std::collections::BTreeMap::new();
     let mut largest = 0.0_f64;
-    for (offset, &value) in orbits.offsets().iter().zip(network.kernel()) {
+    for (offset, &value) in offsets(ratios.dimension, ratios.width).zip(network.kernel()) {
         let squared: isize = offset.iter().map(|b| b * b).sum();
         let range = by_distance.entry(squared).or_insert((value, value));
         *range = (range.0.min(value), range.1.max(value));

@@ -47,3 +47,15 @@ impl Ratios {
         self.width.pow(self.dimension as u32)
     }
 }
+
+/// Offsets from the centre of all entries of a `width^dimension` kernel, in cells, row-major.
+pub(crate) fn offsets(dimension: usize, width: usize) -> impl Iterator<Item = Vec<isize>> {
+    (0..width.pow(dimension as u32)).map(move |mut i| {
+        let mut offset = vec![0; dimension];
+        for along in offset.iter_mut().rev() {
+            *along = (i % width) as isize - (width / 2) as isize;
+            i /= width;
+        }
+        offset
+    })
+}

@@ -73,6 +73,34 @@ impl<const D: usize> Bricks<D> {
         Ok(bricks)
     }
 
+    /// The bricks with these [marks](Self::marks).
+    ///
+    /// # Errors
+    /// [`Error::Bricks`] unless there is a mark for each brick, whose sides are multiples of 8.
+    pub fn with_marks(cells: usize, marks: &[f64]) -> Result<Self, Error> {
+        let per_axis = (1..=cells).find(|per_axis| per_axis.pow(D as u32) >= marks.len());
+        let per_axis = per_axis.filter(|per_axis| per_axis.pow(D as u32) == marks.len());
+        // A side of 0 is refused.
+        let side = per_axis.map_or(0, |per_axis| cells / per_axis);
+        let mark = |place| marks[flat(place, cells / side)];
+        Self::new(
+            cells,
+            side,
+            |place| mark(place) == 0.0,
+            |place| mark(place) > 0.0,
+        )
+    }
+
+    /// For every brick of the grid, row-major, 0 if it is active, or the sign of the phase that it is in.
+    pub fn marks(&self) -> Vec<f64> {
+        let mark = |brick: &i32| match *brick {
+            POSITIVE => 1.0,
+            NEGATIVE => -1.0,
+            _ => 0.0,
+        };
+        self.directory.iter().map(mark).collect()
+    }
+
     /// The place of a brick along each axis, from its row-major index among all of the grid.
     pub fn place(&self, flat: usize) -> [usize; D] {
         digits(flat, self.per_axis)

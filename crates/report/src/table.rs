@@ -24,7 +24,7 @@ pub enum Format {
 #[derive(Debug, Clone, PartialEq, From)]
 pub enum Cell {
     /// Text, whatever the format of the column.
-    #[from(&str)]
+    #[from(String, &str)]
     Text(String),
     /// A whole number, shown as it is whatever the format of the column.
     Integer(i64),

@@ -1,5 +1,6 @@
 //! A commit: the state of a computation, and what the run consists of, in one file.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -24,10 +25,13 @@ const BLOCK: usize = 64;
 /// Blocks that are written at a time.
 const PIECE: usize = 1 << 7;
 
+/// A name and values.
+pub type Array<'a> = (String, Cow<'a, [f64]>);
+
 /// What a run goes on from: all that the caller needs, so that the next step has the same bits as
 /// without an interruption.
 #[derive(Debug, Clone, PartialEq)]
-pub struct State {
+pub struct State<'a> {
     /// Number of steps done.
     pub step: u64,
     /// Small things, at most [`State::MAX_NOTES`] bytes. JSON has no NaN and no infinity: what may
@@ -36,10 +40,10 @@ pub struct State {
     /// Text of any length, for what grows with the number of steps.
     pub text: String,
     /// Named arrays, stored bit by bit. Names differ and are not empty.
-    pub arrays: Vec<(String, Vec<f64>)>,
+    pub arrays: Vec<Array<'a>>,
 }
 
-impl State {
+impl<'a> State<'a> {
     /// Longest notes in bytes of JSON: 1 MiB. A reader takes 160 times as much memory at worst (small
     /// maps).
     pub const MAX_NOTES: usize = 1 << 20;
@@ -56,15 +60,15 @@ impl State {
 
     /// Adds an array.
     #[must_use]
-    pub fn with_array(mut self, name: &str, values: Vec<f64>) -> Self {
-        self.arrays.push((name.into(), values));
+    pub fn with_array(mut self, name: &str, values: impl Into<Cow<'a, [f64]>>) -> Self {
+        self.arrays.push((name.into(), values.into()));
         self
     }
 
     /// An array.
     pub fn array(&self, name: &str) -> Option<&[f64]> {
         let found = self.arrays.iter().find(|(other, _)| other == name);
-        found.map(|(_, values)| values.as_slice())
+        found.map(|(_, values)| &**values)
     }
 
     pub(crate) fn refused(&self, reason: &str) -> Error {
@@ -73,8 +77,8 @@ impl State {
     }
 
     /// Whether the two are stored as the same bytes.
-    pub(crate) fn is_same(&self, other: &Self) -> bool {
-        let same = |(a, b): (&(String, Vec<f64>), &(String, Vec<f64>))| {
+    pub(crate) fn is_same(&self, other: &State<'_>) -> bool {
+        let same = |(a, b): (&Array<'_>, &Array<'_>)| {
             let bits = |v: &f64| v.to_bits();
             a.0 == b.0 && a.1.iter().map(bits).eq(b.1.iter().map(bits))
         };
@@ -129,8 +133,8 @@ pub(crate) struct Header {
 }
 
 /// The bytes before text and arrays, once it is certain that they can be read back.
-pub(crate) fn start(state: &State, files: &Files, finished: bool) -> Result<Vec<u8>, Error> {
-    let lengths = |(name, values): &(String, Vec<f64>)| (name.clone(), values.len() as u64);
+pub(crate) fn start(state: &State<'_>, files: &Files, finished: bool) -> Result<Vec<u8>, Error> {
+    let lengths = |(name, values): &Array<'_>| (name.clone(), values.len() as u64);
     let header = Header {
         step: state.step,
         finished,
@@ -163,7 +167,7 @@ pub(crate) fn start(state: &State, files: &Files, finished: bool) -> Result<Vec<
 }
 
 /// Writes a checkpoint, given its [`start`].
-pub(crate) fn write(out: &mut dyn Write, start: &[u8], state: &State) -> io::Result<()> {
+pub(crate) fn write(out: &mut dyn Write, start: &[u8], state: &State<'_>) -> io::Result<()> {
     let mut hash = Sha256::default();
     let mut put = |bytes: &[u8]| {
         hash.update(bytes);
@@ -212,7 +216,7 @@ pub(crate) fn content(folder: &Path, step: u64) -> Result<(Vec<u8>, PathBuf), Er
 
 /// Reads the checkpoint of a step. A length in it is never more than a request: if there are not as
 /// many bytes, it is damaged.
-pub(crate) fn read(folder: &Path, step: u64) -> Result<(Header, State), Error> {
+pub(crate) fn read(folder: &Path, step: u64) -> Result<(Header, State<'static>), Error> {
     let (bytes, path) = content(folder, step)?;
     let damaged = |what: String| Error::damaged(&path, what);
     let mut rest = bytes.as_slice();
@@ -265,7 +269,7 @@ pub(crate) fn read(folder: &Path, step: u64) -> Result<(Header, State), Error> {
             let stored = stored.map(|b| f64::from_le_bytes(std::array::from_fn(|i| b[i])));
             values.extend(stored.cycle().take(count));
         }
-        state.arrays.push((name.clone(), values));
+        state.arrays.push((name.clone(), values.into()));
     }
     if !rest.is_empty() {
         return Err(damaged(format!("it has {} bytes too many", rest.len())));

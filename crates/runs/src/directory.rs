@@ -38,7 +38,7 @@ impl RunDirectory {
     pub fn create(
         path: impl Into<PathBuf>,
         files: &[(&str, &[u8])],
-        state: &State,
+        state: &State<'_>,
     ) -> Result<Self, Error> {
         Self::create_on(Arc::new(Disk), path, files, state)
     }
@@ -48,7 +48,7 @@ impl RunDirectory {
         storage: Arc<dyn Storage>,
         path: impl Into<PathBuf>,
         files: &[(&str, &[u8])],
-        state: &State,
+        state: &State<'_>,
     ) -> Result<Self, Error> {
         let path = path.into();
         // What could not be read back is refused before anything is there.
@@ -143,13 +143,13 @@ impl RunDirectory {
     /// The same state may be committed again, for example on an interruption right after a commit.
     /// After [`Error::Io`] the directory is that of this commit or of the last one, and the run may go
     /// on or be opened again.
-    pub fn commit(&mut self, state: &State) -> Result<(), Error> {
+    pub fn commit(&mut self, state: &State<'_>) -> Result<(), Error> {
         self.commit_as(state, false)
     }
 
     /// Commits the last state, marks the run as finished, and keeps this checkpoint alone.
     /// [`Error::Damaged`] if a [derived](RunDirectory::replace_file) file is missing.
-    pub fn finish(mut self, state: &State) -> Result<(), Error> {
+    pub fn finish(mut self, state: &State<'_>) -> Result<(), Error> {
         for name in self.files.keys().cloned().collect::<Vec<_>>() {
             if let Some(Kind::Derived(_)) = self.files.get(&name) {
                 let seal = self.flushed(&name)?;
@@ -159,7 +159,7 @@ impl RunDirectory {
         self.commit_as(state, true)
     }
 
-    fn commit_as(&mut self, state: &State, finished: bool) -> Result<(), Error> {
+    fn commit_as(&mut self, state: &State<'_>, finished: bool) -> Result<(), Error> {
         let last = self.steps.first().copied();
         let repeats =
             || checkpoint::read(&self.path, state.step).map(|(_, old)| old.is_same(state));

@@ -14,7 +14,7 @@ use crate::{Error, RunDirectory, digest, folder, lock, names, timings};
 #[derive(Debug)]
 pub struct StoredRun {
     run: RunDirectory,
-    state: State,
+    state: State<'static>,
     finished: bool,
     timings: Value,
     /// Whether there is damage, which is to be given up.
@@ -98,7 +98,7 @@ impl StoredRun {
     }
 
     /// The state of the commit.
-    pub fn state(&self) -> &State {
+    pub fn state(&self) -> &State<'static> {
         &self.state
     }
 
@@ -147,7 +147,7 @@ impl StoredRun {
 
     /// Goes on with the run, also with a finished one: removes everything that is not part of the
     /// commit.
-    pub fn resume(mut self) -> Result<(RunDirectory, State), Error> {
+    pub fn resume(mut self) -> Result<(RunDirectory, State<'static>), Error> {
         self.give_up_checkpoints()?;
         self.remove(|_| true)?;
         for kind in self.run.files.values_mut() {
@@ -160,7 +160,11 @@ impl StoredRun {
 
     /// Goes on with a finished run by a commit of `state`, of the same step, after which the files that `ends` names do not belong to the
     /// run any more: they are removed.
-    pub fn reopen(self, state: &State, ends: impl Fn(&str) -> bool) -> Result<RunDirectory, Error> {
+    pub fn reopen(
+        self,
+        state: &State<'_>,
+        ends: impl Fn(&str) -> bool,
+    ) -> Result<RunDirectory, Error> {
         let (mut run, _) = self.resume()?;
         let ended: Vec<String> = run
             .files
@@ -218,7 +222,7 @@ fn commits(folder: &Path) -> Result<Vec<u64>, Error> {
 }
 
 /// Checks everything. Of the steps, those are left whose checkpoints are part of the run.
-fn check(folder: &Path, steps: &mut Vec<u64>) -> Result<((Header, State), Value), Error> {
+fn check(folder: &Path, steps: &mut Vec<u64>) -> Result<((Header, State<'static>), Value), Error> {
     let newest = intact(folder, steps[0])?;
     let kept = checkpoint::kept(newest.0.finished);
     for &older in steps[1..].iter().take(kept - 1) {
@@ -230,7 +234,7 @@ fn check(folder: &Path, steps: &mut Vec<u64>) -> Result<((Header, State), Value)
 }
 
 /// A checkpoint all of whose files are as they were written.
-fn intact(folder: &Path, step: u64) -> Result<(Header, State), Error> {
+fn intact(folder: &Path, step: u64) -> Result<(Header, State<'static>), Error> {
     let (header, state) = checkpoint::read(folder, step)?;
     for (name, kind) in &header.files {
         if let Kind::Written(seal) | Kind::Derived(Some(seal)) = kind {

@@ -45,24 +45,24 @@ pub fn quick_folder() -> TempDir {
     tempfile::tempdir().unwrap()
 }
 
-fn beginning() -> State {
+fn beginning() -> State<'static> {
     let values = (0..CELLS).map(|i| (i as f64 + 0.5) / CELLS as f64);
     State::new(0, json!({ "time": 0.0, "largest": 0.0 }))
-        .with_array("u", values.collect())
-        .with_array("means", Vec::new())
+        .with_array("u", values.collect::<Vec<f64>>())
+        .with_array("means", vec![])
 }
 
 fn step(state: &mut State) {
     state.step += 1;
     let time = state.notes["time"].as_f64().unwrap() + 0.1;
-    let u = &mut state.arrays[0].1;
+    let u = state.arrays[0].1.to_mut();
     for v in u.iter_mut() {
         *v *= 3.9 * (1.0 - *v);
     }
     let mean = u.iter().sum::<f64>() / CELLS as f64;
     let largest = state.notes["largest"].as_f64().unwrap().max(mean);
     state.notes = json!({ "time": time, "largest": largest });
-    state.arrays[1].1.push(mean);
+    state.arrays[1].1.to_mut().push(mean);
 }
 
 fn write_metrics(run: &mut RunDirectory, state: &State) -> Result<(), Error> {
@@ -73,7 +73,7 @@ fn write_metrics(run: &mut RunDirectory, state: &State) -> Result<(), Error> {
     })
 }
 
-pub fn state_at(step_number: u64) -> State {
+pub fn state_at(step_number: u64) -> State<'static> {
     let mut state = beginning();
     while state.step < step_number {
         step(&mut state);

@@ -50,7 +50,7 @@ fn main() -> Fallible<()> {
     // A short step: c = tau / tautilde^2 = 2.
     let step = |energy: &mut MinimizingMovement<2>, start: &Tensor<2>| {
         energy.set(start, 2.0)?;
-        minimize(energy, start, start, None, params, &device).map(|(result, _)| result)
+        minimize(energy, start, start, params, &device).map(|(result, _)| result)
     };
 
     // J(u) = sum of u^2 over the upper half, of the result of a step from an ellipse.

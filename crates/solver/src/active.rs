@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use burn::tensor::Tensor;
 use geometry::{Field, Grid, parallel};
 use model::{BrickOperator, SeparableOperator};
 use operators::{Bricks, ComputeDevice};
@@ -42,7 +41,15 @@ impl<const D: usize> Active<D> {
             grid,
             bricks: Arc::new(none),
         };
-        nothing.following_field(initial)
+        nothing.following_grid(initial.values())
+    }
+
+    /// These bricks.
+    pub(crate) fn at(&self, bricks: Arc<Bricks<D>>) -> Self {
+        Self {
+            bricks,
+            ..self.clone()
+        }
     }
 
     pub(crate) fn grid(&self) -> &Grid<D> {
@@ -63,24 +70,21 @@ impl<const D: usize> Active<D> {
         self.operator.rests()
     }
 
-    /// Those near the interface of a field of the whole grid.
-    pub(crate) fn following_field(&self, field: &Field<D>) -> Result<Self, Error> {
-        let near = self.near(&self.grid, field.values(), REACH);
+    /// Those near the interface of values on the whole grid.
+    pub(crate) fn following_grid(&self, u: &[f64]) -> Result<Self, Error> {
+        let near = self.near(&self.grid, u, REACH);
         let side = self.bricks.side();
         let first = |place: [usize; D]| self.grid.index(place.map(|at| at * side));
         let bricks = Bricks::new(
             self.grid.cells(),
             side,
             |place| near[self.bricks.flat(place)],
-            |place| field.values()[first(place)] > 0.0,
+            |place| u[first(place)] > 0.0,
         )?;
         if bricks.is_empty() {
             return Err(Error::NoInterface);
         }
-        Ok(Self {
-            bricks: Arc::new(bricks),
-            ..self.clone()
-        })
+        Ok(self.at(Arc::new(bricks)))
     }
 
     /// Those near the interface of `u`, if they are others. Where the interface has vanished, all stay.
@@ -118,22 +122,7 @@ impl<const D: usize> Active<D> {
             None => self.bricks.is_positive(place),
         };
         let bricks = Bricks::new(self.grid.cells(), self.bricks.side(), active, positive)?;
-        Ok((bricks != *self.bricks).then(|| Self {
-            bricks: Arc::new(bricks),
-            ..self.clone()
-        }))
-    }
-
-    /// A field on other bricks of the same grid, on these.
-    pub(crate) fn carried(
-        &self,
-        from: &Self,
-        u: &Tensor<D>,
-        device: &ComputeDevice,
-    ) -> Result<Tensor<D>, Error> {
-        let values = device.values(u.clone())?;
-        let carried = (self.bricks).carried(&from.bricks, &values, self.operator.rests());
-        Ok(device.tensor(&carried, self.bricks.shape()))
+        Ok((bricks != *self.bricks).then(|| self.at(Arc::new(bricks))))
     }
 
     /// For every brick of the grid, whether a cell of it is within `reach eps` of one beside a change of sign.

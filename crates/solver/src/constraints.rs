@@ -13,15 +13,15 @@ use std::sync::Arc;
 
 use burn::tensor::Tensor;
 use geometry::zero_set::{SizeHessian, Sizes, least_perimeter, reduced_volume};
-use geometry::{Field, Grid};
+use geometry::{Field, Grid, positive};
 use operators::{ComputeDevice, HostUpdate, HostVectors, inner_product, retract, update_on_host};
 use serde::{Deserialize, Serialize};
 
+use crate::Error;
 use crate::active::Active;
 use crate::cg::{CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
-use crate::error::check_positive;
+use crate::region::Region;
 use crate::stored::Stored;
-use crate::{Error, Region};
 
 /// How exactly targets are met in the end, relative to them, in double precision.
 const TOLERANCE: f64 = 1e-12;
@@ -80,12 +80,12 @@ impl Constraints {
     /// Refuses targets that no set in the periodic box has.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a target that is not positive and finite, [`Error::VolumeTooLarge`] for the volume of the whole box or more,
+    /// [`Error::Geometry`] for a target that is not positive and finite, [`Error::VolumeTooLarge`] for the volume of the whole box or more,
     /// [`Error::PerimeterTooSmall`] for a perimeter below the least that encloses the volume.
     pub fn check<const D: usize>(&self, grid: &Grid<D>) -> Result<(), Error> {
         for (name, target) in NAMES.into_iter().zip(self.targets()) {
             if let Some(value) = target {
-                check_positive(name, value)?;
+                positive(name, value)?;
             }
         }
         let Some(volume) = self.volume else {

@@ -8,7 +8,7 @@ use model::{BrickOperator, MeanCurvatureOperator};
 use operators::ComputeDevice;
 use serde::{Deserialize, Serialize};
 
-use crate::error::{StepFailure, check_positive};
+use crate::error::StepFailure;
 use crate::{Error, HelfrichTerms, PhaseInverse};
 
 /// Precision of the linear solves.
@@ -110,15 +110,9 @@ impl<const D: usize> MeanCurvatureStep<D> for BrickOperator<D> {
 /// `evaluate` sets the point at which `hessian_vector_product` works; `value` leaves it alone.
 pub trait Objective<const D: usize> {
     /// The function.
-    ///
-    /// # Errors
-    /// If the device fails.
     fn value(&mut self, u: &Tensor<D>) -> Result<f64, Error>;
 
     /// The function and its gradient.
-    ///
-    /// # Errors
-    /// If the device fails.
     fn evaluate(&mut self, u: &Tensor<D>) -> Result<(f64, Tensor<D>), Error>;
 
     /// The Hessian at the last evaluated point, applied to `p`.
@@ -173,9 +167,6 @@ impl<const D: usize> MinimizingMovement<D> {
     /// As [`Self::new`], for tensors of any shape that the step takes, such as that of active bricks; with Hessian-vector products in single
     /// precision if asked for and if the step allows it; with factors of the motion if `weighted`; and with spontaneous curvature, tension and
     /// pressure, if there are such.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
     pub fn with_terms(
         step: Arc<dyn MeanCurvatureStep<D>>,
         shape: [usize; D],
@@ -228,9 +219,9 @@ impl<const D: usize> MinimizingMovement<D> {
     /// Sets the anchor and `c = tau / tautilde^2`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] unless `c` is positive and finite.
+    /// [`Error::Geometry`] unless `c` is positive and finite.
     pub fn set(&mut self, anchor: &Tensor<D>, stiffness: f64) -> Result<(), Error> {
-        check_positive("tau / tautilde^2", stiffness)?;
+        geometry::positive("tau / tautilde^2", stiffness)?;
         self.anchor = anchor.clone().into();
         if self.stiffness.to_bits() != stiffness.to_bits() {
             self.stiffness = stiffness;

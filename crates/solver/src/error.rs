@@ -8,7 +8,6 @@ pub type StepFailure = Box<dyn std::error::Error + Send + Sync>;
 /// What can stop a minimization or a flow.
 #[derive(Debug, ThisError)]
 pub enum Error {
-    /// A value became NaN or infinite.
     #[error(
         "step {step}: {field} is not finite; the initial phase field or the step size is unsuitable"
     )]
@@ -17,20 +16,17 @@ pub enum Error {
         step: usize,
         field: &'static str,
     },
-    /// The minimization gave up before its stop test held.
     #[error(
-        "step {step}: the minimization stopped ({reason}) at {estimate:.1e} of the step, above the tolerance {tolerance:.1e}; \
+        "step {step}: the minimization stopped (limit of Newton steps) at {estimate:.1e} of the step, above the tolerance {tolerance:.1e}; \
          use a smaller time step"
     )]
     NotConverged {
         /// Time step, counted from 1.
         step: usize,
-        reason: crate::Exit,
         /// Estimated distance to the minimizer relative to the motion.
         estimate: f64,
         tolerance: f64,
     },
-    /// Perimeter or volume could not be brought to its target in a step.
     #[error(
         "step {step}: the {measure} could not be brought from {value} to {target}; use smaller time steps, or change the target slowly"
     )]
@@ -41,7 +37,6 @@ pub enum Error {
         value: f64,
         target: f64,
     },
-    /// No set of a volume has so small a perimeter.
     #[error(
         "a perimeter of {perimeter} cannot enclose a volume of {volume}: the reduced volume would be {reduced_volume}, above 1; the perimeter \
          has to be at least {least}"
@@ -52,17 +47,8 @@ pub enum Error {
         least: f64,
         reduced_volume: f64,
     },
-    /// A volume that the box does not hold.
     #[error("a volume of {volume} does not fit a box of volume {box_volume}")]
     VolumeTooLarge { volume: f64, box_volume: f64 },
-    /// A parameter out of range.
-    #[error("{name} = {value:e} is out of range: {expected}")]
-    Parameter {
-        name: &'static str,
-        value: f64,
-        expected: &'static str,
-    },
-    /// A region that does not fit the grid.
     #[error(
         "a region of {marked} of {marks} nodes does not fit a grid of {nodes} nodes; mark at least one node, and give a mark for each"
     )]
@@ -71,27 +57,20 @@ pub enum Error {
         nodes: usize,
         marked: usize,
     },
-    /// A phase field without an interface on active bricks, which follow one.
     #[error(
         "there is no interface for active bricks to follow; give a phase field of both signs, or store the whole grid"
     )]
     NoInterface,
-    /// Something that flows on active bricks cannot do.
     #[error("{what} need the whole grid; store that instead of active bricks")]
     NeedsGrid { what: &'static str },
-    /// The step of mean curvature flow failed.
     #[error("the step of mean curvature flow failed: {0}")]
     Step(StepFailure),
-    /// From the network.
     #[error(transparent)]
     Model(#[from] model::Error),
-    /// From the traced energy.
     #[error(transparent)]
     Linearize(#[from] linearize::Error),
-    /// From the device.
     #[error(transparent)]
     Operators(#[from] operators::Error),
-    /// From the phase field.
     #[error(transparent)]
     Geometry(#[from] geometry::Error),
 }
@@ -104,24 +83,4 @@ impl Error {
         }
         self
     }
-}
-
-/// Refuses a parameter that is not as expected.
-pub(crate) fn check(
-    name: &'static str,
-    value: f64,
-    holds: bool,
-    expected: &'static str,
-) -> Result<(), Error> {
-    let error = Error::Parameter {
-        name,
-        value,
-        expected,
-    };
-    holds.then_some(()).ok_or(error)
-}
-
-pub(crate) fn check_positive(name: &'static str, value: f64) -> Result<(), Error> {
-    let holds = value.is_finite() && value > 0.0;
-    check(name, value, holds, "positive and finite")
 }

@@ -4,20 +4,20 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use burn::tensor::Tensor;
-use geometry::{Field, Grid};
+use geometry::{Field, Grid, positive};
 use model::{Factors, MeanCurvatureOperator, Network, Ratios, SeparableOperator};
-use operators::{ComputeDevice, inner_product};
+use operators::{Bricks, ComputeDevice, inner_product};
 use serde::{Deserialize, Serialize};
 
 use crate::active::Active;
 use crate::constraints::{Constraints, Held};
-use crate::error::check_positive;
 use crate::newton::{NewtonInfo, NewtonParams, minimize_timed};
 use crate::preconditioner::{PhaseInverse, Preconditioner};
+use crate::region::Region;
 use crate::stored::Stored;
 use crate::times::PhaseTimes;
 use crate::{
-    Accuracy, Error, Exit, Helfrich, HelfrichTerms, MeanCurvatureStep, MinimizingMovement, Region,
+    Accuracy, Error, Exit, Helfrich, HelfrichTerms, MeanCurvatureStep, MinimizingMovement,
 };
 
 mod bricks;
@@ -57,7 +57,7 @@ impl FlowParams {
             ("calibration.energy", self.calibration.energy),
             ("calibration.metric", self.calibration.metric),
         ] {
-            check_positive(name, value)?;
+            positive(name, value)?;
         }
         Ok(())
     }
@@ -129,12 +129,14 @@ impl StepRecord {
 /// Where a flow is, for resuming it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlowState<const D: usize> {
+    /// The bricks on which the values are, if not on the whole grid.
+    pub bricks: Option<Arc<Bricks<D>>>,
     /// The phase field.
-    pub current: Field<D>,
+    pub current: Vec<f64>,
     /// The phase field one step ago and the size of that step: what the next step extrapolates.
-    pub previous: Option<(Field<D>, f64)>,
+    pub previous: Option<(Vec<f64>, f64)>,
     /// The rate of displacement at the end of the last step, in `atanh u` per time: what second-order steps continue.
-    pub rate: Option<Field<D>>,
+    pub rate: Option<Vec<f64>>,
     /// The last motions on the coarser grids on which steps [begin](WillmoreFlow::begin_on), the finest first.
     pub half_motions: Vec<Field<D>>,
     /// Steps done.
@@ -147,7 +149,8 @@ impl<const D: usize> FlowState<D> {
     /// A flow of which nothing is known but where it is.
     pub fn new(current: Field<D>, step: usize, time: f64) -> Self {
         Self {
-            current,
+            bricks: None,
+            current: current.into_values(),
             previous: None,
             rate: None,
             half_motions: Vec::new(),
@@ -158,30 +161,6 @@ impl<const D: usize> FlowState<D> {
 }
 
 /// Willmore flow of a phase field by minimizing movements (def:minProblem).
-///
-/// ```
-/// use geometry::{Grid, phase_field, shapes::Ball};
-/// use model::Shipped;
-/// use operators::ComputeDevice;
-/// use solver::{Factors, FlowParams, NewtonParams, WillmoreFlow};
-///
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// let device = ComputeDevice::default_compiled()?;
-/// let grid = Grid::<2>::per_unit(128, 1.0)?;
-/// let params = FlowParams {
-///     eps: 2.0 * grid.spacing(),
-///     mcf_step: grid.spacing().powi(2),
-///     newton: NewtonParams::default(),
-///     calibration: Factors::PAPER,
-/// };
-/// let network = Shipped::Paper.find(params.ratios(&grid, 17))?;
-/// let disc = phase_field(grid, &Ball::<2>::new([0.0, 0.0], 0.2)?, params.eps)?;
-/// let mut flow = WillmoreFlow::with_network(&network, &disc, params, &device)?;
-/// let record = flow.advance(params.mcf_step)?;
-/// assert!(record.energy < record.energy_before);
-/// # Ok(())
-/// # }
-/// ```
 pub struct WillmoreFlow<const D: usize> {
     grid: Grid<D>,
     params: FlowParams,
@@ -227,7 +206,7 @@ impl<const D: usize> WillmoreFlow<D> {
     /// A flow whose curvature comes from any step of mean curvature flow of size `params.mcf_step`.
     ///
     /// # Errors
-    /// [`Error::Parameter`], [`Error::NonFinite`], or what tracing the energy raises.
+    /// [`Error::Geometry`] for parameters, [`Error::NonFinite`], or what tracing the energy raises.
     pub fn new(
         step: impl MeanCurvatureStep<D> + 'static,
         initial: &Field<D>,
@@ -267,7 +246,8 @@ impl<const D: usize> WillmoreFlow<D> {
         network.check_fits(params.ratios(grid, network.ratios().width))?;
         let operator = SeparableOperator::new(network, device)?;
         let active = Active::new(operator, initial, params.eps)?;
-        let current = Stored::part_of(initial, Some(active.clone()), active.rests()).tensor(device);
+        let bricks = active.bricks();
+        let current = device.tensor(&bricks.gather(initial.values()), bricks.shape());
         let step = Arc::new(active.step(device));
         Self::begun(step, Some(active), (grid, current), params, device)
     }
@@ -323,9 +303,6 @@ impl<const D: usize> WillmoreFlow<D> {
 
     /// Holds perimeter and volume at these values in all following steps, from the next one on exactly: to a relative `1e-12` in double
     /// precision. A target that is not the present value is reached in the next step, so change it slowly. Nothing is held by default.
-    ///
-    /// # Errors
-    /// As [`Constraints::check`].
     pub fn constrain(&mut self, constraints: Constraints) -> Result<(), Error> {
         constraints.check(&self.grid)?;
         self.constraints = constraints;
@@ -336,7 +313,7 @@ impl<const D: usize> WillmoreFlow<D> {
     /// (1 for an exact one; [`model::Calibration::response`]). The Willmore energies of the records are then this energy.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for values that are not finite, or what tracing the energy raises.
+    /// [`Error::Geometry`] for values that are not finite, or what tracing the energy raises.
     pub fn set_energy(&mut self, energy: Helfrich, response: f64) -> Result<(), Error> {
         self.terms = if energy.is_willmore() {
             None
@@ -377,36 +354,27 @@ impl<const D: usize> WillmoreFlow<D> {
     }
 
     /// The phase field now.
-    ///
-    /// # Errors
-    /// [`Error::Operators`] if the device fails.
     pub fn field(&self) -> Result<Field<D>, Error> {
         self.on_grid(&self.current)
     }
 
-    /// Puts the phase field now in the place of the one before, which stays outside of the region if there is one; the `L2` distance to
-    /// that.
-    ///
-    /// # Errors
-    /// [`Error::Operators`] if the device fails.
-    pub fn replace(&self, field: &mut Field<D>) -> Result<f64, Error> {
-        let marks = self.region.as_ref().map(Region::marks);
-        self.stored(&self.current)?.replace(field, marks)
+    /// The phase field now, as it is stored.
+    pub fn stored_field(&self) -> Result<Stored<D>, Error> {
+        self.stored(&self.current)
     }
 
     /// Everything the following steps depend on: a flow [restored](Self::restore) from it continues with the same bytes.
-    ///
-    /// # Errors
-    /// [`Error::Operators`] if the device fails.
     pub fn state(&self) -> Result<FlowState<D>, Error> {
+        let values = |u: &Tensor<D>| self.device.values(u.clone());
         let previous = match &self.previous {
-            Some((u, tau)) => Some((self.on_grid(u)?, *tau)),
+            Some((u, tau)) => Some((values(u)?, *tau)),
             None => None,
         };
         Ok(FlowState {
-            current: self.field()?,
+            bricks: self.active.as_ref().map(|active| active.bricks().clone()),
+            current: values(&self.current)?,
             previous,
-            rate: self.rate.as_ref().map(Stored::field).transpose()?,
+            rate: self.rate.clone().map(Stored::into_values),
             half_motions: self.half_motions(),
             step: self.step,
             time: self.time,
@@ -416,33 +384,66 @@ impl<const D: usize> WillmoreFlow<D> {
     /// Goes to a state of a flow with the same grid and parameters.
     ///
     /// # Errors
-    /// [`Error::Geometry`] for fields on another grid or with values that are not finite.
+    /// [`Error::Geometry`] for fields on another grid or on other bricks, [`Error::NonFinite`] for values that are not finite.
     pub fn restore(&mut self, state: &FlowState<D>) -> Result<(), Error> {
-        let grid = self.grid;
-        let fitting = |field: &Field<D>| -> Result<Field<D>, Error> {
-            Ok(Field::from_values(grid, field.values().to_vec())?)
-        };
-        let current = fitting(&state.current)?;
-        let previous = match &state.previous {
-            Some((u, tau)) => Some((fitting(u)?, *tau)),
-            None => None,
-        };
-        self.follow_field(&current)?;
-        let current = self.in_storage(&current);
-        let previous = previous.map(|(u, tau)| (self.in_storage(&u), tau));
-        let rate = match &state.rate {
-            Some(rate) => {
-                let rate = fitting(rate)?;
-                Some(Stored::part_of(&rate, self.active.clone(), [0.0; 2]))
-            }
-            None => None,
-        };
+        let previous = state.previous.as_ref();
+        let fields = [
+            Some(&state.current),
+            previous.map(|(u, _)| u),
+            state.rate.as_ref(),
+        ];
+        for values in fields.into_iter().flatten() {
+            self.check_state(state, values)?;
+        }
         self.set_half_motions(&state.half_motions)?;
-        self.rate = rate;
+        if let Some(active) = &self.active {
+            let next = match &state.bricks {
+                Some(bricks) => active.at(bricks.clone()),
+                None => active.following_grid(&state.current)?,
+            };
+            self.go_to(next)?;
+        }
+        // Values on the whole grid, as of a flow that has not been on bricks yet.
+        let whole = self.active.as_ref().filter(|_| state.bricks.is_none());
+        let stored = |values: &Vec<f64>| match whole {
+            Some(active) => active.bricks().gather(values),
+            None => values.clone(),
+        };
+        let dims = self.current.dims();
+        let tensor = |values: &Vec<f64>| self.device.tensor(&stored(values), dims);
+        let rate = (state.rate.as_ref())
+            .map(|rate| Stored::new(stored(rate), self.grid, self.active.clone(), [0.0; 2]));
+        let current = tensor(&state.current);
+        self.previous = previous.map(|(u, tau)| (tensor(u), *tau));
         self.current = current;
-        self.previous = previous;
+        self.rate = rate;
         self.step = state.step;
         self.time = state.time;
+        Ok(())
+    }
+
+    /// Refuses values of a state that this flow cannot go to.
+    fn check_state(&self, state: &FlowState<D>, values: &[f64]) -> Result<(), Error> {
+        let expected = match (&self.active, &state.bricks) {
+            (Some(active), Some(bricks)) => {
+                let [cells, side] = [bricks.cells(), bricks.side()];
+                if [cells, side] != [self.grid.cells(), active.bricks().side()] {
+                    return Err(operators::Error::Bricks { cells, side }.into());
+                }
+                bricks.len()
+            }
+            _ => self.grid.len(),
+        };
+        if values.len() != expected {
+            let actual = values.len();
+            return Err(geometry::Error::ValueCount { expected, actual }.into());
+        }
+        if !values.iter().all(|value| value.is_finite()) {
+            return Err(Error::NonFinite {
+                step: state.step,
+                field: "phase field",
+            });
+        }
         Ok(())
     }
 
@@ -537,10 +538,14 @@ impl<const D: usize> WillmoreFlow<D> {
         if factors.is_some() && self.weighted.is_none() {
             self.weighted = Some(self.traced(true)?);
         }
-        let preconditioner = self.phase.as_ref().map(|(_, phase)| {
-            Preconditioner::two_level(phase.clone(), &self.grid, self.params.eps, tau)
-                .on(self.active.as_ref().map(Active::bricks))
-                .within(self.region.clone())
+        let preconditioner = self.phase.as_ref().map(|(_, phase)| Preconditioner {
+            phase: phase.clone(),
+            grid: self.grid,
+            eps: self.params.eps,
+            tau,
+            bricks: (self.active.as_ref()).map(|active| active.bricks().clone()),
+            region: self.region.clone(),
+            interface: None,
         });
         let (params, device, current) = (self.params.newton, &self.device, &self.current);
         let energy = match (factors, &mut self.weighted) {
@@ -566,7 +571,6 @@ impl<const D: usize> WillmoreFlow<D> {
         if newton.exit == Exit::IterationLimit {
             return Err(Error::NotConverged {
                 step,
-                reason: newton.exit,
                 estimate: newton.estimate,
                 tolerance: self.params.newton.tolerance,
             });
@@ -644,9 +648,6 @@ pub struct MeanCurvatureFlow<const D: usize> {
 
 impl<const D: usize> MeanCurvatureFlow<D> {
     /// A flow with a learned operator, whose ratios must be those of the grid.
-    ///
-    /// # Errors
-    /// As [`WillmoreFlow::with_network`].
     pub fn with_network(
         network: &Network,
         initial: &Field<D>,

@@ -6,7 +6,6 @@ use operators::{ComputeDevice, brick_convolution, circular_convolution};
 use serde::{Deserialize, Serialize};
 
 use crate::active::Active;
-use crate::error::check;
 use crate::{Error, FlowParams};
 
 /// The second derivative by central differences of eighth order: weights of the node and of its neighbours.
@@ -49,7 +48,7 @@ impl Helfrich {
             ("tension", self.tension),
             ("pressure", self.pressure),
         ] {
-            check(name, value, value.is_finite(), "finite")?;
+            geometry::require(name, value, "finite", |_| true)?;
         }
         Ok(())
     }
@@ -140,7 +139,7 @@ impl<const D: usize> HelfrichTerms<D> {
     /// The terms in a flow with these parameters, by a step with this response to curvature.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for values that are not finite.
+    /// [`Error::Geometry`] for values that are not finite.
     pub fn new(
         helfrich: Helfrich,
         response: f64,

@@ -3,18 +3,17 @@
 //! Two methods share the same inputs and outputs. [`Method::Preconditioned`] is the one to use. [`Method::Paper`] is the
 //! plain Newton-CG with Armijo's rule of the paper (alg:hybrid_scheme), kept for comparison.
 
-use std::fmt;
-
 use burn::tensor::Tensor;
+use geometry::require;
 use operators::{ComputeDevice, retract};
 use serde::{Deserialize, Serialize};
 
 use crate::cg::{CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
 use crate::constraints::{Held, Place, Tangent};
-use crate::error::check;
 use crate::preconditioner::Preconditioner;
+use crate::region::Region;
 use crate::times::{PhaseTimes, Stopwatch};
-use crate::{Error, Objective, Precision, Region};
+use crate::{Error, Objective, Precision};
 
 /// Which minimization.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -81,20 +80,20 @@ impl NewtonParams {
     /// Checks the ranges.
     ///
     /// # Errors
-    /// [`Error::Parameter`] naming the first bad one.
+    /// [`Error::Geometry`] naming the first bad one.
     pub fn validate(&self) -> Result<(), Error> {
         for (name, value) in [
             ("tolerance", self.tolerance),
             ("cg_tolerance", self.cg_tolerance),
             ("linear_accuracy", self.linear_accuracy.unwrap_or(0.5)),
         ] {
-            check(name, value, value > 0.0 && value < 1.0, "between 0 and 1")?;
+            require(name, value, "between 0 and 1", |v| v > 0.0 && v < 1.0)?;
         }
         for (name, value) in [
             ("cg_iterations", self.cg_iterations),
             ("newton_iterations", self.newton_iterations),
         ] {
-            check(name, value as f64, value > 0, "at least 1")?;
+            require(name, value as f64, "at least 1", |v| v >= 1.0)?;
         }
         Ok(())
     }
@@ -112,17 +111,6 @@ pub enum Exit {
     Precision,
     /// The limit of Newton steps was reached.
     IterationLimit,
-}
-
-impl fmt::Display for Exit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Converged => "converged",
-            Self::Stationary => "stationary",
-            Self::Precision => "no further decrease at this precision",
-            Self::IterationLimit => "limit of Newton steps",
-        })
-    }
 }
 
 /// What a minimization did.
@@ -197,13 +185,12 @@ struct Minimizer<'a, 'h, const D: usize, O> {
 /// Minimizes `objective`, whose fidelity term is centred at `previous`, from `start`.
 ///
 /// # Errors
-/// [`Error::Parameter`]; [`Error::NonFinite`] (with step 0: the caller knows the number) if the start has no finite energy;
+/// [`Error::Geometry`]; [`Error::NonFinite`] (with step 0: the caller knows the number) if the start has no finite energy;
 /// device errors.
 pub fn minimize<const D: usize>(
     objective: &mut impl Objective<D>,
     previous: &Tensor<D>,
     start: &Tensor<D>,
-    preconditioner: Option<Preconditioner<D>>,
     params: NewtonParams,
     device: &ComputeDevice,
 ) -> Result<(Tensor<D>, NewtonInfo), Error> {
@@ -212,14 +199,14 @@ pub fn minimize<const D: usize>(
         (None, None),
         previous,
         start,
-        preconditioner,
+        None,
         params,
         device,
     )?;
     Ok((u, info))
 }
 
-/// [`minimize`] with the time of its parts, in a region if there is one, and with measures held at targets.
+/// [`minimize`] with a preconditioner and the time of its parts, in a region if there is one, and with measures held at targets.
 pub(crate) fn minimize_timed<const D: usize>(
     objective: &mut impl Objective<D>,
     (region, held): (Option<&Region<D>>, Option<&mut Held<'_, D>>),

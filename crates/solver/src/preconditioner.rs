@@ -7,8 +7,9 @@ use geometry::Grid;
 use model::Smoother;
 use operators::{Bricks, ComputeDevice, SpectralFilter, spectral_filter, update_on_host};
 
+use crate::Error;
 use crate::interface::InterfaceModes;
-use crate::{Error, Region};
+use crate::region::Region;
 
 /// An approximate inverse of the Hessian in the pure phases.
 #[derive(Clone, Debug)]
@@ -36,81 +37,30 @@ impl PhaseInverse {
 
 /// A symmetric positive definite approximation of the inverse Hessian: the exact one in the pure phases, which handles
 /// everything but displacements of the interface, plus a coarse correction for those that follows the interface.
-pub struct Preconditioner<const D: usize> {
-    phase: PhaseInverse,
-    scales: Option<Scales<D>>,
-    interface: Option<Arc<InterfaceModes<D>>>,
-    region: Option<Region<D>>,
-}
-
-/// What the coarse correction needs to know of a step.
-struct Scales<const D: usize> {
-    grid: Grid<D>,
-    eps: f64,
-    tau: f64,
+pub(crate) struct Preconditioner<const D: usize> {
+    pub(crate) phase: PhaseInverse,
+    pub(crate) grid: Grid<D>,
+    pub(crate) eps: f64,
+    pub(crate) tau: f64,
     /// The active bricks, where values are stored on such.
-    bricks: Option<Arc<Bricks<D>>>,
-}
-
-impl<const D: usize> From<SpectralFilter> for Preconditioner<D> {
-    /// The approximation in the pure phases alone.
-    fn from(filter: SpectralFilter) -> Self {
-        Self {
-            phase: filter.into(),
-            scales: None,
-            interface: None,
-            region: None,
-        }
-    }
+    pub(crate) bricks: Option<Arc<Bricks<D>>>,
+    /// Where values may move, if not everywhere: it is projected there from both sides, which keeps it symmetric and positive.
+    pub(crate) region: Option<Region<D>>,
+    /// None before it [follows](Self::follow) the interface.
+    pub(crate) interface: Option<Arc<InterfaceModes<D>>>,
 }
 
 impl<const D: usize> Preconditioner<D> {
-    /// With the coarse correction, for phase fields with interface width `eps` and a step of size `tau`.
-    pub fn two_level(phase: PhaseInverse, grid: &Grid<D>, eps: f64, tau: f64) -> Self {
-        let scales = Scales {
-            grid: *grid,
-            eps,
-            tau,
-            bricks: None,
-        };
-        Self {
-            phase,
-            scales: Some(scales),
-            interface: None,
-            region: None,
-        }
-    }
-
-    /// The same for values on active bricks, if there are such.
-    #[must_use]
-    pub(crate) fn on(mut self, bricks: Option<&Arc<Bricks<D>>>) -> Self {
-        if let Some(scales) = &mut self.scales {
-            scales.bricks = bricks.cloned();
-        }
-        self
-    }
-
-    /// The same for the values in a region, if there is one: projected from both sides, which keeps it symmetric and positive.
-    #[must_use]
-    pub fn within(self, region: Option<Region<D>>) -> Self {
-        Self { region, ..self }
-    }
-
     /// Moves the coarse correction to the interface of `u`.
-    ///
-    /// # Errors
-    /// [`Error::Operators`] if the device fails.
     pub(crate) fn follow(&mut self, u: &Tensor<D>, device: &ComputeDevice) -> Result<(), Error> {
-        if let Some(scales) = &self.scales {
-            let Scales { grid, eps, tau, .. } = scales;
-            let u = device.values(u.clone())?;
-            let region = self.region.as_ref().map(Region::nodes);
-            self.interface = match &scales.bricks {
-                None => InterfaceModes::new(grid, grid, &u, *eps, *tau, region),
-                Some(bricks) => InterfaceModes::new(grid, &**bricks, &u, *eps, *tau, region),
-            }
-            .map(Arc::new);
+        let u = device.values(u.clone())?;
+        let (grid, eps, tau) = (&self.grid, self.eps, self.tau);
+        let region = self.region.as_ref().map(Region::nodes);
+        self.interface = match &self.bricks {
+            None => InterfaceModes::new(grid, grid, &u, eps, tau, region),
+            Some(bricks) => InterfaceModes::new(grid, &**bricks, &u, eps, tau, region),
         }
+        .map(Arc::new);
         Ok(())
     }
 

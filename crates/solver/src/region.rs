@@ -10,7 +10,7 @@ use crate::Error;
 
 /// The grid nodes whose values may change; the others keep theirs, bit for bit.
 #[derive(Clone)]
-pub struct Region<const D: usize> {
+pub(crate) struct Region<const D: usize> {
     /// All nodes of the grid,
     marks: Arc<[bool]>,
     /// and those that are stored.

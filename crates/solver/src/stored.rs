@@ -15,12 +15,19 @@ pub(crate) fn phases<const D: usize>(active: Option<&Active<D>>) -> [f64; 2] {
 
 /// The values of a field on the whole grid, or on active bricks, with the constants that it has outside.
 #[derive(Clone)]
-pub(crate) struct Stored<const D: usize> {
+pub struct Stored<const D: usize> {
     grid: Grid<D>,
     active: Option<Active<D>>,
     values: Vec<f64>,
     /// The values in the negative and in the positive phase where nothing is stored.
     rests: [f64; 2],
+}
+
+impl<const D: usize> From<Field<D>> for Stored<D> {
+    fn from(field: Field<D>) -> Self {
+        let grid = *field.grid();
+        Self::new(field.into_values(), grid, None, phases::<D>(None))
+    }
 }
 
 impl<const D: usize> Stored<D> {
@@ -31,22 +38,19 @@ impl<const D: usize> Stored<D> {
         active: Option<Active<D>>,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
-        Ok(Self {
-            grid,
-            rests: phases(active.as_ref()),
-            active,
-            values: device.values(u.clone())?,
-        })
+        let rests = phases(active.as_ref());
+        Ok(Self::new(device.values(u.clone())?, grid, active, rests))
     }
 
-    /// A field of the whole grid, as far as it is stored; `rests` elsewhere.
-    pub(crate) fn part_of(field: &Field<D>, active: Option<Active<D>>, rests: [f64; 2]) -> Self {
-        let values = match &active {
-            Some(active) => active.bricks().gather(field.values()),
-            None => field.values().to_vec(),
-        };
+    /// Values as they are stored; `rests` elsewhere.
+    pub(crate) fn new(
+        values: Vec<f64>,
+        grid: Grid<D>,
+        active: Option<Active<D>>,
+        rests: [f64; 2],
+    ) -> Self {
         Self {
-            grid: *field.grid(),
+            grid,
             active,
             values,
             rests,
@@ -62,29 +66,12 @@ impl<const D: usize> Stored<D> {
         Ok(Field::from_values(self.grid, values)?)
     }
 
-    /// Puts it in the place of a field of the whole grid, where only the nodes with these marks change; the `L2` distance to that.
-    pub(crate) fn replace(
-        &self,
-        field: &mut Field<D>,
-        marks: Option<&[bool]>,
-    ) -> Result<f64, Error> {
-        let fill = |start: usize, part: &mut [f64]| match &self.active {
+    /// Writes the values of the whole grid for nodes in a row from one on; where it is on bricks, both multiples of their sides.
+    pub fn read(&self, start: usize, part: &mut [f64]) {
+        match &self.active {
             Some(active) => (active.bricks()).read(&self.values, self.rests, start, part),
             None => part.copy_from_slice(&self.values[start..][..part.len()]),
-        };
-        let Some(marks) = marks else {
-            return Ok(field.replace(fill)?);
-        };
-        Ok(field.replace(|start, part| {
-            let before = part.to_vec();
-            fill(start, part);
-            let kept = before.iter().zip(&marks[start..]);
-            for (value, (before, moves)) in part.iter_mut().zip(kept) {
-                if !moves {
-                    *value = *before;
-                }
-            }
-        })?)
+        }
     }
 
     pub(crate) fn into_values(self) -> Vec<f64> {
@@ -201,13 +188,20 @@ mod tests {
         (disc, active)
     }
 
+    fn part_of(field: &Field<2>, active: Active<2>) -> Stored<2> {
+        let values = active.bricks().gather(field.values());
+        let rests = active.rests();
+        Stored::new(values, *field.grid(), Some(active), rests)
+    }
+
     /// Of the same fields on the whole grid the results have the same bits on the bricks.
     #[test]
     fn results_on_bricks_are_those_on_the_grid() {
         let (disc, active) = disc(0.5);
         let (bricks, rests) = (active.bricks().clone(), active.rests());
-        let part = Stored::part_of(&disc, Some(active), rests);
-        let whole = Stored::part_of(&part.field().unwrap(), None, rests);
+        let part = part_of(&disc, active);
+        let whole = part.field().unwrap().into_values();
+        let whole = Stored::new(whole, *disc.grid(), None, rests);
         assert!(part.values.len() < whole.values.len());
         let same = |part: &Stored<2>, whole: &Stored<2>| {
             assert_eq!(part.values, bricks.gather(&whole.values));
@@ -226,12 +220,11 @@ mod tests {
     #[test]
     fn fields_on_fewer_bricks_are_continued_by_their_constants() {
         let ((small, few), (_, many)) = (disc(0.3), disc(0.6));
-        let rests = few.rests();
-        let u = Stored::part_of(&small, Some(few), rests);
+        let u = part_of(&small, few);
         let v = u.on(&many);
         assert!(v.values.len() > u.values.len());
         // Where those bricks are none of its own, the field is nearly constant.
-        let outer = Stored::part_of(&small, Some(many), rests);
+        let outer = part_of(&small, many);
         let difference = outer.zip_map(&v, |a, b| a - b);
         assert!(difference.largest() < 2e-4, "{}", difference.largest());
         // Nothing remains of a difference to itself, whichever of both has more bricks.

@@ -286,12 +286,12 @@ fn a_region_moves_on_bricks_as_on_the_grid() {
         for _ in 0..8 {
             flow.advance(params.mcf_step / 4.0).unwrap();
         }
-        let mut end = start.clone();
-        let moved = flow.replace(&mut end).unwrap();
-        assert!(moved > 1e-3, "{moved:e}");
+        let end = flow.field().unwrap();
+        assert!(l2_distance(&end, &start).unwrap() > 1e-3);
         for (node, _) in inside.iter().enumerate().filter(|(_, moves)| !**moves) {
-            let [now, before] = [&end, &start].map(|u| u.values()[node].to_bits());
-            assert_eq!(now, before, "node {node}");
+            // Up to the values that are not stored.
+            let change = end.values()[node] - start.values()[node];
+            assert!(change.abs() < 2e-5, "node {node}: {change:e}");
         }
         end
     });

@@ -292,7 +292,7 @@ fn targets_that_cannot_be_are_refused() {
     };
     for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let error = refused(&mut flow, Some(value), None);
-        assert!(matches!(error, Error::Parameter { .. }), "{error}");
+        assert!(matches!(error, Error::Geometry(_)), "{error}");
     }
     let error = refused(&mut flow, None, Some(1.0));
     assert!(matches!(error, Error::VolumeTooLarge { .. }), "{error}");

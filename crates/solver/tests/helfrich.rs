@@ -332,6 +332,6 @@ fn what_is_not_finite_is_refused() {
     let mut flow = flow(&u, Helfrich::default());
     for value in [f64::NAN, f64::INFINITY] {
         let error = flow.set_energy(bent(value), 1.0).unwrap_err();
-        assert!(matches!(error, Error::Parameter { .. }), "{error}");
+        assert!(matches!(error, Error::Geometry(_)), "{error}");
     }
 }

@@ -23,7 +23,7 @@ fn solve(
     params: NewtonParams,
 ) -> (Vec<f64>, NewtonInfo) {
     let start = grid_tensor(previous);
-    let (u, info) = minimize(objective, &start, &start, None, params, &device()).unwrap();
+    let (u, info) = minimize(objective, &start, &start, params, &device()).unwrap();
     (values(&u), info)
 }
 
@@ -196,8 +196,7 @@ fn energies_that_are_not_finite_are_reported() {
         let mut energy = Quadratic::random(1.0);
         energy.d[2] = f64::NAN;
         let start = grid_tensor(&[0.0; N]);
-        let error =
-            minimize(&mut energy, &start, &start, None, tight(method), &device()).unwrap_err();
+        let error = minimize(&mut energy, &start, &start, tight(method), &device()).unwrap_err();
         assert!(
             matches!(
                 error,
@@ -246,9 +245,9 @@ fn settings_out_of_range_are_named() {
     for (expected, params) in bad {
         let mut energy = Quadratic::random(1.0);
         let start = grid_tensor(&energy.a);
-        let error = minimize(&mut energy, &start, &start, None, params, &device()).unwrap_err();
+        let error = minimize(&mut energy, &start, &start, params, &device()).unwrap_err();
         assert!(
-            matches!(error, Error::Parameter { name, .. } if name == expected),
+            matches!(error, Error::Geometry(geometry::Error::InvalidParameter { name, .. }) if name == expected),
             "{error}"
         );
     }

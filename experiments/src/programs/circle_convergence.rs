@@ -83,7 +83,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
     report.data(&session)?;
     session.sheet(report.sheet(), "errors")?;
     for flow in Flow::ALL {
-        session.metric(&format!("{}.scale", flow.key()), report.scale(flow))?;
+        session.metric(&format!("{flow}.scale"), report.scale(flow))?;
     }
     remove_folder(&session.output.subfolder(FINISHED)?)?;
     session.finish("Mean L2 distance to the exact solution")
@@ -210,7 +210,7 @@ impl Report {
     fn data(&self, session: &Session<'_>) -> Result<(), Error> {
         let times = (self.ensembles.iter()).flat_map(|e| (0..=self.steps).map(move |k| (e, k)));
         let times: Vec<(&Ensemble, usize)> = times.collect();
-        let curves = Sheet::of(&times).data("flow", |(e, _)| e.variant.flow.key());
+        let curves = Sheet::of(&times).data("flow", |(e, _)| e.variant.flow.to_string());
         let curves = Variant::columns(curves, |(e, _)| e.variant)
             .data("step", |(_, k)| *k)
             .data("time", |(_, k)| time(*k))
@@ -227,7 +227,7 @@ impl Report {
                 }
             }
         }
-        let sheet = Sheet::of(&circles).data("flow", |(e, ..)| e.variant.flow.key());
+        let sheet = Sheet::of(&circles).data("flow", |(e, ..)| e.variant.flow.to_string());
         let sheet = Variant::columns(sheet, |(e, ..)| e.variant)
             .data("radius", |(_, circle, _)| circle.radius)
             .data("step", |(.., k)| *k)

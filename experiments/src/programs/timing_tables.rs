@@ -169,7 +169,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
     session.sheet(table, "timing")?;
     session.remark(run.title("One Willmore step of a surface"));
     let steps = Sheet::of(&steps)
-        .keyed(|(method, ..), name| format!("timing.armadillo.{}.{name}", method.key()))
+        .keyed(|(method, ..), name| format!("timing.armadillo.{method}.{name}"))
         .text("surface", |_| &surface)
         .text("method", |(method, ..)| method.label())
         .column("n", Shortest, |_| n)

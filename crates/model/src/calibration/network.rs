@@ -3,6 +3,7 @@
 use faer::{Col, Mat};
 
 use super::{POSITIONS, PlanarStep, calibrate, normals, planar};
+use crate::ratios::offsets;
 use crate::{Calibration, Error, Mlp, Network};
 
 /// `V` for functions of `a . x` with an integer normal `a`: the kernel is summed over the planes `a . b = m`.
@@ -26,14 +27,9 @@ impl<'a> NetworkOnPlanes<'a> {
         let reach = middle * normal.iter().map(|a| a.abs()).sum::<isize>();
         let mut kernel = vec![0.0; 2 * reach as usize + 1];
         let mut moments = kernel.clone();
-        for (i, value) in network.kernel().iter().enumerate() {
-            let (mut index, mut plane, mut length) = (i, 0, 0);
-            for axis in (0..dimension).rev() {
-                let offset = (index % width).cast_signed() - middle;
-                index /= width;
-                plane += normal[axis] * offset;
-                length += offset * offset;
-            }
+        for (offset, value) in offsets(dimension, width).zip(network.kernel()) {
+            let plane: isize = offset.iter().zip(normal).map(|(b, axis)| axis * b).sum();
+            let length: isize = offset.iter().map(|b| b * b).sum();
             let tangential = length as f64 - (plane * plane) as f64 / square;
             kernel[(plane + reach) as usize] += value;
             moments[(plane + reach) as usize] += 0.5 * value * tangential / (dimension - 1) as f64;
@@ -123,9 +119,6 @@ impl Network {
     /// Eigenvalues of `J`, the derivative of the operator at its flat interface normal to an axis, largest real part first. The
     /// first belongs to translations and is 1, the second says how fast disturbed profiles recover, and the rest are between
     /// the transfer function's values in the pure phases.
-    ///
-    /// # Errors
-    /// As [`Self::calibrate`].
     pub fn flat_spectrum(&self) -> Result<Vec<[f64; 2]>, Error> {
         let (normal, _) = normals(self.ratios().dimension)[0];
         planar::spectrum(&NetworkOnPlanes::new(self, normal), POSITIONS[0])

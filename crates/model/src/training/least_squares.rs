@@ -23,6 +23,7 @@ use super::distillation::{Distillation, distill_odd};
 use super::levenberg_marquardt::heat_kernel;
 use super::spheres::{BAND, direction, norm};
 use super::{Observer, Recipe, SphereData};
+use crate::ratios::offsets;
 use crate::{Error, Mlp, Ratios};
 
 /// Settings of the accurate recipe.
@@ -275,19 +276,10 @@ pub fn fit(
 
 /// The kernel's entries with their offsets as lengths.
 fn with_offsets(data: &SphereData, kernel: &[f64]) -> Vec<(Vec<f64>, f64)> {
-    let (dimension, width, h) = (data.ratios.dimension, data.ratios.width, data.spacing());
-    let middle = (width / 2) as f64;
-    (kernel.iter().enumerate())
-        .map(|(mut i, &weight)| {
-            let offset = (0..dimension)
-                .map(|_| {
-                    let b = (i % width) as f64 - middle;
-                    i /= width;
-                    b * h
-                })
-                .collect();
-            (offset, weight)
-        })
+    let (ratios, h) = (data.ratios, data.spacing());
+    (offsets(ratios.dimension, ratios.width).zip(kernel))
+        // The fastest axis first.
+        .map(|(offset, &weight)| (offset.iter().rev().map(|&b| b as f64 * h).collect(), weight))
         .collect()
 }
 

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{BandSamples, Observer, Orbits, Progress, Recipe, SphereData};
 use crate::mlp::{forward, forward_with, layout, parameter_count};
+use crate::ratios::offsets;
 use crate::{Error, Mlp, PAPER_LAYERS};
 
 /// Rows of the Jacobian assembled at once.
@@ -332,10 +333,7 @@ impl<'a> Problem<'a> {
 /// The heat kernel of variance `2 tautilde` per axis, sampled and normalised: the kernel of the splitting scheme.
 pub fn heat_kernel(data: &SphereData) -> Vec<f64> {
     let ratios = data.ratios;
-    let orbits = Orbits::new(ratios.dimension, ratios.width);
-    let mut kernel: Vec<f64> = orbits
-        .offsets()
-        .iter()
+    let mut kernel: Vec<f64> = offsets(ratios.dimension, ratios.width)
         .map(|b| {
             let squared: f64 = b.iter().map(|&b| (b * b) as f64).sum();
             (-squared / (4.0 * ratios.step_over_h2)).exp()
@@ -364,9 +362,6 @@ pub fn splitting_activation(step_over_eps2: f64, w: f64) -> f64 {
 const START_RANGE: f64 = 1.4;
 
 /// Fits perceptrons from several random starts to the splitting scheme's activation and returns the best.
-///
-/// # Errors
-/// [`Error::Operators`] if the device fails.
 pub fn splitting_start(
     step_over_eps2: f64,
     params: &LmParams,

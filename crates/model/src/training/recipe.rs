@@ -96,9 +96,6 @@ impl Trained {
 
 impl<R: Recipe> Training<'_, R> {
     /// Trains on from a checkpoint, keeps it up to date, and measures the result.
-    ///
-    /// # Errors
-    /// As [`Recipe::train`] and [`Quality::measure`], and whatever the observer raises.
     pub fn run(
         &self,
         checkpoint: &mut Checkpoint<R::State>,

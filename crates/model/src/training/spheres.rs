@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::Orbits;
+use crate::ratios::offsets;
 use crate::{Error, Ratios};
 
 /// The paper's data: radii uniform in `[r_min, r_max]` on the unit cube, at the grid the ratios were chosen for.
@@ -47,9 +48,6 @@ impl SphereData {
     }
 
     /// Checks the settings after a change.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
     pub fn validate(&self) -> Result<(), Error> {
         self.ratios.validate()?;
         let [low, high] = self.radii;
@@ -169,9 +167,7 @@ impl BandSamples {
             outside += (1.0 - ball_volume(dimension, high)).max(0.0);
         }
         let count = radii.len() as f64;
-        let offsets: Vec<Vec<f64>> = orbits
-            .offsets()
-            .into_iter()
+        let offsets: Vec<Vec<f64>> = offsets(dimension, data.ratios.width)
             .map(|b| b.into_iter().map(|b| b as f64 * data.spacing()).collect())
             .collect();
         let n = orbits.count();

@@ -3,11 +3,11 @@
 //! The dihedral group in 2D and the octahedral group in 3D leave 45, 153 and 561 free values of a kernel of width 17,
 //! 33 and 65 in 2D, and 165 of one of width 17 in 3D.
 
+use crate::ratios::offsets;
+
 /// The orbits of kernel entries under the hyperoctahedral group.
 #[derive(Clone, Debug)]
 pub struct Orbits {
-    dimension: usize,
-    width: usize,
     /// Orbit of each kernel entry.
     index: Vec<usize>,
     /// Entries per orbit.
@@ -17,18 +17,13 @@ pub struct Orbits {
 impl Orbits {
     /// Orbits of a `width^dimension` kernel.
     pub fn new(dimension: usize, width: usize) -> Self {
-        let mut keys: Vec<Vec<usize>> = Vec::new();
         let mut sizes = Vec::new();
         let mut seen = std::collections::HashMap::new();
-        let index = (0..width.pow(dimension as u32))
-            .map(|i| {
-                let mut key: Vec<usize> = offsets(i, width, dimension)
-                    .into_iter()
-                    .map(isize::unsigned_abs)
-                    .collect();
+        let index = offsets(dimension, width)
+            .map(|offset| {
+                let mut key: Vec<usize> = offset.into_iter().map(isize::unsigned_abs).collect();
                 key.sort_unstable();
-                let orbit = *seen.entry(key.clone()).or_insert_with(|| {
-                    keys.push(key);
+                let orbit = *seen.entry(key).or_insert_with(|| {
                     sizes.push(0);
                     sizes.len() - 1
                 });
@@ -36,12 +31,7 @@ impl Orbits {
                 orbit
             })
             .collect();
-        Self {
-            dimension,
-            width,
-            index,
-            sizes,
-        }
+        Self { index, sizes }
     }
 
     /// Number of orbits.
@@ -75,22 +65,6 @@ impl Orbits {
             .map(|(sum, &size)| sum / size as f64)
             .collect()
     }
-
-    /// Offset from the centre of every kernel entry, in cells.
-    pub fn offsets(&self) -> Vec<Vec<isize>> {
-        (0..self.index.len())
-            .map(|i| offsets(i, self.width, self.dimension))
-            .collect()
-    }
-}
-
-fn offsets(mut i: usize, width: usize, dimension: usize) -> Vec<isize> {
-    let mut result = vec![0; dimension];
-    for offset in result.iter_mut().rev() {
-        *offset = (i % width) as isize - (width / 2) as isize;
-        i /= width;
-    }
-    result
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use geometry::Field;
 use super::{Minimum, Movement, WillmoreFlow};
 use crate::Error;
 use crate::active::Active;
-use crate::stored::{Stored, phases};
+use crate::stored::Stored;
 
 impl<const D: usize> WillmoreFlow<D> {
     /// Minimizes the energy of a movement from the present phase field. If the interface comes near the edge of the active bricks, these are
@@ -17,7 +17,10 @@ impl<const D: usize> WillmoreFlow<D> {
         let mut minimum = self.minimize_here(movement)?;
         let (mut anchor, mut factors) = (movement.anchor.clone(), movement.factors.cloned());
         while let Some((from, to)) = self.enlarge(&minimum.u)? {
-            let carried = |x: &Tensor<D>| to.carried(&from, x, &self.device);
+            let carried = |x: &Tensor<D>| -> Result<Tensor<D>, Error> {
+                let before = Stored::of(x, self.grid, Some(from.clone()), &self.device)?;
+                Ok(before.on(&to).tensor(&self.device))
+            };
             let start = carried(&minimum.u)?;
             anchor = carried(&anchor)?;
             // Where nothing moves, factors of the motion are near 1 or, which is the same, near -1.
@@ -46,15 +49,6 @@ impl<const D: usize> WillmoreFlow<D> {
         next.map_or(Ok(()), |next| self.go_to(next).map(|_| ()))
     }
 
-    /// Goes to the bricks near the interface of a field of the whole grid, with nothing but that field to be kept.
-    pub(super) fn follow_field(&mut self, field: &Field<D>) -> Result<(), Error> {
-        let Some(active) = &self.active else {
-            return Ok(());
-        };
-        let next = active.following_field(field)?;
-        self.go_to(next).map(|_| ())
-    }
-
     /// Makes the bricks more if the interface of `u` has come near their edge; those before and after.
     fn enlarge(&mut self, u: &Tensor<D>) -> Result<Option<(Active<D>, Active<D>)>, Error> {
         let Some(active) = &self.active else {
@@ -67,9 +61,11 @@ impl<const D: usize> WillmoreFlow<D> {
     }
 
     /// Carries everything over to other bricks; those before.
-    fn go_to(&mut self, next: Active<D>) -> Result<Active<D>, Error> {
+    pub(super) fn go_to(&mut self, next: Active<D>) -> Result<Active<D>, Error> {
         let before = self.active.clone().unwrap_or_else(|| next.clone());
-        let carried = |u: &Tensor<D>| next.carried(&before, u, &self.device);
+        let carried = |u: &Tensor<D>| -> Result<Tensor<D>, Error> {
+            Ok(self.stored(u)?.on(&next).tensor(&self.device))
+        };
         let current = carried(&self.current)?;
         let previous = match &self.previous {
             Some((u, tau)) => Some((carried(u)?, *tau)),
@@ -93,13 +89,6 @@ impl<const D: usize> WillmoreFlow<D> {
     /// A phase field that is stored as the present one is, for arithmetic.
     pub(super) fn stored(&self, u: &Tensor<D>) -> Result<Stored<D>, Error> {
         Stored::of(u, self.grid, self.active.clone(), &self.device)
-    }
-
-    /// What is stored of a phase field of the whole grid.
-    pub(super) fn in_storage(&self, field: &Field<D>) -> Tensor<D> {
-        let active = self.active.clone();
-        let rests = phases(active.as_ref());
-        Stored::part_of(field, active, rests).tensor(&self.device)
     }
 
     /// The field of the whole grid of which `u` is stored.

@@ -1,14 +1,13 @@
 //! Where the minimization of a time step begins.
 
 use burn::tensor::{Slice, Tensor};
-use geometry::{Field, Grid};
+use geometry::{Field, Grid, require};
 use model::{Factors, Network, Ratios, Shipped};
 use operators::extrapolate;
 use serde::{Deserialize, Serialize};
 
 use super::{WillmoreFlow, download};
 use crate::Error;
-use crate::error::check;
 
 /// The origin of a start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -40,7 +39,7 @@ impl<const D: usize> WillmoreFlow<D> {
     /// `half` may itself begin on its half grid. Its state does not matter: it is set anew in every step.
     ///
     /// # Errors
-    /// [`Error::Geometry`] if its grid is not the half of this one; [`Error::Parameter`] for another `eps` or `tautilde`.
+    /// [`Error::Geometry`] if its grid is not the half of this one, or for another `eps` or `tautilde`.
     pub fn begin_on(&mut self, mut half: Self) -> Result<(), Error> {
         self.needs_grid("starts on half grids")?;
         half.needs_grid("starts on half grids")?;
@@ -55,8 +54,10 @@ impl<const D: usize> WillmoreFlow<D> {
                 half.params.mcf_step,
             ),
         ] {
-            let same = own.to_bits() == other.to_bits();
-            check(name, other, same, "that of the flow, which begins there")?;
+            let expected = "that of the flow, which begins there";
+            require(name, other, expected, |other| {
+                other.to_bits() == own.to_bits()
+            })?;
         }
         if let Some(region) = &self.region {
             half.restrict_to(&every_other_node(self.grid, region.marks()))?;
@@ -69,9 +70,6 @@ impl<const D: usize> WillmoreFlow<D> {
     /// recipe if the network is one of them (or its odd part) or the energy is the paper's, else those of the accurate recipe: the relaxed
     /// profiles of one recipe are alike on all grids. Says how many grids there are below this one; none for an odd number of cells,
     /// without networks, or on active bricks.
-    ///
-    /// # Errors
-    /// What building the flows raises.
     pub fn begin_on_half_grids(&mut self, network: &Network) -> Result<usize, Error> {
         /// Below this many cells per `eps` the motion is too far off to be of use.
         const COARSEST: f64 = 2.0;
