@@ -4,7 +4,7 @@ use burn_backend::{
     Backend, DType, Element, Shape, TensorData, TensorMetadata, tensor::FloatTensor,
 };
 
-use crate::brick_convolution::{self, Ghosts};
+use crate::brick_convolution;
 use crate::convolution::{convolve, correlate};
 use crate::fft::{Real, Transform};
 use crate::filter::SpectralFilter;
@@ -99,7 +99,7 @@ impl<B: Host> GridOps for B {
         let [x, taps, neighbours] = [x, taps, neighbours].map(B::lender);
         in_precision!(dtype, T => {
             let (x, taps, neighbours) = (B::values::<T>(&x), B::values(&taps), B::values(&neighbours));
-            let y = brick_convolution::convolve(x, bricks, neighbours, taps, adjoint, Ghosts::Zero);
+            let y = brick_convolution::convolve(x, bricks, neighbours, taps, adjoint, [0.0; 2]);
             B::tensor(y, shape)
         })
     }
