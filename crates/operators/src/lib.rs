@@ -75,7 +75,7 @@ pub use device::{ComputeDevice, DeviceKind};
 pub use error::Error;
 pub use fft::{Real, Transform};
 pub use filter::SpectralFilter;
-pub use ops::GridOps;
+pub use ops::{GridOps, Operation};
 pub use rules::extensions;
 pub use table::{COEFFICIENTS, HermiteTable, TableRange};
 pub use tensor::{brick_convolution, circular_convolution, kernel_correlation, tabulated};
