@@ -61,7 +61,6 @@ mod filter;
 #[macro_use]
 mod host;
 mod lanes;
-mod open;
 mod ops;
 mod profile;
 mod rules;
