@@ -118,7 +118,7 @@ pub(crate) fn circular_convolution<const R: usize, const K: usize>(
     inverse(product, K)
 }
 
-/// See [`crate::kernel_correlation`].
+/// See [`crate::Operation::Correlation`].
 pub(crate) fn kernel_correlation<const R: usize, const K: usize>(
     x: Tensor<R>,
     g: Tensor<R>,
@@ -299,9 +299,12 @@ mod tests {
                 crate::circular_convolution(x.clone(), kernel.clone(), adjoint),
             );
         }
+        let leaf = kernel.autodiff().require_grad();
+        let y = crate::circular_convolution(x.clone().autodiff(), leaf.clone(), false);
+        let gradients = (y * g.clone().autodiff()).sum().backward();
         assert_close(
-            kernel_correlation::<3, 2>(x.clone(), g.clone(), 5),
-            crate::kernel_correlation(x, g, 5),
+            kernel_correlation::<3, 2>(x, g, 5),
+            leaf.grad(&gradients).unwrap(),
         );
 
         let volume = device.tensor::<3>(&wave(6 * 7 * 8, 0.41), [6, 7, 8]);

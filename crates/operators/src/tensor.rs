@@ -23,16 +23,6 @@ pub fn circular_convolution<const R: usize, const K: usize>(
     grid(Operation::Convolution(x, kernel, adjoint))
 }
 
-/// `c_b = sum_a g_a x_{a+b}` for all offsets `b` of a kernel of the given width, summed over batch axes.
-pub fn kernel_correlation<const R: usize, const K: usize>(
-    x: Tensor<R>,
-    g: Tensor<R>,
-    width: usize,
-) -> Tensor<K> {
-    let (x, g) = (x.into_dispatch(), g.into_dispatch());
-    grid(Operation::Correlation(x, g, width, K))
-}
-
 /// `y_a = sum_{b,..,c} t_b .. t_c x_{a+(b,..,c)}` on active [`crate::Bricks`], as one pass along each axis, the last one first; every pass
 /// takes what is not active as zero. The transpose of that if `adjoint`: the passes in the opposite order with mirrored taps.
 ///
