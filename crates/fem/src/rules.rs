@@ -103,10 +103,10 @@ pub fn extensions() -> Extensions {
         .rule(IMPLICIT, implicit_step)
         .rule(LINEARIZED, linearized_solve);
     #[cfg(feature = "flex")]
-    extensions.on_flex(register);
+    register(&mut extensions.flex);
     #[cfg(feature = "ndarray")]
-    extensions.on_ndarray(register);
+    register(&mut extensions.ndarray);
     #[cfg(any(feature = "wgpu", feature = "cuda"))]
-    extensions.on_cube(register);
+    register(&mut extensions.cube);
     extensions
 }

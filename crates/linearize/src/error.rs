@@ -19,8 +19,8 @@ pub enum Error {
     Rule { operation: String, reason: String },
     /// A program contains a custom operation that the backend has no handler for.
     #[error(
-        "no handler for custom operation `{operation}` on {backend}: register one with \
-         `Extensions::on_{backend}`"
+        "no handler for custom operation `{operation}` on {backend}: register one in \
+         `Extensions::{backend}`"
     )]
     NoHandler {
         operation: String,

@@ -148,18 +148,16 @@ fn rules() -> Extensions {
 }
 
 fn handlers(extensions: &mut Extensions) {
-    extensions.on_flex(|registry| {
-        registry.register("blur", |handles, operation, _| {
-            let x = handles.get_float_tensor::<Flex>(&operation.inputs[0]);
-            let adjoint = operation.scalars[0] == ScalarIr::Bool(true);
-            let y = Flex::blur(x, adjoint);
-            handles.register_float_tensor::<Flex>(&operation.outputs[0].id, y);
-        });
-        registry.register("wave", |handles, operation, _| {
-            let x = handles.get_float_tensor::<Flex>(&operation.inputs[0]);
-            let y = Flex::wave(x, operation.scalars[0].elem());
-            handles.register_float_tensor::<Flex>(&operation.outputs[0].id, y);
-        });
+    (extensions.flex).register("blur", |handles, operation, _| {
+        let x = handles.get_float_tensor::<Flex>(&operation.inputs[0]);
+        let adjoint = operation.scalars[0] == ScalarIr::Bool(true);
+        let y = Flex::blur(x, adjoint);
+        handles.register_float_tensor::<Flex>(&operation.outputs[0].id, y);
+    });
+    (extensions.flex).register("wave", |handles, operation, _| {
+        let x = handles.get_float_tensor::<Flex>(&operation.inputs[0]);
+        let y = Flex::wave(x, operation.scalars[0].elem());
+        handles.register_float_tensor::<Flex>(&operation.outputs[0].id, y);
     });
 }
 

@@ -52,16 +52,16 @@ pub fn extensions() -> Extensions {
         .rule(BRICKS, multilinear)
         .rule(TABULATED, of_table);
     #[cfg(feature = "flex")]
-    extensions.on_flex(|registry| {
-        register(registry);
-        crate::host::flex::register_elementwise(registry);
-    });
+    {
+        register(&mut extensions.flex);
+        crate::host::flex::register_elementwise(&mut extensions.flex);
+    }
     #[cfg(feature = "ndarray")]
-    extensions.on_ndarray(|registry| {
-        register(registry);
-        crate::host::ndarray::register_elementwise(registry);
-    });
+    {
+        register(&mut extensions.ndarray);
+        crate::host::ndarray::register_elementwise(&mut extensions.ndarray);
+    }
     #[cfg(any(feature = "wgpu", feature = "cuda"))]
-    extensions.on_cube(register);
+    register(&mut extensions.cube);
     extensions
 }
