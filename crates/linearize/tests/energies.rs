@@ -163,7 +163,7 @@ fn squares_simplify_alike_and_scalars_are_not_spread() {
                 proximal + i.parameter::<1>(1) * square(flat).sum() * 0.5
             })
             .unwrap();
-            graph.linearize(&Extensions::new()).unwrap()
+            graph.linearize(&Extensions::new(), None).unwrap()
         });
         assert_eq!(programs[0].statistics(), programs[1].statistics());
         let statistics = programs[0].statistics();

@@ -185,7 +185,7 @@ fn against_duals<const D: usize>(shape: [usize; D]) {
     let device = u.device();
     let mut extensions = rules();
     handlers(&mut extensions);
-    let program = graph.linearize(&extensions).unwrap();
+    let program = graph.linearize(&extensions, None).unwrap();
     let mut lin = program.on(&device, &extensions).unwrap();
     let parameters = [Value::from(&f), Value::from(&c)];
     lin.at(&[(&u).into()], &parameters).unwrap();
@@ -223,7 +223,7 @@ fn custom_operations_differentiate_in_2d_and_3d() {
 #[test]
 fn the_tangent_program_is_two_transforms_and_a_few_passes() {
     let (_, _, _, graph) = problem([6, 5]);
-    let program = graph.linearize(&rules()).unwrap();
+    let program = graph.linearize(&rules(), None).unwrap();
     let statistics = program.statistics();
     let total: usize = statistics.tangent.values().sum();
     assert_eq!(statistics.tangent["blur"], 2);
@@ -239,12 +239,12 @@ fn the_tangent_program_is_two_transforms_and_a_few_passes() {
 #[test]
 fn missing_rules_and_handlers_name_the_operation() {
     let (u, _, _, graph) = problem([6, 5]);
-    let error = graph.linearize(&Extensions::new()).unwrap_err();
+    let error = graph.linearize(&Extensions::new(), None).unwrap_err();
     assert!(
         matches!(&error, Error::NoRule { operation } if operation == "blur"),
         "{error}"
     );
-    let program = graph.linearize(&rules()).unwrap();
+    let program = graph.linearize(&rules(), None).unwrap();
     let error = program.on(&u.device(), &rules()).err().unwrap();
     assert!(
         matches!(&error, Error::NoHandler { operation, backend: "flex" }
@@ -261,7 +261,7 @@ fn wrong_rules_are_refused() {
         "blur",
         |_: &CustomOpIr, _: &[Option<TensorIr>], _: &mut Builder| Ok(vec![]),
     );
-    let error = graph.linearize(&extensions).unwrap_err();
+    let error = graph.linearize(&extensions, None).unwrap_err();
     assert!(
         matches!(&error, Error::Rule { operation, .. } if operation == "blur"),
         "{error}"
@@ -299,7 +299,7 @@ fn rules_combine_tangents() {
         },
     );
     let mut lin = graph
-        .linearize(&extensions)
+        .linearize(&extensions, None)
         .unwrap()
         .on(&device, &extensions)
         .unwrap();

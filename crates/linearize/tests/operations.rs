@@ -480,7 +480,7 @@ fn jacobian_vector_products_of_traced_functions() {
                 Graph::trace(&[(&u).into()], &[], |i| vec![map(i.variable(0)).into()]).unwrap();
             let extensions = Extensions::new();
             let program = graph
-                .linearize(&extensions)
+                .linearize(&extensions, None)
                 .unwrap_or_else(|e| panic!("{name}: {e}"));
             let mut lin = program.on(&device, &extensions).unwrap();
             let at = lin.at(&[(&u).into()], &[]).unwrap();

@@ -97,7 +97,7 @@ fn same_input_same_bytes() {
         assert_eq!(run(), run());
         let program = || {
             graph(&u, &u, &c)
-                .linearize(&Extensions::new())
+                .linearize(&Extensions::new(), None)
                 .unwrap()
                 .to_string()
         };
@@ -249,7 +249,10 @@ fn a_missing_rule_names_the_operation() {
         let graph = Graph::trace(&[(&u).into()], &[], |i| {
             vec![i.variable::<2>(0).prod().into()]
         });
-        let error = graph.unwrap().linearize(&Extensions::new()).unwrap_err();
+        let error = graph
+            .unwrap()
+            .linearize(&Extensions::new(), None)
+            .unwrap_err();
         assert!(
             matches!(&error, Error::NoRule { operation } if operation == "Prod"),
             "{error}"
@@ -258,7 +261,7 @@ fn a_missing_rule_names_the_operation() {
         // Without a tangent through it, it passes.
         trace(Tensor::prod)
             .unwrap()
-            .linearize(&Extensions::new())
+            .linearize(&Extensions::new(), None)
             .unwrap();
     }
 }
@@ -346,7 +349,9 @@ fn products_in_single_precision() {
         let c: Tensor<1> = random(&device, [1], 3, 0.5, 1.0);
         let p: Tensor<2> = random(&device, [16, 16], 4, -1.0, 1.0);
         let graph = graph(&u, &f, &c);
-        let program = graph.linearize_in(&Extensions::new(), DType::F32).unwrap();
+        let program = graph
+            .linearize(&Extensions::new(), Some(DType::F32))
+            .unwrap();
         let mut mixed = program.on(&device, &Extensions::new()).unwrap();
         let mut double = linearization(&graph, &device);
         for scale in [1.0, 0.5] {

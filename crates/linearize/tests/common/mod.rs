@@ -92,7 +92,7 @@ pub fn distance(a: &[f64], b: &[f64]) -> f64 {
 
 pub fn linearization(graph: &Graph, device: &Device) -> Linearization {
     let extensions = Extensions::new();
-    let program = graph.linearize(&extensions).unwrap();
+    let program = graph.linearize(&extensions, None).unwrap();
     program.on(device, &extensions).unwrap()
 }
 
@@ -124,7 +124,7 @@ pub fn check<const D: usize>(name: &str, u: &Tensor<D>, energy: impl Fn(Tensor<D
         .unwrap_or_else(|e| panic!("{name}: {e}"));
     let extensions = Extensions::new();
     let program = graph
-        .linearize(&extensions)
+        .linearize(&extensions, None)
         .unwrap_or_else(|e| panic!("{name}: {e}\n{graph}"));
     let mut linearization = program.on(&device, &extensions).unwrap();
 
