@@ -70,7 +70,7 @@
 //! [`Graph::linearize`] shares common subexpressions, removes products with ones and sums with zeros,
 //! and never spreads a number over a grid. Tangents stay sums of *coefficient times tangent* as long as
 //! operations are elementwise, so that pointwise second derivatives merge into one coefficient that is
-//! computed once per point. [`Program`] prints what is left. Last uses are known, so backends compute
+//! computed once per point. [`Program::statistics`] counts what is left. Last uses are known, so backends compute
 //! in place, and between [`at`](Linearization::at) and [`apply`](Linearization::apply) only what the
 //! tangent program reads is kept. Backends with a handler for [`ELEMENTWISE`] run elementwise operations gathered, a pass over memory
 //! for many of them. [`Graph::linearize`] runs the products in another precision than values and

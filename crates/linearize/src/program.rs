@@ -1,7 +1,6 @@
 //! From a graph to straight-line programs.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::fmt;
 
 use burn::backend::ir::{
     BaseOperationIr as Base, NumericOperationIr as Num, OperationIr, TensorId, TensorIr,
@@ -12,7 +11,7 @@ use burn::tensor::DType;
 use crate::conversion::Conversion;
 use crate::emit::Emitter;
 use crate::fusion::fuse;
-use crate::ir::{Line, detach_outputs, each_tensor, name, read_only, rename, with_status};
+use crate::ir::{detach_outputs, each_tensor, name, read_only, rename, with_status};
 use crate::rules::{self, Context};
 use crate::tangent::{Builder, Expression};
 use crate::trace::Sources;
@@ -20,8 +19,6 @@ use crate::{Error, Extensions, Graph, precision};
 
 /// Programs ready to run: constants (once), value, primal (once per point), tangent (once per
 /// direction).
-///
-/// `Display` lists the operations; the [statistics](Self::statistics) count them.
 #[derive(Clone, Debug)]
 pub struct Program {
     pub(crate) sources: Sources,
@@ -110,23 +107,6 @@ fn count(operations: &[OperationIr]) -> BTreeMap<String, usize> {
         *counts.entry(name(operation)).or_insert(0) += 1;
     }
     counts
-}
-
-impl fmt::Display for Program {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (title, operations) in [
-            ("constant", &self.constant),
-            ("value", &self.value.operations),
-            ("primal", &self.primal.operations),
-            ("tangent", &self.tangent.operations),
-        ] {
-            writeln!(f, "{title}:")?;
-            for operation in operations.iter().filter(|operation| !is_drop(operation)) {
-                writeln!(f, "  {}", Line(operation))?;
-            }
-        }
-        Ok(())
-    }
 }
 
 impl Sources {
@@ -666,7 +646,7 @@ mod tests {
                 assert!(
                     held.contains_key(&t.id),
                     "{} reads what is gone",
-                    Line(operation)
+                    name(operation)
                 );
                 if t.status == TensorStatus::ReadWrite {
                     held.remove(&t.id);

@@ -96,10 +96,8 @@ fn same_input_same_bytes() {
         };
         assert_eq!(run(), run());
         let program = || {
-            graph(&u, &u, &c)
-                .linearize(&Extensions::new(), None)
-                .unwrap()
-                .to_string()
+            let program = graph(&u, &u, &c).linearize(&Extensions::new(), None);
+            format!("{:?}", program.unwrap())
         };
         assert_eq!(program(), program());
     }

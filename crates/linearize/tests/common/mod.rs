@@ -125,7 +125,7 @@ pub fn check<const D: usize>(name: &str, u: &Tensor<D>, energy: impl Fn(Tensor<D
     let extensions = Extensions::new();
     let program = graph
         .linearize(&extensions, None)
-        .unwrap_or_else(|e| panic!("{name}: {e}\n{graph}"));
+        .unwrap_or_else(|e| panic!("{name}: {e}"));
     let mut linearization = program.on(&device, &extensions).unwrap();
 
     let before = vec(u);
@@ -147,7 +147,7 @@ pub fn check<const D: usize>(name: &str, u: &Tensor<D>, energy: impl Fn(Tensor<D
     let hp = linearization.apply(&[(&p).into()]).unwrap().remove(0);
     let expected = differences(u, &p, &energy);
     let error = distance(&value_vec(&hp), &expected);
-    assert!(error < 2e-9, "{name}: Hessian off by {error:e}\n{program}");
+    assert!(error < 2e-9, "{name}: Hessian off by {error:e}");
 
     let hq = linearization.apply(&[(&q).into()]).unwrap().remove(0);
     let (left, right) = (Value::from(&q).dot(&hp), Value::from(&p).dot(&hq));
