@@ -13,8 +13,11 @@ pub enum Error {
     )]
     NoRule { operation: String },
     /// A rule returned something that does not fit its operation.
-    #[error("the rule of custom operation `{operation}` is wrong: {reason}")]
-    Rule { operation: String, reason: String },
+    #[error(
+        "the rule of custom operation `{operation}` must give a tangent or none for each output, \
+         of its shape"
+    )]
+    Rule { operation: String },
     /// A program contains a custom operation that the backend has no handler for.
     #[error(
         "no handler for custom operation `{operation}` on {backend}: register one in \

@@ -265,7 +265,7 @@ fn wrong_rules_are_refused() {
     );
     let error = graph.linearize(&extensions, None).unwrap_err();
     assert!(
-        matches!(&error, Error::Rule { operation, .. } if operation == "blur"),
+        matches!(&error, Error::Rule { operation } if operation == "blur"),
         "{error}"
     );
 }

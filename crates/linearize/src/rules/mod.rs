@@ -121,23 +121,14 @@ fn custom(
         .map(|t| cx.d(t).map(|e| cx.build.handle(e)))
         .collect();
     let outputs = rule(operation, &tangents, &mut cx.build)?;
-    let wrong = |reason| {
-        let operation = id.clone();
-        Err(Error::Rule { operation, reason })
+    let fits = |(tangent, out): (&Option<TensorIr>, &TensorIr)| {
+        tangent.as_ref().is_none_or(|t| t.shape == out.shape)
     };
-    let (found, expected) = (outputs.len(), operation.outputs.len());
-    if found != expected {
-        return wrong(format!("{found} tangents for {expected} outputs"));
-    }
-    for (tangent, out) in outputs.iter().zip(&operation.outputs) {
-        if let Some(tangent) = tangent
-            && tangent.shape != out.shape
-        {
-            let (found, expected) = (tangent.shape.to_vec(), out.shape.to_vec());
-            return wrong(format!(
-                "tangent of shape {found:?} for an output of shape {expected:?}"
-            ));
-        }
+    if outputs.len() != operation.outputs.len() || !outputs.iter().zip(&operation.outputs).all(fits)
+    {
+        return Err(Error::Rule {
+            operation: id.clone(),
+        });
     }
     Ok(outputs
         .into_iter()
