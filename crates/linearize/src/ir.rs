@@ -89,3 +89,21 @@ pub(crate) fn rename(operation: &mut OperationIr, map: &HashMap<TensorId, Tensor
         }
     });
 }
+
+/// The operation with other tensors for its inputs at these places.
+pub(crate) fn with_inputs(
+    operation: &OperationIr,
+    places: &[usize],
+    tensors: &[TensorIr],
+) -> OperationIr {
+    let mut operation = operation.clone();
+    let mut position = 0;
+    // Inputs are visited before outputs, in their order.
+    each_tensor(&mut operation, |tensor| {
+        if let Some(i) = places.iter().position(|place| *place == position) {
+            tensor.id = tensors[i].id;
+        }
+        position += 1;
+    });
+    operation
+}
