@@ -19,9 +19,9 @@ const LINES: usize = 8;
 /// The side of a brick is a multiple of the numbers in a register.
 const MOST_LANES: usize = 8;
 
-/// `sum_b t_b .. t_c x_{a+(b,..,c)}` by passes along the last axis, the one before it, and so on; where no brick is active they see `rests`,
-/// constants in the negative and in the positive phase. The adjoint takes the passes in the opposite order with mirrored taps, which is the
-/// transpose although passes that are cut at the edge of the bricks do not commute.
+/// `sum_b t_b .. t_c x_{a+(b,..,c)}` by passes along the last axis, the one before it, and so on; where no brick is active they see
+/// `rests`, constants in the negative and in the positive phase. The adjoint takes the passes in the opposite order with mirrored taps,
+/// which is the transpose although passes that are cut at the edge of the bricks do not commute.
 ///
 /// `bricks` are cubes of `side^axes` cells, `neighbours` is the table of [`crate::Bricks::neighbours`], and the taps are no more
 /// than `2 side + 1`.

@@ -86,8 +86,9 @@ impl<B: Host> GridOps for B {
                 in_precision!(dtype, T => {
                     let x = B::values::<T>(&x);
                     let (taps, neighbours) = (B::values(&taps), B::values(&neighbours));
-                    let rests = [0.0; 2];
-                    let y = brick_convolution::convolve(x, bricks, neighbours, taps, adjoint, rests);
+                    let y = brick_convolution::convolve(
+                        x, bricks, neighbours, taps, adjoint, [0.0; 2],
+                    );
                     B::tensor(y, shape)
                 })
             }
