@@ -13,8 +13,8 @@ use linearize::taylor::{halvings, remainder};
 use model::{MeanCurvatureOperator, Network, Shipped};
 use operators::{
     COEFFICIENTS, HermiteTable, HostUpdate, HostVectors, SpectralFilter, TableRange, add_scaled,
-    circular_convolution, extrapolate, inner_product, kernel_correlation, retract, spectral_filter,
-    tabulated, update_on_host,
+    circular_convolution, extrapolate, inner_product, retract, spectral_filter, tabulated,
+    update_on_host,
 };
 use solver::{
     Exit, FlowParams, MeanCurvatureStep, MinimizingMovement, NewtonParams, Objective, StepRecord,
@@ -36,6 +36,19 @@ fn close(backend: &Backend, found: &[f64], expected: &[f64], tolerance: f64, wha
         "{}: {what} differs by {difference:.1e}, more than {tolerance:.0e}",
         backend.name
     );
+}
+
+/// `c_b = sum_a g_a x_{a+b}`: the gradient of `sum_a g_a (K * x)_a` in the kernel `K`.
+fn correlated<const R: usize, const K: usize>(
+    x: Tensor<R>,
+    g: Tensor<R>,
+    width: usize,
+) -> Tensor<K> {
+    let kernel = Tensor::<K>::zeros([width; K], (&x.device(), x.dtype()));
+    let leaf = kernel.autodiff().require_grad();
+    let y = circular_convolution(x.autodiff(), leaf.clone(), false);
+    let gradients = (y * g.autodiff()).sum().backward();
+    leaf.grad(&gradients).unwrap()
 }
 
 /// `K` axes of a grid behind `R - K` of a batch.
@@ -68,8 +81,7 @@ fn convolution_case<const R: usize, const K: usize>(
         );
     }
     let g = noise(x.len(), 3);
-    let found: Tensor<K> =
-        kernel_correlation(device.tensor(&x, shape), device.tensor(&g, shape), width);
+    let found: Tensor<K> = correlated(device.tensor(&x, shape), device.tensor(&g, shape), width);
     let expected = correlation(&x, &g, &shape[R - K..], width);
     assert_eq!(found.dims(), [width; K]);
     let what = format!("correlation {shape:?}, {width}^{K}");
@@ -244,7 +256,7 @@ fn operations_take_slices_for_what_they_are() {
         let found = circular_convolution(grid_of(&x), sliced, false);
         check(&values(found), &expected, "convolution");
         let g = noise(48, 6);
-        let found: Tensor<2> = kernel_correlation(grid_of(&x), grid_of(&g), width);
+        let found: Tensor<2> = correlated(grid_of(&x), grid_of(&g), width);
         check(
             &values(found),
             &correlation(&x, &g, &grid, width),

@@ -24,33 +24,21 @@ pub(crate) const LINEARIZED: &str = "fem::linearized_solve";
 
 /// A scheme of any dimension, as operations see it.
 pub(crate) trait Host: Send + Sync {
-    fn mass(&self, x: &[f64]) -> Vec<f64>;
-    fn heat_solve(&self, x: &[f64]) -> Vec<f64>;
-    fn product(&self, a: &[f64], b: &[f64], c: &[f64]) -> Vec<f64>;
-    fn implicit_step(&self, u: &[f64]) -> Vec<f64>;
-    fn linearized_solve(&self, v: &[f64], g: &[f64]) -> Vec<f64>;
+    /// The operation of this identifier.
+    fn run(&self, id: &str, inputs: &[Vec<f64>]) -> Vec<f64>;
     fn reaction(&self) -> f64;
 }
 
 impl<const D: usize> Host for Scheme<D> {
-    fn mass(&self, x: &[f64]) -> Vec<f64> {
-        Scheme::mass(self, x)
-    }
-
-    fn heat_solve(&self, x: &[f64]) -> Vec<f64> {
-        Scheme::heat_solve(self, x)
-    }
-
-    fn product(&self, a: &[f64], b: &[f64], c: &[f64]) -> Vec<f64> {
-        Scheme::product(self, a, b, c)
-    }
-
-    fn implicit_step(&self, u: &[f64]) -> Vec<f64> {
-        self.or_nan(Scheme::implicit_step(self, u))
-    }
-
-    fn linearized_solve(&self, v: &[f64], g: &[f64]) -> Vec<f64> {
-        self.or_nan(Scheme::linearized_solve(self, v, g))
+    fn run(&self, id: &str, inputs: &[Vec<f64>]) -> Vec<f64> {
+        match (id, inputs) {
+            (MASS, [x]) => self.mass(x),
+            (HEAT, [x]) => self.heat_solve(x),
+            (PRODUCT, [a, b, c]) => self.product(a, b, c),
+            (IMPLICIT, [u]) => self.or_nan(self.implicit_step(u)),
+            (LINEARIZED, [v, g]) => self.or_nan(self.linearized_solve(v, g)),
+            _ => unreachable!("schemes have no operation {id} of {} inputs", inputs.len()),
+        }
     }
 
     fn reaction(&self) -> f64 {
@@ -122,6 +110,19 @@ pub enum Operation<B: Backend> {
     LinearizedSolve(FloatTensor<B>, FloatTensor<B>),
 }
 
+impl<B: Backend> Operation<B> {
+    /// The identifier and the arguments.
+    pub(crate) fn parts(self) -> (&'static str, Vec<FloatTensor<B>>) {
+        match self {
+            Mass(x) => (MASS, vec![x]),
+            HeatSolve(x) => (HEAT, vec![x]),
+            Product(a, b, c) => (PRODUCT, vec![a, b, c]),
+            ImplicitStep(u) => (IMPLICIT, vec![u]),
+            LinearizedSolve(v, g) => (LINEARIZED, vec![v, g]),
+        }
+    }
+}
+
 /// Finite-element schemes on a backend; their operations are closed under differentiation in both modes.
 #[backend_extension(
     Flex: cfg(feature = "flex"),
@@ -137,13 +138,7 @@ pub trait FemOps: Backend {
 
 impl FemOps for CaptureBackend {
     fn fem(operation: Operation<Self>, scheme: u64) -> FloatTensor<Self> {
-        let (id, inputs) = match operation {
-            Mass(x) => (MASS, vec![x]),
-            HeatSolve(x) => (HEAT, vec![x]),
-            Product(a, b, c) => (PRODUCT, vec![a, b, c]),
-            ImplicitStep(u) => (IMPLICIT, vec![u]),
-            LinearizedSolve(v, g) => (LINEARIZED, vec![v, g]),
-        };
+        let (id, inputs) = operation.parts();
         let shape = inputs[0].shape();
         captured(id, inputs, shape, vec![ScalarIr::UInt(scheme)])
     }

@@ -5,7 +5,8 @@
 use burn_ir::{BackendIr, CustomOpIr, ScalarIr, TensorIr};
 use linearize::{Builder, CustomOpRegistry, Extensions, Tangents, multilinear};
 
-use crate::ops::{FemOps, HEAT, IMPLICIT, LINEARIZED, MASS, Operation, PRODUCT, host};
+use crate::backends::on_host;
+use crate::ops::{HEAT, IMPLICIT, LINEARIZED, MASS, PRODUCT, host};
 
 /// `d int a b c phi`: linear in each factor, and symmetric, so that equal factors are differentiated once.
 fn product(operation: &CustomOpIr, tangents: &[Option<TensorIr>], build: &mut Builder) -> Tangents {
@@ -76,21 +77,15 @@ fn linearized_solve(
     Ok(vec![Some(dy)])
 }
 
-fn register<B: BackendIr + FemOps>(registry: &mut CustomOpRegistry<B>) {
-    let scheme = |scalars: &[ScalarIr]| scalars[0].elem::<u64>();
-    registry.register_function(MASS, move |[x], s| B::fem(Operation::Mass(x), scheme(s)));
-    registry.register_function(HEAT, move |[x], s| {
-        B::fem(Operation::HeatSolve(x), scheme(s))
-    });
-    registry.register_function(PRODUCT, move |[a, b, c], s| {
-        B::fem(Operation::Product(a, b, c), scheme(s))
-    });
-    registry.register_function(IMPLICIT, move |[u], s| {
-        B::fem(Operation::ImplicitStep(u), scheme(s))
-    });
-    registry.register_function(LINEARIZED, move |[v, g], s| {
-        B::fem(Operation::LinearizedSolve(v, g), scheme(s))
-    });
+fn register<B: BackendIr>(registry: &mut CustomOpRegistry<B>) {
+    for id in [MASS, HEAT, PRODUCT, IMPLICIT, LINEARIZED] {
+        registry.register(id, |handles, operation, _| {
+            let inputs = operation.inputs.iter();
+            let inputs = inputs.map(|t| handles.get_float_tensor::<B>(t)).collect();
+            let output = on_host::<B>(&operation.id, inputs, operation.scalars[0].elem());
+            handles.register_float_tensor::<B>(&operation.outputs[0].id, output);
+        });
+    }
 }
 
 /// Everything [`linearize`] needs to differentiate and replay the operations of this crate.
@@ -103,10 +98,10 @@ pub fn extensions() -> Extensions {
         .rule(IMPLICIT, implicit_step)
         .rule(LINEARIZED, linearized_solve);
     #[cfg(feature = "flex")]
-    extensions.on_flex(register);
+    register(&mut extensions.flex);
     #[cfg(feature = "ndarray")]
-    extensions.on_ndarray(register);
+    register(&mut extensions.ndarray);
     #[cfg(any(feature = "wgpu", feature = "cuda"))]
-    extensions.on_cube(register);
+    register(&mut extensions.cube);
     extensions
 }

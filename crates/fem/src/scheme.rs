@@ -62,10 +62,10 @@ pub struct Scheme<const D: usize> {
     failure: Mutex<Option<Error>>,
 }
 
-/// The matrix `A(v)` of the linearized implicit step.
-struct System<const D: usize> {
-    matrix: Stencil<D>,
-    factorization: Option<Factorization>,
+/// The matrix `A(v)` of the linearized implicit step, as its solver wants it.
+enum System<const D: usize> {
+    Matrix(Stencil<D>),
+    Factored(Factorization),
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -230,7 +230,7 @@ impl<const D: usize> Scheme<D> {
             }
             lock(&self.statistics).newton += 1;
             let accuracy = residual.clamp(tolerances.linear.min(1e-2), 1e-2);
-            let update = self.solve(&self.system(&v), &right, accuracy)?;
+            let update = self.solve(&self.system(&v)?, &right, accuracy)?;
             zip_apply(&mut v, &update, |v, d| v + d);
         }
         Err(Error::NotConverged {
@@ -261,11 +261,12 @@ impl<const D: usize> Scheme<D> {
         Stencil::with_square(self.cells, 1.0 - r, self.diffusion, 3.0 * r, v)
     }
 
-    fn system(&self, v: &[f64]) -> System<D> {
-        System {
-            matrix: self.matrix(v),
-            factorization: None,
-        }
+    fn system(&self, v: &[f64]) -> Result<System<D>, Error> {
+        let matrix = self.matrix(v);
+        Ok(match self.solver {
+            LinearSolver::Direct => System::Factored(self.factorize(&matrix)?),
+            LinearSolver::ConjugateGradients => System::Matrix(matrix),
+        })
     }
 
     fn cached_system(&self, v: &[f64]) -> Result<Arc<System<D>>, Error> {
@@ -273,11 +274,7 @@ impl<const D: usize> Scheme<D> {
         if let Some(i) = systems.iter().position(|(at, _)| at == v) {
             return Ok(systems[i].1.clone());
         }
-        let mut system = self.system(v);
-        if self.solver == LinearSolver::Direct {
-            system.factorization = Some(self.factorize(&system.matrix)?);
-        }
-        let system = Arc::new(system);
+        let system = Arc::new(self.system(v)?);
         if systems.len() >= CACHED_SYSTEMS {
             systems.remove(0);
         }
@@ -297,12 +294,9 @@ impl<const D: usize> Scheme<D> {
 
     fn solve(&self, system: &System<D>, right: &[f64], tolerance: f64) -> Result<Vec<f64>, Error> {
         lock(&self.statistics).solves += 1;
-        match (&system.factorization, self.solver) {
-            (Some(factorization), _) => Ok(factorization.solve(right)),
-            (None, LinearSolver::Direct) => Ok(self.factorize(&system.matrix)?.solve(right)),
-            (None, LinearSolver::ConjugateGradients) => {
-                self.conjugate_gradients(&system.matrix, right, tolerance)
-            }
+        match system {
+            System::Factored(factorization) => Ok(factorization.solve(right)),
+            System::Matrix(matrix) => self.conjugate_gradients(matrix, right, tolerance),
         }
     }
 

@@ -21,13 +21,17 @@ fn main() -> Result<(), Error> {
     let graph = Graph::trace(&[(&x).into()], &[], |inputs| {
         vec![function(inputs.variable(0)).into()]
     })?;
-    let mut tangent = graph.linearize(&extensions)?.on(&device, &extensions)?;
+    let mut tangent = graph
+        .linearize(&extensions, None)?
+        .on(&device, &extensions)?;
     tangent.at(&[(&x).into()], &[])?;
     let slope = tangent.apply(&[(&direction).into()])?[0].to_vec()[0];
 
     // Hessian-vector product: the derivative of its gradient, forward over reverse.
     let graph = Graph::gradient(&[(&x).into()], &[], |inputs| function(inputs.variable(0)))?;
-    let mut hessian = graph.linearize(&extensions)?.on(&device, &extensions)?;
+    let mut hessian = graph
+        .linearize(&extensions, None)?
+        .on(&device, &extensions)?;
     let at = hessian.at(&[(&x).into()], &[])?;
     let product = hessian.apply(&[(&direction).into()])?[0].to_vec();
     let along = Value::from(&direction).to_vec();

@@ -19,7 +19,7 @@
 //! product.into_data().assert_eq(&TensorData::from([6.0, 120.0]), true);
 //! ```
 
-use std::ops::{Add, Div, Mul, Sub};
+use std::ops::{Add, Mul, Sub};
 
 use burn::tensor::Tensor;
 
@@ -59,19 +59,6 @@ impl<const D: usize> Dual<D> {
         Self {
             primal: value,
             tangent: self.tangent * slope,
-        }
-    }
-
-    /// Image of two duals under a bilinear map.
-    #[must_use]
-    pub fn bilinear<const E: usize, const F: usize>(
-        self,
-        other: Dual<E>,
-        map: impl Fn(Tensor<D>, Tensor<E>) -> Tensor<F>,
-    ) -> Dual<F> {
-        Dual {
-            primal: map(self.primal.clone(), other.primal.clone()),
-            tangent: map(self.tangent, other.primal) + map(self.primal, other.tangent),
         }
     }
 
@@ -123,17 +110,10 @@ impl<const D: usize> Mul for Dual<D> {
     type Output = Self;
 
     fn mul(self, other: Self) -> Self {
-        self.bilinear(other, |a, b| a * b)
-    }
-}
-
-impl<const D: usize> Div for Dual<D> {
-    type Output = Self;
-
-    fn div(self, other: Self) -> Self {
-        let quotient = self.primal / other.primal.clone();
-        let tangent = (self.tangent - quotient.clone() * other.tangent) / other.primal;
-        Self::new(quotient, tangent)
+        Self {
+            primal: self.primal.clone() * other.primal.clone(),
+            tangent: self.tangent * other.primal + self.primal * other.tangent,
+        }
     }
 }
 
@@ -154,14 +134,6 @@ impl<const D: usize> Sub<Tensor<D>> for Dual<D> {
     }
 }
 
-impl<const D: usize> Mul<Tensor<D>> for Dual<D> {
-    type Output = Self;
-
-    fn mul(self, other: Tensor<D>) -> Self {
-        self.linear(|t| t * other.clone())
-    }
-}
-
 impl<const D: usize> Add<f64> for Dual<D> {
     type Output = Self;
 
@@ -170,31 +142,11 @@ impl<const D: usize> Add<f64> for Dual<D> {
     }
 }
 
-impl<const D: usize> Sub<f64> for Dual<D> {
-    type Output = Self;
-
-    fn sub(self, other: f64) -> Self {
-        Self::new(self.primal - other, self.tangent)
-    }
-}
-
 impl<const D: usize> Mul<f64> for Dual<D> {
     type Output = Self;
 
     fn mul(self, other: f64) -> Self {
         self.linear(|t| t * other)
-    }
-}
-
-#[allow(
-    clippy::suspicious_arithmetic_impl,
-    reason = "Burn's backward pass of a division by a number has single precision"
-)]
-impl<const D: usize> Div<f64> for Dual<D> {
-    type Output = Self;
-
-    fn div(self, other: f64) -> Self {
-        self.linear(|t| t * other.recip())
     }
 }
 

@@ -2,8 +2,6 @@
 
 #![allow(missing_docs, reason = "messages and names say it")]
 
-use burn::tensor::DType;
-
 /// Errors of tracing, linearizing and replaying.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -15,12 +13,15 @@ pub enum Error {
     )]
     NoRule { operation: String },
     /// A rule returned something that does not fit its operation.
-    #[error("the rule of custom operation `{operation}` is wrong: {reason}")]
-    Rule { operation: String, reason: String },
+    #[error(
+        "the rule of custom operation `{operation}` must give a tangent or none for each output, \
+         of its shape"
+    )]
+    Rule { operation: String },
     /// A program contains a custom operation that the backend has no handler for.
     #[error(
-        "no handler for custom operation `{operation}` on {backend}: register one with \
-         `Extensions::on_{backend}`"
+        "no handler for custom operation `{operation}` on {backend}: register one in \
+         `Extensions::{backend}`"
     )]
     NoHandler {
         operation: String,
@@ -44,39 +45,13 @@ pub enum Error {
     /// A tensor has the wrong number of axes.
     #[error("expected a tensor with {expected} axes, found {found}")]
     Rank { expected: usize, found: usize },
-    /// Not as many tensors as the graph was traced with.
-    #[error("expected {expected} {role}, found {found}")]
-    Count {
-        /// "variables", "parameters" or "directions".
-        role: &'static str,
-        expected: usize,
-        found: usize,
-    },
-    /// A tensor's shape differs from the one the graph was traced with.
-    #[error("{role} {index}: expected shape {expected:?}, found {found:?}; trace again")]
-    Shape {
-        /// "variable", "parameter" or "direction".
-        role: &'static str,
-        index: usize,
-        expected: Vec<usize>,
-        found: Vec<usize>,
-    },
-    /// A tensor's element type differs from the one the graph was traced with.
-    #[error("{role} {index}: expected elements of type {expected:?}, found {found:?}")]
-    DType {
-        /// "variable", "parameter" or "direction".
-        role: &'static str,
-        index: usize,
-        expected: DType,
-        found: DType,
-    },
-    /// A tensor lives on another backend than the program, or is tracked by autodiff.
-    #[error("{role} {index} does not live on the program's backend: {reason}")]
-    Backend {
-        /// "variable", "parameter" or "direction".
-        role: &'static str,
-        index: usize,
-        reason: String,
+    /// Inputs differ from those the graph was traced with in number, shape or element type, or do not live on the program's backend.
+    #[error("{input}: expected {expected}, found {found}")]
+    Input {
+        /// "variables" or "variable 0", and so on for parameters and directions.
+        input: String,
+        expected: String,
+        found: String,
     },
     /// Replaying on this device is not compiled in.
     #[error("cannot replay on device {device}: enable the feature of its backend")]

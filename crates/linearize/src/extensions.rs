@@ -78,16 +78,19 @@ impl<B: BackendIr> CustomOpRegistry<B> {
 #[derive(Clone, Default)]
 pub struct Extensions {
     pub(crate) rules: BTreeMap<String, Arc<Rule>>,
+    /// Handlers on the Flex backend.
     #[cfg(feature = "flex")]
-    pub(crate) flex: CustomOpRegistry<burn::backend::Flex>,
+    pub flex: CustomOpRegistry<burn::backend::Flex>,
+    /// Handlers on the `NdArray` backend.
     #[cfg(feature = "ndarray")]
     #[allow(
         deprecated,
         reason = "burn deprecates the backend, which we still offer"
     )]
-    pub(crate) ndarray: CustomOpRegistry<burn::backend::NdArray>,
+    pub ndarray: CustomOpRegistry<burn::backend::NdArray>,
+    /// Handlers on the `CubeCL` backend (wgpu, CUDA).
     #[cfg(any(feature = "wgpu", feature = "cuda"))]
-    pub(crate) cube: CustomOpRegistry<burn::backend::Cube>,
+    pub cube: CustomOpRegistry<burn::backend::Cube>,
 }
 
 impl Extensions {
@@ -102,40 +105,6 @@ impl Extensions {
         F: Fn(&CustomOpIr, &[Option<TensorIr>], &mut Builder) -> Tangents + Send + Sync + 'static,
     {
         self.rules.insert(id.to_owned(), Arc::new(rule));
-        self
-    }
-
-    /// Register handlers on the Flex backend.
-    #[cfg(feature = "flex")]
-    pub fn on_flex(
-        &mut self,
-        f: impl FnOnce(&mut CustomOpRegistry<burn::backend::Flex>),
-    ) -> &mut Self {
-        f(&mut self.flex);
-        self
-    }
-
-    /// Register handlers on the `NdArray` backend.
-    #[cfg(feature = "ndarray")]
-    #[allow(
-        deprecated,
-        reason = "burn deprecates the backend, which we still offer"
-    )]
-    pub fn on_ndarray(
-        &mut self,
-        f: impl FnOnce(&mut CustomOpRegistry<burn::backend::NdArray>),
-    ) -> &mut Self {
-        f(&mut self.ndarray);
-        self
-    }
-
-    /// Register handlers on the `CubeCL` backend (wgpu, CUDA).
-    #[cfg(any(feature = "wgpu", feature = "cuda"))]
-    pub fn on_cube(
-        &mut self,
-        f: impl FnOnce(&mut CustomOpRegistry<burn::backend::Cube>),
-    ) -> &mut Self {
-        f(&mut self.cube);
         self
     }
 }

@@ -1,7 +1,6 @@
 //! Small helpers over Burn's intermediate representation.
 
 use std::collections::HashMap;
-use std::fmt;
 
 use burn::backend::ir::{IrVisitorMut, OperationIr, TensorId, TensorIr, TensorStatus};
 use burn::tensor::{DType, Shape};
@@ -91,34 +90,20 @@ pub(crate) fn rename(operation: &mut OperationIr, map: &HashMap<TensorId, Tensor
     });
 }
 
-/// `%3 = Mul(%1, %2) [64, 64]`
-pub(crate) struct Line<'a>(pub &'a OperationIr);
-
-impl fmt::Display for Line<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let join = |tensors: Vec<String>| tensors.join(", ");
-        let id = |tensor: &TensorIr| {
-            let id = tensor.id.value();
-            if id >= TANGENT_IDS {
-                format!("%t{}", id - TANGENT_IDS)
-            } else {
-                format!("%{id}")
-            }
-        };
-        let outputs: Vec<_> = self.0.outputs().map(id).collect();
-        let inputs: Vec<_> = self.0.inputs().map(id).collect();
-        let shape = self.0.outputs().next().map(|out| out.shape.to_vec());
-        if outputs.is_empty() {
-            write!(f, "{}({})", name(self.0), join(inputs))
-        } else {
-            write!(
-                f,
-                "{} = {}({}) {:?}",
-                join(outputs),
-                name(self.0),
-                join(inputs),
-                shape.unwrap_or_default()
-            )
+/// The operation with other tensors for its inputs at these places.
+pub(crate) fn with_inputs(
+    operation: &OperationIr,
+    places: &[usize],
+    tensors: &[TensorIr],
+) -> OperationIr {
+    let mut operation = operation.clone();
+    let mut position = 0;
+    // Inputs are visited before outputs, in their order.
+    each_tensor(&mut operation, |tensor| {
+        if let Some(i) = places.iter().position(|place| *place == position) {
+            tensor.id = tensors[i].id;
         }
-    }
+        position += 1;
+    });
+    operation
 }

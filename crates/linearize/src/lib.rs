@@ -29,7 +29,7 @@
 //! // Once: record the energy and its gradient, transform, load onto the device.
 //! let graph = Graph::gradient(&[(&u).into()], &[], |inputs| energy(inputs.variable(0), 0.5))?;
 //! let extensions = Extensions::new();
-//! let program = graph.linearize(&extensions)?;
+//! let program = graph.linearize(&extensions, None)?;
 //! let mut linearization = program.on(&device, &extensions)?;
 //!
 //! // Once per point: energy and gradient.
@@ -70,10 +70,11 @@
 //! [`Graph::linearize`] shares common subexpressions, removes products with ones and sums with zeros,
 //! and never spreads a number over a grid. Tangents stay sums of *coefficient times tangent* as long as
 //! operations are elementwise, so that pointwise second derivatives merge into one coefficient that is
-//! computed once per point. [`Program`] prints what is left. Last uses are known, so backends compute
+//! computed once per point. [`Program::statistics`] counts what is left. Last uses are known, so backends compute
 //! in place, and between [`at`](Linearization::at) and [`apply`](Linearization::apply) only what the
 //! tangent program reads is kept. Backends with a handler for [`ELEMENTWISE`] run elementwise operations gathered, a pass over memory
-//! for many of them. [`Graph::linearize_in`] runs the products in another precision than values and gradients.
+//! for many of them. [`Graph::linearize`] runs the products in another precision than values and
+//! gradients if asked to.
 //!
 //! Rules cover arithmetic with broadcasting, elementary functions, reductions, matrix products,
 //! convolutions and linear layers with their backward passes, indexing, masks, and what Burn's autodiff

@@ -1,7 +1,6 @@
 //! From a graph to straight-line programs.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::fmt;
 
 use burn::backend::ir::{
     BaseOperationIr as Base, NumericOperationIr as Num, OperationIr, TensorId, TensorIr,
@@ -12,7 +11,7 @@ use burn::tensor::DType;
 use crate::conversion::Conversion;
 use crate::emit::Emitter;
 use crate::fusion::fuse;
-use crate::ir::{Line, detach_outputs, each_tensor, name, read_only, rename, with_status};
+use crate::ir::{detach_outputs, each_tensor, name, read_only, rename, with_status};
 use crate::rules::{self, Context};
 use crate::tangent::{Builder, Expression};
 use crate::trace::Sources;
@@ -20,8 +19,6 @@ use crate::{Error, Extensions, Graph, precision};
 
 /// Programs ready to run: constants (once), value, primal (once per point), tangent (once per
 /// direction).
-///
-/// `Display` lists the operations; the [statistics](Self::statistics) count them.
 #[derive(Clone, Debug)]
 pub struct Program {
     pub(crate) sources: Sources,
@@ -112,23 +109,6 @@ fn count(operations: &[OperationIr]) -> BTreeMap<String, usize> {
     counts
 }
 
-impl fmt::Display for Program {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (title, operations) in [
-            ("constant", &self.constant),
-            ("value", &self.value.operations),
-            ("primal", &self.primal.operations),
-            ("tangent", &self.tangent.operations),
-        ] {
-            writeln!(f, "{title}:")?;
-            for operation in operations.iter().filter(|operation| !is_drop(operation)) {
-                writeln!(f, "  {}", Line(operation))?;
-            }
-        }
-        Ok(())
-    }
-}
-
 impl Sources {
     /// The same under fresh names, which the map then knows.
     fn renamed(&self, emitter: &mut Emitter, map: &mut HashMap<TensorId, TensorIr>) -> Self {
@@ -214,99 +194,87 @@ fn live<'a, 'b>(
 impl Graph {
     /// Transform the graph into a primal and a tangent program.
     ///
-    /// # Errors
-    /// [`Error::NoRule`] if a tangent reaches an operation that cannot be differentiated.
-    pub fn linearize(&self, extensions: &Extensions) -> Result<Program, Error> {
-        linearize(self, extensions, None)
-    }
-
-    /// As [`linearize`](Self::linearize), with products in the float type `products`: values and gradients keep the type they were
-    /// traced with; what [`at`](crate::Linearization::at) keeps is converted once per point, and
-    /// [`apply`](crate::Linearization::apply) takes and returns tensors of the other type. Products in single precision cost half
-    /// as much, and inexact Newton methods do not need more.
+    /// With `products` in another float type than that of the graph, values and gradients keep the type they were traced with; what
+    /// [`at`](crate::Linearization::at) keeps is converted once per point, and [`apply`](crate::Linearization::apply) takes and returns
+    /// tensors of the other type. Products in single precision cost half as much, and inexact Newton methods do not need more.
     ///
     /// # Errors
     /// [`Error::NoRule`] if a tangent reaches an operation that cannot be differentiated.
-    pub fn linearize_in(&self, extensions: &Extensions, products: DType) -> Result<Program, Error> {
-        linearize(self, extensions, Some(products))
-    }
-}
+    pub fn linearize(
+        &self,
+        extensions: &Extensions,
+        products: Option<DType>,
+    ) -> Result<Program, Error> {
+        let simplified = simplify(self);
+        let mut cx = Context {
+            build: Builder::new(),
+            extensions,
+            tangents: HashMap::new(),
+        };
+        let mut map: HashMap<TensorId, TensorIr> = HashMap::new();
+        let sources = (simplified.sources).renamed(&mut cx.build.primal, &mut map);
+        let directions: Vec<TensorIr> = (sources.variables.iter())
+            .map(|variable| {
+                let seed = cx
+                    .build
+                    .tangent
+                    .fresh(variable.shape.clone(), variable.dtype);
+                cx.tangents
+                    .insert(variable.id, Expression::atom(seed.clone()));
+                seed
+            })
+            .collect();
 
-/// `products`: the float type of the tangent program, if not that of the graph.
-fn linearize(
-    graph: &Graph,
-    extensions: &Extensions,
-    products: Option<DType>,
-) -> Result<Program, Error> {
-    let simplified = simplify(graph);
-    let mut cx = Context {
-        build: Builder::new(),
-        extensions,
-        tangents: HashMap::new(),
-    };
-    let mut map: HashMap<TensorId, TensorIr> = HashMap::new();
-    let sources = (simplified.sources).renamed(&mut cx.build.primal, &mut map);
-    let directions: Vec<TensorIr> = (sources.variables.iter())
-        .map(|variable| {
-            let seed = cx
-                .build
-                .tangent
-                .fresh(variable.shape.clone(), variable.dtype);
-            cx.tangents
-                .insert(variable.id, Expression::atom(seed.clone()));
-            seed
-        })
-        .collect();
-
-    // Only what the outputs depend on needs a tangent; the value alone does not.
-    let mut differentiated: HashSet<TensorId> = HashSet::new();
-    let mut uses: HashMap<TensorId, usize> = HashMap::new();
-    for operation in live(&simplified.operations, simplified.outputs.iter()) {
-        differentiated.extend(operation.outputs().map(|t| t.id));
-        for t in operation.inputs() {
+        // Only what the outputs depend on needs a tangent; the value alone does not.
+        let mut differentiated: HashSet<TensorId> = HashSet::new();
+        let mut uses: HashMap<TensorId, usize> = HashMap::new();
+        for operation in live(&simplified.operations, simplified.outputs.iter()) {
+            differentiated.extend(operation.outputs().map(|t| t.id));
+            for t in operation.inputs() {
+                *uses.entry(t.id).or_insert(0) += 1;
+            }
+        }
+        for t in &simplified.outputs {
             *uses.entry(t.id).or_insert(0) += 1;
         }
-    }
-    for t in &simplified.outputs {
-        *uses.entry(t.id).or_insert(0) += 1;
-    }
-    for operation in &simplified.operations {
-        let emitted = replay(&mut map, operation, |new| cx.build.primal.emit(new));
-        if !operation
-            .outputs()
-            .any(|out| differentiated.contains(&out.id))
-        {
-            continue;
-        }
-        let tangents = rules::jvp(&mut cx, &emitted)?;
-        for ((old, new), tangent) in operation.outputs().zip(emitted.outputs()).zip(tangents) {
-            let Some(mut tangent) = tangent else { continue };
-            if uses.get(&old.id).copied().unwrap_or(0) > 1 && tangent.is_long() {
-                tangent = cx.build.shared(tangent);
+        for operation in &simplified.operations {
+            let emitted = replay(&mut map, operation, |new| cx.build.primal.emit(new));
+            if !operation
+                .outputs()
+                .any(|out| differentiated.contains(&out.id))
+            {
+                continue;
             }
-            cx.tangents.insert(new.id, tangent);
+            let tangents = rules::jvp(&mut cx, &emitted)?;
+            for ((old, new), tangent) in operation.outputs().zip(emitted.outputs()).zip(tangents) {
+                let Some(mut tangent) = tangent else { continue };
+                if uses.get(&old.id).copied().unwrap_or(0) > 1 && tangent.is_long() {
+                    tangent = cx.build.shared(tangent);
+                }
+                cx.tangents.insert(new.id, tangent);
+            }
         }
-    }
 
-    let value = map[&simplified.value.id].clone();
-    let outputs: Vec<TensorIr> = (simplified.outputs.iter())
-        .map(|t| map[&t.id].clone())
-        .collect();
-    let tangents: Vec<TensorIr> = outputs
-        .iter()
-        .map(|out| {
-            let tangent = cx.tangents.get(&out.id).cloned();
-            cx.build.or_zeros(tangent, &out.shape, out.dtype)
-        })
-        .collect();
-    let ends = Ends {
-        sources,
-        directions,
-        value,
-        outputs,
-        tangents,
-    };
-    Ok(assemble(cx.build, ends, products))
+        let value = map[&simplified.value.id].clone();
+        let outputs: Vec<TensorIr> = (simplified.outputs.iter())
+            .map(|t| map[&t.id].clone())
+            .collect();
+        let tangents: Vec<TensorIr> = outputs
+            .iter()
+            .map(|out| {
+                let tangent = cx.tangents.get(&out.id).cloned();
+                cx.build.or_zeros(tangent, &out.shape, out.dtype)
+            })
+            .collect();
+        let ends = Ends {
+            sources,
+            directions,
+            value,
+            outputs,
+            tangents,
+        };
+        Ok(assemble(cx.build, ends, products))
+    }
 }
 
 /// Inputs and outputs of all programs.
@@ -678,7 +646,7 @@ mod tests {
                 assert!(
                     held.contains_key(&t.id),
                     "{} reads what is gone",
-                    Line(operation)
+                    name(operation)
                 );
                 if t.status == TensorStatus::ReadWrite {
                     held.remove(&t.id);
@@ -713,7 +681,7 @@ mod tests {
             v.sum()
         })
         .unwrap();
-        let program = graph.linearize(&Extensions::new()).unwrap();
+        let program = graph.linearize(&Extensions::new(), None).unwrap();
         let elements = 64;
         let mut held = HashMap::new();
         simulate(&program.value, &mut held);

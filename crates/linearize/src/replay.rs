@@ -99,11 +99,7 @@ impl Linearization {
         if !self.evaluated {
             return Err(Error::NotEvaluated);
         }
-        check(
-            ("directions", "direction"),
-            &self.program.directions,
-            directions,
-        )?;
+        check("direction", &self.program.directions, directions)?;
         let mut inputs = named("direction", directions);
         self.interpreter.run(&self.program.tangent, &mut inputs)
     }
@@ -119,8 +115,8 @@ impl Linearization {
 
     fn check_inputs(&self, variables: &[Value], parameters: &[Value]) -> Result<(), Error> {
         let sources = &self.program.sources;
-        check(("variables", "variable"), &sources.variables, variables)?;
-        check(("parameters", "parameter"), &sources.parameters, parameters)
+        check("variable", &sources.variables, variables)?;
+        check("parameter", &sources.parameters, parameters)
     }
 }
 
@@ -132,34 +128,21 @@ fn named<'a>(role: &'static str, values: &'a [Value]) -> impl Iterator<Item = Na
     indexed.map(move |(index, value)| (role, index, value))
 }
 
-fn check(
-    (plural, role): (&'static str, &'static str),
-    expected: &[TensorIr],
-    found: &[Value],
-) -> Result<(), Error> {
+fn check(role: &'static str, expected: &[TensorIr], found: &[Value]) -> Result<(), Error> {
     if expected.len() != found.len() {
-        return Err(Error::Count {
-            role: plural,
-            expected: expected.len(),
-            found: found.len(),
+        return Err(Error::Input {
+            input: format!("{role}s"),
+            expected: expected.len().to_string(),
+            found: found.len().to_string(),
         });
     }
-    for (index, (expected, found)) in expected.iter().zip(found).enumerate() {
-        let shape = found.0.shape();
-        if expected.shape != shape {
-            return Err(Error::Shape {
-                role,
-                index,
-                expected: expected.shape.to_vec(),
-                found: shape.to_vec(),
-            });
-        }
-        if expected.dtype != found.dtype() {
-            return Err(Error::DType {
-                role,
-                index,
-                expected: expected.dtype,
-                found: found.dtype(),
+    for (expected, (role, index, found)) in expected.iter().zip(named(role, found)) {
+        let (shape, dtype) = (found.0.shape(), found.dtype());
+        if (&expected.shape, expected.dtype) != (&shape, dtype) {
+            return Err(Error::Input {
+                input: format!("{role} {index}"),
+                expected: format!("{:?} of {:?}", expected.shape.to_vec(), expected.dtype),
+                found: format!("{:?} of {dtype:?}", shape.to_vec()),
             });
         }
     }
@@ -230,10 +213,10 @@ where
             let Some(id) = id else { continue };
             let primitive =
                 <DispatchTensor as DispatchKindConversion<B>>::try_into_backend(value.0.clone())
-                    .map_err(|reason| Error::Backend {
-                        role,
-                        index,
-                        reason,
+                    .map_err(|_| Error::Input {
+                        input: format!("{role} {index}"),
+                        expected: "the program's backend".to_owned(),
+                        found: format!("{:?}", value.0.device()),
                     })?;
             self.register_tensor_to_device(*id, HandleKind::Float(primitive.float()));
         }

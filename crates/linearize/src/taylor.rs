@@ -18,10 +18,6 @@
 //! assert!(!wrong.is_consistent(0.2));
 //! ```
 
-use burn::tensor::DType;
-
-use crate::{Error, Linearization, Value};
-
 /// How far above the rounding error of `φ` a remainder must be to count, so that its logarithm is
 /// good to a few percent.
 const MARGIN: f64 = 64.0;
@@ -115,55 +111,6 @@ impl Remainder {
             None => self.remainders.last().is_some_and(|r| *r <= self.floor),
         }
     }
-}
-
-/// Taylor tests of a gradient and of a Hessian along one direction.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Check {
-    /// Remainder with the gradient: rate 2.
-    pub gradient: Remainder,
-    /// Remainder with gradient and Hessian: rate 3.
-    pub hessian: Remainder,
-}
-
-/// Test the gradient and the Hessian-vector product of a linearized energy at a point.
-///
-/// # Errors
-/// As for [`Linearization::at`] and [`Linearization::apply`].
-pub fn check(
-    linearization: &mut Linearization,
-    variables: &[Value],
-    parameters: &[Value],
-    directions: &[Value],
-    steps: &[f64],
-) -> Result<Check, Error> {
-    let evaluation = linearization.at(variables, parameters)?;
-    let products = linearization.apply(directions)?;
-    let dot =
-        |values: &[Value]| -> f64 { values.iter().zip(directions).map(|(v, p)| v.dot(p)).sum() };
-    let derivatives = [dot(&evaluation.gradients), dot(&products)];
-    let mut values = Vec::with_capacity(steps.len() + 1);
-    for &t in [0.0].iter().chain(steps) {
-        let moved: Vec<Value> = (variables.iter().zip(directions))
-            .map(|(u, p)| u.add_scaled(t, p))
-            .collect();
-        let value = linearization.value(&moved, parameters)?;
-        values.push((t, value.to_vec().iter().sum::<f64>()));
-    }
-    let value = |t: f64| {
-        let known = values
-            .iter()
-            .find(|(step, _)| step.to_bits() == t.to_bits());
-        known.map_or(f64::NAN, |(_, value)| *value)
-    };
-    let precision = match variables.first().map(Value::dtype) {
-        Some(DType::F64) => f64::EPSILON,
-        _ => f64::from(f32::EPSILON),
-    };
-    Ok(Check {
-        gradient: remainder(value, &derivatives[..1], steps, precision),
-        hessian: remainder(value, &derivatives, steps, precision),
-    })
 }
 
 #[cfg(test)]

@@ -6,7 +6,6 @@
 //! its primitive. That is below Burn's stable surface; `tests/burn_internals.rs` pins it.
 
 use std::collections::HashMap;
-use std::fmt;
 use std::sync::{Mutex, PoisonError};
 
 use burn::backend::autodiff::Autodiff;
@@ -21,7 +20,7 @@ use burn::backend::{
 use burn::tensor::{DType, Device, FloatDType, Shape, Tensor, TensorData};
 use burn_router::{RouterClient, RouterTensor};
 
-use crate::ir::{Line, rename, tensor};
+use crate::ir::{rename, tensor};
 use crate::{Error, Value, precision};
 
 type Tracked = Autodiff<Capture>;
@@ -164,15 +163,6 @@ impl Graph {
             let outputs = tracked.iter().map(|t| t.grad(&gradients)).collect();
             Ok((value, outputs))
         })
-    }
-}
-
-impl fmt::Display for Graph {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for operation in &self.operations {
-            writeln!(f, "{}", Line(operation))?;
-        }
-        Ok(())
     }
 }
 

@@ -48,13 +48,6 @@ impl Value {
         self.0.dtype()
     }
 
-    /// `self + factor * other`, for values of equal shape on one device.
-    #[must_use]
-    pub fn add_scaled(&self, factor: f64, other: &Self) -> Self {
-        let scaled = Dispatch::float_mul_scalar(other.0.clone(), factor.into());
-        Self(Dispatch::float_add(self.0.clone(), scaled))
-    }
-
     /// Euclidean inner product of values of equal shape on one device, summed in the elements' own
     /// precision.
     pub fn dot(&self, other: &Self) -> f64 {

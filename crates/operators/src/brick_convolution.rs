@@ -19,18 +19,9 @@ const LINES: usize = 8;
 /// The side of a brick is a multiple of the numbers in a register.
 const MOST_LANES: usize = 8;
 
-/// What passes see where no brick is active.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Ghosts {
-    /// Nothing.
-    Zero,
-    /// Constants in the negative and in the positive phase.
-    At([f64; 2]),
-}
-
-/// `sum_b t_b .. t_c x_{a+(b,..,c)}` by passes along the last axis, the one before it, and so on; each pass sees the ghosts outside the
-/// bricks. The adjoint takes the passes in the opposite order with mirrored taps, which is the transpose although passes that are cut at the
-/// edge of the bricks do not commute.
+/// `sum_b t_b .. t_c x_{a+(b,..,c)}` by passes along the last axis, the one before it, and so on; where no brick is active they see
+/// `rests`, constants in the negative and in the positive phase. The adjoint takes the passes in the opposite order with mirrored taps,
+/// which is the transpose although passes that are cut at the edge of the bricks do not commute.
 ///
 /// `bricks` are cubes of `side^axes` cells, `neighbours` is the table of [`crate::Bricks::neighbours`], and the taps are no more
 /// than `2 side + 1`.
@@ -40,7 +31,7 @@ pub(crate) fn convolve<T: Real>(
     neighbours: &[T],
     taps: &[T],
     adjoint: bool,
-    ghosts: Ghosts,
+    rests: [f64; 2],
 ) -> Vec<T> {
     let reach = taps.len() / 2;
     debug_assert!(taps.len() % 2 == 1 && reach <= side && side.is_multiple_of(MOST_LANES));
@@ -51,10 +42,7 @@ pub(crate) fn convolve<T: Real>(
     }
     weights.resize(weights.len() + ROWS - 1, T::zero());
     let volume = side.pow(axes as u32);
-    let mut rests = match ghosts {
-        Ghosts::Zero => [T::zero(); 2],
-        Ghosts::At(rests) => rests.map(T::of),
-    };
+    let mut rests = rests.map(T::of);
     let sum = taps.iter().fold(T::zero(), |sum, tap| sum + *tap);
     // Passes write by turns to a vector that is kept and to the one that is returned, to which the last one does.
     let mut kept = std::mem::take(&mut *lock(&T::shared().scratch));
@@ -282,7 +270,7 @@ mod tests {
 
     fn on<const D: usize>(bricks: &Bricks<D>, x: &[f64], taps: &[f64], adjoint: bool) -> Vec<f64> {
         let shape = (bricks.side(), D);
-        convolve(x, shape, &bricks.neighbours(), taps, adjoint, Ghosts::Zero)
+        convolve(x, shape, &bricks.neighbours(), taps, adjoint, [0.0; 2])
     }
 
     /// The definition on the whole grid: after every pass what is not active is `rests`, times what a pass makes of constants.
@@ -376,7 +364,7 @@ mod tests {
         let table = bricks.neighbours();
         let run = || {
             let (x, table, taps) = (single(&x), single(&table), single(&taps));
-            convolve(&x, (8, 3), &table, &taps, true, Ghosts::Zero)
+            convolve(&x, (8, 3), &table, &taps, true, [0.0; 2])
         };
         let found: Vec<f64> = run().into_iter().map(f64::from).collect();
         assert_near(&found, &double, 1e-5);

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::Error;
-use crate::brick_convolution::{Ghosts, convolve};
+use crate::brick_convolution::convolve;
 
 /// A brick that is not stored, in the tables of neighbours: the field is constant there, in the phase of positive values
 const POSITIVE: i32 = -1;
@@ -232,14 +232,7 @@ impl<const D: usize> Bricks<D> {
     pub fn convolution_of_outside(&self, taps: &[f64], rests: [f64; 2]) -> Vec<f64> {
         let zeros = vec![0.0; self.len()];
         let table = self.neighbours();
-        convolve(
-            &zeros,
-            (self.side, D),
-            &table,
-            taps,
-            false,
-            Ghosts::At(rests),
-        )
+        convolve(&zeros, (self.side, D), &table, taps, false, rests)
     }
 
     /// The values of the active bricks, of those of the whole grid.

@@ -118,7 +118,7 @@ pub(crate) fn circular_convolution<const R: usize, const K: usize>(
     inverse(product, K)
 }
 
-/// See [`crate::kernel_correlation`].
+/// See [`crate::Operation::Correlation`].
 pub(crate) fn kernel_correlation<const R: usize, const K: usize>(
     x: Tensor<R>,
     g: Tensor<R>,
@@ -243,26 +243,26 @@ pub(crate) fn spectral_filter<const R: usize>(x: Tensor<R>, symbol: Tensor<1>) -
     inverse((re * symbol.clone(), im * symbol), R)
 }
 
-/// Extends an even symbol from the half spectrum of the last axis to all frequencies.
+/// Extends an even symbol from the order of [`crate::Transform`]'s spectra, divided by the number of grid points, to all frequencies,
+/// row-major.
 pub(crate) fn full_symbol(dims: &[usize], half: &[f64]) -> Vec<f64> {
-    let last = dims[dims.len() - 1];
-    let half_last = last / 2 + 1;
+    let (n0, last) = (dims[0], dims[dims.len() - 1]);
     let total: usize = dims.iter().product();
     (0..total)
         .map(|i| {
             let mirrored = i % last > last / 2;
-            let (mut rest, mut stride, mut index) = (i, 1, 0);
-            for (axis, &n) in dims.iter().enumerate().rev() {
-                let k = if mirrored {
-                    (n - rest % n) % n
-                } else {
-                    rest % n
-                };
-                index += k * stride;
-                stride *= if axis == dims.len() - 1 { half_last } else { n };
+            let mut rest = i;
+            let mut place = |n: usize| {
+                let k = rest % n;
                 rest /= n;
+                if mirrored { (n - k) % n } else { k }
+            };
+            let (mut column, mut stride) = (0, 1);
+            for (axis, &n) in dims.iter().enumerate().skip(1).rev() {
+                column += place(n) * stride;
+                stride *= if axis == dims.len() - 1 { n / 2 + 1 } else { n };
             }
-            half[index]
+            half[column * n0 + place(n0)] * total as f64
         })
         .collect()
 }
@@ -299,9 +299,12 @@ mod tests {
                 crate::circular_convolution(x.clone(), kernel.clone(), adjoint),
             );
         }
+        let leaf = kernel.autodiff().require_grad();
+        let y = crate::circular_convolution(x.clone().autodiff(), leaf.clone(), false);
+        let gradients = (y * g.clone().autodiff()).sum().backward();
         assert_close(
-            kernel_correlation::<3, 2>(x.clone(), g.clone(), 5),
-            crate::kernel_correlation(x, g, 5),
+            kernel_correlation::<3, 2>(x, g, 5),
+            leaf.grad(&gradients).unwrap(),
         );
 
         let volume = device.tensor::<3>(&wave(6 * 7 * 8, 0.41), [6, 7, 8]);

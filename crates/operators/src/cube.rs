@@ -6,9 +6,8 @@ use burn_backend::TensorMetadata;
 
 use crate::composed;
 use crate::filter::SpectralFilter;
-use crate::ops::GridOps;
+use crate::ops::{GridOps, Operation};
 use crate::profile;
-use crate::table::TableRange;
 use crate::vector::{self, SharedUpdate, VectorOps};
 
 type CubeTensor = FloatTensor<Cube>;
@@ -47,33 +46,26 @@ macro_rules! gridded {
 }
 
 impl GridOps for Cube {
-    fn circular_convolution(x: CubeTensor, kernel: CubeTensor, adjoint: bool) -> CubeTensor {
-        gridded!(x.shape().num_dims(), kernel.shape().num_dims(), (2 2) (3 2) (3 3) (4 2) (4 3), R, K => {
-            down(composed::circular_convolution::<R, K>(up(x), up(kernel), adjoint))
-        })
-    }
-
-    fn kernel_correlation(x: CubeTensor, g: CubeTensor, width: usize, axes: usize) -> CubeTensor {
-        gridded!(x.shape().num_dims(), axes, (2 2) (3 2) (3 3) (4 2) (4 3), R, K => {
-            down(composed::kernel_correlation::<R, K>(up(x), up(g), width))
-        })
-    }
-
-    fn brick_convolution(
-        x: CubeTensor,
-        taps: CubeTensor,
-        neighbours: CubeTensor,
-        adjoint: bool,
-    ) -> CubeTensor {
-        ranked!(x.shape().num_dims(), 2 3, R => {
-            down(composed::brick_convolution::<R>(up(x), up(taps), up(neighbours), adjoint))
-        })
-    }
-
-    fn tabulated(w: CubeTensor, table: CubeTensor, range: TableRange, order: usize) -> CubeTensor {
-        ranked!(w.shape().num_dims(), 1 2 3 4, R => {
-            down(composed::tabulated::<R>(up(w), up(table), range, order))
-        })
+    fn grid(operation: Operation<Self>) -> CubeTensor {
+        let rank = |x: &CubeTensor| x.shape().num_dims();
+        match operation {
+            Operation::Convolution(x, kernel, adjoint) => {
+                gridded!(rank(&x), rank(&kernel), (2 2) (3 2) (3 3) (4 2) (4 3), R, K => {
+                    down(composed::circular_convolution::<R, K>(up(x), up(kernel), adjoint))
+                })
+            }
+            Operation::Correlation(x, g, width, axes) => {
+                gridded!(rank(&x), axes, (2 2) (3 2) (3 3) (4 2) (4 3), R, K => {
+                    down(composed::kernel_correlation::<R, K>(up(x), up(g), width))
+                })
+            }
+            Operation::Bricks(x, taps, neighbours, adjoint) => ranked!(rank(&x), 2 3, R => {
+                down(composed::brick_convolution::<R>(up(x), up(taps), up(neighbours), adjoint))
+            }),
+            Operation::Tabulated(w, table, range, order) => ranked!(rank(&w), 1 2 3 4, R => {
+                down(composed::tabulated::<R>(up(w), up(table), range, order))
+            }),
+        }
     }
 }
 

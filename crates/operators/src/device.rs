@@ -1,4 +1,4 @@
-//! Devices by name, and tensors of the right precision on them.
+//! Devices by name, opened, and tensors of the right precision on them.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,6 +6,8 @@ use std::str::FromStr;
 use burn::tensor::{DType, Device, Tensor, TensorData};
 
 use crate::Error;
+#[cfg(any(feature = "wgpu", feature = "cuda"))]
+use crate::device_check;
 
 /// The backends a device can belong to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, derive_more::Display)]
@@ -54,6 +56,13 @@ impl DeviceKind {
     pub fn compiled() -> impl Iterator<Item = Self> {
         Self::ALL.into_iter().filter(|kind| kind.is_compiled())
     }
+
+    fn not_compiled(self) -> Error {
+        Error::NotCompiled {
+            name: self.name(),
+            compiled: compiled_names(),
+        }
+    }
 }
 
 impl FromStr for DeviceKind {
@@ -70,15 +79,12 @@ impl FromStr for DeviceKind {
         if kind.is_compiled() {
             Ok(kind)
         } else {
-            Err(Error::NotCompiled {
-                name: kind.name(),
-                compiled: compiled_names(),
-            })
+            Err(kind.not_compiled())
         }
     }
 }
 
-pub(crate) fn compiled_names() -> String {
+fn compiled_names() -> String {
     DeviceKind::compiled()
         .map(DeviceKind::name)
         .collect::<Vec<_>>()
@@ -94,21 +100,52 @@ pub struct ComputeDevice {
 }
 
 impl ComputeDevice {
-    #[cfg(any(feature = "flex", feature = "ndarray"))]
-    pub(crate) fn cpu(kind: DeviceKind, device: Device) -> Self {
-        Self {
-            kind,
-            device,
-            dtype: DType::F64,
+    /// Opens a device. A GPU is compared with the CPU first, on operations that drivers and tuned kernels have been
+    /// seen to get wrong.
+    ///
+    /// # Errors
+    /// [`Error::NotCompiled`], [`Error::Unavailable`] without a usable adapter, [`Error::WrongArithmetic`].
+    pub fn open(kind: DeviceKind) -> Result<Self, Error> {
+        match kind {
+            #[cfg(feature = "flex")]
+            DeviceKind::Flex => Ok(Self::new(kind, Device::flex())),
+            #[cfg(feature = "ndarray")]
+            DeviceKind::NdArray => Ok(Self::new(kind, Device::ndarray())),
+            #[cfg(feature = "wgpu")]
+            DeviceKind::Wgpu => device_check::open_gpu(kind, || {
+                Device::wgpu(burn::tensor::DeviceKind::DefaultDevice)
+            }),
+            #[cfg(feature = "cuda")]
+            DeviceKind::Cuda => device_check::open_gpu(kind, || Device::cuda(0)),
+            #[allow(unreachable_patterns)] // reachable unless every backend is compiled in
+            _ => Err(kind.not_compiled()),
         }
     }
 
-    #[cfg(any(feature = "wgpu", feature = "cuda"))]
-    pub(crate) fn gpu(kind: DeviceKind, device: Device) -> Self {
+    /// The first device compiled in: `flex` unless default features are off.
+    ///
+    /// # Errors
+    /// As [`Self::open`]; [`Error::UnknownDevice`] if no backend was compiled in at all.
+    pub fn default_compiled() -> Result<Self, Error> {
+        let kind = DeviceKind::compiled()
+            .next()
+            .ok_or_else(|| Error::UnknownDevice {
+                name: "default".to_owned(),
+                compiled: "no backend".to_owned(),
+            })?;
+        Self::open(kind)
+    }
+
+    pub(crate) fn new(kind: DeviceKind, device: Device) -> Self {
+        let dtype = if kind.is_cpu() {
+            DType::F64
+        } else {
+            DType::F32
+        };
         Self {
             kind,
             device,
-            dtype: DType::F32,
+            dtype,
         }
     }
 
@@ -117,8 +154,7 @@ impl ComputeDevice {
     /// # Errors
     /// [`Error::Unavailable`] for `f64` on a GPU, which computes wrongly there.
     pub fn with_dtype(mut self, dtype: DType) -> Result<Self, Error> {
-        let gpu = matches!(self.kind, DeviceKind::Wgpu | DeviceKind::Cuda);
-        if gpu && dtype != DType::F32 {
+        if !self.kind.is_cpu() && dtype != DType::F32 {
             return Err(Error::Unavailable {
                 name: self.kind.name(),
                 reason: format!("{dtype:?} is not reliable there; use f32"),

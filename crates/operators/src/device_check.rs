@@ -19,7 +19,7 @@ pub(crate) fn open_gpu(
 ) -> Result<ComputeDevice, Error> {
     // Burn panics when there is no adapter; a user gets one line instead.
     let opened = catch_unwind(AssertUnwindSafe(|| {
-        let device = ComputeDevice::gpu(kind, device());
+        let device = ComputeDevice::new(kind, device());
         let one = device.scalar(device.tensor::<1>(&[1.0], [1]))?;
         Ok((device, one))
     }));

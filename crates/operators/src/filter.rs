@@ -102,24 +102,10 @@ impl SpectralFilter {
         {
             return symbol.clone();
         }
-        let values = full_symbol(&self.0.shape, &self.row_major());
+        let values = full_symbol(&self.0.shape, &self.0.double);
         let length = values.len();
         let symbol = Tensor::from_data(TensorData::new(values, [length]), (device, dtype));
         *uploaded = Some((device.clone(), dtype, symbol.clone()));
         symbol
-    }
-
-    /// The symbol row-major over the half spectrum `[n0, .., n_last / 2 + 1]`, not normalised.
-    pub fn row_major(&self) -> Vec<f64> {
-        let n0 = self.0.shape[0];
-        let points: usize = self.0.shape.iter().product();
-        let columns = self.0.double.len() / n0;
-        let mut natural = vec![0.0; self.0.double.len()];
-        for column in 0..columns {
-            for row in 0..n0 {
-                natural[row * columns + column] = self.0.double[column * n0 + row] * points as f64;
-            }
-        }
-        natural
     }
 }

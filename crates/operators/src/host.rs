@@ -4,12 +4,12 @@ use burn_backend::{
     Backend, DType, Element, Shape, TensorData, TensorMetadata, tensor::FloatTensor,
 };
 
-use crate::brick_convolution::{self, Ghosts};
+use crate::brick_convolution;
 use crate::convolution::{convolve, correlate};
 use crate::fft::{Real, Transform};
 use crate::filter::SpectralFilter;
-use crate::ops::GridOps;
-use crate::table::{TableRange, evaluate};
+use crate::ops::{GridOps, Operation};
+use crate::table::evaluate;
 use crate::vector::{self, SharedUpdate, VectorOps};
 use crate::{profile, slices};
 
@@ -56,65 +56,50 @@ macro_rules! in_precision {
 }
 
 impl<B: Host> GridOps for B {
-    fn circular_convolution(
-        x: FloatTensor<B>,
-        kernel: FloatTensor<B>,
-        adjoint: bool,
-    ) -> FloatTensor<B> {
-        let (dtype, shape, kernel_shape) = (x.dtype(), x.shape(), kernel.shape());
-        // Batch axes lead.
-        let grid = &shape[shape.num_dims() - kernel_shape.num_dims()..];
-        let (x, kernel) = (B::lender(x), B::lender(kernel));
-        in_precision!(dtype, T => {
-            let (x, kernel) = (B::values::<T>(&x), B::values(&kernel));
-            let y = convolve(x, grid, kernel, kernel_shape[0], adjoint);
-            B::tensor(y, shape)
-        })
-    }
-
-    fn kernel_correlation(
-        x: FloatTensor<B>,
-        g: FloatTensor<B>,
-        width: usize,
-        axes: usize,
-    ) -> FloatTensor<B> {
-        let (dtype, shape) = (x.dtype(), x.shape());
-        let grid = &shape[shape.num_dims() - axes..];
-        let (x, g) = (B::lender(x), B::lender(g));
-        in_precision!(dtype, T => {
-            let c = correlate(B::values::<T>(&x), B::values(&g), grid, width);
-            B::tensor(c, vec![width; axes].into())
-        })
-    }
-
-    fn brick_convolution(
-        x: FloatTensor<B>,
-        taps: FloatTensor<B>,
-        neighbours: FloatTensor<B>,
-        adjoint: bool,
-    ) -> FloatTensor<B> {
-        let (dtype, shape) = (x.dtype(), x.shape());
-        let axes = shape.num_dims();
-        let bricks = (shape[axes - 1], axes);
-        let [x, taps, neighbours] = [x, taps, neighbours].map(B::lender);
-        in_precision!(dtype, T => {
-            let (x, taps, neighbours) = (B::values::<T>(&x), B::values(&taps), B::values(&neighbours));
-            let y = brick_convolution::convolve(x, bricks, neighbours, taps, adjoint, Ghosts::Zero);
-            B::tensor(y, shape)
-        })
-    }
-
-    fn tabulated(
-        w: FloatTensor<B>,
-        table: FloatTensor<B>,
-        range: TableRange,
-        order: usize,
-    ) -> FloatTensor<B> {
-        let (dtype, shape) = (w.dtype(), w.shape());
-        let (w, table) = (B::lender(w), B::lender(table));
-        in_precision!(dtype, T => {
-            B::tensor(evaluate(B::values::<T>(&w), range, B::values(&table), order), shape)
-        })
+    fn grid(operation: Operation<B>) -> FloatTensor<B> {
+        match operation {
+            Operation::Convolution(x, kernel, adjoint) => {
+                let (dtype, shape, kernel_shape) = (x.dtype(), x.shape(), kernel.shape());
+                // Batch axes lead.
+                let grid = &shape[shape.num_dims() - kernel_shape.num_dims()..];
+                let (x, kernel) = (B::lender(x), B::lender(kernel));
+                in_precision!(dtype, T => {
+                    let (x, kernel) = (B::values::<T>(&x), B::values(&kernel));
+                    let y = convolve(x, grid, kernel, kernel_shape[0], adjoint);
+                    B::tensor(y, shape)
+                })
+            }
+            Operation::Correlation(x, g, width, axes) => {
+                let (dtype, shape) = (x.dtype(), x.shape());
+                let grid = &shape[shape.num_dims() - axes..];
+                let (x, g) = (B::lender(x), B::lender(g));
+                in_precision!(dtype, T => {
+                    let c = correlate(B::values::<T>(&x), B::values(&g), grid, width);
+                    B::tensor(c, vec![width; axes].into())
+                })
+            }
+            Operation::Bricks(x, taps, neighbours, adjoint) => {
+                let (dtype, shape) = (x.dtype(), x.shape());
+                let axes = shape.num_dims();
+                let bricks = (shape[axes - 1], axes);
+                let [x, taps, neighbours] = [x, taps, neighbours].map(B::lender);
+                in_precision!(dtype, T => {
+                    let x = B::values::<T>(&x);
+                    let (taps, neighbours) = (B::values(&taps), B::values(&neighbours));
+                    let y = brick_convolution::convolve(
+                        x, bricks, neighbours, taps, adjoint, [0.0; 2],
+                    );
+                    B::tensor(y, shape)
+                })
+            }
+            Operation::Tabulated(w, table, range, order) => {
+                let (dtype, shape) = (w.dtype(), w.shape());
+                let (w, table) = (B::lender(w), B::lender(table));
+                in_precision!(dtype, T => {
+                    B::tensor(evaluate(B::values::<T>(&w), range, B::values(&table), order), shape)
+                })
+            }
+        }
     }
 }
 

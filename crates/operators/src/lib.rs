@@ -19,9 +19,8 @@
 //!
 //! | operation | formula | derivative |
 //! |---|---|---|
-//! | [`circular_convolution`] | `y_a = sum_b K_b x_{a+b}` | itself with `adjoint` flipped; in the kernel [`kernel_correlation`] |
+//! | [`circular_convolution`] | `y_a = sum_b K_b x_{a+b}` | itself with `adjoint` flipped; in the kernel `c_b = sum_a g_a x_{a+b}` |
 //! | [`brick_convolution`] | `y_a = sum t_b .. t_c x_{a+(b,..,c)}` on active [`Bricks`] | itself with `adjoint` flipped |
-//! | [`kernel_correlation`] | `c_b = sum_a g_a x_{a+b}` | [`circular_convolution`] |
 //! | [`tabulated`] | `y_a = F^(k)(w_a)`, `F` a quintic Hermite table | itself with `k + 1` |
 //! | [`spectral_filter`] | `y = F^-1[symbol F[x]]` | none (preconditioners) |
 //! | [`inner_product`], [`add_scaled`], [`update_on_host`] | `sum a b`, `x + alpha y`, work on the host | none (iterative solvers) |
@@ -61,7 +60,6 @@ mod filter;
 #[macro_use]
 mod host;
 mod lanes;
-mod open;
 mod ops;
 mod profile;
 mod rules;
@@ -75,10 +73,10 @@ pub use device::{ComputeDevice, DeviceKind};
 pub use error::Error;
 pub use fft::{Real, Transform};
 pub use filter::SpectralFilter;
-pub use ops::GridOps;
+pub use ops::{GridOps, Operation};
 pub use rules::extensions;
 pub use table::{COEFFICIENTS, HermiteTable, TableRange};
-pub use tensor::{brick_convolution, circular_convolution, kernel_correlation, tabulated};
+pub use tensor::{brick_convolution, circular_convolution, tabulated};
 pub use vector::{
     HostUpdate, HostVectors, SharedUpdate, VectorOps, add_scaled, extrapolate, inner_product,
     retract, spectral_filter, update_on_host,

@@ -1,24 +1,35 @@
 //! The extension operations as a Burn backend trait, with their autodiff and capture implementations.
 
-use burn::backend::{Backend, backend_extension, tensor::FloatTensor};
+use burn::backend::{Backend, ExtensionType, backend_extension, tensor::FloatTensor};
 use burn_autodiff::{Autodiff, checkpoint::strategy::CheckpointStrategy};
-use burn_backend::{Shape, TensorMetadata};
+use burn_backend::TensorMetadata;
 use burn_capture::CaptureBackend;
 use burn_ir::ScalarIr;
 
+use self::Operation::{Bricks, Convolution, Correlation, Tabulated};
 use crate::recording::{Pullback, captured, on_tape};
 use crate::table::TableRange;
 
-/// Identifier of [`GridOps::circular_convolution`] in captured graphs.
 pub(crate) const CONVOLUTION: &str = "operators::circular_convolution";
-/// Identifier of [`GridOps::kernel_correlation`] in captured graphs.
 pub(crate) const CORRELATION: &str = "operators::kernel_correlation";
-/// Identifier of [`GridOps::brick_convolution`] in captured graphs.
 pub(crate) const BRICKS: &str = "operators::brick_convolution";
-/// Identifier of [`GridOps::tabulated`] in captured graphs.
 pub(crate) const TABULATED: &str = "operators::tabulated";
 
-/// Operations that Burn does not have, closed under differentiation in both modes.
+/// An operation that Burn does not have, on its arguments.
+#[derive(ExtensionType)]
+pub enum Operation<B: Backend> {
+    /// [`crate::circular_convolution`] of a grid with a kernel, its adjoint if so said.
+    Convolution(FloatTensor<B>, FloatTensor<B>, bool),
+    /// `sum_a g_a x_{a+b}`, of `x` and `g`, for all offsets `b` of a kernel of this width and number of axes; also summed over leading
+    /// batch axes. The derivative of the convolution by its kernel.
+    Correlation(FloatTensor<B>, FloatTensor<B>, usize, usize),
+    /// [`crate::brick_convolution`] of a field with taps, given the neighbours; its adjoint if so said.
+    Bricks(FloatTensor<B>, FloatTensor<B>, FloatTensor<B>, bool),
+    /// [`crate::tabulated`], of this order, at every entry of a grid, by the coefficients of a table.
+    Tabulated(FloatTensor<B>, FloatTensor<B>, TableRange, usize),
+}
+
+/// Operations on grids, closed under differentiation in both modes.
 #[backend_extension(
     Flex: cfg(feature = "flex"),
     NdArray: cfg(feature = "ndarray"),
@@ -27,149 +38,87 @@ pub(crate) const TABULATED: &str = "operators::tabulated";
     Autodiff
 )]
 pub trait GridOps: Backend {
-    /// `sum_b K_b x_{a+b}`, or `x_{a-b}` if `adjoint`, over the trailing axes (as many as the kernel has).
-    fn circular_convolution(
-        x: FloatTensor<Self>,
-        kernel: FloatTensor<Self>,
-        adjoint: bool,
-    ) -> FloatTensor<Self>;
-    /// `sum_a g_a x_{a+b}` for the `width^D` offsets `b` of a kernel, also summed over leading batch axes.
-    fn kernel_correlation(
-        x: FloatTensor<Self>,
-        g: FloatTensor<Self>,
-        width: usize,
-        axes: usize,
-    ) -> FloatTensor<Self>;
-    /// `sum_b t_b .. t_c x_{a+(b,..,c)}` over the cells of active bricks, pass by pass; the transpose if `adjoint`.
-    fn brick_convolution(
-        x: FloatTensor<Self>,
-        taps: FloatTensor<Self>,
-        neighbours: FloatTensor<Self>,
-        adjoint: bool,
-    ) -> FloatTensor<Self>;
-    /// The `order`-th derivative of a tabulated function at every entry of `w`.
-    fn tabulated(
-        w: FloatTensor<Self>,
-        table: FloatTensor<Self>,
-        range: TableRange,
-        order: usize,
-    ) -> FloatTensor<Self>;
+    /// The result of an operation.
+    fn grid(#[extension_type] operation: Operation<Self>) -> FloatTensor<Self>;
 }
 
 impl GridOps for CaptureBackend {
-    fn circular_convolution(
-        x: FloatTensor<Self>,
-        kernel: FloatTensor<Self>,
-        adjoint: bool,
-    ) -> FloatTensor<Self> {
-        let shape = x.shape();
-        let scalars = vec![ScalarIr::Bool(adjoint)];
-        captured(CONVOLUTION, vec![x, kernel], shape, scalars)
-    }
-
-    fn kernel_correlation(
-        x: FloatTensor<Self>,
-        g: FloatTensor<Self>,
-        width: usize,
-        axes: usize,
-    ) -> FloatTensor<Self> {
-        let scalars = vec![ScalarIr::UInt(width as u64), ScalarIr::UInt(axes as u64)];
-        let shape = Shape::from(vec![width; axes]);
-        captured(CORRELATION, vec![x, g], shape, scalars)
-    }
-
-    fn brick_convolution(
-        x: FloatTensor<Self>,
-        taps: FloatTensor<Self>,
-        neighbours: FloatTensor<Self>,
-        adjoint: bool,
-    ) -> FloatTensor<Self> {
-        let shape = x.shape();
-        let scalars = vec![ScalarIr::Bool(adjoint)];
-        captured(BRICKS, vec![x, taps, neighbours], shape, scalars)
-    }
-
-    fn tabulated(
-        w: FloatTensor<Self>,
-        table: FloatTensor<Self>,
-        range: TableRange,
-        order: usize,
-    ) -> FloatTensor<Self> {
-        let shape = w.shape();
-        let scalars = vec![
-            ScalarIr::UInt(order as u64),
-            ScalarIr::Float(range.low),
-            ScalarIr::Float(range.high),
-            ScalarIr::UInt(range.cells as u64),
-        ];
-        captured(TABULATED, vec![w, table], shape, scalars)
+    fn grid(operation: Operation<Self>) -> FloatTensor<Self> {
+        let count = |n: usize| ScalarIr::UInt(n as u64);
+        let (id, inputs, scalars) = match operation {
+            Convolution(x, kernel, adjoint) => {
+                (CONVOLUTION, vec![x, kernel], vec![ScalarIr::Bool(adjoint)])
+            }
+            Correlation(x, g, width, axes) => {
+                let shape = vec![width; axes].into();
+                return captured(
+                    CORRELATION,
+                    vec![x, g],
+                    shape,
+                    vec![count(width), count(axes)],
+                );
+            }
+            Bricks(x, taps, neighbours, adjoint) => {
+                let scalars = vec![ScalarIr::Bool(adjoint)];
+                (BRICKS, vec![x, taps, neighbours], scalars)
+            }
+            Tabulated(w, table, TableRange { low, high, cells }, order) => {
+                let ends = [low, high].map(ScalarIr::Float);
+                let scalars = vec![count(order), ends[0], ends[1], count(cells)];
+                (TABULATED, vec![w, table], scalars)
+            }
+        };
+        let shape = inputs[0].shape();
+        captured(id, inputs, shape, scalars)
     }
 }
 
 impl<B: Backend + GridOps, C: CheckpointStrategy> GridOps for Autodiff<B, C> {
-    fn circular_convolution(
-        x: FloatTensor<Self>,
-        kernel: FloatTensor<Self>,
-        adjoint: bool,
-    ) -> FloatTensor<Self> {
-        let nodes = [x.node(), kernel.node()];
-        let (x, kernel) = (x.into_primitive(), kernel.into_primitive());
-        let y = B::circular_convolution(x.clone(), kernel.clone(), adjoint);
-        let (width, axes) = (kernel.shape()[0], kernel.shape().num_dims());
-        let to_x = move |g| B::circular_convolution(g, kernel.clone(), !adjoint);
-        let to_kernel = move |g| {
-            let (x, g) = if adjoint {
-                (g, x.clone())
-            } else {
-                (x.clone(), g)
-            };
-            B::kernel_correlation(x, g, width, axes)
-        };
-        on_tape::<B, C, 2>(nodes, y, [Pullback::new(to_x), Pullback::new(to_kernel)])
-    }
-
-    fn kernel_correlation(
-        x: FloatTensor<Self>,
-        g: FloatTensor<Self>,
-        width: usize,
-        axes: usize,
-    ) -> FloatTensor<Self> {
-        let nodes = [x.node(), g.node()];
-        let (x, g) = (x.into_primitive(), g.into_primitive());
-        let y = B::kernel_correlation(x.clone(), g.clone(), width, axes);
-        let to_x = move |c| B::circular_convolution(g.clone(), c, true);
-        let to_g = move |c| B::circular_convolution(x.clone(), c, false);
-        on_tape::<B, C, 2>(nodes, y, [Pullback::new(to_x), Pullback::new(to_g)])
-    }
-
-    fn brick_convolution(
-        x: FloatTensor<Self>,
-        taps: FloatTensor<Self>,
-        neighbours: FloatTensor<Self>,
-        adjoint: bool,
-    ) -> FloatTensor<Self> {
-        let (node, x) = (x.node(), x.into_primitive());
-        // Taps and neighbours are data, not variables.
-        let (taps, neighbours) = (taps.into_primitive(), neighbours.into_primitive());
-        let y = B::brick_convolution(x, taps.clone(), neighbours.clone(), adjoint);
-        let to_x = move |g| B::brick_convolution(g, taps.clone(), neighbours.clone(), !adjoint);
-        on_tape::<B, C, 1>([node], y, [Pullback::new(to_x)])
-    }
-
-    fn tabulated(
-        w: FloatTensor<Self>,
-        table: FloatTensor<Self>,
-        range: TableRange,
-        order: usize,
-    ) -> FloatTensor<Self> {
-        let node = w.node();
-        // The table is data, not a variable: no gradient flows into it.
-        let (w, table) = (w.into_primitive(), table.into_primitive());
-        let y = B::tabulated(w.clone(), table.clone(), range, order);
-        let to_w = move |g| {
-            let slope = B::tabulated(w.clone(), table.clone(), range, order + 1);
-            B::float_mul(g, slope)
-        };
-        on_tape::<B, C, 1>([node], y, [Pullback::new(to_w)])
+    fn grid(operation: Operation<Self>) -> FloatTensor<Self> {
+        match operation {
+            Convolution(x, kernel, adjoint) => {
+                let nodes = [x.node(), kernel.node()];
+                let (x, kernel) = (x.into_primitive(), kernel.into_primitive());
+                let y = B::grid(Convolution(x.clone(), kernel.clone(), adjoint));
+                let (width, axes) = (kernel.shape()[0], kernel.shape().num_dims());
+                let to_x = move |g| B::grid(Convolution(g, kernel.clone(), !adjoint));
+                let to_kernel = move |g| {
+                    let (x, g) = if adjoint {
+                        (g, x.clone())
+                    } else {
+                        (x.clone(), g)
+                    };
+                    B::grid(Correlation(x, g, width, axes))
+                };
+                on_tape::<B, C, 2>(nodes, y, [Pullback::new(to_x), Pullback::new(to_kernel)])
+            }
+            Correlation(x, g, width, axes) => {
+                let nodes = [x.node(), g.node()];
+                let (x, g) = (x.into_primitive(), g.into_primitive());
+                let y = B::grid(Correlation(x.clone(), g.clone(), width, axes));
+                let to_x = move |c| B::grid(Convolution(g.clone(), c, true));
+                let to_g = move |c| B::grid(Convolution(x.clone(), c, false));
+                on_tape::<B, C, 2>(nodes, y, [Pullback::new(to_x), Pullback::new(to_g)])
+            }
+            Bricks(x, taps, neighbours, adjoint) => {
+                let (node, x) = (x.node(), x.into_primitive());
+                // Taps and neighbours are data, not variables.
+                let (taps, neighbours) = (taps.into_primitive(), neighbours.into_primitive());
+                let run =
+                    move |x, adjoint| B::grid(Bricks(x, taps.clone(), neighbours.clone(), adjoint));
+                let y = run(x, adjoint);
+                let to_x = move |g| run(g, !adjoint);
+                on_tape::<B, C, 1>([node], y, [Pullback::new(to_x)])
+            }
+            Tabulated(w, table, range, order) => {
+                let node = w.node();
+                // The table is data, not a variable: no gradient flows into it.
+                let (w, table) = (w.into_primitive(), table.into_primitive());
+                let run = move |order| B::grid(Tabulated(w.clone(), table.clone(), range, order));
+                let y = run(order);
+                let to_w = move |g| B::float_mul(g, run(order + 1));
+                on_tape::<B, C, 1>([node], y, [Pullback::new(to_w)])
+            }
+        }
     }
 }

@@ -3,7 +3,7 @@
 use burn_ir::{BackendIr, CustomOpIr, ScalarIr, TensorIr};
 use linearize::{Builder, CustomOpRegistry, Error, Extensions, Tangents, multilinear};
 
-use crate::ops::{BRICKS, CONVOLUTION, CORRELATION, GridOps, TABULATED};
+use crate::ops::{BRICKS, CONVOLUTION, CORRELATION, GridOps, Operation, TABULATED};
 use crate::table::TableRange;
 
 /// `d F^(k)(w) = F^(k+1)(w) dw`; the table is constant.
@@ -25,24 +25,21 @@ fn of_table(
 }
 
 fn register<B: BackendIr + GridOps>(registry: &mut CustomOpRegistry<B>) {
-    registry.register_function(CONVOLUTION, |[x, kernel], scalars| {
-        B::circular_convolution(x, kernel, scalars[0] == ScalarIr::Bool(true))
+    let flag = |scalar: &ScalarIr| *scalar == ScalarIr::Bool(true);
+    let count = |scalar: &ScalarIr| scalar.elem::<u64>() as usize;
+    registry.register_function(CONVOLUTION, move |[x, kernel], s| {
+        B::grid(Operation::Convolution(x, kernel, flag(&s[0])))
     });
-    registry.register_function(CORRELATION, |[x, g], scalars| {
-        let [width, axes] = [0, 1].map(|i| scalars[i].elem::<u64>() as usize);
-        B::kernel_correlation(x, g, width, axes)
+    registry.register_function(CORRELATION, move |[x, g], s| {
+        B::grid(Operation::Correlation(x, g, count(&s[0]), count(&s[1])))
     });
-    registry.register_function(BRICKS, |[x, taps, neighbours], scalars| {
-        B::brick_convolution(x, taps, neighbours, scalars[0] == ScalarIr::Bool(true))
+    registry.register_function(BRICKS, move |[x, taps, neighbours], s| {
+        B::grid(Operation::Bricks(x, taps, neighbours, flag(&s[0])))
     });
-    registry.register_function(TABULATED, |[w, table], scalars| {
-        let order = scalars[0].elem::<u64>() as usize;
-        let range = TableRange {
-            low: scalars[1].elem(),
-            high: scalars[2].elem(),
-            cells: scalars[3].elem::<u64>() as usize,
-        };
-        B::tabulated(w, table, range, order)
+    registry.register_function(TABULATED, move |[w, table], s| {
+        let (low, high, cells) = (s[1].elem(), s[2].elem(), count(&s[3]));
+        let range = TableRange { low, high, cells };
+        B::grid(Operation::Tabulated(w, table, range, count(&s[0])))
     });
 }
 
@@ -55,16 +52,16 @@ pub fn extensions() -> Extensions {
         .rule(BRICKS, multilinear)
         .rule(TABULATED, of_table);
     #[cfg(feature = "flex")]
-    extensions.on_flex(|registry| {
-        register(registry);
-        crate::host::flex::register_elementwise(registry);
-    });
+    {
+        register(&mut extensions.flex);
+        crate::host::flex::register_elementwise(&mut extensions.flex);
+    }
     #[cfg(feature = "ndarray")]
-    extensions.on_ndarray(|registry| {
-        register(registry);
-        crate::host::ndarray::register_elementwise(registry);
-    });
+    {
+        register(&mut extensions.ndarray);
+        crate::host::ndarray::register_elementwise(&mut extensions.ndarray);
+    }
     #[cfg(any(feature = "wgpu", feature = "cuda"))]
-    extensions.on_cube(register);
+    register(&mut extensions.cube);
     extensions
 }

@@ -3,8 +3,12 @@
 use burn::backend::Dispatch;
 use burn::tensor::Tensor;
 
-use crate::ops::GridOps;
+use crate::ops::{GridOps, Operation};
 use crate::table::TableRange;
+
+fn grid<const R: usize>(operation: Operation<Dispatch>) -> Tensor<R> {
+    Tensor::from_dispatch(<Dispatch as GridOps>::grid(operation))
+}
 
 /// `y_a = sum_b K_b x_{a+b}` (or `x_{a-b}` if `adjoint`) with periodic `x`: the paper's `K * U`.
 ///
@@ -15,25 +19,8 @@ pub fn circular_convolution<const R: usize, const K: usize>(
     kernel: Tensor<K>,
     adjoint: bool,
 ) -> Tensor<R> {
-    Tensor::from_dispatch(<Dispatch as GridOps>::circular_convolution(
-        x.into_dispatch(),
-        kernel.into_dispatch(),
-        adjoint,
-    ))
-}
-
-/// `c_b = sum_a g_a x_{a+b}` for all offsets `b` of a kernel of the given width, summed over batch axes.
-pub fn kernel_correlation<const R: usize, const K: usize>(
-    x: Tensor<R>,
-    g: Tensor<R>,
-    width: usize,
-) -> Tensor<K> {
-    Tensor::from_dispatch(<Dispatch as GridOps>::kernel_correlation(
-        x.into_dispatch(),
-        g.into_dispatch(),
-        width,
-        K,
-    ))
+    let (x, kernel) = (x.into_dispatch(), kernel.into_dispatch());
+    grid(Operation::Convolution(x, kernel, adjoint))
 }
 
 /// `y_a = sum_{b,..,c} t_b .. t_c x_{a+(b,..,c)}` on active [`crate::Bricks`], as one pass along each axis, the last one first; every pass
@@ -47,12 +34,9 @@ pub fn brick_convolution<const D: usize>(
     neighbours: Tensor<2>,
     adjoint: bool,
 ) -> Tensor<D> {
-    Tensor::from_dispatch(<Dispatch as GridOps>::brick_convolution(
-        x.into_dispatch(),
-        taps.into_dispatch(),
-        neighbours.into_dispatch(),
-        adjoint,
-    ))
+    let (taps, neighbours) = (taps.into_dispatch(), neighbours.into_dispatch());
+    let operation = Operation::Bricks(x.into_dispatch(), taps, neighbours, adjoint);
+    grid(operation)
 }
 
 /// `F^(order)(w)` entry by entry, `F` given by the coefficients `[cells, 6]` of a [`crate::HermiteTable`].
@@ -64,10 +48,6 @@ pub fn tabulated<const R: usize>(
     range: TableRange,
     order: usize,
 ) -> Tensor<R> {
-    Tensor::from_dispatch(<Dispatch as GridOps>::tabulated(
-        w.into_dispatch(),
-        table.into_dispatch(),
-        range,
-        order,
-    ))
+    let (w, table) = (w.into_dispatch(), table.into_dispatch());
+    grid(Operation::Tabulated(w, table, range, order))
 }

@@ -200,10 +200,7 @@ impl<const D: usize> MinimizingMovement<D> {
         let extensions = step.extensions();
         let single = products == Precision::Single && step.allows_single_precision();
         let product_dtype = (single && device.dtype() != DType::F32).then_some(DType::F32);
-        let program = match product_dtype {
-            Some(dtype) => graph.linearize_in(&extensions, dtype)?,
-            None => graph.linearize(&extensions)?,
-        };
+        let program = graph.linearize(&extensions, product_dtype)?;
         Ok(Self {
             linearization: program.on(device.device(), &extensions)?,
             product_dtype,

@@ -8,36 +8,31 @@ use crate::tangent::Tangent;
 
 pub(super) fn jvp(cx: &mut Context, whole: &OperationIr, op: &Base) -> Option<Vec<Tangent>> {
     let one = match op {
-        Base::Reshape(s) | Base::Expand(s) => cx.linear(whole, &s.input),
-        Base::SwapDims(s) => cx.linear(whole, &s.input),
-        Base::Permute(s) => cx.linear(whole, &s.input),
-        Base::Flip(s) => cx.linear(whole, &s.input),
-        Base::Unfold(s) => cx.linear(whole, &s.input),
-        Base::Slice(s) => cx.linear(whole, &s.tensor),
-        Base::Select(s) => cx.linear(whole, &s.tensor),
-        Base::Gather(s) => cx.linear(whole, &s.tensor),
-        Base::GatherNd(s) => cx.linear(whole, &s.data),
-        Base::RepeatDim(s) => cx.linear(whole, &s.tensor),
-        Base::Cast(s) => cx.linear(whole, &s.input),
-        Base::SliceAssign(s) => cx.jointly_linear(whole, &[&s.tensor, &s.value]),
-        Base::SelectAssign(s) if overwrites(s.update) => {
-            cx.jointly_linear(whole, &[&s.tensor, &s.value])
-        }
-        Base::Scatter(s) if overwrites(s.update) => {
-            cx.jointly_linear(whole, &[&s.tensor, &s.value])
-        }
-        Base::ScatterNd(s) if overwrites(s.reduction) => {
-            cx.jointly_linear(whole, &[&s.data, &s.values])
-        }
-        Base::MaskWhere(s) => cx.jointly_linear(whole, &[&s.tensor, &s.value]),
+        Base::Reshape(_)
+        | Base::Expand(_)
+        | Base::SwapDims(_)
+        | Base::Permute(_)
+        | Base::Flip(_)
+        | Base::Unfold(_)
+        | Base::Slice(_)
+        | Base::Select(_)
+        | Base::Gather(_)
+        | Base::GatherNd(_)
+        | Base::RepeatDim(_)
+        | Base::Cast(_) => cx.linear(whole),
+        Base::SliceAssign(_) => cx.jointly_linear(whole, &[0, 1]),
+        Base::SelectAssign(s) if overwrites(s.update) => cx.jointly_linear(whole, &[0, 2]),
+        Base::Scatter(s) if overwrites(s.update) => cx.jointly_linear(whole, &[0, 2]),
+        Base::ScatterNd(s) if overwrites(s.reduction) => cx.jointly_linear(whole, &[0, 2]),
+        Base::MaskWhere(_) => cx.jointly_linear(whole, &[0, 2]),
         Base::MaskFill(s) => {
             let filled = MaskFillOpIr {
                 value: ScalarIr::Float(0.0),
                 ..s.clone()
             };
-            cx.linear(&OperationIr::BaseFloat(Base::MaskFill(filled)), &s.tensor)
+            cx.linear(&OperationIr::BaseFloat(Base::MaskFill(filled)))
         }
-        Base::Cat(c) => cx.jointly_linear(whole, &c.tensors.iter().collect::<Vec<_>>()),
+        Base::Cat(c) => cx.jointly_linear(whole, &(0..c.tensors.len()).collect::<Vec<_>>()),
         // Not real.
         Base::Equal(_)
         | Base::EqualElem(_)

@@ -2,26 +2,15 @@
 
 use std::f64::consts::PI;
 
-use burn::backend::ir::{
-    BinaryOpIr, CrossOpIr, FloatOperationIr as Float, MatmulOpIr, OperationIr, TensorIr, UnaryOpIr,
-};
-use burn::tensor::DType;
+use burn::backend::ir::{BinaryOpIr, FloatOperationIr as Float, OperationIr, TensorIr, UnaryOpIr};
 
 use super::Context;
 use crate::emit::Emitter;
 use crate::tangent::{Builder, Tangent};
 
-pub(super) fn jvp(cx: &mut Context, dtype: DType, op: &Float) -> Option<Vec<Tangent>> {
-    let wrap = move |op| OperationIr::Float(dtype, op);
+pub(super) fn jvp(cx: &mut Context, whole: &OperationIr, op: &Float) -> Option<Vec<Tangent>> {
     let one = match op {
-        Float::Matmul(m) => cx.bilinear([&m.lhs, &m.rhs], |lhs, rhs| {
-            let out = m.out.clone();
-            wrap(Float::Matmul(MatmulOpIr { lhs, rhs, out }))
-        }),
-        Float::Cross(m) => cx.bilinear([&m.lhs, &m.rhs], |lhs, rhs| {
-            let m = m.clone();
-            wrap(Float::Cross(CrossOpIr { lhs, rhs, ..m }))
-        }),
+        Float::Matmul(_) | Float::Cross(_) => cx.multilinear(whole, &[0, 1]),
         Float::PowfScalar(s) => {
             let exponent: f64 = s.rhs.elem();
             let power = cx.build.primal.powf(&s.lhs, exponent - 1.0);

@@ -17,7 +17,7 @@ use burn::backend::ir::{
 };
 use burn::tensor::{BoolStore, DType};
 
-use crate::ir::{like, name, output, read_only, rename};
+use crate::ir::{like, name, output, read_only, with_inputs};
 use crate::tangent::{Builder, Expression, Tangent};
 use crate::{Error, Extensions};
 
@@ -38,31 +38,26 @@ impl Context<'_> {
         t.and_then(|e| self.build.times(p, e, &out.shape))
     }
 
-    /// The operation on the tangent of the argument in which it is linear. Others are no floats, or give it their shapes only.
-    fn linear(&mut self, operation: &OperationIr, argument: &TensorIr) -> Tangent {
-        self.jointly_linear(operation, &[argument])
+    /// The operation on the tangent of its first input, in which it is linear. Others are no floats.
+    fn linear(&mut self, operation: &OperationIr) -> Tangent {
+        self.jointly_linear(operation, &[0])
     }
 
-    /// The operation on the tangents of the arguments in which it is jointly linear.
-    fn jointly_linear(&mut self, operation: &OperationIr, arguments: &[&TensorIr]) -> Tangent {
-        let tangents = arguments.iter().map(|t| (self.d(t), *t)).collect();
-        let mut operation = operation.clone();
-        self.build.jointly_linear(tangents, |tangents| {
-            let ids = arguments.iter().map(|t| t.id);
-            rename(&mut operation, &ids.zip(tangents).collect());
-            operation
+    /// The operation on the tangents of its inputs at these places, in which it is jointly linear. Others are no floats, or give it
+    /// their shapes only, or stay as they are.
+    fn jointly_linear(&mut self, operation: &OperationIr, places: &[usize]) -> Tangent {
+        let inputs: Vec<&TensorIr> = operation.inputs().collect();
+        let tangents = places.iter().map(|i| (self.d(inputs[*i]), inputs[*i]));
+        let tangents = tangents.collect();
+        (self.build).jointly_linear(tangents, |t| with_inputs(operation, places, &t))
+    }
+
+    /// The sum of the operation on the tangent of each of its inputs at these places, in which it is linear separately.
+    fn multilinear(&mut self, operation: &OperationIr, places: &[usize]) -> Tangent {
+        places.iter().fold(None, |sum, place| {
+            let term = self.jointly_linear(operation, &[*place]);
+            self.build.plus(sum, term)
         })
-    }
-
-    /// The sum of the operation on the tangent of either argument and the other argument itself.
-    fn bilinear(
-        &mut self,
-        [l, r]: [&TensorIr; 2],
-        make: impl Fn(TensorIr, TensorIr) -> OperationIr,
-    ) -> Tangent {
-        let left = (self.d(l)).map(|e| self.build.linear(e, |tangent| make(tangent, r.clone())));
-        let right = (self.d(r)).map(|e| self.build.linear(e, |tangent| make(l.clone(), tangent)));
-        self.build.plus(left, right)
     }
 
     /// `1` where `t` compares true, `0` elsewhere.
@@ -95,7 +90,7 @@ pub(crate) fn jvp(cx: &mut Context, operation: &OperationIr) -> Result<Vec<Tange
     }
     let found = match operation {
         OperationIr::NumericFloat(dtype, op) => numeric::jvp(cx, operation, *dtype, op),
-        OperationIr::Float(dtype, op) => float::jvp(cx, *dtype, op),
+        OperationIr::Float(_, op) => float::jvp(cx, operation, op),
         OperationIr::BaseFloat(op) => base::jvp(cx, operation, op),
         OperationIr::Module(op) => module::jvp(cx, operation, op),
         OperationIr::Activation(op) => activation::jvp(cx, op),
@@ -121,23 +116,14 @@ fn custom(
         .map(|t| cx.d(t).map(|e| cx.build.handle(e)))
         .collect();
     let outputs = rule(operation, &tangents, &mut cx.build)?;
-    let wrong = |reason| {
-        let operation = id.clone();
-        Err(Error::Rule { operation, reason })
+    let fits = |(tangent, out): (&Option<TensorIr>, &TensorIr)| {
+        tangent.as_ref().is_none_or(|t| t.shape == out.shape)
     };
-    let (found, expected) = (outputs.len(), operation.outputs.len());
-    if found != expected {
-        return wrong(format!("{found} tangents for {expected} outputs"));
-    }
-    for (tangent, out) in outputs.iter().zip(&operation.outputs) {
-        if let Some(tangent) = tangent
-            && tangent.shape != out.shape
-        {
-            let (found, expected) = (tangent.shape.to_vec(), out.shape.to_vec());
-            return wrong(format!(
-                "tangent of shape {found:?} for an output of shape {expected:?}"
-            ));
-        }
+    if outputs.len() != operation.outputs.len() || !outputs.iter().zip(&operation.outputs).all(fits)
+    {
+        return Err(Error::Rule {
+            operation: id.clone(),
+        });
     }
     Ok(outputs
         .into_iter()

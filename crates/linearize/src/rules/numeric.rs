@@ -83,17 +83,18 @@ pub(super) fn jvp(
             let inside = cx.indicator(&s.lhs, s.rhs, Num::LowerEqualElem);
             cx.times(&inside, cx.d(&s.lhs), &s.out)
         }
-        Num::Sum(r) | Num::Mean(r) => cx.linear(whole, &r.input),
-        Num::SumDim(r) | Num::MeanDim(r) => cx.linear(whole, &r.input),
-        Num::SumDims(r) => cx.linear(whole, &r.input),
-        Num::CumSum(r) => cx.linear(whole, &r.input),
+        Num::Sum(_)
+        | Num::Mean(_)
+        | Num::SumDim(_)
+        | Num::MeanDim(_)
+        | Num::SumDims(_)
+        | Num::CumSum(_) => cx.linear(whole),
         Num::Pad(p) => {
             let mut p = p.clone();
             if let PadModeIr::Constant(value) = &mut p.mode {
                 *value = ScalarIr::Float(0.0);
             }
-            let input = p.input.clone();
-            cx.linear(&wrap(Num::Pad(p)), &input)
+            cx.linear(&wrap(Num::Pad(p)))
         }
         Num::MaxDimWithIndices(m) | Num::MinDimWithIndices(m) => {
             return Some(selected(cx, &m.tensor, m.dim, &m.out_indices, &m.out));
