@@ -51,14 +51,6 @@ pub enum Error {
     /// A metric inserted twice.
     #[error("metric {name:?} is already set to {value}")]
     DuplicateMetric { name: String, value: String },
-    /// A table row with the wrong number of cells.
-    #[error("row {row} of the table has {found} cells where there are {expected} columns")]
-    RowLength {
-        /// Index of the row, from 0.
-        row: usize,
-        expected: usize,
-        found: usize,
-    },
     /// A file or folder that could not be written; what was there before is untouched.
     #[error(transparent)]
     File(#[from] files::Error),
