@@ -1,8 +1,6 @@
 //! Shapes in the plane, as the pixels of an image.
 
-use images::{
-    Drawing, Frame, Image, Inside, Interface, Outline, OutlineDistance, Side, Svg, Threshold,
-};
+use images::{Drawing, Frame, Image, Inside, Interface, Outline, OutlineDistance, Side, Threshold};
 use render::Rgb;
 
 use crate::paths::{extension, read};
@@ -101,11 +99,6 @@ impl Plane {
         self.original = Some(Original { picture, drawn });
         Ok(())
     }
-
-    fn svg(&self, u: &Field<2>) -> Result<Svg, Error> {
-        let outline = Outline::of_phase_field(u)?;
-        Ok(Svg::on_white(self.frame).filled(&outline, Rgb::BLACK))
-    }
 }
 
 impl Original {
@@ -195,7 +188,10 @@ impl Presentation<2> for Plane {
 
     fn save(&self, u: &Field<2>, eps: f64, path: &Path) -> Result<(), Error> {
         match &*extension(path) {
-            "svg" => self.svg(u)?.write(path)?,
+            "svg" => {
+                let text = images::svg(&self.frame, &Outline::of_phase_field(u)?);
+                files::write_atomically(path, |out| out.write_all(text.as_bytes()))?;
+            }
             _ => self.picture(u, u, eps)?.write_png(path)?,
         }
         Ok(())

@@ -3,8 +3,8 @@
 //! ```
 //! use geometry::{Grid, Placement, phase_field};
 //! use images::{
-//!     Drawing, Frame, Inside, Interface, Outline, OutlineDistance, Side, Svg, Threshold,
-//!     read,
+//!     Drawing, Frame, Inside, Interface, Outline, OutlineDistance, Side, Threshold, read,
+//!     svg,
 //! };
 //! use render::Rgb;
 //!
@@ -34,7 +34,9 @@
 //!     let drawing = Drawing::transparent(frame).filled(&interface, Rgb::BLACK);
 //!     drawing.picture()?.write_png(folder.join("again.png"))?;
 //!     let curves = Outline::of_phase_field(&u)?;
-//!     Svg::on_white(frame).filled(&curves, Rgb::BLACK).write(folder.join("again.svg"))?;
+//!     files::write_atomically(folder.join("again.svg"), |out| {
+//!         out.write_all(svg(&frame, &curves).as_bytes())
+//!     })?;
 //!
 //!     let again = read(folder.join("again.png"))?;
 //!     let side = Side::of(&again, Inside::Auto, Threshold::default())?;
@@ -87,4 +89,4 @@ pub use read::colours;
 pub use read::error::FormatError;
 pub use read::{decode, read};
 pub use selection::{Inside, Side, Threshold, Tones};
-pub use svg::Svg;
+pub use svg::svg;
