@@ -64,10 +64,4 @@ pub enum Error {
          not change sign"
     )]
     NoInterface { low: f64, high: f64 },
-    /// A region that contains no node.
-    #[error(
-        "no node of the grid of {nodes} nodes is in the region, so nothing could move; check where \
-         it is placed, or use a finer grid"
-    )]
-    EmptyMask { nodes: usize },
 }

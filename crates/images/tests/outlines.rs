@@ -10,9 +10,7 @@ use geometry::shapes::{Ball, Cuboid};
 use geometry::{
     Field, Grid, Placement, Rotation, SignedDistance, SignedDistanceExt, optimal_profile,
 };
-use images::{
-    Error, Image, Inside, Interface, Outline, OutlineDistance, Side, Threshold, decode, mask,
-};
+use images::{Error, Image, Inside, Interface, Outline, OutlineDistance, Side, Threshold, decode};
 use proptest::prelude::*;
 
 fn outline(image: &Image) -> Outline {
@@ -424,31 +422,6 @@ fn placement_and_its_inverse() {
             .to_string(),
         "longest side of the bounding box = 0.0 is not allowed: it must be finite and positive"
     );
-}
-
-#[test]
-fn masks_hold_the_nodes_inside() {
-    let image = Raster::new([50, 50], 4, disc([25.0, 25.0], 20.0)).image();
-    let grid = Grid::<2>::centred(128, 1.0).unwrap();
-    let placement = Placement::fit(&image.bounding_box(), &grid, 1.0, 0.0).unwrap();
-    let region = OutlineDistance::new(&outline(&image).placed(&placement));
-    let nodes = mask(grid, &region).unwrap();
-    assert_eq!(nodes.len(), grid.len());
-    let count = nodes.iter().filter(|&&inside| inside).count();
-    near(count as f64 / grid.len() as f64, PI * 0.16, 2e-3);
-    for (k, &inside) in nodes.iter().enumerate() {
-        let [x, y] = grid.node(k);
-        if (x.hypot(y) - 0.4).abs() > 0.003 {
-            assert_eq!(inside, x.hypot(y) < 0.4);
-        }
-    }
-    let error = mask(grid, &region.translated([5.0, 0.0])).unwrap_err();
-    assert_eq!(
-        error.to_string(),
-        "no node of the grid of 16384 nodes is in the region, so nothing could move; check where it \
-         is placed, or use a finer grid"
-    );
-    assert!(mask(grid, &|_: [f64; 2]| f64::NAN).is_err());
 }
 
 #[test]
