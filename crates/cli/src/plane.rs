@@ -1,6 +1,6 @@
 //! Shapes in the plane, as the pixels of an image.
 
-use images::{Drawing, Frame, Image, Inside, Interface, Outline, OutlineDistance, Side, Threshold};
+use images::{Frame, Image, Inside, Interface, Outline, OutlineDistance, Side, Threshold, drawing};
 use render::Rgb;
 
 use crate::paths::{extension, read};
@@ -169,13 +169,8 @@ impl Presentation<2> for Plane {
     fn picture(&self, _: &Field<2>, u: &Field<2>, eps: f64) -> Result<Picture, Error> {
         let interface = Interface::new(u, eps)?;
         match &self.original {
-            None => Ok(Drawing::on_white(self.frame)
-                .filled(&interface, Rgb::BLACK)
-                .picture()?),
-            Some(original) => {
-                let drawing = Drawing::transparent(self.frame).filled(&interface, Rgb::BLACK);
-                original.with(&drawing.picture()?)
-            }
+            None => Ok(drawing(&self.frame, &interface, Some(Rgb::WHITE))?),
+            Some(original) => original.with(&drawing(&self.frame, &interface, None)?),
         }
     }
 

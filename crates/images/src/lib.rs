@@ -3,8 +3,7 @@
 //! ```
 //! use geometry::{Grid, Placement, phase_field};
 //! use images::{
-//!     Drawing, Frame, Inside, Interface, Outline, OutlineDistance, Side, Threshold, read,
-//!     svg,
+//!     Frame, Inside, Interface, Outline, OutlineDistance, Side, Threshold, drawing, read, svg,
 //! };
 //! use render::Rgb;
 //!
@@ -13,7 +12,7 @@
 //! #   let folder = folder.path();
 //! #   let disc = geometry::shapes::Ball::new([50.0, 40.0], 30.0)?;
 //! #   let frame = Frame::new(100, 80, [0.0, 80.0], 1.0)?;
-//! #   Drawing::on_white(frame).filled(&disc, Rgb::BLACK).picture()?.write_png(folder.join("logo.png"))?;
+//! #   drawing(&frame, &disc, Some(Rgb::WHITE))?.write_png(folder.join("logo.png"))?;
 //!     // A black disc of radius 30 pixels on white, of 100 times 80 pixels.
 //!     let image = read(folder.join("logo.png"))?;
 //!     let side = Side::of(&image, Inside::Auto, Threshold::default())?;
@@ -31,8 +30,7 @@
 //!     // Back in the pixels of the image, and as curves.
 //!     let frame = Frame::of_image(&image, &placement)?;
 //!     let interface = Interface::new(&u, eps)?;
-//!     let drawing = Drawing::transparent(frame).filled(&interface, Rgb::BLACK);
-//!     drawing.picture()?.write_png(folder.join("again.png"))?;
+//!     drawing(&frame, &interface, None)?.write_png(folder.join("again.png"))?;
 //!     let curves = Outline::of_phase_field(&u)?;
 //!     files::write_atomically(folder.join("again.svg"), |out| {
 //!         out.write_all(svg(&frame, &curves).as_bytes())
@@ -77,7 +75,7 @@ mod selection;
 mod svg;
 
 pub use distance::OutlineDistance;
-pub use drawing::Drawing;
+pub use drawing::drawing;
 pub use error::Error;
 pub use frame::Frame;
 pub use image::{Image, LARGEST_IMAGE};
