@@ -1,6 +1,6 @@
 //! Shapes in the plane, as the pixels of an image.
 
-use images::{Frame, Image, Inside, Interface, Outline, OutlineDistance, Side, Threshold, drawing};
+use images::{Frame, Image, Interface, Outline, OutlineDistance, Side, drawing};
 use render::Rgb;
 
 use crate::paths::{extension, read};
@@ -71,7 +71,7 @@ impl Plane {
                 size[0], size[1]
             )));
         }
-        let side = Side::of(&image, Inside::Auto, Threshold::default())?;
+        let side = Side::of(&image, 0.5)?;
         let mut outline = Outline::of_image(&image, side)?;
         if self.image.is_none() {
             let fills = Placement::fit(&image.bounding_box(), grid, grid.side(), 0.0)?;

@@ -3,7 +3,7 @@
 //! ```
 //! use geometry::{Grid, Placement, phase_field};
 //! use images::{
-//!     Frame, Inside, Interface, Outline, OutlineDistance, Side, Threshold, drawing, read, svg,
+//!     Frame, Interface, Outline, OutlineDistance, Side, drawing, read, svg,
 //! };
 //! use render::Rgb;
 //!
@@ -15,7 +15,7 @@
 //! #   drawing(&frame, &disc, Some(Rgb::WHITE))?.write_png(folder.join("logo.png"))?;
 //!     // A black disc of radius 30 pixels on white, of 100 times 80 pixels.
 //!     let image = read(folder.join("logo.png"))?;
-//!     let side = Side::of(&image, Inside::Auto, Threshold::default())?;
+//!     let side = Side::of(&image, 0.5)?;
 //!     let outline = Outline::of_image(&image, side)?;
 //!     println!("{side}, area {:.0} pixels", outline.area()); // 900 pi = 2827.4
 //! #   assert_eq!(format!("{side}, {:.0}", outline.area()), "darker than 0.5000, 2829");
@@ -37,7 +37,7 @@
 //!     })?;
 //!
 //!     let again = read(folder.join("again.png"))?;
-//!     let side = Side::of(&again, Inside::Auto, Threshold::default())?;
+//!     let side = Side::of(&again, 0.5)?;
 //!     println!("{side}, area {:.0} pixels", Outline::of_image(&again, side)?.area());
 //! #   let area = Outline::of_image(&again, side)?.area();
 //! #   assert_eq!(format!("{side}, {area:.0}"), "more opaque than 0.5000, 2829");
@@ -84,5 +84,5 @@ pub use outline::{LARGEST_OUTLINE, Outline};
 pub use read::colours;
 pub use read::error::FormatError;
 pub use read::{decode, read};
-pub use selection::{Inside, Side, Threshold, Tones};
+pub use selection::{Side, Tones};
 pub use svg::svg;

@@ -7,14 +7,11 @@ use std::f64::consts::PI;
 use crate::common::{Raster, disc, near, square};
 use geometry::shapes::{Ball, Cuboid};
 use geometry::{Field, Grid, Placement, Rotation, SignedDistance, SignedDistanceExt, phase_field};
-use images::{
-    Frame, Image, Inside, Interface, Outline, OutlineDistance, Side, Threshold, decode, drawing,
-    svg,
-};
+use images::{Frame, Image, Interface, Outline, OutlineDistance, Side, decode, drawing, svg};
 use render::{Picture, Rgb};
 
 fn outline(image: &Image) -> Outline {
-    let side = Side::of(image, Inside::Auto, Threshold::default()).unwrap();
+    let side = Side::of(image, 0.5).unwrap();
     Outline::of_image(image, side).unwrap()
 }
 

@@ -1,7 +1,7 @@
 //! What tells drawings from photographs, and the raster from the shape.
 
 use geometry::SignedDistance;
-use images::{Image, Inside, Outline, OutlineDistance, Side, Threshold, Tones, colours};
+use images::{Image, Outline, OutlineDistance, Side, Tones, colours};
 
 const PIXELS: u32 = 160;
 
@@ -24,7 +24,7 @@ fn drawings_have_two_tones_and_photographs_do_not() {
     let hard = image(|x, y| f64::from(u8::from(radius(x, y) > 60.0)));
     let photograph = image(|x, y| 0.5 + 0.4 * (0.05 * x).sin() * (0.07 * y).cos());
     let tones = |image: &Image| {
-        let side = Side::of(image, Inside::Auto, Threshold::default()).unwrap();
+        let side = Side::of(image, 0.5).unwrap();
         Tones::of(image, side)
     };
     let [blended, hard, photograph] = [&blended, &hard, &photograph].map(tones);
