@@ -91,8 +91,8 @@ fn images_survive_the_way_through_a_phase_field() {
     let placement = Placement::fit(&image.bounding_box(), &grid, 1.0, 0.0).unwrap();
     let u = phase_field(grid, &OutlineDistance::new(&found.placed(&placement)), eps).unwrap();
     let interface = Interface::new(&u, eps).unwrap();
-    let frame = Frame::of_image(&image, &placement).unwrap();
-    assert_eq!((frame.width(), frame.height()), (200, 120));
+    let corner = placement.apply([0.0, 120.0]);
+    let frame = Frame::new(200, 120, corner, placement.scale()).unwrap();
 
     for paper in [Some(Rgb::WHITE), None] {
         let drawn = drawing(&frame, &interface, paper).unwrap();

@@ -61,6 +61,6 @@ mod shadow;
 pub use camera::View;
 pub use error::Error;
 pub use model::Tube;
-pub use picture::{LARGEST_SIDE, Picture, animation};
+pub use picture::{Picture, animation, checked_size};
 pub use scene::{Quality, Scene};
 pub use srgb::Rgb;

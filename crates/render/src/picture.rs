@@ -9,10 +9,13 @@ use geometry::require;
 use crate::Error;
 
 /// Largest side of a picture, in pixels.
-pub const LARGEST_SIDE: u32 = 8192;
+const LARGEST_SIDE: u32 = 8192;
 
 /// Accepts sizes that can be drawn.
-pub(crate) fn checked(size: [u32; 2]) -> Result<[u32; 2], Error> {
+///
+/// # Errors
+/// [`Error::PictureSize`].
+pub fn checked_size(size: [u32; 2]) -> Result<[u32; 2], Error> {
     if size.iter().all(|side| (1..=LARGEST_SIDE).contains(side)) {
         return Ok(size);
     }
@@ -36,7 +39,7 @@ impl Picture {
     /// # Errors
     /// The sides must be from 1 to 8192, and the pixels `width * height`.
     pub fn new(width: u32, height: u32, pixels: Vec<[u8; 4]>) -> Result<Self, Error> {
-        let size = checked([width, height])?;
+        let size = checked_size([width, height])?;
         if pixels.len() != width as usize * height as usize {
             return Err(Error::PixelCount {
                 width,

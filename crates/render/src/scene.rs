@@ -11,7 +11,7 @@ use crate::Error;
 use crate::camera::{Camera, View};
 use crate::light::Lights;
 use crate::model::{Model, Tube};
-use crate::picture::{Picture, checked};
+use crate::picture::{Picture, checked_size};
 use crate::raster::Triangle;
 use crate::shadow::{Effort, arriving};
 
@@ -180,7 +180,7 @@ impl Scene {
     /// # Errors
     /// A number out of range, nothing to frame, or a size that cannot be drawn.
     pub fn render(&self, size: [u32; 2]) -> Result<Picture, Error> {
-        let size = checked(size)?;
+        let size = checked_size(size)?;
         let mut model = Model::new(&self.mesh);
         let mut colours = vec![self.colour.linear()];
         for (index, tube) in self.tubes.iter().enumerate() {
