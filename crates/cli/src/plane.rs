@@ -85,10 +85,7 @@ impl Plane {
         let Some(path) = &self.image else {
             return Ok(());
         };
-        let picture = images::colours(&read(path)?).map_err(|problem| images::Error::Format {
-            path: path.clone(),
-            problem,
-        })?;
+        let picture = images::colours(path, &read(path)?)?;
         let width = self.frame.width() as usize;
         let is_inside = |pixel: usize| {
             let [column, row] = [pixel % width, pixel / width].map(|i| i as f64 + 0.5);
@@ -207,7 +204,7 @@ impl Presentation<2> for Plane {
 
     fn restore(&mut self, stored: &StoredRun) -> Result<(), Error> {
         if self.is_repaired {
-            let picture = |name: &str| Ok::<_, Error>(Picture::from_png(&stored.read(name)?)?);
+            let picture = |name: &str| Ok::<_, Error>(images::colours(name, &stored.read(name)?)?);
             let drawn = picture(MASK)?.pixels().iter().map(|p| p[0] == 0).collect();
             let picture = picture(ORIGINAL)?;
             self.original = Some(Original { picture, drawn });

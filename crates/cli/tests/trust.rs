@@ -230,8 +230,8 @@ fn inpainting_copies_the_pixels_outside_of_the_mask_in_their_colours() {
         &[&inpaint[..], &["--save", "whole.png", "--output", "run"]].concat(),
     );
     let read = |name: &str| {
-        let bytes = fs::read(folder.path().join(name)).unwrap();
-        images::colours(&bytes).unwrap()
+        let path = folder.path().join(name);
+        images::colours(&path, &fs::read(&path).unwrap()).unwrap()
     };
     let repaired = read("whole.png");
     assert_eq!(read("run/final.png").pixels(), repaired.pixels());

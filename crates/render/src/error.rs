@@ -16,9 +16,6 @@ pub enum Error {
     /// The PNG encoder failed.
     #[error("the picture could not be encoded as PNG")]
     Encode(#[from] png::EncodingError),
-    /// Bytes that are no picture of this crate.
-    #[error("the picture cannot be read: {0}")]
-    Decode(#[from] png::DecodingError),
     /// The camera is to be fitted to a surface that is not there.
     #[error(
         "there is no surface and no tube, so nothing can be framed; say within which box for a \

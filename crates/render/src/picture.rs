@@ -74,23 +74,6 @@ impl Picture {
         self.pixels[y as usize * self.size[0] as usize + x as usize]
     }
 
-    /// The picture in the bytes of a PNG file as this crate writes them: eight bits, with or without opacity; the first one of an
-    /// animation.
-    ///
-    /// # Errors
-    /// [`Error::Decode`]; as [`Picture::new`].
-    pub fn from_png(bytes: &[u8]) -> Result<Self, Error> {
-        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info()?;
-        let mut data = vec![0; reader.output_buffer_size().unwrap_or(0)];
-        let info = reader.next_frame(&mut data)?;
-        let channels = info.color_type.samples();
-        let pixels = data[..info.buffer_size()].chunks_exact(channels).map(|p| {
-            let opacity = p.get(3).copied().unwrap_or(u8::MAX);
-            [p[0], p[1 % channels], p[2 % channels], opacity]
-        });
-        Self::new(info.width, info.height, pixels.collect())
-    }
-
     /// The bytes of a PNG file.
     ///
     /// # Errors

@@ -457,13 +457,8 @@ fn files_hold_the_pictures() {
     assert!(colour == png::ColorType::Rgba && control.is_none());
     assert_eq!(frames[0], picture.pixels().as_flattened());
     let opaque = Picture::new(2, 1, vec![[1, 2, 3, 255]; 2]).unwrap();
-    for picture in [&picture, &opaque] {
-        let again = Picture::from_png(&picture.to_png().unwrap()).unwrap();
-        assert_eq!(again.pixels(), picture.pixels());
-    }
-    assert!(Picture::from_png(b"no picture").is_err());
     let (colour, _, frames) = decoded(&opaque.to_png().unwrap());
-    assert_eq!((colour, frames[0].len()), (png::ColorType::Rgb, 6));
+    assert!(colour == png::ColorType::Rgb && frames[0] == [1, 2, 3, 1, 2, 3]);
 
     let pictures = [
         picture.clone(),
