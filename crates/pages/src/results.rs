@@ -1,9 +1,8 @@
 //! Pages of results: what the folders of experiments hold, as sections.
 //!
 //! A folder of an experiment has a `manifest.json` and a `summary.json`, figures (PNG, the same as
-//! SVG beside it), numbered pictures (`name_000.png`, `name_001.png`, ...), and tables (Markdown,
-//! the same as CSV beside it). [`index_page`] makes one page of all folders, [`run_page`] one of a
-//! single folder.
+//! SVG beside it), and tables (Markdown, the same as CSV beside it). [`index_page`] makes one page
+//! of all folders, [`run_page`] one of a single folder.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -16,7 +15,7 @@ use serde_json::Value;
 use crate::error::{Error, Result};
 use crate::facts::{Facts, five_digits, natural};
 use crate::image::Image;
-use crate::page::{Details, Figure, Frames, Page, Section};
+use crate::page::{Details, Figure, Page, Section};
 use crate::table::Table;
 use crate::text::Text;
 
@@ -128,24 +127,14 @@ fn experiment(root: &Path, folder: &str, name: Option<&str>, problems: &mut Vec<
     if let Some(entry) = entry {
         section.push(Text::markdown(&entry.description));
     }
-    let (single, sequences) = pictures(&files);
     let captions = entry.map_or(&[][..], |entry| &entry.figures);
-    for (file, caption) in ordered(single, captions) {
+    for (file, caption) in ordered(pictures(&files), captions) {
         let Some(file) = file else {
             problems.push(Error::Missing(path(&caption)));
             continue;
         };
         if let Some(image) = kept(image(root, &path(&file)), problems) {
             section.push(Figure::new(image, caption));
-        }
-    }
-    for (name, files) in sequences {
-        let frames = files.iter().filter_map(|file| {
-            let image = kept(image(root, &path(file)), problems)?;
-            Some((number_of(file)?.1.to_owned(), image))
-        });
-        if let Ok(frames) = Frames::new(format!("{}.", spelled_out(&name)), frames.collect()) {
-            section.push(frames);
         }
     }
     let mut folded = Vec::new();
@@ -307,26 +296,14 @@ fn tables(files: &[String]) -> impl Iterator<Item = (&str, bool)> {
         })
 }
 
-/// Single pictures, a PNG before the SVG of the same name, and numbered ones by their name.
-fn pictures(files: &[String]) -> (Vec<String>, Vec<(String, Vec<String>)>) {
-    let (mut single, mut sequences) = (Vec::new(), Vec::<(String, Vec<String>)>::new());
-    let has = |stem: &str, extension: &str| files.contains(&format!("{stem}.{extension}"));
-    for file in files {
-        let stem = stem_of(file);
-        match (extension_of(file), number_of(file)) {
-            ("png", Some((name, _))) => match sequences.iter_mut().find(|(n, _)| n == name) {
-                Some((_, files)) => files.push(file.clone()),
-                None => sequences.push((name.to_owned(), vec![file.clone()])),
-            },
-            ("png" | "apng", _) => single.push(file.clone()),
-            ("svg", _) if !has(stem, "png") && !has(stem, "apng") => single.push(file.clone()),
-            _ => {}
-        }
-    }
-    // One number is no sequence.
-    let (sequences, ones): (Vec<_>, Vec<_>) = sequences.into_iter().partition(|(_, f)| f.len() > 1);
-    single.extend(ones.into_iter().flat_map(|(_, files)| files));
-    (single, sequences)
+/// Pictures: PNG, and SVG that are not there as PNG.
+fn pictures(files: &[String]) -> Vec<String> {
+    let is_shown = |file: &&String| match extension_of(file) {
+        "png" => true,
+        "svg" => !files.contains(&format!("{}.png", stem_of(file))),
+        _ => false,
+    };
+    files.iter().filter(is_shown).cloned().collect()
 }
 
 fn extension_of(file: &str) -> &str {
@@ -335,13 +312,6 @@ fn extension_of(file: &str) -> &str {
 
 fn stem_of(file: &str) -> &str {
     file.rsplit_once('.').map_or(file, |(stem, _)| stem)
-}
-
-/// `name` and `012` of `name_012.png`.
-fn number_of(file: &str) -> Option<(&str, &str)> {
-    let (name, number) = stem_of(file).rsplit_once(['_', '-'])?;
-    let is_number = number.len() >= 3 && number.bytes().all(|b| b.is_ascii_digit());
-    is_number.then_some((name, number))
 }
 
 /// `Error over radius` of `error_over_radius`.
@@ -371,21 +341,9 @@ mod tests {
     }
 
     #[test]
-    fn pictures_are_sorted_into_figures_and_sequences() {
-        let files = [
-            "a.png",
-            "a.svg",
-            "b.svg",
-            "turn_000.png",
-            "turn_001.png",
-            "x-123.png",
-            "t.csv",
-        ];
-        let files: Vec<String> = files.map(str::to_owned).into();
-        let (single, sequences) = pictures(&files);
-        assert_eq!(single, ["a.png", "b.svg", "x-123.png"]);
-        let turn = vec!["turn_000.png".to_owned(), "turn_001.png".to_owned()];
-        assert_eq!(sequences, [("turn".to_owned(), turn)]);
+    fn pictures_are_shown_once() {
+        let files = ["a.png", "a.svg", "b.svg", "t.csv"].map(str::to_owned);
+        assert_eq!(pictures(&files), ["a.png", "b.svg"]);
     }
 
     #[test]
