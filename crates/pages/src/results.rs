@@ -2,7 +2,7 @@
 //!
 //! A folder of an experiment has a `manifest.json` and a `summary.json`, figures (PNG, the same as
 //! SVG beside it), and tables (Markdown, the same as CSV beside it). [`index_page`] makes one page
-//! of all folders, [`run_page`] one of a single folder.
+//! of all folders.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -76,32 +76,15 @@ pub fn index_page(folder: &Path) -> Result<(Page, Vec<Error>)> {
         sections.push(Section::new("Beside the paper").with(text));
     }
     for name in &names {
-        sections.push(experiment(folder, name, None, &mut problems));
+        sections.push(experiment(folder, name, &mut problems));
     }
-    Ok((finished(page, sections, &problems), problems))
-}
-
-/// The page of one run, and what is missing or broken.
-///
-/// # Errors
-/// [`Error::Read`] if the folder cannot be read. Files are none.
-pub fn run_page(folder: &Path) -> Result<(Page, Vec<Error>)> {
-    entries(folder, false)?;
-    let mut problems = Vec::new();
-    let name = manifest(folder, "manifest.json").map(|(name, _)| name);
-    let name = name.unwrap_or_default();
-    let section = experiment(folder, "", Some(&name), &mut problems);
-    let page = Page::new(title(&name));
-    Ok((finished(page, vec![section], &problems), problems))
-}
-
-fn finished(page: Page, sections: Vec<Section>, problems: &[Error]) -> Page {
     let mut first = Section::new("Missing or broken files").named("problems");
-    for problem in problems {
+    for problem in &problems {
         first.push(Text::from(problem.to_string()));
     }
     let first = (!problems.is_empty()).then_some(first);
-    first.into_iter().chain(sections).fold(page, Page::with)
+    let page = first.into_iter().chain(sections).fold(page, Page::with);
+    Ok((page, problems))
 }
 
 fn title(name: &str) -> String {
@@ -109,19 +92,11 @@ fn title(name: &str) -> String {
     entry.map_or_else(|| spelled_out(name), |entry| entry.title.clone())
 }
 
-/// The section of the experiment in the folder `root/folder`, which is `name`, or that of the folder.
-fn experiment(root: &Path, folder: &str, name: Option<&str>, problems: &mut Vec<Error>) -> Section {
-    let path = |file: &str| {
-        if folder.is_empty() {
-            file.to_owned()
-        } else {
-            format!("{folder}/{file}")
-        }
-    };
-    let heading = name.map_or_else(|| title(folder), |_| "Results".to_owned());
-    let name = name.unwrap_or(folder);
-    let mut section = Section::new(heading).named(name);
-    let files = kept(entries(&root.join(folder), false), problems).unwrap_or_default();
+/// The section of the experiment in the folder `root/name`.
+fn experiment(root: &Path, name: &str, problems: &mut Vec<Error>) -> Section {
+    let path = |file: &str| format!("{name}/{file}");
+    let mut section = Section::new(title(name)).named(name);
+    let files = kept(entries(&root.join(name), false), problems).unwrap_or_default();
     let facts = kept(manifest(root, &path("manifest.json")), problems);
     let entry = CATALOGUE.iter().find(|entry| entry.folder == name);
     if let Some(entry) = entry {
@@ -162,7 +137,7 @@ fn experiment(root: &Path, folder: &str, name: Option<&str>, problems: &mut Vec<
     if let Some(summary) = kept(summary, problems) {
         folded.push(Details::new("Metrics").with(summary));
     }
-    if let Some((_, facts)) = facts {
+    if let Some(facts) = facts {
         folded.push(Details::new("How it was computed").with(facts));
     }
     folded.into_iter().fold(section, Section::with)
@@ -210,8 +185,8 @@ fn image(root: &Path, file: &str) -> Result<Image> {
     Image::from_bytes(file, &read_bytes(root, file)?)
 }
 
-/// The experiment of a manifest, and the important facts: program, machine, seed, times, parameters.
-fn manifest(root: &Path, file: &str) -> Result<(String, Facts)> {
+/// The important facts of a manifest: program, machine, seed, times, parameters.
+fn manifest(root: &Path, file: &str) -> Result<Facts> {
     const KEYS: [&str; 12] = [
         "experiment",
         "version",
@@ -233,8 +208,8 @@ fn manifest(root: &Path, file: &str) -> Result<(String, Facts)> {
     };
     let manifest: Value =
         serde_json::from_str(&read(root, file)?).map_err(|error| failed(error.to_string()))?;
-    let (Some(name), Value::Object(parameters)) =
-        (manifest["experiment"].as_str(), &manifest["parameters"])
+    let (Value::String(_), Value::Object(parameters)) =
+        (&manifest["experiment"], &manifest["parameters"])
     else {
         return Err(failed("it names no experiment or no parameters".to_owned()));
     };
@@ -246,14 +221,13 @@ fn manifest(root: &Path, file: &str) -> Result<(String, Facts)> {
             facts.with_value(key, value)
         });
     let phases = manifest["phases"].as_array().map_or(&[][..], Vec::as_slice);
-    let facts = phases.iter().take(MOST_PHASES).fold(facts, |facts, phase| {
+    Ok(phases.iter().take(MOST_PHASES).fold(facts, |facts, phase| {
         let seconds = phase["seconds"].as_f64().unwrap_or(f64::NAN);
         facts.with(
             phase["name"].as_str().unwrap_or_default(),
             format!("{} s", five_digits(seconds)),
         )
-    });
-    Ok((name.to_owned(), facts))
+    }))
 }
 
 /// A Markdown text without the line of its title.
@@ -318,10 +292,8 @@ fn stem_of(file: &str) -> &str {
 fn spelled_out(name: &str) -> String {
     let text = name.replace(['_', '-'], " ");
     let mut characters = text.chars();
-    match characters.next() {
-        Some(first) => first.to_uppercase().chain(characters).collect(),
-        None => "Results".to_owned(),
-    }
+    let first = characters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(characters).collect()
 }
 
 #[cfg(test)]
@@ -337,7 +309,6 @@ mod tests {
         assert!(CATALOGUE.iter().all(|entry| !entry.figures.is_empty()));
         assert_eq!(title("cross"), "Willmore flow of a cross");
         assert_eq!(title("error_over_radius"), "Error over radius");
-        assert_eq!(title(""), "Results");
     }
 
     #[test]
@@ -355,7 +326,7 @@ mod tests {
             "l": [{"d": "e"}]}, "dtype": "f64", "seed": null, "wall_seconds": 1.5,
             "phases": [{"name": "p", "seconds": 2}]}"#,
         );
-        let (name, facts) = manifest(folder.path(), "m.json").unwrap();
+        let facts = manifest(folder.path(), "m.json").unwrap();
         let entries: Vec<(&str, &str)> = (facts.entries().iter())
             .map(|(name, value)| (name.as_str(), value.as_str()))
             .collect();
@@ -368,7 +339,7 @@ mod tests {
             ("n", "64, 128"),
             ("p", "2 s"),
         ];
-        assert_eq!((name.as_str(), &entries[..]), ("x", &expected[..]));
+        assert_eq!(entries, expected);
         for json in ["", "{}", "[]", "{\"experiment\": 3, \"parameters\": {}}"] {
             write(json);
             let message = manifest(folder.path(), "m.json").unwrap_err().to_string();

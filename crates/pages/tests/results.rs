@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use pages::Error;
-use pages::results::{index_page, run_page};
+use pages::results::index_page;
 
 const MANIFEST: &str = r#"{"experiment": "cross", "parameters": {"n": [64]}, "commit": "abc123",
     "device": "cpu", "dtype": "f64", "backend": "flex", "seed": 1, "wall_seconds": 2.5}"#;
@@ -89,19 +89,6 @@ fn the_place_and_the_time_do_not_matter() {
     };
     assert_eq!(page(), page());
     assert!(page().contains("<h2 id=\"another_one\">Another one</h2>"));
-}
-
-#[test]
-fn a_run_is_one_file() {
-    let root = tempfile::tempdir().unwrap();
-    let folder = root.path().join("x");
-    run(&folder);
-    let (page, problems) = run_page(&folder).unwrap();
-    assert!(problems.is_empty());
-    let html = page.to_html();
-    assert!(html.contains("<title>Willmore flow of a cross</title>"));
-    assert_eq!(html.matches("src=\"data:image/png;base64,").count(), 3);
-    assert!(!html.contains("href=\""));
 }
 
 #[test]
