@@ -87,18 +87,14 @@ pub fn index_page(folder: &Path) -> Result<(Page, Vec<Error>)> {
     Ok((page, problems))
 }
 
-fn title(name: &str) -> String {
-    let entry = CATALOGUE.iter().find(|entry| entry.folder == name);
-    entry.map_or_else(|| spelled_out(name), |entry| entry.title.clone())
-}
-
 /// The section of the experiment in the folder `root/name`.
 fn experiment(root: &Path, name: &str, problems: &mut Vec<Error>) -> Section {
     let path = |file: &str| format!("{name}/{file}");
-    let mut section = Section::new(title(name)).named(name);
     let files = kept(entries(&root.join(name), false), problems).unwrap_or_default();
     let facts = kept(manifest(root, &path("manifest.json")), problems);
     let entry = CATALOGUE.iter().find(|entry| entry.folder == name);
+    let title = entry.map_or_else(|| spelled_out(name), |entry| entry.title.clone());
+    let mut section = Section::new(title).named(name);
     if let Some(entry) = entry {
         section.push(Text::markdown(&entry.description));
     }
@@ -307,8 +303,7 @@ mod tests {
         let folders: HashSet<&str> = CATALOGUE.iter().map(|e| e.folder.as_str()).collect();
         assert_eq!(folders.len(), CATALOGUE.len());
         assert!(CATALOGUE.iter().all(|entry| !entry.figures.is_empty()));
-        assert_eq!(title("cross"), "Willmore flow of a cross");
-        assert_eq!(title("error_over_radius"), "Error over radius");
+        assert_eq!(spelled_out("error_over_radius"), "Error over radius");
     }
 
     #[test]
