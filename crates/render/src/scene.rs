@@ -66,22 +66,13 @@ pub struct Scene {
 
 impl Scene {
     /// The surface `u = 0` of a phase field, which is positive inside: that of the distances
-    /// `-(4 eps / 3) atanh u`.
+    /// `-(4 eps / 3) atanh u`, smoothed a little, so that edges are rounded over two cells and have no
+    /// teeth; what is smooth moves by `h^2 / 3` times the mean curvature, which no picture shows.
     ///
     /// # Errors
     /// `u` must be finite, and `eps` finite and positive.
     pub fn new(u: &Field<3>, eps: f64) -> Result<Self, Error> {
-        Self::from_signed_distance(&distances_from_phase_field(u, eps)?)
-    }
-
-    /// The surface of a signed distance, which is negative inside; only its zeros, and its slope
-    /// there, matter. It is smoothed a little, so that edges are rounded over two cells and have no
-    /// teeth; what is smooth moves by `h^2 / 3` times the mean curvature, which no picture shows.
-    ///
-    /// # Errors
-    /// The field must be finite.
-    pub fn from_signed_distance(distance: &Field<3>) -> Result<Self, Error> {
-        distance.check_finite()?;
+        let distance = distances_from_phase_field(u, eps)?;
         Ok(Self::of_mesh(isosurface(&distance.smoothed())?))
     }
 

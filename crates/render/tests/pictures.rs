@@ -329,10 +329,8 @@ fn the_bytes_do_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn fields_distances_and_meshes_are_drawn_alike() {
+fn fields_and_meshes_are_drawn_alike() {
     let shape = ball([0.1, 0.0, -0.1], 0.25);
-    let grid = Grid::centred(64, 1.0).unwrap();
-    let distance = Field::from_fn(grid, |x| shape.signed_distance(x));
     let mesh = surfaces::phase_field_surface(&field(&shape), EPS).unwrap();
     let picture = |scene: Scene| {
         let bounds = scene.bounds().unwrap();
@@ -344,13 +342,8 @@ fn fields_distances_and_meshes_are_drawn_alike() {
         scene.quality(Quality::Draft).render([80; 2]).unwrap()
     };
     let reference = picture(Scene::new(&field(&shape), EPS).unwrap());
-    for scene in [
-        Scene::from_signed_distance(&distance).unwrap(),
-        Scene::of_mesh(mesh),
-    ] {
-        let mean = mean_difference(&picture(scene), &reference);
-        assert!(mean < 0.5, "{mean} levels");
-    }
+    let mean = mean_difference(&picture(Scene::of_mesh(mesh)), &reference);
+    assert!(mean < 0.5, "{mean} levels");
 }
 
 #[test]
@@ -375,7 +368,6 @@ fn what_cannot_be_drawn_is_refused() {
         )
     };
     assert!(refused(Scene::new(&broken, EPS)));
-    assert!(refused(Scene::from_signed_distance(&broken)));
     let good = || Scene::new(&u, EPS).unwrap();
     assert!(refused(good().highlight_mask(&broken, Rgb::SKY)));
 
