@@ -65,10 +65,12 @@ impl<'a> Session<'a> {
         let place = if device.kind().is_cpu() { "cpu" } else { "gpu" };
         let dtype = format!("{:?}", device.dtype()).to_lowercase();
         Ok(Self {
-            manifest: Manifest::start(program)
-                .with_parameters(&parameters)?
-                .with_backend(device.kind().name(), place, dtype)
-                .with_seed(options.seed),
+            manifest: Manifest::start(
+                program,
+                &parameters,
+                [device.kind().name(), place, &dtype],
+                options.seed,
+            )?,
             progress: Progress::new(options.quiet),
             summary: Summary::new(),
             report: Vec::new(),

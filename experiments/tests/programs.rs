@@ -4,13 +4,12 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::{refused, run};
+use crate::common::{Summary, read_summary, refused, run};
 use engine::{Method, Record, Run, Scheme};
 use experiments::networks::Chosen;
 use experiments::timing;
 use model::Shipped;
 use operators::ComputeDevice;
-use report::Summary;
 
 const CALIBRATION: &str = env!("CARGO_BIN_EXE_calibration");
 const CIRCLES: &str = env!("CARGO_BIN_EXE_circle_convergence");
@@ -184,9 +183,9 @@ fn the_quick_convergence_test_is_accurate_and_reproducible() {
     assert!(!results[0].join("partial").exists());
     assert!(read(&results[0], "manifest.json").contains("\"quick\": true"));
 
-    let summary = Summary::from_json(&read(&results[0], "summary.json")).unwrap();
+    let summary = read_summary(&results[0]);
     let metric = |name: &str| {
-        summary
+        *summary
             .get(name)
             .unwrap_or_else(|| panic!("no metric {name}"))
     };
@@ -196,7 +195,7 @@ fn the_quick_convergence_test_is_accurate_and_reproducible() {
     assert!(metric("willmore.n128.hybrid.energy_increases") <= 0.0);
     assert!(metric("willmore.n128.hybrid_calibrated.l2.step8") <= 0.0025);
     assert!(metric("willmore.n128.hybrid_calibrated.energy_increases") <= 0.0);
-    assert!(summary.get("mcf.n128.hybrid_calibrated.l2.step8").is_none());
+    assert!(!summary.contains_key("mcf.n128.hybrid_calibrated.l2.step8"));
     assert!(metric("willmore.n128.hybrid.hvp_per_step") >= 1.0);
     assert!(metric("willmore.n128.hybrid.newton_per_step") >= 1.0);
     assert!(metric("willmore.scale") > 5.0 * metric("mcf.n128.hybrid.l2.step8"));
@@ -247,12 +246,8 @@ fn one_circle_is_accurate_and_reproducible_and_not_computed_again() {
         root.path().join(folder)
     });
     reproduced(&runs[0], &runs[1]);
-    let summary = fs::read_to_string(runs[0].join("summary.json")).unwrap();
-    let summary = Summary::from_json(&summary).unwrap();
-    let error = |scheme: &str| {
-        let key = format!("willmore.n128.hybrid{scheme}.l2.step8");
-        summary.get(&key).unwrap()
-    };
+    let summary = read_summary(&runs[0]);
+    let error = |scheme: &str| summary[&format!("willmore.n128.hybrid{scheme}.l2.step8")];
     assert!(
         error("_accurate") < 0.004 && error("_calibrated") < 0.004,
         "{summary:?}"
@@ -285,8 +280,7 @@ fn one_scheme_alone_gives_the_same_numbers() {
         let mut arguments = vec!["--quick", "--quiet", "--output", folder];
         arguments.extend(options);
         assert!(run(CIRCLES, root.path(), &arguments).status.success());
-        let text = fs::read_to_string(root.path().join(folder).join("summary.json")).unwrap();
-        Summary::from_json(&text).unwrap()
+        read_summary(&root.path().join(folder))
     };
     let both = summary(&["--methods", "hybrid"], "both");
     for (scheme, own, other) in [
@@ -295,9 +289,9 @@ fn one_scheme_alone_gives_the_same_numbers() {
     ] {
         let one = summary(&["--methods", "hybrid", "--scheme", scheme], scheme);
         let key = |name: &str| format!("willmore.n128.{name}.l2.step8");
-        let bits = |summary: &Summary| summary.get(&key(own)).unwrap().to_bits();
+        let bits = |summary: &Summary| summary[&key(own)].to_bits();
         assert_eq!(bits(&one), bits(&both), "{scheme}");
-        assert!(one.get(&key(other)).is_none(), "{scheme}");
+        assert!(!one.contains_key(&key(other)), "{scheme}");
     }
 }
 
@@ -313,9 +307,8 @@ fn the_quick_calibration_predicts_the_energies_and_installs_the_network() {
     for name in ["calibration.md", "discs.svg", "discs.csv", "manifest.json"] {
         assert!(folder.join(name).exists(), "{name}");
     }
-    let summary = fs::read_to_string(folder.join("summary.json")).unwrap();
-    let summary = Summary::from_json(&summary).unwrap();
-    let c = summary.get("d2_k17_eps2_step1.energy").unwrap();
+    let summary = read_summary(&folder);
+    let c = summary["d2_k17_eps2_step1.energy"];
     assert!((c - 0.932).abs() < 0.002, "{c}");
     let discs = fs::read_to_string(folder.join("discs.csv")).unwrap();
     let mut discs = discs.lines().map(|line| line.split(','));
@@ -360,18 +353,17 @@ fn the_quick_inpainting_changes_nothing_outside() {
     ] {
         assert!(folder.join(name).exists(), "{name}");
     }
-    let summary = fs::read_to_string(folder.join("summary.json")).unwrap();
-    let summary = Summary::from_json(&summary).unwrap();
+    let summary = read_summary(&folder);
     for picture in ["disk", "cross"] {
-        let metric = |name: &str| summary.get(&format!("{picture}.{name}")).unwrap();
+        let metric = |name: &str| summary[&format!("{picture}.{name}")];
         assert!(metric("changed_outside") <= 0.0);
         assert!(metric("energy_increases") <= 0.0);
     }
     // Round again, and the rest of the steps is not made.
-    assert!(summary.get("disk.distance.step0").unwrap() > 0.2);
-    assert!(summary.get("disk.distance.step1").unwrap() < 0.02);
-    assert!(summary.get("disk.still_from").unwrap() < 5.0);
-    assert!(summary.get("disk.parts_of_step1").unwrap() > 4.0);
+    assert!(summary["disk.distance.step0"] > 0.2);
+    assert!(summary["disk.distance.step1"] < 0.02);
+    assert!(summary["disk.still_from"] < 5.0);
+    assert!(summary["disk.parts_of_step1"] > 4.0);
     // As printed, tautilde is beyond what the scheme allows at the paper's resolution.
     refused(
         INPAINTING,
@@ -438,9 +430,8 @@ fn the_quick_cross_compares_all_methods() {
     for name in ["error_table.md", "errors.csv", "steps.csv", "manifest.json"] {
         assert!(folder.join(name).exists(), "{name}");
     }
-    let text = fs::read_to_string(folder.join("summary.json")).unwrap();
-    let summary = Summary::from_json(&text).unwrap();
-    let metric = |name: &str| summary.get(name).unwrap_or_else(|| panic!("no {name}"));
+    let summary = read_summary(&folder);
+    let metric = |name: &str| *summary.get(name).unwrap_or_else(|| panic!("no {name}"));
     for method in ["hybrid", "fe_implicit", "fe_semi"] {
         let key = format!("mcf_cross.n128.{method}");
         assert!(metric(&format!("{key}.l2.step0")) <= 0.0);
@@ -473,10 +464,9 @@ fn the_quick_timing_table_has_a_row_for_every_method() {
     assert!(output.status.success() && message.is_empty(), "{message}");
     let table = fs::read_to_string(root.path().join("out/timing.md")).unwrap();
     assert!(table.contains("extrapolated from") && table.contains("FE implicit, Cholesky inside"));
-    let text = fs::read_to_string(root.path().join("out/summary.json")).unwrap();
-    let summary = Summary::from_json(&text).unwrap();
+    let summary = read_summary(&root.path().join("out"));
     // Wall times are whatever the machine makes of them; the work is not.
-    let metric = |key: &str| summary.get(&format!("timing.{key}")).unwrap();
+    let metric = |key: &str| summary[&format!("timing.{key}")];
     for row in ["hybrid", "fe_implicit", "fe_semi"] {
         let steps = metric(&format!("n128.{row}.measured_steps"));
         assert!((3.0..128.0).contains(&steps), "{row}: {steps}");
@@ -503,7 +493,7 @@ fn the_quick_timing_table_has_a_row_for_every_method() {
 fn an_elastic_curve_keeps_its_length_and_area_and_has_the_exact_energy() {
     let root = tempfile::tempdir().unwrap();
     let summary = quick_summary(ELASTICA, root.path());
-    let metric = |name: &str| summary.get(&format!("elastica.q0.95.{name}")).unwrap();
+    let metric = |name: &str| summary[&format!("elastica.q0.95.{name}")];
     let close = |name: &str, exact: &str, tolerance: f64| {
         let (value, exact) = (metric(name), metric(exact));
         assert!(
@@ -522,7 +512,7 @@ fn an_elastic_curve_keeps_its_length_and_area_and_has_the_exact_energy() {
 fn the_quick_vesicle_keeps_its_area_and_volume() {
     let root = tempfile::tempdir().unwrap();
     let summary = quick_summary(VESICLES, root.path());
-    assert!(summary.get("vesicles.prolate.v0.95.w_over_8pi").unwrap() < 1.3);
+    assert!(summary["vesicles.prolate.v0.95.w_over_8pi"] < 1.3);
 }
 
 /// The metrics of a quick run into the folder `out`.
@@ -530,8 +520,7 @@ fn quick_summary(program: &str, root: &Path) -> Summary {
     let output = run(program, root, &["--quick", "--quiet", "--output", "out"]);
     let message = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success() && message.is_empty(), "{message}");
-    let text = fs::read_to_string(root.join("out/summary.json")).unwrap();
-    Summary::from_json(&text).unwrap()
+    read_summary(&root.join("out"))
 }
 
 #[test]
@@ -540,7 +529,7 @@ fn the_quick_denoising_takes_off_noise_and_keeps_the_volume() {
     let root = tempfile::tempdir().unwrap();
     let summary = quick_summary(DENOISING, root.path());
     for mesh in ["figure", "lever"] {
-        let metric = |name: &str| summary.get(&format!("{mesh}.noise0.3.{name}")).unwrap();
+        let metric = |name: &str| summary[&format!("{mesh}.noise0.3.{name}")];
         assert!(
             metric("fair.rms") < 0.5 * metric("noisy.rms"),
             "{summary:?}"
@@ -562,7 +551,7 @@ fn the_quick_segmentations_keep_their_volume() {
     let root = tempfile::tempdir().unwrap();
     let summary = quick_summary(UNSHRINKING, root.path());
     for body in ["ball", "figure"] {
-        let metric = |name: &str| summary.get(&format!("unshrinking.{body}.{name}")).unwrap();
+        let metric = |name: &str| summary[&format!("unshrinking.{body}.{name}")];
         assert!(metric("fair.volume").abs() < 1e-6, "{summary:?}");
         assert!(
             metric("fair.w_over_8pi") < metric("marched.w_over_8pi"),
@@ -577,7 +566,7 @@ fn the_quick_performance_run_measures_planes_and_solids() {
     let root = tempfile::tempdir().unwrap();
     refused(PERFORMANCE, root.path(), &["--turns", "0"], &["--turns"]);
     let summary = quick_summary(PERFORMANCE, root.path());
-    let metric = |name: &str| summary.get(name).unwrap();
+    let metric = |name: &str| summary[name];
     // The work is that of the same flow by the library.
     let operator = Chosen::default()
         .operator((Method::Hybrid, Scheme::Paper), 128)

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::common::{refused, run};
+use crate::common::{Summary, read_summary, refused, run};
 use engine::{Record, Run, Scheme, StepRule, energy_increases};
 use experiments::flows::willmore_flow;
 use experiments::networks::Chosen;
@@ -13,7 +13,6 @@ use geometry::measure::{l2_distance, zero_set_volume};
 use geometry::shapes::{Ball, Capsule};
 use geometry::{Field, SignedDistanceExt, npy, phase_field};
 use operators::ComputeDevice;
-use report::Summary;
 use runs::Interrupt;
 
 const ARMADILLO: &str = env!("CARGO_BIN_EXE_armadillo");
@@ -30,8 +29,7 @@ fn metrics(program: &str, folder: &Path, arguments: &[&str]) -> Summary {
     let output = run(program, folder, arguments);
     let message = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success() && message.is_empty(), "{message}");
-    let text = fs::read_to_string(folder.join("out/summary.json")).unwrap();
-    Summary::from_json(&text).unwrap()
+    read_summary(&folder.join("out"))
 }
 
 #[test]
@@ -39,7 +37,7 @@ fn built_in_shapes_flow_without_any_file() {
     let root = tempfile::tempdir().unwrap();
     let arguments = ["--quick", "--quiet", "--procedural", "--output", "out"];
     let summary = metrics(ARMADILLO, root.path(), &arguments);
-    let metric = |name: &str| summary.get(name).unwrap_or_else(|| panic!("no {name}"));
+    let metric = |name: &str| *summary.get(name).unwrap_or_else(|| panic!("no {name}"));
     assert!(metric("armadillo.w.step2") < metric("armadillo.w.step0"));
     assert!(metric("armadillo.energy_increases") <= 0.0);
     for file in [
@@ -53,7 +51,7 @@ fn built_in_shapes_flow_without_any_file() {
         assert!(root.path().join("out").join(file).exists(), "{file}");
     }
     let summary = metrics(ROCKER_ARM, root.path(), &arguments);
-    let metric = |name: &str| summary.get(name).unwrap_or_else(|| panic!("no {name}"));
+    let metric = |name: &str| *summary.get(name).unwrap_or_else(|| panic!("no {name}"));
     assert!(metric("rocker_arm.w.step2") < metric("rocker_arm.w.step0"));
     assert!(metric("rocker_arm.energy_increases") <= 0.0);
     // A torus fits better than nothing does: against the empty box the phase field is 2 wrong inside and nothing outside.
@@ -69,7 +67,7 @@ fn cube_and_disk_come_near_their_finite_element_runs() {
     let root = tempfile::tempdir().unwrap();
     let arguments = ["--quick", "--quiet", "--output", "out"];
     let summary = metrics(DISK_AND_CUBE, root.path(), &arguments);
-    let metric = |name: &str| summary.get(name).unwrap_or_else(|| panic!("no {name}"));
+    let metric = |name: &str| *summary.get(name).unwrap_or_else(|| panic!("no {name}"));
     for key in ["cube", "disk"] {
         assert!(metric(&format!("{key}.w.step2")) < metric(&format!("{key}.w.step0")));
         assert!(metric(&format!("{key}.energy_increases")) <= 0.0);
@@ -83,7 +81,7 @@ fn quick_inpainting_changes_nothing_outside() {
     let root = tempfile::tempdir().unwrap();
     let arguments = ["--quick", "--quiet", "--output", "out"];
     let summary = metrics(INPAINTING, root.path(), &arguments);
-    let metric = |name: &str| summary.get(name).unwrap_or_else(|| panic!("no {name}"));
+    let metric = |name: &str| *summary.get(name).unwrap_or_else(|| panic!("no {name}"));
     for (key, last) in [("ball", 5), ("tubes", 8)] {
         assert!(metric(&format!("{key}.changed_outside")) <= 0.0);
         assert!(metric(&format!("{key}.energy_increases")) <= 0.0);
@@ -112,7 +110,7 @@ fn quick_spheres_keep_their_radius() {
         root.path(),
         &["--quick", "--quiet", "--output", "out"],
     );
-    let change = summary.get("spheres.r025.radius_change_over_h").unwrap();
+    let change = summary["spheres.r025.radius_change_over_h"];
     assert!(change.abs() < 0.25, "{change}");
 }
 
@@ -232,11 +230,7 @@ fn a_volume_flows_like_the_shape_it_was_made_from() {
         let arguments = [&common[..], &[folder], arguments].concat();
         let output = run(ARMADILLO, root.path(), &arguments);
         assert!(output.status.success(), "{output:?}");
-        let text = fs::read_to_string(root.path().join(folder).join("summary.json")).unwrap();
-        Summary::from_json(&text)
-            .unwrap()
-            .get("armadillo.w.step2")
-            .unwrap()
+        read_summary(&root.path().join(folder))["armadillo.w.step2"]
     };
     let phase_field = w("a", &["--volume", "u.npy", "--volume-holds", "phase-field"]);
     let distance = w("b", &["--volume", "s.npy"]);

@@ -2,7 +2,7 @@
 
 use geometry::npy::{self, NpyError};
 use geometry::{PURE_BEYOND, distance_from_phase_field, thin_part};
-use images::{Outline, OutlineDistance, Side, Threshold, Tones};
+use images::{Outline, OutlineDistance, Side, Tones};
 use surfaces::hausdorff_distance;
 use surfaces::shapes::{self, BuiltIn};
 
@@ -536,13 +536,13 @@ impl<'a> Reader<'a> {
 
     fn image(&mut self, path: &Path) -> Result<Loaded, Error> {
         let image = images::read(path)?;
-        let inside = match self.options.inside {
-            None | Some(Inside::Auto) => images::Inside::Auto,
-            Some(Inside::Dark) => images::Inside::Dark,
-            Some(Inside::Light) => images::Inside::Light,
+        let threshold = self.options.threshold.unwrap_or(0.5);
+        let usual = Side::of(&image, threshold)?;
+        let side = match self.options.inside {
+            None | Some(Inside::Auto) => usual,
+            Some(Inside::Dark) => Side::Dark(threshold),
+            Some(Inside::Light) => Side::Light(threshold),
         };
-        let threshold = (self.options.threshold).map_or_else(Threshold::default, Threshold::At);
-        let side = Side::of(&image, inside, threshold)?;
         let tones = Tones::of(&image, side);
         if self.options.inside.is_none() && self.options.threshold.is_none() {
             refuse_photographs(&tones, side, path)?;

@@ -271,22 +271,11 @@ fn shortened(cell: &str) -> String {
     cell.parse().map_or_else(|_| cell.to_owned(), five_digits)
 }
 
-/// The entries of a map, numbers with five digits.
+/// The entries of a map.
 fn facts(values: &Value) -> Facts {
-    let Value::Object(map) = values else {
-        return Facts::new();
-    };
-    map.iter().fold(Facts::new(), |facts, (key, value)| {
-        let name = &in_words(&KEYS, key);
-        match value {
-            Value::Number(number) => {
-                let value = number
-                    .as_f64()
-                    .map_or_else(|| number.to_string(), five_digits);
-                facts.with(name, value)
-            }
-            value => facts.with_value(name, value),
-        }
+    let entries = values.as_object().into_iter().flatten();
+    entries.fold(Facts::new(), |facts, (key, value)| {
+        facts.with_value(&in_words(&KEYS, key), value)
     })
 }
 

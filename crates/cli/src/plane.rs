@@ -1,8 +1,6 @@
 //! Shapes in the plane, as the pixels of an image.
 
-use images::{
-    Drawing, Frame, Image, Inside, Interface, Outline, OutlineDistance, Side, Svg, Threshold,
-};
+use images::{Frame, Image, Interface, Outline, OutlineDistance, Side, drawing};
 use render::Rgb;
 
 use crate::paths::{extension, read};
@@ -73,7 +71,7 @@ impl Plane {
                 size[0], size[1]
             )));
         }
-        let side = Side::of(&image, Inside::Auto, Threshold::default())?;
+        let side = Side::of(&image, 0.5)?;
         let mut outline = Outline::of_image(&image, side)?;
         if self.image.is_none() {
             let fills = Placement::fit(&image.bounding_box(), grid, grid.side(), 0.0)?;
@@ -87,10 +85,7 @@ impl Plane {
         let Some(path) = &self.image else {
             return Ok(());
         };
-        let picture = images::colours(&read(path)?).map_err(|problem| images::Error::Format {
-            path: path.clone(),
-            problem,
-        })?;
+        let picture = images::colours(path, &read(path)?)?;
         let width = self.frame.width() as usize;
         let is_inside = |pixel: usize| {
             let [column, row] = [pixel % width, pixel / width].map(|i| i as f64 + 0.5);
@@ -100,11 +95,6 @@ impl Plane {
         self.is_repaired = true;
         self.original = Some(Original { picture, drawn });
         Ok(())
-    }
-
-    fn svg(&self, u: &Field<2>) -> Result<Svg, Error> {
-        let outline = Outline::of_phase_field(u)?;
-        Ok(Svg::on_white(self.frame).filled(&outline, Rgb::BLACK))
     }
 }
 
@@ -176,13 +166,8 @@ impl Presentation<2> for Plane {
     fn picture(&self, _: &Field<2>, u: &Field<2>, eps: f64) -> Result<Picture, Error> {
         let interface = Interface::new(u, eps)?;
         match &self.original {
-            None => Ok(Drawing::on_white(self.frame)
-                .filled(&interface, Rgb::BLACK)
-                .picture()?),
-            Some(original) => {
-                let drawing = Drawing::transparent(self.frame).filled(&interface, Rgb::BLACK);
-                original.with(&drawing.picture()?)
-            }
+            None => Ok(drawing(&self.frame, &interface, Some(Rgb::WHITE))?),
+            Some(original) => original.with(&drawing(&self.frame, &interface, None)?),
         }
     }
 
@@ -195,7 +180,10 @@ impl Presentation<2> for Plane {
 
     fn save(&self, u: &Field<2>, eps: f64, path: &Path) -> Result<(), Error> {
         match &*extension(path) {
-            "svg" => self.svg(u)?.write(path)?,
+            "svg" => {
+                let text = images::svg(&self.frame, &Outline::of_phase_field(u)?);
+                files::write_atomically(path, |out| out.write_all(text.as_bytes()))?;
+            }
             _ => self.picture(u, u, eps)?.write_png(path)?,
         }
         Ok(())
@@ -216,7 +204,7 @@ impl Presentation<2> for Plane {
 
     fn restore(&mut self, stored: &StoredRun) -> Result<(), Error> {
         if self.is_repaired {
-            let picture = |name: &str| Ok::<_, Error>(Picture::from_png(&stored.read(name)?)?);
+            let picture = |name: &str| Ok::<_, Error>(images::colours(name, &stored.read(name)?)?);
             let drawn = picture(MASK)?.pixels().iter().map(|p| p[0] == 0).collect();
             let picture = picture(ORIGINAL)?;
             self.original = Some(Original { picture, drawn });

@@ -454,6 +454,6 @@ fn frames(folder: &Path) -> Result<Vec<Picture>, Error> {
         .map_err(files::Error::of("read", folder))?;
     paths.retain(|path| extension(path) == "png");
     paths.sort();
-    let read = |path: &PathBuf| Ok(Picture::from_png(&read(path)?)?);
+    let read = |path: &PathBuf| Ok(images::colours(path, &read(path)?)?);
     paths.iter().map(read).collect()
 }

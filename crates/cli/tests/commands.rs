@@ -8,7 +8,7 @@ use crate::common::{self, outcome};
 use chacha20::ChaCha8Rng;
 use geometry::shapes::{Ball, Cuboid};
 use geometry::{Field, Grid, npy, phase_field};
-use images::{Drawing, Frame};
+use images::{Frame, drawing};
 use rand::{RngExt, SeedableRng};
 use render::Rgb;
 use surfaces::ClosedMesh;
@@ -269,11 +269,8 @@ fn drawings_flow_in_their_own_pixels() {
     let frame = Frame::new(90, 60, [0.0, 60.0], 1.0).unwrap();
     let square =
         geometry::SignedDistanceExt::translated(Cuboid::new([15.0, 15.0]).unwrap(), [30.0, 30.0]);
-    let drawing = Drawing::on_white(frame)
-        .filled(&square, Rgb::BLACK)
-        .picture()
-        .unwrap();
-    drawing.write_png(folder.path().join("square.png")).unwrap();
+    let drawn = drawing(&frame, &square, Some(Rgb::WHITE)).unwrap();
+    drawn.write_png(folder.path().join("square.png")).unwrap();
     let arguments = [
         "flow",
         "square.png",
@@ -595,21 +592,9 @@ fn images_are_masks_too() {
         |x, y| geometry::SignedDistanceExt::translated(Ball::new([0.0; 2], 1.0).unwrap(), [x, y]);
     let disc = geometry::SignedDistanceExt::scaled(at(1.5, 1.5), 20.0).unwrap();
     let spot = geometry::SignedDistanceExt::scaled(at(5.0, 3.0), 10.0).unwrap();
-    for (name, drawing) in [
-        (
-            "disc.png",
-            Drawing::on_white(frame).filled(&disc, Rgb::BLACK),
-        ),
-        (
-            "spot.png",
-            Drawing::on_white(frame).filled(&spot, Rgb::BLACK),
-        ),
-    ] {
-        drawing
-            .picture()
-            .unwrap()
-            .write_png(folder.path().join(name))
-            .unwrap();
+    for (name, shape) in [("disc.png", &disc), ("spot.png", &spot)] {
+        let drawn = drawing(&frame, shape, Some(Rgb::WHITE)).unwrap();
+        drawn.write_png(folder.path().join(name)).unwrap();
     }
     let arguments = [
         "--cells", "64", "--steps", "1", "--tau", "1e-5", "--ansatz", "empty", "--output", "run",

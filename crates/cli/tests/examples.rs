@@ -4,7 +4,7 @@ use std::path::Path;
 
 use geometry::shapes::Ball;
 use geometry::{SignedDistance, SignedDistanceExt};
-use images::{Drawing, Frame};
+use images::{Frame, drawing};
 use render::Rgb;
 use serde_json::Value;
 use volumes::Volume;
@@ -40,8 +40,8 @@ fn quick(command: &str) -> &'static [&'static str] {
 
 fn draw(path: &Path, shape: &impl SignedDistance<2>) {
     let frame = Frame::new(200, 200, [0.0, 200.0], 1.0).unwrap();
-    let drawing = Drawing::on_white(frame).filled(shape, Rgb::BLACK);
-    drawing.picture().unwrap().write_png(path).unwrap();
+    let drawn = drawing(&frame, shape, Some(Rgb::WHITE)).unwrap();
+    drawn.write_png(path).unwrap();
 }
 
 /// The files that the examples name.

@@ -281,9 +281,7 @@ fn runs_are_resumed_without_their_input_and_elsewhere() {
     let (drawing, path) = (folder.path().join("disc.png"), folder.path().join("first"));
     let frame = images::Frame::new(80, 80, [-1.0, 1.0], 0.025).unwrap();
     let square = geometry::shapes::Cuboid::new([0.5, 0.5]).unwrap();
-    let picture = images::Drawing::on_white(frame)
-        .filled(&square, render::Rgb::BLACK)
-        .picture();
+    let picture = images::drawing(&frame, &square, Some(render::Rgb::WHITE));
     picture.unwrap().write_png(&drawing).unwrap();
     let arguments = [
         "flow",

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use geometry::shapes::{Ball, Cuboid};
 use geometry::{SignedDistance, SignedDistanceExt};
-use images::{Drawing, Frame};
+use images::{Frame, drawing};
 use render::{Picture, Rgb};
 
 use crate::common::{outcome, run, text};
@@ -20,8 +20,8 @@ fn refused(folder: &Path, arguments: &[&str]) -> String {
 /// A drawing of so many pixels a side.
 fn draw(path: &Path, pixels: u32, shape: &impl SignedDistance<2>) {
     let frame = Frame::new(pixels, pixels, [0.0, f64::from(pixels)], 1.0).unwrap();
-    let drawing = Drawing::on_white(frame).filled(shape, Rgb::BLACK);
-    drawing.picture().unwrap().write_png(path).unwrap();
+    let drawn = drawing(&frame, shape, Some(Rgb::WHITE)).unwrap();
+    drawn.write_png(path).unwrap();
 }
 
 fn disc(centre: [f64; 2], radius: f64) -> impl SignedDistance<2> {
@@ -230,8 +230,8 @@ fn inpainting_copies_the_pixels_outside_of_the_mask_in_their_colours() {
         &[&inpaint[..], &["--save", "whole.png", "--output", "run"]].concat(),
     );
     let read = |name: &str| {
-        let bytes = fs::read(folder.path().join(name)).unwrap();
-        images::colours(&bytes).unwrap()
+        let path = folder.path().join(name);
+        images::colours(&path, &fs::read(&path).unwrap()).unwrap()
     };
     let repaired = read("whole.png");
     assert_eq!(read("run/final.png").pixels(), repaired.pixels());

@@ -11,135 +11,100 @@ const PARTS: u32 = 4;
 /// Rows drawn at once.
 const BAND: usize = 16;
 
-/// Shapes drawn one over the other, on white or on nothing.
+/// A shape in black, on paper of a colour or on nothing.
 ///
-/// The value of a pixel is the part of its area that a shape covers: near an edge the shape
+/// The value of a pixel is the part of its area that the shape covers: near an edge the shape
 /// is taken for a half plane in each of 16 parts of the pixel. Colours are mixed in stored values,
 /// as drawing programs do, so that a pixel half covered by black on white has the value 0.5 and the
 /// outline is found again in the picture by a threshold of 0.5.
-pub struct Drawing<'a> {
-    frame: Frame,
-    paper: [f64; 4],
-    layers: Vec<Layer<'a>>,
+///
+/// # Errors
+/// If the frame is too large, which it was checked not to be.
+pub fn drawing(
+    frame: &Frame,
+    shape: &dyn SignedDistance<2>,
+    paper: Option<Rgb>,
+) -> Result<Picture, Error> {
+    // Colour times opacity, and opacity.
+    let paper = paper.map_or([0.0; 4], |Rgb(r, g, b)| {
+        [r, g, b, 255].map(|v| f64::from(v) / 255.0)
+    });
+    let width = frame.width() as usize;
+    let mut pixels = vec![[0; 4]; width * frame.height() as usize];
+    let bands = pixels.par_chunks_mut(BAND * width).enumerate();
+    bands.for_each(|(band, pixels)| {
+        let first = BAND * band;
+        let corners = corners(frame, shape, first, pixels.len() / width);
+        for (index, pixel) in pixels.iter_mut().enumerate() {
+            let [column, row] = [index % width, index / width];
+            let corner = row * (width + 1) + column;
+            let around = [0, 1, width + 1, width + 2].map(|k| corners[corner + k]);
+            let place = [column as f64, (first + row) as f64];
+            let covered = coverage(frame, shape, place, around);
+            let ink = [0.0, 0.0, 0.0, 255.0].map(|v| covered * v / 255.0);
+            *pixel = stored(std::array::from_fn(|c| ink[c] + (1.0 - covered) * paper[c]));
+        }
+    });
+    Ok(Picture::new(frame.width(), frame.height(), pixels)?)
 }
 
-struct Layer<'a> {
-    shape: &'a (dyn SignedDistance<2> + 'a),
-    colour: Rgb,
-}
-
-impl<'a> Drawing<'a> {
-    /// White paper.
-    pub fn on_white(frame: Frame) -> Self {
-        Self {
-            frame,
-            paper: [1.0; 4],
-            layers: Vec::new(),
-        }
-    }
-
-    /// No paper: what is not drawn is transparent.
-    pub fn transparent(frame: Frame) -> Self {
-        Self {
-            paper: [0.0; 4],
-            ..Self::on_white(frame)
-        }
-    }
-
-    /// Fills a shape.
-    #[must_use]
-    pub fn filled(mut self, shape: &'a impl SignedDistance<2>, colour: Rgb) -> Self {
-        self.layers.push(Layer { shape, colour });
-        self
-    }
-
-    /// The picture.
-    ///
-    /// # Errors
-    /// If the frame is too large, which it was checked not to be.
-    pub fn picture(&self) -> Result<Picture, Error> {
-        let [width, height] = [self.frame.width(), self.frame.height()];
-        let mut pixels = vec![[0; 4]; width as usize * height as usize];
-        pixels
-            .par_chunks_mut(BAND * width as usize)
-            .enumerate()
-            .for_each(|(band, pixels)| self.band(BAND * band, pixels));
-        Ok(Picture::new(width, height, pixels)?)
-    }
-
-    /// Some whole rows.
-    fn band(&self, first: usize, pixels: &mut [[u8; 4]]) {
-        let width = self.frame.width() as usize;
-        // Colour times opacity, and opacity.
-        let mut sums = vec![self.paper; pixels.len()];
-        for layer in &self.layers {
-            let corners = layer.corners(&self.frame, first, pixels.len() / width);
-            for (index, sum) in sums.iter_mut().enumerate() {
-                let [column, row] = [index % width, index / width];
-                let corner = row * (width + 1) + column;
-                let around = [0, 1, width + 1, width + 2].map(|k| corners[corner + k]);
-                let place = [column as f64, (first + row) as f64];
-                let opacity = layer.coverage(&self.frame, place, around);
-                let Rgb(r, g, b) = layer.colour;
-                let colour = [r, g, b, 255].map(|v| opacity * f64::from(v) / 255.0);
-                *sum = std::array::from_fn(|c| colour[c] + (1.0 - opacity) * sum[c]);
-            }
-        }
-        let byte = |v: f64| (255.0 * v).round() as u8;
-        for (pixel, [r, g, b, opacity]) in pixels.iter_mut().zip(sums) {
-            *pixel = match byte(opacity) {
-                0 => [0; 4],
-                alpha => {
-                    let [r, g, b] = [r, g, b].map(|v| byte(v / opacity));
-                    [r, g, b, alpha]
-                }
-            };
+/// As a picture has it, of colour times opacity, and opacity.
+fn stored([r, g, b, opacity]: [f64; 4]) -> [u8; 4] {
+    let byte = |v: f64| (255.0 * v).round() as u8;
+    match byte(opacity) {
+        0 => [0; 4],
+        alpha => {
+            let [r, g, b] = [r, g, b].map(|v| byte(v / opacity));
+            [r, g, b, alpha]
         }
     }
 }
 
-impl Layer<'_> {
-    /// Distances at the corners of the pixels of some rows.
-    fn corners(&self, frame: &Frame, first: usize, rows: usize) -> Vec<f64> {
-        let columns = 0..=frame.width();
-        let row = |row: usize| {
-            let place = move |column: u32| [f64::from(column), row as f64];
-            columns.clone().map(place)
-        };
-        let places = (first..=first + rows).flat_map(row);
-        places
-            .map(|place| self.shape.signed_distance(frame.point(place)))
-            .collect()
-    }
+/// Distances at the corners of the pixels of some rows.
+fn corners(frame: &Frame, shape: &dyn SignedDistance<2>, first: usize, rows: usize) -> Vec<f64> {
+    let columns = 0..=frame.width();
+    let row = |row: usize| {
+        let place = move |column: u32| [f64::from(column), row as f64];
+        columns.clone().map(place)
+    };
+    let places = (first..=first + rows).flat_map(row);
+    places
+        .map(|place| shape.signed_distance(frame.point(place)))
+        .collect()
+}
 
-    /// The covered part of the pixel with the given upper left corner, and distances at all four.
-    fn coverage(&self, frame: &Frame, [column, row]: [f64; 2], corners: [f64; 4]) -> f64 {
-        let side = frame.pixel();
-        let s = |x: [f64; 2]| self.shape.signed_distance(x);
-        // Nothing is near: a point in the pixel is at most 0.71 sides from a corner. Fields that have
-        // lost their profile may be steep, so that only the signs tell.
-        let [inside, outside] = [-1.0, 1.0].map(|sign| corners.iter().all(|s| sign * s > side));
-        if inside || outside {
-            return f64::from(u8::from(inside));
-        }
-        let part = side / f64::from(PARTS);
-        let step = 0.25 * part;
-        let mut sum = 0.0;
-        for k in 0..PARTS * PARTS {
-            let [i, j] = [k % PARTS, k / PARTS].map(|i| (f64::from(i) + 0.5) / f64::from(PARTS));
-            let [x, y] = frame.point([column + i, row + j]);
-            let gradient = [
-                (s([x + step, y]) - s([x - step, y])) / (2.0 * step),
-                (s([x, y + step]) - s([x, y - step])) / (2.0 * step),
-            ];
-            let length = gradient[0].hypot(gradient[1]);
-            // On the line in the middle of a shape the gradient means nothing.
-            let slope = if length > 0.5 { length } else { 1.0 };
-            let depth = -s([x, y]) / slope;
-            sum += half_plane(depth / part, gradient);
-        }
-        sum / f64::from(PARTS * PARTS)
+/// The covered part of the pixel with the given upper left corner, and distances at all four.
+fn coverage(
+    frame: &Frame,
+    shape: &dyn SignedDistance<2>,
+    [column, row]: [f64; 2],
+    corners: [f64; 4],
+) -> f64 {
+    let side = frame.pixel();
+    let s = |x: [f64; 2]| shape.signed_distance(x);
+    // Nothing is near: a point in the pixel is at most 0.71 sides from a corner. Fields that have
+    // lost their profile may be steep, so that only the signs tell.
+    let [inside, outside] = [-1.0, 1.0].map(|sign| corners.iter().all(|s| sign * s > side));
+    if inside || outside {
+        return f64::from(u8::from(inside));
     }
+    let part = side / f64::from(PARTS);
+    let step = 0.25 * part;
+    let mut sum = 0.0;
+    for k in 0..PARTS * PARTS {
+        let [i, j] = [k % PARTS, k / PARTS].map(|i| (f64::from(i) + 0.5) / f64::from(PARTS));
+        let [x, y] = frame.point([column + i, row + j]);
+        let gradient = [
+            (s([x + step, y]) - s([x - step, y])) / (2.0 * step),
+            (s([x, y + step]) - s([x, y - step])) / (2.0 * step),
+        ];
+        let length = gradient[0].hypot(gradient[1]);
+        // On the line in the middle of a shape the gradient means nothing.
+        let slope = if length > 0.5 { length } else { 1.0 };
+        let depth = -s([x, y]) / slope;
+        sum += half_plane(depth / part, gradient);
+    }
+    sum / f64::from(PARTS * PARTS)
 }
 
 /// The part of a unit square covered by a half plane whose border is `depth` beyond the centre

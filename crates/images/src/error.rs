@@ -11,7 +11,6 @@ use crate::read::error::FormatError;
 #[error(transparent)]
 #[non_exhaustive]
 pub enum Error {
-    /// A file is no usable image.
     #[error("{path} cannot be read as an image: {problem}", path = path.display())]
     Format { path: PathBuf, problem: FormatError },
     /// Grids and fields, and numbers outside their range.
@@ -20,7 +19,6 @@ pub enum Error {
     Io(#[from] files::Error),
     /// Pictures and their encoding.
     Picture(#[from] render::Error),
-    /// An image without pixels, or with more than are accepted.
     #[error(
         "an image of {width} x {height} pixels cannot be used; it needs at least one pixel and \
          may have up to {limit}"
@@ -30,7 +28,6 @@ pub enum Error {
         height: u32,
         limit: usize,
     },
-    /// The number of values is not that of the pixels.
     #[error("{width} x {height} pixels were announced, but {actual} {values} given")]
     PixelCount {
         width: u32,
@@ -39,7 +36,6 @@ pub enum Error {
         values: &'static str,
         actual: usize,
     },
-    /// All pixels are on the chosen side of the threshold, or none is.
     #[error(
         "{inside} is inside: {inside} is {side}; {quantity} ranges from {low:.4} to {high:.4}, so choose \
          a threshold in between, or another side"
@@ -52,22 +48,14 @@ pub enum Error {
         low: f64,
         high: f64,
     },
-    /// An outline with too many segments: noise, or a photograph.
     #[error(
         "the outline would have about {segments} segments, more than {limit}: this is noise and \
          no shape; blur the image or make it smaller"
     )]
     Noise { segments: usize, limit: usize },
-    /// A field without an interface.
     #[error(
         "the phase field has no interface: its values range from {low:.4} to {high:.4}, and do \
          not change sign"
     )]
     NoInterface { low: f64, high: f64 },
-    /// A region that contains no node.
-    #[error(
-        "no node of the grid of {nodes} nodes is in the region, so nothing could move; check where \
-         it is placed, or use a finer grid"
-    )]
-    EmptyMask { nodes: usize },
 }

@@ -1,9 +1,9 @@
 //! Which part of the plane a drawing shows, and how large its pixels are.
 
-use geometry::{Grid, Placement, positive, require};
+use geometry::{Grid, positive, require};
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, Image};
+use crate::Error;
 
 /// A raster of square pixels in the plane.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,17 +17,9 @@ impl Frame {
     /// A raster of `width` times `height` pixels of side `pixel`, by its upper left corner.
     ///
     /// # Errors
-    /// There must be from one to [`render::LARGEST_SIDE`] pixels a side; the numbers must be
-    /// finite, the pixels of positive side.
+    /// As [`render::checked_size`]; the numbers must be finite, the pixels of positive side.
     pub fn new(width: u32, height: u32, upper_left: [f64; 2], pixel: f64) -> Result<Self, Error> {
-        let size = [width, height];
-        if !size.iter().all(|n| (1..=render::LARGEST_SIDE).contains(n)) {
-            return Err(Error::Picture(render::Error::PictureSize {
-                width,
-                height,
-                limit: render::LARGEST_SIDE,
-            }));
-        }
+        let size = render::checked_size([width, height])?;
         for x in upper_left {
             require("coordinate of the corner", x, "finite", |_| true)?;
         }
@@ -46,15 +38,6 @@ impl Frame {
         let [x, y] = grid.origin();
         let pixel = grid.side() / f64::from(pixels.max(1));
         Self::new(pixels, pixels, [x, y + grid.side()], pixel)
-    }
-
-    /// The pixels of an image where it was placed, so that a drawing can lie on the image.
-    ///
-    /// # Errors
-    /// As [`Frame::new`].
-    pub fn of_image(image: &Image, placement: &Placement<2>) -> Result<Self, Error> {
-        let corner = placement.apply([0.0, f64::from(image.height())]);
-        Self::new(image.width(), image.height(), corner, placement.scale())
     }
 
     /// Pixels in a row.

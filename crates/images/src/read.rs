@@ -70,15 +70,19 @@ pub fn decode(bytes: &[u8]) -> Result<Image, FormatError> {
     upright(bytes, Tones::Grey).map(converted)
 }
 
-/// The image in the bytes of a file with its colours and opacities, 8 bits each.
+/// The image in the bytes of a file with its colours and opacities, 8 bits each; `path` is for messages.
 ///
 /// # Errors
-/// As [`decode`].
-pub fn colours(bytes: &[u8]) -> Result<Picture, FormatError> {
-    let image = upright(bytes, Tones::Colours)?.into_rgba8();
+/// [`Error::Format`].
+pub fn colours(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Picture, Error> {
+    let format = |problem| Error::Format {
+        path: path.as_ref().into(),
+        problem,
+    };
+    let image = upright(bytes, Tones::Colours).map_err(format)?.into_rgba8();
     let pixels = image.pixels().map(|pixel| pixel.0).collect();
     let picture = Picture::new(image.width(), image.height(), pixels);
-    picture.map_err(|error| FormatError::damaged("image", &error.to_string()))
+    picture.map_err(|error| format(FormatError::damaged("image", &error.to_string())))
 }
 
 /// What is wanted of an image.

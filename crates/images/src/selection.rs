@@ -5,39 +5,7 @@ use geometry::require;
 
 use crate::{Error, Image};
 
-/// Which pixels are inside.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Inside {
-    /// The opaque ones if a pixel is less than half opaque; else the dark ones, unless more than
-    /// half of the pixels at the border are dark, and then the light ones.
-    #[default]
-    Auto,
-    /// Those darker than the threshold. What is transparent is seen on white.
-    Dark,
-    /// Those lighter than the threshold. What is transparent is seen on black.
-    Light,
-    /// Those more opaque than the threshold, whatever their colour.
-    Opaque,
-}
-
-/// Where inside and outside are separated, on the scale from 0 (black, transparent) to 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Threshold {
-    /// At this value.
-    At(f64),
-    /// At the value that separates two classes of pixels best: it maximises the variance between
-    /// them, and lies in the middle of all that do. N. Otsu: A threshold selection method from
-    /// gray-level histograms. IEEE Trans. Syst. Man Cybern. 9 (1979).
-    Otsu,
-}
-
-impl Default for Threshold {
-    fn default() -> Self {
-        Self::At(0.5)
-    }
-}
-
-/// A side of a threshold: what [`Inside`] and [`Threshold`] mean for a certain image.
+/// Which pixels of an image are inside: those on a side of a threshold.
 ///
 /// Grey values are compared as they are stored, which is evenly spaced for the eye, and not in
 /// light: drawing programs blend edges in stored values, so that a pixel half covered by black on
@@ -56,42 +24,25 @@ pub enum Side {
 }
 
 impl Side {
-    /// Decides for an image.
+    /// Decides for an image: inside are the opaque pixels if one is less than half opaque; else the dark ones, unless more than
+    /// half of the pixels at the border are dark, and then the light ones.
     ///
     /// # Errors
-    /// [`geometry::Error::InvalidParameter`] unless the threshold is from 0 to 1.
-    pub fn of(image: &Image, inside: Inside, threshold: Threshold) -> Result<Self, Error> {
-        let resolved = |side: fn(f64) -> Self| {
-            let value = match threshold {
-                Threshold::At(value) => require("threshold", value, "from 0 to 1", |v| {
-                    (0.0..=1.0).contains(&v)
-                })?,
-                Threshold::Otsu => otsu(image, side(0.0)),
-            };
-            Ok(side(value))
-        };
-        match inside {
-            Inside::Dark => resolved(Self::Dark),
-            Inside::Light => resolved(Self::Light),
-            Inside::Opaque => resolved(Self::Opaque),
-            Inside::Auto => {
-                let half = |opacity: &[u16]| opacity.iter().any(|&v| v <= u16::MAX / 2);
-                if image.opacity().is_some_and(half) {
-                    return resolved(Self::Opaque);
-                }
-                let dark = resolved(Self::Dark)?;
-                let (mut inside, mut all) = (0_usize, 0_usize);
-                for pixel in image.border() {
-                    inside += usize::from(dark.depth(image.pixel(pixel)) > 0.0);
-                    all += 1;
-                }
-                if 2 * inside > all {
-                    resolved(Self::Light)
-                } else {
-                    Ok(dark)
-                }
-            }
+    /// [`geometry::Error::InvalidParameter`] unless the threshold is from 0 (black, transparent) to 1.
+    pub fn of(image: &Image, threshold: f64) -> Result<Self, Error> {
+        let is_fraction = |v: f64| (0.0..=1.0).contains(&v);
+        let threshold = require("threshold", threshold, "from 0 to 1", is_fraction)?;
+        let half = |opacity: &[u16]| opacity.iter().any(|&v| v <= u16::MAX / 2);
+        if image.opacity().is_some_and(half) {
+            return Ok(Self::Opaque(threshold));
         }
+        let dark = Self::Dark(threshold);
+        let is_dark = |&pixel: &usize| dark.depth(image.pixel(pixel)) > 0.0;
+        let darker = image.border().filter(is_dark).count();
+        if 2 * darker > image.border().count() {
+            return Ok(Self::Light(threshold));
+        }
+        Ok(dark)
     }
 
     /// The same side of another threshold.
@@ -134,7 +85,8 @@ impl Side {
 /// How the values of an image divide into two tones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tones {
-    /// The threshold that separates them best, see [`Threshold::Otsu`].
+    /// The threshold that separates them best: it maximises the variance between the two classes of pixels, and lies in the middle
+    /// of all that do. N. Otsu: A threshold selection method from gray-level histograms. IEEE Trans. Syst. Man Cybern. 9 (1979).
     pub threshold: f64,
     /// The part of the pixels that has neither tone and is not at an edge between them: next to nothing in a drawing, much in
     /// a photograph.

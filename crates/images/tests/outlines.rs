@@ -10,13 +10,11 @@ use geometry::shapes::{Ball, Cuboid};
 use geometry::{
     Field, Grid, Placement, Rotation, SignedDistance, SignedDistanceExt, optimal_profile,
 };
-use images::{
-    Error, Image, Inside, Interface, Outline, OutlineDistance, Side, Threshold, decode, mask,
-};
+use images::{Error, Image, Interface, Outline, OutlineDistance, Side, Tones, decode};
 use proptest::prelude::*;
 
 fn outline(image: &Image) -> Outline {
-    let side = Side::of(image, Inside::Auto, Threshold::default()).unwrap();
+    let side = Side::of(image, 0.5).unwrap();
     Outline::of_image(image, side).unwrap()
 }
 
@@ -178,60 +176,36 @@ fn the_side_is_chosen() {
             .map(|&v| if v < 0.5 { shape } else { ground })
             .collect()
     });
-    let half = Threshold::default();
-    let side = |grey: &[u16], opacity: Option<Vec<u16>>, inside, threshold| {
+    let side = |grey: &[u16], opacity: Option<Vec<u16>>| {
         let image = Image::new(9, 9, grey.to_vec(), opacity).unwrap();
-        Side::of(&image, inside, threshold).unwrap()
+        Side::of(&image, 0.5).unwrap()
     };
-    assert_eq!(side(&dark, None, Inside::Auto, half), Side::Dark(0.5));
-    assert_eq!(side(&light, None, Inside::Auto, half), Side::Light(0.5));
-    assert_eq!(
-        side(&light, None, Inside::Dark, Threshold::At(0.25)),
-        Side::Dark(0.25)
-    );
-    assert_eq!(
-        side(&dark, Some(dark.clone()), Inside::Auto, half),
-        Side::Opaque(0.5)
-    );
+    assert_eq!(side(&dark, None), Side::Dark(0.5));
+    assert_eq!(side(&light, None), Side::Light(0.5));
+    assert_eq!(side(&dark, Some(dark.clone())), Side::Opaque(0.5));
     // Slightly transparent pixels do not cut out a shape.
-    assert_eq!(
-        side(&dark, Some(vec![60000; 81]), Inside::Auto, half),
-        Side::Dark(0.5)
-    );
-    assert_eq!(
-        side(&dark, Some(dark.clone()), Inside::Light, half),
-        Side::Light(0.5)
-    );
-    assert_eq!(side(&dark, None, Inside::Auto, half), Side::Dark(0.5));
+    assert_eq!(side(&dark, Some(vec![60000; 81])), Side::Dark(0.5));
 
     // Two grey values are separated halfway, also when one is rare.
+    let separated = |grey: &[u16]| {
+        let image = Image::new(9, 9, grey.to_vec(), None).unwrap();
+        Tones::of(&image, Side::Dark(0.5)).threshold
+    };
     let grey: Vec<u16> = dark
         .iter()
         .map(|&v| if v == 0 { 60 * 257 } else { 200 * 257 })
         .collect();
-    assert_eq!(
-        side(&grey, None, Inside::Auto, Threshold::Otsu),
-        Side::Dark(130.0 / 255.0)
-    );
     let mut rare = vec![200 * 257; 81];
     rare[40] = 60 * 257;
     assert_eq!(
-        side(&rare, None, Inside::Dark, Threshold::Otsu),
-        Side::Dark(130.0 / 255.0)
+        [&grey, &rare].map(|grey| separated(grey)),
+        [130.0 / 255.0; 2]
     );
-    assert_eq!(
-        side(&dark, None, Inside::Auto, Threshold::Otsu),
-        Side::Dark(0.5)
-    );
-    assert_eq!(
-        side(&[700; 81], None, Inside::Auto, Threshold::Otsu),
-        Side::Light(0.5)
-    );
+    assert_eq!([separated(&dark), separated(&[700; 81])], [0.5; 2]);
 
     // Transparency counts as paper: grey on white for dark shapes, on black for light ones.
     let image = Image::new(3, 1, vec![0, 0, 65535], Some(vec![0, 65535, 65535])).unwrap();
-    let lengths = [Inside::Dark, Inside::Light, Inside::Opaque].map(|inside| {
-        let side = Side::of(&image, inside, half).unwrap();
+    let lengths = [Side::Dark(0.5), Side::Light(0.5), Side::Opaque(0.5)].map(|side| {
         let bounds = Outline::of_image(&image, side).unwrap().bounding_box();
         [bounds.lower[0], bounds.upper[0]]
     });
@@ -277,7 +251,7 @@ fn unusable_images_are_explained() {
         ));
     }
     for threshold in [-0.1, 1.1, f64::NAN, f64::INFINITY] {
-        let error = Side::of(&grey, Inside::Auto, Threshold::At(threshold)).unwrap_err();
+        let error = Side::of(&grey, threshold).unwrap_err();
         assert_eq!(
             error.to_string(),
             format!("threshold = {threshold} is not allowed: it must be from 0 to 1")
@@ -424,31 +398,6 @@ fn placement_and_its_inverse() {
             .to_string(),
         "longest side of the bounding box = 0.0 is not allowed: it must be finite and positive"
     );
-}
-
-#[test]
-fn masks_hold_the_nodes_inside() {
-    let image = Raster::new([50, 50], 4, disc([25.0, 25.0], 20.0)).image();
-    let grid = Grid::<2>::centred(128, 1.0).unwrap();
-    let placement = Placement::fit(&image.bounding_box(), &grid, 1.0, 0.0).unwrap();
-    let region = OutlineDistance::new(&outline(&image).placed(&placement));
-    let nodes = mask(grid, &region).unwrap();
-    assert_eq!(nodes.len(), grid.len());
-    let count = nodes.iter().filter(|&&inside| inside).count();
-    near(count as f64 / grid.len() as f64, PI * 0.16, 2e-3);
-    for (k, &inside) in nodes.iter().enumerate() {
-        let [x, y] = grid.node(k);
-        if (x.hypot(y) - 0.4).abs() > 0.003 {
-            assert_eq!(inside, x.hypot(y) < 0.4);
-        }
-    }
-    let error = mask(grid, &region.translated([5.0, 0.0])).unwrap_err();
-    assert_eq!(
-        error.to_string(),
-        "no node of the grid of 16384 nodes is in the region, so nothing could move; check where it \
-         is placed, or use a finer grid"
-    );
-    assert!(mask(grid, &|_: [f64; 2]| f64::NAN).is_err());
 }
 
 #[test]

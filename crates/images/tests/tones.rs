@@ -1,7 +1,7 @@
 //! What tells drawings from photographs, and the raster from the shape.
 
 use geometry::SignedDistance;
-use images::{Image, Inside, Outline, OutlineDistance, Side, Threshold, Tones, colours};
+use images::{Image, Outline, OutlineDistance, Side, Tones, colours};
 
 const PIXELS: u32 = 160;
 
@@ -24,7 +24,7 @@ fn drawings_have_two_tones_and_photographs_do_not() {
     let hard = image(|x, y| f64::from(u8::from(radius(x, y) > 60.0)));
     let photograph = image(|x, y| 0.5 + 0.4 * (0.05 * x).sin() * (0.07 * y).cos());
     let tones = |image: &Image| {
-        let side = Side::of(image, Inside::Auto, Threshold::default()).unwrap();
+        let side = Side::of(image, 0.5).unwrap();
         Tones::of(image, side)
     };
     let [blended, hard, photograph] = [&blended, &hard, &photograph].map(tones);
@@ -68,7 +68,7 @@ fn smoothed_outlines_have_the_length_of_the_shape_and_stay_near() {
 fn colours_are_those_of_the_file() {
     let pixels: Vec<[u8; 4]> = (0..48).map(|k| [k, 5 * k, 255 - k, 255 - 3 * k]).collect();
     let picture = render::Picture::new(8, 6, pixels).unwrap();
-    let again = colours(&picture.to_png().unwrap()).unwrap();
+    let again = colours("x", &picture.to_png().unwrap()).unwrap();
     assert_eq!(again.pixels(), picture.pixels());
     let mut jpeg = Vec::new();
     let red: Vec<u8> = [200, 30, 40].repeat(64);
@@ -76,12 +76,13 @@ fn colours_are_those_of_the_file() {
     encoder
         .encode(&red, 8, 8, jpeg_encoder::ColorType::Rgb)
         .unwrap();
-    for pixel in colours(&jpeg).unwrap().pixels() {
+    for pixel in colours("x", &jpeg).unwrap().pixels() {
         let near = |a: u8, b: u8| a.abs_diff(b) < 8;
         assert!(
             near(pixel[0], 200) && near(pixel[1], 30) && near(pixel[2], 40),
             "{pixel:?}"
         );
     }
-    assert!(colours(b"no image").is_err());
+    let error = colours("x.png", b"no image").unwrap_err();
+    assert!(error.to_string().starts_with("x.png"), "{error}");
 }

@@ -9,36 +9,29 @@ use std::path::PathBuf;
 #[error(transparent)]
 #[non_exhaustive]
 pub enum Error {
-    /// A file or folder that cannot be read.
     #[error("cannot read {}: {source}", path.display())]
     Read {
         path: PathBuf,
         source: std::io::Error,
     },
-    /// A figure or folder that should be there.
     #[error("{0} is missing")]
     Missing(String),
     /// A page that cannot be written.
     Write(#[from] files::Error),
-    /// Bytes that are no picture a browser shows, or a damaged one.
     #[error("{name} is no intact PNG or SVG picture: {problem}")]
     Picture { name: String, problem: String },
-    /// A picture that cannot be encoded, or a view that cannot be taken.
+    /// A view that cannot be taken.
     Render(#[from] render::Error),
-    /// A table that cannot be read or has rows of different lengths.
     #[error("{name} is no table: {problem}")]
     Table { name: String, problem: String },
-    /// JSON that is not what it should be.
     #[error("{name} is not {expected}: {problem}")]
     Json {
         name: String,
         expected: &'static str,
         problem: String,
     },
-    /// A sequence or a viewer with nothing to show.
     #[error("{what} {title:?} is empty: there is nothing to show")]
     Empty { what: &'static str, title: String },
-    /// A surface with numbers that cannot be drawn.
     #[error("the surface {label:?} cannot be shown: {source}")]
     Surface {
         label: String,

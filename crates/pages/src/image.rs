@@ -6,14 +6,13 @@ use maud::{Markup, html};
 
 use crate::error::{Error, Result};
 
-/// An intact PNG (also animated) or SVG picture, which becomes a part of the page: one file that can
+/// An intact PNG or SVG picture, which becomes a part of the page: one file that can
 /// be moved and mailed.
 #[derive(Clone, Debug)]
 pub struct Image {
     mime: &'static str,
     data: String,
     size: Option<[u32; 2]>,
-    animated: bool,
 }
 
 impl Image {
@@ -33,19 +32,6 @@ impl Image {
         })
     }
 
-    /// A rendered picture, as PNG.
-    ///
-    /// # Errors
-    /// [`Error::Render`] if it cannot be encoded.
-    pub fn from_picture(picture: &render::Picture) -> Result<Self> {
-        Self::from_bytes("the rendered picture", &picture.to_png()?)
-    }
-
-    /// Whether it moves.
-    pub(crate) fn is_animated(&self) -> bool {
-        self.animated
-    }
-
     /// The element; `alternative` is for readers who cannot see the picture.
     pub(crate) fn html(&self, alternative: &str) -> Markup {
         // With the size known beforehand, nothing jumps while a page is loaded.
@@ -63,23 +49,17 @@ fn png(bytes: &[u8]) -> Result<Image, String> {
         .read_info()
         .map_err(line)?;
     let info = reader.info();
-    let (size, frames) = (
-        [info.width, info.height],
-        info.animation_control().map(|a| a.num_frames),
-    );
+    let size = [info.width, info.height];
     let length = reader
         .output_buffer_size()
         .ok_or("it is too large for this machine")?;
     let mut pixels = vec![0; length];
-    for _ in 0..frames.unwrap_or(1) {
-        reader.next_frame(&mut pixels).map_err(line)?;
-    }
+    reader.next_frame(&mut pixels).map_err(line)?;
     reader.finish().map_err(line)?;
     Ok(Image {
         mime: "image/png",
         data: STANDARD.encode(bytes),
         size: Some(size),
-        animated: frames.is_some_and(|n| n > 1),
     })
 }
 
@@ -99,14 +79,11 @@ fn svg(bytes: &[u8]) -> Result<Image, String> {
         mime: "image/svg+xml",
         data: STANDARD.encode(bytes),
         size: side("width").zip(side("height")).map(|(w, h)| [w, h]),
-        animated: false,
     })
 }
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use super::*;
 
     fn picture(shade: u8) -> render::Picture {
@@ -115,16 +92,11 @@ mod tests {
 
     #[test]
     fn pictures_are_recognised_with_their_size() {
-        let still = Image::from_picture(&picture(7)).unwrap();
-        assert_eq!((still.size, still.animated), (Some([3, 2]), false));
+        let still = Image::from_bytes("still", &picture(7).to_png().unwrap()).unwrap();
+        assert_eq!(still.size, Some([3, 2]));
         let html = still.html("red \"squares\"").0;
         assert!(html.starts_with("<img src=\"data:image/png;base64,iVBOR"));
         assert!(html.ends_with("alt=\"red &quot;squares&quot;\" width=\"3\" height=\"2\">"));
-
-        let frames = [picture(1), picture(2)];
-        let moving = render::animation(&frames, Duration::from_millis(50)).unwrap();
-        let moving = Image::from_bytes("moving", &moving).unwrap();
-        assert!(moving.is_animated());
 
         let svg = br#"<svg xmlns="http://www.w3.org/2000/svg" width="80" height="40.4"/>"#;
         let svg = Image::from_bytes("drawing", svg).unwrap();

@@ -13,7 +13,7 @@
 //!         .quality(render::Quality::Draft)
 //!         .render([160, 120])?;
 //!
-//!     let poster = Image::from_picture(&picture)?;
+//!     let poster = Image::from_bytes("ball", &picture.to_png()?)?;
 //!     let ball = Viewer::new("A ball", poster, View::default(), [("step 0", &mesh)])?;
 //!     let table = Table::from_csv("Errors", "n,error\n64,0.01\n128,0.0025\n")?;
 //!     let details = Details::new("Parameters").with(Facts::new().with("eps", "2 h"));

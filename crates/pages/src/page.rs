@@ -261,14 +261,8 @@ impl Figure {
 
 impl Render for Figure {
     fn render(&self) -> Markup {
-        let figure = html! {
+        html! {
             figure { (self.image.html(&self.caption)) figcaption { (self.caption) } }
-        };
-        if self.image.is_animated() {
-            // What moves can be put away.
-            html! { details open { summary { "Animation" } (figure) } }
-        } else {
-            figure
         }
     }
 }

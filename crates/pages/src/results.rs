@@ -1,9 +1,8 @@
 //! Pages of results: what the folders of experiments hold, as sections.
 //!
 //! A folder of an experiment has a `manifest.json` and a `summary.json`, figures (PNG, the same as
-//! SVG beside it), numbered pictures (`name_000.png`, `name_001.png`, ...), and tables (Markdown,
-//! the same as CSV beside it). [`index_page`] makes one page of all folders, [`run_page`] one of a
-//! single folder.
+//! SVG beside it), and tables (Markdown, the same as CSV beside it). [`index_page`] makes one page
+//! of all folders.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -16,7 +15,7 @@ use serde_json::Value;
 use crate::error::{Error, Result};
 use crate::facts::{Facts, five_digits, natural};
 use crate::image::Image;
-use crate::page::{Details, Figure, Frames, Page, Section};
+use crate::page::{Details, Figure, Page, Section};
 use crate::table::Table;
 use crate::text::Text;
 
@@ -77,75 +76,36 @@ pub fn index_page(folder: &Path) -> Result<(Page, Vec<Error>)> {
         sections.push(Section::new("Beside the paper").with(text));
     }
     for name in &names {
-        sections.push(experiment(folder, name, None, &mut problems));
+        sections.push(experiment(folder, name, &mut problems));
     }
-    Ok((finished(page, sections, &problems), problems))
-}
-
-/// The page of one run, and what is missing or broken.
-///
-/// # Errors
-/// [`Error::Read`] if the folder cannot be read. Files are none.
-pub fn run_page(folder: &Path) -> Result<(Page, Vec<Error>)> {
-    entries(folder, false)?;
-    let mut problems = Vec::new();
-    let name = manifest(folder, "manifest.json").map(|(name, _)| name);
-    let name = name.unwrap_or_default();
-    let section = experiment(folder, "", Some(&name), &mut problems);
-    let page = Page::new(title(&name));
-    Ok((finished(page, vec![section], &problems), problems))
-}
-
-fn finished(page: Page, sections: Vec<Section>, problems: &[Error]) -> Page {
     let mut first = Section::new("Missing or broken files").named("problems");
-    for problem in problems {
+    for problem in &problems {
         first.push(Text::from(problem.to_string()));
     }
     let first = (!problems.is_empty()).then_some(first);
-    first.into_iter().chain(sections).fold(page, Page::with)
+    let page = first.into_iter().chain(sections).fold(page, Page::with);
+    Ok((page, problems))
 }
 
-fn title(name: &str) -> String {
-    let entry = CATALOGUE.iter().find(|entry| entry.folder == name);
-    entry.map_or_else(|| spelled_out(name), |entry| entry.title.clone())
-}
-
-/// The section of the experiment in the folder `root/folder`, which is `name`, or that of the folder.
-fn experiment(root: &Path, folder: &str, name: Option<&str>, problems: &mut Vec<Error>) -> Section {
-    let path = |file: &str| {
-        if folder.is_empty() {
-            file.to_owned()
-        } else {
-            format!("{folder}/{file}")
-        }
-    };
-    let heading = name.map_or_else(|| title(folder), |_| "Results".to_owned());
-    let name = name.unwrap_or(folder);
-    let mut section = Section::new(heading).named(name);
-    let files = kept(entries(&root.join(folder), false), problems).unwrap_or_default();
+/// The section of the experiment in the folder `root/name`.
+fn experiment(root: &Path, name: &str, problems: &mut Vec<Error>) -> Section {
+    let path = |file: &str| format!("{name}/{file}");
+    let files = kept(entries(&root.join(name), false), problems).unwrap_or_default();
     let facts = kept(manifest(root, &path("manifest.json")), problems);
     let entry = CATALOGUE.iter().find(|entry| entry.folder == name);
+    let title = entry.map_or_else(|| spelled_out(name), |entry| entry.title.clone());
+    let mut section = Section::new(title).named(name);
     if let Some(entry) = entry {
         section.push(Text::markdown(&entry.description));
     }
-    let (single, sequences) = pictures(&files);
     let captions = entry.map_or(&[][..], |entry| &entry.figures);
-    for (file, caption) in ordered(single, captions) {
+    for (file, caption) in ordered(pictures(&files), captions) {
         let Some(file) = file else {
             problems.push(Error::Missing(path(&caption)));
             continue;
         };
         if let Some(image) = kept(image(root, &path(&file)), problems) {
             section.push(Figure::new(image, caption));
-        }
-    }
-    for (name, files) in sequences {
-        let frames = files.iter().filter_map(|file| {
-            let image = kept(image(root, &path(file)), problems)?;
-            Some((number_of(file)?.1.to_owned(), image))
-        });
-        if let Ok(frames) = Frames::new(format!("{}.", spelled_out(&name)), frames.collect()) {
-            section.push(frames);
         }
     }
     let mut folded = Vec::new();
@@ -173,7 +133,7 @@ fn experiment(root: &Path, folder: &str, name: Option<&str>, problems: &mut Vec<
     if let Some(summary) = kept(summary, problems) {
         folded.push(Details::new("Metrics").with(summary));
     }
-    if let Some((_, facts)) = facts {
+    if let Some(facts) = facts {
         folded.push(Details::new("How it was computed").with(facts));
     }
     folded.into_iter().fold(section, Section::with)
@@ -221,8 +181,8 @@ fn image(root: &Path, file: &str) -> Result<Image> {
     Image::from_bytes(file, &read_bytes(root, file)?)
 }
 
-/// The experiment of a manifest, and the important facts: program, machine, seed, times, parameters.
-fn manifest(root: &Path, file: &str) -> Result<(String, Facts)> {
+/// The important facts of a manifest: program, machine, seed, times, parameters.
+fn manifest(root: &Path, file: &str) -> Result<Facts> {
     const KEYS: [&str; 12] = [
         "experiment",
         "version",
@@ -244,8 +204,8 @@ fn manifest(root: &Path, file: &str) -> Result<(String, Facts)> {
     };
     let manifest: Value =
         serde_json::from_str(&read(root, file)?).map_err(|error| failed(error.to_string()))?;
-    let (Some(name), Value::Object(parameters)) =
-        (manifest["experiment"].as_str(), &manifest["parameters"])
+    let (Value::String(_), Value::Object(parameters)) =
+        (&manifest["experiment"], &manifest["parameters"])
     else {
         return Err(failed("it names no experiment or no parameters".to_owned()));
     };
@@ -257,14 +217,13 @@ fn manifest(root: &Path, file: &str) -> Result<(String, Facts)> {
             facts.with_value(key, value)
         });
     let phases = manifest["phases"].as_array().map_or(&[][..], Vec::as_slice);
-    let facts = phases.iter().take(MOST_PHASES).fold(facts, |facts, phase| {
+    Ok(phases.iter().take(MOST_PHASES).fold(facts, |facts, phase| {
         let seconds = phase["seconds"].as_f64().unwrap_or(f64::NAN);
         facts.with(
             phase["name"].as_str().unwrap_or_default(),
             format!("{} s", five_digits(seconds)),
         )
-    });
-    Ok((name.to_owned(), facts))
+    }))
 }
 
 /// A Markdown text without the line of its title.
@@ -307,26 +266,14 @@ fn tables(files: &[String]) -> impl Iterator<Item = (&str, bool)> {
         })
 }
 
-/// Single pictures, a PNG before the SVG of the same name, and numbered ones by their name.
-fn pictures(files: &[String]) -> (Vec<String>, Vec<(String, Vec<String>)>) {
-    let (mut single, mut sequences) = (Vec::new(), Vec::<(String, Vec<String>)>::new());
-    let has = |stem: &str, extension: &str| files.contains(&format!("{stem}.{extension}"));
-    for file in files {
-        let stem = stem_of(file);
-        match (extension_of(file), number_of(file)) {
-            ("png", Some((name, _))) => match sequences.iter_mut().find(|(n, _)| n == name) {
-                Some((_, files)) => files.push(file.clone()),
-                None => sequences.push((name.to_owned(), vec![file.clone()])),
-            },
-            ("png" | "apng", _) => single.push(file.clone()),
-            ("svg", _) if !has(stem, "png") && !has(stem, "apng") => single.push(file.clone()),
-            _ => {}
-        }
-    }
-    // One number is no sequence.
-    let (sequences, ones): (Vec<_>, Vec<_>) = sequences.into_iter().partition(|(_, f)| f.len() > 1);
-    single.extend(ones.into_iter().flat_map(|(_, files)| files));
-    (single, sequences)
+/// Pictures: PNG, and SVG that are not there as PNG.
+fn pictures(files: &[String]) -> Vec<String> {
+    let is_shown = |file: &&String| match extension_of(file) {
+        "png" => true,
+        "svg" => !files.contains(&format!("{}.png", stem_of(file))),
+        _ => false,
+    };
+    files.iter().filter(is_shown).cloned().collect()
 }
 
 fn extension_of(file: &str) -> &str {
@@ -337,21 +284,12 @@ fn stem_of(file: &str) -> &str {
     file.rsplit_once('.').map_or(file, |(stem, _)| stem)
 }
 
-/// `name` and `012` of `name_012.png`.
-fn number_of(file: &str) -> Option<(&str, &str)> {
-    let (name, number) = stem_of(file).rsplit_once(['_', '-'])?;
-    let is_number = number.len() >= 3 && number.bytes().all(|b| b.is_ascii_digit());
-    is_number.then_some((name, number))
-}
-
 /// `Error over radius` of `error_over_radius`.
 fn spelled_out(name: &str) -> String {
     let text = name.replace(['_', '-'], " ");
     let mut characters = text.chars();
-    match characters.next() {
-        Some(first) => first.to_uppercase().chain(characters).collect(),
-        None => "Results".to_owned(),
-    }
+    let first = characters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(characters).collect()
 }
 
 #[cfg(test)]
@@ -365,27 +303,13 @@ mod tests {
         let folders: HashSet<&str> = CATALOGUE.iter().map(|e| e.folder.as_str()).collect();
         assert_eq!(folders.len(), CATALOGUE.len());
         assert!(CATALOGUE.iter().all(|entry| !entry.figures.is_empty()));
-        assert_eq!(title("cross"), "Willmore flow of a cross");
-        assert_eq!(title("error_over_radius"), "Error over radius");
-        assert_eq!(title(""), "Results");
+        assert_eq!(spelled_out("error_over_radius"), "Error over radius");
     }
 
     #[test]
-    fn pictures_are_sorted_into_figures_and_sequences() {
-        let files = [
-            "a.png",
-            "a.svg",
-            "b.svg",
-            "turn_000.png",
-            "turn_001.png",
-            "x-123.png",
-            "t.csv",
-        ];
-        let files: Vec<String> = files.map(str::to_owned).into();
-        let (single, sequences) = pictures(&files);
-        assert_eq!(single, ["a.png", "b.svg", "x-123.png"]);
-        let turn = vec!["turn_000.png".to_owned(), "turn_001.png".to_owned()];
-        assert_eq!(sequences, [("turn".to_owned(), turn)]);
+    fn pictures_are_shown_once() {
+        let files = ["a.png", "a.svg", "b.svg", "t.csv"].map(str::to_owned);
+        assert_eq!(pictures(&files), ["a.png", "b.svg"]);
     }
 
     #[test]
@@ -397,7 +321,7 @@ mod tests {
             "l": [{"d": "e"}]}, "dtype": "f64", "seed": null, "wall_seconds": 1.5,
             "phases": [{"name": "p", "seconds": 2}]}"#,
         );
-        let (name, facts) = manifest(folder.path(), "m.json").unwrap();
+        let facts = manifest(folder.path(), "m.json").unwrap();
         let entries: Vec<(&str, &str)> = (facts.entries().iter())
             .map(|(name, value)| (name.as_str(), value.as_str()))
             .collect();
@@ -410,7 +334,7 @@ mod tests {
             ("n", "64, 128"),
             ("p", "2 s"),
         ];
-        assert_eq!((name.as_str(), &entries[..]), ("x", &expected[..]));
+        assert_eq!(entries, expected);
         for json in ["", "{}", "[]", "{\"experiment\": 3, \"parameters\": {}}"] {
             write(json);
             let message = manifest(folder.path(), "m.json").unwrap_err().to_string();

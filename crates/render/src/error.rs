@@ -13,39 +13,29 @@ pub enum Error {
     Io(#[from] files::Error),
     /// A surface cannot be found.
     Surface(#[from] surfaces::Error),
-    /// The PNG encoder failed.
     #[error("the picture could not be encoded as PNG")]
     Encode(#[from] png::EncodingError),
-    /// Bytes that are no picture of this crate.
-    #[error("the picture cannot be read: {0}")]
-    Decode(#[from] png::DecodingError),
-    /// The camera is to be fitted to a surface that is not there.
     #[error(
         "there is no surface and no tube, so nothing can be framed; say within which box for a \
          picture that may be empty"
     )]
     NothingToFrame,
-    /// A tube with too few points.
     #[error("tube {index} has {points} points; it needs at least 2")]
     TubePoints {
         /// Which tube, from 0.
         index: usize,
         points: usize,
     },
-    /// A picture without pixels, or with more than can be meant.
     #[error("a picture of {width} x {height} pixels cannot be drawn; use 1 to {limit} a side")]
     PictureSize { width: u32, height: u32, limit: u32 },
-    /// The number of pixels is not that of the picture.
     #[error("{width} x {height} pixels were announced, but {actual} given")]
     PixelCount {
         width: u32,
         height: u32,
         actual: usize,
     },
-    /// An animation without pictures.
     #[error("an animation needs at least one picture")]
     NoFrames,
-    /// The pictures of an animation differ in size.
     #[error(
         "picture {index} of the animation has {} x {} pixels, but the first has {} x {}",
         size[0], size[1], first[0], first[1]

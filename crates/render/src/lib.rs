@@ -1,4 +1,4 @@
-//! Pictures of surfaces given as phase fields, signed distances or meshes, without a GPU or a display.
+//! Pictures of surfaces given as phase fields or meshes, without a GPU or a display.
 //!
 //! ```
 //! use geometry::shapes::Torus;
@@ -39,8 +39,7 @@
 //!
 //! # Conventions
 //!
-//! - The solid is where `u > 0`, or where a signed distance is negative, inside the box of the
-//!   grid. What lies beyond the box is outside: a picture repeats nothing.
+//! - The solid is where `u > 0` inside the box of the grid. What lies beyond the box is outside: a picture repeats nothing.
 //! - Drawn are the triangles of [`surfaces::isosurface`] with normals that are interpolated, sorted
 //!   by depth for several samples of every pixel.
 //! - Ambient occlusion and shadows are those at the vertices. The directions of light are fixed:
@@ -61,6 +60,6 @@ mod shadow;
 pub use camera::View;
 pub use error::Error;
 pub use model::Tube;
-pub use picture::{LARGEST_SIDE, Picture, animation};
+pub use picture::{Picture, animation, checked_size};
 pub use scene::{Quality, Scene};
 pub use srgb::Rgb;

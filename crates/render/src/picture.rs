@@ -9,10 +9,13 @@ use geometry::require;
 use crate::Error;
 
 /// Largest side of a picture, in pixels.
-pub const LARGEST_SIDE: u32 = 8192;
+const LARGEST_SIDE: u32 = 8192;
 
 /// Accepts sizes that can be drawn.
-pub(crate) fn checked(size: [u32; 2]) -> Result<[u32; 2], Error> {
+///
+/// # Errors
+/// [`Error::PictureSize`].
+pub fn checked_size(size: [u32; 2]) -> Result<[u32; 2], Error> {
     if size.iter().all(|side| (1..=LARGEST_SIDE).contains(side)) {
         return Ok(size);
     }
@@ -36,7 +39,7 @@ impl Picture {
     /// # Errors
     /// The sides must be from 1 to 8192, and the pixels `width * height`.
     pub fn new(width: u32, height: u32, pixels: Vec<[u8; 4]>) -> Result<Self, Error> {
-        let size = checked([width, height])?;
+        let size = checked_size([width, height])?;
         if pixels.len() != width as usize * height as usize {
             return Err(Error::PixelCount {
                 width,
@@ -69,23 +72,6 @@ impl Picture {
     pub fn pixel(&self, x: u32, y: u32) -> [u8; 4] {
         assert!(x < self.size[0], "x = {x} is not below {}", self.size[0]);
         self.pixels[y as usize * self.size[0] as usize + x as usize]
-    }
-
-    /// The picture in the bytes of a PNG file as this crate writes them: eight bits, with or without opacity; the first one of an
-    /// animation.
-    ///
-    /// # Errors
-    /// [`Error::Decode`]; as [`Picture::new`].
-    pub fn from_png(bytes: &[u8]) -> Result<Self, Error> {
-        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info()?;
-        let mut data = vec![0; reader.output_buffer_size().unwrap_or(0)];
-        let info = reader.next_frame(&mut data)?;
-        let channels = info.color_type.samples();
-        let pixels = data[..info.buffer_size()].chunks_exact(channels).map(|p| {
-            let opacity = p.get(3).copied().unwrap_or(u8::MAX);
-            [p[0], p[1 % channels], p[2 % channels], opacity]
-        });
-        Self::new(info.width, info.height, pixels.collect())
     }
 
     /// The bytes of a PNG file.

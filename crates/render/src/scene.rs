@@ -11,7 +11,7 @@ use crate::Error;
 use crate::camera::{Camera, View};
 use crate::light::Lights;
 use crate::model::{Model, Tube};
-use crate::picture::{Picture, checked};
+use crate::picture::{Picture, checked_size};
 use crate::raster::Triangle;
 use crate::shadow::{Effort, arriving};
 
@@ -55,7 +55,6 @@ pub struct Scene {
     view: View,
     framed: Option<BoundingBox<3>>,
     colour: Rgb,
-    transparent: bool,
     tubes: Vec<Tube>,
     /// A colour, and where it is: where the value at a vertex, interpolated, exceeds one half.
     highlight: Option<(Vec<f64>, Rgb)>,
@@ -66,22 +65,13 @@ pub struct Scene {
 
 impl Scene {
     /// The surface `u = 0` of a phase field, which is positive inside: that of the distances
-    /// `-(4 eps / 3) atanh u`.
+    /// `-(4 eps / 3) atanh u`, smoothed a little, so that edges are rounded over two cells and have no
+    /// teeth; what is smooth moves by `h^2 / 3` times the mean curvature, which no picture shows.
     ///
     /// # Errors
     /// `u` must be finite, and `eps` finite and positive.
     pub fn new(u: &Field<3>, eps: f64) -> Result<Self, Error> {
-        Self::from_signed_distance(&distances_from_phase_field(u, eps)?)
-    }
-
-    /// The surface of a signed distance, which is negative inside; only its zeros, and its slope
-    /// there, matter. It is smoothed a little, so that edges are rounded over two cells and have no
-    /// teeth; what is smooth moves by `h^2 / 3` times the mean curvature, which no picture shows.
-    ///
-    /// # Errors
-    /// The field must be finite.
-    pub fn from_signed_distance(distance: &Field<3>) -> Result<Self, Error> {
-        distance.check_finite()?;
+        let distance = distances_from_phase_field(u, eps)?;
         Ok(Self::of_mesh(isosurface(&distance.smoothed())?))
     }
 
@@ -92,7 +82,6 @@ impl Scene {
             view: View::default(),
             framed: None,
             colour: Rgb::CLAY,
-            transparent: false,
             tubes: Vec::new(),
             highlight: None,
             painted: None,
@@ -119,13 +108,6 @@ impl Scene {
     #[must_use]
     pub fn colour(mut self, colour: Rgb) -> Self {
         self.colour = colour;
-        self
-    }
-
-    /// Leaves out the white background: the picture has an opacity channel.
-    #[must_use]
-    pub fn transparent(mut self) -> Self {
-        self.transparent = true;
         self
     }
 
@@ -180,7 +162,7 @@ impl Scene {
     /// # Errors
     /// A number out of range, nothing to frame, or a size that cannot be drawn.
     pub fn render(&self, size: [u32; 2]) -> Result<Picture, Error> {
-        let size = checked(size)?;
+        let size = checked_size(size)?;
         let mut model = Model::new(&self.mesh);
         let mut colours = vec![self.colour.linear()];
         for (index, tube) in self.tubes.iter().enumerate() {
@@ -200,7 +182,6 @@ impl Scene {
             painted: (self.painted.iter().flatten())
                 .map(|colour| colour.linear())
                 .collect(),
-            background: if self.transparent { [0.0; 4] } else { [1.0; 4] },
             per_side,
             model,
             colours,
@@ -247,7 +228,6 @@ struct Drawing<'a> {
     highlight: Option<(&'a [f64], [f32; 3])>,
     /// Of the first vertices, if those have their own.
     painted: Vec<[f32; 3]>,
-    background: [f32; 4],
     camera: Camera,
     lights: Lights,
     size: [usize; 2],
@@ -280,21 +260,22 @@ impl Drawing<'_> {
             });
         }
         for (at, pixel) in pixels.iter_mut().enumerate() {
-            // Linear intensities times opacities, and opacities.
-            let mut sum = [0.0; 4];
+            // Linear intensities.
+            let mut sum = [0.0; 3];
             for part in 0..per_side * per_side {
                 let x = at % self.size[0] * per_side + part % per_side;
                 let y = at / self.size[0] * per_side + part / per_side;
                 let (_, triangle) = samples[y * columns + x];
                 let light = if triangle == usize::MAX {
-                    self.background
+                    [1.0; 3]
                 } else {
-                    let [r, g, b] = self.shade(triangle, [x, y + from].map(|v| v as f64 + 0.5));
-                    [r, g, b, 1.0]
+                    self.shade(triangle, [x, y + from].map(|v| v as f64 + 0.5))
                 };
                 sum = std::array::from_fn(|c| sum[c] + light[c]);
             }
-            *pixel = encoded(sum, (per_side * per_side) as f32);
+            let count = (per_side * per_side) as f32;
+            let [r, g, b] = sum.map(|light| srgb::encode(light / count));
+            *pixel = [r, g, b, 255];
         }
     }
 
@@ -327,14 +308,4 @@ impl Drawing<'_> {
         };
         self.lights.shade(body, normal, toward, [light.x, light.y])
     }
-}
-
-/// The sRGB value of a sum of `count` samples, not multiplied by the opacity.
-fn encoded(sum: [f32; 4], count: f32) -> [u8; 4] {
-    let [r, g, b, opacity] = sum;
-    if opacity <= 0.0 {
-        return [0; 4];
-    }
-    let [r, g, b] = [r, g, b].map(|v| srgb::encode(v / opacity));
-    [r, g, b, (255.0 * opacity / count).round() as u8]
 }

@@ -6,21 +6,17 @@
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A panel without a single point or pixel that can be drawn.
     #[error(
         "nothing to draw in {chart:?}: it has no finite point (positive on a logarithmic axis) and no pixel"
     )]
     Empty { chart: String },
-    /// A figure without panels.
     #[error("the figure has no panels: add one with `Figure::with_panel`")]
     NoPanels,
-    /// An axis or colour range that is empty, not finite, or not positive where it must be.
     #[error(
         "the range [{low}, {high}] of axis {axis:?} must be finite, increasing by more than \
          rounding, and positive on a logarithmic scale"
     )]
     Range { axis: String, low: f64, high: f64 },
-    /// An array whose length does not match its shape.
     #[error("the array of {chart:?} has {found} values where its shape {shape:?} needs {expected}")]
     ArrayShape {
         chart: String,
@@ -28,7 +24,6 @@ pub enum Error {
         expected: usize,
         found: usize,
     },
-    /// A figure size that leaves no room to draw, or more pixels than can be meant.
     #[error(
         "a figure of {width} x {height} units cannot be drawn: give it between 80 and 2600 \
          a side and at least 40 for every panel"
@@ -39,39 +34,25 @@ pub enum Error {
         /// Height in layout units, 0 if it is not known.
         height: f64,
     },
-    /// A metric or table cell that is NaN or infinite.
     #[error("{what} is {value}, which is not a finite number")]
     NotFinite { what: String, value: f64 },
-    /// A metric name outside the allowed grammar.
     #[error(
         "metric name {name:?} is not allowed: use lower-case words of letters, digits and '_', \
          joined by '.' and beginning with a letter, such as \"circle.error_l2\""
     )]
     MetricName { name: String },
-    /// A metric inserted twice.
     #[error("metric {name:?} is already set to {value}")]
     DuplicateMetric { name: String, value: String },
-    /// A table row with the wrong number of cells.
-    #[error("row {row} of the table has {found} cells where there are {expected} columns")]
-    RowLength {
-        /// Index of the row, from 0.
-        row: usize,
-        expected: usize,
-        found: usize,
-    },
     /// A file or folder that could not be written; what was there before is untouched.
     #[error(transparent)]
     File(#[from] files::Error),
-    /// A file name that is not a single plain component.
     #[error("file name {name:?} is not allowed: give one plain name without separators")]
     FileName { name: String },
-    /// A value that cannot be turned into JSON, or JSON that is not what it should be.
     #[error("{what} is not valid as JSON: {source}")]
     Json {
         what: String,
         source: serde_json::Error,
     },
-    /// A record that cannot be turned into a CSV row.
     #[error("cannot write the records as CSV: {source}")]
     Csv {
         #[from]

@@ -608,7 +608,7 @@ mod tests {
             chart
                 .series
                 .iter_mut()
-                .for_each(|series| series.name.clear());
+                .for_each(|series| series.entry.label.clear());
             chart
         };
         let (with, without) = (Figure::from(two()), Figure::from(nameless(two())));

@@ -9,7 +9,8 @@
 //! # fn main() -> Result<(), report::Error> {
 //! let root = std::env::temp_dir().join("report-first-steps");
 //! let folder = OutputDir::create(&root)?; // fails now, not after hours of computing
-//! let mut manifest = Manifest::start("decay").with_seed(1);
+//! let parameters = serde_json::json!({ "exponent": 2 });
+//! let mut manifest = Manifest::start("decay", &parameters, ["none", "cpu", "f64"], 1)?;
 //!
 //! let steps = [32.0, 64.0, 128.0, 256.0].map(f64::recip);
 //! let error = |h: f64| 0.7 * h.powi(2) + 0.1 * h.powi(3);

@@ -19,7 +19,7 @@ struct Phase {
 
 /// What is needed to repeat a run, and its wall times. It holds nothing about who ran it where: no host name, no user, no paths.
 ///
-/// Beside what is set here, these are the version of the workspace, the commit of the sources, the compiler, the target triple, the
+/// Beside what it is started with, these are the version of the workspace, the commit of the sources, the compiler, the target triple, the
 /// number of processors available, and the start of the run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Manifest {
@@ -32,10 +32,10 @@ pub struct Manifest {
     os: &'static str,
     arch: &'static str,
     cpus: usize,
-    device: Option<String>,
-    dtype: Option<String>,
-    backend: Option<String>,
-    seed: Option<u64>,
+    device: String,
+    dtype: String,
+    backend: String,
+    seed: u64,
     started: String,
     wall_seconds: f64,
     phases: Vec<Phase>,
@@ -44,11 +44,21 @@ pub struct Manifest {
 }
 
 impl Manifest {
-    /// Starts the clock and looks up what the program can know by itself.
-    pub fn start(experiment: impl Into<String>) -> Self {
-        Self {
-            experiment: experiment.into(),
-            parameters: Map::new(),
+    /// Starts the clock and looks up what the program can know by itself. Parameters are anything that serialises to a map, such as a
+    /// struct; then come the tensor backend, its device and its number format, and the seed of all random numbers.
+    ///
+    /// # Errors
+    /// [`Error::Json`] if the parameters do not.
+    pub fn start(
+        experiment: &str,
+        parameters: &impl Serialize,
+        [backend, device, dtype]: [&str; 3],
+        seed: u64,
+    ) -> Result<Self> {
+        let parameters = serde_json::to_value(parameters).and_then(serde_json::from_value);
+        Ok(Self {
+            experiment: experiment.to_owned(),
+            parameters: parameters.map_err(Error::json("the run parameters"))?,
             version: env!("CARGO_PKG_VERSION"),
             commit: commit(),
             rustc: env!("REPORT_RUSTC"),
@@ -56,46 +66,15 @@ impl Manifest {
             os: std::env::consts::OS,
             arch: std::env::consts::ARCH,
             cpus: std::thread::available_parallelism().map_or(1, usize::from),
-            device: None,
-            dtype: None,
-            backend: None,
-            seed: None,
+            device: device.to_owned(),
+            dtype: dtype.to_owned(),
+            backend: backend.to_owned(),
+            seed,
             started: rfc3339(SystemTime::now()),
             wall_seconds: 0.0,
             phases: Vec::new(),
             clock: Instant::now(),
-        }
-    }
-
-    /// Sets the parameters from anything that serialises to a map, such as a struct.
-    ///
-    /// # Errors
-    /// [`Error::Json`] if it does not.
-    pub fn with_parameters(mut self, parameters: &impl Serialize) -> Result<Self> {
-        let map = serde_json::to_value(parameters).and_then(serde_json::from_value);
-        self.parameters = map.map_err(Error::json("the run parameters"))?;
-        Ok(self)
-    }
-
-    /// Names the tensor backend, its device and its number format.
-    #[must_use]
-    pub fn with_backend(
-        mut self,
-        backend: impl Into<String>,
-        device: impl Into<String>,
-        dtype: impl Into<String>,
-    ) -> Self {
-        self.backend = Some(backend.into());
-        self.device = Some(device.into());
-        self.dtype = Some(dtype.into());
-        self
-    }
-
-    /// Names the seed of all random numbers.
-    #[must_use]
-    pub fn with_seed(mut self, seed: u64) -> Self {
-        self.seed = Some(seed);
-        self
+        })
     }
 
     /// Does a part of the run and records how long it took.
@@ -175,14 +154,12 @@ mod tests {
     fn a_manifest_says_what_was_run_but_not_where() {
         let root = tempfile::tempdir().unwrap();
         let folder = OutputDir::create(root.path()).unwrap();
-        let mut manifest = Manifest::start("circle")
-            .with_parameters(&Parameters {
-                epsilon: 0.02,
-                shape: "circle",
-            })
-            .unwrap()
-            .with_backend("flex", "cpu", "f64")
-            .with_seed(7);
+        let parameters = Parameters {
+            epsilon: 0.02,
+            shape: "circle",
+        };
+        let mut manifest =
+            Manifest::start("circle", &parameters, ["flex", "cpu", "f64"], 7).unwrap();
         let answer = manifest.phase("solve", || {
             std::thread::sleep(std::time::Duration::from_millis(20));
             42
@@ -231,9 +208,7 @@ mod tests {
 
     #[test]
     fn parameters_must_be_a_map() {
-        let error = Manifest::start("circle")
-            .with_parameters(&[1, 2])
-            .unwrap_err();
+        let error = Manifest::start("circle", &[1, 2], [""; 3], 0).unwrap_err();
         assert!(error.to_string().contains("expected a map"));
     }
 }

@@ -13,12 +13,10 @@ use crate::surface::Surface;
 /// A named curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    pub(crate) name: String,
+    /// Its name and looks.
+    pub(crate) entry: LegendEntry,
     /// Data points `[x, y]` in drawing order.
     pub points: Vec<[f64; 2]>,
-    colour: Colour,
-    style: LineStyle,
-    marker: Option<Marker>,
     width: f64,
 }
 
@@ -27,11 +25,8 @@ impl Series {
     /// positive on a logarithmic axis, are left out and interrupt the curve. Without a name it is not in the legend.
     pub fn new(name: impl Into<String>, points: impl Into<Vec<[f64; 2]>>) -> Self {
         Self {
-            name: name.into(),
+            entry: LegendEntry::line(name, 0, LineStyle::Solid),
             points: points.into(),
-            colour: Colour::Palette(0),
-            style: LineStyle::Solid,
-            marker: None,
             width: 2.0,
         }
     }
@@ -49,21 +44,21 @@ impl Series {
     /// Sets the colour: a palette index or a [`Colour`].
     #[must_use]
     pub fn with_colour(mut self, colour: impl Into<Colour>) -> Self {
-        self.colour = colour.into();
+        self.entry.colour = colour.into();
         self
     }
 
     /// Sets the line style.
     #[must_use]
     pub fn with_style(mut self, style: LineStyle) -> Self {
-        self.style = style;
+        self.entry.style = style;
         self
     }
 
     /// Marks the data points, but for those too close to others.
     #[must_use]
     pub fn with_marker(mut self, marker: Marker) -> Self {
-        self.marker = Some(marker);
+        self.entry.marker = Some(marker);
         self
     }
 
@@ -145,7 +140,7 @@ impl LineChart {
         let points = self.series.iter().flat_map(|s| &s.points);
         let shown: Vec<[f64; 2]> = points.copied().filter(|&p| self.shows(p)).collect();
         // Symbols need more room at the ends than plain lines.
-        let symbols = self.series.iter().any(|s| s.marker.is_some());
+        let symbols = self.series.iter().any(|s| s.entry.marker.is_some());
         let margin = if symbols { 0.04 } else { 0.02 };
         let x = self.x.resolve(shown.iter().map(|[x, _]| *x), margin)?;
         let y = self.y.resolve(shown.iter().map(|[_, y]| *y), 0.05)?;
@@ -174,14 +169,9 @@ impl Drawable for Plot<'_> {
         if let Some(groups) = &self.chart.entries {
             return groups.clone();
         }
-        let named = (self.chart.series.iter()).filter(|series| !series.name.is_empty());
-        let entry = |series: &Series| LegendEntry {
-            label: series.name.clone(),
-            colour: series.colour,
-            style: series.style,
-            marker: series.marker,
-        };
-        vec![named.map(entry).collect()]
+        let entries = self.chart.series.iter().map(|series| &series.entry);
+        let named = entries.filter(|entry| !entry.label.is_empty());
+        vec![named.cloned().collect()]
     }
 
     fn aspect(&self) -> Option<f64> {
@@ -196,21 +186,22 @@ impl Drawable for Plot<'_> {
         self.axes.draw_grid(surface, plot);
         let bounds = plot.grown(0.5);
         for series in &self.chart.series {
-            let colour = series.colour.rgb();
+            let entry = &series.entry;
+            let colour = entry.colour.rgb();
             let mut symbols = Vec::new();
             for run in series.points.split(|&p| !self.chart.shows(p)) {
                 let placed: Vec<Point> = run
                     .iter()
                     .map(|&p| self.axes.window.place(&plot, p))
                     .collect();
-                if series.style != LineStyle::None {
+                if entry.style != LineStyle::None {
                     for piece in clip_polyline(&thin(&placed, 0.2), &bounds) {
-                        surface.dashed(&piece, series.width, colour, series.style.pattern());
+                        surface.dashed(&piece, series.width, colour, entry.style.pattern());
                     }
                 }
                 symbols.extend(placed.into_iter().filter(|&p| bounds.contains(p)));
             }
-            if let Some(marker) = series.marker {
+            if let Some(marker) = entry.marker {
                 surface.markers(marker, &thin(&symbols, 11.0), colour);
             }
         }

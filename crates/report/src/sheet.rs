@@ -33,8 +33,10 @@ pub struct Sheet<'a, R> {
 impl<'a, R> Sheet<'a, R> {
     /// A row for every record, and no columns yet.
     pub fn of(rows: &'a [R]) -> Self {
-        let mut table = Table::data(&[]);
-        table.rows = rows.iter().map(|_| Vec::new()).collect();
+        let table = Table {
+            columns: Vec::new(),
+            rows: vec![Vec::new(); rows.len()],
+        };
         Self {
             rows,
             key: Box::new(|_, name| name.to_owned()),
@@ -126,9 +128,9 @@ impl<'a, R> Sheet<'a, R> {
     /// The table, and the metrics with their names.
     ///
     /// # Errors
-    /// As [`Table::push`].
+    /// [`Error::NotFinite`](crate::Error::NotFinite), naming column and row.
     pub fn finish(self) -> Result<(Table, Vec<(String, Cell)>)> {
-        (0..self.rows.len()).try_for_each(|row| self.table.check(row))?;
+        self.table.check()?;
         Ok((self.table, self.metrics))
     }
 }

@@ -12,14 +12,12 @@ impl Rgb {
     pub const CLAY: Self = Self(229, 219, 205);
     /// Light blue.
     pub const SKY: Self = Self(160, 191, 221);
-    /// Vermillion of the palette of Okabe and Ito, for what is to stand out.
-    pub const VERMILLION: Self = Self(213, 94, 0);
     /// Near-black, for lines.
     pub const INK: Self = Self(40, 40, 44);
-    /// Bluish green of the same palette.
-    pub const GREEN: Self = Self(0, 158, 115);
     /// Black.
     pub const BLACK: Self = Self(0, 0, 0);
+    /// White.
+    pub const WHITE: Self = Self(255, 255, 255);
 
     /// Linear intensities in `[0, 1]`.
     pub fn linear(self) -> [f32; 3] {

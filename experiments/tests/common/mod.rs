@@ -1,8 +1,18 @@
 //! Running the compiled programs.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+
+/// Metrics by their names.
+pub type Summary = BTreeMap<String, f64>;
+
+/// The metrics in a folder of results.
+pub fn read_summary(folder: &Path) -> Summary {
+    let text = fs::read_to_string(folder.join("summary.json")).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
 
 /// Runs a program in a folder, away from the meshes that this machine may have.
 pub fn run(program: &str, folder: &Path, arguments: &[&str]) -> Output {

@@ -6,19 +6,15 @@
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FormatError {
-    /// Nothing in it.
     #[error("the file is empty")]
     Empty,
-    /// More bytes than an image can need.
     #[error("it has more than {limit} bytes; make the image smaller")]
     TooLong { limit: u64 },
-    /// The first bytes are not those of a known format.
     #[error(
         "it begins with the bytes {start:02x?}, which is none of PNG, JPEG, WebP, GIF, TIFF and \
          BMP; save it as one of these"
     )]
     UnknownFormat { start: Vec<u8> },
-    /// No pixels, or more than are accepted.
     #[error("it has {width} x {height} pixels, and may have 1 to {limit}; make it smaller")]
     Size {
         width: u32,

@@ -1,23 +1,19 @@
-//! Writes a page of results: all figures, tables and numbers of a folder of runs, or of one run.
+//! Writes a page of results: all figures, tables and numbers of a folder of runs.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
 use pages::Error;
-use pages::results::{index_page, run_page};
+use pages::results::index_page;
 
-/// Makes a page to look at of the folder of all results, or of one run: one file with everything inside.
+/// Makes a page to look at of the folder of all results: one file with everything inside.
 #[derive(Parser, Debug)]
 #[command(name = "results_page", version)]
 struct Options {
     /// The folder with a folder for each experiment
     #[arg(long, value_name = "DIR", default_value = "results")]
     results: PathBuf,
-
-    /// Makes a page of this one run instead
-    #[arg(long, value_name = "DIR", conflicts_with = "results")]
-    run: Option<PathBuf>,
 
     /// The page [default: index.html in the folder]
     #[arg(long, value_name = "FILE")]
@@ -41,11 +37,9 @@ fn main() -> ExitCode {
 }
 
 fn program(options: &Options) -> Result<Vec<Error>, Error> {
-    let (folder, (page, problems)) = match &options.run {
-        Some(folder) => (folder, run_page(folder)?),
-        None => (&options.results, index_page(&options.results)?),
-    };
-    let output = (options.output.clone()).unwrap_or_else(|| folder.join("index.html"));
+    let (page, problems) = index_page(&options.results)?;
+    let output = options.output.clone();
+    let output = output.unwrap_or_else(|| options.results.join("index.html"));
     page.write(&output)?;
     for problem in &problems {
         eprintln!("warning: {problem}");
