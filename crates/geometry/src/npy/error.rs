@@ -16,11 +16,8 @@ pub enum NpyError {
     #[error("the header has {length} bytes, and may have {limit}")]
     HeaderLength { length: usize, limit: usize },
     /// The header is not the dictionary that the format prescribes.
-    #[error("the header is malformed at byte {position} of its text: expected {expected}")]
-    Header {
-        position: usize,
-        expected: &'static str,
-    },
+    #[error("the header is malformed: {reason}")]
+    Header { reason: String },
     /// The element type is not a floating-point number of 4 or 8 bytes.
     #[error("elements have type {found}; save the array as float64 (float32 is accepted too)")]
     DataType {
