@@ -60,29 +60,10 @@ pub enum Error {
     /// A point lies outside the box spanned by the nodes.
     #[error("the point {point:?} is outside the box spanned by the nodes")]
     PointOutside { point: Vec<f64> },
-    /// What is placed is larger than the box less its margin.
     #[error(
-        "a side length of {side_length} with a margin of {margin} on both sides does not fit the \
-         box of side {box_side}; use at most {largest}"
+        "a side length of {side_length} does not fit the box of side {box_side}; use at most that"
     )]
-    DoesNotFit {
-        side_length: f64,
-        box_side: f64,
-        margin: f64,
-        largest: f64,
-    },
-    /// What is not to be moved reaches beyond the box.
-    #[error(
-        "the shape spans {lower:?} to {upper:?}, beyond the box less its margin, {lowest:?} to \
-         {highest:?}; fit it to the box instead, by a side length of at most {largest}"
-    )]
-    Outside {
-        lower: Vec<f64>,
-        upper: Vec<f64>,
-        lowest: Vec<f64>,
-        highest: Vec<f64>,
-        largest: f64,
-    },
+    DoesNotFit { side_length: f64, box_side: f64 },
     /// No name of a coordinate axis.
     #[error("{name:?} is no axis: choose x, y or z")]
     UnknownAxis { name: String },

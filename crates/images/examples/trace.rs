@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let grid = Grid::<2>::centred(cells, 1.0)?;
     let eps = 2.0 * grid.spacing();
-    let placement = Placement::fit(&image.bounding_box(), &grid, 1.0, 0.0)?;
+    let placement = Placement::fit(&image.bounding_box(), &grid, 1.0)?;
     let distance = OutlineDistance::new(&outline.placed(&placement));
     let u = phase_field(grid, &distance, eps)?;
     told(&format!("phase field of {cells} x {cells} nodes"));

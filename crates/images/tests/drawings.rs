@@ -103,7 +103,7 @@ fn images_survive_the_way_through_a_phase_field() {
 
     let grid = Grid::<2>::centred(256, 1.0).unwrap();
     let eps = 2.0 * grid.spacing();
-    let placement = Placement::fit(&image.bounding_box(), &grid, 1.0, 0.0).unwrap();
+    let placement = Placement::fit(&image.bounding_box(), &grid, 1.0).unwrap();
     let u = phase_field(grid, &OutlineDistance::new(&found.placed(&placement)), eps).unwrap();
     let interface = Interface::new(&u, eps).unwrap();
     let frame = Frame::of_image(&image, &placement).unwrap();

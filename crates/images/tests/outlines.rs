@@ -371,7 +371,7 @@ fn placement_and_its_inverse() {
         .unwrap();
 
     // The whole image: its lower left corner is that of the placed rectangle.
-    let placement = Placement::fit(&image.bounding_box(), &grid, 1.6, 0.2).unwrap();
+    let placement = Placement::fit(&image.bounding_box(), &grid, 1.6).unwrap();
     assert_eq!(placement.scale(), 1.6 / 200.0);
     let corner = placement.apply([0.0, 0.0]);
     near(corner[0], 3.2, 1e-15);
@@ -389,39 +389,31 @@ fn placement_and_its_inverse() {
     near(s, -20.0 * 0.008, 1e-3);
 
     // The shape alone, in the middle.
-    let placement = Placement::fit(&found.bounding_box(), &grid, 1.0, 0.0).unwrap();
+    let placement = Placement::fit(&found.bounding_box(), &grid, 1.0).unwrap();
     let bounds = found.placed(&placement).bounding_box();
     near(bounds.centre()[0], 4.0, 1e-12);
     near(bounds.centre()[1], 0.0, 1e-12);
     near(bounds.extent()[0], 1.0, 1e-3);
 
-    let message = |length, margin| {
-        Placement::fit(&image.bounding_box(), &grid, length, margin)
-            .unwrap_err()
-            .to_string()
+    let message = |length| {
+        let placement = Placement::fit(&image.bounding_box(), &grid, length);
+        placement.unwrap_err().to_string()
     };
     assert_eq!(
-        message(1.7, 0.2),
-        "a side length of 1.7 with a margin of 0.2 on both sides does not fit the box of side 2; \
-         use at most 1.6"
+        message(2.1),
+        "a side length of 2.1 does not fit the box of side 2; use at most that"
     );
     assert_eq!(
-        message(0.0, 0.2),
+        message(0.0),
         "side length = 0.0 is not allowed: it must be finite and positive"
     );
-    assert_eq!(
-        message(1.0, -0.2),
-        "margin = -0.2 is not allowed: it must be finite and not negative"
-    );
-    assert!(message(f64::NAN, 0.0).contains("side length = NaN"));
+    assert!(message(f64::NAN).contains("side length = NaN"));
     let point = geometry::measure::BoundingBox {
         lower: [1.0; 2],
         upper: [1.0; 2],
     };
     assert_eq!(
-        Placement::fit(&point, &grid, 1.0, 0.0)
-            .unwrap_err()
-            .to_string(),
+        Placement::fit(&point, &grid, 1.0).unwrap_err().to_string(),
         "longest side of the bounding box = 0.0 is not allowed: it must be finite and positive"
     );
 }
@@ -430,7 +422,7 @@ fn placement_and_its_inverse() {
 fn masks_hold_the_nodes_inside() {
     let image = Raster::new([50, 50], 4, disc([25.0, 25.0], 20.0)).image();
     let grid = Grid::<2>::centred(128, 1.0).unwrap();
-    let placement = Placement::fit(&image.bounding_box(), &grid, 1.0, 0.0).unwrap();
+    let placement = Placement::fit(&image.bounding_box(), &grid, 1.0).unwrap();
     let region = OutlineDistance::new(&outline(&image).placed(&placement));
     let nodes = mask(grid, &region).unwrap();
     assert_eq!(nodes.len(), grid.len());
