@@ -1,9 +1,8 @@
 //! Geometry on periodic grids: signed distances, phase fields, their measures and files.
 //!
 //! ```
-//! use geometry::contour::{self, Interpolation};
 //! use geometry::shapes::{Ball, Cuboid};
-//! use geometry::{Error, Grid, Rotation, SignedDistanceExt, measure, phase_field};
+//! use geometry::{Error, Grid, Rotation, SignedDistanceExt, contour, measure, phase_field};
 //!
 //! fn main() -> Result<(), Error> {
 //!     // The box (-1,1)^2 with 128 cells per unit length, and an interface of width eps = 2h.
@@ -18,7 +17,7 @@
 //!     let length = measure::perimeter(&u, eps)?; // 2 pi 0.6 + 4 * 0.4 = 5.36991
 //!     println!("area {area:.4}, perimeter {length:.3}");
 //!
-//!     let curves = contour::zero_level(&u, Interpolation::Profile);
+//!     let curves = contour::zero_level(&u);
 //!     let tip = contour::ray_crossing(&u, [0.4, 0.0], [1.0, 0.0])?;
 //!     println!("{} curves, right end at x = {:.5}", curves.len(), 0.4 + tip.unwrap_or(0.0));
 //! #   assert_eq!(format!("{area:.4}, {length:.3}"), "0.9710, 5.360");
@@ -77,7 +76,7 @@ pub use grid::Grid;
 pub use placement::Placement;
 pub use profile::{
     PURE_BEYOND, distance_from_phase_field, distances_from_phase_field, optimal_profile,
-    phase_field,
+    phase_field, profile_variable,
 };
 pub use thickness::{is_thin, thickness, thin_part};
 pub use up::UpAxis;
