@@ -2,15 +2,17 @@
 //!
 //! ```
 //! use geometry::shapes::{Ball, Cuboid};
-//! use geometry::{Error, Grid, Rotation, SignedDistanceExt, contour, measure, phase_field};
+//! use geometry::{Error, Grid, SignedDistance, SignedDistanceExt, contour, measure, phase_field};
 //!
 //! fn main() -> Result<(), Error> {
 //!     // The box (-1,1)^2 with 128 cells per unit length, and an interface of width eps = 2h.
 //!     let grid = Grid::<2>::per_unit(128, 2.0)?;
 //!     let eps = 2.0 * grid.spacing();
 //!
-//!     // A disc with a turned square hole.
-//!     let hole = Cuboid::new([0.2, 0.2])?.rotated(Rotation::by_angle(0.5));
+//!     // A disc with a turned square hole; closures are shapes.
+//!     let square = Cuboid::new([0.2, 0.2])?;
+//!     let (sin, cos) = 0.5_f64.sin_cos();
+//!     let hole = |[x, y]: [f64; 2]| square.signed_distance([cos * x + sin * y, cos * y - sin * x]);
 //!     let u = phase_field(grid, &Ball::new([0.0, 0.0], 0.6)?.difference(hole), eps)?;
 //!
 //!     let area = measure::zero_set_volume(&u); // pi 0.6^2 - 0.4^2 = 0.97097
@@ -69,7 +71,7 @@ pub mod vti;
 pub mod zero_set;
 
 pub use clifford::CliffordTorus;
-pub use distance::{Rotation, SignedDistance, SignedDistanceExt};
+pub use distance::{SignedDistance, SignedDistanceExt};
 pub use error::{Error, positive, require};
 pub use field::Field;
 pub use grid::Grid;

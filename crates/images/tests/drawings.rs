@@ -7,7 +7,7 @@ use std::fs;
 
 use crate::common::{Raster, disc, near, square};
 use geometry::shapes::{Ball, Cuboid};
-use geometry::{Field, Grid, Placement, Rotation, SignedDistance, SignedDistanceExt, phase_field};
+use geometry::{Field, Grid, Placement, SignedDistance, phase_field};
 use images::{
     Drawing, Frame, Image, Inside, Interface, Outline, OutlineDistance, Side, Svg, Threshold,
     decode,
@@ -62,9 +62,9 @@ fn coverage_is_the_area() {
     assert_eq!(drawn.pixel(50, 60), [255, 255, 255, 255]);
 
     // What is thinner than a pixel is as grey as it is thin.
-    let thread = Cuboid::new([0.5, 0.002])
-        .unwrap()
-        .rotated(Rotation::by_angle(0.4));
+    let thread = Cuboid::new([0.5, 0.002]).unwrap();
+    let (sin, cos) = 0.4_f64.sin_cos();
+    let thread = |[x, y]: [f64; 2]| thread.signed_distance([cos * x + sin * y, cos * y - sin * x]);
     let drawn = picture(&Drawing::on_white(frame).filled(&thread, Rgb::BLACK));
     near(darkness(&drawn), 0.004 / (pixel * pixel), 1.0);
 }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use geometry::shapes::{Ball, Cross, RoundedBox, Torus};
+use geometry::shapes::{Ball, Cross, Cuboid, Torus};
 use geometry::{Field, Grid, SignedDistance, SignedDistanceExt, UpAxis, phase_field};
 use render::{Picture, Rgb, Scene, Tube, View};
 
@@ -77,7 +77,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     ]);
     draw("torus_circles", &scene)?;
 
-    let cube = field(&RoundedBox::new([0.26; 3], 0.06)?.translated(middle))?;
+    let core = Cuboid::new([0.2; 3])?.translated(middle);
+    let cube = field(&|x: [f64; 3]| core.signed_distance(x) - 0.06)?;
     draw("cube", &Scene::new(&cube, eps)?)?;
     let near = Ball::new([0.76, 0.6, 0.7], 0.17)?;
     let mask = Field::from_fn(grid, |x| f64::from(u8::from(near.signed_distance(x) < 0.0)));
