@@ -1,6 +1,6 @@
 //! How things look in the figures.
 
-use geometry::contour::{Interpolation, zero_level};
+use geometry::contour::zero_level;
 
 use crate::prelude::*;
 
@@ -28,7 +28,7 @@ pub fn colour(method: Method, scheme: Scheme) -> usize {
 }
 
 pub fn outline(field: &Field<2>) -> Curve {
-    let curves = zero_level(field, Interpolation::Profile).into_iter();
+    let curves = zero_level(field).into_iter();
     Curve::new(curves.map(|curve| curve.points).collect::<Vec<_>>())
 }
 

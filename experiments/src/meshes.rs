@@ -130,7 +130,7 @@ impl MeshOptions {
             self.read(known)?
         };
         let side_length = self.side_length.unwrap_or(known.side_length);
-        let placement = Placement::fit(&mesh.bounding_box(), grid, side_length, 0.0)?;
+        let placement = Placement::fit(&mesh.bounding_box(), grid, side_length)?;
         about["vertices"] = mesh.mesh().vertices.len().into();
         about["faces"] = mesh.mesh().faces.len().into();
         about["genus"] = mesh.genus().into();

@@ -1,7 +1,7 @@
 //! Runs against the exact flow of their curves, and of their surfaces of revolution.
 
 use engine::{Storage, estimated_time_error};
-use geometry::contour::{Interpolation, zero_level};
+use geometry::contour::zero_level;
 use geometry::distance_from_phase_field;
 use reference::revolution::{self, Surface};
 use reference::{Curve, Shape, planar};
@@ -287,7 +287,7 @@ impl Truth {
 
 #[expect(clippy::unnecessary_wraps, reason = "isosurfaces may fail")]
 fn level(field: &Field<2>, _: f64) -> Result<Vec<[f64; 2]>, surfaces::Error> {
-    let curves = zero_level(field, Interpolation::Profile).into_iter();
+    let curves = zero_level(field).into_iter();
     Ok(curves.flat_map(|curve| curve.points).collect())
 }
 

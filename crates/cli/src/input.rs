@@ -527,7 +527,7 @@ impl<'a> Reader<'a> {
             BuiltIn::Space(shape) => self.in_space(&*shape),
             BuiltIn::Mesh(mesh) => {
                 let grid = self.grid()?;
-                let placement = Placement::fit(&mesh.bounding_box(), &grid, side, 0.0)?;
+                let placement = Placement::fit(&mesh.bounding_box(), &grid, side)?;
                 self.options.cells = chosen;
                 self.mesh(&mesh.placed(&placement), UpAxis::default())
             }

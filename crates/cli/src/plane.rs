@@ -74,7 +74,7 @@ impl Plane {
         let side = Side::of(&image, 0.5)?;
         let mut outline = Outline::of_image(&image, side)?;
         if self.image.is_none() {
-            let fills = Placement::fit(&image.bounding_box(), grid, grid.side(), 0.0)?;
+            let fills = Placement::fit(&image.bounding_box(), grid, grid.side())?;
             outline = outline.placed(&fills);
         }
         Ok(Box::new(OutlineDistance::new(&outline)))

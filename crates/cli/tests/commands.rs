@@ -588,10 +588,8 @@ fn samples_are_inputs() {
 fn images_are_masks_too() {
     let folder = tempfile::tempdir().unwrap();
     let frame = Frame::new(60, 60, [0.0, 60.0], 1.0).unwrap();
-    let at =
-        |x, y| geometry::SignedDistanceExt::translated(Ball::new([0.0; 2], 1.0).unwrap(), [x, y]);
-    let disc = geometry::SignedDistanceExt::scaled(at(1.5, 1.5), 20.0).unwrap();
-    let spot = geometry::SignedDistanceExt::scaled(at(5.0, 3.0), 10.0).unwrap();
+    let disc = Ball::new([30.0, 30.0], 20.0).unwrap();
+    let spot = Ball::new([50.0, 30.0], 10.0).unwrap();
     for (name, shape) in [("disc.png", &disc), ("spot.png", &spot)] {
         let drawn = drawing(&frame, shape, Some(Rgb::WHITE)).unwrap();
         drawn.write_png(folder.path().join(name)).unwrap();

@@ -8,26 +8,6 @@ use crate::error::{finite, positive};
 use crate::profile::profile_variable;
 use crate::{Error, Field, vector};
 
-/// Which quantity is taken to be linear along the edges of the grid.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Interpolation {
-    /// `atanh u`, proportional to the distance for the optimal profile: `O(h^2)` with a
-    /// constant that does not grow as `eps` shrinks towards `h`. For phase fields.
-    #[default]
-    Profile,
-    /// `u` itself. For other fields.
-    Value,
-}
-
-impl Interpolation {
-    fn apply(self, u: f64) -> f64 {
-        match self {
-            Self::Profile => profile_variable(u),
-            Self::Value => u,
-        }
-    }
-}
-
 /// A curve through the given points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polyline {
@@ -64,18 +44,20 @@ impl Polyline {
     }
 }
 
-/// The zero level set by marching squares, with `u > 0` on the left of every curve.
+/// The zero level set of a phase field by marching squares, with `u > 0` on the left of every curve.
+///
+/// `atanh u` is taken to be linear along the edges of the grid. For the optimal profile it is proportional to the distance: the error
+/// is `O(h^2)` with a constant that does not grow as `eps` shrinks towards `h`.
 ///
 /// Outer boundaries thus run counter-clockwise (first axis to the right, second upwards), holes
 /// clockwise. Nodes with `u = 0` count as outside. In a cell with two opposite corners inside, the
 /// sign of the mean of the corners decides whether they are joined. Open curves come first,
 /// then closed ones, in the order of their first grid edge.
-pub fn zero_level(field: &Field<2>, interpolation: Interpolation) -> Vec<Polyline> {
+pub fn zero_level(field: &Field<2>) -> Vec<Polyline> {
     let (grid, v) = (field.grid(), field.values());
     zero_level_of(
         grid.shape(),
-        |node| v[grid.index(node)],
-        interpolation,
+        |node| profile_variable(v[grid.index(node)]),
         |node, axis, [a, b]| {
             let mut point = [0, 1].map(|axis| grid.coordinate(axis, node[axis]));
             point[axis] += grid.spacing() * a / (a - b);
@@ -84,23 +66,20 @@ pub fn zero_level(field: &Field<2>, interpolation: Interpolation) -> Vec<Polylin
     )
 }
 
-/// As [`zero_level`], for values at the nodes of any lattice that is not stored as a [`Field`]:
-/// one that is not square or not evenly spaced, such as the pixels of an image.
+/// As [`zero_level`], for values at the nodes of any lattice, linear along its edges: one that is not square or not evenly spaced,
+/// such as the pixels of an image. Of phase fields these are [`profile_variable`]s.
 ///
 /// `value` gives the value at a node, by its index along both axes; the second runs fastest. `crossing` gives the point
 /// where the line from `a` at a node to `b` at the next node along `axis` is zero, which is the
-/// fraction `a / (a - b)` of the way; `a` and `b` are the values or, by the interpolation, their
-/// `atanh`.
+/// fraction `a / (a - b)` of the way.
 pub fn zero_level_of(
     shape: [usize; 2],
     value: impl Fn([usize; 2]) -> f64,
-    interpolation: Interpolation,
     crossing: impl Fn([usize; 2], usize, [f64; 2]) -> [f64; 2],
 ) -> Vec<Polyline> {
     let lattice = Lattice {
         shape,
         value,
-        interpolation,
         crossing,
     };
     let next = lattice.segments();
@@ -124,7 +103,6 @@ pub fn zero_level_of(
 struct Lattice<V, C> {
     shape: [usize; 2],
     value: V,
-    interpolation: Interpolation,
     crossing: C,
 }
 
@@ -178,7 +156,7 @@ where
                     self.edge(corners[3], 0),
                     self.edge(corners[0], 1),
                 ];
-                let sum: f64 = corners.into_iter().map(|c| self.interpolated(c)).sum();
+                let sum: f64 = corners.into_iter().map(&self.value).sum();
                 for k in (0..4).filter(|&k| inside[k] && !inside[(k + 1) % 4]) {
                     // The border leaves the inside at edge k. Joined insides: the curve cuts off
                     // the outer corner ahead and ends where the border enters again; else it goes
@@ -202,17 +180,13 @@ where
         2 * (i * self.shape[1] + j) + axis
     }
 
-    fn interpolated(&self, node: [usize; 2]) -> f64 {
-        self.interpolation.apply((self.value)(node))
-    }
-
     /// Where the interface crosses an edge.
     fn point(&self, edge: usize) -> [f64; 2] {
         let (index, axis) = (edge / 2, edge % 2);
         let node = [index / self.shape[1], index % self.shape[1]];
         let mut end = node;
         end[axis] += 1;
-        (self.crossing)(node, axis, [node, end].map(|n| self.interpolated(n)))
+        (self.crossing)(node, axis, [node, end].map(&self.value))
     }
 }
 

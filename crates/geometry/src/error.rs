@@ -10,10 +10,8 @@ use crate::npy::error::NpyError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A periodic grid needs at least two cells per side.
     #[error("a periodic grid needs at least 2 cells per side, got {cells}")]
     GridTooSmall { cells: usize },
-    /// The number of nodes does not fit in memory addresses.
     #[error("{cells}^{dimension} nodes cannot be addressed on this machine; use fewer cells")]
     GridTooLarge { cells: usize, dimension: usize },
     /// `n * side` cells per side is not a whole number.
@@ -29,24 +27,20 @@ pub enum Error {
     /// The search for the torus nearest to a phase field.
     #[error("no Clifford torus fits: {0}")]
     NoCliffordTorus(&'static str),
-    /// A number is outside the range in which the formula makes sense.
     #[error("{name} = {value:?} is not allowed: it must be {requirement}")]
     InvalidParameter {
         name: &'static str,
         value: f64,
         requirement: &'static str,
     },
-    /// The number of values is not the number of nodes.
     #[error("the grid has {expected} nodes, but {actual} values were given")]
     ValueCount { expected: usize, actual: usize },
-    /// A nodal value is NaN or infinite.
     #[error("the value at node {index} is {value}; all nodal values must be finite")]
     NonFinite {
         /// Row-major index of the first such node.
         index: usize,
         value: f64,
     },
-    /// Two fields live on different grids.
     #[error(
         "the grids differ: {left_cells} cells on a side of {left_side} against {right_cells} \
          on {right_side} (or their origins differ)"
@@ -57,39 +51,16 @@ pub enum Error {
         right_cells: usize,
         right_side: f64,
     },
-    /// A point lies outside the box spanned by the nodes.
     #[error("the point {point:?} is outside the box spanned by the nodes")]
     PointOutside { point: Vec<f64> },
-    /// What is placed is larger than the box less its margin.
     #[error(
-        "a side length of {side_length} with a margin of {margin} on both sides does not fit the \
-         box of side {box_side}; use at most {largest}"
+        "a side length of {side_length} does not fit the box of side {box_side}; use at most that"
     )]
-    DoesNotFit {
-        side_length: f64,
-        box_side: f64,
-        margin: f64,
-        largest: f64,
-    },
-    /// What is not to be moved reaches beyond the box.
-    #[error(
-        "the shape spans {lower:?} to {upper:?}, beyond the box less its margin, {lowest:?} to \
-         {highest:?}; fit it to the box instead, by a side length of at most {largest}"
-    )]
-    Outside {
-        lower: Vec<f64>,
-        upper: Vec<f64>,
-        lowest: Vec<f64>,
-        highest: Vec<f64>,
-        largest: f64,
-    },
-    /// No name of a coordinate axis.
+    DoesNotFit { side_length: f64, box_side: f64 },
     #[error("{name:?} is no axis: choose x, y or z")]
     UnknownAxis { name: String },
-    /// The operating system refused.
     #[error(transparent)]
     Io(#[from] files::Error),
-    /// A file is not a usable NPY file.
     #[error("{path} cannot be read as a field", path = path.display())]
     Npy { path: PathBuf, source: NpyError },
 }

@@ -9,9 +9,6 @@ use std::f64::consts::PI;
 /// Willmore energy of every sphere in 3D, `8 pi`.
 pub const WILLMORE_ENERGY_SPHERE: f64 = 8.0 * PI;
 
-/// Willmore energy of every Clifford torus, `4 pi^2`: the minimum among tori (Marques, Neves).
-pub const WILLMORE_ENERGY_CLIFFORD_TORUS: f64 = 4.0 * PI * PI;
-
 /// Radius `sqrt(r^2 - 2 (d-1) t)` of a sphere of radius `r` after mean curvature flow for time `t`.
 ///
 /// The sphere vanishes at `t = r^2 / (2 (d-1))`; the radius is zero from then on, where
@@ -33,15 +30,4 @@ pub fn willmore_radius(r: f64, t: f64, dimension: usize) -> f64 {
         .max(0.0)
         .sqrt()
         .sqrt()
-}
-
-/// Willmore energy of a circle, `pi / R`.
-pub fn willmore_energy_circle(radius: f64) -> f64 {
-    PI / radius
-}
-
-/// Willmore energy of a torus, `2 pi^2 c^2 / sqrt(c^2 - 1)` with `c = major / minor > 1`.
-pub fn willmore_energy_torus(major: f64, minor: f64) -> f64 {
-    let squared = (major / minor).powi(2);
-    2.0 * PI * PI * squared / (squared - 1.0).sqrt()
 }

@@ -1,24 +1,25 @@
 //! Geometry on periodic grids: signed distances, phase fields, their measures and files.
 //!
 //! ```
-//! use geometry::contour::{self, Interpolation};
 //! use geometry::shapes::{Ball, Cuboid};
-//! use geometry::{Error, Grid, Rotation, SignedDistanceExt, measure, phase_field};
+//! use geometry::{Error, Grid, SignedDistance, SignedDistanceExt, contour, measure, phase_field};
 //!
 //! fn main() -> Result<(), Error> {
 //!     // The box (-1,1)^2 with 128 cells per unit length, and an interface of width eps = 2h.
 //!     let grid = Grid::<2>::per_unit(128, 2.0)?;
 //!     let eps = 2.0 * grid.spacing();
 //!
-//!     // A disc with a turned square hole.
-//!     let hole = Cuboid::new([0.2, 0.2])?.rotated(Rotation::by_angle(0.5));
+//!     // A disc with a turned square hole; closures are shapes.
+//!     let square = Cuboid::new([0.2, 0.2])?;
+//!     let (sin, cos) = 0.5_f64.sin_cos();
+//!     let hole = |[x, y]: [f64; 2]| square.signed_distance([cos * x + sin * y, cos * y - sin * x]);
 //!     let u = phase_field(grid, &Ball::new([0.0, 0.0], 0.6)?.difference(hole), eps)?;
 //!
 //!     let area = measure::zero_set_volume(&u); // pi 0.6^2 - 0.4^2 = 0.97097
 //!     let length = measure::perimeter(&u, eps)?; // 2 pi 0.6 + 4 * 0.4 = 5.36991
 //!     println!("area {area:.4}, perimeter {length:.3}");
 //!
-//!     let curves = contour::zero_level(&u, Interpolation::Profile);
+//!     let curves = contour::zero_level(&u);
 //!     let tip = contour::ray_crossing(&u, [0.4, 0.0], [1.0, 0.0])?;
 //!     println!("{} curves, right end at x = {:.5}", curves.len(), 0.4 + tip.unwrap_or(0.0));
 //! #   assert_eq!(format!("{area:.4}, {length:.3}"), "0.9710, 5.360");
@@ -70,14 +71,14 @@ pub mod vti;
 pub mod zero_set;
 
 pub use clifford::CliffordTorus;
-pub use distance::{Rotation, SignedDistance, SignedDistanceExt};
+pub use distance::{SignedDistance, SignedDistanceExt};
 pub use error::{Error, positive, require};
 pub use field::Field;
 pub use grid::Grid;
 pub use placement::Placement;
 pub use profile::{
     PURE_BEYOND, distance_from_phase_field, distances_from_phase_field, optimal_profile,
-    phase_field,
+    phase_field, profile_variable,
 };
 pub use thickness::{is_thin, thickness, thin_part};
 pub use up::UpAxis;

@@ -1,19 +1,13 @@
-//! Norms, perimeter, enclosed volume and extent of fields.
+//! Distances, perimeter, enclosed volume and extent of fields.
 //!
 //! Sums run in parallel over fixed chunks, so that results do not depend on the number of threads.
 
 use crate::error::positive;
 use crate::parallel::Reader;
 use crate::profile::profile_variable;
-use crate::{Error, Field, Grid, parallel, vector};
+use crate::{Error, Field, Grid, parallel};
 
-/// `L2` norm `sqrt(h^D sum u^2)`: the trapezoidal rule on the periodic box, not a mean.
-pub fn l2_norm<const D: usize>(u: &Field<D>) -> f64 {
-    let v = u.values();
-    (u.grid().cell_volume() * parallel::sum(v.len(), |i| v[i] * v[i])).sqrt()
-}
-
-/// `L2` norm of the difference.
+/// `L2` norm `sqrt(h^D sum (a - b)^2)` of the difference: the trapezoidal rule on the periodic box, not a mean.
 ///
 /// # Errors
 /// Both fields must live on the same grid.
@@ -28,21 +22,6 @@ pub fn l2_distance<const D: usize>(a: &Field<D>, b: &Field<D>) -> Result<f64, Er
 /// multiple of 4096.
 pub fn l2_distance_of_parts<const D: usize>(grid: &Grid<D>, a: &Reader<'_>, b: &Reader<'_>) -> f64 {
     (grid.cell_volume() * parallel::squared_distance(grid.len(), a, b)).sqrt()
-}
-
-/// Maximum norm over the nodes; NaN if a value is.
-pub fn linf<const D: usize>(u: &Field<D>) -> f64 {
-    u.values()
-        .iter()
-        .fold(0.0, |largest, v| vector::max(largest, v.abs()))
-}
-
-/// Maximum norm of the difference.
-///
-/// # Errors
-/// Both fields must live on the same grid.
-pub fn linf_distance<const D: usize>(a: &Field<D>, b: &Field<D>) -> Result<f64, Error> {
-    Ok(linf(&a.zip_map(b, |v, w| v - w)?))
 }
 
 /// Whether there is an interface at all.

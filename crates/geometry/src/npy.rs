@@ -15,21 +15,23 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The header is parsed here and not by a general reader, so that no file, however broken, can
-//! cause more than a typed error: nothing is allocated on the word of a header.
+//! No file, however broken, can cause more than a typed error: nothing is allocated on the word of
+//! a header.
 
 pub(crate) mod error;
 
 use std::path::Path;
 
 use files::{Number, write_atomically};
+use serde::Deserialize;
+use serde_json::Value;
 
 use crate::{Error, Field, Grid};
 pub use error::NpyError;
 
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
-/// Longest header, in bytes; version 1.0 of the format allows no more.
-const LONGEST_HEADER: usize = u16::MAX as usize;
+/// Longest header, in bytes, as NumPy has it.
+const LONGEST_HEADER: usize = 10_000;
 /// Most axes, as NumPy has it.
 const MOST_AXES: usize = 64;
 /// The header is padded so that the data start at a multiple of this.
@@ -102,7 +104,7 @@ fn header(shape: &[usize]) -> Vec<u8> {
 pub fn decode<const D: usize>(bytes: &[u8]) -> Result<(usize, Vec<f64>), NpyError> {
     let (header, data) = split(bytes)?;
     let header = Header::parse(header)?;
-    let (number, big_endian) = number(&header.data_type)?;
+    let (number, big_endian) = number(header.descr.as_str().unwrap_or("a record"))?;
     let shape = header.shape;
     if shape.len() != D {
         return Err(NpyError::Rank { expected: D, shape });
@@ -200,127 +202,47 @@ fn number(data_type: &str) -> Result<(Number, bool), NpyError> {
 }
 
 /// The three entries of the dictionary.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Header {
-    data_type: String,
+    /// A string; anything else is the description of a record, which is not a number.
+    descr: Value,
     fortran_order: bool,
     shape: Vec<u64>,
 }
 
 impl Header {
     fn parse(text: &[u8]) -> Result<Self, NpyError> {
-        let text = String::from_utf8_lossy(text);
-        let mut cursor = Cursor {
-            length: text.len(),
-            rest: &text,
+        let malformed = |reason: &str| NpyError::Header {
+            reason: files::shortened(reason, 120),
         };
-        let (mut data_type, mut fortran_order, mut shape) = (None, None, None);
-        cursor.expect("{")?;
-        while !cursor.take("}") {
-            let key = cursor.string()?;
-            cursor.expect(":")?;
-            match key {
-                "descr" => data_type = Some(cursor.data_type()?),
-                "fortran_order" => fortran_order = Some(cursor.boolean()?),
-                "shape" => shape = Some(cursor.tuple()?),
-                _ => return Err(cursor.error("the key descr, fortran_order or shape")),
-            }
-            if !cursor.take(",") && !cursor.rest.starts_with('}') {
-                return Err(cursor.error(", or }"));
-            }
+        let header: Self = serde_json::from_str(&json(&String::from_utf8_lossy(text)))
+            .map_err(|error| malformed(&error.to_string()))?;
+        if header.shape.len() > MOST_AXES {
+            return Err(malformed("more than 64 axes"));
         }
-        if !cursor.rest.trim_start().is_empty() {
-            return Err(cursor.error("nothing after }"));
-        }
-        Ok(Self {
-            data_type: data_type.ok_or(cursor.error("the key descr"))?,
-            fortran_order: fortran_order.ok_or(cursor.error("the key fortran_order"))?,
-            shape: shape.ok_or(cursor.error("the key shape"))?,
-        })
+        Ok(header)
     }
 }
 
-/// Reads the subset of Python literals that NPY headers use.
-struct Cursor<'a> {
-    rest: &'a str,
-    /// Of the whole text.
-    length: usize,
-}
-
-impl<'a> Cursor<'a> {
-    fn error(&self, expected: &'static str) -> NpyError {
-        NpyError::Header {
-            position: self.length - self.rest.len(),
-            expected,
+/// The literals of Python that headers consist of, in JSON.
+fn json(literals: &str) -> String {
+    let mut json = String::with_capacity(literals.len());
+    for c in literals.chars() {
+        // Python may have a comma behind the last item, JSON may not.
+        if matches!(c, ')' | '}') {
+            let items = json
+                .trim_end()
+                .strip_suffix(',')
+                .map_or(json.len(), str::len);
+            json.truncate(items);
         }
+        json.push(match c {
+            '\'' => '"',
+            '(' => '[',
+            ')' => ']',
+            _ => c,
+        });
     }
-
-    /// Passes over white space, and over this if it comes next.
-    fn take(&mut self, token: &str) -> bool {
-        self.rest = self.rest.trim_start();
-        let behind = self.rest.strip_prefix(token);
-        self.rest = behind.unwrap_or(self.rest);
-        behind.is_some()
-    }
-
-    fn expect(&mut self, token: &'static str) -> Result<(), NpyError> {
-        if self.take(token) {
-            Ok(())
-        } else {
-            Err(self.error(token))
-        }
-    }
-
-    fn string(&mut self) -> Result<&'a str, NpyError> {
-        let quote = ["'", "\""].into_iter().find(|quote| self.take(quote));
-        let quote = quote.ok_or(self.error("a quoted string"))?;
-        let parts = self.rest.split_once(quote);
-        let (text, rest) = parts.ok_or(self.error("a quoted string that ends"))?;
-        self.rest = rest;
-        Ok(text)
-    }
-
-    /// A string; anything else is the description of a record, which is not a number.
-    fn data_type(&mut self) -> Result<String, NpyError> {
-        if self.take("[") || self.take("(") {
-            return Err(NpyError::DataType {
-                found: "a record".into(),
-            });
-        }
-        self.string().map(str::to_owned)
-    }
-
-    fn boolean(&mut self) -> Result<bool, NpyError> {
-        if self.take("True") {
-            return Ok(true);
-        }
-        if self.take("False") {
-            return Ok(false);
-        }
-        Err(self.error("True or False"))
-    }
-
-    fn tuple(&mut self) -> Result<Vec<u64>, NpyError> {
-        let mut items = Vec::new();
-        self.expect("(")?;
-        while !self.take(")") {
-            if items.len() == MOST_AXES {
-                return Err(self.error("at most 64 axes"));
-            }
-            items.push(self.integer()?);
-            if !self.take(",") && !self.rest.starts_with(')') {
-                return Err(self.error(", or )"));
-            }
-        }
-        Ok(items)
-    }
-
-    fn integer(&mut self) -> Result<u64, NpyError> {
-        self.rest = self.rest.trim_start();
-        let behind = self.rest.trim_start_matches(|c: char| c.is_ascii_digit());
-        let digits = &self.rest[..self.rest.len() - behind.len()];
-        let value = digits.parse();
-        let value = value.map_err(|_| self.error("a whole number below 2^64"))?;
-        self.rest = behind;
-        Ok(value)
-    }
+    json.replace("True", "true").replace("False", "false")
 }

@@ -1,6 +1,6 @@
 //! Where a shape goes in the box of a grid.
 
-use crate::error::{positive, require};
+use crate::error::positive;
 use crate::measure::BoundingBox;
 use crate::{Error, Grid};
 
@@ -20,57 +20,21 @@ impl<const D: usize> Placement<D> {
     /// unless what is placed has one.
     ///
     /// # Errors
-    /// The bounding box must be finite and have an extent, the side length be finite and positive,
-    /// the margin finite and not negative; [`Error::DoesNotFit`] unless
-    /// `side_length + 2 margin <= side` of the box.
-    pub fn fit(
-        bounds: &BoundingBox<D>,
-        grid: &Grid<D>,
-        side_length: f64,
-        margin: f64,
-    ) -> Result<Self, Error> {
-        let largest = largest(grid, margin)?;
+    /// The bounding box must be finite and have an extent, the side length be finite and positive;
+    /// [`Error::DoesNotFit`] if that is longer than the side of the box.
+    pub fn fit(bounds: &BoundingBox<D>, grid: &Grid<D>, side_length: f64) -> Result<Self, Error> {
         let side_length = positive("side length", side_length)?;
         let longest = positive("longest side of the bounding box", bounds.longest_side())?;
-        if side_length > largest {
+        if side_length > grid.side() {
             return Err(Error::DoesNotFit {
                 side_length,
                 box_side: grid.side(),
-                margin,
-                largest,
             });
         }
         Ok(Self {
             centre: bounds.centre(),
             scale: positive("scale", side_length / longest)?,
             target: grid.origin().map(|x| x + 0.5 * grid.side()),
-        })
-    }
-
-    /// Leaves everything where it is.
-    ///
-    /// # Errors
-    /// The margin must be finite and not negative; [`Error::Outside`] if the bounding box leaves the
-    /// box of the grid less its margin.
-    pub fn keep(bounds: &BoundingBox<D>, grid: &Grid<D>, margin: f64) -> Result<Self, Error> {
-        let largest = largest(grid, margin)?;
-        let allowed = BoundingBox {
-            lower: grid.origin().map(|x| x + margin),
-            upper: grid.origin().map(|x| x + grid.side() - margin),
-        };
-        if !(allowed.contains(bounds.lower) && allowed.contains(bounds.upper)) {
-            return Err(Error::Outside {
-                lower: bounds.lower.into(),
-                upper: bounds.upper.into(),
-                lowest: allowed.lower.into(),
-                highest: allowed.upper.into(),
-                largest,
-            });
-        }
-        Ok(Self {
-            centre: [0.0; D],
-            scale: 1.0,
-            target: [0.0; D],
         })
     }
 
@@ -100,11 +64,4 @@ impl<const D: usize> Placement<D> {
     pub fn scale(&self) -> f64 {
         self.scale
     }
-}
-
-/// The largest side length that leaves the margin on both sides.
-fn largest<const D: usize>(grid: &Grid<D>, margin: f64) -> Result<f64, Error> {
-    let holds = margin.is_finite() && margin >= 0.0;
-    require("margin", margin, "finite and not negative", |_| holds)?;
-    Ok((grid.side() - 2.0 * margin).max(0.0))
 }

@@ -20,7 +20,7 @@ const CLAMP: f64 = 1.0 - f64::EPSILON;
 const FARTHEST: f64 = 18.368_400_284_838_55;
 
 /// `atanh` of `u`, clamped to `|u| <= 1 - 2^-52`: positive inside, zero on the interface.
-pub(crate) fn profile_variable(u: f64) -> f64 {
+pub fn profile_variable(u: f64) -> f64 {
     let size = u.abs();
     let variable = if size < CLAMP { size.atanh() } else { FARTHEST };
     variable.copysign(u)

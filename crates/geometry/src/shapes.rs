@@ -1,7 +1,7 @@
 //! Shapes with exact signed distances, inside and outside.
 //!
-//! All but [`Ball`], [`Capsule`] and [`HalfSpace`] are centred at the origin; move them with the
-//! combinations of [`SignedDistanceExt`](crate::SignedDistanceExt).
+//! All but [`Ball`] and [`Capsule`] are centred at the origin; move them with
+//! [`translated`](crate::SignedDistanceExt::translated).
 
 use crate::error::{finite, positive, require};
 use crate::{Error, SignedDistance, vector};
@@ -63,39 +63,6 @@ impl<const D: usize> Cuboid<D> {
 impl<const D: usize> SignedDistance<D> for Cuboid<D> {
     fn signed_distance(&self, x: [f64; D]) -> f64 {
         cuboid_distance(x.map(f64::abs), self.half_extents)
-    }
-}
-
-/// A box whose edges and corners are rounded; the extents include the rounding. Exact everywhere.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RoundedBox<const D: usize> {
-    core: [f64; D],
-    radius: f64,
-}
-
-impl<const D: usize> RoundedBox<D> {
-    /// The box with the given outer half extents and radius of its edges.
-    ///
-    /// # Errors
-    /// The extents must be finite and positive, the radius at least zero and at most the smallest
-    /// half extent.
-    pub fn new(half_extents: [f64; D], radius: f64) -> Result<Self, Error> {
-        Cuboid::new(half_extents)?;
-        let smallest = half_extents.into_iter().fold(f64::INFINITY, f64::min);
-        let holds = (0.0..=smallest).contains(&radius);
-        let requirement = "between zero and the smallest half extent";
-        require("rounding radius", radius, requirement, |_| holds)?;
-        Ok(Self {
-            core: half_extents.map(|a| a - radius),
-            radius,
-        })
-    }
-}
-
-impl<const D: usize> SignedDistance<D> for RoundedBox<D> {
-    fn signed_distance(&self, x: [f64; D]) -> f64 {
-        // The offset of a convex shape is exact on both sides.
-        cuboid_distance(x.map(f64::abs), self.core) - self.radius
     }
 }
 
@@ -232,35 +199,6 @@ impl<const D: usize> SignedDistance<D> for Capsule<D> {
             0.0
         };
         vector::norm(vector::sub(relative, vector::scale(axis, along))) - self.radius
-    }
-}
-
-/// The points behind a hyperplane. Exact everywhere.
-///
-/// It is not periodic: intersect it with something that stays inside the box.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HalfSpace<const D: usize> {
-    point: [f64; D],
-    normal: [f64; D],
-}
-
-impl<const D: usize> HalfSpace<D> {
-    /// The half space `(x - point) . normal <= 0`; the normal, of any length, points outwards.
-    ///
-    /// # Errors
-    /// The point must be finite, the normal finite and not zero.
-    pub fn new(point: [f64; D], normal: [f64; D]) -> Result<Self, Error> {
-        let length = positive("length of the normal", vector::norm(normal))?;
-        Ok(Self {
-            point: finite("point", point)?,
-            normal: vector::scale(normal, 1.0 / length),
-        })
-    }
-}
-
-impl<const D: usize> SignedDistance<D> for HalfSpace<D> {
-    fn signed_distance(&self, x: [f64; D]) -> f64 {
-        vector::dot(vector::sub(x, self.point), self.normal)
     }
 }
 

@@ -1,7 +1,5 @@
 //! The grid of half as many cells, and fields from there.
 
-use rayon::prelude::*;
-
 use crate::error::require;
 use crate::{Error, Field, Grid, parallel};
 
@@ -58,25 +56,16 @@ impl<const D: usize> Field<D> {
 
 /// `cells` periodic layers of `line` values each, over and over, with layers put in between.
 fn refined_along(values: &[f64], cells: usize, line: usize) -> Vec<f64> {
-    let mut fine = vec![0.0; 2 * values.len()];
-    let blocks = fine.par_chunks_mut(2 * cells * line);
-    blocks
-        .zip(values.par_chunks(cells * line))
-        .for_each(|(fine, coarse)| {
-            let layer = |i: usize| &coarse[i % cells * line..][..line];
-            fine.par_chunks_mut(2 * line)
-                .enumerate()
-                .for_each(|(i, pair)| {
-                    let (own, between) = pair.split_at_mut(line);
-                    own.copy_from_slice(layer(i));
-                    let around = [i + cells - 1, i, i + 1, i + 2].map(layer);
-                    for (j, value) in between.iter_mut().enumerate() {
-                        let [a, b, c, d] = around.map(|layer| layer[j]);
-                        *value = (9.0 * (b + c) - a - d) / 16.0;
-                    }
-                });
-        });
-    fine
+    parallel::values(2 * values.len(), |at| {
+        let (layer, place) = (at / line, at % line);
+        let (block, k) = (layer / (2 * cells), layer % (2 * cells) / 2);
+        let value = |l: usize| values[(block * cells + l % cells) * line + place];
+        if layer % 2 == 0 {
+            value(k)
+        } else {
+            (9.0 * (value(k) + value(k + 1)) - value(k + cells - 1) - value(k + 2)) / 16.0
+        }
+    })
 }
 
 #[cfg(test)]

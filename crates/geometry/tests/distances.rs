@@ -2,12 +2,8 @@
 
 #![allow(clippy::float_cmp, reason = "where equality is asserted, it is exact")]
 
-use std::f64::consts::PI;
-
-use geometry::shapes::{
-    Ball, Capsule, Cross, Cuboid, Cylinder, Ellipse, HalfSpace, RoundedBox, Torus,
-};
-use geometry::{Error, Grid, Rotation, SignedDistance, SignedDistanceExt, phase_field};
+use geometry::shapes::{Ball, Capsule, Cross, Cuboid, Cylinder, Ellipse, Torus};
+use geometry::{Error, Grid, SignedDistance, SignedDistanceExt, phase_field};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -49,11 +45,6 @@ fn generic_cases<const D: usize>() -> Vec<Case<D>> {
         }),
         case("cuboid", Cuboid::new(half), move |x| {
             (0..D).all(|i| x[i].abs() < half[i])
-        }),
-        case("rounded box", RoundedBox::new(half, 0.2), move |x| {
-            // Within 0.2 of the nearest point of the core.
-            let core = std::array::from_fn(|i| x[i].clamp(0.2 - half[i], half[i] - 0.2));
-            squared_distance(x, core) < 0.04
         }),
         case("cross", Cross::new(0.6, 0.2), |x| {
             let arm = |k| (0..D).all(|i: usize| x[i].abs() < if i == k { 0.6 } else { 0.2 });
@@ -213,13 +204,6 @@ fn gradient_norm<const D: usize>(shape: &dyn SignedDistance<D>, x: [f64; D]) -> 
         .sqrt()
 }
 
-fn motion() -> (Rotation<3>, [f64; 3]) {
-    (
-        Rotation::about_axis([1.0, -2.0, 0.5], 0.8).unwrap(),
-        [0.1, -0.2, 0.3],
-    )
-}
-
 fn config() -> ProptestConfig {
     ProptestConfig {
         cases: 200,
@@ -241,9 +225,8 @@ proptest! {
             let norm = gradient_norm(&*shape, x);
             prop_assert!((norm - 1.0).abs() < 1e-6, "{name}: {norm} at {x:?}");
         }
-        let half_space = HalfSpace::new([0.1, 0.2, 0.3], [3.0, -1.0, 2.0]).unwrap();
         let mut cases = generic_cases::<3>();
-        cases.extend([torus(), cylinder(), case("half space", Ok(half_space), |_| true)]);
+        cases.extend([torus(), cylinder()]);
         for Case { name, shape, .. } in cases {
             let norm = gradient_norm(&*shape, y);
             prop_assert!((norm - 1.0).abs() < 1e-6, "{name}: {norm} at {y:?}");
@@ -256,13 +239,12 @@ proptest! {
         x in prop::array::uniform2(-1.0..1.0_f64),
         y in prop::array::uniform2(-1.0..1.0_f64),
     ) {
-        let a = || Cross::<2>::new(0.6, 0.2).unwrap().rotated(Rotation::by_angle(0.4));
+        let a = || Cross::<2>::new(0.6, 0.2).unwrap();
         let b = || Ball::new([0.3, 0.2], 0.35).unwrap();
         let inside = |s: &dyn SignedDistance<2>| s.signed_distance(x) < 0.0;
         let (in_a, in_b) = (inside(&a()), inside(&b()));
-        let combinations: [(Shape<2>, bool); 3] = [
+        let combinations: [(Shape<2>, bool); 2] = [
             (Box::new(a().union(b())), in_a || in_b),
-            (Box::new(a().intersection(b())), in_a && in_b),
             (Box::new(a().difference(b())), in_a && !in_b),
         ];
         for (shape, expected) in combinations {
@@ -273,35 +255,14 @@ proptest! {
     }
 
     #[test]
-    fn motions_and_scalings_move_the_distance(y in prop::array::uniform3(-1.0..1.0_f64)) {
-        let (rotation, shift) = motion();
-        let shape = RoundedBox::new([0.5, 0.3, 0.2], 0.1).unwrap();
-        let moved = shape.rotated(rotation).translated(shift);
-        let image = rotation.apply(y);
-        let image = std::array::from_fn(|i| image[i] + shift[i]);
+    fn translations_move_the_distance(y in prop::array::uniform3(-1.0..1.0_f64)) {
+        let shift = [0.1, -0.2, 0.3];
+        let shape = Cuboid::new([0.5, 0.3, 0.2]).unwrap();
+        let moved = shape.translated(shift);
+        let image = std::array::from_fn(|i| y[i] + shift[i]);
         let (distance, expected) = (moved.signed_distance(image), shape.signed_distance(y));
         prop_assert!((distance - expected).abs() < 1e-14);
-        let scaled = shape.scaled(2.5).unwrap().signed_distance(y.map(|v| 2.5 * v));
-        prop_assert!((scaled - 2.5 * expected).abs() < 1e-14);
     }
-}
-
-#[test]
-fn rotations_turn_the_right_way() {
-    let [x, y] = Rotation::by_angle(PI / 2.0).apply([1.0, 0.0]);
-    assert!(x.abs() < 1e-15 && (y - 1.0).abs() < 1e-15);
-    let about_z = Rotation::about_axis([0.0, 0.0, 3.0], 0.3).unwrap();
-    let plane = Rotation::by_angle(0.3).matrix();
-    for (i, row) in plane.iter().enumerate() {
-        for (j, entry) in row.iter().enumerate() {
-            assert!((about_z.matrix()[i][j] - entry).abs() < 1e-15);
-        }
-    }
-    // About (1,1,1) by 120 degrees the axes are permuted cyclically.
-    let [x, y, z] = Rotation::about_axis([1.0; 3], 2.0 * PI / 3.0)
-        .unwrap()
-        .apply([1.0, 2.0, 3.0]);
-    assert!((x - 3.0).abs() < 1e-14 && (y - 1.0).abs() < 1e-14 && (z - 2.0).abs() < 1e-14);
 }
 
 #[test]
@@ -311,7 +272,8 @@ fn closures_are_distances() {
     let ball = Ball::new([0.0, 0.0], 0.5).unwrap();
     let a = phase_field(grid, &closure, 0.1).unwrap();
     let b = phase_field(grid, &ball, 0.1).unwrap();
-    assert!(geometry::measure::linf_distance(&a, &b).unwrap() < 1e-14);
+    let mut pairs = a.values().iter().zip(b.values());
+    assert!(pairs.all(|(a, b)| (a - b).abs() < 1e-14));
     let dynamic: &dyn SignedDistance<2> = &ball;
     assert_eq!(phase_field(grid, dynamic, 0.1).unwrap(), b);
 }
@@ -327,16 +289,11 @@ fn impossible_shapes_are_refused() {
     refused(Ball::new([0.0, f64::NAN], 1.0).map(drop));
     refused(Ball::new([0.0, 0.0], 0.0).map(drop));
     refused(Cuboid::new([1.0, -1.0]).map(drop));
-    refused(RoundedBox::new([1.0, 0.5], 0.6).map(drop));
-    refused(RoundedBox::new([1.0, 0.5], f64::NAN).map(drop));
     refused(Cross::<2>::new(0.2, 0.8).map(drop));
     refused(Ellipse::new([0.2, 0.0]).map(drop));
     refused(Torus::new(0.2, 0.2).map(drop));
     refused(Torus::clifford(f64::INFINITY).map(drop));
     refused(Cylinder::new(0.1, 0.0).map(drop));
-    refused(HalfSpace::new([0.0; 3], [0.0; 3]).map(drop));
-    refused(Ball::new([0.0], 1.0).unwrap().scaled(-1.0).map(drop));
-    refused(Rotation::about_axis([0.0; 3], 1.0).map(drop));
 }
 
 #[test]
@@ -344,11 +301,7 @@ fn undefined_distances_do_not_become_phase_fields() {
     let grid = Grid::<2>::centred(4, 2.0).unwrap();
     let shapes: [Shape<2>; 4] = [
         Box::new(Cuboid::new([0.5, 0.5]).unwrap().translated([f64::NAN, 0.0])),
-        Box::new(
-            Cross::new(0.5, 0.2)
-                .unwrap()
-                .rotated(Rotation::by_angle(f64::NAN)),
-        ),
+        Box::new(Cross::new(0.5, 0.2).unwrap().translated([0.0, f64::NAN])),
         Box::new(
             Ball::new([0.0; 2], 0.5)
                 .unwrap()

@@ -87,7 +87,7 @@ fn spheres_and_discs() {
             2.0 * PI * radius,
             PI * radius * radius,
             2.0 * PI,
-            exact::willmore_energy_circle(radius),
+            PI / radius,
         ];
         close(&measured(1.0, &disc), exact);
     }
@@ -103,7 +103,8 @@ fn spheroids_ellipses_and_a_torus() {
     let (major, minor) = (0.32, 0.17);
     let torus = measured(1.25, &Torus::new(major, minor).unwrap());
     let area = 4.0 * PI * PI * major * minor;
-    let energy = exact::willmore_energy_torus(major, minor);
+    let squared = (major / minor).powi(2);
+    let energy = 2.0 * PI * PI * squared / (squared - 1.0).sqrt();
     close(&torus, [area, 0.5 * area * minor, area / minor, energy]);
 }
 

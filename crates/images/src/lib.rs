@@ -21,7 +21,7 @@
 //!     // Its phase field in the box (-1,1)^2, the longer side of the image 1.6 long.
 //!     let grid = Grid::<2>::centred(128, 2.0)?;
 //!     let eps = 2.0 * grid.spacing();
-//!     let placement = Placement::fit(&image.bounding_box(), &grid, 1.6, 0.0)?;
+//!     let placement = Placement::fit(&image.bounding_box(), &grid, 1.6)?;
 //!     let distance = OutlineDistance::new(&outline.placed(&placement));
 //!     let u = phase_field(grid, &distance, eps)?;
 //!

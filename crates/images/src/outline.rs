@@ -1,8 +1,8 @@
 //! Closed curves around a shape.
 
-use geometry::contour::{Interpolation, Polyline, zero_level_of};
+use geometry::contour::{Polyline, zero_level_of};
 use geometry::measure::BoundingBox;
-use geometry::{Field, Placement, positive};
+use geometry::{Field, Placement, positive, profile_variable};
 use rayon::prelude::*;
 
 use crate::{Error, Image, Side};
@@ -82,7 +82,7 @@ impl Outline {
             depth(row * width + column)
         };
         let nodes = size.map(|n| n + 2);
-        let mut curves = closed_curves(nodes, value, coordinate, Interpolation::Value);
+        let mut curves = closed_curves(nodes, value, coordinate);
         for point in curves.iter_mut().flat_map(|curve| &mut curve.points) {
             *point = [point[1], height as f64 - point[0]];
         }
@@ -123,9 +123,8 @@ impl Outline {
         }
         let curves = closed_curves(
             grid.shape().map(|n| n + 1),
-            |node| values[grid.index(node)],
+            |node| profile_variable(values[grid.index(node)]),
             |axis, i| grid.coordinate(axis, i),
-            Interpolation::Profile,
         );
         Self::of(curves).ok_or(Error::NoInterface { low, high })
     }
@@ -250,7 +249,6 @@ fn closed_curves(
     shape: [usize; 2],
     value: impl Fn([usize; 2]) -> f64,
     coordinate: impl Fn(usize, usize) -> f64,
-    interpolation: Interpolation,
 ) -> Vec<Polyline> {
     // One more layer of nodes all around, in the same places as the outermost ones.
     let inner = |axis: usize, node: usize| node.clamp(1, shape[axis]) - 1;
@@ -262,17 +260,12 @@ fn closed_curves(
         let v = value(nearest);
         if added { -v.abs() } else { v }
     };
-    let mut curves = zero_level_of(
-        shape.map(|n| n + 2),
-        surrounded,
-        interpolation,
-        |node, axis, [a, b]| {
-            let mut point = [0, 1].map(|axis| coordinate(axis, inner(axis, node[axis])));
-            let end = coordinate(axis, inner(axis, node[axis] + 1));
-            point[axis] += (end - point[axis]) * (a / (a - b));
-            point
-        },
-    );
+    let mut curves = zero_level_of(shape.map(|n| n + 2), surrounded, |node, axis, [a, b]| {
+        let mut point = [0, 1].map(|axis| coordinate(axis, inner(axis, node[axis])));
+        let end = coordinate(axis, inner(axis, node[axis] + 1));
+        point[axis] += (end - point[axis]) * (a / (a - b));
+        point
+    });
     curves.retain(|curve| curve.closed && curve.points.len() > 2);
     curves
 }

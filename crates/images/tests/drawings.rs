@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 use crate::common::{Raster, disc, near, square};
 use geometry::shapes::{Ball, Cuboid};
-use geometry::{Field, Grid, Placement, Rotation, SignedDistance, SignedDistanceExt, phase_field};
+use geometry::{Field, Grid, Placement, SignedDistance, phase_field};
 use images::{Frame, Image, Interface, Outline, OutlineDistance, Side, decode, drawing, svg};
 use render::{Picture, Rgb};
 
@@ -58,9 +58,9 @@ fn coverage_is_the_area() {
     assert_eq!(drawn.pixel(50, 60), [255, 255, 255, 255]);
 
     // What is thinner than a pixel is as grey as it is thin.
-    let thread = Cuboid::new([0.5, 0.002])
-        .unwrap()
-        .rotated(Rotation::by_angle(0.4));
+    let thread = Cuboid::new([0.5, 0.002]).unwrap();
+    let (sin, cos) = 0.4_f64.sin_cos();
+    let thread = |[x, y]: [f64; 2]| thread.signed_distance([cos * x + sin * y, cos * y - sin * x]);
     let drawn = on_white(&frame, &thread);
     near(darkness(&drawn), 0.004 / (pixel * pixel), 1.0);
 }
@@ -88,7 +88,7 @@ fn images_survive_the_way_through_a_phase_field() {
 
     let grid = Grid::<2>::centred(256, 1.0).unwrap();
     let eps = 2.0 * grid.spacing();
-    let placement = Placement::fit(&image.bounding_box(), &grid, 1.0, 0.0).unwrap();
+    let placement = Placement::fit(&image.bounding_box(), &grid, 1.0).unwrap();
     let u = phase_field(grid, &OutlineDistance::new(&found.placed(&placement)), eps).unwrap();
     let interface = Interface::new(&u, eps).unwrap();
     let corner = placement.apply([0.0, 120.0]);

@@ -7,9 +7,7 @@ use std::f64::consts::PI;
 use crate::common::{Raster, disc, jpeg, near, square};
 use geometry::contour::Polyline;
 use geometry::shapes::{Ball, Cuboid};
-use geometry::{
-    Field, Grid, Placement, Rotation, SignedDistance, SignedDistanceExt, optimal_profile,
-};
+use geometry::{Field, Grid, Placement, SignedDistance, SignedDistanceExt, optimal_profile};
 use images::{Error, Image, Interface, Outline, OutlineDistance, Side, Tones, decode};
 use proptest::prelude::*;
 
@@ -69,16 +67,17 @@ fn discs_are_found_below_the_size_of_a_pixel() {
 #[test]
 fn turned_squares_and_rings_are_found() {
     // Counter-clockwise with the second axis upwards: a turn the other way would be 0.7 off.
-    let exact = Cuboid::new([30.0, 30.0])
-        .unwrap()
-        .rotated(Rotation::by_angle(0.3))
-        .translated(CENTRE);
+    let upright = Cuboid::new([30.0, 30.0]).unwrap();
+    let turned_back = |[x, y]: [f64; 2]| {
+        let (sin, cos) = 0.3_f64.sin_cos();
+        [cos * x + sin * y, cos * y - sin * x]
+    };
+    let exact = (|x| upright.signed_distance(turned_back(x))).translated(CENTRE);
     let found = outline(&Raster::new([100, 96], 16, square(CENTRE, 30.0, 0.3)).image());
     let error = deviation(&found, &exact, 100.0);
     // Away from the corners, which pixels cannot resolve.
-    let rotation = Rotation::by_angle(0.3);
     let sides = found.curves()[0].points.iter().filter(|p| {
-        let [x, y] = rotation.apply_inverse([p[0] - CENTRE[0], p[1] - CENTRE[1]]);
+        let [x, y] = turned_back([p[0] - CENTRE[0], p[1] - CENTRE[1]]);
         x.abs().min(y.abs()) < 28.0
     });
     let along = sides.map(|&p| exact.signed_distance(p).abs());
@@ -345,7 +344,7 @@ fn placement_and_its_inverse() {
         .unwrap();
 
     // The whole image: its lower left corner is that of the placed rectangle.
-    let placement = Placement::fit(&image.bounding_box(), &grid, 1.6, 0.2).unwrap();
+    let placement = Placement::fit(&image.bounding_box(), &grid, 1.6).unwrap();
     assert_eq!(placement.scale(), 1.6 / 200.0);
     let corner = placement.apply([0.0, 0.0]);
     near(corner[0], 3.2, 1e-15);
@@ -363,39 +362,31 @@ fn placement_and_its_inverse() {
     near(s, -20.0 * 0.008, 1e-3);
 
     // The shape alone, in the middle.
-    let placement = Placement::fit(&found.bounding_box(), &grid, 1.0, 0.0).unwrap();
+    let placement = Placement::fit(&found.bounding_box(), &grid, 1.0).unwrap();
     let bounds = found.placed(&placement).bounding_box();
     near(bounds.centre()[0], 4.0, 1e-12);
     near(bounds.centre()[1], 0.0, 1e-12);
     near(bounds.extent()[0], 1.0, 1e-3);
 
-    let message = |length, margin| {
-        Placement::fit(&image.bounding_box(), &grid, length, margin)
-            .unwrap_err()
-            .to_string()
+    let message = |length| {
+        let placement = Placement::fit(&image.bounding_box(), &grid, length);
+        placement.unwrap_err().to_string()
     };
     assert_eq!(
-        message(1.7, 0.2),
-        "a side length of 1.7 with a margin of 0.2 on both sides does not fit the box of side 2; \
-         use at most 1.6"
+        message(2.1),
+        "a side length of 2.1 does not fit the box of side 2; use at most that"
     );
     assert_eq!(
-        message(0.0, 0.2),
+        message(0.0),
         "side length = 0.0 is not allowed: it must be finite and positive"
     );
-    assert_eq!(
-        message(1.0, -0.2),
-        "margin = -0.2 is not allowed: it must be finite and not negative"
-    );
-    assert!(message(f64::NAN, 0.0).contains("side length = NaN"));
+    assert!(message(f64::NAN).contains("side length = NaN"));
     let point = geometry::measure::BoundingBox {
         lower: [1.0; 2],
         upper: [1.0; 2],
     };
     assert_eq!(
-        Placement::fit(&point, &grid, 1.0, 0.0)
-            .unwrap_err()
-            .to_string(),
+        Placement::fit(&point, &grid, 1.0).unwrap_err().to_string(),
         "longest side of the bounding box = 0.0 is not allowed: it must be finite and positive"
     );
 }

@@ -6,14 +6,12 @@
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A parameter out of its range.
     #[error("{name} must be {requirement}, got {value}")]
     InvalidParameter {
         name: &'static str,
         requirement: &'static str,
         value: f64,
     },
-    /// A curve that is no simple closed curve.
     #[error(
         "the curve turns by {turning:.3} times 2 pi where a simple closed curve turns once; give its points in order, without crossings or cusps"
     )]
@@ -21,7 +19,6 @@ pub enum Error {
         /// Total turning over `2 pi`.
         turning: f64,
     },
-    /// The self-similar solution at a corner was not found.
     #[error(
         "no self-similar solution found at a corner of exterior angle {angle:.4}; the last Newton step was {residual:.1e}"
     )]
@@ -30,30 +27,24 @@ pub enum Error {
         /// Largest entry of the last Newton step.
         residual: f64,
     },
-    /// A time before the corners of a polygon are resolved.
     #[error(
         "time {time:.3e} is before {first:.3e}, when the polygon starts with rounded corners; take a smaller rounding"
     )]
     TooEarly { time: f64, first: f64 },
-    /// Requested times do not increase.
     #[error(
         "times must be finite, not negative and in increasing order, got {time} after {before}"
     )]
     TimesNotIncreasing { time: f64, before: f64 },
-    /// The curve cannot be resolved any more, as before a singularity.
     #[error(
         "{points} points do not resolve the curve at time {time:.6e}; the flow may be singular there, or the start needs more points"
     )]
     Unresolved { points: usize, time: f64 },
-    /// The time steps became too short.
     #[error("no time step meets the tolerance at time {time:.6e}; the flow may be singular there")]
     StepTooShort { time: f64 },
-    /// A surface of revolution needs a profile on one side of the axis or symmetric about it.
     #[error(
         "a surface of revolution needs a curve with positive x, or one symmetric about the y axis that starts on it"
     )]
     NoProfile,
-    /// Newton's method for an equilibrium failed.
     #[error(
         "no equilibrium found at ratio {ratio}: residual {residual:.2e} after {iterations} Newton steps; the branch may end before"
     )]

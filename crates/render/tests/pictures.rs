@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::time::Duration;
 
 use geometry::measure::BoundingBox;
-use geometry::shapes::{Ball, Cross, RoundedBox};
+use geometry::shapes::{Ball, Cross, Cuboid};
 use geometry::{Field, Grid, SignedDistance, SignedDistanceExt, UpAxis, phase_field};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -98,7 +98,8 @@ fn the_outline_of_a_ball_is_the_cone_that_touches_it() {
 
 #[test]
 fn a_shape_fills_its_picture() {
-    let shape = RoundedBox::new([0.3, 0.1, 0.2], 0.05).unwrap();
+    let core = Cuboid::new([0.25, 0.05, 0.15]).unwrap();
+    let shape = |x: [f64; 3]| core.signed_distance(x) - 0.05;
     for size in [[200, 150], [90, 140]] {
         let picture = scene(&shape).view(view(25.0, 30.0)).render(size).unwrap();
         let seen = |x: u32, y: u32| is_drawn(&picture, x, y);

@@ -2,7 +2,7 @@
 
 use crate::common::{self, Scaled, ball, device, network, network_3d, params};
 use burn::tensor::Tensor;
-use geometry::measure::{l2_distance, linf, perimeter, zero_set_volume};
+use geometry::measure::{l2_distance, perimeter, zero_set_volume};
 use geometry::{Field, Grid, exact};
 use model::MeanCurvatureOperator;
 use operators::SpectralFilter;
@@ -58,7 +58,7 @@ fn a_disc_grows_as_the_exact_solution() {
         let perimeter = perimeter(&field, params(&grid()).eps).unwrap();
         assert!((perimeter / circumference - 1.0).abs() < 0.02, "{record:?}");
         // E = w_tautilde: pi / R in the limit, times the factor of the paper's network, .93 for slow bends and .96 for this radius.
-        let factor = record.willmore_energy / exact::willmore_energy_circle(found);
+        let factor = record.willmore_energy * found / std::f64::consts::PI;
         assert!((factor - 0.96).abs() < 0.01, "{factor}");
     }
     // An independent implementation has .0032 and .0191.
@@ -264,7 +264,7 @@ fn a_ball_stays_put() {
         "{} h",
         moved / grid.spacing()
     );
-    assert!(linf(&end) < 1.05);
+    assert!(end.values().iter().all(|u| u.abs() < 1.05));
 }
 
 #[test]

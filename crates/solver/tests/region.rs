@@ -1,18 +1,15 @@
 //! Flows in which only some unknowns move.
 
 use crate::common::{ball, device, network, network_3d, params};
-use geometry::shapes::{Ball, HalfSpace};
+use geometry::shapes::Ball;
 use geometry::{Field, Grid, SignedDistanceExt, measure, phase_field};
 use model::Network;
 use solver::{Error, Exit, WillmoreFlow};
 
 /// A ball without the part beyond a plane through its middle, and a cube around the cut.
 fn cut<const D: usize>(grid: Grid<D>, eps: f64) -> (Field<D>, Vec<bool>) {
-    let mut normal = [0.0; D];
-    normal[0] = 1.0;
     let ball = Ball::new([0.0; D], 0.25).unwrap();
-    let point: [f64; D] = std::array::from_fn(|axis| if axis == 0 { 0.12 } else { 0.0 });
-    let shape = ball.intersection(HalfSpace::new(point, normal).unwrap());
+    let shape = ball.difference(|x: [f64; D]| 0.12 - x[0]);
     let nodes = (0..grid.len()).map(|i| grid.node(i)[0] > 0.05).collect();
     (phase_field(grid, &shape, eps).unwrap(), nodes)
 }

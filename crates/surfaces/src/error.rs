@@ -13,28 +13,23 @@ use crate::read::error::FormatError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The extension names no known format.
     #[error(
         "{path} has no known extension; meshes are read and written as .obj, .ply or .stl",
         path = path.display()
     )]
     UnknownFormat { path: PathBuf },
-    /// A file is no usable mesh.
     #[error("{path} cannot be read as a mesh: {problem}", path = path.display())]
     Format { path: PathBuf, problem: FormatError },
     /// Grids and fields, and numbers outside their range.
     #[error(transparent)]
     Geometry(#[from] geometry::Error),
-    /// The operating system refused.
     #[error(transparent)]
     Io(#[from] files::Error),
     /// A shape or a region that cannot be built from its description.
     #[error("{0}")]
     Shape(String),
-    /// A mesh without faces.
     #[error("the mesh has no faces; a surface needs at least four")]
     NoFaces,
-    /// Triangles that enclose nothing, however they are closed.
     #[error(
         "the mesh encloses nothing that could be repaired: nowhere on a grid of cells of {spacing:.3e} do its faces wind round by more than half"
     )]
@@ -51,17 +46,6 @@ pub enum Error {
         /// Largest magnitude that the format holds.
         limit: f64,
     },
-    /// A normal is NaN or infinite, or there are more or fewer normals than vertices.
-    #[error(
-        "{normals} normals for {vertices} vertices, {finite} of them finite; \
-         every vertex needs one, or the mesh none"
-    )]
-    Normals {
-        normals: usize,
-        finite: usize,
-        vertices: usize,
-    },
-    /// A face refers to a vertex that does not exist.
     #[error("face {face} refers to vertex {vertex}, but there are {vertices} vertices")]
     IndexOutOfRange {
         /// The first such face.
@@ -69,13 +53,11 @@ pub enum Error {
         vertex: u32,
         vertices: usize,
     },
-    /// More vertices or faces than 32-bit indices can count.
     #[error("{count} {elements} are more than 32-bit indices can count; use a coarser mesh")]
     TooLarge {
         elements: &'static str,
         count: usize,
     },
-    /// Edges with one face only.
     #[error(
         "the surface is open: {edges} edges belong to one face only, such as {from:?} - {to:?} of \
          face {face}; close the holes"
@@ -86,7 +68,6 @@ pub enum Error {
         from: [f64; 3],
         to: [f64; 3],
     },
-    /// Edges with more than two faces.
     #[error(
         "the surface is not a manifold: {edges} edges belong to more than two faces, such as \
          {from:?} - {to:?} of face {face} and {others} others; remove the inner or doubled sheets"
@@ -98,7 +79,6 @@ pub enum Error {
         from: [f64; 3],
         to: [f64; 3],
     },
-    /// Edges that both their faces run through in the same direction.
     #[error(
         "the orientation is mixed: {edges} edges are run through twice in the same direction, \
          such as {from:?} - {to:?} by the faces {first} and {second}; orient all faces alike"
@@ -110,7 +90,6 @@ pub enum Error {
         from: [f64; 3],
         to: [f64; 3],
     },
-    /// Faces without area, whose normal is undefined.
     #[error(
         "{faces} faces have no area, such as face {face} with the corners {corners:?} on a line; \
          merge their vertices or flip their longest edges"
@@ -120,13 +99,11 @@ pub enum Error {
         face: usize,
         corners: [[f64; 3]; 3],
     },
-    /// A closed surface that encloses nothing.
     #[error(
         "the enclosed volume {volume:e} is zero up to rounding (area {area:e}), so that inside \
          and outside cannot be told apart"
     )]
     NoVolume { volume: f64, area: f64 },
-    /// A component whose orientation does not agree with where it lies.
     #[error(
         "the component with face {face} is oriented {orientation}, but {enclosing} other \
          components enclose it where {expected} should; unite overlapping parts, orient cavities \

@@ -1,9 +1,9 @@
 //! A noisy mesh, and what becomes of its vertices while a phase field flows.
 
-use geometry::{Field, Placement, is_thin};
+use geometry::{Field, Placement, distances_from_phase_field, is_thin};
 use rayon::prelude::*;
 
-use crate::level_set::LevelSet;
+use crate::level_set::project;
 use crate::vector::Vector;
 use crate::{ClosedMesh, Error, MeshDistance, TriangleMesh};
 
@@ -140,11 +140,12 @@ impl Fairing {
             let t = (s.abs() / own - 1.0).clamp(0.0, 1.0);
             s * t * t * (3.0 - 2.0 * t)
         };
-        let levels = LevelSet::new(start, eps)?.values(&vertices);
+        let distance = distances_from_phase_field(start, eps)?;
+        let levels = vertices.par_iter().map(|&x| kept(distance.spline(x).0));
         Ok(Followed {
+            levels: levels.collect(),
             placement,
             vertices,
-            levels: levels.into_iter().map(kept).collect(),
             eps,
         })
     }
@@ -208,9 +209,9 @@ impl Fairing {
 impl Followed {
     /// Where the level sets of `u` have taken the vertices, in the coordinates of the mesh.
     fn at(&self, u: &Field<3>) -> Result<Vec<[f64; 3]>, Error> {
-        let now = LevelSet::new(u, self.eps)?;
+        let now = distances_from_phase_field(u, self.eps)?;
         let pairs = self.vertices.par_iter().zip(&self.levels);
-        let moved = pairs.map(|(&x, &level)| now.project(x, level, REACH * self.eps));
+        let moved = pairs.map(|(&x, &level)| project(&now, x, level, REACH * self.eps));
         Ok(moved.map(|x| self.placement.apply_inverse(x)).collect())
     }
 
@@ -219,11 +220,11 @@ impl Followed {
     /// # Errors
     /// The values must be finite.
     pub fn left_behind(&self, u: &Field<3>) -> Result<f64, Error> {
-        let now = LevelSet::new(u, self.eps)?;
+        let now = distances_from_phase_field(u, self.eps)?;
         let pairs = self.vertices.par_iter().zip(&self.levels);
         let off = pairs.filter(|&(&x, &level)| {
-            let moved = now.project(x, level, REACH * self.eps);
-            (now.value(moved) - level).abs() > RESOLVED.1 * self.eps
+            let moved = project(&now, x, level, REACH * self.eps);
+            (now.spline(moved).0 - level).abs() > RESOLVED.1 * self.eps
         });
         Ok(off.count() as f64 / self.vertices.len().max(1) as f64)
     }

@@ -27,7 +27,7 @@
 //!     }
 //!     let coarse = Grid::<3>::centred(32, 2.0)?;
 //!     let eps = 2.0 * coarse.spacing();
-//!     let placement = Placement::fit(&ball.bounding_box(), &coarse, 1.2, 2.0 * eps)?;
+//!     let placement = Placement::fit(&ball.bounding_box(), &coarse, 1.2)?;
 //!     let distance = MeshDistance::new(&ball.placed(&placement));
 //!     let s = distance.sample(coarse, || ())?;
 //!     let u = s.map(|s| optimal_profile(s, eps));

@@ -1,9 +1,9 @@
 //! Zero level sets as meshes of well-shaped triangles.
 
-use geometry::Field;
+use geometry::{Field, distances_from_phase_field};
 
 use crate::half_edges::{HalfEdges, next, previous};
-use crate::level_set::LevelSet;
+use crate::level_set::project;
 use crate::vector::{Vector, scaled_normal};
 use crate::{ClosedMesh, Error, TriangleMesh, isosurface};
 
@@ -54,9 +54,9 @@ const ON: f64 = 1e-4;
 /// # Errors
 /// As [`phase_field_surface`](crate::phase_field_surface).
 pub fn remeshed_surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
-    let level_set = LevelSet::new(u, eps)?;
-    let marched = isosurface(level_set.distance())?;
-    let Some(mut remeshing) = Remeshing::new(&level_set, &marched) else {
+    let distance = distances_from_phase_field(u, eps)?;
+    let marched = isosurface(&distance)?;
+    let Some(mut remeshing) = Remeshing::new(&distance, &marched) else {
         return Ok(marched);
     };
     for _ in 0..ROUNDS {
@@ -144,14 +144,14 @@ enum Change {
 
 /// The mesh on its way.
 struct Remeshing<'a> {
-    level_set: &'a LevelSet,
+    distance: &'a Field<3>,
     spacing: f64,
     surface: HalfEdges,
     points: Vec<Point>,
 }
 
 impl<'a> Remeshing<'a> {
-    fn new(level_set: &'a LevelSet, mesh: &TriangleMesh) -> Option<Self> {
+    fn new(distance: &'a Field<3>, mesh: &TriangleMesh) -> Option<Self> {
         let normals = mesh.normals.as_ref()?.iter();
         let points = mesh.points().into_iter().zip(normals);
         let points = points.map(|(x, &normal)| Point {
@@ -159,8 +159,8 @@ impl<'a> Remeshing<'a> {
             normal: normal.into(),
         });
         Some(Self {
-            level_set,
-            spacing: level_set.grid().spacing(),
+            distance,
+            spacing: distance.grid().spacing(),
             surface: HalfEdges::new(mesh.vertices.len(), &mesh.faces)?,
             points: points.collect(),
         })
@@ -181,7 +181,7 @@ impl<'a> Remeshing<'a> {
 
     /// Whether a place is between the nodes: what lies further out is a cap, which stays as it is.
     fn is_free(&self, x: Vector) -> bool {
-        let grid = self.level_set.grid();
+        let grid = self.distance.grid();
         let between = |axis: usize| {
             let place = (x[axis] - grid.origin()[axis]) / self.spacing;
             (0.0..=grid.cells() as f64 - 1.0).contains(&place)
@@ -197,8 +197,9 @@ impl<'a> Remeshing<'a> {
     /// The point of the level set next to a place; `None` where there is none close by.
     fn on_level_set(&self, x: Vector) -> Option<Point> {
         let reach = REACH * self.spacing;
-        let x = Vector::from_array(self.level_set.project(x.to_array(), 0.0, reach));
-        let (value, gradient) = self.level_set.value_and_gradient(x);
+        let x = Vector::from_array(project(self.distance, x.to_array(), 0.0, reach));
+        let (value, gradient) = self.distance.spline(x.to_array());
+        let gradient = Vector::from_array(gradient);
         let normal = gradient.try_normalize()?;
         let on = value.abs() <= ON * self.spacing * gradient.length() && self.is_free(x);
         on.then_some(Point { x, normal })

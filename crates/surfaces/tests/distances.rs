@@ -246,7 +246,7 @@ fn results_do_not_depend_on_the_number_of_threads() {
 fn placed_meshes_keep_their_distances() {
     let mesh = closed(translated(torus(5.0, 2.0, 40, 20), [100.0, 3.0, -7.0]));
     let grid = Grid::<3>::new(16, 2.0).unwrap();
-    let placement = Placement::fit(&mesh.bounding_box(), &grid, 1.4, 0.3).unwrap();
+    let placement = Placement::fit(&mesh.bounding_box(), &grid, 1.4).unwrap();
     let before = MeshDistance::new(&mesh);
     let after = MeshDistance::new(&mesh.placed(&placement));
     for index in 0..grid.len() {

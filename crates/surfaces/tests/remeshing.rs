@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 
 use crate::common::{Numbers, closed};
-use geometry::shapes::{Ball, Capsule, Cuboid, RoundedBox, Torus};
+use geometry::shapes::{Ball, Capsule, Cuboid, Torus};
 use geometry::{Field, Grid, SignedDistance, SignedDistanceExt, optimal_profile, phase_field};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -173,7 +173,8 @@ fn assert_well_shaped(name: &str, u: &Field<3>) {
 fn triangles_are_well_shaped() {
     let ball = Ball::new([0.0; 3], 0.3).unwrap();
     let torus = Torus::new(0.27, 0.1).unwrap();
-    let cube = RoundedBox::new([0.25; 3], 0.06).unwrap();
+    let core = Cuboid::new([0.25 - 0.06; 3]).unwrap();
+    let cube = |x: [f64; 3]| core.signed_distance(x) - 0.06;
     let figure = MeshDistance::new(&samples::figure(64).unwrap());
     let lever = MeshDistance::new(&samples::lever(64).unwrap());
     for (cells, offset) in [

@@ -8,19 +8,15 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The operating system refused.
     #[error(transparent)]
     Io(#[from] files::Error),
-    /// A file is no usable volume.
     #[error("{path} cannot be read as a volume: {problem}", path = path.display())]
     Format { path: PathBuf, problem: FormatError },
     /// The number of values is not that of the voxels, or one of them is no number, or they have no place in space.
     #[error("no volume: {0}")]
     Volume(FormatError),
-    /// No voxel is of the body.
     #[error("no voxel is {what}: the values range from {low} to {high}")]
     NothingInside { what: String, low: f64, high: f64 },
-    /// What is to be written has an extension of another format.
     #[error("{path} must end in .nii or .nii.gz: volumes are written as NIfTI", path = path.display())]
     UnknownFormat { path: PathBuf },
     /// Of the surface.
@@ -32,12 +28,10 @@ pub enum Error {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FormatError {
-    /// The first bytes are those of no known format.
     #[error(
         "it begins with the bytes {start:02x?}, and is none of NIfTI (.nii, .nii.gz), MRC (.mrc, .map) and stacks of TIFF images"
     )]
     Unknown { start: Vec<u8> },
-    /// An entry of the header is not understood.
     #[error("{entry} of the {format} header is {value}; it must be {requirement}")]
     Header {
         format: &'static str,
@@ -45,24 +39,20 @@ pub enum FormatError {
         value: String,
         requirement: &'static str,
     },
-    /// More or fewer bytes than the header announces.
     #[error("it should have {expected} bytes by its header, and has {found}{}", if *longer { " or more" } else { "" })]
     Length {
         expected: u64,
         found: u64,
         longer: bool,
     },
-    /// No voxels, or more than are accepted.
     #[error("it has {}, and may have up to {limit} bytes of voxels, with two along each axis at least", shown(*size, *bytes))]
     Size {
         size: [u64; 3],
         bytes: u64,
         limit: u64,
     },
-    /// A value is NaN or infinite.
     #[error("voxel {index:?} has the value {value}; all values must be finite")]
     NonFinite { index: [usize; 3], value: f64 },
-    /// What the library of a format says.
     #[error("damaged, truncated or unusual {format}: {message}")]
     Damaged {
         format: &'static str,

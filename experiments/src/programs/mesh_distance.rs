@@ -48,7 +48,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let grid = Grid::<3>::new(options.cells, 1.0)?;
     let progress = Progress::new(options.quiet);
     let bar = progress.bar("signed distance".to_owned(), options.cells as u64);
-    let placement = Placement::fit(&mesh.bounding_box(), &grid, options.side_length, 0.0)?;
+    let placement = Placement::fit(&mesh.bounding_box(), &grid, options.side_length)?;
     let distance = MeshDistance::new(&mesh.placed(&placement));
     let distance = meshes::sampled(&distance, grid, &bar)?;
     bar.finish();

@@ -6,20 +6,16 @@
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FormatError {
-    /// Nothing in it.
     #[error("the file is empty")]
     Empty,
-    /// A line of text is not what the format says.
     #[error("line {line} has {found:?} where {expected} is expected")]
     Line {
         line: usize,
         found: String,
         expected: &'static str,
     },
-    /// The text ends too early.
     #[error("the file ends in line {line} where {expected} is expected: it is truncated")]
     EndOfText { line: usize, expected: &'static str },
-    /// The number of bytes does not agree with the header.
     #[error(
         "the header announces {count} {elements}, which take at least {expected} bytes, but the \
          file has {found}: truncated, or another format"
@@ -31,10 +27,8 @@ pub enum FormatError {
         expected: u64,
         found: u64,
     },
-    /// A coordinate is NaN or infinite.
     #[error("vertex {vertex} has the coordinate {value}; all coordinates must be finite")]
     NonFinite { vertex: usize, value: f64 },
-    /// A corner of a face does not exist.
     #[error(
         "face {face} refers to vertex {index}, but the file has {vertices} vertices, the first of \
          which is {first}"
@@ -52,16 +46,12 @@ pub enum FormatError {
         corners: usize,
         expected: &'static str,
     },
-    /// No faces.
     #[error("the file has {vertices} vertices and no faces: no mesh, or another format")]
     NoFaces { vertices: usize },
-    /// More vertices than 32-bit indices can count.
     #[error("{vertices} vertices are more than 32-bit indices can count; use a coarser mesh")]
     TooManyVertices { vertices: usize },
-    /// The header of a PLY file lacks something.
     #[error("the header does not declare {missing}")]
     Undeclared { missing: &'static str },
-    /// An element of a PLY file has no properties and hence no data.
     #[error("the header announces {count} elements {element:?} without properties")]
     NoProperties { element: String, count: usize },
 }
