@@ -46,6 +46,15 @@ pub enum Error {
         /// Largest magnitude that the format holds.
         limit: f64,
     },
+    #[error(
+        "{normals} normals for {vertices} vertices, {finite} of them finite; \
+         every vertex needs one, or the mesh none"
+    )]
+    Normals {
+        normals: usize,
+        finite: usize,
+        vertices: usize,
+    },
     #[error("face {face} refers to vertex {vertex}, but there are {vertices} vertices")]
     IndexOutOfRange {
         /// The first such face.

@@ -16,7 +16,7 @@ pub struct TriangleMesh {
     pub vertices: Vec<[f64; 3]>,
     /// Three vertices each, counter-clockwise seen from outside.
     pub faces: Vec<[u32; 3]>,
-    /// Outward unit normals of the vertices, one each, if known.
+    /// Outward unit normals of the vertices, if known.
     pub normals: Option<Vec<[f64; 3]>>,
 }
 
@@ -77,7 +77,7 @@ impl TriangleMesh {
     /// Checks that all numbers are finite and at most `limit`, and all indices in range.
     ///
     /// # Errors
-    /// [`Error::NonFiniteVertex`], [`Error::IndexOutOfRange`].
+    /// [`Error::NonFiniteVertex`], [`Error::IndexOutOfRange`], [`Error::Normals`].
     pub fn check(&self, limit: f64) -> Result<(), Error> {
         let count = self.vertices.len();
         let representable = |x: &[f64; 3]| x.iter().all(|v| v.abs() <= limit);
@@ -93,6 +93,17 @@ impl TriangleMesh {
                 return Err(Error::IndexOutOfRange {
                     face,
                     vertex,
+                    vertices: count,
+                });
+            }
+        }
+        if let Some(normals) = &self.normals {
+            let finite = normals.iter().filter(|n| n.iter().all(|v| v.is_finite()));
+            let finite = finite.count();
+            if finite != count || normals.len() != count {
+                return Err(Error::Normals {
+                    normals: normals.len(),
+                    finite,
                     vertices: count,
                 });
             }

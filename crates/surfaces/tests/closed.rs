@@ -221,6 +221,16 @@ fn meshes_without_sense_are_refused() {
             Error::NonFiniteVertex { vertex: 6, .. }
         ));
     }
+    let mut mesh = cube(0.5);
+    mesh.normals = Some(vec![[1.0, 0.0, 0.0]; 7]);
+    assert!(matches!(
+        error(mesh),
+        Error::Normals {
+            normals: 7,
+            vertices: 8,
+            ..
+        }
+    ));
     for (size, word) in [(1e-71, "between"), (1e71, "between"), (0.0, "no faces")] {
         let text = error(cube(size)).to_string();
         assert!(text.contains(word), "{text}");

@@ -506,6 +506,9 @@ fn unusable_meshes_are_not_written() {
             write(&path, &mesh),
             Err(Error::IndexOutOfRange { face: 2, .. })
         ));
+        let mut mesh = cube(1.0);
+        mesh.normals = Some(Vec::new());
+        assert!(matches!(write(&path, &mesh), Err(Error::Normals { .. })));
     }
     let huge = cube(1e39);
     let text = write(folder.path().join("mesh.stl"), &huge)
