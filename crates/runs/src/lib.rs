@@ -15,7 +15,7 @@
 //!         stored => stored?.resume()?,
 //!     };
 //!     while state.step < last {
-//!         state.arrays[0].1.iter_mut().for_each(|v| *v *= 3.9 * (1.0 - *v));
+//!         state.arrays[0].1.to_mut().iter_mut().for_each(|v| *v *= 3.9 * (1.0 - *v));
 //!         state.step += 1;
 //!         if state.step % 3 == 0 {
 //!             run.commit(&state)?;
