@@ -24,9 +24,9 @@ pub enum Storage {
 
 /// Bytes for each node of a flow on the whole grid, measured at 128 and 192 cells.
 const PER_NODE: f64 = 300.0;
-/// Bytes for each stored cell of a flow on bricks, and for each node of its grid, whose phase fields before and after a step are kept; measured
-/// with the armadillo at 128 and 256 cells.
-const ON_BRICKS: [f64; 2] = [220.0, 24.0];
+/// Bytes for each stored cell of a flow on bricks, and for each node of its grid, on which a phase field is made to be measured; measured with
+/// the armadillo at 128, 256 and 512 cells.
+const ON_BRICKS: [f64; 2] = [310.0, 8.0];
 
 impl Storage {
     /// About how many bytes a flow takes on a grid of so many nodes of which so many are stored.

@@ -7,7 +7,8 @@
 //!   `H` the second derivative of `E + lambda C`. For that the preconditioner `P` is projected, `P - P A (A^T P A)^-1 A^T P`, whose spectrum
 //!   with `H` lies within that of `P`: constraints cost no iterations. What is left of the residual corrects the multipliers.
 //! - Every trial is [restored](Held::restored) to `C = C*` by Newton's method for one or two numbers: displacements of the interface along its
-//!   normal that are constant (for the volume) and proportional to the mean curvature (for the perimeter), which keep the profile.
+//!   normal that are constant (for the volume) and proportional to the mean curvature (for the perimeter), which keep the profile. A perimeter
+//!   that is held alone is restored by the shorter one of both, since the second one sharpens edges.
 
 use std::sync::Arc;
 
@@ -298,23 +299,37 @@ impl<'a, const D: usize> Held<'a, D> {
         }
     }
 
-    /// The motion that restores a measure: a displacement of the interface, times `1 - u^2`.
-    fn motion(&self, tangent: &Tangent<D>, part: Part) -> Vec<f64> {
-        let well = |u: &f64| (1.0 - u * u).max(0.0);
-        let wells = tangent.u.iter().map(well);
-        if part.measure == 1 {
-            return self.inside(wells.collect());
+    /// The motions that restore the measures: displacements of the interface, constant for the volume and proportional to the mean curvature
+    /// for the perimeter (for one that is held alone, the shorter one of both), times `1 - u^2`.
+    fn motions(&self, tangent: &Tangent<D>, gradients: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let wells: Vec<f64> = tangent.u.iter().map(|u| (1.0 - u * u).max(0.0)).collect();
+        let constant = || self.inside(wells.clone());
+        let bent = || {
+            // Sharper bends than the interface is wide are corners.
+            let most = self.eps.recip();
+            let curvature = self.stored(tangent.sizes.mean_curvature());
+            let bends = curvature.iter().map(|k| k.clamp(-most, most));
+            self.inside(wells.iter().zip(bends).map(|(well, k)| well * k).collect())
+        };
+        if let ([part], [gradient]) = (&tangent.parts[..], gradients)
+            && part.measure == 0
+        {
+            let (constant, bent) = (constant(), bent());
+            let longest = longest_displacement(&tangent.u, &bent);
+            let shorter =
+                product(gradient, &constant).abs() * longest > product(gradient, &bent).abs();
+            return vec![if shorter { constant } else { bent }];
         }
-        // Sharper bends than the interface is wide are corners.
-        let most = self.eps.recip();
-        let curvature = self.stored(tangent.sizes.mean_curvature());
-        let bends = curvature.iter().map(|k| k.clamp(-most, most));
-        self.inside(wells.zip(bends).map(|(well, k)| well * k).collect())
-    }
-
-    fn motions(&self, tangent: &Tangent<D>) -> Vec<Vec<f64>> {
         let parts = tangent.parts.iter();
-        parts.map(|part| self.motion(tangent, *part)).collect()
+        parts
+            .map(|part| {
+                if part.measure == 0 {
+                    bent()
+                } else {
+                    constant()
+                }
+            })
+            .collect()
     }
 
     /// Zero where nothing may move.
@@ -329,14 +344,19 @@ impl<'a, const D: usize> Held<'a, D> {
         values
     }
 
+    fn gradients(&self, tangent: &Tangent<D>) -> Vec<Vec<f64>> {
+        let parts = tangent.parts.iter();
+        parts.map(|part| self.gradient(tangent, *part)).collect()
+    }
+
     /// The motions that restore the constraints at a phase field, with what they change.
     fn correction(&self, tangent: &Tangent<D>) -> Correction {
-        let (parts, motions) = (&tangent.parts, self.motions(tangent));
+        let gradients = self.gradients(tangent);
+        let motions = self.motions(tangent, &gradients);
         let mut changes = [[0.0; 2]; 2];
-        for (row, part) in changes.iter_mut().zip(parts) {
-            let gradient = self.gradient(tangent, *part);
+        for (row, gradient) in changes.iter_mut().zip(&gradients) {
             for (change, motion) in row.iter_mut().zip(&motions) {
-                *change = product(&gradient, motion);
+                *change = product(gradient, motion);
             }
         }
         Correction { motions, changes }
@@ -344,7 +364,7 @@ impl<'a, const D: usize> Held<'a, D> {
 
     /// The multipliers for which the Lagrangian does not change along the motions that restore the constraints.
     fn estimate(&self, tangent: &Tangent<D>, gradients: &[Vec<f64>], force: &[f64]) -> [f64; 2] {
-        let (parts, motions) = (&tangent.parts, self.motions(tangent));
+        let (parts, motions) = (&tangent.parts, self.motions(tangent, gradients));
         let found = solve(
             parts.len(),
             |row| -product(force, &motions[row]),
@@ -382,10 +402,7 @@ impl<'a, const D: usize> Held<'a, D> {
             unit,
         } = quadratic;
         let parts = &tangent.parts;
-        let gradients: Vec<_> = parts
-            .iter()
-            .map(|part| self.gradient(tangent, *part))
-            .collect();
+        let gradients = self.gradients(tangent);
         if !self.solved {
             let force = self.device.values(gradient.clone())?;
             self.multipliers = self.estimate(tangent, &gradients, &force);
@@ -452,12 +469,7 @@ impl Correction {
                 *sum += factor * value;
             }
         }
-        // On the interface, where 1 - u^2 > 1/2, the displacement is the motion over 1 - u^2.
-        let wells = tangent.u.iter().map(|u| 1.0 - u * u);
-        let shifts = motion.iter().zip(wells).filter(|(_, well)| *well > 0.5);
-        let longest = shifts.fold(0.0, |longest: f64, (motion, well)| {
-            longest.max((motion / well).abs())
-        });
+        let longest = longest_displacement(&tangent.u, &motion);
         let is_short = longest <= NEAR;
         if longest > LONGEST {
             for value in &mut motion {
@@ -497,6 +509,15 @@ fn solve(
     let (r, s) = (right(0), right(1));
     let independent = determinant.abs() > DEPENDENT * (a * d).abs();
     independent.then(|| [(d * r - b * s) / determinant, (a * s - c * r) / determinant])
+}
+
+/// Of the interface, where `1 - u^2 > 1/2`: there, the displacement is the motion over `1 - u^2`.
+fn longest_displacement(u: &[f64], motion: &[f64]) -> f64 {
+    let wells = u.iter().map(|u| 1.0 - u * u);
+    let shifts = motion.iter().zip(wells).filter(|(_, well)| *well > 0.5);
+    shifts.fold(0.0, |longest: f64, (motion, well)| {
+        longest.max((motion / well).abs())
+    })
 }
 
 fn product(a: &[f64], b: &[f64]) -> f64 {

@@ -1,7 +1,7 @@
 //! Flows with perimeter and volume held.
 
 use crate::common::{ball, device, network, params};
-use geometry::shapes::{Ball, Ellipse};
+use geometry::shapes::{Ball, Cuboid, Ellipse};
 use geometry::zero_set::reduced_volume;
 use geometry::{Field, Grid, SignedDistance, ZeroSet, phase_field};
 use model::{Ratios, Shipped};
@@ -180,6 +180,18 @@ fn a_spheroid_keeps_its_volume_in_space() {
         assert_eq!(record.newton.exit, Exit::Converged, "{record:?}");
         assert!(record.energy < record.energy_before);
     }
+}
+
+#[test]
+fn the_area_of_a_body_with_edges_is_kept_without_sharper_ones() {
+    let grid = Grid::<3>::per_unit(32, 1.0).unwrap();
+    let plate = Cuboid::new([0.3, 0.3, 0.1]).unwrap();
+    let u = phase_field(grid, &plate, params(&grid).eps).unwrap();
+    let tau = 0.05 * grid.spacing().powi(2);
+    let free = run(&mut free(&u), [false; 2], tau, 4).0;
+    let (records, drift) = run(&mut keeping(&u, PERIMETER), PERIMETER, tau, 4);
+    assert!(drift < 1e-11, "{drift:e}");
+    assert!(products(&records) < 1.5 * products(&free));
 }
 
 #[test]
