@@ -7,7 +7,6 @@ use runs::Interrupt;
 
 use crate::harness::{in_parallel, workers};
 use crate::prelude::*;
-use crate::study::{self, Variant};
 
 pub const COUNT: usize = 30;
 pub const STEPS: usize = 64;
@@ -76,11 +75,7 @@ pub struct Circle {
 impl Circle {
     /// `L2` distance to the exact solution after `k` steps.
     pub fn error(&self, k: usize) -> f64 {
-        let values = match k {
-            0 => &self.trajectory.start,
-            k => &self.trajectory.records[k - 1].measures,
-        };
-        values["l2"]
+        self.trajectory.measures(k).expect("all steps are made")["l2"]
     }
 }
 

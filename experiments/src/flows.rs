@@ -1,6 +1,5 @@
 //! The cases of the experiments.
 
-use engine::Helfrich;
 use model::Networks;
 
 use crate::networks::scales;
@@ -10,29 +9,8 @@ use crate::prelude::*;
 pub const PAPERS: (Method, Scheme) = (Method::Hybrid, Scheme::Paper);
 /// and in that of the least errors.
 pub const ACCURATE: (Method, Scheme) = (Method::Hybrid, Scheme::Accurate);
-
-/// Willmore flow everywhere; in the paper the steps are those of a rule, each made as a whole.
-pub fn willmore_flow<const D: usize>(
-    shape: &str,
-    initial: Field<D>,
-    operator: Operator,
-    scales: Scales,
-    (time_steps, count): (impl Into<TimeSteps>, usize),
-) -> Case<D> {
-    Case {
-        shape: shape.to_owned(),
-        initial,
-        region: None,
-        energy: Helfrich::default(),
-        held: Held::default(),
-        flow: Flow::Willmore,
-        operator,
-        scales,
-        steps: time_steps.into(),
-        stops: vec![Stop::Steps(count)],
-        measures: Measure::size(scales.eps),
-    }
-}
+/// The finite elements of the paper's references.
+pub const ELEMENTS: (Method, Scheme) = (Method::FeImplicit, Scheme::Paper);
 
 /// A flow at the scales of the convergence tests in equal steps, with nothing measured; the inner step of mean curvature flow is its step.
 pub fn planar_flow(
@@ -49,7 +27,7 @@ pub fn planar_flow(
     Case {
         flow,
         measures: Vec::new(),
-        ..willmore_flow(shape, initial, operator.clone(), scales, time)
+        ..Case::willmore(shape, initial, operator.clone(), scales, time)
     }
 }
 

@@ -1,7 +1,6 @@
 //! Inpainting, in any dimension: Willmore flow of the values in a region, the rest held.
 
 use crate::prelude::*;
-use crate::steps;
 
 /// A shape is stationary once it moves by less than this part of the way it has come per step.
 const STILL: f64 = 1e-5;
@@ -49,7 +48,7 @@ impl<const D: usize> Shape<D> {
         let title = format!("inpainted {}", self.title);
         let initial = phase_field(grid, &self.initial, scales.eps)?;
         let time = (self.rule, self.steps);
-        let mut case = willmore_flow(&title, initial, operator.clone(), scales, time);
+        let mut case = Case::willmore(&title, initial, operator.clone(), scales, time);
         case.region = Some((0..grid.len()).map(moves).collect());
         case.steps.first_substep = Some(first_substep(scales.eps));
         case.stops.insert(0, Stop::Motion(STILL));

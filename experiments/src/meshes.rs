@@ -2,7 +2,7 @@
 
 use geometry::{PURE_BEYOND, npy};
 use runs::fingerprint;
-use surfaces::{ClosedMesh, MeshDistance, usual_up_axis};
+use surfaces::usual_up_axis;
 
 use crate::prelude::*;
 
@@ -27,13 +27,8 @@ pub struct MeshOptions {
     pub volume: Option<PathBuf>,
 
     /// What the values are
-    #[arg(
-        long,
-        value_name = "KIND",
-        value_enum,
-        default_value_t,
-        requires = "volume"
-    )]
+    #[arg(long, value_name = "KIND", value_enum, default_value_t)]
+    #[arg(requires = "volume")]
     pub volume_holds: VolumeKind,
 
     /// Longest side of the mesh
@@ -213,19 +208,16 @@ fn volume(path: &Path, grid: Grid<3>, holds: VolumeKind) -> Result<Field<3>, Err
     let name = path.display();
     let field = npy::read(path, |cells| Grid::<3>::new(cells, grid.side()))?;
     let (found, expected) = (field.grid().cells(), grid.cells());
-    require(
-        found == expected,
-        format!(
-            "{name} has {found} nodes per side, and the box {expected}: choose --cells and --box-side with a product of {found}"
-        ),
-    )?;
+    let message = format!(
+        "{name} has {found} nodes per side, and the box {expected}: choose --cells and --box-side with a product of {found}"
+    );
+    require(found == expected, message)?;
     let largest = field.values().iter().map(|u| u.abs()).fold(0.0, f64::max);
-    require(
-        holds != VolumeKind::PhaseField || largest <= LARGEST,
-        format!(
-            "{name} holds values up to {largest}, which no phase field has; are they signed distances?"
-        ),
-    )?;
+    let message = format!(
+        "{name} holds values up to {largest}, which no phase field has; are they signed distances?"
+    );
+    let possible = holds != VolumeKind::PhaseField || largest <= LARGEST;
+    require(possible, message)?;
     Ok(Field::from_values(grid, field.into_values())?)
 }
 

@@ -9,6 +9,11 @@ pub const EPS: f64 = 1.0 / 64.0;
 /// Time step `tau = tautilde = 2^-14` of both flows.
 pub const STEP: f64 = 1.0 / 16384.0;
 
+/// The time after so many of these steps.
+pub fn time(step: usize) -> f64 {
+    step as f64 * STEP
+}
+
 pub fn scales() -> Scales {
     Scales {
         eps: EPS,
@@ -70,12 +75,10 @@ impl Chosen {
 
 /// The network of the convergence tests in 2D at resolution `n`, with the paper's kernel width `n/8 + 1`.
 pub fn convergence_network(n: usize) -> Result<NeededNetwork, Error> {
-    require(
-        n > 0 && n.is_multiple_of(16),
-        format!(
-            "n = {n} is not possible: the kernel width n/8 + 1 must be odd, so n must be a multiple of 16"
-        ),
-    )?;
+    let message = format!(
+        "n = {n} is not possible: the kernel width n/8 + 1 must be odd, so n must be a multiple of 16"
+    );
+    require(n > 0 && n.is_multiple_of(16), message)?;
     let ratios = Ratios::of_run(2, n / 8 + 1, 1.0 / n as f64, EPS, STEP);
     ratios.validate()?;
     Ok(NeededNetwork::exactly(ratios))

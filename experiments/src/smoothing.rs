@@ -1,9 +1,7 @@
 //! What comparisons of smoothings of meshes share.
 
-use engine::Storage;
-use geometry::measure::BoundingBox;
 use render::{Scene, View};
-use surfaces::{Fairing, TriangleMesh};
+use surfaces::Fairing;
 
 use crate::prelude::*;
 use crate::surfaces::raster;
@@ -32,7 +30,7 @@ pub fn fairing_flow(title: &str, mut distance: Field<3>) -> Result<Case<3>, Erro
     };
     let mut operator = operator(ACCURATE, &grid, &scales)?;
     operator.storage = Storage::Auto;
-    Ok(willmore_flow(title, initial, operator, scales, (rule, 0)))
+    Ok(Case::willmore(title, initial, operator, scales, (rule, 0)))
 }
 
 /// A picture of a mesh in a frame.

@@ -1,7 +1,5 @@
 //! The steps of runs as a table.
 
-use std::collections::BTreeSet;
-
 use engine::Values;
 
 use crate::prelude::*;

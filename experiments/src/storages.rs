@@ -1,13 +1,10 @@
 //! What a surface and a curve cost by what is stored of their phase fields: the whole grid, or bricks near them.
 
 use derive_more::Display;
-use engine::Storage;
-use operators::memory;
 
 use crate::meshes::{ARMADILLO, MeshOptions};
 use crate::prelude::*;
 use crate::surfaces::{centred_box, needed_network, scales};
-use crate::timing;
 use crate::truth::CROSS;
 
 /// Steps on every grid, each twice as long as the one before,
@@ -96,7 +93,7 @@ impl StorageOptions {
             operator.storage = Storage::Bricks;
             let steps = TimeSteps::controlled(ErrorControl::default());
             let time = (steps.rule, if quick { 2 } else { CROSS_STEPS });
-            let mut case = willmore_flow(CROSS.key, initial, operator, scales, time);
+            let mut case = Case::willmore(CROSS.key, initial, operator, scales, time);
             case.steps = steps;
             measured.push(Stored::measure(CROSS.key, n, case, session)?);
         }
@@ -119,7 +116,7 @@ impl StorageOptions {
                 let time = (rule, if quick { 2 } else { STEPS });
                 dense_or_bricks.storage = storage;
                 let operator = dense_or_bricks.clone();
-                let case = willmore_flow("armadillo", initial, operator, scales(n), time);
+                let case = Case::willmore("armadillo", initial, operator, scales(n), time);
                 measured.push(Stored::measure("armadillo", n, case, session)?);
             }
         }

@@ -1,17 +1,10 @@
 //! Surfaces under Willmore flow: their scales, the shown steps of a run, and the pictures, tables and metrics of those.
 
-use engine::Storage;
-use geometry::measure::BoundingBox;
 use model::NeededNetwork;
-use operators::memory;
 pub use render::View;
 use render::{Picture, Quality, Rgb, Scene, Tube};
-use surfaces::ClosedMesh;
 
-use crate::look::one_over_two_to;
-use crate::networks::Chosen;
 use crate::prelude::*;
-use crate::steps;
 
 const EPS_OVER_H: f64 = 2.0;
 const WIDTH: usize = 17;
@@ -275,7 +268,7 @@ pub struct SurfaceFlows {
 
 /// Sizes of time steps that are powers of two, for figures.
 fn in_words(steps: StepRule) -> String {
-    let power = |tau: f64| one_over_two_to(tau.recip().log2().round() as u32);
+    let power = |tau: f64| look::power_of_two(tau.log2().round() as i32);
     match steps {
         StepRule::Constant(tau) => format!("τ = {}", power(tau)),
         StepRule::Doubling(first) => {
@@ -305,7 +298,7 @@ impl SurfaceFlows {
                 }
                 let (title, operator) = (&surface.title, setting.operator(variant)?);
                 let case =
-                    willmore_flow(title, initial.clone(), operator, setting.scales, self.time);
+                    Case::willmore(title, initial.clone(), operator, setting.scales, self.time);
                 all.push(surface.flow(case, &mut session)?);
             }
         }

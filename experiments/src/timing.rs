@@ -1,8 +1,7 @@
 //! Wall times, work and memory. Contenders take turns, so that whatever else the machine does burdens them alike.
 
-use crate::networks::{Chosen, convergence_network};
 use crate::prelude::*;
-use crate::{study, surfaces, truth};
+use crate::{surfaces, truth};
 
 /// Round after round, everyone who goes on has a turn.
 pub fn take_turns<C>(

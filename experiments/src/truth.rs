@@ -1,6 +1,6 @@
 //! Runs against the exact flow of their curves, and of their surfaces of revolution.
 
-use engine::{Storage, estimated_time_error};
+use engine::estimated_time_error;
 use geometry::contour::zero_level;
 use geometry::distance_from_phase_field;
 use reference::revolution::{self, Surface};
@@ -233,7 +233,7 @@ pub fn flow<const D: usize>(
     if grid.len() > MOST_STORED {
         operator.storage = Storage::Auto;
     }
-    let mut case = willmore_flow(shape, initial, operator, scales, (steps, 1));
+    let mut case = Case::willmore(shape, initial, operator, scales, (steps, 1));
     case.stops = vec![Stop::Time(end)];
     case.measures = Measure::crossings(0.0);
     session.trajectory(name, case, name, &Samples::every(1))
@@ -320,6 +320,12 @@ pub fn until<const D: usize>(run: &Trajectory<D>, time: f64) -> &[Record] {
     &run.records[..=run.records.partition_point(earlier)]
 }
 
+/// The last of them.
+pub fn at<const D: usize>(run: &Trajectory<D>, time: f64) -> &Record {
+    let so_far = until(run, time);
+    &so_far[so_far.len() - 1]
+}
+
 /// What a run has reached at a time at which one of its steps ends.
 pub struct Reached {
     pub mark: usize,
@@ -346,7 +352,7 @@ impl Reached {
         exact: &Truth,
     ) -> Result<Self, Error> {
         let so_far = until(run, exact.time());
-        let last = &so_far[so_far.len() - 1];
+        let last = at(run, exact.time());
         let (field, eps) = (run.field(last.step)?, run.case.scales.eps);
         let zero_set = ZeroSet::of(&field, eps)?;
         let points = (sample.level)(&field, eps)?;
@@ -361,7 +367,7 @@ impl Reached {
             sizes: exact.sizes.keys().map(|&name| (name, size(name))).collect(),
             distance: exact.outline.largest_distance_of(&points),
             points,
-            hvp: so_far.iter().filter_map(Record::hvp).sum(),
+            hvp: total_hvp(so_far),
             seconds: so_far.iter().map(|record| record.seconds).sum(),
             steps: so_far.len(),
             estimated: estimated_time_error(so_far).unwrap_or(0.0),

@@ -8,7 +8,7 @@ use crate::smoothing::{LAPLACIAN, TAUBIN, fairing_flow, mesh_raster, rms_distanc
 use crate::surfaces::centred_box;
 use engine::DISPLACEMENT;
 use rand::{RngExt, SeedableRng};
-use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, samples, usual_up_axis};
+use surfaces::{Fairing, samples, usual_up_axis};
 
 const TITLE: &str = "Noise of meshes taken off";
 /// Standard deviations along the normals, in percent of the longest side.
@@ -141,8 +141,8 @@ fn denoise<'a>(
     for (colour, method, factors) in [(1, "Taubin", TAUBIN), (2, "Laplacian", LAPLACIAN)] {
         let clock = Instant::now();
         let smoothed = |count| noisy.smoothed(count, factors[0], factors[1]);
-        let all = (1..=ITERATIONS).map(|count| clean.quality(&smoothed(count)));
-        let all: Vec<Quality> = all.collect();
+        let quality = |count| clean.quality(&smoothed(count));
+        let all: Vec<Quality> = (1..=ITERATIONS).map(quality).collect();
         let seconds = clock.elapsed().as_secs_f64() / ITERATIONS as f64;
         let best = (2..ITERATIONS).min_by(|&a, &b| all[a].rms.total_cmp(&all[b].rms));
         let best = best.unwrap_or(2) + 1;
@@ -156,12 +156,10 @@ fn denoise<'a>(
         curves.push(curve.with_colour(colour));
     }
     let [noisy, fair, taubin] = [0, 1, 2].map(|k: usize| rows[k].quality);
+    let (distances, normals) = (fair.rms / taubin.rms, fair.normals / least_normals[0]);
     let ratios = [
-        ("fair_over_taubin", (fair.rms / taubin.rms).into()),
-        (
-            "normals_over_taubin",
-            (fair.normals / least_normals[0]).into(),
-        ),
+        ("fair_over_taubin", distances.into()),
+        ("normals_over_taubin", normals.into()),
     ];
     session.metrics(&clean.key(noise), ratios)?;
     let level = |name, quality: Quality| {

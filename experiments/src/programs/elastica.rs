@@ -44,7 +44,7 @@ pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
         };
         let initial = equilibrium.start(grid, scales.eps, 0.0)?;
         let rule = (StepRule::ByEnergy(None), 1);
-        let case = willmore_flow("ellipse", initial, operator.clone(), scales, rule);
+        let case = Case::willmore("ellipse", initial, operator.clone(), scales, rule);
         all.push(equilibrium.relax(&mut session, case, None)?);
     }
     let panels = all.iter().map(|one| {

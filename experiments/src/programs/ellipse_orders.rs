@@ -1,6 +1,5 @@
 //! The order of convergence of Willmore flow of an ellipse in h and in tau, against its own finest run.
 
-use crate::networks::Chosen;
 use crate::orders::{chart, refinements};
 use crate::prelude::*;
 

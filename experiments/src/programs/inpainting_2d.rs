@@ -6,7 +6,6 @@ use model::{NeededNetwork, Ratios};
 use report::Rgb;
 use solver::Precision;
 
-const PROGRAM: &str = "inpainting_2d";
 /// Cells per unit length of a quick run and of the paper.
 const CELLS: [usize; 2] = [256, 1024];
 const WIDTH: usize = 17;
@@ -27,7 +26,7 @@ const GREEN: Rgb = Rgb(0, 140, 60);
 /// Steps are made in parts of adaptive size where one minimization would be too much for them. A run ends when nothing moves any more.
 /// The paper has n = 1024; eps = 4/n and tautilde = 4/n^2.
 #[derive(Parser, Debug)]
-#[command(name = PROGRAM, version)]
+#[command(name = "inpainting_2d", version)]
 pub struct Options {
     #[command(flatten)]
     common: InpaintingOptions,
@@ -86,7 +85,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let operator = networks.learned(scheme, &needed)?;
     let shapes = shapes(run.quick)?;
     let parameters = inpainting::parameters((n, &scales), &operator, &shapes);
-    let mut session = Session::open(PROGRAM, run, parameters)?;
+    let mut session = Session::open("inpainting_2d", run, parameters)?;
     let mut trajectories = Vec::new();
     for shape in &shapes {
         let case = shape.case(grid, scales, &operator)?;

@@ -5,7 +5,6 @@ use std::ffi::OsStr;
 use crate::meshes;
 use crate::prelude::*;
 use geometry::{npy, vti};
-use surfaces::{ClosedMesh, MeshDistance};
 
 /// Writes the signed distance to a closed triangle mesh, negative inside, at the nodes i/n of the unit cube. The mesh is scaled so
 /// that the longest side of its bounding box has the given length, and its bounding box is centred at (0.5, 0.5, 0.5).

@@ -5,7 +5,7 @@ use chacha20::ChaCha8Rng;
 use crate::prelude::*;
 use crate::smoothing::{LAPLACIAN, TAUBIN, fairing_flow, mesh_raster, rms_distance};
 use rand::{RngExt, SeedableRng};
-use surfaces::{ClosedMesh, MeshDistance, TriangleMesh, samples};
+use surfaces::samples;
 use volumes::{Body, Inside, Volume};
 
 const TITLE: &str = "Segmentations without their steps, and their volumes";
@@ -126,7 +126,8 @@ impl Segmented {
 
     fn treated(&self, session: &mut Session<'_>) -> Result<Vec<Row<'_>>, Error> {
         let (body, marched) = (&self.body.surface, &self.marched);
-        let (taubin, laplacian) = (self.smoothed(TAUBIN)?, self.smoothed(LAPLACIAN)?);
+        let (t, taubin) = self.smoothed(TAUBIN)?;
+        let (l, laplacian) = self.smoothed(LAPLACIAN)?;
         let (none, kept, free) = (None, Some(true), Some(false));
         // Key, words, what it starts from, iterations, and for flows whether the volume is kept.
         let all = [
@@ -135,14 +136,8 @@ impl Segmented {
             ("free", "fair, free", body, None, free),
             ("marched_fair", "marched, volume kept", marched, None, kept),
             ("marched_free", "marched, free", marched, None, free),
-            ("taubin", "Taubin", &taubin.1, Some(taubin.0), none),
-            (
-                "laplacian",
-                "Laplacian",
-                &laplacian.1,
-                Some(laplacian.0),
-                none,
-            ),
+            ("taubin", "Taubin", &taubin, Some(t), none),
+            ("laplacian", "Laplacian", &laplacian, Some(l), none),
         ];
         let row = |(key, words, start, iterations, flow): (_, _, &ClosedMesh, _, Option<bool>)| {
             session.phase(format!("{}: {words}", self.name), |stage| {
@@ -179,9 +174,8 @@ impl Segmented {
         let smoothed = |count| self.marched.mesh().smoothed(count, lambda, mu);
         let distance = |count| (count, rms_distance(&smoothed(count), &*self.shape));
         let all = (1..=ITERATIONS).map(distance);
-        let best = all
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map_or(1, |best| best.0);
+        let best = all.min_by(|a, b| a.1.total_cmp(&b.1));
+        let best = best.map_or(1, |(count, _)| count);
         Ok((best, ClosedMesh::new(smoothed(best))?.0))
     }
 }
