@@ -42,7 +42,7 @@ pub fn box_cells(flow: Flow, radius: f64, steps: usize, cells_per_unit: usize) -
 }
 
 /// That box about the centre of the circle.
-pub fn grid(flow: Flow, radius: f64, steps: usize, n: usize) -> Result<Grid<2>, Error> {
+pub fn grid(flow: Flow, radius: f64, steps: usize, n: usize) -> Result<Grid<2>> {
     let cells = box_cells(flow, radius, steps, n);
     Ok(Grid::centred(cells, cells as f64 / n as f64)?)
 }
@@ -92,7 +92,7 @@ impl Ensemble {
         (count, steps): (usize, usize),
         folder: &str,
         stage: &Stage<'_>,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let (device, folder) = (stage.device, stage.output.subfolder(folder)?);
         stage.bar.set_length(count as u64);
         let Variant { flow, n, .. } = *variant;

@@ -110,7 +110,7 @@ struct Comparison<'a> {
     second_order: Vec<(String, Vec<Reached>)>,
 }
 
-fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
+fn run(setting: &Setting, options: &Options) -> Result<()> {
     let (flow, quick, cells) = (setting.flow, options.study.run.quick, options.study.cells());
     let finest = cells.iter().copied().max().unwrap_or(0);
     let usual = if quick { finest } else { 2 * finest };
@@ -185,11 +185,11 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
 impl Setting {
     fn run(
         &self,
-        session: &mut Session<'_>,
+        session: &mut Session,
         what: &str,
         (variant, operator): (Variant, &Operator),
         (steps, ratio): (usize, usize),
-    ) -> Result<Compared, Error> {
+    ) -> Result<Compared> {
         let grid = Grid::<2>::per_unit(variant.n, self.sample.side)?;
         let initial = (self.sample.initial)(grid, EPS)?;
         let time = (STEP / ratio as f64, steps * ratio);
@@ -225,7 +225,7 @@ fn sampled(steps: usize) -> impl Iterator<Item = usize> {
 }
 
 impl Compared {
-    fn compare(&mut self, reference: &Self, steps: usize) -> Result<(), Error> {
+    fn compare(&mut self, reference: &Self, steps: usize) -> Result<()> {
         if (self.variant, self.ratio) == (reference.variant, reference.ratio) {
             return Ok(());
         }
@@ -237,7 +237,7 @@ impl Compared {
         Ok(())
     }
 
-    fn compare_with_exact(&mut self, setting: &Setting, exact: &[Truth]) -> Result<(), Error> {
+    fn compare_with_exact(&mut self, setting: &Setting, exact: &[Truth]) -> Result<()> {
         for Truth { mark, outline, .. } in exact {
             let field = self.trajectory.field(mark * self.ratio)?;
             let points = (setting.sample.level)(&field, EPS)?;
@@ -247,7 +247,7 @@ impl Compared {
         Ok(())
     }
 
-    fn loops(&self, step: usize) -> Result<Curve, Error> {
+    fn loops(&self, step: usize) -> Result<Curve> {
         let field = self.trajectory.field(step * self.ratio)?;
         Ok(look::outline(&field))
     }
@@ -284,7 +284,7 @@ impl Comparison<'_> {
         format!("Reference: implicit finite elements, n = {n}{step}{estimate}.")
     }
 
-    fn write(&self, mut session: Session<'_>) -> Result<(), Error> {
+    fn write(&self, mut session: Session) -> Result<()> {
         session.figure(self.error_figure(), "errors")?;
         session.figure(self.shape_figure()?, "shapes")?;
         session.sheet(self.sheet(), "error_table")?;
@@ -305,7 +305,7 @@ impl Comparison<'_> {
         session.finish(self.setting.title)
     }
 
-    fn data(&self, session: &Session<'_>) -> Result<(), Error> {
+    fn data(&self, session: &Session) -> Result<()> {
         let errors = self.runs.iter().flat_map(|run| {
             let errors = run.errors.iter();
             errors.map(move |(step, l2)| (run, *step, *l2))
@@ -358,7 +358,7 @@ impl Comparison<'_> {
     }
 
     /// Rows: methods at their finest resolution, and the reference; columns: times.
-    fn shape_figure(&self) -> Result<Figure, Error> {
+    fn shape_figure(&self) -> Result<Figure> {
         let mut rows: Vec<(&Compared, String)> = Vec::new();
         for shown in look::variants() {
             let own = |run: &&Compared| run.variant.look() == shown && !run.errors.is_empty();

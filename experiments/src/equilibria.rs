@@ -66,12 +66,7 @@ impl Equilibrium {
     }
 
     /// The ellipse or spheroid from which the flow starts, around a centre; for a stomatocyte the exact shape.
-    pub fn start<const D: usize>(
-        &self,
-        grid: Grid<D>,
-        eps: f64,
-        centre: f64,
-    ) -> Result<Field<D>, Error> {
+    pub fn start<const D: usize>(&self, grid: Grid<D>, eps: f64, centre: f64) -> Result<Field<D>> {
         let profile: Box<dyn SignedDistance<2>> = match self.branch {
             Some(Branch::Stomatocyte) => Box::new(Polygon(self.outline())),
             _ => Box::new(Ellipse::new(self.half_axes::<D>())?),
@@ -93,10 +88,10 @@ impl Equilibrium {
     /// Lets a flow come to rest with these sizes: [implicit steps by the energy](StepRule::ByEnergy).
     pub fn relax<const D: usize>(
         self,
-        session: &mut Session<'_>,
+        session: &mut Session,
         mut case: Case<D>,
         steps: Option<usize>,
-    ) -> Result<AtRest<D>, Error> {
+    ) -> Result<AtRest<D>> {
         let eps = case.scales.eps;
         let start = ZeroSet::of(&case.initial, eps)?;
         let [perimeter, volume] = self.sizes::<D>();

@@ -37,12 +37,7 @@ pub struct Shape<const D: usize> {
 }
 
 impl<const D: usize> Shape<D> {
-    pub fn case(
-        &self,
-        grid: Grid<D>,
-        scales: Scales,
-        operator: &Operator,
-    ) -> Result<Case<D>, Error> {
+    pub fn case(&self, grid: Grid<D>, scales: Scales, operator: &Operator) -> Result<Case<D>> {
         let [low, high] = self.region;
         let moves = |node| grid.node(node).iter().all(|x| low < *x && *x < high);
         let title = format!("inpainted {}", self.title);
@@ -93,7 +88,7 @@ pub struct Inpainted<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Inpainted<'a, D> {
-    pub fn measure(shape: &'a Shape<D>, trajectory: &'a Trajectory<D>) -> Result<Self, Error> {
+    pub fn measure(shape: &'a Shape<D>, trajectory: &'a Trajectory<D>) -> Result<Self> {
         let (case, steps) = (&trajectory.case, trajectory.steps());
         let goal = match &shape.whole {
             Some(whole) => phase_field(*case.grid(), whole, case.scales.eps)?,
@@ -130,7 +125,7 @@ impl<'a, const D: usize> Inpainted<'a, D> {
         stands_still.then_some((last.time - last.tau) / self.tau())
     }
 
-    pub fn write_frames(&self, session: &Session<'_>, figure: Figure) -> Result<(), Error> {
+    pub fn write_frames(&self, session: &Session, figure: Figure) -> Result<()> {
         let title = format!("Inpainting: {}", self.shape.title);
         let name = format!("{}_frames", self.shape.key);
         session.figure(Figure { title, ..figure }, &name)
@@ -139,10 +134,10 @@ impl<'a, const D: usize> Inpainted<'a, D> {
 
 /// Writes the energies, the records of all steps, the table of distances and the metrics, and ends the program.
 pub fn finish<const D: usize>(
-    mut session: Session<'_>,
+    mut session: Session,
     title: &str,
     all: &[Inpainted<'_, D>],
-) -> Result<(), Error> {
+) -> Result<()> {
     let energies = all.iter().map(|one| {
         let point = |r: &Record| Some([r.time, r.willmore_energy()?]);
         let points: Vec<_> = one.trajectory.records.iter().filter_map(point).collect();

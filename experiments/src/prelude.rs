@@ -30,9 +30,11 @@ pub use serde_json::{Value, json};
 pub use solver::{NewtonParams, StepRecord};
 pub use surfaces::{ClosedMesh, MeshDistance, TriangleMesh};
 
-pub use crate::flows::{ACCURATE, ELEMENTS, PAPERS, operator, planar_flow};
-pub use crate::networks::{Chosen, EPS, NetworkOptions, STEP, convergence_network, time};
+pub use crate::networks::{
+    ACCURATE, Chosen, ELEMENTS, EPS, NetworkOptions, PAPERS, STEP, convergence_network, operator,
+    planar_flow, time,
+};
 pub use crate::options::{FigureOptions, RunOptions};
 pub use crate::session::{Session, Stage};
 pub use crate::study::{self, Study, StudyOptions, Variant};
-pub use crate::{Error, harness, look, quality, require, steps, timing};
+pub use crate::{Error, Result, harness, look, quality, require, steps, timing};

@@ -35,7 +35,7 @@ struct ByHand {
 }
 
 impl ByHand {
-    fn new(network: &Network, shape: &[usize], u: &[f64]) -> Result<Self, Error> {
+    fn new(network: &Network, shape: &[usize], u: &[f64]) -> Result<Self> {
         let plan = Transform::of_shape(shape);
         let symbol = kernel_symbol(shape, network.kernel(), network.ratios().width);
         let table = network.activation().table()?;
@@ -83,7 +83,7 @@ pub fn measure<const D: usize>(
     u: &Field<D>,
     device: &ComputeDevice,
     seconds: f64,
-) -> Result<Numbers, Error> {
+) -> Result<Numbers> {
     const LEAST: usize = 11;
     let grid = *u.grid();
     let direction = |(i, u): (usize, &f64)| (1.0 - u.powi(2)) + 0.1 * (0.37 * i as f64).sin();
@@ -91,7 +91,7 @@ pub fn measure<const D: usize>(
     let tensor = |x: &[f64]| -> Tensor<D> { device.tensor(x, grid.shape()) };
     let previous: Vec<f64> = u.values().iter().map(|u| 0.99 * u).collect();
     let operator = Arc::new(MeanCurvatureOperator::<D>::new(network, device)?);
-    let energy = |precision| -> Result<_, Error> {
+    let energy = |precision| -> Result<_> {
         let (operator, shape) = (operator.clone(), grid.shape());
         let mut energy =
             MinimizingMovement::with_terms(operator, shape, precision, (false, None), device)?;

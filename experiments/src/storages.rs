@@ -61,22 +61,17 @@ const COLUMNS: [(&str, Format, &str); 7] = [
 
 impl StorageOptions {
     /// Refuses resolutions that cannot be measured.
-    pub fn check(&self) -> Result<(), Error> {
+    pub fn check(&self) -> Result<()> {
         let possible = |n: &usize| *n >= 16 && n.is_multiple_of(8);
         let mut cells = self.surface_cells.iter().chain(&self.curve_cells);
-        require(
-            cells.all(possible),
-            "--surface-cells and --curve-cells must be multiples of 8, from 16 on, as bricks are",
-        )
+        let message =
+            "--surface-cells and --curve-cells must be multiples of 8, from 16 on, as bricks are";
+        require(cells.all(possible), message)
     }
 
     /// Lets the cross flow on bricks, and then the armadillo on both storages at every resolution; the built-in figure in a quick run, or if it
     /// is not here.
-    pub fn measure(
-        &self,
-        networks: &NetworkOptions,
-        session: &mut Session<'_>,
-    ) -> Result<Vec<Stored>, Error> {
+    pub fn measure(&self, networks: &NetworkOptions, session: &mut Session) -> Result<Vec<Stored>> {
         let networks = networks.load(&[needed_network()])?;
         let mut dense_or_bricks = networks.learned(Scheme::Accurate, &needed_network())?;
         let quick = session.options.quick;
@@ -134,8 +129,8 @@ impl Stored {
         shape: &'static str,
         n: usize,
         mut case: Case<D>,
-        session: &mut Session<'_>,
-    ) -> Result<Self, Error> {
+        session: &mut Session,
+    ) -> Result<Self> {
         case.measures.clear();
         let (storage, nodes) = (case.operator.storage, case.grid().len() as f64);
         let mut run = Run::new(case, &session.device)?;
@@ -165,7 +160,7 @@ impl Stored {
 }
 
 /// Writes the table, the metrics and the figure of the two storages.
-pub fn write(stored: &[Stored], session: &mut Session<'_>) -> Result<(), Error> {
+pub fn write(stored: &[Stored], session: &mut Session) -> Result<()> {
     let sheet = Sheet::of(stored)
         .keyed(|row, name| format!("{row}.{name}"))
         .text("shape", |row| row.shape)

@@ -44,14 +44,14 @@ impl NetworkSpec {
     pub const CONVERGENCE: &'static [Self] = Self::PAPER.split_at(3).0;
     pub const SURFACES: Self = Self::PAPER[4];
 
-    pub fn data(&self, quick: bool) -> Result<SphereData, Error> {
+    pub fn data(&self, quick: bool) -> Result<SphereData> {
         let data = SphereData::new(self.ratios, self.cells)?;
         Ok(if quick { data.quick() } else { data })
     }
 }
 
 /// Training needs double precision: the given device if it has that, else a CPU.
-pub fn training_device(device: &ComputeDevice) -> Result<ComputeDevice, Error> {
+pub fn training_device(device: &ComputeDevice) -> Result<ComputeDevice> {
     if device.kind().is_cpu() {
         return Ok(device.clone());
     }
@@ -70,7 +70,7 @@ pub fn train<R: Recipe>(
     (spec, recipe): (&NetworkSpec, &R),
     file: &Path,
     stage: &Stage<'_>,
-) -> Result<Trained, Error> {
+) -> Result<Trained> {
     let training = Training {
         recipe,
         data: spec.data(stage.options.quick)?,

@@ -45,7 +45,7 @@ pub struct Options {
     install: Option<PathBuf>,
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let run = &options.run;
     let mut networks: Vec<(String, Network)> = Vec::new();
     for path in &options.network {
@@ -140,7 +140,7 @@ fn relaxed<const D: usize>(
     initial: &Field<D>,
     scales: Scales,
     device: &ComputeDevice,
-) -> Result<(f64, Field<D>), Error> {
+) -> Result<(f64, Field<D>)> {
     let mut operator = Operator::learned(Scheme::Paper, named.clone())?;
     operator.factors = factors;
     let time = (StepRule::Constant(STEP_RATIO * scales.mcf_step), 1);
@@ -167,7 +167,7 @@ struct DiscRow {
 }
 
 /// Discs of either phase by every network with the scales of the convergence tests up to `n = 256`, and by its odd part.
-fn discs(all: &[NamedNetwork], stage: &Stage<'_>) -> Result<Vec<DiscRow>, Error> {
+fn discs(all: &[NamedNetwork], stage: &Stage<'_>) -> Result<Vec<DiscRow>> {
     let radii = stage.options.either(&QUICK_RADII[..], &RADII);
     let mut variants = Vec::new();
     for one in all {
@@ -200,7 +200,7 @@ fn discs(all: &[NamedNetwork], stage: &Stage<'_>) -> Result<Vec<DiscRow>, Error>
         let disc = phase_field(grid, &Ball::new([0.0, 0.0], radius)?, EPS)?;
         let disc = disc.map(|u| sign * u);
         // Over that of the zero level set of the relaxed disc, `pi / R`.
-        let energy = |factors| -> Result<f64, Error> {
+        let energy = |factors| -> Result<f64> {
             let (energy, field) = relaxed((one, factors), &disc, scales(), stage.device)?;
             let inside = zero_set_volume(&field);
             let outside = grid.side().powi(2) - inside;
@@ -260,7 +260,7 @@ struct SurfaceRow {
     calibrated: f64,
 }
 
-fn balls_and_tori(all: &[NamedNetwork], stage: &Stage<'_>) -> Result<Vec<SurfaceRow>, Error> {
+fn balls_and_tori(all: &[NamedNetwork], stage: &Stage<'_>) -> Result<Vec<SurfaceRow>> {
     let grid = Grid::<3>::per_unit(SURFACE_CELLS, SURFACE_SIDE)?;
     let scales = surfaces::scales(SURFACE_CELLS);
     let mut shapes: Vec<(String, Field<3>, f64)> = Vec::new();
@@ -280,7 +280,7 @@ fn balls_and_tori(all: &[NamedNetwork], stage: &Stage<'_>) -> Result<Vec<Surface
     for one in all.iter().filter(is_solid) {
         let (odd, factors) = (odd_part(one), one.network.calibration()?.factors);
         for (surface, initial, exact) in &shapes {
-            let energy = |factors| -> Result<f64, Error> {
+            let energy = |factors| -> Result<f64> {
                 Ok(relaxed((&odd, factors), initial, scales, stage.device)?.0 / exact)
             };
             rows.push(SurfaceRow {
@@ -305,7 +305,7 @@ struct Diagnostics {
     bend: Vec<[f64; 2]>,
 }
 
-fn diagnostics(all: &[NamedNetwork], stage: &Stage<'_>) -> Result<Vec<Diagnostics>, Error> {
+fn diagnostics(all: &[NamedNetwork], stage: &Stage<'_>) -> Result<Vec<Diagnostics>> {
     let count: usize = if stage.options.quick { 3 } else { 12 };
     // Kernels of width 65 have a thousand planes; surfaces have millions of nodes.
     let small = all.iter().filter(|one| {
@@ -365,7 +365,7 @@ fn diagnostics_figure(all: &[Diagnostics]) -> Figure {
         .with_shared_legend()
 }
 
-fn elements() -> Result<Vec<(String, Calibration)>, Error> {
+fn elements() -> Result<Vec<(String, Calibration)>> {
     let (plane, space) = (Grid::<2>::centred(16, 16.0)?, Grid::<3>::centred(8, 8.0)?);
     let name = |kind, [eps, step]: [f64; 2]| format!("FE {kind}, eps = {eps} h, step = {step} h²");
     let mut all = Vec::new();

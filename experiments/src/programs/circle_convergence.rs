@@ -38,7 +38,7 @@ impl Options {
     }
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let run = &options.study.run;
     let (all, steps) = run.either((4, 8), (circles::COUNT, circles::STEPS));
     let count = options.circles.unwrap_or(all);
@@ -103,7 +103,7 @@ impl Report {
         })
     }
 
-    fn figures(&self, session: &Session<'_>) -> Result<(), Error> {
+    fn figures(&self, session: &Session) -> Result<()> {
         let (steps, end) = (self.steps, time(self.steps));
         let mut over_time = self.flows("time t", "mean L² error", |e| {
             let points = (0..=steps).map(|k| [time(k), e.mean_error(k)]);
@@ -189,7 +189,7 @@ impl Report {
             ))
     }
 
-    fn data(&self, session: &Session<'_>) -> Result<(), Error> {
+    fn data(&self, session: &Session) -> Result<()> {
         let times = (self.ensembles.iter()).flat_map(|e| (0..=self.steps).map(move |k| (e, k)));
         let times: Vec<(&Ensemble, usize)> = times.collect();
         let curves = Sheet::of(&times).data("flow", |(e, _)| e.variant.flow.to_string());

@@ -66,7 +66,7 @@ struct Quality {
     volume: f64,
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let quick = options.run.quick;
     let noises = if quick { &NOISES[..1] } else { &NOISES };
     let cells = if quick { 64 } else { CELLS };
@@ -114,11 +114,11 @@ pub fn program(options: &Options) -> Result<(), Error> {
 
 /// A mesh with noise, and what `fair`, Taubin's and Laplacian smoothing make of it, and the distances over the number of iterations.
 fn denoise<'a>(
-    session: &mut Session<'_>,
+    session: &mut Session,
     clean: &'a Clean,
     noise: f64,
     cells: usize,
-) -> Result<(Vec<Row<'a>>, LineChart), Error> {
+) -> Result<(Vec<Row<'a>>, LineChart)> {
     let noisy = clean.with_noise(noise, session.options.seed);
     let row = |method, iterations, result: TriangleMesh, seconds| Row {
         clean,
@@ -174,7 +174,7 @@ fn denoise<'a>(
 }
 
 /// The built-in shapes, and the meshes that are chosen or here.
-fn clean_meshes(options: &Options) -> Result<Vec<Clean>, Error> {
+fn clean_meshes(options: &Options) -> Result<Vec<Clean>> {
     let mut meshes = vec![
         Clean::new("figure", samples::figure(96)?, UpAxis::Y),
         Clean::new("lever", samples::lever(96)?, UpAxis::Z),
@@ -240,11 +240,11 @@ impl Clean {
 
 /// The noise taken off as `willmore fair` does at its defaults.
 fn fair(
-    session: &mut Session<'_>,
+    session: &mut Session,
     noisy: &TriangleMesh,
     cells: usize,
     title: &str,
-) -> Result<TriangleMesh, Error> {
+) -> Result<TriangleMesh> {
     let (closed, _) = ClosedMesh::new(noisy.clone())?;
     let fairing = Fairing::new(closed, noisy.noise(), |_| false);
     let grid = centred_box(cells, 1.0)?;

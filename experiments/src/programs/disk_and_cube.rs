@@ -49,7 +49,7 @@ impl Options {
     }
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let [radius, half_height] = THICK_DISK;
     let run = &options.figure.run;
     let steps = (options.steps).unwrap_or(if run.quick { 2 } else { STEPS });
@@ -107,11 +107,11 @@ struct Compared {
 /// Lets a surface flow in controlled steps of second order, and compares it and its extrapolation in `eps` with the exact flow after
 /// 1, 2, 4, ... 64 and all steps of the paper.
 fn compare_with_exact(
-    session: &mut Session<'_>,
+    session: &mut Session,
     sample: &Sample<3>,
     n: usize,
     (tau, steps): (f64, usize),
-) -> Result<Vec<Compared>, Error> {
+) -> Result<Vec<Compared>> {
     let powers = (0..=HALVINGS).map(|k| 1_usize << k).filter(|k| *k < steps);
     let marks = powers.chain([steps]).map(|k| (k, k as f64 * tau));
     let marks: Vec<(usize, f64)> = marks.collect();
@@ -153,10 +153,7 @@ fn sheet(rows: &[Compared], n: usize) -> Sheet<'_, Compared> {
 }
 
 /// Adds the L2 distances of the learned operators to the finite elements, where both ran, to captions and metrics.
-fn compare_with_finite_elements(
-    session: &mut Session<'_>,
-    all: &mut [Flowed],
-) -> Result<(), Error> {
+fn compare_with_finite_elements(session: &mut Session, all: &mut [Flowed]) -> Result<()> {
     let method = |one: &Flowed| one.trajectory.case.operator.method;
     let (elements, mut others): (Vec<_>, Vec<_>) =
         (all.iter_mut()).partition(|one| method(one) == Method::FeImplicit);

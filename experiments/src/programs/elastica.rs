@@ -21,7 +21,7 @@ pub struct Options {
     run: RunOptions,
 }
 
-pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
+pub fn program(Options { run: options }: &Options) -> Result<()> {
     let count = if options.quick { 1 } else { QUOTIENTS.len() };
     let parameters = json!({ "n": CELLS, "eps_over_h": 2, "quotients": QUOTIENTS[..count], "radius": RADIUS, "side": SIDE });
     let mut session = Session::open("elastica", options, parameters)?;

@@ -22,7 +22,7 @@ pub struct Options {
     run: RunOptions,
 }
 
-pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
+pub fn program(Options { run: options }: &Options) -> Result<()> {
     let (used, steps) = if options.quick { (3, 2) } else { (4, STEPS) };
     let parameters =
         json!({ "half_axes": HALF_AXES, "side": SIDE, "steps": steps, "tolerance": TOLERANCE });

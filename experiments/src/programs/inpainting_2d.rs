@@ -37,7 +37,7 @@ pub struct Options {
     printed_tautilde: bool,
 }
 
-fn shapes(quick: bool) -> Result<[Shape<2>; 2], Error> {
+fn shapes(quick: bool) -> Result<[Shape<2>; 2]> {
     let disk = Ball::new([0.0; 2], RADIUS)?;
     let corner = Cuboid::new([0.5 * (0.5 - CORNER); 2])?.translated([0.5 * (CORNER + 0.5); 2]);
     let steps = |papers: usize| if quick { 5 } else { papers };
@@ -68,7 +68,7 @@ fn shapes(quick: bool) -> Result<[Shape<2>; 2], Error> {
     Ok([disk, cross])
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let run = &options.common.figure.run;
     let n = options.common.figure.cells(CELLS);
     let grid = Grid::<2>::per_unit(n, 1.0)?.with_origin([-0.5; 2])?;
@@ -94,7 +94,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
     }
     let inpainted = shapes.iter().zip(&trajectories);
     let inpainted = inpainted.map(|(shape, trajectory)| Inpainted::measure(shape, trajectory));
-    let inpainted = inpainted.collect::<Result<Vec<_>, Error>>()?;
+    let inpainted = inpainted.collect::<Result<Vec<_>>>()?;
     for one in &inpainted {
         one.write_frames(&session, frames(one, n)?)?;
     }
@@ -102,7 +102,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
 }
 
 /// The shapes over time, D outlined in green.
-fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure, Error> {
+fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure> {
     let (trajectory, tau) = (one.trajectory, one.tau());
     let mut shown = vec![("step 0".to_owned(), trajectory.case.initial.clone())];
     for &k in INSIDE {

@@ -38,7 +38,7 @@ pub struct Options {
 }
 
 /// The shapes with the azimuths from which they are looked at. The last step shown is one on the way to the end.
-fn shapes(extra_steps: usize) -> Result<[(Shape<3>, f64); 2], Error> {
+fn shapes(extra_steps: usize) -> Result<[(Shape<3>, f64); 2]> {
     let ball = Ball::new([0.0; 3], RADIUS)?;
     let half = 0.5 * (0.5 - CORNER);
     let corner = Cuboid::new([half; 3])?.translated([CORNER + half; 3]);
@@ -82,7 +82,7 @@ fn growing(papers: usize) -> StepRule {
     }
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let run = &options.common.figure.run;
     let extra_steps = options.extra_steps;
     let message = format!(
@@ -131,10 +131,8 @@ fn decorate(snapshots: &mut [Snapshot], measured: &Inpainted<'_, 3>) {
         let distance = distance.filter(|_| measured.shape.whole.is_some());
         let distance = distance.map(|(_, l2)| format!("\nL² distance to the ball {l2:.4}"));
         let [time, distance] = [time, distance].map(Option::unwrap_or_default);
-        snapshot.caption = format!(
-            "step {step}{time}: w = {:.2}{distance}",
-            snapshot.measures["w"]
-        );
+        let w = snapshot.measures["w"];
+        snapshot.caption = format!("step {step}{time}: w = {w:.2}{distance}");
         let edges = Tube::edges_of_box([low; 3], [high; 3], EDGE).into_iter();
         snapshot.tubes = edges.map(|edge| edge.with_colour(GREEN)).collect();
     }

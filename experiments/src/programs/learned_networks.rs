@@ -19,7 +19,7 @@ pub struct Options {
     networks: NetworkOptions,
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let run = &options.run;
     let specs = &NetworkSpec::CONVERGENCE[..run.either(1, 3)];
     let needs: Vec<_> = (specs.iter().map(|spec| NeededNetwork::exactly(spec.ratios))).collect();
@@ -91,7 +91,7 @@ struct Entry {
     density: f64,
 }
 
-fn entries(spec: NetworkSpec, network: &Network) -> Result<Vec<Entry>, Error> {
+fn entries(spec: NetworkSpec, network: &Network) -> Result<Vec<Entry>> {
     let (width, eps_over_h) = (spec.ratios.width, spec.ratios.eps_over_h);
     let (middle, heat) = ((width / 2).cast_signed(), heat_kernel(&spec.data(false)?));
     let entry = |(i, (&kernel, &heat_kernel)): (usize, (&f64, &f64))| {

@@ -32,14 +32,12 @@ pub struct Options {
     quiet: bool,
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let (path, output) = (options.mesh.display(), options.output.display());
     let extension = options.output.extension().map(OsStr::to_ascii_lowercase);
     let volume = extension.as_ref().is_some_and(|name| name == "vti");
-    require(
-        volume || extension.is_some_and(|name| name == "npy"),
-        format!("--output {output} must end in .npy or .vti"),
-    )?;
+    let known = volume || extension.is_some_and(|name| name == "npy");
+    require(known, format!("--output {output} must end in .npy or .vti"))?;
     let (mesh, warnings) = ClosedMesh::new(surfaces::read(&options.mesh)?)?;
     for warning in &warnings {
         eprintln!("warning: {path}: {warning}");

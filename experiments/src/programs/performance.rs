@@ -77,7 +77,7 @@ const PRODUCTS: [(&str, Format, &str); 7] = [
     ("energy and gradient [ms]", Fixed(2), "evaluate_ms"),
 ];
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let (run, quick) = (&options.run, options.run.quick);
     let possible = options.turns.is_finite() && options.turns > 0.0;
     require(possible, "--turns must be positive")?;
@@ -127,7 +127,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
 }
 
 /// A cube of side 1/2, or a body with arms: a ball with three capsules through it.
-fn solid_shape(name: &str, n: usize) -> Result<Field<3>, Error> {
+fn solid_shape(name: &str, n: usize) -> Result<Field<3>> {
     let (grid, eps) = (Grid::<3>::per_unit(n, 1.0)?, surfaces::scales(n).eps);
     if name == "cube" {
         return Ok(phase_field(grid, &Cuboid::new([0.25, 0.25, 0.25])?, eps)?);
@@ -141,11 +141,8 @@ fn solid_shape(name: &str, n: usize) -> Result<Field<3>, Error> {
 }
 
 /// Distance of the end of some steps to that with a smaller tolerance, over the way from the start.
-fn distance_to_tighter<const D: usize>(
-    case: &Case<D>,
-    device: &ComputeDevice,
-) -> Result<f64, Error> {
-    let end = |case: Case<D>| -> Result<Field<D>, Error> {
+fn distance_to_tighter<const D: usize>(case: &Case<D>, device: &ComputeDevice) -> Result<f64> {
+    let end = |case: Case<D>| -> Result<Field<D>> {
         let mut run = Run::new(case, device)?;
         while run.steps() < COMPARED_STEPS && run.step()?.is_some() {}
         Ok(run.field().clone())
@@ -163,9 +160,9 @@ impl Measurement {
     fn of<const D: usize>(
         case_name: &'static str,
         case: &Case<D>,
-        session: &mut Session<'_>,
+        session: &mut Session,
         turns: f64,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let grid = *case.grid();
         let n = grid.spacing().recip().round();
         let name = format!("{case_name}, n = {n}");
@@ -196,11 +193,9 @@ impl Measurement {
         })?;
         let mut steps = timing::numbers(&run);
         let floor = products.get("floor_single_ms").copied();
+        let over_floor = floor.map(|ms| steps["ms_per_product"] / ms);
         let others = [
-            (
-                "product_over_floor",
-                floor.map(|ms| steps["ms_per_product"] / ms),
-            ),
+            ("product_over_floor", over_floor),
             ("pages_per_product", pages),
             ("peak_mib", peak_mib),
             ("distance_to_tighter", distance),

@@ -42,12 +42,12 @@ pub struct Options {
     flow: MeshFlowOptions,
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     ROCKER_ARM_FLOW.run(&options.flow, clifford_tori)
 }
 
 /// Finds the Clifford torus nearest to the last shape of each run, and draws it there.
-fn clifford_tori(session: &mut Session<'_>, all: &mut [Flowed]) -> Result<String, Error> {
+fn clifford_tori(session: &mut Session, all: &mut [Flowed]) -> Result<String> {
     let mut tori = BTreeMap::new();
     for one in all {
         let case = &one.trajectory.case;

@@ -65,7 +65,7 @@ fn variants() -> impl Iterator<Item = (Method, Scheme)> {
     look::variants().filter(|(method, scheme)| method.schemes(Flow::MeanCurvature).contains(scheme))
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let run = &options.figure.run;
     let radii = if run.quick { &RADII[2..4] } else { &RADII };
     let willmore_steps = if run.quick { 2 } else { WILLMORE_STEPS };
@@ -103,11 +103,11 @@ fn measure(
     stage: &Stage<'_>,
     radius: f64,
     willmore_steps: usize,
-) -> Result<Measurement, Error> {
+) -> Result<Measurement> {
     let (grid, scales) = (setting.grid, setting.scales);
     let ball = move |grid, radius| phase_field(grid, &Ball::new([0.5; 3], radius)?, scales.eps);
     let shape = format!("sphere of radius {radius}");
-    let case = |variant, tau, steps| -> Result<Case<3>, Error> {
+    let case = |variant, tau, steps| -> Result<Case<3>> {
         let (initial, operator) = (ball(grid, radius)?, setting.operator(variant)?);
         let time = (StepRule::Constant(tau), steps);
         Ok(Case::willmore(&shape, initial, operator, scales, time))

@@ -106,7 +106,7 @@ const COLUMNS: [(&str, Format, &str); 4] = [
     ("Cholesky/step", Fixed(1), "factorizations_per_step"),
 ];
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let (run, quick) = (&options.run, options.run.quick);
     let possible = options.budget.is_finite() && options.budget > 0.0;
     require(possible, "--budget must be positive")?;
@@ -119,7 +119,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
     };
     let checksums = cells.iter().map(checksum);
     let parameters = json!({
-        "networks": checksums.collect::<Result<serde_json::Map<_, _>, Error>>()?,
+        "networks": checksums.collect::<Result<serde_json::Map<_, _>>>()?,
         "cells": cells, "budget": budget, "steps": STEPS,
     });
     let mut session = Session::open("timing_tables", run, parameters)?;
@@ -185,12 +185,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
     session.finish("128 Willmore steps of the cross: wall time on this machine")
 }
 
-fn measure(
-    session: &mut Session<'_>,
-    networks: &Chosen,
-    n: usize,
-    budget: f64,
-) -> Result<Vec<Timing>, Error> {
+fn measure(session: &mut Session, networks: &Chosen, n: usize, budget: f64) -> Result<Vec<Timing>> {
     let mut contenders = Vec::new();
     for row in &VARIANTS {
         let mut operator = networks.operator((row.method, Scheme::Paper), n)?;

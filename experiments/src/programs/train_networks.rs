@@ -54,7 +54,7 @@ impl Recipe {
     }
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let run = &options.run;
     let chosen = options.chosen()?;
     require(options.adam_epochs > 0, "--adam-epochs must be at least 1")?;
@@ -121,7 +121,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
 }
 
 impl Options {
-    fn chosen(&self) -> Result<Vec<NetworkSpec>, Error> {
+    fn chosen(&self) -> Result<Vec<NetworkSpec>> {
         let mut specs = match self.recipe {
             Recipe::Accurate => NetworkSpec::ACCURATE,
             Recipe::Lm | Recipe::Adam | Recipe::Both => NetworkSpec::PAPER,
@@ -141,8 +141,8 @@ impl Options {
 }
 
 /// Trainings one after the other. Those of the chosen networks are kept and saved at once.
-struct Trainings<'a> {
-    session: Session<'a>,
+struct Trainings {
+    session: Session,
     /// Where interrupted trainings are kept until all are finished.
     checkpoints: OutputDir,
     folder: OutputDir,
@@ -156,13 +156,13 @@ struct Finished {
     trained: Trained,
 }
 
-impl Trainings<'_> {
+impl Trainings {
     fn train<R: training::Recipe>(
         &mut self,
         recipe: Recipe,
         spec: &NetworkSpec,
         params: &R,
-    ) -> Result<Network, Error> {
+    ) -> Result<Network> {
         let (key, label, _, prefix) = recipe.look();
         let name = format!("{}-{key}", spec.name);
         let file = self.checkpoints.path(&format!("{name}.json"))?;
@@ -183,7 +183,7 @@ impl Trainings<'_> {
 
     /// The paper's progressive training up to the finest of the chosen networks: each starts from the refined kernel
     /// and the activation of the one before. The others have no coarser one and are trained `alone`, from a random start.
-    fn progressively(&mut self, first: &AdamParams, alone: bool) -> Result<(), Error> {
+    fn progressively(&mut self, first: &AdamParams, alone: bool) -> Result<()> {
         let mut stages = NetworkSpec::CONVERGENCE.to_vec();
         let others = self.chosen.iter().filter(|spec| !stages.contains(spec));
         let others: Vec<_> = others.filter(|_| alone).copied().collect();

@@ -55,7 +55,7 @@ struct Row<'a> {
     surface: TriangleMesh,
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let full = usize::from(!options.run.quick);
     let parameters = json!({ "bodies": BODIES, "wrong": WRONG, "time": TIME, "taubin": TAUBIN, "laplacian": LAPLACIAN, "iterations": ITERATIONS });
     let mut session = Session::open("unshrinking", &options.run, parameters)?;
@@ -90,7 +90,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
 }
 
 impl Segmented {
-    fn new(name: &'static str, voxels: f64, seed: u64) -> Result<Self, Error> {
+    fn new(name: &'static str, voxels: f64, seed: u64) -> Result<Self> {
         let centre = [0.5 * voxels + MARGIN + 0.2; 3];
         let (shape, wrong, up): (Box<dyn SignedDistance<3>>, _, _) = if name == "ball" {
             (Box::new(Ball::new(centre, 0.5 * voxels)?), WRONG, UpAxis::Z)
@@ -124,7 +124,7 @@ impl Segmented {
         })
     }
 
-    fn treated(&self, session: &mut Session<'_>) -> Result<Vec<Row<'_>>, Error> {
+    fn treated(&self, session: &mut Session) -> Result<Vec<Row<'_>>> {
         let (body, marched) = (&self.body.surface, &self.marched);
         let (t, taubin) = self.smoothed(TAUBIN)?;
         let (l, laplacian) = self.smoothed(LAPLACIAN)?;
@@ -170,7 +170,7 @@ impl Segmented {
     }
 
     /// The surface after the number of iterations that brings it nearest to the shape.
-    fn smoothed(&self, [lambda, mu]: [f64; 2]) -> Result<(usize, ClosedMesh), Error> {
+    fn smoothed(&self, [lambda, mu]: [f64; 2]) -> Result<(usize, ClosedMesh)> {
         let smoothed = |count| self.marched.mesh().smoothed(count, lambda, mu);
         let distance = |count| (count, rms_distance(&smoothed(count), &*self.shape));
         let all = (1..=ITERATIONS).map(distance);
@@ -198,7 +198,7 @@ impl Row<'_> {
         all.fold(0.0, f64::max)
     }
 
-    fn picture(&self) -> Result<Raster, Error> {
+    fn picture(&self) -> Result<Raster> {
         let frame = (self.of.up, self.of.marched.bounding_box());
         let caption = format!("{}\nvolume {:+.2} %", self.treatment.1, self.change());
         mesh_raster(&self.surface, frame, caption)

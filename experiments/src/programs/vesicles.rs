@@ -60,7 +60,7 @@ pub struct Options {
     branches: Vec<String>,
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let run = &options.figure.run;
     let (count, steps) = run.either((1, Some(2)), (usize::MAX, None));
     let wanted = |family: &&Family| options.branches.iter().any(|name| name == family.name);
@@ -134,7 +134,7 @@ fn crossing(all: &[AtRest<3>], energy: impl Fn(&AtRest<3>) -> f64) -> Option<f64
 }
 
 /// Exact branches as lines, the flow's shapes as marks.
-fn diagram(session: &mut Session<'_>, all: &[AtRest<3>]) -> Result<Figure, Error> {
+fn diagram(session: &mut Session, all: &[AtRest<3>]) -> Result<Figure> {
     use Branch::{Oblate, Prolate, Stomatocyte};
     let branches = [
         (Prolate, "prolate", 0.99, 0.5, Marker::Circle),
@@ -166,7 +166,7 @@ fn diagram(session: &mut Session<'_>, all: &[AtRest<3>]) -> Result<Figure, Error
 }
 
 /// A picture of every shape, and below it its section through the axis over the exact profile.
-fn shapes(all: &[AtRest<3>], options: &RunOptions) -> Result<Figure, Error> {
+fn shapes(all: &[AtRest<3>], options: &RunOptions) -> Result<Figure> {
     let (mut pictures, mut sections) = (Vec::new(), Vec::new());
     for one in all {
         let scene = Scene::new(&one.field, one.trajectory.case.scales.eps)?.view(VIEW);
@@ -186,7 +186,7 @@ fn shapes(all: &[AtRest<3>], options: &RunOptions) -> Result<Figure, Error> {
 }
 
 /// The plane through the axis, moved to the origin.
-fn section(field: &Field<3>) -> Result<Field<2>, Error> {
+fn section(field: &Field<3>) -> Result<Field<2>> {
     let grid = field.grid();
     let (cells, plane) = (grid.cells(), Grid::<2>::centred(grid.cells(), grid.side())?);
     let values = (0..plane.len()).map(|node| {

@@ -94,7 +94,7 @@ struct Compared<'a> {
     reached: Reached,
 }
 
-pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
+pub fn program(Options { run: options }: &Options) -> Result<()> {
     let used = if options.quick { 1 } else { usize::MAX };
     let marks: Vec<usize> = MARKS.into_iter().take(used).collect();
     let cells: Vec<usize> = CELLS.into_iter().take(used).collect();
@@ -139,12 +139,12 @@ pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
 /// Runs a sample in all kinds of time steps and compares it at the marks, graded steps at the ends of those in which the marks are; adds the
 /// ratios of estimated to true time errors.
 fn compare<'a, const D: usize>(
-    session: &mut Session<'_>,
+    session: &mut Session,
     sample: &Sample<D>,
     (cells, marks): (&[usize], &[(usize, f64)]),
     steppings: &'a [Stepping],
     ratios: &mut Vec<f64>,
-) -> Result<Vec<Compared<'a>>, Error> {
+) -> Result<Vec<Compared<'a>>> {
     let mut rows = Vec::new();
     let title = format!("{}: the exact flow", sample.key);
     let exact = session.phase(title, |_| sample.exact(Flow::Willmore, marks))?;
@@ -195,10 +195,10 @@ const SAME: f64 = 1e-5;
 /// them. Cases without an estimate, after less than three steps, do not count, nor those that are nearer to the strict run than that is known to be
 /// near the truth.
 fn time_errors<const D: usize>(
-    session: &mut Session<'_>,
+    session: &mut Session,
     marks: &[(usize, f64)],
     runs: &[(String, Trajectory<D>)],
-) -> Result<Vec<f64>, Error> {
+) -> Result<Vec<f64>> {
     let mut ratios = Vec::new();
     let Some(((_, strict), others)) = runs.split_last() else {
         return Ok(ratios);
@@ -221,7 +221,7 @@ fn time_errors<const D: usize>(
 /// The circles of `circle_convergence` at n = 128 with the accurate operator, in equal steps of first order, in controlled ones of second order, and
 /// those extrapolated in `eps` from n = 64 and 128: their mean L2 error at the end of the 64 steps, and all Hessian-vector products, which on
 /// the coarser grid count by their share of the unknowns.
-fn circles(session: &mut Session<'_>) -> Result<(), Error> {
+fn circles(session: &mut Session) -> Result<()> {
     let usual = (circles::COUNT, circles::STEPS);
     let (count, steps) = session.options.either((2, 4), usual);
     let variant = Variant::new(Flow::Willmore, ACCURATE, CELLS[1]);
@@ -253,9 +253,8 @@ fn circles(session: &mut Session<'_>) -> Result<(), Error> {
         let (u, work) = run(fine, "controlled", ErrorControl::default())?;
         let (a, coarse_work) = run(coarse, "careful", careful(coarse))?;
         let (b, fine_work) = run(fine, "careful", careful(fine))?;
-        let radius_of = |u: &Field<2>, eps| -> Result<f64, Error> {
-            Ok((ZeroSet::of(u, eps)?.volume / PI).sqrt())
-        };
+        let radius_of =
+            |u: &Field<2>, eps| -> Result<f64> { Ok((ZeroSet::of(u, eps)?.volume / PI).sqrt()) };
         let circle = |radius| phase_field(*u.grid(), &Ball::new([0.0; 2], radius)?, EPS);
         let limit = (4.0 * radius_of(&b, EPS)? - radius_of(&a, 2.0 * EPS)?) / 3.0;
         let exact = circle(circles::radius_at(flow, radius, end))?;
