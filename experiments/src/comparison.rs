@@ -306,11 +306,10 @@ impl Comparison<'_> {
     }
 
     fn data(&self, session: &Session) -> Result<()> {
-        let errors = self.runs.iter().flat_map(|run| {
-            let errors = run.errors.iter();
-            errors.map(move |(step, l2)| (run, *step, *l2))
-        });
-        let errors: Vec<_> = errors.collect();
+        let mut errors = Vec::new();
+        for run in &self.runs {
+            errors.extend(run.errors.iter().map(|(step, l2)| (run, *step, *l2)));
+        }
         let errors = Variant::columns(Sheet::of(&errors), |(run, ..)| run.variant)
             .data("step", |(_, step, _)| *step)
             .data("time", |(_, step, _)| time(*step))
