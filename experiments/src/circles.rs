@@ -7,7 +7,6 @@ use runs::Interrupt;
 
 use crate::harness::{in_parallel, workers};
 use crate::prelude::*;
-use crate::study::{self, Variant};
 
 pub const COUNT: usize = 30;
 pub const STEPS: usize = 64;
@@ -43,7 +42,7 @@ pub fn box_cells(flow: Flow, radius: f64, steps: usize, cells_per_unit: usize) -
 }
 
 /// That box about the centre of the circle.
-pub fn grid(flow: Flow, radius: f64, steps: usize, n: usize) -> Result<Grid<2>, Error> {
+pub fn grid(flow: Flow, radius: f64, steps: usize, n: usize) -> Result<Grid<2>> {
     let cells = box_cells(flow, radius, steps, n);
     Ok(Grid::centred(cells, cells as f64 / n as f64)?)
 }
@@ -76,11 +75,7 @@ pub struct Circle {
 impl Circle {
     /// `L2` distance to the exact solution after `k` steps.
     pub fn error(&self, k: usize) -> f64 {
-        let values = match k {
-            0 => &self.trajectory.start,
-            k => &self.trajectory.records[k - 1].measures,
-        };
-        values["l2"]
+        self.trajectory.measures(k).expect("all steps are made")["l2"]
     }
 }
 
@@ -97,7 +92,7 @@ impl Ensemble {
         (count, steps): (usize, usize),
         folder: &str,
         stage: &Stage<'_>,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let (device, folder) = (stage.device, stage.output.subfolder(folder)?);
         stage.bar.set_length(count as u64);
         let Variant { flow, n, .. } = *variant;

@@ -3,10 +3,7 @@
 use clap::{CommandFactory, FromArgMatches};
 use geometry::measure::perimeter;
 
-use crate::look::one_over_two_to;
 use crate::prelude::*;
-use crate::steps;
-use crate::study::{self, Study, StudyOptions, Variant};
 use crate::truth::{self, CELLS, Reached, Sample, Truth};
 
 pub struct Setting {
@@ -113,18 +110,16 @@ struct Comparison<'a> {
     second_order: Vec<(String, Vec<Reached>)>,
 }
 
-fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
+fn run(setting: &Setting, options: &Options) -> Result<()> {
     let (flow, quick, cells) = (setting.flow, options.study.run.quick, options.study.cells());
     let finest = cells.iter().copied().max().unwrap_or(0);
     let usual = if quick { finest } else { 2 * finest };
     let reference_n = options.reference_n.unwrap_or(usual);
     for n in &cells {
-        require(
-            reference_n.is_multiple_of(*n),
-            format!(
-                "--reference-n {reference_n} must be a multiple of every n compared with it, also of {n}"
-            ),
-        )?;
+        let message = format!(
+            "--reference-n {reference_n} must be a multiple of every n compared with it, also of {n}"
+        );
+        require(reference_n.is_multiple_of(*n), message)?;
     }
     let steps = (options.steps).unwrap_or(if quick { 2 } else { STEPS });
     require(steps > 0, "--steps must be at least 1")?;
@@ -134,36 +129,22 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
     let variants = options.study.variants(flow, stable);
     let study = Study::new(&options.study.networks, &variants)?;
     let parameters = json!({
-        "shape": setting.shape,
-        "flow": flow,
-        "cells": cells,
-        "reference_n": reference_n,
-        "reference_steps_per_step": setting.reference_ratio,
-        "side": setting.sample.side,
-        "eps": EPS,
-        "time_step": STEP,
-        "steps": steps,
-        "networks": study.checksums(),
+        "shape": setting.shape, "flow": flow, "side": setting.sample.side,
+        "cells": cells, "reference_n": reference_n, "reference_steps_per_step": setting.reference_ratio,
+        "eps": EPS, "time_step": STEP, "steps": steps, "networks": study.checksums(),
     });
     let mut session = Session::open(setting.program, &options.study.run, parameters)?;
     let mut runs = Vec::new();
     for (variant, operator) in &study.plan {
         runs.push(setting.run(&mut session, "", (*variant, operator), (steps, 1))?);
     }
-    // The paper's references are implicit finite elements.
     let half = reference_n / 2;
     let halved = (reference_n.is_multiple_of(2) && finest <= half).then_some(half);
     let mut references: Vec<Compared> = Vec::new();
     for n in [Some(reference_n), halved].into_iter().flatten() {
         let what = ["reference: ", "for the reference's error: "][references.len()];
-        let (method, scheme) = (Method::FeImplicit, Scheme::Paper);
-        let variant = Variant {
-            flow,
-            method,
-            scheme,
-            n,
-        };
-        let operator = study.networks.operator(variant.look(), n)?;
+        let variant = Variant::new(flow, ELEMENTS, n);
+        let operator = study.networks.operator(ELEMENTS, n)?;
         let time = (steps, setting.reference_ratio);
         references.push(setting.run(&mut session, what, (variant, &operator), time)?);
     }
@@ -171,8 +152,7 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
     for run in runs.iter_mut().chain(half) {
         run.compare(&reference[0], steps)?;
     }
-    let marks = sampled(steps).filter(|k| *k > 0).map(|k| (k, time(k)));
-    let marks: Vec<(usize, f64)> = marks.collect();
+    let marks: Vec<_> = sampled(steps).skip(1).map(|k| (k, time(k))).collect();
     let exact = session.phase("the exact flow", |_| setting.sample.exact(flow, &marks))?;
     for run in runs.iter_mut().chain(&mut references) {
         run.compare_with_exact(setting, &exact)?;
@@ -205,11 +185,11 @@ fn run(setting: &Setting, options: &Options) -> Result<(), Error> {
 impl Setting {
     fn run(
         &self,
-        session: &mut Session<'_>,
+        session: &mut Session,
         what: &str,
         (variant, operator): (Variant, &Operator),
         (steps, ratio): (usize, usize),
-    ) -> Result<Compared, Error> {
+    ) -> Result<Compared> {
         let grid = Grid::<2>::per_unit(variant.n, self.sample.side)?;
         let initial = (self.sample.initial)(grid, EPS)?;
         let time = (STEP / ratio as f64, steps * ratio);
@@ -244,12 +224,8 @@ fn sampled(steps: usize) -> impl Iterator<Item = usize> {
     (0..=steps).filter(move |&step| samples(1).holds(step) || step == steps)
 }
 
-fn time(step: usize) -> f64 {
-    step as f64 * STEP
-}
-
 impl Compared {
-    fn compare(&mut self, reference: &Self, steps: usize) -> Result<(), Error> {
+    fn compare(&mut self, reference: &Self, steps: usize) -> Result<()> {
         if (self.variant, self.ratio) == (reference.variant, reference.ratio) {
             return Ok(());
         }
@@ -261,7 +237,7 @@ impl Compared {
         Ok(())
     }
 
-    fn compare_with_exact(&mut self, setting: &Setting, exact: &[Truth]) -> Result<(), Error> {
+    fn compare_with_exact(&mut self, setting: &Setting, exact: &[Truth]) -> Result<()> {
         for Truth { mark, outline, .. } in exact {
             let field = self.trajectory.field(mark * self.ratio)?;
             let points = (setting.sample.level)(&field, EPS)?;
@@ -271,12 +247,7 @@ impl Compared {
         Ok(())
     }
 
-    /// The mean over all minimizations; nothing for mean curvature flow.
-    fn mean(&self, of: fn(&StepRecord) -> f64) -> Option<f64> {
-        study::mean(minimizations(&self.trajectory.records), of)
-    }
-
-    fn loops(&self, step: usize) -> Result<Curve, Error> {
+    fn loops(&self, step: usize) -> Result<Curve> {
         let field = self.trajectory.field(step * self.ratio)?;
         Ok(look::outline(&field))
     }
@@ -313,7 +284,7 @@ impl Comparison<'_> {
         format!("Reference: implicit finite elements, n = {n}{step}{estimate}.")
     }
 
-    fn write(&self, mut session: Session<'_>) -> Result<(), Error> {
+    fn write(&self, mut session: Session) -> Result<()> {
         session.figure(self.error_figure(), "errors")?;
         session.figure(self.shape_figure()?, "shapes")?;
         session.sheet(self.sheet(), "error_table")?;
@@ -334,12 +305,11 @@ impl Comparison<'_> {
         session.finish(self.setting.title)
     }
 
-    fn data(&self, session: &Session<'_>) -> Result<(), Error> {
-        let errors = self.runs.iter().flat_map(|run| {
-            let errors = run.errors.iter();
-            errors.map(move |(step, l2)| (run, *step, *l2))
-        });
-        let errors: Vec<_> = errors.collect();
+    fn data(&self, session: &Session) -> Result<()> {
+        let mut errors = Vec::new();
+        for run in &self.runs {
+            errors.extend(run.errors.iter().map(|(step, l2)| (run, *step, *l2)));
+        }
         let errors = Variant::columns(Sheet::of(&errors), |(run, ..)| run.variant)
             .data("step", |(_, step, _)| *step)
             .data("time", |(_, step, _)| time(*step))
@@ -387,9 +357,9 @@ impl Comparison<'_> {
     }
 
     /// Rows: methods at their finest resolution, and the reference; columns: times.
-    fn shape_figure(&self) -> Result<Figure, Error> {
+    fn shape_figure(&self) -> Result<Figure> {
         let mut rows: Vec<(&Compared, String)> = Vec::new();
-        for shown in look::variants(|_| true) {
+        for shown in look::variants() {
             let own = |run: &&Compared| run.variant.look() == shown && !run.errors.is_empty();
             if let Some(run) = self.runs.iter().filter(own).max_by_key(|run| run.variant.n) {
                 rows.push((run, run.variant.label().replace(", ", "\n")));
@@ -447,8 +417,11 @@ impl Comparison<'_> {
                 });
             }
         }
-        let hvp = |run: &Compared| run.mean(StepRecord::hvp);
-        let newton = |run: &Compared| run.mean(|made| made.newton.newton as f64);
+        let of_steps = |run: &Compared, of: fn(&StepRecord) -> f64| {
+            study::mean(minimizations(&run.trajectory.records), of)
+        };
+        let hvp = |run: &Compared| of_steps(run, StepRecord::hvp);
+        let newton = |run: &Compared| of_steps(run, |made| made.newton.newton as f64);
         let per_step = |run: &Compared| run.trajectory.seconds() / run.trajectory.steps() as f64;
         let increases = |run: &Compared| energy_increases(&run.trajectory.records);
         sheet
@@ -468,7 +441,7 @@ fn time_label(step: usize) -> String {
         return "0".to_owned();
     }
     let power = step.trailing_zeros();
-    let unit = one_over_two_to(14 - power);
+    let unit = look::power_of_two(power as i32 - 14);
     match step >> power {
         1 => unit,
         factor => format!("{factor}·{unit}"),

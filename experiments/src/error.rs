@@ -22,6 +22,9 @@ pub enum Error {
     Volumes(#[from] volumes::Error),
 }
 
+/// What can fail as an experiment does, unless it says otherwise.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
 impl Error {
     /// The message with its causes, on one line.
     pub fn line(&self) -> String {
@@ -30,7 +33,7 @@ impl Error {
 }
 
 /// Refuses options with this message unless the condition holds.
-pub fn require(holds: bool, message: impl Into<String>) -> Result<(), Error> {
+pub fn require(holds: bool, message: impl Into<String>) -> Result<()> {
     holds
         .then_some(())
         .ok_or_else(|| Error::Options(message.into()))

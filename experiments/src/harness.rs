@@ -8,16 +8,16 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use clap::Parser;
 use operators::{ComputeDevice, memory};
 
-use crate::Error;
+use crate::{Error, Result};
 
 /// Runs a program with the options of the command line.
-pub fn main<O: Parser>(program: impl FnOnce(&O) -> Result<(), Error>) -> ExitCode {
+pub fn main<O: Parser>(program: impl FnOnce(&O) -> Result<()>) -> ExitCode {
     let options = O::parse();
     run(|| program(&options))
 }
 
 /// Runs a program: success is exit code 0, a failure one line on standard error and exit code 2.
-pub fn run(program: impl FnOnce() -> Result<(), Error>) -> ExitCode {
+pub fn run(program: impl FnOnce() -> Result<()>) -> ExitCode {
     memory::keep_freed();
     match program() {
         Ok(()) => ExitCode::SUCCESS,
@@ -44,8 +44,8 @@ pub fn workers(device: &ComputeDevice) -> usize {
 pub fn in_parallel<R: Send>(
     count: usize,
     workers: usize,
-    task: impl Fn(usize) -> Result<R, Error> + Sync,
-) -> Result<Vec<R>, Error> {
+    task: impl Fn(usize) -> Result<R> + Sync,
+) -> Result<Vec<R>> {
     let (started, results) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
     let work = || {
         while let Some(number) = count.checked_sub(1 + started.fetch_add(1, Ordering::Relaxed)) {

@@ -1,7 +1,6 @@
 //! Inpainting, in any dimension: Willmore flow of the values in a region, the rest held.
 
 use crate::prelude::*;
-use crate::steps;
 
 /// A shape is stationary once it moves by less than this part of the way it has come per step.
 const STILL: f64 = 1e-5;
@@ -38,18 +37,13 @@ pub struct Shape<const D: usize> {
 }
 
 impl<const D: usize> Shape<D> {
-    pub fn case(
-        &self,
-        grid: Grid<D>,
-        scales: Scales,
-        operator: &Operator,
-    ) -> Result<Case<D>, Error> {
+    pub fn case(&self, grid: Grid<D>, scales: Scales, operator: &Operator) -> Result<Case<D>> {
         let [low, high] = self.region;
         let moves = |node| grid.node(node).iter().all(|x| low < *x && *x < high);
         let title = format!("inpainted {}", self.title);
         let initial = phase_field(grid, &self.initial, scales.eps)?;
         let time = (self.rule, self.steps);
-        let mut case = willmore_flow(&title, initial, operator.clone(), scales, time);
+        let mut case = Case::willmore(&title, initial, operator.clone(), scales, time);
         case.region = Some((0..grid.len()).map(moves).collect());
         case.steps.first_substep = Some(first_substep(scales.eps));
         case.stops.insert(0, Stop::Motion(STILL));
@@ -94,7 +88,7 @@ pub struct Inpainted<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Inpainted<'a, D> {
-    pub fn measure(shape: &'a Shape<D>, trajectory: &'a Trajectory<D>) -> Result<Self, Error> {
+    pub fn measure(shape: &'a Shape<D>, trajectory: &'a Trajectory<D>) -> Result<Self> {
         let (case, steps) = (&trajectory.case, trajectory.steps());
         let goal = match &shape.whole {
             Some(whole) => phase_field(*case.grid(), whole, case.scales.eps)?,
@@ -131,7 +125,7 @@ impl<'a, const D: usize> Inpainted<'a, D> {
         stands_still.then_some((last.time - last.tau) / self.tau())
     }
 
-    pub fn write_frames(&self, session: &Session<'_>, figure: Figure) -> Result<(), Error> {
+    pub fn write_frames(&self, session: &Session, figure: Figure) -> Result<()> {
         let title = format!("Inpainting: {}", self.shape.title);
         let name = format!("{}_frames", self.shape.key);
         session.figure(Figure { title, ..figure }, &name)
@@ -140,10 +134,10 @@ impl<'a, const D: usize> Inpainted<'a, D> {
 
 /// Writes the energies, the records of all steps, the table of distances and the metrics, and ends the program.
 pub fn finish<const D: usize>(
-    mut session: Session<'_>,
+    mut session: Session,
     title: &str,
     all: &[Inpainted<'_, D>],
-) -> Result<(), Error> {
+) -> Result<()> {
     let energies = all.iter().map(|one| {
         let point = |r: &Record| Some([r.time, r.willmore_energy()?]);
         let points: Vec<_> = one.trajectory.records.iter().filter_map(point).collect();

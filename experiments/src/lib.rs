@@ -29,7 +29,6 @@ pub mod circles;
 pub mod comparison;
 pub mod equilibria;
 mod error;
-pub mod flows;
 pub mod harness;
 pub mod inpainting;
 pub mod look;
@@ -52,4 +51,4 @@ pub mod timing;
 pub mod training;
 pub mod truth;
 
-pub use error::{Error, require};
+pub use error::{Error, Result, require};

@@ -4,14 +4,10 @@ use geometry::contour::zero_level;
 
 use crate::prelude::*;
 
-/// The methods in their schemes that are shown, in the order of legends.
-pub fn variants(
-    shown: impl Fn((Method, Scheme)) -> bool,
-) -> impl Iterator<Item = (Method, Scheme)> {
-    let all = Method::ALL
-        .into_iter()
-        .flat_map(|method| Scheme::ALL.map(|scheme| (method, scheme)));
-    all.filter(move |&variant| shown(variant))
+/// The methods in their schemes, in the order of legends.
+pub fn variants() -> impl Iterator<Item = (Method, Scheme)> {
+    let schemes = |method| Scheme::ALL.map(|scheme| (method, scheme));
+    Method::ALL.into_iter().flat_map(schemes)
 }
 
 /// Colour of a method in a scheme, an entry of the palette.
@@ -32,10 +28,7 @@ pub fn outline(field: &Field<2>) -> Curve {
     Curve::new(curves.map(|curve| curve.points).collect::<Vec<_>>())
 }
 
-/// A negative power of two, as `2⁻⁹`.
-pub fn one_over_two_to(exponent: u32) -> String {
-    let digits = exponent.to_string();
-    let digits = digits.chars().filter_map(|c| c.to_digit(10));
-    let superscript = digits.filter_map(|digit| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize));
-    format!("2⁻{}", superscript.collect::<String>())
+/// A power of two, as `2⁻⁹`.
+pub fn power_of_two(exponent: i32) -> String {
+    format!("2{}", report::superscript(exponent))
 }

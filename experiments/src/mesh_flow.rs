@@ -43,8 +43,8 @@ impl MeshFlow {
     pub fn run(
         &self,
         options: &MeshFlowOptions,
-        remarks: impl FnOnce(&mut Session<'_>, &mut [Flowed]) -> Result<String, Error>,
-    ) -> Result<(), Error> {
+        remarks: impl FnOnce(&mut Session, &mut [Flowed]) -> Result<String>,
+    ) -> Result<()> {
         let run = &options.figure.run;
         let side = options.mesh.box_side(&self.mesh);
         let setting = Setting::new(&options.figure, [32, self.cells], side)?;

@@ -2,7 +2,7 @@
 
 use geometry::{PURE_BEYOND, npy};
 use runs::fingerprint;
-use surfaces::{ClosedMesh, MeshDistance, usual_up_axis};
+use surfaces::usual_up_axis;
 
 use crate::prelude::*;
 
@@ -27,13 +27,8 @@ pub struct MeshOptions {
     pub volume: Option<PathBuf>,
 
     /// What the values are
-    #[arg(
-        long,
-        value_name = "KIND",
-        value_enum,
-        default_value_t,
-        requires = "volume"
-    )]
+    #[arg(long, value_name = "KIND", value_enum, default_value_t)]
+    #[arg(requires = "volume")]
     pub volume_holds: VolumeKind,
 
     /// Longest side of the mesh
@@ -107,12 +102,12 @@ impl MeshOptions {
     }
 
     /// The axis that points up in pictures: the usual one of the format of a chosen mesh, else that of the program.
-    pub fn up(&self, programs: UpAxis) -> Result<UpAxis, Error> {
+    pub fn up(&self, programs: UpAxis) -> Result<UpAxis> {
         Ok(self.mesh.as_ref().map_or(Ok(programs), usual_up_axis)?)
     }
 
     /// The chosen mesh or volume, for runs on a grid.
-    pub fn load(&self, known: &KnownMesh, grid: &Grid<3>) -> Result<Loaded, Error> {
+    pub fn load(&self, known: &KnownMesh, grid: &Grid<3>) -> Result<Loaded> {
         if let Some(path) = &self.volume {
             let (title, mut about) = about_file(path)?;
             about["holds"] = json!(self.volume_holds);
@@ -142,7 +137,7 @@ impl MeshOptions {
         })
     }
 
-    fn read(&self, known: &KnownMesh) -> Result<(ClosedMesh, String, Value), Error> {
+    fn read(&self, known: &KnownMesh) -> Result<(ClosedMesh, String, Value)> {
         let path = self.find(known).ok_or_else(|| {
             Error::Options(format!(
                 "{} is not here: run scripts/fetch_meshes, or set {FOLDER_VARIABLE} to a folder that holds it, or give --mesh FILE, \
@@ -160,7 +155,7 @@ impl MeshOptions {
     }
 
     /// The chosen mesh, or the built-in shape if none was chosen and that of the paper is not here.
-    pub fn load_or_built_in(&self, known: &KnownMesh, grid: &Grid<3>) -> Result<Loaded, Error> {
+    pub fn load_or_built_in(&self, known: &KnownMesh, grid: &Grid<3>) -> Result<Loaded> {
         let mut options = self.clone();
         options.procedural |= self.volume.is_none() && self.find(known).is_none();
         options.load(known, grid)
@@ -178,7 +173,7 @@ pub fn folder() -> PathBuf {
     named.unwrap_or_else(|| PathBuf::from(FOLDER))
 }
 
-fn about_file(path: &Path) -> Result<(String, Value), Error> {
+fn about_file(path: &Path) -> Result<(String, Value)> {
     let bytes = std::fs::read(path).map_err(files::Error::of("read", path))?;
     let name = path.file_name().unwrap_or(path.as_os_str());
     let name = name.to_string_lossy().into_owned();
@@ -188,12 +183,7 @@ fn about_file(path: &Path) -> Result<(String, Value), Error> {
 
 impl Loaded {
     /// The phase field on the grid for which the data were loaded.
-    pub fn phase_field(
-        &self,
-        grid: Grid<3>,
-        eps: f64,
-        bar: &ProgressBar,
-    ) -> Result<Field<3>, Error> {
+    pub fn phase_field(&self, grid: Grid<3>, eps: f64, bar: &ProgressBar) -> Result<Field<3>> {
         let profile = |distance: &Field<3>| distance.map(|s| optimal_profile(s, eps));
         Ok(match &self.shape {
             Shape::Distance(distance) => {
@@ -207,33 +197,26 @@ impl Loaded {
 }
 
 /// The values of an NPY file on a grid.
-fn volume(path: &Path, grid: Grid<3>, holds: VolumeKind) -> Result<Field<3>, Error> {
+fn volume(path: &Path, grid: Grid<3>, holds: VolumeKind) -> Result<Field<3>> {
     /// Flows overshoot the phases of a phase field a little.
     const LARGEST: f64 = 1.1;
     let name = path.display();
     let field = npy::read(path, |cells| Grid::<3>::new(cells, grid.side()))?;
     let (found, expected) = (field.grid().cells(), grid.cells());
-    require(
-        found == expected,
-        format!(
-            "{name} has {found} nodes per side, and the box {expected}: choose --cells and --box-side with a product of {found}"
-        ),
-    )?;
+    let message = format!(
+        "{name} has {found} nodes per side, and the box {expected}: choose --cells and --box-side with a product of {found}"
+    );
+    require(found == expected, message)?;
     let largest = field.values().iter().map(|u| u.abs()).fold(0.0, f64::max);
-    require(
-        holds != VolumeKind::PhaseField || largest <= LARGEST,
-        format!(
-            "{name} holds values up to {largest}, which no phase field has; are they signed distances?"
-        ),
-    )?;
+    let message = format!(
+        "{name} holds values up to {largest}, which no phase field has; are they signed distances?"
+    );
+    let possible = holds != VolumeKind::PhaseField || largest <= LARGEST;
+    require(possible, message)?;
     Ok(Field::from_values(grid, field.into_values())?)
 }
 
-pub fn sampled(
-    distance: &MeshDistance,
-    grid: Grid<3>,
-    bar: &ProgressBar,
-) -> Result<Field<3>, Error> {
+pub fn sampled(distance: &MeshDistance, grid: Grid<3>, bar: &ProgressBar) -> Result<Field<3>> {
     bar.set_length(grid.cells() as u64);
     Ok(distance.sample(grid, || bar.inc(1))?)
 }

@@ -1,4 +1,4 @@
-//! The scales of the convergence tests, and where networks come from.
+//! The scales and cases of the convergence tests, and where networks come from.
 
 use model::{NamedNetwork, NeededNetwork, Networks, Ratios};
 
@@ -9,6 +9,11 @@ pub const EPS: f64 = 1.0 / 64.0;
 /// Time step `tau = tautilde = 2^-14` of both flows.
 pub const STEP: f64 = 1.0 / 16384.0;
 
+/// The time after so many of these steps.
+pub fn time(step: usize) -> f64 {
+    step as f64 * STEP
+}
+
 pub fn scales() -> Scales {
     Scales {
         eps: EPS,
@@ -16,6 +21,13 @@ pub fn scales() -> Scales {
         newton: NewtonParams::default(),
     }
 }
+
+/// The learned operator in the paper's scheme,
+pub const PAPERS: (Method, Scheme) = (Method::Hybrid, Scheme::Paper);
+/// and in that of the least errors.
+pub const ACCURATE: (Method, Scheme) = (Method::Hybrid, Scheme::Accurate);
+/// The finite elements of the paper's references.
+pub const ELEMENTS: (Method, Scheme) = (Method::FeImplicit, Scheme::Paper);
 
 /// Options for programs that use trained networks.
 #[derive(Args, Clone, Debug, Default)]
@@ -27,7 +39,7 @@ pub struct NetworkOptions {
 
 impl NetworkOptions {
     /// Where the networks of the paper's and the calibrated scheme come from.
-    pub fn load(&self, needs: &[NeededNetwork]) -> Result<Chosen, Error> {
+    pub fn load(&self, needs: &[NeededNetwork]) -> Result<Chosen> {
         Ok(Chosen(Networks::load(&self.network, needs)?))
     }
 }
@@ -45,20 +57,16 @@ impl Chosen {
         }
     }
 
-    pub fn find(&self, scheme: Scheme, needed: &NeededNetwork) -> Result<NamedNetwork, Error> {
+    pub fn find(&self, scheme: Scheme, needed: &NeededNetwork) -> Result<NamedNetwork> {
         Ok(self.of(scheme).find(scheme.shipped(), needed)?)
     }
 
-    pub fn learned(&self, scheme: Scheme, needed: &NeededNetwork) -> Result<Operator, Error> {
+    pub fn learned(&self, scheme: Scheme, needed: &NeededNetwork) -> Result<Operator> {
         Ok(Operator::learned(scheme, self.find(scheme, needed)?)?)
     }
 
     /// The operator of a method in a scheme at resolution `n` of the convergence tests.
-    pub fn operator(
-        &self,
-        (method, scheme): (Method, Scheme),
-        n: usize,
-    ) -> Result<Operator, Error> {
+    pub fn operator(&self, (method, scheme): (Method, Scheme), n: usize) -> Result<Operator> {
         if method.is_learned() {
             return self.learned(scheme, &convergence_network(n)?);
         }
@@ -69,14 +77,41 @@ impl Chosen {
 }
 
 /// The network of the convergence tests in 2D at resolution `n`, with the paper's kernel width `n/8 + 1`.
-pub fn convergence_network(n: usize) -> Result<NeededNetwork, Error> {
-    require(
-        n > 0 && n.is_multiple_of(16),
-        format!(
-            "n = {n} is not possible: the kernel width n/8 + 1 must be odd, so n must be a multiple of 16"
-        ),
-    )?;
+pub fn convergence_network(n: usize) -> Result<NeededNetwork> {
+    let message = format!(
+        "n = {n} is not possible: the kernel width n/8 + 1 must be odd, so n must be a multiple of 16"
+    );
+    require(n > 0 && n.is_multiple_of(16), message)?;
     let ratios = Ratios::of_run(2, n / 8 + 1, 1.0 / n as f64, EPS, STEP);
     ratios.validate()?;
     Ok(NeededNetwork::exactly(ratios))
+}
+
+/// A flow at the scales of the convergence tests in equal steps, with nothing measured; the inner step of mean curvature flow is its step.
+pub fn planar_flow(
+    (flow, operator): (Flow, &Operator),
+    shape: &str,
+    initial: Field<2>,
+    (tau, steps): (f64, usize),
+) -> Case<2> {
+    let mut scales = scales();
+    if flow == Flow::MeanCurvature {
+        scales.mcf_step = tau;
+    }
+    let time = (StepRule::Constant(tau), steps);
+    Case {
+        flow,
+        measures: Vec::new(),
+        ..Case::willmore(shape, initial, operator.clone(), scales, time)
+    }
+}
+
+/// The operator of a method in a scheme with the shipped network for the scales of a grid.
+pub fn operator<const D: usize>(
+    variant: (Method, Scheme),
+    grid: &Grid<D>,
+    scales: &Scales,
+) -> Result<Operator> {
+    let (needed, networks) = (scales.needs(D, grid.spacing()), Networks::default());
+    Ok(Operator::new(variant, &networks, &needed, grid, scales)?)
 }

@@ -28,7 +28,7 @@ pub struct RunOptions {
 }
 
 impl RunOptions {
-    pub fn open_device(&self) -> Result<ComputeDevice, Error> {
+    pub fn open_device(&self) -> Result<ComputeDevice> {
         Ok(match &self.device {
             Some(name) => ComputeDevice::open(name.parse::<DeviceKind>()?)?,
             None => ComputeDevice::default_compiled()?,

@@ -21,7 +21,7 @@ pub struct Refinement {
 pub fn refinements(
     refined: &'static str,
     runs: &[(f64, Trajectory<2>)],
-) -> Result<Vec<Refinement>, Error> {
+) -> Result<Vec<Refinement>> {
     let distance = |coarse: &Trajectory<2>, fine: &Trajectory<2>| {
         coarse.distance(coarse.steps(), fine, fine.steps())
     };
@@ -54,11 +54,8 @@ pub fn chart(rows: &[Refinement]) -> LineChart {
     };
     let next = Series::of("to the next finer run", rows, |row| [row.size, row.to_next]);
     let finest = Series::of("to the finest run", rows, |row| [row.size, row.to_finest]);
-    let (size, distance) = (
-        Axis::log(first.refined),
-        Axis::log("L² distance at the end"),
-    );
-    LineChart::new("", size, distance).with_curves([
+    let distance = Axis::log("L² distance at the end");
+    LineChart::new("", Axis::log(first.refined), distance).with_curves([
         next.with_marker(Marker::Circle),
         finest.with_colour(1).with_marker(Marker::Square),
         guide(1, LineStyle::Dashed),

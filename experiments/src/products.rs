@@ -18,7 +18,6 @@ use rustfft::num_complex::Complex;
 use solver::{MinimizingMovement, Objective, Precision};
 
 use crate::prelude::*;
-use crate::timing::{median, take_turns};
 
 /// `c = tau / tautilde^2` of a typical step: `tau = tautilde = 2^-14`.
 const STIFFNESS: f64 = 16384.0;
@@ -36,7 +35,7 @@ struct ByHand {
 }
 
 impl ByHand {
-    fn new(network: &Network, shape: &[usize], u: &[f64]) -> Result<Self, Error> {
+    fn new(network: &Network, shape: &[usize], u: &[f64]) -> Result<Self> {
         let plan = Transform::of_shape(shape);
         let symbol = kernel_symbol(shape, network.kernel(), network.ratios().width);
         let table = network.activation().table()?;
@@ -84,7 +83,7 @@ pub fn measure<const D: usize>(
     u: &Field<D>,
     device: &ComputeDevice,
     seconds: f64,
-) -> Result<Numbers, Error> {
+) -> Result<Numbers> {
     const LEAST: usize = 11;
     let grid = *u.grid();
     let direction = |(i, u): (usize, &f64)| (1.0 - u.powi(2)) + 0.1 * (0.37 * i as f64).sin();
@@ -92,7 +91,7 @@ pub fn measure<const D: usize>(
     let tensor = |x: &[f64]| -> Tensor<D> { device.tensor(x, grid.shape()) };
     let previous: Vec<f64> = u.values().iter().map(|u| 0.99 * u).collect();
     let operator = Arc::new(MeanCurvatureOperator::<D>::new(network, device)?);
-    let energy = |precision| -> Result<_, Error> {
+    let energy = |precision| -> Result<_> {
         let (operator, shape) = (operator.clone(), grid.shape());
         let mut energy =
             MinimizingMovement::with_terms(operator, shape, precision, (false, None), device)?;
@@ -113,10 +112,8 @@ pub fn measure<const D: usize>(
     let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
     let defect: Vec<f64> = burn.iter().zip(&hand).map(|(a, b)| a - b).collect();
     let difference = norm(&defect) / norm(&hand);
-    require(
-        difference <= 1e-12,
-        format!("the products through Burn and by hand differ by {difference:.1e}"),
-    )?;
+    let message = format!("the products through Burn and by hand differ by {difference:.1e}");
+    require(difference <= 1e-12, message)?;
     let [floor, floor_single] = [p.clone(), p_single.clone()].map(|p| {
         let floor = floor.clone();
         move || spectral_filter(spectral_filter(black_box(p.clone()), &floor), &floor)
@@ -138,15 +135,15 @@ pub fn measure<const D: usize>(
     let goes_on = |(.., times): &(_, _, Vec<f64>)| {
         times.len() < LEAST || clock.elapsed().as_secs_f64() < seconds
     };
-    take_turns(&mut contenders, goes_on, |(_, work, times)| {
+    timing::take_turns(&mut contenders, goes_on, |(_, work, times)| {
         let clock = Instant::now();
         work();
         times.push(1e3 * clock.elapsed().as_secs_f64());
         Ok(())
     })?;
     let (burn, by_hand) = (&contenders[0].2, &contenders[2].2);
-    let ratio = median(burn.iter().zip(by_hand).map(|(a, b)| a / b).collect());
-    let times = contenders.map(|(name, _, times)| (name, median(times)));
+    let ratio = timing::median(burn.iter().zip(by_hand).map(|(a, b)| a / b).collect());
+    let times = contenders.map(|(name, _, times)| (name, timing::median(times)));
     let mut numbers = Numbers::from(times);
     numbers.insert("ratio", ratio);
     numbers.insert("over_floor", numbers["ms"] / numbers["floor_ms"]);

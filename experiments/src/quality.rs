@@ -23,11 +23,11 @@ const COLUMNS: [(&str, Format, fn(&Quality) -> f64); 10] = [
 
 /// Measures a network on spheres that it was not trained on; adds the metrics.
 pub fn measure(
-    session: &mut Session<'_>,
+    session: &mut Session,
     title: String,
     spec: &NetworkSpec,
     network: &Network,
-) -> Result<Quality, Error> {
+) -> Result<Quality> {
     let (data, radii) = (spec.data(false)?, held_out_radii(session.options.quick));
     let quality = session.phase(title, |stage| {
         Ok(Quality::measure(network, &data, radii, stage.device)?)

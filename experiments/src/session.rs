@@ -8,8 +8,8 @@ use runs::Interrupt;
 use crate::prelude::*;
 
 /// A program whose options are checked, and what it has to say so far.
-pub struct Session<'a> {
-    pub options: &'a RunOptions,
+pub struct Session {
+    pub options: RunOptions,
     pub device: ComputeDevice,
     pub output: OutputDir,
     pub progress: Progress,
@@ -31,13 +31,13 @@ pub struct Stage<'a> {
 
 impl Stage<'_> {
     /// Runs a case to its end; the bar counts the steps.
-    pub fn run<const D: usize>(&self, case: Case<D>) -> Result<Run<D>, Error> {
+    pub fn run<const D: usize>(&self, case: Case<D>) -> Result<Run<D>> {
         let mut run = Run::new(case, self.device)?;
         self.finish(&mut run)?;
         Ok(run)
     }
 
-    pub fn finish<const D: usize>(&self, run: &mut Run<D>) -> Result<(), Error> {
+    pub fn finish<const D: usize>(&self, run: &mut Run<D>) -> Result<()> {
         while run.step()?.is_some() {
             self.bar.inc(1);
         }
@@ -45,9 +45,9 @@ impl Stage<'_> {
     }
 }
 
-impl<'a> Session<'a> {
+impl Session {
     /// Opens the device and the output folder of a program and begins its manifest; to be called when everything else has been checked.
-    pub fn open(program: &str, options: &'a RunOptions, parameters: Value) -> Result<Self, Error> {
+    pub fn open(program: &str, options: &RunOptions, parameters: Value) -> Result<Self> {
         Self::on(options.open_device()?, program, options, parameters)
     }
 
@@ -55,9 +55,9 @@ impl<'a> Session<'a> {
     pub fn on(
         device: ComputeDevice,
         program: &str,
-        options: &'a RunOptions,
+        options: &RunOptions,
         mut parameters: Value,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         parameters["quick"] = options.quick.into();
         let folder = options.output.clone();
         let folder = folder.unwrap_or_else(|| PathBuf::from("results").join(program));
@@ -75,7 +75,7 @@ impl<'a> Session<'a> {
             summary: Summary::new(),
             report: Vec::new(),
             clock: Instant::now(),
-            options,
+            options: options.clone(),
             device,
             output,
         })
@@ -85,11 +85,11 @@ impl<'a> Session<'a> {
     pub fn phase<T>(
         &mut self,
         title: impl Into<String>,
-        work: impl FnOnce(&Stage<'_>) -> Result<T, Error>,
-    ) -> Result<T, Error> {
+        work: impl FnOnce(&Stage<'_>) -> Result<T>,
+    ) -> Result<T> {
         let title = title.into();
         let stage = Stage {
-            options: self.options,
+            options: &self.options,
             device: &self.device,
             output: &self.output,
             bar: self.progress.bar(title.clone(), 0),
@@ -106,7 +106,7 @@ impl<'a> Session<'a> {
         case: Case<D>,
         name: &str,
         samples: &Samples,
-    ) -> Result<Trajectory<D>, Error> {
+    ) -> Result<Trajectory<D>> {
         let folder = self.output.as_path().join("fields").join(name);
         let steps = case.stops.iter().find_map(|stop| match stop {
             Stop::Steps(steps) => Some(*steps as u64),
@@ -124,13 +124,13 @@ impl<'a> Session<'a> {
     }
 
     /// Writes a figure; its title says so if this is a quick run.
-    pub fn figure(&self, figure: Figure, stem: &str) -> Result<(), Error> {
+    pub fn figure(&self, figure: Figure, stem: &str) -> Result<()> {
         let title = self.options.title(&figure.title);
         Ok(Figure { title, ..figure }.write(&self.output, stem)?)
     }
 
     /// Writes a table, which is printed in the end, too, and adds its metrics.
-    pub fn sheet<R>(&mut self, sheet: Sheet<'_, R>, stem: &str) -> Result<(), Error> {
+    pub fn sheet<R>(&mut self, sheet: Sheet<'_, R>, stem: &str) -> Result<()> {
         let (table, metrics) = sheet.finish()?;
         table.write(&self.output, stem)?;
         self.remark(table.to_markdown());
@@ -138,14 +138,14 @@ impl<'a> Session<'a> {
     }
 
     /// Writes a table for programs alone.
-    pub fn csv<R>(&self, sheet: Sheet<'_, R>, stem: &str) -> Result<(), Error> {
+    pub fn csv<R>(&self, sheet: Sheet<'_, R>, stem: &str) -> Result<()> {
         let (table, _) = sheet.finish()?;
         self.output.write(&format!("{stem}.csv"), table.to_csv()?)?;
         Ok(())
     }
 
     /// Adds a metric, unless its value is missing.
-    pub fn metric(&mut self, name: &str, value: impl Into<Cell>) -> Result<(), Error> {
+    pub fn metric(&mut self, name: &str, value: impl Into<Cell>) -> Result<()> {
         match value.into() {
             Cell::Integer(count) => self.summary.insert_count(name, count as usize)?,
             Cell::Number(value) => self.summary.insert(name, value)?,
@@ -154,11 +154,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    pub fn metrics<const N: usize>(
-        &mut self,
-        key: &str,
-        metrics: [(&str, Cell); N],
-    ) -> Result<(), Error> {
+    pub fn metrics<const N: usize>(&mut self, key: &str, metrics: [(&str, Cell); N]) -> Result<()> {
         let mut metrics = metrics.into_iter();
         metrics.try_for_each(|(name, value)| self.metric(&format!("{key}.{name}"), value))
     }
@@ -168,7 +164,7 @@ impl<'a> Session<'a> {
     }
 
     /// Writes the metrics, with the wall time since the beginning, and the manifest, and prints the tables and remarks below the title.
-    pub fn finish(mut self, title: &str) -> Result<(), Error> {
+    pub fn finish(mut self, title: &str) -> Result<()> {
         let seconds = self.clock.elapsed().as_secs_f64();
         self.summary.insert("seconds", seconds)?;
         self.summary.write(&self.output)?;
@@ -188,7 +184,7 @@ impl<'a> Session<'a> {
 }
 
 /// Removes a folder of partial results, after the final ones have been written.
-pub fn remove_folder(folder: &OutputDir) -> Result<(), Error> {
+pub fn remove_folder(folder: &OutputDir) -> Result<()> {
     let path = folder.as_path();
     Ok(std::fs::remove_dir_all(path).map_err(files::Error::of("remove", path))?)
 }

@@ -1,9 +1,7 @@
 //! What comparisons of smoothings of meshes share.
 
-use engine::Storage;
-use geometry::measure::BoundingBox;
 use render::{Scene, View};
-use surfaces::{Fairing, TriangleMesh};
+use surfaces::Fairing;
 
 use crate::prelude::*;
 use crate::surfaces::raster;
@@ -21,7 +19,7 @@ pub fn rms_distance(mesh: &TriangleMesh, shape: &dyn SignedDistance<3>) -> f64 {
 }
 
 /// Willmore flow from signed distances as `willmore fair` makes it, without its ends and measures.
-pub fn fairing_flow(title: &str, mut distance: Field<3>) -> Result<Case<3>, Error> {
+pub fn fairing_flow(title: &str, mut distance: Field<3>) -> Result<Case<3>> {
     surfaces::mend_signs(&mut distance);
     let (grid, spacing) = (*distance.grid(), distance.grid().spacing());
     let scales = Scales::of_grid(spacing, 2.0);
@@ -32,7 +30,7 @@ pub fn fairing_flow(title: &str, mut distance: Field<3>) -> Result<Case<3>, Erro
     };
     let mut operator = operator(ACCURATE, &grid, &scales)?;
     operator.storage = Storage::Auto;
-    Ok(willmore_flow(title, initial, operator, scales, (rule, 0)))
+    Ok(Case::willmore(title, initial, operator, scales, (rule, 0)))
 }
 
 /// A picture of a mesh in a frame.
@@ -40,7 +38,7 @@ pub fn mesh_raster(
     mesh: &TriangleMesh,
     (up, frame): (UpAxis, BoundingBox<3>),
     caption: impl Into<String>,
-) -> Result<Raster, Error> {
+) -> Result<Raster> {
     let scene = Scene::of_mesh(mesh.clone()).within(frame).view(View {
         up,
         azimuth: -60.0,

@@ -1,7 +1,5 @@
 //! The steps of runs as a table.
 
-use std::collections::BTreeSet;
-
 use engine::Values;
 
 use crate::prelude::*;
@@ -40,10 +38,10 @@ pub fn with_start<R: Copy, const D: usize>(
 
 /// Writes the steps of runs by any names, with method and scheme, as `steps.csv`.
 pub fn write<'a, const D: usize>(
-    session: &Session<'_>,
+    session: &Session,
     named: &str,
     runs: impl Iterator<Item = (&'a str, &'a Trajectory<D>)>,
-) -> Result<(), Error> {
+) -> Result<()> {
     let steps = runs.flat_map(|(name, run)| of((name, &run.case.operator), run));
     let steps: Vec<_> = steps.collect();
     let sheet = Sheet::of(&steps)

@@ -1,13 +1,10 @@
 //! What a surface and a curve cost by what is stored of their phase fields: the whole grid, or bricks near them.
 
 use derive_more::Display;
-use engine::Storage;
-use operators::memory;
 
 use crate::meshes::{ARMADILLO, MeshOptions};
 use crate::prelude::*;
 use crate::surfaces::{centred_box, needed_network, scales};
-use crate::timing;
 use crate::truth::CROSS;
 
 /// Steps on every grid, each twice as long as the one before,
@@ -64,22 +61,17 @@ const COLUMNS: [(&str, Format, &str); 7] = [
 
 impl StorageOptions {
     /// Refuses resolutions that cannot be measured.
-    pub fn check(&self) -> Result<(), Error> {
+    pub fn check(&self) -> Result<()> {
         let possible = |n: &usize| *n >= 16 && n.is_multiple_of(8);
         let mut cells = self.surface_cells.iter().chain(&self.curve_cells);
-        require(
-            cells.all(possible),
-            "--surface-cells and --curve-cells must be multiples of 8, from 16 on, as bricks are",
-        )
+        let message =
+            "--surface-cells and --curve-cells must be multiples of 8, from 16 on, as bricks are";
+        require(cells.all(possible), message)
     }
 
     /// Lets the cross flow on bricks, and then the armadillo on both storages at every resolution; the built-in figure in a quick run, or if it
     /// is not here.
-    pub fn measure(
-        &self,
-        networks: &NetworkOptions,
-        session: &mut Session<'_>,
-    ) -> Result<Vec<Stored>, Error> {
+    pub fn measure(&self, networks: &NetworkOptions, session: &mut Session) -> Result<Vec<Stored>> {
         let networks = networks.load(&[needed_network()])?;
         let mut dense_or_bricks = networks.learned(Scheme::Accurate, &needed_network())?;
         let quick = session.options.quick;
@@ -96,7 +88,7 @@ impl StorageOptions {
             operator.storage = Storage::Bricks;
             let steps = TimeSteps::controlled(ErrorControl::default());
             let time = (steps.rule, if quick { 2 } else { CROSS_STEPS });
-            let mut case = willmore_flow(CROSS.key, initial, operator, scales, time);
+            let mut case = Case::willmore(CROSS.key, initial, operator, scales, time);
             case.steps = steps;
             measured.push(Stored::measure(CROSS.key, n, case, session)?);
         }
@@ -119,7 +111,7 @@ impl StorageOptions {
                 let time = (rule, if quick { 2 } else { STEPS });
                 dense_or_bricks.storage = storage;
                 let operator = dense_or_bricks.clone();
-                let case = willmore_flow("armadillo", initial, operator, scales(n), time);
+                let case = Case::willmore("armadillo", initial, operator, scales(n), time);
                 measured.push(Stored::measure("armadillo", n, case, session)?);
             }
         }
@@ -137,8 +129,8 @@ impl Stored {
         shape: &'static str,
         n: usize,
         mut case: Case<D>,
-        session: &mut Session<'_>,
-    ) -> Result<Self, Error> {
+        session: &mut Session,
+    ) -> Result<Self> {
         case.measures.clear();
         let (storage, nodes) = (case.operator.storage, case.grid().len() as f64);
         let mut run = Run::new(case, &session.device)?;
@@ -168,7 +160,7 @@ impl Stored {
 }
 
 /// Writes the table, the metrics and the figure of the two storages.
-pub fn write(stored: &[Stored], session: &mut Session<'_>) -> Result<(), Error> {
+pub fn write(stored: &[Stored], session: &mut Session) -> Result<()> {
     let sheet = Sheet::of(stored)
         .keyed(|row, name| format!("{row}.{name}"))
         .text("shape", |row| row.shape)

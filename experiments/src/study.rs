@@ -1,8 +1,5 @@
 //! Studies in the plane at the scales of the convergence tests: methods in their schemes at several resolutions.
 
-use std::collections::BTreeSet;
-
-use crate::networks::{Chosen, convergence_network};
 use crate::prelude::*;
 
 /// Options of the studies.
@@ -55,12 +52,7 @@ impl StudyOptions {
         for method in Method::ALL {
             for scheme in method.chosen_schemes(flow, self.scheme) {
                 let cells = self.cells().into_iter().filter(|&n| chosen(method, n));
-                variants.extend(cells.map(|n| Variant {
-                    flow,
-                    method,
-                    scheme,
-                    n,
-                }));
+                variants.extend(cells.map(|n| Variant::new(flow, (method, scheme), n)));
             }
         }
         variants
@@ -76,6 +68,15 @@ pub struct Variant {
 }
 
 impl Variant {
+    pub fn new(flow: Flow, (method, scheme): (Method, Scheme), n: usize) -> Self {
+        Self {
+            flow,
+            method,
+            scheme,
+            n,
+        }
+    }
+
     /// Adds columns that say of which variant a row is.
     pub fn columns<R>(sheet: Sheet<'_, R>, of: impl Fn(&R) -> Self) -> Sheet<'_, R> {
         sheet
@@ -108,7 +109,7 @@ pub struct Study {
 
 impl Study {
     /// The operators of all variants; variants without a network are left out if the accurate recipe has one for the resolution.
-    pub fn new(options: &NetworkOptions, variants: &[Variant]) -> Result<Self, Error> {
+    pub fn new(options: &NetworkOptions, variants: &[Variant]) -> Result<Self> {
         let learned = variants.iter().filter(|v| v.method.is_learned());
         let needs = learned.map(|v| convergence_network(v.n));
         let networks = options.load(&needs.collect::<Result<Vec<_>, _>>()?)?;
@@ -166,8 +167,8 @@ impl Study {
 
     /// A chart of such curves with a legend for all variants: methods, then resolutions.
     pub fn chart(&self, chart: LineChart, curves: impl IntoIterator<Item = Series>) -> LineChart {
-        let planned = |look| self.variants().any(|variant| variant.look() == look);
-        let methods = look::variants(planned).map(|(method, scheme)| {
+        let planned = |look: &_| self.variants().any(|variant| variant.look() == *look);
+        let methods = look::variants().filter(planned).map(|(method, scheme)| {
             let (label, colour) = (method.label_in(scheme), look::colour(method, scheme));
             LegendEntry::line(label, colour, LineStyle::Solid)
         });

@@ -1,17 +1,10 @@
 //! Surfaces under Willmore flow: their scales, the shown steps of a run, and the pictures, tables and metrics of those.
 
-use engine::Storage;
-use geometry::measure::BoundingBox;
 use model::NeededNetwork;
-use operators::memory;
 pub use render::View;
 use render::{Picture, Quality, Rgb, Scene, Tube};
-use surfaces::ClosedMesh;
 
-use crate::look::one_over_two_to;
-use crate::networks::Chosen;
 use crate::prelude::*;
-use crate::steps;
 
 const EPS_OVER_H: f64 = 2.0;
 const WIDTH: usize = 17;
@@ -36,7 +29,7 @@ pub fn needed_network() -> NeededNetwork {
 }
 
 /// The box of the given side around `(0.5, 0.5, 0.5)` with `n` cells per unit length; the nodes of the unit box are `i/n`.
-pub fn centred_box(n: usize, side: f64) -> Result<Grid<3>, Error> {
+pub fn centred_box(n: usize, side: f64) -> Result<Grid<3>> {
     Ok(Grid::per_unit(n, side)?.with_origin([0.5 - 0.5 * side; 3])?)
 }
 
@@ -49,7 +42,7 @@ pub struct Setting {
 
 impl Setting {
     /// A box of the given side, with the usual numbers of cells per unit length of a quick run and of the paper.
-    pub fn new(options: &FigureOptions, usual: [usize; 2], side: f64) -> Result<Self, Error> {
+    pub fn new(options: &FigureOptions, usual: [usize; 2], side: f64) -> Result<Self> {
         let n = options.cells(usual);
         Ok(Self {
             networks: options.networks.load(&[needed_network()])?,
@@ -59,7 +52,7 @@ impl Setting {
         })
     }
 
-    pub fn operator(&self, variant: (Method, Scheme)) -> Result<Operator, Error> {
+    pub fn operator(&self, variant: (Method, Scheme)) -> Result<Operator> {
         let (networks, needed) = (self.networks.of(variant.1), needed_network());
         let (grid, scales) = (&self.grid, &self.scales);
         let mut operator = Operator::new(variant, &networks, &needed, grid, scales)?;
@@ -70,7 +63,7 @@ impl Setting {
     }
 
     /// The parameters of a program for its manifest: the common ones, and others.
-    pub fn parameters(&self, others: Value) -> Result<Value, Error> {
+    pub fn parameters(&self, others: Value) -> Result<Value> {
         let papers = self.operator(PAPERS)?;
         let mut parameters = json!({
             "n": self.n, "box_side": self.grid.side(), "eps": self.scales.eps, "mcf_step": self.scales.mcf_step,
@@ -137,7 +130,7 @@ pub struct Flowed {
 
 impl Surface {
     /// Lets the surface flow, or continues or looks up its run, and measures the steps to be shown.
-    pub fn flow(self, case: Case<3>, session: &mut Session<'_>) -> Result<Flowed, Error> {
+    pub fn flow(self, case: Case<3>, session: &mut Session) -> Result<Flowed> {
         let n = case.grid().spacing().recip().round();
         let run = format!("{}, {}, n = {n}", self.title, case.operator.label());
         let folder = format!("{}-{}", self.key, case.operator.key());
@@ -164,7 +157,7 @@ impl Surface {
 
 impl Flowed {
     /// Measures the phase field after a step, and writes its isosurface.
-    fn snapshot(&self, step: usize, stage: &Stage<'_>) -> Result<Snapshot, Error> {
+    fn snapshot(&self, step: usize, stage: &Stage<'_>) -> Result<Snapshot> {
         let (case, u) = (&self.trajectory.case, self.trajectory.field(step)?);
         // The isosurface is closed by construction; whoever uses the file relies on it.
         let (mesh, _) = ClosedMesh::new(surfaces::phase_field_surface(&u, case.scales.eps)?)?;
@@ -221,7 +214,7 @@ impl Flowed {
     }
 
     /// Pictures of the shown steps with this side in pixels (less in a quick run), all in one framing, each also as a file of its own.
-    pub fn pictures(&self, stage: &Stage<'_>, side: u32) -> Result<Vec<Raster>, Error> {
+    pub fn pictures(&self, stage: &Stage<'_>, side: u32) -> Result<Vec<Raster>> {
         memory::release_freed();
         let usual = (side, Quality::Standard);
         let (side, quality) = stage.options.either((120, Quality::Draft), usual);
@@ -246,7 +239,7 @@ impl Flowed {
         self.snapshots.iter().map(picture).collect()
     }
 
-    fn scene(&self, snapshot: &Snapshot) -> Result<Scene, Error> {
+    fn scene(&self, snapshot: &Snapshot) -> Result<Scene> {
         let case = &self.trajectory.case;
         let mut scene = Scene::new(&self.trajectory.field(snapshot.step)?, case.scales.eps)?;
         if let Some(region) = &case.region {
@@ -275,7 +268,7 @@ pub struct SurfaceFlows {
 
 /// Sizes of time steps that are powers of two, for figures.
 fn in_words(steps: StepRule) -> String {
-    let power = |tau: f64| one_over_two_to(tau.recip().log2().round() as u32);
+    let power = |tau: f64| look::power_of_two(tau.log2().round() as i32);
     match steps {
         StepRule::Constant(tau) => format!("τ = {}", power(tau)),
         StepRule::Doubling(first) => {
@@ -291,10 +284,10 @@ impl SurfaceFlows {
     /// figure should say.
     pub fn run(
         self,
-        mut session: Session<'_>,
+        mut session: Session,
         setting: &Setting,
-        remarks: impl FnOnce(&mut Session<'_>, &mut [Flowed]) -> Result<String, Error>,
-    ) -> Result<(), Error> {
+        remarks: impl FnOnce(&mut Session, &mut [Flowed]) -> Result<String>,
+    ) -> Result<()> {
         let mut all = Vec::new();
         for (surface, initial) in &self.surfaces {
             for &variant in &self.variants {
@@ -305,7 +298,7 @@ impl SurfaceFlows {
                 }
                 let (title, operator) = (&surface.title, setting.operator(variant)?);
                 let case =
-                    willmore_flow(title, initial.clone(), operator, setting.scales, self.time);
+                    Case::willmore(title, initial.clone(), operator, setting.scales, self.time);
                 all.push(surface.flow(case, &mut session)?);
             }
         }
@@ -343,11 +336,11 @@ impl SurfaceFlows {
 
 /// Writes the shown steps of all runs, beside the paper's energies. Metrics begin with `key`.
 pub fn write_snapshots(
-    session: &mut Session<'_>,
+    session: &mut Session,
     all: &[Flowed],
     stem: &str,
     key: impl Fn(&Flowed) -> String,
-) -> Result<(), Error> {
+) -> Result<()> {
     let rows: Vec<(&Flowed, &Snapshot)> = (all.iter())
         .flat_map(|one| one.snapshots.iter().map(move |shown| (one, shown)))
         .collect();

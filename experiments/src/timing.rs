@@ -1,15 +1,14 @@
 //! Wall times, work and memory. Contenders take turns, so that whatever else the machine does burdens them alike.
 
-use crate::networks::{Chosen, convergence_network};
 use crate::prelude::*;
-use crate::{study, surfaces, truth};
+use crate::{surfaces, truth};
 
 /// Round after round, everyone who goes on has a turn.
 pub fn take_turns<C>(
     contenders: &mut [C],
     goes_on: impl Fn(&C) -> bool,
-    mut turn: impl FnMut(&mut C) -> Result<(), Error>,
-) -> Result<(), Error> {
+    mut turn: impl FnMut(&mut C) -> Result<()>,
+) -> Result<()> {
     loop {
         let round: Vec<&mut C> = contenders.iter_mut().filter(|c| goes_on(c)).collect();
         if round.is_empty() {
@@ -32,14 +31,14 @@ pub fn exponent(points: &[[f64; 2]]) -> Option<f64> {
 }
 
 /// The networks of the convergence tests at some resolutions, and that of surfaces.
-pub fn networks(options: &NetworkOptions, cells: &[usize]) -> Result<Chosen, Error> {
+pub fn networks(options: &NetworkOptions, cells: &[usize]) -> Result<Chosen> {
     let needs = cells.iter().map(|&n| convergence_network(n));
     let needs = needs.chain([Ok(surfaces::needed_network())]);
     options.load(&needs.collect::<Result<Vec<_>, _>>()?)
 }
 
 /// What is timed in the plane: the cross in steps of `2^-14`, or for a smoke test a disc on a small box.
-pub fn plane(operator: &Operator, n: usize, steps: usize, quick: bool) -> Result<Case<2>, Error> {
+pub fn plane(operator: &Operator, n: usize, steps: usize, quick: bool) -> Result<Case<2>> {
     let (shape, initial) = if quick {
         let disc = Ball::new([0.0, 0.0], 0.2)?;
         ("disc", phase_field(Grid::per_unit(n, 0.75)?, &disc, EPS)?)

@@ -18,62 +18,40 @@ pub struct NetworkSpec {
     pub cells: usize,
 }
 
-/// Dimension, width of the kernel, `eps/h`, `tautilde/h^2`; cells per unit length of the training grid.
-const fn spec(name: &'static str, ratios: (usize, usize, f64, f64), cells: usize) -> NetworkSpec {
-    let (dimension, width, eps_over_h, step_over_h2) = ratios;
-    let ratios = Ratios {
-        dimension,
-        width,
-        eps_over_h,
-        step_over_h2,
-    };
-    NetworkSpec {
-        name,
-        ratios,
-        cells,
-    }
-}
-
-/// `n64` to `n512` have the scales of the convergence tests, `eps = 2^-6` and `tautilde = 2^-14`. The paper inpaints at `n = 1024`
-/// with `eps = 2^-8` and `tautilde = 2^-18`, which are the same ratios as those of the training at `n = 256`. The network of the
-/// surfaces serves `n = 64` with `eps = 2^-5` and `tautilde = 2^-12`; it is trained at `n = 128`, where the smallest sphere
-/// measures six cells.
-const NETWORKS: [NetworkSpec; 6] = [
-    spec("n64", (2, 9, 1.0, 0.25), 64),
-    spec("n128", (2, 17, 2.0, 1.0), 128),
-    spec("n256", (2, 33, 4.0, 4.0), 256),
-    spec("n512", (2, 65, 8.0, 16.0), 512),
-    spec("inpainting", (2, 17, 4.0, 4.0), 256),
-    spec("surfaces", (3, 17, 2.0, 1.0), 128),
-];
-
 impl NetworkSpec {
-    /// The networks of the accurate recipe: those of the paper's, and one for `eps = h`.
-    pub fn accurate() -> Vec<Self> {
-        NETWORKS.to_vec()
+    const fn new(name: &'static str, ratios: Ratios, cells: usize) -> Self {
+        Self {
+            name,
+            ratios,
+            cells,
+        }
     }
 
-    pub fn paper() -> Vec<Self> {
-        NETWORKS[1..].to_vec()
-    }
-
+    /// The networks of the accurate recipe: those of the paper's, and one for `eps = h`. `n64` to `n512` have the scales of the
+    /// convergence tests, `eps = 2^-6` and `tautilde = 2^-14`. The paper inpaints at `n = 1024` with `eps = 2^-8` and `tautilde = 2^-18`,
+    /// which are the same ratios as those of the training at `n = 256`. The network of the surfaces serves `n = 64` with `eps = 2^-5` and
+    /// `tautilde = 2^-12`; it is trained at `n = 128`, where the smallest sphere measures six cells.
+    pub const ACCURATE: &'static [Self] = &[
+        Self::new("n64", Ratios::of_run(2, 9, 1.0, 1.0, 0.25), 64),
+        Self::new("n128", Ratios::of_run(2, 17, 1.0, 2.0, 1.0), 128),
+        Self::new("n256", Ratios::of_run(2, 33, 1.0, 4.0, 4.0), 256),
+        Self::new("n512", Ratios::of_run(2, 65, 1.0, 8.0, 16.0), 512),
+        Self::new("inpainting", Ratios::of_run(2, 17, 1.0, 4.0, 4.0), 256),
+        Self::new("surfaces", Ratios::of_run(3, 17, 1.0, 2.0, 1.0), 128),
+    ];
+    pub const PAPER: &'static [Self] = Self::ACCURATE.split_at(1).1;
     /// The networks of the paper's convergence tests, each with twice the resolution of the one before.
-    pub fn convergence() -> Vec<Self> {
-        NETWORKS[1..4].to_vec()
-    }
+    pub const CONVERGENCE: &'static [Self] = Self::PAPER.split_at(3).0;
+    pub const SURFACES: Self = Self::PAPER[4];
 
-    pub fn surfaces() -> Self {
-        NETWORKS[5]
-    }
-
-    pub fn data(&self, quick: bool) -> Result<SphereData, Error> {
+    pub fn data(&self, quick: bool) -> Result<SphereData> {
         let data = SphereData::new(self.ratios, self.cells)?;
         Ok(if quick { data.quick() } else { data })
     }
 }
 
 /// Training needs double precision: the given device if it has that, else a CPU.
-pub fn training_device(device: &ComputeDevice) -> Result<ComputeDevice, Error> {
+pub fn training_device(device: &ComputeDevice) -> Result<ComputeDevice> {
     if device.kind().is_cpu() {
         return Ok(device.clone());
     }
@@ -92,7 +70,7 @@ pub fn train<R: Recipe>(
     (spec, recipe): (&NetworkSpec, &R),
     file: &Path,
     stage: &Stage<'_>,
-) -> Result<Trained, Error> {
+) -> Result<Trained> {
     let training = Training {
         recipe,
         data: spec.data(stage.options.quick)?,

@@ -1,6 +1,6 @@
 //! Runs against the exact flow of their curves, and of their surfaces of revolution.
 
-use engine::{Storage, estimated_time_error};
+use engine::estimated_time_error;
 use geometry::contour::zero_level;
 use geometry::distance_from_phase_field;
 use reference::revolution::{self, Surface};
@@ -108,7 +108,7 @@ pub fn controlled(control: ErrorControl, (end, halvings): (f64, u32)) -> TimeSte
 
 impl<const D: usize> Sample<D> {
     /// The exact flow at times, each with a number that names it.
-    pub fn exact(&self, flow: Flow, marks: &[(usize, f64)]) -> Result<Vec<Truth>, Error> {
+    pub fn exact(&self, flow: Flow, marks: &[(usize, f64)]) -> Result<Vec<Truth>> {
         let flow = match flow {
             Flow::Willmore => reference::Flow::Willmore,
             Flow::MeanCurvature => reference::Flow::MeanCurvature,
@@ -128,11 +128,11 @@ impl<const D: usize> Sample<D> {
     /// Willmore flow on `n` cells per unit length, so many to `eps`, up to a time in such steps.
     pub fn run(
         &self,
-        session: &mut Session<'_>,
+        session: &mut Session,
         (n, eps_over_h): (usize, f64),
         variant: (Method, Scheme),
         (name, steps, end): (&str, TimeSteps, f64),
-    ) -> Result<Trajectory<D>, Error> {
+    ) -> Result<Trajectory<D>> {
         let grid = Grid::<D>::per_unit(n, self.side)?;
         let initial = (self.initial)(grid, eps_over_h * grid.spacing())?;
         let name = format!("{}-n{n}-{name}", self.key);
@@ -145,11 +145,11 @@ impl<const D: usize> Sample<D> {
     /// `KEY.extrapolated`.
     pub fn second_order(
         &self,
-        session: &mut Session<'_>,
+        session: &mut Session,
         n: usize,
         ramp: (f64, u32),
         exact: &[&Truth],
-    ) -> Result<[Vec<Reached>; 2], Error> {
+    ) -> Result<[Vec<Reached>; 2]> {
         let steps = controlled(ErrorControl::default(), ramp);
         let run = ("controlled", steps, last(exact));
         let run = self.run(session, (n, 2.0), ACCURATE, run)?;
@@ -164,10 +164,10 @@ impl<const D: usize> Sample<D> {
     /// two on which a corner is round by then. Adds the metrics `KEY.extrapolated`. A quick look takes coarser ones.
     pub fn extrapolated(
         &self,
-        session: &mut Session<'_>,
+        session: &mut Session,
         ramp: (f64, u32),
         exact: &[&Truth],
-    ) -> Result<Vec<Reached>, Error> {
+    ) -> Result<Vec<Reached>> {
         // With two cells to eps the lattice holds slow flows back by as much as the extrapolation leaves. In space no network has more.
         let (cells, eps_over_h): (&[usize], f64) = match (D, session.options.quick) {
             (2, false) => (&[256, 512], 4.0),
@@ -210,11 +210,11 @@ fn last(exact: &[&Truth]) -> f64 {
 
 /// Willmore flow of a phase field with so many cells to `eps`, a shape of this name, up to a time in such steps.
 pub fn flow<const D: usize>(
-    session: &mut Session<'_>,
+    session: &mut Session,
     (shape, initial, eps_over_h): (&str, Field<D>, f64),
     variant: (Method, Scheme),
     (name, steps, end): (&str, TimeSteps, f64),
-) -> Result<Trajectory<D>, Error> {
+) -> Result<Trajectory<D>> {
     let newton = match steps.order {
         Order::First => NewtonParams::default(),
         Order::Controlled(STRICT) => NewtonParams {
@@ -233,7 +233,7 @@ pub fn flow<const D: usize>(
     if grid.len() > MOST_STORED {
         operator.storage = Storage::Auto;
     }
-    let mut case = willmore_flow(shape, initial, operator, scales, (steps, 1));
+    let mut case = Case::willmore(shape, initial, operator, scales, (steps, 1));
     case.stops = vec![Stop::Time(end)];
     case.measures = Measure::crossings(0.0);
     session.trajectory(name, case, name, &Samples::every(1))
@@ -280,7 +280,7 @@ impl Truth {
     }
 
     /// Adds its sizes as metrics `KEY.exact.SIZE.stepMARK`.
-    pub fn record(&self, session: &mut Session<'_>, key: &str) -> Result<(), Error> {
+    pub fn record(&self, session: &mut Session, key: &str) -> Result<()> {
         record(session, &format!("{key}.exact"), self.mark, &self.sizes)
     }
 }
@@ -303,12 +303,7 @@ fn profile(field: &Field<3>, eps: f64) -> Result<Vec<[f64; 2]>, surfaces::Error>
 }
 
 /// Adds metrics `KEY.NAME.stepMARK`.
-fn record(
-    session: &mut Session<'_>,
-    key: &str,
-    mark: usize,
-    numbers: &Numbers,
-) -> Result<(), Error> {
+fn record(session: &mut Session, key: &str, mark: usize, numbers: &Numbers) -> Result<()> {
     let mut numbers = numbers.iter();
     numbers
         .try_for_each(|(name, value)| session.metric(&format!("{key}.{name}.step{mark}"), *value))
@@ -318,6 +313,12 @@ fn record(
 pub fn until<const D: usize>(run: &Trajectory<D>, time: f64) -> &[Record] {
     let earlier = |record: &Record| record.time < time * (1.0 - 1e-9);
     &run.records[..=run.records.partition_point(earlier)]
+}
+
+/// The last of them.
+pub fn at<const D: usize>(run: &Trajectory<D>, time: f64) -> &Record {
+    let so_far = until(run, time);
+    &so_far[so_far.len() - 1]
 }
 
 /// What a run has reached at a time at which one of its steps ends.
@@ -344,9 +345,9 @@ impl Reached {
         sample: &Sample<D>,
         run: &Trajectory<D>,
         exact: &Truth,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let so_far = until(run, exact.time());
-        let last = &so_far[so_far.len() - 1];
+        let last = at(run, exact.time());
         let (field, eps) = (run.field(last.step)?, run.case.scales.eps);
         let zero_set = ZeroSet::of(&field, eps)?;
         let points = (sample.level)(&field, eps)?;
@@ -361,7 +362,7 @@ impl Reached {
             sizes: exact.sizes.keys().map(|&name| (name, size(name))).collect(),
             distance: exact.outline.largest_distance_of(&points),
             points,
-            hvp: so_far.iter().filter_map(Record::hvp).sum(),
+            hvp: total_hvp(so_far),
             seconds: so_far.iter().map(|record| record.seconds).sum(),
             steps: so_far.len(),
             estimated: estimated_time_error(so_far).unwrap_or(0.0),
@@ -369,7 +370,7 @@ impl Reached {
     }
 
     /// Adds it as metrics `KEY.NAME.stepMARK`.
-    fn record(&self, session: &mut Session<'_>, key: &str) -> Result<(), Error> {
+    fn record(&self, session: &mut Session, key: &str) -> Result<()> {
         let mut numbers = self.sizes.clone();
         numbers.extend([
             ("distance_to_exact", self.distance),

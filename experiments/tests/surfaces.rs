@@ -4,8 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::{Summary, read_summary, refused, run};
-use engine::{Record, Run, Scheme, StepRule, energy_increases};
-use experiments::flows::willmore_flow;
+use engine::{Case, Record, Run, Scheme, StepRule, energy_increases};
 use experiments::networks::Chosen;
 use experiments::surfaces::{centred_box, needed_network, scales};
 use geometry::measure::{l2_distance, zero_set_volume};
@@ -255,7 +254,7 @@ fn flow(initial: &Field<3>, n: usize, steps: usize) -> (Field<3>, Vec<Record>) {
     let device = ComputeDevice::default_compiled().unwrap();
     let operator = Chosen::default().learned(Scheme::Paper, &needed_network());
     let time = (StepRule::Constant(TAU), steps);
-    let case = willmore_flow("shape", initial.clone(), operator.unwrap(), scales(n), time);
+    let case = Case::willmore("shape", initial.clone(), operator.unwrap(), scales(n), time);
     let mut run = Run::new(case, &device).unwrap();
     run.advance(None, &mut [], &Interrupt::never()).unwrap();
     (run.field().clone(), run.records().to_vec())

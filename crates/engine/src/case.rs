@@ -37,6 +37,29 @@ pub struct Case<const D: usize> {
 }
 
 impl<const D: usize> Case<D> {
+    /// Willmore flow everywhere, with nothing held, until so many steps are made; the [size](Measure::size) is measured.
+    pub fn willmore(
+        shape: &str,
+        initial: Field<D>,
+        operator: Operator,
+        scales: Scales,
+        (steps, count): (impl Into<TimeSteps>, usize),
+    ) -> Self {
+        Self {
+            shape: shape.to_owned(),
+            initial,
+            region: None,
+            energy: Helfrich::default(),
+            held: Held::default(),
+            flow: Flow::Willmore,
+            operator,
+            scales,
+            steps: steps.into(),
+            stops: vec![Stop::Steps(count)],
+            measures: Measure::size(scales.eps),
+        }
+    }
+
     /// The grid.
     pub fn grid(&self) -> &Grid<D> {
         self.initial.grid()

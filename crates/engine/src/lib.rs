@@ -78,6 +78,7 @@ pub use observer::{Event, Observer, Samples};
 pub use operator::{Flow, Method, Operator, Scales, Scheme, quarter_square};
 pub use record::{
     Record, Values, energy_increases, estimated_time_error, mean_hvp, minimizations, to_csv,
+    total_hvp,
 };
 pub use run::{Ending, Run};
 pub use solver::Helfrich;

@@ -91,10 +91,14 @@ pub fn estimated_time_error(records: &[Record]) -> Option<f64> {
     Some(ESTIMATES_MISS * delay? * rate)
 }
 
+/// All Hessian-vector products.
+pub fn total_hvp(records: &[Record]) -> f64 {
+    records.iter().filter_map(Record::hvp).sum()
+}
+
 /// Hessian-vector products per minimization.
 pub fn mean_hvp(records: &[Record]) -> f64 {
-    let hvp: f64 = records.iter().filter_map(Record::hvp).sum();
-    hvp / records.len().max(1) as f64
+    total_hvp(records) / records.len().max(1) as f64
 }
 
 /// All records as CSV, with a column for each measure.

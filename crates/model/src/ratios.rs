@@ -19,7 +19,7 @@ pub struct Ratios {
 
 impl Ratios {
     /// The ratios of a run with interface width `eps` and inner step `mcf_step` on a grid of spacing `h`.
-    pub fn of_run(dimension: usize, width: usize, h: f64, eps: f64, mcf_step: f64) -> Self {
+    pub const fn of_run(dimension: usize, width: usize, h: f64, eps: f64, mcf_step: f64) -> Self {
         Self {
             dimension,
             width,

@@ -269,12 +269,15 @@ fn log_ticks(low: f64, high: f64, target: usize) -> Ticks {
 
 /// `10⁻³` for -3.
 pub(crate) fn power_of_ten(exponent: i32) -> String {
+    format!("10{}", superscript(exponent))
+}
+
+/// `⁻³` for -3.
+pub fn superscript(exponent: i32) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     let digits = exponent.to_string();
-    let raised = digits
-        .chars()
-        .map(|c| c.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize]));
-    format!("10{}", raised.collect::<String>())
+    let raised = |c: char| c.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize]);
+    digits.chars().map(raised).collect()
 }
 
 /// A real minus sign, and none on zero.

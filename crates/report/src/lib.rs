@@ -71,7 +71,7 @@ mod surface;
 mod svg;
 mod table;
 
-pub use axis::Axis;
+pub use axis::{Axis, superscript};
 pub use colour::{Colour, OKABE_ITO, viridis};
 pub use error::{Error, Result};
 pub use figure::Figure;

@@ -28,6 +28,6 @@ pub struct Options {
     flow: MeshFlowOptions,
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     ARMADILLO_FLOW.run(&options.flow, |_, _| Ok(String::new()))
 }

@@ -9,8 +9,6 @@ use model::training::SphereData;
 use model::{Calibration, NamedNetwork, Network, Shipped, displacement_errors};
 use solver::Factors;
 
-const PROGRAM: &str = "calibration";
-
 const RADII: [f64; 7] = [0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6];
 const QUICK_RADII: [f64; 2] = [0.15, 0.3];
 /// Distance of a disc to the box's boundary.
@@ -33,7 +31,7 @@ const ELEMENTS: [[f64; 2]; 2] = [[2.0, 1.0], [4.0, 4.0]];
 /// either phase with the one that the scheme finds, and the energy of balls and Clifford tori with the exact one; draws what
 /// tells good networks from bad ones.
 #[derive(Parser, Debug)]
-#[command(name = PROGRAM, version)]
+#[command(name = "calibration", version)]
 pub struct Options {
     #[command(flatten)]
     run: RunOptions,
@@ -47,43 +45,43 @@ pub struct Options {
     install: Option<PathBuf>,
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let run = &options.run;
-    let mut networks = Vec::new();
+    let mut networks: Vec<(String, Network)> = Vec::new();
     for path in &options.network {
         let network = Network::load(path)?;
-        let name = network.ratios().file_name();
-        networks.push(NamedNetwork { name, network });
+        networks.push((network.ratios().file_name(), network));
     }
     if networks.is_empty() {
         for (name, network) in [Shipped::Paper.all()?, Shipped::Accurate.all()?].concat() {
-            let name = name.to_owned();
-            networks.push(NamedNetwork { name, network });
+            networks.push((name.to_owned(), network));
         }
     }
     networks.truncate(run.either(1, usize::MAX));
-    let checksums = (networks.iter()).map(|one| (&one.name, one.network.fingerprint()));
+    let checksums = (networks.iter()).map(|(name, network)| (name, network.fingerprint()));
     let parameters = json!({
         "networks": checksums.collect::<BTreeMap<_, _>>(),
         "eps": EPS,
         "inner_step": STEP,
         "time_step": STEP_RATIO * STEP,
     });
-    let mut session = Session::open(PROGRAM, run, parameters)?;
+    let mut session = Session::open("calibration", run, parameters)?;
     let install = options.install.as_ref().map(OutputDir::create);
     let install = install.transpose()?;
-    let mut all = Vec::new();
-    for NamedNetwork { name, network } in networks {
+    let (mut all, mut rows) = (Vec::new(), Vec::new());
+    for (name, network) in networks {
         let calibration = session.phase(&name, |_| Ok(network.calibrate()?))?;
         let network = network.with_calibration(Some(calibration));
         if let Some(install) = &install {
             network.save(&install.path(&name)?)?;
         }
-        all.push(Calibrated {
-            named: NamedNetwork { name, network },
-            calibration,
-        });
+        let (summary, key) = (&mut session.summary, key(&name));
+        summary.insert_record(key, &calibration)?;
+        summary.insert_record(key, &calibration.factors)?;
+        rows.push((name.clone(), calibration));
+        all.push(NamedNetwork { name, network });
     }
+    rows.extend(elements()?);
     let discs = session.phase("discs", |stage| discs(&all, stage))?;
     let surfaces = session.phase("balls and tori", |stage| balls_and_tori(&all, stage))?;
     let diagnosed = session.phase("diagnostics", |stage| diagnostics(&all, stage))?;
@@ -94,8 +92,6 @@ pub fn program(options: &Options) -> Result<(), Error> {
     output.write_json("diagnostics.json", &diagnosed)?;
     output.write_csv("discs.csv", &discs)?;
     output.write_csv("surfaces.csv", &surfaces)?;
-    let learned = (all.iter()).map(|one| (one.named.name.clone(), one.calibration));
-    let rows: Vec<(String, Calibration)> = learned.chain(elements()?).collect();
     let small = Scientific(1);
     let factors = Sheet::of(&rows)
         .text("network", |(name, _)| name)
@@ -124,41 +120,34 @@ pub fn program(options: &Options) -> Result<(), Error> {
         .column("w / exact", Fixed(4), |r| r.measured)
         .column("calibrated w / exact", Fixed(4), |r| r.calibrated);
     session.sheet(of_surfaces, "surfaces_table")?;
-    for one in &all {
-        let (key, calibration) = (one.key(), &one.calibration);
-        session.summary.insert_record(key, calibration)?;
-        session.summary.insert_record(key, &calibration.factors)?;
-    }
     session.finish("Calibration of the learned operators and of finite elements")
 }
 
-#[derive(Clone)]
-struct Calibrated {
-    named: NamedNetwork,
-    calibration: Calibration,
+/// Name of a network in metrics.
+fn key(name: &str) -> &str {
+    name.trim_end_matches(".safetensors")
 }
 
-impl Calibrated {
-    fn key(&self) -> &str {
-        self.named.name.trim_end_matches(".safetensors")
-    }
+/// The same network with the odd part of its activation.
+fn odd_part(one: &NamedNetwork) -> NamedNetwork {
+    let (name, network) = (one.name.clone(), one.network.odd_part());
+    NamedNetwork { name, network }
+}
 
-    /// Willmore energy and phase field after one small step with these factors.
-    fn relaxed<const D: usize>(
-        &self,
-        initial: &Field<D>,
-        scales: Scales,
-        factors: Factors,
-        device: &ComputeDevice,
-    ) -> Result<(f64, Field<D>), Error> {
-        let mut operator = Operator::learned(Scheme::Paper, self.named.clone())?;
-        operator.factors = factors;
-        let time = (StepRule::Constant(STEP_RATIO * scales.mcf_step), 1);
-        let case = willmore_flow("surface at rest", initial.clone(), operator, scales, time);
-        let mut run = Run::new(case, device)?;
-        let energy = run.step()?.and_then(Record::willmore_energy);
-        Ok((energy.unwrap_or(f64::NAN), run.field().clone()))
-    }
+/// Willmore energy and phase field after one small step with these factors.
+fn relaxed<const D: usize>(
+    (named, factors): (&NamedNetwork, Factors),
+    initial: &Field<D>,
+    scales: Scales,
+    device: &ComputeDevice,
+) -> Result<(f64, Field<D>)> {
+    let mut operator = Operator::learned(Scheme::Paper, named.clone())?;
+    operator.factors = factors;
+    let time = (StepRule::Constant(STEP_RATIO * scales.mcf_step), 1);
+    let case = Case::willmore("surface at rest", initial.clone(), operator, scales, time);
+    let mut run = Run::new(case, device)?;
+    let energy = run.step()?.and_then(Record::willmore_energy);
+    Ok((energy.unwrap_or(f64::NAN), run.field().clone()))
 }
 
 /// The Willmore energy that the scheme sees in a disc.
@@ -178,11 +167,11 @@ struct DiscRow {
 }
 
 /// Discs of either phase by every network with the scales of the convergence tests up to `n = 256`, and by its odd part.
-fn discs(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<DiscRow>, Error> {
+fn discs(all: &[NamedNetwork], stage: &Stage<'_>) -> Result<Vec<DiscRow>> {
     let radii = stage.options.either(&QUICK_RADII[..], &RADII);
     let mut variants = Vec::new();
     for one in all {
-        let ratios = one.named.network.ratios();
+        let ratios = one.network.ratios();
         // At which the network has the scales of the convergence tests, if it does at all.
         let n = (ratios.eps_over_h / EPS).round();
         let fits = ratios.dimension == 2 && (ratios.step_over_h2 - n * n * STEP).abs() < 1e-9;
@@ -190,38 +179,36 @@ fn discs(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<DiscRow>, Error> {
             continue;
         }
         variants.push((n, false, one.clone()));
-        if !one.key().starts_with("accurate") {
-            let mut odd = one.clone();
-            odd.named.network = one.named.network.odd_part();
-            odd.calibration = odd.named.network.calibrate()?;
-            variants.push((n, true, odd));
+        if !one.name.starts_with("accurate") {
+            variants.push((n, true, odd_part(one)));
         }
     }
     let mut tasks = Vec::new();
-    for variant in &variants {
+    for (n, odd, one) in &variants {
+        let calibration = one.network.calibration()?;
         for &radius in radii {
-            tasks.extend([1, -1].map(|phase| (variant, radius, phase)));
+            tasks.extend([1, -1].map(|phase| (*n, *odd, one, calibration, radius, phase)));
         }
     }
     stage.bar.set_length(tasks.len() as u64);
     harness::in_parallel(tasks.len(), harness::workers(stage.device), |i| {
-        let (&(n, odd_part, ref one), radius, phase) = tasks[i];
-        let (sign, factors) = (f64::from(phase), one.calibration.factors);
-        let offset = one.calibration.spontaneous_curvature / EPS * sign;
+        let (n, odd_part, one, calibration, radius, phase) = tasks[i];
+        let (sign, factors) = (f64::from(phase), calibration.factors);
+        let offset = calibration.spontaneous_curvature / EPS * sign;
         let half = ((radius + MARGIN) * n).ceil();
         let grid = Grid::<2>::centred(2 * half as usize, 2.0 * half / n)?;
         let disc = phase_field(grid, &Ball::new([0.0, 0.0], radius)?, EPS)?;
         let disc = disc.map(|u| sign * u);
         // Over that of the zero level set of the relaxed disc, `pi / R`.
-        let energy = |factors| -> Result<f64, Error> {
-            let (energy, field) = one.relaxed(&disc, scales(), factors, stage.device)?;
+        let energy = |factors| -> Result<f64> {
+            let (energy, field) = relaxed((one, factors), &disc, scales(), stage.device)?;
             let inside = zero_set_volume(&field);
             let outside = grid.side().powi(2) - inside;
             let area = if phase > 0 { inside } else { outside };
             Ok(energy * (area / PI).sqrt() / PI)
         };
         let row = DiscRow {
-            network: one.named.name.clone(),
+            network: one.name.clone(),
             odd_part,
             phase,
             radius,
@@ -273,7 +260,7 @@ struct SurfaceRow {
     calibrated: f64,
 }
 
-fn balls_and_tori(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<SurfaceRow>, Error> {
+fn balls_and_tori(all: &[NamedNetwork], stage: &Stage<'_>) -> Result<Vec<SurfaceRow>> {
     let grid = Grid::<3>::per_unit(SURFACE_CELLS, SURFACE_SIDE)?;
     let scales = surfaces::scales(SURFACE_CELLS);
     let mut shapes: Vec<(String, Field<3>, f64)> = Vec::new();
@@ -289,19 +276,18 @@ fn balls_and_tori(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<SurfaceRo
         shapes.truncate(1);
     }
     let mut rows = Vec::new();
-    let is_solid = |one: &&Calibrated| one.named.network.ratios().dimension == 3;
+    let is_solid = |one: &&NamedNetwork| one.network.ratios().dimension == 3;
     for one in all.iter().filter(is_solid) {
-        let mut odd = one.clone();
-        odd.named.network = one.named.network.odd_part();
+        let (odd, factors) = (odd_part(one), one.network.calibration()?.factors);
         for (surface, initial, exact) in &shapes {
-            let energy = |factors| -> Result<f64, Error> {
-                Ok(odd.relaxed(initial, scales, factors, stage.device)?.0 / exact)
+            let energy = |factors| -> Result<f64> {
+                Ok(relaxed((&odd, factors), initial, scales, stage.device)?.0 / exact)
             };
             rows.push(SurfaceRow {
-                network: one.named.name.clone(),
+                network: one.name.clone(),
                 surface: surface.clone(),
                 measured: energy(Factors::PAPER)?,
-                calibrated: energy(one.calibration.factors)?,
+                calibrated: energy(factors)?,
             });
         }
     }
@@ -319,15 +305,14 @@ struct Diagnostics {
     bend: Vec<[f64; 2]>,
 }
 
-fn diagnostics(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<Diagnostics>, Error> {
+fn diagnostics(all: &[NamedNetwork], stage: &Stage<'_>) -> Result<Vec<Diagnostics>> {
     let count: usize = if stage.options.quick { 3 } else { 12 };
     // Kernels of width 65 have a thousand planes; surfaces have millions of nodes.
     let small = all.iter().filter(|one| {
-        let ratios = one.named.network.ratios();
+        let ratios = one.network.ratios();
         ratios.width < 65 && ratios.dimension == 2
     });
-    let diagnose = |one: &Calibrated| {
-        let network = &one.named.network;
+    let diagnose = |NamedNetwork { name, network }: &NamedNetwork| {
         let data = SphereData::new(network.ratios(), network.provenance().reference_cells)?;
         let mut displacement = Vec::new();
         for i in 0..count {
@@ -339,7 +324,7 @@ fn diagnostics(all: &[Calibrated], stage: &Stage<'_>) -> Result<Vec<Diagnostics>
         displacement.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let bend = (0..=400).map(|i| f64::from(i) / 200.0 - 1.0);
         Ok(Diagnostics {
-            network: one.key().to_owned(),
+            network: key(name).to_owned(),
             displacement,
             spectrum: network.flat_spectrum()?,
             bend: bend.map(|w| [w, network.activation().jet(w)[2]]).collect(),
@@ -380,20 +365,18 @@ fn diagnostics_figure(all: &[Diagnostics]) -> Figure {
         .with_shared_legend()
 }
 
-fn elements() -> Result<Vec<(String, Calibration)>, Error> {
+fn elements() -> Result<Vec<(String, Calibration)>> {
     let (plane, space) = (Grid::<2>::centred(16, 16.0)?, Grid::<3>::centred(8, 8.0)?);
     let name = |kind, [eps, step]: [f64; 2]| format!("FE {kind}, eps = {eps} h, step = {step} h²");
     let mut all = Vec::new();
     for ratios @ [eps, step] in ELEMENTS {
-        let implicit = FiniteElementStep::implicit(&plane, eps, step)?;
-        all.push((name("implicit, 2D", ratios), implicit.calibrate()?));
-        let semi_implicit = FiniteElementStep::semi_implicit(&plane, eps, step)?;
-        all.push((
-            name("semi-implicit, 2D", ratios),
-            semi_implicit.calibrate()?,
-        ));
+        let implicit = FiniteElementStep::implicit(&plane, eps, step)?.calibrate()?;
+        let semi = FiniteElementStep::semi_implicit(&plane, eps, step)?.calibrate()?;
+        all.push((name("implicit, 2D", ratios), implicit));
+        all.push((name("semi-implicit, 2D", ratios), semi));
     }
-    let implicit = FiniteElementStep::implicit(&space, ELEMENTS[0][0], ELEMENTS[0][1])?;
-    all.push((name("implicit, 3D", ELEMENTS[0]), implicit.calibrate()?));
+    let [eps, step] = ELEMENTS[0];
+    let implicit = FiniteElementStep::implicit(&space, eps, step)?.calibrate()?;
+    all.push((name("implicit, 3D", ELEMENTS[0]), implicit));
     Ok(all)
 }

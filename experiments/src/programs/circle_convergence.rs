@@ -3,10 +3,7 @@
 use crate::circles::{self, Circle, Ensemble};
 use crate::prelude::*;
 use crate::session::remove_folder;
-use crate::steps;
-use crate::study::{Study, StudyOptions, Variant};
 
-const PROGRAM: &str = "circle_convergence";
 /// Steps at which tables and summaries give the error.
 const SHOWN_STEPS: [usize; 5] = [1, 8, 16, 32, 64];
 /// Folder of finished circles, until all are finished.
@@ -15,7 +12,7 @@ const FINISHED: &str = "partial";
 /// Mean curvature flow by all methods and Willmore flow by the learned operator (with --full by all) of 30 circles, eps = 2^-6, 64
 /// steps of 2^-14: L2 distance to the exact solution over time, mean over the radii 0.05 pi + 0.15 pi i/30.
 #[derive(Parser, Debug)]
-#[command(name = PROGRAM, version)]
+#[command(name = "circle_convergence", version)]
 pub struct Options {
     #[command(flatten)]
     study: StudyOptions,
@@ -36,43 +33,32 @@ impl Options {
         let usual = |method: Method, _| method.is_learned() || self.study.full;
         let mut willmore = self.study.variants(Flow::Willmore, usual);
         willmore.retain(|variant| variant.method.is_learned() || variant.n <= limit);
-        let mut variants = self.study.variants(Flow::MeanCurvature, |_, _| true);
-        variants.extend(willmore);
-        variants
+        let mean_curvature = self.study.variants(Flow::MeanCurvature, |_, _| true);
+        [mean_curvature, willmore].concat()
     }
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let run = &options.study.run;
     let (all, steps) = run.either((4, 8), (circles::COUNT, circles::STEPS));
     let count = options.circles.unwrap_or(all);
-    require(
-        (1..=circles::COUNT).contains(&count),
-        format!(
-            "--circles must be from 1 to {}, not {count}",
-            circles::COUNT
-        ),
-    )?;
+    let most = circles::COUNT;
+    let message = format!("--circles must be from 1 to {most}, not {count}");
+    require((1..=most).contains(&count), message)?;
     let variants = options.variants();
     let study = Study::new(&options.study.networks, &variants)?;
     let parameters = json!({
-        "cells": study.cells,
-        "runs": study.variants().collect::<Vec<_>>(),
-        "circles": count,
-        "steps": steps,
-        "eps": EPS,
-        "time_step": STEP,
-        "networks": study.checksums(),
+        "cells": study.cells, "runs": study.variants().collect::<Vec<_>>(), "networks": study.checksums(),
+        "circles": count, "steps": steps, "eps": EPS, "time_step": STEP,
     });
-    let mut session = Session::open(PROGRAM, run, parameters)?;
+    let mut session = Session::open("circle_convergence", run, parameters)?;
     let mut ensembles = Vec::new();
     for planned in &study.plan {
         let Variant { flow, n, .. } = planned.0;
         let title = format!("{}, {}, n = {n}", flow.title(), planned.0.label());
-        let ensemble = session.phase(title, |stage| {
+        ensembles.push(session.phase(title, |stage| {
             Ensemble::run(planned, (count, steps), FINISHED, stage)
-        })?;
-        ensembles.push(ensemble);
+        })?);
     }
     let report = Report {
         study,
@@ -93,10 +79,6 @@ struct Report {
     study: Study,
     ensembles: Vec<Ensemble>,
     steps: usize,
-}
-
-fn time(step: usize) -> f64 {
-    step as f64 * STEP
 }
 
 impl Report {
@@ -121,7 +103,7 @@ impl Report {
         })
     }
 
-    fn figures(&self, session: &Session<'_>) -> Result<(), Error> {
+    fn figures(&self, session: &Session) -> Result<()> {
         let (steps, end) = (self.steps, time(self.steps));
         let mut over_time = self.flows("time t", "mean L² error", |e| {
             let points = (0..=steps).map(|k| [time(k), e.mean_error(k)]);
@@ -185,7 +167,7 @@ impl Report {
     fn cost(&self) -> Figure {
         let steps = self.steps;
         let own = |look| (self.of_flow(Flow::Willmore)).filter(move |e| e.variant.look() == look);
-        let shown = look::variants(|look| own(look).next().is_some());
+        let shown = look::variants().filter(|&look| own(look).next().is_some());
         let curves = shown.map(|(method, scheme)| {
             let cells: Vec<String> = own((method, scheme))
                 .map(|e| e.variant.n.to_string())
@@ -207,7 +189,7 @@ impl Report {
             ))
     }
 
-    fn data(&self, session: &Session<'_>) -> Result<(), Error> {
+    fn data(&self, session: &Session) -> Result<()> {
         let times = (self.ensembles.iter()).flat_map(|e| (0..=self.steps).map(move |k| (e, k)));
         let times: Vec<(&Ensemble, usize)> = times.collect();
         let curves = Sheet::of(&times).data("flow", |(e, _)| e.variant.flow.to_string());

@@ -8,7 +8,7 @@ use crate::smoothing::{LAPLACIAN, TAUBIN, fairing_flow, mesh_raster, rms_distanc
 use crate::surfaces::centred_box;
 use engine::DISPLACEMENT;
 use rand::{RngExt, SeedableRng};
-use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, samples, usual_up_axis};
+use surfaces::{Fairing, samples, usual_up_axis};
 
 const TITLE: &str = "Noise of meshes taken off";
 /// Standard deviations along the normals, in percent of the longest side.
@@ -66,7 +66,7 @@ struct Quality {
     volume: f64,
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let quick = options.run.quick;
     let noises = if quick { &NOISES[..1] } else { &NOISES };
     let cells = if quick { 64 } else { CELLS };
@@ -114,11 +114,11 @@ pub fn program(options: &Options) -> Result<(), Error> {
 
 /// A mesh with noise, and what `fair`, Taubin's and Laplacian smoothing make of it, and the distances over the number of iterations.
 fn denoise<'a>(
-    session: &mut Session<'_>,
+    session: &mut Session,
     clean: &'a Clean,
     noise: f64,
     cells: usize,
-) -> Result<(Vec<Row<'a>>, LineChart), Error> {
+) -> Result<(Vec<Row<'a>>, LineChart)> {
     let noisy = clean.with_noise(noise, session.options.seed);
     let row = |method, iterations, result: TriangleMesh, seconds| Row {
         clean,
@@ -141,8 +141,8 @@ fn denoise<'a>(
     for (colour, method, factors) in [(1, "Taubin", TAUBIN), (2, "Laplacian", LAPLACIAN)] {
         let clock = Instant::now();
         let smoothed = |count| noisy.smoothed(count, factors[0], factors[1]);
-        let all = (1..=ITERATIONS).map(|count| clean.quality(&smoothed(count)));
-        let all: Vec<Quality> = all.collect();
+        let quality = |count| clean.quality(&smoothed(count));
+        let all: Vec<Quality> = (1..=ITERATIONS).map(quality).collect();
         let seconds = clock.elapsed().as_secs_f64() / ITERATIONS as f64;
         let best = (2..ITERATIONS).min_by(|&a, &b| all[a].rms.total_cmp(&all[b].rms));
         let best = best.unwrap_or(2) + 1;
@@ -156,12 +156,10 @@ fn denoise<'a>(
         curves.push(curve.with_colour(colour));
     }
     let [noisy, fair, taubin] = [0, 1, 2].map(|k: usize| rows[k].quality);
+    let (distances, normals) = (fair.rms / taubin.rms, fair.normals / least_normals[0]);
     let ratios = [
-        ("fair_over_taubin", (fair.rms / taubin.rms).into()),
-        (
-            "normals_over_taubin",
-            (fair.normals / least_normals[0]).into(),
-        ),
+        ("fair_over_taubin", distances.into()),
+        ("normals_over_taubin", normals.into()),
     ];
     session.metrics(&clean.key(noise), ratios)?;
     let level = |name, quality: Quality| {
@@ -176,7 +174,7 @@ fn denoise<'a>(
 }
 
 /// The built-in shapes, and the meshes that are chosen or here.
-fn clean_meshes(options: &Options) -> Result<Vec<Clean>, Error> {
+fn clean_meshes(options: &Options) -> Result<Vec<Clean>> {
     let mut meshes = vec![
         Clean::new("figure", samples::figure(96)?, UpAxis::Y),
         Clean::new("lever", samples::lever(96)?, UpAxis::Z),
@@ -242,11 +240,11 @@ impl Clean {
 
 /// The noise taken off as `willmore fair` does at its defaults.
 fn fair(
-    session: &mut Session<'_>,
+    session: &mut Session,
     noisy: &TriangleMesh,
     cells: usize,
     title: &str,
-) -> Result<TriangleMesh, Error> {
+) -> Result<TriangleMesh> {
     let (closed, _) = ClosedMesh::new(noisy.clone())?;
     let fairing = Fairing::new(closed, noisy.noise(), |_| false);
     let grid = centred_box(cells, 1.0)?;

@@ -4,7 +4,6 @@ use crate::prelude::*;
 use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, VIEW};
 use crate::truth::{DISK, ELLIPSOID, Reached, Sample, THICK_DISK, Truth};
 
-const PROGRAM: &str = "disk_and_cube";
 /// Cells per unit length of a quick run and of the paper.
 const CELLS: [usize; 2] = [24, 64];
 const TAU: f64 = 1.0 / 262_144.0;
@@ -20,7 +19,7 @@ const DISK_ENERGIES: [(usize, f64); 3] = [(0, 87.15), (1, 50.49), (STEPS, 25.59)
 /// Willmore flow of a cube and of a thick disk, n = 64, eps = 2^-5, tautilde = 2^-12, tau = 2^-18, by the hybrid scheme and by
 /// nested implicit finite elements: pictures, Willmore energies w and L2 distances after 0, 1 and 100 steps.
 #[derive(Parser, Debug)]
-#[command(name = PROGRAM, version)]
+#[command(name = "disk_and_cube", version)]
 pub struct Options {
     #[command(flatten)]
     figure: FigureOptions,
@@ -50,15 +49,13 @@ impl Options {
     }
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let [radius, half_height] = THICK_DISK;
     let run = &options.figure.run;
     let steps = (options.steps).unwrap_or(if run.quick { 2 } else { STEPS });
     let variants = options.variants();
-    require(
-        steps > 0 && !variants.is_empty(),
-        "--steps must be at least 1, and --methods must name a method",
-    )?;
+    let message = "--steps must be at least 1, and --methods must name a method";
+    require(steps > 0 && !variants.is_empty(), message)?;
     let setting = Setting::new(&options.figure, CELLS, 1.0)?;
     let (n, grid, eps) = (setting.n, setting.grid, setting.scales.eps);
     let cube = Cuboid::new([CUBE_HALF_SIDE; 3])?.translated([0.5; 3]);
@@ -80,9 +77,9 @@ pub fn program(options: &Options) -> Result<(), Error> {
         "tau": TAU, "steps": steps, "variants": variants, "cube_half_side": CUBE_HALF_SIDE, "disk_radius": radius,
         "disk_half_height": half_height,
     }))?;
-    let session = Session::open(PROGRAM, run, parameters)?;
+    let session = Session::open("disk_and_cube", run, parameters)?;
     let flows = SurfaceFlows {
-        program: PROGRAM,
+        program: "disk_and_cube",
         title: "Willmore flow of a cube and of a thick disk".to_owned(),
         surfaces,
         variants,
@@ -110,11 +107,11 @@ struct Compared {
 /// Lets a surface flow in controlled steps of second order, and compares it and its extrapolation in `eps` with the exact flow after
 /// 1, 2, 4, ... 64 and all steps of the paper.
 fn compare_with_exact(
-    session: &mut Session<'_>,
+    session: &mut Session,
     sample: &Sample<3>,
     n: usize,
     (tau, steps): (f64, usize),
-) -> Result<Vec<Compared>, Error> {
+) -> Result<Vec<Compared>> {
     let powers = (0..=HALVINGS).map(|k| 1_usize << k).filter(|k| *k < steps);
     let marks = powers.chain([steps]).map(|k| (k, k as f64 * tau));
     let marks: Vec<(usize, f64)> = marks.collect();
@@ -156,10 +153,7 @@ fn sheet(rows: &[Compared], n: usize) -> Sheet<'_, Compared> {
 }
 
 /// Adds the L2 distances of the learned operators to the finite elements, where both ran, to captions and metrics.
-fn compare_with_finite_elements(
-    session: &mut Session<'_>,
-    all: &mut [Flowed],
-) -> Result<(), Error> {
+fn compare_with_finite_elements(session: &mut Session, all: &mut [Flowed]) -> Result<()> {
     let method = |one: &Flowed| one.trajectory.case.operator.method;
     let (elements, mut others): (Vec<_>, Vec<_>) =
         (all.iter_mut()).partition(|one| method(one) == Method::FeImplicit);

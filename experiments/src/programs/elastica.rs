@@ -21,7 +21,7 @@ pub struct Options {
     run: RunOptions,
 }
 
-pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
+pub fn program(Options { run: options }: &Options) -> Result<()> {
     let count = if options.quick { 1 } else { QUOTIENTS.len() };
     let parameters = json!({ "n": CELLS, "eps_over_h": 2, "quotients": QUOTIENTS[..count], "radius": RADIUS, "side": SIDE });
     let mut session = Session::open("elastica", options, parameters)?;
@@ -44,7 +44,7 @@ pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
         };
         let initial = equilibrium.start(grid, scales.eps, 0.0)?;
         let rule = (StepRule::ByEnergy(None), 1);
-        let case = willmore_flow("ellipse", initial, operator.clone(), scales, rule);
+        let case = Case::willmore("ellipse", initial, operator.clone(), scales, rule);
         all.push(equilibrium.relax(&mut session, case, None)?);
     }
     let panels = all.iter().map(|one| {

@@ -1,6 +1,5 @@
 //! The order of convergence of Willmore flow of an ellipse in h and in tau, against its own finest run.
 
-use crate::networks::Chosen;
 use crate::orders::{chart, refinements};
 use crate::prelude::*;
 
@@ -23,7 +22,7 @@ pub struct Options {
     run: RunOptions,
 }
 
-pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
+pub fn program(Options { run: options }: &Options) -> Result<()> {
     let (used, steps) = if options.quick { (3, 2) } else { (4, STEPS) };
     let parameters =
         json!({ "half_axes": HALF_AXES, "side": SIDE, "steps": steps, "tolerance": TOLERANCE });

@@ -6,7 +6,6 @@ use model::{NeededNetwork, Ratios};
 use report::Rgb;
 use solver::Precision;
 
-const PROGRAM: &str = "inpainting_2d";
 /// Cells per unit length of a quick run and of the paper.
 const CELLS: [usize; 2] = [256, 1024];
 const WIDTH: usize = 17;
@@ -27,7 +26,7 @@ const GREEN: Rgb = Rgb(0, 140, 60);
 /// Steps are made in parts of adaptive size where one minimization would be too much for them. A run ends when nothing moves any more.
 /// The paper has n = 1024; eps = 4/n and tautilde = 4/n^2.
 #[derive(Parser, Debug)]
-#[command(name = PROGRAM, version)]
+#[command(name = "inpainting_2d", version)]
 pub struct Options {
     #[command(flatten)]
     common: InpaintingOptions,
@@ -38,7 +37,7 @@ pub struct Options {
     printed_tautilde: bool,
 }
 
-fn shapes(quick: bool) -> Result<[Shape<2>; 2], Error> {
+fn shapes(quick: bool) -> Result<[Shape<2>; 2]> {
     let disk = Ball::new([0.0; 2], RADIUS)?;
     let corner = Cuboid::new([0.5 * (0.5 - CORNER); 2])?.translated([0.5 * (CORNER + 0.5); 2]);
     let steps = |papers: usize| if quick { 5 } else { papers };
@@ -69,7 +68,7 @@ fn shapes(quick: bool) -> Result<[Shape<2>; 2], Error> {
     Ok([disk, cross])
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let run = &options.common.figure.run;
     let n = options.common.figure.cells(CELLS);
     let grid = Grid::<2>::per_unit(n, 1.0)?.with_origin([-0.5; 2])?;
@@ -86,7 +85,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let operator = networks.learned(scheme, &needed)?;
     let shapes = shapes(run.quick)?;
     let parameters = inpainting::parameters((n, &scales), &operator, &shapes);
-    let mut session = Session::open(PROGRAM, run, parameters)?;
+    let mut session = Session::open("inpainting_2d", run, parameters)?;
     let mut trajectories = Vec::new();
     for shape in &shapes {
         let case = shape.case(grid, scales, &operator)?;
@@ -95,7 +94,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
     }
     let inpainted = shapes.iter().zip(&trajectories);
     let inpainted = inpainted.map(|(shape, trajectory)| Inpainted::measure(shape, trajectory));
-    let inpainted = inpainted.collect::<Result<Vec<_>, Error>>()?;
+    let inpainted = inpainted.collect::<Result<Vec<_>>>()?;
     for one in &inpainted {
         one.write_frames(&session, frames(one, n)?)?;
     }
@@ -103,7 +102,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
 }
 
 /// The shapes over time, D outlined in green.
-fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure, Error> {
+fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure> {
     let (trajectory, tau) = (one.trajectory, one.tau());
     let mut shown = vec![("step 0".to_owned(), trajectory.case.initial.clone())];
     for &k in INSIDE {

@@ -5,7 +5,6 @@ use crate::prelude::*;
 use crate::surfaces::{Flowed, Setting, Snapshot, Surface, VIEW, View, write_snapshots};
 use render::{Rgb, Tube};
 
-const PROGRAM: &str = "inpainting_3d";
 const TITLE: &str = "Inpainting of surfaces";
 /// Cells per unit length of a quick run and of the paper.
 const CELLS: [usize; 2] = [32, 128];
@@ -28,7 +27,7 @@ const GREEN: Rgb = Rgb(0, 140, 60);
 /// Frames are those of the paper's 5 and 8 steps of tau = 2^-21. Further steps follow, each twice as long as the one before, until
 /// nothing moves any more. The paper has n = 128; eps = 2/n and tautilde = 1/n^2.
 #[derive(Parser, Debug)]
-#[command(name = PROGRAM, version)]
+#[command(name = "inpainting_3d", version)]
 pub struct Options {
     #[command(flatten)]
     common: InpaintingOptions,
@@ -39,7 +38,7 @@ pub struct Options {
 }
 
 /// The shapes with the azimuths from which they are looked at. The last step shown is one on the way to the end.
-fn shapes(extra_steps: usize) -> Result<[(Shape<3>, f64); 2], Error> {
+fn shapes(extra_steps: usize) -> Result<[(Shape<3>, f64); 2]> {
     let ball = Ball::new([0.0; 3], RADIUS)?;
     let half = 0.5 * (0.5 - CORNER);
     let corner = Cuboid::new([half; 3])?.translated([CORNER + half; 3]);
@@ -83,23 +82,19 @@ fn growing(papers: usize) -> StepRule {
     }
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let run = &options.common.figure.run;
     let extra_steps = options.extra_steps;
-    require(
-        extra_steps <= MOST_EXTRA,
-        format!(
-            "--extra-steps {extra_steps} is too many: each step is twice as long as the one before; give at most {MOST_EXTRA}"
-        ),
-    )?;
+    let message = format!(
+        "--extra-steps {extra_steps} is too many: each step is twice as long as the one before; give at most {MOST_EXTRA}"
+    );
+    require(extra_steps <= MOST_EXTRA, message)?;
     let setting = Setting::new(&options.common.figure, CELLS, 1.0)?;
-    let Setting {
-        n, grid, scales, ..
-    } = setting;
+    let (n, grid, scales) = (setting.n, setting.grid, setting.scales);
     let operator = setting.operator((Method::Hybrid, options.common.scheme))?;
     let (shapes, azimuths): (Vec<_>, Vec<_>) = shapes(extra_steps)?.into_iter().unzip();
     let parameters = inpainting::parameters((n, &scales), &operator, &shapes);
-    let mut session = Session::open(PROGRAM, run, parameters)?;
+    let mut session = Session::open("inpainting_3d", run, parameters)?;
     let mut flowed = Vec::new();
     for (shape, azimuth) in shapes.iter().zip(azimuths) {
         let surface = Surface {
@@ -136,10 +131,8 @@ fn decorate(snapshots: &mut [Snapshot], measured: &Inpainted<'_, 3>) {
         let distance = distance.filter(|_| measured.shape.whole.is_some());
         let distance = distance.map(|(_, l2)| format!("\nL² distance to the ball {l2:.4}"));
         let [time, distance] = [time, distance].map(Option::unwrap_or_default);
-        snapshot.caption = format!(
-            "step {step}{time}: w = {:.2}{distance}",
-            snapshot.measures["w"]
-        );
+        let w = snapshot.measures["w"];
+        snapshot.caption = format!("step {step}{time}: w = {w:.2}{distance}");
         let edges = Tube::edges_of_box([low; 3], [high; 3], EDGE).into_iter();
         snapshot.tubes = edges.map(|edge| edge.with_colour(GREEN)).collect();
     }

@@ -3,17 +3,14 @@
 use std::f64::consts::{SQRT_2, TAU};
 
 use crate::prelude::*;
-use crate::quality;
 use crate::training::{NetworkSpec, held_out_radii};
 use model::training::levenberg_marquardt::{heat_kernel, splitting_activation};
 use model::{NeededNetwork, Network, Quality};
 use report::Heatmap;
 
-const PROGRAM: &str = "learned_networks";
-
 /// Kernels, activations, transfer functions and quality of the learned operators for n = 128, 256, 512.
 #[derive(Parser, Debug)]
-#[command(name = PROGRAM, version)]
+#[command(name = "learned_networks", version)]
 pub struct Options {
     #[command(flatten)]
     run: RunOptions,
@@ -22,10 +19,9 @@ pub struct Options {
     networks: NetworkOptions,
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let run = &options.run;
-    let mut specs = NetworkSpec::convergence();
-    specs.truncate(if run.quick { 1 } else { specs.len() });
+    let specs = &NetworkSpec::CONVERGENCE[..run.either(1, 3)];
     let needs: Vec<_> = (specs.iter().map(|spec| NeededNetwork::exactly(spec.ratios))).collect();
     let chosen = options.networks.load(&needs)?;
     let mut networks: Vec<(NetworkSpec, Network)> = Vec::new();
@@ -35,7 +31,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let checksums = (networks.iter()).map(|(spec, network)| (spec.name, network.fingerprint()));
     let checksums: BTreeMap<_, _> = checksums.collect();
     let parameters = json!({"networks": checksums, "held_out_radii": held_out_radii(run.quick)});
-    let mut session = Session::open(PROGRAM, run, parameters)?;
+    let mut session = Session::open("learned_networks", run, parameters)?;
     let mut shown = Vec::new();
     for (spec, network) in networks {
         let title = format!("quality of {}", spec.name);
@@ -95,7 +91,7 @@ struct Entry {
     density: f64,
 }
 
-fn entries(spec: NetworkSpec, network: &Network) -> Result<Vec<Entry>, Error> {
+fn entries(spec: NetworkSpec, network: &Network) -> Result<Vec<Entry>> {
     let (width, eps_over_h) = (spec.ratios.width, spec.ratios.eps_over_h);
     let (middle, heat) = ((width / 2).cast_signed(), heat_kernel(&spec.data(false)?));
     let entry = |(i, (&kernel, &heat_kernel)): (usize, (&f64, &f64))| {

@@ -5,7 +5,6 @@ use std::ffi::OsStr;
 use crate::meshes;
 use crate::prelude::*;
 use geometry::{npy, vti};
-use surfaces::{ClosedMesh, MeshDistance};
 
 /// Writes the signed distance to a closed triangle mesh, negative inside, at the nodes i/n of the unit cube. The mesh is scaled so
 /// that the longest side of its bounding box has the given length, and its bounding box is centred at (0.5, 0.5, 0.5).
@@ -33,14 +32,12 @@ pub struct Options {
     quiet: bool,
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let (path, output) = (options.mesh.display(), options.output.display());
     let extension = options.output.extension().map(OsStr::to_ascii_lowercase);
     let volume = extension.as_ref().is_some_and(|name| name == "vti");
-    require(
-        volume || extension.is_some_and(|name| name == "npy"),
-        format!("--output {output} must end in .npy or .vti"),
-    )?;
+    let known = volume || extension.is_some_and(|name| name == "npy");
+    require(known, format!("--output {output} must end in .npy or .vti"))?;
     let (mesh, warnings) = ClosedMesh::new(surfaces::read(&options.mesh)?)?;
     for warning in &warnings {
         eprintln!("warning: {path}: {warning}");

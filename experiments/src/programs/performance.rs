@@ -1,17 +1,15 @@
 //! What a time step costs, and where the time goes.
 
-use crate::networks::convergence_network;
 use crate::prelude::*;
 use crate::storages::{self, StorageOptions};
-use crate::timing;
 use crate::{products, surfaces};
 use geometry::shapes::Capsule;
-use operators::memory;
 
-const PROGRAM: &str = "performance";
 /// Steps of a comparison with a smaller tolerance, and how much smaller.
 const COMPARED_STEPS: usize = 20;
 const TIGHTER: f64 = 100.0;
+/// The finest plane grid on which they are compared.
+const FINEST_COMPARED: f64 = 256.0;
 
 /// Cost of Willmore steps by the hybrid scheme on this machine: the cross of the paper (128 steps, eps = 2^-6, tau = tautilde =
 /// 2^-14) at n = 128, 256 and 512, and in 3D a cube at n = 64 and a blob at n = 128 (eps = 2h, tautilde = h^2, tau = 2^-18).
@@ -19,7 +17,7 @@ const TIGHTER: f64 = 100.0;
 /// (eps = 2h, 16 steps of the accurate scheme, tau = h^4/32 doubled after every step) on the whole grid and on bricks near the surface, and the
 /// cross (eps = 2h, 32 controlled steps of second order) on bricks.
 #[derive(Parser, Debug)]
-#[command(name = PROGRAM, version)]
+#[command(name = "performance", version)]
 pub struct Options {
     #[command(flatten)]
     run: RunOptions,
@@ -79,12 +77,10 @@ const PRODUCTS: [(&str, Format, &str); 7] = [
     ("energy and gradient [ms]", Fixed(2), "evaluate_ms"),
 ];
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let (run, quick) = (&options.run, options.run.quick);
-    require(
-        options.turns.is_finite() && options.turns > 0.0,
-        "--turns must be positive",
-    )?;
+    let possible = options.turns.is_finite() && options.turns > 0.0;
+    require(possible, "--turns must be positive")?;
     options.storage.check()?;
     let planes: &[usize] = if quick { &[128] } else { &[128, 256, 512] };
     let solids = run.either(
@@ -95,14 +91,12 @@ pub fn program(options: &Options) -> Result<(), Error> {
     let learned = |needed| networks.learned(Scheme::Paper, &needed);
     let turns = if quick { 0.05 } else { options.turns };
     let parameters = json!({ "turns": turns, "threads": rayon::current_num_threads() });
-    let mut session = Session::open(PROGRAM, run, parameters)?;
+    let mut session = Session::open("performance", run, parameters)?;
     let mut all = Vec::new();
     for &n in planes {
         let operator = learned(convergence_network(n)?)?;
         let case = timing::plane(&operator, n, if quick { 2 } else { 128 }, quick)?;
-        let compared = n <= 256;
-        let measured = Measurement::of("cross", &case, &mut session, turns, compared)?;
-        all.push(measured);
+        all.push(Measurement::of("cross", &case, &mut session, turns)?);
     }
     // Before larger ones, as what these leave behind would count as their memory.
     let stored = options.storage.measure(&options.networks, &mut session)?;
@@ -110,8 +104,8 @@ pub fn program(options: &Options) -> Result<(), Error> {
         let operator = learned(surfaces::needed_network())?;
         let time = (StepRule::Constant(0.5_f64.powi(18)), steps);
         let initial = solid_shape(name, n)?;
-        let case = willmore_flow(name, initial, operator, surfaces::scales(n), time);
-        all.push(Measurement::of(name, &case, &mut session, turns, false)?);
+        let case = Case::willmore(name, initial, operator, surfaces::scales(n), time);
+        all.push(Measurement::of(name, &case, &mut session, turns)?);
     }
     let steps = Sheet::of(&all)
         .keyed(|m, name| format!("{}.n{}.{name}", m.case, m.n))
@@ -133,7 +127,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
 }
 
 /// A cube of side 1/2, or a body with arms: a ball with three capsules through it.
-fn solid_shape(name: &str, n: usize) -> Result<Field<3>, Error> {
+fn solid_shape(name: &str, n: usize) -> Result<Field<3>> {
     let (grid, eps) = (Grid::<3>::per_unit(n, 1.0)?, surfaces::scales(n).eps);
     if name == "cube" {
         return Ok(phase_field(grid, &Cuboid::new([0.25, 0.25, 0.25])?, eps)?);
@@ -147,11 +141,8 @@ fn solid_shape(name: &str, n: usize) -> Result<Field<3>, Error> {
 }
 
 /// Distance of the end of some steps to that with a smaller tolerance, over the way from the start.
-fn distance_to_tighter<const D: usize>(
-    case: &Case<D>,
-    device: &ComputeDevice,
-) -> Result<f64, Error> {
-    let end = |case: Case<D>| -> Result<Field<D>, Error> {
+fn distance_to_tighter<const D: usize>(case: &Case<D>, device: &ComputeDevice) -> Result<f64> {
+    let end = |case: Case<D>| -> Result<Field<D>> {
         let mut run = Run::new(case, device)?;
         while run.steps() < COMPARED_STEPS && run.step()?.is_some() {}
         Ok(run.field().clone())
@@ -169,10 +160,9 @@ impl Measurement {
     fn of<const D: usize>(
         case_name: &'static str,
         case: &Case<D>,
-        session: &mut Session<'_>,
+        session: &mut Session,
         turns: f64,
-        compared: bool,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let grid = *case.grid();
         let n = grid.spacing().recip().round();
         let name = format!("{case_name}, n = {n}");
@@ -187,29 +177,25 @@ impl Measurement {
             Ok(())
         })?;
         let later = minimizations(run.records()).skip(1);
-        let later = later.map(|made| made.newton.hvp as f64);
-        let later = later.sum::<f64>().max(1.0);
+        let later: f64 = later.map(|made| made.newton.hvp as f64).sum();
         let pages = memory::pages().zip(warm);
-        let pages = pages.map(|(now, warm)| (now - warm) as f64 / later);
+        let pages = pages.map(|(now, warm)| (now - warm) as f64 / later.max(1.0));
         let peak_mib = memory::peak_mib();
         let (products, distance) = session.phase(format!("{name}: products"), |stage| {
-            let distance = compared.then(|| distance_to_tighter(case, stage.device));
-            let network = &case.operator.network().expect("a learned operator").network;
-            let on_cpu = stage.device.kind().is_cpu();
-            let products =
-                on_cpu.then(|| products::measure(network, run.field(), stage.device, turns));
-            Ok((
-                products.transpose()?.unwrap_or_default(),
-                distance.transpose()?,
-            ))
+            let (device, network) = (stage.device, case.operator.network());
+            let network = &network.expect("a learned operator").network;
+            let compared = D == 2 && n <= FINEST_COMPARED;
+            let distance = compared.then(|| distance_to_tighter(case, device));
+            let on_cpu = device.kind().is_cpu();
+            let products = on_cpu.then(|| products::measure(network, run.field(), device, turns));
+            let products = products.transpose()?.unwrap_or_default();
+            Ok((products, distance.transpose()?))
         })?;
         let mut steps = timing::numbers(&run);
         let floor = products.get("floor_single_ms").copied();
+        let over_floor = floor.map(|ms| steps["ms_per_product"] / ms);
         let others = [
-            (
-                "product_over_floor",
-                floor.map(|ms| steps["ms_per_product"] / ms),
-            ),
+            ("product_over_floor", over_floor),
             ("pages_per_product", pages),
             ("peak_mib", peak_mib),
             ("distance_to_tighter", distance),

@@ -42,12 +42,12 @@ pub struct Options {
     flow: MeshFlowOptions,
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     ROCKER_ARM_FLOW.run(&options.flow, clifford_tori)
 }
 
 /// Finds the Clifford torus nearest to the last shape of each run, and draws it there.
-fn clifford_tori(session: &mut Session<'_>, all: &mut [Flowed]) -> Result<String, Error> {
+fn clifford_tori(session: &mut Session, all: &mut [Flowed]) -> Result<String> {
     let mut tori = BTreeMap::new();
     for one in all {
         let case = &one.trajectory.case;
@@ -58,9 +58,7 @@ fn clifford_tori(session: &mut Session<'_>, all: &mut [Flowed]) -> Result<String
         })?;
         let as_field = torus.phase_field(last.grid(), case.scales.eps)?;
         let w = case.implicit_elements()?.willmore_energy(&as_field)?;
-        let CliffordTorus {
-            l2, outer_radius, ..
-        } = torus;
+        let (l2, outer_radius) = (torus.l2, torus.outer_radius);
         session.remark(format!(
             "Nearest Clifford torus, {}: L2 distance {l2:.4} (paper {PAPERS_L2:.4}), outer radius {outer_radius:.3}, w = {w:.2} (paper \
              {PAPERS_CLIFFORD})",

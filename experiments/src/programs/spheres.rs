@@ -1,12 +1,10 @@
 //! Spheres by the network for surfaces: mean curvature flow, Willmore energies, and standing still.
 
 use crate::prelude::*;
-use crate::quality;
 use crate::surfaces::Setting;
 use crate::training::NetworkSpec;
 use geometry::exact::{WILLMORE_ENERGY_SPHERE, mean_curvature_radius};
 
-const PROGRAM: &str = "spheres";
 const TITLE: &str = "Spheres by the network for surfaces";
 /// Cells per unit length of a quick run and of the paper.
 const CELLS: [usize; 2] = [32, 64];
@@ -22,7 +20,7 @@ const TAU: f64 = 1.0 / 262_144.0;
 /// R^2 = r^2 - 4t beside finite elements, Willmore energies w against 8 pi, and the change of the radius in 20 steps of Willmore
 /// flow, tau = 2^-18, which leaves spheres alone.
 #[derive(Parser, Debug)]
-#[command(name = PROGRAM, version)]
+#[command(name = "spheres", version)]
 pub struct Options {
     #[command(flatten)]
     figure: FigureOptions,
@@ -64,17 +62,17 @@ const MEASURES: [(&str, &str, usize, fn(&Still) -> f64); 4] = [
 
 /// Methods and schemes of mean curvature flow.
 fn variants() -> impl Iterator<Item = (Method, Scheme)> {
-    look::variants(|(method, scheme)| method.schemes(Flow::MeanCurvature).contains(&scheme))
+    look::variants().filter(|(method, scheme)| method.schemes(Flow::MeanCurvature).contains(scheme))
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let run = &options.figure.run;
     let radii = if run.quick { &RADII[2..4] } else { &RADII };
     let willmore_steps = if run.quick { 2 } else { WILLMORE_STEPS };
     let setting = Setting::new(&options.figure, CELLS, 1.0)?;
     let others = json!({ "tau": TAU, "willmore_steps": willmore_steps });
     let parameters = setting.parameters(others)?;
-    let mut session = Session::open(PROGRAM, run, parameters)?;
+    let mut session = Session::open("spheres", run, parameters)?;
     let mut all = Vec::new();
     for &radius in radii {
         all.push(session.phase(format!("radius {radius}"), |stage| {
@@ -83,7 +81,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
     }
     session.sheet(sheet(&all), "spheres")?;
     if !run.quick {
-        let (spec, papers) = (NetworkSpec::surfaces(), setting.operator(PAPERS)?);
+        let (spec, papers) = (NetworkSpec::SURFACES, setting.operator(PAPERS)?);
         let network = &papers.network().expect("it is learned").network;
         let title = "quality of the network".to_owned();
         let measured = [quality::measure(&mut session, title, &spec, network)?];
@@ -105,14 +103,14 @@ fn measure(
     stage: &Stage<'_>,
     radius: f64,
     willmore_steps: usize,
-) -> Result<Measurement, Error> {
+) -> Result<Measurement> {
     let (grid, scales) = (setting.grid, setting.scales);
     let ball = move |grid, radius| phase_field(grid, &Ball::new([0.5; 3], radius)?, scales.eps);
     let shape = format!("sphere of radius {radius}");
-    let case = |variant, tau, steps| -> Result<Case<3>, Error> {
+    let case = |variant, tau, steps| -> Result<Case<3>> {
         let (initial, operator) = (ball(grid, radius)?, setting.operator(variant)?);
         let time = (StepRule::Constant(tau), steps);
-        Ok(willmore_flow(&shape, initial, operator, scales, time))
+        Ok(Case::willmore(&shape, initial, operator, scales, time))
     };
     let mut mcf = Vec::new();
     for variant in variants() {

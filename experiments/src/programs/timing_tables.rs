@@ -1,15 +1,12 @@
 //! Time of the methods for the same flow on the same machine.
 
 use crate::meshes::{ARMADILLO, MeshOptions};
-use crate::networks::{Chosen, convergence_network};
 use crate::prelude::*;
 use crate::surfaces;
-use crate::timing::{self, take_turns};
 use engine::Method::{FeImplicit, FeSemi, Hybrid};
 use fem::LinearSolver::{self, ConjugateGradients, Direct};
 use solver::Method::{self as Newton, Paper, Preconditioned};
 
-const PROGRAM: &str = "timing_tables";
 /// Time steps of the table, until `t = 2^-7`.
 const STEPS: usize = 128;
 /// Headings of the columns with the times over those of the hybrid scheme, and with the paper's.
@@ -20,7 +17,7 @@ const PAPERS: &str = "paper, other machines [s]";
 /// nested finite elements, taking turns step by step on this machine, with the numbers of Newton steps, Hessian-vector products and
 /// inner iterations. Rows that exceed the budget are extrapolated from the steps done, and say so.
 #[derive(Parser, Debug)]
-#[command(name = PROGRAM, version)]
+#[command(name = "timing_tables", version)]
 pub struct Options {
     #[command(flatten)]
     run: RunOptions,
@@ -92,9 +89,6 @@ const VARIANTS: [Variant; 5] = [
     },
 ];
 
-/// Methods for one step of a surface, and the seconds that the paper reports.
-const SURFACE_STEPS: [(Method, f64); 2] = [(Hybrid, 807.0), (FeImplicit, 14589.0)];
-
 /// A row at work, and what was measured.
 struct Timing {
     row: &'static Variant,
@@ -112,12 +106,10 @@ const COLUMNS: [(&str, Format, &str); 4] = [
     ("Cholesky/step", Fixed(1), "factorizations_per_step"),
 ];
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let (run, quick) = (&options.run, options.run.quick);
-    require(
-        options.budget.is_finite() && options.budget > 0.0,
-        "--budget must be positive",
-    )?;
+    let possible = options.budget.is_finite() && options.budget > 0.0;
+    require(possible, "--budget must be positive")?;
     let cells = if quick { &[128][..] } else { &options.cells };
     let budget = if quick { 0.1 } else { options.budget };
     let networks = timing::networks(&options.networks, cells)?;
@@ -127,12 +119,10 @@ pub fn program(options: &Options) -> Result<(), Error> {
     };
     let checksums = cells.iter().map(checksum);
     let parameters = json!({
-        "networks": checksums.collect::<Result<serde_json::Map<_, _>, Error>>()?,
-        "cells": cells,
-        "budget": budget,
-        "steps": STEPS,
+        "networks": checksums.collect::<Result<serde_json::Map<_, _>>>()?,
+        "cells": cells, "budget": budget, "steps": STEPS,
     });
-    let mut session = Session::open(PROGRAM, run, parameters)?;
+    let mut session = Session::open("timing_tables", run, parameters)?;
     let mut timings = Vec::new();
     for &n in cells {
         timings.extend(measure(&mut session, &networks, n, budget)?);
@@ -146,11 +136,11 @@ pub fn program(options: &Options) -> Result<(), Error> {
         let mesh = options.mesh.load_or_built_in(&ARMADILLO, &grid)?;
         let initial = mesh.phase_field(grid, scales.eps, &stage.bar)?;
         let mut steps = Vec::new();
-        for (method, papers_seconds) in SURFACE_STEPS {
+        for (method, papers_seconds) in [(Hybrid, 807.0), (FeImplicit, 14589.0)] {
             let (variant, source) = ((method, Scheme::Paper), networks.of(Scheme::Paper));
             let operator = Operator::new(variant, &source, &needed, &grid, &scales)?;
             let initial = initial.clone();
-            let run = stage.run(willmore_flow(&mesh.title, initial, operator, scales, time))?;
+            let run = stage.run(Case::willmore(&mesh.title, initial, operator, scales, time))?;
             steps.push((method, timing::numbers(&run), papers_seconds));
         }
         Ok((mesh.title, steps))
@@ -195,12 +185,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
     session.finish("128 Willmore steps of the cross: wall time on this machine")
 }
 
-fn measure(
-    session: &mut Session<'_>,
-    networks: &Chosen,
-    n: usize,
-    budget: f64,
-) -> Result<Vec<Timing>, Error> {
+fn measure(session: &mut Session, networks: &Chosen, n: usize, budget: f64) -> Result<Vec<Timing>> {
     let mut contenders = Vec::new();
     for row in &VARIANTS {
         let mut operator = networks.operator((row.method, Scheme::Paper), n)?;
@@ -225,7 +210,7 @@ fn measure(
     };
     session.phase(format!("n = {n}"), |stage| {
         stage.bar.set_length((VARIANTS.len() * STEPS) as u64);
-        take_turns(&mut contenders, goes_on, |timing| {
+        timing::take_turns(&mut contenders, goes_on, |timing| {
             stage.bar.inc(1);
             match timing.run.step() {
                 Err(engine::Error::Step { source, .. })

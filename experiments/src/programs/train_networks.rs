@@ -1,9 +1,6 @@
 //! Trains the networks that ship with the library.
 
-use std::collections::BTreeSet;
-
 use crate::prelude::*;
-use crate::quality;
 use crate::session::remove_folder;
 use crate::training::{NetworkSpec, train, training_device};
 use model::Network;
@@ -11,8 +8,6 @@ use model::training::adam::AdamParams;
 use model::training::least_squares::LeastSquaresParams;
 use model::training::levenberg_marquardt::LmParams;
 use model::training::{self, CurvePoint, Trained};
-
-const PROGRAM: &str = "train_networks";
 
 #[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
@@ -29,7 +24,7 @@ enum Recipe {
 
 /// Trains the networks: n = 128, 256, 512 of the convergence tests, the one for inpainting, and the one for surfaces in 3D.
 #[derive(Parser, Debug)]
-#[command(name = PROGRAM, version)]
+#[command(name = "train_networks", version)]
 pub struct Options {
     #[command(flatten)]
     run: RunOptions,
@@ -59,7 +54,7 @@ impl Recipe {
     }
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let run = &options.run;
     let chosen = options.chosen()?;
     require(options.adam_epochs > 0, "--adam-epochs must be at least 1")?;
@@ -70,13 +65,10 @@ pub fn program(options: &Options) -> Result<(), Error> {
         ..AdamParams::default()
     };
     let parameters = json!({
-        "recipe": options.recipe,
-        "networks": chosen,
-        "levenberg_marquardt": lm,
-        "adam": adam,
-        "accurate": accurate,
+        "recipe": options.recipe, "networks": chosen,
+        "levenberg_marquardt": lm, "adam": adam, "accurate": accurate,
     });
-    let session = Session::on(device, PROGRAM, run, parameters)?;
+    let session = Session::on(device, "train_networks", run, parameters)?;
     let mut trainings = Trainings {
         checkpoints: session.output.subfolder("checkpoints")?,
         folder: session.output.subfolder("networks")?,
@@ -98,10 +90,10 @@ pub fn program(options: &Options) -> Result<(), Error> {
     }
     let (mut session, all) = (trainings.session, trainings.finished);
     session.figure(figure(&all), "learning_curves")?;
-    let points = all
-        .iter()
-        .flat_map(|one| one.trained.curve.iter().map(move |at| (one, at)));
-    let points: Vec<(&Finished, &CurvePoint)> = points.collect();
+    let mut points: Vec<(&Finished, &CurvePoint)> = Vec::new();
+    for one in &all {
+        points.extend(one.trained.curve.iter().map(|at| (one, at)));
+    }
     let curves = Sheet::of(&points)
         .data("network", |(one, _)| one.spec.name)
         .data("recipe", |(one, _)| one.recipe.look().0)
@@ -129,18 +121,17 @@ pub fn program(options: &Options) -> Result<(), Error> {
 }
 
 impl Options {
-    fn chosen(&self) -> Result<Vec<NetworkSpec>, Error> {
+    fn chosen(&self) -> Result<Vec<NetworkSpec>> {
         let mut specs = match self.recipe {
-            Recipe::Accurate => NetworkSpec::accurate(),
-            Recipe::Lm | Recipe::Adam | Recipe::Both => NetworkSpec::paper(),
-        };
+            Recipe::Accurate => NetworkSpec::ACCURATE,
+            Recipe::Lm | Recipe::Adam | Recipe::Both => NetworkSpec::PAPER,
+        }
+        .to_vec();
         let names: Vec<&str> = specs.iter().map(|spec| spec.name).collect();
-        let (all, is_one) = (names.join(", "), |name: &String| {
-            names.contains(&name.as_str())
-        });
-        if let Some(name) = self.only.iter().find(|name| !is_one(name)) {
+        for name in &self.only {
+            let all = names.join(", ");
             let message = format!("no network is called '{name}'; there are {all}");
-            return Err(Error::Options(message));
+            require(names.contains(&name.as_str()), message)?;
         }
         if !self.only.is_empty() {
             specs.retain(|spec| self.only.iter().any(|name| name == spec.name));
@@ -150,8 +141,8 @@ impl Options {
 }
 
 /// Trainings one after the other. Those of the chosen networks are kept and saved at once.
-struct Trainings<'a> {
-    session: Session<'a>,
+struct Trainings {
+    session: Session,
     /// Where interrupted trainings are kept until all are finished.
     checkpoints: OutputDir,
     folder: OutputDir,
@@ -165,13 +156,13 @@ struct Finished {
     trained: Trained,
 }
 
-impl Trainings<'_> {
+impl Trainings {
     fn train<R: training::Recipe>(
         &mut self,
         recipe: Recipe,
         spec: &NetworkSpec,
         params: &R,
-    ) -> Result<Network, Error> {
+    ) -> Result<Network> {
         let (key, label, _, prefix) = recipe.look();
         let name = format!("{}-{key}", spec.name);
         let file = self.checkpoints.path(&format!("{name}.json"))?;
@@ -192,8 +183,8 @@ impl Trainings<'_> {
 
     /// The paper's progressive training up to the finest of the chosen networks: each starts from the refined kernel
     /// and the activation of the one before. The others have no coarser one and are trained `alone`, from a random start.
-    fn progressively(&mut self, first: &AdamParams, alone: bool) -> Result<(), Error> {
-        let mut stages = NetworkSpec::convergence();
+    fn progressively(&mut self, first: &AdamParams, alone: bool) -> Result<()> {
+        let mut stages = NetworkSpec::CONVERGENCE.to_vec();
         let others = self.chosen.iter().filter(|spec| !stages.contains(spec));
         let others: Vec<_> = others.filter(|_| alone).copied().collect();
         while stages.pop_if(|spec| !self.chosen.contains(spec)).is_some() {}
@@ -227,9 +218,8 @@ fn figure(all: &[Finished]) -> Figure {
     let used = |recipe: &Recipe| all.iter().any(|one| one.recipe == *recipe);
     let entry = |recipe: Recipe| LegendEntry::line(recipe.look().1, Colour::Black, recipe.look().2);
     let recipes: Vec<_> = recipes.filter(used).map(entry).collect();
-    let networks = names.iter().enumerate();
-    let networks = networks.map(|(k, name)| LegendEntry::line(*name, k, LineStyle::Solid));
-    let networks: Vec<_> = networks.collect();
+    let network = |(k, name): (usize, &&str)| LegendEntry::line(*name, k, LineStyle::Solid);
+    let networks: Vec<_> = names.iter().enumerate().map(network).collect();
     let chart = |label: &str, abscissa: fn(&CurvePoint) -> f64| {
         let curves = all.iter().map(|one| {
             let (key, _, style, _) = one.recipe.look();

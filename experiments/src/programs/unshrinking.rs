@@ -5,7 +5,7 @@ use chacha20::ChaCha8Rng;
 use crate::prelude::*;
 use crate::smoothing::{LAPLACIAN, TAUBIN, fairing_flow, mesh_raster, rms_distance};
 use rand::{RngExt, SeedableRng};
-use surfaces::{ClosedMesh, MeshDistance, TriangleMesh, samples};
+use surfaces::samples;
 use volumes::{Body, Inside, Volume};
 
 const TITLE: &str = "Segmentations without their steps, and their volumes";
@@ -55,7 +55,7 @@ struct Row<'a> {
     surface: TriangleMesh,
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let full = usize::from(!options.run.quick);
     let parameters = json!({ "bodies": BODIES, "wrong": WRONG, "time": TIME, "taubin": TAUBIN, "laplacian": LAPLACIAN, "iterations": ITERATIONS });
     let mut session = Session::open("unshrinking", &options.run, parameters)?;
@@ -90,7 +90,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
 }
 
 impl Segmented {
-    fn new(name: &'static str, voxels: f64, seed: u64) -> Result<Self, Error> {
+    fn new(name: &'static str, voxels: f64, seed: u64) -> Result<Self> {
         let centre = [0.5 * voxels + MARGIN + 0.2; 3];
         let (shape, wrong, up): (Box<dyn SignedDistance<3>>, _, _) = if name == "ball" {
             (Box::new(Ball::new(centre, 0.5 * voxels)?), WRONG, UpAxis::Z)
@@ -124,9 +124,10 @@ impl Segmented {
         })
     }
 
-    fn treated(&self, session: &mut Session<'_>) -> Result<Vec<Row<'_>>, Error> {
+    fn treated(&self, session: &mut Session) -> Result<Vec<Row<'_>>> {
         let (body, marched) = (&self.body.surface, &self.marched);
-        let (taubin, laplacian) = (self.smoothed(TAUBIN)?, self.smoothed(LAPLACIAN)?);
+        let (t, taubin) = self.smoothed(TAUBIN)?;
+        let (l, laplacian) = self.smoothed(LAPLACIAN)?;
         let (none, kept, free) = (None, Some(true), Some(false));
         // Key, words, what it starts from, iterations, and for flows whether the volume is kept.
         let all = [
@@ -135,14 +136,8 @@ impl Segmented {
             ("free", "fair, free", body, None, free),
             ("marched_fair", "marched, volume kept", marched, None, kept),
             ("marched_free", "marched, free", marched, None, free),
-            ("taubin", "Taubin", &taubin.1, Some(taubin.0), none),
-            (
-                "laplacian",
-                "Laplacian",
-                &laplacian.1,
-                Some(laplacian.0),
-                none,
-            ),
+            ("taubin", "Taubin", &taubin, Some(t), none),
+            ("laplacian", "Laplacian", &laplacian, Some(l), none),
         ];
         let row = |(key, words, start, iterations, flow): (_, _, &ClosedMesh, _, Option<bool>)| {
             session.phase(format!("{}: {words}", self.name), |stage| {
@@ -175,13 +170,12 @@ impl Segmented {
     }
 
     /// The surface after the number of iterations that brings it nearest to the shape.
-    fn smoothed(&self, [lambda, mu]: [f64; 2]) -> Result<(usize, ClosedMesh), Error> {
+    fn smoothed(&self, [lambda, mu]: [f64; 2]) -> Result<(usize, ClosedMesh)> {
         let smoothed = |count| self.marched.mesh().smoothed(count, lambda, mu);
         let distance = |count| (count, rms_distance(&smoothed(count), &*self.shape));
         let all = (1..=ITERATIONS).map(distance);
-        let best = all
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map_or(1, |best| best.0);
+        let best = all.min_by(|a, b| a.1.total_cmp(&b.1));
+        let best = best.map_or(1, |(count, _)| count);
         Ok((best, ClosedMesh::new(smoothed(best))?.0))
     }
 }
@@ -204,7 +198,7 @@ impl Row<'_> {
         all.fold(0.0, f64::max)
     }
 
-    fn picture(&self) -> Result<Raster, Error> {
+    fn picture(&self) -> Result<Raster> {
         let frame = (self.of.up, self.of.marched.bounding_box());
         let caption = format!("{}\nvolume {:+.2} %", self.treatment.1, self.change());
         mesh_raster(&self.surface, frame, caption)

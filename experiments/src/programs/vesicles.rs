@@ -60,22 +60,20 @@ pub struct Options {
     branches: Vec<String>,
 }
 
-pub fn program(options: &Options) -> Result<(), Error> {
+pub fn program(options: &Options) -> Result<()> {
     let run = &options.figure.run;
     let (count, steps) = run.either((1, Some(2)), (usize::MAX, None));
     let wanted = |family: &&Family| options.branches.iter().any(|name| name == family.name);
-    let families: Vec<&Family> = FAMILIES.iter().filter(wanted).take(count).collect();
-    let settings = (families.iter())
-        .map(|family| Setting::new(&options.figure, family.cells, SIDE))
-        .collect::<Result<Vec<_>, Error>>()?;
-    let about = families.iter().zip(&settings).map(|(family, setting)| {
-        json!({ "branch": family.name, "reduced_volumes": family.reduced_volumes, "radius": family.radius, "n": setting.n })
-    });
-    let about: Vec<Value> = about.collect();
-    let parameters = settings[0].parameters(json!({ "families": about }))?;
+    let (mut families, mut about) = (Vec::new(), Vec::new());
+    for family in FAMILIES.iter().filter(wanted).take(count) {
+        let setting = Setting::new(&options.figure, family.cells, SIDE)?;
+        about.push(json!({ "branch": family.name, "reduced_volumes": family.reduced_volumes, "radius": family.radius, "n": setting.n }));
+        families.push((family, setting));
+    }
+    let parameters = families[0].1.parameters(json!({ "families": about }))?;
     let mut session = Session::open("vesicles", run, parameters)?;
     let mut all: Vec<AtRest<3>> = Vec::new();
-    for (family, setting) in families.iter().zip(&settings) {
+    for (family, setting) in &families {
         let (branch, name, radius) = (family.branch, family.name, family.radius);
         let volumes = family.reduced_volumes.iter().copied().take(count);
         let volumes: Vec<f64> = volumes.collect();
@@ -98,7 +96,7 @@ pub fn program(options: &Options) -> Result<(), Error> {
                 _ => equilibrium.start(setting.grid, setting.scales.eps, 0.5)?,
             };
             let (operator, time) = (setting.operator(ACCURATE)?, (StepRule::ByEnergy(None), 1));
-            let case = willmore_flow(name, initial, operator, setting.scales, time);
+            let case = Case::willmore(name, initial, operator, setting.scales, time);
             all.push(equilibrium.relax(&mut session, case, steps)?);
         }
     }
@@ -136,7 +134,7 @@ fn crossing(all: &[AtRest<3>], energy: impl Fn(&AtRest<3>) -> f64) -> Option<f64
 }
 
 /// Exact branches as lines, the flow's shapes as marks.
-fn diagram(session: &mut Session<'_>, all: &[AtRest<3>]) -> Result<Figure, Error> {
+fn diagram(session: &mut Session, all: &[AtRest<3>]) -> Result<Figure> {
     use Branch::{Oblate, Prolate, Stomatocyte};
     let branches = [
         (Prolate, "prolate", 0.99, 0.5, Marker::Circle),
@@ -168,7 +166,7 @@ fn diagram(session: &mut Session<'_>, all: &[AtRest<3>]) -> Result<Figure, Error
 }
 
 /// A picture of every shape, and below it its section through the axis over the exact profile.
-fn shapes(all: &[AtRest<3>], options: &RunOptions) -> Result<Figure, Error> {
+fn shapes(all: &[AtRest<3>], options: &RunOptions) -> Result<Figure> {
     let (mut pictures, mut sections) = (Vec::new(), Vec::new());
     for one in all {
         let scene = Scene::new(&one.field, one.trajectory.case.scales.eps)?.view(VIEW);
@@ -188,7 +186,7 @@ fn shapes(all: &[AtRest<3>], options: &RunOptions) -> Result<Figure, Error> {
 }
 
 /// The plane through the axis, moved to the origin.
-fn section(field: &Field<3>) -> Result<Field<2>, Error> {
+fn section(field: &Field<3>) -> Result<Field<2>> {
     let grid = field.grid();
     let (cells, plane) = (grid.cells(), Grid::<2>::centred(grid.cells(), grid.side())?);
     let values = (0..plane.len()).map(|node| {

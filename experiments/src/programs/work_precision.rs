@@ -1,9 +1,7 @@
 //! Errors of the time steps against the exact flow, and what they cost.
 
 use crate::circles::{self, Ensemble};
-use crate::networks::Chosen;
 use crate::prelude::*;
-use crate::study::Variant;
 use crate::truth::{
     self, CELLS, CROSS, ELLIPSE, ELLIPSOID, RECTANGLE, Reached, STRICT, Sample, Truth,
 };
@@ -24,14 +22,14 @@ const EULER: &str = "implicit Euler, equal steps";
 const GRADED: &str = "implicit Euler, graded steps";
 const EQUAL: &str = "second order, equal steps";
 const CONTROLLED: &str = "second order, controlled steps";
-const ELEMENTS: &str = "finite elements, implicit Euler";
+const NESTED: &str = "finite elements, implicit Euler";
 /// With their colours and marks in the figures.
 const KINDS: [(&str, usize, Marker); 5] = [
     (EULER, 1, Marker::Square),
     (GRADED, 3, Marker::Diamond),
     (EQUAL, 0, Marker::Triangle),
     (CONTROLLED, 2, Marker::Circle),
-    (ELEMENTS, 4, Marker::Triangle),
+    (NESTED, 4, Marker::Triangle),
 ];
 
 /// A way to make time steps, and its curve in the figure.
@@ -72,11 +70,8 @@ fn steppings(longest: f64, quick: bool) -> Vec<Stepping> {
         let (suffix, control) = controls[k];
         let steps = truth::controlled(control, (END, HALVINGS));
         add(CONTROLLED, format!("controlled{suffix}"), steps);
-        add(
-            ELEMENTS,
-            key("elements", 0.125 * halved),
-            equal(0.125 * halved),
-        );
+        let longer = 0.125 * halved;
+        add(NESTED, key("elements", longer), equal(longer));
     }
     all.sort_by_key(|stepping| KINDS.iter().position(|kind| kind.0 == stepping.kind));
     all
@@ -99,14 +94,14 @@ struct Compared<'a> {
     reached: Reached,
 }
 
-pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
+pub fn program(Options { run: options }: &Options) -> Result<()> {
     let used = if options.quick { 1 } else { usize::MAX };
     let marks: Vec<usize> = MARKS.into_iter().take(used).collect();
     let cells: Vec<usize> = CELLS.into_iter().take(used).collect();
     let parameters = json!({ "marks": marks, "cells": cells, "time_unit": STEP, "eps_over_h": 2 });
     let mut session = Session::open("work_precision", options, parameters)?;
     let (mut rows, mut ratios) = (Vec::new(), Vec::new());
-    let times: Vec<(usize, f64)> = marks.iter().map(|&k| (k, k as f64 * STEP)).collect();
+    let times: Vec<(usize, f64)> = marks.iter().map(|&k| (k, time(k))).collect();
     let in_plane = steppings(STEP, options.quick);
     for sample in &CURVES {
         let at = (&cells[..], &times[..]);
@@ -114,15 +109,13 @@ pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
     }
     let halves: Vec<usize> = cells.iter().map(|n| n / 2).collect();
     let mut in_space = steppings(4.0 * STEP, options.quick);
-    in_space.retain(|stepping| stepping.kind != ELEMENTS);
+    in_space.retain(|stepping| stepping.kind != NESTED);
     let at = (&halves[..], &times[..]);
     rows.extend(compare(&mut session, &SURFACE, at, &in_space, &mut ratios)?);
     if !ratios.is_empty() {
         // The least ratio of an estimated time error to the true one, and in which part of the cases it is between 1/3 and 3.
-        let good = ratios
-            .iter()
-            .filter(|r| (1.0 / 3.0..=3.0).contains(*r))
-            .count();
+        let is_good = |ratio: &&f64| (1.0 / 3.0..=3.0).contains(*ratio);
+        let good = ratios.iter().filter(is_good).count();
         let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
         let within = good as f64 / ratios.len() as f64;
         let metrics = [
@@ -146,12 +139,12 @@ pub fn program(Options { run: options }: &Options) -> Result<(), Error> {
 /// Runs a sample in all kinds of time steps and compares it at the marks, graded steps at the ends of those in which the marks are; adds the
 /// ratios of estimated to true time errors.
 fn compare<'a, const D: usize>(
-    session: &mut Session<'_>,
+    session: &mut Session,
     sample: &Sample<D>,
     (cells, marks): (&[usize], &[(usize, f64)]),
     steppings: &'a [Stepping],
     ratios: &mut Vec<f64>,
-) -> Result<Vec<Compared<'a>>, Error> {
+) -> Result<Vec<Compared<'a>>> {
     let mut rows = Vec::new();
     let title = format!("{}: the exact flow", sample.key);
     let exact = session.phase(title, |_| sample.exact(Flow::Willmore, marks))?;
@@ -160,20 +153,15 @@ fn compare<'a, const D: usize>(
         let mut controlled = Vec::new();
         for stepping in steppings {
             let variant = match stepping.kind {
-                ELEMENTS => (Method::FeImplicit, Scheme::Paper),
+                NESTED => ELEMENTS,
                 _ => ACCURATE,
             };
             let steps = (&stepping.key[..], stepping.steps, marks[marks.len() - 1].1);
             let run = sample.run(session, (n, 2.0), variant, steps)?;
             let mut at = marks.to_vec();
             if stepping.kind == GRADED {
-                let end = |time| {
-                    truth::until(&run, time)
-                        .last()
-                        .map_or(time, |last| last.time)
-                };
                 for (_, time) in &mut at {
-                    *time = end(*time);
+                    *time = truth::at(&run, *time).time;
                 }
             }
             let own = (at != marks)
@@ -207,22 +195,19 @@ const SAME: f64 = 1e-5;
 /// them. Cases without an estimate, after less than three steps, do not count, nor those that are nearer to the strict run than that is known to be
 /// near the truth.
 fn time_errors<const D: usize>(
-    session: &mut Session<'_>,
+    session: &mut Session,
     marks: &[(usize, f64)],
     runs: &[(String, Trajectory<D>)],
-) -> Result<Vec<f64>, Error> {
+) -> Result<Vec<f64>> {
     let mut ratios = Vec::new();
     let Some(((_, strict), others)) = runs.split_last() else {
         return Ok(ratios);
     };
     for (name, run) in others {
         for &(mark, time) in marks {
-            let field = |run: &Trajectory<D>| {
-                let so_far = truth::until(run, time);
-                run.field(so_far[so_far.len() - 1].step)
-            };
+            let [field, precise] = [run, strict].map(|run| run.field(truth::at(run, time).step));
             let eps = run.case.scales.eps;
-            let error = truth::distance_of_levels(&field(run)?, &field(strict)?, eps);
+            let error = truth::distance_of_levels(&field?, &precise?, eps);
             session.metric(&format!("{name}.time_error.step{mark}"), error)?;
             let estimated = engine::estimated_time_error(truth::until(run, time)).unwrap_or(0.0);
             if estimated > 0.0 && error > SAME {
@@ -236,21 +221,16 @@ fn time_errors<const D: usize>(
 /// The circles of `circle_convergence` at n = 128 with the accurate operator, in equal steps of first order, in controlled ones of second order, and
 /// those extrapolated in `eps` from n = 64 and 128: their mean L2 error at the end of the 64 steps, and all Hessian-vector products, which on
 /// the coarser grid count by their share of the unknowns.
-fn circles(session: &mut Session<'_>) -> Result<(), Error> {
+fn circles(session: &mut Session) -> Result<()> {
     let usual = (circles::COUNT, circles::STEPS);
     let (count, steps) = session.options.either((2, 4), usual);
-    let variant = Variant {
-        flow: Flow::Willmore,
-        method: Method::Hybrid,
-        scheme: Scheme::Accurate,
-        n: CELLS[1],
-    };
-    let (flow, end) = (variant.flow, steps as f64 * STEP);
+    let variant = Variant::new(Flow::Willmore, ACCURATE, CELLS[1]);
+    let (flow, end) = (variant.flow, time(steps));
     let operator = Chosen::default().operator(ACCURATE, variant.n)?;
     let euler = session.phase("circles: euler1", |stage| {
         Ensemble::run(&(variant, operator), (count, steps), "fields", stage)
     })?;
-    let hvp = |run: &Trajectory<2>| run.records.iter().filter_map(Record::hvp).sum::<f64>();
+    let hvp = |run: &Trajectory<2>| total_hvp(&run.records);
     let work = euler.circles.iter().map(|circle| hvp(&circle.trajectory));
     let mut all = [[euler.mean_error(steps), work.sum()], [0.0; 2], [0.0; 2]];
     for (k, radius) in circles::radii(count).into_iter().enumerate() {
@@ -273,9 +253,8 @@ fn circles(session: &mut Session<'_>) -> Result<(), Error> {
         let (u, work) = run(fine, "controlled", ErrorControl::default())?;
         let (a, coarse_work) = run(coarse, "careful", careful(coarse))?;
         let (b, fine_work) = run(fine, "careful", careful(fine))?;
-        let radius_of = |u: &Field<2>, eps| -> Result<f64, Error> {
-            Ok((ZeroSet::of(u, eps)?.volume / PI).sqrt())
-        };
+        let radius_of =
+            |u: &Field<2>, eps| -> Result<f64> { Ok((ZeroSet::of(u, eps)?.volume / PI).sqrt()) };
         let circle = |radius| phase_field(*u.grid(), &Ball::new([0.0; 2], radius)?, EPS);
         let limit = (4.0 * radius_of(&b, EPS)? - radius_of(&a, 2.0 * EPS)?) / 3.0;
         let exact = circle(circles::radius_at(flow, radius, end))?;
