@@ -607,10 +607,10 @@ impl ForceOption {
     /// Refuses a file that is there.
     pub fn check(self, name: &str, path: &Path) -> Result<(), Error> {
         if path.exists() && !self.force {
-            return Err(Error::options(format!(
+            refuse!(
                 "{name} {} is there already: give another name, or --force to write over it",
                 path.display()
-            )));
+            );
         }
         Ok(())
     }

@@ -38,6 +38,14 @@ pub enum Error {
     Volumes(#[from] volumes::Error),
 }
 
+/// Returns [`Error::Options`] with a message that is given as to `format!`.
+macro_rules! refuse {
+    ($($message:tt)*) => {
+        return Err($crate::error::Error::Options(format!($($message)*)))
+    };
+}
+pub(crate) use refuse;
+
 impl From<engine::Error> for Error {
     fn from(error: engine::Error) -> Self {
         match error {

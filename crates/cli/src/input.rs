@@ -119,14 +119,14 @@ impl Source {
                 Ok(Self::Image(path))
             }
             "npy" => Ok(Self::Field(path)),
-            "vti" => Err(Error::options(format!(
+            "vti" => refuse!(
                 "{input} is for ParaView and is not read: give the same values as .npy, such as the final.npy beside a final.vti"
-            ))),
+            ),
             "nii" | "gz" | "mrc" | "map" => Ok(Self::Volume(path)),
-            _ => Err(Error::options(format!(
+            _ => refuse!(
                 "{input} is no input: give a mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), \
                  a volume (.nii, .nii.gz, .mrc, .map, .tif of several pages), a field (.npy), builtin:NAME, or a region as box:... or ball:..."
-            ))),
+            ),
         }
     }
 
@@ -179,9 +179,7 @@ impl Source {
             ("--box-side", options.box_side.is_some()),
         ] {
             if given && !allowed.contains(&name) {
-                return Err(Error::options(format!(
-                    "{name} has no meaning for {what}: leave it out"
-                )));
+                refuse!("{name} has no meaning for {what}: leave it out");
             }
         }
         Ok(())
@@ -264,17 +262,17 @@ impl<'a> Reader<'a> {
         let (cells, box_side) = usual_box::<D>();
         let cells = *self.options.cells.get_or_insert(cells);
         if cells < FEWEST_CELLS {
-            return Err(Error::options(format!(
+            refuse!(
                 "--cells {cells} resolves nothing: use at least {FEWEST_CELLS} per unit length"
-            )));
+            );
         }
         let box_side = *self.options.box_side.get_or_insert(box_side);
         let grid = Grid::<D>::per_unit(cells, box_side)?.with_origin([-0.5 * box_side; D])?;
         let nodes = (grid.cells() as f64).powi(D as i32);
         if nodes > MOST_NODES {
-            return Err(Error::options(format!(
+            refuse!(
                 "--cells {cells} makes {nodes:.1e} nodes in a box of side {box_side}, more than {MOST_NODES:.1e}: use fewer"
-            )));
+            );
         }
         Ok(grid)
     }
@@ -362,7 +360,7 @@ impl<'a> Reader<'a> {
                 far_from(mesh, surface.as_ref()),
             );
             if let Some(advice) = refused {
-                return Err(Error::options(format!("{message}; {advice}")));
+                refuse!("{message}; {advice}");
             }
             self.messages.warn(&message);
         }
@@ -396,9 +394,7 @@ impl<'a> Reader<'a> {
             self.cells(),
         );
         if refuses && part >= MOST_LOST {
-            return Err(Error::options(format!(
-                "{message}: give a larger --side-length, or --cells to go on all the same"
-            )));
+            refuse!("{message}: give a larger --side-length, or --cells to go on all the same");
         }
         self.messages.warn(&message);
         Ok(())
@@ -467,10 +463,10 @@ impl<'a> Reader<'a> {
         let usual = (part * box_side).min(most);
         let side = *self.options.side_length.get_or_insert(usual);
         if !(side > 0.0 && side <= most) {
-            return Err(Error::options(format!(
+            refuse!(
                 "--side-length {side} does not fit the box of side {box_side}, whose sides are to be an interface width away: give a \
                  positive length of at most {most:.4}"
-            )));
+            );
         }
         Ok(side)
     }
@@ -620,10 +616,10 @@ impl<'a> Reader<'a> {
             .find(outside)
             .filter(|_| holds == Holds::PhaseField)
         {
-            return Err(Error::options(format!(
+            refuse!(
                 "{} holds the value {value}, which no phase field has; give --holds distance if these are signed distances",
                 path.display()
-            )));
+            );
         }
         let eps = self.eps_over_h * field.grid().spacing();
         let distance = match (holds, self.options.cells) {
@@ -660,7 +656,7 @@ fn refuse_photographs(tones: &Tones, side: Side, path: &Path) -> Result<(), Erro
     if tones.between < PHOTOGRAPH {
         return Ok(());
     }
-    Err(Error::options(format!(
+    refuse!(
         "{} has continuous tones, as a photograph: {:.0} % of its pixels have none of two. A shape has two: with --threshold {:.2}, which \
          separates them best, the pixels {}, {:.0} % of all, would be inside, and all other tones of them would be lost; say so by \
          --threshold or --inside",
@@ -669,7 +665,7 @@ fn refuse_photographs(tones: &Tones, side: Side, path: &Path) -> Result<(), Erro
         tones.threshold,
         side.at(tones.threshold),
         100.0 * tones.inside,
-    )))
+    )
 }
 
 /// Whether a file of values is meant to be in the plane; its reader says what is wrong with it.
@@ -686,9 +682,9 @@ pub fn check_phases<const D: usize>(field: &Field<D>, input: &str) -> Result<(),
     let inside = field.values().iter().filter(|u| **u > 0.0).count();
     let nodes = field.grid().len();
     if inside == 0 || inside == nodes {
-        return Err(Error::options(format!(
+        refuse!(
             "{input} has {inside} of {nodes} nodes inside, so that there is nothing to move: use more --cells, or another size"
-        )));
+        );
     }
     Ok(())
 }

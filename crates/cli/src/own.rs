@@ -98,16 +98,15 @@ impl OwnMesh {
         let fairing = Fairing::new(closed, self.noise, stays);
         let kept = fairing.keeps().iter().filter(|&&kept| kept).count();
         if kept == fairing.keeps().len() {
-            return Err(Error::options(
-                "--keep contains all of the mesh: nothing could move",
-            ));
+            refuse!("--keep contains all of the mesh: nothing could move");
         }
         if keep.is_some() && kept == 0 {
             let bounds = fairing.rough().bounding_box();
-            return Err(Error::options(format!(
+            refuse!(
                 "--keep contains no vertex of the mesh, which goes from {:?} to {:?}",
-                bounds.lower, bounds.upper
-            )));
+                bounds.lower,
+                bounds.upper
+            );
         }
         self.loaded = Some(Box::new(Loaded {
             bytes,

@@ -66,10 +66,11 @@ impl Plane {
             _ => None,
         };
         if let Some(needed) = needed {
-            return Err(Error::options(format!(
+            refuse!(
                 "--mask {mask} has {} x {} pixels; it must be {needed}",
-                size[0], size[1]
-            )));
+                size[0],
+                size[1]
+            );
         }
         let side = Side::of(&image, 0.5)?;
         let mut outline = Outline::of_image(&image, side)?;
@@ -157,9 +158,7 @@ impl Presentation<2> for Plane {
     fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error> {
         match up {
             None => Ok(()),
-            Some(axis) => Err(Error::options(format!(
-                "--up {axis} has no meaning in the plane: leave it out"
-            ))),
+            Some(axis) => refuse!("--up {axis} has no meaning in the plane: leave it out"),
         }
     }
 

@@ -18,3 +18,4 @@ pub use surfaces::shapes::Region;
 pub use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh};
 
 pub use crate::error::Error;
+pub(crate) use crate::error::refuse;

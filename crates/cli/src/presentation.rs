@@ -82,11 +82,11 @@ pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
         if Self::SAVED.contains(&&*extension(path)) {
             return Ok(());
         }
-        Err(Error::options(format!(
+        refuse!(
             "--save {}: a result in {D}D is saved as .{}",
             path.display(),
             Self::SAVED.join(" or .")
-        )))
+        )
     }
 
     /// Writes the shape to any such file.

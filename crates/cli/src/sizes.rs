@@ -115,8 +115,8 @@ pub fn round_edges<const D: usize>(
     if !holds_volume {
         return Ok(());
     }
-    Err(Error::options(
+    refuse!(
         "area and volume cannot both be held: the grid does not resolve parts of the shape, and so their area; give more --cells, or hold \
          one of them",
-    ))
+    )
 }

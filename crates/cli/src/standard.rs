@@ -28,9 +28,7 @@ impl Standard {
             let read = std::io::stdin().read_to_end(&mut bytes);
             read.map_err(files::Error::of("read", name))?;
             if bytes.is_empty() {
-                return Err(Error::options(
-                    "standard input is empty: pipe a mesh, an image or a field into it",
-                ));
+                refuse!("standard input is empty: pipe a mesh, an image or a field into it");
             }
             let path = stand_in("input", kind(&bytes));
             std::fs::write(&path, bytes).map_err(files::Error::of("write", &path))?;
@@ -42,14 +40,10 @@ impl Standard {
             return Ok(standard);
         };
         if messages.json {
-            return Err(Error::options(
-                "--json and --save - would both write to standard output: leave one out",
-            ));
+            refuse!("--json and --save - would both write to standard output: leave one out");
         }
         if several {
-            return Err(Error::options(
-                "--save - writes one mesh, and --label all makes several: give a file",
-            ));
+            refuse!("--save - writes one mesh, and --label all makes several: give a file");
         }
         messages.quiet = true;
         let format = usual_format(input.input.as_deref().unwrap_or_default())?;

@@ -57,11 +57,11 @@ pub fn run(mut options: CheckOptions, messages: MessageOptions) -> Result<ExitCo
     if failed.is_empty() {
         return Ok(ExitCode::SUCCESS);
     }
-    Err(Error::options(format!(
+    refuse!(
         "these checks failed on the device {}: {}; do not trust its results",
         device.kind(),
         failed.join(", ")
-    )))
+    )
 }
 
 fn findings<const D: usize>(

@@ -49,15 +49,13 @@ impl FairOptions {
         };
         self.flow.check(usual)?;
         if let Some(ratio) = self.energy_ratio.filter(|ratio| *ratio >= 1.0) {
-            return Err(Error::options(format!(
-                "--energy-ratio {ratio} is reached before the first step: give a part below 1"
-            )));
+            refuse!("--energy-ratio {ratio} is reached before the first step: give a part below 1");
         }
         if let Some(energy) = self.flow.energy.filter(|energy| *energy < BALL) {
-            return Err(Error::options(format!(
+            refuse!(
                 "--energy {energy} has only a ball, which has 8 pi = 25.13, and nothing of the shape would be left: leave it out to take \
                  off the noise, or give --energy-ratio 0.5 for half the energy that there is"
-            )));
+            );
         }
         Ok(())
     }
@@ -73,9 +71,9 @@ impl FairOptions {
                 } else {
                     "--keep"
                 };
-                return Err(Error::options(format!(
+                refuse!(
                     "{given} has no meaning for a volume, of which a new mesh is made: leave it out"
-                )));
+                );
             }
             Source::Volume(_) => {
                 let mut loaded = reader.load()?;
@@ -94,27 +92,27 @@ impl FairOptions {
                 loaded
             }
             _ if self.noise.is_some() || self.keep.is_some() || !self.ends => {
-                return Err(Error::options(
+                refuse!(
                     "only a mesh in a file has noise to take off: say how smooth the surface is to become, by --energy-ratio, --time, \
                      --energy or --steps, without --noise and --keep",
-                ));
+                );
             }
             _ => reader.load()?,
         };
         match loaded {
             Loaded::Space(_) => Ok(loaded),
-            Loaded::Plane(_) => Err(Error::options(
+            Loaded::Plane(_) => refuse!(
                 "`fair` is for surfaces in space; for images and shapes in the plane there is `willmore flow`",
-            )),
+            ),
         }
     }
 
     fn load_mesh(&mut self, path: &Path, messages: MessageOptions) -> Result<Loaded, Error> {
         let repairs = self.flow.run.input.repair;
         if repairs && !self.remesh {
-            return Err(Error::options(
+            refuse!(
                 "--repair makes a new mesh: write it by `willmore sample --repair --save`, which can then be faired, or give --remesh",
-            ));
+            );
         }
         if let Some(mask) = self.keep.as_deref().and_then(Keep::mask) {
             self.keep = Some(absolute(mask)?.to_string_lossy().into_owned());

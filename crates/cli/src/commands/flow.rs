@@ -101,9 +101,9 @@ impl FlowOptions {
         check_positive("--energy", self.energy)?;
         match self.tolerance {
             Some(tolerance) if self.tau.unwrap_or(usual) != StepRule::Controlled => {
-                Err(Error::options(format!(
+                refuse!(
                     "--tolerance {tolerance} is for controlled time steps: give --tau controlled, or leave it out"
-                )))
+                )
             }
             _ => Ok(()),
         }
@@ -113,9 +113,7 @@ impl FlowOptions {
     fn energy(&self) -> Result<Helfrich, Error> {
         let finite = |name: &str, value: Option<f64>| match value.unwrap_or(0.0) {
             value if value.is_finite() => Ok(value),
-            value => Err(Error::options(format!(
-                "{name} {value} must be a finite number"
-            ))),
+            value => refuse!("{name} {value} must be a finite number"),
         };
         Ok(Helfrich {
             spontaneous_curvature: finite("--spontaneous-curvature", self.spontaneous_curvature)?,
@@ -136,25 +134,22 @@ impl RunOptions {
             ("--checkpoint-every", Some(self.keep.checkpoint_every)),
         ] {
             if value == Some(0) {
-                return Err(Error::options(format!("{name} must be at least 1")));
+                refuse!("{name} must be at least 1");
             }
         }
         let force = self.keep.force;
         if let Some(save) = &mut self.keep.save {
             if !SAVED.contains(&&*extension(save)) {
-                return Err(Error::options(format!(
+                refuse!(
                     "--save {} must end in .{}",
                     save.display(),
                     SAVED.join(", .")
-                )));
+                );
             }
             *save = absolute(&*save)?;
             force.check("--save", save)?;
             if !save.parent().is_some_and(Path::is_dir) {
-                return Err(Error::options(format!(
-                    "--save {}: there is no such folder",
-                    save.display()
-                )));
+                refuse!("--save {}: there is no such folder", save.display());
             }
         }
         Ok(())

@@ -62,12 +62,12 @@ impl InpaintOptions {
         let inside = |node: usize| mask.signed_distance(grid.node(node)) < 0.0;
         let region: Vec<bool> = (0..grid.len()).map(inside).collect();
         if !region.contains(&true) {
-            return Err(Error::options(format!(
+            refuse!(
                 "--mask {} contains no node of the box from {:?} of side {}: nothing could move",
                 self.mask()?,
                 grid.origin(),
                 grid.side()
-            )));
+            );
         }
         let eps = self.flow.run.scheme.eps_over_h() * grid.spacing();
         let inner = match &self.ansatz {
@@ -95,9 +95,7 @@ fn usual(tau: f64) -> StepRule {
 /// A region that is a mask.
 fn region<const D: usize>(mask: &str) -> Result<Box<dyn SignedDistance<D>>, Error> {
     if !Region::is_meant(mask) {
-        return Err(Error::options(format!(
-            "--mask {mask} is no region in {D}D: give box:... or ball:..."
-        )));
+        refuse!("--mask {mask} is no region in {D}D: give box:... or ball:...");
     }
     let region: Region = mask
         .parse()

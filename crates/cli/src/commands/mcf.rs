@@ -10,9 +10,9 @@ impl McfOptions {
         } = &self.run.scheme;
         let chosen = network.is_some() || *scheme != Scheme::Accurate;
         if chosen && !self.method.is_learned() {
-            return Err(Error::options(
+            refuse!(
                 "--network and --scheme have no meaning for finite elements: leave them out, or choose --method network",
-            ));
+            );
         }
         Ok(())
     }

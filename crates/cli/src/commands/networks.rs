@@ -22,9 +22,9 @@ pub fn run(show: Option<&NetworksCommand>, messages: MessageOptions) -> Result<E
         Some((_, network)) => network,
         None if Path::new(wanted).exists() => &Network::load(Path::new(wanted))?,
         None => {
-            return Err(Error::options(format!(
+            refuse!(
                 "there is no network {wanted:?}, neither in the list of `willmore networks` nor as a file"
-            )));
+            );
         }
     };
     let about = about(&stem(wanted), network);

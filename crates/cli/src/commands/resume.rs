@@ -16,9 +16,7 @@ pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<ExitCode
     let parsed = config::parse_resolved(&stored.read_text(config::FILE)?, &path)?;
     let Command::Run(mut command) = parsed.command else {
         let path = path.display();
-        return Err(Error::options(format!(
-            "{path} names no command that makes runs"
-        )));
+        refuse!("{path} names no command that makes runs");
     };
     let keep = &mut command.options().keep;
     keep.force = options.force;

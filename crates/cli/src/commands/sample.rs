@@ -33,21 +33,17 @@ pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<ExitC
     let is_mesh = MESHES.contains(&&*format);
     let shown = path.display();
     if !is_mesh && !["png", "npy", "vti", "nii", "gz"].contains(&&*format) {
-        return Err(Error::options(format!(
-            "--save {shown} must end in .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz"
-        )));
+        refuse!("--save {shown} must end in .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz");
     }
     options.force.check("--save", &path)?;
     let noise = options.noise.unwrap_or(0.0);
     if !(noise.is_finite() && noise >= 0.0) {
-        return Err(Error::options(format!(
-            "--noise {noise} must not be negative"
-        )));
+        refuse!("--noise {noise} must not be negative");
     }
     if noise > 0.0 && !is_mesh {
-        return Err(Error::options(format!(
+        refuse!(
             "--noise moves the vertices of meshes: leave it out, or save a mesh in place of {shown}"
-        )));
+        );
     }
     let done = || {
         let outcome = json!({ "command": "sample", "file": path });
@@ -122,10 +118,7 @@ fn write<const D: usize, O: Presentation<D>>(
 fn segmentation<const D: usize>(u: &Field<D>, path: &Path) -> Result<Volume, Error> {
     let grid = u.grid();
     let Ok(origin) = <[f64; 3]>::try_from(&grid.origin()[..]) else {
-        return Err(Error::options(format!(
-            "--save {}: a shape in {D}D has no voxels",
-            path.display()
-        )));
+        refuse!("--save {}: a shape in {D}D has no voxels", path.display());
     };
     let cells = grid.cells();
     // The first axis runs fastest.
