@@ -74,6 +74,7 @@ const PHOTOGRAPH: f64 = 0.05;
 const WILL_NOT_LAST: &str = "which will not last";
 /// Largest magnitude in a phase field: flows overshoot the phases a little.
 const LARGEST_PHASE: f64 = 1.1;
+
 /// The usual format of what becomes of an input: that of a mesh, otherwise PLY in space and PNG in the plane.
 pub fn usual_format(input: &str) -> Result<String, Error> {
     let in_plane = match Source::of(input)? {
@@ -156,18 +157,12 @@ impl Source {
     /// Refuses options that say nothing about such an input.
     fn refuse_foreign(&self, options: &InputOptions) -> Result<(), Error> {
         let (what, allowed): (_, &[&str]) = match self {
-            Self::Mesh(_) => ("a mesh", &["--repair", "--side-length", "--box-side"]),
-            Self::Image(_) => (
-                "an image",
-                &["--inside", "--threshold", "--side-length", "--box-side"],
-            ),
-            Self::Field(_) => ("a field", &["--holds", "--box-side"]),
-            Self::Volume(_) => (
-                "a volume",
-                &["--threshold", "--label", "--side-length", "--box-side"],
-            ),
-            Self::BuiltIn(_) => ("a built-in shape", &["--side-length", "--box-side"]),
-            Self::Region(_) => ("a region", &["--box-side"]),
+            Self::Mesh(_) => ("a mesh", &["--repair", "--side-length"]),
+            Self::Image(_) => ("an image", &["--inside", "--threshold", "--side-length"]),
+            Self::Field(_) => ("a field", &["--holds"]),
+            Self::Volume(_) => ("a volume", &["--threshold", "--label", "--side-length"]),
+            Self::BuiltIn(_) => ("a built-in shape", &["--side-length"]),
+            Self::Region(_) => ("a region", &[]),
         };
         for (name, given) in [
             ("--inside", options.inside.is_some()),
@@ -176,7 +171,6 @@ impl Source {
             ("--holds", options.holds.is_some()),
             ("--repair", options.repair),
             ("--side-length", options.side_length.is_some()),
-            ("--box-side", options.box_side.is_some()),
         ] {
             if given && !allowed.contains(&name) {
                 refuse!("{name} has no meaning for {what}: leave it out");
@@ -241,7 +235,7 @@ impl<'a> Reader<'a> {
             }
             Source::Field(path) => {
                 let field = self.values(&path)?;
-                self.space(field, Space::new(UpAxis::default()))
+                self.space(field, Space::default())
             }
             Source::Region(region) if region.dimension() == 2 => {
                 self.in_plane(&*region.shape()?)?
@@ -286,7 +280,7 @@ impl<'a> Reader<'a> {
         let grid = self.grid::<D>()?;
         // An image is all of its box: what is drawn may go on at its border.
         let room = if D == 2 { 0.0 } else { ROOM };
-        let side = self.side(part, &grid, room)?;
+        let side = self.side::<D>(part, room)?;
         let own = bounds.longest_side() / side * grid.side();
         let corner = bounds.centre().map(|x| x - 0.5 * own);
         Ok(Grid::new(grid.cells(), own)?.with_origin(corner)?)
@@ -413,14 +407,12 @@ impl<'a> Reader<'a> {
         let advice =
             "give a larger --side-length or more --cells, or these --cells to go on without them";
         let (field, _) = self.like_mesh(mesh, PART, &grids, (!chosen).then_some(advice))?;
-        let input = Some(Topology::of(mesh));
-        Ok(self.space(
-            field,
-            Space {
-                input,
-                ..Space::new(up)
-            },
-        ))
+        let space = Space {
+            up,
+            input: Some(Topology::of(mesh)),
+            ..Space::default()
+        };
+        Ok(self.space(field, space))
     }
 
     /// A mesh whose vertices follow the flow, on the coarsest grid that holds its parts and holes.
@@ -446,18 +438,20 @@ impl<'a> Reader<'a> {
             grid.spacing(),
             far_from(start, surface.as_ref())
         ));
-        let (input, region) = (Some(Topology::of(rough)), own.nodes(grid));
+        let region = own.nodes(grid);
         let space = Space {
-            input,
+            up: surfaces::usual_up_axis(path)?,
+            input: Some(Topology::of(rough)),
             own: Some(own),
-            ..Space::new(surfaces::usual_up_axis(path)?)
+            ..Space::default()
         };
         let start = self.start(field, space);
         Ok(Loaded::Space(Start { region, ..start }))
     }
 
     /// The longest side of what is in the box, a part of that unless it is chosen, so many interface widths from its sides.
-    fn side<const D: usize>(&mut self, part: f64, grid: &Grid<D>, room: f64) -> Result<f64, Error> {
+    fn side<const D: usize>(&mut self, part: f64, room: f64) -> Result<f64, Error> {
+        let grid = self.grid::<D>()?;
         let box_side = grid.side();
         let most = box_side - 2.0 * room * self.eps_over_h * grid.spacing();
         let usual = (part * box_side).min(most);
@@ -506,17 +500,14 @@ impl<'a> Reader<'a> {
     fn in_space(&mut self, shape: &dyn SignedDistance<3>) -> Result<Loaded, Error> {
         let grid = self.grid()?;
         let field = self.sampled(grid, shape)?;
-        Ok(self.space(field, Space::new(UpAxis::default())))
+        Ok(self.space(field, Space::default()))
     }
 
     fn built_in(&mut self, name: &str) -> Result<Loaded, Error> {
         let chosen = self.options.cells;
-        let side = if shapes::dimension(name)? == 2 {
-            let grid = self.grid::<2>()?;
-            self.side(PART, &grid, ROOM)?
-        } else {
-            let grid = self.grid::<3>()?;
-            self.side(PART, &grid, ROOM)?
+        let side = match shapes::dimension(name)? {
+            2 => self.side::<2>(PART, ROOM)?,
+            _ => self.side::<3>(PART, ROOM)?,
         };
         match shapes::built_in(name, side)? {
             BuiltIn::Plane(shape) => self.in_plane(&*shape),
@@ -548,9 +539,8 @@ impl<'a> Reader<'a> {
         let sides = outline.sides();
         let grid = self.grid_holding(&image.bounding_box(), &IMAGE_CELLS, &distance, &sides)?;
         let field = self.sampled(grid, &distance)?;
-        Ok(Loaded::Plane(
-            self.start(field, Plane::of_image(&image, path)?),
-        ))
+        let plane = Plane::of_image(&image, path)?;
+        Ok(Loaded::Plane(self.start(field, plane)))
     }
 
     fn volume(&mut self, path: &Path) -> Result<Loaded, Error> {
@@ -575,14 +565,14 @@ impl<'a> Reader<'a> {
             ));
         }
         let field = self.mesh_field(&body.surface, grid)?;
-        let voxels = Voxels {
+        let voxels = Some(Voxels {
             volume: body.volume,
             side: body.voxel,
             farthest: None,
-        };
+        });
         let space = Space {
-            voxels: Some(voxels),
-            ..Space::new(UpAxis::default())
+            voxels,
+            ..Space::default()
         };
         Ok(self.space(field, space))
     }
@@ -609,35 +599,24 @@ impl<'a> Reader<'a> {
         let (_, side) = usual_box::<D>();
         let side = *self.options.box_side.get_or_insert(side);
         let field = npy::read(path, |cells| Grid::centred(cells, side))?;
-        let outside = |u: &&f64| u.abs() > LARGEST_PHASE;
-        if let Some(value) = field
-            .values()
-            .iter()
-            .find(outside)
-            .filter(|_| holds == Holds::PhaseField)
-        {
+        let outside = field.values().iter().find(|u| u.abs() > LARGEST_PHASE);
+        if let (Holds::PhaseField, Some(value)) = (holds, outside) {
             refuse!(
                 "{} holds the value {value}, which no phase field has; give --holds distance if these are signed distances",
                 path.display()
             );
         }
         let eps = self.eps_over_h * field.grid().spacing();
-        let distance = match (holds, self.options.cells) {
+        let mut distance = match (holds, self.options.cells) {
             (Holds::PhaseField, None) => return Ok(field),
             (Holds::PhaseField, Some(_)) => field.map(|u| distance_from_phase_field(u, eps)),
             (Holds::Distance, _) => field,
         };
-        let distance = self.resampled(distance)?;
+        if self.options.cells.is_some() {
+            distance = Field::from_fn(self.grid()?, |x| distance.interpolate(x));
+        }
         let eps = self.eps_over_h * distance.grid().spacing();
         Ok(distance.map(|s| optimal_profile(s, eps)))
-    }
-
-    /// Distances in the same box with the number of cells that was chosen, interpolated linearly.
-    fn resampled<const D: usize>(&mut self, distance: Field<D>) -> Result<Field<D>, Error> {
-        if self.options.cells.is_none() {
-            return Ok(distance);
-        }
-        Ok(Field::from_fn(self.grid()?, |x| distance.interpolate(x)))
     }
 }
 
@@ -653,19 +632,19 @@ fn far_from(mesh: &ClosedMesh, surface: Option<&ClosedMesh>) -> String {
 
 /// Refuses images that are no drawings, unless it is said what is to be inside.
 fn refuse_photographs(tones: &Tones, side: Side, path: &Path) -> Result<(), Error> {
-    if tones.between < PHOTOGRAPH {
-        return Ok(());
-    }
-    refuse!(
-        "{} has continuous tones, as a photograph: {:.0} % of its pixels have none of two. A shape has two: with --threshold {:.2}, which \
+    if tones.between >= PHOTOGRAPH {
+        refuse!(
+            "{} has continuous tones, as a photograph: {:.0} % of its pixels have none of two. A shape has two: with --threshold {:.2}, which \
          separates them best, the pixels {}, {:.0} % of all, would be inside, and all other tones of them would be lost; say so by \
          --threshold or --inside",
-        path.display(),
-        100.0 * tones.between,
-        tones.threshold,
-        side.at(tones.threshold),
-        100.0 * tones.inside,
-    )
+            path.display(),
+            100.0 * tones.between,
+            tones.threshold,
+            side.at(tones.threshold),
+            100.0 * tones.inside,
+        );
+    }
+    Ok(())
 }
 
 /// Whether a file of values is meant to be in the plane; its reader says what is wrong with it.

@@ -8,6 +8,7 @@ mod faired;
 mod input;
 mod keep;
 mod messages;
+mod outcome;
 mod own;
 mod page;
 mod paths;

@@ -3,8 +3,6 @@
 //! It is made of the files of the run alone, and the same files give the same bytes. It is not one of them: the checkpoint
 //! does not know it, so that it may be removed, and is written again by `willmore resume`.
 
-use std::fmt::Write;
-
 use engine::METRICS;
 use pages::{
     Details, Facts, Figure, Frames, Image, Page, Section, Table, Text, Viewer, five_digits,
@@ -14,7 +12,7 @@ use report::{Axis, LineChart, Marker, Series};
 use crate::faired::view;
 use crate::paths::MESHES;
 use crate::prelude::*;
-use crate::{config, own, plane, presentation};
+use crate::{config, outcome, own, plane, presentation};
 
 pub const NAME: &str = "index.html";
 
@@ -222,27 +220,17 @@ impl Files<'_> {
         self.records.iter().filter_map(point).collect()
     }
 
-    /// What came out, in a sentence.
+    /// What came out, in words.
     fn lead(&self, outcome: Option<&Value>) -> String {
         let last = self.records.last();
         let (step, time) = last.map_or((0, 0.0), |last| (last.step, last.time));
-        let time = five_digits(time);
+        let progress = outcome::progress(step as u64, time);
         let Some(outcome) = outcome else {
-            return format!("Not finished: {step} steps to the time {time} so far.");
+            return format!("Not finished: {progress} so far.");
         };
-        let mut lead = format!("{step} steps to the time {time}.");
-        let number = |name: &str| outcome[name].as_f64().map(five_digits);
-        if let (Some(first), Some(last)) = (number("first_energy"), number("energy")) {
-            let name = match outcome["energy_terms"] {
-                Value::Null => "Willmore energy",
-                _ => "Energy",
-            };
-            let _ = write!(lead, " {name} {last}, before {first}.");
-        }
-        if outcome["components"] == 0 {
-            lead += " The shape has vanished.";
-        }
-        lead
+        let vanished = (outcome["components"] == 0).then(|| "the shape has vanished".to_owned());
+        let sentences = outcome::sentences(outcome).into_iter().chain(vanished);
+        sentences.fold(progress, |lead, sentence| lead + "; " + &sentence) + "."
     }
 
     fn has(&self, name: &str) -> bool {

@@ -17,7 +17,6 @@ const PIXELS: u32 = 512;
 #[derive(Serialize, Deserialize)]
 pub struct Plane {
     frame: Frame,
-    is_repaired: bool,
     #[serde(skip)]
     original: Option<Original>,
     /// The input, if it is an image, which a mask has to fit.
@@ -33,23 +32,21 @@ struct Original {
 
 impl Plane {
     pub fn of_box(grid: &Grid<2>) -> Result<Self, Error> {
-        Ok(Self::new(Frame::of_box(grid, PIXELS)?, None))
+        Ok(Self {
+            frame: Frame::of_box(grid, PIXELS)?,
+            original: None,
+            image: None,
+        })
     }
 
     /// The frame has the pixels of the image.
     pub fn of_image(image: &Image, path: &Path) -> Result<Self, Error> {
         let (width, height) = (image.width(), image.height());
-        let frame = Frame::new(width, height, [0.0, f64::from(height)], 1.0)?;
-        Ok(Self::new(frame, Some(path.to_owned())))
-    }
-
-    fn new(frame: Frame, image: Option<PathBuf>) -> Self {
-        Self {
-            frame,
-            is_repaired: false,
+        Ok(Self {
+            frame: Frame::new(width, height, [0.0, f64::from(height)], 1.0)?,
             original: None,
-            image,
-        }
+            image: Some(path.to_owned()),
+        })
     }
 
     /// What is inside a mask that is an image: of the size of the input, or else a square, which fills the box.
@@ -93,7 +90,6 @@ impl Plane {
             mask.signed_distance(self.frame.point([column, row])) < 0.0
         };
         let drawn = (0..picture.pixels().len()).map(is_inside).collect();
-        self.is_repaired = true;
         self.original = Some(Original { picture, drawn });
         Ok(())
     }
@@ -156,10 +152,10 @@ impl Presentation<2> for Plane {
     const USUAL: &'static str = "svg";
 
     fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error> {
-        match up {
-            None => Ok(()),
-            Some(axis) => refuse!("--up {axis} has no meaning in the plane: leave it out"),
+        if let Some(axis) = up {
+            refuse!("--up {axis} has no meaning in the plane: leave it out");
         }
+        Ok(())
     }
 
     fn picture(&self, _: &Field<2>, u: &Field<2>, eps: f64) -> Result<Picture, Error> {
@@ -202,7 +198,7 @@ impl Presentation<2> for Plane {
     }
 
     fn restore(&mut self, stored: &StoredRun) -> Result<(), Error> {
-        if self.is_repaired {
+        if stored.files().any(|name| name == ORIGINAL) {
             let picture = |name: &str| Ok::<_, Error>(images::colours(name, &stored.read(name)?)?);
             let drawn = picture(MASK)?.pixels().iter().map(|p| p[0] == 0).collect();
             let picture = picture(ORIGINAL)?;

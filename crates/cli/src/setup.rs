@@ -8,20 +8,12 @@ use crate::prelude::*;
 
 /// Refuses widths of the interface, in cells, that no grid resolves.
 pub fn check_eps_over_h(eps_over_h: f64) -> Result<(), Error> {
-    if (0.5..=64.0).contains(&eps_over_h) {
-        return Ok(());
+    if !(0.5..=64.0).contains(&eps_over_h) {
+        refuse!(
+            "--eps-over-h {eps_over_h} is not possible: an interface is from 0.5 to 64 cells wide"
+        );
     }
-    refuse!("--eps-over-h {eps_over_h} is not possible: an interface is from 0.5 to 64 cells wide")
-}
-
-/// Refuses values that are not positive.
-pub fn check_positive(name: &str, value: Option<f64>) -> Result<(), Error> {
-    match value {
-        Some(value) if !(value.is_finite() && value > 0.0) => {
-            refuse!("{name} {value} must be positive")
-        }
-        _ => Ok(()),
-    }
+    Ok(())
 }
 
 impl CommonOptions {

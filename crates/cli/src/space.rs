@@ -12,7 +12,7 @@ const PIXELS: u32 = 480;
 /// Room around a surface for its flow, as a part of its longest side.
 const ROOM: f64 = 0.06;
 
-#[derive(Serialize, Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 pub struct Space {
     pub up: UpAxis,
     /// The parts and holes of the mesh that it was, if it was one.
@@ -33,17 +33,6 @@ pub struct Voxels {
     pub side: f64,
     /// How far its surface may go, root of the mean square, if that ends the flow.
     pub farthest: Option<f64>,
-}
-
-impl Space {
-    pub fn new(up: UpAxis) -> Self {
-        Self {
-            up,
-            input: None,
-            own: None,
-            voxels: None,
-        }
-    }
 }
 
 impl Presentation<3> for Space {
@@ -119,8 +108,7 @@ impl Presentation<3> for Space {
     }
 
     fn restore(&mut self, stored: &StoredRun) -> Result<(), Error> {
-        self.own
-            .as_mut()
-            .map_or(Ok(()), |own| own.load_from(stored))
+        let own = self.own.as_mut();
+        own.map_or(Ok(()), |own| own.load_from(stored))
     }
 }

@@ -8,7 +8,6 @@ use crate::keep::Keep;
 use crate::own::OwnMesh;
 use crate::paths::{absolute, read};
 use crate::prelude::*;
-use crate::setup::check_positive;
 use crate::values::SizeTarget;
 
 /// Energies below this have only balls, which have `8 pi`.
@@ -29,7 +28,7 @@ fn graded(spacing: f64) -> StepRule {
 
 impl FairOptions {
     /// Whether it ends as soon as something is reached, which must not be jumped over.
-    fn takes_small_steps(&self) -> bool {
+    pub fn takes_small_steps(&self) -> bool {
         let ratio = self.energy_ratio.or(self.flow.energy);
         self.noise.is_some() || ratio.is_some() || !self.ends
     }
@@ -40,8 +39,6 @@ impl FairOptions {
             || flow.run.time.is_some()
             || flow.energy.is_some()
             || flow.run.steps.is_some();
-        check_positive("--noise", self.noise)?;
-        check_positive("--energy-ratio", self.energy_ratio)?;
         let usual = if self.takes_small_steps() {
             graded(f64::NAN)
         } else {
@@ -66,11 +63,7 @@ impl FairOptions {
         let loaded = match reader.source.clone() {
             Source::Mesh(path) => return self.load_mesh(&path, messages),
             Source::Volume(_) if self.noise.is_some() || self.keep.is_some() => {
-                let given = if self.noise.is_some() {
-                    "--noise"
-                } else {
-                    "--keep"
-                };
+                let given = self.noise.map_or("--keep", |_| "--noise");
                 refuse!(
                     "{given} has no meaning for a volume, of which a new mesh is made: leave it out"
                 );
@@ -99,12 +92,12 @@ impl FairOptions {
             }
             _ => reader.load()?,
         };
-        match loaded {
-            Loaded::Space(_) => Ok(loaded),
-            Loaded::Plane(_) => refuse!(
-                "`fair` is for surfaces in space; for images and shapes in the plane there is `willmore flow`",
-            ),
+        if let Loaded::Plane(_) = loaded {
+            refuse!(
+                "`fair` is for surfaces in space; for images and shapes in the plane there is `willmore flow`"
+            );
         }
+        Ok(loaded)
     }
 
     fn load_mesh(&mut self, path: &Path, messages: MessageOptions) -> Result<Loaded, Error> {

@@ -3,15 +3,14 @@
 use engine::{ErrorControl, Flow, Held, Helfrich, Store, TimeSteps};
 use solver::NewtonParams;
 
-use crate::cli::{FlowOptions, MessageOptions, RunCommand, RunOptions};
+use crate::cli::{FlowOptions, MessageOptions, RunCommand, RunOptions, SchemeOptions};
 use crate::config;
 use crate::input::{Loaded, Reader, Start, usual_box};
-use crate::paths::{absolute, extension};
+use crate::paths::absolute;
 use crate::plane::Plane;
 use crate::prelude::*;
 use crate::presentation::{self, Presentation};
 use crate::run::{Plan, free_folder, make_way};
-use crate::setup::check_positive;
 use crate::sizes;
 use crate::space::Space;
 use crate::values::{Amount, Label};
@@ -19,7 +18,6 @@ use crate::volume;
 
 /// In a step the interface moves by at most so many widths of it.
 const LONGEST_MOVE: f64 = 2.0;
-const SAVED: [&str; 5] = ["ply", "obj", "stl", "png", "svg"];
 
 impl RunCommand {
     /// Refuses options before anything is read.
@@ -28,16 +26,24 @@ impl RunCommand {
             Self::Flow(flow) => flow.check(StepRule::Controlled),
             Self::Fair(fair) => fair.check(),
             Self::Inpaint(inpaint) => inpaint.check(),
-            Self::Mcf(mcf) => mcf.check(),
+            Self::Mcf(mcf) => {
+                let SchemeOptions {
+                    scheme, network, ..
+                } = &mcf.run.scheme;
+                let chosen = network.is_some() || *scheme != Scheme::Accurate;
+                if chosen && !mcf.method.is_learned() {
+                    refuse!(
+                        "--network and --scheme have no meaning for finite elements: leave them out, or choose --method network"
+                    );
+                }
+                Ok(())
+            }
         }
     }
 
     /// How many steps are made unless it is said: few, or many where something else ends the run; those of mean curvature flow are short.
     fn usual_steps(&mut self) -> usize {
-        let fairs = match self {
-            Self::Fair(fair) => fair.noise.is_some() || fair.energy_ratio.is_some() || !fair.ends,
-            _ => false,
-        };
+        let fairs = matches!(self, Self::Fair(fair) if fair.takes_small_steps());
         let energy = self.willmore().and_then(|flow| flow.energy);
         let has_an_end = fairs || energy.is_some() || self.options().time.is_some();
         match self {
@@ -96,30 +102,25 @@ impl FlowOptions {
             .insert(rule.resolved(scales.mcf_step * unit.powi(2)))
     }
 
-    /// Refuses a tolerance that the time steps do not look at, and energies that nothing has.
+    /// Refuses a tolerance that the time steps do not look at.
     pub fn check(&self, usual: StepRule) -> Result<(), Error> {
-        check_positive("--energy", self.energy)?;
-        match self.tolerance {
-            Some(tolerance) if self.tau.unwrap_or(usual) != StepRule::Controlled => {
-                refuse!(
-                    "--tolerance {tolerance} is for controlled time steps: give --tau controlled, or leave it out"
-                )
-            }
-            _ => Ok(()),
+        if let Some(tolerance) = self.tolerance
+            && self.tau.unwrap_or(usual) != StepRule::Controlled
+        {
+            refuse!(
+                "--tolerance {tolerance} is for controlled time steps: give --tau controlled, or leave it out"
+            );
         }
+        Ok(())
     }
 
     /// Spontaneous curvature, tension and pressure, in the units of the input.
-    fn energy(&self) -> Result<Helfrich, Error> {
-        let finite = |name: &str, value: Option<f64>| match value.unwrap_or(0.0) {
-            value if value.is_finite() => Ok(value),
-            value => refuse!("{name} {value} must be a finite number"),
-        };
-        Ok(Helfrich {
-            spontaneous_curvature: finite("--spontaneous-curvature", self.spontaneous_curvature)?,
-            tension: finite("--tension", self.tension)?,
-            pressure: finite("--pressure", self.pressure)?,
-        })
+    fn energy(&self) -> Helfrich {
+        Helfrich {
+            spontaneous_curvature: self.spontaneous_curvature.unwrap_or(0.0),
+            tension: self.tension.unwrap_or(0.0),
+            pressure: self.pressure.unwrap_or(0.0),
+        }
     }
 }
 
@@ -127,25 +128,8 @@ impl RunOptions {
     /// Refuses what cannot be done before anything is computed.
     fn check(&mut self) -> Result<(), Error> {
         self.scheme.fill_in()?;
-        check_positive("--time", self.time)?;
-        for (name, value) in [
-            ("--steps", self.steps),
-            ("--frames", self.keep.frames),
-            ("--checkpoint-every", Some(self.keep.checkpoint_every)),
-        ] {
-            if value == Some(0) {
-                refuse!("{name} must be at least 1");
-            }
-        }
         let force = self.keep.force;
         if let Some(save) = &mut self.keep.save {
-            if !SAVED.contains(&&*extension(save)) {
-                refuse!(
-                    "--save {} must end in .{}",
-                    save.display(),
-                    SAVED.join(", .")
-                );
-            }
             *save = absolute(&*save)?;
             force.check("--save", save)?;
             if !save.parent().is_some_and(Path::is_dir) {
@@ -323,10 +307,7 @@ impl Job {
         let eps = scales.eps;
         let known = presentation.known(&initial, eps)?;
         let (energy, held) = match options {
-            Some(options) => (
-                options.energy()?,
-                options.held(&initial, eps, known.volume)?,
-            ),
+            Some(options) => (options.energy(), options.held(&initial, eps, known.volume)?),
             None => (Helfrich::default(), Held::default()),
         };
         let mut measures = vec![Measure::zero_set(eps, &held)];
@@ -346,7 +327,7 @@ impl Job {
         })
     }
 
-    fn plan<O>(&mut self, name: String, presentation: O) -> Plan<O> {
+    fn plan<const D: usize, O>(&mut self, name: String, presentation: O) -> Plan<D, O> {
         let format = match &self.command {
             RunCommand::Fair(fair) => fair.format.clone(),
             _ => None,
