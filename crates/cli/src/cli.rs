@@ -446,15 +446,15 @@ pub struct SampleOptions {
 
     /// The file to write: a picture (.png), a mesh (.ply, .obj, .stl), a field (.npy, .vti) or a segmentation (.nii, .nii.gz)
     #[arg(long, value_name = "FILE")]
-    pub save: Option<PathBuf>,
+    pub save: PathBuf,
 
     /// Cut this region out: box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z; may be given again
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub without: Vec<Region>,
 
     /// Move the vertices of a mesh along their normals by random lengths of up to this
-    #[arg(long, value_name = "LENGTH")]
-    pub noise: Option<f64>,
+    #[arg(long, value_name = "LENGTH", default_value_t = 0.0)]
+    pub noise: f64,
 
     /// Seed of the noise
     #[arg(long, default_value_t = 1)]

@@ -10,7 +10,7 @@ pub const SIZES: [&str; 3] = ["length", "area", "volume"];
 /// How far a run has come.
 pub fn progress(steps: u64, time: f64) -> String {
     let plural = if steps == 1 { "" } else { "s" };
-    format!("{steps} step{plural} to t = {}", five_digits(time))
+    format!("{steps} step{plural} to t = {time:.4e}")
 }
 
 /// Energy, sizes, and how far the surface has moved, each in a sentence, and then what may have gone wrong.

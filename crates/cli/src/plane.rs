@@ -117,19 +117,15 @@ impl Original {
     /// The mean of the pixels outside of the mask where the drawing has this opacity: those near the mask, or else all of them.
     fn tone(&self, drawing: &Picture, opacity: u8) -> Option<[f64; 4]> {
         let width = self.picture.width() as usize;
-        let place = |pixel: usize| [pixel % width, pixel / width];
+        let place = |pixel: usize| [pixel % width, pixel / width].map(|i| i as f64);
         let drawn = (0..self.drawn.len()).filter(|&pixel| self.drawn[pixel]);
-        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
-        for pixel in drawn {
-            for (axis, at) in place(pixel).into_iter().enumerate() {
-                low[axis] = low[axis].min(at);
-                high[axis] = high[axis].max(at);
-            }
-        }
+        let mask = BoundingBox::around(drawn.map(place))?;
+        let margins = mask.extent().map(|side| 8.0 + (side / 4.0).floor());
         let is_near = |pixel: usize| {
-            (place(pixel).into_iter().enumerate()).all(|(axis, at)| {
-                let margin = 8 + (high[axis].saturating_sub(low[axis])) / 4;
-                (low[axis].saturating_sub(margin)..=high[axis] + margin).contains(&at)
+            let at = place(pixel);
+            (0..2).all(|axis| {
+                let (low, high) = (mask.lower[axis], mask.upper[axis]);
+                (low - margins[axis]..=high + margins[axis]).contains(&at[axis])
             })
         };
         let mean = |near: bool| {

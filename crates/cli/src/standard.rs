@@ -35,14 +35,13 @@ impl Standard {
             input.input = Some(path.to_string_lossy().into_owned());
             standard.input = Some(path);
         }
-        let several = input.label == Some(Label::All);
-        let Some(save) = save.as_mut().filter(|path| path.as_os_str() == "-") else {
+        let Some(save) = save.filter(|path| path.as_os_str() == "-") else {
             return Ok(standard);
         };
         if messages.json {
             refuse!("--json and --save - would both write to standard output: leave one out");
         }
-        if several {
+        if input.label == Some(Label::All) {
             refuse!("--save - writes one mesh, and --label all makes several: give a file");
         }
         messages.quiet = true;
@@ -71,12 +70,12 @@ impl Drop for Standard {
 }
 
 /// The input of a command and the file that it writes, if it has these.
-fn paths(command: &mut Command) -> Option<(&mut InputOptions, &mut Option<PathBuf>)> {
+fn paths(command: &mut Command) -> Option<(&mut InputOptions, Option<&mut PathBuf>)> {
     match command {
-        Command::Sample(sample) => Some((&mut sample.input, &mut sample.save)),
+        Command::Sample(sample) => Some((&mut sample.input, Some(&mut sample.save))),
         Command::Run(command) => {
             let options = command.options();
-            Some((&mut options.input, &mut options.keep.save))
+            Some((&mut options.input, options.keep.save.as_mut()))
         }
         _ => None,
     }

@@ -344,7 +344,7 @@ fn every_mistake_is_one_clear_line() {
         ),
         (&["networks", "show", "net.safetensors"], "net.safetensors"),
         (&["check"], "there is no input"),
-        (&["sample", "builtin:disc"], "sample needs --save"),
+        (&["sample", "builtin:disc"], "not provided: --save <FILE>"),
         (
             &["sample", "builtin:disc", "--save", "a.jpg"],
             "must end in .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz",

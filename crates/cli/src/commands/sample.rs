@@ -2,7 +2,7 @@
 
 use volumes::Volume;
 
-use crate::cli::{InputOptions, MessageOptions, SampleOptions};
+use crate::cli::{MessageOptions, SampleOptions};
 use crate::input::{Loaded, Reader, Source, Start, check_phases, closed};
 use crate::paths::{MESHES, extension};
 use crate::prelude::*;
@@ -15,16 +15,12 @@ const EPS_OVER_H: f64 = 2.0;
 
 /// Writes an input as the flows begin with it, possibly damaged.
 pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<ExitCode, Error> {
-    let path = options.save.take().ok_or_else(|| {
-        Error::options(
-            "sample needs --save FILE, with .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz",
-        )
-    })?;
+    let path = options.save.clone();
     if let Some(labels) = volume::all_labels(&options.input)? {
         for label in labels {
             let mut one = options.clone();
             one.input.label = Some(Label::One(label));
-            one.save = Some(volume::named(&path, label));
+            one.save = volume::named(&path, label);
             run(one, messages)?;
         }
         return Ok(ExitCode::SUCCESS);
@@ -36,7 +32,7 @@ pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<ExitC
         refuse!("--save {shown} must end in .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz");
     }
     options.force.check("--save", &path)?;
-    let noise = options.noise.unwrap_or(0.0);
+    let noise = options.noise;
     if !(noise.is_finite() && noise >= 0.0) {
         refuse!("--noise {noise} must not be negative");
     }
@@ -50,18 +46,16 @@ pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<ExitC
         messages.report(&outcome, &format!("wrote {shown}"));
         Ok(ExitCode::SUCCESS)
     };
-    let InputOptions {
-        cells,
-        box_side,
-        side_length,
-        ..
-    } = &options.input;
-    let on_grid =
-        options.resample || cells.is_some() || box_side.is_some() || side_length.is_some();
-    let whole = is_mesh && options.without.is_empty() && !on_grid;
-    let repairs = options.input.repair;
+    let input = &options.input;
+    let as_it_is = is_mesh
+        && !options.resample
+        && options.without.is_empty()
+        && input.cells.is_none()
+        && input.box_side.is_none()
+        && input.side_length.is_none();
+    let repairs = input.repair;
     let mut reader = Reader::of(&mut options.input, EPS_OVER_H, messages)?;
-    if let (Source::Mesh(from), true) = (&reader.source, whole) {
+    if let (Source::Mesh(from), true) = (&reader.source, as_it_is) {
         let mut mesh = if repairs {
             closed(from, true, messages)?.into_mesh()
         } else {
