@@ -498,16 +498,13 @@ pub enum NetworksCommand {
     },
 }
 
-#[derive(Args, Serialize, Clone, Debug)]
+#[derive(Args, Clone, Debug)]
 pub struct CheckOptions {
     #[command(flatten)]
-    #[serde(flatten)]
     pub input: InputOptions,
     #[command(flatten)]
-    #[serde(flatten)]
     pub scheme: SchemeOptions,
     #[command(flatten)]
-    #[serde(flatten)]
     pub common: CommonOptions,
 }
 
@@ -565,11 +562,11 @@ impl RunCommand {
     }
 
     /// The options of Willmore flow; mean curvature flow has no energy and no controlled steps.
-    pub fn willmore(&self) -> Option<&FlowOptions> {
+    pub fn willmore(&mut self) -> Option<&mut FlowOptions> {
         match self {
             Self::Flow(flow) => Some(flow),
-            Self::Fair(fair) => Some(&fair.flow),
-            Self::Inpaint(inpaint) => Some(&inpaint.flow),
+            Self::Fair(fair) => Some(&mut fair.flow),
+            Self::Inpaint(inpaint) => Some(&mut inpaint.flow),
             Self::Mcf(_) => None,
         }
     }

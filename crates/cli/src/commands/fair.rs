@@ -18,14 +18,6 @@ const STEPS: f64 = 1.6;
 /// as long as the surface goes no further than so many, root of the mean square.
 const FARTHEST: f64 = 0.35;
 
-/// The usual steps on a grid of this spacing.
-fn graded(spacing: f64) -> StepRule {
-    StepRule::Graded {
-        first: Fairing::first_step(spacing),
-        part: Fairing::GROWTH,
-    }
-}
-
 impl FairOptions {
     /// Whether it ends as soon as something is reached, which must not be jumped over.
     pub fn takes_small_steps(&self) -> bool {
@@ -39,12 +31,6 @@ impl FairOptions {
             || flow.run.time.is_some()
             || flow.energy.is_some()
             || flow.run.steps.is_some();
-        let usual = if self.takes_small_steps() {
-            graded(f64::NAN)
-        } else {
-            StepRule::Controlled
-        };
-        self.flow.check(usual)?;
         if let Some(ratio) = self.energy_ratio.filter(|ratio| *ratio >= 1.0) {
             refuse!("--energy-ratio {ratio} is reached before the first step: give a part below 1");
         }
@@ -80,7 +66,6 @@ impl FairOptions {
                 {
                     voxels.farthest = Some(FARTHEST * voxels.side);
                     flow.run.time = Some((STEPS * voxels.side).powi(4));
-                    flow.tau.get_or_insert(graded(start.field.grid().spacing()));
                 }
                 loaded
             }
@@ -132,13 +117,5 @@ impl FairOptions {
         }
         let eps_over_h = self.flow.run.scheme.eps_over_h();
         Reader::of(&mut self.flow.run.input, eps_over_h, messages)?.own(own, path, self.allow_loss)
-    }
-
-    pub fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
-        if self.takes_small_steps() {
-            let spacing = scales.eps / self.flow.run.scheme.eps_over_h();
-            self.flow.tau.get_or_insert(graded(spacing));
-        }
-        self.flow.rule(scales, unit)
     }
 }

@@ -3,7 +3,7 @@
 use engine::{ErrorControl, Flow, Held, Helfrich, Store, TimeSteps};
 use solver::NewtonParams;
 
-use crate::cli::{FlowOptions, MessageOptions, RunCommand, RunOptions, SchemeOptions};
+use crate::cli::{FlowOptions, McfOptions, MessageOptions, RunCommand, RunOptions};
 use crate::config;
 use crate::input::{Loaded, Reader, Start, usual_box};
 use crate::paths::absolute;
@@ -18,26 +18,66 @@ use crate::volume;
 
 /// In a step the interface moves by at most so many widths of it.
 const LONGEST_MOVE: f64 = 2.0;
+/// The usual step of inpainting in units of the inner one,
+const INPAINT_STEP: f64 = 16.0;
+/// which a ramp reaches that starts this many times halved: at the border of the region there is a jump.
+const INPAINT_HALVINGS: u32 = 12;
 
 impl RunCommand {
     /// Refuses options before anything is read.
     fn check(&mut self) -> Result<(), Error> {
         match self {
-            Self::Flow(flow) => flow.check(StepRule::Controlled),
-            Self::Fair(fair) => fair.check(),
-            Self::Inpaint(inpaint) => inpaint.check(),
-            Self::Mcf(mcf) => {
-                let SchemeOptions {
-                    scheme, network, ..
-                } = &mcf.run.scheme;
-                let chosen = network.is_some() || *scheme != Scheme::Accurate;
-                if chosen && !mcf.method.is_learned() {
+            Self::Flow(_) => (),
+            Self::Fair(fair) => fair.check()?,
+            Self::Inpaint(inpaint) => inpaint.check()?,
+            Self::Mcf(McfOptions { method, run }) => {
+                let chosen = run.scheme.network.is_some() || run.scheme.scheme != Scheme::Accurate;
+                if chosen && !method.is_learned() {
                     refuse!(
                         "--network and --scheme have no meaning for finite elements: leave them out, or choose --method network"
                     );
                 }
-                Ok(())
             }
+        }
+        let usual = self.usual_rule(f64::NAN, f64::NAN);
+        if let Some(flow) = self.willmore()
+            && let Some(tolerance) = flow.tolerance
+            && flow.tau.unwrap_or(usual) != StepRule::Controlled
+        {
+            refuse!(
+                "--tolerance {tolerance} is for controlled time steps: give --tau controlled, or leave it out"
+            );
+        }
+        Ok(())
+    }
+
+    /// The rule for the time steps of Willmore flow unless one is chosen, for this inner step and spacing of the grid.
+    fn usual_rule(&self, inner: f64, spacing: f64) -> StepRule {
+        match self {
+            Self::Fair(fair) if fair.takes_small_steps() => StepRule::Graded {
+                first: Fairing::first_step(spacing),
+                part: Fairing::GROWTH,
+            },
+            Self::Inpaint(_) => StepRule::Ramp {
+                tau: INPAINT_STEP * inner,
+                halvings: INPAINT_HALVINGS,
+            },
+            _ => StepRule::Controlled,
+        }
+    }
+
+    /// The rule for time steps, filled in for these scales and the length that a unit of the usual box has: time steps that follow from
+    /// the inner step do so in a box of that size.
+    fn rule(&mut self, scales: &Scales, unit: f64, spacing: f64) -> StepRule {
+        let inner = scales.mcf_step * unit.powi(2);
+        let usual = self.usual_rule(inner, spacing);
+        match self.willmore() {
+            Some(flow) => {
+                let rule = flow.tau.unwrap_or(usual).resolved(inner);
+                flow.tau = Some(rule);
+                rule
+            }
+            None => StepRule::Constant(scales.mcf_step),
         }
     }
 
@@ -65,17 +105,6 @@ impl RunCommand {
         }
     }
 
-    /// The rule for time steps, filled in for these scales and the length that a unit of the usual box has: time steps that follow from
-    /// the inner step do so in a box of that size.
-    fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
-        match self {
-            Self::Flow(flow) => flow.rule(scales, unit),
-            Self::Fair(fair) => fair.rule(scales, unit),
-            Self::Inpaint(inpaint) => inpaint.rule(scales, unit),
-            Self::Mcf(_) => StepRule::Constant(scales.mcf_step),
-        }
-    }
-
     fn stops(&mut self, rule: StepRule) -> Vec<Stop> {
         // What has gone wrong is said before what was asked for.
         let mut stops = vec![Stop::Vanished, Stop::NoSurface, Stop::AtTheSide];
@@ -95,25 +124,6 @@ impl RunCommand {
 }
 
 impl FlowOptions {
-    pub fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
-        let rule = self.tau.unwrap_or(StepRule::Controlled);
-        *self
-            .tau
-            .insert(rule.resolved(scales.mcf_step * unit.powi(2)))
-    }
-
-    /// Refuses a tolerance that the time steps do not look at.
-    pub fn check(&self, usual: StepRule) -> Result<(), Error> {
-        if let Some(tolerance) = self.tolerance
-            && self.tau.unwrap_or(usual) != StepRule::Controlled
-        {
-            refuse!(
-                "--tolerance {tolerance} is for controlled time steps: give --tau controlled, or leave it out"
-            );
-        }
-        Ok(())
-    }
-
     /// Spontaneous curvature, tension and pressure, in the units of the input.
     fn energy(&self) -> Helfrich {
         Helfrich {
@@ -279,9 +289,10 @@ impl Job {
         let RunOptions { scheme, input, .. } = self.command.options();
         let (mut scales, operator) = scheme.operator(method, initial.grid())?;
         let unit = initial.grid().side() / input.box_side.unwrap_or(usual_box::<D>().1);
-        let rule = self.command.rule(&scales, unit);
+        let spacing = initial.grid().spacing();
+        let rule = self.command.rule(&scales, unit, spacing);
         let stops = self.command.stops(rule);
-        let options = self.command.willmore();
+        let options = self.command.willmore().map(|options| &*options);
         let steps = match rule {
             StepRule::Controlled => {
                 scales.newton = NewtonParams {

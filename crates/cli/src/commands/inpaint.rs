@@ -6,14 +6,8 @@ use crate::paths::absolute;
 use crate::prelude::*;
 use crate::values::Ansatz;
 
-/// The usual step in units of the inner one.
-const STEP: f64 = 16.0;
-/// The first step is divided into a ramp that starts this many times halved: at the border of the region there is a jump.
-const HALVINGS: u32 = 12;
-
 impl InpaintOptions {
     pub fn check(&mut self) -> Result<(), Error> {
-        self.flow.check(usual(f64::NAN))?;
         let mask = self.mask()?;
         if !Region::is_meant(mask) {
             let absolute = absolute(mask)?;
@@ -38,12 +32,6 @@ impl InpaintOptions {
             }
             Loaded::Space(start) => Loaded::Space(self.restricted(start, region(mask)?.as_ref())?),
         })
-    }
-
-    pub fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
-        let inner = scales.mcf_step * unit.powi(2);
-        self.flow.tau.get_or_insert(usual(STEP * inner));
-        self.flow.rule(scales, unit)
     }
 
     fn mask(&self) -> Result<&str, Error> {
@@ -82,13 +70,6 @@ impl InpaintOptions {
         }
         start.region = Some(region);
         Ok(start)
-    }
-}
-
-fn usual(tau: f64) -> StepRule {
-    StepRule::Ramp {
-        tau,
-        halvings: HALVINGS,
     }
 }
 
