@@ -11,7 +11,7 @@ use crate::own::{OwnMesh, thinnest};
 use crate::paths::{absolute, extension, read};
 use crate::plane::Plane;
 use crate::prelude::*;
-use crate::presentation::Topology;
+use crate::presentation::{Presentation, Topology};
 use crate::space::{Space, Voxels};
 use crate::volume;
 
@@ -229,18 +229,12 @@ impl<'a> Reader<'a> {
             }
             Source::Image(path) => self.image(&path)?,
             Source::Volume(path) => self.volume(&path)?,
-            Source::Field(path) if is_planar(&path)? => {
-                let field = self.values(&path)?;
-                self.plane(field)?
-            }
-            Source::Field(path) => {
-                let field = self.values(&path)?;
-                self.space(field, Space::default())
-            }
+            Source::Field(path) if is_planar(&path)? => Loaded::Plane(self.values(&path)?),
+            Source::Field(path) => Loaded::Space(self.values(&path)?),
             Source::Region(region) if region.dimension() == 2 => {
-                self.in_plane(&*region.shape()?)?
+                Loaded::Plane(self.shape(&*region.shape()?)?)
             }
-            Source::Region(region) => self.in_space(&*region.shape()?)?,
+            Source::Region(region) => Loaded::Space(self.shape(&*region.shape()?)?),
             Source::BuiltIn(name) => self.built_in(&name)?,
         };
         let input = self.options.input.as_deref().unwrap_or_default();
@@ -412,7 +406,7 @@ impl<'a> Reader<'a> {
             input: Some(Topology::of(mesh)),
             ..Space::default()
         };
-        Ok(self.space(field, space))
+        Ok(Loaded::Space(self.start(field, space)))
     }
 
     /// A mesh whose vertices follow the flow, on the coarsest grid that holds its parts and holes.
@@ -483,24 +477,12 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn space(&self, field: Field<3>, space: Space) -> Loaded {
-        Loaded::Space(self.start(field, space))
-    }
-
-    fn plane(&self, field: Field<2>) -> Result<Loaded, Error> {
-        let plane = Plane::of_box(field.grid())?;
-        Ok(Loaded::Plane(self.start(field, plane)))
-    }
-
-    fn in_plane(&mut self, shape: &dyn SignedDistance<2>) -> Result<Loaded, Error> {
+    fn shape<const D: usize, O: Presentation<D>>(
+        &mut self,
+        shape: &dyn SignedDistance<D>,
+    ) -> Result<Start<D, O>, Error> {
         let grid = self.grid()?;
-        self.plane(self.sampled(grid, shape)?)
-    }
-
-    fn in_space(&mut self, shape: &dyn SignedDistance<3>) -> Result<Loaded, Error> {
-        let grid = self.grid()?;
-        let field = self.sampled(grid, shape)?;
-        Ok(self.space(field, Space::default()))
+        Ok(self.start(self.sampled(grid, shape)?, O::of_box(&grid)?))
     }
 
     fn built_in(&mut self, name: &str) -> Result<Loaded, Error> {
@@ -510,8 +492,8 @@ impl<'a> Reader<'a> {
             _ => self.side::<3>(PART, ROOM)?,
         };
         match shapes::built_in(name, side)? {
-            BuiltIn::Plane(shape) => self.in_plane(&*shape),
-            BuiltIn::Space(shape) => self.in_space(&*shape),
+            BuiltIn::Plane(shape) => Ok(Loaded::Plane(self.shape(&*shape)?)),
+            BuiltIn::Space(shape) => Ok(Loaded::Space(self.shape(&*shape)?)),
             BuiltIn::Mesh(mesh) => {
                 let grid = self.grid()?;
                 let placement = Placement::fit(&mesh.bounding_box(), &grid, side)?;
@@ -574,7 +556,7 @@ impl<'a> Reader<'a> {
             voxels,
             ..Space::default()
         };
-        Ok(self.space(field, space))
+        Ok(Loaded::Space(self.start(field, space)))
     }
 
     fn mesh_field(&self, mesh: &ClosedMesh, grid: Grid<3>) -> Result<Field<3>, Error> {
@@ -594,11 +576,14 @@ impl<'a> Reader<'a> {
         Ok(distance.map(|s| optimal_profile(s, eps)))
     }
 
-    fn values<const D: usize>(&mut self, path: &Path) -> Result<Field<D>, Error> {
+    fn values<const D: usize, O: Presentation<D>>(
+        &mut self,
+        path: &Path,
+    ) -> Result<Start<D, O>, Error> {
         let holds = *self.options.holds.get_or_insert(Holds::PhaseField);
         let (_, side) = usual_box::<D>();
         let side = *self.options.box_side.get_or_insert(side);
-        let field = npy::read(path, |cells| Grid::centred(cells, side))?;
+        let mut field = npy::read(path, |cells| Grid::centred(cells, side))?;
         let outside = field.values().iter().find(|u| u.abs() > LARGEST_PHASE);
         if let (Holds::PhaseField, Some(value)) = (holds, outside) {
             refuse!(
@@ -606,17 +591,21 @@ impl<'a> Reader<'a> {
                 path.display()
             );
         }
-        let eps = self.eps_over_h * field.grid().spacing();
-        let mut distance = match (holds, self.options.cells) {
-            (Holds::PhaseField, None) => return Ok(field),
-            (Holds::PhaseField, Some(_)) => field.map(|u| distance_from_phase_field(u, eps)),
-            (Holds::Distance, _) => field,
-        };
+        let is_phase = holds == Holds::PhaseField;
         if self.options.cells.is_some() {
-            distance = Field::from_fn(self.grid()?, |x| distance.interpolate(x));
+            // Distances are linear across the interface, as what lies between the nodes is taken to be.
+            if is_phase {
+                let eps = self.eps_over_h * field.grid().spacing();
+                field = field.map(|u| distance_from_phase_field(u, eps));
+            }
+            field = Field::from_fn(self.grid()?, |x| field.interpolate(x));
         }
-        let eps = self.eps_over_h * distance.grid().spacing();
-        Ok(distance.map(|s| optimal_profile(s, eps)))
+        if !is_phase || self.options.cells.is_some() {
+            let eps = self.eps_over_h * field.grid().spacing();
+            field = field.map(|s| optimal_profile(s, eps));
+        }
+        let presentation = O::of_box(field.grid())?;
+        Ok(self.start(field, presentation))
     }
 }
 

@@ -31,14 +31,6 @@ struct Original {
 }
 
 impl Plane {
-    pub fn of_box(grid: &Grid<2>) -> Result<Self, Error> {
-        Ok(Self {
-            frame: Frame::of_box(grid, PIXELS)?,
-            original: None,
-            image: None,
-        })
-    }
-
     /// The frame has the pixels of the image.
     pub fn of_image(image: &Image, path: &Path) -> Result<Self, Error> {
         let (width, height) = (image.width(), image.height());
@@ -146,6 +138,14 @@ impl Original {
 impl Presentation<2> for Plane {
     const SAVED: &'static [&'static str] = &["png", "svg"];
     const USUAL: &'static str = "svg";
+
+    fn of_box(grid: &Grid<2>) -> Result<Self, Error> {
+        Ok(Self {
+            frame: Frame::of_box(grid, PIXELS)?,
+            original: None,
+            image: None,
+        })
+    }
 
     fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error> {
         if let Some(axis) = up {

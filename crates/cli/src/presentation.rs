@@ -64,6 +64,9 @@ pub struct Known<const D: usize> {
 
 /// How phase fields in `D` dimensions are shown.
 pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
+    /// That of a shape that is given on a grid or by a formula.
+    fn of_box(grid: &Grid<D>) -> Result<Self, Error>;
+
     /// Lets the axis that was chosen point up, or says which one does.
     fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error>;
 

@@ -34,9 +34,9 @@ impl FlowOptions {
         let target = |wanted: Option<SizeTarget>, from: f64, of_input: f64| {
             wanted.map(|wanted| match wanted {
                 SizeTarget::Keep => Target::keep(of_input),
-                other @ SizeTarget::To(_) => Target {
+                SizeTarget::To(amount) => Target {
                     from,
-                    to: other.of(of_input),
+                    to: amount.of(of_input),
                     over: ramp,
                 },
             })

@@ -39,6 +39,10 @@ impl Presentation<3> for Space {
     const SAVED: &'static [&'static str] = &MESHES;
     const USUAL: &'static str = MESHES[0];
 
+    fn of_box(_: &Grid<3>) -> Result<Self, Error> {
+        Ok(Self::default())
+    }
+
     fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error> {
         self.up = *up.get_or_insert(self.up);
         Ok(())

@@ -44,11 +44,17 @@ impl Amount {
         positive(number).map(amount).map_err(wrong)
     }
 
+    /// The value, if `whole` is what it may be a part of.
+    pub fn of(self, whole: f64) -> f64 {
+        match self {
+            Self::Value(value) => value,
+            Self::Percent(percent) => percent / 100.0 * whole,
+        }
+    }
+
     pub fn tolerance(text: &str) -> Result<Self, String> {
-        Self::parse(
-            text,
-            "a length, or a part of the motion in percent, such as 2%",
-        )
+        let expected = "a length, or a part of the motion in percent, such as 2%";
+        Self::parse(text, expected)
     }
 }
 
@@ -67,17 +73,6 @@ pub enum SizeTarget {
     /// This, or this part of what it is at the beginning.
     #[serde(untagged)]
     To(Amount),
-}
-
-impl SizeTarget {
-    /// The value, for a size that is `now` at the beginning.
-    pub fn of(self, now: f64) -> f64 {
-        match self {
-            Self::Keep => now,
-            Self::To(Amount::Value(value)) => value,
-            Self::To(Amount::Percent(percent)) => percent / 100.0 * now,
-        }
-    }
 }
 
 impl FromStr for SizeTarget {
