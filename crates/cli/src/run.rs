@@ -50,7 +50,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
     }
 
     /// From the last checkpoint to the end.
-    pub fn go_on(&self, mut store: Store, mut run: Run<D>) -> Result<ExitCode, Error> {
+    pub fn go_on(&self, mut store: Store, mut run: Run<D>) -> Result<(), Error> {
         let interrupt = Interrupt::catch()?;
         let (nodes, stored) = (run.case().grid().len(), run.stored_cells());
         let what = if stored < nodes {
@@ -93,10 +93,10 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         bar.finish();
         progress.clear();
         self.tell(outcome, &folder, run.ended(), seconds);
-        Ok(match ending {
-            Ending::Stopped(_) => ExitCode::SUCCESS,
-            Ending::Interrupted => ExitCode::from(Interrupt::EXIT_CODE),
-        })
+        match ending {
+            Ending::Stopped(_) => Ok(()),
+            Ending::Interrupted => Err(Error::Interrupted),
+        }
     }
 
     fn finish(&self, mut store: Store, run: &Run<D>) -> Result<Value, Error> {

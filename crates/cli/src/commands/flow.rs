@@ -155,7 +155,7 @@ pub fn run(
     mut command: RunCommand,
     messages: MessageOptions,
     stored: Option<(StoredRun, Option<usize>)>,
-) -> Result<ExitCode, Error> {
+) -> Result<(), Error> {
     if let Some(labels) = volume::all_labels(&command.options().input)? {
         return each_label(&command, &labels, messages);
     }
@@ -189,11 +189,7 @@ pub fn run(
 }
 
 /// One run for each label of a volume, until one is interrupted.
-fn each_label(
-    command: &RunCommand,
-    labels: &[i64],
-    messages: MessageOptions,
-) -> Result<ExitCode, Error> {
+fn each_label(command: &RunCommand, labels: &[i64], messages: MessageOptions) -> Result<(), Error> {
     for &label in labels {
         let mut one = command.clone();
         let RunOptions { input, keep, .. } = one.options();
@@ -201,12 +197,9 @@ fn each_label(
         for name in keep.output.iter_mut().chain(&mut keep.save) {
             *name = volume::named(name, label);
         }
-        let code = run(one, messages, None)?;
-        if code != ExitCode::SUCCESS {
-            return Ok(code);
-        }
+        run(one, messages, None)?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 struct Job {
@@ -219,7 +212,7 @@ impl Job {
     fn start<const D: usize, O: Presentation<D>>(
         mut self,
         mut start: Start<D, O>,
-    ) -> Result<ExitCode, Error> {
+    ) -> Result<(), Error> {
         let keep = &mut self.command.options().keep;
         start.presentation.turn(&mut keep.up)?;
         keep.save.as_deref().map_or(Ok(()), O::check_saved)?;
@@ -250,7 +243,7 @@ impl Job {
         mut self,
         stored: StoredRun,
         more: Option<usize>,
-    ) -> Result<ExitCode, Error> {
+    ) -> Result<(), Error> {
         let mut notes = engine::notes(&stored).clone();
         let name = notes["about"]["name"].as_str().unwrap_or("run").to_owned();
         let mut presentation = O::deserialize(&notes["outlet"]).map_err(|reason| {

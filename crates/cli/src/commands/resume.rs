@@ -6,7 +6,7 @@ use crate::prelude::*;
 use crate::{config, page};
 
 /// Continues a run by the options and the state that it stored; its input is not needed again.
-pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<ExitCode, Error> {
+pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<(), Error> {
     let stored = if options.recover {
         RunDirectory::recover(&options.run)?
     } else {
@@ -35,5 +35,5 @@ pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<ExitCode
         "The run in {folder} is finished already; willmore resume {folder} --steps N goes on to N steps in all"
     );
     messages.report(&outcome, &text);
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }

@@ -14,7 +14,7 @@ use crate::volume;
 const EPS_OVER_H: f64 = 2.0;
 
 /// Writes an input as the flows begin with it, possibly damaged.
-pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<ExitCode, Error> {
+pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<(), Error> {
     let path = options.save.clone();
     if let Some(labels) = volume::all_labels(&options.input)? {
         for label in labels {
@@ -23,7 +23,7 @@ pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<ExitC
             one.save = volume::named(&path, label);
             run(one, messages)?;
         }
-        return Ok(ExitCode::SUCCESS);
+        return Ok(());
     }
     let format = extension(&path);
     let is_mesh = MESHES.contains(&&*format);
@@ -41,11 +41,6 @@ pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<ExitC
             "--noise moves the vertices of meshes: leave it out, or save a mesh in place of {shown}"
         );
     }
-    let done = || {
-        let outcome = json!({ "command": "sample", "file": path });
-        messages.report(&outcome, &format!("wrote {shown}"));
-        Ok(ExitCode::SUCCESS)
-    };
     let input = &options.input;
     let as_it_is = is_mesh
         && !options.resample
@@ -66,19 +61,21 @@ pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<ExitC
             mesh.roughen(noise, options.seed);
         }
         surfaces::write(&path, &mesh)?;
-        return done();
-    }
-    match reader.load()? {
-        Loaded::Plane(start) => write(start, options, &path)?,
-        Loaded::Space(start) if noise > 0.0 => {
-            let u = without(start.field, &options.without)?;
-            let mut mesh = surfaces::remeshed_surface(&u, eps(&u))?;
-            mesh.roughen(noise, options.seed);
-            surfaces::write(&path, &mesh)?;
+    } else {
+        match reader.load()? {
+            Loaded::Plane(start) => write(start, options, &path)?,
+            Loaded::Space(start) if noise > 0.0 => {
+                let u = without(start.field, &options.without)?;
+                let mut mesh = surfaces::remeshed_surface(&u, eps(&u))?;
+                mesh.roughen(noise, options.seed);
+                surfaces::write(&path, &mesh)?;
+            }
+            Loaded::Space(start) => write(start, options, &path)?,
         }
-        Loaded::Space(start) => write(start, options, &path)?,
     }
-    done()
+    let outcome = json!({ "command": "sample", "file": path });
+    messages.report(&outcome, &format!("wrote {shown}"));
+    Ok(())
 }
 
 fn eps<const D: usize>(u: &Field<D>) -> f64 {
