@@ -77,15 +77,11 @@ const LARGEST_PHASE: f64 = 1.1;
 
 /// The usual format of what becomes of an input: that of a mesh, otherwise PLY in space and PNG in the plane.
 pub fn usual_format(input: &str) -> Result<String, Error> {
-    let in_plane = match Source::of(input)? {
-        Source::Mesh(path) => return Ok(extension(&path)),
-        Source::Image(_) => true,
-        Source::Field(path) => is_planar(&path)?,
-        Source::Volume(_) => false,
-        Source::BuiltIn(name) => shapes::dimension(&name)? == 2,
-        Source::Region(region) => region.dimension() == 2,
-    };
-    Ok(if in_plane { "png" } else { "ply" }.to_owned())
+    Ok(match Source::of(input)? {
+        Source::Mesh(path) => extension(&path),
+        source if source.is_planar()? => "png".to_owned(),
+        _ => "ply".to_owned(),
+    })
 }
 
 /// The closed mesh in a file, possibly after a repair.
@@ -138,6 +134,20 @@ impl Source {
             }
             Self::BuiltIn(_) | Self::Region(_) => None,
         }
+    }
+
+    fn is_planar(&self) -> Result<bool, Error> {
+        Ok(match self {
+            Self::Mesh(_) | Self::Volume(_) => false,
+            Self::Image(_) => true,
+            // Whatever else is wrong with the file is said when its values are read.
+            Self::Field(path) => {
+                let decoded = npy::decode::<2>(&read(path)?);
+                !matches!(decoded, Err(NpyError::Rank { .. }))
+            }
+            Self::BuiltIn(name) => shapes::dimension(name)? == 2,
+            Self::Region(region) => region.dimension() == 2,
+        })
     }
 
     fn name(&self) -> String {
@@ -222,6 +232,7 @@ impl<'a> Reader<'a> {
 
     /// Reads it.
     pub fn load(&mut self) -> Result<Loaded, Error> {
+        let is_planar = self.source.is_planar()?;
         let loaded = match self.source.clone() {
             Source::Mesh(path) => {
                 let mesh = closed(&path, self.options.repair, self.messages)?;
@@ -229,11 +240,9 @@ impl<'a> Reader<'a> {
             }
             Source::Image(path) => self.image(&path)?,
             Source::Volume(path) => self.volume(&path)?,
-            Source::Field(path) if is_planar(&path)? => Loaded::Plane(self.values(&path)?),
+            Source::Field(path) if is_planar => Loaded::Plane(self.values(&path)?),
             Source::Field(path) => Loaded::Space(self.values(&path)?),
-            Source::Region(region) if region.dimension() == 2 => {
-                Loaded::Plane(self.shape(&*region.shape()?)?)
-            }
+            Source::Region(region) if is_planar => Loaded::Plane(self.shape(&*region.shape()?)?),
             Source::Region(region) => Loaded::Space(self.shape(&*region.shape()?)?),
             Source::BuiltIn(name) => self.built_in(&name)?,
         };
@@ -487,9 +496,10 @@ impl<'a> Reader<'a> {
 
     fn built_in(&mut self, name: &str) -> Result<Loaded, Error> {
         let chosen = self.options.cells;
-        let side = match shapes::dimension(name)? {
-            2 => self.side::<2>(PART, ROOM)?,
-            _ => self.side::<3>(PART, ROOM)?,
+        let side = if self.source.is_planar()? {
+            self.side::<2>(PART, ROOM)?
+        } else {
+            self.side::<3>(PART, ROOM)?
         };
         match shapes::built_in(name, side)? {
             BuiltIn::Plane(shape) => Ok(Loaded::Plane(self.shape(&*shape)?)),
@@ -634,15 +644,6 @@ fn refuse_photographs(tones: &Tones, side: Side, path: &Path) -> Result<(), Erro
         );
     }
     Ok(())
-}
-
-/// Whether a file of values is meant to be in the plane; its reader says what is wrong with it.
-fn is_planar(path: &Path) -> Result<bool, Error> {
-    let bytes = read(path)?;
-    Ok(!matches!(
-        npy::decode::<2>(&bytes),
-        Err(NpyError::Rank { .. })
-    ))
 }
 
 /// Refuses shapes of which there is nothing on the grid, or nothing else.

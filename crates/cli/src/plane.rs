@@ -44,21 +44,16 @@ impl Plane {
     /// What is inside a mask that is an image: of the size of the input, or else a square, which fills the box.
     pub fn mask(&self, mask: &str, grid: &Grid<2>) -> Result<Box<dyn SignedDistance<2>>, Error> {
         let image = images::read(mask)?;
-        let size = [image.width(), image.height()];
-        let needed = match [self.frame.width(), self.frame.height()] {
-            [w, h] if self.image.is_some() && size != [w, h] => {
-                Some(format!("{w} x {h} pixels, as the input"))
-            }
-            _ if self.image.is_none() && size[0] != size[1] => {
-                Some("a square, which fills the box".to_owned())
-            }
-            _ => None,
-        };
-        if let Some(needed) = needed {
+        let (width, height) = (image.width(), image.height());
+        let [w, h] = [self.frame.width(), self.frame.height()];
+        if self.image.is_some() && [width, height] != [w, h] {
             refuse!(
-                "--mask {mask} has {} x {} pixels; it must be {needed}",
-                size[0],
-                size[1]
+                "--mask {mask} has {width} x {height} pixels; it must have {w} x {h}, as the input"
+            );
+        }
+        if self.image.is_none() && width != height {
+            refuse!(
+                "--mask {mask} has {width} x {height} pixels; it must be a square, which fills the box"
             );
         }
         let side = Side::of(&image, 0.5)?;

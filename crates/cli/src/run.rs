@@ -325,12 +325,11 @@ pub fn make_way(folder: &Path) -> Result<(), Error> {
 
 /// `runs/NAME`, with the first number that is free.
 pub fn free_folder(name: &str) -> PathBuf {
-    let folder = Path::new("runs").join(name);
-    let numbered = (2..).map(|k| Path::new("runs").join(format!("{name}-{k}")));
-    std::iter::once(folder)
-        .chain(numbered)
-        .find(|folder| !folder.exists())
-        .expect("some number is free")
+    let numbered = (2..).map(|k| format!("{name}-{k}"));
+    let names = std::iter::once(name.to_owned()).chain(numbered);
+    let mut folders = names.map(|name| Path::new("runs").join(name));
+    let free = folders.find(|folder| !folder.exists());
+    free.expect("some number is free")
 }
 
 /// What controlled steps say of themselves: their [estimated error](estimated_time_error), the way of the place that moves farthest in each,
