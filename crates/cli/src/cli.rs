@@ -19,7 +19,6 @@ the last step was finished and stored, `willmore resume` goes on.";
 #[command(name = "willmore", version, after_help = EXIT_CODES, max_term_width = 120)]
 #[command(args_override_self = true, disable_help_subcommand = true)]
 pub struct Cli {
-    /// What to do.
     #[command(subcommand)]
     pub command: Command,
     #[command(flatten)]
@@ -151,12 +150,7 @@ pub struct InputOptions {
     pub threshold: Option<f64>,
 
     /// The label of a volume that is inside, or all: each but 0 becomes a surface of its own [default: the larger of two values]
-    #[arg(
-        long,
-        value_name = "LABEL",
-        conflicts_with = "threshold",
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "LABEL", conflicts_with = "threshold")]
     pub label: Option<Label>,
 
     /// Mend a mesh that is open, crosses itself or is not oriented alike: a new mesh is made, and it is said what was changed
@@ -418,12 +412,7 @@ pub struct InpaintOptions {
     pub mask: Option<String>,
 
     /// What the region holds at the beginning: keep, empty, full, or a shape like the mask
-    #[arg(
-        long,
-        value_name = "SHAPE",
-        default_value = "keep",
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "SHAPE", default_value = "keep")]
     pub ansatz: Ansatz,
 }
 
@@ -569,13 +558,6 @@ impl RunCommand {
             Self::Inpaint(inpaint) => Some(&mut inpaint.flow),
             Self::Mcf(_) => None,
         }
-    }
-}
-
-impl SchemeOptions {
-    /// Interface width in cells.
-    pub fn eps_over_h(&self) -> f64 {
-        self.eps_over_h.unwrap_or(2.0)
     }
 }
 

@@ -110,14 +110,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         if has_interface(u) {
             faired = presentation.faired(start, u, eps)?;
         }
-        self.write(
-            start,
-            u,
-            eps,
-            faired.as_ref(),
-            presentation::FINAL,
-            directory,
-        )?;
+        self.write(case, u, faired.as_ref(), presentation::FINAL, directory)?;
         if has_interface(u) {
             topology = presentation.topology(u, eps)?;
             if let Some(path) = &self.keep.save {
@@ -193,9 +186,8 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
     /// Writes the field for ParaView and, unless the shape has vanished, a picture and the shape to files `stem.*` of a run.
     fn write(
         &self,
-        start: &Field<D>,
+        case: &Case<D>,
         u: &Field<D>,
-        eps: f64,
         faired: Option<&Faired>,
         stem: &str,
         run: &mut RunDirectory,
@@ -206,7 +198,9 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         if !has_interface(u) {
             return Ok(());
         }
-        let picture = self.presentation.picture(start, u, eps)?.to_png()?;
+        let eps = case.scales.eps;
+        let picture = self.presentation.picture(&case.initial, u, eps)?;
+        let picture = picture.to_png()?;
         run.write_file(&format!("{stem}.png"), |out| out.write_all(&picture))?;
         if let Some(faired) = faired {
             let figure = faired.displacement.to_svg()?;
@@ -298,7 +292,7 @@ impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
         let frames = plan.keep.frames;
         if frames.is_some_and(|every| step.is_multiple_of(every)) {
             let name = presentation::frame(step);
-            let written = plan.write(&case.initial, u, eps, None, &name, run);
+            let written = plan.write(case, u, None, &name, run);
             written.map_err(engine::Error::observer)?;
         }
         // Touching sheets have no topology.

@@ -29,6 +29,11 @@ impl CommonOptions {
 }
 
 impl SchemeOptions {
+    /// Interface width in cells.
+    pub fn eps_over_h(&self) -> f64 {
+        self.eps_over_h.unwrap_or(2.0)
+    }
+
     /// Takes the width of the interface from the network, unless it is given.
     pub fn fill_in(&mut self) -> Result<(), Error> {
         if let (None, Some(path)) = (self.eps_over_h, &self.network) {
