@@ -126,14 +126,31 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         // Touching sheets have no topology; that is no reason not to flow.
         let of_start = || presentation.topology(start, eps).unwrap_or_default();
         let before = presentation.input().unwrap_or_else(of_start);
+        let (first, last) = (run.records().first(), run.records().last());
+        let energy = last.and_then(Record::willmore_energy);
+        let is_willmore = case.energy.is_willmore();
+        let spheres = energy.filter(|_| D == 3 && is_willmore);
+        let target = case.stops.iter().find_map(|stop| match stop {
+            Stop::Energy(target) => Some(*target),
+            _ => None,
+        });
         let mut outcome = json!({
             "command": self.command,
             "finished": true,
             "steps": run.steps(),
             "time": run.time(),
+            "time_steps": time_accuracy(run.records(), eps),
+            "shortened_steps": run.records().iter().filter(|record| record.halvings > 0).count(),
+            "first_energy": first.and_then(|first| Some(first.minimization?.energy_at_rest())),
+            "energy": energy,
+            "energy_terms": energy.filter(|_| !is_willmore).map(|_| case.energy),
+            "energy_over_8_pi": spheres.map(|energy| energy / (8.0 * PI)),
+            "energy_reached": target.map(|target| energy.is_some_and(|energy| energy <= target)),
             "components": topology.components,
+            "euler_characteristic": topology.euler_characteristic,
             "same_topology": topology == before,
             "touches_box": touches_side(u, -0.5),
+            "mesh": faired.map(|faired| faired.report),
             "grid": {
                 "cells": case.grid().cells(),
                 "spacing": case.grid().spacing(),
@@ -141,15 +158,10 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
                 "interface_width": eps,
                 "stored_cells": run.stored_cells(),
             },
-            "shortened_steps": run.records().iter().filter(|record| record.halvings > 0).count(),
         });
-        if let Some(accuracy) = time_accuracy(run.records(), eps) {
-            outcome["time_steps"] = accuracy;
+        if let Some(entries) = outcome.as_object_mut() {
+            entries.retain(|_, value| !value.is_null());
         }
-        if let Some(number) = topology.euler_characteristic {
-            outcome["euler_characteristic"] = number.into();
-        }
-        let (first, last) = (run.records().first(), run.records().last());
         for (name, value) in last.map_or(run.start(), |record| &record.measures) {
             outcome[name] = (*value).into();
             let before = run.start().get(name).filter(|_| SIZES.contains(&&**name));
@@ -157,25 +169,6 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
                 let change = 100.0 * (value / before - 1.0);
                 outcome[&format!("{name}_change_percent")] = change.into();
             }
-        }
-        let energy = last.and_then(Record::willmore_energy);
-        if let (Some(first), Some(energy)) = (first.and_then(|r| r.minimization), energy) {
-            outcome["first_energy"] = first.energy_at_rest().into();
-            outcome["energy"] = energy.into();
-            if !case.energy.is_willmore() {
-                outcome["energy_terms"] = json!(case.energy);
-            } else if D == 3 {
-                outcome["energy_over_8_pi"] = (energy / (8.0 * PI)).into();
-            }
-        }
-        for stop in &case.stops {
-            if let Stop::Energy(target) = stop {
-                let reached = energy.is_some_and(|energy| energy <= *target);
-                outcome["energy_reached"] = reached.into();
-            }
-        }
-        if let Some(Faired { report, .. }) = faired {
-            outcome["mesh"] = report;
         }
         let text = format!("{outcome:#}\n");
         directory.write_file(presentation::SUMMARY, |out| out.write_all(text.as_bytes()))?;
