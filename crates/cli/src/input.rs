@@ -109,22 +109,20 @@ impl Source {
             return Ok(Self::Region(input.parse().map_err(Error::Options)?));
         }
         let path = absolute(input)?;
-        match &*extension(&path) {
-            "obj" | "stl" | "ply" => Ok(Self::Mesh(path)),
-            "tif" | "tiff" if volumes::is_stack(&path) => Ok(Self::Volume(path)),
-            "png" | "jpg" | "jpeg" | "webp" | "gif" | "tif" | "tiff" | "bmp" => {
-                Ok(Self::Image(path))
-            }
-            "npy" => Ok(Self::Field(path)),
+        Ok(match &*extension(&path) {
+            "obj" | "stl" | "ply" => Self::Mesh(path),
+            "tif" | "tiff" if volumes::is_stack(&path) => Self::Volume(path),
+            "png" | "jpg" | "jpeg" | "webp" | "gif" | "tif" | "tiff" | "bmp" => Self::Image(path),
+            "npy" => Self::Field(path),
             "vti" => refuse!(
                 "{input} is for ParaView and is not read: give the same values as .npy, such as the final.npy beside a final.vti"
             ),
-            "nii" | "gz" | "mrc" | "map" => Ok(Self::Volume(path)),
+            "nii" | "gz" | "mrc" | "map" => Self::Volume(path),
             _ => refuse!(
                 "{input} is no input: give a mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), \
                  a volume (.nii, .nii.gz, .mrc, .map, .tif of several pages), a field (.npy), builtin:NAME, or a region as box:... or ball:..."
             ),
-        }
+        })
     }
 
     fn path(&self) -> Option<&Path> {
@@ -154,9 +152,10 @@ impl Source {
         let stem = match self {
             Self::BuiltIn(name) => name.into(),
             Self::Region(region) => region.name().into(),
-            file => (file.path().and_then(Path::file_stem))
-                .unwrap_or_default()
-                .to_string_lossy(),
+            file => {
+                let stem = file.path().and_then(Path::file_stem);
+                stem.unwrap_or_default().to_string_lossy()
+            }
         };
         // Of .nii.gz.
         let stem = stem.strip_suffix(".nii").unwrap_or(&stem);
@@ -211,11 +210,11 @@ impl<'a> Reader<'a> {
         eps_over_h: f64,
         messages: MessageOptions,
     ) -> Result<Self, Error> {
-        let input = options.input.as_deref().ok_or_else(|| {
-            Error::options(
-                "there is no input: give a file or builtin:NAME, or `input = ...` in a --config file",
-            )
-        })?;
+        let Some(input) = options.input.as_deref() else {
+            refuse!(
+                "there is no input: give a file or builtin:NAME, or `input = ...` in a --config file"
+            );
+        };
         let source = Source::of(input)?;
         source.refuse_foreign(options)?;
         if let Some(path) = source.path() {

@@ -30,12 +30,10 @@ fn usual(volume: &Volume, path: &Path) -> Result<Inside, Error> {
     let found = match volume.labels().as_deref() {
         Some([_, (label, _)]) => return Ok(Inside::Label(*label)),
         Some(labels) if labels.len() > 2 => {
-            let listed = labels
-                .iter()
-                .take(LISTED)
-                .map(|(label, _)| label.to_string());
+            let listed = labels.iter().take(LISTED);
+            let listed: Vec<String> = listed.map(|(label, _)| label.to_string()).collect();
             let more = if labels.len() > LISTED { ", ..." } else { "" };
-            let listed = listed.collect::<Vec<_>>().join(", ");
+            let listed = listed.join(", ");
             format!("the values {listed}{more}: give --label N of one of them, --label all")
         }
         _ => format!("values from {low} to {high}: give --label N"),
