@@ -6,7 +6,7 @@ use engine::Storage;
 
 use crate::paths::MESHES;
 use crate::prelude::*;
-use crate::values::{Amount, Ansatz, Label, SizeTarget};
+use crate::values::{Amount, Ansatz, Label, SizeTarget, count, finite, positive};
 
 const EXIT_CODES: &str = "Exit codes: 0 success; 2 bad input or failure, one line on standard error; 130 interrupted (Ctrl-C): \
 the last step was finished and stored, `willmore resume` goes on.";
@@ -19,42 +19,56 @@ the last step was finished and stored, `willmore resume` goes on.";
 #[command(name = "willmore", version, after_help = EXIT_CODES, max_term_width = 120)]
 #[command(args_override_self = true, disable_help_subcommand = true)]
 pub struct Cli {
-    /// What to do.
     #[command(subcommand)]
     pub command: Command,
     #[command(flatten)]
     pub messages: MessageOptions,
 }
 
-/// The subcommands.
 #[derive(Subcommand, Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one of them")]
 pub enum Command {
     #[command(flatten)]
     Run(RunCommand),
     /// Continue an interrupted run, to the same final bytes as if it had not been interrupted
-    #[command(after_help = RESUME_EXAMPLES)]
+    #[command(after_help = "Examples:
+  willmore resume runs/bunny
+  willmore resume runs/bunny --steps 40")]
     Resume(ResumeOptions),
     /// Write a built-in shape or another input to a file, possibly with noise and holes: something to try the program on
-    #[command(after_help = SAMPLE_EXAMPLES)]
+    #[command(after_help = "Examples:
+  willmore sample builtin:figure --noise 0.005 --save scan.ply
+  willmore sample builtin:ring --without ball:0.4,0.2,0.1 --save logo.png
+  willmore sample ball:0.4,0.2,0.15 --save mask.png
+  willmore sample scan.obj --save scan.stl
+  willmore sample scan.obj --repair --save whole.ply")]
     Sample(SampleOptions),
     /// List the networks that come with the program, or show one
-    #[command(after_help = NETWORKS_EXAMPLES)]
+    #[command(after_help = "Examples:
+  willmore networks
+  willmore networks show d2_k17_eps2_step1
+  willmore networks show mine.safetensors")]
     Networks {
         #[command(subcommand)]
         show: Option<NetworksCommand>,
     },
     /// Versions, devices and features of this program
-    #[command(after_help = INFO_EXAMPLES)]
+    #[command(after_help = "Example:
+  willmore info --json")]
     Info,
     /// Check derivatives, symmetry and device on your own input
-    #[command(after_help = CHECK_EXAMPLES)]
+    #[command(after_help = "Examples:
+  willmore check logo.png
+  willmore check builtin:torus --device wgpu")]
     Check(CheckOptions),
     /// Train a network for other ratios than those of the networks that come with the program
-    #[command(after_help = TRAIN_EXAMPLES)]
+    #[command(after_help = "Example:
+  willmore train --dimension 2 --width 25 --eps-over-h 3 --step-over-h2 2.25 --save mine.safetensors
+  willmore flow logo.png --network mine.safetensors")]
     Train(TrainOptions),
     /// Print completions for a shell
-    #[command(after_help = COMPLETIONS_EXAMPLES)]
+    #[command(after_help = "Example:
+  willmore completions bash > ~/.local/share/bash-completion/completions/willmore")]
     Completions {
         /// The shell
         shell: Shell,
@@ -69,21 +83,7 @@ pub enum Command {
 #[serde(untagged)]
 pub enum RunCommand {
     /// Willmore flow of a mesh, an image, a field or a built-in shape
-    #[command(after_help = FLOW_EXAMPLES)]
-    Flow(FlowOptions),
-    /// Take the noise off a mesh, whose vertices move while all else of the file stays, or the voxels off a segmentation
-    #[command(after_help = FAIR_EXAMPLES)]
-    Fair(FairOptions),
-    /// Fill a region of a shape smoothly; everything outside stays bit for bit
-    #[command(after_help = INPAINT_EXAMPLES)]
-    Inpaint(InpaintOptions),
-    /// Mean curvature flow, by the network or by finite elements
-    #[command(after_help = MCF_EXAMPLES)]
-    #[command(mut_arg("steps", |steps| steps.help(MCF_STEPS)), mut_arg("time", |time| time.help(MCF_TIME)))]
-    Mcf(McfOptions),
-}
-
-const FLOW_EXAMPLES: &str = "Examples:
+    #[command(after_help = "Examples:
   willmore flow bunny.ply --steps 12 --output runs/bunny
   willmore flow logo.png --frames 1 --save smooth.svg
   willmore flow builtin:cube --tau doubling:1e-6 --steps 10
@@ -91,46 +91,33 @@ const FLOW_EXAMPLES: &str = "Examples:
 Lengths, areas, volumes and times (length^4) are in the units of the mesh, in pixels of the image, or in those of the box.
 The Willmore energy is 1/2 int h^2 dA in space, h the sum of the principal curvatures (a sphere has 8 pi, no closed surface less),
 and 1/2 int kappa^2 ds in the plane (a circle of radius R has pi / R).
-Ctrl-C (exit code 130) leaves a run that `willmore resume DIR` continues.";
-const RESUME_EXAMPLES: &str = "Examples:
-  willmore resume runs/bunny
-  willmore resume runs/bunny --steps 40";
-const FAIR_EXAMPLES: &str = "Examples:
+Ctrl-C (exit code 130) leaves a run that `willmore resume DIR` continues.")]
+    Flow(FlowOptions),
+    /// Take the noise off a mesh, whose vertices move while all else of the file stays, or the voxels off a segmentation
+    #[command(after_help = "Examples:
   willmore fair scan.stl --save smooth.stl
   willmore fair scan.obj --noise 0.2 --keep box:-5,-5,0,5,5,2
   willmore fair scan.ply --energy-ratio 0.5 --remesh
-  willmore fair organs.nii.gz --label all --save organ.stl";
-const INPAINT_EXAMPLES: &str = "Examples:
+  willmore fair organs.nii.gz --label all --save organ.stl")]
+    Fair(FairOptions),
+    /// Fill a region of a shape smoothly; everything outside stays bit for bit
+    #[command(after_help = "Examples:
   willmore inpaint drawing.png --mask damage.png --steps 40
   willmore inpaint builtin:disc --mask box:0.2,0.2,0.9,0.9 --ansatz empty
   willmore inpaint bunny.ply --mask ball:0.1,0.2,0,0.15
-Regions are in the coordinates of the input: of the mesh or field, in pixels from the lower left corner of an image, of the box about 0.";
-const MCF_EXAMPLES: &str = "Examples:
+Regions are in the coordinates of the input: of the mesh or field, in pixels from the lower left corner of an image, of the box about 0.")]
+    Inpaint(InpaintOptions),
+    /// Mean curvature flow, by the network or by finite elements
+    #[command(after_help = "Examples:
   willmore mcf logo.png --steps 64
-  willmore mcf builtin:torus --method fe-implicit --frames 4";
+  willmore mcf builtin:torus --method fe-implicit --frames 4")]
+    #[command(mut_arg("steps", |steps| steps.help(MCF_STEPS)), mut_arg("time", |time| time.help(MCF_TIME)))]
+    Mcf(McfOptions),
+}
+
 const MCF_STEPS: &str = "Stop after this many steps, of (eps/h)^2/4 cells squared each [default: 20, or 100000 with --time]";
 const MCF_TIME: &str =
     "Stop with the step that reaches this time, a squared length in the units of the input";
-const SAMPLE_EXAMPLES: &str = "Examples:
-  willmore sample builtin:figure --noise 0.005 --save scan.ply
-  willmore sample builtin:ring --without ball:0.4,0.2,0.1 --save logo.png
-  willmore sample ball:0.4,0.2,0.15 --save mask.png
-  willmore sample scan.obj --save scan.stl
-  willmore sample scan.obj --repair --save whole.ply";
-const NETWORKS_EXAMPLES: &str = "Examples:
-  willmore networks
-  willmore networks show d2_k17_eps2_step1
-  willmore networks show mine.safetensors";
-const INFO_EXAMPLES: &str = "Example:
-  willmore info --json";
-const CHECK_EXAMPLES: &str = "Examples:
-  willmore check logo.png
-  willmore check builtin:torus --device wgpu";
-const TRAIN_EXAMPLES: &str = "Example:
-  willmore train --dimension 2 --width 25 --eps-over-h 3 --step-over-h2 2.25 --save mine.safetensors
-  willmore flow logo.png --network mine.safetensors";
-const COMPLETIONS_EXAMPLES: &str =
-    "Example:\n  willmore completions bash > ~/.local/share/bash-completion/completions/willmore";
 
 /// Where the shape comes from and how large it is.
 #[derive(Args, Serialize, Clone, Debug)]
@@ -163,12 +150,7 @@ pub struct InputOptions {
     pub threshold: Option<f64>,
 
     /// The label of a volume that is inside, or all: each but 0 becomes a surface of its own [default: the larger of two values]
-    #[arg(
-        long,
-        value_name = "LABEL",
-        conflicts_with = "threshold",
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "LABEL", conflicts_with = "threshold")]
     pub label: Option<Label>,
 
     /// Mend a mesh that is open, crosses itself or is not oriented alike: a new mesh is made, and it is said what was changed
@@ -229,11 +211,11 @@ pub struct SchemeOptions {
 #[serde(rename_all = "kebab-case")]
 pub struct KeepOptions {
     /// Keep a picture, the field and the shape every so many steps, and an animation
-    #[arg(long, value_name = "EVERY")]
+    #[arg(long, value_name = "EVERY", value_parser = count)]
     pub frames: Option<usize>,
 
     /// Steps between two checkpoints
-    #[arg(long, value_name = "STEPS", default_value_t = 5)]
+    #[arg(long, value_name = "STEPS", value_parser = count, default_value_t = 5)]
     pub checkpoint_every: usize,
 
     /// Axis that points up in pictures and on the page: x, y or z [default: y for .obj, otherwise z]
@@ -308,11 +290,11 @@ pub struct RunOptions {
     pub scheme: SchemeOptions,
 
     /// Stop after this many steps [default: 20, or 1000 where something else ends the run]
-    #[arg(long, value_name = "COUNT")]
+    #[arg(long, value_name = "COUNT", value_parser = count)]
     pub steps: Option<usize>,
 
     /// Stop at this time, a length to the fourth power in the units of the input
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", value_parser = positive)]
     pub time: Option<f64>,
 
     #[command(flatten)]
@@ -323,7 +305,6 @@ pub struct RunOptions {
     pub common: CommonOptions,
 }
 
-/// Options of `flow`.
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct FlowOptions {
@@ -359,19 +340,19 @@ pub struct FlowOptions {
 
     /// The curvature c0 that bends for nothing, one over a length: the energy is 1/2 int (h - c0)^2 dA, h the sum of the principal
     /// curvatures, positive for a ball [default: 0]
-    #[arg(long, value_name = "C0", allow_hyphen_values = true)]
+    #[arg(long, value_name = "C0", value_parser = finite, allow_hyphen_values = true)]
     pub spontaneous_curvature: Option<f64>,
 
     /// Add this times the area of the surface (the length) to the energy; one over a length squared [default: 0]
-    #[arg(long, value_name = "SIGMA", allow_hyphen_values = true)]
+    #[arg(long, value_name = "SIGMA", value_parser = finite, allow_hyphen_values = true)]
     pub tension: Option<f64>,
 
     /// Add this times the volume (the area of a plane shape) to the energy; one over a length cubed [default: 0]
-    #[arg(long, value_name = "P", allow_hyphen_values = true)]
+    #[arg(long, value_name = "P", value_parser = finite, allow_hyphen_values = true)]
     pub pressure: Option<f64>,
 
     /// Stop when the Willmore energy is no more than this; a sphere has 8 pi = 25.13, a circle of radius R pi / R
-    #[arg(long, value_name = "W")]
+    #[arg(long, value_name = "W", value_parser = positive)]
     pub energy: Option<f64>,
 
     #[command(flatten)]
@@ -379,7 +360,6 @@ pub struct FlowOptions {
     pub run: RunOptions,
 }
 
-/// Options of `fair`.
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct FairOptions {
@@ -389,11 +369,11 @@ pub struct FairOptions {
 
     /// Take off noise of this standard deviation along the normals, in the units of the mesh [default: estimated from the mesh,
     /// unless --time, --energy, --energy-ratio or --steps says when to stop; a segmentation flows for (1.6 voxels)^4, or until it has gone by .35 of a voxel]
-    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    #[arg(long, value_name = "LENGTH", value_parser = positive, allow_hyphen_values = true)]
     pub noise: Option<f64>,
 
     /// Stop as soon as the Willmore energy is no more than this part of that at the beginning; the volume is kept by --volume keep
-    #[arg(long, value_name = "PART", allow_hyphen_values = true)]
+    #[arg(long, value_name = "PART", value_parser = positive, allow_hyphen_values = true)]
     pub energy_ratio: Option<f64>,
 
     /// Leave this where it is: everything in box:x0,y0,z0,x1,y1,z1, in ball:x,y,z,r or inside a closed mesh (.obj, .stl, .ply), in the
@@ -420,7 +400,6 @@ pub struct FairOptions {
     pub ends: bool,
 }
 
-/// Options of `inpaint`.
 #[derive(Args, Serialize, Clone, Debug)]
 pub struct InpaintOptions {
     #[command(flatten)]
@@ -433,16 +412,10 @@ pub struct InpaintOptions {
     pub mask: Option<String>,
 
     /// What the region holds at the beginning: keep, empty, full, or a shape like the mask
-    #[arg(
-        long,
-        value_name = "SHAPE",
-        default_value = "keep",
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "SHAPE", default_value = "keep")]
     pub ansatz: Ansatz,
 }
 
-/// Options of `mcf`.
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct McfOptions {
@@ -455,7 +428,6 @@ pub struct McfOptions {
     pub run: RunOptions,
 }
 
-/// Options of `sample`.
 #[derive(Args, Clone, Debug)]
 pub struct SampleOptions {
     #[command(flatten)]
@@ -463,15 +435,15 @@ pub struct SampleOptions {
 
     /// The file to write: a picture (.png), a mesh (.ply, .obj, .stl), a field (.npy, .vti) or a segmentation (.nii, .nii.gz)
     #[arg(long, value_name = "FILE")]
-    pub save: Option<PathBuf>,
+    pub save: PathBuf,
 
     /// Cut this region out: box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z; may be given again
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub without: Vec<Region>,
 
     /// Move the vertices of a mesh along their normals by random lengths of up to this
-    #[arg(long, value_name = "LENGTH")]
-    pub noise: Option<f64>,
+    #[arg(long, value_name = "LENGTH", default_value_t = 0.0)]
+    pub noise: f64,
 
     /// Seed of the noise
     #[arg(long, default_value_t = 1)]
@@ -489,7 +461,6 @@ pub struct SampleOptions {
     pub force: ForceOption,
 }
 
-/// Options of `resume`.
 #[derive(Args, Clone, Debug)]
 pub struct ResumeOptions {
     /// The folder of the run
@@ -500,14 +471,13 @@ pub struct ResumeOptions {
     pub recover: bool,
 
     /// Go on to so many steps in all, also with a finished run
-    #[arg(long, value_name = "COUNT")]
+    #[arg(long, value_name = "COUNT", value_parser = count)]
     pub steps: Option<usize>,
 
     #[command(flatten)]
     pub force: ForceOption,
 }
 
-/// What to do with networks.
 #[derive(Subcommand, Clone, Debug)]
 pub enum NetworksCommand {
     /// Everything about one network
@@ -517,21 +487,16 @@ pub enum NetworksCommand {
     },
 }
 
-/// Options of `check`.
-#[derive(Args, Serialize, Clone, Debug)]
+#[derive(Args, Clone, Debug)]
 pub struct CheckOptions {
     #[command(flatten)]
-    #[serde(flatten)]
     pub input: InputOptions,
     #[command(flatten)]
-    #[serde(flatten)]
     pub scheme: SchemeOptions,
     #[command(flatten)]
-    #[serde(flatten)]
     pub common: CommonOptions,
 }
 
-/// Options of `train`.
 #[derive(Args, Clone, Debug)]
 pub struct TrainOptions {
     /// Of space: 2 or 3
@@ -586,20 +551,13 @@ impl RunCommand {
     }
 
     /// The options of Willmore flow; mean curvature flow has no energy and no controlled steps.
-    pub fn willmore(&self) -> Option<&FlowOptions> {
+    pub fn willmore(&mut self) -> Option<&mut FlowOptions> {
         match self {
             Self::Flow(flow) => Some(flow),
-            Self::Fair(fair) => Some(&fair.flow),
-            Self::Inpaint(inpaint) => Some(&inpaint.flow),
+            Self::Fair(fair) => Some(&mut fair.flow),
+            Self::Inpaint(inpaint) => Some(&mut inpaint.flow),
             Self::Mcf(_) => None,
         }
-    }
-}
-
-impl SchemeOptions {
-    /// Interface width in cells.
-    pub fn eps_over_h(&self) -> f64 {
-        self.eps_over_h.unwrap_or(2.0)
     }
 }
 
@@ -607,10 +565,10 @@ impl ForceOption {
     /// Refuses a file that is there.
     pub fn check(self, name: &str, path: &Path) -> Result<(), Error> {
         if path.exists() && !self.force {
-            return Err(Error::options(format!(
+            refuse!(
                 "{name} {} is there already: give another name, or --force to write over it",
                 path.display()
-            )));
+            );
         }
         Ok(())
     }

@@ -140,42 +140,27 @@ fn read(text: &str, path: &Path) -> Result<Table, Error> {
 
 /// The entries of a file as they would be typed.
 fn as_typed(table: &Table, command: &str, path: &Path) -> Result<Vec<OsString>, Error> {
-    let refused = |message: String| Err(bad(path, message));
+    let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-';
     let mut arguments = Vec::new();
     for (name, value) in table {
-        if name == COMMAND {
-            if value.as_str() != Some(command) {
-                return refused(format!("it is for the command {value}, not for {command}"));
-            }
-            continue;
-        }
-        if name == "config" {
-            return refused("a configuration cannot name another one".to_owned());
-        }
-        let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-';
-        if name.is_empty() || !name.chars().all(is_name) || ["help", "version"].contains(&&**name) {
-            return refused(format!("{name:?} is no option"));
-        }
-        let text = match value {
-            Value::Boolean(false) => continue,
-            Value::Boolean(true) => {
-                arguments.push(format!("--{name}").into());
-                continue;
-            }
-            Value::String(text) => text.clone(),
-            Value::Integer(number) => number.to_string(),
-            Value::Float(number) => number.to_string(),
-            _ => return refused(format!("{name} must be a number, a text, true or false")),
-        };
-        if name != "input" {
-            arguments.push(format!("--{name}={text}").into());
-        } else if text.starts_with('-') {
-            return refused(format!(
+        let typed = match (&**name, value) {
+            (COMMAND, Value::String(of)) if of == command => continue,
+            (COMMAND, of) => Err(format!("it is for the command {of}, not for {command}")),
+            ("config", _) => Err("a configuration cannot name another one".to_owned()),
+            ("" | "help" | "version", _) => Err(format!("{name:?} is no option")),
+            _ if !name.chars().all(is_name) => Err(format!("{name:?} is no option")),
+            (_, Value::Boolean(false)) => continue,
+            (_, Value::Boolean(true)) => Ok(format!("--{name}")),
+            ("input", Value::String(text)) if text.starts_with('-') => Err(format!(
                 "the input {text:?} looks like an option: put ./ before it"
-            ));
-        } else {
-            arguments.push(text.into());
-        }
+            )),
+            ("input", Value::String(text)) => Ok(text.clone()),
+            (_, Value::String(text)) => Ok(format!("--{name}={text}")),
+            (_, Value::Integer(number)) => Ok(format!("--{name}={number}")),
+            (_, Value::Float(number)) => Ok(format!("--{name}={number}")),
+            _ => Err(format!("{name} must be a number, a text, true or false")),
+        };
+        arguments.push(typed.map_err(|message| bad(path, message))?.into());
     }
     Ok(arguments)
 }

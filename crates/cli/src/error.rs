@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::config::one_line;
+
 /// What can stop the program. Every message is one line and says what to do.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
@@ -9,8 +11,11 @@ pub enum Error {
     /// Options that contradict each other or the input.
     #[error("{0}")]
     Options(String),
-    /// What clap says, which may be the help that was asked for.
-    Typed(#[from] clap::Error),
+    /// The help or the version, which was asked for.
+    Help(clap::Error),
+    /// Ctrl-C ended the run, or the training, after what was said of it.
+    #[error("interrupted")]
+    Interrupted,
     #[error("{}: {message}", path.display())]
     Config {
         path: PathBuf,
@@ -36,6 +41,30 @@ pub enum Error {
     Solver(#[from] solver::Error),
     Surfaces(#[from] surfaces::Error),
     Volumes(#[from] volumes::Error),
+}
+
+/// Returns [`Error::Options`] with a message that is given as to `format!`.
+macro_rules! refuse {
+    ($($message:tt)*) => {
+        return Err($crate::error::Error::Options(format!($($message)*)))
+    };
+}
+pub(crate) use refuse;
+
+impl From<clap::Error> for Error {
+    fn from(error: clap::Error) -> Self {
+        use clap::error::ErrorKind::{
+            DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion,
+            MissingSubcommand,
+        };
+        match error.kind() {
+            DisplayHelp | DisplayVersion => Self::Help(error),
+            DisplayHelpOnMissingArgumentOrSubcommand | MissingSubcommand => {
+                Self::options("there is no command; see willmore --help")
+            }
+            _ => Self::options(format!("{}; see --help", one_line(&error))),
+        }
+    }
 }
 
 impl From<engine::Error> for Error {

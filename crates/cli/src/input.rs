@@ -11,7 +11,7 @@ use crate::own::{OwnMesh, thinnest};
 use crate::paths::{absolute, extension, read};
 use crate::plane::Plane;
 use crate::prelude::*;
-use crate::presentation::Topology;
+use crate::presentation::{Presentation, Topology};
 use crate::space::{Space, Voxels};
 use crate::volume;
 
@@ -74,17 +74,14 @@ const PHOTOGRAPH: f64 = 0.05;
 const WILL_NOT_LAST: &str = "which will not last";
 /// Largest magnitude in a phase field: flows overshoot the phases a little.
 const LARGEST_PHASE: f64 = 1.1;
+
 /// The usual format of what becomes of an input: that of a mesh, otherwise PLY in space and PNG in the plane.
 pub fn usual_format(input: &str) -> Result<String, Error> {
-    let in_plane = match Source::of(input)? {
-        Source::Mesh(path) => return Ok(extension(&path)),
-        Source::Image(_) => true,
-        Source::Field(path) => is_planar(&path)?,
-        Source::Volume(_) => false,
-        Source::BuiltIn(name) => shapes::dimension(&name)? == 2,
-        Source::Region(region) => region.dimension() == 2,
-    };
-    Ok(if in_plane { "png" } else { "ply" }.to_owned())
+    Ok(match Source::of(input)? {
+        Source::Mesh(path) => extension(&path),
+        source if source.is_planar()? => "png".to_owned(),
+        _ => "ply".to_owned(),
+    })
 }
 
 /// The closed mesh in a file, possibly after a repair.
@@ -112,22 +109,20 @@ impl Source {
             return Ok(Self::Region(input.parse().map_err(Error::Options)?));
         }
         let path = absolute(input)?;
-        match &*extension(&path) {
-            "obj" | "stl" | "ply" => Ok(Self::Mesh(path)),
-            "tif" | "tiff" if volumes::is_stack(&path) => Ok(Self::Volume(path)),
-            "png" | "jpg" | "jpeg" | "webp" | "gif" | "tif" | "tiff" | "bmp" => {
-                Ok(Self::Image(path))
-            }
-            "npy" => Ok(Self::Field(path)),
-            "vti" => Err(Error::options(format!(
+        Ok(match &*extension(&path) {
+            "obj" | "stl" | "ply" => Self::Mesh(path),
+            "tif" | "tiff" if volumes::is_stack(&path) => Self::Volume(path),
+            "png" | "jpg" | "jpeg" | "webp" | "gif" | "tif" | "tiff" | "bmp" => Self::Image(path),
+            "npy" => Self::Field(path),
+            "vti" => refuse!(
                 "{input} is for ParaView and is not read: give the same values as .npy, such as the final.npy beside a final.vti"
-            ))),
-            "nii" | "gz" | "mrc" | "map" => Ok(Self::Volume(path)),
-            _ => Err(Error::options(format!(
+            ),
+            "nii" | "gz" | "mrc" | "map" => Self::Volume(path),
+            _ => refuse!(
                 "{input} is no input: give a mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), \
                  a volume (.nii, .nii.gz, .mrc, .map, .tif of several pages), a field (.npy), builtin:NAME, or a region as box:... or ball:..."
-            ))),
-        }
+            ),
+        })
     }
 
     fn path(&self) -> Option<&Path> {
@@ -139,13 +134,28 @@ impl Source {
         }
     }
 
+    fn is_planar(&self) -> Result<bool, Error> {
+        Ok(match self {
+            Self::Mesh(_) | Self::Volume(_) => false,
+            Self::Image(_) => true,
+            // Whatever else is wrong with the file is said when its values are read.
+            Self::Field(path) => {
+                let decoded = npy::decode::<2>(&read(path)?);
+                !matches!(decoded, Err(NpyError::Rank { .. }))
+            }
+            Self::BuiltIn(name) => shapes::dimension(name)? == 2,
+            Self::Region(region) => region.dimension() == 2,
+        })
+    }
+
     fn name(&self) -> String {
         let stem = match self {
             Self::BuiltIn(name) => name.into(),
             Self::Region(region) => region.name().into(),
-            file => (file.path().and_then(Path::file_stem))
-                .unwrap_or_default()
-                .to_string_lossy(),
+            file => {
+                let stem = file.path().and_then(Path::file_stem);
+                stem.unwrap_or_default().to_string_lossy()
+            }
         };
         // Of .nii.gz.
         let stem = stem.strip_suffix(".nii").unwrap_or(&stem);
@@ -156,18 +166,12 @@ impl Source {
     /// Refuses options that say nothing about such an input.
     fn refuse_foreign(&self, options: &InputOptions) -> Result<(), Error> {
         let (what, allowed): (_, &[&str]) = match self {
-            Self::Mesh(_) => ("a mesh", &["--repair", "--side-length", "--box-side"]),
-            Self::Image(_) => (
-                "an image",
-                &["--inside", "--threshold", "--side-length", "--box-side"],
-            ),
-            Self::Field(_) => ("a field", &["--holds", "--box-side"]),
-            Self::Volume(_) => (
-                "a volume",
-                &["--threshold", "--label", "--side-length", "--box-side"],
-            ),
-            Self::BuiltIn(_) => ("a built-in shape", &["--side-length", "--box-side"]),
-            Self::Region(_) => ("a region", &["--box-side"]),
+            Self::Mesh(_) => ("a mesh", &["--repair", "--side-length"]),
+            Self::Image(_) => ("an image", &["--inside", "--threshold", "--side-length"]),
+            Self::Field(_) => ("a field", &["--holds"]),
+            Self::Volume(_) => ("a volume", &["--threshold", "--label", "--side-length"]),
+            Self::BuiltIn(_) => ("a built-in shape", &["--side-length"]),
+            Self::Region(_) => ("a region", &[]),
         };
         for (name, given) in [
             ("--inside", options.inside.is_some()),
@@ -176,12 +180,9 @@ impl Source {
             ("--holds", options.holds.is_some()),
             ("--repair", options.repair),
             ("--side-length", options.side_length.is_some()),
-            ("--box-side", options.box_side.is_some()),
         ] {
             if given && !allowed.contains(&name) {
-                return Err(Error::options(format!(
-                    "{name} has no meaning for {what}: leave it out"
-                )));
+                refuse!("{name} has no meaning for {what}: leave it out");
             }
         }
         Ok(())
@@ -209,11 +210,11 @@ impl<'a> Reader<'a> {
         eps_over_h: f64,
         messages: MessageOptions,
     ) -> Result<Self, Error> {
-        let input = options.input.as_deref().ok_or_else(|| {
-            Error::options(
-                "there is no input: give a file or builtin:NAME, or `input = ...` in a --config file",
-            )
-        })?;
+        let Some(input) = options.input.as_deref() else {
+            refuse!(
+                "there is no input: give a file or builtin:NAME, or `input = ...` in a --config file"
+            );
+        };
         let source = Source::of(input)?;
         source.refuse_foreign(options)?;
         if let Some(path) = source.path() {
@@ -230,6 +231,7 @@ impl<'a> Reader<'a> {
 
     /// Reads it.
     pub fn load(&mut self) -> Result<Loaded, Error> {
+        let is_planar = self.source.is_planar()?;
         let loaded = match self.source.clone() {
             Source::Mesh(path) => {
                 let mesh = closed(&path, self.options.repair, self.messages)?;
@@ -237,18 +239,10 @@ impl<'a> Reader<'a> {
             }
             Source::Image(path) => self.image(&path)?,
             Source::Volume(path) => self.volume(&path)?,
-            Source::Field(path) if is_planar(&path)? => {
-                let field = self.values(&path)?;
-                self.plane(field)?
-            }
-            Source::Field(path) => {
-                let field = self.values(&path)?;
-                self.space(field, Space::new(UpAxis::default()))
-            }
-            Source::Region(region) if region.dimension() == 2 => {
-                self.in_plane(&*region.shape()?)?
-            }
-            Source::Region(region) => self.in_space(&*region.shape()?)?,
+            Source::Field(path) if is_planar => Loaded::Plane(self.values(&path)?),
+            Source::Field(path) => Loaded::Space(self.values(&path)?),
+            Source::Region(region) if is_planar => Loaded::Plane(self.shape(&*region.shape()?)?),
+            Source::Region(region) => Loaded::Space(self.shape(&*region.shape()?)?),
             Source::BuiltIn(name) => self.built_in(&name)?,
         };
         let input = self.options.input.as_deref().unwrap_or_default();
@@ -264,17 +258,17 @@ impl<'a> Reader<'a> {
         let (cells, box_side) = usual_box::<D>();
         let cells = *self.options.cells.get_or_insert(cells);
         if cells < FEWEST_CELLS {
-            return Err(Error::options(format!(
+            refuse!(
                 "--cells {cells} resolves nothing: use at least {FEWEST_CELLS} per unit length"
-            )));
+            );
         }
         let box_side = *self.options.box_side.get_or_insert(box_side);
         let grid = Grid::<D>::per_unit(cells, box_side)?.with_origin([-0.5 * box_side; D])?;
         let nodes = (grid.cells() as f64).powi(D as i32);
         if nodes > MOST_NODES {
-            return Err(Error::options(format!(
+            refuse!(
                 "--cells {cells} makes {nodes:.1e} nodes in a box of side {box_side}, more than {MOST_NODES:.1e}: use fewer"
-            )));
+            );
         }
         Ok(grid)
     }
@@ -288,7 +282,7 @@ impl<'a> Reader<'a> {
         let grid = self.grid::<D>()?;
         // An image is all of its box: what is drawn may go on at its border.
         let room = if D == 2 { 0.0 } else { ROOM };
-        let side = self.side(part, &grid, room)?;
+        let side = self.side::<D>(part, room)?;
         let own = bounds.longest_side() / side * grid.side();
         let corner = bounds.centre().map(|x| x - 0.5 * own);
         Ok(Grid::new(grid.cells(), own)?.with_origin(corner)?)
@@ -362,7 +356,7 @@ impl<'a> Reader<'a> {
                 far_from(mesh, surface.as_ref()),
             );
             if let Some(advice) = refused {
-                return Err(Error::options(format!("{message}; {advice}")));
+                refuse!("{message}; {advice}");
             }
             self.messages.warn(&message);
         }
@@ -396,9 +390,7 @@ impl<'a> Reader<'a> {
             self.cells(),
         );
         if refuses && part >= MOST_LOST {
-            return Err(Error::options(format!(
-                "{message}: give a larger --side-length, or --cells to go on all the same"
-            )));
+            refuse!("{message}: give a larger --side-length, or --cells to go on all the same");
         }
         self.messages.warn(&message);
         Ok(())
@@ -417,14 +409,12 @@ impl<'a> Reader<'a> {
         let advice =
             "give a larger --side-length or more --cells, or these --cells to go on without them";
         let (field, _) = self.like_mesh(mesh, PART, &grids, (!chosen).then_some(advice))?;
-        let input = Some(Topology::of(mesh));
-        Ok(self.space(
-            field,
-            Space {
-                input,
-                ..Space::new(up)
-            },
-        ))
+        let space = Space {
+            up,
+            input: Some(Topology::of(mesh)),
+            ..Space::default()
+        };
+        Ok(Loaded::Space(self.start(field, space)))
     }
 
     /// A mesh whose vertices follow the flow, on the coarsest grid that holds its parts and holes.
@@ -450,27 +440,29 @@ impl<'a> Reader<'a> {
             grid.spacing(),
             far_from(start, surface.as_ref())
         ));
-        let (input, region) = (Some(Topology::of(rough)), own.nodes(grid));
+        let region = own.nodes(grid);
         let space = Space {
-            input,
+            up: surfaces::usual_up_axis(path)?,
+            input: Some(Topology::of(rough)),
             own: Some(own),
-            ..Space::new(surfaces::usual_up_axis(path)?)
+            ..Space::default()
         };
         let start = self.start(field, space);
         Ok(Loaded::Space(Start { region, ..start }))
     }
 
     /// The longest side of what is in the box, a part of that unless it is chosen, so many interface widths from its sides.
-    fn side<const D: usize>(&mut self, part: f64, grid: &Grid<D>, room: f64) -> Result<f64, Error> {
+    fn side<const D: usize>(&mut self, part: f64, room: f64) -> Result<f64, Error> {
+        let grid = self.grid::<D>()?;
         let box_side = grid.side();
         let most = box_side - 2.0 * room * self.eps_over_h * grid.spacing();
         let usual = (part * box_side).min(most);
         let side = *self.options.side_length.get_or_insert(usual);
         if !(side > 0.0 && side <= most) {
-            return Err(Error::options(format!(
+            refuse!(
                 "--side-length {side} does not fit the box of side {box_side}, whose sides are to be an interface width away: give a \
                  positive length of at most {most:.4}"
-            )));
+            );
         }
         Ok(side)
     }
@@ -493,38 +485,24 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn space(&self, field: Field<3>, space: Space) -> Loaded {
-        Loaded::Space(self.start(field, space))
-    }
-
-    fn plane(&self, field: Field<2>) -> Result<Loaded, Error> {
-        let plane = Plane::of_box(field.grid())?;
-        Ok(Loaded::Plane(self.start(field, plane)))
-    }
-
-    fn in_plane(&mut self, shape: &dyn SignedDistance<2>) -> Result<Loaded, Error> {
+    fn shape<const D: usize, O: Presentation<D>>(
+        &mut self,
+        shape: &dyn SignedDistance<D>,
+    ) -> Result<Start<D, O>, Error> {
         let grid = self.grid()?;
-        self.plane(self.sampled(grid, shape)?)
-    }
-
-    fn in_space(&mut self, shape: &dyn SignedDistance<3>) -> Result<Loaded, Error> {
-        let grid = self.grid()?;
-        let field = self.sampled(grid, shape)?;
-        Ok(self.space(field, Space::new(UpAxis::default())))
+        Ok(self.start(self.sampled(grid, shape)?, O::of_box(&grid)?))
     }
 
     fn built_in(&mut self, name: &str) -> Result<Loaded, Error> {
         let chosen = self.options.cells;
-        let side = if shapes::dimension(name)? == 2 {
-            let grid = self.grid::<2>()?;
-            self.side(PART, &grid, ROOM)?
+        let side = if self.source.is_planar()? {
+            self.side::<2>(PART, ROOM)?
         } else {
-            let grid = self.grid::<3>()?;
-            self.side(PART, &grid, ROOM)?
+            self.side::<3>(PART, ROOM)?
         };
         match shapes::built_in(name, side)? {
-            BuiltIn::Plane(shape) => self.in_plane(&*shape),
-            BuiltIn::Space(shape) => self.in_space(&*shape),
+            BuiltIn::Plane(shape) => Ok(Loaded::Plane(self.shape(&*shape)?)),
+            BuiltIn::Space(shape) => Ok(Loaded::Space(self.shape(&*shape)?)),
             BuiltIn::Mesh(mesh) => {
                 let grid = self.grid()?;
                 let placement = Placement::fit(&mesh.bounding_box(), &grid, side)?;
@@ -552,9 +530,8 @@ impl<'a> Reader<'a> {
         let sides = outline.sides();
         let grid = self.grid_holding(&image.bounding_box(), &IMAGE_CELLS, &distance, &sides)?;
         let field = self.sampled(grid, &distance)?;
-        Ok(Loaded::Plane(
-            self.start(field, Plane::of_image(&image, path)?),
-        ))
+        let plane = Plane::of_image(&image, path)?;
+        Ok(Loaded::Plane(self.start(field, plane)))
     }
 
     fn volume(&mut self, path: &Path) -> Result<Loaded, Error> {
@@ -579,16 +556,16 @@ impl<'a> Reader<'a> {
             ));
         }
         let field = self.mesh_field(&body.surface, grid)?;
-        let voxels = Voxels {
+        let voxels = Some(Voxels {
             volume: body.volume,
             side: body.voxel,
             farthest: None,
-        };
+        });
         let space = Space {
-            voxels: Some(voxels),
-            ..Space::new(UpAxis::default())
+            voxels,
+            ..Space::default()
         };
-        Ok(self.space(field, space))
+        Ok(Loaded::Space(self.start(field, space)))
     }
 
     fn mesh_field(&self, mesh: &ClosedMesh, grid: Grid<3>) -> Result<Field<3>, Error> {
@@ -608,40 +585,36 @@ impl<'a> Reader<'a> {
         Ok(distance.map(|s| optimal_profile(s, eps)))
     }
 
-    fn values<const D: usize>(&mut self, path: &Path) -> Result<Field<D>, Error> {
+    fn values<const D: usize, O: Presentation<D>>(
+        &mut self,
+        path: &Path,
+    ) -> Result<Start<D, O>, Error> {
         let holds = *self.options.holds.get_or_insert(Holds::PhaseField);
         let (_, side) = usual_box::<D>();
         let side = *self.options.box_side.get_or_insert(side);
-        let field = npy::read(path, |cells| Grid::centred(cells, side))?;
-        let outside = |u: &&f64| u.abs() > LARGEST_PHASE;
-        if let Some(value) = field
-            .values()
-            .iter()
-            .find(outside)
-            .filter(|_| holds == Holds::PhaseField)
-        {
-            return Err(Error::options(format!(
+        let mut field = npy::read(path, |cells| Grid::centred(cells, side))?;
+        let outside = field.values().iter().find(|u| u.abs() > LARGEST_PHASE);
+        if let (Holds::PhaseField, Some(value)) = (holds, outside) {
+            refuse!(
                 "{} holds the value {value}, which no phase field has; give --holds distance if these are signed distances",
                 path.display()
-            )));
+            );
         }
-        let eps = self.eps_over_h * field.grid().spacing();
-        let distance = match (holds, self.options.cells) {
-            (Holds::PhaseField, None) => return Ok(field),
-            (Holds::PhaseField, Some(_)) => field.map(|u| distance_from_phase_field(u, eps)),
-            (Holds::Distance, _) => field,
-        };
-        let distance = self.resampled(distance)?;
-        let eps = self.eps_over_h * distance.grid().spacing();
-        Ok(distance.map(|s| optimal_profile(s, eps)))
-    }
-
-    /// Distances in the same box with the number of cells that was chosen, interpolated linearly.
-    fn resampled<const D: usize>(&mut self, distance: Field<D>) -> Result<Field<D>, Error> {
-        if self.options.cells.is_none() {
-            return Ok(distance);
+        let is_phase = holds == Holds::PhaseField;
+        if self.options.cells.is_some() {
+            // Distances are linear across the interface, as what lies between the nodes is taken to be.
+            if is_phase {
+                let eps = self.eps_over_h * field.grid().spacing();
+                field = field.map(|u| distance_from_phase_field(u, eps));
+            }
+            field = Field::from_fn(self.grid()?, |x| field.interpolate(x));
         }
-        Ok(Field::from_fn(self.grid()?, |x| distance.interpolate(x)))
+        if !is_phase || self.options.cells.is_some() {
+            let eps = self.eps_over_h * field.grid().spacing();
+            field = field.map(|s| optimal_profile(s, eps));
+        }
+        let presentation = O::of_box(field.grid())?;
+        Ok(self.start(field, presentation))
     }
 }
 
@@ -657,28 +630,19 @@ fn far_from(mesh: &ClosedMesh, surface: Option<&ClosedMesh>) -> String {
 
 /// Refuses images that are no drawings, unless it is said what is to be inside.
 fn refuse_photographs(tones: &Tones, side: Side, path: &Path) -> Result<(), Error> {
-    if tones.between < PHOTOGRAPH {
-        return Ok(());
-    }
-    Err(Error::options(format!(
-        "{} has continuous tones, as a photograph: {:.0} % of its pixels have none of two. A shape has two: with --threshold {:.2}, which \
+    if tones.between >= PHOTOGRAPH {
+        refuse!(
+            "{} has continuous tones, as a photograph: {:.0} % of its pixels have none of two. A shape has two: with --threshold {:.2}, which \
          separates them best, the pixels {}, {:.0} % of all, would be inside, and all other tones of them would be lost; say so by \
          --threshold or --inside",
-        path.display(),
-        100.0 * tones.between,
-        tones.threshold,
-        side.at(tones.threshold),
-        100.0 * tones.inside,
-    )))
-}
-
-/// Whether a file of values is meant to be in the plane; its reader says what is wrong with it.
-fn is_planar(path: &Path) -> Result<bool, Error> {
-    let bytes = read(path)?;
-    Ok(!matches!(
-        npy::decode::<2>(&bytes),
-        Err(NpyError::Rank { .. })
-    ))
+            path.display(),
+            100.0 * tones.between,
+            tones.threshold,
+            side.at(tones.threshold),
+            100.0 * tones.inside,
+        );
+    }
+    Ok(())
 }
 
 /// Refuses shapes of which there is nothing on the grid, or nothing else.
@@ -686,9 +650,9 @@ pub fn check_phases<const D: usize>(field: &Field<D>, input: &str) -> Result<(),
     let inside = field.values().iter().filter(|u| **u > 0.0).count();
     let nodes = field.grid().len();
     if inside == 0 || inside == nodes {
-        return Err(Error::options(format!(
+        refuse!(
             "{input} has {inside} of {nodes} nodes inside, so that there is nothing to move: use more --cells, or another size"
-        )));
+        );
     }
     Ok(())
 }

@@ -38,15 +38,15 @@ impl Keep {
         if let Some(colour) = text.strip_prefix("colour:") {
             let digits = colour.strip_prefix('#').unwrap_or(colour);
             let value = u32::from_str_radix(digits, 16).ok();
-            let value = value.filter(|_| digits.len() == 6);
-            let value = value
-                .ok_or_else(|| wrong("give six hexadecimal digits, as colour:ff0000".into()))?;
+            let Some(value) = value.filter(|_| digits.len() == 6) else {
+                refuse!("--keep {text}: give six hexadecimal digits, as colour:ff0000");
+            };
             let [_, colour @ ..] = value.to_be_bytes();
-            let colours = surfaces::vertex_colours(bytes, file)?.ok_or_else(|| {
-                Error::options(
-                    "--keep colour:... needs a mesh whose vertices have colours, in PLY or OBJ",
-                )
-            })?;
+            let Some(colours) = surfaces::vertex_colours(bytes, file)? else {
+                refuse!(
+                    "--keep colour:... needs a mesh whose vertices have colours, in PLY or OBJ"
+                );
+            };
             let vertices = mesh.vertices.iter().zip(colours);
             let kept = vertices.filter(|(_, of)| *of == colour);
             return Ok(Self::At(kept.map(|(x, _)| key(*x)).collect()));
@@ -74,12 +74,12 @@ impl Keep {
             Self::Inside(shape) => (0..grid.len())
                 .map(|node| shape.signed_distance(grid.node(node)) > 0.0)
                 .collect(),
-            Self::At(_) => self.far_from(grid, vertices),
+            Self::At(_) => self.nearest_moves(grid, vertices),
         }
     }
 
     /// Whether the vertex that is nearest to a node moves.
-    fn far_from(&self, grid: &Grid<3>, vertices: &[[f64; 3]]) -> Vec<bool> {
+    fn nearest_moves(&self, grid: &Grid<3>, vertices: &[[f64; 3]]) -> Vec<bool> {
         let mut nearest = vec![(f64::INFINITY, true); grid.len()];
         let (spacing, last) = (grid.spacing(), grid.cells() as f64 - 1.0);
         for &x in vertices {

@@ -14,7 +14,7 @@ use crate::prelude::*;
 pub const INPUT: &str = "input";
 
 /// A mesh of which everything but the positions of its vertices stays: see [`Fairing`].
-#[derive(Serialize, Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 pub struct OwnMesh {
     /// The file in the folder of the run, a copy of the input.
     file: String,
@@ -52,10 +52,8 @@ impl OwnMesh {
         let mut own = Self {
             file: format!("{INPUT}.{}", extension(path)),
             noise: noise.unwrap_or(f64::NAN),
-            keeps_volume: false,
-            is_new: false,
             keep,
-            loaded: None,
+            ..Self::default()
         };
         let mask = own.mask().map(|(path, _)| read(path)).transpose()?;
         let warnings = own.load(bytes, path, mask)?;
@@ -64,10 +62,8 @@ impl OwnMesh {
 
     /// Takes the copy in the folder of a run.
     pub fn load_from(&mut self, stored: &StoredRun) -> Result<(), Error> {
-        let mask = self
-            .mask()
-            .map(|(_, copy)| stored.read(&copy))
-            .transpose()?;
+        let mask = self.mask().map(|(_, copy)| stored.read(&copy));
+        let mask = mask.transpose()?;
         let bytes = stored.read(&self.file)?;
         self.load(bytes, &stored.path().join(&self.file), mask)?;
         Ok(())
@@ -98,16 +94,15 @@ impl OwnMesh {
         let fairing = Fairing::new(closed, self.noise, stays);
         let kept = fairing.keeps().iter().filter(|&&kept| kept).count();
         if kept == fairing.keeps().len() {
-            return Err(Error::options(
-                "--keep contains all of the mesh: nothing could move",
-            ));
+            refuse!("--keep contains all of the mesh: nothing could move");
         }
         if keep.is_some() && kept == 0 {
             let bounds = fairing.rough().bounding_box();
-            return Err(Error::options(format!(
+            refuse!(
                 "--keep contains no vertex of the mesh, which goes from {:?} to {:?}",
-                bounds.lower, bounds.upper
-            )));
+                bounds.lower,
+                bounds.upper
+            );
         }
         self.loaded = Some(Box::new(Loaded {
             bytes,
@@ -126,10 +121,9 @@ impl OwnMesh {
     /// The copies of the input and of the mask for the folder of a run, with their names.
     pub fn inputs(&self) -> Vec<(String, Vec<u8>)> {
         let Loaded { bytes, mask, .. } = self.loaded();
-        let mask = self.mask().map(|(_, copy)| copy).zip(mask.clone());
-        std::iter::once((self.file.clone(), bytes.clone()))
-            .chain(mask)
-            .collect()
+        let mut inputs = vec![(self.file.clone(), bytes.clone())];
+        inputs.extend(self.mask().map(|(_, copy)| copy).zip(mask.clone()));
+        inputs
     }
 
     /// What becomes of the vertices.

@@ -3,8 +3,6 @@
 //! It is made of the files of the run alone, and the same files give the same bytes. It is not one of them: the checkpoint
 //! does not know it, so that it may be removed, and is written again by `willmore resume`.
 
-use std::fmt::Write;
-
 use engine::METRICS;
 use pages::{
     Details, Facts, Figure, Frames, Image, Page, Section, Table, Text, Viewer, five_digits,
@@ -14,7 +12,7 @@ use report::{Axis, LineChart, Marker, Series};
 use crate::faired::view;
 use crate::paths::MESHES;
 use crate::prelude::*;
-use crate::{config, own, plane, presentation};
+use crate::{config, outcome, own, plane, presentation};
 
 pub const NAME: &str = "index.html";
 
@@ -79,18 +77,19 @@ impl Files<'_> {
             2 => self.drawings()?.map(|frames| section.with(frames)),
             _ => self.surfaces()?.map(|viewer| section.with(viewer)),
         };
-        let (Some(section), Some(bytes)) = (&section, self.read(presentation::DISPLACEMENT)?)
-        else {
-            return Ok(section);
+        let Some(mut section) = section else {
+            return Ok(None);
         };
-        let image = Image::from_bytes(presentation::DISPLACEMENT, &bytes)?;
-        let what = if self.before() == own::INPUT {
-            "vertices have"
-        } else {
-            "surface has"
-        };
-        let caption = format!("How far the {what} gone, as colours and as a histogram.");
-        Ok(Some(section.clone().with(Figure::new(image, caption))))
+        if let Some(bytes) = self.read(presentation::DISPLACEMENT)? {
+            let image = Image::from_bytes(presentation::DISPLACEMENT, &bytes)?;
+            let what = match self.before() {
+                own::INPUT => "vertices have",
+                _ => "surface has",
+            };
+            let caption = format!("How far the {what} gone, as colours and as a histogram.");
+            section.push(Figure::new(image, caption));
+        }
+        Ok(Some(section))
     }
 
     fn drawings(&self) -> Result<Option<Frames>, Error> {
@@ -171,20 +170,16 @@ impl Files<'_> {
             _ => [("area", "Area"), ("volume", "Volume")],
         };
         let at_rest = |first: &Record| Some(first.minimization?.energy_at_rest());
-        let mut curves = vec![(
-            "Energy",
-            self.records.first().and_then(at_rest),
-            self.points(Record::willmore_energy),
-        )];
+        let start = self.records.first().and_then(at_rest);
+        let mut curves = vec![("Energy", self.points(start, Record::willmore_energy))];
         for (name, title) in columns {
             let start = self.run.state().notes["start"][name].as_f64();
-            curves.push((title, start, self.points(|record| record.measure(name))));
+            curves.push((title, self.points(start, |record| record.measure(name))));
         }
-        let mut figure = report::Figure::new("", 3);
         // Mean curvature flow has no energy.
-        for (title, start, points) in curves.into_iter().filter(|curve| !curve.2.is_empty()) {
-            let start = start.map(|start| [0.0, start]);
-            let points: Vec<[f64; 2]> = start.into_iter().chain(points).collect();
+        curves.retain(|(_, points)| !points.is_empty());
+        let mut figure = report::Figure::new("", 3);
+        for (title, points) in curves {
             let mut series = Series::new("", points);
             if series.points.len() < FEW_STEPS {
                 series = series.with_marker(Marker::Circle);
@@ -195,54 +190,39 @@ impl Files<'_> {
         }
         let image = Image::from_bytes("the plot of the steps", figure.to_svg()?.as_bytes())?;
         let table = Table::from_csv("Steps", &self.run.read_text(METRICS)?)?;
-        let rows: Vec<Vec<String>> = thinned(table.rows(), MOST_ROWS)
-            .map(|row| row.iter().map(|cell| shortened(cell)).collect())
-            .collect();
-        let (shown, all) = (rows.len(), table.rows().len());
-        let note = if shown < all {
-            format!("{shown} of {all} steps; all are in `{METRICS}`.")
-        } else {
-            format!("All digits are in `{METRICS}`.")
-        };
+        let rows = || thinned(table.rows(), MOST_ROWS);
+        let (shown, all) = (rows().count(), table.rows().len());
+        let note = format!(
+            "{shown} of {all} steps in five digits; all digits of all steps are in `{METRICS}`."
+        );
+        let head = table.head().iter().map(|key| in_words(&COLUMNS, key));
+        let rows = rows().map(|row| row.iter().map(|cell| shortened(cell)));
         let details = Details::new("Steps as a table")
             .with(Text::markdown(&note))
-            .with(Table::new(
-                "Steps",
-                table.head().iter().map(|key| in_words(&COLUMNS, key)),
-                rows,
-            )?);
+            .with(Table::new("Steps", head, rows)?);
         let caption = "Energy and measures of the shape at the beginning and after every step.";
         let figure = Figure::new(image, caption);
         Ok(Section::new("Steps").with(figure).with(details))
     }
 
-    /// The values over the steps.
-    fn points(&self, of: impl Fn(&Record) -> Option<f64>) -> Vec<[f64; 2]> {
+    /// The values at the beginning and over the steps.
+    fn points(&self, start: Option<f64>, of: impl Fn(&Record) -> Option<f64>) -> Vec<[f64; 2]> {
         let point = |record: &Record| Some([record.step as f64, of(record)?]);
-        self.records.iter().filter_map(point).collect()
+        let start = start.map(|start| [0.0, start]).into_iter();
+        start.chain(self.records.iter().filter_map(point)).collect()
     }
 
-    /// What came out, in a sentence.
+    /// What came out, in words.
     fn lead(&self, outcome: Option<&Value>) -> String {
         let last = self.records.last();
         let (step, time) = last.map_or((0, 0.0), |last| (last.step, last.time));
-        let time = five_digits(time);
+        let progress = outcome::progress(step as u64, time);
         let Some(outcome) = outcome else {
-            return format!("Not finished: {step} steps to the time {time} so far.");
+            return format!("Not finished: {progress} so far.");
         };
-        let mut lead = format!("{step} steps to the time {time}.");
-        let number = |name: &str| outcome[name].as_f64().map(five_digits);
-        if let (Some(first), Some(last)) = (number("first_energy"), number("energy")) {
-            let name = match outcome["energy_terms"] {
-                Value::Null => "Willmore energy",
-                _ => "Energy",
-            };
-            let _ = write!(lead, " {name} {last}, before {first}.");
-        }
-        if outcome["components"] == 0 {
-            lead += " The shape has vanished.";
-        }
-        lead
+        let vanished = (outcome["components"] == 0).then(|| "the shape has vanished".to_owned());
+        let sentences = outcome::sentences(outcome).into_iter().chain(vanished);
+        sentences.fold(progress, |lead, sentence| lead + "; " + &sentence) + "."
     }
 
     fn has(&self, name: &str) -> bool {

@@ -17,7 +17,6 @@ const PIXELS: u32 = 512;
 #[derive(Serialize, Deserialize)]
 pub struct Plane {
     frame: Frame,
-    is_repaired: bool,
     #[serde(skip)]
     original: Option<Original>,
     /// The input, if it is an image, which a mask has to fit.
@@ -32,44 +31,30 @@ struct Original {
 }
 
 impl Plane {
-    pub fn of_box(grid: &Grid<2>) -> Result<Self, Error> {
-        Ok(Self::new(Frame::of_box(grid, PIXELS)?, None))
-    }
-
     /// The frame has the pixels of the image.
     pub fn of_image(image: &Image, path: &Path) -> Result<Self, Error> {
         let (width, height) = (image.width(), image.height());
-        let frame = Frame::new(width, height, [0.0, f64::from(height)], 1.0)?;
-        Ok(Self::new(frame, Some(path.to_owned())))
-    }
-
-    fn new(frame: Frame, image: Option<PathBuf>) -> Self {
-        Self {
-            frame,
-            is_repaired: false,
+        Ok(Self {
+            frame: Frame::new(width, height, [0.0, f64::from(height)], 1.0)?,
             original: None,
-            image,
-        }
+            image: Some(path.to_owned()),
+        })
     }
 
     /// What is inside a mask that is an image: of the size of the input, or else a square, which fills the box.
     pub fn mask(&self, mask: &str, grid: &Grid<2>) -> Result<Box<dyn SignedDistance<2>>, Error> {
         let image = images::read(mask)?;
-        let size = [image.width(), image.height()];
-        let needed = match [self.frame.width(), self.frame.height()] {
-            [w, h] if self.image.is_some() && size != [w, h] => {
-                Some(format!("{w} x {h} pixels, as the input"))
-            }
-            _ if self.image.is_none() && size[0] != size[1] => {
-                Some("a square, which fills the box".to_owned())
-            }
-            _ => None,
-        };
-        if let Some(needed) = needed {
-            return Err(Error::options(format!(
-                "--mask {mask} has {} x {} pixels; it must be {needed}",
-                size[0], size[1]
-            )));
+        let (width, height) = (image.width(), image.height());
+        let [w, h] = [self.frame.width(), self.frame.height()];
+        if self.image.is_some() && [width, height] != [w, h] {
+            refuse!(
+                "--mask {mask} has {width} x {height} pixels; it must have {w} x {h}, as the input"
+            );
+        }
+        if self.image.is_none() && width != height {
+            refuse!(
+                "--mask {mask} has {width} x {height} pixels; it must be a square, which fills the box"
+            );
         }
         let side = Side::of(&image, 0.5)?;
         let mut outline = Outline::of_image(&image, side)?;
@@ -92,7 +77,6 @@ impl Plane {
             mask.signed_distance(self.frame.point([column, row])) < 0.0
         };
         let drawn = (0..picture.pixels().len()).map(is_inside).collect();
-        self.is_repaired = true;
         self.original = Some(Original { picture, drawn });
         Ok(())
     }
@@ -120,19 +104,15 @@ impl Original {
     /// The mean of the pixels outside of the mask where the drawing has this opacity: those near the mask, or else all of them.
     fn tone(&self, drawing: &Picture, opacity: u8) -> Option<[f64; 4]> {
         let width = self.picture.width() as usize;
-        let place = |pixel: usize| [pixel % width, pixel / width];
+        let place = |pixel: usize| [pixel % width, pixel / width].map(|i| i as f64);
         let drawn = (0..self.drawn.len()).filter(|&pixel| self.drawn[pixel]);
-        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
-        for pixel in drawn {
-            for (axis, at) in place(pixel).into_iter().enumerate() {
-                low[axis] = low[axis].min(at);
-                high[axis] = high[axis].max(at);
-            }
-        }
+        let mask = BoundingBox::around(drawn.map(place))?;
+        let margins = mask.extent().map(|side| 8.0 + (side / 4.0).floor());
         let is_near = |pixel: usize| {
-            (place(pixel).into_iter().enumerate()).all(|(axis, at)| {
-                let margin = 8 + (high[axis].saturating_sub(low[axis])) / 4;
-                (low[axis].saturating_sub(margin)..=high[axis] + margin).contains(&at)
+            let at = place(pixel);
+            (0..2).all(|axis| {
+                let (low, high) = (mask.lower[axis], mask.upper[axis]);
+                (low - margins[axis]..=high + margins[axis]).contains(&at[axis])
             })
         };
         let mean = |near: bool| {
@@ -154,13 +134,19 @@ impl Presentation<2> for Plane {
     const SAVED: &'static [&'static str] = &["png", "svg"];
     const USUAL: &'static str = "svg";
 
+    fn of_box(grid: &Grid<2>) -> Result<Self, Error> {
+        Ok(Self {
+            frame: Frame::of_box(grid, PIXELS)?,
+            original: None,
+            image: None,
+        })
+    }
+
     fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error> {
-        match up {
-            None => Ok(()),
-            Some(axis) => Err(Error::options(format!(
-                "--up {axis} has no meaning in the plane: leave it out"
-            ))),
+        if let Some(axis) = up {
+            refuse!("--up {axis} has no meaning in the plane: leave it out");
         }
+        Ok(())
     }
 
     fn picture(&self, _: &Field<2>, u: &Field<2>, eps: f64) -> Result<Picture, Error> {
@@ -203,7 +189,7 @@ impl Presentation<2> for Plane {
     }
 
     fn restore(&mut self, stored: &StoredRun) -> Result<(), Error> {
-        if self.is_repaired {
+        if stored.files().any(|name| name == ORIGINAL) {
             let picture = |name: &str| Ok::<_, Error>(images::colours(name, &stored.read(name)?)?);
             let drawn = picture(MASK)?.pixels().iter().map(|p| p[0] == 0).collect();
             let picture = picture(ORIGINAL)?;

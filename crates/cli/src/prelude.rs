@@ -1,7 +1,6 @@
 //! What nearly every module needs of other crates.
 
 pub use std::path::{Path, PathBuf};
-pub use std::process::ExitCode;
 pub use std::str::FromStr;
 
 pub use engine::{Case, Measure, Method, Record, Run, Scales, Scheme, StepRule, Stop};
@@ -18,3 +17,4 @@ pub use surfaces::shapes::Region;
 pub use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh};
 
 pub use crate::error::Error;
+pub(crate) use crate::error::refuse;

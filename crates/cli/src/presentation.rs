@@ -64,6 +64,9 @@ pub struct Known<const D: usize> {
 
 /// How phase fields in `D` dimensions are shown.
 pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
+    /// That of a shape that is given on a grid or by a formula.
+    fn of_box(grid: &Grid<D>) -> Result<Self, Error>;
+
     /// Lets the axis that was chosen point up, or says which one does.
     fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error>;
 
@@ -79,46 +82,15 @@ pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
 
     /// Refuses other files.
     fn check_saved(path: &Path) -> Result<(), Error> {
-        if Self::SAVED.contains(&&*extension(path)) {
-            return Ok(());
+        if !Self::SAVED.contains(&&*extension(path)) {
+            let (path, formats) = (path.display(), Self::SAVED.join(" or ."));
+            refuse!("--save {path}: a result in {D}D is saved as .{formats}");
         }
-        Err(Error::options(format!(
-            "--save {}: a result in {D}D is saved as .{}",
-            path.display(),
-            Self::SAVED.join(" or .")
-        )))
+        Ok(())
     }
 
     /// Writes the shape to any such file.
     fn save(&self, u: &Field<D>, eps: f64, path: &Path) -> Result<(), Error>;
-
-    /// Writes the shape to a file `stem.*` of a run.
-    fn write_shape(
-        &self,
-        u: &Field<D>,
-        eps: f64,
-        stem: &str,
-        format: Option<&str>,
-        run: &mut RunDirectory,
-    ) -> Result<(), Error> {
-        let name = format!("{stem}.{}", format.unwrap_or(Self::USUAL));
-        self.save(u, eps, &run.path().join(&name))?;
-        Ok(run.adopt_file(&name)?)
-    }
-
-    /// Writes a picture to a file of a run.
-    fn write_picture(
-        &self,
-        start: &Field<D>,
-        u: &Field<D>,
-        eps: f64,
-        name: &str,
-        run: &mut RunDirectory,
-    ) -> Result<(), Error> {
-        let bytes = self.picture(start, u, eps)?.to_png()?;
-        run.write_file(name, |out| out.write_all(&bytes))?;
-        Ok(())
-    }
 
     /// What becomes of a surface, and how far it has gone.
     fn faired(&self, _: &Field<D>, _: &Field<D>, _: f64) -> Result<Option<Faired>, Error> {

@@ -6,18 +6,18 @@ use std::time::{Duration, Instant};
 
 use engine::{Checkpoints, Ending, Event, Observer, Storage, Store, estimated_time_error};
 use geometry::measure::touches_side;
-use pages::five_digits;
 use solver::StepEstimates;
 
 use crate::cli::{KeepOptions, MessageOptions};
 use crate::faired::Faired;
+use crate::outcome::{self, SIZES};
 use crate::page;
-use crate::paths::{extension, read};
+use crate::paths::read;
 use crate::prelude::*;
 use crate::presentation::{self, Presentation, Topology};
 
 /// Everything about a run but its case.
-pub struct Plan<O> {
+pub struct Plan<const D: usize, O> {
     pub command: &'static str,
     pub name: String,
     pub presentation: O,
@@ -27,16 +27,11 @@ pub struct Plan<O> {
     pub messages: MessageOptions,
 }
 
-/// Measures whose change is told.
-const SIZES: [&str; 3] = ["length", "area", "volume"];
 const DELAY: Duration = Duration::from_millis(200);
 
-impl<O> Plan<O> {
+impl<const D: usize, O: Presentation<D>> Plan<D, O> {
     /// What is kept with the run.
-    pub fn notes<const D: usize>(&self, case: &Case<D>, device: &ComputeDevice) -> Value
-    where
-        O: Presentation<D>,
-    {
+    pub fn notes(&self, case: &Case<D>, device: &ComputeDevice) -> Value {
         let network = case.operator.network();
         json!({
             "about": {
@@ -55,14 +50,7 @@ impl<O> Plan<O> {
     }
 
     /// From the last checkpoint to the end.
-    pub fn go_on<const D: usize>(
-        &self,
-        mut store: Store,
-        mut run: Run<D>,
-    ) -> Result<ExitCode, Error>
-    where
-        O: Presentation<D>,
-    {
+    pub fn go_on(&self, mut store: Store, mut run: Run<D>) -> Result<(), Error> {
         let interrupt = Interrupt::catch()?;
         let (nodes, stored) = (run.case().grid().len(), run.stored_cells());
         let what = if stored < nodes {
@@ -105,51 +93,64 @@ impl<O> Plan<O> {
         bar.finish();
         progress.clear();
         self.tell(outcome, &folder, run.ended(), seconds);
-        Ok(match ending {
-            Ending::Stopped(_) => ExitCode::SUCCESS,
-            Ending::Interrupted => ExitCode::from(Interrupt::EXIT_CODE),
-        })
+        match ending {
+            Ending::Stopped(_) => Ok(()),
+            Ending::Interrupted => Err(Error::Interrupted),
+        }
     }
 
-    fn finish<const D: usize>(&self, mut store: Store, run: &Run<D>) -> Result<Value, Error>
-    where
-        O: Presentation<D>,
-    {
-        let (case, u) = (run.case(), run.field());
-        let eps = case.scales.eps;
+    fn finish(&self, mut store: Store, run: &Run<D>) -> Result<Value, Error> {
+        let (case, u, presentation) = (run.case(), run.field(), &self.presentation);
+        let (start, eps) = (&case.initial, case.scales.eps);
         let directory = store.directory();
-        // What has vanished leaves no vertices behind.
-        let faired = has_interface(u).then(|| self.presentation.faired(&case.initial, u, eps));
-        let faired = faired.transpose()?.flatten();
-        let topology = self.write_final(&case.initial, u, eps, faired.as_ref(), directory)?;
-        if let Some(path) = self.keep.save.as_ref().filter(|_| has_interface(u)) {
-            match &faired {
-                Some(faired) => faired.write(path)?,
-                None => self.presentation.save(u, eps, path)?,
+        npy::write(directory.path().join("final.npy"), u)?;
+        directory.adopt_file("final.npy")?;
+        // What has vanished leaves no shape behind.
+        let (mut faired, mut topology) = (None, Topology::default());
+        if has_interface(u) {
+            faired = presentation.faired(start, u, eps)?;
+        }
+        self.write(case, u, faired.as_ref(), presentation::FINAL, directory)?;
+        if has_interface(u) {
+            topology = presentation.topology(u, eps)?;
+            if let Some(path) = &self.keep.save {
+                self.save(u, eps, faired.as_ref(), path)?;
             }
         }
         if self.keep.frames.is_some() {
-            let frames = frames(&directory.path().join(presentation::FRAMES))?;
-            let animation = render::animation(&frames, DELAY)?;
+            let (pictures, series) = frames(directory.path(), run.records())?;
+            let animation = render::animation(&pictures, DELAY)?;
             directory.write_file(presentation::ANIMATION, |out| out.write_all(&animation))?;
-            let series = series(directory.path(), run.records());
             directory.write_file(presentation::SERIES, |out| out.write_all(series.as_bytes()))?;
         }
         // Touching sheets have no topology; that is no reason not to flow.
-        let of_start = || {
-            self.presentation
-                .topology(&case.initial, eps)
-                .unwrap_or_default()
-        };
-        let before = self.presentation.input().unwrap_or_else(of_start);
+        let of_start = || presentation.topology(start, eps).unwrap_or_default();
+        let before = presentation.input().unwrap_or_else(of_start);
+        let (first, last) = (run.records().first(), run.records().last());
+        let energy = last.and_then(Record::willmore_energy);
+        let is_willmore = case.energy.is_willmore();
+        let spheres = energy.filter(|_| D == 3 && is_willmore);
+        let target = case.stops.iter().find_map(|stop| match stop {
+            Stop::Energy(target) => Some(*target),
+            _ => None,
+        });
         let mut outcome = json!({
             "command": self.command,
             "finished": true,
             "steps": run.steps(),
             "time": run.time(),
+            "time_steps": time_accuracy(run.records(), eps),
+            "shortened_steps": run.records().iter().filter(|record| record.halvings > 0).count(),
+            "first_energy": first.and_then(|first| Some(first.minimization?.energy_at_rest())),
+            "energy": energy,
+            "energy_terms": energy.filter(|_| !is_willmore).map(|_| case.energy),
+            "energy_over_8_pi": spheres.map(|energy| energy / (8.0 * PI)),
+            "energy_reached": target.map(|target| energy.is_some_and(|energy| energy <= target)),
             "components": topology.components,
+            "euler_characteristic": topology.euler_characteristic,
             "same_topology": topology == before,
             "touches_box": touches_side(u, -0.5),
+            "mesh": faired.map(|faired| faired.report),
             "grid": {
                 "cells": case.grid().cells(),
                 "spacing": case.grid().spacing(),
@@ -157,15 +158,10 @@ impl<O> Plan<O> {
                 "interface_width": eps,
                 "stored_cells": run.stored_cells(),
             },
-            "shortened_steps": run.records().iter().filter(|record| record.halvings > 0).count(),
         });
-        if let Some(accuracy) = time_accuracy(run.records(), eps) {
-            outcome["time_steps"] = accuracy;
+        if let Some(entries) = outcome.as_object_mut() {
+            entries.retain(|_, value| !value.is_null());
         }
-        if let Some(number) = topology.euler_characteristic {
-            outcome["euler_characteristic"] = number.into();
-        }
-        let (first, last) = (run.records().first(), run.records().last());
         for (name, value) in last.map_or(run.start(), |record| &record.measures) {
             outcome[name] = (*value).into();
             let before = run.start().get(name).filter(|_| SIZES.contains(&&**name));
@@ -174,155 +170,78 @@ impl<O> Plan<O> {
                 outcome[&format!("{name}_change_percent")] = change.into();
             }
         }
-        let energy = last.and_then(Record::willmore_energy);
-        if let (Some(first), Some(energy)) = (first.and_then(|r| r.minimization), energy) {
-            outcome["first_energy"] = first.energy_at_rest().into();
-            outcome["energy"] = energy.into();
-            if !case.energy.is_willmore() {
-                outcome["energy_terms"] = json!(case.energy);
-            } else if D == 3 {
-                outcome["energy_over_8_pi"] = (energy / (8.0 * PI)).into();
-            }
-        }
-        for stop in &case.stops {
-            if let Stop::Energy(target) = stop {
-                let reached = energy.is_some_and(|energy| energy <= *target);
-                outcome["energy_reached"] = reached.into();
-            }
-        }
-        if let Some(Faired { report, .. }) = faired {
-            outcome["mesh"] = report;
-        }
         let text = format!("{outcome:#}\n");
         directory.write_file(presentation::SUMMARY, |out| out.write_all(text.as_bytes()))?;
         store.finish(run)?;
         Ok(outcome)
     }
 
-    /// Writes `final.npy`, `final.vti`, and, unless the shape has vanished, picture and shape, of which it returns the parts.
-    fn write_final<const D: usize>(
+    /// Writes the field for ParaView and, unless the shape has vanished, a picture and the shape to files `stem.*` of a run.
+    fn write(
         &self,
-        start: &Field<D>,
+        case: &Case<D>,
+        u: &Field<D>,
+        faired: Option<&Faired>,
+        stem: &str,
+        run: &mut RunDirectory,
+    ) -> Result<(), Error> {
+        let name = format!("{stem}.vti");
+        vti::write(run.path().join(&name), "phase_field", u)?;
+        run.adopt_file(&name)?;
+        if !has_interface(u) {
+            return Ok(());
+        }
+        let eps = case.scales.eps;
+        let picture = self.presentation.picture(&case.initial, u, eps)?;
+        let picture = picture.to_png()?;
+        run.write_file(&format!("{stem}.png"), |out| out.write_all(&picture))?;
+        if let Some(faired) = faired {
+            let figure = faired.displacement.to_svg()?;
+            run.write_file(presentation::DISPLACEMENT, |out| {
+                out.write_all(figure.as_bytes())
+            })?;
+        }
+        self.write_shape(u, eps, faired, stem, run)
+    }
+
+    /// Writes the shape to a file `stem.*` of a run.
+    fn write_shape(
+        &self,
         u: &Field<D>,
         eps: f64,
         faired: Option<&Faired>,
+        stem: &str,
         run: &mut RunDirectory,
-    ) -> Result<Topology, Error>
-    where
-        O: Presentation<D>,
-    {
-        let presentation = &self.presentation;
-        npy::write(run.path().join("final.npy"), u)?;
-        run.adopt_file("final.npy")?;
-        vti::write(run.path().join("final.vti"), "phase_field", u)?;
-        run.adopt_file("final.vti")?;
-        if !has_interface(u) {
-            return Ok(Topology::default());
+    ) -> Result<(), Error> {
+        let usual = faired.map_or(O::USUAL, |faired| &faired.extension);
+        let name = format!("{stem}.{}", self.format.as_deref().unwrap_or(usual));
+        self.save(u, eps, faired, &run.path().join(&name))?;
+        Ok(run.adopt_file(&name)?)
+    }
+
+    /// Writes the shape, or what became of the surface that it was, to a file.
+    fn save(
+        &self,
+        u: &Field<D>,
+        eps: f64,
+        faired: Option<&Faired>,
+        path: &Path,
+    ) -> Result<(), Error> {
+        match faired {
+            Some(faired) => faired.write(path),
+            None => self.presentation.save(u, eps, path),
         }
-        presentation.write_picture(start, u, eps, presentation::PICTURE, run)?;
-        let format = self.format.as_deref();
-        if let Some(faired) = faired {
-            let name = format!(
-                "{}.{}",
-                presentation::FINAL,
-                format.unwrap_or(&faired.extension)
-            );
-            faired.write(&run.path().join(&name))?;
-            run.adopt_file(&name)?;
-            let text = faired.displacement.to_svg()?;
-            run.write_file(presentation::DISPLACEMENT, |out| {
-                out.write_all(text.as_bytes())
-            })?;
-        } else {
-            presentation.write_shape(u, eps, presentation::FINAL, format, run)?;
-        }
-        presentation.topology(u, eps)
     }
 
     fn tell(&self, mut outcome: Value, folder: &Path, ended: Option<Stop>, seconds: f64) {
-        let number = |name: &str| outcome[name].as_f64();
-        let steps = outcome["steps"].as_u64().unwrap_or(0);
-        let time = number("time").unwrap_or(0.0);
+        let (steps, time) = (outcome["steps"].as_u64(), outcome["time"].as_f64());
+        let progress = outcome::progress(steps.unwrap_or(0), time.unwrap_or(0.0));
         let reason = match ended {
             None | Some(Stop::Steps(_)) => String::new(),
             Some(stop) => format!(": {stop}"),
         };
-        let mut text = vec![format!(
-            "{} to t = {time:.4e} in {seconds:.1} s{reason}",
-            counted(steps)
-        )];
-        if let (Some(first), Some(energy)) = (number("first_energy"), number("energy")) {
-            let spheres = number("energy_over_8_pi");
-            let spheres = spheres.map_or(String::new(), |w| format!(" = {w:.4} x 8 pi"));
-            let name = match outcome["energy_terms"] {
-                Value::Null => "Willmore energy",
-                _ => "energy",
-            };
-            let [energy, first] = [energy, first].map(five_digits);
-            text.push(format!("{name} {energy}{spheres}, before {first}"));
-        }
-        let of_steps = |name: &str| outcome["time_steps"][name].as_f64();
-        if let (Some(error), Some(path)) = (of_steps("estimated_error"), of_steps("path")) {
-            text.push(format!(
-                "time error about {error:.1e} (estimated), after a way of {path:.3}"
-            ));
-        }
-        let sizes = SIZES.iter().filter_map(|name| {
-            let change = match number(&format!("{name}_change_percent")) {
-                Some(percent) if outcome["mesh"].is_null() => format!(" ({percent:+.2} %)"),
-                _ => String::new(),
-            };
-            Some(format!("{name} {}{change}", five_digits(number(name)?)))
-        });
-        text.push(sizes.collect::<Vec<_>>().join(", "));
-        let mesh = &outcome["mesh"];
-        if let Some(moved) = mesh["displacement_rms"].as_f64() {
-            let of = |name: &str| mesh[name].as_f64().unwrap_or(f64::NAN);
-            let what = if mesh["left_behind_percent"].is_null() {
-                "the surface"
-            } else {
-                "vertices"
-            };
-            text.push(format!(
-                "{what} moved by {moved:.3e} (root mean square) and {:.3e} at most, {:.3} % and {:.3} % of the longest side; \
-                 volume {:+.4} %, area {:+.3} %",
-                of("displacement_largest"),
-                of("displacement_rms_percent"),
-                of("displacement_largest_percent"),
-                of("volume_change_percent"),
-                of("area_change_percent"),
-            ));
-        }
-        let left_behind = mesh["left_behind_percent"].as_f64().unwrap_or(0.0) > 1.0;
-        let notes = [
-            (
-                left_behind,
-                "vertices could not follow the surface, which has gone further than 4 interface widths: use --remesh for a new mesh",
-            ),
-            (
-                outcome["energy_reached"] == false,
-                "the energy asked for was not reached: `willmore resume` goes on with more --steps",
-            ),
-            (
-                outcome["shortened_steps"].as_u64().unwrap_or(0) > 0,
-                "some steps were made shorter than they were to be, since the interface would have moved by more than 2 widths of it, or could not keep its sizes",
-            ),
-            (
-                outcome["same_topology"] == false,
-                if mesh["left_behind_percent"].is_null() {
-                    "parts or holes have come or gone: if they should not, use more --cells or a larger --side-length"
-                } else {
-                    "on the grid parts or holes have come or gone: if vertices nearby followed the wrong surface, use more --cells or a \
-                     larger --side-length"
-                },
-            ),
-            (
-                outcome["touches_box"] == true,
-                "the shape touches the side of the box: a smaller --side-length gives it room",
-            ),
-        ];
-        let holding = notes.into_iter().filter(|(holds, _)| *holds);
-        text.extend(holding.map(|(_, note)| note.to_owned()));
+        let mut text = vec![format!("{progress} in {seconds:.1} s{reason}")];
+        text.extend(outcome::sentences(&outcome));
         let shown = folder.display();
         text.push(if outcome["finished"] == false {
             format!("interrupted, go on with: willmore resume {shown}")
@@ -342,12 +261,12 @@ impl<O> Plan<O> {
 }
 
 /// Writes the shape at the beginning, and pictures of it in between, and says when its parts or holes change.
-struct Pictures<'a, O> {
-    plan: &'a Plan<O>,
+struct Pictures<'a, const D: usize, O> {
+    plan: &'a Plan<D, O>,
     topology: Option<Topology>,
 }
 
-impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, O> {
+impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
     fn observe(&mut self, event: &mut Event<'_, D>) -> Result<(), engine::Error> {
         let (case, u) = (event.run.case(), event.run.field());
         let eps = case.scales.eps;
@@ -358,30 +277,22 @@ impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, O> {
         if !has_interface(u) {
             return Ok(());
         }
-        let Plan {
-            presentation, keep, ..
-        } = self.plan;
-        let mut write = || -> Result<(), Error> {
-            if step == 0 {
-                let format = self.plan.format.as_deref();
-                presentation.write_shape(u, eps, presentation::START, format, run)?;
-            }
-            if keep.frames.is_some_and(|every| step.is_multiple_of(every)) {
-                let name = presentation::frame(step);
-                presentation.write_picture(&case.initial, u, eps, &format!("{name}.png"), run)?;
-                let values = format!("{name}.vti");
-                vti::write(run.path().join(&values), "phase_field", u)?;
-                run.adopt_file(&values)?;
-                presentation.write_shape(u, eps, &name, self.plan.format.as_deref(), run)?;
-            }
-            Ok(())
-        };
-        write().map_err(engine::Error::observer)?;
+        let plan = self.plan;
+        if step == 0 {
+            let written = plan.write_shape(u, eps, None, presentation::START, run);
+            written.map_err(engine::Error::observer)?;
+        }
+        let frames = plan.keep.frames;
+        if frames.is_some_and(|every| step.is_multiple_of(every)) {
+            let name = presentation::frame(step);
+            let written = plan.write(case, u, None, &name, run);
+            written.map_err(engine::Error::observer)?;
+        }
         // Touching sheets have no topology.
-        let topology = presentation.topology(u, eps).ok();
+        let topology = plan.presentation.topology(u, eps).ok();
         if let Some((before, now)) = self.topology.zip(topology).filter(|(a, b)| a != b) {
             let time = event.run.time();
-            self.plan.messages.note(&format!(
+            plan.messages.note(&format!(
                 "step {step}, t = {time:.4e}: parts or holes have come or gone, {now} where there were {before}"
             ));
         }
@@ -401,17 +312,11 @@ pub fn make_way(folder: &Path) -> Result<(), Error> {
 
 /// `runs/NAME`, with the first number that is free.
 pub fn free_folder(name: &str) -> PathBuf {
-    let folder = Path::new("runs").join(name);
-    let numbered = (2..).map(|k| Path::new("runs").join(format!("{name}-{k}")));
-    std::iter::once(folder)
-        .chain(numbered)
-        .find(|folder| !folder.exists())
-        .expect("some number is free")
-}
-
-fn counted(steps: u64) -> String {
-    let plural = if steps == 1 { "" } else { "s" };
-    format!("{steps} step{plural}")
+    let numbered = (2..).map(|k| format!("{name}-{k}"));
+    let names = std::iter::once(name.to_owned()).chain(numbered);
+    let mut folders = names.map(|name| Path::new("runs").join(name));
+    let free = folders.find(|folder| !folder.exists());
+    free.expect("some number is free")
 }
 
 /// What controlled steps say of themselves: their [estimated error](estimated_time_error), the way of the place that moves farthest in each,
@@ -430,30 +335,24 @@ fn time_accuracy(records: &[Record], eps: f64) -> Option<Value> {
     }))
 }
 
-/// The fields of the frames in a folder with their times, for `ParaView`.
-fn series(run: &Path, records: &[Record]) -> String {
-    let mut text =
+/// The pictures of the frames in the folder of a run, and their fields with their times, for `ParaView`.
+fn frames(run: &Path, records: &[Record]) -> Result<(Vec<Picture>, String), Error> {
+    let mut pictures = Vec::new();
+    let mut series =
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n  <Collection>\n"
             .to_owned();
     let complete = records.iter().filter(|record| record.completes_step);
     let times = complete.map(|record| (record.step, record.time));
     for (step, time) in std::iter::once((0, 0.0)).chain(times) {
-        let name = presentation::frame(step) + ".vti";
-        if run.join(&name).exists() {
-            let _ = writeln!(text, "    <DataSet timestep=\"{time}\" file=\"{name}\"/>");
+        let name = presentation::frame(step);
+        let picture = run.join(format!("{name}.png"));
+        if picture.exists() {
+            pictures.push(images::colours(&picture, &read(&picture)?)?);
+            let _ = writeln!(
+                series,
+                "    <DataSet timestep=\"{time}\" file=\"{name}.vti\"/>"
+            );
         }
     }
-    text + "  </Collection>\n</VTKFile>\n"
-}
-
-fn frames(folder: &Path) -> Result<Vec<Picture>, Error> {
-    let entries = std::fs::read_dir(folder).map_err(files::Error::of("read", folder))?;
-    let mut paths: Vec<PathBuf> = entries
-        .map(|entry| Ok(entry?.path()))
-        .collect::<Result<_, _>>()
-        .map_err(files::Error::of("read", folder))?;
-    paths.retain(|path| extension(path) == "png");
-    paths.sort();
-    let read = |path: &PathBuf| Ok(images::colours(path, &read(path)?)?);
-    paths.iter().map(read).collect()
+    Ok((pictures, series + "  </Collection>\n</VTKFile>\n"))
 }

@@ -8,22 +8,12 @@ use crate::prelude::*;
 
 /// Refuses widths of the interface, in cells, that no grid resolves.
 pub fn check_eps_over_h(eps_over_h: f64) -> Result<(), Error> {
-    if (0.5..=64.0).contains(&eps_over_h) {
-        return Ok(());
+    if !(0.5..=64.0).contains(&eps_over_h) {
+        refuse!(
+            "--eps-over-h {eps_over_h} is not possible: an interface is from 0.5 to 64 cells wide"
+        );
     }
-    Err(Error::options(format!(
-        "--eps-over-h {eps_over_h} is not possible: an interface is from 0.5 to 64 cells wide"
-    )))
-}
-
-/// Refuses values that are not positive.
-pub fn check_positive(name: &str, value: Option<f64>) -> Result<(), Error> {
-    match value {
-        Some(value) if !(value.is_finite() && value > 0.0) => {
-            Err(Error::options(format!("{name} {value} must be positive")))
-        }
-        _ => Ok(()),
-    }
+    Ok(())
 }
 
 impl CommonOptions {
@@ -39,6 +29,11 @@ impl CommonOptions {
 }
 
 impl SchemeOptions {
+    /// Interface width in cells.
+    pub fn eps_over_h(&self) -> f64 {
+        self.eps_over_h.unwrap_or(2.0)
+    }
+
     /// Takes the width of the interface from the network, unless it is given.
     pub fn fill_in(&mut self) -> Result<(), Error> {
         if let (None, Some(path)) = (self.eps_over_h, &self.network) {

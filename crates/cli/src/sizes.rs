@@ -34,9 +34,9 @@ impl FlowOptions {
         let target = |wanted: Option<SizeTarget>, from: f64, of_input: f64| {
             wanted.map(|wanted| match wanted {
                 SizeTarget::Keep => Target::keep(of_input),
-                other @ SizeTarget::To(_) => Target {
+                SizeTarget::To(amount) => Target {
                     from,
-                    to: other.of(of_input),
+                    to: amount.of(of_input),
                     over: ramp,
                 },
             })
@@ -115,8 +115,8 @@ pub fn round_edges<const D: usize>(
     if !holds_volume {
         return Ok(());
     }
-    Err(Error::options(
+    refuse!(
         "area and volume cannot both be held: the grid does not resolve parts of the shape, and so their area; give more --cells, or hold \
          one of them",
-    ))
+    )
 }

@@ -12,7 +12,7 @@ const PIXELS: u32 = 480;
 /// Room around a surface for its flow, as a part of its longest side.
 const ROOM: f64 = 0.06;
 
-#[derive(Serialize, Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 pub struct Space {
     pub up: UpAxis,
     /// The parts and holes of the mesh that it was, if it was one.
@@ -35,20 +35,13 @@ pub struct Voxels {
     pub farthest: Option<f64>,
 }
 
-impl Space {
-    pub fn new(up: UpAxis) -> Self {
-        Self {
-            up,
-            input: None,
-            own: None,
-            voxels: None,
-        }
-    }
-}
-
 impl Presentation<3> for Space {
     const SAVED: &'static [&'static str] = &MESHES;
     const USUAL: &'static str = MESHES[0];
+
+    fn of_box(_: &Grid<3>) -> Result<Self, Error> {
+        Ok(Self::default())
+    }
 
     fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error> {
         self.up = *up.get_or_insert(self.up);
@@ -119,8 +112,7 @@ impl Presentation<3> for Space {
     }
 
     fn restore(&mut self, stored: &StoredRun) -> Result<(), Error> {
-        self.own
-            .as_mut()
-            .map_or(Ok(()), |own| own.load_from(stored))
+        let own = self.own.as_mut();
+        own.map_or(Ok(()), |own| own.load_from(stored))
     }
 }

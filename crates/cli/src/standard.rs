@@ -28,28 +28,21 @@ impl Standard {
             let read = std::io::stdin().read_to_end(&mut bytes);
             read.map_err(files::Error::of("read", name))?;
             if bytes.is_empty() {
-                return Err(Error::options(
-                    "standard input is empty: pipe a mesh, an image or a field into it",
-                ));
+                refuse!("standard input is empty: pipe a mesh, an image or a field into it");
             }
             let path = stand_in("input", kind(&bytes));
             std::fs::write(&path, bytes).map_err(files::Error::of("write", &path))?;
             input.input = Some(path.to_string_lossy().into_owned());
             standard.input = Some(path);
         }
-        let several = input.label == Some(Label::All);
-        let Some(save) = save.as_mut().filter(|path| path.as_os_str() == "-") else {
+        let Some(save) = save.filter(|path| path.as_os_str() == "-") else {
             return Ok(standard);
         };
         if messages.json {
-            return Err(Error::options(
-                "--json and --save - would both write to standard output: leave one out",
-            ));
+            refuse!("--json and --save - would both write to standard output: leave one out");
         }
-        if several {
-            return Err(Error::options(
-                "--save - writes one mesh, and --label all makes several: give a file",
-            ));
+        if input.label == Some(Label::All) {
+            refuse!("--save - writes one mesh, and --label all makes several: give a file");
         }
         messages.quiet = true;
         let format = usual_format(input.input.as_deref().unwrap_or_default())?;
@@ -77,12 +70,12 @@ impl Drop for Standard {
 }
 
 /// The input of a command and the file that it writes, if it has these.
-fn paths(command: &mut Command) -> Option<(&mut InputOptions, &mut Option<PathBuf>)> {
+fn paths(command: &mut Command) -> Option<(&mut InputOptions, Option<&mut PathBuf>)> {
     match command {
-        Command::Sample(sample) => Some((&mut sample.input, &mut sample.save)),
+        Command::Sample(sample) => Some((&mut sample.input, Some(&mut sample.save))),
         Command::Run(command) => {
             let options = command.options();
-            Some((&mut options.input, &mut options.keep.save))
+            Some((&mut options.input, options.keep.save.as_mut()))
         }
         _ => None,
     }

@@ -1,8 +1,30 @@
 //! Values of options, which are read as they are written.
 
+use std::num::ParseIntError;
+
 use derive_more::Display;
 
 use crate::prelude::*;
+
+/// A finite number.
+pub fn finite(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|value: &f64| value.is_finite());
+    value.ok_or_else(|| "it must be a finite number".to_owned())
+}
+
+/// A finite number above 0.
+pub fn positive(text: &str) -> Result<f64, String> {
+    let value = finite(text).ok().filter(|value| *value > 0.0);
+    value.ok_or_else(|| "it must be positive".to_owned())
+}
+
+/// A whole number above 0.
+pub fn count(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) => Err("it must be at least 1".to_owned()),
+        parsed => parsed.map_err(|error: ParseIntError| error.to_string()),
+    }
+}
 
 /// A value in the units of the input, or a part of another one in percent.
 #[derive(Clone, Copy, Debug, PartialEq, Display)]
@@ -18,17 +40,21 @@ impl Amount {
             Some(percent) => (percent, Self::Percent),
             None => (text, Self::Value),
         };
-        match number.parse::<f64>() {
-            Ok(value) if value.is_finite() && value > 0.0 => Ok(amount(value)),
-            _ => Err(format!("{number:?} is no positive number; give {expected}")),
+        let wrong = |_| format!("{number:?} is no positive number; give {expected}");
+        positive(number).map(amount).map_err(wrong)
+    }
+
+    /// The value, if `whole` is what it may be a part of.
+    pub fn of(self, whole: f64) -> f64 {
+        match self {
+            Self::Value(value) => value,
+            Self::Percent(percent) => percent / 100.0 * whole,
         }
     }
 
     pub fn tolerance(text: &str) -> Result<Self, String> {
-        Self::parse(
-            text,
-            "a length, or a part of the motion in percent, such as 2%",
-        )
+        let expected = "a length, or a part of the motion in percent, such as 2%";
+        Self::parse(text, expected)
     }
 }
 
@@ -49,17 +75,6 @@ pub enum SizeTarget {
     To(Amount),
 }
 
-impl SizeTarget {
-    /// The value, for a size that is `now` at the beginning.
-    pub fn of(self, now: f64) -> f64 {
-        match self {
-            Self::Keep => now,
-            Self::To(Amount::Value(value)) => value,
-            Self::To(Amount::Percent(percent)) => percent / 100.0 * now,
-        }
-    }
-}
-
 impl FromStr for SizeTarget {
     type Err = String;
 
@@ -73,18 +88,14 @@ impl FromStr for SizeTarget {
 }
 
 /// What of a volume is inside.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Display)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Display, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Label {
     /// Each but 0 becomes a surface of its own.
     #[display("all")]
     All,
+    #[serde(untagged)]
     One(i64),
-}
-
-impl Serialize for Label {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
 }
 
 impl FromStr for Label {

@@ -14,9 +14,9 @@ pub fn body(path: &Path, options: &InputOptions) -> Result<Body, Error> {
     let inside = match (options.label, options.threshold) {
         (Some(Label::One(label)), _) => Inside::Label(label as f64),
         (Some(Label::All), _) => {
-            return Err(Error::options(
+            refuse!(
                 "--label all makes a surface of each label, and this command takes one: give its number",
-            ));
+            );
         }
         (None, Some(threshold)) => Inside::Above(threshold),
         (None, None) => usual(&volume, path)?,
@@ -30,20 +30,18 @@ fn usual(volume: &Volume, path: &Path) -> Result<Inside, Error> {
     let found = match volume.labels().as_deref() {
         Some([_, (label, _)]) => return Ok(Inside::Label(*label)),
         Some(labels) if labels.len() > 2 => {
-            let listed = labels
-                .iter()
-                .take(LISTED)
-                .map(|(label, _)| label.to_string());
+            let listed = labels.iter().take(LISTED);
+            let listed: Vec<String> = listed.map(|(label, _)| label.to_string()).collect();
             let more = if labels.len() > LISTED { ", ..." } else { "" };
-            let listed = listed.collect::<Vec<_>>().join(", ");
+            let listed = listed.join(", ");
             format!("the values {listed}{more}: give --label N of one of them, --label all")
         }
         _ => format!("values from {low} to {high}: give --label N"),
     };
-    Err(Error::options(format!(
+    refuse!(
         "{} holds {found}, or --threshold VALUE, above which is inside",
         path.display()
-    )))
+    )
 }
 
 /// The labels of a volume but 0, of which there must be some, if all are to become surfaces.
@@ -56,10 +54,10 @@ pub fn all_labels(options: &InputOptions) -> Result<Option<Vec<i64>>, Error> {
     let labels = labels.iter().map(|(label, _)| *label as i64);
     let labels: Vec<i64> = labels.filter(|&label| label != 0).collect();
     if labels.is_empty() {
-        return Err(Error::options(format!(
+        refuse!(
             "{} holds no labels, which are whole numbers other than 0: give --threshold VALUE, above which is inside",
             path.display()
-        )));
+        );
     }
     Ok(Some(labels))
 }

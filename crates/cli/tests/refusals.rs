@@ -136,27 +136,27 @@ fn every_mistake_is_one_clear_line() {
         ),
         (
             &["flow", "builtin:disc", "--tension", "nan"],
-            "--tension NaN must be a finite number",
+            "'--tension <SIGMA>': it must be a finite number",
         ),
         (
             &["flow", "builtin:disc", "--steps", "0"],
-            "--steps must be at least 1",
+            "'--steps <COUNT>': it must be at least 1",
         ),
         (
             &["flow", "builtin:disc", "--frames", "0"],
-            "--frames must be at least 1",
+            "'--frames <EVERY>': it must be at least 1",
         ),
         (
             &["flow", "builtin:disc", "--checkpoint-every", "0"],
-            "--checkpoint-every must be at least 1",
+            "'--checkpoint-every <STEPS>': it must be at least 1",
         ),
         (
             &["flow", "builtin:disc", "--time", "0"],
-            "--time 0 must be positive",
+            "'0' for '--time <T>': it must be positive",
         ),
         (
             &["flow", "builtin:disc", "--energy", "nan"],
-            "--energy NaN must be positive",
+            "'nan' for '--energy <W>': it must be positive",
         ),
         (
             &["flow", "builtin:disc", "--tau", "fast"],
@@ -247,7 +247,7 @@ fn every_mistake_is_one_clear_line() {
         ),
         (
             &["fair", "builtin:sphere", "--noise", "-1"],
-            "--noise -1 must be positive",
+            "'-1' for '--noise <LENGTH>': it must be positive",
         ),
         (
             &["fair", "builtin:disc", "--steps", "1"],
@@ -344,7 +344,7 @@ fn every_mistake_is_one_clear_line() {
         ),
         (&["networks", "show", "net.safetensors"], "net.safetensors"),
         (&["check"], "there is no input"),
-        (&["sample", "builtin:disc"], "sample needs --save"),
+        (&["sample", "builtin:disc"], "not provided: --save <FILE>"),
         (
             &["sample", "builtin:disc", "--save", "a.jpg"],
             "must end in .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz",

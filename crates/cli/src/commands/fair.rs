@@ -8,7 +8,6 @@ use crate::keep::Keep;
 use crate::own::OwnMesh;
 use crate::paths::{absolute, read};
 use crate::prelude::*;
-use crate::setup::check_positive;
 use crate::values::SizeTarget;
 
 /// Energies below this have only balls, which have `8 pi`.
@@ -19,17 +18,9 @@ const STEPS: f64 = 1.6;
 /// as long as the surface goes no further than so many, root of the mean square.
 const FARTHEST: f64 = 0.35;
 
-/// The usual steps on a grid of this spacing.
-fn graded(spacing: f64) -> StepRule {
-    StepRule::Graded {
-        first: Fairing::first_step(spacing),
-        part: Fairing::GROWTH,
-    }
-}
-
 impl FairOptions {
     /// Whether it ends as soon as something is reached, which must not be jumped over.
-    fn takes_small_steps(&self) -> bool {
+    pub fn takes_small_steps(&self) -> bool {
         let ratio = self.energy_ratio.or(self.flow.energy);
         self.noise.is_some() || ratio.is_some() || !self.ends
     }
@@ -40,24 +31,14 @@ impl FairOptions {
             || flow.run.time.is_some()
             || flow.energy.is_some()
             || flow.run.steps.is_some();
-        check_positive("--noise", self.noise)?;
-        check_positive("--energy-ratio", self.energy_ratio)?;
-        let usual = if self.takes_small_steps() {
-            graded(f64::NAN)
-        } else {
-            StepRule::Controlled
-        };
-        self.flow.check(usual)?;
         if let Some(ratio) = self.energy_ratio.filter(|ratio| *ratio >= 1.0) {
-            return Err(Error::options(format!(
-                "--energy-ratio {ratio} is reached before the first step: give a part below 1"
-            )));
+            refuse!("--energy-ratio {ratio} is reached before the first step: give a part below 1");
         }
         if let Some(energy) = self.flow.energy.filter(|energy| *energy < BALL) {
-            return Err(Error::options(format!(
+            refuse!(
                 "--energy {energy} has only a ball, which has 8 pi = 25.13, and nothing of the shape would be left: leave it out to take \
                  off the noise, or give --energy-ratio 0.5 for half the energy that there is"
-            )));
+            );
         }
         Ok(())
     }
@@ -68,14 +49,10 @@ impl FairOptions {
         let loaded = match reader.source.clone() {
             Source::Mesh(path) => return self.load_mesh(&path, messages),
             Source::Volume(_) if self.noise.is_some() || self.keep.is_some() => {
-                let given = if self.noise.is_some() {
-                    "--noise"
-                } else {
-                    "--keep"
-                };
-                return Err(Error::options(format!(
+                let given = self.noise.map_or("--keep", |_| "--noise");
+                refuse!(
                     "{given} has no meaning for a volume, of which a new mesh is made: leave it out"
-                )));
+                );
             }
             Source::Volume(_) => {
                 let mut loaded = reader.load()?;
@@ -89,32 +66,31 @@ impl FairOptions {
                 {
                     voxels.farthest = Some(FARTHEST * voxels.side);
                     flow.run.time = Some((STEPS * voxels.side).powi(4));
-                    flow.tau.get_or_insert(graded(start.field.grid().spacing()));
                 }
                 loaded
             }
             _ if self.noise.is_some() || self.keep.is_some() || !self.ends => {
-                return Err(Error::options(
+                refuse!(
                     "only a mesh in a file has noise to take off: say how smooth the surface is to become, by --energy-ratio, --time, \
                      --energy or --steps, without --noise and --keep",
-                ));
+                );
             }
             _ => reader.load()?,
         };
-        match loaded {
-            Loaded::Space(_) => Ok(loaded),
-            Loaded::Plane(_) => Err(Error::options(
-                "`fair` is for surfaces in space; for images and shapes in the plane there is `willmore flow`",
-            )),
+        if let Loaded::Plane(_) = loaded {
+            refuse!(
+                "`fair` is for surfaces in space; for images and shapes in the plane there is `willmore flow`"
+            );
         }
+        Ok(loaded)
     }
 
     fn load_mesh(&mut self, path: &Path, messages: MessageOptions) -> Result<Loaded, Error> {
         let repairs = self.flow.run.input.repair;
         if repairs && !self.remesh {
-            return Err(Error::options(
+            refuse!(
                 "--repair makes a new mesh: write it by `willmore sample --repair --save`, which can then be faired, or give --remesh",
-            ));
+            );
         }
         if let Some(mask) = self.keep.as_deref().and_then(Keep::mask) {
             self.keep = Some(absolute(mask)?.to_string_lossy().into_owned());
@@ -141,13 +117,5 @@ impl FairOptions {
         }
         let eps_over_h = self.flow.run.scheme.eps_over_h();
         Reader::of(&mut self.flow.run.input, eps_over_h, messages)?.own(own, path, self.allow_loss)
-    }
-
-    pub fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
-        if self.takes_small_steps() {
-            let spacing = scales.eps / self.flow.run.scheme.eps_over_h();
-            self.flow.tau.get_or_insert(graded(spacing));
-        }
-        self.flow.rule(scales, unit)
     }
 }

@@ -3,15 +3,14 @@
 use engine::{ErrorControl, Flow, Held, Helfrich, Store, TimeSteps};
 use solver::NewtonParams;
 
-use crate::cli::{FlowOptions, MessageOptions, RunCommand, RunOptions};
+use crate::cli::{FlowOptions, McfOptions, MessageOptions, RunCommand, RunOptions};
 use crate::config;
 use crate::input::{Loaded, Reader, Start, usual_box};
-use crate::paths::{absolute, extension};
+use crate::paths::absolute;
 use crate::plane::Plane;
 use crate::prelude::*;
 use crate::presentation::{self, Presentation};
 use crate::run::{Plan, free_folder, make_way};
-use crate::setup::check_positive;
 use crate::sizes;
 use crate::space::Space;
 use crate::values::{Amount, Label};
@@ -19,25 +18,72 @@ use crate::volume;
 
 /// In a step the interface moves by at most so many widths of it.
 const LONGEST_MOVE: f64 = 2.0;
-const SAVED: [&str; 5] = ["ply", "obj", "stl", "png", "svg"];
+/// The usual step of inpainting in units of the inner one,
+const INPAINT_STEP: f64 = 16.0;
+/// which a ramp reaches that starts this many times halved: at the border of the region there is a jump.
+const INPAINT_HALVINGS: u32 = 12;
 
 impl RunCommand {
     /// Refuses options before anything is read.
     fn check(&mut self) -> Result<(), Error> {
         match self {
-            Self::Flow(flow) => flow.check(StepRule::Controlled),
-            Self::Fair(fair) => fair.check(),
-            Self::Inpaint(inpaint) => inpaint.check(),
-            Self::Mcf(mcf) => mcf.check(),
+            Self::Flow(_) => (),
+            Self::Fair(fair) => fair.check()?,
+            Self::Inpaint(inpaint) => inpaint.check()?,
+            Self::Mcf(McfOptions { method, run }) => {
+                let chosen = run.scheme.network.is_some() || run.scheme.scheme != Scheme::Accurate;
+                if chosen && !method.is_learned() {
+                    refuse!(
+                        "--network and --scheme have no meaning for finite elements: leave them out, or choose --method network"
+                    );
+                }
+            }
+        }
+        let usual = self.usual_rule(f64::NAN, f64::NAN);
+        if let Some(flow) = self.willmore()
+            && let Some(tolerance) = flow.tolerance
+            && flow.tau.unwrap_or(usual) != StepRule::Controlled
+        {
+            refuse!(
+                "--tolerance {tolerance} is for controlled time steps: give --tau controlled, or leave it out"
+            );
+        }
+        Ok(())
+    }
+
+    /// The rule for the time steps of Willmore flow unless one is chosen, for this inner step and spacing of the grid.
+    fn usual_rule(&self, inner: f64, spacing: f64) -> StepRule {
+        match self {
+            Self::Fair(fair) if fair.takes_small_steps() => StepRule::Graded {
+                first: Fairing::first_step(spacing),
+                part: Fairing::GROWTH,
+            },
+            Self::Inpaint(_) => StepRule::Ramp {
+                tau: INPAINT_STEP * inner,
+                halvings: INPAINT_HALVINGS,
+            },
+            _ => StepRule::Controlled,
+        }
+    }
+
+    /// The rule for time steps, filled in for these scales and the length that a unit of the usual box has: time steps that follow from
+    /// the inner step do so in a box of that size.
+    fn rule(&mut self, scales: &Scales, unit: f64, spacing: f64) -> StepRule {
+        let inner = scales.mcf_step * unit.powi(2);
+        let usual = self.usual_rule(inner, spacing);
+        match self.willmore() {
+            Some(flow) => {
+                let rule = flow.tau.unwrap_or(usual).resolved(inner);
+                flow.tau = Some(rule);
+                rule
+            }
+            None => StepRule::Constant(scales.mcf_step),
         }
     }
 
     /// How many steps are made unless it is said: few, or many where something else ends the run; those of mean curvature flow are short.
     fn usual_steps(&mut self) -> usize {
-        let fairs = match self {
-            Self::Fair(fair) => fair.noise.is_some() || fair.energy_ratio.is_some() || !fair.ends,
-            _ => false,
-        };
+        let fairs = matches!(self, Self::Fair(fair) if fair.takes_small_steps());
         let energy = self.willmore().and_then(|flow| flow.energy);
         let has_an_end = fairs || energy.is_some() || self.options().time.is_some();
         match self {
@@ -56,17 +102,6 @@ impl RunCommand {
                 let RunOptions { input, scheme, .. } = self.options();
                 Reader::of(input, scheme.eps_over_h(), messages)?.load()
             }
-        }
-    }
-
-    /// The rule for time steps, filled in for these scales and the length that a unit of the usual box has: time steps that follow from
-    /// the inner step do so in a box of that size.
-    fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
-        match self {
-            Self::Flow(flow) => flow.rule(scales, unit),
-            Self::Fair(fair) => fair.rule(scales, unit),
-            Self::Inpaint(inpaint) => inpaint.rule(scales, unit),
-            Self::Mcf(_) => StepRule::Constant(scales.mcf_step),
         }
     }
 
@@ -89,39 +124,13 @@ impl RunCommand {
 }
 
 impl FlowOptions {
-    pub fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
-        let rule = self.tau.unwrap_or(StepRule::Controlled);
-        *self
-            .tau
-            .insert(rule.resolved(scales.mcf_step * unit.powi(2)))
-    }
-
-    /// Refuses a tolerance that the time steps do not look at, and energies that nothing has.
-    pub fn check(&self, usual: StepRule) -> Result<(), Error> {
-        check_positive("--energy", self.energy)?;
-        match self.tolerance {
-            Some(tolerance) if self.tau.unwrap_or(usual) != StepRule::Controlled => {
-                Err(Error::options(format!(
-                    "--tolerance {tolerance} is for controlled time steps: give --tau controlled, or leave it out"
-                )))
-            }
-            _ => Ok(()),
-        }
-    }
-
     /// Spontaneous curvature, tension and pressure, in the units of the input.
-    fn energy(&self) -> Result<Helfrich, Error> {
-        let finite = |name: &str, value: Option<f64>| match value.unwrap_or(0.0) {
-            value if value.is_finite() => Ok(value),
-            value => Err(Error::options(format!(
-                "{name} {value} must be a finite number"
-            ))),
-        };
-        Ok(Helfrich {
-            spontaneous_curvature: finite("--spontaneous-curvature", self.spontaneous_curvature)?,
-            tension: finite("--tension", self.tension)?,
-            pressure: finite("--pressure", self.pressure)?,
-        })
+    fn energy(&self) -> Helfrich {
+        Helfrich {
+            spontaneous_curvature: self.spontaneous_curvature.unwrap_or(0.0),
+            tension: self.tension.unwrap_or(0.0),
+            pressure: self.pressure.unwrap_or(0.0),
+        }
     }
 }
 
@@ -129,32 +138,12 @@ impl RunOptions {
     /// Refuses what cannot be done before anything is computed.
     fn check(&mut self) -> Result<(), Error> {
         self.scheme.fill_in()?;
-        check_positive("--time", self.time)?;
-        for (name, value) in [
-            ("--steps", self.steps),
-            ("--frames", self.keep.frames),
-            ("--checkpoint-every", Some(self.keep.checkpoint_every)),
-        ] {
-            if value == Some(0) {
-                return Err(Error::options(format!("{name} must be at least 1")));
-            }
-        }
         let force = self.keep.force;
         if let Some(save) = &mut self.keep.save {
-            if !SAVED.contains(&&*extension(save)) {
-                return Err(Error::options(format!(
-                    "--save {} must end in .{}",
-                    save.display(),
-                    SAVED.join(", .")
-                )));
-            }
             *save = absolute(&*save)?;
             force.check("--save", save)?;
             if !save.parent().is_some_and(Path::is_dir) {
-                return Err(Error::options(format!(
-                    "--save {}: there is no such folder",
-                    save.display()
-                )));
+                refuse!("--save {}: there is no such folder", save.display());
             }
         }
         Ok(())
@@ -166,7 +155,7 @@ pub fn run(
     mut command: RunCommand,
     messages: MessageOptions,
     stored: Option<(StoredRun, Option<usize>)>,
-) -> Result<ExitCode, Error> {
+) -> Result<(), Error> {
     if let Some(labels) = volume::all_labels(&command.options().input)? {
         return each_label(&command, &labels, messages);
     }
@@ -200,11 +189,7 @@ pub fn run(
 }
 
 /// One run for each label of a volume, until one is interrupted.
-fn each_label(
-    command: &RunCommand,
-    labels: &[i64],
-    messages: MessageOptions,
-) -> Result<ExitCode, Error> {
+fn each_label(command: &RunCommand, labels: &[i64], messages: MessageOptions) -> Result<(), Error> {
     for &label in labels {
         let mut one = command.clone();
         let RunOptions { input, keep, .. } = one.options();
@@ -212,12 +197,9 @@ fn each_label(
         for name in keep.output.iter_mut().chain(&mut keep.save) {
             *name = volume::named(name, label);
         }
-        let code = run(one, messages, None)?;
-        if code != ExitCode::SUCCESS {
-            return Ok(code);
-        }
+        run(one, messages, None)?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 struct Job {
@@ -230,7 +212,7 @@ impl Job {
     fn start<const D: usize, O: Presentation<D>>(
         mut self,
         mut start: Start<D, O>,
-    ) -> Result<ExitCode, Error> {
+    ) -> Result<(), Error> {
         let keep = &mut self.command.options().keep;
         start.presentation.turn(&mut keep.up)?;
         keep.save.as_deref().map_or(Ok(()), O::check_saved)?;
@@ -261,7 +243,7 @@ impl Job {
         mut self,
         stored: StoredRun,
         more: Option<usize>,
-    ) -> Result<ExitCode, Error> {
+    ) -> Result<(), Error> {
         let mut notes = engine::notes(&stored).clone();
         let name = notes["about"]["name"].as_str().unwrap_or("run").to_owned();
         let mut presentation = O::deserialize(&notes["outlet"]).map_err(|reason| {
@@ -300,9 +282,10 @@ impl Job {
         let RunOptions { scheme, input, .. } = self.command.options();
         let (mut scales, operator) = scheme.operator(method, initial.grid())?;
         let unit = initial.grid().side() / input.box_side.unwrap_or(usual_box::<D>().1);
-        let rule = self.command.rule(&scales, unit);
+        let spacing = initial.grid().spacing();
+        let rule = self.command.rule(&scales, unit, spacing);
         let stops = self.command.stops(rule);
-        let options = self.command.willmore();
+        let options = self.command.willmore().map(|options| &*options);
         let steps = match rule {
             StepRule::Controlled => {
                 scales.newton = NewtonParams {
@@ -328,10 +311,7 @@ impl Job {
         let eps = scales.eps;
         let known = presentation.known(&initial, eps)?;
         let (energy, held) = match options {
-            Some(options) => (
-                options.energy()?,
-                options.held(&initial, eps, known.volume)?,
-            ),
+            Some(options) => (options.energy(), options.held(&initial, eps, known.volume)?),
             None => (Helfrich::default(), Held::default()),
         };
         let mut measures = vec![Measure::zero_set(eps, &held)];
@@ -351,7 +331,7 @@ impl Job {
         })
     }
 
-    fn plan<O>(&mut self, name: String, presentation: O) -> Plan<O> {
+    fn plan<const D: usize, O>(&mut self, name: String, presentation: O) -> Plan<D, O> {
         let format = match &self.command {
             RunCommand::Fair(fair) => fair.format.clone(),
             _ => None,

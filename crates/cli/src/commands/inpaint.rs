@@ -6,14 +6,8 @@ use crate::paths::absolute;
 use crate::prelude::*;
 use crate::values::Ansatz;
 
-/// The usual step in units of the inner one.
-const STEP: f64 = 16.0;
-/// The first step is divided into a ramp that starts this many times halved: at the border of the region there is a jump.
-const HALVINGS: u32 = 12;
-
 impl InpaintOptions {
     pub fn check(&mut self) -> Result<(), Error> {
-        self.flow.check(usual(f64::NAN))?;
         let mask = self.mask()?;
         if !Region::is_meant(mask) {
             let absolute = absolute(mask)?;
@@ -40,12 +34,6 @@ impl InpaintOptions {
         })
     }
 
-    pub fn rule(&mut self, scales: &Scales, unit: f64) -> StepRule {
-        let inner = scales.mcf_step * unit.powi(2);
-        self.flow.tau.get_or_insert(usual(STEP * inner));
-        self.flow.rule(scales, unit)
-    }
-
     fn mask(&self) -> Result<&str, Error> {
         self.mask.as_deref().ok_or_else(|| {
             Error::options("say which region to fill: --mask IMAGE, box:x0,y0,x1,y1 or ball:x,y,r")
@@ -62,12 +50,12 @@ impl InpaintOptions {
         let inside = |node: usize| mask.signed_distance(grid.node(node)) < 0.0;
         let region: Vec<bool> = (0..grid.len()).map(inside).collect();
         if !region.contains(&true) {
-            return Err(Error::options(format!(
+            refuse!(
                 "--mask {} contains no node of the box from {:?} of side {}: nothing could move",
                 self.mask()?,
                 grid.origin(),
                 grid.side()
-            )));
+            );
         }
         let eps = self.flow.run.scheme.eps_over_h() * grid.spacing();
         let inner = match &self.ansatz {
@@ -85,19 +73,10 @@ impl InpaintOptions {
     }
 }
 
-fn usual(tau: f64) -> StepRule {
-    StepRule::Ramp {
-        tau,
-        halvings: HALVINGS,
-    }
-}
-
 /// A region that is a mask.
 fn region<const D: usize>(mask: &str) -> Result<Box<dyn SignedDistance<D>>, Error> {
     if !Region::is_meant(mask) {
-        return Err(Error::options(format!(
-            "--mask {mask} is no region in {D}D: give box:... or ball:..."
-        )));
+        refuse!("--mask {mask} is no region in {D}D: give box:... or ball:...");
     }
     let region: Region = mask
         .parse()

@@ -5,7 +5,6 @@ pub mod fair;
 pub mod flow;
 pub mod info;
 pub mod inpaint;
-pub mod mcf;
 pub mod networks;
 pub mod resume;
 pub mod sample;

@@ -5,7 +5,7 @@ use model::{Network, Shipped};
 use crate::cli::{MessageOptions, NetworksCommand};
 use crate::prelude::*;
 
-pub fn run(show: Option<&NetworksCommand>, messages: MessageOptions) -> Result<ExitCode, Error> {
+pub fn run(show: Option<&NetworksCommand>, messages: MessageOptions) -> Result<(), Error> {
     let all = [Shipped::Accurate.all()?, Shipped::Paper.all()?].concat();
     let mut all = all.iter().map(|(name, network)| (stem(name), network));
     let Some(NetworksCommand::Show { network: wanted }) = show else {
@@ -16,20 +16,20 @@ pub fn run(show: Option<&NetworksCommand>, messages: MessageOptions) -> Result<E
             })
             .unzip();
         messages.report(&Value::Array(list), &lines.join("\n"));
-        return Ok(ExitCode::SUCCESS);
+        return Ok(());
     };
     let network = match all.find(|(name, _)| *name == stem(wanted)) {
         Some((_, network)) => network,
         None if Path::new(wanted).exists() => &Network::load(Path::new(wanted))?,
         None => {
-            return Err(Error::options(format!(
+            refuse!(
                 "there is no network {wanted:?}, neither in the list of `willmore networks` nor as a file"
-            )));
+            );
         }
     };
     let about = about(&stem(wanted), network);
     messages.report(&about, &format!("{about:#}"));
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 fn about(name: &str, network: &Network) -> Value {

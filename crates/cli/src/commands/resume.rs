@@ -6,7 +6,7 @@ use crate::prelude::*;
 use crate::{config, page};
 
 /// Continues a run by the options and the state that it stored; its input is not needed again.
-pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<ExitCode, Error> {
+pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<(), Error> {
     let stored = if options.recover {
         RunDirectory::recover(&options.run)?
     } else {
@@ -16,9 +16,7 @@ pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<ExitCode
     let parsed = config::parse_resolved(&stored.read_text(config::FILE)?, &path)?;
     let Command::Run(mut command) = parsed.command else {
         let path = path.display();
-        return Err(Error::options(format!(
-            "{path} names no command that makes runs"
-        )));
+        refuse!("{path} names no command that makes runs");
     };
     let keep = &mut command.options().keep;
     keep.force = options.force;
@@ -37,5 +35,5 @@ pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<ExitCode
         "The run in {folder} is finished already; willmore resume {folder} --steps N goes on to N steps in all"
     );
     messages.report(&outcome, &text);
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }

@@ -2,7 +2,7 @@
 
 use volumes::Volume;
 
-use crate::cli::{InputOptions, MessageOptions, SampleOptions};
+use crate::cli::{MessageOptions, SampleOptions};
 use crate::input::{Loaded, Reader, Source, Start, check_phases, closed};
 use crate::paths::{MESHES, extension};
 use crate::prelude::*;
@@ -14,58 +14,43 @@ use crate::volume;
 const EPS_OVER_H: f64 = 2.0;
 
 /// Writes an input as the flows begin with it, possibly damaged.
-pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<ExitCode, Error> {
-    let path = options.save.take().ok_or_else(|| {
-        Error::options(
-            "sample needs --save FILE, with .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz",
-        )
-    })?;
+pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<(), Error> {
+    let path = options.save.clone();
     if let Some(labels) = volume::all_labels(&options.input)? {
         for label in labels {
             let mut one = options.clone();
             one.input.label = Some(Label::One(label));
-            one.save = Some(volume::named(&path, label));
+            one.save = volume::named(&path, label);
             run(one, messages)?;
         }
-        return Ok(ExitCode::SUCCESS);
+        return Ok(());
     }
     let format = extension(&path);
     let is_mesh = MESHES.contains(&&*format);
     let shown = path.display();
     if !is_mesh && !["png", "npy", "vti", "nii", "gz"].contains(&&*format) {
-        return Err(Error::options(format!(
-            "--save {shown} must end in .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz"
-        )));
+        refuse!("--save {shown} must end in .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz");
     }
     options.force.check("--save", &path)?;
-    let noise = options.noise.unwrap_or(0.0);
+    let noise = options.noise;
     if !(noise.is_finite() && noise >= 0.0) {
-        return Err(Error::options(format!(
-            "--noise {noise} must not be negative"
-        )));
+        refuse!("--noise {noise} must not be negative");
     }
     if noise > 0.0 && !is_mesh {
-        return Err(Error::options(format!(
+        refuse!(
             "--noise moves the vertices of meshes: leave it out, or save a mesh in place of {shown}"
-        )));
+        );
     }
-    let done = || {
-        let outcome = json!({ "command": "sample", "file": path });
-        messages.report(&outcome, &format!("wrote {shown}"));
-        Ok(ExitCode::SUCCESS)
-    };
-    let InputOptions {
-        cells,
-        box_side,
-        side_length,
-        ..
-    } = &options.input;
-    let on_grid =
-        options.resample || cells.is_some() || box_side.is_some() || side_length.is_some();
-    let whole = is_mesh && options.without.is_empty() && !on_grid;
-    let repairs = options.input.repair;
+    let input = &options.input;
+    let as_it_is = is_mesh
+        && !options.resample
+        && options.without.is_empty()
+        && input.cells.is_none()
+        && input.box_side.is_none()
+        && input.side_length.is_none();
+    let repairs = input.repair;
     let mut reader = Reader::of(&mut options.input, EPS_OVER_H, messages)?;
-    if let (Source::Mesh(from), true) = (&reader.source, whole) {
+    if let (Source::Mesh(from), true) = (&reader.source, as_it_is) {
         let mut mesh = if repairs {
             closed(from, true, messages)?.into_mesh()
         } else {
@@ -76,19 +61,21 @@ pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<ExitC
             mesh.roughen(noise, options.seed);
         }
         surfaces::write(&path, &mesh)?;
-        return done();
-    }
-    match reader.load()? {
-        Loaded::Plane(start) => write(start, options, &path)?,
-        Loaded::Space(start) if noise > 0.0 => {
-            let u = without(start.field, &options.without)?;
-            let mut mesh = surfaces::remeshed_surface(&u, eps(&u))?;
-            mesh.roughen(noise, options.seed);
-            surfaces::write(&path, &mesh)?;
+    } else {
+        match reader.load()? {
+            Loaded::Plane(start) => write(start, options, &path)?,
+            Loaded::Space(start) if noise > 0.0 => {
+                let u = without(start.field, &options.without)?;
+                let mut mesh = surfaces::remeshed_surface(&u, eps(&u))?;
+                mesh.roughen(noise, options.seed);
+                surfaces::write(&path, &mesh)?;
+            }
+            Loaded::Space(start) => write(start, options, &path)?,
         }
-        Loaded::Space(start) => write(start, options, &path)?,
     }
-    done()
+    let outcome = json!({ "command": "sample", "file": path });
+    messages.report(&outcome, &format!("wrote {shown}"));
+    Ok(())
 }
 
 fn eps<const D: usize>(u: &Field<D>) -> f64 {
@@ -122,10 +109,7 @@ fn write<const D: usize, O: Presentation<D>>(
 fn segmentation<const D: usize>(u: &Field<D>, path: &Path) -> Result<Volume, Error> {
     let grid = u.grid();
     let Ok(origin) = <[f64; 3]>::try_from(&grid.origin()[..]) else {
-        return Err(Error::options(format!(
-            "--save {}: a shape in {D}D has no voxels",
-            path.display()
-        )));
+        refuse!("--save {}: a shape in {D}D has no voxels", path.display());
     };
     let cells = grid.cells();
     // The first axis runs fastest.

@@ -8,15 +8,14 @@ use clap_complete::Shell;
 use crate::cli::Cli;
 use crate::prelude::*;
 
-pub fn completions(shell: Shell) -> ExitCode {
+pub fn completions(shell: Shell) {
     let mut text = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "willmore", &mut text);
     print(&text);
-    ExitCode::SUCCESS
 }
 
 /// Prints the manual page: that of the program, then those of its commands.
-pub fn man() -> Result<ExitCode, Error> {
+pub fn man() -> Result<(), Error> {
     let mut text = Vec::new();
     let mut command = Cli::command();
     command.build();
@@ -27,7 +26,7 @@ pub fn man() -> Result<ExitCode, Error> {
             .map_err(files::Error::of("make the manual page of", page.get_name()))?;
     }
     print(&text);
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 fn print(text: &[u8]) {

@@ -14,7 +14,7 @@ const CELLS: f64 = 128.0;
 /// Radii on which the quality is measured.
 const HELD_OUT: usize = 20;
 
-pub fn run(mut options: TrainOptions, messages: MessageOptions) -> Result<ExitCode, Error> {
+pub fn run(mut options: TrainOptions, messages: MessageOptions) -> Result<(), Error> {
     let missing = |name: &str| {
         Error::options(format!(
             "train needs --{name}; for example: willmore train --dimension 2 --width 25 --eps-over-h 3 --save mine.safetensors"
@@ -57,10 +57,7 @@ pub fn run(mut options: TrainOptions, messages: MessageOptions) -> Result<ExitCo
     progress.clear();
     let Trained {
         network, quality, ..
-    } = match trained {
-        Err(model::Error::Interrupted { .. }) => return Ok(ExitCode::from(Interrupt::EXIT_CODE)),
-        trained => trained?,
-    };
+    } = trained?;
     let calibration = network.calibration()?;
     network.save(save)?;
     let outcome = json!({
@@ -76,5 +73,5 @@ pub fn run(mut options: TrainOptions, messages: MessageOptions) -> Result<ExitCo
         save.display()
     );
     messages.report(&outcome, &text);
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
