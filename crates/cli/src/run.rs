@@ -185,23 +185,21 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         stem: &str,
         run: &mut RunDirectory,
     ) -> Result<(), Error> {
+        if has_interface(u) {
+            let eps = case.scales.eps;
+            let picture = self.presentation.picture(&case.initial, u, eps)?.to_png()?;
+            run.write_file(&format!("{stem}.png"), |out| out.write_all(&picture))?;
+            if let Some(faired) = faired {
+                let figure = faired.displacement.to_svg()?;
+                run.write_file(presentation::DISPLACEMENT, |out| {
+                    out.write_all(figure.as_bytes())
+                })?;
+            }
+            self.write_shape(u, eps, faired, stem, run)?;
+        }
         let name = format!("{stem}.vti");
         vti::write(run.path().join(&name), "phase_field", u)?;
-        run.adopt_file(&name)?;
-        if !has_interface(u) {
-            return Ok(());
-        }
-        let eps = case.scales.eps;
-        let picture = self.presentation.picture(&case.initial, u, eps)?;
-        let picture = picture.to_png()?;
-        run.write_file(&format!("{stem}.png"), |out| out.write_all(&picture))?;
-        if let Some(faired) = faired {
-            let figure = faired.displacement.to_svg()?;
-            run.write_file(presentation::DISPLACEMENT, |out| {
-                out.write_all(figure.as_bytes())
-            })?;
-        }
-        self.write_shape(u, eps, faired, stem, run)
+        Ok(run.adopt_file(&name)?)
     }
 
     /// Writes the shape to a file `stem.*` of a run.
