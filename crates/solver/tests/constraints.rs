@@ -183,15 +183,18 @@ fn a_spheroid_keeps_its_volume_in_space() {
 }
 
 #[test]
-fn the_area_of_a_body_with_edges_is_kept_without_sharper_ones() {
+fn an_area_alone_is_kept_without_sharper_edges() {
     let grid = Grid::<3>::per_unit(32, 1.0).unwrap();
-    let plate = Cuboid::new([0.3, 0.3, 0.1]).unwrap();
-    let u = phase_field(grid, &plate, params(&grid).eps).unwrap();
-    let tau = 0.05 * grid.spacing().powi(2);
-    let free = run(&mut free(&u), [false; 2], tau, 4).0;
-    let (records, drift) = run(&mut keeping(&u, PERIMETER), PERIMETER, tau, 4);
-    assert!(drift < 1e-11, "{drift:e}");
-    assert!(products(&records) < 1.5 * products(&free));
+    let tau = 0.25 * grid.spacing().powi(2);
+    for sides in [[0.35, 0.35, 0.35], [0.7, 0.12, 0.12]] {
+        let u = phase_field(grid, &Cuboid::new(sides).unwrap(), params(&grid).eps).unwrap();
+        let cost = products(&run(&mut free(&u), [false; 2], tau, 4).0);
+        let (records, drift) = run(&mut keeping(&u, PERIMETER), PERIMETER, tau, 4);
+        assert!(drift < 1e-11, "{drift:e}");
+        // Restored along the mean curvature, the edges would cost 3.7 and 1.7 times as much.
+        let ratio = products(&records) / cost;
+        assert!(ratio < 1.2, "{sides:?}: {ratio}");
+    }
 }
 
 #[test]
