@@ -97,7 +97,7 @@ impl<const D: usize> InterfaceModes<D> {
             let mut sums = [0.0; MOST_CORNERS];
             for sample in samples.of_cell(cell) {
                 let value = sample.weight * r[sample.node as usize].double();
-                for (sum, hat) in sums.iter_mut().zip(sample.hats()) {
+                for (sum, hat) in sums.iter_mut().zip(sample.hats()).take(1 << D) {
                     *sum += hat * value;
                 }
             }
