@@ -342,17 +342,6 @@ impl Builder {
         terms
     }
 
-    /// Apply an operation that is linear in one argument: `make` puts the tangent into it.
-    pub(crate) fn linear(
-        &mut self,
-        e: Expression,
-        make: impl FnOnce(TensorIr) -> OperationIr,
-    ) -> Expression {
-        let (factor, atom) = self.evaluate(e);
-        let out = self.tangent.emit_one(make(read_only(&atom)));
-        Expression::atom(out).scale(factor)
-    }
-
     /// The tangent as a tensor, zeros if there is none.
     pub(crate) fn or_zeros(&mut self, t: Tangent, shape: &Shape, dtype: DType) -> TensorIr {
         match t {
@@ -365,7 +354,7 @@ impl Builder {
         }
     }
 
-    /// Apply an operation that is jointly linear in several arguments.
+    /// Apply an operation that is jointly linear in several arguments: `make` puts the tangents into it.
     pub(crate) fn jointly_linear(
         &mut self,
         arguments: Vec<(Tangent, &TensorIr)>,
