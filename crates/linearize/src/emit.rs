@@ -107,42 +107,31 @@ impl Emitter {
     pub(crate) fn simplify(&mut self, operation: OperationIr) -> Vec<TensorIr> {
         let one = match &operation {
             OperationIr::NumericFloat(_, op) => match op {
-                Num::Add(b) => Some(self.add(&b.lhs, &b.rhs)),
-                Num::Sub(b) => Some(self.sub(&b.lhs, &b.rhs)),
-                Num::Mul(b) => Some(self.mul(&b.lhs, &b.rhs)),
-                Num::Div(b) => Some(self.div(&b.lhs, &b.rhs)),
-                Num::Neg(u) => Some(self.neg(&u.input)),
-                Num::MulScalar(s) => Some(self.scale(&s.lhs, s.rhs.elem())),
-                Num::AddScalar(s) => Some(self.shift(&s.lhs, s.rhs.elem())),
-                Num::SubScalar(s) => Some(self.shift(&s.lhs, -s.rhs.elem::<f64>())),
+                Num::Add(b) => self.add(&b.lhs, &b.rhs),
+                Num::Sub(b) => self.sub(&b.lhs, &b.rhs),
+                Num::Mul(b) => self.mul(&b.lhs, &b.rhs),
+                Num::Div(b) => self.div(&b.lhs, &b.rhs),
+                Num::Neg(u) => self.neg(&u.input),
+                Num::MulScalar(s) => self.scale(&s.lhs, s.rhs.elem()),
+                Num::AddScalar(s) => self.shift(&s.lhs, s.rhs.elem()),
+                Num::SubScalar(s) => self.shift(&s.lhs, -s.rhs.elem::<f64>()),
                 Num::DivScalar(s) if self.constant(&s.lhs).is_some() => {
-                    Some(self.scale(&s.lhs, 1.0 / s.rhs.elem::<f64>()))
+                    self.scale(&s.lhs, 1.0 / s.rhs.elem::<f64>())
                 }
-                Num::PowiScalar(s) => Some(self.powi(&s.lhs, s.rhs.elem())),
-                Num::Full(full) => {
-                    Some(self.full(full.out.shape.clone(), full.out.dtype, full.value.elem()))
-                }
-                Num::SumDim(r) | Num::MeanDim(r) if r.input.shape[r.axis] == 1 => {
-                    Some(r.input.clone())
-                }
-                _ => None,
+                Num::PowiScalar(s) => self.powi(&s.lhs, s.rhs.elem()),
+                Num::Full(f) => self.full(f.out.shape.clone(), f.out.dtype, f.value.elem()),
+                Num::SumDim(r) | Num::MeanDim(r) if r.input.shape[r.axis] == 1 => r.input.clone(),
+                _ => return self.emit(operation),
             },
-            OperationIr::Float(_, Float::PowfScalar(s)) => Some(self.powf(&s.lhs, s.rhs.elem())),
-            OperationIr::BaseFloat(Base::Reshape(r)) => {
-                Some(self.reshape(&r.input, r.out.shape.clone()))
-            }
-            OperationIr::BaseFloat(Base::Expand(e)) => {
-                Some(self.expand(&e.input, e.out.shape.clone()))
-            }
+            OperationIr::Float(_, Float::PowfScalar(s)) => self.powf(&s.lhs, s.rhs.elem()),
+            OperationIr::BaseFloat(Base::Reshape(r)) => self.reshape(&r.input, r.out.shape.clone()),
+            OperationIr::BaseFloat(Base::Expand(e)) => self.expand(&e.input, e.out.shape.clone()),
             OperationIr::BaseFloat(Base::Cast(c)) if c.input.dtype == c.out.dtype => {
-                Some(c.input.clone())
+                c.input.clone()
             }
-            _ => None,
+            _ => return self.emit(operation),
         };
-        match one {
-            Some(out) => vec![out],
-            None => self.emit(operation),
-        }
+        vec![one]
     }
 
     fn note_uniform(&mut self, operation: &OperationIr) {
