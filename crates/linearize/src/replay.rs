@@ -210,13 +210,12 @@ where
 {
     for (id, (role, index, value)) in block.inputs.iter().zip(inputs) {
         let Some(id) = id else { continue };
-        let primitive =
-            <DispatchTensor as DispatchKindConversion<B>>::try_into_backend(value.0.clone())
-                .map_err(|_| Error::Input {
-                    input: format!("{role} {index}"),
-                    expected: "the program's backend".to_owned(),
-                    found: format!("{:?}", value.0.device()),
-                })?;
+        let primitive: BackendTensor<B> = DispatchTensor::try_into_backend(value.0.clone())
+            .map_err(|_| Error::Input {
+                input: format!("{role} {index}"),
+                expected: "the program's backend".to_owned(),
+                found: format!("{:?}", value.0.device()),
+            })?;
         it.register_tensor_to_device(*id, HandleKind::Float(primitive.float()));
     }
     for operation in &block.operations {
@@ -226,10 +225,9 @@ where
         let HandleKind::Float(tensor) = it.get_tensor(out) else {
             unreachable!("outputs of traced functions are float tensors")
         };
-        let tensor = BackendTensor::Float(tensor);
-        Value(<DispatchTensor as DispatchKindConversion<B>>::from_backend(
+        Value(DispatchTensor::from_backend(BackendTensor::<B>::Float(
             tensor,
-        ))
+        )))
     };
     Ok(block.outputs.iter().map(output).collect())
 }
