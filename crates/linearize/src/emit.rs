@@ -23,6 +23,7 @@ struct Uniform {
 }
 
 /// Builds one program.
+#[derive(Default)]
 pub(crate) struct Emitter {
     next: u64,
     operations: Vec<OperationIr>,
@@ -36,10 +37,7 @@ impl Emitter {
     pub(crate) fn new(first_id: u64) -> Self {
         Self {
             next: first_id,
-            operations: Vec::new(),
-            seen: HashMap::new(),
-            producer: HashMap::new(),
-            uniform: HashMap::new(),
+            ..Self::default()
         }
     }
 
@@ -97,10 +95,7 @@ impl Emitter {
 
     /// [`emit`](Self::emit) for operations with one output.
     pub(crate) fn emit_one(&mut self, operation: OperationIr) -> TensorIr {
-        self.emit(operation)
-            .into_iter()
-            .next()
-            .expect("an operation built here has an output")
+        self.emit(operation).swap_remove(0)
     }
 
     /// Emit a captured operation through the simplifying constructors.

@@ -376,10 +376,9 @@ impl Builder {
 
 /// Forgets the identifiers of the outputs: a rule may describe them by those of another operation, which is perhaps an input
 /// of this one.
-fn release_outputs(operation: &mut CustomOpIr) {
-    for (position, out) in operation.outputs.iter_mut().enumerate() {
-        out.id = TensorId::new(u64::MAX - position as u64);
-    }
+fn released(mut operation: CustomOpIr) -> OperationIr {
+    operation.outputs = operation.outputs.iter().map(like).collect();
+    OperationIr::Custom(operation)
 }
 
 /// For rules of custom operations. Tangents are handles to unevaluated expressions: pass them
@@ -391,9 +390,8 @@ impl Builder {
     ///
     /// # Panics
     /// If the operation has no outputs.
-    pub fn primal(&mut self, mut operation: CustomOpIr) -> TensorIr {
-        release_outputs(&mut operation);
-        self.primal.emit_one(OperationIr::Custom(operation))
+    pub fn primal(&mut self, operation: CustomOpIr) -> TensorIr {
+        self.primal.emit_one(released(operation))
     }
 
     /// Add an operation to the tangent program and return its first output. The operation must be
@@ -401,9 +399,8 @@ impl Builder {
     ///
     /// # Panics
     /// If the operation has no outputs.
-    pub fn tangent(&mut self, mut operation: CustomOpIr) -> TensorIr {
-        release_outputs(&mut operation);
-        let mut operation = OperationIr::Custom(operation);
+    pub fn tangent(&mut self, operation: CustomOpIr) -> TensorIr {
+        let mut operation = released(operation);
         let mut values = HashMap::new();
         for input in operation.inputs() {
             if let Some(e) = self.expressions.get(&input.id).cloned() {
