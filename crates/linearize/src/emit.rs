@@ -169,13 +169,8 @@ impl Emitter {
 
     /// The value of a tensor that is the same known number everywhere.
     pub(crate) fn constant(&self, t: &TensorIr) -> Option<f64> {
-        match self.uniform.get(&t.id) {
-            Some(Uniform {
-                factor,
-                scalar: None,
-            }) => Some(*factor),
-            _ => None,
-        }
+        let uniform = self.uniform.get(&t.id)?;
+        uniform.scalar.is_none().then_some(uniform.factor)
     }
 
     /// A tensor with one element that broadcasts to `t`, if `t` is uniform; otherwise `t`.
@@ -367,7 +362,7 @@ impl Emitter {
             return if is(value, 1.0) {
                 a.clone()
             } else {
-                self.scalar(a, value, Num::DivScalar)
+                self.scalar(a, ScalarIr::Float(value), Num::DivScalar)
             };
         }
         self.binary(a, b, shape, Num::Div)
@@ -392,11 +387,10 @@ impl Emitter {
             let single = self.single(&uniform, t.shape.num_dims(), t.dtype);
             return self.expand(&single, t.shape.clone());
         }
+        if let Some(negated) = self.negated(t) {
+            return self.scale(&negated, -factor);
+        }
         match self.definition(t) {
-            Some(OperationIr::NumericFloat(_, Num::Neg(inner))) => {
-                let input = inner.input.clone();
-                self.scale(&input, -factor)
-            }
             Some(OperationIr::NumericFloat(_, Num::MulScalar(inner))) if !is(factor, -1.0) => {
                 let (input, inner) = (inner.lhs.clone(), inner.rhs.elem::<f64>());
                 self.scale(&input, factor * inner)
@@ -416,7 +410,7 @@ impl Emitter {
             // Negatives of what is there vanish in differences.
             _ => match self.find_multiple(t, -factor) {
                 Some(opposite) => self.neg(&opposite),
-                None => self.scalar(t, factor, Num::MulScalar),
+                None => self.scalar(t, ScalarIr::Float(factor), Num::MulScalar),
             },
         }
     }
@@ -433,7 +427,7 @@ impl Emitter {
             let (input, inner) = (inner.lhs.clone(), inner.rhs.elem::<f64>());
             return self.shift(&input, inner + value);
         }
-        self.scalar(t, value, Num::AddScalar)
+        self.scalar(t, ScalarIr::Float(value), Num::AddScalar)
     }
 
     /// Integer power; small ones become products.
@@ -448,10 +442,7 @@ impl Emitter {
                 self.mul(&square, rest)
             }
             -1 => self.unary(t, Float::Recip),
-            _ => self.emit_one(OperationIr::NumericFloat(
-                t.dtype,
-                Num::PowiScalar(by_number(t, ScalarIr::Int(exponent))),
-            )),
+            _ => self.scalar(t, ScalarIr::Int(exponent), Num::PowiScalar),
         }
     }
 
@@ -473,8 +464,13 @@ impl Emitter {
         self.emit_one(OperationIr::NumericFloat(t.dtype, variant(of_one(t))))
     }
 
-    fn scalar(&mut self, t: &TensorIr, value: f64, variant: fn(ScalarOpIr) -> Num) -> TensorIr {
-        let operation = variant(by_number(t, ScalarIr::Float(value)));
+    fn scalar(
+        &mut self,
+        t: &TensorIr,
+        number: ScalarIr,
+        variant: fn(ScalarOpIr) -> Num,
+    ) -> TensorIr {
+        let operation = variant(by_number(t, number));
         self.emit_one(OperationIr::NumericFloat(t.dtype, operation))
     }
 

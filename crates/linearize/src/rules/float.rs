@@ -91,38 +91,24 @@ fn slope(primal: &mut Emitter, op: &Float, x: &TensorIr, y: &TensorIr) -> Option
             let sin = primal.unary(x, Float::Sin);
             primal.neg(&sin)
         }
-        Float::Tan(_) => one_plus_square(primal, y, 1.0),
+        Float::Tan(_) => power_of_one_plus_square(primal, y, 1.0, 1.0),
         Float::Sinh(_) => primal.unary(x, Float::Cosh),
         Float::Cosh(_) => primal.unary(x, Float::Sinh),
-        Float::Tanh(_) => one_plus_square(primal, y, -1.0),
-        // (1 − x²)^(−1/2)
-        Float::ArcSin(_) => {
-            let rest = one_plus_square(primal, x, -1.0);
-            primal.powf(&rest, -0.5)
-        }
+        Float::Tanh(_) => power_of_one_plus_square(primal, y, -1.0, 1.0),
+        Float::ArcSin(_) => power_of_one_plus_square(primal, x, -1.0, -0.5),
         Float::ArcCos(_) => {
-            let rest = one_plus_square(primal, x, -1.0);
-            let root = primal.powf(&rest, -0.5);
-            primal.neg(&root)
+            let of_sine = power_of_one_plus_square(primal, x, -1.0, -0.5);
+            primal.neg(&of_sine)
         }
-        Float::ArcSinh(_) => {
-            let rest = one_plus_square(primal, x, 1.0);
-            primal.powf(&rest, -0.5)
-        }
+        Float::ArcSinh(_) => power_of_one_plus_square(primal, x, 1.0, -0.5),
         // (x² − 1)^(−1/2)
         Float::ArcCosh(_) => {
             let square = primal.mul(x, x);
             let rest = primal.shift(&square, -1.0);
             primal.powf(&rest, -0.5)
         }
-        Float::ArcTan(_) => {
-            let rest = one_plus_square(primal, x, 1.0);
-            primal.powi(&rest, -1)
-        }
-        Float::ArcTanh(_) => {
-            let rest = one_plus_square(primal, x, -1.0);
-            primal.powi(&rest, -1)
-        }
+        Float::ArcTan(_) => power_of_one_plus_square(primal, x, 1.0, -1.0),
+        Float::ArcTanh(_) => power_of_one_plus_square(primal, x, -1.0, -1.0),
         // −y²
         Float::Recip(_) => {
             let square = primal.mul(y, y);
@@ -132,9 +118,10 @@ fn slope(primal: &mut Emitter, op: &Float, x: &TensorIr, y: &TensorIr) -> Option
     })
 }
 
-/// `1 + sign t²`
-fn one_plus_square(primal: &mut Emitter, t: &TensorIr, sign: f64) -> TensorIr {
+/// `(1 + sign t²)^power`
+fn power_of_one_plus_square(primal: &mut Emitter, t: &TensorIr, sign: f64, power: f64) -> TensorIr {
     let square = primal.mul(t, t);
     let signed = primal.scale(&square, sign);
-    primal.shift(&signed, 1.0)
+    let sum = primal.shift(&signed, 1.0);
+    primal.powf(&sum, power)
 }
