@@ -132,7 +132,7 @@ fn simplify(graph: &Graph) -> Graph {
     let mut emitter = Emitter::new(0);
     let mut map: HashMap<TensorId, TensorIr> = HashMap::new();
     let sources = graph.sources.renamed(&mut emitter, &mut map);
-    let ends = |graph: &Graph| [&graph.outputs[..], &[graph.value.clone()]].concat();
+    let ends = |graph: &Graph| [&graph.outputs[..], std::slice::from_ref(&graph.value)].concat();
     for operation in live(&graph.operations, &ends(graph)) {
         replay(&mut map, &operation, |operation| {
             precision::simplify(&mut emitter, operation)
