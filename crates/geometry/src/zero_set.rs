@@ -64,7 +64,7 @@ impl ZeroSet {
         let samples = layer.map(|place| {
             let distance = layer.near(place)?;
             (distance.abs() < CURVATURE_REACH * spacing)
-                .then(|| sample(&layer, &normals, place, distance))
+                .then(|| sample(&layer, normals, place, distance))
         });
         let mut sums = Sums::default();
         for sample in samples.iter().flatten() {

@@ -23,6 +23,7 @@ struct Uniform {
 }
 
 /// Builds one program.
+#[derive(Default)]
 pub(crate) struct Emitter {
     next: u64,
     operations: Vec<OperationIr>,
@@ -36,10 +37,7 @@ impl Emitter {
     pub(crate) fn new(first_id: u64) -> Self {
         Self {
             next: first_id,
-            operations: Vec::new(),
-            seen: HashMap::new(),
-            producer: HashMap::new(),
-            uniform: HashMap::new(),
+            ..Self::default()
         }
     }
 
@@ -97,52 +95,38 @@ impl Emitter {
 
     /// [`emit`](Self::emit) for operations with one output.
     pub(crate) fn emit_one(&mut self, operation: OperationIr) -> TensorIr {
-        self.emit(operation)
-            .into_iter()
-            .next()
-            .expect("an operation built here has an output")
+        self.emit(operation).swap_remove(0)
     }
 
     /// Emit a captured operation through the simplifying constructors.
     pub(crate) fn simplify(&mut self, operation: OperationIr) -> Vec<TensorIr> {
         let one = match &operation {
             OperationIr::NumericFloat(_, op) => match op {
-                Num::Add(b) => Some(self.add(&b.lhs, &b.rhs)),
-                Num::Sub(b) => Some(self.sub(&b.lhs, &b.rhs)),
-                Num::Mul(b) => Some(self.mul(&b.lhs, &b.rhs)),
-                Num::Div(b) => Some(self.div(&b.lhs, &b.rhs)),
-                Num::Neg(u) => Some(self.neg(&u.input)),
-                Num::MulScalar(s) => Some(self.scale(&s.lhs, s.rhs.elem())),
-                Num::AddScalar(s) => Some(self.shift(&s.lhs, s.rhs.elem())),
-                Num::SubScalar(s) => Some(self.shift(&s.lhs, -s.rhs.elem::<f64>())),
+                Num::Add(b) => self.add(&b.lhs, &b.rhs),
+                Num::Sub(b) => self.sub(&b.lhs, &b.rhs),
+                Num::Mul(b) => self.mul(&b.lhs, &b.rhs),
+                Num::Div(b) => self.div(&b.lhs, &b.rhs),
+                Num::Neg(u) => self.neg(&u.input),
+                Num::MulScalar(s) => self.scale(&s.lhs, s.rhs.elem()),
+                Num::AddScalar(s) => self.shift(&s.lhs, s.rhs.elem()),
+                Num::SubScalar(s) => self.shift(&s.lhs, -s.rhs.elem::<f64>()),
                 Num::DivScalar(s) if self.constant(&s.lhs).is_some() => {
-                    Some(self.scale(&s.lhs, 1.0 / s.rhs.elem::<f64>()))
+                    self.scale(&s.lhs, 1.0 / s.rhs.elem::<f64>())
                 }
-                Num::PowiScalar(s) => Some(self.powi(&s.lhs, s.rhs.elem())),
-                Num::Full(full) => {
-                    Some(self.full(full.out.shape.clone(), full.out.dtype, full.value.elem()))
-                }
-                Num::SumDim(r) | Num::MeanDim(r) if r.input.shape[r.axis] == 1 => {
-                    Some(r.input.clone())
-                }
-                _ => None,
+                Num::PowiScalar(s) => self.powi(&s.lhs, s.rhs.elem()),
+                Num::Full(f) => self.full(f.out.shape.clone(), f.out.dtype, f.value.elem()),
+                Num::SumDim(r) | Num::MeanDim(r) if r.input.shape[r.axis] == 1 => r.input.clone(),
+                _ => return self.emit(operation),
             },
-            OperationIr::Float(_, Float::PowfScalar(s)) => Some(self.powf(&s.lhs, s.rhs.elem())),
-            OperationIr::BaseFloat(Base::Reshape(r)) => {
-                Some(self.reshape(&r.input, r.out.shape.clone()))
-            }
-            OperationIr::BaseFloat(Base::Expand(e)) => {
-                Some(self.expand(&e.input, e.out.shape.clone()))
-            }
+            OperationIr::Float(_, Float::PowfScalar(s)) => self.powf(&s.lhs, s.rhs.elem()),
+            OperationIr::BaseFloat(Base::Reshape(r)) => self.reshape(&r.input, r.out.shape.clone()),
+            OperationIr::BaseFloat(Base::Expand(e)) => self.expand(&e.input, e.out.shape.clone()),
             OperationIr::BaseFloat(Base::Cast(c)) if c.input.dtype == c.out.dtype => {
-                Some(c.input.clone())
+                c.input.clone()
             }
-            _ => None,
+            _ => return self.emit(operation),
         };
-        match one {
-            Some(out) => vec![out],
-            None => self.emit(operation),
-        }
+        vec![one]
     }
 
     fn note_uniform(&mut self, operation: &OperationIr) {
@@ -185,13 +169,8 @@ impl Emitter {
 
     /// The value of a tensor that is the same known number everywhere.
     pub(crate) fn constant(&self, t: &TensorIr) -> Option<f64> {
-        match self.uniform.get(&t.id) {
-            Some(Uniform {
-                factor,
-                scalar: None,
-            }) => Some(*factor),
-            _ => None,
-        }
+        let uniform = self.uniform.get(&t.id)?;
+        uniform.scalar.is_none().then_some(uniform.factor)
     }
 
     /// A tensor with one element that broadcasts to `t`, if `t` is uniform; otherwise `t`.
@@ -383,7 +362,7 @@ impl Emitter {
             return if is(value, 1.0) {
                 a.clone()
             } else {
-                self.scalar(a, value, Num::DivScalar)
+                self.scalar(a, ScalarIr::Float(value), Num::DivScalar)
             };
         }
         self.binary(a, b, shape, Num::Div)
@@ -408,11 +387,10 @@ impl Emitter {
             let single = self.single(&uniform, t.shape.num_dims(), t.dtype);
             return self.expand(&single, t.shape.clone());
         }
+        if let Some(negated) = self.negated(t) {
+            return self.scale(&negated, -factor);
+        }
         match self.definition(t) {
-            Some(OperationIr::NumericFloat(_, Num::Neg(inner))) => {
-                let input = inner.input.clone();
-                self.scale(&input, -factor)
-            }
             Some(OperationIr::NumericFloat(_, Num::MulScalar(inner))) if !is(factor, -1.0) => {
                 let (input, inner) = (inner.lhs.clone(), inner.rhs.elem::<f64>());
                 self.scale(&input, factor * inner)
@@ -432,7 +410,7 @@ impl Emitter {
             // Negatives of what is there vanish in differences.
             _ => match self.find_multiple(t, -factor) {
                 Some(opposite) => self.neg(&opposite),
-                None => self.scalar(t, factor, Num::MulScalar),
+                None => self.scalar(t, ScalarIr::Float(factor), Num::MulScalar),
             },
         }
     }
@@ -449,7 +427,7 @@ impl Emitter {
             let (input, inner) = (inner.lhs.clone(), inner.rhs.elem::<f64>());
             return self.shift(&input, inner + value);
         }
-        self.scalar(t, value, Num::AddScalar)
+        self.scalar(t, ScalarIr::Float(value), Num::AddScalar)
     }
 
     /// Integer power; small ones become products.
@@ -464,10 +442,7 @@ impl Emitter {
                 self.mul(&square, rest)
             }
             -1 => self.unary(t, Float::Recip),
-            _ => self.emit_one(OperationIr::NumericFloat(
-                t.dtype,
-                Num::PowiScalar(by_number(t, ScalarIr::Int(exponent))),
-            )),
+            _ => self.scalar(t, ScalarIr::Int(exponent), Num::PowiScalar),
         }
     }
 
@@ -489,8 +464,13 @@ impl Emitter {
         self.emit_one(OperationIr::NumericFloat(t.dtype, variant(of_one(t))))
     }
 
-    fn scalar(&mut self, t: &TensorIr, value: f64, variant: fn(ScalarOpIr) -> Num) -> TensorIr {
-        let operation = variant(by_number(t, ScalarIr::Float(value)));
+    fn scalar(
+        &mut self,
+        t: &TensorIr,
+        number: ScalarIr,
+        variant: fn(ScalarOpIr) -> Num,
+    ) -> TensorIr {
+        let operation = variant(by_number(t, number));
         self.emit_one(OperationIr::NumericFloat(t.dtype, operation))
     }
 

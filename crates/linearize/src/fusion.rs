@@ -8,8 +8,8 @@
 use std::collections::{HashMap, HashSet};
 
 use burn::backend::ir::{
-    BaseOperationIr as Base, BinaryOpIr, CustomOpIr, NumericOperationIr as Num, OperationIr,
-    ScalarIr, ScalarOpIr, TensorId, TensorIr,
+    BaseOperationIr as Base, CustomOpIr, NumericOperationIr as Num, OperationIr, ScalarIr,
+    ScalarOpIr, TensorId, TensorIr,
 };
 use burn::tensor::DType;
 
@@ -123,40 +123,30 @@ enum Action {
 impl<'a> Entrywise<'a> {
     fn of(operation: &'a OperationIr) -> Option<Self> {
         use Arithmetic::{Add, Div, Mul, Sub};
-        let binary = |arithmetic, op: &'a BinaryOpIr| {
-            let action = Action::Compute(arithmetic, None);
-            (action, vec![&op.lhs, &op.rhs], &op.out)
-        };
-        let number = |arithmetic, number: f64, op: &'a ScalarOpIr| {
-            let action = Action::Compute(arithmetic, Some(number));
-            (action, vec![&op.lhs], &op.out)
-        };
-        let (action, operands, result) = match operation {
+        let compute = |arithmetic| Action::Compute(arithmetic, None);
+        let by_number =
+            |arithmetic, op: &ScalarOpIr| Action::Compute(arithmetic, Some(op.rhs.elem()));
+        let action = match operation {
             OperationIr::NumericFloat(_, operation) => match operation {
-                Num::Add(op) => binary(Add, op),
-                Num::Sub(op) => binary(Sub, op),
-                Num::Mul(op) => binary(Mul, op),
-                Num::Div(op) => binary(Div, op),
-                Num::AddScalar(op) => number(Add, op.rhs.elem(), op),
-                Num::SubScalar(op) => number(Sub, op.rhs.elem(), op),
-                Num::MulScalar(op) => number(Mul, op.rhs.elem(), op),
-                Num::DivScalar(op) => number(Div, op.rhs.elem(), op),
-                Num::Neg(op) => {
-                    let negate = Action::Compute(Mul, Some(-1.0));
-                    (negate, vec![&op.input], &op.out)
-                }
-                Num::Sum(op) => (Action::End(Output::Sum), vec![&op.input], &op.out),
+                Num::Add(_) => compute(Add),
+                Num::Sub(_) => compute(Sub),
+                Num::Mul(_) => compute(Mul),
+                Num::Div(_) => compute(Div),
+                Num::AddScalar(op) => by_number(Add, op),
+                Num::SubScalar(op) => by_number(Sub, op),
+                Num::MulScalar(op) => by_number(Mul, op),
+                Num::DivScalar(op) => by_number(Div, op),
+                Num::Neg(_) => Action::Compute(Mul, Some(-1.0)),
+                Num::Sum(_) => Action::End(Output::Sum),
                 _ => return None,
             },
-            OperationIr::BaseFloat(Base::Cast(op)) => {
-                (Action::End(Output::Values), vec![&op.input], &op.out)
-            }
+            OperationIr::BaseFloat(Base::Cast(_)) => Action::End(Output::Values),
             _ => return None,
         };
         let found = Self {
             action,
-            operands,
-            result,
+            operands: operation.inputs().collect(),
+            result: operation.outputs().next()?,
         };
         found.fits().then_some(found)
     }
@@ -321,7 +311,7 @@ impl Classes {
 mod tests {
     use super::*;
     use crate::ir::{name, output, read_only, tensor};
-    use burn::backend::ir::{ReduceOpIr, UnaryOpIr};
+    use burn::backend::ir::{BinaryOpIr, ReduceOpIr, UnaryOpIr};
     use burn::tensor::Shape;
 
     fn t(id: u64) -> TensorIr {

@@ -31,34 +31,25 @@ pub(crate) fn restore_reciprocals(operations: &mut [OperationIr]) {
     }
 }
 
-/// [`Emitter::simplify`], with activations that lose digits lowered.
+/// [`Emitter::simplify`], with activations that lose digits lowered: some backends compute sigmoids in single precision, and the
+/// derivative of `gelu` from another function that is only close to it. Elementary functions are exact.
 pub(crate) fn simplify(emitter: &mut Emitter, operation: OperationIr) -> Vec<TensorIr> {
-    if let OperationIr::Activation(activation) = &operation
-        && let Some(output) = lower(emitter, activation)
-    {
-        return vec![output];
-    }
-    emitter.simplify(operation)
-}
-
-/// Some backends compute sigmoids in single precision, and the derivative of `gelu` from another
-/// function that is only close to it. Write both in elementary functions, which are exact.
-fn lower(emitter: &mut Emitter, operation: &Act) -> Option<TensorIr> {
-    match operation {
-        Act::Sigmoid(u) => {
+    let lowered = match &operation {
+        OperationIr::Activation(Act::Sigmoid(u)) => {
             let negated = emitter.neg(&u.input);
-            Some(sigmoid_of_negative(emitter, &negated))
+            sigmoid_of_negative(emitter, &negated)
         }
-        Act::SigmoidBackward(b) => {
+        OperationIr::Activation(Act::SigmoidBackward(b)) => {
             let slope = sigmoid_slope(emitter, &b.lhs);
-            Some(emitter.mul(&slope, &b.rhs))
+            emitter.mul(&slope, &b.rhs)
         }
-        Act::GeluBackward(b) => {
+        OperationIr::Activation(Act::GeluBackward(b)) => {
             let slope = gelu_slope(emitter, &b.lhs);
-            Some(emitter.mul(&slope, &b.rhs))
+            emitter.mul(&slope, &b.rhs)
         }
-        _ => None,
-    }
+        _ => return emitter.simplify(operation),
+    };
+    vec![lowered]
 }
 
 /// `σ(−x) = 1/(1 + eˣ)`

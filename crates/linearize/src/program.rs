@@ -132,26 +132,20 @@ fn simplify(graph: &Graph) -> Graph {
     let mut emitter = Emitter::new(0);
     let mut map: HashMap<TensorId, TensorIr> = HashMap::new();
     let sources = graph.sources.renamed(&mut emitter, &mut map);
-    for operation in live(
-        &graph.operations,
-        graph.outputs.iter().chain([&graph.value]),
-    ) {
-        replay(&mut map, operation, |operation| {
+    let ends = |graph: &Graph| [&graph.outputs[..], std::slice::from_ref(&graph.value)].concat();
+    for operation in live(&graph.operations, &ends(graph)) {
+        replay(&mut map, &operation, |operation| {
             precision::simplify(&mut emitter, operation)
         });
     }
-    let value = map[&graph.value.id].clone();
-    let outputs: Vec<TensorIr> = graph.outputs.iter().map(|t| map[&t.id].clone()).collect();
-    let operations = emitter.into_operations();
-    let operations = live(&operations, outputs.iter().chain([&value]))
-        .cloned()
-        .collect();
-    Graph {
-        operations,
+    let mut simplified = Graph {
+        operations: emitter.into_operations(),
         sources,
-        value,
-        outputs,
-    }
+        value: map[&graph.value.id].clone(),
+        outputs: graph.outputs.iter().map(|t| map[&t.id].clone()).collect(),
+    };
+    simplified.operations = live(&simplified.operations, &ends(&simplified));
+    simplified
 }
 
 /// Emit `operation` with its inputs renamed, and note what its outputs are called now: the operation in the new names.
@@ -173,22 +167,20 @@ fn replay(
 }
 
 /// Dead-code elimination: the operations that `outputs` depend on, in order.
-fn live<'a, 'b>(
-    operations: &'a [OperationIr],
-    outputs: impl Iterator<Item = &'b TensorIr>,
-) -> impl Iterator<Item = &'a OperationIr> {
+fn live<'a>(
+    operations: &[OperationIr],
+    outputs: impl IntoIterator<Item = &'a TensorIr>,
+) -> Vec<OperationIr> {
     let mut needed = ids(outputs);
-    let mut keep = vec![false; operations.len()];
-    for (operation, keep) in operations.iter().zip(&mut keep).rev() {
+    let mut kept = Vec::new();
+    for operation in operations.iter().rev() {
         if operation.outputs().any(|out| needed.contains(&out.id)) {
             needed.extend(operation.inputs().map(|t| t.id));
-            *keep = true;
+            kept.push(operation.clone());
         }
     }
-    operations
-        .iter()
-        .zip(keep)
-        .filter_map(|(operation, keep)| keep.then_some(operation))
+    kept.reverse();
+    kept
 }
 
 impl Graph {
@@ -213,28 +205,20 @@ impl Graph {
         };
         let mut map: HashMap<TensorId, TensorIr> = HashMap::new();
         let sources = (simplified.sources).renamed(&mut cx.build.primal, &mut map);
-        let directions: Vec<TensorIr> = (sources.variables.iter())
-            .map(|variable| {
-                let seed = cx
-                    .build
-                    .tangent
-                    .fresh(variable.shape.clone(), variable.dtype);
-                cx.tangents
-                    .insert(variable.id, Expression::atom(seed.clone()));
-                seed
-            })
-            .collect();
+        let mut directions = Vec::new();
+        for variable in &sources.variables {
+            let seed = (cx.build.tangent).fresh(variable.shape.clone(), variable.dtype);
+            directions.push(seed.clone());
+            cx.tangents.insert(variable.id, Expression::atom(seed));
+        }
 
         // Only what the outputs depend on needs a tangent; the value alone does not.
         let mut differentiated: HashSet<TensorId> = HashSet::new();
         let mut uses: HashMap<TensorId, usize> = HashMap::new();
-        for operation in live(&simplified.operations, simplified.outputs.iter()) {
-            differentiated.extend(operation.outputs().map(|t| t.id));
-            for t in operation.inputs() {
-                *uses.entry(t.id).or_insert(0) += 1;
-            }
-        }
-        for t in &simplified.outputs {
+        let active = live(&simplified.operations, &simplified.outputs);
+        differentiated.extend(outputs_of(&active));
+        let read = active.iter().flat_map(OperationIr::inputs);
+        for t in read.chain(&simplified.outputs) {
             *uses.entry(t.id).or_insert(0) += 1;
         }
         for operation in &simplified.operations {
@@ -255,35 +239,24 @@ impl Graph {
             }
         }
 
-        let value = map[&simplified.value.id].clone();
         let outputs: Vec<TensorIr> = (simplified.outputs.iter())
             .map(|t| map[&t.id].clone())
             .collect();
-        let tangents: Vec<TensorIr> = outputs
-            .iter()
+        let tangents = (outputs.iter())
             .map(|out| {
                 let tangent = cx.tangents.get(&out.id).cloned();
                 cx.build.or_zeros(tangent, &out.shape, out.dtype)
             })
             .collect();
-        let ends = Ends {
+        let primal = Graph {
+            operations: cx.build.primal.into_operations(),
             sources,
-            directions,
-            value,
+            value: map[&simplified.value.id].clone(),
             outputs,
-            tangents,
         };
-        Ok(assemble(cx.build, ends, products))
+        let tangent = cx.build.tangent.into_operations();
+        Ok(assemble(primal, &tangent, directions, tangents, products))
     }
-}
-
-/// Inputs and outputs of all programs.
-struct Ends {
-    sources: Sources,
-    directions: Vec<TensorIr>,
-    value: TensorIr,
-    outputs: Vec<TensorIr>,
-    tangents: Vec<TensorIr>,
 }
 
 fn outputs_of(operations: &[OperationIr]) -> impl Iterator<Item = TensorId> {
@@ -294,20 +267,20 @@ fn ids<'a>(tensors: impl IntoIterator<Item = &'a TensorIr>) -> HashSet<TensorId>
     tensors.into_iter().map(|t| t.id).collect()
 }
 
-fn assemble(build: Builder, mut ends: Ends, products: Option<DType>) -> Program {
-    let mut tangent: Vec<OperationIr> =
-        live(&build.tangent.into_operations(), ends.tangents.iter())
-            .cloned()
-            .collect();
-    let all = build.primal.into_operations();
+/// The programs that compute a graph and, from `directions`, its `tangents`.
+fn assemble(
+    graph: Graph,
+    tangent: &[OperationIr],
+    mut directions: Vec<TensorIr>,
+    mut tangents: Vec<TensorIr>,
+    products: Option<DType>,
+) -> Program {
+    let mut tangent = live(tangent, &tangents);
 
     // What depends on inputs, and what does not.
-    let inputs: Vec<TensorIr> = (ends.sources.variables.iter())
-        .chain(&ends.sources.parameters)
-        .cloned()
-        .collect();
+    let inputs = [&graph.sources.variables[..], &graph.sources.parameters].concat();
     let mut varying = ids(&inputs);
-    for operation in &all {
+    for operation in &graph.operations {
         if operation.inputs().any(|t| varying.contains(&t.id)) {
             varying.extend(operation.outputs().map(|t| t.id));
         }
@@ -315,15 +288,14 @@ fn assemble(build: Builder, mut ends: Ends, products: Option<DType>) -> Program 
     let varies = |operation: &OperationIr| operation.outputs().any(|t| varying.contains(&t.id));
     // Filling memory with a number is as cheap as reading it: do that where it is needed. Whatever
     // else is constant is computed once.
-    let local: Vec<OperationIr> = all
-        .iter()
+    let local: Vec<OperationIr> = (graph.operations.iter())
         .filter(|operation| varies(operation) || is_fill(operation))
         .cloned()
         .collect();
     let mut produced_locally = ids(&inputs);
     produced_locally.extend(outputs_of(&local));
 
-    let mut in_tangent = ids(&ends.directions);
+    let mut in_tangent = ids(&directions);
     in_tangent.extend(outputs_of(&tangent));
     let mut saved: Vec<TensorIr> = Vec::new();
     let mut constants_of_tangent: Vec<TensorIr> = Vec::new();
@@ -340,22 +312,19 @@ fn assemble(build: Builder, mut ends: Ends, products: Option<DType>) -> Program 
         }
     }
 
-    let value = std::slice::from_ref(&ends.value);
-    let needed = ends.outputs.iter().chain(value).chain(&saved);
-    let mut primal: Vec<OperationIr> = live(&local, needed).cloned().collect();
-    let value_operations: Vec<OperationIr> = live(&local, value.iter()).cloned().collect();
+    let value = std::slice::from_ref(&graph.value);
+    let outputs = [value, &graph.outputs].concat();
+    let mut primal = live(&local, outputs.iter().chain(&saved));
+    let value_operations = live(&local, value);
     let mut from_constants: Vec<TensorIr> = (primal.iter().chain(&value_operations))
         .flat_map(OperationIr::inputs)
-        .chain(&ends.outputs)
-        .chain(value)
+        .chain(&outputs)
         .filter(|t| !produced_locally.contains(&t.id))
         .cloned()
         .collect();
-    let mut constant: Vec<OperationIr> =
-        live(&all, from_constants.iter().chain(&constants_of_tangent))
-            .filter(|operation| !varies(operation))
-            .cloned()
-            .collect();
+    let needed = from_constants.iter().chain(&constants_of_tangent);
+    let mut constant = live(&graph.operations, needed);
+    constant.retain(|operation| !varies(operation));
     if let Some(dtype) = products {
         let mut conversion = Conversion::to(dtype);
         primal.extend(conversion.cast(&mut saved));
@@ -363,30 +332,25 @@ fn assemble(build: Builder, mut ends: Ends, products: Option<DType>) -> Program 
         for operation in &mut tangent {
             conversion.rewrite(operation);
         }
-        for t in ends.directions.iter_mut().chain(&mut ends.tangents) {
+        for t in directions.iter_mut().chain(&mut tangents) {
             conversion.convert(t);
         }
     }
     from_constants.extend(constants_of_tangent);
 
-    let primal_outputs: Vec<TensorIr> = value.iter().chain(&ends.outputs).cloned().collect();
-    let (keep, kept_constants) = (ids(&saved), ids(&from_constants));
+    let (nothing, keep, kept_constants) = (HashSet::new(), ids(&saved), ids(&from_constants));
+    let block = Block::new(&inputs, value_operations, value, &nothing);
     Program {
-        value: separate(Block::new(
-            &inputs,
-            value_operations,
-            value,
-            &HashSet::new(),
-        )),
-        primal: Block::new(&inputs, primal, &primal_outputs, &keep),
-        tangent: Block::new(&ends.directions, tangent, &ends.tangents, &HashSet::new()),
+        value: separate(block, &kept_constants),
+        primal: Block::new(&inputs, primal, &outputs, &keep),
+        tangent: Block::new(&directions, tangent, &tangents, &nothing),
         constant: Block::new(&[], constant, &[], &kept_constants).operations,
         saved: saved
             .iter()
             .map(|t| with_status(t, TensorStatus::ReadWrite))
             .collect(),
-        sources: ends.sources,
-        directions: ends.directions,
+        sources: graph.sources,
+        directions,
     }
 }
 
@@ -446,37 +410,28 @@ impl Block {
         for mut operation in operations.into_iter().rev() {
             let results: Vec<TensorIr> = operation.outputs().cloned().collect();
             let arguments: Vec<TensorIr> = operation.inputs().cloned().collect();
+            let ends = |t: &TensorIr| owned.contains(&t.id) && !used.contains(&t.id);
+            let is_single = |t: &TensorIr| arguments.iter().filter(|a| a.id == t.id).count() == 1;
             // Results that nobody reads, and repeated arguments, which cannot be given away by one
             // of their occurrences, are dropped after the operation.
-            let mut drops: Vec<TensorIr> = (results.iter())
-                .filter(|t| owned.contains(&t.id) && !used.contains(&t.id))
-                .cloned()
-                .collect();
-            let mut last: HashSet<TensorId> = HashSet::new();
-            for t in &arguments {
-                let times = arguments.iter().filter(|other| other.id == t.id).count();
-                if !owned.contains(&t.id) || used.contains(&t.id) {
-                    continue;
-                }
-                if times == 1 {
-                    last.insert(t.id);
-                } else if !drops.iter().any(|drop| drop.id == t.id) {
-                    drops.push(t.clone());
+            let mut dropped: Vec<TensorIr> = Vec::new();
+            for t in results.iter().chain(&arguments) {
+                let known = dropped.iter().any(|drop| drop.id == t.id);
+                if ends(t) && !is_single(t) && !known {
+                    dropped.push(with_status(t, TensorStatus::ReadWrite));
                 }
             }
-            used.extend(arguments.iter().map(|t| t.id));
             each_tensor(&mut operation, |t| {
                 t.status = if results.iter().any(|out| out.id == t.id) {
                     TensorStatus::NotInit
-                } else if last.contains(&t.id) {
+                } else if ends(t) && is_single(t) {
                     TensorStatus::ReadWrite
                 } else {
                     TensorStatus::ReadOnly
                 };
             });
-            reversed.extend(
-                (drops.iter()).map(|t| OperationIr::Drop(with_status(t, TensorStatus::ReadWrite))),
-            );
+            used.extend(arguments.iter().map(|t| t.id));
+            reversed.extend(dropped.into_iter().map(OperationIr::Drop));
             reversed.push(operation);
         }
         reversed.reverse();
@@ -500,27 +455,21 @@ impl Block {
     }
 }
 
-/// Rename everything that the value program owns, so that running it between `at` and `apply`
-/// leaves the point alone.
-fn separate(mut block: Block) -> Block {
+/// Rename everything that the value program owns, which is all but the constants, so that running it
+/// between `at` and `apply` leaves the point alone.
+fn separate(mut block: Block, constants: &HashSet<TensorId>) -> Block {
     const OFFSET: u64 = 1 << 24;
-    let mut own: HashSet<TensorId> = block.inputs.iter().flatten().copied().collect();
-    own.extend(outputs_of(&block.operations));
-    let shift = |id: TensorId| {
-        if own.contains(&id) {
-            TensorId::new(id.value() + OFFSET)
-        } else {
-            id
+    let shift = |id: &mut TensorId| {
+        if !constants.contains(id) {
+            *id = TensorId::new(id.value() + OFFSET);
         }
     };
-    for id in block.inputs.iter_mut().flatten() {
-        *id = shift(*id);
-    }
+    block.inputs.iter_mut().flatten().for_each(shift);
     for operation in &mut block.operations {
-        each_tensor(operation, |t| t.id = shift(t.id));
+        each_tensor(operation, |t| shift(&mut t.id));
     }
     for out in &mut block.outputs {
-        out.id = shift(out.id);
+        shift(&mut out.id);
     }
     block
 }
@@ -561,8 +510,7 @@ mod tests {
     #[test]
     fn dead_code_is_eliminated() {
         let operations = [abs(0, 1), abs(1, 2), mul(0, 1, 3), abs(3, 4)];
-        let kept: Vec<_> = live(&operations, [t(3)].iter()).cloned().collect();
-        assert_eq!(kept, [abs(0, 1), mul(0, 1, 3)]);
+        assert_eq!(live(&operations, &[t(3)]), [abs(0, 1), mul(0, 1, 3)]);
     }
 
     #[test]
@@ -603,7 +551,7 @@ mod tests {
         let spread = emitter.mul(&ones, &one_by_one);
         let product = emitter.mul(&x, &spread);
         let operations = emitter.into_operations();
-        let names: Vec<_> = live(&operations, [product].iter()).map(name).collect();
+        let names: Vec<_> = live(&operations, &[product]).iter().map(name).collect();
         assert_eq!(names, ["Reshape", "Mul"]);
     }
 

@@ -26,9 +26,15 @@ pub struct Evaluation {
 /// It can move between threads, and several can run at once.
 pub struct Linearization {
     program: Program,
-    interpreter: Box<dyn Interpreter>,
+    run: Box<Run>,
     evaluated: bool,
 }
+
+/// Runs a block on its inputs, and takes its outputs: Burn's interpreter on whichever backend.
+type Run = dyn FnMut(&Block, &[Named]) -> Result<Vec<Value>, Error> + Send;
+
+/// An input, and what it is called in messages.
+type Named<'a> = (&'static str, usize, &'a Value);
 
 impl Program {
     /// Load the programs onto a device.
@@ -65,9 +71,8 @@ impl Linearization {
     /// If the inputs do not have the number, shapes and element types they were traced with, or
     /// live on another backend.
     pub fn value(&mut self, variables: &[Value], parameters: &[Value]) -> Result<Value, Error> {
-        self.check_inputs(variables, parameters)?;
-        let mut inputs = named("variable", variables).chain(named("parameter", parameters));
-        let mut outputs = self.interpreter.run(&self.program.value, &mut inputs)?;
+        let point = self.point(variables, parameters)?;
+        let mut outputs = (self.run)(&self.program.value, &point)?;
         outputs.pop().ok_or(Error::NoOutputs)
     }
 
@@ -78,11 +83,9 @@ impl Linearization {
     /// If the inputs do not have the number, shapes and element types they were traced with, or
     /// live on another backend.
     pub fn at(&mut self, variables: &[Value], parameters: &[Value]) -> Result<Evaluation, Error> {
-        self.check_inputs(variables, parameters)?;
+        let point = self.point(variables, parameters)?;
         self.forget();
-        let mut inputs = named("variable", variables).chain(named("parameter", parameters));
-        let outputs = self.interpreter.run(&self.program.primal, &mut inputs)?;
-        let mut outputs = outputs.into_iter();
+        let mut outputs = (self.run)(&self.program.primal, &point)?.into_iter();
         self.evaluated = true;
         Ok(Evaluation {
             value: outputs.next().ok_or(Error::NoOutputs)?,
@@ -99,9 +102,8 @@ impl Linearization {
         if !self.evaluated {
             return Err(Error::NotEvaluated);
         }
-        check("direction", &self.program.directions, directions)?;
-        let mut inputs = named("direction", directions);
-        self.interpreter.run(&self.program.tangent, &mut inputs)
+        let directions = checked("direction", &self.program.directions, directions)?;
+        (self.run)(&self.program.tangent, &directions)
     }
 
     /// Free what [`at`](Self::at) keeps for [`apply`](Self::apply).
@@ -110,25 +112,33 @@ impl Linearization {
             return;
         }
         self.evaluated = false;
-        self.interpreter.free(&self.program.saved);
+        let saved = self.program.saved.iter().cloned();
+        let freeing = Block {
+            inputs: Vec::new(),
+            operations: saved.map(OperationIr::Drop).collect(),
+            outputs: Vec::new(),
+        };
+        (self.run)(&freeing, &[]).expect("it has no inputs");
     }
 
-    fn check_inputs(&self, variables: &[Value], parameters: &[Value]) -> Result<(), Error> {
+    fn point<'a>(
+        &self,
+        variables: &'a [Value],
+        parameters: &'a [Value],
+    ) -> Result<Vec<Named<'a>>, Error> {
         let sources = &self.program.sources;
-        check("variable", &sources.variables, variables)?;
-        check("parameter", &sources.parameters, parameters)
+        let mut inputs = checked("variable", &sources.variables, variables)?;
+        inputs.extend(checked("parameter", &sources.parameters, parameters)?);
+        Ok(inputs)
     }
 }
 
-/// What an input is called in messages.
-type Named<'a> = (&'static str, usize, &'a Value);
-
-fn named<'a>(role: &'static str, values: &'a [Value]) -> impl Iterator<Item = Named<'a>> {
-    let indexed = values.iter().enumerate();
-    indexed.map(move |(index, value)| (role, index, value))
-}
-
-fn check(role: &'static str, expected: &[TensorIr], found: &[Value]) -> Result<(), Error> {
+/// The values with their names, if they have the expected number, shapes and element types.
+fn checked<'a>(
+    role: &'static str,
+    expected: &[TensorIr],
+    found: &'a [Value],
+) -> Result<Vec<Named<'a>>, Error> {
     if expected.len() != found.len() {
         return Err(Error::Input {
             input: format!("{role}s"),
@@ -136,17 +146,20 @@ fn check(role: &'static str, expected: &[TensorIr], found: &[Value]) -> Result<(
             found: found.len().to_string(),
         });
     }
-    for (expected, (role, index, found)) in expected.iter().zip(named(role, found)) {
-        let (shape, dtype) = (found.0.shape(), found.dtype());
-        if (&expected.shape, expected.dtype) != (&shape, dtype) {
-            return Err(Error::Input {
+    let indexed = expected.iter().zip(found).enumerate();
+    indexed
+        .map(|(index, (expected, value))| {
+            let (shape, dtype) = (value.0.shape(), value.dtype());
+            if (&expected.shape, expected.dtype) == (&shape, dtype) {
+                return Ok((role, index, value));
+            }
+            Err(Error::Input {
                 input: format!("{role} {index}"),
                 expected: format!("{:?} of {:?}", expected.shape.to_vec(), expected.dtype),
                 found: format!("{:?} of {dtype:?}", shape.to_vec()),
-            });
-        }
-    }
-    Ok(())
+            })
+        })
+        .collect()
 }
 
 /// A program on a backend, with its constants in place.
@@ -182,62 +195,39 @@ where
     }
     Ok(Linearization {
         program,
-        interpreter: Box::new(it),
+        run: Box::new(move |block, inputs| run(&mut it, block, inputs)),
         evaluated: false,
     })
 }
 
-/// Burn's interpreter on whichever backend.
-trait Interpreter: Send {
-    /// Runs a block on its inputs, and takes its outputs.
-    fn run(
-        &mut self,
-        block: &Block,
-        inputs: &mut dyn Iterator<Item = Named<'_>>,
-    ) -> Result<Vec<Value>, Error>;
-
-    /// Frees tensors.
-    fn free(&mut self, tensors: &[TensorIr]);
-}
-
-impl<B: BackendIr> Interpreter for TensorInterpreter<B>
+fn run<B: BackendIr>(
+    it: &mut TensorInterpreter<B>,
+    block: &Block,
+    inputs: &[Named],
+) -> Result<Vec<Value>, Error>
 where
     DispatchTensor: DispatchKindConversion<B>,
 {
-    fn run(
-        &mut self,
-        block: &Block,
-        inputs: &mut dyn Iterator<Item = Named<'_>>,
-    ) -> Result<Vec<Value>, Error> {
-        for (id, (role, index, value)) in block.inputs.iter().zip(inputs) {
-            let Some(id) = id else { continue };
-            let primitive =
-                <DispatchTensor as DispatchKindConversion<B>>::try_into_backend(value.0.clone())
-                    .map_err(|_| Error::Input {
-                        input: format!("{role} {index}"),
-                        expected: "the program's backend".to_owned(),
-                        found: format!("{:?}", value.0.device()),
-                    })?;
-            self.register_tensor_to_device(*id, HandleKind::Float(primitive.float()));
-        }
-        for operation in &block.operations {
-            self.register_op(operation.clone());
-        }
-        let output = |out| {
-            let HandleKind::Float(tensor) = self.get_tensor(out) else {
-                unreachable!("outputs of traced functions are float tensors")
-            };
-            let tensor = BackendTensor::Float(tensor);
-            Value(<DispatchTensor as DispatchKindConversion<B>>::from_backend(
-                tensor,
-            ))
+    for (id, (role, index, value)) in block.inputs.iter().zip(inputs) {
+        let Some(id) = id else { continue };
+        let primitive: BackendTensor<B> = DispatchTensor::try_into_backend(value.0.clone())
+            .map_err(|_| Error::Input {
+                input: format!("{role} {index}"),
+                expected: "the program's backend".to_owned(),
+                found: format!("{:?}", value.0.device()),
+            })?;
+        it.register_tensor_to_device(*id, HandleKind::Float(primitive.float()));
+    }
+    for operation in &block.operations {
+        it.register_op(operation.clone());
+    }
+    let output = |out| {
+        let HandleKind::Float(tensor) = it.get_tensor(out) else {
+            unreachable!("outputs of traced functions are float tensors")
         };
-        Ok(block.outputs.iter().map(output).collect())
-    }
-
-    fn free(&mut self, tensors: &[TensorIr]) {
-        for t in tensors {
-            self.register_op(OperationIr::Drop(t.clone()));
-        }
-    }
+        Value(DispatchTensor::from_backend(BackendTensor::<B>::Float(
+            tensor,
+        )))
+    };
+    Ok(block.outputs.iter().map(output).collect())
 }

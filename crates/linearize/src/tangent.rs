@@ -27,6 +27,14 @@ struct Term {
 }
 
 impl Term {
+    fn plain(factor: f64, atom: TensorIr) -> Self {
+        Self {
+            factor,
+            coefficient: None,
+            atom,
+        }
+    }
+
     /// Whether multiplying by the coefficient costs a pass over data that the sum need not make.
     fn is_plain(&self) -> bool {
         self.coefficient
@@ -35,33 +43,27 @@ impl Term {
     }
 }
 
-/// Sum of terms, all of the same shape.
+/// Sum of terms, at least one, whose atoms have the same shape and type.
 #[derive(Clone, Debug)]
 pub(crate) struct Expression {
-    pub(crate) shape: Shape,
-    pub(crate) dtype: DType,
     terms: Vec<Term>,
 }
 
 impl Expression {
     pub(crate) fn atom(atom: TensorIr) -> Self {
-        Self {
-            shape: atom.shape.clone(),
-            dtype: atom.dtype,
-            terms: vec![Term {
-                factor: 1.0,
-                coefficient: None,
-                atom,
-            }],
-        }
+        Self::multiple(1.0, atom)
     }
 
     /// `factor` must not be zero: the zero tangent is `None`.
-    fn scale(mut self, factor: f64) -> Self {
-        for term in &mut self.terms {
-            term.factor *= factor;
+    fn multiple(factor: f64, atom: TensorIr) -> Self {
+        Self {
+            terms: vec![Term::plain(factor, atom)],
         }
-        self
+    }
+
+    /// Of the shape and the type of the sum.
+    fn first(&self) -> &TensorIr {
+        &self.terms[0].atom
     }
 
     /// Whether several uses had better share one evaluation than carry the terms on. Carrying on
@@ -94,7 +96,11 @@ impl Builder {
 
     /// `factor · e`
     pub(crate) fn scaled(e: Tangent, factor: f64) -> Tangent {
-        e.filter(|_| factor != 0.0).map(|e| e.scale(factor))
+        let mut e = e.filter(|_| factor != 0.0)?;
+        for term in &mut e.terms {
+            term.factor *= factor;
+        }
+        Some(e)
     }
 
     /// `p ⊙ e`, broadcast to `shape`.
@@ -109,16 +115,8 @@ impl Builder {
             // One product with the sum of the plain terms instead of one with each.
             let (plain, mut rest): (Vec<Term>, Vec<Term>) =
                 e.terms.into_iter().partition(Term::is_plain);
-            let (factor, atom) = self.evaluate(Expression {
-                shape: e.shape.clone(),
-                dtype: e.dtype,
-                terms: plain,
-            });
-            rest.push(Term {
-                factor,
-                coefficient: None,
-                atom,
-            });
+            let (factor, atom) = self.evaluate(Expression { terms: plain });
+            rest.push(Term::plain(factor, atom));
             e.terms = rest;
         }
         for term in &mut e.terms {
@@ -164,37 +162,29 @@ impl Builder {
             let factor = a.factor + b.factor;
             return (factor != 0.0).then(|| (factor, a.coefficient.clone()));
         }
-        let sum = match (&a.coefficient, &b.coefficient) {
-            (Some(p), Some(q)) if a.factor.abs().to_bits() == b.factor.abs().to_bits() => {
-                let sum = if a.factor.is_sign_positive() == b.factor.is_sign_positive() {
-                    self.primal.add(p, q)
-                } else {
-                    self.primal.sub(p, q)
-                };
-                return self.merged(a.factor, sum);
+        let primal = &mut self.primal;
+        let (factor, sum) = match (&a.coefficient, &b.coefficient) {
+            (Some(p), Some(q)) if a.factor.to_bits() == b.factor.to_bits() => {
+                (a.factor, primal.add(p, q))
+            }
+            (Some(p), Some(q)) if a.factor.to_bits() == (-b.factor).to_bits() => {
+                (a.factor, primal.sub(p, q))
             }
             (Some(p), Some(q)) => {
-                let (p, q) = (
-                    self.primal.scale(p, a.factor),
-                    self.primal.scale(q, b.factor),
-                );
-                self.primal.add(&p, &q)
+                let (p, q) = (primal.scale(p, a.factor), primal.scale(q, b.factor));
+                (1.0, primal.add(&p, &q))
             }
             (Some(p), None) => {
-                let p = self.primal.scale(p, a.factor);
-                self.primal.shift(&p, b.factor)
+                let p = primal.scale(p, a.factor);
+                (1.0, primal.shift(&p, b.factor))
             }
             (None, Some(q)) => {
-                let q = self.primal.scale(q, b.factor);
-                self.primal.shift(&q, a.factor)
+                let q = primal.scale(q, b.factor);
+                (1.0, primal.shift(&q, a.factor))
             }
             (None, None) => unreachable!("equal coefficients were merged above"),
         };
-        self.merged(1.0, sum)
-    }
-
-    fn merged(&self, factor: f64, sum: TensorIr) -> Option<(f64, Option<TensorIr>)> {
-        match self.primal.constant(&sum) {
+        match primal.constant(&sum) {
             Some(0.0) => None,
             Some(value) => Some((factor * value, None)),
             None => Some((factor, Some(sum))),
@@ -203,29 +193,21 @@ impl Builder {
 
     /// Broadcast `e` to `shape`.
     pub(crate) fn spread(&mut self, e: Expression, shape: &Shape) -> Expression {
-        if e.shape == *shape {
+        if e.first().shape == *shape {
             return e;
         }
-        let dtype = e.dtype;
         let (factor, atom) = self.evaluate(e);
-        let atom = self
-            .tangent
-            .emit_one(OperationIr::BaseFloat(Base::Expand(ShapeOpIr {
-                input: read_only(&atom),
-                out: output(shape.clone(), dtype),
-            })));
-        Expression::atom(atom).scale(factor)
+        let out = output(shape.clone(), atom.dtype);
+        let input = read_only(&atom);
+        let expand = OperationIr::BaseFloat(Base::Expand(ShapeOpIr { input, out }));
+        Expression::multiple(factor, self.tangent.emit_one(expand))
     }
 
     /// Evaluate up to a factor: `e = factor · tensor`. Cheaper than [`exactly`](Self::exactly).
-    pub(crate) fn evaluate(&mut self, e: Expression) -> (f64, TensorIr) {
+    pub(crate) fn evaluate(&mut self, mut e: Expression) -> (f64, TensorIr) {
         // A plain term cannot hide its factor in a primal coefficient: take it out of the sum.
-        let unit = e
-            .terms
-            .iter()
-            .find(|t| t.coefficient.is_none())
-            .map_or_else(|| e.terms[0].factor, |t| t.factor);
-        let mut e = e;
+        let plain = e.terms.iter().find(|t| t.coefficient.is_none());
+        let unit = plain.unwrap_or(&e.terms[0]).factor;
         for term in &mut e.terms {
             term.factor /= unit;
         }
@@ -235,7 +217,7 @@ impl Builder {
     /// Evaluate now, so that several uses share the sum.
     pub(crate) fn shared(&mut self, e: Expression) -> Expression {
         let (factor, atom) = self.evaluate(e);
-        Expression::atom(atom).scale(factor)
+        Expression::multiple(factor, atom)
     }
 
     /// Evaluate.
@@ -306,11 +288,7 @@ impl Builder {
                 for term in &mut group {
                     term.coefficient = None;
                 }
-                let (factor, atom) = self.evaluate(Expression {
-                    shape: group[0].atom.shape.clone(),
-                    dtype: group[0].atom.dtype,
-                    terms: group,
-                });
+                let (factor, atom) = self.evaluate(Expression { terms: group });
                 Term {
                     factor,
                     coefficient,
@@ -342,17 +320,6 @@ impl Builder {
         terms
     }
 
-    /// Apply an operation that is linear in one argument: `make` puts the tangent into it.
-    pub(crate) fn linear(
-        &mut self,
-        e: Expression,
-        make: impl FnOnce(TensorIr) -> OperationIr,
-    ) -> Expression {
-        let (factor, atom) = self.evaluate(e);
-        let out = self.tangent.emit_one(make(read_only(&atom)));
-        Expression::atom(out).scale(factor)
-    }
-
     /// The tangent as a tensor, zeros if there is none.
     pub(crate) fn or_zeros(&mut self, t: Tangent, shape: &Shape, dtype: DType) -> TensorIr {
         match t {
@@ -365,7 +332,7 @@ impl Builder {
         }
     }
 
-    /// Apply an operation that is jointly linear in several arguments.
+    /// Apply an operation that is jointly linear in several arguments: `make` puts the tangents into it.
     pub(crate) fn jointly_linear(
         &mut self,
         arguments: Vec<(Tangent, &TensorIr)>,
@@ -388,12 +355,12 @@ impl Builder {
             })
             .collect();
         let out = self.tangent.emit_one(make(arguments));
-        Some(Expression::atom(out).scale(unit.unwrap_or(1.0)))
+        Some(Expression::multiple(unit.unwrap_or(1.0), out))
     }
 
     pub(crate) fn handle(&mut self, e: Expression) -> TensorIr {
         let id = EXPRESSION_IDS + self.expressions.len() as u64;
-        let handle = tensor(id, e.shape.clone(), e.dtype);
+        let handle = tensor(id, e.first().shape.clone(), e.first().dtype);
         self.expressions.insert(handle.id, e);
         handle
     }
@@ -409,10 +376,9 @@ impl Builder {
 
 /// Forgets the identifiers of the outputs: a rule may describe them by those of another operation, which is perhaps an input
 /// of this one.
-fn release_outputs(operation: &mut CustomOpIr) {
-    for (position, out) in operation.outputs.iter_mut().enumerate() {
-        out.id = TensorId::new(u64::MAX - position as u64);
-    }
+fn released(mut operation: CustomOpIr) -> OperationIr {
+    operation.outputs = operation.outputs.iter().map(like).collect();
+    OperationIr::Custom(operation)
 }
 
 /// For rules of custom operations. Tangents are handles to unevaluated expressions: pass them
@@ -424,9 +390,8 @@ impl Builder {
     ///
     /// # Panics
     /// If the operation has no outputs.
-    pub fn primal(&mut self, mut operation: CustomOpIr) -> TensorIr {
-        release_outputs(&mut operation);
-        self.primal.emit_one(OperationIr::Custom(operation))
+    pub fn primal(&mut self, operation: CustomOpIr) -> TensorIr {
+        self.primal.emit_one(released(operation))
     }
 
     /// Add an operation to the tangent program and return its first output. The operation must be
@@ -434,12 +399,10 @@ impl Builder {
     ///
     /// # Panics
     /// If the operation has no outputs.
-    pub fn tangent(&mut self, mut operation: CustomOpIr) -> TensorIr {
-        release_outputs(&mut operation);
-        let mut operation = OperationIr::Custom(operation);
+    pub fn tangent(&mut self, operation: CustomOpIr) -> TensorIr {
+        let mut operation = released(operation);
         let mut values = HashMap::new();
-        let inputs: Vec<TensorIr> = operation.inputs().cloned().collect();
-        for input in inputs {
+        for input in operation.inputs() {
             if let Some(e) = self.expressions.get(&input.id).cloned() {
                 values.insert(input.id, self.exactly(e));
             }
@@ -500,7 +463,7 @@ pub fn multilinear(
         replaced.inputs[i] = read_only(&atom);
         let outputs = build.tangent.emit(OperationIr::Custom(replaced));
         for (sum, out) in sums.iter_mut().zip(outputs) {
-            *sum = build.plus(sum.take(), Some(Expression::atom(out).scale(factor)));
+            *sum = build.plus(sum.take(), Some(Expression::multiple(factor, out)));
         }
     }
     let handles = sums.into_iter().map(|sum| sum.map(|e| build.handle(e)));

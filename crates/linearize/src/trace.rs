@@ -5,22 +5,21 @@
 //! not: the traced function works on tensors of that backend, and the backward pass is called on
 //! its primitive. That is below Burn's stable surface; `tests/burn_internals.rs` pins it.
 
-use std::collections::HashMap;
+use std::collections::BTreeSet;
 use std::sync::{Mutex, PoisonError};
 
 use burn::backend::autodiff::Autodiff;
-use burn::backend::ir::{
-    BaseOperationIr as Base, CreationOpIr, CustomOpIr, OperationIr, TensorId, TensorIr,
-};
+use burn::backend::ir::{CustomOpIr, OperationIr, TensorId, TensorIr};
+use burn::backend::ops::FloatTensorOps;
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{
-    BackendTensor, Capture, DispatchAutodiffContext, DispatchKindConversion, DispatchTensor,
-    TensorMetadata,
+    Backend, BackendTensor, Capture, DispatchAutodiffContext, DispatchKindConversion,
+    DispatchTensor, TensorMetadata,
 };
-use burn::tensor::{DType, Device, FloatDType, Shape, Tensor, TensorData};
+use burn::tensor::{DType, Device, FloatDType, Tensor, TensorData};
 use burn_router::{RouterClient, RouterTensor};
 
-use crate::ir::{rename, tensor};
+use crate::ir::tensor;
 use crate::{Error, Value, precision};
 
 type Tracked = Autodiff<Capture>;
@@ -108,12 +107,12 @@ impl Graph {
         parameters: &[Value],
         f: impl FnOnce(&Inputs) -> Vec<Value>,
     ) -> Result<Self, Error> {
-        record(variables, parameters, |session| {
-            let outputs = f(&session.inputs()).into_iter().enumerate();
+        record(variables, parameters, |_, inputs| {
+            let outputs = f(inputs).into_iter().enumerate();
             let outputs = outputs
-                .map(|(index, output)| output_on::<Capture>(index, output.0).map(Some))
+                .map(|(index, output)| output_on::<Capture>(index, output.0))
                 .collect::<Result<Vec<_>, Error>>()?;
-            let value = outputs.first().cloned().flatten().ok_or(Error::NoOutputs)?;
+            let value = outputs.first().cloned().ok_or(Error::NoOutputs)?;
             Ok((value, outputs))
         })
     }
@@ -131,153 +130,123 @@ impl Graph {
         parameters: &[Value],
         f: impl FnOnce(&Inputs) -> Tensor<1>,
     ) -> Result<Self, Error> {
-        record(variables, parameters, |session| {
-            let tracked: Vec<TrackedSymbol> = session
-                .variables
-                .iter()
+        record(variables, parameters, |variables, inputs| {
+            let tracked: Vec<TrackedSymbol> = (variables.iter())
                 .map(|symbol| TrackedSymbol::new(symbol.clone()).require_grad())
                 .collect();
-            let mut inputs = session.inputs();
-            inputs.variables = tracked
-                .iter()
-                .map(|t| DispatchTensor::from_backend(BackendTensor::<Tracked>::Float(t.clone())))
-                .collect();
-            let energy = f(&inputs).into_dispatch();
+            inputs.variables = tracked.iter().map(wrapped::<Tracked>).collect();
+            let energy = f(inputs).into_dispatch();
             let shape = energy.shape();
             if shape.num_elements() != 1 {
                 return Err(Error::NotScalar {
                     shape: shape.to_vec(),
                 });
             }
-            if energy.autodiff == DispatchAutodiffContext::Disabled {
-                // A constant energy: no variable reaches it.
-                let energy = output_on::<Capture>(0, energy)?;
-                return Ok((energy, vec![None; tracked.len()]));
-            }
-            let energy = output_on::<Tracked>(0, energy)?;
-            let value = energy.primitive().clone();
-            if !energy.is_tracked() {
-                return Ok((value, vec![None; tracked.len()]));
-            }
-            let gradients = energy.backward();
-            let outputs = tracked.iter().map(|t| t.grad(&gradients)).collect();
-            Ok((value, outputs))
+            // A constant energy, which no variable reaches, is not tracked.
+            let (value, gradients) = if energy.autodiff == DispatchAutodiffContext::Disabled {
+                (output_on::<Capture>(0, energy)?, None)
+            } else {
+                let energy = output_on::<Tracked>(0, energy)?;
+                let value = energy.primitive().clone();
+                (value, energy.is_tracked().then(|| energy.backward()))
+            };
+            let gradient = |symbol: &TrackedSymbol| {
+                let found = gradients.as_ref().and_then(|all| symbol.grad(all));
+                found.unwrap_or_else(|| zeros_like(symbol.primitive()))
+            };
+            Ok((value, tracked.iter().map(gradient).collect()))
         })
     }
 }
 
-/// The symbol behind an output; detached tensors of the gradient's device count too.
-fn output_on<B>(index: usize, output: DispatchTensor) -> Result<FloatTensor<B>, Error>
+fn zeros_like(symbol: &Symbol) -> Symbol {
+    Capture::float_zeros(symbol.shape(), &symbol.device(), symbol.dtype().into())
+}
+
+fn wrapped<B: Backend>(symbol: &FloatTensor<B>) -> DispatchTensor
 where
-    B: burn::backend::Backend,
+    DispatchTensor: DispatchKindConversion<B>,
+{
+    DispatchTensor::from_backend(BackendTensor::Float(symbol.clone()))
+}
+
+/// The symbol behind an output; detached tensors of the gradient's device count too.
+fn output_on<B: Backend>(index: usize, output: DispatchTensor) -> Result<FloatTensor<B>, Error>
+where
     DispatchTensor: DispatchKindConversion<B>,
 {
     let found = format!("{:?}", output.device());
-    match <DispatchTensor as DispatchKindConversion<B>>::try_into_backend(output) {
+    match DispatchTensor::try_into_backend(output) {
         Ok(BackendTensor::Float(tensor)) => Ok(tensor),
         _ => Err(Error::OutputDevice { index, found }),
     }
 }
 
-/// One recording in progress.
-struct Session {
-    device: Device,
-    variables: Vec<Symbol>,
-    parameters: Vec<Symbol>,
-}
-
-impl Session {
-    fn inputs(&self) -> Inputs {
-        let wrap = |symbol: &Symbol| {
-            DispatchTensor::from_backend(BackendTensor::<Capture>::Float(symbol.clone()))
-        };
-        let all = |symbols: &[Symbol]| symbols.iter().map(wrap).collect();
-        Inputs {
-            variables: all(&self.variables),
-            parameters: all(&self.parameters),
-            device: self.device.clone(),
-        }
-    }
-}
-
-type Outputs = (Symbol, Vec<Option<Symbol>>);
-
+/// Records a function of the symbols of the variables and of the inputs, which gives the value and the outputs.
 fn record(
     variables: &[Value],
     parameters: &[Value],
-    f: impl FnOnce(&Session) -> Result<Outputs, Error>,
+    f: impl FnOnce(&[Symbol], &mut Inputs) -> Result<(Symbol, Vec<Symbol>), Error>,
 ) -> Result<Graph, Error> {
     let dtype = variables.first().map_or(DType::F32, Value::dtype);
     let lease = Lease::take(dtype);
-    let device = lease.device.clone();
-    let mut failure = None;
-    let mut found: Option<Ids> = None;
-    let captured = device.capture_scope(|scope| {
-        let session = open(&device, dtype, variables, parameters);
+    let mut recorded = None;
+    let captured = lease.device.capture_scope(|scope| {
+        let [variables, parameters] = open(&lease.device, dtype, [variables, parameters]);
+        let mut inputs = Inputs {
+            variables: variables.iter().map(wrapped::<Capture>).collect(),
+            parameters: parameters.iter().map(wrapped::<Capture>).collect(),
+            device: lease.device.clone(),
+        };
+        let outputs = f(&variables, &mut inputs);
+        let completed = match &outputs {
+            Ok((value, outputs)) => {
+                // The capture device wants no repetitions.
+                let outputs = outputs.iter().chain([value]).map(Symbol::id);
+                let inputs = variables.iter().chain(&parameters).map(Symbol::id);
+                scope.complete(inputs, outputs.collect::<BTreeSet<TensorId>>())
+            }
+            Err(_) => scope.complete([], []),
+        };
         // Outputs must outlive the scope's completion: the capture device takes the last use of a
         // tensor for its end.
-        let outputs = f(&session).map_err(|error| failure = Some(error)).ok();
-        let ids = outputs.as_ref().map(|outputs| Ids::new(&session, outputs));
-        let completed = match &ids {
-            Some(ids) => scope.complete(ids.inputs(), ids.unique.clone()),
-            None => scope.complete([], []),
-        };
-        found = ids;
-        drop(outputs);
+        recorded = Some(outputs.map(|(value, outputs)| Graph {
+            operations: Vec::new(),
+            sources: Sources {
+                variables: variables.iter().map(description).collect(),
+                parameters: parameters.iter().map(description).collect(),
+                constants: Vec::new(),
+            },
+            value: description(&value),
+            outputs: outputs.iter().map(description).collect(),
+        }));
         completed
     });
-    if let Some(error) = failure {
-        return Err(error);
-    }
+    let recorded = recorded.transpose()?;
     let captured = captured.map_err(|error| Error::Capture {
         reason: error.to_string(),
     })?;
-    let ids = found.ok_or(Error::NoOutputs)?;
-    Ok(build(captured.graph.operations, captured.values, &ids))
+    let mut graph = recorded.ok_or(Error::NoOutputs)?;
+    graph.operations = captured.graph.operations;
+    graph.operations.retain(|operation| match operation {
+        OperationIr::Init(_) | OperationIr::Drop(_) => false,
+        OperationIr::Custom(custom) => custom.id != INPUTS,
+        _ => true,
+    });
+    precision::restore_reciprocals(&mut graph.operations);
+    graph.sources.constants = (captured.values.into_iter())
+        .map(|(id, data)| (tensor(id.value(), data.shape().clone(), data.dtype()), data))
+        .collect();
+    Ok(graph)
 }
 
-/// What the inputs and outputs are called on the capture device.
-struct Ids {
-    variables: Vec<TensorIr>,
-    parameters: Vec<TensorIr>,
-    value: TensorId,
-    outputs: Vec<Option<TensorId>>,
-    /// Outputs without repetitions, as the capture device wants them.
-    unique: Vec<TensorId>,
-}
-
-impl Ids {
-    fn new(session: &Session, (value, outputs): &Outputs) -> Self {
-        let describe = |symbol: &Symbol| {
-            let (shape, dtype) = (symbol.shape(), symbol.dtype());
-            tensor(symbol.id().value(), shape, dtype)
-        };
-        let value = value.id();
-        let outputs: Vec<_> = outputs.iter().map(|o| o.as_ref().map(Symbol::id)).collect();
-        let mut unique = vec![value];
-        for id in outputs.iter().flatten() {
-            if !unique.contains(id) {
-                unique.push(*id);
-            }
-        }
-        Self {
-            variables: session.variables.iter().map(describe).collect(),
-            parameters: session.parameters.iter().map(describe).collect(),
-            value,
-            outputs,
-            unique,
-        }
-    }
-
-    fn inputs(&self) -> Vec<TensorId> {
-        let inputs = self.variables.iter().chain(&self.parameters);
-        inputs.map(|t| t.id).collect()
-    }
+fn description(symbol: &Symbol) -> TensorIr {
+    tensor(symbol.id().value(), symbol.shape(), symbol.dtype())
 }
 
 /// Symbols for the inputs, without values: a function that reads data fails to trace instead of
 /// freezing the data into the graph.
-fn open(device: &Device, dtype: DType, variables: &[Value], parameters: &[Value]) -> Session {
+fn open(device: &Device, dtype: DType, inputs: [&[Value]; 2]) -> [Vec<Symbol>; 2] {
     // Tensors that the traced function creates get the precision of its variables. A device can be
     // configured once, within a scope; a device that served before is configured already.
     if dtype.is_float() {
@@ -291,83 +260,16 @@ fn open(device: &Device, dtype: DType, variables: &[Value], parameters: &[Value]
         let (id, shape) = (client.create_empty_handle(), value.0.shape());
         RouterTensor::new(id, shape, value.dtype(), client.clone())
     };
-    let session = Session {
-        device: device.clone(),
-        variables: variables.iter().map(symbol).collect(),
-        parameters: parameters.iter().map(symbol).collect(),
-    };
-    let inputs = session.variables.iter().chain(&session.parameters);
+    let symbols = inputs.map(|values| values.iter().map(symbol).collect::<Vec<Symbol>>());
     client.register_op(OperationIr::Custom(CustomOpIr {
         id: INPUTS.to_owned(),
-        inputs: inputs.map(|symbol| symbol.clone().into_ir()).collect(),
+        inputs: (symbols.iter().flatten())
+            .map(|symbol| symbol.clone().into_ir())
+            .collect(),
         outputs: Vec::new(),
         scalars: Vec::new(),
     }));
-    session
-}
-
-/// Number the tensors of a captured graph from zero: variables, parameters, constants, the rest.
-fn build(
-    mut operations: Vec<OperationIr>,
-    values: impl IntoIterator<Item = (TensorId, TensorData)>,
-    ids: &Ids,
-) -> Graph {
-    operations.retain(|operation| match operation {
-        OperationIr::Init(_) | OperationIr::Drop(_) => false,
-        OperationIr::Custom(custom) => custom.id != INPUTS,
-        _ => true,
-    });
-    let mut numbers: HashMap<TensorId, TensorIr> = HashMap::new();
-    let mut next = 0;
-    let mut number = |old: TensorId, shape: &Shape, dtype: DType| {
-        let new = tensor(next, shape.clone(), dtype);
-        next += 1;
-        numbers.insert(old, new.clone());
-        new
-    };
-    let mut renamed = |t: &TensorIr| number(t.id, &t.shape, t.dtype);
-    let variables: Vec<TensorIr> = ids.variables.iter().map(&mut renamed).collect();
-    let parameters = ids.parameters.iter().map(&mut renamed).collect();
-    let constants = values
-        .into_iter()
-        .map(|(id, data)| (number(id, data.shape(), data.dtype()), data))
-        .collect();
-    for out in operations.iter().flat_map(OperationIr::outputs) {
-        number(out.id, &out.shape, out.dtype);
-    }
-    let outputs = ids
-        .outputs
-        .iter()
-        .zip(variables.iter().map(Some).chain(std::iter::repeat(None)))
-        .map(|(id, variable)| match (id, variable) {
-            (Some(id), _) => numbers[id].clone(),
-            // A variable that the energy does not depend on.
-            (None, variable) => {
-                let like = variable.expect("only gradients are absent, one per variable");
-                let out = tensor(next, like.shape.clone(), like.dtype);
-                next += 1;
-                operations.push(OperationIr::BaseFloat(Base::Zeros(CreationOpIr {
-                    out: out.clone(),
-                })));
-                numbers.insert(out.id, out.clone());
-                out
-            }
-        })
-        .collect();
-    precision::restore_reciprocals(&mut operations);
-    for operation in &mut operations {
-        rename(operation, &numbers);
-    }
-    Graph {
-        value: numbers[&ids.value].clone(),
-        operations,
-        sources: Sources {
-            variables,
-            parameters,
-            constants,
-        },
-        outputs,
-    }
+    symbols
 }
 
 /// A capture device for the duration of one recording. Devices allow one recording at a time and

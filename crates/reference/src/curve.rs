@@ -98,11 +98,6 @@ impl Curve {
         crossings.map(refine).max_by(f64::total_cmp)
     }
 
-    /// Distance of a point to the curve.
-    pub fn distance(&self, point: [f64; 2]) -> f64 {
-        self.largest_distance_of(&[point])
-    }
-
     /// The largest distance of any of the points to the curve.
     pub fn largest_distance_of(&self, points: &[[f64; 2]]) -> f64 {
         let series = self.series();

@@ -26,17 +26,13 @@ pub(crate) fn run(
     const FIRST_STEP: f64 = 1e-5;
     positive("tolerance", tolerance)?;
     let passed = start.time / start.clock(flow);
-    let mut run = Run {
-        flow,
-        tolerance,
-        step: if passed > 0.0 {
-            passed / 8.0
-        } else {
-            FIRST_STEP
-        },
-        curve: start,
+    // Length of the next step.
+    let mut step = if passed > 0.0 {
+        passed / 8.0
+    } else {
+        FIRST_STEP
     };
-    let (first, mut before) = (run.curve.time, 0.0);
+    let (first, mut before, mut curve) = (start.time, 0.0, start);
     let mut curves = Vec::with_capacity(times.len());
     for &time in times {
         if !(time >= before && time.is_finite()) {
@@ -45,56 +41,56 @@ pub(crate) fn run(
         if time < first {
             return Err(Error::TooEarly { time, first });
         }
-        run.advance(method, time)?;
-        curves.push(run.curve.clone());
+        while time - curve.time > SLACK * time {
+            curve = advanced(
+                method,
+                flow,
+                tolerance,
+                &curve.fitted(tolerance)?,
+                time,
+                &mut step,
+            )?;
+        }
+        curve.time = time;
+        curves.push(curve.clone());
         before = time;
     }
     Ok(curves)
 }
 
-struct Run {
+/// Of the time, that need not be met.
+const SLACK: f64 = 1e-13;
+
+/// The curve after one step, which ends at the time at the latest.
+fn advanced<M: Method>(
+    method: &M,
     flow: Flow,
     tolerance: f64,
-    curve: Curve,
-    /// Length of the next step.
-    step: f64,
-}
-
-impl Run {
-    fn advance<M: Method>(&mut self, method: &M, time: f64) -> Result<(), Error> {
-        /// Of the time, that need not be met.
-        const SLACK: f64 = 1e-13;
-        while time - self.curve.time > SLACK * time {
-            self.curve = self.curve.fitted(self.tolerance)?;
-            let clock = self.curve.clock(self.flow);
-            let attempt = method.attempts(&self.curve);
-            let mut length = self.step.min((time - self.curve.time) / clock);
-            let end = loop {
-                let (end, error) = attempt(length);
-                let factor = (0.9 * (self.tolerance / error).powf(1.0 / M::ORDER)).clamp(0.1, 4.0);
-                if error <= self.tolerance && end.time <= time * (1.0 + SLACK) {
-                    // A step that only had to meet the time says nothing about the next one.
-                    if length >= self.step {
-                        self.step = length * factor;
-                    }
-                    break end;
-                } else if error <= self.tolerance && end.time.is_finite() {
-                    length *= (time - self.curve.time) / (end.time - self.curve.time);
-                } else {
-                    // Numbers that are not finite count as a large error.
-                    length *= if error > self.tolerance { factor } else { 0.1 };
-                    self.step = length;
-                }
-                if length * clock < SLACK * self.curve.time.max(f64::MIN_POSITIVE) {
-                    return Err(Error::StepTooShort {
-                        time: self.curve.time,
-                    });
-                }
-            };
-            drop(attempt);
-            self.curve = end;
+    curve: &Curve,
+    time: f64,
+    step: &mut f64,
+) -> Result<Curve, Error> {
+    let clock = curve.clock(flow);
+    let attempt = method.attempts(curve);
+    let mut length = step.min((time - curve.time) / clock);
+    loop {
+        let (end, error) = attempt(length);
+        let factor = (0.9 * (tolerance / error).powf(1.0 / M::ORDER)).clamp(0.1, 4.0);
+        if error <= tolerance && end.time <= time * (1.0 + SLACK) {
+            // A step that only had to meet the time says nothing about the next one.
+            if length >= *step {
+                *step = length * factor;
+            }
+            return Ok(end);
+        } else if error <= tolerance && end.time.is_finite() {
+            length *= (time - curve.time) / (end.time - curve.time);
+        } else {
+            // Numbers that are not finite count as a large error.
+            length *= if error > tolerance { factor } else { 0.1 };
+            *step = length;
         }
-        self.curve.time = time;
-        Ok(())
+        if length * clock < SLACK * curve.time.max(f64::MIN_POSITIVE) {
+            return Err(Error::StepTooShort { time: curve.time });
+        }
     }
 }

@@ -161,12 +161,12 @@ fn distances_are_those_of_the_curve() {
     let curve = &evolve(&circle, Flow::Willmore, &[0.0], &ACCURACY).unwrap()[0];
     let points = [0.3, 2.0, 4.4].map(|angle: f64| [1.01 * angle.cos(), 1.01 * angle.sin()]);
     assert!((curve.largest_distance_of(&points) - 0.01).abs() < 1e-12);
-    assert!((curve.distance([0.5, 0.0]) - 0.5).abs() < 1e-12);
+    assert!((curve.largest_distance_of(&[[0.5, 0.0]]) - 0.5).abs() < 1e-12);
     assert!((curve.distance_along([-1.0, 2.0]).unwrap() - 1.0).abs() < 1e-12);
     let ellipse = Shape::ellipse(0.9, 0.4).unwrap();
     let curve = &evolve(&ellipse, Flow::Willmore, &[0.0], &ACCURACY).unwrap()[0];
     assert!((curve.area() - PI * 0.36).abs() < 1e-12);
-    let error = curve.distance([0.2, 0.0]) - (0.16 - 0.04 * 0.16 / 0.65_f64).sqrt();
+    let error = curve.largest_distance_of(&[[0.2, 0.0]]) - (0.16 - 0.04 * 0.16 / 0.65_f64).sqrt();
     assert!(error.abs() < 1e-12, "{error:e}");
 }
 

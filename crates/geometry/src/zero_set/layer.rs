@@ -101,6 +101,7 @@ pub(super) struct Layer<const D: usize> {
     /// Along an axis, the nodes one to three spacings below and above.
     neighbours: Vec<[[usize; 2]; 3]>,
     gradients: OnceLock<Vec<[f64; D]>>,
+    normals: OnceLock<Vec<[f64; D]>>,
 }
 
 impl<const D: usize> Layer<D> {
@@ -128,6 +129,7 @@ impl<const D: usize> Layer<D> {
             places: vec![NOWHERE; grid.len()],
             neighbours: (0..n).map(around).collect(),
             gradients: OnceLock::new(),
+            normals: OnceLock::new(),
         };
         layer.find_nodes();
         Ok(layer)
@@ -269,15 +271,12 @@ impl<const D: usize> Layer<D> {
     }
 
     /// Unit vectors along the gradients; zero where there is none.
-    pub(super) fn normals(&self) -> Vec<[f64; D]> {
+    pub(super) fn normals(&self) -> &[[f64; D]] {
         let gradients = self.gradients();
         let unit = |place: usize| {
-            let gradient = gradients[place];
-            vector::scale(
-                gradient,
-                vector::norm(gradient).max(f64::MIN_POSITIVE).recip(),
-            )
+            let length = vector::norm(gradients[place]).max(f64::MIN_POSITIVE);
+            vector::scale(gradients[place], length.recip())
         };
-        self.map(unit)
+        self.normals.get_or_init(|| self.map(unit))
     }
 }

@@ -13,7 +13,6 @@ pub struct Sizes<const D: usize> {
     layer: Layer<D>,
     /// First and second derivative of the distance variable by the value at the node, at the places of the layer.
     slopes: Vec<[f64; 2]>,
-    normals: OnceLock<Vec<[f64; D]>>,
     /// Derivatives of perimeter and volume by the distance variable, at the places of the layer.
     by_distance: [OnceLock<Vec<f64>>; 2],
 }
@@ -39,7 +38,6 @@ impl<const D: usize> Sizes<D> {
         Ok(Self {
             layer,
             slopes,
-            normals: OnceLock::new(),
             by_distance: Default::default(),
         })
     }
@@ -66,7 +64,7 @@ impl<const D: usize> Sizes<D> {
 
     /// The mean curvature `k` at the nodes with a weight, zero elsewhere.
     pub fn mean_curvature(&self) -> Vec<f64> {
-        let normals = self.normals();
+        let normals = self.layer.normals();
         self.spread(self.layer.map(|place| match self.layer.near(place) {
             Some(_) => self.layer.divergence_at(place, normals),
             None => 0.0,
@@ -84,14 +82,10 @@ impl<const D: usize> Sizes<D> {
         self.spread(pairs.map(|([slope, _], d)| slope * d).collect())
     }
 
-    fn normals(&self) -> &[[f64; D]] {
-        self.normals.get_or_init(|| self.layer.normals())
-    }
-
     fn perimeter_by_distance(&self) -> &[f64] {
         self.by_distance[0].get_or_init(|| {
             let (layer, kernel) = (&self.layer, self.layer.kernel);
-            let (normals, gradients) = (self.normals(), layer.gradients());
+            let (normals, gradients) = (layer.normals(), layer.gradients());
             let fluxes = layer.map(|place| match layer.near(place) {
                 Some(d) => vector::scale(normals[place], kernel.value(d)),
                 None => [0.0; D],
@@ -204,7 +198,7 @@ impl<const D: usize> SizeHessian<D> {
                 places.push(place);
             }
         }
-        let (first, normals) = (sizes.by_distance(weights), sizes.normals());
+        let (first, normals) = (sizes.by_distance(weights), layer.normals());
         let site_of = |place: u32| sites_of.get(place as usize).copied().unwrap_or(u32::MAX);
         let site = |index: usize| {
             let place = places[index];

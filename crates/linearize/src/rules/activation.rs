@@ -6,12 +6,12 @@ use burn::backend::ir::{
 };
 
 use super::Context;
-use crate::ir::{output, read_only};
+use crate::ir::{output, with_inputs};
 use crate::precision;
 use crate::tangent::{Builder, Tangent};
 
-pub(super) fn jvp(cx: &mut Context, op: &Act) -> Option<Vec<Tangent>> {
-    let one = match op {
+pub(super) fn jvp(cx: &mut Context, op: &Act) -> Option<Tangent> {
+    Some(match op {
         Act::Relu(u) => {
             let positive = positive(cx, &u.input);
             cx.times(&positive, cx.d(&u.input), &u.out)
@@ -64,8 +64,7 @@ pub(super) fn jvp(cx: &mut Context, op: &Act) -> Option<Vec<Tangent>> {
             cx.build.plus(direct, Builder::scaled(mean, -1.0))
         }
         _ => return None,
-    };
-    Some(vec![one])
+    })
 }
 
 fn positive(cx: &mut Context, t: &TensorIr) -> TensorIr {
@@ -73,21 +72,14 @@ fn positive(cx: &mut Context, t: &TensorIr) -> TensorIr {
 }
 
 fn sum_along(cx: &mut Context, t: Tangent, s: &DimOpIr) -> Tangent {
-    let axis = s.axis;
     let mut shape = s.out.shape.clone();
-    shape[axis] = 1;
-    let out = output(shape, s.out.dtype);
-    t.map(|e| {
-        cx.build.linear(e, |input| {
-            OperationIr::NumericFloat(
-                out.dtype,
-                Num::SumDim(ReduceDimOpIr {
-                    input: read_only(&input),
-                    out,
-                    axis,
-                    accumulator_len: 1,
-                }),
-            )
-        })
-    })
+    shape[s.axis] = 1;
+    let sum = ReduceDimOpIr {
+        input: s.input.clone(),
+        out: output(shape, s.out.dtype),
+        axis: s.axis,
+        accumulator_len: 1,
+    };
+    let sum = OperationIr::NumericFloat(s.out.dtype, Num::SumDim(sum));
+    (cx.build).jointly_linear(vec![(t, &s.input)], |t| with_inputs(&sum, &[0], &t))
 }

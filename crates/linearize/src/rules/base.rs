@@ -6,8 +6,8 @@ use burn::tensor::IndexingUpdateOp;
 use super::Context;
 use crate::tangent::Tangent;
 
-pub(super) fn jvp(cx: &mut Context, whole: &OperationIr, op: &Base) -> Option<Vec<Tangent>> {
-    let one = match op {
+pub(super) fn jvp(cx: &mut Context, whole: &OperationIr, op: &Base) -> Option<Tangent> {
+    Some(match op {
         Base::Reshape(_)
         | Base::Expand(_)
         | Base::SwapDims(_)
@@ -33,18 +33,8 @@ pub(super) fn jvp(cx: &mut Context, whole: &OperationIr, op: &Base) -> Option<Ve
             cx.linear(&OperationIr::BaseFloat(Base::MaskFill(filled)))
         }
         Base::Cat(c) => cx.jointly_linear(whole, &(0..c.tensors.len()).collect::<Vec<_>>()),
-        // Not real.
-        Base::Equal(_)
-        | Base::EqualElem(_)
-        | Base::NotEqual(_)
-        | Base::NotEqualElem(_)
-        | Base::All(_)
-        | Base::Any(_)
-        | Base::AllDim(_)
-        | Base::AnyDim(_) => None,
         _ => return None,
-    };
-    Some(vec![one])
+    })
 }
 
 fn overwrites(update: IndexingUpdateOp) -> bool {

@@ -2,14 +2,14 @@
 
 use std::f64::consts::PI;
 
-use burn::backend::ir::{BinaryOpIr, FloatOperationIr as Float, OperationIr, TensorIr, UnaryOpIr};
+use burn::backend::ir::{BinaryOpIr, FloatOperationIr as Float, OperationIr, TensorIr};
 
 use super::Context;
 use crate::emit::Emitter;
 use crate::tangent::{Builder, Tangent};
 
-pub(super) fn jvp(cx: &mut Context, whole: &OperationIr, op: &Float) -> Option<Vec<Tangent>> {
-    let one = match op {
+pub(super) fn jvp(cx: &mut Context, whole: &OperationIr, op: &Float) -> Option<Tangent> {
+    Some(match op {
         Float::Matmul(_) | Float::Cross(_) => cx.multilinear(whole, &[0, 1]),
         Float::PowfScalar(s) => {
             let exponent: f64 = s.rhs.elem();
@@ -35,18 +35,15 @@ pub(super) fn jvp(cx: &mut Context, whole: &OperationIr, op: &Float) -> Option<V
             let r = cx.times(&r, cx.d(&b.rhs), &b.out);
             cx.build.plus(l, Builder::scaled(r, -1.0))
         }
-        // Piecewise constant, or not real.
-        Float::Round(_)
-        | Float::Floor(_)
-        | Float::Ceil(_)
-        | Float::Trunc(_)
-        | Float::IntoInt(_)
-        | Float::IsNan(_)
-        | Float::IsInf(_)
-        | Float::Random(_) => None,
-        _ => return pointwise(cx, op).map(|tangent| vec![tangent]),
-    };
-    Some(vec![one])
+        // Piecewise constant.
+        Float::Round(_) | Float::Floor(_) | Float::Ceil(_) | Float::Trunc(_) => None,
+        // f′(x) ⊙ ẋ
+        _ => {
+            let (x, y) = (whole.inputs().next()?, whole.outputs().next()?);
+            let slope = slope(&mut cx.build.primal, op, x, y)?;
+            cx.times(&slope, cx.d(x), y)
+        }
+    })
 }
 
 /// `r lʳ⁻¹ l̇ + lʳ ln(l) ṙ`
@@ -67,84 +64,64 @@ fn powf(cx: &mut Context, b: &BinaryOpIr) -> Tangent {
     cx.build.plus(l, r)
 }
 
-/// `f′(x) ⊙ ẋ`
-fn pointwise(cx: &mut Context, op: &Float) -> Option<Tangent> {
-    let (u, slope) = slope(cx, op)?;
-    Some(cx.times(&slope, cx.d(&u.input), &u.out))
-}
-
-/// Derivative of a function of one number, in terms of the input `x` and the output `y`.
-fn slope<'a>(cx: &mut Context, op: &'a Float) -> Option<(&'a UnaryOpIr, TensorIr)> {
-    let primal = &mut cx.build.primal;
+/// Derivative of the function `y` of one number `x`.
+fn slope(primal: &mut Emitter, op: &Float, x: &TensorIr, y: &TensorIr) -> Option<TensorIr> {
     Some(match op {
-        Float::Exp(u) => (u, u.out.clone()),
-        Float::Log(u) => (u, primal.powi(&u.input, -1)),
+        Float::Exp(_) => y.clone(),
+        Float::Log(_) => primal.powi(x, -1),
         // 1/(1 + x)
-        Float::Log1p(u) => {
-            let shifted = primal.shift(&u.input, 1.0);
-            (u, primal.powi(&shifted, -1))
+        Float::Log1p(_) => {
+            let shifted = primal.shift(x, 1.0);
+            primal.powi(&shifted, -1)
         }
         // 2/√π e^(−x²)
-        Float::Erf(u) => {
-            let square = primal.mul(&u.input, &u.input);
+        Float::Erf(_) => {
+            let square = primal.mul(x, x);
             let negated = primal.neg(&square);
             let exp = primal.unary(&negated, Float::Exp);
-            (u, primal.scale(&exp, 2.0 / PI.sqrt()))
+            primal.scale(&exp, 2.0 / PI.sqrt())
         }
         // 1/(2y)
-        Float::Sqrt(u) => {
-            let reciprocal = primal.powi(&u.out, -1);
-            (u, primal.scale(&reciprocal, 0.5))
+        Float::Sqrt(_) => {
+            let reciprocal = primal.powi(y, -1);
+            primal.scale(&reciprocal, 0.5)
         }
-        Float::Sin(u) => (u, primal.unary(&u.input, Float::Cos)),
-        Float::Cos(u) => {
-            let sin = primal.unary(&u.input, Float::Sin);
-            (u, primal.neg(&sin))
+        Float::Sin(_) => primal.unary(x, Float::Cos),
+        Float::Cos(_) => {
+            let sin = primal.unary(x, Float::Sin);
+            primal.neg(&sin)
         }
-        Float::Tan(u) => (u, one_plus_square(primal, &u.out, 1.0)),
-        Float::Sinh(u) => (u, primal.unary(&u.input, Float::Cosh)),
-        Float::Cosh(u) => (u, primal.unary(&u.input, Float::Sinh)),
-        Float::Tanh(u) => (u, one_plus_square(primal, &u.out, -1.0)),
-        // (1 − x²)^(−1/2)
-        Float::ArcSin(u) => {
-            let rest = one_plus_square(primal, &u.input, -1.0);
-            (u, primal.powf(&rest, -0.5))
+        Float::Tan(_) => power_of_one_plus_square(primal, y, 1.0, 1.0),
+        Float::Sinh(_) => primal.unary(x, Float::Cosh),
+        Float::Cosh(_) => primal.unary(x, Float::Sinh),
+        Float::Tanh(_) => power_of_one_plus_square(primal, y, -1.0, 1.0),
+        Float::ArcSin(_) => power_of_one_plus_square(primal, x, -1.0, -0.5),
+        Float::ArcCos(_) => {
+            let of_sine = power_of_one_plus_square(primal, x, -1.0, -0.5);
+            primal.neg(&of_sine)
         }
-        Float::ArcCos(u) => {
-            let rest = one_plus_square(primal, &u.input, -1.0);
-            let root = primal.powf(&rest, -0.5);
-            (u, primal.neg(&root))
-        }
-        Float::ArcSinh(u) => {
-            let rest = one_plus_square(primal, &u.input, 1.0);
-            (u, primal.powf(&rest, -0.5))
-        }
+        Float::ArcSinh(_) => power_of_one_plus_square(primal, x, 1.0, -0.5),
         // (x² − 1)^(−1/2)
-        Float::ArcCosh(u) => {
-            let square = primal.mul(&u.input, &u.input);
+        Float::ArcCosh(_) => {
+            let square = primal.mul(x, x);
             let rest = primal.shift(&square, -1.0);
-            (u, primal.powf(&rest, -0.5))
+            primal.powf(&rest, -0.5)
         }
-        Float::ArcTan(u) => {
-            let rest = one_plus_square(primal, &u.input, 1.0);
-            (u, primal.powi(&rest, -1))
-        }
-        Float::ArcTanh(u) => {
-            let rest = one_plus_square(primal, &u.input, -1.0);
-            (u, primal.powi(&rest, -1))
-        }
+        Float::ArcTan(_) => power_of_one_plus_square(primal, x, 1.0, -1.0),
+        Float::ArcTanh(_) => power_of_one_plus_square(primal, x, -1.0, -1.0),
         // −y²
-        Float::Recip(u) => {
-            let square = primal.mul(&u.out, &u.out);
-            (u, primal.neg(&square))
+        Float::Recip(_) => {
+            let square = primal.mul(y, y);
+            primal.neg(&square)
         }
         _ => return None,
     })
 }
 
-/// `1 + sign t²`
-fn one_plus_square(primal: &mut Emitter, t: &TensorIr, sign: f64) -> TensorIr {
+/// `(1 + sign t²)^power`
+fn power_of_one_plus_square(primal: &mut Emitter, t: &TensorIr, sign: f64, power: f64) -> TensorIr {
     let square = primal.mul(t, t);
     let signed = primal.scale(&square, sign);
-    primal.shift(&signed, 1.0)
+    let sum = primal.shift(&signed, 1.0);
+    primal.powf(&sum, power)
 }

@@ -1,7 +1,8 @@
 //! Forward-mode rules of Burn's operations.
 //!
-//! Each rule maps the tangents of an operation's inputs to those of its outputs. Operations without
-//! active inputs never get here; operations that are not listed are [`Error::NoRule`].
+//! Each rule maps the tangents of an operation's inputs to that of its first output. Operations without
+//! active inputs or without float outputs never get here; operations that are not listed are
+//! [`Error::NoRule`].
 
 mod activation;
 mod base;
@@ -85,10 +86,12 @@ impl Context<'_> {
 
 /// Tangents of the outputs of `operation`, which is part of the primal program.
 pub(crate) fn jvp(cx: &mut Context, operation: &OperationIr) -> Result<Vec<Tangent>, Error> {
-    if !operation.inputs().any(|t| cx.tangents.contains_key(&t.id)) {
-        return Ok(vec![None; operation.outputs().count()]);
+    let mut tangents = vec![None; operation.outputs().count()];
+    let active = operation.inputs().any(|t| cx.tangents.contains_key(&t.id));
+    if !active || operation.outputs().all(is_discrete) {
+        return Ok(tangents);
     }
-    let found = match operation {
+    let first = match operation {
         OperationIr::NumericFloat(dtype, op) => numeric::jvp(cx, operation, *dtype, op),
         OperationIr::Float(_, op) => float::jvp(cx, operation, op),
         OperationIr::BaseFloat(op) => base::jvp(cx, operation, op),
@@ -97,9 +100,16 @@ pub(crate) fn jvp(cx: &mut Context, operation: &OperationIr) -> Result<Vec<Tange
         OperationIr::Custom(op) => return custom(cx, op),
         _ => None,
     };
-    found.ok_or_else(|| Error::NoRule {
+    // Further outputs are indices.
+    tangents[0] = first.ok_or_else(|| Error::NoRule {
         operation: name(operation),
-    })
+    })?;
+    Ok(tangents)
+}
+
+/// Whether the elements are integers or truth values, which do not vary with the variables but for jumps.
+fn is_discrete(t: &TensorIr) -> bool {
+    t.dtype.is_int() || t.dtype.is_uint() || t.dtype.is_bool()
 }
 
 fn custom(

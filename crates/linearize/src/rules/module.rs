@@ -6,8 +6,8 @@ use super::Context;
 use crate::ir::with_inputs;
 use crate::tangent::Tangent;
 
-pub(super) fn jvp(cx: &mut Context, whole: &OperationIr, op: &Mod) -> Option<Vec<Tangent>> {
-    let one = match op {
+pub(super) fn jvp(cx: &mut Context, whole: &OperationIr, op: &Mod) -> Option<Tangent> {
+    Some(match op {
         Mod::Linear(_)
         | Mod::Conv1d(_)
         | Mod::Conv2d(_)
@@ -51,8 +51,7 @@ pub(super) fn jvp(cx: &mut Context, whole: &OperationIr, op: &Mod) -> Option<Vec
         | Mod::Interpolate(_)
         | Mod::Unfold4d(_) => cx.linear(whole),
         _ => return None,
-    };
-    Some(vec![one])
+    })
 }
 
 /// `weight * x + bias`: jointly linear in `x` and `bias`, and in `weight` with zeros for the bias.

@@ -16,9 +16,9 @@ pub(super) fn jvp(
     whole: &OperationIr,
     dtype: DType,
     op: &Num,
-) -> Option<Vec<Tangent>> {
+) -> Option<Tangent> {
     let wrap = move |op| OperationIr::NumericFloat(dtype, op);
-    let one = match op {
+    Some(match op {
         Num::Add(b) => {
             let (l, r) = spread_operands(cx, b);
             cx.build.plus(l, r)
@@ -97,7 +97,7 @@ pub(super) fn jvp(
             cx.linear(&wrap(Num::Pad(p)))
         }
         Num::MaxDimWithIndices(m) | Num::MinDimWithIndices(m) => {
-            return Some(selected(cx, &m.tensor, m.dim, &m.out_indices, &m.out));
+            gather(cx, &m.tensor, m.dim, &m.out_indices, &m.out)
         }
         Num::MaxDim(r) | Num::MinDim(r) => {
             let variant = if matches!(op, Num::MaxDim(_)) {
@@ -113,31 +113,12 @@ pub(super) fn jvp(
             })));
             gather(cx, &r.input, r.axis, &indices[1], &r.out)
         }
-        Num::TopKWithIndices(m) => {
-            return Some(selected(cx, &m.tensor, m.dim, &m.out_indices, &m.out));
-        }
-        Num::SortWithIndices(m) => {
-            return Some(selected(cx, &m.input, m.dim, &m.out_indices, &m.out));
-        }
-        // Piecewise constant, or not real.
-        Num::Sign(_)
-        | Num::Full(_)
-        | Num::Greater(_)
-        | Num::GreaterElem(_)
-        | Num::GreaterEqual(_)
-        | Num::GreaterEqualElem(_)
-        | Num::Lower(_)
-        | Num::LowerElem(_)
-        | Num::LowerEqual(_)
-        | Num::LowerEqualElem(_)
-        | Num::ArgMax(_)
-        | Num::ArgMin(_)
-        | Num::ArgTopK(_)
-        | Num::ArgSort(_)
-        | Num::IntRandom(_) => None,
+        Num::TopKWithIndices(m) => gather(cx, &m.tensor, m.dim, &m.out_indices, &m.out),
+        Num::SortWithIndices(m) => gather(cx, &m.input, m.dim, &m.out_indices, &m.out),
+        // Piecewise constant.
+        Num::Sign(_) => None,
         _ => return None,
-    };
-    Some(vec![one])
+    })
 }
 
 fn spread_operands(cx: &mut Context, b: &BinaryOpIr) -> (Tangent, Tangent) {
@@ -172,17 +153,6 @@ fn powi_slope(cx: &mut Context, dtype: DType, b: &BinaryOpIr) -> TensorIr {
     primal.mul(&power, &exponent)
 }
 
-/// Tangents of selected elements and of their indices.
-fn selected(
-    cx: &mut Context,
-    input: &TensorIr,
-    dim: usize,
-    indices: &TensorIr,
-    out: &TensorIr,
-) -> Vec<Tangent> {
-    vec![gather(cx, input, dim, indices, out), None]
-}
-
 /// The tangent of selected elements is the selection of the tangent.
 fn gather(
     cx: &mut Context,
@@ -191,15 +161,10 @@ fn gather(
     indices: &TensorIr,
     out: &TensorIr,
 ) -> Tangent {
-    let (indices, out) = (read_only(indices), like(out));
-    cx.d(input).map(|e| {
-        cx.build.linear(e, |tensor| {
-            OperationIr::BaseFloat(Base::Gather(GatherOpIr {
-                tensor,
-                dim,
-                indices,
-                out,
-            }))
-        })
-    })
+    cx.linear(&OperationIr::BaseFloat(Base::Gather(GatherOpIr {
+        tensor: input.clone(),
+        dim,
+        indices: indices.clone(),
+        out: like(out),
+    })))
 }
