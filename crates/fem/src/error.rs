@@ -3,15 +3,8 @@
 use thiserror::Error as ThisError;
 
 /// What can go wrong in a finite-element step.
-#[derive(Clone, Debug, PartialEq, ThisError)]
+#[derive(Debug, ThisError)]
 pub enum Error {
-    /// A parameter out of range.
-    #[error("{name} = {value:e} is out of range: {expected}")]
-    Parameter {
-        name: &'static str,
-        value: f64,
-        expected: &'static str,
-    },
     /// The time step is so large that the implicit step has no unique solution.
     #[error(
         "tautilde = {step:e} is too large for eps = {eps:e}: the implicit step needs tautilde < 8/9 eps^2 = {bound:e}"
@@ -42,4 +35,6 @@ pub enum Error {
     /// The sparse factorization failed.
     #[error("the sparse Cholesky factorization of {unknowns} unknowns failed: {reason}")]
     Factorization { unknowns: usize, reason: String },
+    #[error(transparent)]
+    Geometry(#[from] geometry::Error),
 }

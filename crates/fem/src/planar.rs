@@ -9,7 +9,7 @@ use faer::linalg::solvers::{PartialPivLu, Solve};
 use faer::{Col, Mat};
 use model::{Calibration, PlanarStep};
 
-use crate::element::{GAUSS_NODES, GAUSS_WEIGHTS};
+use crate::element::gauss_points;
 use crate::scheme::Kind;
 
 /// A limit that no well-posed step comes near.
@@ -57,24 +57,6 @@ impl ElementsOnPlanes {
             let along = |(axis, a): (usize, &isize)| a * bit(corner, axis).cast_signed();
             normal.iter().enumerate().map(along).sum()
         };
-        let points: Vec<(f64, Vec<f64>)> = (0..3_usize.pow(dimension as u32))
-            .map(|q| {
-                let digit = |axis: usize| q / 3_usize.pow(axis as u32) % 3;
-                let weight = (0..dimension)
-                    .map(|axis| GAUSS_WEIGHTS[digit(axis)])
-                    .product();
-                let values = (0..count)
-                    .map(|corner| {
-                        let factor = |axis: usize| {
-                            let s = GAUSS_NODES[digit(axis)];
-                            if bit(corner, axis) == 1 { s } else { 1.0 - s }
-                        };
-                        (0..dimension).map(factor).product()
-                    })
-                    .collect();
-                (weight, values)
-            })
-            .collect();
         let table = |entry: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
             let row = |c: usize| (0..count).map(|d| entry(c, d)).collect();
             (0..count).map(row).collect()
@@ -113,7 +95,7 @@ impl ElementsOnPlanes {
             reaction: 9.0 / 8.0 * step_over_h2 / (eps_over_h * eps_over_h),
             spacing: 1.0 / square.sqrt(),
             corners: (0..count).map(|c| plane(c).cast_unsigned()).collect(),
-            points,
+            points: gauss_points(dimension),
             mass,
             stiffness,
             bend,
