@@ -5,7 +5,6 @@ use thiserror::Error as ThisError;
 /// What can go wrong in a finite-element step.
 #[derive(Debug, ThisError)]
 pub enum Error {
-    /// The time step is so large that the implicit step has no unique solution.
     #[error(
         "tautilde = {step:e} is too large for eps = {eps:e}: the implicit step needs tautilde < 8/9 eps^2 = {bound:e}"
     )]
@@ -16,7 +15,6 @@ pub enum Error {
         /// `8/9 eps^2`.
         bound: f64,
     },
-    /// An inner iteration ended above its tolerance.
     #[error(
         "{solver} stopped after {iterations} iterations at a relative residual of {residual:.1e}, above {tolerance:.1e}"
     )]
@@ -26,13 +24,11 @@ pub enum Error {
         residual: f64,
         tolerance: f64,
     },
-    /// A value became NaN or infinite.
     #[error("{field} is not finite in {solver}")]
     NonFinite {
         field: &'static str,
         solver: &'static str,
     },
-    /// The sparse factorization failed.
     #[error("the sparse Cholesky factorization of {unknowns} unknowns failed: {reason}")]
     Factorization { unknowns: usize, reason: String },
     #[error(transparent)]
