@@ -11,6 +11,7 @@ use operators::SpectralFilter;
 use solver::{Accuracy, MeanCurvatureStep, PhaseInverse};
 
 use crate::ops::{FemOps, Operation, register};
+use crate::planar::ElementsOnPlanes;
 use crate::scheme::Kind;
 use crate::{Error, LinearSolver, Scheme, Statistics, Tolerances};
 
@@ -156,7 +157,9 @@ impl<const D: usize> FiniteElementStep<D> {
     /// [`model::Error::Calibration`] if the step has no flat interface at rest.
     pub fn calibrate(&self) -> Result<Calibration, model::Error> {
         let h = self.grid.spacing();
-        crate::planar::calibrate(self.kind, D, self.eps / h, self.step / (h * h))
+        let (eps, step) = (self.eps / h, self.step / (h * h));
+        let on_planes = |normal: &[isize]| ElementsOnPlanes::new(self.kind, eps, step, normal);
+        model::calibrate(model::normals(D), on_planes)
     }
 
     /// The derivative of the step at `u` in direction `p`, given `v = v[u]`, as a Burn graph: `A(v)^-1 M p` for the implicit

@@ -116,28 +116,27 @@ impl Networks {
             return Ok(own.clone());
         }
         let all = shipped.all()?;
+        let best = (all.iter())
+            .filter(|(_, network)| fits(network))
+            .max_by_key(|(_, network)| network.ratios().width);
+        if let Some((name, network)) = best {
+            return Ok(NamedNetwork {
+                name: stem(Path::new(name)),
+                network: network.clone(),
+            });
+        }
         let mut available: Vec<f64> = (all.iter().map(|(_, network)| network.ratios()))
             .filter(|ratios| ratios.dimension == needed.dimension)
             .map(|ratios| ratios.eps_over_h)
             .collect();
-        (all.into_iter())
-            .filter(|(_, network)| fits(network))
-            .max_by_key(|(_, network)| network.ratios().width)
-            .map(|(name, network)| NamedNetwork {
-                name: stem(Path::new(name)),
-                network,
-            })
-            .ok_or_else(|| {
-                available.sort_by(f64::total_cmp);
-                available.dedup();
-                let list: Vec<String> =
-                    (available.iter().map(|eps| format!("eps/h = {eps}"))).collect();
-                Error::MissingNetwork {
-                    recipe: shipped.recipe(),
-                    wanted: needed.ratios(),
-                    available: list.join(", "),
-                }
-            })
+        available.sort_by(f64::total_cmp);
+        available.dedup();
+        let list: Vec<String> = (available.iter().map(|eps| format!("eps/h = {eps}"))).collect();
+        Err(Error::MissingNetwork {
+            recipe: shipped.recipe(),
+            wanted: needed.ratios(),
+            available: list.join(", "),
+        })
     }
 }
 

@@ -57,8 +57,7 @@ impl SphereData {
                 self.count, self.cells, self.ratios.width
             )));
         }
-        let shrunk = low * low - 2.0 * (self.ratios.dimension as f64 - 1.0) * self.step();
-        if !(low > 0.0 && low < high && high < 0.5 && shrunk > 0.0) {
+        if !(low > 0.0 && low < high && high < 0.5 && self.shrunk(low) > 0.0) {
             return Err(Error::Training(format!(
                 "radii [{low}, {high}] must lie in (0, 0.5) and survive a step of {:e}",
                 self.step()
