@@ -10,24 +10,32 @@ use burn::tensor::Tensor;
 use crate::fft::{Real, is_f64};
 use crate::filter::SpectralFilter;
 
-/// Two vectors in the memory of the host, in the precision of their tensors.
-pub enum HostVectors<'a> {
-    /// Double precision.
-    Double(&'a [f64], &'a mut [f64]),
-    /// Single precision.
-    Single(&'a [f32], &'a mut [f32]),
-}
-
 /// A change of one vector that depends on another and is computed on the host, such as a sparse correction.
 pub trait HostUpdate: Send + Sync {
-    /// Changes the second vector.
-    fn update(&self, vectors: HostVectors<'_>);
+    /// Changes `z`, given `x`, in the precision of their tensors.
+    fn update<T: Real>(&self, x: &[T], z: &mut [T]);
+}
+
+/// A [`HostUpdate`] of any type.
+trait AnyUpdate: Send + Sync {
+    fn double(&self, x: &[f64], z: &mut [f64]);
+    fn single(&self, x: &[f32], z: &mut [f32]);
+}
+
+impl<U: HostUpdate> AnyUpdate for U {
+    fn double(&self, x: &[f64], z: &mut [f64]) {
+        self.update(x, z);
+    }
+
+    fn single(&self, x: &[f32], z: &mut [f32]) {
+        self.update(x, z);
+    }
 }
 
 /// A shared [`HostUpdate`].
 #[derive(Clone, derive_more::Debug)]
 #[debug("SharedUpdate")]
-pub struct SharedUpdate(pub(crate) Arc<dyn HostUpdate>);
+pub struct SharedUpdate(Arc<dyn AnyUpdate>);
 
 /// How a vector moves by another, entry by entry.
 #[derive(Clone, Copy, Debug)]
@@ -118,10 +126,9 @@ pub fn update_on_host<const R: usize>(
 
 /// Calls an update with slices of either precision.
 pub(crate) fn call<T: Real>(update: &SharedUpdate, x: &[T], z: &mut [T]) {
-    let vectors = if is_f64::<T>() {
-        HostVectors::Double(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(z))
+    if is_f64::<T>() {
+        (update.0).double(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(z));
     } else {
-        HostVectors::Single(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(z))
-    };
-    update.0.update(vectors);
+        (update.0).single(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(z));
+    }
 }

@@ -46,7 +46,7 @@ impl MeanCurvatureStep<2> for AllenCahn {
             let change = self.step * (laplacian / self.spacing.powi(2) - 4.0 * self.a.powi(2));
             1.0 / (1.0 + stiffness * change * change)
         });
-        inverse.into()
+        PhaseInverse::Spectral(inverse)
     }
 }
 

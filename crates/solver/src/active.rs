@@ -183,7 +183,7 @@ fn distance<const D: usize>(cell: [i64; D], offset: [i64; D], side: i64) -> f64 
 
 /// The places of the nodes beside which `u` changes its sign.
 fn interface<const D: usize>(nodes: &impl Nodes<D>, u: &[f64]) -> Vec<[usize; D]> {
-    parallel::filter_map(nodes.count(), CHUNK, &|node| {
+    parallel::filter_map(u.len(), CHUNK, &|node| {
         let place = nodes.place(node);
         let positive = u[node] > 0.0;
         let changes = (0..D).any(|axis| {

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use burn::tensor::Tensor;
 use geometry::zero_set::{SizeHessian, Sizes, least_perimeter, reduced_volume};
 use geometry::{Field, Grid, positive};
-use operators::{ComputeDevice, HostUpdate, HostVectors, inner_product, retract, update_on_host};
+use operators::{ComputeDevice, HostUpdate, Real, inner_product, retract, update_on_host};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
@@ -597,16 +597,8 @@ impl<const D: usize> Projection<D> {
 struct Curvature<const D: usize>(SizeHessian<D>);
 
 impl<const D: usize> HostUpdate for Curvature<D> {
-    fn update(&self, vectors: HostVectors<'_>) {
-        match vectors {
-            HostVectors::Double(p, product) => {
-                self.0
-                    .multiply(|node| p[node], |node, value| product[node] += value);
-            }
-            HostVectors::Single(p, product) => self.0.multiply(
-                |node| f64::from(p[node]),
-                |node, value| product[node] += value as f32,
-            ),
-        }
+    fn update<T: Real>(&self, p: &[T], product: &mut [T]) {
+        let add = |node: usize, value| product[node] = product[node] + T::of(value);
+        self.0.multiply(|node| p[node].double(), add);
     }
 }

@@ -36,8 +36,10 @@ pub trait MeanCurvatureStep<const D: usize>: Send + Sync {
         x
     }
 
-    /// Rules and handlers of the custom operations in that graph.
-    fn extensions(&self) -> linearize::Extensions;
+    /// Rules and handlers of the custom operations in that graph: by default of those of [`operators`].
+    fn extensions(&self) -> linearize::Extensions {
+        operators::extensions()
+    }
 
     /// Whether Hessian-vector products may be computed in single precision.
     fn allows_single_precision(&self) -> bool {
@@ -72,16 +74,13 @@ impl<const D: usize> MeanCurvatureStep<D> for MeanCurvatureOperator<D> {
         MeanCurvatureOperator::apply(self, u)
     }
 
-    fn extensions(&self) -> linearize::Extensions {
-        operators::extensions()
-    }
-
     fn allows_single_precision(&self) -> bool {
         true
     }
 
     fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse {
-        MeanCurvatureOperator::phase_preconditioner(self, cells, stiffness).into()
+        let inverse = MeanCurvatureOperator::phase_preconditioner(self, cells, stiffness);
+        PhaseInverse::Spectral(inverse)
     }
 }
 
@@ -90,18 +89,13 @@ impl<const D: usize> MeanCurvatureStep<D> for BrickOperator<D> {
         BrickOperator::apply(self, u)
     }
 
-    fn extensions(&self) -> linearize::Extensions {
-        operators::extensions()
-    }
-
     fn allows_single_precision(&self) -> bool {
         true
     }
 
     fn phase_preconditioner(&self, _cells: usize, stiffness: f64) -> PhaseInverse {
-        PhaseInverse::Bricks(Box::new(BrickOperator::phase_preconditioner(
-            self, stiffness,
-        )))
+        let inverse = BrickOperator::phase_preconditioner(self, stiffness);
+        PhaseInverse::Bricks(Box::new(inverse))
     }
 }
 

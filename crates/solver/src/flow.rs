@@ -238,10 +238,9 @@ impl<const D: usize> WillmoreFlow<D> {
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
         params.validate()?;
-        initial.check_finite().map_err(|_| Error::NonFinite {
-            step: 0,
-            field: "phase field",
-        })?;
+        initial
+            .check_finite()
+            .map_err(|_| Error::non_finite(0, "phase field"))?;
         let grid = initial.grid();
         network.check_fits(params.ratios(grid, network.ratios().width))?;
         let operator = SeparableOperator::new(network, device)?;
@@ -439,10 +438,7 @@ impl<const D: usize> WillmoreFlow<D> {
             return Err(geometry::Error::ValueCount { expected, actual }.into());
         }
         if !values.iter().all(|value| value.is_finite()) {
-            return Err(Error::NonFinite {
-                step: state.step,
-                field: "phase field",
-            });
+            return Err(Error::non_finite(state.step, "phase field"));
         }
         Ok(())
     }
@@ -493,29 +489,41 @@ impl<const D: usize> WillmoreFlow<D> {
             start: &start,
             tau,
         })?;
-        let (scale, newton) = (self.energy_scale(), minimum.newton);
-        let record = StepRecord {
-            step: self.step + 1,
-            time: self.time + tau,
-            tau,
-            energy_before: scale * newton.energy_before,
-            energy: scale * newton.energy,
-            willmore_energy: minimum.willmore_energy,
-            tension: minimum.tension,
-            pressure: minimum.pressure,
-            start: origin,
-            newton,
-            estimates: None,
-            seconds: clock.elapsed().as_secs_f64(),
-            times: PhaseTimes {
-                start: beginning,
-                ..minimum.times
-            },
-        };
+        let scale = self.energy_scale();
+        let energies = [minimum.newton.energy_before, minimum.newton.energy];
+        let energies = energies.map(|energy| scale * energy);
+        let mut record = self.record(tau, &minimum, energies, origin, clock);
+        record.times.start = beginning;
         self.previous = Some((std::mem::replace(&mut self.current, minimum.u), tau));
         self.step += 1;
         self.time += tau;
         Ok(record)
+    }
+
+    /// What a step of size `tau` says of itself that ended in a minimum, with the energies of standing still and of the result.
+    fn record(
+        &self,
+        tau: f64,
+        minimum: &Minimum<D>,
+        [energy_before, energy]: [f64; 2],
+        start: Start,
+        clock: Instant,
+    ) -> StepRecord {
+        StepRecord {
+            step: self.step + 1,
+            time: self.time + tau,
+            tau,
+            energy_before,
+            energy,
+            willmore_energy: minimum.willmore_energy,
+            start,
+            newton: minimum.newton,
+            tension: minimum.tension,
+            pressure: minimum.pressure,
+            estimates: None,
+            seconds: clock.elapsed().as_secs_f64(),
+            times: minimum.times,
+        }
     }
 
     /// The scaled energy counts points; this makes it the paper's, with true L2 norms: `2 eps h^D`, over the factor of the metric.
@@ -576,10 +584,7 @@ impl<const D: usize> WillmoreFlow<D> {
             });
         }
         if !self.device.values(u.clone())?.iter().all(|u| u.is_finite()) {
-            return Err(Error::NonFinite {
-                step,
-                field: "phase field",
-            });
+            return Err(Error::non_finite(step, "phase field"));
         }
         let mut motion = u.clone() - anchor.clone();
         if let Some(factors) = factors {
@@ -695,10 +700,8 @@ impl<const D: usize> MeanCurvatureFlow<D> {
     /// # Errors
     /// [`Error::NonFinite`] naming the step, [`Error::Operators`] if the device fails.
     pub fn field(&self) -> Result<Field<D>, Error> {
-        download(&self.grid, &self.current, &self.device).map_err(|_| Error::NonFinite {
-            step: self.step,
-            field: "phase field",
-        })
+        download(&self.grid, &self.current, &self.device)
+            .map_err(|_| Error::non_finite(self.step, "phase field"))
     }
 }
 
@@ -715,10 +718,9 @@ fn fitting_operator<const D: usize>(
 }
 
 fn upload<const D: usize>(field: &Field<D>, device: &ComputeDevice) -> Result<Tensor<D>, Error> {
-    field.check_finite().map_err(|_| Error::NonFinite {
-        step: 0,
-        field: "phase field",
-    })?;
+    field
+        .check_finite()
+        .map_err(|_| Error::non_finite(0, "phase field"))?;
     Ok(device.tensor(field.values(), field.grid().shape()))
 }
 

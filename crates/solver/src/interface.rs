@@ -17,7 +17,7 @@
 use faer::linalg::solvers::{Llt, Solve};
 use faer::{ColMut, Mat, Side};
 use geometry::{Grid, parallel};
-use operators::{HostUpdate, HostVectors, Real};
+use operators::{HostUpdate, Real};
 
 use crate::nodes::Nodes;
 use crate::samples::{MOST_CORNERS, Samples};
@@ -76,7 +76,7 @@ impl<const D: usize> InterfaceModes<D> {
         tau: f64,
         region: Option<&[bool]>,
     ) -> Option<Self> {
-        let samples = Samples::new(grid, nodes, u, eps, SPACING * eps, region);
+        let samples = Samples::new(grid, nodes, u, eps, SPACING * eps, region)?;
         let sharp = (samples.nodes.iter()).filter(|s| s.curvature.abs() * eps > 1.0);
         let corners_dominate = sharp.count() as f64 > SHARP * samples.nodes.len() as f64;
         if samples.nodes.is_empty() || corners_dominate {
@@ -89,9 +89,11 @@ impl<const D: usize> InterfaceModes<D> {
         };
         Some(Self { samples, inverse })
     }
+}
 
+impl<const D: usize> HostUpdate for InterfaceModes<D> {
     /// Adds `Z A^-1 Z^T r` to `z`.
-    pub(crate) fn correct<T: Real>(&self, r: &[T], z: &mut [T]) {
+    fn update<T: Real>(&self, r: &[T], z: &mut [T]) {
         let samples = &self.samples;
         let parts = parallel::map(samples.corners.len(), 16, &|cell| {
             let mut sums = [0.0; MOST_CORNERS];
@@ -206,15 +208,6 @@ fn local_matrices<const D: usize, const N: usize>(
     parallel::map(samples.corners.len(), 1, &of_cell)
 }
 
-impl<const D: usize> HostUpdate for InterfaceModes<D> {
-    fn update(&self, vectors: HostVectors<'_>) {
-        match vectors {
-            HostVectors::Double(r, z) => self.correct(r, z),
-            HostVectors::Single(r, z) => self.correct(r, z),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -251,7 +244,7 @@ mod tests {
         for k in [0.0_f64, 2.0, 5.0] {
             let p = wave(&grid, &u, k);
             let mut z = vec![0.0; p.len()];
-            modes.correct(&p, &mut z);
+            modes.update(&p, &mut z);
             // On the circle of radius R, with kappa = 1/R and the wave number k/R.
             let (w, kappa) = (k / 0.3, 1.0_f64 / 0.3);
             let stiffness = w.powi(4) + BENT * kappa.powi(2) * (w.powi(2) + kappa.powi(2));
@@ -276,7 +269,7 @@ mod tests {
         };
         let apply = |x: &[f64]| {
             let mut z = vec![0.0; x.len()];
-            modes.correct(x, &mut z);
+            modes.update(x, &mut z);
             z
         };
         let (a, b) = (vector(0.37), vector(1.91));

@@ -3,6 +3,8 @@
 //! Two methods share the same inputs and outputs. [`Method::Preconditioned`] is the one to use. [`Method::Paper`] is the
 //! plain Newton-CG with Armijo's rule of the paper (alg:hybrid_scheme), kept for comparison.
 
+use std::cell::Cell;
+
 use burn::tensor::Tensor;
 use geometry::require;
 use operators::{ComputeDevice, retract};
@@ -10,9 +12,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::cg::{CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
 use crate::constraints::{Held, Place, Tangent};
-use crate::preconditioner::Preconditioner;
+use crate::preconditioner::{Level, Preconditioner};
 use crate::region::Region;
-use crate::times::{PhaseTimes, Stopwatch};
+use crate::times::{PhaseTimes, timed};
 use crate::{Error, Objective, Precision};
 
 /// Which minimization.
@@ -150,13 +152,6 @@ impl NewtonInfo {
     }
 }
 
-/// Which parts of the preconditioner.
-#[derive(Clone, Copy)]
-enum Level {
-    Both,
-    Phase,
-}
-
 /// A point with its energy and gradient; the objective's own point is this one.
 struct Point<const D: usize> {
     u: Tensor<D>,
@@ -176,10 +171,7 @@ struct Minimizer<'a, 'h, const D: usize, O> {
     previous: &'a Tensor<D>,
     unknowns: f64,
     info: NewtonInfo,
-    products: Stopwatch,
-    energies: Stopwatch,
-    preconditioning: Stopwatch,
-    assembly: Stopwatch,
+    times: Cell<PhaseTimes>,
 }
 
 /// Minimizes `objective`, whose fidelity term is centred at `previous`, from `start`.
@@ -217,13 +209,10 @@ pub(crate) fn minimize_timed<const D: usize>(
     device: &ComputeDevice,
 ) -> Result<(Tensor<D>, NewtonInfo, PhaseTimes), Error> {
     params.validate()?;
-    let energies = Stopwatch::default();
-    let energy_before = energies.time(|| objective.value(previous))?;
+    let times = Cell::<PhaseTimes>::default();
+    let energy_before = timed(&times, |t| &mut t.energies, || objective.value(previous))?;
     if !energy_before.is_finite() {
-        return Err(Error::NonFinite {
-            step: 0,
-            field: "energy",
-        });
+        return Err(Error::non_finite(0, "energy"));
     }
     let mut minimizer = Minimizer {
         objective,
@@ -245,25 +234,15 @@ pub(crate) fn minimize_timed<const D: usize>(
             energy: energy_before,
             estimate: f64::INFINITY,
         },
-        products: Stopwatch::default(),
-        energies,
-        preconditioning: Stopwatch::default(),
-        assembly: Stopwatch::default(),
+        times,
     };
     let u = match params.method {
         Method::Preconditioned => minimizer.preconditioned(start)?,
         Method::Paper => minimizer.paper()?,
     };
     // Adding nothing makes 0.0 of -0.0.
-    let u = minimizer.hold(minimizer.exact(u)?);
-    let times = PhaseTimes {
-        products: minimizer.products.seconds(),
-        preconditioner: minimizer.preconditioning.seconds(),
-        assembly: minimizer.assembly.seconds(),
-        energies: minimizer.energies.seconds(),
-        start: 0.0,
-    };
-    Ok((u, minimizer.info, times))
+    let u = minimizer.hold(minimizer.found(&u, true)?.u);
+    Ok((u, minimizer.info, minimizer.times.get()))
 }
 
 impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
@@ -280,28 +259,24 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         }
     }
 
-    /// The phase field near `u` that fulfils the constraints exactly.
-    fn exact(&self, u: Tensor<D>) -> Result<Tensor<D>, Error> {
+    /// The same, exactly if so said, and where there is none, the error that says so.
+    fn found(&self, u: &Tensor<D>, exactly: bool) -> Result<Place<D>, Error> {
+        let (u, tangent) = (u.clone(), None);
         let Some(held) = &self.held else {
-            return Ok(u);
+            return Ok(Place { u, tangent });
         };
-        match held.restored(u.clone(), true, |u| self.hold(u))? {
-            Some(place) => Ok(place.u),
+        match held.restored(u.clone(), exactly, |u| self.hold(u))? {
+            Some(place) => Ok(place),
             None => Err(held.lost(&u)?),
         }
     }
 
-    /// The place at the previous phase field.
-    fn rest(&self) -> Result<Place<D>, Error> {
-        match (self.place(self.previous.clone())?, &self.held) {
-            (Some(rest), _) => Ok(rest),
-            (None, Some(held)) => Err(held.lost(self.previous)?),
-            (None, None) => unreachable!("without constraints every place is one"),
-        }
-    }
-
     fn point(&mut self, Place { u, tangent }: Place<D>) -> Result<Point<D>, Error> {
-        let (energy, gradient) = self.energies.time(|| self.objective.evaluate(&u))?;
+        let (energy, gradient) = timed(
+            &self.times,
+            |t| &mut t.energies,
+            || self.objective.evaluate(&u),
+        )?;
         self.info.gradients += 1;
         Ok(Point {
             u,
@@ -325,7 +300,11 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
 
     fn energy(&mut self, place: &Place<D>) -> Result<f64, Error> {
         self.info.values += 1;
-        let energy = self.energies.time(|| self.objective.value(&place.u))?;
+        let energy = timed(
+            &self.times,
+            |t| &mut t.energies,
+            || self.objective.value(&place.u),
+        )?;
         Ok(energy + self.excess(place.tangent.as_ref()))
     }
 
@@ -344,13 +323,13 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         level: Level,
     ) -> Result<CgSolution<D>, Error> {
         let (preconditioner, device) = (self.preconditioner.as_ref(), self.device);
-        let clock = &self.preconditioning;
+        let times = &self.times;
         let precondition = |r: &Tensor<D>| {
-            clock.time(|| match (preconditioner, level) {
-                (Some(preconditioner), Level::Both) => preconditioner.apply(r),
-                (Some(preconditioner), Level::Phase) => preconditioner.apply_phase(r),
-                (None, _) => r.clone(),
-            })
+            let apply = || match preconditioner {
+                Some(preconditioner) => preconditioner.apply(r, level),
+                None => r.clone(),
+            };
+            timed(times, |t| &mut t.preconditioner, apply)
         };
         let gradient = &point.gradient;
         let quadratic = Quadratic {
@@ -358,13 +337,14 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             dtype: (self.objective.product_dtype()).unwrap_or(gradient.dtype()),
             unit: self.objective.unit(),
             product: &mut |p| {
-                let product = (self.products).time(|| self.objective.hessian_vector_product(p))?;
+                let product = || self.objective.hessian_vector_product(p);
+                let product = timed(times, |t| &mut t.products, product)?;
                 Ok(Region::project(self.region, product))
             },
         };
         let solution = match (&mut self.held, &point.tangent) {
             (Some(held), Some(tangent)) => {
-                let keep = matches!(level, Level::Both);
+                let keep = level == Level::Both;
                 held.solve(quadratic, tangent, &precondition, limits, keep)?
             }
             _ => conjugate_gradients(quadratic, &precondition, limits, device)?,
@@ -372,10 +352,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         self.info.hvp += solution.iterations;
         self.info.negative_curvature += usize::from(solution.negative_curvature);
         if !solution.slope.is_finite() {
-            return Err(Error::NonFinite {
-                step: 0,
-                field: "search direction",
-            });
+            return Err(Error::non_finite(0, "search direction"));
         }
         Ok(solution)
     }
@@ -480,19 +457,16 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         const SHORTEST: f64 = 0.02;
         let place = match self.place(self.hold(start.clone()))? {
             Some(place) => place,
-            None => self.rest()?,
+            None => self.found(self.previous, false)?,
         };
         let mut point = self.point(place)?;
         if !point.energy.is_finite() {
-            return Err(Error::NonFinite {
-                step: 0,
-                field: "energy of the start",
-            });
+            return Err(Error::non_finite(0, "energy of the start"));
         }
         point = self.clean(point)?;
         if point.energy > self.info.energy_before {
             // An extrapolation that made things worse is dropped. Where a target moves, so does the energy of standing still.
-            let rest = self.point(self.rest()?)?;
+            let rest = self.point(self.found(self.previous, false)?)?;
             if rest.energy < point.energy {
                 point = rest;
             }
@@ -506,8 +480,8 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
                 iterations: self.params.cg_iterations,
             };
             if let Some(preconditioner) = &mut self.preconditioner {
-                self.assembly
-                    .time(|| preconditioner.follow(&point.u, self.device))?;
+                let follow = || preconditioner.follow(&point.u, self.device);
+                timed(&self.times, |t| &mut t.assembly, follow)?;
             }
             let solution = self.solve(&point, limits, Level::Both)?;
             let sign = -solution.slope.signum();
@@ -566,8 +540,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
 
     /// alg:hybrid_scheme: from `u_k`, conjugate gradients with a forcing sequence, Armijo backtracking on a straight line.
     fn paper(&mut self) -> Result<Tensor<D>, Error> {
-        let rest = self.rest()?;
-        let mut point = self.point(rest)?;
+        let mut point = self.point(self.found(self.previous, false)?)?;
         let first = dot(&point.gradient, &point.gradient, self.device)?.sqrt();
         while self.info.newton < self.params.newton_iterations {
             let norm = dot(&point.gradient, &point.gradient, self.device)?.sqrt();

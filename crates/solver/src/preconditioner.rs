@@ -20,12 +20,6 @@ pub enum PhaseInverse {
     Bricks(Box<Smoother>),
 }
 
-impl From<SpectralFilter> for PhaseInverse {
-    fn from(filter: SpectralFilter) -> Self {
-        Self::Spectral(filter)
-    }
-}
-
 impl PhaseInverse {
     fn apply<const D: usize>(&self, r: &Tensor<D>) -> Tensor<D> {
         match self {
@@ -33,6 +27,13 @@ impl PhaseInverse {
             Self::Bricks(smoother) => smoother.apply(r),
         }
     }
+}
+
+/// Which parts of the preconditioner.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Level {
+    Both,
+    Phase,
 }
 
 /// A symmetric positive definite approximation of the inverse Hessian: the exact one in the pure phases, which handles
@@ -65,20 +66,12 @@ impl<const D: usize> Preconditioner<D> {
     }
 
     /// Applies it, in the precision of `r`.
-    pub(crate) fn apply(&self, r: &Tensor<D>) -> Tensor<D> {
+    pub(crate) fn apply(&self, r: &Tensor<D>, level: Level) -> Tensor<D> {
         let z = self.phase.apply(r);
-        self.projected(match &self.interface {
-            Some(interface) => update_on_host(r, z, interface),
-            None => z,
-        })
-    }
-
-    /// Applies the approximation in the pure phases alone.
-    pub(crate) fn apply_phase(&self, r: &Tensor<D>) -> Tensor<D> {
-        self.projected(self.phase.apply(r))
-    }
-
-    fn projected(&self, z: Tensor<D>) -> Tensor<D> {
+        let z = match &self.interface {
+            Some(interface) if level == Level::Both => update_on_host(r, z, interface),
+            _ => z,
+        };
         Region::project(self.region.as_ref(), z)
     }
 }

@@ -8,10 +8,8 @@ use crate::Error;
 use crate::active::Active;
 use crate::nodes::Nodes;
 
-/// The values of phase fields where nothing is stored, in the negative and in the positive phase.
-pub(crate) fn phases<const D: usize>(active: Option<&Active<D>>) -> [f64; 2] {
-    active.map_or([-1.0, 1.0], Active::rests)
-}
+/// The values of phase fields in the negative and in the positive phase.
+const PHASES: [f64; 2] = [-1.0, 1.0];
 
 /// The values of a field on the whole grid, or on active bricks, with the constants that it has outside.
 #[derive(Clone)]
@@ -26,7 +24,7 @@ pub struct Stored<const D: usize> {
 impl<const D: usize> From<Field<D>> for Stored<D> {
     fn from(field: Field<D>) -> Self {
         let grid = *field.grid();
-        Self::new(field.into_values(), grid, None, phases::<D>(None))
+        Self::new(field.into_values(), grid, None, PHASES)
     }
 }
 
@@ -38,7 +36,7 @@ impl<const D: usize> Stored<D> {
         active: Option<Active<D>>,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
-        let rests = phases(active.as_ref());
+        let rests = active.as_ref().map_or(PHASES, Active::rests);
         Ok(Self::new(device.values(u.clone())?, grid, active, rests))
     }
 
@@ -98,12 +96,8 @@ impl<const D: usize> Stored<D> {
     }
 
     pub(crate) fn map(&self, f: impl Fn(f64) -> f64 + Sync) -> Self {
-        Self {
-            grid: self.grid,
-            active: self.active.clone(),
-            values: parallel::values(self.values.len(), |i| f(self.values[i])),
-            rests: self.rests.map(f),
-        }
+        let values = parallel::values(self.values.len(), |i| f(self.values[i]));
+        Self::new(values, self.grid, self.active.clone(), self.rests.map(f))
     }
 
     /// A function of two fields, on the larger one of their sets of bricks, to which the other is carried.
@@ -123,12 +117,9 @@ impl<const D: usize> Stored<D> {
             "both are on bricks, or neither"
         );
         let (own, others) = (&self.values, &other.values);
-        Self {
-            grid: self.grid,
-            active: active.cloned(),
-            values: parallel::values(own.len(), |i| f(own[i], others[i])),
-            rests: [0, 1].map(|phase| f(self.rests[phase], other.rests[phase])),
-        }
+        let values = parallel::values(own.len(), |i| f(own[i], others[i]));
+        let rests = [0, 1].map(|phase| f(self.rests[phase], other.rests[phase]));
+        Self::new(values, self.grid, active.cloned(), rests)
     }
 
     /// The Laplacian by centred differences of second order, periodic.
@@ -137,12 +128,7 @@ impl<const D: usize> Stored<D> {
             Some(active) => self.laplacian_at(&**active.bricks()),
             None => self.laplacian_at(&self.grid),
         };
-        Self {
-            grid: self.grid,
-            active: self.active.clone(),
-            values,
-            rests: [0.0; 2],
-        }
+        Self::new(values, self.grid, self.active.clone(), [0.0; 2])
     }
 
     fn laplacian_at(&self, nodes: &impl Nodes<D>) -> Vec<f64> {
@@ -158,7 +144,7 @@ impl<const D: usize> Stored<D> {
             };
             unit * (0..D).map(along).sum::<f64>()
         };
-        parallel::values(nodes.count(), at)
+        parallel::values(self.values.len(), at)
     }
 
     /// The largest size of a value.

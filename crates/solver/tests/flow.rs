@@ -367,7 +367,8 @@ impl MeanCurvatureStep<2> for Pointwise {
     }
 
     fn phase_preconditioner(&self, cells: usize, _stiffness: f64) -> PhaseInverse {
-        SpectralFilter::from_kernel(&[cells; 2], &[1.0], 1, |_| 1.0).into()
+        let filter = SpectralFilter::from_kernel(&[cells; 2], &[1.0], 1, |_| 1.0);
+        PhaseInverse::Spectral(filter)
     }
 }
 
