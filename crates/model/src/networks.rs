@@ -39,12 +39,11 @@ impl NeededNetwork {
         }
     }
 
-    /// With the width that is wanted, or else the usual one, `8 eps/h + 1`.
-    fn ratios(&self) -> Ratios {
-        let usual = 8 * self.eps_over_h.clamp(1.0, 64.0).ceil() as usize + 1;
+    /// With the width that is wanted, or else another.
+    fn ratios(&self, other: usize) -> Ratios {
         Ratios {
             dimension: self.dimension,
-            width: self.width.unwrap_or(usual),
+            width: self.width.unwrap_or(other),
             eps_over_h: self.eps_over_h,
             step_over_h2: self.step_over_h2,
         }
@@ -52,10 +51,7 @@ impl NeededNetwork {
 
     fn is_met_by(&self, network: &Network) -> bool {
         let own = network.ratios();
-        own.matches(&Ratios {
-            width: self.width.unwrap_or(own.width),
-            ..self.ratios()
-        })
+        own.matches(&self.ratios(own.width))
     }
 }
 
@@ -92,10 +88,7 @@ impl Networks {
                 };
                 // The need that is most like the network makes the most helpful message.
                 let nearest = (needs.iter().max_by_key(alike)).ok_or(Error::NetworkNotNeeded)?;
-                let run = Ratios {
-                    width: nearest.width.unwrap_or(own.width),
-                    ..nearest.ratios()
-                };
+                let run = nearest.ratios(own.width);
                 return Err(Error::Mismatch { network: own, run });
             }
             files.push(NamedNetwork {
@@ -132,9 +125,10 @@ impl Networks {
         available.sort_by(f64::total_cmp);
         available.dedup();
         let list: Vec<String> = (available.iter().map(|eps| format!("eps/h = {eps}"))).collect();
+        let usual = 8 * needed.eps_over_h.clamp(1.0, 64.0).ceil() as usize + 1;
         Err(Error::MissingNetwork {
             recipe: shipped.recipe(),
-            wanted: needed.ratios(),
+            wanted: needed.ratios(usual),
             available: list.join(", "),
         })
     }

@@ -22,8 +22,8 @@ const CHUNK: usize = 1 << 14;
 pub(crate) struct Active<const D: usize> {
     operator: SeparableOperator<D>,
     eps: f64,
-    grid: Grid<D>,
-    bricks: Arc<Bricks<D>>,
+    pub(crate) grid: Grid<D>,
+    pub(crate) bricks: Arc<Bricks<D>>,
 }
 
 impl<const D: usize> Active<D> {
@@ -50,14 +50,6 @@ impl<const D: usize> Active<D> {
             bricks,
             ..self.clone()
         }
-    }
-
-    pub(crate) fn grid(&self) -> &Grid<D> {
-        &self.grid
-    }
-
-    pub(crate) fn bricks(&self) -> &Arc<Bricks<D>> {
-        &self.bricks
     }
 
     /// The step of mean curvature flow on them.

@@ -138,8 +138,7 @@ pub struct MinimizingMovement<const D: usize> {
     step: Arc<dyn MeanCurvatureStep<D>>,
     device: ComputeDevice,
     anchor: Value,
-    stiffness: f64,
-    stiffness_tensor: Value,
+    stiffness: Value,
     /// `s`, where the motion is weighted.
     factors: Option<Value>,
 }
@@ -170,9 +169,9 @@ impl<const D: usize> MinimizingMovement<D> {
     ) -> Result<Self, Error> {
         let options = (device.device(), device.dtype());
         let anchor = Value::from(Tensor::<D>::zeros(shape, options));
-        let stiffness_tensor = Value::from(device.tensor::<1>(&[1.0], [1]));
+        let stiffness = Value::from(device.tensor::<1>(&[1.0], [1]));
         let factors = weighted.then(|| Value::from(Tensor::<D>::ones(shape, options)));
-        let mut parameters = vec![anchor.clone(), stiffness_tensor.clone()];
+        let mut parameters = vec![anchor.clone(), stiffness.clone()];
         parameters.extend(factors.clone());
         let graph = Graph::gradient(std::slice::from_ref(&anchor), &parameters, |inputs| {
             let u = inputs.variable::<D>(0);
@@ -201,8 +200,7 @@ impl<const D: usize> MinimizingMovement<D> {
             step,
             device: device.clone(),
             anchor,
-            stiffness: 1.0,
-            stiffness_tensor,
+            stiffness,
             factors,
         })
     }
@@ -214,10 +212,7 @@ impl<const D: usize> MinimizingMovement<D> {
     pub fn set(&mut self, anchor: &Tensor<D>, stiffness: f64) -> Result<(), Error> {
         geometry::positive("tau / tautilde^2", stiffness)?;
         self.anchor = anchor.clone().into();
-        if self.stiffness.to_bits() != stiffness.to_bits() {
-            self.stiffness = stiffness;
-            self.stiffness_tensor = self.device.tensor::<1>(&[stiffness], [1]).into();
-        }
+        self.stiffness = self.device.tensor::<1>(&[stiffness], [1]).into();
         self.linearization.forget();
         Ok(())
     }
@@ -237,7 +232,7 @@ impl<const D: usize> MinimizingMovement<D> {
     }
 
     fn parameters(&self) -> Vec<Value> {
-        let mut parameters = vec![self.anchor.clone(), self.stiffness_tensor.clone()];
+        let mut parameters = vec![self.anchor.clone(), self.stiffness.clone()];
         parameters.extend(self.factors.clone());
         parameters
     }

@@ -245,7 +245,7 @@ impl<const D: usize> WillmoreFlow<D> {
         network.check_fits(params.ratios(grid, network.ratios().width))?;
         let operator = SeparableOperator::new(network, device)?;
         let active = Active::new(operator, initial, params.eps)?;
-        let bricks = active.bricks();
+        let bricks = &active.bricks;
         let current = device.tensor(&bricks.gather(initial.values()), bricks.shape());
         let step = Arc::new(active.step(device));
         Self::begun(step, Some(active), (grid, current), params, device)
@@ -291,7 +291,7 @@ impl<const D: usize> WillmoreFlow<D> {
     pub fn restrict_to(&mut self, nodes: &[bool]) -> Result<(), Error> {
         let mut region = Region::new(&self.grid, nodes, &self.device)?;
         if let Some(active) = &self.active {
-            region = region.on(active.bricks(), &self.device);
+            region = region.on(&active.bricks, &self.device);
         }
         if let Some(half) = &mut self.half {
             half.restrict_to(&every_other_node(self.grid, nodes))?;
@@ -354,7 +354,7 @@ impl<const D: usize> WillmoreFlow<D> {
 
     /// The phase field now.
     pub fn field(&self) -> Result<Field<D>, Error> {
-        self.on_grid(&self.current)
+        self.stored_field()?.field()
     }
 
     /// The phase field now, as it is stored.
@@ -370,7 +370,7 @@ impl<const D: usize> WillmoreFlow<D> {
             None => None,
         };
         Ok(FlowState {
-            bricks: self.active.as_ref().map(|active| active.bricks().clone()),
+            bricks: self.active.as_ref().map(|active| active.bricks.clone()),
             current: values(&self.current)?,
             previous,
             rate: self.rate.clone().map(Stored::into_values),
@@ -405,7 +405,7 @@ impl<const D: usize> WillmoreFlow<D> {
         // Values on the whole grid, as of a flow that has not been on bricks yet.
         let whole = self.active.as_ref().filter(|_| state.bricks.is_none());
         let stored = |values: &Vec<f64>| match whole {
-            Some(active) => active.bricks().gather(values),
+            Some(active) => active.bricks.gather(values),
             None => values.clone(),
         };
         let dims = self.current.dims();
@@ -426,7 +426,7 @@ impl<const D: usize> WillmoreFlow<D> {
         let expected = match (&self.active, &state.bricks) {
             (Some(active), Some(bricks)) => {
                 let [cells, side] = [bricks.cells(), bricks.side()];
-                if [cells, side] != [self.grid.cells(), active.bricks().side()] {
+                if [cells, side] != [self.grid.cells(), active.bricks.side()] {
                     return Err(operators::Error::Bricks { cells, side }.into());
                 }
                 bricks.len()
@@ -551,7 +551,7 @@ impl<const D: usize> WillmoreFlow<D> {
             grid: self.grid,
             eps: self.params.eps,
             tau,
-            bricks: (self.active.as_ref()).map(|active| active.bricks().clone()),
+            bricks: (self.active.as_ref()).map(|active| active.bricks.clone()),
             region: self.region.clone(),
             interface: None,
         });
@@ -596,7 +596,7 @@ impl<const D: usize> WillmoreFlow<D> {
                 .scalar((motion.clone() * self.mcf.mass(motion)).sum())?;
         // The energy of standing still is 2 tau w.
         let unit = self.energy_scale() / (2.0 * tau);
-        let multipliers = held.map(|held| held.multipliers().map(|value| unit * value));
+        let multipliers = held.map(|held| held.multipliers.map(|value| unit * value));
         let [tension, pressure] = multipliers.unwrap_or_default();
         Ok(Minimum {
             u,

@@ -14,7 +14,7 @@
 //!
 //! [sparse]: crate::sparse
 
-use faer::linalg::solvers::{Llt, Solve};
+use faer::linalg::solvers::Solve;
 use faer::{ColMut, Mat, Side};
 use geometry::{Grid, parallel};
 use operators::{HostUpdate, Real};
@@ -43,22 +43,8 @@ pub(crate) struct InterfaceModes<const D: usize> {
     inverse: Inverse,
 }
 
-/// The inverse of the coarse problem.
-enum Inverse {
-    Dense(Llt<f64>),
-    Sparse(Box<SparseInverse>),
-}
-
-impl Inverse {
-    fn apply(&self, x: &mut [f64]) {
-        match self {
-            Self::Dense(factor) => {
-                factor.solve_in_place(ColMut::from_slice_mut(x).as_mat_mut());
-            }
-            Self::Sparse(inverse) => inverse.apply(x),
-        }
-    }
-}
+/// Applies the inverse of the coarse problem.
+type Inverse = Box<dyn Fn(&mut [f64]) + Send + Sync>;
 
 /// One matrix per cell, rows and columns being the corners.
 type Local = [[f64; MOST_CORNERS]; MOST_CORNERS];
@@ -82,10 +68,12 @@ impl<const D: usize> InterfaceModes<D> {
         if samples.nodes.is_empty() || corners_dominate {
             return None;
         }
-        let inverse = if N::WHOLE_GRID && samples.columns.len() <= MOST_DENSE {
-            Inverse::Dense(coarse_matrix(&samples, tau)?.llt(Side::Lower).ok()?)
+        let inverse: Inverse = if N::WHOLE_GRID && samples.columns.len() <= MOST_DENSE {
+            let factor = coarse_matrix(&samples, tau)?.llt(Side::Lower).ok()?;
+            Box::new(move |x| factor.solve_in_place(ColMut::from_slice_mut(x).as_mat_mut()))
         } else {
-            Inverse::Sparse(Box::new(sparse_inverse(&samples, tau)?))
+            let inverse = sparse_inverse(&samples, tau)?;
+            Box::new(move |x| inverse.apply(x))
         };
         Some(Self { samples, inverse })
     }
@@ -111,7 +99,7 @@ impl<const D: usize> HostUpdate for InterfaceModes<D> {
                 coarse[column as usize] += sum;
             }
         }
-        self.inverse.apply(&mut coarse);
+        (self.inverse)(&mut coarse);
         parallel::over_chunks(z, CHUNK, &|first, z| {
             let from = samples.nodes.partition_point(|s| (s.node as usize) < first);
             for sample in &samples.nodes[from..] {

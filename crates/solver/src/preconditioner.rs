@@ -56,7 +56,7 @@ impl<const D: usize> Preconditioner<D> {
     pub(crate) fn follow(&mut self, u: &Tensor<D>, device: &ComputeDevice) -> Result<(), Error> {
         let u = device.values(u.clone())?;
         let (grid, eps, tau) = (&self.grid, self.eps, self.tau);
-        let region = self.region.as_ref().map(Region::nodes);
+        let region = self.region.as_ref().map(|region| &*region.nodes);
         self.interface = match &self.bricks {
             None => InterfaceModes::new(grid, grid, &u, eps, tau, region),
             Some(bricks) => InterfaceModes::new(grid, &**bricks, &u, eps, tau, region),

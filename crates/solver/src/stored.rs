@@ -58,7 +58,7 @@ impl<const D: usize> Stored<D> {
     /// The field on the whole grid.
     pub(crate) fn field(&self) -> Result<Field<D>, Error> {
         let values = match &self.active {
-            Some(active) => active.bricks().scatter(&self.values, self.rests),
+            Some(active) => active.bricks.scatter(&self.values, self.rests),
             None => self.values.clone(),
         };
         Ok(Field::from_values(self.grid, values)?)
@@ -67,7 +67,7 @@ impl<const D: usize> Stored<D> {
     /// Writes the values of the whole grid for nodes in a row from one on; where it is on bricks, both multiples of their sides.
     pub fn read(&self, start: usize, part: &mut [f64]) {
         match &self.active {
-            Some(active) => (active.bricks()).read(&self.values, self.rests, start, part),
+            Some(active) => (active.bricks).read(&self.values, self.rests, start, part),
             None => part.copy_from_slice(&self.values[start..][..part.len()]),
         }
     }
@@ -78,7 +78,7 @@ impl<const D: usize> Stored<D> {
 
     pub(crate) fn tensor(&self, device: &ComputeDevice) -> Tensor<D> {
         let whole = || self.grid.shape();
-        let shape = (self.active.as_ref()).map_or_else(whole, |active| active.bricks().shape());
+        let shape = (self.active.as_ref()).map_or_else(whole, |active| active.bricks.shape());
         device.tensor(&self.values, shape)
     }
 
@@ -87,9 +87,9 @@ impl<const D: usize> Stored<D> {
         let Some(own) = &self.active else {
             return self.clone();
         };
-        let (bricks, rests) = (active.bricks(), self.rests);
+        let (bricks, rests) = (&active.bricks, self.rests);
         Self {
-            values: bricks.carried(own.bricks(), &self.values, rests),
+            values: bricks.carried(&own.bricks, &self.values, rests),
             active: Some(active.clone()),
             ..*self
         }
@@ -103,7 +103,7 @@ impl<const D: usize> Stored<D> {
     /// A function of two fields, on the larger one of their sets of bricks, to which the other is carried.
     pub(crate) fn zip_map(&self, other: &Self, f: impl Fn(f64, f64) -> f64 + Sync) -> Self {
         let active = match (&self.active, &other.active) {
-            (Some(own), Some(others)) if own.bricks() != others.bricks() => {
+            (Some(own), Some(others)) if own.bricks != others.bricks => {
                 if other.values.len() > self.values.len() {
                     return self.on(others).zip_map(other, f);
                 }
@@ -125,7 +125,7 @@ impl<const D: usize> Stored<D> {
     /// The Laplacian by centred differences of second order, periodic.
     pub(crate) fn laplacian(&self) -> Self {
         let values = match &self.active {
-            Some(active) => self.laplacian_at(&**active.bricks()),
+            Some(active) => self.laplacian_at(&*active.bricks),
             None => self.laplacian_at(&self.grid),
         };
         Self::new(values, self.grid, self.active.clone(), [0.0; 2])
@@ -175,7 +175,7 @@ mod tests {
     }
 
     fn part_of(field: &Field<2>, active: Active<2>) -> Stored<2> {
-        let values = active.bricks().gather(field.values());
+        let values = active.bricks.gather(field.values());
         let rests = active.rests();
         Stored::new(values, *field.grid(), Some(active), rests)
     }
@@ -184,7 +184,7 @@ mod tests {
     #[test]
     fn results_on_bricks_are_those_on_the_grid() {
         let (disc, active) = disc(0.5);
-        let (bricks, rests) = (active.bricks().clone(), active.rests());
+        let (bricks, rests) = (active.bricks.clone(), active.rests());
         let part = part_of(&disc, active);
         let whole = part.field().unwrap().into_values();
         let whole = Stored::new(whole, *disc.grid(), None, rests);

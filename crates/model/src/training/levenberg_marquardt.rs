@@ -491,7 +491,7 @@ impl Recipe for LmParams {
         let heat = orbits.average(&heat_kernel(data.ratios));
         let activation_len = parameter_count(&PAPER_LAYERS);
         let mut ridge: Vec<f64> = orbits
-            .sizes()
+            .sizes
             .iter()
             .map(|&s| self.kernel_ridge * s as f64)
             .collect();
@@ -500,7 +500,7 @@ impl Recipe for LmParams {
         let n = orbits.count();
         let scale = training.identity_loss;
         let held_scale = held_out.identity_loss;
-        let sizes = orbits.sizes();
+        let sizes = &orbits.sizes;
         let no_ridge = (vec![0.0; ridge.len()], centre.clone());
         let held_out = Problem::new(&held_out, sizes, no_ridge, device);
         let problem = Problem::new(&training, sizes, (ridge, centre), device);
@@ -596,7 +596,7 @@ mod tests {
         let x = [heat, random_activation(&mut rng)].concat();
         let centre = x.iter().map(|x| 0.9 * x).collect();
         let ridge = vec![1e-2; x.len()];
-        let problem = Problem::new(&samples, orbits.sizes(), (ridge, centre), device);
+        let problem = Problem::new(&samples, &orbits.sizes, (ridge, centre), device);
         (problem, x)
     }
 

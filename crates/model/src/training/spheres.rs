@@ -175,7 +175,7 @@ impl BandSamples {
             .par_chunks_mut(n)
             .zip(&points)
             .for_each(|(row, (radius, x, _))| {
-                for (offset, &orbit) in offsets.iter().zip(orbits.of_entries()) {
+                for (offset, &orbit) in offsets.iter().zip(&orbits.index) {
                     let squared: f64 = x.iter().zip(offset).map(|(x, b)| (x + b) * (x + b)).sum();
                     row[orbit] += optimal_profile(squared.sqrt() - radius, eps);
                 }
@@ -194,7 +194,7 @@ impl BandSamples {
                 weight * step * step
             })
             .sum();
-        let sizes: Vec<f64> = orbits.sizes().iter().map(|&s| s as f64).collect();
+        let sizes: Vec<f64> = orbits.sizes.iter().map(|&s| s as f64).collect();
         for (phase, area) in [(1.0, inside), (-1.0, outside)] {
             design.extend(sizes.iter().map(|s| phase * s));
             target.push(phase);
