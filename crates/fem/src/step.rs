@@ -7,7 +7,7 @@ use burn::tensor::Tensor;
 use geometry::{Field, Grid};
 use linearize::Extensions;
 use model::Calibration;
-use operators::SpectralFilter;
+use operators::{SpectralFilter, spectral_filter};
 use solver::{Accuracy, MeanCurvatureStep, PhaseInverse};
 
 use crate::ops::{FemOps, Operation, register};
@@ -207,12 +207,12 @@ impl<const D: usize> MeanCurvatureStep<D> for FiniteElementStep<D> {
         crate::extensions()
     }
 
-    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse {
+    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse<D> {
         let inverse = SpectralFilter::from_symbol(&[cells; D], |theta| {
             let (mass, derivative) = self.scheme.phase_symbols(self.kind, theta);
             1.0 / (mass * (1.0 + stiffness * (1.0 - derivative).powi(2)))
         });
-        PhaseInverse::Spectral(inverse)
+        Arc::new(move |r| spectral_filter(r.clone(), &inverse))
     }
 
     /// A product with the Hessian contains `c (J - 1)^T M (J - 1) p`; where `J` is near 1, errors of `J p` come out `c` times

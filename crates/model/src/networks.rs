@@ -30,15 +30,6 @@ impl NeededNetwork {
         }
     }
 
-    /// The same with a kernel of this width.
-    #[must_use]
-    pub fn of_width(self, width: usize) -> Self {
-        Self {
-            width: Some(width),
-            ..self
-        }
-    }
-
     /// With the width that is wanted, or else another.
     fn ratios(&self, other: usize) -> Ratios {
         Ratios {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use burn::tensor::{DType, Tensor};
 use linearize::{Graph, Linearization, Value};
 use model::{BrickOperator, MeanCurvatureOperator};
-use operators::ComputeDevice;
+use operators::{ComputeDevice, spectral_filter};
 use serde::{Deserialize, Serialize};
 
 use crate::error::StepFailure;
@@ -47,7 +47,7 @@ pub trait MeanCurvatureStep<const D: usize>: Send + Sync {
     }
 
     /// An approximate inverse of `1 + c (J - 1)^T (J - 1)` in the pure phases, `J` the derivative of `v`.
-    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse;
+    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse<D>;
 
     /// Says how accurate derivatives of the step have to be; a step that solves systems adapts its tolerances.
     fn set_accuracy(&self, _accuracy: &Accuracy) {}
@@ -78,9 +78,9 @@ impl<const D: usize> MeanCurvatureStep<D> for MeanCurvatureOperator<D> {
         true
     }
 
-    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse {
+    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse<D> {
         let inverse = MeanCurvatureOperator::phase_preconditioner(self, cells, stiffness);
-        PhaseInverse::Spectral(inverse)
+        Arc::new(move |r| spectral_filter(r.clone(), &inverse))
     }
 }
 
@@ -93,9 +93,8 @@ impl<const D: usize> MeanCurvatureStep<D> for BrickOperator<D> {
         true
     }
 
-    fn phase_preconditioner(&self, _cells: usize, stiffness: f64) -> PhaseInverse {
-        let inverse = BrickOperator::phase_preconditioner(self, stiffness);
-        PhaseInverse::Bricks(Box::new(inverse))
+    fn phase_preconditioner(&self, _cells: usize, stiffness: f64) -> PhaseInverse<D> {
+        Arc::new(BrickOperator::phase_preconditioner(self, stiffness))
     }
 }
 

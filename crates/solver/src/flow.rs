@@ -173,7 +173,7 @@ pub struct WillmoreFlow<const D: usize> {
     terms: Option<HelfrichTerms<D>>,
     /// The same with weights of the motion, from the first second-order step on.
     weighted: Option<MinimizingMovement<D>>,
-    phase: Option<(f64, PhaseInverse)>,
+    phase: Option<(f64, PhaseInverse<D>)>,
     region: Option<Region<D>>,
     constraints: Constraints,
     /// Where steps begin, if on the half grid, and what that moved last.

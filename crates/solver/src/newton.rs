@@ -160,6 +160,9 @@ struct Point<const D: usize> {
     tangent: Option<Tangent<D>>,
 }
 
+/// Why a minimization ended, and where: the phase field and its energy.
+type End<const D: usize> = (Exit, (Tensor<D>, f64));
+
 struct Minimizer<'a, 'h, const D: usize, O> {
     objective: &'a mut O,
     /// Outside of it, values stay as they were.
@@ -236,10 +239,11 @@ pub(crate) fn minimize_timed<const D: usize>(
         },
         times,
     };
-    let u = match params.method {
+    let (exit, (u, energy)) = match params.method {
         Method::Preconditioned => minimizer.preconditioned(start)?,
         Method::Paper => minimizer.paper()?,
     };
+    (minimizer.info.exit, minimizer.info.energy) = (exit, energy);
     // Adding nothing makes 0.0 of -0.0.
     let u = minimizer.hold(minimizer.found(&u, true)?.u);
     Ok((u, minimizer.info, minimizer.times.get()))
@@ -386,12 +390,6 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         }
     }
 
-    fn finish(&mut self, exit: Exit, (u, energy): (Tensor<D>, f64)) -> Tensor<D> {
-        self.info.exit = exit;
-        self.info.energy = energy;
-        u
-    }
-
     /// A few preconditioned iterations on the new Hessian: they remove the stiff error that a long step leaves in the
     /// profile, before the energy is compared.
     fn clean(&mut self, mut point: Point<D>) -> Result<Point<D>, Error> {
@@ -452,7 +450,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         Ok(None)
     }
 
-    fn preconditioned(&mut self, start: &Tensor<D>) -> Result<Tensor<D>, Error> {
+    fn preconditioned(&mut self, start: &Tensor<D>) -> Result<End<D>, Error> {
         const HOPELESS: f64 = 50.0;
         const SHORTEST: f64 = 0.02;
         let place = match self.place(self.hold(start.clone()))? {
@@ -497,7 +495,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
                         end = (place.u, energy);
                     }
                 }
-                return Ok(self.finish(exit, end));
+                return Ok((exit, end));
             }
             let mut t = 1.0;
             let mut next = None;
@@ -521,12 +519,12 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
                     Some((place, _)) => self.point(place)?,
                     None => {
                         let exit = self.stuck(decrease, point.energy);
-                        return Ok(self.finish(exit, (point.u, point.energy)));
+                        return Ok((exit, (point.u, point.energy)));
                     }
                 },
             };
         }
-        Ok(self.finish(Exit::IterationLimit, (point.u, point.energy)))
+        Ok((Exit::IterationLimit, (point.u, point.energy)))
     }
 
     /// No step lowered the energy: either the expected decrease drowns in rounding, or the method failed.
@@ -539,7 +537,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
     }
 
     /// alg:hybrid_scheme: from `u_k`, conjugate gradients with a forcing sequence, Armijo backtracking on a straight line.
-    fn paper(&mut self) -> Result<Tensor<D>, Error> {
+    fn paper(&mut self) -> Result<End<D>, Error> {
         let mut point = self.point(self.found(self.previous, false)?)?;
         let first = dot(&point.gradient, &point.gradient, self.device)?.sqrt();
         while self.info.newton < self.params.newton_iterations {
@@ -554,21 +552,15 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             let done = self.converged(self.motion(&point)?, solution.slope);
             self.info.newton += 1;
             let next = self.straight(&point, &solution, 1.0, 1e-6, 1e-4)?;
-            match (done, next) {
-                (Some(exit), next) => {
-                    let end = match next {
-                        Some((place, energy)) => (place.u, energy),
-                        None => (point.u, point.energy),
-                    };
-                    return Ok(self.finish(exit, end));
+            point = match (done, next) {
+                (None, Some((place, _))) => self.point(place)?,
+                (Some(exit), Some((place, energy))) => return Ok((exit, (place.u, energy))),
+                (done, None) => {
+                    let stuck = self.stuck(solution.slope.abs(), point.energy);
+                    return Ok((done.unwrap_or(stuck), (point.u, point.energy)));
                 }
-                (None, Some((place, _))) => point = self.point(place)?,
-                (None, None) => {
-                    let exit = self.stuck(solution.slope.abs(), point.energy);
-                    return Ok(self.finish(exit, (point.u, point.energy)));
-                }
-            }
+            };
         }
-        Ok(self.finish(Exit::IterationLimit, (point.u, point.energy)))
+        Ok((Exit::IterationLimit, (point.u, point.energy)))
     }
 }

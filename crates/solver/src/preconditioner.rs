@@ -4,30 +4,14 @@ use std::sync::Arc;
 
 use burn::tensor::Tensor;
 use geometry::Grid;
-use model::Smoother;
-use operators::{Bricks, ComputeDevice, SpectralFilter, spectral_filter, update_on_host};
+use operators::{Bricks, ComputeDevice, update_on_host};
 
 use crate::Error;
 use crate::interface::InterfaceModes;
 use crate::region::Region;
 
-/// An approximate inverse of the Hessian in the pure phases.
-#[derive(Clone, Debug)]
-pub enum PhaseInverse {
-    /// Diagonal in Fourier space.
-    Spectral(SpectralFilter),
-    /// A polynomial of the convolution on active bricks.
-    Bricks(Box<Smoother>),
-}
-
-impl PhaseInverse {
-    fn apply<const D: usize>(&self, r: &Tensor<D>) -> Tensor<D> {
-        match self {
-            Self::Spectral(filter) => spectral_filter(r.clone(), filter),
-            Self::Bricks(smoother) => smoother.apply(r),
-        }
-    }
-}
+/// An approximate inverse of the Hessian in the pure phases, symmetric and positive definite, in the precision of what it is applied to.
+pub type PhaseInverse<const D: usize> = Arc<dyn Fn(&Tensor<D>) -> Tensor<D> + Send + Sync>;
 
 /// Which parts of the preconditioner.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -39,7 +23,7 @@ pub(crate) enum Level {
 /// A symmetric positive definite approximation of the inverse Hessian: the exact one in the pure phases, which handles
 /// everything but displacements of the interface, plus a coarse correction for those that follows the interface.
 pub(crate) struct Preconditioner<const D: usize> {
-    pub(crate) phase: PhaseInverse,
+    pub(crate) phase: PhaseInverse<D>,
     pub(crate) grid: Grid<D>,
     pub(crate) eps: f64,
     pub(crate) tau: f64,
@@ -67,7 +51,7 @@ impl<const D: usize> Preconditioner<D> {
 
     /// Applies it, in the precision of `r`.
     pub(crate) fn apply(&self, r: &Tensor<D>, level: Level) -> Tensor<D> {
-        let z = self.phase.apply(r);
+        let z = (self.phase)(r);
         let z = match &self.interface {
             Some(interface) if level == Level::Both => update_on_host(r, z, interface),
             _ => z,
