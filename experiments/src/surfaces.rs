@@ -27,7 +27,10 @@ pub fn scales(n: usize) -> Scales {
 
 /// The network for surfaces, the same at every resolution.
 pub fn needed_network() -> NeededNetwork {
-    scales(1).needs(3, 1.0).of_width(WIDTH)
+    NeededNetwork {
+        width: Some(WIDTH),
+        ..scales(1).needs(3, 1.0)
+    }
 }
 
 /// The box of the given side around `(0.5, 0.5, 0.5)` with `n` cells per unit length; the nodes of the unit box are `i/n`.

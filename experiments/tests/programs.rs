@@ -327,7 +327,7 @@ fn the_quick_calibration_predicts_the_energies_and_installs_the_network() {
     }
     let name = "networks/d2_k17_eps2_step1.safetensors";
     let installed = model::Network::load(&root.path().join(name)).unwrap();
-    assert!(installed.stored_calibration().is_some());
+    assert!(installed.calibration.is_some());
     refused(
         CALIBRATION,
         root.path(),
@@ -385,7 +385,7 @@ fn the_accurate_recipe_trains_a_network() {
     assert!(output.status.success() && message.is_empty(), "{message}");
     let name = "out/networks/accurate_d2_k9_eps1_step0.25.safetensors";
     let network = model::Network::load(&root.path().join(name)).unwrap();
-    assert!(network.provenance().recipe.contains("least squares"));
+    assert!(network.provenance.recipe.contains("least squares"));
     let paper = ["--quick", "--only", "n64"];
     refused(TRAIN, root.path(), &paper, &["n64", "n128"]);
 }

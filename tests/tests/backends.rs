@@ -12,7 +12,7 @@ use linearize::dual::{self, Dual};
 use linearize::taylor::{halvings, remainder};
 use model::{MeanCurvatureOperator, Network, Shipped};
 use operators::{
-    COEFFICIENTS, HermiteTable, HostUpdate, HostVectors, SpectralFilter, TableRange, add_scaled,
+    COEFFICIENTS, HermiteTable, HostUpdate, Real, SpectralFilter, TableRange, add_scaled,
     circular_convolution, extrapolate, inner_product, retract, spectral_filter, tabulated,
     update_on_host,
 };
@@ -290,11 +290,10 @@ fn operations_take_slices_for_what_they_are() {
 struct AddThrice;
 
 impl HostUpdate for AddThrice {
-    fn update(&self, vectors: HostVectors<'_>) {
-        match vectors {
-            HostVectors::Double(x, z) => z.iter_mut().zip(x).for_each(|(z, x)| *z += 3.0 * x),
-            HostVectors::Single(x, z) => z.iter_mut().zip(x).for_each(|(z, x)| *z += 3.0 * x),
-        }
+    fn update<T: Real>(&self, x: &[T], z: &mut [T]) {
+        z.iter_mut()
+            .zip(x)
+            .for_each(|(z, x)| *z = *z + T::of(3.0) * *x);
     }
 }
 

@@ -6,58 +6,29 @@
 use rayon::prelude::*;
 
 /// Nodes of the three-point Gauss rule on `[0, 1]`: `1/2 -+ sqrt(3/5)/2`, `1/2`.
-pub(crate) const GAUSS_NODES: [f64; 3] = [0.112_701_665_379_258_3, 0.5, 0.887_298_334_620_741_7];
-pub(crate) const GAUSS_WEIGHTS: [f64; 3] = [5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0];
+const GAUSS_NODES: [f64; 3] = [0.112_701_665_379_258_3, 0.5, 0.887_298_334_620_741_7];
+const GAUSS_WEIGHTS: [f64; 3] = [5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0];
 /// Below this number of nodes one thread is faster than two.
 const PARALLEL_FROM: usize = 1 << 14;
 
-/// The lines along the last axis that bound a row of cells, and the Gauss points of the other axes.
-///
-/// A row of cells is `[s, s+1] x [j, j+1] x .. x (all of the last axis)`; `2^(D-1)` lines of nodes bound it.
-struct Rows<const D: usize> {
-    cells: usize,
-    /// Weight of each Gauss point of the first `D - 1` axes and the interpolation weights of the bounding lines there.
-    points: Vec<(f64, Vec<f64>)>,
-}
-
-impl<const D: usize> Rows<D> {
-    fn new(cells: usize) -> Self {
-        let axes = D - 1;
-        let points = (0..3_usize.pow(axes as u32))
-            .map(|mut q| {
-                let mut weight = 1.0;
-                let mut lines = vec![1.0; 1 << axes];
-                for axis in 0..axes {
-                    let s = GAUSS_NODES[q % 3];
-                    weight *= GAUSS_WEIGHTS[q % 3];
-                    for (corner, line) in lines.iter_mut().enumerate() {
-                        *line *= if corner >> axis & 1 == 1 { s } else { 1.0 - s };
-                    }
-                    q /= 3;
+/// Gauss points of the cell `[0, 1]^axes`: their weights, and the values of the basis functions of its corners there. Bit `a` of a
+/// corner says which side of axis `a` it is on.
+pub(crate) fn gauss_points(axes: usize) -> Vec<(f64, Vec<f64>)> {
+    (0..3_usize.pow(axes as u32))
+        .map(|mut q| {
+            let mut weight = 1.0;
+            let mut values = vec![1.0; 1 << axes];
+            for axis in 0..axes {
+                let s = GAUSS_NODES[q % 3];
+                weight *= GAUSS_WEIGHTS[q % 3];
+                for (corner, value) in values.iter_mut().enumerate() {
+                    *value *= if corner >> axis & 1 == 1 { s } else { 1.0 - s };
                 }
-                (weight, lines)
-            })
-            .collect();
-        Self { cells, points }
-    }
-
-    /// Rows of cells in one slab `[s, s+1]` of the first axis.
-    fn per_slab(&self) -> usize {
-        self.cells.pow(D as u32 - 2)
-    }
-
-    /// Number of a bounding line of row `row` in slab `slab`: `(slab offset, line inside the slab)`. Bit `a` of `corner`
-    /// says which side of axis `a` it is on.
-    fn line(&self, row: usize, corner: usize) -> (usize, usize) {
-        let (mut rest, mut stride, mut inside) = (row, 1, 0);
-        for axis in (1..D - 1).rev() {
-            let j = (rest % self.cells + (corner >> axis & 1)) % self.cells;
-            inside += j * stride;
-            stride *= self.cells;
-            rest /= self.cells;
-        }
-        (corner & 1, inside)
-    }
+                q /= 3;
+            }
+            (weight, values)
+        })
+        .collect()
 }
 
 /// Runs `f(first slab, slabs)` on chunks of slabs of the first axis; `per_slab` values belong to each.
@@ -152,59 +123,91 @@ impl Work {
     }
 }
 
-/// `int a b c phi_i` for every basis function, divided by `h^D`: symmetric and linear in each argument.
-///
-/// The arguments are nodal values, `cells^D` each, row-major.
-pub fn product<const D: usize>(cells: usize, a: &[f64], b: &[f64], c: &[f64]) -> Vec<f64> {
-    let rows = Rows::<D>::new(cells);
+/// One of the lines along the last axis that bound the row of cells `row` in a slab `[s, s+1]` of the first axis, in which a row is
+/// `[j, j+1] x .. x (all of the last axis)`: on which side of the slab it is, and its number inside.
+fn bounding_line<const D: usize>(cells: usize, row: usize, corner: usize) -> (usize, usize) {
+    let (mut rest, mut stride, mut inside) = (row, 1, 0);
+    for axis in (1..D - 1).rev() {
+        inside += (rest % cells + (corner >> axis & 1)) % cells * stride;
+        stride *= cells;
+        rest /= cells;
+    }
+    (corner & 1, inside)
+}
+
+/// A Gauss point of the first `D - 1` axes in a row of cells.
+struct RowPoint<'a> {
+    weight: f64,
+    /// Interpolation weights of the lines that bound the row.
+    at: &'a [f64],
+    /// Where the nodes of these lines begin in a chunk of results, if they are in it.
+    places: &'a [Option<usize>],
+}
+
+/// Calls `add(work, point, results)` at every Gauss point of every row of cells, with the lines there of some fields in `work`. Of the results
+/// `per_node` belong to each node, slab by slab of the first axis.
+fn over_rows<const D: usize>(
+    cells: usize,
+    results: &mut [f64],
+    per_node: usize,
+    fields: &[&[f64]],
+    add: &(dyn Fn(&mut Work, RowPoint, &mut [f64]) + Sync),
+) {
+    let points = gauss_points(D - 1);
     let slab = cells.pow(D as u32 - 1);
-    let corners = 1_usize << (D - 1);
-    let mut result = vec![0.0; a.len()];
-    let parallel = a.len() >= PARALLEL_FROM;
-    over_slabs(&mut result, slab, parallel, &|first, out| {
+    let parallel = fields[0].len() >= PARALLEL_FROM;
+    over_slabs(results, per_node * slab, parallel, &|first, out| {
         let mut work = Work::new(cells);
-        let count = out.len() / slab;
+        let count = out.len() / (per_node * slab);
         // A node gets contributions of the slabs of cells on both sides: the one below the first node is done here, too.
         for k in 0..=count {
             let below = (first + cells + k - 1) % cells;
-            for row in 0..rows.per_slab() {
-                let lines: Vec<(usize, usize)> =
-                    (0..corners).map(|corner| rows.line(row, corner)).collect();
-                let nodes = |x| -> Vec<&[f64]> {
-                    let start = |&(side, line): &(usize, usize)| {
-                        (below + side) % cells * slab + line * cells
-                    };
-                    lines.iter().map(|l| nodes_of(x, start(l), cells)).collect()
+            for row in 0..slab / cells {
+                let corners = 0..1 << (D - 1);
+                let lines: Vec<(usize, usize)> = corners
+                    .map(|corner| bounding_line::<D>(cells, row, corner))
+                    .collect();
+                let place = |&(side, line): &(usize, usize)| {
+                    let target = (k + side).checked_sub(1).filter(|target| *target < count);
+                    target.map(|target| target * per_node * slab + line * cells)
                 };
-                let (na, nb, nc) = (nodes(a), nodes(b), nodes(c));
-                for (weight, at) in &rows.points {
-                    interpolate(&na, at, &mut work.lines[0]);
-                    interpolate(&nb, at, &mut work.lines[1]);
-                    interpolate(&nc, at, &mut work.lines[2]);
-                    work.product_along_row(cells);
-                    for (&(side, line), &at) in lines.iter().zip(at) {
-                        // Slab `k - 1 + side` of this chunk.
-                        let target = k + side;
-                        if target == 0 || target > count {
-                            continue;
-                        }
-                        let out = &mut out[(target - 1) * slab + line * cells..][..cells];
-                        let factor = weight * at;
-                        out[0] += factor * (work.low[0] + work.high[cells - 1]);
-                        let ends = work.low[1..cells].iter().zip(&work.high[..cells - 1]);
-                        for (value, (low, high)) in out[1..].iter_mut().zip(ends) {
-                            *value += factor * (low + high);
-                        }
+                let places: Vec<Option<usize>> = lines.iter().map(place).collect();
+                let start = |(side, line)| (below + side) % cells * slab + line * cells;
+                let starts: Vec<usize> = lines.into_iter().map(start).collect();
+                let nodes: Vec<Vec<&[f64]>> = (fields.iter())
+                    .map(|x| starts.iter().map(|i| &x[*i..][..cells]).collect())
+                    .collect();
+                for (weight, at) in &points {
+                    for (nodes, line) in nodes.iter().zip(&mut work.lines) {
+                        interpolate(nodes, at, line);
                     }
+                    let (weight, places) = (*weight, &places[..]);
+                    add(&mut work, RowPoint { weight, at, places }, out);
                 }
             }
         }
     });
-    result
 }
 
-fn nodes_of(x: &[f64], start: usize, cells: usize) -> &[f64] {
-    &x[start..][..cells]
+/// `int a b c phi_i` for every basis function, divided by `h^D`: symmetric and linear in each argument.
+///
+/// The arguments are nodal values, `cells^D` each, row-major.
+pub fn product<const D: usize>(cells: usize, a: &[f64], b: &[f64], c: &[f64]) -> Vec<f64> {
+    let mut result = vec![0.0; a.len()];
+    over_rows::<D>(cells, &mut result, 1, &[a, b, c], &|work, point, out| {
+        work.product_along_row(cells);
+        for (place, at) in point.places.iter().zip(point.at) {
+            let Some(place) = *place else { continue };
+            let out = &mut out[place..][..cells];
+            let factor = point.weight * at;
+            out[0] += factor * (work.low[0] + work.high[cells - 1]);
+            let ends = work.low[1..cells].iter().zip(&work.high[..cells - 1]);
+            for (value, (low, high)) in out[1..].iter_mut().zip(ends) {
+                *value += factor * (low + high);
+            }
+        }
+    });
+    result
 }
 
 /// A symmetric matrix that couples each node with its `3^D` neighbours: the diagonal and the couplings to the
@@ -272,96 +275,52 @@ impl<const D: usize> Stencil<D> {
     /// `mass * M + stiffness * S + weight * int v^2 phi_i phi_j`.
     pub fn with_square(cells: usize, mass: f64, stiffness: f64, weight: f64, v: &[f64]) -> Self {
         let mut result = Self::constant(cells, mass, stiffness);
-        result.add_square(weight, v);
-        result
-    }
-
-    fn add_square(&mut self, weight: f64, v: &[f64]) {
-        let cells = self.cells;
-        let rows = Rows::<D>::new(cells);
-        let slab = cells.pow(D as u32 - 1);
-        let corners = 1_usize << (D - 1);
-        let count = self.offsets.len();
-        let index: Vec<[isize; D]> = self.offsets.clone();
-        let position = |offset: [isize; D]| {
-            index
-                .iter()
-                .position(|o| *o == offset)
-                .expect("neighbouring lines differ by at most one")
-        };
-        // Pairs of bounding lines, the earlier first, with the positions of the offsets (.., -1), (.., 0), (.., 1).
+        let (offsets, slab) = (&result.offsets, cells.pow(D as u32 - 1));
+        let count = offsets.len();
+        // Pairs of bounding lines, the earlier first, with the position of their offset (.., 0), which is between (.., -1) and (.., 1).
         let mut pairs = Vec::new();
-        for first in 0..corners {
-            for second in 0..corners {
+        for first in 0..1_usize << (D - 1) {
+            for second in 0..1_usize << (D - 1) {
                 let mut offset = [0; D];
                 for (axis, o) in offset.iter_mut().enumerate().take(D - 1) {
                     *o = (second >> axis & 1) as isize - (first >> axis & 1) as isize;
                 }
-                if offset < [0; D] {
-                    continue;
+                if let Some(position) = offsets.iter().position(|o| *o == offset) {
+                    pairs.push((first, second, position));
                 }
-                let mut along = [usize::MAX; 3];
-                for (k, o) in [-1, 0, 1].into_iter().enumerate() {
-                    offset[D - 1] = o;
-                    if first != second || o >= 0 {
-                        along[k] = position(offset);
-                    }
-                }
-                pairs.push((first, second, along));
             }
         }
         // Slab by slab: the weights of all offsets of one slab of nodes lie together while they are summed.
-        let parallel = v.len() >= PARALLEL_FROM;
         let mut together = vec![0.0; count * v.len()];
-        over_slabs(&mut together, count * slab, parallel, &|first, out| {
-            let mut work = Work::new(cells);
-            let slabs = out.len() / (count * slab);
-            for k in 0..=slabs {
-                let below = (first + cells + k - 1) % cells;
-                for row in 0..rows.per_slab() {
-                    let lines: Vec<(usize, usize)> =
-                        (0..corners).map(|corner| rows.line(row, corner)).collect();
-                    let nodes: Vec<&[f64]> = lines
-                        .iter()
-                        .map(|&(side, line)| {
-                            nodes_of(v, (below + side) % cells * slab + line * cells, cells)
-                        })
-                        .collect();
-                    for (gauss, at) in &rows.points {
-                        interpolate(&nodes, at, &mut work.lines[0]);
-                        work.mass_along_row(cells);
-                        for &(one, two, along) in &pairs {
-                            let (side, line) = lines[one];
-                            let target = k + side;
-                            if target == 0 || target > slabs {
-                                continue;
-                            }
-                            let factor = weight * gauss * at[one] * at[two];
-                            let base = (target - 1) * count * slab + line * cells;
-                            let mut entry = |offset: usize, shift: usize, values: &[f64]| {
-                                let out = &mut out[base + offset * slab..][..cells];
-                                let (head, tail) = out.split_at_mut(shift);
-                                let split = cells - shift;
-                                for (o, x) in tail.iter_mut().zip(&values[..split]) {
-                                    *o += factor * x;
-                                }
-                                for (o, x) in head.iter_mut().zip(&values[split..]) {
-                                    *o += factor * x;
-                                }
-                            };
-                            // Node i of a line is the left end of cell i and the right end of cell i - 1.
-                            entry(along[1], 0, &work.low[..cells]);
-                            entry(along[1], 1, &work.high[..cells]);
-                            entry(along[2], 0, &work.mixed[..cells]);
-                            if one != two {
-                                entry(along[0], 1, &work.mixed[..cells]);
-                            }
-                        }
+        over_rows::<D>(cells, &mut together, count, &[v], &|work, point, out| {
+            work.mass_along_row(cells);
+            for &(one, two, position) in &pairs {
+                let Some(base) = point.places[one] else {
+                    continue;
+                };
+                let factor = weight * point.weight * point.at[one] * point.at[two];
+                let mut entry = |offset: usize, shift: usize, values: &[f64]| {
+                    let out = &mut out[base + offset * slab..][..cells];
+                    let (head, tail) = out.split_at_mut(shift);
+                    let split = cells - shift;
+                    for (o, x) in tail.iter_mut().zip(&values[..split]) {
+                        *o += factor * x;
                     }
+                    for (o, x) in head.iter_mut().zip(&values[split..cells]) {
+                        *o += factor * x;
+                    }
+                };
+                // Node i of a line is the left end of cell i and the right end of cell i - 1.
+                entry(position, 0, &work.low);
+                entry(position, 1, &work.high);
+                entry(position + 1, 0, &work.mixed);
+                if one != two {
+                    entry(position - 1, 1, &work.mixed);
                 }
             }
         });
-        for (offset, weights) in self.weights.iter_mut().enumerate() {
+        let parallel = v.len() >= PARALLEL_FROM;
+        for (offset, weights) in result.weights.iter_mut().enumerate() {
             over_slabs(weights, slab, parallel, &|first, out| {
                 for (k, out) in out.chunks_exact_mut(slab).enumerate() {
                     let from = &together[((first + k) * count + offset) * slab..][..slab];
@@ -371,12 +330,12 @@ impl<const D: usize> Stencil<D> {
                 }
             });
         }
+        result
     }
 
     /// The matrix times a vector.
     pub fn apply(&self, x: &[f64]) -> Vec<f64> {
         let cells = self.cells;
-        let lines = x.len() / cells;
         let mut result = vec![0.0; x.len()];
         let parallel = x.len() >= PARALLEL_FROM;
         over_slabs(&mut result, cells, parallel, &|first, out| {
@@ -385,14 +344,13 @@ impl<const D: usize> Stencil<D> {
                 for (offset, weights) in self.offsets.iter().zip(&self.weights) {
                     let shift = offset[D - 1];
                     let here = &weights[line * cells..][..cells];
-                    let later = self.neighbour(line, offset, 1, lines);
-                    let (x_later, x_earlier);
-                    x_later = &x[later * cells..][..cells];
+                    let later = self.neighbour(line, offset, 1);
+                    let x_later = &x[later * cells..][..cells];
                     add_shifted(out, shift, |i, j| here[i] * x_later[j]);
                     if offset.iter().any(|o| *o != 0) {
-                        let earlier = self.neighbour(line, offset, -1, lines);
+                        let earlier = self.neighbour(line, offset, -1);
                         let there = &weights[earlier * cells..][..cells];
-                        x_earlier = &x[earlier * cells..][..cells];
+                        let x_earlier = &x[earlier * cells..][..cells];
                         add_shifted(out, -shift, |_, j| there[j] * x_earlier[j]);
                     }
                 }
@@ -402,7 +360,7 @@ impl<const D: usize> Stencil<D> {
     }
 
     /// The line at `sign * offset` (its first `D - 1` axes) from `line`.
-    fn neighbour(&self, line: usize, offset: &[isize; D], sign: isize, lines: usize) -> usize {
+    fn neighbour(&self, line: usize, offset: &[isize; D], sign: isize) -> usize {
         let n = self.cells as isize;
         let (mut rest, mut stride, mut result) = (line, 1, 0);
         for axis in (0..D - 1).rev() {
@@ -411,13 +369,11 @@ impl<const D: usize> Stencil<D> {
             stride *= self.cells;
             rest /= self.cells;
         }
-        debug_assert!(result < lines);
         result
     }
 
     /// Every entry `(row, column, value)` with `column <= row`.
     pub fn lower_entries(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
-        let lines = self.weights[0].len() / self.cells;
         let cells = self.cells as isize;
         self.offsets
             .iter()
@@ -425,7 +381,7 @@ impl<const D: usize> Stencil<D> {
             .flat_map(move |(offset, weights)| {
                 weights.iter().enumerate().map(move |(node, &value)| {
                     let (line, i) = (node / self.cells, (node % self.cells) as isize);
-                    let other = self.neighbour(line, offset, 1, lines) * self.cells
+                    let other = self.neighbour(line, offset, 1) * self.cells
                         + (i + offset[D - 1]).rem_euclid(cells) as usize;
                     (node.max(other), node.min(other), value)
                 })

@@ -3,16 +3,8 @@
 use thiserror::Error as ThisError;
 
 /// What can go wrong in a finite-element step.
-#[derive(Clone, Debug, PartialEq, ThisError)]
+#[derive(Debug, ThisError)]
 pub enum Error {
-    /// A parameter out of range.
-    #[error("{name} = {value:e} is out of range: {expected}")]
-    Parameter {
-        name: &'static str,
-        value: f64,
-        expected: &'static str,
-    },
-    /// The time step is so large that the implicit step has no unique solution.
     #[error(
         "tautilde = {step:e} is too large for eps = {eps:e}: the implicit step needs tautilde < 8/9 eps^2 = {bound:e}"
     )]
@@ -23,7 +15,6 @@ pub enum Error {
         /// `8/9 eps^2`.
         bound: f64,
     },
-    /// An inner iteration ended above its tolerance.
     #[error(
         "{solver} stopped after {iterations} iterations at a relative residual of {residual:.1e}, above {tolerance:.1e}"
     )]
@@ -33,13 +24,13 @@ pub enum Error {
         residual: f64,
         tolerance: f64,
     },
-    /// A value became NaN or infinite.
     #[error("{field} is not finite in {solver}")]
     NonFinite {
         field: &'static str,
         solver: &'static str,
     },
-    /// The sparse factorization failed.
     #[error("the sparse Cholesky factorization of {unknowns} unknowns failed: {reason}")]
     Factorization { unknowns: usize, reason: String },
+    #[error(transparent)]
+    Geometry(#[from] geometry::Error),
 }

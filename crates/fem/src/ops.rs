@@ -53,38 +53,15 @@ fn registry() -> MutexGuard<'static, BTreeMap<u64, Weak<dyn Host>>> {
     SCHEMES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A scheme with its number; leaves the registry when the last clone is dropped.
-#[derive(Clone)]
-pub(crate) struct Registered<const D: usize>(Arc<Entry<D>>);
-
-struct Entry<const D: usize> {
-    number: u64,
-    scheme: Arc<Scheme<D>>,
-}
-
-impl<const D: usize> Registered<D> {
-    pub(crate) fn new(scheme: Scheme<D>) -> Self {
-        static NEXT: AtomicU64 = AtomicU64::new(0);
-        let number = NEXT.fetch_add(1, Ordering::Relaxed);
-        let scheme = Arc::new(scheme);
-        let host: Arc<dyn Host> = scheme.clone();
-        registry().insert(number, Arc::downgrade(&host));
-        Self(Arc::new(Entry { number, scheme }))
-    }
-
-    pub(crate) fn number(&self) -> u64 {
-        self.0.number
-    }
-
-    pub(crate) fn scheme(&self) -> &Scheme<D> {
-        &self.0.scheme
-    }
-}
-
-impl<const D: usize> Drop for Entry<D> {
-    fn drop(&mut self) {
-        registry().remove(&self.number);
-    }
+/// The number of a scheme, under which it is found as long as it has an owner.
+pub(crate) fn register<const D: usize>(scheme: &Arc<Scheme<D>>) -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(0);
+    let number = NEXT.fetch_add(1, Ordering::Relaxed);
+    let host: Arc<dyn Host> = scheme.clone();
+    let mut schemes = registry();
+    schemes.retain(|_, scheme| scheme.strong_count() > 0);
+    schemes.insert(number, Arc::downgrade(&host));
+    number
 }
 
 /// The scheme of that number.

@@ -7,9 +7,10 @@
 
 use faer::linalg::solvers::{PartialPivLu, Solve};
 use faer::{Col, Mat};
-use model::{Calibration, PlanarStep};
+use model::PlanarStep;
+use model::calibration::PlanarScales;
 
-use crate::element::{GAUSS_NODES, GAUSS_WEIGHTS};
+use crate::element::gauss_points;
 use crate::scheme::Kind;
 
 /// A limit that no well-posed step comes near.
@@ -20,12 +21,9 @@ const CONVERGED: f64 = 1e-13;
 /// A finite-element step on planes with one normal.
 pub(crate) struct ElementsOnPlanes {
     kind: Kind,
-    eps: f64,
-    /// `tautilde / h^2`.
-    diffusion: f64,
+    scales: PlanarScales,
     /// `9/8 tautilde / eps^2`.
     reaction: f64,
-    spacing: f64,
     /// Planes of the corners, from the plane of the first.
     corners: Vec<usize>,
     /// Weights and values of the corners' basis functions at the Gauss points.
@@ -57,24 +55,6 @@ impl ElementsOnPlanes {
             let along = |(axis, a): (usize, &isize)| a * bit(corner, axis).cast_signed();
             normal.iter().enumerate().map(along).sum()
         };
-        let points: Vec<(f64, Vec<f64>)> = (0..3_usize.pow(dimension as u32))
-            .map(|q| {
-                let digit = |axis: usize| q / 3_usize.pow(axis as u32) % 3;
-                let weight = (0..dimension)
-                    .map(|axis| GAUSS_WEIGHTS[digit(axis)])
-                    .product();
-                let values = (0..count)
-                    .map(|corner| {
-                        let factor = |axis: usize| {
-                            let s = GAUSS_NODES[digit(axis)];
-                            if bit(corner, axis) == 1 { s } else { 1.0 - s }
-                        };
-                        (0..dimension).map(factor).product()
-                    })
-                    .collect();
-                (weight, values)
-            })
-            .collect();
         let table = |entry: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
             let row = |c: usize| (0..count).map(|d| entry(c, d)).collect();
             (0..count).map(row).collect()
@@ -108,12 +88,14 @@ impl ElementsOnPlanes {
         });
         Self {
             kind,
-            eps: eps_over_h,
-            diffusion: step_over_h2,
+            scales: PlanarScales {
+                eps: eps_over_h,
+                time_step: step_over_h2,
+                spacing: 1.0 / square.sqrt(),
+            },
             reaction: 9.0 / 8.0 * step_over_h2 / (eps_over_h * eps_over_h),
-            spacing: 1.0 / square.sqrt(),
             corners: (0..count).map(|c| plane(c).cast_unsigned()).collect(),
-            points,
+            points: gauss_points(dimension),
             mass,
             stiffness,
             bend,
@@ -185,7 +167,7 @@ impl ElementsOnPlanes {
     /// The derivative of the left side of the step's equation in `v`.
     fn left<'a>(&self, v: &'a Col<f64>) -> Vec<Part<'a>> {
         let r = self.reaction;
-        let mut parts = vec![Part::Mass(1.0), Part::Stiffness(self.diffusion)];
+        let mut parts = vec![Part::Mass(1.0), Part::Stiffness(self.scales.time_step)];
         if self.kind == Kind::Implicit {
             parts.extend([Part::Mass(-r), Part::Weighted(3.0 * r, v)]);
         }
@@ -218,7 +200,7 @@ impl ElementsOnPlanes {
         let right = self.apply(&[Part::Mass(1.0)], false, u);
         let mut v = u.clone();
         for _ in 0..NEWTON {
-            let linear = [Part::Mass(1.0 - r), Part::Stiffness(self.diffusion)];
+            let linear = [Part::Mass(1.0 - r), Part::Stiffness(self.scales.time_step)];
             let cubic = [Part::Weighted(r, &v)];
             let residual =
                 &right - &self.apply(&linear, false, &v) - &self.apply(&cubic, false, &v);
@@ -229,10 +211,8 @@ impl ElementsOnPlanes {
                 return Ok(v);
             }
         }
-        Err(model::Error::Calibration {
-            reason: "the implicit step does not converge",
-            eigenvalue: f64::NAN,
-        })
+        let reason = "the implicit step does not converge";
+        Err(model::Error::uncalibrated(reason))
     }
 }
 
@@ -245,16 +225,8 @@ fn add(local: &mut [Vec<f64>], factor: f64, matrix: &[Vec<f64>]) {
 }
 
 impl PlanarStep for ElementsOnPlanes {
-    fn eps(&self) -> f64 {
-        self.eps
-    }
-
-    fn time_step(&self) -> f64 {
-        self.diffusion
-    }
-
-    fn spacing(&self) -> f64 {
-        self.spacing
+    fn scales(&self) -> PlanarScales {
+        self.scales
     }
 
     fn linearize(&self, w: &Col<f64>) -> Result<(Col<f64>, Mat<f64>), model::Error> {
@@ -285,23 +257,6 @@ impl PlanarStep for ElementsOnPlanes {
     fn mass(&self, planes: usize) -> Option<Mat<f64>> {
         Some(self.matrix(planes, &[Part::Mass(1.0)]))
     }
-}
-
-/// Calibrates a step with these ratios in `dimension` dimensions.
-pub(crate) fn calibrate(
-    kind: Kind,
-    dimension: usize,
-    eps_over_h: f64,
-    step_over_h2: f64,
-) -> Result<Calibration, model::Error> {
-    let steps: Vec<_> = model::normals(dimension)
-        .iter()
-        .map(|&(normal, weight)| {
-            let step = ElementsOnPlanes::new(kind, eps_over_h, step_over_h2, normal);
-            (step, weight)
-        })
-        .collect();
-    model::calibrate(&steps)
 }
 
 #[cfg(test)]
@@ -388,7 +343,7 @@ mod tests {
             for normal in [[1_isize, 0], [1, 1]] {
                 let planes = ElementsOnPlanes::new(kind, eps, 1.0, &normal);
                 // Nodes of the grid along the normal, from the inside out, as planes of distance growing outwards.
-                let spacing = planes.spacing;
+                let spacing = planes.scales.spacing;
                 let skip = if normal == [1, 1] { 2 } else { 1 };
                 let count = 61;
                 let start = (radius / (skip as f64 * spacing)).round() as usize - 15;

@@ -2,7 +2,7 @@
 
 #![expect(clippy::unnecessary_wraps, reason = "all rules have one type")]
 
-use burn_ir::{BackendIr, CustomOpIr, ScalarIr, TensorIr};
+use burn_ir::{BackendIr, CustomOpIr, TensorIr};
 use linearize::{Builder, CustomOpRegistry, Extensions, Tangents, multilinear};
 
 use crate::backends::on_host;
@@ -32,8 +32,7 @@ fn product(operation: &CustomOpIr, tangents: &[Option<TensorIr>], build: &mut Bu
 }
 
 fn with_inputs(operation: &CustomOpIr, id: &'static str, inputs: &[TensorIr]) -> CustomOpIr {
-    let scalars: Vec<ScalarIr> = operation.scalars.clone();
-    CustomOpIr::with_scalars(id, inputs, &operation.outputs, scalars)
+    CustomOpIr::with_scalars(id, inputs, &operation.outputs, operation.scalars.clone())
 }
 
 /// `dv = A(v)^-1 M du`

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use geometry::{positive, require};
 use operators::SpectralFilter;
 use operators::slices::{dot, zip_apply};
 
@@ -76,7 +77,7 @@ impl<const D: usize> Scheme<D> {
     /// A scheme on a grid of `cells` per side and spacing `h`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for fewer than 4 cells or scales that are not positive; [`Error::StepTooLarge`].
+    /// [`Error::Geometry`] for fewer than 4 cells or scales that are not positive; [`Error::StepTooLarge`].
     pub fn new(
         cells: usize,
         spacing: f64,
@@ -84,21 +85,9 @@ impl<const D: usize> Scheme<D> {
         step: f64,
         solver: LinearSolver,
     ) -> Result<Self, Error> {
-        if cells < 4 {
-            return Err(Error::Parameter {
-                name: "cells per side",
-                value: cells as f64,
-                expected: "at least 4",
-            });
-        }
+        require("cells per side", cells as f64, "at least 4", |n| n >= 4.0)?;
         for (name, value) in [("h", spacing), ("eps", eps), ("tautilde", step)] {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(Error::Parameter {
-                    name,
-                    value,
-                    expected: "positive and finite",
-                });
-            }
+            positive(name, value)?;
         }
         let bound = 8.0 / 9.0 * eps * eps;
         if step >= bound {
@@ -127,13 +116,15 @@ impl<const D: usize> Scheme<D> {
         })
     }
 
-    /// Symbols of `M`, and of the derivative `J` of the implicit and of the semi-implicit step in the pure phases.
-    pub(crate) fn phase_symbols(&self, theta: &[f64]) -> (f64, f64, f64) {
+    /// Symbols of `M`, and of the derivative `J` of the step in the pure phases.
+    pub(crate) fn phase_symbols(&self, kind: Kind, theta: &[f64]) -> (f64, f64) {
         let (mass, stiffness) = element::symbols(theta);
-        let (mass_term, diffusion) = (mass, self.diffusion * stiffness);
-        let implicit = mass / (mass_term * (1.0 + 2.0 * self.reaction) + diffusion);
-        let semi_implicit = mass * (1.0 - 2.0 * self.reaction) / (mass_term + diffusion);
-        (mass, implicit, semi_implicit)
+        let diffusion = self.diffusion * stiffness;
+        let derivative = match kind {
+            Kind::Implicit => mass / (mass * (1.0 + 2.0 * self.reaction) + diffusion),
+            Kind::SemiImplicit => mass * (1.0 - 2.0 * self.reaction) / (mass + diffusion),
+        };
+        (mass, derivative)
     }
 
     /// Sets how accurately the inner systems are solved.

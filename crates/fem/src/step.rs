@@ -1,14 +1,17 @@
 //! Finite-element steps of mean curvature flow as Burn graphs.
 
+use std::sync::Arc;
+
 use burn::backend::Dispatch;
 use burn::tensor::Tensor;
 use geometry::{Field, Grid};
 use linearize::Extensions;
 use model::Calibration;
-use operators::SpectralFilter;
+use operators::{SpectralFilter, spectral_filter};
 use solver::{Accuracy, MeanCurvatureStep, PhaseInverse};
 
-use crate::ops::{FemOps, Operation, Registered};
+use crate::ops::{FemOps, Operation, register};
+use crate::planar::ElementsOnPlanes;
 use crate::scheme::Kind;
 use crate::{Error, LinearSolver, Scheme, Statistics, Tolerances};
 
@@ -44,7 +47,9 @@ pub struct FiniteElementStep<const D: usize> {
     grid: Grid<D>,
     eps: f64,
     step: f64,
-    scheme: Registered<D>,
+    scheme: Arc<Scheme<D>>,
+    /// Under which the scheme is registered.
+    number: u64,
 }
 
 impl<const D: usize> FiniteElementStep<D> {
@@ -85,24 +90,31 @@ impl<const D: usize> FiniteElementStep<D> {
         step: f64,
         solver: LinearSolver,
     ) -> Result<Self, Error> {
-        let scheme = Scheme::new(grid.cells(), grid.spacing(), eps, step, solver)?;
+        let scheme = Arc::new(Scheme::new(
+            grid.cells(),
+            grid.spacing(),
+            eps,
+            step,
+            solver,
+        )?);
         Ok(Self {
             kind,
             grid: *grid,
             eps,
             step,
-            scheme: Registered::new(scheme),
+            number: register(&scheme),
+            scheme,
         })
     }
 
     /// The matrices and solvers.
     pub fn scheme(&self) -> &Scheme<D> {
-        self.scheme.scheme()
+        &self.scheme
     }
 
     /// Work of the inner solvers so far.
     pub fn statistics(&self) -> Statistics {
-        self.scheme().statistics()
+        self.scheme.statistics()
     }
 
     /// One step of mean curvature flow.
@@ -118,10 +130,9 @@ impl<const D: usize> FiniteElementStep<D> {
             self.grid.cells(),
             "the phase field lives on another grid than the scheme"
         );
-        let scheme = self.scheme();
         let values = match self.kind {
-            Kind::Implicit => scheme.implicit_step(u.values())?,
-            Kind::SemiImplicit => scheme.semi_implicit_step(u.values()),
+            Kind::Implicit => self.scheme.implicit_step(u.values())?,
+            Kind::SemiImplicit => self.scheme.semi_implicit_step(u.values()),
         };
         Ok(Field::from_values(*u.grid(), values).expect("a step keeps the number of nodes"))
     }
@@ -133,17 +144,10 @@ impl<const D: usize> FiniteElementStep<D> {
     /// As [`Self::step`].
     pub fn willmore_energy(&self, u: &Field<D>) -> Result<f64, Error> {
         let v = self.step(u)?;
-        let motion: Vec<f64> = v
-            .values()
-            .iter()
-            .zip(u.values())
-            .map(|(v, u)| v - u)
-            .collect();
-        let square: f64 = motion
-            .iter()
-            .zip(self.scheme().mass(&motion))
-            .map(|(a, b)| a * b)
-            .sum();
+        let pairs = v.values().iter().zip(u.values());
+        let motion: Vec<f64> = pairs.map(|(v, u)| v - u).collect();
+        let mass = self.scheme.mass(&motion);
+        let square: f64 = motion.iter().zip(mass).map(|(a, b)| a * b).sum();
         Ok(self.eps / (2.0 * self.step * self.step) * square * self.grid.cell_volume())
     }
 
@@ -153,7 +157,9 @@ impl<const D: usize> FiniteElementStep<D> {
     /// [`model::Error::Calibration`] if the step has no flat interface at rest.
     pub fn calibrate(&self) -> Result<Calibration, model::Error> {
         let h = self.grid.spacing();
-        crate::planar::calibrate(self.kind, D, self.eps / h, self.step / (h * h))
+        let (eps, step) = (self.eps / h, self.step / (h * h));
+        let on_planes = |normal: &[isize]| ElementsOnPlanes::new(self.kind, eps, step, normal);
+        model::calibrate(model::normals(D), on_planes)
     }
 
     /// The derivative of the step at `u` in direction `p`, given `v = v[u]`, as a Burn graph: `A(v)^-1 M p` for the implicit
@@ -161,26 +167,22 @@ impl<const D: usize> FiniteElementStep<D> {
     pub fn derivative(&self, u: Tensor<D>, v: Tensor<D>, p: Tensor<D>) -> Tensor<D> {
         match self.kind {
             Kind::Implicit => {
-                let (v, right) = (v.into_dispatch(), self.mass_tensor(p).into_dispatch());
+                let (v, right) = (v.into_dispatch(), self.mass(p).into_dispatch());
                 self.run(Operation::LinearizedSolve(v, right))
             }
             Kind::SemiImplicit => {
-                let r = self.scheme().reaction();
+                let r = self.scheme.reaction();
                 let slope = (u.clone() * u) * (-3.0 * r) + (1.0 + r);
-                self.heat_tensor(self.mass_tensor(slope * p))
+                self.heat_solve(self.mass(slope * p))
             }
         }
     }
 
     fn run(&self, operation: Operation<Dispatch>) -> Tensor<D> {
-        Tensor::from_dispatch(<Dispatch as FemOps>::fem(operation, self.scheme.number()))
+        Tensor::from_dispatch(<Dispatch as FemOps>::fem(operation, self.number))
     }
 
-    fn mass_tensor(&self, x: Tensor<D>) -> Tensor<D> {
-        self.run(Operation::Mass(x.into_dispatch()))
-    }
-
-    fn heat_tensor(&self, x: Tensor<D>) -> Tensor<D> {
+    fn heat_solve(&self, x: Tensor<D>) -> Tensor<D> {
         self.run(Operation::HeatSolve(x.into_dispatch()))
     }
 }
@@ -190,46 +192,42 @@ impl<const D: usize> MeanCurvatureStep<D> for FiniteElementStep<D> {
         match self.kind {
             Kind::Implicit => self.run(Operation::ImplicitStep(u.into_dispatch())),
             Kind::SemiImplicit => {
-                let r = self.scheme().reaction();
+                let r = self.scheme.reaction();
                 let cubic = u.clone() * u.clone() * u.clone();
-                self.heat_tensor(self.mass_tensor(u * (1.0 + r) - cubic * r))
+                self.heat_solve(self.mass(u * (1.0 + r) - cubic * r))
             }
         }
     }
 
     fn mass(&self, x: Tensor<D>) -> Tensor<D> {
-        self.mass_tensor(x)
+        self.run(Operation::Mass(x.into_dispatch()))
     }
 
     fn extensions(&self) -> Extensions {
         crate::extensions()
     }
 
-    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse {
+    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse<D> {
         let inverse = SpectralFilter::from_symbol(&[cells; D], |theta| {
-            let (mass, implicit, semi_implicit) = self.scheme().phase_symbols(theta);
-            let derivative = match self.kind {
-                Kind::Implicit => implicit,
-                Kind::SemiImplicit => semi_implicit,
-            };
+            let (mass, derivative) = self.scheme.phase_symbols(self.kind, theta);
             1.0 / (mass * (1.0 + stiffness * (1.0 - derivative).powi(2)))
         });
-        inverse.into()
+        Arc::new(move |r| spectral_filter(r.clone(), &inverse))
     }
 
     /// A product with the Hessian contains `c (J - 1)^T M (J - 1) p`; where `J` is near 1, errors of `J p` come out `c` times
     /// larger than what the outer iteration looks at.
     fn set_accuracy(&self, accuracy: &Accuracy) {
         let amplification = 1.0 + accuracy.stiffness;
-        self.scheme().set_tolerances(Tolerances {
+        self.scheme.set_tolerances(Tolerances {
             linear: (1e-2 * accuracy.cg_tolerance / amplification).clamp(1e-12, 1e-6),
             newton: (1e-2 * accuracy.tolerance / amplification).clamp(1e-13, 1e-8),
-            ..self.scheme().tolerances()
+            ..self.scheme.tolerances()
         });
     }
 
     fn failure(&self) -> Option<solver::StepFailure> {
-        self.scheme()
+        self.scheme
             .take_failure()
             .map(|error| Box::new(error) as solver::StepFailure)
     }

@@ -280,7 +280,7 @@ fn failures_are_typed_and_carry_their_numbers() {
         let error = Scheme::<2>::new(cells, spacing, eps, size, solver)
             .err()
             .unwrap();
-        assert!(matches!(error, Error::Parameter { .. }), "{error}");
+        assert!(matches!(error, Error::Geometry(_)), "{error}");
     }
     let scheme = Scheme::<2>::new(16, 1.0 / 16.0, eps, 0.002, LinearSolver::default()).unwrap();
     let mut broken = vec![0.5; 256];

@@ -111,6 +111,14 @@ impl Error {
         })
     }
 
+    /// The calibration of a step that has no flat interface.
+    pub fn uncalibrated(reason: &'static str) -> Self {
+        Self::Calibration {
+            reason,
+            eigenvalue: f64::NAN,
+        }
+    }
+
     /// Refuses numbers that are not finite.
     pub(crate) fn check_finite(what: &'static str, values: &[f64]) -> Result<(), Self> {
         match values.iter().position(|value| !value.is_finite()) {

@@ -63,4 +63,4 @@ pub use operator::MeanCurvatureOperator;
 pub use pretrained::Shipped;
 pub use quality::{Quality, REFERENCE_RADII, displacement_errors};
 pub use ratios::Ratios;
-pub use separable::{BrickOperator, SeparableOperator, Smoother};
+pub use separable::{BrickOperator, SeparableOperator};

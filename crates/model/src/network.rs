@@ -56,8 +56,10 @@ pub struct Network {
     ratios: Ratios,
     kernel: Vec<f64>,
     activation: Mlp,
-    provenance: Provenance,
-    calibration: Option<Calibration>,
+    /// How it was trained.
+    pub provenance: Provenance,
+    /// The calibration stored with the weights, if there is one.
+    pub calibration: Option<Calibration>,
 }
 
 impl Network {
@@ -107,11 +109,6 @@ impl Network {
         &self.activation
     }
 
-    /// How it was trained.
-    pub fn provenance(&self) -> &Provenance {
-        &self.provenance
-    }
-
     /// SHA-256 of the numbers, in hexadecimal: networks with the same fingerprint are the same operator.
     pub fn fingerprint(&self) -> String {
         let mut bytes = self.ratios.to_string().into_bytes();
@@ -123,21 +120,9 @@ impl Network {
         hexadecimal(Sha256::of(bytes))
     }
 
-    /// The calibration stored with the weights, if there is one.
-    pub fn stored_calibration(&self) -> Option<&Calibration> {
-        self.calibration.as_ref()
-    }
-
     /// The stored calibration, or a new one.
     pub fn calibration(&self) -> Result<Calibration, Error> {
         self.calibration.map_or_else(|| self.calibrate(), Ok)
-    }
-
-    /// The same operator with a calibration to be stored with it.
-    #[must_use]
-    pub fn with_calibration(mut self, calibration: Option<Calibration>) -> Self {
-        self.calibration = calibration;
-        self
     }
 
     /// The part of the operator that commutes with exchanging the phases, `(V[u] - V[-u]) / 2`: a network of the same form
@@ -164,12 +149,5 @@ impl Network {
             network: self.ratios,
             run,
         })
-    }
-
-    /// The same operator with another provenance.
-    #[must_use]
-    pub fn with_provenance(mut self, provenance: Provenance) -> Self {
-        self.provenance = provenance;
-        self
     }
 }

@@ -30,21 +30,11 @@ impl NeededNetwork {
         }
     }
 
-    /// The same with a kernel of this width.
-    #[must_use]
-    pub fn of_width(self, width: usize) -> Self {
-        Self {
-            width: Some(width),
-            ..self
-        }
-    }
-
-    /// With the width that is wanted, or else the usual one, `8 eps/h + 1`.
-    fn ratios(&self) -> Ratios {
-        let usual = 8 * self.eps_over_h.clamp(1.0, 64.0).ceil() as usize + 1;
+    /// With the width that is wanted, or else another.
+    fn ratios(&self, other: usize) -> Ratios {
         Ratios {
             dimension: self.dimension,
-            width: self.width.unwrap_or(usual),
+            width: self.width.unwrap_or(other),
             eps_over_h: self.eps_over_h,
             step_over_h2: self.step_over_h2,
         }
@@ -52,10 +42,7 @@ impl NeededNetwork {
 
     fn is_met_by(&self, network: &Network) -> bool {
         let own = network.ratios();
-        own.matches(&Ratios {
-            width: self.width.unwrap_or(own.width),
-            ..self.ratios()
-        })
+        own.matches(&self.ratios(own.width))
     }
 }
 
@@ -92,10 +79,7 @@ impl Networks {
                 };
                 // The need that is most like the network makes the most helpful message.
                 let nearest = (needs.iter().max_by_key(alike)).ok_or(Error::NetworkNotNeeded)?;
-                let run = Ratios {
-                    width: nearest.width.unwrap_or(own.width),
-                    ..nearest.ratios()
-                };
+                let run = nearest.ratios(own.width);
                 return Err(Error::Mismatch { network: own, run });
             }
             files.push(NamedNetwork {
@@ -116,28 +100,28 @@ impl Networks {
             return Ok(own.clone());
         }
         let all = shipped.all()?;
+        let best = (all.iter())
+            .filter(|(_, network)| fits(network))
+            .max_by_key(|(_, network)| network.ratios().width);
+        if let Some((name, network)) = best {
+            return Ok(NamedNetwork {
+                name: stem(Path::new(name)),
+                network: network.clone(),
+            });
+        }
         let mut available: Vec<f64> = (all.iter().map(|(_, network)| network.ratios()))
             .filter(|ratios| ratios.dimension == needed.dimension)
             .map(|ratios| ratios.eps_over_h)
             .collect();
-        (all.into_iter())
-            .filter(|(_, network)| fits(network))
-            .max_by_key(|(_, network)| network.ratios().width)
-            .map(|(name, network)| NamedNetwork {
-                name: stem(Path::new(name)),
-                network,
-            })
-            .ok_or_else(|| {
-                available.sort_by(f64::total_cmp);
-                available.dedup();
-                let list: Vec<String> =
-                    (available.iter().map(|eps| format!("eps/h = {eps}"))).collect();
-                Error::MissingNetwork {
-                    recipe: shipped.recipe(),
-                    wanted: needed.ratios(),
-                    available: list.join(", "),
-                }
-            })
+        available.sort_by(f64::total_cmp);
+        available.dedup();
+        let list: Vec<String> = (available.iter().map(|eps| format!("eps/h = {eps}"))).collect();
+        let usual = 8 * needed.eps_over_h.clamp(1.0, 64.0).ceil() as usize + 1;
+        Err(Error::MissingNetwork {
+            recipe: shipped.recipe(),
+            wanted: needed.ratios(usual),
+            available: list.join(", "),
+        })
     }
 }
 

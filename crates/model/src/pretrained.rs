@@ -32,13 +32,9 @@ const ACCURATE: &[(&str, &[u8])] = shipped![
 impl Ratios {
     /// The name under which a network of the paper's recipe with these ratios is shipped.
     pub fn file_name(self) -> String {
-        let Self {
-            dimension,
-            width,
-            eps_over_h,
-            step_over_h2,
-        } = self;
-        format!("d{dimension}_k{width}_eps{eps_over_h}_step{step_over_h2}.safetensors")
+        let (dimension, width) = (self.dimension, self.width);
+        let (eps, step) = (self.eps_over_h, self.step_over_h2);
+        format!("d{dimension}_k{width}_eps{eps}_step{step}.safetensors")
     }
 }
 

@@ -1,5 +1,7 @@
 //! What a network is worth: losses on whole grids, its transfer function, its activation.
 
+use std::collections::BTreeMap;
+
 use chacha20::ChaCha8Rng;
 use operators::{ComputeDevice, Transform, circular_convolution, kernel_symbol};
 use rand::SeedableRng;
@@ -71,9 +73,7 @@ impl Quality {
         let shape = vec![n; network.ratios().dimension];
         let points = Transform::<f64>::of_shape(&shape).len() as f64;
         let symbol = kernel_symbol(&shape, network.kernel(), network.ratios().width);
-        let fold = |start: f64, f: fn(f64, f64) -> f64| {
-            symbol.iter().map(|k| k.re * points).fold(start, f)
-        };
+        let transfer = || symbol.iter().map(|k| k.re * points);
         let activation = network.activation();
         Ok(Self {
             held_out_loss,
@@ -81,16 +81,10 @@ impl Quality {
             identity_loss,
             reference_loss,
             reference_flipped_loss,
-            transfer_min: fold(f64::INFINITY, f64::min),
-            transfer_max: fold(f64::NEG_INFINITY, f64::max),
-            transfer_imaginary: symbol
-                .iter()
-                .map(|k| (k.im * points).abs())
-                .fold(0.0, f64::max),
-            phase_defect: [-1.0, 1.0]
-                .map(|w| (activation.value(w) - w).abs())
-                .into_iter()
-                .fold(0.0, f64::max),
+            transfer_min: transfer().fold(f64::INFINITY, f64::min),
+            transfer_max: transfer().fold(f64::NEG_INFINITY, f64::max),
+            transfer_imaginary: largest(symbol.iter().map(|k| k.im * points)),
+            phase_defect: largest([-1.0, 1.0].iter().map(|w| activation.value(*w) - w)),
             activation_roughness: roughness(network),
             radial_asymmetry: radial_asymmetry(network),
         })
@@ -187,31 +181,26 @@ fn roughness(network: &Network) -> f64 {
         .map(|i| -1.05 + 2.1 * i as f64 / (POINTS - 1) as f64)
         .map(|w| network.activation().jet(w)[2])
         .collect();
-    let largest = bends.iter().fold(0.0, |m: f64, b| m.max(b.abs()));
-    let jump = bends
-        .windows(2)
-        .map(|w| (w[1] - w[0]).abs())
-        .fold(0.0, f64::max);
-    jump / largest.max(f64::MIN_POSITIVE)
+    let jump = largest(bends.windows(2).map(|w| w[1] - w[0]));
+    jump / largest(bends.into_iter()).max(f64::MIN_POSITIVE)
 }
 
 /// Compares entries of different orbits that lie at the same distance, like offsets (5, 0) and (4, 3).
 fn radial_asymmetry(network: &Network) -> f64 {
     let ratios = network.ratios();
-    let mut by_distance: std::collections::BTreeMap<isize, (f64, f64)> =
-        std::collections::BTreeMap::new();
-    let mut largest = 0.0_f64;
+    let mut by_distance: BTreeMap<isize, (f64, f64)> = BTreeMap::new();
     for (offset, &value) in offsets(ratios.dimension, ratios.width).zip(network.kernel()) {
         let squared: isize = offset.iter().map(|b| b * b).sum();
         let range = by_distance.entry(squared).or_insert((value, value));
         *range = (range.0.min(value), range.1.max(value));
-        largest = largest.max(value.abs());
     }
-    let spread = by_distance
-        .values()
-        .map(|(low, high)| high - low)
-        .fold(0.0, f64::max);
-    spread / largest.max(f64::MIN_POSITIVE)
+    let spread = largest(by_distance.values().map(|(low, high)| high - low));
+    spread / largest(network.kernel().iter().copied()).max(f64::MIN_POSITIVE)
+}
+
+/// The largest size of a value.
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.map(f64::abs).fold(0.0, f64::max)
 }
 
 #[cfg(test)]
@@ -226,7 +215,7 @@ mod tests {
         let (_, network) = Shipped::Paper.all().unwrap().remove(0);
         let device = ComputeDevice::default_compiled().unwrap();
         let mut data =
-            SphereData::new(network.ratios(), network.provenance().reference_cells).unwrap();
+            SphereData::new(network.ratios(), network.provenance.reference_cells).unwrap();
         data.count = 4;
         let quality = |network: &Network| Quality::measure(network, &data, 2, &device).unwrap();
         let kernel = network.kernel().iter().map(|k| SCALE * k).collect();
@@ -237,7 +226,7 @@ mod tests {
         }
         let activation =
             crate::Mlp::new(network.activation().layers().to_vec(), parameters).unwrap();
-        let provenance = network.provenance().clone();
+        let provenance = network.provenance.clone();
         let scaled = Network::new(network.ratios(), kernel, activation, provenance).unwrap();
         let (expected, found) = (quality(&network), quality(&scaled));
         let ratio = found.held_out_loss / expected.held_out_loss;

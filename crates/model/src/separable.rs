@@ -118,39 +118,27 @@ impl<const D: usize> BrickOperator<D> {
         tabulated(smoothed, table, self.operator.range, 0)
     }
 
-    /// An approximate inverse of the energy's Hessian in the pure phases, for `c = tau / tautilde^2`.
-    pub fn phase_preconditioner(&self, stiffness: f64) -> Smoother {
-        let [identity, smoothed] = self.operator.phase_polynomial(stiffness);
-        let mass = self.operator.taps.iter().sum::<f64>().powi(D as i32);
-        Smoother {
-            identity,
-            smoothed: smoothed / mass,
-            taps: self.taps.clone(),
-            neighbours: self.neighbours.clone(),
+    /// An approximate inverse of the energy's Hessian in the pure phases, for `c = tau / tautilde^2`: it applies `x + y K`, in the
+    /// precision of the field. Up to what passes over the bricks lose at their edge it is symmetric.
+    pub fn phase_preconditioner(
+        &self,
+        stiffness: f64,
+    ) -> impl Fn(&Tensor<D>) -> Tensor<D> + Send + Sync + use<D> {
+        let [x, y] = self.operator.phase_polynomial(stiffness);
+        let y = y / self.operator.taps.iter().sum::<f64>().powi(D as i32);
+        let (taps, neighbours) = (self.taps.clone(), self.neighbours.clone());
+        move |r| {
+            let identity = r.clone() * x;
+            if y == 0.0 {
+                return identity;
+            }
+            let (taps, neighbours) = (
+                taps.clone().cast(r.dtype()),
+                neighbours.clone().cast(r.dtype()),
+            );
+            let smoothed = brick_convolution(r.clone(), taps, neighbours, false);
+            add_scaled(identity, &smoothed, y)
         }
-    }
-}
-
-/// `x + y K` on active bricks. Up to what passes over the bricks lose at their edge it is symmetric.
-#[derive(Clone, Debug)]
-pub struct Smoother {
-    identity: f64,
-    smoothed: f64,
-    taps: Tensor<1>,
-    neighbours: Tensor<2>,
-}
-
-impl Smoother {
-    /// Applies it, in the precision of `r`.
-    pub fn apply<const D: usize>(&self, r: &Tensor<D>) -> Tensor<D> {
-        let identity = r.clone() * self.identity;
-        if self.smoothed == 0.0 {
-            return identity;
-        }
-        let taps = self.taps.clone().cast(r.dtype());
-        let neighbours = self.neighbours.clone().cast(r.dtype());
-        let smoothed = brick_convolution(r.clone(), taps, neighbours, false);
-        add_scaled(identity, &smoothed, self.smoothed)
     }
 }
 

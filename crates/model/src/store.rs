@@ -35,12 +35,12 @@ fn checksum(network: &Network) -> serde_json::Result<String> {
     let mut hash = Sha256::default();
     let about = (
         network.ratios(),
-        network.provenance(),
+        &network.provenance,
         network.activation().layers(),
     );
     hash.update(serde_json::to_vec(&about)?);
     // Files from before there was a calibration have none, and keep their checksum.
-    if let Some(calibration) = network.stored_calibration() {
+    if let Some(calibration) = &network.calibration {
         hash.update(serde_json::to_vec(calibration)?);
     }
     hash.update(bytes(network.kernel()));
@@ -78,8 +78,8 @@ impl Network {
         let metadata = Metadata {
             format: FORMAT.to_owned(),
             ratios: self.ratios(),
-            provenance: self.provenance().clone(),
-            calibration: self.stored_calibration().copied(),
+            provenance: self.provenance.clone(),
+            calibration: self.calibration,
             checksum: checksum(self).map_err(unencodable)?,
         };
         let metadata = serde_json::to_string(&metadata).map_err(unencodable)?;
@@ -198,9 +198,9 @@ impl Network {
         }
         debug_assert_eq!(parameters.len(), parameter_count(&layers));
         let activation = Mlp::new(layers, parameters).map_err(|e| failed(e.to_string()))?;
-        let network = Self::new(ratios, kernel, activation, provenance)
-            .map_err(|e| failed(e.to_string()))?
-            .with_calibration(calibration);
+        let mut network =
+            Self::new(ratios, kernel, activation, provenance).map_err(|e| failed(e.to_string()))?;
+        network.calibration = calibration;
         if checksum(&network).ok() != Some(expected) {
             return Err(failed(
                 "its checksum is wrong: the file was damaged or edited".to_owned(),

@@ -1,43 +1,42 @@
 //! Calibrations against steps whose factors are known, and those of the shipped networks.
 
 use faer::{Col, Mat};
-use model::calibration::{Calibration, PlanarStep, calibrate, solve};
+use model::calibration::{Calibration, PlanarScales, PlanarStep, calibrate, solve};
 use model::{Error, Mlp, Network, PAPER_LAYERS, Ratios, Shipped, parameter_count};
 
 /// An explicit step of the Allen-Cahn equation along an axis, `u + t (u'' - Psi'(u) / (2 eps^2))`, with the mobility and the
 /// forcing of choice. Its derivative is symmetric, so that `psi = w'`, and it takes the curvature `force / mobility` for flat.
+#[derive(Clone, Copy)]
 struct Explicit {
     eps: f64,
     mobility: f64,
     force: f64,
 }
 
+const TIME_STEP: f64 = 0.1;
+
 impl PlanarStep for Explicit {
-    fn eps(&self) -> f64 {
-        self.eps
-    }
-
-    fn time_step(&self) -> f64 {
-        0.1
-    }
-
-    fn spacing(&self) -> f64 {
-        1.0
+    fn scales(&self) -> PlanarScales {
+        PlanarScales {
+            eps: self.eps,
+            time_step: TIME_STEP,
+            spacing: 1.0,
+        }
     }
 
     fn linearize(&self, w: &Col<f64>) -> Result<(Col<f64>, Mat<f64>), Error> {
         let n = w.nrows();
-        let t = self.mobility * self.time_step();
+        let t = self.mobility * TIME_STEP;
         let reaction = 1.125 / (self.eps * self.eps);
         let at = |i: usize| w[i.min(n - 1)];
         let value = Col::from_fn(n, |i| {
             let second = at(i + 1) - 2.0 * at(i) + at(i.saturating_sub(1));
-            let force = self.force * self.time_step() * 0.75 / self.eps * (1.0 - at(i).powi(2));
+            let force = self.force * TIME_STEP * 0.75 / self.eps * (1.0 - at(i).powi(2));
             at(i) + t * (second + reaction * (at(i) - at(i).powi(3))) + force
         });
         let mut jacobian = Mat::zeros(n, n);
         for i in 0..n {
-            let force = -self.force * self.time_step() * 1.5 / self.eps * w[i];
+            let force = -self.force * TIME_STEP * 1.5 / self.eps * w[i];
             jacobian[(i, i)] += 1.0 - 2.0 * t + t * reaction * (1.0 - 3.0 * w[i] * w[i]) + force;
             jacobian[(i, i.saturating_sub(1))] += t;
             jacobian[(i, (i + 1).min(n - 1))] += t;
@@ -47,9 +46,7 @@ impl PlanarStep for Explicit {
 
     /// The Laplacian of a bent interface is `w'' - kappa w'`.
     fn bending(&self, _: &Col<f64>, slope: &Col<f64>) -> Col<f64> {
-        Col::from_fn(slope.nrows(), |i| {
-            -self.mobility * self.time_step() * slope[i]
-        })
+        Col::from_fn(slope.nrows(), |i| -self.mobility * TIME_STEP * slope[i])
     }
 }
 
@@ -112,7 +109,7 @@ fn steps_without_an_interface_at_rest_are_refused_with_the_eigenvalue() {
     let mut broken = explicit(0.3);
     broken.mobility = -4.0;
     broken.force = 9.0;
-    match calibrate(&[(broken, 1.0)]) {
+    match calibrate(&[(&[1, 0], 1.0)], |_| broken) {
         Err(Error::Calibration { reason, .. }) => assert!(!reason.is_empty()),
         other => panic!("{other:?}"),
     }
@@ -125,7 +122,7 @@ fn steps_without_an_interface_at_rest_are_refused_with_the_eigenvalue() {
     let count = parameter_count(&PAPER_LAYERS);
     let activation = Mlp::new(PAPER_LAYERS.to_vec(), vec![0.1; count]).unwrap();
     let trained = Shipped::Paper.find(ratios).unwrap();
-    let provenance = trained.provenance().clone();
+    let provenance = trained.provenance.clone();
     let untrained = Network::new(ratios, trained.kernel().to_vec(), activation, provenance);
     let error = untrained.unwrap().calibration().unwrap_err();
     assert!(matches!(error, Error::Calibration { .. }), "{error}");
@@ -163,7 +160,7 @@ fn close(a: &Calibration, b: &Calibration, tolerance: f64) -> bool {
 #[test]
 fn shipped_networks_carry_their_calibration() {
     for (name, network) in Shipped::Paper.all().unwrap() {
-        let stored = *network.stored_calibration().expect(name);
+        let stored = network.calibration.expect(name);
         let found = network.calibrate().unwrap();
         assert!(close(&stored, &found, 1e-8), "{name}: {stored:?} {found:?}");
         assert_eq!(network.calibration().unwrap(), stored);
@@ -186,7 +183,7 @@ fn shipped_networks_carry_their_calibration() {
 fn networks_of_the_accurate_recipe_carry_theirs_and_are_nearly_exact() {
     for (name, network) in Shipped::Accurate.all().unwrap() {
         let ratios = network.ratios();
-        let stored = *network.stored_calibration().expect(name);
+        let stored = network.calibration.expect(name);
         if ratios.width < 65 {
             // The widest takes seconds on the same code path.
             let found = network.calibrate().unwrap();
@@ -252,10 +249,12 @@ fn odd_parts_have_the_same_factors_and_no_spontaneous_curvature() {
 fn files_with_and_without_a_calibration_are_read() {
     let (_, network) = Shipped::Paper.all().unwrap().remove(0);
     let path = std::path::Path::new("network.safetensors");
-    for network in [network.clone().with_calibration(None), network] {
+    let mut without = network.clone();
+    without.calibration = None;
+    for network in [without, network] {
         let data = network.to_bytes().unwrap();
         let read = Network::from_bytes(&data, path).unwrap();
-        assert_eq!(read.stored_calibration(), network.stored_calibration());
+        assert_eq!(read.calibration, network.calibration);
         assert_eq!(read, network);
     }
 }

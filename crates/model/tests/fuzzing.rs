@@ -158,14 +158,12 @@ fn the_worst_files_stay_within_the_limit() {
 fn headers_have_a_limit() {
     let network = network(2, 3, &[1, 1]);
     let with = |length: usize| {
-        let provenance = Provenance {
-            recipe: "x".repeat(length),
-            ..network.provenance().clone()
-        };
-        network.clone().with_provenance(provenance).to_bytes()
+        let mut long = network.clone();
+        long.provenance.recipe = "x".repeat(length);
+        long.to_bytes()
     };
     let long = with(64_000).unwrap();
-    assert_eq!(read(&long).unwrap().provenance().recipe.len(), 64_000);
+    assert_eq!(read(&long).unwrap().provenance.recipe.len(), 64_000);
     let error = with(65_536).unwrap_err().to_string();
     assert!(error.contains("and may have 65536"), "{error}");
     let mut announced = long;

@@ -18,7 +18,7 @@ fn shipped_networks_reach_their_quality() {
     assert_eq!(networks.len(), 5);
     for (name, network) in networks {
         assert_eq!(name, network.ratios().file_name());
-        let cells = network.provenance().reference_cells;
+        let cells = network.provenance.reference_cells;
         let data = SphereData::new(network.ratios(), cells).unwrap();
         let quality = Quality::measure(&network, &data, 8, &device).unwrap();
         let (loss, flipped) = bounds(network.ratios());
@@ -52,10 +52,10 @@ fn accurate_networks_treat_both_phases_alike() {
                 "{name}"
             );
         }
-        if network.provenance().reference_cells > 256 || network.ratios().dimension > 2 {
+        if network.provenance.reference_cells > 256 || network.ratios().dimension > 2 {
             continue; // the same code path, many times the time
         }
-        let data = SphereData::new(network.ratios(), network.provenance().reference_cells).unwrap();
+        let data = SphereData::new(network.ratios(), network.provenance.reference_cells).unwrap();
         let quality = Quality::measure(&network, &data, 8, &device).unwrap();
         assert!(quality.reference_loss < 7e-8, "{name}: {quality:?}");
         assert!((quality.flipped_loss / quality.held_out_loss - 1.0).abs() < 1e-6);
@@ -69,7 +69,7 @@ fn accurate_networks_treat_both_phases_alike() {
 fn losses_in_the_metadata_are_those_of_the_weights() {
     let device = ComputeDevice::default_compiled().unwrap();
     for (name, network) in Shipped::Paper.all().unwrap() {
-        let provenance = network.provenance();
+        let provenance = &network.provenance;
         if provenance.reference_cells > 256 || network.ratios().dimension > 2 {
             continue; // the same code path, many times the time
         }

@@ -9,7 +9,7 @@ use std::sync::Mutex;
 use burn::tensor::{DType, Device, IndexingUpdateOp, Int, Tensor, TensorData};
 
 use crate::fft::lock;
-use crate::table::{COEFFICIENTS, TableRange};
+use crate::table::{COEFFICIENTS, TableRange, factor};
 
 /// Real and imaginary part.
 pub(crate) type Complex<const R: usize> = (Tensor<R>, Tensor<R>);
@@ -199,8 +199,7 @@ pub(crate) fn tabulated<const R: usize>(
     range: TableRange,
     order: usize,
 ) -> Tensor<R> {
-    let TableRange { low, high, cells } = range;
-    let width = (high - low) / cells as f64;
+    let (TableRange { low, cells, .. }, width) = (range, range.width());
     let dims = w.dims();
     let points = dims.iter().product();
     let w: Tensor<1> = w.reshape([points]);
@@ -212,12 +211,11 @@ pub(crate) fn tabulated<const R: usize>(
     let polynomial = |order: usize| {
         let mut sum = t.zeros_like();
         for j in (order..COEFFICIENTS).rev() {
-            let falling: f64 = (0..order).map(|i| j as f64 - i as f64).product();
             let c: Tensor<1> = coefficients
                 .clone()
                 .slice([0..points, j..j + 1])
                 .reshape([points]);
-            sum = sum * t.clone() + c * (falling / width.powi(order as i32));
+            sum = sum * t.clone() + c * factor(width, j, order);
         }
         sum
     };

@@ -29,7 +29,13 @@ pub fn kernel_symbol<T: Real>(shape: &[usize], kernel: &[T], width: usize) -> Ar
     drop(entries);
     let plan = Transform::<T>::of_shape(shape);
     let scale = T::of(1.0 / plan.len() as f64);
-    let mut symbol = plan.forward(&periodised(shape, kernel, width));
+    // The kernel placed on the grid with its centre at the origin.
+    let mut grid = vec![T::zero(); plan.len()];
+    for (i, &value) in kernel.iter().enumerate() {
+        let j = wrapped_index(shape, i, width);
+        grid[j] = grid[j] + value;
+    }
+    let mut symbol = plan.forward(&grid);
     for value in &mut symbol {
         *value = value.conj().scale(scale);
     }
@@ -45,16 +51,6 @@ pub fn kernel_symbol<T: Real>(shape: &[usize], kernel: &[T], width: usize) -> Ar
         symbol: symbol.clone(),
     });
     symbol
-}
-
-/// The kernel placed on the grid with its centre at the origin.
-fn periodised<T: Real>(shape: &[usize], kernel: &[T], width: usize) -> Vec<T> {
-    let mut grid = vec![T::zero(); shape.iter().product()];
-    for (i, &value) in kernel.iter().enumerate() {
-        let j = wrapped_index(shape, i, width);
-        grid[j] = grid[j] + value;
-    }
-    grid
 }
 
 /// Grid index of the `i`-th kernel entry's offset.
@@ -81,15 +77,12 @@ pub(crate) fn convolve<T: Real>(
 ) -> Vec<T> {
     let symbol = kernel_symbol(shape, kernel, width);
     let plan = Transform::<T>::of_shape(shape);
-    batched(x, plan.len(), |x| plan.filter(x, &symbol, adjoint))
-}
-
-/// Applies `f` to each consecutive `len` values; batches run side by side, single grids are split inside `f`.
-fn batched<T: Real>(x: &[T], len: usize, f: impl Fn(&[T]) -> Vec<T> + Sync) -> Vec<T> {
-    if x.len() == len {
-        return f(x);
+    // Batches run side by side, single grids are split inside the transform.
+    if x.len() == plan.len() {
+        return plan.filter(x, &symbol, adjoint);
     }
-    let parts: Vec<Vec<T>> = x.par_chunks_exact(len).map(&f).collect();
+    let grids = x.par_chunks_exact(plan.len());
+    let parts: Vec<Vec<T>> = grids.map(|x| plan.filter(x, &symbol, adjoint)).collect();
     parts.concat()
 }
 

@@ -8,7 +8,7 @@ use crate::composed;
 use crate::filter::SpectralFilter;
 use crate::ops::{GridOps, Operation};
 use crate::profile;
-use crate::vector::{self, SharedUpdate, VectorOps};
+use crate::vector::{self, Motion, SharedUpdate, VectorOps};
 
 type CubeTensor = FloatTensor<Cube>;
 
@@ -82,17 +82,14 @@ impl VectorOps for Cube {
         })
     }
 
-    fn add_scaled(x: CubeTensor, y: CubeTensor, alpha: f64) -> CubeTensor {
-        ranked!(x.shape().num_dims(), 1 2 3 4, R => down(up::<R>(x) + up::<R>(y) * alpha))
-    }
-
-    fn retract(u: CubeTensor, p: CubeTensor, t: f64) -> CubeTensor {
-        ranked!(u.shape().num_dims(), 1 2 3 4, R => down(profile::retract(up::<R>(u), up::<R>(p), t)))
-    }
-
-    fn extrapolate(u: CubeTensor, previous: CubeTensor, factor: f64) -> CubeTensor {
-        ranked!(u.shape().num_dims(), 1 2 3 4, R => {
-            down(profile::extrapolate(up::<R>(u), up::<R>(previous), factor))
+    fn moved(x: CubeTensor, y: CubeTensor, motion: Motion) -> CubeTensor {
+        ranked!(x.shape().num_dims(), 1 2 3 4, R => {
+            let (x, y) = (up::<R>(x), up::<R>(y));
+            down(match motion {
+                Motion::Straight(alpha) => x + y * alpha,
+                Motion::Retracted(t) => profile::retract(x, y, t),
+                Motion::Extrapolated(factor) => profile::extrapolate(x, y, factor),
+            })
         })
     }
 

@@ -127,13 +127,9 @@ impl<T: Real> Transform<T> {
     }
 
     /// Number of grid points.
+    #[allow(clippy::len_without_is_empty, reason = "a grid is never empty")]
     pub fn len(&self) -> usize {
         self.shape.iter().product()
-    }
-
-    /// Never: a plan has at least one point.
-    pub fn is_empty(&self) -> bool {
-        false
     }
 
     /// Number of complex numbers in a spectrum.
@@ -171,30 +167,24 @@ impl<T: Real> Transform<T> {
 
     /// `inverse(symbol * forward(x))`, the symbol conjugated if asked: a circulant matrix or its transpose.
     pub fn filter(&self, x: &[T], symbol: &[Complex<T>], conjugate: bool) -> Vec<T> {
-        self.filter_with(x, |first, columns| {
-            let symbol = &symbol[first..first + columns.len()];
-            if conjugate {
-                for (value, factor) in columns.iter_mut().zip(symbol) {
-                    *value = *value * factor.conj();
-                }
-            } else {
-                for (value, factor) in columns.iter_mut().zip(symbol) {
-                    *value = *value * *factor;
-                }
-            }
-        })
+        if conjugate {
+            self.filter_with(x, symbol, |value, factor| value * factor.conj())
+        } else {
+            self.filter_with(x, symbol, |value, factor| value * factor)
+        }
     }
 
     /// `inverse(symbol * forward(x))` with a real symbol: a symmetric circulant matrix.
     pub fn filter_real(&self, x: &[T], symbol: &[T]) -> Vec<T> {
-        self.filter_with(x, |first, columns| {
-            for (value, &factor) in columns.iter_mut().zip(&symbol[first..]) {
-                *value = value.scale(factor);
-            }
-        })
+        self.filter_with(x, symbol, |value, factor| value.scale(factor))
     }
 
-    fn filter_with(&self, x: &[T], multiply: impl Fn(usize, &mut [Complex<T>]) + Sync) -> Vec<T> {
+    fn filter_with<F: Copy + Sync>(
+        &self,
+        x: &[T],
+        symbol: &[F],
+        multiply: impl Fn(Complex<T>, F) -> Complex<T> + Sync,
+    ) -> Vec<T> {
         let n0 = self.shape[0];
         let rows = self.slabs_forward(x);
         let mut blocks = self.take();
@@ -202,7 +192,9 @@ impl<T: Real> Transform<T> {
             let columns = &mut work.columns[..chunk.len()];
             gather(&rows, self.columns, first, n0, columns);
             self.plans.complex[0][0].process_with_scratch(columns, &mut work.scratch);
-            multiply(first * n0, columns);
+            for (value, factor) in columns.iter_mut().zip(&symbol[first * n0..]) {
+                *value = multiply(*value, *factor);
+            }
             self.plans.complex[0][1].process_with_scratch(columns, &mut work.scratch);
             scatter(columns, n0, chunk);
         });
@@ -216,28 +208,20 @@ impl<T: Real> Transform<T> {
     fn slabs_forward(&self, x: &[T]) -> Vec<Complex<T>> {
         assert_eq!(x.len(), self.len(), "grid of shape {:?}", self.shape);
         let points = self.len() / self.shape[0];
+        let last = self.shape[self.shape.len() - 1];
+        let real = &self.plans.real;
         let mut rows = self.take();
         self.over_chunks(&mut rows, self.columns, &|work, index, slab| {
-            let x = &x[index * points..][..points];
-            self.slab_forward(x, slab, work);
+            let lines = x[index * points..][..points].chunks_exact(last);
+            for (line, out) in lines.zip(slab.chunks_exact_mut(self.half)) {
+                work.row.copy_from_slice(line);
+                let scratch = &mut work.scratch[..real.get_scratch_len()];
+                real.process_with_scratch(&mut work.row, out, scratch)
+                    .expect("row and spectrum have the plan's lengths");
+            }
+            self.inner_axes(slab, work, 0);
         });
         rows
-    }
-
-    fn slab_forward(&self, x: &[T], slab: &mut [Complex<T>], work: &mut Work<T>) {
-        let last = self.shape[self.shape.len() - 1];
-        for (line, out) in x.chunks_exact(last).zip(slab.chunks_exact_mut(self.half)) {
-            work.row.copy_from_slice(line);
-            self.plans
-                .real
-                .process_with_scratch(
-                    &mut work.row,
-                    out,
-                    &mut work.scratch[..self.plans.real.get_scratch_len()],
-                )
-                .expect("row and spectrum have the plan's lengths");
-        }
-        self.inner_axes(slab, work, 0);
     }
 
     /// Complex transforms (`direction` 0 forward, 1 inverse) of the axes between the first and the last.
@@ -268,6 +252,7 @@ impl<T: Real> Transform<T> {
         let n0 = self.shape[0];
         let points = self.len() / n0;
         let last = self.shape[self.shape.len() - 1];
+        let real = &self.plans.real_inverse;
         let mut result = vec![T::zero(); self.len()];
         self.over_chunks(&mut result, points, &|work, index, out| {
             let mut slab = std::mem::take(&mut work.slab);
@@ -276,21 +261,14 @@ impl<T: Real> Transform<T> {
                 part.copy_from_slice(&blocks[start..start + part.len()]);
             }
             self.inner_axes(&mut slab, work, 1);
-            for (line, out) in slab
-                .chunks_exact_mut(self.half)
-                .zip(out.chunks_exact_mut(last))
-            {
+            let lines = slab.chunks_exact_mut(self.half);
+            for (line, out) in lines.zip(out.chunks_exact_mut(last)) {
                 line[0].im = T::zero();
                 if last.is_multiple_of(2) {
                     line[self.half - 1].im = T::zero();
                 }
-                self.plans
-                    .real_inverse
-                    .process_with_scratch(
-                        line,
-                        out,
-                        &mut work.scratch[..self.plans.real_inverse.get_scratch_len()],
-                    )
+                let scratch = &mut work.scratch[..real.get_scratch_len()];
+                real.process_with_scratch(line, out, scratch)
                     .expect("row and spectrum have the plan's lengths");
             }
             work.slab = slab;
@@ -337,28 +315,22 @@ impl<T: Real> Transform<T> {
     }
 
     fn work(&self) -> Work<T> {
-        let scratch = self
-            .plans
-            .complex
-            .iter()
-            .flatten()
+        let (last, others) = self.shape.split_last().expect("a grid has axes");
+        let Plans {
+            real,
+            real_inverse,
+            complex,
+        } = &self.plans;
+        let inplace = complex.iter().flatten();
+        let scratch = inplace
             .map(|fft| fft.get_inplace_scratch_len())
-            .chain([
-                self.plans.real.get_scratch_len(),
-                self.plans.real_inverse.get_scratch_len(),
-            ])
-            .max()
-            .unwrap_or(0);
-        let longest = self.shape[..self.shape.len() - 1]
-            .iter()
-            .max()
-            .copied()
-            .unwrap_or(0);
+            .chain([real.get_scratch_len(), real_inverse.get_scratch_len()]);
+        let longest = others.iter().copied();
         Work {
-            row: vec![T::zero(); self.shape[self.shape.len() - 1]],
+            row: vec![T::zero(); *last],
             slab: vec![Complex::default(); self.columns],
-            columns: vec![Complex::default(); BLOCK * longest],
-            scratch: vec![Complex::default(); scratch],
+            columns: vec![Complex::default(); BLOCK * longest.fold(0, usize::max)],
+            scratch: vec![Complex::default(); scratch.fold(0, usize::max)],
         }
     }
 

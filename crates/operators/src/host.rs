@@ -1,8 +1,12 @@
 //! The extension operations on the CPU backends, through the host kernels, in `f64` or `f32`.
 
+use std::borrow::Cow;
+
 use burn_backend::{
     Backend, DType, Element, Shape, TensorData, TensorMetadata, tensor::FloatTensor,
 };
+use burn_ir::{BackendIr, TensorStatus};
+use linearize::{CustomOpRegistry, ELEMENTWISE};
 
 use crate::brick_convolution;
 use crate::convolution::{convolve, correlate};
@@ -10,8 +14,8 @@ use crate::fft::{Real, Transform};
 use crate::filter::SpectralFilter;
 use crate::ops::{GridOps, Operation};
 use crate::table::evaluate;
-use crate::vector::{self, SharedUpdate, VectorOps};
-use crate::{profile, slices};
+use crate::vector::{self, Motion, SharedUpdate, VectorOps};
+use crate::{elementwise, profile, slices};
 
 /// A backend whose tensors are in the memory of the host.
 pub(crate) trait Host: Backend {
@@ -23,6 +27,9 @@ pub(crate) trait Host: Backend {
 
     /// The values, in the precision of the tensor.
     fn values<T: Real + Element>(lender: &Self::Lender) -> &[T];
+
+    /// The values without copying, if the tensor is `given` away and nobody else holds them; otherwise the lender.
+    fn owned<T: Real + Element>(lender: Self::Lender, given: bool) -> Result<Vec<T>, Self::Lender>;
 
     fn tensor<T: Real + Element>(values: Vec<T>, shape: Shape) -> FloatTensor<Self>;
 
@@ -139,21 +146,17 @@ impl<B: Host> VectorOps for B {
         })
     }
 
-    fn add_scaled(x: FloatTensor<B>, y: FloatTensor<B>, alpha: f64) -> FloatTensor<B> {
-        changed!(x, y, |x: &mut [T], y| {
-            let alpha = T::of(alpha);
-            slices::zip_apply(x, y, |x, y| x + alpha * y);
-        })
-    }
-
-    fn retract(u: FloatTensor<B>, p: FloatTensor<B>, t: f64) -> FloatTensor<B> {
-        mapped::<B>(u, p, |u, p| profile::retracted(u, t * p))
-    }
-
-    fn extrapolate(u: FloatTensor<B>, previous: FloatTensor<B>, factor: f64) -> FloatTensor<B> {
-        mapped::<B>(u, previous, |u, before| {
-            profile::extrapolated(u, before, factor)
-        })
+    fn moved(x: FloatTensor<B>, y: FloatTensor<B>, motion: Motion) -> FloatTensor<B> {
+        match motion {
+            Motion::Straight(alpha) => changed!(x, y, |x: &mut [T], y| {
+                let alpha = T::of(alpha);
+                slices::zip_apply(x, y, |x, y| x + alpha * y);
+            }),
+            Motion::Retracted(t) => mapped::<B>(x, y, |u, p| profile::retracted(u, t * p)),
+            Motion::Extrapolated(factor) => mapped::<B>(x, y, |u, previous| {
+                profile::extrapolated(u, previous, factor)
+            }),
+        }
     }
 
     fn update_on_host(
@@ -165,17 +168,36 @@ impl<B: Host> VectorOps for B {
     }
 }
 
+/// Runs gathered elementwise operations of captured programs.
+pub(crate) fn register_elementwise<B: Host + BackendIr>(registry: &mut CustomOpRegistry<B>) {
+    registry.register(ELEMENTWISE, |handles, ir, device| {
+        let results = in_precision!(ir.inputs[0].dtype, T => {
+            // A tensor that was given away lends its memory to a result.
+            let mut inputs: Vec<_> = (ir.inputs.iter())
+                .map(|x| {
+                    let given = x.status == TensorStatus::ReadWrite;
+                    B::owned::<T>(B::lender(handles.get_float_tensor::<B>(x)), given)
+                })
+                .collect();
+            let inputs = inputs.iter_mut().map(|input| match input {
+                Ok(values) => Cow::Owned(std::mem::take(values)),
+                Err(lender) => Cow::Borrowed(B::values(lender)),
+            });
+            elementwise::run_operation::<T>(ir, inputs.collect())
+        });
+        for (result, out) in results.into_iter().zip(&ir.outputs) {
+            let data = result.into_data(out.shape.clone());
+            handles.register_float_tensor::<B>(&out.id, B::float_from_data(data, device));
+        }
+    });
+}
+
 #[cfg(feature = "flex")]
-pub(crate) mod flex {
-    use std::borrow::Cow;
-
-    use burn_backend::{DType, Element, Shape, TensorData};
+mod flex {
+    use burn_backend::{Element, Shape, TensorData};
     use burn_flex::{Flex, FlexTensor};
-    use burn_ir::TensorStatus;
-    use linearize::{CustomOpRegistry, ELEMENTWISE};
 
-    use super::Host;
-    use crate::elementwise;
+    use super::{Host, into_values};
     use crate::fft::Real;
 
     fn contiguous(x: FlexTensor) -> FlexTensor {
@@ -199,6 +221,14 @@ pub(crate) mod flex {
                 .expect("the tensor is contiguous and of this type")
         }
 
+        fn owned<T: Real + Element>(x: FlexTensor, given: bool) -> Result<Vec<T>, FlexTensor> {
+            if given && x.is_unique() {
+                Ok(into_values(x.into_data()))
+            } else {
+                Err(x)
+            }
+        }
+
         fn tensor<T: Real + Element>(values: Vec<T>, shape: Shape) -> FlexTensor {
             FlexTensor::from_data(TensorData::new(values, shape))
         }
@@ -210,48 +240,16 @@ pub(crate) mod flex {
             x
         }
     }
-
-    /// Runs gathered elementwise operations of captured programs.
-    pub(crate) fn register_elementwise(registry: &mut CustomOpRegistry<Flex>) {
-        registry.register(ELEMENTWISE, |handles, ir, _| {
-            let inputs: Vec<FlexTensor> = (ir.inputs.iter())
-                .map(|t| contiguous(handles.get_float_tensor::<Flex>(t)))
-                .collect();
-            let results = in_precision!(ir.inputs[0].dtype, T => {
-                let (mut given, mut lent) = (Vec::new(), Vec::new());
-                for (x, ir) in inputs.into_iter().zip(&ir.inputs) {
-                    // A tensor that was given away and that nobody else holds lends its memory to a result.
-                    let owned = ir.status == TensorStatus::ReadWrite && x.is_unique();
-                    let (give, lend) = if owned { (Some(x), None) } else { (None, Some(x)) };
-                    given.push(give.map(|x| super::into_values::<T>(x.into_data())));
-                    lent.push(lend);
-                }
-                let inputs = (given.into_iter().zip(&lent))
-                    .map(|(given, lent)| {
-                        let borrowed = lent.as_ref().map(|x| Cow::Borrowed(Flex::values::<T>(x)));
-                        given.map(Cow::Owned).or(borrowed).expect("it is either")
-                    })
-                    .collect();
-                elementwise::run_operation::<T>(ir, inputs)
-            });
-            for (result, out) in results.into_iter().zip(&ir.outputs) {
-                let data = result.into_data(out.shape.clone());
-                handles.register_float_tensor::<Flex>(&out.id, FlexTensor::from_data(data));
-            }
-        });
-    }
 }
 
 #[cfg(feature = "ndarray")]
-pub(crate) mod ndarray {
+mod ndarray {
     use burn_backend::{
-        DType, Element, Shape, TensorData, TensorMetadata, ops::FloatTensorOps, tensor::FloatTensor,
+        Element, Shape, TensorData, TensorMetadata, ops::FloatTensorOps, tensor::FloatTensor,
     };
     use burn_ndarray::NdArray;
-    use linearize::{CustomOpRegistry, ELEMENTWISE};
 
     use super::{Host, into_values};
-    use crate::elementwise;
     use crate::fft::Real;
 
     type NdTensor = FloatTensor<NdArray>;
@@ -270,6 +268,10 @@ pub(crate) mod ndarray {
                 .expect("the tensor has the element type of its dtype")
         }
 
+        fn owned<T: Real + Element>(data: TensorData, _: bool) -> Result<Vec<T>, TensorData> {
+            Ok(into_values(data))
+        }
+
         fn tensor<T: Real + Element>(values: Vec<T>, shape: Shape) -> NdTensor {
             NdArray::float_from_data(TensorData::new(values, shape), &Default::default())
         }
@@ -280,21 +282,5 @@ pub(crate) mod ndarray {
             f(&mut values);
             Self::tensor(values, shape)
         }
-    }
-
-    /// Runs gathered elementwise operations of captured programs.
-    pub(crate) fn register_elementwise(registry: &mut CustomOpRegistry<NdArray>) {
-        registry.register(ELEMENTWISE, |handles, ir, _| {
-            let inputs = (ir.inputs.iter()).map(|t| handles.get_float_tensor::<NdArray>(t));
-            let results = in_precision!(ir.inputs[0].dtype, T => {
-                let inputs = inputs.map(|x| into_values::<T>(NdArray::lender(x)).into()).collect();
-                elementwise::run_operation::<T>(ir, inputs)
-            });
-            for (result, out) in results.into_iter().zip(&ir.outputs) {
-                let data = result.into_data(out.shape.clone());
-                let tensor = NdArray::float_from_data(data, &Default::default());
-                handles.register_float_tensor::<NdArray>(&out.id, tensor);
-            }
-        });
     }
 }

@@ -78,6 +78,6 @@ pub use rules::extensions;
 pub use table::{COEFFICIENTS, HermiteTable, TableRange};
 pub use tensor::{brick_convolution, circular_convolution, tabulated};
 pub use vector::{
-    HostUpdate, HostVectors, SharedUpdate, VectorOps, add_scaled, extrapolate, inner_product,
-    retract, spectral_filter, update_on_host,
+    HostUpdate, Motion, SharedUpdate, VectorOps, add_scaled, extrapolate, inner_product, retract,
+    spectral_filter, update_on_host,
 };

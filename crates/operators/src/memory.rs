@@ -37,20 +37,19 @@ pub fn forget_peak() {
 
 /// Largest resident memory of this process in MiB, where the system tells.
 pub fn peak_mib() -> Option<f64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
-    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kib / 1024.0)
+    Some(kib("/proc/self/status", "VmHWM:")? / 1024.0)
 }
 
 /// Bytes of memory that programs could still take without swapping, where the system tells.
 pub fn available() -> Option<f64> {
-    let info = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = info
-        .lines()
-        .find(|line| line.starts_with("MemAvailable:"))?;
-    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kib * 1024.0)
+    Some(kib("/proc/meminfo", "MemAvailable:")? * 1024.0)
+}
+
+/// The number on the line of a file of the system that begins like this.
+fn kib(path: &str, beginning: &str) -> Option<f64> {
+    let text = std::fs::read_to_string(path).ok()?;
+    let line = text.lines().find(|line| line.starts_with(beginning))?;
+    line.split_whitespace().nth(1)?.parse().ok()
 }
 
 /// Pages of memory that the system has handed to this process so far, where it tells. While vectors are recycled, there are none.

@@ -50,13 +50,8 @@ impl GridOps for CaptureBackend {
                 (CONVOLUTION, vec![x, kernel], vec![ScalarIr::Bool(adjoint)])
             }
             Correlation(x, g, width, axes) => {
-                let shape = vec![width; axes].into();
-                return captured(
-                    CORRELATION,
-                    vec![x, g],
-                    shape,
-                    vec![count(width), count(axes)],
-                );
+                let scalars = vec![count(width), count(axes)];
+                return captured(CORRELATION, vec![x, g], vec![width; axes].into(), scalars);
             }
             Bricks(x, taps, neighbours, adjoint) => {
                 let scalars = vec![ScalarIr::Bool(adjoint)];

@@ -54,12 +54,12 @@ pub fn extensions() -> Extensions {
     #[cfg(feature = "flex")]
     {
         register(&mut extensions.flex);
-        crate::host::flex::register_elementwise(&mut extensions.flex);
+        crate::host::register_elementwise(&mut extensions.flex);
     }
     #[cfg(feature = "ndarray")]
     {
         register(&mut extensions.ndarray);
-        crate::host::ndarray::register_elementwise(&mut extensions.ndarray);
+        crate::host::register_elementwise(&mut extensions.ndarray);
     }
     #[cfg(any(feature = "wgpu", feature = "cuda"))]
     register(&mut extensions.cube);

@@ -27,7 +27,7 @@ pub struct TableRange {
 }
 
 impl TableRange {
-    fn width(&self) -> f64 {
+    pub(crate) fn width(&self) -> f64 {
         (self.high - self.low) / self.cells as f64
     }
 }
@@ -121,7 +121,7 @@ struct Evaluator<T, const ORDER: usize> {
 }
 
 /// `j! / (j - order)! / width^order`: what the `order`-th derivative multiplies coefficient `j` by.
-fn factor(width: f64, j: usize, order: usize) -> f64 {
+pub(crate) fn factor(width: f64, j: usize, order: usize) -> f64 {
     let falling: f64 = (0..order).map(|i| j as f64 - i as f64).product();
     falling / width.powi(order as i32)
 }

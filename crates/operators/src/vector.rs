@@ -10,24 +10,43 @@ use burn::tensor::Tensor;
 use crate::fft::{Real, is_f64};
 use crate::filter::SpectralFilter;
 
-/// Two vectors in the memory of the host, in the precision of their tensors.
-pub enum HostVectors<'a> {
-    /// Double precision.
-    Double(&'a [f64], &'a mut [f64]),
-    /// Single precision.
-    Single(&'a [f32], &'a mut [f32]),
-}
-
 /// A change of one vector that depends on another and is computed on the host, such as a sparse correction.
 pub trait HostUpdate: Send + Sync {
-    /// Changes the second vector.
-    fn update(&self, vectors: HostVectors<'_>);
+    /// Changes `z`, given `x`, in the precision of their tensors.
+    fn update<T: Real>(&self, x: &[T], z: &mut [T]);
+}
+
+/// A [`HostUpdate`] of any type.
+trait AnyUpdate: Send + Sync {
+    fn double(&self, x: &[f64], z: &mut [f64]);
+    fn single(&self, x: &[f32], z: &mut [f32]);
+}
+
+impl<U: HostUpdate> AnyUpdate for U {
+    fn double(&self, x: &[f64], z: &mut [f64]) {
+        self.update(x, z);
+    }
+
+    fn single(&self, x: &[f32], z: &mut [f32]) {
+        self.update(x, z);
+    }
 }
 
 /// A shared [`HostUpdate`].
 #[derive(Clone, derive_more::Debug)]
 #[debug("SharedUpdate")]
-pub struct SharedUpdate(pub(crate) Arc<dyn HostUpdate>);
+pub struct SharedUpdate(Arc<dyn AnyUpdate>);
+
+/// How a vector moves by another, entry by entry.
+#[derive(Clone, Copy, Debug)]
+pub enum Motion {
+    /// [`add_scaled`], by this factor.
+    Straight(f64),
+    /// [`retract`], by this factor.
+    Retracted(f64),
+    /// [`extrapolate`], by this factor.
+    Extrapolated(f64),
+}
 
 /// Vector operations of iterative solvers.
 #[backend_extension(
@@ -40,16 +59,8 @@ pub trait VectorOps: Backend {
     fn inner_product(a: FloatTensor<Self>, b: FloatTensor<Self>) -> FloatTensor<Self>;
     /// [`spectral_filter`] on primitives.
     fn spectral_filter(x: FloatTensor<Self>, filter: SpectralFilter) -> FloatTensor<Self>;
-    /// `x + alpha y`.
-    fn add_scaled(x: FloatTensor<Self>, y: FloatTensor<Self>, alpha: f64) -> FloatTensor<Self>;
-    /// [`retract`] on primitives.
-    fn retract(u: FloatTensor<Self>, p: FloatTensor<Self>, t: f64) -> FloatTensor<Self>;
-    /// [`extrapolate`] on primitives.
-    fn extrapolate(
-        u: FloatTensor<Self>,
-        previous: FloatTensor<Self>,
-        factor: f64,
-    ) -> FloatTensor<Self>;
+    /// A vector moved by another.
+    fn moved(x: FloatTensor<Self>, y: FloatTensor<Self>, motion: Motion) -> FloatTensor<Self>;
     /// [`update_on_host`] on primitives.
     fn update_on_host(
         x: FloatTensor<Self>,
@@ -72,12 +83,7 @@ pub fn spectral_filter<const R: usize>(x: Tensor<R>, filter: &SpectralFilter) ->
 
 /// `x + alpha y`, in place on a CPU if nobody else holds `x`.
 pub fn add_scaled<const R: usize>(x: Tensor<R>, y: &Tensor<R>, alpha: f64) -> Tensor<R> {
-    let y = y.clone().into_dispatch();
-    Tensor::from_dispatch(<Dispatch as VectorOps>::add_scaled(
-        x.into_dispatch(),
-        y,
-        alpha,
-    ))
+    moved(x, y, Motion::Straight(alpha))
 }
 
 /// A phase field `u` moved along `p`: in `atanh u`, which is the distance, where the interface is, straight elsewhere.
@@ -87,8 +93,7 @@ pub fn add_scaled<const R: usize>(x: Tensor<R>, y: &Tensor<R>, alpha: f64) -> Te
 /// the motion becomes the translation of `atanh u` by `d`; what is left of `t p` is added straight. Agrees with `u + t p` to first
 /// order in `t`.
 pub fn retract<const R: usize>(u: &Tensor<R>, p: &Tensor<R>, t: f64) -> Tensor<R> {
-    let (u, p) = (u.clone().into_dispatch(), p.clone().into_dispatch());
-    Tensor::from_dispatch(<Dispatch as VectorOps>::retract(u, p, t))
+    moved(u.clone(), p, Motion::Retracted(t))
 }
 
 /// The phase field after `factor` more steps like the last one, extrapolated in `atanh u`.
@@ -96,8 +101,12 @@ pub fn retract<const R: usize>(u: &Tensor<R>, p: &Tensor<R>, t: f64) -> Tensor<R
 /// `(u + s w) / (1 + u s w)` with `s = factor (u - u_previous) / (1 - u u_previous)`, limited to 0.9, windowed to the interface by
 /// `w = q^2 / (q^2 + 0.05^2)`, `q = 1 - u^2`.
 pub fn extrapolate<const R: usize>(u: &Tensor<R>, previous: &Tensor<R>, factor: f64) -> Tensor<R> {
-    let (u, previous) = (u.clone().into_dispatch(), previous.clone().into_dispatch());
-    Tensor::from_dispatch(<Dispatch as VectorOps>::extrapolate(u, previous, factor))
+    moved(u.clone(), previous, Motion::Extrapolated(factor))
+}
+
+fn moved<const R: usize>(x: Tensor<R>, y: &Tensor<R>, motion: Motion) -> Tensor<R> {
+    let (x, y) = (x.into_dispatch(), y.clone().into_dispatch());
+    Tensor::from_dispatch(<Dispatch as VectorOps>::moved(x, y, motion))
 }
 
 /// Changes `z` by a host computation that depends on `x`. On a CPU nothing is copied if nobody else holds `z`.
@@ -117,10 +126,9 @@ pub fn update_on_host<const R: usize>(
 
 /// Calls an update with slices of either precision.
 pub(crate) fn call<T: Real>(update: &SharedUpdate, x: &[T], z: &mut [T]) {
-    let vectors = if is_f64::<T>() {
-        HostVectors::Double(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(z))
+    if is_f64::<T>() {
+        (update.0).double(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(z));
     } else {
-        HostVectors::Single(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(z))
-    };
-    update.0.update(vectors);
+        (update.0).single(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(z));
+    }
 }

@@ -22,8 +22,8 @@ const CHUNK: usize = 1 << 14;
 pub(crate) struct Active<const D: usize> {
     operator: SeparableOperator<D>,
     eps: f64,
-    grid: Grid<D>,
-    bricks: Arc<Bricks<D>>,
+    pub(crate) grid: Grid<D>,
+    pub(crate) bricks: Arc<Bricks<D>>,
 }
 
 impl<const D: usize> Active<D> {
@@ -50,14 +50,6 @@ impl<const D: usize> Active<D> {
             bricks,
             ..self.clone()
         }
-    }
-
-    pub(crate) fn grid(&self) -> &Grid<D> {
-        &self.grid
-    }
-
-    pub(crate) fn bricks(&self) -> &Arc<Bricks<D>> {
-        &self.bricks
     }
 
     /// The step of mean curvature flow on them.
@@ -183,7 +175,7 @@ fn distance<const D: usize>(cell: [i64; D], offset: [i64; D], side: i64) -> f64 
 
 /// The places of the nodes beside which `u` changes its sign.
 fn interface<const D: usize>(nodes: &impl Nodes<D>, u: &[f64]) -> Vec<[usize; D]> {
-    parallel::filter_map(nodes.count(), CHUNK, &|node| {
+    parallel::filter_map(u.len(), CHUNK, &|node| {
         let place = nodes.place(node);
         let positive = u[node] > 0.0;
         let changes = (0..D).any(|axis| {

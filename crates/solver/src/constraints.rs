@@ -15,7 +15,7 @@ use std::sync::Arc;
 use burn::tensor::Tensor;
 use geometry::zero_set::{SizeHessian, Sizes, least_perimeter, reduced_volume};
 use geometry::{Field, Grid, positive};
-use operators::{ComputeDevice, HostUpdate, HostVectors, inner_product, retract, update_on_host};
+use operators::{ComputeDevice, HostUpdate, Real, inner_product, retract, update_on_host};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
@@ -135,7 +135,8 @@ pub(crate) struct Held<'a, const D: usize> {
     targets: [Option<f64>; 2],
     region: Option<&'a Region<D>>,
     device: &'a ComputeDevice,
-    multipliers: [f64; 2],
+    /// Multipliers of perimeter and volume in the energy that is minimized; zero where nothing is held.
+    pub(crate) multipliers: [f64; 2],
     /// Whether they are from a linear solve, which knows them better than an estimate does.
     solved: bool,
 }
@@ -183,11 +184,6 @@ impl<'a, const D: usize> Held<'a, D> {
         })
     }
 
-    /// Multipliers of perimeter and volume in the energy that was minimized; zero where nothing is held.
-    pub(crate) fn multipliers(&self) -> [f64; 2] {
-        self.multipliers
-    }
-
     fn tolerance(&self) -> f64 {
         TOLERANCE.max(ROUNDINGS * self.device.epsilon())
     }
@@ -199,11 +195,8 @@ impl<'a, const D: usize> Held<'a, D> {
 
     /// What is missing to the targets, by the multipliers: with it, the energy does not depend to first order on how exactly they are met.
     pub(crate) fn excess(&self, tangent: &Tangent<D>) -> f64 {
-        let multipliers = self.multipliers();
-        let parts = tangent.parts.iter();
-        parts
-            .map(|part| multipliers[part.measure] * (part.value - part.target))
-            .sum()
+        let excess = |part: &Part| self.multipliers[part.measure] * (part.value - part.target);
+        tangent.parts.iter().map(excess).sum()
     }
 
     /// The phase field near `u` that fulfils the constraints well enough for an iterate, or `exactly`, if there is one. Moves it by displacements
@@ -245,13 +238,12 @@ impl<'a, const D: usize> Held<'a, D> {
         let worst = parts
             .iter()
             .max_by(|a, b| a.violation().total_cmp(&b.violation()));
-        let (measure, value, target) = match worst {
-            Some(part) => (NAMES[part.measure], part.value, part.target),
-            None => (NAMES[0], f64::NAN, f64::NAN),
-        };
+        let (measure, value, target) = worst.map_or((0, f64::NAN, f64::NAN), |part| {
+            (part.measure, part.value, part.target)
+        });
         Ok(Error::NotHeld {
             step: 0,
-            measure,
+            measure: NAMES[measure],
             value,
             target,
         })
@@ -282,19 +274,10 @@ impl<'a, const D: usize> Held<'a, D> {
         }))
     }
 
-    /// The derivatives of a measure by the values that may move.
-    fn gradient(&self, tangent: &Tangent<D>, part: Part) -> Vec<f64> {
-        let gradient = match part.measure {
-            0 => tangent.sizes.perimeter_gradient(),
-            _ => tangent.sizes.volume_gradient(),
-        };
-        self.inside(self.stored(gradient))
-    }
-
     /// Of values on the whole grid those that are stored.
     fn stored(&self, values: Vec<f64>) -> Vec<f64> {
         match self.active {
-            Some(active) => active.bricks().gather(&values),
+            Some(active) => active.bricks.gather(&values),
             None => values,
         }
     }
@@ -320,22 +303,17 @@ impl<'a, const D: usize> Held<'a, D> {
                 product(gradient, &constant).abs() * longest > product(gradient, &bent).abs();
             return vec![if shorter { constant } else { bent }];
         }
-        let parts = tangent.parts.iter();
-        parts
-            .map(|part| {
-                if part.measure == 0 {
-                    bent()
-                } else {
-                    constant()
-                }
-            })
-            .collect()
+        let motion = |part: &Part| match part.measure {
+            0 => bent(),
+            _ => constant(),
+        };
+        tangent.parts.iter().map(motion).collect()
     }
 
     /// Zero where nothing may move.
     fn inside(&self, mut values: Vec<f64>) -> Vec<f64> {
         if let Some(region) = self.region {
-            for (value, inside) in values.iter_mut().zip(region.nodes()) {
+            for (value, inside) in values.iter_mut().zip(&*region.nodes) {
                 if !inside {
                     *value = 0.0;
                 }
@@ -344,9 +322,16 @@ impl<'a, const D: usize> Held<'a, D> {
         values
     }
 
+    /// The derivatives of the measures that are held by the values that may move.
     fn gradients(&self, tangent: &Tangent<D>) -> Vec<Vec<f64>> {
+        let gradient = |part: &Part| match part.measure {
+            0 => tangent.sizes.perimeter_gradient(),
+            _ => tangent.sizes.volume_gradient(),
+        };
         let parts = tangent.parts.iter();
-        parts.map(|part| self.gradient(tangent, *part)).collect()
+        parts
+            .map(|part| self.inside(self.stored(gradient(part))))
+            .collect()
     }
 
     /// The motions that restore the constraints at a phase field, with what they change.
@@ -381,7 +366,7 @@ impl<'a, const D: usize> Held<'a, D> {
     fn curvature(&self, tangent: &Tangent<D>) -> Curvature<D> {
         let all = tangent.sizes.second_derivative(self.multipliers);
         Curvature(match self.active {
-            Some(active) => all.at(|node| active.bricks().cell(self.grid.multi_index(node))),
+            Some(active) => all.at(|node| active.bricks.cell(self.grid.multi_index(node))),
             None => all,
         })
     }
@@ -597,16 +582,8 @@ impl<const D: usize> Projection<D> {
 struct Curvature<const D: usize>(SizeHessian<D>);
 
 impl<const D: usize> HostUpdate for Curvature<D> {
-    fn update(&self, vectors: HostVectors<'_>) {
-        match vectors {
-            HostVectors::Double(p, product) => {
-                self.0
-                    .multiply(|node| p[node], |node, value| product[node] += value);
-            }
-            HostVectors::Single(p, product) => self.0.multiply(
-                |node| f64::from(p[node]),
-                |node, value| product[node] += value as f32,
-            ),
-        }
+    fn update<T: Real>(&self, p: &[T], product: &mut [T]) {
+        let add = |node: usize, value| product[node] = product[node] + T::of(value);
+        self.0.multiply(|node| p[node].double(), add);
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use burn::tensor::{DType, Tensor};
 use linearize::{Graph, Linearization, Value};
 use model::{BrickOperator, MeanCurvatureOperator};
-use operators::ComputeDevice;
+use operators::{ComputeDevice, spectral_filter};
 use serde::{Deserialize, Serialize};
 
 use crate::error::StepFailure;
@@ -36,8 +36,10 @@ pub trait MeanCurvatureStep<const D: usize>: Send + Sync {
         x
     }
 
-    /// Rules and handlers of the custom operations in that graph.
-    fn extensions(&self) -> linearize::Extensions;
+    /// Rules and handlers of the custom operations in that graph: by default of those of [`operators`].
+    fn extensions(&self) -> linearize::Extensions {
+        operators::extensions()
+    }
 
     /// Whether Hessian-vector products may be computed in single precision.
     fn allows_single_precision(&self) -> bool {
@@ -45,7 +47,7 @@ pub trait MeanCurvatureStep<const D: usize>: Send + Sync {
     }
 
     /// An approximate inverse of `1 + c (J - 1)^T (J - 1)` in the pure phases, `J` the derivative of `v`.
-    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse;
+    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse<D>;
 
     /// Says how accurate derivatives of the step have to be; a step that solves systems adapts its tolerances.
     fn set_accuracy(&self, _accuracy: &Accuracy) {}
@@ -72,16 +74,13 @@ impl<const D: usize> MeanCurvatureStep<D> for MeanCurvatureOperator<D> {
         MeanCurvatureOperator::apply(self, u)
     }
 
-    fn extensions(&self) -> linearize::Extensions {
-        operators::extensions()
-    }
-
     fn allows_single_precision(&self) -> bool {
         true
     }
 
-    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse {
-        MeanCurvatureOperator::phase_preconditioner(self, cells, stiffness).into()
+    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse<D> {
+        let inverse = MeanCurvatureOperator::phase_preconditioner(self, cells, stiffness);
+        Arc::new(move |r| spectral_filter(r.clone(), &inverse))
     }
 }
 
@@ -90,18 +89,12 @@ impl<const D: usize> MeanCurvatureStep<D> for BrickOperator<D> {
         BrickOperator::apply(self, u)
     }
 
-    fn extensions(&self) -> linearize::Extensions {
-        operators::extensions()
-    }
-
     fn allows_single_precision(&self) -> bool {
         true
     }
 
-    fn phase_preconditioner(&self, _cells: usize, stiffness: f64) -> PhaseInverse {
-        PhaseInverse::Bricks(Box::new(BrickOperator::phase_preconditioner(
-            self, stiffness,
-        )))
+    fn phase_preconditioner(&self, _cells: usize, stiffness: f64) -> PhaseInverse<D> {
+        Arc::new(BrickOperator::phase_preconditioner(self, stiffness))
     }
 }
 
@@ -144,8 +137,7 @@ pub struct MinimizingMovement<const D: usize> {
     step: Arc<dyn MeanCurvatureStep<D>>,
     device: ComputeDevice,
     anchor: Value,
-    stiffness: f64,
-    stiffness_tensor: Value,
+    stiffness: Value,
     /// `s`, where the motion is weighted.
     factors: Option<Value>,
 }
@@ -176,9 +168,9 @@ impl<const D: usize> MinimizingMovement<D> {
     ) -> Result<Self, Error> {
         let options = (device.device(), device.dtype());
         let anchor = Value::from(Tensor::<D>::zeros(shape, options));
-        let stiffness_tensor = Value::from(device.tensor::<1>(&[1.0], [1]));
+        let stiffness = Value::from(device.tensor::<1>(&[1.0], [1]));
         let factors = weighted.then(|| Value::from(Tensor::<D>::ones(shape, options)));
-        let mut parameters = vec![anchor.clone(), stiffness_tensor.clone()];
+        let mut parameters = vec![anchor.clone(), stiffness.clone()];
         parameters.extend(factors.clone());
         let graph = Graph::gradient(std::slice::from_ref(&anchor), &parameters, |inputs| {
             let u = inputs.variable::<D>(0);
@@ -207,8 +199,7 @@ impl<const D: usize> MinimizingMovement<D> {
             step,
             device: device.clone(),
             anchor,
-            stiffness: 1.0,
-            stiffness_tensor,
+            stiffness,
             factors,
         })
     }
@@ -220,10 +211,7 @@ impl<const D: usize> MinimizingMovement<D> {
     pub fn set(&mut self, anchor: &Tensor<D>, stiffness: f64) -> Result<(), Error> {
         geometry::positive("tau / tautilde^2", stiffness)?;
         self.anchor = anchor.clone().into();
-        if self.stiffness.to_bits() != stiffness.to_bits() {
-            self.stiffness = stiffness;
-            self.stiffness_tensor = self.device.tensor::<1>(&[stiffness], [1]).into();
-        }
+        self.stiffness = self.device.tensor::<1>(&[stiffness], [1]).into();
         self.linearization.forget();
         Ok(())
     }
@@ -243,7 +231,7 @@ impl<const D: usize> MinimizingMovement<D> {
     }
 
     fn parameters(&self) -> Vec<Value> {
-        let mut parameters = vec![self.anchor.clone(), self.stiffness_tensor.clone()];
+        let mut parameters = vec![self.anchor.clone(), self.stiffness.clone()];
         parameters.extend(self.factors.clone());
         parameters
     }

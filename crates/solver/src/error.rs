@@ -76,6 +76,11 @@ pub enum Error {
 }
 
 impl Error {
+    /// Of a field after so many steps.
+    pub(crate) fn non_finite(step: usize, field: &'static str) -> Self {
+        Self::NonFinite { step, field }
+    }
+
     /// The same of this time step.
     pub(crate) fn at(mut self, number: usize) -> Self {
         if let Self::NonFinite { step, .. } | Self::NotHeld { step, .. } = &mut self {

@@ -173,7 +173,7 @@ pub struct WillmoreFlow<const D: usize> {
     terms: Option<HelfrichTerms<D>>,
     /// The same with weights of the motion, from the first second-order step on.
     weighted: Option<MinimizingMovement<D>>,
-    phase: Option<(f64, PhaseInverse)>,
+    phase: Option<(f64, PhaseInverse<D>)>,
     region: Option<Region<D>>,
     constraints: Constraints,
     /// Where steps begin, if on the half grid, and what that moved last.
@@ -238,15 +238,14 @@ impl<const D: usize> WillmoreFlow<D> {
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
         params.validate()?;
-        initial.check_finite().map_err(|_| Error::NonFinite {
-            step: 0,
-            field: "phase field",
-        })?;
+        initial
+            .check_finite()
+            .map_err(|_| Error::non_finite(0, "phase field"))?;
         let grid = initial.grid();
         network.check_fits(params.ratios(grid, network.ratios().width))?;
         let operator = SeparableOperator::new(network, device)?;
         let active = Active::new(operator, initial, params.eps)?;
-        let bricks = active.bricks();
+        let bricks = &active.bricks;
         let current = device.tensor(&bricks.gather(initial.values()), bricks.shape());
         let step = Arc::new(active.step(device));
         Self::begun(step, Some(active), (grid, current), params, device)
@@ -292,7 +291,7 @@ impl<const D: usize> WillmoreFlow<D> {
     pub fn restrict_to(&mut self, nodes: &[bool]) -> Result<(), Error> {
         let mut region = Region::new(&self.grid, nodes, &self.device)?;
         if let Some(active) = &self.active {
-            region = region.on(active.bricks(), &self.device);
+            region = region.on(&active.bricks, &self.device);
         }
         if let Some(half) = &mut self.half {
             half.restrict_to(&every_other_node(self.grid, nodes))?;
@@ -355,7 +354,7 @@ impl<const D: usize> WillmoreFlow<D> {
 
     /// The phase field now.
     pub fn field(&self) -> Result<Field<D>, Error> {
-        self.on_grid(&self.current)
+        self.stored_field()?.field()
     }
 
     /// The phase field now, as it is stored.
@@ -371,7 +370,7 @@ impl<const D: usize> WillmoreFlow<D> {
             None => None,
         };
         Ok(FlowState {
-            bricks: self.active.as_ref().map(|active| active.bricks().clone()),
+            bricks: self.active.as_ref().map(|active| active.bricks.clone()),
             current: values(&self.current)?,
             previous,
             rate: self.rate.clone().map(Stored::into_values),
@@ -406,7 +405,7 @@ impl<const D: usize> WillmoreFlow<D> {
         // Values on the whole grid, as of a flow that has not been on bricks yet.
         let whole = self.active.as_ref().filter(|_| state.bricks.is_none());
         let stored = |values: &Vec<f64>| match whole {
-            Some(active) => active.bricks().gather(values),
+            Some(active) => active.bricks.gather(values),
             None => values.clone(),
         };
         let dims = self.current.dims();
@@ -427,7 +426,7 @@ impl<const D: usize> WillmoreFlow<D> {
         let expected = match (&self.active, &state.bricks) {
             (Some(active), Some(bricks)) => {
                 let [cells, side] = [bricks.cells(), bricks.side()];
-                if [cells, side] != [self.grid.cells(), active.bricks().side()] {
+                if [cells, side] != [self.grid.cells(), active.bricks.side()] {
                     return Err(operators::Error::Bricks { cells, side }.into());
                 }
                 bricks.len()
@@ -439,10 +438,7 @@ impl<const D: usize> WillmoreFlow<D> {
             return Err(geometry::Error::ValueCount { expected, actual }.into());
         }
         if !values.iter().all(|value| value.is_finite()) {
-            return Err(Error::NonFinite {
-                step: state.step,
-                field: "phase field",
-            });
+            return Err(Error::non_finite(state.step, "phase field"));
         }
         Ok(())
     }
@@ -493,29 +489,41 @@ impl<const D: usize> WillmoreFlow<D> {
             start: &start,
             tau,
         })?;
-        let (scale, newton) = (self.energy_scale(), minimum.newton);
-        let record = StepRecord {
-            step: self.step + 1,
-            time: self.time + tau,
-            tau,
-            energy_before: scale * newton.energy_before,
-            energy: scale * newton.energy,
-            willmore_energy: minimum.willmore_energy,
-            tension: minimum.tension,
-            pressure: minimum.pressure,
-            start: origin,
-            newton,
-            estimates: None,
-            seconds: clock.elapsed().as_secs_f64(),
-            times: PhaseTimes {
-                start: beginning,
-                ..minimum.times
-            },
-        };
+        let scale = self.energy_scale();
+        let energies = [minimum.newton.energy_before, minimum.newton.energy];
+        let energies = energies.map(|energy| scale * energy);
+        let mut record = self.record(tau, &minimum, energies, origin, clock);
+        record.times.start = beginning;
         self.previous = Some((std::mem::replace(&mut self.current, minimum.u), tau));
         self.step += 1;
         self.time += tau;
         Ok(record)
+    }
+
+    /// What a step of size `tau` says of itself that ended in a minimum, with the energies of standing still and of the result.
+    fn record(
+        &self,
+        tau: f64,
+        minimum: &Minimum<D>,
+        [energy_before, energy]: [f64; 2],
+        start: Start,
+        clock: Instant,
+    ) -> StepRecord {
+        StepRecord {
+            step: self.step + 1,
+            time: self.time + tau,
+            tau,
+            energy_before,
+            energy,
+            willmore_energy: minimum.willmore_energy,
+            start,
+            newton: minimum.newton,
+            tension: minimum.tension,
+            pressure: minimum.pressure,
+            estimates: None,
+            seconds: clock.elapsed().as_secs_f64(),
+            times: minimum.times,
+        }
     }
 
     /// The scaled energy counts points; this makes it the paper's, with true L2 norms: `2 eps h^D`, over the factor of the metric.
@@ -543,7 +551,7 @@ impl<const D: usize> WillmoreFlow<D> {
             grid: self.grid,
             eps: self.params.eps,
             tau,
-            bricks: (self.active.as_ref()).map(|active| active.bricks().clone()),
+            bricks: (self.active.as_ref()).map(|active| active.bricks.clone()),
             region: self.region.clone(),
             interface: None,
         });
@@ -576,10 +584,7 @@ impl<const D: usize> WillmoreFlow<D> {
             });
         }
         if !self.device.values(u.clone())?.iter().all(|u| u.is_finite()) {
-            return Err(Error::NonFinite {
-                step,
-                field: "phase field",
-            });
+            return Err(Error::non_finite(step, "phase field"));
         }
         let mut motion = u.clone() - anchor.clone();
         if let Some(factors) = factors {
@@ -591,7 +596,7 @@ impl<const D: usize> WillmoreFlow<D> {
                 .scalar((motion.clone() * self.mcf.mass(motion)).sum())?;
         // The energy of standing still is 2 tau w.
         let unit = self.energy_scale() / (2.0 * tau);
-        let multipliers = held.map(|held| held.multipliers().map(|value| unit * value));
+        let multipliers = held.map(|held| held.multipliers.map(|value| unit * value));
         let [tension, pressure] = multipliers.unwrap_or_default();
         Ok(Minimum {
             u,
@@ -695,10 +700,8 @@ impl<const D: usize> MeanCurvatureFlow<D> {
     /// # Errors
     /// [`Error::NonFinite`] naming the step, [`Error::Operators`] if the device fails.
     pub fn field(&self) -> Result<Field<D>, Error> {
-        download(&self.grid, &self.current, &self.device).map_err(|_| Error::NonFinite {
-            step: self.step,
-            field: "phase field",
-        })
+        download(&self.grid, &self.current, &self.device)
+            .map_err(|_| Error::non_finite(self.step, "phase field"))
     }
 }
 
@@ -715,10 +718,9 @@ fn fitting_operator<const D: usize>(
 }
 
 fn upload<const D: usize>(field: &Field<D>, device: &ComputeDevice) -> Result<Tensor<D>, Error> {
-    field.check_finite().map_err(|_| Error::NonFinite {
-        step: 0,
-        field: "phase field",
-    })?;
+    field
+        .check_finite()
+        .map_err(|_| Error::non_finite(0, "phase field"))?;
     Ok(device.tensor(field.values(), field.grid().shape()))
 }
 

@@ -97,7 +97,7 @@ struct DirichletForm<const D: usize> {
 
 impl<const D: usize> DirichletForm<D> {
     fn new(active: &Active<D>, device: &ComputeDevice) -> Self {
-        let bricks = active.bricks();
+        let bricks = &active.bricks;
         let taps = [-SMALL, SMALL].map(|part| {
             let mut taps = second_difference().map(|weight| part * weight);
             taps[WIDTH / 2] += 1.0;
@@ -118,7 +118,7 @@ impl<const D: usize> DirichletForm<D> {
             neighbours: device.tensor(&bricks.neighbours(), [bricks.places().len(), 2 * D]),
             outside: device.tensor(&outside, bricks.shape()),
             rest,
-            scale: 1.0 / (2.0 * SMALL * active.grid().spacing().powi(2)),
+            scale: 1.0 / (2.0 * SMALL * active.grid.spacing().powi(2)),
         }
     }
 
@@ -167,7 +167,7 @@ impl<const D: usize> HelfrichTerms<D> {
         let dirichlet = || Box::new(DirichletForm::new(active, device));
         Self {
             on_bricks: (self.tension != 0.0).then(dirichlet),
-            inside: active.bricks().positive_outside() as f64,
+            inside: active.bricks.positive_outside() as f64,
             ..self.clone()
         }
     }
@@ -201,10 +201,8 @@ impl<const D: usize> HelfrichTerms<D> {
             let volume = ((u.clone() * 3.0 - cube) + 2.0).sum() * 0.25 + self.inside;
             volume * self.pressure
         });
-        match (tension, pressure) {
-            (Some(tension), Some(pressure)) => Some(tension + pressure),
-            (tension, pressure) => tension.or(pressure),
-        }
+        let parts = tension.into_iter().chain(pressure);
+        parts.reduce(|tension, pressure| tension + pressure)
     }
 }
 

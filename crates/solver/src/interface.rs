@@ -14,10 +14,10 @@
 //!
 //! [sparse]: crate::sparse
 
-use faer::linalg::solvers::{Llt, Solve};
+use faer::linalg::solvers::Solve;
 use faer::{ColMut, Mat, Side};
 use geometry::{Grid, parallel};
-use operators::{HostUpdate, HostVectors, Real};
+use operators::{HostUpdate, Real};
 
 use crate::nodes::Nodes;
 use crate::samples::{MOST_CORNERS, Samples};
@@ -43,22 +43,8 @@ pub(crate) struct InterfaceModes<const D: usize> {
     inverse: Inverse,
 }
 
-/// The inverse of the coarse problem.
-enum Inverse {
-    Dense(Llt<f64>),
-    Sparse(Box<SparseInverse>),
-}
-
-impl Inverse {
-    fn apply(&self, x: &mut [f64]) {
-        match self {
-            Self::Dense(factor) => {
-                factor.solve_in_place(ColMut::from_slice_mut(x).as_mat_mut());
-            }
-            Self::Sparse(inverse) => inverse.apply(x),
-        }
-    }
-}
+/// Applies the inverse of the coarse problem.
+type Inverse = Box<dyn Fn(&mut [f64]) + Send + Sync>;
 
 /// One matrix per cell, rows and columns being the corners.
 type Local = [[f64; MOST_CORNERS]; MOST_CORNERS];
@@ -76,22 +62,26 @@ impl<const D: usize> InterfaceModes<D> {
         tau: f64,
         region: Option<&[bool]>,
     ) -> Option<Self> {
-        let samples = Samples::new(grid, nodes, u, eps, SPACING * eps, region);
+        let samples = Samples::new(grid, nodes, u, eps, SPACING * eps, region)?;
         let sharp = (samples.nodes.iter()).filter(|s| s.curvature.abs() * eps > 1.0);
         let corners_dominate = sharp.count() as f64 > SHARP * samples.nodes.len() as f64;
         if samples.nodes.is_empty() || corners_dominate {
             return None;
         }
-        let inverse = if N::WHOLE_GRID && samples.columns.len() <= MOST_DENSE {
-            Inverse::Dense(coarse_matrix(&samples, tau)?.llt(Side::Lower).ok()?)
+        let inverse: Inverse = if N::WHOLE_GRID && samples.columns.len() <= MOST_DENSE {
+            let factor = coarse_matrix(&samples, tau)?.llt(Side::Lower).ok()?;
+            Box::new(move |x| factor.solve_in_place(ColMut::from_slice_mut(x).as_mat_mut()))
         } else {
-            Inverse::Sparse(Box::new(sparse_inverse(&samples, tau)?))
+            let inverse = sparse_inverse(&samples, tau)?;
+            Box::new(move |x| inverse.apply(x))
         };
         Some(Self { samples, inverse })
     }
+}
 
+impl<const D: usize> HostUpdate for InterfaceModes<D> {
     /// Adds `Z A^-1 Z^T r` to `z`.
-    pub(crate) fn correct<T: Real>(&self, r: &[T], z: &mut [T]) {
+    fn update<T: Real>(&self, r: &[T], z: &mut [T]) {
         let samples = &self.samples;
         let parts = parallel::map(samples.corners.len(), 16, &|cell| {
             let mut sums = [0.0; MOST_CORNERS];
@@ -109,7 +99,7 @@ impl<const D: usize> InterfaceModes<D> {
                 coarse[column as usize] += sum;
             }
         }
-        self.inverse.apply(&mut coarse);
+        (self.inverse)(&mut coarse);
         parallel::over_chunks(z, CHUNK, &|first, z| {
             let from = samples.nodes.partition_point(|s| (s.node as usize) < first);
             for sample in &samples.nodes[from..] {
@@ -206,15 +196,6 @@ fn local_matrices<const D: usize, const N: usize>(
     parallel::map(samples.corners.len(), 1, &of_cell)
 }
 
-impl<const D: usize> HostUpdate for InterfaceModes<D> {
-    fn update(&self, vectors: HostVectors<'_>) {
-        match vectors {
-            HostVectors::Double(r, z) => self.correct(r, z),
-            HostVectors::Single(r, z) => self.correct(r, z),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -251,7 +232,7 @@ mod tests {
         for k in [0.0_f64, 2.0, 5.0] {
             let p = wave(&grid, &u, k);
             let mut z = vec![0.0; p.len()];
-            modes.correct(&p, &mut z);
+            modes.update(&p, &mut z);
             // On the circle of radius R, with kappa = 1/R and the wave number k/R.
             let (w, kappa) = (k / 0.3, 1.0_f64 / 0.3);
             let stiffness = w.powi(4) + BENT * kappa.powi(2) * (w.powi(2) + kappa.powi(2));
@@ -276,7 +257,7 @@ mod tests {
         };
         let apply = |x: &[f64]| {
             let mut z = vec![0.0; x.len()];
-            modes.correct(x, &mut z);
+            modes.update(x, &mut z);
             z
         };
         let (a, b) = (vector(0.37), vector(1.91));

@@ -3,6 +3,8 @@
 //! Two methods share the same inputs and outputs. [`Method::Preconditioned`] is the one to use. [`Method::Paper`] is the
 //! plain Newton-CG with Armijo's rule of the paper (alg:hybrid_scheme), kept for comparison.
 
+use std::cell::Cell;
+
 use burn::tensor::Tensor;
 use geometry::require;
 use operators::{ComputeDevice, retract};
@@ -10,9 +12,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::cg::{CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
 use crate::constraints::{Held, Place, Tangent};
-use crate::preconditioner::Preconditioner;
+use crate::preconditioner::{Level, Preconditioner};
 use crate::region::Region;
-use crate::times::{PhaseTimes, Stopwatch};
+use crate::times::{PhaseTimes, timed};
 use crate::{Error, Objective, Precision};
 
 /// Which minimization.
@@ -150,13 +152,6 @@ impl NewtonInfo {
     }
 }
 
-/// Which parts of the preconditioner.
-#[derive(Clone, Copy)]
-enum Level {
-    Both,
-    Phase,
-}
-
 /// A point with its energy and gradient; the objective's own point is this one.
 struct Point<const D: usize> {
     u: Tensor<D>,
@@ -164,6 +159,9 @@ struct Point<const D: usize> {
     gradient: Tensor<D>,
     tangent: Option<Tangent<D>>,
 }
+
+/// Why a minimization ended, and where: the phase field and its energy.
+type End<const D: usize> = (Exit, (Tensor<D>, f64));
 
 struct Minimizer<'a, 'h, const D: usize, O> {
     objective: &'a mut O,
@@ -176,10 +174,7 @@ struct Minimizer<'a, 'h, const D: usize, O> {
     previous: &'a Tensor<D>,
     unknowns: f64,
     info: NewtonInfo,
-    products: Stopwatch,
-    energies: Stopwatch,
-    preconditioning: Stopwatch,
-    assembly: Stopwatch,
+    times: Cell<PhaseTimes>,
 }
 
 /// Minimizes `objective`, whose fidelity term is centred at `previous`, from `start`.
@@ -217,13 +212,10 @@ pub(crate) fn minimize_timed<const D: usize>(
     device: &ComputeDevice,
 ) -> Result<(Tensor<D>, NewtonInfo, PhaseTimes), Error> {
     params.validate()?;
-    let energies = Stopwatch::default();
-    let energy_before = energies.time(|| objective.value(previous))?;
+    let times = Cell::<PhaseTimes>::default();
+    let energy_before = timed(&times, |t| &mut t.energies, || objective.value(previous))?;
     if !energy_before.is_finite() {
-        return Err(Error::NonFinite {
-            step: 0,
-            field: "energy",
-        });
+        return Err(Error::non_finite(0, "energy"));
     }
     let mut minimizer = Minimizer {
         objective,
@@ -245,25 +237,16 @@ pub(crate) fn minimize_timed<const D: usize>(
             energy: energy_before,
             estimate: f64::INFINITY,
         },
-        products: Stopwatch::default(),
-        energies,
-        preconditioning: Stopwatch::default(),
-        assembly: Stopwatch::default(),
+        times,
     };
-    let u = match params.method {
+    let (exit, (u, energy)) = match params.method {
         Method::Preconditioned => minimizer.preconditioned(start)?,
         Method::Paper => minimizer.paper()?,
     };
+    (minimizer.info.exit, minimizer.info.energy) = (exit, energy);
     // Adding nothing makes 0.0 of -0.0.
-    let u = minimizer.hold(minimizer.exact(u)?);
-    let times = PhaseTimes {
-        products: minimizer.products.seconds(),
-        preconditioner: minimizer.preconditioning.seconds(),
-        assembly: minimizer.assembly.seconds(),
-        energies: minimizer.energies.seconds(),
-        start: 0.0,
-    };
-    Ok((u, minimizer.info, times))
+    let u = minimizer.hold(minimizer.found(&u, true)?.u);
+    Ok((u, minimizer.info, minimizer.times.get()))
 }
 
 impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
@@ -280,28 +263,24 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         }
     }
 
-    /// The phase field near `u` that fulfils the constraints exactly.
-    fn exact(&self, u: Tensor<D>) -> Result<Tensor<D>, Error> {
+    /// The same, exactly if so said, and where there is none, the error that says so.
+    fn found(&self, u: &Tensor<D>, exactly: bool) -> Result<Place<D>, Error> {
+        let (u, tangent) = (u.clone(), None);
         let Some(held) = &self.held else {
-            return Ok(u);
+            return Ok(Place { u, tangent });
         };
-        match held.restored(u.clone(), true, |u| self.hold(u))? {
-            Some(place) => Ok(place.u),
+        match held.restored(u.clone(), exactly, |u| self.hold(u))? {
+            Some(place) => Ok(place),
             None => Err(held.lost(&u)?),
         }
     }
 
-    /// The place at the previous phase field.
-    fn rest(&self) -> Result<Place<D>, Error> {
-        match (self.place(self.previous.clone())?, &self.held) {
-            (Some(rest), _) => Ok(rest),
-            (None, Some(held)) => Err(held.lost(self.previous)?),
-            (None, None) => unreachable!("without constraints every place is one"),
-        }
-    }
-
     fn point(&mut self, Place { u, tangent }: Place<D>) -> Result<Point<D>, Error> {
-        let (energy, gradient) = self.energies.time(|| self.objective.evaluate(&u))?;
+        let (energy, gradient) = timed(
+            &self.times,
+            |t| &mut t.energies,
+            || self.objective.evaluate(&u),
+        )?;
         self.info.gradients += 1;
         Ok(Point {
             u,
@@ -325,7 +304,11 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
 
     fn energy(&mut self, place: &Place<D>) -> Result<f64, Error> {
         self.info.values += 1;
-        let energy = self.energies.time(|| self.objective.value(&place.u))?;
+        let energy = timed(
+            &self.times,
+            |t| &mut t.energies,
+            || self.objective.value(&place.u),
+        )?;
         Ok(energy + self.excess(place.tangent.as_ref()))
     }
 
@@ -344,13 +327,13 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         level: Level,
     ) -> Result<CgSolution<D>, Error> {
         let (preconditioner, device) = (self.preconditioner.as_ref(), self.device);
-        let clock = &self.preconditioning;
+        let times = &self.times;
         let precondition = |r: &Tensor<D>| {
-            clock.time(|| match (preconditioner, level) {
-                (Some(preconditioner), Level::Both) => preconditioner.apply(r),
-                (Some(preconditioner), Level::Phase) => preconditioner.apply_phase(r),
-                (None, _) => r.clone(),
-            })
+            let apply = || match preconditioner {
+                Some(preconditioner) => preconditioner.apply(r, level),
+                None => r.clone(),
+            };
+            timed(times, |t| &mut t.preconditioner, apply)
         };
         let gradient = &point.gradient;
         let quadratic = Quadratic {
@@ -358,13 +341,14 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             dtype: (self.objective.product_dtype()).unwrap_or(gradient.dtype()),
             unit: self.objective.unit(),
             product: &mut |p| {
-                let product = (self.products).time(|| self.objective.hessian_vector_product(p))?;
+                let product = || self.objective.hessian_vector_product(p);
+                let product = timed(times, |t| &mut t.products, product)?;
                 Ok(Region::project(self.region, product))
             },
         };
         let solution = match (&mut self.held, &point.tangent) {
             (Some(held), Some(tangent)) => {
-                let keep = matches!(level, Level::Both);
+                let keep = level == Level::Both;
                 held.solve(quadratic, tangent, &precondition, limits, keep)?
             }
             _ => conjugate_gradients(quadratic, &precondition, limits, device)?,
@@ -372,10 +356,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         self.info.hvp += solution.iterations;
         self.info.negative_curvature += usize::from(solution.negative_curvature);
         if !solution.slope.is_finite() {
-            return Err(Error::NonFinite {
-                step: 0,
-                field: "search direction",
-            });
+            return Err(Error::non_finite(0, "search direction"));
         }
         Ok(solution)
     }
@@ -407,12 +388,6 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         } else {
             None
         }
-    }
-
-    fn finish(&mut self, exit: Exit, (u, energy): (Tensor<D>, f64)) -> Tensor<D> {
-        self.info.exit = exit;
-        self.info.energy = energy;
-        u
     }
 
     /// A few preconditioned iterations on the new Hessian: they remove the stiff error that a long step leaves in the
@@ -475,24 +450,21 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         Ok(None)
     }
 
-    fn preconditioned(&mut self, start: &Tensor<D>) -> Result<Tensor<D>, Error> {
+    fn preconditioned(&mut self, start: &Tensor<D>) -> Result<End<D>, Error> {
         const HOPELESS: f64 = 50.0;
         const SHORTEST: f64 = 0.02;
         let place = match self.place(self.hold(start.clone()))? {
             Some(place) => place,
-            None => self.rest()?,
+            None => self.found(self.previous, false)?,
         };
         let mut point = self.point(place)?;
         if !point.energy.is_finite() {
-            return Err(Error::NonFinite {
-                step: 0,
-                field: "energy of the start",
-            });
+            return Err(Error::non_finite(0, "energy of the start"));
         }
         point = self.clean(point)?;
         if point.energy > self.info.energy_before {
             // An extrapolation that made things worse is dropped. Where a target moves, so does the energy of standing still.
-            let rest = self.point(self.rest()?)?;
+            let rest = self.point(self.found(self.previous, false)?)?;
             if rest.energy < point.energy {
                 point = rest;
             }
@@ -506,8 +478,8 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
                 iterations: self.params.cg_iterations,
             };
             if let Some(preconditioner) = &mut self.preconditioner {
-                self.assembly
-                    .time(|| preconditioner.follow(&point.u, self.device))?;
+                let follow = || preconditioner.follow(&point.u, self.device);
+                timed(&self.times, |t| &mut t.assembly, follow)?;
             }
             let solution = self.solve(&point, limits, Level::Both)?;
             let sign = -solution.slope.signum();
@@ -523,7 +495,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
                         end = (place.u, energy);
                     }
                 }
-                return Ok(self.finish(exit, end));
+                return Ok((exit, end));
             }
             let mut t = 1.0;
             let mut next = None;
@@ -547,12 +519,12 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
                     Some((place, _)) => self.point(place)?,
                     None => {
                         let exit = self.stuck(decrease, point.energy);
-                        return Ok(self.finish(exit, (point.u, point.energy)));
+                        return Ok((exit, (point.u, point.energy)));
                     }
                 },
             };
         }
-        Ok(self.finish(Exit::IterationLimit, (point.u, point.energy)))
+        Ok((Exit::IterationLimit, (point.u, point.energy)))
     }
 
     /// No step lowered the energy: either the expected decrease drowns in rounding, or the method failed.
@@ -565,9 +537,8 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
     }
 
     /// alg:hybrid_scheme: from `u_k`, conjugate gradients with a forcing sequence, Armijo backtracking on a straight line.
-    fn paper(&mut self) -> Result<Tensor<D>, Error> {
-        let rest = self.rest()?;
-        let mut point = self.point(rest)?;
+    fn paper(&mut self) -> Result<End<D>, Error> {
+        let mut point = self.point(self.found(self.previous, false)?)?;
         let first = dot(&point.gradient, &point.gradient, self.device)?.sqrt();
         while self.info.newton < self.params.newton_iterations {
             let norm = dot(&point.gradient, &point.gradient, self.device)?.sqrt();
@@ -581,21 +552,15 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             let done = self.converged(self.motion(&point)?, solution.slope);
             self.info.newton += 1;
             let next = self.straight(&point, &solution, 1.0, 1e-6, 1e-4)?;
-            match (done, next) {
-                (Some(exit), next) => {
-                    let end = match next {
-                        Some((place, energy)) => (place.u, energy),
-                        None => (point.u, point.energy),
-                    };
-                    return Ok(self.finish(exit, end));
+            point = match (done, next) {
+                (None, Some((place, _))) => self.point(place)?,
+                (Some(exit), Some((place, energy))) => return Ok((exit, (place.u, energy))),
+                (done, None) => {
+                    let stuck = self.stuck(solution.slope.abs(), point.energy);
+                    return Ok((done.unwrap_or(stuck), (point.u, point.energy)));
                 }
-                (None, Some((place, _))) => point = self.point(place)?,
-                (None, None) => {
-                    let exit = self.stuck(solution.slope.abs(), point.energy);
-                    return Ok(self.finish(exit, (point.u, point.energy)));
-                }
-            }
+            };
         }
-        Ok(self.finish(Exit::IterationLimit, (point.u, point.energy)))
+        Ok((Exit::IterationLimit, (point.u, point.energy)))
     }
 }

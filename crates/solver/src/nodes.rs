@@ -8,9 +8,6 @@ pub(crate) trait Nodes<const D: usize>: Sync {
     /// Whether they are all that the grid has.
     const WHOLE_GRID: bool;
 
-    /// How many there are.
-    fn count(&self) -> usize;
-
     /// The place of a node along each axis.
     fn place(&self, node: usize) -> [usize; D];
 
@@ -26,10 +23,6 @@ pub(crate) trait Nodes<const D: usize>: Sync {
 
 impl<const D: usize> Nodes<D> for Grid<D> {
     const WHOLE_GRID: bool = true;
-
-    fn count(&self) -> usize {
-        self.len()
-    }
 
     fn place(&self, node: usize) -> [usize; D] {
         self.multi_index(node)
@@ -50,10 +43,6 @@ impl<const D: usize> Nodes<D> for Grid<D> {
 
 impl<const D: usize> Nodes<D> for Bricks<D> {
     const WHOLE_GRID: bool = false;
-
-    fn count(&self) -> usize {
-        self.len()
-    }
 
     fn place(&self, node: usize) -> [usize; D] {
         self.multi_index(node)

@@ -4,41 +4,26 @@ use std::sync::Arc;
 
 use burn::tensor::Tensor;
 use geometry::Grid;
-use model::Smoother;
-use operators::{Bricks, ComputeDevice, SpectralFilter, spectral_filter, update_on_host};
+use operators::{Bricks, ComputeDevice, update_on_host};
 
 use crate::Error;
 use crate::interface::InterfaceModes;
 use crate::region::Region;
 
-/// An approximate inverse of the Hessian in the pure phases.
-#[derive(Clone, Debug)]
-pub enum PhaseInverse {
-    /// Diagonal in Fourier space.
-    Spectral(SpectralFilter),
-    /// A polynomial of the convolution on active bricks.
-    Bricks(Box<Smoother>),
-}
+/// An approximate inverse of the Hessian in the pure phases, symmetric and positive definite, in the precision of what it is applied to.
+pub type PhaseInverse<const D: usize> = Arc<dyn Fn(&Tensor<D>) -> Tensor<D> + Send + Sync>;
 
-impl From<SpectralFilter> for PhaseInverse {
-    fn from(filter: SpectralFilter) -> Self {
-        Self::Spectral(filter)
-    }
-}
-
-impl PhaseInverse {
-    fn apply<const D: usize>(&self, r: &Tensor<D>) -> Tensor<D> {
-        match self {
-            Self::Spectral(filter) => spectral_filter(r.clone(), filter),
-            Self::Bricks(smoother) => smoother.apply(r),
-        }
-    }
+/// Which parts of the preconditioner.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Level {
+    Both,
+    Phase,
 }
 
 /// A symmetric positive definite approximation of the inverse Hessian: the exact one in the pure phases, which handles
 /// everything but displacements of the interface, plus a coarse correction for those that follows the interface.
 pub(crate) struct Preconditioner<const D: usize> {
-    pub(crate) phase: PhaseInverse,
+    pub(crate) phase: PhaseInverse<D>,
     pub(crate) grid: Grid<D>,
     pub(crate) eps: f64,
     pub(crate) tau: f64,
@@ -55,7 +40,7 @@ impl<const D: usize> Preconditioner<D> {
     pub(crate) fn follow(&mut self, u: &Tensor<D>, device: &ComputeDevice) -> Result<(), Error> {
         let u = device.values(u.clone())?;
         let (grid, eps, tau) = (&self.grid, self.eps, self.tau);
-        let region = self.region.as_ref().map(Region::nodes);
+        let region = self.region.as_ref().map(|region| &*region.nodes);
         self.interface = match &self.bricks {
             None => InterfaceModes::new(grid, grid, &u, eps, tau, region),
             Some(bricks) => InterfaceModes::new(grid, &**bricks, &u, eps, tau, region),
@@ -65,20 +50,12 @@ impl<const D: usize> Preconditioner<D> {
     }
 
     /// Applies it, in the precision of `r`.
-    pub(crate) fn apply(&self, r: &Tensor<D>) -> Tensor<D> {
-        let z = self.phase.apply(r);
-        self.projected(match &self.interface {
-            Some(interface) => update_on_host(r, z, interface),
-            None => z,
-        })
-    }
-
-    /// Applies the approximation in the pure phases alone.
-    pub(crate) fn apply_phase(&self, r: &Tensor<D>) -> Tensor<D> {
-        self.projected(self.phase.apply(r))
-    }
-
-    fn projected(&self, z: Tensor<D>) -> Tensor<D> {
+    pub(crate) fn apply(&self, r: &Tensor<D>, level: Level) -> Tensor<D> {
+        let z = (self.phase)(r);
+        let z = match &self.interface {
+            Some(interface) if level == Level::Both => update_on_host(r, z, interface),
+            _ => z,
+        };
         Region::project(self.region.as_ref(), z)
     }
 }

@@ -11,10 +11,10 @@ use crate::Error;
 /// The grid nodes whose values may change; the others keep theirs, bit for bit.
 #[derive(Clone)]
 pub(crate) struct Region<const D: usize> {
-    /// All nodes of the grid,
-    marks: Arc<[bool]>,
-    /// and those that are stored.
-    nodes: Arc<[bool]>,
+    /// Which nodes of the grid are inside, in its order,
+    pub(crate) marks: Arc<[bool]>,
+    /// and which of those that are stored.
+    pub(crate) nodes: Arc<[bool]>,
     /// The indicator function of the region: 1 inside, 0 outside.
     inside: Tensor<D>,
     outside: Tensor<D, Bool>,
@@ -58,16 +58,6 @@ impl<const D: usize> Region<D> {
             outside: inside.clone().equal_elem(0.0),
             inside,
         }
-    }
-
-    /// Which nodes are inside, in the order of the grid.
-    pub fn marks(&self) -> &[bool] {
-        &self.marks
-    }
-
-    /// Which of the stored nodes are inside.
-    pub(crate) fn nodes(&self) -> &[bool] {
-        &self.nodes
     }
 
     /// `x` inside, zero outside, if there is a region.

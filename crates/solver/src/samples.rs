@@ -96,19 +96,19 @@ impl<const D: usize> Samples<D> {
         eps: f64,
         spacing: f64,
         region: Option<&[bool]>,
-    ) -> Self {
+    ) -> Option<Self> {
         let cells = ((grid.side() / spacing).round() as usize).max(4);
         let lattice = Lattice {
             grid,
             eps,
-            cells,
+            points: Grid::new(cells, grid.side()).ok()?,
             width: grid.cells() as f64 / cells as f64,
         };
         let mut samples: Vec<Sample<D>> = parallel::filter_map(u.len(), CHUNK, &|node| {
             let moves = region.is_none_or(|region| region[node]);
             moves.then(|| lattice.sample(node, nodes, u)).flatten()
         });
-        let mut cell_of = vec![u32::MAX; cells.pow(D as u32)];
+        let mut cell_of = vec![u32::MAX; lattice.points.len()];
         let mut column_of = cell_of.clone();
         let mut corners: Vec<[u32; MOST_CORNERS]> = Vec::new();
         let mut columns = Vec::new();
@@ -117,12 +117,15 @@ impl<const D: usize> Samples<D> {
             if *cell == u32::MAX {
                 *cell = corners.len() as u32;
                 let mut ends = [0; MOST_CORNERS];
+                let place = lattice.points.multi_index(sample.cell as usize);
                 for (corner, end) in ends.iter_mut().enumerate().take(1 << D) {
-                    let position = lattice.corner(sample.cell as usize, corner);
+                    let place = std::array::from_fn(|axis| place[axis] + (corner >> axis & 1));
+                    let position = lattice.points.index(place);
                     let column = &mut column_of[position];
                     if *column == u32::MAX {
                         *column = columns.len() as u32;
-                        columns.push(lattice.place(position));
+                        let place = lattice.points.multi_index(position);
+                        columns.push(place.map(|at| at as u32));
                     }
                     *end = *column;
                 }
@@ -131,7 +134,7 @@ impl<const D: usize> Samples<D> {
             sample.cell = *cell;
         }
         let (order, starts) = grouped(&samples, corners.len());
-        Self {
+        Some(Self {
             nodes: samples,
             order,
             starts,
@@ -139,7 +142,7 @@ impl<const D: usize> Samples<D> {
             columns,
             cells,
             spacing: lattice.width * grid.spacing(),
-        }
+        })
     }
 
     /// The samples of one lattice cell, in the order of the grid.
@@ -171,8 +174,7 @@ fn grouped<const D: usize>(samples: &[Sample<D>], cells: usize) -> (Vec<u32>, Ve
 struct Lattice<'a, const D: usize> {
     grid: &'a Grid<D>,
     eps: f64,
-    /// Lattice cells per side of the box.
-    cells: usize,
+    points: Grid<D>,
     /// Grid cells per lattice cell.
     width: f64,
 }
@@ -209,45 +211,20 @@ impl<const D: usize> Lattice<'_, D> {
         for n in &mut normal {
             *n /= length;
         }
-        let mut cell = 0;
-        let mut fraction = [0.0; D];
-        for axis in 0..D {
-            // The foot point on the interface, in units of the lattice.
-            let x = (index[axis] as f64 - here * normal[axis] / spacing) / self.width;
-            let low = x.floor().rem_euclid(self.cells as f64) as usize % self.cells;
-            cell = cell * self.cells + low;
-            fraction[axis] = x - x.floor();
-        }
+        // The foot point on the interface, in units of the lattice.
+        let foot: [f64; D] = std::array::from_fn(|axis| {
+            (index[axis] as f64 - here * normal[axis] / spacing) / self.width
+        });
+        let cells = self.points.cells() as f64;
+        let low = foot.map(|x| x.floor().rem_euclid(cells) as usize);
         Some(Sample {
             node: node as u32,
-            cell: cell as u32,
-            fraction,
+            cell: self.points.index(low) as u32,
+            fraction: foot.map(|x| x - x.floor()),
             normal,
             weight,
             // For a distance function the Laplacian is the mean curvature.
             curvature: laplacian / (spacing * spacing),
         })
-    }
-
-    /// The place along each axis of a position in row-major order.
-    fn place(&self, mut position: usize) -> [u32; D] {
-        let mut place = [0; D];
-        for at in place.iter_mut().rev() {
-            *at = (position % self.cells) as u32;
-            position /= self.cells;
-        }
-        place
-    }
-
-    /// Row-major index of a corner of a cell.
-    fn corner(&self, cell: usize, corner: usize) -> usize {
-        let (mut rest, mut stride, mut position) = (cell, 1, 0);
-        for axis in (0..D).rev() {
-            let low = rest % self.cells;
-            rest /= self.cells;
-            position += (low + (corner >> axis & 1)) % self.cells * stride;
-            stride *= self.cells;
-        }
-        position
     }
 }

@@ -42,17 +42,22 @@ impl SparseInverse {
         for (place, column) in dissection(places, cells).into_iter().enumerate() {
             position[column as usize] = place as u32;
         }
-        let lower: Vec<(usize, usize, f64, f64)> = (entries.iter())
-            .map(|&(row, column, m, k)| {
-                let [row, column] = [row, column].map(|i| position[i as usize] as usize);
-                (row, column, m, k)
-            })
-            .filter(|(row, column, ..)| row >= column)
-            .collect();
-        let mass: Vec<_> = (lower.iter())
-            .map(|&(row, column, m, _)| Triplet::new(row, column, m))
-            .collect();
-        let real: Vec<_> = lower.iter().flat_map(real_form).flatten().collect();
+        let (mut mass, mut real) = (Vec::new(), Vec::new());
+        for &(row, column, m, k) in entries {
+            let [row, column] = [row, column].map(|i| position[i as usize] as usize);
+            if row < column {
+                continue;
+            }
+            mass.push(Triplet::new(row, column, m));
+            // The entries in the upper triangle of the real system.
+            let (below, left) = (2 * row, 2 * column);
+            real.push(Triplet::new(left, below, m));
+            real.push(Triplet::new(left, below + 1, -k));
+            if row > column {
+                real.push(Triplet::new(left + 1, below, -k));
+            }
+            real.push(Triplet::new(left + 1, below + 1, -m));
+        }
         let mass = SparseColMat::try_new_from_triplets(count, count, &mass).ok()?;
         let real = SparseColMat::try_new_from_triplets(2 * count, 2 * count, &real).ok()?;
         let (symbolic, factor) = factorize(&real)?;
@@ -102,19 +107,6 @@ impl SparseInverse {
             MemStack::new(&mut MemBuffer::new(memory)),
         );
     }
-}
-
-/// The entries in the upper triangle of the real system.
-fn real_form(
-    &(row, column, m, k): &(usize, usize, f64, f64),
-) -> [Option<Triplet<usize, usize, f64>>; 4] {
-    let (below, left) = (2 * row, 2 * column);
-    [
-        Some(Triplet::new(left, below, m)),
-        Some(Triplet::new(left, below + 1, -k)),
-        (row > column).then(|| Triplet::new(left + 1, below, -k)),
-        Some(Triplet::new(left + 1, below + 1, -m)),
-    ]
 }
 
 fn factorize(matrix: &SparseColMat<usize, f64>) -> Option<(SymbolicCholesky<usize>, Vec<f64>)> {

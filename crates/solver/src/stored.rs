@@ -8,10 +8,8 @@ use crate::Error;
 use crate::active::Active;
 use crate::nodes::Nodes;
 
-/// The values of phase fields where nothing is stored, in the negative and in the positive phase.
-pub(crate) fn phases<const D: usize>(active: Option<&Active<D>>) -> [f64; 2] {
-    active.map_or([-1.0, 1.0], Active::rests)
-}
+/// The values of phase fields in the negative and in the positive phase.
+const PHASES: [f64; 2] = [-1.0, 1.0];
 
 /// The values of a field on the whole grid, or on active bricks, with the constants that it has outside.
 #[derive(Clone)]
@@ -26,7 +24,7 @@ pub struct Stored<const D: usize> {
 impl<const D: usize> From<Field<D>> for Stored<D> {
     fn from(field: Field<D>) -> Self {
         let grid = *field.grid();
-        Self::new(field.into_values(), grid, None, phases::<D>(None))
+        Self::new(field.into_values(), grid, None, PHASES)
     }
 }
 
@@ -38,7 +36,7 @@ impl<const D: usize> Stored<D> {
         active: Option<Active<D>>,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
-        let rests = phases(active.as_ref());
+        let rests = active.as_ref().map_or(PHASES, Active::rests);
         Ok(Self::new(device.values(u.clone())?, grid, active, rests))
     }
 
@@ -60,7 +58,7 @@ impl<const D: usize> Stored<D> {
     /// The field on the whole grid.
     pub(crate) fn field(&self) -> Result<Field<D>, Error> {
         let values = match &self.active {
-            Some(active) => active.bricks().scatter(&self.values, self.rests),
+            Some(active) => active.bricks.scatter(&self.values, self.rests),
             None => self.values.clone(),
         };
         Ok(Field::from_values(self.grid, values)?)
@@ -69,7 +67,7 @@ impl<const D: usize> Stored<D> {
     /// Writes the values of the whole grid for nodes in a row from one on; where it is on bricks, both multiples of their sides.
     pub fn read(&self, start: usize, part: &mut [f64]) {
         match &self.active {
-            Some(active) => (active.bricks()).read(&self.values, self.rests, start, part),
+            Some(active) => (active.bricks).read(&self.values, self.rests, start, part),
             None => part.copy_from_slice(&self.values[start..][..part.len()]),
         }
     }
@@ -80,7 +78,7 @@ impl<const D: usize> Stored<D> {
 
     pub(crate) fn tensor(&self, device: &ComputeDevice) -> Tensor<D> {
         let whole = || self.grid.shape();
-        let shape = (self.active.as_ref()).map_or_else(whole, |active| active.bricks().shape());
+        let shape = (self.active.as_ref()).map_or_else(whole, |active| active.bricks.shape());
         device.tensor(&self.values, shape)
     }
 
@@ -89,27 +87,23 @@ impl<const D: usize> Stored<D> {
         let Some(own) = &self.active else {
             return self.clone();
         };
-        let (bricks, rests) = (active.bricks(), self.rests);
+        let (bricks, rests) = (&active.bricks, self.rests);
         Self {
-            values: bricks.carried(own.bricks(), &self.values, rests),
+            values: bricks.carried(&own.bricks, &self.values, rests),
             active: Some(active.clone()),
             ..*self
         }
     }
 
     pub(crate) fn map(&self, f: impl Fn(f64) -> f64 + Sync) -> Self {
-        Self {
-            grid: self.grid,
-            active: self.active.clone(),
-            values: parallel::values(self.values.len(), |i| f(self.values[i])),
-            rests: self.rests.map(f),
-        }
+        let values = parallel::values(self.values.len(), |i| f(self.values[i]));
+        Self::new(values, self.grid, self.active.clone(), self.rests.map(f))
     }
 
     /// A function of two fields, on the larger one of their sets of bricks, to which the other is carried.
     pub(crate) fn zip_map(&self, other: &Self, f: impl Fn(f64, f64) -> f64 + Sync) -> Self {
         let active = match (&self.active, &other.active) {
-            (Some(own), Some(others)) if own.bricks() != others.bricks() => {
+            (Some(own), Some(others)) if own.bricks != others.bricks => {
                 if other.values.len() > self.values.len() {
                     return self.on(others).zip_map(other, f);
                 }
@@ -123,26 +117,18 @@ impl<const D: usize> Stored<D> {
             "both are on bricks, or neither"
         );
         let (own, others) = (&self.values, &other.values);
-        Self {
-            grid: self.grid,
-            active: active.cloned(),
-            values: parallel::values(own.len(), |i| f(own[i], others[i])),
-            rests: [0, 1].map(|phase| f(self.rests[phase], other.rests[phase])),
-        }
+        let values = parallel::values(own.len(), |i| f(own[i], others[i]));
+        let rests = [0, 1].map(|phase| f(self.rests[phase], other.rests[phase]));
+        Self::new(values, self.grid, active.cloned(), rests)
     }
 
     /// The Laplacian by centred differences of second order, periodic.
     pub(crate) fn laplacian(&self) -> Self {
         let values = match &self.active {
-            Some(active) => self.laplacian_at(&**active.bricks()),
+            Some(active) => self.laplacian_at(&*active.bricks),
             None => self.laplacian_at(&self.grid),
         };
-        Self {
-            grid: self.grid,
-            active: self.active.clone(),
-            values,
-            rests: [0.0; 2],
-        }
+        Self::new(values, self.grid, self.active.clone(), [0.0; 2])
     }
 
     fn laplacian_at(&self, nodes: &impl Nodes<D>) -> Vec<f64> {
@@ -158,7 +144,7 @@ impl<const D: usize> Stored<D> {
             };
             unit * (0..D).map(along).sum::<f64>()
         };
-        parallel::values(nodes.count(), at)
+        parallel::values(self.values.len(), at)
     }
 
     /// The largest size of a value.
@@ -189,7 +175,7 @@ mod tests {
     }
 
     fn part_of(field: &Field<2>, active: Active<2>) -> Stored<2> {
-        let values = active.bricks().gather(field.values());
+        let values = active.bricks.gather(field.values());
         let rests = active.rests();
         Stored::new(values, *field.grid(), Some(active), rests)
     }
@@ -198,7 +184,7 @@ mod tests {
     #[test]
     fn results_on_bricks_are_those_on_the_grid() {
         let (disc, active) = disc(0.5);
-        let (bricks, rests) = (active.bricks().clone(), active.rests());
+        let (bricks, rests) = (active.bricks.clone(), active.rests());
         let part = part_of(&disc, active);
         let whole = part.field().unwrap().into_values();
         let whole = Stored::new(whole, *disc.grid(), None, rests);

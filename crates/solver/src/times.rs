@@ -23,19 +23,16 @@ pub struct PhaseTimes {
     pub start: f64,
 }
 
-/// Adds up wall times.
-#[derive(Default)]
-pub(crate) struct Stopwatch(Cell<f64>);
-
-impl Stopwatch {
-    pub(crate) fn time<T>(&self, f: impl FnOnce() -> T) -> T {
-        let clock = Instant::now();
-        let result = f();
-        self.0.set(self.0.get() + clock.elapsed().as_secs_f64());
-        result
-    }
-
-    pub(crate) fn seconds(&self) -> f64 {
-        self.0.get()
-    }
+/// Adds the wall time of some work to that of a phase.
+pub(crate) fn timed<T>(
+    times: &Cell<PhaseTimes>,
+    phase: fn(&mut PhaseTimes) -> &mut f64,
+    work: impl FnOnce() -> T,
+) -> T {
+    let clock = Instant::now();
+    let result = work();
+    let mut sum = times.get();
+    *phase(&mut sum) += clock.elapsed().as_secs_f64();
+    times.set(sum);
+    result
 }

@@ -5,12 +5,13 @@ use burn::tensor::Tensor;
 use geometry::measure::{l2_distance, perimeter, zero_set_volume};
 use geometry::{Field, Grid, exact};
 use model::MeanCurvatureOperator;
-use operators::SpectralFilter;
+use operators::{SpectralFilter, spectral_filter};
 use solver::{
     Error, Exit, FlowParams, MeanCurvatureFlow, MeanCurvatureStep, Method, MinimizingMovement,
     NewtonParams, Objective, PhaseInverse, PhaseTimes, Precision, StepRecord, WillmoreFlow,
     minimize,
 };
+use std::sync::Arc;
 
 /// A radius of the reference experiment, `2^-4 pi`.
 const RADIUS: f64 = 0.19635;
@@ -366,8 +367,9 @@ impl MeanCurvatureStep<2> for Pointwise {
         linearize::Extensions::new()
     }
 
-    fn phase_preconditioner(&self, cells: usize, _stiffness: f64) -> PhaseInverse {
-        SpectralFilter::from_kernel(&[cells; 2], &[1.0], 1, |_| 1.0).into()
+    fn phase_preconditioner(&self, cells: usize, _stiffness: f64) -> PhaseInverse<2> {
+        let filter = SpectralFilter::from_kernel(&[cells; 2], &[1.0], 1, |_| 1.0);
+        Arc::new(move |r| spectral_filter(r.clone(), &filter))
     }
 }
 

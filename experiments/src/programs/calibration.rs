@@ -69,9 +69,9 @@ pub fn program(options: &Options) -> Result<()> {
     let install = options.install.as_ref().map(OutputDir::create);
     let install = install.transpose()?;
     let (mut all, mut rows) = (Vec::new(), Vec::new());
-    for (name, network) in networks {
+    for (name, mut network) in networks {
         let calibration = session.phase(&name, |_| Ok(network.calibrate()?))?;
-        let network = network.with_calibration(Some(calibration));
+        network.calibration = Some(calibration);
         if let Some(install) = &install {
             network.save(&install.path(&name)?)?;
         }
@@ -313,7 +313,7 @@ fn diagnostics(all: &[NamedNetwork], stage: &Stage<'_>) -> Result<Vec<Diagnostic
         ratios.width < 65 && ratios.dimension == 2
     });
     let diagnose = |NamedNetwork { name, network }: &NamedNetwork| {
-        let data = SphereData::new(network.ratios(), network.provenance().reference_cells)?;
+        let data = SphereData::new(network.ratios(), network.provenance.reference_cells)?;
         let mut displacement = Vec::new();
         for i in 0..count {
             let radius = 0.05 * (0.42_f64 / 0.05).powf(i as f64 / (count - 1) as f64);

@@ -62,7 +62,7 @@ pub fn program(options: &Options) -> Result<()> {
     let transfers = directions.flat_map(|(one, direction)| one.transfer(direction));
     session.output.write_csv("transfer.csv", transfers)?;
     let origins: BTreeMap<_, _> = (shown.iter())
-        .map(|one| (one.spec.name, (&one.quality, one.network.provenance())))
+        .map(|one| (one.spec.name, (&one.quality, &one.network.provenance)))
         .collect();
     session.output.write_json("networks.json", &origins)?;
     let table = Sheet::of(&shown).text("network", |one| one.spec.name);
@@ -93,7 +93,7 @@ struct Entry {
 
 fn entries(spec: NetworkSpec, network: &Network) -> Result<Vec<Entry>> {
     let (width, eps_over_h) = (spec.ratios.width, spec.ratios.eps_over_h);
-    let (middle, heat) = ((width / 2).cast_signed(), heat_kernel(&spec.data(false)?));
+    let (middle, heat) = ((width / 2).cast_signed(), heat_kernel(spec.ratios));
     let entry = |(i, (&kernel, &heat_kernel)): (usize, (&f64, &f64))| {
         let [offset_x, offset_y] = [i / width, i % width].map(|k| k.cast_signed() - middle);
         Entry {

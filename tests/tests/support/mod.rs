@@ -89,7 +89,7 @@ pub fn splitting_network(dimension: usize, width: usize) -> Result<Network, mode
         held_out_loss: f64::NAN,
         flipped_loss: f64::NAN,
     };
-    let kernel = levenberg_marquardt::heat_kernel(&data);
+    let kernel = levenberg_marquardt::heat_kernel(data.ratios);
     Network::new(ratios, kernel, splitting_activation()?, provenance)
 }
 

@@ -37,8 +37,8 @@ fn about(name: &str, network: &Network) -> Value {
         "name": name,
         "ratios": network.ratios(),
         "layers": network.activation().layers(),
-        "provenance": network.provenance(),
-        "calibration": network.stored_calibration(),
+        "provenance": &network.provenance,
+        "calibration": network.calibration,
     })
 }
 

@@ -34,7 +34,7 @@ mod planar;
 
 use serde::{Deserialize, Serialize};
 
-pub use planar::{PlanarInterface, PlanarStep, solve};
+pub use planar::{PlanarInterface, PlanarScales, PlanarStep, solve};
 
 use crate::Error;
 
@@ -120,20 +120,24 @@ pub fn normals(dimension: usize) -> &'static [(&'static [isize], f64)] {
 /// Positions of the interface between two planes, in fractions of their distance.
 const POSITIONS: [f64; 4] = [0.125, 0.375, 0.625, 0.875];
 
-/// Calibrates a step given on planes, one [`PlanarStep`] with its weight for each normal.
+/// Calibrates a step given on planes, by their normals and the weights of these.
 ///
 /// # Errors
 /// [`Error::Calibration`] if the step has no flat interface at rest, or if its response to curvature vanishes.
-pub fn calibrate(normals: &[(impl PlanarStep, f64)]) -> Result<Calibration, Error> {
+pub fn calibrate<S: PlanarStep>(
+    normals: &[(&[isize], f64)],
+    step: impl Fn(&[isize]) -> S + Sync,
+) -> Result<Calibration, Error> {
     // One thread: the order of sums in the factorizations depends on their number.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let work = || -> Result<Vec<(Vec<PlanarInterface>, f64)>, Error> {
-        let mut all = Vec::with_capacity(normals.len());
-        for (step, weight) in normals {
-            let interfaces: Result<Vec<_>, _> = POSITIONS.iter().map(|&s| solve(step, s)).collect();
-            all.push((interfaces?, *weight));
-        }
-        Ok(all)
+        let all = normals.iter().map(|(normal, weight)| {
+            let step = step(normal);
+            let interfaces: Result<Vec<_>, _> =
+                POSITIONS.map(|s| solve(&step, s)).into_iter().collect();
+            Ok((interfaces?, *weight))
+        });
+        all.collect()
     };
     let all = match pool {
         Ok(pool) => pool.install(work),
@@ -145,11 +149,9 @@ pub fn calibrate(normals: &[(impl PlanarStep, f64)]) -> Result<Calibration, Erro
             (all.iter()).map(|(i, weight)| weight * i.iter().map(f).sum::<f64>() / i.len() as f64);
         means.sum::<f64>() / total
     };
-    let energies: Vec<f64> = (all.iter())
-        .map(|(i, _)| i.iter().map(|i| i.energy).sum::<f64>() / i.len() as f64)
-        .collect();
-    let position_spreads =
-        (all.iter()).map(|(i, _)| spread(&i.iter().map(|i| i.energy).collect::<Vec<_>>()));
+    let energies =
+        (all.iter()).map(|(i, _)| i.iter().map(|i| i.energy).sum::<f64>() / i.len() as f64);
+    let position_spreads = (all.iter()).map(|(i, _)| spread(i.iter().map(|i| i.energy)));
     let eigenvalues = all.iter().flat_map(|(i, _)| i.iter().map(|i| i.eigenvalue));
     Ok(Calibration {
         factors: Factors {
@@ -160,18 +162,15 @@ pub fn calibrate(normals: &[(impl PlanarStep, f64)]) -> Result<Calibration, Erro
         displacement: mean(|i| i.displacement),
         alignment: mean(|i| i.alignment),
         eigenvalue: eigenvalues.fold(1.0, |worst: f64, e| {
-            if (e - 1.0).abs() > (worst - 1.0).abs() {
-                e
-            } else {
-                worst
-            }
+            let worse = (e - 1.0).abs() > (worst - 1.0).abs();
+            if worse { e } else { worst }
         }),
         position_spread: position_spreads.fold(0.0, f64::max),
-        normal_spread: spread(&energies),
+        normal_spread: spread(energies),
     })
 }
 
-fn spread(values: &[f64]) -> f64 {
-    let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    largest - values.iter().copied().fold(f64::INFINITY, f64::min)
+fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let largest = values.clone().fold(f64::NEG_INFINITY, f64::max);
+    largest - values.fold(f64::INFINITY, f64::min)
 }

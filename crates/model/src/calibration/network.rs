@@ -2,7 +2,7 @@
 
 use faer::{Col, Mat};
 
-use super::{POSITIONS, PlanarStep, calibrate, normals, planar};
+use super::{POSITIONS, PlanarScales, PlanarStep, calibrate, normals, planar};
 use crate::ratios::offsets;
 use crate::{Calibration, Error, Mlp, Network};
 
@@ -13,9 +13,7 @@ struct NetworkOnPlanes<'a> {
     kernel: Vec<f64>,
     /// `1/2 sum K_b |b_t|^2 / (D - 1)` over each plane, `b_t` the component of `b` in the plane.
     moments: Vec<f64>,
-    spacing: f64,
-    eps: f64,
-    time_step: f64,
+    scales: PlanarScales,
 }
 
 impl<'a> NetworkOnPlanes<'a> {
@@ -38,9 +36,11 @@ impl<'a> NetworkOnPlanes<'a> {
             activation: network.activation(),
             kernel,
             moments,
-            spacing: 1.0 / square.sqrt(),
-            eps: ratios.eps_over_h,
-            time_step: ratios.step_over_h2,
+            scales: PlanarScales {
+                eps: ratios.eps_over_h,
+                time_step: ratios.step_over_h2,
+                spacing: 1.0 / square.sqrt(),
+            },
         }
     }
 
@@ -68,16 +68,8 @@ impl<'a> NetworkOnPlanes<'a> {
 }
 
 impl PlanarStep for NetworkOnPlanes<'_> {
-    fn eps(&self) -> f64 {
-        self.eps
-    }
-
-    fn time_step(&self) -> f64 {
-        self.time_step
-    }
-
-    fn spacing(&self) -> f64 {
-        self.spacing
+    fn scales(&self) -> PlanarScales {
+        self.scales
     }
 
     fn linearize(&self, w: &Col<f64>) -> Result<(Col<f64>, Mat<f64>), Error> {
@@ -109,11 +101,8 @@ impl Network {
     /// # Errors
     /// [`Error::Calibration`] if the operator has no flat interface at rest, as after too little training.
     pub fn calibrate(&self) -> Result<Calibration, Error> {
-        let steps: Vec<_> = normals(self.ratios().dimension)
-            .iter()
-            .map(|&(normal, weight)| (NetworkOnPlanes::new(self, normal), weight))
-            .collect();
-        calibrate(&steps)
+        let step = |normal: &[isize]| NetworkOnPlanes::new(self, normal);
+        calibrate(normals(self.ratios().dimension), step)
     }
 
     /// Eigenvalues of `J`, the derivative of the operator at its flat interface normal to an axis, largest real part first. The
@@ -154,10 +143,10 @@ mod tests {
                     slope = &jacobian * &slope;
                 }
                 let jump = w[w.nrows() - 1] - w[0];
-                slope *= faer::Scale(jump / (slope.sum() * step.spacing()));
+                slope *= faer::Scale(jump / (slope.sum() * step.scales.spacing));
                 let psi = step.smoothed(&step.kernel, &slope);
                 let response = dot(&slope, &step.smoothed(&step.moments, &slope));
-                let scale = step.time_step().powi(2) * dot(&optimal_slope, &optimal_slope);
+                let scale = step.scales.time_step.powi(2) * dot(&optimal_slope, &optimal_slope);
                 let energy = response.powi(2) / (dot(&psi, &psi) * scale);
                 assert!(
                     (energy / found.energy - 1.0).abs() < 1e-5,
@@ -183,7 +172,7 @@ mod tests {
                 // The variance per axis of a symmetric kernel does not depend on the direction.
                 let reach = (step.kernel.len() / 2) as f64;
                 let variance: f64 = (step.kernel.iter().enumerate())
-                    .map(|(m, k)| k * ((m as f64 - reach) * step.spacing).powi(2))
+                    .map(|(m, k)| k * ((m as f64 - reach) * step.scales.spacing).powi(2))
                     .sum();
                 let moment: f64 = step.moments.iter().sum();
                 assert!(

@@ -1,24 +1,29 @@
 //! The flat interface of a step: a dense problem in one dimension.
 
 use faer::linalg::solvers::{PartialPivLu, Solve};
-use faer::{Col, Mat};
+use faer::{Col, Mat, MatRef};
 use geometry::optimal_profile;
 
 use crate::Error;
+
+/// The scales of a step on planes, in units of the grid spacing `h`.
+#[derive(Clone, Copy, Debug)]
+pub struct PlanarScales {
+    /// Interface width `eps / h`.
+    pub eps: f64,
+    /// Time step `tautilde / h^2`.
+    pub time_step: f64,
+    /// Distance of neighbouring planes; `1 / |a|` for the integer normal `a`.
+    pub spacing: f64,
+}
 
 /// A step of mean curvature flow restricted to functions that are constant on parallel planes of grid nodes.
 ///
 /// Lengths are in units of the grid spacing `h`, times in `h^2`. Beyond the first and the last plane the function continues as
 /// a constant.
 pub trait PlanarStep: Sync {
-    /// Interface width `eps / h`.
-    fn eps(&self) -> f64;
-
-    /// Time step `tautilde / h^2`.
-    fn time_step(&self) -> f64;
-
-    /// Distance of neighbouring planes in units of `h`; `1 / |a|` for the integer normal `a`.
-    fn spacing(&self) -> f64;
+    /// The lengths and the time that it depends on.
+    fn scales(&self) -> PlanarScales;
 
     /// `v[w]` and the matrix of its derivative.
     ///
@@ -75,13 +80,15 @@ const OFF: f64 = 1e-2;
 /// # Errors
 /// [`Error::Calibration`].
 pub fn solve(step: &impl PlanarStep, position: f64) -> Result<PlanarInterface, Error> {
-    let failed = |reason, eigenvalue| Error::Calibration { reason, eigenvalue };
-    let (eps, spacing) = (step.eps(), step.spacing());
+    let PlanarScales {
+        eps,
+        time_step: tautilde,
+        spacing,
+    } = step.scales();
     let thickness = 2.0 * HALF_WIDTH * eps / spacing;
     if thickness.is_nan() || thickness > MOST_PLANES {
-        return Err(failed(
+        return Err(Error::uncalibrated(
             "the interface is too wide for the grid spacing",
-            f64::NAN,
         ));
     }
     let (start, optimal_slope) = optimal_interface(step, position);
@@ -90,20 +97,12 @@ pub fn solve(step: &impl PlanarStep, position: f64) -> Result<PlanarInterface, E
 
     let w = flat_interface(step, &start, &optimal_slope)?;
     let (value, jacobian) = step.linearize(&w)?;
-    let shifted = |transpose: bool| {
-        PartialPivLu::new(
-            Mat::from_fn(planes, planes, |i, j| {
-                let entry = if transpose {
-                    jacobian[(j, i)]
-                } else {
-                    jacobian[(i, j)]
-                };
-                entry - if i == j { SHIFT } else { 0.0 }
-            })
-            .as_ref(),
-        )
+    let shifted = |matrix: MatRef<f64>| {
+        let shift = |i, j| if i == j { SHIFT } else { 0.0 };
+        let shifted = Mat::from_fn(planes, planes, |i, j| matrix[(i, j)] - shift(i, j));
+        PartialPivLu::new(shifted.as_ref())
     };
-    let (left, right) = (shifted(true), shifted(false));
+    let (left, right) = (shifted(jacobian.transpose()), shifted(jacobian.as_ref()));
     let mut psi = optimal_slope.clone();
     let mut slope = optimal_slope.clone();
     for _ in 0..INVERSE {
@@ -115,10 +114,10 @@ pub fn solve(step: &impl PlanarStep, position: f64) -> Result<PlanarInterface, E
     let residual = eigenvector_residual(&image, &psi, eigenvalue);
     // Written so that NaN is refused.
     if !((eigenvalue - 1.0).abs() <= OFF && residual <= RESIDUAL) {
-        return Err(failed(
-            "translations of the flat interface are no eigenvector",
+        return Err(Error::Calibration {
+            reason: "translations of the flat interface are no eigenvector",
             eigenvalue,
-        ));
+        });
     }
     // The slope integrates to the jump between the phases.
     let jump = w[planes - 1] - w[0];
@@ -132,7 +131,6 @@ pub fn solve(step: &impl PlanarStep, position: f64) -> Result<PlanarInterface, E
     let bending = step.bending(&w, &slope);
     let response = dot(&bending, &psi);
     let (psi_square, slope_square) = (dot(&psi, &dual_psi), dot(&slope, &mass_of_slope));
-    let tautilde = step.time_step();
     let interface = PlanarInterface {
         energy: response * response / (psi_square * tautilde * tautilde * optimal_square),
         metric: slope_square / optimal_square,
@@ -143,7 +141,10 @@ pub fn solve(step: &impl PlanarStep, position: f64) -> Result<PlanarInterface, E
     };
     let PlanarInterface { energy, metric, .. } = interface;
     if !(energy.is_finite() && energy > 0.0 && metric.is_finite() && metric > 0.0) {
-        return Err(failed("the step does not see curvature", eigenvalue));
+        return Err(Error::Calibration {
+            reason: "the step does not see curvature",
+            eigenvalue,
+        });
     }
     Ok(interface)
 }
@@ -153,10 +154,8 @@ pub(super) fn spectrum(step: &impl PlanarStep, position: f64) -> Result<Vec<[f64
     let (start, optimal_slope) = optimal_interface(step, position);
     let w = flat_interface(step, &start, &optimal_slope)?;
     let (_, jacobian) = step.linearize(&w)?;
-    let values = jacobian.eigenvalues().map_err(|_| Error::Calibration {
-        reason: "the eigenvalues of the flat interface do not converge",
-        eigenvalue: f64::NAN,
-    })?;
+    let failed = |_| Error::uncalibrated("the eigenvalues of the flat interface do not converge");
+    let values = jacobian.eigenvalues().map_err(failed)?;
     let mut values: Vec<[f64; 2]> = values.iter().map(|z| [z.re, z.im]).collect();
     values.sort_by(|a, b| b[0].total_cmp(&a[0]));
     Ok(values)
@@ -164,7 +163,7 @@ pub(super) fn spectrum(step: &impl PlanarStep, position: f64) -> Result<Vec<[f64
 
 /// `q` and `q'` on the planes of the layer.
 pub(super) fn optimal_interface(step: &impl PlanarStep, position: f64) -> (Col<f64>, Col<f64>) {
-    let (eps, spacing) = (step.eps(), step.spacing());
+    let PlanarScales { eps, spacing, .. } = step.scales();
     let half = (HALF_WIDTH * eps / spacing).ceil();
     let planes = 2 * half as usize + 1;
     let x = |i: usize| (i as f64 - half + position) * spacing;
@@ -213,10 +212,7 @@ pub(super) fn flat_interface(
             return Ok(w);
         }
     }
-    Err(Error::Calibration {
-        reason: "no flat interface is at rest",
-        eigenvalue: f64::NAN,
-    })
+    Err(Error::uncalibrated("no flat interface is at rest"))
 }
 
 fn dot(a: &Col<f64>, b: &Col<f64>) -> f64 {

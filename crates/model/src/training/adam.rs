@@ -371,7 +371,7 @@ mod tests {
     #[test]
     fn refinement_keeps_mass_and_linear_kernels() {
         for dimension in [2, 3] {
-            let kernel = heat_kernel(&data(dimension));
+            let kernel = heat_kernel(data(dimension).ratios);
             let (fine, width) = refine_kernel(&kernel, dimension, 9);
             assert_eq!((width, fine.len()), (17, 17_usize.pow(dimension as u32)));
             let (coarse_sum, fine_sum): (f64, f64) = (kernel.iter().sum(), fine.iter().sum());

@@ -1,12 +1,10 @@
 //! Perceptrons of the paper's form that imitate a given odd function with its first two derivatives.
 
-use chacha20::ChaCha8Rng;
 use faer::Mat;
 use operators::ComputeDevice;
-use rand::SeedableRng;
 use serde::{Deserialize, Serialize};
 
-use super::levenberg_marquardt::{Problem, random_activation};
+use super::levenberg_marquardt::{Problem, best_start};
 use super::{BandSamples, Observer, Progress};
 use crate::{Error, Mlp, PAPER_LAYERS};
 
@@ -37,9 +35,6 @@ const IMITATED: usize = 105;
 const NODE_DISTANCE: f64 = 0.0125;
 /// Weights of first and second differences against values.
 const SOBOLEV: [f64; 2] = [0.03, 0.002];
-/// A start this good is taken.
-const GOOD_START: f64 = 1e-9;
-
 /// Fits a perceptron `N` of the paper's layers such that `(N(z) - N(-z)) / 2` is the odd function `target`, together with its
 /// first two derivatives (a Sobolev norm on a fine grid), and returns that odd part.
 ///
@@ -84,21 +79,13 @@ pub(super) fn distill_odd(
             progress.tell(observer, &())
         })
     };
-    let mut best: Option<(f64, Vec<f64>)> = None;
-    for start in 0..settings.starts.max(1) {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(start as u64));
-        let mut found = (f64::INFINITY, random_activation(&mut rng));
+    let mut parameters = best_start(settings.starts, seed, |x| {
+        let mut found = (f64::INFINITY, x);
         for ridge in [1e-6, 1e-7, 1e-8, 1e-9] {
             found = fit(found.1, ridge, settings.start_iterations)?;
         }
-        if best.as_ref().is_none_or(|(loss, _)| found.0 < *loss) {
-            best = Some(found);
-        }
-        if best.as_ref().is_some_and(|(loss, _)| *loss < GOOD_START) {
-            break;
-        }
-    }
-    let (_, mut parameters) = best.ok_or_else(|| Error::Training("no start".to_owned()))?;
+        Ok(found)
+    })?;
     for ridge in [1e-10, 1e-11, 1e-12] {
         (_, parameters) = fit(parameters, ridge, settings.iterations)?;
     }

@@ -74,19 +74,9 @@ impl OddPolynomial {
     pub fn jet(&self, z: f64) -> [f64; 3] {
         let x = z.clamp(-1.0, 1.0);
         let mut sum = [0.0; 3];
-        // T_(n+1) = 2 x T_n - T_(n-1), differentiated twice.
-        let (mut before, mut now) = ([1.0, 0.0, 0.0], [x, 1.0, 0.0]);
-        for coefficient in &self.coefficients {
-            for (sum, t) in sum.iter_mut().zip(now) {
+        for (coefficient, jet) in self.coefficients.iter().zip(odd_chebyshev(x)) {
+            for (sum, t) in sum.iter_mut().zip(jet) {
                 *sum += coefficient * t;
-            }
-            for _ in 0..2 {
-                let next = [
-                    2.0 * x * now[0] - before[0],
-                    2.0 * (now[0] + x * now[1]) - before[1],
-                    2.0 * (2.0 * now[1] + x * now[2]) - before[2],
-                ];
-                (before, now) = (now, next);
             }
         }
         let beyond = z - x;
@@ -96,20 +86,21 @@ impl OddPolynomial {
             sum[2],
         ]
     }
+}
 
-    /// The odd Chebyshev polynomials at `z`, as many as there are coefficients.
-    fn basis(terms: usize, z: f64) -> Vec<f64> {
-        let (mut before, mut now) = (1.0, z);
-        (0..terms)
-            .map(|_| {
-                let value = now;
-                for _ in 0..2 {
-                    (before, now) = (now, 2.0 * z * now - before);
-                }
-                value
-            })
-            .collect()
-    }
+/// The Chebyshev polynomials of degree 1, 3, 5, ... at `x`, with their first two derivatives.
+fn odd_chebyshev(x: f64) -> impl Iterator<Item = [f64; 3]> {
+    // T_(n+1) = 2 x T_n - T_(n-1), differentiated twice.
+    let next = move |[before, now]: [[f64; 3]; 2]| {
+        let next = [
+            2.0 * x * now[0] - before[0],
+            2.0 * (now[0] + x * now[1]) - before[1],
+            2.0 * (2.0 * now[1] + x * now[2]) - before[2],
+        ];
+        [now, next]
+    };
+    let first = [[1.0, 0.0, 0.0], [x, 1.0, 0.0]];
+    std::iter::successors(Some(first), move |pair| Some(next(next(*pair)))).map(|[_, now]| now)
 }
 
 /// Number of samples across a flat interface.
@@ -256,10 +247,8 @@ pub fn fit(
     });
     let mut matrix = Mat::zeros(rows.len(), params.terms);
     for (i, row) in rows.iter().enumerate() {
-        for (j, value) in OddPolynomial::basis(params.terms, row.smoothed)
-            .iter()
-            .enumerate()
-        {
+        let basis = odd_chebyshev(row.smoothed).take(params.terms);
+        for (j, [value, ..]) in basis.enumerate() {
             matrix[(i, j)] = row.weight * value;
         }
     }
@@ -289,13 +278,9 @@ pub fn kernel_of_full_variance(data: &SphereData) -> Vec<f64> {
     const SHORT: f64 = 0.01;
     let wanted = 2.0 * data.ratios.step_over_h2;
     let kernel_for = |step_over_h2: f64| {
-        let ratios = Ratios {
+        heat_kernel(Ratios {
             step_over_h2,
             ..data.ratios
-        };
-        heat_kernel(&SphereData {
-            ratios,
-            ..data.clone()
         })
     };
     let variance = |kernel: &[f64]| -> f64 {
@@ -408,7 +393,7 @@ mod tests {
     fn displacements_are_exact_up_to_the_square_of_the_curvature() {
         let data = data();
         let params = LeastSquaresParams::default();
-        let kernel = heat_kernel(&data);
+        let kernel = heat_kernel(data.ratios);
         let polynomial = fit(&data, &params, &kernel, 7).unwrap();
         let offsets = with_offsets(&data, &kernel);
         let mut rng = ChaCha8Rng::seed_from_u64(99);
@@ -436,7 +421,7 @@ mod tests {
     #[test]
     fn narrow_kernels_keep_the_variance() {
         let wide = data();
-        assert_eq!(kernel_of_full_variance(&wide), heat_kernel(&wide));
+        assert_eq!(kernel_of_full_variance(&wide), heat_kernel(wide.ratios));
         let ratios = Ratios {
             eps_over_h: 4.0,
             step_over_h2: 4.0,
@@ -455,7 +440,7 @@ mod tests {
     #[test]
     fn settings_that_determine_nothing_are_refused() {
         let data = data();
-        let kernel = heat_kernel(&data);
+        let kernel = heat_kernel(data.ratios);
         for params in [
             LeastSquaresParams {
                 range: [0.1, 30.0],

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use super::{BandSamples, Observer, Orbits, Progress, Recipe, SphereData};
 use crate::mlp::{forward, forward_with, layout, parameter_count};
 use crate::ratios::offsets;
-use crate::{Error, Mlp, PAPER_LAYERS};
+use crate::{Error, Mlp, PAPER_LAYERS, Ratios};
 
 /// Rows of the Jacobian assembled at once.
 const CHUNK: usize = 2048;
@@ -331,8 +331,7 @@ impl<'a> Problem<'a> {
 }
 
 /// The heat kernel of variance `2 tautilde` per axis, sampled and normalised: the kernel of the splitting scheme.
-pub fn heat_kernel(data: &SphereData) -> Vec<f64> {
-    let ratios = data.ratios;
+pub fn heat_kernel(ratios: Ratios) -> Vec<f64> {
     let mut kernel: Vec<f64> = offsets(ratios.dimension, ratios.width)
         .map(|b| {
             let squared: f64 = b.iter().map(|&b| (b * b) as f64).sum();
@@ -381,28 +380,44 @@ pub fn splitting_start(
         identity_loss: 1.0,
         design: w,
     };
-    let mut best: Option<(f64, Vec<f64>)> = None;
-    for start in 0..params.starts.max(1) {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(start as u64));
-        let mut x = random_activation(&mut rng);
+    let parameters = best_start(params.starts, seed, |mut x| {
+        let mut best = (f64::INFINITY, x.clone());
         for ridge in [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10] {
             let problem = Problem::of_activation(&samples, ridge, device);
             let loss;
             (loss, x) = problem.fit_activation(x, 15, |_| Ok(()))?;
-            if best.as_ref().is_none_or(|(b, _)| loss < *b) {
-                best = Some((loss, x.clone()));
+            if loss < best.0 {
+                best = (loss, x.clone());
             }
         }
-        if best.as_ref().is_some_and(|(loss, _)| *loss < 1e-9) {
-            break;
-        }
-    }
-    let (_, parameters) = best.ok_or_else(|| Error::Training("no start".to_owned()))?;
+        Ok(best)
+    })?;
     Mlp::new(PAPER_LAYERS.to_vec(), parameters)
 }
 
+/// The parameters with the smallest loss that `fit` finds from several random starts; the first that are good enough are taken.
+pub(super) fn best_start(
+    starts: usize,
+    seed: u64,
+    mut fit: impl FnMut(Vec<f64>) -> Result<(f64, Vec<f64>), Error>,
+) -> Result<Vec<f64>, Error> {
+    const GOOD: f64 = 1e-9;
+    let mut best = (f64::INFINITY, Vec::new());
+    for start in 0..starts.max(1) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(start as u64));
+        let found = fit(random_activation(&mut rng))?;
+        if start == 0 || found.0 < best.0 {
+            best = found;
+        }
+        if best.0 < GOOD {
+            break;
+        }
+    }
+    Ok(best.1)
+}
+
 /// Parameters whose neurons cover the interval of interest.
-pub(super) fn random_activation(rng: &mut ChaCha8Rng) -> Vec<f64> {
+fn random_activation(rng: &mut ChaCha8Rng) -> Vec<f64> {
     let mut normal = || {
         // Box-Muller
         let (a, b): (f64, f64) = (rng.random_range(1e-12..1.0), rng.random_range(0.0..1.0));
@@ -473,10 +488,10 @@ impl Recipe for LmParams {
             BandSamples::draw(data, &orbits, self.shells, self.directions, flipped, rng)
         };
         let (training, held_out) = (samples(&mut rng, self.flipped), samples(&mut rng, 0.0));
-        let heat = orbits.average(&heat_kernel(data));
+        let heat = orbits.average(&heat_kernel(data.ratios));
         let activation_len = parameter_count(&PAPER_LAYERS);
         let mut ridge: Vec<f64> = orbits
-            .sizes()
+            .sizes
             .iter()
             .map(|&s| self.kernel_ridge * s as f64)
             .collect();
@@ -485,7 +500,7 @@ impl Recipe for LmParams {
         let n = orbits.count();
         let scale = training.identity_loss;
         let held_scale = held_out.identity_loss;
-        let sizes = orbits.sizes();
+        let sizes = &orbits.sizes;
         let no_ridge = (vec![0.0; ridge.len()], centre.clone());
         let held_out = Problem::new(&held_out, sizes, no_ridge, device);
         let problem = Problem::new(&training, sizes, (ridge, centre), device);
@@ -546,7 +561,6 @@ impl Recipe for LmParams {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Ratios;
     use crate::training::Progress;
 
     fn data(dimension: usize) -> SphereData {
@@ -578,11 +592,11 @@ mod tests {
         let orbits = Orbits::new(data.ratios.dimension, data.ratios.width);
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let samples = BandSamples::draw(data, &orbits, 12, 2, 0.25, &mut rng);
-        let heat = orbits.average(&heat_kernel(data));
+        let heat = orbits.average(&heat_kernel(data.ratios));
         let x = [heat, random_activation(&mut rng)].concat();
         let centre = x.iter().map(|x| 0.9 * x).collect();
         let ridge = vec![1e-2; x.len()];
-        let problem = Problem::new(&samples, orbits.sizes(), (ridge, centre), device);
+        let problem = Problem::new(&samples, &orbits.sizes, (ridge, centre), device);
         (problem, x)
     }
 

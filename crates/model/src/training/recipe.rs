@@ -120,18 +120,8 @@ impl<R: Recipe> Training<'_, R> {
         };
         let (kernel, activation) =
             (self.recipe).train(&self.data, self.seed, state, device, &mut record)?;
-        self.finish(kernel, activation, checkpoint.curve.clone(), device)
-    }
-
-    /// Measures the trained operator and makes a network of it.
-    fn finish(
-        &self,
-        kernel: Vec<f64>,
-        activation: Mlp,
-        curve: Vec<CurvePoint>,
-        device: &ComputeDevice,
-    ) -> Result<Trained, Error> {
-        let mut provenance = Provenance {
+        let curve = checkpoint.curve.clone();
+        let provenance = Provenance {
             recipe: self.recipe.describe(&self.data, curve.len()),
             reference_cells: self.data.cells,
             seed: self.seed,
@@ -140,15 +130,13 @@ impl<R: Recipe> Training<'_, R> {
             held_out_loss: 0.0,
             flipped_loss: 0.0,
         };
-        let network = Network::new(self.data.ratios, kernel, activation, provenance.clone())?;
+        let mut network = Network::new(self.data.ratios, kernel, activation, provenance)?;
         let quality = Quality::measure(&network, &self.data, self.held_out, device)?;
-        provenance.held_out_loss = quality.held_out_loss;
-        provenance.flipped_loss = quality.flipped_loss;
-        let calibration = network.calibrate().ok();
+        network.provenance.held_out_loss = quality.held_out_loss;
+        network.provenance.flipped_loss = quality.flipped_loss;
+        network.calibration = network.calibrate().ok();
         Ok(Trained {
-            network: network
-                .with_provenance(provenance)
-                .with_calibration(calibration),
+            network,
             curve,
             quality,
         })

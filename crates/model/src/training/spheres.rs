@@ -57,8 +57,7 @@ impl SphereData {
                 self.count, self.cells, self.ratios.width
             )));
         }
-        let shrunk = low * low - 2.0 * (self.ratios.dimension as f64 - 1.0) * self.step();
-        if !(low > 0.0 && low < high && high < 0.5 && shrunk > 0.0) {
+        if !(low > 0.0 && low < high && high < 0.5 && self.shrunk(low) > 0.0) {
             return Err(Error::Training(format!(
                 "radii [{low}, {high}] must lie in (0, 0.5) and survive a step of {:e}",
                 self.step()
@@ -176,7 +175,7 @@ impl BandSamples {
             .par_chunks_mut(n)
             .zip(&points)
             .for_each(|(row, (radius, x, _))| {
-                for (offset, &orbit) in offsets.iter().zip(orbits.of_entries()) {
+                for (offset, &orbit) in offsets.iter().zip(&orbits.index) {
                     let squared: f64 = x.iter().zip(offset).map(|(x, b)| (x + b) * (x + b)).sum();
                     row[orbit] += optimal_profile(squared.sqrt() - radius, eps);
                 }
@@ -195,7 +194,7 @@ impl BandSamples {
                 weight * step * step
             })
             .sum();
-        let sizes: Vec<f64> = orbits.sizes().iter().map(|&s| s as f64).collect();
+        let sizes: Vec<f64> = orbits.sizes.iter().map(|&s| s as f64).collect();
         for (phase, area) in [(1.0, inside), (-1.0, outside)] {
             design.extend(sizes.iter().map(|s| phase * s));
             target.push(phase);

@@ -8,10 +8,10 @@ use crate::ratios::offsets;
 /// The orbits of kernel entries under the hyperoctahedral group.
 #[derive(Clone, Debug)]
 pub struct Orbits {
-    /// Orbit of each kernel entry.
-    index: Vec<usize>,
+    /// Orbit of each kernel entry, row-major.
+    pub index: Vec<usize>,
     /// Entries per orbit.
-    sizes: Vec<usize>,
+    pub sizes: Vec<usize>,
 }
 
 impl Orbits {
@@ -37,16 +37,6 @@ impl Orbits {
     /// Number of orbits.
     pub fn count(&self) -> usize {
         self.sizes.len()
-    }
-
-    /// Entries in each orbit.
-    pub fn sizes(&self) -> &[usize] {
-        &self.sizes
-    }
-
-    /// Orbit of every kernel entry, row-major.
-    pub fn of_entries(&self) -> &[usize] {
-        &self.index
     }
 
     /// The whole kernel from one value per orbit.
@@ -77,7 +67,7 @@ mod tests {
             let orbits = Orbits::new(dimension, width);
             assert_eq!(orbits.count(), count);
             assert_eq!(
-                orbits.sizes().iter().sum::<usize>(),
+                orbits.sizes.iter().sum::<usize>(),
                 width.pow(dimension as u32)
             );
         }

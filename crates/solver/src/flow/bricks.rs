@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use burn::tensor::Tensor;
-use geometry::Field;
 
 use super::{Minimum, Movement, WillmoreFlow};
 use crate::Error;
@@ -46,23 +45,23 @@ impl<const D: usize> WillmoreFlow<D> {
             return Ok(());
         };
         let next = active.following(&self.device.values(self.current.clone())?)?;
-        next.map_or(Ok(()), |next| self.go_to(next).map(|_| ()))
+        next.map_or(Ok(()), |next| self.go_to(next))
     }
 
     /// Makes the bricks more if the interface of `u` has come near their edge; those before and after.
     fn enlarge(&mut self, u: &Tensor<D>) -> Result<Option<(Active<D>, Active<D>)>, Error> {
-        let Some(active) = &self.active else {
+        let Some(active) = self.active.clone() else {
             return Ok(None);
         };
-        match active.enlarged(&self.device.values(u.clone())?)? {
-            Some(next) => Ok(Some((self.go_to(next.clone())?, next))),
-            None => Ok(None),
+        let next = active.enlarged(&self.device.values(u.clone())?)?;
+        if let Some(next) = &next {
+            self.go_to(next.clone())?;
         }
+        Ok(next.map(|next| (active, next)))
     }
 
-    /// Carries everything over to other bricks; those before.
-    pub(super) fn go_to(&mut self, next: Active<D>) -> Result<Active<D>, Error> {
-        let before = self.active.clone().unwrap_or_else(|| next.clone());
+    /// Carries everything over to other bricks.
+    pub(super) fn go_to(&mut self, next: Active<D>) -> Result<(), Error> {
         let carried = |u: &Tensor<D>| -> Result<Tensor<D>, Error> {
             Ok(self.stored(u)?.on(&next).tensor(&self.device))
         };
@@ -73,7 +72,7 @@ impl<const D: usize> WillmoreFlow<D> {
         };
         self.rate = self.rate.as_ref().map(|rate| rate.on(&next));
         let region = self.region.take();
-        self.region = region.map(|region| region.on(next.bricks(), &self.device));
+        self.region = region.map(|region| region.on(&next.bricks, &self.device));
         self.current = current;
         self.previous = previous;
         self.mcf = Arc::new(next.step(&self.device));
@@ -83,17 +82,12 @@ impl<const D: usize> WillmoreFlow<D> {
         self.phase = None;
         self.weighted = None;
         self.energy = self.traced(false)?;
-        Ok(before)
+        Ok(())
     }
 
     /// A phase field that is stored as the present one is, for arithmetic.
     pub(super) fn stored(&self, u: &Tensor<D>) -> Result<Stored<D>, Error> {
         Stored::of(u, self.grid, self.active.clone(), &self.device)
-    }
-
-    /// The field of the whole grid of which `u` is stored.
-    pub(super) fn on_grid(&self, u: &Tensor<D>) -> Result<Field<D>, Error> {
-        self.stored(u)?.field()
     }
 
     /// Refuses what active bricks cannot do.

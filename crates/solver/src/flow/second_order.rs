@@ -36,12 +36,6 @@ pub struct StepEstimates {
     pub displacement: f64,
 }
 
-/// The rates of displacement of a step, in `atanh u` per time, at its stages.
-struct Rates<const D: usize> {
-    first: Stored<D>,
-    second: Stored<D>,
-}
-
 impl<const D: usize> WillmoreFlow<D> {
     /// One step of second order of size `tau`, in two minimizations, if `accept` takes it: it is shown the record with its
     /// [estimates](StepEstimates). Otherwise the flow stays where it was. Starts on half grids are not used.
@@ -73,17 +67,27 @@ impl<const D: usize> WillmoreFlow<D> {
         let after = self.stored(&second.u)?;
 
         let rate = |to: &Stored<D>, from| to.zip_map(from, |u, v| displacement(u, v) / stage);
-        let rates = Rates {
-            first: rate(&middle, &before),
-            second: rate(&after, &anchor),
-        };
+        let rates = [rate(&middle, &before), rate(&after, &anchor)];
         let estimates = self.estimates([&before, &middle, &after], &rates, tau);
-        let record = self.second_order_record(tau, &first, &second, estimates, clock);
+        // At u_k nothing has moved, and the energy is that of the curvature.
+        let at_rest = self.energy_scale() * first.newton.energy_before / (2.0 * stage);
+        let energies = [at_rest, second.willmore_energy].map(|w| 2.0 * tau * w);
+        let kind = match self.rate {
+            Some(_) => StartKind::Extrapolated,
+            None => StartKind::Rest,
+        };
+        let record = StepRecord {
+            newton: second.newton.after(&first.newton),
+            estimates: Some(estimates),
+            times: first.times + second.times,
+            ..self.record(tau, &second, energies, Start { kind, hvp: 0.0 }, clock)
+        };
         let accepted = accept(&record);
         if accepted {
             self.current = second.u;
             self.previous = None;
-            self.rate = Some(rates.second);
+            let [_, last] = rates;
+            self.rate = Some(last);
             self.step += 1;
             self.time += tau;
         }
@@ -136,7 +140,7 @@ impl<const D: usize> WillmoreFlow<D> {
     fn estimates(
         &self,
         [before, middle, after]: [&Stored<D>; 3],
-        rates: &Rates<D>,
+        [first, second]: &[Stored<D>; 2],
         tau: f64,
     ) -> StepEstimates {
         const FIRST: f64 = 1.0 / (6.0 * GAMMA * (1.0 - GAMMA));
@@ -148,7 +152,7 @@ impl<const D: usize> WillmoreFlow<D> {
             |to: &Stored<D>, from| unit * largest(&to.zip_map(from, displacement), middle);
         let error = match &self.rate {
             Some(start) if self.step >= WITHOUT => {
-                let stages = rates.first.zip_map(&rates.second, |first, second| {
+                let stages = first.zip_map(second, |first, second| {
                     (FIRST - 1.0 + GAMMA) * first + (SECOND - GAMMA) * second
                 });
                 let error = stages.zip_map(start, |stages, start| {
@@ -162,38 +166,6 @@ impl<const D: usize> WillmoreFlow<D> {
             error,
             motion: between(after, before),
             displacement: between(middle, before).max(between(after, middle)),
-        }
-    }
-
-    fn second_order_record(
-        &self,
-        tau: f64,
-        first: &Minimum<D>,
-        second: &Minimum<D>,
-        estimates: StepEstimates,
-        clock: Instant,
-    ) -> StepRecord {
-        let (one, two) = (first.newton, second.newton);
-        // At u_k nothing has moved, and the energy is that of the curvature.
-        let at_rest = self.energy_scale() * one.energy_before / (2.0 * GAMMA * tau);
-        let kind = match self.rate {
-            Some(_) => StartKind::Extrapolated,
-            None => StartKind::Rest,
-        };
-        StepRecord {
-            step: self.step + 1,
-            time: self.time + tau,
-            tau,
-            energy_before: 2.0 * tau * at_rest,
-            energy: 2.0 * tau * second.willmore_energy,
-            willmore_energy: second.willmore_energy,
-            tension: second.tension,
-            pressure: second.pressure,
-            start: Start { kind, hvp: 0.0 },
-            newton: two.after(&one),
-            estimates: Some(estimates),
-            seconds: clock.elapsed().as_secs_f64(),
-            times: first.times + second.times,
         }
     }
 }

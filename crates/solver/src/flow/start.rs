@@ -60,7 +60,7 @@ impl<const D: usize> WillmoreFlow<D> {
             })?;
         }
         if let Some(region) = &self.region {
-            half.restrict_to(&every_other_node(self.grid, region.marks()))?;
+            half.restrict_to(&every_other_node(self.grid, &region.marks))?;
         }
         self.half = Some(Box::new(half));
         Ok(())
@@ -74,10 +74,7 @@ impl<const D: usize> WillmoreFlow<D> {
         /// Below this many cells per `eps` the motion is too far off to be of use.
         const COARSEST: f64 = 2.0;
         let ratios = halved(network.ratios()).filter(|r| r.eps_over_h >= COARSEST);
-        let Some(ratios) = ratios.filter(|_| self.active.is_none()) else {
-            return Ok(0);
-        };
-        let Ok(grid) = self.grid.half() else {
+        let (Some(ratios), Ok(grid), None) = (ratios, self.grid.half(), &self.active) else {
             return Ok(0);
         };
         let papers_energy = self.params.calibration == Factors::PAPER;
@@ -85,12 +82,12 @@ impl<const D: usize> WillmoreFlow<D> {
             || Shipped::Paper
                 .find(network.ratios())
                 .is_ok_and(|n| n.kernel() == network.kernel());
-        let found = if papers_recipe {
-            Shipped::Paper.find(ratios)
+        let shipped = if papers_recipe {
+            Shipped::Paper
         } else {
-            Shipped::Accurate.find(ratios)
+            Shipped::Accurate
         };
-        let Ok(mut network) = found else {
+        let Ok(mut network) = shipped.find(ratios) else {
             return Ok(0);
         };
         let mut params = self.params;

@@ -1,7 +1,7 @@
 //! What the tests share: networks, discs and small objectives on the host.
 use burn::tensor::Tensor;
 use geometry::{Field, Grid, phase_field, shapes::Ball};
-use model::training::{SphereData, levenberg_marquardt::heat_kernel};
+use model::training::levenberg_marquardt::heat_kernel;
 use model::{Network, Ratios, Shipped};
 use operators::ComputeDevice;
 use solver::{Error, FlowParams, NewtonParams, Objective};
@@ -27,9 +27,9 @@ pub fn network() -> Network {
 /// A 3D operator that depends on no training in 3D: the heat kernel, with the activation of the 2D network.
 pub fn network_3d() -> Network {
     let flat = network();
-    let kernel = heat_kernel(&SphereData::new(ratios(3), 64).unwrap());
+    let kernel = heat_kernel(ratios(3));
     let activation = flat.activation().clone();
-    Network::new(ratios(3), kernel, activation, flat.provenance().clone()).unwrap()
+    Network::new(ratios(3), kernel, activation, flat.provenance.clone()).unwrap()
 }
 
 /// The scales that fit the networks here.
