@@ -47,17 +47,8 @@ impl Stage<'_> {
 
 impl Session {
     /// Opens the device and the output folder of a program and begins its manifest; to be called when everything else has been checked.
-    pub fn open(program: &str, options: &RunOptions, parameters: Value) -> Result<Self> {
-        Self::on(options.open_device()?, program, options, parameters)
-    }
-
-    /// The same on this device.
-    pub fn on(
-        device: ComputeDevice,
-        program: &str,
-        options: &RunOptions,
-        mut parameters: Value,
-    ) -> Result<Self> {
+    pub fn open(program: &str, options: &RunOptions, mut parameters: Value) -> Result<Self> {
+        let device = options.open_device()?;
         parameters["quick"] = options.quick.into();
         let folder = options.output.clone();
         let folder = folder.unwrap_or_else(|| PathBuf::from("results").join(program));

@@ -268,7 +268,7 @@ pub struct SurfaceFlows {
 
 /// Sizes of time steps that are powers of two, for figures.
 fn in_words(steps: StepRule) -> String {
-    let power = |tau: f64| look::power_of_two(tau.log2().round() as i32);
+    let power = |tau: f64| format!("2{}", report::superscript(tau.log2().round() as i32));
     match steps {
         StepRule::Constant(tau) => format!("τ = {}", power(tau)),
         StepRule::Doubling(first) => {
