@@ -2,7 +2,7 @@
 
 use crate::meshes::{KnownMesh, MeshOptions};
 use crate::prelude::*;
-use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, View};
+use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, View};
 
 #[derive(Args, Clone, Debug)]
 pub struct MeshFlowOptions {
@@ -39,7 +39,7 @@ pub struct MeshFlow {
 }
 
 impl MeshFlow {
-    /// Runs the program. `remarks` is that of [`SurfaceFlows::run`].
+    /// Runs the program. `remarks` is that of [`Setting::run`].
     pub fn run(
         &self,
         options: &MeshFlowOptions,
@@ -73,14 +73,10 @@ impl MeshFlow {
             view: View { up, ..self.view },
         };
         let variants = schemes.into_iter().map(|scheme| (Method::Hybrid, scheme));
-        let flows = SurfaceFlows {
-            program: self.program,
-            title: format!("Willmore flow: {}", surface.title),
-            surfaces: vec![(surface, initial)],
-            variants: variants.collect(),
-            time: (time_steps, steps),
-        };
-        flows.run(session, &setting, remarks)
+        let variants: Vec<_> = variants.collect();
+        let title = format!("Willmore flow: {}", surface.title);
+        let (surfaces, time) = ([(surface, initial)], (time_steps, steps));
+        setting.run(session, &title, &surfaces, &variants, time, remarks)
     }
 
     /// The steps on `n` cells per unit length, and how many more than the paper's they are. On finer grids a first step that is

@@ -9,6 +9,7 @@ use crate::prelude::*;
 
 /// A program whose options are checked, and what it has to say so far.
 pub struct Session {
+    pub program: String,
     pub options: RunOptions,
     pub device: ComputeDevice,
     pub output: OutputDir,
@@ -56,6 +57,7 @@ impl Session {
         let place = if device.kind().is_cpu() { "cpu" } else { "gpu" };
         let dtype = format!("{:?}", device.dtype()).to_lowercase();
         Ok(Self {
+            program: program.to_owned(),
             manifest: Manifest::start(
                 program,
                 &parameters,
