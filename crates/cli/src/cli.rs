@@ -563,7 +563,7 @@ impl RunCommand {
 
 impl ForceOption {
     /// Refuses a file that is there.
-    pub fn check(self, name: &str, path: &Path) -> Result<(), Error> {
+    pub fn check(self, name: &str, path: &Path) -> Result<()> {
         if path.exists() && !self.force {
             refuse!(
                 "{name} {} is there already: give another name, or --force to write over it",

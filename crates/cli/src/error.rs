@@ -4,6 +4,9 @@ use std::path::PathBuf;
 
 use crate::config::one_line;
 
+/// What can fail as the program does, unless it says otherwise.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
 /// What can stop the program. Every message is one line and says what to do.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]

@@ -34,7 +34,7 @@ impl Faired {
         (lengths, lost): (&[f64], &[bool]),
         extension: String,
         up: UpAxis,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         Ok(Self {
             extension,
             file: None,
@@ -50,7 +50,7 @@ impl Faired {
         mesh: TriangleMesh,
         extension: String,
         up: UpAxis,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let distance = MeshDistance::new(before);
         let lengths = distance.signed_distances(&mesh.vertices).into_iter();
         let lengths: Vec<f64> = lengths.map(f64::abs).collect();
@@ -59,7 +59,7 @@ impl Faired {
     }
 
     /// Writes a file: in the format of the input with everything that this had, in another one the triangles alone.
-    pub fn write(&self, path: &Path) -> Result<(), Error> {
+    pub fn write(&self, path: &Path) -> Result<()> {
         let same = extension(path) == self.extension;
         if let Some(file) = self.file.as_ref().filter(|_| same) {
             let written = files::write_atomically(path, |out| out.write_all(file));
@@ -79,7 +79,7 @@ pub fn view(up: UpAxis) -> View {
 }
 
 /// The zero set as triangles, which would cut off what is round, with its volume where that can be measured.
-pub fn surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
+pub fn surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh> {
     let mesh = surfaces::remeshed_surface(u, eps)?;
     let zero_set = ZeroSet::of(u, eps)?;
     Ok(if zero_set.sizes_hold() {
@@ -116,12 +116,7 @@ fn report(before: &ClosedMesh, after: &TriangleMesh, lengths: &[f64]) -> Value {
 
 /// The surface in the colours of the lengths by which its vertices have moved, and their histogram, whose bars say which colour is which
 /// length. Vertices that are `lost`, at parts or gaps that the grid does not hold, have a colour of their own.
-fn figure(
-    mesh: &TriangleMesh,
-    lengths: &[f64],
-    lost: &[bool],
-    up: UpAxis,
-) -> Result<Figure, Error> {
+fn figure(mesh: &TriangleMesh, lengths: &[f64], lost: &[bool], up: UpAxis) -> Result<Figure> {
     let largest = lengths.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let colours = lengths.iter().zip(lost);
     let colours = colours.map(|(length, lost)| {

@@ -53,7 +53,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn execute(mut cli: Cli) -> Result<(), Error> {
+fn execute(mut cli: Cli) -> Result<()> {
     let standard = Standard::open(&mut cli.command, &mut cli.messages)?;
     let messages = cli.messages;
     match cli.command {

@@ -50,7 +50,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
     }
 
     /// From the last checkpoint to the end.
-    pub fn go_on(&self, mut store: Store, mut run: Run<D>) -> Result<(), Error> {
+    pub fn go_on(&self, mut store: Store, mut run: Run<D>) -> Result<()> {
         let interrupt = Interrupt::catch()?;
         let (nodes, stored) = (run.case().grid().len(), run.stored_cells());
         let what = if stored < nodes {
@@ -99,7 +99,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         }
     }
 
-    fn finish(&self, mut store: Store, run: &Run<D>) -> Result<Value, Error> {
+    fn finish(&self, mut store: Store, run: &Run<D>) -> Result<Value> {
         let (case, u, presentation) = (run.case(), run.field(), &self.presentation);
         let (start, eps) = (&case.initial, case.scales.eps);
         let directory = store.directory();
@@ -184,7 +184,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         faired: Option<&Faired>,
         stem: &str,
         run: &mut RunDirectory,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         if has_interface(u) {
             let eps = case.scales.eps;
             let picture = self.presentation.picture(&case.initial, u, eps)?.to_png()?;
@@ -210,7 +210,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         faired: Option<&Faired>,
         stem: &str,
         run: &mut RunDirectory,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let usual = faired.map_or(O::USUAL, |faired| &faired.extension);
         let name = format!("{stem}.{}", self.format.as_deref().unwrap_or(usual));
         self.save(u, eps, faired, &run.path().join(&name))?;
@@ -218,13 +218,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
     }
 
     /// Writes the shape, or what became of the surface that it was, to a file.
-    fn save(
-        &self,
-        u: &Field<D>,
-        eps: f64,
-        faired: Option<&Faired>,
-        path: &Path,
-    ) -> Result<(), Error> {
+    fn save(&self, u: &Field<D>, eps: f64, faired: Option<&Faired>, path: &Path) -> Result<()> {
         match faired {
             Some(faired) => faired.write(path),
             None => self.presentation.save(u, eps, path),
@@ -300,7 +294,7 @@ impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
 }
 
 /// Removes the run in a folder, if there is one that nobody works on. A folder of something else stays.
-pub fn make_way(folder: &Path) -> Result<(), Error> {
+pub fn make_way(folder: &Path) -> Result<()> {
     match RunDirectory::recover(folder) {
         Ok(_) => Ok(std::fs::remove_dir_all(folder).map_err(files::Error::of("remove", folder))?),
         Err(locked @ runs::Error::Locked(_)) => Err(locked.into()),
@@ -334,7 +328,7 @@ fn time_accuracy(records: &[Record], eps: f64) -> Option<Value> {
 }
 
 /// The pictures of the frames in the folder of a run, and their fields with their times, for `ParaView`.
-fn frames(run: &Path, records: &[Record]) -> Result<(Vec<Picture>, String), Error> {
+fn frames(run: &Path, records: &[Record]) -> Result<(Vec<Picture>, String)> {
     let mut pictures = Vec::new();
     let mut series =
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n  <Collection>\n"

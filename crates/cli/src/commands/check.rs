@@ -33,7 +33,7 @@ struct Finding {
 }
 
 /// Checks the derivatives of the energy at the input.
-pub fn run(mut options: CheckOptions, messages: MessageOptions) -> Result<(), Error> {
+pub fn run(mut options: CheckOptions, messages: MessageOptions) -> Result<()> {
     options.scheme.fill_in()?;
     let device = options.common.open_device()?;
     let eps_over_h = options.scheme.eps_over_h();
@@ -62,7 +62,7 @@ fn findings<const D: usize>(
     field: &Field<D>,
     options: &CheckOptions,
     device: &ComputeDevice,
-) -> Result<Vec<Finding>, Error> {
+) -> Result<Vec<Finding>> {
     let (scales, operator) = options.scheme.operator(Method::Hybrid, field.grid())?;
     let network = operator.network();
     let network = &network.expect("a learned operator has one").network;
@@ -139,7 +139,7 @@ fn derivatives<const D: usize>(
     params: &FlowParams,
     seed: u64,
     device: &ComputeDevice,
-) -> Result<Derivatives, Error> {
+) -> Result<Derivatives> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut direction = || {
         // Along the interface, where the flow moves values too.

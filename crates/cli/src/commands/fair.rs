@@ -25,7 +25,7 @@ impl FairOptions {
         self.noise.is_some() || ratio.is_some() || !self.ends
     }
 
-    pub fn check(&mut self) -> Result<(), Error> {
+    pub fn check(&mut self) -> Result<()> {
         let flow = &self.flow;
         self.ends = self.energy_ratio.is_some()
             || flow.run.time.is_some()
@@ -43,7 +43,7 @@ impl FairOptions {
         Ok(())
     }
 
-    pub fn load(&mut self, messages: MessageOptions) -> Result<Loaded, Error> {
+    pub fn load(&mut self, messages: MessageOptions) -> Result<Loaded> {
         let eps_over_h = self.flow.run.scheme.eps_over_h();
         let mut reader = Reader::of(&mut self.flow.run.input, eps_over_h, messages)?;
         let loaded = match reader.source.clone() {
@@ -85,7 +85,7 @@ impl FairOptions {
         Ok(loaded)
     }
 
-    fn load_mesh(&mut self, path: &Path, messages: MessageOptions) -> Result<Loaded, Error> {
+    fn load_mesh(&mut self, path: &Path, messages: MessageOptions) -> Result<Loaded> {
         let repairs = self.flow.run.input.repair;
         if repairs && !self.remesh {
             refuse!(

@@ -25,7 +25,7 @@ const INPAINT_HALVINGS: u32 = 12;
 
 impl RunCommand {
     /// Refuses options before anything is read.
-    fn check(&mut self) -> Result<(), Error> {
+    fn check(&mut self) -> Result<()> {
         match self {
             Self::Flow(_) => (),
             Self::Fair(fair) => fair.check()?,
@@ -94,7 +94,7 @@ impl RunCommand {
     }
 
     /// The input, as it is before it flows.
-    fn load(&mut self, messages: MessageOptions) -> Result<Loaded, Error> {
+    fn load(&mut self, messages: MessageOptions) -> Result<Loaded> {
         match self {
             Self::Fair(fair) => fair.load(messages),
             Self::Inpaint(inpaint) => inpaint.load(messages),
@@ -136,7 +136,7 @@ impl FlowOptions {
 
 impl RunOptions {
     /// Refuses what cannot be done before anything is computed.
-    fn check(&mut self) -> Result<(), Error> {
+    fn check(&mut self) -> Result<()> {
         self.scheme.fill_in()?;
         let force = self.keep.force;
         if let Some(save) = &mut self.keep.save {
@@ -155,7 +155,7 @@ pub fn run(
     mut command: RunCommand,
     messages: MessageOptions,
     stored: Option<(StoredRun, Option<usize>)>,
-) -> Result<(), Error> {
+) -> Result<()> {
     if let Some(labels) = volume::all_labels(&command.options().input)? {
         return each_label(&command, &labels, messages);
     }
@@ -189,7 +189,7 @@ pub fn run(
 }
 
 /// One run for each label of a volume, until one is interrupted.
-fn each_label(command: &RunCommand, labels: &[i64], messages: MessageOptions) -> Result<(), Error> {
+fn each_label(command: &RunCommand, labels: &[i64], messages: MessageOptions) -> Result<()> {
     for &label in labels {
         let mut one = command.clone();
         let RunOptions { input, keep, .. } = one.options();
@@ -209,10 +209,7 @@ struct Job {
 }
 
 impl Job {
-    fn start<const D: usize, O: Presentation<D>>(
-        mut self,
-        mut start: Start<D, O>,
-    ) -> Result<(), Error> {
+    fn start<const D: usize, O: Presentation<D>>(mut self, mut start: Start<D, O>) -> Result<()> {
         let keep = &mut self.command.options().keep;
         start.presentation.turn(&mut keep.up)?;
         keep.save.as_deref().map_or(Ok(()), O::check_saved)?;
@@ -243,7 +240,7 @@ impl Job {
         mut self,
         stored: StoredRun,
         more: Option<usize>,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let mut notes = engine::notes(&stored).clone();
         let name = notes["about"]["name"].as_str().unwrap_or("run").to_owned();
         let mut presentation = O::deserialize(&notes["outlet"]).map_err(|reason| {
@@ -274,7 +271,7 @@ impl Job {
         initial: Field<D>,
         region: Option<Vec<bool>>,
         presentation: &impl Presentation<D>,
-    ) -> Result<Case<D>, Error> {
+    ) -> Result<Case<D>> {
         let (flow, method) = match &self.command {
             RunCommand::Mcf(mcf) => (Flow::MeanCurvature, mcf.method),
             _ => (Flow::Willmore, Method::Hybrid),

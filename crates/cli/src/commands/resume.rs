@@ -6,7 +6,7 @@ use crate::prelude::*;
 use crate::{config, page};
 
 /// Continues a run by the options and the state that it stored; its input is not needed again.
-pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<(), Error> {
+pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<()> {
     let stored = if options.recover {
         RunDirectory::recover(&options.run)?
     } else {
