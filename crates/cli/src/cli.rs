@@ -206,40 +206,6 @@ pub struct SchemeOptions {
     pub storage: Option<Storage>,
 }
 
-/// What is kept.
-#[derive(Args, Serialize, Clone, Debug)]
-#[serde(rename_all = "kebab-case")]
-pub struct KeepOptions {
-    /// Keep a picture, the field and the shape every so many steps, and an animation
-    #[arg(long, value_name = "EVERY", value_parser = count)]
-    pub frames: Option<usize>,
-
-    /// Steps between two checkpoints
-    #[arg(long, value_name = "STEPS", value_parser = count, default_value_t = 5)]
-    pub checkpoint_every: usize,
-
-    /// Axis that points up in pictures and on the page: x, y or z [default: y for .obj, otherwise z]
-    #[arg(long, value_name = "AXIS")]
-    pub up: Option<UpAxis>,
-
-    /// Leave out index.html, the page of the run for a browser
-    #[arg(long)]
-    pub no_page: bool,
-
-    /// Folder of the run [default: runs/NAME-COMMAND, with a number if that is there]
-    #[arg(long, value_name = "DIR")]
-    #[serde(skip)]
-    pub output: Option<PathBuf>,
-
-    /// Write the result to this file too: a mesh (.ply, .obj, .stl) in space, a picture (.png, .svg) in the plane, - for standard output
-    #[arg(long, value_name = "FILE")]
-    pub save: Option<PathBuf>,
-
-    #[command(flatten)]
-    #[serde(skip)]
-    pub force: ForceOption,
-}
-
 /// What is there stays, unless this is given.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct ForceOption {
@@ -297,9 +263,34 @@ pub struct RunOptions {
     #[arg(long, value_name = "T", value_parser = positive)]
     pub time: Option<f64>,
 
+    /// Keep a picture, the field and the shape every so many steps, and an animation
+    #[arg(long, value_name = "EVERY", value_parser = count)]
+    pub frames: Option<usize>,
+
+    /// Steps between two checkpoints
+    #[arg(long, value_name = "STEPS", value_parser = count, default_value_t = 5)]
+    pub checkpoint_every: usize,
+
+    /// Axis that points up in pictures and on the page: x, y or z [default: y for .obj, otherwise z]
+    #[arg(long, value_name = "AXIS")]
+    pub up: Option<UpAxis>,
+
+    /// Leave out index.html, the page of the run for a browser
+    #[arg(long)]
+    pub no_page: bool,
+
+    /// Folder of the run [default: runs/NAME-COMMAND, with a number if that is there]
+    #[arg(long, value_name = "DIR")]
+    #[serde(skip)]
+    pub output: Option<PathBuf>,
+
+    /// Write the result to this file too: a mesh (.ply, .obj, .stl) in space, a picture (.png, .svg) in the plane, - for standard output
+    #[arg(long, value_name = "FILE")]
+    pub save: Option<PathBuf>,
+
     #[command(flatten)]
-    #[serde(flatten)]
-    pub keep: KeepOptions,
+    #[serde(skip)]
+    pub force: ForceOption,
     #[command(flatten)]
     #[serde(flatten)]
     pub common: CommonOptions,

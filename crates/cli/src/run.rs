@@ -8,7 +8,7 @@ use engine::{Checkpoints, Ending, Event, Observer, Storage, Store, estimated_tim
 use geometry::measure::touches_side;
 use solver::StepEstimates;
 
-use crate::cli::{KeepOptions, MessageOptions};
+use crate::cli::{MessageOptions, RunOptions};
 use crate::faired::Faired;
 use crate::outcome::{self, SIZES};
 use crate::page;
@@ -21,7 +21,7 @@ pub struct Plan<const D: usize, O> {
     pub command: &'static str,
     pub name: String,
     pub presentation: O,
-    pub keep: KeepOptions,
+    pub options: RunOptions,
     /// The extension of meshes, if it is not the usual one.
     pub format: Option<String>,
     pub messages: MessageOptions,
@@ -46,7 +46,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
     }
 
     pub fn checkpoints(&self) -> Checkpoints {
-        Checkpoints::EverySteps(self.keep.checkpoint_every)
+        Checkpoints::EverySteps(self.options.checkpoint_every)
     }
 
     /// From the last checkpoint to the end.
@@ -87,7 +87,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
                 json!({ "command": self.command, "finished": false, "steps": steps, "time": time })
             }
         };
-        if !self.keep.no_page {
+        if !self.options.no_page {
             page::write(&RunDirectory::open(&folder)?)?;
         }
         bar.finish();
@@ -113,11 +113,11 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         self.write(case, u, faired.as_ref(), presentation::FINAL, directory)?;
         if has_interface(u) {
             topology = presentation.topology(u, eps)?;
-            if let Some(path) = &self.keep.save {
+            if let Some(path) = &self.options.save {
                 self.save(u, eps, faired.as_ref(), path)?;
             }
         }
-        if self.keep.frames.is_some() {
+        if self.options.frames.is_some() {
             let (pictures, series) = frames(directory.path(), run.records())?;
             let animation = render::animation(&pictures, DELAY)?;
             directory.write_file(presentation::ANIMATION, |out| out.write_all(&animation))?;
@@ -237,7 +237,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         let shown = folder.display();
         text.push(if outcome["finished"] == false {
             format!("interrupted, go on with: willmore resume {shown}")
-        } else if self.keep.no_page {
+        } else if self.options.no_page {
             format!("results are in {shown}")
         } else {
             let page = folder.join(page::NAME);
@@ -274,7 +274,7 @@ impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
             let written = plan.write_shape(u, eps, None, presentation::START, run);
             written.map_err(engine::Error::observer)?;
         }
-        let frames = plan.keep.frames;
+        let frames = plan.options.frames;
         if frames.is_some_and(|every| step.is_multiple_of(every)) {
             let name = presentation::frame(step);
             let written = plan.write(case, u, None, &name, run);

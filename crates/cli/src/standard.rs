@@ -75,7 +75,7 @@ fn paths(command: &mut Command) -> Option<(&mut InputOptions, Option<&mut PathBu
         Command::Sample(sample) => Some((&mut sample.input, Some(&mut sample.save))),
         Command::Run(command) => {
             let options = command.options();
-            Some((&mut options.input, options.keep.save.as_mut()))
+            Some((&mut options.input, options.save.as_mut()))
         }
         _ => None,
     }

@@ -138,8 +138,8 @@ impl RunOptions {
     /// Refuses what cannot be done before anything is computed.
     fn check(&mut self) -> Result<()> {
         self.scheme.fill_in()?;
-        let force = self.keep.force;
-        if let Some(save) = &mut self.keep.save {
+        let force = self.force;
+        if let Some(save) = &mut self.save {
             *save = absolute(&*save)?;
             force.check("--save", save)?;
             if !save.parent().is_some_and(Path::is_dir) {
@@ -192,9 +192,9 @@ pub fn run(
 fn each_label(command: &RunCommand, labels: &[i64], messages: MessageOptions) -> Result<()> {
     for &label in labels {
         let mut one = command.clone();
-        let RunOptions { input, keep, .. } = one.options();
-        input.label = Some(Label::One(label));
-        for name in keep.output.iter_mut().chain(&mut keep.save) {
+        let options = one.options();
+        options.input.label = Some(Label::One(label));
+        for name in options.output.iter_mut().chain(&mut options.save) {
             *name = volume::named(name, label);
         }
         run(one, messages, None)?;
@@ -210,9 +210,9 @@ struct Job {
 
 impl Job {
     fn start<const D: usize, O: Presentation<D>>(mut self, mut start: Start<D, O>) -> Result<()> {
-        let keep = &mut self.command.options().keep;
-        start.presentation.turn(&mut keep.up)?;
-        keep.save.as_deref().map_or(Ok(()), O::check_saved)?;
+        let options = self.command.options();
+        start.presentation.turn(&mut options.up)?;
+        options.save.as_deref().map_or(Ok(()), O::check_saved)?;
         if let RunCommand::Flow(options) = &mut self.command {
             sizes::round_edges(options, &mut start.field, &self.device, self.messages)?;
         }
@@ -221,11 +221,11 @@ impl Job {
         let plan = self.plan(start.name, start.presentation);
         let notes = plan.notes(&case, &self.device);
         let run = Run::new(case, &self.device)?;
-        let folder = match &plan.keep.output {
+        let folder = match &plan.options.output {
             Some(folder) => folder.clone(),
             None => free_folder(&format!("{}-{}", plan.name, plan.command)),
         };
-        if plan.keep.force.force {
+        if plan.options.force.force {
             make_way(&folder)?;
         }
         let inputs = plan.presentation.inputs()?;
@@ -338,7 +338,7 @@ impl Job {
             name,
             presentation,
             format,
-            keep: self.command.options().keep.clone(),
+            options: self.command.options().clone(),
             messages: self.messages,
         }
     }
