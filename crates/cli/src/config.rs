@@ -111,11 +111,9 @@ pub fn one_line(error: &clap::Error) -> String {
     )
 }
 
-fn bad(path: &Path, message: impl Into<String>) -> Error {
-    Error::Config {
-        path: path.to_owned(),
-        message: files::shortened(&message.into(), 400),
-    }
+fn bad(path: &Path, message: impl AsRef<str>) -> Error {
+    let message = files::shortened(message.as_ref(), 400);
+    Error::Options(format!("{}: {message}", path.display()))
 }
 
 fn read(text: &str, path: &Path) -> Result<Table> {

@@ -1,7 +1,5 @@
 //! The one error type of the program.
 
-use std::path::PathBuf;
-
 use crate::config::one_line;
 
 /// What can fail as the program does, unless it says otherwise.
@@ -11,7 +9,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
 pub enum Error {
-    /// Options that contradict each other or the input.
+    /// Options that contradict each other or the input, and advice on what the crates below refuse.
     #[error("{0}")]
     Options(String),
     /// The help or the version, which was asked for.
@@ -19,17 +17,6 @@ pub enum Error {
     /// Ctrl-C ended the run, or the training, after what was said of it.
     #[error("interrupted")]
     Interrupted,
-    #[error("{}: {message}", path.display())]
-    Config {
-        path: PathBuf,
-        message: String,
-    },
-    /// A mesh that bounds nothing, and that can be repaired.
-    #[error("{0}, or give --repair")]
-    Mendable(#[source] surfaces::Error),
-    /// Time steps became too small.
-    #[error("{0}; the shape is not resolved, use more --cells")]
-    TooStiff(#[source] engine::Error),
     Engine(engine::Error),
     Files(#[from] files::Error),
     Geometry(#[from] geometry::Error),
@@ -73,7 +60,11 @@ impl From<clap::Error> for Error {
 impl From<engine::Error> for Error {
     fn from(error: engine::Error) -> Self {
         match error {
-            engine::Error::TooStiff { .. } => Self::TooStiff(error),
+            // Time steps became too small.
+            engine::Error::TooStiff { .. } => Self::Options(format!(
+                "{}; the shape is not resolved, use more --cells",
+                files::with_causes(&error)
+            )),
             error => Self::Engine(error),
         }
     }
@@ -84,11 +75,12 @@ impl Error {
         Self::Options(message.into())
     }
 
+    /// Of a mesh that bounds nothing, and that can perhaps be repaired.
     pub fn mesh(error: surfaces::Error) -> Self {
         use surfaces::Error::{MixedOrientation, Nesting, NonManifold, Open};
         match error {
             Open { .. } | NonManifold { .. } | MixedOrientation { .. } | Nesting { .. } => {
-                Self::Mendable(error)
+                Self::Options(format!("{error}, or give --repair"))
             }
             error => error.into(),
         }
