@@ -22,10 +22,9 @@ pub fn radius_at(flow: Flow, r: f64, t: f64) -> f64 {
 
 /// `count` of the radii `r_i = 0.05 pi + 0.15 pi i / 30`, `i = 0..29`, evenly chosen.
 pub fn radii(count: usize) -> Vec<f64> {
-    (0..count)
-        .map(|k| k * COUNT / count)
-        .map(|i| 0.05 * PI + 0.15 * PI * i as f64 / COUNT as f64)
-        .collect()
+    let chosen = (0..count).map(|k| k * COUNT / count);
+    let radius = |i| 0.05 * PI + 0.15 * PI * i as f64 / COUNT as f64;
+    chosen.map(radius).collect()
 }
 
 /// Cells per side of the smallest suitable box for a circle: the interface stays 0.3 away from the boundary, and the

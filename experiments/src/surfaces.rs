@@ -208,11 +208,6 @@ impl Flowed {
         }
     }
 
-    fn row_label(&self) -> String {
-        let operator = self.label().replace(", ", "\n");
-        format!("{}\n{operator}", self.surface.title)
-    }
-
     /// Pictures of the shown steps with this side in pixels (less in a quick run), all in one framing, each also as a file of its own.
     pub fn pictures(&self, stage: &Stage<'_>, side: u32) -> Result<Vec<Raster>> {
         memory::release_freed();
@@ -301,8 +296,12 @@ impl Setting {
             pictures.collect::<Result<Vec<_>, _>>()
         })?;
         let columns = pictures.iter().map(Vec::len).max();
+        let label = |one: &Flowed| {
+            let operator = one.label().replace(", ", "\n");
+            format!("{}\n{operator}", one.surface.title)
+        };
         let figure = Figure::new(title, columns.unwrap_or(1))
-            .with_row_labels(all.iter().map(Flowed::row_label))
+            .with_row_labels(all.iter().map(label))
             .with_panels(pictures.into_iter().flatten())
             .with_note(format!(
                 "n = {}, ε = 2/n, inner step 1/n², {}. w: Willmore energy with the implicit finite-element step; a sphere has 8π = 25.13.{remarks}",

@@ -56,10 +56,8 @@ pub fn program(options: &Options) -> Result<()> {
     session.output.write_csv("kernels.csv", kernels)?;
     let activations = shown.iter().flat_map(Shown::activation);
     session.output.write_csv("activations.csv", activations)?;
-    let directions = shown
-        .iter()
-        .flat_map(|one| ["axis", "diagonal"].map(|name| (one, name)));
-    let transfers = directions.flat_map(|(one, direction)| one.transfer(direction));
+    let both = |one| ["axis", "diagonal"].map(|direction| Shown::transfer(one, direction));
+    let transfers = shown.iter().flat_map(both).flatten();
     session.output.write_csv("transfer.csv", transfers)?;
     let origins: BTreeMap<_, _> = (shown.iter())
         .map(|one| (one.spec.name, (&one.quality, one.network.provenance())))
