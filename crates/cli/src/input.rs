@@ -339,9 +339,8 @@ impl<'a> Reader<'a> {
         let (field, surface, found) = self.first_good(grids, |reader| {
             let grid = reader.grid_around(&mesh.bounding_box(), part)?;
             let field = reader.mesh_field(mesh, grid)?;
-            let eps = reader.eps_over_h * grid.spacing();
-            let surface = ClosedMesh::new(surfaces::phase_field_surface(&field, eps)?).ok();
-            let surface = surface.map(|(surface, _)| surface);
+            let surface = surfaces::phase_field_surface(&field, reader.eps(&grid))?;
+            let surface = ClosedMesh::new(surface).ok().map(|(surface, _)| surface);
             let found = surface.as_ref().map(Topology::of);
             Ok(((field, surface, found), found == Some(wanted)))
         })?;
@@ -467,13 +466,8 @@ impl<'a> Reader<'a> {
         Ok(side)
     }
 
-    fn sampled<const D: usize>(
-        &self,
-        grid: Grid<D>,
-        shape: &(impl SignedDistance<D> + ?Sized),
-    ) -> Result<Field<D>> {
-        let eps = self.eps_over_h * grid.spacing();
-        Ok(phase_field(grid, shape, eps)?)
+    fn eps<const D: usize>(&self, grid: &Grid<D>) -> f64 {
+        self.eps_over_h * grid.spacing()
     }
 
     fn start<const D: usize, O>(&self, field: Field<D>, presentation: O) -> Start<D, O> {
@@ -490,7 +484,8 @@ impl<'a> Reader<'a> {
         shape: &dyn SignedDistance<D>,
     ) -> Result<Start<D, O>> {
         let grid = self.grid()?;
-        Ok(self.start(self.sampled(grid, shape)?, O::of_box(&grid)?))
+        let field = phase_field(grid, shape, self.eps(&grid))?;
+        Ok(self.start(field, O::of_box(&grid)?))
     }
 
     fn built_in(&mut self, name: &str) -> Result<Loaded> {
@@ -529,7 +524,7 @@ impl<'a> Reader<'a> {
         let distance = OutlineDistance::new(&outline);
         let sides = outline.sides();
         let grid = self.grid_holding(&image.bounding_box(), &IMAGE_CELLS, &distance, &sides)?;
-        let field = self.sampled(grid, &distance)?;
+        let field = phase_field(grid, &distance, self.eps(&grid))?;
         let plane = Plane::of_image(&image, path)?;
         Ok(Loaded::Plane(self.start(field, plane)))
     }
@@ -571,8 +566,7 @@ impl<'a> Reader<'a> {
     fn mesh_field(&self, mesh: &ClosedMesh, grid: Grid<3>) -> Result<Field<3>> {
         let progress = self.messages.progress();
         let bar = progress.bar("signed distance", grid.cells() as u64);
-        let distance = MeshDistance::new(mesh);
-        let eps = self.eps_over_h * grid.spacing();
+        let (distance, eps) = (MeshDistance::new(mesh), self.eps(&grid));
         let mut distance = distance.sample_within(PURE_BEYOND * eps, grid, || bar.inc(1))?;
         bar.finish();
         progress.clear();
@@ -601,13 +595,13 @@ impl<'a> Reader<'a> {
         if self.options.cells.is_some() {
             // Distances are linear across the interface, as what lies between the nodes is taken to be.
             if is_phase {
-                let eps = self.eps_over_h * field.grid().spacing();
+                let eps = self.eps(field.grid());
                 field = field.map(|u| distance_from_phase_field(u, eps));
             }
             field = Field::from_fn(self.grid()?, |x| field.interpolate(x));
         }
         if !is_phase || self.options.cells.is_some() {
-            let eps = self.eps_over_h * field.grid().spacing();
+            let eps = self.eps(field.grid());
             field = field.map(|s| optimal_profile(s, eps));
         }
         let presentation = O::of_box(field.grid())?;

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use engine::DISPLACEMENT;
 use surfaces::{Followed, Warning};
 
-use crate::faired::{Faired, surface};
+use crate::faired::{Faired, figure, report, surface};
 use crate::keep::{Keep, key};
 use crate::paths::{extension, read};
 use crate::prelude::*;
@@ -196,13 +196,15 @@ impl OwnMesh {
             normals: None,
         };
         let lost = fairing.unresolved(&followed, thinnest(start.grid()));
-        let mut made = Faired::new(rough, moved, (&lengths, &lost), extension, up)?;
-        made.report["noise"] = self.noise.into();
-        made.report["left_behind_percent"] = (100.0 * followed.left_behind(u)?).into();
+        let mut report = report(rough, &moved, &lengths);
+        report["noise"] = self.noise.into();
+        report["left_behind_percent"] = (100.0 * followed.left_behind(u)?).into();
         Ok(Faired {
+            extension,
             file: Some(surfaces::rewrite(bytes, &self.file, &all)?),
+            displacement: figure(&moved, &lengths, &lost, up)?,
             mesh: all,
-            ..made
+            report,
         })
     }
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::cli::{FairOptions, MessageOptions};
-use crate::input::{Loaded, Reader, Source, closed};
+use crate::input::{Loaded, Source, closed};
 use crate::keep::Keep;
 use crate::own::OwnMesh;
 use crate::paths::{absolute, read};
@@ -44,8 +44,7 @@ impl FairOptions {
     }
 
     pub fn load(&mut self, messages: MessageOptions) -> Result<Loaded> {
-        let eps_over_h = self.flow.run.scheme.eps_over_h();
-        let mut reader = Reader::of(&mut self.flow.run.input, eps_over_h, messages)?;
+        let mut reader = self.flow.run.reader(messages)?;
         let loaded = match reader.source.clone() {
             Source::Mesh(path) => return self.load_mesh(&path, messages),
             Source::Volume(_) if self.noise.is_some() || self.keep.is_some() => {
@@ -115,7 +114,7 @@ impl FairOptions {
             ));
             self.noise = Some(noise);
         }
-        let eps_over_h = self.flow.run.scheme.eps_over_h();
-        Reader::of(&mut self.flow.run.input, eps_over_h, messages)?.own(own, path, self.allow_loss)
+        let mut reader = self.flow.run.reader(messages)?;
+        reader.own(own, path, self.allow_loss)
     }
 }

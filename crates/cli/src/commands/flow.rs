@@ -98,10 +98,7 @@ impl RunCommand {
         match self {
             Self::Fair(fair) => fair.load(messages),
             Self::Inpaint(inpaint) => inpaint.load(messages),
-            Self::Flow(_) | Self::Mcf(_) => {
-                let RunOptions { input, scheme, .. } = self.options();
-                Reader::of(input, scheme.eps_over_h(), messages)?.load()
-            }
+            Self::Flow(_) | Self::Mcf(_) => self.options().reader(messages)?.load(),
         }
     }
 
@@ -135,6 +132,11 @@ impl FlowOptions {
 }
 
 impl RunOptions {
+    /// Reads the input.
+    pub fn reader(&mut self, messages: MessageOptions) -> Result<Reader<'_>> {
+        Reader::of(&mut self.input, self.scheme.eps_over_h(), messages)
+    }
+
     /// Refuses what cannot be done before anything is computed.
     fn check(&mut self) -> Result<()> {
         self.scheme.fill_in()?;

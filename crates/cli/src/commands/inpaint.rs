@@ -1,7 +1,7 @@
 //! `willmore inpaint`.
 
 use crate::cli::{InpaintOptions, MessageOptions};
-use crate::input::{Loaded, Reader, Start};
+use crate::input::{Loaded, Start};
 use crate::paths::absolute;
 use crate::prelude::*;
 use crate::values::Ansatz;
@@ -17,8 +17,7 @@ impl InpaintOptions {
     }
 
     pub fn load(&mut self, messages: MessageOptions) -> Result<Loaded> {
-        let eps_over_h = self.flow.run.scheme.eps_over_h();
-        let loaded = Reader::of(&mut self.flow.run.input, eps_over_h, messages)?.load()?;
+        let loaded = self.flow.run.reader(messages)?.load()?;
         let mask = self.mask()?;
         Ok(match loaded {
             Loaded::Plane(mut start) => {
