@@ -1,11 +1,15 @@
 //! Inpainting, in any dimension: Willmore flow of the values in a region, the rest held.
 
+use report::Rgb;
+
 use crate::prelude::*;
 
 /// A shape is stationary once it moves by less than this part of the way it has come per step.
 const STILL: f64 = 1e-5;
 /// The first substep of the first step, in units of `eps^4`: the time in which a corner becomes about as round as the interface is wide.
 const FIRST_SUBSTEP: f64 = 32.0;
+/// Colour of the region in the pictures.
+pub const GREEN: Rgb = Rgb(0, 140, 60);
 
 #[derive(Args, Clone, Debug)]
 pub struct InpaintingOptions {

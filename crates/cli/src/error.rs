@@ -43,13 +43,10 @@ pub(crate) use refuse;
 
 impl From<clap::Error> for Error {
     fn from(error: clap::Error) -> Self {
-        use clap::error::ErrorKind::{
-            DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion,
-            MissingSubcommand,
-        };
+        use clap::error::ErrorKind as Kind;
         match error.kind() {
-            DisplayHelp | DisplayVersion => Self::Help(error),
-            DisplayHelpOnMissingArgumentOrSubcommand | MissingSubcommand => {
+            Kind::DisplayHelp | Kind::DisplayVersion => Self::Help(error),
+            Kind::DisplayHelpOnMissingArgumentOrSubcommand | Kind::MissingSubcommand => {
                 Self::options("there is no command; see willmore --help")
             }
             _ => Self::options(format!("{}; see --help", one_line(&error))),

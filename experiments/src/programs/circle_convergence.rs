@@ -1,5 +1,3 @@
-//! Convergence test on circles: mean curvature flow and Willmore flow against the exact solutions.
-
 use crate::circles::{self, Circle, Ensemble};
 use crate::prelude::*;
 use crate::session::remove_folder;

@@ -1,5 +1,3 @@
-//! A cube and a thick disk under Willmore flow.
-
 use crate::prelude::*;
 use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, VIEW};
 use crate::truth::{DISK, ELLIPSOID, Reached, Sample, THICK_DISK, Truth};

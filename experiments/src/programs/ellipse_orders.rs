@@ -1,5 +1,3 @@
-//! The order of convergence of Willmore flow of an ellipse in h and in tau, against its own finest run.
-
 use crate::prelude::*;
 
 const TITLE: &str = "Willmore flow of an ellipse, each h with its network";

@@ -1,9 +1,6 @@
-//! Inpainting in 2D: Willmore flow of the values in a region, the rest of the image held.
-
-use crate::inpainting::{self, Inpainted, InpaintingOptions, Shape};
+use crate::inpainting::{self, GREEN, Inpainted, InpaintingOptions, Shape};
 use crate::prelude::*;
 use model::{NeededNetwork, Ratios};
-use report::Rgb;
 use solver::Precision;
 
 /// Cells per unit length of a quick run and of the paper.
@@ -18,7 +15,6 @@ const INSIDE: &[u32] = &[12, 9, 6, 3];
 const RADIUS: f64 = 0.35;
 /// The cut-out corner: everything right of and above this.
 const CORNER: f64 = 0.12;
-const GREEN: Rgb = Rgb(0, 140, 60);
 
 /// Inpainting: a disk whose corner was cut out grows round again (tau = 2^-7), the middle of a cross is smoothed (tau = 2^-14). Only
 /// the values in the region D, outlined in green, move; all others stay bit for bit.

@@ -1,9 +1,7 @@
-//! Inpainting of surfaces: Willmore flow of the values in a region, the rest of the surface held.
-
-use crate::inpainting::{self, Inpainted, InpaintingOptions, Shape};
+use crate::inpainting::{self, GREEN, Inpainted, InpaintingOptions, Shape};
 use crate::prelude::*;
 use crate::surfaces::{Flowed, Setting, Snapshot, Surface, VIEW, View, write_snapshots};
-use render::{Rgb, Tube};
+use render::Tube;
 
 const TITLE: &str = "Inpainting of surfaces";
 /// Cells per unit length of a quick run and of the paper.
@@ -19,7 +17,6 @@ const SIDE: u32 = 480;
 const COLUMNS: usize = 3;
 /// After so many doublings a step has size 8: nothing moves for long.
 const MOST_EXTRA: usize = 24;
-const GREEN: Rgb = Rgb(0, 140, 60);
 
 /// Inpainting of surfaces: a ball grows its missing corner again, and six tubes are blended in the middle. Only the values in the
 /// region D move (green in the pictures); all others stay bit for bit.

@@ -1,5 +1,3 @@
-//! Pictures and quality of the learned 2D operators.
-
 use std::f64::consts::{SQRT_2, TAU};
 
 use crate::prelude::*;
@@ -34,8 +32,7 @@ pub fn program(options: &Options) -> Result<()> {
     let mut session = Session::open("learned_networks", run, parameters)?;
     let mut shown = Vec::new();
     for (spec, network) in networks {
-        let title = format!("quality of {}", spec.name);
-        let quality = quality::measure(&mut session, title, &spec, &network)?;
+        let quality = quality::measure(&mut session, &spec, &network)?;
         shown.push(Shown {
             entries: entries(spec, &network)?,
             spec,

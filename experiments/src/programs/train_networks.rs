@@ -1,5 +1,3 @@
-//! Trains the networks that ship with the library.
-
 use crate::prelude::*;
 use crate::session::remove_folder;
 use crate::training::{NetworkSpec, in_double_precision, train};

@@ -1,5 +1,3 @@
-//! `willmore check`.
-
 use std::fmt::Write;
 use std::sync::Arc;
 

@@ -1,5 +1,3 @@
-//! `willmore fair`.
-
 use std::f64::consts::PI;
 
 use crate::cli::{FairOptions, MessageOptions};

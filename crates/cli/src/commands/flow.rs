@@ -158,8 +158,18 @@ pub fn run(
     messages: MessageOptions,
     stored: Option<(StoredRun, Option<usize>)>,
 ) -> Result<()> {
+    // One run for each label of a volume, until one is interrupted.
     if let Some(labels) = volume::all_labels(&command.options().input)? {
-        return each_label(&command, &labels, messages);
+        for label in labels {
+            let mut one = command.clone();
+            let options = one.options();
+            options.input.label = Some(Label::One(label));
+            for name in options.output.iter_mut().chain(&mut options.save) {
+                *name = volume::named(name, label);
+            }
+            run(one, messages, None)?;
+        }
+        return Ok(());
     }
     command.check()?;
     let steps = command.usual_steps();
@@ -188,20 +198,6 @@ pub fn run(
         Loaded::Plane(start) => job.start(start),
         Loaded::Space(start) => job.start(start),
     }
-}
-
-/// One run for each label of a volume, until one is interrupted.
-fn each_label(command: &RunCommand, labels: &[i64], messages: MessageOptions) -> Result<()> {
-    for &label in labels {
-        let mut one = command.clone();
-        let options = one.options();
-        options.input.label = Some(Label::One(label));
-        for name in options.output.iter_mut().chain(&mut options.save) {
-            *name = volume::named(name, label);
-        }
-        run(one, messages, None)?;
-    }
-    Ok(())
 }
 
 struct Job {

@@ -1,5 +1,3 @@
-//! `willmore info`.
-
 use std::fmt::Write;
 
 use model::Shipped;

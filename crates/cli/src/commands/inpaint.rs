@@ -1,5 +1,3 @@
-//! `willmore inpaint`.
-
 use crate::cli::{InpaintOptions, MessageOptions};
 use crate::input::{Loaded, Start};
 use crate::paths::absolute;

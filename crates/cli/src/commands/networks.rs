@@ -1,5 +1,3 @@
-//! `willmore networks`.
-
 use model::{Network, Shipped};
 
 use crate::cli::{MessageOptions, NetworksCommand};

@@ -1,5 +1,3 @@
-//! `willmore resume`.
-
 use super::flow;
 use crate::cli::{Command, MessageOptions, ResumeOptions};
 use crate::prelude::*;

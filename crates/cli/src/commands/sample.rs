@@ -1,5 +1,3 @@
-//! `willmore sample`.
-
 use volumes::Volume;
 
 use crate::cli::{MessageOptions, SampleOptions};

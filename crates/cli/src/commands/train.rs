@@ -1,5 +1,3 @@
-//! `willmore train`.
-
 use engine::quarter_square;
 use model::Ratios;
 use model::training::least_squares::LeastSquaresParams;
