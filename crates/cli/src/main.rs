@@ -7,7 +7,6 @@ mod error;
 mod faired;
 mod input;
 mod keep;
-mod messages;
 mod outcome;
 mod own;
 mod page;
