@@ -39,7 +39,7 @@ pub struct MeshFlow {
 }
 
 impl MeshFlow {
-    /// Runs the program. `remarks` is that of [`Setting::run`].
+    /// `remarks` is that of [`Setting::run`].
     pub fn run(
         &self,
         options: &MeshFlowOptions,

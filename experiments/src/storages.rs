@@ -44,7 +44,6 @@ pub struct Stored {
     numbers: Numbers,
 }
 
-/// Columns of the table.
 const COLUMNS: [(&str, Format, &str); 7] = [
     ("all steps [s]", Fixed(1), "seconds"),
     ("HVP/step", Fixed(1), "hvp_per_step"),

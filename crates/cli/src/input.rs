@@ -229,7 +229,6 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Reads it.
     pub fn load(&mut self) -> Result<Loaded> {
         let is_planar = self.source.is_planar()?;
         let loaded = match self.source.clone() {

@@ -20,7 +20,6 @@ const SHORT: f64 = 0.3;
 /// Largest asymmetry of the Hessian and largest difference between devices, in units of the rounding error per node.
 const ROUNDING: f64 = 1e4;
 
-/// One check: its name, what was found, and whether that is right.
 #[derive(Serialize)]
 struct Finding {
     name: &'static str,

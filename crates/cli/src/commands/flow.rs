@@ -3,7 +3,7 @@
 use engine::{ErrorControl, Flow, Held, Helfrich, Store, TimeSteps};
 use solver::NewtonParams;
 
-use crate::cli::{FlowOptions, McfOptions, MessageOptions, RunCommand, RunOptions};
+use crate::cli::{McfOptions, MessageOptions, RunCommand, RunOptions};
 use crate::config;
 use crate::input::{Loaded, Reader, Start, usual_box};
 use crate::paths::absolute;
@@ -117,17 +117,6 @@ impl RunCommand {
             stops.extend(fair.energy_ratio.map(Stop::EnergyRatio));
         }
         stops
-    }
-}
-
-impl FlowOptions {
-    /// Spontaneous curvature, tension and pressure, in the units of the input.
-    fn energy(&self) -> Helfrich {
-        Helfrich {
-            spontaneous_curvature: self.spontaneous_curvature.unwrap_or(0.0),
-            tension: self.tension.unwrap_or(0.0),
-            pressure: self.pressure.unwrap_or(0.0),
-        }
     }
 }
 
@@ -305,10 +294,13 @@ impl Job {
         };
         let eps = scales.eps;
         let known = presentation.known(&initial, eps)?;
-        let (energy, held) = match options {
-            Some(options) => (options.energy(), options.held(&initial, eps, known.volume)?),
-            None => (Helfrich::default(), Held::default()),
-        };
+        let (mut energy, mut held) = (Helfrich::default(), Held::default());
+        if let Some(options) = options {
+            energy.spontaneous_curvature = options.spontaneous_curvature.unwrap_or(0.0);
+            energy.tension = options.tension.unwrap_or(0.0);
+            energy.pressure = options.pressure.unwrap_or(0.0);
+            held = options.held(&initial, eps, known.volume)?;
+        }
         let mut measures = vec![Measure::zero_set(eps, &held)];
         measures.extend(known.measures);
         Ok(Case {
