@@ -148,11 +148,6 @@ impl Ensemble {
         records.flat_map(|records| minimizations(records))
     }
 
-    /// Mean of a quantity over all minimizations; nothing for mean curvature flow.
-    pub fn mean_of_steps(&self, f: impl Fn(&StepRecord) -> f64) -> Option<f64> {
-        study::mean(self.minimizations(), f)
-    }
-
     /// Steps that did not lower the energy `E[u_k, .]`, or that raised the Willmore energy; nothing for mean curvature flow.
     pub fn energy_increases(&self) -> Option<usize> {
         let raised =
@@ -164,11 +159,6 @@ impl Ensemble {
     pub fn negative_curvature(&self) -> Option<usize> {
         let solves = self.minimizations().map(|r| r.newton.negative_curvature);
         solves.reduce(|a, b| a + b)
-    }
-
-    /// Name in metrics, such as `willmore.n128.hybrid_calibrated`.
-    pub fn key(&self) -> String {
-        format!("{}.{}", self.variant.flow, self.variant.key())
     }
 }
 

@@ -36,8 +36,6 @@ pub struct Shape<const D: usize> {
     /// and most of them.
     pub steps: usize,
     pub shown: Vec<usize>,
-    /// Of the first step, what is there after `2^-k` of it is shown, for these `k`.
-    pub halvings: &'static [u32],
 }
 
 impl<const D: usize> Shape<D> {
@@ -52,14 +50,6 @@ impl<const D: usize> Shape<D> {
         case.steps.first_substep = Some(first_substep(scales.eps));
         case.stops.insert(0, Stop::Motion(STILL));
         Ok(case)
-    }
-
-    pub fn samples(&self) -> Samples {
-        Samples {
-            every: self.steps,
-            also: self.shown.clone(),
-            halvings: self.halvings.to_vec(),
-        }
     }
 }
 

@@ -52,7 +52,8 @@ impl MeshFlow {
         let steps = (options.steps).unwrap_or(if run.quick { 2 } else { self.steps + more });
         require(steps > 0, "--steps must be at least 1")?;
         let mesh = options.mesh.load(&self.mesh, &setting.grid)?;
-        let up = (options.up).map_or_else(|| options.mesh.up(self.view.up), Ok)?;
+        let usual = options.mesh.mesh.as_ref().map(surfaces::usual_up_axis);
+        let up = (options.up.or(usual.transpose()?)).unwrap_or(self.view.up);
         let schemes = options.schemes.schemes();
         let parameters = setting.parameters(json!({
             "mesh": mesh.about, "tau": time_steps.rule, "steps": steps, "schemes": schemes,

@@ -2,7 +2,6 @@
 
 use geometry::{PURE_BEYOND, npy};
 use runs::fingerprint;
-use surfaces::usual_up_axis;
 
 use crate::prelude::*;
 
@@ -94,11 +93,6 @@ const PROCEDURAL_CELLS: usize = 96;
 impl MeshOptions {
     pub fn box_side(&self, known: &KnownMesh) -> f64 {
         self.box_side.unwrap_or(known.box_side)
-    }
-
-    /// The axis that points up in pictures: the usual one of the format of a chosen mesh, else that of the program.
-    pub fn up(&self, programs: UpAxis) -> Result<UpAxis> {
-        Ok(self.mesh.as_ref().map_or(Ok(programs), usual_up_axis)?)
     }
 
     /// The chosen mesh or volume, for runs on a grid.

@@ -222,7 +222,7 @@ impl Report {
     /// The mean errors, and of Willmore flow the work.
     fn sheet(&self) -> Sheet<'_, Ensemble> {
         let mut sheet = Sheet::of(&self.ensembles)
-            .keyed(|e, name| format!("{}.{name}", e.key()))
+            .keyed(|e, name| format!("{}.{}.{name}", e.variant.flow, e.variant.key()))
             .text("flow", |e| e.variant.flow.title())
             .column("n", Shortest, |e| e.variant.n)
             .text("method", |e| e.variant.label());
@@ -232,8 +232,8 @@ impl Report {
         }
         // Of Willmore flow.
         let seconds = |e: &Ensemble| e.minimizations().next().map(|_| e.seconds_per_step());
-        let hvp = |e: &Ensemble| e.mean_of_steps(StepRecord::hvp);
-        let newton = |e: &Ensemble| e.mean_of_steps(|r| r.newton.newton as f64);
+        let hvp = |e: &Ensemble| study::mean(e.minimizations(), StepRecord::hvp);
+        let newton = |e: &Ensemble| study::mean(e.minimizations(), |r| r.newton.newton as f64);
         sheet
             .measure("hvp_per_step", ("HVP/step", Fixed(1)), hvp)
             .metric("newton_per_step", newton)

@@ -47,7 +47,6 @@ fn shapes(quick: bool) -> Result<[Shape<2>; 2]> {
         rule: StepRule::Constant(1.0 / 128.0),
         steps: steps(2000),
         shown: vec![0, 1, 100, 500, 1000, 1500, 2000],
-        halvings: INSIDE,
     };
     let [half_length, half_width] = [0.4, 0.1];
     let cross = Shape {
@@ -59,7 +58,6 @@ fn shapes(quick: bool) -> Result<[Shape<2>; 2]> {
         rule: StepRule::Constant(1.0 / 16384.0),
         steps: steps(50),
         shown: vec![0, 1, 5, 10, 20, 35, 50],
-        halvings: INSIDE,
     };
     Ok([disk, cross])
 }
@@ -86,7 +84,12 @@ pub fn program(options: &Options) -> Result<()> {
     for shape in &shapes {
         let case = shape.case(grid, scales, &operator)?;
         let folder = format!("{}-{}", shape.key, operator.key());
-        trajectories.push(session.trajectory(shape.title, case, &folder, &shape.samples())?);
+        let samples = Samples {
+            every: shape.steps,
+            also: shape.shown.clone(),
+            halvings: INSIDE.to_vec(),
+        };
+        trajectories.push(session.trajectory(shape.title, case, &folder, &samples)?);
     }
     let inpainted = shapes.iter().zip(&trajectories);
     let inpainted = inpainted.map(|(shape, trajectory)| Inpainted::measure(shape, trajectory));

@@ -55,7 +55,6 @@ fn shapes(extra_steps: usize) -> Result<[(Shape<3>, f64); 2]> {
         rule: growing(5),
         steps: 5 + extra_steps,
         shown: vec![0, 1, 3, 5, 11],
-        halvings: &[],
     };
     let tubes_shape = Shape {
         key: "tubes",
@@ -66,7 +65,6 @@ fn shapes(extra_steps: usize) -> Result<[(Shape<3>, f64); 2]> {
         rule: growing(8),
         steps: 8 + extra_steps,
         shown: vec![0, 1, 4, 8, 14],
-        halvings: &[],
     };
     Ok([(ball_shape, 30.0), (tubes_shape, 25.0)])
 }
