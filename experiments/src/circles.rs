@@ -132,10 +132,8 @@ impl Ensemble {
         self.mean(|circle| circle.error(k))
     }
 
-    pub fn error_range(&self, k: usize) -> [f64; 2] {
-        let errors = || self.circles.iter().map(|circle| circle.error(k));
-        let least = errors().fold(f64::INFINITY, f64::min);
-        [least, errors().fold(0.0, f64::max)]
+    pub fn errors(&self, k: usize) -> impl Iterator<Item = f64> {
+        self.circles.iter().map(move |circle| circle.error(k))
     }
 
     pub fn seconds_per_step(&self) -> f64 {
@@ -148,17 +146,9 @@ impl Ensemble {
         records.flat_map(|records| minimizations(records))
     }
 
-    /// Steps that did not lower the energy `E[u_k, .]`, or that raised the Willmore energy; nothing for mean curvature flow.
-    pub fn energy_increases(&self) -> Option<usize> {
-        let raised =
-            |r: &StepRecord| r.energy >= r.energy_before || r.willmore_energy > r.energy_at_rest();
-        (self.minimizations().map(|r| usize::from(raised(r)))).reduce(|a, b| a + b)
-    }
-
-    /// Linear solves that met negative curvature; nothing for mean curvature flow.
-    pub fn negative_curvature(&self) -> Option<usize> {
-        let solves = self.minimizations().map(|r| r.newton.negative_curvature);
-        solves.reduce(|a, b| a + b)
+    /// A number summed over all minimizations; nothing for mean curvature flow.
+    pub fn total(&self, of: impl Fn(&StepRecord) -> usize) -> Option<usize> {
+        self.minimizations().map(of).reduce(|a, b| a + b)
     }
 }
 

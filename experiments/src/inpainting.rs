@@ -118,12 +118,6 @@ impl<'a, const D: usize> Inpainted<'a, D> {
         let stands_still = matches!(self.trajectory.ended, Stop::Motion(_));
         stands_still.then_some((last.time - last.tau) / self.tau())
     }
-
-    pub fn write_frames(&self, session: &Session, figure: Figure) -> Result<()> {
-        let title = format!("Inpainting: {}", self.shape.title);
-        let name = format!("{}_frames", self.shape.key);
-        session.figure(Figure { title, ..figure }, &name)
-    }
 }
 
 /// Writes the energies, the records of all steps, the table of distances and the metrics, and ends the program.

@@ -73,6 +73,10 @@ impl StorageOptions {
         let usual = [&self.curve_cells[..], &self.surface_cells];
         let [curves, surfaces] = session.options.either([&[64][..], &[32, 64]], usual);
         let mut measured = Vec::new();
+        let forget_memory = || {
+            memory::release_freed();
+            memory::forget_peak();
+        };
         for &n in curves {
             forget_memory();
             let grid = Grid::per_unit(n, CROSS.side)?;
@@ -112,11 +116,6 @@ impl StorageOptions {
         }
         Ok(measured)
     }
-}
-
-fn forget_memory() {
-    memory::release_freed();
-    memory::forget_peak();
 }
 
 impl Stored {

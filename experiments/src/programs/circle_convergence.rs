@@ -195,8 +195,10 @@ impl Report {
             .data("step", |(_, k)| *k)
             .data("time", |(_, k)| time(*k))
             .data("l2_mean", |(e, k)| e.mean_error(*k))
-            .data("l2_min", |(e, k)| e.error_range(*k)[0])
-            .data("l2_max", |(e, k)| e.error_range(*k)[1]);
+            .data("l2_min", |(e, k)| {
+                e.errors(*k).fold(f64::INFINITY, f64::min)
+            })
+            .data("l2_max", |(e, k)| e.errors(*k).fold(0.0, f64::max));
         session.csv(curves, "curves")?;
         let (mut circles, mut steps) = (Vec::new(), Vec::new());
         for e in &self.ensembles {
@@ -234,11 +236,16 @@ impl Report {
         let seconds = |e: &Ensemble| e.minimizations().next().map(|_| e.seconds_per_step());
         let hvp = |e: &Ensemble| study::mean(e.minimizations(), StepRecord::hvp);
         let newton = |e: &Ensemble| study::mean(e.minimizations(), |r| r.newton.newton as f64);
+        // Steps that did not lower the energy `E[u_k, .]`, or that raised the Willmore energy.
+        let raised =
+            |r: &StepRecord| r.energy >= r.energy_before || r.willmore_energy > r.energy_at_rest();
         sheet
             .measure("hvp_per_step", ("HVP/step", Fixed(1)), hvp)
             .metric("newton_per_step", newton)
             .metric("seconds_per_step", seconds)
-            .metric("energy_increases", Ensemble::energy_increases)
-            .metric("negative_curvature", Ensemble::negative_curvature)
+            .metric("energy_increases", |e| e.total(|r| raised(r).into()))
+            .metric("negative_curvature", |e| {
+                e.total(|r| r.newton.negative_curvature)
+            })
     }
 }

@@ -95,7 +95,7 @@ pub fn program(options: &Options) -> Result<()> {
     let inpainted = inpainted.map(|(shape, trajectory)| Inpainted::measure(shape, trajectory));
     let inpainted = inpainted.collect::<Result<Vec<_>>>()?;
     for one in &inpainted {
-        one.write_frames(&session, frames(one, n)?)?;
+        session.figure(frames(one, n)?, &format!("{}_frames", one.shape.key))?;
     }
     inpainting::finish(session, "Inpainting", &inpainted)
 }
@@ -130,7 +130,8 @@ fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure> {
             .with_curve(frame.clone().with_width(1.6))
             .with_window([-0.5, 0.5], [-0.5, 0.5])
     });
-    Ok(Figure::new("", 4).with_panels(panels).with_note(format!(
+    let title = format!("Inpainting: {}", one.shape.title);
+    Ok(Figure::new(title, 4).with_panels(panels).with_note(format!(
         "n = {n}, τ = 2^{}; only the values inside the green frame move. The first step is made in {} parts.{end}",
         tau.log2(),
         trajectory.substeps(1).len(),

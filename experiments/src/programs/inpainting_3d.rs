@@ -109,8 +109,10 @@ pub fn program(options: &Options) -> Result<()> {
         decorate(&mut one.snapshots, &measured);
         let title = format!("{}: pictures", shape.title);
         let pictures = session.phase(title, |stage| one.pictures(stage, SIDE))?;
-        let figure = Figure::new("", COLUMNS).with_panels(pictures);
-        measured.write_frames(&session, figure.with_note(note(&measured, n)))?;
+        let title = format!("Inpainting: {}", shape.title);
+        let figure = Figure::new(title, COLUMNS).with_panels(pictures);
+        let figure = figure.with_note(note(&measured, n));
+        session.figure(figure, &format!("{}_frames", shape.key))?;
         inpainted.push(measured);
     }
     inpainting::finish(session, TITLE, &inpainted)
