@@ -9,7 +9,6 @@ pub enum Error {
     Options(String),
     Files(#[from] files::Error),
     Engine(#[from] engine::Error),
-    Runs(#[from] runs::Error),
     Fem(#[from] fem::Error),
     Model(#[from] model::Error),
     Operators(#[from] operators::Error),

@@ -21,7 +21,6 @@ pub enum Error {
     Files(#[from] files::Error),
     Geometry(#[from] geometry::Error),
     Images(#[from] images::Error),
-    Linearize(#[from] linearize::Error),
     Model(#[from] model::Error),
     Operators(#[from] operators::Error),
     Pages(#[from] pages::Error),

@@ -16,13 +16,10 @@ const ROOM: f64 = 0.06;
 pub struct Space {
     pub up: UpAxis,
     /// The parts and holes of the mesh that it was, if it was one.
-    #[serde(default)]
     pub input: Option<Topology>,
     /// The mesh whose vertices follow the flow, if it is one.
-    #[serde(default)]
     pub own: Option<OwnMesh>,
     /// The voxels that it was, if it was some.
-    #[serde(default)]
     pub voxels: Option<Voxels>,
 }
 
