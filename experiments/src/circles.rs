@@ -22,10 +22,9 @@ pub fn radius_at(flow: Flow, r: f64, t: f64) -> f64 {
 
 /// `count` of the radii `r_i = 0.05 pi + 0.15 pi i / 30`, `i = 0..29`, evenly chosen.
 pub fn radii(count: usize) -> Vec<f64> {
-    (0..count)
-        .map(|k| k * COUNT / count)
-        .map(|i| 0.05 * PI + 0.15 * PI * i as f64 / COUNT as f64)
-        .collect()
+    let chosen = (0..count).map(|k| k * COUNT / count);
+    let radius = |i| 0.05 * PI + 0.15 * PI * i as f64 / COUNT as f64;
+    chosen.map(radius).collect()
 }
 
 /// Cells per side of the smallest suitable box for a circle: the interface stays 0.3 away from the boundary, and the
@@ -133,10 +132,8 @@ impl Ensemble {
         self.mean(|circle| circle.error(k))
     }
 
-    pub fn error_range(&self, k: usize) -> [f64; 2] {
-        let errors = || self.circles.iter().map(|circle| circle.error(k));
-        let least = errors().fold(f64::INFINITY, f64::min);
-        [least, errors().fold(0.0, f64::max)]
+    pub fn errors(&self, k: usize) -> impl Iterator<Item = f64> {
+        self.circles.iter().map(move |circle| circle.error(k))
     }
 
     pub fn seconds_per_step(&self) -> f64 {
@@ -149,27 +146,9 @@ impl Ensemble {
         records.flat_map(|records| minimizations(records))
     }
 
-    /// Mean of a quantity over all minimizations; nothing for mean curvature flow.
-    pub fn mean_of_steps(&self, f: impl Fn(&StepRecord) -> f64) -> Option<f64> {
-        study::mean(self.minimizations(), f)
-    }
-
-    /// Steps that did not lower the energy `E[u_k, .]`, or that raised the Willmore energy; nothing for mean curvature flow.
-    pub fn energy_increases(&self) -> Option<usize> {
-        let raised =
-            |r: &StepRecord| r.energy >= r.energy_before || r.willmore_energy > r.energy_at_rest();
-        (self.minimizations().map(|r| usize::from(raised(r)))).reduce(|a, b| a + b)
-    }
-
-    /// Linear solves that met negative curvature; nothing for mean curvature flow.
-    pub fn negative_curvature(&self) -> Option<usize> {
-        let solves = self.minimizations().map(|r| r.newton.negative_curvature);
-        solves.reduce(|a, b| a + b)
-    }
-
-    /// Name in metrics, such as `willmore.n128.hybrid_calibrated`.
-    pub fn key(&self) -> String {
-        format!("{}.{}", self.variant.flow, self.variant.key())
+    /// A number summed over all minimizations; nothing for mean curvature flow.
+    pub fn total(&self, of: impl Fn(&StepRecord) -> usize) -> Option<usize> {
+        self.minimizations().map(of).reduce(|a, b| a + b)
     }
 }
 

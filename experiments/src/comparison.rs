@@ -2,6 +2,7 @@
 
 use clap::{CommandFactory, FromArgMatches};
 use geometry::measure::perimeter;
+use report::superscript;
 
 use crate::prelude::*;
 use crate::truth::{self, CELLS, Reached, Sample, Truth};
@@ -441,7 +442,7 @@ fn time_label(step: usize) -> String {
         return "0".to_owned();
     }
     let power = step.trailing_zeros();
-    let unit = look::power_of_two(power as i32 - 14);
+    let unit = format!("2{}", superscript(power as i32 - 14));
     match step >> power {
         1 => unit,
         factor => format!("{factor}·{unit}"),

@@ -9,7 +9,6 @@ pub enum Error {
     Options(String),
     Files(#[from] files::Error),
     Engine(#[from] engine::Error),
-    Runs(#[from] runs::Error),
     Fem(#[from] fem::Error),
     Model(#[from] model::Error),
     Operators(#[from] operators::Error),
@@ -24,13 +23,6 @@ pub enum Error {
 
 /// What can fail as an experiment does, unless it says otherwise.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
-
-impl Error {
-    /// The message with its causes, on one line.
-    pub fn line(&self) -> String {
-        files::with_causes(self)
-    }
-}
 
 /// Refuses options with this message unless the condition holds.
 pub fn require(holds: bool, message: impl Into<String>) -> Result<()> {

@@ -22,7 +22,7 @@ pub fn run(program: impl FnOnce() -> Result<()>) -> ExitCode {
     match program() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", error.line());
+            eprintln!("error: {}", files::with_causes(&error));
             ExitCode::from(2)
         }
     }
@@ -99,7 +99,7 @@ mod tests {
             Ok(i)
         })
         .unwrap_err();
-        assert_eq!(error.line(), "task 996");
+        assert_eq!(error.to_string(), "task 996");
         assert!(started.load(Ordering::Relaxed) < 100);
     }
 }

@@ -1,11 +1,15 @@
 //! Inpainting, in any dimension: Willmore flow of the values in a region, the rest held.
 
+use report::Rgb;
+
 use crate::prelude::*;
 
 /// A shape is stationary once it moves by less than this part of the way it has come per step.
 const STILL: f64 = 1e-5;
 /// The first substep of the first step, in units of `eps^4`: the time in which a corner becomes about as round as the interface is wide.
 const FIRST_SUBSTEP: f64 = 32.0;
+/// Colour of the region in the pictures.
+pub const GREEN: Rgb = Rgb(0, 140, 60);
 
 #[derive(Args, Clone, Debug)]
 pub struct InpaintingOptions {
@@ -32,8 +36,6 @@ pub struct Shape<const D: usize> {
     /// and most of them.
     pub steps: usize,
     pub shown: Vec<usize>,
-    /// Of the first step, what is there after `2^-k` of it is shown, for these `k`.
-    pub halvings: &'static [u32],
 }
 
 impl<const D: usize> Shape<D> {
@@ -48,14 +50,6 @@ impl<const D: usize> Shape<D> {
         case.steps.first_substep = Some(first_substep(scales.eps));
         case.stops.insert(0, Stop::Motion(STILL));
         Ok(case)
-    }
-
-    pub fn samples(&self) -> Samples {
-        Samples {
-            every: self.steps,
-            also: self.shown.clone(),
-            halvings: self.halvings.to_vec(),
-        }
     }
 }
 
@@ -123,12 +117,6 @@ impl<'a, const D: usize> Inpainted<'a, D> {
         let last = self.trajectory.records.last()?;
         let stands_still = matches!(self.trajectory.ended, Stop::Motion(_));
         stands_still.then_some((last.time - last.tau) / self.tau())
-    }
-
-    pub fn write_frames(&self, session: &Session, figure: Figure) -> Result<()> {
-        let title = format!("Inpainting: {}", self.shape.title);
-        let name = format!("{}_frames", self.shape.key);
-        session.figure(Figure { title, ..figure }, &name)
     }
 }
 

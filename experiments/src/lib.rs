@@ -36,7 +36,6 @@ pub mod mesh_flow;
 pub mod meshes;
 pub mod networks;
 pub mod options;
-pub mod orders;
 pub mod prelude;
 pub mod products;
 pub mod programs;

@@ -27,8 +27,3 @@ pub fn outline(field: &Field<2>) -> Curve {
     let curves = zero_level(field).into_iter();
     Curve::new(curves.map(|curve| curve.points).collect::<Vec<_>>())
 }
-
-/// A power of two, as `2⁻⁹`.
-pub fn power_of_two(exponent: i32) -> String {
-    format!("2{}", report::superscript(exponent))
-}

@@ -2,7 +2,7 @@
 
 use crate::meshes::{KnownMesh, MeshOptions};
 use crate::prelude::*;
-use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, View};
+use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, View};
 
 #[derive(Args, Clone, Debug)]
 pub struct MeshFlowOptions {
@@ -39,7 +39,7 @@ pub struct MeshFlow {
 }
 
 impl MeshFlow {
-    /// Runs the program. `remarks` is that of [`SurfaceFlows::run`].
+    /// `remarks` is that of [`Setting::run`].
     pub fn run(
         &self,
         options: &MeshFlowOptions,
@@ -52,7 +52,8 @@ impl MeshFlow {
         let steps = (options.steps).unwrap_or(if run.quick { 2 } else { self.steps + more });
         require(steps > 0, "--steps must be at least 1")?;
         let mesh = options.mesh.load(&self.mesh, &setting.grid)?;
-        let up = (options.up).map_or_else(|| options.mesh.up(self.view.up), Ok)?;
+        let usual = options.mesh.mesh.as_ref().map(surfaces::usual_up_axis);
+        let up = (options.up.or(usual.transpose()?)).unwrap_or(self.view.up);
         let schemes = options.schemes.schemes();
         let parameters = setting.parameters(json!({
             "mesh": mesh.about, "tau": time_steps.rule, "steps": steps, "schemes": schemes,
@@ -61,7 +62,8 @@ impl MeshFlow {
         let initial = session.phase("signed distance", |stage| {
             mesh.phase_field(setting.grid, setting.scales.eps, &stage.bar)
         })?;
-        let papers = options.mesh.is_the_papers();
+        let chosen = &options.mesh;
+        let papers = chosen.mesh.is_none() && chosen.volume.is_none() && !chosen.procedural;
         let energy = |&(step, w): &(usize, Option<f64>)| {
             let step = if step > 1 { step + more } else { step };
             (step, w.filter(|_| papers))
@@ -73,14 +75,10 @@ impl MeshFlow {
             view: View { up, ..self.view },
         };
         let variants = schemes.into_iter().map(|scheme| (Method::Hybrid, scheme));
-        let flows = SurfaceFlows {
-            program: self.program,
-            title: format!("Willmore flow: {}", surface.title),
-            surfaces: vec![(surface, initial)],
-            variants: variants.collect(),
-            time: (time_steps, steps),
-        };
-        flows.run(session, &setting, remarks)
+        let variants: Vec<_> = variants.collect();
+        let title = format!("Willmore flow: {}", surface.title);
+        let (surfaces, time) = ([(surface, initial)], (time_steps, steps));
+        setting.run(session, &title, &surfaces, &variants, time, remarks)
     }
 
     /// The steps on `n` cells per unit length, and how many more than the paper's they are. On finer grids a first step that is

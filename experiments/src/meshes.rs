@@ -2,7 +2,6 @@
 
 use geometry::{PURE_BEYOND, npy};
 use runs::fingerprint;
-use surfaces::usual_up_axis;
 
 use crate::prelude::*;
 
@@ -96,16 +95,6 @@ impl MeshOptions {
         self.box_side.unwrap_or(known.box_side)
     }
 
-    /// Whether nothing but the mesh of the paper was asked for.
-    pub fn is_the_papers(&self) -> bool {
-        self.mesh.is_none() && self.volume.is_none() && !self.procedural
-    }
-
-    /// The axis that points up in pictures: the usual one of the format of a chosen mesh, else that of the program.
-    pub fn up(&self, programs: UpAxis) -> Result<UpAxis> {
-        Ok(self.mesh.as_ref().map_or(Ok(programs), usual_up_axis)?)
-    }
-
     /// The chosen mesh or volume, for runs on a grid.
     pub fn load(&self, known: &KnownMesh, grid: &Grid<3>) -> Result<Loaded> {
         if let Some(path) = &self.volume {
@@ -169,8 +158,8 @@ impl MeshOptions {
 
 /// The folder that holds the meshes of the paper, if they are here.
 pub fn folder() -> PathBuf {
-    let named = std::env::var_os(FOLDER_VARIABLE).map(PathBuf::from);
-    named.unwrap_or_else(|| PathBuf::from(FOLDER))
+    let named = std::env::var_os(FOLDER_VARIABLE);
+    named.unwrap_or_else(|| FOLDER.into()).into()
 }
 
 fn about_file(path: &Path) -> Result<(String, Value)> {

@@ -1,4 +1,4 @@
-//! The programs: a figure of the paper each, or a study of ours.
+//! The programs: a figure of the paper each, or a study of ours, as the help of each says.
 
 pub mod armadillo;
 pub mod calibration;

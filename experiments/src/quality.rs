@@ -22,14 +22,9 @@ const COLUMNS: [(&str, Format, fn(&Quality) -> f64); 10] = [
 ];
 
 /// Measures a network on spheres that it was not trained on; adds the metrics.
-pub fn measure(
-    session: &mut Session,
-    title: String,
-    spec: &NetworkSpec,
-    network: &Network,
-) -> Result<Quality> {
+pub fn measure(session: &mut Session, spec: &NetworkSpec, network: &Network) -> Result<Quality> {
     let (data, radii) = (spec.data(false)?, held_out_radii(session.options.quick));
-    let quality = session.phase(title, |stage| {
+    let quality = session.phase(format!("quality of {}", spec.name), |stage| {
         Ok(Quality::measure(network, &data, radii, stage.device)?)
     })?;
     session.summary.insert_record(spec.name, &quality)?;

@@ -9,6 +9,7 @@ use crate::prelude::*;
 
 /// A program whose options are checked, and what it has to say so far.
 pub struct Session {
+    pub program: String,
     pub options: RunOptions,
     pub device: ComputeDevice,
     pub output: OutputDir,
@@ -47,17 +48,8 @@ impl Stage<'_> {
 
 impl Session {
     /// Opens the device and the output folder of a program and begins its manifest; to be called when everything else has been checked.
-    pub fn open(program: &str, options: &RunOptions, parameters: Value) -> Result<Self> {
-        Self::on(options.open_device()?, program, options, parameters)
-    }
-
-    /// The same on this device.
-    pub fn on(
-        device: ComputeDevice,
-        program: &str,
-        options: &RunOptions,
-        mut parameters: Value,
-    ) -> Result<Self> {
+    pub fn open(program: &str, options: &RunOptions, mut parameters: Value) -> Result<Self> {
+        let device = options.open_device()?;
         parameters["quick"] = options.quick.into();
         let folder = options.output.clone();
         let folder = folder.unwrap_or_else(|| PathBuf::from("results").join(program));
@@ -65,6 +57,7 @@ impl Session {
         let place = if device.kind().is_cpu() { "cpu" } else { "gpu" };
         let dtype = format!("{:?}", device.dtype()).to_lowercase();
         Ok(Self {
+            program: program.to_owned(),
             manifest: Manifest::start(
                 program,
                 &parameters,

@@ -1,7 +1,5 @@
 //! What a surface and a curve cost by what is stored of their phase fields: the whole grid, or bricks near them.
 
-use derive_more::Display;
-
 use crate::meshes::{ARMADILLO, MeshOptions};
 use crate::prelude::*;
 use crate::surfaces::{centred_box, needed_network, scales};
@@ -38,8 +36,6 @@ pub struct StorageOptions {
 }
 
 /// What was measured at one resolution with one storage.
-#[derive(Display)]
-#[display("{shape}.n{n}.{storage}")]
 pub struct Stored {
     shape: &'static str,
     n: usize,
@@ -48,7 +44,6 @@ pub struct Stored {
     numbers: Numbers,
 }
 
-/// Columns of the table.
 const COLUMNS: [(&str, Format, &str); 7] = [
     ("all steps [s]", Fixed(1), "seconds"),
     ("HVP/step", Fixed(1), "hvp_per_step"),
@@ -78,6 +73,10 @@ impl StorageOptions {
         let usual = [&self.curve_cells[..], &self.surface_cells];
         let [curves, surfaces] = session.options.either([&[64][..], &[32, 64]], usual);
         let mut measured = Vec::new();
+        let forget_memory = || {
+            memory::release_freed();
+            memory::forget_peak();
+        };
         for &n in curves {
             forget_memory();
             let grid = Grid::per_unit(n, CROSS.side)?;
@@ -119,11 +118,6 @@ impl StorageOptions {
     }
 }
 
-fn forget_memory() {
-    memory::release_freed();
-    memory::forget_peak();
-}
-
 impl Stored {
     fn measure<const D: usize>(
         shape: &'static str,
@@ -162,13 +156,16 @@ impl Stored {
 /// Writes the table, the metrics and the figure of the two storages.
 pub fn write(stored: &[Stored], session: &mut Session) -> Result<()> {
     let sheet = Sheet::of(stored)
-        .keyed(|row, name| format!("{row}.{name}"))
+        .keyed(|row, name| format!("{}.n{}.{}.{name}", row.shape, row.n, row.storage))
         .text("shape", |row| row.shape)
         .text("n", |row| row.n.to_string())
         .text("storage", |row| row.storage.to_string())
         .numbers(&COLUMNS, |row| &row.numbers);
     session.sheet(sheet, "storages")?;
-    for (n, ratio) in product_ratios(stored) {
+    let products = |storage| surfaces(stored, storage, "ms_per_product");
+    for [n, dense] in products(Storage::Dense) {
+        let bricks = products(Storage::Bricks).find(|[m, _]| m.to_bits() == n.to_bits());
+        let ratio = bricks.map(|[_, bricks]| bricks / dense);
         session.metric(&format!("hvp.armadillo.n{n}.bricks_over_dense"), ratio)?;
     }
     for name in ["seconds", "peak_mib", "active_cells"] {
@@ -182,15 +179,6 @@ fn surfaces(measured: &[Stored], storage: Storage, name: &str) -> impl Iterator<
         .iter()
         .filter(move |row| row.shape != CROSS.key && row.storage == storage);
     rows.filter_map(move |row| Some([row.n as f64, *row.numbers.get(name)?]))
-}
-
-/// Hessian-vector products on bricks over those on the whole grid, by resolution.
-fn product_ratios(measured: &[Stored]) -> impl Iterator<Item = (usize, f64)> {
-    let times = |storage| surfaces(measured, storage, "ms_per_product");
-    times(Storage::Dense).filter_map(move |[n, dense]| {
-        let bricks = times(Storage::Bricks).find(|[m, _]| m.to_bits() == n.to_bits())?;
-        Some((n as usize, bricks[1] / dense))
-    })
 }
 
 /// The exponent of a number on bricks in `n`, from 128 on.

@@ -220,11 +220,6 @@ impl Flowed {
         }
     }
 
-    fn row_label(&self) -> String {
-        let operator = self.label().replace(", ", "\n");
-        format!("{}\n{operator}", self.surface.title)
-    }
-
     /// Pictures of the shown steps with this side in pixels (less in a quick run), all in one framing, each also as a file of its own.
     pub fn pictures(&self, stage: &Stage<'_>, side: u32) -> Result<Vec<Raster>> {
         memory::release_freed();
@@ -268,19 +263,9 @@ pub fn raster(picture: &Picture, caption: impl Into<String>) -> Raster {
     Raster::new(size, picture.pixels()).with_caption(caption)
 }
 
-/// Surfaces under Willmore flow by several methods, as a program shows them.
-pub struct SurfaceFlows {
-    pub program: &'static str,
-    pub title: String,
-    pub surfaces: Vec<(Surface, Field<3>)>,
-    pub variants: Vec<(Method, Scheme)>,
-    /// Sizes of the time steps, and their number.
-    pub time: (TimeSteps, usize),
-}
-
 /// Sizes of time steps that are powers of two, for figures.
 fn in_words(steps: StepRule) -> String {
-    let power = |tau: f64| look::power_of_two(tau.log2().round() as i32);
+    let power = |tau: f64| format!("2{}", report::superscript(tau.log2().round() as i32));
     match steps {
         StepRule::Constant(tau) => format!("τ = {}", power(tau)),
         StepRule::Doubling(first) => {
@@ -290,27 +275,29 @@ fn in_words(steps: StepRule) -> String {
     }
 }
 
-impl SurfaceFlows {
-    /// Lets all surfaces flow, and writes a figure with a row of pictures for each run, the table of the shown steps, the records of all
-    /// steps and the metrics. `remarks` looks at the flows, may add to captions, pictures and metrics, and says what else the note of the
-    /// figure should say.
+impl Setting {
+    /// Lets all surfaces flow by several methods in so many time steps, and ends the program: writes a figure with a row of pictures for each
+    /// run, the table of the shown steps, the records of all steps and the metrics. `remarks` looks at the flows, may add to captions, pictures
+    /// and metrics, and says what else the note of the figure should say.
     pub fn run(
-        self,
+        &self,
         mut session: Session,
-        setting: &Setting,
+        title: &str,
+        surfaces: &[(Surface, Field<3>)],
+        variants: &[(Method, Scheme)],
+        time: (TimeSteps, usize),
         remarks: impl FnOnce(&mut Session, &mut [Flowed]) -> Result<String>,
     ) -> Result<()> {
         let mut all = Vec::new();
-        for (surface, initial) in &self.surfaces {
-            for &variant in &self.variants {
+        for (surface, initial) in surfaces {
+            for &variant in variants {
                 let mut surface = surface.clone();
                 if variant != PAPERS {
                     // The paper reports energies of its own scheme.
                     surface.shown.iter_mut().for_each(|(_, w)| *w = None);
                 }
-                let (title, operator) = (&surface.title, setting.operator(variant)?);
-                let case =
-                    Case::willmore(title, initial.clone(), operator, setting.scales, self.time);
+                let (shape, operator) = (&surface.title, self.operator(variant)?);
+                let case = Case::willmore(shape, initial.clone(), operator, self.scales, time);
                 all.push(surface.flow(case, &mut session)?);
             }
         }
@@ -321,17 +308,21 @@ impl SurfaceFlows {
             pictures.collect::<Result<Vec<_>, _>>()
         })?;
         let columns = pictures.iter().map(Vec::len).max();
-        let measured = if setting.grid.len() > MOST_NODES {
+        let measured = if self.grid.len() > MOST_NODES {
             "as the scheme measures it"
         } else {
             "with the implicit finite-element step"
         };
-        let figure = Figure::new(&self.title, columns.unwrap_or(1))
-            .with_row_labels(all.iter().map(Flowed::row_label))
+        let label = |one: &Flowed| {
+            let operator = one.label().replace(", ", "\n");
+            format!("{}\n{operator}", one.surface.title)
+        };
+        let figure = Figure::new(title, columns.unwrap_or(1))
+            .with_row_labels(all.iter().map(label))
             .with_panels(pictures.into_iter().flatten())
             .with_note(format!(
                 "n = {}, ε = 2/n, inner step 1/n², {}. w: Willmore energy {measured}; a sphere has 8π = 25.13.{remarks}",
-                setting.n, in_words(self.time.0.rule)
+                self.n, in_words(time.0.rule)
             ));
         session.figure(figure, "surfaces")?;
         let runs = all.iter().map(|one| (one.surface.key, &one.trajectory));
@@ -345,9 +336,9 @@ impl SurfaceFlows {
             ];
             session.metrics(&one.key(), metrics)?;
         }
-        let peak = format!("{}.peak_mib_with_pictures", self.program);
+        let peak = format!("{}.peak_mib_with_pictures", session.program);
         session.metric(&peak, memory::peak_mib())?;
-        session.finish(&self.title)
+        session.finish(title)
     }
 }
 

@@ -50,22 +50,23 @@ impl NetworkSpec {
     }
 }
 
-/// Training needs double precision: the given device if it has that, else a CPU.
-pub fn training_device(device: &ComputeDevice) -> Result<ComputeDevice> {
-    if device.kind().is_cpu() {
-        return Ok(device.clone());
+/// Training needs double precision: the same options if their device has that, else with a CPU.
+pub fn in_double_precision(options: &RunOptions) -> Result<RunOptions> {
+    let mut options = options.clone();
+    if !options.open_device()?.kind().is_cpu() {
+        let none = "training needs double precision: build with the feature `flex` or `ndarray`";
+        let kind = DeviceKind::compiled().find(|kind| kind.is_cpu());
+        let kind = kind.ok_or_else(|| Error::Options(none.to_owned()))?;
+        options.device = Some(kind.name().to_owned());
     }
-    let none = "training needs double precision: build with the feature `flex` or `ndarray`";
-    let kind = (DeviceKind::compiled().find(|kind| kind.is_cpu()))
-        .ok_or_else(|| Error::Options(none.to_owned()))?;
-    Ok(ComputeDevice::open(kind)?)
+    Ok(options)
 }
 
 pub fn held_out_radii(quick: bool) -> usize {
     if quick { 4 } else { 20 }
 }
 
-/// Trains a network by a recipe on a [`training_device`], continuing from the checkpoint in a file.
+/// Trains a network by a recipe [in double precision](in_double_precision), continuing from the checkpoint in a file.
 pub fn train<R: Recipe>(
     (spec, recipe): (&NetworkSpec, &R),
     file: &Path,

@@ -1,8 +1,11 @@
 //! What can be typed.
 
+use std::io::Write;
+
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use engine::Storage;
+use report::Progress;
 
 use crate::paths::MESHES;
 use crate::prelude::*;
@@ -206,40 +209,6 @@ pub struct SchemeOptions {
     pub storage: Option<Storage>,
 }
 
-/// What is kept.
-#[derive(Args, Serialize, Clone, Debug)]
-#[serde(rename_all = "kebab-case")]
-pub struct KeepOptions {
-    /// Keep a picture, the field and the shape every so many steps, and an animation
-    #[arg(long, value_name = "EVERY", value_parser = count)]
-    pub frames: Option<usize>,
-
-    /// Steps between two checkpoints
-    #[arg(long, value_name = "STEPS", value_parser = count, default_value_t = 5)]
-    pub checkpoint_every: usize,
-
-    /// Axis that points up in pictures and on the page: x, y or z [default: y for .obj, otherwise z]
-    #[arg(long, value_name = "AXIS")]
-    pub up: Option<UpAxis>,
-
-    /// Leave out index.html, the page of the run for a browser
-    #[arg(long)]
-    pub no_page: bool,
-
-    /// Folder of the run [default: runs/NAME-COMMAND, with a number if that is there]
-    #[arg(long, value_name = "DIR")]
-    #[serde(skip)]
-    pub output: Option<PathBuf>,
-
-    /// Write the result to this file too: a mesh (.ply, .obj, .stl) in space, a picture (.png, .svg) in the plane, - for standard output
-    #[arg(long, value_name = "FILE")]
-    pub save: Option<PathBuf>,
-
-    #[command(flatten)]
-    #[serde(skip)]
-    pub force: ForceOption,
-}
-
 /// What is there stays, unless this is given.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct ForceOption {
@@ -297,9 +266,34 @@ pub struct RunOptions {
     #[arg(long, value_name = "T", value_parser = positive)]
     pub time: Option<f64>,
 
+    /// Keep a picture, the field and the shape every so many steps, and an animation
+    #[arg(long, value_name = "EVERY", value_parser = count)]
+    pub frames: Option<usize>,
+
+    /// Steps between two checkpoints
+    #[arg(long, value_name = "STEPS", value_parser = count, default_value_t = 5)]
+    pub checkpoint_every: usize,
+
+    /// Axis that points up in pictures and on the page: x, y or z [default: y for .obj, otherwise z]
+    #[arg(long, value_name = "AXIS")]
+    pub up: Option<UpAxis>,
+
+    /// Leave out index.html, the page of the run for a browser
+    #[arg(long)]
+    pub no_page: bool,
+
+    /// Folder of the run [default: runs/NAME-COMMAND, with a number if that is there]
+    #[arg(long, value_name = "DIR")]
+    #[serde(skip)]
+    pub output: Option<PathBuf>,
+
+    /// Write the result to this file too: a mesh (.ply, .obj, .stl) in space, a picture (.png, .svg) in the plane, - for standard output
+    #[arg(long, value_name = "FILE")]
+    pub save: Option<PathBuf>,
+
     #[command(flatten)]
-    #[serde(flatten)]
-    pub keep: KeepOptions,
+    #[serde(skip)]
+    pub force: ForceOption,
     #[command(flatten)]
     #[serde(flatten)]
     pub common: CommonOptions,
@@ -561,9 +555,37 @@ impl RunCommand {
     }
 }
 
+impl MessageOptions {
+    /// Prints the outcome of a command: an object, or a text for people.
+    pub fn report(self, outcome: &Value, text: &str) {
+        // A closed pipe (`| head`) is no reason to fail after the results have been written.
+        if self.json {
+            let _ = writeln!(std::io::stdout(), "{outcome}");
+        } else if !self.quiet {
+            let _ = writeln!(std::io::stdout(), "{text}");
+        }
+    }
+
+    pub fn warn(self, what: &str) {
+        if !self.quiet {
+            eprintln!("warning: {what}");
+        }
+    }
+
+    pub fn note(self, what: &str) {
+        if !self.quiet && !self.json {
+            eprintln!("{what}");
+        }
+    }
+
+    pub fn progress(self) -> Progress {
+        Progress::new(self.quiet || self.json)
+    }
+}
+
 impl ForceOption {
     /// Refuses a file that is there.
-    pub fn check(self, name: &str, path: &Path) -> Result<(), Error> {
+    pub fn check(self, name: &str, path: &Path) -> Result<()> {
         if path.exists() && !self.force {
             refuse!(
                 "{name} {} is there already: give another name, or --force to write over it",

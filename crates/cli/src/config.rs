@@ -33,7 +33,7 @@ fn program() -> clap::Command {
 }
 
 /// What was typed, together with the configuration file it names.
-pub fn parse(arguments: &[OsString]) -> Result<Cli, Error> {
+pub fn parse(arguments: &[OsString]) -> Result<Cli> {
     let matches = program().try_get_matches_from(arguments)?;
     let named = matches.subcommand().and_then(|(command, typed)| {
         let file: Option<&PathBuf> = typed.try_get_one("config").ok().flatten();
@@ -57,7 +57,7 @@ fn parse_both(
     typed: &ArgMatches,
     text: &str,
     path: &Path,
-) -> Result<Cli, Error> {
+) -> Result<Cli> {
     let mut table = read(text, path)?;
     if typed.try_contains_id("input").unwrap_or(false) {
         table.remove("input");
@@ -66,7 +66,7 @@ fn parse_both(
 }
 
 /// The options that a run was started with.
-pub fn parse_resolved(text: &str, path: &Path) -> Result<Cli, Error> {
+pub fn parse_resolved(text: &str, path: &Path) -> Result<Cli> {
     let table = read(text, path)?;
     let Some(Value::String(command)) = table.get(COMMAND) else {
         return Err(bad(path, "it does not say which command it is for"));
@@ -78,12 +78,7 @@ pub fn parse_resolved(text: &str, path: &Path) -> Result<Cli, Error> {
 }
 
 /// Puts the entries of a file behind the command.
-fn with_table(
-    arguments: &[OsString],
-    command: &str,
-    table: &Table,
-    path: &Path,
-) -> Result<Cli, Error> {
+fn with_table(arguments: &[OsString], command: &str, table: &Table, path: &Path) -> Result<Cli> {
     let place = arguments.iter().position(|argument| argument == command);
     let place = place.map_or(arguments.len(), |place| place + 1);
     let mut all = arguments.to_vec();
@@ -95,7 +90,7 @@ fn with_table(
 }
 
 /// All options of a run, to be read by [`parse_resolved`] and by `--config`.
-pub fn resolved(command: &str, options: &impl Serialize) -> Result<String, Error> {
+pub fn resolved(command: &str, options: &impl Serialize) -> Result<String> {
     let unwritable = |error| Error::options(format!("the options cannot be stored: {error}"));
     let options = toml::to_string(options).map_err(unwritable)?;
     Ok(format!("{COMMAND} = {command:?}\n{options}"))
@@ -116,14 +111,12 @@ pub fn one_line(error: &clap::Error) -> String {
     )
 }
 
-fn bad(path: &Path, message: impl Into<String>) -> Error {
-    Error::Config {
-        path: path.to_owned(),
-        message: files::shortened(&message.into(), 400),
-    }
+fn bad(path: &Path, message: impl AsRef<str>) -> Error {
+    let message = files::shortened(message.as_ref(), 400);
+    Error::Options(format!("{}: {message}", path.display()))
 }
 
-fn read(text: &str, path: &Path) -> Result<Table, Error> {
+fn read(text: &str, path: &Path) -> Result<Table> {
     if text.len() > LONGEST {
         return Err(bad(
             path,
@@ -139,7 +132,7 @@ fn read(text: &str, path: &Path) -> Result<Table, Error> {
 }
 
 /// The entries of a file as they would be typed.
-fn as_typed(table: &Table, command: &str, path: &Path) -> Result<Vec<OsString>, Error> {
+fn as_typed(table: &Table, command: &str, path: &Path) -> Result<Vec<OsString>> {
     let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-';
     let mut arguments = Vec::new();
     for (name, value) in table {

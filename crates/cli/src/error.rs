@@ -1,14 +1,15 @@
 //! The one error type of the program.
 
-use std::path::PathBuf;
-
 use crate::config::one_line;
+
+/// What can fail as the program does, unless it says otherwise.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// What can stop the program. Every message is one line and says what to do.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
 pub enum Error {
-    /// Options that contradict each other or the input.
+    /// Options that contradict each other or the input, and advice on what the crates below refuse.
     #[error("{0}")]
     Options(String),
     /// The help or the version, which was asked for.
@@ -16,22 +17,10 @@ pub enum Error {
     /// Ctrl-C ended the run, or the training, after what was said of it.
     #[error("interrupted")]
     Interrupted,
-    #[error("{}: {message}", path.display())]
-    Config {
-        path: PathBuf,
-        message: String,
-    },
-    /// A mesh that bounds nothing, and that can be repaired.
-    #[error("{0}, or give --repair")]
-    Mendable(#[source] surfaces::Error),
-    /// Time steps became too small.
-    #[error("{0}; the shape is not resolved, use more --cells")]
-    TooStiff(#[source] engine::Error),
     Engine(engine::Error),
     Files(#[from] files::Error),
     Geometry(#[from] geometry::Error),
     Images(#[from] images::Error),
-    Linearize(#[from] linearize::Error),
     Model(#[from] model::Error),
     Operators(#[from] operators::Error),
     Pages(#[from] pages::Error),
@@ -53,13 +42,10 @@ pub(crate) use refuse;
 
 impl From<clap::Error> for Error {
     fn from(error: clap::Error) -> Self {
-        use clap::error::ErrorKind::{
-            DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion,
-            MissingSubcommand,
-        };
+        use clap::error::ErrorKind as Kind;
         match error.kind() {
-            DisplayHelp | DisplayVersion => Self::Help(error),
-            DisplayHelpOnMissingArgumentOrSubcommand | MissingSubcommand => {
+            Kind::DisplayHelp | Kind::DisplayVersion => Self::Help(error),
+            Kind::DisplayHelpOnMissingArgumentOrSubcommand | Kind::MissingSubcommand => {
                 Self::options("there is no command; see willmore --help")
             }
             _ => Self::options(format!("{}; see --help", one_line(&error))),
@@ -70,7 +56,11 @@ impl From<clap::Error> for Error {
 impl From<engine::Error> for Error {
     fn from(error: engine::Error) -> Self {
         match error {
-            engine::Error::TooStiff { .. } => Self::TooStiff(error),
+            // Time steps became too small.
+            engine::Error::TooStiff { .. } => Self::Options(format!(
+                "{}; the shape is not resolved, use more --cells",
+                files::with_causes(&error)
+            )),
             error => Self::Engine(error),
         }
     }
@@ -81,11 +71,12 @@ impl Error {
         Self::Options(message.into())
     }
 
+    /// Of a mesh that bounds nothing, and that can perhaps be repaired.
     pub fn mesh(error: surfaces::Error) -> Self {
         use surfaces::Error::{MixedOrientation, Nesting, NonManifold, Open};
         match error {
             Open { .. } | NonManifold { .. } | MixedOrientation { .. } | Nesting { .. } => {
-                Self::Mendable(error)
+                Self::Options(format!("{error}, or give --repair"))
             }
             error => error.into(),
         }

@@ -26,40 +26,28 @@ pub struct Faired {
 }
 
 impl Faired {
-    /// A mesh whose vertices have gone as far as `lengths` says from the surface `before`. Those that are `lost` are at parts or gaps that the grid
-    /// does not hold.
-    pub fn new(
-        before: &ClosedMesh,
-        mesh: TriangleMesh,
-        (lengths, lost): (&[f64], &[bool]),
-        extension: String,
-        up: UpAxis,
-    ) -> Result<Self, Error> {
-        Ok(Self {
-            extension,
-            file: None,
-            displacement: figure(&mesh, lengths, lost, up)?,
-            report: report(before, &mesh, lengths),
-            mesh,
-        })
-    }
-
     /// A new mesh in place of a surface.
     pub fn anew(
         before: &ClosedMesh,
         mesh: TriangleMesh,
         extension: String,
         up: UpAxis,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let distance = MeshDistance::new(before);
         let lengths = distance.signed_distances(&mesh.vertices).into_iter();
         let lengths: Vec<f64> = lengths.map(f64::abs).collect();
         let none_lost = vec![false; lengths.len()];
-        Self::new(before, mesh, (&lengths, &none_lost), extension, up)
+        Ok(Self {
+            extension,
+            file: None,
+            displacement: figure(&mesh, &lengths, &none_lost, up)?,
+            report: report(before, &mesh, &lengths),
+            mesh,
+        })
     }
 
     /// Writes a file: in the format of the input with everything that this had, in another one the triangles alone.
-    pub fn write(&self, path: &Path) -> Result<(), Error> {
+    pub fn write(&self, path: &Path) -> Result<()> {
         let same = extension(path) == self.extension;
         if let Some(file) = self.file.as_ref().filter(|_| same) {
             let written = files::write_atomically(path, |out| out.write_all(file));
@@ -79,7 +67,7 @@ pub fn view(up: UpAxis) -> View {
 }
 
 /// The zero set as triangles, which would cut off what is round, with its volume where that can be measured.
-pub fn surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
+pub fn surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh> {
     let mesh = surfaces::remeshed_surface(u, eps)?;
     let zero_set = ZeroSet::of(u, eps)?;
     Ok(if zero_set.sizes_hold() {
@@ -90,7 +78,7 @@ pub fn surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
 }
 
 /// How a mesh whose vertices are that far from the surface `before` differs from that.
-fn report(before: &ClosedMesh, after: &TriangleMesh, lengths: &[f64]) -> Value {
+pub fn report(before: &ClosedMesh, after: &TriangleMesh, lengths: &[f64]) -> Value {
     let mut report = json!({});
     let side = before.bounding_box().longest_side();
     let mut add = |name: &str, length: f64| {
@@ -116,12 +104,7 @@ fn report(before: &ClosedMesh, after: &TriangleMesh, lengths: &[f64]) -> Value {
 
 /// The surface in the colours of the lengths by which its vertices have moved, and their histogram, whose bars say which colour is which
 /// length. Vertices that are `lost`, at parts or gaps that the grid does not hold, have a colour of their own.
-fn figure(
-    mesh: &TriangleMesh,
-    lengths: &[f64],
-    lost: &[bool],
-    up: UpAxis,
-) -> Result<Figure, Error> {
+pub fn figure(mesh: &TriangleMesh, lengths: &[f64], lost: &[bool], up: UpAxis) -> Result<Figure> {
     let largest = lengths.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let colours = lengths.iter().zip(lost);
     let colours = colours.map(|(length, lost)| {

@@ -76,7 +76,7 @@ const WILL_NOT_LAST: &str = "which will not last";
 const LARGEST_PHASE: f64 = 1.1;
 
 /// The usual format of what becomes of an input: that of a mesh, otherwise PLY in space and PNG in the plane.
-pub fn usual_format(input: &str) -> Result<String, Error> {
+pub fn usual_format(input: &str) -> Result<String> {
     Ok(match Source::of(input)? {
         Source::Mesh(path) => extension(&path),
         source if source.is_planar()? => "png".to_owned(),
@@ -85,7 +85,7 @@ pub fn usual_format(input: &str) -> Result<String, Error> {
 }
 
 /// The closed mesh in a file, possibly after a repair.
-pub fn closed(path: &Path, repairs: bool, messages: MessageOptions) -> Result<ClosedMesh, Error> {
+pub fn closed(path: &Path, repairs: bool, messages: MessageOptions) -> Result<ClosedMesh> {
     let mesh = surfaces::read(path)?;
     let warn = |what: &dyn std::fmt::Display| messages.warn(&format!("{}: {what}", path.display()));
     if repairs {
@@ -101,7 +101,7 @@ pub fn closed(path: &Path, repairs: bool, messages: MessageOptions) -> Result<Cl
 }
 
 impl Source {
-    fn of(input: &str) -> Result<Self, Error> {
+    fn of(input: &str) -> Result<Self> {
         if let Some(name) = input.strip_prefix("builtin:") {
             return Ok(Self::BuiltIn(name.to_owned()));
         }
@@ -134,7 +134,7 @@ impl Source {
         }
     }
 
-    fn is_planar(&self) -> Result<bool, Error> {
+    fn is_planar(&self) -> Result<bool> {
         Ok(match self {
             Self::Mesh(_) | Self::Volume(_) => false,
             Self::Image(_) => true,
@@ -164,7 +164,7 @@ impl Source {
     }
 
     /// Refuses options that say nothing about such an input.
-    fn refuse_foreign(&self, options: &InputOptions) -> Result<(), Error> {
+    fn refuse_foreign(&self, options: &InputOptions) -> Result<()> {
         let (what, allowed): (_, &[&str]) = match self {
             Self::Mesh(_) => ("a mesh", &["--repair", "--side-length"]),
             Self::Image(_) => ("an image", &["--inside", "--threshold", "--side-length"]),
@@ -209,7 +209,7 @@ impl<'a> Reader<'a> {
         options: &'a mut InputOptions,
         eps_over_h: f64,
         messages: MessageOptions,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let Some(input) = options.input.as_deref() else {
             refuse!(
                 "there is no input: give a file or builtin:NAME, or `input = ...` in a --config file"
@@ -229,8 +229,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Reads it.
-    pub fn load(&mut self) -> Result<Loaded, Error> {
+    pub fn load(&mut self) -> Result<Loaded> {
         let is_planar = self.source.is_planar()?;
         let loaded = match self.source.clone() {
             Source::Mesh(path) => {
@@ -254,7 +253,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The grid about 0.
-    fn grid<const D: usize>(&mut self) -> Result<Grid<D>, Error> {
+    fn grid<const D: usize>(&mut self) -> Result<Grid<D>> {
         let (cells, box_side) = usual_box::<D>();
         let cells = *self.options.cells.get_or_insert(cells);
         if cells < FEWEST_CELLS {
@@ -278,7 +277,7 @@ impl<'a> Reader<'a> {
         &mut self,
         bounds: &BoundingBox<D>,
         part: f64,
-    ) -> Result<Grid<D>, Error> {
+    ) -> Result<Grid<D>> {
         let grid = self.grid::<D>()?;
         // An image is all of its box: what is drawn may go on at its border.
         let room = if D == 2 { 0.0 } else { ROOM };
@@ -292,8 +291,8 @@ impl<'a> Reader<'a> {
     fn first_good<T>(
         &mut self,
         grids: &[usize],
-        attempt: impl Fn(&mut Self) -> Result<(T, bool), Error>,
-    ) -> Result<T, Error> {
+        attempt: impl Fn(&mut Self) -> Result<(T, bool)>,
+    ) -> Result<T> {
         let (last, others) = grids.split_last().expect("there is a grid to try");
         for &cells in others {
             self.options.cells = Some(cells);
@@ -312,7 +311,7 @@ impl<'a> Reader<'a> {
         grids: &[usize],
         shape: &(impl SignedDistance<D> + ?Sized),
         sides: &(impl Iterator<Item = ([f64; D], [f64; D], f64)> + Clone),
-    ) -> Result<Grid<D>, Error> {
+    ) -> Result<Grid<D>> {
         let chosen = self.options.cells;
         let (grid, thin) = self.first_good(
             &chosen.map_or(grids.to_vec(), |cells| vec![cells]),
@@ -334,14 +333,13 @@ impl<'a> Reader<'a> {
         part: f64,
         grids: &[usize],
         refused: Option<&str>,
-    ) -> Result<(Field<3>, Option<ClosedMesh>), Error> {
+    ) -> Result<(Field<3>, Option<ClosedMesh>)> {
         let wanted = Topology::of(mesh);
         let (field, surface, found) = self.first_good(grids, |reader| {
             let grid = reader.grid_around(&mesh.bounding_box(), part)?;
             let field = reader.mesh_field(mesh, grid)?;
-            let eps = reader.eps_over_h * grid.spacing();
-            let surface = ClosedMesh::new(surfaces::phase_field_surface(&field, eps)?).ok();
-            let surface = surface.map(|(surface, _)| surface);
+            let surface = surfaces::phase_field_surface(&field, reader.eps(&grid))?;
+            let surface = ClosedMesh::new(surface).ok().map(|(surface, _)| surface);
             let found = surface.as_ref().map(Topology::of);
             Ok(((field, surface, found), found == Some(wanted)))
         })?;
@@ -379,7 +377,7 @@ impl<'a> Reader<'a> {
         grid: &Grid<D>,
         what: &str,
         refuses: bool,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         if part < THIN_PART {
             return Ok(());
         }
@@ -397,7 +395,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The start of the flow of a mesh, on the coarsest grid that holds its thin parts, its components and its holes.
-    fn mesh(&mut self, mesh: &ClosedMesh, up: UpAxis) -> Result<Loaded, Error> {
+    fn mesh(&mut self, mesh: &ClosedMesh, up: UpAxis) -> Result<Loaded> {
         let chosen = self.options.cells.is_some();
         let sides = mesh.mesh().sides(MOST_RAYS);
         let distance = MeshDistance::new(mesh);
@@ -418,7 +416,7 @@ impl<'a> Reader<'a> {
     }
 
     /// A mesh whose vertices follow the flow, on the coarsest grid that holds its parts and holes.
-    pub fn own(&mut self, own: OwnMesh, path: &Path, allow_loss: bool) -> Result<Loaded, Error> {
+    pub fn own(&mut self, own: OwnMesh, path: &Path, allow_loss: bool) -> Result<Loaded> {
         let (rough, start) = (own.rough(), own.fairing().start());
         let grids = (self.options.cells).map_or(OWN_CELLS.to_vec(), |cells| vec![cells]);
         let part = OWN_PART[usize::from(own.fairing().noise() == 0.0)];
@@ -452,7 +450,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The longest side of what is in the box, a part of that unless it is chosen, so many interface widths from its sides.
-    fn side<const D: usize>(&mut self, part: f64, room: f64) -> Result<f64, Error> {
+    fn side<const D: usize>(&mut self, part: f64, room: f64) -> Result<f64> {
         let grid = self.grid::<D>()?;
         let box_side = grid.side();
         let most = box_side - 2.0 * room * self.eps_over_h * grid.spacing();
@@ -467,13 +465,8 @@ impl<'a> Reader<'a> {
         Ok(side)
     }
 
-    fn sampled<const D: usize>(
-        &self,
-        grid: Grid<D>,
-        shape: &(impl SignedDistance<D> + ?Sized),
-    ) -> Result<Field<D>, Error> {
-        let eps = self.eps_over_h * grid.spacing();
-        Ok(phase_field(grid, shape, eps)?)
+    fn eps<const D: usize>(&self, grid: &Grid<D>) -> f64 {
+        self.eps_over_h * grid.spacing()
     }
 
     fn start<const D: usize, O>(&self, field: Field<D>, presentation: O) -> Start<D, O> {
@@ -488,12 +481,13 @@ impl<'a> Reader<'a> {
     fn shape<const D: usize, O: Presentation<D>>(
         &mut self,
         shape: &dyn SignedDistance<D>,
-    ) -> Result<Start<D, O>, Error> {
+    ) -> Result<Start<D, O>> {
         let grid = self.grid()?;
-        Ok(self.start(self.sampled(grid, shape)?, O::of_box(&grid)?))
+        let field = phase_field(grid, shape, self.eps(&grid))?;
+        Ok(self.start(field, O::of_box(&grid)?))
     }
 
-    fn built_in(&mut self, name: &str) -> Result<Loaded, Error> {
+    fn built_in(&mut self, name: &str) -> Result<Loaded> {
         let chosen = self.options.cells;
         let side = if self.source.is_planar()? {
             self.side::<2>(PART, ROOM)?
@@ -512,7 +506,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn image(&mut self, path: &Path) -> Result<Loaded, Error> {
+    fn image(&mut self, path: &Path) -> Result<Loaded> {
         let image = images::read(path)?;
         let threshold = self.options.threshold.unwrap_or(0.5);
         let usual = Side::of(&image, threshold)?;
@@ -529,12 +523,12 @@ impl<'a> Reader<'a> {
         let distance = OutlineDistance::new(&outline);
         let sides = outline.sides();
         let grid = self.grid_holding(&image.bounding_box(), &IMAGE_CELLS, &distance, &sides)?;
-        let field = self.sampled(grid, &distance)?;
+        let field = phase_field(grid, &distance, self.eps(&grid))?;
         let plane = Plane::of_image(&image, path)?;
         Ok(Loaded::Plane(self.start(field, plane)))
     }
 
-    fn volume(&mut self, path: &Path) -> Result<Loaded, Error> {
+    fn volume(&mut self, path: &Path) -> Result<Loaded> {
         let body = volume::body(path, self.options)?;
         if let Some(label) = self.options.label {
             self.name = format!("{}-label{label}", self.name);
@@ -568,11 +562,10 @@ impl<'a> Reader<'a> {
         Ok(Loaded::Space(self.start(field, space)))
     }
 
-    fn mesh_field(&self, mesh: &ClosedMesh, grid: Grid<3>) -> Result<Field<3>, Error> {
+    fn mesh_field(&self, mesh: &ClosedMesh, grid: Grid<3>) -> Result<Field<3>> {
         let progress = self.messages.progress();
         let bar = progress.bar("signed distance", grid.cells() as u64);
-        let distance = MeshDistance::new(mesh);
-        let eps = self.eps_over_h * grid.spacing();
+        let (distance, eps) = (MeshDistance::new(mesh), self.eps(&grid));
         let mut distance = distance.sample_within(PURE_BEYOND * eps, grid, || bar.inc(1))?;
         bar.finish();
         progress.clear();
@@ -585,10 +578,7 @@ impl<'a> Reader<'a> {
         Ok(distance.map(|s| optimal_profile(s, eps)))
     }
 
-    fn values<const D: usize, O: Presentation<D>>(
-        &mut self,
-        path: &Path,
-    ) -> Result<Start<D, O>, Error> {
+    fn values<const D: usize, O: Presentation<D>>(&mut self, path: &Path) -> Result<Start<D, O>> {
         let holds = *self.options.holds.get_or_insert(Holds::PhaseField);
         let (_, side) = usual_box::<D>();
         let side = *self.options.box_side.get_or_insert(side);
@@ -604,13 +594,13 @@ impl<'a> Reader<'a> {
         if self.options.cells.is_some() {
             // Distances are linear across the interface, as what lies between the nodes is taken to be.
             if is_phase {
-                let eps = self.eps_over_h * field.grid().spacing();
+                let eps = self.eps(field.grid());
                 field = field.map(|u| distance_from_phase_field(u, eps));
             }
             field = Field::from_fn(self.grid()?, |x| field.interpolate(x));
         }
         if !is_phase || self.options.cells.is_some() {
-            let eps = self.eps_over_h * field.grid().spacing();
+            let eps = self.eps(field.grid());
             field = field.map(|s| optimal_profile(s, eps));
         }
         let presentation = O::of_box(field.grid())?;
@@ -629,7 +619,7 @@ fn far_from(mesh: &ClosedMesh, surface: Option<&ClosedMesh>) -> String {
 }
 
 /// Refuses images that are no drawings, unless it is said what is to be inside.
-fn refuse_photographs(tones: &Tones, side: Side, path: &Path) -> Result<(), Error> {
+fn refuse_photographs(tones: &Tones, side: Side, path: &Path) -> Result<()> {
     if tones.between >= PHOTOGRAPH {
         refuse!(
             "{} has continuous tones, as a photograph: {:.0} % of its pixels have none of two. A shape has two: with --threshold {:.2}, which \
@@ -646,7 +636,7 @@ fn refuse_photographs(tones: &Tones, side: Side, path: &Path) -> Result<(), Erro
 }
 
 /// Refuses shapes of which there is nothing on the grid, or nothing else.
-pub fn check_phases<const D: usize>(field: &Field<D>, input: &str) -> Result<(), Error> {
+pub fn check_phases<const D: usize>(field: &Field<D>, input: &str) -> Result<()> {
     let inside = field.values().iter().filter(|u| **u > 0.0).count();
     let nodes = field.grid().len();
     if inside == 0 || inside == nodes {

@@ -33,7 +33,7 @@ impl Keep {
         mask: Option<&[u8]>,
         mesh: &TriangleMesh,
         (bytes, file): (&[u8], &str),
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let wrong = |reason: String| Error::options(format!("--keep {text}: {reason}"));
         if let Some(colour) = text.strip_prefix("colour:") {
             let digits = colour.strip_prefix('#').unwrap_or(colour);

@@ -7,7 +7,6 @@ mod error;
 mod faired;
 mod input;
 mod keep;
-mod messages;
 mod outcome;
 mod own;
 mod page;
@@ -53,7 +52,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn execute(mut cli: Cli) -> Result<(), Error> {
+fn execute(mut cli: Cli) -> Result<()> {
     let standard = Standard::open(&mut cli.command, &mut cli.messages)?;
     let messages = cli.messages;
     match cli.command {

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use engine::DISPLACEMENT;
 use surfaces::{Followed, Warning};
 
-use crate::faired::{Faired, surface};
+use crate::faired::{Faired, figure, report, surface};
 use crate::keep::{Keep, key};
 use crate::paths::{extension, read};
 use crate::prelude::*;
@@ -48,7 +48,7 @@ impl OwnMesh {
         bytes: Vec<u8>,
         noise: Option<f64>,
         keep: Option<String>,
-    ) -> Result<(Self, Vec<Warning>), Error> {
+    ) -> Result<(Self, Vec<Warning>)> {
         let mut own = Self {
             file: format!("{INPUT}.{}", extension(path)),
             noise: noise.unwrap_or(f64::NAN),
@@ -61,7 +61,7 @@ impl OwnMesh {
     }
 
     /// Takes the copy in the folder of a run.
-    pub fn load_from(&mut self, stored: &StoredRun) -> Result<(), Error> {
+    pub fn load_from(&mut self, stored: &StoredRun) -> Result<()> {
         let mask = self.mask().map(|(_, copy)| stored.read(&copy));
         let mask = mask.transpose()?;
         let bytes = stored.read(&self.file)?;
@@ -76,12 +76,7 @@ impl OwnMesh {
     }
 
     /// Takes the bytes of a file; noise that is not a number is estimated.
-    fn load(
-        &mut self,
-        bytes: Vec<u8>,
-        path: &Path,
-        mask: Option<Vec<u8>>,
-    ) -> Result<Vec<Warning>, Error> {
+    fn load(&mut self, bytes: Vec<u8>, path: &Path, mask: Option<Vec<u8>>) -> Result<Vec<Warning>> {
         let mesh = surfaces::decode(&bytes, path)?;
         let (closed, warnings) = ClosedMesh::new(mesh.clone()).map_err(Error::mesh)?;
         if self.noise.is_nan() {
@@ -143,13 +138,13 @@ impl OwnMesh {
     }
 
     /// The grid has the coordinates of the mesh.
-    fn followed(&self, start: &Field<3>, eps: f64) -> Result<Followed, Error> {
+    fn followed(&self, start: &Field<3>, eps: f64) -> Result<Followed> {
         let in_place = Placement::about([0.0; 3], 1.0)?;
         Ok(self.fairing().follow(in_place, start, eps)?)
     }
 
     /// How far the vertices have gone along the normals, root of the mean square.
-    pub fn measure(&self, start: &Field<3>, eps: f64) -> Result<Measure<3>, Error> {
+    pub fn measure(&self, start: &Field<3>, eps: f64) -> Result<Measure<3>> {
         let (fairing, followed) = (self.fairing().clone(), self.followed(start, eps)?);
         Ok(Measure::new(DISPLACEMENT, move |u, _| {
             // A field that is not finite stops the run elsewhere.
@@ -169,13 +164,7 @@ impl OwnMesh {
     }
 
     /// The mesh with the vertices where the phase field `u` has taken them, or the new one in its place.
-    pub fn faired(
-        &self,
-        start: &Field<3>,
-        u: &Field<3>,
-        eps: f64,
-        up: UpAxis,
-    ) -> Result<Faired, Error> {
+    pub fn faired(&self, start: &Field<3>, u: &Field<3>, eps: f64, up: UpAxis) -> Result<Faired> {
         let (rough, extension) = (self.rough(), extension(Path::new(&self.file)));
         if self.is_new {
             let mut mesh = surface(u, eps)?;
@@ -207,13 +196,15 @@ impl OwnMesh {
             normals: None,
         };
         let lost = fairing.unresolved(&followed, thinnest(start.grid()));
-        let mut made = Faired::new(rough, moved, (&lengths, &lost), extension, up)?;
-        made.report["noise"] = self.noise.into();
-        made.report["left_behind_percent"] = (100.0 * followed.left_behind(u)?).into();
+        let mut report = report(rough, &moved, &lengths);
+        report["noise"] = self.noise.into();
+        report["left_behind_percent"] = (100.0 * followed.left_behind(u)?).into();
         Ok(Faired {
+            extension,
             file: Some(surfaces::rewrite(bytes, &self.file, &all)?),
+            displacement: figure(&moved, &lengths, &lost, up)?,
             mesh: all,
-            ..made
+            report,
         })
     }
 }

@@ -26,7 +26,7 @@ const MOST_ROWS: usize = 60;
 const FEW_STEPS: usize = 40;
 
 /// Writes the page of a run and returns its path.
-pub fn write(run: &StoredRun) -> Result<PathBuf, Error> {
+pub fn write(run: &StoredRun) -> Result<PathBuf> {
     let path = run.path().join(NAME);
     let records = engine::records(run)?;
     Files { run, records }.page()?.write(&path)?;
@@ -39,7 +39,7 @@ struct Files<'a> {
 }
 
 impl Files<'_> {
-    fn page(&self) -> Result<Page, Error> {
+    fn page(&self) -> Result<Page> {
         let about = &engine::notes(self.run)["about"];
         let text = |name: &str| about[name].as_str().unwrap_or_default();
         let outcome = self.outcome()?;
@@ -62,7 +62,7 @@ impl Files<'_> {
         Ok(page.with(numbers.with(options).with(program)))
     }
 
-    fn outcome(&self) -> Result<Option<Value>, Error> {
+    fn outcome(&self) -> Result<Option<Value>> {
         let bytes = self.read(presentation::SUMMARY)?;
         let outcome = bytes
             .map(|bytes| serde_json::from_slice(&bytes))
@@ -71,7 +71,7 @@ impl Files<'_> {
     }
 
     /// The shape before, in the frames and after, in one view: drawings in the plane, surfaces to turn in space.
-    fn shape(&self) -> Result<Option<Section>, Error> {
+    fn shape(&self) -> Result<Option<Section>> {
         let section = Section::new("Shape");
         let section = match engine::dimension(self.run)? {
             2 => self.drawings()?.map(|frames| section.with(frames)),
@@ -92,7 +92,7 @@ impl Files<'_> {
         Ok(Some(section))
     }
 
-    fn drawings(&self) -> Result<Option<Frames>, Error> {
+    fn drawings(&self) -> Result<Option<Frames>> {
         // Images are repaired in their own tones.
         let (before, format) = if self.has(plane::ORIGINAL) {
             (plane::ORIGINAL.trim_end_matches(".png"), "png")
@@ -111,7 +111,7 @@ impl Files<'_> {
         Ok(frames.transpose()?)
     }
 
-    fn surfaces(&self) -> Result<Option<Viewer>, Error> {
+    fn surfaces(&self) -> Result<Option<Viewer>> {
         let stages = self.stages(self.before(), &MESHES);
         // Until it is started, and on paper, the viewer is a picture.
         let (Some(poster), Some((_, first))) = (self.read(presentation::PICTURE)?, stages.first())
@@ -123,7 +123,7 @@ impl Files<'_> {
         let most = (MOST_VERTICES / vertices.max(1)).clamp(2, MOST_FRAMES);
         let meshes: Vec<(&str, TriangleMesh)> = thinned(&stages, most)
             .map(|(label, name)| Ok((label.as_str(), read(name)?)))
-            .collect::<Result<_, Error>>()?;
+            .collect::<Result<_>>()?;
         let up = UpAxis::deserialize(&engine::notes(self.run)["outlet"]["up"]);
         Ok(Some(Viewer::new(
             "The surface over the steps",
@@ -164,7 +164,7 @@ impl Files<'_> {
     }
 
     /// Energy and measures over the steps, drawn and as a table.
-    fn steps(&self) -> Result<Section, Error> {
+    fn steps(&self) -> Result<Section> {
         let columns = match engine::dimension(self.run)? {
             2 => [("length", "Length"), ("area", "Area")],
             _ => [("area", "Area"), ("volume", "Volume")],
@@ -230,7 +230,7 @@ impl Files<'_> {
     }
 
     /// A file, if it belongs to the run.
-    fn read(&self, name: &str) -> Result<Option<Vec<u8>>, Error> {
+    fn read(&self, name: &str) -> Result<Option<Vec<u8>>> {
         let bytes = self.has(name).then(|| self.run.read(name));
         Ok(bytes.transpose()?)
     }

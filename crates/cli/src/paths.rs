@@ -6,7 +6,7 @@ use crate::prelude::*;
 pub const MESHES: [&str; 3] = ["ply", "obj", "stl"];
 
 /// The path of a file from wherever the program may run later.
-pub fn absolute(path: impl AsRef<Path>) -> Result<PathBuf, Error> {
+pub fn absolute(path: impl AsRef<Path>) -> Result<PathBuf> {
     let path = path.as_ref();
     Ok(std::path::absolute(path).map_err(files::Error::of("find", path))?)
 }
@@ -16,7 +16,7 @@ pub fn extension(path: &Path) -> String {
     extension.to_ascii_lowercase()
 }
 
-pub fn read(path: impl AsRef<Path>) -> Result<Vec<u8>, Error> {
+pub fn read(path: impl AsRef<Path>) -> Result<Vec<u8>> {
     let path = path.as_ref();
     Ok(std::fs::read(path).map_err(files::Error::of("read", path))?)
 }

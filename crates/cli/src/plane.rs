@@ -32,7 +32,7 @@ struct Original {
 
 impl Plane {
     /// The frame has the pixels of the image.
-    pub fn of_image(image: &Image, path: &Path) -> Result<Self, Error> {
+    pub fn of_image(image: &Image, path: &Path) -> Result<Self> {
         let (width, height) = (image.width(), image.height());
         Ok(Self {
             frame: Frame::new(width, height, [0.0, f64::from(height)], 1.0)?,
@@ -42,7 +42,7 @@ impl Plane {
     }
 
     /// What is inside a mask that is an image: of the size of the input, or else a square, which fills the box.
-    pub fn mask(&self, mask: &str, grid: &Grid<2>) -> Result<Box<dyn SignedDistance<2>>, Error> {
+    pub fn mask(&self, mask: &str, grid: &Grid<2>) -> Result<Box<dyn SignedDistance<2>>> {
         let image = images::read(mask)?;
         let (width, height) = (image.width(), image.height());
         let [w, h] = [self.frame.width(), self.frame.height()];
@@ -66,7 +66,7 @@ impl Plane {
     }
 
     /// From now on in the tones of the input, if it is an image, all of whose pixels outside of a mask stay.
-    pub fn repair(&mut self, mask: &dyn SignedDistance<2>) -> Result<(), Error> {
+    pub fn repair(&mut self, mask: &dyn SignedDistance<2>) -> Result<()> {
         let Some(path) = &self.image else {
             return Ok(());
         };
@@ -84,7 +84,7 @@ impl Plane {
 
 impl Original {
     /// With a drawing, whose opacity is 1 inside, in the mask.
-    fn with(&self, drawing: &Picture) -> Result<Picture, Error> {
+    fn with(&self, drawing: &Picture) -> Result<Picture> {
         let [ink, paper] = [(u8::MAX, 0.0), (0, 255.0)].map(|(opacity, usual)| {
             let around = self.tone(drawing, opacity);
             around.unwrap_or([usual, usual, usual, 255.0])
@@ -134,7 +134,7 @@ impl Presentation<2> for Plane {
     const SAVED: &'static [&'static str] = &["png", "svg"];
     const USUAL: &'static str = "svg";
 
-    fn of_box(grid: &Grid<2>) -> Result<Self, Error> {
+    fn of_box(grid: &Grid<2>) -> Result<Self> {
         Ok(Self {
             frame: Frame::of_box(grid, PIXELS)?,
             original: None,
@@ -142,14 +142,14 @@ impl Presentation<2> for Plane {
         })
     }
 
-    fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error> {
+    fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<()> {
         if let Some(axis) = up {
             refuse!("--up {axis} has no meaning in the plane: leave it out");
         }
         Ok(())
     }
 
-    fn picture(&self, _: &Field<2>, u: &Field<2>, eps: f64) -> Result<Picture, Error> {
+    fn picture(&self, _: &Field<2>, u: &Field<2>, eps: f64) -> Result<Picture> {
         let interface = Interface::new(u, eps)?;
         match &self.original {
             None => Ok(drawing(&self.frame, &interface, Some(Rgb::WHITE))?),
@@ -157,14 +157,14 @@ impl Presentation<2> for Plane {
         }
     }
 
-    fn topology(&self, u: &Field<2>, _: f64) -> Result<Topology, Error> {
+    fn topology(&self, u: &Field<2>, _: f64) -> Result<Topology> {
         Ok(Topology {
             components: Outline::of_phase_field(u)?.curves().len(),
             euler_characteristic: None,
         })
     }
 
-    fn save(&self, u: &Field<2>, eps: f64, path: &Path) -> Result<(), Error> {
+    fn save(&self, u: &Field<2>, eps: f64, path: &Path) -> Result<()> {
         match &*extension(path) {
             "svg" => {
                 let text = images::svg(&self.frame, &Outline::of_phase_field(u)?);
@@ -175,7 +175,7 @@ impl Presentation<2> for Plane {
         Ok(())
     }
 
-    fn inputs(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
+    fn inputs(&self) -> Result<Vec<(String, Vec<u8>)>> {
         let Some(original) = &self.original else {
             return Ok(Vec::new());
         };
@@ -188,7 +188,7 @@ impl Presentation<2> for Plane {
         ])
     }
 
-    fn restore(&mut self, stored: &StoredRun) -> Result<(), Error> {
+    fn restore(&mut self, stored: &StoredRun) -> Result<()> {
         if stored.files().any(|name| name == ORIGINAL) {
             let picture = |name: &str| Ok::<_, Error>(images::colours(name, &stored.read(name)?)?);
             let drawn = picture(MASK)?.pixels().iter().map(|p| p[0] == 0).collect();

@@ -16,5 +16,5 @@ pub use serde_json::{Value, json};
 pub use surfaces::shapes::Region;
 pub use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh};
 
-pub use crate::error::Error;
 pub(crate) use crate::error::refuse;
+pub use crate::error::{Error, Result};

@@ -65,15 +65,15 @@ pub struct Known<const D: usize> {
 /// How phase fields in `D` dimensions are shown.
 pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
     /// That of a shape that is given on a grid or by a formula.
-    fn of_box(grid: &Grid<D>) -> Result<Self, Error>;
+    fn of_box(grid: &Grid<D>) -> Result<Self>;
 
     /// Lets the axis that was chosen point up, or says which one does.
-    fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error>;
+    fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<()>;
 
     /// A picture, in the same frame for all steps of a flow from `start`.
-    fn picture(&self, start: &Field<D>, u: &Field<D>, eps: f64) -> Result<Picture, Error>;
+    fn picture(&self, start: &Field<D>, u: &Field<D>, eps: f64) -> Result<Picture>;
 
-    fn topology(&self, u: &Field<D>, eps: f64) -> Result<Topology, Error>;
+    fn topology(&self, u: &Field<D>, eps: f64) -> Result<Topology>;
 
     /// The extensions of files that hold it,
     const SAVED: &'static [&'static str];
@@ -81,7 +81,7 @@ pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
     const USUAL: &'static str;
 
     /// Refuses other files.
-    fn check_saved(path: &Path) -> Result<(), Error> {
+    fn check_saved(path: &Path) -> Result<()> {
         if !Self::SAVED.contains(&&*extension(path)) {
             let (path, formats) = (path.display(), Self::SAVED.join(" or ."));
             refuse!("--save {path}: a result in {D}D is saved as .{formats}");
@@ -90,10 +90,10 @@ pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
     }
 
     /// Writes the shape to any such file.
-    fn save(&self, u: &Field<D>, eps: f64, path: &Path) -> Result<(), Error>;
+    fn save(&self, u: &Field<D>, eps: f64, path: &Path) -> Result<()>;
 
     /// What becomes of a surface, and how far it has gone.
-    fn faired(&self, _: &Field<D>, _: &Field<D>, _: f64) -> Result<Option<Faired>, Error> {
+    fn faired(&self, _: &Field<D>, _: &Field<D>, _: f64) -> Result<Option<Faired>> {
         Ok(None)
     }
 
@@ -102,17 +102,17 @@ pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
         None
     }
 
-    fn known(&self, _: &Field<D>, _: f64) -> Result<Known<D>, Error> {
+    fn known(&self, _: &Field<D>, _: f64) -> Result<Known<D>> {
         Ok(Known::default())
     }
 
     /// Names and bytes of the files that it takes to resume a run,
-    fn inputs(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
+    fn inputs(&self) -> Result<Vec<(String, Vec<u8>)>> {
         Ok(Vec::new())
     }
 
     /// and what becomes of them there.
-    fn restore(&mut self, _: &StoredRun) -> Result<(), Error> {
+    fn restore(&mut self, _: &StoredRun) -> Result<()> {
         Ok(())
     }
 }

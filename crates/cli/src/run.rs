@@ -8,7 +8,7 @@ use engine::{Checkpoints, Ending, Event, Observer, Storage, Store, estimated_tim
 use geometry::measure::touches_side;
 use solver::StepEstimates;
 
-use crate::cli::{KeepOptions, MessageOptions};
+use crate::cli::{MessageOptions, RunOptions};
 use crate::faired::Faired;
 use crate::outcome::{self, SIZES};
 use crate::page;
@@ -21,7 +21,7 @@ pub struct Plan<const D: usize, O> {
     pub command: &'static str,
     pub name: String,
     pub presentation: O,
-    pub keep: KeepOptions,
+    pub options: RunOptions,
     /// The extension of meshes, if it is not the usual one.
     pub format: Option<String>,
     pub messages: MessageOptions,
@@ -46,11 +46,11 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
     }
 
     pub fn checkpoints(&self) -> Checkpoints {
-        Checkpoints::EverySteps(self.keep.checkpoint_every)
+        Checkpoints::EverySteps(self.options.checkpoint_every)
     }
 
     /// From the last checkpoint to the end.
-    pub fn go_on(&self, mut store: Store, mut run: Run<D>) -> Result<(), Error> {
+    pub fn go_on(&self, mut store: Store, mut run: Run<D>) -> Result<()> {
         let interrupt = Interrupt::catch()?;
         let (nodes, stored) = (run.case().grid().len(), run.stored_cells());
         let what = if stored < nodes {
@@ -87,7 +87,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
                 json!({ "command": self.command, "finished": false, "steps": steps, "time": time })
             }
         };
-        if !self.keep.no_page {
+        if !self.options.no_page {
             page::write(&RunDirectory::open(&folder)?)?;
         }
         bar.finish();
@@ -99,7 +99,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         }
     }
 
-    fn finish(&self, mut store: Store, run: &Run<D>) -> Result<Value, Error> {
+    fn finish(&self, mut store: Store, run: &Run<D>) -> Result<Value> {
         let (case, u, presentation) = (run.case(), run.field(), &self.presentation);
         let (start, eps) = (&case.initial, case.scales.eps);
         let directory = store.directory();
@@ -113,11 +113,11 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         self.write(case, u, faired.as_ref(), presentation::FINAL, directory)?;
         if has_interface(u) {
             topology = presentation.topology(u, eps)?;
-            if let Some(path) = &self.keep.save {
+            if let Some(path) = &self.options.save {
                 self.save(u, eps, faired.as_ref(), path)?;
             }
         }
-        if self.keep.frames.is_some() {
+        if self.options.frames.is_some() {
             let (pictures, series) = frames(directory.path(), run.records())?;
             let animation = render::animation(&pictures, DELAY)?;
             directory.write_file(presentation::ANIMATION, |out| out.write_all(&animation))?;
@@ -184,7 +184,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         faired: Option<&Faired>,
         stem: &str,
         run: &mut RunDirectory,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         if has_interface(u) {
             let eps = case.scales.eps;
             let picture = self.presentation.picture(&case.initial, u, eps)?.to_png()?;
@@ -210,7 +210,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         faired: Option<&Faired>,
         stem: &str,
         run: &mut RunDirectory,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let usual = faired.map_or(O::USUAL, |faired| &faired.extension);
         let name = format!("{stem}.{}", self.format.as_deref().unwrap_or(usual));
         self.save(u, eps, faired, &run.path().join(&name))?;
@@ -218,13 +218,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
     }
 
     /// Writes the shape, or what became of the surface that it was, to a file.
-    fn save(
-        &self,
-        u: &Field<D>,
-        eps: f64,
-        faired: Option<&Faired>,
-        path: &Path,
-    ) -> Result<(), Error> {
+    fn save(&self, u: &Field<D>, eps: f64, faired: Option<&Faired>, path: &Path) -> Result<()> {
         match faired {
             Some(faired) => faired.write(path),
             None => self.presentation.save(u, eps, path),
@@ -243,7 +237,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         let shown = folder.display();
         text.push(if outcome["finished"] == false {
             format!("interrupted, go on with: willmore resume {shown}")
-        } else if self.keep.no_page {
+        } else if self.options.no_page {
             format!("results are in {shown}")
         } else {
             let page = folder.join(page::NAME);
@@ -280,7 +274,7 @@ impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
             let written = plan.write_shape(u, eps, None, presentation::START, run);
             written.map_err(engine::Error::observer)?;
         }
-        let frames = plan.keep.frames;
+        let frames = plan.options.frames;
         if frames.is_some_and(|every| step.is_multiple_of(every)) {
             let name = presentation::frame(step);
             let written = plan.write(case, u, None, &name, run);
@@ -300,7 +294,7 @@ impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
 }
 
 /// Removes the run in a folder, if there is one that nobody works on. A folder of something else stays.
-pub fn make_way(folder: &Path) -> Result<(), Error> {
+pub fn make_way(folder: &Path) -> Result<()> {
     match RunDirectory::recover(folder) {
         Ok(_) => Ok(std::fs::remove_dir_all(folder).map_err(files::Error::of("remove", folder))?),
         Err(locked @ runs::Error::Locked(_)) => Err(locked.into()),
@@ -334,7 +328,7 @@ fn time_accuracy(records: &[Record], eps: f64) -> Option<Value> {
 }
 
 /// The pictures of the frames in the folder of a run, and their fields with their times, for `ParaView`.
-fn frames(run: &Path, records: &[Record]) -> Result<(Vec<Picture>, String), Error> {
+fn frames(run: &Path, records: &[Record]) -> Result<(Vec<Picture>, String)> {
     let mut pictures = Vec::new();
     let mut series =
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n  <Collection>\n"

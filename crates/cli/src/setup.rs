@@ -7,7 +7,7 @@ use crate::cli::{CommonOptions, SchemeOptions};
 use crate::prelude::*;
 
 /// Refuses widths of the interface, in cells, that no grid resolves.
-pub fn check_eps_over_h(eps_over_h: f64) -> Result<(), Error> {
+pub fn check_eps_over_h(eps_over_h: f64) -> Result<()> {
     if !(0.5..=64.0).contains(&eps_over_h) {
         refuse!(
             "--eps-over-h {eps_over_h} is not possible: an interface is from 0.5 to 64 cells wide"
@@ -18,7 +18,7 @@ pub fn check_eps_over_h(eps_over_h: f64) -> Result<(), Error> {
 
 impl CommonOptions {
     /// Opens the device and notes its name.
-    pub fn open_device(&mut self) -> Result<ComputeDevice, Error> {
+    pub fn open_device(&mut self) -> Result<ComputeDevice> {
         let device = match &self.device {
             Some(name) => ComputeDevice::open(name.parse::<DeviceKind>()?)?,
             None => ComputeDevice::default_compiled()?,
@@ -35,7 +35,7 @@ impl SchemeOptions {
     }
 
     /// Takes the width of the interface from the network, unless it is given.
-    pub fn fill_in(&mut self) -> Result<(), Error> {
+    pub fn fill_in(&mut self) -> Result<()> {
         if let (None, Some(path)) = (self.eps_over_h, &self.network) {
             self.eps_over_h = Some(Network::load(path)?.ratios().eps_over_h);
         }
@@ -48,7 +48,7 @@ impl SchemeOptions {
         &self,
         method: Method,
         grid: &Grid<D>,
-    ) -> Result<(Scales, Operator), Error> {
+    ) -> Result<(Scales, Operator)> {
         let scales = Scales::of_grid(grid.spacing(), self.eps_over_h());
         let needed = scales.needs(D, grid.spacing());
         let networks = Networks::load(self.network.as_slice(), &[needed])?;

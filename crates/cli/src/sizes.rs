@@ -22,7 +22,7 @@ impl FlowOptions {
         initial: &Field<D>,
         eps: f64,
         of_input: Option<f64>,
-    ) -> Result<Held, Error> {
+    ) -> Result<Held> {
         let ramp = self.ramp.unwrap_or(RAMP);
         if let Some(target) = self.reduced_volume {
             return Ok(Held::at_reduced_volume(initial, eps, target, ramp)?);
@@ -61,7 +61,7 @@ pub fn round_edges<const D: usize>(
     start: &mut Field<D>,
     device: &ComputeDevice,
     messages: MessageOptions,
-) -> Result<(), Error> {
+) -> Result<()> {
     if options.area.is_none() && options.reduced_volume.is_none() {
         return Ok(());
     }

@@ -16,13 +16,10 @@ const ROOM: f64 = 0.06;
 pub struct Space {
     pub up: UpAxis,
     /// The parts and holes of the mesh that it was, if it was one.
-    #[serde(default)]
     pub input: Option<Topology>,
     /// The mesh whose vertices follow the flow, if it is one.
-    #[serde(default)]
     pub own: Option<OwnMesh>,
     /// The voxels that it was, if it was some.
-    #[serde(default)]
     pub voxels: Option<Voxels>,
 }
 
@@ -39,16 +36,16 @@ impl Presentation<3> for Space {
     const SAVED: &'static [&'static str] = &MESHES;
     const USUAL: &'static str = MESHES[0];
 
-    fn of_box(_: &Grid<3>) -> Result<Self, Error> {
+    fn of_box(_: &Grid<3>) -> Result<Self> {
         Ok(Self::default())
     }
 
-    fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<(), Error> {
+    fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<()> {
         self.up = *up.get_or_insert(self.up);
         Ok(())
     }
 
-    fn picture(&self, start: &Field<3>, u: &Field<3>, eps: f64) -> Result<Picture, Error> {
+    fn picture(&self, start: &Field<3>, u: &Field<3>, eps: f64) -> Result<Picture> {
         let mut scene = Scene::new(u, eps)?.view(view(self.up));
         // Room to grow, and more only for what grows beyond it, so that the pictures of a film do not jump.
         let start = bounding_box(start).map(|bounds| {
@@ -65,16 +62,16 @@ impl Presentation<3> for Space {
         Ok(scene.render([PIXELS; 2])?)
     }
 
-    fn topology(&self, u: &Field<3>, eps: f64) -> Result<Topology, Error> {
+    fn topology(&self, u: &Field<3>, eps: f64) -> Result<Topology> {
         let (closed, _) = ClosedMesh::new(surfaces::phase_field_surface(u, eps)?)?;
         Ok(Topology::of(&closed))
     }
 
-    fn save(&self, u: &Field<3>, eps: f64, path: &Path) -> Result<(), Error> {
+    fn save(&self, u: &Field<3>, eps: f64, path: &Path) -> Result<()> {
         Ok(surfaces::write(path, &surface(u, eps)?)?)
     }
 
-    fn faired(&self, start: &Field<3>, u: &Field<3>, eps: f64) -> Result<Option<Faired>, Error> {
+    fn faired(&self, start: &Field<3>, u: &Field<3>, eps: f64) -> Result<Option<Faired>> {
         if let Some(own) = &self.own {
             return own.faired(start, u, eps, self.up).map(Some);
         }
@@ -92,7 +89,7 @@ impl Presentation<3> for Space {
         self.input
     }
 
-    fn known(&self, start: &Field<3>, eps: f64) -> Result<Known<3>, Error> {
+    fn known(&self, start: &Field<3>, eps: f64) -> Result<Known<3>> {
         let mut known = Known::default();
         if let Some(own) = &self.own {
             known.volume = own.keeps_volume.then(|| own.rough().volume());
@@ -107,11 +104,11 @@ impl Presentation<3> for Space {
         Ok(known)
     }
 
-    fn inputs(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
+    fn inputs(&self) -> Result<Vec<(String, Vec<u8>)>> {
         Ok(self.own.as_ref().map_or(Vec::new(), OwnMesh::inputs))
     }
 
-    fn restore(&mut self, stored: &StoredRun) -> Result<(), Error> {
+    fn restore(&mut self, stored: &StoredRun) -> Result<()> {
         let own = self.own.as_mut();
         own.map_or(Ok(()), |own| own.load_from(stored))
     }

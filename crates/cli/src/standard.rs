@@ -17,7 +17,7 @@ pub struct Standard {
 
 impl Standard {
     /// Reads standard input if it is the input, and puts files in place of every `-` in the options.
-    pub fn open(command: &mut Command, messages: &mut MessageOptions) -> Result<Self, Error> {
+    pub fn open(command: &mut Command, messages: &mut MessageOptions) -> Result<Self> {
         let mut standard = Self::default();
         let Some((input, save)) = paths(command) else {
             return Ok(standard);
@@ -51,7 +51,7 @@ impl Standard {
         Ok(standard)
     }
 
-    pub fn write(&self) -> Result<(), Error> {
+    pub fn write(&self) -> Result<()> {
         let Some(path) = self.output.as_ref().filter(|path| path.exists()) else {
             return Ok(());
         };
@@ -75,7 +75,7 @@ fn paths(command: &mut Command) -> Option<(&mut InputOptions, Option<&mut PathBu
         Command::Sample(sample) => Some((&mut sample.input, Some(&mut sample.save))),
         Command::Run(command) => {
             let options = command.options();
-            Some((&mut options.input, options.keep.save.as_mut()))
+            Some((&mut options.input, options.save.as_mut()))
         }
         _ => None,
     }

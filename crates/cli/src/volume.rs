@@ -9,7 +9,7 @@ use crate::values::Label;
 
 const LISTED: usize = 20;
 
-pub fn body(path: &Path, options: &InputOptions) -> Result<Body, Error> {
+pub fn body(path: &Path, options: &InputOptions) -> Result<Body> {
     let volume = volumes::read(path)?;
     let inside = match (options.label, options.threshold) {
         (Some(Label::One(label)), _) => Inside::Label(label as f64),
@@ -25,7 +25,7 @@ pub fn body(path: &Path, options: &InputOptions) -> Result<Body, Error> {
 }
 
 /// The larger one of two values.
-fn usual(volume: &Volume, path: &Path) -> Result<Inside, Error> {
+fn usual(volume: &Volume, path: &Path) -> Result<Inside> {
     let [low, high] = volume.range();
     let found = match volume.labels().as_deref() {
         Some([_, (label, _)]) => return Ok(Inside::Label(*label)),
@@ -45,7 +45,7 @@ fn usual(volume: &Volume, path: &Path) -> Result<Inside, Error> {
 }
 
 /// The labels of a volume but 0, of which there must be some, if all are to become surfaces.
-pub fn all_labels(options: &InputOptions) -> Result<Option<Vec<i64>>, Error> {
+pub fn all_labels(options: &InputOptions) -> Result<Option<Vec<i64>>> {
     let (Some(input), Some(Label::All)) = (&options.input, options.label) else {
         return Ok(None);
     };

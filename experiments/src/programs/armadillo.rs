@@ -1,5 +1,3 @@
-//! A scanned figure under Willmore flow with time steps that double.
-
 use crate::mesh_flow::{MeshFlow, MeshFlowOptions};
 use crate::meshes::ARMADILLO;
 use crate::prelude::*;

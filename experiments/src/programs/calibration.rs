@@ -1,5 +1,3 @@
-//! The factors by which the hybrid scheme differs from Willmore flow, predicted and measured on discs.
-
 use crate::networks::scales;
 use crate::prelude::*;
 use crate::surfaces;

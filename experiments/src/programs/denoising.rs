@@ -1,5 +1,3 @@
-//! Noise taken off meshes by Willmore flow, by Taubin's smoothing and by Laplacian smoothing.
-
 use chacha20::ChaCha8Rng;
 
 use crate::meshes::{folder, sampled};

@@ -1,9 +1,8 @@
-//! A cube and a thick disk under Willmore flow.
-
 use crate::prelude::*;
-use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, SurfaceFlows, VIEW};
+use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, VIEW};
 use crate::truth::{DISK, ELLIPSOID, Reached, Sample, THICK_DISK, Truth};
 
+const TITLE: &str = "Willmore flow of a cube and of a thick disk";
 /// Cells per unit length of a quick run and of the paper.
 const CELLS: [usize; 2] = [24, 64];
 const TAU: f64 = 1.0 / 262_144.0;
@@ -69,7 +68,7 @@ pub fn program(options: &Options) -> Result<()> {
         };
         phase_field(grid, shape, eps).map(|initial| (surface, initial))
     };
-    let surfaces = vec![
+    let surfaces = [
         start("cube", "cube", &cube, CUBE_ENERGIES)?,
         start("disk", "thick disk", &disk, DISK_ENERGIES)?,
     ];
@@ -78,14 +77,8 @@ pub fn program(options: &Options) -> Result<()> {
         "disk_half_height": half_height,
     }))?;
     let session = Session::open("disk_and_cube", run, parameters)?;
-    let flows = SurfaceFlows {
-        program: "disk_and_cube",
-        title: "Willmore flow of a cube and of a thick disk".to_owned(),
-        surfaces,
-        variants,
-        time: (StepRule::Constant(TAU).into(), steps),
-    };
-    flows.run(session, &setting, |session, all| {
+    let time = (StepRule::Constant(TAU).into(), steps);
+    let comparisons = |session: &mut Session, all: &mut [Flowed]| {
         compare_with_finite_elements(session, all)?;
         let mut rows = Vec::new();
         for sample in [&DISK, &ELLIPSOID] {
@@ -93,7 +86,8 @@ pub fn program(options: &Options) -> Result<()> {
         }
         session.sheet(sheet(&rows, n), "exact")?;
         Ok(String::new())
-    })
+    };
+    setting.run(session, TITLE, &surfaces, &variants, time, comparisons)
 }
 
 /// A surface of revolution in controlled steps, or extrapolated, and the sizes of the exact flow.

@@ -1,5 +1,3 @@
-//! Closed elastic curves: length and area held.
-
 use crate::equilibria::{self, Equilibrium};
 use crate::prelude::*;
 use reference::equilibria::elastica;

@@ -1,6 +1,3 @@
-//! The order of convergence of Willmore flow of an ellipse in h and in tau, against its own finest run.
-
-use crate::orders::{chart, refinements};
 use crate::prelude::*;
 
 const TITLE: &str = "Willmore flow of an ellipse, each h with its network";
@@ -55,4 +52,60 @@ pub fn program(Options { run: options }: &Options) -> Result<()> {
         .measure("order", ("order", Fixed(2)), |row| row.order);
     session.sheet(sheet, "orders")?;
     session.finish(&format!("{TITLE}: orders of convergence"))
+}
+
+/// A run in a sequence in which a size, `h` or `tau`, is halved from one to the next.
+#[derive(Clone, Copy)]
+struct Refinement {
+    refined: &'static str,
+    /// Its number in the sequence, from 1, the coarsest.
+    pair: usize,
+    size: f64,
+    /// `L2` distance of its end to that of the finest run, which is small only as long as the finest run is much finer,
+    to_finest: f64,
+    /// and to that of the next one, which is of the order of the error whatever the finest run is.
+    to_next: f64,
+    /// The order `p` as the distances to the next fall like `size^p` up to the next run; none for the last.
+    order: Option<f64>,
+}
+
+/// What the runs say, coarsest first; the finest one has no row.
+fn refinements(refined: &'static str, runs: &[(f64, Trajectory<2>)]) -> Result<Vec<Refinement>> {
+    let distance = |coarse: &Trajectory<2>, fine: &Trajectory<2>| {
+        coarse.distance(coarse.steps(), fine, fine.steps())
+    };
+    let pairs = runs.windows(2).map(|pair| distance(&pair[0].1, &pair[1].1));
+    let to_next = pairs.collect::<Result<Vec<f64>, _>>()?;
+    let finest = &runs[to_next.len()].1;
+    let row = |k: usize| {
+        Ok(Refinement {
+            refined,
+            pair: k + 1,
+            size: runs[k].0,
+            to_finest: distance(&runs[k].1, finest)?,
+            to_next: to_next[k],
+            order: to_next.get(k + 1).map(|next| (to_next[k] / next).log2()),
+        })
+    };
+    (0..to_next.len()).map(row).collect()
+}
+
+/// The refinements of a size as a chart, with slopes 1 and 2 for comparison.
+fn chart(rows: &[Refinement]) -> LineChart {
+    let (first, last) = (rows[0], rows[rows.len() - 1]);
+    let guide = |slope: i32, style| {
+        let power = |size: f64| first.to_next * (size / first.size).powi(slope);
+        let line = [first, last].map(|row| [row.size, power(row.size)]);
+        let guide = Series::new(format!("slope {slope}"), line).with_colour(Colour::Grey);
+        guide.with_style(style)
+    };
+    let next = Series::of("to the next finer run", rows, |row| [row.size, row.to_next]);
+    let finest = Series::of("to the finest run", rows, |row| [row.size, row.to_finest]);
+    let distance = Axis::log("L² distance at the end");
+    LineChart::new("", Axis::log(first.refined), distance).with_curves([
+        next.with_marker(Marker::Circle),
+        finest.with_colour(1).with_marker(Marker::Square),
+        guide(1, LineStyle::Dashed),
+        guide(2, LineStyle::Dotted),
+    ])
 }

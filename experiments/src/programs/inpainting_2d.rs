@@ -1,9 +1,6 @@
-//! Inpainting in 2D: Willmore flow of the values in a region, the rest of the image held.
-
-use crate::inpainting::{self, Inpainted, InpaintingOptions, Shape};
+use crate::inpainting::{self, GREEN, Inpainted, InpaintingOptions, Shape};
 use crate::prelude::*;
 use model::{NeededNetwork, Ratios};
-use report::Rgb;
 use solver::Precision;
 
 /// Cells per unit length of a quick run and of the paper.
@@ -18,7 +15,6 @@ const INSIDE: &[u32] = &[12, 9, 6, 3];
 const RADIUS: f64 = 0.35;
 /// The cut-out corner: everything right of and above this.
 const CORNER: f64 = 0.12;
-const GREEN: Rgb = Rgb(0, 140, 60);
 
 /// Inpainting: a disk whose corner was cut out grows round again (tau = 2^-7), the middle of a cross is smoothed (tau = 2^-14). Only
 /// the values in the region D, outlined in green, move; all others stay bit for bit.
@@ -51,7 +47,6 @@ fn shapes(quick: bool) -> Result<[Shape<2>; 2]> {
         rule: StepRule::Constant(1.0 / 128.0),
         steps: steps(2000),
         shown: vec![0, 1, 100, 500, 1000, 1500, 2000],
-        halvings: INSIDE,
     };
     let [half_length, half_width] = [0.4, 0.1];
     let cross = Shape {
@@ -63,7 +58,6 @@ fn shapes(quick: bool) -> Result<[Shape<2>; 2]> {
         rule: StepRule::Constant(1.0 / 16384.0),
         steps: steps(50),
         shown: vec![0, 1, 5, 10, 20, 35, 50],
-        halvings: INSIDE,
     };
     Ok([disk, cross])
 }
@@ -90,13 +84,18 @@ pub fn program(options: &Options) -> Result<()> {
     for shape in &shapes {
         let case = shape.case(grid, scales, &operator)?;
         let folder = format!("{}-{}", shape.key, operator.key());
-        trajectories.push(session.trajectory(shape.title, case, &folder, &shape.samples())?);
+        let samples = Samples {
+            every: shape.steps,
+            also: shape.shown.clone(),
+            halvings: INSIDE.to_vec(),
+        };
+        trajectories.push(session.trajectory(shape.title, case, &folder, &samples)?);
     }
     let inpainted = shapes.iter().zip(&trajectories);
     let inpainted = inpainted.map(|(shape, trajectory)| Inpainted::measure(shape, trajectory));
     let inpainted = inpainted.collect::<Result<Vec<_>>>()?;
     for one in &inpainted {
-        one.write_frames(&session, frames(one, n)?)?;
+        session.figure(frames(one, n)?, &format!("{}_frames", one.shape.key))?;
     }
     inpainting::finish(session, "Inpainting", &inpainted)
 }
@@ -131,7 +130,8 @@ fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure> {
             .with_curve(frame.clone().with_width(1.6))
             .with_window([-0.5, 0.5], [-0.5, 0.5])
     });
-    Ok(Figure::new("", 4).with_panels(panels).with_note(format!(
+    let title = format!("Inpainting: {}", one.shape.title);
+    Ok(Figure::new(title, 4).with_panels(panels).with_note(format!(
         "n = {n}, τ = 2^{}; only the values inside the green frame move. The first step is made in {} parts.{end}",
         tau.log2(),
         trajectory.substeps(1).len(),

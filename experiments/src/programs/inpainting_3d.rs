@@ -1,9 +1,7 @@
-//! Inpainting of surfaces: Willmore flow of the values in a region, the rest of the surface held.
-
-use crate::inpainting::{self, Inpainted, InpaintingOptions, Shape};
+use crate::inpainting::{self, GREEN, Inpainted, InpaintingOptions, Shape};
 use crate::prelude::*;
 use crate::surfaces::{Flowed, Setting, Snapshot, Surface, VIEW, View, write_snapshots};
-use render::{Rgb, Tube};
+use render::Tube;
 
 const TITLE: &str = "Inpainting of surfaces";
 /// Cells per unit length of a quick run and of the paper.
@@ -19,7 +17,6 @@ const SIDE: u32 = 480;
 const COLUMNS: usize = 3;
 /// After so many doublings a step has size 8: nothing moves for long.
 const MOST_EXTRA: usize = 24;
-const GREEN: Rgb = Rgb(0, 140, 60);
 
 /// Inpainting of surfaces: a ball grows its missing corner again, and six tubes are blended in the middle. Only the values in the
 /// region D move (green in the pictures); all others stay bit for bit.
@@ -58,7 +55,6 @@ fn shapes(extra_steps: usize) -> Result<[(Shape<3>, f64); 2]> {
         rule: growing(5),
         steps: 5 + extra_steps,
         shown: vec![0, 1, 3, 5, 11],
-        halvings: &[],
     };
     let tubes_shape = Shape {
         key: "tubes",
@@ -69,7 +65,6 @@ fn shapes(extra_steps: usize) -> Result<[(Shape<3>, f64); 2]> {
         rule: growing(8),
         steps: 8 + extra_steps,
         shown: vec![0, 1, 4, 8, 14],
-        halvings: &[],
     };
     Ok([(ball_shape, 30.0), (tubes_shape, 25.0)])
 }
@@ -114,8 +109,10 @@ pub fn program(options: &Options) -> Result<()> {
         decorate(&mut one.snapshots, &measured);
         let title = format!("{}: pictures", shape.title);
         let pictures = session.phase(title, |stage| one.pictures(stage, SIDE))?;
-        let figure = Figure::new("", COLUMNS).with_panels(pictures);
-        measured.write_frames(&session, figure.with_note(note(&measured, n)))?;
+        let title = format!("Inpainting: {}", shape.title);
+        let figure = Figure::new(title, COLUMNS).with_panels(pictures);
+        let figure = figure.with_note(note(&measured, n));
+        session.figure(figure, &format!("{}_frames", shape.key))?;
         inpainted.push(measured);
     }
     inpainting::finish(session, TITLE, &inpainted)

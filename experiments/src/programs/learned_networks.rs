@@ -1,5 +1,3 @@
-//! Pictures and quality of the learned 2D operators.
-
 use std::f64::consts::{SQRT_2, TAU};
 
 use crate::prelude::*;
@@ -34,8 +32,7 @@ pub fn program(options: &Options) -> Result<()> {
     let mut session = Session::open("learned_networks", run, parameters)?;
     let mut shown = Vec::new();
     for (spec, network) in networks {
-        let title = format!("quality of {}", spec.name);
-        let quality = quality::measure(&mut session, title, &spec, &network)?;
+        let quality = quality::measure(&mut session, &spec, &network)?;
         shown.push(Shown {
             entries: entries(spec, &network)?,
             spec,
@@ -56,10 +53,8 @@ pub fn program(options: &Options) -> Result<()> {
     session.output.write_csv("kernels.csv", kernels)?;
     let activations = shown.iter().flat_map(Shown::activation);
     session.output.write_csv("activations.csv", activations)?;
-    let directions = shown
-        .iter()
-        .flat_map(|one| ["axis", "diagonal"].map(|name| (one, name)));
-    let transfers = directions.flat_map(|(one, direction)| one.transfer(direction));
+    let both = |one| ["axis", "diagonal"].map(|direction| Shown::transfer(one, direction));
+    let transfers = shown.iter().flat_map(both).flatten();
     session.output.write_csv("transfer.csv", transfers)?;
     let origins: BTreeMap<_, _> = (shown.iter())
         .map(|one| (one.spec.name, (&one.quality, &one.network.provenance)))

@@ -1,5 +1,3 @@
-//! The signed distance of any mesh on any grid.
-
 use std::ffi::OsStr;
 
 use crate::meshes;

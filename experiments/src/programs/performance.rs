@@ -1,5 +1,3 @@
-//! What a time step costs, and where the time goes.
-
 use crate::prelude::*;
 use crate::storages::{self, StorageOptions};
 use crate::{products, surfaces};

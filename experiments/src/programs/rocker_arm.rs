@@ -1,5 +1,3 @@
-//! A machine part of genus one under Willmore flow, and the Clifford torus next to it.
-
 use crate::mesh_flow::{MeshFlow, MeshFlowOptions};
 use crate::meshes::KnownMesh;
 use crate::prelude::*;

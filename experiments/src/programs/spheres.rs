@@ -1,5 +1,3 @@
-//! Spheres by the network for surfaces: mean curvature flow, Willmore energies, and standing still.
-
 use crate::prelude::*;
 use crate::surfaces::Setting;
 use crate::training::NetworkSpec;
@@ -83,8 +81,7 @@ pub fn program(options: &Options) -> Result<()> {
     if !run.quick {
         let (spec, papers) = (NetworkSpec::SURFACES, setting.operator(PAPERS)?);
         let network = &papers.network().expect("it is learned").network;
-        let title = "quality of the network".to_owned();
-        let measured = [quality::measure(&mut session, title, &spec, network)?];
+        let measured = [quality::measure(&mut session, &spec, network)?];
         let names = Sheet::of(&measured).text("network", |_| spec.name);
         session.sheet(quality::columns(names, |measured| measured), "quality")?;
     }

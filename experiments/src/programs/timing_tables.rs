@@ -1,5 +1,3 @@
-//! Time of the methods for the same flow on the same machine.
-
 use crate::meshes::{ARMADILLO, MeshOptions};
 use crate::prelude::*;
 use crate::surfaces;

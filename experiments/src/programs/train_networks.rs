@@ -1,8 +1,6 @@
-//! Trains the networks that ship with the library.
-
 use crate::prelude::*;
 use crate::session::remove_folder;
-use crate::training::{NetworkSpec, train, training_device};
+use crate::training::{NetworkSpec, in_double_precision, train};
 use model::Network;
 use model::training::adam::AdamParams;
 use model::training::least_squares::LeastSquaresParams;
@@ -55,10 +53,9 @@ impl Recipe {
 }
 
 pub fn program(options: &Options) -> Result<()> {
-    let run = &options.run;
     let chosen = options.chosen()?;
     require(options.adam_epochs > 0, "--adam-epochs must be at least 1")?;
-    let device = training_device(&run.open_device()?)?;
+    let run = &in_double_precision(&options.run)?;
     let (lm, accurate) = (LmParams::new(run.quick), LeastSquaresParams::new(run.quick));
     let adam = AdamParams {
         epochs: if run.quick { 2 } else { options.adam_epochs },
@@ -68,7 +65,7 @@ pub fn program(options: &Options) -> Result<()> {
         "recipe": options.recipe, "networks": chosen,
         "levenberg_marquardt": lm, "adam": adam, "accurate": accurate,
     });
-    let session = Session::on(device, "train_networks", run, parameters)?;
+    let session = Session::open("train_networks", run, parameters)?;
     let mut trainings = Trainings {
         checkpoints: session.output.subfolder("checkpoints")?,
         folder: session.output.subfolder("networks")?,

@@ -1,5 +1,3 @@
-//! Lipid vesicles: area and volume held.
-
 use crate::equilibria::{self, AtRest, Equilibrium};
 use crate::prelude::*;
 use crate::surfaces::{Setting, VIEW, raster};

@@ -1,5 +1,3 @@
-//! Errors of the time steps against the exact flow, and what they cost.
-
 use crate::circles::{self, Ensemble};
 use crate::prelude::*;
 use crate::truth::{
@@ -130,7 +128,7 @@ pub fn program(Options { run: options }: &Options) -> Result<()> {
         ("seconds", "seconds", |reached| reached.seconds),
     ];
     for (stem, axis, work) in work {
-        session.figure(figure(&rows, &marks, &Axis::log(axis), work), stem)?;
+        session.figure(figure(&rows, &marks, axis, work), stem)?;
     }
     session.sheet(sheet(&rows), "errors")?;
     session.finish(TITLE)
@@ -298,12 +296,7 @@ fn sheet<'a>(rows: &'a [Compared<'a>]) -> Sheet<'a, Compared<'a>> {
 }
 
 /// Largest distances from the exact flow against work, for the second and the last mark.
-fn figure(
-    rows: &[Compared<'_>],
-    marks: &[usize],
-    axis: &Axis,
-    work: fn(&Reached) -> f64,
-) -> Figure {
+fn figure(rows: &[Compared<'_>], marks: &[usize], axis: &str, work: fn(&Reached) -> f64) -> Figure {
     let mut shown: Vec<usize> = vec![marks[1.min(marks.len() - 1)], marks[marks.len() - 1]];
     shown.dedup();
     let [coarse, fine] = CELLS;
@@ -331,7 +324,7 @@ fn figure(
                 }
             }
             let title = format!("{title}, t = {mark}·2⁻¹⁴");
-            let chart = LineChart::new(title, axis.clone(), Axis::log("largest distance"));
+            let chart = LineChart::new(title, Axis::log(axis), Axis::log("largest distance"));
             figure = figure.with_panel(chart.with_curves(curves));
         }
     }

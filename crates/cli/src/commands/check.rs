@@ -1,5 +1,3 @@
-//! `willmore check`.
-
 use std::fmt::Write;
 use std::sync::Arc;
 
@@ -22,7 +20,6 @@ const SHORT: f64 = 0.3;
 /// Largest asymmetry of the Hessian and largest difference between devices, in units of the rounding error per node.
 const ROUNDING: f64 = 1e4;
 
-/// One check: its name, what was found, and whether that is right.
 #[derive(Serialize)]
 struct Finding {
     name: &'static str,
@@ -33,7 +30,7 @@ struct Finding {
 }
 
 /// Checks the derivatives of the energy at the input.
-pub fn run(mut options: CheckOptions, messages: MessageOptions) -> Result<(), Error> {
+pub fn run(mut options: CheckOptions, messages: MessageOptions) -> Result<()> {
     options.scheme.fill_in()?;
     let device = options.common.open_device()?;
     let eps_over_h = options.scheme.eps_over_h();
@@ -62,7 +59,7 @@ fn findings<const D: usize>(
     field: &Field<D>,
     options: &CheckOptions,
     device: &ComputeDevice,
-) -> Result<Vec<Finding>, Error> {
+) -> Result<Vec<Finding>> {
     let (scales, operator) = options.scheme.operator(Method::Hybrid, field.grid())?;
     let network = operator.network();
     let network = &network.expect("a learned operator has one").network;
@@ -139,7 +136,7 @@ fn derivatives<const D: usize>(
     params: &FlowParams,
     seed: u64,
     device: &ComputeDevice,
-) -> Result<Derivatives, Error> {
+) -> Result<Derivatives> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut direction = || {
         // Along the interface, where the flow moves values too.

@@ -1,9 +1,7 @@
-//! `willmore fair`.
-
 use std::f64::consts::PI;
 
 use crate::cli::{FairOptions, MessageOptions};
-use crate::input::{Loaded, Reader, Source, closed};
+use crate::input::{Loaded, Source, closed};
 use crate::keep::Keep;
 use crate::own::OwnMesh;
 use crate::paths::{absolute, read};
@@ -25,7 +23,7 @@ impl FairOptions {
         self.noise.is_some() || ratio.is_some() || !self.ends
     }
 
-    pub fn check(&mut self) -> Result<(), Error> {
+    pub fn check(&mut self) -> Result<()> {
         let flow = &self.flow;
         self.ends = self.energy_ratio.is_some()
             || flow.run.time.is_some()
@@ -43,9 +41,8 @@ impl FairOptions {
         Ok(())
     }
 
-    pub fn load(&mut self, messages: MessageOptions) -> Result<Loaded, Error> {
-        let eps_over_h = self.flow.run.scheme.eps_over_h();
-        let mut reader = Reader::of(&mut self.flow.run.input, eps_over_h, messages)?;
+    pub fn load(&mut self, messages: MessageOptions) -> Result<Loaded> {
+        let mut reader = self.flow.run.reader(messages)?;
         let loaded = match reader.source.clone() {
             Source::Mesh(path) => return self.load_mesh(&path, messages),
             Source::Volume(_) if self.noise.is_some() || self.keep.is_some() => {
@@ -85,7 +82,7 @@ impl FairOptions {
         Ok(loaded)
     }
 
-    fn load_mesh(&mut self, path: &Path, messages: MessageOptions) -> Result<Loaded, Error> {
+    fn load_mesh(&mut self, path: &Path, messages: MessageOptions) -> Result<Loaded> {
         let repairs = self.flow.run.input.repair;
         if repairs && !self.remesh {
             refuse!(
@@ -115,7 +112,7 @@ impl FairOptions {
             ));
             self.noise = Some(noise);
         }
-        let eps_over_h = self.flow.run.scheme.eps_over_h();
-        Reader::of(&mut self.flow.run.input, eps_over_h, messages)?.own(own, path, self.allow_loss)
+        let mut reader = self.flow.run.reader(messages)?;
+        reader.own(own, path, self.allow_loss)
     }
 }

@@ -3,7 +3,7 @@
 use engine::{ErrorControl, Flow, Held, Helfrich, Store, TimeSteps};
 use solver::NewtonParams;
 
-use crate::cli::{FlowOptions, McfOptions, MessageOptions, RunCommand, RunOptions};
+use crate::cli::{McfOptions, MessageOptions, RunCommand, RunOptions};
 use crate::config;
 use crate::input::{Loaded, Reader, Start, usual_box};
 use crate::paths::absolute;
@@ -25,7 +25,7 @@ const INPAINT_HALVINGS: u32 = 12;
 
 impl RunCommand {
     /// Refuses options before anything is read.
-    fn check(&mut self) -> Result<(), Error> {
+    fn check(&mut self) -> Result<()> {
         match self {
             Self::Flow(_) => (),
             Self::Fair(fair) => fair.check()?,
@@ -94,14 +94,11 @@ impl RunCommand {
     }
 
     /// The input, as it is before it flows.
-    fn load(&mut self, messages: MessageOptions) -> Result<Loaded, Error> {
+    fn load(&mut self, messages: MessageOptions) -> Result<Loaded> {
         match self {
             Self::Fair(fair) => fair.load(messages),
             Self::Inpaint(inpaint) => inpaint.load(messages),
-            Self::Flow(_) | Self::Mcf(_) => {
-                let RunOptions { input, scheme, .. } = self.options();
-                Reader::of(input, scheme.eps_over_h(), messages)?.load()
-            }
+            Self::Flow(_) | Self::Mcf(_) => self.options().reader(messages)?.load(),
         }
     }
 
@@ -123,23 +120,17 @@ impl RunCommand {
     }
 }
 
-impl FlowOptions {
-    /// Spontaneous curvature, tension and pressure, in the units of the input.
-    fn energy(&self) -> Helfrich {
-        Helfrich {
-            spontaneous_curvature: self.spontaneous_curvature.unwrap_or(0.0),
-            tension: self.tension.unwrap_or(0.0),
-            pressure: self.pressure.unwrap_or(0.0),
-        }
-    }
-}
-
 impl RunOptions {
+    /// Reads the input.
+    pub fn reader(&mut self, messages: MessageOptions) -> Result<Reader<'_>> {
+        Reader::of(&mut self.input, self.scheme.eps_over_h(), messages)
+    }
+
     /// Refuses what cannot be done before anything is computed.
-    fn check(&mut self) -> Result<(), Error> {
+    fn check(&mut self) -> Result<()> {
         self.scheme.fill_in()?;
-        let force = self.keep.force;
-        if let Some(save) = &mut self.keep.save {
+        let force = self.force;
+        if let Some(save) = &mut self.save {
             *save = absolute(&*save)?;
             force.check("--save", save)?;
             if !save.parent().is_some_and(Path::is_dir) {
@@ -155,9 +146,19 @@ pub fn run(
     mut command: RunCommand,
     messages: MessageOptions,
     stored: Option<(StoredRun, Option<usize>)>,
-) -> Result<(), Error> {
+) -> Result<()> {
+    // One run for each label of a volume, until one is interrupted.
     if let Some(labels) = volume::all_labels(&command.options().input)? {
-        return each_label(&command, &labels, messages);
+        for label in labels {
+            let mut one = command.clone();
+            let options = one.options();
+            options.input.label = Some(Label::One(label));
+            for name in options.output.iter_mut().chain(&mut options.save) {
+                *name = volume::named(name, label);
+            }
+            run(one, messages, None)?;
+        }
+        return Ok(());
     }
     command.check()?;
     let steps = command.usual_steps();
@@ -188,20 +189,6 @@ pub fn run(
     }
 }
 
-/// One run for each label of a volume, until one is interrupted.
-fn each_label(command: &RunCommand, labels: &[i64], messages: MessageOptions) -> Result<(), Error> {
-    for &label in labels {
-        let mut one = command.clone();
-        let RunOptions { input, keep, .. } = one.options();
-        input.label = Some(Label::One(label));
-        for name in keep.output.iter_mut().chain(&mut keep.save) {
-            *name = volume::named(name, label);
-        }
-        run(one, messages, None)?;
-    }
-    Ok(())
-}
-
 struct Job {
     command: RunCommand,
     device: ComputeDevice,
@@ -209,13 +196,10 @@ struct Job {
 }
 
 impl Job {
-    fn start<const D: usize, O: Presentation<D>>(
-        mut self,
-        mut start: Start<D, O>,
-    ) -> Result<(), Error> {
-        let keep = &mut self.command.options().keep;
-        start.presentation.turn(&mut keep.up)?;
-        keep.save.as_deref().map_or(Ok(()), O::check_saved)?;
+    fn start<const D: usize, O: Presentation<D>>(mut self, mut start: Start<D, O>) -> Result<()> {
+        let options = self.command.options();
+        start.presentation.turn(&mut options.up)?;
+        options.save.as_deref().map_or(Ok(()), O::check_saved)?;
         if let RunCommand::Flow(options) = &mut self.command {
             sizes::round_edges(options, &mut start.field, &self.device, self.messages)?;
         }
@@ -224,11 +208,11 @@ impl Job {
         let plan = self.plan(start.name, start.presentation);
         let notes = plan.notes(&case, &self.device);
         let run = Run::new(case, &self.device)?;
-        let folder = match &plan.keep.output {
+        let folder = match &plan.options.output {
             Some(folder) => folder.clone(),
             None => free_folder(&format!("{}-{}", plan.name, plan.command)),
         };
-        if plan.keep.force.force {
+        if plan.options.force.force {
             make_way(&folder)?;
         }
         let inputs = plan.presentation.inputs()?;
@@ -243,7 +227,7 @@ impl Job {
         mut self,
         stored: StoredRun,
         more: Option<usize>,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let mut notes = engine::notes(&stored).clone();
         let name = notes["about"]["name"].as_str().unwrap_or("run").to_owned();
         let mut presentation = O::deserialize(&notes["outlet"]).map_err(|reason| {
@@ -274,7 +258,7 @@ impl Job {
         initial: Field<D>,
         region: Option<Vec<bool>>,
         presentation: &impl Presentation<D>,
-    ) -> Result<Case<D>, Error> {
+    ) -> Result<Case<D>> {
         let (flow, method) = match &self.command {
             RunCommand::Mcf(mcf) => (Flow::MeanCurvature, mcf.method),
             _ => (Flow::Willmore, Method::Hybrid),
@@ -310,10 +294,13 @@ impl Job {
         };
         let eps = scales.eps;
         let known = presentation.known(&initial, eps)?;
-        let (energy, held) = match options {
-            Some(options) => (options.energy(), options.held(&initial, eps, known.volume)?),
-            None => (Helfrich::default(), Held::default()),
-        };
+        let (mut energy, mut held) = (Helfrich::default(), Held::default());
+        if let Some(options) = options {
+            energy.spontaneous_curvature = options.spontaneous_curvature.unwrap_or(0.0);
+            energy.tension = options.tension.unwrap_or(0.0);
+            energy.pressure = options.pressure.unwrap_or(0.0);
+            held = options.held(&initial, eps, known.volume)?;
+        }
         let mut measures = vec![Measure::zero_set(eps, &held)];
         measures.extend(known.measures);
         Ok(Case {
@@ -341,7 +328,7 @@ impl Job {
             name,
             presentation,
             format,
-            keep: self.command.options().keep.clone(),
+            options: self.command.options().clone(),
             messages: self.messages,
         }
     }

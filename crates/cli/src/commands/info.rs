@@ -1,5 +1,3 @@
-//! `willmore info`.
-
 use std::fmt::Write;
 
 use model::Shipped;
@@ -7,7 +5,7 @@ use model::Shipped;
 use crate::cli::MessageOptions;
 use crate::prelude::*;
 
-pub fn run(messages: MessageOptions) -> Result<(), Error> {
+pub fn run(messages: MessageOptions) -> Result<()> {
     let version = env!("CARGO_PKG_VERSION");
     let mut devices = Vec::new();
     let mut text = format!(

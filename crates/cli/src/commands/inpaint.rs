@@ -1,13 +1,11 @@
-//! `willmore inpaint`.
-
 use crate::cli::{InpaintOptions, MessageOptions};
-use crate::input::{Loaded, Reader, Start};
+use crate::input::{Loaded, Start};
 use crate::paths::absolute;
 use crate::prelude::*;
 use crate::values::Ansatz;
 
 impl InpaintOptions {
-    pub fn check(&mut self) -> Result<(), Error> {
+    pub fn check(&mut self) -> Result<()> {
         let mask = self.mask()?;
         if !Region::is_meant(mask) {
             let absolute = absolute(mask)?;
@@ -16,9 +14,8 @@ impl InpaintOptions {
         Ok(())
     }
 
-    pub fn load(&mut self, messages: MessageOptions) -> Result<Loaded, Error> {
-        let eps_over_h = self.flow.run.scheme.eps_over_h();
-        let loaded = Reader::of(&mut self.flow.run.input, eps_over_h, messages)?.load()?;
+    pub fn load(&mut self, messages: MessageOptions) -> Result<Loaded> {
+        let loaded = self.flow.run.reader(messages)?.load()?;
         let mask = self.mask()?;
         Ok(match loaded {
             Loaded::Plane(mut start) => {
@@ -34,7 +31,7 @@ impl InpaintOptions {
         })
     }
 
-    fn mask(&self) -> Result<&str, Error> {
+    fn mask(&self) -> Result<&str> {
         self.mask.as_deref().ok_or_else(|| {
             Error::options("say which region to fill: --mask IMAGE, box:x0,y0,x1,y1 or ball:x,y,r")
         })
@@ -45,7 +42,7 @@ impl InpaintOptions {
         &self,
         mut start: Start<D, O>,
         mask: &dyn SignedDistance<D>,
-    ) -> Result<Start<D, O>, Error> {
+    ) -> Result<Start<D, O>> {
         let grid = *start.field.grid();
         let inside = |node: usize| mask.signed_distance(grid.node(node)) < 0.0;
         let region: Vec<bool> = (0..grid.len()).map(inside).collect();
@@ -74,7 +71,7 @@ impl InpaintOptions {
 }
 
 /// A region that is a mask.
-fn region<const D: usize>(mask: &str) -> Result<Box<dyn SignedDistance<D>>, Error> {
+fn region<const D: usize>(mask: &str) -> Result<Box<dyn SignedDistance<D>>> {
     if !Region::is_meant(mask) {
         refuse!("--mask {mask} is no region in {D}D: give box:... or ball:...");
     }

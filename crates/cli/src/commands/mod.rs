@@ -1,4 +1,4 @@
-//! The subcommands.
+//! The subcommands, each in the module of its name.
 
 pub mod check;
 pub mod fair;

@@ -1,11 +1,9 @@
-//! `willmore networks`.
-
 use model::{Network, Shipped};
 
 use crate::cli::{MessageOptions, NetworksCommand};
 use crate::prelude::*;
 
-pub fn run(show: Option<&NetworksCommand>, messages: MessageOptions) -> Result<(), Error> {
+pub fn run(show: Option<&NetworksCommand>, messages: MessageOptions) -> Result<()> {
     let all = [Shipped::Accurate.all()?, Shipped::Paper.all()?].concat();
     let mut all = all.iter().map(|(name, network)| (stem(name), network));
     let Some(NetworksCommand::Show { network: wanted }) = show else {

@@ -1,12 +1,10 @@
-//! `willmore resume`.
-
 use super::flow;
 use crate::cli::{Command, MessageOptions, ResumeOptions};
 use crate::prelude::*;
 use crate::{config, page};
 
 /// Continues a run by the options and the state that it stored; its input is not needed again.
-pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<(), Error> {
+pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<()> {
     let stored = if options.recover {
         RunDirectory::recover(&options.run)?
     } else {
@@ -18,14 +16,14 @@ pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<(), Erro
         let path = path.display();
         refuse!("{path} names no command that makes runs");
     };
-    let keep = &mut command.options().keep;
-    keep.force = options.force;
+    let stored_options = command.options();
+    stored_options.force = options.force;
     if !stored.is_finished() || options.steps.is_some() {
         return flow::run(command, messages, Some((stored, options.steps)));
     }
     // Nothing else is touched in a finished run: what is there besides may be its owner's.
     stored.tidy()?;
-    if !keep.no_page {
+    if !stored_options.no_page {
         page::write(&stored)?;
     }
     let folder = options.run.to_string_lossy();

@@ -1,5 +1,3 @@
-//! `willmore sample`.
-
 use volumes::Volume;
 
 use crate::cli::{MessageOptions, SampleOptions};
@@ -14,7 +12,7 @@ use crate::volume;
 const EPS_OVER_H: f64 = 2.0;
 
 /// Writes an input as the flows begin with it, possibly damaged.
-pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<(), Error> {
+pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<()> {
     let path = options.save.clone();
     if let Some(labels) = volume::all_labels(&options.input)? {
         for label in labels {
@@ -86,7 +84,7 @@ fn write<const D: usize, O: Presentation<D>>(
     mut start: Start<D, O>,
     mut options: SampleOptions,
     path: &Path,
-) -> Result<(), Error> {
+) -> Result<()> {
     start.presentation.turn(&mut options.up)?;
     let u = without(start.field, &options.without)?;
     match &*extension(path) {
@@ -106,7 +104,7 @@ fn write<const D: usize, O: Presentation<D>>(
 }
 
 /// The nodes inside as voxels labelled 1.
-fn segmentation<const D: usize>(u: &Field<D>, path: &Path) -> Result<Volume, Error> {
+fn segmentation<const D: usize>(u: &Field<D>, path: &Path) -> Result<Volume> {
     let grid = u.grid();
     let Ok(origin) = <[f64; 3]>::try_from(&grid.origin()[..]) else {
         refuse!("--save {}: a shape in {D}D has no voxels", path.display());
@@ -122,7 +120,7 @@ fn segmentation<const D: usize>(u: &Field<D>, path: &Path) -> Result<Volume, Err
     Ok(Volume::of_labels([cells; 3], origin, sides, labels)?)
 }
 
-fn without<const D: usize>(mut u: Field<D>, regions: &[Region]) -> Result<Field<D>, Error> {
+fn without<const D: usize>(mut u: Field<D>, regions: &[Region]) -> Result<Field<D>> {
     for region in regions {
         let hole = phase_field(*u.grid(), region.shape::<D>()?.as_ref(), eps(&u))?;
         for (value, hole) in u.values_mut().iter_mut().zip(hole.values()) {

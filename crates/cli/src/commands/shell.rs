@@ -15,7 +15,7 @@ pub fn completions(shell: Shell) {
 }
 
 /// Prints the manual page: that of the program, then those of its commands.
-pub fn man() -> Result<(), Error> {
+pub fn man() -> Result<()> {
     let mut text = Vec::new();
     let mut command = Cli::command();
     command.build();

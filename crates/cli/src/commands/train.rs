@@ -1,5 +1,3 @@
-//! `willmore train`.
-
 use engine::quarter_square;
 use model::Ratios;
 use model::training::least_squares::LeastSquaresParams;
@@ -14,7 +12,7 @@ const CELLS: f64 = 128.0;
 /// Radii on which the quality is measured.
 const HELD_OUT: usize = 20;
 
-pub fn run(mut options: TrainOptions, messages: MessageOptions) -> Result<(), Error> {
+pub fn run(mut options: TrainOptions, messages: MessageOptions) -> Result<()> {
     let missing = |name: &str| {
         Error::options(format!(
             "train needs --{name}; for example: willmore train --dimension 2 --width 25 --eps-over-h 3 --save mine.safetensors"
