@@ -142,7 +142,7 @@ fn figure(
             percent * count as f64
         ),
     };
-    let size = [picture.width(), picture.height()].map(|side| side as usize);
+    let size = picture.size().map(|side| side as usize);
     let surface = Raster::new(size, picture.pixels()).with_caption(caption);
     let mut shares = [0.0; BARS];
     for length in lengths {

@@ -419,9 +419,9 @@ impl<'a> Reader<'a> {
 
     /// A mesh whose vertices follow the flow, on the coarsest grid that holds its parts and holes.
     pub fn own(&mut self, own: OwnMesh, path: &Path, allow_loss: bool) -> Result<Loaded, Error> {
-        let (rough, start) = (own.rough(), own.fairing().start());
+        let (rough, start) = (own.rough(), &own.fairing().start);
         let grids = (self.options.cells).map_or(OWN_CELLS.to_vec(), |cells| vec![cells]);
-        let part = OWN_PART[usize::from(own.fairing().noise() == 0.0)];
+        let part = OWN_PART[usize::from(own.fairing().noise == 0.0)];
         let advice = "use more --cells, or --allow-loss to go on without them";
         let refused = (!allow_loss).then_some(advice);
         let (field, surface) = self.like_mesh(start, part, &grids, refused)?;

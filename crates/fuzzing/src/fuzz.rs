@@ -68,6 +68,7 @@ pub struct Report {
 type Case = (Index, Vec<Change>, bool);
 
 /// One reader and the files to change.
+#[must_use]
 pub struct Fuzz<'a> {
     name: &'static str,
     limit: Limit,
@@ -93,7 +94,6 @@ impl<'a> Fuzz<'a> {
     }
 
     /// Files that the reader accepts.
-    #[must_use]
     pub fn valid(mut self, files: impl IntoIterator<Item = Vec<u8>>) -> Self {
         let before = self.material.files.len();
         self.material.files.splice(0..0, files);
@@ -102,7 +102,6 @@ impl<'a> Fuzz<'a> {
     }
 
     /// Beginnings of files, to be followed by random bytes.
-    #[must_use]
     pub fn starts<T: AsRef<[u8]>>(mut self, starts: impl IntoIterator<Item = T>) -> Self {
         let starts = starts.into_iter().map(|s| s.as_ref().to_vec());
         self.material.files.extend(starts);
@@ -110,7 +109,6 @@ impl<'a> Fuzz<'a> {
     }
 
     /// Words that have a meaning in the format, such as those that open something: they are repeated, and nested by that.
-    #[must_use]
     pub fn words<T: AsRef<[u8]>>(mut self, words: impl IntoIterator<Item = T>) -> Self {
         let words = words.into_iter().map(|w| w.as_ref().to_vec());
         self.material.words.extend(words);
@@ -119,7 +117,6 @@ impl<'a> Fuzz<'a> {
 
     /// Half of the changed files go through this, such as for checksums that fit again: behind them
     /// is more to reach.
-    #[must_use]
     pub fn repair(mut self, repair: impl Fn(Vec<u8>) -> Vec<u8> + 'a) -> Self {
         self.repair = Some(Box::new(repair));
         self

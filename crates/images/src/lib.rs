@@ -9,7 +9,7 @@
 //! #   let folder = tempfile::tempdir().expect("a folder for temporary files");
 //! #   let folder = folder.path();
 //! #   let disc = geometry::shapes::Ball::new([50.0, 40.0], 30.0)?;
-//! #   let frame = Frame::new(100, 80, [0.0, 80.0], 1.0)?;
+//! #   let frame = Frame::new([100, 80], [0.0, 80.0], 1.0)?;
 //! #   drawing(&frame, &disc, Some(Rgb::WHITE))?.write_png(folder.join("logo.png"))?;
 //!     // A black disc of radius 30 pixels on white, of 100 times 80 pixels.
 //!     let image = read(folder.join("logo.png"))?;

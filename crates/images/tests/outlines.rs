@@ -114,7 +114,7 @@ fn rows_run_downwards_and_the_plane_upwards() {
     // A black pixel in the upper left corner of three by two.
     let mut grey = vec![u16::MAX; 6];
     grey[0] = 0;
-    let found = outline(&Image::new(3, 2, grey, None).unwrap());
+    let found = outline(&Image::new([3, 2], grey, None).unwrap());
     let bounds = found.bounding_box();
     // Halfway to the neighbours, and along the edges of the image.
     assert_eq!((bounds.lower, bounds.upper), ([0.0, 1.0], [1.0, 2.0]));
@@ -141,10 +141,10 @@ fn shapes_end_at_the_edge_of_the_image() {
     }
 
     // Images of one row or column.
-    let row = Image::new(4, 1, vec![0, 0, u16::MAX, 0], None).unwrap();
+    let row = Image::new([4, 1], vec![0, 0, u16::MAX, 0], None).unwrap();
     let found = Outline::of_image(&row, Side::Dark(0.5)).unwrap();
     assert_eq!((found.curves().len(), found.area()), (2, 3.0 - 0.0));
-    let column = Image::new(1, 3, vec![u16::MAX, 0, u16::MAX], None).unwrap();
+    let column = Image::new([1, 3], vec![u16::MAX, 0, u16::MAX], None).unwrap();
     let found = Outline::of_image(&column, Side::Dark(0.5)).unwrap();
     assert_eq!((found.curves().len(), found.area()), (1, 1.0));
 }
@@ -154,7 +154,7 @@ fn diagonal_pixels_are_joined_by_their_mean() {
     let image = |dark: u16| {
         let mut grey = vec![u16::MAX; 16];
         (grey[5], grey[10]) = (dark, dark);
-        Image::new(4, 4, grey, None).unwrap()
+        Image::new([4, 4], grey, None).unwrap()
     };
     // The mean of the four is 0.5 and is outside for a lower threshold, inside for a higher one.
     for (threshold, curves) in [(0.4, 2), (0.6, 1)] {
@@ -176,7 +176,7 @@ fn the_side_is_chosen() {
             .collect()
     });
     let side = |grey: &[u16], opacity: Option<Vec<u16>>| {
-        let image = Image::new(9, 9, grey.to_vec(), opacity).unwrap();
+        let image = Image::new([9, 9], grey.to_vec(), opacity).unwrap();
         Side::of(&image, 0.5).unwrap()
     };
     assert_eq!(side(&dark, None), Side::Dark(0.5));
@@ -187,7 +187,7 @@ fn the_side_is_chosen() {
 
     // Two grey values are separated halfway, also when one is rare.
     let separated = |grey: &[u16]| {
-        let image = Image::new(9, 9, grey.to_vec(), None).unwrap();
+        let image = Image::new([9, 9], grey.to_vec(), None).unwrap();
         Tones::of(&image, Side::Dark(0.5)).threshold
     };
     let grey: Vec<u16> = dark
@@ -203,7 +203,7 @@ fn the_side_is_chosen() {
     assert_eq!([separated(&dark), separated(&[700; 81])], [0.5; 2]);
 
     // Transparency counts as paper: grey on white for dark shapes, on black for light ones.
-    let image = Image::new(3, 1, vec![0, 0, 65535], Some(vec![0, 65535, 65535])).unwrap();
+    let image = Image::new([3, 1], vec![0, 0, 65535], Some(vec![0, 65535, 65535])).unwrap();
     let lengths = [Side::Dark(0.5), Side::Light(0.5), Side::Opaque(0.5)].map(|side| {
         let bounds = Outline::of_image(&image, side).unwrap().bounding_box();
         [bounds.lower[0], bounds.upper[0]]
@@ -215,8 +215,8 @@ fn the_side_is_chosen() {
 fn opacity_alone_gives_the_same_outline() {
     let raster = Raster::new([60, 50], 8, disc([30.0, 25.0], 17.0));
     let opacity: Vec<u16> = raster.shorts().into_iter().map(|v| 65535 - v).collect();
-    let transparent = Image::new(60, 50, vec![12345; 3000], Some(opacity)).unwrap();
-    let plain = Image::new(60, 50, raster.shorts(), None).unwrap();
+    let transparent = Image::new([60, 50], vec![12345; 3000], Some(opacity)).unwrap();
+    let plain = Image::new([60, 50], raster.shorts(), None).unwrap();
     let [a, b] = [outline(&transparent), outline(&plain)];
     near(a.area(), b.area(), 1e-9);
     near(a.area(), PI * 17.0 * 17.0, 0.5);
@@ -224,7 +224,7 @@ fn opacity_alone_gives_the_same_outline() {
 
 #[test]
 fn unusable_images_are_explained() {
-    let image = |grey: Vec<u16>| Image::new(2, 2, grey, None).unwrap();
+    let image = |grey: Vec<u16>| Image::new([2, 2], grey, None).unwrap();
     let message = |image: &Image, side| Outline::of_image(image, side).unwrap_err().to_string();
     let grey = image(vec![0x4000, 0x8000, 0x8000, 0xc000]);
     assert_eq!(
@@ -264,7 +264,7 @@ fn unusable_images_are_explained() {
             u16::MAX
         }
     });
-    let noise = Image::new(2048, 2048, noise.collect(), None).unwrap();
+    let noise = Image::new([2048, 2048], noise.collect(), None).unwrap();
     assert_eq!(
         message(&noise, Side::Dark(0.5)),
         "the outline would have about 8384512 segments, more than 4194304: this is noise and no \
@@ -272,7 +272,7 @@ fn unusable_images_are_explained() {
     );
 
     let message = |width, height, grey, opacity: Option<usize>| {
-        Image::new(width, height, vec![0; grey], opacity.map(|n| vec![0; n]))
+        Image::new([width, height], vec![0; grey], opacity.map(|n| vec![0; n]))
             .unwrap_err()
             .to_string()
     };
@@ -456,7 +456,7 @@ proptest! {
         let count = (width * height) as usize;
         let values = &seed[..count];
         let grey: Vec<u16> = values.iter().map(|v| 65535 / 5 * v).collect();
-        let image = Image::new(width, height, grey, None).unwrap();
+        let image = Image::new([width, height], grey, None).unwrap();
         let side = Side::Light(f64::from(threshold) / 5.0);
         let inside: Vec<bool> = values.iter().map(|&v| v > threshold).collect();
         match Outline::of_image(&image, side) {

@@ -9,6 +9,7 @@ use serde_json::Value;
 use crate::error::{Error, Result};
 
 /// A list of names with values, such as the metrics of a run.
+#[must_use]
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Facts {
     entries: Vec<(String, String)>,
@@ -24,7 +25,6 @@ impl Facts {
     }
 
     /// Adds an entry at the end.
-    #[must_use]
     pub fn with(mut self, name: impl Into<String>, value: impl Into<String>) -> Self {
         self.entries.push((name.into(), value.into()));
         self
@@ -32,7 +32,6 @@ impl Facts {
 
     /// Adds a value at the end: entries of maps are named `name: key of the entry`, lists of plain values are one line,
     /// numbers have five digits unless they are whole, and null is left out.
-    #[must_use]
     pub fn with_value(mut self, name: &str, value: &Value) -> Self {
         match value {
             Value::Object(map) => {

@@ -17,7 +17,7 @@ fn ball() -> TriangleMesh {
 }
 
 fn picture() -> Image {
-    let picture = render::Picture::new(4, 3, vec![[1, 2, 3, 255]; 12]).unwrap();
+    let picture = render::Picture::new([4, 3], vec![[1, 2, 3, 255]; 12]).unwrap();
     Image::from_bytes("picture", &picture.to_png().unwrap()).unwrap()
 }
 

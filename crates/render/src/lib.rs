@@ -26,7 +26,7 @@
 //!     picture.write_png(&path)?;
 //!
 //!     let blue = picture.pixels().iter().filter(|[r, _, b, _]| b > r).count();
-//!     println!("{} x {} pixels, {} per cent blue", picture.width(), picture.height(),
+//!     println!("{} x {} pixels, {} per cent blue", picture.size()[0], picture.size()[1],
 //!         100 * blue / picture.pixels().len());
 //! #   assert_eq!(100 * blue / picture.pixels().len(), 60);
 //!     Ok(())

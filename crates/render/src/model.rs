@@ -15,6 +15,7 @@ const AROUND: usize = 12;
 const ROWS: usize = 3;
 
 /// A round tube along a polyline, with round ends and joints.
+#[must_use]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tube {
     /// The points of the polyline. Repeated ones are passed over.
@@ -39,14 +40,12 @@ impl Tube {
     }
 
     /// Joins the last point to the first.
-    #[must_use]
     pub fn closed(mut self) -> Self {
         self.closed = true;
         self
     }
 
     /// Sets the colour.
-    #[must_use]
     pub fn with_colour(mut self, colour: Rgb) -> Self {
         self.colour = colour;
         self

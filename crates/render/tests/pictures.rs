@@ -49,8 +49,9 @@ fn is_drawn(picture: &Picture, x: u32, y: u32) -> bool {
 /// Area and centre of what is drawn, in pixels.
 fn silhouette(picture: &Picture) -> (f64, [f64; 2]) {
     let (mut area, mut moment) = (0.0, [0.0; 2]);
-    for y in 0..picture.height() {
-        for x in 0..picture.width() {
+    let [width, height] = picture.size();
+    for y in 0..height {
+        for x in 0..width {
             let cover = f64::from(u8::from(is_drawn(picture, x, y)));
             area += cover;
             moment[0] += cover * (f64::from(x) + 0.5);
@@ -439,19 +440,19 @@ fn decoded(bytes: &[u8]) -> (png::ColorType, Option<png::AnimationControl>, Vec<
 fn files_hold_the_pictures() {
     let folder = tempfile::tempdir().unwrap();
     let pixels = (0..1200).map(|k| [k, k / 2, 9, k / 5].map(|v| v as u8));
-    let picture = Picture::new(40, 30, pixels.collect()).unwrap();
+    let picture = Picture::new([40, 30], pixels.collect()).unwrap();
     let path = folder.path().join("ball.png");
     picture.write_png(&path).unwrap();
     let (colour, control, frames) = decoded(&std::fs::read(&path).unwrap());
     assert!(colour == png::ColorType::Rgba && control.is_none());
     assert_eq!(frames[0], picture.pixels().as_flattened());
-    let opaque = Picture::new(2, 1, vec![[1, 2, 3, 255]; 2]).unwrap();
+    let opaque = Picture::new([2, 1], vec![[1, 2, 3, 255]; 2]).unwrap();
     let (colour, _, frames) = decoded(&opaque.to_png().unwrap());
     assert!(colour == png::ColorType::Rgb && frames[0] == [1, 2, 3, 1, 2, 3]);
 
     let pictures = [
         picture.clone(),
-        Picture::new(40, 30, vec![[7; 4]; 1200]).unwrap(),
+        Picture::new([40, 30], vec![[7; 4]; 1200]).unwrap(),
     ];
     let bytes = animation(&pictures, Duration::from_millis(120)).unwrap();
     let (_, control, frames) = decoded(&bytes);
@@ -468,7 +469,7 @@ fn files_hold_the_pictures() {
     let never = animation(&[picture], Duration::ZERO);
     assert!(matches!(never, Err(Error::Geometry(_))));
     assert!(matches!(
-        Picture::new(2, 2, vec![[0; 4]; 3]),
+        Picture::new([2, 2], vec![[0; 4]; 3]),
         Err(Error::PixelCount { actual: 3, .. })
     ));
 }

@@ -20,6 +20,7 @@ use crate::svg;
 ///
 /// Sizes are in layout units, one CSS pixel each when a README shows the figure at its own width.
 /// The PNG has two pixels per unit. Legends are below the panels, where they cover nothing.
+#[must_use]
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
     /// Heading above all panels; may be empty.
@@ -34,8 +35,8 @@ pub struct Figure {
     pub row_labels: Vec<String>,
     /// One legend below all panels instead of one below each.
     pub shared_legend: bool,
-    /// A remark in small type at the bottom.
-    pub note: Option<String>,
+    /// A remark in small type at the bottom; may be empty.
+    pub note: String,
     /// Width; the height follows from the panels.
     pub width: f64,
 }
@@ -62,27 +63,24 @@ impl Figure {
             column_labels: Vec::new(),
             row_labels: Vec::new(),
             shared_legend: false,
-            note: None,
+            note: String::new(),
             width: 800.0,
         }
     }
 
     /// Adds a panel to the right of the last one, or at the start of the next row.
-    #[must_use]
     pub fn with_panel(mut self, panel: impl Into<Panel>) -> Self {
         self.panels.push(panel.into());
         self
     }
 
     /// Adds panels, row by row.
-    #[must_use]
     pub fn with_panels<P: Into<Panel>>(mut self, panels: impl IntoIterator<Item = P>) -> Self {
         self.panels.extend(panels.into_iter().map(Into::into));
         self
     }
 
     /// Labels the columns.
-    #[must_use]
     pub fn with_column_labels<S: Into<String>>(
         mut self,
         labels: impl IntoIterator<Item = S>,
@@ -92,28 +90,24 @@ impl Figure {
     }
 
     /// Labels the rows; a line break in a label makes two lines.
-    #[must_use]
     pub fn with_row_labels<S: Into<String>>(mut self, labels: impl IntoIterator<Item = S>) -> Self {
         self.row_labels = labels.into_iter().map(Into::into).collect();
         self
     }
 
     /// Collects the legends of all panels below the figure.
-    #[must_use]
     pub fn with_shared_legend(mut self) -> Self {
         self.shared_legend = true;
         self
     }
 
     /// Adds a remark at the bottom.
-    #[must_use]
     pub fn with_note(mut self, note: impl Into<String>) -> Self {
-        self.note = Some(note.into());
+        self.note = note.into();
         self
     }
 
     /// Fixes the width; the height follows.
-    #[must_use]
     pub fn with_width(mut self, width: f64) -> Self {
         self.width = width;
         self
@@ -186,8 +180,7 @@ impl Figure {
         };
         let legend = Block::new(&shared, fonts.legend, inner);
         let note_top = legend_top + legend.height;
-        let note = self.note.as_deref().unwrap_or("");
-        let height = (note_top + font::height(note, fonts.note, inner) + PADDING).round();
+        let height = (note_top + font::height(&self.note, fonts.note, inner) + PADDING).round();
         let small = |cell: &Cell<'_>| cell.plot.width.min(cell.plot.height) < SMALLEST_PLOT;
         if !SIDES.contains(&height) || cells.iter().any(small) {
             return refused(height);
@@ -226,10 +219,9 @@ impl Figure {
         }
         let legend_top = point(middle, layout.legend_top);
         layout.legend.draw(surface, legend_top);
-        let note = self.note.as_deref().unwrap_or("");
         let style = TextStyle::new(fonts.note, GREY).aligned(Align::Left);
         let at = point(PADDING + 4.0, layout.note_top + AIR);
-        draw_lines(surface, note, style, at, inner);
+        draw_lines(surface, &self.note, style, at, inner);
     }
 }
 

@@ -12,6 +12,7 @@ use crate::style::Fonts;
 use crate::surface::Surface;
 
 /// An array as viridis colours, with a colour bar.
+#[must_use]
 #[derive(Debug, Clone, PartialEq)]
 pub struct Heatmap {
     pub(crate) title: String,
@@ -40,14 +41,12 @@ impl Heatmap {
     }
 
     /// Sets both axes. Their ranges are the outer edges of the cells.
-    #[must_use]
     pub fn with_axes(mut self, x: Axis, y: Axis) -> Self {
         (self.x, self.y) = (x, y);
         self
     }
 
     /// Sets label, scale and range of the colour bar.
-    #[must_use]
     pub fn with_bar(mut self, bar: Axis) -> Self {
         self.bar = bar;
         self

@@ -10,6 +10,7 @@ use crate::Error;
 use crate::vector::{Vector, scaled_normal};
 
 /// Triangles over shared vertices, not necessarily closed; see [`ClosedMesh`](crate::ClosedMesh).
+#[must_use]
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
     /// Positions.

@@ -74,11 +74,11 @@ pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Volume, FormatError> {
         // A page more than there is, so that one alone is no reason yet.
         length([size[0], size[1], pages + 1], element, limit)?;
         let layout = reader.image_buffer_layout()?;
-        let start = data.len();
-        data.resize(start + area(size, element), 0);
-        if layout.len != data.len() - start {
+        if layout.len != (size[0] * size[1]) as usize * element.size() {
             return bad("page", &format!("{} bytes long", layout.len), "one plane");
         }
+        let start = data.len();
+        data.resize(start + layout.len, 0);
         reader.read_image_bytes(&mut data[start..])?;
         if !reader.more_images() {
             break;
@@ -96,10 +96,6 @@ pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Volume, FormatError> {
         scale: [1.0, 0.0],
     };
     Volume::new(size, DAffine3::from_scale(sides), voxels)
-}
-
-fn area([width, height]: [u64; 2], element: Number) -> usize {
-    width as usize * height as usize * element.size()
 }
 
 /// Columns and rows of the page, and its numbers.
