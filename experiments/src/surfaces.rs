@@ -253,7 +253,7 @@ impl Flowed {
 /// A picture as a panel of a figure.
 pub fn raster(picture: &Picture, caption: impl Into<String>) -> Raster {
     let size = picture.size().map(|side| side as usize);
-    Raster::new(size, picture.pixels()).with_caption(caption)
+    Raster::new(caption, size, picture.pixels())
 }
 
 /// Surfaces under Willmore flow by several methods, as a program shows them.

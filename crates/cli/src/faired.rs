@@ -143,7 +143,7 @@ fn figure(
         ),
     };
     let size = picture.size().map(|side| side as usize);
-    let surface = Raster::new(size, picture.pixels()).with_caption(caption);
+    let surface = Raster::new(caption, size, picture.pixels());
     let mut shares = [0.0; BARS];
     for length in lengths {
         let bar = (length / largest * BARS as f64) as usize;

@@ -2,7 +2,7 @@
 
 use geometry::npy::{self, NpyError};
 use geometry::{PURE_BEYOND, distance_from_phase_field, thin_part};
-use images::{Outline, OutlineDistance, Side, Tones};
+use images::{Outline, Side, Tones};
 use surfaces::hausdorff_distance;
 use surfaces::shapes::{self, BuiltIn};
 
@@ -526,7 +526,7 @@ impl<'a> Reader<'a> {
             refuse_photographs(&tones, side, path)?;
         }
         let outline = Outline::of_image(&image, side)?.smoothed(tones.raster())?;
-        let distance = OutlineDistance::new(&outline);
+        let distance = outline.distance();
         let sides = outline.sides();
         let grid = self.grid_holding(&image.bounding_box(), &IMAGE_CELLS, &distance, &sides)?;
         let field = self.sampled(grid, &distance)?;

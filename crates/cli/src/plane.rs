@@ -1,6 +1,6 @@
 //! Shapes in the plane, as the pixels of an image.
 
-use images::{Frame, Image, Interface, Outline, OutlineDistance, Side, drawing};
+use images::{Frame, Image, Outline, Side, drawing, interface};
 use render::Rgb;
 
 use crate::paths::{extension, read};
@@ -61,7 +61,7 @@ impl Plane {
             let fills = Placement::fit(&image.bounding_box(), grid, grid.side())?;
             outline = outline.placed(&fills);
         }
-        Ok(Box::new(OutlineDistance::new(&outline)))
+        Ok(Box::new(outline.distance()))
     }
 
     /// From now on in the tones of the input, if it is an image, all of whose pixels outside of a mask stay.
@@ -148,7 +148,7 @@ impl Presentation<2> for Plane {
     }
 
     fn picture(&self, _: &Field<2>, u: &Field<2>, eps: f64) -> Result<Picture, Error> {
-        let interface = Interface::new(u, eps)?;
+        let interface = interface(u, eps)?;
         match &self.original {
             None => Ok(drawing(&self.frame, &interface, Some(Rgb::WHITE))?),
             Some(original) => original.with(&drawing(&self.frame, &interface, None)?),

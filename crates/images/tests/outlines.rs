@@ -8,7 +8,7 @@ use crate::common::{Raster, disc, jpeg, near, square};
 use geometry::contour::Polyline;
 use geometry::shapes::{Ball, Cuboid};
 use geometry::{Field, Grid, Placement, SignedDistance, SignedDistanceExt, optimal_profile};
-use images::{Error, Image, Interface, Outline, OutlineDistance, Side, Tones, decode};
+use images::{Error, Image, Outline, Side, Tones, decode, interface};
 use proptest::prelude::*;
 
 fn outline(image: &Image) -> Outline {
@@ -18,7 +18,7 @@ fn outline(image: &Image) -> Outline {
 
 /// The largest deviation of the distance from the exact one, over the image and around it.
 fn deviation(outline: &Outline, exact: &impl SignedDistance<2>, size: f64) -> f64 {
-    let distance = OutlineDistance::new(outline);
+    let distance = outline.distance();
     let mut worst = 0.0_f64;
     for k in 0..120 * 120 {
         let x = [k % 120, k / 120].map(|i| size * (-0.1 + 0.01 * f64::from(i)));
@@ -98,7 +98,7 @@ fn turned_squares_and_rings_are_found() {
     let areas: Vec<f64> = found.curves().iter().map(Polyline::signed_area).collect();
     assert!(areas[0] * areas[1] < 0.0, "{areas:?}");
     near(found.area(), PI * (1600.0 - 400.0), 3.0);
-    let distance = OutlineDistance::new(&found);
+    let distance = found.distance();
     for k in 0..90 * 90 {
         let x = [k % 90, k / 90].map(|i| 5.0 + f64::from(i));
         let expected = exact.signed_distance(x);
@@ -119,7 +119,7 @@ fn rows_run_downwards_and_the_plane_upwards() {
     // Halfway to the neighbours, and along the edges of the image.
     assert_eq!((bounds.lower, bounds.upper), ([0.0, 1.0], [1.0, 2.0]));
     near(found.area(), 1.0 - 0.125, 1e-12);
-    let distance = OutlineDistance::new(&found);
+    let distance = found.distance();
     assert_eq!(distance.signed_distance([0.5, 1.75]), -0.25);
     assert_eq!(distance.signed_distance([0.5, 0.5]), 0.5);
     assert_eq!(distance.signed_distance([-3.0, 6.0]), 5.0);
@@ -133,7 +133,7 @@ fn shapes_end_at_the_edge_of_the_image() {
     assert_eq!(found.length(), 22.0);
     let bounds = found.bounding_box();
     assert_eq!((bounds.lower, bounds.upper), ([0.0; 2], [8.0, 3.0]));
-    let distance = OutlineDistance::new(&found);
+    let distance = found.distance();
     let exact = Cuboid::new([4.0, 1.5]).unwrap().translated([4.0, 1.5]);
     for k in 0..400 {
         let x = [k % 20, k / 20].map(|i| 0.6137 * f64::from(i) - 1.0);
@@ -160,7 +160,7 @@ fn diagonal_pixels_are_joined_by_their_mean() {
     for (threshold, curves) in [(0.4, 2), (0.6, 1)] {
         let found = Outline::of_image(&image(0), Side::Dark(threshold)).unwrap();
         assert_eq!(found.curves().len(), curves, "{threshold}");
-        let middle = OutlineDistance::new(&found).signed_distance([2.0, 2.0]);
+        let middle = found.distance().signed_distance([2.0, 2.0]);
         assert_eq!(middle < 0.0, curves == 1);
     }
 }
@@ -298,7 +298,7 @@ fn unusable_curves_and_fields_are_explained() {
     let ball = geometry::phase_field(grid, &Ball::new([0.0; 2], 0.3).unwrap(), 0.2).unwrap();
     let found = Outline::of_phase_field(&ball).unwrap();
     // What is not a point has no distance.
-    let distance = OutlineDistance::new(&found);
+    let distance = found.distance();
     for x in [f64::NAN, f64::INFINITY, -1e101] {
         assert!(distance.signed_distance([x, 0.0]).is_nan());
         assert!(distance.signed_distance([0.0, x]).is_nan());
@@ -323,9 +323,9 @@ fn unusable_curves_and_fields_are_explained() {
         Outline::of_phase_field(&Field::constant(grid, f64::NAN)),
         Err(Error::Geometry(_))
     ));
-    assert!(Interface::new(&Field::constant(grid, f64::NAN), 0.1).is_err());
+    assert!(interface(&Field::constant(grid, f64::NAN), 0.1).is_err());
     for eps in [0.0, -1.0, f64::NAN] {
-        let error = Interface::new(&Field::constant(grid, 0.5), eps).unwrap_err();
+        let error = interface(&Field::constant(grid, 0.5), eps).err().unwrap();
         assert_eq!(
             error.to_string(),
             format!("eps = {eps:?} is not allowed: it must be finite and positive")
@@ -358,7 +358,7 @@ fn placement_and_its_inverse() {
     near(placed.bounding_box().centre()[0], 3.2 + 60.0 * 0.008, 1e-4);
     near(placed.bounding_box().centre()[1], -0.4 + 30.0 * 0.008, 1e-4);
     near(placed.area(), found.area() * 0.008 * 0.008, 1e-12);
-    let s = OutlineDistance::new(&placed).signed_distance([3.68, -0.16]);
+    let s = placed.distance().signed_distance([3.68, -0.16]);
     near(s, -20.0 * 0.008, 1e-3);
 
     // The shape alone, in the middle.
@@ -398,7 +398,7 @@ fn interfaces_between_nodes_are_those_of_the_distance() {
         let grid = Grid::<2>::centred(cells, 1.0).unwrap();
         let eps = 2.0 * grid.spacing();
         let u = Field::from_fn(grid, |x| optimal_profile(exact.signed_distance(x), eps));
-        let interface = Interface::new(&u, eps).unwrap();
+        let interface = interface(&u, eps).unwrap();
         let points = (0..2000).map(|k| {
             let (angle, radius) = (0.1 * f64::from(k), 0.3 + 0.02 * f64::from(k).sin());
             [0.03 + radius * angle.cos(), -0.02 + radius * angle.sin()]
@@ -413,7 +413,7 @@ fn interfaces_between_nodes_are_those_of_the_distance() {
 
     // The box has an end, and outside is outside.
     let grid = Grid::<2>::new(16, 1.0).unwrap();
-    let inside = Interface::new(&Field::constant(grid, 1.0), 0.1).unwrap();
+    let inside = interface(&Field::constant(grid, 1.0), 0.1).unwrap();
     near(inside.signed_distance([0.5, 0.9]), -0.1, 1e-15);
     assert_eq!(inside.signed_distance([-3.0, 5.0]), 5.0);
     assert!(inside.signed_distance([f64::NAN, 0.5]).is_nan());
@@ -461,7 +461,7 @@ proptest! {
         let inside: Vec<bool> = values.iter().map(|&v| v > threshold).collect();
         match Outline::of_image(&image, side) {
             Ok(found) => {
-                let distance = OutlineDistance::new(&found);
+                let distance = found.distance();
                 let segments: Vec<_> = found.curves().iter().flat_map(Polyline::segments).collect();
                 for (k, &inside) in inside.iter().enumerate() {
                     let [column, row] = [k as u32 % width, k as u32 / width];

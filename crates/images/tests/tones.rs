@@ -1,7 +1,7 @@
 //! What tells drawings from photographs, and the raster from the shape.
 
 use geometry::SignedDistance;
-use images::{Image, Outline, OutlineDistance, Side, Tones, colours};
+use images::{Image, Outline, Side, Tones, colours};
 
 const PIXELS: u32 = 160;
 
@@ -50,7 +50,7 @@ fn smoothed_outlines_have_the_length_of_the_shape_and_stay_near() {
         (length / circumference - 1.0).abs() < 0.006,
         "{length}, not {circumference}"
     );
-    let distance = OutlineDistance::new(&rough);
+    let distance = rough.distance();
     let points = smooth.curves().iter().flat_map(|curve| &curve.points);
     let far = points.map(|&x| distance.signed_distance(x).abs());
     assert!(far.fold(0.0, f64::max) < 1.2);

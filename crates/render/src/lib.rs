@@ -18,7 +18,7 @@
 //!
 //!     let scene = Scene::new(&u, eps)?
 //!         .colour(Rgb::SKY)
-//!         .tubes([Tube::new(circle, 0.005).closed()])
+//!         .tubes([Tube { closed: true, ..Tube::new(circle, 0.005) }])
 //!         .quality(Quality::Draft);
 //!     let picture = scene.render([160, 120])?;
 //! #   let folder = tempfile::tempdir().expect("a folder for temporary files");

@@ -15,7 +15,6 @@ const AROUND: usize = 12;
 const ROWS: usize = 3;
 
 /// A round tube along a polyline, with round ends and joints.
-#[must_use]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tube {
     /// The points of the polyline. Repeated ones are passed over.
@@ -29,7 +28,7 @@ pub struct Tube {
 }
 
 impl Tube {
-    /// An open tube, near-black.
+    /// An open tube, near-black; for others, `Tube { closed: true, ..Tube::new(points, radius) }`.
     pub fn new(points: impl Into<Vec<[f64; 3]>>, radius: f64) -> Self {
         Self {
             points: points.into(),
@@ -37,18 +36,6 @@ impl Tube {
             radius,
             colour: Rgb::INK,
         }
-    }
-
-    /// Joins the last point to the first.
-    pub fn closed(mut self) -> Self {
-        self.closed = true;
-        self
-    }
-
-    /// Sets the colour.
-    pub fn with_colour(mut self, colour: Rgb) -> Self {
-        self.colour = colour;
-        self
     }
 
     /// The twelve edges of a box.

@@ -184,7 +184,10 @@ fn shadows_fall_away_from_the_key_light() {
 #[test]
 fn tubes_hide_and_are_hidden() {
     let red = Rgb(200, 30, 30);
-    let tube = |x: f64| Tube::new([[x, -0.45, 0.0], [x, 0.45, 0.0]], 0.03).with_colour(red);
+    let tube = |x: f64| Tube {
+        colour: red,
+        ..Tube::new([[x, -0.45, 0.0], [x, 0.45, 0.0]], 0.03)
+    };
     let picture = |tube: Tube| {
         let scene = scene(&ball([0.0; 3], 0.3)).within(BOX);
         scene.tubes([tube]).render([100; 2]).unwrap()
@@ -222,7 +225,10 @@ fn closed_tubes_and_boxes_are_complete() {
         scene.view(view(0.0, 0.0)).render([100; 2]).unwrap()
     };
     let open = picture(vec![Tube::new(square, 0.02)]);
-    let closed = picture(vec![Tube::new(square, 0.02).closed()]);
+    let closed = picture(vec![Tube {
+        closed: true,
+        ..Tube::new(square, 0.02)
+    }]);
     assert!(!is_drawn(&open, 5, 50) && is_drawn(&closed, 5, 50));
     assert!(is_drawn(&open, 94, 50) && !is_drawn(&closed, 50, 50));
     let edges = Tube::edges_of_box([-0.3; 3], [0.3; 3], 0.02);
@@ -491,7 +497,7 @@ proptest! {
         let mut scene = scene.view(view(angles[0], angles[1]));
         if !ends.is_empty() {
             let points: Vec<[f64; 3]> = ends.iter().map(|p| p.map(|c| c * grid.side())).collect();
-            scene = scene.tubes([Tube::new(points, 0.1 * grid.side()).closed()]);
+            scene = scene.tubes([Tube { closed: true, ..Tube::new(points, 0.1 * grid.side()) }]);
         }
         match scene.render([9, 7]) {
             Ok(picture) => prop_assert_eq!(picture.pixels().len(), 63),

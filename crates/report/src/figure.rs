@@ -445,6 +445,10 @@ mod tests {
         LineChart::new(title, axis("time t [s]"), axis("length <L>"))
     }
 
+    fn heat_map(title: &str, shape: [usize; 2], values: Vec<f64>) -> Heatmap {
+        Heatmap::new(title, ["x", "y", ""].map(Axis::linear), shape, values)
+    }
+
     /// The straight line from corner to corner of the plot.
     fn diagonal() -> LineChart {
         unit_square("Diagonal & more")
@@ -509,9 +513,9 @@ mod tests {
         let empty = LineChart::new("c", Axis::linear("t"), Axis::log("W")).with_series(bad);
         let panels = [
             Panel::from(empty),
-            Heatmap::new("c", [2, 2], vec![f64::NAN; 4]).into(),
+            heat_map("c", [2, 2], vec![f64::NAN; 4]).into(),
             Shapes::new("c").into(),
-            Raster::new([0, 3], vec![]).with_caption("c").into(),
+            Raster::new("c", [0, 3], vec![]).into(),
         ];
         for panel in panels {
             let error = Figure::from(panel).to_svg().unwrap_err();
@@ -539,9 +543,9 @@ mod tests {
             );
         }
         let panels = [
-            (Panel::from(Heatmap::new("u", [3, 4], vec![0.0; 11])), 11),
-            (Raster::new([3, 4], vec![[0; 4]; 13]).into(), 13),
-            (Raster::new([usize::MAX, 2], vec![[0; 4]; 3]).into(), 3),
+            (Panel::from(heat_map("u", [3, 4], vec![0.0; 11])), 11),
+            (Raster::new("", [3, 4], vec![[0; 4]; 13]).into(), 13),
+            (Raster::new("", [usize::MAX, 2], vec![[0; 4]; 3]).into(), 3),
         ];
         for (panel, length) in panels {
             let error = Figure::from(panel).to_svg().unwrap_err();
@@ -642,10 +646,8 @@ mod tests {
         let mut values = vec![0.0; 12];
         (values[3 * 3], values[2]) = (1.0, f64::NAN);
         let axis = |label, high| Axis::linear(label).with_range(0.0, high);
-        let map = Heatmap::new("Hot cell", [4, 3], values)
-            .with_axes(axis("x", 4.0), axis("y", 3.0))
-            .with_bar(Axis::linear("value"));
-        let figure = Figure::from(map);
+        let axes = [axis("x", 4.0), axis("y", 3.0), Axis::linear("value")];
+        let figure = Figure::from(Heatmap::new("Hot cell", axes, [4, 3], values));
         let (picture, plot) = (picture(&figure), plot(&figure));
         assert!(
             (plot.height / plot.width - 0.75).abs() < 0.01,
@@ -739,7 +741,7 @@ mod tests {
     fn mixed_panels_are_written_twice_with_the_same_bytes() {
         let figure = Figure::new("Mixed", 2)
             .with_panel(diagonal())
-            .with_panel(Heatmap::new("u", [2, 2], vec![1.0, 2.0, 3.0, 4.0]))
+            .with_panel(heat_map("u", [2, 2], vec![1.0, 2.0, 3.0, 4.0]))
             .with_panel(Shapes::new("s").with_curve(Curve::new(vec![square(1.0)])))
             .with_panel(half(30, 20));
         let root = tempfile::tempdir().unwrap();
@@ -768,14 +770,14 @@ mod tests {
             }
         };
         let pixels: Vec<[u8; 4]> = (0..columns * rows).map(pixel).collect();
-        Raster::new([columns, rows], pixels)
+        Raster::new("step 100", [columns, rows], pixels)
     }
 
     #[test]
     fn pictures_keep_their_shape_and_show_the_page_where_they_are_transparent() {
         let green = OKABE_ITO[2];
         for (columns, rows) in [(300, 200), (60, 40), (1500, 1000)] {
-            let figure = Figure::from(half(columns, rows).with_caption("step 100"));
+            let figure = Figure::from(half(columns, rows));
             let (picture, plot) = (picture(&figure), plot(&figure));
             assert!((plot.height / plot.width - 2.0 / 3.0).abs() < 0.01);
             let at = |x, y| at(&picture, plot.x + x * plot.width, plot.y + y * plot.height);
@@ -792,7 +794,7 @@ mod tests {
     #[test]
     fn pictures_of_the_right_size_are_copied_and_others_averaged_in_linear_light() {
         let shown = |size: [usize; 2], pixels: Vec<[u8; 4]>| {
-            let figure = Figure::from(Raster::new(size, pixels)).with_width(200.0);
+            let figure = Figure::from(Raster::new("", size, pixels)).with_width(200.0);
             (picture(&figure), plot(&figure))
         };
         // The layout depends on the ratio of the sides alone.
