@@ -11,7 +11,7 @@ use crate::Error;
 ///
 /// # Errors
 /// `eps` must be finite and positive, the values finite.
-pub fn interface(u: &Field<2>, eps: f64) -> Result<impl SignedDistance<2>, Error> {
+pub fn interface(u: &Field<2>, eps: f64) -> Result<impl SignedDistance<2> + use<>, Error> {
     let distance = distances_from_phase_field(u, eps)?;
     Ok(move |x: [f64; 2]| {
         let (low, side) = (distance.grid().origin(), distance.grid().side());
