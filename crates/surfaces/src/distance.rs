@@ -46,11 +46,11 @@ impl MeshDistance {
         let scale = (-exponent).clamp(-1000.0, 1000.0).exp2();
         let mesh = mesh.mesh();
         // Where sheets touch in a vertex, the pseudo-normal is the sum over all of them.
-        let merged = merge_coincident(&mesh.vertices);
-        let vertices = merged.first.iter().map(|&v| mesh.vertices[v]);
+        let (first, index) = merge_coincident(&mesh.vertices);
+        let vertices = first.iter().map(|&v| mesh.vertices[v]);
         let vertices: Vec<_> = vertices.map(|x| Vector::from_array(x) * scale).collect();
         let faces = mesh.faces.iter();
-        let faces: Vec<_> = faces.map(|f| f.map(|v| merged.index[v as usize])).collect();
+        let faces: Vec<_> = faces.map(|f| f.map(|v| index[v as usize])).collect();
         let triangles: Vec<_> = faces
             .iter()
             .map(|f| f.map(|v| vertices[v as usize]))

@@ -77,17 +77,10 @@ fn marched(lattice: &Lattice<'_>) -> Result<TriangleMesh, Error> {
         faces: Vec::new(),
     };
     for cell in lattice.mixed_cells() {
-        // The corner with even indices, and the steps to the one with odd indices.
-        let even = cell.map(|c| c + c % 2);
+        // The corner whose index is odd along the axes with a bit.
         let corner = |bits: usize| -> Node {
-            std::array::from_fn(|axis| {
-                let odd = cell[axis] + 1 - cell[axis] % 2;
-                if bits >> axis & 1 == 1 {
-                    odd
-                } else {
-                    even[axis]
-                }
-            })
+            let is_odd = |axis: usize| bits >> axis & 1;
+            std::array::from_fn(|axis| cell[axis] + (cell[axis] % 2 ^ is_odd(axis)))
         };
         let reflected = cell.iter().map(|c| c % 2).sum::<usize>() % 2 == 1;
         for (corners, positive) in TETRAHEDRA {

@@ -114,7 +114,7 @@ impl TriangleMesh {
 
     /// With vertices at exactly the same place as one, and without the faces that repeat a vertex then.
     pub(crate) fn merged(&self) -> Self {
-        let Merged { first, index } = merge_coincident(&self.vertices);
+        let (first, index) = merge_coincident(&self.vertices);
         let mut merged = self.reindexed(&first, |v| index[v as usize]);
         merged.faces.retain(has_three_corners);
         merged
@@ -145,16 +145,8 @@ pub(crate) fn has_three_corners(&[a, b, c]: &[u32; 3]) -> bool {
     a != b && b != c && c != a
 }
 
-/// Positions that coincide exactly, as one.
-pub(crate) struct Merged {
-    /// For every distinct position, the first vertex there.
-    pub first: Vec<usize>,
-    /// For every vertex, the number of its position.
-    pub index: Vec<u32>,
-}
-
-/// Finds the vertices with exactly equal coordinates (`-0` equals `0`).
-pub(crate) fn merge_coincident(vertices: &[[f64; 3]]) -> Merged {
+/// For every distinct position (`-0` equals `0`) the first vertex there, and for every vertex the number of its position.
+pub(crate) fn merge_coincident(vertices: &[[f64; 3]]) -> (Vec<usize>, Vec<u32>) {
     let mut known = HashMap::with_capacity(vertices.len());
     let mut first = Vec::new();
     let index = vertices.iter().enumerate().map(|(vertex, x)| {
@@ -166,5 +158,5 @@ pub(crate) fn merge_coincident(vertices: &[[f64; 3]]) -> Merged {
         })
     });
     let index = index.collect();
-    Merged { first, index }
+    (first, index)
 }

@@ -35,11 +35,11 @@ pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
             });
         }
     };
-    let merged = merge_coincident(&corners);
-    let mut polygons = Polygons::new(merged.first.len(), 0)?;
-    polygons.faces = merged.index.as_chunks().0.to_vec();
+    let (first, index) = merge_coincident(&corners);
+    let mut polygons = Polygons::new(first.len(), 0)?;
+    polygons.faces = index.as_chunks().0.to_vec();
     Ok(TriangleMesh {
-        vertices: merged.first.iter().map(|&v| corners[v]).collect(),
+        vertices: first.iter().map(|&v| corners[v]).collect(),
         faces: polygons.finish()?,
         normals: None,
     })
