@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 #[must_use]
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Facts {
-    entries: Vec<(String, String)>,
+    pub(crate) entries: Vec<(String, String)>,
 }
 
 /// Metrics `name.stepK` for more values of `K` than these are shown by the first and the last.
@@ -95,11 +95,6 @@ impl Facts {
             }
         }
         Ok(facts)
-    }
-
-    /// The entries.
-    pub fn entries(&self) -> &[(String, String)] {
-        &self.entries
     }
 }
 
@@ -190,7 +185,7 @@ mod tests {
         json.push_str(",\"a.n128\":2e-7,\"a.n64\":3,\"b.step0\":1,\"b.step1\":2}");
         let facts = Facts::from_summary("summary.json", &json).unwrap();
         let entries: Vec<(&str, &str)> = facts
-            .entries()
+            .entries
             .iter()
             .map(|(name, value)| (name.as_str(), value.as_str()))
             .collect();

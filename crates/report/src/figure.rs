@@ -5,13 +5,12 @@ use std::ops::RangeInclusive;
 
 use crate::bitmap;
 use crate::colour::{GREY, INK};
-use crate::drawable::Drawable;
 use crate::error::{Error, Result};
 use crate::font::{self, AIR, Align, LEADING, TextStyle};
 use crate::geom::{Margins, Point, Rect, point};
 use crate::legend::{Block, LegendEntry};
 use crate::output::OutputDir;
-use crate::panel::Panel;
+use crate::panel::{Drawable, Panel};
 use crate::style::Fonts;
 use crate::surface::Surface;
 use crate::svg;
@@ -399,7 +398,7 @@ mod tests {
     use srgb::Rgb;
 
     use super::*;
-    use crate::colour::{WHITE, viridis};
+    use crate::colour::viridis;
     use crate::{
         Axis, Colour, Curve, Heatmap, LineChart, LineStyle, Marker, OKABE_ITO, Raster, Series,
         Shapes,
@@ -466,7 +465,7 @@ mod tests {
         let figure = Figure::from(diagonal());
         let (picture, size) = (picture(&figure), figure.layout().unwrap().size);
         assert_eq!(picture.dimensions(), (2 * size.0, 2 * size.1));
-        assert_eq!(at(&picture, 0.0, 0.0), WHITE);
+        assert_eq!(at(&picture, 0.0, 0.0), Rgb::WHITE);
         for t in [0.1, 0.25, 0.5, 0.75, 0.9] {
             let (x, y) = place(&figure, [t, t]);
             assert!(has_near(&picture, BLUE, [x, y], 0.5), "nothing at {t}");
@@ -708,7 +707,7 @@ mod tests {
             assert_eq!(at(x, y), VERMILLION);
         }
         for (x, y) in [(0.0, 0.0), (0.4, 0.4), (1.05, 0.0)] {
-            assert_eq!(at(x, y), WHITE);
+            assert_eq!(at(x, y), Rgb::WHITE);
         }
         let y = right.centre().y;
         assert!(has_near(
@@ -782,7 +781,11 @@ mod tests {
             assert!((plot.height / plot.width - 2.0 / 3.0).abs() < 0.01);
             let at = |x, y| at(&picture, plot.x + x * plot.width, plot.y + y * plot.height);
             for y in [0.02, 0.5, 0.98] {
-                assert_eq!((at(0.02, y), at(0.45, y)), (WHITE, WHITE), "{columns} {y}");
+                assert_eq!(
+                    (at(0.02, y), at(0.45, y)),
+                    (Rgb::WHITE, Rgb::WHITE),
+                    "{columns} {y}"
+                );
                 assert_eq!((at(0.55, y), at(0.98, y)), (green, green), "{columns} {y}");
             }
             let svg = figure.to_svg().unwrap();

@@ -4,9 +4,9 @@ use srgb::Rgb;
 
 use crate::axis::Window;
 use crate::colour::Colour;
-use crate::drawable::Drawable;
 use crate::error::{Error, Result};
 use crate::geom::{Point, Rect, clip_loop, clip_polyline, thin};
+use crate::panel::Drawable;
 use crate::style::LineStyle;
 use crate::surface::Surface;
 
