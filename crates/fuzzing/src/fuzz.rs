@@ -35,12 +35,6 @@ pub struct Limit {
     pub plus: usize,
 }
 
-impl Limit {
-    fn of(self, file: &[u8]) -> usize {
-        self.times * file.len() + self.plus
-    }
-}
-
 /// What was measured.
 #[derive(Clone, Debug, Default, derive_more::Display)]
 #[display(
@@ -224,7 +218,7 @@ impl<'a> Fuzz<'a> {
         }));
         let time = start.elapsed();
         let (refusal, peak) = attempt.map_err(|payload| panic_message(&*payload))?;
-        let limit = self.limit.of(bytes);
+        let limit = self.limit.times * bytes.len() + self.limit.plus;
         report.cases += 1;
         report.accepted += u64::from(refusal.is_none());
         report.time += time;

@@ -281,10 +281,7 @@ impl Frames {
     pub fn new(caption: impl Into<String>, frames: Vec<(String, Image)>) -> Result<Self> {
         let caption = caption.into();
         if frames.is_empty() {
-            return Err(Error::Empty {
-                what: "the sequence of pictures",
-                title: caption,
-            });
+            return Err(Error::Empty("the sequence of pictures", caption));
         }
         Ok(Self { caption, frames })
     }

@@ -519,7 +519,7 @@ mod tests {
         for panel in panels {
             let error = Figure::from(panel).to_svg().unwrap_err();
             assert!(
-                matches!(&error, Error::Empty { chart } if chart == "c"),
+                matches!(&error, Error::Empty(chart) if chart == "c"),
                 "{error}"
             );
         }

@@ -53,8 +53,8 @@ impl Heatmap {
         let constant = values.all(|v| Some(v) == first);
         let padding = if constant { 0.05 } else { 0.0 };
         let colours = self.bar.resolve(self.values.iter().copied(), padding)?;
-        let chart = self.title.clone();
-        let bar = Ruler::new(&self.bar, colours.ok_or(Error::Empty { chart })?, fonts);
+        let colours = colours.ok_or_else(|| Error::Empty(self.title.clone()))?;
+        let bar = Ruler::new(&self.bar, colours, fonts);
         let ends = [&self.x, &self.y].map(|axis| axis.range.unwrap_or([0.0, 1.0]));
         let window = Window::linear([&self.x.label, &self.y.label], ends)?;
         let axes = Axes::new(window, [&self.x, &self.y], fonts);

@@ -138,8 +138,7 @@ impl LineChart {
         let x = self.x.resolve(shown.iter().map(|[x, _]| *x), margin)?;
         let y = self.y.resolve(shown.iter().map(|[_, y]| *y), 0.05)?;
         let (Some(x), Some(y), false) = (x, y, shown.is_empty()) else {
-            let chart = self.title.clone();
-            return Err(Error::Empty { chart });
+            return Err(Error::Empty(self.title.clone()));
         };
         let axes = Axes::new(Window { x, y }, [&self.x, &self.y], fonts);
         Ok(Plot { chart: self, axes })

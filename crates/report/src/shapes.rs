@@ -103,8 +103,7 @@ impl Shapes {
         let bounds = points
             .map(|point| point.map(|c| [c, c]))
             .reduce(|a, b| [join(a[0], b[0]), join(a[1], b[1])]);
-        let chart = self.caption.clone();
-        let bounds = bounds.ok_or(Error::Empty { chart })?;
+        let bounds = bounds.ok_or_else(|| Error::Empty(self.caption.clone()))?;
         let [width, height] = bounds.map(|[low, high]| high - low);
         let longest = width.max(height);
         let margin = if longest > 0.0 { 0.06 * longest } else { 1.0 };

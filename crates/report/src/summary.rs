@@ -76,9 +76,7 @@ impl Summary {
 
     fn add(&mut self, name: &str, number: Number) -> Result<()> {
         if !is_metric_name(name) {
-            return Err(Error::MetricName {
-                name: name.to_owned(),
-            });
+            return Err(Error::MetricName(name.to_owned()));
         }
         if let Some(old) = self.metrics.get(name) {
             let (name, value) = (name.to_owned(), old.to_string());

@@ -67,7 +67,9 @@ fn unpacked(mut packed: impl Read, limit: u64) -> Result<Volume, FormatError> {
     let mut bytes = Vec::new();
     let mut head = packed.by_ref().take(HEAD as u64);
     head.read_to_end(&mut bytes).map_err(damaged)?;
-    let header = header(&bytes)?;
+    let header = nifti::header(&bytes).or_else(|| mrc::header(&bytes));
+    let start = bytes.iter().take(8).copied().collect();
+    let header = header.ok_or(FormatError::Unknown { start })??;
     let expected = header.end(limit)?;
     // One more than announced tells that there are more.
     let rest = (expected + 1).saturating_sub(bytes.len() as u64);
@@ -110,14 +112,6 @@ struct Header {
     frame: DAffine3,
     /// Where the voxels begin.
     start: u64,
-}
-
-fn header(head: &[u8]) -> Result<Header, FormatError> {
-    let known = nifti::header(head).or_else(|| mrc::header(head));
-    known.unwrap_or_else(|| {
-        let start = head.iter().take(8).copied().collect();
-        Err(FormatError::Unknown { start })
-    })
 }
 
 /// Numbers of voxels.

@@ -4,7 +4,7 @@
 //! refuses `solid` without a name, reads the first of several solids only, and rounds ASCII to
 //! single precision.
 
-use super::{FormatError, Polygons, finite, position, shortened};
+use super::{FormatError, Polygons, finite, position};
 use crate::TriangleMesh;
 use crate::mesh::merge_coincident;
 use crate::vector::{Vector, scaled_normal};
@@ -28,11 +28,12 @@ pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
             });
         }
         None => {
-            return Err(FormatError::Line {
-                line: 1,
-                found: shortened(&String::from_utf8_lossy(bytes)),
-                expected: "\"solid\", or a binary header of 84 bytes,",
-            });
+            let expected = "\"solid\", or a binary header of 84 bytes,";
+            return Err(FormatError::line(
+                1,
+                &String::from_utf8_lossy(bytes),
+                expected,
+            ));
         }
     };
     let (first, index) = merge_coincident(&corners);
@@ -102,23 +103,17 @@ fn ascii(text: &str) -> Result<Vec<[f64; 3]>, FormatError> {
             }
             ("outer" | "endloop", true) | ("solid" | "endsolid", false) => {}
             _ => {
-                return Err(FormatError::Line {
-                    line: last,
-                    found: shortened(line),
-                    expected: if open {
-                        "outer loop, vertex, endloop or endfacet"
-                    } else {
-                        "facet or endsolid"
-                    },
-                });
+                let expected = if open {
+                    "outer loop, vertex, endloop or endfacet"
+                } else {
+                    "facet or endsolid"
+                };
+                return Err(FormatError::line(last, line, expected));
             }
         }
     }
     if !complete {
-        return Err(FormatError::EndOfText {
-            line: last,
-            expected: "endsolid",
-        });
+        return Err(FormatError::EndOfText(last, "endsolid"));
     }
     Ok(corners)
 }
