@@ -58,11 +58,8 @@ impl Surface {
         let mut bytes = Vec::with_capacity(10 * used.len() + corners.len());
         for position in &used {
             for i in 0..3 {
-                let part = if extent[i] > 0.0 {
-                    (position[i] - low[i]) / extent[i]
-                } else {
-                    0.0
-                };
+                // Where the box is flat it is NaN, which becomes 0.
+                let part = (position[i] - low[i]) / extent[i];
                 bytes.extend(((part * STEPS).round() as u16).to_le_bytes());
             }
         }

@@ -168,8 +168,11 @@ impl Fairing {
     /// # Errors
     /// The values must be finite.
     pub fn faired(&self, followed: &Followed, u: &Field<3>) -> Result<TriangleMesh, Error> {
+        let now = distances_from_phase_field(u, followed.eps)?;
+        let pairs = followed.vertices.par_iter().zip(&followed.levels);
+        let moved = pairs.map(|(&x, &level)| project(&now, x, level, REACH * followed.eps));
         let mut mesh = TriangleMesh {
-            vertices: followed.at(u)?,
+            vertices: (moved.map(|x| followed.placement.apply_inverse(x))).collect(),
             faces: self.rough.mesh().faces.clone(),
             normals: None,
         };
@@ -191,14 +194,6 @@ impl Fairing {
 }
 
 impl Followed {
-    /// Where the level sets of `u` have taken the vertices, in the coordinates of the mesh.
-    fn at(&self, u: &Field<3>) -> Result<Vec<[f64; 3]>, Error> {
-        let now = distances_from_phase_field(u, self.eps)?;
-        let pairs = self.vertices.par_iter().zip(&self.levels);
-        let moved = pairs.map(|(&x, &level)| project(&now, x, level, REACH * self.eps));
-        Ok(moved.map(|x| self.placement.apply_inverse(x)).collect())
-    }
-
     /// The part of the vertices that the zero level set of `u` has left behind.
     ///
     /// # Errors

@@ -138,13 +138,12 @@ fn orient(faces: &mut [[u32; 3]]) -> usize {
     for (number, face) in faces.iter().enumerate() {
         for i in 0..3 {
             let (a, b) = (face[i], face[(i + 1) % 3]);
-            edges
-                .entry([a.min(b), a.max(b)])
-                .or_default()
-                .push((number, a < b));
+            let sides = edges.entry([a.min(b), a.max(b)]).or_default();
+            sides.push((number, a < b));
         }
     }
     let mut turned: Vec<Option<bool>> = vec![None; faces.len()];
+    let mut total = 0;
     for start in 0..faces.len() {
         if turned[start].is_some() {
             continue;
@@ -167,24 +166,19 @@ fn orient(faces: &mut [[u32; 3]]) -> usize {
                 }
             }
         }
-        let count = patch
-            .iter()
-            .filter(|&&face| turned[face] == Some(true))
-            .count();
-        if 2 * count > patch.len() {
-            for &face in &patch {
-                turned[face] = turned[face].map(|turned| !turned);
-            }
+        let (some, others): (Vec<usize>, Vec<usize>) =
+            (patch.into_iter()).partition(|&face| turned[face] == Some(true));
+        let fewer = if some.len() <= others.len() {
+            some
+        } else {
+            others
+        };
+        total += fewer.len();
+        for face in fewer {
+            faces[face].swap(1, 2);
         }
     }
-    let mut count = 0;
-    for (face, turned) in faces.iter_mut().zip(&turned) {
-        if *turned == Some(true) {
-            face.swap(1, 2);
-            count += 1;
-        }
-    }
-    count
+    total
 }
 
 /// Generalized winding numbers of triangles.

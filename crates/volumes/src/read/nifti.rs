@@ -40,21 +40,16 @@ fn entries(fields: &Fields<'_>, is_first: bool) -> Result<Header, FormatError> {
     };
     // Places in the headers of both versions.
     let at = |first: usize, second: usize| if is_first { first } else { second };
-    let (wanted, least): (&[u8], f64) = if is_first {
-        (b"n+1\0", 352.0)
+    let (wanted, least, [whole, code, real, offset]): (&[u8], f64, _) = if is_first {
+        (b"n+1\0", 352.0, [I16, I16, F32, F32])
     } else {
-        (b"n+2\0\r\n\x1a\n", 544.0)
+        (b"n+2\0\r\n\x1a\n", 544.0, [I64, I32, F64, I64])
     };
     let magic = &fields.bytes[at(344, 4)..at(348, 12)];
     if magic != wanted {
         let magic = magic.escape_ascii();
         return bad("magic", &magic, "n+1 or n+2: header and voxels in one file");
     }
-    let [whole, code, real, offset] = if is_first {
-        [I16, I16, F32, F32]
-    } else {
-        [I64, I32, F64, I64]
-    };
     let dimensions: [f64; 8] = fields.numbers(at(40, 16), whole);
     let [axes, nx, ny, nz, more @ ..] = dimensions;
     // Axes beyond those that are counted say nothing.
