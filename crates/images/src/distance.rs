@@ -24,11 +24,8 @@ impl Outline {
             }
             let nearest = segments.nearest_neighbor_with_distance_2(x);
             let distance = nearest.map_or(f64::NAN, |(_, squared)| squared.sqrt());
-            if is_inside(&segments, x) {
-                -distance
-            } else {
-                distance
-            }
+            let sign = if is_inside(&segments, x) { -1.0 } else { 1.0 };
+            sign * distance
         }
     }
 }

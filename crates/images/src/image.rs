@@ -30,12 +30,9 @@ impl Image {
     /// [`Error::PixelCount`] unless that many values are given.
     pub fn new(size: [u32; 2], grey: Vec<u16>, opacity: Option<Vec<u16>>) -> Result<Self, Error> {
         let pixels = pixels(size).ok_or(Error::ImageSize(size))?;
-        let counts = [
-            ("grey values", Some(grey.len())),
-            ("opacities", opacity.as_ref().map(Vec::len)),
-        ];
-        for (values, actual) in counts {
-            if let Some(actual) = actual.filter(|&count| count != pixels) {
+        let opacities = opacity.as_ref().map_or(pixels, Vec::len);
+        for (values, actual) in [("grey values", grey.len()), ("opacities", opacities)] {
+            if actual != pixels {
                 return Err(Error::PixelCount {
                     size,
                     values,

@@ -18,11 +18,8 @@ pub fn interface(u: &Field<2>, eps: f64) -> Result<impl SignedDistance<2> + use<
         let nearest = std::array::from_fn(|i| x[i].clamp(low[i], low[i] + side));
         // The box is inside its faces.
         let [a, b] = std::array::from_fn(|i| (low[i] - x[i]).max(x[i] - low[i] - side));
-        let to_box = if a.max(b) > 0.0 {
-            a.max(0.0).hypot(b.max(0.0))
-        } else {
-            a.max(b)
-        };
+        let outside = a.max(0.0).hypot(b.max(0.0));
+        let to_box = if a.max(b) > 0.0 { outside } else { a.max(b) };
         if x.iter().any(|v| v.is_nan()) {
             return f64::NAN;
         }

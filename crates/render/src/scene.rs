@@ -130,10 +130,10 @@ impl Scene {
     /// # Errors
     /// There must be as many colours as vertices.
     pub fn painted(mut self, colours: Vec<Rgb>) -> Result<Self, Error> {
-        let vertices = self.mesh.vertices.len() as f64;
-        let count = colours.len() as f64;
-        require("number of colours", count, "that of the vertices", |n| {
-            n.to_bits() == vertices.to_bits()
+        let (count, vertices) = (colours.len(), self.mesh.vertices.len());
+        let range = "that of the vertices";
+        require("number of colours", count as f64, range, |_| {
+            count == vertices
         })?;
         self.painted = Some(colours);
         Ok(self)

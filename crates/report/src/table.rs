@@ -1,7 +1,5 @@
 //! Small tables, written as CSV for programs and as Markdown for people.
 
-use std::path::PathBuf;
-
 use derive_more::From;
 
 use crate::axis::power_of_ten;
@@ -148,11 +146,10 @@ impl Table {
     ///
     /// # Errors
     /// As [`Table::to_csv`], or [`Error::File`].
-    pub fn write(&self, folder: &OutputDir, stem: &str) -> Result<[PathBuf; 2]> {
-        Ok([
-            folder.write(&format!("{stem}.csv"), self.to_csv()?)?,
-            folder.write(&format!("{stem}.md"), self.to_markdown())?,
-        ])
+    pub fn write(&self, folder: &OutputDir, stem: &str) -> Result<()> {
+        folder.write(&format!("{stem}.csv"), self.to_csv()?)?;
+        folder.write(&format!("{stem}.md"), self.to_markdown())?;
+        Ok(())
     }
 }
 

@@ -178,7 +178,7 @@ impl MeshDistance {
         match nearest.part {
             Part::Corner(i) => self.vertex_normals[face[i] as usize],
             Part::Edge(i) => self.edge_normals[&edge(face, i)],
-            Part::Inside => scaled_normal(*self.hierarchy.triangle(nearest.triangle)),
+            Part::Inside => scaled_normal(self.hierarchy.triangles[nearest.triangle]),
         }
     }
 }

@@ -11,7 +11,7 @@ const LEAF: usize = 4;
 /// Boxes around all triangles, around halves of them, halves of these, and so on.
 #[derive(Clone, Debug)]
 pub(crate) struct Hierarchy {
-    triangles: Vec<Triangle>,
+    pub(crate) triangles: Vec<Triangle>,
     /// The two halves of box `i` are `2 i + 1` and `2 i + 2`; the last level is complete.
     boxes: Vec<BoundingBox<3>>,
 }
@@ -36,10 +36,6 @@ impl Hierarchy {
         divide(triangles, &mut order, &mut boxes, 0);
         let triangles = order.iter().map(|&t| triangles[t]).collect();
         (Self { triangles, boxes }, order)
-    }
-
-    pub(crate) fn triangle(&self, number: usize) -> &Triangle {
-        &self.triangles[number]
     }
 
     pub(crate) fn project(&self, x: Vector, triangle: usize) -> Nearest {
