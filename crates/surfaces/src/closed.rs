@@ -29,24 +29,15 @@ pub enum Warning {
     /// The total volume was negative: all faces were reversed.
     #[display("the surface was oriented inwards: all faces reversed")]
     Reversed,
-    /// The surface is closed only if vertices with exactly equal coordinates are one.
-    #[display("{vertices} vertices were merged with others at exactly the same place")]
-    Merged {
-        /// Vertices less than before.
-        vertices: usize,
-    },
-    /// Faces with a repeated vertex were left out.
-    #[display("{faces} faces with a repeated vertex were left out")]
-    Collapsed {
-        /// Number of such faces.
-        faces: usize,
-    },
-    /// Vertices of no face were left out.
-    #[display("{vertices} vertices of no face were left out")]
-    Unreferenced {
-        /// Number of such vertices.
-        vertices: usize,
-    },
+    /// The surface is closed only if vertices with exactly equal coordinates are one: so many less than before.
+    #[display("{_0} vertices were merged with others at exactly the same place")]
+    Merged(usize),
+    /// So many faces with a repeated vertex were left out.
+    #[display("{_0} faces with a repeated vertex were left out")]
+    Collapsed(usize),
+    /// So many vertices of no face were left out.
+    #[display("{_0} vertices of no face were left out")]
+    Unreferenced(usize),
 }
 
 impl ClosedMesh {
@@ -82,14 +73,14 @@ impl ClosedMesh {
             mesh = mesh.merged();
             let vertices = before[0] - mesh.vertices.len();
             let faces = before[1] - mesh.faces.len();
-            warnings.extend((vertices > 0).then_some(Warning::Merged { vertices }));
-            warnings.extend((faces > 0).then_some(Warning::Collapsed { faces }));
+            warnings.extend((vertices > 0).then_some(Warning::Merged(vertices)));
+            warnings.extend((faces > 0).then_some(Warning::Collapsed(faces)));
             seams = Seams::find(&mesh);
         }
         let seams = seams?;
         has_no_area(&mesh)?;
         let vertices = drop_unreferenced(&mut mesh);
-        warnings.extend((vertices > 0).then_some(Warning::Unreferenced { vertices }));
+        warnings.extend((vertices > 0).then_some(Warning::Unreferenced(vertices)));
 
         let bounds = mesh.bounding_box().ok_or(Error::NoFaces)?;
         let (area, volume) = (area(&mesh), volume(&mesh, &mesh.faces));
