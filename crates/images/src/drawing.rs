@@ -62,15 +62,10 @@ fn stored([r, g, b, opacity]: [f64; 4]) -> [u8; 4] {
 
 /// Distances at the corners of the pixels of some rows.
 fn corners(frame: &Frame, shape: &dyn SignedDistance<2>, first: usize, rows: usize) -> Vec<f64> {
-    let columns = 0..=frame.size()[0];
-    let row = |row: usize| {
-        let place = move |column: u32| [f64::from(column), row as f64];
-        columns.clone().map(place)
-    };
-    let places = (first..=first + rows).flat_map(row);
-    places
-        .map(|place| shape.signed_distance(frame.point(place)))
-        .collect()
+    let columns = frame.size()[0] as usize + 1;
+    let place = |k: usize| frame.point([(k % columns) as f64, (first + k / columns) as f64]);
+    let corners = 0..columns * (rows + 1);
+    corners.map(|k| shape.signed_distance(place(k))).collect()
 }
 
 /// The covered part of the pixel with the given upper left corner, and distances at all four.

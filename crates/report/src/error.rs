@@ -17,11 +17,13 @@ pub enum Error {
          rounding, and positive on a logarithmic scale"
     )]
     Range { axis: String, low: f64, high: f64 },
-    #[error("the array of {chart:?} has {found} values where its shape {shape:?} needs {expected}")]
+    #[error(
+        "the array of {chart:?} has {found} values where its shape {shape:?} needs {}",
+        shape[0].saturating_mul(shape[1])
+    )]
     ArrayShape {
         chart: String,
         shape: [usize; 2],
-        expected: usize,
         found: usize,
     },
     #[error(
@@ -63,14 +65,13 @@ pub enum Error {
 impl Error {
     /// Whether an array has the length that its shape says, and that is not 0.
     pub(crate) fn check_shape(chart: &str, shape: [usize; 2], found: usize) -> Result<()> {
-        let (chart, expected) = (chart.to_owned(), shape[0].saturating_mul(shape[1]));
-        match found == expected {
+        let chart = chart.to_owned();
+        match shape[0].saturating_mul(shape[1]) == found {
             true if found == 0 => Err(Self::Empty(chart)),
             true => Ok(()),
             false => Err(Self::ArrayShape {
                 chart,
                 shape,
-                expected,
                 found,
             }),
         }

@@ -6,8 +6,7 @@ use geometry::{Field, Grid, SignedDistance};
 use rayon::prelude::*;
 
 use crate::hierarchy::{Hierarchy, Nearest};
-use crate::mesh::merge_coincident;
-use crate::normals::angle_weighted_normals;
+use crate::mesh::{angle_weighted_normals, merge_coincident};
 use crate::triangle::Part;
 use crate::vector::{Vector, scaled_normal};
 use crate::{ClosedMesh, Error};
