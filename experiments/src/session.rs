@@ -139,12 +139,7 @@ impl Session {
 
     /// Adds a metric, unless its value is missing.
     pub fn metric(&mut self, name: &str, value: impl Into<Cell>) -> Result<()> {
-        match value.into() {
-            Cell::Integer(count) => self.summary.insert_count(name, count as usize)?,
-            Cell::Number(value) => self.summary.insert(name, value)?,
-            Cell::Text(_) | Cell::Missing => {}
-        }
-        Ok(())
+        Ok(self.summary.insert(name, value)?)
     }
 
     pub fn metrics<const N: usize>(&mut self, key: &str, metrics: [(&str, Cell); N]) -> Result<()> {

@@ -259,8 +259,8 @@ impl Flowed {
 
 /// A picture as a panel of a figure.
 pub fn raster(picture: &Picture, caption: impl Into<String>) -> Raster {
-    let size = [picture.width(), picture.height()].map(|side| side as usize);
-    Raster::new(size, picture.pixels()).with_caption(caption)
+    let size = picture.size().map(|side| side as usize);
+    Raster::new(caption, size, picture.pixels())
 }
 
 /// Sizes of time steps that are powers of two, for figures.

@@ -125,8 +125,8 @@ pub fn figure(mesh: &TriangleMesh, lengths: &[f64], lost: &[bool], up: UpAxis) -
             percent * count as f64
         ),
     };
-    let size = [picture.width(), picture.height()].map(|side| side as usize);
-    let surface = Raster::new(size, picture.pixels()).with_caption(caption);
+    let size = picture.size().map(|side| side as usize);
+    let surface = Raster::new(caption, size, picture.pixels());
     let mut shares = [0.0; BARS];
     for length in lengths {
         let bar = (length / largest * BARS as f64) as usize;

@@ -2,7 +2,7 @@
 
 use geometry::npy::{self, NpyError};
 use geometry::{PURE_BEYOND, distance_from_phase_field, thin_part};
-use images::{Outline, OutlineDistance, Side, Tones};
+use images::{Outline, Side, Tones};
 use surfaces::hausdorff_distance;
 use surfaces::shapes::{self, BuiltIn};
 
@@ -417,9 +417,9 @@ impl<'a> Reader<'a> {
 
     /// A mesh whose vertices follow the flow, on the coarsest grid that holds its parts and holes.
     pub fn own(&mut self, own: OwnMesh, path: &Path, allow_loss: bool) -> Result<Loaded> {
-        let (rough, start) = (own.rough(), own.fairing().start());
+        let (rough, start) = (own.rough(), &own.fairing().start);
         let grids = (self.options.cells).map_or(OWN_CELLS.to_vec(), |cells| vec![cells]);
-        let part = OWN_PART[usize::from(own.fairing().noise() == 0.0)];
+        let part = OWN_PART[usize::from(own.fairing().noise == 0.0)];
         let advice = "use more --cells, or --allow-loss to go on without them";
         let refused = (!allow_loss).then_some(advice);
         let (field, surface) = self.like_mesh(start, part, &grids, refused)?;
@@ -520,7 +520,7 @@ impl<'a> Reader<'a> {
             refuse_photographs(&tones, side, path)?;
         }
         let outline = Outline::of_image(&image, side)?.smoothed(tones.raster())?;
-        let distance = OutlineDistance::new(&outline);
+        let distance = outline.distance();
         let sides = outline.sides();
         let grid = self.grid_holding(&image.bounding_box(), &IMAGE_CELLS, &distance, &sides)?;
         let field = phase_field(grid, &distance, self.eps(&grid))?;

@@ -87,12 +87,12 @@ impl OwnMesh {
         let keep = keep.transpose()?;
         let stays = |x| keep.as_ref().is_some_and(|keep| keep.holds(x));
         let fairing = Fairing::new(closed, self.noise, stays);
-        let kept = fairing.keeps().iter().filter(|&&kept| kept).count();
-        if kept == fairing.keeps().len() {
+        let kept = fairing.kept.iter().filter(|&&kept| kept).count();
+        if kept == fairing.kept.len() {
             refuse!("--keep contains all of the mesh: nothing could move");
         }
         if keep.is_some() && kept == 0 {
-            let bounds = fairing.rough().bounding_box();
+            let bounds = fairing.rough.bounding_box();
             refuse!(
                 "--keep contains no vertex of the mesh, which goes from {:?} to {:?}",
                 bounds.lower,
@@ -128,7 +128,7 @@ impl OwnMesh {
 
     /// The mesh as it was given.
     pub fn rough(&self) -> &ClosedMesh {
-        self.fairing().rough()
+        &self.fairing().rough
     }
 
     /// The nodes that may move, if not all.
@@ -180,7 +180,7 @@ impl OwnMesh {
         let followed = self.followed(start, eps)?;
         let mut moved = fairing.faired(&followed, u)?;
         if self.keeps_volume {
-            moved = moved.with_volume(rough.volume(), |v| !fairing.keeps()[v]);
+            moved = moved.with_volume(rough.volume(), |v| !fairing.kept[v]);
         }
         let ways = rough.mesh().vertices.iter().zip(&moved.vertices);
         let goes: HashMap<_, _> = (ways.clone().map(|(from, to)| (key(*from), *to))).collect();

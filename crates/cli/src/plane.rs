@@ -1,6 +1,6 @@
 //! Shapes in the plane, as the pixels of an image.
 
-use images::{Frame, Image, Interface, Outline, OutlineDistance, Side, drawing};
+use images::{Frame, Image, Outline, Side, drawing, interface};
 use render::Rgb;
 
 use crate::paths::{extension, read};
@@ -33,9 +33,9 @@ struct Original {
 impl Plane {
     /// The frame has the pixels of the image.
     pub fn of_image(image: &Image, path: &Path) -> Result<Self> {
-        let (width, height) = (image.width(), image.height());
+        let [_, height] = image.size();
         Ok(Self {
-            frame: Frame::new(width, height, [0.0, f64::from(height)], 1.0)?,
+            frame: Frame::new(image.size(), [0.0, f64::from(height)], 1.0)?,
             original: None,
             image: Some(path.to_owned()),
         })
@@ -44,8 +44,7 @@ impl Plane {
     /// What is inside a mask that is an image: of the size of the input, or else a square, which fills the box.
     pub fn mask(&self, mask: &str, grid: &Grid<2>) -> Result<Box<dyn SignedDistance<2>>> {
         let image = images::read(mask)?;
-        let (width, height) = (image.width(), image.height());
-        let [w, h] = [self.frame.width(), self.frame.height()];
+        let ([width, height], [w, h]) = (image.size(), self.frame.size());
         if self.image.is_some() && [width, height] != [w, h] {
             refuse!(
                 "--mask {mask} has {width} x {height} pixels; it must have {w} x {h}, as the input"
@@ -62,7 +61,7 @@ impl Plane {
             let fills = Placement::fit(&image.bounding_box(), grid, grid.side())?;
             outline = outline.placed(&fills);
         }
-        Ok(Box::new(OutlineDistance::new(&outline)))
+        Ok(Box::new(outline.distance()))
     }
 
     /// From now on in the tones of the input, if it is an image, all of whose pixels outside of a mask stay.
@@ -71,7 +70,7 @@ impl Plane {
             return Ok(());
         };
         let picture = images::colours(path, &read(path)?)?;
-        let width = self.frame.width() as usize;
+        let width = self.frame.size()[0] as usize;
         let is_inside = |pixel: usize| {
             let [column, row] = [pixel % width, pixel / width].map(|i| i as f64 + 0.5);
             mask.signed_distance(self.frame.point([column, row])) < 0.0
@@ -97,13 +96,12 @@ impl Original {
             std::array::from_fn(|c| (part * ink[c] + (1.0 - part) * paper[c]).round() as u8)
         };
         let pixels = self.picture.pixels().iter().enumerate().map(mixed);
-        let (width, height) = (self.picture.width(), self.picture.height());
-        Ok(Picture::new(width, height, pixels.collect())?)
+        Ok(Picture::new(self.picture.size(), pixels.collect())?)
     }
 
     /// The mean of the pixels outside of the mask where the drawing has this opacity: those near the mask, or else all of them.
     fn tone(&self, drawing: &Picture, opacity: u8) -> Option<[f64; 4]> {
-        let width = self.picture.width() as usize;
+        let width = self.picture.size()[0] as usize;
         let place = |pixel: usize| [pixel % width, pixel / width].map(|i| i as f64);
         let drawn = (0..self.drawn.len()).filter(|&pixel| self.drawn[pixel]);
         let mask = BoundingBox::around(drawn.map(place))?;
@@ -150,7 +148,7 @@ impl Presentation<2> for Plane {
     }
 
     fn picture(&self, _: &Field<2>, u: &Field<2>, eps: f64) -> Result<Picture> {
-        let interface = Interface::new(u, eps)?;
+        let interface = interface(u, eps)?;
         match &self.original {
             None => Ok(drawing(&self.frame, &interface, Some(Rgb::WHITE))?),
             Some(original) => original.with(&drawing(&self.frame, &interface, None)?),
@@ -180,8 +178,8 @@ impl Presentation<2> for Plane {
             return Ok(Vec::new());
         };
         let tone = |&drawn: &bool| if drawn { [0, 0, 0, 255] } else { [255; 4] };
-        let (width, height) = (original.picture.width(), original.picture.height());
-        let mask = Picture::new(width, height, original.drawn.iter().map(tone).collect())?;
+        let drawn = original.drawn.iter().map(tone).collect();
+        let mask = Picture::new(original.picture.size(), drawn)?;
         Ok(vec![
             (ORIGINAL.to_owned(), original.picture.to_png()?),
             (MASK.to_owned(), mask.to_png()?),

@@ -266,7 +266,7 @@ fn inpainting_in_space_keeps_what_is_outside_bit_for_bit() {
 #[test]
 fn drawings_flow_in_their_own_pixels() {
     let folder = tempfile::tempdir().unwrap();
-    let frame = Frame::new(90, 60, [0.0, 60.0], 1.0).unwrap();
+    let frame = Frame::new([90, 60], [0.0, 60.0], 1.0).unwrap();
     let square =
         geometry::SignedDistanceExt::translated(Cuboid::new([15.0, 15.0]).unwrap(), [30.0, 30.0]);
     let drawn = drawing(&frame, &square, Some(Rgb::WHITE)).unwrap();
@@ -291,7 +291,7 @@ fn drawings_flow_in_their_own_pixels() {
     let area = outcome["area"].as_f64().unwrap();
     assert!((area / 900.0 - 1.0).abs() < 0.1, "{outcome}");
     let after = images::read(folder.path().join("run/final.png")).unwrap();
-    assert_eq!((after.width(), after.height()), (90, 60));
+    assert_eq!(after.size(), [90, 60]);
     assert!(after.grey()[30 * 90 + 30] < 100 && after.grey()[30 * 90 + 60] > 60_000);
     for name in [
         "final.svg",
@@ -494,7 +494,7 @@ fn photographs_are_drawings_too() {
         let area = outcome["area"].as_f64().unwrap();
         assert!((area / 1024.0 - 1.0).abs() < 0.03, "{outcome}");
         let after = images::read(folder.path().join(output).join("final.png")).unwrap();
-        assert_eq!((after.width(), after.height()), (64, 64));
+        assert_eq!(after.size(), [64, 64]);
     }
     // Half of a file is refused in one line, which names it.
     let bytes = std::fs::read(folder.path().join("square.jpg")).unwrap();
@@ -587,7 +587,7 @@ fn samples_are_inputs() {
 #[test]
 fn images_are_masks_too() {
     let folder = tempfile::tempdir().unwrap();
-    let frame = Frame::new(60, 60, [0.0, 60.0], 1.0).unwrap();
+    let frame = Frame::new([60, 60], [0.0, 60.0], 1.0).unwrap();
     let disc = Ball::new([30.0, 30.0], 20.0).unwrap();
     let spot = Ball::new([50.0, 30.0], 10.0).unwrap();
     for (name, shape) in [("disc.png", &disc), ("spot.png", &spot)] {

@@ -177,7 +177,7 @@ fn tensions_are_in_the_units_of_the_input() {
         let value = if x * x + y * y < 2500 { 0 } else { 255 };
         [value, value, value, 255]
     };
-    let picture = render::Picture::new(200, 200, (0..40_000).map(pixel).collect()).unwrap();
+    let picture = render::Picture::new([200, 200], (0..40_000).map(pixel).collect()).unwrap();
     picture.write_png(folder.path().join("disc.png")).unwrap();
     let area = |run: &str, options: &[&str]| {
         let common = [

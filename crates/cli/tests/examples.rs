@@ -39,7 +39,7 @@ fn quick(command: &str) -> &'static [&'static str] {
 }
 
 fn draw(path: &Path, shape: &impl SignedDistance<2>) {
-    let frame = Frame::new(200, 200, [0.0, 200.0], 1.0).unwrap();
+    let frame = Frame::new([200, 200], [0.0, 200.0], 1.0).unwrap();
     let drawn = drawing(&frame, shape, Some(Rgb::WHITE)).unwrap();
     drawn.write_png(path).unwrap();
 }

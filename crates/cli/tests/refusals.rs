@@ -29,7 +29,7 @@ fn every_mistake_is_one_clear_line() {
     write("type.toml", b"steps = [3]\n");
     write("value.toml", b"steps = \"many\"\n");
     write("other.toml", b"command = \"mcf\"\nsteps = 3\n");
-    let white = render::Picture::new(8, 8, vec![[255; 4]; 64]).unwrap();
+    let white = render::Picture::new([8, 8], vec![[255; 4]; 64]).unwrap();
     white.write_png(folder.path().join("white.png")).unwrap();
     std::fs::create_dir(folder.path().join("full")).unwrap();
     write("full/mine", b"");

@@ -279,7 +279,7 @@ fn a_flipped_bit_in_any_file_is_found_and_the_file_named() {
 fn runs_are_resumed_without_their_input_and_elsewhere() {
     let folder = tempfile::tempdir().unwrap();
     let (drawing, path) = (folder.path().join("disc.png"), folder.path().join("first"));
-    let frame = images::Frame::new(80, 80, [-1.0, 1.0], 0.025).unwrap();
+    let frame = images::Frame::new([80, 80], [-1.0, 1.0], 0.025).unwrap();
     let square = geometry::shapes::Cuboid::new([0.5, 0.5]).unwrap();
     let picture = images::drawing(&frame, &square, Some(render::Rgb::WHITE));
     picture.unwrap().write_png(&drawing).unwrap();

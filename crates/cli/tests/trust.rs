@@ -19,7 +19,7 @@ fn refused(folder: &Path, arguments: &[&str]) -> String {
 
 /// A drawing of so many pixels a side.
 fn draw(path: &Path, pixels: u32, shape: &impl SignedDistance<2>) {
-    let frame = Frame::new(pixels, pixels, [0.0, f64::from(pixels)], 1.0).unwrap();
+    let frame = Frame::new([pixels; 2], [0.0, f64::from(pixels)], 1.0).unwrap();
     let drawn = drawing(&frame, shape, Some(Rgb::WHITE)).unwrap();
     drawn.write_png(path).unwrap();
 }
@@ -215,7 +215,7 @@ fn inpainting_copies_the_pixels_outside_of_the_mask_in_their_colours() {
             paper
         }
     };
-    let picture = Picture::new(160, 160, (0..160 * 160).map(pixel).collect()).unwrap();
+    let picture = Picture::new([160, 160], (0..160 * 160).map(pixel).collect()).unwrap();
     picture.write_png(folder.path().join("disc.png")).unwrap();
     let inpaint = [
         "inpaint",
@@ -257,7 +257,7 @@ fn photographs_are_refused_until_it_is_said_what_is_inside() {
         let v = (255.0 * (0.5 + 0.3 * (7.0 * x).sin() * (5.0 * y).cos() + 0.2 * x)) as u8;
         [v, v, v, 255]
     };
-    let picture = Picture::new(120, 120, (0..120 * 120).map(shade).collect()).unwrap();
+    let picture = Picture::new([120, 120], (0..120 * 120).map(shade).collect()).unwrap();
     picture.write_png(folder.path().join("photo.png")).unwrap();
     for command in ["flow", "inpaint", "mcf"] {
         let mask: &[&str] = if command == "inpaint" {

@@ -22,8 +22,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // The phase field: the mesh in the unit box, by its signed distance.
     let grid = Grid::<3>::per_unit(64, 1.0)?;
     let scales = Scales::of_grid(grid.spacing(), 2.0);
-    let placement = Placement::fit(&fairing.start().bounding_box(), &grid, 0.8)?;
-    let distance = MeshDistance::new(&fairing.start().placed(&placement));
+    let placement = Placement::fit(&fairing.start.bounding_box(), &grid, 0.8)?;
+    let distance = MeshDistance::new(&fairing.start.placed(&placement));
     let initial = geometry::Field::from_fn(grid, |x| {
         optimal_profile(distance.signed_distance(x), scales.eps)
     });

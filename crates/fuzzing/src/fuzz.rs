@@ -35,12 +35,6 @@ pub struct Limit {
     pub plus: usize,
 }
 
-impl Limit {
-    fn of(self, file: &[u8]) -> usize {
-        self.times * file.len() + self.plus
-    }
-}
-
 /// What was measured.
 #[derive(Clone, Debug, Default, derive_more::Display)]
 #[display(
@@ -68,6 +62,7 @@ pub struct Report {
 type Case = (Index, Vec<Change>, bool);
 
 /// One reader and the files to change.
+#[must_use]
 pub struct Fuzz<'a> {
     name: &'static str,
     limit: Limit,
@@ -93,7 +88,6 @@ impl<'a> Fuzz<'a> {
     }
 
     /// Files that the reader accepts.
-    #[must_use]
     pub fn valid(mut self, files: impl IntoIterator<Item = Vec<u8>>) -> Self {
         let before = self.material.files.len();
         self.material.files.splice(0..0, files);
@@ -102,7 +96,6 @@ impl<'a> Fuzz<'a> {
     }
 
     /// Beginnings of files, to be followed by random bytes.
-    #[must_use]
     pub fn starts<T: AsRef<[u8]>>(mut self, starts: impl IntoIterator<Item = T>) -> Self {
         let starts = starts.into_iter().map(|s| s.as_ref().to_vec());
         self.material.files.extend(starts);
@@ -110,7 +103,6 @@ impl<'a> Fuzz<'a> {
     }
 
     /// Words that have a meaning in the format, such as those that open something: they are repeated, and nested by that.
-    #[must_use]
     pub fn words<T: AsRef<[u8]>>(mut self, words: impl IntoIterator<Item = T>) -> Self {
         let words = words.into_iter().map(|w| w.as_ref().to_vec());
         self.material.words.extend(words);
@@ -119,7 +111,6 @@ impl<'a> Fuzz<'a> {
 
     /// Half of the changed files go through this, such as for checksums that fit again: behind them
     /// is more to reach.
-    #[must_use]
     pub fn repair(mut self, repair: impl Fn(Vec<u8>) -> Vec<u8> + 'a) -> Self {
         self.repair = Some(Box::new(repair));
         self
@@ -227,7 +218,7 @@ impl<'a> Fuzz<'a> {
         }));
         let time = start.elapsed();
         let (refusal, peak) = attempt.map_err(|payload| panic_message(&*payload))?;
-        let limit = self.limit.of(bytes);
+        let limit = self.limit.times * bytes.len() + self.limit.plus;
         report.cases += 1;
         report.accepted += u64::from(refusal.is_none());
         report.time += time;

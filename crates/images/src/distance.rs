@@ -10,61 +10,42 @@ use crate::Outline;
 /// Coordinates are below this, so that squares of distances are far from overflowing.
 const FAR: f64 = 1e100;
 
-/// The signed distance to the curves of an outline: negative inside, exact to rounding.
-///
-/// The nearest segment is found in an R-tree. A point is inside if a ray from it crosses
-/// the curves an odd number of times, so that curves which touch or overlap do no harm.
-#[derive(Clone, Debug)]
-pub struct OutlineDistance {
-    segments: RTree<Line<[f64; 2]>>,
-}
-
-impl OutlineDistance {
-    /// Builds the tree.
-    pub fn new(outline: &Outline) -> Self {
-        let segments = outline.curves().iter().flat_map(Polyline::segments);
-        Self {
-            segments: RTree::bulk_load(segments.map(|(a, b)| Line::new(a, b)).collect()),
+impl Outline {
+    /// The signed distance to the curves: negative inside, exact to rounding; NaN for coordinates that are not finite, or beyond `1e100`.
+    ///
+    /// The nearest segment is found in an R-tree. A point is inside if a ray from it crosses
+    /// the curves an odd number of times, so that curves which touch or overlap do no harm.
+    pub fn distance(&self) -> impl SignedDistance<2> + use<> {
+        let segments = self.curves().iter().flat_map(Polyline::segments);
+        let segments = RTree::bulk_load(segments.map(|(a, b)| Line::new(a, b)).collect());
+        move |x: [f64; 2]| {
+            if !x.iter().all(|v| v.abs() < FAR) {
+                return f64::NAN;
+            }
+            let nearest = segments.nearest_neighbor_with_distance_2(x);
+            let distance = nearest.map_or(f64::NAN, |(_, squared)| squared.sqrt());
+            let sign = if is_inside(&segments, x) { -1.0 } else { 1.0 };
+            sign * distance
         }
-    }
-
-    /// Whether a ray to the left or right, to where the bounding box is nearer, crosses the curves an
-    /// odd number of times.
-    fn is_inside(&self, [x, y]: [f64; 2]) -> bool {
-        let bounds = self.segments.root().envelope();
-        if !bounds.contains_point(&[x, y]) {
-            return false;
-        }
-        let (left, right) = (bounds.lower()[0], bounds.upper()[0]);
-        let leftwards = x - left < right - x;
-        let end = if leftwards { left } else { right };
-        let ray = AABB::from_corners([end, y], [x, y]);
-        let crossed =
-            self.segments
-                .locate_in_envelope_intersecting(ray)
-                .filter(|Line { from, to }| {
-                    // The lower end belongs to a segment, the upper one does not: every corner counts
-                    // once.
-                    let across = (from[1] > y) != (to[1] > y);
-                    let at = from[0] + (y - from[1]) / (to[1] - from[1]) * (to[0] - from[0]);
-                    across && (at < x) == leftwards
-                });
-        crossed.count() % 2 == 1
     }
 }
 
-impl SignedDistance<2> for OutlineDistance {
-    /// NaN for coordinates that are not finite, or beyond `1e100`.
-    fn signed_distance(&self, x: [f64; 2]) -> f64 {
-        if !x.iter().all(|v| v.abs() < FAR) {
-            return f64::NAN;
-        }
-        let nearest = self.segments.nearest_neighbor_with_distance_2(x);
-        let distance = nearest.map_or(f64::NAN, |(_, squared)| squared.sqrt());
-        if self.is_inside(x) {
-            -distance
-        } else {
-            distance
-        }
+/// Whether a ray to the left or right, to where the bounding box is nearer, crosses the segments an odd number of times.
+fn is_inside(segments: &RTree<Line<[f64; 2]>>, [x, y]: [f64; 2]) -> bool {
+    let bounds = segments.root().envelope();
+    if !bounds.contains_point(&[x, y]) {
+        return false;
     }
+    let (left, right) = (bounds.lower()[0], bounds.upper()[0]);
+    let leftwards = x - left < right - x;
+    let end = if leftwards { left } else { right };
+    let ray = AABB::from_corners([end, y], [x, y]);
+    let crosses = |Line { from, to }: &&Line<[f64; 2]>| {
+        // The lower end belongs to a segment, the upper one does not: every corner counts once.
+        let across = (from[1] > y) != (to[1] > y);
+        let at = from[0] + (y - from[1]) / (to[1] - from[1]) * (to[0] - from[0]);
+        across && (at < x) == leftwards
+    };
+    let crossed = segments.locate_in_envelope_intersecting(ray);
+    crossed.filter(crosses).count() % 2 == 1
 }

@@ -29,8 +29,8 @@ pub fn drawing(
     let paper = paper.map_or([0.0; 4], |Rgb(r, g, b)| {
         [r, g, b, 255].map(|v| f64::from(v) / 255.0)
     });
-    let width = frame.width() as usize;
-    let mut pixels = vec![[0; 4]; width * frame.height() as usize];
+    let [width, height] = frame.size().map(|side| side as usize);
+    let mut pixels = vec![[0; 4]; width * height];
     let bands = pixels.par_chunks_mut(BAND * width).enumerate();
     bands.for_each(|(band, pixels)| {
         let first = BAND * band;
@@ -45,7 +45,7 @@ pub fn drawing(
             *pixel = stored(std::array::from_fn(|c| ink[c] + (1.0 - covered) * paper[c]));
         }
     });
-    Ok(Picture::new(frame.width(), frame.height(), pixels)?)
+    Ok(Picture::new(frame.size(), pixels)?)
 }
 
 /// As a picture has it, of colour times opacity, and opacity.
@@ -62,15 +62,10 @@ fn stored([r, g, b, opacity]: [f64; 4]) -> [u8; 4] {
 
 /// Distances at the corners of the pixels of some rows.
 fn corners(frame: &Frame, shape: &dyn SignedDistance<2>, first: usize, rows: usize) -> Vec<f64> {
-    let columns = 0..=frame.width();
-    let row = |row: usize| {
-        let place = move |column: u32| [f64::from(column), row as f64];
-        columns.clone().map(place)
-    };
-    let places = (first..=first + rows).flat_map(row);
-    places
-        .map(|place| shape.signed_distance(frame.point(place)))
-        .collect()
+    let columns = frame.size()[0] as usize + 1;
+    let place = |k: usize| frame.point([(k % columns) as f64, (first + k / columns) as f64]);
+    let corners = 0..columns * (rows + 1);
+    corners.map(|k| shape.signed_distance(place(k))).collect()
 }
 
 /// The covered part of the pixel with the given upper left corner, and distances at all four.

@@ -4,6 +4,8 @@
 
 use std::path::PathBuf;
 
+use crate::image::LARGEST_IMAGE;
+use crate::outline::LARGEST_OUTLINE;
 use crate::read::error::FormatError;
 
 /// Errors of images, outlines, placement and drawings, each with the numbers needed to act on it.
@@ -20,18 +22,13 @@ pub enum Error {
     /// Pictures and their encoding.
     Picture(#[from] render::Error),
     #[error(
-        "an image of {width} x {height} pixels cannot be used; it needs at least one pixel and \
-         may have up to {limit}"
+        "an image of {} x {} pixels cannot be used; it needs at least one pixel and may have up to {LARGEST_IMAGE}",
+        _0[0], _0[1]
     )]
-    ImageSize {
-        width: u32,
-        height: u32,
-        limit: usize,
-    },
-    #[error("{width} x {height} pixels were announced, but {actual} {values} given")]
+    ImageSize([u32; 2]),
+    #[error("{} x {} pixels were announced, but {actual} {values} given", size[0], size[1])]
     PixelCount {
-        width: u32,
-        height: u32,
+        size: [u32; 2],
         /// What is given: grey values or opacities.
         values: &'static str,
         actual: usize,
@@ -49,10 +46,10 @@ pub enum Error {
         high: f64,
     },
     #[error(
-        "the outline would have about {segments} segments, more than {limit}: this is noise and \
+        "the outline would have about {segments} segments, more than {LARGEST_OUTLINE}: this is noise and \
          no shape; blur the image or make it smaller"
     )]
-    Noise { segments: usize, limit: usize },
+    Noise { segments: usize },
     #[error(
         "the phase field has no interface: its values range from {low:.4} to {high:.4}, and do \
          not change sign"

@@ -14,17 +14,16 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// A raster of `width` times `height` pixels of side `pixel`, by its upper left corner.
+    /// A raster of so many columns and rows of pixels of side `pixel`, by its upper left corner.
     ///
     /// # Errors
     /// As [`render::checked_size`]; the numbers must be finite, the pixels of positive side.
-    pub fn new(width: u32, height: u32, upper_left: [f64; 2], pixel: f64) -> Result<Self, Error> {
-        let size = render::checked_size([width, height])?;
+    pub fn new(size: [u32; 2], upper_left: [f64; 2], pixel: f64) -> Result<Self, Error> {
         for x in upper_left {
             require("coordinate of the corner", x, "finite", |_| true)?;
         }
         Ok(Self {
-            size,
+            size: render::checked_size(size)?,
             upper_left,
             pixel: positive("side of a pixel", pixel)?,
         })
@@ -37,17 +36,12 @@ impl Frame {
     pub fn of_box(grid: &Grid<2>, pixels: u32) -> Result<Self, Error> {
         let [x, y] = grid.origin();
         let pixel = grid.side() / f64::from(pixels.max(1));
-        Self::new(pixels, pixels, [x, y + grid.side()], pixel)
+        Self::new([pixels; 2], [x, y + grid.side()], pixel)
     }
 
-    /// Pixels in a row.
-    pub fn width(&self) -> u32 {
-        self.size[0]
-    }
-
-    /// Rows.
-    pub fn height(&self) -> u32 {
-        self.size[1]
+    /// Pixels in a row, and rows.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
     }
 
     /// The side of a pixel.

@@ -28,46 +28,28 @@ impl Image {
     /// # Errors
     /// [`Error::ImageSize`] unless there are from one to [`LARGEST_IMAGE`] pixels,
     /// [`Error::PixelCount`] unless that many values are given.
-    pub fn new(
-        width: u32,
-        height: u32,
-        grey: Vec<u16>,
-        opacity: Option<Vec<u16>>,
-    ) -> Result<Self, Error> {
-        let pixels = pixels(width, height).ok_or(Error::ImageSize {
-            width,
-            height,
-            limit: LARGEST_IMAGE,
-        })?;
-        let counts = [
-            ("grey values", Some(grey.len())),
-            ("opacities", opacity.as_ref().map(Vec::len)),
-        ];
-        for (values, actual) in counts {
-            if let Some(actual) = actual.filter(|&count| count != pixels) {
+    pub fn new(size: [u32; 2], grey: Vec<u16>, opacity: Option<Vec<u16>>) -> Result<Self, Error> {
+        let pixels = pixels(size).ok_or(Error::ImageSize(size))?;
+        let opacities = opacity.as_ref().map_or(pixels, Vec::len);
+        for (values, actual) in [("grey values", grey.len()), ("opacities", opacities)] {
+            if actual != pixels {
                 return Err(Error::PixelCount {
-                    width,
-                    height,
+                    size,
                     values,
                     actual,
                 });
             }
         }
         Ok(Self {
-            size: [width, height],
+            size,
             grey,
             opacity: opacity.filter(|o| o.iter().any(|&v| v != u16::MAX)),
         })
     }
 
-    /// Pixels in a row.
-    pub fn width(&self) -> u32 {
-        self.size[0]
-    }
-
-    /// Rows.
-    pub fn height(&self) -> u32 {
-        self.size[1]
+    /// Pixels in a row, and rows.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
     }
 
     /// The grey values, row by row from the top.
@@ -107,7 +89,7 @@ impl Image {
 }
 
 /// The number of pixels, unless there are none or too many.
-pub(crate) fn pixels(width: u32, height: u32) -> Option<usize> {
+pub(crate) fn pixels([width, height]: [u32; 2]) -> Option<usize> {
     let count = u64::from(width) * u64::from(height);
     (1..=LARGEST_IMAGE as u64)
         .contains(&count)

@@ -2,14 +2,14 @@
 //!
 //! ```
 //! use geometry::{Grid, Placement, phase_field};
-//! use images::{Frame, Interface, Outline, OutlineDistance, Side, drawing, read, svg};
+//! use images::{Frame, Outline, Side, drawing, read, svg, interface};
 //! use render::Rgb;
 //!
 //! fn main() -> Result<(), images::Error> {
 //! #   let folder = tempfile::tempdir().expect("a folder for temporary files");
 //! #   let folder = folder.path();
 //! #   let disc = geometry::shapes::Ball::new([50.0, 40.0], 30.0)?;
-//! #   let frame = Frame::new(100, 80, [0.0, 80.0], 1.0)?;
+//! #   let frame = Frame::new([100, 80], [0.0, 80.0], 1.0)?;
 //! #   drawing(&frame, &disc, Some(Rgb::WHITE))?.write_png(folder.join("logo.png"))?;
 //!     // A black disc of radius 30 pixels on white, of 100 times 80 pixels.
 //!     let image = read(folder.join("logo.png"))?;
@@ -22,12 +22,12 @@
 //!     let grid = Grid::<2>::centred(128, 2.0)?;
 //!     let eps = 2.0 * grid.spacing();
 //!     let placement = Placement::fit(&image.bounding_box(), &grid, 1.6)?;
-//!     let distance = OutlineDistance::new(&outline.placed(&placement));
+//!     let distance = outline.placed(&placement).distance();
 //!     let u = phase_field(grid, &distance, eps)?;
 //!
 //!     // Back as pixels of the same size, and as curves.
 //!     let frame = Frame::of_box(&grid, 125)?;
-//!     let interface = Interface::new(&u, eps)?;
+//!     let interface = interface(&u, eps)?;
 //!     drawing(&frame, &interface, None)?.write_png(folder.join("again.png"))?;
 //!     let curves = Outline::of_phase_field(&u)?;
 //!     files::write_atomically(folder.join("again.svg"), |out| {
@@ -72,12 +72,11 @@ mod read;
 mod selection;
 mod svg;
 
-pub use distance::OutlineDistance;
 pub use drawing::drawing;
 pub use error::Error;
 pub use frame::Frame;
 pub use image::{Image, LARGEST_IMAGE};
-pub use interface::Interface;
+pub use interface::interface;
 pub use outline::{LARGEST_OUTLINE, Outline};
 pub use read::colours;
 pub use read::error::FormatError;

@@ -35,7 +35,7 @@ impl Outline {
     /// [`Error::OneSided`], or [`Error::Noise`] for more than
     /// [`LARGEST_OUTLINE`] segments.
     pub fn of_image(image: &Image, side: Side) -> Result<Self, Error> {
-        let [width, height] = [image.width(), image.height()].map(|n| n as usize);
+        let [width, height] = image.size().map(|n| n as usize);
         let depth = |pixel: usize| side.depth(image.pixel(pixel));
         let pixels = width * height;
 
@@ -63,10 +63,7 @@ impl Outline {
         };
         let segments = (0..height).into_par_iter().map(changes).sum();
         if segments > LARGEST_OUTLINE {
-            return Err(Error::Noise {
-                segments,
-                limit: LARGEST_OUTLINE,
-            });
+            return Err(Error::Noise { segments });
         }
 
         // Nodes are the centres of the pixels, and the edges of the image before and after them. The
@@ -98,12 +95,9 @@ impl Outline {
     /// The tolerance must be finite and positive.
     pub fn smoothed(&self, tolerance: f64) -> Result<Self, Error> {
         positive("tolerance", tolerance)?;
-        let smoothed = |curve: &Polyline| Polyline {
-            points: smoothed(&every_half_unit(curve), tolerance),
-            closed: true,
-        };
+        let curves = self.curves.par_iter();
         Ok(Self {
-            curves: self.curves.par_iter().map(smoothed).collect(),
+            curves: (curves.map(|curve| smoothed(every_half_unit(curve), tolerance))).collect(),
         })
     }
 
@@ -187,8 +181,7 @@ impl Outline {
 fn every_half_unit(curve: &Polyline) -> Vec<[f64; 2]> {
     let length = curve.length();
     let count = ((2.0 * length).ceil() as usize).max(8);
-    let ends = curve.points.iter().skip(1).chain(&curve.points[..1]);
-    let mut segments = curve.points.iter().zip(ends);
+    let mut segments = curve.segments();
     let (mut points, mut passed) = (Vec::with_capacity(count), 0.0);
     let mut segment = segments.next();
     for k in 0..count {
@@ -212,9 +205,9 @@ const ROUNDS: usize = 1500;
 
 /// A closed curve that is as short as it can be, none of whose points goes further than that, moved along its normals to the area that it
 /// had.
-fn smoothed(original: &[[f64; 2]], farthest: f64) -> Vec<[f64; 2]> {
+fn smoothed(original: Vec<[f64; 2]>, farthest: f64) -> Polyline {
     let count = original.len();
-    let mut points = original.to_vec();
+    let mut points = original.clone();
     let mut next = points.clone();
     for _ in 0..ROUNDS {
         for (k, point) in next.iter_mut().enumerate() {
@@ -226,11 +219,11 @@ fn smoothed(original: &[[f64; 2]], farthest: f64) -> Vec<[f64; 2]> {
         }
         std::mem::swap(&mut points, &mut next);
     }
-    let curve = |points: &[[f64; 2]]| Polyline {
-        points: points.to_vec(),
+    let curve = |points| Polyline {
+        points,
         closed: true,
     };
-    let smooth = curve(&points);
+    let smooth = curve(points.clone());
     let lost = curve(original).signed_area() - smooth.signed_area();
     let outwards = lost / smooth.length();
     let moved = (0..count).map(|k| {
@@ -241,7 +234,7 @@ fn smoothed(original: &[[f64; 2]], farthest: f64) -> Vec<[f64; 2]> {
         let normal = [along[1] / length, -along[0] / length];
         [0, 1].map(|i| points[k][i] + outwards * normal[i])
     });
-    moved.collect()
+    curve(moved.collect())
 }
 
 /// The zero level set of a lattice, closed along its edges: beyond them is outside.

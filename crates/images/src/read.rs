@@ -17,7 +17,7 @@ use error::FormatError;
 
 /// Largest image file, in bytes: eight bytes a pixel, as many as the largest image has at 16 bits
 /// without compression.
-const LARGEST_FILE: u64 = 8 * LARGEST_IMAGE as u64;
+pub(crate) const LARGEST_FILE: u64 = 8 * LARGEST_IMAGE as u64;
 /// Most bytes for each pixel while decoding.
 const DEEPEST: u64 = 16;
 
@@ -55,9 +55,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Image, Error> {
         length = read.map_err(io)? as u64;
     }
     if length > LARGEST_FILE {
-        return Err(format(FormatError::TooLong {
-            limit: LARGEST_FILE,
-        }));
+        return Err(format(FormatError::TooLong));
     }
     decode(&bytes).map_err(format)
 }
@@ -81,7 +79,7 @@ pub fn colours(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Picture, Error> {
     };
     let image = upright(bytes, Tones::Colours).map_err(format)?.into_rgba8();
     let pixels = image.pixels().map(|pixel| pixel.0).collect();
-    let picture = Picture::new(image.width(), image.height(), pixels);
+    let picture = Picture::new([image.width(), image.height()], pixels);
     picture.map_err(|error| format(FormatError::damaged("image", &error.to_string())))
 }
 
@@ -130,8 +128,7 @@ fn other(
     limits.max_alloc = Some(DEEPEST * LARGEST_IMAGE as u64);
     reader.limits(limits);
     let mut decoder = reader.into_decoder().map_err(refused)?;
-    let (width, height) = decoder.dimensions();
-    checked(width, height)?;
+    checked(decoder.dimensions().into())?;
     let orientation = decoder.orientation().map_err(refused)?;
     let image = DynamicImage::from_decoder(decoder).map_err(refused)?;
     Ok((image, Some(orientation)))
@@ -154,25 +151,20 @@ fn converted(image: DynamicImage) -> Image {
             u16::from_ne_bytes([bytes[2 * at], bytes[2 * at + 1]])
         }
     };
-    let [width, height] = [image.width(), image.height()];
-    let pixels = 0..width as usize * height as usize;
+    let pixels = 0..image.width() as usize * image.height() as usize;
     let grey = pixels.clone().map(|pixel| match channels {
         1 | 2 => sample(pixel, 0),
         _ => luma([0, 1, 2].map(|channel| sample(pixel, channel))),
     });
     let opacity = pixels.map(|pixel| sample(pixel, channels - 1));
     let opacity = colour.has_alpha().then(|| opacity.collect());
-    let image = Image::new(width, height, grey.collect(), opacity);
+    let image = Image::new([image.width(), image.height()], grey.collect(), opacity);
     image.expect("the size is checked and all pixels are filled")
 }
 
 /// The number of pixels, if it is accepted.
-fn checked(width: u32, height: u32) -> Result<usize, FormatError> {
-    pixels(width, height).ok_or(FormatError::Size {
-        width,
-        height,
-        limit: LARGEST_IMAGE,
-    })
+fn checked(size: [u32; 2]) -> Result<usize, FormatError> {
+    pixels(size).ok_or(FormatError::Size(size))
 }
 
 /// The luma `0.299 R + 0.587 G + 0.114 B`, rounded.

@@ -121,7 +121,7 @@ impl Tones {
         };
         let tones = [median(false), median(true)];
         let far = BETWEEN * (tones[1] - tones[0]);
-        let [width, height] = [image.width(), image.height()].map(|n| n as usize);
+        let [width, height] = image.size().map(|n| n as usize);
         let is_at_edge = |pixel: usize| {
             let (x, y) = (pixel % width, pixel / width);
             let above = value(pixel) > threshold;

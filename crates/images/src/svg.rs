@@ -18,7 +18,7 @@ pub fn svg(frame: &Frame, outline: &Outline) -> String {
         }
         path.push('Z');
     }
-    let [width, height] = [frame.width(), frame.height()];
+    let [width, height] = frame.size();
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
          viewBox=\"0 0 {width} {height}\">\n\

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use crate::common::{Raster, disc, near, square};
 use geometry::shapes::{Ball, Cuboid};
 use geometry::{Field, Grid, Placement, SignedDistance, phase_field};
-use images::{Frame, Image, Interface, Outline, OutlineDistance, Side, decode, drawing, svg};
+use images::{Frame, Image, Outline, Side, decode, drawing, interface, svg};
 use render::{Picture, Rgb};
 
 fn outline(image: &Image) -> Outline {
@@ -89,10 +89,10 @@ fn images_survive_the_way_through_a_phase_field() {
     let grid = Grid::<2>::centred(256, 1.0).unwrap();
     let eps = 2.0 * grid.spacing();
     let placement = Placement::fit(&image.bounding_box(), &grid, 1.0).unwrap();
-    let u = phase_field(grid, &OutlineDistance::new(&found.placed(&placement)), eps).unwrap();
-    let interface = Interface::new(&u, eps).unwrap();
+    let u = phase_field(grid, &found.placed(&placement).distance(), eps).unwrap();
+    let interface = interface(&u, eps).unwrap();
     let corner = placement.apply([0.0, 120.0]);
-    let frame = Frame::new(200, 120, corner, placement.scale()).unwrap();
+    let frame = Frame::new([200, 120], corner, placement.scale()).unwrap();
 
     for paper in [Some(Rgb::WHITE), None] {
         let drawn = drawing(&frame, &interface, paper).unwrap();
@@ -115,7 +115,7 @@ fn images_survive_the_way_through_a_phase_field() {
         assert!(worst < 0.3 && mean < 2e-3, "{worst} {mean}");
         near(area, 0.0, 3.0);
         // The same outline, to less than a pixel even at the corners.
-        let (a, b) = (OutlineDistance::new(&found), outline(&again));
+        let (a, b) = (found.distance(), outline(&again));
         let apart = b
             .curves()
             .iter()
@@ -136,9 +136,9 @@ fn edges_of_steep_fields_are_smooth_too() {
         let within = x.abs().max(y.abs()) < 0.301;
         if within { 1.0 } else { -1.0 }
     });
-    let interface = Interface::new(&u, 0.04).unwrap();
+    let interface = interface(&u, 0.04).unwrap();
     // Nodes at 0.3 and 0.32: the interface is between them, three quarters up a pixel.
-    let frame = Frame::new(100, 100, [-0.5025, 0.5025], 0.01).unwrap();
+    let frame = Frame::new([100, 100], [-0.5025, 0.5025], 0.01).unwrap();
     let drawn = on_white(&frame, &interface);
     assert_eq!(drawn.pixel(50, 50), [0, 0, 0, 255]);
     for x in [40, 50, 60] {
@@ -164,7 +164,7 @@ fn frames_are_the_right_way_up() {
     assert_eq!(drawn.pixel(5, 44), [255; 4]);
 
     let message = |width, height, corner, pixel| {
-        Frame::new(width, height, [corner, 0.0], pixel)
+        Frame::new([width, height], [corner, 0.0], pixel)
             .unwrap_err()
             .to_string()
     };
@@ -189,7 +189,7 @@ fn vector_graphics_hold_the_curves() {
         (5.0..12.0).contains(&(x - 17.0).hypot(y - 15.0))
     });
     let found = outline(&ring.image());
-    let frame = Frame::new(40, 30, [0.0, 30.0], 1.0).unwrap();
+    let frame = Frame::new([40, 30], [0.0, 30.0], 1.0).unwrap();
     let text = svg(&frame, &found);
     assert!(text.starts_with(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"40\" height=\"30\" viewBox=\"0 0 40 30\">\n\

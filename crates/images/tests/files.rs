@@ -100,7 +100,7 @@ fn every_kind_of_jpeg_is_read() {
     ] {
         for progressive in [false, true] {
             let image = decode(&jpeg(raster.size, colour, progressive, &data)).unwrap();
-            assert_eq!([image.width(), image.height()], raster.size);
+            assert_eq!(image.size(), raster.size);
             let errors = image
                 .grey()
                 .iter()
@@ -172,7 +172,7 @@ fn photographs_are_set_upright() {
             chunk(&mut bytes, *b"IDAT", &zlib(&rows));
             chunk(&mut bytes, *b"IEND", &[]);
             let image = decode(&bytes).unwrap();
-            assert_eq!((image.width(), image.height()), (3, 2), "{value}");
+            assert_eq!(image.size(), [3, 2], "{value}");
             assert_eq!(image.grey(), widened(upright.concat()), "{value}");
         }
     }
@@ -186,7 +186,7 @@ fn photographs_are_set_upright() {
         .unwrap();
     encoder.encode(&raster.bytes(), 32, 16, Jpeg::Luma).unwrap();
     let image = decode(&bytes).unwrap();
-    assert_eq!((image.width(), image.height()), (16, 32));
+    assert_eq!(image.size(), [16, 32]);
     // The left quarter of the stored rows is on top.
     let dark: Vec<bool> = image.grey().chunks(16).map(|row| row[7] < 0x8000).collect();
     assert_eq!(dark, (0..32).map(|y| y < 8).collect::<Vec<bool>>());

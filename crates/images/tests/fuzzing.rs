@@ -4,7 +4,7 @@ use crate::common::files::{SIZE, chunk, exif, other_files, png_files, raster};
 use crate::common::jpeg;
 use fuzzing::{Fuzz, Limit};
 use geometry::SignedDistance;
-use images::{Image, LARGEST_IMAGE, Outline, OutlineDistance, Side, Tones, decode};
+use images::{Image, LARGEST_IMAGE, Outline, Side, Tones, decode};
 use jpeg_encoder::ColorType as Jpeg;
 
 /// As documented at [`images::read`].
@@ -16,14 +16,18 @@ const LIMIT: Limit = Limit {
 /// Whatever was read has an outline or a reason.
 #[allow(clippy::needless_pass_by_value, reason = "as the harness calls it")]
 fn check(_: &[u8], image: Image) {
-    let count = image.width() as usize * image.height() as usize;
+    let count = image
+        .size()
+        .iter()
+        .map(|&side| side as usize)
+        .product::<usize>();
     assert_eq!(image.grey().len(), count);
     assert!(image.opacity().is_none_or(|o| o.len() == count));
     if count < 10_000 {
         let side = Side::of(&image, 0.5).unwrap();
         let side = side.at(Tones::of(&image, side).threshold);
         if let Ok(outline) = Outline::of_image(&image, side) {
-            let s = OutlineDistance::new(&outline).signed_distance([1.0, 1.0]);
+            let s = outline.distance().signed_distance([1.0, 1.0]);
             assert!(s.is_finite());
         }
     }

@@ -8,7 +8,7 @@ use crate::common::{Raster, disc, jpeg, near, square};
 use geometry::contour::Polyline;
 use geometry::shapes::{Ball, Cuboid};
 use geometry::{Field, Grid, Placement, SignedDistance, SignedDistanceExt, optimal_profile};
-use images::{Error, Image, Interface, Outline, OutlineDistance, Side, Tones, decode};
+use images::{Error, Image, Outline, Side, Tones, decode, interface};
 use proptest::prelude::*;
 
 fn outline(image: &Image) -> Outline {
@@ -18,7 +18,7 @@ fn outline(image: &Image) -> Outline {
 
 /// The largest deviation of the distance from the exact one, over the image and around it.
 fn deviation(outline: &Outline, exact: &impl SignedDistance<2>, size: f64) -> f64 {
-    let distance = OutlineDistance::new(outline);
+    let distance = outline.distance();
     let mut worst = 0.0_f64;
     for k in 0..120 * 120 {
         let x = [k % 120, k / 120].map(|i| size * (-0.1 + 0.01 * f64::from(i)));
@@ -98,7 +98,7 @@ fn turned_squares_and_rings_are_found() {
     let areas: Vec<f64> = found.curves().iter().map(Polyline::signed_area).collect();
     assert!(areas[0] * areas[1] < 0.0, "{areas:?}");
     near(found.area(), PI * (1600.0 - 400.0), 3.0);
-    let distance = OutlineDistance::new(&found);
+    let distance = found.distance();
     for k in 0..90 * 90 {
         let x = [k % 90, k / 90].map(|i| 5.0 + f64::from(i));
         let expected = exact.signed_distance(x);
@@ -114,12 +114,12 @@ fn rows_run_downwards_and_the_plane_upwards() {
     // A black pixel in the upper left corner of three by two.
     let mut grey = vec![u16::MAX; 6];
     grey[0] = 0;
-    let found = outline(&Image::new(3, 2, grey, None).unwrap());
+    let found = outline(&Image::new([3, 2], grey, None).unwrap());
     let bounds = found.bounding_box();
     // Halfway to the neighbours, and along the edges of the image.
     assert_eq!((bounds.lower, bounds.upper), ([0.0, 1.0], [1.0, 2.0]));
     near(found.area(), 1.0 - 0.125, 1e-12);
-    let distance = OutlineDistance::new(&found);
+    let distance = found.distance();
     assert_eq!(distance.signed_distance([0.5, 1.75]), -0.25);
     assert_eq!(distance.signed_distance([0.5, 0.5]), 0.5);
     assert_eq!(distance.signed_distance([-3.0, 6.0]), 5.0);
@@ -133,7 +133,7 @@ fn shapes_end_at_the_edge_of_the_image() {
     assert_eq!(found.length(), 22.0);
     let bounds = found.bounding_box();
     assert_eq!((bounds.lower, bounds.upper), ([0.0; 2], [8.0, 3.0]));
-    let distance = OutlineDistance::new(&found);
+    let distance = found.distance();
     let exact = Cuboid::new([4.0, 1.5]).unwrap().translated([4.0, 1.5]);
     for k in 0..400 {
         let x = [k % 20, k / 20].map(|i| 0.6137 * f64::from(i) - 1.0);
@@ -141,10 +141,10 @@ fn shapes_end_at_the_edge_of_the_image() {
     }
 
     // Images of one row or column.
-    let row = Image::new(4, 1, vec![0, 0, u16::MAX, 0], None).unwrap();
+    let row = Image::new([4, 1], vec![0, 0, u16::MAX, 0], None).unwrap();
     let found = Outline::of_image(&row, Side::Dark(0.5)).unwrap();
     assert_eq!((found.curves().len(), found.area()), (2, 3.0 - 0.0));
-    let column = Image::new(1, 3, vec![u16::MAX, 0, u16::MAX], None).unwrap();
+    let column = Image::new([1, 3], vec![u16::MAX, 0, u16::MAX], None).unwrap();
     let found = Outline::of_image(&column, Side::Dark(0.5)).unwrap();
     assert_eq!((found.curves().len(), found.area()), (1, 1.0));
 }
@@ -154,13 +154,13 @@ fn diagonal_pixels_are_joined_by_their_mean() {
     let image = |dark: u16| {
         let mut grey = vec![u16::MAX; 16];
         (grey[5], grey[10]) = (dark, dark);
-        Image::new(4, 4, grey, None).unwrap()
+        Image::new([4, 4], grey, None).unwrap()
     };
     // The mean of the four is 0.5 and is outside for a lower threshold, inside for a higher one.
     for (threshold, curves) in [(0.4, 2), (0.6, 1)] {
         let found = Outline::of_image(&image(0), Side::Dark(threshold)).unwrap();
         assert_eq!(found.curves().len(), curves, "{threshold}");
-        let middle = OutlineDistance::new(&found).signed_distance([2.0, 2.0]);
+        let middle = found.distance().signed_distance([2.0, 2.0]);
         assert_eq!(middle < 0.0, curves == 1);
     }
 }
@@ -176,7 +176,7 @@ fn the_side_is_chosen() {
             .collect()
     });
     let side = |grey: &[u16], opacity: Option<Vec<u16>>| {
-        let image = Image::new(9, 9, grey.to_vec(), opacity).unwrap();
+        let image = Image::new([9, 9], grey.to_vec(), opacity).unwrap();
         Side::of(&image, 0.5).unwrap()
     };
     assert_eq!(side(&dark, None), Side::Dark(0.5));
@@ -187,7 +187,7 @@ fn the_side_is_chosen() {
 
     // Two grey values are separated halfway, also when one is rare.
     let separated = |grey: &[u16]| {
-        let image = Image::new(9, 9, grey.to_vec(), None).unwrap();
+        let image = Image::new([9, 9], grey.to_vec(), None).unwrap();
         Tones::of(&image, Side::Dark(0.5)).threshold
     };
     let grey: Vec<u16> = dark
@@ -203,7 +203,7 @@ fn the_side_is_chosen() {
     assert_eq!([separated(&dark), separated(&[700; 81])], [0.5; 2]);
 
     // Transparency counts as paper: grey on white for dark shapes, on black for light ones.
-    let image = Image::new(3, 1, vec![0, 0, 65535], Some(vec![0, 65535, 65535])).unwrap();
+    let image = Image::new([3, 1], vec![0, 0, 65535], Some(vec![0, 65535, 65535])).unwrap();
     let lengths = [Side::Dark(0.5), Side::Light(0.5), Side::Opaque(0.5)].map(|side| {
         let bounds = Outline::of_image(&image, side).unwrap().bounding_box();
         [bounds.lower[0], bounds.upper[0]]
@@ -215,8 +215,8 @@ fn the_side_is_chosen() {
 fn opacity_alone_gives_the_same_outline() {
     let raster = Raster::new([60, 50], 8, disc([30.0, 25.0], 17.0));
     let opacity: Vec<u16> = raster.shorts().into_iter().map(|v| 65535 - v).collect();
-    let transparent = Image::new(60, 50, vec![12345; 3000], Some(opacity)).unwrap();
-    let plain = Image::new(60, 50, raster.shorts(), None).unwrap();
+    let transparent = Image::new([60, 50], vec![12345; 3000], Some(opacity)).unwrap();
+    let plain = Image::new([60, 50], raster.shorts(), None).unwrap();
     let [a, b] = [outline(&transparent), outline(&plain)];
     near(a.area(), b.area(), 1e-9);
     near(a.area(), PI * 17.0 * 17.0, 0.5);
@@ -224,7 +224,7 @@ fn opacity_alone_gives_the_same_outline() {
 
 #[test]
 fn unusable_images_are_explained() {
-    let image = |grey: Vec<u16>| Image::new(2, 2, grey, None).unwrap();
+    let image = |grey: Vec<u16>| Image::new([2, 2], grey, None).unwrap();
     let message = |image: &Image, side| Outline::of_image(image, side).unwrap_err().to_string();
     let grey = image(vec![0x4000, 0x8000, 0x8000, 0xc000]);
     assert_eq!(
@@ -264,7 +264,7 @@ fn unusable_images_are_explained() {
             u16::MAX
         }
     });
-    let noise = Image::new(2048, 2048, noise.collect(), None).unwrap();
+    let noise = Image::new([2048, 2048], noise.collect(), None).unwrap();
     assert_eq!(
         message(&noise, Side::Dark(0.5)),
         "the outline would have about 8384512 segments, more than 4194304: this is noise and no \
@@ -272,7 +272,7 @@ fn unusable_images_are_explained() {
     );
 
     let message = |width, height, grey, opacity: Option<usize>| {
-        Image::new(width, height, vec![0; grey], opacity.map(|n| vec![0; n]))
+        Image::new([width, height], vec![0; grey], opacity.map(|n| vec![0; n]))
             .unwrap_err()
             .to_string()
     };
@@ -298,7 +298,7 @@ fn unusable_curves_and_fields_are_explained() {
     let ball = geometry::phase_field(grid, &Ball::new([0.0; 2], 0.3).unwrap(), 0.2).unwrap();
     let found = Outline::of_phase_field(&ball).unwrap();
     // What is not a point has no distance.
-    let distance = OutlineDistance::new(&found);
+    let distance = found.distance();
     for x in [f64::NAN, f64::INFINITY, -1e101] {
         assert!(distance.signed_distance([x, 0.0]).is_nan());
         assert!(distance.signed_distance([0.0, x]).is_nan());
@@ -323,9 +323,9 @@ fn unusable_curves_and_fields_are_explained() {
         Outline::of_phase_field(&Field::constant(grid, f64::NAN)),
         Err(Error::Geometry(_))
     ));
-    assert!(Interface::new(&Field::constant(grid, f64::NAN), 0.1).is_err());
+    assert!(interface(&Field::constant(grid, f64::NAN), 0.1).is_err());
     for eps in [0.0, -1.0, f64::NAN] {
-        let error = Interface::new(&Field::constant(grid, 0.5), eps).unwrap_err();
+        let error = interface(&Field::constant(grid, 0.5), eps).err().unwrap();
         assert_eq!(
             error.to_string(),
             format!("eps = {eps:?} is not allowed: it must be finite and positive")
@@ -358,7 +358,7 @@ fn placement_and_its_inverse() {
     near(placed.bounding_box().centre()[0], 3.2 + 60.0 * 0.008, 1e-4);
     near(placed.bounding_box().centre()[1], -0.4 + 30.0 * 0.008, 1e-4);
     near(placed.area(), found.area() * 0.008 * 0.008, 1e-12);
-    let s = OutlineDistance::new(&placed).signed_distance([3.68, -0.16]);
+    let s = placed.distance().signed_distance([3.68, -0.16]);
     near(s, -20.0 * 0.008, 1e-3);
 
     // The shape alone, in the middle.
@@ -398,7 +398,7 @@ fn interfaces_between_nodes_are_those_of_the_distance() {
         let grid = Grid::<2>::centred(cells, 1.0).unwrap();
         let eps = 2.0 * grid.spacing();
         let u = Field::from_fn(grid, |x| optimal_profile(exact.signed_distance(x), eps));
-        let interface = Interface::new(&u, eps).unwrap();
+        let interface = interface(&u, eps).unwrap();
         let points = (0..2000).map(|k| {
             let (angle, radius) = (0.1 * f64::from(k), 0.3 + 0.02 * f64::from(k).sin());
             [0.03 + radius * angle.cos(), -0.02 + radius * angle.sin()]
@@ -413,7 +413,7 @@ fn interfaces_between_nodes_are_those_of_the_distance() {
 
     // The box has an end, and outside is outside.
     let grid = Grid::<2>::new(16, 1.0).unwrap();
-    let inside = Interface::new(&Field::constant(grid, 1.0), 0.1).unwrap();
+    let inside = interface(&Field::constant(grid, 1.0), 0.1).unwrap();
     near(inside.signed_distance([0.5, 0.9]), -0.1, 1e-15);
     assert_eq!(inside.signed_distance([-3.0, 5.0]), 5.0);
     assert!(inside.signed_distance([f64::NAN, 0.5]).is_nan());
@@ -456,12 +456,12 @@ proptest! {
         let count = (width * height) as usize;
         let values = &seed[..count];
         let grey: Vec<u16> = values.iter().map(|v| 65535 / 5 * v).collect();
-        let image = Image::new(width, height, grey, None).unwrap();
+        let image = Image::new([width, height], grey, None).unwrap();
         let side = Side::Light(f64::from(threshold) / 5.0);
         let inside: Vec<bool> = values.iter().map(|&v| v > threshold).collect();
         match Outline::of_image(&image, side) {
             Ok(found) => {
-                let distance = OutlineDistance::new(&found);
+                let distance = found.distance();
                 let segments: Vec<_> = found.curves().iter().flat_map(Polyline::segments).collect();
                 for (k, &inside) in inside.iter().enumerate() {
                     let [column, row] = [k as u32 % width, k as u32 / width];

@@ -1,7 +1,7 @@
 //! What tells drawings from photographs, and the raster from the shape.
 
 use geometry::SignedDistance;
-use images::{Image, Outline, OutlineDistance, Side, Tones, colours};
+use images::{Image, Outline, Side, Tones, colours};
 
 const PIXELS: u32 = 160;
 
@@ -11,7 +11,7 @@ fn image(grey: impl Fn(f64, f64) -> f64) -> Image {
         let [x, y] = [k % PIXELS, k / PIXELS].map(|i| f64::from(i) + 0.5);
         (65535.0 * grey(x, y)) as u16
     });
-    Image::new(PIXELS, PIXELS, values.collect(), None).unwrap()
+    Image::new([PIXELS; 2], values.collect(), None).unwrap()
 }
 
 fn radius(x: f64, y: f64) -> f64 {
@@ -50,7 +50,7 @@ fn smoothed_outlines_have_the_length_of_the_shape_and_stay_near() {
         (length / circumference - 1.0).abs() < 0.006,
         "{length}, not {circumference}"
     );
-    let distance = OutlineDistance::new(&rough);
+    let distance = rough.distance();
     let points = smooth.curves().iter().flat_map(|curve| &curve.points);
     let far = points.map(|&x| distance.signed_distance(x).abs());
     assert!(far.fold(0.0, f64::max) < 1.2);
@@ -67,7 +67,7 @@ fn smoothed_outlines_have_the_length_of_the_shape_and_stay_near() {
 #[test]
 fn colours_are_those_of_the_file() {
     let pixels: Vec<[u8; 4]> = (0..48).map(|k| [k, 5 * k, 255 - k, 255 - 3 * k]).collect();
-    let picture = render::Picture::new(8, 6, pixels).unwrap();
+    let picture = render::Picture::new([8, 6], pixels).unwrap();
     let again = colours("x", &picture.to_png().unwrap()).unwrap();
     assert_eq!(again.pixels(), picture.pixels());
     let mut jpeg = Vec::new();

@@ -30,8 +30,9 @@ pub enum Error {
         expected: &'static str,
         problem: String,
     },
-    #[error("{what} {title:?} is empty: there is nothing to show")]
-    Empty { what: &'static str, title: String },
+    /// What has nothing to show, and its title.
+    #[error("{0} {1:?} is empty: there is nothing to show")]
+    Empty(&'static str, String),
     #[error("the surface {label:?} cannot be shown: {source}")]
     Surface {
         label: String,

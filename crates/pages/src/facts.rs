@@ -9,9 +9,10 @@ use serde_json::Value;
 use crate::error::{Error, Result};
 
 /// A list of names with values, such as the metrics of a run.
+#[must_use]
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Facts {
-    entries: Vec<(String, String)>,
+    pub(crate) entries: Vec<(String, String)>,
 }
 
 /// Metrics `name.stepK` for more values of `K` than these are shown by the first and the last.
@@ -24,7 +25,6 @@ impl Facts {
     }
 
     /// Adds an entry at the end.
-    #[must_use]
     pub fn with(mut self, name: impl Into<String>, value: impl Into<String>) -> Self {
         self.entries.push((name.into(), value.into()));
         self
@@ -32,7 +32,6 @@ impl Facts {
 
     /// Adds a value at the end: entries of maps are named `name: key of the entry`, lists of plain values are one line,
     /// numbers have five digits unless they are whole, and null is left out.
-    #[must_use]
     pub fn with_value(mut self, name: &str, value: &Value) -> Self {
         match value {
             Value::Object(map) => {
@@ -96,11 +95,6 @@ impl Facts {
             }
         }
         Ok(facts)
-    }
-
-    /// The entries.
-    pub fn entries(&self) -> &[(String, String)] {
-        &self.entries
     }
 }
 
@@ -191,7 +185,7 @@ mod tests {
         json.push_str(",\"a.n128\":2e-7,\"a.n64\":3,\"b.step0\":1,\"b.step1\":2}");
         let facts = Facts::from_summary("summary.json", &json).unwrap();
         let entries: Vec<(&str, &str)> = facts
-            .entries()
+            .entries
             .iter()
             .map(|(name, value)| (name.as_str(), value.as_str()))
             .collect();

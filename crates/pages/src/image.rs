@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     fn picture(shade: u8) -> render::Picture {
-        render::Picture::new(3, 2, vec![[shade, 0, 0, 255]; 6]).unwrap()
+        render::Picture::new([3, 2], vec![[shade, 0, 0, 255]; 6]).unwrap()
     }
 
     #[test]

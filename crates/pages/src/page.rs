@@ -26,6 +26,7 @@ const CONTENTS_FROM: usize = 3;
 /// Its HTML needs nothing else: style, scripts and pictures are inside, and a content security policy
 /// forbids the browser to load anything from anywhere, or to run any other script. The same page
 /// gives the same bytes.
+#[must_use]
 #[derive(Clone, Debug)]
 pub struct Page {
     title: String,
@@ -44,14 +45,12 @@ impl Page {
     }
 
     /// Adds a paragraph between the title and the first section.
-    #[must_use]
     pub fn with_lead(mut self, text: impl Into<Text>) -> Self {
         self.lead.push(text.into());
         self
     }
 
     /// Adds a section.
-    #[must_use]
     pub fn with(mut self, section: Section) -> Self {
         self.sections.push(section);
         self
@@ -172,6 +171,7 @@ fn policy(script: &str) -> String {
 }
 
 /// A part of a page under a heading of its own.
+#[must_use]
 #[derive(Clone, Debug)]
 pub struct Section {
     title: String,
@@ -192,7 +192,6 @@ impl Section {
 
     /// Gives the section a name of its own for links to it, `page.html#name`; without, it is the
     /// title in small letters.
-    #[must_use]
     pub fn named(mut self, name: impl Into<String>) -> Self {
         self.name = name.into();
         self
@@ -200,7 +199,6 @@ impl Section {
 
     /// Adds a [`Text`], [`Figure`], [`Table`](crate::Table), [`Facts`](crate::Facts), [`Frames`],
     /// [`Viewer`](crate::Viewer) or [`Details`].
-    #[must_use]
     pub fn with(mut self, block: impl Render) -> Self {
         self.push(block);
         self
@@ -213,6 +211,7 @@ impl Section {
 }
 
 /// Blocks behind a line that opens them.
+#[must_use]
 #[derive(Clone, Debug)]
 pub struct Details {
     summary: String,
@@ -229,7 +228,6 @@ impl Details {
     }
 
     /// Adds a block.
-    #[must_use]
     pub fn with(mut self, block: impl Render) -> Self {
         block.render_to(&mut self.body);
         self
@@ -283,10 +281,7 @@ impl Frames {
     pub fn new(caption: impl Into<String>, frames: Vec<(String, Image)>) -> Result<Self> {
         let caption = caption.into();
         if frames.is_empty() {
-            return Err(Error::Empty {
-                what: "the sequence of pictures",
-                title: caption,
-            });
+            return Err(Error::Empty("the sequence of pictures", caption));
         }
         Ok(Self { caption, frames })
     }

@@ -34,10 +34,7 @@ impl Surface {
     pub fn new(label: &str, mesh: &TriangleMesh) -> Result<Self> {
         let label = label.to_owned();
         if mesh.faces.is_empty() {
-            return Err(Error::Empty {
-                what: "the surface",
-                title: label,
-            });
+            return Err(Error::Empty("the surface", label));
         }
         if let Err(error) = mesh.check(LARGEST) {
             let source = Box::new(error);
@@ -61,11 +58,8 @@ impl Surface {
         let mut bytes = Vec::with_capacity(10 * used.len() + corners.len());
         for position in &used {
             for i in 0..3 {
-                let part = if extent[i] > 0.0 {
-                    (position[i] - low[i]) / extent[i]
-                } else {
-                    0.0
-                };
+                // Where the box is flat it is NaN, which becomes 0.
+                let part = (position[i] - low[i]) / extent[i];
                 bytes.extend(((part * STEPS).round() as u16).to_le_bytes());
             }
         }
@@ -224,7 +218,7 @@ mod tests {
             normals: None,
         };
         let error = Surface::new("none", &mesh(&[[0.0; 3]], &[])).unwrap_err();
-        assert!(matches!(&error, Error::Empty { title, .. } if title == "none"));
+        assert!(matches!(&error, Error::Empty(_, title) if title == "none"));
         for value in [f64::NAN, f64::INFINITY, 1e300] {
             let vertices = [[0.0; 3], [0.0, value, 0.0]];
             let error = Surface::new("far", &mesh(&vertices, &[[0, 1, 0]])).unwrap_err();

@@ -48,10 +48,7 @@ impl Viewer {
         }
         let surfaces = encoded;
         if surfaces.is_empty() {
-            return Err(Error::Empty {
-                what: "the viewer",
-                title: caption,
-            });
+            return Err(Error::Empty("the viewer", caption));
         }
         let (centre, radius) = ball(&points);
         Ok(Self {

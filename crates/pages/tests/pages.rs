@@ -17,7 +17,7 @@ fn ball() -> TriangleMesh {
 }
 
 fn picture() -> Image {
-    let picture = render::Picture::new(4, 3, vec![[1, 2, 3, 255]; 12]).unwrap();
+    let picture = render::Picture::new([4, 3], vec![[1, 2, 3, 255]; 12]).unwrap();
     Image::from_bytes("picture", &picture.to_png().unwrap()).unwrap()
 }
 
@@ -182,9 +182,9 @@ fn viewers_turn_about_the_axis_that_points_up() {
 #[test]
 fn what_shows_nothing_is_refused() {
     let error = Frames::new("film", Vec::new()).unwrap_err();
-    assert!(matches!(&error, Error::Empty { title, .. } if title == "film"));
+    assert!(matches!(&error, Error::Empty(_, title) if title == "film"));
     let error = Viewer::new("ball", picture(), View::default(), []).unwrap_err();
-    assert!(matches!(&error, Error::Empty { title, .. } if title == "ball"));
+    assert!(matches!(&error, Error::Empty(_, title) if title == "ball"));
     let ball = ball();
     let view = View {
         elevation: 90.5,

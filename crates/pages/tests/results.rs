@@ -12,7 +12,7 @@ const MANIFEST: &str = r#"{"experiment": "cross", "parameters": {"n": [64]}, "co
 const README: &str = "# Title\n\n| paper | here |\n|---|---|\n| a cross | [cross](cross/errors.png), [x](../x.md) |\n";
 
 fn png(shade: u8) -> Vec<u8> {
-    let picture = render::Picture::new(8, 6, vec![[shade, 0, 0, 255]; 48]).unwrap();
+    let picture = render::Picture::new([8, 6], vec![[shade, 0, 0, 255]; 48]).unwrap();
     picture.to_png().unwrap()
 }
 

@@ -125,9 +125,8 @@ impl Camera {
         // The eye is where the slits of both directions are wide enough.
         let wide = |axis: usize| across(axis, slopes[axis]).0 / slopes[axis];
         let eye = wide(0).max(wide(1));
-        let nearest = placed
-            .iter()
-            .fold(f64::NEG_INFINITY, |z, p| f64::max(z, p.z));
+        let depths = placed.iter().map(|p| p.z);
+        let nearest = depths.fold(f64::NEG_INFINITY, f64::max);
         let range = "positive and not too small for its place";
         require("extent of what is framed", eye - nearest, range, |d| {
             d > 1e-9 * (1.0 + centre.length())

@@ -2,6 +2,8 @@
 
 #![allow(missing_docs, reason = "messages and names say it")]
 
+use crate::picture::LARGEST_SIDE;
+
 /// Errors of scenes and pictures, each with the numbers needed to act on it.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
@@ -26,14 +28,10 @@ pub enum Error {
         index: usize,
         points: usize,
     },
-    #[error("a picture of {width} x {height} pixels cannot be drawn; use 1 to {limit} a side")]
-    PictureSize { width: u32, height: u32, limit: u32 },
-    #[error("{width} x {height} pixels were announced, but {actual} given")]
-    PixelCount {
-        width: u32,
-        height: u32,
-        actual: usize,
-    },
+    #[error("a picture of {} x {} pixels cannot be drawn; use 1 to {LARGEST_SIDE} a side", _0[0], _0[1])]
+    PictureSize([u32; 2]),
+    #[error("{} x {} pixels were announced, but {actual} given", size[0], size[1])]
+    PixelCount { size: [u32; 2], actual: usize },
     #[error("an animation needs at least one picture")]
     NoFrames,
     #[error(

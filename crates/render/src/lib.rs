@@ -18,7 +18,7 @@
 //!
 //!     let scene = Scene::new(&u, eps)?
 //!         .colour(Rgb::SKY)
-//!         .tubes([Tube::new(circle, 0.005).closed()])
+//!         .tubes([Tube { closed: true, ..Tube::new(circle, 0.005) }])
 //!         .quality(Quality::Draft);
 //!     let picture = scene.render([160, 120])?;
 //! #   let folder = tempfile::tempdir().expect("a folder for temporary files");
@@ -26,7 +26,7 @@
 //!     picture.write_png(&path)?;
 //!
 //!     let blue = picture.pixels().iter().filter(|[r, _, b, _]| b > r).count();
-//!     println!("{} x {} pixels, {} per cent blue", picture.width(), picture.height(),
+//!     println!("{} x {} pixels, {} per cent blue", picture.size()[0], picture.size()[1],
 //!         100 * blue / picture.pixels().len());
 //! #   assert_eq!(100 * blue / picture.pixels().len(), 60);
 //!     Ok(())

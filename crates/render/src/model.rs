@@ -28,7 +28,7 @@ pub struct Tube {
 }
 
 impl Tube {
-    /// An open tube, near-black.
+    /// An open tube, near-black; for others, `Tube { closed: true, ..Tube::new(points, radius) }`.
     pub fn new(points: impl Into<Vec<[f64; 3]>>, radius: f64) -> Self {
         Self {
             points: points.into(),
@@ -36,20 +36,6 @@ impl Tube {
             radius,
             colour: Rgb::INK,
         }
-    }
-
-    /// Joins the last point to the first.
-    #[must_use]
-    pub fn closed(mut self) -> Self {
-        self.closed = true;
-        self
-    }
-
-    /// Sets the colour.
-    #[must_use]
-    pub fn with_colour(mut self, colour: Rgb) -> Self {
-        self.colour = colour;
-        self
     }
 
     /// The twelve edges of a box.

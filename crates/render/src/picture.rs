@@ -9,7 +9,7 @@ use geometry::require;
 use crate::Error;
 
 /// Largest side of a picture, in pixels.
-const LARGEST_SIDE: u32 = 8192;
+pub(crate) const LARGEST_SIDE: u32 = 8192;
 
 /// Accepts sizes that can be drawn.
 ///
@@ -19,11 +19,7 @@ pub fn checked_size(size: [u32; 2]) -> Result<[u32; 2], Error> {
     if size.iter().all(|side| (1..=LARGEST_SIDE).contains(side)) {
         return Ok(size);
     }
-    Err(Error::PictureSize {
-        width: size[0],
-        height: size[1],
-        limit: LARGEST_SIDE,
-    })
+    Err(Error::PictureSize(size))
 }
 
 /// A picture: 8-bit sRGB with straight (not premultiplied) opacity, row by row from the top.
@@ -37,27 +33,19 @@ impl Picture {
     /// Takes over pixels.
     ///
     /// # Errors
-    /// The sides must be from 1 to 8192, and the pixels `width * height`.
-    pub fn new(width: u32, height: u32, pixels: Vec<[u8; 4]>) -> Result<Self, Error> {
-        let size = checked_size([width, height])?;
-        if pixels.len() != width as usize * height as usize {
-            return Err(Error::PixelCount {
-                width,
-                height,
-                actual: pixels.len(),
-            });
+    /// The sides must be from 1 to 8192, and the pixels as many as their product.
+    pub fn new(size: [u32; 2], pixels: Vec<[u8; 4]>) -> Result<Self, Error> {
+        let [width, height] = checked_size(size)?.map(|side| side as usize);
+        let actual = pixels.len();
+        if actual != width * height {
+            return Err(Error::PixelCount { size, actual });
         }
         Ok(Self { size, pixels })
     }
 
-    /// Pixels in a row.
-    pub fn width(&self) -> u32 {
-        self.size[0]
-    }
-
-    /// Rows.
-    pub fn height(&self) -> u32 {
-        self.size[1]
+    /// Pixels in a row, and rows.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
     }
 
     /// All pixels, row by row from the top.
@@ -122,8 +110,8 @@ fn encode_png(frames: &[Picture], delay: Option<u16>) -> Result<Vec<u8>, Error> 
     } else {
         (png::ColorType::Rgba, 4)
     };
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, frames[0].width(), frames[0].height());
+    let ([width, height], mut bytes) = (frames[0].size, Vec::new());
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(colour);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);

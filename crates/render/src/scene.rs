@@ -30,18 +30,15 @@ pub enum Quality {
 
 impl Quality {
     fn effort(self) -> Effort {
-        let [sky, key, pixels] = match self {
-            Self::Draft => [64, 8, 160],
-            Self::Standard => [160, 24, 400],
+        let [sky, key, pixels, samples] = match self {
+            Self::Draft => [64, 8, 160, 3],
+            Self::Standard => [160, 24, 400, 4],
         };
-        Effort { sky, key, pixels }
-    }
-
-    /// Samples of a pixel along each axis.
-    fn samples(self) -> usize {
-        match self {
-            Self::Draft => 3,
-            Self::Standard => 4,
+        Effort {
+            sky,
+            key,
+            pixels,
+            samples,
         }
     }
 }
@@ -49,6 +46,7 @@ impl Quality {
 /// A surface, the view of it, and its looks.
 ///
 /// Setters never fail; everything is checked by [`Scene::render`].
+#[must_use]
 #[derive(Clone)]
 pub struct Scene {
     mesh: TriangleMesh,
@@ -90,7 +88,6 @@ impl Scene {
     }
 
     /// Sets the direction of view.
-    #[must_use]
     pub fn view(mut self, view: View) -> Self {
         self.view = view;
         self
@@ -98,21 +95,18 @@ impl Scene {
 
     /// Lets a box fill the picture, such as that around the surfaces of several scenes, and not the
     /// surface with its tubes.
-    #[must_use]
     pub fn within(mut self, bounds: BoundingBox<3>) -> Self {
         self.framed = Some(bounds);
         self
     }
 
     /// Sets the body colour of the surface.
-    #[must_use]
     pub fn colour(mut self, colour: Rgb) -> Self {
         self.colour = colour;
         self
     }
 
     /// Adds tubes.
-    #[must_use]
     pub fn tubes(mut self, tubes: impl IntoIterator<Item = Tube>) -> Self {
         self.tubes.extend(tubes);
         self
@@ -136,17 +130,16 @@ impl Scene {
     /// # Errors
     /// There must be as many colours as vertices.
     pub fn painted(mut self, colours: Vec<Rgb>) -> Result<Self, Error> {
-        let vertices = self.mesh.vertices.len() as f64;
-        let count = colours.len() as f64;
-        require("number of colours", count, "that of the vertices", |n| {
-            n.to_bits() == vertices.to_bits()
+        let (count, vertices) = (colours.len(), self.mesh.vertices.len());
+        let range = "that of the vertices";
+        require("number of colours", count as f64, range, |_| {
+            count == vertices
         })?;
         self.painted = Some(colours);
         Ok(self)
     }
 
     /// Sets how much is spent.
-    #[must_use]
     pub fn quality(mut self, quality: Quality) -> Self {
         self.quality = quality;
         self
@@ -169,11 +162,12 @@ impl Scene {
             model.push(tube, index, colours.len())?;
             colours.push(tube.colour.linear());
         }
-        let per_side = self.quality.samples();
+        let effort = self.quality.effort();
+        let per_side = effort.samples;
         let camera = self.camera(&model, size.map(|side| per_side as u32 * side))?;
         let lights = Lights::new(&self.view.orientation()?);
         let drawing = Drawing {
-            arriving: arriving(&model, &lights, self.quality.effort()),
+            arriving: arriving(&model, &lights, effort),
             triangles: (model.triangles.iter())
                 .map(|corners| corners.map(|v| camera.project(model.vertices[v as usize].place)))
                 .map(Triangle::new)
@@ -189,7 +183,7 @@ impl Scene {
             lights,
             size: size.map(|side| side as usize),
         };
-        Picture::new(size[0], size[1], drawing.pixels())
+        Picture::new(size, drawing.pixels())
     }
 
     /// The camera, fitted to what is to fill the picture.

@@ -17,12 +17,14 @@ const AT_ONCE: usize = 16;
 /// Lookups start this far from the surface, in pixels of a map.
 const OFFSET: f64 = 0.75;
 
-/// Numbers of directions to the surroundings and into the key light, and pixels a side of a map.
+/// Numbers of directions to the surroundings and into the key light, pixels a side of a map, and samples of a pixel of the picture along
+/// each axis.
 #[derive(Clone, Copy)]
 pub(crate) struct Effort {
     pub sky: usize,
     pub key: usize,
     pub pixels: usize,
+    pub samples: usize,
 }
 
 /// For every vertex the visible part of the key light and the arriving part of the surroundings'

@@ -49,8 +49,9 @@ fn is_drawn(picture: &Picture, x: u32, y: u32) -> bool {
 /// Area and centre of what is drawn, in pixels.
 fn silhouette(picture: &Picture) -> (f64, [f64; 2]) {
     let (mut area, mut moment) = (0.0, [0.0; 2]);
-    for y in 0..picture.height() {
-        for x in 0..picture.width() {
+    let [width, height] = picture.size();
+    for y in 0..height {
+        for x in 0..width {
             let cover = f64::from(u8::from(is_drawn(picture, x, y)));
             area += cover;
             moment[0] += cover * (f64::from(x) + 0.5);
@@ -183,7 +184,10 @@ fn shadows_fall_away_from_the_key_light() {
 #[test]
 fn tubes_hide_and_are_hidden() {
     let red = Rgb(200, 30, 30);
-    let tube = |x: f64| Tube::new([[x, -0.45, 0.0], [x, 0.45, 0.0]], 0.03).with_colour(red);
+    let tube = |x: f64| Tube {
+        colour: red,
+        ..Tube::new([[x, -0.45, 0.0], [x, 0.45, 0.0]], 0.03)
+    };
     let picture = |tube: Tube| {
         let scene = scene(&ball([0.0; 3], 0.3)).within(BOX);
         scene.tubes([tube]).render([100; 2]).unwrap()
@@ -221,7 +225,10 @@ fn closed_tubes_and_boxes_are_complete() {
         scene.view(view(0.0, 0.0)).render([100; 2]).unwrap()
     };
     let open = picture(vec![Tube::new(square, 0.02)]);
-    let closed = picture(vec![Tube::new(square, 0.02).closed()]);
+    let closed = picture(vec![Tube {
+        closed: true,
+        ..Tube::new(square, 0.02)
+    }]);
     assert!(!is_drawn(&open, 5, 50) && is_drawn(&closed, 5, 50));
     assert!(is_drawn(&open, 94, 50) && !is_drawn(&closed, 50, 50));
     let edges = Tube::edges_of_box([-0.3; 3], [0.3; 3], 0.02);
@@ -439,19 +446,19 @@ fn decoded(bytes: &[u8]) -> (png::ColorType, Option<png::AnimationControl>, Vec<
 fn files_hold_the_pictures() {
     let folder = tempfile::tempdir().unwrap();
     let pixels = (0..1200).map(|k| [k, k / 2, 9, k / 5].map(|v| v as u8));
-    let picture = Picture::new(40, 30, pixels.collect()).unwrap();
+    let picture = Picture::new([40, 30], pixels.collect()).unwrap();
     let path = folder.path().join("ball.png");
     picture.write_png(&path).unwrap();
     let (colour, control, frames) = decoded(&std::fs::read(&path).unwrap());
     assert!(colour == png::ColorType::Rgba && control.is_none());
     assert_eq!(frames[0], picture.pixels().as_flattened());
-    let opaque = Picture::new(2, 1, vec![[1, 2, 3, 255]; 2]).unwrap();
+    let opaque = Picture::new([2, 1], vec![[1, 2, 3, 255]; 2]).unwrap();
     let (colour, _, frames) = decoded(&opaque.to_png().unwrap());
     assert!(colour == png::ColorType::Rgb && frames[0] == [1, 2, 3, 1, 2, 3]);
 
     let pictures = [
         picture.clone(),
-        Picture::new(40, 30, vec![[7; 4]; 1200]).unwrap(),
+        Picture::new([40, 30], vec![[7; 4]; 1200]).unwrap(),
     ];
     let bytes = animation(&pictures, Duration::from_millis(120)).unwrap();
     let (_, control, frames) = decoded(&bytes);
@@ -468,7 +475,7 @@ fn files_hold_the_pictures() {
     let never = animation(&[picture], Duration::ZERO);
     assert!(matches!(never, Err(Error::Geometry(_))));
     assert!(matches!(
-        Picture::new(2, 2, vec![[0; 4]; 3]),
+        Picture::new([2, 2], vec![[0; 4]; 3]),
         Err(Error::PixelCount { actual: 3, .. })
     ));
 }
@@ -490,7 +497,7 @@ proptest! {
         let mut scene = scene.view(view(angles[0], angles[1]));
         if !ends.is_empty() {
             let points: Vec<[f64; 3]> = ends.iter().map(|p| p.map(|c| c * grid.side())).collect();
-            scene = scene.tubes([Tube::new(points, 0.1 * grid.side()).closed()]);
+            scene = scene.tubes([Tube { closed: true, ..Tube::new(points, 0.1 * grid.side()) }]);
         }
         match scene.render([9, 7]) {
             Ok(picture) => prop_assert_eq!(picture.pixels().len(), 63),

@@ -108,14 +108,11 @@ impl Mapping {
 
     /// 0 at the low end, 1 at the high end; far outside values are pulled in, or their coordinates overflow later on.
     pub fn fraction(&self, value: f64) -> f64 {
-        let fraction = match self.scale {
-            Scale::Linear => (value - self.low) / (self.high - self.low),
-            Scale::Log => {
-                let low = self.low.log10();
-                (value.log10() - low) / (self.high.log10() - low)
-            }
+        let [value, low, high] = match self.scale {
+            Scale::Linear => [value, self.low, self.high],
+            Scale::Log => [value, self.low, self.high].map(f64::log10),
         };
-        fraction.clamp(-1e4, 1e4)
+        ((value - low) / (high - low)).clamp(-1e4, 1e4)
     }
 
     /// Ticks for an axis `length` units long. `extent` is the room a label takes along the axis.

@@ -5,7 +5,6 @@ use std::fmt::Debug;
 use plotters::prelude::{BitMapBackend, Color, DrawingBackend, RGBColor};
 use srgb::Rgb;
 
-use crate::colour::WHITE;
 use crate::font::{self, Align, TextStyle};
 use crate::geom::{self, Point, Rect, dash, point};
 use crate::style::Marker;
@@ -99,7 +98,10 @@ impl Surface for PngSurface<'_> {
 
     fn markers(&mut self, marker: Marker, places: &[Point], colour: Rgb) {
         for &at in places {
-            self.fill(&[marker.outline(at, Marker::RADIUS + Marker::RIM)], WHITE);
+            self.fill(
+                &[marker.outline(at, Marker::RADIUS + Marker::RIM)],
+                Rgb::WHITE,
+            );
             self.fill(&[marker.outline(at, Marker::RADIUS)], colour);
         }
     }
@@ -147,7 +149,7 @@ impl Surface for PngSurface<'_> {
 pub(crate) fn png((width, height): (u32, u32), draw: impl FnOnce(&mut dyn Surface)) -> Vec<u8> {
     let [width, height] = [width, height].map(|side| side as usize * PNG_SCALE);
     let fine = [width, height].map(|side| side * SUPERSAMPLING);
-    let Rgb(page, ..) = WHITE;
+    let Rgb(page, ..) = Rgb::WHITE;
     let mut samples = vec![page; 3 * fine[0] * fine[1]];
     let backend = BitMapBackend::with_buffer(&mut samples, fine.map(|side| side as u32).into());
     draw(&mut PngSurface(backend));

@@ -4,7 +4,6 @@ use derive_more::From;
 use plotters::style::colors::colormaps::ViridisRGB;
 use srgb::Rgb;
 
-pub(crate) const WHITE: Rgb = Rgb(255, 255, 255);
 pub(crate) const INK: Rgb = Rgb(32, 32, 32);
 pub(crate) const GREY: Rgb = Rgb(110, 110, 110);
 pub(crate) const GRID: Rgb = Rgb(226, 226, 226);

@@ -7,9 +7,9 @@
 #[non_exhaustive]
 pub enum Error {
     #[error(
-        "nothing to draw in {chart:?}: it has no finite point (positive on a logarithmic axis) and no pixel"
+        "nothing to draw in {0:?}: it has no finite point (positive on a logarithmic axis) and no pixel"
     )]
-    Empty { chart: String },
+    Empty(String),
     #[error("the figure has no panels: add one with `Figure::with_panel`")]
     NoPanels,
     #[error(
@@ -17,11 +17,13 @@ pub enum Error {
          rounding, and positive on a logarithmic scale"
     )]
     Range { axis: String, low: f64, high: f64 },
-    #[error("the array of {chart:?} has {found} values where its shape {shape:?} needs {expected}")]
+    #[error(
+        "the array of {chart:?} has {found} values where its shape {shape:?} needs {}",
+        shape[0].saturating_mul(shape[1])
+    )]
     ArrayShape {
         chart: String,
         shape: [usize; 2],
-        expected: usize,
         found: usize,
     },
     #[error(
@@ -37,17 +39,17 @@ pub enum Error {
     #[error("{what} is {value}, which is not a finite number")]
     NotFinite { what: String, value: f64 },
     #[error(
-        "metric name {name:?} is not allowed: use lower-case words of letters, digits and '_', \
+        "metric name {0:?} is not allowed: use lower-case words of letters, digits and '_', \
          joined by '.' and beginning with a letter, such as \"circle.error_l2\""
     )]
-    MetricName { name: String },
+    MetricName(String),
     #[error("metric {name:?} is already set to {value}")]
     DuplicateMetric { name: String, value: String },
     /// A file or folder that could not be written; what was there before is untouched.
     #[error(transparent)]
     File(#[from] files::Error),
-    #[error("file name {name:?} is not allowed: give one plain name without separators")]
-    FileName { name: String },
+    #[error("file name {0:?} is not allowed: give one plain name without separators")]
+    FileName(String),
     #[error("{what} is not valid as JSON: {source}")]
     Json {
         what: String,
@@ -63,14 +65,13 @@ pub enum Error {
 impl Error {
     /// Whether an array has the length that its shape says, and that is not 0.
     pub(crate) fn check_shape(chart: &str, shape: [usize; 2], found: usize) -> Result<()> {
-        let (chart, expected) = (chart.to_owned(), shape[0].saturating_mul(shape[1]));
-        match found == expected {
-            true if found == 0 => Err(Self::Empty { chart }),
+        let chart = chart.to_owned();
+        match shape[0].saturating_mul(shape[1]) == found {
+            true if found == 0 => Err(Self::Empty(chart)),
             true => Ok(()),
             false => Err(Self::ArrayShape {
                 chart,
                 shape,
-                expected,
                 found,
             }),
         }

@@ -5,13 +5,12 @@ use std::ops::RangeInclusive;
 
 use crate::bitmap;
 use crate::colour::{GREY, INK};
-use crate::drawable::Drawable;
 use crate::error::{Error, Result};
 use crate::font::{self, AIR, Align, LEADING, TextStyle};
 use crate::geom::{Margins, Point, Rect, point};
 use crate::legend::{Block, LegendEntry};
 use crate::output::OutputDir;
-use crate::panel::Panel;
+use crate::panel::{Drawable, Panel};
 use crate::style::Fonts;
 use crate::surface::Surface;
 use crate::svg;
@@ -20,6 +19,7 @@ use crate::svg;
 ///
 /// Sizes are in layout units, one CSS pixel each when a README shows the figure at its own width.
 /// The PNG has two pixels per unit. Legends are below the panels, where they cover nothing.
+#[must_use]
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
     /// Heading above all panels; may be empty.
@@ -34,8 +34,8 @@ pub struct Figure {
     pub row_labels: Vec<String>,
     /// One legend below all panels instead of one below each.
     pub shared_legend: bool,
-    /// A remark in small type at the bottom.
-    pub note: Option<String>,
+    /// A remark in small type at the bottom; may be empty.
+    pub note: String,
     /// Width; the height follows from the panels.
     pub width: f64,
 }
@@ -62,27 +62,24 @@ impl Figure {
             column_labels: Vec::new(),
             row_labels: Vec::new(),
             shared_legend: false,
-            note: None,
+            note: String::new(),
             width: 800.0,
         }
     }
 
     /// Adds a panel to the right of the last one, or at the start of the next row.
-    #[must_use]
     pub fn with_panel(mut self, panel: impl Into<Panel>) -> Self {
         self.panels.push(panel.into());
         self
     }
 
     /// Adds panels, row by row.
-    #[must_use]
     pub fn with_panels<P: Into<Panel>>(mut self, panels: impl IntoIterator<Item = P>) -> Self {
         self.panels.extend(panels.into_iter().map(Into::into));
         self
     }
 
     /// Labels the columns.
-    #[must_use]
     pub fn with_column_labels<S: Into<String>>(
         mut self,
         labels: impl IntoIterator<Item = S>,
@@ -92,28 +89,24 @@ impl Figure {
     }
 
     /// Labels the rows; a line break in a label makes two lines.
-    #[must_use]
     pub fn with_row_labels<S: Into<String>>(mut self, labels: impl IntoIterator<Item = S>) -> Self {
         self.row_labels = labels.into_iter().map(Into::into).collect();
         self
     }
 
     /// Collects the legends of all panels below the figure.
-    #[must_use]
     pub fn with_shared_legend(mut self) -> Self {
         self.shared_legend = true;
         self
     }
 
     /// Adds a remark at the bottom.
-    #[must_use]
     pub fn with_note(mut self, note: impl Into<String>) -> Self {
-        self.note = Some(note.into());
+        self.note = note.into();
         self
     }
 
     /// Fixes the width; the height follows.
-    #[must_use]
     pub fn with_width(mut self, width: f64) -> Self {
         self.width = width;
         self
@@ -186,8 +179,7 @@ impl Figure {
         };
         let legend = Block::new(&shared, fonts.legend, inner);
         let note_top = legend_top + legend.height;
-        let note = self.note.as_deref().unwrap_or("");
-        let height = (note_top + font::height(note, fonts.note, inner) + PADDING).round();
+        let height = (note_top + font::height(&self.note, fonts.note, inner) + PADDING).round();
         let small = |cell: &Cell<'_>| cell.plot.width.min(cell.plot.height) < SMALLEST_PLOT;
         if !SIDES.contains(&height) || cells.iter().any(small) {
             return refused(height);
@@ -226,10 +218,9 @@ impl Figure {
         }
         let legend_top = point(middle, layout.legend_top);
         layout.legend.draw(surface, legend_top);
-        let note = self.note.as_deref().unwrap_or("");
         let style = TextStyle::new(fonts.note, GREY).aligned(Align::Left);
         let at = point(PADDING + 4.0, layout.note_top + AIR);
-        draw_lines(surface, note, style, at, inner);
+        draw_lines(surface, &self.note, style, at, inner);
     }
 }
 
@@ -407,7 +398,7 @@ mod tests {
     use srgb::Rgb;
 
     use super::*;
-    use crate::colour::{WHITE, viridis};
+    use crate::colour::viridis;
     use crate::{
         Axis, Colour, Curve, Heatmap, LineChart, LineStyle, Marker, OKABE_ITO, Raster, Series,
         Shapes,
@@ -453,6 +444,10 @@ mod tests {
         LineChart::new(title, axis("time t [s]"), axis("length <L>"))
     }
 
+    fn heat_map(title: &str, shape: [usize; 2], values: Vec<f64>) -> Heatmap {
+        Heatmap::new(title, ["x", "y", ""].map(Axis::linear), shape, values)
+    }
+
     /// The straight line from corner to corner of the plot.
     fn diagonal() -> LineChart {
         unit_square("Diagonal & more")
@@ -470,7 +465,7 @@ mod tests {
         let figure = Figure::from(diagonal());
         let (picture, size) = (picture(&figure), figure.layout().unwrap().size);
         assert_eq!(picture.dimensions(), (2 * size.0, 2 * size.1));
-        assert_eq!(at(&picture, 0.0, 0.0), WHITE);
+        assert_eq!(at(&picture, 0.0, 0.0), Rgb::WHITE);
         for t in [0.1, 0.25, 0.5, 0.75, 0.9] {
             let (x, y) = place(&figure, [t, t]);
             assert!(has_near(&picture, BLUE, [x, y], 0.5), "nothing at {t}");
@@ -517,14 +512,14 @@ mod tests {
         let empty = LineChart::new("c", Axis::linear("t"), Axis::log("W")).with_series(bad);
         let panels = [
             Panel::from(empty),
-            Heatmap::new("c", [2, 2], vec![f64::NAN; 4]).into(),
+            heat_map("c", [2, 2], vec![f64::NAN; 4]).into(),
             Shapes::new("c").into(),
-            Raster::new([0, 3], vec![]).with_caption("c").into(),
+            Raster::new("c", [0, 3], vec![]).into(),
         ];
         for panel in panels {
             let error = Figure::from(panel).to_svg().unwrap_err();
             assert!(
-                matches!(&error, Error::Empty { chart } if chart == "c"),
+                matches!(&error, Error::Empty(chart) if chart == "c"),
                 "{error}"
             );
         }
@@ -547,9 +542,9 @@ mod tests {
             );
         }
         let panels = [
-            (Panel::from(Heatmap::new("u", [3, 4], vec![0.0; 11])), 11),
-            (Raster::new([3, 4], vec![[0; 4]; 13]).into(), 13),
-            (Raster::new([usize::MAX, 2], vec![[0; 4]; 3]).into(), 3),
+            (Panel::from(heat_map("u", [3, 4], vec![0.0; 11])), 11),
+            (Raster::new("", [3, 4], vec![[0; 4]; 13]).into(), 13),
+            (Raster::new("", [usize::MAX, 2], vec![[0; 4]; 3]).into(), 3),
         ];
         for (panel, length) in panels {
             let error = Figure::from(panel).to_svg().unwrap_err();
@@ -650,10 +645,8 @@ mod tests {
         let mut values = vec![0.0; 12];
         (values[3 * 3], values[2]) = (1.0, f64::NAN);
         let axis = |label, high| Axis::linear(label).with_range(0.0, high);
-        let map = Heatmap::new("Hot cell", [4, 3], values)
-            .with_axes(axis("x", 4.0), axis("y", 3.0))
-            .with_bar(Axis::linear("value"));
-        let figure = Figure::from(map);
+        let axes = [axis("x", 4.0), axis("y", 3.0), Axis::linear("value")];
+        let figure = Figure::from(Heatmap::new("Hot cell", axes, [4, 3], values));
         let (picture, plot) = (picture(&figure), plot(&figure));
         assert!(
             (plot.height / plot.width - 0.75).abs() < 0.01,
@@ -714,7 +707,7 @@ mod tests {
             assert_eq!(at(x, y), VERMILLION);
         }
         for (x, y) in [(0.0, 0.0), (0.4, 0.4), (1.05, 0.0)] {
-            assert_eq!(at(x, y), WHITE);
+            assert_eq!(at(x, y), Rgb::WHITE);
         }
         let y = right.centre().y;
         assert!(has_near(
@@ -747,7 +740,7 @@ mod tests {
     fn mixed_panels_are_written_twice_with_the_same_bytes() {
         let figure = Figure::new("Mixed", 2)
             .with_panel(diagonal())
-            .with_panel(Heatmap::new("u", [2, 2], vec![1.0, 2.0, 3.0, 4.0]))
+            .with_panel(heat_map("u", [2, 2], vec![1.0, 2.0, 3.0, 4.0]))
             .with_panel(Shapes::new("s").with_curve(Curve::new(vec![square(1.0)])))
             .with_panel(half(30, 20));
         let root = tempfile::tempdir().unwrap();
@@ -776,19 +769,23 @@ mod tests {
             }
         };
         let pixels: Vec<[u8; 4]> = (0..columns * rows).map(pixel).collect();
-        Raster::new([columns, rows], pixels)
+        Raster::new("step 100", [columns, rows], pixels)
     }
 
     #[test]
     fn pictures_keep_their_shape_and_show_the_page_where_they_are_transparent() {
         let green = OKABE_ITO[2];
         for (columns, rows) in [(300, 200), (60, 40), (1500, 1000)] {
-            let figure = Figure::from(half(columns, rows).with_caption("step 100"));
+            let figure = Figure::from(half(columns, rows));
             let (picture, plot) = (picture(&figure), plot(&figure));
             assert!((plot.height / plot.width - 2.0 / 3.0).abs() < 0.01);
             let at = |x, y| at(&picture, plot.x + x * plot.width, plot.y + y * plot.height);
             for y in [0.02, 0.5, 0.98] {
-                assert_eq!((at(0.02, y), at(0.45, y)), (WHITE, WHITE), "{columns} {y}");
+                assert_eq!(
+                    (at(0.02, y), at(0.45, y)),
+                    (Rgb::WHITE, Rgb::WHITE),
+                    "{columns} {y}"
+                );
                 assert_eq!((at(0.55, y), at(0.98, y)), (green, green), "{columns} {y}");
             }
             let svg = figure.to_svg().unwrap();
@@ -800,7 +797,7 @@ mod tests {
     #[test]
     fn pictures_of_the_right_size_are_copied_and_others_averaged_in_linear_light() {
         let shown = |size: [usize; 2], pixels: Vec<[u8; 4]>| {
-            let figure = Figure::from(Raster::new(size, pixels)).with_width(200.0);
+            let figure = Figure::from(Raster::new("", size, pixels)).with_width(200.0);
             (picture(&figure), plot(&figure))
         };
         // The layout depends on the ratio of the sides alone.

@@ -103,12 +103,11 @@ pub(crate) struct TextStyle {
 impl TextStyle {
     /// Horizontal and centred.
     pub fn new(em: f64, colour: Rgb) -> Self {
-        let (align, vertical) = (Align::Centre, false);
         Self {
             em,
             colour,
-            align,
-            vertical,
+            align: Align::Centre,
+            vertical: false,
         }
     }
 
@@ -116,11 +115,9 @@ impl TextStyle {
         Self { align, ..self }
     }
 
-    pub fn upwards(self) -> Self {
-        Self {
-            vertical: true,
-            ..self
-        }
+    pub fn upwards(mut self) -> Self {
+        self.vertical = true;
+        self
     }
 
     /// From the top of the line down to the middle of the capitals.

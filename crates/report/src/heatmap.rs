@@ -5,9 +5,9 @@ use srgb::Rgb;
 use crate::axes::{Axes, Ruler};
 use crate::axis::{Axis, Window};
 use crate::colour::{FRAME, viridis};
-use crate::drawable::Drawable;
 use crate::error::{Error, Result};
 use crate::geom::{Margins, Rect};
+use crate::panel::Drawable;
 use crate::style::Fonts;
 use crate::surface::Surface;
 
@@ -23,34 +23,26 @@ pub struct Heatmap {
 }
 
 impl Heatmap {
-    /// A heat map on the unit square with an automatic, linear colour range, which spans the data.
+    /// A heat map with its axes and its colour bar. Ranges of the axes are the outer edges of the cells, 0 to 1 if there is none; without
+    /// a range the colours span the data.
     ///
     /// Values are in grid order: `values[i * shape[1] + j]` belongs to the `i`-th position along the
     /// horizontal axis and the `j`-th along the vertical one (row-major, last axis fastest, `y` up).
     /// Values that cannot be shown (NaN, or not positive on a logarithmic colour axis) are drawn grey.
-    pub fn new(title: impl Into<String>, shape: [usize; 2], values: impl Into<Vec<f64>>) -> Self {
+    pub fn new(
+        title: impl Into<String>,
+        [x, y, bar]: [Axis; 3],
+        shape: [usize; 2],
+        values: impl Into<Vec<f64>>,
+    ) -> Self {
         Self {
             title: title.into(),
-            x: Axis::linear("x"),
-            y: Axis::linear("y"),
+            x,
+            y,
             shape,
             values: values.into(),
-            bar: Axis::linear(""),
+            bar,
         }
-    }
-
-    /// Sets both axes. Their ranges are the outer edges of the cells.
-    #[must_use]
-    pub fn with_axes(mut self, x: Axis, y: Axis) -> Self {
-        (self.x, self.y) = (x, y);
-        self
-    }
-
-    /// Sets label, scale and range of the colour bar.
-    #[must_use]
-    pub fn with_bar(mut self, bar: Axis) -> Self {
-        self.bar = bar;
-        self
     }
 
     /// The heat map with the ends of its axes.
@@ -61,8 +53,8 @@ impl Heatmap {
         let constant = values.all(|v| Some(v) == first);
         let padding = if constant { 0.05 } else { 0.0 };
         let colours = self.bar.resolve(self.values.iter().copied(), padding)?;
-        let chart = self.title.clone();
-        let bar = Ruler::new(&self.bar, colours.ok_or(Error::Empty { chart })?, fonts);
+        let colours = colours.ok_or_else(|| Error::Empty(self.title.clone()))?;
+        let bar = Ruler::new(&self.bar, colours, fonts);
         let ends = [&self.x, &self.y].map(|axis| axis.range.unwrap_or([0.0, 1.0]));
         let window = Window::linear([&self.x.label, &self.y.label], ends)?;
         let axes = Axes::new(window, [&self.x, &self.y], fonts);

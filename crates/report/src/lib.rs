@@ -49,7 +49,6 @@ mod axis;
 mod bitmap;
 mod colour;
 mod data;
-mod drawable;
 mod encode;
 mod error;
 mod figure;

@@ -112,11 +112,8 @@ fn commit() -> Option<String> {
     };
     let hash = git(&["rev-parse", "HEAD"])?;
     let changes = git(&["status", "--porcelain", "--untracked-files=no"])?;
-    Some(if changes.is_empty() {
-        hash
-    } else {
-        format!("{hash}-modified")
-    })
+    let suffix = if changes.is_empty() { "" } else { "-modified" };
+    Some(hash + suffix)
 }
 
 /// Date and time of day in UTC to the second, as RFC 3339 writes them.

@@ -47,9 +47,7 @@ impl OutputDir {
         let mut components = Path::new(name).components();
         match (components.next(), components.next()) {
             (Some(Component::Normal(only)), None) if only == name => Ok(self.path.join(name)),
-            _ => Err(Error::FileName {
-                name: name.to_owned(),
-            }),
+            _ => Err(Error::FileName(name.to_owned())),
         }
     }
 

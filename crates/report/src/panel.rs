@@ -2,13 +2,15 @@
 
 use derive_more::From;
 
-use crate::drawable::Drawable;
 use crate::error::Result;
+use crate::geom::{Margins, Rect};
 use crate::heatmap::Heatmap;
+use crate::legend::LegendEntry;
 use crate::plot::LineChart;
 use crate::raster::Raster;
 use crate::shapes::Shapes;
 use crate::style::Fonts;
+use crate::surface::Surface;
 
 /// One cell of a figure.
 #[derive(Debug, Clone, PartialEq, From)]
@@ -34,4 +36,26 @@ impl Panel {
             Self::Raster(raster) => Box::new(raster.checked()?),
         })
     }
+}
+
+/// A panel whose content is checked.
+pub(crate) trait Drawable {
+    /// Title above, caption in the middle below, remark in small type below; each may be empty.
+    fn texts(&self) -> [&str; 3];
+
+    /// Groups of entries for the legend.
+    fn legend(&self) -> Vec<Vec<LegendEntry>> {
+        Vec::new()
+    }
+
+    /// Height over width of the plot box, if that is fixed.
+    fn aspect(&self) -> Option<f64>;
+
+    /// Room for axes around a plot box of the given size; without any, for its outline.
+    fn margins(&self, _width: f64, _height: f64) -> Margins {
+        Margins::even(1.0)
+    }
+
+    /// Draws into the plot box, and axes around it.
+    fn draw(&self, surface: &mut dyn Surface, plot: Rect);
 }

@@ -3,14 +3,15 @@
 use crate::axes::Axes;
 use crate::axis::{Axis, Window};
 use crate::colour::Colour;
-use crate::drawable::Drawable;
 use crate::error::{Error, Result};
 use crate::geom::{Margins, Point, Rect, clip_polyline, thin};
 use crate::legend::LegendEntry;
+use crate::panel::Drawable;
 use crate::style::{Fonts, LineStyle, Marker};
 use crate::surface::Surface;
 
 /// A named curve.
+#[must_use]
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     /// Its name and looks.
@@ -42,34 +43,29 @@ impl Series {
     }
 
     /// Sets the colour: a palette index or a [`Colour`].
-    #[must_use]
     pub fn with_colour(mut self, colour: impl Into<Colour>) -> Self {
         self.entry.colour = colour.into();
         self
     }
 
     /// Sets the line style.
-    #[must_use]
     pub fn with_style(mut self, style: LineStyle) -> Self {
         self.entry.style = style;
         self
     }
 
     /// Marks the data points, but for those too close to others.
-    #[must_use]
     pub fn with_marker(mut self, marker: Marker) -> Self {
         self.entry.marker = Some(marker);
         self
     }
 
     /// Shows symbols at the data points, and no line.
-    #[must_use]
     pub fn with_symbols(self, marker: Marker) -> Self {
         self.with_style(LineStyle::None).with_marker(marker)
     }
 
     /// Sets the width of the line in layout units (2 by default).
-    #[must_use]
     pub fn with_width(mut self, width: f64) -> Self {
         self.width = width;
         self
@@ -77,6 +73,7 @@ impl Series {
 }
 
 /// Curves over a pair of axes, later ones on top.
+#[must_use]
 #[derive(Debug, Clone, PartialEq)]
 pub struct LineChart {
     pub(crate) title: String,
@@ -84,8 +81,8 @@ pub struct LineChart {
     y: Axis,
     pub(crate) series: Vec<Series>,
     entries: Option<Vec<Vec<LegendEntry>>>,
-    /// A remark in small type below the plot.
-    pub note: Option<String>,
+    /// A remark in small type below the plot; may be empty.
+    pub note: String,
 }
 
 impl LineChart {
@@ -97,19 +94,17 @@ impl LineChart {
             y,
             series: Vec::new(),
             entries: None,
-            note: None,
+            note: String::new(),
         }
     }
 
     /// Adds a curve.
-    #[must_use]
     pub fn with_series(mut self, series: Series) -> Self {
         self.series.push(series);
         self
     }
 
     /// Adds curves.
-    #[must_use]
     pub fn with_curves(mut self, curves: impl IntoIterator<Item = Series>) -> Self {
         self.series.extend(curves);
         self
@@ -117,7 +112,6 @@ impl LineChart {
 
     /// Replaces the legend by groups of entries; call it once for every group. With line style for the method and colour for the
     /// resolution, two small groups explain many curves.
-    #[must_use]
     pub fn with_entries(mut self, group: impl IntoIterator<Item = LegendEntry>) -> Self {
         let groups = self.entries.get_or_insert_default();
         groups.push(group.into_iter().collect());
@@ -125,9 +119,8 @@ impl LineChart {
     }
 
     /// Adds a remark in small type below the plot.
-    #[must_use]
     pub fn with_note(mut self, note: impl Into<String>) -> Self {
-        self.note = Some(note.into());
+        self.note = note.into();
         self
     }
 
@@ -145,8 +138,7 @@ impl LineChart {
         let x = self.x.resolve(shown.iter().map(|[x, _]| *x), margin)?;
         let y = self.y.resolve(shown.iter().map(|[_, y]| *y), 0.05)?;
         let (Some(x), Some(y), false) = (x, y, shown.is_empty()) else {
-            let chart = self.title.clone();
-            return Err(Error::Empty { chart });
+            return Err(Error::Empty(self.title.clone()));
         };
         let axes = Axes::new(Window { x, y }, [&self.x, &self.y], fonts);
         Ok(Plot { chart: self, axes })
@@ -161,8 +153,7 @@ pub(crate) struct Plot<'a> {
 
 impl Drawable for Plot<'_> {
     fn texts(&self) -> [&str; 3] {
-        let note = self.chart.note.as_deref();
-        [&self.chart.title, "", note.unwrap_or("")]
+        [&self.chart.title, "", &self.chart.note]
     }
 
     fn legend(&self) -> Vec<Vec<LegendEntry>> {

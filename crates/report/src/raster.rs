@@ -2,12 +2,12 @@
 
 use srgb::Rgb;
 
-use crate::drawable::Drawable;
 use crate::error::{Error, Result};
 use crate::geom::Rect;
+use crate::panel::Drawable;
 use crate::surface::{PNG_SCALE, Surface};
 
-/// A panel that shows a picture, with a caption below.
+/// A panel that shows a picture, with a caption below, which may be empty.
 ///
 /// It is averaged, in linear light, over the pixels of the figure, two per layout unit, or interpolated linearly if these are smaller
 /// than its own. Transparent pixels show the white page.
@@ -21,19 +21,16 @@ pub struct Raster {
 impl Raster {
     /// A picture of `size` columns and rows. Pixels are red, green, blue and opacity (not multiplied into the colour), sRGB, row by row
     /// from the top.
-    pub fn new(size: [usize; 2], pixels: impl Into<Vec<[u8; 4]>>) -> Self {
+    pub fn new(
+        caption: impl Into<String>,
+        size: [usize; 2],
+        pixels: impl Into<Vec<[u8; 4]>>,
+    ) -> Self {
         Self {
-            caption: String::new(),
+            caption: caption.into(),
             size,
             pixels: pixels.into(),
         }
-    }
-
-    /// Sets the caption below the picture.
-    #[must_use]
-    pub fn with_caption(mut self, caption: impl Into<String>) -> Self {
-        self.caption = caption.into();
-        self
     }
 
     pub(crate) fn checked(&self) -> Result<&Self> {

@@ -4,13 +4,14 @@ use srgb::Rgb;
 
 use crate::axis::Window;
 use crate::colour::Colour;
-use crate::drawable::Drawable;
 use crate::error::{Error, Result};
 use crate::geom::{Point, Rect, clip_loop, clip_polyline, thin};
+use crate::panel::Drawable;
 use crate::style::LineStyle;
 use crate::surface::Surface;
 
 /// Closed polylines drawn alike, such as all components of one zero level set.
+#[must_use]
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     loops: Vec<Vec<[f64; 2]>>,
@@ -33,28 +34,24 @@ impl Curve {
     }
 
     /// Sets the colour of the outline.
-    #[must_use]
     pub fn with_colour(mut self, colour: impl Into<Colour>) -> Self {
         self.colour = colour.into();
         self
     }
 
     /// Sets the line style of the outline; [`LineStyle::None`] leaves it out.
-    #[must_use]
     pub fn with_style(mut self, style: LineStyle) -> Self {
         self.style = style;
         self
     }
 
     /// Sets the width of the outline in layout units (1.6 by default).
-    #[must_use]
     pub fn with_width(mut self, width: f64) -> Self {
         self.width = width;
         self
     }
 
     /// Fills the region inside an odd number of the polylines.
-    #[must_use]
     pub fn filled(mut self, colour: impl Into<Colour>) -> Self {
         self.fill = Some(colour.into());
         self
@@ -69,6 +66,7 @@ impl Curve {
 }
 
 /// A panel of plane curves, later ones on top, with a caption above.
+#[must_use]
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shapes {
     pub(crate) caption: String,
@@ -87,14 +85,12 @@ impl Shapes {
     }
 
     /// Adds a curve.
-    #[must_use]
     pub fn with_curve(mut self, curve: Curve) -> Self {
         self.curves.push(curve);
         self
     }
 
     /// Fixes the ends of what is shown. Panels to be compared need the same.
-    #[must_use]
     pub fn with_window(mut self, x: [f64; 2], y: [f64; 2]) -> Self {
         self.window = Some([x, y]);
         self
@@ -107,8 +103,7 @@ impl Shapes {
         let bounds = points
             .map(|point| point.map(|c| [c, c]))
             .reduce(|a, b| [join(a[0], b[0]), join(a[1], b[1])]);
-        let chart = self.caption.clone();
-        let bounds = bounds.ok_or(Error::Empty { chart })?;
+        let bounds = bounds.ok_or_else(|| Error::Empty(self.caption.clone()))?;
         let [width, height] = bounds.map(|[low, high]| high - low);
         let longest = width.max(height);
         let margin = if longest > 0.0 { 0.06 * longest } else { 1.0 };

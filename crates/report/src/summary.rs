@@ -8,6 +8,7 @@ use serde_json::{Map, Number, Value};
 
 use crate::error::{Error, Result};
 use crate::output::OutputDir;
+use crate::table::Cell;
 
 /// Metric names and their values, sorted by name.
 ///
@@ -18,7 +19,7 @@ use crate::output::OutputDir;
 /// ```
 /// let mut summary = report::Summary::new();
 /// summary.insert("circle.error_l2", 2.5e-4)?;
-/// summary.insert_count("circle.newton_iterations", 17)?;
+/// summary.insert("circle.newton_iterations", 17_usize)?;
 /// assert_eq!(
 ///     summary.to_json(),
 ///     "{\n  \"circle.error_l2\": 0.00025,\n  \"circle.newton_iterations\": 17\n}\n"
@@ -36,15 +37,19 @@ impl Summary {
         Self::default()
     }
 
-    /// Adds a metric.
+    /// Adds a metric: an integer without a decimal point, and nothing for text or a missing value.
     ///
     /// # Errors
     /// [`Error::NotFinite`], [`Error::MetricName`], or [`Error::DuplicateMetric`].
-    pub fn insert(&mut self, name: &str, value: f64) -> Result<()> {
-        let number = Number::from_f64(value).ok_or_else(|| Error::NotFinite {
-            what: format!("metric {name:?}"),
-            value,
-        })?;
+    pub fn insert(&mut self, name: &str, value: impl Into<Cell>) -> Result<()> {
+        let number = match value.into() {
+            Cell::Integer(value) => value.into(),
+            Cell::Number(value) => Number::from_f64(value).ok_or_else(|| Error::NotFinite {
+                what: format!("metric {name:?}"),
+                value,
+            })?,
+            Cell::Text(_) | Cell::Missing => return Ok(()),
+        };
         self.add(name, number)
     }
 
@@ -69,19 +74,9 @@ impl Summary {
         Ok(())
     }
 
-    /// Adds a metric that counts something; it is written without a decimal point.
-    ///
-    /// # Errors
-    /// [`Error::MetricName`] or [`Error::DuplicateMetric`].
-    pub fn insert_count(&mut self, name: &str, value: usize) -> Result<()> {
-        self.add(name, Number::from(value))
-    }
-
     fn add(&mut self, name: &str, number: Number) -> Result<()> {
         if !is_metric_name(name) {
-            return Err(Error::MetricName {
-                name: name.to_owned(),
-            });
+            return Err(Error::MetricName(name.to_owned()));
         }
         if let Some(old) = self.metrics.get(name) {
             let (name, value) = (name.to_owned(), old.to_string());

@@ -4,7 +4,6 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use srgb::Rgb;
 
-use crate::colour::WHITE;
 use crate::font::{Align, HALF_CAPITAL, TextStyle};
 use crate::geom::{Point, Rect, point, simplified};
 use crate::style::Marker;
@@ -86,7 +85,7 @@ impl Surface for SvgSurface {
             }
             _ => format!("<path d=\"{}z\"/>\n", path(&marker.outline(at, radius))),
         };
-        let (fill, rim, width) = (hex(colour), hex(WHITE), units(Marker::RIM));
+        let (fill, rim, width) = (hex(colour), hex(Rgb::WHITE), units(Marker::RIM));
         let symbols: String = places.iter().map(symbol).collect();
         self.shapes.push(format!(
             "<g fill=\"{fill}\" stroke=\"{rim}\" stroke-width=\"{width}\" stroke-linejoin=\"miter\">\n{symbols}</g>\n"
@@ -138,7 +137,7 @@ pub(crate) fn svg((width, height): (u32, u32), draw: impl FnOnce(&mut dyn Surfac
     let mut surface = SvgSurface::default();
     draw(&mut surface);
     let elements = [surface.images, surface.shapes].concat().concat();
-    let (w, h, page) = (width * SCALE, height * SCALE, hex(WHITE));
+    let (w, h, page) = (width * SCALE, height * SCALE, hex(Rgb::WHITE));
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {w} {h}\" \
          font-family=\"{FAMILY}\" fill=\"none\" fill-rule=\"evenodd\" stroke-linejoin=\"round\">\n\

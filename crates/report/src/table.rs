@@ -1,7 +1,5 @@
 //! Small tables, written as CSV for programs and as Markdown for people.
 
-use std::path::PathBuf;
-
 use derive_more::From;
 
 use crate::axis::power_of_ten;
@@ -118,49 +116,40 @@ impl Table {
 
     /// The table as Markdown with padded columns, numbers as their columns say.
     pub fn to_markdown(&self) -> String {
-        // Every column with its width, its cells padded to it.
-        let columns: Vec<(usize, Vec<String>)> = (self.columns.iter().enumerate())
-            .map(|(k, column)| {
-                let cells = self.rows.iter().map(|row| row[k].shown(column.format));
-                let cells: Vec<String> = [escaped(&column.name)].into_iter().chain(cells).collect();
-                let lengths = cells.iter().map(|cell| cell.chars().count());
-                let width = lengths.fold(3, usize::max);
-                let padded = |cell: &String| match column.format {
-                    None => format!("{cell:<width$}"),
-                    Some(_) => format!("{cell:>width$}"),
-                };
-                (width, cells.iter().map(padded).collect())
-            })
-            .collect();
+        // Every column with a rule below its name, all padded to its width.
+        let column = |(k, column): (usize, &Column)| -> Vec<String> {
+            let cells = self.rows.iter().map(|row| row[k].shown(column.format));
+            let cells: Vec<String> = [escaped(&column.name)].into_iter().chain(cells).collect();
+            let lengths = cells.iter().map(|cell| cell.chars().count());
+            let width = lengths.fold(3, usize::max);
+            let padded = |cell: &String| match column.format {
+                None => format!(" {cell:<width$} "),
+                Some(_) => format!(" {cell:>width$} "),
+            };
+            let rule = match column.format {
+                None => format!(":{}-", "-".repeat(width)),
+                Some(_) => format!("-{}:", "-".repeat(width)),
+            };
+            let mut lines: Vec<String> = cells.iter().map(padded).collect();
+            lines.insert(1, rule);
+            lines
+        };
+        let columns: Vec<_> = self.columns.iter().enumerate().map(column).collect();
         let line = |number: usize| -> String {
-            let cells = columns
-                .iter()
-                .map(|(_, cells)| format!("| {} ", cells[number]));
+            let cells = columns.iter().map(|cells| format!("|{}", cells[number]));
             cells.collect::<String>() + "|\n"
         };
-        let rules = columns
-            .iter()
-            .zip(&self.columns)
-            .map(|((width, _), column)| {
-                let rule = "-".repeat(*width);
-                match column.format {
-                    None => format!("|:{rule}-"),
-                    Some(_) => format!("|-{rule}:"),
-                }
-            });
-        let body: String = (1..=self.rows.len()).map(line).collect();
-        format!("{}{}|\n{body}", line(0), rules.collect::<String>())
+        (0..self.rows.len() + 2).map(line).collect()
     }
 
     /// Writes `<stem>.csv` and `<stem>.md`.
     ///
     /// # Errors
     /// As [`Table::to_csv`], or [`Error::File`].
-    pub fn write(&self, folder: &OutputDir, stem: &str) -> Result<[PathBuf; 2]> {
-        Ok([
-            folder.write(&format!("{stem}.csv"), self.to_csv()?)?,
-            folder.write(&format!("{stem}.md"), self.to_markdown())?,
-        ])
+    pub fn write(&self, folder: &OutputDir, stem: &str) -> Result<()> {
+        folder.write(&format!("{stem}.csv"), self.to_csv()?)?;
+        folder.write(&format!("{stem}.md"), self.to_markdown())?;
+        Ok(())
     }
 }
 

@@ -5,6 +5,7 @@ use geometry::measure::BoundingBox;
 use geometry::{Placement, require};
 use rayon::prelude::*;
 
+use crate::half_edges::next;
 use crate::mesh::has_three_corners;
 use crate::vector::{Vector, scaled_normal, solid_angle};
 use crate::{Error, TriangleMesh};
@@ -28,24 +29,15 @@ pub enum Warning {
     /// The total volume was negative: all faces were reversed.
     #[display("the surface was oriented inwards: all faces reversed")]
     Reversed,
-    /// The surface is closed only if vertices with exactly equal coordinates are one.
-    #[display("{vertices} vertices were merged with others at exactly the same place")]
-    Merged {
-        /// Vertices less than before.
-        vertices: usize,
-    },
-    /// Faces with a repeated vertex were left out.
-    #[display("{faces} faces with a repeated vertex were left out")]
-    Collapsed {
-        /// Number of such faces.
-        faces: usize,
-    },
-    /// Vertices of no face were left out.
-    #[display("{vertices} vertices of no face were left out")]
-    Unreferenced {
-        /// Number of such vertices.
-        vertices: usize,
-    },
+    /// The surface is closed only if vertices with exactly equal coordinates are one: so many less than before.
+    #[display("{_0} vertices were merged with others at exactly the same place")]
+    Merged(usize),
+    /// So many faces with a repeated vertex were left out.
+    #[display("{_0} faces with a repeated vertex were left out")]
+    Collapsed(usize),
+    /// So many vertices of no face were left out.
+    #[display("{_0} vertices of no face were left out")]
+    Unreferenced(usize),
 }
 
 impl ClosedMesh {
@@ -81,22 +73,14 @@ impl ClosedMesh {
             mesh = mesh.merged();
             let vertices = before[0] - mesh.vertices.len();
             let faces = before[1] - mesh.faces.len();
-            if vertices > 0 {
-                warnings.push(Warning::Merged { vertices });
-            }
-            if faces > 0 {
-                warnings.push(Warning::Collapsed { faces });
-            }
+            warnings.extend((vertices > 0).then_some(Warning::Merged(vertices)));
+            warnings.extend((faces > 0).then_some(Warning::Collapsed(faces)));
             seams = Seams::find(&mesh);
         }
         let seams = seams?;
         has_no_area(&mesh)?;
-        let unreferenced = drop_unreferenced(&mut mesh);
-        if unreferenced > 0 {
-            warnings.push(Warning::Unreferenced {
-                vertices: unreferenced,
-            });
-        }
+        let vertices = drop_unreferenced(&mut mesh);
+        warnings.extend((vertices > 0).then_some(Warning::Unreferenced(vertices)));
 
         let bounds = mesh.bounding_box().ok_or(Error::NoFaces)?;
         let (area, volume) = (area(&mesh), volume(&mesh, &mesh.faces));
@@ -310,11 +294,16 @@ struct Seams {
 struct Side {
     low: u32,
     high: u32,
-    face: u32,
-    /// Corner from which the side starts.
-    corner: u8,
+    /// Number of the corner from which it starts, of all corners of all faces.
+    start: u32,
     /// From `low` to `high`.
     upwards: bool,
+}
+
+impl Side {
+    fn face(self) -> u32 {
+        self.start / 3
+    }
 }
 
 impl Seams {
@@ -331,30 +320,27 @@ impl Seams {
                 count,
             });
         }
-        let mut sides: Vec<Side> = Vec::with_capacity(3 * count);
-        for (face, corners) in mesh.faces.iter().enumerate() {
-            for corner in 0..3 {
-                let (from, to) = (corners[corner], corners[(corner + 1) % 3]);
-                sides.push(Side {
-                    low: from.min(to),
-                    high: from.max(to),
-                    face: face as u32,
-                    corner: corner as u8,
-                    upwards: from < to,
-                });
+        let corners = mesh.faces.as_flattened();
+        let side = |start: u32| {
+            let (from, to) = (corners[start as usize], corners[next(start) as usize]);
+            Side {
+                low: from.min(to),
+                high: from.max(to),
+                start,
+                upwards: from < to,
             }
-        }
+        };
+        let mut sides: Vec<Side> = (0..corners.len() as u32).map(side).collect();
         sides.par_sort_unstable();
         check_edges(mesh, &sides)?;
 
         let mut faces = DisjointSets::new(count);
         let mut sheets = DisjointSets::new(3 * count);
-        for pair in sides.as_chunks::<2>().0 {
-            let [a, b] = pair;
-            faces.unite(a.face, b.face);
+        for [a, b] in sides.as_chunks().0 {
+            faces.unite(a.face(), b.face());
             // The start of one side is the end of the other.
-            sheets.unite(a.start(), b.end());
-            sheets.unite(a.end(), b.start());
+            sheets.unite(a.start, next(b.start));
+            sheets.unite(next(a.start), b.start);
         }
         let (component, components) = faces.numbered();
         let (_, vertices) = sheets.numbered();
@@ -375,16 +361,6 @@ impl Seams {
     }
 }
 
-impl Side {
-    fn start(self) -> u32 {
-        3 * self.face + u32::from(self.corner)
-    }
-
-    fn end(self) -> u32 {
-        3 * self.face + (u32::from(self.corner) + 1) % 3
-    }
-}
-
 /// Every edge must have one side in each direction.
 fn check_edges(mesh: &TriangleMesh, sides: &[Side]) -> Result<(), Error> {
     let edges = || sides.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high));
@@ -399,7 +375,7 @@ fn check_edges(mesh: &TriangleMesh, sides: &[Side]) -> Result<(), Error> {
     if let Some((edges, edge, from, to)) = wrong(&|edge| edge.len() > 2) {
         return Err(Error::NonManifold {
             edges,
-            face: edge[0].face as usize,
+            face: edge[0].face() as usize,
             others: edge.len() - 1,
             from,
             to,
@@ -408,7 +384,7 @@ fn check_edges(mesh: &TriangleMesh, sides: &[Side]) -> Result<(), Error> {
     if let Some((edges, edge, from, to)) = wrong(&|edge| edge.len() == 1) {
         return Err(Error::Open {
             edges,
-            face: edge[0].face as usize,
+            face: edge[0].face() as usize,
             from,
             to,
         });
@@ -416,8 +392,8 @@ fn check_edges(mesh: &TriangleMesh, sides: &[Side]) -> Result<(), Error> {
     if let Some((edges, edge, from, to)) = wrong(&|edge| edge[0].upwards == edge[1].upwards) {
         return Err(Error::MixedOrientation {
             edges,
-            first: edge[0].face as usize,
-            second: edge[1].face as usize,
+            first: edge[0].face() as usize,
+            second: edge[1].face() as usize,
             from,
             to,
         });
@@ -450,18 +426,17 @@ impl DisjointSets {
 
     /// The number of the set of every element, in the order of first elements, and of sets.
     fn numbered(mut self) -> (Vec<u32>, usize) {
-        let mut number = vec![u32::MAX; self.0.len()];
-        let mut sets = 0;
-        let all = 0..self.0.len() as u32;
-        let numbers = all.map(|element| {
-            let root = self.root(element) as usize;
-            if number[root] == u32::MAX {
-                number[root] = sets;
-                sets += 1;
-            }
-            number[root]
-        });
-        let numbers = numbers.collect();
+        let (mut numbers, mut sets) = (Vec::with_capacity(self.0.len()), 0);
+        for element in 0..self.0.len() as u32 {
+            // The first element of a set is its root.
+            let root = self.root(element);
+            numbers.push(if root == element {
+                sets
+            } else {
+                numbers[root as usize]
+            });
+            sets += u32::from(root == element);
+        }
         (numbers, sets as usize)
     }
 }

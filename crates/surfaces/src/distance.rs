@@ -6,8 +6,7 @@ use geometry::{Field, Grid, SignedDistance};
 use rayon::prelude::*;
 
 use crate::hierarchy::{Hierarchy, Nearest};
-use crate::mesh::merge_coincident;
-use crate::normals::angle_weighted_normals;
+use crate::mesh::{angle_weighted_normals, merge_coincident};
 use crate::triangle::Part;
 use crate::vector::{Vector, scaled_normal};
 use crate::{ClosedMesh, Error};
@@ -46,11 +45,11 @@ impl MeshDistance {
         let scale = (-exponent).clamp(-1000.0, 1000.0).exp2();
         let mesh = mesh.mesh();
         // Where sheets touch in a vertex, the pseudo-normal is the sum over all of them.
-        let merged = merge_coincident(&mesh.vertices);
-        let vertices = merged.first.iter().map(|&v| mesh.vertices[v]);
+        let (first, index) = merge_coincident(&mesh.vertices);
+        let vertices = first.iter().map(|&v| mesh.vertices[v]);
         let vertices: Vec<_> = vertices.map(|x| Vector::from_array(x) * scale).collect();
         let faces = mesh.faces.iter();
-        let faces: Vec<_> = faces.map(|f| f.map(|v| merged.index[v as usize])).collect();
+        let faces: Vec<_> = faces.map(|f| f.map(|v| index[v as usize])).collect();
         let triangles: Vec<_> = faces
             .iter()
             .map(|f| f.map(|v| vertices[v as usize]))
@@ -178,7 +177,7 @@ impl MeshDistance {
         match nearest.part {
             Part::Corner(i) => self.vertex_normals[face[i] as usize],
             Part::Edge(i) => self.edge_normals[&edge(face, i)],
-            Part::Inside => scaled_normal(*self.hierarchy.triangle(nearest.triangle)),
+            Part::Inside => scaled_normal(self.hierarchy.triangles[nearest.triangle]),
         }
     }
 }

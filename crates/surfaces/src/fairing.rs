@@ -37,7 +37,7 @@ const REACH: f64 = 4.0;
 ///
 /// Noise that is independent from vertex to vertex has waves as short as the edges, which a grid of such a width shows as facets and
 /// not as noise. So first Taubin's smoothing along the edges takes off the shortest waves, as long as the vertices move by less than most
-/// of the noise. From the phase field of this [start](Self::start) Willmore flow takes off longer ones, until the
+/// of the noise. From the phase field of this [start](Self#structfield.start) Willmore flow takes off longer ones, until the
 /// surface is [as far](Self::farthest) from the rough one as noise is. The zero level set takes the vertices along, but for those
 /// parts of the mesh that the grid does not resolve, which keep their distance from it. Last, what the flow took off the long waves is
 /// given back ([`TriangleMesh::with_long_waves_of`]), and the volume is made that of the rough mesh.
@@ -47,12 +47,16 @@ const REACH: f64 = 4.0;
 ///
 /// Without noise the vertices follow the level set, and that is all.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Fairing {
-    rough: ClosedMesh,
-    start: ClosedMesh,
-    noise: f64,
-    /// Vertices that stay, if any do.
-    kept: Vec<bool>,
+    /// The mesh as it was given.
+    pub rough: ClosedMesh,
+    /// The mesh from which the flow starts.
+    pub start: ClosedMesh,
+    /// Standard deviation of the noise.
+    pub noise: f64,
+    /// Whether a vertex stays.
+    pub kept: Vec<bool>,
 }
 
 /// The vertices of the start of a fairing in the box of a grid.
@@ -83,26 +87,6 @@ impl Fairing {
             kept: rough.mesh().vertices.iter().map(|&x| kept(x)).collect(),
             rough,
         }
-    }
-
-    /// The mesh as it was given.
-    pub fn rough(&self) -> &ClosedMesh {
-        &self.rough
-    }
-
-    /// The mesh from which the flow starts.
-    pub fn start(&self) -> &ClosedMesh {
-        &self.start
-    }
-
-    /// Standard deviation of the noise.
-    pub fn noise(&self) -> f64 {
-        self.noise
-    }
-
-    /// Whether a vertex stays.
-    pub fn keeps(&self) -> &[bool] {
-        &self.kept
     }
 
     /// The longest time of Willmore flow for the noise, on a grid of this spacing, all lengths multiplied by `scale`.
@@ -184,8 +168,11 @@ impl Fairing {
     /// # Errors
     /// The values must be finite.
     pub fn faired(&self, followed: &Followed, u: &Field<3>) -> Result<TriangleMesh, Error> {
+        let now = distances_from_phase_field(u, followed.eps)?;
+        let pairs = followed.vertices.par_iter().zip(&followed.levels);
+        let moved = pairs.map(|(&x, &level)| project(&now, x, level, REACH * followed.eps));
         let mut mesh = TriangleMesh {
-            vertices: followed.at(u)?,
+            vertices: (moved.map(|x| followed.placement.apply_inverse(x))).collect(),
             faces: self.rough.mesh().faces.clone(),
             normals: None,
         };
@@ -207,14 +194,6 @@ impl Fairing {
 }
 
 impl Followed {
-    /// Where the level sets of `u` have taken the vertices, in the coordinates of the mesh.
-    fn at(&self, u: &Field<3>) -> Result<Vec<[f64; 3]>, Error> {
-        let now = distances_from_phase_field(u, self.eps)?;
-        let pairs = self.vertices.par_iter().zip(&self.levels);
-        let moved = pairs.map(|(&x, &level)| project(&now, x, level, REACH * self.eps));
-        Ok(moved.map(|x| self.placement.apply_inverse(x)).collect())
-    }
-
     /// The part of the vertices that the zero level set of `u` has left behind.
     ///
     /// # Errors

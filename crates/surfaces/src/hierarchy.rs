@@ -1,5 +1,7 @@
 //! A hierarchy of bounding boxes of triangles.
 
+use geometry::measure::BoundingBox;
+
 use crate::triangle::{Part, Triangle, offset};
 use crate::vector::Vector;
 
@@ -9,15 +11,9 @@ const LEAF: usize = 4;
 /// Boxes around all triangles, around halves of them, halves of these, and so on.
 #[derive(Clone, Debug)]
 pub(crate) struct Hierarchy {
-    triangles: Vec<Triangle>,
+    pub(crate) triangles: Vec<Triangle>,
     /// The two halves of box `i` are `2 i + 1` and `2 i + 2`; the last level is complete.
-    boxes: Vec<Bounds>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Bounds {
-    min: Vector,
-    max: Vector,
+    boxes: Vec<BoundingBox<3>>,
 }
 
 /// The point of the triangles that is nearest to another point.
@@ -35,15 +31,11 @@ impl Hierarchy {
     /// hierarchy to those given.
     pub(crate) fn new(triangles: &[Triangle]) -> (Self, Vec<usize>) {
         let levels = triangles.len().div_ceil(LEAF).next_power_of_two().ilog2();
-        let mut boxes = vec![Bounds::around(triangles.iter().take(1)); (2 << levels) - 1];
+        let mut boxes = vec![bounds(triangles.iter().take(1)); (2 << levels) - 1];
         let mut order: Vec<usize> = (0..triangles.len()).collect();
         divide(triangles, &mut order, &mut boxes, 0);
         let triangles = order.iter().map(|&t| triangles[t]).collect();
         (Self { triangles, boxes }, order)
-    }
-
-    pub(crate) fn triangle(&self, number: usize) -> &Triangle {
-        &self.triangles[number]
     }
 
     pub(crate) fn project(&self, x: Vector, triangle: usize) -> Nearest {
@@ -60,7 +52,7 @@ impl Hierarchy {
     pub(crate) fn nearest(&self, x: Vector, guess: Option<Nearest>) -> Option<Nearest> {
         let mut best = guess;
         let bound = best.map_or(f64::MAX, |b| b.squared_distance);
-        if self.boxes[0].squared_distance(x) < bound {
+        if squared_distance(&self.boxes[0], x) < bound {
             self.search(x, 0, 0..self.triangles.len(), &mut best);
         }
         best
@@ -86,7 +78,7 @@ impl Hierarchy {
         }
         let middle = range.start.midpoint(range.end);
         let mut halves = [(first, range.start..middle), (first + 1, middle..range.end)]
-            .map(|(half, range)| (self.boxes[half].squared_distance(x), half, range));
+            .map(|(half, range)| (squared_distance(&self.boxes[half], x), half, range));
         if halves[1].0 < halves[0].0 {
             halves.swap(0, 1);
         }
@@ -98,34 +90,24 @@ impl Hierarchy {
     }
 }
 
-impl Bounds {
-    fn around<'a>(triangles: impl IntoIterator<Item = &'a Triangle>) -> Self {
-        let empty = Self {
-            min: Vector::INFINITY,
-            max: Vector::NEG_INFINITY,
-        };
-        triangles
-            .into_iter()
-            .flatten()
-            .fold(empty, |bounds, &corner| Self {
-                min: bounds.min.min(corner),
-                max: bounds.max.max(corner),
-            })
-    }
+/// The smallest box around triangles, of which there is one at least.
+pub(crate) fn bounds<'a>(triangles: impl IntoIterator<Item = &'a Triangle>) -> BoundingBox<3> {
+    let corners = triangles.into_iter().flatten();
+    BoundingBox::around(corners.map(Vector::to_array)).expect("there are triangles")
+}
 
-    fn squared_distance(&self, x: Vector) -> f64 {
-        let outside = (self.min - x).max(x - self.max).max(Vector::ZERO);
-        outside.length_squared()
-    }
+fn squared_distance(bounds: &BoundingBox<3>, x: Vector) -> f64 {
+    let [low, high] = [bounds.lower, bounds.upper].map(Vector::from_array);
+    (low - x).max(x - high).max(Vector::ZERO).length_squared()
 }
 
 /// Sorts the triangles of a box into its halves and these likewise, and sets their bounds.
-fn divide(triangles: &[Triangle], order: &mut [usize], boxes: &mut [Bounds], node: usize) {
-    boxes[node] = Bounds::around(order.iter().map(|&t| &triangles[t]));
+fn divide(triangles: &[Triangle], order: &mut [usize], boxes: &mut [BoundingBox<3>], node: usize) {
+    boxes[node] = bounds(order.iter().map(|&t| &triangles[t]));
     if 2 * node + 1 >= boxes.len() {
         return;
     }
-    let axis = (boxes[node].max - boxes[node].min).max_position();
+    let axis = Vector::from_array(boxes[node].extent()).max_position();
     let centre = |t: &usize| triangles[*t].iter().map(|corner| corner[axis]).sum::<f64>();
     let middle = order.len() / 2;
     order.select_nth_unstable_by(middle, |a, b| centre(a).total_cmp(&centre(b)));

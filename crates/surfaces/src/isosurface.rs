@@ -77,17 +77,10 @@ fn marched(lattice: &Lattice<'_>) -> Result<TriangleMesh, Error> {
         faces: Vec::new(),
     };
     for cell in lattice.mixed_cells() {
-        // The corner with even indices, and the steps to the one with odd indices.
-        let even = cell.map(|c| c + c % 2);
+        // The corner whose index is odd along the axes with a bit.
         let corner = |bits: usize| -> Node {
-            std::array::from_fn(|axis| {
-                let odd = cell[axis] + 1 - cell[axis] % 2;
-                if bits >> axis & 1 == 1 {
-                    odd
-                } else {
-                    even[axis]
-                }
-            })
+            let is_odd = |axis: usize| bits >> axis & 1;
+            std::array::from_fn(|axis| cell[axis] + (cell[axis] % 2 ^ is_odd(axis)))
         };
         let reflected = cell.iter().map(|c| c % 2).sum::<usize>() % 2 == 1;
         for (corners, positive) in TETRAHEDRA {
@@ -219,27 +212,19 @@ impl<'a> Lattice<'a> {
             let node: [isize; 3] = std::array::from_fn(|i| a[i] as isize + k * step[i]);
             self.value(node)
         };
-        let part = match (at(0), at(1)) {
+        let (part, gradient) = match (at(0), at(1)) {
             (Some(va), Some(vb)) => {
-                let curvature = |left: Option<f64>, middle: f64, right: Option<f64>| {
-                    left.zip(right).map_or(0.0, |(l, r)| l - 2.0 * middle + r)
-                };
-                let bend = smaller(
-                    curvature(at(-1), va, Some(vb)),
-                    curvature(Some(va), vb, at(2)),
-                );
-                root(va, vb, bend)
+                // Second differences at both ends.
+                let here = at(-1).map_or(0.0, |before| before - 2.0 * va + vb);
+                let there = at(2).map_or(0.0, |after| va - 2.0 * vb + after);
+                let part = root(va, vb, smaller(here, there)).clamp(CLEARANCE, 1.0 - CLEARANCE);
+                (part, self.gradient(a).lerp(self.gradient(b), part))
             }
             // A cap at the border of the grid.
-            (Some(_), None) => 0.0,
-            (None, _) => 1.0,
+            (Some(_), None) => (CLEARANCE, Vector::ZERO),
+            (None, _) => (1.0 - CLEARANCE, Vector::ZERO),
         };
-        let part = part.clamp(CLEARANCE, 1.0 - CLEARANCE);
         let (xa, xb) = (self.position(a), self.position(b));
-        let gradient = match (at(0), at(1)) {
-            (Some(_), Some(_)) => self.gradient(a).lerp(self.gradient(b), part),
-            _ => Vector::ZERO,
-        };
         let outwards = if self.is_inside(a) { xb - xa } else { xa - xb };
         let normal = gradient
             .try_normalize()

@@ -66,7 +66,6 @@ mod hierarchy;
 mod isosurface;
 mod level_set;
 mod mesh;
-mod normals;
 mod read;
 mod remeshing;
 mod repair;

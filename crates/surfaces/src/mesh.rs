@@ -10,6 +10,7 @@ use crate::Error;
 use crate::vector::{Vector, scaled_normal};
 
 /// Triangles over shared vertices, not necessarily closed; see [`ClosedMesh`](crate::ClosedMesh).
+#[must_use]
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
     /// Positions.
@@ -74,6 +75,25 @@ impl TriangleMesh {
         }
     }
 
+    /// The unit normal of a face; zero for a face without area.
+    pub fn face_normal(&self, face: [u32; 3]) -> [f64; 3] {
+        let normal = scaled_normal(self.corners(face)).normalize_or_zero();
+        normal.to_array()
+    }
+
+    /// The volume that a closed surface encloses, `1/6 sum a . (b x c)`.
+    pub fn volume(&self) -> f64 {
+        crate::closed::volume(self, &self.faces)
+    }
+
+    /// Outward unit normals of the vertices: the sums of the unit normals of the faces there, weighted by their angles; zero for
+    /// a vertex of no face.
+    pub fn vertex_normals(&self) -> Vec<[f64; 3]> {
+        let sums = angle_weighted_normals(&self.points(), &self.faces);
+        let unit = |sum: Vector| sum.normalize_or_zero().to_array();
+        sums.into_iter().map(unit).collect()
+    }
+
     /// Checks that all numbers are finite and at most `limit`, and all indices in range.
     ///
     /// # Errors
@@ -113,7 +133,7 @@ impl TriangleMesh {
 
     /// With vertices at exactly the same place as one, and without the faces that repeat a vertex then.
     pub(crate) fn merged(&self) -> Self {
-        let Merged { first, index } = merge_coincident(&self.vertices);
+        let (first, index) = merge_coincident(&self.vertices);
         let mut merged = self.reindexed(&first, |v| index[v as usize]);
         merged.faces.retain(has_three_corners);
         merged
@@ -144,16 +164,8 @@ pub(crate) fn has_three_corners(&[a, b, c]: &[u32; 3]) -> bool {
     a != b && b != c && c != a
 }
 
-/// Positions that coincide exactly, as one.
-pub(crate) struct Merged {
-    /// For every distinct position, the first vertex there.
-    pub first: Vec<usize>,
-    /// For every vertex, the number of its position.
-    pub index: Vec<u32>,
-}
-
-/// Finds the vertices with exactly equal coordinates (`-0` equals `0`).
-pub(crate) fn merge_coincident(vertices: &[[f64; 3]]) -> Merged {
+/// For every distinct position (`-0` equals `0`) the first vertex there, and for every vertex the number of its position.
+pub(crate) fn merge_coincident(vertices: &[[f64; 3]]) -> (Vec<usize>, Vec<u32>) {
     let mut known = HashMap::with_capacity(vertices.len());
     let mut first = Vec::new();
     let index = vertices.iter().enumerate().map(|(vertex, x)| {
@@ -165,5 +177,21 @@ pub(crate) fn merge_coincident(vertices: &[[f64; 3]]) -> Merged {
         })
     });
     let index = index.collect();
-    Merged { first, index }
+    (first, index)
+}
+
+/// For every vertex the sum of the unit normals of its faces, weighted by their angles there.
+pub(crate) fn angle_weighted_normals(vertices: &[Vector], faces: &[[u32; 3]]) -> Vec<Vector> {
+    let mut normals = vec![Vector::ZERO; vertices.len()];
+    for face in faces {
+        let triangle = face.map(|v| vertices[v as usize]);
+        let normal = scaled_normal(triangle).normalize_or_zero();
+        for i in 0..3 {
+            let [here, next, last] = [i, i + 1, i + 2].map(|i| triangle[i % 3]);
+            let (a, b) = (next - here, last - here);
+            let angle = a.cross(b).length().atan2(a.dot(b));
+            normals[face[i] as usize] += normal * angle;
+        }
+    }
+    normals
 }

@@ -101,11 +101,6 @@ fn level(part: f64) -> u8 {
     (255.0 * part.clamp(0.0, 1.0)).round() as u8
 }
 
-/// The start of a text of a file.
-fn shortened(text: &str) -> String {
-    files::shortened(text, 60)
-}
-
 /// The three coordinates that follow in a line of text.
 fn position<'a>(
     mut words: impl Iterator<Item = &'a str>,
@@ -115,11 +110,8 @@ fn position<'a>(
     let mut position = [0.0; 3];
     for coordinate in &mut position {
         let word = words.next().unwrap_or_default();
-        *coordinate = word.parse().map_err(|_| FormatError::Line {
-            line,
-            found: shortened(word),
-            expected: "a coordinate",
-        })?;
+        let wrong = |_| FormatError::line(line, word, "a coordinate");
+        *coordinate = word.parse().map_err(wrong)?;
     }
     finite(position, vertex)
 }
@@ -181,9 +173,8 @@ impl Polygons {
 
     fn finish(self) -> Result<Vec<[u32; 3]>, FormatError> {
         if self.faces.is_empty() {
-            return Err(FormatError::NoFaces {
-                vertices: self.vertices,
-            });
+            let vertices = self.vertices;
+            return Err(FormatError::NoFaces { vertices });
         }
         Ok(self.faces)
     }

@@ -7,7 +7,7 @@ use derive_more::Display;
 use geometry::{Field, Grid, SignedDistance, optimal_profile};
 use rayon::prelude::*;
 
-use crate::hierarchy::Hierarchy;
+use crate::hierarchy::{Hierarchy, bounds};
 use crate::vector::{Vector, scaled_normal, solid_angle};
 use crate::{ClosedMesh, Error, MeshDistance, TriangleMesh, remeshed_surface};
 
@@ -52,12 +52,12 @@ pub struct Repaired {
 /// [`Error::NoFaces`], [`Error::NonFiniteVertex`], [`Error::IndexOutOfRange`]; [`Error::EnclosesNothing`].
 pub fn repair(mesh: &TriangleMesh, cells: usize) -> Result<Repaired, Error> {
     mesh.check(1e70)?;
-    let bounds = mesh.bounding_box().filter(|_| !mesh.faces.is_empty());
+    let mut old = mesh.merged();
+    let bounds = mesh.bounding_box().filter(|_| !old.faces.is_empty());
     let bounds = bounds.ok_or(Error::NoFaces)?;
     let side = bounds.longest_side() / PART;
     let corner = bounds.centre().map(|x| x - 0.5 * side);
     let grid = Grid::new(cells, side)?.with_origin(corner)?;
-    let mut old = mesh.merged();
     let turned = orient(&mut old.faces);
     let triangles: Vec<[Vector; 3]> = old.faces.iter().map(|&f| old.corners(f)).collect();
     let tree = Windings::new(&triangles);
@@ -138,13 +138,12 @@ fn orient(faces: &mut [[u32; 3]]) -> usize {
     for (number, face) in faces.iter().enumerate() {
         for i in 0..3 {
             let (a, b) = (face[i], face[(i + 1) % 3]);
-            edges
-                .entry([a.min(b), a.max(b)])
-                .or_default()
-                .push((number, a < b));
+            let sides = edges.entry([a.min(b), a.max(b)]).or_default();
+            sides.push((number, a < b));
         }
     }
     let mut turned: Vec<Option<bool>> = vec![None; faces.len()];
+    let mut total = 0;
     for start in 0..faces.len() {
         if turned[start].is_some() {
             continue;
@@ -167,24 +166,19 @@ fn orient(faces: &mut [[u32; 3]]) -> usize {
                 }
             }
         }
-        let count = patch
-            .iter()
-            .filter(|&&face| turned[face] == Some(true))
-            .count();
-        if 2 * count > patch.len() {
-            for &face in &patch {
-                turned[face] = turned[face].map(|turned| !turned);
-            }
+        let (some, others): (Vec<usize>, Vec<usize>) =
+            (patch.into_iter()).partition(|&face| turned[face] == Some(true));
+        let fewer = if some.len() <= others.len() {
+            some
+        } else {
+            others
+        };
+        total += fewer.len();
+        for face in fewer {
+            faces[face].swap(1, 2);
         }
     }
-    let mut count = 0;
-    for (face, turned) in faces.iter_mut().zip(&turned) {
-        if *turned == Some(true) {
-            face.swap(1, 2);
-            count += 1;
-        }
-    }
-    count
+    total
 }
 
 /// Generalized winding numbers of triangles.
@@ -218,16 +212,13 @@ impl Windings {
     fn divide(&mut self, range: std::ops::Range<usize>) -> usize {
         let triangles = &mut self.triangles[range.clone()];
         let middle = |t: &[Vector; 3]| (t[0] + t[1] + t[2]) / 3.0;
-        let (mut low, mut high) = (triangles[0][0], triangles[0][0]);
-        for corner in triangles.iter().flatten() {
-            (low, high) = (low.min(*corner), high.max(*corner));
-        }
-        let centre = 0.5 * (low + high);
+        let bounds = bounds(triangles.iter());
+        let centre = Vector::from_array(bounds.centre());
         let corners = triangles.iter().flatten();
         let radius = corners.map(|x| x.distance(centre)).fold(0.0, f64::max);
         let dipole = triangles.iter().map(|&t| 0.5 * scaled_normal(t)).sum();
         let number = self.parts.len();
-        let axis = (high - low).max_position();
+        let axis = Vector::from_array(bounds.extent()).max_position();
         triangles.sort_by(|a, b| middle(a)[axis].total_cmp(&middle(b)[axis]));
         self.parts.push(Part {
             centre,

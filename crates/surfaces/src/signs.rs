@@ -35,11 +35,8 @@ pub fn mend_signs(distance: &mut Field<3>) -> usize {
                 }
             }
         }
-        let sign = if !at_side && 2 * inside > part.len() {
-            -1.0
-        } else {
-            1.0
-        };
+        let is_inside = !at_side && 2 * inside > part.len();
+        let sign = if is_inside { -1.0 } else { 1.0 };
         for node in part {
             changed += usize::from(values[node] * sign < 0.0);
             values[node] = values[node].abs() * sign;

@@ -79,7 +79,6 @@ impl TriangleMesh {
     /// inflates, where `L x` is a vertex less the mean of its neighbours.
     ///
     /// With `mu = 0` it is Laplacian smoothing. G. Taubin: A signal processing approach to fair surface design. SIGGRAPH (1995).
-    #[must_use]
     pub fn smoothed(&self, iterations: usize, lambda: f64, mu: f64) -> Self {
         let mut x = self.points();
         Umbrellas::of(self).smooth(&mut x, iterations, [lambda, mu]);
@@ -92,7 +91,6 @@ impl TriangleMesh {
     ///
     /// Every smoothing takes something of the long waves along; what `y - x` has of these is it, while noise averages out. What is
     /// wrong in the end is the product of two small errors, `(1 - A)(y - x)`; J. W. Tukey called this twicing.
-    #[must_use]
     pub fn with_long_waves_of(&self, rough: &Self, wavelength: f64) -> Self {
         const ROUNDS: [f64; 2] = [12.0, 400.0];
         // On a lattice of equilateral triangles a wave has the eigenvalue (wave number times edge)^2 / 4.
@@ -119,7 +117,6 @@ impl TriangleMesh {
     }
 
     /// All vertices that may move moved along their normals by the same length, so that the closed surface encloses `volume`.
-    #[must_use]
     pub fn with_volume(&self, volume: f64, moves: impl Fn(usize) -> bool) -> Self {
         /// Newton steps; the volume is a polynomial of third degree in the length, nearly linear.
         const STEPS: usize = 4;
@@ -151,7 +148,6 @@ impl TriangleMesh {
     /// The closed surface as small as it becomes in some rounds in which every vertex moves halfway to the middle of its neighbours, then
     /// all of them along their normals so that it encloses `volume`, and none further from where it was than `shortened` allows, which
     /// says of a vertex and its way how much of it may be gone. In the end it encloses `volume`.
-    #[must_use]
     pub fn relaxed(
         &self,
         rounds: usize,

@@ -1,6 +1,6 @@
 //! Mesh files out.
 
-use std::io::{self, Write};
+use std::fmt::Write;
 use std::path::Path;
 
 use files::write_atomically;
@@ -44,76 +44,72 @@ pub fn encode(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<Vec<u8>, Er
     if faces == 0 {
         return Err(Error::NoFaces);
     }
-    let mut bytes = Vec::new();
-    let encoded = match format {
-        Format::Obj => obj(&mut bytes, mesh),
-        Format::Ply => ply(&mut bytes, mesh),
-        Format::Stl => stl(&mut bytes, mesh, faces),
-    };
-    encoded.expect("writing to memory does not fail");
-    Ok(bytes)
+    Ok(match format {
+        Format::Obj => obj(mesh).into_bytes(),
+        Format::Ply => ply(mesh),
+        Format::Stl => stl(mesh, faces),
+    })
 }
 
-fn obj(out: &mut dyn Write, mesh: &TriangleMesh) -> io::Result<()> {
+fn obj(mesh: &TriangleMesh) -> String {
+    let mut out = String::new();
+    // Writing to a string does not fail.
     for [x, y, z] in &mesh.vertices {
-        writeln!(out, "v {x} {y} {z}")?;
+        let _ = writeln!(out, "v {x} {y} {z}");
     }
     for [x, y, z] in mesh.normals.iter().flatten() {
-        writeln!(out, "vn {x} {y} {z}")?;
+        let _ = writeln!(out, "vn {x} {y} {z}");
     }
     for face in &mesh.faces {
         // Counted from one.
         let [a, b, c] = face.map(|v| u64::from(v) + 1);
-        if mesh.normals.is_some() {
-            writeln!(out, "f {a}//{a} {b}//{b} {c}//{c}")?;
+        let _ = if mesh.normals.is_some() {
+            writeln!(out, "f {a}//{a} {b}//{b} {c}//{c}")
         } else {
-            writeln!(out, "f {a} {b} {c}")?;
-        }
+            writeln!(out, "f {a} {b} {c}")
+        };
     }
-    Ok(())
+    out
 }
 
-fn ply(out: &mut dyn Write, mesh: &TriangleMesh) -> io::Result<()> {
-    writeln!(out, "ply\nformat binary_little_endian 1.0")?;
-    writeln!(out, "element vertex {}", mesh.vertices.len())?;
-    for axis in ["x", "y", "z"] {
-        writeln!(out, "property double {axis}")?;
-    }
-    if mesh.normals.is_some() {
-        for axis in ["nx", "ny", "nz"] {
-            writeln!(out, "property double {axis}")?;
-        }
-    }
-    writeln!(out, "element face {}", mesh.faces.len())?;
-    writeln!(out, "property list uchar uint vertex_indices\nend_header")?;
+fn ply(mesh: &TriangleMesh) -> Vec<u8> {
+    let axes: &[&str] = match mesh.normals {
+        Some(_) => &["x", "y", "z", "nx", "ny", "nz"],
+        None => &["x", "y", "z"],
+    };
+    let properties = axes.iter().map(|axis| format!("property double {axis}\n"));
+    let mut out = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\n{}element face {}\n\
+         property list uchar uint vertex_indices\nend_header\n",
+        mesh.vertices.len(),
+        properties.collect::<String>(),
+        mesh.faces.len()
+    )
+    .into_bytes();
     for (vertex, position) in mesh.vertices.iter().enumerate() {
         let normal = mesh.normals.as_ref().map(|n| n[vertex]);
-        for value in position.iter().chain(normal.iter().flatten()) {
-            out.write_all(&value.to_le_bytes())?;
-        }
+        let values = position.iter().chain(normal.iter().flatten());
+        out.extend(values.flat_map(|value| value.to_le_bytes()));
     }
     for face in &mesh.faces {
-        out.write_all(&[3])?;
-        for vertex in face {
-            out.write_all(&vertex.to_le_bytes())?;
-        }
+        out.push(3);
+        out.extend(face.iter().flat_map(|vertex| vertex.to_le_bytes()));
     }
-    Ok(())
+    out
 }
 
-fn stl(out: &mut dyn Write, mesh: &TriangleMesh, faces: u32) -> io::Result<()> {
-    out.write_all(&[0; 80])?;
-    out.write_all(&faces.to_le_bytes())?;
+fn stl(mesh: &TriangleMesh, faces: u32) -> Vec<u8> {
+    let mut out = vec![0; 80];
+    out.extend(faces.to_le_bytes());
     for &face in &mesh.faces {
         // The normal is that of the rounded corners.
         let rounded = |x: Vector| x.to_array().map(|v| v as f32);
         let corners = mesh.corners(face).map(rounded);
         let normal = scaled_normal(corners.map(|x| Vector::from_array(x.map(f64::from))));
         let normal = rounded(normal.normalize_or_zero());
-        for value in [normal].as_flattened().iter().chain(corners.as_flattened()) {
-            out.write_all(&value.to_le_bytes())?;
-        }
-        out.write_all(&[0; 2])?;
+        let values = normal.iter().chain(corners.as_flattened());
+        out.extend(values.flat_map(|value| value.to_le_bytes()));
+        out.extend([0; 2]);
     }
-    Ok(())
+    out
 }

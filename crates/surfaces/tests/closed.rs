@@ -104,7 +104,7 @@ fn seams_are_merged_and_only_if_needed() {
         normals: Some(vec![[1.0, 0.0, 0.0]; 36]),
     };
     let (mesh, warnings) = ClosedMesh::new(split.clone()).unwrap();
-    assert_eq!(warnings, [Warning::Merged { vertices: 28 }]);
+    assert_eq!(warnings, [Warning::Merged(28)]);
     assert_eq!(
         (mesh.mesh().vertices.len(), mesh.euler_characteristic()),
         (8, 2)
@@ -131,7 +131,7 @@ fn sheets_that_share_a_vertex_count_it_twice() {
         *corner = if *corner == 8 { 7 } else { *corner };
     }
     let (mesh, warnings) = ClosedMesh::new(mesh).unwrap();
-    assert_eq!(warnings, [Warning::Unreferenced { vertices: 1 }]);
+    assert_eq!(warnings, [Warning::Unreferenced(1)]);
     assert_eq!(
         (mesh.mesh().vertices.len(), mesh.euler_characteristic()),
         (15, 4)
@@ -145,13 +145,7 @@ fn collapsed_faces_are_left_out() {
     mesh.faces.push([3, 3, 5]);
     mesh.vertices.push([9.0; 3]);
     let (mesh, warnings) = ClosedMesh::new(mesh).unwrap();
-    assert_eq!(
-        warnings,
-        [
-            Warning::Collapsed { faces: 1 },
-            Warning::Unreferenced { vertices: 1 }
-        ]
-    );
+    assert_eq!(warnings, [Warning::Collapsed(1), Warning::Unreferenced(1)]);
     assert_eq!(
         (mesh.mesh().faces.len(), mesh.mesh().vertices.len()),
         (12, 8)

@@ -132,7 +132,7 @@ fn vertices_follow_a_sphere_that_grows() {
         let radius = x.iter().map(|x| x * x).sum::<f64>().sqrt();
         let expected = match vertex {
             0 => 1.5,
-            _ if fairing.keeps()[vertex] => 1.0,
+            _ if fairing.kept[vertex] => 1.0,
             _ => 1.1,
         };
         assert!(
@@ -140,11 +140,11 @@ fn vertices_follow_a_sphere_that_grows() {
             "{vertex}: {radius}, not {expected}"
         );
     }
-    assert!(fairing.keeps().contains(&true));
+    assert!(fairing.kept.contains(&true));
     let displacement = fairing.displacement(&followed, &grown).unwrap();
     // Those that stay count too.
-    let stay = fairing.keeps().iter().filter(|kept| **kept).count() as f64;
-    let expected = 0.1 * (1.0 - stay / fairing.keeps().len() as f64).sqrt();
+    let stay = fairing.kept.iter().filter(|kept| **kept).count() as f64;
+    let expected = 0.1 * (1.0 - stay / fairing.kept.len() as f64).sqrt();
     assert!((displacement - expected).abs() < 1e-3, "{displacement}");
     assert!(followed.left_behind(&field(0.02)).unwrap() > 0.5);
 }
@@ -159,7 +159,7 @@ fn a_fairing_takes_off_noise_before_the_flow_begins() {
     let grid = Grid::<3>::centred(64, 1.0).unwrap();
     let eps = 2.0 * grid.spacing();
     let placement = Placement::about([0.0; 3], 1.0).unwrap();
-    let distance = MeshDistance::new(fairing.start())
+    let distance = MeshDistance::new(&fairing.start)
         .sample(grid, || ())
         .unwrap();
     let start = distance.map(|s| optimal_profile(s, eps));

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use derive_more::Display;
+use glam::DVec3;
 use surfaces::{ClosedMesh, TriangleMesh, lattice_surface};
 
 use crate::{Error, Volume};
@@ -115,7 +116,8 @@ impl Volume {
         let turned = |&[a, b, c]: &[u32; 3]| [a, c, b];
         TriangleMesh {
             vertices: vertices.collect(),
-            faces: if self.is_mirrored() {
+            // Where the axes are left-handed.
+            faces: if self.frame.matrix3.determinant() < 0.0 {
                 lattice.faces.iter().map(turned).collect()
             } else {
                 lattice.faces.clone()
@@ -126,7 +128,7 @@ impl Volume {
 
     fn without_steps(&self, lattice: &TriangleMesh, volume: f64) -> Result<ClosedMesh, Error> {
         let mesh = self.placed(lattice);
-        let to_voxels = self.to_voxels();
+        let to_voxels = self.frame.matrix3.inverse();
         // A vertex is in the middle of an edge along one axis or more, where its coordinates are halves.
         let halves = |x: &[f64; 3]| {
             x.iter()
@@ -138,7 +140,8 @@ impl Volume {
             .collect();
         let relaxed = |reach: f64| {
             mesh.relaxed(ROUNDS, volume, |vertex, way| {
-                (reach * to_centres[vertex] / to_voxels(way).length()).min(1.0)
+                (reach * to_centres[vertex] / (to_voxels * DVec3::from_array(way)).length())
+                    .min(1.0)
             })
         };
         let mut surfaces = REACHES

@@ -45,7 +45,10 @@ pub enum FormatError {
         found: u64,
         longer: bool,
     },
-    #[error("it has {}, and may have up to {limit} bytes of voxels, with two along each axis at least", shown(*size, *bytes))]
+    #[error(
+        "it has {} x {} x {} voxels of {bytes} bytes, and may have up to {limit} bytes of voxels, with two along each axis at least",
+        size[0], size[1], size[2]
+    )]
     Size {
         size: [u64; 3],
         bytes: u64,
@@ -58,10 +61,6 @@ pub enum FormatError {
         format: &'static str,
         message: String,
     },
-}
-
-fn shown([x, y, z]: [u64; 3], bytes: u64) -> String {
-    format!("{x} x {y} x {z} voxels of {bytes} bytes")
 }
 
 impl FormatError {

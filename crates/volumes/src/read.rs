@@ -67,8 +67,18 @@ fn unpacked(mut packed: impl Read, limit: u64) -> Result<Volume, FormatError> {
     let mut bytes = Vec::new();
     let mut head = packed.by_ref().take(HEAD as u64);
     head.read_to_end(&mut bytes).map_err(damaged)?;
-    let header = header(&bytes)?;
-    let expected = header.end(limit)?;
+    let header = nifti::header(&bytes).or_else(|| mrc::header(&bytes));
+    let start = bytes.iter().take(8).copied().collect();
+    let header = header.ok_or(FormatError::Unknown { start })??;
+    let length = length(header.size, header.element, limit)?;
+    if header.start > limit {
+        return Err(FormatError::Length {
+            expected: header.start,
+            found: HEAD as u64,
+            longer: true,
+        });
+    }
+    let expected = header.start + length;
     // One more than announced tells that there are more.
     let rest = (expected + 1).saturating_sub(bytes.len() as u64);
     packed.take(rest).read_to_end(&mut bytes).map_err(damaged)?;
@@ -81,7 +91,13 @@ fn unpacked(mut packed: impl Read, limit: u64) -> Result<Volume, FormatError> {
         });
     }
     bytes.drain(..header.start as usize);
-    header.volume(bytes)
+    let voxels = Voxels {
+        bytes,
+        element: header.element,
+        big_endian: header.big_endian,
+        scale: header.scale,
+    };
+    Volume::new(header.size.map(|n| n as usize), header.frame, voxels)
 }
 
 /// Numbers in a header.
@@ -112,44 +128,11 @@ struct Header {
     start: u64,
 }
 
-fn header(head: &[u8]) -> Result<Header, FormatError> {
-    let known = nifti::header(head).or_else(|| mrc::header(head));
-    known.unwrap_or_else(|| {
-        let start = head.iter().take(8).copied().collect();
-        Err(FormatError::Unknown { start })
-    })
-}
-
 /// Numbers of voxels.
 fn size(format: &'static str, size: [f64; 3]) -> Result<[u64; 3], FormatError> {
     match size.iter().find(|&&n| n < 2.0) {
         Some(n) => FormatError::entry(format, "number of voxels", n, "2 at least along each axis"),
         None => Ok(size.map(|n| n as u64)),
-    }
-}
-
-impl Header {
-    /// Where the voxels end.
-    fn end(&self, limit: u64) -> Result<u64, FormatError> {
-        let length = length(self.size, self.element, limit)?;
-        if self.start > limit {
-            return Err(FormatError::Length {
-                expected: self.start,
-                found: HEAD as u64,
-                longer: true,
-            });
-        }
-        Ok(self.start + length)
-    }
-
-    fn volume(&self, bytes: Vec<u8>) -> Result<Volume, FormatError> {
-        let voxels = Voxels {
-            bytes,
-            element: self.element,
-            big_endian: self.big_endian,
-            scale: self.scale,
-        };
-        Volume::new(self.size.map(|n| n as usize), self.frame, voxels)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Values on a lattice in space.
 
 use files::Number;
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DMat3};
 use rayon::prelude::*;
 
 use crate::{Error, FormatError};
@@ -12,7 +12,8 @@ use crate::{Error, FormatError};
 #[derive(Clone, Debug)]
 pub struct Volume {
     size: [usize; 3],
-    frame: DAffine3,
+    /// From coordinates in voxels to positions.
+    pub(crate) frame: DAffine3,
     voxels: Voxels,
 }
 
@@ -129,21 +130,6 @@ impl Volume {
     /// Volume of a voxel.
     pub fn voxel_volume(&self) -> f64 {
         self.frame.matrix3.determinant().abs()
-    }
-
-    /// Whether the axes are left-handed.
-    pub(crate) fn is_mirrored(&self) -> bool {
-        self.frame.matrix3.determinant() < 0.0
-    }
-
-    /// The map from positions to coordinates in voxels.
-    pub(crate) fn to_voxels(&self) -> impl Fn([f64; 3]) -> DVec3 + Sync + use<> {
-        let inverse = self.frame.matrix3.inverse();
-        move |offset| inverse * DVec3::from_array(offset)
-    }
-
-    pub(crate) fn frame(&self) -> &DAffine3 {
-        &self.frame
     }
 
     /// Where a voxel is of which so many are before it.

@@ -53,7 +53,7 @@ fn nifti(out: &mut dyn Write, volume: &Volume) -> io::Result<()> {
     put(112, &1_f32.to_le_bytes());
     // The map of aligned coordinates.
     put(254, &2_i16.to_le_bytes());
-    let columns = volume.frame().to_cols_array_2d();
+    let columns = volume.frame.to_cols_array_2d();
     for (column, entries) in columns.iter().enumerate() {
         for (row, &entry) in entries.iter().enumerate() {
             put(280 + 16 * row + 4 * column, &(entry as f32).to_le_bytes());

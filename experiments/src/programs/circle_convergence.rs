@@ -108,9 +108,9 @@ impl Report {
             self.study.series(e.variant, points.collect())
         });
         for (chart, flow) in over_time.iter_mut().zip(Flow::ALL) {
-            chart.note = self.scale(flow).map(|scale| {
-                format!("For scale: mean ‖u(t) − u(0)‖ = {scale:.3} at t = {end:.4}.")
-            });
+            if let Some(scale) = self.scale(flow) {
+                chart.note = format!("For scale: mean ‖u(t) − u(0)‖ = {scale:.3} at t = {end:.4}.");
+            }
         }
         let over_radius = self.flows("initial radius r", "L² error", |e| {
             let points = e.circles.iter().map(|c| [c.radius, c.error(steps)]);

@@ -246,8 +246,8 @@ fn fair(
     let (closed, _) = ClosedMesh::new(noisy.clone())?;
     let fairing = Fairing::new(closed, noisy.noise(), |_| false);
     let grid = centred_box(cells, 1.0)?;
-    let placement = Placement::fit(&fairing.start().bounding_box(), &grid, SIDE)?;
-    let distance = MeshDistance::new(&fairing.start().placed(&placement));
+    let placement = Placement::fit(&fairing.start.bounding_box(), &grid, SIDE)?;
+    let distance = MeshDistance::new(&fairing.start.placed(&placement));
     let distance = session.phase(format!("{title}: signed distance"), |stage| {
         sampled(&distance, grid, &stage.bar)
     })?;

@@ -131,7 +131,12 @@ fn decorate(snapshots: &mut [Snapshot], measured: &Inpainted<'_, 3>) {
         let w = snapshot.measures["w"];
         snapshot.caption = format!("step {step}{time}: w = {w:.2}{distance}");
         let edges = Tube::edges_of_box([low; 3], [high; 3], EDGE).into_iter();
-        snapshot.tubes = edges.map(|edge| edge.with_colour(GREEN)).collect();
+        snapshot.tubes = edges
+            .map(|edge| Tube {
+                colour: GREEN,
+                ..edge
+            })
+            .collect();
     }
 }
 

@@ -174,9 +174,9 @@ fn operators_figure(shown: &[Shown]) -> Figure {
         let width = one.spec.ratios.width;
         let reach = 0.5 * width as f64 / one.spec.ratios.eps_over_h;
         let axis = |label| Axis::linear(label).with_range(-reach, reach);
-        Heatmap::new(one.title(), [width, width], values)
-            .with_axes(axis("x / ε"), axis("y / ε"))
-            .with_bar(Axis::linear("K ε²/h²").with_range(0.0, highest))
+        let bar = Axis::linear("K ε²/h²").with_range(0.0, highest);
+        let axes = [axis("x / ε"), axis("y / ε"), bar];
+        Heatmap::new(one.title(), axes, [width, width], values)
     };
     let activation = |one: &Shown| {
         let learned = Series::of("learned F", one.activation(), |at| [at.w, at.activation]);

@@ -63,7 +63,10 @@ fn clifford_tori(session: &mut Session, all: &mut [Flowed]) -> Result<String> {
             one.label()
         ));
         let circles = torus.minor_circles(CIRCLES.0, CIRCLES.1)?.into_iter();
-        let tube = |circle: Vec<[f64; 3]>| Tube::new(circle, 0.1 * case.scales.eps).closed();
+        let tube = |circle: Vec<[f64; 3]>| Tube {
+            closed: true,
+            ..Tube::new(circle, 0.1 * case.scales.eps)
+        };
         if let Some(shown) = one.snapshots.last_mut() {
             let torus = format!("L² distance to the torus {l2:.4}\n(which has w = {w:.2})");
             shown.caption = format!("{}\n{torus}", shown.caption);

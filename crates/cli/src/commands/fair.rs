@@ -105,7 +105,7 @@ impl FairOptions {
             messages.warn(&format!("{}: {warning}", path.display()));
         }
         if noise.is_none() {
-            let noise = own.fairing().noise();
+            let noise = own.fairing().noise;
             messages.note(&format!(
                 "noise: {noise:.3e}, {:.3} % of the longest side, estimated (--noise)",
                 100.0 * noise / own.rough().bounding_box().longest_side()

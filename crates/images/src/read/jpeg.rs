@@ -27,7 +27,7 @@ pub(super) fn decode(
     decoder.decode_headers()?;
     let (width, height) = decoder.dimensions().ok_or_else(|| unusual("no size"))?;
     let [width, height] = [width, height].map(|n| n as u32);
-    let count = checked(width, height)?;
+    let count = checked([width, height])?;
     let (output, channels) = match decoder.input_colorspace() {
         Some(ColorSpace::Luma) => (ColorSpace::Luma, 1),
         Some(ColorSpace::YCbCr) if tones == Tones::Grey => (ColorSpace::Luma, 1),

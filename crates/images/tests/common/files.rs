@@ -37,7 +37,7 @@ pub fn widened(bytes: impl IntoIterator<Item = u8>) -> Vec<u16> {
 pub fn png_files() -> Vec<(&'static str, Vec<u8>, Image)> {
     let raster = raster();
     let (bytes, shorts) = (raster.bytes(), raster.shorts());
-    let image = |grey: Vec<u16>, opacity| Image::new(SIZE[0], SIZE[1], grey, opacity).unwrap();
+    let image = |grey: Vec<u16>, opacity| Image::new(SIZE, grey, opacity).unwrap();
     let plain = || widened(bytes.iter().copied());
     let big_endian = |values: &[u16]| {
         values
@@ -191,7 +191,7 @@ pub fn other_files() -> Vec<(&'static str, Vec<u8>, Image)> {
     let bytes = raster().bytes();
     let colours = bytes.iter().flat_map(|&v| [v; 3]).collect();
     let picture = image::RgbImage::from_raw(SIZE[0], SIZE[1], colours).unwrap();
-    let expected = Image::new(SIZE[0], SIZE[1], widened(bytes), None).unwrap();
+    let expected = Image::new(SIZE, widened(bytes), None).unwrap();
     [
         ("BMP", image::ImageFormat::Bmp),
         ("GIF", image::ImageFormat::Gif),

@@ -14,8 +14,9 @@ pub enum FormatError {
         found: String,
         expected: &'static str,
     },
-    #[error("the file ends in line {line} where {expected} is expected: it is truncated")]
-    EndOfText { line: usize, expected: &'static str },
+    /// The last line, and what is missing.
+    #[error("the file ends in line {0} where {1} is expected: it is truncated")]
+    EndOfText(usize, &'static str),
     #[error(
         "the header announces {count} {elements}, which take at least {expected} bytes, but the \
          file has {found}: truncated, or another format"
@@ -50,8 +51,20 @@ pub enum FormatError {
     NoFaces { vertices: usize },
     #[error("{vertices} vertices are more than 32-bit indices can count; use a coarser mesh")]
     TooManyVertices { vertices: usize },
-    #[error("the header does not declare {missing}")]
-    Undeclared { missing: &'static str },
+    #[error("the header does not declare {0}")]
+    Undeclared(&'static str),
     #[error("the header announces {count} elements {element:?} without properties")]
     NoProperties { element: String, count: usize },
+}
+
+impl FormatError {
+    /// Something else in a line of text than it should have.
+    pub(super) fn line(line: usize, found: &str, expected: &'static str) -> Self {
+        let found = files::shortened(found, 60);
+        Self::Line {
+            line,
+            found,
+            expected,
+        }
+    }
 }

@@ -3,7 +3,7 @@
 //! Not by a library: of those, `tobj` takes polylines for faces, splits vertices between groups,
 //! and tells no line numbers; `obj` reads single precision.
 
-use super::{FormatError, Polygons, level, position, shortened};
+use super::{FormatError, Polygons, level, position};
 use crate::TriangleMesh;
 use crate::vector::Vector;
 
@@ -97,20 +97,14 @@ pub(super) fn colours(bytes: &[u8]) -> Option<Vec<[u8; 3]>> {
 /// last vertex so far, which is -1.
 fn corner(word: &str, line: usize, so_far: usize) -> Result<i64, FormatError> {
     let vertex = word.split('/').next().unwrap_or_default();
-    let index: i64 = vertex.parse().map_err(|_| FormatError::Line {
-        line,
-        found: shortened(word),
-        expected: "the index of a vertex",
-    })?;
+    let wrong = |expected| FormatError::line(line, word, expected);
+    let index: i64 = (vertex.parse()).map_err(|_| wrong("the index of a vertex"))?;
     if index >= 0 {
         return Ok(index);
     }
     let resolved = index.checked_add(so_far as i64 + 1);
-    resolved.filter(|&v| v >= 1).ok_or(FormatError::Line {
-        line,
-        found: shortened(word),
-        expected: "a relative index of a vertex above",
-    })
+    let resolved = resolved.filter(|&v| v >= 1);
+    resolved.ok_or_else(|| wrong("a relative index of a vertex above"))
 }
 
 /// The text with other coordinates of vertices, and with normals to fit them.

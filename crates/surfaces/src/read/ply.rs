@@ -13,17 +13,13 @@ use crate::TriangleMesh;
 const FACES: [&str; 2] = ["face", STRIPS];
 const STRIPS: &str = "tristrips";
 
-const NO_VERTICES: FormatError = FormatError::Undeclared {
-    missing: "an element vertex",
-};
+const NO_VERTICES: FormatError = FormatError::Undeclared("an element vertex");
 
 pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     let header = Header::parse(bytes)?;
     let vertices = header.element("vertex").ok_or(NO_VERTICES)?;
     if FACES.iter().all(|name| header.element(name).is_none()) {
-        return Err(FormatError::Undeclared {
-            missing: "an element face or tristrips",
-        });
+        return Err(FormatError::Undeclared("an element face or tristrips"));
     }
     let mut polygons = Polygons::new(vertices.count, 0)?;
     let mut mesh = TriangleMesh::default();
@@ -47,9 +43,7 @@ fn read_vertices(
 ) -> Result<(), FormatError> {
     let axes = element
         .scalars(["x", "y", "z"])
-        .ok_or(FormatError::Undeclared {
-            missing: "x, y and z of vertex",
-        })?;
+        .ok_or(FormatError::Undeclared("x, y and z of vertex"))?;
     let normal_axes = element.scalars(["nx", "ny", "nz"]);
     let mut normals = Vec::new();
     mesh.vertices.reserve_exact(element.count);
@@ -73,9 +67,9 @@ fn read_faces(
     let list = ["vertex_indices", "vertex_index"]
         .into_iter()
         .find_map(|name| element.indices(name))
-        .ok_or(FormatError::Undeclared {
-            missing: "a list vertex_indices of its faces",
-        })?;
+        .ok_or(FormatError::Undeclared(
+            "a list vertex_indices of its faces",
+        ))?;
     let mut corners = Vec::new();
     body.rows(element, |face, row| {
         corners.clear();
@@ -158,9 +152,9 @@ pub(super) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<u8>, For
         .iter()
         .any(|(column, ..)| kind(*column).is_integer())
     {
-        return Err(FormatError::Undeclared {
-            missing: "x, y and z of vertex as float or double",
-        });
+        return Err(FormatError::Undeclared(
+            "x, y and z of vertex as float or double",
+        ));
     }
     let (mut out, mut copied) = (Vec::with_capacity(bytes.len()), 0);
     body.rows(element, |number, row| {

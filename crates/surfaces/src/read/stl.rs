@@ -4,7 +4,7 @@
 //! refuses `solid` without a name, reads the first of several solids only, and rounds ASCII to
 //! single precision.
 
-use super::{FormatError, Polygons, finite, position, shortened};
+use super::{FormatError, Polygons, finite, position};
 use crate::TriangleMesh;
 use crate::mesh::merge_coincident;
 use crate::vector::{Vector, scaled_normal};
@@ -28,18 +28,19 @@ pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
             });
         }
         None => {
-            return Err(FormatError::Line {
-                line: 1,
-                found: shortened(&String::from_utf8_lossy(bytes)),
-                expected: "\"solid\", or a binary header of 84 bytes,",
-            });
+            let expected = "\"solid\", or a binary header of 84 bytes,";
+            return Err(FormatError::line(
+                1,
+                &String::from_utf8_lossy(bytes),
+                expected,
+            ));
         }
     };
-    let merged = merge_coincident(&corners);
-    let mut polygons = Polygons::new(merged.first.len(), 0)?;
-    polygons.faces = merged.index.as_chunks().0.to_vec();
+    let (first, index) = merge_coincident(&corners);
+    let mut polygons = Polygons::new(first.len(), 0)?;
+    polygons.faces = index.as_chunks().0.to_vec();
     Ok(TriangleMesh {
-        vertices: merged.first.iter().map(|&v| corners[v]).collect(),
+        vertices: first.iter().map(|&v| corners[v]).collect(),
         faces: polygons.finish()?,
         normals: None,
     })
@@ -102,23 +103,17 @@ fn ascii(text: &str) -> Result<Vec<[f64; 3]>, FormatError> {
             }
             ("outer" | "endloop", true) | ("solid" | "endsolid", false) => {}
             _ => {
-                return Err(FormatError::Line {
-                    line: last,
-                    found: shortened(line),
-                    expected: if open {
-                        "outer loop, vertex, endloop or endfacet"
-                    } else {
-                        "facet or endsolid"
-                    },
-                });
+                let expected = if open {
+                    "outer loop, vertex, endloop or endfacet"
+                } else {
+                    "facet or endsolid"
+                };
+                return Err(FormatError::line(last, line, expected));
             }
         }
     }
     if !complete {
-        return Err(FormatError::EndOfText {
-            line: last,
-            expected: "endsolid",
-        });
+        return Err(FormatError::EndOfText(last, "endsolid"));
     }
     Ok(corners)
 }

@@ -30,125 +30,86 @@ pub(super) fn header(head: &[u8]) -> Option<Result<Header, FormatError>> {
         bytes: head,
         big_endian,
     };
-    Some(Entries::of(&fields, length == LENGTHS[0]).header(big_endian))
+    Some(entries(&fields, length == LENGTHS[0]))
 }
 
-/// The entries that count, of either version.
-struct Entries<'a> {
-    is_first: bool,
-    magic: &'a [u8],
-    dimensions: [f64; 8],
-    data_type: f64,
-    sides: [f64; 8],
-    start: f64,
-    scale: [f64; 2],
-    /// Whether there is a map by quaternions, and one by rows.
-    codes: [f64; 2],
-    quaternion: [f64; 3],
-    offset: [f64; 3],
-    rows: [[f64; 4]; 3],
-}
-
-impl<'a> Entries<'a> {
-    fn of(fields: &Fields<'a>, is_first: bool) -> Self {
-        use Number::{F32, F64, I16, I32, I64};
-        // Places in the headers of both versions.
-        let at = |first: usize, second: usize| if is_first { first } else { second };
-        let [whole, code, real, start] = if is_first {
-            [I16, I16, F32, F32]
-        } else {
-            [I64, I32, F64, I64]
-        };
-        Self {
-            is_first,
-            magic: &fields.bytes[at(344, 4)..at(348, 12)],
-            dimensions: fields.numbers(at(40, 16), whole),
-            data_type: fields.number(at(70, 12), I16),
-            sides: fields.numbers(at(76, 104), real),
-            start: fields.number(at(108, 168), start),
-            scale: fields.numbers(at(112, 176), real),
-            codes: fields.numbers(at(252, 344), code),
-            quaternion: fields.numbers(at(256, 352), real),
-            offset: fields.numbers(at(268, 376), real),
-            rows: [0, 1, 2].map(|row| fields.numbers(at(280 + 16 * row, 400 + 32 * row), real)),
-        }
+fn entries(fields: &Fields<'_>, is_first: bool) -> Result<Header, FormatError> {
+    use Number::{F32, F64, I16, I32, I64};
+    let bad = |entry, value: &dyn ToString, requirement| {
+        FormatError::entry("NIfTI", entry, &value.to_string(), requirement)
+    };
+    // Places in the headers of both versions.
+    let at = |first: usize, second: usize| if is_first { first } else { second };
+    let (wanted, least, [whole, code, real, offset]): (&[u8], f64, _) = if is_first {
+        (b"n+1\0", 352.0, [I16, I16, F32, F32])
+    } else {
+        (b"n+2\0\r\n\x1a\n", 544.0, [I64, I32, F64, I64])
+    };
+    let magic = &fields.bytes[at(344, 4)..at(348, 12)];
+    if magic != wanted {
+        let magic = magic.escape_ascii();
+        return bad("magic", &magic, "n+1 or n+2: header and voxels in one file");
     }
-
-    fn header(&self, big_endian: bool) -> Result<Header, FormatError> {
-        let bad = |entry, value: &dyn ToString, requirement| {
-            FormatError::entry("NIfTI", entry, &value.to_string(), requirement)
-        };
-        let (wanted, least): (&[u8], f64) = if self.is_first {
-            (b"n+1\0", 352.0)
-        } else {
-            (b"n+2\0\r\n\x1a\n", 544.0)
-        };
-        if self.magic != wanted {
-            let magic = self.magic.escape_ascii();
-            return bad("magic", &magic, "n+1 or n+2: header and voxels in one file");
-        }
-        let [axes, nx, ny, nz, more @ ..] = self.dimensions;
-        // Axes beyond those that are counted say nothing.
-        let several = |n: &usize| more[*n] > 1.0 && (*n as f64) < axes - 3.0;
-        if !(3.0..=7.0).contains(&axes) || (0..4).any(|n| several(&n)) {
-            let shown = format!("{:?}", self.dimensions.map(|n| n as i64));
-            return bad("dim", &shown, "that of one volume with three axes");
-        }
-        let element = match self.data_type as i16 {
-            2 => Number::U8,
-            4 => Number::I16,
-            8 => Number::I32,
-            16 => Number::F32,
-            64 => Number::F64,
-            256 => Number::I8,
-            512 => Number::U16,
-            768 => Number::U32,
-            1024 => Number::I64,
-            1280 => Number::U64,
-            other => {
-                return bad("datatype", &other, "a real number of up to 64 bits");
-            }
-        };
-        if !(self.start >= least && self.start <= 2_f64.powi(40) && self.start.fract() == 0.0) {
-            let requirement = "a whole number behind the header";
-            return bad("vox_offset", &self.start, requirement);
-        }
-        let scale = match self.scale {
-            // Without a slope there is none.
-            [0.0, _] => [1.0, 0.0],
-            [slope, shift] if slope.is_finite() && shift.is_finite() => [slope, shift],
-            [slope, shift] => {
-                return bad("scl_slope", &format!("{slope} {shift}"), "finite");
-            }
-        };
-        Ok(Header {
-            size: size("NIfTI", [nx, ny, nz])?,
-            element,
-            big_endian,
-            scale,
-            frame: self.frame(),
-            start: self.start as u64,
-        })
+    let dimensions: [f64; 8] = fields.numbers(at(40, 16), whole);
+    let [axes, nx, ny, nz, more @ ..] = dimensions;
+    // Axes beyond those that are counted say nothing.
+    let several = |n: &usize| more[*n] > 1.0 && (*n as f64) < axes - 3.0;
+    if !(3.0..=7.0).contains(&axes) || (0..4).any(|n| several(&n)) {
+        let shown = format!("{:?}", dimensions.map(|n| n as i64));
+        return bad("dim", &shown, "that of one volume with three axes");
     }
-
-    /// The map from indices to positions: by rows, by a quaternion, or by the sides of voxels.
-    fn frame(&self) -> DAffine3 {
-        let [handed, x, y, z, ..] = self.sides;
-        // What is not written is one.
-        let sides = DVec3::new(x, y, z).abs();
-        let sides = DVec3::select(sides.cmpeq(DVec3::ZERO), DVec3::ONE, sides);
-        if self.codes[1] > 0.0 {
-            let column = |i: usize| DVec3::from_array([0, 1, 2].map(|row| self.rows[row][i]));
-            return DAffine3::from_cols(column(0), column(1), column(2), column(3));
-        }
-        if self.codes[0] <= 0.0 {
-            return DAffine3::from_scale(sides);
-        }
-        let [b, c, d] = self.quaternion;
+    let element = match fields.number(at(70, 12), I16) as i16 {
+        2 => Number::U8,
+        4 => I16,
+        8 => I32,
+        16 => F32,
+        64 => F64,
+        256 => Number::I8,
+        512 => Number::U16,
+        768 => Number::U32,
+        1024 => I64,
+        1280 => Number::U64,
+        other => return bad("datatype", &other, "a real number of up to 64 bits"),
+    };
+    let start = fields.number(at(108, 168), offset);
+    if !(start >= least && start <= 2_f64.powi(40) && start.fract() == 0.0) {
+        let requirement = "a whole number behind the header";
+        return bad("vox_offset", &start, requirement);
+    }
+    let scale = match fields.numbers::<2>(at(112, 176), real) {
+        // Without a slope there is none.
+        [0.0, _] => [1.0, 0.0],
+        [slope, shift] if slope.is_finite() && shift.is_finite() => [slope, shift],
+        [slope, shift] => return bad("scl_slope", &format!("{slope} {shift}"), "finite"),
+    };
+    let [handed, x, y, z] = fields.numbers(at(76, 104), real);
+    // What is not written is one.
+    let sides = DVec3::new(x, y, z).abs();
+    let sides = DVec3::select(sides.cmpeq(DVec3::ZERO), DVec3::ONE, sides);
+    // The map from indices to positions: by rows, by a quaternion, or by the sides of voxels.
+    let [by_quaternion, by_rows] = fields.numbers(at(252, 344), code);
+    let frame = if by_rows > 0.0 {
+        let rows: [[f64; 4]; 3] =
+            [0, 1, 2].map(|row| fields.numbers(at(280 + 16 * row, 400 + 32 * row), real));
+        let column = |i: usize| DVec3::from_array(rows.map(|row| row[i]));
+        DAffine3::from_cols(column(0), column(1), column(2), column(3))
+    } else if by_quaternion > 0.0 {
+        let [b, c, d] = fields.numbers(at(256, 352), real);
         let a = (1.0 - (b * b + c * c + d * d)).max(0.0).sqrt();
         let turn = DMat3::from_quat(glam::DQuat::from_xyzw(b, c, d, a));
         let last = if handed < 0.0 { -1.0 } else { 1.0 };
-        let sides = sides * DVec3::new(1.0, 1.0, last);
-        DAffine3::from_mat3_translation(turn * DMat3::from_diagonal(sides), self.offset.into())
-    }
+        let matrix = turn * DMat3::from_diagonal(sides * DVec3::new(1.0, 1.0, last));
+        let offset: [f64; 3] = fields.numbers(at(268, 376), real);
+        DAffine3::from_mat3_translation(matrix, offset.into())
+    } else {
+        DAffine3::from_scale(sides)
+    };
+    Ok(Header {
+        size: size("NIfTI", [nx, ny, nz])?,
+        element,
+        big_endian: fields.big_endian,
+        scale,
+        frame,
+        start: start as u64,
+    })
 }

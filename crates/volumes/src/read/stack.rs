@@ -60,8 +60,7 @@ pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Volume, FormatError> {
     limits.decoding_buffer_size = LARGEST_PAGE;
     limits.intermediate_buffer_size = LARGEST_PAGE;
     let mut reader = Decoder::new(Cursor::new(bytes))?.with_limits(limits);
-    let about = About::of(&mut reader)?;
-    let sides = about.sides(&mut reader)?;
+    let (noted, sides) = described(&mut reader)?;
     let (first, element) = page(&mut reader)?;
     let (mut data, mut pages) = (Vec::new(), 0);
     loop {
@@ -74,18 +73,18 @@ pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Volume, FormatError> {
         // A page more than there is, so that one alone is no reason yet.
         length([size[0], size[1], pages + 1], element, limit)?;
         let layout = reader.image_buffer_layout()?;
-        let start = data.len();
-        data.resize(start + area(size, element), 0);
-        if layout.len != data.len() - start {
+        if layout.len != (size[0] * size[1]) as usize * element.size() {
             return bad("page", &format!("{} bytes long", layout.len), "one plane");
         }
+        let start = data.len();
+        data.resize(start + layout.len, 0);
         reader.read_image_bytes(&mut data[start..])?;
         if !reader.more_images() {
             break;
         }
         reader.next_image()?;
     }
-    if about.images.is_some_and(|images| images != pages) {
+    if noted.is_some_and(|noted| noted != pages) {
         return bad("number of pages", &pages, "what ImageJ notes");
     }
     let size = [first[0], first[1], pages].map(|n| n as usize);
@@ -96,10 +95,6 @@ pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Volume, FormatError> {
         scale: [1.0, 0.0],
     };
     Volume::new(size, DAffine3::from_scale(sides), voxels)
-}
-
-fn area([width, height]: [u64; 2], element: Number) -> usize {
-    width as usize * height as usize * element.size()
 }
 
 /// Columns and rows of the page, and its numbers.
@@ -129,55 +124,38 @@ fn page(reader: &mut Decoder<impl Read + Seek>) -> Result<([u64; 2], Number), Fo
     Ok((size, element))
 }
 
-/// What ImageJ notes in the description of the first page.
-struct About {
-    is_by_imagej: bool,
-    images: Option<u64>,
-    spacing: Option<f64>,
-}
-
-impl About {
-    fn of(reader: &mut Decoder<impl Read + Seek>) -> Result<Self, FormatError> {
-        let text = reader.get_tag_ascii_string(Tag::ImageDescription);
-        let text = text.unwrap_or_default();
-        let is_by_imagej = text.starts_with("ImageJ=");
-        let note = |name: &str| {
-            let mut lines = text.lines().filter_map(|line| line.split_once('='));
-            let line = lines.find(|(key, _)| is_by_imagej && *key == name);
-            line.map(|(_, value)| value)
-        };
-        let count = |name| note(name).and_then(|n| n.parse::<u64>().ok());
-        for axis in ["channels", "frames"] {
-            if let Some(n) = count(axis).filter(|&n| n > 1) {
-                return bad("number of channels or times", &n, "1: save one of them");
-            }
+/// The number of pages, if ImageJ notes it in the description of the first one, and the sides of voxels.
+fn described(reader: &mut Decoder<impl Read + Seek>) -> Result<(Option<u64>, DVec3), FormatError> {
+    let text = reader.get_tag_ascii_string(Tag::ImageDescription);
+    let text = text.unwrap_or_default();
+    let is_by_imagej = text.starts_with("ImageJ=");
+    let note = |name: &str| {
+        let mut lines = text.lines().filter_map(|line| line.split_once('='));
+        let line = lines.find(|(key, _)| is_by_imagej && *key == name);
+        line.map(|(_, value)| value)
+    };
+    let count = |name| note(name).and_then(|n| n.parse::<u64>().ok());
+    for axis in ["channels", "frames"] {
+        if let Some(n) = count(axis).filter(|&n| n > 1) {
+            return bad("number of channels or times", &n, "1: save one of them");
         }
-        let spacing = note("spacing").and_then(|n| n.parse::<f64>().ok());
-        Ok(Self {
-            is_by_imagej,
-            images: count("images"),
-            spacing: spacing.map(f64::abs),
-        })
     }
-
-    /// Of voxels.
-    fn sides(&self, reader: &mut Decoder<impl Read + Seek>) -> Result<DVec3, FormatError> {
-        let unit = reader.find_tag_unsigned::<u16>(Tag::ResolutionUnit)?;
-        let unit = match unit.and_then(ResolutionUnit::from_u16) {
-            Some(ResolutionUnit::Centimeter) if !self.is_by_imagej => CENTIMETRE,
-            Some(ResolutionUnit::Inch) if !self.is_by_imagej => INCH,
-            _ => 1.0,
+    let unit = reader.find_tag_unsigned::<u16>(Tag::ResolutionUnit)?;
+    let unit = match unit.and_then(ResolutionUnit::from_u16) {
+        Some(ResolutionUnit::Centimeter) if !is_by_imagej => CENTIMETRE,
+        Some(ResolutionUnit::Inch) if !is_by_imagej => INCH,
+        _ => 1.0,
+    };
+    let mut side = |tag| {
+        let pixels = match reader.get_tag(tag) {
+            Ok(Value::Rational(n, d)) => f64::from(n) / f64::from(d),
+            _ => 0.0,
         };
-        let mut side = |tag| {
-            let pixels = match reader.get_tag(tag) {
-                Ok(Value::Rational(n, d)) => f64::from(n) / f64::from(d),
-                _ => 0.0,
-            };
-            let side = unit / pixels;
-            if side.is_normal() { side } else { 1.0 }
-        };
-        let (x, y) = (side(Tag::XResolution), side(Tag::YResolution));
-        let z = self.spacing.filter(|&z| z > 0.0).unwrap_or(y);
-        Ok(DVec3::new(x, y, z))
-    }
+        let side = unit / pixels;
+        if side.is_normal() { side } else { 1.0 }
+    };
+    let (x, y) = (side(Tag::XResolution), side(Tag::YResolution));
+    let spacing = note("spacing").and_then(|n| n.parse::<f64>().ok());
+    let z = spacing.map(f64::abs).filter(|&z| z > 0.0).unwrap_or(y);
+    Ok((count("images"), DVec3::new(x, y, z)))
 }

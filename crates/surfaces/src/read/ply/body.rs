@@ -5,7 +5,7 @@ use std::ops::Range;
 use files::Number;
 
 use super::header::{Element, Encoding, Header};
-use crate::read::{FormatError, shortened};
+use crate::read::FormatError;
 
 /// What an element has of a property: one value, or those of a list.
 #[derive(Clone, Default)]
@@ -74,12 +74,9 @@ impl<'a> Body<'a> {
         if self.encoding == Encoding::Ascii {
             let place = self.word();
             let word = String::from_utf8_lossy(&self.bytes[place.clone()]);
-            let value = parsed(number, &word).ok_or_else(|| FormatError::Line {
-                line: self.lines,
-                found: shortened(&word),
-                expected: "a number of the type in the header",
-            });
-            return Ok((value?, place));
+            let expected = "a number of the type in the header";
+            let wrong = || FormatError::line(self.lines, &word, expected);
+            return Ok((parsed(number, &word).ok_or_else(wrong)?, place));
         }
         let place = self.position..self.position.saturating_add(number.size());
         let Some(bytes) = self.bytes.get(place.clone()) else {
@@ -113,10 +110,7 @@ impl<'a> Body<'a> {
             }
             self.position = next;
         }
-        Err(FormatError::EndOfText {
-            line: self.lines,
-            expected: "an element",
-        })
+        Err(FormatError::EndOfText(self.lines, "an element"))
     }
 }
 

@@ -1,8 +1,8 @@
 //! What a PLY file announces.
 
-use files::Number;
+use files::{Number, shortened};
 
-use crate::read::{FormatError, shortened};
+use crate::read::FormatError;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
@@ -44,18 +44,11 @@ impl Header {
         loop {
             lines += 1;
             let Some(length) = bytes[begin..].iter().position(|&byte| byte == b'\n') else {
-                return Err(FormatError::EndOfText {
-                    line: lines,
-                    expected: "end_header",
-                });
+                return Err(FormatError::EndOfText(lines, "end_header"));
             };
             let line = String::from_utf8_lossy(&bytes[begin..begin + length]);
             begin += length + 1;
-            let expected = |expected| FormatError::Line {
-                line: lines,
-                found: shortened(line.trim_end()),
-                expected,
-            };
+            let expected = |expected| FormatError::line(lines, &line, expected);
             let words = &mut line.split_ascii_whitespace();
             let keyword = words.next().unwrap_or_default();
             match keyword {
@@ -88,9 +81,7 @@ impl Header {
                 _ => return Err(expected("a line of a header")),
             }
         }
-        let encoding = encoding.ok_or(FormatError::Undeclared {
-            missing: "the format",
-        })?;
+        let encoding = encoding.ok_or(FormatError::Undeclared("the format"))?;
         for element in &elements {
             element.check_length(encoding, begin, bytes.len())?;
         }
@@ -168,7 +159,7 @@ impl Element {
     ) -> Result<(), FormatError> {
         if self.properties.is_empty() && self.count > 0 {
             return Err(FormatError::NoProperties {
-                element: shortened(&self.name),
+                element: shortened(&self.name, 60),
                 count: self.count,
             });
         }
@@ -189,7 +180,7 @@ impl Element {
 
     pub(super) fn too_short(&self, expected: usize, length: usize) -> FormatError {
         FormatError::Length {
-            elements: format!("elements {:?}", shortened(&self.name)),
+            elements: format!("elements {:?}", shortened(&self.name, 60)),
             count: self.count as u64,
             expected: expected as u64,
             found: length as u64,
