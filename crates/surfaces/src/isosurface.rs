@@ -80,7 +80,7 @@ fn marched(lattice: &Lattice<'_>) -> Result<TriangleMesh, Error> {
         // The corner whose index is odd along the axes with a bit.
         let corner = |bits: usize| -> Node {
             let is_odd = |axis: usize| bits >> axis & 1;
-            std::array::from_fn(|axis| cell[axis] + (cell[axis] % 2 ^ is_odd(axis)))
+            std::array::from_fn(|axis| cell[axis] + ((cell[axis] % 2) ^ is_odd(axis)))
         };
         let reflected = cell.iter().map(|c| c % 2).sum::<usize>() % 2 == 1;
         for (corners, positive) in TETRAHEDRA {

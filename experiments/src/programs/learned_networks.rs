@@ -34,7 +34,7 @@ pub fn program(options: &Options) -> Result<()> {
     for (spec, network) in networks {
         let quality = quality::measure(&mut session, &spec, &network)?;
         shown.push(Shown {
-            entries: entries(spec, &network)?,
+            entries: entries(spec, &network),
             spec,
             network,
             quality,
@@ -86,7 +86,7 @@ struct Entry {
     density: f64,
 }
 
-fn entries(spec: NetworkSpec, network: &Network) -> Result<Vec<Entry>> {
+fn entries(spec: NetworkSpec, network: &Network) -> Vec<Entry> {
     let (width, eps_over_h) = (spec.ratios.width, spec.ratios.eps_over_h);
     let (middle, heat) = ((width / 2).cast_signed(), heat_kernel(spec.ratios));
     let entry = |(i, (&kernel, &heat_kernel)): (usize, (&f64, &f64))| {
@@ -102,7 +102,7 @@ fn entries(spec: NetworkSpec, network: &Network) -> Result<Vec<Entry>> {
         }
     };
     let entries = network.kernel().iter().zip(&heat).enumerate();
-    Ok(entries.map(entry).collect())
+    entries.map(entry).collect()
 }
 
 #[derive(Serialize)]
