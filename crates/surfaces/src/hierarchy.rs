@@ -97,7 +97,11 @@ pub(crate) fn bounds<'a>(triangles: impl IntoIterator<Item = &'a Triangle>) -> B
 }
 
 fn squared_distance(bounds: &BoundingBox<3>, x: Vector) -> f64 {
-    let [low, high] = [bounds.lower, bounds.upper].map(Vector::from_array);
+    // Not by the `map` of an array, which is a call in the innermost loop of all searches.
+    let (low, high) = (
+        Vector::from_array(bounds.lower),
+        Vector::from_array(bounds.upper),
+    );
     (low - x).max(x - high).max(Vector::ZERO).length_squared()
 }
 
