@@ -15,7 +15,7 @@ pub const VIEW: View = View {
     elevation: 25.0,
 };
 const SIDE: u32 = 640;
-/// On larger grids the finite-element step takes too much memory (32 GB and more).
+/// On larger grids the finite-element step takes too much memory (30 GB and more).
 const MOST_NODES: usize = 1 << 26;
 /// Colour of a surface where it may move, if it may not everywhere.
 const MOVING: Rgb = Rgb(150, 196, 160);
