@@ -82,13 +82,28 @@ fn entries(fields: &Fields<'_>, is_first: bool) -> Result<Header, FormatError> {
         [slope, shift] if slope.is_finite() && shift.is_finite() => [slope, shift],
         [slope, shift] => return bad("scl_slope", &format!("{slope} {shift}"), "finite"),
     };
+    Ok(Header {
+        size: size("NIfTI", [nx, ny, nz])?,
+        element,
+        big_endian: fields.big_endian,
+        scale,
+        frame: frame(fields, at, [code, real]),
+        start: start as u64,
+    })
+}
+
+/// The map from indices to positions, by rows, by a quaternion, or by the sides of voxels; `at` tells places in the headers of both versions.
+fn frame(
+    fields: &Fields<'_>,
+    at: impl Fn(usize, usize) -> usize,
+    [code, real]: [Number; 2],
+) -> DAffine3 {
     let [handed, x, y, z] = fields.numbers(at(76, 104), real);
     // What is not written is one.
     let sides = DVec3::new(x, y, z).abs();
     let sides = DVec3::select(sides.cmpeq(DVec3::ZERO), DVec3::ONE, sides);
-    // The map from indices to positions: by rows, by a quaternion, or by the sides of voxels.
     let [by_quaternion, by_rows] = fields.numbers(at(252, 344), code);
-    let frame = if by_rows > 0.0 {
+    if by_rows > 0.0 {
         let rows: [[f64; 4]; 3] =
             [0, 1, 2].map(|row| fields.numbers(at(280 + 16 * row, 400 + 32 * row), real));
         let column = |i: usize| DVec3::from_array(rows.map(|row| row[i]));
@@ -103,13 +118,5 @@ fn entries(fields: &Fields<'_>, is_first: bool) -> Result<Header, FormatError> {
         DAffine3::from_mat3_translation(matrix, offset.into())
     } else {
         DAffine3::from_scale(sides)
-    };
-    Ok(Header {
-        size: size("NIfTI", [nx, ny, nz])?,
-        element,
-        big_endian: fields.big_endian,
-        scale,
-        frame,
-        start: start as u64,
-    })
+    }
 }
