@@ -107,6 +107,8 @@ impl Equilibrium {
             longest_move: Some(if flat { 0.3 } else { 1.0 }),
             ..StepRule::ByEnergy(None).into()
         };
+        // Steps that are not too long take four Newton steps; what does not end in some more is refused for less.
+        case.scales.newton.newton_iterations = 15;
         case.stops = vec![
             Stop::Steps(steps.unwrap_or(MOST)),
             Stop::EnergyAtRest,
