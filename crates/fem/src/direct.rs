@@ -1,12 +1,12 @@
-//! The paper's linear algebra: sparse Cholesky factorizations (faer).
+//! The paper's linear algebra: sparse Cholesky factorizations (faer), for all dimensions alike.
 
 use faer::linalg::solvers::Solve;
+pub(crate) use faer::sparse::Pair;
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
-use faer::sparse::{Pair, SparseColMat, SymbolicSparseColMat};
+use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use faer::{Mat, Side};
 
 use crate::Error;
-use crate::element::Stencil;
 
 type Argsort = faer::sparse::Argsort<usize>;
 
@@ -29,14 +29,10 @@ fn failed(unknowns: usize, reason: &impl std::fmt::Debug) -> Error {
 }
 
 impl Symbolic {
-    pub(crate) fn new<const D: usize>(matrix: &Stencil<D>) -> Result<Self, Error> {
-        let unknowns = matrix.diagonal().len();
-        let indices: Vec<Pair<usize, usize>> = matrix
-            .lower_entries()
-            .map(|(row, col, _)| Pair { row, col })
-            .collect();
+    /// Of matrices with entries at these places of the lower triangle.
+    pub(crate) fn new(unknowns: usize, places: &[Pair<usize, usize>]) -> Result<Self, Error> {
         let (pattern, order) =
-            SymbolicSparseColMat::try_new_from_indices(unknowns, unknowns, &indices)
+            SymbolicSparseColMat::try_new_from_indices(unknowns, unknowns, places)
                 .map_err(|error| failed(unknowns, &error))?;
         let cholesky = SymbolicLlt::try_new(pattern.as_ref(), Side::Lower)
             .map_err(|error| failed(unknowns, &error))?;
@@ -48,12 +44,9 @@ impl Symbolic {
         })
     }
 
-    pub(crate) fn factorize<const D: usize>(
-        &self,
-        matrix: &Stencil<D>,
-    ) -> Result<Factorization, Error> {
-        let values: Vec<f64> = matrix.lower_entries().map(|(.., value)| value).collect();
-        let matrix = SparseColMat::new_from_argsort(self.pattern.clone(), &self.order, &values)
+    /// The matrix with these entries at the places.
+    pub(crate) fn factorize(&self, entries: &[f64]) -> Result<Factorization, Error> {
+        let matrix = SparseColMat::new_from_argsort(self.pattern.clone(), &self.order, entries)
             .map_err(|error| failed(self.unknowns, &error))?;
         Llt::try_new_with_symbolic(self.cholesky.clone(), matrix.as_ref(), Side::Lower)
             .map(Factorization)

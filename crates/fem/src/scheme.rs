@@ -6,7 +6,7 @@ use geometry::{positive, require};
 use operators::SpectralFilter;
 use operators::slices::{dot, zip_apply};
 
-use crate::direct::{Factorization, Symbolic};
+use crate::direct::{Factorization, Pair, Symbolic};
 use crate::element::{self, Stencil};
 use crate::{Error, LinearSolver, Tolerances};
 
@@ -277,10 +277,17 @@ impl<const D: usize> Scheme<D> {
         let mut symbolic = lock(&self.symbolic);
         let symbolic = match &mut *symbolic {
             Some(symbolic) => symbolic,
-            none => none.insert(Symbolic::new(matrix)?),
+            none => {
+                let places = matrix
+                    .lower_entries()
+                    .map(|(row, col, _)| Pair { row, col });
+                let places: Vec<Pair<usize, usize>> = places.collect();
+                none.insert(Symbolic::new(matrix.diagonal().len(), &places)?)
+            }
         };
         lock(&self.statistics).factorizations += 1;
-        symbolic.factorize(matrix)
+        let entries: Vec<f64> = matrix.lower_entries().map(|(.., value)| value).collect();
+        symbolic.factorize(&entries)
     }
 
     fn solve(&self, system: &System<D>, right: &[f64], tolerance: f64) -> Result<Vec<f64>, Error> {

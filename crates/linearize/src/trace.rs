@@ -130,33 +130,42 @@ impl Graph {
         parameters: &[Value],
         f: impl FnOnce(&Inputs) -> Tensor<1>,
     ) -> Result<Self, Error> {
-        record(variables, parameters, |variables, inputs| {
-            let tracked: Vec<TrackedSymbol> = (variables.iter())
-                .map(|symbol| TrackedSymbol::new(symbol.clone()).require_grad())
-                .collect();
-            inputs.variables = tracked.iter().map(wrapped::<Tracked>).collect();
-            let energy = f(inputs).into_dispatch();
-            let shape = energy.shape();
-            if shape.num_elements() != 1 {
-                return Err(Error::NotScalar {
-                    shape: shape.to_vec(),
-                });
-            }
-            // A constant energy, which no variable reaches, is not tracked.
-            let (value, gradients) = if energy.autodiff == DispatchAutodiffContext::Disabled {
-                (output_on::<Capture>(0, energy)?, None)
-            } else {
-                let energy = output_on::<Tracked>(0, energy)?;
-                let value = energy.primitive().clone();
-                (value, energy.is_tracked().then(|| energy.backward()))
-            };
-            let gradient = |symbol: &TrackedSymbol| {
-                let found = gradients.as_ref().and_then(|all| symbol.grad(all));
-                found.unwrap_or_else(|| zeros_like(symbol.primitive()))
-            };
-            Ok((value, tracked.iter().map(gradient).collect()))
-        })
+        record_gradient(variables, parameters, Box::new(f))
     }
+}
+
+/// [`Graph::gradient`] of a function behind a pointer, so that this is compiled once and not for every function.
+fn record_gradient(
+    variables: &[Value],
+    parameters: &[Value],
+    f: Box<dyn FnOnce(&Inputs) -> Tensor<1> + '_>,
+) -> Result<Graph, Error> {
+    record(variables, parameters, |variables, inputs| {
+        let tracked: Vec<TrackedSymbol> = (variables.iter())
+            .map(|symbol| TrackedSymbol::new(symbol.clone()).require_grad())
+            .collect();
+        inputs.variables = tracked.iter().map(wrapped::<Tracked>).collect();
+        let energy = f(inputs).into_dispatch();
+        let shape = energy.shape();
+        if shape.num_elements() != 1 {
+            return Err(Error::NotScalar {
+                shape: shape.to_vec(),
+            });
+        }
+        // A constant energy, which no variable reaches, is not tracked.
+        let (value, gradients) = if energy.autodiff == DispatchAutodiffContext::Disabled {
+            (output_on::<Capture>(0, energy)?, None)
+        } else {
+            let energy = output_on::<Tracked>(0, energy)?;
+            let value = energy.primitive().clone();
+            (value, energy.is_tracked().then(|| energy.backward()))
+        };
+        let gradient = |symbol: &TrackedSymbol| {
+            let found = gradients.as_ref().and_then(|all| symbol.grad(all));
+            found.unwrap_or_else(|| zeros_like(symbol.primitive()))
+        };
+        Ok((value, tracked.iter().map(gradient).collect()))
+    })
 }
 
 fn zeros_like(symbol: &Symbol) -> Symbol {

@@ -19,6 +19,7 @@ use faer::{ColMut, Mat, Side};
 use geometry::{Grid, parallel};
 use operators::{HostUpdate, Real};
 
+use crate::dissection::dissection;
 use crate::nodes::Nodes;
 use crate::samples::{MOST_CORNERS, Samples};
 use crate::sparse::{Entry, SparseInverse};
@@ -69,8 +70,7 @@ impl<const D: usize> InterfaceModes<D> {
             return None;
         }
         let inverse: Inverse = if N::WHOLE_GRID && samples.columns.len() <= MOST_DENSE {
-            let factor = coarse_matrix(&samples, tau)?.llt(Side::Lower).ok()?;
-            Box::new(move |x| factor.solve_in_place(ColMut::from_slice_mut(x).as_mat_mut()))
+            dense_inverse(coarse_matrices(&samples), tau)?
         } else {
             let inverse = sparse_inverse(&samples, tau)?;
             Box::new(move |x| inverse.apply(x))
@@ -117,8 +117,8 @@ impl<const D: usize> HostUpdate for InterfaceModes<D> {
     }
 }
 
-/// `M + tau (S M^-1 S + B)`
-fn coarse_matrix<const D: usize>(samples: &Samples<D>, tau: f64) -> Option<Mat<f64>> {
+/// `M`, `S` and `B`.
+fn coarse_matrices<const D: usize>(samples: &Samples<D>) -> [Mat<f64>; 3] {
     let locals = local_matrices(samples, |dot, product, square| {
         [product, dot, BENT * square * (dot + square * product)]
     });
@@ -136,13 +136,23 @@ fn coarse_matrix<const D: usize>(samples: &Samples<D>, tau: f64) -> Option<Mat<f
             }
         }
     }
+    [mass, stiffness, bent]
+}
+
+/// `(M + tau (S M^-1 S + B))^-1`
+fn dense_inverse([mut mass, stiffness, bent]: [Mat<f64>; 3], tau: f64) -> Option<Inverse> {
+    let columns = mass.nrows();
     let mean: f64 = (0..columns).map(|j| mass[(j, j)]).sum::<f64>() / columns as f64;
     for j in 0..columns {
         mass[(j, j)] += RIDGE * mean;
     }
     let bending = &stiffness * mass.llt(Side::Lower).ok()?.solve(&stiffness);
-    Some(Mat::from_fn(columns, columns, |j, k| {
+    let matrix = Mat::from_fn(columns, columns, |j, k| {
         mass[(j, k)] + tau * (0.5 * (bending[(j, k)] + bending[(k, j)]) + bent[(j, k)])
+    });
+    let factor = matrix.llt(Side::Lower).ok()?;
+    Some(Box::new(move |x| {
+        factor.solve_in_place(ColMut::from_slice_mut(x).as_mat_mut());
     }))
 }
 
@@ -165,7 +175,8 @@ fn sparse_inverse<const D: usize>(samples: &Samples<D>, tau: f64) -> Option<Spar
     let diagonal = entries.iter().filter(|(row, column, ..)| row == column);
     let mean = diagonal.map(|(.., m, _)| m).sum::<f64>() / columns as f64;
     entries.extend((0..columns as u32).map(|j| (j, j, RIDGE * mean, 0.0)));
-    SparseInverse::new(&samples.columns, samples.cells as u32, &entries)
+    let order = dissection(&samples.columns, samples.cells as u32);
+    SparseInverse::new(&order, &entries)
 }
 
 /// What each cell of the lattice adds to some matrices: for every sample and every pair of functions the `entries` made of

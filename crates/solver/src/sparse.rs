@@ -15,8 +15,6 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMat, Triplet};
 use faer::{Conj, Mat, Par, Side, Spec};
 
-use crate::dissection::dissection;
-
 /// `conj(C)^-1 M C^-1`.
 pub(crate) struct SparseInverse {
     /// Where each column is in the order of elimination.
@@ -31,15 +29,11 @@ pub(crate) struct SparseInverse {
 pub(crate) type Entry = (u32, u32, f64, f64);
 
 impl SparseInverse {
-    /// Factorizes, for columns at these places of a periodic lattice with `cells` points per axis.
-    pub(crate) fn new<const D: usize>(
-        places: &[[u32; D]],
-        cells: u32,
-        entries: &[Entry],
-    ) -> Option<Self> {
-        let count = places.len();
+    /// Factorizes, eliminating the columns in this order.
+    pub(crate) fn new(order: &[u32], entries: &[Entry]) -> Option<Self> {
+        let count = order.len();
         let mut position = vec![0; count];
-        for (place, column) in dissection(places, cells).into_iter().enumerate() {
+        for (place, &column) in order.iter().enumerate() {
             position[column as usize] = place as u32;
         }
         let (mut mass, mut real) = (Vec::new(), Vec::new());
@@ -140,6 +134,7 @@ fn factorize(matrix: &SparseColMat<usize, f64>) -> Option<(SymbolicCholesky<usiz
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dissection::dissection;
     use faer::c64;
     use faer::linalg::solvers::Solve;
 
@@ -178,7 +173,7 @@ mod tests {
         let right = Mat::from_fn(count, 1, |i, _| c64::new(b[i], 0.0));
         let expected = product.partial_piv_lu().solve(&right);
         let mut found = b;
-        SparseInverse::new(&places, cells, &entries)
+        SparseInverse::new(&dissection(&places, cells), &entries)
             .unwrap()
             .apply(&mut found);
         for (i, found) in found.iter().enumerate() {
