@@ -29,7 +29,7 @@ const FAMILIES: [Family; 3] = [
     Family {
         branch: Branch::Oblate,
         name: "oblate",
-        reduced_volumes: &[0.7, 0.65, 0.64, 0.6],
+        reduced_volumes: &[0.7, 0.65, 0.6],
         radius: 0.6,
         cells: [32, 128],
     },
