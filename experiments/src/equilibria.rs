@@ -107,7 +107,7 @@ impl Equilibrium {
             longest_move: Some(if flat { 0.3 } else { 1.0 }),
             ..StepRule::ByEnergy(None).into()
         };
-        // Steps that are not too long take four Newton steps; what does not end in some more is refused for less.
+        // Steps that succeed take about four Newton steps. With the usual limit a step that is too long takes minutes until it is halved.
         case.scales.newton.newton_iterations = 15;
         case.stops = vec![
             Stop::Steps(steps.unwrap_or(MOST)),
