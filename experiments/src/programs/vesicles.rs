@@ -16,8 +16,8 @@ struct Family {
     cells: [usize; 2],
 }
 
-/// The two sides of oblate shapes must be several interface widths apart in the middle: with half as many cells they break through below .62. Longer
-/// prolate shapes come to the side of the box. The neck of stomatocytes must be some interface widths wide, too.
+/// A red blood cell is oblate, with the reduced volume .64. The two sides of oblate shapes must be several interface widths apart in the middle: with
+/// half as many cells they break through below .62. Longer prolate shapes come to the side of the box. The neck of stomatocytes must be some interface widths wide, too.
 const FAMILIES: [Family; 3] = [
     Family {
         branch: Branch::Prolate,
@@ -29,7 +29,7 @@ const FAMILIES: [Family; 3] = [
     Family {
         branch: Branch::Oblate,
         name: "oblate",
-        reduced_volumes: &[0.7, 0.65, 0.6],
+        reduced_volumes: &[0.7, 0.65, 0.64, 0.6],
         radius: 0.6,
         cells: [32, 128],
     },
