@@ -91,7 +91,7 @@ pub fn round_edges<const D: usize>(
     };
     let mut run = Run::new(case, device)?;
     while run.step()?.is_some() {
-        let round = ZeroSet::of(run.field(), eps)?;
+        let round = ZeroSet::of(&run.current(), eps)?;
         if round.perimeter < (1.0 - LOST) * sharp.perimeter {
             break;
         }

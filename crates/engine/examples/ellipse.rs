@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut run = Run::new(case, &ComputeDevice::default_compiled()?)?;
     println!("       t        tau    length      area    energy");
     while let Some(record) = run.step()?.cloned() {
-        let curve = ZeroSet::of(run.field(), scales.eps)?;
+        let curve = ZeroSet::of(&run.current(), scales.eps)?;
         println!(
             "{:8.2e}   {:8.2e}   {:.5}   {:.5}   {:.5}",
             record.time, record.tau, curve.perimeter, curve.volume, curve.willmore_energy

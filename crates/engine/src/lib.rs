@@ -54,6 +54,7 @@
 
 mod case;
 mod control;
+mod current;
 mod error;
 mod held;
 mod measure;
@@ -71,6 +72,7 @@ mod trajectory;
 
 pub use case::Case;
 pub use control::ErrorControl;
+pub use current::Current;
 pub use error::Error;
 pub use held::{Held, Target};
 pub use measure::{DISPLACEMENT, Measure};

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use geometry::contour::ray_crossing;
 use geometry::measure::{l2_distance, perimeter, zero_set_volume};
 use geometry::zero_set::reduced_volume;
-use geometry::{Field, Grid, ZeroSet, distance_from_phase_field};
+use geometry::{Field, Grid, PhaseField, ZeroSet, distance_from_phase_field};
 
-use crate::{Error, Held};
+use crate::{Current, Error, Held};
 
 /// The name of a measure of how far the surface has gone since the beginning, a length in the box.
 pub const DISPLACEMENT: &str = "displacement";
@@ -16,7 +16,7 @@ pub const DISPLACEMENT: &str = "displacement";
 const NEAR: f64 = 2.0;
 
 type Function<const D: usize> =
-    dyn Fn(&Field<D>, f64) -> Result<Vec<Option<f64>>, geometry::Error> + Send + Sync;
+    dyn Fn(&Current<'_, D>, f64) -> Result<Vec<Option<f64>>, geometry::Error> + Send + Sync;
 
 /// Numbers that are measured together on the phase field after every step, each under a name.
 #[derive(Clone, derive_more::Debug)]
@@ -30,7 +30,10 @@ impl<const D: usize> Measure<D> {
     /// A function of the phase field and the time; nothing where the shape does not have it.
     pub fn new(
         name: impl Into<String>,
-        of: impl Fn(&Field<D>, f64) -> Result<Option<f64>, geometry::Error> + Send + Sync + 'static,
+        of: impl Fn(&Current<'_, D>, f64) -> Result<Option<f64>, geometry::Error>
+        + Send
+        + Sync
+        + 'static,
     ) -> Self {
         Self {
             names: vec![name.into()],
@@ -83,15 +86,16 @@ impl<const D: usize> Measure<D> {
     pub fn displacement(start: &Field<D>, eps: f64) -> Self {
         let spacing = start.grid().spacing();
         let distances = (start.values().iter()).map(|&u| distance_from_phase_field(u, eps));
-        let near: Vec<(usize, f64)> = distances
+        let near: Vec<([usize; D], f64)> = distances
             .enumerate()
             .filter(|(_, distance)| distance.abs() < NEAR * spacing)
+            .map(|(node, distance)| (start.grid().multi_index(node), distance))
             .collect();
         Self::new(DISPLACEMENT, move |u, _| {
             let (mut weights, mut squares) = (0.0, 0.0);
-            for &(node, before) in &near {
+            for &(place, before) in &near {
                 let weight = (-(before / spacing).powi(2)).exp();
-                let gone = distance_from_phase_field(u.values()[node], eps) - before;
+                let gone = distance_from_phase_field(u.at(place), eps) - before;
                 weights += weight;
                 squares += weight * gone * gone;
             }
@@ -123,12 +127,12 @@ impl<const D: usize> Measure<D> {
     }
 
     /// Their values, with the names of those that the shape has.
-    pub fn of(
+    pub(crate) fn of(
         &self,
-        field: &Field<D>,
+        now: &Current<'_, D>,
         time: f64,
     ) -> Result<impl Iterator<Item = (&str, f64)>, Error> {
-        let values = self.names().zip((self.of)(field, time)?);
+        let values = self.names().zip((self.of)(now, time)?);
         Ok(values.filter_map(|(name, value)| Some((name, value?))))
     }
 }

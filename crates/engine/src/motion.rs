@@ -102,14 +102,6 @@ impl<const D: usize> Motion<D> {
         }
     }
 
-    /// The phase field.
-    pub(crate) fn field(&self) -> Result<Field<D>, solver::Error> {
-        match &self.flow {
-            Either::Willmore(flow) => flow.field(),
-            Either::MeanCurvature(flow) => flow.field(),
-        }
-    }
-
     /// The phase field, as it is stored.
     pub(crate) fn stored(&self) -> Result<Stored<D>, solver::Error> {
         match &self.flow {
@@ -150,7 +142,7 @@ fn learned<const D: usize>(
     case: &Case<D>,
     device: &ComputeDevice,
 ) -> Result<WillmoreFlow<D>, solver::Error> {
-    use solver::Error::{Model, NoInterface, Operators};
+    use solver::Error::{Geometry, Model, NoInterface};
     /// Bricks that are more than this part of the grid do not pay.
     const PAYS: f64 = 0.5;
     let (network, initial, params) = (network(case), &case.initial, case.params());
@@ -162,7 +154,7 @@ fn learned<const D: usize>(
         Storage::Auto if !case.takes_bricks() => dense()?,
         Storage::Auto => match bricks() {
             Ok(flow) if (flow.stored_cells() as f64) < PAYS * case.grid().len() as f64 => flow,
-            Ok(_) | Err(Model(_) | NoInterface | Operators(operators::Error::Bricks { .. })) => {
+            Ok(_) | Err(Model(_) | NoInterface | Geometry(geometry::Error::Bricks { .. })) => {
                 dense()?
             }
             Err(error) => return Err(error),

@@ -10,10 +10,11 @@ use runs::Interrupt;
 use serde_json::Value;
 use solver::{FlowState, StepRecord, Stored};
 
+use crate::current::read;
 use crate::motion::Motion;
 use crate::record::Values;
 use crate::steps::StepControl;
-use crate::{Case, Error, Event, Flow, Observer, Record, Stop, Storage, Store};
+use crate::{Case, Current, Error, Event, Flow, Observer, Record, Stop, Storage, Store};
 
 /// Why [`Run::advance`] returned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +49,12 @@ impl<const D: usize> Run<D> {
     /// # Errors
     /// If something in the case is not possible: [`Error::Solver`], [`Error::Fem`], [`Error::Geometry`].
     pub fn new(case: Case<D>, device: &ComputeDevice) -> Result<Self, Error> {
-        let start = values(&case, 0.0, || &case.initial)?;
+        let initial = Current {
+            case: &case,
+            stored: None,
+            whole: &OnceLock::new(),
+        };
+        let start = values(&initial, 0.0)?;
         Self::at(case, device, start, Vec::new(), None)
     }
 
@@ -112,8 +118,6 @@ impl<const D: usize> Run<D> {
         let moved = self.distance(Some(&now), self.stored.as_ref());
         let travelled = self.distance(Some(&now), None);
         self.stored = Some(now);
-        // That of before was made if it was asked how far the interface went.
-        self.whole.take();
         let seconds = clock.elapsed().as_secs_f64();
         let step_size = self.control.step_size();
         let mcf_step = self.case.scales.mcf_step;
@@ -129,7 +133,7 @@ impl<const D: usize> Run<D> {
             moved,
             travelled,
             minimization,
-            measures: values(&self.case, time, || self.field())?,
+            measures: values(&self.current(), time)?,
             seconds,
         };
         self.ramped += record.tau / step_size;
@@ -197,7 +201,7 @@ impl<const D: usize> Run<D> {
         }
         let (mut halvings, mut refused_hvp) = (0, 0.0);
         let longest = self.case.steps.longest_move;
-        let before = longest.map(|_| self.state()).transpose()?;
+        let before = longest.map(|_| self.before()).transpose()?;
         // What was too long for the last step is not tried again at once.
         let last = self
             .records
@@ -220,8 +224,10 @@ impl<const D: usize> Run<D> {
                 Ok((minimization, true)) => {
                     let too_long = longest.zip(before.as_ref()).filter(|_| halvings < SHORTER);
                     match too_long {
-                        Some((longest, before)) if self.has_gone_too_far(longest)? => {
-                            self.motion = Motion::new(&self.case, Some(before), &self.device)?;
+                        Some((longest, (state, before)))
+                            if self.has_gone_too_far(before, longest)? =>
+                        {
+                            self.motion = Motion::new(&self.case, Some(state), &self.device)?;
                         }
                         _ => {
                             return Ok(Attempt {
@@ -258,11 +264,16 @@ impl<const D: usize> Run<D> {
 
     /// Whether the interface has moved by more than so many of its widths in the step that was just made, also to where there was no
     /// interface, or away altogether.
-    fn has_gone_too_far(&self, widths: f64) -> Result<bool, Error> {
-        let now = self.motion.field().map_err(|source| self.failed(source))?;
+    fn has_gone_too_far(&self, before: &Stored<D>, widths: f64) -> Result<bool, Error> {
+        let now = self.motion.stored().map_err(|source| self.failed(source))?;
         Ok(!has_interface(&now)
-            || has_gone_further(self.field(), &now, widths)
-            || has_gone_further(&now, self.field(), widths))
+            || has_gone_further(before, &now, widths)
+            || has_gone_further(&now, before, widths))
+    }
+
+    /// Where it is before a step, for trying that again.
+    fn before(&self) -> Result<(FlowState<D>, Stored<D>), Error> {
+        Ok((self.state()?, self.motion.stored()?))
     }
 
     fn failed(&self, source: solver::Error) -> Error {
@@ -289,17 +300,18 @@ impl<const D: usize> Run<D> {
         &self.case
     }
 
-    /// The phase field at the present time.
-    #[allow(clippy::missing_panics_doc, reason = "stored values are finite")]
+    /// The phase field at the present time, on the whole grid.
     pub fn field(&self) -> &Field<D> {
-        let Some(stored) = &self.stored else {
-            return &self.case.initial;
-        };
-        let case = &self.case;
-        self.whole.get_or_init(|| {
-            let read = |start: usize, part: &mut [f64]| read(case, Some(stored), start, part);
-            Field::read_from(*case.grid(), &read).expect("stored values are finite")
-        })
+        self.current().field()
+    }
+
+    /// The phase field at the present time, as it is stored.
+    pub fn current(&self) -> Current<'_, D> {
+        Current {
+            case: &self.case,
+            stored: self.stored.as_ref(),
+            whole: &self.whole,
+        }
     }
 
     /// The `L2` distance of two phase fields of this run; the initial one where none is stored.
@@ -353,30 +365,6 @@ impl<const D: usize> Run<D> {
     }
 }
 
-/// Writes values of a phase field from a node on, whole rows of bricks: those that are stored, or the initial ones, which it keeps outside of
-/// the region.
-fn read<const D: usize>(
-    case: &Case<D>,
-    stored: Option<&Stored<D>>,
-    start: usize,
-    part: &mut [f64],
-) {
-    let initial = &case.initial.values()[start..][..part.len()];
-    let Some(stored) = stored else {
-        part.copy_from_slice(initial);
-        return;
-    };
-    stored.read(start, part);
-    if let Some(region) = &case.region {
-        let kept = initial.iter().zip(&region[start..]);
-        for (value, (initial, moves)) in part.iter_mut().zip(kept) {
-            if !moves {
-                *value = *initial;
-            }
-        }
-    }
-}
-
 /// The flow of a case at a state or at its start, if it fits into the memory.
 fn motion_in_memory<const D: usize>(
     case: &Case<D>,
@@ -416,41 +404,17 @@ const VANISHING: f64 = 0.02;
 
 /// Whether the interface has moved by more than so many of its widths: where `u = tanh(3 s / (4 eps))` changes its sign, the new
 /// phase field is nearly that of a phase.
-fn has_gone_further<const D: usize>(u: &Field<D>, now: &Field<D>, widths: f64) -> bool {
-    let (grid, limit) = (u.grid(), (0.75 * widths).tanh());
-    let (mut all, mut far) = (0_usize, 0_usize);
-    for axis in 0..D {
-        let stride = grid.stride(axis);
-        let lines = grid.cells() * stride;
-        let (u, now) = (
-            u.values().chunks_exact(lines),
-            now.values().chunks_exact(lines),
-        );
-        for (u, now) in u.zip(now) {
-            let beside = (stride..lines).chain(0..stride);
-            for (node, next) in (0..lines).zip(beside) {
-                let [a, b] = [node, next].map(|k| u[k]);
-                if (a > 0.0) == (b > 0.0) {
-                    continue;
-                }
-                let [c, d] = [node, next].map(|k| now[k]);
-                all += 1;
-                far += usize::from((c + (d - c) * a / (a - b)).abs() > limit);
-            }
-        }
-    }
-    far as f64 > VANISHING * all as f64
+fn has_gone_further<const D: usize>(u: &Stored<D>, now: &Stored<D>, widths: f64) -> bool {
+    let (values, limit) = (now.where_zero(u), (0.75 * widths).tanh());
+    let far = values.iter().filter(|value| value.abs() > limit).count();
+    far as f64 > VANISHING * values.len() as f64
 }
 
-/// The measures of the phase field at a time, which is made only if there are any.
-fn values<'a, const D: usize>(
-    case: &Case<D>,
-    time: f64,
-    field: impl Fn() -> &'a Field<D>,
-) -> Result<Values, Error> {
+/// The measures of a phase field at a time.
+fn values<const D: usize>(now: &Current<'_, D>, time: f64) -> Result<Values, Error> {
     let mut values = Values::new();
-    for measure in &case.measures {
-        let measured = measure.of(field(), time)?;
+    for measure in &now.case.measures {
+        let measured = measure.of(now, time)?;
         values.extend(measured.map(|(name, value)| (name.to_owned(), value)));
     }
     Ok(values)

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use derive_more::Display;
-use geometry::Field;
+use geometry::PhaseField;
 use geometry::measure::{has_interface, touches_side};
 use serde::{Deserialize, Serialize};
 use solver::StepRecord;
@@ -95,8 +95,8 @@ impl Stop {
                 let bending = run.case.energy.is_willmore();
                 D == 3 && bending && energy.is_some_and(|energy| energy < 4.0 * PI)
             }
-            Self::Vanished => !has_interface(run.field()),
-            Self::AtTheSide => is_near_side(run.field()) && !is_near_side(&run.case.initial),
+            Self::Vanished => !has_interface(&run.current()),
+            Self::AtTheSide => is_near_side(&run.current()) && !is_near_side(&run.case.initial),
         }
     }
 }
@@ -112,7 +112,7 @@ fn is_at_rest<const D: usize>(run: &Run<D>, record: &Record) -> bool {
 }
 
 /// Whether the shape is within two interface widths of the side of the box.
-fn is_near_side<const D: usize>(u: &Field<D>) -> bool {
+fn is_near_side<const D: usize>(u: &impl PhaseField<D>) -> bool {
     // `tanh(3/2) = 0.905`.
     touches_side(u, -0.9)
 }

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use geometry::{Field, Grid};
-use operators::{Bricks, ComputeDevice};
+use geometry::{Bricks, Field, Grid};
+use operators::ComputeDevice;
 use runs::{RunDirectory, State, StoredRun};
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};

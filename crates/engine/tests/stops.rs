@@ -1,7 +1,7 @@
 //! Every reason to end.
 
-use crate::common::{EPS, TAU, case, disc, divided, finished, grid};
-use engine::{Flow, Measure, Method, Record, StepRule, Stop};
+use crate::common::{EPS, TAU, case, device, disc, divided, finished, grid};
+use engine::{Flow, Measure, Method, Record, Run, StepRule, Stop};
 use geometry::Field;
 
 #[test]
@@ -69,12 +69,10 @@ fn a_flat_interface_is_at_rest() {
 fn how_far_the_zero_set_has_gone_is_measured() {
     let measure = Measure::displacement(&disc(128, 0.2), EPS);
     for (radius, gone) in [(0.2, 0.0), (0.203, 0.003), (0.19, 0.01)] {
-        let u = disc(128, radius);
-        let measured: Vec<_> = measure.of(&u, 0.0).unwrap().collect();
-        let [(name, value)] = measured[..] else {
-            panic!("{measured:?}");
-        };
-        assert_eq!(name, engine::DISPLACEMENT);
+        let mut other = case(Flow::Willmore, Method::Hybrid, disc(128, radius));
+        other.measures = vec![measure.clone()];
+        let run = Run::new(other, &device()).unwrap();
+        let value = run.start()[engine::DISPLACEMENT];
         assert!((value - gone).abs() < 1e-6, "{value} {gone}");
     }
     let mut growing = case(Flow::Willmore, Method::Hybrid, disc(128, 0.15));

@@ -14,6 +14,10 @@ pub enum Error {
     GridTooSmall { cells: usize },
     #[error("{cells}^{dimension} nodes cannot be addressed on this machine; use fewer cells")]
     GridTooLarge { cells: usize, dimension: usize },
+    #[error(
+        "a grid of {cells} cells per side cannot be divided into bricks of {side}; take a multiple of {side} cells, or store the whole grid"
+    )]
+    Bricks { cells: usize, side: usize },
     /// `n * side` cells per side is not a whole number.
     #[error(
         "{cells_per_unit} cells per unit length on a side of {side} give {cells} cells; \

@@ -1,5 +1,6 @@
 //! Nodal values on a grid.
 
+use crate::nodes::check_finite;
 use crate::parallel::Reader;
 use crate::{Error, Grid, parallel};
 
@@ -49,10 +50,7 @@ impl<const D: usize> Field<D> {
     /// # Errors
     /// Names the first node where one is.
     pub fn check_finite(&self) -> Result<(), Error> {
-        match self.values.iter().enumerate().find(|(_, v)| !v.is_finite()) {
-            None => Ok(()),
-            Some((index, &value)) => Err(Error::NonFinite { index, value }),
-        }
+        check_finite(&self.values)
     }
 
     /// The grid.

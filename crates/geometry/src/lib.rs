@@ -48,9 +48,11 @@
 //! - Everything is generic over the dimension `D` unless it exists in one dimension only.
 //! - Same input, same bytes: parallel sums have a fixed order.
 
+mod bricks;
 mod error;
 mod field;
 mod grid;
+mod nodes;
 mod placement;
 mod profile;
 mod spline;
@@ -70,11 +72,13 @@ pub mod shapes;
 pub mod vti;
 pub mod zero_set;
 
+pub use bricks::Bricks;
 pub use clifford::CliffordTorus;
 pub use distance::{SignedDistance, SignedDistanceExt};
 pub use error::{Error, positive, require};
 pub use field::Field;
 pub use grid::Grid;
+pub use nodes::{Nodes, PhaseField};
 pub use placement::Placement;
 pub use profile::{
     PURE_BEYOND, distance_from_phase_field, distances_from_phase_field, optimal_profile,

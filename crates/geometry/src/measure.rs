@@ -5,7 +5,7 @@
 use crate::error::positive;
 use crate::parallel::Reader;
 use crate::profile::profile_variable;
-use crate::{Error, Field, Grid, parallel};
+use crate::{Error, Field, Grid, PhaseField, parallel};
 
 /// `L2` norm `sqrt(h^D sum (a - b)^2)` of the difference: the trapezoidal rule on the periodic box, not a mean.
 ///
@@ -25,16 +25,24 @@ pub fn l2_distance_of_parts<const D: usize>(grid: &Grid<D>, a: &Reader<'_>, b: &
 }
 
 /// Whether there is an interface at all.
-pub fn has_interface<const D: usize>(u: &Field<D>) -> bool {
-    let inside = u.values().iter().filter(|u| **u > 0.0).count();
-    inside > 0 && inside < u.grid().len()
+pub fn has_interface<const D: usize>(u: &impl PhaseField<D>) -> bool {
+    let nodes = u.nodes();
+    let inside = u.values().iter().filter(|u| **u > 0.0).count() + nodes.positive_outside();
+    inside > 0 && inside < nodes.grid().len()
 }
 
 /// Whether a node at the side of the box has a value above this one.
-pub fn touches_side<const D: usize>(u: &Field<D>, above: f64) -> bool {
-    let (grid, last) = (u.grid(), u.grid().cells() - 1);
-    let at_side = |node: usize| (grid.multi_index(node).iter()).any(|&i| i == 0 || i == last);
-    (u.values().iter().enumerate()).any(|(node, u)| *u > above && at_side(node))
+pub fn touches_side<const D: usize>(u: &impl PhaseField<D>, above: f64) -> bool {
+    let nodes = u.nodes();
+    let last = nodes.grid().cells() - 1;
+    let at_side = |node: usize| (nodes.place(node).iter()).any(|&i| i == 0 || i == last);
+    let stored = (u.values().iter().enumerate()).any(|(node, u)| *u > above && at_side(node));
+    let outside = (nodes.bricks()).map_or([false; 2], |bricks| bricks.phases_at_side());
+    let outside = outside.into_iter().zip(u.rests());
+    stored
+        || outside
+            .into_iter()
+            .any(|(there, rest)| there && rest > above)
 }
 
 /// Perimeter `P_eps[u] = 1/2 integral of eps |grad u|^2 + Psi(u)/eps`, `Psi(u) = 9/16 (1-u^2)^2`.

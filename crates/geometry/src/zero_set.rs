@@ -12,7 +12,7 @@
 //! average over the level sets of `d` of what belongs to one of them, and the sums are those of smooth functions. That the interface has a
 //! width does not matter: `d` need not be a distance, only smooth.
 
-use crate::{Error, Field, Grid, vector};
+use crate::{Error, Grid, PhaseField, vector};
 
 mod layer;
 mod sizes;
@@ -57,27 +57,30 @@ impl ZeroSet {
     ///
     /// # Errors
     /// `eps` must be finite and positive, and the values finite.
-    pub fn of<const D: usize>(u: &Field<D>, eps: f64) -> Result<Self, Error> {
-        let layer = Layer::new(u, eps)?;
+    pub fn of<const D: usize>(u: &impl PhaseField<D>, eps: f64) -> Result<Self, Error> {
+        Ok(Self::on(&Layer::new(u, eps)?))
+    }
+
+    fn on<const D: usize>(layer: &Layer<D>) -> Self {
         let (spacing, cell) = (layer.grid.spacing(), layer.grid.cell_volume());
         let normals = layer.normals();
         let samples = layer.map(|place| {
             let distance = layer.near(place)?;
             (distance.abs() < CURVATURE_REACH * spacing)
-                .then(|| sample(&layer, normals, place, distance))
+                .then(|| sample(layer, normals, place, distance))
         });
         let mut sums = Sums::default();
         for sample in samples.iter().flatten() {
             sums.add(sample, spacing);
         }
-        Ok(Self {
+        Self {
             perimeter: layer.perimeter(),
             volume: layer.volume(),
             mean_curvature: cell * sums.curvature,
             willmore_energy: cell * sums.energy,
             spread: sums.spread(),
             smallest_radius: (sums.sharpest * spacing).recip(),
-        })
+        }
     }
 
     /// Whether perimeter and volume hold: false at corners, thin sheets and contacts.

@@ -1,9 +1,10 @@
 //! The operator on active bricks, for kernels that are products of functions of one variable.
 
 use burn::tensor::Tensor;
+use geometry::Bricks;
 use operators::{
-    Bricks, COEFFICIENTS, ComputeDevice, HermiteTable, TableRange, add_scaled, brick_convolution,
-    tabulated,
+    COEFFICIENTS, ComputeDevice, HermiteTable, TableRange, add_scaled, brick_convolution,
+    convolution_of_outside, tabulated,
 };
 
 use crate::{Error, Network};
@@ -85,12 +86,13 @@ impl<const D: usize> SeparableOperator<D> {
 
     /// The operator on some bricks.
     pub fn on(&self, bricks: &Bricks<D>, device: &ComputeDevice) -> BrickOperator<D> {
-        let outside = bricks.convolution_of_outside(&self.taps, self.rests);
+        let (side, neighbours) = (bricks.side(), bricks.neighbours());
+        let outside = convolution_of_outside::<D>(side, &neighbours, &self.taps, self.rests);
         let count = bricks.places().len();
         BrickOperator {
             operator: self.clone(),
             taps: device.tensor(&self.taps, [self.taps.len()]),
-            neighbours: device.tensor(&bricks.neighbours(), [count, 2 * D]),
+            neighbours: device.tensor(&neighbours, [count, 2 * D]),
             outside: device.tensor(&outside, bricks.shape()),
         }
     }

@@ -19,11 +19,25 @@ const LINES: usize = 8;
 /// The side of a brick is a multiple of the numbers in a register.
 const MOST_LANES: usize = 8;
 
+/// What constant values outside of active bricks, `rests` in the negative and in the positive phase, add to the convolution of a field with
+/// `taps` along each axis: [`crate::brick_convolution`] itself takes them as zero. The bricks are cubes of `side^D` cells; `neighbours` is
+/// their table.
+pub fn convolution_of_outside<const D: usize>(
+    side: usize,
+    neighbours: &[f64],
+    taps: &[f64],
+    rests: [f64; 2],
+) -> Vec<f64> {
+    let bricks = neighbours.len() / (2 * D);
+    let zeros = vec![0.0; bricks * side.pow(D as u32)];
+    convolve(&zeros, (side, D), neighbours, taps, false, rests)
+}
+
 /// `sum_b t_b .. t_c x_{a+(b,..,c)}` by passes along the last axis, the one before it, and so on; where no brick is active they see
 /// `rests`, constants in the negative and in the positive phase. The adjoint takes the passes in the opposite order with mirrored taps,
 /// which is the transpose although passes that are cut at the edge of the bricks do not commute.
 ///
-/// `bricks` are cubes of `side^axes` cells, `neighbours` is the table of [`crate::Bricks::neighbours`], and the taps are no more
+/// `bricks` are cubes of `side^axes` cells, `neighbours` is the table of `geometry::Bricks::neighbours`, and the taps are no more
 /// than `2 side + 1`.
 pub(crate) fn convolve<T: Real>(
     x: &[T],
@@ -236,8 +250,8 @@ impl<T: Real> WithSimd for Group<'_, T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Bricks;
     use crate::convolution::convolve as circular;
+    use geometry::Bricks;
 
     fn noise(n: usize, seed: u64) -> Vec<f64> {
         let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
@@ -306,7 +320,7 @@ mod tests {
         let x = noise(bricks.len(), 1);
         let taps = noise(2 * reach + 1, 2);
         let rests = [-0.9, 1.1];
-        let outside = bricks.convolution_of_outside(&taps, rests);
+        let outside = convolution_of_outside::<D>(side, &bricks.neighbours(), &taps, rests);
         let linear = on(&bricks, &x, &taps, false);
         let both: Vec<f64> = linear.iter().zip(&outside).map(|(a, b)| a + b).collect();
         assert_near(&linear, &by_passes(&bricks, &x, &taps, [0.0; 2]), 1e-13);
@@ -374,34 +388,5 @@ mod tests {
             .unwrap();
         assert_eq!(run(), one.install(run));
         assert_eq!(double, one.install(|| on(&bricks, &x, &taps, true)));
-    }
-
-    #[test]
-    fn values_keep_their_places() {
-        let (few, all) = (
-            some::<2>(48, 16),
-            Bricks::<2>::new(48, 16, |_| true, |_| true).unwrap(),
-        );
-        let x = noise(few.len(), 10);
-        let carried = all.carried(&few, &x, [-1.0, 1.0]);
-        let dense = few.scatter(&x, [-1.0, 1.0]);
-        assert_eq!(all.scatter(&carried, [0.0; 2]), dense);
-        assert_eq!(few.carried(&all, &carried, [0.0; 2]), x);
-        for (cell, value) in x.iter().enumerate() {
-            let [i, j] = few.multi_index(cell);
-            assert_eq!(dense[48 * i + j].to_bits(), value.to_bits());
-            let next = dense[48 * i + (j + 1) % 48];
-            match few.beside(cell, 1, true) {
-                Ok(beside) => assert_eq!(x[beside].to_bits(), next.to_bits()),
-                Err(positive) => assert_eq!(positive, next > 0.0),
-            }
-        }
-        assert!(matches!(
-            Bricks::<2>::new(50, 16, |_| true, |_| true),
-            Err(crate::Error::Bricks {
-                cells: 50,
-                side: 16
-            })
-        ));
     }
 }

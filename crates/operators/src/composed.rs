@@ -326,7 +326,7 @@ mod tests {
         fn check<const D: usize>(side: usize, reach: usize) {
             let device = ComputeDevice::open(DeviceKind::Flex).unwrap();
             let odd = |place: [usize; D]| place.iter().sum::<usize>() % 3 != 1;
-            let bricks = crate::Bricks::<D>::new(3 * side, side, odd, |_| true).unwrap();
+            let bricks = geometry::Bricks::<D>::new(3 * side, side, odd, |_| true).unwrap();
             let x = device.tensor::<D>(&wave(bricks.len(), 0.37), bricks.shape());
             let taps = device.tensor::<1>(&wave(2 * reach + 1, 1.1), [2 * reach + 1]);
             let count = bricks.places().len();

@@ -27,10 +27,6 @@ pub enum Error {
     },
     #[error("a result could not be read from the device: {reason}")]
     Read { reason: String },
-    #[error(
-        "a grid of {cells} cells per side cannot be divided into bricks of {side}; take a multiple of {side} cells, or store the whole grid"
-    )]
-    Bricks { cells: usize, side: usize },
     #[error("a table needs a finite interval and cells, got [{low}, {high}] with {cells} cells")]
     TableRange { low: f64, high: f64, cells: usize },
     #[error("the function to tabulate is not finite at {at}")]

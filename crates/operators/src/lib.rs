@@ -20,7 +20,7 @@
 //! | operation | formula | derivative |
 //! |---|---|---|
 //! | [`circular_convolution`] | `y_a = sum_b K_b x_{a+b}` | itself with `adjoint` flipped; in the kernel `c_b = sum_a g_a x_{a+b}` |
-//! | [`brick_convolution`] | `y_a = sum t_b .. t_c x_{a+(b,..,c)}` on active [`Bricks`] | itself with `adjoint` flipped |
+//! | [`brick_convolution`] | `y_a = sum t_b .. t_c x_{a+(b,..,c)}` on active bricks (`geometry::Bricks`) | itself with `adjoint` flipped |
 //! | [`tabulated`] | `y_a = F^(k)(w_a)`, `F` a quintic Hermite table | itself with `k + 1` |
 //! | [`spectral_filter`] | `y = F^-1[symbol F[x]]` | none (preconditioners) |
 //! | [`inner_product`], [`add_scaled`], [`update_on_host`] | `sum a b`, `x + alpha y`, work on the host | none (iterative solvers) |
@@ -45,7 +45,6 @@ pub mod recording;
 pub mod slices;
 
 mod brick_convolution;
-mod bricks;
 mod composed;
 mod convolution;
 #[cfg(any(feature = "wgpu", feature = "cuda"))]
@@ -67,7 +66,7 @@ mod table;
 mod tensor;
 mod vector;
 
-pub use bricks::Bricks;
+pub use brick_convolution::convolution_of_outside;
 pub use convolution::kernel_symbol;
 pub use device::{ComputeDevice, DeviceKind};
 pub use error::Error;

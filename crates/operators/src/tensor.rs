@@ -23,11 +23,11 @@ pub fn circular_convolution<const R: usize, const K: usize>(
     grid(Operation::Convolution(x, kernel, adjoint))
 }
 
-/// `y_a = sum_{b,..,c} t_b .. t_c x_{a+(b,..,c)}` on active [`crate::Bricks`], as one pass along each axis, the last one first; every pass
+/// `y_a = sum_{b,..,c} t_b .. t_c x_{a+(b,..,c)}` on active bricks (`geometry::Bricks`), as one pass along each axis, the last one first; every pass
 /// takes what is not active as zero. The transpose of that if `adjoint`: the passes in the opposite order with mirrored taps.
 ///
-/// `x` has the shape of [`crate::Bricks::shape`]; `taps` are odd in number with the centre in the middle, and reach no further than the
-/// next brick; `neighbours` is [`crate::Bricks::neighbours`]. Linear and differentiable in `x`; the others are constant.
+/// `x` has the shape of `Bricks::shape`; `taps` are odd in number with the centre in the middle, and reach no further than the
+/// next brick; `neighbours` is `Bricks::neighbours`. Linear and differentiable in `x`; the others are constant.
 pub fn brick_convolution<const D: usize>(
     x: Tensor<D>,
     taps: Tensor<1>,

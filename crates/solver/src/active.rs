@@ -2,12 +2,11 @@
 
 use std::sync::Arc;
 
-use geometry::{Field, Grid, parallel};
+use geometry::{Bricks, Field, Grid, Nodes, parallel};
 use model::{BrickOperator, SeparableOperator};
-use operators::{Bricks, ComputeDevice};
+use operators::ComputeDevice;
 
 use crate::Error;
-use crate::nodes::Nodes;
 
 /// Bricks nearer to the interface than this are active, in units of `eps`: the phase field ends where it differs from the pure phases by
 /// `1e-5`, which changes a flow by a millionth of its motion.
@@ -52,6 +51,11 @@ impl<const D: usize> Active<D> {
         }
     }
 
+    /// Where their cells lie.
+    pub(crate) fn nodes(&self) -> Nodes<D> {
+        Nodes::on_bricks(self.grid, self.bricks.clone())
+    }
+
     /// The step of mean curvature flow on them.
     pub(crate) fn step(&self, device: &ComputeDevice) -> BrickOperator<D> {
         self.operator.on(&self.bricks, device)
@@ -64,7 +68,7 @@ impl<const D: usize> Active<D> {
 
     /// Those near the interface of values on the whole grid.
     pub(crate) fn following_grid(&self, u: &[f64]) -> Result<Self, Error> {
-        let near = self.near(&self.grid, u, REACH);
+        let near = self.near(&self.grid.into(), u, REACH);
         let side = self.bricks.side();
         let first = |place: [usize; D]| self.grid.index(place.map(|at| at * side));
         let bricks = Bricks::new(
@@ -81,7 +85,7 @@ impl<const D: usize> Active<D> {
 
     /// Those near the interface of `u`, if they are others. Where the interface has vanished, all stay.
     pub(crate) fn following(&self, u: &[f64]) -> Result<Option<Self>, Error> {
-        let near = self.near(&*self.bricks, u, REACH);
+        let near = self.near(&self.nodes(), u, REACH);
         if !near.contains(&true) {
             return Ok(None);
         }
@@ -90,7 +94,7 @@ impl<const D: usize> Active<D> {
 
     /// The set with the bricks near the interface of `u`, if that has come near its edge.
     pub(crate) fn enlarged(&self, u: &[f64]) -> Result<Option<Self>, Error> {
-        let needed = self.near(&*self.bricks, u, MARGIN);
+        let needed = self.near(&self.nodes(), u, MARGIN);
         let places = (0..needed.len()).filter(|&brick| needed[brick]);
         let missing = places
             .map(|brick| self.bricks.place(brick))
@@ -98,7 +102,7 @@ impl<const D: usize> Active<D> {
         if !missing {
             return Ok(None);
         }
-        let near = self.near(&*self.bricks, u, REACH);
+        let near = self.near(&self.nodes(), u, REACH);
         self.replaced(u, |place| {
             near[self.bricks.flat(place)] || self.bricks.number(place).is_some()
         })
@@ -118,7 +122,7 @@ impl<const D: usize> Active<D> {
     }
 
     /// For every brick of the grid, whether a cell of it is within `reach eps` of one beside a change of sign.
-    fn near(&self, nodes: &impl Nodes<D>, u: &[f64], reach: f64) -> Vec<bool> {
+    fn near(&self, nodes: &Nodes<D>, u: &[f64], reach: f64) -> Vec<bool> {
         let (side, per_axis) = (self.bricks.side(), self.bricks.per_axis());
         let mut cells_of = vec![Vec::new(); per_axis.pow(D as u32)];
         for place in interface(nodes, u) {
@@ -174,13 +178,13 @@ fn distance<const D: usize>(cell: [i64; D], offset: [i64; D], side: i64) -> f64 
 }
 
 /// The places of the nodes beside which `u` changes its sign.
-fn interface<const D: usize>(nodes: &impl Nodes<D>, u: &[f64]) -> Vec<[usize; D]> {
+fn interface<const D: usize>(nodes: &Nodes<D>, u: &[f64]) -> Vec<[usize; D]> {
     parallel::filter_map(u.len(), CHUNK, &|node| {
         let place = nodes.place(node);
         let positive = u[node] > 0.0;
         let changes = (0..D).any(|axis| {
-            [false, true].into_iter().any(|forward| {
-                let beside = nodes.beside(node, place, axis, forward);
+            let beside = nodes.along(node, place, axis, [-1, 1]);
+            beside.into_iter().any(|beside| {
                 positive != beside.map_or_else(|positive| positive, |node| u[node] > 0.0)
             })
         });

@@ -251,11 +251,11 @@ impl<'a, const D: usize> Held<'a, D> {
 
     /// None for values that are not finite.
     fn tangent(&self, u: &Tensor<D>) -> Result<Option<Tangent<D>>, Error> {
-        let stored = Stored::of(u, self.grid, self.active.cloned(), self.device)?;
-        let Ok(field) = stored.field() else {
-            return Ok(None);
+        let stored = Stored::of(u, self.grid, self.active, self.device)?;
+        let sizes = match Sizes::of(&stored, self.eps) {
+            Err(geometry::Error::NonFinite { .. }) => return Ok(None),
+            sizes => sizes?,
         };
-        let sizes = Sizes::of(&field, self.eps)?;
         let held = self.targets.iter().enumerate();
         let parts = held.filter_map(|(measure, target)| {
             target.map(|target| Part {
@@ -274,14 +274,6 @@ impl<'a, const D: usize> Held<'a, D> {
         }))
     }
 
-    /// Of values on the whole grid those that are stored.
-    fn stored(&self, values: Vec<f64>) -> Vec<f64> {
-        match self.active {
-            Some(active) => active.bricks.gather(&values),
-            None => values,
-        }
-    }
-
     /// The motions that restore the measures: displacements of the interface, constant for the volume and proportional to the mean curvature
     /// for the perimeter (for one that is held alone, the shorter one of both), times `1 - u^2`.
     fn motions(&self, tangent: &Tangent<D>, gradients: &[Vec<f64>]) -> Vec<Vec<f64>> {
@@ -290,7 +282,7 @@ impl<'a, const D: usize> Held<'a, D> {
         let bent = || {
             // Sharper bends than the interface is wide are corners.
             let most = self.eps.recip();
-            let curvature = self.stored(tangent.sizes.mean_curvature());
+            let curvature = tangent.sizes.mean_curvature();
             let bends = curvature.iter().map(|k| k.clamp(-most, most));
             self.inside(wells.iter().zip(bends).map(|(well, k)| well * k).collect())
         };
@@ -329,9 +321,7 @@ impl<'a, const D: usize> Held<'a, D> {
             _ => tangent.sizes.volume_gradient(),
         };
         let parts = tangent.parts.iter();
-        parts
-            .map(|part| self.inside(self.stored(gradient(part))))
-            .collect()
+        parts.map(|part| self.inside(gradient(part))).collect()
     }
 
     /// The motions that restore the constraints at a phase field, with what they change.
@@ -360,15 +350,6 @@ impl<'a, const D: usize> Held<'a, D> {
             multipliers[part.measure] = value;
         }
         multipliers
-    }
-
-    /// The second derivative of the measures by what is stored.
-    fn curvature(&self, tangent: &Tangent<D>) -> Curvature<D> {
-        let all = tangent.sizes.second_derivative(self.multipliers);
-        Curvature(match self.active {
-            Some(active) => all.at(|node| active.bricks.cell(self.grid.multi_index(node))),
-            None => all,
-        })
     }
 
     /// Solves for the motion that minimizes a quadratic model of the energy among those tangential to the constraints. With `keep`, what is found out about the multipliers is remembered; without, the motion only cleans the profile.
@@ -401,7 +382,8 @@ impl<'a, const D: usize> Held<'a, D> {
         }
         let projection = Projection::new(normals, precondition, self.device)?;
         // To clean the profile, which is much stiffer, it is not needed.
-        let curvature = keep.then(|| Arc::new(self.curvature(tangent)));
+        let curvature =
+            keep.then(|| Arc::new(Curvature(tangent.sizes.second_derivative(multipliers))));
         let mut product = |p: &Tensor<D>| {
             let product = of_energy(p)?;
             Ok(match &curvature {

@@ -4,9 +4,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use burn::tensor::Tensor;
-use geometry::{Field, Grid, positive};
+use geometry::{Bricks, Field, Grid, positive};
 use model::{Factors, MeanCurvatureOperator, Network, Ratios, SeparableOperator};
-use operators::{Bricks, ComputeDevice, inner_product};
+use operators::{ComputeDevice, inner_product};
 use serde::{Deserialize, Serialize};
 
 use crate::active::Active;
@@ -347,7 +347,7 @@ impl<const D: usize> WillmoreFlow<D> {
         self.current.shape().num_elements()
     }
 
-    /// The phase field now, on the device: on the whole grid, or on its active [`operators::Bricks`].
+    /// The phase field now, on the device: on the whole grid, or on its active [`Bricks`].
     pub fn current(&self) -> &Tensor<D> {
         &self.current
     }
@@ -410,8 +410,8 @@ impl<const D: usize> WillmoreFlow<D> {
         };
         let dims = self.current.dims();
         let tensor = |values: &Vec<f64>| self.device.tensor(&stored(values), dims);
-        let rate = (state.rate.as_ref())
-            .map(|rate| Stored::new(stored(rate), self.grid, self.active.clone(), [0.0; 2]));
+        let rate =
+            (state.rate.as_ref()).map(|rate| Stored::new(stored(rate), self.nodes(), [0.0; 2]));
         let current = tensor(&state.current);
         self.previous = previous.map(|(u, tau)| (tensor(u), *tau));
         self.current = current;
@@ -427,7 +427,7 @@ impl<const D: usize> WillmoreFlow<D> {
             (Some(active), Some(bricks)) => {
                 let [cells, side] = [bricks.cells(), bricks.side()];
                 if [cells, side] != [self.grid.cells(), active.bricks.side()] {
-                    return Err(operators::Error::Bricks { cells, side }.into());
+                    return Err(geometry::Error::Bricks { cells, side }.into());
                 }
                 bricks.len()
             }
@@ -548,10 +548,9 @@ impl<const D: usize> WillmoreFlow<D> {
         }
         let preconditioner = self.phase.as_ref().map(|(_, phase)| Preconditioner {
             phase: phase.clone(),
-            grid: self.grid,
+            nodes: self.nodes(),
             eps: self.params.eps,
             tau,
-            bricks: (self.active.as_ref()).map(|active| active.bricks.clone()),
             region: self.region.clone(),
             interface: None,
         });

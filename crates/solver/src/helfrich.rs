@@ -2,7 +2,7 @@
 
 use burn::tensor::Tensor;
 use geometry::Grid;
-use operators::{ComputeDevice, brick_convolution, circular_convolution};
+use operators::{ComputeDevice, brick_convolution, circular_convolution, convolution_of_outside};
 use serde::{Deserialize, Serialize};
 
 use crate::active::Active;
@@ -98,13 +98,15 @@ struct DirichletForm<const D: usize> {
 impl<const D: usize> DirichletForm<D> {
     fn new(active: &Active<D>, device: &ComputeDevice) -> Self {
         let bricks = &active.bricks;
+        let (side, neighbours) = (bricks.side(), bricks.neighbours());
         let taps = [-SMALL, SMALL].map(|part| {
             let mut taps = second_difference().map(|weight| part * weight);
             taps[WIDTH / 2] += 1.0;
             taps
         });
         let of_outside = |values: [f64; 2]| -> Vec<f64> {
-            let [minus, plus] = taps.map(|taps| bricks.convolution_of_outside(&taps, values));
+            let [minus, plus] =
+                taps.map(|taps| convolution_of_outside::<D>(side, &neighbours, &taps, values));
             minus.iter().zip(&plus).map(|(a, b)| a - b).collect()
         };
         let rests = active.rests();
@@ -115,7 +117,7 @@ impl<const D: usize> DirichletForm<D> {
             .sum::<f64>();
         Self {
             taps: taps.map(|taps| device.tensor(&taps, [WIDTH])),
-            neighbours: device.tensor(&bricks.neighbours(), [bricks.places().len(), 2 * D]),
+            neighbours: device.tensor(&neighbours, [bricks.places().len(), 2 * D]),
             outside: device.tensor(&outside, bricks.shape()),
             rest,
             scale: 1.0 / (2.0 * SMALL * active.grid.spacing().powi(2)),

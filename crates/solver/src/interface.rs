@@ -16,11 +16,10 @@
 
 use faer::linalg::solvers::Solve;
 use faer::{ColMut, Mat, Side};
-use geometry::{Grid, parallel};
+use geometry::{Nodes, parallel};
 use operators::{HostUpdate, Real};
 
 use crate::dissection::dissection;
-use crate::nodes::Nodes;
 use crate::samples::{MOST_CORNERS, Samples};
 use crate::sparse::{Entry, SparseInverse};
 
@@ -51,25 +50,24 @@ type Inverse = Box<dyn Fn(&mut [f64]) + Send + Sync>;
 type Local = [[f64; MOST_CORNERS]; MOST_CORNERS];
 
 impl<const D: usize> InterfaceModes<D> {
-    /// The correction for the interface of `u`, whose values are stored at some `nodes` of the grid, or none if there is no interface, or
+    /// The correction for the interface of `u`, whose values lie at some nodes of the grid, or none if there is no interface, or
     /// one with corners.
     ///
     /// With a `region` only its nodes count.
-    pub(crate) fn new<N: Nodes<D>>(
-        grid: &Grid<D>,
-        nodes: &N,
+    pub(crate) fn new(
+        nodes: &Nodes<D>,
         u: &[f64],
         eps: f64,
         tau: f64,
         region: Option<&[bool]>,
     ) -> Option<Self> {
-        let samples = Samples::new(grid, nodes, u, eps, SPACING * eps, region)?;
+        let samples = Samples::new(nodes, u, eps, SPACING * eps, region)?;
         let sharp = (samples.nodes.iter()).filter(|s| s.curvature.abs() * eps > 1.0);
         let corners_dominate = sharp.count() as f64 > SHARP * samples.nodes.len() as f64;
         if samples.nodes.is_empty() || corners_dominate {
             return None;
         }
-        let inverse: Inverse = if N::WHOLE_GRID && samples.columns.len() <= MOST_DENSE {
+        let inverse: Inverse = if nodes.bricks().is_none() && samples.columns.len() <= MOST_DENSE {
             dense_inverse(coarse_matrices(&samples), tau)?
         } else {
             let inverse = sparse_inverse(&samples, tau)?;
@@ -210,8 +208,8 @@ fn local_matrices<const D: usize, const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use geometry::phase_field;
     use geometry::shapes::{Ball, Cuboid};
+    use geometry::{Grid, phase_field};
 
     const EPS: f64 = 1.0 / 32.0;
 
@@ -239,7 +237,7 @@ mod tests {
         let grid = Grid::<2>::centred(96, 1.0).unwrap();
         let u = disc(&grid);
         let tau = 2e-5;
-        let modes = InterfaceModes::new(&grid, &grid, &u, EPS, tau, None).unwrap();
+        let modes = InterfaceModes::new(&grid.into(), &u, EPS, tau, None).unwrap();
         for k in [0.0_f64, 2.0, 5.0] {
             let p = wave(&grid, &u, k);
             let mut z = vec![0.0; p.len()];
@@ -260,7 +258,7 @@ mod tests {
     fn the_correction_is_symmetric_and_not_negative() {
         let grid = Grid::<2>::centred(64, 1.0).unwrap();
         let u = disc(&grid);
-        let modes = InterfaceModes::new(&grid, &grid, &u, EPS, 1e-4, None).unwrap();
+        let modes = InterfaceModes::new(&grid.into(), &u, EPS, 1e-4, None).unwrap();
         let vector = |a: f64| -> Vec<f64> {
             (0..u.len())
                 .map(|i| (a * i as f64).sin() + 0.2 * (a * a * i as f64).cos())
@@ -282,9 +280,9 @@ mod tests {
     fn nothing_is_corrected_without_an_interface_or_at_corners() {
         let grid = Grid::<2>::centred(64, 1.0).unwrap();
         let flat = vec![1.0; grid.len()];
-        assert!(InterfaceModes::new(&grid, &grid, &flat, EPS, 1e-4, None).is_none());
+        assert!(InterfaceModes::new(&grid.into(), &flat, EPS, 1e-4, None).is_none());
         let square = Cuboid::new([0.3, 0.3]).unwrap();
         let square = phase_field(grid, &square, EPS).unwrap();
-        assert!(InterfaceModes::new(&grid, &grid, square.values(), EPS, 1e-4, None).is_none());
+        assert!(InterfaceModes::new(&grid.into(), square.values(), EPS, 1e-4, None).is_none());
     }
 }

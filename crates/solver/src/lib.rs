@@ -57,7 +57,6 @@ mod flow;
 mod helfrich;
 mod interface;
 mod newton;
-mod nodes;
 mod preconditioner;
 mod region;
 mod samples;

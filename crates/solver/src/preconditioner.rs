@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use burn::tensor::Tensor;
-use geometry::Grid;
-use operators::{Bricks, ComputeDevice, update_on_host};
+use geometry::Nodes;
+use operators::{ComputeDevice, update_on_host};
 
 use crate::Error;
 use crate::interface::InterfaceModes;
@@ -24,11 +24,9 @@ pub(crate) enum Level {
 /// everything but displacements of the interface, plus a coarse correction for those that follows the interface.
 pub(crate) struct Preconditioner<const D: usize> {
     pub(crate) phase: PhaseInverse<D>,
-    pub(crate) grid: Grid<D>,
+    pub(crate) nodes: Nodes<D>,
     pub(crate) eps: f64,
     pub(crate) tau: f64,
-    /// The active bricks, where values are stored on such.
-    pub(crate) bricks: Option<Arc<Bricks<D>>>,
     /// Where values may move, if not everywhere: it is projected there from both sides, which keeps it symmetric and positive.
     pub(crate) region: Option<Region<D>>,
     /// None before it [follows](Self::follow) the interface.
@@ -39,13 +37,9 @@ impl<const D: usize> Preconditioner<D> {
     /// Moves the coarse correction to the interface of `u`.
     pub(crate) fn follow(&mut self, u: &Tensor<D>, device: &ComputeDevice) -> Result<(), Error> {
         let u = device.values(u.clone())?;
-        let (grid, eps, tau) = (&self.grid, self.eps, self.tau);
         let region = self.region.as_ref().map(|region| &*region.nodes);
-        self.interface = match &self.bricks {
-            None => InterfaceModes::new(grid, grid, &u, eps, tau, region),
-            Some(bricks) => InterfaceModes::new(grid, &**bricks, &u, eps, tau, region),
-        }
-        .map(Arc::new);
+        let modes = InterfaceModes::new(&self.nodes, &u, self.eps, self.tau, region);
+        self.interface = modes.map(Arc::new);
         Ok(())
     }
 

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use burn::tensor::{Bool, Tensor};
-use geometry::Grid;
-use operators::{Bricks, ComputeDevice};
+use geometry::{Bricks, Grid};
+use operators::ComputeDevice;
 
 use crate::Error;
 

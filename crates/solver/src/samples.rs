@@ -1,8 +1,6 @@
 //! The grid nodes of an interface, with their foot points on it, in the cells of a coarse lattice.
 
-use geometry::{Grid, parallel};
-
-use crate::nodes::Nodes;
+use geometry::{Grid, Nodes, parallel};
 
 /// Corners of a cell of the lattice in 3D; in 2D the first four count.
 pub(crate) const MOST_CORNERS: usize = 8;
@@ -87,16 +85,16 @@ pub(crate) struct Samples<const D: usize> {
 }
 
 impl<const D: usize> Samples<D> {
-    /// The interface of `u`, whose values are stored at some `nodes` of the grid and whose width is `eps`, on a lattice of about the given
+    /// The interface of `u`, whose values lie at some nodes of the grid and whose width is `eps`, on a lattice of about the given
     /// spacing. With a `region`, only its nodes count.
     pub(crate) fn new(
-        grid: &Grid<D>,
-        nodes: &impl Nodes<D>,
+        nodes: &Nodes<D>,
         u: &[f64],
         eps: f64,
         spacing: f64,
         region: Option<&[bool]>,
     ) -> Option<Self> {
+        let grid = nodes.grid();
         let cells = ((grid.side() / spacing).round() as usize).max(4);
         let lattice = Lattice {
             grid,
@@ -185,7 +183,7 @@ impl<const D: usize> Lattice<'_, D> {
     }
 
     /// The sample of a node, if the node belongs to the interface, with all nodes beside it. Its cell is still that of the whole lattice.
-    fn sample(&self, node: usize, nodes: &impl Nodes<D>, u: &[f64]) -> Option<Sample<D>> {
+    fn sample(&self, node: usize, nodes: &Nodes<D>, u: &[f64]) -> Option<Sample<D>> {
         let weight = 1.0 - u[node] * u[node];
         if weight < WINDOW {
             return None;
@@ -196,11 +194,9 @@ impl<const D: usize> Lattice<'_, D> {
         let mut laplacian = 0.0;
         let mut normal = [0.0; D];
         for (axis, normal) in normal.iter_mut().enumerate() {
-            let at = |forward: bool| {
-                let beside = nodes.beside(node, index, axis, forward).ok()?;
-                Some(self.distance(u[beside]))
-            };
-            let (after, before) = (at(true)?, at(false)?);
+            let [before, after] = nodes.along(node, index, axis, [-1, 1]);
+            let at = |node: usize| self.distance(u[node]);
+            let (after, before) = (at(after.ok()?), at(before.ok()?));
             laplacian += after - 2.0 * here + before;
             *normal = after - before;
         }

@@ -1,21 +1,21 @@
 //! Arithmetic of fields node by node, on what is stored of them.
 
 use burn::tensor::Tensor;
-use geometry::{Field, Grid, parallel};
+use geometry::{Field, Grid, Nodes, PhaseField, parallel};
 use operators::ComputeDevice;
 
 use crate::Error;
 use crate::active::Active;
-use crate::nodes::Nodes;
 
+/// Nodes are worked on in pieces of this many.
+const CHUNK: usize = 1 << 14;
 /// The values of phase fields in the negative and in the positive phase.
 const PHASES: [f64; 2] = [-1.0, 1.0];
 
 /// The values of a field on the whole grid, or on active bricks, with the constants that it has outside.
 #[derive(Clone)]
 pub struct Stored<const D: usize> {
-    grid: Grid<D>,
-    active: Option<Active<D>>,
+    nodes: Nodes<D>,
     values: Vec<f64>,
     /// The values in the negative and in the positive phase where nothing is stored.
     rests: [f64; 2],
@@ -23,8 +23,22 @@ pub struct Stored<const D: usize> {
 
 impl<const D: usize> From<Field<D>> for Stored<D> {
     fn from(field: Field<D>) -> Self {
-        let grid = *field.grid();
-        Self::new(field.into_values(), grid, None, PHASES)
+        let nodes = (*field.grid()).into();
+        Self::new(field.into_values(), nodes, PHASES)
+    }
+}
+
+impl<const D: usize> PhaseField<D> for Stored<D> {
+    fn nodes(&self) -> Nodes<D> {
+        self.nodes.clone()
+    }
+
+    fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn rests(&self) -> [f64; 2] {
+        self.rests
     }
 }
 
@@ -33,23 +47,18 @@ impl<const D: usize> Stored<D> {
     pub(crate) fn of(
         u: &Tensor<D>,
         grid: Grid<D>,
-        active: Option<Active<D>>,
+        active: Option<&Active<D>>,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
-        let rests = active.as_ref().map_or(PHASES, Active::rests);
-        Ok(Self::new(device.values(u.clone())?, grid, active, rests))
+        let rests = active.map_or(PHASES, Active::rests);
+        let nodes = active.map_or_else(|| grid.into(), Active::nodes);
+        Ok(Self::new(device.values(u.clone())?, nodes, rests))
     }
 
     /// Values as they are stored; `rests` elsewhere.
-    pub(crate) fn new(
-        values: Vec<f64>,
-        grid: Grid<D>,
-        active: Option<Active<D>>,
-        rests: [f64; 2],
-    ) -> Self {
+    pub(crate) fn new(values: Vec<f64>, nodes: Nodes<D>, rests: [f64; 2]) -> Self {
         Self {
-            grid,
-            active,
+            nodes,
             values,
             rests,
         }
@@ -57,17 +66,17 @@ impl<const D: usize> Stored<D> {
 
     /// The field on the whole grid.
     pub(crate) fn field(&self) -> Result<Field<D>, Error> {
-        let values = match &self.active {
-            Some(active) => active.bricks.scatter(&self.values, self.rests),
+        let values = match self.nodes.bricks() {
+            Some(bricks) => bricks.scatter(&self.values, self.rests),
             None => self.values.clone(),
         };
-        Ok(Field::from_values(self.grid, values)?)
+        Ok(Field::from_values(*self.nodes.grid(), values)?)
     }
 
     /// Writes the values of the whole grid for nodes in a row from one on; where it is on bricks, both multiples of their sides.
     pub fn read(&self, start: usize, part: &mut [f64]) {
-        match &self.active {
-            Some(active) => (active.bricks).read(&self.values, self.rests, start, part),
+        match self.nodes.bricks() {
+            Some(bricks) => bricks.read(&self.values, self.rests, start, part),
             None => part.copy_from_slice(&self.values[start..][..part.len()]),
         }
     }
@@ -77,74 +86,75 @@ impl<const D: usize> Stored<D> {
     }
 
     pub(crate) fn tensor(&self, device: &ComputeDevice) -> Tensor<D> {
-        let whole = || self.grid.shape();
-        let shape = (self.active.as_ref()).map_or_else(whole, |active| active.bricks.shape());
+        let whole = || self.nodes.grid().shape();
+        let shape = (self.nodes.bricks()).map_or_else(whole, |bricks| bricks.shape());
         device.tensor(&self.values, shape)
     }
 
     /// The same field on other bricks.
-    pub(crate) fn on(&self, active: &Active<D>) -> Self {
-        let Some(own) = &self.active else {
+    pub(crate) fn on(&self, nodes: &Nodes<D>) -> Self {
+        let (Some(own), Some(bricks)) = (self.nodes.bricks(), nodes.bricks()) else {
             return self.clone();
         };
-        let (bricks, rests) = (&active.bricks, self.rests);
-        Self {
-            values: bricks.carried(&own.bricks, &self.values, rests),
-            active: Some(active.clone()),
-            ..*self
-        }
+        let values = bricks.carried(own, &self.values, self.rests);
+        Self::new(values, nodes.clone(), self.rests)
+    }
+
+    /// Its values where `other` changes its sign, by linear interpolation along the edges of the grid.
+    pub fn where_zero(&self, other: &Self) -> Vec<f64> {
+        let (nodes, own) = (&other.nodes, self.on(&other.nodes));
+        let of_axis = |axis: usize| {
+            parallel::filter_map(nodes.len(), CHUNK, &|node| {
+                let [next] = nodes.along(node, nodes.place(node), axis, [1]);
+                let next = next.ok()?;
+                let [a, b] = [node, next].map(|k| other.values[k]);
+                let [c, d] = [node, next].map(|k| own.values[k]);
+                ((a > 0.0) != (b > 0.0)).then(|| c + (d - c) * a / (a - b))
+            })
+        };
+        (0..D).flat_map(of_axis).collect()
     }
 
     pub(crate) fn map(&self, f: impl Fn(f64) -> f64 + Sync) -> Self {
         let values = parallel::values(self.values.len(), |i| f(self.values[i]));
-        Self::new(values, self.grid, self.active.clone(), self.rests.map(f))
+        Self::new(values, self.nodes.clone(), self.rests.map(f))
     }
 
     /// A function of two fields, on the larger one of their sets of bricks, to which the other is carried.
     pub(crate) fn zip_map(&self, other: &Self, f: impl Fn(f64, f64) -> f64 + Sync) -> Self {
-        let active = match (&self.active, &other.active) {
-            (Some(own), Some(others)) if own.bricks != others.bricks => {
-                if other.values.len() > self.values.len() {
-                    return self.on(others).zip_map(other, f);
-                }
-                return self.zip_map(&other.on(own), f);
-            }
-            (own, others) => own.as_ref().or(others.as_ref()),
-        };
         assert_eq!(
-            self.values.len(),
-            other.values.len(),
+            self.nodes.bricks().is_some(),
+            other.nodes.bricks().is_some(),
             "both are on bricks, or neither"
         );
+        if self.nodes.bricks() != other.nodes.bricks() {
+            if other.values.len() > self.values.len() {
+                return self.on(&other.nodes).zip_map(other, f);
+            }
+            return self.zip_map(&other.on(&self.nodes), f);
+        }
         let (own, others) = (&self.values, &other.values);
         let values = parallel::values(own.len(), |i| f(own[i], others[i]));
         let rests = [0, 1].map(|phase| f(self.rests[phase], other.rests[phase]));
-        Self::new(values, self.grid, active.cloned(), rests)
+        Self::new(values, self.nodes.clone(), rests)
     }
 
     /// The Laplacian by centred differences of second order, periodic.
     pub(crate) fn laplacian(&self) -> Self {
-        let values = match &self.active {
-            Some(active) => self.laplacian_at(&*active.bricks),
-            None => self.laplacian_at(&self.grid),
-        };
-        Self::new(values, self.grid, self.active.clone(), [0.0; 2])
-    }
-
-    fn laplacian_at(&self, nodes: &impl Nodes<D>) -> Vec<f64> {
-        let unit = self.grid.spacing().powi(-2);
+        let unit = self.nodes.grid().spacing().powi(-2);
         let at = |node: usize| {
-            let place = nodes.place(node);
+            let place = self.nodes.place(node);
             let along = |axis: usize| {
-                let [before, after] = [false, true].map(|forward| {
-                    let beside = nodes.beside(node, place, axis, forward);
+                let beside = self.nodes.along(node, place, axis, [-1, 1]);
+                let [before, after] = beside.map(|beside| {
                     beside.map_or_else(|phase| self.rests[usize::from(phase)], |k| self.values[k])
                 });
                 after - 2.0 * self.values[node] + before
             };
             unit * (0..D).map(along).sum::<f64>()
         };
-        parallel::values(self.values.len(), at)
+        let values = parallel::values(self.values.len(), at);
+        Self::new(values, self.nodes.clone(), [0.0; 2])
     }
 
     /// The largest size of a value.
@@ -177,7 +187,7 @@ mod tests {
     fn part_of(field: &Field<2>, active: Active<2>) -> Stored<2> {
         let values = active.bricks.gather(field.values());
         let rests = active.rests();
-        Stored::new(values, *field.grid(), Some(active), rests)
+        Stored::new(values, active.nodes(), rests)
     }
 
     /// Of the same fields on the whole grid the results have the same bits on the bricks.
@@ -187,7 +197,7 @@ mod tests {
         let (bricks, rests) = (active.bricks.clone(), active.rests());
         let part = part_of(&disc, active);
         let whole = part.field().unwrap().into_values();
-        let whole = Stored::new(whole, *disc.grid(), None, rests);
+        let whole = Stored::new(whole, (*disc.grid()).into(), rests);
         assert!(part.values.len() < whole.values.len());
         let same = |part: &Stored<2>, whole: &Stored<2>| {
             assert_eq!(part.values, bricks.gather(&whole.values));
@@ -207,7 +217,7 @@ mod tests {
     fn fields_on_fewer_bricks_are_continued_by_their_constants() {
         let ((small, few), (_, many)) = (disc(0.3), disc(0.6));
         let u = part_of(&small, few);
-        let v = u.on(&many);
+        let v = u.on(&many.nodes());
         assert!(v.values.len() > u.values.len());
         // Where those bricks are none of its own, the field is nearly constant.
         let outer = part_of(&small, many);

@@ -6,10 +6,9 @@ use crate::common::{device, distance, network, noise, params, ratios};
 use geometry::distance::SignedDistanceExt;
 use geometry::measure::l2_distance;
 use geometry::shapes::{Ball, Cross};
-use geometry::{Field, Grid, SignedDistance, phase_field};
+use geometry::{Bricks, Field, Grid, SignedDistance, phase_field};
 use linearize::taylor::{halvings, remainder};
 use model::{Network, SeparableOperator, Shipped};
-use operators::Bricks;
 use solver::{
     Constraints, Error, FlowParams, Helfrich, MinimizingMovement, NewtonParams, Objective,
     Precision, StartKind, WillmoreFlow,

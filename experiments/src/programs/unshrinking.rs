@@ -151,7 +151,7 @@ impl Segmented {
                     case.held.volume = keeps.then_some(Target::keep(self.body.volume));
                     let run = stage.run(case.clone())?;
                     case.initial = run.field().clone();
-                    volume = ZeroSet::of(run.field(), case.scales.eps)?.volume;
+                    volume = ZeroSet::of(&run.current(), case.scales.eps)?.volume;
                     surface = surfaces::remeshed_surface(run.field(), case.scales.eps)?
                         .with_volume(volume, |_| true);
                 }

@@ -4,7 +4,8 @@ use std::f64::consts::FRAC_2_SQRT_PI;
 use std::sync::OnceLock;
 
 use crate::error::positive;
-use crate::{Error, Field, Grid, distance_from_phase_field, parallel, vector};
+use crate::nodes::check_finite;
+use crate::{Error, Grid, Nodes, PhaseField, distance_from_phase_field, parallel, vector};
 
 /// Width of the kernel in spacings of the grid.
 const WIDTH: f64 = 1.25;
@@ -17,6 +18,8 @@ const REACH: f64 = 10.0;
 const WEIGHTS: [f64; 3] = [45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0];
 /// Neighbours along an axis in a difference.
 pub(super) const NEIGHBOURS: usize = 6;
+/// How far they are, in spacings, in the order of [`Layer::weights`].
+const STEPS: [isize; NEIGHBOURS] = [1, -1, 2, -2, 3, -3];
 /// Work on fewer values than this is not worth another thread.
 pub(super) const SHARE: usize = 1 << 13;
 /// Place of a node that is not in the layer.
@@ -87,47 +90,49 @@ fn gaussian(d: f64, width: f64) -> f64 {
     0.5 * FRAC_2_SQRT_PI / width * (-t * t).exp()
 }
 
-/// The nodes near the zero set, and those that the differences there reach.
+/// The nodes near the zero set, and those that the differences there reach, as far as they are stored.
 pub(super) struct Layer<const D: usize> {
+    stored: Nodes<D>,
     pub(super) grid: Grid<D>,
     pub(super) kernel: Kernel,
     reach: f64,
-    /// The distance variable at all nodes of the grid.
+    /// The distance variable at all stored nodes,
     distance: Vec<f64>,
-    /// The nodes of the layer in the order of the grid.
+    /// and where nothing is stored.
+    rests: [f64; 2],
+    /// The nodes of the layer in the order of storage.
     pub(super) nodes: Vec<u32>,
-    /// Where a node of the grid is in `nodes`.
+    /// Where a stored node is in `nodes`.
     places: Vec<u32>,
-    /// Along an axis, the nodes one to three spacings below and above.
-    neighbours: Vec<[[usize; 2]; 3]>,
     gradients: OnceLock<Vec<[f64; D]>>,
     normals: OnceLock<Vec<[f64; D]>>,
 }
 
 impl<const D: usize> Layer<D> {
-    pub(super) fn new(u: &Field<D>, eps: f64) -> Result<Self, Error> {
+    pub(super) fn new(u: &impl PhaseField<D>, eps: f64) -> Result<Self, Error> {
+        Self::of((u.nodes(), u.values(), u.rests()), eps)
+    }
+
+    fn of((stored, values, rests): (Nodes<D>, &[f64], [f64; 2]), eps: f64) -> Result<Self, Error> {
         positive("eps", eps)?;
-        u.check_finite()?;
-        let grid = *u.grid();
-        let n = grid.cells();
-        if u32::try_from(grid.len()).is_err() {
+        check_finite(values)?;
+        let grid = *stored.grid();
+        if u32::try_from(values.len()).is_err() {
             return Err(Error::GridTooLarge {
-                cells: n,
+                cells: grid.cells(),
                 dimension: D,
             });
         }
-        let around = |i: usize| [1, 2, 3].map(|step| [(i + 3 * n - step) % n, (i + step) % n]);
-        let distance = parallel::values(grid.len(), |node| {
-            distance_from_phase_field(u.values()[node], eps)
-        });
+        let distance = |u: f64| distance_from_phase_field(u, eps);
         let mut layer = Self {
+            stored,
             grid,
             kernel: Kernel::new(grid.spacing()),
             reach: REACH * grid.spacing(),
-            distance,
+            distance: parallel::values(values.len(), |node| distance(values[node])),
+            rests: rests.map(distance),
             nodes: Vec::new(),
-            places: vec![NOWHERE; grid.len()],
-            neighbours: (0..n).map(around).collect(),
+            places: vec![NOWHERE; values.len()],
             gradients: OnceLock::new(),
             normals: OnceLock::new(),
         };
@@ -137,24 +142,21 @@ impl<const D: usize> Layer<D> {
 
     /// Gradients of the distance variable at the nodes of the layer, which the volume does not need.
     pub(super) fn gradients(&self) -> &[[f64; D]] {
-        self.gradients.get_or_init(|| {
-            self.map(|place| self.gradient(self.nodes[place] as usize, |i| self.distance[i]))
-        })
+        self.gradients
+            .get_or_init(|| self.map(|place| self.gradient(self.nodes[place] as usize)))
     }
 
     /// Fills `nodes` and `places`.
     fn find_nodes(&mut self) {
         const FOUND: u32 = 0;
-        for node in 0..self.grid.len() {
+        for node in 0..self.places.len() {
             if self.is_near(node) {
                 self.places[node] = FOUND;
-                let position = self.grid.multi_index(node);
+                let place = self.stored.place(node);
                 for axis in 0..D {
-                    for [below, above] in self.neighbours[position[axis]] {
-                        for other in [below, above] {
-                            let reached = self.moved(node, position, axis, other);
-                            self.places[reached] = FOUND;
-                        }
+                    let around = self.stored.along(node, place, axis, STEPS);
+                    for reached in around.into_iter().flatten() {
+                        self.places[reached] = FOUND;
                     }
                 }
             }
@@ -167,7 +169,12 @@ impl<const D: usize> Layer<D> {
         }
     }
 
-    /// Whether a node of the grid has a weight.
+    /// How many nodes are stored.
+    pub(super) fn stored_len(&self) -> usize {
+        self.distance.len()
+    }
+
+    /// Whether a node has a weight.
     fn is_near(&self, node: usize) -> bool {
         self.distance[node].abs() < self.reach
     }
@@ -178,30 +185,29 @@ impl<const D: usize> Layer<D> {
         self.is_near(node).then(|| self.distance[node])
     }
 
-    /// The node with another index along one axis.
-    fn moved(&self, node: usize, position: [usize; D], axis: usize, other: usize) -> usize {
-        let stride = self.grid.stride(axis);
-        node - position[axis] * stride + other * stride
-    }
-
-    /// Calls `add` with the axis, the weight and the node of each term of the differences `sum_k w_k (f_k - f_-k) / h`.
-    fn differences(&self, node: usize, mut add: impl FnMut(usize, f64, usize)) {
-        let position = self.grid.multi_index(node);
-        let inverse = self.grid.spacing().recip();
+    /// Calls `add` with the axis, the weight and the node, or the phase where none is stored, of each term of the differences
+    /// `sum_k w_k (f_k - f_-k) / h`.
+    fn differences(&self, node: usize, mut add: impl FnMut(usize, f64, Result<usize, bool>)) {
+        let place = self.stored.place(node);
+        let weights = self.weights();
         for axis in 0..D {
-            for (weight, [below, above]) in WEIGHTS.iter().zip(self.neighbours[position[axis]]) {
-                let weight = weight * inverse;
-                add(axis, weight, self.moved(node, position, axis, above));
-                add(axis, -weight, self.moved(node, position, axis, below));
+            let around = self.stored.along(node, place, axis, STEPS);
+            for (weight, neighbour) in weights.into_iter().zip(around) {
+                add(axis, weight, neighbour);
             }
         }
+    }
+
+    /// Where a neighbour is among the nodes of the layer; beyond the last where it is not.
+    fn place_of(&self, neighbour: Result<usize, bool>) -> u32 {
+        neighbour.map_or(NOWHERE, |node| self.places[node])
     }
 
     /// For each axis the places of the neighbours of a place, in the order of [`Self::weights`]; beyond the last where there is none.
     pub(super) fn places_around(&self, place: usize) -> [[u32; NEIGHBOURS]; D] {
         let (mut places, mut term) = ([[NOWHERE; NEIGHBOURS]; D], 0);
         self.differences(self.nodes[place] as usize, |axis, _, node| {
-            places[axis][term % NEIGHBOURS] = self.places[node];
+            places[axis][term % NEIGHBOURS] = self.place_of(node);
             term += 1;
         });
         places
@@ -209,14 +215,20 @@ impl<const D: usize> Layer<D> {
 
     /// The weights of the neighbours along an axis in a difference.
     pub(super) fn weights(&self) -> [f64; NEIGHBOURS] {
-        let [near, middle, far] = WEIGHTS.map(|weight| weight / self.grid.spacing());
+        let [near, middle, far] = WEIGHTS.map(|weight| weight * self.grid.spacing().recip());
         [near, -near, middle, -middle, far, -far]
     }
 
-    /// The gradient of a function of the nodes of the grid.
-    fn gradient(&self, node: usize, of: impl Fn(usize) -> f64) -> [f64; D] {
+    /// The gradient of the distance variable.
+    fn gradient(&self, node: usize) -> [f64; D] {
         let mut sums = [0.0; D];
-        self.differences(node, |axis, weight, node| sums[axis] += weight * of(node));
+        self.differences(node, |axis, weight, neighbour| {
+            let distance = match neighbour {
+                Ok(node) => self.distance[node],
+                Err(phase) => self.rests[usize::from(phase)],
+            };
+            sums[axis] += weight * distance;
+        });
         sums
     }
 
@@ -224,7 +236,7 @@ impl<const D: usize> Layer<D> {
     pub(super) fn jacobian_at(&self, place: usize, field: &[[f64; D]]) -> [[f64; D]; D] {
         let mut sums = [[0.0; D]; D];
         self.differences(self.nodes[place] as usize, |axis, weight, node| {
-            if let Some(value) = field.get(self.places[node] as usize) {
+            if let Some(value) = field.get(self.place_of(node) as usize) {
                 sums[axis] = vector::add(sums[axis], vector::scale(*value, weight));
             }
         });
@@ -235,7 +247,7 @@ impl<const D: usize> Layer<D> {
     pub(super) fn divergence_at(&self, place: usize, field: &[[f64; D]]) -> f64 {
         let mut sum = 0.0;
         self.differences(self.nodes[place] as usize, |axis, weight, node| {
-            if let Some(value) = field.get(self.places[node] as usize) {
+            if let Some(value) = field.get(self.place_of(node) as usize) {
                 sum += weight * value[axis];
             }
         });
@@ -257,7 +269,8 @@ impl<const D: usize> Layer<D> {
                 f64::from(d < 0.0)
             }
         };
-        self.grid.cell_volume() * parallel::sum(self.grid.len(), inside)
+        let stored = parallel::sum(self.distance.len(), inside);
+        self.grid.cell_volume() * (stored + self.stored.positive_outside() as f64)
     }
 
     /// Length or area of the zero set.

@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use super::layer::{Layer, NEIGHBOURS, SHARE};
-use crate::{Error, Field, parallel, vector};
+use crate::{Error, PhaseField, parallel, vector};
 
 /// Perimeter and volume of the zero set as functions of the nodal values, at one phase field: values, gradients, and products with
 /// second derivatives.
@@ -22,7 +22,7 @@ impl<const D: usize> Sizes<D> {
     ///
     /// # Errors
     /// `eps` must be finite and positive, and the values finite.
-    pub fn of(u: &Field<D>, eps: f64) -> Result<Self, Error> {
+    pub fn of(u: &impl PhaseField<D>, eps: f64) -> Result<Self, Error> {
         let layer = Layer::new(u, eps)?;
         let values = u.values();
         let slopes = layer.map(|place| {
@@ -52,12 +52,12 @@ impl<const D: usize> Sizes<D> {
         self.layer.volume()
     }
 
-    /// Derivatives of the perimeter by the nodal values.
+    /// Derivatives of the perimeter by the stored values.
     pub fn perimeter_gradient(&self) -> Vec<f64> {
         self.gradient(self.perimeter_by_distance())
     }
 
-    /// Derivatives of the volume by the nodal values.
+    /// Derivatives of the volume by the stored values.
     pub fn volume_gradient(&self) -> Vec<f64> {
         self.gradient(self.volume_by_distance())
     }
@@ -145,9 +145,9 @@ impl<const D: usize> Sizes<D> {
         .map(|v| cell * v)
     }
 
-    /// Values at the places of the layer as values at the nodes of the grid.
+    /// Values at the places of the layer as values at all stored nodes.
     fn spread(&self, values: Vec<f64>) -> Vec<f64> {
-        let mut all = vec![0.0; self.layer.grid.len()];
+        let mut all = vec![0.0; self.layer.stored_len()];
         for (node, value) in self.layer.nodes.iter().zip(values) {
             all[*node as usize] = value;
         }
@@ -167,7 +167,6 @@ pub struct SizeHessian<const D: usize> {
 
 /// One node, and what it contributes.
 struct Site<const D: usize> {
-    /// Its place among the values; the last number there is if it has none.
     node: u32,
     /// Its neighbours among the sites; beyond the last where there is none.
     around: [[u32; NEIGHBOURS]; D],
@@ -222,23 +221,10 @@ impl<const D: usize> SizeHessian<D> {
         }
     }
 
-    /// The same for values that are stored in another order, by the place of each node in it; those that have none do not move.
-    #[must_use]
-    pub fn at(mut self, place: impl Fn(usize) -> Option<usize>) -> Self {
-        for site in &mut self.sites {
-            let place = place(site.node as usize);
-            site.node = place.map_or(u32::MAX, |place| place as u32);
-        }
-        self
-    }
-
-    /// Calls `add` with the place of each value that the product with `p` changes, and by how much.
+    /// Calls `add` with each node whose value the product with `p` changes, and by how much.
     pub fn multiply(&self, p: impl Fn(usize) -> f64 + Sync, mut add: impl FnMut(usize, f64)) {
         let sites = &self.sites;
-        let of = |site: &Site<D>| match site.node {
-            u32::MAX => 0.0,
-            node => p(node as usize),
-        };
+        let of = |site: &Site<D>| p(site.node as usize);
         let products = match &self.weights {
             None => map(sites, |_, site| {
                 (site.slope * site.second[0] * site.slope + site.bent) * of(site)
@@ -254,8 +240,7 @@ impl<const D: usize> SizeHessian<D> {
                 })
             }
         };
-        let stored = |site: &Site<D>| site.node != u32::MAX;
-        for (site, product) in sites.iter().zip(products).filter(|(site, _)| stored(site)) {
+        for (site, product) in sites.iter().zip(products) {
             add(site.node as usize, product);
         }
     }

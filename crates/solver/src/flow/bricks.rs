@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use burn::tensor::Tensor;
+use geometry::Nodes;
 
 use super::{Minimum, Movement, WillmoreFlow};
 use crate::Error;
@@ -17,8 +18,8 @@ impl<const D: usize> WillmoreFlow<D> {
         let (mut anchor, mut factors) = (movement.anchor.clone(), movement.factors.cloned());
         while let Some((from, to)) = self.enlarge(&minimum.u)? {
             let carried = |x: &Tensor<D>| -> Result<Tensor<D>, Error> {
-                let before = Stored::of(x, self.grid, Some(from.clone()), &self.device)?;
-                Ok(before.on(&to).tensor(&self.device))
+                let before = Stored::of(x, self.grid, Some(&from), &self.device)?;
+                Ok(before.on(&to.nodes()).tensor(&self.device))
             };
             let start = carried(&minimum.u)?;
             anchor = carried(&anchor)?;
@@ -62,15 +63,16 @@ impl<const D: usize> WillmoreFlow<D> {
 
     /// Carries everything over to other bricks.
     pub(super) fn go_to(&mut self, next: Active<D>) -> Result<(), Error> {
+        let nodes = next.nodes();
         let carried = |u: &Tensor<D>| -> Result<Tensor<D>, Error> {
-            Ok(self.stored(u)?.on(&next).tensor(&self.device))
+            Ok(self.stored(u)?.on(&nodes).tensor(&self.device))
         };
         let current = carried(&self.current)?;
         let previous = match &self.previous {
             Some((u, tau)) => Some((carried(u)?, *tau)),
             None => None,
         };
-        self.rate = self.rate.as_ref().map(|rate| rate.on(&next));
+        self.rate = self.rate.as_ref().map(|rate| rate.on(&nodes));
         let region = self.region.take();
         self.region = region.map(|region| region.on(&next.bricks, &self.device));
         self.current = current;
@@ -85,9 +87,15 @@ impl<const D: usize> WillmoreFlow<D> {
         Ok(())
     }
 
+    /// Where the values of the phase field lie.
+    pub(super) fn nodes(&self) -> Nodes<D> {
+        let whole = || self.grid.into();
+        self.active.as_ref().map_or_else(whole, Active::nodes)
+    }
+
     /// A phase field that is stored as the present one is, for arithmetic.
     pub(super) fn stored(&self, u: &Tensor<D>) -> Result<Stored<D>, Error> {
-        Stored::of(u, self.grid, self.active.clone(), &self.device)
+        Stored::of(u, self.grid, self.active.as_ref(), &self.device)
     }
 
     /// Refuses what active bricks cannot do.

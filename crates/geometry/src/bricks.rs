@@ -3,7 +3,6 @@
 use rayon::prelude::*;
 
 use crate::Error;
-use crate::brick_convolution::convolve;
 
 /// A brick that is not stored, in the tables of neighbours: the field is constant there, in the phase of positive values
 const POSITIVE: i32 = -1;
@@ -16,9 +15,9 @@ const NEGATIVE: i32 = -2;
 /// pointwise operations need not know. Everywhere else the field is constant, at one of two values, the rest values of the two phases.
 ///
 /// ```
-/// use operators::Bricks;
+/// use geometry::Bricks;
 ///
-/// # fn main() -> Result<(), operators::Error> {
+/// # fn main() -> Result<(), geometry::Error> {
 /// // The left half of a grid of 32 x 32 cells, in bricks of 8 x 8; the right half is in the negative phase.
 /// let bricks = Bricks::<2>::new(32, 8, |[_, column]| column < 2, |_| false)?;
 /// assert_eq!(bricks.shape(), [64, 8]);
@@ -30,7 +29,8 @@ const NEGATIVE: i32 = -2;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bricks<const D: usize> {
-    side: usize,
+    /// The binary logarithm of the side: places are divided by it all the time.
+    bits: u32,
     per_axis: usize,
     places: Vec<[usize; D]>,
     /// For every brick of the grid, row-major, its number or the phase that it is in.
@@ -41,19 +41,19 @@ impl<const D: usize> Bricks<D> {
     /// The bricks of `side^D` cells that are `active`, by their places along each axis; `positive` says which phase the others are in.
     ///
     /// # Errors
-    /// [`Error::Bricks`] unless the side is a multiple of 8 that divides the `cells` per axis of the grid.
+    /// [`Error::Bricks`] unless the side is a power of two from 8 on that divides the `cells` per axis of the grid.
     pub fn new(
         cells: usize,
         side: usize,
         active: impl Fn([usize; D]) -> bool,
         positive: impl Fn([usize; D]) -> bool,
     ) -> Result<Self, Error> {
-        if side == 0 || !side.is_multiple_of(8) || !cells.is_multiple_of(side) {
+        if side < 8 || !side.is_power_of_two() || !cells.is_multiple_of(side) {
             return Err(Error::Bricks { cells, side });
         }
         let per_axis = cells / side;
         let mut bricks = Self {
-            side,
+            bits: side.trailing_zeros(),
             per_axis,
             places: Vec::new(),
             directory: Vec::new(),
@@ -76,7 +76,7 @@ impl<const D: usize> Bricks<D> {
     /// The bricks with these [marks](Self::marks).
     ///
     /// # Errors
-    /// [`Error::Bricks`] unless there is a mark for each brick, whose sides are multiples of 8.
+    /// [`Error::Bricks`] unless there is a mark for each brick, as for [`Self::new`].
     pub fn with_marks(cells: usize, marks: &[f64]) -> Result<Self, Error> {
         let per_axis = (1..=cells).find(|per_axis| per_axis.pow(D as u32) >= marks.len());
         let per_axis = per_axis.filter(|per_axis| per_axis.pow(D as u32) == marks.len());
@@ -113,12 +113,12 @@ impl<const D: usize> Bricks<D> {
 
     /// Cells along each axis of a brick, `B`.
     pub fn side(&self) -> usize {
-        self.side
+        1 << self.bits
     }
 
     /// Cells along each axis of the grid, `N`.
     pub fn cells(&self) -> usize {
-        self.side * self.per_axis
+        self.per_axis << self.bits
     }
 
     /// Bricks along each axis of the grid, `N / B`.
@@ -133,7 +133,7 @@ impl<const D: usize> Bricks<D> {
 
     /// Cells of a brick, `B^D`.
     pub fn volume(&self) -> usize {
-        self.side.pow(D as u32)
+        1 << (self.bits * D as u32)
     }
 
     /// Stored cells.
@@ -148,7 +148,7 @@ impl<const D: usize> Bricks<D> {
 
     /// The shape of fields as tensors, `[bricks B, B, ..]`.
     pub fn shape(&self) -> [usize; D] {
-        let mut shape = [self.side; D];
+        let mut shape = [self.side(); D];
         shape[0] *= self.places.len();
         shape
     }
@@ -158,7 +158,7 @@ impl<const D: usize> Bricks<D> {
         usize::try_from(self.directory[self.flat(place)]).ok()
     }
 
-    /// Whether a place is in the positive phase, if no brick is active there.
+    /// Whether the brick at a place is in the positive phase, if it is not active.
     pub fn is_positive(&self, place: [usize; D]) -> bool {
         self.directory[self.flat(place)] == POSITIVE
     }
@@ -169,41 +169,90 @@ impl<const D: usize> Bricks<D> {
         bricks.count() * self.volume()
     }
 
+    /// Whether a brick that is not active touches the side of the grid, in the negative and in the positive phase.
+    pub(crate) fn phases_at_side(&self) -> [bool; 2] {
+        let last = self.per_axis - 1;
+        let at_side = |brick: usize| self.place(brick).iter().any(|&i| i == 0 || i == last);
+        [NEGATIVE, POSITIVE].map(|phase| {
+            let mut bricks = self.directory.iter().enumerate();
+            bricks.any(|(brick, found)| *found == phase && at_side(brick))
+        })
+    }
+
     /// Place on the grid of a stored cell.
     pub fn multi_index(&self, cell: usize) -> [usize; D] {
-        let place = self.places[cell / self.volume()];
-        let inside: [usize; D] = digits(cell % self.volume(), self.side);
-        std::array::from_fn(|axis| place[axis] * self.side + inside[axis])
+        let place = self.places[self.brick_of(cell)];
+        std::array::from_fn(|axis| {
+            (place[axis] << self.bits) + self.within(cell >> self.shift(axis))
+        })
     }
 
-    /// The stored cell at a place on the grid, if a brick is active there.
-    pub fn cell(&self, index: [usize; D]) -> Option<usize> {
-        let number = self.number(index.map(|at| at / self.side))?;
-        let inside = flat(index.map(|at| at % self.side), self.side);
-        Some(number * self.volume() + inside)
-    }
-
-    /// The cell beside a stored one.
+    /// The stored cell at a place on the grid.
     ///
     /// # Errors
     /// If no brick is active there: whether it is in the positive phase.
-    pub fn beside(&self, cell: usize, axis: usize, forward: bool) -> Result<usize, bool> {
-        let stride = self.side.pow((D - 1 - axis) as u32);
-        let within = cell / stride % self.side;
-        let last = self.side - 1;
-        match forward {
-            true if within < last => Ok(cell + stride),
-            false if within > 0 => Ok(cell - stride),
-            _ => {
-                let place = self.shifted(self.places[cell / self.volume()], axis, forward);
-                let inside = cell % self.volume();
-                match self.number(place) {
-                    Some(number) if forward => Ok(number * self.volume() + inside - last * stride),
-                    Some(number) => Ok(number * self.volume() + inside + last * stride),
-                    None => Err(self.is_positive(place)),
-                }
+    pub(crate) fn at(&self, index: [usize; D]) -> Result<usize, bool> {
+        let brick = index.map(|at| at >> self.bits);
+        let number = self.number(brick).ok_or_else(|| self.is_positive(brick))?;
+        let inside = index
+            .into_iter()
+            .fold(0, |flat, at| (flat << self.bits) + self.within(at));
+        Ok(number * self.volume() + inside)
+    }
+
+    /// The number of the brick that has a stored cell.
+    fn brick_of(&self, cell: usize) -> usize {
+        cell >> (self.bits * D as u32)
+    }
+
+    /// Of a place along an axis that within its brick.
+    fn within(&self, at: usize) -> usize {
+        at & (self.side() - 1)
+    }
+
+    /// The binary logarithm of how far neighbours along an axis are apart in a brick.
+    fn shift(&self, axis: usize) -> u32 {
+        self.bits * (D - 1 - axis) as u32
+    }
+
+    /// The cells so many steps along an axis from a stored one at a place, none of them further away than the side of a brick.
+    ///
+    /// # Errors
+    /// Where no brick is active: whether it is in the positive phase.
+    #[inline]
+    pub(crate) fn along<const N: usize>(
+        &self,
+        cell: usize,
+        place: [usize; D],
+        axis: usize,
+        steps: [isize; N],
+    ) -> [Result<usize, bool>; N] {
+        let (side, shift) = (self.side() as isize, self.shift(axis));
+        let within = self.within(place[axis]) as isize;
+        // All steps out of the brick in one direction lead into the same one.
+        let leaves = |forward: bool| {
+            let ends = steps.map(|step| within + step);
+            ends.into_iter()
+                .any(|end| if forward { end >= side } else { end < 0 })
+        };
+        let [before, after] = [false, true].map(|forward| {
+            if !leaves(forward) {
+                return Ok(cell);
             }
-        }
+            let brick = self.shifted(place.map(|at| at >> self.bits), axis, forward);
+            match self.number(brick) {
+                Some(number) => Ok(number * self.volume() + (cell & (self.volume() - 1))),
+                None => Err(self.is_positive(brick)),
+            }
+        });
+        steps.map(|step| {
+            let (from, step) = match within + step {
+                end if end < 0 => (before, step + side),
+                end if end >= side => (after, step - side),
+                _ => (Ok(cell), step),
+            };
+            Ok(from?.wrapping_add_signed(step << shift))
+        })
     }
 
     fn shifted(&self, mut place: [usize; D], axis: usize, forward: bool) -> [usize; D] {
@@ -213,7 +262,7 @@ impl<const D: usize> Bricks<D> {
     }
 
     /// The table of neighbours, `[bricks, 2 D]`: the numbers of the bricks before and after along each axis, negative for those that are not
-    /// active. Numbers as floats, so that the table can be an input of [`crate::brick_convolution`].
+    /// active. Numbers as floats, so that the table can be an input of a tensor operation.
     pub fn neighbours(&self) -> Vec<f64> {
         let mut table = Vec::with_capacity(self.places.len() * 2 * D);
         for place in &self.places {
@@ -227,21 +276,13 @@ impl<const D: usize> Bricks<D> {
         table
     }
 
-    /// What constant values outside, `rests` in the negative and in the positive phase, add to the convolution of a field with `taps`
-    /// along each axis: [`crate::brick_convolution`] itself takes them as zero.
-    pub fn convolution_of_outside(&self, taps: &[f64], rests: [f64; 2]) -> Vec<f64> {
-        let zeros = vec![0.0; self.len()];
-        let table = self.neighbours();
-        convolve(&zeros, (self.side, D), &table, taps, false, rests)
-    }
-
     /// The values of the active bricks, of those of the whole grid.
     pub fn gather<T: Copy>(&self, dense: &[T]) -> Vec<T> {
         let mut values = Vec::with_capacity(self.len());
         // Row by row of the active bricks.
-        for cell in (0..self.len()).step_by(self.side) {
+        for cell in (0..self.len()).step_by(self.side()) {
             let start = flat(self.multi_index(cell), self.cells());
-            values.extend_from_slice(&dense[start..][..self.side]);
+            values.extend_from_slice(&dense[start..][..self.side()]);
         }
         values
     }
@@ -258,14 +299,11 @@ impl<const D: usize> Bricks<D> {
     /// Fills a part of the whole grid from a cell on, both multiples of the side.
     pub fn read(&self, values: &[f64], rests: [f64; 2], start: usize, part: &mut [f64]) {
         // A row of a brick lies in one row of the grid.
-        for (k, row) in part.chunks_exact_mut(self.side).enumerate() {
-            let index = digits(start + k * self.side, self.cells());
-            match self.cell(index) {
-                Some(cell) => row.copy_from_slice(&values[cell..][..self.side]),
-                None => {
-                    let phase = self.is_positive(index.map(|at| at / self.side));
-                    row.fill(rests[usize::from(phase)]);
-                }
+        for (k, row) in part.chunks_exact_mut(self.side()).enumerate() {
+            let index = digits(start + (k << self.bits), self.cells());
+            match self.at(index) {
+                Ok(cell) => row.copy_from_slice(&values[cell..][..self.side()]),
+                Err(phase) => row.fill(rests[usize::from(phase)]),
             }
         }
     }
@@ -275,7 +313,7 @@ impl<const D: usize> Bricks<D> {
     /// # Panics
     /// If the bricks have other sides.
     pub fn carried(&self, from: &Self, values: &[f64], rests: [f64; 2]) -> Vec<f64> {
-        assert_eq!((self.side, self.per_axis), (from.side, from.per_axis));
+        assert_eq!((self.bits, self.per_axis), (from.bits, from.per_axis));
         let volume = self.volume();
         let mut carried = Vec::with_capacity(self.len());
         for place in &self.places {

@@ -1,0 +1,204 @@
+//! Where the values of a field lie.
+
+use std::sync::Arc;
+
+use crate::{Bricks, Error, Field, Grid};
+
+/// The nodes of a periodic grid whose values are stored: all of them, or those of some bricks, in the order of storage.
+#[derive(Clone, Debug)]
+pub struct Nodes<const D: usize> {
+    grid: Grid<D>,
+    bricks: Option<Arc<Bricks<D>>>,
+}
+
+impl<const D: usize> From<Grid<D>> for Nodes<D> {
+    fn from(grid: Grid<D>) -> Self {
+        Self { grid, bricks: None }
+    }
+}
+
+impl<const D: usize> Nodes<D> {
+    /// Those of some bricks of the grid.
+    pub fn on_bricks(grid: Grid<D>, bricks: Arc<Bricks<D>>) -> Self {
+        Self {
+            grid,
+            bricks: Some(bricks),
+        }
+    }
+
+    /// The whole grid.
+    pub fn grid(&self) -> &Grid<D> {
+        &self.grid
+    }
+
+    /// The bricks that are stored, if not the whole grid.
+    pub fn bricks(&self) -> Option<&Arc<Bricks<D>>> {
+        self.bricks.as_ref()
+    }
+
+    /// How many there are.
+    #[allow(
+        clippy::len_without_is_empty,
+        reason = "there may be none, but nobody asks"
+    )]
+    pub fn len(&self) -> usize {
+        self.bricks
+            .as_ref()
+            .map_or_else(|| self.grid.len(), |bricks| bricks.len())
+    }
+
+    /// The place of a node along each axis of the grid.
+    pub fn place(&self, node: usize) -> [usize; D] {
+        match &self.bricks {
+            None => self.grid.multi_index(node),
+            Some(bricks) => bricks.multi_index(node),
+        }
+    }
+
+    /// The node at a place.
+    ///
+    /// # Errors
+    /// Where nothing is stored: whether the values there, which are constant, are positive.
+    pub fn at(&self, place: [usize; D]) -> Result<usize, bool> {
+        match &self.bricks {
+            None => Ok(self.grid.index(place)),
+            Some(bricks) => bricks.at(place),
+        }
+    }
+
+    /// The nodes so many steps along an axis from one at a place, on bricks none of them further away than their side.
+    ///
+    /// # Errors
+    /// As [`Self::at`].
+    #[inline]
+    pub fn along<const N: usize>(
+        &self,
+        node: usize,
+        place: [usize; D],
+        axis: usize,
+        steps: [isize; N],
+    ) -> [Result<usize, bool>; N] {
+        match &self.bricks {
+            None => {
+                let (here, cells) = (place[axis] as isize, self.grid.cells() as isize);
+                let stride = self.grid.stride(axis) as isize;
+                steps.map(|steps| {
+                    let mut there = here + steps;
+                    if !(0..cells).contains(&there) {
+                        there = there.rem_euclid(cells);
+                    }
+                    Ok(node.wrapping_add_signed((there - here) * stride))
+                })
+            }
+            Some(bricks) => bricks.along(node, place, axis, steps),
+        }
+    }
+
+    /// How many nodes that are not stored are in the positive phase.
+    pub fn positive_outside(&self) -> usize {
+        self.bricks
+            .as_ref()
+            .map_or(0, |bricks| bricks.positive_outside())
+    }
+}
+
+/// A phase field, as it is stored.
+pub trait PhaseField<const D: usize> {
+    /// Where its values lie.
+    fn nodes(&self) -> Nodes<D>;
+
+    /// The values there.
+    fn values(&self) -> &[f64];
+
+    /// The values in the negative and in the positive phase, where nothing is stored.
+    fn rests(&self) -> [f64; 2];
+
+    /// The value at a place on the grid.
+    fn at(&self, place: [usize; D]) -> f64 {
+        match self.nodes().at(place) {
+            Ok(node) => self.values()[node],
+            Err(phase) => self.rests()[usize::from(phase)],
+        }
+    }
+}
+
+impl<const D: usize> PhaseField<D> for Field<D> {
+    fn nodes(&self) -> Nodes<D> {
+        (*self.grid()).into()
+    }
+
+    fn values(&self) -> &[f64] {
+        self.values()
+    }
+
+    fn rests(&self) -> [f64; 2] {
+        [-1.0, 1.0]
+    }
+}
+
+/// Checks that no value is NaN or infinite.
+///
+/// # Errors
+/// Names the first node where one is.
+pub(crate) fn check_finite(values: &[f64]) -> Result<(), Error> {
+    match values.iter().enumerate().find(|(_, v)| !v.is_finite()) {
+        None => Ok(()),
+        Some((index, &value)) => Err(Error::NonFinite { index, value }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_keep_their_places() {
+        let active = |[i, j]: [usize; 2]| (i + 2 * j) % 3 != 1;
+        let few = Bricks::<2>::new(48, 16, active, |place| place[0] % 2 == 0).unwrap();
+        let all = Bricks::<2>::new(48, 16, |_| true, |_| true).unwrap();
+        let x: Vec<f64> = (0..few.len())
+            .map(|i| 0.9 * (0.37 * i as f64).sin())
+            .collect();
+        let rests = [-1.0, 1.0];
+        let (carried, dense) = (all.carried(&few, &x, rests), few.scatter(&x, rests));
+        assert_eq!(all.scatter(&carried, [0.0; 2]), dense);
+        assert_eq!(few.carried(&all, &carried, [0.0; 2]), x);
+
+        let grid = Grid::new(48, 1.0).unwrap();
+        let (whole, stored) = (
+            Nodes::from(grid),
+            Nodes::on_bricks(grid, Arc::new(few.clone())),
+        );
+        let inside = dense.iter().filter(|x| x.to_bits() == 1.0_f64.to_bits());
+        assert_eq!(stored.positive_outside(), inside.count());
+        for (node, value) in x.iter().enumerate() {
+            let place = stored.place(node);
+            let on_grid = grid.index(place);
+            assert_eq!(dense[on_grid].to_bits(), value.to_bits());
+            let steps = [-16, -3, -1, 1, 3, 16];
+            for axis in 0..2 {
+                let found = stored.along(node, place, axis, steps);
+                let of_grid = whole.along(on_grid, place, axis, steps);
+                for ((found, of_grid), steps) in found.into_iter().zip(of_grid).zip(steps) {
+                    let mut there = place.map(|at| at as isize);
+                    there[axis] += steps;
+                    let there = there.map(|at| at.rem_euclid(48) as usize);
+                    assert_eq!(of_grid, Ok(grid.index(there)));
+                    assert_eq!(stored.at(there), found);
+                    let found = match found {
+                        Ok(node) => x[node],
+                        Err(positive) => rests[usize::from(positive)],
+                    };
+                    assert_eq!(found.to_bits(), dense[grid.index(there)].to_bits());
+                }
+            }
+        }
+        assert!(matches!(
+            Bricks::<2>::new(50, 16, |_| true, |_| true),
+            Err(Error::Bricks {
+                cells: 50,
+                side: 16
+            })
+        ));
+    }
+}
