@@ -27,6 +27,12 @@ pub fn map<T: Send>(len: usize, share: usize, f: &(dyn Fn(usize) -> T + Sync)) -
     indices.map(f).collect()
 }
 
+/// Calls `work` with each index. At least `share` of them make a task.
+pub(crate) fn over(len: usize, share: usize, work: &(dyn Fn(usize) + Sync)) {
+    let indices = (0..len).into_par_iter().with_min_len(share);
+    indices.for_each(work);
+}
+
 /// Those of `f(0), f(1), ...` that there are, in this order.
 pub fn filter_map<T: Send>(
     len: usize,

@@ -2,6 +2,7 @@
 
 use std::f64::consts::FRAC_2_SQRT_PI;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::positive;
 use crate::nodes::check_finite;
@@ -104,6 +105,8 @@ pub(super) struct Layer<const D: usize> {
     pub(super) nodes: Vec<u32>,
     /// Where a stored node is in `nodes`.
     places: Vec<u32>,
+    /// For each axis the places of the neighbours of a place, in the order of [`Self::weights`]; beyond the last where there is none.
+    around: OnceLock<Vec<[[u32; NEIGHBOURS]; D]>>,
     gradients: OnceLock<Vec<[f64; D]>>,
     normals: OnceLock<Vec<[f64; D]>>,
 }
@@ -133,6 +136,7 @@ impl<const D: usize> Layer<D> {
             rests: rests.map(distance),
             nodes: Vec::new(),
             places: vec![NOWHERE; values.len()],
+            around: OnceLock::new(),
             gradients: OnceLock::new(),
             normals: OnceLock::new(),
         };
@@ -143,27 +147,26 @@ impl<const D: usize> Layer<D> {
     /// Gradients of the distance variable at the nodes of the layer, which the volume does not need.
     pub(super) fn gradients(&self) -> &[[f64; D]] {
         self.gradients
-            .get_or_init(|| self.map(|place| self.gradient(self.nodes[place] as usize)))
+            .get_or_init(|| self.map(|place| self.gradient(place)))
     }
 
     /// Fills `nodes` and `places`.
     fn find_nodes(&mut self) {
-        const FOUND: u32 = 0;
-        for node in 0..self.places.len() {
+        let found: Vec<AtomicBool> = self.distance.iter().map(|_| false.into()).collect();
+        let find = |node: usize| found[node].store(true, Ordering::Relaxed);
+        parallel::over(self.distance.len(), SHARE, &|node| {
             if self.is_near(node) {
-                self.places[node] = FOUND;
+                find(node);
                 let place = self.stored.place(node);
                 for axis in 0..D {
                     let around = self.stored.along(node, place, axis, STEPS);
-                    for reached in around.into_iter().flatten() {
-                        self.places[reached] = FOUND;
-                    }
+                    around.into_iter().flatten().for_each(find);
                 }
             }
-        }
-        for (node, place) in self.places.iter_mut().enumerate() {
-            if *place == FOUND {
-                *place = self.nodes.len() as u32;
+        });
+        for (node, found) in found.into_iter().enumerate() {
+            if found.into_inner() {
+                self.places[node] = self.nodes.len() as u32;
                 self.nodes.push(node as u32);
             }
         }
@@ -185,32 +188,34 @@ impl<const D: usize> Layer<D> {
         self.is_near(node).then(|| self.distance[node])
     }
 
-    /// Calls `add` with the axis, the weight and the node, or the phase where none is stored, of each term of the differences
-    /// `sum_k w_k (f_k - f_-k) / h`.
-    fn differences(&self, node: usize, mut add: impl FnMut(usize, f64, Result<usize, bool>)) {
-        let place = self.stored.place(node);
+    /// For each axis the places of the neighbours of the nodes of the layer.
+    pub(super) fn around(&self) -> &[[[u32; NEIGHBOURS]; D]] {
+        let place_of =
+            |neighbour: Result<usize, bool>| neighbour.map_or(NOWHERE, |node| self.places[node]);
+        self.around
+            .get_or_init(|| self.map(|place| self.neighbours(place).map(|axis| axis.map(place_of))))
+    }
+
+    /// For each axis the stored neighbours of a place, or the phases where nothing is stored.
+    fn neighbours(&self, place: usize) -> [[Result<usize, bool>; NEIGHBOURS]; D] {
+        let node = self.nodes[place] as usize;
+        let at = self.stored.place(node);
+        std::array::from_fn(|axis| self.stored.along(node, at, axis, STEPS))
+    }
+
+    /// The gradient of the distance variable: `sum_k w_k (d_k - d_-k) / h` along each axis.
+    fn gradient(&self, place: usize) -> [f64; D] {
         let weights = self.weights();
-        for axis in 0..D {
-            let around = self.stored.along(node, place, axis, STEPS);
-            for (weight, neighbour) in weights.into_iter().zip(around) {
-                add(axis, weight, neighbour);
-            }
-        }
-    }
-
-    /// Where a neighbour is among the nodes of the layer; beyond the last where it is not.
-    fn place_of(&self, neighbour: Result<usize, bool>) -> u32 {
-        neighbour.map_or(NOWHERE, |node| self.places[node])
-    }
-
-    /// For each axis the places of the neighbours of a place, in the order of [`Self::weights`]; beyond the last where there is none.
-    pub(super) fn places_around(&self, place: usize) -> [[u32; NEIGHBOURS]; D] {
-        let (mut places, mut term) = ([[NOWHERE; NEIGHBOURS]; D], 0);
-        self.differences(self.nodes[place] as usize, |axis, _, node| {
-            places[axis][term % NEIGHBOURS] = self.place_of(node);
-            term += 1;
-        });
-        places
+        self.neighbours(place).map(|neighbours| {
+            let distances = neighbours.map(|neighbour| match neighbour {
+                Ok(node) => self.distance[node],
+                Err(phase) => self.rests[usize::from(phase)],
+            });
+            weights
+                .iter()
+                .zip(distances)
+                .fold(0.0, |sum, (weight, d)| sum + weight * d)
+        })
     }
 
     /// The weights of the neighbours along an axis in a difference.
@@ -219,38 +224,30 @@ impl<const D: usize> Layer<D> {
         [near, -near, middle, -middle, far, -far]
     }
 
-    /// The gradient of the distance variable.
-    fn gradient(&self, node: usize) -> [f64; D] {
-        let mut sums = [0.0; D];
-        self.differences(node, |axis, weight, neighbour| {
-            let distance = match neighbour {
-                Ok(node) => self.distance[node],
-                Err(phase) => self.rests[usize::from(phase)],
-            };
-            sums[axis] += weight * distance;
-        });
-        sums
-    }
-
     /// The derivatives of a vector field on the layer, zero elsewhere; the first index is that of the derivative.
     pub(super) fn jacobian_at(&self, place: usize, field: &[[f64; D]]) -> [[f64; D]; D] {
-        let mut sums = [[0.0; D]; D];
-        self.differences(self.nodes[place] as usize, |axis, weight, node| {
-            if let Some(value) = field.get(self.place_of(node) as usize) {
-                sums[axis] = vector::add(sums[axis], vector::scale(*value, weight));
+        let weights = self.weights();
+        self.around()[place].map(|around| {
+            let mut sum = [0.0; D];
+            for (weight, other) in weights.iter().zip(around) {
+                if let Some(value) = field.get(other as usize) {
+                    sum = vector::add(sum, vector::scale(*value, *weight));
+                }
             }
-        });
-        sums
+            sum
+        })
     }
 
     /// The divergence of a vector field on the layer, zero elsewhere: minus the adjoint of the gradient.
     pub(super) fn divergence_at(&self, place: usize, field: &[[f64; D]]) -> f64 {
-        let mut sum = 0.0;
-        self.differences(self.nodes[place] as usize, |axis, weight, node| {
-            if let Some(value) = field.get(self.place_of(node) as usize) {
-                sum += weight * value[axis];
+        let (weights, mut sum) = (self.weights(), 0.0);
+        for (axis, around) in self.around()[place].iter().enumerate() {
+            for (weight, other) in weights.iter().zip(around) {
+                if let Some(value) = field.get(*other as usize) {
+                    sum += weight * value[axis];
+                }
             }
-        });
+        }
         sum
     }
 

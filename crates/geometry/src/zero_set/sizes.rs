@@ -165,6 +165,14 @@ pub struct SizeHessian<const D: usize> {
     weights: Option<[f64; NEIGHBOURS]>,
 }
 
+/// The distance variable at a place of a layer, if that counts in second derivatives.
+fn counts<const D: usize>(layer: &Layer<D>, place: usize) -> Option<f64> {
+    /// In spacings.
+    const REACH: f64 = 6.0;
+    let near = layer.near(place);
+    near.filter(|d| d.abs() < REACH * layer.grid.spacing())
+}
+
 /// One node, and what it contributes.
 struct Site<const D: usize> {
     node: u32,
@@ -181,13 +189,12 @@ struct Site<const D: usize> {
 
 impl<const D: usize> SizeHessian<D> {
     fn new(sizes: &Sizes<D>, weights: [f64; 2]) -> Self {
-        /// In spacings.
-        const REACH: f64 = 6.0;
         let layer = &sizes.layer;
-        let reach = REACH * layer.grid.spacing();
-        let active: Vec<bool> =
-            layer.map(|place| layer.near(place).is_some_and(|d| d.abs() < reach));
-        let around = layer.map(|place| layer.places_around(place));
+        if weights[0] == 0.0 {
+            return Self::of_volume(sizes, weights[1]);
+        }
+        let active: Vec<bool> = layer.map(|place| counts(layer, place).is_some());
+        let around = layer.around();
         let mut sites_of = vec![u32::MAX; active.len()];
         let mut places = Vec::new();
         for (place, around) in around.iter().enumerate() {
@@ -217,7 +224,29 @@ impl<const D: usize> SizeHessian<D> {
         };
         Self {
             sites: parallel::map(places.len(), SHARE, &site),
-            weights: (weights[0] != 0.0).then(|| layer.weights()),
+            weights: Some(layer.weights()),
+        }
+    }
+
+    fn of_volume(sizes: &Sizes<D>, weight: f64) -> Self {
+        let (layer, first) = (&sizes.layer, sizes.by_distance([0.0, weight]));
+        let site = |place: usize| {
+            let [slope, curvature] = sizes.slopes[place];
+            layer.near(place).map(|_| Site {
+                node: layer.nodes[place],
+                around: [[u32::MAX; NEIGHBOURS]; D],
+                slope,
+                bent: first[place] * curvature,
+                normal: [0.0; D],
+                second: counts(layer, place).map_or([0.0; 3], |d| {
+                    let own = -weight * layer.kernel.slope(d);
+                    [layer.grid.cell_volume() * own, 0.0, 0.0]
+                }),
+            })
+        };
+        Self {
+            sites: parallel::filter_map(layer.nodes.len(), SHARE, &site),
+            weights: None,
         }
     }
 
