@@ -219,7 +219,8 @@ impl<const D: usize> Bricks<D> {
     ///
     /// # Errors
     /// Where no brick is active: whether it is in the positive phase.
-    #[inline]
+    #[expect(clippy::inline_always, reason = "what it returns stays in registers")]
+    #[inline(always)]
     pub(crate) fn along<const N: usize>(
         &self,
         cell: usize,

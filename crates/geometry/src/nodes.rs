@@ -70,7 +70,8 @@ impl<const D: usize> Nodes<D> {
     ///
     /// # Errors
     /// As [`Self::at`].
-    #[inline]
+    #[expect(clippy::inline_always, reason = "what it returns stays in registers")]
+    #[inline(always)]
     pub fn along<const N: usize>(
         &self,
         node: usize,

@@ -193,29 +193,31 @@ impl<const D: usize> Layer<D> {
         let place_of =
             |neighbour: Result<usize, bool>| neighbour.map_or(NOWHERE, |node| self.places[node]);
         self.around
-            .get_or_init(|| self.map(|place| self.neighbours(place).map(|axis| axis.map(place_of))))
-    }
-
-    /// For each axis the stored neighbours of a place, or the phases where nothing is stored.
-    fn neighbours(&self, place: usize) -> [[Result<usize, bool>; NEIGHBOURS]; D] {
-        let node = self.nodes[place] as usize;
-        let at = self.stored.place(node);
-        std::array::from_fn(|axis| self.stored.along(node, at, axis, STEPS))
+            .get_or_init(|| self.map(|place| self.by_axis(place, |along| along.map(place_of))))
     }
 
     /// The gradient of the distance variable: `sum_k w_k (d_k - d_-k) / h` along each axis.
     fn gradient(&self, place: usize) -> [f64; D] {
         let weights = self.weights();
-        self.neighbours(place).map(|neighbours| {
-            let distances = neighbours.map(|neighbour| match neighbour {
+        self.by_axis(place, |along| {
+            let distances = along.map(|neighbour| match neighbour {
                 Ok(node) => self.distance[node],
                 Err(phase) => self.rests[usize::from(phase)],
             });
-            weights
-                .iter()
-                .zip(distances)
-                .fold(0.0, |sum, (weight, d)| sum + weight * d)
+            let terms = weights.iter().zip(distances);
+            terms.fold(0.0, |sum, (weight, d)| sum + weight * d)
         })
+    }
+
+    /// A function of the stored neighbours of a place along each axis, or of their phases where nothing is stored.
+    fn by_axis<T>(
+        &self,
+        place: usize,
+        of: impl Fn([Result<usize, bool>; NEIGHBOURS]) -> T,
+    ) -> [T; D] {
+        let node = self.nodes[place] as usize;
+        let at = self.stored.place(node);
+        std::array::from_fn(|axis| of(self.stored.along(node, at, axis, STEPS)))
     }
 
     /// The weights of the neighbours along an axis in a difference.
