@@ -21,6 +21,9 @@ pub struct Record {
     pub tau: f64,
     /// How often it was made again, shorter: because the minimization failed, or because a controlled step was too long.
     pub halvings: u32,
+    /// Whether the interface moved so far that twice the size would have been too long; so that is not tried.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub far: bool,
     /// Hessian-vector products of steps that were too long.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub refused_hvp: f64,
@@ -152,6 +155,7 @@ pub(crate) mod tests {
             time: 0.0,
             tau,
             halvings: 0,
+            far: false,
             refused_hvp: 0.0,
             moved: 0.0,
             travelled: 0.0,

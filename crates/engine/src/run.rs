@@ -111,6 +111,7 @@ impl<const D: usize> Run<D> {
         self.whole.take();
         let Attempt {
             halvings,
+            far,
             refused_hvp,
             minimization,
         } = self.attempt()?;
@@ -129,6 +130,7 @@ impl<const D: usize> Run<D> {
             time,
             tau: minimization.map_or(mcf_step, |made| made.tau),
             halvings,
+            far,
             refused_hvp,
             moved,
             travelled,
@@ -207,7 +209,8 @@ impl<const D: usize> Run<D> {
             .records
             .last()
             .filter(|last| longest.is_some() && last.halvings > 0);
-        while last.is_some_and(|last| size > 2.0 * last.tau) && halvings < SHORTER {
+        let longer = |last: &Record| if last.far { 1.5 } else { 2.0 };
+        while last.is_some_and(|last| size > longer(last) * last.tau) && halvings < SHORTER {
             size *= 0.5;
             halvings += 1;
         }
@@ -222,16 +225,21 @@ impl<const D: usize> Run<D> {
             let constraints = self.case.held.at(ramped);
             let refused = match self.motion.advance(size, constraints, accept) {
                 Ok((minimization, true)) => {
-                    let too_long = longest.zip(before.as_ref()).filter(|_| halvings < SHORTER);
-                    match too_long {
-                        Some((longest, (state, before)))
-                            if self.has_gone_too_far(before, longest)? =>
-                        {
+                    let gone_further = |part: f64| match (longest, &before) {
+                        (Some(longest), Some((_, before))) => {
+                            self.has_gone_too_far(before, part * longest)
+                        }
+                        _ => Ok(false),
+                    };
+                    let retried = before.as_ref().filter(|_| halvings < SHORTER);
+                    match retried {
+                        Some((state, _)) if gone_further(1.0)? => {
                             self.motion = Motion::new(&self.case, Some(state), &self.device)?;
                         }
                         _ => {
                             return Ok(Attempt {
                                 halvings,
+                                far: gone_further(FAR)?,
                                 refused_hvp,
                                 minimization,
                             });
@@ -392,6 +400,8 @@ fn motion_in_memory<const D: usize>(
 struct Attempt {
     /// How often it was tried with a longer size,
     halvings: u32,
+    /// whether a step twice as long would have been too long,
+    far: bool,
     /// and Hessian-vector products of those tries that were refused.
     refused_hvp: f64,
     minimization: Option<StepRecord>,
@@ -399,6 +409,8 @@ struct Attempt {
 
 /// How often a step is halved that moves the interface too far, or cannot hold what it is to hold.
 const SHORTER: u32 = 12;
+/// A step that moves the interface this part of what it may is not followed by one of twice its size, which would be refused.
+const FAR: f64 = 0.6;
 /// The part of the interface that may move further: that of parts that vanish.
 const VANISHING: f64 = 0.02;
 

@@ -232,9 +232,8 @@ impl<const D: usize> Bricks<D> {
         let within = self.within(place[axis]) as isize;
         // All steps out of the brick in one direction lead into the same one.
         let leaves = |forward: bool| {
-            let ends = steps.map(|step| within + step);
-            ends.into_iter()
-                .any(|end| if forward { end >= side } else { end < 0 })
+            let mut ends = steps.iter().map(|step| within + step);
+            ends.any(|end| if forward { end >= side } else { end < 0 })
         };
         let [before, after] = [false, true].map(|forward| {
             if !leaves(forward) {
@@ -246,14 +245,16 @@ impl<const D: usize> Bricks<D> {
                 None => Err(self.is_positive(brick)),
             }
         });
-        steps.map(|step| {
+        let mut cells = [Ok(cell); N];
+        for (found, step) in cells.iter_mut().zip(steps) {
             let (from, step) = match within + step {
                 end if end < 0 => (before, step + side),
                 end if end >= side => (after, step - side),
                 _ => (Ok(cell), step),
             };
-            Ok(from?.wrapping_add_signed(step << shift))
-        })
+            *found = from.map(|from| from.wrapping_add_signed(step << shift));
+        }
+        cells
     }
 
     fn shifted(&self, mut place: [usize; D], axis: usize, forward: bool) -> [usize; D] {

@@ -83,13 +83,15 @@ impl<const D: usize> Nodes<D> {
             None => {
                 let (here, cells) = (place[axis] as isize, self.grid.cells() as isize);
                 let stride = self.grid.stride(axis) as isize;
-                steps.map(|steps| {
+                let mut nodes = [Ok(node); N];
+                for (found, steps) in nodes.iter_mut().zip(steps) {
                     let mut there = here + steps;
                     if !(0..cells).contains(&there) {
                         there = there.rem_euclid(cells);
                     }
-                    Ok(node.wrapping_add_signed((there - here) * stride))
-                })
+                    *found = Ok(node.wrapping_add_signed((there - here) * stride));
+                }
+                nodes
             }
             Some(bricks) => bricks.along(node, place, axis, steps),
         }

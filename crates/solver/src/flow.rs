@@ -550,7 +550,7 @@ impl<const D: usize> WillmoreFlow<D> {
             phase: phase.clone(),
             nodes: self.nodes(),
             eps: self.params.eps,
-            tau,
+            step: (tau, stiffness),
             region: self.region.clone(),
             interface: None,
         });

@@ -25,6 +25,12 @@ use crate::sparse::{Entry, SparseInverse};
 
 /// Spacing of the lattice in units of `eps`.
 const SPACING: f64 = 4.0;
+/// The functions are cut off where `q` falls below this: at `|s| = 3.1 eps`,
+const WINDOW: f64 = 0.03;
+/// or below this over the square root of `c = tau / tautilde^2`, since the edge adds about `c q^2` to the energy of a displacement,
+const CUT: f64 = 4.0;
+/// but nowhere below this, at `|s| = 5.5 eps`.
+const LEAST: f64 = 0.001;
 /// With more functions than this the matrices are sparse.
 const MOST_DENSE: usize = 2000;
 /// With more than this fraction of the interface curved more sharply than `1/eps` (corners, in the first steps), displacements
@@ -58,12 +64,14 @@ impl<const D: usize> InterfaceModes<D> {
         nodes: &Nodes<D>,
         u: &[f64],
         eps: f64,
-        tau: f64,
+        (tau, stiffness): (f64, f64),
         region: Option<&[bool]>,
     ) -> Option<Self> {
-        let samples = Samples::new(nodes, u, eps, SPACING * eps, region)?;
-        let sharp = (samples.nodes.iter()).filter(|s| s.curvature.abs() * eps > 1.0);
-        let corners_dominate = sharp.count() as f64 > SHARP * samples.nodes.len() as f64;
+        let window = (CUT / stiffness.sqrt()).clamp(LEAST, WINDOW);
+        let samples = Samples::new(nodes, u, eps, SPACING * eps, window, region)?;
+        let inner = samples.nodes.iter().filter(|s| s.weight >= WINDOW);
+        let sharp = (inner.clone()).filter(|s| s.curvature.abs() * eps > 1.0);
+        let corners_dominate = sharp.count() as f64 > SHARP * inner.count() as f64;
         if samples.nodes.is_empty() || corners_dominate {
             return None;
         }
@@ -237,7 +245,7 @@ mod tests {
         let grid = Grid::<2>::centred(96, 1.0).unwrap();
         let u = disc(&grid);
         let tau = 2e-5;
-        let modes = InterfaceModes::new(&grid.into(), &u, EPS, tau, None).unwrap();
+        let modes = InterfaceModes::new(&grid.into(), &u, EPS, (tau, 1.0), None).unwrap();
         for k in [0.0_f64, 2.0, 5.0] {
             let p = wave(&grid, &u, k);
             let mut z = vec![0.0; p.len()];
@@ -258,7 +266,7 @@ mod tests {
     fn the_correction_is_symmetric_and_not_negative() {
         let grid = Grid::<2>::centred(64, 1.0).unwrap();
         let u = disc(&grid);
-        let modes = InterfaceModes::new(&grid.into(), &u, EPS, 1e-4, None).unwrap();
+        let modes = InterfaceModes::new(&grid.into(), &u, EPS, (1e-4, 1.0), None).unwrap();
         let vector = |a: f64| -> Vec<f64> {
             (0..u.len())
                 .map(|i| (a * i as f64).sin() + 0.2 * (a * a * i as f64).cos())
@@ -280,9 +288,11 @@ mod tests {
     fn nothing_is_corrected_without_an_interface_or_at_corners() {
         let grid = Grid::<2>::centred(64, 1.0).unwrap();
         let flat = vec![1.0; grid.len()];
-        assert!(InterfaceModes::new(&grid.into(), &flat, EPS, 1e-4, None).is_none());
+        assert!(InterfaceModes::new(&grid.into(), &flat, EPS, (1e-4, 1.0), None).is_none());
         let square = Cuboid::new([0.3, 0.3]).unwrap();
         let square = phase_field(grid, &square, EPS).unwrap();
-        assert!(InterfaceModes::new(&grid.into(), square.values(), EPS, 1e-4, None).is_none());
+        assert!(
+            InterfaceModes::new(&grid.into(), square.values(), EPS, (1e-4, 1.0), None).is_none()
+        );
     }
 }

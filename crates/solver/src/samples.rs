@@ -4,8 +4,6 @@ use geometry::{Grid, Nodes, parallel};
 
 /// Corners of a cell of the lattice in 3D; in 2D the first four count.
 pub(crate) const MOST_CORNERS: usize = 8;
-/// Nodes with `1 - u^2` above this belong to the interface: `|s| < 3.1 eps`.
-const WINDOW: f64 = 0.03;
 /// Nodes are worked on in pieces of this many.
 const CHUNK: usize = 1 << 14;
 /// Where the distance to the interface changes less than this per unit length, there is no normal.
@@ -86,12 +84,13 @@ pub(crate) struct Samples<const D: usize> {
 
 impl<const D: usize> Samples<D> {
     /// The interface of `u`, whose values lie at some nodes of the grid and whose width is `eps`, on a lattice of about the given
-    /// spacing. With a `region`, only its nodes count.
+    /// spacing: its nodes are those with `1 - u^2` above `window`. With a `region`, only its nodes count.
     pub(crate) fn new(
         nodes: &Nodes<D>,
         u: &[f64],
         eps: f64,
         spacing: f64,
+        window: f64,
         region: Option<&[bool]>,
     ) -> Option<Self> {
         let grid = nodes.grid();
@@ -99,6 +98,7 @@ impl<const D: usize> Samples<D> {
         let lattice = Lattice {
             grid,
             eps,
+            window,
             points: Grid::new(cells, grid.side()).ok()?,
             width: grid.cells() as f64 / cells as f64,
         };
@@ -172,6 +172,7 @@ fn grouped<const D: usize>(samples: &[Sample<D>], cells: usize) -> (Vec<u32>, Ve
 struct Lattice<'a, const D: usize> {
     grid: &'a Grid<D>,
     eps: f64,
+    window: f64,
     points: Grid<D>,
     /// Grid cells per lattice cell.
     width: f64,
@@ -185,7 +186,7 @@ impl<const D: usize> Lattice<'_, D> {
     /// The sample of a node, if the node belongs to the interface, with all nodes beside it. Its cell is still that of the whole lattice.
     fn sample(&self, node: usize, nodes: &Nodes<D>, u: &[f64]) -> Option<Sample<D>> {
         let weight = 1.0 - u[node] * u[node];
-        if weight < WINDOW {
+        if weight < self.window {
             return None;
         }
         let spacing = self.grid.spacing();

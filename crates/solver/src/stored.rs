@@ -167,8 +167,10 @@ impl<const D: usize> Stored<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use geometry::phase_field;
+    use geometry::measure::{has_interface, touches_side};
     use geometry::shapes::Ball;
+    use geometry::zero_set::Sizes;
+    use geometry::{ZeroSet, phase_field};
     use model::{Ratios, SeparableOperator, Shipped};
 
     const EPS: f64 = 1.0 / 32.0;
@@ -211,6 +213,34 @@ mod tests {
             mixed(&whole).field().unwrap()
         );
         assert!((part.laplacian().largest() - whole.laplacian().largest()).abs() < 1e-9);
+    }
+
+    /// Sums over the bricks have another order, and the values outside are counted.
+    #[test]
+    fn measures_on_bricks_are_those_on_the_grid() {
+        for sign in [1.0, -1.0] {
+            let (disc, active) = disc(0.5);
+            let bricks = active.bricks.clone();
+            let part = part_of(&disc, active).map(|u| sign * u);
+            let whole = Stored::from(part.field().unwrap());
+            let [few, all] = [&part, &whole].map(|u| Sizes::of(u, EPS).unwrap());
+            let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-13, "{a} {b}");
+            near(few.perimeter(), all.perimeter());
+            near(few.volume(), all.volume());
+            let same = |few: Vec<f64>, all: Vec<f64>| assert_eq!(few, bricks.gather(&all));
+            same(few.perimeter_gradient(), all.perimeter_gradient());
+            same(few.volume_gradient(), all.volume_gradient());
+            same(few.mean_curvature(), all.mean_curvature());
+            let [few, all] = [&part, &whole].map(|u| ZeroSet::of(u, EPS).unwrap());
+            near(few.willmore_energy, all.willmore_energy);
+            near(few.smallest_radius, all.smallest_radius);
+            for u in [&part, &whole] {
+                assert!(has_interface(u));
+                assert_eq!(touches_side(u, -0.9), sign < 0.0);
+                assert!(u.where_zero(u).iter().all(|value| value.abs() < 1e-15));
+            }
+            assert_eq!(part.where_zero(&part).len(), whole.where_zero(&whole).len());
+        }
     }
 
     #[test]
