@@ -28,7 +28,7 @@ const SPACING: f64 = 4.0;
 /// The functions are cut off where `q` falls below this: at `|s| = 3.1 eps`,
 const WINDOW: f64 = 0.03;
 /// or below this over the square root of `c = tau / tautilde^2`, since the edge adds about `c q^2` to the energy of a displacement,
-const CUT: f64 = 4.0;
+const CUT: f64 = 5.0;
 /// but nowhere below this, at `|s| = 5.5 eps`.
 const LEAST: f64 = 0.001;
 /// With more functions than this the matrices are sparse.
