@@ -163,10 +163,12 @@ impl<const D: usize> Bricks<D> {
         self.directory[self.flat(place)] == POSITIVE
     }
 
-    /// Cells of the positive phase that are not stored.
-    pub fn positive_outside(&self) -> usize {
-        let bricks = self.directory.iter().filter(|brick| **brick == POSITIVE);
-        bricks.count() * self.volume()
+    /// Cells of the negative and of the positive phase that are not stored.
+    pub fn outside(&self) -> [usize; 2] {
+        [NEGATIVE, POSITIVE].map(|phase| {
+            let bricks = self.directory.iter().filter(|brick| **brick == phase);
+            bricks.count() * self.volume()
+        })
     }
 
     /// Whether a brick that is not active touches the side of the grid, in the negative and in the positive phase.

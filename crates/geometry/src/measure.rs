@@ -27,7 +27,9 @@ pub fn l2_distance_of_parts<const D: usize>(grid: &Grid<D>, a: &Reader<'_>, b: &
 /// Whether there is an interface at all.
 pub fn has_interface<const D: usize>(u: &impl PhaseField<D>) -> bool {
     let nodes = u.nodes();
-    let inside = u.values().iter().filter(|u| **u > 0.0).count() + nodes.positive_outside();
+    let outside = nodes.outside().into_iter().zip(u.rests());
+    let outside = outside.map(|(nodes, rest)| if rest > 0.0 { nodes } else { 0 });
+    let inside = u.values().iter().filter(|u| **u > 0.0).count() + outside.sum::<usize>();
     inside > 0 && inside < nodes.grid().len()
 }
 

@@ -97,11 +97,9 @@ impl<const D: usize> Nodes<D> {
         }
     }
 
-    /// How many nodes that are not stored are in the positive phase.
-    pub fn positive_outside(&self) -> usize {
-        self.bricks
-            .as_ref()
-            .map_or(0, |bricks| bricks.positive_outside())
+    /// How many nodes of the negative and of the positive phase are not stored.
+    pub(crate) fn outside(&self) -> [usize; 2] {
+        (self.bricks.as_ref()).map_or([0; 2], |bricks| bricks.outside())
     }
 }
 
@@ -173,7 +171,7 @@ mod tests {
             Nodes::on_bricks(grid, Arc::new(few.clone())),
         );
         let inside = dense.iter().filter(|x| x.to_bits() == 1.0_f64.to_bits());
-        assert_eq!(stored.positive_outside(), inside.count());
+        assert_eq!(stored.outside()[1], inside.count());
         for (node, value) in x.iter().enumerate() {
             let place = stored.place(node);
             let on_grid = grid.index(place);

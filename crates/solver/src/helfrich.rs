@@ -169,7 +169,7 @@ impl<const D: usize> HelfrichTerms<D> {
         let dirichlet = || Box::new(DirichletForm::new(active, device));
         Self {
             on_bricks: (self.tension != 0.0).then(dirichlet),
-            inside: active.bricks.positive_outside() as f64,
+            inside: active.bricks.outside()[1] as f64,
             ..self.clone()
         }
     }

@@ -139,7 +139,7 @@ fn a_grid_that_gives_up_in_the_middle_of_a_chain() {
         assert_eq!(record.start.kind, StartKind::HalfGrid);
     }
     assert_eq!(flow.state().unwrap().half_motions.len(), 2);
-    let record = flow.advance(64.0 * TAU).unwrap();
+    let record = flow.advance(256.0 * TAU).unwrap();
     assert_ne!(record.start.kind, StartKind::HalfGrid, "the middle gave up");
     let state = flow.state().unwrap();
     assert!(state.half_motions.is_empty());

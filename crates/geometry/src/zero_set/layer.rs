@@ -268,8 +268,10 @@ impl<const D: usize> Layer<D> {
                 f64::from(d < 0.0)
             }
         };
+        let outside = self.stored.outside().into_iter().zip(self.rests);
+        let outside = outside.map(|(nodes, d)| if d < 0.0 { nodes as f64 } else { 0.0 });
         let stored = parallel::sum(self.distance.len(), inside);
-        self.grid.cell_volume() * (stored + self.stored.positive_outside() as f64)
+        self.grid.cell_volume() * (stored + outside.sum::<f64>())
     }
 
     /// Length or area of the zero set.
