@@ -186,7 +186,7 @@ mod tests {
         (disc, active)
     }
 
-    fn part_of(field: &Field<2>, active: Active<2>) -> Stored<2> {
+    fn part_of(field: &Field<2>, active: &Active<2>) -> Stored<2> {
         let values = active.bricks.gather(field.values());
         let rests = active.rests();
         Stored::new(values, active.nodes(), rests)
@@ -197,7 +197,7 @@ mod tests {
     fn results_on_bricks_are_those_on_the_grid() {
         let (disc, active) = disc(0.5);
         let (bricks, rests) = (active.bricks.clone(), active.rests());
-        let part = part_of(&disc, active);
+        let part = part_of(&disc, &active);
         let whole = part.field().unwrap().into_values();
         let whole = Stored::new(whole, (*disc.grid()).into(), rests);
         assert!(part.values.len() < whole.values.len());
@@ -221,7 +221,7 @@ mod tests {
         for sign in [1.0, -1.0] {
             let (disc, active) = disc(0.5);
             let bricks = active.bricks.clone();
-            let part = part_of(&disc, active).map(|u| sign * u);
+            let part = part_of(&disc, &active).map(|u| sign * u);
             let whole = Stored::from(part.field().unwrap());
             let [few, all] = [&part, &whole].map(|u| Sizes::of(u, EPS).unwrap());
             let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-13, "{a} {b}");
@@ -246,11 +246,11 @@ mod tests {
     #[test]
     fn fields_on_fewer_bricks_are_continued_by_their_constants() {
         let ((small, few), (_, many)) = (disc(0.3), disc(0.6));
-        let u = part_of(&small, few);
+        let u = part_of(&small, &few);
         let v = u.on(&many.nodes());
         assert!(v.values.len() > u.values.len());
         // Where those bricks are none of its own, the field is nearly constant.
-        let outer = part_of(&small, many);
+        let outer = part_of(&small, &many);
         let difference = outer.zip_map(&v, |a, b| a - b);
         assert!(difference.largest() < 2e-4, "{}", difference.largest());
         // Nothing remains of a difference to itself, whichever of both has more bricks.
