@@ -36,6 +36,25 @@ fn a_step_that_is_too_large_is_made_in_substeps() {
 }
 
 /// A minimization that fails at every size ends the run with the last size that was tried.
+/// What the next step would be refused for is known from how far the last one went.
+#[test]
+fn a_step_that_moves_the_interface_too_far_is_halved() {
+    let mut one = case(Flow::Willmore, Method::Hybrid, square(128));
+    one.steps = TimeSteps {
+        longest_move: Some(0.05),
+        ..StepRule::Constant(TAU).into()
+    };
+    one.stops = vec![Stop::Steps(1)];
+    let run = finished(one);
+    let records = run.records();
+    assert!(records.len() > 2 && records[0].refused_hvp > 0.0);
+    let after_far = records.windows(2).filter(|pair| pair[0].far);
+    assert!(after_far.clone().count() > 0);
+    for pair in after_far {
+        assert!(pair[1].refused_hvp == 0.0 || pair[1].tau < pair[0].tau);
+    }
+}
+
 #[test]
 fn halving_gives_up_with_the_size_and_the_step() {
     let mut hopeless = case(Flow::Willmore, Method::Hybrid, square(128));

@@ -7,7 +7,7 @@
 //! how the step of mean curvature flow is computed.
 //!
 //! So the coarse correction of the preconditioner is `Z (M + tau (S M^-1 S + B))^-1 Z^T` on hat functions `phi_j` of a lattice of
-//! spacing `4 eps`, evaluated at the foot point on the interface: `Z = q phi_j`, `M = int q^2 phi_j phi_k`,
+//! spacing `4 eps`, evaluated at the foot point on the interface: `Z = q phi_j`, cut off where `q` is small, `M = int q^2 phi_j phi_k`,
 //! `S = int q^2 grad phi_j . grad phi_k` with tangential gradients, and `B = 4 int q^2 (kappa^2 grad phi_j . grad phi_k +
 //! kappa^4 phi_j phi_k)` for the terms of lower order. Nothing of it needs a Hessian-vector product. Where there are too many functions for
 //! dense matrices, and on active bricks, the [sparse] form takes their place.
