@@ -225,21 +225,19 @@ impl<const D: usize> Run<D> {
             let constraints = self.case.held.at(ramped);
             let refused = match self.motion.advance(size, constraints, accept) {
                 Ok((minimization, true)) => {
-                    let gone_further = |part: f64| match (longest, &before) {
-                        (Some(longest), Some((_, before))) => {
-                            self.has_gone_too_far(before, part * longest)
-                        }
-                        _ => Ok(false),
+                    // Of what it may.
+                    let part = match (longest, &before) {
+                        (Some(longest), Some((_, before))) => self.has_gone(before)? / longest,
+                        _ => 0.0,
                     };
-                    let retried = before.as_ref().filter(|_| halvings < SHORTER);
-                    match retried {
-                        Some((state, _)) if gone_further(1.0)? => {
+                    match before.as_ref().filter(|_| halvings < SHORTER) {
+                        Some((state, _)) if part > 1.0 => {
                             self.motion = Motion::new(&self.case, Some(state), &self.device)?;
                         }
                         _ => {
                             return Ok(Attempt {
                                 halvings,
-                                far: gone_further(FAR)?,
+                                far: part > FAR,
                                 refused_hvp,
                                 minimization,
                             });
@@ -270,13 +268,14 @@ impl<const D: usize> Run<D> {
         }
     }
 
-    /// Whether the interface has moved by more than so many of its widths in the step that was just made, also to where there was no
-    /// interface, or away altogether.
-    fn has_gone_too_far(&self, before: &Stored<D>, widths: f64) -> Result<bool, Error> {
+    /// How many of its widths the interface has moved in the step that was just made, also to where there was none; infinitely many if it is
+    /// away altogether.
+    fn has_gone(&self, before: &Stored<D>) -> Result<f64, Error> {
         let now = self.motion.stored().map_err(|source| self.failed(source))?;
-        Ok(!has_interface(&now)
-            || has_gone_further(before, &now, widths)
-            || has_gone_further(&now, before, widths))
+        if !has_interface(&now) {
+            return Ok(f64::INFINITY);
+        }
+        Ok(widths_between(before, &now).max(widths_between(&now, before)))
     }
 
     /// Where it is before a step, for trying that again.
@@ -414,12 +413,19 @@ const FAR: f64 = 0.6;
 /// The part of the interface that may move further: that of parts that vanish.
 const VANISHING: f64 = 0.02;
 
-/// Whether the interface has moved by more than so many of its widths: where `u = tanh(3 s / (4 eps))` changes its sign, the new
-/// phase field is nearly that of a phase.
-fn has_gone_further<const D: usize>(u: &Stored<D>, now: &Stored<D>, widths: f64) -> bool {
-    let (values, limit) = (now.where_zero(u), (0.75 * widths).tanh());
-    let far = values.iter().filter(|value| value.abs() > limit).count();
-    far as f64 > VANISHING * values.len() as f64
+/// How many widths all but the part of the interface that may vanish has moved: where `u = tanh(3 s / (4 eps))` changes its sign, the other
+/// phase field says how far its own interface is.
+fn widths_between<const D: usize>(u: &Stored<D>, other: &Stored<D>) -> f64 {
+    let mut sizes = other.where_zero(u);
+    for size in &mut sizes {
+        *size = size.abs().min(1.0);
+    }
+    let vanishing = (VANISHING * sizes.len() as f64) as usize;
+    if vanishing >= sizes.len() {
+        return 0.0;
+    }
+    let (_, size, _) = sizes.select_nth_unstable_by(vanishing, |a, b| b.total_cmp(a));
+    size.atanh() / 0.75
 }
 
 /// The measures of a phase field at a time.

@@ -183,7 +183,7 @@ impl<const D: usize> Bricks<D> {
 
     /// Place on the grid of a stored cell.
     pub fn multi_index(&self, cell: usize) -> [usize; D] {
-        let place = self.places[self.brick_of(cell)];
+        let place = self.places[cell >> (self.bits * D as u32)];
         std::array::from_fn(|axis| {
             (place[axis] << self.bits) + self.within(cell >> self.shift(axis))
         })
@@ -200,11 +200,6 @@ impl<const D: usize> Bricks<D> {
             .into_iter()
             .fold(0, |flat, at| (flat << self.bits) + self.within(at));
         Ok(number * self.volume() + inside)
-    }
-
-    /// The number of the brick that has a stored cell.
-    fn brick_of(&self, cell: usize) -> usize {
-        cell >> (self.bits * D as u32)
     }
 
     /// Of a place along an axis that within its brick.

@@ -17,7 +17,8 @@ struct Family {
 }
 
 /// A red blood cell is oblate, with the reduced volume .64. The two sides of oblate shapes must be several interface widths apart in the middle: with
-/// half as many cells they break through below .62. Longer prolate shapes come to the side of the box. The neck of stomatocytes must be some interface widths wide, too.
+/// half as many cells they break through below .62. Longer prolate shapes come to the side of the box. The neck of stomatocytes must be some interface
+/// widths wide, too.
 const FAMILIES: [Family; 3] = [
     Family {
         branch: Branch::Prolate,
