@@ -114,7 +114,7 @@ impl Ensemble {
             stage.bar.inc(1);
             Ok(Circle {
                 radius,
-                travelled: l2_distance(&last, &trajectory.case.initial)?,
+                travelled: l2_distance(&last, &trajectory.case.initial.field()?)?,
                 trajectory,
             })
         })?;

@@ -84,9 +84,10 @@ pub struct Inpainted<'a, const D: usize> {
 impl<'a, const D: usize> Inpainted<'a, D> {
     pub fn measure(shape: &'a Shape<D>, trajectory: &'a Trajectory<D>) -> Result<Self> {
         let (case, steps) = (&trajectory.case, trajectory.steps());
+        let start = case.initial.field()?;
         let goal = match &shape.whole {
             Some(whole) => phase_field(*case.grid(), whole, case.scales.eps)?,
-            None => case.initial.clone(),
+            None => start.clone(),
         };
         let mut distances = Vec::new();
         let shown = shape.shown.iter().copied().filter(|&k| k < steps);
@@ -94,7 +95,7 @@ impl<'a, const D: usize> Inpainted<'a, D> {
             distances.push((k, l2_distance(&trajectory.field(k)?, &goal)?));
         }
         let (last, moves) = (trajectory.field(steps)?, case.region.iter().flatten());
-        let values = last.values().iter().zip(case.initial.values());
+        let values = last.values().iter().zip(start.values());
         let changed_outside = values
             .zip(moves)
             .filter(|((u, start), inside)| !**inside && u.to_bits() != start.to_bits())

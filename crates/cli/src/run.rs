@@ -101,7 +101,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
 
     fn finish(&self, mut store: Store, run: &Run<D>) -> Result<Value> {
         let (case, u, presentation) = (run.case(), run.field(), &self.presentation);
-        let (start, eps) = (&case.initial, case.scales.eps);
+        let (start, eps) = (&case.initial.field()?, case.scales.eps);
         let directory = store.directory();
         npy::write(directory.path().join("final.npy"), u)?;
         directory.adopt_file("final.npy")?;
@@ -187,7 +187,8 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
     ) -> Result<()> {
         if has_interface(u) {
             let eps = case.scales.eps;
-            let picture = self.presentation.picture(&case.initial, u, eps)?.to_png()?;
+            let picture = self.presentation.picture(&case.initial.field()?, u, eps)?;
+            let picture = picture.to_png()?;
             run.write_file(&format!("{stem}.png"), |out| out.write_all(&picture))?;
             if let Some(faired) = faired {
                 let figure = faired.displacement.to_svg()?;

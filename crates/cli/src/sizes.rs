@@ -75,7 +75,7 @@ pub fn round_edges<const D: usize>(
     let targets = options.held(start, eps, None)?.targets();
     let case = Case {
         shape: "edges".to_owned(),
-        initial: start.clone(),
+        initial: start.clone().into(),
         region: None,
         energy: Helfrich::default(),
         held: Held {

@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let network = Networks::default().find(Scheme::Accurate.shipped(), &needed)?;
     let case = Case {
         shape: "ellipse".to_owned(),
-        initial: phase_field(grid, &Ellipse::new([0.3, 0.2])?, scales.eps)?,
+        initial: phase_field(grid, &Ellipse::new([0.3, 0.2])?, scales.eps)?.into(),
         region: None,
         energy: Helfrich::default(),
         held: Held::default(),

@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let accurate = (Method::Hybrid, Scheme::Accurate);
     let case = Case {
         shape: "mesh".to_owned(),
-        initial,
+        initial: initial.into(),
         region: None,
         energy: Helfrich::default(),
         held: Held::default(),

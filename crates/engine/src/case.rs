@@ -3,9 +3,9 @@
 use fem::FiniteElementStep;
 use geometry::{Field, Grid};
 use operators::ComputeDevice;
-use runs::fingerprint;
+use runs::{fingerprint, fingerprint_of_parts};
 use serde_json::{Value, json};
-use solver::FlowParams;
+use solver::{FlowParams, Stored};
 
 use crate::{Error, Flow, Held, Helfrich, Measure, Operator, Scales, Stop, TimeSteps};
 
@@ -15,7 +15,7 @@ pub struct Case<const D: usize> {
     /// Name of the initial shape with its measures.
     pub shape: String,
     /// The initial phase field.
-    pub initial: Field<D>,
+    pub initial: Stored<D>,
     /// The nodes whose values may move, if not all.
     pub region: Option<Vec<bool>>,
     /// Spontaneous curvature, tension and pressure in the energy; mean curvature flow has none.
@@ -47,7 +47,7 @@ impl<const D: usize> Case<D> {
     ) -> Self {
         Self {
             shape: shape.to_owned(),
-            initial,
+            initial: initial.into(),
             region: None,
             energy: Helfrich::default(),
             held: Held::default(),
@@ -118,19 +118,18 @@ impl<const D: usize> Case<D> {
     /// What distinguishes this case from others, as stored in checkpoints; fields and networks are stored as checksums.
     pub fn identity(&self, device: &ComputeDevice) -> Value {
         let grid = self.grid();
-        let bytes = |u: &Field<D>| -> Vec<u8> {
-            u.values()
-                .iter()
-                .flat_map(|value| value.to_le_bytes())
-                .collect()
-        };
+        let mut row = vec![0.0; grid.cells()];
+        let rows = (0..grid.len()).step_by(grid.cells()).map(|start| {
+            self.initial.read(start, &mut row);
+            row.iter().flat_map(|value| value.to_le_bytes()).collect()
+        });
         let marks = |nodes: &Vec<bool>| -> Vec<u8> { nodes.iter().map(|&n| u8::from(n)).collect() };
         let names: Vec<&str> = self.measures.iter().flat_map(Measure::names).collect();
         let mut identity = json!({
             "version": env!("CARGO_PKG_VERSION"),
             "device": format!("{} {:?}", device.kind(), device.dtype()).to_lowercase(),
             "grid": { "dimension": D, "cells": grid.cells(), "side": grid.side(), "origin": grid.origin().to_vec() },
-            "initial": fingerprint(bytes(&self.initial)),
+            "initial": fingerprint_of_parts::<Vec<u8>>(rows),
             "region": self.region.as_ref().map(marks).map(fingerprint),
             "flow": self.flow,
             "operator": self.operator.identity(),

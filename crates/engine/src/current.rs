@@ -12,31 +12,18 @@ use crate::Case;
 /// first asked for.
 pub struct Current<'a, const D: usize> {
     pub(crate) case: &'a Case<D>,
-    /// Nothing before the first step.
-    pub(crate) stored: Option<&'a Stored<D>>,
+    /// The initial one before the first step.
+    pub(crate) stored: &'a Stored<D>,
     pub(crate) whole: &'a OnceLock<Field<D>>,
 }
 
 impl<'a, const D: usize> Current<'a, D> {
     /// It on the whole grid.
     pub(crate) fn field(&self) -> &'a Field<D> {
-        let Current {
-            case,
-            stored,
-            whole,
-        } = *self;
-        let Some(stored) = stored else {
-            return &case.initial;
-        };
-        whole.get_or_init(|| {
-            let read = |start: usize, part: &mut [f64]| read(case, Some(stored), start, part);
-            Field::read_from(*case.grid(), &read).expect("stored values are finite")
+        let read = |start: usize, part: &mut [f64]| read(self.case, self.stored, start, part);
+        self.whole.get_or_init(|| {
+            Field::read_from(*self.case.grid(), &read).expect("stored values are finite")
         })
-    }
-
-    /// What is stored says all, but for the values outside of a region where bricks are missing.
-    fn is_stored(&self) -> Option<&'a Stored<D>> {
-        self.stored.filter(|_| self.case.region.is_none())
     }
 }
 
@@ -50,33 +37,30 @@ impl<const D: usize> Deref for Current<'_, D> {
 
 impl<const D: usize> PhaseField<D> for Current<'_, D> {
     fn nodes(&self) -> Nodes<D> {
-        (self.is_stored()).map_or_else(|| PhaseField::nodes(self.field()), PhaseField::nodes)
+        self.stored.nodes()
     }
 
     fn values(&self) -> &[f64] {
-        (self.is_stored()).map_or_else(|| self.field().values(), PhaseField::values)
+        self.stored.values()
     }
 
     fn rests(&self) -> [f64; 2] {
-        (self.is_stored()).map_or_else(|| self.field().rests(), PhaseField::rests)
+        self.stored.rests()
     }
 }
 
-/// Writes values of a phase field from a node on, whole rows of bricks: those that are stored, or the initial ones, which it keeps outside of
-/// the region.
+/// Writes values of a phase field from a node on, whole rows of bricks: those that are stored, and outside of the region the initial ones, which
+/// it keeps even where nothing is stored.
 pub(crate) fn read<const D: usize>(
     case: &Case<D>,
-    stored: Option<&Stored<D>>,
+    stored: &Stored<D>,
     start: usize,
     part: &mut [f64],
 ) {
-    let initial = &case.initial.values()[start..][..part.len()];
-    let Some(stored) = stored else {
-        part.copy_from_slice(initial);
-        return;
-    };
     stored.read(start, part);
     if let Some(region) = &case.region {
+        let mut initial = vec![0.0; part.len()];
+        case.initial.read(start, &mut initial);
         let kept = initial.iter().zip(&region[start..]);
         for (value, (initial, moves)) in part.iter_mut().zip(kept) {
             if !moves {

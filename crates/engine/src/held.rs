@@ -1,7 +1,7 @@
 //! Perimeter and volume held, or driven to targets.
 
 use geometry::zero_set::reduced_volume;
-use geometry::{Field, ZeroSet};
+use geometry::{PhaseField, ZeroSet};
 use serde::{Deserialize, Serialize};
 use solver::Constraints;
 
@@ -62,7 +62,7 @@ impl Held {
     /// # Errors
     /// [`Error::ReducedVolume`] unless `target` is above 0 and at most 1, [`Error::Geometry`].
     pub fn at_reduced_volume<const D: usize>(
-        u: &Field<D>,
+        u: &impl PhaseField<D>,
         eps: f64,
         target: f64,
         over: usize,

@@ -14,7 +14,7 @@
 //! let network = Networks::default().find(Scheme::Accurate.shipped(), &scales.needs(2, grid.spacing()))?;
 //! let case = Case {
 //!     shape: "square of side 1/2".to_owned(),
-//!     initial: phase_field(grid, &Cuboid::new([0.25; 2])?, scales.eps)?,
+//!     initial: phase_field(grid, &Cuboid::new([0.25; 2])?, scales.eps)?.into(),
 //!     region: None,
 //!     energy: Helfrich::default(),
 //!     held: Held::default(),

@@ -83,13 +83,14 @@ impl<const D: usize> Measure<D> {
 
     /// How far the zero set has gone from that of `start`, along its normals, root of the mean square over it, as [`DISPLACEMENT`]: by
     /// how much the distances `-(4 eps/3) atanh u` have changed at the nodes near it.
-    pub fn displacement(start: &Field<D>, eps: f64) -> Self {
-        let spacing = start.grid().spacing();
+    pub fn displacement(start: &impl PhaseField<D>, eps: f64) -> Self {
+        let nodes = start.nodes();
+        let spacing = nodes.grid().spacing();
         let distances = (start.values().iter()).map(|&u| distance_from_phase_field(u, eps));
         let near: Vec<([usize; D], f64)> = distances
             .enumerate()
             .filter(|(_, distance)| distance.abs() < NEAR * spacing)
-            .map(|(node, distance)| (start.grid().multi_index(node), distance))
+            .map(|(node, distance)| (nodes.place(node), distance))
             .collect();
         Self::new(DISPLACEMENT, move |u, _| {
             let (mut weights, mut squares) = (0.0, 0.0);

@@ -44,7 +44,9 @@ impl<const D: usize> Motion<D> {
         let flow = match case.flow {
             Flow::Willmore => {
                 let mut flow = match &elements {
-                    Some(step) => WillmoreFlow::new(step.clone(), &case.initial, params, device)?,
+                    Some(step) => {
+                        WillmoreFlow::new(step.clone(), &case.initial.field()?, params, device)?
+                    }
                     None => learned(case, device)?,
                 };
                 if !case.energy.is_willmore() {
@@ -62,12 +64,12 @@ impl<const D: usize> Motion<D> {
             }
             Flow::MeanCurvature => {
                 let from = match state {
-                    Some(state) => &Field::from_values(*case.grid(), state.current.clone())?,
-                    None => &case.initial,
+                    Some(state) => Field::from_values(*case.grid(), state.current.clone())?,
+                    None => case.initial.field()?,
                 };
                 let flow = match &elements {
-                    Some(step) => MeanCurvatureFlow::new(step.clone(), from, device)?,
-                    None => MeanCurvatureFlow::with_network(network(case), from, &params, device)?,
+                    Some(step) => MeanCurvatureFlow::new(step.clone(), &from, device)?,
+                    None => MeanCurvatureFlow::with_network(network(case), &from, &params, device)?,
                 };
                 Either::MeanCurvature(Box::new(flow))
             }
@@ -106,7 +108,7 @@ impl<const D: usize> Motion<D> {
     pub(crate) fn stored(&self) -> Result<Stored<D>, solver::Error> {
         match &self.flow {
             Either::Willmore(flow) => flow.stored_field(),
-            Either::MeanCurvature(flow) => Ok(flow.field()?.into()),
+            Either::MeanCurvature(flow) => Ok(Stored::whole(flow.field()?)),
         }
     }
 
@@ -146,7 +148,7 @@ fn learned<const D: usize>(
     /// Bricks that are more than this part of the grid do not pay.
     const PAYS: f64 = 0.5;
     let (network, initial, params) = (network(case), &case.initial, case.params());
-    let dense = || WillmoreFlow::with_network(network, initial, params, device);
+    let dense = || WillmoreFlow::with_network(network, &initial.field()?, params, device);
     let bricks = || WillmoreFlow::on_bricks(network, initial, params, device);
     let mut flow = match case.operator.storage {
         Storage::Dense => dense()?,

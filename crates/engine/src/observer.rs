@@ -4,6 +4,7 @@ use geometry::npy;
 use indicatif::ProgressBar;
 use runs::RunDirectory;
 
+use crate::current::read;
 use crate::{Error, Run};
 
 /// A run at its start, or after an accepted step.
@@ -27,7 +28,11 @@ impl<const D: usize> Event<'_, D> {
     /// Writes the phase field to a file of the run; nothing where the run is not stored.
     pub fn write_field(&mut self, name: &str) -> Result<(), Error> {
         if let Some(directory) = &mut self.directory {
-            npy::write(directory.path().join(name), self.run.field())?;
+            let (case, now) = (&self.run.case, self.run.now());
+            let path = directory.path().join(name);
+            npy::write_parts(path, case.grid(), &|start, part| {
+                read(case, now, start, part);
+            })?;
             directory.adopt_file(name)?;
         }
         Ok(())

@@ -51,7 +51,7 @@ impl<const D: usize> Run<D> {
     pub fn new(case: Case<D>, device: &ComputeDevice) -> Result<Self, Error> {
         let initial = Current {
             case: &case,
-            stored: None,
+            stored: &case.initial,
             whole: &OnceLock::new(),
         };
         let start = values(&initial, 0.0)?;
@@ -116,8 +116,8 @@ impl<const D: usize> Run<D> {
             minimization,
         } = self.attempt()?;
         let now = self.motion.stored().map_err(|source| self.failed(source))?;
-        let moved = self.distance(Some(&now), self.stored.as_ref());
-        let travelled = self.distance(Some(&now), None);
+        let moved = self.distance(&now, self.now());
+        let travelled = self.distance(&now, &self.case.initial);
         self.stored = Some(now);
         let seconds = clock.elapsed().as_secs_f64();
         let step_size = self.control.step_size();
@@ -316,13 +316,17 @@ impl<const D: usize> Run<D> {
     pub fn current(&self) -> Current<'_, D> {
         Current {
             case: &self.case,
-            stored: self.stored.as_ref(),
+            stored: self.now(),
             whole: &self.whole,
         }
     }
 
-    /// The `L2` distance of two phase fields of this run; the initial one where none is stored.
-    fn distance(&self, a: Option<&Stored<D>>, b: Option<&Stored<D>>) -> f64 {
+    pub(crate) fn now(&self) -> &Stored<D> {
+        self.stored.as_ref().unwrap_or(&self.case.initial)
+    }
+
+    /// The `L2` distance of two phase fields of this run.
+    fn distance(&self, a: &Stored<D>, b: &Stored<D>) -> f64 {
         let case = &self.case;
         l2_distance_of_parts(
             case.grid(),

@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use geometry::{Bricks, Field, Grid};
+use geometry::{Bricks, Field, Grid, Nodes, PhaseField};
 use operators::ComputeDevice;
 use runs::{RunDirectory, State, StoredRun};
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
-use solver::FlowState;
+use solver::{FlowState, Stored};
 
 use crate::record::to_csv;
 use crate::{Case, Error, Record, Run};
@@ -154,10 +154,22 @@ pub fn dimension(stored: &StoredRun) -> Result<usize, Error> {
 
 /// The initial phase field of a stored run, and the nodes whose values move if not all do: a case can be built from them without its
 /// input.
-pub fn initial<const D: usize>(stored: &StoredRun) -> Result<(Field<D>, Option<Vec<bool>>), Error> {
+pub fn initial<const D: usize>(
+    stored: &StoredRun,
+) -> Result<(Stored<D>, Option<Vec<bool>>), Error> {
     let region = stored.state().array("region");
     let region = region.map(|marks| marks.iter().map(|&mark| mark > 0.5).collect());
-    Ok((field(stored, "initial", grid(stored)?)?, region))
+    let grid = grid(stored)?;
+    let initial = match bricks(stored, "initial_bricks", &grid)? {
+        Some(bricks) => {
+            let values = stored.state().array("initial");
+            let values = values.ok_or_else(|| lacking(stored, "initial"))?;
+            Stored::from_values(Nodes::on_bricks(grid, bricks), values.to_vec())?
+        }
+        // As earlier versions stored it.
+        None => field(stored, "initial", grid)?.into(),
+    };
+    Ok((initial, region))
 }
 
 /// All records of a stored run with their wall times.
@@ -182,12 +194,19 @@ fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<State<'a>,
         "time": state.time,
         "previous_tau": previous_tau,
     });
+    let initial = &run.case.initial;
     let mut packed = State::new(run.records.len() as u64, notes)
-        .with_array("initial", run.case.initial.values())
+        .with_array("initial", initial.values())
         .with_array("current", state.current);
     packed.text = serde_json::to_string(&run.records).expect("records are numbers and names");
-    if let Some(bricks) = state.bricks {
-        packed = packed.with_array("bricks", bricks.marks());
+    let all = [
+        ("initial_bricks", initial.nodes().bricks().cloned()),
+        ("bricks", state.bricks),
+    ];
+    for (name, bricks) in all {
+        if let Some(bricks) = bricks {
+            packed = packed.with_array(name, bricks.marks());
+        }
     }
     if let Some(previous) = previous {
         packed = packed.with_array("previous", previous);
@@ -222,13 +241,6 @@ fn restore<const D: usize>(
     }
     check_identity(stored, &wanted)?;
     let grid = *case.grid();
-    let bricks = match state.array("bricks") {
-        Some(marks) => {
-            let bricks = Bricks::with_marks(grid.cells(), marks);
-            Some(Arc::new(bricks.map_err(|error| unreadable(stored, error))?))
-        }
-        None => None,
-    };
     let values = |name: &str| state.array(name).map(<[f64]>::to_vec);
     let previous = match values("previous") {
         Some(previous) => Some((previous, read(stored, &state.notes["previous_tau"])?)),
@@ -240,7 +252,7 @@ fn restore<const D: usize>(
         half_motions.push(field(stored, &half_motion(half_motions.len()), half)?);
     }
     let at = FlowState {
-        bricks,
+        bricks: bricks(stored, "bricks", &grid)?,
         current: values("current").ok_or_else(|| lacking(stored, "current"))?,
         previous,
         rate: values("rate"),
@@ -279,6 +291,18 @@ fn grid<const D: usize>(stored: &StoredRun) -> Result<Grid<D>, Error> {
         .map_err(|_| unreadable(stored, format!("its grid is not in {D}D")))?;
     let (cells, side) = (read(stored, &grid["cells"])?, read(stored, &grid["side"])?);
     Ok(Grid::new(cells, side)?.with_origin(origin)?)
+}
+
+fn bricks<const D: usize>(
+    stored: &StoredRun,
+    name: &str,
+    grid: &Grid<D>,
+) -> Result<Option<Arc<Bricks<D>>>, Error> {
+    let bricks = |marks| {
+        let bricks = Bricks::with_marks(grid.cells(), marks);
+        Ok(Arc::new(bricks.map_err(|error| unreadable(stored, error))?))
+    };
+    stored.state().array(name).map(bricks).transpose()
 }
 
 fn field<const D: usize>(stored: &StoredRun, name: &str, grid: Grid<D>) -> Result<Field<D>, Error> {

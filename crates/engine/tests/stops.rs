@@ -35,7 +35,7 @@ fn a_shape_that_comes_to_the_side_ends_a_run_unless_it_was_there_before() {
     let run = finished(growing.clone());
     assert_eq!(run.ended(), Some(Stop::AtTheSide));
     let band = |x: [f64; 2]| x[1].abs() - 0.1;
-    growing.initial = Field::from_fn(grid(128), |x| geometry::optimal_profile(band(x), EPS));
+    growing.initial = Field::from_fn(grid(128), |x| geometry::optimal_profile(band(x), EPS)).into();
     growing.stops = vec![Stop::Steps(1), Stop::AtTheSide];
     assert_eq!(finished(growing).ended(), Some(Stop::Steps(1)));
 }
@@ -56,7 +56,7 @@ fn stationary_shapes_end_a_run() {
 fn a_flat_interface_is_at_rest() {
     let mut flat = case(Flow::Willmore, Method::Hybrid, disc(128, 0.2));
     let band = |x: [f64; 2]| x[1].abs() - 0.15;
-    flat.initial = Field::from_fn(grid(128), |x| geometry::optimal_profile(band(x), EPS));
+    flat.initial = Field::from_fn(grid(128), |x| geometry::optimal_profile(band(x), EPS)).into();
     let largest = 0.75_f64.powi(4) / 1024.0;
     flat.steps = StepRule::ByEnergy(Some(largest)).into();
     flat.stops = vec![Stop::Steps(12), Stop::EnergyAtRest];

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::Error;
+use crate::{Error, PhaseField, parallel};
 
 /// A brick that is not stored, in the tables of neighbours: the field is constant there, in the phase of positive values
 const POSITIVE: i32 = -1;
@@ -88,6 +88,38 @@ impl<const D: usize> Bricks<D> {
             side,
             |place| mark(place) == 0.0,
             |place| mark(place) > 0.0,
+        )
+    }
+
+    /// The bricks on which values of the whole grid are not all the same one of `rests`, that of the negative or of the positive phase, bit
+    /// for bit.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn holding(
+        cells: usize,
+        side: usize,
+        values: &[f64],
+        rests: [f64; 2],
+    ) -> Result<Self, Error> {
+        let all = Self::new(cells, side, |_| true, |_| true)?;
+        let [negative, positive] = rests.map(f64::to_bits);
+        let mark = |number: usize| {
+            let mut rows = (number * all.volume()..(number + 1) * all.volume()).step_by(side);
+            let row = |cell| &values[flat(all.multi_index(cell), cells)..][..side];
+            let first = row(number * all.volume())[0];
+            let rests = [negative, positive].contains(&first.to_bits());
+            let same = |value: &f64| value.to_bits() == first.to_bits();
+            let is_constant = rests && rows.all(|cell| row(cell).iter().all(same));
+            if is_constant { first } else { 0.0 }
+        };
+        let marks = parallel::map(all.places.len(), 1, &mark);
+        let mark = |place| marks[all.number(place).expect("all are active")];
+        Self::new(
+            cells,
+            side,
+            |place| mark(place) == 0.0,
+            |place| mark(place).to_bits() == positive,
         )
     }
 
@@ -307,24 +339,25 @@ impl<const D: usize> Bricks<D> {
         }
     }
 
-    /// The values on these bricks of a field on others of the same grid; where those have none, `rests` of their phases.
+    /// The values on these bricks of a phase field that is stored anywhere on the same grid.
     ///
     /// # Panics
-    /// If the bricks have other sides.
-    pub fn carried(&self, from: &Self, values: &[f64], rests: [f64; 2]) -> Vec<f64> {
-        assert_eq!((self.bits, self.per_axis), (from.bits, from.per_axis));
-        let volume = self.volume();
-        let mut carried = Vec::with_capacity(self.len());
-        for place in &self.places {
-            match from.number(*place) {
-                Some(number) => carried.extend_from_slice(&values[number * volume..][..volume]),
-                None => {
-                    let rest = rests[usize::from(from.is_positive(*place))];
-                    carried.resize(carried.len() + volume, rest);
-                }
+    /// If it is on another grid.
+    pub fn values_of(&self, u: &impl PhaseField<D>) -> Vec<f64> {
+        let (nodes, stored, rests) = (u.nodes(), u.values(), u.rests());
+        assert_eq!(nodes.grid().cells(), self.cells());
+        // A piece of a row lies in one row of one brick on either side.
+        let piece = nodes
+            .bricks()
+            .map_or(self.side(), |b| b.side().min(self.side()));
+        let mut values = Vec::with_capacity(self.len());
+        for cell in (0..self.len()).step_by(piece) {
+            match nodes.at(self.multi_index(cell)) {
+                Ok(node) => values.extend_from_slice(&stored[node..][..piece]),
+                Err(phase) => values.resize(values.len() + piece, rests[usize::from(phase)]),
             }
         }
-        carried
+        values
     }
 }
 

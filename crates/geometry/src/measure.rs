@@ -60,35 +60,28 @@ pub fn touches_side<const D: usize>(u: &impl PhaseField<D>, above: f64) -> bool 
 ///
 /// # Errors
 /// `eps` must be finite and positive.
-pub fn perimeter<const D: usize>(u: &Field<D>, eps: f64) -> Result<f64, Error> {
+pub fn perimeter<const D: usize>(u: &impl PhaseField<D>, eps: f64) -> Result<f64, Error> {
     positive("eps", eps)?;
-    let (grid, v) = (*u.grid(), u.values());
-    let h = grid.spacing();
-    let density = |index: usize| {
-        let well = 1.0 - v[index] * v[index];
-        let node = grid.multi_index(index);
-        let gradient: f64 = (0..D)
-            .map(|axis| edge_derivative(&grid, v, node, axis).powi(2))
-            .sum();
-        0.5 * (eps / (h * h) * gradient + 0.5625 * well * well / eps)
+    let (nodes, v, rests) = (u.nodes(), u.values(), u.rests());
+    let h = nodes.grid().spacing();
+    let well = |u: f64| {
+        let well = 1.0 - u * u;
+        0.5625 * well * well / eps
     };
-    Ok(grid.cell_volume() * parallel::sum(v.len(), density))
-}
-
-/// Fourth-order difference, times `h`, at the middle of the edge from `node` along `axis`.
-fn edge_derivative<const D: usize>(
-    grid: &Grid<D>,
-    values: &[f64],
-    node: [usize; D],
-    axis: usize,
-) -> f64 {
-    // `index` wraps around, so that stepping back by one is stepping forward by N - 1.
-    let at = |step: usize| {
-        let mut shifted = node;
-        shifted[axis] += step;
-        values[grid.index(shifted)]
+    let value = |found: Result<usize, bool>| found.map_or_else(|p| rests[usize::from(p)], |k| v[k]);
+    let density = |node: usize| {
+        let place = nodes.place(node);
+        let along = |axis: usize| {
+            let beside = nodes.along(node, place, axis, [-1, 1, 2]);
+            let [before, next, second] = beside.map(value);
+            ((27.0 * (next - v[node]) - (second - before)) / 24.0).powi(2)
+        };
+        let gradient: f64 = (0..D).map(along).sum();
+        0.5 * (eps / (h * h) * gradient + well(v[node]))
     };
-    (27.0 * (at(1) - at(0)) - (at(2) - at(grid.cells() - 1))) / 24.0
+    let outside = nodes.outside().into_iter().zip(rests);
+    let outside: f64 = outside.map(|(k, rest)| 0.5 * k as f64 * well(rest)).sum();
+    Ok(nodes.grid().cell_volume() * (parallel::sum(v.len(), density) + outside))
 }
 
 /// Area or volume of `{u > 0}`, resolved below the size of a cell.
@@ -96,14 +89,18 @@ fn edge_derivative<const D: usize>(
 /// Every cell is cut into `D!` simplices along its main diagonal (Kuhn's triangulation), on each
 /// of which `atanh u`, which is nearly the distance, is interpolated linearly; the volume of
 /// the positive part is then exact. The error is `O(h^2)`, without a contribution of `eps`.
-pub fn zero_set_volume<const D: usize>(u: &Field<D>) -> f64 {
-    let (grid, v) = (*u.grid(), u.values());
-    let orders = permutations::<D>();
+pub fn zero_set_volume<const D: usize>(u: &impl PhaseField<D>) -> f64 {
+    let (nodes, v, rests) = (u.nodes(), u.values(), u.rests());
+    let (grid, orders) = (nodes.grid(), permutations::<D>());
     let cell = |index: usize| {
-        let node = grid.multi_index(index);
+        let node = nodes.place(index);
         let corner = |bits: usize| {
-            let upper = std::array::from_fn(|axis| node[axis] + (bits >> axis & 1));
-            v[grid.index(upper)]
+            let upper =
+                std::array::from_fn(|axis| (node[axis] + (bits >> axis & 1)) % grid.cells());
+            match nodes.at(upper) {
+                Ok(node) => v[node],
+                Err(phase) => rests[usize::from(phase)],
+            }
         };
         let inside = (0..1_usize << D).filter(|&bits| corner(bits) > 0.0).count();
         if inside == 0 || inside == 1 << D {
@@ -121,7 +118,8 @@ pub fn zero_set_volume<const D: usize>(u: &Field<D>) -> f64 {
         });
         simplices.sum::<f64>() / orders.len() as f64
     };
-    grid.cell_volume() * parallel::sum(v.len(), cell)
+    let [_, outside] = nodes.outside();
+    grid.cell_volume() * (parallel::sum(v.len(), cell) + outside as f64)
 }
 
 /// All orders of the axes.

@@ -161,11 +161,13 @@ mod tests {
             .map(|i| 0.9 * (0.37 * i as f64).sin())
             .collect();
         let rests = [-1.0, 1.0];
-        let (carried, dense) = (all.carried(&few, &x, rests), few.scatter(&x, rests));
-        assert_eq!(all.scatter(&carried, [0.0; 2]), dense);
-        assert_eq!(few.carried(&all, &carried, [0.0; 2]), x);
-
+        let dense = few.scatter(&x, rests);
         let grid = Grid::new(48, 1.0).unwrap();
+        let field = Field::from_values(grid, dense.clone()).unwrap();
+        assert_eq!(few.values_of(&field), x);
+        assert_eq!(all.scatter(&all.values_of(&field), [0.0; 2]), dense);
+        assert_eq!(Bricks::holding(48, 16, &dense, rests).unwrap(), few);
+
         let (whole, stored) = (
             Nodes::from(grid),
             Nodes::on_bricks(grid, Arc::new(few.clone())),

@@ -26,6 +26,7 @@ use files::{Number, write_atomically};
 use serde::Deserialize;
 use serde_json::Value;
 
+use crate::parallel::{CHUNK, Reader};
 use crate::{Error, Field, Grid};
 pub use error::NpyError;
 
@@ -42,11 +43,30 @@ const ALIGNMENT: usize = 64;
 /// # Errors
 /// [`Error::Io`].
 pub fn write<const D: usize>(path: impl AsRef<Path>, field: &Field<D>) -> Result<(), Error> {
-    let header = header(&field.grid().shape());
+    let values = field.values();
+    let read =
+        |start: usize, part: &mut [f64]| part.copy_from_slice(&values[start..][..part.len()]);
+    write_parts(path, field.grid(), &read)
+}
+
+/// The same for a field of which not the whole is in memory: `read` writes the values of nodes in a row from one on, whose number is a
+/// multiple of 4096.
+pub fn write_parts<const D: usize>(
+    path: impl AsRef<Path>,
+    grid: &Grid<D>,
+    read: &Reader<'_>,
+) -> Result<(), Error> {
+    let header = header(&grid.shape());
     Ok(write_atomically(path, |out| {
         out.write_all(&header)?;
-        let mut values = field.values().iter();
-        values.try_for_each(|value| out.write_all(&value.to_le_bytes()))
+        let mut part = [0.0; CHUNK];
+        for start in (0..grid.len()).step_by(CHUNK) {
+            let part = &mut part[..CHUNK.min(grid.len() - start)];
+            read(start, part);
+            let mut values = part.iter();
+            values.try_for_each(|value| out.write_all(&value.to_le_bytes()))?;
+        }
+        Ok(())
     })?)
 }
 

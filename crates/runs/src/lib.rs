@@ -70,7 +70,7 @@ mod stored;
 mod timings;
 
 pub use checkpoint::State;
-pub use digest::fingerprint;
+pub use digest::{fingerprint, fingerprint_of_parts};
 pub use directory::RunDirectory;
 pub use error::Error;
 pub use interrupt::Interrupt;

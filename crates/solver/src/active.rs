@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use geometry::{Bricks, Field, Grid, Nodes, parallel};
+use geometry::{Bricks, Grid, Nodes, PhaseField, parallel};
 use model::{BrickOperator, SeparableOperator};
 use operators::ComputeDevice;
 
@@ -29,10 +29,10 @@ impl<const D: usize> Active<D> {
     /// The bricks near the interface of a phase field.
     pub(crate) fn new(
         operator: SeparableOperator<D>,
-        initial: &Field<D>,
+        initial: &impl PhaseField<D>,
         eps: f64,
     ) -> Result<Self, Error> {
-        let grid = *initial.grid();
+        let grid = *initial.nodes().grid();
         let none = Bricks::new(grid.cells(), operator.brick_side(), |_| false, |_| false)?;
         let nothing = Self {
             operator,
@@ -40,7 +40,7 @@ impl<const D: usize> Active<D> {
             grid,
             bricks: Arc::new(none),
         };
-        nothing.following_grid(initial.values())
+        nothing.following_field(initial)
     }
 
     /// These bricks.
@@ -66,16 +66,20 @@ impl<const D: usize> Active<D> {
         self.operator.rests()
     }
 
-    /// Those near the interface of values on the whole grid.
-    pub(crate) fn following_grid(&self, u: &[f64]) -> Result<Self, Error> {
-        let near = self.near(&self.grid.into(), u, REACH);
+    /// Those near the interface of a phase field that is stored in another way.
+    pub(crate) fn following_field(&self, u: &impl PhaseField<D>) -> Result<Self, Error> {
+        let (nodes, values, rests) = (u.nodes(), u.values(), u.rests());
+        let near = self.near(&nodes, values, REACH);
         let side = self.bricks.side();
-        let first = |place: [usize; D]| self.grid.index(place.map(|at| at * side));
+        let first = |place: [usize; D]| match nodes.at(place.map(|at| at * side)) {
+            Ok(node) => values[node],
+            Err(phase) => rests[usize::from(phase)],
+        };
         let bricks = Bricks::new(
             self.grid.cells(),
             side,
             |place| near[self.bricks.flat(place)],
-            |place| u[first(place)] > 0.0,
+            |place| first(place) > 0.0,
         )?;
         if bricks.is_empty() {
             return Err(Error::NoInterface);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use burn::tensor::Tensor;
-use geometry::{Bricks, Field, Grid, positive};
+use geometry::{Bricks, Field, Grid, PhaseField, positive};
 use model::{Factors, MeanCurvatureOperator, Network, Ratios, SeparableOperator};
 use operators::{ComputeDevice, inner_product};
 use serde::{Deserialize, Serialize};
@@ -233,20 +233,21 @@ impl<const D: usize> WillmoreFlow<D> {
     /// into bricks, and [`Error::NoInterface`].
     pub fn on_bricks(
         network: &Network,
-        initial: &Field<D>,
+        initial: &impl PhaseField<D>,
         params: FlowParams,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
         params.validate()?;
-        initial
-            .check_finite()
-            .map_err(|_| Error::non_finite(0, "phase field"))?;
-        let grid = initial.grid();
+        let nodes = initial.nodes();
+        if !initial.values().iter().all(|value| value.is_finite()) {
+            return Err(Error::non_finite(0, "phase field"));
+        }
+        let grid = nodes.grid();
         network.check_fits(params.ratios(grid, network.ratios().width))?;
         let operator = SeparableOperator::new(network, device)?;
         let active = Active::new(operator, initial, params.eps)?;
         let bricks = &active.bricks;
-        let current = device.tensor(&bricks.gather(initial.values()), bricks.shape());
+        let current = device.tensor(&bricks.values_of(initial), bricks.shape());
         let step = Arc::new(active.step(device));
         Self::begun(step, Some(active), (grid, current), params, device)
     }
@@ -398,7 +399,10 @@ impl<const D: usize> WillmoreFlow<D> {
         if let Some(active) = &self.active {
             let next = match &state.bricks {
                 Some(bricks) => active.at(bricks.clone()),
-                None => active.following_grid(&state.current)?,
+                None => {
+                    let current = state.current.clone();
+                    active.following_field(&Field::from_values(self.grid, current)?)?
+                }
             };
             self.go_to(next)?;
         }

@@ -1,7 +1,9 @@
 //! Arithmetic of fields node by node, on what is stored of them.
 
+use std::sync::Arc;
+
 use burn::tensor::Tensor;
-use geometry::{Field, Grid, Nodes, PhaseField, parallel};
+use geometry::{Bricks, Field, Grid, Nodes, PhaseField, parallel};
 use operators::ComputeDevice;
 
 use crate::Error;
@@ -9,11 +11,13 @@ use crate::active::Active;
 
 /// Nodes are worked on in pieces of this many.
 const CHUNK: usize = 1 << 14;
+/// Cells along each axis of the bricks without which a phase field is stored that is constant there.
+const SIDE: usize = 8;
 /// The values of phase fields in the negative and in the positive phase.
 const PHASES: [f64; 2] = [-1.0, 1.0];
 
 /// The values of a field on the whole grid, or on active bricks, with the constants that it has outside.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Stored<const D: usize> {
     nodes: Nodes<D>,
     values: Vec<f64>,
@@ -21,10 +25,17 @@ pub struct Stored<const D: usize> {
     rests: [f64; 2],
 }
 
+/// Without the parts of the grid on which it is nothing but -1 or 1, if there are such.
 impl<const D: usize> From<Field<D>> for Stored<D> {
-    fn from(field: Field<D>) -> Self {
-        let nodes = (*field.grid()).into();
-        Self::new(field.into_values(), nodes, PHASES)
+    fn from(u: Field<D>) -> Self {
+        let grid = *u.grid();
+        match Bricks::holding(grid.cells(), SIDE, u.values(), PHASES) {
+            Ok(bricks) if bricks.len() < grid.len() => {
+                let values = bricks.values_of(&u);
+                Self::new(values, Nodes::on_bricks(grid, Arc::new(bricks)), PHASES)
+            }
+            _ => Self::whole(u),
+        }
     }
 }
 
@@ -64,13 +75,43 @@ impl<const D: usize> Stored<D> {
         }
     }
 
+    /// A phase field with these values at nodes, -1 or 1 elsewhere.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] for another number of values than of nodes, and for values that are not finite.
+    pub fn from_values(nodes: Nodes<D>, values: Vec<f64>) -> Result<Self, Error> {
+        let (expected, actual) = (nodes.len(), values.len());
+        if expected != actual {
+            return Err(geometry::Error::ValueCount { expected, actual }.into());
+        }
+        let mut all = values.iter().enumerate();
+        if let Some((index, &value)) = all.find(|(_, value)| !value.is_finite()) {
+            return Err(geometry::Error::NonFinite { index, value }.into());
+        }
+        Ok(Self::new(values, nodes, PHASES))
+    }
+
+    /// All of a phase field.
+    pub fn whole(u: Field<D>) -> Self {
+        let nodes = (*u.grid()).into();
+        Self::new(u.into_values(), nodes, PHASES)
+    }
+
+    /// The grid.
+    pub fn grid(&self) -> &Grid<D> {
+        self.nodes.grid()
+    }
+
     /// The field on the whole grid.
-    pub(crate) fn field(&self) -> Result<Field<D>, Error> {
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] for values that are not finite.
+    pub fn field(&self) -> Result<Field<D>, Error> {
         let values = match self.nodes.bricks() {
             Some(bricks) => bricks.scatter(&self.values, self.rests),
             None => self.values.clone(),
         };
-        Ok(Field::from_values(*self.nodes.grid(), values)?)
+        Ok(Field::from_values(*self.grid(), values)?)
     }
 
     /// Writes the values of the whole grid for nodes in a row from one on; where it is on bricks, both multiples of their sides.
@@ -86,17 +127,17 @@ impl<const D: usize> Stored<D> {
     }
 
     pub(crate) fn tensor(&self, device: &ComputeDevice) -> Tensor<D> {
-        let whole = || self.nodes.grid().shape();
+        let whole = || self.grid().shape();
         let shape = (self.nodes.bricks()).map_or_else(whole, |bricks| bricks.shape());
         device.tensor(&self.values, shape)
     }
 
     /// The same field on other bricks.
     pub(crate) fn on(&self, nodes: &Nodes<D>) -> Self {
-        let (Some(own), Some(bricks)) = (self.nodes.bricks(), nodes.bricks()) else {
+        let Some(bricks) = nodes.bricks() else {
             return self.clone();
         };
-        let values = bricks.carried(own, &self.values, self.rests);
+        let values = bricks.values_of(self);
         Self::new(values, nodes.clone(), self.rests)
     }
 
@@ -141,7 +182,7 @@ impl<const D: usize> Stored<D> {
 
     /// The Laplacian by centred differences of second order, periodic.
     pub(crate) fn laplacian(&self) -> Self {
-        let unit = self.nodes.grid().spacing().powi(-2);
+        let unit = self.grid().spacing().powi(-2);
         let at = |node: usize| {
             let place = self.nodes.place(node);
             let along = |axis: usize| {
@@ -167,7 +208,7 @@ impl<const D: usize> Stored<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use geometry::measure::{has_interface, touches_side};
+    use geometry::measure::{has_interface, perimeter, touches_side, zero_set_volume};
     use geometry::shapes::Ball;
     use geometry::zero_set::Sizes;
     use geometry::{ZeroSet, phase_field};
@@ -222,9 +263,13 @@ mod tests {
             let (disc, active) = disc(0.5);
             let bricks = active.bricks.clone();
             let part = part_of(&disc, &active).map(|u| sign * u);
-            let whole = Stored::from(part.field().unwrap());
+            let whole = Stored::whole(part.field().unwrap());
             let [few, all] = [&part, &whole].map(|u| Sizes::of(u, EPS).unwrap());
             let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-13, "{a} {b}");
+            near(zero_set_volume(&part), zero_set_volume(&whole));
+            // Edges that lead to the bricks from outside are left out.
+            let lengths = [&part, &whole].map(|u| perimeter(u, EPS).unwrap());
+            assert!((lengths[0] / lengths[1] - 1.0).abs() < 1e-8, "{lengths:?}");
             near(few.perimeter(), all.perimeter());
             near(few.volume(), all.volume());
             let same = |few: Vec<f64>, all: Vec<f64>| assert_eq!(few, bricks.gather(&all));
@@ -241,6 +286,23 @@ mod tests {
             }
             assert_eq!(part.where_zero(&part).len(), whole.where_zero(&whole).len());
         }
+    }
+
+    #[test]
+    fn without_its_pure_phases_a_field_is_the_same() {
+        let grid = Grid::centred(128, 8.0).unwrap();
+        let disc = phase_field(grid, &Ball::new([0.0; 2], 1.0).unwrap(), EPS).unwrap();
+        let stored = Stored::from(disc.clone());
+        assert!(2 * stored.values.len() < grid.len());
+        assert_eq!(stored.field().unwrap(), disc);
+        // On bricks of another size, too.
+        let bricks = Bricks::new(128, 16, |[i, j]| (i + j) % 2 == 0, |_| false).unwrap();
+        assert_eq!(bricks.values_of(&stored), bricks.gather(disc.values()));
+        let undivided = Field::constant(Grid::new(20, 1.0).unwrap(), 1.0);
+        let stored = Stored::<2>::from(undivided.clone());
+        assert_eq!(stored.field().unwrap(), undivided);
+        let lacking = Stored::from_values(stored.nodes(), vec![1.0; 3]);
+        assert!(lacking.is_err());
     }
 
     #[test]

@@ -103,7 +103,7 @@ pub fn program(options: &Options) -> Result<()> {
 /// The shapes over time, D outlined in green.
 fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure> {
     let (trajectory, tau) = (one.trajectory, one.tau());
-    let mut shown = vec![("step 0".to_owned(), trajectory.case.initial.clone())];
+    let mut shown = vec![("step 0".to_owned(), trajectory.case.initial.field()?)];
     for &k in INSIDE {
         if let Some(field) = trajectory.part_field(k)? {
             shown.push((format!("2^-{k} of a step"), field));

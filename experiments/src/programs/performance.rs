@@ -151,7 +151,7 @@ fn distance_to_tighter<const D: usize>(case: &Case<D>, device: &ComputeDevice) -
     // Linear solves that leave a tenth would take a Newton step for every digit.
     newton.cg_tolerance /= TIGHTER.sqrt();
     let (loose, tight) = (end(case.clone())?, end(tighter)?);
-    Ok(l2_distance(&loose, &tight)? / l2_distance(&case.initial, &tight)?)
+    Ok(l2_distance(&loose, &tight)? / l2_distance(&case.initial.field()?, &tight)?)
 }
 
 impl Measurement {

@@ -141,7 +141,9 @@ fn measure(
     Ok(Measurement {
         radius,
         mcf,
-        w_elements: still.implicit_elements()?.willmore_energy(&still.initial)?,
+        w_elements: still
+            .implicit_elements()?
+            .willmore_energy(&still.initial.field()?)?,
         willmore,
     })
 }

@@ -150,12 +150,14 @@ impl Segmented {
                 if let Some(keeps) = flow {
                     case.held.volume = keeps.then_some(Target::keep(self.body.volume));
                     let run = stage.run(case.clone())?;
-                    case.initial = run.field().clone();
+                    case.initial = run.field().clone().into();
                     volume = ZeroSet::of(&run.current(), case.scales.eps)?.volume;
                     surface = surfaces::remeshed_surface(run.field(), case.scales.eps)?
                         .with_volume(volume, |_| true);
                 }
-                let elements = case.implicit_elements()?.willmore_energy(&case.initial)?;
+                let elements = case
+                    .implicit_elements()?
+                    .willmore_energy(&case.initial.field()?)?;
                 Ok(Row {
                     of: self,
                     treatment: (key, words),

@@ -236,9 +236,9 @@ impl Job {
                 "{path} cannot be resumed: {reason}; start a new run"
             ))
         })?;
-        let (field, region) = engine::initial(&stored)?;
+        let (initial, region) = engine::initial(&stored)?;
         presentation.restore(&stored)?;
-        let case = self.case(&name, field, region, &presentation)?;
+        let case = self.case(&name, initial.field()?, region, &presentation)?;
         let plan = self.plan(name, presentation);
         let checkpoints = plan.checkpoints();
         let (store, run) = match more {
@@ -305,7 +305,7 @@ impl Job {
         measures.extend(known.measures);
         Ok(Case {
             shape: name.to_owned(),
-            initial,
+            initial: initial.into(),
             region,
             energy,
             held,

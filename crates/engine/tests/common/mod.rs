@@ -57,7 +57,7 @@ pub fn case(flow: Flow, method: Method, initial: Field<2>) -> Case<2> {
     measures.extend(Measure::crossings(0.0));
     Case {
         shape: "shape".to_owned(),
-        initial,
+        initial: initial.into(),
         region: None,
         energy: Helfrich::default(),
         held: Held::default(),
