@@ -84,7 +84,7 @@ impl MeshFlow {
     /// The steps on `n` cells per unit length, and how many more than the paper's they are. On finer grids a first step that is
     /// shorter by the fourth power of their ratio moves the interface as many cells as the paper's does: doubling steps begin with it, and so many
     /// more lead to the same time; constant steps are made in substeps that begin with it. Where limbs vanish, a later step is too
-    /// long for one minimization there, and is made in substeps that do not move the interface too far.
+    /// long for one minimization there, and is made in substeps, too.
     fn time_steps(&self, n: usize) -> (TimeSteps, usize) {
         let halvings = 4.0 * (n as f64 / self.cells as f64).log2();
         let halvings = halvings.round().max(0.0) as usize;
@@ -98,7 +98,6 @@ impl MeshFlow {
         };
         let steps = TimeSteps {
             first_substep: Some(first),
-            longest_move: Some(TimeSteps::LONGEST_MOVE),
             ..rule.into()
         };
         (steps, more)

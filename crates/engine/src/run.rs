@@ -208,7 +208,7 @@ impl<const D: usize> Run<D> {
         let last = self
             .records
             .last()
-            .filter(|last| longest.is_some() && (last.far || last.halvings > 0));
+            .filter(|last| longest.is_some() && last.halvings > 0);
         let longer = |last: &Record| if last.far { 1.5 } else { 2.0 };
         while last.is_some_and(|last| size > longer(last) * last.tau) && halvings < SHORTER {
             size *= 0.5;

@@ -122,9 +122,6 @@ impl Order {
 }
 
 impl TimeSteps {
-    /// The [longest move](Self::longest_move) of a step after which the minimizer is that of the same valley.
-    pub const LONGEST_MOVE: f64 = 2.0;
-
     /// Steps of second order as long as their errors allow.
     pub fn controlled(control: ErrorControl) -> Self {
         Self {

@@ -57,7 +57,6 @@ pub fn touches_side<const D: usize>(u: &impl PhaseField<D>, above: f64) -> bool 
 /// difference `(27 (u_1 - u_0) - (u_2 - u_-1)) / (24 h)`; squares are summed over the
 /// edges, and the double well over the nodes, with weight `h^D`. The sums are spectrally accurate
 /// on a periodic grid, so the error is `O(h^4)` at fixed `eps`: a relative 1e-4 at `eps = 2h`.
-/// Where bricks are stored, edges that lead into them from outside are left out: a relative 1e-8.
 ///
 /// # Errors
 /// `eps` must be finite and positive.

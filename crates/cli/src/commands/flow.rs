@@ -16,6 +16,8 @@ use crate::space::Space;
 use crate::values::{Amount, Label};
 use crate::volume;
 
+/// In a step the interface moves by at most so many widths of it.
+const LONGEST_MOVE: f64 = 2.0;
 /// The usual step of inpainting in units of the inner one,
 const INPAINT_STEP: f64 = 16.0;
 /// which a ramp reaches that starts this many times halved: at the border of the region there is a jump.
@@ -286,7 +288,7 @@ impl Job {
                 TimeSteps::controlled(control)
             }
             rule => TimeSteps {
-                longest_move: (flow == Flow::Willmore).then_some(TimeSteps::LONGEST_MOVE),
+                longest_move: (flow == Flow::Willmore).then_some(LONGEST_MOVE),
                 ..rule.into()
             },
         };
