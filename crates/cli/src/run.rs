@@ -261,16 +261,15 @@ struct Pictures<'a, const D: usize, O> {
 
 impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
     fn observe(&mut self, event: &mut Event<'_, D>) -> Result<(), engine::Error> {
-        let (case, u) = (event.run.case(), event.run.field());
-        let eps = case.scales.eps;
         let (Some(step), Some(run)) = (event.step(), event.directory.as_deref_mut()) else {
             return Ok(());
         };
         // An inpainted region may have been all of the shape.
-        if !has_interface(u) {
+        if !has_interface(&event.run.current()) {
             return Ok(());
         }
-        let plan = self.plan;
+        let (case, u, plan) = (event.run.case(), event.run.field(), self.plan);
+        let eps = case.scales.eps;
         if step == 0 {
             let written = plan.write_shape(u, eps, None, presentation::START, run);
             written.map_err(engine::Error::observer)?;

@@ -14,7 +14,7 @@ use crate::{Error, Flow, Held, Helfrich, Measure, Operator, Scales, Stop, TimeSt
 pub struct Case<const D: usize> {
     /// Name of the initial shape with its measures.
     pub shape: String,
-    /// The initial phase field.
+    /// The initial phase field, without its pure phases.
     pub initial: Stored<D>,
     /// The nodes whose values may move, if not all.
     pub region: Option<Vec<bool>>,

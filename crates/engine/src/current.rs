@@ -9,7 +9,7 @@ use solver::Stored;
 use crate::Case;
 
 /// The current phase field of a run, as it is stored ([`PhaseField`]), or, as a [`Field`], on the whole grid, which is made of it when it is
-/// first asked for.
+/// first asked for. Outside of a region that has the initial values, also where the former has those of the pure phases since nothing is stored.
 pub struct Current<'a, const D: usize> {
     pub(crate) case: &'a Case<D>,
     /// The initial one before the first step.

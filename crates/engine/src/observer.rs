@@ -28,7 +28,7 @@ impl<const D: usize> Event<'_, D> {
     /// Writes the phase field to a file of the run; nothing where the run is not stored.
     pub fn write_field(&mut self, name: &str) -> Result<(), Error> {
         if let Some(directory) = &mut self.directory {
-            let (case, now) = (&self.run.case, self.run.now());
+            let (case, now) = (&self.run.case, self.run.stored_now());
             let path = directory.path().join(name);
             npy::write_parts(path, case.grid(), &|start, part| {
                 read(case, now, start, part);

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use geometry::measure::{has_interface, l2_distance_of_parts};
-use geometry::{Field, require};
+use geometry::{Field, PhaseField, require};
 use operators::ComputeDevice;
 use runs::Interrupt;
 use serde_json::Value;
@@ -49,6 +49,7 @@ impl<const D: usize> Run<D> {
     /// # Errors
     /// If something in the case is not possible: [`Error::Solver`], [`Error::Fem`], [`Error::Geometry`].
     pub fn new(case: Case<D>, device: &ComputeDevice) -> Result<Self, Error> {
+        case.initial.check_finite()?;
         let initial = Current {
             case: &case,
             stored: &case.initial,
@@ -116,7 +117,7 @@ impl<const D: usize> Run<D> {
             minimization,
         } = self.attempt()?;
         let now = self.motion.stored().map_err(|source| self.failed(source))?;
-        let moved = self.distance(&now, self.now());
+        let moved = self.distance(&now, self.stored_now());
         let travelled = self.distance(&now, &self.case.initial);
         self.stored = Some(now);
         let seconds = clock.elapsed().as_secs_f64();
@@ -316,12 +317,12 @@ impl<const D: usize> Run<D> {
     pub fn current(&self) -> Current<'_, D> {
         Current {
             case: &self.case,
-            stored: self.now(),
+            stored: self.stored_now(),
             whole: &self.whole,
         }
     }
 
-    pub(crate) fn now(&self) -> &Stored<D> {
+    pub(crate) fn stored_now(&self) -> &Stored<D> {
         self.stored.as_ref().unwrap_or(&self.case.initial)
     }
 

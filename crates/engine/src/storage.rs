@@ -24,7 +24,7 @@ pub enum Storage {
 
 /// Bytes for each node of a flow on the whole grid, measured at 128 and 192 cells.
 const PER_NODE: f64 = 300.0;
-/// Bytes for each stored cell of a flow on bricks, and for each node of its grid, on which the initial phase field lies; measured with
+/// Bytes for each stored cell of a flow on bricks, and for each node of its grid, on which the initial phase field is made; measured with
 /// the armadillo at 128, 256 and 512 cells.
 const ON_BRICKS: [f64; 2] = [310.0, 8.0];
 

@@ -160,15 +160,10 @@ pub fn initial<const D: usize>(
     let region = stored.state().array("region");
     let region = region.map(|marks| marks.iter().map(|&mark| mark > 0.5).collect());
     let grid = grid(stored)?;
-    let initial = match bricks(stored, "initial_bricks", &grid)? {
-        Some(bricks) => {
-            let values = stored.state().array("initial");
-            let values = values.ok_or_else(|| lacking(stored, "initial"))?;
-            Stored::from_values(Nodes::on_bricks(grid, bricks), values.to_vec())?
-        }
-        // As earlier versions stored it.
-        None => field(stored, "initial", grid)?.into(),
-    };
+    let bricks = bricks(stored, "initial_bricks", &grid)?;
+    let nodes = bricks.map_or_else(|| grid.into(), |bricks| Nodes::on_bricks(grid, bricks));
+    let initial = Stored::from_values(nodes, values(stored, "initial")?);
+    let initial = initial.map_err(|error| unreadable(stored, error))?;
     Ok((initial, region))
 }
 
@@ -241,8 +236,8 @@ fn restore<const D: usize>(
     }
     check_identity(stored, &wanted)?;
     let grid = *case.grid();
-    let values = |name: &str| state.array(name).map(<[f64]>::to_vec);
-    let previous = match values("previous") {
+    let optional = |name: &str| state.array(name).map(<[f64]>::to_vec);
+    let previous = match optional("previous") {
         Some(previous) => Some((previous, read(stored, &state.notes["previous_tau"])?)),
         None => None,
     };
@@ -253,9 +248,9 @@ fn restore<const D: usize>(
     }
     let at = FlowState {
         bricks: bricks(stored, "bricks", &grid)?,
-        current: values("current").ok_or_else(|| lacking(stored, "current"))?,
+        current: values(stored, "current")?,
         previous,
-        rate: values("rate"),
+        rate: optional("rate"),
         half_motions,
         step: usize::try_from(state.step).map_err(|error| unreadable(stored, error))?,
         time: read(stored, &state.notes["time"])?,
@@ -306,13 +301,12 @@ fn bricks<const D: usize>(
 }
 
 fn field<const D: usize>(stored: &StoredRun, name: &str, grid: Grid<D>) -> Result<Field<D>, Error> {
-    let values = stored.state().array(name);
-    let values = values.ok_or_else(|| lacking(stored, name))?;
-    Ok(Field::from_values(grid, values.to_vec())?)
+    Ok(Field::from_values(grid, values(stored, name)?)?)
 }
 
-fn lacking(stored: &StoredRun, name: &str) -> Error {
-    unreadable(stored, format!("it has no {name:?}"))
+fn values(stored: &StoredRun, name: &str) -> Result<Vec<f64>, Error> {
+    let values = stored.state().array(name).map(<[f64]>::to_vec);
+    values.ok_or_else(|| unreadable(stored, format!("it has no {name:?}")))
 }
 
 pub(crate) fn read<T: DeserializeOwned>(stored: &StoredRun, value: &Value) -> Result<T, Error> {

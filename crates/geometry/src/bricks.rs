@@ -79,9 +79,9 @@ impl<const D: usize> Bricks<D> {
     /// [`Error::Bricks`] unless there is a mark for each brick, as for [`Self::new`].
     pub fn with_marks(cells: usize, marks: &[f64]) -> Result<Self, Error> {
         let per_axis = (1..=cells).find(|per_axis| per_axis.pow(D as u32) >= marks.len());
-        let per_axis = per_axis.filter(|per_axis| per_axis.pow(D as u32) == marks.len());
+        let fits = |n: &usize| n.pow(D as u32) == marks.len() && cells.is_multiple_of(*n);
         // A side of 0 is refused.
-        let side = per_axis.map_or(0, |per_axis| cells / per_axis);
+        let side = per_axis.filter(fits).map_or(0, |per_axis| cells / per_axis);
         let mark = |place| marks[flat(place, cells / side)];
         Self::new(
             cells,
@@ -91,36 +91,46 @@ impl<const D: usize> Bricks<D> {
         )
     }
 
-    /// The bricks on which values of the whole grid are not all the same one of `rests`, that of the negative or of the positive phase, bit
-    /// for bit.
+    /// All but those on which values of the whole grid are one of `rests`, that of the negative or of the positive phase, bit for bit, and
+    /// beside which nothing is in the other phase.
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn holding(
+    pub fn without_phases(
         cells: usize,
         side: usize,
         values: &[f64],
         rests: [f64; 2],
     ) -> Result<Self, Error> {
-        let all = Self::new(cells, side, |_| true, |_| true)?;
-        let [negative, positive] = rests.map(f64::to_bits);
-        let mark = |number: usize| {
-            let mut rows = (number * all.volume()..(number + 1) * all.volume()).step_by(side);
-            let row = |cell| &values[flat(all.multi_index(cell), cells)..][..side];
-            let first = row(number * all.volume())[0];
-            let rests = [negative, positive].contains(&first.to_bits());
-            let same = |value: &f64| value.to_bits() == first.to_bits();
-            let is_constant = rests && rows.all(|cell| row(cell).iter().all(same));
-            if is_constant { first } else { 0.0 }
+        let all = Self::new(cells, side, |_| true, |_| false)?;
+        let (volume, rests) = (all.volume(), rests.map(f64::to_bits));
+        // Whether a brick has nothing but rest values, and which phases are in it.
+        let scan = |number: usize| {
+            let (mut rest, mut phases) = (true, [false; 2]);
+            for cell in (number * volume..(number + 1) * volume).step_by(side) {
+                let start = flat(all.multi_index(cell), cells);
+                for value in &values[start..][..side] {
+                    let phase = usize::from(*value > 0.0);
+                    rest &= value.to_bits() == rests[phase];
+                    phases[phase] = true;
+                }
+            }
+            (rest, phases)
         };
-        let marks = parallel::map(all.places.len(), 1, &mark);
-        let mark = |place| marks[all.number(place).expect("all are active")];
-        Self::new(
-            cells,
-            side,
-            |place| mark(place) == 0.0,
-            |place| mark(place).to_bits() == positive,
-        )
+        let scans = parallel::map(all.places.len(), 1, &scan);
+        let at = |place| scans[all.number(place).expect("all are active")];
+        let beside = |place: [usize; D], offset: usize| {
+            let offset: [usize; D] = digits(offset, 3);
+            std::array::from_fn(|axis| {
+                (place[axis] + offset[axis] + all.per_axis - 1) % all.per_axis
+            })
+        };
+        let is_pure = |place| {
+            let (rest, phases) = at(place);
+            let mut around = (0..3_usize.pow(D as u32)).map(|offset| at(beside(place, offset)).1);
+            rest && around.all(|others| others == phases) && phases != [true; 2]
+        };
+        Self::new(cells, side, |place| !is_pure(place), |place| at(place).1[1])
     }
 
     /// For every brick of the grid, row-major, 0 if it is active, or the sign of the phase that it is in.
@@ -344,7 +354,7 @@ impl<const D: usize> Bricks<D> {
     /// # Panics
     /// If it is on another grid.
     pub fn values_of(&self, u: &impl PhaseField<D>) -> Vec<f64> {
-        let (nodes, stored, rests) = (u.nodes(), u.values(), u.rests());
+        let (nodes, stored) = (u.nodes(), u.values());
         assert_eq!(nodes.grid().cells(), self.cells());
         // A piece of a row lies in one row of one brick on either side.
         let piece = nodes
@@ -354,7 +364,7 @@ impl<const D: usize> Bricks<D> {
         for cell in (0..self.len()).step_by(piece) {
             match nodes.at(self.multi_index(cell)) {
                 Ok(node) => values.extend_from_slice(&stored[node..][..piece]),
-                Err(phase) => values.resize(values.len() + piece, rests[usize::from(phase)]),
+                Err(phase) => values.resize(values.len() + piece, u.value(Err(phase))),
             }
         }
         values

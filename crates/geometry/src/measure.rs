@@ -62,24 +62,33 @@ pub fn touches_side<const D: usize>(u: &impl PhaseField<D>, above: f64) -> bool 
 /// `eps` must be finite and positive.
 pub fn perimeter<const D: usize>(u: &impl PhaseField<D>, eps: f64) -> Result<f64, Error> {
     positive("eps", eps)?;
-    let (nodes, v, rests) = (u.nodes(), u.values(), u.rests());
+    let (nodes, v) = (u.nodes(), u.values());
     let h = nodes.grid().spacing();
     let well = |u: f64| {
         let well = 1.0 - u * u;
         0.5625 * well * well / eps
     };
-    let value = |found: Result<usize, bool>| found.map_or_else(|p| rests[usize::from(p)], |k| v[k]);
+    let square = |[a, b, c, d]: [f64; 4]| ((27.0 * (c - b) - (d - a)) / 24.0).powi(2);
     let density = |node: usize| {
-        let place = nodes.place(node);
+        let (place, here) = (nodes.place(node), v[node]);
         let along = |axis: usize| {
             let beside = nodes.along(node, place, axis, [-1, 1, 2]);
-            let [before, next, second] = beside.map(value);
-            ((27.0 * (next - v[node]) - (second - before)) / 24.0).powi(2)
+            let [before, next, second] = beside.map(|found| u.value(found));
+            let mut squares = square([before, here, next, second]);
+            // Edges where nothing is stored, at whose ends or beside which something is.
+            if beside[0].is_err() {
+                squares += square([before, before, here, next]);
+                squares += square([before, before, before, here]);
+            }
+            if beside[1].is_err() {
+                squares += square([here, next, next, next]);
+            }
+            squares
         };
         let gradient: f64 = (0..D).map(along).sum();
-        0.5 * (eps / (h * h) * gradient + well(v[node]))
+        0.5 * (eps / (h * h) * gradient + well(here))
     };
-    let outside = nodes.outside().into_iter().zip(rests);
+    let outside = nodes.outside().into_iter().zip(u.rests());
     let outside: f64 = outside.map(|(k, rest)| 0.5 * k as f64 * well(rest)).sum();
     Ok(nodes.grid().cell_volume() * (parallel::sum(v.len(), density) + outside))
 }
@@ -90,17 +99,14 @@ pub fn perimeter<const D: usize>(u: &impl PhaseField<D>, eps: f64) -> Result<f64
 /// of which `atanh u`, which is nearly the distance, is interpolated linearly; the volume of
 /// the positive part is then exact. The error is `O(h^2)`, without a contribution of `eps`.
 pub fn zero_set_volume<const D: usize>(u: &impl PhaseField<D>) -> f64 {
-    let (nodes, v, rests) = (u.nodes(), u.values(), u.rests());
+    let (nodes, v) = (u.nodes(), u.values());
     let (grid, orders) = (nodes.grid(), permutations::<D>());
     let cell = |index: usize| {
         let node = nodes.place(index);
         let corner = |bits: usize| {
             let upper =
                 std::array::from_fn(|axis| (node[axis] + (bits >> axis & 1)) % grid.cells());
-            match nodes.at(upper) {
-                Ok(node) => v[node],
-                Err(phase) => rests[usize::from(phase)],
-            }
+            u.value(nodes.at(upper))
         };
         let inside = (0..1_usize << D).filter(|&bits| corner(bits) > 0.0).count();
         if inside == 0 || inside == 1 << D {

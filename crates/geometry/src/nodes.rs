@@ -104,7 +104,7 @@ impl<const D: usize> Nodes<D> {
 }
 
 /// A phase field, as it is stored.
-pub trait PhaseField<const D: usize> {
+pub trait PhaseField<const D: usize>: Sync {
     /// Where its values lie.
     fn nodes(&self) -> Nodes<D>;
 
@@ -114,12 +114,25 @@ pub trait PhaseField<const D: usize> {
     /// The values in the negative and in the positive phase, where nothing is stored.
     fn rests(&self) -> [f64; 2];
 
-    /// The value at a place on the grid.
-    fn at(&self, place: [usize; D]) -> f64 {
-        match self.nodes().at(place) {
+    /// The value at a node, or in a phase where nothing is stored: positive or not.
+    fn value(&self, found: Result<usize, bool>) -> f64 {
+        match found {
             Ok(node) => self.values()[node],
             Err(phase) => self.rests()[usize::from(phase)],
         }
+    }
+
+    /// The value at a place on the grid.
+    fn at(&self, place: [usize; D]) -> f64 {
+        self.value(self.nodes().at(place))
+    }
+
+    /// Checks that no value is NaN or infinite.
+    ///
+    /// # Errors
+    /// [`Error::NonFinite`] with the first node, as it is stored, where one is.
+    fn check_finite(&self) -> Result<(), Error> {
+        check_finite(self.values())
     }
 }
 
@@ -166,7 +179,6 @@ mod tests {
         let field = Field::from_values(grid, dense.clone()).unwrap();
         assert_eq!(few.values_of(&field), x);
         assert_eq!(all.scatter(&all.values_of(&field), [0.0; 2]), dense);
-        assert_eq!(Bricks::holding(48, 16, &dense, rests).unwrap(), few);
 
         let (whole, stored) = (
             Nodes::from(grid),

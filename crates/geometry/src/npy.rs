@@ -51,6 +51,9 @@ pub fn write<const D: usize>(path: impl AsRef<Path>, field: &Field<D>) -> Result
 
 /// The same for a field of which not the whole is in memory: `read` writes the values of nodes in a row from one on, whose number is a
 /// multiple of 4096.
+///
+/// # Errors
+/// [`Error::Io`].
 pub fn write_parts<const D: usize>(
     path: impl AsRef<Path>,
     grid: &Grid<D>,
@@ -59,7 +62,7 @@ pub fn write_parts<const D: usize>(
     let header = header(&grid.shape());
     Ok(write_atomically(path, |out| {
         out.write_all(&header)?;
-        let mut part = [0.0; CHUNK];
+        let mut part = vec![0.0; CHUNK];
         for start in (0..grid.len()).step_by(CHUNK) {
             let part = &mut part[..CHUNK.min(grid.len() - start)];
             read(start, part);

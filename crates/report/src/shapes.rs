@@ -7,7 +7,6 @@ use crate::colour::Colour;
 use crate::error::{Error, Result};
 use crate::geom::{Point, Rect, clip_loop, clip_polyline, thin};
 use crate::panel::Drawable;
-use crate::style::LineStyle;
 use crate::surface::Surface;
 
 /// Closed polylines drawn alike, such as all components of one zero level set.
@@ -16,7 +15,6 @@ use crate::surface::Surface;
 pub struct Curve {
     loops: Vec<Vec<[f64; 2]>>,
     colour: Colour,
-    style: LineStyle,
     width: f64,
     fill: Option<Colour>,
 }
@@ -27,7 +25,6 @@ impl Curve {
         Self {
             loops: loops.into(),
             colour: Colour::Black,
-            style: LineStyle::Solid,
             width: 1.6,
             fill: None,
         }
@@ -36,12 +33,6 @@ impl Curve {
     /// Sets the colour of the outline.
     pub fn with_colour(mut self, colour: impl Into<Colour>) -> Self {
         self.colour = colour.into();
-        self
-    }
-
-    /// Sets the line style of the outline; [`LineStyle::None`] leaves it out.
-    pub fn with_style(mut self, style: LineStyle) -> Self {
-        self.style = style;
         self
     }
 
@@ -148,14 +139,10 @@ impl Drawable for Seen<'_> {
                 let inside: Vec<_> = placed.iter().map(|ring| clip_loop(ring, &plot)).collect();
                 surface.fill(&inside, fill.rgb());
             }
-            if curve.style == LineStyle::None {
-                continue;
-            }
-            let (colour, pattern) = (curve.colour.rgb(), curve.style.pattern());
             for mut ring in placed {
                 ring.extend(ring.first().copied());
                 for piece in clip_polyline(&ring, &plot) {
-                    surface.dashed(&piece, curve.width, colour, pattern);
+                    surface.stroke(&piece, curve.width, curve.colour.rgb());
                 }
             }
         }

@@ -14,8 +14,6 @@ pub enum LineStyle {
     ShortDashed,
     /// Dots.
     Dotted,
-    /// Dashes and dots in turn.
-    DashDot,
     /// Dashes, each followed by two dots.
     DashDotDot,
     /// No line: only the markers are drawn.
@@ -30,7 +28,6 @@ impl LineStyle {
             Self::Dashed => &[8.5, 4.5],
             Self::ShortDashed => &[4.6, 3.2],
             Self::Dotted => &[2.2, 3.2],
-            Self::DashDot => &[9.0, 3.5, 2.2, 3.5],
             Self::DashDotDot => &[9.0, 3.2, 2.2, 3.2, 2.2, 3.2],
         }
     }

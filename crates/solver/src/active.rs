@@ -68,18 +68,13 @@ impl<const D: usize> Active<D> {
 
     /// Those near the interface of a phase field that is stored in another way.
     pub(crate) fn following_field(&self, u: &impl PhaseField<D>) -> Result<Self, Error> {
-        let (nodes, values, rests) = (u.nodes(), u.values(), u.rests());
-        let near = self.near(&nodes, values, REACH);
+        let near = self.near(&u.nodes(), u.values(), REACH);
         let side = self.bricks.side();
-        let first = |place: [usize; D]| match nodes.at(place.map(|at| at * side)) {
-            Ok(node) => values[node],
-            Err(phase) => rests[usize::from(phase)],
-        };
         let bricks = Bricks::new(
             self.grid.cells(),
             side,
             |place| near[self.bricks.flat(place)],
-            |place| first(place) > 0.0,
+            |place| u.at(place.map(|at| at * side)) > 0.0,
         )?;
         if bricks.is_empty() {
             return Err(Error::NoInterface);

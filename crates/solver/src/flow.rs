@@ -229,7 +229,7 @@ impl<const D: usize> WillmoreFlow<D> {
     /// the length or area of the interface.
     ///
     /// # Errors
-    /// As [`Self::with_network`]; [`Error::Model`] for a network whose kernel is not separable, [`Error::Operators`] if the grid cannot be divided
+    /// As [`Self::with_network`]; [`Error::Model`] for a network whose kernel is not separable, [`Error::Geometry`] if the grid cannot be divided
     /// into bricks, and [`Error::NoInterface`].
     pub fn on_bricks(
         network: &Network,
@@ -239,9 +239,9 @@ impl<const D: usize> WillmoreFlow<D> {
     ) -> Result<Self, Error> {
         params.validate()?;
         let nodes = initial.nodes();
-        if !initial.values().iter().all(|value| value.is_finite()) {
-            return Err(Error::non_finite(0, "phase field"));
-        }
+        initial
+            .check_finite()
+            .map_err(|_| Error::non_finite(0, "phase field"))?;
         let grid = nodes.grid();
         network.check_fits(params.ratios(grid, network.ratios().width))?;
         let operator = SeparableOperator::new(network, device)?;

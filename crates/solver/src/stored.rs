@@ -16,7 +16,7 @@ const SIDE: usize = 8;
 /// The values of phase fields in the negative and in the positive phase.
 const PHASES: [f64; 2] = [-1.0, 1.0];
 
-/// The values of a field on the whole grid, or on active bricks, with the constants that it has outside.
+/// The values of a field on the whole grid, or on bricks, with the constants that it has outside.
 #[derive(Clone, Debug)]
 pub struct Stored<const D: usize> {
     nodes: Nodes<D>,
@@ -29,7 +29,7 @@ pub struct Stored<const D: usize> {
 impl<const D: usize> From<Field<D>> for Stored<D> {
     fn from(u: Field<D>) -> Self {
         let grid = *u.grid();
-        match Bricks::holding(grid.cells(), SIDE, u.values(), PHASES) {
+        match Bricks::without_phases(grid.cells(), SIDE, u.values(), PHASES) {
             Ok(bricks) if bricks.len() < grid.len() => {
                 let values = bricks.values_of(&u);
                 Self::new(values, Nodes::on_bricks(grid, Arc::new(bricks)), PHASES)
@@ -84,11 +84,9 @@ impl<const D: usize> Stored<D> {
         if expected != actual {
             return Err(geometry::Error::ValueCount { expected, actual }.into());
         }
-        let mut all = values.iter().enumerate();
-        if let Some((index, &value)) = all.find(|(_, value)| !value.is_finite()) {
-            return Err(geometry::Error::NonFinite { index, value }.into());
-        }
-        Ok(Self::new(values, nodes, PHASES))
+        let stored = Self::new(values, nodes, PHASES);
+        stored.check_finite()?;
+        Ok(stored)
     }
 
     /// All of a phase field.
@@ -107,11 +105,14 @@ impl<const D: usize> Stored<D> {
     /// # Errors
     /// [`Error::Geometry`] for values that are not finite.
     pub fn field(&self) -> Result<Field<D>, Error> {
-        let values = match self.nodes.bricks() {
+        Ok(Field::from_values(*self.grid(), self.on_grid())?)
+    }
+
+    fn on_grid(&self) -> Vec<f64> {
+        match self.nodes.bricks() {
             Some(bricks) => bricks.scatter(&self.values, self.rests),
             None => self.values.clone(),
-        };
-        Ok(Field::from_values(*self.grid(), values)?)
+        }
     }
 
     /// Writes the values of the whole grid for nodes in a row from one on; where it is on bricks, both multiples of their sides.
@@ -134,10 +135,10 @@ impl<const D: usize> Stored<D> {
 
     /// The same field on other bricks.
     pub(crate) fn on(&self, nodes: &Nodes<D>) -> Self {
-        let Some(bricks) = nodes.bricks() else {
-            return self.clone();
+        let values = match nodes.bricks() {
+            Some(bricks) => bricks.values_of(self),
+            None => self.on_grid(),
         };
-        let values = bricks.values_of(self);
         Self::new(values, nodes.clone(), self.rests)
     }
 
@@ -187,9 +188,7 @@ impl<const D: usize> Stored<D> {
             let place = self.nodes.place(node);
             let along = |axis: usize| {
                 let beside = self.nodes.along(node, place, axis, [-1, 1]);
-                let [before, after] = beside.map(|beside| {
-                    beside.map_or_else(|phase| self.rests[usize::from(phase)], |k| self.values[k])
-                });
+                let [before, after] = beside.map(|found| self.value(found));
                 after - 2.0 * self.values[node] + before
             };
             unit * (0..D).map(along).sum::<f64>()
@@ -267,9 +266,8 @@ mod tests {
             let [few, all] = [&part, &whole].map(|u| Sizes::of(u, EPS).unwrap());
             let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-13, "{a} {b}");
             near(zero_set_volume(&part), zero_set_volume(&whole));
-            // Edges that lead to the bricks from outside are left out.
             let lengths = [&part, &whole].map(|u| perimeter(u, EPS).unwrap());
-            assert!((lengths[0] / lengths[1] - 1.0).abs() < 1e-8, "{lengths:?}");
+            near(lengths[0], lengths[1]);
             near(few.perimeter(), all.perimeter());
             near(few.volume(), all.volume());
             let same = |few: Vec<f64>, all: Vec<f64>| assert_eq!(few, bricks.gather(&all));
@@ -303,6 +301,25 @@ mod tests {
         assert_eq!(stored.field().unwrap(), undivided);
         let lacking = Stored::from_values(stored.nodes(), vec![1.0; 3]);
         assert!(lacking.is_err());
+    }
+
+    /// A square whose sides are those of bricks, without a profile.
+    #[test]
+    fn interfaces_between_bricks_are_stored() {
+        let inside = |x: [f64; 2]| x.iter().all(|x| (0.25..0.5).contains(x));
+        let grid = Grid::new(64, 1.0).unwrap();
+        let square = Field::from_fn(grid, |x| if inside(x) { 1.0 } else { -1.0 });
+        let (stored, whole) = (Stored::from(square.clone()), Stored::whole(square));
+        assert_eq!(stored.values.len(), 16 * 64);
+        assert_eq!(stored.field().unwrap(), whole.field().unwrap());
+        let of = |u: &Stored<2>| (perimeter(u, EPS).unwrap(), zero_set_volume(u));
+        let ((length, area), (whole_length, whole_area)) = (of(&stored), of(&whole));
+        assert!((length / whole_length - 1.0).abs() < 1e-13);
+        assert!((area / whole_area - 1.0).abs() < 1e-13);
+        assert_eq!(
+            stored.where_zero(&whole).len(),
+            whole.where_zero(&whole).len()
+        );
     }
 
     #[test]
