@@ -26,11 +26,15 @@ pub fn l2_distance_of_parts<const D: usize>(grid: &Grid<D>, a: &Reader<'_>, b: &
 
 /// Whether there is an interface at all.
 pub fn has_interface<const D: usize>(u: &impl PhaseField<D>) -> bool {
-    let nodes = u.nodes();
-    let outside = nodes.outside().into_iter().zip(u.rests());
+    let inside = u.values().iter().filter(|u| **u > 0.0).count() + positive_outside(u);
+    inside > 0 && inside < u.nodes().grid().len()
+}
+
+/// How many nodes that are not stored have positive values.
+fn positive_outside<const D: usize>(u: &impl PhaseField<D>) -> usize {
+    let outside = u.nodes().outside().into_iter().zip(u.rests());
     let outside = outside.map(|(nodes, rest)| if rest > 0.0 { nodes } else { 0 });
-    let inside = u.values().iter().filter(|u| **u > 0.0).count() + outside.sum::<usize>();
-    inside > 0 && inside < nodes.grid().len()
+    outside.sum()
 }
 
 /// Whether a node at the side of the box has a value above this one.
@@ -124,8 +128,7 @@ pub fn zero_set_volume<const D: usize>(u: &impl PhaseField<D>) -> f64 {
         });
         simplices.sum::<f64>() / orders.len() as f64
     };
-    let [_, outside] = nodes.outside();
-    grid.cell_volume() * (parallel::sum(v.len(), cell) + outside as f64)
+    grid.cell_volume() * (parallel::sum(v.len(), cell) + positive_outside(u) as f64)
 }
 
 /// All orders of the axes.
