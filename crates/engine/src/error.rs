@@ -4,24 +4,18 @@ use std::path::PathBuf;
 
 use thiserror::Error as ThisError;
 
-/// What can stop a case. Errors of the libraries pass through.
+/// What can stop a case.
 #[derive(Debug, ThisError)]
-#[error(transparent)]
 pub enum Error {
     #[error(
         "a reduced volume of {target} is not possible: a ball has 1, any other shape less, this one {present:.4} at the beginning"
     )]
-    ReducedVolume {
-        target: f64,
-        present: f64,
-    },
+    ReducedVolume { target: f64, present: f64 },
     #[error(
         "only a ball has a reduced volume of {reduced_volume:.5}, so that nothing could move: hold one of the two sizes, or a smaller reduced \
          volume"
     )]
-    OnlyBall {
-        reduced_volume: f64,
-    },
+    OnlyBall { reduced_volume: f64 },
     /// A time step that failed, with the case that it belongs to.
     #[error("{case}: {source}")]
     Step {
@@ -54,29 +48,27 @@ pub enum Error {
         "a run with {cells} cells per side cannot be compared with a reference with {reference}: the latter must be a multiple, in the \
          same box"
     )]
-    Incomparable {
-        cells: usize,
-        reference: usize,
-    },
+    Incomparable { cells: usize, reference: usize },
     #[error("there is no step {step} in a run of {steps} steps")]
-    NoSuchStep {
-        step: usize,
-        steps: usize,
-    },
+    NoSuchStep { step: usize, steps: usize },
     /// A stored run of another case, one that is over, or one that cannot be read.
     #[error("the run in {} cannot go on: {reason}", path.display())]
-    Stored {
-        path: PathBuf,
-        reason: String,
-    },
+    Stored { path: PathBuf, reason: String },
     /// From an observer of another crate.
+    #[error(transparent)]
     Observer(Box<dyn std::error::Error + Send + Sync>),
+    #[error(transparent)]
     Runs(#[from] runs::Error),
+    #[error(transparent)]
     Fem(#[from] fem::Error),
+    #[error(transparent)]
     Model(#[from] model::Error),
     /// From the solver, before the first step.
+    #[error(transparent)]
     Solver(#[from] solver::Error),
+    #[error(transparent)]
     Operators(#[from] operators::Error),
+    #[error(transparent)]
     Geometry(#[from] geometry::Error),
 }
 

@@ -133,7 +133,7 @@ impl<const D: usize> Stored<D> {
         device.tensor(&self.values, shape)
     }
 
-    /// The same field on other bricks.
+    /// The same field, stored at other nodes.
     pub(crate) fn on(&self, nodes: &Nodes<D>) -> Self {
         let values = match nodes.bricks() {
             Some(bricks) => bricks.values_of(self),
