@@ -109,6 +109,30 @@ impl Constraints {
         }
     }
 
+    /// The targets after this part of a step from `u`, which approaches them evenly. Where `u` fulfils them, they stay.
+    pub(crate) fn after<const D: usize>(
+        &self,
+        part: f64,
+        u: &Stored<D>,
+        eps: f64,
+    ) -> Result<Self, Error> {
+        if self.is_empty() {
+            return Ok(*self);
+        }
+        let sizes = Sizes::of(u, eps)?;
+        let after = |target: f64, from: f64| {
+            if (from / target - 1.0).abs() <= ITERATES {
+                target
+            } else {
+                from + part * (target - from)
+            }
+        };
+        Ok(Self {
+            perimeter: self.perimeter.map(|to| after(to, sizes.perimeter())),
+            volume: self.volume.map(|to| after(to, sizes.volume())),
+        })
+    }
+
     /// The targets in proportion to what is measured on another grid: `u` is a phase field of this one, `other` of that.
     pub(crate) fn carried<const D: usize>(
         &self,

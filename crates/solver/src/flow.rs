@@ -492,6 +492,7 @@ impl<const D: usize> WillmoreFlow<D> {
             factors: None,
             start: &start,
             tau,
+            constraints: self.constraints,
         })?;
         let scale = self.energy_scale();
         let energies = [minimum.newton.energy_before, minimum.newton.energy];
@@ -543,6 +544,7 @@ impl<const D: usize> WillmoreFlow<D> {
             factors,
             start,
             tau,
+            constraints,
         } = *movement;
         let step = self.step + 1;
         let stiffness = self.params.stiffness(tau);
@@ -568,7 +570,7 @@ impl<const D: usize> WillmoreFlow<D> {
         };
         energy.set(anchor, stiffness)?;
         let (stored, eps) = ((self.grid, self.active.as_ref()), self.params.eps);
-        let mut held = Held::new(&self.constraints, stored, eps, self.region.as_ref(), device);
+        let mut held = Held::new(&constraints, stored, eps, self.region.as_ref(), device);
         let (u, newton, times) = minimize_timed(
             energy,
             (self.region.as_ref(), held.as_mut()),
@@ -603,8 +605,8 @@ impl<const D: usize> WillmoreFlow<D> {
         let [tension, pressure] = multipliers.unwrap_or_default();
         Ok(Minimum {
             u,
-            tension: self.constraints.perimeter.map(|_| tension),
-            pressure: self.constraints.volume.map(|_| pressure),
+            tension: constraints.perimeter.map(|_| tension),
+            pressure: constraints.volume.map(|_| pressure),
             willmore_energy: self.energy_scale() * (newton.energy - fidelity) / (2.0 * tau),
             newton,
             times,
@@ -627,12 +629,13 @@ impl<const D: usize> WillmoreFlow<D> {
     }
 }
 
-/// One minimization: what it is centred at, the factors of the motion if it is weighted, where it begins, and its time step.
+/// One minimization: what it is centred at, the factors of the motion if it is weighted, where it begins, its time step, and what is held.
 struct Movement<'a, const D: usize> {
     anchor: &'a Tensor<D>,
     factors: Option<&'a Tensor<D>>,
     start: &'a Tensor<D>,
     tau: f64,
+    constraints: Constraints,
 }
 
 /// The result of one minimization.

@@ -30,6 +30,7 @@ impl<const D: usize> WillmoreFlow<D> {
                 factors: factors.as_ref(),
                 start: &start,
                 tau: movement.tau,
+                constraints: movement.constraints,
             })?;
             minimum = Minimum {
                 newton: again.newton.after(&minimum.newton),

@@ -11,6 +11,7 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use super::{Minimum, Movement, StepRecord, WillmoreFlow};
+use crate::constraints::Constraints;
 use crate::displacement::{
     curvature_weight, depth, displaced, displacement, metric_weight, on_interface, window,
 };
@@ -56,14 +57,16 @@ impl<const D: usize> WillmoreFlow<D> {
 
         let anticipated = self.anticipated(&before, stage);
         let start = before.zip_map(&limited(&anticipated), displaced);
-        let first = self.stage(&before, &anticipated, &start, stage)?;
+        // Targets are approached evenly, so that both stages go the same way to them.
+        let part_way = self.constraints.after(GAMMA, &before, self.params.eps)?;
+        let first = self.stage(&before, &anticipated, &start, (stage, part_way))?;
         let middle = self.stored(&first.u)?;
 
         let moved = middle.zip_map(&before, displacement);
         let further = moved.map(|y| FURTHER * y);
         let anchor = anchor(&before, &middle, &further);
         let start = middle.zip_map(&further, displaced);
-        let second = self.stage(&anchor, &moved, &start, stage)?;
+        let second = self.stage(&anchor, &moved, &start, (stage, self.constraints))?;
         let after = self.stored(&second.u)?;
 
         let rate = |to: &Stored<D>, from| to.zip_map(from, |u, v| displacement(u, v) / stage);
@@ -94,13 +97,13 @@ impl<const D: usize> WillmoreFlow<D> {
         Ok((record, accepted))
     }
 
-    /// One stage: the minimization from an anchor, weighted for the displacement that is expected of it.
+    /// One stage: the minimization from an anchor, weighted for the displacement that is expected of it, of this size and under these constraints.
     fn stage(
         &mut self,
         anchor: &Stored<D>,
         expected: &Stored<D>,
         start: &Stored<D>,
-        tau: f64,
+        (tau, constraints): (f64, Constraints),
     ) -> Result<Minimum<D>, Error> {
         let long = displaced_part(&expected.map(|y| FURTHER * y), start);
         let factors = self.factors(expected, start, long).tensor(&self.device);
@@ -109,6 +112,7 @@ impl<const D: usize> WillmoreFlow<D> {
             factors: Some(&factors),
             start: &start.tensor(&self.device),
             tau,
+            constraints,
         })
     }
 
