@@ -36,7 +36,7 @@ pub struct StorageOptions {
 }
 
 /// What was measured at one resolution with one storage.
-pub struct Stored {
+pub struct Measured {
     shape: &'static str,
     n: usize,
     storage: Storage,
@@ -66,7 +66,11 @@ impl StorageOptions {
 
     /// Lets the cross flow on bricks, and then the armadillo on both storages at every resolution; the built-in figure in a quick run, or if it
     /// is not here.
-    pub fn measure(&self, networks: &NetworkOptions, session: &mut Session) -> Result<Vec<Stored>> {
+    pub fn measure(
+        &self,
+        networks: &NetworkOptions,
+        session: &mut Session,
+    ) -> Result<Vec<Measured>> {
         let networks = networks.load(&[needed_network()])?;
         let mut dense_or_bricks = networks.learned(Scheme::Accurate, &needed_network())?;
         let quick = session.options.quick;
@@ -89,7 +93,7 @@ impl StorageOptions {
             let time = (steps.rule, if quick { 2 } else { CROSS_STEPS });
             let mut case = Case::willmore(CROSS.key, initial, operator, scales, time);
             case.steps = steps;
-            measured.push(Stored::measure(CROSS.key, n, case, session)?);
+            measured.push(Measured::measure(CROSS.key, n, case, session)?);
         }
         let mut mesh_options = self.mesh.clone();
         mesh_options.procedural |= quick;
@@ -111,14 +115,14 @@ impl StorageOptions {
                 dense_or_bricks.storage = storage;
                 let operator = dense_or_bricks.clone();
                 let case = Case::willmore("armadillo", initial, operator, scales(n), time);
-                measured.push(Stored::measure("armadillo", n, case, session)?);
+                measured.push(Measured::measure("armadillo", n, case, session)?);
             }
         }
         Ok(measured)
     }
 }
 
-impl Stored {
+impl Measured {
     fn measure<const D: usize>(
         shape: &'static str,
         n: usize,
@@ -154,7 +158,7 @@ impl Stored {
 }
 
 /// Writes the table, the metrics and the figure of the two storages.
-pub fn write(stored: &[Stored], session: &mut Session) -> Result<()> {
+pub fn write(stored: &[Measured], session: &mut Session) -> Result<()> {
     let sheet = Sheet::of(stored)
         .keyed(|row, name| format!("{}.n{}.{}.{name}", row.shape, row.n, row.storage))
         .text("shape", |row| row.shape)
@@ -174,7 +178,7 @@ pub fn write(stored: &[Stored], session: &mut Session) -> Result<()> {
     session.figure(figure(stored), "storages")
 }
 
-fn surfaces(measured: &[Stored], storage: Storage, name: &str) -> impl Iterator<Item = [f64; 2]> {
+fn surfaces(measured: &[Measured], storage: Storage, name: &str) -> impl Iterator<Item = [f64; 2]> {
     let rows = measured
         .iter()
         .filter(move |row| row.shape != CROSS.key && row.storage == storage);
@@ -182,14 +186,14 @@ fn surfaces(measured: &[Stored], storage: Storage, name: &str) -> impl Iterator<
 }
 
 /// The exponent of a number on bricks in `n`, from 128 on.
-fn exponent(measured: &[Stored], name: &str) -> Option<f64> {
+fn exponent(measured: &[Measured], name: &str) -> Option<f64> {
     let points = surfaces(measured, Storage::Bricks, name);
     let points: Vec<_> = points.filter(|[n, _]| *n >= COARSEST_FITTED).collect();
     timing::exponent(&points)
 }
 
 /// Seconds and memory against `n`, a colour for each storage.
-fn figure(measured: &[Stored]) -> Figure {
+fn figure(measured: &[Measured]) -> Figure {
     let panel = |title: &str, y: &str, name: &str| {
         let curves = STORAGES.into_iter().enumerate().map(|(colour, storage)| {
             let points: Vec<_> = surfaces(measured, storage, name).collect();

@@ -164,6 +164,7 @@ impl Flowed {
     /// Measures the phase field after a step, and writes its isosurface.
     fn snapshot(&self, step: usize, stage: &Stage<'_>) -> Result<Snapshot> {
         let (case, u) = (&self.trajectory.case, self.trajectory.field(step)?);
+        let u = Stored::from(u);
         // The isosurface is closed by construction; whoever uses the file relies on it.
         let (mesh, _) = ClosedMesh::new(surfaces::phase_field_surface(&u, case.scales.eps)?)?;
         let file = format!("{}.ply", self.file(step));
@@ -176,7 +177,7 @@ impl Flowed {
         let w = if case.grid().len() > MOST_NODES {
             None
         } else {
-            Some(case.implicit_elements()?.willmore_energy(&u)?)
+            Some(case.implicit_elements()?.willmore_energy(&u.field()?)?)
         };
         memory::release_freed();
         let mut measures = Numbers::from([
@@ -248,7 +249,8 @@ impl Flowed {
 
     fn scene(&self, snapshot: &Snapshot) -> Result<Scene> {
         let case = &self.trajectory.case;
-        let mut scene = Scene::new(&self.trajectory.field(snapshot.step)?, case.scales.eps)?;
+        let u = Stored::from(self.trajectory.field(snapshot.step)?);
+        let mut scene = Scene::new(&u, case.scales.eps)?;
         if let Some(region) = &case.region {
             let mask = region.iter().map(|&moves| f64::from(moves)).collect();
             scene = scene.highlight_mask(&Field::from_values(*case.grid(), mask)?, MOVING)?;

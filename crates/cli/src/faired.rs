@@ -67,7 +67,7 @@ pub fn view(up: UpAxis) -> View {
 }
 
 /// The zero set as triangles, which would cut off what is round, with its volume where that can be measured.
-pub fn surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh> {
+pub fn surface(u: &Stored<3>, eps: f64) -> Result<TriangleMesh> {
     let mesh = surfaces::remeshed_surface(u, eps)?;
     let zero_set = ZeroSet::of(u, eps)?;
     Ok(if zero_set.sizes_hold() {

@@ -18,7 +18,7 @@ use crate::volume;
 /// What a run starts from.
 pub struct Start<const D: usize, O> {
     pub name: String,
-    pub field: Field<D>,
+    pub initial: Stored<D>,
     pub presentation: O,
     /// The nodes that move, if not all.
     pub region: Option<Vec<bool>>,
@@ -246,8 +246,8 @@ impl<'a> Reader<'a> {
         };
         let input = self.options.input.as_deref().unwrap_or_default();
         match &loaded {
-            Loaded::Plane(start) => check_phases(&start.field, input)?,
-            Loaded::Space(start) => check_phases(&start.field, input)?,
+            Loaded::Plane(start) => check_phases(&start.initial, input)?,
+            Loaded::Space(start) => check_phases(&start.initial, input)?,
         }
         Ok(loaded)
     }
@@ -333,7 +333,7 @@ impl<'a> Reader<'a> {
         part: f64,
         grids: &[usize],
         refused: Option<&str>,
-    ) -> Result<(Field<3>, Option<ClosedMesh>)> {
+    ) -> Result<(Stored<3>, Option<ClosedMesh>)> {
         let wanted = Topology::of(mesh);
         let (field, surface, found) = self.first_good(grids, |reader| {
             let grid = reader.grid_around(&mesh.bounding_box(), part)?;
@@ -469,10 +469,14 @@ impl<'a> Reader<'a> {
         self.eps_over_h * grid.spacing()
     }
 
-    fn start<const D: usize, O>(&self, field: Field<D>, presentation: O) -> Start<D, O> {
+    fn start<const D: usize, O>(
+        &self,
+        initial: impl Into<Stored<D>>,
+        presentation: O,
+    ) -> Start<D, O> {
         Start {
             name: self.name.clone(),
-            field,
+            initial: initial.into(),
             presentation,
             region: None,
         }
@@ -562,7 +566,7 @@ impl<'a> Reader<'a> {
         Ok(Loaded::Space(self.start(field, space)))
     }
 
-    fn mesh_field(&self, mesh: &ClosedMesh, grid: Grid<3>) -> Result<Field<3>> {
+    fn mesh_field(&self, mesh: &ClosedMesh, grid: Grid<3>) -> Result<Stored<3>> {
         let progress = self.messages.progress();
         let bar = progress.bar("signed distance", grid.cells() as u64);
         let (distance, eps) = (MeshDistance::new(mesh), self.eps(&grid));
@@ -575,7 +579,7 @@ impl<'a> Reader<'a> {
                 "the mesh crosses itself: {mended} nodes of the grid, which its faces put on the wrong side, were put right"
             ));
         }
-        Ok(distance.map(|s| optimal_profile(s, eps)))
+        Ok(distance.map(|s| optimal_profile(s, eps)).into())
     }
 
     fn values<const D: usize, O: Presentation<D>>(&mut self, path: &Path) -> Result<Start<D, O>> {
@@ -636,10 +640,10 @@ fn refuse_photographs(tones: &Tones, side: Side, path: &Path) -> Result<()> {
 }
 
 /// Refuses shapes of which there is nothing on the grid, or nothing else.
-pub fn check_phases<const D: usize>(field: &Field<D>, input: &str) -> Result<()> {
-    let inside = field.values().iter().filter(|u| **u > 0.0).count();
-    let nodes = field.grid().len();
-    if inside == 0 || inside == nodes {
+pub fn check_phases<const D: usize>(u: &impl PhaseField<D>, input: &str) -> Result<()> {
+    if !has_interface(u) {
+        let nodes = u.nodes().grid().len();
+        let inside = if u.at([0; D]) > 0.0 { nodes } else { 0 };
         refuse!(
             "{input} has {inside} of {nodes} nodes inside, so that there is nothing to move: use more --cells, or another size"
         );

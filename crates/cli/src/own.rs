@@ -138,13 +138,13 @@ impl OwnMesh {
     }
 
     /// The grid has the coordinates of the mesh.
-    fn followed(&self, start: &Field<3>, eps: f64) -> Result<Followed> {
+    fn followed(&self, start: &Stored<3>, eps: f64) -> Result<Followed> {
         let in_place = Placement::about([0.0; 3], 1.0)?;
         Ok(self.fairing().follow(in_place, start, eps)?)
     }
 
     /// How far the vertices have gone along the normals, root of the mean square.
-    pub fn measure(&self, start: &Field<3>, eps: f64) -> Result<Measure<3>> {
+    pub fn measure(&self, start: &Stored<3>, eps: f64) -> Result<Measure<3>> {
         let (fairing, followed) = (self.fairing().clone(), self.followed(start, eps)?);
         Ok(Measure::new(DISPLACEMENT, move |u, _| {
             // A field that is not finite stops the run elsewhere.
@@ -164,7 +164,7 @@ impl OwnMesh {
     }
 
     /// The mesh with the vertices where the phase field `u` has taken them, or the new one in its place.
-    pub fn faired(&self, start: &Field<3>, u: &Field<3>, eps: f64, up: UpAxis) -> Result<Faired> {
+    pub fn faired(&self, start: &Stored<3>, u: &Stored<3>, eps: f64, up: UpAxis) -> Result<Faired> {
         let (rough, extension) = (self.rough(), extension(Path::new(&self.file)));
         if self.is_new {
             let mut mesh = surface(u, eps)?;

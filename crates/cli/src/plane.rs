@@ -147,25 +147,25 @@ impl Presentation<2> for Plane {
         Ok(())
     }
 
-    fn picture(&self, _: &Field<2>, u: &Field<2>, eps: f64) -> Result<Picture> {
-        let interface = interface(u, eps)?;
+    fn picture(&self, _: &Stored<2>, u: &Stored<2>, eps: f64) -> Result<Picture> {
+        let interface = interface(&u.field()?, eps)?;
         match &self.original {
             None => Ok(drawing(&self.frame, &interface, Some(Rgb::WHITE))?),
             Some(original) => original.with(&drawing(&self.frame, &interface, None)?),
         }
     }
 
-    fn topology(&self, u: &Field<2>, _: f64) -> Result<Topology> {
+    fn topology(&self, u: &Stored<2>, _: f64) -> Result<Topology> {
         Ok(Topology {
-            components: Outline::of_phase_field(u)?.curves().len(),
+            components: Outline::of_phase_field(&u.field()?)?.curves().len(),
             euler_characteristic: None,
         })
     }
 
-    fn save(&self, u: &Field<2>, eps: f64, path: &Path) -> Result<()> {
+    fn save(&self, u: &Stored<2>, eps: f64, path: &Path) -> Result<()> {
         match &*extension(path) {
             "svg" => {
-                let text = images::svg(&self.frame, &Outline::of_phase_field(u)?);
+                let text = images::svg(&self.frame, &Outline::of_phase_field(&u.field()?)?);
                 files::write_atomically(path, |out| out.write_all(text.as_bytes()))?;
             }
             _ => self.picture(u, u, eps)?.write_png(path)?,

@@ -6,7 +6,8 @@ pub use std::str::FromStr;
 pub use engine::{Case, Measure, Method, Record, Run, Scales, Scheme, StepRule, Stop};
 pub use geometry::measure::{BoundingBox, has_interface};
 pub use geometry::{
-    Field, Grid, Placement, SignedDistance, UpAxis, ZeroSet, npy, optimal_profile, phase_field, vti,
+    Field, Grid, PhaseField, Placement, SignedDistance, Stored, UpAxis, ZeroSet, npy,
+    optimal_profile, phase_field, vti,
 };
 pub use operators::{ComputeDevice, DeviceKind};
 pub use render::{Picture, Scene};

@@ -71,9 +71,9 @@ pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
     fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<()>;
 
     /// A picture, in the same frame for all steps of a flow from `start`.
-    fn picture(&self, start: &Field<D>, u: &Field<D>, eps: f64) -> Result<Picture>;
+    fn picture(&self, start: &Stored<D>, u: &Stored<D>, eps: f64) -> Result<Picture>;
 
-    fn topology(&self, u: &Field<D>, eps: f64) -> Result<Topology>;
+    fn topology(&self, u: &Stored<D>, eps: f64) -> Result<Topology>;
 
     /// The extensions of files that hold it,
     const SAVED: &'static [&'static str];
@@ -90,10 +90,10 @@ pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
     }
 
     /// Writes the shape to any such file.
-    fn save(&self, u: &Field<D>, eps: f64, path: &Path) -> Result<()>;
+    fn save(&self, u: &Stored<D>, eps: f64, path: &Path) -> Result<()>;
 
     /// What becomes of a surface, and how far it has gone.
-    fn faired(&self, _: &Field<D>, _: &Field<D>, _: f64) -> Result<Option<Faired>> {
+    fn faired(&self, _: &Stored<D>, _: &Stored<D>, _: f64) -> Result<Option<Faired>> {
         Ok(None)
     }
 
@@ -102,7 +102,7 @@ pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
         None
     }
 
-    fn known(&self, _: &Field<D>, _: f64) -> Result<Known<D>> {
+    fn known(&self, _: &Stored<D>, _: f64) -> Result<Known<D>> {
         Ok(Known::default())
     }
 

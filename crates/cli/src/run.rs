@@ -100,17 +100,20 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
     }
 
     fn finish(&self, mut store: Store, run: &Run<D>) -> Result<Value> {
-        let (case, u, presentation) = (run.case(), run.field(), &self.presentation);
-        let (start, eps) = (&case.initial.field()?, case.scales.eps);
+        let (case, u, presentation) = (run.case(), run.stored(), &self.presentation);
+        let (start, eps) = (&case.initial, case.scales.eps);
         let directory = store.directory();
-        npy::write(directory.path().join("final.npy"), u)?;
-        directory.adopt_file("final.npy")?;
+        Event {
+            run,
+            directory: Some(directory),
+        }
+        .write_field("final.npy")?;
         // What has vanished leaves no shape behind.
         let (mut faired, mut topology) = (None, Topology::default());
         if has_interface(u) {
             faired = presentation.faired(start, u, eps)?;
         }
-        self.write(case, u, faired.as_ref(), presentation::FINAL, directory)?;
+        self.write(run, faired.as_ref(), presentation::FINAL, directory)?;
         if has_interface(u) {
             topology = presentation.topology(u, eps)?;
             if let Some(path) = &self.options.save {
@@ -179,34 +182,34 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
     /// Writes the field for ParaView and, unless the shape has vanished, a picture and the shape to files `stem.*` of a run.
     fn write(
         &self,
-        case: &Case<D>,
-        u: &Field<D>,
+        run: &Run<D>,
         faired: Option<&Faired>,
         stem: &str,
-        run: &mut RunDirectory,
+        directory: &mut RunDirectory,
     ) -> Result<()> {
+        let u = run.stored();
         if has_interface(u) {
-            let eps = case.scales.eps;
-            let picture = self.presentation.picture(&case.initial.field()?, u, eps)?;
-            let picture = picture.to_png()?;
-            run.write_file(&format!("{stem}.png"), |out| out.write_all(&picture))?;
+            let (start, eps) = (&run.case().initial, run.case().scales.eps);
+            let picture = self.presentation.picture(start, u, eps)?.to_png()?;
+            directory.write_file(&format!("{stem}.png"), |out| out.write_all(&picture))?;
             if let Some(faired) = faired {
                 let figure = faired.displacement.to_svg()?;
-                run.write_file(presentation::DISPLACEMENT, |out| {
+                directory.write_file(presentation::DISPLACEMENT, |out| {
                     out.write_all(figure.as_bytes())
                 })?;
             }
-            self.write_shape(u, eps, faired, stem, run)?;
+            self.write_shape(u, eps, faired, stem, directory)?;
         }
         let name = format!("{stem}.vti");
-        vti::write(run.path().join(&name), "phase_field", u)?;
-        Ok(run.adopt_file(&name)?)
+        let path = directory.path().join(&name);
+        vti::write(path, "phase_field", &run.current())?;
+        Ok(directory.adopt_file(&name)?)
     }
 
     /// Writes the shape to a file `stem.*` of a run.
     fn write_shape(
         &self,
-        u: &Field<D>,
+        u: &Stored<D>,
         eps: f64,
         faired: Option<&Faired>,
         stem: &str,
@@ -219,7 +222,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
     }
 
     /// Writes the shape, or what became of the surface that it was, to a file.
-    fn save(&self, u: &Field<D>, eps: f64, faired: Option<&Faired>, path: &Path) -> Result<()> {
+    fn save(&self, u: &Stored<D>, eps: f64, faired: Option<&Faired>, path: &Path) -> Result<()> {
         match faired {
             Some(faired) => faired.write(path),
             None => self.presentation.save(u, eps, path),
@@ -265,10 +268,10 @@ impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
             return Ok(());
         };
         // An inpainted region may have been all of the shape.
-        if !has_interface(&event.run.current()) {
+        if !has_interface(event.run.stored()) {
             return Ok(());
         }
-        let (case, u, plan) = (event.run.case(), event.run.field(), self.plan);
+        let (case, u, plan) = (event.run.case(), event.run.stored(), self.plan);
         let eps = case.scales.eps;
         if step == 0 {
             let written = plan.write_shape(u, eps, None, presentation::START, run);
@@ -277,7 +280,7 @@ impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
         let frames = plan.options.frames;
         if frames.is_some_and(|every| step.is_multiple_of(every)) {
             let name = presentation::frame(step);
-            let written = plan.write(case, u, None, &name, run);
+            let written = plan.write(event.run, None, &name, run);
             written.map_err(engine::Error::observer)?;
         }
         // Touching sheets have no topology.

@@ -19,7 +19,7 @@ impl FlowOptions {
     /// The sizes that are held, from what they are at the beginning; `of_input` is the volume of the input, if the grid does not say it.
     pub fn held<const D: usize>(
         &self,
-        initial: &Field<D>,
+        initial: &Stored<D>,
         eps: f64,
         of_input: Option<f64>,
     ) -> Result<Held> {
@@ -58,7 +58,7 @@ impl FlowOptions {
 /// With the volume held, where that does not help, or takes too much away, since the shape is too thin.
 pub fn round_edges<const D: usize>(
     options: &mut FlowOptions,
-    start: &mut Field<D>,
+    start: &mut Stored<D>,
     device: &ComputeDevice,
     messages: MessageOptions,
 ) -> Result<()> {
@@ -75,7 +75,7 @@ pub fn round_edges<const D: usize>(
     let targets = options.held(start, eps, None)?.targets();
     let case = Case {
         shape: "edges".to_owned(),
-        initial: start.clone().into(),
+        initial: start.clone(),
         region: None,
         energy: Helfrich::default(),
         held: Held {
@@ -109,7 +109,7 @@ pub fn round_edges<const D: usize>(
             let volume = targets.volume.unwrap_or(sharp.volume);
             options.volume = Some(SizeTarget::To(Amount::Value(volume)));
         }
-        start.clone_from(run.field());
+        start.clone_from(run.stored());
         return Ok(());
     }
     if !holds_volume {

@@ -45,7 +45,7 @@ impl Presentation<3> for Space {
         Ok(())
     }
 
-    fn picture(&self, start: &Field<3>, u: &Field<3>, eps: f64) -> Result<Picture> {
+    fn picture(&self, start: &Stored<3>, u: &Stored<3>, eps: f64) -> Result<Picture> {
         let mut scene = Scene::new(u, eps)?.view(view(self.up));
         // Room to grow, and more only for what grows beyond it, so that the pictures of a film do not jump.
         let start = bounding_box(start).map(|bounds| {
@@ -62,16 +62,16 @@ impl Presentation<3> for Space {
         Ok(scene.render([PIXELS; 2])?)
     }
 
-    fn topology(&self, u: &Field<3>, eps: f64) -> Result<Topology> {
+    fn topology(&self, u: &Stored<3>, eps: f64) -> Result<Topology> {
         let (closed, _) = ClosedMesh::new(surfaces::phase_field_surface(u, eps)?)?;
         Ok(Topology::of(&closed))
     }
 
-    fn save(&self, u: &Field<3>, eps: f64, path: &Path) -> Result<()> {
+    fn save(&self, u: &Stored<3>, eps: f64, path: &Path) -> Result<()> {
         Ok(surfaces::write(path, &surface(u, eps)?)?)
     }
 
-    fn faired(&self, start: &Field<3>, u: &Field<3>, eps: f64) -> Result<Option<Faired>> {
+    fn faired(&self, start: &Stored<3>, u: &Stored<3>, eps: f64) -> Result<Option<Faired>> {
         if let Some(own) = &self.own {
             return own.faired(start, u, eps, self.up).map(Some);
         }
@@ -89,7 +89,7 @@ impl Presentation<3> for Space {
         self.input
     }
 
-    fn known(&self, start: &Field<3>, eps: f64) -> Result<Known<3>> {
+    fn known(&self, start: &Stored<3>, eps: f64) -> Result<Known<3>> {
         let mut known = Known::default();
         if let Some(own) = &self.own {
             known.volume = own.keeps_volume.then(|| own.rough().volume());

@@ -1,11 +1,11 @@
 //! A flow and everything that its result depends on.
 
 use fem::FiniteElementStep;
-use geometry::{Field, Grid};
+use geometry::{Field, Grid, Stored};
 use operators::ComputeDevice;
 use runs::{fingerprint, fingerprint_of_parts};
 use serde_json::{Value, json};
-use solver::{FlowParams, Stored};
+use solver::FlowParams;
 
 use crate::{Error, Flow, Held, Helfrich, Measure, Operator, Scales, Stop, TimeSteps};
 

@@ -3,8 +3,7 @@
 use std::ops::Deref;
 use std::sync::OnceLock;
 
-use geometry::{Field, Nodes, PhaseField};
-use solver::Stored;
+use geometry::{Field, Nodes, PhaseField, Stored};
 
 use crate::Case;
 
@@ -20,10 +19,15 @@ pub struct Current<'a, const D: usize> {
 impl<'a, const D: usize> Current<'a, D> {
     /// It on the whole grid.
     pub(crate) fn field(&self) -> &'a Field<D> {
-        let read = |start: usize, part: &mut [f64]| read(self.case, self.stored, start, part);
+        let read = |start: usize, part: &mut [f64]| self.read(start, part);
         self.whole.get_or_init(|| {
             Field::read_from(*self.case.grid(), &read).expect("stored values are finite")
         })
+    }
+
+    /// Writes the values of the whole grid from a node on, whole rows of bricks.
+    pub fn read(&self, start: usize, part: &mut [f64]) {
+        read(self.case, self.stored, start, part);
     }
 }
 
@@ -36,7 +40,7 @@ impl<const D: usize> Deref for Current<'_, D> {
 }
 
 impl<const D: usize> PhaseField<D> for Current<'_, D> {
-    fn nodes(&self) -> Nodes<D> {
+    fn nodes(&self) -> &Nodes<D> {
         self.stored.nodes()
     }
 
@@ -46,6 +50,14 @@ impl<const D: usize> PhaseField<D> for Current<'_, D> {
 
     fn rests(&self) -> [f64; 2] {
         self.stored.rests()
+    }
+
+    fn at(&self, place: [usize; D]) -> f64 {
+        let moves = |region: &Vec<bool>| region[self.case.grid().index(place)];
+        match &self.case.region {
+            Some(region) if !moves(region) => self.case.initial.at(place),
+            _ => self.stored.at(place),
+        }
     }
 }
 

@@ -1,10 +1,10 @@
 //! Mean curvature flow and Willmore flow behind one interface.
 
 use fem::{FiniteElementStep, Statistics};
-use geometry::Field;
+use geometry::{Field, Stored};
 use model::Network;
 use operators::ComputeDevice;
-use solver::{Constraints, FlowState, MeanCurvatureFlow, StepRecord, Stored, WillmoreFlow};
+use solver::{Constraints, FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow};
 
 use crate::{Case, Error, Flow, Method, Order, Storage};
 

@@ -4,7 +4,6 @@ use geometry::npy;
 use indicatif::ProgressBar;
 use runs::RunDirectory;
 
-use crate::current::read;
 use crate::{Error, Run};
 
 /// A run at its start, or after an accepted step.
@@ -28,10 +27,9 @@ impl<const D: usize> Event<'_, D> {
     /// Writes the phase field to a file of the run; nothing where the run is not stored.
     pub fn write_field(&mut self, name: &str) -> Result<(), Error> {
         if let Some(directory) = &mut self.directory {
-            let (case, now) = (&self.run.case, self.run.stored_now());
-            let path = directory.path().join(name);
-            npy::write_parts(path, case.grid(), &|start, part| {
-                read(case, now, start, part);
+            let (path, now) = (directory.path().join(name), self.run.current());
+            npy::write_parts(path, self.run.case.grid(), &|start, part| {
+                now.read(start, part);
             })?;
             directory.adopt_file(name)?;
         }

@@ -4,11 +4,11 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use geometry::measure::{has_interface, l2_distance_of_parts};
-use geometry::{Field, PhaseField, require};
+use geometry::{Field, PhaseField, Stored, require};
 use operators::ComputeDevice;
 use runs::Interrupt;
 use serde_json::Value;
-use solver::{FlowState, StepRecord, Stored};
+use solver::{FlowState, StepRecord};
 
 use crate::current::read;
 use crate::motion::Motion;
@@ -117,7 +117,7 @@ impl<const D: usize> Run<D> {
             minimization,
         } = self.attempt()?;
         let now = self.motion.stored().map_err(|source| self.failed(source))?;
-        let moved = self.distance(&now, self.stored_now());
+        let moved = self.distance(&now, self.stored());
         let travelled = self.distance(&now, &self.case.initial);
         self.stored = Some(now);
         let seconds = clock.elapsed().as_secs_f64();
@@ -317,12 +317,13 @@ impl<const D: usize> Run<D> {
     pub fn current(&self) -> Current<'_, D> {
         Current {
             case: &self.case,
-            stored: self.stored_now(),
+            stored: self.stored(),
             whole: &self.whole,
         }
     }
 
-    pub(crate) fn stored_now(&self) -> &Stored<D> {
+    /// The same without what a region keeps where nothing is stored.
+    pub fn stored(&self) -> &Stored<D> {
         self.stored.as_ref().unwrap_or(&self.case.initial)
     }
 

@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use geometry::{Bricks, Field, Grid, Nodes, PhaseField};
+use geometry::{Bricks, Field, Grid, Nodes, PhaseField, Stored};
 use operators::ComputeDevice;
 use runs::{RunDirectory, State, StoredRun};
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
-use solver::{FlowState, Stored};
+use solver::FlowState;
 
 use crate::record::to_csv;
 use crate::{Case, Error, Record, Run};

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::{Error, PhaseField, parallel};
+use crate::{Error, parallel};
 
 /// A brick that is not stored, in the tables of neighbours: the field is constant there, in the phase of positive values
 const POSITIVE: i32 = -1;
@@ -213,13 +213,14 @@ impl<const D: usize> Bricks<D> {
         })
     }
 
-    /// Whether a brick that is not active touches the side of the grid, in the negative and in the positive phase.
-    pub(crate) fn phases_at_side(&self) -> [bool; 2] {
-        let last = self.per_axis - 1;
-        let at_side = |brick: usize| self.place(brick).iter().any(|&i| i == 0 || i == last);
-        [NEGATIVE, POSITIVE].map(|phase| {
-            let mut bricks = self.directory.iter().enumerate();
-            bricks.any(|(brick, found)| *found == phase && at_side(brick))
+    /// The first and the last place on the grid of each brick that is not active and in this phase: positive or not.
+    pub(crate) fn not_active(&self, positive: bool) -> impl Iterator<Item = [[usize; D]; 2]> + '_ {
+        let phase = if positive { POSITIVE } else { NEGATIVE };
+        let bricks = self.directory.iter().enumerate();
+        let bricks = bricks.filter(move |(_, found)| **found == phase);
+        bricks.map(|(brick, _)| {
+            let first = self.place(brick).map(|at| at << self.bits);
+            [first, first.map(|at| at + self.side() - 1)]
         })
     }
 
@@ -347,27 +348,6 @@ impl<const D: usize> Bricks<D> {
                 Err(phase) => row.fill(rests[usize::from(phase)]),
             }
         }
-    }
-
-    /// The values on these bricks of a phase field that is stored anywhere on the same grid.
-    ///
-    /// # Panics
-    /// If it is on another grid.
-    pub fn values_of(&self, u: &impl PhaseField<D>) -> Vec<f64> {
-        let (nodes, stored) = (u.nodes(), u.values());
-        assert_eq!(nodes.grid().cells(), self.cells());
-        // A piece of a row lies in one row of one brick on either side.
-        let piece = nodes
-            .bricks()
-            .map_or(self.side(), |b| b.side().min(self.side()));
-        let mut values = Vec::with_capacity(self.len());
-        for cell in (0..self.len()).step_by(piece) {
-            match nodes.at(self.multi_index(cell)) {
-                Ok(node) => values.extend_from_slice(&stored[node..][..piece]),
-                Err(phase) => values.resize(values.len() + piece, u.value(Err(phase))),
-            }
-        }
-        values
     }
 }
 

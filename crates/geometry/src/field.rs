@@ -2,12 +2,12 @@
 
 use crate::nodes::check_finite;
 use crate::parallel::Reader;
-use crate::{Error, Grid, parallel};
+use crate::{Error, Grid, Nodes, PhaseField, parallel};
 
 /// One `f64` per node of a [`Grid`], row-major, last axis fastest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field<const D: usize> {
-    grid: Grid<D>,
+    pub(crate) nodes: Nodes<D>,
     values: Vec<f64>,
 }
 
@@ -17,13 +17,14 @@ impl<const D: usize> Field<D> {
     /// The values are not checked; see [`Field::check_finite`].
     pub fn from_fn(grid: Grid<D>, f: impl Fn([f64; D]) -> f64 + Sync) -> Self {
         let values = parallel::map(grid.len(), 1, &|i| f(grid.node(i)));
-        Self { grid, values }
+        let nodes = grid.into();
+        Self { nodes, values }
     }
 
     /// The constant function.
     pub fn constant(grid: Grid<D>, value: f64) -> Self {
         Self {
-            grid,
+            nodes: grid.into(),
             values: vec![value; grid.len()],
         }
     }
@@ -40,7 +41,8 @@ impl<const D: usize> Field<D> {
                 actual: values.len(),
             });
         }
-        let field = Self { grid, values };
+        let nodes = grid.into();
+        let field = Self { nodes, values };
         field.check_finite()?;
         Ok(field)
     }
@@ -55,7 +57,7 @@ impl<const D: usize> Field<D> {
 
     /// The grid.
     pub fn grid(&self) -> &Grid<D> {
-        &self.grid
+        self.nodes.grid()
     }
 
     /// The nodal values.
@@ -87,7 +89,7 @@ impl<const D: usize> Field<D> {
     #[must_use]
     pub fn map(&self, f: impl Fn(f64) -> f64 + Sync) -> Self {
         Self {
-            grid: self.grid,
+            nodes: self.nodes.clone(),
             values: parallel::values(self.values.len(), |i| f(self.values[i])),
         }
     }
@@ -97,10 +99,10 @@ impl<const D: usize> Field<D> {
     /// # Errors
     /// Both fields must live on the same grid.
     pub fn zip_map(&self, other: &Self, f: impl Fn(f64, f64) -> f64 + Sync) -> Result<Self, Error> {
-        self.grid.same_as(&other.grid)?;
+        self.grid().same_as(other.grid())?;
         let (own, others) = (&self.values, &other.values);
         Ok(Self {
-            grid: self.grid,
+            nodes: self.nodes.clone(),
             values: parallel::values(own.len(), |i| f(own[i], others[i])),
         })
     }
@@ -112,7 +114,7 @@ impl<const D: usize> Field<D> {
 
     /// The multilinear interpolant of `f(value)` at `x`.
     pub(crate) fn interpolate_with(&self, x: [f64; D], f: impl Fn(f64) -> f64) -> f64 {
-        let grid = &self.grid;
+        let grid = self.grid();
         let (mut cell, mut weight) = ([0; D], [0.0; D]);
         for axis in 0..D {
             let cells = grid.cells() as f64;
@@ -140,5 +142,19 @@ impl<const D: usize> Field<D> {
             }
         }
         sum
+    }
+}
+
+impl<const D: usize> PhaseField<D> for Field<D> {
+    fn nodes(&self) -> &Nodes<D> {
+        &self.nodes
+    }
+
+    fn values(&self) -> &[f64] {
+        self.values()
+    }
+
+    fn rests(&self) -> [f64; 2] {
+        [-1.0, 1.0]
     }
 }

@@ -56,6 +56,7 @@ mod nodes;
 mod placement;
 mod profile;
 mod spline;
+mod stored;
 mod thickness;
 mod transfer;
 mod up;
@@ -84,6 +85,7 @@ pub use profile::{
     PURE_BEYOND, distance_from_phase_field, distances_from_phase_field, optimal_profile,
     phase_field, profile_variable,
 };
+pub use stored::Stored;
 pub use thickness::{is_thin, thickness, thin_part};
 pub use up::UpAxis;
 pub use zero_set::ZeroSet;

@@ -43,12 +43,11 @@ pub fn touches_side<const D: usize>(u: &impl PhaseField<D>, above: f64) -> bool 
     let last = nodes.grid().cells() - 1;
     let at_side = |node: usize| (nodes.place(node).iter()).any(|&i| i == 0 || i == last);
     let stored = (u.values().iter().enumerate()).any(|(node, u)| *u > above && at_side(node));
-    let outside = (nodes.bricks()).map_or([false; 2], |bricks| bricks.phases_at_side());
-    let outside = outside.into_iter().zip(u.rests());
-    stored
-        || outside
-            .into_iter()
-            .any(|(there, rest)| there && rest > above)
+    let outside = |phase: bool| {
+        let mut bricks = (nodes.bricks().into_iter()).flat_map(|bricks| bricks.not_active(phase));
+        bricks.any(|[first, end]| first.contains(&0) || end.contains(&last))
+    };
+    stored || ([false, true].into_iter()).any(|phase| u.value(Err(phase)) > above && outside(phase))
 }
 
 /// Perimeter `P_eps[u] = 1/2 integral of eps |grad u|^2 + Psi(u)/eps`, `Psi(u) = 9/16 (1-u^2)^2`.
@@ -216,30 +215,35 @@ impl<const D: usize> BoundingBox<D> {
 ///
 /// The ends come from linear interpolation of `atanh u` along the grid lines, so they are
 /// accurate to `O(h^2)` at a smooth interface. The grid is treated as a picture: it does not wrap.
-pub fn bounding_box<const D: usize>(u: &Field<D>) -> Option<BoundingBox<D>> {
-    let (grid, v) = (u.grid(), u.values());
-    let (mut lower, mut upper) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
-    for (index, &value) in v.iter().enumerate().filter(|(_, value)| **value > 0.0) {
-        let node = grid.multi_index(index);
-        let inside = profile_variable(value);
-        for axis in 0..D {
-            let here = grid.coordinate(axis, node[axis]);
-            // How far the interface is towards a neighbour outside, if that one is.
-            let reach = |neighbour: usize| {
-                let outside = profile_variable(v[neighbour]);
-                if outside > 0.0 {
-                    0.0
-                } else {
-                    grid.spacing() * inside / (inside - outside)
-                }
-            };
-            let stride = grid.stride(axis);
-            let (first, last) = (node[axis] == 0, node[axis] + 1 == grid.cells());
-            let back = if first { 0.0 } else { reach(index - stride) };
-            let ahead = if last { 0.0 } else { reach(index + stride) };
-            lower[axis] = lower[axis].min(here - back);
-            upper[axis] = upper[axis].max(here + ahead);
-        }
-    }
-    (lower[0] <= upper[0]).then_some(BoundingBox { lower, upper })
+pub fn bounding_box<const D: usize>(u: &impl PhaseField<D>) -> Option<BoundingBox<D>> {
+    let (nodes, grid) = (u.nodes(), u.nodes().grid());
+    let point = |place: [usize; D], beyond: &dyn Fn(usize) -> f64| {
+        std::array::from_fn(|axis| grid.coordinate(axis, place[axis]) + beyond(axis))
+    };
+    let around_node = |(node, &value): (usize, &f64)| {
+        let (place, inside) = (nodes.place(node), profile_variable(value));
+        // How far the interface is towards a neighbour outside, if that one is.
+        let reach = |axis: usize, step: isize| {
+            let end = if step < 0 { 0 } else { grid.cells() - 1 };
+            let [beside] = nodes.along(node, place, axis, [step]);
+            let outside = profile_variable(u.value(beside));
+            if place[axis] == end || outside > 0.0 {
+                0.0
+            } else {
+                grid.spacing() * inside / (inside - outside)
+            }
+        };
+        [
+            point(place, &|axis| -reach(axis, -1)),
+            point(place, &|axis| reach(axis, 1)),
+        ]
+    };
+    let stored = u.values().iter().enumerate();
+    let stored = stored.filter(|(_, value)| **value > 0.0);
+    let of_brick = |[first, last]: [[usize; D]; 2]| [first, last].map(|at| point(at, &|_| 0.0));
+    let outside = [false, true]
+        .into_iter()
+        .filter(|phase| u.value(Err(*phase)) > 0.0);
+    let outside = outside.flat_map(|phase| nodes.bricks().map(|bricks| bricks.not_active(phase)));
+    BoundingBox::around((stored.flat_map(around_node)).chain(outside.flatten().flat_map(of_brick)))
 }

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::{Bricks, Error, Field, Grid};
+use crate::{Bricks, Error, Grid};
 
 /// The nodes of a periodic grid whose values are stored: all of them, or those of some bricks, in the order of storage.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Nodes<const D: usize> {
     grid: Grid<D>,
     bricks: Option<Arc<Bricks<D>>>,
@@ -103,10 +103,10 @@ impl<const D: usize> Nodes<D> {
     }
 }
 
-/// A phase field, as it is stored.
+/// A phase field, or a function of one, as it is stored.
 pub trait PhaseField<const D: usize>: Sync {
     /// Where its values lie.
-    fn nodes(&self) -> Nodes<D>;
+    fn nodes(&self) -> &Nodes<D>;
 
     /// The values there.
     fn values(&self) -> &[f64];
@@ -134,19 +134,26 @@ pub trait PhaseField<const D: usize>: Sync {
     fn check_finite(&self) -> Result<(), Error> {
         check_finite(self.values())
     }
-}
 
-impl<const D: usize> PhaseField<D> for Field<D> {
-    fn nodes(&self) -> Nodes<D> {
-        (*self.grid()).into()
-    }
-
-    fn values(&self) -> &[f64] {
-        self.values()
-    }
-
-    fn rests(&self) -> [f64; 2] {
-        [-1.0, 1.0]
+    /// The values on bricks of the grid.
+    ///
+    /// # Panics
+    /// If the bricks are of another grid.
+    fn values_on(&self, bricks: &Bricks<D>) -> Vec<f64> {
+        let (nodes, stored) = (self.nodes(), self.values());
+        assert_eq!(nodes.grid().cells(), bricks.cells());
+        // A piece of a row lies in one row of one brick on either side.
+        let piece = nodes
+            .bricks()
+            .map_or(bricks.side(), |own| own.side().min(bricks.side()));
+        let mut values = Vec::with_capacity(bricks.len());
+        for cell in (0..bricks.len()).step_by(piece) {
+            match nodes.at(bricks.multi_index(cell)) {
+                Ok(node) => values.extend_from_slice(&stored[node..][..piece]),
+                Err(phase) => values.resize(values.len() + piece, self.value(Err(phase))),
+            }
+        }
+        values
     }
 }
 
@@ -164,6 +171,7 @@ pub(crate) fn check_finite(values: &[f64]) -> Result<(), Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Field;
 
     #[test]
     fn values_keep_their_places() {
@@ -177,8 +185,8 @@ mod tests {
         let dense = few.scatter(&x, rests);
         let grid = Grid::new(48, 1.0).unwrap();
         let field = Field::from_values(grid, dense.clone()).unwrap();
-        assert_eq!(few.values_of(&field), x);
-        assert_eq!(all.scatter(&all.values_of(&field), [0.0; 2]), dense);
+        assert_eq!(field.values_on(&few), x);
+        assert_eq!(all.scatter(&field.values_on(&all), [0.0; 2]), dense);
 
         let (whole, stored) = (
             Nodes::from(grid),

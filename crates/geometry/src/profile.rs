@@ -1,7 +1,7 @@
 //! The optimal profile: from signed distances to phase fields and back.
 
 use crate::error::positive;
-use crate::{Error, Field, Grid, SignedDistance};
+use crate::{Error, Field, Grid, PhaseField, SignedDistance, Stored, parallel};
 
 /// Beyond so many interface widths the optimal profile is `-1` or `1` exactly, by rounding.
 pub const PURE_BEYOND: f64 = 26.0;
@@ -36,17 +36,23 @@ pub fn distance_from_phase_field(u: f64, eps: f64) -> f64 {
     -4.0 / 3.0 * eps * profile_variable(u)
 }
 
-/// The [distances](distance_from_phase_field) at all nodes.
+/// The [distances](distance_from_phase_field), where the phase field is stored.
 ///
 /// # Errors
 /// `eps` must be finite and positive, the values finite.
 pub fn distances_from_phase_field<const D: usize>(
-    u: &Field<D>,
+    u: &impl PhaseField<D>,
     eps: f64,
-) -> Result<Field<D>, Error> {
+) -> Result<Stored<D>, Error> {
     positive("eps", eps)?;
     u.check_finite()?;
-    Ok(u.map(|u| distance_from_phase_field(u, eps)))
+    let (distance, values) = (|u| distance_from_phase_field(u, eps), u.values());
+    let distances = parallel::values(values.len(), |node| distance(values[node]));
+    Ok(Stored::new(
+        distances,
+        u.nodes().clone(),
+        u.rests().map(distance),
+    ))
 }
 
 /// The phase field `u = tanh(-3 s(x) / (4 eps))` of a shape with signed distance `s`.

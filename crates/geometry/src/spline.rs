@@ -1,8 +1,8 @@
 //! Fields between their nodes, with continuous gradients.
 
-use crate::Field;
+use crate::{PhaseField, Stored};
 
-impl<const D: usize> Field<D> {
+impl<const D: usize> Stored<D> {
     /// Value and gradient at `x` of the tensor product of Catmull-Rom splines through the nodal values: continuously differentiable, of
     /// third order where the field is smooth, and periodic as the grid.
     pub fn spline(&self, x: [f64; D]) -> (f64, [f64; D]) {
@@ -26,10 +26,10 @@ impl<const D: usize> Field<D> {
             for axis in 0..last {
                 first[axis] = nodes[axis][place(axis)];
             }
-            let first = grid.index(first);
             let (mut line, mut slope) = (0.0, 0.0);
             for (k, node) in nodes[last].into_iter().enumerate() {
-                let value = self.values()[first + node];
+                first[last] = node;
+                let value = self.at(first);
                 line += weights[last][k] * value;
                 slope += slopes[last][k] * value;
             }

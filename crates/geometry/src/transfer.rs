@@ -32,26 +32,6 @@ impl<const D: usize> Field<D> {
         }
         Self::from_values(grid, values)
     }
-
-    /// The nodal values of the periodic grid with the weights `(1, 4, 1) / 6` of a cubic B-spline along every axis, twice: edges are rounded
-    /// over two cells, and `cos(k x)` is multiplied by `((2 + cos k h) / 3)^2`.
-    #[must_use]
-    pub fn smoothed(&self) -> Self {
-        let (grid, cells) = (*self.grid(), self.grid().cells());
-        let mut values = self.values().to_vec();
-        for axis in (0..D).chain(0..D) {
-            let stride = grid.stride(axis);
-            let along = |at: usize| {
-                let k = at / stride % cells;
-                let neighbour = |l: usize| values[at - k * stride + l % cells * stride];
-                (neighbour(k + cells - 1) + 4.0 * values[at] + neighbour(k + 1)) / 6.0
-            };
-            values = parallel::values(grid.len(), along);
-        }
-        let mut smoothed = self.clone();
-        smoothed.values_mut().copy_from_slice(&values);
-        smoothed
-    }
 }
 
 /// `cells` periodic layers of `line` values each, over and over, with layers put in between.
@@ -110,19 +90,6 @@ mod tests {
                 (order - 4.0).abs() < 0.1,
                 "observed order {order} from {errors:?}"
             );
-        }
-    }
-
-    #[test]
-    fn smoothing_multiplies_waves_by_its_symbol() {
-        let wave = wave::<3>(16);
-        let along = |axis: usize| {
-            let cosine = (std::f64::consts::TAU * (axis + 1) as f64 / 16.0).cos();
-            ((2.0 + cosine) / 3.0).powi(2)
-        };
-        let symbol: f64 = (0..3).map(along).product();
-        for (smooth, value) in wave.smoothed().values().iter().zip(wave.values()) {
-            assert!((smooth - symbol * value).abs() < 1e-14);
         }
     }
 

@@ -19,19 +19,19 @@ use std::path::Path;
 
 use files::write_atomically;
 
-use crate::{Error, Field, Grid};
+use crate::{Error, Grid, PhaseField};
 
-/// Writes a field as a point array of that name, atomically (see [`write_atomically`]).
+/// Writes a phase field on its whole grid as a point array of that name, atomically (see [`write_atomically`]).
 ///
 /// # Errors
 /// [`Error::Io`].
 pub fn write<const D: usize>(
     path: impl AsRef<Path>,
     name: &str,
-    field: &Field<D>,
+    field: &impl PhaseField<D>,
 ) -> Result<(), Error> {
     const { assert!(D <= 3, "VTK image data have at most three axes") };
-    let grid = field.grid();
+    let grid = field.nodes().grid();
     Ok(write_atomically(path, |out| {
         out.write_all(header(grid, name).as_bytes())?;
         let size = (grid.len() * size_of::<f64>()) as u64;
@@ -40,7 +40,7 @@ pub fn write<const D: usize>(
             // VTK's fastest axis is our slowest: reverse the axes.
             let mut multi_index = grid.multi_index(position);
             multi_index.reverse();
-            out.write_all(&field.values()[grid.index(multi_index)].to_le_bytes())?;
+            out.write_all(&field.at(multi_index).to_le_bytes())?;
         }
         out.write_all(b"\n  </AppendedData>\n</VTKFile>\n")
     })?)

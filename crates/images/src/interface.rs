@@ -6,7 +6,7 @@ use crate::Error;
 
 /// The distance `s = -(4 eps / 3) atanh u` to the interface of a phase field of width `eps`, interpolated by cubics.
 ///
-/// The interpolant is [`Field::spline`]. Near the interface of a phase field that keeps its profile it is the signed distance;
+/// The interpolant is [`geometry::Stored::spline`]. Near the interface of a phase field that keeps its profile it is the signed distance;
 /// elsewhere it has the right sign. In the box it is periodic; it ends at the faces, beyond which everything is outside.
 ///
 /// # Errors

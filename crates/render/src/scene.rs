@@ -1,7 +1,7 @@
 //! Scenes: a surface and how it is shown.
 
 use geometry::measure::BoundingBox;
-use geometry::{Field, distances_from_phase_field, require};
+use geometry::{Field, PhaseField, Stored, distances_from_phase_field, require};
 use glam::DVec3;
 use rayon::prelude::*;
 use srgb::Rgb;
@@ -68,7 +68,7 @@ impl Scene {
     ///
     /// # Errors
     /// `u` must be finite, and `eps` finite and positive.
-    pub fn new(u: &Field<3>, eps: f64) -> Result<Self, Error> {
+    pub fn new(u: &impl PhaseField<3>, eps: f64) -> Result<Self, Error> {
         let distance = distances_from_phase_field(u, eps)?;
         Ok(Self::of_mesh(isosurface(&distance.smoothed())?))
     }
@@ -119,7 +119,7 @@ impl Scene {
     /// The mask must be finite.
     pub fn highlight_mask(mut self, mask: &Field<3>, colour: Rgb) -> Result<Self, Error> {
         mask.check_finite()?;
-        let mask = mask.smoothed();
+        let mask = Stored::whole(mask.clone()).smoothed().field()?;
         let values = self.mesh.vertices.iter().map(|&x| mask.interpolate(x));
         self.highlight = Some((values.collect(), colour));
         Ok(self)

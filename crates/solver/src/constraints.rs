@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use burn::tensor::Tensor;
 use geometry::zero_set::{SizeHessian, Sizes, least_perimeter, reduced_volume};
-use geometry::{Field, Grid, positive};
+use geometry::{Field, Grid, Stored, positive};
 use operators::{ComputeDevice, HostUpdate, Real, inner_product, retract, update_on_host};
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +22,7 @@ use crate::Error;
 use crate::active::Active;
 use crate::cg::{CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
 use crate::region::Region;
-use crate::stored::Stored;
+use crate::stored::stored;
 
 /// How exactly targets are met in the end, relative to them, in double precision.
 const TOLERANCE: f64 = 1e-12;
@@ -275,7 +275,7 @@ impl<'a, const D: usize> Held<'a, D> {
 
     /// None for values that are not finite.
     fn tangent(&self, u: &Tensor<D>) -> Result<Option<Tangent<D>>, Error> {
-        let stored = Stored::of(u, self.grid, self.active, self.device)?;
+        let stored = stored(u, self.grid, self.active, self.device)?;
         let sizes = match Sizes::of(&stored, self.eps) {
             Err(geometry::Error::NonFinite { .. }) => return Ok(None),
             sizes => sizes?,

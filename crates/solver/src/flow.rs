@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use burn::tensor::Tensor;
-use geometry::{Bricks, Field, Grid, PhaseField, positive};
+use geometry::{Bricks, Field, Grid, PhaseField, Stored, positive};
 use model::{Factors, MeanCurvatureOperator, Network, Ratios, SeparableOperator};
 use operators::{ComputeDevice, inner_product};
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,6 @@ use crate::constraints::{Constraints, Held};
 use crate::newton::{NewtonInfo, NewtonParams, minimize_timed};
 use crate::preconditioner::{PhaseInverse, Preconditioner};
 use crate::region::Region;
-use crate::stored::Stored;
 use crate::times::PhaseTimes;
 use crate::{
     Accuracy, Error, Exit, Helfrich, HelfrichTerms, MeanCurvatureStep, MinimizingMovement,
@@ -247,7 +246,7 @@ impl<const D: usize> WillmoreFlow<D> {
         let operator = SeparableOperator::new(network, device)?;
         let active = Active::new(operator, initial, params.eps)?;
         let bricks = &active.bricks;
-        let current = device.tensor(&bricks.values_of(initial), bricks.shape());
+        let current = device.tensor(&initial.values_on(&bricks), bricks.shape());
         let step = Arc::new(active.step(device));
         Self::begun(step, Some(active), (grid, current), params, device)
     }
@@ -355,7 +354,7 @@ impl<const D: usize> WillmoreFlow<D> {
 
     /// The phase field now.
     pub fn field(&self) -> Result<Field<D>, Error> {
-        self.stored_field()?.field()
+        Ok(self.stored_field()?.field()?)
     }
 
     /// The phase field now, as it is stored.

@@ -76,5 +76,4 @@ pub use model::Factors;
 pub use newton::{Exit, Method, NewtonInfo, NewtonParams, minimize};
 pub use operators::{extrapolate, retract};
 pub use preconditioner::PhaseInverse;
-pub use stored::Stored;
 pub use times::PhaseTimes;

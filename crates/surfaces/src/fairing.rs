@@ -1,6 +1,6 @@
 //! A noisy mesh, and what becomes of its vertices while a phase field flows.
 
-use geometry::{Field, Placement, distances_from_phase_field, is_thin};
+use geometry::{PhaseField, Placement, distances_from_phase_field, is_thin};
 use rayon::prelude::*;
 
 use crate::level_set::project;
@@ -109,7 +109,7 @@ impl Fairing {
     pub fn follow(
         &self,
         placement: Placement<3>,
-        start: &Field<3>,
+        start: &impl PhaseField<3>,
         eps: f64,
     ) -> Result<Followed, Error> {
         let vertices = self.start.mesh().vertices.iter();
@@ -156,7 +156,7 @@ impl Fairing {
     ///
     /// # Errors
     /// The values must be finite.
-    pub fn displacement(&self, followed: &Followed, u: &Field<3>) -> Result<f64, Error> {
+    pub fn displacement(&self, followed: &Followed, u: &impl PhaseField<3>) -> Result<f64, Error> {
         let now = self.faired(followed, u)?;
         let start = self.start.mesh();
         let displacements = along_normals(start, self.rough.mesh(), &now);
@@ -167,7 +167,11 @@ impl Fairing {
     ///
     /// # Errors
     /// The values must be finite.
-    pub fn faired(&self, followed: &Followed, u: &Field<3>) -> Result<TriangleMesh, Error> {
+    pub fn faired(
+        &self,
+        followed: &Followed,
+        u: &impl PhaseField<3>,
+    ) -> Result<TriangleMesh, Error> {
         let now = distances_from_phase_field(u, followed.eps)?;
         let pairs = followed.vertices.par_iter().zip(&followed.levels);
         let moved = pairs.map(|(&x, &level)| project(&now, x, level, REACH * followed.eps));
@@ -198,7 +202,7 @@ impl Followed {
     ///
     /// # Errors
     /// The values must be finite.
-    pub fn left_behind(&self, u: &Field<3>) -> Result<f64, Error> {
+    pub fn left_behind(&self, u: &impl PhaseField<3>) -> Result<f64, Error> {
         let now = distances_from_phase_field(u, self.eps)?;
         let pairs = self.vertices.par_iter().zip(&self.levels);
         let off = pairs.filter(|&(&x, &level)| {

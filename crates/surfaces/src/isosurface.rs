@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use geometry::{Field, distances_from_phase_field};
+use geometry::{PhaseField, distances_from_phase_field};
 use rayon::prelude::*;
 
 use crate::vector::Vector;
@@ -15,7 +15,7 @@ use crate::{Error, TriangleMesh};
 ///
 /// # Errors
 /// `eps` must be finite and positive; otherwise as [`isosurface`].
-pub fn phase_field_surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
+pub fn phase_field_surface(u: &impl PhaseField<3>, eps: f64) -> Result<TriangleMesh, Error> {
     isosurface(&distances_from_phase_field(u, eps)?)
 }
 
@@ -40,15 +40,15 @@ pub fn phase_field_surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error
 ///
 /// # Errors
 /// [`geometry::Error::NonFinite`]; [`Error::TooLarge`].
-pub fn isosurface(s: &Field<3>) -> Result<TriangleMesh, Error> {
+pub fn isosurface(s: &impl PhaseField<3>) -> Result<TriangleMesh, Error> {
     s.check_finite()?;
-    let grid = s.grid();
-    marched(&Lattice::new(
-        grid.shape(),
-        s.values(),
-        grid.origin(),
-        [grid.side(), grid.cells() as f64],
-    ))
+    let grid = s.nodes().grid();
+    marched(&Lattice {
+        size: grid.shape(),
+        value_at: &|place| s.at(place),
+        origin: grid.origin(),
+        spacing: [grid.side(), grid.cells() as f64],
+    })
 }
 
 /// The same of values on a lattice of any size, the last axis fastest, whose nodes have their indices as coordinates: not of a grid in a
@@ -65,7 +65,12 @@ pub fn lattice_surface(size: [usize; 3], values: &[f64]) -> Result<TriangleMesh,
         let value = values[index];
         return Err(geometry::Error::NonFinite { index, value }.into());
     }
-    marched(&Lattice::new(size, values, [0.0; 3], [1.0; 2]))
+    marched(&Lattice {
+        size,
+        value_at: &|[i, j, k]| values[(i * size[1] + j) * size[2] + k],
+        origin: [0.0; 3],
+        spacing: [1.0; 2],
+    })
 }
 
 fn marched(lattice: &Lattice<'_>) -> Result<TriangleMesh, Error> {
@@ -99,33 +104,13 @@ const CLEARANCE: f64 = 1.0 / 1024.0;
 /// The nodes with a layer of outside around them.
 struct Lattice<'a> {
     size: [usize; 3],
-    values: &'a [f64],
-    inside: Vec<bool>,
+    value_at: &'a (dyn Fn([usize; 3]) -> f64 + Sync),
     origin: [f64; 3],
     /// So many nodes along each axis are so long: length and number.
     spacing: [f64; 2],
 }
 
-impl<'a> Lattice<'a> {
-    fn new(size: [usize; 3], values: &'a [f64], origin: [f64; 3], spacing: [f64; 2]) -> Self {
-        let layers = size.map(|n| n + 2);
-        let mut inside = vec![false; layers.iter().product()];
-        for (row, values) in values.chunks(size[2]).enumerate() {
-            let (i, j) = (row / size[1] + 1, row % size[1] + 1);
-            let start = (i * layers[1] + j) * layers[2] + 1;
-            for (inside, &value) in inside[start..].iter_mut().zip(values) {
-                *inside = value < 0.0;
-            }
-        }
-        Self {
-            size,
-            values,
-            inside,
-            origin,
-            spacing,
-        }
-    }
-
+impl Lattice<'_> {
     fn layers(&self) -> [usize; 3] {
         self.size.map(|n| n + 2)
     }
@@ -136,23 +121,35 @@ impl<'a> Lattice<'a> {
     }
 
     fn is_inside(&self, node: Node) -> bool {
-        self.inside[self.index(node)]
+        self.value(node.map(|i| i as isize))
+            .is_some_and(|value| value < 0.0)
+    }
+
+    /// Which nodes of a layer of the first axis are inside.
+    fn inside(&self, i: usize) -> Vec<bool> {
+        let [_, rows, columns] = self.layers();
+        let mut inside = vec![false; rows * columns];
+        if (1..=self.size[0]).contains(&i) {
+            for j in 1..rows - 1 {
+                for k in 1..columns - 1 {
+                    inside[j * columns + k] = (self.value_at)([i - 1, j - 1, k - 1]) < 0.0;
+                }
+            }
+        }
+        inside
     }
 
     /// First corners of the cells with corners on both sides, in order.
     fn mixed_cells(&self) -> Vec<Node> {
-        let layers = self.layers();
+        let [layers, rows, columns] = self.layers();
         let of_layer = |i: usize| {
-            let mut mixed = Vec::new();
-            for j in 0..layers[1] - 1 {
-                let row = |di: usize, dj: usize| {
-                    let start = self.index([i + di, j + dj, 0]);
-                    &self.inside[start..start + layers[2]]
-                };
+            let (layers, mut mixed) = ([i, i + 1].map(|i| self.inside(i)), Vec::new());
+            for j in 0..rows - 1 {
+                let row = |di: usize, dj: usize| &layers[di][(j + dj) * columns..][..columns];
                 let rows = [row(0, 0), row(0, 1), row(1, 0), row(1, 1)];
                 let column = |k: usize| rows.iter().map(|row| u8::from(row[k])).sum::<u8>();
                 let mut left = column(0);
-                for k in 0..layers[2] - 1 {
+                for k in 0..columns - 1 {
                     let right = column(k + 1);
                     if !matches!(left + right, 0 | 8) {
                         mixed.push([i, j, k]);
@@ -162,18 +159,17 @@ impl<'a> Lattice<'a> {
             }
             mixed
         };
-        let by_layer: Vec<Vec<Node>> = (0..layers[0] - 1).into_par_iter().map(of_layer).collect();
+        let by_layer: Vec<Vec<Node>> = (0..layers - 1).into_par_iter().map(of_layer).collect();
         by_layer.concat()
     }
 
     /// The value at a node, `None` outside the grid.
     fn value(&self, node: [isize; 3]) -> Option<f64> {
-        let mut index = 0;
-        for (i, size) in node.into_iter().zip(self.size) {
-            let i = usize::try_from(i - 1).ok().filter(|&i| i < size)?;
-            index = index * size + i;
+        let mut place = [0; 3];
+        for (axis, i) in node.into_iter().enumerate() {
+            place[axis] = (usize::try_from(i - 1).ok()).filter(|&i| i < self.size[axis])?;
         }
-        Some(self.values[index])
+        Some((self.value_at)(place))
     }
 
     fn position(&self, node: Node) -> Vector {

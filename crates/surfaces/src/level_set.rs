@@ -1,6 +1,6 @@
 //! Points on level sets.
 
-use geometry::Field;
+use geometry::Stored;
 
 use crate::vector::Vector;
 
@@ -11,9 +11,9 @@ const TOLERANCE: f64 = 1e-6;
 /// A gradient below this, where that of a distance is 1, points nowhere.
 const FLAT: f64 = 0.1;
 
-/// The point where the [spline](Field::spline) of a distance has the value `level`, by Newton's method along the gradient from `x`.
+/// The point where the [spline](Stored::spline) of a distance has the value `level`, by Newton's method along the gradient from `x`.
 /// Where the gradient vanishes on the way, as in the middle of a plate, it ends; it goes no further than `reach` from `x`.
-pub(crate) fn project(distance: &Field<3>, x: [f64; 3], level: f64, reach: f64) -> [f64; 3] {
+pub(crate) fn project(distance: &Stored<3>, x: [f64; 3], level: f64, reach: f64) -> [f64; 3] {
     let start = Vector::from_array(x);
     let spacing = distance.grid().spacing();
     let mut at = start;

@@ -1,6 +1,6 @@
 //! Zero level sets as meshes of well-shaped triangles.
 
-use geometry::{Field, distances_from_phase_field};
+use geometry::{PhaseField, Stored, distances_from_phase_field};
 
 use crate::half_edges::{HalfEdges, next, previous};
 use crate::level_set::project;
@@ -53,7 +53,7 @@ const ON: f64 = 1e-4;
 ///
 /// # Errors
 /// As [`phase_field_surface`](crate::phase_field_surface).
-pub fn remeshed_surface(u: &Field<3>, eps: f64) -> Result<TriangleMesh, Error> {
+pub fn remeshed_surface(u: &impl PhaseField<3>, eps: f64) -> Result<TriangleMesh, Error> {
     let distance = distances_from_phase_field(u, eps)?;
     let marched = isosurface(&distance)?;
     let Some(mut remeshing) = Remeshing::new(&distance, &marched) else {
@@ -144,14 +144,14 @@ enum Change {
 
 /// The mesh on its way.
 struct Remeshing<'a> {
-    distance: &'a Field<3>,
+    distance: &'a Stored<3>,
     spacing: f64,
     surface: HalfEdges,
     points: Vec<Point>,
 }
 
 impl<'a> Remeshing<'a> {
-    fn new(distance: &'a Field<3>, mesh: &TriangleMesh) -> Option<Self> {
+    fn new(distance: &'a Stored<3>, mesh: &TriangleMesh) -> Option<Self> {
         let normals = mesh.normals.as_ref()?.iter();
         let points = mesh.points().into_iter().zip(normals);
         let points = points.map(|(x, &normal)| Point {

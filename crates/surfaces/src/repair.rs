@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 
 use derive_more::Display;
-use geometry::{Field, Grid, SignedDistance, optimal_profile};
+use geometry::{Field, Grid, SignedDistance, Stored, optimal_profile};
 use rayon::prelude::*;
 
 use crate::hierarchy::{Hierarchy, bounds};
@@ -72,8 +72,7 @@ pub fn repair(mesh: &TriangleMesh, cells: usize) -> Result<Repaired, Error> {
     let unsigned = sampled(grid, to_old)?;
     let eps = EPS_OVER_H * grid.spacing();
     let u = signed(&unsigned, &winding)?.map(|s| optimal_profile(s, eps));
-    let u = without_sharp_edges(&u)?;
-    let new = remeshed_surface(&u, eps)?;
+    let new = remeshed_surface(&without_sharp_edges(u), eps)?;
     if new.faces.is_empty() {
         let spacing = grid.spacing();
         return Err(Error::EnclosesNothing { spacing });
@@ -126,10 +125,10 @@ fn signed(unsigned: &Field<3>, winding: &Field<3>) -> Result<Field<3>, Error> {
 }
 
 /// Smoothed by `S (2 - S)`, which rounds creases and closes gaps narrower than a cell, and moves smooth surfaces by the fourth order only.
-fn without_sharp_edges(u: &Field<3>) -> Result<Field<3>, Error> {
-    let once = u.smoothed();
+fn without_sharp_edges(u: Field<3>) -> Stored<3> {
+    let once = Stored::whole(u).smoothed();
     let twice = once.smoothed();
-    Ok(once.zip_map(&twice, |once, twice| 2.0 * once - twice)?)
+    once.zip_map(&twice, |once, twice| 2.0 * once - twice)
 }
 
 /// Turns faces round so that neighbours across edges of two faces agree, as few as possible of each patch; returns how many.

@@ -252,7 +252,7 @@ fn fair(
         sampled(&distance, grid, &stage.bar)
     })?;
     let mut case = fairing_flow(title, distance)?;
-    let followed = fairing.follow(placement, &case.initial.field()?, case.scales.eps)?;
+    let followed = fairing.follow(placement, &case.initial, case.scales.eps)?;
     let measured = (fairing.clone(), followed.clone());
     case.measures = vec![Measure::new(DISPLACEMENT, move |u, _| {
         let gone = measured.0.displacement(&measured.1, u).ok();
@@ -263,6 +263,6 @@ fn fair(
         Stop::Displacement(fairing.farthest() * placement.scale()),
     ];
     session.phase(title, |stage| {
-        Ok(fairing.faired(&followed, stage.run(case)?.field())?)
+        Ok(fairing.faired(&followed, stage.run(case)?.stored())?)
     })
 }

@@ -145,18 +145,18 @@ impl Segmented {
                 let mut case = fairing_flow(self.name, distance)?;
                 case.measures = vec![Measure::displacement(&case.initial, case.scales.eps)];
                 case.stops = vec![Stop::Time(TIME), Stop::Displacement(FARTHEST)];
-                let mut u = case.initial.field()?;
+                let mut u = case.initial.clone();
                 let mut surface = start.mesh().clone();
                 let mut volume = start.volume();
                 if let Some(keeps) = flow {
                     case.held.volume = keeps.then_some(Target::keep(self.body.volume));
                     let run = stage.run(case.clone())?;
-                    u = run.field().clone();
-                    volume = ZeroSet::of(&run.current(), case.scales.eps)?.volume;
+                    u = run.stored().clone();
+                    volume = ZeroSet::of(&u, case.scales.eps)?.volume;
                     surface = surfaces::remeshed_surface(&u, case.scales.eps)?
                         .with_volume(volume, |_| true);
                 }
-                let elements = case.implicit_elements()?.willmore_energy(&u)?;
+                let elements = case.implicit_elements()?.willmore_energy(&u.field()?)?;
                 Ok(Row {
                     of: self,
                     treatment: (key, words),

@@ -35,8 +35,8 @@ pub fn run(mut options: CheckOptions, messages: MessageOptions) -> Result<()> {
     let device = options.common.open_device()?;
     let eps_over_h = options.scheme.eps_over_h();
     let findings = match Reader::of(&mut options.input, eps_over_h, messages)?.load()? {
-        Loaded::Plane(start) => findings(&start.field, &options, &device)?,
-        Loaded::Space(start) => findings(&start.field, &options, &device)?,
+        Loaded::Plane(start) => findings(&start.initial.field()?, &options, &device)?,
+        Loaded::Space(start) => findings(&start.initial.field()?, &options, &device)?,
     };
     let mut text = String::new();
     for finding in &findings {

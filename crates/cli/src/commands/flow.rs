@@ -201,9 +201,14 @@ impl Job {
         start.presentation.turn(&mut options.up)?;
         options.save.as_deref().map_or(Ok(()), O::check_saved)?;
         if let RunCommand::Flow(options) = &mut self.command {
-            sizes::round_edges(options, &mut start.field, &self.device, self.messages)?;
+            sizes::round_edges(options, &mut start.initial, &self.device, self.messages)?;
         }
-        let case = self.case(&start.name, start.field, start.region, &start.presentation)?;
+        let case = self.case(
+            &start.name,
+            start.initial,
+            start.region,
+            &start.presentation,
+        )?;
         let options = config::resolved(self.command.name(), &self.command)?;
         let plan = self.plan(start.name, start.presentation);
         let notes = plan.notes(&case, &self.device);
@@ -238,7 +243,7 @@ impl Job {
         })?;
         let (initial, region) = engine::initial(&stored)?;
         presentation.restore(&stored)?;
-        let case = self.case(&name, initial.field()?, region, &presentation)?;
+        let case = self.case(&name, initial, region, &presentation)?;
         let plan = self.plan(name, presentation);
         let checkpoints = plan.checkpoints();
         let (store, run) = match more {
@@ -255,7 +260,7 @@ impl Job {
     fn case<const D: usize>(
         &mut self,
         name: &str,
-        initial: Field<D>,
+        initial: Stored<D>,
         region: Option<Vec<bool>>,
         presentation: &impl Presentation<D>,
     ) -> Result<Case<D>> {
@@ -305,7 +310,7 @@ impl Job {
         measures.extend(known.measures);
         Ok(Case {
             shape: name.to_owned(),
-            initial: initial.into(),
+            initial,
             region,
             energy,
             held,

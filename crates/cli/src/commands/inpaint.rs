@@ -22,7 +22,7 @@ impl InpaintOptions {
                 let shape = if Region::is_meant(mask) {
                     region(mask)?
                 } else {
-                    start.presentation.mask(mask, start.field.grid())?
+                    start.presentation.mask(mask, start.initial.grid())?
                 };
                 start.presentation.repair(shape.as_ref())?;
                 Loaded::Plane(self.restricted(start, shape.as_ref())?)
@@ -43,7 +43,8 @@ impl InpaintOptions {
         mut start: Start<D, O>,
         mask: &dyn SignedDistance<D>,
     ) -> Result<Start<D, O>> {
-        let grid = *start.field.grid();
+        let mut field = start.initial.field()?;
+        let grid = *field.grid();
         let inside = |node: usize| mask.signed_distance(grid.node(node)) < 0.0;
         let region: Vec<bool> = (0..grid.len()).map(inside).collect();
         if !region.contains(&true) {
@@ -56,16 +57,16 @@ impl InpaintOptions {
         }
         let eps = self.flow.run.scheme.eps_over_h() * grid.spacing();
         let inner = match &self.ansatz {
-            Ansatz::Keep => start.field.clone(),
+            Ansatz::Keep => field.clone(),
             Ansatz::Empty => Field::constant(grid, -1.0),
             Ansatz::Full => Field::constant(grid, 1.0),
             Ansatz::Shape(shape) => phase_field(grid, shape.shape::<D>()?.as_ref(), eps)?,
         };
-        let values = start.field.values_mut().iter_mut().zip(inner.values());
+        let values = field.values_mut().iter_mut().zip(inner.values());
         for ((value, inner), _) in values.zip(&region).filter(|(_, inside)| **inside) {
             *value = *inner;
         }
-        start.region = Some(region);
+        (start.initial, start.region) = (field.into(), Some(region));
         Ok(start)
     }
 }

@@ -63,7 +63,7 @@ pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<()> {
         match reader.load()? {
             Loaded::Plane(start) => write(start, options, &path)?,
             Loaded::Space(start) if noise > 0.0 => {
-                let u = without(start.field, &options.without)?;
+                let u = without(start.initial.field()?, &options.without)?;
                 let mut mesh = surfaces::remeshed_surface(&u, eps(&u))?;
                 mesh.roughen(noise, options.seed);
                 surfaces::write(&path, &mesh)?;
@@ -86,18 +86,20 @@ fn write<const D: usize, O: Presentation<D>>(
     path: &Path,
 ) -> Result<()> {
     start.presentation.turn(&mut options.up)?;
-    let u = without(start.field, &options.without)?;
+    let u = without(start.initial.field()?, &options.without)?;
+    let eps = eps(&u);
     match &*extension(path) {
         "npy" => npy::write(path, &u)?,
         "nii" | "gz" => volumes::write(path, &segmentation(&u, path)?)?,
         "vti" => vti::write(path, "phase_field", &u)?,
-        "png" => start
-            .presentation
-            .picture(&u, &u, eps(&u))?
-            .write_png(path)?,
+        "png" => {
+            let u = u.into();
+            let picture = start.presentation.picture(&u, &u, eps)?;
+            picture.write_png(path)?;
+        }
         _ => {
             O::check_saved(path)?;
-            start.presentation.save(&u, eps(&u), path)?;
+            start.presentation.save(&u.into(), eps, path)?;
         }
     }
     Ok(())

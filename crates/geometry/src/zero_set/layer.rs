@@ -113,7 +113,7 @@ pub(super) struct Layer<const D: usize> {
 
 impl<const D: usize> Layer<D> {
     pub(super) fn new(u: &impl PhaseField<D>, eps: f64) -> Result<Self, Error> {
-        Self::of((u.nodes(), u.values(), u.rests()), eps)
+        Self::of((u.nodes().clone(), u.values(), u.rests()), eps)
     }
 
     fn of((stored, values, rests): (Nodes<D>, &[f64], [f64; 2]), eps: f64) -> Result<Self, Error> {

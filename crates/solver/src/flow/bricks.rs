@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use burn::tensor::Tensor;
-use geometry::Nodes;
+use geometry::{Nodes, Stored};
 
 use super::{Minimum, Movement, WillmoreFlow};
 use crate::Error;
 use crate::active::Active;
-use crate::stored::Stored;
+use crate::stored::{stored, tensor};
 
 impl<const D: usize> WillmoreFlow<D> {
     /// Minimizes the energy of a movement from the present phase field. If the interface comes near the edge of the active bricks, these are
@@ -18,8 +18,8 @@ impl<const D: usize> WillmoreFlow<D> {
         let (mut anchor, mut factors) = (movement.anchor.clone(), movement.factors.cloned());
         while let Some((from, to)) = self.enlarge(&minimum.u)? {
             let carried = |x: &Tensor<D>| -> Result<Tensor<D>, Error> {
-                let before = Stored::of(x, self.grid, Some(&from), &self.device)?;
-                Ok(before.on(&to.nodes()).tensor(&self.device))
+                let before = stored(x, self.grid, Some(&from), &self.device)?;
+                Ok(tensor(&before.on(&to.nodes()), &self.device))
             };
             let start = carried(&minimum.u)?;
             anchor = carried(&anchor)?;
@@ -66,7 +66,7 @@ impl<const D: usize> WillmoreFlow<D> {
     pub(super) fn go_to(&mut self, next: Active<D>) -> Result<(), Error> {
         let nodes = next.nodes();
         let carried = |u: &Tensor<D>| -> Result<Tensor<D>, Error> {
-            Ok(self.stored(u)?.on(&nodes).tensor(&self.device))
+            Ok(tensor(&self.stored(u)?.on(&nodes), &self.device))
         };
         let current = carried(&self.current)?;
         let previous = match &self.previous {
@@ -96,7 +96,7 @@ impl<const D: usize> WillmoreFlow<D> {
 
     /// A phase field that is stored as the present one is, for arithmetic.
     pub(super) fn stored(&self, u: &Tensor<D>) -> Result<Stored<D>, Error> {
-        Stored::of(u, self.grid, self.active.as_ref(), &self.device)
+        stored(u, self.grid, self.active.as_ref(), &self.device)
     }
 
     /// Refuses what active bricks cannot do.

@@ -8,6 +8,7 @@
 
 use std::time::Instant;
 
+use geometry::Stored;
 use serde::{Deserialize, Serialize};
 
 use super::{Minimum, Movement, StepRecord, WillmoreFlow};
@@ -15,7 +16,7 @@ use crate::constraints::Constraints;
 use crate::displacement::{
     curvature_weight, depth, displaced, displacement, metric_weight, on_interface, window,
 };
-use crate::stored::Stored;
+use crate::stored::tensor;
 use crate::{Error, Start, StartKind};
 
 /// `gamma = 1 - 1/sqrt 2`: the size of a stage over that of the step.
@@ -106,11 +107,11 @@ impl<const D: usize> WillmoreFlow<D> {
         (tau, constraints): (f64, Constraints),
     ) -> Result<Minimum<D>, Error> {
         let long = displaced_part(&expected.map(|y| FURTHER * y), start);
-        let factors = self.factors(expected, start, long).tensor(&self.device);
+        let factors = tensor(&self.factors(expected, start, long), &self.device);
         self.minimize(&Movement {
-            anchor: &anchor.tensor(&self.device),
+            anchor: &tensor(anchor, &self.device),
             factors: Some(&factors),
-            start: &start.tensor(&self.device),
+            start: &tensor(start, &self.device),
             tau,
             constraints,
         })
