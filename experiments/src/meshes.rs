@@ -172,15 +172,16 @@ fn about_file(path: &Path) -> Result<(String, Value)> {
 
 impl Loaded {
     /// The phase field on the grid for which the data were loaded.
-    pub fn phase_field(&self, grid: Grid<3>, eps: f64, bar: &ProgressBar) -> Result<Field<3>> {
-        let profile = |distance: &Field<3>| distance.map(|s| optimal_profile(s, eps));
+    pub fn phase_field(&self, grid: Grid<3>, eps: f64, bar: &ProgressBar) -> Result<Stored<3>> {
+        let profile = |s| optimal_profile(s, eps);
         Ok(match &self.shape {
             Shape::Distance(distance) => {
                 bar.set_length(grid.cells() as u64);
-                profile(&distance.sample_within(PURE_BEYOND * eps, grid, || bar.inc(1))?)
+                let within = distance.sample_within(PURE_BEYOND * eps, grid, || bar.inc(1))?;
+                within.map(profile)
             }
-            Shape::Volume(values, VolumeKind::SignedDistance) => profile(values),
-            Shape::Volume(values, VolumeKind::PhaseField) => values.clone(),
+            Shape::Volume(values, VolumeKind::SignedDistance) => values.map(profile).into(),
+            Shape::Volume(values, VolumeKind::PhaseField) => values.clone().into(),
         })
     }
 }

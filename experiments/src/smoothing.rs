@@ -19,8 +19,8 @@ pub fn rms_distance(mesh: &TriangleMesh, shape: &dyn SignedDistance<3>) -> f64 {
 }
 
 /// Willmore flow from signed distances as `willmore fair` makes it, without its ends and measures.
-pub fn fairing_flow(title: &str, mut distance: Field<3>) -> Result<Case<3>> {
-    surfaces::mend_signs(&mut distance);
+pub fn fairing_flow(title: &str, distance: Field<3>) -> Result<Case<3>> {
+    let (distance, _) = surfaces::mend_signs(Stored::whole(distance));
     let (grid, spacing) = (*distance.grid(), distance.grid().spacing());
     let scales = Scales::of_grid(spacing, 2.0);
     let initial = distance.map(|s| optimal_profile(s, scales.eps));

@@ -285,7 +285,7 @@ impl Setting {
         &self,
         mut session: Session,
         title: &str,
-        surfaces: &[(Surface, Field<3>)],
+        surfaces: &[(Surface, Stored<3>)],
         variants: &[(Method, Scheme)],
         time: (TimeSteps, usize),
         remarks: impl FnOnce(&mut Session, &mut [Flowed]) -> Result<String>,

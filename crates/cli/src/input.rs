@@ -570,16 +570,16 @@ impl<'a> Reader<'a> {
         let progress = self.messages.progress();
         let bar = progress.bar("signed distance", grid.cells() as u64);
         let (distance, eps) = (MeshDistance::new(mesh), self.eps(&grid));
-        let mut distance = distance.sample_within(PURE_BEYOND * eps, grid, || bar.inc(1))?;
+        let distance = distance.sample_within(PURE_BEYOND * eps, grid, || bar.inc(1))?;
         bar.finish();
         progress.clear();
-        let mended = surfaces::mend_signs(&mut distance);
+        let (distance, mended) = surfaces::mend_signs(distance);
         if mended > 0 {
             self.messages.warn(&format!(
                 "the mesh crosses itself: {mended} nodes of the grid, which its faces put on the wrong side, were put right"
             ));
         }
-        Ok(distance.map(|s| optimal_profile(s, eps)).into())
+        Ok(distance.map(|s| optimal_profile(s, eps)))
     }
 
     fn values<const D: usize, O: Presentation<D>>(&mut self, path: &Path) -> Result<Start<D, O>> {

@@ -1,7 +1,7 @@
 //! A flow and everything that its result depends on.
 
 use fem::FiniteElementStep;
-use geometry::{Field, Grid, Stored};
+use geometry::{Grid, Stored};
 use operators::ComputeDevice;
 use runs::{fingerprint, fingerprint_of_parts};
 use serde_json::{Value, json};
@@ -40,7 +40,7 @@ impl<const D: usize> Case<D> {
     /// Willmore flow everywhere, with nothing held, until so many steps are made; the [size](Measure::size) is measured.
     pub fn willmore(
         shape: &str,
-        initial: Field<D>,
+        initial: impl Into<Stored<D>>,
         operator: Operator,
         scales: Scales,
         (steps, count): (impl Into<TimeSteps>, usize),

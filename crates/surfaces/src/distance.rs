@@ -1,8 +1,9 @@
 //! The exact signed distance to a closed mesh.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
-use geometry::{Field, Grid, SignedDistance};
+use geometry::{Bricks, Field, Grid, Nodes, PhaseField, SignedDistance, Stored};
 use rayon::prelude::*;
 
 use crate::hierarchy::{Hierarchy, Nearest};
@@ -32,8 +33,8 @@ pub struct MeshDistance {
     scale: f64,
 }
 
-/// Nodes along a side of the blocks for which it is asked first whether they are far away.
-const BLOCK: usize = 8;
+/// Nodes along a side of the bricks for which it is asked first whether they are far away.
+const SIDE: usize = 8;
 
 /// Two vertices in ascending order.
 type Edge = [u32; 2];
@@ -82,10 +83,21 @@ impl MeshDistance {
     /// # Errors
     /// [`geometry::Error::NonFinite`] for nodes so far away that squares of distances overflow.
     pub fn sample(&self, grid: Grid<3>, layer_done: impl Fn() + Sync) -> Result<Field<3>, Error> {
-        self.sample_within(f64::INFINITY, grid, layer_done)
+        let cells = grid.cells();
+        let mut values = vec![0.0; grid.len()];
+        let layers = values.par_chunks_mut(cells * cells).enumerate();
+        layers.for_each(|(i, layer)| {
+            let mut start = None;
+            for (j, row) in layer.chunks_mut(cells).enumerate() {
+                start = self.sample_row(&grid, [i, j, 0], start, row);
+            }
+            layer_done();
+        });
+        Ok(Field::from_values(grid, values)?)
     }
 
-    /// The same, but distances are cut off beyond `reach`, on either side: where nothing is nearer than that, nothing is searched for.
+    /// The same, but distances are cut off beyond `reach`, on either side, and where nothing is nearer than that, nothing is searched for or
+    /// stored, unless the bricks of this do not fit the grid. `part_done` is called at most as often as there are layers.
     ///
     /// # Errors
     /// As [`Self::sample`].
@@ -93,66 +105,81 @@ impl MeshDistance {
         &self,
         reach: f64,
         grid: Grid<3>,
-        layer_done: impl Fn() + Sync,
-    ) -> Result<Field<3>, Error> {
-        let cells = grid.cells();
-        let blocks = cells.div_ceil(BLOCK);
-        let far = self.far_blocks(reach, &grid);
-        let mut values = vec![0.0; grid.len()];
-        values
-            .par_chunks_mut(cells * cells)
-            .enumerate()
-            .for_each(|(i, layer)| {
-                let x = grid.coordinate(0, i);
-                let mut row_start = None;
-                for (j, row) in layer.chunks_mut(cells).enumerate() {
-                    let y = grid.coordinate(1, j);
-                    let far = &far[(i / BLOCK * blocks + j / BLOCK) * blocks..][..blocks];
-                    let mut near = row_start;
-                    for (k, value) in row.iter_mut().enumerate() {
-                        if let Some(distance) = far[k / BLOCK] {
-                            *value = distance;
-                            continue;
-                        }
-                        let node = Vector::new(x, y, grid.coordinate(2, k));
-                        (*value, near) = self.distance_near(node, near);
-                        *value = value.clamp(-reach, reach);
-                        if k == 0 {
-                            row_start = near;
-                        }
-                    }
+        part_done: impl Fn() + Sync,
+    ) -> Result<Stored<3>, Error> {
+        let Some(bricks) = self.bricks_within(reach, &grid) else {
+            let all = self.sample(grid, part_done)?;
+            return Ok(Stored::whole(all.map(|s| s.clamp(-reach, reach))));
+        };
+        let mut values = vec![0.0; bricks.len()];
+        let part = bricks.places().len().div_ceil(grid.cells()).max(1) * bricks.volume();
+        let parts = values.par_chunks_mut(part).enumerate();
+        parts.for_each(|(number, values)| {
+            let mut start = None;
+            for (row, values) in values.chunks_mut(SIDE).enumerate() {
+                let cell = number * part + row * SIDE;
+                start = self.sample_row(&grid, bricks.multi_index(cell), start, values);
+                for value in values {
+                    *value = value.clamp(-reach, reach);
                 }
-                layer_done();
-            });
-        Ok(Field::from_values(grid, values)?)
+            }
+            part_done();
+        });
+        let nodes = Nodes::on_bricks(grid, Arc::new(bricks));
+        let stored = Stored::new(values, nodes, [reach, -reach]);
+        stored.check_finite()?;
+        Ok(stored)
+    }
+
+    /// The distances of nodes in a row from a place on, and the face nearest to the first of them.
+    fn sample_row(
+        &self,
+        grid: &Grid<3>,
+        [i, j, first]: [usize; 3],
+        near_start: Option<usize>,
+        row: &mut [f64],
+    ) -> Option<usize> {
+        let [x, y] = [grid.coordinate(0, i), grid.coordinate(1, j)];
+        let (mut near, mut start) = (near_start, None);
+        for (k, value) in row.iter_mut().enumerate() {
+            let node = Vector::new(x, y, grid.coordinate(2, first + k));
+            (*value, near) = self.distance_near(node, near);
+            if k == 0 {
+                start = near;
+            }
+        }
+        start
+    }
+
+    /// The bricks of which not all is further away than `reach`, if they fit the grid.
+    fn bricks_within(&self, reach: f64, grid: &Grid<3>) -> Option<Bricks<3>> {
+        let per_axis = grid.cells() / SIDE;
+        let to_centre = 0.5 * (SIDE - 1) as f64 * grid.spacing();
+        let flat = |[i, j, k]: [usize; 3]| (i * per_axis + j) * per_axis + k;
+        let at = |brick: usize, axis: usize| {
+            let place = brick / per_axis.pow(2 - axis as u32) % per_axis;
+            grid.coordinate(axis, place * SIDE) + to_centre
+        };
+        let distance = |brick: usize| {
+            let centre = Vector::new(at(brick, 0), at(brick, 1), at(brick, 2));
+            self.distance_near(centre, None).0
+        };
+        let distances = (0..per_axis.pow(3)).into_par_iter().map(distance);
+        let distances: Vec<f64> = distances.collect();
+        let far = reach + 3.0_f64.sqrt() * to_centre;
+        Bricks::new(
+            grid.cells(),
+            SIDE,
+            |place| !(distances[flat(place)].abs() > far),
+            |place| distances[flat(place)] < 0.0,
+        )
+        .ok()
     }
 
     /// The distances of many points, in parallel.
     pub fn signed_distances(&self, points: &[[f64; 3]]) -> Vec<f64> {
         let points = points.par_iter();
         points.map(|&x| self.signed_distance(x)).collect()
-    }
-
-    /// For every block of `BLOCK^3` nodes, `reach` with its sign if all of the block is further away.
-    fn far_blocks(&self, reach: f64, grid: &Grid<3>) -> Vec<Option<f64>> {
-        let blocks = grid.cells().div_ceil(BLOCK);
-        if reach.is_infinite() {
-            return vec![None; blocks.pow(3)];
-        }
-        let to_centre = 0.5 * (BLOCK - 1) as f64 * grid.spacing();
-        let far = |block: usize| {
-            let place = [
-                block / (blocks * blocks),
-                block / blocks % blocks,
-                block % blocks,
-            ];
-            let at = |axis: usize| grid.coordinate(axis, place[axis] * BLOCK) + to_centre;
-            let centre = Vector::new(at(0), at(1), at(2));
-            let (distance, _) = self.distance_near(centre, None);
-            (distance.abs() > reach + 3.0_f64.sqrt() * to_centre)
-                .then_some(reach.copysign(distance))
-        };
-        (0..blocks.pow(3)).into_par_iter().map(far).collect()
     }
 
     /// The signed distance of `x`, and the nearest face; NaN if there is none. A face that is not

@@ -3,10 +3,11 @@
 #![allow(clippy::float_cmp, reason = "where equality is asserted, it is exact")]
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use crate::common::{Numbers, closed, cube, reversed, sphere, together, torus, translated};
 use geometry::shapes::{self, Ball};
-use geometry::{Field, Grid, Placement, SignedDistance};
+use geometry::{Bricks, Field, Grid, Nodes, PhaseField, Placement, SignedDistance, Stored};
 use surfaces::{ClosedMesh, MeshDistance, mend_signs, samples};
 
 type Point = [f64; 3];
@@ -217,7 +218,8 @@ fn sampling_is_the_distance_at_every_node() {
         // Whole blocks are further away than this, and others in part.
         let reach = 0.1;
         let within = distance.sample_within(reach, grid, || ()).unwrap();
-        for (a, b) in within.values().iter().zip(direct.values()) {
+        assert!(within.values().len() < grid.len());
+        for (a, b) in within.field().unwrap().values().iter().zip(direct.values()) {
             assert!((a - b.clamp(-reach, reach)).abs() < 1e-15, "{a} for {b}");
         }
     }
@@ -275,16 +277,48 @@ fn wrong_signs_are_mended_and_right_ones_stay() {
     let ball = Ball::new([0.0; 3], 0.3).unwrap();
     let grid = Grid::<3>::centred(16, 1.0).unwrap();
     let right = Field::from_fn(grid, |x| ball.signed_distance(x));
-    let mut mended = right.clone();
-    assert_eq!(mend_signs(&mut mended), 0);
-    assert_eq!(mended, right);
+    let (mended, changed) = mend_signs(Stored::whole(right.clone()));
+    assert_eq!((mended.field().unwrap(), changed), (right.clone(), 0));
     // A ray of wrong signs from the surface to the side of the box, and one to the centre.
     let wrong = Field::from_fn(grid, |x| {
         let s = ball.signed_distance(x);
         let on_ray = x[1].abs() < 0.01 && x[2].abs() < 0.01 && x[0] > -0.01;
         if on_ray && s.abs() > 0.05 { -s } else { s }
     });
-    let mut mended = wrong.clone();
-    assert!(mend_signs(&mut mended) > 4);
-    assert_eq!(mended, right);
+    let (mended, changed) = mend_signs(Stored::whole(wrong));
+    assert!(changed > 4);
+    assert_eq!(mended.field().unwrap(), right);
+}
+
+/// Of a distance of which only what is near is stored, also whole bricks of which nothing is.
+#[test]
+fn signs_are_mended_where_nothing_is_stored() {
+    let grid = Grid::<3>::centred(64, 4.0).unwrap();
+    let (ball, reach) = (Ball::new([0.0; 3], 1.7).unwrap(), 0.2);
+    let ball = Field::from_fn(grid, |x| ball.signed_distance(x));
+    let profile = |s: f64| -s.clamp(-reach, reach) / reach;
+    let stored = |s: &Field<3>| Stored::from(s.map(profile)).map(|u| -reach * u);
+    let right = stored(&ball);
+    let (mended, changed) = mend_signs(right.clone());
+    assert_eq!(
+        (mended.field().unwrap(), changed),
+        (right.field().unwrap(), 0)
+    );
+    // A brick in the middle, and one at the corner of the box.
+    let wrong = Bricks::new(
+        64,
+        8,
+        |place| right.nodes().bricks().unwrap().number(place).is_some(),
+        |place| {
+            place == [0; 3] || place != [4; 3] && right.nodes().bricks().unwrap().is_positive(place)
+        },
+    );
+    let wrong = Nodes::on_bricks(grid, Arc::new(wrong.unwrap()));
+    let wrong = Stored::new(right.values().to_vec(), wrong, right.rests());
+    assert_ne!(wrong.field().unwrap(), right.field().unwrap());
+    let (mended, changed) = mend_signs(wrong);
+    assert_eq!(
+        (mended.field().unwrap(), changed),
+        (right.field().unwrap(), 2 * 512)
+    );
 }

@@ -6,11 +6,12 @@ use std::f64::consts::PI;
 
 use crate::common::Numbers;
 use geometry::shapes::{Ball, Cuboid, Torus};
-use geometry::{Field, Grid, SignedDistance, SignedDistanceExt, phase_field};
+use geometry::{Field, Grid, PhaseField, SignedDistance, SignedDistanceExt, Stored, phase_field};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use surfaces::{
-    ClosedMesh, Error, MeshDistance, isosurface, lattice_surface, phase_field_surface, samples,
+    ClosedMesh, Error, MeshDistance, isosurface, lattice_surface, phase_field_surface,
+    remeshed_surface, samples,
 };
 
 /// Every edge once in each direction, without mending anything.
@@ -375,4 +376,29 @@ fn relaxed_surfaces_keep_their_volume_and_their_place() {
     let gone = ways.fold(0.0, f64::max).sqrt();
     // The last move to the volume comes on top.
     assert!(gone < 1.2 * reach, "{gone} {reach}");
+}
+
+/// Stored on bricks, of a shape in the middle, of one that is cut off by the sides of the box, and of what is around both.
+#[test]
+fn surfaces_of_what_is_stored_are_the_same() {
+    let grid = Grid::<3>::centred(64, 4.0).unwrap();
+    let eps = 0.5 * grid.spacing();
+    for (x, sign) in [(0.1, 1.0), (0.1, -1.0), (1.8, 1.0), (1.8, -1.0)] {
+        let ball = Ball::new([x, 0.0, 0.3], 0.9).unwrap();
+        let u = phase_field(grid, &ball, eps).unwrap().map(|u| sign * u);
+        let stored = Stored::from(u.clone());
+        assert!(4 * stored.values().len() < 3 * grid.len());
+        let marched = [
+            phase_field_surface(&stored, eps),
+            phase_field_surface(&u, eps),
+        ];
+        let [few, all] = marched.map(Result::unwrap);
+        assert_eq!(
+            (few.vertices, few.normals, few.faces),
+            (all.vertices, all.normals, all.faces)
+        );
+        let [few, all] =
+            [remeshed_surface(&stored, eps), remeshed_surface(&u, eps)].map(Result::unwrap);
+        assert_eq!((few.vertices, few.faces), (all.vertices, all.faces));
+    }
 }

@@ -66,7 +66,7 @@ pub fn program(options: &Options) -> Result<()> {
             shown: energies.map(|(step, w)| (step, Some(w))).to_vec(),
             view: VIEW,
         };
-        phase_field(grid, shape, eps).map(|initial| (surface, initial))
+        phase_field(grid, shape, eps).map(|initial| (surface, initial.into()))
     };
     let surfaces = [
         start("cube", "cube", &cube, CUBE_ENERGIES)?,
