@@ -244,6 +244,6 @@ pub fn bounding_box<const D: usize>(u: &impl PhaseField<D>) -> Option<BoundingBo
     let outside = [false, true]
         .into_iter()
         .filter(|phase| u.value(Err(*phase)) > 0.0);
-    let outside = outside.flat_map(|phase| nodes.bricks().map(|bricks| bricks.not_active(phase)));
+    let outside = outside.filter_map(|phase| nodes.bricks().map(|bricks| bricks.not_active(phase)));
     BoundingBox::around((stored.flat_map(around_node)).chain(outside.flatten().flat_map(of_brick)))
 }

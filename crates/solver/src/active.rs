@@ -68,7 +68,7 @@ impl<const D: usize> Active<D> {
 
     /// Those near the interface of a phase field that is stored in another way.
     pub(crate) fn following_field(&self, u: &impl PhaseField<D>) -> Result<Self, Error> {
-        let near = self.near(&u.nodes(), u.values(), REACH);
+        let near = self.near(u.nodes(), u.values(), REACH);
         let side = self.bricks.side();
         let bricks = Bricks::new(
             self.grid.cells(),

@@ -246,7 +246,7 @@ impl<const D: usize> WillmoreFlow<D> {
         let operator = SeparableOperator::new(network, device)?;
         let active = Active::new(operator, initial, params.eps)?;
         let bricks = &active.bricks;
-        let current = device.tensor(&initial.values_on(&bricks), bricks.shape());
+        let current = device.tensor(&initial.values_on(bricks), bricks.shape());
         let step = Arc::new(active.step(device));
         Self::begun(step, Some(active), (grid, current), params, device)
     }

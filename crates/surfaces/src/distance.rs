@@ -167,10 +167,12 @@ impl MeshDistance {
         let distances = (0..per_axis.pow(3)).into_par_iter().map(distance);
         let distances: Vec<f64> = distances.collect();
         let far = reach + 3.0_f64.sqrt() * to_centre;
+        // Not where it is NaN, which is to be seen.
+        let is_far = |place| distances[flat(place)].abs() > far;
         Bricks::new(
             grid.cells(),
             SIDE,
-            |place| !(distances[flat(place)].abs() > far),
+            |place| !is_far(place),
             |place| distances[flat(place)] < 0.0,
         )
         .ok()
