@@ -80,6 +80,14 @@ fn an_interrupted_run_on_bricks_continues_with_the_same_bytes() {
         for (node, (now, start)) in values.filter(|(node, _)| stays(*node)) {
             assert_eq!(now.to_bits(), start.to_bits(), "node {node}");
         }
+        // Node by node, too, as files are written.
+        let mut run = Run::new(case.clone(), &device()).unwrap();
+        run.step().unwrap();
+        let now = run.current();
+        for (node, value) in run.field().values().iter().enumerate() {
+            let there = now.at(start.grid().multi_index(node));
+            assert_eq!(there.to_bits(), value.to_bits(), "node {node}");
+        }
     }
 }
 
