@@ -26,7 +26,7 @@ impl<'a, const D: usize> Current<'a, D> {
     }
 
     /// Writes the values of the whole grid from a node on, whole rows of bricks.
-    pub fn read(&self, start: usize, part: &mut [f64]) {
+    pub(crate) fn read(&self, start: usize, part: &mut [f64]) {
         read(self.case, self.stored, start, part);
     }
 }

@@ -7,7 +7,7 @@ use crate::{Error, Grid, Nodes, PhaseField, parallel};
 /// One `f64` per node of a [`Grid`], row-major, last axis fastest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field<const D: usize> {
-    pub(crate) nodes: Nodes<D>,
+    nodes: Nodes<D>,
     values: Vec<f64>,
 }
 

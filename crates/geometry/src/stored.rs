@@ -49,7 +49,7 @@ impl<const D: usize> PhaseField<D> for Stored<D> {
 }
 
 impl<const D: usize> Stored<D> {
-    /// Values as they are stored; `rests` elsewhere.
+    /// As many values as there are nodes, and `rests` elsewhere, in the negative and in the positive phase.
     pub fn new(values: Vec<f64>, nodes: Nodes<D>, rests: [f64; 2]) -> Self {
         Self {
             nodes,
