@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::{Error, parallel};
+use crate::Error;
+use crate::parallel::{self, Reader};
 
 /// A brick that is not stored, in the tables of neighbours: the field is constant there, in the phase of positive values
 const POSITIVE: i32 = -1;
@@ -91,15 +92,15 @@ impl<const D: usize> Bricks<D> {
         )
     }
 
-    /// All but those on which values of the whole grid are one of `rests`, that of the negative or of the positive phase, bit for bit, and
-    /// beside which nothing is in the other phase.
+    /// All but those on which the values of the whole grid, which `read` writes, are one of `rests`, that of the negative or of the positive
+    /// phase, bit for bit, and beside which nothing is in the other phase.
     ///
     /// # Errors
     /// As [`Self::new`].
     pub fn without_phases(
         cells: usize,
         side: usize,
-        values: &[f64],
+        read: &Reader<'_>,
         rests: [f64; 2],
     ) -> Result<Self, Error> {
         let all = Self::new(cells, side, |_| true, |_| false)?;
@@ -107,9 +108,10 @@ impl<const D: usize> Bricks<D> {
         // Whether a brick has nothing but rest values, and which phases are in it.
         let scan = |number: usize| {
             let (mut rest, mut phases) = (true, [false; 2]);
+            let mut row = vec![0.0; side];
             for cell in (number * volume..(number + 1) * volume).step_by(side) {
-                let start = flat(all.multi_index(cell), cells);
-                for value in &values[start..][..side] {
+                read(flat(all.multi_index(cell), cells), &mut row);
+                for value in &row {
                     let phase = usize::from(*value > 0.0);
                     rest &= value.to_bits() == rests[phase];
                     phases[phase] = true;
@@ -326,6 +328,18 @@ impl<const D: usize> Bricks<D> {
             let start = flat(self.multi_index(cell), self.cells());
             values.extend_from_slice(&dense[start..][..self.side()]);
         }
+        values
+    }
+
+    /// The same where `read` writes the values of the whole grid.
+    pub(crate) fn gather_from(&self, read: &Reader<'_>) -> Vec<f64> {
+        let mut values = vec![0.0; self.len()];
+        parallel::over_chunks(&mut values, self.volume(), &|first, brick| {
+            for (row, part) in brick.chunks_exact_mut(self.side()).enumerate() {
+                let cell = first + (row << self.bits);
+                read(flat(self.multi_index(cell), self.cells()), part);
+            }
+        });
         values
     }
 

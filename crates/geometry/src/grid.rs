@@ -131,6 +131,15 @@ impl<const D: usize> Grid<D> {
         self.origin[axis] + self.side * (i as f64 / self.cells as f64)
     }
 
+    /// The row-major index of the node that is nearest to a point in the box.
+    pub fn nearest(&self, x: [f64; D]) -> usize {
+        let last = self.cells - 1;
+        self.index(std::array::from_fn(|axis| {
+            let at = (x[axis] - self.origin[axis]) / self.spacing();
+            (at.round() as usize).min(last)
+        }))
+    }
+
     /// Row-major index of a node given by its index along each axis (taken modulo `N`).
     pub fn index(&self, multi_index: [usize; D]) -> usize {
         multi_index

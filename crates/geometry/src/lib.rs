@@ -83,7 +83,7 @@ pub use nodes::{Nodes, PhaseField};
 pub use placement::Placement;
 pub use profile::{
     PURE_BEYOND, distance_from_phase_field, distances_from_phase_field, optimal_profile,
-    phase_field, profile_variable,
+    phase_field, profile_variable, stored_phase_field,
 };
 pub use stored::Stored;
 pub use thickness::{is_thin, thickness, thin_part};

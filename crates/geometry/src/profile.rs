@@ -68,9 +68,37 @@ pub fn phase_field<const D: usize>(
     eps: f64,
 ) -> Result<Field<D>, Error> {
     positive("eps", eps)?;
-    let field = Field::from_fn(grid, |x| optimal_profile(shape.signed_distance(x), eps));
-    field.check_finite()?;
-    Ok(field)
+    Field::read_from(grid, &|first, part| {
+        of_shape(&grid, shape, eps, first, part);
+    })
+}
+
+/// The same [phase field](phase_field), of which only what is near the interface is in memory.
+///
+/// # Errors
+/// As for [`phase_field`].
+pub fn stored_phase_field<const D: usize>(
+    grid: Grid<D>,
+    shape: &(impl SignedDistance<D> + ?Sized),
+    eps: f64,
+) -> Result<Stored<D>, Error> {
+    positive("eps", eps)?;
+    Stored::read_from(grid, &|first, part| {
+        of_shape(&grid, shape, eps, first, part);
+    })
+}
+
+/// Writes the values of a shape's phase field from a node on.
+fn of_shape<const D: usize>(
+    grid: &Grid<D>,
+    shape: &(impl SignedDistance<D> + ?Sized),
+    eps: f64,
+    first: usize,
+    part: &mut [f64],
+) {
+    for (value, node) in part.iter_mut().zip(first..) {
+        *value = optimal_profile(shape.signed_distance(grid.node(node)), eps);
+    }
 }
 
 #[cfg(test)]

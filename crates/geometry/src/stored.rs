@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::{Bricks, Error, Field, Grid, Nodes, PhaseField, parallel};
+use crate::parallel::{self, Reader};
+use crate::{Bricks, Error, Field, Grid, Nodes, PhaseField};
 
 /// Nodes are worked on in pieces of this many.
 const CHUNK: usize = 1 << 14;
@@ -20,17 +21,13 @@ pub struct Stored<const D: usize> {
     rests: [f64; 2],
 }
 
-/// Without the parts of the grid on which it is nothing but -1 or 1, if there are such.
+/// Without its pure phases, as [`Stored::read_from`].
 impl<const D: usize> From<Field<D>> for Stored<D> {
     fn from(u: Field<D>) -> Self {
-        let grid = *u.grid();
-        match Bricks::without_phases(grid.cells(), SIDE, u.values(), PHASES) {
-            Ok(bricks) if bricks.len() < grid.len() => {
-                let values = u.values_on(&bricks);
-                Self::new(values, Nodes::on_bricks(grid, Arc::new(bricks)), PHASES)
-            }
-            _ => Self::whole(u),
-        }
+        let values = u.values();
+        let read =
+            |start: usize, part: &mut [f64]| part.copy_from_slice(&values[start..][..part.len()]);
+        Self::without_phases(*u.grid(), &read).unwrap_or_else(|| Self::whole(u))
     }
 }
 
@@ -70,6 +67,28 @@ impl<const D: usize> Stored<D> {
         let stored = Self::new(values, nodes, PHASES);
         stored.check_finite()?;
         Ok(stored)
+    }
+
+    /// The phase field whose values `read` writes for nodes in a row from one on, perhaps more than once, without the parts of the grid on
+    /// which it is nothing but -1 or 1, if there are such: they are never in memory.
+    ///
+    /// # Errors
+    /// [`Error::NonFinite`].
+    pub fn read_from(grid: Grid<D>, read: &Reader<'_>) -> Result<Self, Error> {
+        let Some(stored) = Self::without_phases(grid, read) else {
+            return Ok(Self::whole(Field::read_from(grid, read)?));
+        };
+        stored.check_finite()?;
+        Ok(stored)
+    }
+
+    /// None if all of the grid is stored.
+    fn without_phases(grid: Grid<D>, read: &Reader<'_>) -> Option<Self> {
+        let bricks = Bricks::without_phases(grid.cells(), SIDE, read, PHASES).ok()?;
+        (bricks.len() < grid.len()).then(|| {
+            let values = bricks.gather_from(read);
+            Self::new(values, Nodes::on_bricks(grid, Arc::new(bricks)), PHASES)
+        })
     }
 
     /// All of a phase field.
@@ -212,16 +231,21 @@ mod tests {
     use super::*;
     use crate::measure::{bounding_box, perimeter, zero_set_volume};
     use crate::shapes::Ball;
-    use crate::{distances_from_phase_field, phase_field};
+    use crate::{distances_from_phase_field, phase_field, stored_phase_field};
 
     const EPS: f64 = 1.0 / 32.0;
 
     #[test]
     fn without_its_pure_phases_a_field_is_the_same() {
         let grid = Grid::centred(128, 8.0).unwrap();
-        let disc = phase_field(grid, &Ball::new([0.0; 2], 1.0).unwrap(), EPS).unwrap();
+        let shape = Ball::new([0.0; 2], 1.0).unwrap();
+        let disc = phase_field(grid, &shape, EPS).unwrap();
         let stored = Stored::from(disc.clone());
         assert!(2 * stored.values().len() < grid.len());
+        let never_whole = stored_phase_field(grid, &shape, EPS).unwrap();
+        assert_eq!(never_whole.nodes(), stored.nodes());
+        assert_eq!(never_whole.values(), stored.values());
+        assert!(stored_phase_field(grid, &|_: [f64; 2]| f64::NAN, EPS).is_err());
         assert_eq!(stored.field().unwrap(), disc);
         // On bricks of another size, too.
         let bricks = Bricks::new(128, 16, |[i, j]| (i + j) % 2 == 0, |_| false).unwrap();
