@@ -12,7 +12,7 @@ use crate::prelude::*;
 use crate::values::{Amount, Ansatz, Label, SizeTarget, count, finite, positive};
 
 const EXIT_CODES: &str = "Exit codes: 0 success; 2 bad input or failure, one line on standard error; 130 interrupted (Ctrl-C): \
-the last step was finished and stored, `willmore resume` goes on.";
+of a run the last step was finished and stored, and `willmore resume` goes on.";
 
 /// Willmore flow of meshes, images and fields.
 ///
@@ -103,7 +103,7 @@ Ctrl-C (exit code 130) leaves a run that `willmore resume DIR` continues.")]
   willmore fair scan.ply --energy-ratio 0.5 --remesh
   willmore fair organs.nii.gz --label all --save organ.stl")]
     Fair(FairOptions),
-    /// Fill a region of a shape smoothly; everything outside stays bit for bit
+    /// Fill a region of a shape smoothly; the pixels outside of it and the phase field there stay bit for bit, and a mesh becomes a new one
     #[command(after_help = "Examples:
   willmore inpaint drawing.png --mask damage.png --steps 40
   willmore inpaint builtin:disc --mask box:0.2,0.2,0.9,0.9 --ansatz empty
@@ -140,7 +140,8 @@ pub struct InputOptions {
     #[arg(long, value_name = "LENGTH")]
     pub box_side: Option<f64>,
 
-    /// Longest side of the shape in the box, which is made around a mesh, image or volume in its own units [default: 0.6 of the box]
+    /// Longest side of the shape in the box, which is made around a mesh, image or volume in its own units [default: 0.6 of the box, for `fair`
+    /// of a mesh 0.8 or 0.9]
     #[arg(long, value_name = "LENGTH")]
     pub side_length: Option<f64>,
 
@@ -245,6 +246,10 @@ pub struct MessageOptions {
     /// Print the outcome as one JSON object
     #[arg(long, global = true)]
     pub json: bool,
+
+    /// Whether standard output is a result, beside which only warnings are told.
+    #[arg(skip)]
+    pub to_pipe: bool,
 }
 
 /// Options of every command that makes runs.
@@ -400,8 +405,8 @@ pub struct InpaintOptions {
     #[serde(flatten)]
     pub flow: FlowOptions,
 
-    /// The region that is filled: an image of the size of the input (its dark or opaque pixels), box:x0,y0,x1,y1, ball:x,y,r,
-    /// and in 3D box:x0,y0,z0,x1,y1,z1, ball:x,y,z,r
+    /// The region that is filled: an image of the size of the input (its opaque pixels if some are not, else the dark ones, or the light ones if
+    /// most of its border is dark), box:x0,y0,x1,y1, ball:x,y,r, and in 3D box:x0,y0,z0,x1,y1,z1, ball:x,y,z,r
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub mask: Option<String>,
 
@@ -559,7 +564,8 @@ impl MessageOptions {
     /// Prints the outcome of a command: an object, or a text for people.
     pub fn report(self, outcome: &Value, text: &str) {
         // A closed pipe (`| head`) is no reason to fail after the results have been written.
-        if self.json {
+        if self.to_pipe {
+        } else if self.json {
             let _ = writeln!(std::io::stdout(), "{outcome}");
         } else if !self.quiet {
             let _ = writeln!(std::io::stdout(), "{text}");
@@ -573,19 +579,23 @@ impl MessageOptions {
     }
 
     pub fn note(self, what: &str) {
-        if !self.quiet && !self.json {
+        if !self.quiet && !self.json && !self.to_pipe {
             eprintln!("{what}");
         }
     }
 
     pub fn progress(self) -> Progress {
-        Progress::new(self.quiet || self.json)
+        Progress::new(self.quiet || self.json || self.to_pipe)
     }
 }
 
 impl ForceOption {
-    /// Refuses a file that is there.
+    /// Refuses a file that is there, or whose folder is not.
     pub fn check(self, name: &str, path: &Path) -> Result<()> {
+        let folder = path.parent().unwrap_or(path);
+        if !(folder.as_os_str().is_empty() || folder.is_dir()) {
+            refuse!("{name} {}: there is no such folder", path.display());
+        }
         if path.exists() && !self.force {
             refuse!(
                 "{name} {} is there already: give another name, or --force to write over it",

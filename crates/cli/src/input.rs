@@ -487,7 +487,7 @@ impl<'a> Reader<'a> {
         shape: &dyn SignedDistance<D>,
     ) -> Result<Start<D, O>> {
         let grid = self.grid()?;
-        let field = phase_field(grid, shape, self.eps(&grid))?;
+        let field = stored_phase_field(grid, shape, self.eps(&grid))?;
         Ok(self.start(field, O::of_box(&grid)?))
     }
 
@@ -527,7 +527,7 @@ impl<'a> Reader<'a> {
         let distance = outline.distance();
         let sides = outline.sides();
         let grid = self.grid_holding(&image.bounding_box(), &IMAGE_CELLS, &distance, &sides)?;
-        let field = phase_field(grid, &distance, self.eps(&grid))?;
+        let field = stored_phase_field(grid, &distance, self.eps(&grid))?;
         let plane = Plane::of_image(&image, path)?;
         Ok(Loaded::Plane(self.start(field, plane)))
     }
@@ -558,7 +558,14 @@ impl<'a> Reader<'a> {
             volume: body.volume,
             side: body.voxel,
             farthest: None,
+            time: None,
         });
+        if body.specks > 0 {
+            self.messages.warn(&format!(
+                "{} parts or holes of a few voxels are left out, and their volume goes to the others",
+                body.specks
+            ));
+        }
         let space = Space {
             voxels,
             ..Space::default()

@@ -170,7 +170,12 @@ impl OwnMesh {
             let mut mesh = surface(u, eps)?;
             // That of the zero level set, but for what noise does not change.
             if self.noise > 0.0 || self.keeps_volume {
-                mesh = mesh.with_volume(rough.volume(), |_| true);
+                let (grid, moving) = (u.grid(), self.nodes(u.grid()));
+                let moves = |vertex: usize| {
+                    let node = grid.nearest(mesh.vertices[vertex]);
+                    moving.as_ref().is_none_or(|moving| moving[node])
+                };
+                mesh = mesh.with_volume(rough.volume(), moves);
             }
             let mut made = Faired::anew(rough, mesh, extension, up)?;
             made.report["noise"] = self.noise.into();

@@ -7,7 +7,7 @@ pub use engine::{Case, Measure, Method, Record, Run, Scales, Scheme, StepRule, S
 pub use geometry::measure::{BoundingBox, has_interface};
 pub use geometry::{
     Field, Grid, PhaseField, Placement, SignedDistance, Stored, UpAxis, ZeroSet, npy,
-    optimal_profile, phase_field, vti,
+    optimal_profile, phase_field, stored_phase_field, vti,
 };
 pub use operators::{ComputeDevice, DeviceKind};
 pub use render::{Picture, Scene};

@@ -5,7 +5,8 @@ use std::fmt;
 use serde::de::DeserializeOwned;
 
 use crate::faired::Faired;
-use crate::paths::extension;
+use crate::page;
+use crate::paths::{MESHES, extension};
 use crate::prelude::*;
 
 /// Names of files that hold the shape at the beginning, without their extension.
@@ -119,6 +120,19 @@ pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
 
 /// Whether a file is written at the end of a run.
 pub fn is_of_end(name: &str) -> bool {
-    let stem = name.split('.').next();
-    stem == Some(FINAL) || [SUMMARY, ANIMATION, SERIES].contains(&name)
+    is_stage(name, FINAL) || [SUMMARY, ANIMATION, SERIES].contains(&name)
+}
+
+/// Whether a file or folder, by its name, is one that a run writes besides those that it begins with.
+pub fn is_written(name: &str) -> bool {
+    let frame = name.starts_with("step-") && is_stage(name, name.split('.').next().unwrap_or(""));
+    is_of_end(name) || is_stage(name, START) || frame || [FRAMES, page::NAME].contains(&name)
+}
+
+/// Whether a file shows the shape at a stage of the flow.
+fn is_stage(name: &str, stage: &str) -> bool {
+    let rest = name.strip_prefix(stage).unwrap_or_default();
+    let formats = ["npy", "vti", "png", "svg", "displacement.svg"].into_iter();
+    let mut formats = formats.chain(MESHES);
+    formats.any(|format| rest.strip_prefix('.') == Some(format))
 }

@@ -103,6 +103,8 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         let (case, u, presentation) = (run.case(), run.stored(), &self.presentation);
         let (start, eps) = (&case.initial, case.scales.eps);
         let directory = store.directory();
+        // Those of an earlier end of a run that went on.
+        directory.remove_others(presentation::is_of_end)?;
         Event {
             run,
             directory: Some(directory),
@@ -119,9 +121,12 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
             if let Some(path) = &self.options.save {
                 self.save(u, eps, faired.as_ref(), path)?;
             }
+        } else if self.options.save.is_some() {
+            let messages = self.messages;
+            messages.warn("nothing is saved to the file of --save: the shape has vanished");
         }
-        if self.options.frames.is_some() {
-            let (pictures, series) = frames(directory.path(), run.records())?;
+        let (pictures, series) = frames(directory.path(), run.records())?;
+        if !pictures.is_empty() {
             let animation = render::animation(&pictures, DELAY)?;
             directory.write_file(presentation::ANIMATION, |out| out.write_all(&animation))?;
             directory.write_file(presentation::SERIES, |out| out.write_all(series.as_bytes()))?;
@@ -133,8 +138,10 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         let energy = last.and_then(Record::willmore_energy);
         let is_willmore = case.energy.is_willmore();
         let spheres = energy.filter(|_| D == 3 && is_willmore);
+        let first_energy = first.and_then(|first| Some(first.minimization?.energy_at_rest()));
         let target = case.stops.iter().find_map(|stop| match stop {
             Stop::Energy(target) => Some(*target),
+            Stop::EnergyRatio(part) => Some(part * first_energy?),
             _ => None,
         });
         let mut outcome = json!({
@@ -144,7 +151,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
             "time": run.time(),
             "time_steps": time_accuracy(run.records(), eps),
             "shortened_steps": run.records().iter().filter(|record| record.halvings > 0).count(),
-            "first_energy": first.and_then(|first| Some(first.minimization?.energy_at_rest())),
+            "first_energy": first_energy,
             "energy": energy,
             "energy_terms": energy.filter(|_| !is_willmore).map(|_| case.energy),
             "energy_over_8_pi": spheres.map(|energy| energy / (8.0 * PI)),
@@ -296,13 +303,23 @@ impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
     }
 }
 
-/// Removes the run in a folder, if there is one that nobody works on. A folder of something else stays.
+/// Removes the run in a folder, if there is one that nobody works on. A folder of something else stays, and so does one with something else.
 pub fn make_way(folder: &Path) -> Result<()> {
-    match RunDirectory::recover(folder) {
-        Ok(_) => Ok(std::fs::remove_dir_all(folder).map_err(files::Error::of("remove", folder))?),
-        Err(locked @ runs::Error::Locked(_)) => Err(locked.into()),
-        Err(_) => Ok(()),
+    let stored = match RunDirectory::recover(folder) {
+        Ok(stored) => stored,
+        Err(locked @ runs::Error::Locked(_)) => return Err(locked.into()),
+        Err(_) => return Ok(()),
+    };
+    stored.tidy()?;
+    let name = |path: &Path| path.file_name()?.to_str().map(presentation::is_written);
+    let mut others = stored.leftovers().filter(|path| path.exists());
+    if let Some(other) = others.find(|path| name(path) != Some(true)) {
+        refuse!(
+            "{} is not of the run in this folder, which --force would remove: move it away, or give another --output",
+            other.display()
+        );
     }
+    Ok(std::fs::remove_dir_all(folder).map_err(files::Error::of("remove", folder))?)
 }
 
 /// `runs/NAME`, with the first number that is free.

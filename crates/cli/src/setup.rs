@@ -4,6 +4,7 @@ use engine::{Operator, Storage};
 use model::{Network, Networks};
 
 use crate::cli::{CommonOptions, SchemeOptions};
+use crate::paths::absolute;
 use crate::prelude::*;
 
 /// Refuses widths of the interface, in cells, that no grid resolves.
@@ -36,6 +37,9 @@ impl SchemeOptions {
 
     /// Takes the width of the interface from the network, unless it is given.
     pub fn fill_in(&mut self) -> Result<()> {
+        if let Some(network) = &mut self.network {
+            *network = absolute(&*network)?;
+        }
         if let (None, Some(path)) = (self.eps_over_h, &self.network) {
             self.eps_over_h = Some(Network::load(path)?.ratios().eps_over_h);
         }

@@ -28,8 +28,10 @@ pub struct Voxels {
     pub volume: f64,
     /// The side of a cube as large as a voxel.
     pub side: f64,
-    /// How far its surface may go, root of the mean square, if that ends the flow.
+    /// How far its surface may go, root of the mean square, and for how long, if that ends the flow.
     pub farthest: Option<f64>,
+    #[serde(default)]
+    pub time: Option<f64>,
 }
 
 impl Presentation<3> for Space {
@@ -99,6 +101,7 @@ impl Presentation<3> for Space {
         if let Some(voxels) = &self.voxels {
             known.volume = Some(voxels.volume);
             known.measures.push(Measure::displacement(start, eps));
+            known.stops.extend(voxels.time.map(Stop::Time));
             known.stops.extend(voxels.farthest.map(Stop::Displacement));
         }
         Ok(known)

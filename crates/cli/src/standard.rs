@@ -44,7 +44,7 @@ impl Standard {
         if input.label == Some(Label::All) {
             refuse!("--save - writes one mesh, and --label all makes several: give a file");
         }
-        messages.quiet = true;
+        messages.to_pipe = true;
         let format = usual_format(input.input.as_deref().unwrap_or_default())?;
         *save = stand_in("output", &format);
         standard.output = Some(save.clone());
@@ -72,6 +72,7 @@ impl Drop for Standard {
 /// The input of a command and the file that it writes, if it has these.
 fn paths(command: &mut Command) -> Option<(&mut InputOptions, Option<&mut PathBuf>)> {
     match command {
+        Command::Check(check) => Some((&mut check.input, None)),
         Command::Sample(sample) => Some((&mut sample.input, Some(&mut sample.save))),
         Command::Run(command) => {
             let options = command.options();

@@ -64,10 +64,10 @@ pub fn all_labels(options: &InputOptions) -> Result<Option<Vec<i64>>> {
 
 /// The name of a file or folder for one of several labels.
 pub fn named(path: &Path, label: i64) -> PathBuf {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let name = match path.extension() {
-        Some(extension) => format!("{stem}-label{label}.{}", extension.to_string_lossy()),
-        None => format!("{stem}-label{label}"),
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let (stem, extension) = match name.strip_suffix(".nii.gz") {
+        Some(stem) => (stem, ".nii.gz"),
+        None => name.split_at(name.rfind('.').unwrap_or(name.len())),
     };
-    path.with_file_name(name)
+    path.with_file_name(format!("{stem}-label{label}{extension}"))
 }

@@ -349,8 +349,13 @@ fn a_shape_that_vanishes_ends_its_run() {
         "500",
         "--output",
         "run",
+        "--save",
+        "gone.png",
     ];
-    let outcome = outcome(folder.path(), &arguments);
+    let output = common::run(folder.path(), &arguments);
+    let warning = common::text(&output.stderr);
+    assert!(warning.contains("nothing is saved"), "{warning}");
+    let outcome: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(outcome["components"], 0, "{outcome}");
     assert_eq!(outcome["ended"], "the shape has vanished");
     assert!(outcome["steps"].as_u64().unwrap() < 200, "{outcome}");

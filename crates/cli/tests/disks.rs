@@ -154,7 +154,7 @@ fn on_a_read_only_disk_there_is_one_line() {
     let read_only = "mount -t tmpfs tmpfs \"$DISK\" || exit 77
         cp -R \"$COPY\" \"$DISK/run\" || exit 78
         mount -o remount,ro \"$DISK\" || exit 77";
-    let resume = ["resume", "disk/run"];
+    let resume = ["resume", "disk/run", "--quiet"];
     if let Some(output) = on_a_disk(folder.path(), [read_only, ""], 0, &resume) {
         assert_refused(&output, "Read-only file system");
     }

@@ -148,6 +148,14 @@ fn meshes_and_pictures_go_through_pipes() {
         of_this(&name.to_string_lossy()) && name.to_string_lossy().ends_with("input.stl")
     });
     assert_eq!(left.count(), 0);
+    let stored = fs::read_to_string(at("run-in.ply/config.toml")).unwrap();
+    assert!(!stored.contains("save"), "{stored}");
+    let check = program(folder.path())
+        .args(["check", "-", "--cells", "32"])
+        .stdin(File::open(at("in.png")).unwrap())
+        .output()
+        .unwrap();
+    assert!(check.status.success(), "{}", text(&check.stderr));
     let json = run(folder.path(), &["flow", "in.ply", "--save", "-"]);
     assert!(text(&json.stderr).contains("--json and --save -"));
     let empty = run(folder.path(), &["flow", "-"]);

@@ -29,6 +29,8 @@ fn every_mistake_is_one_clear_line() {
     write("type.toml", b"steps = [3]\n");
     write("value.toml", b"steps = \"many\"\n");
     write("other.toml", b"command = \"mcf\"\nsteps = 3\n");
+    let simplex = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+    write("simplex.obj", simplex.as_bytes());
     let white = render::Picture::new([8, 8], vec![[255; 4]; 64]).unwrap();
     white.write_png(folder.path().join("white.png")).unwrap();
     std::fs::create_dir(folder.path().join("full")).unwrap();
@@ -233,6 +235,10 @@ fn every_mistake_is_one_clear_line() {
             "other.toml: it is for the command \"mcf\"",
         ),
         (&["fair"], "there is no input"),
+        (
+            &["fair", "simplex.obj", "--noise", "0.01", "--volume", "90%"],
+            "the volume stays where noise is taken off",
+        ),
         (
             &["fair", "builtin:sphere"],
             "say how smooth the surface is to become",

@@ -115,6 +115,12 @@ fn nothing_is_written_over_what_is_there() {
     let line = refused(folder.path(), &[&flow[..], &["own", "--force"]].concat());
     assert!(line.contains("holds thesis.txt"), "{line}");
     assert!(at("own/thesis.txt").exists());
+    // Nor what somebody has put beside a run.
+    fs::write(at("run/thesis.txt"), "years").unwrap();
+    let line = refused(folder.path(), &[&flow[..], &["run", "--force"]].concat());
+    assert!(line.contains("thesis.txt is not of the run"), "{line}");
+    outcome(folder.path(), &["resume", "run", "--steps", "2"]);
+    assert_eq!(fs::read(at("run/thesis.txt")).unwrap(), b"years");
 }
 
 /// A ring of radii 150 and 75 pixels has the energy `pi / 150 + pi / 75`.
@@ -465,6 +471,24 @@ fn meshes_are_converted_as_they_are() {
         surfaces::read(at("new.ply")).unwrap().faces.len(),
         mesh.faces.len()
     );
+    // Every face with vertices of its own: noise leaves no gaps between them.
+    let corners = mesh.faces.iter().flatten();
+    let soup = surfaces::TriangleMesh {
+        vertices: corners.map(|v| mesh.vertices[*v as usize]).collect(),
+        faces: (0..mesh.faces.len() as u32)
+            .map(|face| [3 * face, 3 * face + 1, 3 * face + 2])
+            .collect(),
+        normals: None,
+    };
+    surfaces::write(at("soup.ply"), &soup).unwrap();
+    for file in ["soup", "lever"] {
+        let (from, to) = (format!("{file}.ply"), format!("{file}-noisy.ply"));
+        let sample = ["sample", &from, "--noise", "0.002", "--save", &to];
+        outcome(folder.path(), &sample);
+        let noisy = surfaces::read(at(&to)).unwrap();
+        assert_ne!(noisy.vertices, surfaces::read(at(&from)).unwrap().vertices);
+        surfaces::ClosedMesh::new(noisy).unwrap();
+    }
 }
 
 /// A box without its lid.

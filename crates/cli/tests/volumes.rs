@@ -63,6 +63,16 @@ fn a_ball_of_voxels_becomes_a_ball_of_their_volume() {
         "{}",
         mesh.volume()
     );
+    // The options that it has stored make the same run.
+    let again = ["fair", "--config", "run/config.toml", "--save", "again.ply"];
+    let again = outcome(
+        folder.path(),
+        &[&again[..], &["--output", "again"]].concat(),
+    );
+    assert_eq!(
+        [&again["steps"], &again["ended"]],
+        [&ended["steps"], &ended["ended"]]
+    );
     // In the coordinates of the volume.
     let radius = (0.75 / PI * voxels).cbrt();
     for x in &mesh.mesh().vertices {
@@ -171,6 +181,19 @@ fn every_label_becomes_a_surface() {
         assert!((mesh.volume() / voxels - 1.0).abs() < 2e-3, "{label}");
         let low = mesh.bounding_box().lower[0];
         assert!((low - ORIGIN[0] - SIDE * first).abs() < 0.5 * SIDE, "{low}");
+    }
+    let sample = [
+        "sample",
+        "two.nii",
+        "--label",
+        "all",
+        "--save",
+        "body.nii.gz",
+    ];
+    run(folder.path(), &sample);
+    for label in [3, 7] {
+        let file = folder.path().join(format!("body-label{label}.nii.gz"));
+        assert!(volumes::read(&file).is_ok(), "{label}");
     }
     let options = [
         "--label", "all", "--cells", "32", "--steps", "2", "--output", "run",

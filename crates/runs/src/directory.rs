@@ -129,6 +129,19 @@ impl RunDirectory {
         Ok(())
     }
 
+    /// Removes the files of these names that do not belong to the run.
+    pub fn remove_others(&self, which: impl Fn(&str) -> bool) -> Result<(), Error> {
+        self.remove(|path| path.is_file() && which(&folder::name(&self.path, path)))
+    }
+
+    fn remove(&self, which: impl Fn(&Path) -> bool) -> Result<(), Error> {
+        let others = folder::others(&self.path, &self.files, &self.steps)?;
+        for path in others.into_iter().filter(|path| which(path)) {
+            (self.storage.remove(&path)).map_err(files::Error::of("remove", path))?;
+        }
+        Ok(())
+    }
+
     /// Replaces `timings.json`, the one file that may differ between two runs of the same
     /// computation: wall times and the like, 4 MiB at most. It stands outside of the commits, and a
     /// crash leaves the old one or the new one.
@@ -156,6 +169,8 @@ impl RunDirectory {
                 self.files.insert(name, Kind::Derived(Some(seal)));
             }
         }
+        // Those in folders that were no part of the run when it was resumed.
+        self.remove(folder::is_temporary)?;
         self.commit_as(state, true)
     }
 

@@ -73,7 +73,7 @@ pub(crate) fn is_temporary(path: &Path) -> bool {
 }
 
 /// The name of something in a run, with `/` between folders.
-fn name(root: &Path, path: &Path) -> String {
+pub(crate) fn name(root: &Path, path: &Path) -> String {
     let inner = path.strip_prefix(root).unwrap_or(path).components();
     let parts: Vec<_> = inner.map(|c| c.as_os_str().to_string_lossy()).collect();
     parts.join("/")

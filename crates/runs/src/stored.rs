@@ -132,24 +132,21 @@ impl StoredRun {
         &self.timings
     }
 
-    /// Files and folders that are not part of the run, left by a process that was killed; those that
-    /// [`StoredRun::resume`] removes.
+    /// Files and folders that are not part of the run: left by a process that was killed, or somebody else's.
     pub fn leftovers(&self) -> impl Iterator<Item = &Path> {
         self.leftovers.iter().map(PathBuf::as_path)
     }
 
-    /// Removes old checkpoints and temporary files, which are what a kill right after the last commit
-    /// of a finished run leaves behind, and nothing else.
+    /// Removes old checkpoints and temporary files, which a process that was killed has left, and nothing else.
     pub fn tidy(&self) -> Result<(), Error> {
         self.give_up_checkpoints()?;
         self.remove(folder::is_temporary)
     }
 
-    /// Goes on with the run, also with a finished one: removes everything that is not part of the
-    /// commit.
+    /// Goes on with the run, also with a finished one. [Leftovers](StoredRun::leftovers) stay until files of the same names are written, but
+    /// for those that are [tidied](StoredRun::tidy) away.
     pub fn resume(mut self) -> Result<(RunDirectory, State<'static>), Error> {
-        self.give_up_checkpoints()?;
-        self.remove(|_| true)?;
+        self.tidy()?;
         for kind in self.run.files.values_mut() {
             if let Kind::Derived(seal) = kind {
                 *seal = None;
@@ -159,27 +156,17 @@ impl StoredRun {
     }
 
     /// Goes on with a finished run by a commit of `state`, of the same step, after which the files that `ends` names do not belong to the
-    /// run any more: they are removed.
+    /// run any more; they stay until [`RunDirectory::remove_others`].
     pub fn reopen(
         self,
         state: &State<'_>,
         ends: impl Fn(&str) -> bool,
     ) -> Result<RunDirectory, Error> {
         let (mut run, _) = self.resume()?;
-        let ended: Vec<String> = run
-            .files
-            .keys()
-            .filter(|name| ends(name))
-            .cloned()
-            .collect();
         run.files.retain(|name, _| !ends(name));
         // The one commit that there is gives way to this one.
         run.steps.clear();
         run.commit(state)?;
-        for name in ended {
-            let path = run.path.join(name);
-            (run.storage.remove(&path)).map_err(files::Error::of("remove", path))?;
-        }
         Ok(run)
     }
 

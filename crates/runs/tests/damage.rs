@@ -150,7 +150,7 @@ fn recovery_ends_with_the_same_bytes() {
 }
 
 #[test]
-fn what_a_killed_process_leaves_is_removed_and_told() {
+fn what_is_no_part_of_a_run_is_told_and_stays() {
     let folder = quick_folder();
     let run = folder.path().join("run");
     run_to(&run, 32).unwrap();
@@ -181,8 +181,11 @@ fn what_a_killed_process_leaves_is_removed_and_told() {
     assert_eq!(listed, expected);
     drop(stored);
     assert!(run.join("extra/deep").exists());
-    drop(RunDirectory::open(&run).unwrap().resume().unwrap());
-    assert!(expected.iter().all(|path| !path.exists()));
+    let (resumed, _) = RunDirectory::open(&run).unwrap().resume().unwrap();
+    assert!(run.join("extra/deep").exists());
+    resumed.remove_others(|name| name == left[0]).unwrap();
+    let found = [run.join(left[0]), run.join("extra")].map(|path| path.exists());
+    assert_eq!(found, [false, true]);
 }
 
 #[test]
@@ -205,6 +208,11 @@ fn only_checkpoints_and_temporary_files_are_tidied_away() {
     assert!(run.join(".partial-folder").exists());
     assert!(run.join("fields/mine").exists() && run.join("mine/.partial-x").exists());
     drop(stored.resume().unwrap());
+    assert!(run.join("mine/.partial-x").exists());
+    for folder in ["mine", ".partial-folder"] {
+        fs::remove_dir_all(run.join(folder)).unwrap();
+    }
+    fs::remove_file(run.join("fields/mine")).unwrap();
     assert!(toy::all_contents(&run) == expected);
 }
 

@@ -81,10 +81,11 @@ impl Fairing {
     /// Of a mesh with noise of this standard deviation along its normals, see [`TriangleMesh::noise`]; zero for none. `kept` says of a
     /// position whether its vertex stays.
     pub fn new(rough: ClosedMesh, noise: f64, kept: impl Fn([f64; 3]) -> bool) -> Self {
+        let kept: Vec<bool> = rough.mesh().vertices.iter().map(|&x| kept(x)).collect();
         Self {
-            start: without_short_waves(&rough, noise),
+            start: without_short_waves(&rough, noise, &kept),
             noise,
-            kept: rough.mesh().vertices.iter().map(|&x| kept(x)).collect(),
+            kept,
             rough,
         }
     }
@@ -184,11 +185,7 @@ impl Fairing {
             let wavelength = LONG * followed.eps / followed.placement.scale();
             mesh = mesh.with_long_waves_of(self.start.mesh(), wavelength);
         }
-        for (vertex, x) in mesh.vertices.iter_mut().enumerate() {
-            if self.kept[vertex] {
-                *x = self.rough.mesh().vertices[vertex];
-            }
-        }
+        hold(&mut mesh, self.rough.mesh(), &self.kept);
         Ok(if self.noise > 0.0 {
             mesh.with_volume(self.rough.volume(), |vertex| !self.kept[vertex])
         } else {
@@ -214,12 +211,13 @@ impl Followed {
 }
 
 /// As many rounds of Taubin's smoothing as move the vertices along the normals by no more than most of the noise, and along the surface,
-/// where it would make edges alike, by no more than noise does.
-fn without_short_waves(rough: &ClosedMesh, noise: f64) -> ClosedMesh {
+/// where it would make edges alike, by no more than noise does; those that are kept stay.
+fn without_short_waves(rough: &ClosedMesh, noise: f64, kept: &[bool]) -> ClosedMesh {
     let mut smooth = rough.clone();
     for _ in 0..ROUNDS {
         let mut next = smooth.mesh().smoothed(1, TAUBIN[0], TAUBIN[1]);
         hold_along_surface(&mut next, rough.mesh(), SLIDING * noise);
+        hold(&mut next, rough.mesh(), kept);
         let moved = root_mean_square(&along_normals(&next, rough.mesh(), &next));
         match ClosedMesh::new(next) {
             Ok((next, _)) if moved <= SMOOTHED * noise => smooth = next,
@@ -228,6 +226,14 @@ fn without_short_waves(rough: &ClosedMesh, noise: f64) -> ClosedMesh {
         }
     }
     smooth
+}
+
+/// Puts the vertices that are kept where those of a rough mesh are.
+fn hold(mesh: &mut TriangleMesh, rough: &TriangleMesh, kept: &[bool]) {
+    let vertices = mesh.vertices.iter_mut().zip(&rough.vertices).zip(kept);
+    for ((x, from), _) in vertices.filter(|(_, kept)| **kept) {
+        *x = *from;
+    }
 }
 
 /// Shortens the ways of the vertices from those of a rough mesh along the surface to a length.

@@ -147,6 +147,13 @@ fn vertices_follow_a_sphere_that_grows() {
     let expected = 0.1 * (1.0 - stay / fairing.kept.len() as f64).sqrt();
     assert!((displacement - expected).abs() < 1e-3, "{displacement}");
     assert!(followed.left_behind(&field(0.02)).unwrap() > 0.5);
+    // Nor does the smoothing before the flow take along what is kept.
+    let smoothed = Fairing::new(fairing.rough.clone(), 0.05, |x| x[2] < -0.9);
+    let start = smoothed.start.mesh().vertices.iter();
+    let pairs = start.zip(&fairing.rough.mesh().vertices);
+    let mut kept = pairs.zip(&smoothed.kept);
+    assert!(kept.clone().any(|((x, from), _)| x != from));
+    assert!(kept.all(|((x, from), kept)| x == from || !kept));
 }
 
 /// Without a flow: the zero level set of the start, long waves given back.
@@ -171,7 +178,7 @@ fn a_fairing_takes_off_noise_before_the_flow_begins() {
     assert!(fairing.time(grid.spacing(), 1.0) > 0.0);
 }
 
-const QUAD: &str = "# a pyramid\r\nmtllib a.mtl\r\nv 0 0 0 1 0.5 0\r\nv 1 0 0\r\nv 1 1 0\r\nv 0 1 0\r\nv 0.5 0.5 1\r\nvt 0 0\r\nvn 0 0 -1\r\nvn 9 9 9\r\n\
+const QUAD: &str = "# a pyramid\r\nmtllib a.mtl\r\nv 0 0 0 1 0.5 0\r\nv 1 0 0\r\nv 1 1 0\r\nv 0 1 0\r\nv 0.5 0.5 1\r\nvt 0 0\r\nvn 0 0 -1\r\nvn 9 9 9\r\nvn 0 1 0\r\n\
     usemtl red\r\nf 4/1/1 3/1/1 2/1/1 1/1/1\r\ng sides\r\nf 1//2 2//2 5//2\r\nf 2 3 5\r\nf -3 -2 -1\r\nf 4 1 5\r\n";
 
 #[test]
@@ -194,6 +201,17 @@ fn an_obj_file_keeps_everything_but_positions_and_normals() {
     // The colour stays, the normals follow: the quadrangle now faces the other way along the first axis.
     assert!(text.contains("v 0 0 0.125 1 0.5 0\r\n"), "{text}");
     assert!(text.contains("vn -1 0 0\r\n"), "{text}");
+    // The third belongs to no face. Far from the origin all of them are the same.
+    assert!(text.contains("vn 0 1 0\r\n"), "{text}");
+    for x in &mut mesh.vertices {
+        *x = x.map(|x| x / 64.0 + 4_194_304.0);
+    }
+    let far = rewrite(QUAD.as_bytes(), "a.obj", &mesh).unwrap();
+    let normals = |text: &str| -> Vec<String> {
+        let lines = text.lines().filter(|line| line.starts_with("vn"));
+        lines.map(str::to_owned).collect()
+    };
+    assert_eq!(normals(&String::from_utf8(far).unwrap()), normals(&text));
 }
 
 #[test]

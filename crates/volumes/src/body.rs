@@ -16,7 +16,7 @@ const MARGIN: usize = 2;
 const ROUNDS: usize = 30;
 /// and how far vertices may go, as a part of the way to the centres of the voxels on both sides; less where sheets would cross.
 const REACHES: [f64; 3] = [0.9, 0.45, 0.0];
-/// Parts of fewer voxels are specks.
+/// Parts whose surface, by marching tetrahedra, encloses fewer voxels are specks.
 const SPECK: f64 = 8.0;
 
 /// Which voxels are inside.
@@ -49,6 +49,8 @@ pub struct Body {
     pub volume: f64,
     /// The side of a cube as large as a voxel.
     pub voxel: f64,
+    /// Parts and holes that are left out.
+    pub specks: usize,
 }
 
 impl Volume {
@@ -87,8 +89,8 @@ impl Volume {
     /// The surface of labels is that by marching tetrahedra without its steps, which tell of the voxels and not of the body: vertices
     /// move towards the middle of their neighbours again and again while the volume stays that of the voxels, but each stays
     /// between the centres of the voxels whose difference put it there. (S. F. F. Gibson: Constrained elastic surface nets. MICCAI 1998.)
-    /// A body of few voxels across becomes thinner by up to a voxel where others are thick. Parts and holes of fewer than eight voxels are
-    /// taken for noise and left out, if there are larger ones.
+    /// A body of few voxels across becomes thinner by up to a voxel where others are thick. Parts and holes inside whose surface there are
+    /// fewer than eight voxels are taken for noise and left out, if there are larger ones; the others take their volume.
     ///
     /// # Errors
     /// [`Error::NothingInside`], [`Error::Surfaces`].
@@ -96,17 +98,19 @@ impl Volume {
         let part = Part::of(self, inside)?;
         let (lattice, _) = ClosedMesh::new(part.surface(self, inside)?)?;
         let cell = self.voxel_volume();
-        let surface = match inside {
-            Inside::Above(_) => ClosedMesh::new(self.placed(lattice.mesh()))?.0,
+        let (surface, specks) = match inside {
+            Inside::Above(_) => (ClosedMesh::new(self.placed(lattice.mesh()))?.0, 0),
             Inside::Label(_) => {
-                let lattice = lattice.without_small_parts(SPECK)?;
-                self.without_steps(lattice.mesh(), part.count as f64 * cell)?
+                let large = lattice.without_small_parts(SPECK)?;
+                let surface = self.without_steps(large.mesh(), part.count as f64 * cell)?;
+                (surface, lattice.components() - large.components())
             }
         };
         Ok(Body {
             volume: surface.volume(),
             surface,
             voxel: cell.cbrt(),
+            specks,
         })
     }
 

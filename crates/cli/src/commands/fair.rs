@@ -62,7 +62,7 @@ impl FairOptions {
                     && let Some(voxels) = start.presentation.voxels.as_mut().filter(|_| !self.ends)
                 {
                     voxels.farthest = Some(FARTHEST * voxels.side);
-                    flow.run.time = Some((STEPS * voxels.side).powi(4));
+                    voxels.time = Some((STEPS * voxels.side).powi(4));
                 }
                 loaded
             }
@@ -101,11 +101,29 @@ impl FairOptions {
         let (mut own, warnings) = OwnMesh::new(path, bytes, noise, self.keep.clone())?;
         own.is_new = self.remesh;
         own.keeps_volume = self.flow.volume == Some(SizeTarget::Keep);
+        let but = if self.remesh {
+            ""
+        } else {
+            " for the flow, and not in what is written"
+        };
         for warning in warnings {
-            messages.warn(&format!("{}: {warning}", path.display()));
+            messages.warn(&format!("{}: {warning}{but}", path.display()));
+        }
+        let to_target = matches!(self.flow.volume, Some(SizeTarget::To(_)));
+        if own.fairing().noise > 0.0 && (to_target || self.flow.reduced_volume.is_some()) {
+            refuse!(
+                "the volume stays where noise is taken off: leave out --volume and --reduced-volume, or --noise and say how smooth the surface is \
+                 to become, by --energy-ratio, --time, --energy or --steps"
+            );
         }
         if noise.is_none() {
             let noise = own.fairing().noise;
+            if noise == 0.0 {
+                refuse!(
+                    "the mesh has no noise that could be estimated: give --noise LENGTH, or say how smooth the surface is to become, by \
+                     --energy-ratio, --time, --energy or --steps"
+                );
+            }
             messages.note(&format!(
                 "noise: {noise:.3e}, {:.3} % of the longest side, estimated (--noise)",
                 100.0 * noise / own.rough().bounding_box().longest_side()

@@ -133,9 +133,6 @@ impl RunOptions {
         if let Some(save) = &mut self.save {
             *save = absolute(&*save)?;
             force.check("--save", save)?;
-            if !save.parent().is_some_and(Path::is_dir) {
-                refuse!("--save {}: there is no such folder", save.display());
-            }
         }
         Ok(())
     }
@@ -209,7 +206,7 @@ impl Job {
             start.region,
             &start.presentation,
         )?;
-        let options = config::resolved(self.command.name(), &self.command)?;
+        let options = config::resolved(self.command.name(), &self.to_store())?;
         let plan = self.plan(start.name, start.presentation);
         let notes = plan.notes(&case, &self.device);
         let run = Run::new(case, &self.device)?;
@@ -225,6 +222,20 @@ impl Job {
         files.extend(inputs.iter().map(|(name, bytes)| (&**name, &bytes[..])));
         let store = Store::create(folder, &files, &run, notes, plan.checkpoints())?;
         plan.go_on(store, run)
+    }
+
+    /// The options of which the same run can be made again.
+    fn to_store(&self) -> RunCommand {
+        let mut command = self.command.clone();
+        // Standard output is not there any more when a run is resumed.
+        if self.messages.to_pipe {
+            command.options().save = None;
+        }
+        // Where the noise ends the flow, no steps were chosen, and to say so would be to choose.
+        if matches!(&command, RunCommand::Fair(fair) if !fair.ends) {
+            command.options().steps = None;
+        }
+        command
     }
 
     /// Continues a run from its last checkpoint, a finished one to more steps.

@@ -53,6 +53,9 @@ pub fn run(mut options: TrainOptions, messages: MessageOptions) -> Result<()> {
     let trained = training.run(&mut Checkpoint::default(), &device, &mut observer);
     bar.finish();
     progress.clear();
+    if let Err(model::Error::Interrupted { .. }) = &trained {
+        messages.warn("interrupted: nothing of the training is kept");
+    }
     let Trained {
         network, quality, ..
     } = trained?;

@@ -117,7 +117,7 @@ pub(super) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<u8>, For
         let mut words = text.split_whitespace();
         let (keyword, numbers) = match words.next() {
             Some("v") => ("v", vertices.next().copied()),
-            Some("vn") => ("vn", normals.next().map(|n| n.to_array())),
+            Some("vn") => ("vn", normals.next().flatten()),
             _ => ("", None),
         };
         let Some([x, y, z]) = numbers else {
@@ -135,8 +135,9 @@ pub(super) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<u8>, For
     Ok(out)
 }
 
-/// For every normal in the text the unit normal of the corners that refer to it, which tells flat faces from smooth ones.
-fn normals(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<Vector>, FormatError> {
+/// For every normal in the text the unit normal of the corners that refer to it, which tells flat faces from smooth ones; none where no face
+/// with an area does.
+fn normals(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<Option<[f64; 3]>>, FormatError> {
     let found = Statements::of(bytes)?;
     let mut sums = vec![Vector::ZERO; found.normals];
     for face in found.faces() {
@@ -144,10 +145,11 @@ fn normals(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<Vector>, FormatErro
             let position = moved.vertices.get((vertex - 1) as usize);
             Vector::from_array(position.copied().unwrap_or_default())
         };
-        // Twice the vector area.
+        // Twice the vector area, from a corner: far from the origin products of places lose all digits.
+        let first = face.first().map_or(Vector::ZERO, place);
         let next = face.iter().cycle().skip(1);
         let area: Vector = (face.iter().zip(next))
-            .map(|(a, b)| place(a).cross(place(b)))
+            .map(|(a, b)| (place(a) - first).cross(place(b) - first))
             .sum();
         for normal in face.iter().filter_map(|(_, normal)| *normal) {
             if let Some(sum) = sums.get_mut(normal) {
@@ -155,5 +157,6 @@ fn normals(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<Vector>, FormatErro
             }
         }
     }
-    Ok(sums.into_iter().map(Vector::normalize_or_zero).collect())
+    let unit = |sum: Vector| Some(sum.try_normalize()?.to_array());
+    Ok(sums.into_iter().map(unit).collect())
 }
