@@ -316,7 +316,7 @@ impl Comparison<'_> {
             .data("time", |(_, step, _)| time(*step))
             .data("l2", |(.., l2)| *l2)
             .data("distance_to_exact", |(run, step, _)| {
-                run.from_exact.get(step).copied().unwrap_or(0.0)
+                run.from_exact.get(step).copied()
             });
         session.csv(errors, "errors")?;
         let compared = self.runs.iter().map(|run| (run, "false"));

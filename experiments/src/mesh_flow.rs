@@ -55,9 +55,10 @@ impl MeshFlow {
         let usual = options.mesh.mesh.as_ref().map(surfaces::usual_up_axis);
         let up = (options.up.or(usual.transpose()?)).unwrap_or(self.view.up);
         let schemes = options.schemes.schemes();
-        let parameters = setting.parameters(json!({
-            "mesh": mesh.about, "tau": time_steps.rule, "steps": steps, "schemes": schemes,
-        }))?;
+        let variants = schemes.into_iter().map(|scheme| (Method::Hybrid, scheme));
+        let variants: Vec<_> = variants.collect();
+        let others = json!({ "mesh": mesh.about, "tau": time_steps.rule, "steps": steps });
+        let parameters = setting.parameters(&variants, others)?;
         let mut session = Session::open(self.program, run, parameters)?;
         let initial = session.phase("signed distance", |stage| {
             mesh.phase_field(setting.grid, setting.scales.eps, &stage.bar)
@@ -74,8 +75,6 @@ impl MeshFlow {
             shown: self.shown.iter().map(energy).collect(),
             view: View { up, ..self.view },
         };
-        let variants = schemes.into_iter().map(|scheme| (Method::Hybrid, scheme));
-        let variants: Vec<_> = variants.collect();
         let title = format!("Willmore flow: {}", surface.title);
         let (surfaces, time) = ([(surface, initial)], (time_steps, steps));
         setting.run(session, &title, &surfaces, &variants, time, remarks)

@@ -150,6 +150,15 @@ impl MeshOptions {
         options.load(known, grid)
     }
 
+    /// The file that [`Self::load_or_built_in`] takes, with its checksum, or the built-in shape.
+    pub fn about(&self, known: &KnownMesh) -> Result<Value> {
+        let found = self.volume.clone().or_else(|| self.find(known));
+        match found.filter(|_| !self.procedural) {
+            Some(path) => Ok(about_file(&path)?.1),
+            None => Ok(known.procedural_title.into()),
+        }
+    }
+
     fn find(&self, known: &KnownMesh) -> Option<PathBuf> {
         let papers = Some(folder().join(known.file)).filter(|path| path.exists());
         self.mesh.clone().or(papers)

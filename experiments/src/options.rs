@@ -46,6 +46,16 @@ impl RunOptions {
     }
 }
 
+/// Numbers from the least to the largest, each once.
+pub fn distinct(numbers: &[usize]) -> Vec<usize> {
+    numbers
+        .iter()
+        .copied()
+        .collect::<BTreeSet<_>>()
+        .into_iter()
+        .collect()
+}
+
 /// Options of a figure at one resolution.
 #[derive(Args, Clone, Debug)]
 pub struct FigureOptions {

@@ -34,7 +34,7 @@ pub use crate::networks::{
     ACCURATE, Chosen, ELEMENTS, EPS, NetworkOptions, PAPERS, STEP, convergence_network, operator,
     planar_flow, time,
 };
-pub use crate::options::{FigureOptions, RunOptions};
+pub use crate::options::{FigureOptions, RunOptions, distinct};
 pub use crate::session::{Session, Stage};
 pub use crate::study::{self, Study, StudyOptions, Variant};
 pub use crate::{Error, Result, harness, look, quality, require, steps, timing};

@@ -64,6 +64,14 @@ impl StorageOptions {
         require(cells.all(possible), message)
     }
 
+    /// What is measured, for the manifest.
+    pub fn about(&self) -> Result<Value> {
+        Ok(json!({
+            "mesh": self.mesh.about(&ARMADILLO)?, "surface_cells": self.surface_cells, "dense_up_to": self.dense_up_to,
+            "curve_cells": self.curve_cells,
+        }))
+    }
+
     /// Lets the cross flow on bricks, and then the armadillo on both storages at every resolution; the built-in figure in a quick run, or if it
     /// is not here.
     pub fn measure(
@@ -75,13 +83,14 @@ impl StorageOptions {
         let mut dense_or_bricks = networks.learned(Scheme::Accurate, &needed_network())?;
         let quick = session.options.quick;
         let usual = [&self.curve_cells[..], &self.surface_cells];
-        let [curves, surfaces] = session.options.either([&[64][..], &[32, 64]], usual);
+        let cells = session.options.either([&[64][..], &[32, 64]], usual);
+        let [curves, surfaces] = cells.map(distinct);
         let mut measured = Vec::new();
         let forget_memory = || {
             memory::release_freed();
             memory::forget_peak();
         };
-        for &n in curves {
+        for n in curves {
             forget_memory();
             let grid = Grid::per_unit(n, CROSS.side)?;
             let mut scales = scales(n);
@@ -97,7 +106,7 @@ impl StorageOptions {
         }
         let mut mesh_options = self.mesh.clone();
         mesh_options.procedural |= quick;
-        for &n in surfaces {
+        for n in surfaces {
             for storage in STORAGES {
                 if storage == Storage::Dense && n > self.dense_up_to {
                     continue;

@@ -31,15 +31,12 @@ pub struct StudyOptions {
 
 impl StudyOptions {
     pub fn cells(&self) -> Vec<usize> {
-        let mut cells = match (&self.cells[..], self.run.quick, self.full) {
-            ([], true, _) => vec![128],
-            ([], false, false) => vec![128, 256],
-            ([], false, true) => vec![128, 256, 512],
-            (chosen, ..) => chosen.to_vec(),
-        };
-        cells.sort_unstable();
-        cells.dedup();
-        cells
+        distinct(match (&self.cells[..], self.run.quick, self.full) {
+            ([], true, _) => &[128],
+            ([], false, false) => &[128, 256],
+            ([], false, true) => &[128, 256, 512],
+            (chosen, ..) => chosen,
+        })
     }
 
     /// The chosen methods in their schemes at all resolutions; without a choice those that are `usual` at a resolution.

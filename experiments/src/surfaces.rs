@@ -67,12 +67,17 @@ impl Setting {
         Ok(operator)
     }
 
-    /// The parameters of a program for its manifest: the common ones, and others.
-    pub fn parameters(&self, others: Value) -> Result<Value> {
-        let papers = self.operator(PAPERS)?;
+    /// The parameters of a program for its manifest: the common ones with the networks of these operators, and others.
+    pub fn parameters(&self, variants: &[(Method, Scheme)], others: Value) -> Result<Value> {
+        let mut networks = BTreeMap::new();
+        for &variant in variants {
+            if let Some(named) = self.operator(variant)?.network() {
+                networks.insert(variant.0.key_in(variant.1), named.network.fingerprint());
+            }
+        }
         let mut parameters = json!({
             "n": self.n, "box_side": self.grid.side(), "eps": self.scales.eps, "mcf_step": self.scales.mcf_step,
-            "network": papers.network().map(|named| named.network.fingerprint()),
+            "networks": networks,
         });
         if let (Value::Object(all), Value::Object(others)) = (&mut parameters, others) {
             all.extend(others);
@@ -129,7 +134,7 @@ pub struct Flowed {
     pub surface: Surface,
     pub trajectory: Trajectory<3>,
     pub snapshots: Vec<Snapshot>,
-    /// Largest resident memory of the process until the last step was done, in MiB, where the system tells.
+    /// Largest resident memory of the process during the steps, in MiB, where the system tells.
     peak_mib: Option<f64>,
 }
 
@@ -141,6 +146,8 @@ impl Surface {
         let folder = format!("{}-{}", self.key, case.operator.key());
         let mut samples = Samples::every(usize::MAX);
         samples.also = self.shown.iter().map(|(step, _)| *step).collect();
+        memory::release_freed();
+        memory::forget_peak();
         let trajectory = session.trajectory(&run, case, &folder, &samples)?;
         let mut flowed = Flowed {
             surface: self,
@@ -160,6 +167,17 @@ impl Surface {
     }
 }
 
+/// The Willmore energy of a phase field with the implicit finite-element step and the mass-matrix norm, up to [`MOST_NODES`].
+pub fn energy_by_elements(
+    case: &Case<3>,
+    u: impl FnOnce() -> Result<Field<3>>,
+) -> Result<Option<f64>> {
+    if case.grid().len() > MOST_NODES {
+        return Ok(None);
+    }
+    Ok(Some(case.implicit_elements()?.willmore_energy(&u()?)?))
+}
+
 impl Flowed {
     /// Measures the phase field after a step, and writes its isosurface.
     fn snapshot(&self, step: usize, stage: &Stage<'_>) -> Result<Snapshot> {
@@ -174,11 +192,7 @@ impl Flowed {
         let at_start = || self.trajectory.records.first().and_then(at_rest);
         let w_scheme = record.map_or_else(at_start, Record::willmore_energy);
         let measured = self.trajectory.measures(step)?;
-        let w = if case.grid().len() > MOST_NODES {
-            None
-        } else {
-            Some(case.implicit_elements()?.willmore_energy(&u.field()?)?)
-        };
+        let w = energy_by_elements(case, || Ok(u.field()?))?;
         memory::release_freed();
         let mut measures = Numbers::from([
             ("perimeter", measured["perimeter"]),

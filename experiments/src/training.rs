@@ -28,7 +28,7 @@ impl NetworkSpec {
     }
 
     /// The networks of the accurate recipe: those of the paper's, and one for `eps = h`. `n64` to `n512` have the scales of the
-    /// convergence tests, `eps = 2^-6` and `tautilde = 2^-14`. The paper inpaints at `n = 1024` with `eps = 2^-8` and `tautilde = 2^-18`,
+    /// convergence tests, `eps = 2^-6` and `tautilde = 2^-14`. Inpainting at `n = 1024` has `eps = 2^-8` and `tautilde = 2^-18`,
     /// which are the same ratios as those of the training at `n = 256`. The network of the surfaces serves `n = 64` with `eps = 2^-5` and
     /// `tautilde = 2^-12`; it is trained at `n = 128`, where the smallest sphere measures six cells.
     pub const ACCURATE: &'static [Self] = &[

@@ -319,10 +319,10 @@ fn the_quick_calibration_predicts_the_energies_and_installs_the_network() {
     assert_eq!(discs.len(), 8);
     for disc in &discs {
         let number = |name: &str| disc[name].parse::<f64>().unwrap();
-        let ratio = number("measured") / number("predicted");
+        let ratio = number("w R/π") / number("predicted");
         assert!((ratio - 1.0).abs() < 0.008, "{disc:?}");
-        if disc["odd_part"] == "true" {
-            assert!((number("calibrated") - 1.0).abs() < 0.01, "{disc:?}");
+        if disc["F"] == "odd part" {
+            assert!((number("calibrated w R/π") - 1.0).abs() < 0.01, "{disc:?}");
         }
     }
     let name = "networks/d2_k17_eps2_step1.safetensors";

@@ -200,6 +200,15 @@ fn every_metric_is_explained_and_every_explanation_is_of_a_metric() {
     }
 }
 
+#[test]
+fn all_results_are_in_the_catalogue() {
+    let catalogue = read("crates/pages/assets/catalogue.toml");
+    for folder in summaries().keys() {
+        let entry = format!("folder = \"{folder}\"\n");
+        assert!(catalogue.contains(&entry), "{folder} is not");
+    }
+}
+
 /// A table is checked if the head of its last column is "metric". Its cells hold the folder of the results and the metric; words in
 /// capitals stand for the code or the last word in the head of the column. A metric without capitals is that of the column before.
 #[test]

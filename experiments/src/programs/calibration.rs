@@ -55,6 +55,9 @@ pub fn program(options: &Options) -> Result<()> {
             networks.push((name.to_owned(), network));
         }
     }
+    let names: BTreeSet<&str> = networks.iter().map(|(name, _)| &**name).collect();
+    let message = "two networks have the same ratios: give them in runs of their own";
+    require(names.len() == networks.len(), message)?;
     networks.truncate(run.either(1, usize::MAX));
     let checksums = (networks.iter()).map(|(name, network)| (name, network.fingerprint()));
     let parameters = json!({
@@ -84,12 +87,14 @@ pub fn program(options: &Options) -> Result<()> {
     let surfaces = session.phase("balls and tori", |stage| balls_and_tori(&all, stage))?;
     let diagnosed = session.phase("diagnostics", |stage| diagnostics(&all, stage))?;
 
-    session.figure(diagnostics_figure(&diagnosed), "diagnostics")?;
-    session.figure(discs_figure(&discs), "discs")?;
-    let output = &session.output;
-    output.write_json("diagnostics.json", &diagnosed)?;
-    output.write_csv("discs.csv", &discs)?;
-    output.write_csv("surfaces.csv", &surfaces)?;
+    // None are of networks for surfaces.
+    if !diagnosed.is_empty() {
+        session.figure(diagnostics_figure(&diagnosed), "diagnostics")?;
+    }
+    if !discs.is_empty() {
+        session.figure(discs_figure(&discs), "discs")?;
+    }
+    session.output.write_json("diagnostics.json", &diagnosed)?;
     let small = Scientific(1);
     let factors = Sheet::of(&rows)
         .text("network", |(name, _)| name)
@@ -111,13 +116,13 @@ pub fn program(options: &Options) -> Result<()> {
         .column("w R/π", Fixed(4), |r| r.measured)
         .column("predicted", Fixed(4), |r| r.predicted)
         .column("calibrated w R/π", Fixed(4), |r| r.calibrated);
-    session.sheet(of_discs, "discs_table")?;
+    session.sheet(of_discs, "discs")?;
     let of_surfaces = Sheet::of(&surfaces)
         .text("network", |r| &r.network)
         .text("surface", |r| &r.surface)
         .column("w / exact", Fixed(4), |r| r.measured)
         .column("calibrated w / exact", Fixed(4), |r| r.calibrated);
-    session.sheet(of_surfaces, "surfaces_table")?;
+    session.sheet(of_surfaces, "surfaces")?;
     session.finish("Calibration of the learned operators and of finite elements")
 }
 
@@ -149,7 +154,6 @@ fn relaxed<const D: usize>(
 }
 
 /// The Willmore energy that the scheme sees in a disc.
-#[derive(Serialize)]
 struct DiscRow {
     network: String,
     odd_part: bool,
@@ -249,7 +253,6 @@ fn discs_figure(discs: &[DiscRow]) -> Figure {
 }
 
 /// The Willmore energy that the scheme sees in a surface whose energy is known.
-#[derive(Serialize)]
 struct SurfaceRow {
     network: String,
     surface: String,

@@ -44,6 +44,9 @@ pub fn program(options: &Options) -> Result<()> {
     let message = format!("--circles must be from 1 to {most}, not {count}");
     require((1..=most).contains(&count), message)?;
     let variants = options.variants();
+    let has = |flow| variants.iter().any(|variant| variant.flow == flow);
+    let message = "no method is left for one of the two flows: choose other --methods, --scheme or --elements-up-to";
+    require(Flow::ALL.into_iter().all(has), message)?;
     let study = Study::new(&options.study.networks, &variants)?;
     let parameters = json!({
         "cells": study.cells, "runs": study.variants().collect::<Vec<_>>(), "networks": study.checksums(),

@@ -15,7 +15,7 @@ const NOISES: [f64; 2] = [0.3, 0.5];
 const CELLS: usize = 128;
 const SIDE: f64 = 0.9;
 /// The most iterations of Taubin's and of Laplacian smoothing.
-const ITERATIONS: usize = 30;
+const ITERATIONS: usize = 100;
 
 /// Independent normally distributed noise along the normals of clean meshes, taken off by `willmore fair` at its defaults, by Taubin's
 /// and by Laplacian smoothing with the number of iterations that comes nearest to the clean mesh: distances, normals and volumes.
@@ -142,10 +142,10 @@ fn denoise<'a>(
         let quality = |count| clean.quality(&smoothed(count));
         let all: Vec<Quality> = (1..=ITERATIONS).map(quality).collect();
         let seconds = clock.elapsed().as_secs_f64() / ITERATIONS as f64;
-        let best = (2..ITERATIONS).min_by(|&a, &b| all[a].rms.total_cmp(&all[b].rms));
-        let best = best.unwrap_or(2) + 1;
+        let best = (0..ITERATIONS).min_by(|&a, &b| all[a].rms.total_cmp(&all[b].rms));
+        let best = best.unwrap_or(0) + 1;
         let row = row(method, Some(best), smoothed(best), seconds);
-        let least = all[2..].iter().map(|q| q.normals).fold(f64::MAX, f64::min);
+        let least = all.iter().map(|q| q.normals).fold(f64::MAX, f64::min);
         session.metric(&format!("{}.least_normals", row.key()), least)?;
         least_normals.push(least);
         rows.push(row);
@@ -167,7 +167,7 @@ fn denoise<'a>(
     let noisy = level("noisy", noisy).with_colour(4);
     curves.push(noisy.with_style(LineStyle::Dotted));
     let distance = Axis::log("distance, % of the longest side");
-    let chart = LineChart::new(title, Axis::linear("iterations"), distance);
+    let chart = LineChart::new(title, Axis::log("iterations"), distance);
     Ok((rows, chart.with_curves(curves)))
 }
 
@@ -185,9 +185,17 @@ fn clean_meshes(options: &Options) -> Result<Vec<Clean>> {
     for path in files {
         let (mesh, _) = ClosedMesh::new(surfaces::read(&path)?)?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
-        let name = name.replace('.', "_");
+        // Metrics are named after it.
+        let other = |c: char| !(c.is_ascii_alphanumeric() || "-_".contains(c));
+        let mut name = name.replace(other, "_");
+        if !name.starts_with(|c: char| c.is_ascii_alphabetic()) {
+            name.insert_str(0, "mesh_");
+        }
         meshes.push(Clean::new(&name, mesh, usual_up_axis(&path)?));
     }
+    let names: BTreeSet<String> = meshes.iter().map(|clean| clean.key(0.0)).collect();
+    let message = "two meshes have the same name, or that of a built-in one: rename a file";
+    require(names.len() == meshes.len(), message)?;
     Ok(meshes)
 }
 

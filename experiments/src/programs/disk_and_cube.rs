@@ -72,10 +72,11 @@ pub fn program(options: &Options) -> Result<()> {
         start("cube", "cube", &cube, CUBE_ENERGIES)?,
         start("disk", "thick disk", &disk, DISK_ENERGIES)?,
     ];
-    let parameters = setting.parameters(json!({
+    let others = json!({
         "tau": TAU, "steps": steps, "variants": variants, "cube_half_side": CUBE_HALF_SIDE, "disk_radius": radius,
         "disk_half_height": half_height,
-    }))?;
+    });
+    let parameters = setting.parameters(&variants, others)?;
     let session = Session::open("disk_and_cube", run, parameters)?;
     let time = (StepRule::Constant(TAU).into(), steps);
     let comparisons = |session: &mut Session, all: &mut [Flowed]| {

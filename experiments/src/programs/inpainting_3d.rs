@@ -128,8 +128,10 @@ fn decorate(snapshots: &mut [Snapshot], measured: &Inpainted<'_, 3>) {
         let distance = distance.filter(|_| measured.shape.whole.is_some());
         let distance = distance.map(|(_, l2)| format!("\nL² distance to the ball {l2:.4}"));
         let [time, distance] = [time, distance].map(Option::unwrap_or_default);
-        let w = snapshot.measures["w"];
-        snapshot.caption = format!("step {step}{time}: w = {w:.2}{distance}");
+        let [finite_elements, scheme] = ["w", "w_scheme"].map(|w| snapshot.measures.get(w));
+        let w = finite_elements.or(scheme).map(|w| format!(": w = {w:.2}"));
+        let w = w.unwrap_or_default();
+        snapshot.caption = format!("step {step}{time}{w}{distance}");
         let edges = Tube::edges_of_box([low; 3], [high; 3], EDGE).into_iter();
         snapshot.tubes = edges
             .map(|edge| Tube {

@@ -88,7 +88,7 @@ pub fn program(options: &Options) -> Result<()> {
     let networks = timing::networks(&options.networks, planes)?;
     let learned = |needed| networks.learned(Scheme::Paper, &needed);
     let turns = if quick { 0.05 } else { options.turns };
-    let parameters = json!({ "turns": turns, "threads": rayon::current_num_threads() });
+    let parameters = json!({ "turns": turns, "threads": rayon::current_num_threads(), "storages": options.storage.about()? });
     let mut session = Session::open("performance", run, parameters)?;
     let mut all = Vec::new();
     for &n in planes {
@@ -164,6 +164,7 @@ impl Measurement {
         let grid = *case.grid();
         let n = grid.spacing().recip().round();
         let name = format!("{case_name}, n = {n}");
+        memory::release_freed();
         memory::forget_peak();
         let mut run = Run::new(case.clone(), &session.device)?;
         let mut warm = None;

@@ -1,7 +1,7 @@
 use crate::mesh_flow::{MeshFlow, MeshFlowOptions};
 use crate::meshes::KnownMesh;
 use crate::prelude::*;
-use crate::surfaces::{Flowed, View};
+use crate::surfaces::{Flowed, View, energy_by_elements};
 use geometry::CliffordTorus;
 use render::Tube;
 
@@ -54,13 +54,14 @@ fn clifford_tori(session: &mut Session, all: &mut [Flowed]) -> Result<String> {
         let torus = session.phase(title, |_| {
             Ok(CliffordTorus::nearest(&last, case.scales.eps)?)
         })?;
-        let as_field = torus.phase_field(last.grid(), case.scales.eps)?;
-        let w = case.implicit_elements()?.willmore_energy(&as_field)?;
+        let as_field = || Ok(torus.phase_field(last.grid(), case.scales.eps)?);
+        let w = energy_by_elements(case, as_field)?;
         let (l2, outer_radius) = (torus.l2, torus.outer_radius);
         session.remark(format!(
-            "Nearest Clifford torus, {}: L2 distance {l2:.4} (paper {PAPERS_L2:.4}), outer radius {outer_radius:.3}, w = {w:.2} (paper \
+            "Nearest Clifford torus, {}: L2 distance {l2:.4} (paper {PAPERS_L2:.4}), outer radius {outer_radius:.3}{} (paper \
              {PAPERS_CLIFFORD})",
-            one.label()
+            one.label(),
+            w.map_or(String::new(), |w| format!(", w = {w:.2}"))
         ));
         let circles = torus.minor_circles(CIRCLES.0, CIRCLES.1)?.into_iter();
         let tube = |circle: Vec<[f64; 3]>| Tube {
@@ -68,11 +69,16 @@ fn clifford_tori(session: &mut Session, all: &mut [Flowed]) -> Result<String> {
             ..Tube::new(circle, 0.1 * case.scales.eps)
         };
         if let Some(shown) = one.snapshots.last_mut() {
-            let torus = format!("L² distance to the torus {l2:.4}\n(which has w = {w:.2})");
+            let w = w.map_or(String::new(), |w| format!("\n(which has w = {w:.2})"));
+            let torus = format!("L² distance to the torus {l2:.4}{w}");
             shown.caption = format!("{}\n{torus}", shown.caption);
             shown.tubes = circles.map(tube).collect();
         }
-        for (name, value) in [("l2", l2), ("w", w), ("outer_radius", outer_radius)] {
+        for (name, value) in [
+            ("l2", Some(l2)),
+            ("w", w),
+            ("outer_radius", Some(outer_radius)),
+        ] {
             session.metric(&format!("{}.clifford_{name}", one.key()), value)?;
         }
         tori.insert(one.key(), torus);

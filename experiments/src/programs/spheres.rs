@@ -24,7 +24,6 @@ pub struct Options {
     figure: FigureOptions,
 }
 
-#[derive(Serialize)]
 struct Measurement {
     radius: f64,
     /// Errors of mean curvature flow, in the order of [`variants`], for each of the reported steps.
@@ -35,9 +34,7 @@ struct Measurement {
     willmore: Vec<Still>,
 }
 
-#[derive(Serialize)]
 struct Still {
-    scheme: Scheme,
     /// `w` of the start as the scheme measures it, by its factors of calibration.
     w_learned: f64,
     /// `w` of the end: the profile is now the one of the scheme, which the calibration is about.
@@ -69,7 +66,9 @@ pub fn program(options: &Options) -> Result<()> {
     let willmore_steps = if run.quick { 2 } else { WILLMORE_STEPS };
     let setting = Setting::new(&options.figure, CELLS, 1.0)?;
     let others = json!({ "tau": TAU, "willmore_steps": willmore_steps });
-    let parameters = setting.parameters(others)?;
+    let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
+    let variants: Vec<_> = schemes.map(|&scheme| (Method::Hybrid, scheme)).collect();
+    let parameters = setting.parameters(&variants, others)?;
     let mut session = Session::open("spheres", run, parameters)?;
     let mut all = Vec::new();
     for &radius in radii {
@@ -85,7 +84,6 @@ pub fn program(options: &Options) -> Result<()> {
         let names = Sheet::of(&measured).text("network", |_| spec.name);
         session.sheet(quality::columns(names, |measured| measured), "quality")?;
     }
-    session.output.write_json("spheres.json", &all)?;
     let note = format!(
         "n = {}, ε = 2/n, inner step 1/n². Energies by the schemes are those after the steps of Willmore flow, of the relaxed profile.",
         setting.n
@@ -129,7 +127,6 @@ fn measure(
         let end = last.map_or(f64::NAN, |record| record.measures["volume"]);
         let change = radius(end) - radius(run.start()["volume"]);
         willmore.push(Still {
-            scheme,
             w_learned: first.map_or(f64::NAN, |made| made.energy_at_rest()),
             w_relaxed: last.and_then(Record::willmore_energy).unwrap_or(f64::NAN),
             radius_change_over_h: change * setting.n as f64,

@@ -108,7 +108,7 @@ pub fn program(options: &Options) -> Result<()> {
     let (run, quick) = (&options.run, options.run.quick);
     let possible = options.budget.is_finite() && options.budget > 0.0;
     require(possible, "--budget must be positive")?;
-    let cells = if quick { &[128][..] } else { &options.cells };
+    let cells = &distinct(if quick { &[128] } else { &options.cells });
     let budget = if quick { 0.1 } else { options.budget };
     let networks = timing::networks(&options.networks, cells)?;
     let checksum = |&n| {
@@ -118,7 +118,7 @@ pub fn program(options: &Options) -> Result<()> {
     let checksums = cells.iter().map(checksum);
     let parameters = json!({
         "networks": checksums.collect::<Result<serde_json::Map<_, _>>>()?,
-        "cells": cells, "budget": budget, "steps": STEPS,
+        "cells": cells, "budget": budget, "steps": STEPS, "mesh": options.mesh.about(&ARMADILLO)?,
     });
     let mut session = Session::open("timing_tables", run, parameters)?;
     let mut timings = Vec::new();

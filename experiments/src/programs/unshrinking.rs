@@ -22,7 +22,7 @@ const FINE: f64 = 1.25;
 const TIME: f64 = 6.5536;
 const FARTHEST: f64 = 0.35;
 /// The most iterations of Taubin's and of Laplacian smoothing.
-const ITERATIONS: usize = 60;
+const ITERATIONS: usize = 200;
 
 /// A ball with wrong labels and a figure, as voxels: their surface by marching tetrahedra, what `willmore fair` makes of the voxels and of
 /// that surface, with the volume kept and without, and Taubin's and Laplacian smoothing of it with the number of iterations that comes

@@ -69,7 +69,7 @@ pub fn program(options: &Options) -> Result<()> {
         about.push(json!({ "branch": family.name, "reduced_volumes": family.reduced_volumes, "radius": family.radius, "n": setting.n }));
         families.push((family, setting));
     }
-    let parameters = families[0].1.parameters(json!({ "families": about }))?;
+    let parameters = (families[0].1).parameters(&[ACCURATE], json!({ "families": about }))?;
     let mut session = Session::open("vesicles", run, parameters)?;
     let mut all: Vec<AtRest<3>> = Vec::new();
     for (family, setting) in &families {
