@@ -109,10 +109,11 @@ impl<const D: usize> Case<D> {
 
     /// The time at which the flow ends, if there is one.
     pub(crate) fn end(&self) -> Option<f64> {
-        self.stops.iter().find_map(|stop| match stop {
+        let ends = self.stops.iter().filter_map(|stop| match stop {
             Stop::Time(end) => Some(*end),
             _ => None,
-        })
+        });
+        ends.reduce(f64::min)
     }
 
     /// What distinguishes this case from others, as stored in checkpoints; fields and networks are stored as checksums.

@@ -115,6 +115,12 @@ impl Held {
         Ok(())
     }
 
+    /// How many steps reach all targets.
+    pub(crate) fn steps(&self) -> usize {
+        let targets = self.perimeter.iter().chain(&self.volume);
+        targets.map(|target| target.over).max().unwrap_or(0)
+    }
+
     /// Whether so many steps reach all targets.
     pub(crate) fn is_reached(&self, steps: f64) -> bool {
         let mut targets = self.perimeter.iter().chain(&self.volume);

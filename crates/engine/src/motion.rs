@@ -55,8 +55,11 @@ impl<const D: usize> Motion<D> {
                 if let Some(region) = &case.region {
                     flow.restrict_to(region)?;
                 }
-                flow.constrain(case.held.targets())?;
                 case.held.check(D)?;
+                // What no shape has is refused before the first step, on the way to the targets, too.
+                for step in 1..=case.held.steps() + 1 {
+                    flow.constrain(case.held.at(step as f64))?;
+                }
                 if let Some(state) = state {
                     flow.restore(state)?;
                 }
@@ -143,23 +146,30 @@ fn network<const D: usize>(case: &Case<D>) -> &Network {
 fn learned<const D: usize>(
     case: &Case<D>,
     device: &ComputeDevice,
-) -> Result<WillmoreFlow<D>, solver::Error> {
+) -> Result<WillmoreFlow<D>, Error> {
     use solver::Error::{Geometry, Model, NoInterface};
     /// Bricks that are more than this part of the grid do not pay.
     const PAYS: f64 = 0.5;
     let (network, initial, params) = (network(case), &case.initial, case.params());
     let dense = || WillmoreFlow::with_network(network, &initial.field()?, params, device);
     let bricks = || WillmoreFlow::on_bricks(network, initial, params, device);
+    // Where bricks are no alternative.
+    let dense_instead = || -> Result<_, Error> {
+        if device.kind().is_cpu() {
+            Storage::check(case.grid(), case.grid().len(), false)?;
+        }
+        Ok(dense()?)
+    };
     let mut flow = match case.operator.storage {
         Storage::Dense => dense()?,
         Storage::Bricks => bricks()?,
-        Storage::Auto if !case.takes_bricks() => dense()?,
+        Storage::Auto if !case.takes_bricks() => dense_instead()?,
         Storage::Auto => match bricks() {
             Ok(flow) if (flow.stored_cells() as f64) < PAYS * case.grid().len() as f64 => flow,
             Ok(_) | Err(Model(_) | NoInterface | Geometry(geometry::Error::Bricks { .. })) => {
-                dense()?
+                dense_instead()?
             }
-            Err(error) => return Err(error),
+            Err(error) => return Err(error.into()),
         },
     };
     if case.operator.half_grids {

@@ -40,6 +40,8 @@ pub struct Run<const D: usize> {
     whole: OnceLock<Field<D>>,
     pub(crate) start: Values,
     pub(crate) records: Vec<Record>,
+    /// Whether a step failed after the flow had moved, so that it is not where the last record says.
+    torn: bool,
     ended: Option<Stop>,
 }
 
@@ -73,6 +75,13 @@ impl<const D: usize> Run<D> {
             require("tau", first, expected, |tau| {
                 tau.to_bits() == mcf_step.to_bits()
             })?;
+            let kept = case.region.as_ref().map_or(0, Vec::len) as f64;
+            require(
+                "nodes of a region",
+                kept,
+                "0, for mean curvature flow",
+                |n| n < 1.0,
+            )?;
         }
         let mut control = StepControl::new(&case)?;
         let (mut step_size, mut ramped) = (control.step_size(), 0.0);
@@ -82,7 +91,9 @@ impl<const D: usize> Run<D> {
             control.accept(record)?;
         }
         let motion = motion_in_memory(&case, state, device)?;
-        let stored = state.map(|_| motion.stored()).transpose()?;
+        // Before the first step all of the initial values count, also where they are not stored.
+        let begun = state.filter(|_| !records.is_empty());
+        let stored = begun.map(|_| motion.stored()).transpose()?;
         let mut run = Self {
             motion,
             device: device.clone(),
@@ -94,6 +105,7 @@ impl<const D: usize> Run<D> {
             ramped,
             start,
             records,
+            torn: false,
             ended: None,
         };
         run.ended = run.stop(step_size);
@@ -103,7 +115,7 @@ impl<const D: usize> Run<D> {
     /// Makes one step: a minimization of the next size, halved if it fails and the rule allows that. None once a stop rule holds.
     ///
     /// # Errors
-    /// [`Error::Step`], [`Error::TooStiff`]; the run stays where it was.
+    /// [`Error::Step`], [`Error::TooStiff`]: the run stays where it was. After errors of measures it goes on from its last checkpoint only.
     pub fn step(&mut self) -> Result<Option<&Record>, Error> {
         if self.ended.is_some() {
             return Ok(None);
@@ -116,6 +128,7 @@ impl<const D: usize> Run<D> {
             refused_hvp,
             minimization,
         } = self.attempt()?;
+        self.torn = true;
         let now = self.motion.stored().map_err(|source| self.failed(source))?;
         let moved = self.distance(&now, self.stored());
         let travelled = self.distance(&now, &self.case.initial);
@@ -142,6 +155,7 @@ impl<const D: usize> Run<D> {
         self.ramped += record.tau / step_size;
         record.completes_step = self.control.accept(&record)?;
         self.records.push(record);
+        self.torn = false;
         self.ended = self.stop(step_size);
         Ok(self.records.last())
     }
@@ -165,7 +179,7 @@ impl<const D: usize> Run<D> {
                 return Ok(Ending::Stopped(stop));
             }
             if let Err(error) = self.step() {
-                if let Some(store) = &mut store {
+                if let Some(store) = store.filter(|_| !self.torn) {
                     store.commit(self, true)?;
                 }
                 return Err(error);

@@ -133,10 +133,14 @@ impl TimeSteps {
 
 impl From<StepRule> for TimeSteps {
     fn from(rule: StepRule) -> Self {
+        let order = match rule {
+            StepRule::Controlled => Order::Controlled(ErrorControl::default()),
+            _ => Order::First,
+        };
         Self {
             rule,
             first_substep: None,
-            order: Order::First,
+            order,
             longest_move: None,
         }
     }
@@ -196,7 +200,9 @@ impl StepControl {
         self.size = self.wanted.min(self.end - self.time);
         self.due = self.time + self.size;
         let first_substep = self.steps.first_substep;
-        if let Some(very_first) = first_substep.filter(|_| self.controller.is_none()) {
+        // At the end nothing is left to make.
+        let substeps = self.controller.is_none() && self.size > 0.0;
+        if let Some(very_first) = first_substep.filter(|_| substeps) {
             let largest = if self.completed == 0 {
                 very_first
             } else {

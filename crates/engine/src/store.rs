@@ -1,5 +1,6 @@
 //! Runs that are stored in directories.
 
+use std::collections::BTreeSet;
 use std::fmt::Display;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -82,7 +83,7 @@ impl Store {
     }
 
     /// Goes on with a finished run under other stop rules, and with other notes; `case` is the stored one but for those. The files of its
-    /// end, which `ends` names, are removed.
+    /// end, which `ends` names, stay and are no longer part of it.
     ///
     /// # Errors
     /// As [`Self::resume`]; [`Error::Stored`] if one of the stop rules holds already.
@@ -265,8 +266,10 @@ pub(crate) fn check_identity(stored: &StoredRun, wanted: &Value) -> Result<(), E
     if found == wanted {
         return Ok(());
     }
-    let keys = wanted.as_object().into_iter().flat_map(|map| map.keys());
+    let keys = [wanted, found].into_iter().filter_map(Value::as_object);
+    let keys: BTreeSet<&String> = keys.flat_map(|map| map.keys()).collect();
     let differing: Vec<String> = keys
+        .into_iter()
         .map(|key| (key, &found[key], &wanted[key]))
         .filter(|(_, there, here)| there != here)
         .map(|(key, there, here)| format!("{key}: {there} there, {here} here"))

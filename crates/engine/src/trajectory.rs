@@ -173,7 +173,7 @@ fn found<const D: usize>(
                 return Ok(Some(stored));
             }
         }
-        Err(error @ RunsError::Locked { .. }) => return Err(error.into()),
+        Err(error @ (RunsError::Locked(_) | RunsError::Io(_))) => return Err(error.into()),
         Err(_) => {}
     }
     match std::fs::remove_dir_all(folder) {

@@ -1,7 +1,9 @@
 //! Sizes that are driven to targets.
 
-use crate::common::{EPS, TAU, case, finished, grid};
-use engine::{Case, ErrorControl, Flow, Held, Measure, Method, StepRule, Stop, Target, TimeSteps};
+use crate::common::{EPS, TAU, case, device, finished, grid};
+use engine::{
+    Case, ErrorControl, Flow, Held, Measure, Method, Run, StepRule, Stop, Target, TimeSteps,
+};
 use geometry::zero_set::reduced_volume;
 use geometry::{Field, ZeroSet, phase_field, shapes::Ellipse};
 
@@ -76,4 +78,32 @@ fn a_step_that_cannot_hold_its_target_is_halved_with_it() {
     let expected = run.case().held.at(part).volume.unwrap();
     let found = first.measure("area").unwrap();
     assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+}
+
+/// At both ends there are shapes with these sizes, but not half-way.
+#[test]
+fn targets_that_no_shape_has_on_the_way_are_refused() {
+    let u = ellipse();
+    let sizes = ZeroSet::of(&u, EPS).unwrap();
+    let driven = |from: f64, factor: f64| {
+        Some(Target {
+            from,
+            to: factor * from,
+            over: 10,
+        })
+    };
+    let held = Held {
+        perimeter: driven(sizes.perimeter, 2.0),
+        volume: driven(sizes.volume, 3.9),
+    };
+    let case = Case {
+        held,
+        ..case(Flow::Willmore, Method::Hybrid, u)
+    };
+    let refused = Run::new(case, &device()).err().unwrap();
+    let source = std::error::Error::source(&refused).map(ToString::to_string);
+    assert!(
+        format!("{refused} {source:?}").contains("perimeter"),
+        "{refused}"
+    );
 }

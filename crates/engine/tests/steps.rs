@@ -2,7 +2,8 @@
 
 use crate::common::{EPS, TAU, case, device, disc, divided, finished, square};
 use engine::{
-    Error, ErrorControl, Flow, Method, Record, Run, StepRule, Stop, TimeSteps, estimated_time_error,
+    Case, Error, ErrorControl, Flow, Method, Record, Run, StepRule, Stop, TimeSteps,
+    estimated_time_error,
 };
 
 /// With three Newton steps a whole step of a square's flow is too much, substeps are not.
@@ -155,6 +156,20 @@ fn a_time_error_that_is_given_is_kept() {
         run.records().len()
     });
     assert!(steps[1] > steps[0], "{steps:?}");
+}
+
+#[test]
+fn the_earliest_time_ends_a_run_in_substeps() {
+    let case = Case {
+        steps: divided(TAU, TAU / 4.0),
+        stops: [2.5, 1.25].map(|steps| Stop::Time(steps * TAU)).to_vec(),
+        ..case(Flow::Willmore, Method::Hybrid, disc(128, 0.2))
+    };
+    let run = finished(case);
+    assert_eq!(run.ended(), Some(Stop::Time(1.25 * TAU)));
+    assert!((run.time() / (1.25 * TAU) - 1.0).abs() < 1e-12);
+    let controlled = TimeSteps::from(StepRule::Controlled);
+    assert!(controlled == TimeSteps::controlled(ErrorControl::default()));
 }
 
 #[test]

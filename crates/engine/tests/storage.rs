@@ -91,6 +91,24 @@ fn an_interrupted_run_on_bricks_continues_with_the_same_bytes() {
     }
 }
 
+/// Values that its bricks do not store are there before the first step.
+#[test]
+fn a_run_on_bricks_without_a_step_continues_with_the_same_bytes() {
+    let case = Case {
+        initial: disc(128, 0.1).into(),
+        ..stored(Storage::Bricks, 0.1)
+    };
+    let root = tempfile::tempdir().unwrap();
+    let (folder, every) = (root.path().join("run"), Checkpoints::EverySteps(1));
+    let run = Run::new(case.clone(), &device()).unwrap();
+    drop(Store::create(&folder, &[], &run, Value::Null, every).unwrap());
+    let stored = RunDirectory::open(&folder).unwrap();
+    let (_, resumed) = Store::resume(stored, case, &device(), every).unwrap();
+    assert_eq!(run.field(), resumed.field());
+    let moved = [run, resumed].map(|mut run| run.step().unwrap().unwrap().moved.to_bits());
+    assert_eq!(moved[0], moved[1]);
+}
+
 #[test]
 fn bricks_are_refused_or_left_where_they_cannot_be() {
     let paper = |storage: Storage| {

@@ -41,13 +41,13 @@
 //! | `timings.json` | wall times and the like, and its own SHA-256 | replaced at any time |
 //! | `lock` | nothing; locked while a process works here | once |
 //!
-//! The directory belongs to the run: resuming removes all files that are not part of it.
+//! Resuming removes checkpoints and temporary files that are no part of the run; files of others stay.
 //!
 //! # What is promised
 //!
 //! - A checkpoint is the commit. Other files are written and flushed before it, so that it describes
-//!   a whole state of the run whenever the process dies. What it does not list was written after it;
-//!   resuming removes that, and the computation writes it again.
+//!   a whole state of the run whenever the process dies. What it does not list was written after it,
+//!   and the computation of a resumed run writes it again.
 //! - A run that is a function of its [`State`] ends with the same bytes in every file but
 //!   `timings.json`, however often it was stopped: only the last checkpoint stays.
 //! - A bit that has flipped in any of the files is noticed when the run is opened, and the file

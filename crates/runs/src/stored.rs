@@ -155,7 +155,7 @@ impl StoredRun {
         Ok((self.run, self.state))
     }
 
-    /// Goes on with a finished run by a commit of `state`, of the same step, after which the files that `ends` names do not belong to the
+    /// Goes on with a run by a commit of `state`, of the same step, after which the files that `ends` names do not belong to the
     /// run any more; they stay until [`RunDirectory::remove_others`].
     pub fn reopen(
         self,
@@ -164,9 +164,14 @@ impl StoredRun {
     ) -> Result<RunDirectory, Error> {
         let (mut run, _) = self.resume()?;
         run.files.retain(|name, _| !ends(name));
-        // The one commit that there is gives way to this one.
-        run.steps.clear();
+        // The commits that there are give way to this one.
+        let mut others = std::mem::take(&mut run.steps);
         run.commit(state)?;
+        others.retain(|&step| step != state.step);
+        for other in others {
+            let path = run.path.join(names::checkpoint(other));
+            (run.storage.remove(&path)).map_err(files::Error::of("remove", path))?;
+        }
         Ok(run)
     }
 

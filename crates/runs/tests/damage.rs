@@ -245,7 +245,16 @@ fn a_finished_run_can_be_extended() {
     again.finish(&toy::state_at(9)).unwrap();
     let stored = RunDirectory::open(&run).unwrap();
     assert!(stored.is_finished() && stored.state().step == 9);
-    assert_eq!(fs::read_dir(run.join("checkpoints")).unwrap().count(), 1);
+    let checkpoints = || fs::read_dir(run.join("checkpoints")).unwrap().count();
+    assert_eq!(checkpoints(), 1);
+    // Nor are checkpoints left of a run that goes on under other rules.
+    let (mut again, _) = stored.resume().unwrap();
+    again.commit(&toy::state_at(12)).unwrap();
+    drop(again);
+    assert_eq!(checkpoints(), 2);
+    let stored = RunDirectory::open(&run).unwrap();
+    drop(stored.reopen(&toy::state_at(12), |_| false).unwrap());
+    assert_eq!(checkpoints(), 1);
 }
 
 /// As it is kept for a moment by a process that is forked and has not yet become another program.

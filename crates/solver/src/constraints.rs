@@ -481,7 +481,13 @@ impl<const D: usize> Tangent<D> {
     fn violation(&self) -> f64 {
         let violations = self.parts.iter().map(Part::violation);
         // A NaN must not pass for zero.
-        violations.fold(0.0, |worst, v| if v <= worst { worst } else { v })
+        violations.fold(0.0, |worst: f64, v| {
+            if v <= worst || worst.is_nan() {
+                worst
+            } else {
+                v
+            }
+        })
     }
 }
 

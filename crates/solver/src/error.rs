@@ -17,7 +17,7 @@ pub enum Error {
         field: &'static str,
     },
     #[error(
-        "step {step}: the minimization stopped (limit of Newton steps) at {estimate:.1e} of the step, above the tolerance {tolerance:.1e}; \
+        "step {step}: the minimization stopped at {estimate:.1e} of the step, above the tolerance {tolerance:.1e}; \
          use a smaller time step"
     )]
     NotConverged {
