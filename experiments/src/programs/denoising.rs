@@ -139,8 +139,12 @@ fn denoise<'a>(
     for (colour, method, factors) in [(1, "Taubin", TAUBIN), (2, "Laplacian", LAPLACIAN)] {
         let clock = Instant::now();
         let smoothed = |count| noisy.smoothed(count, factors[0], factors[1]);
-        let quality = |count| clean.quality(&smoothed(count));
-        let all: Vec<Quality> = (1..=ITERATIONS).map(quality).collect();
+        let mut mesh = noisy.clone();
+        let mut all: Vec<Quality> = Vec::new();
+        for _ in 0..ITERATIONS {
+            mesh = mesh.smoothed(1, factors[0], factors[1]);
+            all.push(clean.quality(&mesh));
+        }
         let seconds = clock.elapsed().as_secs_f64() / ITERATIONS as f64;
         let best = (0..ITERATIONS).min_by(|&a, &b| all[a].rms.total_cmp(&all[b].rms));
         let best = best.unwrap_or(0) + 1;

@@ -172,12 +172,16 @@ impl Segmented {
 
     /// The surface after the number of iterations that brings it nearest to the shape.
     fn smoothed(&self, [lambda, mu]: [f64; 2]) -> Result<(usize, ClosedMesh)> {
-        let smoothed = |count| self.marched.mesh().smoothed(count, lambda, mu);
-        let distance = |count| (count, rms_distance(&smoothed(count), &*self.shape));
-        let all = (1..=ITERATIONS).map(distance);
-        let best = all.min_by(|a, b| a.1.total_cmp(&b.1));
-        let best = best.map_or(1, |(count, _)| count);
-        Ok((best, ClosedMesh::new(smoothed(best))?.0))
+        let mut mesh = self.marched.mesh().clone();
+        let mut best = (f64::INFINITY, 0, mesh.clone());
+        for count in 1..=ITERATIONS {
+            mesh = mesh.smoothed(1, lambda, mu);
+            let distance = rms_distance(&mesh, &*self.shape);
+            if distance < best.0 {
+                best = (distance, count, mesh.clone());
+            }
+        }
+        Ok((best.1, ClosedMesh::new(best.2)?.0))
     }
 }
 
