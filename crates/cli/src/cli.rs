@@ -563,9 +563,11 @@ impl RunCommand {
 impl MessageOptions {
     /// Prints the outcome of a command: an object, or a text for people.
     pub fn report(self, outcome: &Value, text: &str) {
-        // A closed pipe (`| head`) is no reason to fail after the results have been written.
         if self.to_pipe {
-        } else if self.json {
+            return;
+        }
+        // A closed pipe (`| head`) is no reason to fail after the results have been written.
+        if self.json {
             let _ = writeln!(std::io::stdout(), "{outcome}");
         } else if !self.quiet {
             let _ = writeln!(std::io::stdout(), "{text}");

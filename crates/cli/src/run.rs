@@ -122,8 +122,8 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
                 self.save(u, eps, faired.as_ref(), path)?;
             }
         } else if self.options.save.is_some() {
-            let messages = self.messages;
-            messages.warn("nothing is saved to the file of --save: the shape has vanished");
+            let gone = "nothing is saved to the file of --save: the shape has vanished";
+            self.messages.warn(gone);
         }
         let (pictures, series) = frames(directory.path(), run.records())?;
         if !pictures.is_empty() {

@@ -1,3 +1,5 @@
+use std::ops::RangeInclusive;
+
 use chacha20::ChaCha8Rng;
 
 use crate::meshes::{folder, sampled};
@@ -14,8 +16,10 @@ const NOISES: [f64; 2] = [0.3, 0.5];
 /// The grid as `willmore fair` chooses it: cells per unit length, and the longest side in the box.
 const CELLS: usize = 128;
 const SIDE: f64 = 0.9;
-/// The most iterations of Taubin's and of Laplacian smoothing.
+/// The most iterations of Taubin's and of Laplacian smoothing,
 const ITERATIONS: usize = 100;
+/// and the usual ones of Taubin's.
+const USUAL: RangeInclusive<usize> = 3..=30;
 
 /// Independent normally distributed noise along the normals of clean meshes, taken off by `willmore fair` at its defaults, by Taubin's
 /// and by Laplacian smoothing with the number of iterations that comes nearest to the clean mesh: distances, normals and volumes.
@@ -135,7 +139,7 @@ fn denoise<'a>(
         row("noisy", None, noisy.clone(), 0.0),
         row("fair", None, faired, seconds),
     ];
-    let (mut curves, mut least_normals) = (Vec::new(), Vec::new());
+    let (mut curves, mut taubin) = (Vec::new(), Vec::new());
     for (colour, method, factors) in [(1, "Taubin", TAUBIN), (2, "Laplacian", LAPLACIAN)] {
         let clock = Instant::now();
         let smoothed = |count| noisy.smoothed(count, factors[0], factors[1]);
@@ -149,21 +153,25 @@ fn denoise<'a>(
         let best = (0..ITERATIONS).min_by(|&a, &b| all[a].rms.total_cmp(&all[b].rms));
         let best = best.unwrap_or(0) + 1;
         let row = row(method, Some(best), smoothed(best), seconds);
-        let least = all.iter().map(|q| q.normals).fold(f64::MAX, f64::min);
-        session.metric(&format!("{}.least_normals", row.key()), least)?;
-        least_normals.push(least);
+        let least_normals = least(&all, |quality| quality.normals);
+        session.metric(&format!("{}.least_normals", row.key()), least_normals)?;
         rows.push(row);
         let points = (1..).zip(&all);
         let curve = Series::of(method, points, |(k, quality)| [f64::from(k), quality.rms]);
         curves.push(curve.with_colour(colour));
+        if method == "Taubin" {
+            taubin = all;
+        }
     }
-    let [noisy, fair, taubin] = [0, 1, 2].map(|k: usize| rows[k].quality);
-    let (distances, normals) = (fair.rms / taubin.rms, fair.normals / least_normals[0]);
-    let ratios = [
-        ("fair_over_taubin", distances.into()),
-        ("normals_over_taubin", normals.into()),
-    ];
-    session.metrics(&clean.key(noise), ratios)?;
+    let [noisy, fair] = [0, 1].map(|k: usize| rows[k].quality);
+    let usual = &taubin[USUAL.start() - 1..*USUAL.end()];
+    for (name, taubin) in [("taubin", usual), ("best_taubin", &taubin[..])] {
+        let distances = fair.rms / least(taubin, |quality| quality.rms);
+        let normals = fair.normals / least(taubin, |quality| quality.normals);
+        let key = clean.key(noise);
+        session.metric(&format!("{key}.fair_over_{name}"), distances)?;
+        session.metric(&format!("{key}.normals_over_{name}"), normals)?;
+    }
     let level = |name, quality: Quality| {
         Series::new(name, [1.0, ITERATIONS as f64].map(|x| [x, quality.rms]))
     };
@@ -173,6 +181,10 @@ fn denoise<'a>(
     let distance = Axis::log("distance, % of the longest side");
     let chart = LineChart::new(title, Axis::log("iterations"), distance);
     Ok((rows, chart.with_curves(curves)))
+}
+
+fn least(all: &[Quality], of: fn(&Quality) -> f64) -> f64 {
+    all.iter().map(of).fold(f64::MAX, f64::min)
 }
 
 /// The built-in shapes, and the meshes that are chosen or here.
