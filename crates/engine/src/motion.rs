@@ -56,8 +56,9 @@ impl<const D: usize> Motion<D> {
                     flow.restrict_to(region)?;
                 }
                 case.held.check(D)?;
-                // What no shape has is refused before the first step, on the way to the targets, too.
-                for step in 1..=case.held.steps() + 1 {
+                // What no shape has is refused before the first step: the targets, and sizes on the way to them.
+                flow.constrain(case.held.targets())?;
+                for step in 1..=case.held.steps() {
                     flow.constrain(case.held.at(step as f64))?;
                 }
                 if let Some(state) = state {
