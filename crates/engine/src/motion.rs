@@ -55,9 +55,9 @@ impl<const D: usize> Motion<D> {
                 if let Some(region) = &case.region {
                     flow.restrict_to(region)?;
                 }
-                case.held.check(D)?;
                 // What no shape has is refused before the first step: the targets, and sizes on the way to them.
                 flow.constrain(case.held.targets())?;
+                case.held.check(D)?;
                 for step in 1..=case.held.steps() {
                     flow.constrain(case.held.at(step as f64))?;
                 }
