@@ -167,7 +167,7 @@ impl Surface {
     }
 }
 
-/// The Willmore energy of a phase field with the implicit finite-element step and the mass-matrix norm, up to [`MOST_NODES`].
+/// The Willmore energy of a phase field with the implicit finite-element step and the mass-matrix norm, up to `2^26` nodes.
 pub fn energy_by_elements(
     case: &Case<3>,
     u: impl FnOnce() -> Result<Field<3>>,
