@@ -48,12 +48,10 @@ impl RunOptions {
 
 /// Numbers from the least to the largest, each once.
 pub fn distinct(numbers: &[usize]) -> Vec<usize> {
-    numbers
-        .iter()
-        .copied()
-        .collect::<BTreeSet<_>>()
-        .into_iter()
-        .collect()
+    let mut distinct = numbers.to_vec();
+    distinct.sort_unstable();
+    distinct.dedup();
+    distinct
 }
 
 /// Options of a figure at one resolution.

@@ -14,8 +14,6 @@ use crate::paths::MESHES;
 use crate::prelude::*;
 use crate::{config, outcome, own, plane, presentation};
 
-pub const NAME: &str = "index.html";
-
 /// Of longer sequences every second, third, ... picture is shown: a page should stay small enough to be mailed.
 const MOST_FRAMES: usize = 60;
 /// The same for surfaces, some 25 bytes for a vertex.
@@ -27,7 +25,7 @@ const FEW_STEPS: usize = 40;
 
 /// Writes the page of a run and returns its path.
 pub fn write(run: &StoredRun) -> Result<PathBuf> {
-    let path = run.path().join(NAME);
+    let path = run.path().join(presentation::PAGE);
     let records = engine::records(run)?;
     Files { run, records }.page()?.write(&path)?;
     Ok(path)

@@ -5,7 +5,6 @@ use std::fmt;
 use serde::de::DeserializeOwned;
 
 use crate::faired::Faired;
-use crate::page;
 use crate::paths::{MESHES, extension};
 use crate::prelude::*;
 
@@ -23,6 +22,7 @@ pub const ANIMATION: &str = "animation.png";
 /// The fields of the frames with their times.
 pub const SERIES: &str = "frames.pvd";
 pub const SUMMARY: &str = "summary.json";
+pub const PAGE: &str = "index.html";
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Topology {
@@ -126,7 +126,7 @@ pub fn is_of_end(name: &str) -> bool {
 /// Whether a file or folder, by its name, is one that a run writes besides those that it begins with.
 pub fn is_written(name: &str) -> bool {
     let frame = name.starts_with("step-") && is_stage(name, name.split('.').next().unwrap_or(""));
-    is_of_end(name) || is_stage(name, START) || frame || [FRAMES, page::NAME].contains(&name)
+    is_of_end(name) || is_stage(name, START) || frame || [FRAMES, PAGE].contains(&name)
 }
 
 /// Whether a file shows the shape at a stage of the flow.

@@ -125,11 +125,15 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
             let gone = "nothing is saved to the file of --save: the shape has vanished";
             self.messages.warn(gone);
         }
-        let (pictures, series) = frames(directory.path(), run.records())?;
-        if !pictures.is_empty() {
-            let animation = render::animation(&pictures, DELAY)?;
-            directory.write_file(presentation::ANIMATION, |out| out.write_all(&animation))?;
-            directory.write_file(presentation::SERIES, |out| out.write_all(series.as_bytes()))?;
+        if self.options.frames.is_some() {
+            let (pictures, series) = frames(directory.path(), run.records())?;
+            // There are none of a shape that is never there.
+            if !pictures.is_empty() {
+                let animation = render::animation(&pictures, DELAY)?;
+                directory.write_file(presentation::ANIMATION, |out| out.write_all(&animation))?;
+                directory
+                    .write_file(presentation::SERIES, |out| out.write_all(series.as_bytes()))?;
+            }
         }
         // Touching sheets have no topology; that is no reason not to flow.
         let of_start = || presentation.topology(start, eps).unwrap_or_default();
@@ -251,7 +255,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         } else if self.options.no_page {
             format!("results are in {shown}")
         } else {
-            let page = folder.join(page::NAME);
+            let page = folder.join(presentation::PAGE);
             format!("results are in {shown}, to look at: {}", page.display())
         });
         if let Some(stop) = ended {

@@ -75,10 +75,10 @@ impl<const D: usize> Run<D> {
             require("tau", first, expected, |tau| {
                 tau.to_bits() == mcf_step.to_bits()
             })?;
-            let kept = case.region.as_ref().map_or(0, Vec::len) as f64;
+            let nodes = case.region.as_ref().map_or(0, Vec::len) as f64;
             require(
                 "nodes of a region",
-                kept,
+                nodes,
                 "0, for mean curvature flow",
                 |n| n < 1.0,
             )?;

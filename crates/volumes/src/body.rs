@@ -49,7 +49,7 @@ pub struct Body {
     pub volume: f64,
     /// The side of a cube as large as a voxel.
     pub voxel: f64,
-    /// Parts and holes that are left out.
+    /// How many parts and holes are left out.
     pub specks: usize,
 }
 
