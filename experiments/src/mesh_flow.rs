@@ -47,18 +47,18 @@ impl MeshFlow {
     ) -> Result<()> {
         let run = &options.figure.run;
         let side = options.mesh.box_side(&self.mesh);
-        let setting = Setting::new(&options.figure, [32, self.cells], side)?;
+        let schemes = options.schemes.schemes();
+        let variants = schemes.into_iter().map(|scheme| (Method::Hybrid, scheme));
+        let variants: Vec<_> = variants.collect();
+        let setting = Setting::new(&options.figure, &variants, [32, self.cells], side)?;
         let (time_steps, more) = self.time_steps(setting.n);
         let steps = (options.steps).unwrap_or(if run.quick { 2 } else { self.steps + more });
         require(steps > 0, "--steps must be at least 1")?;
         let mesh = options.mesh.load(&self.mesh, &setting.grid)?;
         let usual = options.mesh.mesh.as_ref().map(surfaces::usual_up_axis);
         let up = (options.up.or(usual.transpose()?)).unwrap_or(self.view.up);
-        let schemes = options.schemes.schemes();
-        let variants = schemes.into_iter().map(|scheme| (Method::Hybrid, scheme));
-        let variants: Vec<_> = variants.collect();
         let others = json!({ "mesh": mesh.about, "tau": time_steps.rule, "steps": steps });
-        let parameters = setting.parameters(&variants, others)?;
+        let parameters = setting.parameters(others)?;
         let mut session = Session::open(self.program, run, parameters)?;
         let initial = session.phase("signed distance", |stage| {
             mesh.phase_field(setting.grid, setting.scales.eps, &stage.bar)

@@ -38,10 +38,15 @@ pub struct NetworkOptions {
 }
 
 impl NetworkOptions {
-    /// Where the networks of the paper's and the calibrated scheme come from.
+    /// Where the networks of the paper's and the calibrated scheme come from; files that meet none of the needs are refused.
     pub fn load(&self, needs: &[NeededNetwork]) -> Result<Chosen> {
         Ok(Chosen(Networks::load(&self.network, needs)?))
     }
+}
+
+/// Whether a user's network takes part.
+pub fn takes_networks((method, scheme): (Method, Scheme)) -> bool {
+    method.is_learned() && scheme != Scheme::Accurate
 }
 
 /// The user's networks in place of those of the paper's recipe, before the shipped ones.

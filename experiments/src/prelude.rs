@@ -32,7 +32,7 @@ pub use surfaces::{ClosedMesh, MeshDistance, TriangleMesh};
 
 pub use crate::networks::{
     ACCURATE, Chosen, ELEMENTS, EPS, NetworkOptions, PAPERS, STEP, convergence_network, operator,
-    planar_flow, time,
+    planar_flow, takes_networks, time,
 };
 pub use crate::options::{FigureOptions, RunOptions, distinct};
 pub use crate::session::{Session, Stage};

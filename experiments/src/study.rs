@@ -107,7 +107,7 @@ pub struct Study {
 impl Study {
     /// The operators of all variants; variants without a network are left out if the accurate recipe has one for the resolution.
     pub fn new(options: &NetworkOptions, variants: &[Variant]) -> Result<Self> {
-        let learned = variants.iter().filter(|v| v.method.is_learned());
+        let learned = variants.iter().filter(|v| takes_networks(v.look()));
         let needs = learned.map(|v| convergence_network(v.n));
         let networks = options.load(&needs.collect::<Result<Vec<_>, _>>()?)?;
         let cells: BTreeSet<usize> = variants.iter().map(|v| v.n).collect();

@@ -42,15 +42,24 @@ pub struct Setting {
     pub n: usize,
     pub grid: Grid<3>,
     pub scales: Scales,
+    variants: Vec<(Method, Scheme)>,
     networks: Chosen,
 }
 
 impl Setting {
-    /// A box of the given side, with the usual numbers of cells per unit length of a quick run and of the paper.
-    pub fn new(options: &FigureOptions, usual: [usize; 2], side: f64) -> Result<Self> {
+    /// For these methods, in a box of the given side, with the usual numbers of cells per unit length of a quick run and of the paper.
+    pub fn new(
+        options: &FigureOptions,
+        variants: &[(Method, Scheme)],
+        usual: [usize; 2],
+        side: f64,
+    ) -> Result<Self> {
         let n = options.cells(usual);
+        let learned = variants.iter().filter(|&&variant| takes_networks(variant));
+        let needs: Vec<_> = learned.map(|_| needed_network()).collect();
         Ok(Self {
-            networks: options.networks.load(&[needed_network()])?,
+            variants: variants.to_vec(),
+            networks: options.networks.load(&needs)?,
             grid: centred_box(n, side)?,
             scales: scales(n),
             n,
@@ -67,10 +76,10 @@ impl Setting {
         Ok(operator)
     }
 
-    /// The parameters of a program for its manifest: the common ones with the networks of these operators, and others.
-    pub fn parameters(&self, variants: &[(Method, Scheme)], others: Value) -> Result<Value> {
+    /// The parameters of a program for its manifest: the common ones with the networks of all operators, and others.
+    pub fn parameters(&self, others: Value) -> Result<Value> {
         let mut networks = BTreeMap::new();
-        for &variant in variants {
+        for &variant in &self.variants {
             if let Some(named) = self.operator(variant)?.network() {
                 networks.insert(variant.0.key_in(variant.1), named.network.fingerprint());
             }

@@ -102,6 +102,11 @@ fn weights_that_are_missing_damaged_or_of_another_run() {
         let arguments = ["--quick", "--network", "other.safetensors"];
         refused(program, root.path(), &arguments, &["n_K = 33", "n_K = 17"]);
     }
+    // The accurate recipe has always the shipped ones.
+    let unused: &[&str] = &["--network", "other.safetensors"];
+    refused(VESICLES, root.path(), unused, &["leave it out"]);
+    let accurate = [unused, &["--scheme", "accurate"]].concat();
+    refused(CIRCLES, root.path(), &accurate, &["leave it out"]);
 }
 
 #[test]

@@ -35,6 +35,29 @@ fn moved(from: &TriangleMesh, to: &Path, kept: impl Fn([f64; 3]) -> bool) -> usi
     moved.len()
 }
 
+/// What is sharp on purpose cannot be told from noise where all vertices are near it.
+#[test]
+fn edges_between_flat_sides_are_told_before_they_become_round() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut octahedron = noisy_ball();
+    for x in &mut octahedron.vertices {
+        let length = (x[0] - 1.0).abs() + x[1].abs() + x[2].abs();
+        *x = [(x[0] - 1.0) / length, x[1] / length, x[2] / length];
+    }
+    for (name, is_told) in [("octahedron.ply", true), ("ball.ply", false)] {
+        let mesh = if is_told {
+            octahedron.clone()
+        } else {
+            noisy_ball()
+        };
+        surfaces::write(folder.path().join(name), &mesh).unwrap();
+        let said = run(folder.path(), &["fair", name, "--cells", "32"]);
+        assert!(said.status.success(), "{}", text(&said.stderr));
+        let warns = text(&said.stderr).contains("of the vertices lie in a plane");
+        assert_eq!(warns, is_told, "{}", text(&said.stderr));
+    }
+}
+
 #[test]
 fn a_mask_and_a_colour_keep_parts_of_a_mesh_and_the_page_shows_how_far_the_others_went() {
     let folder = tempfile::tempdir().unwrap();

@@ -25,7 +25,7 @@ pub enum Error {
         wanted: Ratios,
         available: String,
     },
-    #[error("no run of these methods needs a network")]
+    #[error("no run of these methods uses a network that is given: leave it out")]
     NetworkNotNeeded,
     #[error(
         "the kernel is {width} cells wide, but the grid has only {cells}; use a larger box or a finer grid"

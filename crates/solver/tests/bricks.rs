@@ -306,7 +306,7 @@ fn difference_with<const D: usize>(start: &Field<D>, helfrich: Helfrich) -> (f64
     let mut flows = (dense(start, params), bricks(start, params));
     flows.0.set_energy(helfrich, response).unwrap();
     flows.1.set_energy(helfrich, response).unwrap();
-    difference_of((&mut flows.0, &mut flows.1), &[params.mcf_step / 4.0; 3])
+    difference_of((&mut flows.0, &mut flows.1), &[params.mcf_step / 4.0; 2])
 }
 
 #[test]

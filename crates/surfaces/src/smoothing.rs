@@ -203,20 +203,15 @@ impl TriangleMesh {
     /// small one, by its curvature. Zero for a mesh without faces.
     pub fn noise(&self) -> f64 {
         let umbrellas = Umbrellas::of(self);
-        let x = self.points();
-        let twice = umbrellas.laplacian(&umbrellas.laplacian(&x));
         // Normals of the smoothed mesh: noise turns those of the mesh itself, towards the plane of their neighbours.
         let normals = self.smoothed(12, 0.5, -0.53).vertex_normals();
-        let mut weights = Vec::new();
-        let inner: Vec<bool> = umbrellas.0.iter().map(|near| near.len() > 2).collect();
+        let found = self.squared_noise(&umbrellas, &normals);
         // A number at each vertex, as a vector.
-        let mut squares = vec![Vector::ZERO; x.len()];
-        for v in (0..x.len()).filter(|&v| inner[v]) {
-            let along = twice[v].dot(Vector::from_array(normals[v]));
-            squares[v].x = along * along / umbrellas.squared_weights(v, &mut weights);
-        }
+        let mut squares: Vec<Vector> = (found.iter())
+            .map(|square| Vector::new(square.unwrap_or(0.0), 0.0, 0.0))
+            .collect();
         umbrellas.smooth(&mut squares, AVERAGING, [0.5, 0.0]);
-        let means = squares.iter().zip(inner).filter(|(_, inner)| *inner);
+        let means = squares.iter().zip(&found).filter(|(_, at)| at.is_some());
         let mut means: Vec<f64> = means.map(|(mean, _)| mean.x).collect();
         if means.is_empty() {
             return 0.0;
@@ -224,6 +219,30 @@ impl TriangleMesh {
         let middle = means.len() / 2;
         let (_, median, _) = means.select_nth_unstable_by(middle, f64::total_cmp);
         median.sqrt() / MEDIAN_OF_MEANS
+    }
+
+    /// The part of the vertices that lie in a plane with their neighbours and those of these, to a ten-thousandth of `noise`, which
+    /// would leave as small a part. Meshes with flat sides and sharp edges have many.
+    pub fn flat_part(&self, noise: f64) -> f64 {
+        let found = self.squared_noise(&Umbrellas::of(self), &self.vertex_normals());
+        let flat = found
+            .iter()
+            .flatten()
+            .filter(|&&square| square.sqrt() <= 1e-4 * noise);
+        flat.count() as f64 / found.len().max(1) as f64
+    }
+
+    /// `(n . L L x)^2` at each vertex with the normal `n`, divided by the sum of the squares of its coefficients; none where there are too
+    /// few neighbours.
+    fn squared_noise(&self, umbrellas: &Umbrellas, normals: &[[f64; 3]]) -> Vec<Option<f64>> {
+        let twice = umbrellas.laplacian(&umbrellas.laplacian(&self.points()));
+        let mut weights = Vec::new();
+        let mut at = |v: usize| {
+            let along = twice[v].dot(Vector::from_array(normals[v]));
+            along * along / umbrellas.squared_weights(v, &mut weights)
+        };
+        let inner = umbrellas.0.iter().map(|near| near.len() > 2);
+        (inner.enumerate().map(|(v, inner)| inner.then(|| at(v)))).collect()
     }
 }
 

@@ -41,6 +41,22 @@ fn noise_is_estimated_to_five_percent_and_is_next_to_nothing_on_a_smooth_surface
     }
 }
 
+/// Of an octahedron's edges something is taken for noise, of which its flat sides have none.
+#[test]
+fn flat_sides_have_no_noise() {
+    let sphere = sphere([0.0; 3], 1.0, 4);
+    let mut octahedron = sphere.clone();
+    for x in &mut octahedron.vertices {
+        let length: f64 = x.iter().map(|x| x.abs()).sum();
+        *x = x.map(|x| x / length);
+    }
+    assert!(octahedron.flat_part(octahedron.noise()) > 0.3);
+    for mesh in [octahedron, sphere] {
+        let noisy = with_noise(&mesh, 0.01);
+        assert!(noisy.flat_part(noisy.noise()) < 0.002);
+    }
+}
+
 /// The variance is that of any distribution.
 #[test]
 fn noise_need_not_be_normally_distributed_nor_along_the_normals() {

@@ -55,7 +55,7 @@ pub fn program(options: &Options) -> Result<()> {
     let variants = options.variants();
     let message = "--steps must be at least 1, and --methods must name a method";
     require(steps > 0 && !variants.is_empty(), message)?;
-    let setting = Setting::new(&options.figure, CELLS, 1.0)?;
+    let setting = Setting::new(&options.figure, &variants, CELLS, 1.0)?;
     let (n, grid, eps) = (setting.n, setting.grid, setting.scales.eps);
     let cube = Cuboid::new([CUBE_HALF_SIDE; 3])?.translated([0.5; 3]);
     let disk = Cylinder::new(radius, half_height)?.translated([0.5; 3]);
@@ -76,7 +76,7 @@ pub fn program(options: &Options) -> Result<()> {
         "tau": TAU, "steps": steps, "variants": variants, "cube_half_side": CUBE_HALF_SIDE, "disk_radius": radius,
         "disk_half_height": half_height,
     });
-    let parameters = setting.parameters(&variants, others)?;
+    let parameters = setting.parameters(others)?;
     let session = Session::open("disk_and_cube", run, parameters)?;
     let time = (StepRule::Constant(TAU).into(), steps);
     let comparisons = |session: &mut Session, all: &mut [Flowed]| {

@@ -75,7 +75,8 @@ pub fn program(options: &Options) -> Result<()> {
     let ratios = Ratios::of_run(2, WIDTH, 1.0 / n as f64, scales.eps, scales.mcf_step);
     ratios.validate()?;
     let (scheme, needed) = (options.common.scheme, NeededNetwork::exactly(ratios));
-    let networks = options.common.figure.networks.load(&[needed])?;
+    let needs = takes_networks((Method::Hybrid, scheme)).then_some(needed);
+    let networks = options.common.figure.networks.load(needs.as_slice())?;
     let operator = networks.learned(scheme, &needed)?;
     let shapes = shapes(run.quick)?;
     let parameters = inpainting::parameters((n, &scales), &operator, &shapes);

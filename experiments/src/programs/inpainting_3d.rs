@@ -84,9 +84,10 @@ pub fn program(options: &Options) -> Result<()> {
         "--extra-steps {extra_steps} is too many: each step is twice as long as the one before; give at most {MOST_EXTRA}"
     );
     require(extra_steps <= MOST_EXTRA, message)?;
-    let setting = Setting::new(&options.common.figure, CELLS, 1.0)?;
+    let variant = (Method::Hybrid, options.common.scheme);
+    let setting = Setting::new(&options.common.figure, &[variant], CELLS, 1.0)?;
     let (n, grid, scales) = (setting.n, setting.grid, setting.scales);
-    let operator = setting.operator((Method::Hybrid, options.common.scheme))?;
+    let operator = setting.operator(variant)?;
     let (shapes, azimuths): (Vec<_>, Vec<_>) = shapes(extra_steps)?.into_iter().unzip();
     let parameters = inpainting::parameters((n, &scales), &operator, &shapes);
     let mut session = Session::open("inpainting_3d", run, parameters)?;

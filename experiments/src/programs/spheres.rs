@@ -64,11 +64,11 @@ pub fn program(options: &Options) -> Result<()> {
     let run = &options.figure.run;
     let radii = if run.quick { &RADII[2..4] } else { &RADII };
     let willmore_steps = if run.quick { 2 } else { WILLMORE_STEPS };
-    let setting = Setting::new(&options.figure, CELLS, 1.0)?;
-    let others = json!({ "tau": TAU, "willmore_steps": willmore_steps });
     let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
     let variants: Vec<_> = schemes.map(|&scheme| (Method::Hybrid, scheme)).collect();
-    let parameters = setting.parameters(&variants, others)?;
+    let setting = Setting::new(&options.figure, &variants, CELLS, 1.0)?;
+    let others = json!({ "tau": TAU, "willmore_steps": willmore_steps });
+    let parameters = setting.parameters(others)?;
     let mut session = Session::open("spheres", run, parameters)?;
     let mut all = Vec::new();
     for &radius in radii {

@@ -65,11 +65,11 @@ pub fn program(options: &Options) -> Result<()> {
     let wanted = |family: &&Family| options.branches.iter().any(|name| name == family.name);
     let (mut families, mut about) = (Vec::new(), Vec::new());
     for family in FAMILIES.iter().filter(wanted).take(count) {
-        let setting = Setting::new(&options.figure, family.cells, SIDE)?;
+        let setting = Setting::new(&options.figure, &[ACCURATE], family.cells, SIDE)?;
         about.push(json!({ "branch": family.name, "reduced_volumes": family.reduced_volumes, "radius": family.radius, "n": setting.n }));
         families.push((family, setting));
     }
-    let parameters = (families[0].1).parameters(&[ACCURATE], json!({ "families": about }))?;
+    let parameters = (families[0].1).parameters(json!({ "families": about }))?;
     let mut session = Session::open("vesicles", run, parameters)?;
     let mut all: Vec<AtRest<3>> = Vec::new();
     for (family, setting) in &families {

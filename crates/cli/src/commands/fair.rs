@@ -16,6 +16,9 @@ const STEPS: f64 = 1.6;
 /// as long as the surface goes no further than so many, root of the mean square.
 const FARTHEST: f64 = 0.35;
 
+/// Where more than this part of the vertices is flat, edges may have been taken for noise.
+const FLAT: f64 = 0.05;
+
 impl FairOptions {
     /// Whether it ends as soon as something is reached, which must not be jumped over.
     pub fn takes_small_steps(&self) -> bool {
@@ -128,6 +131,14 @@ impl FairOptions {
                 "noise: {noise:.3e}, {:.3} % of the longest side, estimated (--noise)",
                 100.0 * noise / own.rough().bounding_box().longest_side()
             ));
+            let flat = own.rough().mesh().flat_part(noise);
+            if flat > FLAT {
+                messages.warn(&format!(
+                    "{:.0} % of the vertices lie in a plane with those around them, where noise leaves none: what was taken for noise may be the \
+                     edges of the mesh, which become round; --noise LENGTH says how much noise there is",
+                    100.0 * flat
+                ));
+            }
             self.noise = Some(noise);
         }
         let mut reader = self.flow.run.reader(messages)?;
