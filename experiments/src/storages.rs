@@ -37,7 +37,9 @@ pub struct StorageOptions {
 
 /// What was measured at one resolution with one storage.
 pub struct Measured {
+    /// Its name in metrics; that of the armadillo is that of what stands in for it, too.
     shape: &'static str,
+    title: String,
     n: usize,
     storage: Storage,
     /// Wall time of all steps, with all that the engine does between minimizations; work, memory and cells.
@@ -102,7 +104,8 @@ impl StorageOptions {
             let time = (steps.rule, if quick { 2 } else { CROSS_STEPS });
             let mut case = Case::willmore(CROSS.key, initial, operator, scales, time);
             case.steps = steps;
-            measured.push(Measured::measure(CROSS.key, n, case, session)?);
+            let names = (CROSS.key, CROSS.key.to_owned());
+            measured.push(Measured::measure(names, n, case, session)?);
         }
         let mut mesh_options = self.mesh.clone();
         mesh_options.procedural |= quick;
@@ -114,17 +117,18 @@ impl StorageOptions {
                 forget_memory();
                 let grid = centred_box(n, self.mesh.box_side(&ARMADILLO))?;
                 let mesh = mesh_options.load_or_built_in(&ARMADILLO, &grid)?;
-                let (title, eps) = (format!("armadillo, n = {n}, {storage}"), scales(n).eps);
-                let initial = session.phase(format!("{title}: signed distance"), |stage| {
-                    mesh.phase_field(grid, eps, &stage.bar)
-                })?;
+                let (title, eps) = (mesh.title.clone(), scales(n).eps);
+                let distances = format!("{title}, n = {n}, {storage}: signed distance");
+                let initial =
+                    session.phase(distances, |stage| mesh.phase_field(grid, eps, &stage.bar))?;
                 drop(mesh);
                 let rule = StepRule::Doubling(FIRST_STEP * grid.spacing().powi(4));
                 let time = (rule, if quick { 2 } else { STEPS });
                 dense_or_bricks.storage = storage;
                 let operator = dense_or_bricks.clone();
                 let case = Case::willmore("armadillo", initial, operator, scales(n), time);
-                measured.push(Measured::measure("armadillo", n, case, session)?);
+                let key = "armadillo";
+                measured.push(Measured::measure((key, title), n, case, session)?);
             }
         }
         Ok(measured)
@@ -133,7 +137,7 @@ impl StorageOptions {
 
 impl Measured {
     fn measure<const D: usize>(
-        shape: &'static str,
+        (shape, title): (&'static str, String),
         n: usize,
         mut case: Case<D>,
         session: &mut Session,
@@ -142,8 +146,8 @@ impl Measured {
         let (storage, nodes) = (case.operator.storage, case.grid().len() as f64);
         let mut run = Run::new(case, &session.device)?;
         let cells = run.stored_cells() as f64;
-        let title = format!("{shape}, n = {n}, {storage}: steps");
-        let seconds = session.phase(title, |stage| {
+        let steps = format!("{title}, n = {n}, {storage}: steps");
+        let seconds = session.phase(steps, |stage| {
             let clock = Instant::now();
             stage.finish(&mut run)?;
             Ok(clock.elapsed().as_secs_f64())
@@ -159,6 +163,7 @@ impl Measured {
         numbers.extend(memory::peak_mib().map(|peak| ("peak_mib", peak)));
         Ok(Self {
             shape,
+            title,
             n,
             storage,
             numbers,
@@ -215,7 +220,8 @@ fn figure(measured: &[Measured]) -> Figure {
     let fitted = exponent(measured, "seconds").map(|exponent| {
         format!(" On bricks seconds grow like n to the power {exponent:.2} from n = {COARSEST_FITTED} on.")
     });
-    Figure::new("The armadillo on the whole grid and on bricks", 3)
+    let title = measured.last().map_or("surface", |row| &row.title);
+    Figure::new(format!("The {title} on the whole grid and on bricks"), 3)
         .with_panel(panel("time", "all steps [s]", "seconds"))
         .with_panel(panel("memory", "largest memory [MiB]", "peak_mib"))
         .with_panel(panel("size", "stored cells", "active_cells"))
